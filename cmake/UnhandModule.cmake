@@ -1,0 +1,45 @@
+# One folder = one target unhand::<folder> = one namespace unhand::<folder>.
+#
+#   unhand_module(contact
+#     SOURCES limit_surface.cpp ...
+#     HEADERS limit_surface.hpp ...
+#     USES    dynamics              # the modules of architecture this one may include
+#     LINKS   SUNDIALS::cvode_shared)  # private third-party libraries
+function(unhand_module name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS;USES;LINKS" ${ARGN})
+  add_library(unhand_${name} ${ARG_SOURCES})
+  add_library(unhand::${name} ALIAS unhand_${name})
+  set_target_properties(unhand_${name} PROPERTIES EXPORT_NAME ${name})
+  target_compile_features(unhand_${name} PUBLIC cxx_std_20)
+  target_include_directories(unhand_${name} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:include/unhand>)
+  foreach(used IN LISTS ARG_USES)
+    target_link_libraries(unhand_${name} PUBLIC unhand::${used})
+  endforeach()
+  foreach(library IN LISTS ARG_LINKS)
+    target_link_libraries(unhand_${name} PRIVATE $<BUILD_INTERFACE:${library}>)
+    if(NOT BUILD_SHARED_LIBS)  # a static library hands what it needs to whoever links it
+      target_link_libraries(unhand_${name} INTERFACE $<INSTALL_INTERFACE:${library}>)
+    endif()
+  endforeach()
+  target_link_libraries(unhand_${name} PRIVATE $<BUILD_INTERFACE:unhand_warnings>)
+  install(TARGETS unhand_${name} EXPORT unhandTargets)
+  install(FILES ${ARG_HEADERS} DESTINATION include/unhand/${name})
+endfunction()
+
+# unhand_test(dynamics  integrator_test.cpp ... USES release)
+# makes the executable test_<name> from tests/<name>/*.cpp and registers each test case.
+function(unhand_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;USES" ${ARGN})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 300)
+  endif()
+  add_executable(test_${name} ${ARG_SOURCES})
+  foreach(used IN LISTS ARG_USES)
+    target_link_libraries(test_${name} PRIVATE unhand::${used})
+  endforeach()
+  target_link_libraries(test_${name} PRIVATE unhand_warnings GTest::gmock GTest::gtest_main)
+  target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR})
+  gtest_discover_tests(test_${name} TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60
+    PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS ${name})
+endfunction()

@@ -1,0 +1,145 @@
+// A hybrid dynamical system: modes with a flow each, guards that leave a mode, and what happens there.
+#pragma once
+
+#include <array>
+#include <limits>
+#include <string_view>
+#include <vector>
+
+#include "dynamics/scalar.hpp"
+#include "dynamics/window.hpp"
+
+namespace unhand::dynamics {
+
+template <class S, int N>
+using State = std::array<S, N>;
+
+/// What the flow of a mode asks of a stepper.
+enum class FlowKind {
+  frozen,    ///< the state does not change: y' = 0 exactly, and no stepper is needed
+  smooth,    ///< not stiff: explicit Runge-Kutta
+  stiff,     ///< fast contracting directions: an L-stable implicit stepper
+  finished,  ///< nothing is left to simulate: entering the mode ends the integration
+};
+
+/// A guard g(t, y) fires where it passes zero in this direction, once, on (t0, t1].
+enum class Crossing { rising, falling };
+
+struct Guard {
+  std::string_view name;
+  Crossing crossing{};
+};
+
+/// A mode inside a window of smooth data.
+struct Phase {
+  int mode{};
+  Window window;
+};
+
+/// Where a phase begins: the mode with its state. An entry may lie a little after the event that caused it, when the
+/// first instants are known in closed form.
+template <class S, int N>
+struct Entry {
+  int mode{};
+  S t{};
+  State<S, N> y{};
+};
+
+/// Everything the integrator knows of a system. One overload serves double and one Dual (virtual functions cannot be
+/// templates); HybridSystemFrom writes both from one template.
+template <int N>
+class HybridSystem {
+ public:
+  virtual ~HybridSystem() = default;
+
+  virtual FlowKind kind(int mode) const = 0;
+  virtual std::string_view mode_name(int mode) const = 0;
+  virtual int guard_count(int mode) const = 0;
+  virtual Guard guard(int mode, int index) const = 0;
+
+  /// Instants [s], increasing, at which data jump or kink; the integrator steps exactly to each.
+  virtual void time_events(std::vector<double>& out) const = 0;
+  virtual void time_events(std::vector<Dual>& out) const = 0;
+
+  /// dy/dt of the mode.
+  virtual void flow(const Phase&, double t, const State<double, N>& y, State<double, N>& dy) const = 0;
+  virtual void flow(const Phase&, const Dual& t, const State<Dual, N>& y, State<Dual, N>& dy) const = 0;
+
+  /// The guards of the mode, `guard_count(mode)` values of order one.
+  virtual void guards(const Phase&, double t, const State<double, N>& y, double* g) const = 0;
+  virtual void guards(const Phase&, const Dual& t, const State<Dual, N>& y, Dual* g) const = 0;
+
+  /// What happens when `guard` of `from` fires at t. The window is the one in force.
+  virtual Entry<double, N> on_guard(const Phase& from, int guard, double t, const State<double, N>& y) const = 0;
+  virtual Entry<Dual, N> on_guard(const Phase& from, int guard, const Dual& t, const State<Dual, N>& y) const = 0;
+
+  /// What happens at a time event; `window` is the one that begins there.
+  virtual Entry<double, N> on_time(int mode, const Window&, double t, const State<double, N>& y) const = 0;
+  virtual Entry<Dual, N> on_time(int mode, const Window&, const Dual& t, const State<Dual, N>& y) const = 0;
+
+  /// The state at an accumulation point of events at t. Only asked for when `has_limit` says so.
+  virtual bool has_limit(int /*mode*/, int /*guard*/) const { return false; }
+  virtual Entry<double, N> at_limit(const Phase& from, double t, const State<double, N>& y) const {
+    return {from.mode, t, y};
+  }
+  virtual Entry<Dual, N> at_limit(const Phase& from, const Dual& t, const State<Dual, N>& y) const {
+    return {from.mode, t, y};
+  }
+
+  /// An upper bound [s] on the next step, for flows that are singular at a point they approach.
+  virtual double max_step(const Phase&, double /*t*/, const State<double, N>&, const State<double, N>& /*dy*/) const {
+    return std::numeric_limits<double>::infinity();
+  }
+};
+
+/// Writes both overloads of every function from the templates flow_, guards_, on_guard_, on_time_ of Derived.
+/// `time_events_` has a default (none), as has at_limit_.
+template <class Derived, int N>
+class HybridSystemFrom : public HybridSystem<N> {
+ public:
+  void time_events(std::vector<double>& out) const override { self().time_events_(out); }
+  void time_events(std::vector<Dual>& out) const override { self().time_events_(out); }
+  void flow(const Phase& p, double t, const State<double, N>& y, State<double, N>& dy) const override {
+    self().flow_(p, t, y, dy);
+  }
+  void flow(const Phase& p, const Dual& t, const State<Dual, N>& y, State<Dual, N>& dy) const override {
+    self().flow_(p, t, y, dy);
+  }
+  void guards(const Phase& p, double t, const State<double, N>& y, double* g) const override {
+    self().guards_(p, t, y, g);
+  }
+  void guards(const Phase& p, const Dual& t, const State<Dual, N>& y, Dual* g) const override {
+    self().guards_(p, t, y, g);
+  }
+  Entry<double, N> on_guard(const Phase& p, int i, double t, const State<double, N>& y) const override {
+    return self().on_guard_(p, i, t, y);
+  }
+  Entry<Dual, N> on_guard(const Phase& p, int i, const Dual& t, const State<Dual, N>& y) const override {
+    return self().on_guard_(p, i, t, y);
+  }
+  Entry<double, N> on_time(int mode, const Window& w, double t, const State<double, N>& y) const override {
+    return self().on_time_(mode, w, t, y);
+  }
+  Entry<Dual, N> on_time(int mode, const Window& w, const Dual& t, const State<Dual, N>& y) const override {
+    return self().on_time_(mode, w, t, y);
+  }
+  Entry<double, N> at_limit(const Phase& p, double t, const State<double, N>& y) const override {
+    return self().at_limit_(p, t, y);
+  }
+  Entry<Dual, N> at_limit(const Phase& p, const Dual& t, const State<Dual, N>& y) const override {
+    return self().at_limit_(p, t, y);
+  }
+
+ protected:
+  template <class S>
+  void time_events_(std::vector<S>& out) const { out.clear(); }
+  template <class S>
+  Entry<S, N> on_time_(int mode, const Window&, const S& t, const State<S, N>& y) const { return {mode, t, y}; }
+  template <class S>
+  Entry<S, N> at_limit_(const Phase& from, const S& t, const State<S, N>& y) const { return {from.mode, t, y}; }
+
+ private:
+  const Derived& self() const { return static_cast<const Derived&>(*this); }
+};
+
+}  // namespace unhand::dynamics
