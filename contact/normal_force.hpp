@@ -1,6 +1,9 @@
-// The normal force of one pad while the gripper opens: a profile, or a measured series smoothed with its noise known.
+// The normal force of one pad while the gripper opens: a profile, or a measured series smoothed with its
+// noise known.
 #pragma once
 
+#include <cmath>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -19,8 +22,152 @@ class NormalForce {
   virtual ~NormalForce() = default;
   virtual double at(const Window&, double t) const = 0;
   virtual Dual at(const Window&, const Dual& t) const = 0;
-  /// Instants [s], increasing, at which f_N or its slope jumps; the last is the release, if there is one.
-  virtual std::vector<double> kinks() const = 0;
+  /// Appends the instants [s], increasing, at which f_N or its slope jumps; the last is the release, if there
+  /// is one. As Dual they carry the derivatives with respect to the parameters of the force.
+  virtual void kinks(std::vector<double>& out) const = 0;
+  virtual void kinks(std::vector<Dual>& out) const = 0;
+  std::vector<double> kinks() const {
+    std::vector<double> out;
+    kinks(out);
+    return out;
+  }
   /// Start of the final interval with f_N = 0 [s]; +infinity when the pads never part.
   virtual double release_time() const = 0;
 };
+
+/// Parameters of the opening profile; S is double, or Dual to differentiate with respect to them.
+template <class S>
+struct OpeningProfile {
+  double open_command{};  ///< t_open, when the gripper is told to open [s]
+  S grip_force{};         ///< f₀ > 0 [N]
+  S dead_time{0.0};       ///< δ >= 0, from the command to the first change of the force [s]
+  S opening_time{0.05};   ///< T > 0, from the first change to zero [s]
+  S shape{1.0};           ///< p > 0; 1 is a linear ramp [-]
+};
+
+/// s = (t − t_open − δ)/T;  f_N = f₀ for s <= 0,  f₀ (1 − s)^p for 0 < s < 1,  0 for s >= 1.
+///
+/// The branch is that of the window: inside a window that ends at a kink the limit from the left holds. For p
+/// < 1 the slope is unbounded at s → 1: the value is exact up to the end, the derivatives are those at 1 − s
+/// = 1e-9.
+template <class S>
+S opening_profile(const OpeningProfile<S>& q, const Window& window, const S& t) {
+  using dynamics::value_of;
+  using std::pow;
+  const double start = q.open_command + value_of(q.dead_time), span = value_of(q.opening_time);
+  // a point well inside the window decides for the branch at its limits
+  const double snap = std::min(1e-9, 0.25 * (window.end - window.begin));
+  const double at = std::min(std::max(value_of(t), window.begin + snap), window.end - snap);
+  if (at <= start) return q.grip_force;
+  if (at >= start + span) return S(0.0);
+  const S rest = 1.0 - (t - q.open_command - q.dead_time) / q.opening_time;
+  const double least = std::min(value_of(rest), 1.0), p = value_of(q.shape), f0 = value_of(q.grip_force);
+  if (least <= 0.0) return S(0.0);
+  const double clamped = std::max(least, 1e-9);
+  if constexpr (std::is_same_v<S, double>) {
+    return f0 * pow(least, p);
+  } else {
+    const double power = pow(clamped, p);
+    return S(f0 * pow(least, p), power * q.grip_force.v + f0 * p * power / clamped * rest.v +
+                                     f0 * power * std::log(clamped) * q.shape.v);
+  }
+}
+
+/// The normal force of an OpeningProfile.
+class ProfileNormalForce final : public NormalForce {
+ public:
+  /// Throws std::invalid_argument, naming parameter, value and range.
+  explicit ProfileNormalForce(const OpeningProfile<Dual>& profile);
+  explicit ProfileNormalForce(const OpeningProfile<double>& profile);
+
+  double at(const Window& window, double t) const override { return opening_profile(values_, window, t); }
+  Dual at(const Window& window, const Dual& t) const override { return opening_profile(profile_, window, t); }
+  using NormalForce::kinks;
+  void kinks(std::vector<double>& out) const override;
+  void kinks(std::vector<Dual>& out) const override;
+  double release_time() const override;
+  const OpeningProfile<Dual>& profile() const { return profile_; }
+
+ private:
+  OpeningProfile<Dual> profile_;
+  OpeningProfile<double> values_;
+};
+
+/// A smoothed measured series: cubic pieces, >= 0 everywhere, exactly 0 from the release on.
+class SampledNormalForce final : public NormalForce {
+ public:
+  using Polynomial = dynamics::PiecewisePolynomial<1, 3>;
+
+  /// `kinks` [s], increasing: the breaks of `force` [N] at which the force or its slope jumps. `release` [s]
+  /// is the last of them, or +infinity. Values below zero are cut off at zero.
+  SampledNormalForce(Polynomial force, std::vector<double> kinks, double release);
+
+  double at(const Window& window, double t) const override {
+    return std::max(0.0, force_.value(window, t)[0]);
+  }
+  Dual at(const Window& window, const Dual& t) const override {
+    const Dual f = force_.value(window, t)[0];
+    return f.a > 0.0 ? f : Dual(0.0);
+  }
+  using NormalForce::kinks;
+  void kinks(std::vector<double>& out) const override;
+  void kinks(std::vector<Dual>& out) const override;
+  double release_time() const override { return release_; }
+  const Polynomial& force() const { return force_; }
+
+ private:
+  Polynomial force_;
+  std::vector<double> kinks_;
+  double release_;
+};
+
+struct NormalForceOptions {
+  /// χ² per degree of freedom up to which the residual counts as noise, beside its own statistical scatter.
+  double chi2_target = 1.1;
+  /// Fewest samples in a knot interval.
+  int min_samples_per_interval = 3;
+  /// The largest plateau after the opening that still counts as zero, as a fraction of the grip force. A
+  /// larger one means that the pad still presses, and there is no release.
+  double max_tail_bias = 0.05;
+};
+
+/// What the smoothing found.
+struct NormalForceSummary {
+  double sigma{};         ///< noise used [N]
+  double chi2_per_dof{};  ///< of the smoothed force against the series before the release
+  double max_whitened_residual{};
+  int knots{};          ///< breaks strictly between the first sample and the release
+  double grip_force{};  ///< at the start of the opening [N]
+  double opening_start{
+      std::numeric_limits<double>::quiet_NaN()};           ///< first change of the force [s]; NaN: none
+  double shape{std::numeric_limits<double>::quiet_NaN()};  ///< exponent p of the ramp's end; NaN: no ramp
+  double release_time{std::numeric_limits<double>::infinity()};    ///< s
+  double release_sigma{std::numeric_limits<double>::quiet_NaN()};  ///< its 1-σ uncertainty from the noise [s]
+  double tail_mean{};  ///< mean of the series after the release [N]: the sensor's bias, if it has one
+  double tail_mean_sigma{std::numeric_limits<double>::infinity()};  ///< [N]; infinite without samples there
+};
+
+struct NormalForceFit {
+  SampledNormalForce force;
+  NormalForceSummary summary;
+};
+
+/// Smooths a measured normal force [N] at `time` [s]; `sigma` is its declared noise [N] (0 or NaN: estimated
+/// from the series' own scatter).
+///
+/// The series is taken as a slowly varying grip, one opening ramp that starts with a kink and falls like (1 −
+/// s)^p, and a tail. Start, end and p are found by least squares together with the tail's level, so the
+/// release is known to well below a sample; the force itself is then a cubic spline with a kink at the start,
+/// zero at the release.
+///
+/// A sensor bias shows as a tail that is not zero. The force is **not** shifted by it: the release is where
+/// the ramp meets the tail's plateau, the spline is pulled to zero there, and `tail_mean` reports the bias. A
+/// plateau higher than `max_tail_bias` of the grip force is contact, not bias: release_time is +infinity
+/// then, as it is when the series ends before the force does.
+///
+/// Throws std::invalid_argument for fewer than four samples, sizes that differ, times that do not increase or
+/// a value that is not finite.
+NormalForceFit smooth_normal_force(std::span<const double> time, std::span<const double> value, double sigma,
+                                   const NormalForceOptions& options = {});
+
+}  // namespace unhand::contact

@@ -36,13 +36,14 @@ struct Phase {
   Window window;
 };
 
-/// Where a phase begins: the mode with its state. An entry may lie a little after the event that caused it, when the
-/// first instants are known in closed form.
+/// Where a phase begins: the mode with its state at t. Where the first instants after an event are known in closed
+/// form, t lies `lead` after the event.
 template <class S, int N>
 struct Entry {
   int mode{};
   S t{};
   State<S, N> y{};
+  S lead{};
 };
 
 /// Everything the integrator knows of a system. One overload serves double and one Dual (virtual functions cannot be
@@ -80,14 +81,14 @@ class HybridSystem {
   /// The state at an accumulation point of events at t. Only asked for when `has_limit` says so.
   virtual bool has_limit(int /*mode*/, int /*guard*/) const { return false; }
   virtual Entry<double, N> at_limit(const Phase& from, double t, const State<double, N>& y) const {
-    return {from.mode, t, y};
+    return {from.mode, t, y, 0.0};
   }
   virtual Entry<Dual, N> at_limit(const Phase& from, const Dual& t, const State<Dual, N>& y) const {
-    return {from.mode, t, y};
+    return {from.mode, t, y, Dual(0.0)};
   }
 
   /// An upper bound [s] on the next step, for flows that are singular at a point they approach.
-  virtual double max_step(const Phase&, double /*t*/, const State<double, N>&, const State<double, N>& /*dy*/) const {
+  virtual double max_step(const Phase&, double /*t*/, const State<double, N>& /*y*/) const {
     return std::numeric_limits<double>::infinity();
   }
 };
@@ -134,9 +135,9 @@ class HybridSystemFrom : public HybridSystem<N> {
   template <class S>
   void time_events_(std::vector<S>& out) const { out.clear(); }
   template <class S>
-  Entry<S, N> on_time_(int mode, const Window&, const S& t, const State<S, N>& y) const { return {mode, t, y}; }
+  Entry<S, N> on_time_(int mode, const Window&, const S& t, const State<S, N>& y) const { return {mode, t, y, S(0)}; }
   template <class S>
-  Entry<S, N> at_limit_(const Phase& from, const S& t, const State<S, N>& y) const { return {from.mode, t, y}; }
+  Entry<S, N> at_limit_(const Phase& from, const S& t, const State<S, N>& y) const { return {from.mode, t, y, S(0)}; }
 
  private:
   const Derived& self() const { return static_cast<const Derived&>(*this); }

@@ -1,0 +1,80 @@
+// The event-detected integrator of hybrid systems.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "dynamics/hybrid_system.hpp"
+#include "dynamics/stepper.hpp"
+#include "dynamics/trajectory.hpp"
+
+namespace unhand::dynamics {
+
+struct IntegratorOptions {
+  Method method{Method::automatic};
+  Tolerances tolerances;
+  /// Longest step [s]; guards are sampled at thirds of a step and through the cubic in between, so two roots closer
+  /// than about a ninth of this may be missed.
+  double longest_step{5e-3};
+  long step_budget{200'000};
+  int event_budget{10'000};
+  int events_per_instant{24};  ///< mode changes without time passing, before the answer is `mode_cycle`
+  /// Events accumulate at t∞: jump there when what is left of the state's change is below this (SI units).
+  double zeno_tolerance{1e-7};
+  bool record{false};  ///< keep the trajectory
+};
+
+/// How an integration ended. Only the first two are answers; the rest say why there is none.
+enum class Outcome {
+  finished,            ///< a mode of kind `finished` was entered
+  horizon,             ///< t_end was reached
+  zeno,                ///< events accumulate at the returned time and the system knows no state there
+  event_budget_spent,
+  step_budget_spent,
+  mode_cycle,          ///< no mode is consistent at the returned instant
+  step_too_small,
+  not_finite,          ///< a flow or a guard returned NaN or infinity
+};
+const char* to_string(Outcome);
+
+enum class EventKind { guard, time, limit };
+
+/// One entry of the event log: what fired, when, and the mode and state right after.
+template <class S, int N>
+struct Event {
+  EventKind kind{};
+  int index{};  ///< the guard's or time event's index in the mode left
+  int mode_before{}, mode_after{};
+  S t{};
+  State<S, N> y{};
+};
+
+struct IntegratorStatistics {
+  long steps{}, rejected_steps{}, flow_evaluations{};
+  int grazings{};  ///< guards that came within tolerance of zero without passing it: derivatives there are one-sided
+};
+
+template <class S, int N>
+struct Solution {
+  Outcome outcome{};
+  int mode{};
+  S t{};
+  State<S, N> y{};
+  std::vector<Event<S, N>> events;
+  Trajectory<S, N> trajectory;  ///< empty unless options.record
+  IntegratorStatistics statistics;
+};
+
+/// Integrates from `start` to `t_end` [s] or to a finished mode.
+///
+/// Events fire once, on (t0, t1], at the earliest root; roots found on the dense output are polished with true steps.
+/// Guards that fire together are handled in the order of their indices, each transition deciding anew. A guard that is
+/// at zero when a phase begins is armed once it has been seen on its safe side. Time events are stepped to exactly.
+/// Instantiated for N = 2, 6, 7 with double and Dual. Throws std::invalid_argument when `start` is not finite, t_end
+/// lies before it, or derivatives are asked of a method that has none.
+template <class S, int N>
+Solution<S, N> integrate(const HybridSystem<N>& system, const Entry<S, N>& start, const S& t_end,
+                         const IntegratorOptions& options = {});
+
+}  // namespace unhand::dynamics

@@ -1,0 +1,165 @@
+// One interface for every way of advancing a smooth flow.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "dynamics/hybrid_system.hpp"
+
+namespace unhand::dynamics {
+
+/// Local error per step is kept below absolute + relative·|y_i| in every component (root mean square over them), in
+/// the SI units of the state.
+struct Tolerances {
+  double relative{1e-8};
+  double absolute{1e-10};
+};
+
+enum class StepStatus {
+  accepted,
+  too_small,   ///< the error cannot be met above the spacing of representable times
+  not_finite,  ///< the flow returned NaN or infinity however short the step
+};
+
+/// Advances one phase. `start` fixes where; each `step` replaces the last accepted step [t0, t1] by the next one.
+/// With S = Dual, the values choose the step and the derivatives are those of the discrete solution, exactly.
+template <class S, int N>
+class Stepper {
+ public:
+  virtual ~Stepper() = default;
+
+  /// Begins at (t, y). Step-size memory is kept: the next step starts from the length of the last one.
+  virtual void start(const HybridSystem<N>& system, const Phase& phase, const S& t, const State<S, N>& y) = 0;
+
+  /// One error-controlled step of at most `longest` [s], ending exactly at `limit` if it gets there.
+  virtual StepStatus step(const S& limit, double longest) = 0;
+
+  /// The state at t0 + θ (t1 − t0) from the dense output of the last step, 0 <= θ <= 1.
+  virtual void interpolate(double theta, State<S, N>& y) const = 0;
+
+  /// The last step taken again with the length h <= t1 − t0, without the dense output's error: what event times are
+  /// polished with.
+  virtual void retake(double h, State<S, N>& y) = 0;
+
+  const S& t0() const { return t0_; }
+  const S& t1() const { return t1_; }
+  const State<S, N>& y0() const { return y0_; }
+  const State<S, N>& y1() const { return y1_; }
+
+  long flow_evaluations() const { return flow_evaluations_; }
+  long rejected_steps() const { return rejected_; }
+
+ protected:
+  S t0_{}, t1_{};
+  State<S, N> y0_{}, y1_{};
+  long flow_evaluations_{};
+  long rejected_{};
+};
+
+/// Root mean square of e_i / (absolute + relative max(|y0_i|, |y1_i|)); NaN if anything is.
+template <class S, int N>
+double error_norm(const State<S, N>& error, const State<S, N>& y0, const State<S, N>& y1, const Tolerances& tol) {
+  double sum = 0;
+  for (int i = 0; i < N; ++i) {
+    const double scale =
+        tol.absolute + tol.relative * std::max(std::abs(value_of(y0[i])), std::abs(value_of(y1[i])));
+    const double e = value_of(error[i]) / scale;
+    sum += e * e;
+  }
+  return std::sqrt(sum / N);
+}
+
+/// The shortest step [s] that still moves t.
+inline double shortest_step(double t) { return 16 * std::numeric_limits<double>::epsilon() * std::max(std::abs(t), 1e-9); }
+
+/// A first step length from the sizes of the state and its rate ([HairerNorsettWanner1993] II.4, without the
+/// trial step: error control corrects a poor guess at the price of one rejection).
+template <class S, int N>
+double first_step(const State<S, N>& y, const State<S, N>& dy, const Tolerances& tol) {
+  const State<S, N> zero{};
+  const double d0 = error_norm<S, N>(y, y, zero, tol), d1 = error_norm<S, N>(dy, y, zero, tol);
+  if (!(d0 > 1e-5) || !(d1 > 1e-5)) return 1e-6;
+  return 0.01 * d0 / d1;
+}
+
+/// The step controller that all single-step methods share: h_next = h · clamp(0.9 err^(−1/order), 0.2, 5).
+inline double step_factor(double error, double order) {
+  if (error <= 1e-30) return 5.0;
+  return std::clamp(0.9 * std::pow(error, -1.0 / order), 0.2, 5.0);
+}
+
+/// The error-controlled step of a single-step method. Derived supplies
+///   double attempt(const S& h)   takes y0_ at t0_ to y1_ and returns the error norm (NaN if not finite),
+///   kOrder                       the exponent's order,
+///   void prepare(bool retry)     what a new start point needs (once a step).
+template <class Derived, class S, int N>
+class SingleStep : public Stepper<S, N> {
+ public:
+  explicit SingleStep(const Tolerances& tolerances) : tolerances_(tolerances) {}
+
+  void start(const HybridSystem<N>& system, const Phase& phase, const S& t, const State<S, N>& y) override {
+    system_ = &system;
+    phase_ = phase;
+    this->t1_ = t;
+    this->y1_ = y;
+    fresh_ = true;
+  }
+
+  StepStatus step(const S& limit, double longest) override {
+    this->t0_ = this->t1_;
+    this->y0_ = this->y1_;
+    self().prepare(fresh_);
+    if (fresh_ && !(h_next_ > 0)) h_next_ = self().guess();
+    fresh_ = false;
+    const double t = value_of(this->t0_);
+    const double left = value_of(limit) - t;
+    double h = std::min(h_next_, longest);
+    for (bool rejected = false;; rejected = true) {
+      // Land on the limit rather than leave a sliver before it.
+      const bool last = h >= left * (1 - 1e-10);
+      if (!last && h > 0.5 * left) h = 0.5 * left;
+      const S length = last ? S(limit - this->t0_) : S(h);
+      const double error = self().attempt(length);
+      if (error <= 1.0) {
+        this->t1_ = last ? limit : S(this->t0_ + length);
+        const double factor = step_factor(error, Derived::kOrder);
+        const double taken = value_of(length);
+        const double next = taken * (rejected ? std::min(factor, 1.0) : factor);
+        // A step cut short by a limit says little about what the next one may be.
+        h_next_ = (last || h >= longest) ? std::max(next, std::min(h_next_, taken * 5)) : next;
+        return StepStatus::accepted;
+      }
+      ++this->rejected_;
+      const bool finite = std::isfinite(error);
+      h = value_of(length) * (finite ? std::min(step_factor(error, Derived::kOrder), 0.9) : 0.1);
+      if (h < shortest_step(t)) return finite ? StepStatus::too_small : StepStatus::not_finite;
+    }
+  }
+
+ protected:
+  void flow(const S& t, const State<S, N>& y, State<S, N>& dy) {
+    ++this->flow_evaluations_;
+    system_->flow(phase_, t, y, dy);
+  }
+
+  const HybridSystem<N>* system_{};
+  Phase phase_;
+  Tolerances tolerances_;
+  double h_next_{};
+  bool fresh_{true};
+
+ private:
+  Derived& self() { return static_cast<Derived&>(*this); }
+};
+
+/// The ways of stepping a flow; `automatic` takes dormand_prince for smooth modes and, for stiff ones, rosenbrock
+/// with double and sdirk with Dual.
+enum class Method { automatic, dormand_prince, rosenbrock, sdirk, cvode };
+
+/// CVODE (SUNDIALS) behind the same interface: Adams for smooth, BDF with the exact Jacobian for stiff modes. It is
+/// the oracle of the other steppers; double only.
+template <int N>
+std::unique_ptr<Stepper<double, N>> make_cvode_stepper(const Tolerances&, FlowKind);
+
+}  // namespace unhand::dynamics
