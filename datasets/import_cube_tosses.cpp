@@ -1,0 +1,217 @@
+#include "datasets/import_cube_tosses.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <set>
+#include <stdexcept>
+#include <string_view>
+
+#include "datasets/channel_rules.hpp"
+#include "datasets/channel_table.hpp"
+
+namespace unhand::datasets {
+namespace {
+
+constexpr std::string_view header =
+    "toss,k,t_s,x_m,y_m,z_m,qw,qx,qy,qz,vx,vy,vz,wx_body,wy_body,wz_body,before_first_contact";
+constexpr std::size_t n_columns = 17;
+constexpr double norm_tolerance = 1e-3;  // six printed decimals leave 1e-6
+
+struct Row {
+  int toss = 0, k = 0, line = 0;
+  bool before_contact = false;
+  double t = 0;
+  std::array<double, 7> pose{};
+};
+
+struct Toss {
+  std::vector<Row> rows;
+  std::size_t flight = 0;  // samples before the first contact
+};
+
+/// One line of the CSV, with the place of everything in it.
+class Line {
+ public:
+  Line(const std::string& file, int number, std::string_view text)
+      : file_(file), number_(number), rest_(text) {}
+
+  [[noreturn]] void fail(std::string_view column, const std::string& why) const {
+    throw ImportError(
+        file_,
+        column.empty() ? fmt::format("line {}", number_) : fmt::format("line {}, column {}", number_, column),
+        why);
+  }
+
+  template <class Number>
+  Number next(std::string_view column) {
+    std::string_view part = next_part(rest_);
+    while (!part.empty() && part.front() == ' ') part.remove_prefix(1);
+    while (!part.empty() && part.back() == ' ') part.remove_suffix(1);
+    Number value{};
+    const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
+    if (error != std::errc{} || end != part.data() + part.size()) {
+      fail(column,
+           fmt::format("'{}' is not {}", part, std::is_integral_v<Number> ? "an integer" : "a number"));
+    }
+    if constexpr (!std::is_integral_v<Number>) {
+      if (!std::isfinite(value)) fail(column, fmt::format("{} is not finite", value));
+    }
+    return value;
+  }
+
+ private:
+  const std::string& file_;
+  int number_;
+  std::string_view rest_;
+};
+
+Row parse_row(const std::string& file, int number, std::string_view text) {
+  Line line(file, number, text);
+  const auto found = static_cast<std::size_t>(std::count(text.begin(), text.end(), ',')) + 1;
+  if (found != n_columns) line.fail("", fmt::format("{} values, expected {}", found, n_columns));
+  Row row;
+  row.line = number;
+  row.toss = line.next<int>("toss");
+  row.k = line.next<int>("k");
+  row.t = line.next<double>("t_s");
+  for (std::size_t j = 0; j < 7; ++j) row.pose[j] = line.next<double>(part_of(header, 3 + j));
+  for (std::size_t j = 10; j < 16; ++j) line.next<double>(part_of(header, j));
+  const int flag = line.next<int>("before_first_contact");
+  if (flag != 0 && flag != 1) line.fail("before_first_contact", fmt::format("{} is not 0 or 1", flag));
+  row.before_contact = flag == 1;
+  if (row.toss < 0) line.fail("toss", fmt::format("{} is negative", row.toss));
+  double norm = 0;
+  for (std::size_t j = 3; j < 7; ++j) norm += row.pose[j] * row.pose[j];
+  norm = std::sqrt(norm);
+  if (std::abs(norm - 1) > norm_tolerance)
+    line.fail("qw", fmt::format("quaternion of norm {:.6g}, expected 1", norm));
+  return row;
+}
+
+/// The rows of one toss follow one another in the file: samples counted from 0, time rising, flag falling
+/// once.
+void append(const std::string& file, std::vector<Toss>& tosses, std::set<int>& seen, const Row& row) {
+  const Line line(file, row.line, {});
+  if (tosses.empty() || tosses.back().rows.back().toss != row.toss) {
+    if (!seen.insert(row.toss).second)
+      line.fail("toss", fmt::format("toss {} appears in two places", row.toss));
+    if (row.k != 0) line.fail("k", fmt::format("a toss starts at sample {}, expected 0", row.k));
+    tosses.emplace_back();
+  } else {
+    const Row& last = tosses.back().rows.back();
+    if (row.k != last.k + 1) line.fail("k", fmt::format("sample {} after {}", row.k, last.k));
+    if (row.t <= last.t)
+      line.fail("t_s", fmt::format("time is not strictly increasing: {} after {}", row.t, last.t));
+    if (row.before_contact && !last.before_contact)
+      line.fail("before_first_contact", "back to 1 after contact");
+  }
+  tosses.back().rows.push_back(row);
+  tosses.back().flight += row.before_contact;
+}
+
+std::vector<Toss> read_tosses(const std::filesystem::path& csv, int& rows) {
+  const std::string file = csv.string();
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(csv, error)) throw ImportError(file, "line 0", "no such file");
+  std::ifstream in(csv, std::ios::binary);
+  std::vector<Toss> tosses;
+  std::set<int> seen;
+  std::string text;
+  for (int number = 1; std::getline(in, text); ++number) {
+    if (text.ends_with('\r')) text.pop_back();
+    if (number == 1) {
+      if (text != header)
+        throw ImportError(file, "line 1", fmt::format("the header is missing, expected '{}'", header));
+    } else if (!text.empty()) {
+      append(file, tosses, seen, parse_row(file, number, text));
+      ++rows;
+    }
+  }
+  if (in.bad()) throw ImportError(file, "line 0", "cannot be read");
+  if (tosses.empty()) throw ImportError(file, "line 1", "holds no tosses");
+  return tosses;
+}
+
+Throw make_throw(const Toss& toss, const CubeTossOptions& options) {
+  const std::size_t n = toss.rows.size();
+  Throw out;
+  out.repetition = toss.rows.front().toss;
+  out.id = fmt::format("toss-{:04}", out.repetition);
+  out.object = "cube";
+  out.condition = "toss";
+  out.split = out.repetition % options.test_every == options.test_every - 1 ? Split::test : Split::train;
+  MocapLog& mocap = out.mocap.emplace();
+  const double p = options.sigma_position, q = options.sigma_quaternion;
+  mocap.time = {n, 1, {}, {}};
+  mocap.pose = {n, 7, {}, {p, p, p, q, q, q, q}};
+  const double start = toss.rows.front().t;
+  for (const Row& row : toss.rows) {
+    mocap.time.data.push_back(row.t - start);
+    mocap.pose.data.insert(mocap.pose.data.end(), row.pose.begin(), row.pose.end());
+  }
+  normalise_quaternions(mocap.pose, {});
+  out.free_flight = {mocap.time(0), mocap.time(toss.flight - 1)};
+  return out;
+}
+
+void check_options(const CubeTossOptions& options) {
+  if (options.min_samples < 2) {
+    throw std::invalid_argument(fmt::format("min_samples: {} is not >= 2", options.min_samples));
+  }
+  if (options.test_every < 2)
+    throw std::invalid_argument(fmt::format("test_every: {} is not >= 2", options.test_every));
+}
+
+}  // namespace
+
+ThrowLog import_cube_tosses(const std::filesystem::path& csv, const CubeTossOptions& options,
+                            ImportReport* report) {
+  check_options(options);
+  ImportReport counts;
+  const std::vector<Toss> tosses = read_tosses(csv, counts.rows);
+  counts.tosses = static_cast<int>(tosses.size());
+
+  ThrowLog log;
+  log.dimension = 3;
+  log.title = "cube tosses";
+  log.source =
+      "measured: DAIRLab contact-nets (Pfrommer, Halm, Posa, CoRL 2020); mass, side and inertia as "
+      "published; sigma "
+      "estimated by the importer from the scatter about a smooth flight, not stated by the source";
+  log.licence = "BSD-3-Clause";
+  log.gravity = options.gravity;
+  log.landing_height = std::sqrt(3.0) / 2 * options.side;
+  Object cube;
+  cube.mass = options.mass;
+  cube.inertia = std::vector<double>(options.inertia.begin(), options.inertia.end());
+  cube.dims = {options.side, options.side, options.side};
+  log.objects.emplace("cube", cube);
+
+  for (const Toss& toss : tosses) {
+    const int number = toss.rows.front().toss;
+    if (toss.flight < static_cast<std::size_t>(options.min_samples)) {
+      counts.dropped.push_back(
+          {number, static_cast<int>(toss.flight),
+           fmt::format("{} samples before contact, fewer than {}", toss.flight, options.min_samples)});
+      continue;
+    }
+    log.throws.push_back(make_throw(toss, options));
+    ++(log.throws.back().split == Split::train ? counts.train : counts.test);
+  }
+  counts.kept = static_cast<int>(log.throws.size());
+  if (log.throws.empty()) {
+    throw ImportError(
+        csv.string(), "line 1",
+        fmt::format("none of {} tosses has {} samples before contact", counts.tosses, options.min_samples));
+  }
+  std::sort(log.throws.begin(), log.throws.end(), [](const Throw& a, const Throw& b) { return a.id < b.id; });
+  validate(log, csv.string());
+  if (report != nullptr) *report = std::move(counts);
+  return log;
+}
+
+}  // namespace unhand::datasets

@@ -1,0 +1,50 @@
+// Importer: the measured cube tosses of Pfrommer, Halm and Posa (CoRL 2020), as one CSV in SI units.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "datasets/throw_log.hpp"
+
+namespace unhand::datasets {
+
+/// What the CSV does not say. Mass, side and inertia are as published with the data set (0.37 kg, 0.1048 m,
+/// 0.00081 kg m²; a uniform cube of that mass and side would have m s²/6 = 0.00068 kg m²). Gravity is
+/// declared, not measured. The landing height is the half diagonal of the cube, √3 s/2 = 0.0908 m: above that
+/// plane no orientation can touch the table; what a throw is compared over is `free_flight`, which may end a
+/// little above or below it.
+///
+/// The noise is declared by this importer, since the source names none: the scatter about a parabola per toss
+/// and axis before contact is 0.03 mm (pooled over the tosses), that of a quaternion's components 2e-4 about
+/// a smooth curve. These are the fast, independent part only: scale and alignment errors of the tracker are
+/// not in them.
+struct CubeTossOptions {
+  double mass = 0.37, side = 0.1048;                         // [kg], [m]
+  std::array<double, 3> inertia{0.00081, 0.00081, 0.00081};  // [kg m²]
+  double gravity = 9.81;                                     // [m/s²]
+  double sigma_position = 3e-5;                              // [m]
+  double sigma_quaternion = 2e-4;                            // [1]
+  int min_samples = 8;  // before the first contact; fewer do not pin down a flight
+  int test_every = 5;   // toss numbers n with n % test_every == test_every − 1 are held out: 4 to 1
+};
+
+struct DroppedToss {
+  int toss = 0, samples = 0;
+  std::string reason;
+};
+
+struct ImportReport {
+  int rows = 0, tosses = 0, kept = 0, train = 0, test = 0;
+  std::vector<DroppedToss> dropped;
+};
+
+/// A spatial log with one object, "cube", and one throw per kept toss: id "toss-0042", condition "toss",
+/// repetition = the toss number, the whole series as mocap pose (K,7), and `free_flight` from the first
+/// sample to the last one before contact. Quaternions are normalised. The velocities in the file are derived
+/// from the poses and are not kept. Throws ImportError naming file, line and column.
+ThrowLog import_cube_tosses(const std::filesystem::path& csv, const CubeTossOptions& options = {},
+                            ImportReport* report = nullptr);
+
+}  // namespace unhand::datasets

@@ -1,0 +1,56 @@
+#include "datasets/near_miss.hpp"
+
+#include <algorithm>
+#include <vector>
+
+namespace unhand::datasets {
+namespace {
+
+char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+}  // namespace
+
+int edit_distance(std::string_view a, std::string_view b) {
+  const std::size_t n = a.size(), m = b.size();
+  std::vector<int> before(m + 1), last(m + 1), now(m + 1);
+  for (std::size_t j = 0; j <= m; ++j) last[j] = static_cast<int>(j);
+  for (std::size_t i = 1; i <= n; ++i) {
+    now[0] = static_cast<int>(i);
+    for (std::size_t j = 1; j <= m; ++j) {
+      const bool same = lower(a[i - 1]) == lower(b[j - 1]);
+      now[j] = std::min({last[j] + 1, now[j - 1] + 1, last[j - 1] + (same ? 0 : 1)});
+      const bool swapped =
+          i > 1 && j > 1 && lower(a[i - 1]) == lower(b[j - 2]) && lower(a[i - 2]) == lower(b[j - 1]);
+      if (swapped) now[j] = std::min(now[j], before[j - 2] + 1);
+    }
+    before.swap(last);
+    last.swap(now);
+  }
+  return last[m];
+}
+
+bool is_near_miss(std::string_view name, std::string_view known) {
+  if (name == known || name.size() > known.size() + 2) return false;  // also keeps absurdly long names cheap
+  const int distance = edit_distance(name, known);
+  if (known.size() <= 3) {
+    const auto equal = [](char a, char b) { return lower(a) == lower(b); };
+    return distance <= 1 && std::is_permutation(name.begin(), name.end(), known.begin(), known.end(), equal);
+  }
+  return distance <= (known.size() <= 5 ? 1 : 2);
+}
+
+std::string_view nearest_name(std::string_view name, std::span<const std::string_view> known) {
+  std::string_view best;
+  int best_distance = 3;
+  for (const std::string_view candidate : known) {
+    if (!is_near_miss(name, candidate)) continue;
+    const int distance = edit_distance(name, candidate);
+    if (distance < best_distance) {
+      best = candidate;
+      best_distance = distance;
+    }
+  }
+  return best;
+}
+
+}  // namespace unhand::datasets

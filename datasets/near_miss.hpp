@@ -1,0 +1,20 @@
+// Is an unknown name a known one, misspelt?
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace unhand::datasets {
+
+/// Edit distance in which swapping two neighbours is one step (optimal string alignment); case is ignored.
+int edit_distance(std::string_view a, std::string_view b);
+
+/// True when `name` is plausibly `known` misspelt: one step for names up to five letters (for names up to
+/// three only a swap or another case), two for longer ones.
+bool is_near_miss(std::string_view name, std::string_view known);
+
+/// The nearest of `known` that `name` misses, or nothing.
+std::string_view nearest_name(std::string_view name, std::span<const std::string_view> known);
+
+}  // namespace unhand::datasets

@@ -1,0 +1,26 @@
+// A table of samples in SI base units, one row per sample.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace unhand::datasets {
+
+/// rows × cols numbers, row after row. An empty series (no rows) is one that was not recorded.
+/// sigma: the declared 1-σ noise of each column, in the column's unit; empty where none was declared.
+struct Series {
+  std::size_t rows = 0, cols = 1;
+  std::vector<double> data;
+  std::vector<double> sigma;
+
+  bool empty() const { return rows == 0; }
+  double operator()(std::size_t i, std::size_t j = 0) const { return data[i * cols + j]; }
+  double& operator()(std::size_t i, std::size_t j = 0) { return data[i * cols + j]; }
+  bool operator==(const Series&) const = default;
+};
+
+/// One flag per sample, 0 or 1.
+using Flags = std::vector<std::uint8_t>;
+
+}  // namespace unhand::datasets

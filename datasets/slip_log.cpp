@@ -1,0 +1,103 @@
+#include "datasets/slip_log.hpp"
+
+#include <array>
+#include <set>
+
+#include "datasets/channel_rules.hpp"
+#include "datasets/hdf5_reader.hpp"
+#include "datasets/hdf5_writer.hpp"
+
+namespace unhand::datasets {
+namespace {
+
+constexpr int slip_log_version = 1;
+constexpr int dimension = 2;
+
+constexpr std::array<ColumnLayout, 1> time_columns{{{"t", "s"}}};
+constexpr std::array<ColumnLayout, 1> wrench_columns{{{"fx,fy,tau", "N,N,N m"}}};
+constexpr std::array<ColumnLayout, 1> twist_columns{{{"vx,vy,omega", "m/s,m/s,rad/s"}}};
+
+constexpr Channel<Slip> table[] = {
+    {"", "time", ChannelKind::time, true, false, time_columns, {}, slot_of<&Slip::time, Slip>},
+    {"", "wrench", ChannelKind::real, true, false, wrench_columns, {}, slot_of<&Slip::wrench, Slip>},
+    {"", "twist", ChannelKind::real, true, false, twist_columns, {}, slot_of<&Slip::twist, Slip>},
+};
+const std::span<const Channel<Slip>> channels{table};
+constexpr std::string_view surface_attributes[] = {"mass", "characteristic_length", "description", "licence"};
+constexpr std::string_view slip_attributes[] = {"split"};
+
+template <class Visitor, class Patch>
+void surface_fields(Visitor&& visit, Patch& surface) {
+  visit("mass", surface.mass, positive);
+  visit("characteristic_length", surface.characteristic_length, positive);
+  visit("description", surface.description);
+  visit("licence", surface.licence);
+}
+
+}  // namespace
+
+void validate(const SlipLog& log, const std::string& file) {
+  if (log.surfaces.empty()) fail_at(file, "/surfaces", "is empty: at least one surface is needed");
+  for (const auto& [name, surface] : log.surfaces) {
+    check_name(file, "/surfaces", name);
+    const std::string path = "/surfaces/" + name;
+    surface_fields(AttributeChecker{file, path}, surface);
+    if (surface.slips.empty()) fail_at(file, path + "/slips", "is empty: at least one slip is needed");
+    std::set<std::string_view> ids;
+    for (const Slip& slip : surface.slips) {
+      check_name(file, path + "/slips", slip.id);
+      check_channels<Slip>(file, path + "/slips/" + slip.id, slip, channels, dimension);
+      if (!ids.insert(slip.id).second) fail_at(file, path + "/slips/" + slip.id, "the id is used twice");
+    }
+  }
+}
+
+SlipLog read_slip_log(const std::filesystem::path& file) {
+  const hdf5::Session session;
+  const hdf5::Node root = hdf5::Node::open_file(file.string());
+  hdf5::check_schema(root, "slip-log", slip_log_version);
+  const std::string_view groups[] = {"surfaces"}, inner[] = {"slips"};
+  root.reject_misspelt(groups, {});
+
+  SlipLog log;
+  const hdf5::Node surfaces = root.group("surfaces");
+  for (const std::string& name : surfaces.children()) {
+    const hdf5::Node node = surfaces.group(name);
+    node.reject_misspelt(inner, surface_attributes);
+    Surface surface;
+    surface_fields(hdf5::AttributeReader{node}, surface);
+    const hdf5::Node slips = node.group("slips");
+    for (const std::string& id : slips.children()) {
+      const hdf5::Node home = slips.group(id);
+      Slip slip;
+      hdf5::read_channels<Slip>(home, channels, dimension, slip_attributes, slip);
+      slip.id = id;
+      hdf5::AttributeReader{home}("split", slip.split);
+      surface.slips.push_back(std::move(slip));
+    }
+    log.surfaces.emplace(name, std::move(surface));
+  }
+  validate(log, root.file());
+  return log;
+}
+
+void write_slip_log(const std::filesystem::path& file, const SlipLog& log) {
+  validate(log, file.string());
+  hdf5::write_atomically(file.string(), [&](const hdf5::Output& root) {
+    root.text("schema", "slip-log");
+    root.integer("schema_version", slip_log_version);
+    const hdf5::Output surfaces = root.group("surfaces");
+    for (const auto& [name, surface] : log.surfaces) {
+      const hdf5::Output home = surfaces.group(name);
+      surface_fields(hdf5::AttributeWriter{home}, surface);
+      const hdf5::Output slips = home.group("slips");
+      for (const Slip& slip : surface.slips) {
+        const hdf5::Output out = slips.group(slip.id);
+        hdf5::AttributeWriter{out}("split", slip.split);
+        hdf5::write_channels<Slip>(out, channels, dimension, slip);
+      }
+    }
+  });
+}
+
+}  // namespace unhand::datasets

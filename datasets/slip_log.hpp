@@ -1,0 +1,42 @@
+// A slip log: direct evidence on friction patches, wrenches beside the twists they go with.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "datasets/throw_log.hpp"
+
+namespace unhand::datasets {
+
+/// wrench (N,3) [fx, fy, tau]: what the object applies to the surface [N, N, N m]; twist (N,3) [vx, vy,
+/// omega] of the object [m/s, m/s, rad/s]; both in the object frame about its centre.
+struct Slip {
+  std::string id;
+  Split split = Split::train;
+  Series time, wrench, twist;
+  bool operator==(const Slip&) const = default;
+};
+
+struct Surface {
+  double mass = 0;                   // [kg]
+  double characteristic_length = 0;  // [m]
+  std::string description;
+  std::optional<std::string> licence;
+  std::vector<Slip> slips;  // in order of id when read
+  bool operator==(const Surface&) const = default;
+};
+
+struct SlipLog {
+  std::map<std::string, Surface> surfaces;
+  bool operator==(const SlipLog&) const = default;
+};
+
+/// As for throw logs: the same strictness, the same errors, the same atomic writing.
+SlipLog read_slip_log(const std::filesystem::path& file);
+void write_slip_log(const std::filesystem::path& file, const SlipLog& log);
+void validate(const SlipLog& log, const std::string& file = "(in memory)");
+
+}  // namespace unhand::datasets

@@ -1,0 +1,173 @@
+#include "datasets/summary.hpp"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "datasets/throw_log_table.hpp"
+
+namespace unhand::datasets {
+namespace {
+
+ChannelSummary summarise_channel(std::string_view group, const Series& time, const Flags& valid) {
+  ChannelSummary out;
+  out.group = group;
+  out.rows = time.rows;
+  out.start = time.data.front();
+  out.end = time.data.back();
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < time.rows; ++i) {
+    const double step = time(i) - time(i - 1);
+    steps.push_back(step);
+    if (step > out.longest_gap) {
+      out.longest_gap = step;
+      out.gap_at = time(i - 1);
+    }
+  }
+  if (!steps.empty()) {
+    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+    std::nth_element(steps.begin(), middle, steps.end());
+    out.median_step = *middle;
+    out.rate = 1 / out.median_step;
+  }
+  std::size_t run = 0;
+  for (const std::uint8_t flag_value : valid) {
+    run = flag_value == 0 ? run + 1 : 0;
+    out.lost += flag_value == 0;
+    out.longest_loss = std::max(out.longest_loss, run);
+  }
+  return out;
+}
+
+ThrowSummary summarise_throw(Throw& toss) {
+  ThrowSummary out{toss.id, toss.object, toss.condition, toss.split, toss.landing.has_value(), {}};
+  for (const Channel<Throw>& channel : throw_channels) {
+    if (channel.kind != ChannelKind::time || channel.single) continue;
+    const Slot slot = channel.slot(toss, false);
+    if (std::holds_alternative<std::monostate>(slot)) continue;
+    const bool tracked = channel.group == "mocap";
+    out.channels.push_back(
+        summarise_channel(channel.group, *std::get<Series*>(slot), tracked ? toss.mocap->valid : Flags{}));
+  }
+  return out;
+}
+
+void add(std::vector<GroupSummary>& groups, const ChannelSummary& channel, const std::string& id) {
+  auto group =
+      std::find_if(groups.begin(), groups.end(), [&](const auto& g) { return g.group == channel.group; });
+  if (group == groups.end()) {
+    group = groups.insert(group, {channel.group, 0, 0, 0, channel.rate, channel.rate, 0, ""});
+  }
+  group->throws += 1;
+  group->rows += channel.rows;
+  group->lost += channel.lost;
+  group->lowest_rate = std::min(group->lowest_rate, channel.rate);
+  group->highest_rate = std::max(group->highest_rate, channel.rate);
+  const double ratio = channel.median_step > 0 ? channel.longest_gap / channel.median_step : 0;
+  if (ratio > group->worst_gap_ratio) {
+    group->worst_gap_ratio = ratio;
+    group->worst_gap_throw = id;
+  }
+}
+
+void add(NoiseSummary& noise, const Series& series) {
+  noise.throws += 1;
+  if (series.sigma.empty()) return;
+  noise.declared += 1;
+  if (noise.lowest.empty()) noise.lowest = noise.highest = series.sigma;
+  const std::size_t n = std::min(noise.lowest.size(), series.sigma.size());
+  for (std::size_t j = 0; j < n; ++j) {
+    noise.lowest[j] = std::min(noise.lowest[j], series.sigma[j]);
+    noise.highest[j] = std::max(noise.highest[j], series.sigma[j]);
+  }
+}
+
+}  // namespace
+
+LogSummary summarise(const ThrowLog& log) {
+  validate(log);
+  LogSummary out;
+  out.dimension = log.dimension;
+  out.title = log.title;
+  out.source = log.source;
+  out.licence = log.licence.value_or("");
+  out.gravity = log.gravity;
+  out.landing_height = log.landing_height;
+  out.throws = log.throws.size();
+  for (const auto& [name, object] : log.objects) out.objects.push_back(name);
+  std::vector<Throw> throws = log.throws;
+  for (Throw& toss : throws) {
+    ++(toss.split == Split::train ? out.train : out.test);
+    ++out.conditions[toss.condition];
+    out.free_flights += !toss.hand;
+    out.each.push_back(summarise_throw(toss));
+    for (const ChannelSummary& channel : out.each.back().channels) add(out.groups, channel, toss.id);
+  }
+  for (const Channel<Throw>& channel : throw_channels) {
+    if (channel.kind == ChannelKind::flag) continue;
+    NoiseSummary noise;
+    noise.dataset = std::string(channel.group) + "/" + std::string(channel.name);
+    for (Throw& toss : throws) {
+      const Slot slot = channel.slot(toss, false);
+      const Series* const* series = std::get_if<Series*>(&slot);
+      if (series != nullptr && !(*series)->empty()) add(noise, **series);
+    }
+    if (noise.throws > 0) out.noise.push_back(std::move(noise));
+  }
+  return out;
+}
+
+std::string to_json(const LogSummary& summary) {
+  using nlohmann::ordered_json;
+  ordered_json out{{"schema", "inspect"},
+                   {"schema_version", 1},
+                   {"title", summary.title},
+                   {"source", summary.source},
+                   {"licence", summary.licence},
+                   {"dimension", summary.dimension},
+                   {"gravity_m_s2", summary.gravity},
+                   {"landing_height_m", summary.landing_height},
+                   {"throws", summary.throws},
+                   {"train", summary.train},
+                   {"test", summary.test},
+                   {"free_flights", summary.free_flights},
+                   {"objects", summary.objects},
+                   {"conditions", summary.conditions}};
+  ordered_json& groups = out["groups"] = ordered_json::object();
+  for (const GroupSummary& g : summary.groups) {
+    groups[g.group] = {{"throws", g.throws},
+                       {"samples", g.rows},
+                       {"lost", g.lost},
+                       {"lowest_rate_hz", g.lowest_rate},
+                       {"highest_rate_hz", g.highest_rate},
+                       {"worst_gap_over_median_step", g.worst_gap_ratio},
+                       {"worst_gap_throw", g.worst_gap_throw}};
+  }
+  ordered_json& noise = out["noise"] = ordered_json::object();
+  for (const NoiseSummary& n : summary.noise) {
+    noise[n.dataset] = {
+        {"throws", n.throws}, {"declared", n.declared}, {"lowest", n.lowest}, {"highest", n.highest}};
+  }
+  ordered_json& each = out["each"] = ordered_json::array();
+  for (const ThrowSummary& toss : summary.each) {
+    ordered_json channels = ordered_json::object();
+    for (const ChannelSummary& c : toss.channels) {
+      channels[c.group] = {{"samples", c.rows},
+                           {"start_s", c.start},
+                           {"end_s", c.end},
+                           {"rate_hz", c.rate},
+                           {"longest_gap_s", c.longest_gap},
+                           {"gap_at_s", c.gap_at},
+                           {"lost", c.lost},
+                           {"longest_loss", c.longest_loss}};
+    }
+    each.push_back({{"id", toss.id},
+                    {"object", toss.object},
+                    {"condition", toss.condition},
+                    {"split", toss.split == Split::train ? "train" : "test"},
+                    {"landing", toss.landing},
+                    {"channels", channels}});
+  }
+  return out.dump(1) + "\n";
+}
+
+}  // namespace unhand::datasets

@@ -1,0 +1,65 @@
+// What is in a throw log, at a glance: counts, rates, gaps, declared noise.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "datasets/throw_log.hpp"
+
+namespace unhand::datasets {
+
+/// One group ("hand", "ft", "mocap", "imu") of one throw on its own clock. Rates are 0 where there is one
+/// sample only.
+struct ChannelSummary {
+  std::string group;
+  std::size_t rows = 0, lost = 0;      // lost: samples flagged invalid
+  double start = 0, end = 0;           // [s]
+  double rate = 0;                     // [Hz] 1 / median step
+  double median_step = 0;              // [s]
+  double longest_gap = 0, gap_at = 0;  // [s] the largest step, and the time it starts at
+  std::size_t longest_loss = 0;        // most invalid samples in a row
+};
+
+struct ThrowSummary {
+  std::string id, object, condition;
+  Split split = Split::train;
+  bool landing = false;
+  std::vector<ChannelSummary> channels;
+};
+
+/// One group over all throws that carry it.
+struct GroupSummary {
+  std::string group;
+  std::size_t throws = 0, rows = 0, lost = 0;
+  double lowest_rate = 0, highest_rate = 0;  // [Hz]
+  double worst_gap_ratio = 0;                // longest gap over median step
+  std::string worst_gap_throw;
+};
+
+/// The declared noise of one dataset: [lowest, highest] per column over all throws; empty where none declares
+/// any.
+struct NoiseSummary {
+  std::string dataset;  // "mocap/pose"
+  std::size_t throws = 0, declared = 0;
+  std::vector<double> lowest, highest;
+};
+
+struct LogSummary {
+  int dimension = 2;
+  std::string title, source, licence;
+  double gravity = 0, landing_height = 0;
+  std::size_t throws = 0, train = 0, test = 0, free_flights = 0;
+  std::vector<std::string> objects;
+  std::map<std::string, std::size_t> conditions;  // throws in each
+  std::vector<GroupSummary> groups;
+  std::vector<NoiseSummary> noise;
+  std::vector<ThrowSummary> each;
+};
+
+LogSummary summarise(const ThrowLog& log);
+
+/// {"schema": "inspect", "schema_version": 1, ...}, indented, with a line break at the end.
+std::string to_json(const LogSummary& summary);
+
+}  // namespace unhand::datasets

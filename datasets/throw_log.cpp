@@ -1,0 +1,158 @@
+#include "datasets/throw_log.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "datasets/channel_rules.hpp"
+#include "datasets/hdf5_reader.hpp"
+#include "datasets/hdf5_writer.hpp"
+#include "datasets/throw_log_table.hpp"
+
+namespace unhand::datasets {
+namespace {
+
+const std::span<const Channel<Throw>> channels{throw_channels};
+
+/// The attribute names of a struct, with those that its group carries besides.
+template <class List, class... Rest>
+std::vector<std::string_view> names_of(List&& list, std::initializer_list<std::string_view> more = {}) {
+  AttributeNames names;
+  list(names);
+  names.names.insert(names.names.end(), more);
+  return names.names;
+}
+
+Object read_object(const hdf5::Node& node, int dimension) {
+  Object object;
+  node.reject_misspelt({}, names_of([&](auto& names) { object_fields(names, object, dimension); }));
+  object_fields(hdf5::AttributeReader{node}, object, dimension);
+  return object;
+}
+
+Gripper read_gripper(const hdf5::Node& node) {
+  Gripper gripper;
+  node.reject_misspelt({}, names_of([&](auto& names) { gripper_fields(names, gripper); }));
+  gripper_fields(hdf5::AttributeReader{node}, gripper);
+  return gripper;
+}
+
+Throw read_throw(const hdf5::Node& node, const std::string& id, int dimension) {
+  Throw toss;
+  const auto attributes = names_of([&](auto& names) { throw_fields(names, toss); });
+  hdf5::read_channels<Throw>(node, channels, dimension, attributes, toss);
+  toss.id = id;
+  throw_fields(hdf5::AttributeReader{node}, toss);
+  return toss;
+}
+
+void check_throw(const std::string& file, const ThrowLog& log, const Throw& toss) {
+  check_name(file, "/throws", toss.id);
+  const std::string path = "/throws/" + toss.id;
+  const AttributeChecker check{file, path};
+  throw_fields(check, toss);
+  if (!log.objects.contains(toss.object)) {
+    std::string known;
+    for (const auto& [name, object] : log.objects) known += (known.empty() ? "" : ", ") + name;
+    check.fail("object", fmt::format("there is no object '{}' in /objects (known: {})", toss.object, known));
+  }
+  if (check_channels<Throw>(file, path, toss, channels, log.dimension) == 0) {
+    fail_at(file, path, "is empty: none of hand, ft, mocap, landing, imu");
+  }
+}
+
+}  // namespace
+
+void validate(const ThrowLog& log, const std::string& file) {
+  log_fields(AttributeChecker{file, "/"}, log);
+  if (log.objects.empty()) fail_at(file, "/objects", "is empty: at least one object is needed");
+  for (const auto& [name, object] : log.objects) {
+    check_name(file, "/objects", name);
+    object_fields(AttributeChecker{file, "/objects/" + name}, object, log.dimension);
+  }
+  if (log.gripper) gripper_fields(AttributeChecker{file, "/gripper"}, *log.gripper);
+  if (log.throws.empty()) fail_at(file, "/throws", "is empty: at least one throw is needed");
+  std::set<std::string_view> ids;
+  for (const Throw& toss : log.throws) {
+    check_throw(file, log, toss);
+    if (!ids.insert(toss.id).second) fail_at(file, "/throws/" + toss.id, "the id is used twice");
+  }
+}
+
+ThrowLog read_throw_log(const std::filesystem::path& file) {
+  const hdf5::Session session;
+  const hdf5::Node root = hdf5::Node::open_file(file.string());
+  hdf5::check_schema(root, "throw-log", throw_log_version);
+
+  ThrowLog log;
+  const std::string_view groups[] = {"objects", "gripper", "throws"};
+  root.reject_misspelt(groups,
+                       names_of([&](auto& names) { log_fields(names, log); }, {"schema", "schema_version"}));
+  log_fields(hdf5::AttributeReader{root}, log);
+  log_fields(AttributeChecker{root.file(), "/"}, log);  // the dimension decides on every shape below
+
+  const hdf5::Node objects = root.group("objects");
+  for (const std::string& name : objects.children()) {
+    log.objects.emplace(name, read_object(objects.group(name), log.dimension));
+  }
+  if (root.has("gripper")) log.gripper = read_gripper(root.group("gripper"));
+  const hdf5::Node throws = root.group("throws");
+  for (const std::string& id : throws.children()) {
+    log.throws.push_back(read_throw(throws.group(id), id, log.dimension));
+  }
+  validate(log, root.file());
+  for (Throw& toss : log.throws) {
+    if (toss.mocap) normalise_quaternions(toss.mocap->pose, toss.mocap->valid);
+  }
+  std::sort(log.throws.begin(), log.throws.end(), [](const Throw& a, const Throw& b) { return a.id < b.id; });
+  return log;
+}
+
+void write_throw_log(const std::filesystem::path& file, const ThrowLog& log) {
+  validate(log, file.string());
+  hdf5::write_atomically(file.string(), [&](const hdf5::Output& root) {
+    root.text("schema", "throw-log");
+    root.integer("schema_version", throw_log_version);
+    log_fields(hdf5::AttributeWriter{root}, log);
+    const hdf5::Output objects = root.group("objects");
+    for (const auto& [name, object] : log.objects) {
+      const hdf5::Output out = objects.group(name);
+      object_fields(hdf5::AttributeWriter{out}, object, log.dimension);
+    }
+    if (log.gripper) {
+      const hdf5::Output out = root.group("gripper");
+      gripper_fields(hdf5::AttributeWriter{out}, *log.gripper);
+    }
+    const hdf5::Output throws = root.group("throws");
+    for (const Throw& toss : log.throws) {
+      const hdf5::Output out = throws.group(toss.id);
+      throw_fields(hdf5::AttributeWriter{out}, toss);
+      hdf5::write_channels<Throw>(out, channels, log.dimension, toss);
+    }
+  });
+}
+
+std::string read_schema_name(const std::filesystem::path& file) {
+  const hdf5::Session session;
+  const hdf5::Node root = hdf5::Node::open_file(file.string());
+  const std::string_view known[] = {"schema", "schema_version"};
+  root.reject_misspelt({}, known);
+  return root.text("schema");
+}
+
+std::vector<LayoutRow> throw_log_layout(int dimension) {
+  std::vector<LayoutRow> rows;
+  for (const Channel<Throw>& channel : channels) {
+    for (const ColumnLayout& layout : channel.layouts(dimension)) {
+      const std::string n = channel.single ? "1" : "N";
+      const std::string shape =
+          width(layout) == 1 ? fmt::format("({})", n) : fmt::format("({},{})", n, width(layout));
+      rows.push_back({fmt::format("{}/{}", channel.group, channel.name), shape, std::string(layout.columns),
+                      std::string(layout.units), !channel.required});
+    }
+  }
+  return rows;
+}
+
+}  // namespace unhand::datasets

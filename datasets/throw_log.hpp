@@ -1,0 +1,130 @@
+// A throw log: one campaign of throws as plain values, and its file.
+//
+// Everything is in SI base units and radians. World: x forward, z up. Planar (dimension 2): a pose is [x, z,
+// theta], a twist [vx, vz, omega], an acceleration [ax, az, alpha], a wrench [fx, fz, tau]; angles run from
+// +x towards +z and are unwrapped. Spatial (dimension 3): a pose is [x, y, z, qw, qx, qy, qz], or [x, y, z]
+// where orientation was not tracked.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "datasets/log_error.hpp"
+#include "datasets/series.hpp"
+
+namespace unhand::datasets {
+
+struct Object {
+  double mass = 0;                             // [kg]
+  std::optional<std::vector<double>> inertia;  // [kg m²] about the CoM: 1 value out of plane, 3 when spatial
+  std::optional<double> com_offset;            // [m] pad centre to CoM, along the object's x
+  std::optional<std::array<double, 3>> dims;   // [m]
+  std::optional<std::string> surface, sku;
+  std::optional<double> drag_k;  // [1/m] declared drag, a = −k |v| v: part of the base model
+  bool operator==(const Object&) const = default;
+};
+
+struct Gripper {
+  int n_pads = 2;
+  std::optional<double> pad_radius;            // [m] nominal
+  std::optional<double> opening_command_time;  // [s] robot clock
+  bool operator==(const Gripper&) const = default;
+};
+
+/// The hand frame (midway between the pads) on the robot clock. Where the acceleration jumps it holds the
+/// later value.
+struct HandLog {
+  Series time, pose, twist, acceleration;
+  bool operator==(const HandLog&) const = default;
+};
+
+/// The sensor behind one pad: the wrench this pad applies to the object, in the hand frame, about the pad
+/// centre.
+struct FtLog {
+  Series time, wrench, normal_force;
+  bool operator==(const FtLog&) const = default;
+};
+
+/// The tracked object frame on the motion-capture clock. An empty `valid` means that every sample is good; a
+/// pose may be NaN where valid is 0.
+struct MocapLog {
+  Series time, pose;
+  Flags valid;
+  bool is_valid(std::size_t i) const { return valid.empty() || valid[i] != 0; }
+  bool operator==(const MocapLog&) const = default;
+};
+
+/// Where the tracked frame passes the landing height downwards: [x, theta] planar, [x, y, z] spatial; one
+/// row.
+struct LandingLog {
+  Series time, pose;
+  bool operator==(const LandingLog&) const = default;
+};
+
+/// Inside the object, in its frame: specific force [m/s²] (zero in free fall) and angular rate [rad/s] (may
+/// be empty).
+struct ImuLog {
+  Series time, specific_force, angular_rate;
+  bool operator==(const ImuLog&) const = default;
+};
+
+enum class Split { train, test };
+
+struct Throw {
+  std::string id, object, condition;  // `condition` groups repetitions
+  int repetition = 0;
+  Split split = Split::train;
+  std::optional<double> detach_time;    // [s] annotated by hand
+  std::optional<double> grasp_angle;    // [rad] object x axis against the hand's, before opening
+  std::vector<double> hand_jump_times;  // [s]
+  std::optional<std::pair<double, double>> free_flight;  // [s] mocap clock: touches nothing in between
+  std::optional<HandLog> hand;
+  std::optional<FtLog> ft;
+  std::optional<MocapLog> mocap;
+  std::optional<LandingLog> landing;
+  std::optional<ImuLog> imu;
+  bool operator==(const Throw&) const = default;
+};
+
+struct ThrowLog {
+  int dimension = 2;
+  std::string title, source;
+  std::optional<std::string> licence;
+  double gravity = 9.81;      // [m/s²] declared
+  double landing_height = 0;  // [m]
+  std::map<std::string, Object> objects;
+  std::optional<Gripper> gripper;
+  std::vector<Throw> throws;  // sorted by id when read
+  bool operator==(const ThrowLog&) const = default;
+};
+
+/// Reads and checks a throw log. The file is opened read-only; names that the schema does not know stay in
+/// the file and are ignored (so they are not in the value, and write_throw_log does not repeat them), unless
+/// they look like a missing name misspelt. Quaternions off unit length by up to 1e-3 are normalised. Throws
+/// LogError.
+ThrowLog read_throw_log(const std::filesystem::path& file);
+
+/// Checks and writes: beside the destination first, then renamed, so that a failure leaves nothing behind and
+/// an older file as it was. Doubles come back bit for bit. Throws LogError.
+void write_throw_log(const std::filesystem::path& file, const ThrowLog& log);
+
+/// The rules that reader and writer share (ranges, shapes, order of time, finiteness, references between
+/// parts). Throws LogError with `file` as its file.
+void validate(const ThrowLog& log, const std::string& file = "(in memory)");
+
+/// The root attribute `schema` ("throw-log", "slip-log" or whatever it says), to choose a reader by.
+std::string read_schema_name(const std::filesystem::path& file);
+
+/// One line of the layout for documentation: path inside a throw, shape, columns and SI units.
+struct LayoutRow {
+  std::string path, shape, columns, units;
+  bool optional = false;
+};
+std::vector<LayoutRow> throw_log_layout(int dimension);
+
+}  // namespace unhand::datasets
