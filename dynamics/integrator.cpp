@@ -163,6 +163,7 @@ class Run {
     ++next_time_;
     window_ = {value_of(t), value_of(window_end())};
     Departure departure{system_.on_time(mode, window_, t, y), -1, {}};
+    record_lead(departure.at, y);
     log(EventKind::time, index, mode, departure.at);
     return departure;
   }
@@ -215,6 +216,8 @@ class Run {
 
   Departure transition(int guard, const S& t, const State<S, N>& y) {
     Departure departure{system_.on_guard(phase_, guard, t, y), -1, {}};
+    record_straight(phase_, t, y, departure.at.t - departure.at.lead, departure.at.y);
+    record_lead(departure.at, y);
     if (departure.at.mode == phase_.mode) departure.self_transition_of = guard;
     log(EventKind::guard, guard, phase_.mode, departure.at);
     if (static_cast<int>(solution_.events.size()) >= options_.event_budget)
@@ -229,6 +232,7 @@ class Run {
   // ---------------------------------------------------------------- guards
 
   static constexpr int kNotFinite = -2;
+  static constexpr double kAtZero = 1e-9;  // s
 
   /// Signed so that every guard fires upwards: G < 0 is the safe side.
   bool evaluate(const S& t, const State<S, N>& y, double* G) const {
@@ -247,8 +251,9 @@ class Run {
     return all_finite;
   }
 
-  /// Arms the guards at the start of a phase. A guard already on its unsafe side and not on its way back fires at
-  /// once: its index is returned. One that is zero, or that has just fired, is armed by where it goes next.
+  /// Arms the guards at the start of a phase. One on its safe side is armed. One at zero (its crossing lies within
+  /// kAtZero of now) is armed if it leaves for the safe side and fires at once, returning its index, if it goes on
+  /// through, unless it has just fired. One on its unsafe side waits until it has been seen on the safe side.
   int arm(const Entry<S, N>& entry, int self_transition_of) {
     if (guards_ == 0) return -1;
     double G[kMaxGuards];
@@ -257,16 +262,14 @@ class Run {
     for (int i = 0; i < guards_; ++i) {
       start_[i] = G[i];
       hidden_[i] = false;
-      armed_[i] = G[i] < 0 && i != self_transition_of;
-      if (armed_[i]) continue;
+      armed_[i] = G[i] < 0;
+      if (armed_[i] && i != self_transition_of) continue;
       if (!slope) slope = guard_slopes(entry);
       const double rate = (*slope)[i];
       if (!std::isfinite(rate)) return kNotFinite;
-      if (rate < 0) {  // leaves for the safe side: a root may follow within the first step
-        armed_[i] = hidden_[i] = true;
-      } else if (i != self_transition_of && (G[i] > 0 || rate > 0)) {
-        return i;
-      }
+      if (std::abs(G[i]) > kAtZero * std::abs(rate)) continue;
+      armed_[i] = hidden_[i] = rate < 0;
+      if (rate > 0 && i != self_transition_of) return i;
     }
     return -1;
   }
@@ -541,6 +544,18 @@ class Run {
     const double part = whole > 0 ? (value_of(until) - value_of(stepper.t0())) / whole : 0.0;
     for (int k = 0; k < 5; ++k) stepper.interpolate(0.25 * k * part, piece.nodes[k]);
     solution_.trajectory.pieces.push_back(piece);
+  }
+
+  /// The first instants of an entry, or the last ones before an event, that a transition knew in closed form.
+  void record_straight(const Phase& phase, const S& t0, const State<S, N>& y0, const S& t1, const State<S, N>& y1) {
+    if (!options_.record || !(value_of(t1) > value_of(t0))) return;
+    TrajectoryPiece<S, N> piece{t0, t1, phase, {}};
+    for (int k = 0; k < 5; ++k)
+      for (int i = 0; i < N; ++i) piece.nodes[k][i] = y0[i] + 0.25 * k * (y1[i] - y0[i]);
+    solution_.trajectory.pieces.push_back(piece);
+  }
+  void record_lead(const Entry<S, N>& entry, const State<S, N>& before) {
+    record_straight({entry.mode, window_}, entry.t - entry.lead, before, entry.t, entry.y);
   }
 
   static bool finite(const Entry<S, N>& entry) {

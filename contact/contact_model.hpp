@@ -1,0 +1,211 @@
+// What every contact model answers: which modes it has, which wrench acts in each, which guards leave a mode, and what
+// happens there.
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "contact/normal_force.hpp"
+#include "dynamics/hybrid_system.hpp"
+#include "dynamics/rigid_body.hpp"
+
+namespace unhand::contact {
+
+using dynamics::Acceleration;
+using dynamics::Dual;
+using dynamics::Entry;
+using dynamics::Phase;
+using dynamics::Pose;
+using dynamics::RigidBody;
+using dynamics::State;
+using dynamics::Twist;
+using dynamics::Vec2;
+using dynamics::Window;
+using dynamics::Wrench;
+
+/// What a contact law sees of the world at an instant.
+template <class S>
+struct Scene {
+  RigidBody<S> body;                 ///< kg, kg m²
+  Vec2<S> gravity;                   ///< m/s²
+  Pose<S> hand;                      ///< m, m, rad
+  Twist<S> hand_twist;               ///< m/s, m/s, rad/s
+  Acceleration<S> hand_acceleration; ///< m/s², m/s², rad/s²
+  S normal_force{};                  ///< of one pad [N], >= 0
+};
+
+/// The values, without derivatives: what decides between modes.
+inline Scene<double> values(const Scene<double>& s) { return s; }
+inline Scene<double> values(const Scene<Dual>& s) {
+  return {{s.body.mass.a, s.body.inertia.a},
+          {s.gravity.x.a, s.gravity.z.a},
+          {s.hand.x.a, s.hand.z.a, s.hand.theta.a},
+          {s.hand_twist.vx.a, s.hand_twist.vz.a, s.hand_twist.omega.a},
+          {s.hand_acceleration.ax.a, s.hand_acceleration.az.a, s.hand_acceleration.alpha.a},
+          s.normal_force.a};
+}
+
+/// Where scenes come from; laws look a little ahead at the onset of slip.
+class SceneSource {
+ public:
+  virtual ~SceneSource() = default;
+  virtual Scene<double> scene(const Window&, double t) const = 0;
+  virtual Scene<Dual> scene(const Window&, const Dual& t) const = 0;
+};
+
+/// The object against the hand, which is the state that is integrated.
+///
+/// The arm (CoM from the patch, in the object's frame) changes only while the patch slips, the angle only while it
+/// spins; so sticking is y' = 0 exactly and pivoting leaves the arm alone exactly: neither can creep.
+/// d/dt arm = R(θ_O)ᵀ v_r;  d/dt v_r = (a_C − a_H) − ω_O J v_r, the last term because the material point under the
+/// patch changes. tests/crosscheck integrates (q_O, v_O) instead and must agree.
+template <class S>
+struct Relative {
+  Vec2<S> arm;   ///< R(θ_O)ᵀ (p_WO − p_WH) [m]
+  S angle{};     ///< θ_O − θ_H [rad]
+  Vec2<S> slip;  ///< v_r: material point of the object at the patch against the hand, in the world [m/s]
+  S spin{};      ///< ω_r = ω_O − ω_H [rad/s]
+
+  static Relative from(const State<S, 6>& y) { return {{y[0], y[1]}, y[2], {y[3], y[4]}, y[5]}; }
+  State<S, 6> state() const { return {arm.x, arm.z, angle, slip.x, slip.z, spin}; }
+};
+
+inline Relative<double> values(const Relative<double>& y) { return y; }
+inline Relative<double> values(const Relative<Dual>& y) {
+  return {{y.arm.x.a, y.arm.z.a}, y.angle.a, {y.slip.x.a, y.slip.z.a}, y.spin.a};
+}
+
+/// r = p_WO − p_WH in the world [m].
+template <class S>
+Vec2<S> lever(const Scene<S>& scene, const Relative<S>& y) {
+  return dynamics::rotate(S(scene.hand.theta + y.angle), y.arm);
+}
+
+/// Pose and twist of the object's CoM, in the world.
+template <class S>
+Pose<S> object_pose(const Scene<S>& scene, const Relative<S>& y) {
+  const Vec2<S> r = lever(scene, y);
+  return {scene.hand.x + r.x, scene.hand.z + r.z, scene.hand.theta + y.angle};
+}
+template <class S>
+Twist<S> object_twist(const Scene<S>& scene, const Relative<S>& y) {
+  const Twist<S> patch{scene.hand_twist.vx + y.slip.x, scene.hand_twist.vz + y.slip.z, scene.hand_twist.omega + y.spin};
+  return dynamics::twist_at_com(patch, lever(scene, y));
+}
+
+/// d/dt of the relative state under the wrench `patch` (about the patch, on the object, in the world).
+template <class S>
+State<S, 6> relative_rate(const Scene<S>& scene, const Relative<S>& y, const Wrench<S>& patch) {
+  const Vec2<S> r = lever(scene, y);
+  const S omega = scene.hand_twist.omega + y.spin;
+  const Acceleration<S> com = dynamics::acceleration_under(scene.body, patch, r, scene.gravity);
+  const Acceleration<S> point = dynamics::acceleration_at_patch(com, omega, r);
+  const Vec2<S> arm_rate = dynamics::rotate(S(-(scene.hand.theta + y.angle)), y.slip);
+  return {arm_rate.x, arm_rate.z, y.spin,
+          point.ax - scene.hand_acceleration.ax + omega * y.slip.z,
+          point.az - scene.hand_acceleration.az - omega * y.slip.x, com.alpha - scene.hand_acceleration.alpha};
+}
+
+/// f_p: the wrench about the patch that makes the material point there and the object's rotation follow the hand
+/// (no slip acceleration). [LiuBillard2025] Eq. 19, 20 with the signs of dynamics/frames.hpp.
+template <class S>
+Wrench<S> sticking_wrench(const Scene<S>& scene, const Relative<S>& y) {
+  const Vec2<S> r = lever(scene, y);
+  const S omega = scene.hand_twist.omega + y.spin;
+  const Acceleration<S> com = dynamics::acceleration_at_com(scene.hand_acceleration, omega, r);
+  return dynamics::required_wrench(scene.body, com, r, scene.gravity);
+}
+
+/// An abstract contact model; see architecture in docs/adding-a-contact-model.md for the recipe.
+/// Mode 0 is where a held object starts when its grip holds.
+class ContactModel {
+ public:
+  virtual ~ContactModel() = default;
+
+  virtual std::string_view name() const = 0;
+
+  // Which modes?
+  virtual int mode_count() const = 0;
+  virtual std::string_view mode_name(int mode) const = 0;
+  virtual dynamics::FlowKind kind(int mode) const = 0;
+
+  // Which wrench on the object, about the patch, in the world [N, N, N m]?
+  virtual Wrench<double> wrench(int mode, const Scene<double>&, const Relative<double>&) const = 0;
+  virtual Wrench<Dual> wrench(int mode, const Scene<Dual>&, const Relative<Dual>&) const = 0;
+  virtual void rate(int mode, const Scene<double>&, const Relative<double>&, State<double, 6>&) const = 0;
+  virtual void rate(int mode, const Scene<Dual>&, const Relative<Dual>&, State<Dual, 6>&) const = 0;
+
+  // Which guards leave a mode?
+  virtual int guard_count(int mode) const = 0;
+  virtual dynamics::Guard guard(int mode, int index) const = 0;
+  virtual void guards(int mode, const Scene<double>&, const Relative<double>&, double* g) const = 0;
+  virtual void guards(int mode, const Scene<Dual>&, const Relative<Dual>&, Dual* g) const = 0;
+
+  // What happens at a guard, and which mode holds at an instant (after a time event, or at the start: mode < 0)?
+  virtual Entry<double, 6> on_guard(const Phase&, int guard, const SceneSource&, double t, const Relative<double>&) const = 0;
+  virtual Entry<Dual, 6> on_guard(const Phase&, int guard, const SceneSource&, const Dual& t, const Relative<Dual>&) const = 0;
+  virtual Entry<double, 6> membership(int mode, const Window&, const SceneSource&, double t, const Relative<double>&) const = 0;
+  virtual Entry<Dual, 6> membership(int mode, const Window&, const SceneSource&, const Dual& t, const Relative<Dual>&) const = 0;
+
+  /// When the object is free [s]; +infinity for never. Models that follow the pads answer with the force's release.
+  virtual void separation(const NormalForce&, double& t) const = 0;
+  virtual void separation(const NormalForce&, Dual& t) const = 0;
+
+  /// A bound on the next step [s] near a point where the flow is singular.
+  virtual double max_step(int mode, const Scene<double>&, const Relative<double>&) const = 0;
+
+  /// True if the law can feed energy through its linear slip in this mode (a surrogate, not a material law).
+  virtual bool may_feed_energy(int /*mode*/) const { return false; }
+};
+
+/// The release of the force that the pads follow.
+template <class S>
+void force_release(const NormalForce& force, S& t) {
+  std::vector<S> kinks;
+  force.kinks(kinks);
+  const double release = force.release_time();
+  t = S(release);
+  for (const S& kink : kinks)
+    if (dynamics::value_of(kink) == release) t = kink;
+}
+
+/// Writes both overloads from the templates wrench_, guards_, on_guard_, membership_ of Derived.
+template <class Derived>
+class ContactModelFrom : public ContactModel {
+ public:
+  Wrench<double> wrench(int m, const Scene<double>& s, const Relative<double>& y) const final { return self().wrench_(m, s, y); }
+  Wrench<Dual> wrench(int m, const Scene<Dual>& s, const Relative<Dual>& y) const final { return self().wrench_(m, s, y); }
+  void rate(int m, const Scene<double>& s, const Relative<double>& y, State<double, 6>& dy) const final { self().rate_(m, s, y, dy); }
+  void rate(int m, const Scene<Dual>& s, const Relative<Dual>& y, State<Dual, 6>& dy) const final { self().rate_(m, s, y, dy); }
+  void guards(int m, const Scene<double>& s, const Relative<double>& y, double* g) const final { self().guards_(m, s, y, g); }
+  void guards(int m, const Scene<Dual>& s, const Relative<Dual>& y, Dual* g) const final { self().guards_(m, s, y, g); }
+  Entry<double, 6> on_guard(const Phase& p, int i, const SceneSource& w, double t, const Relative<double>& y) const final {
+    return self().on_guard_(p, i, w, t, y);
+  }
+  Entry<Dual, 6> on_guard(const Phase& p, int i, const SceneSource& w, const Dual& t, const Relative<Dual>& y) const final {
+    return self().on_guard_(p, i, w, t, y);
+  }
+  Entry<double, 6> membership(int m, const Window& v, const SceneSource& w, double t, const Relative<double>& y) const final {
+    return self().membership_(m, v, w, t, y);
+  }
+  Entry<Dual, 6> membership(int m, const Window& v, const SceneSource& w, const Dual& t, const Relative<Dual>& y) const final {
+    return self().membership_(m, v, w, t, y);
+  }
+  void separation(const NormalForce& force, double& t) const override { force_release(force, t); }
+  void separation(const NormalForce& force, Dual& t) const override { force_release(force, t); }
+  double max_step(int, const Scene<double>&, const Relative<double>&) const override {
+    return std::numeric_limits<double>::infinity();
+  }
+
+ private:
+  const Derived& self() const { return static_cast<const Derived&>(*this); }
+};
+
+/// Signed margin of a demand against a limit, both >= 0: (d² − l²)/(d² + l²), in [−1, 1], zero where they are equal.
+/// Takes the squares, so that it is smooth where the demand vanishes.
+template <class S>
+S margin(const S& demand_squared, const S& limit_squared) {
+  return (demand_squared - limit_squared) / (demand_squared + limit_squared + 1e-300);
+}
+
+}  // namespace unhand::contact

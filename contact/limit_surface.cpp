@@ -1,0 +1,306 @@
+#include "contact/limit_surface.hpp"
+
+#include <Eigen/Dense>
+
+#include "contact/slip_stop.hpp"
+
+namespace unhand::contact {
+
+using dynamics::value_of;
+using std::sqrt;
+
+namespace {
+
+/// Time after the onset of slip [s] at which the stiff flow takes over from its leading term. The slip is then of the
+/// order 1e-9 m/s, below the integrator's tolerance, and so is the term left out.
+constexpr double kOnset = 1e-6;
+
+template <class S>
+S dot3(const Vec3<S>& a, const Vec3<S>& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+/// Normalised wrench w to f [N, N, N m]: f = f_max (w_x, w_z, L w_τ).
+template <class S>
+Wrench<S> physical(const Vec3<S>& w, const S& f_max, const S& length) {
+  return {f_max * w[0], f_max * w[1], f_max * length * w[2]};
+}
+
+/// The slip's normalised acceleration under a wrench: (a_C − a_H, L (α_O − α_H)).
+template <class S>
+Vec3<S> normalised_acceleration(const Scene<S>& scene, const Relative<S>& y, const Wrench<S>& wrench, const S& length) {
+  const Vec2<S> r = lever(scene, y);
+  const S omega = scene.hand_twist.omega + y.spin;
+  const Acceleration<S> com = dynamics::acceleration_under(scene.body, wrench, r, scene.gravity);
+  const Acceleration<S> point = dynamics::acceleration_at_patch(com, omega, r);
+  return {point.ax - scene.hand_acceleration.ax, point.az - scene.hand_acceleration.az,
+          length * (point.alpha - scene.hand_acceleration.alpha)};
+}
+
+/// W⁻¹ in normalised coordinates: diag(1,1,1/L) W⁻¹ diag(1,1,1/L), with W⁻¹ = Gᵀ(−r) M G(−r).
+template <class S>
+std::array<Vec3<S>, 3> normalised_inertia(const Scene<S>& scene, const Vec2<S>& r, const S& length) {
+  const auto& [m, I] = scene.body;
+  const S zx = -m * r.z / length, zz = m * r.x / length;
+  return {{{m, S(0), zx}, {S(0), m, zz}, {zx, zz, (I + m * dot(r, r)) / (length * length)}}};
+}
+
+template <class S>
+Vec3<S> times(const std::array<Vec3<S>, 3>& A, const Vec3<S>& x) { return {dot3(A[0], x), dot3(A[1], x), dot3(A[2], x)}; }
+
+}  // namespace
+
+template <class Shape>
+LimitSurface<Shape>::LimitSurface(std::string_view name, const Patch<Dual>& patch, Shape shape)
+    : name_(name), shape_(std::move(shape)), patch_double_(values(patch)), patch_dual_(patch) {
+  validate(patch_double_);
+}
+
+template <class Shape>
+template <class S>
+const Patch<S>& LimitSurface<Shape>::patch() const {
+  if constexpr (std::is_same_v<S, double>) return patch_double_;
+  else return patch_dual_;
+}
+
+template <class Shape>
+dynamics::Guard LimitSurface<Shape>::guard(int mode, int) const {
+  using dynamics::Crossing;
+  return mode == kStick ? dynamics::Guard{"limit surface", Crossing::rising}
+                        : dynamics::Guard{"slip stops", Crossing::falling};
+}
+
+/// u = (v_r, L ω_r), turned into the hand's frame for shapes that have directions of their own.
+template <class Shape>
+template <class S>
+Vec3<S> LimitSurface<Shape>::normalised_slip(const Relative<S>& y) const {
+  return {y.slip.x, y.slip.z, patch<S>().length() * y.spin};
+}
+
+namespace {
+
+/// resist, gauge and slip_direction in the world; shapes with directions of their own live in the hand's frame.
+template <class Shape, class S, class Function>
+Vec3<S> in_hand_frame(const S& hand_angle, const Vec3<S>& world, Function&& function) {
+  if constexpr (Shape::isotropic) {
+    return function(world);
+  } else {
+    const Vec2<S> xz = dynamics::rotate(S(-hand_angle), Vec2<S>{world[0], world[1]});
+    const Vec3<S> there = function(Vec3<S>{xz.x, xz.z, world[2]});
+    const Vec2<S> back = dynamics::rotate(hand_angle, Vec2<S>{there[0], there[1]});
+    return {back.x, back.z, there[2]};
+  }
+}
+
+template <class Shape, class S>
+Vec3<S> resist(const Shape& shape, const Scene<S>& scene, const Vec3<S>& u) {
+  return in_hand_frame<Shape, S>(scene.hand.theta, u, [&](const Vec3<S>& x) { return shape.resist(x); });
+}
+template <class Shape, class S>
+Vec3<S> slip_direction(const Shape& shape, const Scene<S>& scene, const Vec3<S>& w) {
+  return in_hand_frame<Shape, S>(scene.hand.theta, w, [&](const Vec3<S>& x) { return shape.slip_direction(x); });
+}
+template <class Shape, class S>
+S gauge(const Shape& shape, const Scene<S>& scene, const Vec3<S>& w) {
+  if constexpr (Shape::isotropic) {
+    return shape.gauge(w);
+  } else {
+    const Vec2<S> xz = dynamics::rotate(S(-scene.hand.theta), Vec2<S>{w[0], w[1]});
+    return shape.gauge(Vec3<S>{xz.x, xz.z, w[2]});
+  }
+}
+
+/// The Jacobian of resist at u.
+template <class Shape>
+Eigen::Matrix3d resist_jacobian(const Shape& shape, const Scene<double>& scene, const Vec3<double>& u) {
+  Scene<Dual> lifted;
+  lifted.hand.theta = Dual(scene.hand.theta);
+  Vec3<Dual> x;
+  for (int i = 0; i < 3; ++i) x[i] = dynamics::independent(u[i], i);
+  const Vec3<Dual> w = resist(shape, lifted, x);
+  Eigen::Matrix3d J;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) J(i, j) = w[i].v[j];
+  return J;
+}
+
+/// Minimises φ(a) = ½ (a − b)ᵀ A (a − b) + k σ(a), σ(a) = −resist(a)·a, by Newton's method with a line search on φ.
+/// φ is strictly convex and smooth but at a = 0, which is not the minimum when the sticking wrench is outside.
+template <class Shape>
+Vec3<double> minimise(const Shape& shape, const Scene<double>& scene, const std::array<Vec3<double>, 3>& A, double k,
+                      const Vec3<double>& b, Vec3<double> a) {
+  const auto phi = [&](const Vec3<double>& x) {
+    const Vec3<double> d{x[0] - b[0], x[1] - b[1], x[2] - b[2]};
+    return 0.5 * dot3(d, times(A, d)) - k * dot3(resist(shape, scene, x), x);
+  };
+  Eigen::Matrix3d metric;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) metric(i, j) = A[i][j];
+  double value = phi(a);
+  for (int iteration = 0; iteration < 60; ++iteration) {
+    const Vec3<double> w = resist(shape, scene, a), d{a[0] - b[0], a[1] - b[1], a[2] - b[2]}, Ad = times(A, d);
+    const Eigen::Vector3d gradient(Ad[0] - k * w[0], Ad[1] - k * w[1], Ad[2] - k * w[2]);
+    const Eigen::Matrix3d hessian = metric - k * resist_jacobian(shape, scene, a);
+    const Eigen::Vector3d step = hessian.ldlt().solve(-gradient);
+    const double slope = gradient.dot(step);
+    if (!std::isfinite(slope) || !(slope < 0)) break;
+    double length = 1;
+    Vec3<double> next;
+    double next_value = value;
+    for (int halving = 0; halving < 40; ++halving, length *= 0.5) {
+      for (int i = 0; i < 3; ++i) next[i] = a[i] + length * step[i];
+      next_value = phi(next);
+      if (next_value <= value + 1e-4 * length * slope) break;
+    }
+    const double moved = length * step.norm(), size = std::sqrt(dot3(a, a));
+    if (!(next_value < value) && length < 1) break;
+    a = next;
+    value = next_value;
+    if (moved <= 1e-14 * size) break;
+  }
+  return a;
+}
+
+}  // namespace
+
+/// a = W (f* − f_p) in normalised coordinates; zero if f_p is inside.
+template <class Shape>
+template <class S>
+Vec3<S> LimitSurface<Shape>::slip_acceleration(const Scene<S>& scene, const Relative<S>& y) const {
+  const S length = patch<S>().length(), f_max = patch<S>().f_max(scene.normal_force);
+  const Vec3<S> b = normalised_acceleration(scene, y, Wrench<S>{}, length);
+  if (!(value_of(f_max) > 0)) return b;
+  const Wrench<S> demand = sticking_wrench(scene, y);
+  const Vec3<S> w{demand.fx / f_max, demand.fz / f_max, demand.tau / (f_max * length)};
+  const S excess = gauge(shape_, scene, w) - 1.0;
+  if (!(value_of(excess) > 0)) return {S(0), S(0), S(0)};
+
+  const auto A = normalised_inertia(scene, lever(scene, y), length);
+  // Just outside, the slip leaves along the surface's normal: a guess whose size is right to first order.
+  const Vec3<S> n = slip_direction(shape_, scene, w);
+  const S size = excess * f_max * (-dot3(n, w)) / (1.0 + excess) / dot3(n, times(A, n));
+  Vec3<double> guess, b_value;
+  std::array<Vec3<double>, 3> A_value;
+  for (int i = 0; i < 3; ++i) {
+    guess[i] = value_of(size) * value_of(n[i]);
+    b_value[i] = value_of(b[i]);
+    for (int j = 0; j < 3; ++j) A_value[i][j] = value_of(A[i][j]);
+  }
+  const Vec3<double> a = minimise(shape_, values(scene), A_value, value_of(f_max), b_value, guess);
+  if constexpr (std::is_same_v<S, double>) {
+    return a;
+  } else {
+    // One Newton step in dual arithmetic with the real Hessian: the implicit function theorem.
+    Vec3<S> at{S(a[0]), S(a[1]), S(a[2])};
+    const Vec3<S> force = resist(shape_, scene, at), Ad = times(A, Vec3<S>{at[0] - b[0], at[1] - b[1], at[2] - b[2]});
+    Eigen::Matrix3d hessian = -f_max.a * resist_jacobian(shape_, values(scene), a);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) hessian(i, j) += A_value[i][j];
+    const Eigen::LDLT<Eigen::Matrix3d> factor(hessian);
+    Eigen::Matrix<double, 3, dynamics::kDualSize> gradient;
+    for (int i = 0; i < 3; ++i) gradient.row(i) = (Ad[i] - f_max * force[i]).v.transpose();
+    const Eigen::Matrix<double, 3, dynamics::kDualSize> shift = factor.solve(gradient);
+    for (int i = 0; i < 3; ++i) at[i].v -= shift.row(i).transpose();
+    return at;
+  }
+}
+
+template <class Shape>
+template <class S>
+Wrench<S> LimitSurface<Shape>::wrench_(int mode, const Scene<S>& scene, const Relative<S>& y) const {
+  if (mode == kStick) return sticking_wrench(scene, y);
+  const S f_max = patch<S>().f_max(scene.normal_force);
+  return physical(resist(shape_, scene, normalised_slip(y)), f_max, patch<S>().length());
+}
+
+template <class Shape>
+template <class S>
+void LimitSurface<Shape>::rate_(int mode, const Scene<S>& scene, const Relative<S>& y, State<S, 6>& dy) const {
+  dy = relative_rate(scene, y, wrench_(mode, scene, y));
+}
+
+template <class Shape>
+template <class S>
+void LimitSurface<Shape>::guards_(int mode, const Scene<S>& scene, const Relative<S>& y, S* g) const {
+  if (mode == kStick) {
+    const S length = patch<S>().length(), f_max = patch<S>().f_max(scene.normal_force);
+    const Wrench<S> demand = sticking_wrench(scene, y);
+    const S size = gauge(shape_, scene, Vec3<S>{demand.fx, demand.fz, demand.tau / length});
+    g[0] = margin(S(size * size), S(f_max * f_max));
+  } else {
+    const Vec3<S> u = normalised_slip(y);
+    g[0] = sqrt(dot3(u, u)) / kStopSpeed - 1.0;
+  }
+}
+
+template <class Shape>
+double LimitSurface<Shape>::max_step(int mode, const Scene<double>& scene, const Relative<double>& y) const {
+  if (mode == kStick) return std::numeric_limits<double>::infinity();
+  State<double, 6> dy;
+  rate_(mode, scene, y, dy);
+  const Vec3<double> u = normalised_slip(y), du{dy[3], dy[4], patch<double>().length() * dy[5]};
+  const double speed = std::sqrt(dot3(u, u));
+  return longest_step_to_stop(speed, dot3(u, du) / speed);
+}
+
+/// Slip from rest at t. The slip after δ is the integral of the frozen-pose acceleration a(s) = W (f* − f_p)(s), by
+/// Simpson's rule; a(0) = 0 where f_p has just reached the surface.
+template <class Shape>
+template <class S>
+Entry<S, 6> LimitSurface<Shape>::onset(const Window& window, const SceneSource& source, const S& t,
+                                       const Relative<S>& rest, bool at_the_surface) const {
+  const double delta = std::min(kOnset, 0.25 * (window.end - value_of(t)));
+  Relative<S> y = rest;
+  y.slip = {S(0), S(0)};
+  y.spin = S(0);
+  if (!(delta > 0)) return {kStick, t, y.state(), S(0)};
+  const auto acceleration = [&](double after) {
+    return slip_acceleration(source.scene(window, S(t + after)), y);
+  };
+  const Vec3<S> a0 = at_the_surface ? Vec3<S>{S(0), S(0), S(0)} : acceleration(0), a1 = acceleration(0.5 * delta),
+                a2 = acceleration(delta);
+  Vec3<S> u;
+  for (int i = 0; i < 3; ++i) u[i] = delta / 6 * (a0[i] + 4.0 * a1[i] + a2[i]);
+  if (!(value_of(dot3(u, u)) > 0)) return {kStick, t, y.state(), S(0)};  // a demand that only touches the surface
+  y.slip = {u[0], u[1]};
+  y.spin = u[2] / patch<S>().length();
+  return {kSlip, S(t + delta), y.state(), S(delta)};
+}
+
+template <class Shape>
+template <class S>
+Entry<S, 6> LimitSurface<Shape>::on_guard_(const Phase& from, int /*guard*/, const SceneSource& source, const S& t,
+                                           const Relative<S>& at) const {
+  if (from.mode == kStick) return onset(from.window, source, t, at, true);
+  // Along a straight line to zero slip, then decide anew.
+  State<S, 6> dy;
+  rate_(kSlip, source.scene(from.window, t), at, dy);
+  const S length = patch<S>().length();
+  const Vec3<S> u = normalised_slip(at), du{dy[3], dy[4], length * dy[5]};
+  const S left = -dot3(u, u) / dot3(u, du);
+  Relative<S> y = at;
+  y.arm = y.arm + (0.5 * left) * Vec2<S>{dy[0], dy[1]};
+  y.angle += 0.5 * left * y.spin;
+  y.slip = {S(0), S(0)};
+  y.spin = S(0);
+  return membership_(kStick, from.window, source, S(t + left), y);
+}
+
+template <class Shape>
+template <class S>
+Entry<S, 6> LimitSurface<Shape>::membership_(int mode, const Window& window, const SceneSource& source, const S& t,
+                                             const Relative<S>& y) const {
+  const Vec3<S> u = normalised_slip(y);
+  if (mode == kSlip || value_of(dot3(u, u)) > 0) return {kSlip, t, y.state(), S(0)};
+  double g = 0;
+  guards_(kStick, values(source.scene(window, t)), values(y), &g);
+  if (g < 0) return {kStick, t, y.state(), S(0)};
+  return onset(window, source, t, y, false);
+}
+
+template class ContactModelFrom<LimitSurface<Ellipsoid>>;
+template class ContactModelFrom<LimitSurface<UniformDisc>>;
+template class ContactModelFrom<LimitSurface<ConvexQuartic>>;
+template class LimitSurface<Ellipsoid>;
+template class LimitSurface<UniformDisc>;
+template class LimitSurface<ConvexQuartic>;
+
+}  // namespace unhand::contact

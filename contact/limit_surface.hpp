@@ -1,0 +1,76 @@
+// Limit-surface friction as a hybrid system: a true stick mode, and slip whose wrench lies on the surface.
+#pragma once
+
+#include "contact/contact_model.hpp"
+#include "contact/limit_surface_shapes.hpp"
+#include "contact/patch.hpp"
+
+namespace unhand::contact {
+
+/// The set-valued law: slipping, the friction wrench is the one in the limit set that dissipates most,
+///   f = argmin over the set of f · v_r   (for the ellipsoid f = −D v_r / sqrt(v_rᵀ D v_r), D = diag(f_max², f_max², τ_max²));
+/// sticking, any f in the set. The slip acceleration is W f + b, W = G M⁻¹ Gᵀ. [LiuBillard2025] section II-B,
+/// [GoyalRuinaPapadopoulos1991] for the surface.
+///
+/// For a convex law and f_N(t) > 0 the forward solution is unique, so chatter is an artefact of integration: here
+///   stick  y' = 0, left when the sticking wrench f_p reaches the surface;
+///   slip   stiff (the wrench turns with the direction of a tiny slip), left when the slip comes to rest.
+/// At onset the slip leaves along a = W (f* − f_p), f* the projection of f_p onto the limit set in the metric of W:
+/// the minimum of the strictly convex ½ (a − b)ᵀ W⁻¹ (a − b) + σ(a), σ the surface's support function.
+///
+/// All of this is done in the normalised coordinates of limit_surface_shapes.hpp, so a Shape is all that differs.
+template <class Shape>
+class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
+ public:
+  /// Throws std::invalid_argument as Patch's validation does.
+  LimitSurface(std::string_view name, const Patch<Dual>& patch, Shape shape = {});
+  LimitSurface(std::string_view name, const Patch<double>& patch, Shape shape = {})
+      : LimitSurface(name, constant(patch), std::move(shape)) {}
+
+  std::string_view name() const override { return name_; }
+  int mode_count() const override { return 2; }
+  std::string_view mode_name(int mode) const override { return mode == kStick ? "stick" : "slip"; }
+  dynamics::FlowKind kind(int mode) const override {
+    return mode == kStick ? dynamics::FlowKind::frozen : dynamics::FlowKind::stiff;
+  }
+  int guard_count(int) const override { return 1; }
+  dynamics::Guard guard(int mode, int) const override;
+  double max_step(int mode, const Scene<double>&, const Relative<double>&) const override;
+
+  template <class S>
+  Wrench<S> wrench_(int mode, const Scene<S>&, const Relative<S>&) const;
+  template <class S>
+  void rate_(int mode, const Scene<S>&, const Relative<S>&, State<S, 6>&) const;
+  template <class S>
+  void guards_(int mode, const Scene<S>&, const Relative<S>&, S* g) const;
+  template <class S>
+  Entry<S, 6> on_guard_(const Phase&, int guard, const SceneSource&, const S& t, const Relative<S>&) const;
+  template <class S>
+  Entry<S, 6> membership_(int mode, const Window&, const SceneSource&, const S& t, const Relative<S>&) const;
+
+ private:
+  static constexpr int kStick = 0, kSlip = 1;
+
+  template <class S>
+  const Patch<S>& patch() const;
+  template <class S>
+  Vec3<S> normalised_slip(const Relative<S>&) const;
+  template <class S>
+  Vec3<S> slip_acceleration(const Scene<S>&, const Relative<S>&) const;
+  template <class S>
+  Entry<S, 6> onset(const Window&, const SceneSource&, const S& t, const Relative<S>&, bool at_the_surface) const;
+
+  std::string_view name_;
+  Shape shape_;
+  Patch<double> patch_double_;
+  Patch<Dual> patch_dual_;
+};
+
+extern template class ContactModelFrom<LimitSurface<Ellipsoid>>;
+extern template class ContactModelFrom<LimitSurface<UniformDisc>>;
+extern template class ContactModelFrom<LimitSurface<ConvexQuartic>>;
+extern template class LimitSurface<Ellipsoid>;
+extern template class LimitSurface<UniformDisc>;
+extern template class LimitSurface<ConvexQuartic>;
+
+}  // namespace unhand::contact

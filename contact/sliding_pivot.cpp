@@ -1,0 +1,257 @@
+#include "contact/sliding_pivot.hpp"
+
+#include <array>
+
+#include "contact/slip_stop.hpp"
+
+namespace unhand::contact {
+
+using dynamics::value_of;
+using std::sqrt;
+
+namespace {
+
+enum Translation { kStuck, kSlide, kBrake };
+enum Rotation { kLocked, kPositive, kNegative };
+
+constexpr int mode_of(Translation translation, Rotation rotation) { return 3 * translation + rotation; }
+constexpr Translation translation_of(int mode) { return static_cast<Translation>(mode / 3); }
+constexpr Rotation rotation_of(int mode) { return static_cast<Rotation>(mode % 3); }
+constexpr double sign_of(Rotation rotation) { return rotation == kPositive ? 1.0 : -1.0; }
+
+// Guards by index; what an index means depends on the mode.
+constexpr int kRotationGuard = 0, kTranslationGuard = 1, kSlideAgain = 2;
+
+/// The law in one mode: the force that would carry the contact point, what acts, and what follows for the rotation.
+template <class S>
+struct Law {
+  Vec2<S> carrying_force;  ///< f_p [N]
+  Wrench<S> wrench;        ///< about the patch, on the object [N, N, N m]
+  S spin_acceleration{};   ///< α_O − α_H [rad/s²]; 0 while locked
+};
+
+template <class S>
+Law<S> law(int mode, const Patch<S>& patch, const Scene<S>& scene, const Relative<S>& y) {
+  const Translation translation = translation_of(mode);
+  const Rotation rotation = rotation_of(mode);
+  const auto& [m, I] = scene.body;
+  const Vec2<S> r = lever(scene, y);
+  const S omega = scene.hand_twist.omega + y.spin;
+  const S limit = patch.f_max(scene.normal_force);
+  const S alpha_hand = scene.hand_acceleration.alpha;
+  const Vec2<S> apparent = scene.hand_acceleration.linear() - scene.gravity;  // a_H + g e_z
+
+  Law<S> out;
+  S torque{}, alpha = alpha_hand;
+  if (rotation != kLocked) {
+    torque = -sign_of(rotation) * patch.tau_max(scene.normal_force);
+    alpha = (m * (r.z * apparent.x - r.x * apparent.z) + torque) / (I + m * dot(r, r));
+  }
+  out.carrying_force = {m * (apparent.x - alpha * r.z - omega * omega * r.x),
+                        m * (apparent.z + alpha * r.x - omega * omega * r.z)};
+
+  Vec2<S> force = out.carrying_force;
+  if (translation == kSlide) force = (limit / norm(out.carrying_force)) * out.carrying_force;
+  if (translation == kBrake) force = (-limit / norm(y.slip)) * y.slip;
+
+  const S lever_torque = r.z * force.x - r.x * force.z;
+  if (rotation == kLocked) {
+    torque = I * alpha_hand - lever_torque;
+  } else {
+    out.spin_acceleration = (translation == kStuck ? alpha : (torque + lever_torque) / I) - alpha_hand;
+  }
+  out.wrench = {force.x, force.z, torque};
+  return out;
+}
+
+/// The rotation that follows when friction is short of the torque that it takes: the object lags behind the hand.
+constexpr Rotation lagging(double demanded_torque) { return demanded_torque > 0 ? kNegative : kPositive; }
+
+/// Time after the onset of spin [s] at which its sign is beyond rounding: at the onset ω_r and its rate are both zero.
+constexpr double kOnset = 1e-6;
+
+/// Which branches a transition has just left, and so must not choose again.
+struct Excluded {
+  bool locked{}, stuck{}, slide{}, brake{};
+};
+
+/// The first consistent mode at an instant: locked if the torque it takes is within the limit, else the spin that its
+/// own acceleration produces. In slide, where f_p jumps with the rotation, neither spin may: then ω_r = 0 attracts from
+/// both sides, and the rotation stays locked until one of them does.
+int consistent_mode(const Patch<double>& patch, const Scene<double>& scene, const Relative<double>& y,
+                    Translation before, SlideEnd slide_end, const Excluded& excluded) {
+  const double force_limit = patch.f_max(scene.normal_force), torque_limit = patch.tau_max(scene.normal_force);
+  const bool slipping = y.slip.x != 0 || y.slip.z != 0;
+
+  auto translation_with = [&](Rotation rotation) {
+    if (slipping && before == kBrake && slide_end == SlideEnd::latched_brake) return kBrake;
+    const double demand = norm(law(mode_of(kStuck, rotation), patch, scene, y).carrying_force);
+    if (slipping) return excluded.brake || (demand > force_limit && !excluded.slide) ? kSlide : kBrake;
+    return excluded.stuck || (demand > force_limit && !excluded.slide) ? kSlide : kStuck;
+  };
+
+  if (y.spin != 0) {
+    const Rotation rotation = y.spin > 0 ? kPositive : kNegative;
+    return mode_of(translation_with(rotation), rotation);
+  }
+  const int locked = mode_of(translation_with(kLocked), kLocked);
+  const double demand = law(locked, patch, scene, y).wrench.tau;
+  if (!excluded.locked && std::abs(demand) <= torque_limit) return locked;
+  const Rotation first = lagging(demand), second = first == kNegative ? kPositive : kNegative;
+  for (const Rotation rotation : {first, second}) {
+    const int mode = mode_of(translation_with(rotation), rotation);
+    if (sign_of(rotation) * law(mode, patch, scene, y).spin_acceleration > 0) return mode;
+  }
+  return excluded.locked ? mode_of(translation_with(first), first) : locked;
+}
+
+}  // namespace
+
+SlidingPivot::SlidingPivot(const Patch<Dual>& patch, SlideEnd slide_end)
+    : patch_double_(values(patch)), patch_dual_(patch), slide_end_(slide_end) {
+  validate(patch_double_);
+}
+
+template <>
+const Patch<double>& SlidingPivot::patch<double>() const { return patch_double_; }
+template <>
+const Patch<Dual>& SlidingPivot::patch<Dual>() const { return patch_dual_; }
+
+std::string_view SlidingPivot::mode_name(int mode) const {
+  static constexpr std::array<std::string_view, 9> kNames{"stick", "pivot+", "pivot-", "slide",  "slide+",
+                                                          "slide-", "brake", "brake+", "brake-"};
+  return kNames[static_cast<std::size_t>(mode)];
+}
+
+dynamics::FlowKind SlidingPivot::kind(int mode) const {
+  return mode == mode_of(kStuck, kLocked) ? dynamics::FlowKind::frozen : dynamics::FlowKind::smooth;
+}
+
+bool SlidingPivot::may_feed_energy(int mode) const { return translation_of(mode) == kSlide; }
+
+int SlidingPivot::guard_count(int mode) const {
+  return translation_of(mode) == kBrake && slide_end_ == SlideEnd::memoryless ? 3 : 2;
+}
+
+dynamics::Guard SlidingPivot::guard(int mode, int index) const {
+  using dynamics::Crossing;
+  if (index == kRotationGuard)
+    return rotation_of(mode) == kLocked ? dynamics::Guard{"torque limit", Crossing::rising}
+                                        : dynamics::Guard{"spin stops", Crossing::falling};
+  if (index == kSlideAgain) return {"force limit", Crossing::rising};
+  switch (translation_of(mode)) {
+    case kStuck: return {"force limit", Crossing::rising};
+    case kSlide: return {"force suffices", Crossing::falling};
+    default: return {"slip stops", Crossing::falling};
+  }
+}
+
+template <class S>
+void SlidingPivot::guards_(int mode, const Scene<S>& scene, const Relative<S>& y, S* g) const {
+  const Patch<S>& patch = this->patch<S>();
+  const Law<S> now = law(mode, patch, scene, y);
+  const S force_limit = patch.f_max(scene.normal_force), torque_limit = patch.tau_max(scene.normal_force);
+  if (rotation_of(mode) != kLocked) {
+    g[kRotationGuard] = sign_of(rotation_of(mode)) * y.spin;
+  } else {
+    g[kRotationGuard] = margin(S(now.wrench.tau * now.wrench.tau), S(torque_limit * torque_limit));
+    if (translation_of(mode) == kSlide) {
+      const Rotation next = lagging(value_of(now.wrench.tau));
+      const S leaves = sign_of(next) * law(mode_of(kSlide, next), patch, scene, y).spin_acceleration;
+      const S scaled = scene.body.inertia * leaves / (torque_limit + 1e-300);
+      if (scaled < g[kRotationGuard]) g[kRotationGuard] = scaled;
+    }
+  }
+  const S force = margin(dot(now.carrying_force, now.carrying_force), S(force_limit * force_limit));
+  if (translation_of(mode) == kBrake) {
+    g[kTranslationGuard] = norm(y.slip) / kStopSpeed - 1.0;
+    if (slide_end_ == SlideEnd::memoryless) g[kSlideAgain] = force;
+  } else {
+    g[kTranslationGuard] = force;
+  }
+}
+
+template <class S>
+Wrench<S> SlidingPivot::wrench_(int mode, const Scene<S>& scene, const Relative<S>& y) const {
+  return law(mode, patch<S>(), scene, y).wrench;
+}
+
+template <class S>
+void SlidingPivot::rate_(int mode, const Scene<S>& scene, const Relative<S>& y, State<S, 6>& dy) const {
+  const Law<S> now = law(mode, patch<S>(), scene, y);
+  if (translation_of(mode) == kStuck) {
+    dy = {S(0), S(0), y.spin, S(0), S(0), now.spin_acceleration};
+  } else {
+    dy = relative_rate(scene, y, now.wrench);
+    dy[5] = now.spin_acceleration;  // exactly zero while locked
+  }
+}
+
+double SlidingPivot::max_step(int mode, const Scene<double>& scene, const Relative<double>& y) const {
+  if (translation_of(mode) != kBrake) return std::numeric_limits<double>::infinity();
+  State<double, 6> dy;
+  rate_(mode, scene, y, dy);
+  const double speed = norm(y.slip);
+  return longest_step_to_stop(speed, (y.slip.x * dy[3] + y.slip.z * dy[4]) / speed);
+}
+
+template <class S>
+Entry<S, 6> SlidingPivot::on_guard_(const Phase& from, int guard, const SceneSource& source, const S& t,
+                                    const Relative<S>& at) const {
+  const Translation translation = translation_of(from.mode);
+  Relative<S> y = at;
+  S now = t;
+  Excluded excluded;
+  if (guard == kRotationGuard) {
+    if (rotation_of(from.mode) == kLocked) excluded.locked = true;
+    else y.spin = S(0);
+  } else if (guard == kSlideAgain) {
+    excluded.brake = true;
+  } else if (translation == kStuck) {
+    excluded.stuck = true;
+  } else if (translation == kSlide) {
+    excluded.slide = true;
+  } else {  // brake: along a straight line to zero slip
+    State<S, 6> dy;
+    rate_(from.mode, source.scene(from.window, t), y, dy);
+    const S speed = norm(y.slip);
+    const S left = -speed * speed / (y.slip.x * dy[3] + y.slip.z * dy[4]);
+    y.arm = y.arm + (0.5 * left) * Vec2<S>{dy[0], dy[1]};
+    y.angle += left * y.spin;
+    y.spin += left * dy[5];
+    y.slip = {S(0), S(0)};
+    now += left;
+  }
+  const Scene<S> scene = source.scene(from.window, now);
+  const int mode = consistent_mode(patch_double_, values(scene), values(y), translation, slide_end_, excluded);
+  if (rotation_of(mode) == kLocked || value_of(y.spin) != 0) return {mode, now, y.state(), S(0)};
+  return spin_onset(mode, from, source, now, y);
+}
+
+/// The first instants of a spin, by the midpoint rule. A demand that only touches its limit leaves no spin.
+template <class S>
+Entry<S, 6> SlidingPivot::spin_onset(int mode, const Phase& from, const SceneSource& source, const S& t,
+                                     const Relative<S>& rest) const {
+  const double delta = std::min(kOnset, 0.25 * (from.window.end - value_of(t)));
+  const State<S, 6> y0 = rest.state();
+  if (!(delta > 0)) return {mode, t, y0, S(0)};
+  State<S, 6> dy, y = y0;
+  rate_(mode, source.scene(from.window, t), rest, dy);
+  for (int i = 0; i < 6; ++i) y[i] = y0[i] + 0.5 * delta * dy[i];
+  rate_(mode, source.scene(from.window, S(t + 0.5 * delta)), Relative<S>::from(y), dy);
+  for (int i = 0; i < 6; ++i) y[i] = y0[i] + delta * dy[i];
+  if (sign_of(rotation_of(mode)) * value_of(y[5]) > 0) return {mode, S(t + delta), y, S(delta)};
+  return {mode_of(translation_of(mode), kLocked), t, y0, S(0)};
+}
+
+template <class S>
+Entry<S, 6> SlidingPivot::membership_(int mode, const Window& window, const SceneSource& source, const S& t,
+                                      const Relative<S>& y) const {
+  const Translation before = mode < 0 ? kStuck : translation_of(mode);
+  const Scene<S> scene = source.scene(window, t);
+  return {consistent_mode(patch_double_, values(scene), values(y), before, slide_end_, {}), t, y.state(), S(0)};
+}
+
+template class ContactModelFrom<SlidingPivot>;
+
+}  // namespace unhand::contact

@@ -1,0 +1,18 @@
+// What the air does to a flying object.
+#pragma once
+
+#include "dynamics/frames.hpp"
+#include "dynamics/scalar.hpp"
+
+namespace unhand::flight {
+
+/// Quadratic drag, a = −k |v| v, in still air; k = ρ c_d A/(2 m) [1/m], v [m/s]. Returns m/s².
+template <class S>
+dynamics::Vec2<S> quadratic_drag(const S& k, const dynamics::Vec2<S>& v) {
+  using std::sqrt;
+  const S squared = dot(v, v);
+  if (dynamics::value_of(squared) == 0) return {S(0), S(0)};
+  return (-k * S(sqrt(squared))) * v;
+}
+
+}  // namespace unhand::flight

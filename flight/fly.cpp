@@ -1,0 +1,163 @@
+#include "flight/fly.hpp"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "flight/aerodynamics.hpp"
+
+namespace unhand::flight {
+
+using dynamics::Dual;
+using dynamics::Entry;
+using dynamics::Phase;
+using dynamics::Pose;
+using dynamics::State;
+using dynamics::Twist;
+using dynamics::value_of;
+using dynamics::Vec2;
+
+const char* to_string(FlightOutcome outcome) {
+  switch (outcome) {
+    case FlightOutcome::landed: return "landed";
+    case FlightOutcome::never_reaches: return "never_reaches";
+    case FlightOutcome::not_solved: return "not_solved";
+  }
+  return "unknown";
+}
+
+namespace {
+
+constexpr int kFlying = 0, kLanded = 1;
+
+template <class T, class S>
+T convert(const S& x) {
+  if constexpr (std::is_same_v<T, S>) return x;
+  else if constexpr (std::is_same_v<T, double>) return value_of(x);
+  else return T(x);
+}
+
+template <class S>
+Landing<S> tracked_point(const Landing<S>& com, const Vec2<S>& offset) {
+  const Vec2<S> d = dynamics::rotate(com.pose.theta, offset), swing = com.twist.omega * dynamics::perp(d);
+  return {com.flight_time,
+          {com.pose.x + d.x, com.pose.z + d.z, com.pose.theta},
+          {com.twist.vx + swing.x, com.twist.vz + swing.z, com.twist.omega}};
+}
+
+/// State: pose and twist of the CoM. One guard: the tracked point passes the landing height downwards.
+template <class P>
+class Flying final : public dynamics::HybridSystemFrom<Flying<P>, 6> {
+ public:
+  Flying(const FlightProblem<P>& problem, bool lands) : problem_(problem), lands_(lands) {}
+  dynamics::FlowKind kind(int mode) const override {
+    return mode == kLanded ? dynamics::FlowKind::finished : dynamics::FlowKind::smooth;
+  }
+  std::string_view mode_name(int mode) const override { return mode == kLanded ? "landed" : "flying"; }
+  int guard_count(int) const override { return lands_ ? 1 : 0; }
+  dynamics::Guard guard(int, int) const override { return {"landing height", dynamics::Crossing::falling}; }
+
+  template <class S>
+  void flow_(const Phase&, const S&, const State<S, 6>& y, State<S, 6>& dy) const {
+    const Vec2<S> drag = quadratic_drag(convert<S>(problem_.drag_k), Vec2<S>{y[3], y[4]});
+    dy = {y[3], y[4], y[5], drag.x + convert<S>(problem_.gravity.x), drag.z + convert<S>(problem_.gravity.z), S(0)};
+  }
+  template <class S>
+  void guards_(const Phase&, const S&, const State<S, 6>& y, S* g) const {
+    const Vec2<S> offset{convert<S>(problem_.tracked.x), convert<S>(problem_.tracked.z)};
+    g[0] = y[1] + dynamics::rotate(y[2], offset).z - convert<S>(problem_.landing_height);
+  }
+  template <class S>
+  Entry<S, 6> on_guard_(const Phase&, int, const S& t, const State<S, 6>& y) const { return {kLanded, t, y, S(0)}; }
+
+ private:
+  const FlightProblem<P>& problem_;
+  bool lands_;
+};
+
+template <class S>
+void validate(const FlightProblem<S>& p) {
+  for (const S* x : {&p.pose.x, &p.pose.z, &p.pose.theta, &p.twist.vx, &p.twist.vz, &p.twist.omega, &p.gravity.x,
+                     &p.gravity.z, &p.landing_height, &p.tracked.x, &p.tracked.z})
+    if (!std::isfinite(value_of(*x))) throw std::invalid_argument("flight: a component of the problem is not finite");
+  if (!(value_of(p.drag_k) >= 0 && std::isfinite(value_of(p.drag_k))))
+    throw std::invalid_argument(fmt::format("flight: drag_k = {} is not in [0, inf) 1/m", value_of(p.drag_k)));
+}
+
+template <class S>
+State<S, 6> state_of(const FlightProblem<S>& p) {
+  return {p.pose.x, p.pose.z, p.pose.theta, p.twist.vx, p.twist.vz, p.twist.omega};
+}
+template <class S>
+Landing<S> landing_from(const S& t, const State<S, 6>& y, const Vec2<S>& tracked) {
+  return tracked_point(Landing<S>{t, {y[0], y[1], y[2]}, {y[3], y[4], y[5]}}, tracked);
+}
+
+bool has_derivative(double) { return false; }
+bool has_derivative(const Dual& x) { return !x.v.isZero(); }
+
+/// True if the closed form answers: no drag, nor a derivative with respect to it, and the CoM itself is tracked.
+template <class S>
+bool is_projectile(const FlightProblem<S>& p, bool lands) {
+  const bool centred = value_of(p.tracked.x) == 0 && value_of(p.tracked.z) == 0 && !has_derivative(p.tracked.x) &&
+                       !has_derivative(p.tracked.z);
+  return value_of(p.drag_k) == 0 && !has_derivative(p.drag_k) && (centred || !lands);
+}
+
+}  // namespace
+
+template <class S>
+FlightResult<S> fly(const FlightProblem<S>& problem, const dynamics::IntegratorOptions& options) {
+  validate(problem);
+  if (is_projectile(problem, true)) {
+    const auto landing = project(problem.pose, problem.twist, problem.gravity, problem.landing_height);
+    if (!landing || value_of(landing->flight_time) > problem.longest) return {FlightOutcome::never_reaches, {}, {}};
+    return {FlightOutcome::landed, dynamics::Outcome::finished, *landing};
+  }
+  const Flying<S> system(problem, true);
+  dynamics::IntegratorOptions smooth = options;
+  smooth.longest_step = std::max(options.longest_step, 0.05);  // the guard is a smooth height: no need for fine samples
+  const auto solution = dynamics::integrate<S, 6>(system, Entry<S, 6>{kFlying, S(0), state_of(problem), S(0)},
+                                                  S(problem.longest), smooth);
+  const FlightOutcome outcome = solution.outcome == dynamics::Outcome::finished  ? FlightOutcome::landed
+                                : solution.outcome == dynamics::Outcome::horizon ? FlightOutcome::never_reaches
+                                                                                 : FlightOutcome::not_solved;
+  return {outcome, solution.outcome, landing_from(solution.t, solution.y, problem.tracked)};
+}
+
+template <class S>
+std::vector<Pose<S>> fly_through(const FlightProblem<S>& problem, const std::vector<double>& times,
+                                 const dynamics::IntegratorOptions& options) {
+  validate(problem);
+  std::vector<Pose<S>> out;
+  out.reserve(times.size());
+  if (is_projectile(problem, false)) {
+    for (const double t : times)
+      out.push_back(tracked_point(ballistic(problem.pose, problem.twist, problem.gravity, S(t)), problem.tracked).pose);
+    return out;
+  }
+  double first = 0, last = 0;
+  for (const double t : times) first = std::min(first, t), last = std::max(last, t);
+  if (first < 0) throw std::invalid_argument(fmt::format("flight: time {} s lies before the state", first));
+  dynamics::IntegratorOptions recorded = options;
+  recorded.record = true;
+  recorded.longest_step = std::max(options.longest_step, 0.05);
+  const auto solution = dynamics::integrate<S, 6>(Flying<S>(problem, false),
+                                                  Entry<S, 6>{kFlying, S(0), state_of(problem), S(0)}, S(last), recorded);
+  if (solution.outcome != dynamics::Outcome::horizon)
+    throw std::runtime_error(fmt::format("flight: not solved ({})", to_string(solution.outcome)));
+  for (const double t : times)
+    out.push_back(last > 0 ? landing_from(S(t), solution.trajectory.at(S(t)), problem.tracked).pose
+                           : landing_from(S(0), solution.y, problem.tracked).pose);
+  return out;
+}
+
+template FlightResult<double> fly(const FlightProblem<double>&, const dynamics::IntegratorOptions&);
+template FlightResult<Dual> fly(const FlightProblem<Dual>&, const dynamics::IntegratorOptions&);
+template std::vector<Pose<double>> fly_through(const FlightProblem<double>&, const std::vector<double>&,
+                                               const dynamics::IntegratorOptions&);
+template std::vector<Pose<Dual>> fly_through(const FlightProblem<Dual>&, const std::vector<double>&,
+                                             const dynamics::IntegratorOptions&);
+
+}  // namespace unhand::flight

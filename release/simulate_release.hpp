@@ -1,0 +1,99 @@
+// The release: from a grasp in a moving hand to the state at detach.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "contact/contact_model.hpp"
+#include "dynamics/integrator.hpp"
+#include "release/grasp.hpp"
+#include "release/hand_motion.hpp"
+
+namespace unhand::release {
+
+/// Everything that determines a release. The references must outlive the simulation.
+template <class S>
+struct ReleaseProblem {
+  const HandMotion& hand;
+  const contact::NormalForce& normal_force;
+  const contact::ContactModel& contact;
+  dynamics::RigidBody<S> body;
+  dynamics::Vec2<S> gravity;  ///< m/s²
+  Grasp<S> grasp;
+  double start{};  ///< [s]; at rest in the hand
+};
+
+enum class ReleaseOutcome {
+  detached,         ///< free: the state at detach is the answer
+  never_separated,  ///< the normal force is still there at the end of the hand's motion
+  not_solved,       ///< the integrator stopped, see `integration`
+};
+const char* to_string(ReleaseOutcome);
+
+/// The one value that flight gets.
+template <class S>
+struct DetachState {
+  S time{};                 ///< [s]
+  dynamics::Pose<S> pose;   ///< of the CoM, in the world
+  dynamics::Twist<S> twist;
+};
+
+/// What happened, in order: the mode entered at `time`, and why.
+struct ModeEvent {
+  double time{};
+  std::string cause;  ///< the guard's name, "start", "time" or "limit"
+  std::string mode;   ///< the mode entered
+};
+
+/// Energy from the start to detach [J]: kinetic + potential change = hand + friction, and what is left is `residual`.
+struct EnergyLedger {
+  double mechanical_change{};  ///< ½ m v² + ½ I ω² − m g·p
+  double hand_work{};          ///< of the wrench through the hand's motion
+  double linear_friction{};    ///< ∫ f · v_r dt <= 0, without the part below
+  double torsional_friction{}; ///< ∫ τ ω_r dt <= 0
+  double nonphysical_work{};   ///< ∫ max(f · v_r, 0) dt where the law is a surrogate that may feed energy
+  double residual{};           ///< mechanical_change − all the others: the quadrature's and integrator's error
+};
+
+struct ReleaseOptions {
+  dynamics::IntegratorOptions integrator{};
+  bool ledger{false};  ///< book the energy (records the trajectory)
+};
+
+template <class S>
+struct ReleaseResult {
+  ReleaseOutcome outcome{};
+  dynamics::Outcome integration{};
+  bool slips_at_start{};  ///< the grip cannot hold the object even before it opens
+  DetachState<S> detach;
+  contact::Relative<S> relative;  ///< the object against the hand at detach
+  std::vector<dynamics::Event<S, 6>> events;
+  dynamics::Trajectory<S, 6> trajectory;  ///< relative states, if recorded
+  dynamics::IntegratorStatistics statistics;
+  EnergyLedger ledger;
+};
+
+/// Simulates from `problem.start` to detach. Throws std::invalid_argument when an input is not finite or out of range
+/// (mass, inertia, start against the hand's log). Instantiated for double and Dual.
+template <class S>
+ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const ReleaseOptions& options = {});
+
+/// The event log in words.
+template <class S>
+std::vector<ModeEvent> mode_events(const ReleaseProblem<S>& problem, const ReleaseResult<S>& result);
+
+/// A recorded release at t: pose, twist, and the wrench about the patch, all of the object in the world.
+template <class S>
+struct ReleaseSample {
+  std::string_view mode;
+  dynamics::Pose<S> pose;
+  dynamics::Twist<S> twist;
+  dynamics::Wrench<S> wrench;
+  HandState<S> hand;
+  S normal_force{};
+  contact::Relative<S> relative;
+};
+template <class S>
+ReleaseSample<S> sample_release(const ReleaseProblem<S>& problem, const ReleaseResult<S>& result, const S& t);
+
+}  // namespace unhand::release
