@@ -1,0 +1,80 @@
+// Smoothing splines for logged series: weighted least squares with a B-spline basis, on as few knots as the
+// declared noise allows.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "dynamics/piecewise_polynomial.hpp"
+
+namespace unhand::dynamics {
+
+/// Measured values of one derivative of all channels: y_n = d^derivative f(t_n) + noise, row-major N ×
+/// Channels.
+template <int Channels>
+struct SplineObservations {
+  int derivative{};                      ///< 0, 1 or 2
+  std::span<const double> time;          ///< s, increasing; values outside [begin, end] are not used
+  std::span<const double> value;         ///< u, u/s or u/s²
+  std::array<double, Channels> sigma{};  ///< noise, 1 σ, in the units of `value`; > 0
+};
+
+/// An interior break of a spline that is less smooth than an ordinary knot.
+struct SplineBreak {
+  double time{};     ///< s
+  int continuity{};  ///< derivatives that are continuous: 0 a kink of the value, 1 a jump of the second
+                     ///< derivative
+};
+
+/// Which spline on [begin, end] [s]: pieces of degree `Degree`, Degree − 1 times continuously differentiable
+/// except at `breaks`. A sample exactly at a break belongs to the piece on its right.
+template <int Channels, int Degree>
+struct SplineProblem {
+  double begin{}, end{};
+  std::vector<SplineBreak> breaks;  ///< increasing, strictly inside (begin, end)
+  std::vector<SplineObservations<Channels>> observations;
+  std::optional<std::array<double, Channels>> end_value{};  ///< value prescribed at `end`, if any
+};
+
+struct SplineOptions {
+  /// Intervals in each stretch between breaks to begin with.
+  int initial_intervals = 1;
+  /// Whether to halve intervals until the residual is noise; otherwise the initial ones stay.
+  bool refine = true;
+  /// χ² per degree of freedom up to which the residual counts as noise, beside its own statistical scatter.
+  double chi2_target = 1.1;
+  /// Fewest samples in an interval.
+  int min_samples_per_interval = 3;
+};
+
+template <int Channels>
+struct SplineSummary {
+  /// Mean square of residual/σ per observed series (in the order given) and channel.
+  std::vector<std::array<double, Channels>> chi2;
+  double chi2_per_dof{};           ///< of everything together; 0 where nothing is left over
+  double max_whitened_residual{};  ///< largest |residual|/σ
+  int knots{};                     ///< breaks strictly inside (begin, end)
+  bool noise_reached{};            ///< every interval's residual is noise
+};
+
+template <int Channels, int Degree>
+struct SplineFit {
+  PiecewisePolynomial<Channels, Degree> polynomial;
+  SplineSummary<Channels> summary;
+};
+
+/// Minimises Σ ((f^(k)(t_n) − y_n)/σ)² over the splines of the problem. Knots: each stretch between breaks
+/// begins with few equal intervals; those whose χ² exceeds the target by more than four standard deviations
+/// of a χ² variable are halved, until none is left, halving no longer pays, or the samples run out. Solved by
+/// banded Householder QR in time relative to `begin`, so that σ of very different size do not square the
+/// condition number.
+///
+/// Instantiated for <1,3>, <1,5> and <3,5>. Throws std::invalid_argument for a malformed problem, or for
+/// observations that do not determine the spline.
+template <int Channels, int Degree>
+SplineFit<Channels, Degree> fit_spline(const SplineProblem<Channels, Degree>& problem,
+                                       const SplineOptions& options = {});
+
+}  // namespace unhand::dynamics
