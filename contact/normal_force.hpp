@@ -2,9 +2,11 @@
 // noise known.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "dynamics/piecewise_polynomial.hpp"
@@ -48,28 +50,25 @@ struct OpeningProfile {
 /// s = (t − t_open − δ)/T;  f_N = f₀ for s <= 0,  f₀ (1 − s)^p for 0 < s < 1,  0 for s >= 1.
 ///
 /// The branch is that of the window: inside a window that ends at a kink the limit from the left holds. For p
-/// < 1 the slope is unbounded at s → 1: the value is exact up to the end, the derivatives are those at 1 − s
-/// = 1e-9.
+/// < 1 the slope is unbounded at s → 1: the value is exact up to the end, derivatives are taken no nearer to
+/// it than 1 − s = 1e-9.
 template <class S>
 S opening_profile(const OpeningProfile<S>& q, const Window& window, const S& t) {
   using dynamics::value_of;
-  using std::pow;
-  const double start = q.open_command + value_of(q.dead_time), span = value_of(q.opening_time);
-  // a point well inside the window decides for the branch at its limits
+  const double start = q.open_command + value_of(q.dead_time), end = start + value_of(q.opening_time);
+  // A point well inside the window decides for the branch at its limits.
   const double snap = std::min(1e-9, 0.25 * (window.end - window.begin));
-  const double at = std::min(std::max(value_of(t), window.begin + snap), window.end - snap);
-  if (at <= start) return q.grip_force;
-  if (at >= start + span) return S(0.0);
+  const double inside = std::min(std::max(value_of(t), window.begin + snap), window.end - snap);
+  if (inside <= start) return q.grip_force;
+  if (inside >= end) return S(0.0);
   const S rest = 1.0 - (t - q.open_command - q.dead_time) / q.opening_time;
-  const double least = std::min(value_of(rest), 1.0), p = value_of(q.shape), f0 = value_of(q.grip_force);
-  if (least <= 0.0) return S(0.0);
-  const double clamped = std::max(least, 1e-9);
+  const double u = std::clamp(value_of(rest), 0.0, 1.0), p = value_of(q.shape), f0 = value_of(q.grip_force);
+  const double power = p == 1.0 ? u : std::pow(u, p);
   if constexpr (std::is_same_v<S, double>) {
-    return f0 * pow(least, p);
+    return f0 * power;
   } else {
-    const double power = pow(clamped, p);
-    return S(f0 * pow(least, p), power * q.grip_force.v + f0 * p * power / clamped * rest.v +
-                                     f0 * power * std::log(clamped) * q.shape.v);
+    const double v = std::max(u, 1e-9), slope = p == 1.0 ? 1.0 : p * std::pow(v, p - 1.0);
+    return S(f0 * power, power * q.grip_force.v + f0 * slope * rest.v + f0 * power * std::log(v) * q.shape.v);
   }
 }
 
@@ -93,10 +92,10 @@ class ProfileNormalForce final : public NormalForce {
   OpeningProfile<double> values_;
 };
 
-/// A smoothed measured series: cubic pieces, >= 0 everywhere, exactly 0 from the release on.
+/// A smoothed measured series: polynomial pieces, >= 0 everywhere, exactly 0 from the release on.
 class SampledNormalForce final : public NormalForce {
  public:
-  using Polynomial = dynamics::PiecewisePolynomial<1, 3>;
+  using Polynomial = dynamics::PiecewisePolynomial<1, 5>;
 
   /// `kinks` [s], increasing: the breaks of `force` [N] at which the force or its slope jumps. `release` [s]
   /// is the last of them, or +infinity. Values below zero are cut off at zero.
@@ -124,27 +123,32 @@ class SampledNormalForce final : public NormalForce {
 struct NormalForceOptions {
   /// χ² per degree of freedom up to which the residual counts as noise, beside its own statistical scatter.
   double chi2_target = 1.1;
-  /// Fewest samples in a knot interval.
+  /// Fewest samples in a knot interval, where the series is followed by a spline.
   int min_samples_per_interval = 3;
-  /// The largest plateau after the opening that still counts as zero, as a fraction of the grip force. A
-  /// larger one means that the pad still presses, and there is no release.
+  /// The largest plateau after the opening that still counts as the sensor's zero, as a fraction of the grip
+  /// force (or five σ, if that is more). A larger one means that the pad still presses, and there is no
+  /// release.
   double max_tail_bias = 0.05;
 };
 
 /// What the smoothing found.
 struct NormalForceSummary {
   double sigma{};         ///< noise used [N]
-  double chi2_per_dof{};  ///< of the smoothed force against the series before the release
-  double max_whitened_residual{};
-  int knots{};          ///< breaks strictly between the first sample and the release
+  double chi2_per_dof{};  ///< of the smoothed force, and of the tail's level, against the whole series
+  double max_whitened_residual{};  ///< largest |residual|/σ
+  int knots{};                     ///< breaks strictly between the first sample and the release
+  bool power_law{};  ///< the ramp is (1 − s)^p to within the noise; otherwise a spline follows the samples
   double grip_force{};  ///< at the start of the opening [N]
   double opening_start{
-      std::numeric_limits<double>::quiet_NaN()};           ///< first change of the force [s]; NaN: none
-  double shape{std::numeric_limits<double>::quiet_NaN()};  ///< exponent p of the ramp's end; NaN: no ramp
-  double release_time{std::numeric_limits<double>::infinity()};    ///< s
-  double release_sigma{std::numeric_limits<double>::quiet_NaN()};  ///< its 1-σ uncertainty from the noise [s]
+      std::numeric_limits<double>::quiet_NaN()};  ///< first change of the force [s]; NaN: none
+  double shape{
+      std::numeric_limits<double>::quiet_NaN()};  ///< exponent p (of the ramp's end) [-]; NaN: no ramp
+  double release_time{std::numeric_limits<double>::infinity()};  ///< [s]
+  double release_sigma{
+      std::numeric_limits<double>::quiet_NaN()};  ///< 1 σ of it, from the noise [s]; NaN: no release
   double tail_mean{};  ///< mean of the series after the release [N]: the sensor's bias, if it has one
-  double tail_mean_sigma{std::numeric_limits<double>::infinity()};  ///< [N]; infinite without samples there
+  double tail_mean_sigma{
+      std::numeric_limits<double>::infinity()};  ///< 1 σ of it [N]; infinite without samples there
 };
 
 struct NormalForceFit {
@@ -155,18 +159,23 @@ struct NormalForceFit {
 /// Smooths a measured normal force [N] at `time` [s]; `sigma` is its declared noise [N] (0 or NaN: estimated
 /// from the series' own scatter).
 ///
-/// The series is taken as a slowly varying grip, one opening ramp that starts with a kink and falls like (1 −
-/// s)^p, and a tail. Start, end and p are found by least squares together with the tail's level, so the
-/// release is known to well below a sample; the force itself is then a cubic spline with a kink at the start,
-/// zero at the release.
+/// The last opening of the series is taken as a straight grip, a ramp A (1 − s)^p that starts with a kink,
+/// and a level tail. Start, end, p and levels are found together by least squares, so the release is known to
+/// well below a sample. Where the residual is noise, that curve is the smoothed force (in pieces of degree
+/// five); otherwise start and end are found again from their neighbourhoods, and a smoothing spline with a
+/// kink at the start follows the samples. The last bit before the release (below the noise, or 1 % of the
+/// grip) falls monotonically to zero.
 ///
-/// A sensor bias shows as a tail that is not zero. The force is **not** shifted by it: the release is where
-/// the ramp meets the tail's plateau, the spline is pulled to zero there, and `tail_mean` reports the bias. A
-/// plateau higher than `max_tail_bias` of the grip force is contact, not bias: release_time is +infinity
-/// then, as it is when the series ends before the force does.
+/// **A sensor bias** shows as a tail that is not zero. The release is where the ramp meets the tail's
+/// plateau, whatever its level; `tail_mean` reports that level. The grip is not shifted by it; over the ramp
+/// it is faded out linearly, so that the force ends at zero where the pads part.
 ///
-/// Throws std::invalid_argument for fewer than four samples, sizes that differ, times that do not increase or
-/// a value that is not finite.
+/// The release is +infinity, and a spline follows all samples, where the series ends before its plateau
+/// (three samples) or the plateau is no zero (`max_tail_bias`). Before the first sample the force is
+/// constant.
+///
+/// Throws std::invalid_argument for fewer than four samples, sizes that differ, times that do not increase,
+/// or a value that is not finite.
 NormalForceFit smooth_normal_force(std::span<const double> time, std::span<const double> value, double sigma,
                                    const NormalForceOptions& options = {});
 

@@ -131,6 +131,7 @@ class Solver {
   double largest() const { return largest_; }
   // Per interval, and within it per series.
   const std::vector<double>& interval_chi2() const { return interval_chi2_; }
+  const std::vector<double>& interval_lag() const { return interval_lag_; }  // sum of products of neighbours
   const std::vector<int>& interval_rows() const { return interval_rows_; }
   const std::vector<int>& interval_instants() const { return interval_instants_; }
   std::size_t values() const { return rows_.size() * Channels; }
@@ -280,7 +281,9 @@ class Solver {
     series_rows_.assign(problem_.observations.size(), 0);
     const std::size_t series = problem_.observations.size();
     interval_chi2_.assign(grid.column.size() * series, 0.0);
+    interval_lag_.assign(grid.column.size() * series, 0.0);
     interval_rows_.assign(grid.column.size() * series, 0);
+    std::vector<std::array<double, Channels>> last(series);
     total_ = largest_ = 0.0;
     for (const auto& row : rows_) {
       const auto& sigma = problem_.observations[row.series].sigma;
@@ -291,6 +294,9 @@ class Solver {
         const double e = (model - row.value[c]) / sigma[c];
         series_chi2_[row.series][c] += e * e;
         interval_chi2_[row.interval * series + row.series] += e * e;
+        if (interval_rows_[row.interval * series + row.series] > 0)
+          interval_lag_[row.interval * series + row.series] += e * last[row.series][c];
+        last[row.series][c] = e;
         total_ += e * e;
         largest_ = std::max(largest_, std::abs(e));
       }
@@ -305,7 +311,7 @@ class Solver {
   std::vector<Row<Channels, Degree>> rows_;
   std::vector<double> factor_, block_, coefficients_;
   std::vector<std::array<double, Channels>> series_chi2_;
-  std::vector<double> interval_chi2_;
+  std::vector<double> interval_chi2_, interval_lag_;
   std::vector<int> series_rows_, interval_rows_, interval_instants_;
   double total_{}, largest_{};
 };
@@ -381,25 +387,28 @@ SplineFit<Channels, Degree> fit_spline(const SplineProblem<Channels, Degree>& pr
   Solver<Channels, Degree> solver(problem);
   solver.solve(grid);
   const auto dof = [&] { return static_cast<double>(solver.values()) - grid.functions * Channels; };
-  const auto limit = [&](double n) { return options.chi2_target * n + 4.0 * std::sqrt(2.0 * n); };
+  const auto limit = [&](double n, double z) { return options.chi2_target * n + z * std::sqrt(2.0 * n); };
+  constexpr double kSignificant = 3.0, kCertain = 4.5;
   const std::size_t series = problem.observations.size();
-  double bad_total = 0.0;  // the chi2 that halving is meant to lower
-  const auto find_bad = [&] {
+  double bad_total = 0.0;                // the chi2 that halving is meant to lower
+  const auto find_bad = [&](double z) {  // intervals whose residual is not noise, at z standard deviations
     std::vector<bool> bad(grid.column.size());
     bad_total = 0.0;
     for (std::size_t i = 0; i < bad.size(); ++i)
       for (std::size_t k = i * series; k < (i + 1) * series; ++k)
-        if (solver.interval_chi2()[k] > limit(solver.interval_rows()[k])) {
+        // A misfit is smooth: it shows in the product of neighbours before it does in the size.
+        if (solver.interval_chi2()[k] > limit(solver.interval_rows()[k], z) ||
+            solver.interval_lag()[k] > z * std::sqrt(static_cast<double>(solver.interval_rows()[k]))) {
           bad[i] = true;
           bad_total += solver.interval_chi2()[k];
         }
-    if (solver.total() > limit(std::max(1.0, dof())) && bad_total == 0.0) {
+    if (solver.total() > limit(std::max(1.0, dof()), z) && bad_total == 0.0) {
       bad.assign(bad.size(), true);
       bad_total = solver.total();
     }
     return bad;
   };
-  std::vector<bool> bad = find_bad();
+  std::vector<bool> bad = find_bad(kSignificant);
   const auto is_noise = [&] { return std::find(bad.begin(), bad.end(), true) == bad.end(); };
   if (options.refine) {
     Grid best = grid;
@@ -418,14 +427,14 @@ SplineFit<Channels, Degree> fit_spline(const SplineProblem<Channels, Degree>& pr
       } else {
         ++idle;  // a symmetric misfit may need two halvings to give way
       }
-      bad = find_bad();
+      bad = find_bad(kSignificant);
     }
     if (best.functions != grid.functions) {
       grid = best;
       solver.solve(grid);
-      bad = find_bad();
     }
   }
+  bad = find_bad(kCertain);  // an interval that only looked bad, and did not improve, is no misfit
   SplineFit<Channels, Degree> fit{solver.polynomial(grid), {}};
   fit.summary.chi2 = solver.series_chi2();
   fit.summary.chi2_per_dof = dof() > 0.0 ? solver.total() / dof() : 0.0;

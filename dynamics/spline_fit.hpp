@@ -56,7 +56,7 @@ struct SplineSummary {
   double chi2_per_dof{};           ///< of everything together; 0 where nothing is left over
   double max_whitened_residual{};  ///< largest |residual|/σ
   int knots{};                     ///< breaks strictly inside (begin, end)
-  bool noise_reached{};            ///< every interval's residual is noise
+  bool noise_reached{};            ///< no interval has a certain misfit (4.5 standard deviations)
 };
 
 template <int Channels, int Degree>
@@ -66,10 +66,11 @@ struct SplineFit {
 };
 
 /// Minimises Σ ((f^(k)(t_n) − y_n)/σ)² over the splines of the problem. Knots: each stretch between breaks
-/// begins with few equal intervals; those whose χ² exceeds the target by more than four standard deviations
-/// of a χ² variable are halved, until none is left, halving no longer pays, or the samples run out. Solved by
-/// banded Householder QR in time relative to `begin`, so that σ of very different size do not square the
-/// condition number.
+/// begins with few equal intervals; those are halved in which the residual of some series is not noise (its
+/// χ² exceeds the target by more than three standard deviations, or its neighbours are correlated by more
+/// than three), until none is left, halving no longer pays, or the samples run out. Solved by banded
+/// Householder QR in time relative to `begin`, so that σ of very different size do not square the condition
+/// number.
 ///
 /// Instantiated for <1,3>, <1,5> and <3,5>. Throws std::invalid_argument for a malformed problem, or for
 /// observations that do not determine the spline.

@@ -205,7 +205,7 @@ double instant_of(const HandSeries& s, const Found& jump, std::size_t from, std:
   }
   if (!(information > 0.0)) return t;
   const double shift = -sum / information, sigma = 1.0 / std::sqrt(information);
-  const bool resolved = sigma < 0.05 * (t - before) && std::abs(shift) > 6.0 * sigma + 0.01 * (t - before);
+  const bool resolved = sigma < 0.05 * (t - before) && std::abs(shift) > 6.0 * sigma + 1e-4 * (t - before);
   return resolved && shift < 0.0 ? std::max(t + shift, before) : t;
 }
 

@@ -114,7 +114,7 @@ struct HandFitSummary {
   double chi2_per_dof{};                                                    ///< of everything together
   double max_whitened_residual{};                                           ///< largest |residual|/σ
   int knots{};           ///< breaks strictly inside (begin, end), jumps included
-  bool noise_reached{};  ///< chi2_per_dof went below the target
+  bool noise_reached{};  ///< no stretch has a misfit beyond doubt (4.5 standard deviations)
 };
 
 struct HandFit {

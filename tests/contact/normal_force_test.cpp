@@ -1,0 +1,350 @@
+// The opening profile with its derivatives, and normal forces recovered from noisy series.
+#include "contact/normal_force.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace {
+
+using namespace unhand;
+using namespace unhand::contact;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr Window kAlways{-kInfinity, kInfinity};
+
+OpeningProfile<double> profile(double p) { return {0.05, 25.0, 0.007, 0.055, p}; }
+
+TEST(ProfileNormalForce, IsTheFormula) {
+  for (double p : {0.7, 1.0, 1.25, 2.5}) {
+    const ProfileNormalForce f(profile(p));
+    EXPECT_EQ(f.at(kAlways, -1.0), 25.0);
+    EXPECT_EQ(f.at(kAlways, 0.057), 25.0);
+    EXPECT_NEAR(f.at(kAlways, 0.057 + 0.25 * 0.055), 25.0 * std::pow(0.75, p), 1e-12);
+    EXPECT_EQ(f.at(kAlways, 0.2), 0.0);
+    EXPECT_NEAR(f.release_time(), 0.112, 1e-15);
+    EXPECT_EQ(f.kinks(), (std::vector<double>{0.05 + 0.007, f.release_time()}));
+  }
+}
+
+TEST(ProfileNormalForce, DerivativesAreThoseOfTheFormula) {
+  // parameters 0 ... 3, time 4; central differences at steps over powers of ten: the best agrees to 1e-8
+  const double t = 0.08;
+  for (double p : {0.7, 1.0, 2.0}) {
+    const OpeningProfile<double> q = profile(p);
+    const OpeningProfile<Dual> d{q.open_command, Dual(q.grip_force, 0), Dual(q.dead_time, 1),
+                                 Dual(q.opening_time, 2), Dual(q.shape, 3)};
+    const Dual f = ProfileNormalForce(d).at(kAlways, Dual(t, 4));
+    EXPECT_EQ(f.a, ProfileNormalForce(q).at(kAlways, t));
+    for (int k = 0; k < 5; ++k) {
+      const auto shifted = [&](double h) {
+        OpeningProfile<double> x = q;
+        if (k == 0) x.grip_force += h;
+        if (k == 1) x.dead_time += h;
+        if (k == 2) x.opening_time += h;
+        if (k == 3) x.shape += h;
+        return ProfileNormalForce(x).at(kAlways, k == 4 ? t + h : t);
+      };
+      double best = kInfinity;
+      for (double h : {1e-4, 1e-5, 1e-6, 1e-7})
+        best = std::min(best, std::abs((shifted(h) - shifted(-h)) / (2 * h) - f.v[k]));
+      EXPECT_LT(best, 1e-8 * std::max(1.0, std::abs(f.v[k]))) << "p " << p << " parameter " << k;
+    }
+    std::vector<Dual> kinks;
+    ProfileNormalForce(d).kinks(kinks);
+    ASSERT_EQ(kinks.size(), 2u);
+    EXPECT_EQ(kinks[1].a, ProfileNormalForce(q).release_time());
+    EXPECT_EQ(kinks[0].v[1], 1.0);
+    EXPECT_EQ(kinks[0].v[2], 0.0);
+    EXPECT_EQ(kinks[1].v[2], 1.0);
+  }
+}
+
+TEST(ProfileNormalForce, TakesTheBranchOfTheWindowAndStaysFinite) {
+  for (double p : {0.5, 1.0, 1.5, 3.0}) {
+    const OpeningProfile<double> q = profile(p);
+    const ProfileNormalForce f(OpeningProfile<Dual>{q.open_command, Dual(q.grip_force), Dual(q.dead_time),
+                                                    Dual(q.opening_time), Dual(q.shape, 3)});
+    const double start = f.kinks()[0], end = f.kinks()[1];
+    EXPECT_EQ(f.at(Window{0.0, start}, Dual(start, 0)).v[0], 0.0);
+    EXPECT_NEAR(f.at(Window{start, end}, Dual(start, 0)).v[0], -25.0 * p / 0.055, 1e-9);
+    EXPECT_EQ(f.at(Window{end, 1.0}, Dual(end, 0)).v[0], 0.0);
+    const Dual last = f.at(Window{start, end}, Dual(end, 0));
+    EXPECT_GE(last.a, 0.0);
+    EXPECT_LT(last.a, 1e-6);
+    for (int k = 0; k < dynamics::kDualSize; ++k) EXPECT_TRUE(std::isfinite(last.v[k]));
+    if (p == 1.0) {
+      EXPECT_NEAR(last.v[0], -25.0 / 0.055, 1e-9);
+    }  // the limit from the left
+  }
+}
+
+TEST(ProfileNormalForce, RejectsWhatIsOutOfRange) {
+  const auto message = [](OpeningProfile<double> q) -> std::string {
+    try {
+      const ProfileNormalForce f(q);
+    } catch (const std::invalid_argument& e) {
+      return e.what();
+    }
+    return "";
+  };
+  OpeningProfile<double> q = profile(1.0);
+  EXPECT_EQ(message(q), "");
+  q.shape = 0.0;
+  EXPECT_NE(message(q).find("shape"), std::string::npos);
+  q = profile(1.0);
+  q.opening_time = -0.1;
+  EXPECT_NE(message(q).find("opening_time = -0.1"), std::string::npos);
+  q = profile(1.0);
+  q.dead_time = -1e-3;
+  EXPECT_NE(message(q).find("dead_time"), std::string::npos);
+  q = profile(1.0);
+  q.grip_force = NAN;
+  EXPECT_NE(message(q).find("grip_force"), std::string::npos);
+}
+
+struct Log {
+  std::vector<double> time, value;
+};
+
+template <class F>
+Log record(const F& f, double noise, std::mt19937_64& random, double from = -0.01, int n = 311) {
+  std::normal_distribution<double> normal;
+  Log log;
+  for (int k = 0; k < n; ++k) {
+    log.time.push_back(from + 1e-3 * k);
+    log.value.push_back(f(log.time.back()) + noise * normal(random));
+  }
+  return log;
+}
+
+double ramp(double t, double f0, double start, double length, double p) {
+  return f0 * std::pow(std::clamp((start + length - t) / length, 0.0, 1.0), p);
+}
+
+// Every promise of the class, whatever the series was.
+void expect_sound(const NormalForceFit& fit, const Log& log) {
+  const double release = fit.force.release_time();
+  const auto kinks = fit.force.kinks();
+  std::vector<double> events = {log.time.front()};
+  for (double k : kinks)
+    if (k > events.back() && k < log.time.back()) events.push_back(k);
+  events.push_back(log.time.back());
+  double before = -1.0;
+  for (std::size_t i = 0; i + 1 < events.size(); ++i) {
+    const Window window{events[i], events[i + 1]};
+    for (int k = 0; k <= 50; ++k) {
+      const double t = window.begin + (window.end - window.begin) * k / 50.0;
+      const double f = fit.force.at(window, t);
+      ASSERT_TRUE(std::isfinite(f) && f >= 0.0) << t;
+      if (window.begin >= release) {
+        ASSERT_EQ(f, 0.0) << t;
+      }
+      if (k == 0 && before >= 0.0) {
+        EXPECT_NEAR(f, before, 1e-3) << "the force jumps at " << t;
+      }
+      before = f;
+    }
+  }
+  if (std::isfinite(release)) {
+    ASSERT_FALSE(kinks.empty());
+    EXPECT_EQ(kinks.back(), release);
+    EXPECT_EQ(fit.force.at(kAlways, release + 1.0), 0.0);
+  }
+  EXPECT_EQ(fit.summary.release_time, release);
+}
+
+TEST(SmoothNormalForce, FindsTheReleaseToAFractionOfASample) {
+  std::mt19937_64 random(21);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  // With 25 N over 55 ms and 0.05 N of noise, the covariance of (release, p) gives 0.03, 0.06, 0.09, 0.21
+  // samples: the flatter the end, the less it is seen.
+  struct Case {
+    double p, bound;
+  };
+  for (const Case& c : {Case{0.7, 0.05}, {1.0, 0.08}, {1.25, 0.12}, {2.0, 0.30}}) {
+    const double p = c.p, bound = c.bound;
+    double sum = 0.0, square = 0.0, claimed = 0.0, error = 0.0;
+    int samples = 0;
+    constexpr int kRuns = 200;
+    for (int run = 0; run < kRuns; ++run) {
+      const double start = 0.057 + 1e-3 * uniform(random), length = 0.05 + 0.01 * uniform(random);
+      const auto truth = [&](double t) { return ramp(t, 25.0, start, length, p); };
+      const Log log = record(truth, 0.05, random);
+      const NormalForceFit fit = smooth_normal_force(log.time, log.value, 0.05);
+      expect_sound(fit, log);
+      const double e = (fit.summary.release_time - start - length) / 1e-3;
+      sum += e;
+      square += e * e;
+      claimed += fit.summary.release_sigma / 1e-3;
+      for (double t : log.time)
+        if (t < start + length) {
+          error += std::pow(fit.force.at(kAlways, t) - truth(t), 2);
+          ++samples;
+        }
+      EXPECT_NEAR(fit.summary.opening_start, start, 0.5e-3);
+      EXPECT_NEAR(fit.summary.shape, p, 0.08 * p);
+    }
+    const double mean = sum / kRuns, scatter = std::sqrt(square / kRuns - mean * mean);
+    EXPECT_LT(std::abs(mean), 0.1) << p;
+    EXPECT_LT(scatter, bound) << p;
+    EXPECT_NEAR(scatter, claimed / kRuns, 0.2 * scatter) << p;  // 200 runs know their scatter to 5 %
+    EXPECT_LT(std::sqrt(error / samples), 0.05 / 3.0) << p;  // noise reduction: six parameters, 120 samples
+  }
+}
+
+TEST(SmoothNormalForce, ExactSeriesIsReproduced) {
+  std::mt19937_64 random(1);
+  for (double p : {0.8, 1.0, 1.5}) {
+    const auto truth = [&](double t) { return ramp(t, 25.0, 0.0573, 0.0542, p); };
+    const Log log = record(truth, 0.0, random);
+    const NormalForceFit fit = smooth_normal_force(log.time, log.value, 0.05);
+    expect_sound(fit, log);
+    EXPECT_NEAR(fit.summary.release_time, 0.1115, 1e-6);
+    // the pieces follow the curve to a fraction of the declared noise
+    for (double t = -0.01; t < 0.12; t += 0.31e-3) EXPECT_NEAR(fit.force.at(kAlways, t), truth(t), 0.01) << t;
+  }
+}
+
+TEST(SmoothNormalForce, SlopeIsTheDerivative) {
+  std::mt19937_64 random(22);
+  const Log log = record([](double t) { return ramp(t, 25.0, 0.057, 0.055, 1.25); }, 0.05, random);
+  const NormalForceFit fit = smooth_normal_force(log.time, log.value, 0.05);
+  const double t = 0.08, h = 1e-6;
+  const Dual f = fit.force.at(kAlways, Dual(t, 0));
+  EXPECT_EQ(f.a, fit.force.at(kAlways, t));
+  EXPECT_NEAR(f.v[0], (fit.force.at(kAlways, t + h) - fit.force.at(kAlways, t - h)) / (2 * h), 1e-5);
+  EXPECT_NEAR(f.v[0], -25.0 * 1.25 / 0.055 * std::pow(32.0 / 55.0, 0.25), 5.0);
+}
+
+TEST(SmoothNormalForce, BiasIsReportedAndDoesNotMoveTheRelease) {
+  std::mt19937_64 random(23);
+  for (double bias : {0.3, -0.3}) {
+    double sum = 0.0;
+    for (int run = 0; run < 50; ++run) {
+      const Log log =
+          record([&](double t) { return ramp(t, 25.0, 0.0575, 0.055, 1.0) + bias; }, 0.05, random);
+      const NormalForceFit fit = smooth_normal_force(log.time, log.value, 0.05);
+      expect_sound(fit, log);
+      sum += fit.summary.release_time - 0.1125;
+      EXPECT_NEAR(fit.summary.tail_mean, bias, 6.0 * fit.summary.tail_mean_sigma);
+      EXPECT_NEAR(fit.force.at(kAlways, 0.0), 25.0 + bias, 0.05);  // the grip is as measured
+    }
+    EXPECT_LT(std::abs(sum / 50), 0.1e-3);
+  }
+  // A pad that keeps pressing is not a bias.
+  const Log log = record([](double t) { return ramp(t, 20.0, 0.0575, 0.055, 1.0) + 5.0; }, 0.05, random);
+  const NormalForceFit fit = smooth_normal_force(log.time, log.value, 0.05);
+  expect_sound(fit, log);
+  EXPECT_EQ(fit.summary.release_time, kInfinity);
+  EXPECT_NEAR(fit.force.at(kAlways, 0.2), 5.0, 0.05);
+  EXPECT_NEAR(fit.force.at(kAlways, 9.0), 5.0, 0.2);
+}
+
+TEST(SmoothNormalForce, NoReleaseWhereTheSeriesEndsFirst) {
+  std::mt19937_64 random(24);
+  for (int n :
+       {20, 66, 90, 115, 122}) {  // in the grip, at the start, in the ramp, near its end (122: 0.5 ms before)
+    const Log log =
+        record([](double t) { return ramp(t, 25.0, 0.0575, 0.055, 1.0); }, 0.05, random, -0.01, n);
+    const NormalForceFit fit = smooth_normal_force(log.time, log.value, 0.05);
+    expect_sound(fit, log);
+    EXPECT_EQ(fit.summary.release_time, kInfinity) << n;
+  }
+}
+
+TEST(SmoothNormalForce, OtherRampsAreFollowedByASpline) {
+  std::mt19937_64 random(25);
+  // A slowly varying grip, and a ramp that is no power: steep, a shelf, steep again.
+  const auto truth = [](double t) {
+    const double grip = 25.0 + 0.8 * std::sin(40.0 * std::min(t, 0.0575));
+    const double u = std::clamp((0.1125 - t) / 0.055, 0.0, 1.0);
+    return grip * (u + 0.12 * std::sin(2.0 * 3.14159265358979 * u));
+  };
+  double sum = 0.0, square = 0.0;
+  for (int run = 0; run < 50; ++run) {
+    const Log log = record(truth, 0.05, random);
+    const NormalForceFit fit = smooth_normal_force(log.time, log.value, 0.05);
+    expect_sound(fit, log);
+    EXPECT_FALSE(fit.summary.power_law);
+    EXPECT_LT(fit.summary.chi2_per_dof, 1.6);
+    const double e = (fit.summary.release_time - 0.1125) / 1e-3;
+    sum += e;
+    square += e * e;
+  }
+  EXPECT_LT(std::sqrt(square / 50), 0.5);
+  EXPECT_LT(std::abs(sum / 50), 0.3);  // the power that stands in for the ramp's end is not its form
+}
+
+TEST(SmoothNormalForce, LaterGripsAndOddSeriesAreSurvived) {
+  std::mt19937_64 random(26);
+  const auto again = [](double t) {  // opens, closes once more, opens for good
+    if (t < 0.1) return ramp(t, 25.0, 0.02, 0.04, 1.0);
+    if (t < 0.13) return 15.0 * (t - 0.1) / 0.03;
+    return ramp(t, 15.0, 0.16, 0.05, 1.0);
+  };
+  Log log = record(again, 0.05, random);
+  NormalForceFit fit = smooth_normal_force(log.time, log.value, 0.05);
+  expect_sound(fit, log);
+  EXPECT_NEAR(fit.summary.release_time, 0.21, 0.5e-3);
+
+  log = record([](double) { return 0.0; }, 0.05, random);  // never gripped
+  fit = smooth_normal_force(log.time, log.value, 0.05);
+  expect_sound(fit, log);
+  EXPECT_EQ(fit.summary.release_time, log.time.front());
+
+  log = record([](double) { return 20.0; }, 0.05, random);  // never opened
+  fit = smooth_normal_force(log.time, log.value, 0.05);
+  expect_sound(fit, log);
+  EXPECT_EQ(fit.summary.release_time, kInfinity);
+
+  log = record([](double t) { return t < 0.1 ? 20.0 : 0.0; }, 0.05, random);  // at once
+  fit = smooth_normal_force(log.time, log.value, 0.05);
+  expect_sound(fit, log);
+  EXPECT_NEAR(fit.summary.release_time, 0.1, 1.5e-3);
+
+  log = record([](double t) { return ramp(t, 20.0, -0.05, 0.1, 1.0); }, 0.05,
+               random);  // opening before the log
+  fit = smooth_normal_force(log.time, log.value, 0.05);
+  expect_sound(fit, log);
+  EXPECT_NEAR(fit.summary.release_time, 0.05, 0.5e-3);
+
+  for (int n = 4; n < 14; ++n) {  // hardly any samples
+    log = record([](double t) { return ramp(t, 20.0, 0.002, 0.003, 1.0); }, 0.05, random, 0.0, n);
+    expect_sound(smooth_normal_force(log.time, log.value, 0.05), log);
+  }
+  std::normal_distribution<double> normal;
+  for (int run = 0; run < 200; ++run) {  // random walks
+    double level = 0.0;
+    for (double& f : log.value) f = level += normal(random);
+    expect_sound(smooth_normal_force(log.time, log.value, run % 2 ? 0.05 : 0.0), log);
+  }
+  for (int run = 0; run < 200; ++run) {  // random walks that end at zero
+    log = record([](double) { return 0.0; }, 0.0, random, 0.0, 80);
+    double level = 30.0;
+    for (int k = 0; k < 70; ++k) log.value[k] = level += normal(random);
+    expect_sound(smooth_normal_force(log.time, log.value, run % 2 ? 0.05 : 0.0), log);
+  }
+}
+
+TEST(SmoothNormalForce, UndeclaredNoiseIsEstimated) {
+  std::mt19937_64 random(27);
+  const Log log = record([](double t) { return ramp(t, 25.0, 0.0575, 0.055, 1.0); }, 0.05, random);
+  const NormalForceFit fit = smooth_normal_force(log.time, log.value, 0.0);
+  EXPECT_NEAR(fit.summary.sigma, 0.05, 0.015);
+  EXPECT_NEAR(fit.summary.release_time, 0.1125, 0.3e-3);
+}
+
+TEST(SmoothNormalForce, RejectsBrokenSeries) {
+  std::vector<double> t = {0, 1, 2, 3}, f = {1, 1, 1, 1};
+  EXPECT_NO_THROW(smooth_normal_force(t, f, 0.1));
+  EXPECT_THROW(smooth_normal_force(std::span(t).first(3), std::span(f).first(3), 0.1), std::invalid_argument);
+  EXPECT_THROW(smooth_normal_force(t, std::span(f).first(3), 0.1), std::invalid_argument);
+  f[2] = NAN;
+  EXPECT_THROW(smooth_normal_force(t, f, 0.1), std::invalid_argument);
+  f[2] = 1;
+  t[2] = 0.5;
+  EXPECT_THROW(smooth_normal_force(t, f, 0.1), std::invalid_argument);
+}
+
+}  // namespace
