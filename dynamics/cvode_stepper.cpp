@@ -17,14 +17,15 @@ namespace {
 template <int N>
 class CvodeStepper final : public Stepper<double, N> {
  public:
-  CvodeStepper(const Tolerances& tolerances, FlowKind kind) {
+  CvodeStepper(const Tolerances& tolerances, FlowKind kind) : tolerances_(tolerances) {
     check(SUNContext_Create(nullptr, &context_), "SUNContext_Create");
     vector_ = N_VNew_Serial(N, context_);
+    scratch_ = N_VNew_Serial(N, context_);
     memory_ = CVodeCreate(kind == FlowKind::stiff ? CV_BDF : CV_ADAMS, context_);
-    if (vector_ == nullptr || memory_ == nullptr) throw std::runtime_error("CVODE: out of memory");
+    if (vector_ == nullptr || scratch_ == nullptr || memory_ == nullptr) throw std::runtime_error("CVODE: out of memory");
     check(CVodeInit(memory_, &CvodeStepper::call_flow, 0.0, vector_), "CVodeInit");
     check(CVodeSetErrHandlerFn(memory_, &CvodeStepper::ignore_messages, nullptr), "CVodeSetErrHandlerFn");
-    check(CVodeSStolerances(memory_, tolerances.relative, tolerances.absolute), "CVodeSStolerances");
+    check(CVodeWFtolerances(memory_, &CvodeStepper::call_weights), "CVodeWFtolerances");
     check(CVodeSetUserData(memory_, this), "CVodeSetUserData");
     check(CVodeSetMaxConvFails(memory_, 50), "CVodeSetMaxConvFails");
     matrix_ = SUNDenseMatrix(N, N, context_);
@@ -37,6 +38,7 @@ class CvodeStepper final : public Stepper<double, N> {
     CVodeFree(&memory_);
     SUNLinSolFree(solver_);
     SUNMatDestroy(matrix_);
+    N_VDestroy(scratch_);
     N_VDestroy(vector_);
     SUNContext_Free(&context_);
   }
@@ -48,6 +50,7 @@ class CvodeStepper final : public Stepper<double, N> {
     phase_ = phase;
     this->t1_ = t;
     this->y1_ = y;
+    not_finite_ = false;
     for (int i = 0; i < N; ++i) NV_Ith_S(vector_, i) = y[i];
     check(CVodeReInit(memory_, t, vector_), "CVodeReInit");
   }
@@ -62,18 +65,16 @@ class CvodeStepper final : public Stepper<double, N> {
     if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
     if (status == CV_TOO_CLOSE) {  // limit and t0 are the same instant to CVODE
       reached = limit;
-    } else if (status == CV_FIRST_RHSFUNC_ERR || status == CV_RHSFUNC_FAIL || status == CV_REPTD_RHSFUNC_ERR ||
-               status == CV_UNREC_RHSFUNC_ERR) {
-      return StepStatus::not_finite;
     } else if (status < 0) {
-      return StepStatus::too_small;
+      return not_finite_ ? StepStatus::not_finite : StepStatus::too_small;
     }
     this->t1_ = reached;
     for (int i = 0; i < N; ++i) {
       this->y1_[i] = NV_Ith_S(vector_, i);
       if (!std::isfinite(this->y1_[i])) return StepStatus::not_finite;
     }
-    if (!(reached > this->t0_)) return StepStatus::too_small;
+    if (!(reached > this->t0_)) return not_finite_ ? StepStatus::not_finite : StepStatus::too_small;
+    if (reached - this->t0_ > 1e3 * shortest_step(reached)) not_finite_ = false;  // got past it
     return StepStatus::accepted;
   }
 
@@ -98,7 +99,10 @@ class CvodeStepper final : public Stepper<double, N> {
       ++self.flow_evaluations_;
       self.system_->flow(self.phase_, t, state, rate);
       for (int i = 0; i < N; ++i) {
-        if (!std::isfinite(rate[i])) return 1;
+        if (!std::isfinite(rate[i])) {
+          self.not_finite_ = true;
+          return 1;
+        }
         NV_Ith_S(dy, i) = rate[i];
       }
       return 0;
@@ -106,6 +110,18 @@ class CvodeStepper final : public Stepper<double, N> {
       self.thrown_ = std::current_exception();
       return -1;
     }
+  }
+
+  static int call_weights(N_Vector y, N_Vector weights, void* self_pointer) {
+    auto& self = *static_cast<CvodeStepper*>(self_pointer);
+    State<double, N> state, scale;
+    for (int i = 0; i < N; ++i) state[i] = NV_Ith_S(y, i);
+    self.system_->error_scale(self.phase_, self.tolerances_, state, state, scale);
+    for (int i = 0; i < N; ++i) {
+      if (!(scale[i] > 0)) return -1;
+      NV_Ith_S(weights, i) = 1 / scale[i];
+    }
+    return 0;
   }
 
   static int call_jacobian(double t, N_Vector y, N_Vector, SUNMatrix matrix, void* self_pointer, N_Vector, N_Vector,
@@ -119,6 +135,7 @@ class CvodeStepper final : public Stepper<double, N> {
         flow_jacobian<N>(*self.system_, self.phase_, t, state, f, jacobian, ft);
         for (int i = 0; i < N; ++i)
           for (int j = 0; j < N; ++j) SM_ELEMENT_D(matrix, i, j) = jacobian(i, j);
+        self.not_finite_ = self.not_finite_ || !jacobian.allFinite();
         return jacobian.allFinite() ? 0 : 1;
       } catch (...) {
         self.thrown_ = std::current_exception();
@@ -131,21 +148,20 @@ class CvodeStepper final : public Stepper<double, N> {
   void at(double t, State<double, N>& y) const {
     if (t >= this->t1_) { y = this->y1_; return; }
     if (t <= this->t0_) { y = this->y0_; return; }
-    N_Vector out = N_VNew_Serial(N, context_);
-    const int status = CVodeGetDky(memory_, t, 0, out);
-    for (int i = 0; i < N; ++i) y[i] = NV_Ith_S(out, i);
-    N_VDestroy(out);
-    check(status, "CVodeGetDky");
+    check(CVodeGetDky(memory_, t, 0, scratch_), "CVodeGetDky");
+    for (int i = 0; i < N; ++i) y[i] = NV_Ith_S(scratch_, i);
   }
 
+  Tolerances tolerances_;
   SUNContext context_{};
-  N_Vector vector_{};
+  N_Vector vector_{}, scratch_{};
   void* memory_{};
   SUNMatrix matrix_{};
   SUNLinearSolver solver_{};
   const HybridSystem<N>* system_{};
   Phase phase_;
   std::exception_ptr thrown_;
+  bool not_finite_{};  ///< the flow was not finite in an attempt, and no step of some length has succeeded since
 };
 
 }  // namespace
@@ -156,6 +172,7 @@ std::unique_ptr<Stepper<double, N>> make_cvode_stepper(const Tolerances& toleran
 }
 
 template std::unique_ptr<Stepper<double, 2>> make_cvode_stepper<2>(const Tolerances&, FlowKind);
+template std::unique_ptr<Stepper<double, 3>> make_cvode_stepper<3>(const Tolerances&, FlowKind);
 template std::unique_ptr<Stepper<double, 6>> make_cvode_stepper<6>(const Tolerances&, FlowKind);
 template std::unique_ptr<Stepper<double, 7>> make_cvode_stepper<7>(const Tolerances&, FlowKind);
 

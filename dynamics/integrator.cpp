@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "dynamics/dormand_prince.hpp"
+#include "dynamics/paced_stepper.hpp"
 #include "dynamics/rosenbrock.hpp"
 #include "dynamics/sdirk.hpp"
 
@@ -50,48 +51,45 @@ class Frozen final : public Stepper<S, N> {
   void retake(double, State<S, N>& y) override { y = this->y0_; }
 };
 
+template <class S, int N>
+std::unique_ptr<Stepper<S, N>> make_stepper(Method method, FlowKind kind, const Tolerances& tolerances) {
+  if (method == Method::dormand_prince) return std::make_unique<DormandPrince<S, N>>(tolerances);
+  if (method == Method::sdirk) return std::make_unique<Sdirk<S, N>>(tolerances);
+  if constexpr (std::is_same_v<S, double>) {
+    if (method == Method::rosenbrock) return std::make_unique<Rosenbrock<N>>(tolerances);
+    return make_cvode_stepper<N>(tolerances, kind);
+  }
+  throw std::invalid_argument("integrate: methods rosenbrock and cvode have no derivatives; use automatic with Dual");
+}
+
 /// The steppers of one integration, each made when first needed.
 template <class S, int N>
 class Steppers {
  public:
   explicit Steppers(const IntegratorOptions& options) : options_(options) {}
 
-  Stepper<S, N>& of(FlowKind kind) {
+  Stepper<S, N>& of(FlowKind kind, bool paced) {
     if (kind == FlowKind::frozen) return frozen_;
-    switch (method(kind)) {
-      case Method::cvode:
-        if constexpr (std::is_same_v<S, double>) {
-          auto& cvode = kind == FlowKind::stiff ? bdf_ : adams_;
-          if (!cvode) cvode = make_cvode_stepper<N>(options_.tolerances, kind);
-          return *cvode;
+    auto& stepper = made_[kind == FlowKind::stiff][paced];
+    if (!stepper) {
+      if constexpr (N + 2 <= kDualSize) {
+        if (paced) {
+          stepper = std::make_unique<PacedStepper<S, N>>(make_stepper<S, N + 1>(method(kind), kind, options_.tolerances));
+          return *stepper;
         }
-        throw std::invalid_argument("integrate: method cvode has no derivatives; use automatic with Dual");
-      case Method::rosenbrock:
-        if constexpr (std::is_same_v<S, double>) {
-          if (!rosenbrock_) rosenbrock_.emplace(options_.tolerances);
-          return *rosenbrock_;
-        }
-        throw std::invalid_argument("integrate: method rosenbrock has no derivatives; use automatic with Dual");
-      case Method::sdirk:
-        if (!sdirk_) sdirk_.emplace(options_.tolerances);
-        return *sdirk_;
-      default:
-        if (!explicit_) explicit_.emplace(options_.tolerances);
-        return *explicit_;
+      }
+      stepper = make_stepper<S, N>(method(kind), kind, options_.tolerances);
     }
+    return *stepper;
   }
 
   void count(IntegratorStatistics& statistics) const {
-    auto add = [&](const auto& stepper) {
-      if (!stepper) return;
-      statistics.flow_evaluations += stepper->flow_evaluations();
-      statistics.rejected_steps += stepper->rejected_steps();
-    };
-    add(explicit_);
-    add(sdirk_);
-    add(adams_);
-    add(bdf_);
-    if constexpr (std::is_same_v<S, double>) add(rosenbrock_);
+    for (const auto& row : made_)
+      for (const auto& stepper : row) {
+        if (!stepper) continue;
+        statistics.flow_evaluations += stepper->flow_evaluations();
+        statistics.rejected_steps += stepper->rejected_steps();
+      }
   }
 
  private:
@@ -103,11 +101,10 @@ class Steppers {
 
   const IntegratorOptions& options_;
   Frozen<S, N> frozen_;
-  std::optional<DormandPrince<S, N>> explicit_;
-  std::conditional_t<std::is_same_v<S, double>, std::optional<Rosenbrock<N>>, int> rosenbrock_{};
-  std::optional<Sdirk<S, N>> sdirk_;
-  std::unique_ptr<Stepper<S, N>> adams_, bdf_;
+  std::unique_ptr<Stepper<S, N>> made_[2][2];  // by stiffness and pace
 };
+
+constexpr double kNode[4] = {0, 1.0 / 3, 2.0 / 3, 1};  // where guards are sampled in a step
 
 /// A root of one guard inside the last step: the fractions of the step on its safe and unsafe side.
 struct Bracket {
@@ -125,21 +122,19 @@ class Run {
     solution_.events.reserve(32);
     begin_windows(start, t_end);
     Entry<S, N> entry = start;
-    int fired = -1;  // the guard that led here by a transition of a mode to itself
+    phase_.mode = kNoMode;
     for (;;) {
       if (!finite(entry)) return end(Outcome::not_finite, entry);
       if (system_.kind(entry.mode) == FlowKind::finished) return end(Outcome::finished, entry);
-      const Departure departure = run_phase(entry, fired);
+      const Departure departure = run_phase(entry);
       if (departure.outcome) return end(*departure.outcome, departure.at);
       entry = departure.at;
-      fired = departure.self_transition_of;
     }
   }
 
  private:
   struct Departure {
     Entry<S, N> at;
-    int self_transition_of{-1};
     std::optional<Outcome> outcome;
   };
 
@@ -148,6 +143,7 @@ class Run {
   void begin_windows(const Entry<S, N>& start, const S& t_end) {
     system_.time_events(times_);
     const double t = value_of(start.t);
+    skipped_ = static_cast<int>(std::count_if(times_.begin(), times_.end(), [&](const S& x) { return value_of(x) <= t; }));
     std::erase_if(times_, [&](const S& x) { return !(value_of(x) > t) || value_of(x) >= value_of(t_end); });
     times_.push_back(t_end);
     window_ = {t, value_of(times_.front())};
@@ -158,11 +154,11 @@ class Run {
 
   Departure leave_window(int mode, const State<S, N>& y) {
     const S t = window_end();
-    if (last_window()) return {{mode, t, y, S(0)}, -1, Outcome::horizon};
-    const int index = static_cast<int>(next_time_);
+    if (last_window()) return {{mode, t, y, S(0)}, Outcome::horizon};
+    const int index = skipped_ + static_cast<int>(next_time_);
     ++next_time_;
     window_ = {value_of(t), value_of(window_end())};
-    Departure departure{system_.on_time(mode, window_, t, y), -1, {}};
+    Departure departure{system_.on_time(mode, window_, t, y), {}};
     record_lead(departure.at, y);
     log(EventKind::time, index, mode, departure.at);
     return departure;
@@ -170,7 +166,9 @@ class Run {
 
   // ---------------------------------------------------------------- one phase
 
-  Departure run_phase(const Entry<S, N>& entry, int self_transition_of) {
+  Departure run_phase(const Entry<S, N>& entry) {
+    const bool same_mode = entry.mode == phase_.mode;
+    if (!same_mode) fired_ = -1;
     phase_ = {entry.mode, window_};
     guards_ = system_.guard_count(entry.mode);
     if (guards_ > kMaxGuards) throw std::logic_error("integrate: a mode has too many guards");
@@ -179,22 +177,23 @@ class Run {
     if (!(value_of(window_end()) - value_of(entry.t) > shortest_step(value_of(entry.t))))
       return leave_window(entry.mode, entry.y);
 
-    const int immediate = arm(entry, self_transition_of);
-    if (immediate == kNotFinite) return {entry, -1, Outcome::not_finite};
+    const int immediate = arm(entry, same_mode);
+    if (immediate == kNotFinite) return {entry, Outcome::not_finite};
     if (immediate >= 0) return transition(immediate, entry.t, entry.y);
 
-    Stepper<S, N>& stepper = steppers_.of(system_.kind(entry.mode));
+    Stepper<S, N>& stepper = steppers_.of(system_.kind(entry.mode), system_.is_paced(entry.mode));
     stepper.start(system_, phase_, entry.t, entry.y);
-    for (;;) {
+    first_step_ = true;
+    for (;; first_step_ = false) {
       if (++solution_.statistics.steps > options_.step_budget)
-        return {{entry.mode, stepper.t1(), stepper.y1(), S(0)}, -1, Outcome::step_budget_spent};
+        return {{entry.mode, stepper.t1(), stepper.y1(), S(0)}, Outcome::step_budget_spent};
       const StepStatus status = stepper.step(window_end(), longest_step(stepper));
       if (status != StepStatus::accepted)
-        return {{entry.mode, stepper.t0(), stepper.y0(), S(0)}, -1,
+        return {{entry.mode, stepper.t0(), stepper.y0(), S(0)},
                 status == StepStatus::too_small ? Outcome::step_too_small : Outcome::not_finite};
       Bracket first;
       if (guards_ > 0 && !find_first_root(stepper, first))
-        return {{entry.mode, stepper.t0(), stepper.y0(), S(0)}, -1, Outcome::not_finite};
+        return {{entry.mode, stepper.t0(), stepper.y0(), S(0)}, Outcome::not_finite};
       if (first.guard >= 0) {
         const Entry<S, N> root = polish(stepper, first);
         record(stepper, root.t);
@@ -211,14 +210,15 @@ class Run {
     State<double, N> y;
     for (int i = 0; i < N; ++i) y[i] = value_of(stepper.y1()[i]);
     const double bound = system_.max_step(phase_, value_of(stepper.t1()), y);
-    return std::min(options_.longest_step, bound);
+    const bool returning = value_of(stepper.t1()) < short_until_;
+    return std::min({options_.longest_step, bound, returning ? short_step_ : bound});
   }
 
   Departure transition(int guard, const S& t, const State<S, N>& y) {
-    Departure departure{system_.on_guard(phase_, guard, t, y), -1, {}};
+    Departure departure{system_.on_guard(phase_, guard, t, y), {}};
     record_straight(phase_, t, y, departure.at.t - departure.at.lead, departure.at.y);
     record_lead(departure.at, y);
-    if (departure.at.mode == phase_.mode) departure.self_transition_of = guard;
+    fired_ = guard;
     log(EventKind::guard, guard, phase_.mode, departure.at);
     if (static_cast<int>(solution_.events.size()) >= options_.event_budget)
       departure.outcome = Outcome::event_budget_spent;
@@ -231,8 +231,12 @@ class Run {
 
   // ---------------------------------------------------------------- guards
 
-  static constexpr int kNotFinite = -2;
-  static constexpr double kAtZero = 1e-9;  // s
+  static constexpr int kNotFinite = -2, kNoMode = std::numeric_limits<int>::min();
+  static constexpr double kAtZero = 1e-9;     // s
+  static constexpr double kRounding = 1e-13;  // of a guard of order one
+  static constexpr double kNoRate = 1e-6;     // 1/s
+  static constexpr double kGrazing = 1e-6;    // of a guard's range over a step: a peak this close to zero only touches
+  static constexpr double kTogether = 4e-9;   // of a step: roots this close on the dense output are one instant
 
   /// Signed so that every guard fires upwards: G < 0 is the safe side.
   bool evaluate(const S& t, const State<S, N>& y, double* G) const {
@@ -253,25 +257,52 @@ class Run {
 
   /// Arms the guards at the start of a phase. One on its safe side is armed. One at zero (its crossing lies within
   /// kAtZero of now) is armed if it leaves for the safe side and fires at once, returning its index, if it goes on
-  /// through, unless it has just fired. One on its unsafe side waits until it has been seen on the safe side.
-  int arm(const Entry<S, N>& entry, int self_transition_of) {
+  /// through, unless the mode is as before and it has not been safe since it last fired. One on its unsafe side waits
+  /// until it has been seen on the safe side.
+  int arm(const Entry<S, N>& entry, bool same_mode) {
     if (guards_ == 0) return -1;
     double G[kMaxGuards];
     if (!evaluate(entry.t, entry.y, G)) return kNotFinite;
     std::optional<std::array<double, kMaxGuards>> slope;
+    int immediate = -1;
+    short_until_ = short_step_ = std::numeric_limits<double>::infinity();
     for (int i = 0; i < guards_; ++i) {
+      const bool spent = same_mode && (i == fired_ || !armed_[i]);
       start_[i] = G[i];
       hidden_[i] = false;
       armed_[i] = G[i] < 0;
-      if (armed_[i] && i != self_transition_of) continue;
+      if (armed_[i] && !spent) continue;
       if (!slope) slope = guard_slopes(entry);
       const double rate = (*slope)[i];
       if (!std::isfinite(rate)) return kNotFinite;
-      if (std::abs(G[i]) > kAtZero * std::abs(rate)) continue;
-      armed_[i] = hidden_[i] = rate < 0;
-      if (rate > 0 && i != self_transition_of) return i;
+      if (std::abs(G[i]) > kAtZero * std::abs(rate) + kRounding) continue;
+      // A rate of nothing but rounding is how slip begins at a breakaway: there only the first step can tell.
+      armed_[i] = hidden_[i] = rate < 0 || (!spent && rate <= kNoRate);
+      if (rate < 0 && options_.method == Method::cvode) resolve_return(entry, i, rate);
+      if (armed_[i] || spent) continue;
+      armed_[i] = true;  // it fires now or, where a lower index comes first, next
+      if (immediate < 0) immediate = i;
     }
-    return -1;
+    fired_ = -1;
+    return immediate;
+  }
+
+  /// CVODE restarts with order one, and its interpolant errs by the absolute tolerance: a guard that returns sooner
+  /// than that resolves needs short steps until it has. The return is judged by dG/dt and its rate.
+  void resolve_return(const Entry<S, N>& entry, int guard, double rate) {
+    constexpr double kAhead = 1e-7;  // s
+    State<double, N> y, dy{};
+    for (int i = 0; i < N; ++i) y[i] = value_of(entry.y[i]);
+    const double t = value_of(entry.t);
+    if (system_.kind(phase_.mode) == FlowKind::frozen) return;
+    system_.flow(phase_, t, y, dy);
+    Entry<S, N> ahead{entry.mode, S(t + kAhead), {}, S(0)};
+    for (int i = 0; i < N; ++i) ahead.y[i] = S(y[i] + kAhead * dy[i]);
+    const double bend = (guard_slopes(ahead)[guard] - rate) / kAhead;
+    if (!(bend > 0)) return;
+    const double back = -2 * rate / bend;
+    short_step_ = std::min(short_step_, back / 50);
+    short_until_ = t + 2 * back;
   }
 
   /// dG/dt along the flow at the entry, exactly.
@@ -281,20 +312,19 @@ class Run {
     const double t = value_of(entry.t);
     if (system_.kind(phase_.mode) != FlowKind::frozen) system_.flow(phase_, t, y, dy);
     State<Dual, N> yd;
-    for (int i = 0; i < N; ++i) {
-      yd[i] = Dual(y[i]);
-      yd[i].v[0] = dy[i];
-    }
-    Dual g[kMaxGuards];
-    system_.guards(phase_, independent(t, 0), yd, g);
+    for (int i = 0; i < N; ++i) yd[i] = Dual(y[i]);
+    Dual still[kMaxGuards], moving[kMaxGuards];
+    // The parameters of the system may carry derivatives of their own: they must not be taken for those along the flow.
+    if constexpr (!std::is_same_v<S, double>) system_.guards(phase_, Dual(t), yd, still);
+    for (int i = 0; i < N; ++i) yd[i].v[0] = dy[i];
+    system_.guards(phase_, independent(t, 0), yd, moving);
     std::array<double, kMaxGuards> slope{};
-    for (int i = 0; i < guards_; ++i) slope[i] = sign_[i] * g[i].v[0];
+    for (int i = 0; i < guards_; ++i) slope[i] = sign_[i] * (moving[i].v[0] - still[i].v[0]);
     return slope;
   }
 
   /// The earliest root in the last step, if any, in `first`. False if a guard is not finite.
   bool find_first_root(Stepper<S, N>& stepper, Bracket& first) {
-    constexpr double kNode[4] = {0, 1.0 / 3, 2.0 / 3, 1};
     double G[4][kMaxGuards];
     std::copy_n(start_, guards_, G[0]);
     for (int node = 1; node <= 3; ++node)
@@ -302,30 +332,63 @@ class Run {
     std::copy_n(G[3], guards_, start_);
 
     double earliest = 2;
+    bool armed_before[kMaxGuards];
+    std::copy_n(armed_, guards_, armed_before);
     for (int i = 0; i < guards_; ++i) {
       Bracket bracket{i, 0, 0};
       bool found = false;
+      double hidden_before = 0;  // the node by which a hidden excursion had ended
+      double safe_from = armed_[i] && !hidden_[i] ? 0.0 : 1.0;
       for (int node = 1; node <= 3 && !found; ++node) {
         if (G[node][i] < 0) {
+          safe_from = std::min(safe_from, kNode[node]);
           armed_[i] = true;
           hidden_[i] = false;
-        } else if (armed_[i]) {
+        } else if (armed_[i] && !(hidden_[i] && G[node][i] == 0)) {
+          if (!hidden_[i] && touches(stepper, G, i, node)) continue;
           bracket.safe = kNode[node - 1];
           bracket.unsafe = kNode[node];
+          if (hidden_[i]) {
+            hidden_before = bracket.unsafe;
+            if (!shrink_to_first_excursion(stepper, bracket)) continue;
+          }
           found = true;
-          if (hidden_[i] && !shrink_to_first_excursion(stepper, bracket)) return false;
           hidden_[i] = false;
         }
       }
-      if (!found && armed_[i] && G[0][i] < 0) found = find_hidden_peak(stepper, G, bracket);
+      if (armed_[i] && !hidden_[i]) found = find_hidden_peak(stepper, G, safe_from, found, bracket) || found;
       if (!found) continue;
-      const double root = bisect(stepper, bracket);
-      if (root < earliest) {
+      double root = bisect(stepper, bracket);
+      if (hidden_before > 0 && !(slope_at(stepper, root, i) > 0)) {
+        bracket.unsafe = hidden_before;
+        if (!begin_of_rise(stepper, bracket)) continue;
+        root = bracket.unsafe;
+      }
+      if (root < earliest * (1 - kTogether)) {
         earliest = root;
         first = bracket;
       }
     }
+    if (first.guard >= 0)  // what the guards did after the root did not happen
+      for (int i = 0; i < guards_; ++i) {
+        armed_[i] = armed_before[i];
+        for (int node = 1; node <= 3 && kNode[node] <= earliest; ++node) armed_[i] = armed_[i] || G[node][i] < 0;
+      }
     return true;
+  }
+
+  /// Whether the guard is at zero at this node only because it turns back there; then the search for peaks judges it.
+  bool touches(const Stepper<S, N>& stepper, const double (*G)[kMaxGuards], int guard, int node) const {
+    const double range = range_of(G, guard);
+    if (G[node][guard] > kGrazing * range || !(G[node - 1][guard] < 0)) return false;
+    if (node < 3) return G[node + 1][guard] < 0;
+    const double bend = G[3][guard] - 2 * G[2][guard] + G[1][guard];
+    const double length = value_of(stepper.t1()) - value_of(stepper.t0());
+    return bend < 0 && guard_slopes({phase_.mode, stepper.t1(), stepper.y1(), S(0)})[guard] * length < 2e-3 * range;
+  }
+
+  static double range_of(const double (*G)[kMaxGuards], int i) {
+    return std::max({G[0][i], G[1][i], G[2][i], G[3][i]}) - std::min({G[0][i], G[1][i], G[2][i], G[3][i]});
   }
 
   bool sample(Stepper<S, N>& stepper, double theta, double* G) {
@@ -340,7 +403,8 @@ class Run {
     return G[guard];
   }
 
-  /// The guard began at zero towards its safe side and is unsafe at the first node: the excursion ended in between.
+  /// The guard began at zero and is unsafe at a node: its excursion to the safe side, if any, ended in between. False
+  /// if it has not set out yet: what an event leaves of a guard takes an instant to pass.
   bool shrink_to_first_excursion(Stepper<S, N>& stepper, Bracket& bracket) {
     double theta = bracket.unsafe;
     for (int k = 0; k < 200; ++k) {
@@ -352,16 +416,32 @@ class Run {
       }
       theta = trial;
     }
-    bracket.safe = bracket.unsafe = 0;
+    return begin_of_rise(stepper, bracket);
+  }
+
+  /// There was no excursion, or one too small for the dense output: the root is where the guard rises from then on.
+  bool begin_of_rise(Stepper<S, N>& stepper, Bracket& bracket) const {
+    if (!(slope_at(stepper, bracket.unsafe, bracket.guard) > 0)) return false;
+    for (int k = 0; k < 200 && slope_at(stepper, 0.5 * bracket.unsafe, bracket.guard) > 0; ++k) bracket.unsafe *= 0.5;
+    bracket.safe = bracket.unsafe;
     return true;
   }
 
-  /// All nodes are safe; the cubic through them may still pass zero twice. `true` if the guard really does.
-  bool find_hidden_peak(Stepper<S, N>& stepper, const double (*G)[kMaxGuards], Bracket& bracket) {
+  double slope_at(const Stepper<S, N>& stepper, double theta, int guard) const {
+    Entry<S, N> at{phase_.mode, S(stepper.t0() + theta * (stepper.t1() - stepper.t0())), {}, S(0)};
+    stepper.interpolate(theta, at.y);
+    return guard_slopes(at)[guard];
+  }
+
+  /// Between safe nodes the cubic through the four may still pass zero twice. `true`, with the bracket, if the guard
+  /// really does after `safe_from` and, where a crossing is `known`, before that one.
+  bool find_hidden_peak(Stepper<S, N>& stepper, const double (*G)[kMaxGuards], double safe_from, bool known,
+                        Bracket& bracket) {
     const int i = bracket.guard;
-    const double a = G[0][i], b = G[1][i], c = G[2][i], d = G[3][i];
-    const double top = std::max({a, b, c, d}), bottom = std::min({a, b, c, d});
-    if (top + 0.3 * (top - bottom) < 0) return false;
+    const double range = range_of(G, i);
+    if (!(range > 0)) return false;
+    const double a = G[0][i] / range, b = G[1][i] / range, c = G[2][i] / range, d = G[3][i] / range;
+    if (std::max({a, b, c, d}) + 0.3 < 0) return false;
     // Newton's form on u = 3θ: a + u Δ1 + u(u−1)/2 Δ2 + u(u−1)(u−2)/6 Δ3; its derivative is a quadratic in u.
     const double d1 = b - a, d2 = c - 2 * b + a, d3 = d - 3 * c + 3 * b - a;
     const double q2 = 0.5 * d3, q1 = d2 - d3, q0 = d1 - 0.5 * d2 + d3 / 3;
@@ -376,23 +456,26 @@ class Run {
     } else if (q1 != 0) {
       roots[count++] = -q0 / q1;
     }
-    std::sort(roots, roots + count);
-    for (int k = 0; k < count; ++k) {
-      if (!(roots[k] > 0 && roots[k] < 3) || q1 + 2 * q2 * roots[k] >= 0) continue;  // a maximum inside
-      double left = roots[k] / 3, width = 1.0 / 12;
-      double best = sample_one(stepper, left, i);
-      for (int refine = 0; refine < 12 && best < 0; ++refine, width *= 0.5)  // climb to the true maximum
-        for (const double trial : {left - width, left + width}) {
-          if (trial <= 0 || trial >= 1) continue;
-          const double value = sample_one(stepper, trial, i);
-          if (value > best) { best = value; left = trial; break; }
+    // A peak at the joint of two steps belongs to the first of them.
+    const double from = std::max(safe_from, first_step_ ? 0.0 : 1e-3), to = known ? bracket.safe : 1.001;
+    for (int k = 0; k < count; ++k) {  // a cubic has one maximum
+      if (!(roots[k] > 3 * from && roots[k] < 3 * to) || q1 + 2 * q2 * roots[k] >= 0) continue;
+      double peak = std::min(roots[k] / 3, 1.0), width = 1.0 / 12;
+      double best = sample_one(stepper, peak, i) / range;
+      for (int refine = 0; refine < 12 && best <= kGrazing; ++refine, width *= 0.5)  // climb to the true maximum
+        for (const double trial : {peak - width, peak + width}) {
+          if (trial <= from || trial >= std::min(to, 1.0)) continue;
+          const double value = sample_one(stepper, trial, i) / range;
+          if (value > best) { best = value; peak = trial; break; }
         }
-      if (best >= 0) {
-        bracket.unsafe = left;
-        bracket.safe = left > 2.0 / 3 ? 2.0 / 3 : left > 1.0 / 3 ? 1.0 / 3 : 0.0;
+      if (best > kGrazing) {
+        bracket.unsafe = peak;
+        bracket.safe = from;
+        for (int node = 1; node < 3; ++node)
+          if (kNode[node] < peak && kNode[node] > from && G[node][i] < 0) bracket.safe = kNode[node];
         return true;
       }
-      if (best > -1e-6 * (top - bottom)) ++solution_.statistics.grazings;
+      if (best > -kGrazing) ++solution_.statistics.grazings;
     }
     return false;
   }
@@ -432,11 +515,15 @@ class Run {
     double slope = (sample_one(stepper, std::min(1.0, bracket.unsafe + 1e-3), bracket.guard) -
                     sample_one(stepper, std::max(0.0, bracket.unsafe - 1e-3), bracket.guard)) /
                    ((std::min(1.0, bracket.unsafe + 1e-3) - std::max(0.0, bracket.unsafe - 1e-3)) * length);
-    double h_last = h, G_last = 0;
-    for (int k = 0; k < 8; ++k) {
-      stepper.retake(h, y);
+    double h_last = h, G_last = 0, h_best = h, G_best = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < 8 && bracket.safe < bracket.unsafe; ++k) {
+      retake(stepper, h, y);
       evaluate(stepper.t0() + h, y, G);
       const double now = G[bracket.guard];
+      if (std::abs(now) < G_best) {
+        G_best = std::abs(now);
+        h_best = h;
+      }
       if (k > 0 && h != h_last && (now - G_last) / (h - h_last) > 0) slope = (now - G_last) / (h - h_last);
       if (!(slope > 0) || !std::isfinite(now)) break;
       const double move = std::clamp(-now / slope, -0.1 * length, 0.1 * length);
@@ -446,10 +533,16 @@ class Run {
       G_last = now;
       h = next;
     }
-    stepper.retake(h, y);
+    h = h_best;
+    retake(stepper, h, y);
     Entry<S, N> root{phase_.mode, S(stepper.t0() + h), y, S(0)};
     if constexpr (!std::is_same_v<S, double>) add_root_derivative(bracket.guard, root);
     return root;
+  }
+
+  static void retake(Stepper<S, N>& stepper, double h, State<S, N>& y) {
+    if (h > 0) stepper.retake(h, y);
+    else y = stepper.y0();
   }
 
   void add_root_derivative(int guard, Entry<S, N>& root) const {
@@ -485,14 +578,12 @@ class Run {
       double D[4];
       for (int j = 0; j < 4; ++j)
         D[j] = value_of(events[n - 1 - j * period].t) - value_of(events[n - 1 - (j + 1) * period].t);
-      const double t = value_of(departure.at.t);
-      if (!(D[0] > shortest_step(t))) {
-        departure.outcome = Outcome::zeno;
-        return;
-      }
+      const double t = value_of(departure.at.t), resolved = shortest_step(t);
+      if (!(D[0] > resolved)) continue;  // no time passes: a cycle of modes, if it goes on
       const double r = D[0] / D[1], r1 = D[1] / D[2], r2 = D[2] / D[3];
-      const double noise = 1e-3 + 4 * shortest_step(t) / D[0];
-      if (!(r < 1 - 1e-3) || std::abs(r - r1) > noise * r || std::abs(r1 - r2) > noise * r) continue;
+      // Intervals like k^−p have a ratio that drifts by (1 − r)²/p each time: that is not a geometric series.
+      const double drift = 0.01 * (1 - r) * (1 - r) + 4 * resolved / D[0];
+      if (!(r < 1 - 1e-3) || std::abs(r - r1) > drift || std::abs(r1 - r2) > drift) continue;
       double left = 0;
       for (int i = 0; i < N; ++i)
         left = std::max(left, std::abs(value_of(events[n - 1].y[i] - events[n - 1 - period].y[i])) * r / (1 - r));
@@ -510,7 +601,7 @@ class Run {
         return;
       }
       const int before = departure.at.mode;
-      departure = Departure{system_.at_limit({before, window_}, limit, departure.at.y), -1, {}};
+      departure = Departure{system_.at_limit({before, window_}, limit, departure.at.y), {}};
       log(EventKind::limit, guard, before, departure.at);
       return;
     }
@@ -539,9 +630,12 @@ class Run {
 
   void record(const Stepper<S, N>& stepper, const S& until) {
     if (!options_.record) return;
-    TrajectoryPiece<S, N> piece{stepper.t0(), until, phase_, {}};
     const double whole = value_of(stepper.t1()) - value_of(stepper.t0());
     const double part = whole > 0 ? (value_of(until) - value_of(stepper.t0())) / whole : 0.0;
+    // The nodes lie at fixed fractions of the step: their times have the derivatives of the step, not of `until`.
+    S last = until;
+    if constexpr (!std::is_same_v<S, double>) last.v = (stepper.t0() + part * (stepper.t1() - stepper.t0())).v;
+    TrajectoryPiece<S, N> piece{stepper.t0(), last, phase_, {}};
     for (int k = 0; k < 5; ++k) stepper.interpolate(0.25 * k * part, piece.nodes[k]);
     solution_.trajectory.pieces.push_back(piece);
   }
@@ -579,11 +673,15 @@ class Run {
   Solution<S, N> solution_;
   std::vector<S> times_;
   std::size_t next_time_{};
+  int skipped_{};  // time events before the start
   Window window_;
   Phase phase_;
   int guards_{};
   double sign_[kMaxGuards]{}, start_[kMaxGuards]{};
-  bool armed_[kMaxGuards]{}, hidden_[kMaxGuards]{};
+  bool armed_[kMaxGuards]{}, hidden_[kMaxGuards]{};  // hidden: began at zero, no node has told where it went
+  int fired_{-1};                                    // the guard whose transition led to this phase
+  bool first_step_{};
+  double short_step_{}, short_until_{};
 };
 
 }  // namespace

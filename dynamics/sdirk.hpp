@@ -21,18 +21,20 @@ class Sdirk final : public SingleStep<Sdirk<S, N>, S, N> {
   void prepare(bool /*fresh*/) {
     State<double, N> y, ft;
     for (int i = 0; i < N; ++i) y[i] = value_of(this->y0_[i]);
-    flow_jacobian<N>(*this->system_, this->phase_, value_of(this->t0_), y, f0_, jacobian_, ft);
+    flow_jacobian<N>(*this->system_, this->phase_, value_of(this->t0_), y, f0_, jacobian_, ft,
+                     !std::is_same_v<S, double>);
     ++this->flow_evaluations_;
-    this->flow(this->t0_, this->y0_, slope0_);
+    if constexpr (std::is_same_v<S, double>) slope0_ = f0_;
+    else this->flow(this->t0_, this->y0_, slope0_);
   }
-  double guess() const { return first_step<double, N>(values(this->y0_), f0_, this->tolerances_); }
+  double guess() const { return this->first_step(f0_); }
 
   double attempt(const S& h) {
     State<S, N> error;
     if (!advance(h, this->y1_, error)) return slow_ ? 1e3 : std::numeric_limits<double>::quiet_NaN();
     h_ = h;
     this->flow(this->t0_ + h, this->y1_, slope1_);
-    return error_norm<S, N>(error, this->y0_, this->y1_, this->tolerances_);
+    return this->error_norm(error);
   }
 
   /// Cubic Hermite: enough to bracket a root, which is then polished with `retake`.
@@ -47,7 +49,7 @@ class Sdirk final : public SingleStep<Sdirk<S, N>, S, N> {
 
   void retake(double h, State<S, N>& y) override {
     State<S, N> error;
-    advance(S(h), y, error);
+    if (!advance(S(h), y, error)) interpolate(h / value_of(h_), y);  // a shorter step converges too: not expected
   }
 
  private:
@@ -60,12 +62,6 @@ class Sdirk final : public SingleStep<Sdirk<S, N>, S, N> {
                                       {371.0 / 1360, -137.0 / 2720, 15.0 / 544, 1.0 / 4, 0},
                                       {25.0 / 24, -49.0 / 48, 125.0 / 16, -85.0 / 12, 1.0 / 4}};
   static constexpr double kEmbedded[5] = {59.0 / 48, -17.0 / 96, 225.0 / 32, -85.0 / 12, 0};
-
-  static State<double, N> values(const State<S, N>& y) {
-    State<double, N> out;
-    for (int i = 0; i < N; ++i) out[i] = value_of(y[i]);
-    return out;
-  }
 
   /// x := LU⁻¹ x, part by part when x carries derivatives.
   void solve(State<S, N>& x) const {
@@ -92,10 +88,7 @@ class Sdirk final : public SingleStep<Sdirk<S, N>, S, N> {
   double size(const State<S, N>& x, const State<S, N>& reference, double h) const {
     double worst = 0;
     for (int i = 0; i < N; ++i) {
-      const double scale = this->tolerances_.absolute +
-                           this->tolerances_.relative * (std::abs(value_of(this->y0_[i])) +
-                                                         std::abs(h * value_of(reference[i])));
-      worst = std::max(worst, std::abs(h * value_of(x[i])) / scale);
+      worst = std::max(worst, std::abs(h * value_of(x[i])) / scale_[i]);
       if constexpr (!std::is_same_v<S, double>) {
         const double largest = 1 + reference[i].v.cwiseAbs().maxCoeff() * h + this->y0_[i].v.cwiseAbs().maxCoeff();
         worst = std::max(worst, h * x[i].v.cwiseAbs().maxCoeff() / (1e-9 * largest));
@@ -112,6 +105,8 @@ class Sdirk final : public SingleStep<Sdirk<S, N>, S, N> {
     Eigen::Matrix<double, N, N> matrix = -hv * kGamma * jacobian_;
     matrix.diagonal().array() += 1.0;
     lu_.compute(matrix);
+    const State<double, N> start = values<S, N>(this->y0_);
+    this->system_->error_scale(this->phase_, this->tolerances_, start, start, scale_);
     for (int stage = 0; stage < 5; ++stage) {
       State<S, N> base = this->y0_;
       for (int j = 0; j < stage; ++j)
@@ -143,12 +138,13 @@ class Sdirk final : public SingleStep<Sdirk<S, N>, S, N> {
         error[i] += h * ((kA[4][j] - kEmbedded[j]) * k_[j][i]);
       }
     }
+    solve(error);  // ([HairerWanner1996] IV.8) of the stiff parts only what the step does not damp is an error
     return true;
   }
 
   Eigen::Matrix<double, N, N> jacobian_;
   Eigen::PartialPivLU<Eigen::Matrix<double, N, N>> lu_;
-  State<double, N> f0_{};
+  State<double, N> f0_{}, scale_{};
   State<S, N> slope0_{}, slope1_{};
   std::array<State<S, N>, 5> k_{};
   S h_{};

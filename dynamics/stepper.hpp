@@ -9,13 +9,6 @@
 
 namespace unhand::dynamics {
 
-/// Local error per step is kept below absolute + relative·|y_i| in every component (root mean square over them), in
-/// the SI units of the state.
-struct Tolerances {
-  double relative{1e-8};
-  double absolute{1e-10};
-};
-
 enum class StepStatus {
   accepted,
   too_small,   ///< the error cannot be met above the spacing of representable times
@@ -57,31 +50,27 @@ class Stepper {
   long rejected_{};
 };
 
-/// Root mean square of e_i / (absolute + relative max(|y0_i|, |y1_i|)); NaN if anything is.
 template <class S, int N>
-double error_norm(const State<S, N>& error, const State<S, N>& y0, const State<S, N>& y1, const Tolerances& tol) {
-  double sum = 0;
-  for (int i = 0; i < N; ++i) {
-    const double scale =
-        tol.absolute + tol.relative * std::max(std::abs(value_of(y0[i])), std::abs(value_of(y1[i])));
-    const double e = value_of(error[i]) / scale;
-    sum += e * e;
+State<double, N> values(const State<S, N>& y) {
+  if constexpr (std::is_same_v<S, double>) {
+    return y;
+  } else {
+    State<double, N> out;
+    for (int i = 0; i < N; ++i) out[i] = value_of(y[i]);
+    return out;
   }
+}
+
+/// Root mean square of e_i / scale_i; NaN if anything is.
+template <int N>
+double scaled_norm(const State<double, N>& error, const State<double, N>& scale) {
+  double sum = 0;
+  for (int i = 0; i < N; ++i) sum += (error[i] / scale[i]) * (error[i] / scale[i]);
   return std::sqrt(sum / N);
 }
 
 /// The shortest step [s] that still moves t.
 inline double shortest_step(double t) { return 16 * std::numeric_limits<double>::epsilon() * std::max(std::abs(t), 1e-9); }
-
-/// A first step length from the sizes of the state and its rate ([HairerNorsettWanner1993] II.4, without the
-/// trial step: error control corrects a poor guess at the price of one rejection).
-template <class S, int N>
-double first_step(const State<S, N>& y, const State<S, N>& dy, const Tolerances& tol) {
-  const State<S, N> zero{};
-  const double d0 = error_norm<S, N>(y, y, zero, tol), d1 = error_norm<S, N>(dy, y, zero, tol);
-  if (!(d0 > 1e-5) || !(d1 > 1e-5)) return 1e-6;
-  return 0.01 * d0 / d1;
-}
 
 /// The step controller that all single-step methods share: h_next = h · clamp(0.9 err^(−1/order), 0.2, 5).
 inline double step_factor(double error, double order) {
@@ -126,8 +115,8 @@ class SingleStep : public Stepper<S, N> {
         const double factor = step_factor(error, Derived::kOrder);
         const double taken = value_of(length);
         const double next = taken * (rejected ? std::min(factor, 1.0) : factor);
-        // A step cut short by a limit says little about what the next one may be.
-        h_next_ = (last || h >= longest) ? std::max(next, std::min(h_next_, taken * 5)) : next;
+        // A step cut short by a limit says nothing against the length that was meant.
+        h_next_ = !rejected && (last || h >= longest) ? std::max(next, h_next_) : next;
         return StepStatus::accepted;
       }
       ++this->rejected_;
@@ -141,6 +130,23 @@ class SingleStep : public Stepper<S, N> {
   void flow(const S& t, const State<S, N>& y, State<S, N>& dy) {
     ++this->flow_evaluations_;
     system_->flow(phase_, t, y, dy);
+  }
+
+  double error_norm(const State<S, N>& error) const {
+    State<double, N> scale;
+    system_->error_scale(phase_, tolerances_, values<S, N>(this->y0_), values<S, N>(this->y1_), scale);
+    return scaled_norm<N>(values<S, N>(error), scale);
+  }
+
+  /// A first step that changes no component by more than a twentieth of its size, or of a hundred error tolerances.
+  double first_step(const State<double, N>& rate) const {
+    const State<double, N> y = values<S, N>(this->y0_);
+    State<double, N> scale;
+    system_->error_scale(phase_, tolerances_, y, y, scale);
+    double h = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < N; ++i)
+      if (rate[i] != 0) h = std::min(h, 0.05 * std::max(std::abs(y[i]), 100 * scale[i]) / std::abs(rate[i]));
+    return std::isfinite(h) && h > 0 ? h : 1e-6;
   }
 
   const HybridSystem<N>* system_{};

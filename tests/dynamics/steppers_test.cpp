@@ -1,0 +1,354 @@
+// The steppers one by one: order, stiffness, dense output, restarts and derivatives of the discrete solution.
+#include "dynamics/dormand_prince.hpp"
+#include "dynamics/rosenbrock.hpp"
+#include "dynamics/sdirk.hpp"
+#include "tests/dynamics/toy_systems.hpp"
+
+namespace unhand::dynamics {
+namespace {
+
+constexpr Phase kPhase{0, {0, 100}};
+constexpr Tolerances kLoose{1e30, 1e30};  // every step is accepted at the length asked for
+
+template <class Flow>
+auto free_flow(Flow flow, FlowKind kind = FlowKind::smooth) {
+  return Toy({{kind, {}}}, flow, no_guards(), enter(0));
+}
+
+/// Nonlinear, non-autonomous, coupled, with a closed form: y0 = exp(sin t), y1 = cos t + y0².
+auto smooth_problem() {
+  return free_flow([](int, const auto& t, const auto& y, auto& dy) {
+    using std::cos; using std::sin; using std::exp;
+    const auto c = cos(t), s = sin(t);
+    dy[0] = y[0] * c + 0.5 * (y[1] - c - y[0] * y[0]);
+    dy[1] = -s + 2.0 * y[0] * dy[0] - (y[1] - c - y[0] * y[0]);
+  });
+}
+State<double, 2> smooth_solution(double t) {
+  const double y0 = std::exp(std::sin(t));
+  return {y0, std::cos(t) + y0 * y0};
+}
+
+template <class T>
+class SingleSteps : public testing::Test {};
+using Steppers = testing::Types<DormandPrince<double, 2>, Rosenbrock<2>, Sdirk<double, 2>>;
+TYPED_TEST_SUITE(SingleSteps, Steppers);
+
+/// With tolerances this loose Sdirk's Newton iteration would not iterate: its own are used there, and steps small enough.
+template <class T>
+Tolerances fixed_step_tolerances() { return std::is_same_v<T, Sdirk<double, 2>> ? Tolerances{1e-3, 1e-3} : kLoose; }
+
+template <class Stepper, class System>
+double error_of_fixed_steps(const System& system, State<double, 2> y, double t0, double t1, int steps,
+                            State<double, 2> exact, Tolerances tolerances) {
+  Stepper stepper(tolerances);
+  for (int k = 0; k < steps; ++k) {
+    const double t = t0 + (t1 - t0) * k / steps;
+    stepper.start(system, kPhase, t, y);
+    // One accepted step, then the wanted length through `retake`, which is how events use it.
+    if (stepper.step(t + 2 * (t1 - t0) / steps, 2 * (t1 - t0) / steps) != StepStatus::accepted) return NAN;
+    const double h = (t1 - t0) / steps;
+    if (value_of(stepper.t1()) - t < h * (1 - 1e-9)) {  // the first guess was shorter: let it grow
+      State<double, 2> taken = y;
+      stepper.start(system, kPhase, t, taken);
+      while (stepper.t1() - t < h * (1 - 1e-9)) {
+        stepper.start(system, kPhase, t, y);
+        if (stepper.step(t + 2 * h, 2 * h) != StepStatus::accepted) return NAN;
+      }
+    }
+    State<double, 2> next;
+    stepper.retake(h, next);
+    y = next;
+  }
+  return std::max(std::abs(y[0] - exact[0]), std::abs(y[1] - exact[1]));
+}
+
+TYPED_TEST(SingleSteps, ConvergeWithTheirOrder) {
+  // A wrong digit in any coefficient leaves an error of lower order, which halving the step uncovers.
+  const auto problem = smooth_problem();
+  const double order = TypeParam::kOrder;
+  // Sdirk's stages are solved to 1e-3 of its tolerance.
+  const auto tolerances = std::is_same_v<TypeParam, Sdirk<double, 2>> ? Tolerances{1e-11, 1e-11} : kLoose;
+  if (std::is_same_v<TypeParam, Sdirk<double, 2>>) {
+    // Its Newton tolerance is its step tolerance: the order shows in the error against the number of steps instead.
+    double last = NAN, last_steps = NAN;
+    for (const double tolerance : {1e-6, 1e-8, 1e-10}) {
+      IntegratorOptions o;
+      o.method = Method::sdirk;
+      o.tolerances = {tolerance, tolerance};
+      o.longest_step = 10;
+      const auto end = run(problem, smooth_solution(0.2), 3.0, o, 0.2);
+      const auto exact = smooth_solution(3.0);
+      const double error = std::hypot(end.y[0] - exact[0], end.y[1] - exact[1]);
+      const double steps = static_cast<double>(end.statistics.steps);
+      if (last > 0) {
+        EXPECT_NEAR(std::log(last / error) / std::log(steps / last_steps), order, 0.6);
+      }
+      last = error;
+      last_steps = steps;
+    }
+    return;
+  }
+  double last = NAN;
+  for (const int steps : {20, 40, 80}) {
+    const double error = error_of_fixed_steps<TypeParam>(problem, smooth_solution(0.2), 0.2, 2.2, steps,
+                                                         smooth_solution(2.2), tolerances);
+    if (last > 0) {
+      EXPECT_NEAR(std::log2(last / error), order, 0.6) << steps;  // the next order is still visible
+    }
+    last = error;
+  }
+  EXPECT_LT(last, 1e-5);
+}
+
+TYPED_TEST(SingleSteps, TheErrorFollowsTheTolerance) {
+  const auto problem = smooth_problem();
+  for (const double tolerance : {1e-5, 1e-7, 1e-9, 1e-11}) {
+    TypeParam stepper(Tolerances{tolerance, tolerance});
+    stepper.start(problem, kPhase, 0.2, smooth_solution(0.2));
+    while (stepper.t1() < 4.0) ASSERT_EQ(stepper.step(4.0, 10.0), StepStatus::accepted);
+    EXPECT_EQ(stepper.t1(), 4.0);
+    // Errors grow by the flow's own expansion, a factor below 50 here, over some 100 steps at most.
+    EXPECT_NEAR(stepper.y1()[0], smooth_solution(4.0)[0], 300 * tolerance) << tolerance;
+    EXPECT_NEAR(stepper.y1()[1], smooth_solution(4.0)[1], 300 * tolerance) << tolerance;
+  }
+}
+
+TYPED_TEST(SingleSteps, TheDenseOutputIsOfOrderThreeOrBetter) {
+  // Worst error inside one step of length h: falls at least with h⁴ (a polynomial of degree three), and both ends meet.
+  const auto problem = smooth_problem();
+  double last = NAN;
+  for (const double h : {0.1, 0.05, 0.025}) {
+    TypeParam stepper(Tolerances{1e-3, 1e-3});
+    stepper.start(problem, kPhase, 1.0, smooth_solution(1.0));
+    ASSERT_EQ(stepper.step(1.0 + 1e-3, 1.0), StepStatus::accepted);  // a step length to grow from
+    while (stepper.t1() - stepper.t0() < 0.999 * h) {
+      stepper.start(problem, kPhase, 1.0, smooth_solution(1.0));
+      ASSERT_EQ(stepper.step(1.0 + 2 * h, h), StepStatus::accepted);
+    }
+    double worst = 0;
+    State<double, 2> y;
+    for (int k = 0; k <= 20; ++k) {
+      stepper.interpolate(k / 20.0, y);
+      const auto exact = smooth_solution(1.0 + h * k / 20.0);
+      worst = std::max({worst, std::abs(y[0] - exact[0]), std::abs(y[1] - exact[1])});
+    }
+    stepper.interpolate(1.0, y);
+    EXPECT_NEAR(y[0], stepper.y1()[0], 1e-14);
+    stepper.interpolate(0.0, y);
+    EXPECT_NEAR(y[0], stepper.y0()[0], 1e-14);
+    if (last > 0) {
+      EXPECT_GT(std::log2(last / worst), 3.3) << h;  // 4 or 5, less what the next order still adds
+    }
+    last = worst;
+  }
+}
+
+TYPED_TEST(SingleSteps, RetakingTheWholeStepIsTheStepAndLeavesItAlone) {
+  const auto problem = smooth_problem();
+  TypeParam stepper(Tolerances{1e-8, 1e-8});
+  stepper.start(problem, kPhase, 0.2, smooth_solution(0.2));
+  for (int k = 0; k < 5; ++k) {
+    ASSERT_EQ(stepper.step(4.0, 10.0), StepStatus::accepted);
+    State<double, 2> before, after, half, whole;
+    stepper.interpolate(0.4, before);
+    stepper.retake(0.5 * (stepper.t1() - stepper.t0()), half);
+    stepper.retake(stepper.t1() - stepper.t0(), whole);
+    stepper.interpolate(0.4, after);
+    EXPECT_EQ(before[0], after[0]);
+    EXPECT_NEAR(whole[0], stepper.y1()[0], 1e-10);  // Sdirk's iterations start elsewhere: 1e-3 of the tolerance
+    const auto exact = smooth_solution(0.5 * (stepper.t0() + stepper.t1()));
+    EXPECT_NEAR(half[0], exact[0], 1e-6);
+  }
+}
+
+TYPED_TEST(SingleSteps, ARestartForgetsEverythingButTheStepLength) {
+  // The same phase after another one of a different flow gives the same answer to the last bit of the method's own.
+  const auto problem = smooth_problem();
+  const auto other = free_flow([](int, const auto& t, const auto& y, auto& dy) {
+    dy[0] = 5.0 * y[1] + t;
+    dy[1] = -3.0 * y[0];
+  });
+  TypeParam used(Tolerances{1e-9, 1e-9}), fresh(Tolerances{1e-9, 1e-9});
+  used.start(other, kPhase, 0.0, {1.0, 1.0});
+  while (used.t1() < 1.0) ASSERT_EQ(used.step(1.0, 1e-2), StepStatus::accepted);
+  for (TypeParam* stepper : {&used, &fresh}) {
+    stepper->start(problem, kPhase, 0.2, smooth_solution(0.2));
+    while (stepper->t1() < 3.0) ASSERT_EQ(stepper->step(3.0, 10.0), StepStatus::accepted);
+    EXPECT_NEAR(stepper->y1()[0], smooth_solution(3.0)[0], 1e-7);
+  }
+  EXPECT_NEAR(used.y1()[0], fresh.y1()[0], 1e-7);
+}
+
+TYPED_TEST(SingleSteps, AStepCutShortByALimitDoesNotShortenTheNext) {
+  const auto problem = smooth_problem();
+  TypeParam stepper(Tolerances{1e-7, 1e-7});
+  stepper.start(problem, kPhase, 0.2, smooth_solution(0.2));
+  while (stepper.t1() < 1.0) ASSERT_EQ(stepper.step(1.0, 10.0), StepStatus::accepted);
+  const auto y = stepper.y1();
+  stepper.start(problem, kPhase, 1.0, y);
+  ASSERT_EQ(stepper.step(1.0 + 1e-11, 10.0), StepStatus::accepted);  // a sliver
+  ASSERT_EQ(stepper.step(3.0, 10.0), StepStatus::accepted);
+  EXPECT_GT(stepper.t1() - stepper.t0(), 1e-3);
+}
+
+TEST(Fsal, TheLastStageIsTheFirstOfTheNextStep) {
+  const auto problem = smooth_problem();
+  DormandPrince<double, 2> stepper(Tolerances{1e-6, 1e-6});
+  stepper.start(problem, kPhase, 0.2, smooth_solution(0.2));
+  ASSERT_EQ(stepper.step(3.0, 1e-3), StepStatus::accepted);
+  EXPECT_EQ(stepper.flow_evaluations(), 7);
+  ASSERT_EQ(stepper.step(3.0, 1e-3), StepStatus::accepted);
+  EXPECT_EQ(stepper.flow_evaluations(), 13);
+}
+
+// ------------------------------------------------------------------ stiff
+
+class Stiff : public testing::TestWithParam<Method> {};
+INSTANTIATE_TEST_SUITE_P(, Stiff, testing::Values(Method::automatic, Method::rosenbrock, Method::sdirk, Method::cvode),
+                         [](const auto& test) { return name_of(test.param); });
+
+IntegratorOptions stiff_options(Method method, double tolerance) {
+  IntegratorOptions o;
+  o.method = method;
+  o.tolerances = {tolerance, tolerance};
+  o.longest_step = INFINITY;
+  return o;
+}
+
+TEST_P(Stiff, ProtheroRobinson) {
+  // y' = λ (y − φ) + φ', y = φ = sin t: the order reduces, the tolerance must be kept with few steps all the same.
+  for (const double lambda : {-1e2, -1e4, -1e6}) {
+    const auto problem = free_flow(
+        [lambda](int, const auto& t, const auto& y, auto& dy) {
+          using std::cos; using std::sin;
+          dy[0] = lambda * (y[0] - sin(t)) + cos(t);
+          dy[1] = lambda * (y[1] - y[0] * y[0]) + 2.0 * y[0] * cos(t);
+        },
+        FlowKind::stiff);
+    const auto end = run(problem, {0.0, 0.0}, 10.0, stiff_options(GetParam(), 1e-7));
+    EXPECT_EQ(end.outcome, Outcome::horizon);
+    EXPECT_NEAR(end.y[0], std::sin(10.0), 1e-5) << lambda;  // a hundred tolerances
+    EXPECT_NEAR(end.y[1], std::sin(10.0) * std::sin(10.0), 1e-5) << lambda;
+    EXPECT_LT(end.statistics.steps, 6000) << lambda;  // an explicit method needs |λ|·10/3: 3e6 for the last
+  }
+}
+
+TEST_P(Stiff, VanDerPolAgainstTightCvode) {
+  // In the scaling x' = y, ε y' = (1 − x²) y − x with ε = μ^-2 and t in units of μ; past two jumps.
+  for (const double mu : {1e3, 1e6}) {
+    const double eps = 1 / (mu * mu);
+    const auto problem = free_flow(
+        [eps](int, const auto&, const auto& y, auto& dy) {
+          dy[0] = y[1];
+          dy[1] = ((1.0 - y[0] * y[0]) * y[1] - y[0]) / eps;
+        },
+        FlowKind::stiff);
+    auto tight = stiff_options(Method::cvode, 1e-12);
+    const auto oracle = run(problem, {2.0, -2.0 / 3}, 2.0, tight);
+    const auto end = run(problem, {2.0, -2.0 / 3}, 2.0, stiff_options(GetParam(), 1e-8));
+    ASSERT_EQ(oracle.outcome, Outcome::horizon);
+    EXPECT_EQ(end.outcome, Outcome::horizon);
+    // The jumps pass on an error of their time times the slow speed: a few hundred tolerances.
+    EXPECT_NEAR(end.y[0], oracle.y[0], 1e-5) << mu;
+    EXPECT_LT(end.statistics.steps, 12'000) << mu;
+    if (mu == 1e3) {
+      EXPECT_NEAR(oracle.y[0], 1.706167732170469, 1e-6);  // [HairerWanner1996] IV.10: ε = 1e-6, t = 2
+    }
+  }
+}
+
+template <class T>
+class LStable : public testing::Test {};
+using Implicit = testing::Types<Rosenbrock<2>, Sdirk<double, 2>>;
+TYPED_TEST_SUITE(LStable, Implicit);
+
+TYPED_TEST(LStable, AnInfinitelyFastDecayIsGoneInOneStep) {
+  const auto problem = free_flow(
+      [](int, const auto& t, const auto& y, auto& dy) {
+        dy[0] = -1e8 * y[0];
+        dy[1] = 0.0 * y[1] + 0.0 * t;
+      },
+      FlowKind::stiff);
+  TypeParam stepper(Tolerances{1.0, 10.0});  // the step is accepted as asked
+  stepper.start(problem, kPhase, 0.0, {1.0, 1.0});
+  ASSERT_EQ(stepper.step(10.0, 1.0), StepStatus::accepted);
+  while (stepper.t1() - stepper.t0() < 0.999) {
+    stepper.start(problem, kPhase, 0.0, {1.0, 1.0});
+    ASSERT_EQ(stepper.step(10.0, 1.0), StepStatus::accepted);
+  }
+  // R(z) ~ C/z at infinity, z = −1e8.
+  EXPECT_LT(std::abs(stepper.y1()[0]), 1e-6);
+  EXPECT_NEAR(stepper.y1()[1], 1.0, 1e-14);
+}
+
+// ------------------------------------------------------------------ derivatives of the discrete solution
+
+template <class T>
+class WithDual : public testing::Test {};
+using Differentiable = testing::Types<DormandPrince<Dual, 2>, Sdirk<Dual, 2>>;
+TYPED_TEST_SUITE(WithDual, Differentiable);
+
+TYPED_TEST(WithDual, IsThatOfTheSolution) {
+  // x'' = −k x − c x' + sin t from (t0, x0, v0): derivatives with respect to k, c, x0, v0 and t0.
+  auto at_end = [](const std::array<Dual, 5>& q) {
+    const auto problem = free_flow(
+        [q](int, const auto& t, const auto& y, auto& dy) {
+          using S = std::decay_t<decltype(t)>;
+          using std::sin;
+          dy[0] = y[1];
+          dy[1] = -as<S>(q[0]) * y[0] * (1.0 + y[0] * y[0]) - as<S>(q[1]) * y[1] + sin(t);
+        },
+        FlowKind::stiff);
+    TypeParam stepper(Tolerances{1e-11, 1e-12});
+    stepper.start(problem, kPhase, q[4], {q[2], q[3]});
+    while (stepper.t1().a < 3.0) EXPECT_EQ(stepper.step(Dual(3.0), 0.1), StepStatus::accepted);
+    return stepper.y1();
+  };
+  const double p[5] = {4.0, 0.5, 1.0, -0.2, 0.3};
+  std::array<Dual, 5> seeded;
+  for (int k = 0; k < 5; ++k) seeded[k] = independent(p[k], k);
+  const auto y = at_end(seeded);
+  for (int k = 0; k < 5; ++k)
+    for (int i = 0; i < 2; ++i) {
+      double best = INFINITY;
+      for (double step = 1e-1; step > 0.5e-7; step *= 0.1) {
+        std::array<Dual, 5> up, down;
+        for (int j = 0; j < 5; ++j) {
+          up[j] = Dual(p[j] + (j == k ? step : 0));
+          down[j] = Dual(p[j] - (j == k ? step : 0));
+        }
+        best = std::min(best, std::abs((at_end(up)[i].a - at_end(down)[i].a) / (2 * step) - y[i].v[k]));
+      }
+      // The bottom of the V: truncation 1e-8 against step-control noise 1e-10 over 1e-4 to 1e-3.
+      EXPECT_LT(best, 2e-7) << "parameter " << k << " component " << i;
+    }
+}
+
+// ------------------------------------------------------------------ one stepper for several phases of a run
+
+class Phases : public EveryMethod {};
+UNHAND_EVERY_METHOD(Phases);
+
+TEST_P(Phases, ModesAlternateAndReuseTheSteppers) {
+  // Four quarter turns, alternately declared smooth and stiff, are one whole turn.
+  auto swing = Toy({{FlowKind::smooth, {{"x", Crossing::falling}}},
+                    {FlowKind::stiff, {{"v", Crossing::rising}}},
+                    {FlowKind::smooth, {{"x", Crossing::rising}}},
+                    {FlowKind::stiff, {{"v", Crossing::falling}}}},
+                   oscillator(),
+                   [](int mode, const auto&, const auto& y, auto* g) { g[0] = y[mode % 2]; },
+                   [](int mode, int, const auto& t, const auto& y) {
+                     using S = std::decay_t<decltype(t)>;
+                     return Entry<S, 2>{(mode + 1) % 4, t, y, S(0)};
+                   });
+  auto o = options();
+  const auto end = run(swing, {1.0, 0.0}, 6 * M_PI + 0.5, o);
+  EXPECT_EQ(end.outcome, Outcome::horizon);
+  ASSERT_EQ(end.events.size(), 12u);
+  for (int k = 0; k < 12; ++k) EXPECT_NEAR(end.events[k].t, 0.5 * (k + 1) * M_PI, 1e-8);  // 1e-12 in 4,000 steps
+  EXPECT_NEAR(end.y[0], std::cos(0.5), 1e-8);
+}
+
+}  // namespace
+}  // namespace unhand::dynamics

@@ -1,0 +1,157 @@
+// Small hybrid systems written in place: a flow, the guards and what they do, as generic lambdas.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "dynamics/integrator.hpp"
+
+namespace unhand::dynamics {
+
+/// A constant of a toy as the scalar of the moment.
+template <class S>
+S as(const Dual& x) {
+  if constexpr (std::is_same_v<S, double>) return x.a;
+  else return x;
+}
+
+struct ToyMode {
+  FlowKind kind{FlowKind::smooth};
+  std::vector<Guard> guards;
+};
+
+/// flow(mode, t, y, dy); guards(mode, t, y, g); on_guard(mode, guard, t, y) -> Entry<S, 2>.
+template <class Flow, class Guards, class OnGuard>
+class Toy final : public HybridSystemFrom<Toy<Flow, Guards, OnGuard>, 2> {
+ public:
+  Toy(std::vector<ToyMode> modes, Flow flow, Guards guards, OnGuard on_guard)
+      : modes_(std::move(modes)), flow_of_(flow), guards_of_(guards), on_guard_of_(on_guard) {}
+
+  FlowKind kind(int mode) const override { return modes_[mode].kind; }
+  std::string_view mode_name(int) const override { return "toy"; }
+  int guard_count(int mode) const override { return static_cast<int>(modes_[mode].guards.size()); }
+  Guard guard(int mode, int index) const override { return modes_[mode].guards[index]; }
+  bool has_limit(int, int) const override { return limit_mode >= 0; }
+
+  template <class S>
+  void flow_(const Phase& phase, const S& t, const State<S, 2>& y, State<S, 2>& dy) const {
+    flow_of_(phase.mode, t, y, dy);
+  }
+  template <class S>
+  void guards_(const Phase& phase, const S& t, const State<S, 2>& y, S* g) const {
+    guards_of_(phase.mode, t, y, g);
+  }
+  template <class S>
+  Entry<S, 2> on_guard_(const Phase& from, int guard, const S& t, const State<S, 2>& y) const {
+    return on_guard_of_(from.mode, guard, t, y);
+  }
+  template <class S>
+  void time_events_(std::vector<S>& out) const {
+    out.clear();
+    for (const double t : times) out.push_back(S(t));
+  }
+  template <class S>
+  Entry<S, 2> at_limit_(const Phase&, const S& t, const State<S, 2>&) const {
+    return {limit_mode, t, State<S, 2>{}, S(0)};
+  }
+
+  std::vector<double> times;
+  int limit_mode{-1};  ///< where an accumulation of events ends, with a state of zeros; -1: nowhere
+
+ private:
+  std::vector<ToyMode> modes_;
+  Flow flow_of_;
+  Guards guards_of_;
+  OnGuard on_guard_of_;
+};
+
+/// on_guard that ends the integration: enters `mode` with the state as it is.
+inline auto enter(int mode) {
+  return [mode](int, int, const auto& t, const auto& y) {
+    using S = std::decay_t<decltype(t)>;
+    return Entry<S, 2>{mode, t, y, S(0)};
+  };
+}
+
+/// One mode (0) of the kind given, left for a finished one (1) when a guard fires.
+template <class Flow, class Guards>
+auto until_guard(std::vector<Guard> list, Flow flow, Guards guards, FlowKind kind = FlowKind::smooth) {
+  return Toy(std::vector<ToyMode>{{kind, std::move(list)}, {FlowKind::finished, {}}}, flow, guards, enter(1));
+}
+
+inline auto no_guards() {
+  return [](int, const auto&, const auto&, auto*) {};
+}
+/// x'' = -x.
+inline auto oscillator() {
+  return [](int, const auto&, const auto& y, auto& dy) {
+    dy[0] = y[1];
+    dy[1] = -y[0];
+  };
+}
+
+/// A ball over a floor at 0: fly (0), rest (1). Restitution e, gravity g [m/s²].
+inline auto bouncing_ball(Dual gravity, Dual restitution, bool rests = true) {
+  Toy ball(
+      std::vector<ToyMode>{{FlowKind::smooth, {{"floor", Crossing::falling}}}, {FlowKind::frozen, {}}},
+      [gravity](int, const auto& t, const auto& y, auto& dy) {
+        using S = std::decay_t<decltype(t)>;
+        dy[0] = y[1];
+        dy[1] = -as<S>(gravity);
+      },
+      [](int, const auto&, const auto& y, auto* g) { g[0] = y[0]; },
+      [restitution](int, int, const auto& t, const auto& y) {
+        using S = std::decay_t<decltype(t)>;
+        return Entry<S, 2>{0, t, {y[0], S(-as<S>(restitution) * y[1])}, S(0)};
+      });
+  if (rests) ball.limit_mode = 1;
+  return ball;
+}
+
+inline std::string name_of(Method method) {
+  switch (method) {
+    case Method::automatic: return "automatic";
+    case Method::dormand_prince: return "dormand_prince";
+    case Method::rosenbrock: return "rosenbrock";
+    case Method::sdirk: return "sdirk";
+    case Method::cvode: return "cvode";
+  }
+  return "unknown";
+}
+
+/// Tests of this kind run once with every method.
+class EveryMethod : public testing::TestWithParam<Method> {
+ protected:
+  /// CVODE's events are found on its interpolant, which is as good as its tolerance: that sets these.
+  static IntegratorOptions options() {
+    IntegratorOptions options;
+    options.method = GetParam();
+    options.tolerances = {1e-12, 1e-13};
+    return options;
+  }
+};
+
+#define UNHAND_EVERY_METHOD(Suite)                                                                        \
+  INSTANTIATE_TEST_SUITE_P(, Suite,                                                                       \
+                           testing::Values(Method::automatic, Method::dormand_prince, Method::rosenbrock, \
+                                           Method::sdirk, Method::cvode),                                 \
+                           [](const auto& test) { return name_of(test.param); })
+
+template <class System>
+Solution<double, 2> run(const System& system, const State<double, 2>& y, double t_end,
+                        const IntegratorOptions& options, double t0 = 0) {
+  return integrate<double, 2>(system, Entry<double, 2>{0, t0, y, 0.0}, t_end, options);
+}
+
+template <class S, int N>
+int count(const Solution<S, N>& solution, EventKind kind) {
+  int n = 0;
+  for (const auto& event : solution.events) n += event.kind == kind;
+  return n;
+}
+
+}  // namespace unhand::dynamics
