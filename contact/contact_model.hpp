@@ -138,8 +138,8 @@ class ContactModel {
   // Which guards leave a mode?
   virtual int guard_count(int mode) const = 0;
   virtual dynamics::Guard guard(int mode, int index) const = 0;
-  virtual void guards(int mode, const Scene<double>&, const Relative<double>&, double* g) const = 0;
-  virtual void guards(int mode, const Scene<Dual>&, const Relative<Dual>&, Dual* g) const = 0;
+  virtual void guards(const Phase&, const SceneSource&, double t, const Relative<double>&, double* g) const = 0;
+  virtual void guards(const Phase&, const SceneSource&, const Dual& t, const Relative<Dual>&, Dual* g) const = 0;
 
   // What happens at a guard, and which mode holds at an instant (after a time event, or at the start: mode < 0)?
   virtual Entry<double, 6> on_guard(const Phase&, int guard, const SceneSource&, double t, const Relative<double>&) const = 0;
@@ -152,7 +152,16 @@ class ContactModel {
   virtual void separation(const NormalForce&, Dual& t) const = 0;
 
   /// A bound on the next step [s] near a point where the flow is singular.
-  virtual double max_step(int mode, const Scene<double>&, const Relative<double>&) const = 0;
+  virtual double max_step(const Phase&, const SceneSource&, double /*t*/, const Relative<double>&) const {
+    return std::numeric_limits<double>::infinity();
+  }
+
+  /// True if the law depends on the direction of u = (v_r, L ω_r) alone, so that the flow is regular when paced by |u|.
+  bool is_homogeneous() const { return spin_length() > 0; }
+
+  /// The length L [m] that makes a spin comparable to a slip, |u| = |(v_r, L ω_r)|, for laws that depend on the
+  /// direction of u alone: errors of the slip are then judged relative to |u|. 0: component by component.
+  virtual double spin_length() const { return 0; }
 
   /// True if the law can feed energy through its linear slip in this mode (a surrogate, not a material law).
   virtual bool may_feed_energy(int /*mode*/) const { return false; }
@@ -169,36 +178,24 @@ void force_release(const NormalForce& force, S& t) {
     if (dynamics::value_of(kink) == release) t = kink;
 }
 
-/// Writes both overloads from the templates wrench_, guards_, on_guard_, membership_ of Derived.
+/// Writes both overloads from the templates wrench_, rate_, guards_, on_guard_, membership_ of Derived. The definitions
+/// are in contact_model_from.hpp, which only the model's own source includes: it ends with
+/// `template class ContactModelFrom<Model>;`.
 template <class Derived>
 class ContactModelFrom : public ContactModel {
  public:
-  Wrench<double> wrench(int m, const Scene<double>& s, const Relative<double>& y) const final { return self().wrench_(m, s, y); }
-  Wrench<Dual> wrench(int m, const Scene<Dual>& s, const Relative<Dual>& y) const final { return self().wrench_(m, s, y); }
-  void rate(int m, const Scene<double>& s, const Relative<double>& y, State<double, 6>& dy) const final { self().rate_(m, s, y, dy); }
-  void rate(int m, const Scene<Dual>& s, const Relative<Dual>& y, State<Dual, 6>& dy) const final { self().rate_(m, s, y, dy); }
-  void guards(int m, const Scene<double>& s, const Relative<double>& y, double* g) const final { self().guards_(m, s, y, g); }
-  void guards(int m, const Scene<Dual>& s, const Relative<Dual>& y, Dual* g) const final { self().guards_(m, s, y, g); }
-  Entry<double, 6> on_guard(const Phase& p, int i, const SceneSource& w, double t, const Relative<double>& y) const final {
-    return self().on_guard_(p, i, w, t, y);
-  }
-  Entry<Dual, 6> on_guard(const Phase& p, int i, const SceneSource& w, const Dual& t, const Relative<Dual>& y) const final {
-    return self().on_guard_(p, i, w, t, y);
-  }
-  Entry<double, 6> membership(int m, const Window& v, const SceneSource& w, double t, const Relative<double>& y) const final {
-    return self().membership_(m, v, w, t, y);
-  }
-  Entry<Dual, 6> membership(int m, const Window& v, const SceneSource& w, const Dual& t, const Relative<Dual>& y) const final {
-    return self().membership_(m, v, w, t, y);
-  }
+  Wrench<double> wrench(int, const Scene<double>&, const Relative<double>&) const final;
+  Wrench<Dual> wrench(int, const Scene<Dual>&, const Relative<Dual>&) const final;
+  void rate(int, const Scene<double>&, const Relative<double>&, State<double, 6>&) const final;
+  void rate(int, const Scene<Dual>&, const Relative<Dual>&, State<Dual, 6>&) const final;
+  void guards(const Phase&, const SceneSource&, double, const Relative<double>&, double*) const final;
+  void guards(const Phase&, const SceneSource&, const Dual&, const Relative<Dual>&, Dual*) const final;
+  Entry<double, 6> on_guard(const Phase&, int, const SceneSource&, double, const Relative<double>&) const final;
+  Entry<Dual, 6> on_guard(const Phase&, int, const SceneSource&, const Dual&, const Relative<Dual>&) const final;
+  Entry<double, 6> membership(int, const Window&, const SceneSource&, double, const Relative<double>&) const final;
+  Entry<Dual, 6> membership(int, const Window&, const SceneSource&, const Dual&, const Relative<Dual>&) const final;
   void separation(const NormalForce& force, double& t) const override { force_release(force, t); }
   void separation(const NormalForce& force, Dual& t) const override { force_release(force, t); }
-  double max_step(int, const Scene<double>&, const Relative<double>&) const override {
-    return std::numeric_limits<double>::infinity();
-  }
-
- private:
-  const Derived& self() const { return static_cast<const Derived&>(*this); }
 };
 
 /// Signed margin of a demand against a limit, both >= 0: (d² − l²)/(d² + l²), in [−1, 1], zero where they are equal.

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <stdexcept>
+#include "contact/contact_model_from.hpp"
 
 namespace unhand::contact {
 
@@ -59,5 +60,7 @@ GripperDelay::GripperDelay(double open_command, const Dual& delay) : open_comman
     throw std::invalid_argument(fmt::format("gripper delay: open_command = {} s is not finite", open_command));
   validate(DelayDistribution::number(delay.a));
 }
+
+template class ContactModelFrom<GripperDelay>;
 
 }  // namespace unhand::contact

@@ -53,7 +53,7 @@ class GripperDelay final : public ContactModelFrom<GripperDelay> {
   template <class S>
   void rate_(int, const Scene<S>&, const Relative<S>&, State<S, 6>& dy) const { dy = {}; }
   template <class S>
-  void guards_(int, const Scene<S>&, const Relative<S>&, S*) const {}
+  void guards_(const Phase&, const SceneSource&, const S&, const Relative<S>&, S*) const {}
   template <class S>
   Entry<S, 6> on_guard_(const Phase& from, int, const SceneSource&, const S& t, const Relative<S>& y) const {
     return {from.mode, t, y.state(), S(0)};
@@ -67,5 +67,7 @@ class GripperDelay final : public ContactModelFrom<GripperDelay> {
   double open_command_;
   Dual delay_;
 };
+
+extern template class ContactModelFrom<GripperDelay>;
 
 }  // namespace unhand::contact

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 
 #include "contact/slip_stop.hpp"
+#include "contact/contact_model_from.hpp"
 
 namespace unhand::contact {
 
@@ -217,14 +218,22 @@ void LimitSurface<Shape>::rate_(int mode, const Scene<S>& scene, const Relative<
   dy = relative_rate(scene, y, wrench_(mode, scene, y));
 }
 
+/// (demand against the surface) for a stick at `scene`.
 template <class Shape>
 template <class S>
-void LimitSurface<Shape>::guards_(int mode, const Scene<S>& scene, const Relative<S>& y, S* g) const {
-  if (mode == kStick) {
-    const S length = patch<S>().length(), f_max = patch<S>().f_max(scene.normal_force);
-    const Wrench<S> demand = sticking_wrench(scene, y);
-    const S size = gauge(shape_, scene, Vec3<S>{demand.fx, demand.fz, demand.tau / length});
-    g[0] = margin(S(size * size), S(f_max * f_max));
+S LimitSurface<Shape>::stick_margin(const Scene<S>& scene, const Relative<S>& y) const {
+  const S length = patch<S>().length(), f_max = patch<S>().f_max(scene.normal_force);
+  const Wrench<S> demand = sticking_wrench(scene, y);
+  const S size = gauge(shape_, scene, Vec3<S>{demand.fx, demand.fz, demand.tau / length});
+  return margin(S(size * size), S(f_max * f_max));
+}
+
+template <class Shape>
+template <class S>
+void LimitSurface<Shape>::guards_(const Phase& phase, const SceneSource& source, const S& t, const Relative<S>& y,
+                                  S* g) const {
+  if (phase.mode == kStick) {
+    g[0] = stick_margin(source.scene(phase.window, t), y);
   } else {
     const Vec3<S> u = normalised_slip(y);
     g[0] = sqrt(dot3(u, u)) / kStopSpeed - 1.0;
@@ -232,10 +241,11 @@ void LimitSurface<Shape>::guards_(int mode, const Scene<S>& scene, const Relativ
 }
 
 template <class Shape>
-double LimitSurface<Shape>::max_step(int mode, const Scene<double>& scene, const Relative<double>& y) const {
-  if (mode == kStick) return std::numeric_limits<double>::infinity();
+double LimitSurface<Shape>::max_step(const Phase& phase, const SceneSource& source, double t,
+                                     const Relative<double>& y) const {
+  if (phase.mode == kStick) return std::numeric_limits<double>::infinity();
   State<double, 6> dy;
-  rate_(mode, scene, y, dy);
+  rate_(phase.mode, source.scene(phase.window, t), y, dy);
   const Vec3<double> u = normalised_slip(y), du{dy[3], dy[4], patch<double>().length() * dy[5]};
   const double speed = std::sqrt(dot3(u, u));
   return longest_step_to_stop(speed, dot3(u, du) / speed);
@@ -290,9 +300,7 @@ Entry<S, 6> LimitSurface<Shape>::membership_(int mode, const Window& window, con
                                              const Relative<S>& y) const {
   const Vec3<S> u = normalised_slip(y);
   if (mode == kSlip || value_of(dot3(u, u)) > 0) return {kSlip, t, y.state(), S(0)};
-  double g = 0;
-  guards_(kStick, values(source.scene(window, t)), values(y), &g);
-  if (g < 0) return {kStick, t, y.state(), S(0)};
+  if (stick_margin(values(source.scene(window, t)), values(y)) < 0) return {kStick, t, y.state(), S(0)};
   return onset(window, source, t, y, false);
 }
 

@@ -35,14 +35,15 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
   }
   int guard_count(int) const override { return 1; }
   dynamics::Guard guard(int mode, int) const override;
-  double max_step(int mode, const Scene<double>&, const Relative<double>&) const override;
+  double spin_length() const override { return patch_double_.length(); }
+  double max_step(const Phase&, const SceneSource&, double t, const Relative<double>&) const override;
 
   template <class S>
   Wrench<S> wrench_(int mode, const Scene<S>&, const Relative<S>&) const;
   template <class S>
   void rate_(int mode, const Scene<S>&, const Relative<S>&, State<S, 6>&) const;
   template <class S>
-  void guards_(int mode, const Scene<S>&, const Relative<S>&, S* g) const;
+  void guards_(const Phase&, const SceneSource&, const S& t, const Relative<S>&, S* g) const;
   template <class S>
   Entry<S, 6> on_guard_(const Phase&, int guard, const SceneSource&, const S& t, const Relative<S>&) const;
   template <class S>
@@ -55,6 +56,8 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
   const Patch<S>& patch() const;
   template <class S>
   Vec3<S> normalised_slip(const Relative<S>&) const;
+  template <class S>
+  S stick_margin(const Scene<S>&, const Relative<S>&) const;
   template <class S>
   Vec3<S> slip_acceleration(const Scene<S>&, const Relative<S>&) const;
   template <class S>

@@ -3,6 +3,7 @@
 #include <array>
 
 #include "contact/slip_stop.hpp"
+#include "contact/contact_model_from.hpp"
 
 namespace unhand::contact {
 
@@ -147,7 +148,10 @@ dynamics::Guard SlidingPivot::guard(int mode, int index) const {
 }
 
 template <class S>
-void SlidingPivot::guards_(int mode, const Scene<S>& scene, const Relative<S>& y, S* g) const {
+void SlidingPivot::guards_(const Phase& phase, const SceneSource& source, const S& t, const Relative<S>& y,
+                           S* g) const {
+  const int mode = phase.mode;
+  const Scene<S> scene = source.scene(phase.window, t);
   const Patch<S>& patch = this->patch<S>();
   const Law<S> now = law(mode, patch, scene, y);
   const S force_limit = patch.f_max(scene.normal_force), torque_limit = patch.tau_max(scene.normal_force);
@@ -187,10 +191,11 @@ void SlidingPivot::rate_(int mode, const Scene<S>& scene, const Relative<S>& y, 
   }
 }
 
-double SlidingPivot::max_step(int mode, const Scene<double>& scene, const Relative<double>& y) const {
-  if (translation_of(mode) != kBrake) return std::numeric_limits<double>::infinity();
+double SlidingPivot::max_step(const Phase& phase, const SceneSource& source, double t,
+                              const Relative<double>& y) const {
+  if (translation_of(phase.mode) != kBrake) return std::numeric_limits<double>::infinity();
   State<double, 6> dy;
-  rate_(mode, scene, y, dy);
+  rate_(phase.mode, source.scene(phase.window, t), y, dy);
   const double speed = norm(y.slip);
   return longest_step_to_stop(speed, (y.slip.x * dy[3] + y.slip.z * dy[4]) / speed);
 }

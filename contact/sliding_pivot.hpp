@@ -44,14 +44,14 @@ class SlidingPivot final : public ContactModelFrom<SlidingPivot> {
   int guard_count(int mode) const override;
   dynamics::Guard guard(int mode, int index) const override;
   bool may_feed_energy(int mode) const override;
-  double max_step(int mode, const Scene<double>&, const Relative<double>&) const override;
+  double max_step(const Phase&, const SceneSource&, double t, const Relative<double>&) const override;
 
   template <class S>
   Wrench<S> wrench_(int mode, const Scene<S>&, const Relative<S>&) const;
   template <class S>
   void rate_(int mode, const Scene<S>&, const Relative<S>&, State<S, 6>&) const;
   template <class S>
-  void guards_(int mode, const Scene<S>&, const Relative<S>&, S* g) const;
+  void guards_(const Phase&, const SceneSource&, const S& t, const Relative<S>&, S* g) const;
   template <class S>
   Entry<S, 6> on_guard_(const Phase&, int guard, const SceneSource&, const S& t, const Relative<S>&) const;
   template <class S>

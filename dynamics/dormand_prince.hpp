@@ -17,7 +17,7 @@ class DormandPrince final : public SingleStep<DormandPrince<S, N>, S, N> {
     if (fresh) this->flow(this->t0_, this->y0_, k_[0]);
     else k_[0] = k_[6];
   }
-  double guess() const { return first_step<S, N>(this->y0_, k_[0], this->tolerances_); }
+  double guess() const { return this->first_step(values<S, N>(k_[0])); }
 
   double attempt(const S& h) {
     advance(h, this->y1_, true);
@@ -26,7 +26,7 @@ class DormandPrince final : public SingleStep<DormandPrince<S, N>, S, N> {
       error[i] = h * (71.0 / 57600 * k_[0][i] - 71.0 / 16695 * k_[2][i] + 71.0 / 1920 * k_[3][i] -
                       17253.0 / 339200 * k_[4][i] + 22.0 / 525 * k_[5][i] - 1.0 / 40 * k_[6][i]);
     h_ = h;
-    return error_norm<S, N>(error, this->y0_, this->y1_, this->tolerances_);
+    return this->error_norm(error);
   }
 
   void interpolate(double theta, State<S, N>& y) const override {

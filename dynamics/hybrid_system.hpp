@@ -1,7 +1,9 @@
 // A hybrid dynamical system: modes with a flow each, guards that leave a mode, and what happens there.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <string_view>
 #include <vector>
@@ -13,6 +15,12 @@ namespace unhand::dynamics {
 
 template <class S, int N>
 using State = std::array<S, N>;
+
+/// Local error per step: see HybridSystem::error_scale; the norm is the root mean square over the components.
+struct Tolerances {
+  double relative{1e-8};
+  double absolute{1e-10};
+};
 
 /// What the flow of a mode asks of a stepper.
 enum class FlowKind {
@@ -85,6 +93,19 @@ class HybridSystem {
   }
   virtual Entry<Dual, N> at_limit(const Phase& from, const Dual& t, const State<Dual, N>& y) const {
     return {from.mode, t, y, Dual(0.0)};
+  }
+
+  /// dt/dσ > 0 of the variable σ in which the flow of a mode is regular, if `is_paced`; see paced_stepper.hpp.
+  virtual bool is_paced(int /*mode*/) const { return false; }
+  virtual double pace(const Phase&, double /*t*/, const State<double, N>&) const { return 1; }
+  virtual Dual pace(const Phase&, const Dual& /*t*/, const State<Dual, N>&) const { return Dual(1.0); }
+
+  /// The error that one step may make in each component of a state that goes from y0 to y1 (SI units):
+  /// absolute + relative · size. Flows that are singular at a point may ask for errors relative to their distance.
+  virtual void error_scale(const Phase&, const Tolerances& tolerances, const State<double, N>& y0,
+                           const State<double, N>& y1, State<double, N>& scale) const {
+    for (int i = 0; i < N; ++i)
+      scale[i] = tolerances.absolute + tolerances.relative * std::max(std::abs(y0[i]), std::abs(y1[i]));
   }
 
   /// An upper bound [s] on the next step, for flows that are singular at a point they approach.

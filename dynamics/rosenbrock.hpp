@@ -1,4 +1,4 @@
-// A Rosenbrock method of order 4(3), L-stable and stiffly accurate: the stepper of stiff flows.
+// A Rosenbrock method of order 5(4), L-stable and stiffly accurate: the stepper of stiff flows.
 #pragma once
 
 #include <Eigen/LU>
@@ -8,37 +8,36 @@
 
 namespace unhand::dynamics {
 
-/// RODAS, [HairerWanner1996] IV.7: one exact Jacobian, one LU factorisation and six evaluations a step; no Newton
-/// iteration, so nothing fails to converge. Dense output of order 3. Values only: the tangent of a Rosenbrock step
-/// would need the derivative of its Jacobian (Sdirk carries derivatives through stiff phases).
+/// Rodas5P, [Steinebach2023]: one exact Jacobian, one LU factorisation and eight evaluations a step; no Newton
+/// iteration, so nothing fails to converge. Dense output of order 4. Unlike RODAS ([HairerWanner1996] IV.7) it keeps
+/// its order where the solution follows a slowly moving equilibrium of the stiff part, which is what slip does: there
+/// RODAS needs ten times the steps. Values only: the tangent of a Rosenbrock step would need the derivative of its
+/// Jacobian (Sdirk carries derivatives through stiff phases).
 template <int N>
 class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
  public:
-  static constexpr double kOrder = 4;
+  static constexpr double kOrder = 5;
   using SingleStep<Rosenbrock<N>, double, N>::SingleStep;
 
   void prepare(bool /*fresh*/) {
     ++this->flow_evaluations_;
     flow_jacobian<N>(*this->system_, this->phase_, this->t0_, this->y0_, f0_, jacobian_, ft_);
   }
-  double guess() const { return first_step<double, N>(this->y0_, f0_, this->tolerances_); }
+  double guess() const { return this->first_step(f0_); }
 
   double attempt(const double& h) {
     State<double, N> error;
     advance(h, this->y1_, error);
     kept_ = k_;
-    return error_norm<double, N>(error, this->y0_, this->y1_, this->tolerances_);
+    bent_ = false;
+    return this->error_norm(error);
   }
 
   void interpolate(double s, State<double, N>& y) const override {
+    if (!bent_) bend();
     const double s1 = 1 - s;
-    for (int i = 0; i < N; ++i) {
-      const double c2 = kD[0][0] * kept_[0][i] + kD[0][1] * kept_[1][i] + kD[0][2] * kept_[2][i] +
-                        kD[0][3] * kept_[3][i] + kD[0][4] * kept_[4][i];
-      const double c3 = kD[1][0] * kept_[0][i] + kD[1][1] * kept_[1][i] + kD[1][2] * kept_[2][i] +
-                        kD[1][3] * kept_[3][i] + kD[1][4] * kept_[4][i];
-      y[i] = s1 * this->y0_[i] + s * (this->y1_[i] + s1 * (c2 + s * c3));
-    }
+    for (int i = 0; i < N; ++i)
+      y[i] = s1 * this->y0_[i] + s * (this->y1_[i] + s1 * (bend_[0][i] + s * (bend_[1][i] + s * bend_[2][i])));
   }
 
   void retake(double h, State<double, N>& y) override {
@@ -48,60 +47,85 @@ class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
 
  private:
   using Vector = Eigen::Matrix<double, N, 1>;
-  static constexpr double kGamma = 0.25;
-  static constexpr double kAlpha[4] = {0, 0.386, 0.21, 0.63};
-  static constexpr double kGammaI[4] = {0.25, -0.1043, 0.1035, -0.0362};
-  static constexpr double kA[5][4] = {
-      {0, 0, 0, 0},
-      {1.544, 0, 0, 0},
-      {0.9466785280815826, 0.2557011698983284, 0, 0},
-      {3.314825187068521, 2.896124015972201, 0.9986419139977817, 0},
-      {1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950}};
-  static constexpr double kC[6][5] = {
+  static constexpr int kStages = 8;
+  static constexpr double kGamma = 0.21193756319429014;
+  static constexpr double kNode[kStages] = {
+      0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716, 0.4288403609558664, 1, 1, 1};
+  static constexpr double kTimeWeight[kStages] = {
+      0.21193756319429014, -0.42387512638858027, -0.3384627126235924, 1.8046452872882734, 2.325825639765069, 0, 0, 0};
+  // Row i: the weights of stages 0 … i − 1 in the argument of stage i; rows 6 and 7 add the stage before with weight 1.
+  static constexpr double kA[6][5] = {
       {0, 0, 0, 0, 0},
-      {-5.6688, 0, 0, 0, 0},
-      {-2.430093356833875, -0.2063599157091915, 0, 0, 0},
-      {-0.1073529058151375, -9.594562251023355, -20.47028614809616, 0, 0},
-      {7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160, 0},
-      {8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136, -6.058818238834054}};
-  static constexpr double kD[2][5] = {
-      {10.12623508344586, -7.487995877610167, -34.80091861555747, -7.992771707568823, 1.025137723295662},
-      {-0.6762803392806898, 6.087714651680015, 16.43084320892478, 24.76722511418386, -6.594389125716872}};
+      {3.0, 0, 0, 0, 0},
+      {2.849394379747939, 0.45842242204463923, 0, 0, 0},
+      {-6.954028509809101, 2.489845061869568, -10.358996098473584, 0, 0},
+      {2.8029986275628964, 0.5072464736228206, -0.3988312541770524, -0.04721187230404641, 0},
+      {-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946}};
+  static constexpr double kC[kStages][kStages - 1] = {
+      {0, 0, 0, 0, 0, 0, 0},
+      {-14.155112264123755, 0, 0, 0, 0, 0, 0},
+      {-17.97296035885952, -2.859693295451294, 0, 0, 0, 0, 0},
+      {147.12150275711716, -1.41221402718213, 71.68940251302358, 0, 0, 0, 0},
+      {165.43517024871676, -0.4592823456491126, 42.90938336958603, -5.961986721573306, 0, 0, 0},
+      {24.854864614690072, -3.0009227002832186, 47.4931110020768, 5.5814197821558125, -0.6610691825249471, 0, 0},
+      {30.91273214028599, -3.1208243349937974, 77.79954646070892, 34.28646028294783, -19.097331116725623,
+       -28.087943162872662, 0},
+      {37.80277123390563, -3.2571969029072276, 112.26918849496327, 66.9347231244047, -40.06618937091002,
+       -54.66780262877968, -9.48861652309627}};
+  static constexpr double kH[3][kStages] = {
+      {25.948786856663858, -2.5579724845846235, 10.433815404888879, -2.3679251022685204, 0.524948541321073,
+       1.1241088310450404, 0.4272876194431874, -0.17202221070155493},
+      {-9.91568850695171, -0.9689944594115154, 3.0438037242978453, -24.495224566215796, 20.176138334709044,
+       15.98066361424651, -6.789040303419874, -6.710236069923372},
+      {11.419903575922262, 2.8879645146136994, 72.92137995996029, 80.12511834622643, -52.072871366152654,
+       -59.78993625266729, -0.15582684282751913, 4.883087185713722}};
+
+  /// The coefficients of the dense output, when it is first asked for.
+  void bend() const {
+    for (int row = 0; row < 3; ++row)
+      for (int i = 0; i < N; ++i) {
+        bend_[row][i] = 0;
+        for (int j = 0; j < kStages; ++j) bend_[row][i] += kH[row][j] * kept_[j][i];
+      }
+    bent_ = true;
+  }
 
   void advance(double h, State<double, N>& y1, State<double, N>& error) {
     Eigen::Matrix<double, N, N> matrix = -jacobian_;
     matrix.diagonal().array() += 1 / (h * kGamma);
     lu_.compute(matrix);
     State<double, N> y = this->y0_, f = f0_;
-    for (int stage = 0; stage < 6; ++stage) {
-      if (stage > 0 && stage < 5) {
+    for (int stage = 0; stage < kStages; ++stage) {
+      if (stage > 5) {
+        for (int i = 0; i < N; ++i) y[i] += k_[stage - 1][i];
+      } else if (stage > 0) {
         for (int i = 0; i < N; ++i) {
           y[i] = this->y0_[i];
           for (int j = 0; j < stage; ++j) y[i] += kA[stage][j] * k_[j][i];
         }
-      } else if (stage == 5) {
-        for (int i = 0; i < N; ++i) y[i] += k_[4][i];
       }
-      if (stage > 0) this->flow(this->t0_ + (stage < 4 ? kAlpha[stage] : 1.0) * h, y, f);
+      if (stage > 0) this->flow(this->t0_ + kNode[stage] * h, y, f);
       Vector rhs;
       for (int i = 0; i < N; ++i) {
         double c = 0;
         for (int j = 0; j < stage; ++j) c += kC[stage][j] * k_[j][i];
-        rhs[i] = f[i] + (stage < 4 ? kGammaI[stage] * h * ft_[i] : 0.0) + c / h;
+        rhs[i] = f[i] + kTimeWeight[stage] * h * ft_[i] + c / h;
       }
       const Vector k = lu_.solve(rhs);
       for (int i = 0; i < N; ++i) k_[stage][i] = k[i];
     }
     for (int i = 0; i < N; ++i) {
-      error[i] = k_[5][i];
-      y1[i] = y[i] + k_[5][i];
+      error[i] = k_[kStages - 1][i];
+      y1[i] = y[i] + k_[kStages - 1][i];
     }
   }
 
   Eigen::Matrix<double, N, N> jacobian_;
   Eigen::PartialPivLU<Eigen::Matrix<double, N, N>> lu_;
   State<double, N> f0_{}, ft_{};
-  std::array<State<double, N>, 6> k_{}, kept_{};
+  std::array<State<double, N>, kStages> k_{}, kept_{};
+  mutable std::array<State<double, N>, 3> bend_{};
+  mutable bool bent_{};
 };
 
 }  // namespace unhand::dynamics

@@ -56,7 +56,22 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   int guard_count(int mode) const override { return contact_.guard_count(mode); }
   dynamics::Guard guard(int mode, int index) const override { return contact_.guard(mode, index); }
   double max_step(const Phase& p, double t, const State<double, 6>& y) const override {
-    return contact_.max_step(p.mode, scene(p.window, t), Relative<double>::from(y));
+    return contact_.max_step(p, *this, t, Relative<double>::from(y));
+  }
+  bool is_paced(int mode) const override { return contact_.is_homogeneous() && contact_.kind(mode) == dynamics::FlowKind::stiff; }
+  double pace(const Phase&, double, const State<double, 6>& y) const override { return slip_size(y); }
+  Dual pace(const Phase&, const Dual&, const State<Dual, 6>& y) const override { return slip_size(y); }
+
+  void error_scale(const Phase& p, const dynamics::Tolerances& tolerances, const State<double, 6>& y0,
+                   const State<double, 6>& y1, State<double, 6>& scale) const override {
+    dynamics::HybridSystem<6>::error_scale(p, tolerances, y0, y1, scale);
+    const double length = contact_.spin_length();
+    if (length == 0) return;
+    // The absolute part is what a slip at its onset may be wrong by: far below the speed at which a stop is taken.
+    const double speed = std::max(slip_size(y0), slip_size(y1));
+    const double slip = 1e-3 * tolerances.absolute + tolerances.relative * speed;
+    scale[3] = scale[4] = slip;
+    scale[5] = slip / length;
   }
 
   template <class S>
@@ -78,7 +93,7 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   }
   template <class S>
   void guards_(const Phase& p, const S& t, const State<S, 6>& y, S* g) const {
-    contact_.guards(p.mode, scene_(p.window, t), Relative<S>::from(y), g);
+    contact_.guards(p, *this, t, Relative<S>::from(y), g);
   }
   template <class S>
   Entry<S, 6> on_guard_(const Phase& p, int guard, const S& t, const State<S, 6>& y) const {
@@ -98,6 +113,14 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
     return {{convert<S>(m), convert<S>(I)},
             {convert<S>(problem_.gravity.x), convert<S>(problem_.gravity.z)},
             hand.pose, hand.twist, hand.acceleration, problem_.normal_force.at(window, t)};
+  }
+
+  /// |(v_r, L ω_r)|
+  template <class S>
+  S slip_size(const State<S, 6>& y) const {
+    using std::sqrt;
+    const S spin = contact_.spin_length() * y[5];
+    return sqrt(y[3] * y[3] + y[4] * y[4] + spin * spin);
   }
 
   const ReleaseProblem<P>& problem_;

@@ -1,0 +1,157 @@
+// Stepping in a variable of the system's own choice, for flows that are singular where they begin or end.
+#pragma once
+
+#include "dynamics/stepper.hpp"
+
+namespace unhand::dynamics {
+
+/// The system in σ, dt/dσ = pace(t, y) (a Sundman transformation): state (y, t), no explicit dependence on σ.
+///
+/// Where y' = F(u/|u|) with u a part of y, the Jacobian grows as 1/|u|; with the pace |u| the right-hand side becomes
+/// |u| F(u/|u|), homogeneous of degree one and regular down to u = 0, which is now reached exponentially in σ: nothing
+/// can step over it, and errors relative to |u| cost the same number of steps at every scale.
+template <int N>
+class PacedSystem final : public HybridSystem<N + 1> {
+ public:
+  const HybridSystem<N>* system{};
+  Phase phase;
+
+  FlowKind kind(int mode) const override { return system->kind(mode); }
+  std::string_view mode_name(int mode) const override { return system->mode_name(mode); }
+  int guard_count(int) const override { return 0; }
+  Guard guard(int, int) const override { return {}; }
+  void time_events(std::vector<double>& out) const override { out.clear(); }
+  void time_events(std::vector<Dual>& out) const override { out.clear(); }
+  void flow(const Phase&, double, const State<double, N + 1>& y, State<double, N + 1>& dy) const override { flow_(y, dy); }
+  void flow(const Phase&, const Dual&, const State<Dual, N + 1>& y, State<Dual, N + 1>& dy) const override { flow_(y, dy); }
+  void guards(const Phase&, double, const State<double, N + 1>&, double*) const override {}
+  void guards(const Phase&, const Dual&, const State<Dual, N + 1>&, Dual*) const override {}
+  Entry<double, N + 1> on_guard(const Phase&, int, double, const State<double, N + 1>&) const override { return {}; }
+  Entry<Dual, N + 1> on_guard(const Phase&, int, const Dual&, const State<Dual, N + 1>&) const override { return {}; }
+  Entry<double, N + 1> on_time(int, const Window&, double, const State<double, N + 1>&) const override { return {}; }
+  Entry<Dual, N + 1> on_time(int, const Window&, const Dual&, const State<Dual, N + 1>&) const override { return {}; }
+
+  void error_scale(const Phase&, const Tolerances& tolerances, const State<double, N + 1>& y0,
+                   const State<double, N + 1>& y1, State<double, N + 1>& scale) const override {
+    State<double, N> inner;
+    system->error_scale(phase, tolerances, state(y0), state(y1), inner);
+    std::copy(inner.begin(), inner.end(), scale.begin());
+    scale[N] = 0.1 * tolerances.absolute;  // of the time itself [s]
+  }
+
+  template <class S>
+  static State<S, N> state(const State<S, N + 1>& y) {
+    State<S, N> out;
+    std::copy_n(y.begin(), N, out.begin());
+    return out;
+  }
+
+ private:
+  template <class S>
+  void flow_(const State<S, N + 1>& y, State<S, N + 1>& dy) const {
+    const State<S, N> at = state(y);
+    State<S, N> rate;
+    system->flow(phase, y[N], at, rate);
+    const S pace = system->pace(phase, y[N], at);
+    for (int i = 0; i < N; ++i) dy[i] = pace * rate[i];
+    dy[N] = pace;
+  }
+};
+
+/// Any stepper of the system in σ, seen from outside as one in t.
+template <class S, int N>
+class PacedStepper final : public Stepper<S, N> {
+ public:
+  explicit PacedStepper(std::unique_ptr<Stepper<S, N + 1>> inner) : inner_(std::move(inner)) {}
+
+  void start(const HybridSystem<N>& system, const Phase& phase, const S& t, const State<S, N>& y) override {
+    system_.system = &system;
+    system_.phase = phase;
+    State<S, N + 1> augmented;
+    std::copy_n(y.begin(), N, augmented.begin());
+    augmented[N] = t;
+    this->t1_ = t;
+    this->y1_ = y;
+    inner_->start(system_, phase, S(0), augmented);
+  }
+
+  StepStatus step(const S& limit, double longest) override {
+    this->t0_ = this->t1_;
+    this->y0_ = this->y1_;
+    const double pace = system_.system->pace(system_.phase, value_of(this->t0_), values<S, N>(this->y0_));
+    const StepStatus status = inner_->step(S(kFar), longest / pace);
+    count();
+    if (status != StepStatus::accepted) return status;
+    if (value_of(inner_->y1()[N]) < value_of(limit)) {
+      this->t1_ = inner_->y1()[N];
+      this->y1_ = PacedSystem<N>::state(inner_->y1());
+      return value_of(this->t1_) > value_of(this->t0_) ? StepStatus::accepted : StepStatus::too_small;
+    }
+    land(limit, this->y1_);
+    this->t1_ = limit;
+    return StepStatus::accepted;
+  }
+
+  void interpolate(double theta, State<S, N>& y) const override {
+    State<S, N + 1> augmented;
+    inner_->interpolate(fraction_at(value_of(this->t0_) + theta * (value_of(this->t1_) - value_of(this->t0_))), augmented);
+    y = PacedSystem<N>::state(augmented);
+  }
+
+  void retake(double h, State<S, N>& y) override {
+    land(S(this->t0_ + h), y);
+    count();
+  }
+
+ private:
+  static constexpr double kFar = 1e300;
+
+  double length() const { return value_of(inner_->t1()) - value_of(inner_->t0()); }
+  void count() {
+    this->flow_evaluations_ = inner_->flow_evaluations();
+    this->rejected_ = inner_->rejected_steps();
+  }
+
+  /// The fraction of the inner step at which its dense output passes t.
+  double fraction_at(double t) const {
+    const double t0 = value_of(inner_->y0()[N]), t1 = value_of(inner_->y1()[N]);
+    if (t >= t1) return 1;
+    double low = 0, high = 1, theta = (t - t0) / (t1 - t0), before = 0, passed_before = t0;
+    for (int k = 0; k < 60; ++k) {
+      State<S, N + 1> y;
+      inner_->interpolate(theta, y);
+      const double passed = value_of(y[N]);
+      (passed < t ? low : high) = theta;
+      if (std::abs(passed - t) <= 1e-15 * (t1 - t0) || high - low < 1e-15) break;
+      const double slope = (passed - passed_before) / (theta - before);
+      before = theta;
+      passed_before = passed;
+      const double next = theta + (t - passed) / slope;
+      theta = next > low && next < high ? next : 0.5 * (low + high);
+    }
+    return theta;
+  }
+
+  /// True steps from the start of the last one until t is met.
+  void land(const S& t, State<S, N>& y) {
+    State<S, N + 1> augmented;
+    double h = fraction_at(value_of(t)) * length();
+    for (int k = 0; k < 4; ++k) {
+      inner_->retake(h, augmented);
+      const double missed = value_of(t) - value_of(augmented[N]);
+      y = PacedSystem<N>::state(augmented);
+      if (std::abs(missed) < 1e-14) break;
+      h += missed / system_.system->pace(system_.phase, value_of(augmented[N]), values<S, N>(y));
+    }
+    // What is left of t, in value and derivatives, along the flow.
+    State<S, N + 1> rate;
+    system_.flow(system_.phase, S(h), augmented, rate);
+    const S left = (t - augmented[N]) / rate[N];
+    for (int i = 0; i < N; ++i) y[i] += left * rate[i];
+  }
+
+  std::unique_ptr<Stepper<S, N + 1>> inner_;
+  PacedSystem<N> system_;
+};
+
+}  // namespace unhand::dynamics
