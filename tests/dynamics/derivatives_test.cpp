@@ -1,4 +1,5 @@
-// Derivatives through events: dual numbers against closed forms and against central differences over powers of ten.
+// Derivatives through events: dual numbers against closed forms and against central differences over powers
+// of ten.
 #include <functional>
 
 #include "tests/dynamics/toy_systems.hpp"
@@ -15,11 +16,13 @@ class Derivatives : public testing::TestWithParam<Method> {
     return options;
   }
 };
-INSTANTIATE_TEST_SUITE_P(, Derivatives, testing::Values(Method::automatic, Method::dormand_prince, Method::sdirk),
+INSTANTIATE_TEST_SUITE_P(, Derivatives,
+                         testing::Values(Method::automatic, Method::dormand_prince, Method::sdirk),
                          [](const auto& test) { return name_of(test.param); });
 
-/// The smallest error of a central difference of f against `derivative` over steps of 1e-1 to 1e-7: as a function of
-/// the step it falls with its square until rounding takes over, so a true derivative shows at the bottom.
+/// The smallest error of a central difference of f against `derivative` over steps of 1e-1 to 1e-7: as a
+/// function of the step it falls with its square until rounding takes over, so a true derivative shows at the
+/// bottom.
 double best_difference(const std::function<double(double)>& f, double x, double derivative) {
   double best = INFINITY;
   for (double step = 1e-1; step > 0.5e-7; step *= 0.1)
@@ -31,8 +34,8 @@ TEST_P(Derivatives, DropBounceAndTime) {
   // Height and speed at t = 1 s of a ball dropped from h: one bounce at sqrt(2h/g).
   const double p[3] = {9.81, 0.8, 1.0};  // g, e, h
   auto fly = [this](Dual g, Dual e, Dual h) {
-    return integrate<Dual, 2>(bouncing_ball(g, e), Entry<Dual, 2>{0, Dual(0), {h, Dual(0)}, Dual(0)}, Dual(1.0),
-                              options());
+    return integrate<Dual, 2>(bouncing_ball(g, e), Entry<Dual, 2>{0, Dual(0), {h, Dual(0)}, Dual(0)},
+                              Dual(1.0), options());
   };
   const auto end = fly(independent(p[0], 0), independent(p[1], 1), independent(p[2], 2));
   ASSERT_EQ(end.events.size(), 1u);
@@ -50,7 +53,8 @@ TEST_P(Derivatives, DropBounceAndTime) {
         q[k] = x;
         return fly(Dual(q[0]), Dual(q[1]), Dual(q[2])).y[i].a;
       };
-      EXPECT_LT(best_difference(f, p[k], end.y[i].v[k]), 1e-8) << k << i;  // rounding over the step: 1e-13 / 1e-5
+      EXPECT_LT(best_difference(f, p[k], end.y[i].v[k]), 1e-8)
+          << k << i;  // rounding over the step: 1e-13 / 1e-5
     }
 }
 
@@ -64,43 +68,48 @@ TEST_P(Derivatives, TheRestTimeOfAZenoBallIsDifferentiable) {
   for (int k = 0; k < 3; ++k) EXPECT_NEAR(end.events.back().t.v[k], expected.v[k], 1e-6) << k;
 }
 
-/// x'' = −c x' − k x until x falls through `level`, then y -> R y + offset and x'' = b for the rest: every term of
-/// S+ = R S− + R_p − (f+ − R f−) dt*/dp is at work.
+/// x'' = −c x' − k x until x falls through `level`, then y -> R y + offset and x'' = b for the rest: every
+/// term of S+ = R S− + R_p − (f+ − R f−) dt*/dp is at work.
 auto kicked(Dual c, Dual k, Dual level, Dual b, Dual r) {
-  return Toy({{FlowKind::smooth, {{"level", Crossing::falling}}}, {FlowKind::smooth, {}}},
-             [=](int mode, const auto& t, const auto& y, auto& dy) {
-               using S = std::decay_t<decltype(t)>;
-               dy[0] = y[1];
-               if (mode == 0) dy[1] = -as<S>(c) * y[1] - as<S>(k) * y[0] * (1.0 + 0.3 * t);
-               else dy[1] = as<S>(b) + 0.1 * t * y[0];
-             },
-             [=](int, const auto& t, const auto& y, auto* g) {
-               using S = std::decay_t<decltype(t)>;
-               g[0] = y[0] - as<S>(level) - 0.05 * t * t;
-             },
-             [=](int, int, const auto& t, const auto& y) {
-               using S = std::decay_t<decltype(t)>;
-               return Entry<S, 2>{1, t, {S(y[0] + 0.2 * t), S(-as<S>(r) * y[1] + as<S>(k) * t)}, S(0)};
-             });
+  return Toy(
+      {{FlowKind::smooth, {{"level", Crossing::falling}}}, {FlowKind::smooth, {}}},
+      [=](int mode, const auto& t, const auto& y, auto& dy) {
+        using S = std::decay_t<decltype(t)>;
+        dy[0] = y[1];
+        if (mode == 0)
+          dy[1] = -as<S>(c) * y[1] - as<S>(k) * y[0] * (1.0 + 0.3 * t);
+        else
+          dy[1] = as<S>(b) + 0.1 * t * y[0];
+      },
+      [=](int, const auto& t, const auto& y, auto* g) {
+        using S = std::decay_t<decltype(t)>;
+        g[0] = y[0] - as<S>(level) - 0.05 * t * t;
+      },
+      [=](int, int, const auto& t, const auto& y) {
+        using S = std::decay_t<decltype(t)>;
+        return Entry<S, 2>{1, t, {S(y[0] + 0.2 * t), S(-as<S>(r) * y[1] + as<S>(k) * t)}, S(0)};
+      });
 }
 
 TEST_P(Derivatives, EveryTermOfTheJumpOfTheSensitivity) {
   const double p[8] = {0.3, 2.0, 0.1, 0.7, 0.6, 1.0, 0.2, 0.05};  // c, k, level, b, r, x0, v0, t0
   auto integrate_with = [this](const std::array<Dual, 8>& q) {
-    return integrate<Dual, 2>(kicked(q[0], q[1], q[2], q[3], q[4]), Entry<Dual, 2>{0, q[7], {q[5], q[6]}, Dual(0)},
-                              Dual(2.0), options());
+    return integrate<Dual, 2>(kicked(q[0], q[1], q[2], q[3], q[4]),
+                              Entry<Dual, 2>{0, q[7], {q[5], q[6]}, Dual(0)}, Dual(2.0), options());
   };
   std::array<Dual, 8> seeded;
   for (int k = 0; k < 8; ++k) seeded[k] = independent(p[k], k);
   const auto end = integrate_with(seeded);
   ASSERT_EQ(end.events.size(), 1u);
-  // Which slot a parameter takes must not matter: the integrator uses slots of its own for slopes and Jacobians.
+  // Which slot a parameter takes must not matter: the integrator uses slots of its own for slopes and
+  // Jacobians.
   for (int first = 1; first < 8; ++first) {
     for (int k = 0; k < 8; ++k) seeded[k] = independent(p[k], (k + first) % 8);
     const auto turned = integrate_with(seeded);
     for (int k = 0; k < 8; ++k)
       for (int i = 0; i < 2; ++i)
-        EXPECT_NEAR(turned.y[i].v[(k + first) % 8], end.y[i].v[k], 1e-10) << first << k;  // the order of iterations
+        EXPECT_NEAR(turned.y[i].v[(k + first) % 8], end.y[i].v[k], 1e-10)
+            << first << k;  // the order of iterations
   }
   for (int k = 0; k < 8; ++k)
     for (int i = 0; i < 2; ++i) {
@@ -116,14 +125,16 @@ TEST_P(Derivatives, EveryTermOfTheJumpOfTheSensitivity) {
 
 TEST_P(Derivatives, TheHorizonMayBeAParameter) {
   const Dual end_time = independent(1.3, 0);
-  const auto end = integrate<Dual, 2>(Toy({{FlowKind::smooth, {}}}, oscillator(), no_guards(), enter(0)),
-                                      Entry<Dual, 2>{0, Dual(0), {Dual(1), Dual(0)}, Dual(0)}, end_time, options());
+  const auto end =
+      integrate<Dual, 2>(Toy({{FlowKind::smooth, {}}}, oscillator(), no_guards(), enter(0)),
+                         Entry<Dual, 2>{0, Dual(0), {Dual(1), Dual(0)}, Dual(0)}, end_time, options());
   EXPECT_NEAR(end.y[0].v[0], -std::sin(1.3), 1e-10);  // dy/dt_end is the flow there
   EXPECT_NEAR(end.t.v[0], 1.0, 1e-15);
 }
 
 TEST_P(Derivatives, ARecordedTrajectoryHasTheDerivativesAtAFixedTime) {
-  // The step that an event cuts short too: at a fixed time before the event nothing of the event's shift may show.
+  // The step that an event cuts short too: at a fixed time before the event nothing of the event's shift may
+  // show.
   auto o = options();
   o.record = true;
   const Dual h = independent(1.0, 0);
@@ -141,18 +152,19 @@ TEST_P(Derivatives, ARecordedTrajectoryHasTheDerivativesAtAFixedTime) {
 TEST_P(Derivatives, AFrozenPhaseCarriesThem) {
   // Stuck until demand t·a passes 1, at t = 1/a, then x' = 1.
   const Dual a = independent(2.0, 0);
-  const Toy block({{FlowKind::frozen, {{"breaks", Crossing::rising}}}, {FlowKind::smooth, {}}},
-                  [](int, const auto&, const auto& y, auto& dy) {
-                    dy[0] = 1.0 + 0.0 * y[0];
-                    dy[1] = 0.0 * y[0];
-                  },
-                  [a](int, const auto& t, const auto&, auto* g) {
-                    using S = std::decay_t<decltype(t)>;
-                    g[0] = as<S>(a) * t - 1.0;
-                  },
-                  enter(1));
-  const auto end = integrate<Dual, 2>(block, Entry<Dual, 2>{0, Dual(0), {Dual(0), Dual(0)}, Dual(0)}, Dual(1.0),
-                                      options());
+  const Toy block(
+      {{FlowKind::frozen, {{"breaks", Crossing::rising}}}, {FlowKind::smooth, {}}},
+      [](int, const auto&, const auto& y, auto& dy) {
+        dy[0] = 1.0 + 0.0 * y[0];
+        dy[1] = 0.0 * y[0];
+      },
+      [a](int, const auto& t, const auto&, auto* g) {
+        using S = std::decay_t<decltype(t)>;
+        g[0] = as<S>(a) * t - 1.0;
+      },
+      enter(1));
+  const auto end = integrate<Dual, 2>(block, Entry<Dual, 2>{0, Dual(0), {Dual(0), Dual(0)}, Dual(0)},
+                                      Dual(1.0), options());
   EXPECT_NEAR(end.y[0].a, 0.5, 1e-13);
   EXPECT_NEAR(end.y[0].v[0], 0.25, 1e-12);  // 1 − 1/a
 }
@@ -162,8 +174,9 @@ TEST(DerivativesRefused, MethodsWithoutThemThrow) {
     IntegratorOptions o;
     o.method = method;
     const Toy swing({{FlowKind::smooth, {}}}, oscillator(), no_guards(), enter(0));
-    EXPECT_THROW((integrate<Dual, 2>(swing, Entry<Dual, 2>{0, Dual(0), {Dual(1), Dual(0)}, Dual(0)}, Dual(1.0), o)),
-                 std::invalid_argument);
+    EXPECT_THROW(
+        (integrate<Dual, 2>(swing, Entry<Dual, 2>{0, Dual(0), {Dual(1), Dual(0)}, Dual(0)}, Dual(1.0), o)),
+        std::invalid_argument);
   }
 }
 

@@ -1,5 +1,4 @@
 // Events: where they are, that they fire once, and that everything awkward ends in a typed outcome.
-#include <chrono>
 #include <random>
 
 #include "tests/dynamics/toy_systems.hpp"
@@ -12,8 +11,8 @@ constexpr double kGravity = 9.81;
 class Events : public EveryMethod {};
 UNHAND_EVERY_METHOD(Events);
 
-// What every test of an event's time asks: 1e-9 s, the accuracy the library promises. The global error of the methods
-// at tolerances of 1e-12 is 1e-11 to 1e-10 over these spans.
+// What every test of an event's time asks: 1e-9 s, the accuracy the library promises. The global error of the
+// methods at tolerances of 1e-12 is 1e-11 to 1e-10 over these spans.
 constexpr double kEventTime = 1e-9;
 
 auto falling_floor() {
@@ -84,12 +83,13 @@ TEST_P(Events, GuardsMayDependOnTimeInEveryKindOfFlow) {
 
 TEST_P(Events, TheScaleOfAGuardDoesNotMatter) {
   for (const double scale : {1.0, 1e-170, 1e150}) {
-    const Toy swing({{FlowKind::smooth, {{"zero", Crossing::falling}, {"high", Crossing::rising}}}}, oscillator(),
-                    [scale](int, const auto&, const auto& y, auto* g) {
-                      g[0] = scale * y[0];
-                      g[1] = scale * (y[0] - 0.999999);  // two roots 2.8e-3 s apart around the top
-                    },
-                    enter(0));
+    const Toy swing(
+        {{FlowKind::smooth, {{"zero", Crossing::falling}, {"high", Crossing::rising}}}}, oscillator(),
+        [scale](int, const auto&, const auto& y, auto* g) {
+          g[0] = scale * y[0];
+          g[1] = scale * (y[0] - 0.999999);  // two roots 2.8e-3 s apart around the top
+        },
+        enter(0));
     const auto end = run(swing, {0.0, 1.0}, 10.0, options());
     EXPECT_EQ(end.outcome, Outcome::horizon) << scale;
     ASSERT_EQ(end.events.size(), 4u) << scale;
@@ -104,8 +104,9 @@ TEST_P(Events, TheScaleOfAGuardDoesNotMatter) {
 
 TEST_P(Events, AnObservedGuardFiresOncePerCrossing) {
   // The transition changes nothing: the root it leaves behind must not fire again.
-  const Toy swing({{FlowKind::smooth, {{"zero", Crossing::falling}, {"zero", Crossing::rising}}}}, oscillator(),
-                  [](int, const auto&, const auto& y, auto* g) { g[0] = g[1] = y[0]; }, enter(0));
+  const Toy swing(
+      {{FlowKind::smooth, {{"zero", Crossing::falling}, {"zero", Crossing::rising}}}}, oscillator(),
+      [](int, const auto&, const auto& y, auto* g) { g[0] = g[1] = y[0]; }, enter(0));
   const auto end = run(swing, {1.0, 0.0}, 100.0, options());
   ASSERT_EQ(end.events.size(), 32u);  // π/2 + kπ <= 100
   for (int k = 0; k < 32; ++k) {
@@ -116,17 +117,18 @@ TEST_P(Events, AnObservedGuardFiresOncePerCrossing) {
 
 TEST_P(Events, ObserversAtSeveralLevelsFireOnceEach) {
   // Whatever fires, by a guard or by time, those that are past their own root must not fire again.
-  auto ramp = Toy({{FlowKind::smooth, {{"0.2", Crossing::rising}, {"0.5", Crossing::rising}, {"0.7", Crossing::rising}}}},
-                  [](int, const auto&, const auto& y, auto& dy) {
-                    dy[0] = 1.0 + 0.0 * y[0];
-                    dy[1] = 0.0 * y[0];
-                  },
-                  [](int, const auto&, const auto& y, auto* g) {
-                    g[0] = y[0] - 0.2;
-                    g[1] = y[0] - 0.5;
-                    g[2] = y[0] - 0.7;
-                  },
-                  enter(0));
+  auto ramp = Toy(
+      {{FlowKind::smooth, {{"0.2", Crossing::rising}, {"0.5", Crossing::rising}, {"0.7", Crossing::rising}}}},
+      [](int, const auto&, const auto& y, auto& dy) {
+        dy[0] = 1.0 + 0.0 * y[0];
+        dy[1] = 0.0 * y[0];
+      },
+      [](int, const auto&, const auto& y, auto* g) {
+        g[0] = y[0] - 0.2;
+        g[1] = y[0] - 0.5;
+        g[2] = y[0] - 0.7;
+      },
+      enter(0));
   ramp.times = {0.1, 0.3, 0.6, 0.7, 0.8};
   const auto end = run(ramp, {0.0, 0.0}, 1.0, options());
   EXPECT_EQ(end.outcome, Outcome::horizon);
@@ -136,8 +138,9 @@ TEST_P(Events, ObserversAtSeveralLevelsFireOnceEach) {
 
 TEST_P(Events, ARootExactlyAtATimeEventFiresOnceAndBeforeIt) {
   for (const double root : {0.5, std::nextafter(0.5, 0.0)}) {
-    auto clock = Toy({{FlowKind::smooth, {{"half", Crossing::rising}}}}, still(),
-                     [root](int, const auto& t, const auto&, auto* g) { g[0] = t - root; }, enter(0));
+    auto clock = Toy(
+        {{FlowKind::smooth, {{"half", Crossing::rising}}}}, still(),
+        [root](int, const auto& t, const auto&, auto* g) { g[0] = t - root; }, enter(0));
     clock.times = {0.25, 0.5, 0.75};
     const auto end = run(clock, {1.0, 1.0}, 1.0, options());
     EXPECT_EQ(end.outcome, Outcome::horizon);
@@ -150,8 +153,9 @@ TEST_P(Events, ARootExactlyAtATimeEventFiresOnceAndBeforeIt) {
 }
 
 TEST_P(Events, ARootJustAfterATimeEventFiresOnce) {
-  auto clock = Toy({{FlowKind::smooth, {{"half", Crossing::rising}}}}, still(),
-                   [](int, const auto& t, const auto&, auto* g) { g[0] = t - std::nextafter(0.5, 1.0); }, enter(0));
+  auto clock = Toy(
+      {{FlowKind::smooth, {{"half", Crossing::rising}}}}, still(),
+      [](int, const auto& t, const auto&, auto* g) { g[0] = t - std::nextafter(0.5, 1.0); }, enter(0));
   clock.times = {0.5};
   const auto end = run(clock, {1.0, 1.0}, 1.0, options());
   EXPECT_EQ(end.outcome, Outcome::horizon);
@@ -216,16 +220,17 @@ TEST_P(Events, ResidualsAfterAResetDoNotFireAgain) {
 TEST_P(Events, AResetFarFromTheGuardArmsItAtOnce) {
   // A sawtooth with a period far below the longest step, so that every crossing lies in a first step.
   constexpr double kPeriod = 1e-3;
-  const Toy saw({{FlowKind::smooth, {{"full", Crossing::rising}}}},
-                [](int, const auto&, const auto&, auto& dy) {
-                  dy[0] = decltype(dy[0] + 0.0)(1 / kPeriod);
-                  dy[1] = decltype(dy[0] + 0.0)(0);
-                },
-                [](int, const auto&, const auto& y, auto* g) { g[0] = y[0] - 1.0; },
-                [](int, int, const auto& t, const auto& y) {
-                  using S = std::decay_t<decltype(t)>;
-                  return Entry<S, 2>{0, t, {S(y[0] - 1.0), y[1]}, S(0)};
-                });
+  const Toy saw(
+      {{FlowKind::smooth, {{"full", Crossing::rising}}}},
+      [](int, const auto&, const auto&, auto& dy) {
+        dy[0] = decltype(dy[0] + 0.0)(1 / kPeriod);
+        dy[1] = decltype(dy[0] + 0.0)(0);
+      },
+      [](int, const auto&, const auto& y, auto* g) { g[0] = y[0] - 1.0; },
+      [](int, int, const auto& t, const auto& y) {
+        using S = std::decay_t<decltype(t)>;
+        return Entry<S, 2>{0, t, {S(y[0] - 1.0), y[1]}, S(0)};
+      });
   const auto end = run(saw, {0.0, 0.0}, 0.05 + 0.5 * kPeriod, options());
   EXPECT_EQ(end.events.size(), 50u);
 }
@@ -238,10 +243,10 @@ TEST_P(Events, TwoRootsInsideOneStepAreSeen) {
     int seen = 0;
     for (int k = 0; k < 20; ++k) {
       const double middle = 0.5 + 2.5e-4 * k;
-      const auto clock = until_guard({{"bump", Crossing::rising}}, still(),
-                                     [=](int, const auto& t, const auto&, auto* g) {
-                                       g[0] = 0.25 * width * width - (t - middle) * (t - middle);
-                                     });
+      const auto clock =
+          until_guard({{"bump", Crossing::rising}}, still(), [=](int, const auto& t, const auto&, auto* g) {
+            g[0] = 0.25 * width * width - (t - middle) * (t - middle);
+          });
       const auto end = run(clock, {1.0, 0.0}, 1.0, options());
       if (end.outcome != Outcome::finished) continue;
       ++seen;
@@ -255,10 +260,10 @@ TEST_P(Events, APairOfRootsBeforeAThirdInTheSameStepIsSeen) {
   // A cubic in time with three roots inside one step of 5 ms: the first is the event, not the last.
   for (int k = 0; k < 10; ++k) {
     const double begin = 0.4 + 5e-4 * k;
-    const auto clock = until_guard({{"cubic", Crossing::rising}}, still(),
-                                   [=](int, const auto& t, const auto&, auto* g) {
-                                     g[0] = 1e9 * (t - begin) * (t - begin - 1.2e-3) * (t - begin - 4e-3);
-                                   });
+    const auto clock =
+        until_guard({{"cubic", Crossing::rising}}, still(), [=](int, const auto& t, const auto&, auto* g) {
+          g[0] = 1e9 * (t - begin) * (t - begin - 1.2e-3) * (t - begin - 4e-3);
+        });
     const auto end = run(clock, {1.0, 0.0}, 1.0, options());
     EXPECT_EQ(end.outcome, Outcome::finished);
     EXPECT_NEAR(end.t, begin, kEventTime) << k;
@@ -268,12 +273,13 @@ TEST_P(Events, APairOfRootsBeforeAThirdInTheSameStepIsSeen) {
 TEST_P(Events, AnEvenRootIsAGrazingAndNotAnEvent) {
   for (const FlowKind kind : {FlowKind::smooth, FlowKind::frozen})
     for (const double touch : {1.0, 0.501234, 0.5}) {
-      const auto clock = until_guard({{"touch", Crossing::falling}, {"touch", Crossing::rising}}, still(),
-                                     [touch](int, const auto& t, const auto&, auto* g) {
-                                       g[0] = (t - touch) * (t - touch);
-                                       g[1] = -g[0];
-                                     },
-                                     kind);
+      const auto clock = until_guard(
+          {{"touch", Crossing::falling}, {"touch", Crossing::rising}}, still(),
+          [touch](int, const auto& t, const auto&, auto* g) {
+            g[0] = (t - touch) * (t - touch);
+            g[1] = -g[0];
+          },
+          kind);
       const auto end = run(clock, {1.0, 0.0}, 2.0, options());
       EXPECT_EQ(end.outcome, Outcome::horizon) << touch;
       EXPECT_EQ(end.events.size(), 0u) << touch;
@@ -283,15 +289,16 @@ TEST_P(Events, AnEvenRootIsAGrazingAndNotAnEvent) {
 
 TEST_P(Events, ANormAsAGuardEndsTyped) {
   // |v| of a decelerating slip: never negative, so it never fires, and the kink is no false event either.
-  const auto slip = until_guard({{"norm", Crossing::falling}},
-                                [](int, const auto&, const auto& y, auto& dy) {
-                                  dy[0] = y[1];
-                                  dy[1] = decltype(y[1] + 0.0)(-1.0);
-                                },
-                                [](int, const auto&, const auto& y, auto* g) {
-                                  using std::abs;
-                                  g[0] = abs(y[1]);
-                                });
+  const auto slip = until_guard(
+      {{"norm", Crossing::falling}},
+      [](int, const auto&, const auto& y, auto& dy) {
+        dy[0] = y[1];
+        dy[1] = decltype(y[1] + 0.0)(-1.0);
+      },
+      [](int, const auto&, const auto& y, auto* g) {
+        using std::abs;
+        g[0] = abs(y[1]);
+      });
   const auto end = run(slip, {0.0, 0.50123}, 1.0, options());
   EXPECT_TRUE(end.outcome == Outcome::horizon || end.outcome == Outcome::finished);
   if (end.outcome == Outcome::finished) {
@@ -301,9 +308,9 @@ TEST_P(Events, ANormAsAGuardEndsTyped) {
 
 TEST_P(Events, ATouchThatGoesThroughFires) {
   // A triple root passes zero with no slope. The time of such a root is only resolved to eps^(1/3).
-  const auto clock = until_guard({{"flat", Crossing::rising}}, still(), [](int, const auto& t, const auto&, auto* g) {
-    g[0] = (t - 0.7001) * (t - 0.7001) * (t - 0.7001);
-  });
+  const auto clock = until_guard(
+      {{"flat", Crossing::rising}}, still(),
+      [](int, const auto& t, const auto&, auto* g) { g[0] = (t - 0.7001) * (t - 0.7001) * (t - 0.7001); });
   const auto end = run(clock, {1.0, 0.0}, 1.0, options());
   EXPECT_EQ(end.outcome, Outcome::finished);
   EXPECT_NEAR(end.t, 0.7001, 2e-5);
@@ -312,8 +319,8 @@ TEST_P(Events, ATouchThatGoesThroughFires) {
 TEST_P(Events, AHiddenFirstExcursionDoesNotFallThroughTheFloor) {
   // A bounce so low that the whole next flight is shorter than any third of the step that follows it.
   for (const double speed : {1e-2, 1e-3, 1e-5, 1e-8}) {
-    const Toy ball({{FlowKind::smooth, {{"floor", Crossing::falling}}}, {FlowKind::finished, {}}}, free_fall(),
-                   falling_floor(), [speed](int, int, const auto& t, const auto& y) {
+    const Toy ball({{FlowKind::smooth, {{"floor", Crossing::falling}}}, {FlowKind::finished, {}}},
+                   free_fall(), falling_floor(), [speed](int, int, const auto& t, const auto& y) {
                      using S = std::decay_t<decltype(t)>;
                      const int next = value_of(y[1]) < -1.0 ? 0 : 1;
                      return Entry<S, 2>{next, t, {S(0), S(speed)}, S(0)};
@@ -329,19 +336,21 @@ TEST_P(Events, AHiddenFirstExcursionDoesNotFallThroughTheFloor) {
 
 TEST_P(Events, SimultaneousGuardsComeInTheOrderOfTheirIndices) {
   // The same root through three different functions; each transition goes on to the next mode.
-  const std::vector<Guard> three{{"cube", Crossing::rising}, {"line", Crossing::rising}, {"root", Crossing::falling}};
-  const Toy swing({{FlowKind::smooth, three}, {FlowKind::smooth, three}, {FlowKind::finished, {}}}, oscillator(),
-                  [](int mode, const auto&, const auto& y, auto* g) {
-                    const auto x = y[0] - 0.5;
-                    using std::exp;
-                    g[0] = mode == 0 ? exp(3.0 * x) - 1.0 : x * 0.0 - 1.0;
-                    g[1] = mode == 0 ? x : exp(x) - 1.0;
-                    g[2] = -x - x * x * x;
-                  },
-                  [](int mode, int, const auto& t, const auto& y) {
-                    using S = std::decay_t<decltype(t)>;
-                    return Entry<S, 2>{mode + 1, t, y, S(0)};
-                  });
+  const std::vector<Guard> three{
+      {"cube", Crossing::rising}, {"line", Crossing::rising}, {"root", Crossing::falling}};
+  const Toy swing(
+      {{FlowKind::smooth, three}, {FlowKind::smooth, three}, {FlowKind::finished, {}}}, oscillator(),
+      [](int mode, const auto&, const auto& y, auto* g) {
+        const auto x = y[0] - 0.5;
+        using std::exp;
+        g[0] = mode == 0 ? exp(3.0 * x) - 1.0 : x * 0.0 - 1.0;
+        g[1] = mode == 0 ? x : exp(x) - 1.0;
+        g[2] = -x - x * x * x;
+      },
+      [](int mode, int, const auto& t, const auto& y) {
+        using S = std::decay_t<decltype(t)>;
+        return Entry<S, 2>{mode + 1, t, y, S(0)};
+      });
   const auto end = run(swing, {0.0, 1.0}, 2.0, options());
   EXPECT_EQ(end.outcome, Outcome::finished);
   ASSERT_EQ(end.events.size(), 2u);
@@ -386,20 +395,22 @@ TEST_P(Events, AGuardThatStartsAtZeroAndDriftsOffWithoutSlopeFiresThere) {
 
 // ------------------------------------------------------------------ Coulomb friction with a true stick mode
 
-/// A block on an incline: y = (position up the slope, velocity). Modes: slides up (0), stuck (1), slides down (2).
+/// A block on an incline: y = (position up the slope, velocity). Modes: slides up (0), stuck (1), slides down
+/// (2).
 auto incline(double angle, double mu) {
   const double pull = kGravity * std::sin(angle), grip = mu * kGravity * std::cos(angle);
-  return Toy({{FlowKind::smooth, {{"stops", Crossing::falling}}}, {FlowKind::frozen, {}}, {FlowKind::smooth, {}}},
-             [=](int mode, const auto& t, const auto& y, auto& dy) {
-               using S = std::decay_t<decltype(t)>;
-               dy[0] = y[1];
-               dy[1] = S(-pull + (mode == 0 ? -grip : mode == 2 ? grip : 0.0));
-             },
-             [](int, const auto&, const auto& y, auto* g) { g[0] = y[1]; },
-             [=](int, int, const auto& t, const auto& y) {
-               using S = std::decay_t<decltype(t)>;
-               return Entry<S, 2>{pull <= grip ? 1 : 2, t, {y[0], S(0)}, S(0)};
-             });
+  return Toy(
+      {{FlowKind::smooth, {{"stops", Crossing::falling}}}, {FlowKind::frozen, {}}, {FlowKind::smooth, {}}},
+      [=](int mode, const auto& t, const auto& y, auto& dy) {
+        using S = std::decay_t<decltype(t)>;
+        dy[0] = y[1];
+        dy[1] = S(-pull + (mode == 0 ? -grip : mode == 2 ? grip : 0.0));
+      },
+      [](int, const auto&, const auto& y, auto* g) { g[0] = y[1]; },
+      [=](int, int, const auto& t, const auto& y) {
+        using S = std::decay_t<decltype(t)>;
+        return Entry<S, 2>{pull <= grip ? 1 : 2, t, {y[0], S(0)}, S(0)};
+      });
 }
 
 TEST_P(Events, ABlockOnAnInclineTakesTheRightBranch) {
@@ -424,10 +435,12 @@ TEST_P(Events, StuckIsStillToTheLastBit) {
 }
 
 TEST_P(Events, ABreakawayStartsWithoutSlopeAndGoesOn) {
-  // Demand 2 sin t against grip 1: at breakaway slip and slip rate are both zero to rounding, whatever their sign.
+  // Demand 2 sin t against grip 1: at breakaway slip and slip rate are both zero to rounding, whatever their
+  // sign.
   for (const double phase : {0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7}) {
     const Toy block(
-        {{FlowKind::frozen, {{"breaks", Crossing::rising}}}, {FlowKind::smooth, {{"stops", Crossing::falling}}}},
+        {{FlowKind::frozen, {{"breaks", Crossing::rising}}},
+         {FlowKind::smooth, {{"stops", Crossing::falling}}}},
         [phase](int, const auto& t, const auto& y, auto& dy) {
           using std::sin;
           dy[0] = y[1];
@@ -453,21 +466,23 @@ TEST_P(Events, ABreakawayStartsWithoutSlopeAndGoesOn) {
 // ------------------------------------------------------------------ typed failures
 
 TEST_P(Events, NotANumberInAFlow) {
-  const auto never = Toy({{FlowKind::smooth, {}}},
-                         [](int, const auto&, const auto& y, auto& dy) {
-                           dy[0] = y[1] * std::nan("");
-                           dy[1] = y[0];
-                         },
-                         no_guards(), enter(0));
+  const auto never = Toy(
+      {{FlowKind::smooth, {}}},
+      [](int, const auto&, const auto& y, auto& dy) {
+        dy[0] = y[1] * std::nan("");
+        dy[1] = y[0];
+      },
+      no_guards(), enter(0));
   EXPECT_EQ(run(never, {1.0, 1.0}, 1.0, options()).outcome, Outcome::not_finite);
 
-  const auto midway = Toy({{FlowKind::smooth, {}}},
-                          [](int, const auto& t, const auto& y, auto& dy) {
-                            using S = std::decay_t<decltype(t)>;
-                            dy[0] = y[1] + (value_of(t) > 0.503 ? S(NAN) : S(0));
-                            dy[1] = S(-1);
-                          },
-                          no_guards(), enter(0));
+  const auto midway = Toy(
+      {{FlowKind::smooth, {}}},
+      [](int, const auto& t, const auto& y, auto& dy) {
+        using S = std::decay_t<decltype(t)>;
+        dy[0] = y[1] + (value_of(t) > 0.503 ? S(NAN) : S(0));
+        dy[1] = S(-1);
+      },
+      no_guards(), enter(0));
   const auto end = run(midway, {1.0, 1.0}, 1.0, options());
   EXPECT_EQ(end.outcome, Outcome::not_finite);
   EXPECT_LE(end.t, 0.503);
@@ -496,12 +511,13 @@ TEST_P(Events, NotANumberFromATransition) {
 
 TEST_P(Events, AFlowThatExplodesEndsTyped) {
   // y' = y²: infinite at t = 1.
-  const auto blow = Toy({{FlowKind::smooth, {}}},
-                        [](int, const auto&, const auto& y, auto& dy) {
-                          dy[0] = y[0] * y[0];
-                          dy[1] = 0.0 * y[1];
-                        },
-                        no_guards(), enter(0));
+  const auto blow = Toy(
+      {{FlowKind::smooth, {}}},
+      [](int, const auto&, const auto& y, auto& dy) {
+        dy[0] = y[0] * y[0];
+        dy[1] = 0.0 * y[1];
+      },
+      no_guards(), enter(0));
   auto o = options();
   o.step_budget = 20'000;
   const auto end = run(blow, {1.0, 0.0}, 2.0, o);
@@ -516,11 +532,12 @@ TEST_P(Events, InconsistentModesAreACycle) {
   for (const int length : {1, 2, 3, 4, 5, 7}) {
     std::vector<ToyMode> modes(length, {FlowKind::smooth, {{"out", Crossing::rising}}});
     if (length == 1) modes.push_back(modes.front());  // 0 -> 1 -> 1: an observed guard is no cycle
-    const Toy ring(modes, oscillator(), [](int, const auto& t, const auto&, auto* g) { g[0] = t; },
-                   [length](int mode, int, const auto& t, const auto& y) {
-                     using S = std::decay_t<decltype(t)>;
-                     return Entry<S, 2>{length == 1 ? 1 : (mode + 1) % length, t, y, S(0)};
-                   });
+    const Toy ring(
+        modes, oscillator(), [](int, const auto& t, const auto&, auto* g) { g[0] = t; },
+        [length](int mode, int, const auto& t, const auto& y) {
+          using S = std::decay_t<decltype(t)>;
+          return Entry<S, 2>{length == 1 ? 1 : (mode + 1) % length, t, y, S(0)};
+        });
     const auto end = run(ring, {1.0, 0.0}, 1.0, options());
     EXPECT_EQ(end.outcome, length == 1 ? Outcome::horizon : Outcome::mode_cycle) << length;
     if (length > 1) {
@@ -531,7 +548,8 @@ TEST_P(Events, InconsistentModesAreACycle) {
 }
 
 TEST_P(Events, BudgetsAreKept) {
-  const Toy swing({{FlowKind::smooth, {{"zero", Crossing::falling}}}}, oscillator(), falling_floor(), enter(0));
+  const Toy swing({{FlowKind::smooth, {{"zero", Crossing::falling}}}}, oscillator(), falling_floor(),
+                  enter(0));
   auto o = options();
   o.event_budget = 3;
   const auto events = run(swing, {1.0, 0.0}, 1000.0, o);
@@ -549,8 +567,8 @@ TEST_P(Events, BudgetsAreKept) {
 
 // ------------------------------------------------------------------ anything at all
 
-/// A hybrid system drawn at random: three modes with linear flows, sometimes singular; two guards each, lines in the
-/// state and in time; transitions to a random mode with a random linear reset; some time events.
+/// A hybrid system drawn at random: three modes with linear flows, sometimes singular; two guards each, lines
+/// in the state and in time; transitions to a random mode with a random linear reset; some time events.
 struct Draw {
   explicit Draw(unsigned seed) : random(seed) {}
   double real(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); }
@@ -573,8 +591,9 @@ TEST_P(Fuzz, RandomHybridSystemsAlwaysEndTyped) {
       for (auto& row : A[m])
         for (double& a : row) a = draw.real(-3, 3);
       singular[m] = draw.whole(10) == 0;
-      const FlowKind kind = draw.whole(4) == 0 ? FlowKind::frozen : draw.whole(3) == 0 ? FlowKind::stiff
-                                                                                       : FlowKind::smooth;
+      const FlowKind kind = draw.whole(4) == 0   ? FlowKind::frozen
+                            : draw.whole(3) == 0 ? FlowKind::stiff
+                                                 : FlowKind::smooth;
       modes.push_back({kind, {}});
       for (int i = 0; i < 2; ++i) {
         modes[m].guards.push_back({"line", draw.whole(2) ? Crossing::rising : Crossing::falling});
@@ -598,8 +617,11 @@ TEST_P(Fuzz, RandomHybridSystemsAlwaysEndTyped) {
         [&](int m, int i, const auto& t, const auto& y) {
           using S = std::decay_t<decltype(t)>;
           const auto& r = reset[m][i];
-          return Entry<S, 2>{to[m][i], t, {S(r[0][0] * y[0] + r[0][1] * y[1] + r[0][2]),
-                                           S(r[1][0] * y[0] + r[1][1] * y[1] + r[1][2])}, S(0)};
+          return Entry<S, 2>{
+              to[m][i],
+              t,
+              {S(r[0][0] * y[0] + r[0][1] * y[1] + r[0][2]), S(r[1][0] * y[0] + r[1][1] * y[1] + r[1][2])},
+              S(0)};
         });
     for (double t = draw.real(0, 1); t < 2; t += draw.real(1e-9, 1)) system.times.push_back(t);
 
@@ -625,7 +647,8 @@ TEST_P(Fuzz, RandomHybridSystemsAlwaysEndTyped) {
       last = event.t;
     }
     for (std::size_t k = 1; k < end.trajectory.pieces.size(); ++k)
-      EXPECT_GE(end.trajectory.pieces[k].t0, end.trajectory.pieces[k - 1].t1 * (1 - 1e-14)) << "seed " << seed;
+      EXPECT_GE(end.trajectory.pieces[k].t0, end.trajectory.pieces[k - 1].t1 * (1 - 1e-14))
+          << "seed " << seed;
   }
   // The draw is of use only if it reaches more than one kind of ending.
   EXPECT_GT(outcomes[static_cast<int>(Outcome::horizon)], 50);

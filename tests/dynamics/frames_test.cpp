@@ -1,4 +1,5 @@
-// Frames and the rigid body: signs by finite differences of a body that really moves, inverses, power, closed forms.
+// Frames and the rigid body: signs by finite differences of a body that really moves, inverses, power, closed
+// forms.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,7 +16,8 @@ struct Sample {
   double operator()() { return std::uniform_real_distribution<double>(-3, 3)(random); }
 };
 
-/// A body on a path with everything changing: CoM and angle as functions of time, and a point fixed in the body.
+/// A body on a path with everything changing: CoM and angle as functions of time, and a point fixed in the
+/// body.
 struct Path {
   static double angle(double t) { return 0.3 + 1.7 * t + 0.9 * t * t - 0.4 * t * t * t; }
   static Vec2<double> com(double t) { return {std::sin(2 * t), 0.5 * t * t - std::cos(t)}; }
@@ -24,7 +26,9 @@ struct Path {
 };
 
 template <class F>
-Vec2<double> first_difference(F f, double t, double h) { return (0.5 / h) * (f(t + h) - f(t - h)); }
+Vec2<double> first_difference(F f, double t, double h) {
+  return (0.5 / h) * (f(t + h) - f(t - h));
+}
 template <class F>
 Vec2<double> second_difference(F f, double t, double h) {
   return (1 / (h * h)) * (f(t + h) - f(t) - (f(t) - f(t - h)));
@@ -46,7 +50,8 @@ TEST(Frames, TheAccelerationOfAPointOfAMovingBodyDecidesTheSign) {
     EXPECT_NEAR(acceleration.ax, a_point.x, 5e-7);
     EXPECT_NEAR(acceleration.az, a_point.z, 5e-7);
     // The sign printed in the source misses by twice the terms, of order one here.
-    const Vec2<double> printed{a.x - alpha * r.z - omega * omega * r.x, a.z + alpha * r.x - omega * omega * r.z};
+    const Vec2<double> printed{a.x - alpha * r.z - omega * omega * r.x,
+                               a.z + alpha * r.x - omega * omega * r.z};
     EXPECT_GT(norm(printed - a_point), 0.1) << t;
   }
 }
@@ -63,8 +68,8 @@ TEST(Frames, InversesAreInverses) {
     const Vec2<double> minus{-r.x, -r.z};
     const Twist<double> v3 = twist_at_patch(twist_at_patch(v, r), minus);  // G(−r) G(r) = 1
     // Rounding of numbers up to 3 + 3·3 + 9·3: a few times 1e-15.
-    for (const double d : {v2.vx - v.vx, v2.vz - v.vz, v3.vx - v.vx, v3.vz - v.vz, a2.ax - a.ax, a2.az - a.az,
-                           f2.tau - f.tau})
+    for (const double d :
+         {v2.vx - v.vx, v2.vz - v.vz, v3.vx - v.vx, v3.vz - v.vz, a2.ax - a.ax, a2.az - a.az, f2.tau - f.tau})
       EXPECT_NEAR(d, 0, 2e-14) << "draw " << k;
   }
 }
@@ -127,7 +132,8 @@ TEST(RigidBody, TheTorqueOfStickingInClosedForm) {
     const auto f = required_wrench(body, object, r, level_gravity(g));
     const double closed = (body.inertia + body.mass * dot(r, r)) * hand.alpha -
                           body.mass * (r.z * hand.ax - r.x * (hand.az + g));
-    EXPECT_NEAR(f.tau, closed, 1e-12 * (1 + std::abs(closed)) + 1e-12) << "draw " << k;  // ω² l² m of order 500 cancels
+    EXPECT_NEAR(f.tau, closed, 1e-12 * (1 + std::abs(closed)) + 1e-12)
+        << "draw " << k;  // ω² l² m of order 500 cancels
   }
 }
 

@@ -1,38 +1,39 @@
-// A block with dry friction on a plate shaken sinusoidally: where it never sticks, where it always does, and that a
-// stuck block does not creep.
+// A block with dry friction on a plate shaken sinusoidally: where it never sticks, where it always does, and
+// that a stuck block does not creep.
 #include "tests/dynamics/toy_systems.hpp"
 
 namespace unhand::dynamics {
 namespace {
 
-/// Relative to a plate of acceleration sin t, in units of its amplitude: u'' = −sin t − s ρ with ρ = μ g/A and s the
-/// direction of slip. Modes: slip forward (0), slip back (1), stick (2). y = (u, u').
+/// Relative to a plate of acceleration sin t, in units of its amplitude: u'' = −sin t − s ρ with ρ = μ g/A
+/// and s the direction of slip. Modes: slip forward (0), slip back (1), stick (2). y = (u, u').
 auto plate(Dual rho) {
-  return Toy({{FlowKind::smooth, {{"stops", Crossing::falling}}},
-              {FlowKind::smooth, {{"stops", Crossing::rising}}},
-              {FlowKind::frozen, {{"forward", Crossing::falling}, {"back", Crossing::rising}}}},
-             [rho](int mode, const auto& t, const auto& y, auto& dy) {
-               using S = std::decay_t<decltype(t)>;
-               using std::sin;
-               dy[0] = y[1];
-               dy[1] = -sin(t) + (mode == 0 ? -1.0 : 1.0) * as<S>(rho);
-             },
-             [rho](int mode, const auto& t, const auto& y, auto* g) {
-               using S = std::decay_t<decltype(t)>;
-               using std::sin;
-               if (mode != 2) {
-                 g[0] = y[1];
-               } else {
-                 g[0] = sin(t) + as<S>(rho);  // forward slip where −sin t > ρ
-                 g[1] = sin(t) - as<S>(rho);
-               }
-             },
-             [rho](int mode, int guard, const auto& t, const auto& y) {
-               using S = std::decay_t<decltype(t)>;
-               if (mode == 2) return Entry<S, 2>{guard, t, {y[0], S(0)}, S(0)};
-               const double demand = -std::sin(value_of(t)), grip = rho.a;
-               return Entry<S, 2>{demand > grip ? 0 : demand < -grip ? 1 : 2, t, {y[0], S(0)}, S(0)};
-             });
+  return Toy(
+      {{FlowKind::smooth, {{"stops", Crossing::falling}}},
+       {FlowKind::smooth, {{"stops", Crossing::rising}}},
+       {FlowKind::frozen, {{"forward", Crossing::falling}, {"back", Crossing::rising}}}},
+      [rho](int mode, const auto& t, const auto& y, auto& dy) {
+        using S = std::decay_t<decltype(t)>;
+        using std::sin;
+        dy[0] = y[1];
+        dy[1] = -sin(t) + (mode == 0 ? -1.0 : 1.0) * as<S>(rho);
+      },
+      [rho](int mode, const auto& t, const auto& y, auto* g) {
+        using S = std::decay_t<decltype(t)>;
+        using std::sin;
+        if (mode != 2) {
+          g[0] = y[1];
+        } else {
+          g[0] = sin(t) + as<S>(rho);  // forward slip where −sin t > ρ
+          g[1] = sin(t) - as<S>(rho);
+        }
+      },
+      [rho](int mode, int guard, const auto& t, const auto& y) {
+        using S = std::decay_t<decltype(t)>;
+        if (mode == 2) return Entry<S, 2>{guard, t, {y[0], S(0)}, S(0)};
+        const double demand = -std::sin(value_of(t)), grip = rho.a;
+        return Entry<S, 2>{demand > grip ? 0 : demand < -grip ? 1 : 2, t, {y[0], S(0)}, S(0)};
+      });
 }
 
 class Plate : public EveryMethod {
@@ -75,7 +76,8 @@ TEST_P(Plate, StickSlipUpToOneAndAlwaysStickAbove) {
 }
 
 TEST_P(Plate, TheFirstSlipIsTheClosedForm) {
-  // Slip back starts at asin ρ; its speed is cos s − cos s0 − ... = 0 at the end: cos t − cos t0 + ρ (t − t0) = 0.
+  // Slip back starts at asin ρ; its speed is cos s − cos s0 − ... = 0 at the end: cos t − cos t0 + ρ (t − t0)
+  // = 0.
   for (const double rho : {0.6, 0.7, 0.8, 0.9, 0.99}) {
     const auto end = shake(rho, 3.9, options());
     ASSERT_GE(end.events.size(), 2u) << rho;
@@ -102,7 +104,8 @@ TEST_P(Plate, AStuckBlockDoesNotCreep) {
 TEST_P(Plate, TheSlipIsDifferentiableInTheGrip) {
   if (GetParam() == Method::rosenbrock || GetParam() == Method::cvode) GTEST_SKIP() << "no derivatives";
   auto slide = [](Dual rho) {
-    return integrate<Dual, 2>(plate(rho), Entry<Dual, 2>{2, Dual(0), {Dual(0), Dual(0)}, Dual(0)}, Dual(9.0), options());
+    return integrate<Dual, 2>(plate(rho), Entry<Dual, 2>{2, Dual(0), {Dual(0), Dual(0)}, Dual(0)}, Dual(9.0),
+                              options());
   };
   const auto end = slide(independent(0.7, 0));
   const auto up = slide(Dual(0.7 + 1e-4)), down = slide(Dual(0.7 - 1e-4));
@@ -110,7 +113,8 @@ TEST_P(Plate, TheSlipIsDifferentiableInTheGrip) {
   ASSERT_EQ(end.events.size(), down.events.size());
   EXPECT_GE(end.events.size(), 4u);  // two full regimes of slip
   for (int i = 0; i < 2; ++i)
-    EXPECT_NEAR(end.y[i].v[0], (up.y[i].a - down.y[i].a) / 2e-4, 1e-6);  // 1e-8 x third derivative; noise 1e-11/1e-4
+    EXPECT_NEAR(end.y[i].v[0], (up.y[i].a - down.y[i].a) / 2e-4,
+                1e-6);  // 1e-8 x third derivative; noise 1e-11/1e-4
 }
 
 }  // namespace

@@ -15,8 +15,10 @@ namespace unhand::dynamics {
 /// A constant of a toy as the scalar of the moment.
 template <class S>
 S as(const Dual& x) {
-  if constexpr (std::is_same_v<S, double>) return x.a;
-  else return x;
+  if constexpr (std::is_same_v<S, double>)
+    return x.a;
+  else
+    return x;
 }
 
 struct ToyMode {
@@ -114,11 +116,16 @@ inline auto bouncing_ball(Dual gravity, Dual restitution, bool rests = true) {
 
 inline std::string name_of(Method method) {
   switch (method) {
-    case Method::automatic: return "automatic";
-    case Method::dormand_prince: return "dormand_prince";
-    case Method::rosenbrock: return "rosenbrock";
-    case Method::sdirk: return "sdirk";
-    case Method::cvode: return "cvode";
+    case Method::automatic:
+      return "automatic";
+    case Method::dormand_prince:
+      return "dormand_prince";
+    case Method::rosenbrock:
+      return "rosenbrock";
+    case Method::sdirk:
+      return "sdirk";
+    case Method::cvode:
+      return "cvode";
   }
   return "unknown";
 }

@@ -8,8 +8,8 @@ constexpr double kGravity = 9.81;
 
 class Zeno : public EveryMethod {
  protected:
-  /// At the jump flights are 1e-15 m high: CVODE sees them only with an absolute tolerance below that. (The single-step
-  /// methods are exact for parabolas.)
+  /// At the jump flights are 1e-15 m high: CVODE sees them only with an absolute tolerance below that. (The
+  /// single-step methods are exact for parabolas.)
   static IntegratorOptions options() {
     auto o = EveryMethod::options();
     if (GetParam() == Method::cvode) o.tolerances.absolute = 1e-16;
@@ -62,7 +62,8 @@ TEST_P(Zeno, DefaultTolerancesWillDo) {
 TEST_P(Zeno, WithoutALimitTheOutcomeSaysZeno) {
   for (const double restitution : {0.5, 0.9}) {
     const double limit = accumulation(1.0, restitution);
-    const auto end = run(bouncing_ball(Dual(kGravity), Dual(restitution), false), {1.0, 0.0}, limit + 1.0, options());
+    const auto end =
+        run(bouncing_ball(Dual(kGravity), Dual(restitution), false), {1.0, 0.0}, limit + 1.0, options());
     EXPECT_EQ(end.outcome, Outcome::zeno);
     EXPECT_NEAR(end.t, limit, 1e-6);
     EXPECT_LE(end.events.size(), 250u);
@@ -80,18 +81,20 @@ TEST_P(Zeno, AHorizonBeforeTheLimitIsReachedInFlight) {
 }
 
 TEST_P(Zeno, IntervalsThatShrinkLikeAPowerAreNotJumped) {
-  // The ramp is reset by the next interval k^-p: for p = 2 events accumulate at π²/6, for p = 1 they do not at all.
+  // The ramp is reset by the next interval k^-p: for p = 2 events accumulate at π²/6, for p = 1 they do not
+  // at all.
   for (const double power : {1.0, 2.0}) {
-    const Toy ramp({{FlowKind::smooth, {{"end", Crossing::rising}}}},
-                   [](int, const auto&, const auto& y, auto& dy) {
-                     dy[0] = 1.0 + 0.0 * y[0];
-                     dy[1] = 0.0 * y[0];
-                   },
-                   [](int, const auto&, const auto& y, auto* g) { g[0] = y[0]; },
-                   [power](int, int, const auto& t, const auto& y) {
-                     using S = std::decay_t<decltype(t)>;
-                     return Entry<S, 2>{0, t, {S(-std::pow(value_of(y[1]), -power)), S(y[1] + 1.0)}, S(0)};
-                   });
+    const Toy ramp(
+        {{FlowKind::smooth, {{"end", Crossing::rising}}}},
+        [](int, const auto&, const auto& y, auto& dy) {
+          dy[0] = 1.0 + 0.0 * y[0];
+          dy[1] = 0.0 * y[0];
+        },
+        [](int, const auto&, const auto& y, auto* g) { g[0] = y[0]; },
+        [power](int, int, const auto& t, const auto& y) {
+          using S = std::decay_t<decltype(t)>;
+          return Entry<S, 2>{0, t, {S(-std::pow(value_of(y[1]), -power)), S(y[1] + 1.0)}, S(0)};
+        });
     auto o = options();
     o.event_budget = 1500;
     o.zeno_tolerance = 1e30;  // only the ratios decide
@@ -105,19 +108,20 @@ TEST_P(Zeno, IntervalsThatShrinkLikeAPowerAreNotJumped) {
 
 TEST_P(Zeno, APatternOfTwoModesAccumulatesToo) {
   // A ball between two impacts of different restitution: floor and floor, alternately hard and soft.
-  Toy ball({{FlowKind::smooth, {{"hard", Crossing::falling}}},
-            {FlowKind::smooth, {{"soft", Crossing::falling}}},
-            {FlowKind::frozen, {}}},
-           [](int, const auto& t, const auto& y, auto& dy) {
-             using S = std::decay_t<decltype(t)>;
-             dy[0] = y[1];
-             dy[1] = S(-kGravity);
-           },
-           [](int, const auto&, const auto& y, auto* g) { g[0] = y[0]; },
-           [](int mode, int, const auto& t, const auto& y) {
-             using S = std::decay_t<decltype(t)>;
-             return Entry<S, 2>{1 - mode, t, {y[0], S((mode == 0 ? -0.9 : -0.4) * y[1])}, S(0)};
-           });
+  Toy ball(
+      {{FlowKind::smooth, {{"hard", Crossing::falling}}},
+       {FlowKind::smooth, {{"soft", Crossing::falling}}},
+       {FlowKind::frozen, {}}},
+      [](int, const auto& t, const auto& y, auto& dy) {
+        using S = std::decay_t<decltype(t)>;
+        dy[0] = y[1];
+        dy[1] = S(-kGravity);
+      },
+      [](int, const auto&, const auto& y, auto* g) { g[0] = y[0]; },
+      [](int mode, int, const auto& t, const auto& y) {
+        using S = std::decay_t<decltype(t)>;
+        return Entry<S, 2>{1 - mode, t, {y[0], S((mode == 0 ? -0.9 : -0.4) * y[1])}, S(0)};
+      });
   ball.limit_mode = 2;
   const auto end = run(ball, {1.0, 0.0}, 10.0, options());
   EXPECT_EQ(end.mode, 2);
@@ -129,18 +133,20 @@ TEST_P(Zeno, APatternOfTwoModesAccumulatesToo) {
 }
 
 TEST_P(Zeno, AStateThatTravelsOnIsNotJumped) {
-  // The bounces die out while the other component still changes by order one: the limit waits until it is small.
-  const Toy shrinking({{FlowKind::smooth, {{"end", Crossing::rising}}}},
-                      [](int, const auto&, const auto& y, auto& dy) {
-                        dy[0] = 1.0 + 0.0 * y[0];
-                        dy[1] = 0.0 * y[0];
-                      },
-                      [](int, const auto&, const auto& y, auto* g) { g[0] = y[0]; },
-                      [](int, int, const auto& t, const auto& y) {
-                        using S = std::decay_t<decltype(t)>;
-                        const S next = 0.5 * y[1];
-                        return Entry<S, 2>{0, t, {S(-next), next}, S(0)};
-                      });
+  // The bounces die out while the other component still changes by order one: the limit waits until it is
+  // small.
+  const Toy shrinking(
+      {{FlowKind::smooth, {{"end", Crossing::rising}}}},
+      [](int, const auto&, const auto& y, auto& dy) {
+        dy[0] = 1.0 + 0.0 * y[0];
+        dy[1] = 0.0 * y[0];
+      },
+      [](int, const auto&, const auto& y, auto* g) { g[0] = y[0]; },
+      [](int, int, const auto& t, const auto& y) {
+        using S = std::decay_t<decltype(t)>;
+        const S next = 0.5 * y[1];
+        return Entry<S, 2>{0, t, {S(-next), next}, S(0)};
+      });
   auto o = options();
   o.zeno_tolerance = 1e-4;
   const auto end = run(shrinking, {-1.0, 1.0}, 10.0, o);
