@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <stdexcept>
+
 #include "contact/contact_model_from.hpp"
 
 namespace unhand::contact {

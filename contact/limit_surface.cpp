@@ -2,8 +2,8 @@
 
 #include <Eigen/Dense>
 
-#include "contact/slip_stop.hpp"
 #include "contact/contact_model_from.hpp"
+#include "contact/slip_stop.hpp"
 
 namespace unhand::contact {
 
@@ -15,9 +15,6 @@ namespace {
 /// Time after the onset of slip [s] at which the stiff flow takes over from its leading term. The slip is then of the
 /// order 1e-9 m/s, below the integrator's tolerance, and so is the term left out.
 constexpr double kOnset = 1e-6;
-
-template <class S>
-S dot3(const Vec3<S>& a, const Vec3<S>& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 /// Normalised wrench w to f [N, N, N m]: f = f_max (w_x, w_z, L w_τ).
 template <class S>
@@ -95,9 +92,9 @@ template <class Shape, class S>
 Vec3<S> resist(const Shape& shape, const Scene<S>& scene, const Vec3<S>& u) {
   return in_hand_frame<Shape, S>(scene.hand.theta, u, [&](const Vec3<S>& x) { return shape.resist(x); });
 }
-template <class Shape, class S>
-Vec3<S> slip_direction(const Shape& shape, const Scene<S>& scene, const Vec3<S>& w) {
-  return in_hand_frame<Shape, S>(scene.hand.theta, w, [&](const Vec3<S>& x) { return shape.slip_direction(x); });
+template <class Shape>
+Vec3<double> slip_direction(const Shape& shape, const Scene<double>& scene, const Vec3<double>& w) {
+  return in_hand_frame<Shape, double>(scene.hand.theta, w, [&](const Vec3<double>& x) { return shape.slip_direction(x); });
 }
 template <class Shape, class S>
 S gauge(const Shape& shape, const Scene<S>& scene, const Vec3<S>& w) {
@@ -176,23 +173,26 @@ Vec3<S> LimitSurface<Shape>::slip_acceleration(const Scene<S>& scene, const Rela
 
   const auto A = normalised_inertia(scene, lever(scene, y), length);
   // Just outside, the slip leaves along the surface's normal: a guess whose size is right to first order.
-  const Vec3<S> n = slip_direction(shape_, scene, w);
-  const S size = excess * f_max * (-dot3(n, w)) / (1.0 + excess) / dot3(n, times(A, n));
-  Vec3<double> guess, b_value;
+  const Scene<double> scene_value = values(scene);
+  Vec3<double> w_value, b_value, guess;
   std::array<Vec3<double>, 3> A_value;
   for (int i = 0; i < 3; ++i) {
-    guess[i] = value_of(size) * value_of(n[i]);
+    w_value[i] = value_of(w[i]);
     b_value[i] = value_of(b[i]);
     for (int j = 0; j < 3; ++j) A_value[i][j] = value_of(A[i][j]);
   }
-  const Vec3<double> a = minimise(shape_, values(scene), A_value, value_of(f_max), b_value, guess);
+  const Vec3<double> n = slip_direction(shape_, scene_value, w_value);
+  const double outside = value_of(excess), size = outside * value_of(f_max) * -dot3(n, w_value) / (1 + outside) /
+                                                  dot3(n, times(A_value, n));
+  for (int i = 0; i < 3; ++i) guess[i] = size * n[i];
+  const Vec3<double> a = minimise(shape_, scene_value, A_value, value_of(f_max), b_value, guess);
   if constexpr (std::is_same_v<S, double>) {
     return a;
   } else {
     // One Newton step in dual arithmetic with the real Hessian: the implicit function theorem.
     Vec3<S> at{S(a[0]), S(a[1]), S(a[2])};
     const Vec3<S> force = resist(shape_, scene, at), Ad = times(A, Vec3<S>{at[0] - b[0], at[1] - b[1], at[2] - b[2]});
-    Eigen::Matrix3d hessian = -f_max.a * resist_jacobian(shape_, values(scene), a);
+    Eigen::Matrix3d hessian = -f_max.a * resist_jacobian(shape_, scene_value, a);
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) hessian(i, j) += A_value[i][j];
     const Eigen::LDLT<Eigen::Matrix3d> factor(hessian);

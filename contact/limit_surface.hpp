@@ -1,7 +1,11 @@
 // Limit-surface friction as a hybrid system: a true stick mode, and slip whose wrench lies on the surface.
 #pragma once
 
+#include <concepts>
+#include <utility>
+
 #include "contact/contact_model.hpp"
+#include "contact/convex_quartic.hpp"
 #include "contact/limit_surface_shapes.hpp"
 #include "contact/patch.hpp"
 
@@ -23,9 +27,13 @@ template <class Shape>
 class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
  public:
   /// Throws std::invalid_argument as Patch's validation does.
-  LimitSurface(std::string_view name, const Patch<Dual>& patch, Shape shape = {});
-  LimitSurface(std::string_view name, const Patch<double>& patch, Shape shape = {})
+  LimitSurface(std::string_view name, const Patch<Dual>& patch, Shape shape);
+  LimitSurface(std::string_view name, const Patch<double>& patch, Shape shape)
       : LimitSurface(name, constant(patch), std::move(shape)) {}
+  /// For shapes without parameters.
+  template <class S>
+    requires std::default_initializable<Shape>
+  LimitSurface(std::string_view name, const Patch<S>& patch) : LimitSurface(name, patch, Shape{}) {}
 
   std::string_view name() const override { return name_; }
   int mode_count() const override { return 2; }

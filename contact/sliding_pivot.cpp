@@ -2,8 +2,8 @@
 
 #include <array>
 
-#include "contact/slip_stop.hpp"
 #include "contact/contact_model_from.hpp"
+#include "contact/slip_stop.hpp"
 
 namespace unhand::contact {
 

@@ -1,0 +1,143 @@
+#include "experiment/compare.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "experiment/parallel.hpp"
+
+namespace unhand::experiment {
+
+ErrorStatistics statistics_of(const std::vector<double>& errors) {
+  ErrorStatistics out;
+  out.n = static_cast<int>(errors.size());
+  if (errors.empty()) return out;
+  const double n = static_cast<double>(errors.size());
+  for (const double e : errors) {
+    out.mae += std::abs(e) / n;
+    out.bias += e / n;
+  }
+  for (const double e : errors) out.std += (std::abs(e) - out.mae) * (std::abs(e) - out.mae);
+  out.std = errors.size() > 1 ? std::sqrt(out.std / (n - 1)) : 0.0;
+  return out;
+}
+
+namespace {
+
+template <class Keep>
+ErrorStatistics collect(const std::vector<ThrowComparison>& throws, int quantity, Keep&& keep) {
+  std::vector<double> errors;
+  for (const auto& t : throws)
+    if (keep(t) && t.error[quantity]) errors.push_back(*t.error[quantity]);
+  return statistics_of(errors);
+}
+
+ThrowComparison judge(const PreparedThrow& prepared, const Prediction& prediction) {
+  ThrowComparison out{prepared.id, prepared.object, prepared.condition, prepared.split, prediction, {}};
+  const MeasuredOutcome& measured = prepared.measured;
+  if (prediction.release == release::ReleaseOutcome::detached && measured.detach_twist) {
+    // A model may let go earlier or later than the pads did: both twists are then compared at the measured detach, to
+    // which the predicted one is carried by gravity (ω does not change in flight).
+    const double wait = measured.detach_time ? *measured.detach_time - prediction.detach.time : 0.0;
+    out.error[0] = prediction.detach.twist.vx + wait * prepared.gravity.x - measured.detach_twist->vx;
+    out.error[1] = (prediction.detach.twist.omega - measured.detach_twist->omega) * kDegrees;
+  }
+  if (prediction.landed()) {
+    if (measured.landing_x) out.error[2] = prediction.landing.pose.x - *measured.landing_x;
+    if (measured.landing_theta) out.error[3] = (prediction.landing.pose.theta - *measured.landing_theta) * kDegrees;
+  }
+  return out;
+}
+
+RepetitionScatter scatter_of(const std::vector<PreparedThrow>& throws, const std::vector<std::string>& conditions) {
+  RepetitionScatter out;
+  double x_square = 0, theta_square = 0;
+  int freedom = 0;
+  for (const auto& condition : conditions) {
+    std::vector<double> x, theta;
+    for (const auto& t : throws)
+      if (t.condition == condition && t.measured.landing_x && t.measured.landing_theta) {
+        x.push_back(*t.measured.landing_x);
+        theta.push_back(*t.measured.landing_theta * kDegrees);
+      }
+    if (x.size() < 2) continue;
+    ++out.conditions;
+    freedom += static_cast<int>(x.size()) - 1;
+    const auto square = [](const std::vector<double>& v) {
+      double mean = 0, sum = 0;
+      for (const double e : v) mean += e / static_cast<double>(v.size());
+      for (const double e : v) sum += (e - mean) * (e - mean);
+      return sum;
+    };
+    x_square += square(x);
+    theta_square += square(theta);
+  }
+  if (freedom > 0) {
+    out.landing_x = std::sqrt(x_square / freedom);
+    out.landing_theta = std::sqrt(theta_square / freedom);
+  }
+  return out;
+}
+
+}  // namespace
+
+ErrorStatistics ModelComparison::statistics(int quantity, datasets::Split split) const {
+  return collect(throws, quantity, [&](const ThrowComparison& t) { return t.split == split; });
+}
+ErrorStatistics ModelComparison::of_condition(int quantity, const std::string& condition) const {
+  return collect(throws, quantity, [&](const ThrowComparison& t) { return t.condition == condition; });
+}
+
+std::vector<PreparedThrow> prepare_all(const datasets::ThrowLog& log, const std::string& file, int threads) {
+  std::vector<std::optional<PreparedThrow>> prepared(log.throws.size());
+  parallel_for(log.throws.size(), threads, [&](std::size_t i) { prepared[i] = prepare(log, log.throws[i], file); });
+  std::vector<PreparedThrow> out;
+  out.reserve(prepared.size());
+  for (auto& p : prepared) out.push_back(std::move(*p));
+  return out;
+}
+
+Comparison compare(const datasets::ThrowLog& log, const std::string& file, const CompareOptions& options) {
+  for (const auto& model : options.models) require_release_model(model);
+  return compare(log, prepare_all(log, file, options.threads), options);
+}
+
+Comparison compare(const datasets::ThrowLog& log, const std::vector<PreparedThrow>& prepared, const CompareOptions& options) {
+  Comparison out;
+  for (const auto& t : prepared) {
+    if (std::find(out.conditions.begin(), out.conditions.end(), t.condition) == out.conditions.end())
+      out.conditions.push_back(t.condition);
+    out.worst_hand_chi2 = std::max(out.worst_hand_chi2, t.hand_fit.chi2_per_dof);
+    out.mean_force_chi2 += t.force_fit.chi2_per_dof / static_cast<double>(prepared.size());
+  }
+  out.repetitions = scatter_of(prepared, out.conditions);
+
+  for (const auto& model : options.models) {
+    ModelComparison result;
+    result.model = model;
+    if (const auto card = options.parameters.find(model); card != options.parameters.end()) {
+      result.estimate.parameters = card->second;
+      result.estimate.method = "from the card";
+      result.from_card = true;
+    } else {
+      result.estimate = estimate_friction(log, prepared, model);
+    }
+    result.estimate.parameters.naive = options.naive;
+    std::vector<Prediction> predictions(prepared.size());
+    std::vector<double> seconds(prepared.size());
+    parallel_for(prepared.size(), options.threads, [&](std::size_t i) {
+      const auto begin = std::chrono::steady_clock::now();
+      predictions[i] = predict(prepared[i], model, result.estimate.parameters, options.integrator);
+      seconds[i] = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    });
+    for (std::size_t i = 0; i < prepared.size(); ++i) {
+      result.throws.push_back(judge(prepared[i], predictions[i]));
+      if (!predictions[i].landed()) ++result.failed;
+      result.microseconds_per_throw += 1e6 * seconds[i] / static_cast<double>(prepared.size());
+    }
+    out.models.push_back(std::move(result));
+  }
+  return out;
+}
+
+}  // namespace unhand::experiment

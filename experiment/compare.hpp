@@ -1,0 +1,87 @@
+// Models against the measured outcomes of a campaign.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "experiment/friction_estimate.hpp"
+#include "experiment/model.hpp"
+
+namespace unhand::experiment {
+
+/// Errors are predicted minus measured.
+struct ErrorStatistics {
+  int n{};
+  double mae{};   ///< mean of the absolute error
+  double std{};   ///< standard deviation of the absolute error
+  double bias{};  ///< mean of the error
+};
+ErrorStatistics statistics_of(const std::vector<double>& errors);
+
+/// The compared quantities, in the order of the table.
+struct Quantity {
+  const char* key;      ///< in JSON, with its unit
+  const char* title;    ///< in tables
+  double per_unit;      ///< from SI
+};
+inline constexpr double kDegrees = 57.29577951308232;
+inline constexpr Quantity kQuantities[] = {{"detach_vx_m_s", "detach vx [m/s]", 1},
+                                           {"detach_omega_deg_s", "detach omega [deg/s]", kDegrees},
+                                           {"landing_x_m", "landing x [m]", 1},
+                                           {"landing_theta_deg", "landing theta [deg]", kDegrees}};
+inline constexpr int kQuantityCount = 4;
+
+struct ThrowComparison {
+  std::string id, object, condition;
+  datasets::Split split{};
+  Prediction prediction;
+  std::optional<double> error[kQuantityCount];  ///< in the units of kQuantities; absent if not measured or not predicted
+};
+
+struct ModelComparison {
+  std::string model;
+  FrictionEstimate estimate;
+  bool from_card{};
+  std::vector<ThrowComparison> throws;
+  int failed{};  ///< throws that the model does not bring to a landing; they are in no statistic
+  double microseconds_per_throw{};  ///< release and flight, one thread's time
+
+  ErrorStatistics statistics(int quantity, datasets::Split split) const;
+  /// The same over all throws of one condition.
+  ErrorStatistics of_condition(int quantity, const std::string& condition) const;
+};
+
+/// How far repetitions of a condition scatter about their mean: the floor of any model that does not know what differs
+/// between them.
+struct RepetitionScatter {
+  int conditions{};
+  double landing_x{};      ///< pooled standard deviation [m]
+  double landing_theta{};  ///< [deg]
+};
+
+struct Comparison {
+  std::vector<std::string> conditions;  ///< in order of appearance
+  std::vector<ModelComparison> models;
+  RepetitionScatter repetitions;
+  double worst_hand_chi2{}, mean_force_chi2{};  ///< how well the smoothed inputs explain the logged ones
+};
+
+struct CompareOptions {
+  std::vector<std::string> models;
+  int threads{0};
+  dynamics::IntegratorOptions integrator;
+  std::map<std::string, ModelParameters> parameters;  ///< by model, from cards; otherwise estimated from the log
+  release::NaiveOptions naive;
+};
+
+/// All throws prepared, on several threads. `file` names the log in errors. Throws datasets::LogError.
+std::vector<PreparedThrow> prepare_all(const datasets::ThrowLog& log, const std::string& file, int threads);
+
+/// Simulates every throw with every model. Throws std::invalid_argument for unknown models and what the log does not
+/// determine, datasets::LogError for throws that lack what a release needs.
+Comparison compare(const datasets::ThrowLog& log, const std::string& file, const CompareOptions& options);
+Comparison compare(const datasets::ThrowLog& log, const std::vector<PreparedThrow>& prepared, const CompareOptions& options);
+
+}  // namespace unhand::experiment
