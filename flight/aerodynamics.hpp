@@ -3,6 +3,7 @@
 
 #include "dynamics/frames.hpp"
 #include "dynamics/scalar.hpp"
+#include "flight/vec3.hpp"
 
 namespace unhand::flight {
 
@@ -13,6 +14,15 @@ dynamics::Vec2<S> quadratic_drag(const S& k, const dynamics::Vec2<S>& v) {
   const S squared = dot(v, v);
   if (dynamics::value_of(squared) == 0) return {S(0), S(0)};
   return (-k * S(sqrt(squared))) * v;
+}
+
+/// The same in space.
+template <class S>
+Vec3<S> quadratic_drag(const S& k, const Vec3<S>& v) {
+  using std::sqrt;
+  const S squared = dot(v, v);
+  if (dynamics::value_of(squared) == 0) return {S(0), S(0), S(0)};
+  return scaled(S(-k * S(sqrt(squared))), v);
 }
 
 }  // namespace unhand::flight

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "flight/aerodynamics.hpp"
@@ -20,9 +21,12 @@ using dynamics::Vec2;
 
 const char* to_string(FlightOutcome outcome) {
   switch (outcome) {
-    case FlightOutcome::landed: return "landed";
-    case FlightOutcome::never_reaches: return "never_reaches";
-    case FlightOutcome::not_solved: return "not_solved";
+    case FlightOutcome::landed:
+      return "landed";
+    case FlightOutcome::never_reaches:
+      return "never_reaches";
+    case FlightOutcome::not_solved:
+      return "not_solved";
   }
   return "unknown";
 }
@@ -33,9 +37,12 @@ constexpr int kFlying = 0, kLanded = 1;
 
 template <class T, class S>
 T convert(const S& x) {
-  if constexpr (std::is_same_v<T, S>) return x;
-  else if constexpr (std::is_same_v<T, double>) return value_of(x);
-  else return T(x);
+  if constexpr (std::is_same_v<T, S>)
+    return x;
+  else if constexpr (std::is_same_v<T, double>)
+    return value_of(x);
+  else
+    return T(x);
 }
 
 template <class S>
@@ -57,11 +64,18 @@ class Flying final : public dynamics::HybridSystemFrom<Flying<P>, 6> {
   std::string_view mode_name(int mode) const override { return mode == kLanded ? "landed" : "flying"; }
   int guard_count(int) const override { return lands_ ? 1 : 0; }
   dynamics::Guard guard(int, int) const override { return {"landing height", dynamics::Crossing::falling}; }
+  /// θ grows linearly, so the error allows steps of several turns: the tracked point's swing must be sampled
+  /// finer.
+  double max_step(const Phase&, double, const State<double, 6>& y) const override {
+    const bool swings = lands_ && (value_of(problem_.tracked.x) != 0 || value_of(problem_.tracked.z) != 0);
+    return swings && y[5] != 0 ? 1.0 / std::abs(y[5]) : std::numeric_limits<double>::infinity();
+  }
 
   template <class S>
   void flow_(const Phase&, const S&, const State<S, 6>& y, State<S, 6>& dy) const {
     const Vec2<S> drag = quadratic_drag(convert<S>(problem_.drag_k), Vec2<S>{y[3], y[4]});
-    dy = {y[3], y[4], y[5], drag.x + convert<S>(problem_.gravity.x), drag.z + convert<S>(problem_.gravity.z), S(0)};
+    dy = {y[3], y[4], y[5], drag.x + convert<S>(problem_.gravity.x), drag.z + convert<S>(problem_.gravity.z),
+          S(0)};
   }
   template <class S>
   void guards_(const Phase&, const S&, const State<S, 6>& y, S* g) const {
@@ -69,7 +83,9 @@ class Flying final : public dynamics::HybridSystemFrom<Flying<P>, 6> {
     g[0] = y[1] + dynamics::rotate(y[2], offset).z - convert<S>(problem_.landing_height);
   }
   template <class S>
-  Entry<S, 6> on_guard_(const Phase&, int, const S& t, const State<S, 6>& y) const { return {kLanded, t, y, S(0)}; }
+  Entry<S, 6> on_guard_(const Phase&, int, const S& t, const State<S, 6>& y) const {
+    return {kLanded, t, y, S(0)};
+  }
 
  private:
   const FlightProblem<P>& problem_;
@@ -78,11 +94,13 @@ class Flying final : public dynamics::HybridSystemFrom<Flying<P>, 6> {
 
 template <class S>
 void validate(const FlightProblem<S>& p) {
-  for (const S* x : {&p.pose.x, &p.pose.z, &p.pose.theta, &p.twist.vx, &p.twist.vz, &p.twist.omega, &p.gravity.x,
-                     &p.gravity.z, &p.landing_height, &p.tracked.x, &p.tracked.z})
-    if (!std::isfinite(value_of(*x))) throw std::invalid_argument("flight: a component of the problem is not finite");
+  for (const S* x : {&p.pose.x, &p.pose.z, &p.pose.theta, &p.twist.vx, &p.twist.vz, &p.twist.omega,
+                     &p.gravity.x, &p.gravity.z, &p.landing_height, &p.tracked.x, &p.tracked.z})
+    if (!std::isfinite(value_of(*x)))
+      throw std::invalid_argument("flight: a component of the problem is not finite");
   if (!(value_of(p.drag_k) >= 0 && std::isfinite(value_of(p.drag_k))))
-    throw std::invalid_argument(fmt::format("flight: drag_k = {} is not in [0, inf) 1/m", value_of(p.drag_k)));
+    throw std::invalid_argument(
+        fmt::format("flight: drag_k = {} is not in [0, inf) 1/m", value_of(p.drag_k)));
 }
 
 template <class S>
@@ -97,11 +115,12 @@ Landing<S> landing_from(const S& t, const State<S, 6>& y, const Vec2<S>& tracked
 bool has_derivative(double) { return false; }
 bool has_derivative(const Dual& x) { return !x.v.isZero(); }
 
-/// True if the closed form answers: no drag, nor a derivative with respect to it, and the CoM itself is tracked.
+/// True if the closed form answers: no drag, nor a derivative with respect to it, and the CoM itself is
+/// tracked.
 template <class S>
 bool is_projectile(const FlightProblem<S>& p, bool lands) {
-  const bool centred = value_of(p.tracked.x) == 0 && value_of(p.tracked.z) == 0 && !has_derivative(p.tracked.x) &&
-                       !has_derivative(p.tracked.z);
+  const bool centred = value_of(p.tracked.x) == 0 && value_of(p.tracked.z) == 0 &&
+                       !has_derivative(p.tracked.x) && !has_derivative(p.tracked.z);
   return value_of(p.drag_k) == 0 && !has_derivative(p.drag_k) && (centred || !lands);
 }
 
@@ -112,17 +131,21 @@ FlightResult<S> fly(const FlightProblem<S>& problem, const dynamics::IntegratorO
   validate(problem);
   if (is_projectile(problem, true)) {
     const auto landing = project(problem.pose, problem.twist, problem.gravity, problem.landing_height);
-    if (!landing || value_of(landing->flight_time) > problem.longest) return {FlightOutcome::never_reaches, {}, {}};
+    if (!landing || value_of(landing->flight_time) > problem.longest)
+      return {FlightOutcome::never_reaches, {}, {}};
     return {FlightOutcome::landed, dynamics::Outcome::finished, *landing};
   }
   const Flying<S> system(problem, true);
   dynamics::IntegratorOptions smooth = options;
-  smooth.longest_step = std::max(options.longest_step, 0.05);  // the guard is a smooth height: no need for fine samples
+  smooth.longest_step =
+      std::max(options.longest_step, 0.05);  // the guard is a smooth height: no need for fine samples
   const auto solution = dynamics::integrate<S, 6>(system, Entry<S, 6>{kFlying, S(0), state_of(problem), S(0)},
                                                   S(problem.longest), smooth);
-  const FlightOutcome outcome = solution.outcome == dynamics::Outcome::finished  ? FlightOutcome::landed
-                                : solution.outcome == dynamics::Outcome::horizon ? FlightOutcome::never_reaches
-                                                                                 : FlightOutcome::not_solved;
+  const FlightOutcome outcome = solution.outcome == dynamics::Outcome::finished ? FlightOutcome::landed
+                                : solution.outcome == dynamics::Outcome::horizon
+                                    ? FlightOutcome::never_reaches
+                                    : FlightOutcome::not_solved;
+  if (outcome != FlightOutcome::landed) return {outcome, solution.outcome, {}};
   return {outcome, solution.outcome, landing_from(solution.t, solution.y, problem.tracked)};
 }
 
@@ -134,7 +157,8 @@ std::vector<Pose<S>> fly_through(const FlightProblem<S>& problem, const std::vec
   out.reserve(times.size());
   if (is_projectile(problem, false)) {
     for (const double t : times)
-      out.push_back(tracked_point(ballistic(problem.pose, problem.twist, problem.gravity, S(t)), problem.tracked).pose);
+      out.push_back(
+          tracked_point(ballistic(problem.pose, problem.twist, problem.gravity, S(t)), problem.tracked).pose);
     return out;
   }
   double first = 0, last = 0;
@@ -143,8 +167,8 @@ std::vector<Pose<S>> fly_through(const FlightProblem<S>& problem, const std::vec
   dynamics::IntegratorOptions recorded = options;
   recorded.record = true;
   recorded.longest_step = std::max(options.longest_step, 0.05);
-  const auto solution = dynamics::integrate<S, 6>(Flying<S>(problem, false),
-                                                  Entry<S, 6>{kFlying, S(0), state_of(problem), S(0)}, S(last), recorded);
+  const auto solution = dynamics::integrate<S, 6>(
+      Flying<S>(problem, false), Entry<S, 6>{kFlying, S(0), state_of(problem), S(0)}, S(last), recorded);
   if (solution.outcome != dynamics::Outcome::horizon)
     throw std::runtime_error(fmt::format("flight: not solved ({})", to_string(solution.outcome)));
   for (const double t : times)

@@ -8,16 +8,18 @@
 
 namespace unhand::flight {
 
-/// A planar flight. With no drag the closed form is used, otherwise the integrator with the landing as an event.
+/// A planar flight. With no drag the closed form is used, otherwise the integrator with the landing as an
+/// event.
 template <class S>
 struct FlightProblem {
-  dynamics::Pose<S> pose;        ///< of the CoM
+  dynamics::Pose<S> pose;  ///< of the CoM
   dynamics::Twist<S> twist;
-  dynamics::Vec2<S> gravity;     ///< m/s²
-  S drag_k{};                    ///< quadratic drag, a = −k |v| v [1/m]
-  S landing_height{};            ///< [m]
-  dynamics::Vec2<S> tracked{};   ///< tracked point from the CoM, in the object's frame [m]: the event is its passage
-  double longest{30};            ///< [s]; a flight that has not landed by then never reaches the height
+  dynamics::Vec2<S> gravity;  ///< m/s²
+  S drag_k{};                 ///< quadratic drag, a = −k |v| v [1/m]
+  S landing_height{};         ///< [m]
+  dynamics::Vec2<S>
+      tracked{};       ///< tracked point from the CoM, in the object's frame [m]: the event is its passage
+  double longest{30};  ///< [s]; a flight that has not landed by then never reaches the height
 };
 
 enum class FlightOutcome { landed, never_reaches, not_solved };
@@ -27,11 +29,11 @@ template <class S>
 struct FlightResult {
   FlightOutcome outcome{};
   dynamics::Outcome integration{dynamics::Outcome::finished};
-  Landing<S> landing;  ///< pose and twist of the tracked point
+  Landing<S> landing;  ///< pose and twist of the tracked point, if it landed
 };
 
-/// Flies to the landing. Throws std::invalid_argument when an input is not finite or drag_k < 0. Instantiated for
-/// double and Dual.
+/// Flies to the landing. Throws std::invalid_argument when an input is not finite or drag_k < 0. Instantiated
+/// for double and Dual.
 template <class S>
 FlightResult<S> fly(const FlightProblem<S>& problem, const dynamics::IntegratorOptions& options = {});
 
