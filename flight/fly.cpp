@@ -33,7 +33,7 @@ const char* to_string(FlightOutcome outcome) {
 
 namespace {
 
-constexpr int kFlying = 0, kLanded = 1;
+constexpr int kBelow = 0, kAbove = 1, kLanded = 2;
 
 template <class T, class S>
 T convert(const S& x) {
@@ -53,7 +53,10 @@ Landing<S> tracked_point(const Landing<S>& com, const Vec2<S>& offset) {
           {com.twist.vx + swing.x, com.twist.vz + swing.z, com.twist.omega}};
 }
 
-/// State: pose and twist of the CoM. One guard: the tracked point passes the landing height downwards.
+/// State: pose and twist of the CoM. Below the landing height the guard is that the tracked point rises
+/// through it, above that it falls through it. With the second alone, a short visit above the height would go
+/// unseen: a guard waits until it is sampled on its safe side, while one that is armed is also searched for
+/// between samples.
 template <class P>
 class Flying final : public dynamics::HybridSystemFrom<Flying<P>, 6> {
  public:
@@ -61,9 +64,13 @@ class Flying final : public dynamics::HybridSystemFrom<Flying<P>, 6> {
   dynamics::FlowKind kind(int mode) const override {
     return mode == kLanded ? dynamics::FlowKind::finished : dynamics::FlowKind::smooth;
   }
-  std::string_view mode_name(int mode) const override { return mode == kLanded ? "landed" : "flying"; }
+  std::string_view mode_name(int mode) const override {
+    return mode == kLanded ? "landed" : mode == kAbove ? "above" : "below";
+  }
   int guard_count(int) const override { return lands_ ? 1 : 0; }
-  dynamics::Guard guard(int, int) const override { return {"landing height", dynamics::Crossing::falling}; }
+  dynamics::Guard guard(int mode, int) const override {
+    return {"landing height", mode == kAbove ? dynamics::Crossing::falling : dynamics::Crossing::rising};
+  }
   /// θ grows linearly, so the error allows steps of several turns: the tracked point's swing must be sampled
   /// finer.
   double max_step(const Phase&, double, const State<double, 6>& y) const override {
@@ -83,8 +90,8 @@ class Flying final : public dynamics::HybridSystemFrom<Flying<P>, 6> {
     g[0] = y[1] + dynamics::rotate(y[2], offset).z - convert<S>(problem_.landing_height);
   }
   template <class S>
-  Entry<S, 6> on_guard_(const Phase&, int, const S& t, const State<S, 6>& y) const {
-    return {kLanded, t, y, S(0)};
+  Entry<S, 6> on_guard_(const Phase& from, int, const S& t, const State<S, 6>& y) const {
+    return {from.mode == kBelow ? kAbove : kLanded, t, y, S(0)};
   }
 
  private:
@@ -139,7 +146,9 @@ FlightResult<S> fly(const FlightProblem<S>& problem, const dynamics::IntegratorO
   dynamics::IntegratorOptions smooth = options;
   smooth.longest_step =
       std::max(options.longest_step, 0.05);  // the guard is a smooth height: no need for fine samples
-  const auto solution = dynamics::integrate<S, 6>(system, Entry<S, 6>{kFlying, S(0), state_of(problem), S(0)},
+  const Pose<S> start = tracked_point(Landing<S>{S(0), problem.pose, problem.twist}, problem.tracked).pose;
+  const int mode = value_of(start.z) < value_of(problem.landing_height) ? kBelow : kAbove;
+  const auto solution = dynamics::integrate<S, 6>(system, Entry<S, 6>{mode, S(0), state_of(problem), S(0)},
                                                   S(problem.longest), smooth);
   const FlightOutcome outcome = solution.outcome == dynamics::Outcome::finished ? FlightOutcome::landed
                                 : solution.outcome == dynamics::Outcome::horizon
@@ -168,7 +177,7 @@ std::vector<Pose<S>> fly_through(const FlightProblem<S>& problem, const std::vec
   recorded.record = true;
   recorded.longest_step = std::max(options.longest_step, 0.05);
   const auto solution = dynamics::integrate<S, 6>(
-      Flying<S>(problem, false), Entry<S, 6>{kFlying, S(0), state_of(problem), S(0)}, S(last), recorded);
+      Flying<S>(problem, false), Entry<S, 6>{kAbove, S(0), state_of(problem), S(0)}, S(last), recorded);
   if (solution.outcome != dynamics::Outcome::horizon)
     throw std::runtime_error(fmt::format("flight: not solved ({})", to_string(solution.outcome)));
   for (const double t : times)
