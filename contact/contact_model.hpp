@@ -96,12 +96,13 @@ Twist<S> object_twist(const Scene<S>& scene, const Relative<S>& y) {
 /// d/dt of the relative state under the wrench `patch` (about the patch, on the object, in the world).
 template <class S>
 State<S, 6> relative_rate(const Scene<S>& scene, const Relative<S>& y, const Wrench<S>& patch) {
-  const Vec2<S> r = lever(scene, y);
+  using std::cos; using std::sin;
+  const S angle = scene.hand.theta + y.angle, c = cos(angle), s = sin(angle);
+  const Vec2<S> r{c * y.arm.x - s * y.arm.z, s * y.arm.x + c * y.arm.z};
   const S omega = scene.hand_twist.omega + y.spin;
   const Acceleration<S> com = dynamics::acceleration_under(scene.body, patch, r, scene.gravity);
   const Acceleration<S> point = dynamics::acceleration_at_patch(com, omega, r);
-  const Vec2<S> arm_rate = dynamics::rotate(S(-(scene.hand.theta + y.angle)), y.slip);
-  return {arm_rate.x, arm_rate.z, y.spin,
+  return {c * y.slip.x + s * y.slip.z, c * y.slip.z - s * y.slip.x, y.spin,
           point.ax - scene.hand_acceleration.ax + omega * y.slip.z,
           point.az - scene.hand_acceleration.az - omega * y.slip.x, com.alpha - scene.hand_acceleration.alpha};
 }

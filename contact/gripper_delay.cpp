@@ -49,11 +49,10 @@ std::vector<double> DelayDistribution::quantiles(int n) const {
 }
 
 double DelayDistribution::mean() const {
-  constexpr int kNodes = 200;
-  const std::vector<double> nodes = quantiles(kNodes);
-  double sum = 0;
-  for (const double x : nodes) sum += x;
-  return sum / static_cast<double>(nodes.size());
+  if (kind != Kind::truncated_normal) return centre;
+  const double a = (0 - centre) / spread, b = (longest - centre) / spread;
+  const auto density = [](double x) { return std::exp(-0.5 * x * x) / std::sqrt(2 * M_PI); };
+  return centre + spread * (density(a) - density(b)) / (normal_probability(b) - normal_probability(a));
 }
 
 GripperDelay::GripperDelay(double open_command, const Dual& delay) : open_command_(open_command), delay_(delay) {

@@ -12,9 +12,9 @@ using std::sqrt;
 
 namespace {
 
-/// Time after the onset of slip [s] at which the stiff flow takes over from its leading term. The slip is then of the
-/// order 1e-9 m/s, below the integrator's tolerance, and so is the term left out.
-constexpr double kOnset = 1e-6;
+/// Time after the onset of slip [s] at which the flow takes over from its leading term; the slip is then of the order of
+/// 1e-7 m/s and the term left out 1e-5 of it or less.
+constexpr double kOnset = 5e-6;
 
 /// Normalised wrench w to f [N, N, N m]: f = f_max (w_x, w_z, L w_τ).
 template <class S>
@@ -62,8 +62,8 @@ const Patch<S>& LimitSurface<Shape>::patch() const {
 template <class Shape>
 dynamics::Guard LimitSurface<Shape>::guard(int mode, int) const {
   using dynamics::Crossing;
-  return mode == kStick ? dynamics::Guard{"limit surface", Crossing::rising}
-                        : dynamics::Guard{"slip stops", Crossing::falling};
+  return mode == kStick ? dynamics::Guard{"limit surface", Crossing::rising, false}
+                        : dynamics::Guard{"slip stops", Crossing::falling, true};
 }
 
 /// u = (v_r, L ω_r), turned into the hand's frame for shapes that have directions of their own.
@@ -146,13 +146,13 @@ Vec3<double> minimise(const Shape& shape, const Scene<double>& scene, const std:
     for (int halving = 0; halving < 40; ++halving, length *= 0.5) {
       for (int i = 0; i < 3; ++i) next[i] = a[i] + length * step[i];
       next_value = phi(next);
-      if (next_value <= value + 1e-4 * length * slope) break;
+      if (next_value <= value + 1e-4 * length * slope + 1e-14 * std::abs(value)) break;
     }
-    const double moved = length * step.norm(), size = std::sqrt(dot3(a, a));
+    const double moved = length * step.norm(), size = std::sqrt(dot3(next, next));
     if (!(next_value < value) && length < 1) break;
     a = next;
     value = next_value;
-    if (moved <= 1e-14 * size) break;
+    if (moved <= 1e-8 * size) break;  // converging quadratically: what is left is of relative size 1e-16
   }
   return a;
 }
@@ -240,19 +240,10 @@ void LimitSurface<Shape>::guards_(const Phase& phase, const SceneSource& source,
   }
 }
 
-template <class Shape>
-double LimitSurface<Shape>::max_step(const Phase& phase, const SceneSource& source, double t,
-                                     const Relative<double>& y) const {
-  if (phase.mode == kStick) return std::numeric_limits<double>::infinity();
-  State<double, 6> dy;
-  rate_(phase.mode, source.scene(phase.window, t), y, dy);
-  const Vec3<double> u = normalised_slip(y), du{dy[3], dy[4], patch<double>().length() * dy[5]};
-  const double speed = std::sqrt(dot3(u, u));
-  return longest_step_to_stop(speed, dot3(u, du) / speed);
-}
-
-/// Slip from rest at t. The slip after δ is the integral of the frozen-pose acceleration a(s) = W (f* − f_p)(s), by
-/// Simpson's rule; a(0) = 0 where f_p has just reached the surface.
+/// Slip from rest at t. While |u| is tiny its direction is slaved: it relaxes within |u|/(W f_max), microseconds or less,
+/// to the n(t) of the quasi-static acceleration a(t) = W (f* − f_p)(t) = |a| n, so u(δ) = n(δ) ∫ |a| dt (Simpson's rule;
+/// a = 0 at the start where f_p has just reached the surface). What is left out is of relative size |u|/(W f_max T), T the
+/// time scale of the hand and the gripper.
 template <class Shape>
 template <class S>
 Entry<S, 6> LimitSurface<Shape>::onset(const Window& window, const SceneSource& source, const S& t,
@@ -265,13 +256,17 @@ Entry<S, 6> LimitSurface<Shape>::onset(const Window& window, const SceneSource& 
   const auto acceleration = [&](double after) {
     return slip_acceleration(source.scene(window, S(t + after)), y);
   };
-  const Vec3<S> a0 = at_the_surface ? Vec3<S>{S(0), S(0), S(0)} : acceleration(0), a1 = acceleration(0.5 * delta),
-                a2 = acceleration(delta);
-  Vec3<S> u;
-  for (int i = 0; i < 3; ++i) u[i] = delta / 6 * (a0[i] + 4.0 * a1[i] + a2[i]);
-  if (!(value_of(dot3(u, u)) > 0)) return {kStick, t, y.state(), S(0)};  // a demand that only touches the surface
-  y.slip = {u[0], u[1]};
-  y.spin = u[2] / patch<S>().length();
+  const auto size = [](const Vec3<S>& a) {
+    const S square = dot3(a, a);
+    return value_of(square) > 0 ? S(sqrt(square)) : S(0);
+  };
+  const S a0 = at_the_surface ? S(0) : size(acceleration(0)), a1 = size(acceleration(0.5 * delta));
+  const Vec3<S> end = acceleration(delta);
+  const S a2 = size(end), speed = delta / 6 * (a0 + 4.0 * a1 + a2);
+  if (!(value_of(a2) > 0)) return {kStick, t, y.state(), S(0)};  // a demand that only touches the surface
+  const S k = speed / a2;
+  y.slip = {k * end[0], k * end[1]};
+  y.spin = k * end[2] / patch<S>().length();
   return {kSlip, S(t + delta), y.state(), S(delta)};
 }
 

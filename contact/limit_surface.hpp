@@ -44,7 +44,6 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
   int guard_count(int) const override { return 1; }
   dynamics::Guard guard(int mode, int) const override;
   double spin_length() const override { return patch_double_.length(); }
-  double max_step(const Phase&, const SceneSource&, double t, const Relative<double>&) const override;
 
   template <class S>
   Wrench<S> wrench_(int mode, const Scene<S>&, const Relative<S>&) const;

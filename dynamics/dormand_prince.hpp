@@ -10,6 +10,7 @@ namespace unhand::dynamics {
 template <class S, int N>
 class DormandPrince final : public SingleStep<DormandPrince<S, N>, S, N> {
  public:
+  static constexpr bool kPredictive = false;
   static constexpr double kOrder = 5;
   using SingleStep<DormandPrince<S, N>, S, N>::SingleStep;
 

@@ -36,6 +36,7 @@ enum class Crossing { rising, falling };
 struct Guard {
   std::string_view name;
   Crossing crossing{};
+  bool monotone{false};  ///< passes zero at most once in a step, however long: sampled at the ends of steps only
 };
 
 /// A mode inside a window of smooth data.

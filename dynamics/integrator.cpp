@@ -172,7 +172,12 @@ class Run {
     phase_ = {entry.mode, window_};
     guards_ = system_.guard_count(entry.mode);
     if (guards_ > kMaxGuards) throw std::logic_error("integrate: a mode has too many guards");
-    for (int i = 0; i < guards_; ++i) sign_[i] = system_.guard(entry.mode, i).crossing == Crossing::rising ? 1 : -1;
+    monotone_ = true;
+    for (int i = 0; i < guards_; ++i) {
+      const Guard guard = system_.guard(entry.mode, i);
+      sign_[i] = guard.crossing == Crossing::rising ? 1 : -1;
+      monotone_ = monotone_ && guard.monotone;
+    }
 
     if (!(value_of(window_end()) - value_of(entry.t) > shortest_step(value_of(entry.t))))
       return leave_window(entry.mode, entry.y);
@@ -206,7 +211,7 @@ class Run {
   }
 
   double longest_step(const Stepper<S, N>& stepper) const {
-    if (system_.kind(phase_.mode) == FlowKind::frozen) return options_.longest_step;
+    if (system_.kind(phase_.mode) == FlowKind::frozen || system_.is_paced(phase_.mode)) return options_.longest_step;
     State<double, N> y;
     for (int i = 0; i < N; ++i) y[i] = value_of(stepper.y1()[i]);
     const double bound = system_.max_step(phase_, value_of(stepper.t1()), y);
@@ -327,9 +332,13 @@ class Run {
   bool find_first_root(Stepper<S, N>& stepper, Bracket& first) {
     double G[4][kMaxGuards];
     std::copy_n(start_, guards_, G[0]);
-    for (int node = 1; node <= 3; ++node)
-      if (!sample(stepper, kNode[node], G[node])) return false;
+    if (!sample(stepper, 1, G[3])) return false;
+    bool quiet = monotone_;
+    for (int i = 0; i < guards_; ++i) quiet = quiet && armed_[i] && !hidden_[i] && G[3][i] < 0;
     std::copy_n(G[3], guards_, start_);
+    if (quiet) return true;
+    for (int node = 1; node <= 2; ++node)
+      if (!sample(stepper, kNode[node], G[node])) return false;
 
     double earliest = 2;
     bool armed_before[kMaxGuards];
@@ -677,6 +686,7 @@ class Run {
   Window window_;
   Phase phase_;
   int guards_{};
+  bool monotone_{};
   double sign_[kMaxGuards]{}, start_[kMaxGuards]{};
   bool armed_[kMaxGuards]{}, hidden_[kMaxGuards]{};  // hidden: began at zero, no node has told where it went
   int fired_{-1};                                    // the guard whose transition led to this phase

@@ -16,6 +16,7 @@ namespace unhand::dynamics {
 template <int N>
 class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
  public:
+  static constexpr bool kPredictive = true;
   static constexpr double kOrder = 5;
   using SingleStep<Rosenbrock<N>, double, N>::SingleStep;
 

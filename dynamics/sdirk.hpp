@@ -15,6 +15,7 @@ namespace unhand::dynamics {
 template <class S, int N>
 class Sdirk final : public SingleStep<Sdirk<S, N>, S, N> {
  public:
+  static constexpr bool kPredictive = true;
   static constexpr double kOrder = 4;
   using SingleStep<Sdirk<S, N>, S, N>::SingleStep;
 

@@ -81,6 +81,7 @@ inline double step_factor(double error, double order) {
 /// The error-controlled step of a single-step method. Derived supplies
 ///   double attempt(const S& h)   takes y0_ at t0_ to y1_ and returns the error norm (NaN if not finite),
 ///   kOrder                       the exponent's order,
+///   kPredictive                  whether the controller looks at two steps,
 ///   void prepare(bool retry)     what a new start point needs (once a step).
 template <class Derived, class S, int N>
 class SingleStep : public Stepper<S, N> {
@@ -99,7 +100,8 @@ class SingleStep : public Stepper<S, N> {
     this->t0_ = this->t1_;
     this->y0_ = this->y1_;
     self().prepare(fresh_);
-    if (fresh_ && !(h_next_ > 0)) h_next_ = self().guess();
+    if (fresh_ && (Derived::kPredictive || !(h_next_ > 0))) h_next_ = self().guess();
+    if (fresh_) error_before_ = 0;
     fresh_ = false;
     const double t = value_of(this->t0_);
     const double left = value_of(limit) - t;
@@ -112,8 +114,18 @@ class SingleStep : public Stepper<S, N> {
       const double error = self().attempt(length);
       if (error <= 1.0) {
         this->t1_ = last ? limit : S(this->t0_ + length);
-        const double factor = step_factor(error, Derived::kOrder);
         const double taken = value_of(length);
+        double factor = step_factor(error, Derived::kOrder);
+        if (Derived::kPredictive) {
+          // Gustafsson's predictive controller ([HairerWanner1996] IV.8): what the last step's error grew by, the next
+          // one's will too; without it a flow that quickens steadily has every other step rejected.
+          if (error_before_ > 0)
+            factor = std::min(factor, taken / taken_before_ *
+                                          std::pow(error_before_, 1 / Derived::kOrder) * step_factor(error * error, Derived::kOrder));
+          factor = std::max(factor, 0.2);
+          error_before_ = std::max(error, 1e-3);
+          taken_before_ = taken;
+        }
         const double next = taken * (rejected ? std::min(factor, 1.0) : factor);
         // A step cut short by a limit says nothing against the length that was meant.
         h_next_ = !rejected && (last || h >= longest) ? std::max(next, h_next_) : next;
@@ -153,6 +165,7 @@ class SingleStep : public Stepper<S, N> {
   Phase phase_;
   Tolerances tolerances_;
   double h_next_{};
+  double error_before_{}, taken_before_{};
   bool fresh_{true};
 
  private:

@@ -57,7 +57,7 @@ std::unique_ptr<contact::ContactModel> contact_model_for(const PreparedThrow& th
 }
 
 release::ReleaseProblem<double> release_problem(const PreparedThrow& throw_, const contact::ContactModel& contact) {
-  return {throw_.hand, force_of(throw_), contact, throw_.body, throw_.gravity, throw_.grasp, throw_.start};
+  return {throw_.hand, force_of(throw_), contact, throw_.body, throw_.gravity, throw_.grasp, throw_.start, {}, 0};
 }
 
 Prediction predict(const PreparedThrow& throw_, const std::string& model, const ModelParameters& parameters,

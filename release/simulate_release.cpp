@@ -187,7 +187,7 @@ ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const Releas
   validate(problem);
   const ReleaseSystem<S> system(problem);
   const auto& [offset, angle] = problem.grasp;
-  const Relative<S> held{{offset, S(0)}, angle, {S(0), S(0)}, S(0)};
+  const Relative<S> held{{offset, S(0)}, angle, problem.slip, problem.spin};
   std::vector<double> times;
   system.time_events(times);
   const auto next = std::upper_bound(times.begin(), times.end(), problem.start);

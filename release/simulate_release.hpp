@@ -11,7 +11,8 @@
 
 namespace unhand::release {
 
-/// Everything that determines a release. The references must outlive the simulation.
+/// Everything that determines a release. The references must outlive the simulation. A held object starts in the mode
+/// that its grip allows; one that slips already starts slipping.
 template <class S>
 struct ReleaseProblem {
   const HandMotion& hand;
@@ -20,7 +21,9 @@ struct ReleaseProblem {
   dynamics::RigidBody<S> body;
   dynamics::Vec2<S> gravity;  ///< m/s²
   Grasp<S> grasp;
-  double start{};  ///< [s]; at rest in the hand
+  double start{};  ///< [s]
+  dynamics::Vec2<S> slip{};  ///< of the patch at the start [m/s]; zero: held
+  S spin{};                  ///< ω_O − ω_H at the start [rad/s]
 };
 
 enum class ReleaseOutcome {
