@@ -90,7 +90,7 @@ class PlanarArmHand final : public release::HandMotion {
 /// the arm brakes at a constant s'' and comes to rest at `end`. So the acceleration jumps twice: at
 /// `switch_time` and at `follow_through`.
 struct ThrowMotion {
-  double begin{-0.05}, switch_time{0.045}, follow_through{0.16}, end{0.30};  ///< [s], increasing
+  double begin{-0.05}, switch_time{0.020}, follow_through{0.16}, end{0.30};  ///< [s], increasing
   dynamics::Pose<double> pose;    ///< of the hand at the switch; m, m, rad
   dynamics::Twist<double> twist;  ///< the same, v ≠ 0; m/s, m/s, rad/s
   double before{}, after{};       ///< a up to the switch and from it on [m/s²]

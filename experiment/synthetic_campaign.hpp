@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <numbers>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -60,10 +61,10 @@ struct SensorSuite {
   double hand_sigma{1e-6};                                 ///< pose, twist and acceleration, SI units
   std::array<double, 3> wrench_sigma{0.02, 0.02, 2e-4};    ///< N, N, N m
   double normal_force_sigma{0.05};                         ///< [N]
-  std::array<double, 3> mocap_sigma{2e-4, 2e-4, 0.2 * 0.017453292519943295};  ///< m, m, rad
+  std::array<double, 3> mocap_sigma{2e-4, 2e-4, 0.2 * std::numbers::pi / 180};  ///< m, m, rad
   double mocap_dropout{0.005};  ///< share of samples lost, in [0, 1)
-  std::array<double, 2> landing_sigma{1e-3, 0.5 * 0.017453292519943295};  ///< m, rad
-  double landing_time_sigma{1e-3};                                        ///< [s]
+  std::array<double, 2> landing_sigma{1e-3, 0.5 * std::numbers::pi / 180};  ///< m, rad
+  double landing_time_sigma{1e-3};                                          ///< [s]
 
   /// The same rates without noise and without dropouts.
   SensorSuite perfect() const;
@@ -83,21 +84,21 @@ struct CampaignDesign {
   int repetitions{5};
 
   PlanarArm arm;
-  double begin{-0.05}, switch_time{0.045}, follow_through{0.16}, end{0.30};  ///< of the hand's motion [s]
-  double launch_acceleration{8.0};  ///< of the hand along its path before the switch [m/s²]
+  double begin{-0.05}, switch_time{0.020}, follow_through{0.16}, end{0.30};  ///< of the hand's motion [s]
+  double launch_acceleration{3.0};  ///< of the hand along its path before the switch [m/s²]
 
-  contact::Patch<double> patch{0.6, 0.0106};  ///< mu is the campaign's mean
+  contact::Patch<double> patch{0.5, 0.0106};  ///< mu is the campaign's mean
   /// f₀ of one pad [N], dead and opening time [s] are the campaign's means; `open_command` [s] holds for all
   /// throws.
-  contact::OpeningProfile<double> opening{0.05, 50.0, 0.012, 0.045, 1.1};
-  double grasp_angle{-0.85};                        ///< θ_O − θ_H [rad]
+  contact::OpeningProfile<double> opening{0.025, 60.0, 0.010, 0.070, 2.0};
+  double grasp_angle{-0.7};                         ///< θ_O − θ_H [rad]
   std::string contact_model{"limit_surface_disc"};  ///< a name that contact::make_contact_model knows
   ContactFactory contact_factory;                   ///< takes the place of `contact_model` if set
 
   double gravity{9.81};        ///< [m/s²]
   double landing_height{0.0};  ///< [m]
-  double train_share{
-      0.5};  ///< share of each object's conditions in the training split, whole conditions at a time
+  /// Share of each object's conditions that goes into the training split, whole conditions at a time.
+  double train_share{0.5};
   ThrowVariation variation;
   SensorSuite sensors;
 
@@ -137,9 +138,9 @@ struct SyntheticThrow {
 /// (splitmix64) and normal distribution (Box-Muller) are this library's own, hence the same with every
 /// standard library; only the last bits of log, sin and cos are the mathematics library's.
 ///
-/// Throws std::runtime_error, naming the throw and its parameters, if it fails: the arm cannot follow, the
-/// object slips before the gripper opens, never separates, or never lands. std::out_of_range for an index
-/// outside the design.
+/// Throws std::runtime_error, naming the throw and its parameters, if it fails: the arm cannot reach,
+/// the grip does not hold the object at the start, it never separates, or it never lands. std::out_of_range
+/// for an index outside the design.
 SyntheticThrow generate_throw(const CampaignDesign& design, std::uint64_t seed, int index);
 
 /// The log without its throws.
