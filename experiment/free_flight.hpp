@@ -25,33 +25,36 @@ const char* to_string(FreeFlightOutcome);
 /// Two for the first half: the fewest that fix a position and a velocity.
 inline constexpr std::size_t kFewestFlightSamples = 4;
 
-/// The start of a flight, fitted to its first samples, and what it says of all of them. Planar flights lie in the plane
-/// y = 0 and turn about −y: their θ runs from +x to +z.
+/// The start of a flight, fitted to its first samples, and what it says of all of them. Planar flights lie in
+/// the plane y = 0 and turn about −y: their θ runs from +x to +z.
 struct FreeFlightFit {
   FreeFlightOutcome outcome{};
-  std::string reason;             ///< why it was not fitted, in words
-  std::vector<double> times;      ///< of the valid samples of the flight [s]
-  std::size_t fitted{};           ///< the first so many were fitted
-  bool oriented{};                ///< the orientation was tracked
+  std::string reason;                           ///< why it was not fitted, in words
+  std::vector<double> times;                    ///< of the valid samples of the flight [s]
+  std::size_t fitted{};                         ///< the first so many were fitted
+  bool oriented{};                              ///< the orientation was tracked
   flight::Vec3<double> position{}, velocity{};  ///< at times.front() [m, m/s]
   flight::RotationState<double> rotation;       ///< at times.front(), if oriented
   double theta{};                               ///< planar: the same angle, unwrapped [rad]
-  /// Of (position, velocity) [m, m/s] and of (rotation vector in the body, ω) [rad, rad/s], from the declared sigma or,
-  /// where none is declared, from the scatter of the residuals. Zero in the directions that a planar flight lacks.
+  /// Of (position, velocity) [m, m/s] and of (rotation vector in the body, ω) [rad, rad/s], from the declared
+  /// sigma or, where none is declared, from the scatter of the residuals. Zero in the directions that a
+  /// planar flight lacks.
   Eigen::Matrix<double, 6, 6> translation_covariance = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 6> rotation_covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  /// Σ (residual/sigma)² over the fitted samples and its degrees of freedom; no chi2 without a declared sigma.
+  /// Σ (residual/sigma)² over the fitted samples and its degrees of freedom; no chi2 without a declared
+  /// sigma.
   std::optional<double> translation_chi2, rotation_chi2;
   int translation_dof{}, rotation_dof{};
   std::vector<flight::Vec3<double>> position_residuals;     ///< measured − predicted, every sample [m]
   std::vector<flight::Vec3<double>> orientation_residuals;  ///< from predicted to measured, in the body [rad]
 };
 
-/// Fits the start on the first `fraction` of the samples by least squares weighted with the declared sigma, with the
-/// model "projectile": declared gravity straight down, the object's declared drag_k if it has one, torque-free rotation
-/// with its declared inertia (without one, a spherical body's), and the tracked frame taken for the centre of mass.
-/// Used are the valid samples within `free_flight`, or all valid ones. A quaternion's sigma stands for an angle of
-/// twice that much. Throws std::invalid_argument when `fraction` is not in (0, 1].
+/// Fits the start on the first `fraction` of the samples by least squares weighted with the declared sigma,
+/// with the model "projectile": declared gravity straight down, the object's declared drag_k if it has one,
+/// torque-free rotation with its declared inertia (without one, a spherical body's), and the tracked frame
+/// taken for the centre of mass. Used are the valid samples within `free_flight`, or all valid ones. A
+/// quaternion's sigma stands for an angle of twice that much. Throws std::invalid_argument when `fraction` is
+/// not in (0, 1].
 FreeFlightFit fit_free_flight(const datasets::ThrowLog& log, const datasets::Throw& one, double fraction);
 
 /// A model of free flight, by name.
@@ -63,17 +66,19 @@ std::span<const FlightModel> flight_models();
 /// Throws std::invalid_argument that lists the names there are.
 const FlightModel& flight_model(std::string_view name);
 
-/// One throw through one model. `whole` is what is left when the start is fitted on every sample: it shows what the
-/// model lacks. `half` has the start fitted on the first half: its last residual is the error of a prediction.
+/// One throw through one model. `whole` is what is left when the start is fitted on every sample: it shows
+/// what the model lacks. `half` has the start fitted on the first half: its last residual is the error of a
+/// prediction.
 struct FreeFlightErrors {
   std::string id;
   datasets::Split split{};
   FreeFlightOutcome outcome{};
   std::string reason;
-  std::vector<double> normalised_time;  ///< 0 at the first sample, 1 at the last: for figures, beside the residuals
+  std::vector<double>
+      normalised_time;  ///< 0 at the first sample, 1 at the last: for figures, beside the residuals
   FreeFlightFit whole, half;
-  double trajectory_rms{};                 ///< root mean square distance over the flight, of `whole` [m]
-  double end_position_error{};             ///< distance at the last sample, of `half` [m]
+  double trajectory_rms{};                      ///< root mean square distance over the flight, of `whole` [m]
+  double end_position_error{};                  ///< distance at the last sample, of `half` [m]
   std::optional<double> end_orientation_error;  ///< angle at the last sample, of `half` [rad]
 };
 FreeFlightErrors free_flight_errors(const FlightModel& model, const datasets::ThrowLog& log,
@@ -86,8 +91,8 @@ struct Spread {
 };
 
 struct FreeFlightStatistics {
-  std::size_t n{};              ///< throws
-  double trajectory_rms_m{};    ///< pooled over their samples
+  std::size_t n{};                                         ///< throws
+  double trajectory_rms_m{};                               ///< pooled over their samples
   Spread end_position_error_m, end_orientation_error_deg;  ///< the latter over the throws with orientation
 };
 
@@ -99,8 +104,8 @@ struct FreeFlightComparison {
   std::vector<FreeFlightErrors> each;  ///< in the order of the log
 };
 
-/// Every throw of the log through each named model. The answer (but for the time it took) is the same for any number of
-/// threads >= 1. Throws std::invalid_argument for a name that is unknown or threads < 1.
+/// Every throw of the log through each named model. The answer (but for the time it took) is the same for any
+/// number of threads >= 1. Throws std::invalid_argument for a name that is unknown or threads < 1.
 std::vector<FreeFlightComparison> compare_free_flights(const datasets::ThrowLog& log,
                                                        std::span<const std::string> models, int threads = 1);
 

@@ -1,0 +1,462 @@
+#include "experiment/free_flight.hpp"
+
+#include <fmt/core.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <future>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+
+#include "flight/point_flight.hpp"
+
+namespace unhand::experiment {
+
+using datasets::MocapLog;
+using datasets::Object;
+using datasets::Throw;
+using datasets::ThrowLog;
+using dynamics::Dual;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using flight::Quaternion;
+using flight::RotationState;
+using flight::Vec3;
+
+const char* to_string(FreeFlightOutcome outcome) {
+  switch (outcome) {
+    case FreeFlightOutcome::fitted:
+      return "fitted";
+    case FreeFlightOutcome::no_tracking:
+      return "no_tracking";
+    case FreeFlightOutcome::not_free:
+      return "not_free";
+    case FreeFlightOutcome::too_short:
+      return "too_short";
+    case FreeFlightOutcome::not_solved:
+      return "not_solved";
+  }
+  return "unknown";
+}
+
+namespace {
+
+/// The valid samples of a flight, times from the first.
+struct Samples {
+  std::vector<double> elapsed;
+  std::vector<Vec3<double>> position;
+  std::vector<Quaternion<double>> attitude;  // spatial
+  std::vector<double> theta;                 // planar
+  std::vector<int> axes;                     // of the world, that were measured
+  Vec3<double> sigma{1, 1, 1};               // [m], or ones
+  double sigma_angle{1};                     // [rad], or one
+  bool declared{};
+};
+
+void read_sigma(const datasets::Series& pose, Samples& out) {
+  const std::vector<double>& s = pose.sigma;
+  out.declared = s.size() == pose.cols && std::all_of(s.begin(), s.end(), [](double x) { return x > 0; });
+  if (!out.declared) return;
+  const std::size_t n = out.axes.size();
+  for (std::size_t j = 0; j < n; ++j) out.sigma[static_cast<std::size_t>(out.axes[j])] = s[j];
+  if (pose.cols == 7) {
+    double squares = 0;
+    for (std::size_t j = 3; j < 7; ++j) squares += s[j] * s[j];
+    out.sigma_angle = 2 * std::sqrt(squares / 4);  // a rotation by θ moves a quaternion by θ/2
+  } else if (n == 2) {
+    out.sigma_angle = s[2];
+  }
+}
+
+Samples read_samples(const ThrowLog& log, const Throw& one, std::vector<double>& times) {
+  const MocapLog& mocap = *one.mocap;
+  const bool planar = log.dimension == 2;
+  const double infinity = std::numeric_limits<double>::infinity();
+  const auto [begin, end] = one.free_flight.value_or(std::pair{-infinity, infinity});
+  Samples out;
+  out.axes = planar ? std::vector<int>{0, 2} : std::vector<int>{0, 1, 2};
+  read_sigma(mocap.pose, out);
+  for (std::size_t i = 0; i < mocap.time.rows; ++i) {
+    const double t = mocap.time(i);
+    if (!mocap.is_valid(i) || t < begin - 1e-9 || t > end + 1e-9)
+      continue;  // the bounds are sample times themselves
+    const auto p = [&](std::size_t j) { return mocap.pose(i, j); };
+    times.push_back(t);
+    out.elapsed.push_back(t - times.front());
+    if (planar) {
+      out.position.push_back({p(0), 0, p(1)});
+      out.theta.push_back(p(2));
+    } else {
+      out.position.push_back({p(0), p(1), p(2)});
+      if (mocap.pose.cols == 7)
+        out.attitude.push_back(flight::normalised(Quaternion<double>{p(3), p(4), p(5), p(6)}));
+    }
+  }
+  return out;
+}
+
+/// Minimises |r(x)|² by Gauss-Newton with halved steps. evaluate(x, r, J) gives the weighted residual and its
+/// Jacobian with respect to d in move(x, d) at d = 0; `sigma` is the weights' scale, by which r is good to
+/// kSolved/sigma. False if it does not converge. `covariance` becomes (JᵀJ)⁻¹.
+template <class State, class Evaluate, class Move>
+bool gauss_newton(State& x, const Evaluate& evaluate, const Move& move, double sigma, MatrixXd& covariance) {
+  constexpr int kSteps = 40, kHalvings = 12;
+  constexpr double kSolved = 1e-9;  // [m] or [rad]: what the integrator leaves of a state
+  VectorXd r;
+  MatrixXd J;
+  evaluate(x, r, J);
+  for (int step = 0; step < kSteps; ++step) {
+    const Eigen::ColPivHouseholderQR<MatrixXd> qr(J);
+    if (qr.rank() < J.cols()) return false;
+    const VectorXd d = qr.solve(-r);
+    const double cost = r.squaredNorm(), predicted = (J * d).squaredNorm();
+    if (!std::isfinite(predicted)) return false;
+    const double floor = static_cast<double>(r.size()) * (kSolved / sigma) * (kSolved / sigma);
+    if (predicted <= 1e-12 * cost + 1e-2 * floor) {  // a millionth of the scatter
+      x = move(x, d);
+    } else {
+      double k = 1;
+      VectorXd moved_r;
+      MatrixXd moved_J;
+      State moved = x;
+      int halving = 0;
+      for (; halving < kHalvings; ++halving, k *= 0.5) {
+        moved = move(x, VectorXd(k * d));
+        evaluate(moved, moved_r, moved_J);
+        if (moved_r.squaredNorm() < cost) break;
+      }
+      if (halving < kHalvings) {
+        x = moved;
+        r = moved_r;
+        J = moved_J;
+        continue;
+      }
+      if (predicted > 1e-8 * cost + 1e2 * floor) return false;  // not a minimum that rounding hides
+    }
+    covariance = (J.transpose() * J).inverse();
+    return true;
+  }
+  return false;
+}
+
+void place(const MatrixXd& covariance, const std::vector<int>& axes, Eigen::Matrix<double, 6, 6>& out) {
+  const int n = static_cast<int>(axes.size());
+  for (int a = 0; a < 2 * n; ++a)
+    for (int b = 0; b < 2 * n; ++b)
+      out(axes[a % n] + 3 * (a / n), axes[b % n] + 3 * (b / n)) = covariance(a, b);
+}
+
+/// p + v t fitted to y: closed form, about the mean time. Weights are equal, sigma only scales the
+/// covariance.
+struct Line {
+  double p{}, v{};
+  Eigen::Matrix2d covariance;
+};
+Line fit_line(std::span<const double> t, std::span<const double> y, double sigma) {
+  const auto n = static_cast<double>(t.size());
+  double t_mean = 0, y_mean = 0, tt = 0, ty = 0;
+  for (std::size_t i = 0; i < t.size(); ++i) t_mean += t[i] / n, y_mean += y[i] / n;
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    tt += (t[i] - t_mean) * (t[i] - t_mean);
+    ty += (t[i] - t_mean) * (y[i] - y_mean);
+  }
+  Line line;
+  line.v = ty / tt;
+  line.p = y_mean - line.v * t_mean;
+  line.covariance << 1 / n + t_mean * t_mean / tt, -t_mean / tt, -t_mean / tt, 1 / tt;
+  line.covariance *= sigma * sigma;
+  return line;
+}
+
+const dynamics::IntegratorOptions kFine = [] {
+  dynamics::IntegratorOptions options;
+  options.tolerances = {1e-10, 1e-12};  // far below any tracker
+  return options;
+}();
+
+/// The flight of the CoM. With drag the closed form without it is where Gauss-Newton begins.
+bool fit_translation(const Samples& s, const Vec3<double>& gravity, double drag_k, std::size_t n,
+                     FreeFlightFit& fit) {
+  const std::vector<double> fitted(s.elapsed.begin(), s.elapsed.begin() + static_cast<long>(n));
+  for (const int a : s.axes) {
+    std::vector<double> y(n);
+    for (std::size_t i = 0; i < n; ++i) y[i] = s.position[i][a] - 0.5 * gravity[a] * fitted[i] * fitted[i];
+    const Line line = fit_line(fitted, y, s.sigma[a]);
+    fit.position[a] = line.p;
+    fit.velocity[a] = line.v;
+    for (const int i : {0, 1})
+      for (const int j : {0, 1}) fit.translation_covariance(a + 3 * i, a + 3 * j) = line.covariance(i, j);
+  }
+  if (drag_k > 0) {
+    struct Start {
+      Vec3<double> p, v;
+    };
+    const int axes = static_cast<int>(s.axes.size());
+    const auto evaluate = [&](const Start& x, VectorXd& r, MatrixXd& J) {
+      flight::PointFlight<Dual> flight;
+      for (int a = 0; a < 3; ++a)
+        flight.position[a] = Dual(x.p[a]), flight.velocity[a] = Dual(x.v[a]),
+        flight.gravity[a] = Dual(gravity[a]);
+      flight.drag_k = Dual(drag_k);
+      for (int j = 0; j < axes; ++j) {
+        const int a = s.axes[j];
+        flight.position[a] = dynamics::independent(x.p[a], j);
+        flight.velocity[a] = dynamics::independent(x.v[a], axes + j);
+      }
+      const auto predicted = flight::positions(flight, fitted, kFine);
+      r.resize(static_cast<long>(n) * axes);
+      J.resize(r.size(), 2 * axes);
+      for (std::size_t i = 0; i < n; ++i)
+        for (int j = 0; j < axes; ++j) {
+          const int a = s.axes[j];
+          const long row = static_cast<long>(i) * axes + j;
+          r[row] = (predicted[i][a].a - s.position[i][a]) / s.sigma[a];
+          J.row(row) = predicted[i][a].v.head(2 * axes).transpose() / s.sigma[a];
+        }
+    };
+    const auto move = [&](Start x, const VectorXd& d) {
+      for (int j = 0; j < axes; ++j) x.p[s.axes[j]] += d[j], x.v[s.axes[j]] += d[axes + j];
+      return x;
+    };
+    Start x{fit.position, fit.velocity};
+    MatrixXd covariance;
+    if (!gauss_newton(x, evaluate, move, *std::min_element(s.sigma.begin(), s.sigma.end()), covariance))
+      return false;
+    fit.position = x.p;
+    fit.velocity = x.v;
+    place(covariance, s.axes, fit.translation_covariance);
+  }
+  const auto predicted = flight::positions(
+      flight::PointFlight<double>{fit.position, fit.velocity, gravity, drag_k}, s.elapsed, kFine);
+  for (std::size_t i = 0; i < s.elapsed.size(); ++i)
+    fit.position_residuals.push_back(flight::difference(s.position[i], predicted[i]));
+  return true;
+}
+
+/// Torque-free rotation in space. The window grows from the first few samples: however many turns the flight
+/// has, the start is good to a fraction of one by then.
+bool fit_rotation(const Samples& s, const Vec3<double>& inertia, std::size_t n, FreeFlightFit& fit) {
+  const Vec3<Dual> inertia_dual{Dual(inertia[0]), Dual(inertia[1]), Dual(inertia[2])};
+  RotationState<double> x{s.attitude[0], flight::rotation_between(s.attitude[0], s.attitude[1])};
+  for (double& w : x.omega) w /= s.elapsed[1];
+  std::vector<double> window;
+  const auto evaluate = [&](const RotationState<double>& state, VectorXd& r, MatrixXd& J) {
+    const Quaternion<double>& q = state.attitude;
+    const Vec3<Dual> turn{dynamics::independent(0, 0), dynamics::independent(0, 1),
+                          dynamics::independent(0, 2)};
+    const Vec3<Dual> omega{dynamics::independent(state.omega[0], 3), dynamics::independent(state.omega[1], 4),
+                           dynamics::independent(state.omega[2], 5)};
+    const RotationState<Dual> start{
+        Quaternion<Dual>{Dual(q.w), Dual(q.x), Dual(q.y), Dual(q.z)} * flight::exp(turn), omega};
+    const auto predicted = flight::rotate_freely(inertia_dual, start, window, kFine);
+    r.resize(3 * static_cast<long>(window.size()));
+    J.resize(r.size(), 6);
+    for (std::size_t i = 0; i < window.size(); ++i) {
+      const Quaternion<double>& m = s.attitude[i];
+      const Vec3<Dual> error = flight::rotation_between(
+          Quaternion<Dual>{Dual(m.w), Dual(m.x), Dual(m.y), Dual(m.z)}, predicted[i].attitude);
+      for (int a = 0; a < 3; ++a) {
+        const long row = 3 * static_cast<long>(i) + a;
+        r[row] = error[a].a / s.sigma_angle;
+        J.row(row) = error[a].v.head<6>().transpose() / s.sigma_angle;
+      }
+    }
+  };
+  const auto move = [](RotationState<double> state, const VectorXd& d) {
+    state.attitude = flight::normalised(state.attitude * flight::exp(Vec3<double>{d[0], d[1], d[2]}));
+    for (int a = 0; a < 3; ++a) state.omega[a] += d[3 + a];
+    return state;
+  };
+  MatrixXd covariance;
+  for (std::size_t size = std::min<std::size_t>(3, n);; size = std::min(4 * size, n)) {
+    window.assign(s.elapsed.begin(), s.elapsed.begin() + static_cast<long>(size));
+    if (!gauss_newton(x, evaluate, move, s.sigma_angle, covariance)) return false;
+    if (size == n) break;
+  }
+  fit.rotation = x;
+  fit.rotation_covariance = covariance;
+  const auto predicted = flight::rotate_freely(inertia, x, s.elapsed, kFine);
+  for (std::size_t i = 0; i < s.elapsed.size(); ++i)
+    fit.orientation_residuals.push_back(flight::rotation_between(predicted[i].attitude, s.attitude[i]));
+  return true;
+}
+
+void fit_angle(const Samples& s, std::size_t n, FreeFlightFit& fit) {
+  const Line line = fit_line(std::span(s.elapsed).first(n), std::span(s.theta).first(n), s.sigma_angle);
+  fit.theta = line.p;
+  fit.rotation = {flight::exp(Vec3<double>{0, -line.p, 0}), {0, -line.v, 0}};
+  for (const int i : {0, 1})
+    for (const int j : {0, 1}) fit.rotation_covariance(1 + 3 * i, 1 + 3 * j) = line.covariance(i, j);
+  for (std::size_t i = 0; i < s.elapsed.size(); ++i)
+    fit.orientation_residuals.push_back({0, -(s.theta[i] - line.p - line.v * s.elapsed[i]), 0});
+}
+
+/// chi2 and dof; where no sigma is declared, what the residuals say of it scales the covariance instead.
+void judge(const std::vector<Vec3<double>>& residuals, std::size_t n, const Vec3<double>& sigma, int axes,
+           bool declared, std::optional<double>& chi2, int& dof, Eigen::Matrix<double, 6, 6>& covariance) {
+  double sum = 0;
+  for (std::size_t i = 0; i < n; ++i)
+    for (int a = 0; a < 3; ++a) sum += (residuals[i][a] / sigma[a]) * (residuals[i][a] / sigma[a]);
+  dof = axes * (static_cast<int>(n) - 2);
+  if (declared)
+    chi2 = sum;
+  else
+    covariance *= dof > 0 ? sum / dof : std::numeric_limits<double>::quiet_NaN();
+}
+
+FreeFlightFit fit_projectile(const ThrowLog& log, const Throw& one, double fraction) {
+  if (!(fraction > 0 && fraction <= 1))
+    throw std::invalid_argument(fmt::format("free flight: fraction = {} is not in (0, 1]", fraction));
+  FreeFlightFit fit;
+  const auto stop = [&fit](FreeFlightOutcome outcome, std::string reason) {
+    fit.outcome = outcome;
+    fit.reason = std::move(reason);
+    return fit;
+  };
+  if (!one.mocap) return stop(FreeFlightOutcome::no_tracking, "no mocap");
+  if (one.hand && !one.free_flight)
+    return stop(FreeFlightOutcome::not_free, "a hand and no free_flight: it is not known when it flies");
+  const Samples s = read_samples(log, one, fit.times);
+  if (fit.times.size() < kFewestFlightSamples)
+    return stop(FreeFlightOutcome::too_short, fmt::format("{} valid samples in free flight, fewer than {}",
+                                                          fit.times.size(), kFewestFlightSamples));
+  const auto samples = static_cast<double>(fit.times.size());
+  fit.fitted = std::max<std::size_t>(2, static_cast<std::size_t>(std::ceil(fraction * samples - 1e-9)));
+  fit.oriented = !s.attitude.empty() || !s.theta.empty();
+  const Object& object = log.objects.at(one.object);
+  try {
+    if (!fit_translation(s, {0, 0, -log.gravity}, object.drag_k.value_or(0), fit.fitted, fit))
+      return stop(FreeFlightOutcome::not_solved, "the fit of the position did not converge");
+    if (!s.theta.empty()) fit_angle(s, fit.fitted, fit);
+    if (!s.attitude.empty()) {
+      Vec3<double> inertia{1, 1, 1};
+      if (object.inertia && object.inertia->size() == 3)
+        std::copy_n(object.inertia->begin(), 3, inertia.begin());
+      if (!fit_rotation(s, inertia, fit.fitted, fit))
+        return stop(FreeFlightOutcome::not_solved, "the fit of the orientation did not converge");
+    }
+  } catch (const std::runtime_error& error) {
+    return stop(FreeFlightOutcome::not_solved, error.what());
+  }
+  judge(fit.position_residuals, fit.fitted, s.sigma, static_cast<int>(s.axes.size()), s.declared,
+        fit.translation_chi2, fit.translation_dof, fit.translation_covariance);
+  if (fit.oriented)
+    judge(fit.orientation_residuals, fit.fitted, {s.sigma_angle, s.sigma_angle, s.sigma_angle},
+          s.theta.empty() ? 3 : 1, s.declared, fit.rotation_chi2, fit.rotation_dof, fit.rotation_covariance);
+  return fit;
+}
+
+constexpr FlightModel kModels[] = {
+    {"projectile", "declared gravity and drag, torque-free rotation about the tracked point",
+     &fit_projectile},
+};
+
+Spread spread(std::vector<double> x) {
+  Spread out;
+  out.n = x.size();
+  if (x.empty()) return out;
+  std::sort(x.begin(), x.end());
+  const auto n = static_cast<double>(x.size());
+  out.median = 0.5 * (x[(x.size() - 1) / 2] + x[x.size() / 2]);
+  double squares = 0;
+  for (const double e : x) out.mean += e / n;
+  for (const double e : x) squares += (e - out.mean) * (e - out.mean);
+  if (x.size() > 1) out.std = std::sqrt(squares / (n - 1));
+  return out;
+}
+
+FreeFlightStatistics statistics(const std::vector<FreeFlightErrors>& each, datasets::Split split) {
+  FreeFlightStatistics out;
+  std::vector<double> position, angle;
+  double squares = 0, samples = 0;
+  for (const FreeFlightErrors& one : each) {
+    if (one.split != split || one.outcome != FreeFlightOutcome::fitted) continue;
+    ++out.n;
+    const auto n = static_cast<double>(one.whole.times.size());
+    squares += n * one.trajectory_rms * one.trajectory_rms;
+    samples += n;
+    position.push_back(one.end_position_error);
+    if (one.end_orientation_error) angle.push_back(*one.end_orientation_error * 180 / std::numbers::pi);
+  }
+  if (samples > 0) out.trajectory_rms_m = std::sqrt(squares / samples);
+  out.end_position_error_m = spread(std::move(position));
+  out.end_orientation_error_deg = spread(std::move(angle));
+  return out;
+}
+
+}  // namespace
+
+FreeFlightFit fit_free_flight(const ThrowLog& log, const Throw& one, double fraction) {
+  return fit_projectile(log, one, fraction);
+}
+
+std::span<const FlightModel> flight_models() { return kModels; }
+
+const FlightModel& flight_model(std::string_view name) {
+  std::string names;
+  for (const FlightModel& model : kModels) {
+    if (model.name == name) return model;
+    names += fmt::format("{}{}", names.empty() ? "" : ", ", model.name);
+  }
+  throw std::invalid_argument(fmt::format("no flight model '{}'; there are: {}", name, names));
+}
+
+FreeFlightErrors free_flight_errors(const FlightModel& model, const ThrowLog& log, const Throw& one) {
+  FreeFlightErrors out;
+  out.id = one.id;
+  out.split = one.split;
+  out.whole = model.fit(log, one, 1.0);
+  out.half = model.fit(log, one, 0.5);
+  const FreeFlightFit& worse = out.whole.outcome != FreeFlightOutcome::fitted ? out.whole : out.half;
+  out.outcome = worse.outcome;
+  out.reason = worse.reason;
+  if (out.outcome != FreeFlightOutcome::fitted) return out;
+  const std::vector<double>& t = out.whole.times;
+  double squares = 0;
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    out.normalised_time.push_back((t[i] - t.front()) / (t.back() - t.front()));
+    squares += flight::dot(out.whole.position_residuals[i], out.whole.position_residuals[i]);
+  }
+  out.trajectory_rms = std::sqrt(squares / static_cast<double>(t.size()));
+  out.end_position_error = flight::norm(out.half.position_residuals.back());
+  if (out.half.oriented) out.end_orientation_error = flight::norm(out.half.orientation_residuals.back());
+  return out;
+}
+
+std::vector<FreeFlightComparison> compare_free_flights(const ThrowLog& log,
+                                                       std::span<const std::string> models, int threads) {
+  using Clock = std::chrono::steady_clock;
+  if (threads < 1) throw std::invalid_argument(fmt::format("free flight: threads = {} is not >= 1", threads));
+  std::vector<FreeFlightComparison> out;
+  for (const std::string& name : models) {
+    const FlightModel& model = flight_model(name);
+    FreeFlightComparison& comparison = out.emplace_back();
+    comparison.model = name;
+    const std::size_t n = log.throws.size(),
+                      workers = std::min(static_cast<std::size_t>(threads), std::max<std::size_t>(n, 1));
+    comparison.each.resize(n);
+    std::vector<double> seconds(n);
+    const auto work = [&](std::size_t worker) {
+      for (std::size_t i = worker; i < n; i += workers) {
+        const auto begin = Clock::now();
+        comparison.each[i] = free_flight_errors(model, log, log.throws[i]);
+        seconds[i] = std::chrono::duration<double>(Clock::now() - begin).count();
+      }
+    };
+    std::vector<std::future<void>> others;
+    for (std::size_t worker = 1; worker < workers; ++worker)
+      others.push_back(std::async(std::launch::async, work, worker));
+    work(0);
+    for (auto& other : others) other.get();
+    comparison.train = statistics(comparison.each, datasets::Split::train);
+    comparison.test = statistics(comparison.each, datasets::Split::test);
+    comparison.skipped = n - comparison.train.n - comparison.test.n;
+    for (const double s : seconds) comparison.microseconds_per_throw += 1e6 * s / static_cast<double>(n);
+  }
+  return out;
+}
+
+}  // namespace unhand::experiment
