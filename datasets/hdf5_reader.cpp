@@ -7,39 +7,14 @@
 #include <filesystem>
 
 #include "datasets/near_miss.hpp"
-#include "datasets/units.hpp"
 
 namespace unhand::datasets::hdf5 {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t longest_text = 1 << 20;  // bytes of one string attribute
-constexpr std::string_view dataset_attributes[] = {"units", "sigma"};
+constexpr std::size_t longest_text = 1 << 20;       // bytes of one string attribute
 constexpr std::size_t longest_attribute = 100'000;  // numbers in one attribute
-
-std::string_view class_name(H5T_class_t kind) {
-  switch (kind) {
-    case H5T_INTEGER:
-      return "integers";
-    case H5T_FLOAT:
-      return "floating-point numbers";
-    case H5T_STRING:
-      return "text";
-    case H5T_COMPOUND:
-      return "compound values";
-    case H5T_REFERENCE:
-      return "references";
-    case H5T_ENUM:
-      return "an enumeration";
-    case H5T_ARRAY:
-      return "arrays";
-    case H5T_VLEN:
-      return "variable-length lists";
-    default:
-      return "opaque values";
-  }
-}
 
 void misspelt(const std::vector<std::string>& present, std::span<const std::string_view> known, auto&& fail) {
   const auto is_present = [&](std::string_view name) {
@@ -67,14 +42,6 @@ herr_t keep(const char* name, void* out) noexcept {
 }
 
 }  // namespace
-
-/// A dataset opened as far as its type and shape; nothing is allocated for its values yet.
-struct Node::Table {
-  Node node;
-  H5T_class_t kind;
-  std::size_t rows, cols;
-  int rank;
-};
 
 Node::Node(std::shared_ptr<Shared> shared, Handle object, std::string path)
     : shared_(std::move(shared)), object_(std::move(object)), path_(std::move(path)) {}
@@ -280,118 +247,6 @@ std::vector<double> Node::reals(std::string_view name, std::size_t n) const {
   if (n != 0 && count != n)
     fail_attribute(name, fmt::format("wrong shape: {} values, expected {}", count, n));
   return values;
-}
-
-Node::Table Node::open_table(std::string_view name) const {
-  if (!has(name)) fail(name, "required dataset is missing");
-  check_link(name);
-  Handle object = object_handle(H5Oopen(object_.id(), std::string(name).c_str(), H5P_DEFAULT));
-  if (!object) fail(name, fmt::format("cannot be opened ({})", last_message()));
-  if (H5Iget_type(object.id()) != H5I_DATASET) fail(name, "is not a dataset");
-  const Handle type = type_handle(H5Dget_type(object.id()));
-  const Handle space = space_handle(H5Dget_space(object.id()));
-  const Handle creation = list_handle(H5Dget_create_plist(object.id()));
-  if (!type || !space || !creation) fail(name, fmt::format("cannot be opened ({})", last_message()));
-  if (H5Pget_external_count(creation.id()) > 0 || H5Pget_layout(creation.id()) == H5D_VIRTUAL) {
-    fail(name, "keeps its values in another file");
-  }
-  hsize_t sizes[H5S_MAX_RANK] = {};
-  const int rank = H5Sget_simple_extent_dims(space.id(), sizes, nullptr);
-  if (rank < 1 || rank > 2) fail(name, fmt::format("wrong shape: {} axes, expected 1 or 2", rank));
-  const hsize_t rows = sizes[0], cols = rank == 2 ? sizes[1] : 1;
-  const hsize_t budget = shared_->budget;
-  if (rows > budget || cols > budget || (rows > 0 && cols > budget / rows)) {
-    fail(name, fmt::format("absurd size: {} x {} values, where one log may hold {} in all", rows, cols,
-                           element_budget));
-  }
-  shared_->budget -= static_cast<std::size_t>(rows * cols);
-  Node self(shared_, std::move(object), join(path_, name));
-  self.reject_misspelt({}, dataset_attributes);
-  return {std::move(self), H5Tget_class(type.id()), static_cast<std::size_t>(rows),
-          static_cast<std::size_t>(cols), rank};
-}
-
-Series Node::series(std::string_view name, std::span<const ColumnLayout> layouts) const {
-  const Table table = open_table(name);
-  if (table.kind != H5T_FLOAT) {
-    fail(name, fmt::format("wrong type: {}, expected floating-point numbers", class_name(table.kind)));
-  }
-  const std::size_t most = width(layouts.front());
-  const ColumnLayout* layout = layout_of_width(layouts, table.cols);
-  if (layout == nullptr || table.rank != (most == 1 ? 1 : 2)) {
-    std::string wanted;
-    for (const ColumnLayout& option : layouts) {
-      wanted += (wanted.empty() ? "" : " or ") +
-                (most == 1 ? std::string("(N)") : fmt::format("(N,{})", width(option)));
-    }
-    const std::string found =
-        table.rank == 1 ? fmt::format("({})", table.rows) : fmt::format("({},{})", table.rows, table.cols);
-    fail(name, fmt::format("wrong shape {}, expected {}", found, wanted));
-  }
-  if (table.rows == 0) fail(name, "is empty: at least one row is needed");
-
-  const Node& self = table.node;
-  const std::string units = self.text("units");
-  std::vector<const Unit*> unit(table.cols);
-  const auto listed = static_cast<std::size_t>(std::count(units.begin(), units.end(), ',')) + 1;
-  if (listed != 1 && listed != table.cols) {
-    self.fail_attribute("units",
-                        fmt::format("'{}' names {} units for {} columns", units, listed, table.cols));
-  }
-  for (std::size_t j = 0; j < table.cols; ++j) {
-    const std::string_view symbol = part_of(units, listed == 1 ? 0 : j);
-    const Quantity wanted = find_unit(part_of(layout->units, j))->quantity;
-    unit[j] = find_unit(symbol);
-    if (unit[j] == nullptr) {
-      self.fail_attribute("units", fmt::format("unknown unit '{}' for column {} (known: {})", symbol,
-                                               part_of(layout->columns, j), units_of(wanted)));
-    }
-    if (unit[j]->quantity != wanted) {
-      self.fail_attribute("units",
-                          fmt::format("'{}' is a unit of {}, but column {} is {} (known: {})", symbol,
-                                      quantity_name(unit[j]->quantity), part_of(layout->columns, j),
-                                      quantity_name(wanted), units_of(wanted)));
-    }
-  }
-
-  Series series{table.rows, table.cols, std::vector<double>(table.rows * table.cols), {}};
-  if (H5Dread(self.object_.id(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, series.data.data()) < 0) {
-    fail(name, fmt::format("its values cannot be read: damaged data or checksum ({})", last_message()));
-  }
-  for (std::size_t k = 0; k < series.data.size(); ++k)
-    series.data[k] = unit[k % table.cols]->to_si(series.data[k]);
-  if (self.has_attribute("sigma")) {
-    std::vector<double> sigma = self.reals("sigma", 0);
-    if (sigma.size() == 1) sigma.resize(table.cols, sigma[0]);
-    if (sigma.size() != table.cols) {
-      self.fail_attribute("sigma", fmt::format("{} values for {} columns", sigma.size(), table.cols));
-    }
-    for (std::size_t j = 0; j < table.cols; ++j) sigma[j] = unit[j]->to_si(sigma[j]);
-    series.sigma = std::move(sigma);
-  }
-  return series;
-}
-
-Flags Node::flags(std::string_view name) const {
-  const Table table = open_table(name);
-  if (table.kind != H5T_INTEGER)
-    fail(name, fmt::format("wrong type: {}, expected integers", class_name(table.kind)));
-  if (table.rank != 1) fail(name, fmt::format("wrong shape ({},{}), expected (N)", table.rows, table.cols));
-  const Node& self = table.node;
-  const std::string units = self.text("units");
-  if (units != "1")
-    self.fail_attribute("units", fmt::format("unknown unit '{}' for a flag (known: 1)", units));
-  Flags flags(table.rows);
-  // HDF5 clips what does not fit, so that 300 and -1 come out as 255 and 0: read wide, then look.
-  std::vector<long long> wide(table.rows);
-  if (H5Dread(self.object_.id(), H5T_NATIVE_LLONG, H5S_ALL, H5S_ALL, H5P_DEFAULT, wide.data()) < 0) {
-    fail(name, fmt::format("its values cannot be read: damaged data or checksum ({})", last_message()));
-  }
-  for (std::size_t i = 0; i < table.rows; ++i) {
-    if (wide[i] != 0 && wide[i] != 1) fail(name, fmt::format("row {}: {} is not 0 or 1", i, wide[i]));
-    flags[i] = static_cast<std::uint8_t>(wide[i]);
-  }
-  return flags;
 }
 
 void AttributeReader::operator()(std::string_view name, int& value, const Range& range) const {

@@ -1,0 +1,74 @@
+// A model card: a model's name, the numbers it takes, and where they come from, as one JSON file.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "datasets/log_error.hpp"
+
+namespace unhand::datasets {
+
+struct CardParameter {
+  double value = 0;
+  std::optional<double> sigma;  // 1 σ, in the same unit
+  std::string unit;             // "-" where it has none
+  bool operator==(const CardParameter&) const = default;
+};
+
+/// The log that the parameters were estimated from.
+struct CardLog {
+  std::string file, title;
+  std::optional<std::string> checksum;
+  bool operator==(const CardLog&) const = default;
+};
+
+/// The interval of a condition, ends included, in which the card has been tried.
+struct CardRange {
+  double low = 0, high = 0;
+  std::string unit;
+  bool contains(double value) const { return low <= value && value <= high; }
+  bool operator==(const CardRange&) const = default;
+};
+
+///   {"schema": "model-card", "schema_version": 1, "model": "sliding_pivot",
+///    "parameters": {"mu": {"value": 0.61, "sigma": 0.01, "unit": "-"}, ...},
+///    "log": {"file": "campaign.h5", "title": "...", "checksum": "..."},
+///    "split": "train", "valid_range": {"grip_force": {"low": 45, "high": 55, "unit": "N"}, ...},
+///    "library_version": "0.1.0"}
+/// sigma, checksum, split and valid_range may be missing.
+struct ModelCard {
+  std::string model;
+  std::map<std::string, CardParameter> parameters;
+  CardLog log;
+  std::optional<std::string> split;  // the throws that were used: "train"
+  std::map<std::string, CardRange> valid_range;
+  std::string library_version;
+  /// Keys that this version does not know, as the text of a JSON object in the card's own structure; they
+  /// return to their places when the card is written. Empty: none.
+  std::string extra;
+  bool operator==(const ModelCard&) const = default;
+};
+
+/// A card with a mistake in it: path is a JSON pointer ("/parameters/mu/value"), or "line L, column C" where
+/// the file is no JSON.
+class CardError : public LogError {
+ public:
+  using LogError::LogError;
+};
+
+/// Throws CardError.
+ModelCard read_model_card(const std::filesystem::path& file);
+
+/// The same of a text in memory; `file` is its name in errors.
+ModelCard parse_model_card(const std::string& text, const std::string& file = "(in memory)");
+
+/// Indented JSON with a line break at the end. Doubles come back bit for bit. Throws CardError for a card
+/// that could not be read again (no name, a number that is not finite, a range upside down).
+std::string to_json(const ModelCard& card);
+
+/// Written beside the destination, then renamed: a failure leaves nothing behind. Throws CardError.
+void write_model_card(const std::filesystem::path& file, const ModelCard& card);
+
+}  // namespace unhand::datasets

@@ -1,0 +1,118 @@
+#include "datasets/import_cube_tosses.hpp"
+
+#include <sstream>
+#include <stdexcept>
+
+#include "log_samples.hpp"
+
+namespace unhand::datasets::test {
+namespace {
+
+const std::string header =
+    "toss,k,t_s,x_m,y_m,z_m,qw,qx,qy,qz,vx,vy,vz,wx_body,wy_body,wz_body,before_first_contact\n";
+
+std::string row(int toss, int k, bool before) {
+  std::ostringstream out;
+  out << toss << ',' << k << ',' << 0.006757 * k << ",0.2," << 0.01 * k << ",0.15,0.6,0,0.8,0,1,0,0,0,0,3,"
+      << (before ? 1 : 0) << '\n';
+  return out.str();
+}
+
+std::string toss(int number, int before, int after) {
+  std::string text;
+  for (int k = 0; k < before + after; ++k) text += row(number, k, k < before);
+  return text;
+}
+
+TEST(CubeTosses, KeepsWhatFliesLongEnough) {
+  const Scratch scratch;
+  std::string text = header;
+  for (int n = 0; n < 10; ++n) text += toss(n, n == 3 ? 7 : 8 + n, 5);
+  put_bytes(scratch / "t.csv", text);
+  ImportReport report;
+  const ThrowLog log = import_cube_tosses(scratch / "t.csv", {}, &report);
+
+  EXPECT_EQ(report.tosses, 10);
+  EXPECT_EQ(report.kept, 9);
+  EXPECT_EQ(report.train, 7);
+  EXPECT_EQ(report.test, 2);
+  ASSERT_EQ(report.dropped.size(), 1U);
+  EXPECT_EQ(report.dropped[0].toss, 3);
+  EXPECT_EQ(report.dropped[0].samples, 7);
+  EXPECT_THAT(report.dropped[0].reason, testing::HasSubstr("fewer than 8"));
+
+  EXPECT_EQ(log.dimension, 3);
+  EXPECT_EQ(log.objects.at("cube").inertia->size(), 3U);
+  EXPECT_THAT(log.source, testing::HasSubstr("as published"));
+  EXPECT_THAT(log.source, testing::HasSubstr("sigma estimated by the importer"));
+  const Throw& last = log.throws.back();
+  EXPECT_EQ(last.id, "toss-0009");
+  EXPECT_EQ(last.repetition, 9);
+  EXPECT_EQ(last.split, Split::test);
+  EXPECT_EQ(last.condition, "toss");
+  EXPECT_EQ(last.mocap->pose.rows, 17U + 5U);  // the whole series, contact included
+  EXPECT_EQ(last.free_flight->first, 0);
+  EXPECT_DOUBLE_EQ(last.free_flight->second, 0.006757 * 16);
+  EXPECT_EQ(last.mocap->pose(4, 1), 0.04);
+}
+
+TEST(CubeTosses, ResultIsALogThatRoundTrips) {
+  const Scratch scratch;
+  put_bytes(scratch / "t.csv", header + toss(0, 9, 2) + toss(4, 12, 0));
+  const ThrowLog log = import_cube_tosses(scratch / "t.csv");
+  write_throw_log(scratch / "t.h5", log);
+  EXPECT_EQ(read_throw_log(scratch / "t.h5"), log);
+}
+
+// Half the space diagonal: with the centre above it, no orientation touches the table.
+TEST(CubeTosses, LandingHeightClearsEveryOrientation) {
+  const Scratch scratch;
+  put_bytes(scratch / "t.csv", header + toss(0, 9, 2));
+  EXPECT_NEAR(import_cube_tosses(scratch / "t.csv").landing_height, std::hypot(0.0524, 0.0524, 0.0524),
+              1e-15);
+}
+
+TEST(CubeTosses, OptionsChooseTheSplitAndTheMinimum) {
+  const Scratch scratch;
+  put_bytes(scratch / "t.csv", header + toss(0, 9, 2) + toss(1, 4, 2));
+  CubeTossOptions options;
+  options.min_samples = 3;
+  options.test_every = 2;
+  const ThrowLog log = import_cube_tosses(scratch / "t.csv", options);
+  ASSERT_EQ(log.throws.size(), 2U);
+  EXPECT_EQ(log.throws[1].split, Split::test);
+  options.min_samples = 1;
+  EXPECT_THROW(import_cube_tosses(scratch / "t.csv", options), std::invalid_argument);
+}
+
+TEST(CubeTosses, SaysWhichLineAndColumn) {
+  const Scratch scratch;
+  const std::string file = scratch / "t.csv", start = header + toss(0, 9, 2);
+  const auto expect = [&](const std::string& text, const std::string& place, const std::string& reason) {
+    put_bytes(file, text);
+    expect_error<ImportError>([&] { import_cube_tosses(file); }, file, place, reason);
+  };
+  const std::string tail = "0.15,0.6,0,0.8,0,1,0,0,0,0,3,1\n";
+  expect("", "line 1", "holds no tosses");
+  expect(header, "line 1", "holds no tosses");
+  expect(toss(0, 9, 2), "line 1", "header is missing");
+  expect(start + "1,0,0,0.2,0,x.5,0.6,0,0.8,0,1,0,0,0,0,3,1\n", "line 13, column z_m",
+         "'x.5' is not a number");
+  expect(start + "1,0,0,0.2,0,,0.6,0,0.8,0,1,0,0,0,0,3,1\n", "line 13, column z_m", "'' is not a number");
+  expect(start + "1,0,0,0.2,nan," + tail, "line 13, column y_m", "is not finite");
+  expect(start + "1.5,0,0,0.2,0," + tail, "line 13, column toss", "'1.5' is not an integer");
+  expect(start + "1,0,0,0.2," + tail, "line 13", "16 values, expected 17");
+  expect(start + "1,0,0,0.2,0,0.15,0.6,0,0.8,0,1,0,0,0,0,3,2\n", "line 13, column before_first_contact",
+         "2 is not 0 or 1");
+  expect(start + "1,0,0,0.2,0,0.15,0.6,0,0.9,0,1,0,0,0,0,3,1\n", "line 13, column qw",
+         "quaternion of norm 1.08");
+  expect(start + row(1, 0, true) + row(1, 2, true), "line 14, column k", "sample 2 after 0");
+  expect(start + row(0, 11, true), "line 13, column before_first_contact", "back to 1");
+  expect(start + toss(1, 9, 0) + row(0, 0, true), "line 22, column toss", "appears in two places");
+  expect(header + toss(0, 3, 3), "line 1", "none of 1 tosses has 8 samples");
+  std::filesystem::remove(file);
+  expect_error<ImportError>([&] { import_cube_tosses(file); }, file, "line 0", "no such file");
+}
+
+}  // namespace
+}  // namespace unhand::datasets::test

@@ -1,0 +1,245 @@
+// What is written comes back bit for bit; other units, types and strings come back as the same SI values.
+#include <numbers>
+
+#include "hdf5_tools.hpp"
+#include "log_samples.hpp"
+
+namespace unhand::datasets::test {
+namespace {
+
+void expect_same(const ThrowLog& a, const ThrowLog& b) {
+  ThrowLog rest_a = a, rest_b = b;
+  ASSERT_EQ(a.throws.size(), b.throws.size());
+  for (std::size_t k = 0; k < a.throws.size(); ++k) {  // NaN is never equal to itself: poses by their bits
+    ASSERT_EQ(a.throws[k].mocap.has_value(), b.throws[k].mocap.has_value());
+    if (!a.throws[k].mocap) continue;
+    EXPECT_TRUE(same_bits(a.throws[k].mocap->pose, b.throws[k].mocap->pose)) << a.throws[k].id;
+    rest_a.throws[k].mocap->pose = rest_b.throws[k].mocap->pose = {};
+  }
+  EXPECT_EQ(rest_a, rest_b);
+}
+
+TEST(RoundTrip, PlanarWithEveryField) {
+  const Scratch scratch;
+  const ThrowLog log = planar_log();
+  write_throw_log(scratch / "a.h5", log);
+  const ThrowLog back = read_throw_log(scratch / "a.h5");
+  expect_same(log, back);
+  EXPECT_TRUE(std::isnan(back.throws[0].mocap->pose(7, 0)));
+  EXPECT_EQ(read_schema_name(scratch / "a.h5"), "throw-log");
+}
+
+TEST(RoundTrip, SpatialWithAndWithoutOrientation) {
+  const Scratch scratch;
+  write_throw_log(scratch / "a.h5", spatial_log());
+  expect_same(spatial_log(), read_throw_log(scratch / "a.h5"));
+}
+
+TEST(RoundTrip, OnlyWhatIsRequired) {
+  ThrowLog log;
+  log.objects["ball"].mass = 0.1;
+  Throw toss;
+  toss.id = "only";
+  toss.object = "ball";
+  toss.mocap = MocapLog{clock_of(1, 1), wavy(1, 3, 1), {}};
+  log.throws = {toss};
+  const Scratch scratch;
+  write_throw_log(scratch / "a.h5", log);
+  const ThrowLog back = read_throw_log(scratch / "a.h5");
+  EXPECT_EQ(log, back);
+  EXPECT_FALSE(back.gripper || back.licence || back.throws[0].hand || back.throws[0].detach_time);
+  EXPECT_TRUE(back.throws[0].mocap->is_valid(0));
+}
+
+TEST(RoundTrip, ExtremeDoublesKeepTheirBits) {
+  ThrowLog log = planar_log();
+  using limits = std::numeric_limits<double>;
+  log.throws[0].hand->twist.data.assign(
+      {-0.0, limits::denorm_min(), limits::max(), limits::lowest(), limits::epsilon()});
+  log.throws[0].hand->twist.data.resize(120, 1.0 / 3);
+  const Scratch scratch;
+  write_throw_log(scratch / "a.h5", log);
+  EXPECT_TRUE(same_bits(read_throw_log(scratch / "a.h5").throws[0].hand->twist, log.throws[0].hand->twist));
+}
+
+TEST(RoundTrip, MoreRowsThanOneChunk) {
+  ThrowLog log = planar_log();
+  log.throws[0].ft = FtLog{clock_of(10000, 1000), wavy(10000, 3, 3), wavy(10000, 1, 9)};
+  const Scratch scratch;
+  write_throw_log(scratch / "a.h5", log);
+  expect_same(log, read_throw_log(scratch / "a.h5"));
+}
+
+TEST(RoundTrip, ThrowsAreSortedById) {
+  ThrowLog log = planar_log();
+  std::swap(log.throws[0], log.throws[1]);
+  const Scratch scratch;
+  write_throw_log(scratch / "a.h5", log);
+  expect_same(planar_log(), read_throw_log(scratch / "a.h5"));
+}
+
+TEST(RoundTrip, TheSameLogGivesTheSameBytes) {
+  const Scratch scratch;
+  write_throw_log(scratch / "a.h5", planar_log());
+  write_throw_log(scratch / "b.h5", planar_log());
+  EXPECT_EQ(bytes_of(scratch / "a.h5"), bytes_of(scratch / "b.h5"));
+}
+
+TEST(RoundTrip, WritesWithChunksGzipShuffleAndChecksum) {
+  const Scratch scratch;
+  write_throw_log(scratch / "a.h5", planar_log());
+  const Editor f(scratch / "a.h5");
+  const hid_t set = H5Dopen2(f.file, "/throws/001/mocap/pose", 0), list = H5Dget_create_plist(set);
+  EXPECT_EQ(H5Pget_layout(list), H5D_CHUNKED);
+  std::vector<H5Z_filter_t> filters;
+  for (unsigned i = 0; i < unsigned(H5Pget_nfilters(list)); ++i) {
+    std::size_t n = 0;
+    unsigned flags = 0;
+    filters.push_back(H5Pget_filter2(list, i, &flags, &n, nullptr, 0, nullptr, nullptr));
+  }
+  EXPECT_THAT(filters, testing::ElementsAre(H5Z_FILTER_SHUFFLE, H5Z_FILTER_DEFLATE, H5Z_FILTER_FLETCHER32));
+  H5Pclose(list);
+  H5Dclose(set);
+}
+
+// Every conversion is to the nearest double: 21 mm is 0.021 m.
+TEST(Reading, ConvertsUnitsAndNoise) {
+  const Scratch scratch;
+  const std::string file = scratch / "a.h5";
+  write_throw_log(file, planar_log());
+  {
+    const Editor f(file);
+    f.doubles("/throws/001/landing/pose", {1, 2}, {21, 180}, "mm,deg");
+    f.reals("/throws/001/landing/pose", "sigma", {1, 0.5});
+    f.doubles("/throws/001/landing/time", {1}, {412}, "ms");
+    f.real("/throws/001/landing/time", "sigma", 2);
+    std::vector<double> wrench(150, 3);
+    f.doubles("/throws/001/ft/wrench", {50, 3}, wrench, "mN, kN, N mm");
+    f.real("/throws/001/ft/wrench", "sigma", 1);
+  }
+  const Throw toss = read_throw_log(file).throws[0];
+  EXPECT_EQ(toss.landing->pose(0, 0), 0.021);
+  EXPECT_DOUBLE_EQ(toss.landing->pose(0, 1), std::numbers::pi);
+  EXPECT_EQ(toss.landing->pose.sigma[0], 0.001);
+  EXPECT_DOUBLE_EQ(toss.landing->pose.sigma[1], std::numbers::pi / 360);
+  EXPECT_EQ(toss.landing->time(0), 0.412);
+  EXPECT_EQ(toss.landing->time.sigma, std::vector<double>{0.002});
+  EXPECT_EQ(toss.ft->wrench(9, 0), 0.003);
+  EXPECT_EQ(toss.ft->wrench(9, 1), 3000);
+  EXPECT_EQ(toss.ft->wrench(9, 2), 0.003);
+  EXPECT_THAT(toss.ft->wrench.sigma, testing::ElementsAre(0.001, 1000, 0.001));
+}
+
+TEST(Reading, AcceptsOtherWidthsAndStringKinds) {
+  const Scratch scratch;
+  const std::string file = scratch / "a.h5";
+  write_throw_log(file, planar_log());
+  {
+    const Editor f(file);
+    const std::vector<float> single(120, 0.25F);
+    f.dataset("/throws/001/hand/twist", H5T_IEEE_F32BE, {40, 3}, nullptr, "m/s,m/s,rad/s");
+    f.dataset("/throws/001/hand/acceleration", H5T_NATIVE_FLOAT, {40, 3}, single.data(),
+              "m/s^2,m/s^2,rad/s^2");
+    const short version = 1;
+    f.attribute("/", "schema_version", H5T_NATIVE_SHORT, &version, {1});
+    f.fixed_text("/", "title", "padded with blanks", H5T_STR_SPACEPAD, 40);
+    f.fixed_text("/", "source", "padded with nothing", H5T_STR_NULLPAD, 40);
+    f.fixed_text("/throws/001", "object", "bar", H5T_STR_NULLPAD, 3);
+    f.integer("/", "gravity", 10);
+    const std::vector<long long> valid(30, 1);
+    f.dataset("/throws/002/mocap/valid", H5T_NATIVE_LLONG, {30}, valid.data(), "1");
+    for (std::size_t j = 0; j < 3; ++j) f.poke("/throws/002/mocap/pose", 21 + j, 0);
+  }
+  const ThrowLog log = read_throw_log(file);
+  EXPECT_EQ(log.throws[0].hand->acceleration(39, 2), 0.25);
+  EXPECT_EQ(log.throws[0].hand->twist(0, 0), 0);
+  EXPECT_EQ(log.title, "padded with blanks");
+  EXPECT_EQ(log.source, "padded with nothing");
+  EXPECT_EQ(log.throws[0].object, "bar");
+  EXPECT_EQ(log.gravity, 10);
+}
+
+TEST(Reading, IgnoresWhatItDoesNotKnow) {
+  const Scratch scratch;
+  const std::string file = scratch / "a.h5";
+  write_throw_log(file, planar_log());
+  {
+    const Editor f(file);
+    f.group("/camera");
+    f.text("/", "operator", "somebody");
+    f.group("/throws/001/audio");
+    f.doubles("/throws/001/hand/torque", {2}, {1, 2}, "furlong");
+    f.real("/objects/bar", "colour", 3);
+  }
+  const std::string before = bytes_of(file);
+  expect_same(planar_log(), read_throw_log(file));
+  EXPECT_EQ(bytes_of(file), before);
+}
+
+TEST(Reading, NormalisesQuaternionsOnce) {
+  ThrowLog log = spatial_log();
+  Series& pose = log.throws[0].mocap->pose;
+  pose(4, 3) = 0.6004;
+  const Scratch scratch;
+  write_throw_log(scratch / "a.h5", log);
+  const ThrowLog once = read_throw_log(scratch / "a.h5");
+  const Series& q = once.throws[0].mocap->pose;
+  EXPECT_NEAR(q(4, 3) * q(4, 3) + q(4, 5) * q(4, 5), 1, 4e-16);
+  EXPECT_DOUBLE_EQ(q(4, 3) / q(4, 5), 0.6004 / 0.8);
+  EXPECT_EQ(q(3, 3), 0.6);  // already unit: untouched
+  write_throw_log(scratch / "b.h5", once);
+  EXPECT_EQ(read_throw_log(scratch / "b.h5"), once);
+}
+
+// Writing
+
+TEST(Writing, RefusesWhatReadingWouldRefuseAndLeavesNothing) {
+  const Scratch scratch;
+  const std::string file = scratch / "a.h5";
+  const auto expect = [&](auto&& spoil, const std::string& path, const std::string& reason) {
+    ThrowLog log = planar_log();
+    spoil(log);
+    expect_error([&] { write_throw_log(file, log); }, file, path, reason);
+    EXPECT_EQ(scratch.files(), 0U);
+  };
+  expect([](ThrowLog& l) { l.throws[1].hand->twist(3, 1) = std::nan(""); }, "/throws/002/hand/twist",
+         "row 3, column vz");
+  expect([](ThrowLog& l) { l.throws[1].id = "001"; }, "/throws/001", "used twice");
+  expect([](ThrowLog& l) { l.throws[1].id = "a/b"; }, "/throws", "cannot name a group");
+  expect([](ThrowLog& l) { l.throws[1].id = ""; }, "/throws", "cannot name a group");
+  expect([](ThrowLog& l) { l.throws.clear(); }, "/throws", "is empty");
+  expect([](ThrowLog& l) { l.title = "\xff"; }, "/@title", "UTF-8");
+  expect([](ThrowLog& l) { l.title = std::string("a\0b", 3); }, "/@title", "UTF-8");
+  expect([](ThrowLog& l) { l.throws[0].hand->pose.data.pop_back(); }, "/throws/001/hand/pose",
+         "holds 119 numbers");
+  expect([](ThrowLog& l) { l.throws[0].hand->pose.sigma = {1}; }, "/throws/001/hand/pose@sigma",
+         "1 values for 3");
+  expect([](ThrowLog& l) { l.throws[0].mocap->valid.pop_back(); }, "/throws/001/mocap/valid", "29 rows");
+  expect([](ThrowLog& l) { l.throws[0].hand->time = {}; }, "/throws/001/hand/time", "is empty");
+  expect([](ThrowLog& l) { l.dimension = 3; }, "/objects/bar@inertia", "1 values, expected 3");
+}
+
+TEST(Writing, AFailureKeepsTheOlderFile) {
+  const Scratch scratch;
+  const std::string file = scratch / "a.h5";
+  write_throw_log(file, planar_log());
+  const std::string before = bytes_of(file);
+  ThrowLog bad = planar_log();
+  bad.gravity = -1;
+  EXPECT_THROW(write_throw_log(file, bad), LogError);
+  EXPECT_EQ(bytes_of(file), before);
+  write_throw_log(file, spatial_log());  // and a success replaces it
+  EXPECT_EQ(read_throw_log(file).dimension, 3);
+  EXPECT_EQ(scratch.files(), 1U);
+}
+
+TEST(Writing, NamesADestinationThatCannotBe) {
+  const Scratch scratch;
+  const std::string nowhere = scratch / "no/such/folder/a.h5", folder = scratch / ".";
+  expect_error([&] { write_throw_log(nowhere, planar_log()); }, nowhere, "/", "cannot be created");
+  expect_error([&] { write_throw_log(folder, planar_log()); }, folder, "/", "is a directory");
+  EXPECT_EQ(scratch.files(), 0U);
+}
+
+}  // namespace
+}  // namespace unhand::datasets::test
