@@ -6,11 +6,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <future>
 #include <limits>
 #include <numbers>
 #include <stdexcept>
 
+#include "experiment/least_squares.hpp"
+#include "experiment/parallel.hpp"
 #include "flight/point_flight.hpp"
 
 namespace unhand::experiment {
@@ -98,77 +99,11 @@ Samples read_samples(const ThrowLog& log, const Throw& one, std::vector<double>&
   return out;
 }
 
-/// Minimises |r(x)|² by Gauss-Newton with halved steps. evaluate(x, r, J) gives the weighted residual and its
-/// Jacobian with respect to d in move(x, d) at d = 0; `sigma` is the weights' scale, by which r is good to
-/// kSolved/sigma. False if it does not converge. `covariance` becomes (JᵀJ)⁻¹.
-template <class State, class Evaluate, class Move>
-bool gauss_newton(State& x, const Evaluate& evaluate, const Move& move, double sigma, MatrixXd& covariance) {
-  constexpr int kSteps = 40, kHalvings = 12;
-  constexpr double kSolved = 1e-9;  // [m] or [rad]: what the integrator leaves of a state
-  VectorXd r;
-  MatrixXd J;
-  evaluate(x, r, J);
-  for (int step = 0; step < kSteps; ++step) {
-    const Eigen::ColPivHouseholderQR<MatrixXd> qr(J);
-    if (qr.rank() < J.cols()) return false;
-    const VectorXd d = qr.solve(-r);
-    const double cost = r.squaredNorm(), predicted = (J * d).squaredNorm();
-    if (!std::isfinite(predicted)) return false;
-    const double floor = static_cast<double>(r.size()) * (kSolved / sigma) * (kSolved / sigma);
-    if (predicted <= 1e-12 * cost + 1e-2 * floor) {  // a millionth of the scatter
-      x = move(x, d);
-    } else {
-      double k = 1;
-      VectorXd moved_r;
-      MatrixXd moved_J;
-      State moved = x;
-      int halving = 0;
-      for (; halving < kHalvings; ++halving, k *= 0.5) {
-        moved = move(x, VectorXd(k * d));
-        evaluate(moved, moved_r, moved_J);
-        if (moved_r.squaredNorm() < cost) break;
-      }
-      if (halving < kHalvings) {
-        x = moved;
-        r = moved_r;
-        J = moved_J;
-        continue;
-      }
-      if (predicted > 1e-8 * cost + 1e2 * floor) return false;  // not a minimum that rounding hides
-    }
-    covariance = (J.transpose() * J).inverse();
-    return true;
-  }
-  return false;
-}
-
 void place(const MatrixXd& covariance, const std::vector<int>& axes, Eigen::Matrix<double, 6, 6>& out) {
   const int n = static_cast<int>(axes.size());
   for (int a = 0; a < 2 * n; ++a)
     for (int b = 0; b < 2 * n; ++b)
       out(axes[a % n] + 3 * (a / n), axes[b % n] + 3 * (b / n)) = covariance(a, b);
-}
-
-/// p + v t fitted to y: closed form, about the mean time. Weights are equal, sigma only scales the
-/// covariance.
-struct Line {
-  double p{}, v{};
-  Eigen::Matrix2d covariance;
-};
-Line fit_line(std::span<const double> t, std::span<const double> y, double sigma) {
-  const auto n = static_cast<double>(t.size());
-  double t_mean = 0, y_mean = 0, tt = 0, ty = 0;
-  for (std::size_t i = 0; i < t.size(); ++i) t_mean += t[i] / n, y_mean += y[i] / n;
-  for (std::size_t i = 0; i < t.size(); ++i) {
-    tt += (t[i] - t_mean) * (t[i] - t_mean);
-    ty += (t[i] - t_mean) * (y[i] - y_mean);
-  }
-  Line line;
-  line.v = ty / tt;
-  line.p = y_mean - line.v * t_mean;
-  line.covariance << 1 / n + t_mean * t_mean / tt, -t_mean / tt, -t_mean / tt, 1 / tt;
-  line.covariance *= sigma * sigma;
-  return line;
 }
 
 const dynamics::IntegratorOptions kFine = [] {
@@ -184,7 +119,7 @@ bool fit_translation(const Samples& s, const Vec3<double>& gravity, double drag_
   for (const int a : s.axes) {
     std::vector<double> y(n);
     for (std::size_t i = 0; i < n; ++i) y[i] = s.position[i][a] - 0.5 * gravity[a] * fitted[i] * fitted[i];
-    const Line line = fit_line(fitted, y, s.sigma[a]);
+    const FittedLine line = fit_line(fitted, y, s.sigma[a]);
     fit.position[a] = line.p;
     fit.velocity[a] = line.v;
     for (const int i : {0, 1})
@@ -285,7 +220,7 @@ bool fit_rotation(const Samples& s, const Vec3<double>& inertia, std::size_t n, 
 }
 
 void fit_angle(const Samples& s, std::size_t n, FreeFlightFit& fit) {
-  const Line line = fit_line(std::span(s.elapsed).first(n), std::span(s.theta).first(n), s.sigma_angle);
+  const FittedLine line = fit_line(std::span(s.elapsed).first(n), std::span(s.theta).first(n), s.sigma_angle);
   fit.theta = line.p;
   fit.rotation = {flight::exp(Vec3<double>{0, -line.p, 0}), {0, -line.v, 0}};
   for (const int i : {0, 1})
@@ -429,28 +364,20 @@ FreeFlightErrors free_flight_errors(const FlightModel& model, const ThrowLog& lo
 std::vector<FreeFlightComparison> compare_free_flights(const ThrowLog& log,
                                                        std::span<const std::string> models, int threads) {
   using Clock = std::chrono::steady_clock;
-  if (threads < 1) throw std::invalid_argument(fmt::format("free flight: threads = {} is not >= 1", threads));
+  if (threads < 0) throw std::invalid_argument(fmt::format("free flight: threads = {} is not >= 0", threads));
   std::vector<FreeFlightComparison> out;
   for (const std::string& name : models) {
     const FlightModel& model = flight_model(name);
     FreeFlightComparison& comparison = out.emplace_back();
     comparison.model = name;
-    const std::size_t n = log.throws.size(),
-                      workers = std::min(static_cast<std::size_t>(threads), std::max<std::size_t>(n, 1));
+    const std::size_t n = log.throws.size();
     comparison.each.resize(n);
     std::vector<double> seconds(n);
-    const auto work = [&](std::size_t worker) {
-      for (std::size_t i = worker; i < n; i += workers) {
-        const auto begin = Clock::now();
-        comparison.each[i] = free_flight_errors(model, log, log.throws[i]);
-        seconds[i] = std::chrono::duration<double>(Clock::now() - begin).count();
-      }
-    };
-    std::vector<std::future<void>> others;
-    for (std::size_t worker = 1; worker < workers; ++worker)
-      others.push_back(std::async(std::launch::async, work, worker));
-    work(0);
-    for (auto& other : others) other.get();
+    parallel_for(n, threads, [&](std::size_t i) {
+      const auto begin = Clock::now();
+      comparison.each[i] = free_flight_errors(model, log, log.throws[i]);
+      seconds[i] = std::chrono::duration<double>(Clock::now() - begin).count();
+    });
     comparison.train = statistics(comparison.each, datasets::Split::train);
     comparison.test = statistics(comparison.each, datasets::Split::test);
     comparison.skipped = n - comparison.train.n - comparison.test.n;

@@ -104,8 +104,9 @@ struct FreeFlightComparison {
   std::vector<FreeFlightErrors> each;  ///< in the order of the log
 };
 
-/// Every throw of the log through each named model. The answer (but for the time it took) is the same for any
-/// number of threads >= 1. Throws std::invalid_argument for a name that is unknown or threads < 1.
+/// Every throw of the log through each named model, on `threads` threads (0: one per core). The answer (but
+/// for the time it took) does not depend on their number. Throws std::invalid_argument for a name that is
+/// unknown or threads < 0.
 std::vector<FreeFlightComparison> compare_free_flights(const datasets::ThrowLog& log,
                                                        std::span<const std::string> models, int threads = 1);
 

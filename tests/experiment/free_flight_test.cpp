@@ -360,7 +360,7 @@ TEST(FreeFlight, WhatCannotBeFittedSaysWhy) {
 
   EXPECT_THROW(fit_free_flight(c.log, throws[3], 0), std::invalid_argument);
   EXPECT_THROW(fit_free_flight(c.log, throws[3], 1.1), std::invalid_argument);
-  EXPECT_THROW(compare_free_flights(c.log, names, 0), std::invalid_argument);
+  EXPECT_THROW(compare_free_flights(c.log, names, -1), std::invalid_argument);
   const std::vector<std::string> unknown{"projectiles"};
   EXPECT_THROW(compare_free_flights(c.log, unknown), std::invalid_argument);
 }
@@ -369,7 +369,7 @@ TEST(FreeFlight, TheAnswerDoesNotDependOnThreads) {
   const Campaign c = spatial(23, {4e-4, 9e-4, 1.1e-3}, 0.1, 1);
   const std::vector<std::string> names{"projectile"};
   const auto one = compare_free_flights(c.log, names, 1)[0];
-  for (const int threads : {2, 3, 64}) {
+  for (const int threads : {0, 2, 3, 64}) {
     const auto more = compare_free_flights(c.log, names, threads)[0];
     for (const auto part : {&FreeFlightComparison::train, &FreeFlightComparison::test}) {
       EXPECT_EQ((one.*part).n, (more.*part).n);
