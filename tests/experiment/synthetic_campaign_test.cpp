@@ -13,7 +13,6 @@
 #include <set>
 #include <stdexcept>
 
-#include "contact/gripper_delay.hpp"
 #include "contact/sliding_pivot.hpp"
 
 namespace {
