@@ -152,16 +152,11 @@ class ContactModel {
   virtual void separation(const NormalForce&, double& t) const = 0;
   virtual void separation(const NormalForce&, Dual& t) const = 0;
 
-  /// A bound on the next step [s] near a point where the flow is singular.
-  virtual double max_step(const Phase&, const SceneSource&, double /*t*/, const Relative<double>&) const {
-    return std::numeric_limits<double>::infinity();
-  }
+  /// True for modes whose law depends on the direction of u = (v_r, L ω_r) alone: their flow is regular when paced by
+  /// |u| (dynamics/paced_stepper.hpp), and errors of the slip are judged relative to |u|.
+  virtual bool is_homogeneous(int mode) const = 0;
 
-  /// True if the law depends on the direction of u = (v_r, L ω_r) alone, so that the flow is regular when paced by |u|.
-  bool is_homogeneous() const { return spin_length() > 0; }
-
-  /// The length L [m] that makes a spin comparable to a slip, |u| = |(v_r, L ω_r)|, for laws that depend on the
-  /// direction of u alone: errors of the slip are then judged relative to |u|. 0: component by component.
+  /// L above [m]; 0 where the spin does not turn the friction force.
   virtual double spin_length() const { return 0; }
 
   /// True if the law can feed energy through its linear slip in this mode (a surrogate, not a material law).

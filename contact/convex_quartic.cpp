@@ -2,9 +2,11 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/Dense>
-
+#include <limits>
+#include <numbers>
 #include <stdexcept>
+#include <type_traits>
+#include <vector>
 
 #include "contact/disc_friction.hpp"
 
@@ -15,128 +17,144 @@ using dynamics::value_of;
 
 namespace {
 
-constexpr int kExponents[ConvexQuartic::kCoefficients][3] = {
-    {4, 0, 0}, {3, 1, 0}, {3, 0, 1}, {2, 2, 0}, {2, 1, 1}, {2, 0, 2}, {1, 3, 0}, {1, 2, 1},
-    {1, 1, 2}, {1, 0, 3}, {0, 4, 0}, {0, 3, 1}, {0, 2, 2}, {0, 1, 3}, {0, 0, 4}};
+constexpr int kPower[ConvexQuartic::kCoefficients][3] = {{4, 0, 0}, {3, 1, 0}, {3, 0, 1}, {2, 2, 0}, {2, 1, 1},
+                                                         {2, 0, 2}, {1, 3, 0}, {1, 2, 1}, {1, 1, 2}, {1, 0, 3},
+                                                         {0, 4, 0}, {0, 3, 1}, {0, 2, 2}, {0, 1, 3}, {0, 0, 4}};
 
-/// powers[i][k] = w_i^k
-template <class S>
-std::array<std::array<S, 5>, 3> powers_of(const Vec3<S>& w) {
-  std::array<std::array<S, 5>, 3> p;
-  for (int i = 0; i < 3; ++i) {
-    p[i][0] = S(1);
-    for (int k = 1; k < 5; ++k) p[i][k] = p[i][k - 1] * w[i];
+Vec3<double> times(const Mat3& a, const Vec3<double>& x) { return {dot3(a[0], x), dot3(a[1], x), dot3(a[2], x)}; }
+
+// The solution of A x = b, A symmetric and positive semidefinite, by LDLᵀ; a pivot below 1e-13 of the trace is raised to
+// it, so that a singular A gives a long but finite x.
+struct Factored {
+  double d0, d1, d2, l10, l20, l21;
+
+  explicit Factored(const Mat3& a) {
+    const double least = 1e-13 * (a[0][0] + a[1][1] + a[2][2]);
+    d0 = std::max(a[0][0], least);
+    l10 = a[1][0] / d0;
+    l20 = a[2][0] / d0;
+    d1 = std::max(a[1][1] - l10 * a[1][0], least);
+    l21 = (a[2][1] - l10 * a[2][0]) / d1;
+    d2 = std::max(a[2][2] - l20 * a[2][0] - l21 * l21 * d1, least);
   }
-  return p;
+  Vec3<double> solve(const Vec3<double>& b) const {
+    const double y1 = b[1] - l10 * b[0], y2 = b[2] - l20 * b[0] - l21 * y1;
+    const double x2 = y2 / d2, x1 = y1 / d1 - l21 * x2;
+    return {b[0] / d0 - l10 * x1 - l20 * x2, x1, x2};
+  }
+};
+
+// Eigenvalues of a symmetric matrix, by Jacobi rotations, with the eigenvector of the least.
+struct Spectrum {
+  double least, largest;
+  Vec3<double> vector;
+
+  explicit Spectrum(Mat3 a) {
+    Mat3 v{Vec3<double>{1, 0, 0}, Vec3<double>{0, 1, 0}, Vec3<double>{0, 0, 1}};
+    for (int sweep = 0; sweep < 12; ++sweep) {
+      for (const auto& [i, j] : {std::pair{0, 1}, std::pair{0, 2}, std::pair{1, 2}}) {
+        if (a[i][j] == 0.0) continue;
+        const double theta = 0.5 * (a[j][j] - a[i][i]) / a[i][j];
+        const double t = std::copysign(1.0, theta) / (std::abs(theta) + std::hypot(1.0, theta));
+        const double c = 1.0 / std::sqrt(1.0 + t * t), s = t * c;
+        for (int k = 0; k < 3; ++k) {
+          const double x = a[k][i], y = a[k][j];
+          a[k][i] = c * x - s * y;
+          a[k][j] = s * x + c * y;
+        }
+        for (int k = 0; k < 3; ++k) {
+          const double x = a[i][k], y = a[j][k];
+          a[i][k] = c * x - s * y;
+          a[j][k] = s * x + c * y;
+          const double p = v[k][i], q = v[k][j];
+          v[k][i] = c * p - s * q;
+          v[k][j] = s * p + c * q;
+        }
+      }
+    }
+    int low = 0;
+    for (int i = 1; i < 3; ++i) {
+      if (a[i][i] < a[low][low]) low = i;
+    }
+    least = a[low][low];
+    largest = std::max({a[0][0], a[1][1], a[2][2]});
+    vector = {v[0][low], v[1][low], v[2][low]};
+  }
+};
+
+// Directions spread evenly over the half sphere, by the golden angle.
+Vec3<double> spread(int k, int count) {
+  const double z = (k + 0.5) / count, r = std::sqrt(1.0 - z * z);
+  const double phi = k * std::numbers::pi * (3.0 - std::sqrt(5.0));
+  return {r * std::cos(phi), r * std::sin(phi), z};
 }
 
-/// Directions spread evenly over the half sphere.
-Vec3<double> spread(int k, int n) {
-  const double z = (k + 0.5) / n, phi = 2.399963229728653 * k, r = std::sqrt(1 - z * z);
-  return {r * std::cos(phi), r * std::sin(phi), z};
+[[noreturn]] void refuse(const char* what, double value, const Vec3<double>& w) {
+  throw std::invalid_argument(
+      fmt::format("convex quartic: {} = {} at w = ({:.6g}, {:.6g}, {:.6g}); it must not be negative, and H must be positive",
+                  what, value, w[0], w[1], w[2]));
 }
 
 }  // namespace
 
-template <class S>
-S ConvexQuartic::value(const Vec3<S>& w) const {
-  const auto p = powers_of(w);
-  S sum(0);
-  for (int k = 0; k < kCoefficients; ++k)
-    if (coefficients_[k] != 0)
-      sum += coefficients_[k] * (p[0][kExponents[k][0]] * p[1][kExponents[k][1]] * p[2][kExponents[k][2]]);
-  return sum;
-}
-
-void ConvexQuartic::derivatives(const Vec3<double>& w, Vec3<double>& gradient,
-                                std::array<Vec3<double>, 3>& hessian) const {
-  const auto p = powers_of(w);
-  gradient = {};
-  hessian = {};
+ConvexQuartic::ConvexQuartic(const std::array<double, kCoefficients>& coefficients, Unchecked)
+    : coefficients_(coefficients) {
+  constexpr double kFactorial[5] = {1, 1, 2, 6, 24};
   for (int k = 0; k < kCoefficients; ++k) {
-    const double c = coefficients_[k];
-    if (c == 0) continue;
-    const int* e = kExponents[k];
-    const auto monomial = [&](int a, int b) {  // differentiated by w_a and, unless b < 0, by w_b
-      int n[3] = {e[0], e[1], e[2]};
-      double factor = c * n[a]--;
-      if (n[a] < 0) return 0.0;
-      if (b >= 0) {
-        factor *= n[b]--;
-        if (n[b] < 0) return 0.0;
-      }
-      return factor * p[0][n[0]] * p[1][n[1]] * p[2][n[2]];
-    };
-    for (int a = 0; a < 3; ++a) {
-      gradient[a] += monomial(a, -1);
-      for (int b = a; b < 3; ++b) {
-        const double h = monomial(a, b);
-        hessian[a][b] += h;
-        if (b != a) hessian[b][a] += h;
-      }
-    }
+    const int* n = kPower[k];
+    tensor_[k] = 0.5 * kFactorial[n[0]] * kFactorial[n[1]] * kFactorial[n[2]] * coefficients[k];  // 12/multinomial
   }
 }
 
-ConvexQuartic::ConvexQuartic(const std::array<double, kCoefficients>& coefficients) : coefficients_(coefficients) {
-  constexpr int kPoints = 4000;
-  double least = std::numeric_limits<double>::infinity(), largest = 0;
-  Vec3<double> where{};
-  const auto eigenvalues = [&](const Vec3<double>& w) {
-    Vec3<double> gradient;
-    std::array<Vec3<double>, 3> h;
-    derivatives(w, gradient, h);
-    Eigen::Matrix3d H;
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) H(i, j) = h[i][j];
-    return Eigen::Vector3d(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(H, Eigen::EigenvaluesOnly).eigenvalues());
-  };
-  for (const double c : coefficients)
-    if (!std::isfinite(c)) throw std::invalid_argument(fmt::format("convex quartic: coefficient {} is not finite", c));
-  const auto try_at = [&](const Vec3<double>& w) {
-    if (!(value(w) > 0))
-      throw std::invalid_argument(fmt::format("convex quartic: H = {} is not positive at w = ({}, {}, {})", value(w), w[0], w[1], w[2]));
-    const Eigen::Vector3d e = eigenvalues(w);
-    largest = std::max(largest, e[2]);
-    if (e[0] < least) {
-      least = e[0];
-      where = w;
-    }
-  };
-  for (int k = 0; k < kPoints; ++k) try_at(spread(k, kPoints));
-  for (double reach = 0.03; reach > 1e-6; reach *= 0.5) {
-    const Vec3<double> centre = where;
-    for (int k = 0; k < 12; ++k) {
-      Vec3<double> w = spread(k, 12);
-      for (int i = 0; i < 3; ++i) w[i] = centre[i] + (k % 2 == 0 ? reach : -reach) * w[i];
-      const double size = std::sqrt(dot3(w, w));
-      for (double& x : w) x /= size;
-      try_at(w);
+ConvexQuartic::ConvexQuartic(const std::array<double, kCoefficients>& coefficients)
+    : ConvexQuartic(coefficients, Unchecked{}) {
+  for (int k = 0; k < kCoefficients; ++k) {
+    if (!std::isfinite(coefficients[k])) {
+      throw std::invalid_argument(fmt::format("convex quartic: coefficient of w_x^{} w_z^{} w_tau^{} = {} is not finite",
+                                              kPower[k][0], kPower[k][1], kPower[k][2], coefficients[k]));
     }
   }
-  if (least < -1e-9 * largest)
-    throw std::invalid_argument(fmt::format(
-        "convex quartic: not convex, the Hessian has the eigenvalue {} at w = ({}, {}, {})", least, where[0], where[1], where[2]));
+  constexpr int kDirections = 600, kLowest = 24, kTurns = 60;
+  std::vector<std::pair<double, Vec3<double>>> found;
+  double largest = 0.0;
+  for (int k = 0; k < kDirections; ++k) {
+    const Vec3<double> x = spread(k, kDirections);
+    const Spectrum s(hessian(x));
+    largest = std::max(largest, s.largest);
+    found.emplace_back(s.least, x);
+  }
+  if (!(largest > 0.0)) refuse("the largest eigenvalue of the Hessian", largest, found[0].second);
+  std::partial_sort(found.begin(), found.begin() + kLowest, found.end(),
+                    [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (int k = 0; k < kLowest; ++k) {
+    Vec3<double> x = found[k].second;
+    for (int turn = 0; turn < kTurns; ++turn) {
+      const Spectrum s(hessian(x));
+      if (s.least < -1e-10 * largest) refuse("the least eigenvalue of the Hessian", s.least, x);
+      x = s.vector;
+      // A convex H vanishes only along a line on which its Hessian vanishes too: the least eigenvector of any place.
+      const double value = dot3(x, times(hessian(x), x)) / 12.0;
+      if (!(value > 1e-12 * largest)) refuse("H", value, x);
+    }
+  }
 }
 
 ConvexQuartic ConvexQuartic::isotropic_blend(double kappa) {
-  if (!(kappa >= 0 && kappa <= 3))
+  if (!(kappa >= 0.0 && kappa <= 3.0)) {
     throw std::invalid_argument(fmt::format("convex quartic: kappa = {} is not in [0, 3]", kappa));
-  ConvexQuartic out;
-  out.coefficients_ = {1, 0, 0, 2, 0, 2 * kappa, 0, 0, 0, 0, 1, 0, 2 * kappa, 0, 1};
-  return out;
+  }
+  return {{1, 0, 0, 2, 0, 2 * kappa, 0, 0, 0, 0, 1, 0, 2 * kappa, 0, 1}, Unchecked{}};
 }
 
 double ConvexQuartic::kappa_closest_to_disc() {
   static const double kappa = [] {
-    double top = 0, bottom = 0;
+    double top = 0.0, bottom = 0.0;
     constexpr int kPoints = 400;
-    for (int k = 0; k < kPoints; ++k) {  // evenly over the angle between spin and slide
-      const double angle = 0.5 * M_PI * (k + 0.5) / kPoints;
-      const DiscFriction f = disc_friction(std::tan(angle));
-      const double F = f.force * f.force, T = 2.25 * f.torque * f.torque;
-      top += (1 - F * F - T * T) * (2 * F * T);
-      bottom += (2 * F * T) * (2 * F * T);
+    for (int k = 0; k < kPoints; ++k) {
+      const DiscFriction f = disc_friction(std::tan(0.5 * std::numbers::pi * (k + 0.5) / kPoints));
+      const double a2 = f.force * f.force, b2 = 2.25 * f.torque * f.torque, cross = 2.0 * a2 * b2;
+      top += (1.0 - a2 * a2 - b2 * b2) * cross;  // H − 1 = κ cross − (1 − a⁴ − b⁴)
+      bottom += cross * cross;
     }
     return top / bottom;
   }();
@@ -145,73 +163,127 @@ double ConvexQuartic::kappa_closest_to_disc() {
 
 ConvexQuartic ConvexQuartic::closest_to_disc() { return isotropic_blend(kappa_closest_to_disc()); }
 
+// ∇²H(w); by Euler's theorem ∇H = ∇²H w/3 and H = wᵀ∇²H w/12.
+Mat3 ConvexQuartic::hessian(const Vec3<double>& w) const {
+  const auto& t = tensor_;
+  const double xx = w[0] * w[0], zz = w[1] * w[1], ss = w[2] * w[2];
+  const double xz = 2.0 * w[0] * w[1], xs = 2.0 * w[0] * w[2], zs = 2.0 * w[1] * w[2];
+  const auto entry = [&](int a, int b, int c, int d, int e, int f) {
+    return (t[a] * xx + t[b] * xz + t[c] * xs) + (t[d] * zz + t[e] * zs + t[f] * ss);
+  };
+  const double h01 = entry(1, 3, 4, 6, 7, 8), h02 = entry(2, 4, 5, 7, 8, 9), h12 = entry(4, 7, 8, 11, 12, 13);
+  return {Vec3<double>{entry(0, 1, 2, 3, 4, 5), h01, h02}, Vec3<double>{h01, entry(3, 6, 7, 10, 11, 12), h12},
+          Vec3<double>{h02, h12, entry(5, 8, 9, 12, 13, 14)}};
+}
+
 template <class S>
 S ConvexQuartic::gauge(const Vec3<S>& w) const {
-  using std::sqrt;
-  // Scaled to order one first: the fourth power of a small wrench would underflow.
-  const double size = std::sqrt(value_of(dot3(w, w)));
-  if (!(size > 0)) return S(0);
-  const Vec3<S> unit{w[0] / size, w[1] / size, w[2] / size};
-  return size * S(sqrt(S(sqrt(value(unit)))));
+  const double scale = scale_of(w);
+  if (scale == 0.0) return S(0.0);
+  const Vec3<double> v{value_of(w[0]) / scale, value_of(w[1]) / scale, value_of(w[2]) / scale};
+  const Vec3<double> third = times(hessian(v), v);  // 3 ∇H
+  const double g = std::sqrt(std::sqrt(dot3(third, v) / 12.0));
+  if constexpr (std::is_same_v<S, double>) {
+    return scale * g;
+  } else {
+    const double k = 1.0 / (12.0 * g * g * g);
+    return S(scale * g, k * (third[0] * w[0].v + third[1] * w[1].v + third[2] * w[2].v));
+  }
 }
 
-/// The minimum of the convex H(w) + û · w, that is ∇H(w) = −û, by Newton's method with a line search; the wrench is the
-/// point of the surface in that direction.
+// φ(w) = H(w) + û·w, û = u/|u|, is convex with its least value where ∇H(w) = −û. Newton's method from the ellipsoid's
+// direction with backtracking on φ: at most 50 steps, some 5 in general; then w/gauge(w). In Dual, the implicit function
+// theorem at the solution: dw = −(∇²H)⁻¹ dû, and the radial part of it does not count.
 template <class S>
 Vec3<S> ConvexQuartic::resist(const Vec3<S>& u) const {
-  const double size = std::sqrt(value_of(dot3(u, u)));
-  const Vec3<double> target{value_of(u[0]) / size, value_of(u[1]) / size, value_of(u[2]) / size};
-  Vec3<double> w{-0.63 * target[0], -0.63 * target[1], -0.63 * target[2]}, gradient;  // 4^(−1/3): the ellipsoid's
-  std::array<Vec3<double>, 3> h;
-  Eigen::Matrix3d H;
-  double objective = value(w) + dot3(target, w);
+  const double scale = scale_of(u);
+  if (scale == 0.0) return {S(0.0), S(0.0), S(0.0)};
+  Vec3<double> d{value_of(u[0]) / scale, value_of(u[1]) / scale, value_of(u[2]) / scale};
+  const double size = std::sqrt(dot3(d, d));
+  for (double& entry : d) entry /= size;
+
+  Mat3 h = hessian(d);
+  Vec3<double> w = d, third = times(h, d);  // third = 3 ∇H
+  const double start = -std::cbrt(3.0 / dot3(third, d));  // least φ along the ray: 4 t³ H(û) = −1
+  const double square = start * start;
+  for (int i = 0; i < 3; ++i) {
+    w[i] *= start;
+    third[i] *= square * start;
+    for (double& entry : h[i]) entry *= square;
+  }
+  double phi = dot3(third, w) / 12.0 + dot3(d, w);
   for (int iteration = 0; iteration < 50; ++iteration) {
-    derivatives(w, gradient, h);
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) H(i, j) = h[i][j];
-    const Eigen::Vector3d g(gradient[0] + target[0], gradient[1] + target[1], gradient[2] + target[2]);
-    if (g.squaredNorm() < 1e-30) break;
-    H.diagonal().array() += 1e-14;  // the Hessian may be flat on the axes (κ = 0)
-    const Eigen::Vector3d step = -H.ldlt().solve(g);
-    const double slope = g.dot(step);
-    if (!(slope < 0)) break;
+    const Vec3<double> residual{third[0] / 3.0 + d[0], third[1] / 3.0 + d[1], third[2] / 3.0 + d[2]};
+    const Vec3<double> step = Factored(h).solve(residual);  // downhill is −step
+    const double slope = dot3(residual, step);
+    if (!(slope > 0.0)) break;
+    if (slope < 1e-28) {  // nothing left for φ to show: one full step more, and it is over
+      for (int i = 0; i < 3; ++i) w[i] -= step[i];
+      h = hessian(w);
+      break;
+    }
+    double length = 1.0, reached = phi;
     Vec3<double> next = w;
-    double length = 1, reached = objective;
     for (int halving = 0; halving < 30; ++halving, length *= 0.5) {
-      for (int i = 0; i < 3; ++i) next[i] = w[i] + length * step[i];
-      reached = value(next) + dot3(target, next);
-      if (reached <= objective + 1e-4 * length * slope + 1e-16) break;
+      for (int i = 0; i < 3; ++i) next[i] = w[i] - length * step[i];
+      h = hessian(next);
+      third = times(h, next);
+      reached = dot3(third, next) / 12.0 + dot3(d, next);
+      if (reached <= phi - 1e-4 * length * slope + 1e-15) break;
     }
     w = next;
-    objective = reached;
-    if (length * step.norm() < 1e-15) break;
+    phi = reached;
   }
-  Vec3<S> out{S(w[0]), S(w[1]), S(w[2])};
-  if constexpr (!std::is_same_v<S, double>) {
-    derivatives(w, gradient, h);
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) H(i, j) = h[i][j];
-    H.diagonal().array() += 1e-14;
-    Eigen::Matrix<double, 3, dynamics::kDualSize> du;
-    for (int i = 0; i < 3; ++i) du.row(i) = u[i].v.transpose() / size;
-    const Eigen::Matrix<double, 3, dynamics::kDualSize> dw = -H.ldlt().solve(du);
-    for (int i = 0; i < 3; ++i) out[i].v = dw.row(i).transpose();
+  third = times(h, w);
+  const double inverse = 1.0 / std::sqrt(std::sqrt(dot3(third, w) / 12.0));
+  for (double& entry : w) entry *= inverse;
+  if constexpr (std::is_same_v<S, double>) {
+    return w;
+  } else {
+    // With w on the surface now: n = ∇gauge = ∇H/(4 gauge³), and dw → (1 − w nᵀ) dw/gauge.
+    Vec3<double> n;
+    for (int i = 0; i < 3; ++i) n[i] = third[i] * inverse * inverse * inverse / 12.0;
+    const Factored factored(h);
+    Mat3 jacobian;
+    for (int j = 0; j < 3; ++j) {
+      Vec3<double> unit{};
+      unit[j] = -inverse / (size * scale);
+      const Vec3<double> column = factored.solve(unit);
+      const double radial = dot3(n, column);
+      for (int i = 0; i < 3; ++i) jacobian[i][j] = column[i] - w[i] * radial;
+    }
+    return chain3(u, w, jacobian);
   }
-  const S scale = 1.0 / gauge(out);
-  return {scale * out[0], scale * out[1], scale * out[2]};
 }
 
-Vec3<double> ConvexQuartic::slip_direction(const Vec3<double>& w) const {
-  Vec3<double> gradient;
-  std::array<Vec3<double>, 3> hessian;
-  derivatives(w, gradient, hessian);
-  const double size = std::sqrt(dot3(gradient, gradient));
-  return {-gradient[0] / size, -gradient[1] / size, -gradient[2] / size};
+template <class S>
+Vec3<S> ConvexQuartic::slip_direction(const Vec3<S>& w) const {
+  const double scale = scale_of(w);
+  if (scale == 0.0) return {S(0.0), S(0.0), S(0.0)};
+  const Vec3<double> v{value_of(w[0]) / scale, value_of(w[1]) / scale, value_of(w[2]) / scale};
+  const Mat3 h = hessian(v);
+  Vec3<double> n = times(h, v);  // 3 ∇H
+  const double inverse = 1.0 / std::sqrt(dot3(n, n));
+  for (double& entry : n) entry *= -inverse;
+  if constexpr (std::is_same_v<S, double>) {
+    return n;
+  } else {
+    // d(∇H) = ∇²H dw, and −∇H/|∇H| turns by the part of it across itself.
+    Mat3 jacobian;
+    const Vec3<double> nh = times(h, n);
+    const double k = 3.0 * inverse / scale;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) jacobian[i][j] = -k * (h[i][j] - n[i] * nh[j]);
+    }
+    return chain3(w, n, jacobian);
+  }
 }
 
 template Vec3<double> ConvexQuartic::resist(const Vec3<double>&) const;
 template Vec3<Dual> ConvexQuartic::resist(const Vec3<Dual>&) const;
 template double ConvexQuartic::gauge(const Vec3<double>&) const;
 template Dual ConvexQuartic::gauge(const Vec3<Dual>&) const;
+template Vec3<double> ConvexQuartic::slip_direction(const Vec3<double>&) const;
+template Vec3<Dual> ConvexQuartic::slip_direction(const Vec3<Dual>&) const;
 
 }  // namespace unhand::contact

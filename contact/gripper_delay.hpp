@@ -43,6 +43,7 @@ class GripperDelay final : public ContactModelFrom<GripperDelay> {
   int mode_count() const override { return 1; }
   std::string_view mode_name(int) const override { return "carried"; }
   dynamics::FlowKind kind(int) const override { return dynamics::FlowKind::frozen; }
+  bool is_homogeneous(int) const override { return false; }
   int guard_count(int) const override { return 0; }
   dynamics::Guard guard(int, int) const override { return {}; }
   void separation(const NormalForce&, double& t) const override { t = open_command_ + delay_.a; }

@@ -207,7 +207,8 @@ Vec3<S> LimitSurface<Shape>::slip_acceleration(const Scene<S>& scene, const Rela
 template <class Shape>
 template <class S>
 Wrench<S> LimitSurface<Shape>::wrench_(int mode, const Scene<S>& scene, const Relative<S>& y) const {
-  if (mode == kStick) return sticking_wrench(scene, y);
+  // At the very onset of slip there is no direction yet, and the sticking wrench is on the surface.
+  if (mode == kStick || (y.slip.x == S(0) && y.slip.z == S(0) && y.spin == S(0))) return sticking_wrench(scene, y);
   const S f_max = patch<S>().f_max(scene.normal_force);
   return physical(resist(shape_, scene, normalised_slip(y)), f_max, patch<S>().length());
 }
@@ -235,8 +236,11 @@ void LimitSurface<Shape>::guards_(const Phase& phase, const SceneSource& source,
   if (phase.mode == kStick) {
     g[0] = stick_margin(source.scene(phase.window, t), y);
   } else {
-    const Vec3<S> u = normalised_slip(y);
-    g[0] = sqrt(dot3(u, u)) / kStopSpeed - 1.0;
+    State<S, 6> rate;
+    rate_(kSlip, source.scene(phase.window, t), y, rate);
+    const Vec3<S> u = normalised_slip(y), du{rate[3], rate[4], patch<S>().length() * rate[5]};
+    const S speed = sqrt(dot3(u, u));
+    g[0] = stop_guard(speed, S(dot3(u, du) / speed));
   }
 }
 

@@ -43,6 +43,7 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
   }
   int guard_count(int) const override { return 1; }
   dynamics::Guard guard(int mode, int) const override;
+  bool is_homogeneous(int mode) const override { return mode == kSlip; }
   double spin_length() const override { return patch_double_.length(); }
 
   template <class S>

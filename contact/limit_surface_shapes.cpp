@@ -1,106 +1,220 @@
 #include "contact/limit_surface_shapes.hpp"
 
-#include <algorithm>
+#include <type_traits>
 
 #include "contact/disc_friction.hpp"
 
 namespace unhand::contact {
 
-using dynamics::chain;
 using dynamics::Dual;
 using dynamics::value_of;
-using std::sqrt;
 
 namespace {
 
-/// dΨ/dm = −(2Φ′ + Ψ)/(2m), from ε F′ + T′ = 0; the quotient loses its digits towards m = 0, where Ψ′ is constant.
-double darm(double m, const DiscProfile& profile) {
-  constexpr double kSmall = 1e-5;
-  if (m >= kSmall) return -(2 * profile.dslide + profile.arm) / (2 * m);
-  static const double at_zero = [] {
-    const DiscProfile p = disc_profile(kSmall);
-    return -(2 * p.dslide + p.arm) / (2 * kSmall);
-  }();
-  return at_zero;
+// ∇² at x of a function of (a, b) = (|x_xz|, |x_τ|), homogeneous of degree 1: in (a, b) it is λ (b, −a)(b, −a)ᵀ, across
+// the slide it is k, the slope in a over a. `cross` = (λ b² − k)/a², which stays finite at a = 0.
+Mat3 isotropic_hessian(const Vec3<double>& x, double k, double cross, double lambda) {
+  const double xz = cross * x[0] * x[1], along = -lambda * x[2];
+  return {Vec3<double>{k + cross * x[0] * x[0], xz, along * x[0]},
+          Vec3<double>{xz, k + cross * x[1] * x[1], along * x[1]},
+          Vec3<double>{along * x[0], along * x[1], lambda * (x[0] * x[0] + x[1] * x[1])}};
 }
 
-/// The slip ratio ε whose (F, T) points along (a, b), a, b >= 0 not both zero: h(ε) = a T − b F falls from a·2/3 to −b.
-/// Newton's method with bisection in z, ε = z up to 1 and 1/(2 − z) beyond.
-double slip_ratio(double a, double b) {
-  if (a <= 0) return 0;
-  if (b <= 0) return std::numeric_limits<double>::infinity();
-  const double guess = a / (2.25 * b);  // the ellipsoid's
-  double low = 0, high = 2, z = guess <= 1 ? guess : 2 - 1 / guess;
-  for (int k = 0; k < 60; ++k) {
-    const double epsilon = z <= 1 ? z : 1 / (2 - z);
-    const DiscFriction f = disc_friction(epsilon);
-    const double h = a * f.torque - b * f.force;
-    (h > 0 ? low : high) = z;
-    const double slope = f.dforce * (a * epsilon + b) * (z <= 1 ? 1.0 : epsilon * epsilon);
-    double next = slope > 0 ? z + h / slope : 0.5 * (low + high);
-    if (!(next > low && next < high)) next = 0.5 * (low + high);
-    if (std::abs(next - z) <= 1e-15 * z) break;
-    z = next;
+// resist at u of ordinary size; the Jacobian too unless null.
+Vec3<double> disc_resist(const Vec3<double>& u, Mat3* jacobian) {
+  const double slide = u[0] * u[0] + u[1] * u[1], spin = 2.25 * u[2] * u[2];  // v², (ωR)²
+  if (slide <= spin) {
+    const double m = slide / spin, rim = 1.5 * std::abs(u[2]);
+    const DiscProfile p = disc_profile(m);
+    const double k = p.slide / rim;
+    if (jacobian) {
+      const double lambda = 2.25 * (p.slide + 2.0 * m * p.dslide) / (rim * spin);
+      *jacobian = isotropic_hessian(u, -k, -2.0 * p.dslide / (rim * spin), -lambda);
+    }
+    return {-k * u[0], -k * u[1], std::copysign(1.5 * p.spin, -u[2])};
   }
-  return z <= 1 ? z : 1 / (2 - z);
+  const double m = spin / slide, inverse = 1.0 / std::sqrt(slide);
+  const DiscProfile p = disc_profile(m);
+  const double k = p.slide * inverse;
+  if (jacobian) {
+    const double lambda = -4.5 * p.dslide * inverse / slide;
+    *jacobian = isotropic_hessian(u, -k, -(lambda * u[2] * u[2] - k) / slide, -lambda);
+  }
+  return {-k * u[0], -k * u[1], -2.25 * p.arm * inverse * u[2]};
 }
 
-/// The unit-free outward normal (n_xz, n_τ) at slip ratio ε, scaled so that n · w* = 1 on the surface.
-void scaled_normal(double epsilon, double& n_slide, double& n_spin) {
-  const DiscFriction f = disc_friction(epsilon);
-  if (epsilon <= 1) {
-    const double power = epsilon * f.force + f.torque;
-    n_slide = epsilon / power;
-    n_spin = (2.0 / 3.0) / power;
+// The point of the disc's surface on a ray: (F, T̂) ∝ (p, q), T̂ = T/(2/3).
+struct RayPoint {
+  bool inner;     // ε ≤ 1
+  double t;       // ε if inner, else δ = 1/ε
+  double gauge;   // p/F = q/T̂
+  double slide;   // Φ
+  double dslide;  // Φ′
+  double dforce;  // dF/dt: F′(ε) if inner
+  double torque;  // T̂
+  double power;   // t-scaled dissipation: 1.5 ε F + T̂ if inner, else 1.5 F + δ T̂
+};
+
+// Solves h(t) = 0, h = F q − T̂ p if inner and T̂ p − F q if not, by Newton's method kept inside a bracket (h rises; at
+// most 50 steps, rarely more than 3). The gauge is the maximum over t of (1.5 t p + q)/power, or (1.5 p + t q)/power,
+// whose slope is −1.5 h/power²: one more term of its series leaves an error of the third order in the last step.
+RayPoint disc_ray(double p, double q, double accuracy) {
+  RayPoint r{};
+  r.inner = p <= 2.0 * q;  // F(1)/T̂(1) = 2
+  // Start: t over the ratio as a polynomial in the ratio's square, interpolated at Chebyshev points to 2e-3.
+  const double ratio = r.inner ? p / q : q / p, s = ratio * ratio;
+  double t = ratio;
+  if (r.inner) {
+    t *= 0.9939 + s * (-0.50409 + s * (0.31741 + s * (-0.122698 + s * (0.0244012 - s * 0.00190529))));
   } else {
-    const double delta = 1 / epsilon, power = f.force + delta * f.torque;
-    n_slide = 1 / power;
-    n_spin = (2.0 / 3.0) * delta / power;
+    t *= 2.66666 + s * (-3.949 + s * (8.683 + s * (-22.68 + s * (48.41 - s * 58.16))));
   }
+  double low = 0.0, high = 1.0;
+  for (int iteration = 0; iteration < 50; ++iteration) {
+    const DiscProfile at = disc_profile(t * t);
+    double force, h, dh, gain;
+    if (r.inner) {
+      force = t * at.slide;
+      r.torque = 1.5 * at.spin;
+      r.dforce = at.slide + 2.0 * t * t * at.dslide;
+      r.power = 1.5 * t * force + r.torque;
+      h = force * q - r.torque * p;
+      dh = r.dforce * (q + 1.5 * t * p);
+      gain = 1.5 * t * p + q;
+    } else {
+      force = at.slide;
+      r.torque = 1.5 * t * at.arm;
+      r.dforce = 2.0 * t * at.dslide;
+      r.power = 1.5 * force + t * r.torque;
+      h = r.torque * p - force * q;
+      dh = -at.dslide * (3.0 * p + 2.0 * t * q);
+      gain = 1.5 * p + t * q;
+    }
+    (h > 0.0 ? high : low) = t;
+    double next = t - h / dh;
+    if (!(next >= low && next <= high)) next = 0.5 * (low + high);
+    const double step = next - t;
+    r.t = next;
+    if (std::abs(step) <= accuracy || iteration == 49) {
+      r.gauge = (gain - 0.75 * h * step / r.power) / r.power;
+      r.slide = at.slide + at.dslide * (next * next - t * t);
+      r.dslide = at.dslide;
+      if (r.inner) {
+        r.torque -= 1.5 * t * r.dforce * step;
+        r.power += 1.5 * force * step;
+      } else {
+        r.torque -= 3.0 * at.dslide * step;
+        r.power += r.torque * step;
+      }
+      break;
+    }
+    t = next;
+  }
+  return r;
+}
+
+// ∇gauge at w, and ∇² unless null.
+Vec3<double> disc_gradient(const RayPoint& r, const Vec3<double>& w, Mat3* hessian) {
+  const double g = r.gauge, along = r.inner ? 1.0 / (g * r.slide) : 1.0 / std::hypot(w[0], w[1]);  // ε/p, 1/p
+  const double k = 1.5 * along / r.power;
+  if (hessian) {
+    const double gp = g * r.power, cube = gp * gp * gp;
+    if (r.inner) {
+      const double f = r.slide, m = r.t * r.t, lambda = 1.5 / (cube * r.dforce);
+      const double bend =
+          2.0 * r.dslide * r.power * r.power + f * f * (3.0 * r.torque + 2.25 * m * f);
+      *hessian = isotropic_hessian(w, k, -lambda * bend / (f * f * f), lambda);
+    } else {
+      const double lambda = -0.75 / (cube * r.dslide);
+      *hessian = isotropic_hessian(w, k, (lambda * w[2] * w[2] - k) * along * along, lambda);
+    }
+  }
+  return {k * w[0], k * w[1], std::copysign((r.inner ? 1.0 : r.t) / r.power, w[2])};
+}
+
+constexpr double kForValue = 1e-6, kForGradient = 1e-7;  // last Newton step
+
+// w scaled to a largest entry of 1, as the ray wants it; false if w is zero or not a number.
+template <class S>
+bool to_unit(const Vec3<S>& w, Vec3<double>& unit, double& scale) {
+  unit = {value_of(w[0]), value_of(w[1]), value_of(w[2])};
+  scale = std::max({std::abs(unit[0]), std::abs(unit[1]), std::abs(unit[2])});
+  const double sum = unit[0] + unit[1] + unit[2];
+  if (!(scale > 0.0) || std::isnan(sum)) {
+    scale = sum;  // 0 or NaN: max alone does not tell
+    return false;
+  }
+  for (double& entry : unit) entry /= scale;
+  return true;
 }
 
 }  // namespace
 
 template <class S>
 Vec3<S> UniformDisc::resist(const Vec3<S>& u) const {
-  const S slide = u[0] * u[0] + u[1] * u[1], spin = 2.25 * u[2] * u[2];  // v², (ωR)²
-  if (value_of(slide) <= value_of(spin)) {
-    const S m = slide / spin;
-    const DiscProfile p = disc_profile(std::min(value_of(m), 1.0));
-    const S phi = chain(m, p.slide, p.dslide), torque = chain(m, p.spin, -0.5 * (p.slide + 2 * value_of(m) * p.dslide));
-    const S rim = value_of(u[2]) > 0 ? S(1.5 * u[2]) : S(-1.5 * u[2]);  // |ω| R
-    const S k = -phi / rim;
-    return {k * u[0], k * u[1], value_of(u[2]) > 0 ? S(-1.5 * torque) : S(1.5 * torque)};
+  Vec3<double> v{value_of(u[0]), value_of(u[1]), value_of(u[2])};
+  const double scale = scale_of(v);
+  if (scale == 0.0) return {S(0.0), S(0.0), S(0.0)};
+  if (scale != 1.0) {
+    for (double& entry : v) entry /= scale;
   }
-  const S m = spin / slide, inverse = 1.0 / sqrt(slide);
-  const DiscProfile p = disc_profile(std::min(value_of(m), 1.0));
-  const S phi = chain(m, p.slide, p.dslide), psi = chain(m, p.arm, darm(value_of(m), p));
-  return {-phi * inverse * u[0], -phi * inverse * u[1], -2.25 * psi * inverse * u[2]};
+  if constexpr (std::is_same_v<S, double>) {
+    return disc_resist(v, nullptr);
+  } else {
+    Mat3 jacobian;
+    const Vec3<double> w = disc_resist(v, &jacobian);
+    if (scale != 1.0) {
+      for (auto& row : jacobian) {
+        for (double& entry : row) entry /= scale;
+      }
+    }
+    return chain3(u, w, jacobian);
+  }
 }
 
 template <class S>
 S UniformDisc::gauge(const Vec3<S>& w) const {
-  const double x = value_of(w[0]), z = value_of(w[1]), tau = value_of(w[2]), slide = std::hypot(x, z);
-  if (slide == 0 && tau == 0) return S(0);
-  double n_slide, n_spin;
-  scaled_normal(slip_ratio(slide, std::abs(tau) * 2 / 3), n_slide, n_spin);
-  // The gauge is stationary in ε, so n · w is its value and n its gradient.
-  const double nx = slide > 0 ? n_slide * x / slide : 0.0, nz = slide > 0 ? n_slide * z / slide : 0.0;
-  return nx * w[0] + nz * w[1] + std::copysign(n_spin, tau) * w[2];
+  Vec3<double> unit;
+  double scale;
+  if (!to_unit(w, unit, scale)) return S(scale);
+  const double slide = std::sqrt(unit[0] * unit[0] + unit[1] * unit[1]);
+  if constexpr (std::is_same_v<S, double>) {
+    return scale * disc_ray(slide, std::abs(unit[2]), kForValue).gauge;
+  } else {
+    const RayPoint r = disc_ray(slide, std::abs(unit[2]), kForGradient);
+    const Vec3<double> gradient = disc_gradient(r, unit, nullptr);
+    return S(scale * r.gauge, gradient[0] * w[0].v + gradient[1] * w[1].v + gradient[2] * w[2].v);
+  }
 }
 
-Vec3<double> UniformDisc::slip_direction(const Vec3<double>& w) const {
-  const double slide = std::hypot(w[0], w[1]);
-  double n_slide, n_spin;
-  scaled_normal(slip_ratio(slide, std::abs(w[2]) * 2 / 3), n_slide, n_spin);
-  const double size = std::hypot(n_slide, n_spin);
-  return {slide > 0 ? -n_slide / size * w[0] / slide : 0.0, slide > 0 ? -n_slide / size * w[1] / slide : 0.0,
-          -std::copysign(n_spin / size, w[2])};
+template <class S>
+Vec3<S> UniformDisc::slip_direction(const Vec3<S>& w) const {
+  Vec3<double> unit;
+  double scale;
+  if (!to_unit(w, unit, scale)) return {S(scale), S(scale), S(scale)};
+  const double slide = std::sqrt(unit[0] * unit[0] + unit[1] * unit[1]);
+  const RayPoint r = disc_ray(slide, std::abs(unit[2]), kForGradient);
+  Mat3 h;
+  Vec3<double> n = disc_gradient(r, unit, std::is_same_v<S, double> ? nullptr : &h);
+  const double inverse = 1.0 / std::sqrt(dot3(n, n));
+  for (double& entry : n) entry *= -inverse;
+  if constexpr (std::is_same_v<S, double>) {
+    return n;
+  } else {
+    Mat3 jacobian;  // −(1 − n nᵀ) ∇²gauge/|∇gauge|
+    const Vec3<double> nh{dot3(n, h[0]), dot3(n, h[1]), dot3(n, h[2])};
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) jacobian[i][j] = -(h[i][j] - n[i] * nh[j]) * inverse / scale;
+    }
+    return chain3(w, n, jacobian);
+  }
 }
 
 template Vec3<double> UniformDisc::resist(const Vec3<double>&) const;
 template Vec3<Dual> UniformDisc::resist(const Vec3<Dual>&) const;
 template double UniformDisc::gauge(const Vec3<double>&) const;
 template Dual UniformDisc::gauge(const Vec3<Dual>&) const;
+template Vec3<double> UniformDisc::slip_direction(const Vec3<double>&) const;
+template Vec3<Dual> UniformDisc::slip_direction(const Vec3<Dual>&) const;
 
 }  // namespace unhand::contact

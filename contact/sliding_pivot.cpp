@@ -128,6 +128,8 @@ dynamics::FlowKind SlidingPivot::kind(int mode) const {
   return mode == mode_of(kStuck, kLocked) ? dynamics::FlowKind::frozen : dynamics::FlowKind::smooth;
 }
 
+bool SlidingPivot::is_homogeneous(int mode) const { return translation_of(mode) == kBrake; }
+
 bool SlidingPivot::may_feed_energy(int mode) const { return translation_of(mode) == kSlide; }
 
 int SlidingPivot::guard_count(int mode) const {
@@ -168,7 +170,9 @@ void SlidingPivot::guards_(const Phase& phase, const SceneSource& source, const 
   }
   const S force = margin(dot(now.carrying_force, now.carrying_force), S(force_limit * force_limit));
   if (translation_of(mode) == kBrake) {
-    g[kTranslationGuard] = norm(y.slip) / kStopSpeed - 1.0;
+    const State<S, 6> rate = relative_rate(scene, y, now.wrench);
+    const S speed = norm(y.slip);
+    g[kTranslationGuard] = stop_guard(speed, S((y.slip.x * rate[3] + y.slip.z * rate[4]) / speed));
     if (slide_end_ == SlideEnd::memoryless) g[kSlideAgain] = force;
   } else {
     g[kTranslationGuard] = force;
@@ -189,15 +193,6 @@ void SlidingPivot::rate_(int mode, const Scene<S>& scene, const Relative<S>& y, 
     dy = relative_rate(scene, y, now.wrench);
     dy[5] = now.spin_acceleration;  // exactly zero while locked
   }
-}
-
-double SlidingPivot::max_step(const Phase& phase, const SceneSource& source, double t,
-                              const Relative<double>& y) const {
-  if (translation_of(phase.mode) != kBrake) return std::numeric_limits<double>::infinity();
-  State<double, 6> dy;
-  rate_(phase.mode, source.scene(phase.window, t), y, dy);
-  const double speed = norm(y.slip);
-  return longest_step_to_stop(speed, (y.slip.x * dy[3] + y.slip.z * dy[4]) / speed);
 }
 
 template <class S>

@@ -44,7 +44,7 @@ class SlidingPivot final : public ContactModelFrom<SlidingPivot> {
   int guard_count(int mode) const override;
   dynamics::Guard guard(int mode, int index) const override;
   bool may_feed_energy(int mode) const override;
-  double max_step(const Phase&, const SceneSource&, double t, const Relative<double>&) const override;
+  bool is_homogeneous(int mode) const override;
 
   template <class S>
   Wrench<S> wrench_(int mode, const Scene<S>&, const Relative<S>&) const;

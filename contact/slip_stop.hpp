@@ -3,20 +3,21 @@
 // a straight line.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "dynamics/scalar.hpp"
 
 namespace unhand::contact {
 
-/// Slip speed [m/s] at which a stop is extrapolated. At decelerations of 1 to 100 m/s² what is left takes 1e-7 to
-/// 1e-9 s, and the error of the straight line is of second order in that.
-inline constexpr double kStopSpeed = 1e-7;
+/// Time before a stop [s] at which the rest is taken as a straight line; its error is of second order in this.
+inline constexpr double kStopTime = 1e-8;
 
-/// Longest step [s] for a slip of size `speed` [m/s] that changes at `rate` [m/s²]: a tenth of it must be left.
-inline double longest_step_to_stop(double speed, double rate) {
-  if (!(rate < 0)) return std::numeric_limits<double>::infinity();
-  return std::max(0.9 * speed / -rate, 0.1 * kStopSpeed / -rate);
+/// Falls through zero when a slip of size `speed` [m/s] that changes at `rate` [m/s²] is kStopTime away from rest, whatever
+/// its size: positive while the slip grows, however small it still is. In [−1, 1].
+template <class S>
+S stop_guard(const S& speed, const S& rate) {
+  const double size = dynamics::value_of(speed) + kStopTime * std::abs(dynamics::value_of(rate));
+  return (speed + kStopTime * rate) / (size + 1e-300);
 }
 
 }  // namespace unhand::contact

@@ -109,7 +109,7 @@ class HybridSystem {
       scale[i] = tolerances.absolute + tolerances.relative * std::max(std::abs(y0[i]), std::abs(y1[i]));
   }
 
-  /// An upper bound [s] on the next step, for flows that are singular at a point they approach.
+  /// An upper bound [s] on the next step, for flows whose guards change faster than the flow itself.
   virtual double max_step(const Phase&, double /*t*/, const State<double, N>& /*y*/) const {
     return std::numeric_limits<double>::infinity();
   }

@@ -8,8 +8,8 @@
 
 #include "dynamics/dormand_prince.hpp"
 #include "dynamics/paced_stepper.hpp"
+#include "dynamics/radau.hpp"
 #include "dynamics/rosenbrock.hpp"
-#include "dynamics/sdirk.hpp"
 
 namespace unhand::dynamics {
 
@@ -54,7 +54,7 @@ class Frozen final : public Stepper<S, N> {
 template <class S, int N>
 std::unique_ptr<Stepper<S, N>> make_stepper(Method method, FlowKind kind, const Tolerances& tolerances) {
   if (method == Method::dormand_prince) return std::make_unique<DormandPrince<S, N>>(tolerances);
-  if (method == Method::sdirk) return std::make_unique<Sdirk<S, N>>(tolerances);
+  if (method == Method::radau) return std::make_unique<Radau<S, N>>(tolerances);
   if constexpr (std::is_same_v<S, double>) {
     if (method == Method::rosenbrock) return std::make_unique<Rosenbrock<N>>(tolerances);
     return make_cvode_stepper<N>(tolerances, kind);
@@ -96,7 +96,7 @@ class Steppers {
   Method method(FlowKind kind) const {
     if (options_.method != Method::automatic) return options_.method;
     if (kind == FlowKind::smooth) return Method::dormand_prince;
-    return std::is_same_v<S, double> ? Method::rosenbrock : Method::sdirk;
+    return std::is_same_v<S, double> ? Method::rosenbrock : Method::radau;
   }
 
   const IntegratorOptions& options_;

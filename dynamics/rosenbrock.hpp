@@ -12,7 +12,7 @@ namespace unhand::dynamics {
 /// iteration, so nothing fails to converge. Dense output of order 4. Unlike RODAS ([HairerWanner1996] IV.7) it keeps
 /// its order where the solution follows a slowly moving equilibrium of the stiff part, which is what slip does: there
 /// RODAS needs ten times the steps. Values only: the tangent of a Rosenbrock step would need the derivative of its
-/// Jacobian (Sdirk carries derivatives through stiff phases).
+/// Jacobian (Radau carries derivatives through stiff phases).
 template <int N>
 class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
  public:

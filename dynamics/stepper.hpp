@@ -173,8 +173,8 @@ class SingleStep : public Stepper<S, N> {
 };
 
 /// The ways of stepping a flow; `automatic` takes dormand_prince for smooth modes and, for stiff ones, rosenbrock
-/// with double and sdirk with Dual.
-enum class Method { automatic, dormand_prince, rosenbrock, sdirk, cvode };
+/// with double and radau with Dual.
+enum class Method { automatic, dormand_prince, rosenbrock, radau, cvode };
 
 /// CVODE (SUNDIALS) behind the same interface: Adams for smooth, BDF with the exact Jacobian for stiff modes. It is
 /// the oracle of the other steppers; double only.

@@ -55,23 +55,19 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   std::string_view mode_name(int mode) const override { return mode == free_ ? "free" : contact_.mode_name(mode); }
   int guard_count(int mode) const override { return contact_.guard_count(mode); }
   dynamics::Guard guard(int mode, int index) const override { return contact_.guard(mode, index); }
-  double max_step(const Phase& p, double t, const State<double, 6>& y) const override {
-    return contact_.max_step(p, *this, t, Relative<double>::from(y));
-  }
-  bool is_paced(int mode) const override { return contact_.is_homogeneous() && contact_.kind(mode) == dynamics::FlowKind::stiff; }
+  bool is_paced(int mode) const override { return contact_.is_homogeneous(mode); }
   double pace(const Phase&, double, const State<double, 6>& y) const override { return slip_size(y); }
   Dual pace(const Phase&, const Dual&, const State<Dual, 6>& y) const override { return slip_size(y); }
 
   void error_scale(const Phase& p, const dynamics::Tolerances& tolerances, const State<double, 6>& y0,
                    const State<double, 6>& y1, State<double, 6>& scale) const override {
     dynamics::HybridSystem<6>::error_scale(p, tolerances, y0, y1, scale);
-    const double length = contact_.spin_length();
-    if (length == 0) return;
+    if (!contact_.is_homogeneous(p.mode)) return;
     // The absolute part is what a slip at its onset may be wrong by: far below the speed at which a stop is taken.
-    const double speed = std::max(slip_size(y0), slip_size(y1));
+    const double length = contact_.spin_length(), speed = std::max(slip_size(y0), slip_size(y1));
     const double slip = 1e-3 * tolerances.absolute + tolerances.relative * speed;
     scale[3] = scale[4] = slip;
-    scale[5] = slip / length;
+    if (length > 0) scale[5] = slip / length;
   }
 
   template <class S>

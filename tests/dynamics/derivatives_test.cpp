@@ -17,7 +17,7 @@ class Derivatives : public testing::TestWithParam<Method> {
   }
 };
 INSTANTIATE_TEST_SUITE_P(, Derivatives,
-                         testing::Values(Method::automatic, Method::dormand_prince, Method::sdirk),
+                         testing::Values(Method::automatic, Method::dormand_prince, Method::radau),
                          [](const auto& test) { return name_of(test.param); });
 
 /// The smallest error of a central difference of f against `derivative` over steps of 1e-1 to 1e-7: as a

@@ -1,7 +1,7 @@
 // The steppers one by one: order, stiffness, dense output, restarts and derivatives of the discrete solution.
 #include "dynamics/dormand_prince.hpp"
 #include "dynamics/rosenbrock.hpp"
-#include "dynamics/sdirk.hpp"
+#include "dynamics/radau.hpp"
 #include "tests/dynamics/toy_systems.hpp"
 
 namespace unhand::dynamics {
@@ -33,7 +33,7 @@ State<double, 2> smooth_solution(double t) {
 
 template <class T>
 class SingleSteps : public testing::Test {};
-using Steppers = testing::Types<DormandPrince<double, 2>, Rosenbrock<2>, Sdirk<double, 2>>;
+using Steppers = testing::Types<DormandPrince<double, 2>, Rosenbrock<2>, Radau<double, 2>>;
 TYPED_TEST_SUITE(SingleSteps, Steppers);
 
 template <class Stepper, class System>
@@ -65,13 +65,13 @@ TYPED_TEST(SingleSteps, ConvergeWithTheirOrder) {
   // A wrong digit in any coefficient leaves an error of lower order, which halving the step uncovers.
   const auto problem = smooth_problem();
   const double order = TypeParam::kOrder;
-  if (std::is_same_v<TypeParam, Sdirk<double, 2>>) {
+  if (std::is_same_v<TypeParam, Radau<double, 2>>) {
     // Its Newton tolerance is its step tolerance: the order shows in the error against the number of steps
     // instead.
     double last = NAN, last_steps = NAN;
     for (const double tolerance : {1e-6, 1e-8, 1e-10}) {
       IntegratorOptions o;
-      o.method = Method::sdirk;
+      o.method = Method::radau;
       o.tolerances = {tolerance, tolerance};
       o.longest_step = 10;
       const auto end = run(problem, smooth_solution(0.2), 3.0, o, 0.2);
@@ -155,7 +155,7 @@ TYPED_TEST(SingleSteps, RetakingTheWholeStepIsTheStepAndLeavesItAlone) {
     stepper.interpolate(0.4, after);
     EXPECT_EQ(before[0], after[0]);
     EXPECT_NEAR(whole[0], stepper.y1()[0],
-                1e-10);  // Sdirk's iterations start elsewhere: 1e-3 of the tolerance
+                1e-10);  // Radau's iterations start elsewhere: 1e-3 of the tolerance
     const auto exact = smooth_solution(0.5 * (stepper.t0() + stepper.t1()));
     EXPECT_NEAR(half[0], exact[0], 1e-6);
   }
@@ -206,7 +206,7 @@ TEST(Fsal, TheLastStageIsTheFirstOfTheNextStep) {
 
 class Stiff : public testing::TestWithParam<Method> {};
 INSTANTIATE_TEST_SUITE_P(, Stiff,
-                         testing::Values(Method::automatic, Method::rosenbrock, Method::sdirk, Method::cvode),
+                         testing::Values(Method::automatic, Method::rosenbrock, Method::radau, Method::cvode),
                          [](const auto& test) { return name_of(test.param); });
 
 IntegratorOptions stiff_options(Method method, double tolerance) {
@@ -263,7 +263,7 @@ TEST_P(Stiff, VanDerPolAgainstTightCvode) {
 
 template <class T>
 class LStable : public testing::Test {};
-using Implicit = testing::Types<Rosenbrock<2>, Sdirk<double, 2>>;
+using Implicit = testing::Types<Rosenbrock<2>, Radau<double, 2>>;
 TYPED_TEST_SUITE(LStable, Implicit);
 
 TYPED_TEST(LStable, AnInfinitelyFastDecayIsGoneInOneStep) {
@@ -289,7 +289,7 @@ TYPED_TEST(LStable, AnInfinitelyFastDecayIsGoneInOneStep) {
 
 template <class T>
 class WithDual : public testing::Test {};
-using Differentiable = testing::Types<DormandPrince<Dual, 2>, Sdirk<Dual, 2>>;
+using Differentiable = testing::Types<DormandPrince<Dual, 2>, Radau<Dual, 2>>;
 TYPED_TEST_SUITE(WithDual, Differentiable);
 
 TYPED_TEST(WithDual, IsThatOfTheSolution) {

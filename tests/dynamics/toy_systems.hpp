@@ -122,8 +122,8 @@ inline std::string name_of(Method method) {
       return "dormand_prince";
     case Method::rosenbrock:
       return "rosenbrock";
-    case Method::sdirk:
-      return "sdirk";
+    case Method::radau:
+      return "radau";
     case Method::cvode:
       return "cvode";
   }
@@ -145,7 +145,7 @@ class EveryMethod : public testing::TestWithParam<Method> {
 #define UNHAND_EVERY_METHOD(Suite)                                                                        \
   INSTANTIATE_TEST_SUITE_P(, Suite,                                                                       \
                            testing::Values(Method::automatic, Method::dormand_prince, Method::rosenbrock, \
-                                           Method::sdirk, Method::cvode),                                 \
+                                           Method::radau, Method::cvode),                                 \
                            [](const auto& test) { return name_of(test.param); })
 
 template <class System>

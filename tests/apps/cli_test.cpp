@@ -1,0 +1,366 @@
+// The built command, as a user meets it: exit codes, messages, files.
+#include <gmock/gmock.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "datasets/slip_log.hpp"
+#include "datasets/throw_log.hpp"
+
+namespace unhand {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+namespace fs = std::filesystem;
+
+struct Answer {
+  int code{};
+  std::string out, err;
+};
+
+std::string content(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+json read_json(const fs::path& file) { return json::parse(content(file)); }
+
+/// Every test has a folder of its own; a tiny campaign is made once for all.
+class Cli : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    shared = fs::temp_directory_path() / ("unhand_cli_" + std::to_string(getpid()));
+    fs::create_directory(shared);
+    ASSERT_EQ(run_in(shared, "generate quick12 --seed 3 --out quick.h5").code, 0);
+    write_flights(shared / "flights.h5");
+  }
+  static void TearDownTestSuite() { fs::remove_all(shared); }
+
+  void SetUp() override {
+    folder = shared / testing::UnitTest::GetInstance()->current_test_info()->name();
+    fs::create_directory(folder);
+    quick = (shared / "quick.h5").string();
+    flights = (shared / "flights.h5").string();
+  }
+
+  static Answer run_in(const fs::path& where, const std::string& arguments,
+                       const std::string& environment = "") {
+    const fs::path out = shared / "stdout.txt", err = shared / "stderr.txt";
+    const std::string command = "cd '" + where.string() + "' && " + environment + " '" UNHAND_BINARY "' " +
+                                arguments + " >'" + out.string() + "' 2>'" + err.string() + "' </dev/null";
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, content(out), content(err)};
+  }
+  Answer run(const std::string& arguments, const std::string& environment = "") const {
+    return run_in(folder, arguments, environment);
+  }
+
+  std::set<std::string> files() const {
+    std::set<std::string> names;
+    for (const auto& entry : fs::recursive_directory_iterator(folder))
+      names.insert(fs::relative(entry.path(), folder).string());
+    return names;
+  }
+
+  /// One line on stderr, nothing on stdout, nothing written.
+  void expect_refusal(const std::string& arguments, int code, const std::string& reason) {
+    const auto before = files();
+    const Answer answer = run(arguments);
+    EXPECT_EQ(answer.code, code) << arguments << "\n" << answer.err;
+    EXPECT_THAT(answer.err, HasSubstr(reason)) << arguments;
+    EXPECT_THAT(answer.out, IsEmpty()) << arguments;
+    EXPECT_EQ(files(), before) << arguments;
+    if (code == 3) EXPECT_EQ(std::count(answer.err.begin(), answer.err.end(), '\n'), 1) << answer.err;
+  }
+
+  /// Cubes that fall without air, tracked without noise.
+  static void write_flights(const fs::path& file) {
+    datasets::ThrowLog log;
+    log.dimension = 3;
+    log.title = "falling cubes";
+    log.source = "made by a test";
+    log.objects["cube"].mass = 0.4;
+    log.objects["cube"].inertia = std::vector<double>{1e-3, 1e-3, 1e-3};
+    for (int n = 0; n < 5; ++n) {
+      datasets::Throw one;
+      one.id = "toss-" + std::to_string(n);
+      one.object = "cube";
+      one.condition = "toss";
+      one.repetition = n;
+      one.split = n == 4 ? datasets::Split::test : datasets::Split::train;
+      datasets::MocapLog& mocap = one.mocap.emplace();
+      mocap.time = {40, 1, {}, {}};
+      mocap.pose = {40, 7, {}, {}};
+      for (int i = 0; i < 40; ++i) {
+        const double t = 0.01 * i, half = 0.5 * (1 + n) * t;
+        mocap.time.data.push_back(t);
+        for (const double value : {0.3 * n + 1.1 * t, 0.2 * t, 1 + 0.5 * t - 0.5 * 9.81 * t * t,
+                                   std::cos(half), 0.0, 0.0, std::sin(half)})
+          mocap.pose.data.push_back(value);
+      }
+      log.throws.push_back(std::move(one));
+    }
+    datasets::write_throw_log(file, log);
+  }
+
+  static inline fs::path shared;
+  fs::path folder;
+  std::string quick, flights;
+};
+
+TEST_F(Cli, HelpHasAnExampleEverywhere) {
+  EXPECT_EQ(run("--help").code, 0);
+  EXPECT_THAT(run("--version").out, HasSubstr("unhand "));
+  for (const std::string command : {"generate", "import", "inspect", "compare", "predict"}) {
+    const Answer answer = run(command + " --help");
+    EXPECT_EQ(answer.code, 0) << command;
+    for (const char* word : {"Example", "--json", "--threads"})
+      EXPECT_THAT(answer.out, HasSubstr(word)) << command;
+  }
+}
+
+TEST_F(Cli, WrongUsage) {
+  EXPECT_EQ(run("").code, 2);
+  EXPECT_EQ(run("juggle").code, 2);
+  EXPECT_EQ(run("compare").code, 2);
+  EXPECT_EQ(run("inspect " + quick + " --threads -1").code, 2);
+  expect_refusal("generate nonsense --out a.h5", 2, "batch180");
+  expect_refusal("generate quick12 --out a.h5 --effect flight.wind=1", 2, "no effects are registered");
+  expect_refusal("import nonsense in.csv --out a.h5", 2, "cube-tosses");
+  expect_refusal("compare " + quick + " --models sliding_pivot,wishful", 2, "wishful");
+  expect_refusal("compare " + quick + " --models sliding_pivot,sliding_pivot", 2, "twice");
+  expect_refusal("compare " + quick + " --rtol 7", 2, "rtol");
+}
+
+TEST_F(Cli, FittingIsNotPretended) {
+  expect_refusal("compare " + quick + " --fit --json a.json", 1, "not in this version");
+}
+
+TEST_F(Cli, BadInput) {
+  std::ofstream(folder / "text.h5") << "this is no HDF5";
+  std::ofstream(folder / "empty.h5");
+  const std::string whole = content(quick);
+  std::ofstream(folder / "half.h5", std::ios::binary) << whole.substr(0, whole.size() / 2);
+  datasets::SlipLog slips;
+  slips.surfaces["felt"] = {1.0, 0.05, "felt", {}, {}};
+  slips.surfaces["felt"].slips.push_back({"001",
+                                          datasets::Split::train,
+                                          {2, 1, {0, 0.1}, {}},
+                                          {2, 3, {1, 0, 0, 1, 0, 0}, {}},
+                                          {2, 3, {1, 0, 0, 1, 0, 0}, {}}});
+  datasets::write_slip_log(folder / "slips.h5", slips);
+  for (const std::string file : {"none.h5", "text.h5", "empty.h5", "half.h5"}) {
+    expect_refusal("inspect " + file + " --json a.json", 3, file + ": ");
+    expect_refusal("compare " + file + " --json a.json --report r", 3, file + ": ");
+  }
+  expect_refusal("compare slips.h5 --json a.json", 3, "slips.h5: /@schema: is a slip-log");
+  expect_refusal("compare " + flights + " --models sliding_pivot", 3, "free flights");
+  expect_refusal("compare " + quick + " --models projectile", 3, "projectile");
+  expect_refusal("import cube-tosses none.csv --out a.h5", 3, "none.csv: ");
+  const Answer slip = run("inspect slips.h5 --json slips.json");
+  EXPECT_EQ(slip.code, 0) << slip.err;
+  EXPECT_EQ(read_json(folder / "slips.json")["surfaces"]["felt"]["slips"], 1);
+}
+
+TEST_F(Cli, UnwritableOutputs) {
+  std::ofstream(folder / "file") << "in the way";
+  fs::create_directory(folder / "folder");
+  const std::string models = " --models gripper_delay";
+  expect_refusal("generate quick12 --out none/a.h5", 1, "none/a.h5: cannot be written");
+  expect_refusal("generate quick12 --out folder", 1, "it is a directory");
+  expect_refusal("inspect " + quick + " --json none/a.json", 1, "cannot be written");
+  expect_refusal("compare " + quick + models + " --json none/a.json --report r", 1, "cannot be written");
+  expect_refusal("compare " + quick + models + " --json a.json --report file/r", 1, "cannot be written");
+  expect_refusal("compare " + quick + models + " --json a.json --write-cards file", 1, "cannot be written");
+}
+
+TEST_F(Cli, GenerateIsRepeatable) {
+  ASSERT_EQ(run("generate quick12 --seed 3 --threads 1 --out a.h5 --json a.json").code, 0);
+  EXPECT_EQ(content(folder / "a.h5"), content(quick));
+  ASSERT_EQ(run("generate quick12 --seed 4 --out a.h5").code, 0);  // replaced
+  EXPECT_NE(content(folder / "a.h5"), content(quick));
+  EXPECT_EQ(read_json(folder / "a.json")["throws"], 12);
+  EXPECT_THAT(files(), testing::ElementsAre("a.h5", "a.json"));
+}
+
+TEST_F(Cli, Inspect) {
+  const Answer answer = run("inspect " + quick + " --json a.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("12 throws"));
+  EXPECT_THAT(answer.out, HasSubstr("mocap"));
+  EXPECT_THAT(answer.err, IsEmpty());  // no progress bar in a pipe
+  const json seen = read_json(folder / "a.json");
+  EXPECT_EQ(seen["schema"], "inspect");
+  EXPECT_EQ(seen["throws"], 12);
+  EXPECT_EQ(json::parse(run("inspect " + quick + " --json").out), seen);
+}
+
+/// Without what depends on the clock.
+json timeless(json comparison) {
+  for (auto& [name, model] : comparison["models"].items()) model.erase("microseconds_per_throw");
+  return comparison;
+}
+
+TEST_F(Cli, CompareReleases) {
+  const std::string models = "compare " + quick + " --models sliding_pivot,limit_surface,gripper_delay ";
+  ASSERT_EQ(run(models + "--threads 1 --json one.json").code, 0);
+  const Answer answer = run(models + "--threads 2 --json two.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("landing theta [deg]"));
+  EXPECT_THAT(answer.err, IsEmpty());
+  const json one = read_json(folder / "one.json");
+  EXPECT_EQ(timeless(one), timeless(read_json(folder / "two.json")));
+  EXPECT_EQ(one["schema"], "compare");
+  EXPECT_EQ(one["schema_version"], 1);
+  EXPECT_TRUE(one.contains("log"));
+  ASSERT_EQ(one["models"].size(), 3u);
+  for (const auto& [name, model] : one["models"].items()) {
+    EXPECT_FALSE(model["parameters"].empty()) << name;
+    EXPECT_GT(model["microseconds_per_throw"], 0) << name;
+    EXPECT_EQ(model["train"]["n"].get<int>() + model["test"]["n"].get<int>(), 12) << name;
+    for (const char* split : {"train", "test"})
+      for (const char* quantity : {"detach_vx_m_s", "detach_omega_deg_s", "landing_x_m", "landing_theta_deg"})
+        for (const char* statistic : {"mae", "std", "bias"})
+          EXPECT_TRUE(model[split][quantity][statistic].is_number())
+              << name << split << quantity << statistic;
+  }
+}
+
+TEST_F(Cli, NoTestThrowsNoNumbers) {
+  auto log = datasets::read_throw_log(quick);
+  for (auto& one : log.throws) one.split = datasets::Split::train;
+  datasets::write_throw_log(folder / "train.h5", log);
+  const Answer answer = run("compare train.h5 --models gripper_delay --json a.json --report r");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json test = read_json(folder / "a.json")["models"]["gripper_delay"]["test"];
+  EXPECT_EQ(test["n"], 0);
+  EXPECT_TRUE(test["landing_x_m"]["mae"].is_null());
+  for (const auto& text : {answer.out, content(folder / "a.json"), content(folder / "r/report.md"),
+                           content(folder / "r/throws.csv"), content(folder / "r/conditions.dat")}) {
+    EXPECT_THAT(text, Not(HasSubstr("nan")));
+    EXPECT_THAT(text, Not(HasSubstr("NaN")));
+  }
+}
+
+TEST_F(Cli, ReportIsComplete) {
+  const Answer answer = run("compare " + quick + " --models sliding_pivot,gripper_delay --report new/report");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  for (const std::string name : {"landing_errors", "conditions"})
+    for (const char* ending : {".png", ".pdf", ".gp", ".dat"})
+      EXPECT_GT(fs::file_size(folder / "new/report" / (name + ending)), 0u) << name << ending;
+  EXPECT_EQ(read_json(folder / "new/report/compare.json")["schema"], "compare");
+  const std::string csv = content(folder / "new/report/throws.csv");
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 2 * 12);
+  EXPECT_EQ(files().size(), 2u + 8 + 3);  // two folders
+  // Again over the old one, which keeps what is not ours.
+  std::ofstream(folder / "new/report/mine.txt") << "mine";
+  ASSERT_EQ(run("compare " + quick + " --models gripper_delay --report new/report/").code, 0);
+  EXPECT_EQ(content(folder / "new/report/mine.txt"), "mine");
+  EXPECT_EQ(files().size(), 2u + 8 + 3 + 1);
+}
+
+TEST_F(Cli, MissingGnuplotIsSaid) {
+  fs::create_directory(folder / "bin");
+  const Answer answer = run("compare " + quick + " --models gripper_delay --report r --json a.json",
+                            "PATH='" + (folder / "bin").string() + "'");
+  EXPECT_EQ(answer.code, 1);
+  EXPECT_THAT(answer.err, HasSubstr("gnuplot-nox"));
+  EXPECT_THAT(files(), testing::ElementsAre("bin"));
+}
+
+TEST_F(Cli, BrokenGnuplotLeavesNothing) {
+  fs::create_directory(folder / "bin");
+  std::ofstream(folder / "bin/gnuplot") << "#!/bin/sh\necho 'no terminal for you' >&2\nexit 1\n";
+  fs::permissions(folder / "bin/gnuplot", fs::perms::owner_all);
+  const Answer answer =
+      run("compare " + quick + " --models gripper_delay --report r --json a.json --write-cards c",
+          "PATH='" + (folder / "bin").string() + "':$PATH");
+  EXPECT_EQ(answer.code, 1);
+  EXPECT_THAT(answer.err, HasSubstr("no terminal for you"));
+  EXPECT_THAT(files(), testing::ElementsAre("bin", "bin/gnuplot"));
+}
+
+TEST_F(Cli, CardsCarryAnEstimate) {
+  ASSERT_EQ(
+      run("compare " + quick + " --models sliding_pivot,gripper_delay --write-cards cards --json a.json")
+          .code,
+      0);
+  EXPECT_THAT(files(), testing::ElementsAre("a.json", "cards", "cards/gripper_delay.json",
+                                            "cards/sliding_pivot.json"));
+  for (const std::string model : {"sliding_pivot", "gripper_delay"}) {
+    const Answer answer =
+        run("predict " + quick + " --card cards/" + model + ".json --json p.json --csv p.csv --threads 2");
+    ASSERT_EQ(answer.code, 0) << answer.err;
+    const json predicted = read_json(folder / "p.json");
+    EXPECT_EQ(predicted["schema"], "predict");
+    EXPECT_EQ(predicted["throws"].size(), 12u);
+    EXPECT_TRUE(predicted["throws"][0]["landing"]["x_m"].is_number());
+    ASSERT_EQ(
+        run("compare " + quick + " --models " + model + " --card cards/" + model + ".json --json b.json")
+            .code,
+        0);
+    const json again = timeless(read_json(folder / "b.json"))["models"][model];
+    const json first = timeless(read_json(folder / "a.json"))["models"][model];
+    EXPECT_EQ(again["test"], first["test"]);
+    EXPECT_EQ(again["train"], first["train"]);
+    EXPECT_TRUE(again["estimate"]["from_card"]);
+  }
+}
+
+TEST_F(Cli, BadCards) {
+  ASSERT_EQ(run("compare " + quick + " --models sliding_pivot --write-cards .").code, 0);
+  const json good = read_json(folder / "sliding_pivot.json");
+  const auto expect = [&](const json& card, const std::string& reason) {
+    std::ofstream(folder / "bad.json") << card.dump();
+    expect_refusal("predict " + quick + " --card bad.json --json p.json", 3, "bad.json: " + reason);
+  };
+  json bad = good;
+  bad["model"] = "wishful";
+  expect(bad, "/model");
+  bad = good;
+  bad["parameters"].erase("mu");
+  expect(bad, "/parameters/mu");
+  bad = good;
+  bad["parameters"]["mu"]["value"] = -1;
+  expect(bad, "/parameters/mu/value");
+  bad = good;
+  bad["parameters"]["length"]["unit"] = "mm";
+  expect(bad, "/parameters/length/unit");
+  bad = good;
+  bad["parameters"]["luck"] = bad["parameters"]["mu"];
+  expect(bad, "/parameters/luck");
+  std::ofstream(folder / "bad.json") << "{\"schema\": }";
+  expect_refusal("predict " + quick + " --card bad.json", 3, "bad.json: line 1, column 12");
+  expect_refusal("predict " + quick + " --card none.json", 3, "none.json");
+  expect_refusal("compare " + quick + " --models gripper_delay --card sliding_pivot.json", 2,
+                 "sliding_pivot");
+}
+
+TEST_F(Cli, FreeFlights) {
+  const Answer answer = run("compare " + flights + " --json a.json --report r --threads 1");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  ASSERT_EQ(run("compare " + flights + " --models projectile --json b.json --threads 2").code, 0);
+  const json one = read_json(folder / "a.json");
+  EXPECT_EQ(timeless(one), timeless(read_json(folder / "b.json")));
+  const json& model = one["models"]["projectile"];
+  EXPECT_EQ(model["train"]["n"], 4);
+  EXPECT_EQ(model["test"]["n"], 1);
+  EXPECT_LT(model["test"]["trajectory_rms_m"], 1e-6);  // the motion is the model's, rounded
+  EXPECT_GT(fs::file_size(folder / "r/residuals_projectile.png"), 0u);
+}
+
+}  // namespace
+}  // namespace unhand

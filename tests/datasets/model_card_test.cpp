@@ -1,0 +1,168 @@
+#include "datasets/model_card.hpp"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <bit>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <sstream>
+
+namespace unhand::datasets {
+namespace {
+
+using testing::HasSubstr;
+namespace fs = std::filesystem;
+
+ModelCard small_card() {
+  ModelCard card;
+  card.model = "sliding_pivot";
+  card.parameters["mu"] = {0.61, 0.01, "-"};
+  card.parameters["length"] = {0.0071, {}, "m"};
+  card.log = {"campaign.h5", "a campaign", "fnv1a64:0123456789abcdef"};
+  card.split = "train";
+  card.valid_range["grip_force"] = {45, 55, "N"};
+  card.library_version = "0.1.0";
+  return card;
+}
+
+/// The error of a text that must be refused.
+std::string refusal(const std::string& text) {
+  try {
+    parse_model_card(text, "c.json");
+  } catch (const CardError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+/// The small card with one thing changed.
+template <class Change>
+std::string refusal_after(Change&& change) {
+  auto json = nlohmann::json::parse(to_json(small_card()));
+  change(json);
+  return refusal(json.dump());
+}
+
+TEST(ModelCard, ComesBackAsItWas) { EXPECT_EQ(parse_model_card(to_json(small_card())), small_card()); }
+
+TEST(ModelCard, LeavesOutWhatIsNotKnown) {
+  ModelCard card = small_card();
+  card.log.checksum.reset();
+  card.split.reset();
+  card.valid_range.clear();
+  const auto json = nlohmann::json::parse(to_json(card));
+  EXPECT_FALSE(json.contains("split"));
+  EXPECT_FALSE(json.contains("valid_range"));
+  EXPECT_FALSE(json["log"].contains("checksum"));
+  EXPECT_FALSE(json["parameters"]["length"].contains("sigma"));
+  EXPECT_EQ(json["schema"], "model-card");
+  EXPECT_EQ(json["schema_version"], 1);
+  EXPECT_EQ(parse_model_card(to_json(card)), card);
+}
+
+TEST(ModelCard, KeepsEveryBitOfADouble) {
+  std::mt19937_64 bits(20250101);
+  std::vector<double> values{0.0,
+                             -0.0,
+                             0.1,
+                             1.0 / 3,
+                             std::numeric_limits<double>::denorm_min(),
+                             std::numeric_limits<double>::min(),
+                             std::numeric_limits<double>::max(),
+                             1e22,
+                             3.0};
+  while (values.size() < 2000) {
+    const auto value = std::bit_cast<double>(bits());
+    if (std::isfinite(value)) values.push_back(value);
+  }
+  ModelCard card = small_card();
+  for (const double value : values) {
+    card.parameters["mu"].value = value;
+    const double back = parse_model_card(to_json(card)).parameters.at("mu").value;
+    EXPECT_EQ(std::bit_cast<std::uint64_t>(back), std::bit_cast<std::uint64_t>(value)) << value;
+  }
+}
+
+TEST(ModelCard, KeepsKeysItDoesNotKnow) {
+  auto json = nlohmann::json::parse(to_json(small_card()));
+  json["notes"] = {1, 2, {{"deep", true}}};
+  json["log"]["operator"] = "someone";
+  json["parameters"]["mu"]["prior"] = 0.5;
+  json["valid_range"]["grip_force"]["method"] = "seen";
+  ModelCard card = parse_model_card(json.dump());
+  EXPECT_EQ(nlohmann::json::parse(to_json(card)), json);
+
+  card.parameters.erase("mu");  // and what was unknown about it goes too
+  json["parameters"].erase("mu");
+  EXPECT_EQ(nlohmann::json::parse(to_json(card)), json);
+}
+
+TEST(ModelCard, NamesThePlaceOfAMistake) {
+  using Json = nlohmann::json;
+  EXPECT_THAT(refusal_after([](Json& j) { j["schema"] = "throw-log"; }),
+              HasSubstr("c.json: /schema: is 'throw-log'"));
+  EXPECT_THAT(refusal_after([](Json& j) { j["schema_version"] = 2; }), HasSubstr("/schema_version: 2"));
+  EXPECT_THAT(refusal_after([](Json& j) { j.erase("model"); }), HasSubstr("/model: is missing"));
+  EXPECT_THAT(refusal_after([](Json& j) { j["parameters"]["mu"].erase("value"); }),
+              HasSubstr("/parameters/mu/value: is missing"));
+  EXPECT_THAT(refusal_after([](Json& j) { j["parameters"]["mu"]["value"] = "0.6"; }),
+              HasSubstr("/parameters/mu/value: \"0.6\" is not a number"));
+  EXPECT_THAT(refusal_after([](Json& j) { j["parameters"]["mu"]["sigma"] = -1; }),
+              HasSubstr("/parameters/mu/sigma"));
+  EXPECT_THAT(refusal_after([](Json& j) { j["parameters"]["mu"] = 0.6; }),
+              HasSubstr("/parameters/mu: is number"));
+  EXPECT_THAT(refusal_after([](Json& j) { j["parameters"]["a/b"] = 1; }), HasSubstr("/parameters/a~1b"));
+  EXPECT_THAT(refusal_after([](Json& j) { j["valid_range"]["grip_force"]["low"] = 60; }),
+              HasSubstr("/valid_range/grip_force/low"));
+  EXPECT_THAT(refusal_after([](Json& j) {
+                j["libary_version"] = j["library_version"];
+                j.erase("library_version");
+              }),
+              HasSubstr("is 'libary_version' meant?"));
+  EXPECT_THAT(refusal("[1]"), HasSubstr("is array, not an object"));
+}
+
+TEST(ModelCard, CountsLinesAndColumnsOfBrokenJson) {
+  EXPECT_THAT(refusal("{\n  \"schema\": ,\n}"), HasSubstr("c.json: line 2, column 13: syntax error"));
+  EXPECT_THAT(refusal(""), HasSubstr("line 1, column 1"));
+  const std::string whole = to_json(small_card());
+  EXPECT_THAT(refusal(whole.substr(0, whole.size() / 2)), HasSubstr("syntax error"));
+}
+
+TEST(ModelCard, RefusesToWriteWhatCannotBeReadAgain) {
+  ModelCard card = small_card();
+  card.parameters["mu"].value = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(to_json(card), CardError);
+  card = small_card();
+  card.model.clear();
+  EXPECT_THROW(to_json(card), CardError);
+  card = small_card();
+  card.log.title = "\xff\xfe";
+  EXPECT_THROW(to_json(card), CardError);
+}
+
+TEST(ModelCard, FilesAreReplacedAtOnce) {
+  const fs::path folder = fs::temp_directory_path() / ("unhand_cards_" + std::to_string(getpid()));
+  fs::create_directory(folder);
+  const fs::path file = folder / "card.json";
+  write_model_card(file, small_card());
+  ModelCard other = small_card();
+  other.model = "limit_surface";
+  write_model_card(file, other);
+  EXPECT_EQ(read_model_card(file), other);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder), {}), 1);
+  EXPECT_THROW(write_model_card(folder / "none" / "card.json", other), CardError);
+  EXPECT_THROW(write_model_card(folder, other), CardError);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder), {}), 1);
+  EXPECT_THROW(read_model_card(folder), CardError);
+  EXPECT_THROW(read_model_card(folder / "none.json"), CardError);
+  fs::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace unhand::datasets

@@ -1,0 +1,100 @@
+// The limit surface of a small, strong patch tends to the pivot of the decoupled model: with τ_max held and
+// ρ = |f|/f_max → 0 the contact point is carried and the torque is τ_max √(1 − ρ²).
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "contact/limit_surface.hpp"
+#include "contact/sliding_pivot.hpp"
+#include "tests/support/simple_scenes.hpp"
+
+namespace unhand::contact {
+namespace {
+
+constexpr double kNormal = 20;        // N, one pad
+constexpr double kTorqueLimit = 0.05; // N m, held throughout
+constexpr double kEnd = 0.08;         // s
+constexpr double kLever = 0.12;       // m
+const dynamics::RigidBody<double> kBar{0.2, 1.2e-3};
+
+/// Two pads of friction mu whose radius makes the torque limit 0.05 N m.
+Patch<double> patch_of(double mu) { return {mu, kTorqueLimit / (2 * mu * kNormal) * 1.5, 2.0 / 3, 2}; }
+
+/// A bar held off its CoM in a hand that moves up; gravity's torque exceeds the limit.
+struct Pivoting {
+  support::SwayingHand hand{{{{0, 0.4, 3, 0, 1, 0}, {0, 0.5, 6, 0, 1, 0}, {0, 1, -20, 0, 1, 0}}}, kEnd};
+  support::ConstantForce force{kNormal};
+  release::ReleaseProblem<double> problem(const ContactModel& model) const {
+    return {hand, force, model, kBar, {0, -9.81}, {kLever, 0.1}, 0.0, {}, 0.0};
+  }
+};
+
+release::ReleaseOptions options() {
+  release::ReleaseOptions o;
+  o.integrator = support::tight(1e-9, 1e-11);
+  o.integrator.record = true;
+  return o;
+}
+
+/// The pivot equation with the torque `tau`: the force that carries the contact point, with r the lever in the world.
+dynamics::Vec2<double> carrying_force(const release::ReleaseSample<double>& s, double tau) {
+  const auto& [m, I] = kBar;
+  const dynamics::Vec2<double> r{s.pose.x - s.hand.pose.x, s.pose.z - s.hand.pose.z};
+  const auto& a = s.hand.acceleration;
+  const double alpha = (m * (r.z * a.ax - r.x * (a.az + 9.81)) + tau) / (I + m * (r.x * r.x + r.z * r.z));
+  const double omega = s.twist.omega;
+  return {m * (a.ax - alpha * r.z - omega * omega * r.x), m * (a.az + 9.81 + alpha * r.x - omega * omega * r.z)};
+}
+
+TEST(PivotLimit, TheTorqueRatioOfTheEllipsoid) {
+  const Pivoting scene;
+  double worst_before = 1;
+  for (const double mu : {0.5, 1.0, 2.0, 4.0, 8.0}) {
+    const LimitSurface<Ellipsoid> model("limit_surface", patch_of(mu));
+    const auto problem = scene.problem(model);
+    const auto result = simulate_release(problem, options());
+    ASSERT_EQ(result.outcome, release::ReleaseOutcome::never_separated);
+    EXPECT_TRUE(result.slips_at_start);
+    const double f_max = 2 * mu * kNormal;
+    double worst = 0;
+    for (double t = 0.01; t < kEnd; t += 0.0037) {
+      const auto s = sample_release(problem, result, t);
+      ASSERT_EQ(s.mode, "slip");
+      // the force that carries the contact point under the torque in force; ρ follows from it, not from the law
+      const auto f = carrying_force(s, s.wrench.tau);
+      const double rho = norm(f) / f_max;
+      const double ratio = -s.wrench.tau * (s.relative.spin > 0 ? 1 : -1) / kTorqueLimit;
+      worst = std::max(worst, std::abs(ratio - std::sqrt(1 - rho * rho)));
+    }
+    // The slip that is left is of the order of L ω ρ, so its own acceleration is a share of order L/l of the force, and
+    // enters the ratio as ρ² L/l: a factor of eight for each doubling of f_max; four is asked for.
+    EXPECT_LT(worst, 0.25 * worst_before) << "mu " << mu;
+    worst_before = worst;
+  }
+  EXPECT_LT(worst_before, 1e-5);
+}
+
+TEST(PivotLimit, TheMotionTendsToTheDecoupledPivot) {
+  const Pivoting scene;
+  double error_before = 0;
+  for (const double mu : {1.0, 2.0, 4.0, 8.0}) {
+    const LimitSurface<Ellipsoid> surface("limit_surface", patch_of(mu));
+    const SlidingPivot pivot(patch_of(mu));
+    const auto a = simulate_release(scene.problem(surface), options());
+    const auto b = simulate_release(scene.problem(pivot), options());
+    const auto words = mode_events(scene.problem(pivot), b);
+    ASSERT_EQ(words.size(), 1u);  // starts pivoting and goes on
+    ASSERT_EQ(words[0].mode, "pivot-");
+    EXPECT_EQ(norm(b.relative.slip), 0.0);  // carried exactly
+    const double error = std::abs(a.detach.twist.omega - b.detach.twist.omega);
+    // second order in ρ: the torque is short by 1 − √(1 − ρ²)
+    if (error_before > 0) {
+      EXPECT_NEAR(error_before / error, 4, 0.8) << "mu " << mu;
+    }
+    error_before = error;
+  }
+  EXPECT_LT(error_before, 1e-3);  // rad/s
+}
+
+}  // namespace
+}  // namespace unhand::contact
