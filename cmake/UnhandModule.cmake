@@ -12,19 +12,19 @@ function(unhand_module name)
   set_target_properties(unhand_${name} PROPERTIES EXPORT_NAME ${name})
   target_compile_features(unhand_${name} PUBLIC cxx_std_20)
   target_include_directories(unhand_${name} PUBLIC
-    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:include/unhand>)
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/unhand>)
   foreach(used IN LISTS ARG_USES)
     target_link_libraries(unhand_${name} PUBLIC unhand::${used})
   endforeach()
   foreach(library IN LISTS ARG_LINKS)
     target_link_libraries(unhand_${name} PRIVATE $<BUILD_INTERFACE:${library}>)
-    if(NOT BUILD_SHARED_LIBS)  # a static library hands what it needs to whoever links it
-      target_link_libraries(unhand_${name} INTERFACE $<INSTALL_INTERFACE:${library}>)
+    if(NOT BUILD_SHARED_LIBS)  # whoever links a static library links what it needs, and sees no header of it
+      target_link_libraries(unhand_${name} INTERFACE $<INSTALL_INTERFACE:$<LINK_ONLY:${library}>>)
     endif()
   endforeach()
   target_link_libraries(unhand_${name} PRIVATE $<BUILD_INTERFACE:unhand_warnings>)
   install(TARGETS unhand_${name} EXPORT unhandTargets)
-  install(FILES ${ARG_HEADERS} DESTINATION include/unhand/${name})
+  install(FILES ${ARG_HEADERS} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/unhand/${name})
 endfunction()
 
 # unhand_test(dynamics  integrator_test.cpp ... USES release)
