@@ -1,5 +1,5 @@
-// Simple worlds for tests: a hand at rest or in uniform acceleration, a normal force that never changes, and a hand
-// seen from another frame.
+// Simple worlds for tests: a hand at rest or in uniform acceleration, a normal force that never changes, and
+// a hand seen from another frame.
 #pragma once
 
 #include <cmath>
@@ -20,7 +20,9 @@ class ConstantForce final : public contact::NormalForce {
  public:
   explicit ConstantForce(double force) : force_(force) {}
   double at(const contact::Window&, double) const override { return force_; }
-  dynamics::Dual at(const contact::Window&, const dynamics::Dual&) const override { return dynamics::Dual(force_); }
+  dynamics::Dual at(const contact::Window&, const dynamics::Dual&) const override {
+    return dynamics::Dual(force_);
+  }
   void kinks(std::vector<double>&) const override {}
   void kinks(std::vector<dynamics::Dual>&) const override {}
   double release_time() const override { return std::numeric_limits<double>::infinity(); }
@@ -40,10 +42,12 @@ inline SwayingHand accelerating_hand(const dynamics::Acceleration<double>& a, do
   return SwayingHand(c, end);
 }
 
-/// A hand in another frame: mirrored (x → −x) if so asked, then turned by `angle` [rad], then moving on at `velocity`.
+/// A hand in another frame: mirrored (x → −x) if so asked, then turned by `angle` [rad], then moving on at
+/// `velocity`.
 class TransformedHand final : public release::HandMotion {
  public:
-  TransformedHand(const release::HandMotion& hand, bool mirrored, double angle, dynamics::Vec2<double> velocity)
+  TransformedHand(const release::HandMotion& hand, bool mirrored, double angle,
+                  dynamics::Vec2<double> velocity)
       : hand_(hand), mirror_(mirrored ? -1.0 : 1.0), angle_(angle), velocity_(velocity) {}
 
   release::HandState<double> at(const release::Window& w, double t) const override { return at_(w, t); }
@@ -64,7 +68,8 @@ class TransformedHand final : public release::HandMotion {
   template <class S>
   release::HandState<S> at_(const release::Window& w, const S& t) const {
     const release::HandState<S> h = hand_.at(w, t);
-    const auto p = vector<S>({h.pose.x, h.pose.z}), v = vector<S>(h.twist.linear()), a = vector<S>(h.acceleration.linear());
+    const auto p = vector<S>({h.pose.x, h.pose.z}), v = vector<S>(h.twist.linear()),
+               a = vector<S>(h.acceleration.linear());
     const S theta = mirror_ > 0 ? h.pose.theta : S(M_PI - h.pose.theta);
     return {{p.x + velocity_.x * t, p.z + velocity_.z * t, theta + angle_},
             {v.x + velocity_.x, v.z + velocity_.z, mirror_ * h.twist.omega},
@@ -87,8 +92,10 @@ inline contact::ContactParameters<double> parameters_of(const RandomThrow& throw
   return p;
 }
 
-inline release::ReleaseProblem<double> problem_of(const RandomThrow& thrown, const contact::ContactModel& model) {
-  return {thrown.hand, thrown.force, model, thrown.body, dynamics::level_gravity(kGravity), thrown.grasp, 0.0, {}, 0.0};
+inline release::ReleaseProblem<double> problem_of(const RandomThrow& thrown,
+                                                  const contact::ContactModel& model) {
+  return {thrown.hand,  thrown.force, model, thrown.body, dynamics::level_gravity(kGravity),
+          thrown.grasp, 0.0,          {},    0.0};
 }
 
 inline dynamics::IntegratorOptions tight(double relative, double absolute) {

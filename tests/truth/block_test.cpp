@@ -1,5 +1,5 @@
-// A block on an incline and a block on an accelerating hand: slides, stops, sticks, goes the other way. Along a line
-// every law of friction is Coulomb's, and its answer is a parabola.
+// A block on an incline and a block on an accelerating hand: slides, stops, sticks, goes the other way. Along
+// a line every law of friction is Coulomb's, and its answer is a parabola.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,7 +21,8 @@ class Block : public testing::TestWithParam<const char*> {
   }
   release::ReleaseResult<double> run(const release::HandMotion& hand, dynamics::Vec2<double> gravity,
                                      dynamics::Vec2<double> slip = {}) {
-    const release::ReleaseProblem<double> problem{hand, force, *model, {kMass, 1e-3}, gravity, {0, 0}, 0.0, slip, 0.0};
+    const release::ReleaseProblem<double> problem{hand, force, *model, {kMass, 1e-3}, gravity, {0, 0},
+                                                  0.0,  slip,  0.0};
     release::ReleaseOptions options;
     options.integrator = support::tight(1e-10, 1e-12);
     options.integrator.record = true;
@@ -40,10 +41,12 @@ class Block : public testing::TestWithParam<const char*> {
   std::vector<release::ModeEvent> words;
 };
 INSTANTIATE_TEST_SUITE_P(, Block,
-                         testing::Values("sliding_pivot", "limit_surface", "limit_surface_disc", "limit_surface_quartic"),
+                         testing::Values("sliding_pivot", "limit_surface", "limit_surface_disc",
+                                         "limit_surface_quartic"),
                          [](const auto& law) { return std::string(law.param); });
 
-// 1e-9: parabolas are exact for every stepper; the onset of a slip is known to a relative 1e-5 over its first 5e-6 s.
+// 1e-9: parabolas are exact for every stepper; the onset of a slip is known to a relative 1e-5 over its first
+// 5e-6 s.
 
 TEST_P(Block, OnASteepInclineSlidesFromTheStart) {
   const auto hand = support::still_hand(0.5);
@@ -76,8 +79,9 @@ TEST_P(Block, OnAGentleInclineStopsAndStays) {
 }
 
 TEST_P(Block, SlidingUpASteepInclineComesBack) {
-  // Up against g = 12: decelerates by g + A, then slides down at g − A. The decoupled model's force points along the
-  // required one, up the incline, whatever the slip does: it decelerates by g − A only, and feeds energy meanwhile.
+  // Up against g = 12: decelerates by g + A, then slides down at g − A. The decoupled model's force points
+  // along the required one, up the incline, whatever the slip does: it decelerates by g − A only, and feeds
+  // energy meanwhile.
   const auto hand = support::still_hand(0.5);
   const double g = 12, v = 1;
   const auto result = run(hand, {-g, 0}, {v, 0});
@@ -115,8 +119,9 @@ TEST_P(Block, OnAHandThatAcceleratesSlidesStopsAndSticks) {
 }
 
 TEST_P(Block, GoesTheOtherWayWhenTheHandDoes) {
-  // +20 then −20 m/s²: the block lags to −0.6 m/s; friction helps the hand to stop that (8 + 20 m/s²), and from zero it
-  // runs ahead at 20 − 8 = 12 m/s². The decoupled model turns its force at the jump already: 12 m/s² throughout.
+  // +20 then −20 m/s²: the block lags to −0.6 m/s; friction helps the hand to stop that (8 + 20 m/s²), and
+  // from zero it runs ahead at 20 − 8 = 12 m/s². The decoupled model turns its force at the jump already: 12
+  // m/s² throughout.
   const auto hand =
       release::PolynomialHand::segments(0, {}, {}, {{0.05, {20, 0, 0}, {}}, {0.2, {-20, 0, 0}, {}}});
   const auto result = run(hand, {0, 0});

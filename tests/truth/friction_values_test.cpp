@@ -1,4 +1,5 @@
-// Published values of patch friction: the uniform disc, the ellipsoid beside it, and torque limits of round patches.
+// Published values of patch friction: the uniform disc, the ellipsoid beside it, and torque limits of round
+// patches.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -44,7 +45,7 @@ TEST(EllipsoidBesideTheDisc, IsUpToSevenPercentTooLarge) {
       where = epsilon;
     }
   }
-  EXPECT_NEAR(most, 0.0704, 5e-5);   // to the digits known
+  EXPECT_NEAR(most, 0.0704, 5e-5);    // to the digits known
   EXPECT_NEAR(where, 0.766, 1.5e-3);  // to the digits known and the grid of 0.05 %
 }
 
@@ -56,12 +57,13 @@ TEST(EllipsoidBesideTheDisc, TheGaugesSaySo) {
   EXPECT_NEAR(UniformDisc{}.gauge(on_ellipsoid), 1.0704, 5e-5);
 }
 
-/// ∫ p r² dr / ∫ p r dr over [0, 1], by the trapezoidal rule after r = ½ (1 + tanh(π/2 sinh x)): converges exponentially
-/// whatever the pressure does at the rim. `pressure` takes r and 1 − r, since the latter underflows first.
+/// ∫ p r² dr / ∫ p r dr over [0, 1], by the trapezoidal rule after r = ½ (1 + tanh(π/2 sinh x)): converges
+/// exponentially whatever the pressure does at the rim. `pressure` takes r and 1 − r, since the latter
+/// underflows first.
 template <class Pressure>
 double factor_by_quadrature(Pressure&& pressure) {
   double top = 0, bottom = 0;
-  for (double x = -4.5; x <= 4.5; x += 1e-3) {
+  for (double x = -5.8; x <= 5.8; x += 1e-3) {
     const double s = 0.5 * M_PI * std::sinh(x);
     const double r = 1 / (1 + std::exp(-2 * s)), rest = 1 / (1 + std::exp(2 * s));
     const double p = pressure(r, rest) * r * rest * std::cosh(x);
@@ -88,19 +90,23 @@ TEST(TorqueFactor, IsTheIntegralOfThePressure) {
   for (const double n : {0.5, 1.0, 1.7, 2.0, 3.0, 4.0, 7.5})
     EXPECT_NEAR(torque_factor_power(n), factor_by_quadrature([&](double r, double rest) {
                   // 1 − rⁿ without cancellation at the rim
-                  return std::pow(rest < 0.5 ? -std::expm1(n * std::log1p(-rest)) : 1 - std::pow(r, n), 1 / n);
+                  return std::pow(rest < 0.5 ? -std::expm1(n * std::log1p(-rest)) : 1 - std::pow(r, n),
+                                  1 / n);
                 }),
                 1e-11)
         << "n " << n;
   for (const double s : {-0.9, -0.5, 0.0, 0.5, 1.0, 3.0})
     EXPECT_NEAR(torque_factor(s),
-                factor_by_quadrature([&](double r, double rest) { return std::pow(rest * (1 + r), s); }), 1e-11)
+                factor_by_quadrature([&](double r, double rest) { return std::pow(rest * (1 + r), s); }),
+                1e-11)
         << "s " << s;
 }
 
 TEST(TorqueFactor, WhatHasNoPressureIsRejected) {
-  for (const double n : {0.0, -1.0, std::nan("")}) EXPECT_THROW(torque_factor_power(n), std::invalid_argument) << n;
-  for (const double s : {-1.0, -2.0, std::nan("")}) EXPECT_THROW(torque_factor(s), std::invalid_argument) << s;
+  for (const double n : {0.0, -1.0, std::nan("")})
+    EXPECT_THROW(torque_factor_power(n), std::invalid_argument) << n;
+  for (const double s : {-1.0, -2.0, std::nan("")})
+    EXPECT_THROW(torque_factor(s), std::invalid_argument) << s;
 }
 
 }  // namespace

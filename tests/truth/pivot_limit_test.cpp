@@ -11,10 +11,10 @@
 namespace unhand::contact {
 namespace {
 
-constexpr double kNormal = 20;        // N, one pad
-constexpr double kTorqueLimit = 0.05; // N m, held throughout
-constexpr double kEnd = 0.08;         // s
-constexpr double kLever = 0.12;       // m
+constexpr double kNormal = 20;         // N, one pad
+constexpr double kTorqueLimit = 0.05;  // N m, held throughout
+constexpr double kEnd = 0.08;          // s
+constexpr double kLever = 0.12;        // m
 const dynamics::RigidBody<double> kBar{0.2, 1.2e-3};
 
 /// Two pads of friction mu whose radius makes the torque limit 0.05 N m.
@@ -36,14 +36,16 @@ release::ReleaseOptions options() {
   return o;
 }
 
-/// The pivot equation with the torque `tau`: the force that carries the contact point, with r the lever in the world.
+/// The pivot equation with the torque `tau`: the force that carries the contact point, with r the lever in
+/// the world.
 dynamics::Vec2<double> carrying_force(const release::ReleaseSample<double>& s, double tau) {
   const auto& [m, I] = kBar;
   const dynamics::Vec2<double> r{s.pose.x - s.hand.pose.x, s.pose.z - s.hand.pose.z};
   const auto& a = s.hand.acceleration;
   const double alpha = (m * (r.z * a.ax - r.x * (a.az + 9.81)) + tau) / (I + m * (r.x * r.x + r.z * r.z));
   const double omega = s.twist.omega;
-  return {m * (a.ax - alpha * r.z - omega * omega * r.x), m * (a.az + 9.81 + alpha * r.x - omega * omega * r.z)};
+  return {m * (a.ax - alpha * r.z - omega * omega * r.x),
+          m * (a.az + 9.81 + alpha * r.x - omega * omega * r.z)};
 }
 
 TEST(PivotLimit, TheTorqueRatioOfTheEllipsoid) {
@@ -60,14 +62,15 @@ TEST(PivotLimit, TheTorqueRatioOfTheEllipsoid) {
     for (double t = 0.01; t < kEnd; t += 0.0037) {
       const auto s = sample_release(problem, result, t);
       ASSERT_EQ(s.mode, "slip");
-      // the force that carries the contact point under the torque in force; ρ follows from it, not from the law
+      // the force that carries the contact point under the torque in force; ρ follows from it, not from the
+      // law
       const auto f = carrying_force(s, s.wrench.tau);
       const double rho = norm(f) / f_max;
       const double ratio = -s.wrench.tau * (s.relative.spin > 0 ? 1 : -1) / kTorqueLimit;
       worst = std::max(worst, std::abs(ratio - std::sqrt(1 - rho * rho)));
     }
-    // The slip that is left is of the order of L ω ρ, so its own acceleration is a share of order L/l of the force, and
-    // enters the ratio as ρ² L/l: a factor of eight for each doubling of f_max; four is asked for.
+    // The slip that is left is of the order of L ω ρ, so its own acceleration is a share of order L/l of the
+    // force, and enters the ratio as ρ² L/l: a factor of eight for each doubling of f_max; four is asked for.
     EXPECT_LT(worst, 0.25 * worst_before) << "mu " << mu;
     worst_before = worst;
   }
