@@ -1,0 +1,220 @@
+// unhand compare: models against the measured outcomes of a log.
+#include "apps/compare.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <set>
+
+#include "apps/cards.hpp"
+#include "apps/command.hpp"
+#include "apps/figure.hpp"
+#include "apps/progress.hpp"
+#include "experiment/free_flight.hpp"
+#include "experiment/parallel.hpp"
+
+namespace unhand::apps {
+namespace {
+
+constexpr const char* naive_model = "limit_surface_naive";
+
+std::vector<std::string> known_models() {
+  auto names = experiment::release_model_names();
+  for (const auto& model : experiment::flight_models()) names.emplace_back(model.name);
+  return names;
+}
+
+void require_models(const std::vector<std::string>& models) {
+  const auto known = known_models();
+  std::set<std::string> seen;
+  for (const auto& model : models) {
+    if (std::find(known.begin(), known.end(), model) == known.end())
+      throw WrongUsage(fmt::format("model '{}' is unknown; there are {}", model, fmt::join(known, ", ")));
+    if (!seen.insert(model).second) throw WrongUsage(fmt::format("model '{}' is named twice", model));
+  }
+}
+
+/// All release models but the naive one, which is there to be asked for.
+std::vector<std::string> usual_models() {
+  auto names = experiment::release_model_names();
+  std::erase(names, naive_model);
+  return names;
+}
+
+/// The cards by model. Adds their models to `models` if the request names none.
+std::map<std::string, experiment::ModelParameters> read_cards(const CompareRequest& request,
+                                                              std::vector<std::string>& models) {
+  std::map<std::string, experiment::ModelParameters> out;
+  for (const auto& file : request.cards) {
+    const UsableCard card = read_usable_card(file);
+    const std::string& model = card.card.model;
+    if (!out.emplace(model, card.parameters).second)
+      throw WrongUsage(fmt::format("two cards for model '{}'", model));
+    if (std::find(models.begin(), models.end(), model) != models.end()) continue;
+    if (!request.models.empty())
+      throw WrongUsage(fmt::format("{}: a card for '{}', which is not among --models", file, model));
+    models.push_back(model);
+  }
+  return out;
+}
+
+std::vector<experiment::PreparedThrow> prepare_throws(const datasets::ThrowLog& log,
+                                                      const CompareRequest& request) {
+  std::vector<std::optional<experiment::PreparedThrow>> prepared(log.throws.size());
+  Progress progress("prepare", prepared.size());
+  experiment::parallel_for(prepared.size(), request.threads, [&](std::size_t i) {
+    prepared[i] = experiment::prepare(log, log.throws[i], request.log);
+    progress.step();
+  });
+  std::vector<experiment::PreparedThrow> out;
+  for (auto& one : prepared) out.push_back(std::move(*one));
+  return out;
+}
+
+/// Model by model, for the sake of the progress bar.
+experiment::Comparison run_models(const datasets::ThrowLog& log,
+                                  const std::vector<experiment::PreparedThrow>& prepared,
+                                  experiment::CompareOptions options,
+                                  const std::vector<std::string>& models) {
+  Progress progress("simulate", models.size());
+  experiment::Comparison out;
+  for (const auto& model : models) {
+    options.models = {model};
+    auto one = experiment::compare(log, prepared, options);
+    if (!out.models.empty()) one.models.insert(one.models.begin(), out.models.begin(), out.models.end());
+    out = std::move(one);
+    progress.step();
+  }
+  return out;
+}
+
+/// Tells of predictions that failed; if none of any model succeeded, there is no answer.
+void report_failures(const experiment::Comparison& comparison) {
+  bool any = false;
+  for (const auto& model : comparison.models) {
+    any = any || model.failed < static_cast<int>(model.throws.size());
+    std::map<std::string, int> reasons;
+    for (const auto& one : model.throws)
+      if (!one.prediction.landed()) ++reasons[outcome_of(one.prediction)];
+    for (const auto& [reason, n] : reasons)
+      fmt::print(stderr, "unhand: {}: {} of {} throws: {}\n", model.model, n, model.throws.size(), reason);
+  }
+  if (!any) throw Unanswered("no model brought any throw to a landing");
+}
+
+void compare_releases(const CompareRequest& request, const datasets::ThrowLog& log) {
+  auto models = request.models.empty() ? usual_models() : request.models;
+  experiment::CompareOptions options;
+  options.parameters = read_cards(request, models);
+  options.threads = request.threads;
+  options.naive = request.naive;
+  options.integrator.tolerances.relative = request.rtol;
+  const auto prepared = prepare_throws(log, request);
+  const auto comparison = run_models(log, prepared, options, models);
+  report_failures(comparison);
+
+  const ReleaseTables tables = release_tables(comparison, log, request.log);
+  const Json json = release_json(comparison, request);
+  Outputs outputs;
+  if (!request.json.empty()) outputs.json(request.json, json);
+  if (!request.report.empty())
+    write_release_report(comparison, tables, json, outputs.directory(request.report));
+  if (!request.write_cards.empty()) {
+    const auto directory = outputs.directory(request.write_cards);
+    for (const auto& model : comparison.models)
+      if (!model.from_card)
+        datasets::write_model_card(directory / (model.model + ".json"),
+                                   card_of(model, request.log, log, prepared));
+  }
+  outputs.commit();
+  fmt::print("{}\n{}\n{}\nbias (predicted - measured)\n{}\nparameters\n{}", tables.heading,
+             tables.errors.text(), tables.floor, tables.bias.text(), tables.parameters.text());
+}
+
+void compare(const CompareRequest& request) {
+  if (request.fit)
+    throw Unanswered(
+        "fitting is not in this version: leave out --fit to compare with estimated parameters or cards");
+  require_models(request.models);
+  require_writable(request.json);
+  require_writable_directory(request.report);
+  require_writable_directory(request.write_cards);
+  if (!request.report.empty()) require_gnuplot();
+  if (datasets::read_schema_name(request.log) == "slip-log")
+    throw datasets::LogError(
+        request.log, "/@schema",
+        "is a slip-log, which holds no throws; surfaces are compared by fitting, which is not in "
+        "this version");
+  const auto log = datasets::read_throw_log(request.log);
+  if (log.throws.empty()) throw Unanswered(fmt::format("{}: holds no throws", request.log));
+  const bool flights =
+      log.dimension == 3 || std::none_of(log.throws.begin(), log.throws.end(),
+                                         [](const auto& one) { return one.hand.has_value(); });
+  for (const auto& model : request.models) {
+    const auto releases = experiment::release_model_names();
+    const bool of_release = std::find(releases.begin(), releases.end(), model) != releases.end();
+    if (of_release && flights)
+      throw datasets::LogError(request.log, "/throws",
+                               fmt::format("free flights, which {} does not predict: it needs "
+                                           "a hand in the plane (use projectile)",
+                                           model));
+    if (!of_release && !flights)
+      throw datasets::LogError(request.log, "/throws",
+                               fmt::format("throws from a hand, which {} does not predict: it "
+                                           "is for free flights",
+                                           model));
+  }
+  flights ? compare_flights(request, log) : compare_releases(request, log);
+}
+
+}  // namespace
+
+std::string outcome_of(const experiment::Prediction& prediction) {
+  if (prediction.landed()) return "landed";
+  return prediction.release == release::ReleaseOutcome::detached ? to_string(prediction.flight)
+                                                                 : to_string(prediction.release);
+}
+
+Command compare_command(CLI::App& root) {
+  auto request = std::make_shared<CompareRequest>();
+  CLI::App* parser = root.add_subcommand("compare", "Models against the measured outcomes of a log");
+  parser->add_option("LOG", request->log, "A throw log")->required();
+  parser
+      ->add_option(
+          "--models", request->models,
+          fmt::format(
+              "Which models, separated by commas: {}. Without it, all release models but {}; for free "
+              "flights, projectile",
+              fmt::join(known_models(), ", "), naive_model))
+      ->delimiter(',');
+  parser->add_flag("--fit", request->fit, "Fit the parameters to the train throws (not in this version)");
+  parser->add_option("--card", request->cards,
+                     "A model card: its parameters are used for its model; may be repeated");
+  parser->add_option("--json", request->json, "Write the comparison as JSON");
+  parser->add_option("--report", request->report,
+                     "A directory for figures, tables (Markdown), per-throw errors (CSV) and the JSON");
+  parser->add_option("--write-cards", request->write_cards,
+                     "A directory for the estimated parameters as model cards");
+  parser->add_option("--naive-step", request->naive.step, "Step of limit_surface_naive [s]")
+      ->check(CLI::Range(1e-7, 0.1))
+      ->capture_default_str();
+  parser
+      ->add_option("--naive-smoothing", request->naive.smoothing,
+                   "Viscous smoothing of limit_surface_naive [m/s]")
+      ->check(CLI::Range(0.0, 10.0))
+      ->capture_default_str();
+  parser->add_option("--rtol", request->rtol, "Relative tolerance of the integrator")
+      ->check(CLI::Range(1e-13, 1e-2))
+      ->capture_default_str();
+  add_threads(*parser, request->threads);
+  parser->footer(
+      "Parameters that no card gives are estimated from the train throws. Existing files are replaced.\n"
+      "Examples:\n  unhand compare campaign.h5 --models sliding_pivot,limit_surface --report out\n"
+      "  unhand compare cubes.h5 --models projectile --json flights.json");
+  return {parser, [request] { compare(*request); }};
+}
+
+}  // namespace unhand::apps

@@ -1,0 +1,47 @@
+// What the parts of `unhand compare` hand to each other.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "apps/output.hpp"
+#include "apps/table.hpp"
+#include "experiment/compare.hpp"
+
+namespace unhand::apps {
+
+struct CompareRequest {
+  std::string log;
+  std::vector<std::string> models, cards;  ///< no models: the usual ones of that kind of log
+  std::string json, report, write_cards;   ///< destinations; empty: none
+  bool fit{};
+  int threads{0};
+  release::NaiveOptions naive;
+  double rtol{dynamics::Tolerances{}.relative};
+};
+
+/// Free flights: every throw through the flight models.
+void compare_flights(const CompareRequest& request, const datasets::ThrowLog& log);
+
+/// The tables of a comparison of releases, in words and numbers.
+struct ReleaseTables {
+  Table errors, bias, parameters;
+  std::string heading, floor;
+};
+ReleaseTables release_tables(const experiment::Comparison& comparison, const datasets::ThrowLog& log,
+                             const std::string& file);
+Json release_json(const experiment::Comparison& comparison, const CompareRequest& request);
+
+/// Every throw with every model: predictions and errors.
+Table throw_table(const experiment::Comparison& comparison);
+
+/// Figures, tables, per-throw errors and JSON into a directory.
+void write_release_report(const experiment::Comparison& comparison, const ReleaseTables& tables,
+                          const Json& json, const std::filesystem::path& directory);
+
+/// "landed", or what ended the prediction.
+std::string outcome_of(const experiment::Prediction& prediction);
+
+}  // namespace unhand::apps

@@ -1,0 +1,259 @@
+// unhand compare on free flights.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+#include "apps/command.hpp"
+#include "apps/compare.hpp"
+#include "apps/figure.hpp"
+#include "apps/progress.hpp"
+#include "experiment/free_flight.hpp"
+
+namespace unhand::apps {
+namespace {
+
+using datasets::Split;
+using experiment::FreeFlightComparison;
+using experiment::FreeFlightErrors;
+using experiment::FreeFlightOutcome;
+using experiment::FreeFlightStatistics;
+
+struct SplitOf {
+  Split split;
+  const char* name;
+  const FreeFlightStatistics FreeFlightComparison::*statistics;
+};
+constexpr SplitOf splits[] = {{Split::train, "train", &FreeFlightComparison::train},
+                              {Split::test, "test", &FreeFlightComparison::test}};
+
+Json json_of(const experiment::Spread& s) {
+  if (s.n == 0) return {{"n", 0}, {"mean", nullptr}, {"median", nullptr}, {"std", nullptr}};
+  return {{"n", s.n}, {"mean", s.mean}, {"median", s.median}, {"std", s.std}};
+}
+
+std::map<std::string, int> skip_reasons(const FreeFlightComparison& model) {
+  std::map<std::string, int> out;
+  for (const auto& one : model.each)
+    if (one.outcome != FreeFlightOutcome::fitted)
+      ++out[fmt::format("{}: {}", to_string(one.outcome), one.reason)];
+  return out;
+}
+
+Json flights_json(const std::vector<FreeFlightComparison>& models, const CompareRequest& request,
+                  const datasets::ThrowLog& log) {
+  Json out = json_head("compare");
+  out["log"] = request.log;
+  out["dimension"] = log.dimension;
+  out["gravity_m_s2"] = log.gravity;
+  Json& all = out["models"] = Json::object();
+  for (const auto& model : models) {
+    Json& one = all[model.model];
+    one["parameters"] = Json::object();
+    one["failed"] = model.skipped;
+    for (const auto& [split, name, member] : splits) {
+      const FreeFlightStatistics& s = model.*member;
+      one[name] = {{"n", s.n}, {"trajectory_rms_m", nullptr}};
+      if (s.n > 0) one[name]["trajectory_rms_m"] = s.trajectory_rms_m;
+      one[name]["end_position_error_m"] = json_of(s.end_position_error_m);
+      one[name]["end_orientation_error_deg"] = json_of(s.end_orientation_error_deg);
+    }
+    one["microseconds_per_throw"] = model.microseconds_per_throw;
+  }
+  return out;
+}
+
+Table flights_table(const std::vector<FreeFlightComparison>& models) {
+  Table out{{"model", "throws", "n", "trajectory rms [mm]", "end position [mm]", "median",
+             "end orientation [deg]", "median", "us/throw"},
+            {},
+            2};
+  for (const auto& [split, name, member] : splits)
+    for (const auto& model : models) {
+      const FreeFlightStatistics& s = model.*member;
+      const auto &p = s.end_position_error_m, &a = s.end_orientation_error_deg;
+      out.rows.push_back({model.model, name, fmt::to_string(s.n), fixed(s.n > 0, 1e3 * s.trajectory_rms_m, 3),
+                          plus_minus(p.n > 0, 1e3 * p.mean, 1e3 * p.std, 2),
+                          fixed(p.n > 0, 1e3 * p.median, 2), plus_minus(a.n > 0, a.mean, a.std, 2),
+                          fixed(a.n > 0, a.median, 2), fmt::format("{:.0f}", model.microseconds_per_throw)});
+    }
+  return out;
+}
+
+Table flight_rows(const std::vector<FreeFlightComparison>& models) {
+  Table out{{"throw", "split", "model", "outcome", "samples", "trajectory_rms_m", "end_position_error_m",
+             "end_orientation_error_deg"},
+            {},
+            4};
+  for (const auto& model : models)
+    for (const auto& one : model.each) {
+      const bool fitted = one.outcome == FreeFlightOutcome::fitted;
+      const auto number = [&](bool known, double value) {
+        return known ? fmt::format("{}", value) : std::string();
+      };
+      out.rows.push_back({one.id, one.split == Split::train ? "train" : "test", model.model,
+                          to_string(one.outcome), fmt::to_string(one.whole.times.size()),
+                          number(fitted, one.trajectory_rms), number(fitted, one.end_position_error),
+                          number(one.end_orientation_error.has_value(),
+                                 one.end_orientation_error.value_or(0) * experiment::kDegrees)});
+    }
+  return out;
+}
+
+/// Linear interpolation between order statistics; `values` are sorted.
+double quantile(const std::vector<double>& values, double p) {
+  const double at = p * static_cast<double>(values.size() - 1);
+  const auto low = static_cast<std::size_t>(at);
+  const std::size_t high = std::min(low + 1, values.size() - 1);
+  return values[low] + (at - static_cast<double>(low)) * (values[high] - values[low]);
+}
+
+using Residuals = std::vector<flight::Vec3<double>> experiment::FreeFlightFit::*;
+
+/// Median and 10-90 % of one axis in bins of normalised time.
+DataBlock band(const FreeFlightComparison& model, bool test_only, Residuals residuals, int axis, double scale,
+               const std::string& title) {
+  constexpr std::size_t bins = 20;
+  std::array<std::vector<double>, bins> values;
+  for (const auto& one : model.each) {
+    if (one.outcome != FreeFlightOutcome::fitted || (test_only && one.split != Split::test)) continue;
+    const auto& r = one.whole.*residuals;
+    for (std::size_t i = 0; i < r.size(); ++i) {
+      const auto bin = static_cast<std::size_t>(one.normalised_time[i] * bins);
+      values[std::min(bin, bins - 1)].push_back(scale * r[i][static_cast<std::size_t>(axis)]);
+    }
+  }
+  DataBlock out{title, {"normalised time", "10 %", "median", "90 %"}, {}, {}};
+  for (std::size_t b = 0; b < bins; ++b) {
+    if (values[b].empty()) continue;
+    std::sort(values[b].begin(), values[b].end());
+    out.rows.push_back({(static_cast<double>(b) + 0.5) / bins, quantile(values[b], 0.1),
+                        quantile(values[b], 0.5), quantile(values[b], 0.9)});
+  }
+  return out;
+}
+
+/// A row of panels: one kind of residual, by axis.
+struct PanelRow {
+  Residuals residuals;
+  double scale;
+  std::string label;  ///< with its unit
+  std::vector<std::pair<int, std::string>> axes;
+};
+
+std::vector<PanelRow> panel_rows(bool planar, bool oriented) {
+  std::vector<PanelRow> rows{
+      {&experiment::FreeFlightFit::position_residuals, 1e3, "position [mm]", {{0, "x"}, {1, "y"}, {2, "z"}}}};
+  if (oriented)
+    rows.push_back({&experiment::FreeFlightFit::orientation_residuals,
+                    experiment::kDegrees,
+                    "orientation [deg]",
+                    {{0, "about body x"}, {1, "about body y"}, {2, "about body z"}}});
+  if (planar)
+    for (PanelRow& row : rows)
+      std::erase_if(row.axes, [&](const auto& axis) { return (axis.first == 1) == (row.scale > 100); });
+  return rows;
+}
+
+/// What the fit over the whole flight leaves, over the share of the flight that has passed.
+Figure residual_figure(const FreeFlightComparison& model, bool planar) {
+  const bool test_only = model.test.n > 0;
+  const bool oriented = model.train.end_orientation_error_deg.n + model.test.end_orientation_error_deg.n > 0;
+  const auto rows = panel_rows(planar, oriented);
+  Figure figure{"residuals_" + model.model, 19, oriented ? 12.5 : 7.5, {}, {}};
+  const Style style = style_of(model.model);
+  const std::vector<KeyEntry> key{
+      {fmt::format("with filledcurves linecolor rgb '{}'", style.colour), "10 - 90 %"},
+      {fmt::format("with linespoints linecolor rgb '{}' linewidth 1.4 pointtype {} pointsize 0.4",
+                   style.colour, style.marker),
+       "median"}};
+  const double bottom = 2.1, top = figure.height - 1.7, between = 1.8, left = 1.9, aside = 0.7;
+  const double count = static_cast<double>(rows.size());
+  const double height = (top - bottom - between * (count - 1)) / count;
+  std::string& s = figure.script;
+  s = fmt::format(
+      "set multiplot\nunset key\nset style fill transparent solid 0.3 noborder\nset xrange [0:1]\n"
+      "set xtics 0,0.25,1 format '%g'\nset xzeroaxis linetype 1 linecolor rgb '#808080' linewidth 0.6\n"
+      "set label 1 'what {} leaves: measured - fitted, {} flights' at screen 0.5,{:.4f} center\n",
+      plain(model.model), test_only ? "test" : "all", 1 - 0.5 / figure.height);
+  double y = top - height;
+  for (const PanelRow& row : rows) {
+    double extent = 0;
+    const std::size_t first = figure.data.size();
+    for (const auto& [axis, name] : row.axes) {
+      figure.data.push_back(band(model, test_only, row.residuals, axis, row.scale, row.label + ", " + name));
+      for (const auto& values : figure.data.back().rows)
+        for (std::size_t j = 1; j < values.size(); ++j) extent = std::max(extent, std::abs(values[j]));
+    }
+    extent = extent > 0 ? 1.1 * extent : 1;
+    s += fmt::format("set yrange [{:.6g}:{:.6g}]\nset xlabel '{}'\n", -extent, extent,
+                     &row == &rows.back() ? "share of the flight" : "");
+    const double n = static_cast<double>(row.axes.size()),
+                 width = (figure.width - 0.5 - left - (n - 1) * aside) / n;
+    for (std::size_t k = 0; k < row.axes.size(); ++k) {
+      const double x = left + static_cast<double>(k) * (width + aside);
+      s += place(figure, {x, x + width, y, y + height});
+      s += fmt::format("set title '{}' offset 0,-0.6\nset ylabel '{}'\nset format y '{}'\n",
+                       row.axes[k].second, k == 0 ? row.label : "", k == 0 ? "%g" : "");
+      s += fmt::format(
+          "plot DATA index {0} using 1:2:4 {1}, \\\n     DATA index {0} using 1:3 {2}\nunset label 1\n",
+          first + k, key[0].style, key[1].style);
+    }
+    y -= height + between;
+  }
+  s += key_strip(figure, key, 2) + "unset multiplot\n";
+  return figure;
+}
+
+}  // namespace
+
+void compare_flights(const CompareRequest& request, const datasets::ThrowLog& log) {
+  if (!request.cards.empty() || !request.write_cards.empty())
+    throw WrongUsage("models of free flight take no parameters: neither --card nor --write-cards");
+  const auto names = request.models.empty() ? std::vector<std::string>{"projectile"} : request.models;
+  std::vector<FreeFlightComparison> models;
+  {
+    Progress progress("simulate", names.size());
+    for (const auto& name : names) {
+      models.push_back(experiment::compare_free_flights(log, std::array{name}, request.threads).front());
+      progress.step();
+    }
+  }
+  bool any = false;
+  for (const auto& model : models) {
+    any = any || model.train.n + model.test.n > 0;
+    for (const auto& [reason, n] : skip_reasons(model))
+      fmt::print(stderr, "unhand: {}: {} of {} throws: {}\n", model.model, n, model.each.size(), reason);
+  }
+  if (!any) throw Unanswered("no throw could be fitted");
+
+  const std::string heading = fmt::format(
+      "{}: {}\n{} free flights; rms: start fitted to every sample; end errors: start fitted to the first "
+      "half, mean ± "
+      "standard deviation\n",
+      request.log, log.title, log.throws.size());
+  const Table table = flights_table(models);
+  const Json json = flights_json(models, request, log);
+  Outputs outputs;
+  if (!request.json.empty()) outputs.json(request.json, json);
+  if (!request.report.empty()) {
+    const auto directory = outputs.directory(request.report);
+    std::string pictures;
+    for (const auto& model : models) {
+      if (model.train.n + model.test.n == 0) continue;
+      const Figure figure = residual_figure(model, log.dimension == 2);
+      draw(figure, directory);
+      pictures += fmt::format("![What {} leaves]({}.png)\n\n", model.model, figure.name);
+    }
+    write_text(directory / "report.md",
+               fmt::format("# Free flights\n\n{}\n{}\n{}", heading, table.markdown(), pictures));
+    write_text(directory / "throws.csv", flight_rows(models).csv());
+    write_text(directory / "compare.json", json_text(json));
+  }
+  outputs.commit();
+  fmt::print("{}\n{}", heading, table.text());
+}
+
+}  // namespace unhand::apps

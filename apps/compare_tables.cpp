@@ -1,0 +1,139 @@
+// The answer of `unhand compare` on releases, as tables and as JSON.
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+
+#include "apps/cards.hpp"
+#include "apps/compare.hpp"
+
+namespace unhand::apps {
+namespace {
+
+using datasets::Split;
+using experiment::ErrorStatistics;
+using experiment::ModelComparison;
+
+constexpr int decimals[experiment::kQuantityCount] = {4, 2, 4, 2};
+constexpr std::pair<Split, const char*> splits[] = {{Split::train, "train"}, {Split::test, "test"}};
+
+struct Count {
+  int throws{}, failed{};
+};
+Count count(const ModelComparison& model, Split split) {
+  Count out;
+  for (const auto& one : model.throws) {
+    if (one.split != split) continue;
+    ++out.throws;
+    out.failed += !one.prediction.landed();
+  }
+  return out;
+}
+
+Json json_of(const ErrorStatistics& s) {
+  if (s.n == 0) return {{"n", 0}, {"mae", nullptr}, {"std", nullptr}, {"bias", nullptr}};
+  return {{"n", s.n}, {"mae", s.mae}, {"std", s.std}, {"bias", s.bias}};
+}
+
+Json split_json(const ModelComparison& model, Split split) {
+  const Count counted = count(model, split);
+  Json out{{"n", counted.throws}, {"failed", counted.failed}};
+  for (int q = 0; q < experiment::kQuantityCount; ++q)
+    out[experiment::kQuantities[q].key] = json_of(model.statistics(q, split));
+  return out;
+}
+
+}  // namespace
+
+ReleaseTables release_tables(const experiment::Comparison& comparison, const datasets::ThrowLog& log,
+                             const std::string& file) {
+  ReleaseTables out;
+  std::array<int, 2> n{};
+  for (const auto& one : log.throws) ++n[one.split == Split::test];
+  out.heading = fmt::format(
+      "{}: {}\n{} throws ({} train, {} test), {} conditions; mean absolute error ± its standard "
+      "deviation\n",
+      file, log.title, log.throws.size(), n[0], n[1], comparison.conditions.size());
+  out.errors.left = out.bias.left = 2;
+  out.errors.header = out.bias.header = {"model", "throws", "n", "failed"};
+  for (const auto& quantity : experiment::kQuantities) {
+    out.errors.header.push_back(quantity.title);
+    out.bias.header.push_back(quantity.title);
+  }
+  out.errors.header.push_back("us/throw");
+  for (const auto& [split, name] : splits) {
+    for (const auto& model : comparison.models) {
+      const Count counted = count(model, split);
+      std::vector<std::string> row{model.model, name, fmt::to_string(counted.throws),
+                                   fmt::to_string(counted.failed)};
+      auto bias = row;
+      for (int q = 0; q < experiment::kQuantityCount; ++q) {
+        const auto s = model.statistics(q, split);
+        row.push_back(plus_minus(s.n > 0, s.mae, s.std, decimals[q]));
+        bias.push_back(s.n > 0 ? fmt::format("{:+.{}f}", s.bias, decimals[q]) : "-");
+      }
+      row.push_back(fmt::format("{:.0f}", model.microseconds_per_throw));
+      out.errors.rows.push_back(std::move(row));
+      out.bias.rows.push_back(std::move(bias));
+    }
+  }
+  const auto& floor = comparison.repetitions;
+  out.floor =
+      floor.conditions > 0
+          ? fmt::format(
+                "scatter of repetitions: landing x {:.4f} m, landing theta {:.2f} deg (pooled 1 sigma, {} "
+                "conditions): the floor of a model that knows of a throw only its condition\n",
+                floor.landing_x, floor.landing_theta, floor.conditions)
+          : "scatter of repetitions: no condition was repeated with its landing measured\n";
+  out.parameters = {{"model", "parameters", "how", "samples", "scatter"}, {}, 3};
+  for (const auto& model : comparison.models) {
+    std::string values;
+    for (const auto& [name, unit, value] : named_values(model.model, model.estimate.parameters))
+      values += fmt::format("{}{} = {:.5g}{}", values.empty() ? "" : ", ", name, value,
+                            unit == "-" ? "" : " " + unit);
+    const bool sampled = model.estimate.samples > 0;
+    out.parameters.rows.push_back({model.model, values, model.estimate.method,
+                                   sampled ? fmt::to_string(model.estimate.samples) : "-",
+                                   fixed(sampled, model.estimate.scatter, 3)});
+  }
+  return out;
+}
+
+Json release_json(const experiment::Comparison& comparison, const CompareRequest& request) {
+  Json out = json_head("compare");
+  out["log"] = request.log;
+  out["settings"] = {{"rtol", request.rtol},
+                     {"naive_step_s", request.naive.step},
+                     {"naive_smoothing_m_s", request.naive.smoothing}};
+  out["conditions"] = comparison.conditions.size();
+  const auto& floor = comparison.repetitions;
+  out["repetition_scatter"] = {
+      {"conditions", floor.conditions}, {"landing_x_m", nullptr}, {"landing_theta_deg", nullptr}};
+  if (floor.conditions > 0) {
+    out["repetition_scatter"]["landing_x_m"] = floor.landing_x;
+    out["repetition_scatter"]["landing_theta_deg"] = floor.landing_theta;
+  }
+  out["inputs"] = {{"worst_hand_chi2_per_dof", comparison.worst_hand_chi2},
+                   {"mean_normal_force_chi2_per_dof", comparison.mean_force_chi2}};
+  Json& models = out["models"] = Json::object();
+  for (const auto& model : comparison.models) {
+    Json& one = models[model.model];
+    Json parameters = Json::object(), units = Json::object();
+    for (const auto& [name, unit, value] : named_values(model.model, model.estimate.parameters)) {
+      parameters[name] = value;
+      units[name] = unit;
+    }
+    one["parameters"] = parameters;
+    one["parameter_units"] = units;
+    one["estimate"] = {{"from_card", model.from_card},
+                       {"method", model.estimate.method},
+                       {"samples", model.estimate.samples},
+                       {"scatter", model.estimate.scatter}};
+    one["failed"] = model.failed;
+    for (const auto& [split, name] : splits) one[name] = split_json(model, split);
+    one["microseconds_per_throw"] = model.microseconds_per_throw;
+  }
+  return out;
+}
+
+}  // namespace unhand::apps

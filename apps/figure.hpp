@@ -1,0 +1,60 @@
+// Figures. gnuplot draws them, and no other file knows it but for the drawing commands that it hands over.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace unhand::apps {
+
+/// Rows of numbers or quoted text. gnuplot's `index` counts the blocks of a figure from 0.
+struct DataBlock {
+  std::string title;                      ///< a comment in the file
+  std::vector<std::string> columns;       ///< names and units, a comment in the file
+  std::vector<std::vector<double>> rows;  ///< finite
+  std::vector<std::string> labels;        ///< empty, or one text per row: its last column
+};
+
+struct Figure {
+  std::string name;              ///< stem of its files
+  double width{17}, height{11};  ///< [cm]; text is 9 points at this size
+  std::vector<DataBlock> data;
+  std::string script;  ///< plot commands; the data file is the variable DATA
+};
+
+/// Writes NAME.png and NAME.pdf, and beside them NAME.gp and NAME.dat from which `gnuplot NAME.gp` draws them
+/// again. Throws Unanswered if there is no gnuplot or it complains.
+void draw(const Figure& figure, const std::filesystem::path& directory);
+
+/// Throws Unanswered, naming the package, where gnuplot is missing.
+void require_gnuplot();
+
+/// One model's look, the same in every figure: they differ in colour, in lightness and in marker.
+struct Style {
+  int marker{};        ///< gnuplot's point type
+  std::string colour;  ///< "#rrggbb"
+  int dash{};          ///< gnuplot's dash type
+};
+Style style_of(const std::string& model);
+
+/// A panel of a multiplot: its edges [cm from the figure's lower left corner].
+struct Panel {
+  double left{}, right{}, bottom{}, top{};
+};
+std::string place(const Figure& figure, const Panel& panel);
+
+/// The key of a multiplot, in a strip along the figure's lower edge. To be drawn last.
+struct KeyEntry {
+  std::string style;  ///< "with points pointtype 7 ..."
+  std::string title;
+};
+constexpr double key_row = 0.5;  ///< [cm]
+std::string key_strip(const Figure& figure, const std::vector<KeyEntry>& entries, int columns);
+inline double key_height(std::size_t entries, int columns) {
+  return key_row * static_cast<double>((static_cast<int>(entries) + columns - 1) / columns);
+}
+
+/// Text as gnuplot takes it between single quotes, without its own markup.
+std::string plain(const std::string& text);
+
+}  // namespace unhand::apps

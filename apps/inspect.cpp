@@ -1,0 +1,176 @@
+// unhand inspect: what is in a log.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "apps/command.hpp"
+#include "apps/output.hpp"
+#include "apps/table.hpp"
+#include "datasets/slip_log.hpp"
+#include "datasets/summary.hpp"
+
+namespace unhand::apps {
+namespace {
+
+struct Options {
+  std::string log;
+  std::string json;
+  bool json_wanted{};
+  int threads{0};
+};
+
+struct Inspection {
+  std::string text, json;
+};
+
+std::string plural(std::size_t n, const char* what) {
+  return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s");
+}
+
+std::string range(double low, double high) {
+  return low == high ? fmt::format("{:.4g}", low) : fmt::format("{:.4g} to {:.4g}", low, high);
+}
+
+Table groups_of(const datasets::LogSummary& summary) {
+  Table table{{"group", "throws", "samples", "rate [Hz]", "lost", "longest gap / step", "in throw"}, {}, 1};
+  for (const auto& g : summary.groups)
+    table.rows.push_back({g.group, fmt::to_string(g.throws), fmt::to_string(g.rows),
+                          range(g.lowest_rate, g.highest_rate), fmt::to_string(g.lost),
+                          fmt::format("{:.3g}", g.worst_gap_ratio), g.worst_gap_throw});
+  return table;
+}
+
+/// Columns, units and declared noise of every dataset that the log holds.
+Table datasets_of(const datasets::LogSummary& summary) {
+  Table table{{"dataset", "columns", "units", "throws", "declared sigma"}, {}, 5};
+  const auto layout = datasets::throw_log_layout(summary.dimension);
+  for (const auto& noise : summary.noise) {
+    const auto row = std::find_if(layout.begin(), layout.end(), [&](const auto& r) {
+      return r.path == noise.dataset || r.path.ends_with("/" + noise.dataset);
+    });
+    std::string sigma;
+    for (std::size_t j = 0; j < noise.lowest.size(); ++j)
+      sigma += (j > 0 ? ", " : "") + range(noise.lowest[j], noise.highest[j]);
+    if (noise.declared > 0 && noise.declared < noise.throws)
+      sigma += fmt::format(" (in {} throws)", noise.declared);
+    table.rows.push_back({noise.dataset, row == layout.end() ? "" : row->columns,
+                          row == layout.end() ? "" : row->units, fmt::to_string(noise.throws),
+                          sigma.empty() ? "-" : sigma});
+  }
+  return table;
+}
+
+Inspection inspect_throws(const std::string& file) {
+  const auto log = datasets::read_throw_log(file);
+  const auto summary = datasets::summarise(log);
+  Inspection out;
+  out.json = datasets::to_json(summary);
+  out.text = fmt::format("{}: throw-log, dimension {}\n  title    {}\n  source   {}\n", file,
+                         summary.dimension, summary.title, summary.source);
+  if (!summary.licence.empty()) out.text += fmt::format("  licence  {}\n", summary.licence);
+  out.text += fmt::format("  gravity {} m/s^2 (declared), landing height {} m\n", summary.gravity,
+                          summary.landing_height);
+  for (const auto& [name, object] : log.objects) {
+    out.text += fmt::format("  object {}: mass {} kg", name, object.mass);
+    if (object.inertia)
+      for (std::size_t j = 0; j < object.inertia->size(); ++j)
+        out.text += fmt::format("{}{:.6g}{}", j == 0 ? ", inertia " : ", ", (*object.inertia)[j],
+                                j + 1 == object.inertia->size() ? " kg m^2" : "");
+    if (object.com_offset) out.text += fmt::format(", CoM offset {} m", *object.com_offset);
+    if (object.drag_k) out.text += fmt::format(", drag {} 1/m", *object.drag_k);
+    out.text += "\n";
+  }
+  const std::size_t landed = static_cast<std::size_t>(
+      std::count_if(summary.each.begin(), summary.each.end(), [](const auto& t) { return t.landing; }));
+  out.text +=
+      fmt::format("  {} ({} train, {} test), {}, {} with a landing, {}\n\n", plural(summary.throws, "throw"),
+                  summary.train, summary.test, plural(summary.conditions.size(), "condition"), landed,
+                  plural(summary.free_flights, "free flight"));
+  out.text += groups_of(summary).text() + "\n" + datasets_of(summary).text();
+  out.text += "\nno schema errors; times in s, values in SI units and radians as read\n";
+  return out;
+}
+
+Inspection inspect_slips(const std::string& file) {
+  const auto log = datasets::read_slip_log(file);
+  Inspection out;
+  Json json = json_head("inspect");
+  json["log_schema"] = "slip-log";
+  Json& surfaces = json["surfaces"] = Json::object();
+  Table table{
+      {"surface", "mass [kg]", "length [m]", "slips", "train", "test", "samples", "rate [Hz]"}, {}, 1};
+  std::string descriptions;
+  for (const auto& [name, surface] : log.surfaces) {
+    std::size_t train = 0, samples = 0;
+    std::vector<double> steps;
+    for (const auto& slip : surface.slips) {
+      train += slip.split == datasets::Split::train;
+      samples += slip.time.rows;
+      for (std::size_t i = 1; i < slip.time.rows; ++i) steps.push_back(slip.time(i) - slip.time(i - 1));
+    }
+    double rate = 0;
+    if (!steps.empty()) {
+      const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+      std::nth_element(steps.begin(), middle, steps.end());
+      rate = 1 / *middle;
+    }
+    const std::size_t test = surface.slips.size() - train;
+    surfaces[name] = {{"mass_kg", surface.mass},
+                      {"characteristic_length_m", surface.characteristic_length},
+                      {"description", surface.description},
+                      {"licence", surface.licence.value_or("")},
+                      {"slips", surface.slips.size()},
+                      {"train", train},
+                      {"test", test},
+                      {"samples", samples},
+                      {"rate_hz", rate}};
+    table.rows.push_back({name, fmt::format("{}", surface.mass),
+                          fmt::format("{}", surface.characteristic_length),
+                          fmt::to_string(surface.slips.size()), fmt::to_string(train), fmt::to_string(test),
+                          fmt::to_string(samples), fmt::format("{:.4g}", rate)});
+    descriptions += fmt::format("  {}: {}\n", name, surface.description);
+  }
+  out.json = json.dump(1) + "\n";
+  out.text =
+      fmt::format("{}: slip-log, {}\n{}\n{}\nno schema errors; wrench N, N, N m; twist m/s, m/s, rad/s\n",
+                  file, plural(log.surfaces.size(), "surface"), descriptions, table.text());
+  return out;
+}
+
+void inspect(const Options& options) {
+  require_writable(options.json);
+  const Inspection seen = datasets::read_schema_name(options.log) == "slip-log" ? inspect_slips(options.log)
+                                                                                : inspect_throws(options.log);
+  if (options.json_wanted && options.json.empty()) {
+    fmt::print("{}", seen.json);
+    return;
+  }
+  if (!options.json.empty()) {
+    Outputs outputs;
+    outputs.text(options.json, seen.json);
+    outputs.commit();
+  }
+  fmt::print("{}", seen.text);
+}
+
+}  // namespace
+
+Command inspect_command(CLI::App& root) {
+  auto options = std::make_shared<Options>();
+  CLI::App* parser =
+      root.add_subcommand("inspect", "Show what is in a log: units, rates, gaps, noise, schema errors");
+  parser->add_option("LOG", options->log, "A throw log or slip log")->required();
+  CLI::Option* json =
+      parser->add_option("--json", options->json, "Write it as JSON; without a file name, JSON on stdout")
+          ->expected(0, 1);
+  add_threads(*parser, options->threads);
+  parser->footer(
+      "Examples:\n  unhand inspect campaign.h5\n  unhand inspect campaign.h5 --json campaign.json");
+  return {parser, [options, json] {
+            options->json_wanted = json->count() > 0;
+            inspect(*options);
+          }};
+}
+
+}  // namespace unhand::apps

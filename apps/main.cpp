@@ -1,0 +1,52 @@
+// unhand: the command line.
+#include <fmt/format.h>
+
+#include <array>
+#include <exception>
+#include <nlohmann/json.hpp>
+
+#include "apps/command.hpp"
+#include "datasets/log_error.hpp"
+
+namespace {
+
+using namespace unhand::apps;
+
+int say(ExitCode code, const std::exception& error) {
+  fmt::print(stderr, "unhand: {}\n", error.what());
+  return code;
+}
+
+int run(const Command& command) {
+  try {
+    command.run();
+    return done;
+  } catch (const WrongUsage& error) {
+    return say(wrong_usage, error);
+  } catch (const unhand::datasets::LogError& error) {
+    return say(bad_input, error);
+  } catch (const std::exception& error) {
+    return say(unanswered, error);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App root{"unhand: the physics of letting go. Predicts where released objects land.", "unhand"};
+  root.set_version_flag("--version", "unhand " UNHAND_VERSION);
+  root.require_subcommand(1);
+  root.footer(
+      "Exit codes: 0 done, 1 the computation could not answer, 2 wrong usage, 3 bad input.\n"
+      "Existing outputs are replaced, each at once, and only if everything succeeded.");
+  const std::array commands{generate_command(root), import_command(root), inspect_command(root),
+                            compare_command(root), predict_command(root)};
+  try {
+    root.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return root.exit(error) == 0 ? done : wrong_usage;
+  }
+  for (const Command& command : commands)
+    if (command.parser->parsed()) return run(command);
+  return wrong_usage;
+}

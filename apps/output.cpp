@@ -1,0 +1,128 @@
+#include "apps/output.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "apps/command.hpp"
+
+namespace unhand::apps {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+[[noreturn]] void refuse(const fs::path& file, const std::string& why) {
+  throw Unanswered(fmt::format("{}: cannot be written: {}", file.string(), why));
+}
+
+fs::path parent_of(const fs::path& file) {
+  return file.has_parent_path() ? file.parent_path() : fs::path(".");
+}
+
+/// The path without a slash at its end.
+fs::path trimmed(const fs::path& directory) {
+  return directory.has_filename() ? directory : directory.parent_path();
+}
+
+/// The nearest directory above `path` that exists, or what stands in its place.
+fs::path nearest_existing(fs::path path) {
+  std::error_code error;
+  while (!fs::exists(path, error) && path.has_relative_path()) path = parent_of(path);
+  return path;
+}
+
+void require_directory(const fs::path& wanted, const fs::path& directory) {
+  std::error_code error;
+  if (!fs::is_directory(directory, error))
+    refuse(wanted, fmt::format("{} is no directory", directory.string()));
+  if (access(directory.c_str(), W_OK | X_OK) != 0)
+    refuse(wanted, fmt::format("no permission in {}", directory.string()));
+}
+
+void put_in_place(const fs::path& made, const fs::path& destination) {
+  std::error_code error;
+  fs::rename(made, destination, error);
+  if (error) refuse(destination, error.message());
+}
+
+}  // namespace
+
+void write_text(const fs::path& file, const std::string& content) {
+  std::ofstream out(file, std::ios::binary);
+  out << content;
+  out.close();
+  if (!out) refuse(file, "the disk refuses");
+}
+
+Outputs::~Outputs() {
+  std::error_code ignored;
+  for (const Part& part : parts_) fs::remove_all(part.made, ignored);
+}
+
+fs::path Outputs::part_of(const fs::path& destination) {
+  const auto name = fmt::format(".{}.part-{}-{}", destination.filename().string(), getpid(), parts_.size());
+  return nearest_existing(parent_of(destination)) / name;
+}
+
+void Outputs::text(const fs::path& file, const std::string& content) {
+  require_writable(file);
+  parts_.push_back({part_of(file), file, false});
+  write_text(parts_.back().made, content);
+}
+
+void Outputs::log(const fs::path& file, const datasets::ThrowLog& log) {
+  require_writable(file);
+  parts_.push_back({part_of(file), file, false});
+  try {
+    datasets::write_throw_log(parts_.back().made, log);
+  } catch (const datasets::LogError& error) {
+    refuse(file, fmt::format("{}: {}", error.path, error.reason));
+  }
+}
+
+fs::path Outputs::directory(const fs::path& destination) {
+  require_writable_directory(destination);
+  const fs::path wanted = trimmed(destination);
+  parts_.push_back({part_of(wanted), wanted, true});
+  std::error_code error;
+  if (!fs::create_directory(parts_.back().made, error) || error) refuse(destination, error.message());
+  return parts_.back().made;
+}
+
+void Outputs::commit() {
+  for (const Part& part : parts_) {
+    std::error_code error;
+    if (!part.is_directory) {
+      put_in_place(part.made, part.destination);
+      continue;
+    }
+    fs::create_directories(part.destination, error);
+    if (error) refuse(part.destination, error.message());
+    for (const auto& entry : fs::directory_iterator(part.made))
+      put_in_place(entry.path(), part.destination / entry.path().filename());
+    fs::remove(part.made, error);
+  }
+  parts_.clear();
+}
+
+void require_writable(const fs::path& file) {
+  if (file.empty()) return;
+  std::error_code error;
+  if (fs::is_directory(file, error)) refuse(file, "it is a directory");
+  require_directory(file, parent_of(file));
+}
+
+void require_writable_directory(const fs::path& directory) {
+  if (directory.empty()) return;
+  require_directory(directory, nearest_existing(trimmed(directory)));
+}
+
+Json json_head(const std::string& schema) {
+  return {{"schema", schema},
+          {"schema_version", 1},
+          {"software", {{"name", "unhand"}, {"version", UNHAND_VERSION}}}};
+}
+
+}  // namespace unhand::apps

@@ -1,0 +1,61 @@
+// Results as files: all of them in place, or none.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "datasets/throw_log.hpp"
+
+namespace unhand::apps {
+
+using Json = nlohmann::ordered_json;
+
+inline std::string json_text(const Json& value) { return value.dump(1) + "\n"; }
+
+/// Writes a file in place, for directories that are not in place yet. Throws Unanswered.
+void write_text(const std::filesystem::path& file, const std::string& content);
+
+/// The files and directories that one run leaves. Everything is made beside its destination first; commit()
+/// then renames, replacing files of the same names. Without commit() nothing stays. Throws Unanswered where
+/// something cannot be written.
+class Outputs {
+ public:
+  Outputs() = default;
+  Outputs(const Outputs&) = delete;
+  Outputs& operator=(const Outputs&) = delete;
+  ~Outputs();
+
+  void text(const std::filesystem::path& file, const std::string& content);
+  void json(const std::filesystem::path& file, const Json& value) { text(file, json_text(value)); }
+
+  void log(const std::filesystem::path& file, const datasets::ThrowLog& log);
+
+  /// A directory to fill; commit() moves what it holds to `destination`, which may exist and keeps its other
+  /// files.
+  std::filesystem::path directory(const std::filesystem::path& destination);
+
+  void commit();
+
+ private:
+  struct Part {
+    std::filesystem::path made, destination;
+    bool is_directory{};
+  };
+  std::filesystem::path part_of(const std::filesystem::path& destination);
+
+  std::vector<Part> parts_;
+};
+
+/// Finds out before the work begins that a file cannot be written there. An empty path passes. Throws
+/// Unanswered.
+void require_writable(const std::filesystem::path& file);
+/// The same of a directory, which need not exist yet.
+void require_writable_directory(const std::filesystem::path& directory);
+
+/// {"schema": name, "schema_version": 1, "software": {...}}: the head of every JSON file.
+Json json_head(const std::string& schema);
+
+}  // namespace unhand::apps
