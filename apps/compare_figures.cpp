@@ -97,15 +97,21 @@ std::string scatter(const std::vector<Cloud>& clouds, std::size_t first, const E
   return out + "\n";
 }
 
-struct Range {
-  double low{}, high{};
-  bool log{};
-};
-/// Of positive values; logarithmic where they span more than a factor of 20.
-Range axis_range(const std::vector<double>& values) {
+/// An axis of positive values from its commands: logarithmic where they span more than a factor of 20, then
+/// with tics at 1, 2 and 5 where decades alone would be few.
+std::string value_axis(const std::vector<double>& values) {
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  if (*low > 0 && *high / *low > 20) return {*low / 1.4, *high * 1.4, true};
-  return {0, *high > 0 ? 1.08 * *high : 1, false};
+  if (!(*low > 0 && *high / *low > 20))
+    return fmt::format("unset logscale x; set xtics autofreq\nset xrange [0:{:.6g}]\n",
+                       *high > 0 ? 1.08 * *high : 1);
+  const double left = *low / 1.4, right = *high * 1.4;
+  std::string out = fmt::format("set logscale x\nset xrange [{:.6g}:{:.6g}]\n", left, right);
+  if (right / left > 300) return out + "set xtics autofreq\n";
+  std::string tics;
+  for (double decade = std::pow(10, std::floor(std::log10(left))); decade < right; decade *= 10)
+    for (const int digit : {1, 2, 5})
+      tics += fmt::format("{}{:.6g}", tics.empty() ? "" : ", ", digit * decade);
+  return out + fmt::format("set xtics ({})\n", tics);
 }
 
 /// The conditions, that with the largest landing error of `model` first.
@@ -142,11 +148,9 @@ std::string condition_panel(const Figure& figure, int column, std::optional<doub
   std::vector<double> values;
   for (const auto& block : figure.data)
     for (const auto& row : block.rows) values.push_back(row[static_cast<std::size_t>(column) - 1]);
-  const Range range = axis_range(values);
-  std::string out = range.log ? "set logscale x\n" : "unset logscale x\n";
-  out +=
-      fmt::format("set xrange [{:.6g}:{:.6g}]\nset xlabel '{}'\nunset arrow\n", range.low, range.high, label);
-  if (floor && *floor > range.low && *floor < range.high)
+  if (floor) values.push_back(*floor);
+  std::string out = value_axis(values) + fmt::format("set xlabel '{}'\nunset arrow\n", label);
+  if (floor)
     out += fmt::format("set arrow from {0:.6g}, graph 0 to {0:.6g}, graph 1 nohead back {1}\n", *floor,
                        floor_style);
   out += "plot ";

@@ -143,17 +143,16 @@ struct PanelRow {
   std::vector<std::pair<int, std::string>> axes;
 };
 
+/// Planar flights move along x and z and turn about y.
 std::vector<PanelRow> panel_rows(bool planar, bool oriented) {
-  std::vector<PanelRow> rows{
-      {&experiment::FreeFlightFit::position_residuals, 1e3, "position [mm]", {{0, "x"}, {1, "y"}, {2, "z"}}}};
-  if (oriented)
-    rows.push_back({&experiment::FreeFlightFit::orientation_residuals,
-                    experiment::kDegrees,
-                    "orientation [deg]",
-                    {{0, "about body x"}, {1, "about body y"}, {2, "about body z"}}});
-  if (planar)
-    for (PanelRow& row : rows)
-      std::erase_if(row.axes, [&](const auto& axis) { return (axis.first == 1) == (row.scale > 100); });
+  std::vector<PanelRow> rows{{&experiment::FreeFlightFit::position_residuals, 1e3, "position [mm]", {}}};
+  rows[0].axes = planar ? decltype(PanelRow::axes){{0, "x"}, {2, "z"}}
+                        : decltype(PanelRow::axes){{0, "x"}, {1, "y"}, {2, "z"}};
+  if (!oriented) return rows;
+  rows.push_back(
+      {&experiment::FreeFlightFit::orientation_residuals, experiment::kDegrees, "orientation [deg]", {}});
+  rows[1].axes = {{0, "about body x"}, {1, "about body y"}, {2, "about body z"}};
+  if (planar) rows[1].axes = {{1, "about y"}};
   return rows;
 }
 

@@ -181,7 +181,7 @@ std::string key_strip(const Figure& figure, const std::vector<KeyEntry>& entries
       "unset border; unset tics; unset grid; unset title; unset xlabel; unset ylabel; unset arrow; unset "
       "object\n"
       "unset logscale; unset xzeroaxis; unset yzeroaxis\n"
-      "set key inside center center horizontal maxcols {} samplen 1.5 width 1 spacing 1.1 Left reverse\n"
+      "set key inside center center horizontal maxcols {} samplen 2.5 width 1 spacing 1.1 Left reverse\n"
       "plot [0:1] [0:1] 2 notitle",
       columns);
   for (const KeyEntry& entry : entries)

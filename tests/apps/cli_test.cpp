@@ -3,8 +3,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <array>
-#include <cstdio>
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -83,7 +83,9 @@ class Cli : public testing::Test {
     EXPECT_THAT(answer.err, HasSubstr(reason)) << arguments;
     EXPECT_THAT(answer.out, IsEmpty()) << arguments;
     EXPECT_EQ(files(), before) << arguments;
-    if (code == 3) EXPECT_EQ(std::count(answer.err.begin(), answer.err.end(), '\n'), 1) << answer.err;
+    if (code == 3) {
+      EXPECT_EQ(std::count(answer.err.begin(), answer.err.end(), '\n'), 1) << answer.err;
+    }
   }
 
   /// Cubes that fall without air, tracked without noise.
