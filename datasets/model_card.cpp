@@ -192,7 +192,8 @@ ModelCard parse_model_card(const std::string& text, const std::string& file) {
 
 ModelCard read_model_card(const fs::path& file) {
   std::error_code error;
-  if (fs::is_directory(file, error)) throw CardError(file.string(), "/", "is a directory: a card is one file");
+  if (fs::is_directory(file, error))
+    throw CardError(file.string(), "/", "is a directory: a card is one file");
   if (!fs::exists(file, error)) throw CardError(file.string(), "/", "no such file");
   std::ifstream in(file, std::ios::binary);
   std::ostringstream text;
@@ -233,7 +234,8 @@ void write_model_card(const fs::path& file, const ModelCard& card) {
   const std::string text = to_json(card);
   const fs::path part = fmt::format("{}.part-{}", file.string(), getpid());
   std::error_code error;
-  if (fs::is_directory(file, error)) throw CardError(file.string(), "/", "is a directory: a card is one file");
+  if (fs::is_directory(file, error))
+    throw CardError(file.string(), "/", "is a directory: a card is one file");
   std::ofstream out(part, std::ios::binary | std::ios::trunc);
   out << text;
   out.close();
