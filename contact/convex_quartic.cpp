@@ -17,14 +17,16 @@ using dynamics::value_of;
 
 namespace {
 
-constexpr int kPower[ConvexQuartic::kCoefficients][3] = {{4, 0, 0}, {3, 1, 0}, {3, 0, 1}, {2, 2, 0}, {2, 1, 1},
-                                                         {2, 0, 2}, {1, 3, 0}, {1, 2, 1}, {1, 1, 2}, {1, 0, 3},
-                                                         {0, 4, 0}, {0, 3, 1}, {0, 2, 2}, {0, 1, 3}, {0, 0, 4}};
+constexpr int kPower[ConvexQuartic::kCoefficients][3] = {
+    {4, 0, 0}, {3, 1, 0}, {3, 0, 1}, {2, 2, 0}, {2, 1, 1}, {2, 0, 2}, {1, 3, 0}, {1, 2, 1},
+    {1, 1, 2}, {1, 0, 3}, {0, 4, 0}, {0, 3, 1}, {0, 2, 2}, {0, 1, 3}, {0, 0, 4}};
 
-Vec3<double> times(const Mat3& a, const Vec3<double>& x) { return {dot3(a[0], x), dot3(a[1], x), dot3(a[2], x)}; }
+Vec3<double> times(const Mat3& a, const Vec3<double>& x) {
+  return {dot3(a[0], x), dot3(a[1], x), dot3(a[2], x)};
+}
 
-// The solution of A x = b, A symmetric and positive semidefinite, by LDLᵀ; a pivot below 1e-13 of the trace is raised to
-// it, so that a singular A gives a long but finite x.
+// The solution of A x = b, A symmetric and positive semidefinite, by LDLᵀ; a pivot below 1e-13 of the trace
+// is raised to it, so that a singular A gives a long but finite x.
 struct Factored {
   double d0, d1, d2, l10, l20, l21;
 
@@ -91,7 +93,8 @@ Vec3<double> spread(int k, int count) {
 
 [[noreturn]] void refuse(const char* what, double value, const Vec3<double>& w) {
   throw std::invalid_argument(
-      fmt::format("convex quartic: {} = {} at w = ({:.6g}, {:.6g}, {:.6g}); it must not be negative, and H must be positive",
+      fmt::format("convex quartic: {} = {} at w = ({:.6g}, {:.6g}, {:.6g}); it must not be negative, and H "
+                  "must be positive",
                   what, value, w[0], w[1], w[2]));
 }
 
@@ -102,7 +105,8 @@ ConvexQuartic::ConvexQuartic(const std::array<double, kCoefficients>& coefficien
   constexpr double kFactorial[5] = {1, 1, 2, 6, 24};
   for (int k = 0; k < kCoefficients; ++k) {
     const int* n = kPower[k];
-    tensor_[k] = 0.5 * kFactorial[n[0]] * kFactorial[n[1]] * kFactorial[n[2]] * coefficients[k];  // 12/multinomial
+    tensor_[k] =
+        0.5 * kFactorial[n[0]] * kFactorial[n[1]] * kFactorial[n[2]] * coefficients[k];  // 12/multinomial
   }
 }
 
@@ -110,8 +114,9 @@ ConvexQuartic::ConvexQuartic(const std::array<double, kCoefficients>& coefficien
     : ConvexQuartic(coefficients, Unchecked{}) {
   for (int k = 0; k < kCoefficients; ++k) {
     if (!std::isfinite(coefficients[k])) {
-      throw std::invalid_argument(fmt::format("convex quartic: coefficient of w_x^{} w_z^{} w_tau^{} = {} is not finite",
-                                              kPower[k][0], kPower[k][1], kPower[k][2], coefficients[k]));
+      throw std::invalid_argument(
+          fmt::format("convex quartic: coefficient of w_x^{} w_z^{} w_tau^{} = {} is not finite",
+                      kPower[k][0], kPower[k][1], kPower[k][2], coefficients[k]));
     }
   }
   constexpr int kDirections = 600, kLowest = 24, kTurns = 60;
@@ -132,7 +137,8 @@ ConvexQuartic::ConvexQuartic(const std::array<double, kCoefficients>& coefficien
       const Spectrum s(hessian(x));
       if (s.least < -1e-10 * largest) refuse("the least eigenvalue of the Hessian", s.least, x);
       x = s.vector;
-      // A convex H vanishes only along a line on which its Hessian vanishes too: the least eigenvector of any place.
+      // A convex H vanishes only along a line on which its Hessian vanishes too: the least eigenvector of any
+      // place.
       const double value = dot3(x, times(hessian(x), x)) / 12.0;
       if (!(value > 1e-12 * largest)) refuse("H", value, x);
     }
@@ -191,9 +197,10 @@ S ConvexQuartic::gauge(const Vec3<S>& w) const {
   }
 }
 
-// φ(w) = H(w) + û·w, û = u/|u|, is convex with its least value where ∇H(w) = −û. Newton's method from the ellipsoid's
-// direction with backtracking on φ: at most 50 steps, some 5 in general; then w/gauge(w). In Dual, the implicit function
-// theorem at the solution: dw = −(∇²H)⁻¹ dû, and the radial part of it does not count.
+// φ(w) = H(w) + û·w, û = u/|u|, is convex with its least value where ∇H(w) = −û. Newton's method from the
+// ellipsoid's direction with backtracking on φ: at most 50 steps, some 5 in general; then w/gauge(w). In
+// Dual, the implicit function theorem at the solution: dw = −(∇²H)⁻¹ dû, and the radial part of it does not
+// count.
 template <class S>
 Vec3<S> ConvexQuartic::resist(const Vec3<S>& u) const {
   const double scale = scale_of(u);
@@ -203,7 +210,7 @@ Vec3<S> ConvexQuartic::resist(const Vec3<S>& u) const {
   for (double& entry : d) entry /= size;
 
   Mat3 h = hessian(d);
-  Vec3<double> w = d, third = times(h, d);  // third = 3 ∇H
+  Vec3<double> w = d, third = times(h, d);                // third = 3 ∇H
   const double start = -std::cbrt(3.0 / dot3(third, d));  // least φ along the ray: 4 t³ H(û) = −1
   const double square = start * start;
   for (int i = 0; i < 3; ++i) {

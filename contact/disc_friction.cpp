@@ -7,14 +7,14 @@
 namespace unhand::contact {
 namespace {
 
-constexpr int kPower = 64;   // terms of a power series on [0, 1/2]: the rest is below 2⁻⁶⁴
+constexpr int kPower = 64;  // terms of a power series on [0, 1/2]: the rest is below 2⁻⁶⁴
 constexpr int kEconomy = 20;  // terms once economised: the Chebyshev coefficients fall as (3+√8)⁻ᵏ, to 5e-16
 
 using Power = std::array<long double, kPower>;
 using Economy = std::array<double, kEconomy>;
 
-// Σ cₙ mⁿ on [0, 1/2] as a shorter polynomial in x = 4m − 1 ∈ [−1, 1]: written in Chebyshev polynomials, cut, and
-// written in powers of x again.
+// Σ cₙ mⁿ on [0, 1/2] as a shorter polynomial in x = 4m − 1 ∈ [−1, 1]: written in Chebyshev polynomials, cut,
+// and written in powers of x again.
 constexpr Economy economise(const Power& c) {
   Power cheb{};
   for (int n = kPower; n-- > 0;) {  // Horner: cheb ← cheb (1 + x)/4 + cₙ, with x Tₖ = (Tₖ₊₁ + T|ₖ₋₁|)/2
@@ -94,9 +94,10 @@ constexpr Bundle<2> small_tables() {
   return Bundle<2>({economise(b), economise(c)});
 }
 
-// m ≥ 1/2, in μ = 1 − m:  K = Σ aₙ μⁿ (dₙ − ½ ln μ),  E = 1 + Σ ½ (1/2)ₙ(3/2)ₙ/((2)ₙ n!) μⁿ⁺¹ (dₙ − 1/((2n+1)(2n+2)) −
-// ½ ln μ), d₀ = ln 4, dₙ₊₁ = dₙ − 2/((2n+1)(2n+2)). Of these m B = E − μK and m μD = μ(K − E); dividing a series by
-// m = 1 − μ is a running sum of its coefficients. Order: B, μD, and their factors of ln μ.
+// m ≥ 1/2, in μ = 1 − m:  K = Σ aₙ μⁿ (dₙ − ½ ln μ),  E = 1 + Σ ½ (1/2)ₙ(3/2)ₙ/((2)ₙ n!) μⁿ⁺¹ (dₙ −
+// 1/((2n+1)(2n+2)) − ½ ln μ), d₀ = ln 4, dₙ₊₁ = dₙ − 2/((2n+1)(2n+2)). Of these m B = E − μK and m μD = μ(K −
+// E); dividing a series by m = 1 − μ is a running sum of its coefficients. Order: B, μD, and their factors of
+// ln μ.
 constexpr Bundle<4> large_tables() {
   Power k{}, e{}, k_log{}, e_log{};
   e[0] = 1;
@@ -139,11 +140,12 @@ DiscProfile disc_profile(double m) {
     return {kThird * (2.0 * b + y), 0.5 * kThird * (c - d), kNinth * ((3.0 - m) * b + (3.0 - 2.0 * m) * y),
             kNinth * (c + 3.0 * b - d)};
   }
-  const double log = rest > 0.0 ? std::log(rest) : 0.0;  // both logarithms have a factor that vanishes at μ = 0
+  const double log =
+      rest > 0.0 ? std::log(rest) : 0.0;  // both logarithms have a factor that vanishes at μ = 0
   const auto [b0, y0, b_log, y_log] = kLarge(4.0 * rest - 1.0);
   const double b = b0 + b_log * log, y = y0 + y_log * log;
-  return {kThird * (2.0 * b + y), 0.5 * kThird * (y - b) / m,
-          kNinth * ((3.0 - m) * b + (3.0 - 2.0 * m) * y), kNinth * ((3.0 * m - 1.0) * b + y) / m};
+  return {kThird * (2.0 * b + y), 0.5 * kThird * (y - b) / m, kNinth * ((3.0 - m) * b + (3.0 - 2.0 * m) * y),
+          kNinth * ((3.0 * m - 1.0) * b + y) / m};
 }
 
 DiscFriction disc_friction(double epsilon) {
@@ -168,9 +170,11 @@ double disc_force_exact(double epsilon) {
 double disc_torque_exact(double epsilon) {
   const double e = epsilon, e2 = e * e;
   if (e == 1.0) return 2.0 * kNinth;
-  if (e < 1.0) return kNinth * ((4.0 - 2.0 * e2) * std::comp_ellint_2(e) - (1.0 - e2) * std::comp_ellint_1(e));
+  if (e < 1.0)
+    return kNinth * ((4.0 - 2.0 * e2) * std::comp_ellint_2(e) - (1.0 - e2) * std::comp_ellint_1(e));
   return kNinth * e *
-         ((4.0 - 2.0 * e2) * std::comp_ellint_2(1.0 / e) + (2.0 * e2 - 5.0 + 3.0 / e2) * std::comp_ellint_1(1.0 / e));
+         ((4.0 - 2.0 * e2) * std::comp_ellint_2(1.0 / e) +
+          (2.0 * e2 - 5.0 + 3.0 / e2) * std::comp_ellint_1(1.0 / e));
 }
 
 }  // namespace unhand::contact

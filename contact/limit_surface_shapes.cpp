@@ -11,8 +11,9 @@ using dynamics::value_of;
 
 namespace {
 
-// ∇² at x of a function of (a, b) = (|x_xz|, |x_τ|), homogeneous of degree 1: in (a, b) it is λ (b, −a)(b, −a)ᵀ, across
-// the slide it is k, the slope in a over a. `cross` = (λ b² − k)/a², which stays finite at a = 0.
+// ∇² at x of a function of (a, b) = (|x_xz|, |x_τ|), homogeneous of degree 1: in (a, b) it is λ (b, −a)(b,
+// −a)ᵀ, across the slide it is k, the slope in a over a. `cross` = (λ b² − k)/a², which stays finite at a =
+// 0.
 Mat3 isotropic_hessian(const Vec3<double>& x, double k, double cross, double lambda) {
   const double xz = cross * x[0] * x[1], along = -lambda * x[2];
   return {Vec3<double>{k + cross * x[0] * x[0], xz, along * x[0]},
@@ -55,9 +56,10 @@ struct RayPoint {
   double power;   // t-scaled dissipation: 1.5 ε F + T̂ if inner, else 1.5 F + δ T̂
 };
 
-// Solves h(t) = 0, h = F q − T̂ p if inner and T̂ p − F q if not, by Newton's method kept inside a bracket (h rises; at
-// most 50 steps, rarely more than 3). The gauge is the maximum over t of (1.5 t p + q)/power, or (1.5 p + t q)/power,
-// whose slope is −1.5 h/power²: one more term of its series leaves an error of the third order in the last step.
+// Solves h(t) = 0, h = F q − T̂ p if inner and T̂ p − F q if not, by Newton's method kept inside a bracket (h
+// rises; at most 50 steps, rarely more than 3). The gauge is the maximum over t of (1.5 t p + q)/power, or
+// (1.5 p + t q)/power, whose slope is −1.5 h/power²: one more term of its series leaves an error of the third
+// order in the last step.
 RayPoint disc_ray(double p, double q, double accuracy) {
   RayPoint r{};
   r.inner = p <= 2.0 * q;  // F(1)/T̂(1) = 2
@@ -121,8 +123,7 @@ Vec3<double> disc_gradient(const RayPoint& r, const Vec3<double>& w, Mat3* hessi
     const double gp = g * r.power, cube = gp * gp * gp;
     if (r.inner) {
       const double f = r.slide, m = r.t * r.t, lambda = 1.5 / (cube * r.dforce);
-      const double bend =
-          2.0 * r.dslide * r.power * r.power + f * f * (3.0 * r.torque + 2.25 * m * f);
+      const double bend = 2.0 * r.dslide * r.power * r.power + f * f * (3.0 * r.torque + 2.25 * m * f);
       *hessian = isotropic_hessian(w, k, -lambda * bend / (f * f * f), lambda);
     } else {
       const double lambda = -0.75 / (cube * r.dslide);

@@ -1,12 +1,14 @@
 // Limit surfaces in normalised coordinates: the shapes that a slipping patch's wrench can lie on.
 //
 // L = τ_max/f_max [m]. Slip u = (v_x, v_z, L ω_r) [m/s], wrench w = (f_x, f_z, τ/L)/f_max [-]: pure slide is
-// |w_xz| = 1 and pure spin |w_τ| = 1 for every isotropic shape. Each shape is a convex, centrally symmetric set:
-//   resist(u)          the wrench that opposes the slip u ≠ 0: argmin over the set of w · u (maximal dissipation);
-//   gauge(w)           positively homogeneous, 1 on the surface, below 1 inside, 0 at w = 0;
-//   slip_direction(w)  the unit u with resist(u) = w/gauge(w), that is −∇gauge/|∇gauge|, minus the outward normal.
-// With Dual all three carry exact first derivatives. At u = 0 or w = 0 the answer is open: zero is returned, without
-// derivatives. NaN in, NaN out; magnitudes may lie anywhere in the range of double.
+// |w_xz| = 1 and pure spin |w_τ| = 1 for every isotropic shape. Each shape is a convex, centrally symmetric
+// set:
+//   resist(u)          the wrench that opposes the slip u ≠ 0: argmin over the set of w · u (maximal
+//   dissipation); gauge(w)           positively homogeneous, 1 on the surface, below 1 inside, 0 at w = 0;
+//   slip_direction(w)  the unit u with resist(u) = w/gauge(w), that is −∇gauge/|∇gauge|, minus the outward
+//   normal.
+// With Dual all three carry exact first derivatives. At u = 0 or w = 0 the answer is open: zero is returned,
+// without derivatives. NaN in, NaN out; magnitudes may lie anywhere in the range of double.
 #pragma once
 
 #include <algorithm>
@@ -50,7 +52,8 @@ struct Ellipsoid {
     using std::sqrt;
     const double scale = scale_of(u);
     if (scale == 0.0) return {S(0.0), S(0.0), S(0.0)};
-    if (scale != 1.0 && std::isfinite(scale)) return resist(Vec3<S>{u[0] / scale, u[1] / scale, u[2] / scale});
+    if (scale != 1.0 && std::isfinite(scale))
+      return resist(Vec3<S>{u[0] / scale, u[1] / scale, u[2] / scale});
     const S k = -1.0 / sqrt(dot3(u, u));
     return {k * u[0], k * u[1], k * u[2]};
   }
@@ -60,7 +63,8 @@ struct Ellipsoid {
     using std::sqrt;
     const double scale = scale_of(w);
     if (scale == 0.0) return S(0.0);
-    if (scale != 1.0 && std::isfinite(scale)) return scale * gauge(Vec3<S>{w[0] / scale, w[1] / scale, w[2] / scale});
+    if (scale != 1.0 && std::isfinite(scale))
+      return scale * gauge(Vec3<S>{w[0] / scale, w[1] / scale, w[2] / scale});
     return sqrt(dot3(w, w));
   }
   template <class S>
@@ -69,13 +73,15 @@ struct Ellipsoid {
   }
 };
 
-/// The exact surface of a uniformly pressed disc of radius R [m], L = 2R/3 [m]: with ε = v/(|ω|R) = |u_xz|/(1.5 |u_τ|)
-/// [-], w_xz = −F(ε) u_xz/|u_xz| and w_τ = −sgn(u_τ) T(ε)/(2/3), F and T as in disc_friction.hpp. [Farkas2003]
+/// The exact surface of a uniformly pressed disc of radius R [m], L = 2R/3 [m]: with ε = v/(|ω|R) =
+/// |u_xz|/(1.5 |u_τ|)
+/// [-], w_xz = −F(ε) u_xz/|u_xz| and w_τ = −sgn(u_τ) T(ε)/(2/3), F and T as in disc_friction.hpp.
+/// [Farkas2003]
 ///
-/// Everything is written so that nothing is divided by a part of u or w that may vanish. Second derivatives are closed:
-/// the power σ(u) = −resist(u)·u and the gauge depend on (|x_xz|, |x_τ|) and are homogeneous of degree 1, which leaves
-/// one curvature λ and the slope over |x_xz|; ∇resist = −∇²σ. Error of resist and gauge below 1e-14.
-/// Instantiated for double and Dual.
+/// Everything is written so that nothing is divided by a part of u or w that may vanish. Second derivatives
+/// are closed: the power σ(u) = −resist(u)·u and the gauge depend on (|x_xz|, |x_τ|) and are homogeneous of
+/// degree 1, which leaves one curvature λ and the slope over |x_xz|; ∇resist = −∇²σ. Error of resist and
+/// gauge below 1e-14. Instantiated for double and Dual.
 struct UniformDisc {
   static constexpr bool isotropic = true;
   static constexpr const char* name = "uniform disc";
@@ -89,8 +95,11 @@ struct UniformDisc {
 };
 
 /// f(x) for a Dual x when f and its Jacobian are known at the value of x (the chain rule).
-inline Vec3<double> chain3(const Vec3<double>& /*x*/, const Vec3<double>& f, const Mat3& /*jacobian*/) { return f; }
-inline Vec3<dynamics::Dual> chain3(const Vec3<dynamics::Dual>& x, const Vec3<double>& f, const Mat3& jacobian) {
+inline Vec3<double> chain3(const Vec3<double>& /*x*/, const Vec3<double>& f, const Mat3& /*jacobian*/) {
+  return f;
+}
+inline Vec3<dynamics::Dual> chain3(const Vec3<dynamics::Dual>& x, const Vec3<double>& f,
+                                   const Mat3& jacobian) {
   const auto row = [&](int i) {
     return dynamics::Dual(f[i], jacobian[i][0] * x[0].v + jacobian[i][1] * x[1].v + jacobian[i][2] * x[2].v);
   };

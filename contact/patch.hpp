@@ -10,10 +10,10 @@ namespace unhand::contact {
 /// c is the torque factor of the pressure: 2/3 uniform, 3π/16 Hertz, 1 thin ring. [LiuBillard2025] II-A.
 template <class S>
 struct Patch {
-  S mu{};                       ///< friction coefficient, [0, 10]
-  S radius{};                   ///< a, (0, 1] m
-  S torque_factor{2.0 / 3.0};   ///< c, (0, 1]
-  int pads{2};                  ///< n >= 1
+  S mu{};                      ///< friction coefficient, [0, 10]
+  S radius{};                  ///< a, (0, 1] m
+  S torque_factor{2.0 / 3.0};  ///< c, (0, 1]
+  int pads{2};                 ///< n >= 1
 
   S f_max(const S& normal_force) const { return static_cast<double>(pads) * mu * normal_force; }
   S tau_max(const S& normal_force) const { return length() * f_max(normal_force); }
@@ -22,7 +22,9 @@ struct Patch {
 };
 
 inline Patch<double> values(const Patch<double>& p) { return p; }
-inline Patch<double> values(const Patch<dynamics::Dual>& p) { return {p.mu.a, p.radius.a, p.torque_factor.a, p.pads}; }
+inline Patch<double> values(const Patch<dynamics::Dual>& p) {
+  return {p.mu.a, p.radius.a, p.torque_factor.a, p.pads};
+}
 
 /// The same patch as constants of a differentiation.
 inline Patch<dynamics::Dual> constant(const Patch<double>& p) {
@@ -32,14 +34,15 @@ inline Patch<dynamics::Dual> constant(const Patch<double>& p) {
 /// Throws std::invalid_argument, naming parameter, value and accepted range.
 void validate(const Patch<double>&);
 
-/// Torque factor of a circular patch: c = ∫ p r² dr / (a ∫ p r dr) [-], pressure p(r) [Pa] up to the radius a [m].
+/// Torque factor of a circular patch: c = ∫ p r² dr / (a ∫ p r dr) [-], pressure p(r) [Pa] up to the radius a
+/// [m].
 ///
-/// Pressure ∝ (1 − (r/a)²)^s: c = (s+1) B(3/2, s+1), B Euler's beta function. s = 0 uniform 2/3, s = 1/2 Hertz 3π/16,
-/// s = −1/2 a flat rigid punch π/4. Throws std::invalid_argument unless −1 < s <= 1000.
+/// Pressure ∝ (1 − (r/a)²)^s: c = (s+1) B(3/2, s+1), B Euler's beta function. s = 0 uniform 2/3, s = 1/2
+/// Hertz 3π/16, s = −1/2 a flat rigid punch π/4. Throws std::invalid_argument unless −1 < s <= 1000.
 double torque_factor(double pressure_exponent);
 
-/// Pressure ∝ (1 − (r/a)ⁿ)^(1/n): c = B(3/n, 1 + 1/n)/B(2/n, 1 + 1/n), from t = (r/a)ⁿ. n = 1 a cone 1/2, n = 2 Hertz
-/// 3π/16, n → ∞ uniform 2/3. Throws std::invalid_argument unless 0.1 <= n <= 10⁶.
+/// Pressure ∝ (1 − (r/a)ⁿ)^(1/n): c = B(3/n, 1 + 1/n)/B(2/n, 1 + 1/n), from t = (r/a)ⁿ. n = 1 a cone 1/2, n =
+/// 2 Hertz 3π/16, n → ∞ uniform 2/3. Throws std::invalid_argument unless 0.1 <= n <= 10⁶.
 double torque_factor_power(double n);
 
 }  // namespace unhand::contact
