@@ -1,0 +1,136 @@
+// The derivative of a landing with respect to what the throw is made of: through stick, slip, their switches,
+// detach and flight, against central differences.
+#include <cmath>
+#include <limits>
+
+#include "flight/projectile.hpp"
+#include "tests/contract/every_model.hpp"
+
+namespace unhand {
+namespace {
+
+using dynamics::Dual;
+
+constexpr int kParameters = 8;
+constexpr const char* kNames[kParameters] = {"mass",        "inertia", "com_offset",   "angle",
+                                             "mu or delay", "radius",  "opening_time", "grip_force"};
+
+struct Answer {
+  std::array<double, 4> landing{};  ///< t, x, θ at landing; ω at detach
+  std::array<std::array<double, kParameters>, 4> slope{};
+  std::vector<int> modes;
+};
+
+class Derivative : public EveryModel {
+ protected:
+  static std::array<double, kParameters> parameters_of(const support::RandomThrow& t, double delay) {
+    const auto& q = t.force.profile();
+    return {
+        t.body.mass,    t.body.inertia,   t.grasp.com_offset, t.grasp.angle, carried() ? delay : t.patch.mu,
+        t.patch.radius, q.opening_time.a, q.grip_force.a};
+  }
+
+  template <class S>
+  static Answer land(const support::RandomThrow& thrown, const std::array<S, kParameters>& x,
+                     double tolerance) {
+    const auto& q = thrown.force.profile();
+    const contact::OpeningProfile<S> opening{q.open_command, x[7], S(q.dead_time.a), x[6], S(q.shape.a)};
+    const contact::ProfileNormalForce force(opening);
+    contact::ContactParameters<S> p;
+    p.patch = {carried() ? S(thrown.patch.mu) : x[4], x[5], S(thrown.patch.torque_factor), thrown.patch.pads};
+    p.open_command = q.open_command;
+    p.delay = carried() ? x[4] : S(0.0);
+    const auto model = contact::make_contact_model(GetParam(), p);
+    const release::ReleaseProblem<S> problem{thrown.hand,  force, *model, {x[0], x[1]}, {S(0.0), S(-9.81)},
+                                             {x[2], x[3]}, 0.0,   {},     S(0.0)};
+    release::ReleaseOptions options;
+    options.integrator = support::tight(tolerance, 1e-2 * tolerance);
+    // one method for both scalars: the double runs then follow the same steps but for the parameter's change
+    if (surface()) options.integrator.method = dynamics::Method::radau;
+    const auto result = simulate_release(problem, options);
+    EXPECT_EQ(result.outcome, release::ReleaseOutcome::detached) << describe(thrown);
+    Answer answer;
+    answer.modes.push_back(result.slips_at_start);
+    for (const auto& event : result.events) answer.modes.push_back(event.mode_after);
+    const auto landing =
+        flight::project<S>(result.detach.pose, result.detach.twist, {S(0.0), S(-9.81)}, S(-0.5));
+    if (!landing) {
+      ADD_FAILURE() << "never lands, " << describe(thrown);
+      return answer;
+    }
+    const std::array<S, 4> y{S(result.detach.time + landing->flight_time), landing->pose.x,
+                             landing->pose.theta, result.detach.twist.omega};
+    for (int i = 0; i < 4; ++i) {
+      answer.landing[i] = dynamics::value_of(y[i]);
+      if constexpr (!std::is_same_v<S, double>)
+        for (int k = 0; k < kParameters; ++k) answer.slope[i][k] = y[i].v[k];
+    }
+    return answer;
+  }
+};
+UNHAND_EVERY_MODEL(Derivative);
+
+TEST_P(Derivative, OfTheLandingIsTheCentralDifference) {
+  constexpr int kThrows = 6;
+  constexpr double kTolerance = 1e-11;
+  std::mt19937_64 random(61);
+  int compared = 0, switches = 0;
+  for (int i = 0; i < kThrows; ++i) {
+    const auto thrown = support::random_throw(random, 0.5 * (i % 3));
+    const auto at = parameters_of(thrown, 0.031);
+    std::array<Dual, kParameters> seeded;
+    for (int k = 0; k < kParameters; ++k) seeded[k] = dynamics::independent(at[k], k);
+    const Answer exact = land<Dual>(thrown, seeded, kTolerance);
+    switches += static_cast<int>(exact.modes.size());
+    for (int k = 0; k < kParameters; ++k) {
+      const double scale = std::max(std::abs(at[k]), 1e-2);
+      std::array<double, 4> best;
+      best.fill(std::numeric_limits<double>::infinity());
+      for (const double relative : {1e-3, 1e-4, 1e-5, 1e-6}) {
+        const double h = relative * scale;
+        auto above = at, below = at;
+        above[k] += h;
+        below[k] -= h;
+        const Answer a = land<double>(thrown, above, kTolerance), b = land<double>(thrown, below, kTolerance);
+        if (a.modes != exact.modes || b.modes != exact.modes)
+          continue;  // a switch more or less: not differentiable there
+        for (int j = 0; j < 4; ++j) {
+          const double difference = (a.landing[j] - b.landing[j]) / (2 * h);
+          // relative to the slope, or to the effect that a change of the parameter by all of itself would
+          // have
+          const double size = std::max(std::abs(exact.slope[j][k]),
+                                       0.1 * std::max(1.0, std::abs(exact.landing[j])) / scale * 1e-1);
+          best[j] = std::min(best[j], std::abs(difference - exact.slope[j][k]) / size);
+        }
+      }
+      if (std::isinf(best[0])) continue;
+      ++compared;
+      // truncation h² and the noise of the runs, 1e-11/h, cross near 1e-7 of the effect
+      for (int j = 0; j < 4; ++j)
+        EXPECT_LT(best[j], 1e-6) << "answer " << j << " by " << kNames[k] << " slope " << exact.slope[j][k]
+                                 << ' ' << describe(thrown);
+    }
+  }
+  EXPECT_GE(compared, kThrows * kParameters - 4) << "switches that come and go may cost a few";
+  if (!carried()) {
+    EXPECT_GT(switches, 2 * kThrows);
+  }
+}
+
+TEST_P(Derivative, TheValuesAreThoseOfTheDoubleRun) {
+  std::mt19937_64 random(62);
+  for (int i = 0; i < 10; ++i) {
+    const auto thrown = support::random_throw(random, i % 2);
+    const auto at = parameters_of(thrown, 0.031);
+    std::array<Dual, kParameters> seeded;
+    for (int k = 0; k < kParameters; ++k) seeded[k] = dynamics::independent(at[k], k);
+    const Answer a = land<Dual>(thrown, seeded, 1e-9), b = land<double>(thrown, at, 1e-9);
+    EXPECT_EQ(a.modes, b.modes) << describe(thrown);
+    for (int j = 0; j < 4; ++j)
+      EXPECT_NEAR(a.landing[j], b.landing[j], 1e-7 * std::max(1.0, std::abs(b.landing[j])))
+          << describe(thrown);
+  }
+}
+
+}  // namespace
+}  // namespace unhand

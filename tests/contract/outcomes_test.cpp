@@ -1,0 +1,220 @@
+// Every release has an answer that says what it is: expected endings are outcomes, wrong input is refused by
+// name.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "tests/contract/every_model.hpp"
+
+namespace unhand {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+class Outcomes : public EveryModel {};
+UNHAND_EVERY_MODEL(Outcomes);
+
+TEST_P(Outcomes, WithoutFrictionTheObjectIsFreeAtOnce) {
+  if (carried()) GTEST_SKIP() << "knows no friction";
+  std::mt19937_64 random(51);
+  for (int i = 0; i < 20; ++i) {
+    const auto thrown = support::random_throw(random, i % 2);
+    auto p = support::parameters_of(thrown);
+    p.patch.mu = 0;
+    const auto model = make(p);
+    const auto problem = support::problem_of(thrown, *model);
+    release::ReleaseOptions options;
+    options.integrator = support::tight(1e-10, 1e-12);
+    const auto result = simulate_release(problem, options);
+    ASSERT_EQ(result.outcome, release::ReleaseOutcome::detached) << describe(thrown);
+    EXPECT_TRUE(result.slips_at_start);
+    const auto hand = thrown.hand.at({}, 0);
+    const double theta = hand.pose.theta + thrown.grasp.angle, t = result.detach.time;
+    const auto r = dynamics::rotate(theta, dynamics::Vec2<double>{thrown.grasp.com_offset, 0});
+    const auto v = dynamics::twist_at_com(hand.twist, r);
+    EXPECT_DOUBLE_EQ(t, thrown.force.release_time());
+    // free flight from the first instant; 1e-9: the tolerance over a tenth of a second and lengths of a metre
+    EXPECT_NEAR(result.detach.twist.vx, v.vx, 1e-9) << describe(thrown);
+    EXPECT_NEAR(result.detach.twist.vz, v.vz - 9.81 * t, 1e-9);
+    EXPECT_NEAR(result.detach.twist.omega, v.omega, 2e-8);
+    EXPECT_NEAR(result.detach.pose.x, hand.pose.x + r.x + v.vx * t, 1e-9);
+    EXPECT_NEAR(result.detach.pose.z, hand.pose.z + r.z + v.vz * t - 0.5 * 9.81 * t * t, 1e-9);
+    EXPECT_NEAR(result.detach.pose.theta, theta + v.omega * t, 1e-9);
+  }
+}
+
+TEST_P(Outcomes, PadsThatNeverPart) {
+  const auto hand = support::still_hand(0.2);
+  const support::ConstantForce force(5);
+  contact::ContactParameters<double> p;
+  p.patch = {0.5, 0.01, 2.0 / 3, 2};
+  p.open_command = 0.15;
+  p.delay = 0.1;
+  for (const double mass : {0.1, 3.0}) {  // held; falling through
+    const auto model = make(p);
+    const release::ReleaseProblem<double> problem{hand,      force, *model, {mass, 1e-3}, {0, -9.81},
+                                                  {0.02, 0}, 0.0,   {},     0.0};
+    const auto result = simulate_release(problem);
+    EXPECT_EQ(result.outcome, release::ReleaseOutcome::never_separated);
+    EXPECT_EQ(result.integration, dynamics::Outcome::horizon);
+    EXPECT_EQ(result.slips_at_start, !carried() && mass > 1);
+    EXPECT_DOUBLE_EQ(result.detach.time, 0.2);
+    EXPECT_TRUE(std::isfinite(result.detach.pose.z));
+  }
+}
+
+TEST_P(Outcomes, SlippingAtTheStartIsReported) {
+  std::mt19937_64 random(52);
+  for (int i = 0; i < 20; ++i) {
+    const auto thrown = support::random_throw(random, 0);
+    auto p = support::parameters_of(thrown);
+    p.patch.mu = 1e-3;
+    EXPECT_EQ(simulate_release(support::problem_of(thrown, *make(p))).slips_at_start, !carried())
+        << describe(thrown);
+    p.patch = {10, 1, 2.0 / 3, 2};
+    EXPECT_FALSE(simulate_release(support::problem_of(thrown, *make(p))).slips_at_start) << describe(thrown);
+  }
+}
+
+// ---------------------------------------------------------------- wrong input
+
+/// Runs `action`, which must throw std::invalid_argument with all of `words` in its message.
+void expect_refused(const std::vector<std::string>& words, const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const std::invalid_argument& e) {
+    for (const auto& word : words) EXPECT_THAT(e.what(), testing::HasSubstr(word));
+    return;
+  }
+  ADD_FAILURE() << "accepted a wrong " << testing::PrintToString(words);
+}
+
+TEST_P(Outcomes, WrongPatchesAreRefused) {
+  const auto with = [&](auto&& change) {
+    return [&, change] {
+      contact::ContactParameters<double> p;
+      p.patch = {0.5, 0.01, 2.0 / 3, 2};
+      change(p);
+      make(p);
+    };
+  };
+  if (!carried()) {
+    for (const double mu : {-0.1, 10.1, kNaN, kInfinity})
+      expect_refused({"mu", "[0, 10]"}, with([=](auto& p) { p.patch.mu = mu; }));
+    for (const double radius : {0.0, -1.0, 1.1, kNaN})
+      expect_refused({"radius", "(0, 1] m"}, with([=](auto& p) { p.patch.radius = radius; }));
+    for (const double c : {0.0, 1.1, kNaN})
+      expect_refused({"torque_factor", "(0, 1]"}, with([=](auto& p) { p.patch.torque_factor = c; }));
+    expect_refused({"pads"}, with([](auto& p) { p.patch.pads = 0; }));
+  } else {
+    for (const double t : {kNaN, kInfinity})
+      expect_refused({"open_command"}, with([=](auto& p) { p.open_command = t; }));
+    for (const double t : {-0.1, 10.1, kNaN})
+      expect_refused({"gripper delay"}, with([=](auto& p) { p.delay = t; }));
+  }
+}
+
+TEST_P(Outcomes, WrongProblemsAreRefused) {
+  std::mt19937_64 random(53);
+  const auto thrown = support::random_throw(random, 0);
+  const auto model = make(support::parameters_of(thrown));
+  const auto with = [&](auto&& change) {
+    return [&, change] {
+      auto problem = support::problem_of(thrown, *model);
+      change(problem);
+      simulate_release(problem);
+    };
+  };
+  for (const double x : {0.0, -1.0, 2e4, kNaN, kInfinity})
+    expect_refused({"mass", "(0, 1e4] kg"}, with([=](auto& p) { p.body.mass = x; }));
+  for (const double x : {0.0, -1.0, 2e6, kNaN, kInfinity})
+    expect_refused({"inertia", "(0, 1e6] kg"}, with([=](auto& p) { p.body.inertia = x; }));
+  for (const double x : {kNaN, kInfinity}) {
+    expect_refused({"gravity x", "finite"}, with([=](auto& p) { p.gravity.x = x; }));
+    expect_refused({"gravity z", "finite"}, with([=](auto& p) { p.gravity.z = x; }));
+    expect_refused({"grasp angle", "finite"}, with([=](auto& p) { p.grasp.angle = x; }));
+    expect_refused({"slip", "finite"}, with([=](auto& p) { p.slip.x = x; }));
+    expect_refused({"slip", "finite"}, with([=](auto& p) { p.slip.z = x; }));
+    expect_refused({"spin", "finite"}, with([=](auto& p) { p.spin = x; }));
+  }
+  for (const double x : {101.0, kNaN})
+    expect_refused({"com_offset", "[-100, 100] m"}, with([=](auto& p) { p.grasp.com_offset = x; }));
+  for (const double x : {-0.1, 10.0, kNaN})
+    expect_refused({"start", "where the hand's motion is known"}, with([=](auto& p) { p.start = x; }));
+}
+
+TEST(UnknownModel, IsRefusedWithTheNamesThereAre) {
+  auto words = contact::contact_model_names();
+  words.push_back("velcro");
+  expect_refused(words, [] {
+    contact::make_contact_model("velcro", contact::ContactParameters<double>{{0.5, 0.01}, {}, {}, 0, 0});
+  });
+}
+
+// ---------------------------------------------------------------- extreme throws
+
+TEST_P(Outcomes, ExtremeThrowsHaveAnswers) {
+  std::mt19937_64 random(54);
+  const auto uniform = [&](double a, double b) {
+    return std::uniform_real_distribution<double>(a, b)(random);
+  };
+  const auto log_uniform = [&](double a, double b) { return std::exp(uniform(std::log(a), std::log(b))); };
+  int unsolved = 0;
+  long most_steps = 0;
+  for (int i = 0; i < 500; ++i) {
+    const double opening = log_uniform(1e-6, 10), mass = log_uniform(1e-3, 100),
+                 gyration = log_uniform(1e-3, 0.3);
+    std::array<support::SwayingHand::Coordinate, 3> c{};
+    if (i % 3 == 1) c[2].v = i % 2 ? 50 : -50;
+    if (i % 3 == 2) {
+      const double w = uniform(10, 400);
+      for (auto& q : c)
+        q = {uniform(-1, 1), uniform(-3, 3), uniform(-1, 1), uniform(0, 50) / (w * w), w, uniform(0, 6)};
+    }
+    const double end = 0.001 + opening + 0.01;
+    const support::SwayingHand hand(c, end);
+    const contact::ProfileNormalForce force(
+        contact::OpeningProfile<double>{0.001, log_uniform(0.1, 300), 0, opening, uniform(0.5, 3)});
+    contact::ContactParameters<double> p;
+    p.patch = {i % 7 == 0 ? 0.0 : uniform(0, 5), log_uniform(1e-4, 0.1), uniform(0.3, 1), i % 2 + 1};
+    p.open_command = 0.001;
+    p.delay = opening;
+    const auto model = make(p);
+    const release::ReleaseProblem<double> problem{hand,
+                                                  force,
+                                                  *model,
+                                                  {mass, mass * gyration * gyration},
+                                                  {0, i % 5 == 0 ? 0.0 : -9.81},
+                                                  {i % 4 ? uniform(0, 0.3) : 0.0, uniform(-3, 3)},
+                                                  0.0,
+                                                  {},
+                                                  0.0};
+    std::ostringstream inputs;
+    inputs.precision(17);
+    inputs << "throw " << i << " of seed 54: mass " << mass << " gyration " << gyration << " opening "
+           << opening << " grip " << force.profile().grip_force.a << " shape " << force.profile().shape.a
+           << " mu " << p.patch.mu << " radius " << p.patch.radius << " c " << p.patch.torque_factor
+           << " offset " << problem.grasp.com_offset << " angle " << problem.grasp.angle;
+    const auto result = simulate_release(problem);
+    if (result.outcome != release::ReleaseOutcome::detached) {
+      ++unsolved;
+      ADD_FAILURE() << to_string(result.outcome) << ", " << to_string(result.integration) << " at "
+                    << result.detach.time << " s, " << inputs.str();
+    }
+    const auto& d = result.detach;
+    for (const double x : {d.time, d.pose.x, d.pose.z, d.pose.theta, d.twist.vx, d.twist.vz, d.twist.omega})
+      EXPECT_TRUE(std::isfinite(x)) << inputs.str();
+    most_steps = std::max(most_steps, result.statistics.steps);
+    // The budget is 200'000: ten seconds of a hand that shakes at 400 rad/s are 640 periods of some hundred
+    // steps each.
+    EXPECT_LT(result.statistics.steps, 100'000) << inputs.str();
+  }
+  EXPECT_EQ(unsolved, 0);
+  RecordProperty("most_steps", std::to_string(most_steps));
+}
+
+}  // namespace
+}  // namespace unhand

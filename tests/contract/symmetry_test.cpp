@@ -1,0 +1,103 @@
+// What physics does not know of: where up is on the page, left from right, and uniform motion.
+#include <cmath>
+
+#include "tests/contract/every_model.hpp"
+
+namespace unhand {
+namespace {
+
+using dynamics::Vec2;
+using support::TransformedHand;
+
+class Symmetry : public EveryModel {
+ protected:
+  static constexpr int kThrows = 25;
+  static release::ReleaseOptions options() {
+    // The steps depend on the frame (errors are judged by component), so results agree to the integrator's
+    // error: 1e-9 is asked for, 1e-11 relative per step.
+    release::ReleaseOptions o;
+    o.integrator = support::tight(1e-11, 1e-13);
+    return o;
+  }
+  static void expect_same(const contact::Relative<double>& a, const contact::Relative<double>& b,
+                          double tolerance, const std::string& inputs) {
+    EXPECT_NEAR(a.arm.x, b.arm.x, tolerance) << inputs;
+    EXPECT_NEAR(a.arm.z, b.arm.z, tolerance) << inputs;
+    EXPECT_NEAR(a.angle, b.angle, tolerance) << inputs;
+    EXPECT_NEAR(a.slip.x, b.slip.x, tolerance) << inputs;
+    EXPECT_NEAR(a.slip.z, b.slip.z, tolerance) << inputs;
+    EXPECT_NEAR(a.spin, b.spin, tolerance * 20) << inputs;  // rad/s: a metre per second at 5 cm
+  }
+};
+UNHAND_EVERY_MODEL(Symmetry);
+
+TEST_P(Symmetry, NoDirectionIsSpecial) {
+  std::mt19937_64 random(21);
+  for (int i = 0; i < kThrows; ++i) {
+    const auto thrown = support::random_throw(random, i % 2);
+    const double angle = std::uniform_real_distribution<double>(-M_PI, M_PI)(random);
+    const auto model = make(support::parameters_of(thrown));
+    const auto problem = support::problem_of(thrown, *model);
+    const TransformedHand turned(thrown.hand, false, angle, {});
+    const release::ReleaseProblem<double> other{
+        turned,       thrown.force, *model, thrown.body, turned.vector(problem.gravity),
+        thrown.grasp, 0.0,          {},     0.0};
+    const auto a = simulate_release(problem, options()), b = simulate_release(other, options());
+    ASSERT_EQ(a.outcome, release::ReleaseOutcome::detached) << describe(thrown);
+    ASSERT_EQ(b.outcome, a.outcome) << describe(thrown);
+    auto expected = a.relative;
+    expected.slip = turned.vector(expected.slip);
+    expect_same(b.relative, expected, 1e-9, describe(thrown) + " angle " + std::to_string(angle));
+  }
+}
+
+TEST_P(Symmetry, NeitherIsLeftNorRight) {
+  std::mt19937_64 random(22);
+  for (int i = 0; i < kThrows; ++i) {
+    const auto thrown = support::random_throw(random, i % 2);
+    const auto model = make(support::parameters_of(thrown));
+    const auto problem = support::problem_of(thrown, *model);
+    const TransformedHand mirrored(thrown.hand, true, 0, {});
+    const release::ReleaseProblem<double> other{mirrored,
+                                                thrown.force,
+                                                *model,
+                                                thrown.body,
+                                                problem.gravity,
+                                                {thrown.grasp.com_offset, -thrown.grasp.angle},
+                                                0.0,
+                                                {},
+                                                0.0};
+    const auto a = simulate_release(problem, options()), b = simulate_release(other, options());
+    ASSERT_EQ(a.outcome, release::ReleaseOutcome::detached) << describe(thrown);
+    ASSERT_EQ(b.outcome, a.outcome) << describe(thrown);
+    const auto& y = a.relative;
+    expect_same(b.relative, {{y.arm.x, -y.arm.z}, -y.angle, {-y.slip.x, y.slip.z}, -y.spin}, 1e-9,
+                describe(thrown));
+    EXPECT_NEAR(b.detach.pose.x, -a.detach.pose.x, 1e-9);
+    EXPECT_NEAR(b.detach.twist.omega, -a.detach.twist.omega, 2e-8);
+  }
+}
+
+TEST_P(Symmetry, UniformMotionIsRest) {
+  std::mt19937_64 random(23);
+  for (int i = 0; i < kThrows; ++i) {
+    const auto thrown = support::random_throw(random, i % 2);
+    const auto model = make(support::parameters_of(thrown));
+    const auto problem = support::problem_of(thrown, *model);
+    const Vec2<double> v{3.5, -7.25};
+    const TransformedHand moving(thrown.hand, false, 0, v);
+    const release::ReleaseProblem<double> other{
+        moving, thrown.force, *model, thrown.body, problem.gravity, thrown.grasp, 0.0, {}, 0.0};
+    const auto a = simulate_release(problem, options()), b = simulate_release(other, options());
+    ASSERT_EQ(b.outcome, a.outcome) << describe(thrown);
+    // the law never sees the velocity of the hand: equal to the bit
+    EXPECT_EQ(b.relative.state(), a.relative.state()) << describe(thrown);
+    EXPECT_EQ(b.detach.time, a.detach.time);
+    EXPECT_NEAR(b.detach.twist.vx, a.detach.twist.vx + v.x, 1e-12);
+    EXPECT_NEAR(b.detach.twist.vz, a.detach.twist.vz + v.z, 1e-12);
+    EXPECT_NEAR(b.detach.pose.z, a.detach.pose.z + v.z * a.detach.time, 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace unhand
