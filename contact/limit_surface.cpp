@@ -16,6 +16,10 @@ namespace {
 /// 1e-7 m/s and the term left out 1e-5 of it or less.
 constexpr double kOnset = 5e-6;
 
+/// Where the demand is beyond the surface at once (a jump, or a grip that cannot hold) the slip grows linearly and is
+/// followed to this speed [m/s] instead: slaving is weak where friction is, and a free direction turns by 1e-4 in 1e-7 s.
+constexpr double kOnsetSpeed = 1e-6;
+
 /// Normalised wrench w to f [N, N, N m]: f = f_max (w_x, w_z, L w_τ).
 template <class S>
 Wrench<S> physical(const Vec3<S>& w, const S& f_max, const S& length) {
@@ -252,11 +256,9 @@ template <class Shape>
 template <class S>
 Entry<S, 6> LimitSurface<Shape>::onset(const Window& window, const SceneSource& source, const S& t,
                                        const Relative<S>& rest, bool at_the_surface) const {
-  const double delta = std::min(kOnset, 0.25 * (window.end - value_of(t)));
   Relative<S> y = rest;
   y.slip = {S(0), S(0)};
   y.spin = S(0);
-  if (!(delta > 0)) return {kStick, t, y.state(), S(0)};
   const auto acceleration = [&](double after) {
     return slip_acceleration(source.scene(window, S(t + after)), y);
   };
@@ -264,7 +266,11 @@ Entry<S, 6> LimitSurface<Shape>::onset(const Window& window, const SceneSource& 
     const S square = dot3(a, a);
     return value_of(square) > 0 ? S(sqrt(square)) : S(0);
   };
-  const S a0 = at_the_surface ? S(0) : size(acceleration(0)), a1 = size(acceleration(0.5 * delta));
+  const S a0 = at_the_surface ? S(0) : size(acceleration(0));
+  double delta = std::min(kOnset, 0.25 * (window.end - value_of(t)));
+  if (value_of(a0) * delta > kOnsetSpeed) delta = kOnsetSpeed / value_of(a0);
+  if (!(delta > 0)) return {kStick, t, y.state(), S(0)};
+  const S a1 = size(acceleration(0.5 * delta));
   const Vec3<S> end = acceleration(delta);
   const S a2 = size(end), speed = delta / 6 * (a0 + 4.0 * a1 + a2);
   if (!(value_of(a2) > 0)) return {kStick, t, y.state(), S(0)};  // a demand that only touches the surface

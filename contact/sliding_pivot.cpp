@@ -125,7 +125,9 @@ std::string_view SlidingPivot::mode_name(int mode) const {
 }
 
 dynamics::FlowKind SlidingPivot::kind(int mode) const {
-  return mode == mode_of(kStuck, kLocked) ? dynamics::FlowKind::frozen : dynamics::FlowKind::smooth;
+  if (mode == mode_of(kStuck, kLocked)) return dynamics::FlowKind::frozen;
+  // A brake that f_max barely outweighs lasts long while its direction relaxes at once, the faster the longer the lever.
+  return translation_of(mode) == kBrake ? dynamics::FlowKind::stiff : dynamics::FlowKind::smooth;
 }
 
 bool SlidingPivot::is_homogeneous(int mode) const { return translation_of(mode) == kBrake; }

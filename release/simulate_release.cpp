@@ -137,6 +137,9 @@ void validate(const ReleaseProblem<S>& problem) {
   require(std::isfinite(value_of(problem.gravity.z)), "gravity z", value_of(problem.gravity.z), "finite m/s²");
   require(std::abs(value_of(problem.grasp.com_offset)) <= 100, "com_offset", value_of(problem.grasp.com_offset), "[-100, 100] m");
   require(std::isfinite(value_of(problem.grasp.angle)), "grasp angle", value_of(problem.grasp.angle), "finite rad");
+  require(std::isfinite(value_of(problem.slip.x)), "slip x", value_of(problem.slip.x), "finite m/s");
+  require(std::isfinite(value_of(problem.slip.z)), "slip z", value_of(problem.slip.z), "finite m/s");
+  require(std::isfinite(value_of(problem.spin)), "spin", value_of(problem.spin), "finite rad/s");
   require(problem.start >= problem.hand.begin() && problem.start < problem.hand.end(), "start", problem.start,
           fmt::format("[{}, {}) s, where the hand's motion is known", problem.hand.begin(), problem.hand.end()));
 }
