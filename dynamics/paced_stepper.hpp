@@ -72,6 +72,7 @@ class PacedStepper final : public Stepper<S, N> {
     augmented[N] = t;
     this->t1_ = t;
     this->y1_ = y;
+    inner_->suggest(first_length(value_of(t), values<S, N>(y)));  // the last phase's length in σ says nothing here
     inner_->start(system_, phase, S(0), augmented);
   }
 
@@ -105,6 +106,20 @@ class PacedStepper final : public Stepper<S, N> {
 
  private:
   static constexpr double kFar = 1e300;
+
+  /// The length in σ over which the pace changes by a twentieth.
+  double first_length(double t, const State<double, N>& y) const {
+    constexpr double kProbe = 1e-6;  // of that length
+    State<double, N> rate, ahead;
+    system_.system->flow(system_.phase, t, y, rate);
+    const double pace = system_.system->pace(system_.phase, t, y);
+    double fastest = 0;
+    for (int i = 0; i < N; ++i) fastest = std::max(fastest, std::abs(rate[i]));
+    const double dt = kProbe * pace / std::max(fastest, 1e-300);
+    for (int i = 0; i < N; ++i) ahead[i] = y[i] + dt * rate[i];
+    const double change = std::abs(system_.system->pace(system_.phase, t, ahead) - pace) / dt;
+    return change > 0 && std::isfinite(change) ? 0.05 / change : 0.0;
+  }
 
   double length() const { return value_of(inner_->t1()) - value_of(inner_->t0()); }
   void count() {

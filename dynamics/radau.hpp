@@ -34,8 +34,8 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
     if constexpr (std::is_same_v<S, double>) f0_ = f0_value_;
     else this->flow(this->t0_, this->y0_, f0_);
     this->system_->error_scale(this->phase_, this->tolerances_, values<S, N>(this->y0_), values<S, N>(this->y0_), scale_);
-    fresh_ = fresh;
     extrapolate_ = !fresh;
+    refine_ = fresh;
     factored_ = 0;
   }
   double guess() const { return this->first_step(f0_value_); }
@@ -44,17 +44,17 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
     Stages z = start_values(h);
     if (!solve(h, z)) {
       extrapolate_ = false;
-      return 32;  // Newton did not converge: shorten by about half
+      return finite_ ? 32 : std::numeric_limits<double>::quiet_NaN();  // no convergence: shorten by about half
     }
     for (int i = 0; i < N; ++i) this->y1_[i] = this->y0_[i] + z[2][i];
     double error = estimate(h, z);
-    fresh_ = false;
     if (error <= 1) {
       h_before_ = h;
       accepted_ = z;
       start_ = this->y0_;
     } else {
       extrapolate_ = false;
+      refine_ = true;
     }
     return error;
   }
@@ -131,9 +131,12 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
   /// Simplified Newton iterations for the stage increments z. False if they do not converge.
   bool solve(const S& h, Stages& z) {
     constexpr int kMaxIterations = 12, kMaxDualIterations = 40;
-    constexpr double kTarget = 0.02;  // of the error tolerance
     const double hv = value_of(h);
     factor(hv);
+    // A fiftieth of the error tolerance, or what rounding leaves.
+    double target = 0.02;
+    for (int i = 0; i < N; ++i)
+      target = std::max(target, 1e-14 * (std::abs(value_of(this->y0_[i])) + std::abs(hv * f0_value_[i])) / scale_[i]);
     Stages w, f;
     transform(kInverse, z, w);
     double before = 0, contraction = 0.5;
@@ -179,12 +182,13 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
       }
       transform(kT, w, z);
       moved = std::sqrt(moved / (3 * N));
-      if (!std::isfinite(moved) || !std::isfinite(derivative_size)) return false;
+      finite_ = std::isfinite(moved) && std::isfinite(derivative_size);
+      if (!finite_) return false;
       if (iteration > 0 && before > 0) contraction = std::max(moved / before, 1e-6);
-      if (!values_converged && iteration > 0 && contraction >= 0.99 && moved > kTarget) return false;
+      if (!values_converged && iteration > 0 && contraction >= 0.99 && moved > target) return false;
       before = moved;
       const double left = contraction < 1 ? moved * contraction / (1 - contraction) : moved;
-      values_converged = values_converged || left <= kTarget || moved <= 1e-4;
+      values_converged = values_converged || left <= target;
       if (values_converged && (kParts == 1 || derivative_moved <= 1e-11)) return true;
     }
     return values_converged;
@@ -207,7 +211,8 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
     e = real_.solve(e).eval();
     for (int i = 0; i < N; ++i) error[i] = e[i];
     double size = scaled(error);
-    if (size > 1) {  // the estimate is not damped where the flow is very stiff: once more through the flow
+    // On transients, where the estimate of a very stiff flow is too large: once more through the flow.
+    if (size > 1 && refine_) {
       State<S, N> y;
       State<S, N> f;
       for (int i = 0; i < N; ++i) y[i] = this->y0_[i] + error[i];
@@ -235,7 +240,7 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
   Stages accepted_{};
   S h_before_{};
   double factored_{};
-  bool fresh_{}, extrapolate_{};
+  bool extrapolate_{}, refine_{}, finite_{true};
 };
 
 }  // namespace unhand::dynamics

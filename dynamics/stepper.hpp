@@ -35,6 +35,9 @@ class Stepper {
   /// polished with.
   virtual void retake(double h, State<S, N>& y) = 0;
 
+  /// The length with which the next start tries its first step, instead of the one remembered.
+  virtual void suggest(double /*h*/) {}
+
   const S& t0() const { return t0_; }
   const S& t1() const { return t1_; }
   const State<S, N>& y0() const { return y0_; }
@@ -96,11 +99,13 @@ class SingleStep : public Stepper<S, N> {
     fresh_ = true;
   }
 
+  void suggest(double h) override { h_next_ = h; }
+
   StepStatus step(const S& limit, double longest) override {
     this->t0_ = this->t1_;
     this->y0_ = this->y1_;
     self().prepare(fresh_);
-    if (fresh_ && (Derived::kPredictive || !(h_next_ > 0))) h_next_ = self().guess();
+    if (fresh_ && !(h_next_ > 0)) h_next_ = self().guess();
     if (fresh_) error_before_ = 0;
     fresh_ = false;
     const double t = value_of(this->t0_);
@@ -120,10 +125,11 @@ class SingleStep : public Stepper<S, N> {
           // Gustafsson's predictive controller ([HairerWanner1996] IV.8): what the last step's error grew by, the next
           // one's will too; without it a flow that quickens steadily has every other step rejected.
           if (error_before_ > 0)
-            factor = std::min(factor, taken / taken_before_ *
-                                          std::pow(error_before_, 1 / Derived::kOrder) * step_factor(error * error, Derived::kOrder));
+            factor = std::min(factor, 0.9 * taken / taken_before_ *
+                                          std::pow(error_before_ / std::max(error * error, 1e-20), 1 / Derived::kOrder));
           factor = std::max(factor, 0.2);
-          error_before_ = std::max(error, 1e-3);
+          // A step cut short, by a limit or by rejection, tells no trend.
+          error_before_ = rejected || taken < 0.99 * std::min(h_next_, longest) ? 0.0 : std::max(error, 1e-3);
           taken_before_ = taken;
         }
         const double next = taken * (rejected ? std::min(factor, 1.0) : factor);
@@ -150,15 +156,14 @@ class SingleStep : public Stepper<S, N> {
     return scaled_norm<N>(values<S, N>(error), scale);
   }
 
-  /// A first step that changes no component by more than a twentieth of its size, or of a hundred error tolerances.
+  /// A first step length from the sizes of the state and its rate ([HairerNorsettWanner1993] II.4, without the
+  /// trial step: error control corrects a poor guess at the price of one rejection).
   double first_step(const State<double, N>& rate) const {
     const State<double, N> y = values<S, N>(this->y0_);
     State<double, N> scale;
     system_->error_scale(phase_, tolerances_, y, y, scale);
-    double h = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < N; ++i)
-      if (rate[i] != 0) h = std::min(h, 0.05 * std::max(std::abs(y[i]), 100 * scale[i]) / std::abs(rate[i]));
-    return std::isfinite(h) && h > 0 ? h : 1e-6;
+    const double d0 = scaled_norm<N>(y, scale), d1 = scaled_norm<N>(rate, scale);
+    return d0 > 1e-5 && d1 > 1e-5 ? 0.01 * d0 / d1 : 1e-6;
   }
 
   const HybridSystem<N>* system_{};

@@ -79,7 +79,8 @@ TYPED_TEST(SingleSteps, ConvergeWithTheirOrder) {
       const double error = std::hypot(end.y[0] - exact[0], end.y[1] - exact[1]);
       const double steps = static_cast<double>(end.statistics.steps);
       if (last > 0) {
-        EXPECT_NEAR(std::log(last / error) / std::log(steps / last_steps), order, 0.6);
+        // kOrder is that of the error estimate; the solution itself is of order 5.
+        EXPECT_NEAR(std::log(last / error) / std::log(steps / last_steps), order + 1, 0.6);
       }
       last = error;
       last_steps = steps;
@@ -154,8 +155,8 @@ TYPED_TEST(SingleSteps, RetakingTheWholeStepIsTheStepAndLeavesItAlone) {
     stepper.retake(stepper.t1() - stepper.t0(), whole);
     stepper.interpolate(0.4, after);
     EXPECT_EQ(before[0], after[0]);
-    EXPECT_NEAR(whole[0], stepper.y1()[0],
-                1e-10);  // Radau's iterations start elsewhere: 1e-3 of the tolerance
+    // Radau's iterations start elsewhere and stop at a fiftieth of the tolerance, 1e-8 (1 + |y|).
+    EXPECT_NEAR(whole[0], stepper.y1()[0], 0.02 * 1e-8 * (1 + std::abs(whole[0])));
     const auto exact = smooth_solution(0.5 * (stepper.t0() + stepper.t1()));
     EXPECT_NEAR(half[0], exact[0], 1e-6);
   }
