@@ -201,42 +201,55 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
     }
   }
 
+  /// The error estimate in units of the tolerance: of the values and, with Dual, of every derivative, which may err by
+  /// the same fraction of its own size. (The derivatives of a discrete solution that is good to the tolerance need not
+  /// be: where a flow amplifies, as slip does at its onset, they are worse by orders of magnitude.)
   double estimate(const S& h, const Stages& z) {
-    const double hv = value_of(h);
-    Eigen::Matrix<double, N, 1> combined, e;
-    State<double, N> error;
+    const S inverse = 1.0 / h;
+    State<S, N> combined;
     for (int i = 0; i < N; ++i)
-      combined[i] = (kError[0] * value_of(z[0][i]) + kError[1] * value_of(z[1][i]) + kError[2] * value_of(z[2][i])) / hv;
-    for (int i = 0; i < N; ++i) e[i] = combined[i] + f0_value_[i];
-    e = real_.solve(e).eval();
-    for (int i = 0; i < N; ++i) error[i] = e[i];
-    double size = scaled(error);
+      combined[i] = inverse * (kError[0] * z[0][i] + kError[1] * z[1][i] + kError[2] * z[2][i]);
+    double size = filtered(combined, f0_);
     // On transients, where the estimate of a very stiff flow is too large: once more through the flow.
     if (size > 1 && refine_) {
-      State<S, N> y;
-      State<S, N> f;
-      for (int i = 0; i < N; ++i) y[i] = this->y0_[i] + error[i];
+      State<S, N> y, f;
+      for (int i = 0; i < N; ++i) y[i] = this->y0_[i] + error_[i];
       this->flow(this->t0_, y, f);
-      for (int i = 0; i < N; ++i) e[i] = combined[i] + value_of(f[i]);
-      e = real_.solve(e).eval();
-      for (int i = 0; i < N; ++i) error[i] = e[i];
-      const double again = scaled(error);
+      const double again = filtered(combined, f);
       if (std::isfinite(again)) size = again;
     }
     return size;
   }
 
-  double scaled(const State<double, N>& error) const {
+  /// Solves for the error of the last attempt and returns its size.
+  double filtered(const State<S, N>& combined, const State<S, N>& f) {
+    Eigen::Matrix<double, N, kParts> e;
+    for (int i = 0; i < N; ++i)
+      for (int p = 0; p < kParts; ++p) e(i, p) = part(combined[i], p) + part(f[i], p);
+    e = real_.solve(e).eval();
     State<double, N> scale;
     this->system_->error_scale(this->phase_, this->tolerances_, values<S, N>(this->y0_), values<S, N>(this->y1_), scale);
-    return scaled_norm<N>(error, scale);
+    double worst = 0, value_size = 0;
+    for (int p = 0; p < kParts; ++p) {
+      State<double, N> error;
+      double largest = 0;
+      for (int i = 0; i < N; ++i) {
+        error[i] = e(i, p);
+        set_part(error_[i], p, e(i, p));
+        largest = std::max({largest, std::abs(part(this->y0_[i], p)) / scale[i], std::abs(part(this->y1_[i], p)) / scale[i]});
+      }
+      if (p == 0) value_size = largest;
+      if (largest == 0) continue;
+      worst = std::max(worst, scaled_norm<N>(error, scale) * (p == 0 ? 1.0 : value_size / largest));
+    }
+    return worst;
   }
 
   Matrix jacobian_;
   Eigen::PartialPivLU<Matrix> real_;
   Eigen::PartialPivLU<ComplexMatrix> complex_;
   State<double, N> f0_value_{}, scale_{};
-  State<S, N> f0_{}, start_{};
+  State<S, N> f0_{}, start_{}, error_{};
   Stages accepted_{};
   S h_before_{};
   double factored_{};
