@@ -53,8 +53,8 @@ TEST_P(Cvode, AgreesOnTheDetachTwist) {
   double worst = 0;
   for (int i = 0; i < GetParam().throws; ++i) {
     const auto thrown = support::random_throw(random, i % 2);  // shaken and smooth by turns
-    const Answer ours = release(thrown, dynamics::Method::automatic, 1e-9);
-    const Answer cvode = release(thrown, dynamics::Method::cvode, 1e-10);
+    const Answer ours = release(thrown, dynamics::Method::automatic, 1e-10);
+    const Answer cvode = release(thrown, dynamics::Method::cvode, 1e-11);
     switches += static_cast<int>(ours.modes.size());
     if (ours.modes != cvode.modes) {
       // A demand that just touches its limit may or may not count as a slip: counted, not compared.
@@ -65,7 +65,8 @@ TEST_P(Cvode, AgreesOnTheDetachTwist) {
         std::max({std::abs(ours.twist.vx - cvode.twist.vx), std::abs(ours.twist.vz - cvode.twist.vz),
                   std::abs(ours.twist.omega - cvode.twist.omega)});
     worst = std::max(worst, difference);
-    // 1e-7 m/s and rad/s: ours at 1e-9, and CVODE, whose error per step is not its global one, at 1e-10
+    // 1e-7 m/s and rad/s: a slip that lasts amplifies what each step may err (1e-10, and 1e-11 for CVODE,
+    // whose local error makes some ten times the global one) by up to a thousand.
     EXPECT_LT(difference, 1e-7) << "throw " << i << " of seed 71, " << ours.modes.size() << " events, mass "
                                 << thrown.body.mass << " inertia " << thrown.body.inertia << " offset "
                                 << thrown.grasp.com_offset;
