@@ -1,5 +1,5 @@
-// What every contact model answers: which modes it has, which wrench acts in each, which guards leave a mode, and what
-// happens there.
+// What every contact model answers: which modes it has, which wrench acts in each, which guards leave a mode,
+// and what happens there.
 #pragma once
 
 #include <string_view>
@@ -26,12 +26,12 @@ using dynamics::Wrench;
 /// What a contact law sees of the world at an instant.
 template <class S>
 struct Scene {
-  RigidBody<S> body;                 ///< kg, kg m²
-  Vec2<S> gravity;                   ///< m/s²
-  Pose<S> hand;                      ///< m, m, rad
-  Twist<S> hand_twist;               ///< m/s, m/s, rad/s
-  Acceleration<S> hand_acceleration; ///< m/s², m/s², rad/s²
-  S normal_force{};                  ///< of one pad [N], >= 0
+  RigidBody<S> body;                  ///< kg, kg m²
+  Vec2<S> gravity;                    ///< m/s²
+  Pose<S> hand;                       ///< m, m, rad
+  Twist<S> hand_twist;                ///< m/s, m/s, rad/s
+  Acceleration<S> hand_acceleration;  ///< m/s², m/s², rad/s²
+  S normal_force{};                   ///< of one pad [N], >= 0
 };
 
 /// The values, without derivatives: what decides between modes.
@@ -55,10 +55,10 @@ class SceneSource {
 
 /// The object against the hand, which is the state that is integrated.
 ///
-/// The arm (CoM from the patch, in the object's frame) changes only while the patch slips, the angle only while it
-/// spins; so sticking is y' = 0 exactly and pivoting leaves the arm alone exactly: neither can creep.
-/// d/dt arm = R(θ_O)ᵀ v_r;  d/dt v_r = (a_C − a_H) − ω_O J v_r, the last term because the material point under the
-/// patch changes. tests/crosscheck integrates (q_O, v_O) instead and must agree.
+/// The arm (CoM from the patch, in the object's frame) changes only while the patch slips, the angle only
+/// while it spins; so sticking is y' = 0 exactly and pivoting leaves the arm alone exactly: neither can
+/// creep. d/dt arm = R(θ_O)ᵀ v_r;  d/dt v_r = (a_C − a_H) − ω_O J v_r, the last term because the material
+/// point under the patch changes. tests/crosscheck integrates (q_O, v_O) instead and must agree.
 template <class S>
 struct Relative {
   Vec2<S> arm;   ///< R(θ_O)ᵀ (p_WO − p_WH) [m]
@@ -89,26 +89,31 @@ Pose<S> object_pose(const Scene<S>& scene, const Relative<S>& y) {
 }
 template <class S>
 Twist<S> object_twist(const Scene<S>& scene, const Relative<S>& y) {
-  const Twist<S> patch{scene.hand_twist.vx + y.slip.x, scene.hand_twist.vz + y.slip.z, scene.hand_twist.omega + y.spin};
+  const Twist<S> patch{scene.hand_twist.vx + y.slip.x, scene.hand_twist.vz + y.slip.z,
+                       scene.hand_twist.omega + y.spin};
   return dynamics::twist_at_com(patch, lever(scene, y));
 }
 
 /// d/dt of the relative state under the wrench `patch` (about the patch, on the object, in the world).
 template <class S>
 State<S, 6> relative_rate(const Scene<S>& scene, const Relative<S>& y, const Wrench<S>& patch) {
-  using std::cos; using std::sin;
+  using std::cos;
+  using std::sin;
   const S angle = scene.hand.theta + y.angle, c = cos(angle), s = sin(angle);
   const Vec2<S> r{c * y.arm.x - s * y.arm.z, s * y.arm.x + c * y.arm.z};
   const S omega = scene.hand_twist.omega + y.spin;
   const Acceleration<S> com = dynamics::acceleration_under(scene.body, patch, r, scene.gravity);
   const Acceleration<S> point = dynamics::acceleration_at_patch(com, omega, r);
-  return {c * y.slip.x + s * y.slip.z, c * y.slip.z - s * y.slip.x, y.spin,
+  return {c * y.slip.x + s * y.slip.z,
+          c * y.slip.z - s * y.slip.x,
+          y.spin,
           point.ax - scene.hand_acceleration.ax + omega * y.slip.z,
-          point.az - scene.hand_acceleration.az - omega * y.slip.x, com.alpha - scene.hand_acceleration.alpha};
+          point.az - scene.hand_acceleration.az - omega * y.slip.x,
+          com.alpha - scene.hand_acceleration.alpha};
 }
 
-/// f_p: the wrench about the patch that makes the material point there and the object's rotation follow the hand
-/// (no slip acceleration). [LiuBillard2025] Eq. 19, 20 with the signs of dynamics/frames.hpp.
+/// f_p: the wrench about the patch that makes the material point there and the object's rotation follow the
+/// hand (no slip acceleration). [LiuBillard2025] Eq. 19, 20 with the signs of dynamics/frames.hpp.
 template <class S>
 Wrench<S> sticking_wrench(const Scene<S>& scene, const Relative<S>& y) {
   const Vec2<S> r = lever(scene, y);
@@ -139,21 +144,29 @@ class ContactModel {
   // Which guards leave a mode?
   virtual int guard_count(int mode) const = 0;
   virtual dynamics::Guard guard(int mode, int index) const = 0;
-  virtual void guards(const Phase&, const SceneSource&, double t, const Relative<double>&, double* g) const = 0;
-  virtual void guards(const Phase&, const SceneSource&, const Dual& t, const Relative<Dual>&, Dual* g) const = 0;
+  virtual void guards(const Phase&, const SceneSource&, double t, const Relative<double>&,
+                      double* g) const = 0;
+  virtual void guards(const Phase&, const SceneSource&, const Dual& t, const Relative<Dual>&,
+                      Dual* g) const = 0;
 
-  // What happens at a guard, and which mode holds at an instant (after a time event, or at the start: mode < 0)?
-  virtual Entry<double, 6> on_guard(const Phase&, int guard, const SceneSource&, double t, const Relative<double>&) const = 0;
-  virtual Entry<Dual, 6> on_guard(const Phase&, int guard, const SceneSource&, const Dual& t, const Relative<Dual>&) const = 0;
-  virtual Entry<double, 6> membership(int mode, const Window&, const SceneSource&, double t, const Relative<double>&) const = 0;
-  virtual Entry<Dual, 6> membership(int mode, const Window&, const SceneSource&, const Dual& t, const Relative<Dual>&) const = 0;
+  // What happens at a guard, and which mode holds at an instant (after a time event, or at the start: mode <
+  // 0)?
+  virtual Entry<double, 6> on_guard(const Phase&, int guard, const SceneSource&, double t,
+                                    const Relative<double>&) const = 0;
+  virtual Entry<Dual, 6> on_guard(const Phase&, int guard, const SceneSource&, const Dual& t,
+                                  const Relative<Dual>&) const = 0;
+  virtual Entry<double, 6> membership(int mode, const Window&, const SceneSource&, double t,
+                                      const Relative<double>&) const = 0;
+  virtual Entry<Dual, 6> membership(int mode, const Window&, const SceneSource&, const Dual& t,
+                                    const Relative<Dual>&) const = 0;
 
-  /// When the object is free [s]; +infinity for never. Models that follow the pads answer with the force's release.
+  /// When the object is free [s]; +infinity for never. Models that follow the pads answer with the force's
+  /// release.
   virtual void separation(const NormalForce&, double& t) const = 0;
   virtual void separation(const NormalForce&, Dual& t) const = 0;
 
-  /// True for modes whose law depends on the direction of u = (v_r, L ω_r) alone: their flow is regular when paced by
-  /// |u| (dynamics/paced_stepper.hpp), and errors of the slip are judged relative to |u|.
+  /// True for modes whose law depends on the direction of u = (v_r, L ω_r) alone: their flow is regular when
+  /// paced by |u| (dynamics/paced_stepper.hpp), and errors of the slip are judged relative to |u|.
   virtual bool is_homogeneous(int mode) const = 0;
 
   /// L above [m]; 0 where the spin does not turn the friction force.
@@ -174,8 +187,8 @@ void force_release(const NormalForce& force, S& t) {
     if (dynamics::value_of(kink) == release) t = kink;
 }
 
-/// Writes both overloads from the templates wrench_, rate_, guards_, on_guard_, membership_ of Derived. The definitions
-/// are in contact_model_from.hpp, which only the model's own source includes: it ends with
+/// Writes both overloads from the templates wrench_, rate_, guards_, on_guard_, membership_ of Derived. The
+/// definitions are in contact_model_from.hpp, which only the model's own source includes: it ends with
 /// `template class ContactModelFrom<Model>;`.
 template <class Derived>
 class ContactModelFrom : public ContactModel {
@@ -186,16 +199,20 @@ class ContactModelFrom : public ContactModel {
   void rate(int, const Scene<Dual>&, const Relative<Dual>&, State<Dual, 6>&) const final;
   void guards(const Phase&, const SceneSource&, double, const Relative<double>&, double*) const final;
   void guards(const Phase&, const SceneSource&, const Dual&, const Relative<Dual>&, Dual*) const final;
-  Entry<double, 6> on_guard(const Phase&, int, const SceneSource&, double, const Relative<double>&) const final;
-  Entry<Dual, 6> on_guard(const Phase&, int, const SceneSource&, const Dual&, const Relative<Dual>&) const final;
-  Entry<double, 6> membership(int, const Window&, const SceneSource&, double, const Relative<double>&) const final;
-  Entry<Dual, 6> membership(int, const Window&, const SceneSource&, const Dual&, const Relative<Dual>&) const final;
+  Entry<double, 6> on_guard(const Phase&, int, const SceneSource&, double,
+                            const Relative<double>&) const final;
+  Entry<Dual, 6> on_guard(const Phase&, int, const SceneSource&, const Dual&,
+                          const Relative<Dual>&) const final;
+  Entry<double, 6> membership(int, const Window&, const SceneSource&, double,
+                              const Relative<double>&) const final;
+  Entry<Dual, 6> membership(int, const Window&, const SceneSource&, const Dual&,
+                            const Relative<Dual>&) const final;
   void separation(const NormalForce& force, double& t) const override { force_release(force, t); }
   void separation(const NormalForce& force, Dual& t) const override { force_release(force, t); }
 };
 
-/// Signed margin of a demand against a limit, both >= 0: (d² − l²)/(d² + l²), in [−1, 1], zero where they are equal.
-/// Takes the squares, so that it is smooth where the demand vanishes.
+/// Signed margin of a demand against a limit, both >= 0: (d² − l²)/(d² + l²), in [−1, 1], zero where they are
+/// equal. Takes the squares, so that it is smooth where the demand vanishes.
 template <class S>
 S margin(const S& demand_squared, const S& limit_squared) {
   return (demand_squared - limit_squared) / (demand_squared + limit_squared + 1e-300);

@@ -6,7 +6,8 @@
 namespace unhand::contact {
 
 template <class Model>
-Wrench<double> ContactModelFrom<Model>::wrench(int m, const Scene<double>& s, const Relative<double>& y) const {
+Wrench<double> ContactModelFrom<Model>::wrench(int m, const Scene<double>& s,
+                                               const Relative<double>& y) const {
   return static_cast<const Model&>(*this).wrench_(m, s, y);
 }
 template <class Model>
@@ -19,17 +20,18 @@ void ContactModelFrom<Model>::rate(int m, const Scene<double>& s, const Relative
   static_cast<const Model&>(*this).rate_(m, s, y, dy);
 }
 template <class Model>
-void ContactModelFrom<Model>::rate(int m, const Scene<Dual>& s, const Relative<Dual>& y, State<Dual, 6>& dy) const {
+void ContactModelFrom<Model>::rate(int m, const Scene<Dual>& s, const Relative<Dual>& y,
+                                   State<Dual, 6>& dy) const {
   static_cast<const Model&>(*this).rate_(m, s, y, dy);
 }
 template <class Model>
-void ContactModelFrom<Model>::guards(const Phase& p, const SceneSource& w, double t, const Relative<double>& y,
-                                     double* g) const {
+void ContactModelFrom<Model>::guards(const Phase& p, const SceneSource& w, double t,
+                                     const Relative<double>& y, double* g) const {
   static_cast<const Model&>(*this).guards_(p, w, t, y, g);
 }
 template <class Model>
-void ContactModelFrom<Model>::guards(const Phase& p, const SceneSource& w, const Dual& t, const Relative<Dual>& y,
-                                     Dual* g) const {
+void ContactModelFrom<Model>::guards(const Phase& p, const SceneSource& w, const Dual& t,
+                                     const Relative<Dual>& y, Dual* g) const {
   static_cast<const Model&>(*this).guards_(p, w, t, y, g);
 }
 template <class Model>
@@ -48,8 +50,8 @@ Entry<double, 6> ContactModelFrom<Model>::membership(int m, const Window& v, con
   return static_cast<const Model&>(*this).membership_(m, v, w, t, y);
 }
 template <class Model>
-Entry<Dual, 6> ContactModelFrom<Model>::membership(int m, const Window& v, const SceneSource& w, const Dual& t,
-                                                   const Relative<Dual>& y) const {
+Entry<Dual, 6> ContactModelFrom<Model>::membership(int m, const Window& v, const SceneSource& w,
+                                                   const Dual& t, const Relative<Dual>& y) const {
   return static_cast<const Model&>(*this).membership_(m, v, w, t, y);
 }
 

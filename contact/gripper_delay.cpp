@@ -13,7 +13,8 @@ namespace {
 
 double normal_probability(double x) { return 0.5 * std::erfc(-x * M_SQRT1_2); }
 
-/// The quantile of the truncated normal at probability p, by bisection (its distribution function is monotone).
+/// The quantile of the truncated normal at probability p, by bisection (its distribution function is
+/// monotone).
 double truncated_normal_quantile(const DelayDistribution& d, double p) {
   const double low = normal_probability((0 - d.centre) / d.spread);
   const double high = normal_probability((d.longest - d.centre) / d.spread);
@@ -55,9 +56,11 @@ double DelayDistribution::mean() const {
   return centre + spread * (density(a) - density(b)) / (normal_probability(b) - normal_probability(a));
 }
 
-GripperDelay::GripperDelay(double open_command, const Dual& delay) : open_command_(open_command), delay_(delay) {
+GripperDelay::GripperDelay(double open_command, const Dual& delay)
+    : open_command_(open_command), delay_(delay) {
   if (!std::isfinite(open_command))
-    throw std::invalid_argument(fmt::format("gripper delay: open_command = {} s is not finite", open_command));
+    throw std::invalid_argument(
+        fmt::format("gripper delay: open_command = {} s is not finite", open_command));
   validate(DelayDistribution::number(delay.a));
 }
 

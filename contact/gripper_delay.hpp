@@ -9,13 +9,13 @@ namespace unhand::contact {
 
 /// Time between the opening command and the release [s]: a number, or a distribution on [0, longest].
 ///
-/// The distribution is given by its quantile function at equally likely midpoints, which is what predictions need:
-/// the mean over `quantiles(n)` is a quadrature of the expectation.
+/// The distribution is given by its quantile function at equally likely midpoints, which is what predictions
+/// need: the mean over `quantiles(n)` is a quadrature of the expectation.
 struct DelayDistribution {
   enum class Kind { number, uniform, truncated_normal };
   Kind kind{Kind::number};
-  double centre{};   ///< the number; the mean of the normal before truncation [s]
-  double spread{};   ///< standard deviation before truncation [s]
+  double centre{};      ///< the number; the mean of the normal before truncation [s]
+  double spread{};      ///< standard deviation before truncation [s]
   double longest{0.1};  ///< T: the distribution lives on [0, T] [s]
 
   static DelayDistribution number(double delay) { return {Kind::number, delay, 0, delay}; }
@@ -32,8 +32,9 @@ struct DelayDistribution {
 /// Throws std::invalid_argument, naming parameter, value and accepted range.
 void validate(const DelayDistribution&);
 
-/// One mode, in which the object is part of the hand; released at `open_command + delay` with the twist of its CoM.
-/// [LiuBillard2024] uses it with a delay distribution; D4.6 2.1.4 states its limit (grasps off the CoM).
+/// One mode, in which the object is part of the hand; released at `open_command + delay` with the twist of
+/// its CoM. [LiuBillard2024] uses it with a delay distribution; D4.6 2.1.4 states its limit (grasps off the
+/// CoM).
 class GripperDelay final : public ContactModelFrom<GripperDelay> {
  public:
   /// `open_command` [s] on the robot's clock, `delay` [s] >= 0. Throws std::invalid_argument.
@@ -50,9 +51,13 @@ class GripperDelay final : public ContactModelFrom<GripperDelay> {
   void separation(const NormalForce&, Dual& t) const override { t = open_command_ + delay_; }
 
   template <class S>
-  Wrench<S> wrench_(int, const Scene<S>& scene, const Relative<S>& y) const { return sticking_wrench(scene, y); }
+  Wrench<S> wrench_(int, const Scene<S>& scene, const Relative<S>& y) const {
+    return sticking_wrench(scene, y);
+  }
   template <class S>
-  void rate_(int, const Scene<S>&, const Relative<S>&, State<S, 6>& dy) const { dy = {}; }
+  void rate_(int, const Scene<S>&, const Relative<S>&, State<S, 6>& dy) const {
+    dy = {};
+  }
   template <class S>
   void guards_(const Phase&, const SceneSource&, const S&, const Relative<S>&, S*) const {}
   template <class S>

@@ -12,12 +12,13 @@ using std::sqrt;
 
 namespace {
 
-/// Time after the onset of slip [s] at which the flow takes over from its leading term; the slip is then of the order of
-/// 1e-7 m/s and the term left out 1e-5 of it or less.
+/// Time after the onset of slip [s] at which the flow takes over from its leading term; the slip is then of
+/// the order of 1e-7 m/s and the term left out 1e-5 of it or less.
 constexpr double kOnset = 5e-6;
 
-/// Where the demand is beyond the surface at once (a jump, or a grip that cannot hold) the slip grows linearly and is
-/// followed to this speed [m/s] instead: slaving is weak where friction is, and a free direction turns by 1e-4 in 1e-7 s.
+/// Where the demand is beyond the surface at once (a jump, or a grip that cannot hold) the slip grows
+/// linearly and is followed to this speed [m/s] instead: slaving is weak where friction is, and a free
+/// direction turns by 1e-4 in 1e-7 s.
 constexpr double kOnsetSpeed = 1e-6;
 
 /// Normalised wrench w to f [N, N, N m]: f = f_max (w_x, w_z, L w_τ).
@@ -28,7 +29,8 @@ Wrench<S> physical(const Vec3<S>& w, const S& f_max, const S& length) {
 
 /// The slip's normalised acceleration under a wrench: (a_C − a_H, L (α_O − α_H)).
 template <class S>
-Vec3<S> normalised_acceleration(const Scene<S>& scene, const Relative<S>& y, const Wrench<S>& wrench, const S& length) {
+Vec3<S> normalised_acceleration(const Scene<S>& scene, const Relative<S>& y, const Wrench<S>& wrench,
+                                const S& length) {
   const Vec2<S> r = lever(scene, y);
   const S omega = scene.hand_twist.omega + y.spin;
   const Acceleration<S> com = dynamics::acceleration_under(scene.body, wrench, r, scene.gravity);
@@ -46,7 +48,9 @@ std::array<Vec3<S>, 3> normalised_inertia(const Scene<S>& scene, const Vec2<S>& 
 }
 
 template <class S>
-Vec3<S> times(const std::array<Vec3<S>, 3>& A, const Vec3<S>& x) { return {dot3(A[0], x), dot3(A[1], x), dot3(A[2], x)}; }
+Vec3<S> times(const std::array<Vec3<S>, 3>& A, const Vec3<S>& x) {
+  return {dot3(A[0], x), dot3(A[1], x), dot3(A[2], x)};
+}
 
 }  // namespace
 
@@ -59,8 +63,10 @@ LimitSurface<Shape>::LimitSurface(std::string_view name, const Patch<Dual>& patc
 template <class Shape>
 template <class S>
 const Patch<S>& LimitSurface<Shape>::patch() const {
-  if constexpr (std::is_same_v<S, double>) return patch_double_;
-  else return patch_dual_;
+  if constexpr (std::is_same_v<S, double>)
+    return patch_double_;
+  else
+    return patch_dual_;
 }
 
 template <class Shape>
@@ -79,7 +85,8 @@ Vec3<S> LimitSurface<Shape>::normalised_slip(const Relative<S>& y) const {
 
 namespace {
 
-/// resist, gauge and slip_direction in the world; shapes with directions of their own live in the hand's frame.
+/// resist, gauge and slip_direction in the world; shapes with directions of their own live in the hand's
+/// frame.
 template <class Shape, class S, class Function>
 Vec3<S> in_hand_frame(const S& hand_angle, const Vec3<S>& world, Function&& function) {
   if constexpr (Shape::isotropic) {
@@ -98,7 +105,8 @@ Vec3<S> resist(const Shape& shape, const Scene<S>& scene, const Vec3<S>& u) {
 }
 template <class Shape>
 Vec3<double> slip_direction(const Shape& shape, const Scene<double>& scene, const Vec3<double>& w) {
-  return in_hand_frame<Shape, double>(scene.hand.theta, w, [&](const Vec3<double>& x) { return shape.slip_direction(x); });
+  return in_hand_frame<Shape, double>(scene.hand.theta, w,
+                                      [&](const Vec3<double>& x) { return shape.slip_direction(x); });
 }
 template <class Shape, class S>
 S gauge(const Shape& shape, const Scene<S>& scene, const Vec3<S>& w) {
@@ -124,11 +132,12 @@ Eigen::Matrix3d resist_jacobian(const Shape& shape, const Scene<double>& scene, 
   return J;
 }
 
-/// Minimises φ(a) = ½ (a − b)ᵀ A (a − b) + k σ(a), σ(a) = −resist(a)·a, by Newton's method with a line search on φ.
-/// φ is strictly convex and smooth but at a = 0, which is not the minimum when the sticking wrench is outside.
+/// Minimises φ(a) = ½ (a − b)ᵀ A (a − b) + k σ(a), σ(a) = −resist(a)·a, by Newton's method with a line search
+/// on φ. φ is strictly convex and smooth but at a = 0, which is not the minimum when the sticking wrench is
+/// outside.
 template <class Shape>
-Vec3<double> minimise(const Shape& shape, const Scene<double>& scene, const std::array<Vec3<double>, 3>& A, double k,
-                      const Vec3<double>& b, Vec3<double> a) {
+Vec3<double> minimise(const Shape& shape, const Scene<double>& scene, const std::array<Vec3<double>, 3>& A,
+                      double k, const Vec3<double>& b, Vec3<double> a) {
   const auto phi = [&](const Vec3<double>& x) {
     const Vec3<double> d{x[0] - b[0], x[1] - b[1], x[2] - b[2]};
     return 0.5 * dot3(d, times(A, d)) - k * dot3(resist(shape, scene, x), x);
@@ -138,7 +147,8 @@ Vec3<double> minimise(const Shape& shape, const Scene<double>& scene, const std:
     for (int j = 0; j < 3; ++j) metric(i, j) = A[i][j];
   double value = phi(a);
   for (int iteration = 0; iteration < 60; ++iteration) {
-    const Vec3<double> w = resist(shape, scene, a), d{a[0] - b[0], a[1] - b[1], a[2] - b[2]}, Ad = times(A, d);
+    const Vec3<double> w = resist(shape, scene, a), d{a[0] - b[0], a[1] - b[1], a[2] - b[2]},
+                       Ad = times(A, d);
     const Eigen::Vector3d gradient(Ad[0] - k * w[0], Ad[1] - k * w[1], Ad[2] - k * w[2]);
     const Eigen::Matrix3d hessian = metric - k * resist_jacobian(shape, scene, a);
     const Eigen::Vector3d step = hessian.ldlt().solve(-gradient);
@@ -186,8 +196,8 @@ Vec3<S> LimitSurface<Shape>::slip_acceleration(const Scene<S>& scene, const Rela
     for (int j = 0; j < 3; ++j) A_value[i][j] = value_of(A[i][j]);
   }
   const Vec3<double> n = slip_direction(shape_, scene_value, w_value);
-  const double outside = value_of(excess), size = outside * value_of(f_max) * -dot3(n, w_value) / (1 + outside) /
-                                                  dot3(n, times(A_value, n));
+  const double outside = value_of(excess), size = outside * value_of(f_max) * -dot3(n, w_value) /
+                                                  (1 + outside) / dot3(n, times(A_value, n));
   for (int i = 0; i < 3; ++i) guess[i] = size * n[i];
   const Vec3<double> a = minimise(shape_, scene_value, A_value, value_of(f_max), b_value, guess);
   if constexpr (std::is_same_v<S, double>) {
@@ -195,7 +205,8 @@ Vec3<S> LimitSurface<Shape>::slip_acceleration(const Scene<S>& scene, const Rela
   } else {
     // One Newton step in dual arithmetic with the real Hessian: the implicit function theorem.
     Vec3<S> at{S(a[0]), S(a[1]), S(a[2])};
-    const Vec3<S> force = resist(shape_, scene, at), Ad = times(A, Vec3<S>{at[0] - b[0], at[1] - b[1], at[2] - b[2]});
+    const Vec3<S> force = resist(shape_, scene, at),
+                  Ad = times(A, Vec3<S>{at[0] - b[0], at[1] - b[1], at[2] - b[2]});
     Eigen::Matrix3d hessian = -f_max.a * resist_jacobian(shape_, scene_value, a);
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) hessian(i, j) += A_value[i][j];
@@ -212,14 +223,16 @@ template <class Shape>
 template <class S>
 Wrench<S> LimitSurface<Shape>::wrench_(int mode, const Scene<S>& scene, const Relative<S>& y) const {
   // At the very onset of slip there is no direction yet, and the sticking wrench is on the surface.
-  if (mode == kStick || (y.slip.x == S(0) && y.slip.z == S(0) && y.spin == S(0))) return sticking_wrench(scene, y);
+  if (mode == kStick || (y.slip.x == S(0) && y.slip.z == S(0) && y.spin == S(0)))
+    return sticking_wrench(scene, y);
   const S f_max = patch<S>().f_max(scene.normal_force);
   return physical(resist(shape_, scene, normalised_slip(y)), f_max, patch<S>().length());
 }
 
 template <class Shape>
 template <class S>
-void LimitSurface<Shape>::rate_(int mode, const Scene<S>& scene, const Relative<S>& y, State<S, 6>& dy) const {
+void LimitSurface<Shape>::rate_(int mode, const Scene<S>& scene, const Relative<S>& y,
+                                State<S, 6>& dy) const {
   dy = relative_rate(scene, y, wrench_(mode, scene, y));
 }
 
@@ -235,8 +248,8 @@ S LimitSurface<Shape>::stick_margin(const Scene<S>& scene, const Relative<S>& y)
 
 template <class Shape>
 template <class S>
-void LimitSurface<Shape>::guards_(const Phase& phase, const SceneSource& source, const S& t, const Relative<S>& y,
-                                  S* g) const {
+void LimitSurface<Shape>::guards_(const Phase& phase, const SceneSource& source, const S& t,
+                                  const Relative<S>& y, S* g) const {
   if (phase.mode == kStick) {
     g[0] = stick_margin(source.scene(phase.window, t), y);
   } else {
@@ -248,10 +261,10 @@ void LimitSurface<Shape>::guards_(const Phase& phase, const SceneSource& source,
   }
 }
 
-/// Slip from rest at t. While |u| is tiny its direction is slaved: it relaxes within |u|/(W f_max), microseconds or less,
-/// to the n(t) of the quasi-static acceleration a(t) = W (f* − f_p)(t) = |a| n, so u(δ) = n(δ) ∫ |a| dt (Simpson's rule;
-/// a = 0 at the start where f_p has just reached the surface). What is left out is of relative size |u|/(W f_max T), T the
-/// time scale of the hand and the gripper.
+/// Slip from rest at t. While |u| is tiny its direction is slaved: it relaxes within |u|/(W f_max),
+/// microseconds or less, to the n(t) of the quasi-static acceleration a(t) = W (f* − f_p)(t) = |a| n, so u(δ)
+/// = n(δ) ∫ |a| dt (Simpson's rule; a = 0 at the start where f_p has just reached the surface). What is left
+/// out is of relative size |u|/(W f_max T), T the time scale of the hand and the gripper.
 template <class Shape>
 template <class S>
 Entry<S, 6> LimitSurface<Shape>::onset(const Window& window, const SceneSource& source, const S& t,
@@ -282,8 +295,8 @@ Entry<S, 6> LimitSurface<Shape>::onset(const Window& window, const SceneSource& 
 
 template <class Shape>
 template <class S>
-Entry<S, 6> LimitSurface<Shape>::on_guard_(const Phase& from, int /*guard*/, const SceneSource& source, const S& t,
-                                           const Relative<S>& at) const {
+Entry<S, 6> LimitSurface<Shape>::on_guard_(const Phase& from, int /*guard*/, const SceneSource& source,
+                                           const S& t, const Relative<S>& at) const {
   if (from.mode == kStick) return onset(from.window, source, t, at, true);
   // Along a straight line to zero slip, then decide anew.
   State<S, 6> dy;
@@ -301,8 +314,8 @@ Entry<S, 6> LimitSurface<Shape>::on_guard_(const Phase& from, int /*guard*/, con
 
 template <class Shape>
 template <class S>
-Entry<S, 6> LimitSurface<Shape>::membership_(int mode, const Window& window, const SceneSource& source, const S& t,
-                                             const Relative<S>& y) const {
+Entry<S, 6> LimitSurface<Shape>::membership_(int mode, const Window& window, const SceneSource& source,
+                                             const S& t, const Relative<S>& y) const {
   const Vec3<S> u = normalised_slip(y);
   if (mode == kSlip || value_of(dot3(u, u)) > 0) return {kSlip, t, y.state(), S(0)};
   if (stick_margin(values(source.scene(window, t)), values(y)) < 0) return {kStick, t, y.state(), S(0)};

@@ -12,17 +12,20 @@
 namespace unhand::contact {
 
 /// The set-valued law: slipping, the friction wrench is the one in the limit set that dissipates most,
-///   f = argmin over the set of f · v_r   (for the ellipsoid f = −D v_r / sqrt(v_rᵀ D v_r), D = diag(f_max², f_max², τ_max²));
+///   f = argmin over the set of f · v_r   (for the ellipsoid f = −D v_r / sqrt(v_rᵀ D v_r), D = diag(f_max²,
+///   f_max², τ_max²));
 /// sticking, any f in the set. The slip acceleration is W f + b, W = G M⁻¹ Gᵀ. [LiuBillard2025] section II-B,
 /// [GoyalRuinaPapadopoulos1991] for the surface.
 ///
-/// For a convex law and f_N(t) > 0 the forward solution is unique, so chatter is an artefact of integration: here
+/// For a convex law and f_N(t) > 0 the forward solution is unique, so chatter is an artefact of integration:
+/// here
 ///   stick  y' = 0, left when the sticking wrench f_p reaches the surface;
 ///   slip   stiff (the wrench turns with the direction of a tiny slip), left when the slip comes to rest.
-/// At onset the slip leaves along a = W (f* − f_p), f* the projection of f_p onto the limit set in the metric of W:
-/// the minimum of the strictly convex ½ (a − b)ᵀ W⁻¹ (a − b) + σ(a), σ the surface's support function.
+/// At onset the slip leaves along a = W (f* − f_p), f* the projection of f_p onto the limit set in the metric
+/// of W: the minimum of the strictly convex ½ (a − b)ᵀ W⁻¹ (a − b) + σ(a), σ the surface's support function.
 ///
-/// All of this is done in the normalised coordinates of limit_surface_shapes.hpp, so a Shape is all that differs.
+/// All of this is done in the normalised coordinates of limit_surface_shapes.hpp, so a Shape is all that
+/// differs.
 template <class Shape>
 class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
  public:
@@ -32,8 +35,8 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
       : LimitSurface(name, constant(patch), std::move(shape)) {}
   /// For shapes without parameters.
   template <class S>
-    requires std::default_initializable<Shape>
-  LimitSurface(std::string_view name, const Patch<S>& patch) : LimitSurface(name, patch, Shape{}) {}
+  requires std::default_initializable<Shape> LimitSurface(std::string_view name, const Patch<S>& patch)
+      : LimitSurface(name, patch, Shape{}) {}
 
   std::string_view name() const override { return name_; }
   int mode_count() const override { return 2; }
@@ -69,7 +72,8 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
   template <class S>
   Vec3<S> slip_acceleration(const Scene<S>&, const Relative<S>&) const;
   template <class S>
-  Entry<S, 6> onset(const Window&, const SceneSource&, const S& t, const Relative<S>&, bool at_the_surface) const;
+  Entry<S, 6> onset(const Window&, const SceneSource&, const S& t, const Relative<S>&,
+                    bool at_the_surface) const;
 
   std::string_view name_;
   Shape shape_;

@@ -15,20 +15,25 @@ using Maker = std::unique_ptr<ContactModel> (*)(const ContactParameters<Dual>&);
 
 /// A contact model is one line here.
 constexpr std::pair<std::string_view, Maker> kModels[] = {
-    {"sliding_pivot", [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
+    {"sliding_pivot",
+     [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
        return std::make_unique<SlidingPivot>(p.patch, p.slide_end);
      }},
-    {"limit_surface", [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
+    {"limit_surface",
+     [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
        return std::make_unique<LimitSurface<Ellipsoid>>("limit_surface", p.patch);
      }},
-    {"limit_surface_disc", [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
+    {"limit_surface_disc",
+     [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
        return std::make_unique<LimitSurface<UniformDisc>>("limit_surface_disc", p.patch);
      }},
-    {"limit_surface_quartic", [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
-       return std::make_unique<LimitSurface<ConvexQuartic>>("limit_surface_quartic", p.patch,
-                                                            p.quartic ? *p.quartic : ConvexQuartic::closest_to_disc());
+    {"limit_surface_quartic",
+     [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
+       return std::make_unique<LimitSurface<ConvexQuartic>>(
+           "limit_surface_quartic", p.patch, p.quartic ? *p.quartic : ConvexQuartic::closest_to_disc());
      }},
-    {"gripper_delay", [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
+    {"gripper_delay",
+     [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
        return std::make_unique<GripperDelay>(p.open_command, p.delay);
      }},
 };
@@ -41,15 +46,17 @@ std::vector<std::string> contact_model_names() {
   return names;
 }
 
-std::unique_ptr<ContactModel> make_contact_model(std::string_view name, const ContactParameters<Dual>& parameters) {
+std::unique_ptr<ContactModel> make_contact_model(std::string_view name,
+                                                 const ContactParameters<Dual>& parameters) {
   for (const auto& [known, maker] : kModels)
     if (known == name) return maker(parameters);
-  throw std::invalid_argument(
-      fmt::format("contact model \"{}\" is unknown; there are {}", name, fmt::join(contact_model_names(), ", ")));
+  throw std::invalid_argument(fmt::format("contact model \"{}\" is unknown; there are {}", name,
+                                          fmt::join(contact_model_names(), ", ")));
 }
 
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name, const ContactParameters<double>& p) {
-  return make_contact_model(name, ContactParameters<Dual>{constant(p.patch), p.slide_end, p.quartic, p.open_command, Dual(p.delay)});
+  return make_contact_model(name, ContactParameters<Dual>{constant(p.patch), p.slide_end, p.quartic,
+                                                          p.open_command, Dual(p.delay)});
 }
 
 }  // namespace unhand::contact

@@ -18,17 +18,17 @@ namespace unhand::contact {
 template <class S>
 struct ContactParameters {
   Patch<S> patch;
-  SlideEnd slide_end{SlideEnd::latched_brake};   ///< sliding_pivot
-  std::optional<ConvexQuartic> quartic;          ///< limit_surface_quartic; the closest to a uniform disc if absent
-  double open_command{};                         ///< gripper_delay: when the gripper is told to open [s]
-  S delay{};                                     ///< gripper_delay: from the command to the release [s]
+  SlideEnd slide_end{SlideEnd::latched_brake};  ///< sliding_pivot
+  std::optional<ConvexQuartic> quartic;  ///< limit_surface_quartic; the closest to a uniform disc if absent
+  double open_command{};                 ///< gripper_delay: when the gripper is told to open [s]
+  S delay{};                             ///< gripper_delay: from the command to the release [s]
 };
 
 /// The names that make_contact_model knows.
 std::vector<std::string> contact_model_names();
 
-/// The model of that name. Throws std::invalid_argument, listing the names, if there is none, and as the model's
-/// constructor does.
+/// The model of that name. Throws std::invalid_argument, listing the names, if there is none, and as the
+/// model's constructor does.
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name, const ContactParameters<double>&);
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name, const ContactParameters<Dual>&);
 

@@ -16,14 +16,19 @@ enum Translation { kStuck, kSlide, kBrake };
 enum Rotation { kLocked, kPositive, kNegative };
 
 constexpr int mode_of(Translation translation, Rotation rotation) { return 3 * translation + rotation; }
-constexpr Translation translation_of(int mode) { return static_cast<Translation>(mode / 3); }
-constexpr Rotation rotation_of(int mode) { return static_cast<Rotation>(mode % 3); }
+// Sliding with ω_r = 0 attracting from both sides: between slide+ and slide−.
+constexpr int kSlideBetween = 9;
+constexpr Translation translation_of(int mode) {
+  return mode == kSlideBetween ? kSlide : static_cast<Translation>(mode / 3);
+}
+constexpr Rotation rotation_of(int mode) { return static_cast<Rotation>(mode % 3); }  // kSlideBetween: locked
 constexpr double sign_of(Rotation rotation) { return rotation == kPositive ? 1.0 : -1.0; }
 
 // Guards by index; what an index means depends on the mode.
-constexpr int kRotationGuard = 0, kTranslationGuard = 1, kSlideAgain = 2;
+constexpr int kRotationGuard = 0, kTranslationGuard = 1, kSlideAgain = 2, kTorqueSuffices = 2;
 
-/// The law in one mode: the force that would carry the contact point, what acts, and what follows for the rotation.
+/// The law in one mode: the force that would carry the contact point, what acts, and what follows for the
+/// rotation.
 template <class S>
 struct Law {
   Vec2<S> carrying_force;  ///< f_p [N]
@@ -32,7 +37,11 @@ struct Law {
 };
 
 template <class S>
+Law<S> law_between(const Patch<S>& patch, const Scene<S>& scene, const Relative<S>& y);
+
+template <class S>
 Law<S> law(int mode, const Patch<S>& patch, const Scene<S>& scene, const Relative<S>& y) {
+  if (mode == kSlideBetween) return law_between(patch, scene, y);
   const Translation translation = translation_of(mode);
   const Rotation rotation = rotation_of(mode);
   const auto& [m, I] = scene.body;
@@ -65,23 +74,40 @@ Law<S> law(int mode, const Patch<S>& patch, const Scene<S>& scene, const Relativ
   return out;
 }
 
-/// The rotation that follows when friction is short of the torque that it takes: the object lags behind the hand.
+/// Filippov's solution where slide+ decelerates and slide− accelerates the spin: the mixture λ, 1 − λ of
+/// their wrenches that leaves ω_r = 0. Force and torque stay within their limits, being between two that do.
+template <class S>
+Law<S> law_between(const Patch<S>& patch, const Scene<S>& scene, const Relative<S>& y) {
+  const Law<S> plus = law(mode_of(kSlide, kPositive), patch, scene, y);
+  const Law<S> minus = law(mode_of(kSlide, kNegative), patch, scene, y);
+  const S spread = minus.spin_acceleration - plus.spin_acceleration;  // vanishes with the normal force
+  const S share = value_of(spread) > 0 ? S(minus.spin_acceleration / spread) : S(0.5), rest = 1.0 - share;
+  return {share * plus.carrying_force + rest * minus.carrying_force,
+          {share * plus.wrench.fx + rest * minus.wrench.fx, share * plus.wrench.fz + rest * minus.wrench.fz,
+           share * plus.wrench.tau + rest * minus.wrench.tau},
+          S(0)};
+}
+
+/// The rotation that follows when friction is short of the torque that it takes: the object lags behind the
+/// hand.
 constexpr Rotation lagging(double demanded_torque) { return demanded_torque > 0 ? kNegative : kPositive; }
 
-/// Time after the onset of spin [s] at which its sign is beyond rounding: at the onset ω_r and its rate are both zero.
+/// Time after the onset of spin [s] at which its sign is beyond rounding: at the onset ω_r and its rate are
+/// both zero.
 constexpr double kOnset = 1e-6;
 
 /// Which branches a transition has just left, and so must not choose again.
 struct Excluded {
-  bool locked{}, stuck{}, slide{}, brake{};
+  bool locked{}, stuck{}, slide{}, brake{}, between{};
 };
 
-/// The first consistent mode at an instant: locked if the torque it takes is within the limit, else the spin that its
-/// own acceleration produces. In slide, where f_p jumps with the rotation, neither spin may: then ω_r = 0 attracts from
-/// both sides, and the rotation stays locked until one of them does.
+/// The first consistent mode at an instant: locked if the torque it takes is within the limit, else the spin
+/// that its own acceleration produces. In slide, where f_p jumps with the rotation, neither may be: then ω_r
+/// = 0 attracts from both sides.
 int consistent_mode(const Patch<double>& patch, const Scene<double>& scene, const Relative<double>& y,
                     Translation before, SlideEnd slide_end, const Excluded& excluded) {
-  const double force_limit = patch.f_max(scene.normal_force), torque_limit = patch.tau_max(scene.normal_force);
+  const double force_limit = patch.f_max(scene.normal_force),
+               torque_limit = patch.tau_max(scene.normal_force);
   const bool slipping = y.slip.x != 0 || y.slip.z != 0;
 
   auto translation_with = [&](Rotation rotation) {
@@ -99,11 +125,22 @@ int consistent_mode(const Patch<double>& patch, const Scene<double>& scene, cons
   const double demand = law(locked, patch, scene, y).wrench.tau;
   if (!excluded.locked && std::abs(demand) <= torque_limit) return locked;
   const Rotation first = lagging(demand), second = first == kNegative ? kPositive : kNegative;
-  for (const Rotation rotation : {first, second}) {
-    const int mode = mode_of(translation_with(rotation), rotation);
-    if (sign_of(rotation) * law(mode, patch, scene, y).spin_acceleration > 0) return mode;
+  const int modes[2] = {mode_of(translation_with(first), first), mode_of(translation_with(second), second)};
+  double drive[2];  // how the spin of that sign would grow
+  for (int k = 0; k < 2; ++k)
+    drive[k] = sign_of(k == 0 ? first : second) * law(modes[k], patch, scene, y).spin_acceleration;
+  if (excluded.between) return modes[drive[0] >= drive[1] ? 0 : 1];
+  if (drive[0] > 0) return modes[0];
+  if (drive[1] > 0) return modes[1];
+  const bool slides[2] = {translation_of(modes[0]) == kSlide, translation_of(modes[1]) == kSlide};
+  if (slides[0] && slides[1] && drive[0] < 0 && drive[1] < 0) return kSlideBetween;
+  if (slipping &&
+      slides[0] != slides[1]) {  // one spin would brake: the braking force does not jump with the rotation
+    const int braked = mode_of(kBrake, kLocked);
+    const double torque = law(braked, patch, scene, y).wrench.tau;
+    return std::abs(torque) <= torque_limit ? braked : mode_of(kBrake, lagging(torque));
   }
-  return excluded.locked ? mode_of(translation_with(first), first) : locked;
+  return modes[0];
 }
 
 }  // namespace
@@ -114,19 +151,24 @@ SlidingPivot::SlidingPivot(const Patch<Dual>& patch, SlideEnd slide_end)
 }
 
 template <>
-const Patch<double>& SlidingPivot::patch<double>() const { return patch_double_; }
+const Patch<double>& SlidingPivot::patch<double>() const {
+  return patch_double_;
+}
 template <>
-const Patch<Dual>& SlidingPivot::patch<Dual>() const { return patch_dual_; }
+const Patch<Dual>& SlidingPivot::patch<Dual>() const {
+  return patch_dual_;
+}
 
 std::string_view SlidingPivot::mode_name(int mode) const {
-  static constexpr std::array<std::string_view, 9> kNames{"stick", "pivot+", "pivot-", "slide",  "slide+",
-                                                          "slide-", "brake", "brake+", "brake-"};
+  static constexpr std::array<std::string_view, 10> kNames{
+      "stick", "pivot+", "pivot-", "slide", "slide+", "slide-", "brake", "brake+", "brake-", "slide between"};
   return kNames[static_cast<std::size_t>(mode)];
 }
 
 dynamics::FlowKind SlidingPivot::kind(int mode) const {
   if (mode == mode_of(kStuck, kLocked)) return dynamics::FlowKind::frozen;
-  // A brake that f_max barely outweighs lasts long while its direction relaxes at once, the faster the longer the lever.
+  // A brake that f_max barely outweighs lasts long while its direction relaxes at once, the faster the longer
+  // the lever.
   return translation_of(mode) == kBrake ? dynamics::FlowKind::stiff : dynamics::FlowKind::smooth;
 }
 
@@ -135,19 +177,25 @@ bool SlidingPivot::is_homogeneous(int mode) const { return translation_of(mode) 
 bool SlidingPivot::may_feed_energy(int mode) const { return translation_of(mode) == kSlide; }
 
 int SlidingPivot::guard_count(int mode) const {
+  if (mode == kSlideBetween) return 3;
   return translation_of(mode) == kBrake && slide_end_ == SlideEnd::memoryless ? 3 : 2;
 }
 
 dynamics::Guard SlidingPivot::guard(int mode, int index) const {
   using dynamics::Crossing;
+  if (mode == kSlideBetween && index == kRotationGuard) return {"spin sets in", Crossing::rising};
+  if (mode == kSlideBetween && index == kTorqueSuffices) return {"torque suffices", Crossing::falling};
   if (index == kRotationGuard)
     return rotation_of(mode) == kLocked ? dynamics::Guard{"torque limit", Crossing::rising}
                                         : dynamics::Guard{"spin stops", Crossing::falling};
   if (index == kSlideAgain) return {"force limit", Crossing::rising};
   switch (translation_of(mode)) {
-    case kStuck: return {"force limit", Crossing::rising};
-    case kSlide: return {"force suffices", Crossing::falling};
-    default: return {"slip stops", Crossing::falling};
+    case kStuck:
+      return {"force limit", Crossing::rising};
+    case kSlide:
+      return {"force suffices", Crossing::falling};
+    default:
+      return {"slip stops", Crossing::falling};
   }
 }
 
@@ -163,12 +211,15 @@ void SlidingPivot::guards_(const Phase& phase, const SceneSource& source, const 
     g[kRotationGuard] = sign_of(rotation_of(mode)) * y.spin;
   } else {
     g[kRotationGuard] = margin(S(now.wrench.tau * now.wrench.tau), S(torque_limit * torque_limit));
-    if (translation_of(mode) == kSlide) {
-      const Rotation next = lagging(value_of(now.wrench.tau));
-      const S leaves = sign_of(next) * law(mode_of(kSlide, next), patch, scene, y).spin_acceleration;
-      const S scaled = scene.body.inertia * leaves / (torque_limit + 1e-300);
-      if (scaled < g[kRotationGuard]) g[kRotationGuard] = scaled;
-    }
+  }
+  if (mode == kSlideBetween) {
+    const S plus = law(mode_of(kSlide, kPositive), patch, scene, y).spin_acceleration;
+    const S minus = law(mode_of(kSlide, kNegative), patch, scene, y).spin_acceleration;
+    const S drive = plus > -minus ? plus : S(-minus);
+    const S torque = scene.body.inertia * drive;
+    g[kRotationGuard] = torque / (torque_limit + std::abs(value_of(torque)) + 1e-300);
+    const S demand = law(mode_of(kSlide, kLocked), patch, scene, y).wrench.tau;
+    g[kTorqueSuffices] = margin(S(demand * demand), S(torque_limit * torque_limit));
   }
   const S force = margin(dot(now.carrying_force, now.carrying_force), S(force_limit * force_limit));
   if (translation_of(mode) == kBrake) {
@@ -204,9 +255,13 @@ Entry<S, 6> SlidingPivot::on_guard_(const Phase& from, int guard, const SceneSou
   Relative<S> y = at;
   S now = t;
   Excluded excluded;
-  if (guard == kRotationGuard) {
-    if (rotation_of(from.mode) == kLocked) excluded.locked = true;
-    else y.spin = S(0);
+  if (from.mode == kSlideBetween && guard != kTranslationGuard) {
+    excluded.locked = excluded.between = guard == kRotationGuard;
+  } else if (guard == kRotationGuard) {
+    if (rotation_of(from.mode) == kLocked)
+      excluded.locked = true;
+    else
+      y.spin = S(0);
   } else if (guard == kSlideAgain) {
     excluded.brake = true;
   } else if (translation == kStuck) {
@@ -225,7 +280,8 @@ Entry<S, 6> SlidingPivot::on_guard_(const Phase& from, int guard, const SceneSou
     now += left;
   }
   const Scene<S> scene = source.scene(from.window, now);
-  const int mode = consistent_mode(patch_double_, values(scene), values(y), translation, slide_end_, excluded);
+  const int mode =
+      consistent_mode(patch_double_, values(scene), values(y), translation, slide_end_, excluded);
   if (rotation_of(mode) == kLocked || value_of(y.spin) != 0) return {mode, now, y.state(), S(0)};
   return spin_onset(mode, from, source, now, y);
 }
@@ -251,7 +307,8 @@ Entry<S, 6> SlidingPivot::membership_(int mode, const Window& window, const Scen
                                       const Relative<S>& y) const {
   const Translation before = mode < 0 ? kStuck : translation_of(mode);
   const Scene<S> scene = source.scene(window, t);
-  return {consistent_mode(patch_double_, values(scene), values(y), before, slide_end_, {}), t, y.state(), S(0)};
+  return {consistent_mode(patch_double_, values(scene), values(y), before, slide_end_, {}), t, y.state(),
+          S(0)};
 }
 
 template class ContactModelFrom<SlidingPivot>;

@@ -9,25 +9,32 @@ namespace unhand::contact {
 /// What ends a slide once |f_p| <= f_max while the patch still slips. [LiuBillard2025] is silent about it.
 enum class SlideEnd {
   latched_brake,  ///< a braking mode that is kept until the slip is zero
-  memoryless,     ///< slide again as soon as |f_p| > f_max: |f_p| = f_max may attract (chatter) or repel; comparison only
+  memoryless,     ///< slide again as soon as |f_p| > f_max: |f_p| = f_max may attract (chatter) or repel;
+                  ///< comparison only
 };
 
-/// [LiuBillard2025] section II, D4.6 2.2.2, with the corrections below. Limits f_max = n μ f_N, τ_max = c a n μ f_N.
+/// [LiuBillard2025] section II, D4.6 2.2.2, with the corrections below. Limits f_max = n μ f_N, τ_max = c a n
+/// μ f_N.
 ///
 /// A mode is a pair of what the patch does and what the rotation does:
 ///   patch     stuck     the contact point is carried with the hand
-///             slide     |f_p| > f_max: force f_max f_p/|f_p| (along the required force, not against the slip)
-///             brake     |f_p| <= f_max but still slipping: force −f_max v_r/|v_r|
+///             slide     |f_p| > f_max: force f_max f_p/|f_p| (along the required force, not against the
+///             slip) brake     |f_p| <= f_max but still slipping: force −f_max v_r/|v_r|
 ///   rotation  locked    ω_r = 0, torque whatever keeps α_O = α_H, up to τ_max
 ///             + or −    the sign of ω_r: torque −τ_max sgn(ω_r)
 /// (stuck, locked) is sticking, (stuck, ±) pivoting about the contact:
 ///   (I + m l²) α_O = m [z_r ax_H − x_r (az_H + g)] + τ,
-/// which at onset is α_r = −sgn(τ_p)(|τ_p| − τ_max)/(m l² + I). f_p is the force that carries the contact point with
-/// the rotation in force: α_O from this equation while spinning, α_H while locked.
+/// which at onset is α_r = −sgn(τ_p)(|τ_p| − τ_max)/(m l² + I). f_p is the force that carries the contact
+/// point with the rotation in force: α_O from this equation while spinning, α_H while locked.
 ///
-/// Departures from the print: Eq. 21, 22, 25 have sgn(|τ_p|), always +1, and the sign of the reaction, and Eq. 22 lets a
-/// pivoting object feel no friction when |τ_p| < τ_max; Eq. 23's left side is the CoM's absolute acceleration; in
-/// Eq. 24 the lost lever torque is divided by I, since the pivot's constraint is gone.
+/// Where slide+ and slide− both drive the spin back to zero (f_p jumps with the rotation), ω_r = 0 attracts
+/// from both sides: a tenth mode slides between the two, with the mixture of their wrenches that keeps ω_r =
+/// 0 (Filippov's solution).
+///
+/// Departures from the print: Eq. 21, 22, 25 have sgn(|τ_p|), always +1, and the sign of the reaction, and
+/// Eq. 22 lets a pivoting object feel no friction when |τ_p| < τ_max; Eq. 23's left side is the CoM's
+/// absolute acceleration; in Eq. 24 the lost lever torque is divided by I, since the pivot's constraint is
+/// gone.
 ///
 /// The model is a surrogate and not passive: in slide it feeds energy exactly when f_p · v_r > 0.
 class SlidingPivot final : public ContactModelFrom<SlidingPivot> {
@@ -38,7 +45,7 @@ class SlidingPivot final : public ContactModelFrom<SlidingPivot> {
       : SlidingPivot(constant(patch), slide_end) {}
 
   std::string_view name() const override { return "sliding_pivot"; }
-  int mode_count() const override { return 9; }
+  int mode_count() const override { return 10; }
   std::string_view mode_name(int mode) const override;
   dynamics::FlowKind kind(int mode) const override;
   int guard_count(int mode) const override;
@@ -61,7 +68,8 @@ class SlidingPivot final : public ContactModelFrom<SlidingPivot> {
   template <class S>
   const Patch<S>& patch() const;
   template <class S>
-  Entry<S, 6> spin_onset(int mode, const Phase& from, const SceneSource&, const S& t, const Relative<S>& rest) const;
+  Entry<S, 6> spin_onset(int mode, const Phase& from, const SceneSource&, const S& t,
+                         const Relative<S>& rest) const;
 
   Patch<double> patch_double_;
   Patch<Dual> patch_dual_;

@@ -22,7 +22,8 @@ class CvodeStepper final : public Stepper<double, N> {
     vector_ = N_VNew_Serial(N, context_);
     scratch_ = N_VNew_Serial(N, context_);
     memory_ = CVodeCreate(kind == FlowKind::stiff ? CV_BDF : CV_ADAMS, context_);
-    if (vector_ == nullptr || scratch_ == nullptr || memory_ == nullptr) throw std::runtime_error("CVODE: out of memory");
+    if (vector_ == nullptr || scratch_ == nullptr || memory_ == nullptr)
+      throw std::runtime_error("CVODE: out of memory");
     check(CVodeInit(memory_, &CvodeStepper::call_flow, 0.0, vector_), "CVodeInit");
     check(CVodeSetErrHandlerFn(memory_, &CvodeStepper::ignore_messages, nullptr), "CVodeSetErrHandlerFn");
     check(CVodeWFtolerances(memory_, &CvodeStepper::call_weights), "CVodeWFtolerances");
@@ -31,7 +32,8 @@ class CvodeStepper final : public Stepper<double, N> {
     matrix_ = SUNDenseMatrix(N, N, context_);
     solver_ = SUNLinSol_Dense(vector_, matrix_, context_);
     check(CVodeSetLinearSolver(memory_, solver_, matrix_), "CVodeSetLinearSolver");
-    if constexpr (N + 1 <= kDualSize) check(CVodeSetJacFn(memory_, &CvodeStepper::call_jacobian), "CVodeSetJacFn");
+    if constexpr (N + 1 <= kDualSize)
+      check(CVodeSetJacFn(memory_, &CvodeStepper::call_jacobian), "CVodeSetJacFn");
   }
 
   ~CvodeStepper() override {
@@ -45,7 +47,8 @@ class CvodeStepper final : public Stepper<double, N> {
   CvodeStepper(const CvodeStepper&) = delete;
   CvodeStepper& operator=(const CvodeStepper&) = delete;
 
-  void start(const HybridSystem<N>& system, const Phase& phase, const double& t, const State<double, N>& y) override {
+  void start(const HybridSystem<N>& system, const Phase& phase, const double& t,
+             const State<double, N>& y) override {
     system_ = &system;
     phase_ = phase;
     this->t1_ = t;
@@ -81,12 +84,14 @@ class CvodeStepper final : public Stepper<double, N> {
   void interpolate(double theta, State<double, N>& y) const override {
     at(this->t0_ + theta * (this->t1_ - this->t0_), y);
   }
-  /// A multistep method cannot retake a step from its start alone; its interpolant is of the method's own order.
+  /// A multistep method cannot retake a step from its start alone; its interpolant is of the method's own
+  /// order.
   void retake(double h, State<double, N>& y) override { at(this->t0_ + h, y); }
 
  private:
   static void check(int status, const char* call) {
-    if (status < 0) throw std::runtime_error(std::string("CVODE: ") + call + " returned " + std::to_string(status));
+    if (status < 0)
+      throw std::runtime_error(std::string("CVODE: ") + call + " returned " + std::to_string(status));
   }
   static void ignore_messages(int, const char*, const char*, char*, void*) {}
 
@@ -124,8 +129,8 @@ class CvodeStepper final : public Stepper<double, N> {
     return 0;
   }
 
-  static int call_jacobian(double t, N_Vector y, N_Vector, SUNMatrix matrix, void* self_pointer, N_Vector, N_Vector,
-                           N_Vector) {
+  static int call_jacobian(double t, N_Vector y, N_Vector, SUNMatrix matrix, void* self_pointer, N_Vector,
+                           N_Vector, N_Vector) {
     if constexpr (N + 1 <= kDualSize) {
       auto& self = *static_cast<CvodeStepper*>(self_pointer);
       try {
@@ -146,8 +151,14 @@ class CvodeStepper final : public Stepper<double, N> {
   }
 
   void at(double t, State<double, N>& y) const {
-    if (t >= this->t1_) { y = this->y1_; return; }
-    if (t <= this->t0_) { y = this->y0_; return; }
+    if (t >= this->t1_) {
+      y = this->y1_;
+      return;
+    }
+    if (t <= this->t0_) {
+      y = this->y0_;
+      return;
+    }
     check(CVodeGetDky(memory_, t, 0, scratch_), "CVodeGetDky");
     for (int i = 0; i < N; ++i) y[i] = NV_Ith_S(scratch_, i);
   }
@@ -161,7 +172,8 @@ class CvodeStepper final : public Stepper<double, N> {
   const HybridSystem<N>* system_{};
   Phase phase_;
   std::exception_ptr thrown_;
-  bool not_finite_{};  ///< the flow was not finite in an attempt, and no step of some length has succeeded since
+  bool not_finite_{};  ///< the flow was not finite in an attempt, and no step of some length has succeeded
+                       ///< since
 };
 
 }  // namespace

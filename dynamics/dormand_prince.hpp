@@ -5,8 +5,8 @@
 
 namespace unhand::dynamics {
 
-/// [DormandPrince1980]; dense output after [HairerNorsettWanner1993] II.6. Six evaluations a step (the last is the
-/// first of the next).
+/// [DormandPrince1980]; dense output after [HairerNorsettWanner1993] II.6. Six evaluations a step (the last
+/// is the first of the next).
 template <class S, int N>
 class DormandPrince final : public SingleStep<DormandPrince<S, N>, S, N> {
  public:
@@ -15,8 +15,10 @@ class DormandPrince final : public SingleStep<DormandPrince<S, N>, S, N> {
   using SingleStep<DormandPrince<S, N>, S, N>::SingleStep;
 
   void prepare(bool fresh) {
-    if (fresh) this->flow(this->t0_, this->y0_, k_[0]);
-    else k_[0] = k_[6];
+    if (fresh)
+      this->flow(this->t0_, this->y0_, k_[0]);
+    else
+      k_[0] = k_[6];
   }
   double guess() const { return this->first_step(values<S, N>(k_[0])); }
 

@@ -1,9 +1,9 @@
-// Planar frames: poses, twists, accelerations and wrenches in the x-z plane of a throw, with the kinematics of one
-// rigid body seen from another.
+// Planar frames: poses, twists, accelerations and wrenches in the x-z plane of a throw, with the kinematics
+// of one rigid body seen from another.
 //
-// World W: x forward [m], z up [m]; angles θ counter-clockwise from +x to +z [rad], never wrapped. J = [[0,-1],[1,0]].
-// H is the hand frame (midway between the pads), O the object's centre of mass, C the contact patch (at the pads, so
-// at the hand's origin). r = p_WO − p_WH = (x_r, z_r) [m].
+// World W: x forward [m], z up [m]; angles θ counter-clockwise from +x to +z [rad], never wrapped. J =
+// [[0,-1],[1,0]]. H is the hand frame (midway between the pads), O the object's centre of mass, C the contact
+// patch (at the pads, so at the hand's origin). r = p_WO − p_WH = (x_r, z_r) [m].
 #pragma once
 
 #include <cmath>
@@ -16,41 +16,67 @@ struct Vec2 {
 };
 
 template <class S>
-Vec2<S> operator+(const Vec2<S>& a, const Vec2<S>& b) { return {a.x + b.x, a.z + b.z}; }
+Vec2<S> operator+(const Vec2<S>& a, const Vec2<S>& b) {
+  return {a.x + b.x, a.z + b.z};
+}
 template <class S>
-Vec2<S> operator-(const Vec2<S>& a, const Vec2<S>& b) { return {a.x - b.x, a.z - b.z}; }
+Vec2<S> operator-(const Vec2<S>& a, const Vec2<S>& b) {
+  return {a.x - b.x, a.z - b.z};
+}
 template <class S>
-Vec2<S> operator*(const S& k, const Vec2<S>& a) { return {k * a.x, k * a.z}; }
+Vec2<S> operator*(const S& k, const Vec2<S>& a) {
+  return {k * a.x, k * a.z};
+}
 template <class S>
-S dot(const Vec2<S>& a, const Vec2<S>& b) { return a.x * b.x + a.z * b.z; }
+S dot(const Vec2<S>& a, const Vec2<S>& b) {
+  return a.x * b.x + a.z * b.z;
+}
 template <class S>
-S norm(const Vec2<S>& a) { using std::sqrt; return sqrt(dot(a, a)); }
+S norm(const Vec2<S>& a) {
+  using std::sqrt;
+  return sqrt(dot(a, a));
+}
 /// J a: a turned by +90 degrees.
 template <class S>
-Vec2<S> perp(const Vec2<S>& a) { return {-a.z, a.x}; }
+Vec2<S> perp(const Vec2<S>& a) {
+  return {-a.z, a.x};
+}
 /// R(θ) a: a, given in a frame at angle θ, expressed in the world.
 template <class S>
 Vec2<S> rotate(const S& theta, const Vec2<S>& a) {
-  using std::cos; using std::sin;
+  using std::cos;
+  using std::sin;
   const S c = cos(theta), s = sin(theta);
   return {c * a.x - s * a.z, s * a.x + c * a.z};
 }
 
 /// Position [m, m] and angle [rad].
 template <class S>
-struct Pose { S x{}, z{}, theta{}; Vec2<S> position() const { return {x, z}; } };
+struct Pose {
+  S x{}, z{}, theta{};
+  Vec2<S> position() const { return {x, z}; }
+};
 
 /// Linear velocity of the frame's origin [m/s] and angular velocity [rad/s], in the world.
 template <class S>
-struct Twist { S vx{}, vz{}, omega{}; Vec2<S> linear() const { return {vx, vz}; } };
+struct Twist {
+  S vx{}, vz{}, omega{};
+  Vec2<S> linear() const { return {vx, vz}; }
+};
 
 /// Linear acceleration of the frame's origin [m/s²] and angular acceleration [rad/s²], in the world.
 template <class S>
-struct Acceleration { S ax{}, az{}, alpha{}; Vec2<S> linear() const { return {ax, az}; } };
+struct Acceleration {
+  S ax{}, az{}, alpha{};
+  Vec2<S> linear() const { return {ax, az}; }
+};
 
 /// Force [N] and torque about the named point [N m], in the world.
 template <class S>
-struct Wrench { S fx{}, fz{}, tau{}; Vec2<S> force() const { return {fx, fz}; } };
+struct Wrench {
+  S fx{}, fz{}, tau{};
+  Vec2<S> force() const { return {fx, fz}; }
+};
 
 /// Twist of the object's material point at the patch, v_C = G(r) v_O = (vx + ω z_r, vz − ω x_r, ω).
 /// [LiuBillard2025] Eq. 11-13.
@@ -65,17 +91,17 @@ Twist<S> twist_at_com(const Twist<S>& patch, const Vec2<S>& r) {
   return {patch.vx - patch.omega * r.z, patch.vz + patch.omega * r.x, patch.omega};
 }
 
-/// Acceleration of the object's material point at the patch, a_C = a_O + (α z_r + ω² x_r, −α x_r + ω² z_r, 0).
-/// [LiuBillard2025] Eq. 16 prints both terms with the opposite sign; a finite difference of any moving rigid body
-/// decides for the sign used here (tests/dynamics/frames_test.cpp).
+/// Acceleration of the object's material point at the patch, a_C = a_O + (α z_r + ω² x_r, −α x_r + ω² z_r,
+/// 0). [LiuBillard2025] Eq. 16 prints both terms with the opposite sign; a finite difference of any moving
+/// rigid body decides for the sign used here (tests/dynamics/frames_test.cpp).
 template <class S>
 Acceleration<S> acceleration_at_patch(const Acceleration<S>& object, const S& omega, const Vec2<S>& r) {
   return {object.ax + object.alpha * r.z + omega * omega * r.x,
           object.az - object.alpha * r.x + omega * omega * r.z, object.alpha};
 }
 
-/// The inverse: acceleration of the CoM from that of the material point at the patch; with the hand's acceleration
-/// this is the sticking acceleration of [LiuBillard2025] Eq. 19 (sign corrected as above).
+/// The inverse: acceleration of the CoM from that of the material point at the patch; with the hand's
+/// acceleration this is the sticking acceleration of [LiuBillard2025] Eq. 19 (sign corrected as above).
 template <class S>
 Acceleration<S> acceleration_at_com(const Acceleration<S>& patch, const S& omega, const Vec2<S>& r) {
   return {patch.ax - patch.alpha * r.z - omega * omega * r.x,

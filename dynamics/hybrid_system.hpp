@@ -36,7 +36,8 @@ enum class Crossing { rising, falling };
 struct Guard {
   std::string_view name;
   Crossing crossing{};
-  bool monotone{false};  ///< passes zero at most once in a step, however long: sampled at the ends of steps only
+  bool monotone{
+      false};  ///< passes zero at most once in a step, however long: sampled at the ends of steps only
 };
 
 /// A mode inside a window of smooth data.
@@ -45,8 +46,8 @@ struct Phase {
   Window window;
 };
 
-/// Where a phase begins: the mode with its state at t. Where the first instants after an event are known in closed
-/// form, t lies `lead` after the event.
+/// Where a phase begins: the mode with its state at t. Where the first instants after an event are known in
+/// closed form, t lies `lead` after the event.
 template <class S, int N>
 struct Entry {
   int mode{};
@@ -55,8 +56,8 @@ struct Entry {
   S lead{};
 };
 
-/// Everything the integrator knows of a system. One overload serves double and one Dual (virtual functions cannot be
-/// templates); HybridSystemFrom writes both from one template.
+/// Everything the integrator knows of a system. One overload serves double and one Dual (virtual functions
+/// cannot be templates); HybridSystemFrom writes both from one template.
 template <int N>
 class HybridSystem {
  public:
@@ -80,8 +81,10 @@ class HybridSystem {
   virtual void guards(const Phase&, const Dual& t, const State<Dual, N>& y, Dual* g) const = 0;
 
   /// What happens when `guard` of `from` fires at t. The window is the one in force.
-  virtual Entry<double, N> on_guard(const Phase& from, int guard, double t, const State<double, N>& y) const = 0;
-  virtual Entry<Dual, N> on_guard(const Phase& from, int guard, const Dual& t, const State<Dual, N>& y) const = 0;
+  virtual Entry<double, N> on_guard(const Phase& from, int guard, double t,
+                                    const State<double, N>& y) const = 0;
+  virtual Entry<Dual, N> on_guard(const Phase& from, int guard, const Dual& t,
+                                  const State<Dual, N>& y) const = 0;
 
   /// What happens at a time event; `window` is the one that begins there.
   virtual Entry<double, N> on_time(int mode, const Window&, double t, const State<double, N>& y) const = 0;
@@ -96,13 +99,15 @@ class HybridSystem {
     return {from.mode, t, y, Dual(0.0)};
   }
 
-  /// dt/dσ > 0 of the variable σ in which the flow of a mode is regular, if `is_paced`; see paced_stepper.hpp.
+  /// dt/dσ > 0 of the variable σ in which the flow of a mode is regular, if `is_paced`; see
+  /// paced_stepper.hpp.
   virtual bool is_paced(int /*mode*/) const { return false; }
   virtual double pace(const Phase&, double /*t*/, const State<double, N>&) const { return 1; }
   virtual Dual pace(const Phase&, const Dual& /*t*/, const State<Dual, N>&) const { return Dual(1.0); }
 
   /// The error that one step may make in each component of a state that goes from y0 to y1 (SI units):
-  /// absolute + relative · size. Flows that are singular at a point may ask for errors relative to their distance.
+  /// absolute + relative · size. Flows that are singular at a point may ask for errors relative to their
+  /// distance.
   virtual void error_scale(const Phase&, const Tolerances& tolerances, const State<double, N>& y0,
                            const State<double, N>& y1, State<double, N>& scale) const {
     for (int i = 0; i < N; ++i)
@@ -155,11 +160,17 @@ class HybridSystemFrom : public HybridSystem<N> {
 
  protected:
   template <class S>
-  void time_events_(std::vector<S>& out) const { out.clear(); }
+  void time_events_(std::vector<S>& out) const {
+    out.clear();
+  }
   template <class S>
-  Entry<S, N> on_time_(int mode, const Window&, const S& t, const State<S, N>& y) const { return {mode, t, y, S(0)}; }
+  Entry<S, N> on_time_(int mode, const Window&, const S& t, const State<S, N>& y) const {
+    return {mode, t, y, S(0)};
+  }
   template <class S>
-  Entry<S, N> at_limit_(const Phase& from, const S& t, const State<S, N>& y) const { return {from.mode, t, y, S(0)}; }
+  Entry<S, N> at_limit_(const Phase& from, const S& t, const State<S, N>& y) const {
+    return {from.mode, t, y, S(0)};
+  }
 
  private:
   const Derived& self() const { return static_cast<const Derived&>(*this); }

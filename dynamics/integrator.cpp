@@ -15,14 +15,22 @@ namespace unhand::dynamics {
 
 const char* to_string(Outcome outcome) {
   switch (outcome) {
-    case Outcome::finished: return "finished";
-    case Outcome::horizon: return "horizon";
-    case Outcome::zeno: return "zeno";
-    case Outcome::event_budget_spent: return "event_budget_spent";
-    case Outcome::step_budget_spent: return "step_budget_spent";
-    case Outcome::mode_cycle: return "mode_cycle";
-    case Outcome::step_too_small: return "step_too_small";
-    case Outcome::not_finite: return "not_finite";
+    case Outcome::finished:
+      return "finished";
+    case Outcome::horizon:
+      return "horizon";
+    case Outcome::zeno:
+      return "zeno";
+    case Outcome::event_budget_spent:
+      return "event_budget_spent";
+    case Outcome::step_budget_spent:
+      return "step_budget_spent";
+    case Outcome::mode_cycle:
+      return "mode_cycle";
+    case Outcome::step_too_small:
+      return "step_too_small";
+    case Outcome::not_finite:
+      return "not_finite";
   }
   return "unknown";
 }
@@ -59,7 +67,8 @@ std::unique_ptr<Stepper<S, N>> make_stepper(Method method, FlowKind kind, const 
     if (method == Method::rosenbrock) return std::make_unique<Rosenbrock<N>>(tolerances);
     return make_cvode_stepper<N>(tolerances, kind);
   }
-  throw std::invalid_argument("integrate: methods rosenbrock and cvode have no derivatives; use automatic with Dual");
+  throw std::invalid_argument(
+      "integrate: methods rosenbrock and cvode have no derivatives; use automatic with Dual");
 }
 
 /// The steppers of one integration, each made when first needed.
@@ -74,7 +83,8 @@ class Steppers {
     if (!stepper) {
       if constexpr (N + 2 <= kDualSize) {
         if (paced) {
-          stepper = std::make_unique<PacedStepper<S, N>>(make_stepper<S, N + 1>(method(kind), kind, options_.tolerances));
+          stepper = std::make_unique<PacedStepper<S, N>>(
+              make_stepper<S, N + 1>(method(kind), kind, options_.tolerances));
           return *stepper;
         }
       }
@@ -143,7 +153,8 @@ class Run {
   void begin_windows(const Entry<S, N>& start, const S& t_end) {
     system_.time_events(times_);
     const double t = value_of(start.t);
-    skipped_ = static_cast<int>(std::count_if(times_.begin(), times_.end(), [&](const S& x) { return value_of(x) <= t; }));
+    skipped_ = static_cast<int>(
+        std::count_if(times_.begin(), times_.end(), [&](const S& x) { return value_of(x) <= t; }));
     std::erase_if(times_, [&](const S& x) { return !(value_of(x) > t) || value_of(x) >= value_of(t_end); });
     times_.push_back(t_end);
     window_ = {t, value_of(times_.front())};
@@ -211,7 +222,8 @@ class Run {
   }
 
   double longest_step(const Stepper<S, N>& stepper) const {
-    if (system_.kind(phase_.mode) == FlowKind::frozen || system_.is_paced(phase_.mode)) return options_.longest_step;
+    if (system_.kind(phase_.mode) == FlowKind::frozen || system_.is_paced(phase_.mode))
+      return options_.longest_step;
     State<double, N> y;
     for (int i = 0; i < N; ++i) y[i] = value_of(stepper.y1()[i]);
     const double bound = system_.max_step(phase_, value_of(stepper.t1()), y);
@@ -240,8 +252,10 @@ class Run {
   static constexpr double kAtZero = 1e-9;     // s
   static constexpr double kRounding = 1e-13;  // of a guard of order one
   static constexpr double kNoRate = 1e-6;     // 1/s
-  static constexpr double kGrazing = 1e-6;    // of a guard's range over a step: a peak this close to zero only touches
-  static constexpr double kTogether = 4e-9;   // of a step: roots this close on the dense output are one instant
+  static constexpr double kGrazing =
+      1e-6;  // of a guard's range over a step: a peak this close to zero only touches
+  static constexpr double kTogether =
+      4e-9;  // of a step: roots this close on the dense output are one instant
 
   /// Signed so that every guard fires upwards: G < 0 is the safe side.
   bool evaluate(const S& t, const State<S, N>& y, double* G) const {
@@ -260,10 +274,10 @@ class Run {
     return all_finite;
   }
 
-  /// Arms the guards at the start of a phase. One on its safe side is armed. One at zero (its crossing lies within
-  /// kAtZero of now) is armed if it leaves for the safe side and fires at once, returning its index, if it goes on
-  /// through, unless the mode is as before and it has not been safe since it last fired. One on its unsafe side waits
-  /// until it has been seen on the safe side.
+  /// Arms the guards at the start of a phase. One on its safe side is armed. One at zero (its crossing lies
+  /// within kAtZero of now) is armed if it leaves for the safe side and fires at once, returning its index,
+  /// if it goes on through, unless the mode is as before and it has not been safe since it last fired. One on
+  /// its unsafe side waits until it has been seen on the safe side.
   int arm(const Entry<S, N>& entry, bool same_mode) {
     if (guards_ == 0) return -1;
     double G[kMaxGuards];
@@ -292,8 +306,8 @@ class Run {
     return immediate;
   }
 
-  /// CVODE restarts with order one, and its interpolant errs by the absolute tolerance: a guard that returns sooner
-  /// than that resolves needs short steps until it has. The return is judged by dG/dt and its rate.
+  /// CVODE restarts with order one, and its interpolant errs by the absolute tolerance: a guard that returns
+  /// sooner than that resolves needs short steps until it has. The return is judged by dG/dt and its rate.
   void resolve_return(const Entry<S, N>& entry, int guard, double rate) {
     constexpr double kAhead = 1e-7;  // s
     State<double, N> y, dy{};
@@ -319,7 +333,8 @@ class Run {
     State<Dual, N> yd;
     for (int i = 0; i < N; ++i) yd[i] = Dual(y[i]);
     Dual still[kMaxGuards], moving[kMaxGuards];
-    // The parameters of the system may carry derivatives of their own: they must not be taken for those along the flow.
+    // The parameters of the system may carry derivatives of their own: they must not be taken for those along
+    // the flow.
     if constexpr (!std::is_same_v<S, double>) system_.guards(phase_, Dual(t), yd, still);
     for (int i = 0; i < N; ++i) yd[i].v[0] = dy[i];
     system_.guards(phase_, independent(t, 0), yd, moving);
@@ -381,19 +396,22 @@ class Run {
     if (first.guard >= 0)  // what the guards did after the root did not happen
       for (int i = 0; i < guards_; ++i) {
         armed_[i] = armed_before[i];
-        for (int node = 1; node <= 3 && kNode[node] <= earliest; ++node) armed_[i] = armed_[i] || G[node][i] < 0;
+        for (int node = 1; node <= 3 && kNode[node] <= earliest; ++node)
+          armed_[i] = armed_[i] || G[node][i] < 0;
       }
     return true;
   }
 
-  /// Whether the guard is at zero at this node only because it turns back there; then the search for peaks judges it.
+  /// Whether the guard is at zero at this node only because it turns back there; then the search for peaks
+  /// judges it.
   bool touches(const Stepper<S, N>& stepper, const double (*G)[kMaxGuards], int guard, int node) const {
     const double range = range_of(G, guard);
     if (G[node][guard] > kGrazing * range || !(G[node - 1][guard] < 0)) return false;
     if (node < 3) return G[node + 1][guard] < 0;
     const double bend = G[3][guard] - 2 * G[2][guard] + G[1][guard];
     const double length = value_of(stepper.t1()) - value_of(stepper.t0());
-    return bend < 0 && guard_slopes({phase_.mode, stepper.t1(), stepper.y1(), S(0)})[guard] * length < 2e-3 * range;
+    return bend < 0 &&
+           guard_slopes({phase_.mode, stepper.t1(), stepper.y1(), S(0)})[guard] * length < 2e-3 * range;
   }
 
   static double range_of(const double (*G)[kMaxGuards], int i) {
@@ -412,8 +430,8 @@ class Run {
     return G[guard];
   }
 
-  /// The guard began at zero and is unsafe at a node: its excursion to the safe side, if any, ended in between. False
-  /// if it has not set out yet: what an event leaves of a guard takes an instant to pass.
+  /// The guard began at zero and is unsafe at a node: its excursion to the safe side, if any, ended in
+  /// between. False if it has not set out yet: what an event leaves of a guard takes an instant to pass.
   bool shrink_to_first_excursion(Stepper<S, N>& stepper, Bracket& bracket) {
     double theta = bracket.unsafe;
     for (int k = 0; k < 200; ++k) {
@@ -428,10 +446,12 @@ class Run {
     return begin_of_rise(stepper, bracket);
   }
 
-  /// There was no excursion, or one too small for the dense output: the root is where the guard rises from then on.
+  /// There was no excursion, or one too small for the dense output: the root is where the guard rises from
+  /// then on.
   bool begin_of_rise(Stepper<S, N>& stepper, Bracket& bracket) const {
     if (!(slope_at(stepper, bracket.unsafe, bracket.guard) > 0)) return false;
-    for (int k = 0; k < 200 && slope_at(stepper, 0.5 * bracket.unsafe, bracket.guard) > 0; ++k) bracket.unsafe *= 0.5;
+    for (int k = 0; k < 200 && slope_at(stepper, 0.5 * bracket.unsafe, bracket.guard) > 0; ++k)
+      bracket.unsafe *= 0.5;
     bracket.safe = bracket.unsafe;
     return true;
   }
@@ -442,8 +462,8 @@ class Run {
     return guard_slopes(at)[guard];
   }
 
-  /// Between safe nodes the cubic through the four may still pass zero twice. `true`, with the bracket, if the guard
-  /// really does after `safe_from` and, where a crossing is `known`, before that one.
+  /// Between safe nodes the cubic through the four may still pass zero twice. `true`, with the bracket, if
+  /// the guard really does after `safe_from` and, where a crossing is `known`, before that one.
   bool find_hidden_peak(Stepper<S, N>& stepper, const double (*G)[kMaxGuards], double safe_from, bool known,
                         Bracket& bracket) {
     const int i = bracket.guard;
@@ -471,11 +491,16 @@ class Run {
       if (!(roots[k] > 3 * from && roots[k] < 3 * to) || q1 + 2 * q2 * roots[k] >= 0) continue;
       double peak = std::min(roots[k] / 3, 1.0), width = 1.0 / 12;
       double best = sample_one(stepper, peak, i) / range;
-      for (int refine = 0; refine < 12 && best <= kGrazing; ++refine, width *= 0.5)  // climb to the true maximum
+      for (int refine = 0; refine < 12 && best <= kGrazing;
+           ++refine, width *= 0.5)  // climb to the true maximum
         for (const double trial : {peak - width, peak + width}) {
           if (trial <= from || trial >= std::min(to, 1.0)) continue;
           const double value = sample_one(stepper, trial, i) / range;
-          if (value > best) { best = value; peak = trial; break; }
+          if (value > best) {
+            best = value;
+            peak = trial;
+            break;
+          }
         }
       if (best > kGrazing) {
         bracket.unsafe = peak;
@@ -489,10 +514,12 @@ class Run {
     return false;
   }
 
-  /// Narrows the bracket on the dense output (Illinois' false position, safeguarded) and returns the root's fraction.
+  /// Narrows the bracket on the dense output (Illinois' false position, safeguarded) and returns the root's
+  /// fraction.
   double bisect(Stepper<S, N>& stepper, Bracket& bracket) {
     double a = bracket.safe, b = bracket.unsafe;
-    double Ga = a > 0 ? sample_one(stepper, a, bracket.guard) : std::min(sample_one(stepper, a, bracket.guard), 0.0);
+    double Ga =
+        a > 0 ? sample_one(stepper, a, bracket.guard) : std::min(sample_one(stepper, a, bracket.guard), 0.0);
     double Gb = sample_one(stepper, b, bracket.guard);
     double wa = Ga, wb = Gb;
     for (int k = 0; k < 80 && b - a > 1e-9 * b && Gb > 0; ++k) {
@@ -514,8 +541,8 @@ class Run {
     return b;
   }
 
-  /// The root with true steps instead of the interpolant; with Dual, one Newton step carries the derivatives of the
-  /// event's time: dt*/dp = −(g_y dy/dp + g_p)/(dg/dt).
+  /// The root with true steps instead of the interpolant; with Dual, one Newton step carries the derivatives
+  /// of the event's time: dt*/dp = −(g_y dy/dp + g_p)/(dg/dt).
   Entry<S, N> polish(Stepper<S, N>& stepper, const Bracket& bracket) {
     const double t0 = value_of(stepper.t0()), length = value_of(stepper.t1()) - t0;
     double h = bracket.unsafe * length;
@@ -550,8 +577,10 @@ class Run {
   }
 
   static void retake(Stepper<S, N>& stepper, double h, State<S, N>& y) {
-    if (h > 0) stepper.retake(h, y);
-    else y = stepper.y0();
+    if (h > 0)
+      stepper.retake(h, y);
+    else
+      y = stepper.y0();
   }
 
   void add_root_derivative(int guard, Entry<S, N>& root) const {
@@ -577,8 +606,8 @@ class Run {
                             shortest_step(value_of(events[n - 1].t));
   }
 
-  /// A pattern of 1 to kLongestCycle guards that repeats in intervals shrinking by a stable ratio r accumulates at
-  /// t + D r/(1 − r), D the last interval ([Johansson1999], [Heymann2005] on Zeno executions).
+  /// A pattern of 1 to kLongestCycle guards that repeats in intervals shrinking by a stable ratio r
+  /// accumulates at t + D r/(1 − r), D the last interval ([Johansson1999], [Heymann2005] on Zeno executions).
   void leave_zeno(int guard, Departure& departure) {
     const auto& events = solution_.events;
     const int n = static_cast<int>(events.size());
@@ -595,10 +624,12 @@ class Run {
       if (!(r < 1 - 1e-3) || std::abs(r - r1) > drift || std::abs(r1 - r2) > drift) continue;
       double left = 0;
       for (int i = 0; i < N; ++i)
-        left = std::max(left, std::abs(value_of(events[n - 1].y[i] - events[n - 1 - period].y[i])) * r / (1 - r));
+        left = std::max(left,
+                        std::abs(value_of(events[n - 1].y[i] - events[n - 1 - period].y[i])) * r / (1 - r));
       if (left > options_.zeno_tolerance) continue;
       const S remaining = [&] {
-        const S d0 = events[n - 1].t - events[n - 1 - period].t, d1 = events[n - 1 - period].t - events[n - 1 - 2 * period].t;
+        const S d0 = events[n - 1].t - events[n - 1 - period].t,
+                d1 = events[n - 1 - period].t - events[n - 1 - 2 * period].t;
         const S ratio = d0 / d1;
         return S(d0 * ratio / (1.0 - ratio));
       }();
@@ -624,7 +655,8 @@ class Run {
       if (j >= period) continue;
       for (int k = 1; k < 4; ++k) {
         const auto& earlier = events[n - 1 - j - k * period];
-        if (earlier.kind != EventKind::guard || earlier.index != later.index || earlier.mode_before != later.mode_before)
+        if (earlier.kind != EventKind::guard || earlier.index != later.index ||
+            earlier.mode_before != later.mode_before)
           return false;
       }
     }
@@ -641,16 +673,19 @@ class Run {
     if (!options_.record) return;
     const double whole = value_of(stepper.t1()) - value_of(stepper.t0());
     const double part = whole > 0 ? (value_of(until) - value_of(stepper.t0())) / whole : 0.0;
-    // The nodes lie at fixed fractions of the step: their times have the derivatives of the step, not of `until`.
+    // The nodes lie at fixed fractions of the step: their times have the derivatives of the step, not of
+    // `until`.
     S last = until;
-    if constexpr (!std::is_same_v<S, double>) last.v = (stepper.t0() + part * (stepper.t1() - stepper.t0())).v;
+    if constexpr (!std::is_same_v<S, double>)
+      last.v = (stepper.t0() + part * (stepper.t1() - stepper.t0())).v;
     TrajectoryPiece<S, N> piece{stepper.t0(), last, phase_, {}};
     for (int k = 0; k < 5; ++k) stepper.interpolate(0.25 * k * part, piece.nodes[k]);
     solution_.trajectory.pieces.push_back(piece);
   }
 
   /// The first instants of an entry, or the last ones before an event, that a transition knew in closed form.
-  void record_straight(const Phase& phase, const S& t0, const State<S, N>& y0, const S& t1, const State<S, N>& y1) {
+  void record_straight(const Phase& phase, const S& t0, const State<S, N>& y0, const S& t1,
+                       const State<S, N>& y1) {
     if (!options_.record || !(value_of(t1) > value_of(t0))) return;
     TrajectoryPiece<S, N> piece{t0, t1, phase, {}};
     for (int k = 0; k < 5; ++k)
@@ -699,20 +734,28 @@ class Run {
 template <class S, int N>
 Solution<S, N> integrate(const HybridSystem<N>& system, const Entry<S, N>& start, const S& t_end,
                          const IntegratorOptions& options) {
-  if (!std::isfinite(value_of(start.t)) || !std::isfinite(value_of(t_end)) || value_of(t_end) < value_of(start.t))
-    throw std::invalid_argument(fmt::format("integrate: t_end = {} s must be finite and not before the start, {} s",
-                                            value_of(t_end), value_of(start.t)));
+  if (!std::isfinite(value_of(start.t)) || !std::isfinite(value_of(t_end)) ||
+      value_of(t_end) < value_of(start.t))
+    throw std::invalid_argument(
+        fmt::format("integrate: t_end = {} s must be finite and not before the start, {} s", value_of(t_end),
+                    value_of(start.t)));
   for (int i = 0; i < N; ++i)
     if (!std::isfinite(value_of(start.y[i])))
       throw std::invalid_argument(fmt::format("integrate: component {} of the start is not finite", i));
   return Run<S, N>(system, options)(start, t_end);
 }
 
-template Solution<double, 2> integrate(const HybridSystem<2>&, const Entry<double, 2>&, const double&, const IntegratorOptions&);
-template Solution<double, 6> integrate(const HybridSystem<6>&, const Entry<double, 6>&, const double&, const IntegratorOptions&);
-template Solution<double, 7> integrate(const HybridSystem<7>&, const Entry<double, 7>&, const double&, const IntegratorOptions&);
-template Solution<Dual, 2> integrate(const HybridSystem<2>&, const Entry<Dual, 2>&, const Dual&, const IntegratorOptions&);
-template Solution<Dual, 6> integrate(const HybridSystem<6>&, const Entry<Dual, 6>&, const Dual&, const IntegratorOptions&);
-template Solution<Dual, 7> integrate(const HybridSystem<7>&, const Entry<Dual, 7>&, const Dual&, const IntegratorOptions&);
+template Solution<double, 2> integrate(const HybridSystem<2>&, const Entry<double, 2>&, const double&,
+                                       const IntegratorOptions&);
+template Solution<double, 6> integrate(const HybridSystem<6>&, const Entry<double, 6>&, const double&,
+                                       const IntegratorOptions&);
+template Solution<double, 7> integrate(const HybridSystem<7>&, const Entry<double, 7>&, const double&,
+                                       const IntegratorOptions&);
+template Solution<Dual, 2> integrate(const HybridSystem<2>&, const Entry<Dual, 2>&, const Dual&,
+                                     const IntegratorOptions&);
+template Solution<Dual, 6> integrate(const HybridSystem<6>&, const Entry<Dual, 6>&, const Dual&,
+                                     const IntegratorOptions&);
+template Solution<Dual, 7> integrate(const HybridSystem<7>&, const Entry<Dual, 7>&, const Dual&,
+                                     const IntegratorOptions&);
 
 }  // namespace unhand::dynamics

@@ -14,8 +14,8 @@ namespace unhand::dynamics {
 struct IntegratorOptions {
   Method method{Method::automatic};
   Tolerances tolerances;
-  /// Longest step [s]; guards are sampled at thirds of a step and through the cubic in between, so two roots closer
-  /// than about a ninth of this may be missed.
+  /// Longest step [s]; guards are sampled at thirds of a step and through the cubic in between, so two roots
+  /// closer than about a ninth of this may be missed.
   double longest_step{5e-3};
   long step_budget{200'000};
   int event_budget{10'000};
@@ -27,14 +27,14 @@ struct IntegratorOptions {
 
 /// How an integration ended. Only the first two are answers; the rest say why there is none.
 enum class Outcome {
-  finished,            ///< a mode of kind `finished` was entered
-  horizon,             ///< t_end was reached
-  zeno,                ///< events accumulate at the returned time and the system knows no state there
+  finished,  ///< a mode of kind `finished` was entered
+  horizon,   ///< t_end was reached
+  zeno,      ///< events accumulate at the returned time and the system knows no state there
   event_budget_spent,
   step_budget_spent,
-  mode_cycle,          ///< no mode is consistent at the returned instant
+  mode_cycle,  ///< no mode is consistent at the returned instant
   step_too_small,
-  not_finite,          ///< a flow or a guard returned NaN or infinity
+  not_finite,  ///< a flow or a guard returned NaN or infinity
 };
 const char* to_string(Outcome);
 
@@ -52,7 +52,8 @@ struct Event {
 
 struct IntegratorStatistics {
   long steps{}, rejected_steps{}, flow_evaluations{};
-  int grazings{};  ///< guards that came within tolerance of zero without passing it: derivatives there are one-sided
+  int grazings{};  ///< guards that came within tolerance of zero without passing it: derivatives there are
+                   ///< one-sided
 };
 
 template <class S, int N>
@@ -68,11 +69,12 @@ struct Solution {
 
 /// Integrates from `start` to `t_end` [s] or to a finished mode.
 ///
-/// Events fire once, on (t0, t1], at the earliest root; roots found on the dense output are polished with true steps.
-/// Guards that fire together are handled in the order of their indices, each transition deciding anew. A guard that is
-/// at zero when a phase begins is armed once it has been seen on its safe side. Time events are stepped to exactly.
-/// Instantiated for N = 2, 6, 7 with double and Dual. Throws std::invalid_argument when `start` is not finite, t_end
-/// lies before it, or derivatives are asked of a method that has none.
+/// Events fire once, on (t0, t1], at the earliest root; roots found on the dense output are polished with
+/// true steps. Guards that fire together are handled in the order of their indices, each transition deciding
+/// anew. A guard that is at zero when a phase begins is armed once it has been seen on its safe side. Time
+/// events are stepped to exactly. Instantiated for N = 2, 6, 7 with double and Dual. Throws
+/// std::invalid_argument when `start` is not finite, t_end lies before it, or derivatives are asked of a
+/// method that has none.
 template <class S, int N>
 Solution<S, N> integrate(const HybridSystem<N>& system, const Entry<S, N>& start, const S& t_end,
                          const IntegratorOptions& options = {});

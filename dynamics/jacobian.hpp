@@ -7,11 +7,13 @@
 
 namespace unhand::dynamics {
 
-/// ∂f/∂y into `J` and ∂f/∂t into `ft` at (t, y), values of f into `f`; one Dual evaluation, and one more to take away
-/// what the system's parameters carry if they are `seeded` with derivatives of their own. N <= kDualSize − 1.
+/// ∂f/∂y into `J` and ∂f/∂t into `ft` at (t, y), values of f into `f`; one Dual evaluation, and one more to
+/// take away what the system's parameters carry if they are `seeded` with derivatives of their own. N <=
+/// kDualSize − 1.
 template <int N>
 void flow_jacobian(const HybridSystem<N>& system, const Phase& phase, double t, const State<double, N>& y,
-                   State<double, N>& f, Eigen::Matrix<double, N, N>& J, State<double, N>& ft, bool seeded = false) {
+                   State<double, N>& f, Eigen::Matrix<double, N, N>& J, State<double, N>& ft,
+                   bool seeded = false) {
   static_assert(N + 1 <= kDualSize);
   State<Dual, N> yd, fd, own;
   if (seeded) {

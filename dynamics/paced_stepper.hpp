@@ -7,9 +7,10 @@ namespace unhand::dynamics {
 
 /// The system in σ, dt/dσ = pace(t, y) (a Sundman transformation): state (y, t), no explicit dependence on σ.
 ///
-/// Where y' = F(u/|u|) with u a part of y, the Jacobian grows as 1/|u|; with the pace |u| the right-hand side becomes
-/// |u| F(u/|u|), homogeneous of degree one and regular down to u = 0, which is now reached exponentially in σ: nothing
-/// can step over it, and errors relative to |u| cost the same number of steps at every scale.
+/// Where y' = F(u/|u|) with u a part of y, the Jacobian grows as 1/|u|; with the pace |u| the right-hand side
+/// becomes |u| F(u/|u|), homogeneous of degree one and regular down to u = 0, which is now reached
+/// exponentially in σ: nothing can step over it, and errors relative to |u| cost the same number of steps at
+/// every scale.
 template <int N>
 class PacedSystem final : public HybridSystem<N + 1> {
  public:
@@ -22,14 +23,26 @@ class PacedSystem final : public HybridSystem<N + 1> {
   Guard guard(int, int) const override { return {}; }
   void time_events(std::vector<double>& out) const override { out.clear(); }
   void time_events(std::vector<Dual>& out) const override { out.clear(); }
-  void flow(const Phase&, double, const State<double, N + 1>& y, State<double, N + 1>& dy) const override { flow_(y, dy); }
-  void flow(const Phase&, const Dual&, const State<Dual, N + 1>& y, State<Dual, N + 1>& dy) const override { flow_(y, dy); }
+  void flow(const Phase&, double, const State<double, N + 1>& y, State<double, N + 1>& dy) const override {
+    flow_(y, dy);
+  }
+  void flow(const Phase&, const Dual&, const State<Dual, N + 1>& y, State<Dual, N + 1>& dy) const override {
+    flow_(y, dy);
+  }
   void guards(const Phase&, double, const State<double, N + 1>&, double*) const override {}
   void guards(const Phase&, const Dual&, const State<Dual, N + 1>&, Dual*) const override {}
-  Entry<double, N + 1> on_guard(const Phase&, int, double, const State<double, N + 1>&) const override { return {}; }
-  Entry<Dual, N + 1> on_guard(const Phase&, int, const Dual&, const State<Dual, N + 1>&) const override { return {}; }
-  Entry<double, N + 1> on_time(int, const Window&, double, const State<double, N + 1>&) const override { return {}; }
-  Entry<Dual, N + 1> on_time(int, const Window&, const Dual&, const State<Dual, N + 1>&) const override { return {}; }
+  Entry<double, N + 1> on_guard(const Phase&, int, double, const State<double, N + 1>&) const override {
+    return {};
+  }
+  Entry<Dual, N + 1> on_guard(const Phase&, int, const Dual&, const State<Dual, N + 1>&) const override {
+    return {};
+  }
+  Entry<double, N + 1> on_time(int, const Window&, double, const State<double, N + 1>&) const override {
+    return {};
+  }
+  Entry<Dual, N + 1> on_time(int, const Window&, const Dual&, const State<Dual, N + 1>&) const override {
+    return {};
+  }
 
   void error_scale(const Phase&, const Tolerances& tolerances, const State<double, N + 1>& y0,
                    const State<double, N + 1>& y1, State<double, N + 1>& scale) const override {
@@ -72,7 +85,8 @@ class PacedStepper final : public Stepper<S, N> {
     augmented[N] = t;
     this->t1_ = t;
     this->y1_ = y;
-    inner_->suggest(first_length(value_of(t), values<S, N>(y)));  // the last phase's length in σ says nothing here
+    inner_->suggest(
+        first_length(value_of(t), values<S, N>(y)));  // the last phase's length in σ says nothing here
     inner_->start(system_, phase, S(0), augmented);
   }
 
@@ -84,6 +98,15 @@ class PacedStepper final : public Stepper<S, N> {
     count();
     if (status != StepStatus::accepted) return status;
     if (value_of(inner_->y1()[N]) < value_of(limit)) {
+      if constexpr (!std::is_same_v<S, double>) {
+        // The length in σ is taken to depend on the parameters so that the step ends at the same t for all of
+        // them: at fixed σ, derivatives along the flow would grow with the slip and drown the rest.
+        State<S, N + 1> end = inner_->y1(), rate;
+        system_.flow(system_.phase, S(0), end, rate);
+        for (int i = 0; i < N; ++i) end[i].v -= (value_of(rate[i]) / value_of(rate[N])) * end[N].v;
+        end[N].v.setZero();
+        inner_->redirect(end);
+      }
       this->t1_ = inner_->y1()[N];
       this->y1_ = PacedSystem<N>::state(inner_->y1());
       return value_of(this->t1_) > value_of(this->t0_) ? StepStatus::accepted : StepStatus::too_small;
@@ -95,7 +118,8 @@ class PacedStepper final : public Stepper<S, N> {
 
   void interpolate(double theta, State<S, N>& y) const override {
     State<S, N + 1> augmented;
-    inner_->interpolate(fraction_at(value_of(this->t0_) + theta * (value_of(this->t1_) - value_of(this->t0_))), augmented);
+    inner_->interpolate(
+        fraction_at(value_of(this->t0_) + theta * (value_of(this->t1_) - value_of(this->t0_))), augmented);
     y = PacedSystem<N>::state(augmented);
   }
 

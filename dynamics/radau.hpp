@@ -1,4 +1,5 @@
-// Radau IIA of order 5, L-stable and stiffly accurate: the stepper of stiff flows, in values and in derivatives.
+// Radau IIA of order 5, L-stable and stiffly accurate: the stepper of stiff flows, in values and in
+// derivatives.
 #pragma once
 
 #include <Eigen/LU>
@@ -10,15 +11,16 @@
 
 namespace unhand::dynamics {
 
-/// Three-stage collocation at c = (4 ∓ √6)/10, 1, [HairerWanner1996] IV.8. The stage equations are transformed so that
-/// a real and a complex N × N system take the place of one of 3N, and solved by simplified Newton iterations with one
-/// exact Jacobian a step, started from the last step's collocation polynomial. The error estimate is of order 3, the
-/// dense output the collocation polynomial.
+/// Three-stage collocation at c = (4 ∓ √6)/10, 1, [HairerWanner1996] IV.8. The stage equations are
+/// transformed so that a real and a complex N × N system take the place of one of 3N, and solved by
+/// simplified Newton iterations with one exact Jacobian a step, started from the last step's collocation
+/// polynomial. The error estimate is of order 3, the dense output the collocation polynomial.
 ///
-/// Its stages are of high order themselves, so it keeps long steps where a flow follows a slowly moving equilibrium of
-/// its stiff part, as slip does, and where the linearisation at the start of a step (all that a Rosenbrock method knows)
-/// does not hold to its end. With S = Dual the iteration runs until the derivatives stand still too: by the implicit
-/// function theorem they are then those of the discrete solution, exactly, for the price of first derivatives only.
+/// Its stages are of high order themselves, so it keeps long steps where a flow follows a slowly moving
+/// equilibrium of its stiff part, as slip does, and where the linearisation at the start of a step (all that
+/// a Rosenbrock method knows) does not hold to its end. With S = Dual the iteration runs until the
+/// derivatives stand still too: by the implicit function theorem they are then those of the discrete
+/// solution, exactly, for the price of first derivatives only.
 template <class S, int N>
 class Radau final : public SingleStep<Radau<S, N>, S, N> {
  public:
@@ -28,12 +30,15 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
 
   void prepare(bool fresh) {
     State<double, N> ft;
-    flow_jacobian<N>(*this->system_, this->phase_, value_of(this->t0_), values<S, N>(this->y0_), f0_value_, jacobian_, ft,
-                     !std::is_same_v<S, double>);
+    flow_jacobian<N>(*this->system_, this->phase_, value_of(this->t0_), values<S, N>(this->y0_), f0_value_,
+                     jacobian_, ft, !std::is_same_v<S, double>);
     ++this->flow_evaluations_;
-    if constexpr (std::is_same_v<S, double>) f0_ = f0_value_;
-    else this->flow(this->t0_, this->y0_, f0_);
-    this->system_->error_scale(this->phase_, this->tolerances_, values<S, N>(this->y0_), values<S, N>(this->y0_), scale_);
+    if constexpr (std::is_same_v<S, double>)
+      f0_ = f0_value_;
+    else
+      this->flow(this->t0_, this->y0_, f0_);
+    this->system_->error_scale(this->phase_, this->tolerances_, values<S, N>(this->y0_),
+                               values<S, N>(this->y0_), scale_);
     extrapolate_ = !fresh;
     refine_ = fresh;
     factored_ = 0;
@@ -44,7 +49,8 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
     Stages z = start_values(h);
     if (!solve(h, z)) {
       extrapolate_ = false;
-      return finite_ ? 32 : std::numeric_limits<double>::quiet_NaN();  // no convergence: shorten by about half
+      return finite_ ? 32
+                     : std::numeric_limits<double>::quiet_NaN();  // no convergence: shorten by about half
     }
     for (int i = 0; i < N; ++i) this->y1_[i] = this->y0_[i] + z[2][i];
     double error = estimate(h, z);
@@ -83,9 +89,10 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
   static constexpr double kC[3] = {(4 - kRoot6) / 10, (4 + kRoot6) / 10, 1};
   // The eigenvalues of the inverse Runge-Kutta matrix, γ and α ± iβ, and the transformation that shows them.
   static constexpr double kGamma = 3.637834252744496, kAlpha = 2.681082873627752, kBeta = 3.050430199247411;
-  static constexpr double kT[3][3] = {{9.1232394870892942792e-02, -0.14125529502095420843, -3.0029194105147424492e-02},
-                                      {0.24171793270710701896, 0.20412935229379993199, 0.38294211275726193779},
-                                      {0.96604818261509293619, 1, 0}};
+  static constexpr double kT[3][3] = {
+      {9.1232394870892942792e-02, -0.14125529502095420843, -3.0029194105147424492e-02},
+      {0.24171793270710701896, 0.20412935229379993199, 0.38294211275726193779},
+      {0.96604818261509293619, 1, 0}};
   static constexpr double kInverse[3][3] = {
       {4.3255798900631553510, 0.33919925181580986954, 0.54177053993587487119},
       {-4.1787185915519047273, -0.32768282076106238708, 0.47662355450055045196},
@@ -103,7 +110,8 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
     const double l1 = theta * (theta - b) * (theta - 1) / (a * (a - b) * (a - 1));
     const double l2 = theta * (theta - a) * (theta - 1) / (b * (b - a) * (b - 1));
     const double l3 = theta * (theta - a) * (theta - b) / ((1 - a) * (1 - b));
-    for (int i = 0; i < N; ++i) y[i] = start_[i] + l1 * accepted_[0][i] + l2 * accepted_[1][i] + l3 * accepted_[2][i];
+    for (int i = 0; i < N; ++i)
+      y[i] = start_[i] + l1 * accepted_[0][i] + l2 * accepted_[1][i] + l3 * accepted_[2][i];
   }
 
   Stages start_values(const S& h) const {
@@ -136,12 +144,14 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
     // A fiftieth of the error tolerance, or what rounding leaves.
     double target = 0.02;
     for (int i = 0; i < N; ++i)
-      target = std::max(target, 1e-14 * (std::abs(value_of(this->y0_[i])) + std::abs(hv * f0_value_[i])) / scale_[i]);
+      target = std::max(target,
+                        1e-14 * (std::abs(value_of(this->y0_[i])) + std::abs(hv * f0_value_[i])) / scale_[i]);
     Stages w, f;
     transform(kInverse, z, w);
     double before = 0, contraction = 0.5;
     bool values_converged = false;
-    for (int iteration = 0; iteration < (values_converged ? kMaxDualIterations : kMaxIterations); ++iteration) {
+    for (int iteration = 0; iteration < (values_converged ? kMaxDualIterations : kMaxIterations);
+         ++iteration) {
       for (int k = 0; k < 3; ++k) {
         State<S, N> y;
         for (int i = 0; i < N; ++i) y[i] = this->y0_[i] + z[k][i];
@@ -174,7 +184,9 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
             if (p == 0) {
               moved += (add[k] / scale_[i]) * (add[k] / scale_[i]);
             } else {
-              derivative_moved = std::max(derivative_moved, std::abs(add[k]) / (1e-3 + std::abs(now) + std::abs(part(this->y0_[i], p))));
+              derivative_moved =
+                  std::max(derivative_moved,
+                           std::abs(add[k]) / (1e-3 + std::abs(now) + std::abs(part(this->y0_[i], p))));
               derivative_size = std::max(derivative_size, std::abs(now));
             }
           }
@@ -201,55 +213,45 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
     }
   }
 
-  /// The error estimate in units of the tolerance: of the values and, with Dual, of every derivative, which may err by
-  /// the same fraction of its own size. (The derivatives of a discrete solution that is good to the tolerance need not
-  /// be: where a flow amplifies, as slip does at its onset, they are worse by orders of magnitude.)
   double estimate(const S& h, const Stages& z) {
-    const S inverse = 1.0 / h;
-    State<S, N> combined;
+    const double hv = value_of(h);
+    Eigen::Matrix<double, N, 1> combined, e;
+    State<double, N> error;
     for (int i = 0; i < N; ++i)
-      combined[i] = inverse * (kError[0] * z[0][i] + kError[1] * z[1][i] + kError[2] * z[2][i]);
-    double size = filtered(combined, f0_);
+      combined[i] =
+          (kError[0] * value_of(z[0][i]) + kError[1] * value_of(z[1][i]) + kError[2] * value_of(z[2][i])) /
+          hv;
+    for (int i = 0; i < N; ++i) e[i] = combined[i] + f0_value_[i];
+    e = real_.solve(e).eval();
+    for (int i = 0; i < N; ++i) error[i] = e[i];
+    double size = scaled(error);
     // On transients, where the estimate of a very stiff flow is too large: once more through the flow.
     if (size > 1 && refine_) {
-      State<S, N> y, f;
-      for (int i = 0; i < N; ++i) y[i] = this->y0_[i] + error_[i];
+      State<S, N> y;
+      State<S, N> f;
+      for (int i = 0; i < N; ++i) y[i] = this->y0_[i] + error[i];
       this->flow(this->t0_, y, f);
-      const double again = filtered(combined, f);
+      for (int i = 0; i < N; ++i) e[i] = combined[i] + value_of(f[i]);
+      e = real_.solve(e).eval();
+      for (int i = 0; i < N; ++i) error[i] = e[i];
+      const double again = scaled(error);
       if (std::isfinite(again)) size = again;
     }
     return size;
   }
 
-  /// Solves for the error of the last attempt and returns its size.
-  double filtered(const State<S, N>& combined, const State<S, N>& f) {
-    Eigen::Matrix<double, N, kParts> e;
-    for (int i = 0; i < N; ++i)
-      for (int p = 0; p < kParts; ++p) e(i, p) = part(combined[i], p) + part(f[i], p);
-    e = real_.solve(e).eval();
+  double scaled(const State<double, N>& error) const {
     State<double, N> scale;
-    this->system_->error_scale(this->phase_, this->tolerances_, values<S, N>(this->y0_), values<S, N>(this->y1_), scale);
-    double worst = 0, value_size = 0;
-    for (int p = 0; p < kParts; ++p) {
-      State<double, N> error;
-      double largest = 0;
-      for (int i = 0; i < N; ++i) {
-        error[i] = e(i, p);
-        set_part(error_[i], p, e(i, p));
-        largest = std::max({largest, std::abs(part(this->y0_[i], p)) / scale[i], std::abs(part(this->y1_[i], p)) / scale[i]});
-      }
-      if (p == 0) value_size = largest;
-      if (largest == 0) continue;
-      worst = std::max(worst, scaled_norm<N>(error, scale) * (p == 0 ? 1.0 : value_size / largest));
-    }
-    return worst;
+    this->system_->error_scale(this->phase_, this->tolerances_, values<S, N>(this->y0_),
+                               values<S, N>(this->y1_), scale);
+    return scaled_norm<N>(error, scale);
   }
 
   Matrix jacobian_;
   Eigen::PartialPivLU<Matrix> real_;
   Eigen::PartialPivLU<ComplexMatrix> complex_;
   State<double, N> f0_value_{}, scale_{};
-  State<S, N> f0_{}, start_{}, error_{};
+  State<S, N> f0_{}, start_{};
   Stages accepted_{};
   S h_before_{};
   double factored_{};

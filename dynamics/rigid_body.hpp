@@ -7,14 +7,18 @@ namespace unhand::dynamics {
 
 /// Mass m [kg] and moment of inertia I about the CoM, out of the plane [kg m²]; both > 0.
 template <class S>
-struct RigidBody { S mass{}, inertia{}; };
+struct RigidBody {
+  S mass{}, inertia{};
+};
 
 /// The gravity vector of a level base: (0, −g) [m/s²].
 template <class S>
-Vec2<S> level_gravity(const S& g) { return {S(0), -g}; }
+Vec2<S> level_gravity(const S& g) {
+  return {S(0), -g};
+}
 
-/// M a_O = Gᵀ f_C + m g: acceleration of the CoM under the wrench `patch` about the patch [N, N, N m] and gravity
-/// [m/s²]. [LiuBillard2025] Eq. 18, whose printed gravity entry −g is, as a wrench, −m g.
+/// M a_O = Gᵀ f_C + m g: acceleration of the CoM under the wrench `patch` about the patch [N, N, N m] and
+/// gravity [m/s²]. [LiuBillard2025] Eq. 18, whose printed gravity entry −g is, as a wrench, −m g.
 template <class S>
 Acceleration<S> acceleration_under(const RigidBody<S>& body, const Wrench<S>& patch, const Vec2<S>& r,
                                    const Vec2<S>& gravity) {

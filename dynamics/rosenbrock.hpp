@@ -8,11 +8,11 @@
 
 namespace unhand::dynamics {
 
-/// Rodas5P, [Steinebach2023]: one exact Jacobian, one LU factorisation and eight evaluations a step; no Newton
-/// iteration, so nothing fails to converge. Dense output of order 4. Unlike RODAS ([HairerWanner1996] IV.7) it keeps
-/// its order where the solution follows a slowly moving equilibrium of the stiff part, which is what slip does: there
-/// RODAS needs ten times the steps. Values only: the tangent of a Rosenbrock step would need the derivative of its
-/// Jacobian (Radau carries derivatives through stiff phases).
+/// Rodas5P, [Steinebach2023]: one exact Jacobian, one LU factorisation and eight evaluations a step; no
+/// Newton iteration, so nothing fails to converge. Dense output of order 4. Unlike RODAS ([HairerWanner1996]
+/// IV.7) it keeps its order where the solution follows a slowly moving equilibrium of the stiff part, which
+/// is what slip does: there RODAS needs ten times the steps. Values only: the tangent of a Rosenbrock step
+/// would need the derivative of its Jacobian (Radau carries derivatives through stiff phases).
 template <int N>
 class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
  public:
@@ -38,7 +38,8 @@ class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
     if (!bent_) bend();
     const double s1 = 1 - s;
     for (int i = 0; i < N; ++i)
-      y[i] = s1 * this->y0_[i] + s * (this->y1_[i] + s1 * (bend_[0][i] + s * (bend_[1][i] + s * bend_[2][i])));
+      y[i] =
+          s1 * this->y0_[i] + s * (this->y1_[i] + s1 * (bend_[0][i] + s * (bend_[1][i] + s * bend_[2][i])));
   }
 
   void retake(double h, State<double, N>& y) override {
@@ -52,23 +53,32 @@ class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
   static constexpr double kGamma = 0.21193756319429014;
   static constexpr double kNode[kStages] = {
       0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716, 0.4288403609558664, 1, 1, 1};
-  static constexpr double kTimeWeight[kStages] = {
-      0.21193756319429014, -0.42387512638858027, -0.3384627126235924, 1.8046452872882734, 2.325825639765069, 0, 0, 0};
-  // Row i: the weights of stages 0 … i − 1 in the argument of stage i; rows 6 and 7 add the stage before with weight 1.
+  static constexpr double kTimeWeight[kStages] = {0.21193756319429014,
+                                                  -0.42387512638858027,
+                                                  -0.3384627126235924,
+                                                  1.8046452872882734,
+                                                  2.325825639765069,
+                                                  0,
+                                                  0,
+                                                  0};
+  // Row i: the weights of stages 0 … i − 1 in the argument of stage i; rows 6 and 7 add the stage before with
+  // weight 1.
   static constexpr double kA[6][5] = {
       {0, 0, 0, 0, 0},
       {3.0, 0, 0, 0, 0},
       {2.849394379747939, 0.45842242204463923, 0, 0, 0},
       {-6.954028509809101, 2.489845061869568, -10.358996098473584, 0, 0},
       {2.8029986275628964, 0.5072464736228206, -0.3988312541770524, -0.04721187230404641, 0},
-      {-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946}};
+      {-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256,
+       0.030198172008377946}};
   static constexpr double kC[kStages][kStages - 1] = {
       {0, 0, 0, 0, 0, 0, 0},
       {-14.155112264123755, 0, 0, 0, 0, 0, 0},
       {-17.97296035885952, -2.859693295451294, 0, 0, 0, 0, 0},
       {147.12150275711716, -1.41221402718213, 71.68940251302358, 0, 0, 0, 0},
       {165.43517024871676, -0.4592823456491126, 42.90938336958603, -5.961986721573306, 0, 0, 0},
-      {24.854864614690072, -3.0009227002832186, 47.4931110020768, 5.5814197821558125, -0.6610691825249471, 0, 0},
+      {24.854864614690072, -3.0009227002832186, 47.4931110020768, 5.5814197821558125, -0.6610691825249471, 0,
+       0},
       {30.91273214028599, -3.1208243349937974, 77.79954646070892, 34.28646028294783, -19.097331116725623,
        -28.087943162872662, 0},
       {37.80277123390563, -3.2571969029072276, 112.26918849496327, 66.9347231244047, -40.06618937091002,

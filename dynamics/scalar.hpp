@@ -1,13 +1,14 @@
-// The scalars of the library: double, and Dual, which carries a value and its derivatives with respect to up to
-// kDualSize parameters. This is the one file that names ceres::Jet (header only; the Ceres solver is not linked).
+// The scalars of the library: double, and Dual, which carries a value and its derivatives with respect to up
+// to kDualSize parameters. This is the one file that names ceres::Jet (header only; the Ceres solver is not
+// linked).
 #pragma once
 
 #include <ceres/jet.h>
 
 namespace unhand::dynamics {
 
-/// Derivatives a Dual carries at once. Eight is what fills the SIMD registers of baseline x86-64 without spilling;
-/// problems with more parameters run in several sweeps.
+/// Derivatives a Dual carries at once. Eight is what fills the SIMD registers of baseline x86-64 without
+/// spilling; problems with more parameters run in several sweeps.
 inline constexpr int kDualSize = 8;
 
 /// A value with its first derivatives: `.a` the value, `.v` the gradient.
@@ -16,7 +17,8 @@ using Dual = ceres::Jet<double, kDualSize>;
 inline double value_of(double x) { return x; }
 inline double value_of(const Dual& x) { return x.a; }
 
-/// Applies a scalar function whose value f and derivative df at value_of(x) are already known (the chain rule).
+/// Applies a scalar function whose value f and derivative df at value_of(x) are already known (the chain
+/// rule).
 inline double chain(double /*x*/, double f, double /*df*/) { return f; }
 inline Dual chain(const Dual& x, double f, double df) { return Dual(f, df * x.v); }
 

@@ -15,8 +15,9 @@ enum class StepStatus {
   not_finite,  ///< the flow returned NaN or infinity however short the step
 };
 
-/// Advances one phase. `start` fixes where; each `step` replaces the last accepted step [t0, t1] by the next one.
-/// With S = Dual, the values choose the step and the derivatives are those of the discrete solution, exactly.
+/// Advances one phase. `start` fixes where; each `step` replaces the last accepted step [t0, t1] by the next
+/// one. With S = Dual, the values choose the step and the derivatives are those of the discrete solution,
+/// exactly.
 template <class S, int N>
 class Stepper {
  public:
@@ -31,12 +32,15 @@ class Stepper {
   /// The state at t0 + θ (t1 − t0) from the dense output of the last step, 0 <= θ <= 1.
   virtual void interpolate(double theta, State<S, N>& y) const = 0;
 
-  /// The last step taken again with the length h <= t1 − t0, without the dense output's error: what event times are
-  /// polished with.
+  /// The last step taken again with the length h <= t1 − t0, without the dense output's error: what event
+  /// times are polished with.
   virtual void retake(double h, State<S, N>& y) = 0;
 
   /// The length with which the next start tries its first step, instead of the one remembered.
   virtual void suggest(double /*h*/) {}
+
+  /// Gives the end of the last step other derivatives; its values stay.
+  void redirect(const State<S, N>& y1) { y1_ = y1; }
 
   const S& t0() const { return t0_; }
   const S& t1() const { return t1_; }
@@ -73,7 +77,9 @@ double scaled_norm(const State<double, N>& error, const State<double, N>& scale)
 }
 
 /// The shortest step [s] that still moves t.
-inline double shortest_step(double t) { return 16 * std::numeric_limits<double>::epsilon() * std::max(std::abs(t), 1e-9); }
+inline double shortest_step(double t) {
+  return 16 * std::numeric_limits<double>::epsilon() * std::max(std::abs(t), 1e-9);
+}
 
 /// The step controller that all single-step methods share: h_next = h · clamp(0.9 err^(−1/order), 0.2, 5).
 inline double step_factor(double error, double order) {
@@ -122,11 +128,12 @@ class SingleStep : public Stepper<S, N> {
         const double taken = value_of(length);
         double factor = step_factor(error, Derived::kOrder);
         if (Derived::kPredictive) {
-          // Gustafsson's predictive controller ([HairerWanner1996] IV.8): what the last step's error grew by, the next
-          // one's will too; without it a flow that quickens steadily has every other step rejected.
+          // Gustafsson's predictive controller ([HairerWanner1996] IV.8): what the last step's error grew by,
+          // the next one's will too; without it a flow that quickens steadily has every other step rejected.
           if (error_before_ > 0)
-            factor = std::min(factor, 0.9 * taken / taken_before_ *
-                                          std::pow(error_before_ / std::max(error * error, 1e-20), 1 / Derived::kOrder));
+            factor = std::min(
+                factor, 0.9 * taken / taken_before_ *
+                            std::pow(error_before_ / std::max(error * error, 1e-20), 1 / Derived::kOrder));
           factor = std::max(factor, 0.2);
           // A step cut short, by a limit or by rejection, tells no trend.
           error_before_ = rejected || taken < 0.99 * std::min(h_next_, longest) ? 0.0 : std::max(error, 1e-3);
@@ -156,8 +163,8 @@ class SingleStep : public Stepper<S, N> {
     return scaled_norm<N>(values<S, N>(error), scale);
   }
 
-  /// A first step length from the sizes of the state and its rate ([HairerNorsettWanner1993] II.4, without the
-  /// trial step: error control corrects a poor guess at the price of one rejection).
+  /// A first step length from the sizes of the state and its rate ([HairerNorsettWanner1993] II.4, without
+  /// the trial step: error control corrects a poor guess at the price of one rejection).
   double first_step(const State<double, N>& rate) const {
     const State<double, N> y = values<S, N>(this->y0_);
     State<double, N> scale;
@@ -177,12 +184,12 @@ class SingleStep : public Stepper<S, N> {
   Derived& self() { return static_cast<Derived&>(*this); }
 };
 
-/// The ways of stepping a flow; `automatic` takes dormand_prince for smooth modes and, for stiff ones, rosenbrock
-/// with double and radau with Dual.
+/// The ways of stepping a flow; `automatic` takes dormand_prince for smooth modes and, for stiff ones,
+/// rosenbrock with double and radau with Dual.
 enum class Method { automatic, dormand_prince, rosenbrock, radau, cvode };
 
-/// CVODE (SUNDIALS) behind the same interface: Adams for smooth, BDF with the exact Jacobian for stiff modes. It is
-/// the oracle of the other steppers; double only.
+/// CVODE (SUNDIALS) behind the same interface: Adams for smooth, BDF with the exact Jacobian for stiff modes.
+/// It is the oracle of the other steppers; double only.
 template <int N>
 std::unique_ptr<Stepper<double, N>> make_cvode_stepper(const Tolerances&, FlowKind);
 

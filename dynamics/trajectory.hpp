@@ -9,7 +9,8 @@
 
 namespace unhand::dynamics {
 
-/// One step: the state at five equally spaced instants of [t0, t1], which fixes the dense output of every stepper.
+/// One step: the state at five equally spaced instants of [t0, t1], which fixes the dense output of every
+/// stepper.
 template <class S, int N>
 struct TrajectoryPiece {
   S t0{}, t1{};

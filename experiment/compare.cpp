@@ -36,20 +36,22 @@ ThrowComparison judge(const PreparedThrow& prepared, const Prediction& predictio
   ThrowComparison out{prepared.id, prepared.object, prepared.condition, prepared.split, prediction, {}};
   const MeasuredOutcome& measured = prepared.measured;
   if (prediction.release == release::ReleaseOutcome::detached && measured.detach_twist) {
-    // A model may let go earlier or later than the pads did: both twists are then compared at the measured detach, to
-    // which the predicted one is carried by gravity (ω does not change in flight).
+    // A model may let go earlier or later than the pads did: both twists are then compared at the measured
+    // detach, to which the predicted one is carried by gravity (ω does not change in flight).
     const double wait = measured.detach_time ? *measured.detach_time - prediction.detach.time : 0.0;
     out.error[0] = prediction.detach.twist.vx + wait * prepared.gravity.x - measured.detach_twist->vx;
     out.error[1] = (prediction.detach.twist.omega - measured.detach_twist->omega) * kDegrees;
   }
   if (prediction.landed()) {
     if (measured.landing_x) out.error[2] = prediction.landing.pose.x - *measured.landing_x;
-    if (measured.landing_theta) out.error[3] = (prediction.landing.pose.theta - *measured.landing_theta) * kDegrees;
+    if (measured.landing_theta)
+      out.error[3] = (prediction.landing.pose.theta - *measured.landing_theta) * kDegrees;
   }
   return out;
 }
 
-RepetitionScatter scatter_of(const std::vector<PreparedThrow>& throws, const std::vector<std::string>& conditions) {
+RepetitionScatter scatter_of(const std::vector<PreparedThrow>& throws,
+                             const std::vector<std::string>& conditions) {
   RepetitionScatter out;
   double x_square = 0, theta_square = 0;
   int freedom = 0;
@@ -90,7 +92,8 @@ ErrorStatistics ModelComparison::of_condition(int quantity, const std::string& c
 
 std::vector<PreparedThrow> prepare_all(const datasets::ThrowLog& log, const std::string& file, int threads) {
   std::vector<std::optional<PreparedThrow>> prepared(log.throws.size());
-  parallel_for(log.throws.size(), threads, [&](std::size_t i) { prepared[i] = prepare(log, log.throws[i], file); });
+  parallel_for(log.throws.size(), threads,
+               [&](std::size_t i) { prepared[i] = prepare(log, log.throws[i], file); });
   std::vector<PreparedThrow> out;
   out.reserve(prepared.size());
   for (auto& p : prepared) out.push_back(std::move(*p));
@@ -102,7 +105,8 @@ Comparison compare(const datasets::ThrowLog& log, const std::string& file, const
   return compare(log, prepare_all(log, file, options.threads), options);
 }
 
-Comparison compare(const datasets::ThrowLog& log, const std::vector<PreparedThrow>& prepared, const CompareOptions& options) {
+Comparison compare(const datasets::ThrowLog& log, const std::vector<PreparedThrow>& prepared,
+                   const CompareOptions& options) {
   Comparison out;
   for (const auto& t : prepared) {
     if (std::find(out.conditions.begin(), out.conditions.end(), t.condition) == out.conditions.end())

@@ -22,9 +22,9 @@ ErrorStatistics statistics_of(const std::vector<double>& errors);
 
 /// The compared quantities, in the order of the table.
 struct Quantity {
-  const char* key;      ///< in JSON, with its unit
-  const char* title;    ///< in tables
-  double per_unit;      ///< from SI
+  const char* key;    ///< in JSON, with its unit
+  const char* title;  ///< in tables
+  double per_unit;    ///< from SI
 };
 inline constexpr double kDegrees = 57.29577951308232;
 inline constexpr Quantity kQuantities[] = {{"detach_vx_m_s", "detach vx [m/s]", 1},
@@ -37,7 +37,8 @@ struct ThrowComparison {
   std::string id, object, condition;
   datasets::Split split{};
   Prediction prediction;
-  std::optional<double> error[kQuantityCount];  ///< in the units of kQuantities; absent if not measured or not predicted
+  std::optional<double>
+      error[kQuantityCount];  ///< in the units of kQuantities; absent if not measured or not predicted
 };
 
 struct ModelComparison {
@@ -53,8 +54,8 @@ struct ModelComparison {
   ErrorStatistics of_condition(int quantity, const std::string& condition) const;
 };
 
-/// How far repetitions of a condition scatter about their mean: the floor of any model that does not know what differs
-/// between them.
+/// How far repetitions of a condition scatter about their mean: the floor of any model that does not know
+/// what differs between them.
 struct RepetitionScatter {
   int conditions{};
   double landing_x{};      ///< pooled standard deviation [m]
@@ -72,16 +73,18 @@ struct CompareOptions {
   std::vector<std::string> models;
   int threads{0};
   dynamics::IntegratorOptions integrator;
-  std::map<std::string, ModelParameters> parameters;  ///< by model, from cards; otherwise estimated from the log
+  std::map<std::string, ModelParameters>
+      parameters;  ///< by model, from cards; otherwise estimated from the log
   release::NaiveOptions naive;
 };
 
 /// All throws prepared, on several threads. `file` names the log in errors. Throws datasets::LogError.
 std::vector<PreparedThrow> prepare_all(const datasets::ThrowLog& log, const std::string& file, int threads);
 
-/// Simulates every throw with every model. Throws std::invalid_argument for unknown models and what the log does not
-/// determine, datasets::LogError for throws that lack what a release needs.
+/// Simulates every throw with every model. Throws std::invalid_argument for unknown models and what the log
+/// does not determine, datasets::LogError for throws that lack what a release needs.
 Comparison compare(const datasets::ThrowLog& log, const std::string& file, const CompareOptions& options);
-Comparison compare(const datasets::ThrowLog& log, const std::vector<PreparedThrow>& prepared, const CompareOptions& options);
+Comparison compare(const datasets::ThrowLog& log, const std::vector<PreparedThrow>& prepared,
+                   const CompareOptions& options);
 
 }  // namespace unhand::experiment

@@ -16,9 +16,12 @@ using dynamics::Dual;
 namespace {
 
 /// One pad's wrench over its normal force.
-struct Sample { double fx, fz, tau, weight; };
+struct Sample {
+  double fx, fz, tau, weight;
+};
 
-std::vector<Sample> slipping_samples(const datasets::ThrowLog& log, const std::vector<PreparedThrow>& throws) {
+std::vector<Sample> slipping_samples(const datasets::ThrowLog& log,
+                                     const std::vector<PreparedThrow>& throws) {
   std::vector<Sample> out;
   for (std::size_t i = 0; i < throws.size(); ++i) {
     const PreparedThrow& prepared = throws[i];
@@ -32,7 +35,8 @@ std::vector<Sample> slipping_samples(const datasets::ThrowLog& log, const std::v
       if (t < prepared.open_command || t >= release) continue;
       const double f = prepared.normal_force->at({prepared.start, release}, t);
       if (f < low || f > high) continue;
-      out.push_back({logged.ft->wrench(k, 0) / f, logged.ft->wrench(k, 1) / f, logged.ft->wrench(k, 2) / f, f / grip});
+      out.push_back(
+          {logged.ft->wrench(k, 0) / f, logged.ft->wrench(k, 1) / f, logged.ft->wrench(k, 2) / f, f / grip});
     }
   }
   return out;
@@ -45,7 +49,8 @@ double median(std::vector<double> x) {
 
 /// Gauss-Newton on (ln μ, ln L) with weights 1/max(1, |r|/k) and a damped step.
 template <class Shape>
-void solve(const Shape& shape, const std::vector<Sample>& samples, double& mu, double& length, double& scatter) {
+void solve(const Shape& shape, const std::vector<Sample>& samples, double& mu, double& length,
+           double& scatter) {
   std::vector<double> residuals(samples.size());
   for (int iteration = 0; iteration < 60; ++iteration) {
     const Dual mu_d(mu, 0), length_d(length, 1);
@@ -80,16 +85,19 @@ void solve(const Shape& shape, const std::vector<Sample>& samples, double& mu, d
 void estimate_delay(const std::vector<PreparedThrow>& throws, ModelParameters& parameters) {
   std::vector<double> delays;
   for (const auto& t : throws)
-    if (t.split == datasets::Split::train && t.measured.detach_time) delays.push_back(*t.measured.detach_time - t.open_command);
+    if (t.split == datasets::Split::train && t.measured.detach_time)
+      delays.push_back(*t.measured.detach_time - t.open_command);
   if (delays.empty())
-    throw std::invalid_argument("the log shows no detach in any train throw (neither a normal force that ends nor detach_time): "
-                                "the gripper's delay cannot be estimated; give a card");
+    throw std::invalid_argument(
+        "the log shows no detach in any train throw (neither a normal force that ends nor detach_time): "
+        "the gripper's delay cannot be estimated; give a card");
   double mean = 0, square = 0;
   for (const double d : delays) mean += d / static_cast<double>(delays.size());
   for (const double d : delays) square += (d - mean) * (d - mean) / static_cast<double>(delays.size());
   mean = std::max(mean, 0.0);
-  parameters.delay = square > 0 ? contact::DelayDistribution::normal(mean, std::sqrt(square), std::max(0.1, 2 * mean))
-                                : contact::DelayDistribution::number(mean);
+  parameters.delay =
+      square > 0 ? contact::DelayDistribution::normal(mean, std::sqrt(square), std::max(0.1, 2 * mean))
+                 : contact::DelayDistribution::number(mean);
 }
 
 }  // namespace
@@ -107,8 +115,10 @@ FrictionEstimate estimate_friction(const datasets::ThrowLog& log, const std::vec
   const auto samples = slipping_samples(log, throws);
   out.samples = static_cast<int>(samples.size());
   if (samples.size() < 10)
-    throw std::invalid_argument(fmt::format("the log determines no friction for {}: {} F/T samples with a falling normal "
-                                            "force in its train throws, at least 10 are needed; give a card", model, samples.size()));
+    throw std::invalid_argument(
+        fmt::format("the log determines no friction for {}: {} F/T samples with a falling normal "
+                    "force in its train throws, at least 10 are needed; give a card",
+                    model, samples.size()));
   // Start from the envelope: the largest force and torque ratios that are common.
   std::vector<double> force, torque;
   for (const auto& s : samples) {
@@ -119,12 +129,16 @@ FrictionEstimate estimate_friction(const datasets::ThrowLog& log, const std::vec
   std::sort(torque.begin(), torque.end());
   const std::size_t top = samples.size() * 9 / 10;
   double mu = std::clamp(force[top], 0.05, 3.0), length = std::clamp(torque[top] / mu, 1e-4, 0.1);
-  if (model == "limit_surface_disc") solve(contact::UniformDisc{}, samples, mu, length, out.scatter);
-  else if (model == "limit_surface_quartic") solve(contact::ConvexQuartic::closest_to_disc(), samples, mu, length, out.scatter);
-  else solve(contact::Ellipsoid{}, samples, mu, length, out.scatter);
+  if (model == "limit_surface_disc")
+    solve(contact::UniformDisc{}, samples, mu, length, out.scatter);
+  else if (model == "limit_surface_quartic")
+    solve(contact::ConvexQuartic::closest_to_disc(), samples, mu, length, out.scatter);
+  else
+    solve(contact::Ellipsoid{}, samples, mu, length, out.scatter);
   out.parameters.mu = mu;
   out.parameters.length = length;
-  out.method = "friction: the pad's wrench on the limit surface while the normal force vanishes, train throws";
+  out.method =
+      "friction: the pad's wrench on the limit surface while the normal force vanishes, train throws";
   return out;
 }
 

@@ -10,22 +10,23 @@ namespace unhand::experiment {
 
 struct FrictionEstimate {
   ModelParameters parameters;
-  int samples{};            ///< F/T samples used
-  double scatter{};         ///< robust 1 σ of gauge − 1 over them [-]: how well they lie on one limit surface
-  std::string method;       ///< in words, for reports
+  int samples{};       ///< F/T samples used
+  double scatter{};    ///< robust 1 σ of gauge − 1 over them [-]: how well they lie on one limit surface
+  std::string method;  ///< in words, for reports
 };
 
 /// Where a model's parameters start when no card gives them. It uses train throws only.
 ///
-/// Friction: near the end of the opening the demand exceeds what the vanishing normal force allows, so the pad slips and
-/// its wrench lies on the limit surface: gauge(f/(μ f_N), τ/(L μ f_N)) = 1 for the model's own surface, solved for μ and
-/// L by least squares with a loss that grows linearly (samples that still stick lie inside). Samples: smoothed f_N
-/// between 8 σ and 20 % of the grip force, on the falling ramp. The sliding pivot and the naive limit surface take the
-/// ellipsoid's values.
+/// Friction: near the end of the opening the demand exceeds what the vanishing normal force allows, so the
+/// pad slips and its wrench lies on the limit surface: gauge(f/(μ f_N), τ/(L μ f_N)) = 1 for the model's own
+/// surface, solved for μ and L by least squares with a loss that grows linearly (samples that still stick lie
+/// inside). Samples: smoothed f_N between 8 σ and 20 % of the grip force, on the falling ramp. The sliding
+/// pivot and the naive limit surface take the ellipsoid's values.
 ///
 /// Delay: mean and scatter over the train throws of (detach − opening command).
 ///
-/// Throws std::invalid_argument when the log determines neither (no F/T data in any train throw, or no detach).
+/// Throws std::invalid_argument when the log determines neither (no F/T data in any train throw, or no
+/// detach).
 FrictionEstimate estimate_friction(const datasets::ThrowLog& log, const std::vector<PreparedThrow>& throws,
                                    const std::string& model);
 

@@ -15,7 +15,9 @@ constexpr const char* kNaive = "limit_surface_naive";
 class NoForce final : public contact::NormalForce {
  public:
   double at(const dynamics::Window&, double) const override { return 0; }
-  dynamics::Dual at(const dynamics::Window&, const dynamics::Dual&) const override { return dynamics::Dual(0.0); }
+  dynamics::Dual at(const dynamics::Window&, const dynamics::Dual&) const override {
+    return dynamics::Dual(0.0);
+  }
   void kinks(std::vector<double>&) const override {}
   void kinks(std::vector<dynamics::Dual>&) const override {}
   double release_time() const override { return 0; }
@@ -43,21 +45,25 @@ std::vector<std::string> release_model_names() {
 void require_release_model(const std::string& name) {
   const auto names = release_model_names();
   if (std::find(names.begin(), names.end(), name) == names.end())
-    throw std::invalid_argument(fmt::format("model \"{}\" is unknown; there are {}", name, fmt::join(names, ", ")));
+    throw std::invalid_argument(
+        fmt::format("model \"{}\" is unknown; there are {}", name, fmt::join(names, ", ")));
 }
 
-std::unique_ptr<contact::ContactModel> contact_model_for(const PreparedThrow& throw_, const std::string& model,
-                                                         const ModelParameters& p) {
+std::unique_ptr<contact::ContactModel> contact_model_for(const PreparedThrow& throw_,
+                                                         const std::string& model, const ModelParameters& p) {
   if (model == kNaive) return nullptr;
   if (model != "gripper_delay" && !throw_.normal_force)
-    throw std::invalid_argument(
-        fmt::format("throw {}: {} needs the normal force, which was not measured (no ft group)", throw_.id, model));
+    throw std::invalid_argument(fmt::format(
+        "throw {}: {} needs the normal force, which was not measured (no ft group)", throw_.id, model));
   return contact::make_contact_model(
-      model, contact::ContactParameters<double>{patch_of(p), p.slide_end, {}, throw_.open_command, p.delay.mean()});
+      model,
+      contact::ContactParameters<double>{patch_of(p), p.slide_end, {}, throw_.open_command, p.delay.mean()});
 }
 
-release::ReleaseProblem<double> release_problem(const PreparedThrow& throw_, const contact::ContactModel& contact) {
-  return {throw_.hand, force_of(throw_), contact, throw_.body, throw_.gravity, throw_.grasp, throw_.start, {}, 0};
+release::ReleaseProblem<double> release_problem(const PreparedThrow& throw_,
+                                                const contact::ContactModel& contact) {
+  return {
+      throw_.hand, force_of(throw_), contact, throw_.body, throw_.gravity, throw_.grasp, throw_.start, {}, 0};
 }
 
 Prediction predict(const PreparedThrow& throw_, const std::string& model, const ModelParameters& parameters,
@@ -72,17 +78,18 @@ Prediction predict(const PreparedThrow& throw_, const std::string& model, const 
     out.slips_at_start = result.slips_at_start;
   } else {
     if (!throw_.normal_force)
-      throw std::invalid_argument(fmt::format("throw {}: {} needs the normal force, which was not measured (no ft group)",
-                                              throw_.id, model));
+      throw std::invalid_argument(fmt::format(
+          "throw {}: {} needs the normal force, which was not measured (no ft group)", throw_.id, model));
     const contact::GripperDelay unused(0, dynamics::Dual(0.0));
-    const auto result = release::simulate_release_naive(release_problem(throw_, unused), patch_of(parameters), parameters.naive);
+    const auto result = release::simulate_release_naive(release_problem(throw_, unused), patch_of(parameters),
+                                                        parameters.naive);
     out.release = result.outcome;
     out.detach = result.detach;
     out.events = result.reversals;
   }
   if (out.release != release::ReleaseOutcome::detached) return out;
-  const auto flown = flight::fly(flight::FlightProblem<double>{out.detach.pose, out.detach.twist, throw_.gravity,
-                                                               throw_.drag_k, throw_.landing_height, {}, 30});
+  const auto flown = flight::fly(flight::FlightProblem<double>{
+      out.detach.pose, out.detach.twist, throw_.gravity, throw_.drag_k, throw_.landing_height, {}, 30});
   out.flight = flown.outcome;
   out.landing = flown.landing;
   return out;

@@ -15,12 +15,12 @@ namespace unhand::experiment {
 
 /// Campaign parameters of a model; each model reads what it needs.
 struct ModelParameters {
-  double mu{0.5};                  ///< friction coefficient [-]
-  double length{0.007};            ///< L = c a = τ_max/f_max [m]
+  double mu{0.5};        ///< friction coefficient [-]
+  double length{0.007};  ///< L = c a = τ_max/f_max [m]
   int pads{2};
-  contact::SlideEnd slide_end{contact::SlideEnd::latched_brake};  ///< sliding_pivot
+  contact::SlideEnd slide_end{contact::SlideEnd::latched_brake};               ///< sliding_pivot
   contact::DelayDistribution delay{contact::DelayDistribution::number(0.05)};  ///< gripper_delay
-  release::NaiveOptions naive{};   ///< limit_surface_naive
+  release::NaiveOptions naive{};                                               ///< limit_surface_naive
 };
 
 /// The names that a comparison of releases knows: contact::contact_model_names() and limit_surface_naive.
@@ -36,19 +36,23 @@ struct Prediction {
   flight::Landing<double> landing;
   int events{};  ///< mode changes; for limit_surface_naive, reversals of the slip
   bool slips_at_start{};
-  bool landed() const { return release == release::ReleaseOutcome::detached && flight == flight::FlightOutcome::landed; }
+  bool landed() const {
+    return release == release::ReleaseOutcome::detached && flight == flight::FlightOutcome::landed;
+  }
 };
 
-/// Simulates the release with the named model and flies to the landing. Throws std::invalid_argument for parameters
-/// out of range, and for a model that needs the normal force when it was not measured.
+/// Simulates the release with the named model and flies to the landing. Throws std::invalid_argument for
+/// parameters out of range, and for a model that needs the normal force when it was not measured.
 Prediction predict(const PreparedThrow& throw_, const std::string& model, const ModelParameters& parameters,
                    const dynamics::IntegratorOptions& options = {});
 
 /// The contact model that predict() uses; null for limit_surface_naive, which has none.
-std::unique_ptr<contact::ContactModel> contact_model_for(const PreparedThrow& throw_, const std::string& model,
+std::unique_ptr<contact::ContactModel> contact_model_for(const PreparedThrow& throw_,
+                                                         const std::string& model,
                                                          const ModelParameters& parameters);
 
 /// The release problem of a prepared throw. `contact` must outlive it.
-release::ReleaseProblem<double> release_problem(const PreparedThrow& throw_, const contact::ContactModel& contact);
+release::ReleaseProblem<double> release_problem(const PreparedThrow& throw_,
+                                                const contact::ContactModel& contact);
 
 }  // namespace unhand::experiment

@@ -9,11 +9,13 @@
 
 namespace unhand::experiment {
 
-/// Calls work(i) for i = 0 … n − 1 on `threads` threads (0: one per core). Each item writes its own result, so the
-/// outcome does not depend on the number of threads. The first exception is rethrown after all threads have stopped.
+/// Calls work(i) for i = 0 … n − 1 on `threads` threads (0: one per core). Each item writes its own result,
+/// so the outcome does not depend on the number of threads. The first exception is rethrown after all threads
+/// have stopped.
 template <class Work>
 void parallel_for(std::size_t n, int threads, Work&& work) {
-  const std::size_t cores = threads > 0 ? static_cast<std::size_t>(threads) : std::max(1u, std::thread::hardware_concurrency());
+  const std::size_t cores =
+      threads > 0 ? static_cast<std::size_t>(threads) : std::max(1u, std::thread::hardware_concurrency());
   const std::size_t count = std::min(cores, n);
   if (count <= 1) {
     for (std::size_t i = 0; i < n; ++i) work(i);

@@ -22,10 +22,13 @@ std::array<double, 3> sigma_of(const Series& series) {
 }
 
 /// Weighted straight line y ≈ a + b t.
-struct Line { double a{}, b{}; };
+struct Line {
+  double a{}, b{};
+};
 Line fit_line(const std::vector<double>& t, const std::vector<double>& y) {
   const double n = static_cast<double>(t.size());
-  const double tm = std::accumulate(t.begin(), t.end(), 0.0) / n, ym = std::accumulate(y.begin(), y.end(), 0.0) / n;
+  const double tm = std::accumulate(t.begin(), t.end(), 0.0) / n,
+               ym = std::accumulate(y.begin(), y.end(), 0.0) / n;
   double tt = 0, ty = 0;
   for (std::size_t i = 0; i < t.size(); ++i) {
     tt += (t[i] - tm) * (t[i] - tm);
@@ -36,12 +39,14 @@ Line fit_line(const std::vector<double>& t, const std::vector<double>& y) {
 }
 
 /// The state at `detach` of the free flight that explains the motion capture from `from` on. Drag enters as a
-/// correction to the samples, by iteration: the difference of the flights with and without it from the same state.
+/// correction to the samples, by iteration: the difference of the flights with and without it from the same
+/// state.
 void measure_flight(const datasets::Throw& logged, double from, double detach, PreparedThrow& out) {
   std::vector<double> t, x, z, theta;
   const auto& mocap = *logged.mocap;
-  const double until = logged.landing && !logged.landing->time.empty() ? logged.landing->time(0) + 1e-9
-                                                                       : mocap.time(mocap.time.rows - 1) + 1e-9;
+  const double until = logged.landing && !logged.landing->time.empty()
+                           ? logged.landing->time(0) + 1e-9
+                           : mocap.time(mocap.time.rows - 1) + 1e-9;
   for (std::size_t i = 0; i < mocap.time.rows; ++i) {
     if (!mocap.is_valid(i) || mocap.time(i) < from || mocap.time(i) > until) continue;
     t.push_back(mocap.time(i) - detach);
@@ -62,7 +67,8 @@ void measure_flight(const datasets::Throw& logged, double from, double detach, P
     pose = {lx.a, lz.a, lt.a};
     twist = {lx.b, lz.b, lt.b};
     if (out.drag_k <= 0) break;
-    const flight::FlightProblem<double> with{pose, twist, out.gravity, out.drag_k, out.landing_height, {}, 30};
+    const flight::FlightProblem<double> with{pose, twist, out.gravity, out.drag_k, out.landing_height,
+                                             {},   30};
     const auto poses = flight::fly_through(with, t);
     for (std::size_t i = 0; i < t.size(); ++i) {
       const auto free = flight::ballistic(pose, twist, out.gravity, t[i]).pose;
@@ -78,26 +84,43 @@ void measure_flight(const datasets::Throw& logged, double from, double detach, P
 
 PreparedThrow prepare(const datasets::ThrowLog& log, const datasets::Throw& logged, const std::string& file) {
   const std::string path = "/throws/" + logged.id;
-  const auto reject = [&](const std::string& where, const std::string& why) { throw LogError(file, path + where, why); };
+  const auto reject = [&](const std::string& where, const std::string& why) {
+    throw LogError(file, path + where, why);
+  };
   if (log.dimension != 2) throw LogError(file, "/@dimension", "a release needs a planar log (dimension 2)");
   if (!logged.hand) reject("/hand", "missing: a release needs the hand's motion");
   const datasets::Object& object = log.objects.at(logged.object);
   if (!object.inertia)
-    throw LogError(file, "/objects/" + logged.object + "@inertia", "missing: a release needs the moment of inertia");
+    throw LogError(file, "/objects/" + logged.object + "@inertia",
+                   "missing: a release needs the moment of inertia");
 
   const datasets::HandLog& hand = *logged.hand;
   release::HandFit fit = [&] {
     try {
-      return release::fit_hand_motion({hand.time.data, hand.pose.data, hand.twist.data, hand.acceleration.data,
-                                       sigma_of(hand.pose), sigma_of(hand.twist), sigma_of(hand.acceleration)},
-                                      logged.hand_jump_times);
+      return release::fit_hand_motion(
+          {hand.time.data, hand.pose.data, hand.twist.data, hand.acceleration.data, sigma_of(hand.pose),
+           sigma_of(hand.twist), sigma_of(hand.acceleration)},
+          logged.hand_jump_times);
     } catch (const std::invalid_argument& error) {
       throw LogError(file, path + "/hand", error.what());
     }
   }();
-  PreparedThrow out{logged.id, logged.object, logged.condition, logged.split, std::move(fit.motion), fit.summary,
-                    {}, {}, {object.mass, object.inertia->front()}, dynamics::level_gravity(log.gravity),
-                    object.drag_k.value_or(0), log.landing_height, {}, 0, 0, {}};
+  PreparedThrow out{logged.id,
+                    logged.object,
+                    logged.condition,
+                    logged.split,
+                    std::move(fit.motion),
+                    fit.summary,
+                    {},
+                    {},
+                    {object.mass, object.inertia->front()},
+                    dynamics::level_gravity(log.gravity),
+                    object.drag_k.value_or(0),
+                    log.landing_height,
+                    {},
+                    0,
+                    0,
+                    {}};
   out.start = out.hand.begin();
 
   if (logged.ft) {
@@ -112,12 +135,15 @@ PreparedThrow prepare(const datasets::ThrowLog& log, const datasets::Throw& logg
     }
   }
 
-  if (log.gripper && log.gripper->opening_command_time) out.open_command = *log.gripper->opening_command_time;
-  else if (std::isfinite(out.force_fit.opening_start) && out.normal_force) out.open_command = out.force_fit.opening_start;
+  if (log.gripper && log.gripper->opening_command_time)
+    out.open_command = *log.gripper->opening_command_time;
+  else if (std::isfinite(out.force_fit.opening_start) && out.normal_force)
+    out.open_command = out.force_fit.opening_start;
   else if (!logged.detach_time)
     throw LogError(file, "/gripper@opening_command_time",
                    "missing, and " + path + " has neither a normal force that opens nor a detach_time");
-  else out.open_command = *logged.detach_time;
+  else
+    out.open_command = *logged.detach_time;
 
   // The grasp: what motion capture saw while the object was held.
   double angle = 0, offset_x = 0;
@@ -126,7 +152,8 @@ PreparedThrow prepare(const datasets::ThrowLog& log, const datasets::Throw& logg
     const Window whole{out.hand.begin(), out.hand.end()};
     for (std::size_t i = 0; i < logged.mocap->time.rows; ++i) {
       const double t = logged.mocap->time(i);
-      if (!logged.mocap->is_valid(i) || t < out.hand.begin() || t >= out.open_command || t > out.hand.end()) continue;
+      if (!logged.mocap->is_valid(i) || t < out.hand.begin() || t >= out.open_command || t > out.hand.end())
+        continue;
       const auto pose = out.hand.at(whole, t).pose;
       const dynamics::Vec2<double> r{logged.mocap->pose(i, 0) - pose.x, logged.mocap->pose(i, 1) - pose.z};
       angle += logged.mocap->pose(i, 2) - pose.theta;
@@ -134,13 +161,19 @@ PreparedThrow prepare(const datasets::ThrowLog& log, const datasets::Throw& logg
       ++seen;
     }
   }
-  if (seen > 0) out.grasp.angle = angle / seen;
-  else if (logged.grasp_angle) out.grasp.angle = *logged.grasp_angle;
-  else reject("@grasp_angle", "missing, and no motion capture before the gripper opens");
-  if (object.com_offset) out.grasp.com_offset = *object.com_offset;
-  else if (seen > 0) out.grasp.com_offset = offset_x / seen;
+  if (seen > 0)
+    out.grasp.angle = angle / seen;
+  else if (logged.grasp_angle)
+    out.grasp.angle = *logged.grasp_angle;
   else
-    throw LogError(file, "/objects/" + logged.object + "@com_offset", "missing, and no motion capture before the gripper opens");
+    reject("@grasp_angle", "missing, and no motion capture before the gripper opens");
+  if (object.com_offset)
+    out.grasp.com_offset = *object.com_offset;
+  else if (seen > 0)
+    out.grasp.com_offset = offset_x / seen;
+  else
+    throw LogError(file, "/objects/" + logged.object + "@com_offset",
+                   "missing, and no motion capture before the gripper opens");
 
   // The outcome.
   double flight_from = 0;
@@ -154,7 +187,8 @@ PreparedThrow prepare(const datasets::ThrowLog& log, const datasets::Throw& logg
   } else if (logged.detach_time) {
     out.measured.detach_time = flight_from = *logged.detach_time;
   }
-  if (logged.mocap && out.measured.detach_time) measure_flight(logged, flight_from, *out.measured.detach_time, out);
+  if (logged.mocap && out.measured.detach_time)
+    measure_flight(logged, flight_from, *out.measured.detach_time, out);
   if (logged.landing) {
     out.measured.landing_x = logged.landing->pose(0, 0);
     out.measured.landing_theta = logged.landing->pose(0, 1);

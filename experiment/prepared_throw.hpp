@@ -13,8 +13,8 @@
 
 namespace unhand::experiment {
 
-/// What the log says about the outcome. The twist at detach is that of the flight model fitted to the motion capture
-/// after the normal force has fallen below 3 σ, evaluated at detach.
+/// What the log says about the outcome. The twist at detach is that of the flight model fitted to the motion
+/// capture after the normal force has fallen below 3 σ, evaluated at detach.
 struct MeasuredOutcome {
   std::optional<double> detach_time;  ///< [s]
   std::optional<dynamics::Pose<double>> detach_pose;
@@ -34,20 +34,20 @@ struct PreparedThrow {
   double drag_k{};          ///< declared [1/m]
   double landing_height{};  ///< [m]
   release::Grasp<double> grasp;
-  double start{};           ///< [s]
-  double open_command{};    ///< when the gripper is told to open [s]
+  double start{};         ///< [s]
+  double open_command{};  ///< when the gripper is told to open [s]
   MeasuredOutcome measured;
 };
 
 /// Smooths the hand and the normal force, finds the grasp and the measured outcome.
 ///
-/// The hand's motion is the spline of release::fit_hand_motion (pose, twist and acceleration, each weighted by its
-/// declared σ). The grasp angle is the mean of θ_O − θ_H over the motion capture before the gripper is told to open; the
-/// log's `grasp_angle` is used where there is none. The CoM lies at the declared `com_offset` on the object's x axis; if
-/// it is not declared, where motion capture saw it.
+/// The hand's motion is the spline of release::fit_hand_motion (pose, twist and acceleration, each weighted
+/// by its declared σ). The grasp angle is the mean of θ_O − θ_H over the motion capture before the gripper is
+/// told to open; the log's `grasp_angle` is used where there is none. The CoM lies at the declared
+/// `com_offset` on the object's x axis; if it is not declared, where motion capture saw it.
 ///
-/// Throws datasets::LogError, naming the path inside `file`, when the throw lacks what a release needs: the hand, the
-/// planar inertia, a grasp, an opening time.
+/// Throws datasets::LogError, naming the path inside `file`, when the throw lacks what a release needs: the
+/// hand, the planar inertia, a grasp, an opening time.
 PreparedThrow prepare(const datasets::ThrowLog& log, const datasets::Throw& logged, const std::string& file);
 
 }  // namespace unhand::experiment

@@ -5,8 +5,8 @@
 
 namespace unhand::release {
 
-/// p_WO = p_WH + com_offset · e_x(θ_O): the pads hold a point of the object's x axis, `com_offset` [m] behind the CoM;
-/// `angle` is θ_O − θ_H [rad].
+/// p_WO = p_WH + com_offset · e_x(θ_O): the pads hold a point of the object's x axis, `com_offset` [m] behind
+/// the CoM; `angle` is θ_O − θ_H [rad].
 template <class S>
 struct Grasp {
   S com_offset{};

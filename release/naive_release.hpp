@@ -6,10 +6,11 @@
 
 namespace unhand::release {
 
-/// The sign law at a fixed step: f = −D v_r/sqrt(v_rᵀ D v_r + f_max² v_s²) at every v_r, by the explicit Euler method.
+/// The sign law at a fixed step: f = −D v_r/sqrt(v_rᵀ D v_r + f_max² v_s²) at every v_r, by the explicit
+/// Euler method.
 struct NaiveOptions {
-  double step{1e-3};       ///< s
-  double smoothing{0.0};   ///< v_s, viscous smoothing of the sign law [m/s]; 0 is the sign law itself
+  double step{1e-3};      ///< s
+  double smoothing{0.0};  ///< v_s, viscous smoothing of the sign law [m/s]; 0 is the sign law itself
 };
 
 struct NaiveResult {
@@ -19,10 +20,10 @@ struct NaiveResult {
   int reversals{};  ///< steps after which the slip points against the one before: the chatter
 };
 
-/// The ellipsoidal limit surface as [LiuBillard2025] describes it in use, for comparison only: without a stick mode the
-/// wrench of a held object flips from side to side at every step, and the energy that this costs is the error.
-/// The contact model of `problem` is not used; `patch` gives the limits. Throws std::invalid_argument for a step outside
-/// (0, 0.1] s.
+/// The ellipsoidal limit surface as [LiuBillard2025] describes it in use, for comparison only: without a
+/// stick mode the wrench of a held object flips from side to side at every step, and the energy that this
+/// costs is the error. The contact model of `problem` is not used; `patch` gives the limits. Throws
+/// std::invalid_argument for a step outside (0, 0.1] s.
 NaiveResult simulate_release_naive(const ReleaseProblem<double>& problem, const contact::Patch<double>& patch,
                                    const NaiveOptions& options = {});
 

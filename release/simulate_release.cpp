@@ -18,9 +18,12 @@ using dynamics::Wrench;
 
 const char* to_string(ReleaseOutcome outcome) {
   switch (outcome) {
-    case ReleaseOutcome::detached: return "detached";
-    case ReleaseOutcome::never_separated: return "never_separated";
-    case ReleaseOutcome::not_solved: return "not_solved";
+    case ReleaseOutcome::detached:
+      return "detached";
+    case ReleaseOutcome::never_separated:
+      return "never_separated";
+    case ReleaseOutcome::not_solved:
+      return "not_solved";
   }
   return "unknown";
 }
@@ -29,14 +32,18 @@ namespace {
 
 template <class T, class S>
 T convert(const S& x) {
-  if constexpr (std::is_same_v<T, S>) return x;
-  else if constexpr (std::is_same_v<T, double>) return value_of(x);
-  else return T(x);
+  if constexpr (std::is_same_v<T, S>)
+    return x;
+  else if constexpr (std::is_same_v<T, double>)
+    return value_of(x);
+  else
+    return T(x);
 }
 
 /// The release as a hybrid system: the modes of the contact model, and one more in which the object is free.
 template <class P>
-class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 6>, public contact::SceneSource {
+class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 6>,
+                            public contact::SceneSource {
  public:
   explicit ReleaseSystem(const ReleaseProblem<P>& problem)
       : problem_(problem), contact_(problem.contact), free_(contact_.mode_count()) {
@@ -52,7 +59,9 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   dynamics::FlowKind kind(int mode) const override {
     return mode == free_ ? dynamics::FlowKind::finished : contact_.kind(mode);
   }
-  std::string_view mode_name(int mode) const override { return mode == free_ ? "free" : contact_.mode_name(mode); }
+  std::string_view mode_name(int mode) const override {
+    return mode == free_ ? "free" : contact_.mode_name(mode);
+  }
   int guard_count(int mode) const override { return contact_.guard_count(mode); }
   dynamics::Guard guard(int mode, int index) const override { return contact_.guard(mode, index); }
   bool is_paced(int mode) const override { return contact_.is_homogeneous(mode); }
@@ -63,7 +72,8 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
                    const State<double, 6>& y1, State<double, 6>& scale) const override {
     dynamics::HybridSystem<6>::error_scale(p, tolerances, y0, y1, scale);
     if (!contact_.is_homogeneous(p.mode)) return;
-    // The absolute part is what a slip at its onset may be wrong by: far below the speed at which a stop is taken.
+    // The absolute part is what a slip at its onset may be wrong by: far below the speed at which a stop is
+    // taken.
     const double length = contact_.spin_length(), speed = std::max(slip_size(y0), slip_size(y1));
     const double slip = 1e-3 * tolerances.absolute + tolerances.relative * speed;
     scale[3] = scale[4] = slip;
@@ -79,8 +89,10 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
     std::sort(out.begin(), out.end(), [](const S& a, const S& b) { return value_of(a) < value_of(b); });
     // The separation may be one of the kinks; of two events at one instant the one with derivatives stays.
     for (std::size_t i = 1; i < out.size();) {
-      if (value_of(out[i]) - value_of(out[i - 1]) < 1e-12) out.erase(out.begin() + static_cast<std::ptrdiff_t>(i) - 1);
-      else ++i;
+      if (value_of(out[i]) - value_of(out[i - 1]) < 1e-12)
+        out.erase(out.begin() + static_cast<std::ptrdiff_t>(i) - 1);
+      else
+        ++i;
     }
   }
   template <class S>
@@ -108,7 +120,10 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
     const auto& [m, I] = problem_.body;
     return {{convert<S>(m), convert<S>(I)},
             {convert<S>(problem_.gravity.x), convert<S>(problem_.gravity.z)},
-            hand.pose, hand.twist, hand.acceleration, problem_.normal_force.at(window, t)};
+            hand.pose,
+            hand.twist,
+            hand.acceleration,
+            problem_.normal_force.at(window, t)};
   }
 
   /// |(v_r, L ω_r)|
@@ -133,27 +148,36 @@ void validate(const ReleaseProblem<S>& problem) {
   const double m = value_of(problem.body.mass), I = value_of(problem.body.inertia);
   require(m > 0 && m <= 1e4, "mass", m, "(0, 1e4] kg");
   require(I > 0 && I <= 1e6, "inertia", I, "(0, 1e6] kg m²");
-  require(std::isfinite(value_of(problem.gravity.x)), "gravity x", value_of(problem.gravity.x), "finite m/s²");
-  require(std::isfinite(value_of(problem.gravity.z)), "gravity z", value_of(problem.gravity.z), "finite m/s²");
-  require(std::abs(value_of(problem.grasp.com_offset)) <= 100, "com_offset", value_of(problem.grasp.com_offset), "[-100, 100] m");
-  require(std::isfinite(value_of(problem.grasp.angle)), "grasp angle", value_of(problem.grasp.angle), "finite rad");
+  require(std::isfinite(value_of(problem.gravity.x)), "gravity x", value_of(problem.gravity.x),
+          "finite m/s²");
+  require(std::isfinite(value_of(problem.gravity.z)), "gravity z", value_of(problem.gravity.z),
+          "finite m/s²");
+  require(std::abs(value_of(problem.grasp.com_offset)) <= 100, "com_offset",
+          value_of(problem.grasp.com_offset), "[-100, 100] m");
+  require(std::isfinite(value_of(problem.grasp.angle)), "grasp angle", value_of(problem.grasp.angle),
+          "finite rad");
   require(std::isfinite(value_of(problem.slip.x)), "slip x", value_of(problem.slip.x), "finite m/s");
   require(std::isfinite(value_of(problem.slip.z)), "slip z", value_of(problem.slip.z), "finite m/s");
   require(std::isfinite(value_of(problem.spin)), "spin", value_of(problem.spin), "finite rad/s");
-  require(problem.start >= problem.hand.begin() && problem.start < problem.hand.end(), "start", problem.start,
-          fmt::format("[{}, {}) s, where the hand's motion is known", problem.hand.begin(), problem.hand.end()));
+  require(
+      problem.start >= problem.hand.begin() && problem.start < problem.hand.end(), "start", problem.start,
+      fmt::format("[{}, {}) s, where the hand's motion is known", problem.hand.begin(), problem.hand.end()));
 }
 
-double mechanical_energy(const ReleaseProblem<double>& problem, const dynamics::Pose<double>& p, const dynamics::Twist<double>& v) {
+double mechanical_energy(const ReleaseProblem<double>& problem, const dynamics::Pose<double>& p,
+                         const dynamics::Twist<double>& v) {
   const auto& [m, I] = problem.body;
-  return 0.5 * m * dot(v.linear(), v.linear()) + 0.5 * I * v.omega * v.omega - m * dot(problem.gravity, p.position());
+  return 0.5 * m * dot(v.linear(), v.linear()) + 0.5 * I * v.omega * v.omega -
+         m * dot(problem.gravity, p.position());
 }
 
 /// Four-point Gauss-Legendre quadrature of the powers over every recorded step.
 EnergyLedger book(const ReleaseProblem<double>& problem, const ReleaseSystem<double>& system,
                   const ReleaseResult<double>& result) {
-  constexpr double kNode[4] = {0.0694318442029737, 0.3300094782075719, 0.6699905217924281, 0.9305681557970263};
-  constexpr double kWeight[4] = {0.1739274225687269, 0.3260725774312731, 0.3260725774312731, 0.1739274225687269};
+  constexpr double kNode[4] = {0.0694318442029737, 0.3300094782075719, 0.6699905217924281,
+                               0.9305681557970263};
+  constexpr double kWeight[4] = {0.1739274225687269, 0.3260725774312731, 0.3260725774312731,
+                                 0.1739274225687269};
   EnergyLedger ledger;
   for (const auto& piece : result.trajectory.pieces) {
     const double length = piece.t1 - piece.t0;
@@ -162,11 +186,13 @@ EnergyLedger book(const ReleaseProblem<double>& problem, const ReleaseSystem<dou
       const auto y = Relative<double>::from(piece.at_fraction(kNode[k]));
       const Wrench<double> f = problem.contact.wrench(piece.phase.mode, scene, y);
       const double weight = kWeight[k] * length;
-      ledger.hand_work += weight * (dot(f.force(), scene.hand_twist.linear()) + f.tau * scene.hand_twist.omega);
+      ledger.hand_work +=
+          weight * (dot(f.force(), scene.hand_twist.linear()) + f.tau * scene.hand_twist.omega);
       ledger.torsional_friction += weight * f.tau * y.spin;
       const double linear = dot(f.force(), y.slip);
       (linear > 0 && problem.contact.may_feed_energy(piece.phase.mode) ? ledger.nonphysical_work
-                                                                       : ledger.linear_friction) += weight * linear;
+                                                                       : ledger.linear_friction) +=
+          weight * linear;
     }
   }
   const auto& first = result.trajectory.pieces.front();
@@ -174,8 +200,8 @@ EnergyLedger book(const ReleaseProblem<double>& problem, const ReleaseSystem<dou
   const auto y = Relative<double>::from(first.nodes[0]);
   ledger.mechanical_change = mechanical_energy(problem, result.detach.pose, result.detach.twist) -
                              mechanical_energy(problem, object_pose(scene, y), object_twist(scene, y));
-  ledger.residual = ledger.mechanical_change - ledger.hand_work - ledger.linear_friction - ledger.torsional_friction -
-                    ledger.nonphysical_work;
+  ledger.residual = ledger.mechanical_change - ledger.hand_work - ledger.linear_friction -
+                    ledger.torsional_friction - ledger.nonphysical_work;
   return ledger;
 }
 
@@ -190,7 +216,8 @@ ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const Releas
   std::vector<double> times;
   system.time_events(times);
   const auto next = std::upper_bound(times.begin(), times.end(), problem.start);
-  const Window first{problem.start, next == times.end() ? problem.hand.end() : std::min(*next, problem.hand.end())};
+  const Window first{problem.start,
+                     next == times.end() ? problem.hand.end() : std::min(*next, problem.hand.end())};
 
   ReleaseResult<S> result;
   Entry<S, 6> entry{system.free_mode(), S(problem.start), held.state(), S(0)};
@@ -201,8 +228,10 @@ ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const Releas
   dynamics::IntegratorOptions integrator = options.integrator;
   integrator.record = integrator.record || options.ledger;
   // A release at the very end of the log still counts: the horizon lies one instant after.
-  const double horizon = std::max(problem.hand.end(), std::isfinite(system.separation()) && system.separation() <= problem.hand.end()
-                                                          ? std::nextafter(system.separation(), 1e300) + 1e-9 : 0.0);
+  const double horizon = std::max(
+      problem.hand.end(), std::isfinite(system.separation()) && system.separation() <= problem.hand.end()
+                              ? std::nextafter(system.separation(), 1e300) + 1e-9
+                              : 0.0);
   dynamics::Solution<S, 6> solution = dynamics::integrate<S, 6>(system, entry, S(horizon), integrator);
 
   result.integration = solution.outcome;
@@ -210,11 +239,17 @@ ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const Releas
   result.trajectory = std::move(solution.trajectory);
   result.statistics = solution.statistics;
   if (entry.lead != S(0) || result.slips_at_start)
-    result.events.insert(result.events.begin(), {dynamics::EventKind::time, -1, 0, entry.mode, S(problem.start), entry.y});
+    result.events.insert(result.events.begin(),
+                         {dynamics::EventKind::time, -1, 0, entry.mode, S(problem.start), entry.y});
   switch (solution.outcome) {
-    case dynamics::Outcome::finished: result.outcome = ReleaseOutcome::detached; break;
-    case dynamics::Outcome::horizon: result.outcome = ReleaseOutcome::never_separated; break;
-    default: result.outcome = ReleaseOutcome::not_solved;
+    case dynamics::Outcome::finished:
+      result.outcome = ReleaseOutcome::detached;
+      break;
+    case dynamics::Outcome::horizon:
+      result.outcome = ReleaseOutcome::never_separated;
+      break;
+    default:
+      result.outcome = ReleaseOutcome::not_solved;
   }
   const double at = value_of(solution.t);
   const auto after = std::lower_bound(times.begin(), times.end(), at - 1e-12);
@@ -244,21 +279,28 @@ std::vector<ModeEvent> mode_events(const ReleaseProblem<S>& problem, const Relea
 }
 
 template <class S>
-ReleaseSample<S> sample_release(const ReleaseProblem<S>& problem, const ReleaseResult<S>& result, const S& t) {
+ReleaseSample<S> sample_release(const ReleaseProblem<S>& problem, const ReleaseResult<S>& result,
+                                const S& t) {
   const ReleaseSystem<S> system(problem);
   const auto& piece = result.trajectory.piece_at(value_of(t));
   const auto y = Relative<S>::from(result.trajectory.at(t));
   const Scene<S> scene = system.scene(piece.phase.window, t);
-  return {system.mode_name(piece.phase.mode), object_pose(scene, y), object_twist(scene, y),
+  return {system.mode_name(piece.phase.mode),
+          object_pose(scene, y),
+          object_twist(scene, y),
           problem.contact.wrench(piece.phase.mode, scene, y),
-          {scene.hand, scene.hand_twist, scene.hand_acceleration}, scene.normal_force, y};
+          {scene.hand, scene.hand_twist, scene.hand_acceleration},
+          scene.normal_force,
+          y};
 }
 
 template ReleaseResult<double> simulate_release(const ReleaseProblem<double>&, const ReleaseOptions&);
 template ReleaseResult<Dual> simulate_release(const ReleaseProblem<Dual>&, const ReleaseOptions&);
 template std::vector<ModeEvent> mode_events(const ReleaseProblem<double>&, const ReleaseResult<double>&);
 template std::vector<ModeEvent> mode_events(const ReleaseProblem<Dual>&, const ReleaseResult<Dual>&);
-template ReleaseSample<double> sample_release(const ReleaseProblem<double>&, const ReleaseResult<double>&, const double&);
-template ReleaseSample<Dual> sample_release(const ReleaseProblem<Dual>&, const ReleaseResult<Dual>&, const Dual&);
+template ReleaseSample<double> sample_release(const ReleaseProblem<double>&, const ReleaseResult<double>&,
+                                              const double&);
+template ReleaseSample<Dual> sample_release(const ReleaseProblem<Dual>&, const ReleaseResult<Dual>&,
+                                            const Dual&);
 
 }  // namespace unhand::release

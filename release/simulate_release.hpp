@@ -11,8 +11,8 @@
 
 namespace unhand::release {
 
-/// Everything that determines a release. The references must outlive the simulation. A held object starts in the mode
-/// that its grip allows; one that slips already starts slipping.
+/// Everything that determines a release. The references must outlive the simulation. A held object starts in
+/// the mode that its grip allows; one that slips already starts slipping.
 template <class S>
 struct ReleaseProblem {
   const HandMotion& hand;
@@ -21,7 +21,7 @@ struct ReleaseProblem {
   dynamics::RigidBody<S> body;
   dynamics::Vec2<S> gravity;  ///< m/s²
   Grasp<S> grasp;
-  double start{};  ///< [s]
+  double start{};            ///< [s]
   dynamics::Vec2<S> slip{};  ///< of the patch at the start [m/s]; zero: held
   S spin{};                  ///< ω_O − ω_H at the start [rad/s]
 };
@@ -36,8 +36,8 @@ const char* to_string(ReleaseOutcome);
 /// The one value that flight gets.
 template <class S>
 struct DetachState {
-  S time{};                 ///< [s]
-  dynamics::Pose<S> pose;   ///< of the CoM, in the world
+  S time{};                ///< [s]
+  dynamics::Pose<S> pose;  ///< of the CoM, in the world
   dynamics::Twist<S> twist;
 };
 
@@ -48,14 +48,15 @@ struct ModeEvent {
   std::string mode;   ///< the mode entered
 };
 
-/// Energy from the start to detach [J]: kinetic + potential change = hand + friction, and what is left is `residual`.
+/// Energy from the start to detach [J]: kinetic + potential change = hand + friction, and what is left is
+/// `residual`.
 struct EnergyLedger {
-  double mechanical_change{};  ///< ½ m v² + ½ I ω² − m g·p
-  double hand_work{};          ///< of the wrench through the hand's motion
-  double linear_friction{};    ///< ∫ f · v_r dt <= 0, without the part below
-  double torsional_friction{}; ///< ∫ τ ω_r dt <= 0
-  double nonphysical_work{};   ///< ∫ max(f · v_r, 0) dt where the law is a surrogate that may feed energy
-  double residual{};           ///< mechanical_change − all the others: the quadrature's and integrator's error
+  double mechanical_change{};   ///< ½ m v² + ½ I ω² − m g·p
+  double hand_work{};           ///< of the wrench through the hand's motion
+  double linear_friction{};     ///< ∫ f · v_r dt <= 0, without the part below
+  double torsional_friction{};  ///< ∫ τ ω_r dt <= 0
+  double nonphysical_work{};    ///< ∫ max(f · v_r, 0) dt where the law is a surrogate that may feed energy
+  double residual{};  ///< mechanical_change − all the others: the quadrature's and integrator's error
 };
 
 struct ReleaseOptions {
@@ -76,8 +77,8 @@ struct ReleaseResult {
   EnergyLedger ledger;
 };
 
-/// Simulates from `problem.start` to detach. Throws std::invalid_argument when an input is not finite or out of range
-/// (mass, inertia, start against the hand's log). Instantiated for double and Dual.
+/// Simulates from `problem.start` to detach. Throws std::invalid_argument when an input is not finite or out
+/// of range (mass, inertia, start against the hand's log). Instantiated for double and Dual.
 template <class S>
 ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const ReleaseOptions& options = {});
 

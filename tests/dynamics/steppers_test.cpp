@@ -1,7 +1,7 @@
 // The steppers one by one: order, stiffness, dense output, restarts and derivatives of the discrete solution.
 #include "dynamics/dormand_prince.hpp"
-#include "dynamics/rosenbrock.hpp"
 #include "dynamics/radau.hpp"
+#include "dynamics/rosenbrock.hpp"
 #include "tests/dynamics/toy_systems.hpp"
 
 namespace unhand::dynamics {

@@ -14,14 +14,19 @@
 
 namespace unhand::support {
 
-/// Each coordinate is p + v t + ½ a t² + A sin(w t + φ): acceleration and sway make the demand on the grip vary.
+/// Each coordinate is p + v t + ½ a t² + A sin(w t + φ): acceleration and sway make the demand on the grip
+/// vary.
 class SwayingHand final : public release::HandMotion {
  public:
-  struct Coordinate { double p{}, v{}, a{}, amplitude{}, frequency{1}, phase{}; };
+  struct Coordinate {
+    double p{}, v{}, a{}, amplitude{}, frequency{1}, phase{};
+  };
   SwayingHand(std::array<Coordinate, 3> coordinates, double end) : coordinates_(coordinates), end_(end) {}
 
   release::HandState<double> at(const release::Window&, double t) const override { return at_(t); }
-  release::HandState<release::Dual> at(const release::Window&, const release::Dual& t) const override { return at_(t); }
+  release::HandState<release::Dual> at(const release::Window&, const release::Dual& t) const override {
+    return at_(t);
+  }
   std::vector<double> jumps() const override { return {}; }
   double begin() const override { return 0; }
   double end() const override { return end_; }
@@ -29,7 +34,8 @@ class SwayingHand final : public release::HandMotion {
  private:
   template <class S>
   release::HandState<S> at_(const S& t) const {
-    using std::cos; using std::sin;
+    using std::cos;
+    using std::sin;
     std::array<S, 3> q, v, a;
     for (int i = 0; i < 3; ++i) {
       const auto& c = coordinates_[i];
@@ -52,14 +58,21 @@ struct RandomThrow {
   release::Grasp<double> grasp;
 };
 
-/// A throw of a bar or box: 0.05 to 0.5 kg held 0 to 0.16 m off its CoM, speeds of 1 to 3 m/s, opening in 20 to 80 ms.
-/// `sway` scales the shaking of the hand [-]; 0 is a smooth throw, 1 makes several switches of mode.
+/// A throw of a bar or box: 0.05 to 0.5 kg held 0 to 0.16 m off its CoM, speeds of 1 to 3 m/s, opening in 20
+/// to 80 ms. `sway` scales the shaking of the hand [-]; 0 is a smooth throw, 1 makes several switches of
+/// mode.
 inline RandomThrow random_throw(std::mt19937_64& random, double sway) {
-  const auto uniform = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+  const auto uniform = [&](double a, double b) {
+    return std::uniform_real_distribution<double>(a, b)(random);
+  };
   const double frequency = uniform(60, 250), shake = sway * uniform(5, 25);  // rad/s, m/s²
-  std::array<SwayingHand::Coordinate, 3> c{{{0.5, uniform(0.5, 2.5), uniform(-12, 12), shake / (frequency * frequency), frequency, uniform(0, 6.28)},
-                                            {0.8, uniform(0.5, 2.5), uniform(-12, 12), shake / (frequency * frequency), frequency, uniform(0, 6.28)},
-                                            {uniform(-1.5, 1.5), uniform(-6, 6), uniform(-60, 60), sway * uniform(20, 200) / (frequency * frequency), frequency, uniform(0, 6.28)}}};
+  std::array<SwayingHand::Coordinate, 3> c{
+      {{0.5, uniform(0.5, 2.5), uniform(-12, 12), shake / (frequency * frequency), frequency,
+        uniform(0, 6.28)},
+       {0.8, uniform(0.5, 2.5), uniform(-12, 12), shake / (frequency * frequency), frequency,
+        uniform(0, 6.28)},
+       {uniform(-1.5, 1.5), uniform(-6, 6), uniform(-60, 60),
+        sway * uniform(20, 200) / (frequency * frequency), frequency, uniform(0, 6.28)}}};
   const double dead = uniform(0.0, 0.01), opening = uniform(0.02, 0.08), grip = uniform(10, 40);
   contact::OpeningProfile<double> profile;
   profile.open_command = 0.02;
@@ -69,8 +82,11 @@ inline RandomThrow random_throw(std::mt19937_64& random, double sway) {
   profile.shape = uniform(1.0, 1.5);
   const double mass = uniform(0.05, 0.5), gyration = uniform(0.03, 0.1);
   const contact::Patch<double> patch{uniform(0.3, 0.9), uniform(0.006, 0.015)};
-  return {SwayingHand(c, 0.02 + dead + opening + 0.02), contact::ProfileNormalForce(profile), patch,
-          {mass, mass * gyration * gyration}, {uniform(0, 0.16), uniform(-0.2, 0.2)}};
+  return {SwayingHand(c, 0.02 + dead + opening + 0.02),
+          contact::ProfileNormalForce(profile),
+          patch,
+          {mass, mass * gyration * gyration},
+          {uniform(0, 0.16), uniform(-0.2, 0.2)}};
 }
 
 }  // namespace unhand::support
