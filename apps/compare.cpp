@@ -111,7 +111,7 @@ void compare_releases(const CompareRequest& request, const datasets::ThrowLog& l
   options.parameters = read_cards(request, models);
   options.threads = request.threads;
   options.naive = request.naive;
-  options.integrator.tolerances.relative = request.rtol;
+  options.integrator.tolerances = {request.rtol, 0.01 * request.rtol};
   const auto prepared = prepare_throws(log, request);
   const auto comparison = run_models(log, prepared, options, models);
   report_failures(comparison);

@@ -208,7 +208,7 @@ std::optional<Figure> landing_figure(const Comparison& comparison) {
   s += scatter(clouds, 0, all, (two ? "every model, " : "landing errors, ") + which);
   if (two)
     s += "unset object 1\nset ylabel ''\n" + place(figure, {10.8, figure.width - 0.5, bottom, top}) +
-         scatter(clouds, narrow, zoom, "zoom: the dashed frame");
+         scatter(clouds, narrow, zoom, "the same, magnified about zero");
   s += key_strip(figure, key, columns) + "unset multiplot\n";
   return figure;
 }

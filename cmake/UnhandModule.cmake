@@ -32,7 +32,7 @@ endfunction()
 function(unhand_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;USES" ${ARGN})
   if(NOT ARG_TIMEOUT)
-    set(ARG_TIMEOUT 300)
+    set(ARG_TIMEOUT 1500)  # the sanitizers are an order of magnitude slower
   endif()
   add_executable(test_${name} ${ARG_SOURCES})
   foreach(used IN LISTS ARG_USES)
