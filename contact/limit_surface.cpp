@@ -222,9 +222,16 @@ Vec3<S> LimitSurface<Shape>::slip_acceleration(const Scene<S>& scene, const Rela
 template <class Shape>
 template <class S>
 Wrench<S> LimitSurface<Shape>::wrench_(int mode, const Scene<S>& scene, const Relative<S>& y) const {
-  // At the very onset of slip there is no direction yet, and the sticking wrench is on the surface.
-  if (mode == kStick || (y.slip.x == S(0) && y.slip.z == S(0) && y.spin == S(0)))
-    return sticking_wrench(scene, y);
+  if (mode == kStick) return sticking_wrench(scene, y);
+  if (y.slip.x == S(0) && y.slip.z == S(0) && y.spin == S(0)) {
+    // At the very onset of slip there is no direction yet: the demand, brought back to the surface.
+    const Wrench<S> demand = sticking_wrench(scene, y);
+    const S length = patch<S>().length(), limit = patch<S>().f_max(scene.normal_force);
+    const S size = gauge(shape_, scene, Vec3<S>{demand.fx, demand.fz, demand.tau / length});
+    if (!(value_of(size) > value_of(limit))) return demand;
+    const S k = limit / size;
+    return {k * demand.fx, k * demand.fz, k * demand.tau};
+  }
   const S f_max = patch<S>().f_max(scene.normal_force);
   return physical(resist(shape_, scene, normalised_slip(y)), f_max, patch<S>().length());
 }
