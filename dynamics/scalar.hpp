@@ -5,6 +5,8 @@
 
 #include <ceres/jet.h>
 
+#include <type_traits>
+
 namespace unhand::dynamics {
 
 /// Derivatives a Dual carries at once. Eight is what fills the SIMD registers of baseline x86-64 without
@@ -16,6 +18,17 @@ using Dual = ceres::Jet<double, kDualSize>;
 
 inline double value_of(double x) { return x; }
 inline double value_of(const Dual& x) { return x.a; }
+
+/// x as a T: the value alone when T is double, a constant when x is.
+template <class T, class S>
+T convert(const S& x) {
+  if constexpr (std::is_same_v<T, S>)
+    return x;
+  else if constexpr (std::is_same_v<T, double>)
+    return value_of(x);
+  else
+    return T(x);
+}
 
 /// Applies a scalar function whose value f and derivative df at value_of(x) are already known (the chain
 /// rule).

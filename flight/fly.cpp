@@ -10,6 +10,7 @@
 
 namespace unhand::flight {
 
+using dynamics::convert;
 using dynamics::Dual;
 using dynamics::Entry;
 using dynamics::Phase;
@@ -34,16 +35,6 @@ const char* to_string(FlightOutcome outcome) {
 namespace {
 
 constexpr int kBelow = 0, kAbove = 1, kLanded = 2;
-
-template <class T, class S>
-T convert(const S& x) {
-  if constexpr (std::is_same_v<T, S>)
-    return x;
-  else if constexpr (std::is_same_v<T, double>)
-    return value_of(x);
-  else
-    return T(x);
-}
 
 template <class S>
 Landing<S> tracked_point(const Landing<S>& com, const Vec2<S>& offset) {

@@ -8,6 +8,7 @@
 
 namespace unhand::flight {
 
+using dynamics::convert;
 using dynamics::Dual;
 using dynamics::Entry;
 using dynamics::Phase;
@@ -15,16 +16,6 @@ using dynamics::State;
 using dynamics::value_of;
 
 namespace {
-
-template <class T, class S>
-T convert(const S& x) {
-  if constexpr (std::is_same_v<T, S>)
-    return x;
-  else if constexpr (std::is_same_v<T, double>)
-    return value_of(x);
-  else
-    return T(x);
-}
 
 /// State: the attitude against the start's (w, x, y, z) and ω in the body.
 template <class P>

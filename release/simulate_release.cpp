@@ -10,6 +10,7 @@ namespace unhand::release {
 
 using contact::Relative;
 using contact::Scene;
+using dynamics::convert;
 using dynamics::Entry;
 using dynamics::Phase;
 using dynamics::State;
@@ -29,16 +30,6 @@ const char* to_string(ReleaseOutcome outcome) {
 }
 
 namespace {
-
-template <class T, class S>
-T convert(const S& x) {
-  if constexpr (std::is_same_v<T, S>)
-    return x;
-  else if constexpr (std::is_same_v<T, double>)
-    return value_of(x);
-  else
-    return T(x);
-}
 
 /// The release as a hybrid system: the modes of the contact model, and one more in which the object is free.
 template <class P>
