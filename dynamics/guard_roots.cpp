@@ -1,0 +1,284 @@
+#include "dynamics/guard_roots.hpp"
+
+namespace unhand::dynamics {
+namespace {
+
+constexpr double kNode[4] = {0, 1.0 / 3, 2.0 / 3, 1};  // where guards are sampled in a step
+constexpr double kGrazing = 1e-6;   // of a guard's range over a step: a peak this close to zero only touches
+constexpr double kTogether = 4e-9;  // of a step: roots this close on the dense output are one instant
+
+double range_of(const double (&G)[4][kMaxGuards], int i) {
+  return std::max({G[0][i], G[1][i], G[2][i], G[3][i]}) - std::min({G[0][i], G[1][i], G[2][i], G[3][i]});
+}
+
+template <class AnyStepper, class AnyState>
+void retake(AnyStepper& stepper, double h, AnyState& y) {
+  if (h > 0)
+    stepper.retake(h, y);
+  else
+    y = stepper.y0();
+}
+
+}  // namespace
+
+template <class S, int N>
+bool GuardRoots<S, N>::find_first(Stepper<S, N>& stepper, bool first_step, Bracket& first) {
+  first_step_ = first_step;
+  double G[4][kMaxGuards];
+  std::copy_n(watch_.start.begin(), watch_.count, G[0]);
+  if (!sample(stepper, 1, G[3])) return false;
+  bool quiet = watch_.monotone;
+  for (int i = 0; i < watch_.count; ++i) quiet = quiet && watch_.armed[i] && !watch_.hidden[i] && G[3][i] < 0;
+  std::copy_n(G[3], watch_.count, watch_.start.begin());
+  if (quiet) return true;
+  for (int node = 1; node <= 2; ++node)
+    if (!sample(stepper, kNode[node], G[node])) return false;
+
+  double earliest = 2;
+  const auto armed_before = watch_.armed;
+  for (int i = 0; i < watch_.count; ++i) {
+    Bracket bracket{i, 0, 0};
+    bool found = false;
+    double hidden_before = 0;  // the node by which a hidden excursion had ended
+    double safe_from = watch_.armed[i] && !watch_.hidden[i] ? 0.0 : 1.0;
+    for (int node = 1; node <= 3 && !found; ++node) {
+      if (G[node][i] < 0) {
+        safe_from = std::min(safe_from, kNode[node]);
+        watch_.armed[i] = true;
+        watch_.hidden[i] = false;
+      } else if (watch_.armed[i] && !(watch_.hidden[i] && G[node][i] == 0)) {
+        if (!watch_.hidden[i] && touches(stepper, G, i, node)) continue;
+        bracket.safe = kNode[node - 1];
+        bracket.unsafe = kNode[node];
+        if (watch_.hidden[i]) {
+          hidden_before = bracket.unsafe;
+          if (!shrink_to_first_excursion(stepper, bracket)) continue;
+        }
+        found = true;
+        watch_.hidden[i] = false;
+      }
+    }
+    if (watch_.armed[i] && !watch_.hidden[i])
+      found = find_hidden_peak(stepper, G, safe_from, found, bracket) || found;
+    if (!found) continue;
+    double root = bisect(stepper, bracket);
+    if (hidden_before > 0 && !(slope_at(stepper, root, i) > 0)) {
+      bracket.unsafe = hidden_before;
+      if (!begin_of_rise(stepper, bracket)) continue;
+      root = bracket.unsafe;
+    }
+    if (root < earliest * (1 - kTogether)) {
+      earliest = root;
+      first = bracket;
+    }
+  }
+  if (first.guard >= 0)  // what the guards did after the root did not happen
+    for (int i = 0; i < watch_.count; ++i) {
+      watch_.armed[i] = armed_before[i];
+      for (int node = 1; node <= 3 && kNode[node] <= earliest; ++node)
+        watch_.armed[i] = watch_.armed[i] || G[node][i] < 0;
+    }
+  return true;
+}
+
+/// Whether the guard is at zero at this node only because it turns back there; then the search for peaks
+/// judges it.
+template <class S, int N>
+bool GuardRoots<S, N>::touches(const Stepper<S, N>& stepper, const Samples& G, int guard, int node) const {
+  const double range = range_of(G, guard);
+  if (G[node][guard] > kGrazing * range || !(G[node - 1][guard] < 0)) return false;
+  if (node < 3) return G[node + 1][guard] < 0;
+  const double bend = G[3][guard] - 2 * G[2][guard] + G[1][guard];
+  const double length = value_of(stepper.t1()) - value_of(stepper.t0());
+  return bend < 0 &&
+         watch_.slopes({watch_.phase.mode, stepper.t1(), stepper.y1(), S(0)})[guard] * length < 2e-3 * range;
+}
+
+template <class S, int N>
+bool GuardRoots<S, N>::sample(Stepper<S, N>& stepper, double theta, double* G) {
+  State<S, N> y;
+  if (theta >= 1) return watch_.evaluate(stepper.t1(), stepper.y1(), G);
+  stepper.interpolate(theta, y);
+  return watch_.evaluate(stepper.t0() + theta * (stepper.t1() - stepper.t0()), y, G);
+}
+template <class S, int N>
+double GuardRoots<S, N>::sample_one(Stepper<S, N>& stepper, double theta, int guard) {
+  double G[kMaxGuards];
+  sample(stepper, theta, G);
+  return G[guard];
+}
+
+/// The guard began at zero and is unsafe at a node: its excursion to the safe side, if any, ended in
+/// between. False if it has not set out yet: what an event leaves of a guard takes an instant to pass.
+template <class S, int N>
+bool GuardRoots<S, N>::shrink_to_first_excursion(Stepper<S, N>& stepper, Bracket& bracket) {
+  double theta = bracket.unsafe;
+  for (int k = 0; k < 200; ++k) {
+    const double trial = 0.5 * theta;
+    if (sample_one(stepper, trial, bracket.guard) < 0) {
+      bracket.safe = trial;
+      bracket.unsafe = theta;
+      return true;
+    }
+    theta = trial;
+  }
+  return begin_of_rise(stepper, bracket);
+}
+
+/// There was no excursion, or one too small for the dense output: the root is where the guard rises from
+/// then on.
+template <class S, int N>
+bool GuardRoots<S, N>::begin_of_rise(Stepper<S, N>& stepper, Bracket& bracket) const {
+  if (!(slope_at(stepper, bracket.unsafe, bracket.guard) > 0)) return false;
+  for (int k = 0; k < 200 && slope_at(stepper, 0.5 * bracket.unsafe, bracket.guard) > 0; ++k)
+    bracket.unsafe *= 0.5;
+  bracket.safe = bracket.unsafe;
+  return true;
+}
+
+template <class S, int N>
+double GuardRoots<S, N>::slope_at(const Stepper<S, N>& stepper, double theta, int guard) const {
+  Entry<S, N> at{watch_.phase.mode, S(stepper.t0() + theta * (stepper.t1() - stepper.t0())), {}, S(0)};
+  stepper.interpolate(theta, at.y);
+  return watch_.slopes(at)[guard];
+}
+
+/// Between safe nodes the cubic through the four may still pass zero twice. `true`, with the bracket, if
+/// the guard really does after `safe_from` and, where a crossing is `known`, before that one.
+template <class S, int N>
+bool GuardRoots<S, N>::find_hidden_peak(Stepper<S, N>& stepper, const Samples& G, double safe_from,
+                                        bool known, Bracket& bracket) {
+  const int i = bracket.guard;
+  const double range = range_of(G, i);
+  if (!(range > 0)) return false;
+  const double a = G[0][i] / range, b = G[1][i] / range, c = G[2][i] / range, d = G[3][i] / range;
+  if (std::max({a, b, c, d}) + 0.3 < 0) return false;
+  // Newton's form on u = 3θ: a + u Δ1 + u(u−1)/2 Δ2 + u(u−1)(u−2)/6 Δ3; its derivative is a quadratic in u.
+  const double d1 = b - a, d2 = c - 2 * b + a, d3 = d - 3 * c + 3 * b - a;
+  const double q2 = 0.5 * d3, q1 = d2 - d3, q0 = d1 - 0.5 * d2 + d3 / 3;
+  double roots[2];
+  int count = 0;
+  if (std::abs(q2) > 1e-14 * (std::abs(q1) + std::abs(q0))) {
+    const double disc = q1 * q1 - 4 * q2 * q0;
+    if (disc < 0) return false;
+    const double r = -0.5 * (q1 + std::copysign(std::sqrt(disc), q1));
+    roots[count++] = r / q2;
+    if (r != 0) roots[count++] = q0 / r;
+  } else if (q1 != 0) {
+    roots[count++] = -q0 / q1;
+  }
+  // A peak at the joint of two steps belongs to the first of them.
+  const double from = std::max(safe_from, first_step_ ? 0.0 : 1e-3), to = known ? bracket.safe : 1.001;
+  for (int k = 0; k < count; ++k) {  // a cubic has one maximum
+    if (!(roots[k] > 3 * from && roots[k] < 3 * to) || q1 + 2 * q2 * roots[k] >= 0) continue;
+    double peak = std::min(roots[k] / 3, 1.0), width = 1.0 / 12;
+    double best = sample_one(stepper, peak, i) / range;
+    for (int refine = 0; refine < 12 && best <= kGrazing;
+         ++refine, width *= 0.5)  // climb to the true maximum
+      for (const double trial : {peak - width, peak + width}) {
+        if (trial <= from || trial >= std::min(to, 1.0)) continue;
+        const double value = sample_one(stepper, trial, i) / range;
+        if (value > best) {
+          best = value;
+          peak = trial;
+          break;
+        }
+      }
+    if (best > kGrazing) {
+      bracket.unsafe = peak;
+      bracket.safe = from;
+      for (int node = 1; node < 3; ++node)
+        if (kNode[node] < peak && kNode[node] > from && G[node][i] < 0) bracket.safe = kNode[node];
+      return true;
+    }
+    if (best > -kGrazing) ++grazings_;
+  }
+  return false;
+}
+
+/// Narrows the bracket on the dense output (Illinois' false position, safeguarded) and returns the root's
+/// fraction.
+template <class S, int N>
+double GuardRoots<S, N>::bisect(Stepper<S, N>& stepper, Bracket& bracket) {
+  double a = bracket.safe, b = bracket.unsafe;
+  double Ga =
+      a > 0 ? sample_one(stepper, a, bracket.guard) : std::min(sample_one(stepper, a, bracket.guard), 0.0);
+  double Gb = sample_one(stepper, b, bracket.guard);
+  double wa = Ga, wb = Gb;
+  for (int k = 0; k < 80 && b - a > 1e-9 * b && Gb > 0; ++k) {
+    double m = (k % 6 == 5 || !(wa < 0)) ? 0.5 * (a + b) : (a * wb - b * wa) / (wb - wa);
+    if (!(m > a && m < b)) m = 0.5 * (a + b);
+    const double Gm = sample_one(stepper, m, bracket.guard);
+    if (Gm < 0) {
+      a = m;
+      wa = Gm;
+      wb *= 0.5;
+    } else {
+      b = m;
+      Gb = wb = Gm;
+      wa *= 0.5;
+    }
+  }
+  bracket.safe = a;
+  bracket.unsafe = b;
+  return b;
+}
+
+template <class S, int N>
+Entry<S, N> GuardRoots<S, N>::polish(Stepper<S, N>& stepper, const Bracket& bracket) {
+  const double t0 = value_of(stepper.t0()), length = value_of(stepper.t1()) - t0;
+  double h = bracket.unsafe * length;
+  State<S, N> y;
+  double G[kMaxGuards];
+  double slope = (sample_one(stepper, std::min(1.0, bracket.unsafe + 1e-3), bracket.guard) -
+                  sample_one(stepper, std::max(0.0, bracket.unsafe - 1e-3), bracket.guard)) /
+                 ((std::min(1.0, bracket.unsafe + 1e-3) - std::max(0.0, bracket.unsafe - 1e-3)) * length);
+  double h_last = h, G_last = 0, h_best = h, G_best = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < 8 && bracket.safe < bracket.unsafe; ++k) {
+    retake(stepper, h, y);
+    watch_.evaluate(stepper.t0() + h, y, G);
+    const double now = G[bracket.guard];
+    if (std::abs(now) < G_best) {
+      G_best = std::abs(now);
+      h_best = h;
+    }
+    if (k > 0 && h != h_last && (now - G_last) / (h - h_last) > 0) slope = (now - G_last) / (h - h_last);
+    if (!(slope > 0) || !std::isfinite(now)) break;
+    const double move = std::clamp(-now / slope, -0.1 * length, 0.1 * length);
+    const double next = std::clamp(h + move, 0.0, length);
+    if (std::abs(next - h) <= 1e-14 + 4e-16 * std::abs(t0)) break;
+    h_last = h;
+    G_last = now;
+    h = next;
+  }
+  h = h_best;
+  retake(stepper, h, y);
+  Entry<S, N> root{watch_.phase.mode, S(stepper.t0() + h), y, S(0)};
+  if constexpr (!std::is_same_v<S, double>) add_root_derivative(bracket.guard, root);
+  return root;
+}
+
+template <class S, int N>
+void GuardRoots<S, N>::add_root_derivative(int guard, Entry<S, N>& root) const {
+  S g[kMaxGuards];
+  system_.guards(watch_.phase, root.t, root.y, g);
+  const double rate = watch_.sign[guard] * watch_.slopes(root)[guard];
+  if (rate == 0) return;  // grazing: the event time has no derivative
+  S shift = -g[guard] / rate;
+  if constexpr (!std::is_same_v<S, double>) shift.a = 0;  // the value is at the root already
+  State<double, N> y, dy{};
+  for (int i = 0; i < N; ++i) y[i] = value_of(root.y[i]);
+  if (system_.kind(watch_.phase.mode) != FlowKind::frozen)
+    system_.flow(watch_.phase, value_of(root.t), y, dy);
+  root.t += shift;
+  for (int i = 0; i < N; ++i) root.y[i] += dy[i] * shift;
+}
+
+template class GuardRoots<double, 2>;
+template class GuardRoots<double, 6>;
+template class GuardRoots<double, 7>;
+template class GuardRoots<Dual, 2>;
+template class GuardRoots<Dual, 6>;
+template class GuardRoots<Dual, 7>;
+
+}  // namespace unhand::dynamics
