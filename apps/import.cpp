@@ -6,6 +6,7 @@
 #include "apps/command.hpp"
 #include "apps/output.hpp"
 #include "datasets/import_cube_tosses.hpp"
+#include "datasets/import_planar_pushes.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -42,6 +43,33 @@ Imported import_cubes(const Options& options, Outputs& outputs) {
   return out;
 }
 
+Imported import_pushes(const Options& options, Outputs& outputs) {
+  const std::vector<std::filesystem::path> inputs(options.inputs.begin(), options.inputs.end());
+  datasets::PlanarPushReport report;
+  const auto log = datasets::import_planar_pushes(inputs, {}, &report);
+  outputs.log(options.out, log);
+  Imported out;
+  out.text = fmt::format(
+      "{}: {} of {} pushes on {} surfaces ({} train, {} test), {} samples ({} dropped; {} pushes begin in "
+      "contact)\n",
+      options.out, report.kept, report.pushes, log.surfaces.size(), report.train, report.test, report.samples,
+      report.dropped_samples, report.borrowed_offsets);
+  out.details = {{"pushes", report.pushes},
+                 {"kept", report.kept},
+                 {"train", report.train},
+                 {"test", report.test},
+                 {"samples", report.samples},
+                 {"dropped_samples", report.dropped_samples},
+                 {"borrowed_offsets", report.borrowed_offsets},
+                 {"dropped", Json::array()}};
+  for (const auto& dropped : report.dropped) {
+    out.text += fmt::format("  dropped {}, push {}: {}\n", dropped.surface, dropped.push, dropped.reason);
+    out.details["dropped"].push_back(
+        {{"surface", dropped.surface}, {"push", dropped.push}, {"reason", dropped.reason}});
+  }
+  return out;
+}
+
 struct Format {
   const char *name, *summary;
   Imported (*read)(const Options&, Outputs&);
@@ -49,6 +77,7 @@ struct Format {
 /// An importer is one line here.
 constexpr Format formats[] = {
     {"cube-tosses", "measured tosses of a cube, one CSV in SI units: a throw log", &import_cubes},
+    {"planar-pushes", "measured pushes of a block, text logs or folders of them: a slip log", &import_pushes},
 };
 
 std::string known_formats() {
@@ -89,7 +118,9 @@ Command import_command(CLI::App& root) {
   parser->add_option("--out", options->out, "The log to write (replaced if it exists)")->required();
   parser->add_option("--json", options->json, "Write what was read, kept and dropped as JSON");
   add_threads(*parser, options->threads);
-  parser->footer("Example:\n  unhand import cube-tosses cube_tosses.csv --out cubes.h5");
+  parser->footer(
+      "Examples:\n  unhand import cube-tosses cube_tosses.csv --out cubes.h5\n  unhand import planar-pushes "
+      "planar_pushes --out pushes.h5");
   return {parser, [options] { import(*options); }};
 }
 

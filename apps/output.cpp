@@ -72,14 +72,23 @@ void Outputs::text(const fs::path& file, const std::string& content) {
   write_text(parts_.back().made, content);
 }
 
-void Outputs::log(const fs::path& file, const datasets::ThrowLog& log) {
+template <class Write>
+void Outputs::made_by(const fs::path& file, Write&& write) {
   require_writable(file);
   parts_.push_back({part_of(file), file, false});
   try {
-    datasets::write_throw_log(parts_.back().made, log);
+    write(parts_.back().made);
   } catch (const datasets::LogError& error) {
     refuse(file, fmt::format("{}: {}", error.path, error.reason));
   }
+}
+
+void Outputs::log(const fs::path& file, const datasets::ThrowLog& log) {
+  made_by(file, [&](const fs::path& made) { datasets::write_throw_log(made, log); });
+}
+
+void Outputs::log(const fs::path& file, const datasets::SlipLog& log) {
+  made_by(file, [&](const fs::path& made) { datasets::write_slip_log(made, log); });
 }
 
 fs::path Outputs::directory(const fs::path& destination) {

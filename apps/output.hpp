@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "datasets/slip_log.hpp"
 #include "datasets/throw_log.hpp"
 
 namespace unhand::apps {
@@ -32,6 +33,7 @@ class Outputs {
   void json(const std::filesystem::path& file, const Json& value) { text(file, json_text(value)); }
 
   void log(const std::filesystem::path& file, const datasets::ThrowLog& log);
+  void log(const std::filesystem::path& file, const datasets::SlipLog& log);
 
   /// A directory to fill; commit() moves what it holds to `destination`, which may exist and keeps its other
   /// files.
@@ -44,6 +46,8 @@ class Outputs {
     std::filesystem::path made, destination;
     bool is_directory{};
   };
+  template <class Write>
+  void made_by(const std::filesystem::path& file, Write&& write);
   std::filesystem::path part_of(const std::filesystem::path& destination);
 
   std::vector<Part> parts_;

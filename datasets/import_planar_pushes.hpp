@@ -1,0 +1,79 @@
+// Importer: the measured planar pushes of Zhou, Paolini, Bagnell and Mason (ICRA 2016).
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "datasets/slip_log.hpp"
+
+namespace unhand::datasets {
+
+/// A triangular block lies on three feet, or on its whole face, and a finger pushes its edge 16 mm at 2.5
+/// mm/s. A log holds, per push, the block's pose before and after, the finger's pose at 33 Hz and the force
+/// on the finger at 100 Hz. [Zhou2016] What the logs do not say is here: mass, outline and centre of the
+/// block as published with the logs, all in the tracked frame (origin at the right-angled corner, axes along
+/// the legs).
+///
+/// **Frames and units.** Poses are in mm, turned into m; every rotation is a yaw about world z, up. The force
+/// sensor turns with the finger: with θ the finger's yaw, the force on the block in the world is
+/// f = −R(θ) M (f_s − b), M = (1/√2) [[1, 1], [1, −1]], for the sensor's axes stand at 45° and its z points
+/// down. The minus sign turns the load of the finger into the load on the block. That load is also the wrench
+/// which the block applies to the surface: at 2.5 mm/s inertia is nothing beside friction (quasi-static).
+/// The torque is r × f about the block's centre, r from the centre to the finger.
+///
+/// **Offset b.** The median of the first `rest` seconds, when the finger is still on its way. Where that is
+/// further than `offset_tolerance` from the median of the log's pushes the finger was touching already, and
+/// the median of the log's pushes is taken.
+///
+/// **Clocks.** Both series bear stamps of one computer; the finger's pose is interpolated linearly at the
+/// times of the grid and stays at its ends beyond them (0.03 s at most in these logs).
+///
+/// **Motion.** The block's pose is known before and after only. In between it moves along the screw that
+/// leads from one to the other, so its twist has one direction, and where it is along the screw follows from
+/// the finger, which stays on the edge: s(t) in [0, 1], never falling. The edge is the one that the finger is
+/// at when the push ends; what it lacks to the edge then (calibration, up to `contact_tolerance`) is taken as
+/// constant. The finger sits on the block at its own position: its radius does not show in the logs.
+///
+/// **Samples.** Intervals of `step` seconds: mean force, twist = screw · Δs/step. An interval stays if the
+/// block moves faster than `least_speed` (|v| + L|ω|) under more than `least_force`. A push stays if its
+/// screw is longer than `least_motion`, the finger ends at an edge, the mean force presses on that edge (a
+/// contact cannot pull), and an interval is left.
+struct PlanarPushOptions {
+  double mass = 1.518;                                                           // [kg]
+  std::array<double, 2> centre{0.05, 0.05};                                      // [m]
+  std::array<std::array<double, 2>, 3> outline{{{0, 0}, {0.15, 0}, {0, 0.15}}};  // counter-clockwise [m]
+  double characteristic_length = 0.05;                                           // L [m]
+  double step = 0.1;                                                             // [s]
+  double rest = 0.2;                                                             // [s]
+  double offset_tolerance = 0.3;                                                 // [N]
+  double contact_tolerance = 0.004;                                              // [m]
+  double least_motion = 0.001;  // [m], √(|v|² + L²ω²) of the whole screw
+  double least_speed = 2e-4;    // [m/s]
+  double least_force = 0.3;     // [N]
+  int test_every = 5;  // push numbers n, from 0, with n % test_every == test_every − 1 are held out: 4 to 1
+};
+
+struct DroppedPush {
+  std::string surface;
+  int push = 0;  // from 0
+  std::string reason;
+};
+
+struct PlanarPushReport {
+  int pushes = 0, kept = 0, train = 0, test = 0;
+  std::size_t samples = 0, dropped_samples = 0;  // intervals of kept pushes
+  int borrowed_offsets = 0;                      // kept pushes that begin in contact
+  std::vector<DroppedPush> dropped;
+};
+
+/// One surface per log, named by the folder that the log is in (with the file's stem where a folder holds
+/// several), and one slip per kept push, "push-00" on. Times start with the push's first force sample. A
+/// folder among the inputs stands for every .txt file below it. Throws ImportError naming file, line and
+/// column; std::invalid_argument for options out of range.
+SlipLog import_planar_pushes(std::span<const std::filesystem::path> inputs,
+                             const PlanarPushOptions& options = {}, PlanarPushReport* report = nullptr);
+
+}  // namespace unhand::datasets
