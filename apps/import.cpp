@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "apps/command.hpp"
+#include "apps/import_lab.hpp"
 #include "apps/output.hpp"
 #include "datasets/import_cube_tosses.hpp"
 #include "datasets/import_planar_pushes.hpp"
@@ -14,6 +15,7 @@ namespace {
 struct Options {
   std::string format, out, json;
   std::vector<std::string> inputs;
+  LabOptions lab;
   int threads{0};
 };
 
@@ -41,6 +43,11 @@ Imported import_cubes(const Options& options, Outputs& outputs) {
     out.details["dropped"].push_back(
         {{"toss", dropped.toss}, {"samples", dropped.samples}, {"reason", dropped.reason}});
   return out;
+}
+
+Imported import_lab_files(const Options& options, Outputs& outputs) {
+  LabImport imported = import_lab(options.format, options.inputs, options.out, options.lab, outputs);
+  return {std::move(imported.text), std::move(imported.details)};
 }
 
 Imported import_pushes(const Options& options, Outputs& outputs) {
@@ -71,13 +78,30 @@ Imported import_pushes(const Options& options, Outputs& outputs) {
 }
 
 struct Format {
-  const char *name, *summary;
+  const char *name, *summary, *example;
   Imported (*read)(const Options&, Outputs&);
 };
 /// An importer is one line here.
 constexpr Format formats[] = {
-    {"cube-tosses", "measured tosses of a cube, one CSV in SI units: a throw log", &import_cubes},
-    {"planar-pushes", "measured pushes of a block, text logs or folders of them: a slip log", &import_pushes},
+    {"cube-tosses", "measured tosses of a cube, one CSV in SI units: a throw log",
+     "unhand import cube-tosses cube_tosses.csv --out cubes.h5", &import_cubes},
+    {"planar-pushes", "measured pushes of a block, text logs or folders of them: a slip log",
+     "unhand import planar-pushes planar_pushes --out pushes.h5", &import_pushes},
+    {"hand-csv", "a robot's hand in the throwing plane, any CSV with a map of its columns",
+     "unhand import hand-csv hand/*.csv --sku bar.toml --opening-time 0.1 --out log.h5\n"
+     "      --columns time=t,x=X,z=Z,theta=pitch,vx=VX,vz=VZ,omega=q,ax=AX,az=AZ,alpha=qd\n"
+     "      --units time=ms,x=mm,z=mm,theta=deg,vx=m/s,vz=m/s,omega=deg/s,ax=m/s^2,az=m/s^2,alpha=deg/s^2",
+     &import_lab_files},
+    {"ft-csv", "the sensor behind one pad, any CSV with a map of its columns",
+     "unhand import ft-csv ft/*.csv --into log.h5 --columns time=t,fx=-Fx,fz=-Fz,tau=-Ty,normal=Fy\n"
+     "      --units time=s,fx=N,fz=N,tau='N mm',normal=N --sigma fx=0.02,fz=0.02,tau=0.2,normal=0.05",
+     &import_lab_files},
+    {"motive-csv", "rigid bodies exported by OptiTrack Motive, one take a throw",
+     "unhand import motive-csv takes/*.csv --body bar --heading 90 --landing --into log.h5\n"
+     "  unhand import motive-csv ball_01.csv --mass 0.057 --free-flight 1.20,1.85 --out flights.h5",
+     &import_lab_files},
+    {"phyphox", "a phone's accelerometer, cut into its free falls",
+     "unhand import phyphox fall_*/'Raw Data.csv' --mass 0.2 --out falls.h5", &import_lab_files},
 };
 
 std::string known_formats() {
@@ -86,7 +110,15 @@ std::string known_formats() {
   return out;
 }
 
-void import(const Options& options) {
+std::string examples() {
+  std::string out = "Examples:";
+  for (const Format& format : formats) out += fmt::format("\n  {}", format.example);
+  return out;
+}
+
+void import(Options& options) {
+  if (options.out.empty()) options.out = options.lab.into;
+  if (options.out.empty()) throw WrongUsage("--out is required: the log to write");
   for (const Format& format : formats) {
     if (options.format != format.name) continue;
     require_writable(options.out);
@@ -115,12 +147,12 @@ Command import_command(CLI::App& root) {
   CLI::App* parser = root.add_subcommand("import", "Make a log from measured data in another format");
   parser->add_option("FORMAT", options->format, "Which format:" + known_formats())->required();
   parser->add_option("INPUT", options->inputs, "The files to read")->required();
-  parser->add_option("--out", options->out, "The log to write (replaced if it exists)")->required();
+  parser->add_option("--out", options->out,
+                     "The log to write (replaced if it exists); --into, where that is given");
   parser->add_option("--json", options->json, "Write what was read, kept and dropped as JSON");
   add_threads(*parser, options->threads);
-  parser->footer(
-      "Examples:\n  unhand import cube-tosses cube_tosses.csv --out cubes.h5\n  unhand import planar-pushes "
-      "planar_pushes --out pushes.h5");
+  add_lab_options(*parser, options->lab);
+  parser->footer(examples());
   return {parser, [options] { import(*options); }};
 }
 

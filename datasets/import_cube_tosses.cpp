@@ -3,15 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <fstream>
 #include <set>
 #include <stdexcept>
 #include <string_view>
 
 #include "datasets/channel_rules.hpp"
 #include "datasets/channel_table.hpp"
+#include "datasets/csv.hpp"
 
 namespace unhand::datasets {
 namespace {
@@ -22,7 +21,7 @@ constexpr std::size_t n_columns = 17;
 constexpr double norm_tolerance = 1e-3;  // six printed decimals leave 1e-6
 
 struct Row {
-  int toss = 0, k = 0, line = 0;
+  int toss = 0, k = 0;
   bool before_contact = false;
   double t = 0;
   std::array<double, 7> pose{};
@@ -33,54 +32,15 @@ struct Toss {
   std::size_t flight = 0;  // samples before the first contact
 };
 
-/// One line of the CSV, with the place of everything in it.
-class Line {
- public:
-  Line(const std::string& file, int number, std::string_view text)
-      : file_(file), number_(number), rest_(text) {}
-
-  [[noreturn]] void fail(std::string_view column, const std::string& why) const {
-    throw ImportError(
-        file_,
-        column.empty() ? fmt::format("line {}", number_) : fmt::format("line {}, column {}", number_, column),
-        why);
-  }
-
-  template <class Number>
-  Number next(std::string_view column) {
-    std::string_view part = next_part(rest_);
-    while (!part.empty() && part.front() == ' ') part.remove_prefix(1);
-    while (!part.empty() && part.back() == ' ') part.remove_suffix(1);
-    Number value{};
-    const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
-    if (error != std::errc{} || end != part.data() + part.size()) {
-      fail(column,
-           fmt::format("'{}' is not {}", part, std::is_integral_v<Number> ? "an integer" : "a number"));
-    }
-    if constexpr (!std::is_integral_v<Number>) {
-      if (!std::isfinite(value)) fail(column, fmt::format("{} is not finite", value));
-    }
-    return value;
-  }
-
- private:
-  const std::string& file_;
-  int number_;
-  std::string_view rest_;
-};
-
-Row parse_row(const std::string& file, int number, std::string_view text) {
-  Line line(file, number, text);
-  const auto found = static_cast<std::size_t>(std::count(text.begin(), text.end(), ',')) + 1;
-  if (found != n_columns) line.fail("", fmt::format("{} values, expected {}", found, n_columns));
+Row parse_row(const CsvLine& line) {
+  line.expect_cells(n_columns);
   Row row;
-  row.line = number;
-  row.toss = line.next<int>("toss");
-  row.k = line.next<int>("k");
-  row.t = line.next<double>("t_s");
-  for (std::size_t j = 0; j < 7; ++j) row.pose[j] = line.next<double>(part_of(header, 3 + j));
-  for (std::size_t j = 10; j < 16; ++j) line.next<double>(part_of(header, j));
-  const int flag = line.next<int>("before_first_contact");
+  row.toss = line.integer(0, "toss");
+  row.k = line.integer(1, "k");
+  row.t = line.real(2, "t_s");
+  for (std::size_t j = 0; j < 7; ++j) row.pose[j] = line.real(3 + j, part_of(header, 3 + j));
+  for (std::size_t j = 10; j < 16; ++j) line.real(j, part_of(header, j));
+  const int flag = line.integer(16, "before_first_contact");
   if (flag != 0 && flag != 1) line.fail("before_first_contact", fmt::format("{} is not 0 or 1", flag));
   row.before_contact = flag == 1;
   if (row.toss < 0) line.fail("toss", fmt::format("{} is negative", row.toss));
@@ -94,8 +54,7 @@ Row parse_row(const std::string& file, int number, std::string_view text) {
 
 /// The rows of one toss follow one another in the file: samples counted from 0, time rising, flag falling
 /// once.
-void append(const std::string& file, std::vector<Toss>& tosses, std::set<int>& seen, const Row& row) {
-  const Line line(file, row.line, {});
+void append(const CsvLine& line, std::vector<Toss>& tosses, std::set<int>& seen, const Row& row) {
   if (tosses.empty() || tosses.back().rows.back().toss != row.toss) {
     if (!seen.insert(row.toss).second)
       line.fail("toss", fmt::format("toss {} appears in two places", row.toss));
@@ -114,25 +73,14 @@ void append(const std::string& file, std::vector<Toss>& tosses, std::set<int>& s
 }
 
 std::vector<Toss> read_tosses(const std::filesystem::path& csv, int& rows) {
-  const std::string file = csv.string();
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(csv, error)) throw ImportError(file, "line 0", "no such file");
-  std::ifstream in(csv, std::ios::binary);
+  CsvReader reader(csv);
   std::vector<Toss> tosses;
   std::set<int> seen;
-  std::string text;
-  for (int number = 1; std::getline(in, text); ++number) {
-    if (text.ends_with('\r')) text.pop_back();
-    if (number == 1) {
-      if (text != header)
-        throw ImportError(file, "line 1", fmt::format("the header is missing, expected '{}'", header));
-    } else if (!text.empty()) {
-      append(file, tosses, seen, parse_row(file, number, text));
-      ++rows;
-    }
-  }
-  if (in.bad()) throw ImportError(file, "line 0", "cannot be read");
-  if (tosses.empty()) throw ImportError(file, "line 1", "holds no tosses");
+  CsvLine line;
+  if (reader.next(line) && line.text != header)
+    line.fail("", fmt::format("the header is missing, expected '{}'", header));
+  for (; reader.next(line); ++rows) append(line, tosses, seen, parse_row(line));
+  if (tosses.empty()) reader.fail(1, "holds no tosses");
   return tosses;
 }
 

@@ -186,10 +186,25 @@ Sku read_sku(const fs::path& file) {
   return sku;
 }
 
-Object to_object(const Sku& sku) {
+/// About x, y and z; nothing where the shape or a measured inertia leaves one of them open.
+std::optional<std::vector<double>> spatial_inertia(const Sku& sku) {
+  if (!sku.shape || !sku.dims || *sku.shape == "rod") return {};
+  const auto [x, y, z] = *sku.dims;
+  const double about_y = shape_inertia(*sku.shape, sku.mass, *sku.dims);
+  if (std::abs(about_y - sku.inertia.value_or(0)) > 1e-12 * about_y) return {};
+  if (*sku.shape == "sphere") return {{about_y, about_y, about_y}};
+  if (*sku.shape == "disc") return {{about_y / 2, about_y, about_y / 2}};
+  if (*sku.shape == "cylinder") return {{sku.mass * z * z / 8, about_y, about_y}};
+  return {{sku.mass * (y * y + z * z) / 12, about_y, sku.mass * (x * x + y * y) / 12}};
+}
+
+Object to_object(const Sku& sku, int dimension) {
   Object object;
   object.mass = sku.mass;
-  if (sku.inertia) object.inertia = std::vector<double>{*sku.inertia};
+  if (dimension == 3)
+    object.inertia = spatial_inertia(sku);
+  else if (sku.inertia)
+    object.inertia = std::vector<double>{*sku.inertia};
   object.com_offset = sku.com_offset;
   object.dims = sku.dims;
   object.surface = sku.surface;

@@ -46,7 +46,9 @@ double shape_inertia(const std::string& shape, double mass, const std::array<dou
 /// and range.
 Sku read_sku(const std::filesystem::path& file);
 
-/// The object of a planar throw log that this SKU declares.
-Object to_object(const Sku& sku);
+/// The object of a throw log that this SKU declares. In a spatial log (dimension 3) the inertia is known
+/// where it is that of a uniform box, cylinder, disc or sphere: then it is the three about the object's x, y
+/// and z.
+Object to_object(const Sku& sku, int dimension = 2);
 
 }  // namespace unhand::datasets

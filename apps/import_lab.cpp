@@ -1,0 +1,343 @@
+#include "apps/import_lab.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <map>
+#include <numbers>
+#include <stdexcept>
+
+#include "apps/command.hpp"
+#include "datasets/assemble.hpp"
+#include "datasets/import_columns.hpp"
+#include "datasets/import_motive.hpp"
+#include "datasets/import_phyphox.hpp"
+#include "datasets/sku.hpp"
+
+namespace unhand::apps {
+namespace {
+
+using datasets::Throw;
+using datasets::ThrowLog;
+
+/// What one file gave: throws without names, and a line to say of it.
+struct Reading {
+  std::vector<Throw> throws;
+  std::string text;
+  Json details;
+};
+
+bool given(const LabOptions& options, const char* name) { return options.parser->count(name) > 0; }
+
+/// "a=b,c=d"; a part without '=' belongs to the value before it, so that values may hold commas.
+std::map<std::string, std::string> parse_pairs(const char* option, const std::string& text) {
+  std::map<std::string, std::string> out;
+  std::string* last = nullptr;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t comma = std::min(text.find(',', begin), text.size());
+    const std::string part = text.substr(begin, comma - begin);
+    const std::size_t equals = part.find('=');
+    begin = comma + 1;
+    if (equals == std::string::npos && last != nullptr) {
+      *last += "," + part;
+      continue;
+    }
+    if (equals == std::string::npos || equals == 0 || equals + 1 == part.size())
+      throw WrongUsage(fmt::format("{}: '{}' is not NAME=VALUE", option, part));
+    const std::string name = part.substr(0, equals);
+    if (out.contains(name)) throw WrongUsage(fmt::format("{}: '{}' is given twice", option, name));
+    last = &(out[name] = part.substr(equals + 1));
+  }
+  return out;
+}
+
+std::map<std::string, double> parse_numbers(const char* option, const std::string& text) {
+  std::map<std::string, double> out;
+  for (const auto& [name, value] : parse_pairs(option, text)) {
+    const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), out[name]);
+    if (error != std::errc{} || end != value.data() + value.size())
+      throw WrongUsage(fmt::format("{}: '{}' of {} is not a number", option, value, name));
+  }
+  return out;
+}
+
+/// Only those that `format` takes may be given.
+void require_options(const std::string& format, const LabOptions& options) {
+  struct Rule {
+    const char* option;
+    std::vector<std::string_view> formats;
+  };
+  const Rule rules[] = {{"--columns", {"hand-csv", "ft-csv"}},
+                        {"--units", {"hand-csv", "ft-csv"}},
+                        {"--sigma", {"hand-csv", "ft-csv", "motive-csv"}},
+                        {"--time-offset", {"hand-csv", "ft-csv", "motive-csv"}},
+                        {"--into", {"hand-csv", "ft-csv", "motive-csv"}},
+                        {"--body", {"motive-csv"}},
+                        {"--dimension", {"motive-csv"}},
+                        {"--heading", {"motive-csv"}},
+                        {"--origin", {"motive-csv"}},
+                        {"--com", {"motive-csv"}},
+                        {"--landing", {"motive-csv"}},
+                        {"--free-flight", {"motive-csv"}}};
+  for (const Rule& rule : rules)
+    if (given(options, rule.option) &&
+        std::find(rule.formats.begin(), rule.formats.end(), format) == rule.formats.end())
+      throw WrongUsage(fmt::format("{} is not for {}", rule.option, format));
+  if (options.into.empty()) {
+    if (given(options, "--replace")) throw WrongUsage("--replace goes with --into");
+    if (given(options, "--sku") == given(options, "--mass"))
+      throw WrongUsage(
+          "a new log needs its object: --sku FILE or --mass KG (or --into LOG, to add to a log)");
+  } else {
+    for (const char* name : {"--sku", "--mass", "--object", "--title", "--source", "--licence", "--gravity",
+                             "--landing-height", "--pads", "--pad-radius", "--opening-time", "--condition",
+                             "--test-every", "--test-conditions", "--dimension"})
+      if (given(options, name)) throw WrongUsage(fmt::format("{} is for a new log, not for --into", name));
+  }
+}
+
+ThrowLog new_log(const std::string& format, const LabOptions& options, const std::string& source) {
+  ThrowLog log;
+  log.dimension = format == "phyphox" ? 3 : format == "motive-csv" ? options.dimension : 2;
+  log.title = options.title.empty() ? fmt::format("imported from {}", format) : options.title;
+  log.source = options.source.empty() ? source : options.source;
+  if (!options.licence.empty()) log.licence = options.licence;
+  log.gravity = options.gravity;
+  log.landing_height = options.landing_height;
+  datasets::Object object;
+  std::string name = format == "phyphox" ? "phone" : "object";
+  if (options.sku.empty()) {
+    object.mass = options.mass;
+  } else {
+    const datasets::Sku sku = datasets::read_sku(options.sku);
+    object = datasets::to_object(sku, log.dimension);
+    name = sku.name;
+  }
+  log.objects.emplace(options.object.empty() ? name : options.object, object);
+  if (given(options, "--pads") || given(options, "--pad-radius") || given(options, "--opening-time")) {
+    datasets::Gripper& gripper = log.gripper.emplace();
+    gripper.n_pads = options.pads;
+    if (given(options, "--pad-radius")) gripper.pad_radius = options.pad_radius;
+    if (given(options, "--opening-time")) gripper.opening_command_time = options.opening_time;
+  }
+  return log;
+}
+
+Reading read_columns(const std::string& format, const std::string& file, const LabOptions& options) {
+  datasets::ColumnMap map{parse_pairs("--columns", options.columns), parse_pairs("--units", options.units),
+                          parse_numbers("--sigma", options.sigma), options.time_offset};
+  const bool hand = format == "hand-csv";
+  const std::string fault = fault_of(map, hand ? datasets::hand_channels() : datasets::ft_channels());
+  if (!fault.empty()) throw WrongUsage("--" + fault);
+  Reading out;
+  Throw& one = out.throws.emplace_back();
+  if (hand)
+    one.hand = datasets::read_hand_csv(file, map);
+  else
+    one.ft = datasets::read_ft_csv(file, map);
+  const datasets::Series& time = hand ? one.hand->time : one.ft->time;
+  out.text = fmt::format("{} samples, {:.6g} to {:.6g} s", time.rows, time.data.front(), time.data.back());
+  out.details = {{"samples", time.rows}};
+  return out;
+}
+
+std::array<double, 3> triple(const std::vector<double>& values) {
+  return values.empty() ? std::array<double, 3>{} : std::array<double, 3>{values[0], values[1], values[2]};
+}
+
+Reading read_motive(const std::string& file, const ThrowLog& log, const LabOptions& options) {
+  datasets::MotiveOptions motive;
+  motive.body = options.body;
+  motive.dimension = log.dimension;
+  motive.heading = options.heading * std::numbers::pi / 180;
+  motive.origin = triple(options.origin);
+  motive.com = triple(options.com);
+  motive.time_offset = options.time_offset;
+  for (const auto& [name, sigma] : parse_numbers("--sigma", options.sigma)) {
+    if (name != "position" && name != "angle")
+      throw WrongUsage(fmt::format("--sigma: '{}' is neither position (m) nor angle (rad)", name));
+    (name == "position" ? motive.sigma_position : motive.sigma_angle) = sigma;
+  }
+  datasets::MotiveTake take = datasets::read_motive_csv(file, motive);
+  Reading out;
+  Throw& one = out.throws.emplace_back();
+  out.text = fmt::format("rigid body {} of take {}, {} frames", take.body, take.name, take.mocap.time.rows);
+  if (take.frame_rate > 0) out.text += fmt::format(" at {:.6g} Hz", take.frame_rate);
+  out.text += fmt::format(", {} lost", take.lost);
+  out.details = {
+      {"take", take.name}, {"body", take.body}, {"frames", take.mocap.time.rows}, {"lost", take.lost}};
+  if (log.dimension == 2) {
+    const double angle = take.out_of_plane_angle * 180 / std::numbers::pi;
+    out.text += fmt::format(", out of the plane by {:.3g} m and {:.3g} deg", take.out_of_plane, angle);
+    out.details["out_of_plane_m"] = take.out_of_plane;
+    out.details["out_of_plane_deg"] = angle;
+  }
+  if (options.landing) {
+    one.landing = datasets::landing_of(take.mocap, log.dimension, log.landing_height);
+    out.text += one.landing ? fmt::format(", lands at {:.4f} s", one.landing->time(0))
+                            : fmt::format(", no landing: the track does not pass {} m", log.landing_height);
+    out.details["landing"] = one.landing.has_value();
+  }
+  one.mocap = std::move(take.mocap);
+  if (!options.free_flight.empty()) one.free_flight = {options.free_flight[0], options.free_flight[1]};
+  return out;
+}
+
+Reading read_phone(const std::string& file) {
+  datasets::PhyphoxRecording recording = datasets::read_phyphox(file);
+  Reading out;
+  out.text = fmt::format("{} samples, {} free fall{}", recording.samples, recording.falls.size(),
+                         recording.falls.size() == 1 ? "" : "s");
+  out.details = {
+      {"samples", recording.samples}, {"falls", recording.falls.size()}, {"dropped", Json::array()}};
+  for (const Throw& fall : recording.falls)
+    out.text +=
+        fmt::format("\n    falls from {:.3f} to {:.3f} s", fall.free_flight->first, fall.free_flight->second);
+  for (const auto& dropped : recording.dropped) {
+    out.text +=
+        fmt::format("\n    not a fall, {:.3f} to {:.3f} s: {}", dropped.begin, dropped.end, dropped.reason);
+    out.details["dropped"].push_back(
+        {{"begin_s", dropped.begin}, {"end_s", dropped.end}, {"reason", dropped.reason}});
+  }
+  out.throws = std::move(recording.falls);
+  return out;
+}
+
+Reading read(const std::string& format, const std::string& file, const ThrowLog& log,
+             const LabOptions& options) {
+  if (format == "motive-csv") return read_motive(file, log, options);
+  if (format == "phyphox") return read_phone(file);
+  return read_columns(format, file, options);
+}
+
+std::string source_of(const std::string& format, std::size_t files) {
+  return fmt::format(
+      "measured: {} file{} imported by unhand import {}{}", files, files == 1 ? "" : "s", format,
+      format == "phyphox" ? "; sigma estimated by the importer from the scatter in the falls" : "");
+}
+
+}  // namespace
+
+LabImport import_lab(const std::string& format, const std::vector<std::string>& inputs,
+                     const std::string& out, const LabOptions& options, Outputs& outputs) {
+  require_options(format, options);
+  for (const char* single : {"--throw", "--free-flight"})
+    if (inputs.size() != 1 && given(options, single))
+      throw WrongUsage(fmt::format("{} goes with one input, not {}", single, inputs.size()));
+  const bool adding = !options.into.empty();
+  ThrowLog log = adding ? datasets::read_throw_log(options.into)
+                        : new_log(format, options, source_of(format, inputs.size()));
+  LabImport imported;
+  imported.details["files"] = Json::array();
+  for (std::size_t k = 0; k < inputs.size(); ++k) {
+    const std::string& file = inputs[k];
+    Reading reading = read(format, file, log, options);
+    const datasets::ThrowName name = datasets::name_of(file);
+    const std::string id = options.throw_id.empty() ? name.id : options.throw_id;
+    for (std::size_t j = 0; j < reading.throws.size(); ++j) {
+      Throw& one = reading.throws[j];
+      if (adding) {
+        fill_throw(log, id, std::move(one), options.replace, options.into);
+        continue;
+      }
+      one.id = reading.throws.size() == 1 ? id : fmt::format("{}-{}", id, j + 1);
+      one.object = log.objects.begin()->first;
+      one.condition = options.condition.empty() ? name.condition : options.condition;
+      one.repetition = name.repetition;
+      add_throw(log, std::move(one), file);
+    }
+    imported.text +=
+        fmt::format("  {}: {}{}\n", file, adding ? fmt::format("throw {}, ", id) : "", reading.text);
+    reading.details["file"] = file;
+    imported.details["files"].push_back(reading.details);
+  }
+  if (log.throws.empty())
+    throw datasets::ImportError(inputs.front(), "line 1",
+                                "holds no free fall, nor does any other of the inputs");
+  try {
+    if (!adding) split_throws(log, {options.test_every, options.test_conditions});
+  } catch (const std::invalid_argument& error) {
+    throw WrongUsage(error.what());
+  }
+  outputs.log(out, log);
+  const auto train = std::count_if(log.throws.begin(), log.throws.end(),
+                                   [](const Throw& one) { return one.split == datasets::Split::train; });
+  const auto test = static_cast<std::ptrdiff_t>(log.throws.size()) - train;
+  imported.text = fmt::format("{}: {} throw{} ({} train, {} test)\n{}", out, log.throws.size(),
+                              log.throws.size() == 1 ? "" : "s", train, test, imported.text);
+  imported.details["throws"] = log.throws.size();
+  imported.details["train"] = train;
+  imported.details["test"] = test;
+  return imported;
+}
+
+void add_lab_options(CLI::App& parser, LabOptions& options) {
+  options.parser = &parser;
+  const auto add = [&](const char* group, const char* name, auto& value, const char* text) {
+    return parser.add_option(name, value, text)->group(group);
+  };
+  const char* one = "A log to add to (motive-csv, hand-csv, ft-csv)";
+  add(one, "--into", options.into,
+      "Add to the throws of this log that are named like the files; it is --out if that is not given");
+  parser.add_flag("--replace", options.replace, "Where a throw has such data already, replace it")
+      ->group(one);
+  const char* fresh = "A new log (motive-csv, hand-csv, ft-csv, phyphox)";
+  add(fresh, "--sku", options.sku, "The object as an SKU file (TOML): mass, inertia, offset of the CoM");
+  add(fresh, "--mass", options.mass, "[kg] The object's mass, where there is no SKU file")
+      ->check(CLI::PositiveNumber);
+  add(fresh, "--object", options.object, "The object's name; else the SKU file's");
+  add(fresh, "--title", options.title, "The campaign's title");
+  add(fresh, "--source", options.source, "Where the data are from");
+  add(fresh, "--licence", options.licence, "Their licence");
+  add(fresh, "--gravity", options.gravity, "[m/s^2] Gravity")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  add(fresh, "--landing-height", options.landing_height, "[m] Where a throw counts as landed")
+      ->capture_default_str();
+  add(fresh, "--pads", options.pads, "Pads of the gripper")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000));
+  add(fresh, "--pad-radius", options.pad_radius, "[m] Their radius")->check(CLI::PositiveNumber);
+  add(fresh, "--opening-time", options.opening_time,
+      "[s] When the gripper is told to open, on the robot's clock");
+  add(fresh, "--condition", options.condition,
+      "What these throws repeat; else the file's name without its number");
+  add(fresh, "--test-every", options.test_every, "Hold out every so-manieth throw of each condition; 0: none")
+      ->capture_default_str();
+  add(fresh, "--test-conditions", options.test_conditions, "Hold out these conditions as a whole")
+      ->delimiter(',');
+  const char* files = "What is in the files (motive-csv, hand-csv, ft-csv)";
+  add(files, "--throw", options.throw_id, "The throw's name; else the file's");
+  add(files, "--time-offset", options.time_offset,
+      "[s] Added to the file's time, to bring it to the robot's clock");
+  add(files, "--columns", options.columns,
+      "CHANNEL=HEADER,... or CHANNEL=#NUMBER; =-HEADER flips the sign. Channels of hand-csv: "
+      "time,x,z,theta,vx,vz,omega,ax,az,alpha; of ft-csv: time,fx,fz,tau,normal");
+  add(files, "--units", options.units,
+      "CHANNEL=UNIT,... where the header does not say it as 'Fx (N)' or 'Fx [N]'");
+  add(files, "--sigma", options.sigma,
+      "CHANNEL=NOISE,..., 1 sigma in the column's unit; of motive-csv: position=M,angle=RAD");
+  const char* motive = "Motive (motive-csv)";
+  add(motive, "--body", options.body, "The rigid body; else the only one");
+  add(motive, "--dimension", options.dimension, "3: free flights in space; 2: throws in a plane")
+      ->capture_default_str()
+      ->check(CLI::IsMember({2, 3}));
+  add(motive, "--heading", options.heading,
+      "[deg] Of the throw in Motive's floor, from its X axis, counter-clockwise seen from above");
+  add(motive, "--origin", options.origin, "[m] X,Y,Z of the robot's base in Motive's frame")
+      ->delimiter(',')
+      ->expected(3);
+  add(motive, "--com", options.com, "[m] X,Y,Z of the CoM in the rigid body's frame")
+      ->delimiter(',')
+      ->expected(3);
+  add(motive, "--free-flight", options.free_flight, "[s] T0,T1 between which the object touches nothing")
+      ->delimiter(',')
+      ->expected(2);
+  parser
+      .add_flag("--landing", options.landing,
+                "Take the landing from the track, where it passes the landing height")
+      ->group(motive);
+}
+
+}  // namespace unhand::apps

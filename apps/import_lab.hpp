@@ -1,0 +1,42 @@
+// unhand import: the formats of a lab's own instruments, each file a throw or one part of it.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "apps/output.hpp"
+
+namespace unhand::apps {
+
+/// As given on the command line; empty: not given.
+struct LabOptions {
+  std::string into, throw_id;
+  bool replace{};
+  std::string sku, object, title, source, licence, condition;
+  double mass{}, gravity{9.81}, landing_height{}, pad_radius{}, opening_time{};
+  int pads{2}, test_every{5}, dimension{3};
+  std::vector<std::string> test_conditions;
+  std::string columns, units, sigma;
+  double time_offset{};
+  std::string body;
+  double heading{};  // [deg]
+  std::vector<double> origin, com, free_flight;
+  bool landing{};
+  const CLI::App* parser{};  // knows which of them were given
+};
+
+struct LabImport {
+  std::string text;
+  Json details;
+};
+
+/// The options that these formats share, in groups of the help.
+void add_lab_options(CLI::App& parser, LabOptions& options);
+
+/// Reads the files of one format ("motive-csv", "hand-csv", "ft-csv", "phyphox") into a new log, or into the
+/// throws of the log that --into names, and hands it to `outputs` as `out`. Throws WrongUsage and LogError.
+LabImport import_lab(const std::string& format, const std::vector<std::string>& inputs,
+                     const std::string& out, const LabOptions& options, Outputs& outputs);
+
+}  // namespace unhand::apps

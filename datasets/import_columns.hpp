@@ -1,0 +1,48 @@
+// Importers: a robot's hand and a force/torque sensor from plain CSV files, by a map of columns.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "datasets/throw_log.hpp"
+
+namespace unhand::datasets {
+
+/// Which column of a file is which channel of the log. Keys are the names of channels (hand_channels(),
+/// ft_channels()).
+struct ColumnMap {
+  /// Channel -> header of its column, or "#3" for the third column (a file whose channels are all given so
+  /// needs no header). A '-' in front flips the sign: a sensor that reports what the object does to the pad
+  /// has fx=-Fx.
+  std::map<std::string, std::string> columns;
+  /// Channel -> unit of its column ("mm", "deg", "N mm"). Where it is not given, the header says it: "Fx
+  /// (N)", "Fx [N]". There is no default.
+  std::map<std::string, std::string> units;
+  /// Channel -> declared noise, 1 σ, in the column's unit. All channels of a dataset, or none.
+  std::map<std::string, double> sigma;
+  /// [s] added to the file's time, to bring it to the clock of the robot.
+  double time_offset = 0;
+};
+
+/// "time,x,z,theta,vx,vz,omega,ax,az,alpha": the hand frame in the throwing plane (x forward, z up, theta
+/// from +x towards +z). All of them are needed: a controller knows its acceleration, a differentiated log
+/// does not.
+std::vector<std::string> hand_channels();
+/// "time,fx,fz,tau,normal": what this pad applies to the object, in the hand frame, about the pad's centre,
+/// and the pad's normal force, positive when it presses.
+std::vector<std::string> ft_channels();
+
+/// Reads a CSV file (separated by tabs, semicolons or commas; with a decimal comma where it is not the
+/// separator) whose first line is a header. All values finite, time strictly increasing. theta is unwrapped:
+/// it never steps by more than π. Throws ImportError naming file, line and column, and std::invalid_argument
+/// for a map with names of channels that there are not, or without those that are needed.
+HandLog read_hand_csv(const std::filesystem::path& file, const ColumnMap& map);
+FtLog read_ft_csv(const std::filesystem::path& file, const ColumnMap& map);
+
+/// What is wrong with a map for these channels, or nothing: to say so before any file is read.
+std::string fault_of(const ColumnMap& map, const std::vector<std::string>& channels);
+
+}  // namespace unhand::datasets

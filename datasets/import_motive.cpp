@@ -1,0 +1,320 @@
+#include "datasets/import_motive.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+
+#include "datasets/csv.hpp"
+#include "datasets/units.hpp"
+
+namespace unhand::datasets {
+namespace {
+
+using Eigen::AngleAxisd;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+constexpr double pi = std::numbers::pi;
+constexpr double norm_tolerance = 1e-3;  // of a quaternion: six printed decimals leave 1e-6
+
+/// The first line: names and values in turn.
+struct Header {
+  std::string version, take, rotation;
+  double frame_rate = 0;
+  const Unit* length = nullptr;
+};
+
+std::optional<std::size_t> cell_of(const CsvLine& line, std::string_view name) {
+  const auto found = std::find(line.cells.begin(), line.cells.end(), name);
+  if (found == line.cells.end() || found + 1 == line.cells.end()) return {};
+  return static_cast<std::size_t>(found - line.cells.begin()) + 1;
+}
+
+Header parse_header(const CsvLine& line) {
+  const auto text = [&](std::string_view name) {
+    const auto i = cell_of(line, name);
+    return i ? line.cells[*i] : std::string();
+  };
+  Header out;
+  if (line.cells.front() != "Format Version")
+    line.fail(
+        "",
+        "expected Motive's header, 'Format Version,1.23,Take Name,...': export with Header Information on");
+  out.version = text("Format Version");
+  if (out.version.size() < 4 || !out.version.starts_with("1.2"))
+    line.fail("Format Version", fmt::format("'{}' is not supported, expected 1.20 to 1.29", out.version));
+  out.take = text("Take Name");
+  const std::string space = text("Coordinate Space");
+  if (!space.empty() && space != "Global")
+    line.fail("Coordinate Space", fmt::format("'{}' is not supported, expected Global", space));
+  const std::string units = text("Length Units");
+  if (units.empty())
+    line.fail("Length Units", "the header does not say it, expected Millimeters, Centimeters or Meters");
+  out.length = find_unit(units == "Millimeters"   ? "mm"
+                         : units == "Centimeters" ? "cm"
+                         : units == "Meters"      ? "m"
+                                                  : "?");
+  if (out.length == nullptr)
+    line.fail("Length Units",
+              fmt::format("'{}' is not known, expected Millimeters, Centimeters or Meters", units));
+  out.rotation = text("Rotation Type");
+  if (const auto i = cell_of(line, "Export Frame Rate"); i && line.is_number(*i))
+    out.frame_rate = line.real(*i, "Export Frame Rate");
+  else if (const auto j = cell_of(line, "Capture Frame Rate"); j && line.is_number(*j))
+    out.frame_rate = line.real(*j, "Capture Frame Rate");
+  return out;
+}
+
+/// Where the body's numbers stand in a row.
+struct Columns {
+  std::size_t time = 0, width = 0;
+  std::array<std::size_t, 3> position{};
+  std::vector<std::size_t> rotation;  // X Y Z W, X Y Z, or none
+  std::vector<std::string> bodies;
+  std::string body;
+};
+
+/// The rows between the header and the data: types, names, IDs, perhaps parents, then what a column is, then
+/// its axis beside "Frame" and "Time (Seconds)".
+Columns find_columns(CsvReader& reader, const std::string& wanted) {
+  std::vector<CsvLine> rows(1);
+  while (reader.next(rows.back()) && rows.back().cells.front() != "Frame") {
+    if (rows.size() > 8)
+      rows.back().fail("", "expected the row 'Frame,Time (Seconds),...' within ten lines of the header");
+    rows.emplace_back();
+  }
+  const CsvLine& axes = rows.back();
+  if (axes.cells.empty() || axes.cells.front() != "Frame")
+    reader.fail(axes.number, "the file ends before the row 'Frame,Time (Seconds),...'");
+  if (rows.size() < 4)
+    axes.fail("", "expected rows of types, names and Rotation or Position before this one");
+  const CsvLine &types = rows[0], &names = rows[1], &kinds = rows[rows.size() - 2];
+  for (const CsvLine* row : {&types, &names, &kinds}) row->expect_cells(axes.cells.size());
+
+  Columns out;
+  out.width = axes.cells.size();
+  const auto clock = std::find_if(axes.cells.begin(), axes.cells.end(),
+                                  [](const std::string& cell) { return cell.starts_with("Time ("); });
+  if (clock == axes.cells.end()) axes.fail("", "there is no column 'Time (Seconds)'");
+  if (*clock != "Time (Seconds)") axes.fail(*clock, "expected 'Time (Seconds)'");
+  out.time = static_cast<std::size_t>(clock - axes.cells.begin());
+  for (std::size_t j = 0; j < out.width; ++j)
+    if (types.cells[j] == "Rigid Body" &&
+        std::find(out.bodies.begin(), out.bodies.end(), names.cells[j]) == out.bodies.end())
+      out.bodies.push_back(names.cells[j]);
+  if (out.bodies.empty()) types.fail("", "there is no rigid body in it: export with Rigid Bodies on");
+  if (wanted.empty() && out.bodies.size() > 1)
+    names.fail("", fmt::format("say which rigid body: {}", fmt::join(out.bodies, ", ")));
+  out.body = wanted.empty() ? out.bodies.front() : wanted;
+  if (std::find(out.bodies.begin(), out.bodies.end(), out.body) == out.bodies.end())
+    names.fail("", unknown_name(fmt::format("there is no rigid body '{}'", wanted), wanted, out.bodies));
+
+  const auto find = [&](std::string_view kind, std::string_view axis) -> std::optional<std::size_t> {
+    for (std::size_t j = 0; j < out.width; ++j)
+      if (types.cells[j] == "Rigid Body" && names.cells[j] == out.body && kinds.cells[j] == kind &&
+          axes.cells[j] == axis)
+        return j;
+    return {};
+  };
+  const std::string_view letters[] = {"X", "Y", "Z", "W"};
+  for (std::size_t j = 0; j < 3; ++j) {
+    const auto column = find("Position", letters[j]);
+    if (!column)
+      axes.fail("", fmt::format("rigid body '{}' has no column Position {}", out.body, letters[j]));
+    out.position[j] = *column;
+  }
+  for (const std::string_view letter : letters)
+    if (const auto column = find("Rotation", letter)) out.rotation.push_back(*column);
+  if (out.rotation.size() == 1 || out.rotation.size() == 2)
+    axes.fail("", fmt::format("rigid body '{}' has some columns of Rotation and not others", out.body));
+  return out;
+}
+
+/// Position and rotation in Motive's axes, for the rows of one file.
+class Pose {
+ public:
+  Pose(const CsvLine& header, const Header& facts, const Columns& columns)
+      : facts_(facts), columns_(columns) {
+    if (columns.rotation.empty()) return;
+    const std::string& type = facts.rotation;
+    std::string sorted = type.substr(0, 3);
+    std::sort(sorted.begin(), sorted.end());
+    euler_ = sorted == "XYZ";
+    if (type.empty())
+      header.fail("Rotation Type", "the header does not say it, expected Quaternion or XYZ, ZYX, ...");
+    if (!euler_ && type != "Quaternion")
+      header.fail("Rotation Type",
+                  fmt::format("'{}' is not known, expected Quaternion or XYZ, ZYX, ...", type));
+    if ((columns.rotation.size() == 4) == euler_)
+      header.fail("Rotation Type", fmt::format("'{}', but the columns of Rotation are {}", type,
+                                               euler_ ? "X Y Z W" : "X Y Z"));
+  }
+
+  bool lost(const CsvLine& line) const {
+    const auto blank = [&](std::size_t j) { return line.cells[j].empty(); };
+    return std::any_of(columns_.position.begin(), columns_.position.end(), blank) ||
+           std::any_of(columns_.rotation.begin(), columns_.rotation.end(), blank);
+  }
+
+  Vector3d position(const CsvLine& line) const {
+    Vector3d p;
+    for (std::size_t j = 0; j < 3; ++j)
+      p[static_cast<Eigen::Index>(j)] =
+          facts_.length->to_si(line.real(columns_.position[j], column("Position", j)));
+    return p;
+  }
+
+  Quaterniond rotation(const CsvLine& line) const {
+    std::array<double, 4> v{0, 0, 0, 1};
+    for (std::size_t j = 0; j < columns_.rotation.size(); ++j)
+      v[j] = line.real(columns_.rotation[j], column("Rotation", j));
+    if (euler_) {
+      Quaterniond q = Quaterniond::Identity();
+      for (std::size_t k = 0; k < 3; ++k) {
+        const auto axis = facts_.rotation[k] - 'X';
+        q = q * Quaterniond(AngleAxisd(v[static_cast<std::size_t>(axis)] * pi / 180, Vector3d::Unit(axis)));
+      }
+      return q;
+    }
+    const Quaterniond q(v[3], v[0], v[1], v[2]);
+    if (!(std::abs(q.norm() - 1) <= norm_tolerance))
+      line.fail(column("Rotation", 0), fmt::format("quaternion of norm {:.6g}, expected 1", q.norm()));
+    return q.normalized();
+  }
+
+ private:
+  std::string column(std::string_view kind, std::size_t j) const {
+    return fmt::format("{} {} {}", columns_.body, kind, "XYZW"[j]);
+  }
+
+  const Header& facts_;
+  const Columns& columns_;
+  bool euler_ = false;
+};
+
+Vector3d vector(const std::array<double, 3>& a) { return {a[0], a[1], a[2]}; }
+
+void check_options(const MotiveOptions& options) {
+  if (options.dimension != 2 && options.dimension != 3)
+    throw std::invalid_argument(fmt::format("dimension: {} is not 2 or 3", options.dimension));
+  for (const auto& [name, sigma] :
+       {std::pair("sigma_position", options.sigma_position), {"sigma_angle", options.sigma_angle}})
+    if (!(std::isfinite(sigma) && sigma >= 0))
+      throw std::invalid_argument(fmt::format("{}: {} is not >= 0", name, sigma));
+}
+
+/// The log's poses, sample by sample.
+class Track {
+ public:
+  Track(MotiveTake& take, const MotiveOptions& options, bool rotations)
+      : take_(take),
+        options_(options),
+        turned_(AngleAxisd(-options.heading, Vector3d::UnitZ())),
+        upright_(AngleAxisd(pi / 2, Vector3d::UnitX())),
+        cols_(options.dimension == 2 ? 3
+              : rotations            ? 7
+                                     : 3) {
+    const double p = options.sigma_position, a = options.sigma_angle;
+    take.mocap.pose = {0, cols_, {}, {}};
+    std::vector<double>& sigma = take.mocap.pose.sigma;
+    if (p > 0 && options.dimension == 2 && a > 0) sigma = {p, p, a};
+    if (p > 0 && cols_ == 7 && a > 0) sigma = {p, p, p, a / 2, a / 2, a / 2, a / 2};
+    if (p > 0 && options.dimension == 3 && cols_ == 3) sigma = {p, p, p};
+  }
+
+  void add_lost() {
+    take_.mocap.pose.data.insert(take_.mocap.pose.data.end(), cols_,
+                                 std::numeric_limits<double>::quiet_NaN());
+    add_flag(0);
+    ++take_.lost;
+  }
+
+  void add(const Vector3d& pivot, const Quaterniond& q_M) {
+    const Vector3d p_M = pivot + q_M * vector(options_.com) - vector(options_.origin);
+    const Vector3d p = turned_ * (upright_ * p_M);
+    Quaterniond q = turned_ * upright_ * q_M * upright_.conjugate();
+    if (seen_ && q.coeffs().dot(last_.coeffs()) < 0) q.coeffs() *= -1;
+    if (options_.dimension == 2) {
+      const Vector3d x = q * Vector3d::UnitX();
+      double theta = std::atan2(x.z(), x.x());
+      if (seen_) theta -= 2 * pi * std::round((theta - theta_) / (2 * pi));
+      if (!seen_) first_y_ = p.y();
+      take_.out_of_plane = std::max(take_.out_of_plane, std::abs(p.y() - first_y_));
+      take_.out_of_plane_angle =
+          std::max(take_.out_of_plane_angle, std::asin(std::min(1.0, std::abs(x.y()))));
+      theta_ = theta;
+      append({p.x(), p.z(), theta});
+    } else if (cols_ == 7) {
+      append({p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()});
+    } else {
+      append({p.x(), p.y(), p.z()});
+    }
+    last_ = q;
+    seen_ = true;
+    add_flag(1);
+  }
+
+ private:
+  void append(std::initializer_list<double> row) {
+    take_.mocap.pose.data.insert(take_.mocap.pose.data.end(), row);
+  }
+  void add_flag(std::uint8_t flag) {
+    take_.mocap.valid.push_back(flag);
+    ++take_.mocap.pose.rows;
+  }
+
+  MotiveTake& take_;
+  const MotiveOptions& options_;
+  Quaterniond turned_, upright_, last_ = Quaterniond::Identity();
+  std::size_t cols_;
+  double theta_ = 0, first_y_ = 0;
+  bool seen_ = false;
+};
+
+}  // namespace
+
+MotiveTake read_motive_csv(const std::filesystem::path& file, const MotiveOptions& options) {
+  check_options(options);
+  CsvReader reader(file);
+  CsvLine header, line;
+  if (!reader.next(header)) reader.fail(1, "is empty, expected Motive's header 'Format Version,1.23,...'");
+  const Header facts = parse_header(header);
+  const Columns columns = find_columns(reader, options.body);
+  const Pose pose(header, facts, columns);
+  if (columns.rotation.empty() && (options.dimension == 2 || options.com != std::array<double, 3>{}))
+    header.fail(
+        "Rotation Type",
+        fmt::format("rigid body '{}' has no rotations: a planar pose and an offset of the CoM need them",
+                    columns.body));
+
+  MotiveTake take{facts.take, facts.version, columns.body, columns.bodies, facts.frame_rate, {}, 0, 0, 0};
+  Track track(take, options, !columns.rotation.empty());
+  Series& time = take.mocap.time;
+  while (reader.next(line)) {
+    line.expect_cells(columns.width);
+    const double t = line.real(columns.time, "Time (Seconds)") + options.time_offset;
+    if (time.rows > 0 && t <= time.data.back())
+      line.fail("Time (Seconds)",
+                fmt::format("time is not strictly increasing: {} s after {} s", t, time.data.back()));
+    time.data.push_back(t);
+    ++time.rows;
+    if (pose.lost(line))
+      track.add_lost();
+    else
+      track.add(pose.position(line),
+                columns.rotation.empty() ? Quaterniond::Identity() : pose.rotation(line));
+  }
+  if (time.rows == 0) reader.fail(header.number, "holds no frames");
+  if (take.lost == time.rows)
+    reader.fail(header.number,
+                fmt::format("rigid body '{}' is lost in all of its {} frames", columns.body, time.rows));
+  return take;
+}
+
+}  // namespace unhand::datasets

@@ -1,0 +1,223 @@
+#include "datasets/import_phyphox.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+#include "datasets/csv.hpp"
+
+namespace unhand::datasets {
+namespace {
+
+constexpr double norm_tolerance = 1e-3;  // relative, of the absolute value that a file carries
+
+struct Columns {
+  std::size_t width = 0;
+  std::size_t time = 0;
+  std::array<std::size_t, 3> force{1, 2, 3};
+  std::optional<std::array<std::size_t, 3>> rate;
+  std::array<std::string, 7> names{"1", "2", "3", "4", "", "", ""};
+  std::optional<std::size_t> absolute;
+};
+
+Columns columns_of(const CsvLine& line) {
+  Columns out;
+  out.width = line.cells.size();
+  for (const std::string& cell : line.cells)
+    if (cell.starts_with("Linear Acceleration") || cell.starts_with("Linear acceleration"))
+      line.fail(cell, "has gravity taken out by the phone: record 'Acceleration (with g)'");
+  const auto need = [&](const std::string& name) {
+    const auto found = std::find(line.cells.begin(), line.cells.end(), name);
+    if (found != line.cells.end()) return static_cast<std::size_t>(found - line.cells.begin());
+    line.fail("", unknown_name(fmt::format("there is no column '{}'", name), name, line.cells));
+  };
+  out.time = need("Time (s)");
+  out.names[0] = "Time (s)";
+  for (std::size_t j = 0; j < 3; ++j) {
+    out.names[1 + j] = fmt::format("Acceleration {} (m/s^2)", "xyz"[j]);
+    out.force[j] = need(out.names[1 + j]);
+    out.names[4 + j] = fmt::format("Gyroscope {} (rad/s)", "xyz"[j]);
+  }
+  if (std::find(line.cells.begin(), line.cells.end(), out.names[4]) != line.cells.end())
+    out.rate = {need(out.names[4]), need(out.names[5]), need(out.names[6])};
+  return out;
+}
+
+/// A file without a header is believed only if it looks like one of phyphox's.
+Columns columns_without_header(const CsvLine& line) {
+  Columns out;
+  out.width = line.cells.size();
+  if (out.width != 4 && out.width != 5)
+    line.fail("",
+              fmt::format("{} numbers and no header, expected phyphox's header or rows of time, x, y, z and "
+                          "perhaps the absolute value",
+                          out.width));
+  if (out.width == 5) out.absolute = 4;
+  return out;
+}
+
+ImuLog read_imu(const std::filesystem::path& file) {
+  CsvReader reader(file, '\0');
+  CsvLine line;
+  if (!reader.next(line))
+    reader.fail(1, "is empty, expected phyphox's header 'Time (s),Acceleration x (m/s^2),...'");
+  const bool is_row = line.is_number(0);
+  const Columns columns = is_row ? columns_without_header(line) : columns_of(line);
+  ImuLog imu{{0, 1, {}, {}}, {0, 3, {}, {}}, {0, 3, {}, {}}};
+  for (bool more = is_row || reader.next(line); more; more = reader.next(line)) {
+    line.expect_cells(columns.width);
+    const double t = line.real(columns.time, columns.names[0]);
+    if (imu.time.rows > 0 && t <= imu.time.data.back())
+      line.fail(columns.names[0],
+                fmt::format("time is not strictly increasing: {} s after {} s", t, imu.time.data.back()));
+    imu.time.data.push_back(t);
+    ++imu.time.rows;
+    double square = 0;
+    for (std::size_t j = 0; j < 3; ++j) {
+      const double value = line.real(columns.force[j], columns.names[1 + j]);
+      imu.specific_force.data.push_back(value);
+      square += value * value;
+    }
+    ++imu.specific_force.rows;
+    if (columns.absolute) {
+      const double said = line.real(*columns.absolute, "5");
+      if (!(std::abs(said - std::sqrt(square)) <= norm_tolerance * (1 + said)))
+        line.fail(
+            "5",
+            fmt::format("{} is not the absolute value of columns 2 to 4, {:.6g}: is this a file of phyphox?",
+                        said, std::sqrt(square)));
+    }
+    if (!columns.rate) continue;
+    for (std::size_t j = 0; j < 3; ++j)
+      imu.angular_rate.data.push_back(line.real((*columns.rate)[j], columns.names[4 + j]));
+    ++imu.angular_rate.rows;
+  }
+  if (imu.time.rows == 0) reader.fail(1, "holds no rows after the header");
+  return imu;
+}
+
+double magnitude(const ImuLog& imu, std::size_t i) {
+  return std::hypot(imu.specific_force(i, 0), imu.specific_force(i, 1), imu.specific_force(i, 2));
+}
+
+/// Samples [first, last] of small specific force.
+struct Stretch {
+  std::size_t first = 0, last = 0;
+};
+
+std::vector<Stretch> small_force(const ImuLog& imu, double threshold) {
+  std::vector<Stretch> out;
+  bool inside = false;
+  for (std::size_t i = 0; i < imu.time.rows; ++i) {
+    const bool small = magnitude(imu, i) < threshold;
+    if (small && !inside) out.push_back({i, i});
+    if (small) out.back().last = i;
+    inside = small;
+  }
+  return out;
+}
+
+/// Why a stretch is no free fall, or nothing.
+std::string fault_of(const ImuLog& imu, const Stretch& stretch, const PhyphoxOptions& options, double step) {
+  const double begin = imu.time(stretch.first), end = imu.time(stretch.last);
+  if (stretch.first == 0) return "the recording starts in it";
+  if (stretch.last + 1 == imu.time.rows) return "the recording ends in it";
+  for (std::size_t i = stretch.first; i-- > 0 && imu.time(i) >= begin - options.bounce_within;)
+    if (magnitude(imu, i) > options.impact)
+      return fmt::format("a bounce: {:.0f} m/s^2 at {:.3f} s", magnitude(imu, i), imu.time(i));
+  if (end - begin < options.min_duration)
+    return fmt::format("lasts {:.3f} s, less than {} s", end - begin, options.min_duration);
+  for (std::size_t i = stretch.first; i < stretch.last; ++i)
+    if (imu.time(i + 1) - imu.time(i) > 5 * step)
+      return fmt::format("samples are missing from {:.3f} s on", imu.time(i));
+  return {};
+}
+
+/// The independent noise of each axis: third differences of a smooth series keep 20 σ² (1 + 9 + 9 + 1).
+std::vector<double> estimate_sigma(const Series& values, const std::vector<Stretch>& falls) {
+  std::vector<double> out;
+  for (std::size_t j = 0; j < values.cols; ++j) {
+    double sum = 0;
+    std::size_t n = 0;
+    for (const Stretch& fall : falls)
+      for (std::size_t i = fall.first + 3; i <= fall.last; ++i, ++n)
+        sum +=
+            std::pow(values(i, j) - 3 * values(i - 1, j) + 3 * values(i - 2, j) - values(i - 3, j), 2) / 20;
+    if (n < 8) return {};
+    out.push_back(std::sqrt(sum / static_cast<double>(n)));
+  }
+  return out;
+}
+
+Series rows_of(const Series& all, std::size_t first, std::size_t end) {
+  if (all.empty()) return {0, all.cols, {}, {}};
+  const auto at = [&](std::size_t i) { return all.data.begin() + static_cast<std::ptrdiff_t>(i * all.cols); };
+  return {end - first, all.cols, {at(first), at(end)}, all.sigma};
+}
+
+/// The samples of a stretch without its guards; nothing is left of a stretch too short for them.
+std::optional<Stretch> guarded(const ImuLog& imu, const Stretch& stretch, double guard) {
+  const double begin = imu.time(stretch.first) + guard, end = imu.time(stretch.last) - guard;
+  Stretch out = stretch;
+  while (out.first < out.last && imu.time(out.first) < begin) ++out.first;
+  while (out.last > out.first && imu.time(out.last) > end) --out.last;
+  if (out.last <= out.first) return {};
+  return out;
+}
+
+void check_options(const PhyphoxOptions& options) {
+  const auto positive = [](const char* name, double value) {
+    if (!(std::isfinite(value) && value > 0))
+      throw std::invalid_argument(fmt::format("{}: {} is not > 0", name, value));
+  };
+  positive("threshold", options.threshold);
+  positive("min_duration", options.min_duration);
+  positive("impact", options.impact);
+  if (!(options.guard >= 0 && 2 * options.guard < options.min_duration))
+    throw std::invalid_argument(
+        fmt::format("guard: {} is not >= 0 and below half of min_duration", options.guard));
+  if (!(options.bounce_within >= 0))
+    throw std::invalid_argument(fmt::format("bounce_within: {} is not >= 0", options.bounce_within));
+}
+
+}  // namespace
+
+PhyphoxRecording read_phyphox(const std::filesystem::path& file, const PhyphoxOptions& options) {
+  check_options(options);
+  ImuLog imu = read_imu(file);
+  PhyphoxRecording out;
+  out.samples = imu.time.rows;
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < imu.time.rows; ++i) steps.push_back(imu.time(i) - imu.time(i - 1));
+  std::sort(steps.begin(), steps.end());
+  const double step = steps.empty() ? 0 : steps[steps.size() / 2];
+
+  std::vector<Stretch> falls;
+  for (const Stretch& stretch : small_force(imu, options.threshold)) {
+    std::string why = fault_of(imu, stretch, options, step);
+    const auto fall = guarded(imu, stretch, options.guard);
+    if (why.empty() && !fall) why = "too few samples";
+    if (why.empty())
+      falls.push_back(*fall);
+    else if (imu.time(stretch.last) - imu.time(stretch.first) >= options.min_duration / 4)
+      out.dropped.push_back({imu.time(stretch.first), imu.time(stretch.last), why});
+  }
+  imu.specific_force.sigma = estimate_sigma(imu.specific_force, falls);
+  imu.angular_rate.sigma =
+      imu.angular_rate.empty() ? std::vector<double>{} : estimate_sigma(imu.angular_rate, falls);
+  std::size_t first = 0;
+  for (std::size_t k = 0; k < falls.size(); ++k) {
+    const std::size_t end = k + 1 < falls.size() ? (falls[k].last + falls[k + 1].first) / 2 : imu.time.rows;
+    Throw& fall = out.falls.emplace_back();
+    fall.imu = {rows_of(imu.time, first, end), rows_of(imu.specific_force, first, end),
+                rows_of(imu.angular_rate, first, end)};
+    fall.free_flight = {imu.time(falls[k].first), imu.time(falls[k].last)};
+    first = end;
+  }
+  return out;
+}
+
+}  // namespace unhand::datasets

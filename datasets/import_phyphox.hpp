@@ -1,0 +1,46 @@
+// Importer: a phone's accelerometer, as the app phyphox exports it, cut into its free falls.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "datasets/throw_log.hpp"
+
+namespace unhand::datasets {
+
+/// What counts as a free fall: the specific force stays below `threshold` for at least `min_duration`, and no
+/// impact came just before (that would be a bounce). Bias and drag of a phone reach some 2.5 m/s² at 6 m/s, a
+/// hand that holds it stays above 8 m/s², so the threshold lies between; `guard` is cut from both ends, where
+/// the hand lets go and where the ground, or the air before it, begins to push.
+struct PhyphoxOptions {
+  double threshold = 5.0;       ///< [m/s²]
+  double min_duration = 0.4;    ///< [s] a fall from 0.8 m
+  double guard = 0.03;          ///< [s]
+  double impact = 60;           ///< [m/s²] a specific force that no hand gives
+  double bounce_within = 0.25;  ///< [s] what starts that soon after an impact is a bounce
+};
+
+/// A stretch of small specific force that is no free fall, and why.
+struct DroppedFall {
+  double begin = 0, end = 0;  ///< [s]
+  std::string reason;
+};
+
+struct PhyphoxRecording {
+  /// The falls in order, one throw each: `imu` and `free_flight` (on the clock of the imu), nothing else. A
+  /// recording with several is cut half way between them; together they hold every sample of it.
+  std::vector<Throw> falls;
+  std::vector<DroppedFall> dropped;
+  std::size_t samples = 0;
+};
+
+/// Reads time and specific force [m/s²] in the phone's frame, and its angular rate where the file has it
+/// ("Gyroscope x (rad/s)"). Columns are separated by commas, semicolons or tabs, with a header in phyphox's
+/// English words; a file without one holds time, x, y, z and perhaps the absolute value. The noise declared
+/// is estimated from the third differences of each axis over the falls. "Linear acceleration", from which the
+/// phone has taken what it believes gravity to be, is refused. Throws ImportError naming file, line and
+/// column; a recording without a fall is not an error.
+PhyphoxRecording read_phyphox(const std::filesystem::path& file, const PhyphoxOptions& options = {});
+
+}  // namespace unhand::datasets
