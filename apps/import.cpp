@@ -121,6 +121,7 @@ void import(Options& options) {
   if (options.out.empty()) throw WrongUsage("--out is required: the log to write");
   for (const Format& format : formats) {
     if (options.format != format.name) continue;
+    if (format.read != &import_lab_files) refuse_lab_options(options.format, options.lab);
     require_writable(options.out);
     require_writable(options.json);
     Outputs outputs;

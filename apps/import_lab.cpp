@@ -62,6 +62,22 @@ std::map<std::string, double> parse_numbers(const char* option, const std::strin
   return out;
 }
 
+constexpr const char* new_log_options[] = {"--sku",
+                                           "--mass",
+                                           "--object",
+                                           "--title",
+                                           "--source",
+                                           "--licence",
+                                           "--gravity",
+                                           "--pads",
+                                           "--pad-radius",
+                                           "--opening-time",
+                                           "--condition",
+                                           "--test-every",
+                                           "--test-conditions",
+                                           "--dimension",
+                                           "--landing-height"};
+
 /// Only those that `format` takes may be given.
 void require_options(const std::string& format, const LabOptions& options) {
   struct Rule {
@@ -90,9 +106,7 @@ void require_options(const std::string& format, const LabOptions& options) {
       throw WrongUsage(
           "a new log needs its object: --sku FILE or --mass KG (or --into LOG, to add to a log)");
   } else {
-    for (const char* name : {"--sku", "--mass", "--object", "--title", "--source", "--licence", "--gravity",
-                             "--landing-height", "--pads", "--pad-radius", "--opening-time", "--condition",
-                             "--test-every", "--test-conditions", "--dimension"})
+    for (const char* name : new_log_options)
       if (given(options, name)) throw WrongUsage(fmt::format("{} is for a new log, not for --into", name));
   }
 }
@@ -219,12 +233,24 @@ std::string source_of(const std::string& format, std::size_t files) {
 
 }  // namespace
 
+void refuse_lab_options(const std::string& format, const LabOptions& options) {
+  for (const char* name :
+       {"--into", "--replace", "--throw", "--time-offset", "--columns", "--units", "--sigma", "--body",
+        "--heading", "--origin", "--com", "--free-flight", "--landing"})
+    if (given(options, name)) throw WrongUsage(fmt::format("{} is not for {}", name, format));
+  for (const char* name : new_log_options)
+    if (given(options, name)) throw WrongUsage(fmt::format("{} is not for {}", name, format));
+}
+
 LabImport import_lab(const std::string& format, const std::vector<std::string>& inputs,
                      const std::string& out, const LabOptions& options, Outputs& outputs) {
   require_options(format, options);
   for (const char* single : {"--throw", "--free-flight"})
     if (inputs.size() != 1 && given(options, single))
       throw WrongUsage(fmt::format("{} goes with one input, not {}", single, inputs.size()));
+  if (!options.free_flight.empty() && !(options.free_flight[0] < options.free_flight[1]))
+    throw WrongUsage(
+        fmt::format("--free-flight: {} is not before {}", options.free_flight[0], options.free_flight[1]));
   const bool adding = !options.into.empty();
   ThrowLog log = adding ? datasets::read_throw_log(options.into)
                         : new_log(format, options, source_of(format, inputs.size()));
@@ -258,8 +284,9 @@ LabImport import_lab(const std::string& format, const std::vector<std::string>& 
   try {
     if (!adding) split_throws(log, {options.test_every, options.test_conditions});
   } catch (const std::invalid_argument& error) {
-    throw WrongUsage(error.what());
+    throw WrongUsage(fmt::format("--test-every, --test-conditions: {}", error.what()));
   }
+  datasets::validate(log, out);
   outputs.log(out, log);
   const auto train = std::count_if(log.throws.begin(), log.throws.end(),
                                    [](const Throw& one) { return one.split == datasets::Split::train; });
@@ -270,74 +297,6 @@ LabImport import_lab(const std::string& format, const std::vector<std::string>& 
   imported.details["train"] = train;
   imported.details["test"] = test;
   return imported;
-}
-
-void add_lab_options(CLI::App& parser, LabOptions& options) {
-  options.parser = &parser;
-  const auto add = [&](const char* group, const char* name, auto& value, const char* text) {
-    return parser.add_option(name, value, text)->group(group);
-  };
-  const char* one = "A log to add to (motive-csv, hand-csv, ft-csv)";
-  add(one, "--into", options.into,
-      "Add to the throws of this log that are named like the files; it is --out if that is not given");
-  parser.add_flag("--replace", options.replace, "Where a throw has such data already, replace it")
-      ->group(one);
-  const char* fresh = "A new log (motive-csv, hand-csv, ft-csv, phyphox)";
-  add(fresh, "--sku", options.sku, "The object as an SKU file (TOML): mass, inertia, offset of the CoM");
-  add(fresh, "--mass", options.mass, "[kg] The object's mass, where there is no SKU file")
-      ->check(CLI::PositiveNumber);
-  add(fresh, "--object", options.object, "The object's name; else the SKU file's");
-  add(fresh, "--title", options.title, "The campaign's title");
-  add(fresh, "--source", options.source, "Where the data are from");
-  add(fresh, "--licence", options.licence, "Their licence");
-  add(fresh, "--gravity", options.gravity, "[m/s^2] Gravity")
-      ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
-  add(fresh, "--landing-height", options.landing_height, "[m] Where a throw counts as landed")
-      ->capture_default_str();
-  add(fresh, "--pads", options.pads, "Pads of the gripper")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 1000));
-  add(fresh, "--pad-radius", options.pad_radius, "[m] Their radius")->check(CLI::PositiveNumber);
-  add(fresh, "--opening-time", options.opening_time,
-      "[s] When the gripper is told to open, on the robot's clock");
-  add(fresh, "--condition", options.condition,
-      "What these throws repeat; else the file's name without its number");
-  add(fresh, "--test-every", options.test_every, "Hold out every so-manieth throw of each condition; 0: none")
-      ->capture_default_str();
-  add(fresh, "--test-conditions", options.test_conditions, "Hold out these conditions as a whole")
-      ->delimiter(',');
-  const char* files = "What is in the files (motive-csv, hand-csv, ft-csv)";
-  add(files, "--throw", options.throw_id, "The throw's name; else the file's");
-  add(files, "--time-offset", options.time_offset,
-      "[s] Added to the file's time, to bring it to the robot's clock");
-  add(files, "--columns", options.columns,
-      "CHANNEL=HEADER,... or CHANNEL=#NUMBER; =-HEADER flips the sign. Channels of hand-csv: "
-      "time,x,z,theta,vx,vz,omega,ax,az,alpha; of ft-csv: time,fx,fz,tau,normal");
-  add(files, "--units", options.units,
-      "CHANNEL=UNIT,... where the header does not say it as 'Fx (N)' or 'Fx [N]'");
-  add(files, "--sigma", options.sigma,
-      "CHANNEL=NOISE,..., 1 sigma in the column's unit; of motive-csv: position=M,angle=RAD");
-  const char* motive = "Motive (motive-csv)";
-  add(motive, "--body", options.body, "The rigid body; else the only one");
-  add(motive, "--dimension", options.dimension, "3: free flights in space; 2: throws in a plane")
-      ->capture_default_str()
-      ->check(CLI::IsMember({2, 3}));
-  add(motive, "--heading", options.heading,
-      "[deg] Of the throw in Motive's floor, from its X axis, counter-clockwise seen from above");
-  add(motive, "--origin", options.origin, "[m] X,Y,Z of the robot's base in Motive's frame")
-      ->delimiter(',')
-      ->expected(3);
-  add(motive, "--com", options.com, "[m] X,Y,Z of the CoM in the rigid body's frame")
-      ->delimiter(',')
-      ->expected(3);
-  add(motive, "--free-flight", options.free_flight, "[s] T0,T1 between which the object touches nothing")
-      ->delimiter(',')
-      ->expected(2);
-  parser
-      .add_flag("--landing", options.landing,
-                "Take the landing from the track, where it passes the landing height")
-      ->group(motive);
 }
 
 }  // namespace unhand::apps

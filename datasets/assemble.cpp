@@ -90,16 +90,12 @@ void fill_throw(ThrowLog& log, const std::string& id, Throw channels, bool repla
   if (found == log.throws.end()) {
     std::vector<std::string> known;
     for (const Throw& one : log.throws) known.push_back(one.id);
-    if (known.size() > 8) {
-      known.resize(8);
-      known.emplace_back("...");
-    }
     throw LogError(log_file, "/throws", unknown_name(fmt::format("there is no throw '{}'", id), id, known));
   }
   const auto move = [&](auto& to, auto& from, const char* name) {
     if (!move_channel(to, from, replace))
       throw LogError(log_file, fmt::format("/throws/{}/{}", id, name),
-                     "is there already: say so to replace it");
+                     "is there already, and replace is not set");
   };
   move(found->hand, channels.hand, "hand");
   move(found->ft, channels.ft, "ft");

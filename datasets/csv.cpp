@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "datasets/attribute_fields.hpp"
 #include "datasets/near_miss.hpp"
 
 namespace unhand::datasets {
@@ -131,7 +132,7 @@ bool CsvReader::next(CsvLine& line) {
       if (line.text.starts_with("\xff\xfe") || line.text.starts_with("\xfe\xff"))
         line.fail("", "is UTF-16 text, expected UTF-8: save it again as CSV UTF-8");
     }
-    if (line.text.find('\0') != std::string::npos) line.fail("", "is not text");
+    if (!is_utf8_text(line.text)) line.fail("", "is not UTF-8 text");
     if (trimmed(line.text).empty()) continue;
     if (separator_ == '\0') separator_ = find_separator(line.text);
     line.decimal_comma = separator_ != ',';
@@ -147,7 +148,12 @@ std::string unknown_name(const std::string& said, std::string_view name,
   const std::vector<std::string_view> views(known.begin(), known.end());
   const std::string_view meant = nearest_name(name, views);
   if (!meant.empty()) return fmt::format("{}; did you mean '{}'?", said, meant);
-  return fmt::format("{} (there are: {})", said, fmt::join(known, ", "));
+  std::vector<std::string_view> some;
+  for (const std::string_view view : views) {
+    if (!view.empty() && some.size() < 12) some.push_back(view);
+  }
+  return fmt::format("{} (there are: {}{})", said, fmt::join(some, ", "),
+                     some.size() == 12 && views.size() > 12 ? ", ..." : "");
 }
 
 }  // namespace unhand::datasets

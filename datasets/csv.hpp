@@ -45,7 +45,7 @@ class CsvReader {
   bool next(CsvLine& line);
 
   [[noreturn]] void fail(int line, const std::string& why) const;
-  const std::string& file() const { return file_; }
+  int line() const { return number_; }  ///< the last one read
 
  private:
   std::string file_;

@@ -57,6 +57,15 @@ Header parse_header(std::string_view text) {
   return {std::string(name), std::string(text.substr(open + 1, text.size() - open - 2))};
 }
 
+/// How labs spell some units, as the log does.
+std::string spelt(std::string_view unit) {
+  constexpr std::pair<std::string_view, std::string_view> ours[] = {
+      {"Nm", "N m"}, {"Nmm", "N mm"}, {"mNm", "mN m"}, {"sec", "s"}, {"°", "deg"}, {"°/s", "deg/s"}};
+  for (const auto& [theirs, symbol] : ours)
+    if (unit == theirs) return std::string(symbol);
+  return std::string(unit);
+}
+
 /// "#3" as 2.
 std::optional<std::size_t> parse_index(std::string_view text) {
   std::size_t index = 0;
@@ -87,15 +96,14 @@ class ColumnFinder {
     const std::string symbol = given != map_.units.end() ? given->second
                                : has_header_             ? headers_[out.index].unit
                                                          : std::string();
-    const std::string hint =
-        fmt::format("say {}=UNIT in the units ({})", wanted.name, units_of(wanted.quantity));
+    const std::string hint = fmt::format("give {}=UNIT ({})", wanted.name, units_of(wanted.quantity));
     if (symbol.empty()) line_.fail(out.header, "has no unit: " + hint);
-    out.unit = find_unit(symbol);
+    out.unit = find_unit(spelt(symbol));
     if (out.unit == nullptr) line_.fail(out.header, fmt::format("unit '{}' is not known: {}", symbol, hint));
     if (out.unit->quantity != wanted.quantity)
-      line_.fail(out.header, fmt::format("unit '{}' is a {}, but {} is a {}: {}", symbol,
-                                         quantity_name(out.unit->quantity), wanted.name,
-                                         quantity_name(wanted.quantity), hint));
+      line_.fail(out.header,
+                 fmt::format("unit '{}' is for {}, but {} is measured in {}", symbol,
+                             quantity_name(out.unit->quantity), wanted.name, units_of(wanted.quantity)));
     return out;
   }
 

@@ -91,7 +91,7 @@ Columns find_columns(CsvReader& reader, const std::string& wanted) {
   }
   const CsvLine& axes = rows.back();
   if (axes.cells.empty() || axes.cells.front() != "Frame")
-    reader.fail(axes.number, "the file ends before the row 'Frame,Time (Seconds),...'");
+    reader.fail(reader.line(), "the file ends before the row 'Frame,Time (Seconds),...'");
   if (rows.size() < 4)
     axes.fail("", "expected rows of types, names and Rotation or Position before this one");
   const CsvLine &types = rows[0], &names = rows[1], &kinds = rows[rows.size() - 2];
@@ -200,6 +200,9 @@ class Pose {
 
 Vector3d vector(const std::array<double, 3>& a) { return {a[0], a[1], a[2]}; }
 
+/// C: from Y up to z up.
+Vector3d upright(const Vector3d& a) { return {a.x(), -a.z(), a.y()}; }
+
 void check_options(const MotiveOptions& options) {
   if (options.dimension != 2 && options.dimension != 3)
     throw std::invalid_argument(fmt::format("dimension: {} is not 2 or 3", options.dimension));
@@ -216,7 +219,6 @@ class Track {
       : take_(take),
         options_(options),
         turned_(AngleAxisd(-options.heading, Vector3d::UnitZ())),
-        upright_(AngleAxisd(pi / 2, Vector3d::UnitX())),
         cols_(options.dimension == 2 ? 3
               : rotations            ? 7
                                      : 3) {
@@ -237,8 +239,9 @@ class Track {
 
   void add(const Vector3d& pivot, const Quaterniond& q_M) {
     const Vector3d p_M = pivot + q_M * vector(options_.com) - vector(options_.origin);
-    const Vector3d p = turned_ * (upright_ * p_M);
-    Quaterniond q = turned_ * upright_ * q_M * upright_.conjugate();
+    const Vector3d p = turned_ * upright(p_M);
+    const Vector3d axis = upright(q_M.vec());  // C q C⁻¹ turns about the turned axis
+    Quaterniond q = turned_ * Quaterniond(q_M.w(), axis.x(), axis.y(), axis.z());
     if (seen_ && q.coeffs().dot(last_.coeffs()) < 0) q.coeffs() *= -1;
     if (options_.dimension == 2) {
       const Vector3d x = q * Vector3d::UnitX();
@@ -271,7 +274,7 @@ class Track {
 
   MotiveTake& take_;
   const MotiveOptions& options_;
-  Quaterniond turned_, upright_, last_ = Quaterniond::Identity();
+  Quaterniond turned_, last_ = Quaterniond::Identity();
   std::size_t cols_;
   double theta_ = 0, first_y_ = 0;
   bool seen_ = false;

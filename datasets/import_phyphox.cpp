@@ -153,7 +153,7 @@ std::vector<double> estimate_sigma(const Series& values, const std::vector<Stret
 }
 
 Series rows_of(const Series& all, std::size_t first, std::size_t end) {
-  if (all.empty()) return {0, all.cols, {}, {}};
+  if (all.empty()) return {};
   const auto at = [&](std::size_t i) { return all.data.begin() + static_cast<std::ptrdiff_t>(i * all.cols); };
   return {end - first, all.cols, {at(first), at(end)}, all.sigma};
 }

@@ -1,7 +1,9 @@
 // The data folder (UNHAND_DATA), when there is one: its logs are read, and come back the same.
 #include <cstdlib>
 
+#include "datasets/assemble.hpp"
 #include "datasets/import_cube_tosses.hpp"
+#include "datasets/import_phyphox.hpp"
 #include "datasets/summary.hpp"
 #include "log_samples.hpp"
 
@@ -97,6 +99,36 @@ TEST(DataFolder, CubeTossNoiseIsAsDeclared) {
   const double sigma = std::sqrt(sum / double(n)), declared = log.throws[0].mocap->pose.sigma[0];
   EXPECT_GT(sigma, declared / 2);
   EXPECT_LT(sigma, declared * 2);
+}
+
+// 22 drops, 15 throws upwards and 3 drops on edge: one free fall in each recording, and none in the phone at
+// rest.
+TEST(DataFolder, FallingSmartphone) {
+  std::string missing;
+  const fs::path folder = in_data_folder("measured/falling_smartphone", missing);
+  if (!missing.empty()) GTEST_SKIP() << missing;
+  int recordings = 0;
+  const auto expect_one_fall = [&](const fs::path& file, double shortest, double longest) {
+    const PhyphoxRecording recording = read_phyphox(file);
+    ASSERT_EQ(recording.falls.size(), 1U) << file;
+    const auto [begin, end] = *recording.falls[0].free_flight;
+    EXPECT_GT(end - begin, shortest) << file;
+    EXPECT_LT(end - begin, longest) << file;
+    for (const double sigma : recording.falls[0].imu->specific_force.sigma) {
+      EXPECT_GT(sigma, 0.005) << file;  // the phone's resolution is 0.005 m/s²
+      EXPECT_LT(sigma, 0.03) << file;
+    }
+    ++recordings;
+  };
+  for (const auto& entry : fs::directory_iterator(folder / "raw")) {
+    const bool drop = name_of(entry.path() / "Raw Data.csv").condition == "fall";
+    expect_one_fall(entry.path() / "Raw Data.csv", drop ? 0.55 : 0.75, drop ? 0.65 : 1.0);
+  }
+  for (const char* name : {"fall_vertical_1.txt", "fall_vertical_2.txt", "fall_vertical_3.txt"})
+    expect_one_fall(folder / name, 0.55, 0.65);
+  EXPECT_EQ(recordings, 22 + 15 + 3);
+  const PhyphoxRecording still = read_phyphox(folder / "accel_static.txt");
+  EXPECT_TRUE(still.falls.empty() && still.dropped.empty());
 }
 
 }  // namespace
