@@ -82,7 +82,7 @@ struct Throw {
   std::optional<double> detach_time;    // [s] annotated by hand
   std::optional<double> grasp_angle;    // [rad] object x axis against the hand's, before opening
   std::vector<double> hand_jump_times;  // [s]
-  std::optional<std::pair<double, double>> free_flight;  // [s] mocap clock: touches nothing in between
+  std::optional<std::pair<double, double>> free_flight;  // [s] mocap clock (imu, if no mocap): flies free
   std::optional<HandLog> hand;
   std::optional<FtLog> ft;
   std::optional<MocapLog> mocap;
