@@ -15,15 +15,28 @@
 #include "apps/progress.hpp"
 #include "experiment/free_flight.hpp"
 #include "experiment/parallel.hpp"
+#include "fitting/slip_surface.hpp"
 
 namespace unhand::apps {
 namespace {
 
 constexpr const char* naive_model = "limit_surface_naive";
 
+std::vector<std::string> surface_model_names() {
+  std::vector<std::string> names;
+  for (const auto model : fitting::surface_models) names.push_back(to_string(model));
+  return names;
+}
+
+bool is_surface_model(const std::string& name) {
+  const auto names = surface_model_names();
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
 std::vector<std::string> known_models() {
   auto names = experiment::release_model_names();
   for (const auto& model : experiment::flight_models()) names.emplace_back(model.name);
+  for (const auto& model : surface_model_names()) names.push_back(model);
   return names;
 }
 
@@ -135,25 +148,36 @@ void compare_releases(const CompareRequest& request, const datasets::ThrowLog& l
 }
 
 void compare(const CompareRequest& request) {
-  if (request.fit)
-    throw Unanswered(
-        "fitting is not in this version: leave out --fit to compare with estimated parameters or cards");
   require_models(request.models);
   require_writable(request.json);
   require_writable_directory(request.report);
   require_writable_directory(request.write_cards);
   if (!request.report.empty()) require_gnuplot();
-  if (datasets::read_schema_name(request.log) == "slip-log")
-    throw datasets::LogError(
-        request.log, "/@schema",
-        "is a slip-log, which holds no throws; surfaces are compared by fitting, which is not in "
-        "this version");
+  if (datasets::read_schema_name(request.log) == "slip-log") {
+    if (!request.fit)
+      throw datasets::LogError(request.log, "/@schema",
+                               "is a slip-log, whose surfaces are compared by fitting: add --fit");
+    for (const auto& model : request.models)
+      if (!is_surface_model(model))
+        throw datasets::LogError(request.log, "/surfaces",
+                                 fmt::format("slips, which {} does not predict; there are {}", model,
+                                             fmt::join(surface_model_names(), ", ")));
+    compare_slips(request);
+    return;
+  }
+  if (request.fit)
+    throw Unanswered(
+        "throws are not fitted in this version: leave out --fit to compare with estimated parameters or "
+        "cards");
   const auto log = datasets::read_throw_log(request.log);
   if (log.throws.empty()) throw Unanswered(fmt::format("{}: holds no throws", request.log));
   const bool flights =
       log.dimension == 3 || std::none_of(log.throws.begin(), log.throws.end(),
                                          [](const auto& one) { return one.hand.has_value(); });
   for (const auto& model : request.models) {
+    if (is_surface_model(model))
+      throw datasets::LogError(request.log, "/throws",
+                               fmt::format("throws, which {} does not predict: it is for slip-logs", model));
     const auto releases = experiment::release_model_names();
     const bool of_release = std::find(releases.begin(), releases.end(), model) != releases.end();
     if (of_release && flights)
@@ -181,16 +205,16 @@ std::string outcome_of(const experiment::Prediction& prediction) {
 Command compare_command(CLI::App& root) {
   auto request = std::make_shared<CompareRequest>();
   CLI::App* parser = root.add_subcommand("compare", "Models against the measured outcomes of a log");
-  parser->add_option("LOG", request->log, "A throw log")->required();
+  parser->add_option("LOG", request->log, "A throw log or a slip log")->required();
   parser
       ->add_option(
           "--models", request->models,
           fmt::format(
               "Which models, separated by commas: {}. Without it, all release models but {}; for free "
-              "flights, projectile",
+              "flights, projectile; for slip logs, all surfaces",
               fmt::join(known_models(), ", "), naive_model))
       ->delimiter(',');
-  parser->add_flag("--fit", request->fit, "Fit the parameters to the train throws (not in this version)");
+  parser->add_flag("--fit", request->fit, "Fit the models to the log: slip logs only, in this version");
   parser->add_option("--card", request->cards,
                      "A model card: its parameters are used for its model; may be repeated");
   parser->add_option("--json", request->json, "Write the comparison as JSON");
@@ -213,7 +237,8 @@ Command compare_command(CLI::App& root) {
   parser->footer(
       "Parameters that no card gives are estimated from the train throws. Existing files are replaced.\n"
       "Examples:\n  unhand compare campaign.h5 --models sliding_pivot,limit_surface --report out\n"
-      "  unhand compare cubes.h5 --models projectile --json flights.json");
+      "  unhand compare cubes.h5 --models projectile --json flights.json\n"
+      "  unhand compare pushes.h5 --models ellipsoid,convex_quartic --fit --report out");
   return {parser, [request] { compare(*request); }};
 }
 

@@ -25,6 +25,9 @@ struct CompareRequest {
 /// Free flights: every throw through the flight models.
 void compare_flights(const CompareRequest& request, const datasets::ThrowLog& log);
 
+/// Slip logs: limit surfaces identified from measured slips, cross-validated.
+void compare_slips(const CompareRequest& request);
+
 /// The tables of a comparison of releases, in words and numbers.
 struct ReleaseTables {
   Table errors, bias, parameters;

@@ -9,7 +9,7 @@
 
 namespace unhand::fitting {
 
-/// One quasi-static moment of sliding, in the object frame about its centre. L is the surface's
+/// One quasi-static stretch of sliding, in the object frame about its centre. L is the surface's
 /// characteristic length [m].
 struct SlipSample {
   std::array<double, 3> wrench{};     ///< (f_x, f_y, τ/L) [N] that the object applies to the surface
@@ -24,8 +24,10 @@ struct SlipSamples {
   std::vector<SlipSample> samples;
 };
 
-/// The samples of one surface, in the log's order. Rows without motion or without force have no direction and
-/// are left out; a slip that has no other keeps its id.
-SlipSamples slip_samples(const std::string& name, const datasets::Surface& surface);
+/// The samples of one surface, in the log's order. A slip is cut where the twist has turned by more than
+/// `turn` [rad] since the last cut; a sample is the path of one stretch (each row's twist lasts half of each
+/// interval beside it) and its wrench, averaged over that path. Rows without motion or force are left out; a
+/// slip that has no others keeps its id and has no samples.
+SlipSamples slip_samples(const std::string& name, const datasets::Surface& surface, double turn = 0.1);
 
 }  // namespace unhand::fitting
