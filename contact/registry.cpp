@@ -56,7 +56,7 @@ std::unique_ptr<ContactModel> make_contact_model(std::string_view name,
 
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name, const ContactParameters<double>& p) {
   return make_contact_model(name, ContactParameters<Dual>{constant(p.patch), p.slide_end, p.quartic,
-                                                          p.open_command, Dual(p.delay)});
+                                                          p.open_command, Dual(p.delay), constant(p.variation)});
 }
 
 }  // namespace unhand::contact

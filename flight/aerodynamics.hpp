@@ -16,7 +16,15 @@ dynamics::Vec2<S> quadratic_drag(const S& k, const dynamics::Vec2<S>& v) {
   return (-k * S(sqrt(squared))) * v;
 }
 
-/// The same in space.
+/// Magnus lift in the plane, a = k_m ω J v: k_m [-], ω [rad/s] of the object, v [m/s] against the air.
+/// Returns m/s².
+template <class S>
+dynamics::Vec2<S> magnus_lift(const S& k_m, const S& omega, const dynamics::Vec2<S>& v) {
+  const S rate = k_m * omega;
+  return {-rate * v.z, rate * v.x};
+}
+
+/// Quadratic drag in space.
 template <class S>
 Vec3<S> quadratic_drag(const S& k, const Vec3<S>& v) {
   using std::sqrt;

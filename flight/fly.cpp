@@ -71,8 +71,14 @@ class Flying final : public dynamics::HybridSystemFrom<Flying<P>, 6> {
 
   template <class S>
   void flow_(const Phase&, const S&, const State<S, 6>& y, State<S, 6>& dy) const {
-    const Vec2<S> drag = quadratic_drag(convert<S>(problem_.drag_k), Vec2<S>{y[3], y[4]});
-    dy = {y[3], y[4], y[5], drag.x + convert<S>(problem_.gravity.x), drag.z + convert<S>(problem_.gravity.z),
+    const Vec2<S> against_air{y[3] - convert<S>(problem_.wind.x), y[4] - convert<S>(problem_.wind.z)};
+    const Vec2<S> drag = quadratic_drag(convert<S>(problem_.drag_k), against_air),
+                  lift = magnus_lift(convert<S>(problem_.lift_km), y[5], against_air);
+    dy = {y[3],
+          y[4],
+          y[5],
+          drag.x + lift.x + convert<S>(problem_.gravity.x),
+          drag.z + lift.z + convert<S>(problem_.gravity.z),
           S(0)};
   }
   template <class S>
@@ -93,7 +99,8 @@ class Flying final : public dynamics::HybridSystemFrom<Flying<P>, 6> {
 template <class S>
 void validate(const FlightProblem<S>& p) {
   for (const S* x : {&p.pose.x, &p.pose.z, &p.pose.theta, &p.twist.vx, &p.twist.vz, &p.twist.omega,
-                     &p.gravity.x, &p.gravity.z, &p.landing_height, &p.tracked.x, &p.tracked.z})
+                     &p.gravity.x, &p.gravity.z, &p.landing_height, &p.tracked.x, &p.tracked.z, &p.lift_km,
+                     &p.wind.x, &p.wind.z})
     if (!std::isfinite(value_of(*x)))
       throw std::invalid_argument("flight: a component of the problem is not finite");
   if (!(value_of(p.drag_k) >= 0 && std::isfinite(value_of(p.drag_k))))
@@ -113,13 +120,15 @@ Landing<S> landing_from(const S& t, const State<S, 6>& y, const Vec2<S>& tracked
 bool has_derivative(double) { return false; }
 bool has_derivative(const Dual& x) { return !x.v.isZero(); }
 
-/// True if the closed form answers: no drag, nor a derivative with respect to it, and the CoM itself is
-/// tracked.
+/// True if the closed form answers: neither drag nor lift, nor derivatives with respect to them, and the CoM
+/// itself is tracked.
 template <class S>
 bool is_projectile(const FlightProblem<S>& p, bool lands) {
   const bool centred = value_of(p.tracked.x) == 0 && value_of(p.tracked.z) == 0 &&
                        !has_derivative(p.tracked.x) && !has_derivative(p.tracked.z);
-  return value_of(p.drag_k) == 0 && !has_derivative(p.drag_k) && (centred || !lands);
+  const bool airless = value_of(p.drag_k) == 0 && !has_derivative(p.drag_k) && value_of(p.lift_km) == 0 &&
+                       !has_derivative(p.lift_km);
+  return airless && (centred || !lands);
 }
 
 }  // namespace
@@ -164,20 +173,36 @@ std::vector<Pose<S>> fly_through(const FlightProblem<S>& problem, const std::vec
   double first = 0, last = 0;
   for (const double t : times) first = std::min(first, t), last = std::max(last, t);
   if (first < 0) throw std::invalid_argument(fmt::format("flight: time {} s lies before the state", first));
-  dynamics::IntegratorOptions recorded = options;
-  recorded.record = true;
-  recorded.longest_step = std::max(options.longest_step, 0.05);
-  const auto solution = dynamics::integrate<S, 6>(
-      Flying<S>(problem, false), Entry<S, 6>{kAbove, S(0), state_of(problem), S(0)}, S(last), recorded);
-  if (solution.outcome != dynamics::Outcome::horizon)
-    throw std::runtime_error(fmt::format("flight: not solved ({})", to_string(solution.outcome)));
+  if (!(last > 0)) {
+    for (std::size_t i = 0; i < times.size(); ++i)
+      out.push_back(landing_from(S(0), state_of(problem), problem.tracked).pose);
+    return out;
+  }
+  const RecordedFlight<S> flown = record_flight(problem, last, options);
   for (const double t : times)
-    out.push_back(last > 0 ? landing_from(S(t), solution.trajectory.at(S(t)), problem.tracked).pose
-                           : landing_from(S(0), solution.y, problem.tracked).pose);
+    out.push_back(landing_from(S(t), flown.trajectory.at(S(t)), problem.tracked).pose);
   return out;
 }
 
+template <class S>
+RecordedFlight<S> record_flight(const FlightProblem<S>& problem, double longest,
+                                const dynamics::IntegratorOptions& options) {
+  dynamics::IntegratorOptions recorded = options;
+  recorded.record = true;
+  recorded.longest_step = std::max(options.longest_step, 0.05);
+  auto solution =
+      dynamics::integrate<S, 6>(Flying<S>(problem, false), Entry<S, 6>{kAbove, S(0), state_of(problem), S(0)},
+                                S(longest), recorded);
+  if (solution.outcome != dynamics::Outcome::horizon)
+    throw std::runtime_error(fmt::format("flight: not solved ({})", to_string(solution.outcome)));
+  return {std::move(solution.trajectory)};
+}
+
 template FlightResult<double> fly(const FlightProblem<double>&, const dynamics::IntegratorOptions&);
+template RecordedFlight<double> record_flight(const FlightProblem<double>&, double,
+                                              const dynamics::IntegratorOptions&);
+template RecordedFlight<Dual> record_flight(const FlightProblem<Dual>&, double,
+                                            const dynamics::IntegratorOptions&);
 template FlightResult<Dual> fly(const FlightProblem<Dual>&, const dynamics::IntegratorOptions&);
 template std::vector<Pose<double>> fly_through(const FlightProblem<double>&, const std::vector<double>&,
                                                const dynamics::IntegratorOptions&);

@@ -8,8 +8,8 @@
 
 namespace unhand::flight {
 
-/// A planar flight. With no drag the closed form is used, otherwise the integrator with the landing as an
-/// event.
+/// A planar flight. In still thin air (no drag, no lift) the closed form is used, otherwise the integrator
+/// with the landing as an event.
 template <class S>
 struct FlightProblem {
   dynamics::Pose<S> pose;  ///< of the CoM
@@ -20,6 +20,8 @@ struct FlightProblem {
   dynamics::Vec2<S>
       tracked{};       ///< tracked point from the CoM, in the object's frame [m]: the event is its passage
   double longest{30};  ///< [s]; a flight that has not landed by then never reaches the height
+  S lift_km{};         ///< Magnus lift, a = k_m ω J v [-]
+  dynamics::Vec2<S> wind{};  ///< velocity of the air [m/s]; drag and lift see v − wind
 };
 
 enum class FlightOutcome { landed, never_reaches, not_solved };
@@ -36,6 +38,22 @@ struct FlightResult {
 /// for double and Dual.
 template <class S>
 FlightResult<S> fly(const FlightProblem<S>& problem, const dynamics::IntegratorOptions& options = {});
+
+/// A flight that was integrated, to be read at any instant.
+template <class S>
+struct RecordedFlight {
+  dynamics::Trajectory<S, 6> trajectory;  ///< pose and twist of the CoM
+};
+/// Flies for `longest` > 0 [s], without landing. Throws std::runtime_error if the flight is not solved.
+template <class S>
+RecordedFlight<S> record_flight(const FlightProblem<S>& problem, double longest,
+                                const dynamics::IntegratorOptions& options = {});
+/// The CoM's pose `t` [s] after the start of a recorded flight.
+template <class S>
+dynamics::Pose<S> sample_flight(const RecordedFlight<S>& flight, const S& t) {
+  const auto y = flight.trajectory.at(t);
+  return {y[0], y[1], y[2]};
+}
 
 /// Poses of the tracked point at `times` [s] after the problem's state, without landing.
 template <class S>

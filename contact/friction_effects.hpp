@@ -1,0 +1,78 @@
+// How friction and the normal force may depart from a rigid patch under Coulomb's law.
+#pragma once
+
+#include "contact/normal_force.hpp"
+#include "dynamics/effect.hpp"
+
+namespace unhand::contact {
+
+/// Departures of the friction limits, all neutral by default; contact laws read them, and the normal force is
+/// wrapped for adhesion. u = (v_r, L ω_r) is the slip, |u| its speed [m/s].
+template <class S>
+struct FrictionVariation {
+  S static_ratio{1.0};       ///< μ_s/μ_k: μ(|u|) = μ (1 + (μ_s/μ_k − 1) exp(−(|u|/v_s)²)) [-]
+  S stribeck_speed{0.02};    ///< v_s [m/s]
+  S viscous{};               ///< 1/v₀: μ(|u|) = μ (1 + |u|/v₀) [s/m]
+  S softness{};              ///< γ: a = a₀ (f_N/f₀)^γ, soft finger [XydasKao1999] [-]
+  double reference_force{};  ///< f₀ [N]
+  S pressure_exponent{};     ///< s: pressure ∝ (1 − (r/a)²)^s [-]
+  S compliance{};            ///< tangential, of the pads together [m/N]
+  S loss_time{};             ///< of the compliance [s]
+  S adhesion{};              ///< f_adh: limits μ (f_N + f_adh) of a pad [N]
+  S parting_time{};          ///< from f_N = 0 until the adhesion has died [s]
+};
+
+/// With derivatives, for models that store both.
+template <class S>
+FrictionVariation<Dual> constant(const FrictionVariation<S>& v) {
+  return {Dual(v.static_ratio),      Dual(v.stribeck_speed), Dual(v.viscous),    Dual(v.softness),
+          v.reference_force,         Dual(v.pressure_exponent), Dual(v.compliance), Dual(v.loss_time),
+          Dual(v.adhesion),          Dual(v.parting_time)};
+}
+
+/// contact.stribeck, contact.viscous, contact.soft_patch_radius, contact.pressure_profile,
+/// contact.pad_compliance, contact.adhesion
+std::span<const dynamics::EffectOn<FrictionVariation>> friction_effects();
+
+/// f_N + f_adh while the pads press, then f_adh fading linearly within the parting time, at whose end the
+/// object is free. `base` must outlive it.
+class AdhesiveForce final : public NormalForce {
+ public:
+  /// Throws std::invalid_argument unless 0 <= adhesion <= 1000 N and 0 < parting_time <= 1 s.
+  AdhesiveForce(const NormalForce& base, const Dual& adhesion, const Dual& parting_time);
+  double at(const Window& window, double t) const override { return at_(window, t); }
+  Dual at(const Window& window, const Dual& t) const override { return at_(window, t); }
+  void kinks(std::vector<double>& out) const override { kinks_(out); }
+  void kinks(std::vector<Dual>& out) const override { kinks_(out); }
+  double release_time() const override { return base_.release_time() + parting_time_.a; }
+
+ private:
+  template <class S>
+  S at_(const Window& window, const S& t) const;
+  template <class S>
+  void kinks_(std::vector<S>& out) const;
+  const NormalForce& base_;
+  Dual adhesion_, parting_time_, parting_;
+};
+
+/// f_N(t) − b w(t) >= 0, where w is 1 in the grip and falls linearly to 0 over the opening: the smoothing has
+/// already taken the level after the release for the sensor's zero there, so that the release stays where it
+/// was seen. b [N] is reported minus true. `base` must outlive it.
+class BiasedForce final : public NormalForce {
+ public:
+  BiasedForce(const NormalForce& base, const Dual& bias, double opening_start);
+  double at(const Window& window, double t) const override { return at_(window, t); }
+  Dual at(const Window& window, const Dual& t) const override { return at_(window, t); }
+  void kinks(std::vector<double>& out) const override;
+  void kinks(std::vector<Dual>& out) const override;
+  double release_time() const override { return base_.release_time(); }
+
+ private:
+  template <class S>
+  S at_(const Window& window, const S& t) const;
+  const NormalForce& base_;
+  Dual bias_;
+  double opening_start_;
+};
+
+}  // namespace unhand::contact

@@ -1,0 +1,107 @@
+// Effects: one physical or sensing mechanism each that a base model leaves out.
+//
+// An effect's id says where its code lives: "contact.stribeck" in contact/, "sensor.mass" in experiment/.
+// Each folder has a struct of what its effects may change (all neutral by default), and a table of EffectOn:
+// the effect and how its parameters enter that struct. docs/adding-an-effect.md is the recipe.
+#pragma once
+
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "dynamics/scalar.hpp"
+
+namespace unhand::dynamics {
+
+/// One parameter of an effect. With all parameters at their neutral values the equations are the base
+/// model's.
+struct EffectParameter {
+  std::string name;
+  std::string unit;      ///< "-" where it has none
+  double neutral{};      ///< where the effect is absent
+  double low{}, high{};  ///< accepted range, ends included
+  double typical{};      ///< a step from neutral that matters: scales, starts and one-sided footprints
+  /// Values to try for a parameter that has no influence while the effect is absent (a Stribeck speed, say).
+  /// Empty: the parameter measures the effect's size.
+  std::vector<double> grid{};
+  bool is_shape() const { return !grid.empty(); }
+};
+
+struct Effect {
+  std::string id;         ///< "contact.stribeck"
+  std::string mechanism;  ///< one line
+  std::vector<EffectParameter> parameters;
+  bool per_object{false};  ///< every object has its own values, named "k[jar]"
+  /// No two-sided derivative at neutral: its footprint is taken at neutral + typical, over the grid.
+  bool one_sided{false};
+  /// "id.name"
+  std::string full_name(const EffectParameter& parameter) const { return id + "." + parameter.name; }
+};
+
+/// Named numbers; what is not named has the value the reader expects.
+template <class S>
+class Values {
+ public:
+  Values() = default;
+  Values(std::span<const std::string> names, std::span<const S> values) : names_(names), values_(values) {}
+  S get(std::string_view name, double otherwise) const {
+    for (std::size_t i = 0; i < names_.size(); ++i)
+      if (names_[i] == name) return values_[i];
+    return S(otherwise);
+  }
+  bool has_prefix(std::string_view prefix) const {
+    for (const auto& name : names_)
+      if (name.size() > prefix.size() && name.compare(0, prefix.size(), prefix) == 0 &&
+          name[prefix.size()] == '.')
+        return true;
+    return false;
+  }
+
+ private:
+  std::span<const std::string> names_;
+  std::span<const S> values_;
+};
+
+/// The parameters of one effect, neutral where `all` does not name them.
+template <class S>
+class EffectValues {
+ public:
+  EffectValues(const Effect& effect, const Values<S>& all) : effect_(effect), all_(all) {}
+  S operator[](std::string_view name) const {
+    for (const EffectParameter& p : effect_.parameters)
+      if (p.name == name) return all_.get(effect_.full_name(p), p.neutral);
+    throw_unknown(name);
+  }
+
+ private:
+  [[noreturn]] void throw_unknown(std::string_view name) const {
+    throw std::logic_error("effect " + effect_.id + " has no parameter " + std::string(name));
+  }
+  const Effect& effect_;
+  const Values<S>& all_;
+};
+
+/// An effect and how it enters what it changes.
+template <template <class> class Setup>
+struct EffectOn {
+  Effect effect;
+  void (*apply)(const EffectValues<double>&, Setup<double>&);
+  void (*apply_dual)(const EffectValues<Dual>&, Setup<Dual>&);
+};
+
+/// Writes the parameters of all effects of `table` that `values` names into `setup`.
+template <template <class> class Setup, class S>
+void apply_effects(std::span<const EffectOn<Setup>> table, const Values<S>& values, Setup<S>& setup) {
+  for (const EffectOn<Setup>& entry : table) {
+    if (!values.has_prefix(entry.effect.id)) continue;
+    const EffectValues<S> own(entry.effect, values);
+    if constexpr (std::is_same_v<S, double>)
+      entry.apply(own, setup);
+    else
+      entry.apply_dual(own, setup);
+  }
+}
+
+}  // namespace unhand::dynamics

@@ -1,0 +1,26 @@
+// Gravity as the base frame sees it.
+#pragma once
+
+#include <cmath>
+
+#include "dynamics/effect.hpp"
+#include "dynamics/frames.hpp"
+
+namespace unhand::dynamics {
+
+/// Gravity g (sin α, −cos α) in the x-z plane, g [m/s²] declared, α [rad] the angle by which the base frame
+/// is not level (positive: gravity has a component along +x). It acts in the grasp, too.
+template <class S>
+struct Gravity {
+  S tilt{};  ///< α [rad]
+  Vec2<S> at(double g) const {
+    using std::cos;
+    using std::sin;
+    return {g * sin(tilt), -g * cos(tilt)};
+  }
+};
+
+/// flight.gravity_tilt
+std::span<const EffectOn<Gravity>> gravity_effects();
+
+}  // namespace unhand::dynamics

@@ -1,0 +1,123 @@
+#include "experiment/observations.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace unhand::experiment {
+
+using datasets::Series;
+
+std::string_view to_string(Channel channel) {
+  constexpr std::string_view kNames[kChannelCount] = {
+      "ft.fx",   "ft.fz",       "ft.tau",    "ft.normal_force", "mocap.x",
+      "mocap.z", "mocap.theta", "landing.x", "landing.theta",   "landing.time"};
+  return kNames[static_cast<int>(channel)];
+}
+
+namespace {
+
+Channel next(Channel first, std::size_t k) { return static_cast<Channel>(static_cast<int>(first) + static_cast<int>(k)); }
+
+/// 1 σ of white noise on a smooth column, from its third differences (their variance is 20 σ²).
+double scatter_of(const Series& series, std::size_t column) {
+  std::vector<double> d;
+  for (std::size_t i = 3; i < series.rows; ++i) {
+    const double x = series(i, column) - 3 * series(i - 1, column) + 3 * series(i - 2, column) - series(i - 3, column);
+    if (std::isfinite(x)) d.push_back(std::abs(x));
+  }
+  if (d.empty()) return 0;
+  std::nth_element(d.begin(), d.begin() + static_cast<std::ptrdiff_t>(d.size() / 2), d.end());
+  return 1.4826 * d[d.size() / 2] / std::sqrt(20.0);
+}
+
+double sigma_of(const Series& series, std::size_t column, double least) {
+  double sigma = 0;
+  if (!series.sigma.empty()) sigma = series.sigma[series.sigma.size() == 1 ? 0 : column];
+  if (!(sigma > 0)) sigma = scatter_of(series, column);
+  return std::max(sigma, least);
+}
+
+bool is_dead(const Series& series, std::size_t column) {
+  for (std::size_t i = 1; i < series.rows; ++i)
+    if (series(i, column) != series(0, column)) return false;
+  return true;
+}
+
+/// The least σ that a channel is trusted to [SI]: the integration and the smoothed inputs are no better.
+constexpr double kLeastForce = 1e-4, kLeastTorque = 1e-6, kLeastLength = 1e-6, kLeastAngle = 1e-5;
+
+bool is_settling(const std::vector<double>& jumps, double t, double settling) {
+  return std::any_of(jumps.begin(), jumps.end(),
+                     [&](double jump) { return t >= jump - 1e-9 && t < jump + settling; });
+}
+
+void add_wrench(const datasets::FtLog& ft, const PreparedThrow& prepared, const ObservationOptions& options,
+                Observations& out) {
+  std::vector<double> jumps = prepared.hand.jumps();
+  jumps.push_back(prepared.hand.begin());
+  const double least[3] = {kLeastForce, kLeastForce, kLeastTorque};
+  double sigma[3];
+  for (std::size_t c = 0; c < 3; ++c) {
+    sigma[c] = sigma_of(ft.wrench, c, least[c]);
+    if (is_dead(ft.wrench, c)) {
+      sigma[c] = 0;
+      out.notes.push_back(fmt::format("throw {}: {} is dead (always {}): not used", prepared.id,
+                                      to_string(next(Channel::wrench_fx, c)), ft.wrench(0, c)));
+    }
+  }
+  for (std::size_t i = 0; i < ft.time.rows; ++i) {
+    const double t = ft.time(i);
+    if (t < prepared.hand.begin() || t > prepared.hand.end() || is_settling(jumps, t, options.settling)) continue;
+    for (std::size_t c = 0; c < 3; ++c)
+      if (sigma[c] > 0)
+        out.all.push_back({next(Channel::wrench_fx, c), t, ft.wrench(i, c),
+                           std::hypot(sigma[c], options.wrench_trust * ft.wrench(i, c))});
+  }
+}
+
+/// After the release the true normal force is zero, so what is read there is the sensor's own.
+void add_normal_force(const datasets::FtLog& ft, const PreparedThrow& prepared, Observations& out) {
+  if (!prepared.normal_force || !std::isfinite(prepared.normal_force->release_time())) return;
+  const double from = prepared.normal_force->release_time() + 0.005, sigma = sigma_of(ft.normal_force, 0, kLeastForce);
+  for (std::size_t i = 0; i < ft.time.rows; ++i)
+    if (ft.time(i) >= from) out.all.push_back({Channel::normal_force, ft.time(i), ft.normal_force(i), sigma});
+}
+
+void add_mocap(const datasets::ThrowLog& log, const datasets::Throw& logged, const PreparedThrow& prepared,
+               Observations& out) {
+  const auto& mocap = *logged.mocap;
+  const double least[3] = {kLeastLength, kLeastLength, kLeastAngle};
+  double sigma[3];
+  for (std::size_t c = 0; c < 3; ++c) sigma[c] = sigma_of(mocap.pose, c, least[c]);
+  const double landed = logged.landing && !logged.landing->time.empty() ? logged.landing->time(0) : HUGE_VAL;
+  for (std::size_t i = 0; i < mocap.time.rows; ++i) {
+    const double t = mocap.time(i);
+    if (t > landed || (t > prepared.open_command && mocap.is_valid(i) && mocap.pose(i, 1) < log.landing_height)) break;
+    if (!mocap.is_valid(i) || t < prepared.hand.begin()) continue;
+    for (std::size_t c = 0; c < 3; ++c) out.all.push_back({next(Channel::mocap_x, c), t, mocap.pose(i, c), sigma[c]});
+  }
+}
+
+void add_landing(const datasets::LandingLog& landing, Observations& out) {
+  const double t = landing.time.empty() ? 0.0 : landing.time(0);
+  out.all.push_back({Channel::landing_x, t, landing.pose(0, 0), sigma_of(landing.pose, 0, 1e-5)});
+  out.all.push_back({Channel::landing_theta, t, landing.pose(0, 1), sigma_of(landing.pose, 1, 1e-4)});
+  if (!landing.time.empty() && !landing.time.sigma.empty())
+    out.all.push_back({Channel::landing_time, t, t, sigma_of(landing.time, 0, 1e-5)});
+}
+
+}  // namespace
+
+Observations observe(const datasets::ThrowLog& log, const datasets::Throw& logged, const PreparedThrow& prepared,
+                     const ObservationOptions& options) {
+  Observations out;
+  if (logged.ft && options.wrench) add_wrench(*logged.ft, prepared, options, out);
+  if (logged.ft && options.normal_force) add_normal_force(*logged.ft, prepared, out);
+  if (logged.mocap && options.mocap) add_mocap(log, logged, prepared, out);
+  if (logged.landing && options.landing) add_landing(*logged.landing, out);
+  return out;
+}
+
+}  // namespace unhand::experiment

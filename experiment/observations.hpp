@@ -1,0 +1,61 @@
+// What the sensors saw of a throw, as one list of numbers with their noise.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "datasets/throw_log.hpp"
+#include "experiment/prepared_throw.hpp"
+
+namespace unhand::experiment {
+
+/// A measured quantity. Wrenches are one pad's, in the hand frame; poses are the tracked frame's, in the
+/// world.
+enum class Channel {
+  wrench_fx,
+  wrench_fz,
+  wrench_tau,
+  normal_force,  ///< of one pad, after the release only: before, it is an input
+  mocap_x,
+  mocap_z,
+  mocap_theta,
+  landing_x,
+  landing_theta,
+  landing_time,
+};
+inline constexpr int kChannelCount = 10;
+std::string_view to_string(Channel);
+
+struct Observation {
+  Channel channel{};
+  double time{};  ///< as stamped [s]: the robot's clock, for mocap its own
+  double value{}, sigma{};
+};
+
+/// The observations of one throw. The three columns of a wrench or a mocap sample follow each other, with one
+/// time.
+struct Observations {
+  std::vector<Observation> all;
+  std::vector<std::string> notes;  ///< what was left out, and why
+};
+
+struct ObservationOptions {
+  bool wrench{true}, normal_force{true}, mocap{true}, landing{true};
+  /// Wrenches are not used for this long after the log begins and after a jump of the hand's acceleration [s]:
+  /// real pads ring there (some micrometres under a held object of 0.2 kg: 30 ms), rigid ones jump.
+  double settling{0.03};
+  /// To what share of its value a wrench is trusted, beside its noise [-]: an F/T sensor's gain is calibrated
+  /// to a hundredth or two, and no law of friction is better.
+  double wrench_trust{0.02};
+};
+
+/// All that the throw's log holds of the channels asked for. Left out: wrenches that settle; with a
+/// note: samples outside the hand's motion, motion capture after the landing, and a wrench channel that is dead (no two samples of it
+/// differ). A channel without a declared σ takes it from its own scatter (third differences).
+Observations observe(const datasets::ThrowLog& log, const datasets::Throw& logged, const PreparedThrow& prepared,
+                     const ObservationOptions& options = {});
+
+}  // namespace unhand::experiment

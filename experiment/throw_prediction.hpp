@@ -1,0 +1,58 @@
+// Every measured channel of a throw, predicted from the parameters of a model and its effects.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "contact/friction_effects.hpp"
+#include "dynamics/effect.hpp"
+#include "dynamics/gravity_effects.hpp"
+#include "experiment/observations.hpp"
+#include "experiment/prepared_throw.hpp"
+#include "experiment/sensing.hpp"
+#include "flight/effects.hpp"
+#include "release/effects.hpp"
+#include "release/simulate_release.hpp"
+
+namespace unhand::experiment {
+
+/// The effects of all folders, in the order of their ids' first words.
+std::vector<dynamics::Effect> known_effects();
+
+/// The named values that a prediction reads, beside those of the effects ("contact.viscous.1/v_0"):
+///   mu             friction coefficient [-]
+///   length         L = c a = τ_max/f_max [m]
+///   grip_force, dead_time, opening_time, shape   contact::OpeningProfile where no normal force was measured
+///   delay          gripper_delay: from the opening command to the release [s]
+///   grasp_angle    of this throw, beyond the prepared one [rad]
+///   grasp_offset   of this throw: the pads hold a point that much nearer to the tip [m]
+///   mu_deviation   of this throw: its μ is mu (1 + mu_deviation) [-]
+///   delay_deviation  of this throw, beyond `delay` [s]
+struct ThrowModel {
+  std::string contact_model;
+  int pads{2};
+  double reference_force{20};  ///< f₀ of contact.soft_patch_radius: the campaign's median grip force [N]
+  dynamics::IntegratorOptions integrator{};
+};
+
+template <class S>
+struct ThrowPrediction {
+  release::ReleaseOutcome release{};
+  flight::FlightOutcome flight{flight::FlightOutcome::not_solved};
+  release::DetachState<S> detach;
+  flight::Landing<S> landing;    ///< of the tracked point
+  std::vector<S> channels;       ///< one per observation, in its order and units
+  std::vector<int> modes;        ///< the modes entered, in order
+  bool landed() const {
+    return release == release::ReleaseOutcome::detached && flight == flight::FlightOutcome::landed;
+  }
+};
+
+/// Simulates the throw and reads every observed channel from it. Where the release or the flight has no
+/// answer (see the outcomes), `channels` is empty. Throws std::invalid_argument for parameters out of range.
+/// Instantiated for double and Dual.
+template <class S>
+ThrowPrediction<S> predict_channels(const PreparedThrow& prepared, const Observations& observed,
+                                    const ThrowModel& model, const dynamics::Values<S>& values);
+
+}  // namespace unhand::experiment

@@ -1,0 +1,237 @@
+#include "fitting/campaign_problem.hpp"
+
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+#include "experiment/compare.hpp"
+#include "experiment/parallel.hpp"
+
+namespace unhand::fitting {
+
+using dynamics::Dual;
+using dynamics::Effect;
+using dynamics::Values;
+
+namespace {
+
+constexpr double kUniform = 2.0 / 3.0;  // torque factor of a uniform disc
+
+double median(std::vector<double> x) {
+  std::nth_element(x.begin(), x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2), x.end());
+  return x[x.size() / 2];
+}
+
+/// "k[jar]" read as "k" by throws of the jar, and by no other.
+std::optional<std::string> name_for(const std::string& name, const std::string& object) {
+  const std::size_t bracket = name.find('[');
+  if (bracket == std::string::npos) return name;
+  if (name.compare(bracket + 1, name.size() - bracket - 2, object) != 0) return std::nullopt;
+  return name.substr(0, bracket);
+}
+
+}  // namespace
+
+Effect find_effect(const std::string& id) {
+  std::vector<std::string> ids;
+  for (const Effect& effect : experiment::known_effects()) {
+    if (effect.id == id) return effect;
+    ids.push_back(effect.id);
+  }
+  throw std::invalid_argument(fmt::format("effect \"{}\" is unknown; there are {}", id, fmt::join(ids, ", ")));
+}
+
+CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::string& file, const CampaignOptions& options)
+    : options_(options) {
+  experiment::require_release_model(options.model);
+  header_ = log;
+  header_.throws.clear();
+  auto prepared = experiment::prepare_all(log, file, options.threads);
+  std::vector<double> grips;
+  for (const auto& p : prepared)
+    if (p.normal_force && p.force_fit.grip_force > 0) grips.push_back(p.force_fit.grip_force);
+  model_ = {options.model, log.gripper ? log.gripper->n_pads : 2, grips.empty() ? 20.0 : median(grips),
+            options.integrator};
+  if (!grips.empty() && options.model != "gripper_delay") {
+    try {
+      first_guess_ = experiment::estimate_friction(log, prepared, options.model).parameters;
+    } catch (const std::invalid_argument&) {  // too few samples: the default start has to do
+    }
+  } else if (options.model == "gripper_delay") {
+    first_guess_ = experiment::estimate_friction(log, prepared, options.model).parameters;
+  }
+  std::size_t observations = 0;
+  for (std::size_t i = 0; i < prepared.size(); ++i) {
+    CampaignThrow t{std::move(prepared[i]), {}, {}, {}, 0, 0};
+    t.observed = experiment::observe(log, log.throws[i], t.prepared, options.observations);
+    t.opening = t.prepared.normal_force && std::isfinite(t.prepared.force_fit.opening_start)
+                    ? t.prepared.force_fit.opening_start
+                    : t.prepared.open_command;
+    t.release = t.prepared.measured.detach_time.value_or(NAN);
+    observations += t.observed.all.size();
+    notes_.insert(notes_.end(), t.observed.notes.begin(), t.observed.notes.end());
+    throws_.push_back(std::move(t));
+  }
+  if (observations == 0)
+    throw std::invalid_argument(fmt::format(
+        "{}: nothing to fit to: no throw has F/T data, motion capture or a landing among the channels asked for", file));
+  std::vector<Effect> effects;
+  for (const auto& id : options.effects) effects.push_back(find_effect(id));
+  name_unknowns(effects);
+}
+
+CampaignProblem CampaignProblem::with(const std::string& model, const std::vector<std::string>& effects) const {
+  experiment::require_release_model(model);
+  CampaignProblem out(*this);
+  out.options_.model = out.model_.contact_model = model;
+  out.options_.effects = effects;
+  std::vector<Effect> found;
+  for (const auto& id : effects) found.push_back(find_effect(id));
+  out.name_unknowns(found);
+  return out;
+}
+
+void CampaignProblem::name_unknowns(const std::vector<Effect>& effects) {
+  campaign_.clear();
+  own_ = {{"grasp_angle", "rad", 0, -1, 1, 0.01, 0.05}, {"grasp_offset", "m", 0, -0.02, 0.02, 1e-3, 1e-3}};
+  const bool follows_pads = options_.model != "gripper_delay";
+  bool all_forces = true;
+  std::set<std::string> objects;
+  for (const auto& t : throws_) {
+    all_forces = all_forces && t.prepared.normal_force.has_value();
+    objects.insert(t.prepared.object);
+  }
+  if (follows_pads) {
+    const auto radius = header_.gripper ? header_.gripper->pad_radius : std::nullopt;
+    const bool guessed = first_guess_.mu != experiment::ModelParameters{}.mu;
+    const double length = guessed || !radius ? first_guess_.length : kUniform * *radius;
+    // Held to a fifth of what the slipping pads or the declared radius say: a fit of a model that lacks an
+    // effect would otherwise run away with them.
+    constexpr double kHeld = 0.2;
+    std::optional<double> mu_prior, length_prior;
+    if (guessed) mu_prior = kHeld * first_guess_.mu;
+    if (guessed || radius) length_prior = kHeld * length;
+    campaign_.push_back({"mu", "-", first_guess_.mu, 0.01, 5, 0.05, mu_prior});
+    campaign_.push_back({"length", "m", length, 1e-4, 0.2, 0.1 * length, length_prior});
+    own_.push_back({"mu_deviation", "-", 0, -0.5, 0.5, 0.02, 0.03});
+    if (!all_forces) {
+      // μ and f₀ enter only as their product: f₀ is known to a factor of two, no better.
+      campaign_.push_back({"grip_force", "N", 20, 0.5, 500, 10, 10});
+      campaign_.push_back({"dead_time", "s", 0.01, 0, 0.2, 2e-3, {}});
+      campaign_.push_back({"opening_time", "s", 0.05, 1e-3, 0.5, 5e-3, {}});
+      campaign_.push_back({"shape", "-", 1, 0.3, 4, 0.2, {}});
+    }
+  } else {
+    campaign_.push_back({"delay", "s", first_guess_.delay.mean(), 0, 1, 5e-3, {}});
+    own_.push_back({"delay_deviation", "s", 0, -0.1, 0.1, 5e-3, 5e-3});
+  }
+  for (const Effect& effect : effects)
+    for (const auto& p : effect.parameters) {
+      const double start = p.is_shape() ? p.grid[p.grid.size() / 2] : p.neutral;
+      const auto add = [&](const std::string& suffix) {
+        campaign_.push_back({effect.full_name(p) + suffix, p.unit, start, p.low, p.high, p.typical, {}});
+      };
+      if (effect.per_object)
+        for (const auto& object : objects) add("[" + object + "]");
+      else
+        add("");
+    }
+  const int width = static_cast<int>(campaign_.size());
+  for (CampaignThrow& t : throws_) {
+    t.names.clear();
+    t.columns.clear();
+    for (int k = 0; k < width; ++k)
+      if (const auto name = name_for(campaign_[static_cast<std::size_t>(k)].name, t.prepared.object)) {
+        t.names.push_back(*name);
+        t.columns.push_back(k);
+      }
+    for (std::size_t k = 0; k < own_.size(); ++k) {
+      t.names.push_back(own_[k].name);
+      t.columns.push_back(width + static_cast<int>(k));
+    }
+  }
+}
+
+std::vector<double> CampaignProblem::start() const {
+  std::vector<double> out;
+  for (const auto& u : campaign_) out.push_back(u.start);
+  return out;
+}
+
+std::vector<double> CampaignProblem::values_of(const CampaignThrow& thrown, std::span<const double> campaign,
+                                               std::span<const double> own) const {
+  std::vector<double> out;
+  for (const int column : thrown.columns) {
+    const auto c = static_cast<std::size_t>(column);
+    out.push_back(c < campaign.size() ? campaign[c] : own[c - campaign.size()]);
+  }
+  return out;
+}
+
+experiment::ThrowPrediction<double> CampaignProblem::predict(const CampaignThrow& thrown,
+                                                             std::span<const double> campaign,
+                                                             std::span<const double> own) const {
+  const auto values = values_of(thrown, campaign, own);
+  return experiment::predict_channels(thrown.prepared, thrown.observed, model_,
+                                      Values<double>(thrown.names, values));
+}
+
+Linearisation CampaignProblem::linearise(const CampaignThrow& thrown, std::span<const double> campaign,
+                                         std::span<const double> own, bool derivatives) const {
+  const auto& observed = thrown.observed.all;
+  const auto rows = static_cast<Eigen::Index>(observed.size());
+  Linearisation out;
+  if (!derivatives) {
+    const auto predicted = predict(thrown, campaign, own);
+    out.modes = predicted.modes;
+    out.detach = dynamics::value_of(predicted.detach.time);
+    out.solved = predicted.channels.size() == observed.size() && predicted.landed();
+    if (!out.solved) return out;
+    out.residual.resize(rows);
+    for (std::size_t i = 0; i < observed.size(); ++i)
+      out.residual[static_cast<Eigen::Index>(i)] = (predicted.channels[i] - observed[i].value) / observed[i].sigma;
+    out.solved = out.residual.allFinite();
+    return out;
+  }
+  const auto values = values_of(thrown, campaign, own);
+  const auto width = static_cast<int>(campaign.size());
+  out.residual.resize(rows);
+  out.campaign.setZero(rows, width);
+  out.own.setZero(rows, static_cast<Eigen::Index>(own.size()));
+  constexpr int kSize = dynamics::kDualSize;
+  for (int first = 0; first < static_cast<int>(values.size()); first += kSize) {
+    const int last = std::min(first + kSize, static_cast<int>(values.size()));
+    std::vector<Dual> duals;
+    for (int k = 0; k < static_cast<int>(values.size()); ++k) {
+      const double v = values[static_cast<std::size_t>(k)];
+      duals.push_back(k >= first && k < last ? dynamics::independent(v, k - first) : Dual(v));
+    }
+    const auto predicted = experiment::predict_channels(thrown.prepared, thrown.observed, model_,
+                                                        Values<Dual>(thrown.names, std::span<const Dual>(duals)));
+    out.modes = predicted.modes;
+    out.detach = dynamics::value_of(predicted.detach.time);
+    out.solved = predicted.channels.size() == observed.size() && predicted.landed();
+    if (!out.solved) return out;
+    for (std::size_t i = 0; i < observed.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(i);
+      const Dual& p = predicted.channels[i];
+      out.residual[row] = (p.a - observed[i].value) / observed[i].sigma;
+      for (int k = first; k < last; ++k) {
+        const int column = thrown.columns[static_cast<std::size_t>(k)];
+        const double d = p.v[k - first] / observed[i].sigma;
+        if (column < width)
+          out.campaign(row, column) = d;
+        else
+          out.own(row, column - width) = d;
+      }
+    }
+  }
+  out.solved = out.residual.allFinite() && out.campaign.allFinite() && out.own.allFinite();
+  return out;
+}
+
+}  // namespace unhand::fitting

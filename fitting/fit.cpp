@@ -1,0 +1,395 @@
+#include "fitting/fit.hpp"
+
+#include <ceres/ceres.h>
+#include <fmt/core.h>
+
+#include <Eigen/Dense>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+
+#include "experiment/parallel.hpp"
+#include "fitting/normal_equations.hpp"
+
+namespace unhand::fitting {
+
+using experiment::Channel;
+
+std::string_view to_string(Phase phase) {
+  constexpr std::string_view kNames[kPhaseCount] = {"grasped", "release", "flight", "landing"};
+  return kNames[static_cast<int>(phase)];
+}
+
+const char* to_string(FitOutcome outcome) {
+  constexpr const char* kNames[] = {"converged", "iterations_spent", "no_start", "not_solved"};
+  return kNames[static_cast<int>(outcome)];
+}
+
+Phase phase_of(const experiment::Observation& o, double opening, double release) {
+  if (o.channel == Channel::landing_x || o.channel == Channel::landing_theta || o.channel == Channel::landing_time)
+    return Phase::landing;
+  if (o.time < opening) return Phase::grasped;
+  return o.time < release ? Phase::release : Phase::flight;
+}
+
+std::vector<double> FitResult::values() const {
+  std::vector<double> out;
+  for (const auto& u : campaign) out.push_back(u.value);
+  return out;
+}
+
+double FitResult::correlation(std::size_t i, std::size_t j) const {
+  const std::size_t n = campaign.size();
+  const double scale = std::sqrt(covariance[i * n + i] * covariance[j * n + j]);
+  return scale > 0 ? covariance[i * n + j] / scale : 0;
+}
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+/// What all costs share: unknowns in units of their scales.
+struct Shared {
+  const CampaignProblem& problem;
+  const FitOptions& options;
+  std::vector<double> scale, own_scale, own_sigma;  ///< own_sigma: 1 σ of the throws' own unknowns
+  std::atomic<long> jacobian_nanoseconds{0};
+
+  std::vector<double> unscaled(const double* x) const {
+    std::vector<double> out(scale.size());
+    for (std::size_t k = 0; k < out.size(); ++k) out[k] = x[k] * scale[k];
+    return out;
+  }
+  std::vector<double> own_unscaled(const double* x) const {
+    std::vector<double> out(own_scale.size());
+    for (std::size_t k = 0; k < out.size(); ++k) out[k] = x[k] * own_scale[k];
+    return out;
+  }
+};
+
+/// One throw's robust, whitened residual with the priors of its own unknowns below it.
+class ThrowCost final : public ceres::CostFunction {
+ public:
+  ThrowCost(Shared& shared, const CampaignThrow& thrown) : shared_(shared), throw_(thrown) {
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(shared.scale.size()));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(shared.own_scale.size()));
+    set_num_residuals(static_cast<int>(thrown.observed.all.size() + shared.own_scale.size()));
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const auto begin = Clock::now();
+    const auto campaign = shared_.unscaled(parameters[0]), own = shared_.own_unscaled(parameters[1]);
+    Linearisation l;
+    try {
+      l = shared_.problem.linearise(throw_, campaign, own, jacobians != nullptr);
+    } catch (const std::invalid_argument&) {
+      return false;  // a trial step outside the physics
+    }
+    if (!l.solved) return false;
+    robustify(l, shared_.options.sample_limit);
+    const auto rows = static_cast<int>(l.residual.size()), width = static_cast<int>(campaign.size()),
+               n = static_cast<int>(own.size());
+    Eigen::Map<Eigen::VectorXd> r(residuals, rows + n);
+    r.head(rows) = l.residual;
+    for (int k = 0; k < n; ++k) r[rows + k] = own[static_cast<std::size_t>(k)] / shared_.own_sigma[static_cast<std::size_t>(k)];
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    if (jacobians && jacobians[0]) {
+      Eigen::Map<RowMajor> J(jacobians[0], rows + n, width);
+      J.bottomRows(n).setZero();
+      for (int k = 0; k < width; ++k) J.col(k).head(rows) = l.campaign.col(k) * shared_.scale[static_cast<std::size_t>(k)];
+    }
+    if (jacobians && jacobians[1]) {
+      Eigen::Map<RowMajor> J(jacobians[1], rows + n, n);
+      J.setZero();
+      for (int k = 0; k < n; ++k) {
+        const auto i = static_cast<std::size_t>(k);
+        J.col(k).head(rows) = l.own.col(k) * shared_.own_scale[i];
+        J(rows + k, k) = shared_.own_scale[i] / shared_.own_sigma[i];
+      }
+    }
+    if (jacobians)
+      shared_.jacobian_nanoseconds += static_cast<long>(1e9 * seconds_since(begin));
+    return true;
+  }
+
+ private:
+  Shared& shared_;
+  const CampaignThrow& throw_;
+};
+
+/// What is known of a campaign unknown without the log.
+class PriorCost final : public ceres::CostFunction {
+ public:
+  PriorCost(int width, int index, double mean, double sigma) : width_(width), index_(index), mean_(mean), sigma_(sigma) {
+    mutable_parameter_block_sizes()->push_back(width);
+    set_num_residuals(1);
+  }
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    residuals[0] = (parameters[0][index_] - mean_) / sigma_;
+    if (jacobians && jacobians[0]) {
+      std::fill(jacobians[0], jacobians[0] + width_, 0.0);
+      jacobians[0][index_] = 1 / sigma_;
+    }
+    return true;
+  }
+
+ private:
+  int width_, index_;
+  double mean_, sigma_;
+};
+
+double median(std::vector<double> x) {
+  std::nth_element(x.begin(), x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2), x.end());
+  return x[x.size() / 2];
+}
+
+/// Which throws a fit uses: those of the train split (all if there is no other), as far as they can be
+/// simulated at the start.
+std::vector<std::size_t> usable(const CampaignProblem& problem, const FitOptions& options,
+                                const std::vector<double>& start, std::vector<double>& chi2) {
+  const auto& throws = problem.throws();
+  std::vector<char> ok(throws.size(), 0);
+  std::vector<double> squares(throws.size(), 0);
+  const std::vector<double> own(problem.own().size(), 0.0);
+  experiment::parallel_for(throws.size(), options.threads, [&](std::size_t i) {
+    if (options.train_only && throws[i].prepared.split != datasets::Split::train) return;
+    if (throws[i].observed.all.empty()) return;
+    auto l = problem.linearise(throws[i], start, own, false);
+    if (!l.solved) return;
+    robustify(l, options.sample_limit);
+    ok[i] = 1;
+    squares[i] = l.residual.squaredNorm();
+  });
+  std::vector<std::size_t> out;
+  for (std::size_t i = 0; i < throws.size(); ++i)
+    if (ok[i]) {
+      out.push_back(i);
+      chi2.push_back(squares[i]);
+    }
+  return out;
+}
+
+void describe_open_directions(const Eigen::MatrixXd& information, const CampaignProblem& problem,
+                              const std::vector<double>& scale, FitResult& out) {
+  const auto n = static_cast<Eigen::Index>(scale.size());
+  Eigen::MatrixXd scaled = information;
+  for (Eigen::Index i = 0; i < n; ++i)
+    for (Eigen::Index j = 0; j < n; ++j) scaled(i, j) *= scale[static_cast<std::size_t>(i)] * scale[static_cast<std::size_t>(j)];
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
+  constexpr double kOpen = 3;  // a direction known to no better than three changes that matter
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const double sigma = eigen.eigenvalues()[k] > 0 ? 1 / std::sqrt(eigen.eigenvalues()[k]) : HUGE_VAL;
+    if (sigma < kOpen) continue;
+    OpenDirection open;
+    open.sigma = sigma;
+    Eigen::VectorXd v = eigen.eigenvectors().col(k);
+    Eigen::Index largest = 0;
+    v.cwiseAbs().maxCoeff(&largest);
+    if (v[largest] < 0) v = -v;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      open.direction.push_back(v[i]);
+      if (std::abs(v[i]) < 0.2) continue;
+      const Unknown& u = problem.campaign()[static_cast<std::size_t>(i)];
+      open.meaning += fmt::format("{}{} {:+.3g} {}", open.meaning.empty() ? "" : " with ", u.name,
+                                  v[i] * u.scale, u.unit);
+    }
+    out.open.push_back(std::move(open));
+  }
+}
+
+}  // namespace
+
+FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
+  const auto begin = Clock::now();
+  FitResult out;
+  const auto& unknowns = problem.campaign();
+  const auto width = static_cast<int>(unknowns.size());
+  const auto n_own = problem.own().size();
+  std::vector<double> start = options.start.empty() ? problem.start() : options.start;
+  Shared shared{problem, options, {}, {}, {}, {}};
+  for (const auto& u : unknowns) shared.scale.push_back(u.scale);
+  for (const auto& u : problem.own()) {
+    shared.own_scale.push_back(u.scale);
+    shared.own_sigma.push_back(*u.prior_sigma);
+  }
+  std::vector<double> chi2;
+  const auto used = usable(problem, options, start, chi2);
+  out.throws.resize(problem.throws().size());
+  for (std::size_t i = 0; i < out.throws.size(); ++i) {
+    out.throws[i].id = problem.throws()[i].prepared.id;
+    out.throws[i].own.assign(n_own, 0.0);
+  }
+  for (const auto& u : unknowns) out.campaign.push_back({u, u.start, 0, 0, false});
+  if (used.empty()) {
+    out.outcome = FitOutcome::no_start;
+    out.message = "no throw of the fit's share could be simulated with the parameters that it starts from";
+    return out;
+  }
+
+  std::vector<double> x(start.size());
+  for (std::size_t k = 0; k < x.size(); ++k) x[k] = std::clamp(start[k], unknowns[k].low, unknowns[k].high) / shared.scale[k];
+  std::vector<std::vector<double>> own(used.size(), std::vector<double>(n_own, 0.0));
+  std::vector<std::vector<int>> modes_before(used.size());
+
+  ceres::Solver::Options solver;
+  solver.linear_solver_type = ceres::DENSE_SCHUR;
+  solver.max_num_iterations = options.iterations;
+  solver.function_tolerance = options.accuracy;
+  solver.parameter_tolerance = 1e-9;
+  solver.gradient_tolerance = 1e-12;
+  solver.min_trust_region_radius = 1e-2;  // in scales: below, what is left is the integrator's own rounding
+  solver.num_threads = options.threads > 0 ? options.threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  solver.logging_type = ceres::SILENT;
+
+  NormalEquations equations;
+  ceres::Solver::Summary summary;
+  for (int round = 0; round < options.rounds; ++round) {
+    const double limit = options.throw_limit * median(chi2);
+    ceres::Problem::Options ownership;
+    ceres::Problem ceres_problem(ownership);
+    auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+    for (std::size_t i = 0; i < used.size(); ++i) {
+      ceres_problem.AddResidualBlock(new ThrowCost(shared, problem.throws()[used[i]]),
+                                     new ceres::HuberLoss(std::sqrt(limit)), x.data(), own[i].data());
+      ordering->AddElementToGroup(own[i].data(), 0);
+      for (std::size_t k = 0; k < n_own; ++k) {
+        ceres_problem.SetParameterLowerBound(own[i].data(), static_cast<int>(k), problem.own()[k].low / shared.own_scale[k]);
+        ceres_problem.SetParameterUpperBound(own[i].data(), static_cast<int>(k), problem.own()[k].high / shared.own_scale[k]);
+      }
+    }
+    ordering->AddElementToGroup(x.data(), 1);
+    solver.linear_solver_ordering = ordering;
+    std::vector<int> constant;
+    for (int k = 0; k < width; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      ceres_problem.SetParameterLowerBound(x.data(), k, unknowns[i].low / shared.scale[i]);
+      ceres_problem.SetParameterUpperBound(x.data(), k, unknowns[i].high / shared.scale[i]);
+      if (unknowns[i].prior_sigma)
+        ceres_problem.AddResidualBlock(
+            new PriorCost(width, k, unknowns[i].start / shared.scale[i], *unknowns[i].prior_sigma / shared.scale[i]), nullptr,
+            x.data());
+      if (std::find(options.fixed.begin(), options.fixed.end(), unknowns[i].name) != options.fixed.end())
+        constant.push_back(k);
+    }
+    if (static_cast<int>(constant.size()) == width)
+      ceres_problem.SetParameterBlockConstant(x.data());
+    else if (!constant.empty())
+      ceres_problem.SetManifold(x.data(), new ceres::SubsetManifold(width, constant));
+    ceres::Solve(solver, &ceres_problem, &summary);
+    out.iterations += static_cast<int>(summary.iterations.size());
+    if (!summary.IsSolutionUsable()) {
+      out.outcome = FitOutcome::not_solved;
+      out.message = summary.message;
+      return out;
+    }
+
+    equations = normal_equations(problem, used, shared.unscaled(x.data()), own, shared.own_scale, shared.own_sigma,
+                                 options.sample_limit, limit, options.threads);
+    for (std::size_t i = 0; i < used.size(); ++i) {
+      chi2[i] = equations.throws[i].chi2;
+      if (!modes_before[i].empty() && modes_before[i] != equations.throws[i].modes && round + 1 == options.rounds)
+        ++out.mode_changes;
+      modes_before[i] = equations.throws[i].modes;
+    }
+    // Empirical Bayes: the spread of the throws' own unknowns is what they show, plus what each is uncertain by.
+    if (round + 1 < options.rounds && used.size() >= 6)
+      for (std::size_t k = 0; k < n_own; ++k) {
+        double square = 0;
+        for (std::size_t i = 0; i < used.size(); ++i) {
+          const double v = own[i][k] * shared.own_scale[k];
+          square += (v * v + equations.throws[i].own_variance[static_cast<Eigen::Index>(k)]) / static_cast<double>(used.size());
+        }
+        const double prior = *problem.own()[k].prior_sigma;
+        shared.own_sigma[k] = std::clamp(std::sqrt(square), 1e-3 * prior, 3 * prior);
+      }
+  }
+
+  out.outcome = summary.termination_type == ceres::CONVERGENCE ? FitOutcome::converged : FitOutcome::iterations_spent;
+  out.message = summary.message;
+  out.own_spread = shared.own_sigma;
+  Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(width, width);
+  for (int k = 0; k < width; ++k) {
+    const auto& u = unknowns[static_cast<std::size_t>(k)];
+    if (u.prior_sigma) prior(k, k) = 1 / (*u.prior_sigma * *u.prior_sigma);
+    if (std::find(options.fixed.begin(), options.fixed.end(), u.name) != options.fixed.end()) prior(k, k) = 1e30 / (u.scale * u.scale);
+  }
+  const Eigen::MatrixXd covariance = scatter_covariance(equations, prior);
+  const Eigen::MatrixXd data = guarded_inverse(equations.information, shared.scale);
+  for (int k = 0; k < width; ++k) {
+    auto& fitted = out.campaign[static_cast<std::size_t>(k)];
+    fitted.value = x[static_cast<std::size_t>(k)] * fitted.unknown.scale;
+    fitted.sigma = std::sqrt(covariance(k, k));
+    fitted.data_sigma = std::sqrt(data(k, k));
+    const double margin = 1e-6 * (fitted.unknown.high - fitted.unknown.low);
+    fitted.at_bound = fitted.value < fitted.unknown.low + margin || fitted.value > fitted.unknown.high - margin;
+    for (int j = 0; j < width; ++j) out.covariance.push_back(covariance(k, j));
+  }
+  describe_open_directions(equations.information, problem, shared.scale, out);
+
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    const auto& part = equations.throws[i];
+    ThrowFit& throw_fit = out.throws[used[i]];
+    throw_fit.used = throw_fit.solved = true;
+    throw_fit.weight = part.weight;
+    throw_fit.chi2 = part.chi2;
+    throw_fit.own = shared.own_unscaled(own[i].data());
+    throw_fit.modes = part.modes;
+    out.chi2 += part.chi2;
+    const CampaignThrow& thrown = problem.throws()[used[i]];
+    out.samples += static_cast<long>(thrown.observed.all.size());
+    for (std::size_t j = 0; j < thrown.observed.all.size(); ++j) {
+      const auto& o = thrown.observed.all[j];
+      const Phase phase = phase_of(o, thrown.opening, part.detach);
+      auto found = std::find_if(out.misfit.begin(), out.misfit.end(),
+                                [&](const ChannelMisfit& m) { return m.channel == o.channel && m.phase == phase; });
+      if (found == out.misfit.end()) found = out.misfit.insert(out.misfit.end(), {o.channel, phase, 0, 0});
+      ++found->n;
+      const double r = part.residual[static_cast<Eigen::Index>(j)];
+      found->chi2 += r * r;
+    }
+  }
+  std::sort(out.misfit.begin(), out.misfit.end(), [](const ChannelMisfit& a, const ChannelMisfit& b) {
+    return std::pair(a.phase, a.channel) < std::pair(b.phase, b.channel);
+  });
+  out.degrees_of_freedom = out.samples - width - static_cast<long>(used.size() * n_own);
+  out.seconds = seconds_since(begin);
+  out.jacobian_seconds = 1e-9 * static_cast<double>(shared.jacobian_nanoseconds.load());
+  return out;
+}
+
+std::vector<double> own_before_release(const CampaignProblem& problem, const CampaignThrow& thrown, const FitResult& fit) {
+  const auto n = problem.own().size();
+  std::vector<double> own(n, 0.0);
+  const auto campaign = fit.values();
+  CampaignThrow held = thrown;
+  held.observed.all.clear();
+  for (const auto& o : thrown.observed.all)
+    if (phase_of(o, thrown.opening, HUGE_VAL) == Phase::grasped) held.observed.all.push_back(o);
+  if (held.observed.all.empty() || fit.own_spread.empty()) return own;
+  for (int step = 0; step < 3; ++step) {
+    auto l = problem.linearise(held, campaign, own, true);
+    if (!l.solved) return std::vector<double>(n, 0.0);
+    robustify(l, 5);
+    Eigen::MatrixXd H = l.own.transpose() * l.own;
+    Eigen::VectorXd g = l.own.transpose() * l.residual;
+    for (std::size_t k = 0; k < n; ++k) {
+      const double weight = 1 / (fit.own_spread[k] * fit.own_spread[k]);
+      H(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(k)) += weight;
+      g[static_cast<Eigen::Index>(k)] += weight * own[k];
+    }
+    const Eigen::VectorXd d = H.ldlt().solve(-g);
+    if (!d.allFinite()) break;
+    double change = 0;
+    for (std::size_t k = 0; k < n; ++k) {
+      own[k] = std::clamp(own[k] + d[static_cast<Eigen::Index>(k)], problem.own()[k].low, problem.own()[k].high);
+      change = std::max(change, std::abs(d[static_cast<Eigen::Index>(k)]) / problem.own()[k].scale);
+    }
+    if (change < 1e-3) break;
+  }
+  return own;
+}
+
+}  // namespace unhand::fitting

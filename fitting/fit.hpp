@@ -1,0 +1,101 @@
+// The fit of a model to a campaign, and what it is worth.
+#pragma once
+
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "experiment/observations.hpp"
+#include "fitting/campaign_problem.hpp"
+
+namespace unhand::fitting {
+
+/// The part of a throw that an observation belongs to.
+enum class Phase { grasped, release, flight, landing };
+inline constexpr int kPhaseCount = 4;
+std::string_view to_string(Phase);
+/// By the channel, and by the time between the opening and the detach.
+Phase phase_of(const experiment::Observation& observation, double opening, double release);
+
+struct FitOptions {
+  bool train_only{true};
+  int iterations{25};          ///< of the solver, in every round
+  int rounds{3};               ///< in which the spread of the throws' own unknowns is learned
+  double sample_limit{5};      ///< residuals beyond this many σ count linearly [-]
+  double throw_limit{3};       ///< a throw whose χ² exceeds this many medians counts less [-]
+  double accuracy{1e-6};       ///< relative change of the cost at which a round ends
+  int threads{0};
+  std::vector<double> start;   ///< of the campaign's unknowns; empty: the problem's
+  /// Campaign unknowns that keep their start, by name.
+  std::vector<std::string> fixed;
+};
+
+enum class FitOutcome { converged, iterations_spent, no_start, not_solved };
+const char* to_string(FitOutcome);
+
+struct FittedUnknown {
+  Unknown unknown;
+  double value{};
+  double sigma{};       ///< 1 σ, from the scatter between throws (see covariance)
+  double data_sigma{};  ///< 1 σ without the prior; infinite where the log does not determine it
+  bool at_bound{};
+};
+
+/// A direction in the space of the campaign's unknowns that the log leaves open.
+struct OpenDirection {
+  std::vector<double> direction;  ///< per campaign unknown, in units of its scale, of unit length
+  double sigma{};                 ///< along it, from the data alone, in scales; infinite: nothing
+  std::string meaning;            ///< in words
+};
+
+/// χ² of one channel in one phase.
+struct ChannelMisfit {
+  experiment::Channel channel{};
+  Phase phase{};
+  int n{};
+  double chi2{};
+  double chi2_per_sample() const { return n > 0 ? chi2 / n : 0; }
+};
+
+struct ThrowFit {
+  std::string id;
+  bool used{};
+  bool solved{};
+  double weight{1};  ///< below 1: an outlier that counts less
+  double chi2{};
+  std::vector<double> own;        ///< its own unknowns
+  std::vector<int> modes;
+};
+
+struct FitResult {
+  FitOutcome outcome{};
+  std::string message;
+  std::vector<FittedUnknown> campaign;
+  /// Covariance of the campaign's unknowns, row by row. H⁻¹ G H⁻¹ with H the Gauss-Newton matrix after the
+  /// throws' own unknowns are eliminated and G the scatter of the throws' gradients (times n/(n − p)): it
+  /// holds when the noise within a throw is correlated or the law is not quite right. Not below H⁻¹.
+  std::vector<double> covariance;
+  std::vector<double> own_spread;  ///< learned 1 σ of the throws' own unknowns
+  std::vector<OpenDirection> open;
+  std::vector<ThrowFit> throws;
+  std::vector<ChannelMisfit> misfit;  ///< of the throws used
+  double chi2{};
+  long samples{}, degrees_of_freedom{};
+  int iterations{}, mode_changes{};  ///< throws whose modes differ between the start and the end of the last round
+  double seconds{}, jacobian_seconds{};  ///< the second summed over threads
+  double chi2_per_dof() const { return degrees_of_freedom > 0 ? chi2 / static_cast<double>(degrees_of_freedom) : 0; }
+  std::vector<double> values() const;
+  double correlation(std::size_t i, std::size_t j) const;
+};
+
+/// Least squares by Ceres (Levenberg-Marquardt; the throws' own unknowns eliminated by Schur's complement)
+/// with exact derivatives.
+FitResult fit(const CampaignProblem& problem, const FitOptions& options = {});
+
+/// The own unknowns of throws that took no part in a fit, from their samples before the gripper opens alone
+/// and from the learned spread: what is known of a throw before it is thrown.
+std::vector<double> own_before_release(const CampaignProblem& problem, const CampaignThrow& thrown,
+                                       const FitResult& fit);
+
+}  // namespace unhand::fitting

@@ -1,0 +1,121 @@
+#include "release/effects.hpp"
+
+#include <fmt/core.h>
+
+#include <stdexcept>
+
+namespace unhand::release {
+
+using dynamics::convert;
+using dynamics::EffectValues;
+
+namespace {
+
+template <class S>
+void delay(const EffectValues<S>& p, Lateness<S>& late) {
+  late.opening_delay = p["delay"];
+}
+template <class S>
+void lag(const EffectValues<S>& p, Lateness<S>& late) {
+  late.tracking_lag = p["tau"];
+}
+
+Window shifted(const Window& window, double by) { return {window.begin - by, window.end - by}; }
+
+}  // namespace
+
+std::span<const dynamics::EffectOn<Lateness>> lateness_effects() {
+  static const dynamics::EffectOn<Lateness> table[] = {
+      {{"release.opening_delay",
+        "the normal force acts later than its log says",
+        {{"delay", "s", 0, -0.05, 0.05, 5e-4}}},
+       &delay<double>,
+       &delay<Dual>},
+      {{"release.hand_tracking_lag",
+        "the logged hand motion is the commanded one, which the true one follows with a first-order lag",
+        {{"tau", "s", 0, 0, 0.1, 1e-3}},
+        false,
+        true},
+       &lag<double>,
+       &lag<Dual>},
+  };
+  return table;
+}
+
+DelayedForce::DelayedForce(const contact::NormalForce& base, const Dual& delay) : base_(base), delay_(delay) {
+  if (!(std::abs(delay.a) <= 1))
+    throw std::invalid_argument(fmt::format("release.opening_delay: delay = {} is not in [-1, 1] s", delay.a));
+}
+double DelayedForce::at(const Window& window, double t) const {
+  return base_.at(shifted(window, delay_.a), t - delay_.a);
+}
+Dual DelayedForce::at(const Window& window, const Dual& t) const {
+  return base_.at(shifted(window, delay_.a), t - delay_);
+}
+void DelayedForce::kinks(std::vector<double>& out) const {
+  const std::size_t first = out.size();
+  base_.kinks(out);
+  for (std::size_t i = first; i < out.size(); ++i) out[i] += delay_.a;
+}
+void DelayedForce::kinks(std::vector<Dual>& out) const {
+  const std::size_t first = out.size();
+  base_.kinks(out);
+  for (std::size_t i = first; i < out.size(); ++i) out[i] += delay_;
+}
+
+LaggedHand::LaggedHand(const PolynomialHand& logged, const Dual& lag) : logged_(logged), lag_(lag) {
+  if (!(lag.a >= 0 && lag.a <= 1))
+    throw std::invalid_argument(fmt::format("release.hand_tracking_lag: tau = {} is not in [0, 1] s", lag.a));
+  const auto& path = logged.path();
+  const auto& breaks = path.breaks();
+  for (std::size_t i = 0; i < path.pieces().size(); ++i) {
+    const auto& c = path.pieces()[i];
+    Piece piece{};
+    for (int j = 5; j >= 0; --j)
+      for (int n = 0; n < 3; ++n) {
+        // (−τ)^k (j + k)!/j! c_{j+k}, summed by Horner's rule from the highest k.
+        Dual sum(0.0);
+        for (int k = 5 - j; k >= 0; --k) sum = c[j + k][n] - sum * lag * static_cast<double>(j + k + 1);
+        piece.settled[j][n] = sum;
+      }
+    if (i > 0 && lag.a > 0) {
+      const Piece& before = pieces_.back();
+      const double h = breaks[i] - breaks[i - 1];
+      const Dual decay = exp(-h / lag);
+      for (int n = 0; n < 3; ++n) {
+        Dual end = before.settled[5][n];
+        for (int j = 4; j >= 0; --j) end = end * h + before.settled[j][n];
+        piece.transient[n] = end + before.transient[n] * decay - piece.settled[0][n];
+      }
+    }
+    pieces_.push_back(piece);
+  }
+}
+
+template <class S>
+HandState<S> LaggedHand::at_(const Window& window, const S& t) const {
+  using std::exp;
+  const std::size_t i = logged_.path().piece(window, dynamics::value_of(t));
+  const Piece& piece = pieces_[i];
+  const S h = t - logged_.path().breaks()[i];
+  std::array<S, 3> value, first, second;
+  const bool settling = lag_.a > 0;
+  const S rate = settling ? S(1.0 / convert<S>(lag_)) : S(0), decay = settling ? S(exp(-h * rate)) : S(0);
+  for (int n = 0; n < 3; ++n) {
+    S p = convert<S>(piece.settled[5][n]), d(0), half(0);
+    for (int j = 4; j >= 0; --j) {
+      half = half * h + d;
+      d = d * h + p;
+      p = p * h + convert<S>(piece.settled[j][n]);
+    }
+    const S transient = convert<S>(piece.transient[n]) * decay;
+    value[n] = p + transient;
+    first[n] = d - rate * transient;
+    second[n] = 2.0 * half + rate * rate * transient;
+  }
+  return {{value[0], value[1], value[2]}, {first[0], first[1], first[2]}, {second[0], second[1], second[2]}};
+}
+template HandState<double> LaggedHand::at_(const Window&, const double&) const;
+template HandState<Dual> LaggedHand::at_(const Window&, const Dual&) const;
+
+}  // namespace unhand::release
