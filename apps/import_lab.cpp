@@ -78,28 +78,41 @@ constexpr const char* new_log_options[] = {"--sku",
                                            "--dimension",
                                            "--landing-height"};
 
-/// Only those that `format` takes may be given.
-void require_options(const std::string& format, const LabOptions& options) {
-  struct Rule {
-    const char* option;
-    std::vector<std::string_view> formats;
-  };
-  const Rule rules[] = {{"--columns", {"hand-csv", "ft-csv"}},
-                        {"--units", {"hand-csv", "ft-csv"}},
-                        {"--sigma", {"hand-csv", "ft-csv", "motive-csv"}},
-                        {"--time-offset", {"hand-csv", "ft-csv", "motive-csv"}},
-                        {"--into", {"hand-csv", "ft-csv", "motive-csv"}},
-                        {"--body", {"motive-csv"}},
-                        {"--dimension", {"motive-csv"}},
-                        {"--heading", {"motive-csv"}},
-                        {"--origin", {"motive-csv"}},
-                        {"--com", {"motive-csv"}},
-                        {"--landing", {"motive-csv"}},
-                        {"--free-flight", {"motive-csv"}}};
-  for (const Rule& rule : rules)
+/// The options that are for some of these formats only.
+struct Rule {
+  const char* option;
+  std::vector<std::string_view> formats;
+};
+const std::vector<Rule>& rules() {
+  static const std::vector<Rule> list = {{"--columns", {"hand-csv", "ft-csv"}},
+                                         {"--units", {"hand-csv", "ft-csv"}},
+                                         {"--sigma", {"hand-csv", "ft-csv", "motive-csv"}},
+                                         {"--time-offset", {"hand-csv", "ft-csv", "motive-csv"}},
+                                         {"--into", {"hand-csv", "ft-csv", "motive-csv"}},
+                                         {"--replace", {"hand-csv", "ft-csv", "motive-csv"}},
+                                         {"--throw", {"hand-csv", "ft-csv", "motive-csv", "phyphox"}},
+                                         {"--body", {"motive-csv"}},
+                                         {"--dimension", {"motive-csv"}},
+                                         {"--heading", {"motive-csv"}},
+                                         {"--origin", {"motive-csv"}},
+                                         {"--com", {"motive-csv"}},
+                                         {"--landing", {"motive-csv"}},
+                                         {"--free-flight", {"motive-csv"}},
+                                         {"--min-fall", {"phyphox"}},
+                                         {"--fall-threshold", {"phyphox"}}};
+  return list;
+}
+
+void refuse_others(const std::string& format, const LabOptions& options) {
+  for (const Rule& rule : rules())
     if (given(options, rule.option) &&
         std::find(rule.formats.begin(), rule.formats.end(), format) == rule.formats.end())
       throw WrongUsage(fmt::format("{} is not for {}", rule.option, format));
+}
+
+/// Only those that `format` takes may be given, and those of a new log not with a log to add to.
+void require_options(const std::string& format, const LabOptions& options) {
+  refuse_others(format, options);
   if (options.into.empty()) {
     if (given(options, "--replace")) throw WrongUsage("--replace goes with --into");
     if (given(options, "--sku") == given(options, "--mass"))
@@ -173,7 +186,12 @@ Reading read_motive(const std::string& file, const ThrowLog& log, const LabOptio
       throw WrongUsage(fmt::format("--sigma: '{}' is neither position (m) nor angle (rad)", name));
     (name == "position" ? motive.sigma_position : motive.sigma_angle) = sigma;
   }
-  datasets::MotiveTake take = datasets::read_motive_csv(file, motive);
+  datasets::MotiveTake take;
+  try {
+    take = datasets::read_motive_csv(file, motive);
+  } catch (const std::invalid_argument& error) {
+    throw WrongUsage(fmt::format("--{}", error.what()));
+  }
   Reading out;
   Throw& one = out.throws.emplace_back();
   out.text = fmt::format("rigid body {} of take {}, {} frames", take.body, take.name, take.mocap.time.rows);
@@ -198,8 +216,12 @@ Reading read_motive(const std::string& file, const ThrowLog& log, const LabOptio
   return out;
 }
 
-Reading read_phone(const std::string& file) {
-  datasets::PhyphoxRecording recording = datasets::read_phyphox(file);
+Reading read_phone(const std::string& file, const LabOptions& options) {
+  datasets::PhyphoxOptions phone;
+  phone.min_duration = options.min_fall;
+  phone.threshold = options.fall_threshold;
+  phone.guard = std::min(phone.guard, phone.min_duration / 4);
+  datasets::PhyphoxRecording recording = datasets::read_phyphox(file, phone);
   Reading out;
   out.text = fmt::format("{} samples, {} free fall{}", recording.samples, recording.falls.size(),
                          recording.falls.size() == 1 ? "" : "s");
@@ -221,7 +243,7 @@ Reading read_phone(const std::string& file) {
 Reading read(const std::string& format, const std::string& file, const ThrowLog& log,
              const LabOptions& options) {
   if (format == "motive-csv") return read_motive(file, log, options);
-  if (format == "phyphox") return read_phone(file);
+  if (format == "phyphox") return read_phone(file, options);
   return read_columns(format, file, options);
 }
 
@@ -234,10 +256,7 @@ std::string source_of(const std::string& format, std::size_t files) {
 }  // namespace
 
 void refuse_lab_options(const std::string& format, const LabOptions& options) {
-  for (const char* name :
-       {"--into", "--replace", "--throw", "--time-offset", "--columns", "--units", "--sigma", "--body",
-        "--heading", "--origin", "--com", "--free-flight", "--landing"})
-    if (given(options, name)) throw WrongUsage(fmt::format("{} is not for {}", name, format));
+  refuse_others(format, options);
   for (const char* name : new_log_options)
     if (given(options, name)) throw WrongUsage(fmt::format("{} is not for {}", name, format));
 }
@@ -278,9 +297,14 @@ LabImport import_lab(const std::string& format, const std::vector<std::string>& 
     reading.details["file"] = file;
     imported.details["files"].push_back(reading.details);
   }
-  if (log.throws.empty())
+  if (log.throws.empty()) {
+    std::string why = "holds no free fall";
+    for (const Json& dropped : imported.details["files"].front().value("dropped", Json::array()))
+      why += fmt::format("; {:.3f} s: {}", dropped["begin_s"].get<double>(),
+                         dropped["reason"].get<std::string>());
     throw datasets::ImportError(inputs.front(), "line 1",
-                                "holds no free fall, nor does any other of the inputs");
+                                why + (inputs.size() > 1 ? "; nor do the other inputs" : ""));
+  }
   try {
     if (!adding) split_throws(log, {options.test_every, options.test_conditions});
   } catch (const std::invalid_argument& error) {

@@ -23,7 +23,8 @@ struct LabOptions {
   double heading{};  // [deg]
   std::vector<double> origin, com, free_flight;
   bool landing{};
-  const CLI::App* parser{};  // knows which of them were given
+  double min_fall{0.4}, fall_threshold{5};  // [s], [m/s^2]
+  const CLI::App* parser{};                 // knows which of them were given
 };
 
 struct LabImport {

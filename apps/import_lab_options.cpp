@@ -89,6 +89,13 @@ void add_lab_options(CLI::App& parser, LabOptions& options) {
       .add_flag("--landing", options.landing,
                 "Take the landing from the track, where it passes the landing height")
       ->group(motive);
+  const char* phone = "Phones (phyphox)";
+  add(phone, "--min-fall", options.min_fall, "[s] The shortest free fall")
+      ->capture_default_str()
+      ->check(positive);
+  add(phone, "--fall-threshold", options.fall_threshold, "[m/s^2] The specific force in a fall is below it")
+      ->capture_default_str()
+      ->check(positive);
 }
 
 }  // namespace unhand::apps

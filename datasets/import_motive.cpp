@@ -296,6 +296,9 @@ MotiveTake read_motive_csv(const std::filesystem::path& file, const MotiveOption
         fmt::format("rigid body '{}' has no rotations: a planar pose and an offset of the CoM need them",
                     columns.body));
 
+  if (!columns.rotation.empty() && (options.sigma_position > 0) != (options.sigma_angle > 0))
+    throw std::invalid_argument("sigma: give it for positions and angles, or for neither");
+
   MotiveTake take{facts.take, facts.version, columns.body, columns.bodies, facts.frame_rate, {}, 0, 0, 0};
   Track track(take, options, !columns.rotation.empty());
   Series& time = take.mocap.time;

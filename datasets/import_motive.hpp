@@ -24,8 +24,8 @@ struct MotiveOptions {
   std::array<double, 3> origin{};  ///< [m] the robot's base in Motive's axes
   std::array<double, 3> com{};     ///< [m] from the body's pivot to its CoM, in the body's axes in Motive
   double time_offset = 0;          ///< [s] added to Motive's time, to bring it to the clock of the robot
-  /// Declared noise, 1 σ: of a position [m] and of an angle [rad] (σ/2 of a quaternion's components). 0:
-  /// none.
+  /// Declared noise, 1 σ: of a position [m] and of an angle [rad] (σ/2 of a quaternion's components); both or
+  /// neither where the file has rotations. 0: none.
   double sigma_position = 0, sigma_angle = 0;
 };
 

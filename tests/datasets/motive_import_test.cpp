@@ -250,8 +250,31 @@ TEST(Motive, SaysWhichLineAndColumn) {
   options.dimension = 4;
   EXPECT_THROW(read_motive_csv(path, options), std::invalid_argument);
   options = {};
+  options.sigma_position = 1e-4;
+  EXPECT_THROW(read_motive_csv(path, options), std::invalid_argument);
   options.sigma_angle = -1;
   EXPECT_THROW(read_motive_csv(path, options), std::invalid_argument);
+}
+
+// Whatever is left of a file that was cut off, it is read up to there or refused.
+TEST(Motive, CutOffAnywhere) {
+  const Scratch scratch;
+  const std::string path = scratch / "take.csv";
+  File file;
+  for (int k = 0; k < 3; ++k) file.rows += row(k, 0.1 * k, about(Z, 0.3 * k), {1, 2, 3});
+  const std::string text = file.text();
+  int read_whole = 0;
+  for (std::size_t n = 0; n < text.size(); ++n) {
+    put_bytes(path, text.substr(0, n));
+    try {
+      const MotiveTake take = read_motive_csv(path, {});
+      EXPECT_EQ(take.mocap.pose.rows, take.mocap.time.rows);
+      ++read_whole;
+    } catch (const ImportError& error) {
+      EXPECT_EQ(error.file, path) << n;
+    }
+  }
+  EXPECT_LT(read_whole, 40);  // after a whole line, or within its last cell, of which nothing is used
 }
 
 }  // namespace
