@@ -468,7 +468,7 @@ TEST_F(Cli, ImportsPhonesAsFreeFlights) {
   expect_refusal("import phyphox still.csv --mass 0.2 --out a.h5", 3,
                  "still.csv: line 1: holds no free fall");
   expect_refusal("import phyphox fall_1.csv --mass 0.2 --out a.h5 --min-fall 0.8", 3,
-                 "lasts 0.595 s, less than 0.8 s");
+                 "lasts 0.600 s, less than 0.8 s");
 }
 
 }  // namespace
