@@ -169,7 +169,7 @@ dynamics::FlowKind SlidingPivot::kind(int mode) const {
   if (mode == mode_of(kStuck, kLocked)) return dynamics::FlowKind::frozen;
   // A brake that f_max barely outweighs lasts long while its direction relaxes at once, the faster the longer
   // the lever.
-  return translation_of(mode) == kBrake ? dynamics::FlowKind::stiff : dynamics::FlowKind::smooth;
+  return translation_of(mode) == kBrake ? dynamics::FlowKind::mixed : dynamics::FlowKind::smooth;
 }
 
 bool SlidingPivot::is_homogeneous(int mode) const { return translation_of(mode) == kBrake; }

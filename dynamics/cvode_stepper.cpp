@@ -21,7 +21,7 @@ class CvodeStepper final : public Stepper<double, N> {
     check(SUNContext_Create(nullptr, &context_), "SUNContext_Create");
     vector_ = N_VNew_Serial(N, context_);
     scratch_ = N_VNew_Serial(N, context_);
-    memory_ = CVodeCreate(kind == FlowKind::stiff ? CV_BDF : CV_ADAMS, context_);
+    memory_ = CVodeCreate(kind == FlowKind::smooth ? CV_ADAMS : CV_BDF, context_);
     if (vector_ == nullptr || scratch_ == nullptr || memory_ == nullptr)
       throw std::runtime_error("CVODE: out of memory");
     check(CVodeInit(memory_, &CvodeStepper::call_flow, 0.0, vector_), "CVodeInit");

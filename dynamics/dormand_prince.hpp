@@ -32,6 +32,18 @@ class DormandPrince final : public SingleStep<DormandPrince<S, N>, S, N> {
     return this->error_norm(error);
   }
 
+  /// h |λ| of the last step's fastest direction, from the flow at its end and at the stage before.
+  double stiffness() const {
+    double rates = 0, states = 0;
+    for (int i = 0; i < N; ++i) {
+      const double rate = value_of(k_[6][i]) - value_of(k_[5][i]);
+      const double state = value_of(this->y1_[i]) - value_of(last_stage_[i]);
+      rates += rate * rate;
+      states += state * state;
+    }
+    return states > 0 ? std::abs(value_of(h_)) * std::sqrt(rates / states) : 0.0;
+  }
+
   void interpolate(double theta, State<S, N>& y) const override {
     const double one = 1 - theta;
     for (int i = 0; i < N; ++i) {
@@ -75,10 +87,13 @@ class DormandPrince final : public SingleStep<DormandPrince<S, N>, S, N> {
     for (int i = 0; i < N; ++i)
       y1[i] = y0[i] + h * (35.0 / 384 * k_[0][i] + 500.0 / 1113 * k_[2][i] + 125.0 / 192 * k_[3][i] -
                            2187.0 / 6784 * k_[4][i] + 11.0 / 84 * k_[5][i]);
-    if (with_last) this->flow(t + h, y1, k_[6]);
+    if (!with_last) return;
+    this->flow(t + h, y1, k_[6]);
+    last_stage_ = y;
   }
 
   std::array<State<S, N>, 7> k_{};
+  State<S, N> last_stage_{};
   S h_{};
 };
 

@@ -27,6 +27,7 @@ enum class FlowKind {
   frozen,    ///< the state does not change: y' = 0 exactly, and no stepper is needed
   smooth,    ///< not stiff: explicit Runge-Kutta
   stiff,     ///< fast contracting directions: an L-stable implicit stepper
+  mixed,     ///< smooth as a rule and stiff at times: explicit until that shows
   finished,  ///< nothing is left to simulate: entering the mode ends the integration
 };
 

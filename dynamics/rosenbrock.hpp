@@ -1,14 +1,13 @@
 // A Rosenbrock method of order 5(4), L-stable and stiffly accurate: the stepper of stiff flows.
 #pragma once
 
-#include <Eigen/LU>
-
 #include "dynamics/jacobian.hpp"
+#include "dynamics/small_inverse.hpp"
 #include "dynamics/stepper.hpp"
 
 namespace unhand::dynamics {
 
-/// Rodas5P, [Steinebach2023]: one exact Jacobian, one LU factorisation and eight evaluations a step; no
+/// Rodas5P, [Steinebach2023]: one exact Jacobian, one inverse and eight evaluations a step; no
 /// Newton iteration, so nothing fails to converge. Dense output of order 4. Unlike RODAS ([HairerWanner1996]
 /// IV.7) it keeps its order where the solution follows a slowly moving equilibrium of the stiff part, which
 /// is what slip does: there RODAS needs ten times the steps. Values only: the tangent of a Rosenbrock step
@@ -29,7 +28,7 @@ class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
   double attempt(const double& h) {
     State<double, N> error;
     advance(h, this->y1_, error);
-    kept_ = k_;
+    std::copy_n(&k_[0][0], kStages * kPadded, &kept_[0][0]);
     bent_ = false;
     return this->error_norm(error);
   }
@@ -48,8 +47,7 @@ class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
   }
 
  private:
-  using Vector = Eigen::Matrix<double, N, 1>;
-  static constexpr int kStages = 8;
+  static constexpr int kStages = 8, kPadded = SmallInverse<N>::kPadded;
   static constexpr double kGamma = 0.21193756319429014;
   static constexpr double kNode[kStages] = {
       0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716, 0.4288403609558664, 1, 1, 1};
@@ -102,28 +100,29 @@ class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
   }
 
   void advance(double h, State<double, N>& y1, State<double, N>& error) {
-    Eigen::Matrix<double, N, N> matrix = -jacobian_;
-    matrix.diagonal().array() += 1 / (h * kGamma);
-    lu_.compute(matrix);
+    double matrix[N][N];
+    for (int i = 0; i < N; ++i) {
+      for (int j = 0; j < N; ++j) matrix[i][j] = -jacobian_(i, j);
+      matrix[i][i] += 1 / (h * kGamma);
+    }
+    inverse_.compute(matrix);
+    const double rate = 1 / h;
     State<double, N> y = this->y0_, f = f0_;
     for (int stage = 0; stage < kStages; ++stage) {
       if (stage > 5) {
         for (int i = 0; i < N; ++i) y[i] += k_[stage - 1][i];
       } else if (stage > 0) {
-        for (int i = 0; i < N; ++i) {
-          y[i] = this->y0_[i];
-          for (int j = 0; j < stage; ++j) y[i] += kA[stage][j] * k_[j][i];
-        }
+        alignas(16) double sum[kPadded]{};
+        for (int j = 0; j < stage; ++j)
+          for (int i = 0; i < kPadded; ++i) sum[i] += kA[stage][j] * k_[j][i];
+        for (int i = 0; i < N; ++i) y[i] = this->y0_[i] + sum[i];
       }
       if (stage > 0) this->flow(this->t0_ + kNode[stage] * h, y, f);
-      Vector rhs;
-      for (int i = 0; i < N; ++i) {
-        double c = 0;
-        for (int j = 0; j < stage; ++j) c += kC[stage][j] * k_[j][i];
-        rhs[i] = f[i] + kTimeWeight[stage] * h * ft_[i] + c / h;
-      }
-      const Vector k = lu_.solve(rhs);
-      for (int i = 0; i < N; ++i) k_[stage][i] = k[i];
+      alignas(16) double rhs[kPadded]{};
+      for (int j = 0; j < stage; ++j)
+        for (int i = 0; i < kPadded; ++i) rhs[i] += kC[stage][j] * k_[j][i];
+      for (int i = 0; i < N; ++i) rhs[i] = f[i] + kTimeWeight[stage] * h * ft_[i] + rhs[i] * rate;
+      inverse_.multiply(rhs, k_[stage]);
     }
     for (int i = 0; i < N; ++i) {
       error[i] = k_[kStages - 1][i];
@@ -132,9 +131,9 @@ class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
   }
 
   Eigen::Matrix<double, N, N> jacobian_;
-  Eigen::PartialPivLU<Eigen::Matrix<double, N, N>> lu_;
+  SmallInverse<N> inverse_;
   State<double, N> f0_{}, ft_{};
-  std::array<State<double, N>, kStages> k_{}, kept_{};
+  alignas(16) double k_[kStages][kPadded]{}, kept_[kStages][kPadded]{};
   mutable std::array<State<double, N>, 3> bend_{};
   mutable bool bent_{};
 };

@@ -135,8 +135,9 @@ class SingleStep : public Stepper<S, N> {
                 factor, 0.9 * taken / taken_before_ *
                             std::pow(error_before_ / std::max(error * error, 1e-20), 1 / Derived::kOrder));
           factor = std::max(factor, 0.2);
-          // A step cut short, by a limit or by rejection, tells no trend.
-          error_before_ = rejected || taken < 0.99 * std::min(h_next_, longest) ? 0.0 : std::max(error, 1e-3);
+          // A step cut short by a limit tells no trend.
+          error_before_ =
+              !rejected && taken < 0.99 * std::min(h_next_, longest) ? 0.0 : std::max(error, 1e-3);
           taken_before_ = taken;
         }
         const double next = taken * (rejected ? std::min(factor, 1.0) : factor);
@@ -184,12 +185,13 @@ class SingleStep : public Stepper<S, N> {
   Derived& self() { return static_cast<Derived&>(*this); }
 };
 
-/// The ways of stepping a flow; `automatic` takes dormand_prince for smooth modes and, for stiff ones,
-/// rosenbrock with double and radau with Dual.
+/// The ways of stepping a flow; `automatic` takes dormand_prince for smooth modes; for stiff ones rosenbrock
+/// with double and radau with Dual; for mixed ones dormand_prince that goes over to rosenbrock, or radau with
+/// Dual.
 enum class Method { automatic, dormand_prince, rosenbrock, radau, cvode };
 
-/// CVODE (SUNDIALS) behind the same interface: Adams for smooth, BDF with the exact Jacobian for stiff modes.
-/// It is the oracle of the other steppers; double only.
+/// CVODE (SUNDIALS) behind the same interface: Adams for smooth, BDF with the exact Jacobian for the other
+/// modes. It is the oracle of the other steppers; double only.
 template <int N>
 std::unique_ptr<Stepper<double, N>> make_cvode_stepper(const Tolerances&, FlowKind);
 

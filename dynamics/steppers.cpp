@@ -5,7 +5,7 @@
 #include "dynamics/dormand_prince.hpp"
 #include "dynamics/paced_stepper.hpp"
 #include "dynamics/radau.hpp"
-#include "dynamics/rosenbrock.hpp"
+#include "dynamics/switching_stepper.hpp"
 
 namespace unhand::dynamics {
 namespace {
@@ -15,6 +15,7 @@ std::unique_ptr<Stepper<S, N>> make_stepper(Method method, FlowKind kind, const 
   if (method == Method::dormand_prince) return std::make_unique<DormandPrince<S, N>>(tolerances);
   if (method == Method::radau) return std::make_unique<Radau<S, N>>(tolerances);
   if constexpr (std::is_same_v<S, double>) {
+    if (method == Method::automatic) return std::make_unique<SwitchingStepper<N>>(tolerances);
     if (method == Method::rosenbrock) return std::make_unique<Rosenbrock<N>>(tolerances);
     return make_cvode_stepper<N>(tolerances, kind);
   }
@@ -27,7 +28,7 @@ std::unique_ptr<Stepper<S, N>> make_stepper(Method method, FlowKind kind, const 
 template <class S, int N>
 Stepper<S, N>& Steppers<S, N>::of(FlowKind kind, bool paced) {
   if (kind == FlowKind::frozen) return frozen_;
-  auto& stepper = made_[kind == FlowKind::stiff][paced];
+  auto& stepper = made_[static_cast<int>(kind)][paced];
   if (!stepper) {
     if constexpr (N + 2 <= kDualSize) {
       if (paced) {
@@ -55,6 +56,7 @@ template <class S, int N>
 Method Steppers<S, N>::method(FlowKind kind) const {
   if (options_.method != Method::automatic) return options_.method;
   if (kind == FlowKind::smooth) return Method::dormand_prince;
+  if (kind == FlowKind::mixed && std::is_same_v<S, double>) return Method::automatic;
   return std::is_same_v<S, double> ? Method::rosenbrock : Method::radau;
 }
 

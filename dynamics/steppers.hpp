@@ -28,8 +28,8 @@ class Frozen final : public Stepper<S, N> {
 };
 
 /// One stepper per kind of flow, paced or not, each made when first needed; Method::automatic takes
-/// DormandPrince for smooth flows and, for stiff ones, Rosenbrock with double and Radau with Dual.
-/// Instantiated as `integrate` is.
+/// DormandPrince for smooth flows and, with double, Rosenbrock for stiff and SwitchingStepper for mixed ones;
+/// with Dual Radau for both. Instantiated as `integrate` is.
 template <class S, int N>
 class Steppers {
  public:
@@ -43,7 +43,7 @@ class Steppers {
 
   const IntegratorOptions& options_;
   Frozen<S, N> frozen_;
-  std::unique_ptr<Stepper<S, N>> made_[2][2];  // by stiffness and pace
+  std::unique_ptr<Stepper<S, N>> made_[4][2];  // by kind and pace
 };
 
 extern template class Steppers<double, 2>;

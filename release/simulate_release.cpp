@@ -31,6 +31,9 @@ const char* to_string(ReleaseOutcome outcome) {
 
 namespace {
 
+/// The share of a tiny slip by which one step may be wrong.
+constexpr double kSlipShare = 1e-2;
+
 /// The release as a hybrid system: the modes of the contact model, and one more in which the object is free.
 template <class P>
 class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 6>,
@@ -63,10 +66,11 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
                    const State<double, 6>& y1, State<double, 6>& scale) const override {
     dynamics::HybridSystem<6>::error_scale(p, tolerances, y0, y1, scale);
     if (!contact_.is_homogeneous(p.mode)) return;
-    // The absolute part is what a slip at its onset may be wrong by: far below the speed at which a stop is
-    // taken.
+    // While a slip is tiny its direction forgets what it was wrong by, so the absolute tolerance holds for it
+    // as for the rest of the state, but no more than a share of the slip itself, so that its direction stays
+    // one.
     const double length = contact_.spin_length(), speed = std::max(slip_size(y0), slip_size(y1));
-    const double slip = 1e-3 * tolerances.absolute + tolerances.relative * speed;
+    const double slip = std::min(tolerances.absolute, kSlipShare * speed) + tolerances.relative * speed;
     scale[3] = scale[4] = slip;
     if (length > 0) scale[5] = slip / length;
   }
