@@ -68,22 +68,20 @@ Vector6 vector_of(const Sym3& a) {
   return Vector6{{a(0, 0), a(1, 1), a(2, 2), r * a(0, 1), r * a(0, 2), r * a(1, 2)}};
 }
 
-Matrix6 gram_of(const std::array<double, 21>& p) {
-  Matrix6 lower = Matrix6::Zero();
-  std::size_t at = 0;
-  for (int k = 0; k < 6; ++k)
-    for (int i = k; i < 6; ++i) lower(i, k) = p[at++];
-  return lower * lower.transpose();
+using Squares = std::array<double, QuarticTerms::parameters>;
+
+Matrix6 gram_of(const Squares& p) {
+  const Eigen::Map<const Matrix6> columns(p.data());
+  return columns * columns.transpose();
 }
 
-/// The columns of a Cholesky factor; the diagonal is kept off zero.
-std::array<double, 21> factor_of(const Matrix6& gram) {
-  const double floor = 1e-13 * gram.trace();
-  const Matrix6 lower = Matrix6(gram + floor * Matrix6::Identity()).llt().matrixL();
-  std::array<double, 21> p{};
-  std::size_t at = 0;
-  for (int k = 0; k < 6; ++k)
-    for (int i = k; i < 6; ++i) p[at++] = lower(i, k);
+/// The symmetric root.
+Squares squares_of(const Matrix6& gram) {
+  const Eigen::SelfAdjointEigenSolver<Matrix6> found(gram);
+  Squares p{};
+  Eigen::Map<Matrix6>(p.data()) = found.eigenvectors() *
+                                  found.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
+                                  found.eigenvectors().transpose();
   return p;
 }
 
@@ -112,9 +110,9 @@ struct Ball {
 
 /// Mixes in the least share of the ball that makes Σ adj(A_k), which is linear in the Gram matrix, positive
 /// semidefinite.
-std::array<double, 21> made_convex(const std::array<double, 21>& p, const Matrix6& ball) {
+Squares made_convex(const Squares& p, const Matrix6& ball) {
   const Matrix6 gram = gram_of(p);
-  const Sym3 inside = sym_of(adjugate_sum(factor_of(ball).data())), own = sym_of(adjugate_sum(p.data()));
+  const Sym3 inside = sym_of(adjugate_sum(squares_of(ball).data())), own = sym_of(adjugate_sum(p.data()));
   const double margin = 1e-9 * own.norm();
   double low = 0, high = 1;
   if (least_eigenvalue(own) < margin)
@@ -125,7 +123,7 @@ std::array<double, 21> made_convex(const std::array<double, 21>& p, const Matrix
   else
     high = 0;
   const double share = std::max(high, 1e-9);
-  return factor_of((1 - share) * gram + share * ball);
+  return squares_of((1 - share) * gram + share * ball);
 }
 
 }  // namespace
@@ -134,7 +132,7 @@ QuarticSolution solve_quartic(const std::vector<SlipSample>& samples, const std:
                               SurfaceNoise noise) {
   const Ball ball(ellipsoid);
   QuarticSolution out;
-  out.p = factor_of(ball.squared + 0.01 * ball.spread);
+  out.p = squares_of(ball.squared + 0.01 * ball.spread);
   const double size = sym_of(adjugate_sum(out.p.data())).norm();
   ConvexityResidual convexity;
   convexity.penalty = 1e3 / (size * size);
@@ -143,10 +141,12 @@ QuarticSolution solve_quartic(const std::vector<SlipSample>& samples, const std:
   for (int turn = 0; turn < turns; ++turn) {
     ceres::Problem problem;
     add_samples<QuarticTerms>(problem, samples, noise, out.p.data());
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<ConvexityResidual, 3, QuarticTerms::parameters>(
+                                 new ConvexityResidual(convexity)),
+                             nullptr, out.p.data());
     problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<ConvexityResidual, 3, 21>(new ConvexityResidual(convexity)), nullptr,
-        out.p.data());
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Hold, 21, 21>(new Hold), nullptr, out.p.data());
+        new ceres::AutoDiffCostFunction<Hold, QuarticTerms::parameters, QuarticTerms::parameters>(new Hold),
+        nullptr, out.p.data());
     const Solved solved = solve(problem, 200);
     out.iterations += solved.iterations;
     out.usable = solved.usable;
@@ -168,7 +168,7 @@ QuarticSolution solve_quartic(const std::vector<SlipSample>& samples, const std:
 
 std::array<double, 15> quartic_coefficients(const double* p) {
   constexpr int power[6][3] = {{2, 0, 0}, {0, 2, 0}, {0, 0, 2}, {1, 1, 0}, {1, 0, 1}, {0, 1, 1}};
-  std::array<double, 21> columns;
+  Squares columns;
   std::copy_n(p, columns.size(), columns.begin());
   const Matrix6 gram = gram_of(columns);
   std::array<double, 15> out{};

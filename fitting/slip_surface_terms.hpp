@@ -56,9 +56,10 @@ struct Products {
   }
 };
 
-/// Σ_k (a_k · q(w))², a_k (6) the columns of a lower triangular matrix: p holds its 21 entries by columns.
+/// Σ_k (a_k · q(w))²: p holds the six a_k (6), one after another. A triangular set would do, but the way to
+/// the least then leads through zeros of its diagonal, where descent sticks.
 struct QuarticTerms {
-  static constexpr int parameters = 21, degree = 4;
+  static constexpr int parameters = 36, degree = 4;
   template <class T>
   static SurfaceValue<T> at(const T* p, const Wrench& w) {
     const Products products(w);
@@ -66,7 +67,7 @@ struct QuarticTerms {
     for (std::size_t k = 0; k < 6; ++k) {
       T sum = T(0);
       std::array<T, 3> slope{T(0), T(0), T(0)};
-      for (std::size_t i = k; i < 6; ++i, ++p) {
+      for (std::size_t i = 0; i < 6; ++i, ++p) {
         sum += *p * products.q[i];
         for (std::size_t j = 0; j < 3; ++j)
           if (products.dq[i][j] != 0) slope[j] += *p * products.dq[i][j];
@@ -84,8 +85,8 @@ std::array<T, 6> adjugate_sum(const T* p) {
   std::array<T, 6> out{T(0), T(0), T(0), T(0), T(0), T(0)};
   const double r = std::sqrt(0.5);
   for (std::size_t k = 0; k < 6; ++k) {
-    std::array<T, 6> a{T(0), T(0), T(0), T(0), T(0), T(0)};
-    for (std::size_t i = k; i < 6; ++i, ++p) a[i] = i < 3 ? *p : r * *p;
+    std::array<T, 6> a;
+    for (std::size_t i = 0; i < 6; ++i, ++p) a[i] = i < 3 ? *p : r * *p;
     const auto& [xx, yy, zz, xy, xz, yz] = a;
     out[0] += yy * zz - yz * yz;
     out[1] += xz * yz - xy * zz;

@@ -1,0 +1,181 @@
+#include <numbers>
+#include <sstream>
+
+#include "datasets/import_planar_pushes.hpp"
+#include "log_samples.hpp"
+
+namespace unhand::datasets::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A push along +y of the world by a finger under the long leg, at `along` [mm] from the corner, whose yaw is
+/// `tool`; the block is turned by `yaw` and moves straight by `moves` [mm]. Force 3 N on the block along the
+/// push, from the touch on; `offset` is what the sensor reads without load.
+struct Push {
+  double along = 50, moves = 10, yaw = 0, tool = 1.5707963267948966, force = 3;
+  std::array<double, 2> offset{0.02, -0.08};
+  double rest = 2;  // [s] before the touch; speed 2.5 mm/s
+
+  std::string text() const {
+    std::ostringstream out;
+    out.precision(15);
+    const double c = std::cos(yaw), s = std::sin(yaw), time = rest + moves / 2.5;
+    const std::array<double, 2> push{-s, c};  // the block's own y
+    const auto pose = [&](double x, double y, double angle) {
+      out << x << ' ' << y << " 8.5 " << std::cos(angle / 2) << " 0 0 " << std::sin(angle / 2) << '\n';
+    };
+    pose(100, 200, yaw);
+    pose(100 + moves * push[0], 200 + moves * push[1], yaw);
+    // The sensor: f_block = −R(tool) M (f_s − b), and M is its own inverse.
+    const double u = std::cos(tool), v = std::sin(tool);
+    const double fx = -force * (u * push[0] + v * push[1]), fy = -force * (-v * push[0] + u * push[1]);
+    const double sx = (fx + fy) / std::numbers::sqrt2, sy = (fx - fy) / std::numbers::sqrt2;
+    const int n = static_cast<int>(time * 100) + 1, m = static_cast<int>(time * 30) + 2;
+    out << n << '\n';
+    for (int i = 0; i < n; ++i) {
+      const bool load = 0.01 * i > rest;
+      out << 1000 + 0.01 * i << ' ' << offset[0] + (load ? sx : 0) << ' ' << offset[1] + (load ? sy : 0)
+          << '\n';
+    }
+    out << m << '\n';
+    for (int i = 0; i < m; ++i) {
+      const double t = i / 30.0, way = 2.5 * (std::min(t, time) - rest);
+      out << 1000 + t << ' ';
+      pose(100 + along * c + way * push[0], 200 + along * s + way * push[1], tool);
+    }
+    return out.str();
+  }
+};
+
+std::string log_of(const std::vector<Push>& pushes) {
+  std::string out = std::to_string(pushes.size()) + "\n";
+  for (const Push& push : pushes) out += push.text();
+  return out;
+}
+
+SlipLog import_text(const Scratch& scratch, const std::string& text, PlanarPushReport* report = nullptr) {
+  fs::create_directories(scratch / "felt");
+  put_bytes(scratch / "felt/a.txt", text);
+  return import_planar_pushes(std::vector<fs::path>{scratch / "felt"}, {}, report);
+}
+
+TEST(PlanarPushes, StraightPushInEveryFrame) {
+  for (const double yaw : {0.0, 1.0, -2.5})
+    for (const double tool : {1.57, -0.4, 3.1}) {
+      const Scratch scratch;
+      Push push;
+      push.yaw = yaw;
+      push.tool = tool;
+      const SlipLog log = import_text(scratch, log_of({push}));
+      const Surface& surface = log.surfaces.at("felt");
+      EXPECT_EQ(surface.mass, 1.518);
+      EXPECT_EQ(surface.characteristic_length, 0.05);
+      ASSERT_EQ(surface.slips.size(), 1U);
+      const Slip& slip = surface.slips[0];
+      EXPECT_EQ(slip.id, "push-00");
+      ASSERT_GE(slip.time.rows, 38U);  // 4 s of motion in steps of 0.1 s, less the first and last
+      for (std::size_t i = 1; i + 1 < slip.time.rows; ++i) {
+        EXPECT_NEAR(slip.wrench(i, 0), 0, 1e-9);
+        EXPECT_NEAR(slip.wrench(i, 1), 3, 1e-9);
+        EXPECT_NEAR(slip.wrench(i, 2), 0, 1e-9);  // below the centre
+        EXPECT_NEAR(slip.twist(i, 0), 0, 1e-9);
+        EXPECT_NEAR(slip.twist(i, 1), 2.5e-3, 1e-7);
+        EXPECT_NEAR(slip.twist(i, 2), 0, 1e-9);
+      }
+      EXPECT_GE(slip.time(0), 1.9);  // nothing before the touch
+    }
+}
+
+TEST(PlanarPushes, TorqueIsAboutTheCentre) {
+  const Scratch scratch;
+  Push push;
+  push.along = 90;
+  const SlipLog log = import_text(scratch, log_of({push}));
+  const Slip& slip = log.surfaces.at("felt").slips[0];
+  EXPECT_NEAR(slip.wrench(5, 2), 0.04 * 3, 1e-9);  // 40 mm right of the centre, force up
+}
+
+TEST(PlanarPushes, FingerThatTouchesFromTheStartBorrowsItsOffset) {
+  const Scratch scratch;
+  Push touching;
+  touching.rest = -0.005;
+  PlanarPushReport report;
+  const SlipLog log = import_text(scratch, log_of({{}, {}, touching}), &report);
+  EXPECT_EQ(report.borrowed_offsets, 1);
+  EXPECT_NEAR(log.surfaces.at("felt").slips[2].wrench(3, 1), 3, 1e-9);
+}
+
+TEST(PlanarPushes, DropsWhatIsNoPush) {
+  const Scratch scratch;
+  Push still, pulling;
+  still.moves = 0.5;
+  pulling.force = -3;
+  PlanarPushReport report;
+  const SlipLog log = import_text(scratch, log_of({{}, still, pulling, {}, {}}), &report);
+  EXPECT_EQ(report.pushes, 5);
+  EXPECT_EQ(report.kept, 3);
+  EXPECT_EQ(report.train, 2);
+  EXPECT_EQ(report.test, 1);
+  ASSERT_EQ(report.dropped.size(), 2U);
+  EXPECT_EQ(report.dropped[0].push, 1);
+  EXPECT_THAT(report.dropped[0].reason, testing::HasSubstr("moves by 0.5 mm"));
+  EXPECT_THAT(report.dropped[1].reason, testing::HasSubstr("pulls"));
+  EXPECT_EQ(log.surfaces.at("felt").slips.back().id, "push-04");
+  EXPECT_EQ(log.surfaces.at("felt").slips.back().split, Split::test);
+}
+
+TEST(PlanarPushes, SeveralLogsAndARoundTrip) {
+  const Scratch scratch;
+  for (const char* name : {"logs/one", "logs/two"}) {
+    fs::create_directories(scratch / name);
+    put_bytes(scratch / (std::string(name) + "/a.txt"), log_of({{}, {}}));
+  }
+  put_bytes(scratch / "logs/LICENSE", "not a log");
+  const SlipLog log = import_planar_pushes(std::vector<fs::path>{scratch / "logs"});
+  ASSERT_EQ(log.surfaces.size(), 2U);
+  EXPECT_TRUE(log.surfaces.contains("one") && log.surfaces.contains("two"));
+  write_slip_log(scratch / "p.h5", log);
+  EXPECT_EQ(read_slip_log(scratch / "p.h5"), log);
+  put_bytes(scratch / "logs/two/b.txt", log_of({{}}));
+  EXPECT_TRUE(import_planar_pushes(std::vector<fs::path>{scratch / "logs"}).surfaces.contains("two-b"));
+}
+
+TEST(PlanarPushes, SaysWhichLineAndColumn) {
+  const Scratch scratch;
+  const std::string file = scratch / "p.txt";
+  const auto expect = [&](const std::string& text, const std::string& place, const std::string& reason) {
+    put_bytes(file, text);
+    expect_error<ImportError>([&] { import_planar_pushes(std::vector<fs::path>{file}); }, file, place,
+                              reason);
+  };
+  const std::string pose = "1 2 3 1 0 0 0\n", head = "1\n" + pose + pose,
+                    forces = head + "2\n0 1 2\n0.1 1 2\n", robot = forces + "2\n0 " + pose;
+  expect("", "line 1", "the file ends where number of pushes should be");
+  expect("many\n", "line 1, column number of pushes", "'many' is not an integer");
+  expect("0\n", "line 1, column number of pushes", "0 is not in 1");
+  expect("1\n1 2 3 1 0 0\n", "line 2, column qz", "6 of 7 numbers");
+  expect("1\n1 2 3 1 0 0 0 9\n", "line 2, column 8", "'9' after the 7 numbers");
+  expect("1\n1 x 3 1 0 0 0\n", "line 2, column y", "'x' is not a number");
+  expect("1\n1 nan 3 1 0 0 0\n", "line 2, column y", "is not finite");
+  expect("1\n1 2 3 1 1 0 0\n", "line 2, column qw", "quaternion of norm 1.41421");
+  expect("1\n" + pose, "line 3", "the object's pose after the push");
+  expect(head + "1\n", "line 4, column number of force samples", "1 is not in 2");
+  expect(head + "2\n0 1 2\n0 1 2\n", "line 6, column t", "not strictly increasing");
+  expect(forces, "line 7", "the file ends where number of robot poses should be");
+  expect(robot + "0.1 1 2 3 1 0 0\n", "line 9, column qz", "7 of 8 numbers");
+  expect(robot + "0.1 " + pose + "4\n", "line 10", "'4' after the last push");
+  expect(robot + "0.1 " + pose, "line 1", "none of 1 pushes can be used");
+  fs::remove(file);
+  expect_error<ImportError>([&] { import_planar_pushes(std::vector<fs::path>{file}); }, file, "line 0",
+                            "no such file");
+  fs::create_directories(scratch / "empty");
+  expect_error<ImportError>([&] { import_planar_pushes(std::vector<fs::path>{scratch / "empty"}); },
+                            scratch / "empty", "line 0", "without .txt files");
+  PlanarPushOptions options;
+  options.step = 0;
+  EXPECT_THROW(import_planar_pushes(std::vector<fs::path>{file}, options), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace unhand::datasets::test
