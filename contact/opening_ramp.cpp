@@ -1,0 +1,220 @@
+#include "contact/opening_ramp.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <array>
+#include <limits>
+#include <utility>
+#include <vector>
+
+namespace unhand::contact {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr int kParameters = 6;
+using Vector = Eigen::Matrix<double, kParameters, 1>;
+using Matrix = Eigen::Matrix<double, kParameters, kParameters>;
+using Free = std::array<bool, kParameters>;  // grip, slope, tail, start, release, log shape
+
+// Gauss-Newton system of samples [from, to): slope per unit, times in units of `tick`.
+void linearise(const ForceSeries& s, const Ramp& r, std::size_t from, std::size_t to, double tick, Matrix& a,
+               Vector& b) {
+  a.setZero();
+  b.setZero();
+  const double length = r.release - r.start, height = r.grip - r.tail;
+  for (std::size_t k = from; k < to; ++k) {
+    const double t = s.time[k];
+    Vector g = Vector::Zero();
+    double model = r.tail;
+    if (t <= r.start) {
+      model = r.grip + r.slope * (t - r.start);
+      g << 1.0, (t - r.start) / tick, 0.0, -r.slope * tick, 0.0, 0.0;
+    } else if (t < r.release) {
+      const double u = (r.release - t) / length, power = std::pow(u, r.shape);
+      model += height * power;
+      g << power, 0.0, 1.0 - power, height * r.shape * power / length * tick,
+          height * r.shape * power / u * (1.0 - u) / length * tick, height * power * std::log(u) * r.shape;
+    } else {
+      g[2] = 1.0;
+    }
+    g /= s.sigma;
+    a.noalias() += g * g.transpose();
+    b.noalias() += g * ((s.value[k] - model) / s.sigma);
+  }
+}
+
+// Levenberg-Marquardt on samples [from, to) over the free parameters; returns the variance of the release
+// [s²].
+double refine(const ForceSeries& s, Ramp& ramp, std::size_t from, std::size_t to, const Free& free) {
+  const double tick = (s.time.back() - s.time.front()) / static_cast<double>(s.size() - 1);
+  const auto fix = [&](Matrix& a, Vector& b) {
+    for (int i = 0; i < kParameters; ++i) {
+      if (free[i]) continue;
+      a.row(i).setZero();
+      a.col(i).setZero();
+      a(i, i) = 1.0;
+      b[i] = 0.0;
+    }
+  };
+  Matrix a;
+  Vector b;
+  double best = chi2(s, ramp, from, to), damping = 1e-3;
+  for (int iteration = 0; iteration < 60; ++iteration) {
+    linearise(s, ramp, from, to, tick, a, b);
+    fix(a, b);
+    bool moved = false;
+    double gain = 0.0;
+    for (; damping < 1e8 && !moved; damping *= moved ? 0.1 : 8.0) {
+      Matrix damped = a;
+      for (int i = 0; i < kParameters; ++i) damped(i, i) = a(i, i) * (1.0 + damping) + 1e-12;
+      const Vector d = damped.ldlt().solve(b);
+      Ramp next = ramp;
+      next.grip += d[0];
+      next.slope += d[1] / tick;
+      next.tail += d[2];
+      next.start += std::clamp(d[3], -10.0, 10.0) * tick;
+      next.release += std::clamp(d[4], -10.0, 10.0) * tick;
+      next.shape = std::clamp(ramp.shape * std::exp(std::clamp(d[5], -0.5, 0.5)), 0.4, 6.0);
+      if (!(next.release - next.start > 0.5 * tick)) continue;
+      const double trial = chi2(s, next, from, to);
+      if (trial <= best) {
+        gain = best - trial;
+        best = trial;
+        ramp = next;
+        moved = true;
+      }
+    }
+    if (!moved || gain < 1e-6) break;
+  }
+  linearise(s, ramp, from, to, tick, a, b);
+  fix(a, b);
+  for (int i = 0; i < kParameters; ++i) a(i, i) += 1e-12;
+  const double variance = a.ldlt().solve(Vector::Unit(4))[4] * tick * tick;
+  return variance > 0.0 ? variance : 0.0;
+}
+
+double median(std::vector<double> x) {
+  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
+  std::nth_element(x.begin(), middle, x.end());
+  return *middle;
+}
+
+double noise_limit(double target, double n) { return target * n + 4.0 * std::sqrt(2.0 * n); }
+
+}  // namespace
+
+double chi2(const ForceSeries& s, const Ramp& ramp, std::size_t from, std::size_t to) {
+  double sum = 0.0;
+  for (std::size_t k = from; k < to; ++k) sum += std::pow((ramp.at(s.time[k]) - s.value[k]) / s.sigma, 2);
+  return sum;
+}
+
+double scatter(std::span<const double> y) {
+  std::vector<double> size;
+  for (std::size_t i = 4; i < y.size(); ++i)
+    size.push_back(std::abs(y[i] - 4.0 * y[i - 1] + 6.0 * y[i - 2] - 4.0 * y[i - 3] + y[i - 4]));
+  return size.empty() ? 0.0 : median(std::move(size)) / 0.6745 / std::sqrt(70.0);
+}
+
+std::optional<Descent> last_descent(const ForceSeries& s, double noise, double tail, double peak) {
+  const auto n = static_cast<std::ptrdiff_t>(s.size());
+  std::ptrdiff_t last = n - 1;
+  while (last >= 0 && s.value[last] - tail <= std::max(6.0 * noise, 0.02 * (peak - tail))) --last;
+  if (last < 0) return std::nullopt;
+  double top = -kInfinity;
+  std::ptrdiff_t first = last;
+  for (std::ptrdiff_t k = last; k >= 0;
+       --k) {  // back over the plateau, up to where an earlier grip began to close
+    top = std::max(top, s.value[k]);
+    if (s.value[k] < top - std::max(8.0 * noise, 0.15 * (top - tail))) break;
+    first = k;
+  }
+  while (first < last && s.value[first] < top - std::max(6.0 * noise, 0.03 * (top - tail))) ++first;
+  const auto crossing = [&](double level) {
+    std::ptrdiff_t k = last;
+    while (k > first && s.value[k] <= level) --k;
+    if (k + 1 >= n) return s.time[k];
+    const double drop = s.value[k] - s.value[k + 1];
+    const double part = drop > 0.0 ? std::clamp((s.value[k] - level) / drop, 0.0, 1.0) : 0.5;
+    return s.time[k] + part * (s.time[k + 1] - s.time[k]);
+  };
+  const double edge = crossing(tail + 0.9 * (top - tail));
+  std::vector<double> grip;
+  for (std::ptrdiff_t k = first; k <= last && s.time[k] <= edge; ++k) grip.push_back(s.value[k]);
+  const double level = grip.empty() ? top : median(std::move(grip));
+  const double high = crossing(tail + 0.8 * (level - tail)), low = crossing(tail + 0.2 * (level - tail));
+  Descent best;
+  best.plateau = static_cast<std::size_t>(first);
+  best.height = level - tail;
+  double least = kInfinity;
+  const double tick = (s.time.back() - s.time.front()) / static_cast<double>(n - 1);
+  for (double p : {0.6, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 3.2}) {
+    const double u_high = std::pow(0.8, 1.0 / p), u_low = std::pow(0.2, 1.0 / p);
+    const double length = std::max(tick, (low - high) / (u_high - u_low));
+    Ramp ramp{level, 0.0, tail, 0.0, low + u_low * length, p};
+    ramp.start = ramp.release - length;
+    const double x = chi2(s, ramp, best.plateau, s.size());
+    if (x < least) {
+      least = x;
+      best.ramp = ramp;
+    }
+  }
+  return best;
+}
+
+std::size_t index_of(const ForceSeries& s, double t) {
+  return static_cast<std::size_t>(std::lower_bound(s.time.begin(), s.time.end(), t) - s.time.begin());
+}
+
+Opening find_opening(const ForceSeries& s, const Descent& guess, const NormalForceOptions& options) {
+  const std::size_t n = s.size();
+  Opening o{guess.ramp, 0.0, false, false};
+  const auto judge = [&](std::size_t from) {
+    const std::size_t start = index_of(s, o.ramp.start);
+    const std::size_t grip = start > from ? start - from : 0;
+    o.straight_grip =
+        from == 0 && chi2(s, o.ramp, from, start) <=
+                         noise_limit(options.chi2_target, std::max(1.0, static_cast<double>(grip)));
+    o.power_law =
+        chi2(s, o.ramp, start, n) <= noise_limit(options.chi2_target, static_cast<double>(n - start));
+  };
+  o.release_variance = refine(s, o.ramp, guess.plateau, n, {true, true, true, true, true, true});
+  judge(guess.plateau);
+  if (o.straight_grip && o.power_law) return o;
+  // A grip that is not straight: only what lies near the opening says where it starts.
+  const double length = o.ramp.release - o.ramp.start;
+  const std::size_t near = std::max(guess.plateau, index_of(s, o.ramp.start - 0.4 * length));
+  const std::size_t after = std::min(n, index_of(s, o.ramp.release + 2.0 * length));
+  o.release_variance = refine(s, o.ramp, near, after, {true, true, true, true, true, true});
+  judge(guess.plateau);
+  if (o.power_law) return o;
+  // A ramp of another form: each of its ends from its own neighbourhood, as wide as a power still explains.
+  const auto explained = [&](const Ramp& r, std::size_t from, std::size_t to) {
+    const auto count = static_cast<double>(to - from);
+    return chi2(s, r, from, to) <= options.chi2_target * count + 2.0 * std::sqrt(2.0 * count);
+  };
+  constexpr std::size_t kFewest = 6;
+  const Ramp whole = o.ramp;
+  Ramp end = whole, start = whole;
+  for (double part : {0.5, 0.35, 0.25, 0.18, 0.12}) {
+    const std::size_t upper = index_of(s, whole.release - part * length);
+    if (index_of(s, whole.release) < upper + kFewest) break;
+    end = whole;
+    o.release_variance = refine(s, end, upper, after, {true, false, true, false, true, true});
+    if (explained(end, upper, after)) break;
+  }
+  for (double part : {0.5, 0.35, 0.25, 0.18, 0.12}) {
+    const std::size_t lower = index_of(s, whole.start + part * length);
+    if (lower < index_of(s, whole.start) + kFewest) break;
+    start = whole;
+    refine(s, start, near, lower, {true, true, false, true, false, true});
+    if (explained(start, near, lower)) break;
+  }
+  if (start.start < end.release)
+    o.ramp = {start.grip, start.slope, end.tail, start.start, end.release, end.shape};
+  judge(guess.plateau);
+  o.power_law = false;
+  return o;
+}
+
+}  // namespace unhand::contact

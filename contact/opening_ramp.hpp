@@ -1,0 +1,58 @@
+// The opening of a gripper in a measured series of its normal force: a ramp found by least squares.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <span>
+
+#include "contact/normal_force.hpp"
+
+namespace unhand::contact {
+
+/// A measured normal force [N] at `time` [s], with its noise, 1 σ [N].
+struct ForceSeries {
+  std::span<const double> time, value;
+  double sigma{};
+  std::size_t size() const { return time.size(); }
+};
+
+/// grip + slope (t − start) until start, then tail + (grip − tail) u^shape with u from 1 to 0, then tail; N,
+/// N/s, s.
+struct Ramp {
+  double grip{}, slope{}, tail{}, start{}, release{}, shape{1.0};
+
+  double u(double t) const { return std::clamp((release - t) / (release - start), 0.0, 1.0); }
+  double at(double t) const {
+    return t <= start ? grip + slope * (t - start) : tail + (grip - tail) * std::pow(u(t), shape);
+  }
+};
+
+/// Σ ((ramp − sample)/σ)² of the samples [from, to).
+double chi2(const ForceSeries&, const Ramp&, std::size_t from, std::size_t to);
+
+/// The first sample at or after t [s].
+std::size_t index_of(const ForceSeries&, double t);
+
+/// σ from fourth differences (variance 70 σ² for white noise) [N].
+double scatter(std::span<const double> value);
+
+/// The last descent of the series from a plateau to the tail: a first guess, and where its plateau begins.
+struct Descent {
+  Ramp ramp;
+  std::size_t plateau{};
+  double height{};
+};
+std::optional<Descent> last_descent(const ForceSeries&, double noise, double tail, double peak);
+
+/// The opening as measured: start, release and shape of its ramp, and which of its parts are what the model
+/// says.
+struct Opening {
+  Ramp ramp;
+  double release_variance{};
+  bool straight_grip{}, power_law{};
+};
+Opening find_opening(const ForceSeries&, const Descent& guess, const NormalForceOptions& options);
+
+}  // namespace unhand::contact

@@ -1,0 +1,295 @@
+#include <array>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "contact/opening_ramp.hpp"
+#include "dynamics/spline_fit.hpp"
+
+namespace unhand::contact {
+namespace {
+
+using Polynomial = SampledNormalForce::Polynomial;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Instants where the polynomial changes sign in (from, to).
+std::vector<double> sign_changes(const Polynomial& f, double from, double to) {
+  const Window all{-kInfinity, kInfinity};
+  const auto value = [&](double t) { return f.value(all, t)[0]; };
+  std::vector<double> out;
+  for (std::size_t i = 0; i < f.pieces().size(); ++i) {
+    const double a = std::max(from, f.breaks()[i]), b = std::min(to, f.breaks()[i + 1]);
+    constexpr int kParts = 12;
+    for (int k = 0; a < b && k < kParts; ++k) {
+      double low = a + (b - a) * k / kParts, high = a + (b - a) * (k + 1) / kParts;
+      const bool sign = value(low) > 0.0;
+      if (sign == (value(high) > 0.0)) continue;
+      for (int bisection = 0; bisection < 50; ++bisection) {
+        const double middle = 0.5 * (low + high);
+        ((value(middle) > 0.0) == sign ? low : high) = middle;
+      }
+      if (high > from && high < to && (out.empty() || high > out.back())) out.push_back(high);
+    }
+  }
+  return out;
+}
+
+Polynomial::Coefficients constant(double f) {
+  Polynomial::Coefficients c{};
+  c[0][0] = f;
+  return c;
+}
+
+// A cubic on [0, h] from y with slope m to zero with slope m_end, monotone.
+Polynomial::Coefficients landing(double h, double y, double m, double m_end) {
+  Polynomial::Coefficients c{};
+  c[0][0] = y;
+  c[1][0] = m;
+  c[2][0] = (-3.0 * y / h - 2.0 * m - m_end) / h;
+  c[3][0] = (2.0 * y / h + m + m_end) / (h * h);
+  return c;
+}
+
+// The force as pieces, cut off at zero by whoever evaluates it, with its kinks.
+struct Pieces {
+  std::vector<double> breaks;
+  std::vector<Polynomial::Coefficients> pieces;
+  std::vector<double> kinks;
+};
+
+SampledNormalForce assemble(const ForceSeries& s, Pieces p, double release) {
+  const double tick = (s.time.back() - s.time.front()) / static_cast<double>(s.size() - 1);
+  // Before the first sample, and after the release or the last sample, the force is constant.
+  p.pieces.insert(p.pieces.begin(), constant(std::max(0.0, p.pieces.front()[0][0])));
+  p.breaks.insert(p.breaks.begin(), p.breaks.front() - tick);
+  const Polynomial so_far(p.breaks, p.pieces);
+  const double end = p.breaks.back();
+  const double last = so_far.value(Window{p.breaks.front(), end}, end)[0];
+  p.pieces.push_back(constant(std::isfinite(release) ? 0.0 : std::max(0.0, last)));
+  p.breaks.push_back(end + tick);
+  std::sort(p.kinks.begin(), p.kinks.end());
+  p.kinks.erase(std::unique(p.kinks.begin(), p.kinks.end()), p.kinks.end());
+  return {Polynomial(std::move(p.breaks), std::move(p.pieces)), std::move(p.kinks), release};
+}
+
+dynamics::SplineOptions spline_options(const NormalForceOptions& o) {
+  dynamics::SplineOptions out;
+  out.chi2_target = o.chi2_target;
+  out.min_samples_per_interval = o.min_samples_per_interval;
+  return out;
+}
+
+void finish(const ForceSeries& s, NormalForceFit& fit, double parameters) {
+  NormalForceSummary& u = fit.summary;
+  u.sigma = s.sigma;
+  u.release_time = fit.force.release_time();
+  const Window all{-kInfinity, kInfinity};
+  double sum = 0.0, tail = 0.0;
+  int count = 0;
+  for (std::size_t k = 0; k < s.size(); ++k)
+    if (s.time[k] >= u.release_time) {
+      tail += s.value[k];
+      ++count;
+    }
+  if (count > 0) {
+    u.tail_mean = tail / count;
+    u.tail_mean_sigma = s.sigma / std::sqrt(static_cast<double>(count));
+  }
+  // The bias is faded out over the ramp: against the samples it is put back.
+  for (std::size_t k = 0; k < s.size(); ++k) {
+    const double t = s.time[k], length = u.release_time - u.opening_start;
+    const double fade = std::isfinite(length) ? std::clamp((t - u.opening_start) / length, 0.0, 1.0)
+                                              : (t >= u.release_time ? 1.0 : 0.0);
+    const double e = (fit.force.at(all, t) + fade * u.tail_mean - s.value[k]) / s.sigma;
+    sum += e * e;
+    u.max_whitened_residual = std::max(u.max_whitened_residual, std::abs(e));
+  }
+  u.chi2_per_dof = sum / std::max(1.0, static_cast<double>(s.size()) - parameters);
+  for (double t : fit.force.force().breaks())
+    if (t > s.time.front() && t < std::min(u.release_time, s.time.back())) ++u.knots;
+}
+
+// A spline through all samples, without an opening.
+NormalForceFit without_release(const ForceSeries& s, const NormalForceOptions& options) {
+  dynamics::SplineProblem<1, 5> problem;
+  problem.begin = s.time.front();
+  problem.end = s.time.back();
+  const std::array<double, 1> sigma = {s.sigma};
+  if (s.size() < 8) {  // too few for a quintic: a straight line
+    double mean_t = 0.0, mean_f = 0.0, cross = 0.0, square = 0.0;
+    for (std::size_t k = 0; k < s.size(); ++k) {
+      mean_t += s.time[k] / static_cast<double>(s.size());
+      mean_f += s.value[k] / static_cast<double>(s.size());
+    }
+    for (std::size_t k = 0; k < s.size(); ++k) {
+      cross += (s.time[k] - mean_t) * (s.value[k] - mean_f);
+      square += (s.time[k] - mean_t) * (s.time[k] - mean_t);
+    }
+    Polynomial::Coefficients line = constant(mean_f + cross / square * (problem.begin - mean_t));
+    line[1][0] = cross / square;
+    Pieces p{{problem.begin, problem.end}, {line}, {}};
+    p.kinks = sign_changes(Polynomial(p.breaks, p.pieces), problem.begin, problem.end);
+    NormalForceFit fit{assemble(s, std::move(p), kInfinity), {}};
+    finish(s, fit, 2.0);
+    return fit;
+  }
+  problem.observations = {{0, s.time, s.value, sigma}};
+  const auto spline = dynamics::fit_spline(problem, spline_options(options));
+  Pieces p{spline.polynomial.breaks(), spline.polynomial.pieces(), {}};
+  p.kinks = sign_changes(spline.polynomial, problem.begin, problem.end);
+  NormalForceFit fit{assemble(s, std::move(p), kInfinity), {}};
+  fit.summary.grip_force = fit.force.at(Window{-kInfinity, kInfinity}, s.time.front());
+  finish(s, fit, spline.summary.knots + 6.0);
+  return fit;
+}
+
+NormalForceFit with_release(const ForceSeries& s, Opening o, const NormalForceOptions& options) {
+  // A spline needs samples; a stretch with hardly any is left to the model.
+  constexpr std::size_t kFewest = 8;
+  if (index_of(s, o.ramp.start) < kFewest) o.straight_grip = true;
+  if (index_of(s, o.ramp.release) < index_of(s, std::max(o.ramp.start, s.time.front())) + kFewest)
+    o.power_law = true;
+  const double begin = s.time.front(), release = o.ramp.release;
+  const double tick = (s.time.back() - begin) / static_cast<double>(s.size() - 1);
+  // A start before the log, or right at its ends, is not a kink of this series.
+  const bool starts = o.ramp.start > begin + 2.0 * tick;
+  const double start = starts ? o.ramp.start : begin;
+  const auto unbiased = [&](double t, double f) {
+    return f - o.ramp.tail * std::clamp((t - o.ramp.start) / (release - o.ramp.start), 0.0, 1.0);
+  };
+  // From `touch` on the force is below the noise and lands on zero by itself.
+  const double height = std::max(o.ramp.grip - o.ramp.tail, 10.0 * s.sigma);
+  double least = std::pow(std::min(0.3, std::max(0.01, s.sigma / height)), 1.0 / o.ramp.shape);
+  least = std::clamp(least, 1e-3, 0.5);
+  const double touch = release - least * (release - std::max(start, o.ramp.start));
+
+  // What the pieces follow: the model where it explains the samples, or else the samples.
+  std::vector<double> t_grip, f_grip, t_ramp, f_ramp;
+  const auto grid = [&](double from, double to, auto&& place) {
+    constexpr int kPoints = 192;
+    for (int k = 0; k <= kPoints; ++k)
+      place(from + (to - from) * k / kPoints, static_cast<double>(k) / kPoints);
+  };
+  double sigma_grip = s.sigma, sigma_ramp = s.sigma;
+  if (starts && o.straight_grip) {
+    sigma_grip *= 0.02;
+    for (int k = 0; k < 8; ++k) {
+      t_grip.push_back(begin + (start - begin) * k / 8.0);
+      f_grip.push_back(o.ramp.grip + o.ramp.slope * (t_grip.back() - start));
+    }
+  } else if (starts) {
+    for (std::size_t k = 0; k < s.size() && s.time[k] < start; ++k) {
+      t_grip.push_back(s.time[k]);
+      f_grip.push_back(s.value[k]);
+    }
+  }
+  if (o.power_law) {
+    sigma_ramp *= 0.02;
+    grid(0.0, 1.0, [&](double, double x) {  // denser towards the release
+      const double t = start + (touch - start) * x * (2.0 - x);
+      t_ramp.push_back(t);
+      f_ramp.push_back(
+          unbiased(t, o.ramp.tail + (o.ramp.grip - o.ramp.tail) * std::pow(o.ramp.u(t), o.ramp.shape)));
+    });
+  } else {
+    for (std::size_t k = 0; k < s.size() && s.time[k] <= release; ++k)
+      if (s.time[k] >= start) {
+        t_ramp.push_back(s.time[k]);
+        f_ramp.push_back(unbiased(s.time[k], s.value[k]));
+      }
+  }
+  dynamics::SplineProblem<1, 5> problem;
+  problem.begin = begin;
+  problem.end = o.power_law ? touch : release;
+  if (starts) problem.breaks = {{start, 0}};
+  if (starts) problem.observations.push_back({0, t_grip, f_grip, {sigma_grip}});
+  problem.observations.push_back({0, t_ramp, f_ramp, {sigma_ramp}});
+  if (!o.power_law) problem.end_value = {0.0};
+  const auto spline = dynamics::fit_spline(problem, spline_options(options));
+
+  // Up to `touch` the spline; then the landing, from its value and slope to zero.
+  const Window before{-kInfinity, touch};
+  const auto state = spline.polynomial.at(before, touch);
+  Pieces p;
+  const auto& breaks = spline.polynomial.breaks();
+  for (std::size_t i = 0; i + 1 < breaks.size() && breaks[i] < touch; ++i) {
+    p.breaks.push_back(breaks[i]);
+    p.pieces.push_back(spline.polynomial.pieces()[i]);
+  }
+  p.breaks.push_back(touch);
+  p.kinks = sign_changes(spline.polynomial, begin, touch);
+  if (starts) p.kinks.push_back(start);
+  double end = release;
+  if (state.value[0] > 0.0) {
+    const double h = release - touch, y = state.value[0], secant = -y / h;
+    const double slope = std::clamp(state.first[0], 3.0 * secant, 0.0);
+    if (slope != state.first[0]) p.kinks.push_back(touch);
+    // the end's slope takes the cubic through u^p half way
+    const double middle = y * std::pow(0.5, o.ramp.shape);
+    const double slope_end = std::clamp(slope + (4.0 * y - 8.0 * middle) / h, 3.0 * secant, 0.0);
+    p.pieces.push_back(landing(h, y, slope, slope_end));
+    p.breaks.push_back(release);
+  } else {  // the samples' spline is at zero already: from its last crossing on
+    end = p.kinks.empty() ? begin : *std::max_element(p.kinks.begin(), p.kinks.end());
+    while (p.breaks.size() > 2 && p.breaks[p.breaks.size() - 2] >= end) {
+      p.breaks.pop_back();
+      p.pieces.pop_back();
+    }
+    p.breaks.back() = end;
+  }
+  p.kinks.push_back(end);
+  NormalForceFit fit{assemble(s, std::move(p), end), {}};
+  fit.summary.power_law = o.power_law;
+  fit.summary.grip_force = o.ramp.grip;
+  if (starts) fit.summary.opening_start = start;
+  fit.summary.shape = o.ramp.shape;
+  fit.summary.release_sigma = std::sqrt(o.release_variance);
+  finish(s, fit, (o.straight_grip && o.power_law) ? 6.0 : spline.summary.knots + 8.0);
+  return fit;
+}
+
+}  // namespace
+
+NormalForceFit smooth_normal_force(std::span<const double> time, std::span<const double> value, double sigma,
+                                   const NormalForceOptions& options) {
+  const auto require = [](bool ok, const std::string& what) {
+    if (!ok) throw std::invalid_argument("smooth_normal_force: " + what);
+  };
+  require(time.size() == value.size(), "time and value must have the same size");
+  require(time.size() >= 4, "a series needs at least 4 samples, got " + std::to_string(time.size()));
+  for (std::size_t k = 0; k < time.size(); ++k) {
+    require(std::isfinite(time[k]) && (k == 0 || time[k] > time[k - 1]), "time must be finite and increase");
+    require(std::isfinite(value[k]), "value must be finite");
+  }
+  std::vector<double> sorted(value.begin(), value.end());
+  std::sort(sorted.begin(), sorted.end());
+  const double peak = sorted[sorted.size() * 9 / 10];
+  const double natural = scatter(value);
+  const ForceSeries s{
+      time, value,
+      std::isfinite(sigma) && sigma > 0.0 ? sigma : std::max(natural, 1e-6 * std::max(1.0, std::abs(peak)))};
+  const double noise = std::max(s.sigma, natural);  // a declaration may be too optimistic
+
+  const std::size_t n = s.size();
+  const double tail = (value[n - 1] + value[n - 2] + value[n - 3]) / 3.0;
+  const auto is_zero = [&](double level, double height) {
+    return std::abs(level) <= std::max(options.max_tail_bias * height, 5.0 * noise);
+  };
+  if (!is_zero(tail, sorted.back())) return without_release(s, options);
+  const std::optional<Descent> descent = last_descent(s, noise, tail, std::max(peak, 0.5 * sorted.back()));
+  if (!descent) {  // nothing but zero: released from the beginning
+    NormalForceFit fit{
+        {Polynomial({time.front(), time.back()}, {constant(0.0)}), {time.front()}, time.front()}, {}};
+    finish(s, fit, 1.0);
+    return fit;
+  }
+  const Opening opening = find_opening(s, *descent, options);
+  const double tick = (time.back() - time.front()) / static_cast<double>(n - 1);
+  const bool sound = std::isfinite(opening.ramp.release) && index_of(s, opening.ramp.release) + 3 <= n &&
+                     opening.ramp.release > time.front() + 3.0 * tick &&
+                     is_zero(opening.ramp.tail, descent->height);
+  if (!sound) return without_release(s, options);
+  return with_release(s, opening, options);
+}
+
+}  // namespace unhand::contact
