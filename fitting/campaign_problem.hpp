@@ -39,6 +39,8 @@ struct CampaignThrow {
   std::vector<int> columns;        ///< where they are: campaign unknowns first, then the throw's own
   /// By observation: the phase's boundaries as the log has them [s], for choosing samples.
   double opening{}, release{};
+  /// The measured release, or a predicted one where there is none.
+  double release_or(double predicted) const { return release == release ? release : predicted; }
 };
 
 /// r = (predicted − observed)/σ, and its derivatives with respect to the campaign's unknowns and the throw's

@@ -56,6 +56,7 @@ struct Shared {
   const CampaignProblem& problem;
   const FitOptions& options;
   std::vector<double> scale, own_scale, own_sigma;  ///< own_sigma: 1 σ of the throws' own unknowns
+  Weighting weighting;
   std::atomic<long> jacobian_nanoseconds{0};
 
   std::vector<double> unscaled(const double* x) const {
@@ -89,7 +90,7 @@ class ThrowCost final : public ceres::CostFunction {
       return false;  // a trial step outside the physics
     }
     if (!l.solved) return false;
-    robustify(l, shared_.options.sample_limit);
+    weigh(l, throw_, shared_.weighting);
     const auto rows = static_cast<int>(l.residual.size()), width = static_cast<int>(campaign.size()),
                n = static_cast<int>(own.size());
     Eigen::Map<Eigen::VectorXd> r(residuals, rows + n);
@@ -146,23 +147,62 @@ double median(std::vector<double> x) {
   return x[x.size() / 2];
 }
 
+/// χ² by channel and phase.
+struct Misfit {
+  std::array<std::vector<double>, kPhaseCount * kChannelCount> squares;
+
+  void add(const CampaignThrow& thrown, const Eigen::VectorXd& residual, double detach) {
+    for (std::size_t j = 0; j < thrown.observed.all.size(); ++j) {
+      const auto& o = thrown.observed.all[j];
+      const Phase phase = phase_of(o, thrown.opening, thrown.release_or(detach));
+      const double r = residual[static_cast<Eigen::Index>(j)];
+      squares[static_cast<std::size_t>(static_cast<int>(phase) * kChannelCount + static_cast<int>(o.channel))]
+          .push_back(r * r);
+    }
+  }
+  /// The mean square without its largest hundredth, so that single outliers do not speak for a channel.
+  static double mean(std::vector<double> x) {
+    std::sort(x.begin(), x.end());
+    const std::size_t n = x.size() - x.size() / 100;
+    double sum = 0;
+    for (std::size_t i = 0; i < n; ++i) sum += x[i];
+    return n > 0 ? sum / static_cast<double>(n) : 0;
+  }
+  void weigh(Weighting& weighting) const {
+    for (std::size_t g = 0; g < squares.size(); ++g) {
+      if (squares[g].empty()) continue;
+      // A small group's mean scatters by itself.
+      const double allowed = 1 + 3 * std::sqrt(2.0 / static_cast<double>(squares[g].size()));
+      weighting.group[g] = std::sqrt(1 / std::max(1.0, mean(squares[g]) / allowed));
+    }
+  }
+};
+
 /// Which throws a fit uses: those of the train split (all if there is no other), as far as they can be
 /// simulated at the start.
 std::vector<std::size_t> usable(const CampaignProblem& problem, const FitOptions& options,
-                                const std::vector<double>& start, std::vector<double>& chi2) {
+                                const std::vector<double>& start, Weighting& weighting,
+                                std::vector<double>& chi2) {
   const auto& throws = problem.throws();
   std::vector<char> ok(throws.size(), 0);
   std::vector<double> squares(throws.size(), 0);
+  std::vector<Linearisation> starts(throws.size());
   const std::vector<double> own(problem.own().size(), 0.0);
   experiment::parallel_for(throws.size(), options.threads, [&](std::size_t i) {
     if (options.train_only && throws[i].prepared.split != datasets::Split::train) return;
     if (throws[i].observed.all.empty()) return;
-    auto l = problem.linearise(throws[i], start, own, false);
-    if (!l.solved) return;
-    robustify(l, options.sample_limit);
-    ok[i] = 1;
-    squares[i] = l.residual.squaredNorm();
+    starts[i] = problem.linearise(throws[i], start, own, false);
+    ok[i] = starts[i].solved;
   });
+  Misfit misfit;
+  for (std::size_t i = 0; i < throws.size(); ++i)
+    if (ok[i]) misfit.add(throws[i], starts[i].residual, starts[i].detach);
+  misfit.weigh(weighting);
+  for (std::size_t i = 0; i < throws.size(); ++i) {
+    if (!ok[i]) continue;
+    weigh(starts[i], throws[i], weighting);
+    squares[i] = starts[i].residual.squaredNorm();
+  }
   std::vector<std::size_t> out;
   for (std::size_t i = 0; i < throws.size(); ++i)
     if (ok[i]) {
@@ -209,14 +249,15 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
   const auto width = static_cast<int>(unknowns.size());
   const auto n_own = problem.own().size();
   std::vector<double> start = options.start.empty() ? problem.start() : options.start;
-  Shared shared{problem, options, {}, {}, {}, {}};
+  Shared shared{problem, options, {}, {}, {}, {}, {}};
+  shared.weighting.sample_limit = options.sample_limit;
   for (const auto& u : unknowns) shared.scale.push_back(u.scale);
   for (const auto& u : problem.own()) {
     shared.own_scale.push_back(u.scale);
     shared.own_sigma.push_back(*u.prior_sigma);
   }
   std::vector<double> chi2;
-  const auto used = usable(problem, options, start, chi2);
+  const auto used = usable(problem, options, start, shared.weighting, chi2);
   out.throws.resize(problem.throws().size());
   for (std::size_t i = 0; i < out.throws.size(); ++i) {
     out.throws[i].id = problem.throws()[i].prepared.id;
@@ -247,7 +288,7 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
   NormalEquations equations;
   ceres::Solver::Summary summary;
   for (int round = 0; round < options.rounds; ++round) {
-    const double limit = options.throw_limit * median(chi2);
+    const double limit = shared.weighting.throw_limit = options.throw_limit * median(chi2);
     ceres::Problem::Options ownership;
     ceres::Problem ceres_problem(ownership);
     auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
@@ -287,13 +328,17 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
     }
 
     equations = normal_equations(problem, used, shared.unscaled(x.data()), own, shared.own_scale, shared.own_sigma,
-                                 options.sample_limit, limit, options.threads);
+                                 shared.weighting, options.threads);
     for (std::size_t i = 0; i < used.size(); ++i) {
       chi2[i] = equations.throws[i].chi2;
       if (!modes_before[i].empty() && modes_before[i] != equations.throws[i].modes && round + 1 == options.rounds)
         ++out.mode_changes;
       modes_before[i] = equations.throws[i].modes;
     }
+    Misfit misfit;
+    for (std::size_t i = 0; i < used.size(); ++i)
+      misfit.add(problem.throws()[used[i]], equations.throws[i].residual, equations.throws[i].detach);
+    if (round + 1 < options.rounds) misfit.weigh(shared.weighting);
     // Empirical Bayes: the spread of the throws' own unknowns is what they show, plus what each is uncertain by.
     if (round + 1 < options.rounds && used.size() >= 6)
       for (std::size_t k = 0; k < n_own; ++k) {
@@ -329,6 +374,7 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
   }
   describe_open_directions(equations.information, problem, shared.scale, out);
 
+  Misfit total;
   for (std::size_t i = 0; i < used.size(); ++i) {
     const auto& part = equations.throws[i];
     ThrowFit& throw_fit = out.throws[used[i]];
@@ -337,23 +383,19 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
     throw_fit.chi2 = part.chi2;
     throw_fit.own = shared.own_unscaled(own[i].data());
     throw_fit.modes = part.modes;
-    out.chi2 += part.chi2;
-    const CampaignThrow& thrown = problem.throws()[used[i]];
-    out.samples += static_cast<long>(thrown.observed.all.size());
-    for (std::size_t j = 0; j < thrown.observed.all.size(); ++j) {
-      const auto& o = thrown.observed.all[j];
-      const Phase phase = phase_of(o, thrown.opening, part.detach);
-      auto found = std::find_if(out.misfit.begin(), out.misfit.end(),
-                                [&](const ChannelMisfit& m) { return m.channel == o.channel && m.phase == phase; });
-      if (found == out.misfit.end()) found = out.misfit.insert(out.misfit.end(), {o.channel, phase, 0, 0});
-      ++found->n;
-      const double r = part.residual[static_cast<Eigen::Index>(j)];
-      found->chi2 += r * r;
-    }
+    out.samples += static_cast<long>(problem.throws()[used[i]].observed.all.size());
+    total.add(problem.throws()[used[i]], part.residual, part.detach);
   }
-  std::sort(out.misfit.begin(), out.misfit.end(), [](const ChannelMisfit& a, const ChannelMisfit& b) {
-    return std::pair(a.phase, a.channel) < std::pair(b.phase, b.channel);
-  });
+  for (int phase = 0; phase < kPhaseCount; ++phase)
+    for (int channel = 0; channel < kChannelCount; ++channel) {
+      const auto& squares = total.squares[static_cast<std::size_t>(phase * kChannelCount + channel)];
+      if (squares.empty()) continue;
+      ChannelMisfit m{static_cast<Channel>(channel), static_cast<Phase>(phase), static_cast<int>(squares.size()), 0,
+                      shared.weighting.of(static_cast<Phase>(phase), static_cast<Channel>(channel))};
+      for (const double r2 : squares) m.chi2 += r2;
+      out.chi2 += m.chi2;
+      out.misfit.push_back(m);
+    }
   out.degrees_of_freedom = out.samples - width - static_cast<long>(used.size() * n_own);
   out.seconds = seconds_since(begin);
   out.jacobian_seconds = 1e-9 * static_cast<double>(shared.jacobian_nanoseconds.load());
@@ -372,7 +414,7 @@ std::vector<double> own_before_release(const CampaignProblem& problem, const Cam
   for (int step = 0; step < 3; ++step) {
     auto l = problem.linearise(held, campaign, own, true);
     if (!l.solved) return std::vector<double>(n, 0.0);
-    robustify(l, 5);
+    weigh(l, held, Weighting{});
     Eigen::MatrixXd H = l.own.transpose() * l.own;
     Eigen::VectorXd g = l.own.transpose() * l.residual;
     for (std::size_t k = 0; k < n; ++k) {

@@ -21,7 +21,9 @@ Phase phase_of(const experiment::Observation& observation, double opening, doubl
 struct FitOptions {
   bool train_only{true};
   int iterations{25};          ///< of the solver, in every round
-  int rounds{3};               ///< in which the spread of the throws' own unknowns is learned
+  /// Rounds in which the spread of the throws' own unknowns is learned, and the weight of every channel in
+  /// every phase: where its misfit is m > 1 times the noise it counts for 1/m.
+  int rounds{4};
   double sample_limit{5};      ///< residuals beyond this many σ count linearly [-]
   double throw_limit{3};       ///< a throw whose χ² exceeds this many medians counts less [-]
   double accuracy{1e-6};       ///< relative change of the cost at which a round ends
@@ -55,6 +57,7 @@ struct ChannelMisfit {
   Phase phase{};
   int n{};
   double chi2{};
+  double weight{1};  ///< factor on its residuals in the fit
   double chi2_per_sample() const { return n > 0 ? chi2 / n : 0; }
 };
 

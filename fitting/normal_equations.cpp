@@ -8,12 +8,19 @@
 
 namespace unhand::fitting {
 
-void robustify(Linearisation& l, double limit) {
+void weigh(Linearisation& l, const CampaignThrow& thrown, const Weighting& weighting) {
   for (Eigen::Index i = 0; i < l.residual.size(); ++i) {
-    const double r = l.residual[i], size = std::abs(r);
-    if (size <= limit) continue;
-    const double bent = std::sqrt(2 * limit * size - limit * limit), slope = limit / bent;
-    l.residual[i] = std::copysign(bent, r);
+    const auto& o = thrown.observed.all[static_cast<std::size_t>(i)];
+    double slope = weighting.of(phase_of(o, thrown.opening, thrown.release_or(l.detach)), o.channel);
+    double r = slope * l.residual[i];
+    const double size = std::abs(r), limit = weighting.sample_limit;
+    if (size > limit) {
+      const double bent = std::sqrt(2 * limit * size - limit * limit);
+      slope *= limit / bent;
+      r = std::copysign(bent, r);
+    }
+    l.residual[i] = r;
+    if (slope == 1) continue;
     if (l.campaign.rows() > 0) l.campaign.row(i) *= slope;
     if (l.own.rows() > 0) l.own.row(i) *= slope;
   }
@@ -22,7 +29,7 @@ void robustify(Linearisation& l, double limit) {
 NormalEquations normal_equations(const CampaignProblem& problem, const std::vector<std::size_t>& used,
                                  const std::vector<double>& campaign, const std::vector<std::vector<double>>& own,
                                  const std::vector<double>& own_scale, const std::vector<double>& own_sigma,
-                                 double sample_limit, double throw_limit, int threads) {
+                                 const Weighting& weighting, int threads) {
   NormalEquations out;
   const auto width = static_cast<Eigen::Index>(campaign.size());
   out.information.setZero(width, width);
@@ -45,9 +52,9 @@ NormalEquations normal_equations(const CampaignProblem& problem, const std::vect
       return;
     }
     part.residual = l.residual;
-    robustify(l, sample_limit);
+    weigh(l, thrown, weighting);
     part.chi2 = l.residual.squaredNorm();
-    part.weight = part.chi2 > throw_limit ? std::sqrt(throw_limit / part.chi2) : 1.0;
+    part.weight = part.chi2 > weighting.throw_limit ? std::sqrt(weighting.throw_limit / part.chi2) : 1.0;
     Eigen::MatrixXd Hoo = l.own.transpose() * l.own;
     Eigen::VectorXd go = l.own.transpose() * l.residual;
     for (std::size_t k = 0; k < values.size(); ++k) {

@@ -2,15 +2,33 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <vector>
 
-#include "fitting/campaign_problem.hpp"
+#include "fitting/fit.hpp"
 
 namespace unhand::fitting {
 
-/// Huber's loss on every sample: beyond `limit` σ a residual counts as sqrt(2 limit |r| − limit²), with its
-/// derivatives.
-void robustify(Linearisation& l, double limit);
+using experiment::kChannelCount;
+
+/// What a residual counts for.
+struct Weighting {
+  double sample_limit{5};  ///< Huber's loss on every sample: beyond it a residual counts linearly [σ]
+  double throw_limit{};    ///< Huber's loss on the χ² of a throw [-]
+  /// Factors on the residuals of a channel in a phase, <= 1: where the model fails, its failure must not bend
+  /// the rest.
+  std::array<double, kPhaseCount * kChannelCount> group;
+  Weighting() { group.fill(1.0); }
+  double& of(Phase phase, experiment::Channel channel) {
+    return group[static_cast<std::size_t>(static_cast<int>(phase) * kChannelCount + static_cast<int>(channel))];
+  }
+  double of(Phase phase, experiment::Channel channel) const {
+    return const_cast<Weighting*>(this)->of(phase, channel);
+  }
+};
+
+/// Weighs the samples of a throw, with their derivatives.
+void weigh(Linearisation& l, const CampaignThrow& thrown, const Weighting& weighting);
 
 /// One throw's part.
 struct ThrowEquations {
@@ -32,7 +50,7 @@ struct NormalEquations {
 NormalEquations normal_equations(const CampaignProblem& problem, const std::vector<std::size_t>& used,
                                  const std::vector<double>& campaign, const std::vector<std::vector<double>>& own,
                                  const std::vector<double>& own_scale, const std::vector<double>& own_sigma,
-                                 double sample_limit, double throw_limit, int threads);
+                                 const Weighting& weighting, int threads);
 
 /// H⁻¹ G H⁻¹ from the scatter of the throws' gradients, nowhere below H⁻¹; H = information + prior.
 Eigen::MatrixXd scatter_covariance(const NormalEquations& equations, const Eigen::MatrixXd& prior);

@@ -1,0 +1,261 @@
+#include "fitting/footprints.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "experiment/parallel.hpp"
+
+namespace unhand::fitting {
+
+using dynamics::Effect;
+using dynamics::EffectParameter;
+
+namespace {
+
+/// All combinations of the shape parameters' grids.
+std::vector<std::map<std::string, double>> shapes_of(const Effect& effect) {
+  std::vector<std::map<std::string, double>> out{{}};
+  for (const EffectParameter& p : effect.parameters) {
+    if (!p.is_shape()) continue;
+    std::vector<std::map<std::string, double>> next;
+    for (const auto& shape : out)
+      for (const double value : p.grid) {
+        auto extended = shape;
+        extended[effect.full_name(p)] = value;
+        next.push_back(std::move(extended));
+      }
+    out = std::move(next);
+  }
+  return out;
+}
+
+/// A column that is a difference of two simulations.
+struct Difference {
+  CampaignProblem problem;
+  std::vector<double> campaign;
+  double step;
+};
+
+/// The campaign's values of `from`, in the order of `to`, which has the same unknowns and more.
+std::vector<double> carried(const CampaignProblem& from, const std::vector<double>& values, const CampaignProblem& to) {
+  std::vector<double> out = to.start();
+  for (std::size_t k = 0; k < out.size(); ++k)
+    for (std::size_t j = 0; j < values.size(); ++j)
+      if (from.campaign()[j].name == to.campaign()[k].name) out[k] = values[j];
+  return out;
+}
+
+std::size_t index_of(const CampaignProblem& problem, const std::string& name) {
+  for (std::size_t k = 0; k < problem.campaign().size(); ++k)
+    if (problem.campaign()[k].name == name) return k;
+  return problem.campaign().size();
+}
+
+std::string without_object(const std::string& name) { return name.substr(0, name.find('[')); }
+
+}  // namespace
+
+Footprints footprints(const CampaignProblem& problem, const FitResult& fit, const std::vector<std::string>& ids,
+                      const std::vector<std::string>& laws, int threads) {
+  Footprints out;
+  out.fitted = problem.campaign().size();
+  std::size_t width = out.fitted;
+
+  // Derivatives: one problem for each combination of shapes, all effects that have no shape in the first.
+  struct Derivative {
+    CampaignProblem problem;
+    std::vector<double> campaign;
+    std::vector<std::pair<std::size_t, std::size_t>> columns;  ///< unknown → Gram column
+  };
+  std::vector<Derivative> derivatives;
+  std::vector<Difference> differences;
+  std::vector<std::size_t> difference_columns;
+  std::vector<std::string> plain;
+  for (const auto& id : ids) {
+    const auto& present = problem.options().effects;
+    if (std::find(present.begin(), present.end(), id) != present.end()) continue;
+    const Effect effect = find_effect(id);
+    const auto shapes = shapes_of(effect);
+    if (!effect.one_sided && shapes.size() == 1) {
+      plain.push_back(id);
+      continue;
+    }
+    auto effects = present;
+    effects.push_back(id);
+    for (const auto& shape : shapes) {
+      Candidate candidate{id, {}, {}, shape, {}};
+      CampaignProblem extended = problem.with(problem.options().model, effects);
+      auto campaign = carried(problem, fit.values(), extended);
+      for (const auto& [name, value] : shape) campaign[index_of(extended, name)] = value;
+      Derivative derivative{extended, campaign, {}};
+      for (std::size_t k = out.fitted; k < campaign.size(); ++k) {
+        const std::string& name = extended.campaign()[k].name;
+        if (shape.contains(without_object(name))) continue;
+        candidate.parameters.push_back(name);
+        candidate.columns.push_back(width);
+        candidate.unit.push_back(1);
+        if (effect.one_sided) {
+          auto stepped = campaign;
+          const double step = extended.campaign()[k].scale;
+          stepped[k] += step;
+          differences.push_back({extended, stepped, step});
+          difference_columns.push_back(width);
+        } else {
+          derivative.columns.push_back({k, width});
+        }
+        ++width;
+      }
+      if (!effect.one_sided) derivatives.push_back(std::move(derivative));
+      out.candidates.push_back(std::move(candidate));
+    }
+  }
+  auto effects = problem.options().effects;
+  effects.insert(effects.end(), plain.begin(), plain.end());
+  CampaignProblem extended = problem.with(problem.options().model, effects);
+  Derivative all{extended, carried(problem, fit.values(), extended), {}};
+  for (std::size_t k = 0; k < out.fitted; ++k) all.columns.push_back({k, k});
+  for (const auto& id : plain) {
+    Candidate candidate{id, {}, {}, {}, {}};
+    for (std::size_t k = out.fitted; k < extended.campaign().size(); ++k) {
+      const std::string& name = extended.campaign()[k].name;
+      if (name.rfind(id + ".", 0) != 0) continue;
+      candidate.parameters.push_back(name);
+      candidate.columns.push_back(width);
+      candidate.unit.push_back(1);
+      all.columns.push_back({k, width});
+      ++width;
+    }
+    out.candidates.push_back(std::move(candidate));
+  }
+  derivatives.insert(derivatives.begin(), std::move(all));
+  for (const auto& law : laws) {
+    if (law == problem.options().model) continue;
+    out.candidates.push_back({"contact.law:" + law, {""}, {width}, {}, {1}});
+    differences.push_back({problem.with(law, problem.options().effects), fit.values(), 1});
+    difference_columns.push_back(width++);
+  }
+  const std::size_t residual = width++;
+
+  std::vector<std::size_t> used;
+  for (std::size_t i = 0; i < fit.throws.size(); ++i)
+    if (fit.throws[i].used) used.push_back(i);
+  const auto w = static_cast<Eigen::Index>(width);
+  std::vector<Eigen::MatrixXd> grams(used.size());
+  experiment::parallel_for(used.size(), threads, [&](std::size_t n) {
+    const std::size_t i = used[n];
+    const auto& own = fit.throws[i].own;
+    Eigen::MatrixXd columns, own_columns;
+    Eigen::VectorXd base;
+    bool solved = true;
+    for (std::size_t d = 0; d < derivatives.size() && solved; ++d) {
+      const auto& derivative = derivatives[d];
+      const auto l = derivative.problem.linearise(derivative.problem.throws()[i], derivative.campaign, own, true);
+      solved = l.solved;
+      if (!solved) break;
+      if (d == 0) {
+        columns.setZero(l.residual.size(), w);
+        columns.col(static_cast<Eigen::Index>(residual)) = l.residual;
+        own_columns = l.own;
+      }
+      for (const auto& [k, column] : derivative.columns)
+        columns.col(static_cast<Eigen::Index>(column)) = l.campaign.col(static_cast<Eigen::Index>(k));
+    }
+    if (solved) base = problem.linearise(problem.throws()[i], fit.values(), own, false).residual;
+    for (std::size_t d = 0; d < differences.size() && solved; ++d) {
+      const auto& difference = differences[d];
+      const auto l = difference.problem.linearise(difference.problem.throws()[i], difference.campaign, own, false);
+      if (l.solved)
+        columns.col(static_cast<Eigen::Index>(difference_columns[d])) = (l.residual - base) / difference.step;
+    }
+    grams[n].setZero(w, w);
+    if (!solved || base.size() != columns.rows()) return;
+    Eigen::MatrixXd Hoo = own_columns.transpose() * own_columns;
+    for (Eigen::Index k = 0; k < Hoo.rows(); ++k)
+      Hoo(k, k) += 1 / (fit.own_spread[static_cast<std::size_t>(k)] * fit.own_spread[static_cast<std::size_t>(k)]);
+    const Eigen::MatrixXd Hoc = own_columns.transpose() * columns;
+    grams[n] = columns.transpose() * columns - Hoc.transpose() * Hoo.ldlt().solve(Hoc);
+  });
+  out.gram.setZero(w, w);
+  for (const auto& gram : grams) out.gram += gram;
+  return out;
+}
+
+namespace {
+
+/// The Gram matrix of `kept` columns after `removed` ones are projected out; a column that keeps less than
+/// 1e-6 of its norm is set to zero.
+Eigen::MatrixXd project(const Eigen::MatrixXd& gram, const std::vector<Eigen::Index>& removed,
+                        const std::vector<Eigen::Index>& kept) {
+  Eigen::MatrixXd G = gram(kept, kept);
+  if (!removed.empty()) {
+    Eigen::MatrixXd R = gram(removed, removed);
+    const Eigen::VectorXd unit = R.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    R = unit.asDiagonal() * R * unit.asDiagonal();
+    R.diagonal().array() += 1e-12;
+    const Eigen::MatrixXd cross = unit.asDiagonal() * Eigen::MatrixXd(gram(removed, kept));
+    G -= cross.transpose() * R.ldlt().solve(cross);
+  }
+  for (Eigen::Index k = 0; k < G.rows(); ++k)
+    if (!(G(k, k) > 1e-6 * gram(kept[static_cast<std::size_t>(k)], kept[static_cast<std::size_t>(k)]))) {
+      G.row(k).setZero();
+      G.col(k).setZero();
+    }
+  return G;
+}
+
+/// x minimising xᵀAx − 2 bᵀx where A may be singular; returns bᵀx.
+double solve(const Eigen::MatrixXd& A, const Eigen::VectorXd& b, Eigen::VectorXd& x) {
+  const Eigen::VectorXd unit = A.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled = unit.asDiagonal() * A * unit.asDiagonal();
+  x = unit.asDiagonal() * scaled.completeOrthogonalDecomposition().solve(unit.asDiagonal() * b);
+  for (Eigen::Index k = 0; k < x.size(); ++k)
+    if (!(A(k, k) > 0)) x[k] = 0;
+  return b.dot(x);
+}
+
+std::vector<Eigen::Index> range(std::size_t n) {
+  std::vector<Eigen::Index> out;
+  for (std::size_t i = 0; i < n; ++i) out.push_back(static_cast<Eigen::Index>(i));
+  return out;
+}
+
+}  // namespace
+
+std::vector<Score> scores(const Footprints& f) {
+  std::vector<Score> out;
+  for (std::size_t c = 0; c < f.candidates.size(); ++c) {
+    std::vector<Eigen::Index> kept;
+    for (const std::size_t k : f.candidates[c].columns) kept.push_back(static_cast<Eigen::Index>(k));
+    kept.push_back(static_cast<Eigen::Index>(f.residual()));
+    const Eigen::MatrixXd G = project(f.gram, range(f.fitted), kept);
+    const Eigen::Index n = G.rows() - 1;
+    Eigen::VectorXd x;
+    Score score;
+    score.candidate = c;
+    score.gain = solve(G.topLeftCorner(n, n), -G.col(n).head(n), x);
+    score.visible = G.diagonal().head(n).maxCoeff() > 0;
+    score.step.assign(x.data(), x.data() + x.size());
+    out.push_back(std::move(score));
+  }
+  return out;
+}
+
+double correlation(const Footprints& f, const Eigen::VectorXd& contribution, const Candidate& candidate) {
+  // The contribution as a column of its own: fitted columns that take part in it are not projected out.
+  std::vector<Eigen::Index> removed, part;
+  for (Eigen::Index k = 0; k < contribution.size(); ++k) (contribution[k] != 0 ? part : removed).push_back(k);
+  std::vector<Eigen::Index> kept = part;
+  for (const std::size_t k : candidate.columns) kept.push_back(static_cast<Eigen::Index>(k));
+  const Eigen::MatrixXd G = project(f.gram, removed, kept);
+  const auto n = static_cast<Eigen::Index>(part.size()), m = static_cast<Eigen::Index>(candidate.columns.size());
+  Eigen::VectorXd y(n);
+  for (Eigen::Index k = 0; k < n; ++k) y[k] = contribution[part[static_cast<std::size_t>(k)]];
+  const double norm = y.dot(G.topLeftCorner(n, n) * y);
+  if (!(norm > 0)) return 0;
+  Eigen::VectorXd x;
+  const double shared = solve(G.bottomRightCorner(m, m), G.bottomLeftCorner(m, n) * y, x);
+  return std::sqrt(std::clamp(shared / norm, 0.0, 1.0));
+}
+
+}  // namespace unhand::fitting
