@@ -17,34 +17,37 @@ class SmallInverse {
 
   /// Inverts a[row][column]. A singular matrix gives entries that are not finite.
   void compute(const double (&a)[N][N]) {
-    alignas(16) double work[N][kPadded]{};
+    // [A | I] side by side. At pivot k only the N + 1 columns from k on matter: what is left of A, and what
+    // has come into I. They are handled in whole registers, never mixing narrow stores with wide loads, which
+    // stalls.
+    alignas(16) double work[N][kColumns]{};
     int from[N];
     for (int i = 0; i < N; ++i) {
       from[i] = i;
       for (int j = 0; j < N; ++j) work[i][j] = a[i][j];
+      work[i][N + i] = 1;
     }
     for (int k = 0; k < N; ++k) {
       int pivot = k;
       for (int i = k + 1; i < N; ++i)
         if (std::abs(work[i][k]) > std::abs(work[pivot][k])) pivot = i;
-      if (pivot != k) {
+      if (pivot != k) {  // the exchange of the rest of I is kept in `from`
         std::swap(from[k], from[pivot]);
-        for (int j = 0; j < kPadded; ++j) std::swap(work[k][j], work[pivot][j]);
+        for (int j = 0; j < N + k; ++j) std::swap(work[k][j], work[pivot][j]);
       }
+      const int first = k / 2 * 2;
       const double scale = 1 / work[k][k];
-      work[k][k] = 1;
-      for (int j = 0; j < kPadded; ++j) work[k][j] *= scale;
+      alignas(16) double row[kWindow];
+      for (int j = 0; j < kWindow; ++j) row[j] = work[k][first + j] * scale;
+      for (int j = 0; j < kWindow; ++j) work[k][first + j] = row[j];
       for (int i = 0; i < N; ++i) {
-        if (i == k) continue;
         const double factor = work[i][k];
-        if (factor == 0) continue;  // Jacobians are sparse
-        work[i][k] = 0;
-        for (int j = 0; j < kPadded; ++j) work[i][j] -= factor * work[k][j];
+        if (i == k || factor == 0) continue;  // Jacobians are sparse
+        for (int j = 0; j < kWindow; ++j) work[i][first + j] -= factor * row[j];
       }
     }
-    // Row exchanges of A are column exchanges of its inverse.
     for (int j = 0; j < N; ++j)
-      for (int i = 0; i < N; ++i) column_[from[j]][i] = work[i][j];
+      for (int i = 0; i < N; ++i) column_[from[j]][i] = work[i][N + j];
   }
 
   /// y = A⁻¹ x
@@ -56,6 +59,9 @@ class SmallInverse {
   }
 
  private:
+  static constexpr int kWindow = (N + 3) / 2 * 2;  ///< N + 1 columns from an even one on, in whole registers
+  static constexpr int kColumns = N / 2 * 2 + kWindow;
+
   alignas(16) double column_[N][kPadded]{};
 };
 

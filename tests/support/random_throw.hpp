@@ -39,10 +39,14 @@ class SwayingHand final : public release::HandMotion {
     std::array<S, 3> q, v, a;
     for (int i = 0; i < 3; ++i) {
       const auto& c = coordinates_[i];
+      q[i] = c.p + t * (c.v + 0.5 * c.a * t);
+      v[i] = c.v + c.a * t;
+      a[i] = S(c.a);
+      if (c.amplitude == 0) continue;  // sines would cost more than all the rest of a calm throw
       const S s = c.amplitude * sin(c.frequency * t + c.phase);
-      q[i] = c.p + t * (c.v + 0.5 * c.a * t) + s;
-      v[i] = c.v + c.a * t + c.amplitude * c.frequency * cos(c.frequency * t + c.phase);
-      a[i] = c.a - c.frequency * c.frequency * s;
+      q[i] += s;
+      v[i] += c.amplitude * c.frequency * cos(c.frequency * t + c.phase);
+      a[i] -= c.frequency * c.frequency * s;
     }
     return {{q[0], q[1], q[2]}, {v[0], v[1], v[2]}, {a[0], a[1], a[2]}};
   }
