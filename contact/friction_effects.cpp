@@ -45,6 +45,31 @@ void adhesion(const EffectValues<S>& p, FrictionVariation<S>& friction) {
 
 }  // namespace
 
+FrictionVariation<double> values(const FrictionVariation<Dual>& v) {
+  return {v.static_ratio.a,      v.stribeck_speed.a, v.viscous.a,   v.softness.a, v.reference_force,
+          v.pressure_exponent.a, v.compliance.a,     v.loss_time.a, v.adhesion.a, v.parting_time.a};
+}
+
+void validate(const FrictionVariation<Dual>& v) {
+  const auto require = [](bool ok, const char* name, double value, const char* range) {
+    if (!ok) throw std::invalid_argument(fmt::format("contact.{} = {} is not in {}", name, value, range));
+  };
+  require(v.static_ratio.a >= 0.2 && v.static_ratio.a <= 5, "stribeck.mu_s/mu_k", v.static_ratio.a,
+          "[0.2, 5]");
+  require(v.stribeck_speed.a >= 1e-3 && v.stribeck_speed.a <= 1, "stribeck.v_s", v.stribeck_speed.a,
+          "[0.001, 1] m/s");
+  require(v.viscous.a >= -1 && v.viscous.a <= 50, "viscous.1/v_0", v.viscous.a, "[-1, 50] s/m");
+  require(v.softness.a >= -1 && v.softness.a <= 2, "soft_patch_radius.gamma", v.softness.a, "[-1, 2]");
+  const bool soft = v.softness.a != 0 || !v.softness.v.isZero();
+  require(!soft || v.reference_force > 0, "soft_patch_radius: f_0", v.reference_force, "(0, inf) N");
+  require(v.pressure_exponent.a >= -0.4 && v.pressure_exponent.a <= 3, "pressure_profile.s",
+          v.pressure_exponent.a, "[-0.4, 3]");
+  require(v.compliance.a >= 0 && v.compliance.a <= 1e-3, "pad_compliance.compliance", v.compliance.a,
+          "[0, 0.001] m/N");
+  require(v.loss_time.a >= 0 && v.loss_time.a <= 0.1, "pad_compliance.loss_time", v.loss_time.a,
+          "[0, 0.1] s");
+}
+
 std::span<const dynamics::EffectOn<FrictionVariation>> friction_effects() {
   static const dynamics::EffectOn<FrictionVariation> table[] = {
       {{"contact.stribeck",
@@ -69,7 +94,8 @@ std::span<const dynamics::EffectOn<FrictionVariation>> friction_effects() {
        &pressure_profile<Dual>},
       {{"contact.pad_compliance",
         "the pads give tangentially before they slip",
-        {{"compliance", "m/N", 0, 0, 1e-3, 5e-6}, {"loss_time", "s", 0.005, 0, 0.1, 0.005, {0.002, 0.005, 0.02}}},
+        {{"compliance", "m/N", 0, 0, 1e-3, 5e-6},
+         {"loss_time", "s", 0.005, 0, 0.1, 0.005, {0.002, 0.005, 0.02}}},
         false,
         true},
        &compliance<double>,
@@ -88,7 +114,8 @@ std::span<const dynamics::EffectOn<FrictionVariation>> friction_effects() {
 AdhesiveForce::AdhesiveForce(const NormalForce& base, const Dual& adhesion, const Dual& parting_time)
     : base_(base), adhesion_(adhesion), parting_time_(parting_time) {
   if (!(adhesion.a >= 0 && adhesion.a <= 1000))
-    throw std::invalid_argument(fmt::format("contact.adhesion: f_adh = {} is not in [0, 1000] N", adhesion.a));
+    throw std::invalid_argument(
+        fmt::format("contact.adhesion: f_adh = {} is not in [0, 1000] N", adhesion.a));
   if (!(parting_time.a > 0 && parting_time.a <= 1))
     throw std::invalid_argument(
         fmt::format("contact.adhesion: parting_time = {} is not in (0, 1] s", parting_time.a));

@@ -25,10 +25,17 @@ struct FrictionVariation {
 /// With derivatives, for models that store both.
 template <class S>
 FrictionVariation<Dual> constant(const FrictionVariation<S>& v) {
-  return {Dual(v.static_ratio),      Dual(v.stribeck_speed), Dual(v.viscous),    Dual(v.softness),
-          v.reference_force,         Dual(v.pressure_exponent), Dual(v.compliance), Dual(v.loss_time),
-          Dual(v.adhesion),          Dual(v.parting_time)};
+  return {Dual(v.static_ratio), Dual(v.stribeck_speed),    Dual(v.viscous),    Dual(v.softness),
+          v.reference_force,    Dual(v.pressure_exponent), Dual(v.compliance), Dual(v.loss_time),
+          Dual(v.adhesion),     Dual(v.parting_time)};
 }
+
+/// Without derivatives.
+FrictionVariation<double> values(const FrictionVariation<Dual>& v);
+
+/// Throws std::invalid_argument, naming parameter, value and accepted range: those of friction_effects(), and
+/// f₀ > 0 where the patch is soft.
+void validate(const FrictionVariation<Dual>& v);
 
 /// contact.stribeck, contact.viscous, contact.soft_patch_radius, contact.pressure_profile,
 /// contact.pad_compliance, contact.adhesion

@@ -55,18 +55,23 @@ Vec3<S> times(const std::array<Vec3<S>, 3>& A, const Vec3<S>& x) {
 }  // namespace
 
 template <class Shape>
-LimitSurface<Shape>::LimitSurface(std::string_view name, const Patch<Dual>& patch, Shape shape)
-    : name_(name), shape_(std::move(shape)), patch_double_(values(patch)), patch_dual_(patch) {
-  validate(patch_double_);
+LimitSurface<Shape>::LimitSurface(std::string_view name, const Patch<Dual>& patch, Shape shape,
+                                  const FrictionVariation<Dual>& variation)
+    : name_(name),
+      shape_(std::move(shape)),
+      limits_double_(values(patch), values(variation)),
+      limits_dual_(patch, variation) {
+  validate(limits_double_.patch());
+  validate(variation);
 }
 
 template <class Shape>
 template <class S>
-const Patch<S>& LimitSurface<Shape>::patch() const {
+const FrictionLimits<S>& LimitSurface<Shape>::limits() const {
   if constexpr (std::is_same_v<S, double>)
-    return patch_double_;
+    return limits_double_;
   else
-    return patch_dual_;
+    return limits_dual_;
 }
 
 template <class Shape>
@@ -76,14 +81,13 @@ dynamics::Guard LimitSurface<Shape>::guard(int mode, int) const {
                         : dynamics::Guard{"slip stops", Crossing::falling, true};
 }
 
-/// u = (v_r, L ω_r), turned into the hand's frame for shapes that have directions of their own.
-template <class Shape>
-template <class S>
-Vec3<S> LimitSurface<Shape>::normalised_slip(const Relative<S>& y) const {
-  return {y.slip.x, y.slip.z, patch<S>().length() * y.spin};
-}
-
 namespace {
+
+/// u = (v_r, L ω_r)
+template <class S>
+Vec3<S> normalised_slip(const Relative<S>& y, const S& length) {
+  return {y.slip.x, y.slip.z, length * y.spin};
+}
 
 /// resist, gauge and slip_direction in the world; shapes with directions of their own live in the hand's
 /// frame.
@@ -177,7 +181,7 @@ Vec3<double> minimise(const Shape& shape, const Scene<double>& scene, const std:
 template <class Shape>
 template <class S>
 Vec3<S> LimitSurface<Shape>::slip_acceleration(const Scene<S>& scene, const Relative<S>& y) const {
-  const S length = patch<S>().length(), f_max = patch<S>().f_max(scene.normal_force);
+  const S length = limits<S>().length(scene.normal_force), f_max = limits<S>().held(scene.normal_force);
   const Vec3<S> b = normalised_acceleration(scene, y, Wrench<S>{}, length);
   if (!(value_of(f_max) > 0)) return b;
   const Wrench<S> demand = sticking_wrench(scene, y);
@@ -223,17 +227,19 @@ template <class Shape>
 template <class S>
 Wrench<S> LimitSurface<Shape>::wrench_(int mode, const Scene<S>& scene, const Relative<S>& y) const {
   if (mode == kStick) return sticking_wrench(scene, y);
+  const S length = limits<S>().length(scene.normal_force);
   if (y.slip.x == S(0) && y.slip.z == S(0) && y.spin == S(0)) {
     // At the very onset of slip there is no direction yet: the demand, brought back to the surface.
     const Wrench<S> demand = sticking_wrench(scene, y);
-    const S length = patch<S>().length(), limit = patch<S>().f_max(scene.normal_force);
+    const S limit = limits<S>().held(scene.normal_force);
     const S size = gauge(shape_, scene, Vec3<S>{demand.fx, demand.fz, demand.tau / length});
     if (!(value_of(size) > value_of(limit))) return demand;
     const S k = limit / size;
     return {k * demand.fx, k * demand.fz, k * demand.tau};
   }
-  const S f_max = patch<S>().f_max(scene.normal_force);
-  return physical(resist(shape_, scene, normalised_slip(y)), f_max, patch<S>().length());
+  const Vec3<S> u = normalised_slip(y, length);
+  const S f_max = limits<S>().slipping(scene.normal_force, y.slip, y.spin);
+  return physical(resist(shape_, scene, u), f_max, length);
 }
 
 template <class Shape>
@@ -247,7 +253,7 @@ void LimitSurface<Shape>::rate_(int mode, const Scene<S>& scene, const Relative<
 template <class Shape>
 template <class S>
 S LimitSurface<Shape>::stick_margin(const Scene<S>& scene, const Relative<S>& y) const {
-  const S length = patch<S>().length(), f_max = patch<S>().f_max(scene.normal_force);
+  const S length = limits<S>().length(scene.normal_force), f_max = limits<S>().held(scene.normal_force);
   const Wrench<S> demand = sticking_wrench(scene, y);
   const S size = gauge(shape_, scene, Vec3<S>{demand.fx, demand.fz, demand.tau / length});
   return margin(S(size * size), S(f_max * f_max));
@@ -260,9 +266,12 @@ void LimitSurface<Shape>::guards_(const Phase& phase, const SceneSource& source,
   if (phase.mode == kStick) {
     g[0] = stick_margin(source.scene(phase.window, t), y);
   } else {
+    // Where L changes with f_N, L' ω_r is left out of u': of the order of kStopTime beside L ω_r' at a stop.
     State<S, 6> rate;
-    rate_(kSlip, source.scene(phase.window, t), y, rate);
-    const Vec3<S> u = normalised_slip(y), du{rate[3], rate[4], patch<S>().length() * rate[5]};
+    const Scene<S> scene = source.scene(phase.window, t);
+    rate_(kSlip, scene, y, rate);
+    const S length = limits<S>().length(scene.normal_force);
+    const Vec3<S> u = normalised_slip(y, length), du{rate[3], rate[4], length * rate[5]};
     const S speed = sqrt(dot3(u, u));
     g[0] = stop_guard(speed, S(dot3(u, du) / speed));
   }
@@ -296,7 +305,7 @@ Entry<S, 6> LimitSurface<Shape>::onset(const Window& window, const SceneSource& 
   if (!(value_of(a2) > 0)) return {kStick, t, y.state(), S(0)};  // a demand that only touches the surface
   const S k = speed / a2;
   y.slip = {k * end[0], k * end[1]};
-  y.spin = k * end[2] / patch<S>().length();
+  y.spin = k * end[2] / limits<S>().length(source.scene(window, S(t + delta)).normal_force);
   return {kSlip, S(t + delta), y.state(), S(delta)};
 }
 
@@ -307,9 +316,10 @@ Entry<S, 6> LimitSurface<Shape>::on_guard_(const Phase& from, int /*guard*/, con
   if (from.mode == kStick) return onset(from.window, source, t, at, true);
   // Along a straight line to zero slip, then decide anew.
   State<S, 6> dy;
-  rate_(kSlip, source.scene(from.window, t), at, dy);
-  const S length = patch<S>().length();
-  const Vec3<S> u = normalised_slip(at), du{dy[3], dy[4], length * dy[5]};
+  const Scene<S> scene = source.scene(from.window, t);
+  rate_(kSlip, scene, at, dy);
+  const S length = limits<S>().length(scene.normal_force);
+  const Vec3<S> u = normalised_slip(at, length), du{dy[3], dy[4], length * dy[5]};
   const S left = -dot3(u, u) / dot3(u, du);
   Relative<S> y = at;
   y.arm = y.arm + (0.5 * left) * Vec2<S>{dy[0], dy[1]};
@@ -323,8 +333,8 @@ template <class Shape>
 template <class S>
 Entry<S, 6> LimitSurface<Shape>::membership_(int mode, const Window& window, const SceneSource& source,
                                              const S& t, const Relative<S>& y) const {
-  const Vec3<S> u = normalised_slip(y);
-  if (mode == kSlip || value_of(dot3(u, u)) > 0) return {kSlip, t, y.state(), S(0)};
+  const bool slips = value_of(y.slip.x) != 0 || value_of(y.slip.z) != 0 || value_of(y.spin) != 0;
+  if (mode == kSlip || slips) return {kSlip, t, y.state(), S(0)};
   if (stick_margin(values(source.scene(window, t)), values(y)) < 0) return {kStick, t, y.state(), S(0)};
   return onset(window, source, t, y, false);
 }

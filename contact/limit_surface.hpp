@@ -6,8 +6,8 @@
 
 #include "contact/contact_model.hpp"
 #include "contact/convex_quartic.hpp"
+#include "contact/friction_limits.hpp"
 #include "contact/limit_surface_shapes.hpp"
-#include "contact/patch.hpp"
 
 namespace unhand::contact {
 
@@ -29,8 +29,9 @@ namespace unhand::contact {
 template <class Shape>
 class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
  public:
-  /// Throws std::invalid_argument as Patch's validation does.
-  LimitSurface(std::string_view name, const Patch<Dual>& patch, Shape shape);
+  /// Throws std::invalid_argument as the validations of Patch and FrictionVariation do.
+  LimitSurface(std::string_view name, const Patch<Dual>& patch, Shape shape,
+               const FrictionVariation<Dual>& variation = {});
   LimitSurface(std::string_view name, const Patch<double>& patch, Shape shape)
       : LimitSurface(name, constant(patch), std::move(shape)) {}
   /// For shapes without parameters.
@@ -47,7 +48,7 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
   int guard_count(int) const override { return 1; }
   dynamics::Guard guard(int mode, int) const override;
   bool is_homogeneous(int mode) const override { return mode == kSlip; }
-  double spin_length() const override { return patch_double_.length(); }
+  double spin_length() const override { return limits_double_.patch().length(); }
 
   template <class S>
   Wrench<S> wrench_(int mode, const Scene<S>&, const Relative<S>&) const;
@@ -64,9 +65,7 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
   static constexpr int kStick = 0, kSlip = 1;
 
   template <class S>
-  const Patch<S>& patch() const;
-  template <class S>
-  Vec3<S> normalised_slip(const Relative<S>&) const;
+  const FrictionLimits<S>& limits() const;
   template <class S>
   S stick_margin(const Scene<S>&, const Relative<S>&) const;
   template <class S>
@@ -77,8 +76,8 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
 
   std::string_view name_;
   Shape shape_;
-  Patch<double> patch_double_;
-  Patch<Dual> patch_dual_;
+  FrictionLimits<double> limits_double_;
+  FrictionLimits<Dual> limits_dual_;
 };
 
 extern template class ContactModelFrom<LimitSurface<Ellipsoid>>;

@@ -17,20 +17,22 @@ using Maker = std::unique_ptr<ContactModel> (*)(const ContactParameters<Dual>&);
 constexpr std::pair<std::string_view, Maker> kModels[] = {
     {"sliding_pivot",
      [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
-       return std::make_unique<SlidingPivot>(p.patch, p.slide_end);
+       return std::make_unique<SlidingPivot>(p.patch, p.slide_end, p.variation);
      }},
     {"limit_surface",
      [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
-       return std::make_unique<LimitSurface<Ellipsoid>>("limit_surface", p.patch);
+       return std::make_unique<LimitSurface<Ellipsoid>>("limit_surface", p.patch, Ellipsoid{}, p.variation);
      }},
     {"limit_surface_disc",
      [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
-       return std::make_unique<LimitSurface<UniformDisc>>("limit_surface_disc", p.patch);
+       return std::make_unique<LimitSurface<UniformDisc>>("limit_surface_disc", p.patch, UniformDisc{},
+                                                          p.variation);
      }},
     {"limit_surface_quartic",
      [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
        return std::make_unique<LimitSurface<ConvexQuartic>>(
-           "limit_surface_quartic", p.patch, p.quartic ? *p.quartic : ConvexQuartic::closest_to_disc());
+           "limit_surface_quartic", p.patch, p.quartic ? *p.quartic : ConvexQuartic::closest_to_disc(),
+           p.variation);
      }},
     {"gripper_delay",
      [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
@@ -55,8 +57,9 @@ std::unique_ptr<ContactModel> make_contact_model(std::string_view name,
 }
 
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name, const ContactParameters<double>& p) {
-  return make_contact_model(name, ContactParameters<Dual>{constant(p.patch), p.slide_end, p.quartic,
-                                                          p.open_command, Dual(p.delay), constant(p.variation)});
+  return make_contact_model(
+      name, ContactParameters<Dual>{constant(p.patch), p.slide_end, p.quartic, p.open_command, Dual(p.delay),
+                                    constant(p.variation)});
 }
 
 }  // namespace unhand::contact

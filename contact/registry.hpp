@@ -23,7 +23,7 @@ struct ContactParameters {
   std::optional<ConvexQuartic> quartic;  ///< limit_surface_quartic; the closest to a uniform disc if absent
   double open_command{};                 ///< gripper_delay: when the gripper is told to open [s]
   S delay{};                             ///< gripper_delay: from the command to the release [s]
-  FrictionVariation<S> variation{};  ///< departures of the friction limits; neutral by default
+  FrictionVariation<S> variation{};      ///< departures of the friction limits; neutral by default
 };
 
 /// The names that make_contact_model knows.

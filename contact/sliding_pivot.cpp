@@ -37,24 +37,24 @@ struct Law {
 };
 
 template <class S>
-Law<S> law_between(const Patch<S>& patch, const Scene<S>& scene, const Relative<S>& y);
+Law<S> law_between(const FrictionLimits<S>& limits, const Scene<S>& scene, const Relative<S>& y);
 
 template <class S>
-Law<S> law(int mode, const Patch<S>& patch, const Scene<S>& scene, const Relative<S>& y) {
-  if (mode == kSlideBetween) return law_between(patch, scene, y);
+Law<S> law(int mode, const FrictionLimits<S>& limits, const Scene<S>& scene, const Relative<S>& y) {
+  if (mode == kSlideBetween) return law_between(limits, scene, y);
   const Translation translation = translation_of(mode);
   const Rotation rotation = rotation_of(mode);
   const auto& [m, I] = scene.body;
   const Vec2<S> r = lever(scene, y);
   const S omega = scene.hand_twist.omega + y.spin;
-  const S limit = patch.f_max(scene.normal_force);
+  const S limit = limits.slipping(scene.normal_force, y.slip, y.spin);
   const S alpha_hand = scene.hand_acceleration.alpha;
   const Vec2<S> apparent = scene.hand_acceleration.linear() - scene.gravity;  // a_H + g e_z
 
   Law<S> out;
   S torque{}, alpha = alpha_hand;
   if (rotation != kLocked) {
-    torque = -sign_of(rotation) * patch.tau_max(scene.normal_force);
+    torque = -sign_of(rotation) * (limits.length(scene.normal_force) * limit);
     alpha = (m * (r.z * apparent.x - r.x * apparent.z) + torque) / (I + m * dot(r, r));
   }
   out.carrying_force = {m * (apparent.x - alpha * r.z - omega * omega * r.x),
@@ -77,9 +77,9 @@ Law<S> law(int mode, const Patch<S>& patch, const Scene<S>& scene, const Relativ
 /// Filippov's solution where slide+ decelerates and slide− accelerates the spin: the mixture λ, 1 − λ of
 /// their wrenches that leaves ω_r = 0. Force and torque stay within their limits, being between two that do.
 template <class S>
-Law<S> law_between(const Patch<S>& patch, const Scene<S>& scene, const Relative<S>& y) {
-  const Law<S> plus = law(mode_of(kSlide, kPositive), patch, scene, y);
-  const Law<S> minus = law(mode_of(kSlide, kNegative), patch, scene, y);
+Law<S> law_between(const FrictionLimits<S>& limits, const Scene<S>& scene, const Relative<S>& y) {
+  const Law<S> plus = law(mode_of(kSlide, kPositive), limits, scene, y);
+  const Law<S> minus = law(mode_of(kSlide, kNegative), limits, scene, y);
   const S spread = minus.spin_acceleration - plus.spin_acceleration;  // vanishes with the normal force
   const S share = value_of(spread) > 0 ? S(minus.spin_acceleration / spread) : S(0.5), rest = 1.0 - share;
   return {share * plus.carrying_force + rest * minus.carrying_force,
@@ -104,15 +104,16 @@ struct Excluded {
 /// The first consistent mode at an instant: locked if the torque it takes is within the limit, else the spin
 /// that its own acceleration produces. In slide, where f_p jumps with the rotation, neither may be: then ω_r
 /// = 0 attracts from both sides.
-int consistent_mode(const Patch<double>& patch, const Scene<double>& scene, const Relative<double>& y,
-                    Translation before, SlideEnd slide_end, const Excluded& excluded) {
-  const double force_limit = patch.f_max(scene.normal_force),
-               torque_limit = patch.tau_max(scene.normal_force);
+int consistent_mode(const FrictionLimits<double>& limits, const Scene<double>& scene,
+                    const Relative<double>& y, Translation before, SlideEnd slide_end,
+                    const Excluded& excluded) {
+  const double force_limit = limits.slipping(scene.normal_force, y.slip, y.spin),
+               torque_limit = limits.length(scene.normal_force) * force_limit;
   const bool slipping = y.slip.x != 0 || y.slip.z != 0;
 
   auto translation_with = [&](Rotation rotation) {
     if (slipping && before == kBrake && slide_end == SlideEnd::latched_brake) return kBrake;
-    const double demand = norm(law(mode_of(kStuck, rotation), patch, scene, y).carrying_force);
+    const double demand = norm(law(mode_of(kStuck, rotation), limits, scene, y).carrying_force);
     if (slipping) return excluded.brake || (demand > force_limit && !excluded.slide) ? kSlide : kBrake;
     return excluded.stuck || (demand > force_limit && !excluded.slide) ? kSlide : kStuck;
   };
@@ -122,13 +123,13 @@ int consistent_mode(const Patch<double>& patch, const Scene<double>& scene, cons
     return mode_of(translation_with(rotation), rotation);
   }
   const int locked = mode_of(translation_with(kLocked), kLocked);
-  const double demand = law(locked, patch, scene, y).wrench.tau;
+  const double demand = law(locked, limits, scene, y).wrench.tau;
   if (!excluded.locked && std::abs(demand) <= torque_limit) return locked;
   const Rotation first = lagging(demand), second = first == kNegative ? kPositive : kNegative;
   const int modes[2] = {mode_of(translation_with(first), first), mode_of(translation_with(second), second)};
   double drive[2];  // how the spin of that sign would grow
   for (int k = 0; k < 2; ++k)
-    drive[k] = sign_of(k == 0 ? first : second) * law(modes[k], patch, scene, y).spin_acceleration;
+    drive[k] = sign_of(k == 0 ? first : second) * law(modes[k], limits, scene, y).spin_acceleration;
   if (excluded.between) return modes[drive[0] >= drive[1] ? 0 : 1];
   if (drive[0] > 0) return modes[0];
   if (drive[1] > 0) return modes[1];
@@ -137,7 +138,7 @@ int consistent_mode(const Patch<double>& patch, const Scene<double>& scene, cons
   if (slipping &&
       slides[0] != slides[1]) {  // one spin would brake: the braking force does not jump with the rotation
     const int braked = mode_of(kBrake, kLocked);
-    const double torque = law(braked, patch, scene, y).wrench.tau;
+    const double torque = law(braked, limits, scene, y).wrench.tau;
     return std::abs(torque) <= torque_limit ? braked : mode_of(kBrake, lagging(torque));
   }
   return modes[0];
@@ -145,18 +146,22 @@ int consistent_mode(const Patch<double>& patch, const Scene<double>& scene, cons
 
 }  // namespace
 
-SlidingPivot::SlidingPivot(const Patch<Dual>& patch, SlideEnd slide_end)
-    : patch_double_(values(patch)), patch_dual_(patch), slide_end_(slide_end) {
-  validate(patch_double_);
+SlidingPivot::SlidingPivot(const Patch<Dual>& patch, SlideEnd slide_end,
+                           const FrictionVariation<Dual>& variation)
+    : limits_double_(values(patch), values(variation)),
+      limits_dual_(patch, variation),
+      slide_end_(slide_end) {
+  validate(limits_double_.patch());
+  validate(variation);
 }
 
 template <>
-const Patch<double>& SlidingPivot::patch<double>() const {
-  return patch_double_;
+const FrictionLimits<double>& SlidingPivot::limits<double>() const {
+  return limits_double_;
 }
 template <>
-const Patch<Dual>& SlidingPivot::patch<Dual>() const {
-  return patch_dual_;
+const FrictionLimits<Dual>& SlidingPivot::limits<Dual>() const {
+  return limits_dual_;
 }
 
 std::string_view SlidingPivot::mode_name(int mode) const {
@@ -204,21 +209,22 @@ void SlidingPivot::guards_(const Phase& phase, const SceneSource& source, const 
                            S* g) const {
   const int mode = phase.mode;
   const Scene<S> scene = source.scene(phase.window, t);
-  const Patch<S>& patch = this->patch<S>();
-  const Law<S> now = law(mode, patch, scene, y);
-  const S force_limit = patch.f_max(scene.normal_force), torque_limit = patch.tau_max(scene.normal_force);
+  const FrictionLimits<S>& limits = this->limits<S>();
+  const Law<S> now = law(mode, limits, scene, y);
+  const S force_limit = limits.slipping(scene.normal_force, y.slip, y.spin),
+          torque_limit = limits.length(scene.normal_force) * force_limit;
   if (rotation_of(mode) != kLocked) {
     g[kRotationGuard] = sign_of(rotation_of(mode)) * y.spin;
   } else {
     g[kRotationGuard] = margin(S(now.wrench.tau * now.wrench.tau), S(torque_limit * torque_limit));
   }
   if (mode == kSlideBetween) {
-    const S plus = law(mode_of(kSlide, kPositive), patch, scene, y).spin_acceleration;
-    const S minus = law(mode_of(kSlide, kNegative), patch, scene, y).spin_acceleration;
+    const S plus = law(mode_of(kSlide, kPositive), limits, scene, y).spin_acceleration;
+    const S minus = law(mode_of(kSlide, kNegative), limits, scene, y).spin_acceleration;
     const S drive = plus > -minus ? plus : S(-minus);
     const S torque = scene.body.inertia * drive;
     g[kRotationGuard] = torque / (torque_limit + std::abs(value_of(torque)) + 1e-300);
-    const S demand = law(mode_of(kSlide, kLocked), patch, scene, y).wrench.tau;
+    const S demand = law(mode_of(kSlide, kLocked), limits, scene, y).wrench.tau;
     g[kTorqueSuffices] = margin(S(demand * demand), S(torque_limit * torque_limit));
   }
   const S force = margin(dot(now.carrying_force, now.carrying_force), S(force_limit * force_limit));
@@ -234,12 +240,12 @@ void SlidingPivot::guards_(const Phase& phase, const SceneSource& source, const 
 
 template <class S>
 Wrench<S> SlidingPivot::wrench_(int mode, const Scene<S>& scene, const Relative<S>& y) const {
-  return law(mode, patch<S>(), scene, y).wrench;
+  return law(mode, limits<S>(), scene, y).wrench;
 }
 
 template <class S>
 void SlidingPivot::rate_(int mode, const Scene<S>& scene, const Relative<S>& y, State<S, 6>& dy) const {
-  const Law<S> now = law(mode, patch<S>(), scene, y);
+  const Law<S> now = law(mode, limits<S>(), scene, y);
   if (translation_of(mode) == kStuck) {
     dy = {S(0), S(0), y.spin, S(0), S(0), now.spin_acceleration};
   } else {
@@ -281,7 +287,7 @@ Entry<S, 6> SlidingPivot::on_guard_(const Phase& from, int guard, const SceneSou
   }
   const Scene<S> scene = source.scene(from.window, now);
   const int mode =
-      consistent_mode(patch_double_, values(scene), values(y), translation, slide_end_, excluded);
+      consistent_mode(limits_double_, values(scene), values(y), translation, slide_end_, excluded);
   if (rotation_of(mode) == kLocked || value_of(y.spin) != 0) return {mode, now, y.state(), S(0)};
   return spin_onset(mode, from, source, now, y);
 }
@@ -307,7 +313,7 @@ Entry<S, 6> SlidingPivot::membership_(int mode, const Window& window, const Scen
                                       const Relative<S>& y) const {
   const Translation before = mode < 0 ? kStuck : translation_of(mode);
   const Scene<S> scene = source.scene(window, t);
-  return {consistent_mode(patch_double_, values(scene), values(y), before, slide_end_, {}), t, y.state(),
+  return {consistent_mode(limits_double_, values(scene), values(y), before, slide_end_, {}), t, y.state(),
           S(0)};
 }
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "contact/contact_model.hpp"
-#include "contact/patch.hpp"
+#include "contact/friction_limits.hpp"
 
 namespace unhand::contact {
 
@@ -39,8 +39,10 @@ enum class SlideEnd {
 /// The model is a surrogate and not passive: in slide it feeds energy exactly when f_p · v_r > 0.
 class SlidingPivot final : public ContactModelFrom<SlidingPivot> {
  public:
-  /// Throws std::invalid_argument as Patch's validation does.
-  explicit SlidingPivot(const Patch<Dual>& patch, SlideEnd slide_end = SlideEnd::latched_brake);
+  /// Throws std::invalid_argument as the validations of Patch and FrictionVariation do. The limits of every
+  /// mode are those at |(v_r, L ω_r)|.
+  explicit SlidingPivot(const Patch<Dual>& patch, SlideEnd slide_end = SlideEnd::latched_brake,
+                        const FrictionVariation<Dual>& variation = {});
   explicit SlidingPivot(const Patch<double>& patch, SlideEnd slide_end = SlideEnd::latched_brake)
       : SlidingPivot(constant(patch), slide_end) {}
 
@@ -66,13 +68,13 @@ class SlidingPivot final : public ContactModelFrom<SlidingPivot> {
 
  private:
   template <class S>
-  const Patch<S>& patch() const;
+  const FrictionLimits<S>& limits() const;
   template <class S>
   Entry<S, 6> spin_onset(int mode, const Phase& from, const SceneSource&, const S& t,
                          const Relative<S>& rest) const;
 
-  Patch<double> patch_double_;
-  Patch<Dual> patch_dual_;
+  FrictionLimits<double> limits_double_;
+  FrictionLimits<Dual> limits_dual_;
   SlideEnd slide_end_;
 };
 

@@ -1,0 +1,76 @@
+// The friction limits at an instant: what a patch can hold and what it resists with while it slips.
+#pragma once
+
+#include <cmath>
+
+#include "contact/friction_effects.hpp"
+#include "contact/patch.hpp"
+#include "dynamics/frames.hpp"
+
+namespace unhand::contact {
+
+/// f_max and L = τ_max/f_max of n pads, each pressed by f_N [N], that slip with u = (v_r, L ω_r):
+///
+///   L(f_N)     = L₀ (f_N/f₀)^γ                                                                [m]
+///   f_max(f_N) = n μ f_N (1 + (μ_s/μ_k − 1) exp(−|u|²/v_s²)) (1 + |u|/v₀),   τ_max = L f_max  [N], [N m]
+///
+/// with the symbols of FrictionVariation. A held patch has |u| = 0. Neutral values leave the limits of Patch,
+/// to the bit. The soft finger's f_N/f₀ is taken as sqrt((f_N/f₀)² + 10⁻⁸), so that L stays positive and
+/// finite as f_N → 0; f_max (1 + |u|/v₀) is taken as 0 where it would be negative. With adhesion f_N is f_N +
+/// f_adh. [XydasKao1999] for γ, [ArmstrongHelouvryDupont1994] for the speeds.
+template <class S>
+class FrictionLimits {
+ public:
+  FrictionLimits(const Patch<S>& patch, const FrictionVariation<S>& variation)
+      : patch_(patch),
+        variation_(variation),
+        soft_(is_active(variation.softness)),
+        stribeck_(is_active(variation.static_ratio - 1.0)),
+        viscous_(is_active(variation.viscous)) {}
+
+  const Patch<S>& patch() const { return patch_; }
+  const FrictionVariation<S>& variation() const { return variation_; }
+
+  /// L [m]
+  S length(const S& normal_force) const {
+    if (!soft_) return patch_.length();
+    using std::exp;
+    using std::log;
+    const S ratio = normal_force / variation_.reference_force;
+    return patch_.length() * exp(0.5 * variation_.softness * log(ratio * ratio + 1e-8));
+  }
+  /// f_max of a held patch [N]
+  S held(const S& normal_force) const {
+    const S coulomb = patch_.f_max(normal_force);
+    return stribeck_ ? S(variation_.static_ratio * coulomb) : coulomb;
+  }
+  /// f_max while slipping at v_r [m/s] and ω_r [rad/s]
+  S slipping(const S& normal_force, const dynamics::Vec2<S>& slip, const S& spin) const {
+    const S coulomb = patch_.f_max(normal_force);
+    if (!stribeck_ && !viscous_) return coulomb;
+    using std::exp;
+    using std::sqrt;
+    const S spin_speed = length(normal_force) * spin;
+    const S square = dot(slip, slip) + spin_speed * spin_speed;
+    S factor(1.0);
+    if (stribeck_) {
+      const S& v_s = variation_.stribeck_speed;
+      factor += (variation_.static_ratio - 1.0) * exp(-square / (v_s * v_s));
+    }
+    if (viscous_ && dynamics::value_of(square) > 0) {
+      const S growth = 1.0 + variation_.viscous * sqrt(square);
+      factor = dynamics::value_of(growth) > 0 ? S(factor * growth) : S(0);
+    }
+    return factor * coulomb;
+  }
+
+ private:
+  static bool is_active(double x) { return x != 0; }
+  static bool is_active(const dynamics::Dual& x) { return x.a != 0 || !x.v.isZero(); }
+
+  Patch<S> patch_;
+  FrictionVariation<S> variation_;
+  bool soft_, stribeck_, viscous_;
+};
+
+}  // namespace unhand::contact
