@@ -18,13 +18,16 @@ std::string_view to_string(Channel channel) {
 
 namespace {
 
-Channel next(Channel first, std::size_t k) { return static_cast<Channel>(static_cast<int>(first) + static_cast<int>(k)); }
+Channel next(Channel first, std::size_t k) {
+  return static_cast<Channel>(static_cast<int>(first) + static_cast<int>(k));
+}
 
 /// 1 σ of white noise on a smooth column, from its third differences (their variance is 20 σ²).
 double scatter_of(const Series& series, std::size_t column) {
   std::vector<double> d;
   for (std::size_t i = 3; i < series.rows; ++i) {
-    const double x = series(i, column) - 3 * series(i - 1, column) + 3 * series(i - 2, column) - series(i - 3, column);
+    const double x =
+        series(i, column) - 3 * series(i - 1, column) + 3 * series(i - 2, column) - series(i - 3, column);
     if (std::isfinite(x)) d.push_back(std::abs(x));
   }
   if (d.empty()) return 0;
@@ -69,7 +72,8 @@ void add_wrench(const datasets::FtLog& ft, const PreparedThrow& prepared, const 
   }
   for (std::size_t i = 0; i < ft.time.rows; ++i) {
     const double t = ft.time(i);
-    if (t < prepared.hand.begin() || t > prepared.hand.end() || is_settling(jumps, t, options.settling)) continue;
+    if (t < prepared.hand.begin() || t > prepared.hand.end() || is_settling(jumps, t, options.settling))
+      continue;
     for (std::size_t c = 0; c < 3; ++c)
       if (sigma[c] > 0)
         out.all.push_back({next(Channel::wrench_fx, c), t, ft.wrench(i, c),
@@ -80,7 +84,8 @@ void add_wrench(const datasets::FtLog& ft, const PreparedThrow& prepared, const 
 /// After the release the true normal force is zero, so what is read there is the sensor's own.
 void add_normal_force(const datasets::FtLog& ft, const PreparedThrow& prepared, Observations& out) {
   if (!prepared.normal_force || !std::isfinite(prepared.normal_force->release_time())) return;
-  const double from = prepared.normal_force->release_time() + 0.005, sigma = sigma_of(ft.normal_force, 0, kLeastForce);
+  const double from = prepared.normal_force->release_time() + 0.005,
+               sigma = sigma_of(ft.normal_force, 0, kLeastForce);
   for (std::size_t i = 0; i < ft.time.rows; ++i)
     if (ft.time(i) >= from) out.all.push_back({Channel::normal_force, ft.time(i), ft.normal_force(i), sigma});
 }
@@ -94,9 +99,12 @@ void add_mocap(const datasets::ThrowLog& log, const datasets::Throw& logged, con
   const double landed = logged.landing && !logged.landing->time.empty() ? logged.landing->time(0) : HUGE_VAL;
   for (std::size_t i = 0; i < mocap.time.rows; ++i) {
     const double t = mocap.time(i);
-    if (t > landed || (t > prepared.open_command && mocap.is_valid(i) && mocap.pose(i, 1) < log.landing_height)) break;
+    if (t > landed ||
+        (t > prepared.open_command && mocap.is_valid(i) && mocap.pose(i, 1) < log.landing_height))
+      break;
     if (!mocap.is_valid(i) || t < prepared.hand.begin()) continue;
-    for (std::size_t c = 0; c < 3; ++c) out.all.push_back({next(Channel::mocap_x, c), t, mocap.pose(i, c), sigma[c]});
+    for (std::size_t c = 0; c < 3; ++c)
+      out.all.push_back({next(Channel::mocap_x, c), t, mocap.pose(i, c), sigma[c]});
   }
 }
 
@@ -110,8 +118,8 @@ void add_landing(const datasets::LandingLog& landing, Observations& out) {
 
 }  // namespace
 
-Observations observe(const datasets::ThrowLog& log, const datasets::Throw& logged, const PreparedThrow& prepared,
-                     const ObservationOptions& options) {
+Observations observe(const datasets::ThrowLog& log, const datasets::Throw& logged,
+                     const PreparedThrow& prepared, const ObservationOptions& options) {
   Observations out;
   if (logged.ft && options.wrench) add_wrench(*logged.ft, prepared, options, out);
   if (logged.ft && options.normal_force) add_normal_force(*logged.ft, prepared, out);

@@ -44,8 +44,8 @@ struct Observations {
 
 struct ObservationOptions {
   bool wrench{true}, normal_force{true}, mocap{true}, landing{true};
-  /// Wrenches are not used for this long after the log begins and after a jump of the hand's acceleration [s]:
-  /// real pads ring there (some micrometres under a held object of 0.2 kg: 30 ms), rigid ones jump.
+  /// Wrenches are not used for this long after the log begins and after a jump of the hand's acceleration
+  /// [s]: real pads ring there (some micrometres under a held object of 0.2 kg: 30 ms), rigid ones jump.
   double settling{0.03};
   /// To what share of its value a sample of a wrench is trusted, beside its noise [-]. The gain of an F/T
   /// sensor and the shape of a friction law are good to a hundredth, and such an error stays for some twenty
@@ -54,9 +54,10 @@ struct ObservationOptions {
 };
 
 /// All that the throw's log holds of the channels asked for. Left out: wrenches that settle; with a
-/// note: samples outside the hand's motion, motion capture after the landing, and a wrench channel that is dead (no two samples of it
-/// differ). A channel without a declared σ takes it from its own scatter (third differences).
-Observations observe(const datasets::ThrowLog& log, const datasets::Throw& logged, const PreparedThrow& prepared,
-                     const ObservationOptions& options = {});
+/// note: samples outside the hand's motion, motion capture after the landing, and a wrench channel that is
+/// dead (no two samples of it differ). A channel without a declared σ takes it from its own scatter (third
+/// differences).
+Observations observe(const datasets::ThrowLog& log, const datasets::Throw& logged,
+                     const PreparedThrow& prepared, const ObservationOptions& options = {});
 
 }  // namespace unhand::experiment

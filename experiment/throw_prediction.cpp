@@ -266,8 +266,8 @@ ThrowPrediction<S> predict_channels(const PreparedThrow& prepared, const Observa
   return out;
 }
 
-template ThrowPrediction<double> predict_channels(const PreparedThrow&, const Observations&, const ThrowModel&,
-                                                  const Values<double>&);
+template ThrowPrediction<double> predict_channels(const PreparedThrow&, const Observations&,
+                                                  const ThrowModel&, const Values<double>&);
 template ThrowPrediction<Dual> predict_channels(const PreparedThrow&, const Observations&, const ThrowModel&,
                                                 const Values<Dual>&);
 

@@ -40,9 +40,9 @@ struct ThrowPrediction {
   release::ReleaseOutcome release{};
   flight::FlightOutcome flight{flight::FlightOutcome::not_solved};
   release::DetachState<S> detach;
-  flight::Landing<S> landing;    ///< of the tracked point
-  std::vector<S> channels;       ///< one per observation, in its order and units
-  std::vector<int> modes;        ///< the modes entered, in order
+  flight::Landing<S> landing;  ///< of the tracked point
+  std::vector<S> channels;     ///< one per observation, in its order and units
+  std::vector<int> modes;      ///< the modes entered, in order
   bool landed() const {
     return release == release::ReleaseOutcome::detached && flight == flight::FlightOutcome::landed;
   }

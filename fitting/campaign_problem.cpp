@@ -42,10 +42,12 @@ Effect find_effect(const std::string& id) {
     if (effect.id == id) return effect;
     ids.push_back(effect.id);
   }
-  throw std::invalid_argument(fmt::format("effect \"{}\" is unknown; there are {}", id, fmt::join(ids, ", ")));
+  throw std::invalid_argument(
+      fmt::format("effect \"{}\" is unknown; there are {}", id, fmt::join(ids, ", ")));
 }
 
-CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::string& file, const CampaignOptions& options)
+CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::string& file,
+                                 const CampaignOptions& options)
     : options_(options) {
   experiment::require_release_model(options.model);
   header_ = log;
@@ -77,14 +79,17 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
     throws_.push_back(std::move(t));
   }
   if (observations == 0)
-    throw std::invalid_argument(fmt::format(
-        "{}: nothing to fit to: no throw has F/T data, motion capture or a landing among the channels asked for", file));
+    throw std::invalid_argument(
+        fmt::format("{}: nothing to fit to: no throw has F/T data, motion capture or a landing among the "
+                    "channels asked for",
+                    file));
   std::vector<Effect> effects;
   for (const auto& id : options.effects) effects.push_back(find_effect(id));
   name_unknowns(effects);
 }
 
-CampaignProblem CampaignProblem::with(const std::string& model, const std::vector<std::string>& effects) const {
+CampaignProblem CampaignProblem::with(const std::string& model,
+                                      const std::vector<std::string>& effects) const {
   experiment::require_release_model(model);
   CampaignProblem out(*this);
   out.options_.model = out.model_.contact_model = model;
@@ -193,7 +198,8 @@ Linearisation CampaignProblem::linearise(const CampaignThrow& thrown, std::span<
     if (!out.solved) return out;
     out.residual.resize(rows);
     for (std::size_t i = 0; i < observed.size(); ++i)
-      out.residual[static_cast<Eigen::Index>(i)] = (predicted.channels[i] - observed[i].value) / observed[i].sigma;
+      out.residual[static_cast<Eigen::Index>(i)] =
+          (predicted.channels[i] - observed[i].value) / observed[i].sigma;
     out.solved = out.residual.allFinite();
     return out;
   }
@@ -210,8 +216,8 @@ Linearisation CampaignProblem::linearise(const CampaignThrow& thrown, std::span<
       const double v = values[static_cast<std::size_t>(k)];
       duals.push_back(k >= first && k < last ? dynamics::independent(v, k - first) : Dual(v));
     }
-    const auto predicted = experiment::predict_channels(thrown.prepared, thrown.observed, model_,
-                                                        Values<Dual>(thrown.names, std::span<const Dual>(duals)));
+    const auto predicted = experiment::predict_channels(
+        thrown.prepared, thrown.observed, model_, Values<Dual>(thrown.names, std::span<const Dual>(duals)));
     out.modes = predicted.modes;
     out.detach = dynamics::value_of(predicted.detach.time);
     out.solved = predicted.channels.size() == observed.size() && predicted.landed();

@@ -73,8 +73,8 @@ class CampaignProblem {
   std::vector<double> start() const;
 
   /// The residual of one throw; with `derivatives`, through dual numbers, kDualSize unknowns at a time.
-  Linearisation linearise(const CampaignThrow& thrown, std::span<const double> campaign, std::span<const double> own,
-                          bool derivatives) const;
+  Linearisation linearise(const CampaignThrow& thrown, std::span<const double> campaign,
+                          std::span<const double> own, bool derivatives) const;
 
   /// The prediction itself.
   experiment::ThrowPrediction<double> predict(const CampaignThrow& thrown, std::span<const double> campaign,

@@ -26,7 +26,8 @@ const char* to_string(FitOutcome outcome) {
 }
 
 Phase phase_of(const experiment::Observation& o, double opening, double release) {
-  if (o.channel == Channel::landing_x || o.channel == Channel::landing_theta || o.channel == Channel::landing_time)
+  if (o.channel == Channel::landing_x || o.channel == Channel::landing_theta ||
+      o.channel == Channel::landing_time)
     return Phase::landing;
   if (o.time < opening) return Phase::grasped;
   return o.time < release ? Phase::release : Phase::flight;
@@ -95,12 +96,14 @@ class ThrowCost final : public ceres::CostFunction {
                n = static_cast<int>(own.size());
     Eigen::Map<Eigen::VectorXd> r(residuals, rows + n);
     r.head(rows) = l.residual;
-    for (int k = 0; k < n; ++k) r[rows + k] = own[static_cast<std::size_t>(k)] / shared_.own_sigma[static_cast<std::size_t>(k)];
+    for (int k = 0; k < n; ++k)
+      r[rows + k] = own[static_cast<std::size_t>(k)] / shared_.own_sigma[static_cast<std::size_t>(k)];
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     if (jacobians && jacobians[0]) {
       Eigen::Map<RowMajor> J(jacobians[0], rows + n, width);
       J.bottomRows(n).setZero();
-      for (int k = 0; k < width; ++k) J.col(k).head(rows) = l.campaign.col(k) * shared_.scale[static_cast<std::size_t>(k)];
+      for (int k = 0; k < width; ++k)
+        J.col(k).head(rows) = l.campaign.col(k) * shared_.scale[static_cast<std::size_t>(k)];
     }
     if (jacobians && jacobians[1]) {
       Eigen::Map<RowMajor> J(jacobians[1], rows + n, n);
@@ -111,8 +114,7 @@ class ThrowCost final : public ceres::CostFunction {
         J(rows + k, k) = shared_.own_scale[i] / shared_.own_sigma[i];
       }
     }
-    if (jacobians)
-      shared_.jacobian_nanoseconds += static_cast<long>(1e9 * seconds_since(begin));
+    if (jacobians) shared_.jacobian_nanoseconds += static_cast<long>(1e9 * seconds_since(begin));
     return true;
   }
 
@@ -124,7 +126,8 @@ class ThrowCost final : public ceres::CostFunction {
 /// What is known of a campaign unknown without the log.
 class PriorCost final : public ceres::CostFunction {
  public:
-  PriorCost(int width, int index, double mean, double sigma) : width_(width), index_(index), mean_(mean), sigma_(sigma) {
+  PriorCost(int width, int index, double mean, double sigma)
+      : width_(width), index_(index), mean_(mean), sigma_(sigma) {
     mutable_parameter_block_sizes()->push_back(width);
     set_num_residuals(1);
   }
@@ -189,7 +192,9 @@ std::vector<std::size_t> usable(const CampaignProblem& problem, const FitOptions
   std::vector<Linearisation> starts(throws.size());
   const std::vector<double> own(problem.own().size(), 0.0);
   experiment::parallel_for(throws.size(), options.threads, [&](std::size_t i) {
-    if (options.train_only && throws[i].prepared.split != datasets::Split::train) return;
+    if (options.share != Share::all &&
+        (options.share == Share::train) != (throws[i].prepared.split == datasets::Split::train))
+      return;
     if (throws[i].observed.all.empty()) return;
     starts[i] = problem.linearise(throws[i], start, own, false);
     ok[i] = starts[i].solved;
@@ -217,7 +222,8 @@ void describe_open_directions(const Eigen::MatrixXd& information, const Campaign
   const auto n = static_cast<Eigen::Index>(scale.size());
   Eigen::MatrixXd scaled = information;
   for (Eigen::Index i = 0; i < n; ++i)
-    for (Eigen::Index j = 0; j < n; ++j) scaled(i, j) *= scale[static_cast<std::size_t>(i)] * scale[static_cast<std::size_t>(j)];
+    for (Eigen::Index j = 0; j < n; ++j)
+      scaled(i, j) *= scale[static_cast<std::size_t>(i)] * scale[static_cast<std::size_t>(j)];
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
   constexpr double kOpen = 3;  // a direction known to no better than three changes that matter
   for (Eigen::Index k = 0; k < n; ++k) {
@@ -256,6 +262,12 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
     shared.own_scale.push_back(u.scale);
     shared.own_sigma.push_back(*u.prior_sigma);
   }
+  const bool learns = options.own_spread.empty();
+  if (!learns) shared.own_sigma = options.own_spread;
+  const auto is_fixed = [&](const Unknown& u) {
+    return options.all_fixed ||
+           std::find(options.fixed.begin(), options.fixed.end(), u.name) != options.fixed.end();
+  };
   std::vector<double> chi2;
   const auto used = usable(problem, options, start, shared.weighting, chi2);
   out.throws.resize(problem.throws().size());
@@ -271,18 +283,21 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
   }
 
   std::vector<double> x(start.size());
-  for (std::size_t k = 0; k < x.size(); ++k) x[k] = std::clamp(start[k], unknowns[k].low, unknowns[k].high) / shared.scale[k];
+  for (std::size_t k = 0; k < x.size(); ++k)
+    x[k] = std::clamp(start[k], unknowns[k].low, unknowns[k].high) / shared.scale[k];
   std::vector<std::vector<double>> own(used.size(), std::vector<double>(n_own, 0.0));
   std::vector<std::vector<int>> modes_before(used.size());
 
   ceres::Solver::Options solver;
-  solver.linear_solver_type = ceres::DENSE_SCHUR;
+  // With the campaign's unknowns fixed, nothing couples the throws.
+  solver.linear_solver_type = options.all_fixed ? ceres::SPARSE_NORMAL_CHOLESKY : ceres::DENSE_SCHUR;
   solver.max_num_iterations = options.iterations;
-  solver.function_tolerance = options.accuracy;
   solver.parameter_tolerance = 1e-9;
   solver.gradient_tolerance = 1e-12;
   solver.min_trust_region_radius = 1e-2;  // in scales: below, what is left is the integrator's own rounding
-  solver.num_threads = options.threads > 0 ? options.threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  solver.num_threads = options.threads > 0
+                           ? options.threads
+                           : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   solver.logging_type = ceres::SILENT;
 
   NormalEquations equations;
@@ -297,25 +312,28 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
                                      new ceres::HuberLoss(std::sqrt(limit)), x.data(), own[i].data());
       ordering->AddElementToGroup(own[i].data(), 0);
       for (std::size_t k = 0; k < n_own; ++k) {
-        ceres_problem.SetParameterLowerBound(own[i].data(), static_cast<int>(k), problem.own()[k].low / shared.own_scale[k]);
-        ceres_problem.SetParameterUpperBound(own[i].data(), static_cast<int>(k), problem.own()[k].high / shared.own_scale[k]);
+        ceres_problem.SetParameterLowerBound(own[i].data(), static_cast<int>(k),
+                                             problem.own()[k].low / shared.own_scale[k]);
+        ceres_problem.SetParameterUpperBound(own[i].data(), static_cast<int>(k),
+                                             problem.own()[k].high / shared.own_scale[k]);
       }
     }
     ordering->AddElementToGroup(x.data(), 1);
-    solver.linear_solver_ordering = ordering;
+    if (!options.all_fixed) solver.linear_solver_ordering = ordering;
+    // What a round learns needs no more than a coarse solution.
+    solver.function_tolerance = round + 1 < options.rounds ? 1e-3 : options.accuracy;
     std::vector<int> constant;
     for (int k = 0; k < width; ++k) {
       const auto i = static_cast<std::size_t>(k);
       ceres_problem.SetParameterLowerBound(x.data(), k, unknowns[i].low / shared.scale[i]);
       ceres_problem.SetParameterUpperBound(x.data(), k, unknowns[i].high / shared.scale[i]);
       if (unknowns[i].prior_sigma)
-        ceres_problem.AddResidualBlock(
-            new PriorCost(width, k, unknowns[i].start / shared.scale[i], *unknowns[i].prior_sigma / shared.scale[i]), nullptr,
-            x.data());
-      if (std::find(options.fixed.begin(), options.fixed.end(), unknowns[i].name) != options.fixed.end())
-        constant.push_back(k);
+        ceres_problem.AddResidualBlock(new PriorCost(width, k, unknowns[i].start / shared.scale[i],
+                                                     *unknowns[i].prior_sigma / shared.scale[i]),
+                                       nullptr, x.data());
+      if (is_fixed(unknowns[i])) constant.push_back(k);
     }
-    if (static_cast<int>(constant.size()) == width)
+    if (options.all_fixed || static_cast<int>(constant.size()) == width)
       ceres_problem.SetParameterBlockConstant(x.data());
     else if (!constant.empty())
       ceres_problem.SetManifold(x.data(), new ceres::SubsetManifold(width, constant));
@@ -327,11 +345,12 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
       return out;
     }
 
-    equations = normal_equations(problem, used, shared.unscaled(x.data()), own, shared.own_scale, shared.own_sigma,
-                                 shared.weighting, options.threads);
+    equations = normal_equations(problem, used, shared.unscaled(x.data()), own, shared.own_scale,
+                                 shared.own_sigma, shared.weighting, options.threads);
     for (std::size_t i = 0; i < used.size(); ++i) {
       chi2[i] = equations.throws[i].chi2;
-      if (!modes_before[i].empty() && modes_before[i] != equations.throws[i].modes && round + 1 == options.rounds)
+      if (!modes_before[i].empty() && modes_before[i] != equations.throws[i].modes &&
+          round + 1 == options.rounds)
         ++out.mode_changes;
       modes_before[i] = equations.throws[i].modes;
     }
@@ -339,27 +358,30 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
     for (std::size_t i = 0; i < used.size(); ++i)
       misfit.add(problem.throws()[used[i]], equations.throws[i].residual, equations.throws[i].detach);
     if (round + 1 < options.rounds) misfit.weigh(shared.weighting);
-    // Empirical Bayes: the spread of the throws' own unknowns is what they show, plus what each is uncertain by.
-    if (round + 1 < options.rounds && used.size() >= 6)
+    // Empirical Bayes: the spread of the throws' own unknowns is what they show, plus what each is uncertain
+    // by.
+    if (learns && round + 1 < options.rounds && used.size() >= 6)
       for (std::size_t k = 0; k < n_own; ++k) {
         double square = 0;
         for (std::size_t i = 0; i < used.size(); ++i) {
           const double v = own[i][k] * shared.own_scale[k];
-          square += (v * v + equations.throws[i].own_variance[static_cast<Eigen::Index>(k)]) / static_cast<double>(used.size());
+          square += (v * v + equations.throws[i].own_variance[static_cast<Eigen::Index>(k)]) /
+                    static_cast<double>(used.size());
         }
         const double prior = *problem.own()[k].prior_sigma;
         shared.own_sigma[k] = std::clamp(std::sqrt(square), 1e-3 * prior, 3 * prior);
       }
   }
 
-  out.outcome = summary.termination_type == ceres::CONVERGENCE ? FitOutcome::converged : FitOutcome::iterations_spent;
+  out.outcome =
+      summary.termination_type == ceres::CONVERGENCE ? FitOutcome::converged : FitOutcome::iterations_spent;
   out.message = summary.message;
   out.own_spread = shared.own_sigma;
   Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(width, width);
   for (int k = 0; k < width; ++k) {
     const auto& u = unknowns[static_cast<std::size_t>(k)];
     if (u.prior_sigma) prior(k, k) = 1 / (*u.prior_sigma * *u.prior_sigma);
-    if (std::find(options.fixed.begin(), options.fixed.end(), u.name) != options.fixed.end()) prior(k, k) = 1e30 / (u.scale * u.scale);
+    if (is_fixed(u)) prior(k, k) = 1e30 / (u.scale * u.scale);
   }
   const Eigen::MatrixXd covariance = scatter_covariance(equations, prior);
   const Eigen::MatrixXd data = guarded_inverse(equations.information, shared.scale);
@@ -369,7 +391,8 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
     fitted.sigma = std::sqrt(covariance(k, k));
     fitted.data_sigma = std::sqrt(data(k, k));
     const double margin = 1e-6 * (fitted.unknown.high - fitted.unknown.low);
-    fitted.at_bound = fitted.value < fitted.unknown.low + margin || fitted.value > fitted.unknown.high - margin;
+    fitted.at_bound =
+        fitted.value < fitted.unknown.low + margin || fitted.value > fitted.unknown.high - margin;
     for (int j = 0; j < width; ++j) out.covariance.push_back(covariance(k, j));
   }
   describe_open_directions(equations.information, problem, shared.scale, out);
@@ -390,7 +413,8 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
     for (int channel = 0; channel < kChannelCount; ++channel) {
       const auto& squares = total.squares[static_cast<std::size_t>(phase * kChannelCount + channel)];
       if (squares.empty()) continue;
-      ChannelMisfit m{static_cast<Channel>(channel), static_cast<Phase>(phase), static_cast<int>(squares.size()), 0,
+      ChannelMisfit m{static_cast<Channel>(channel), static_cast<Phase>(phase),
+                      static_cast<int>(squares.size()), 0,
                       shared.weighting.of(static_cast<Phase>(phase), static_cast<Channel>(channel))};
       for (const double r2 : squares) m.chi2 += r2;
       out.chi2 += m.chi2;
@@ -402,7 +426,8 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
   return out;
 }
 
-std::vector<double> own_before_release(const CampaignProblem& problem, const CampaignThrow& thrown, const FitResult& fit) {
+std::vector<double> own_before_release(const CampaignProblem& problem, const CampaignThrow& thrown,
+                                       const FitResult& fit) {
   const auto n = problem.own().size();
   std::vector<double> own(n, 0.0);
   const auto campaign = fit.values();
@@ -426,7 +451,8 @@ std::vector<double> own_before_release(const CampaignProblem& problem, const Cam
     if (!d.allFinite()) break;
     double change = 0;
     for (std::size_t k = 0; k < n; ++k) {
-      own[k] = std::clamp(own[k] + d[static_cast<Eigen::Index>(k)], problem.own()[k].low, problem.own()[k].high);
+      own[k] =
+          std::clamp(own[k] + d[static_cast<Eigen::Index>(k)], problem.own()[k].low, problem.own()[k].high);
       change = std::max(change, std::abs(d[static_cast<Eigen::Index>(k)]) / problem.own()[k].scale);
     }
     if (change < 1e-3) break;

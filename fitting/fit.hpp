@@ -18,19 +18,24 @@ std::string_view to_string(Phase);
 /// By the channel, and by the time between the opening and the detach.
 Phase phase_of(const experiment::Observation& observation, double opening, double release);
 
+/// Which throws take part.
+enum class Share { train, test, all };
+
 struct FitOptions {
-  bool train_only{true};
-  int iterations{25};          ///< of the solver, in every round
+  Share share{Share::train};
+  int iterations{25};  ///< of the solver, in every round
   /// Rounds in which the spread of the throws' own unknowns is learned, and the weight of every channel in
   /// every phase: where its misfit is m > 1 times the noise it counts for 1/m.
   int rounds{4};
-  double sample_limit{5};      ///< residuals beyond this many σ count linearly [-]
-  double throw_limit{3};       ///< a throw whose χ² exceeds this many medians counts less [-]
-  double accuracy{1e-6};       ///< relative change of the cost at which a round ends
+  double sample_limit{5};  ///< residuals beyond this many σ count linearly [-]
+  double throw_limit{3};   ///< a throw whose χ² exceeds this many medians counts less [-]
+  double accuracy{1e-6};   ///< relative change of the cost at which a round ends
   int threads{0};
-  std::vector<double> start;   ///< of the campaign's unknowns; empty: the problem's
-  /// Campaign unknowns that keep their start, by name.
+  std::vector<double> start;  ///< of the campaign's unknowns; empty: the problem's
+  /// Campaign unknowns that keep their start, by name; `all_fixed` for every one.
   std::vector<std::string> fixed;
+  bool all_fixed{false};
+  std::vector<double> own_spread;  ///< 1 σ of the throws' own unknowns, if it is known; empty: learned
 };
 
 enum class FitOutcome { converged, iterations_spent, no_start, not_solved };
@@ -67,7 +72,7 @@ struct ThrowFit {
   bool solved{};
   double weight{1};  ///< below 1: an outlier that counts less
   double chi2{};
-  std::vector<double> own;        ///< its own unknowns
+  std::vector<double> own;  ///< its own unknowns
   std::vector<int> modes;
 };
 
@@ -85,9 +90,12 @@ struct FitResult {
   std::vector<ChannelMisfit> misfit;  ///< of the throws used
   double chi2{};
   long samples{}, degrees_of_freedom{};
-  int iterations{}, mode_changes{};  ///< throws whose modes differ between the start and the end of the last round
+  int iterations{},
+      mode_changes{};  ///< throws whose modes differ between the start and the end of the last round
   double seconds{}, jacobian_seconds{};  ///< the second summed over threads
-  double chi2_per_dof() const { return degrees_of_freedom > 0 ? chi2 / static_cast<double>(degrees_of_freedom) : 0; }
+  double chi2_per_dof() const {
+    return degrees_of_freedom > 0 ? chi2 / static_cast<double>(degrees_of_freedom) : 0;
+  }
   std::vector<double> values() const;
   double correlation(std::size_t i, std::size_t j) const;
 };

@@ -38,7 +38,8 @@ struct Difference {
 };
 
 /// The campaign's values of `from`, in the order of `to`, which has the same unknowns and more.
-std::vector<double> carried(const CampaignProblem& from, const std::vector<double>& values, const CampaignProblem& to) {
+std::vector<double> carried(const CampaignProblem& from, const std::vector<double>& values,
+                            const CampaignProblem& to) {
   std::vector<double> out = to.start();
   for (std::size_t k = 0; k < out.size(); ++k)
     for (std::size_t j = 0; j < values.size(); ++j)
@@ -56,8 +57,9 @@ std::string without_object(const std::string& name) { return name.substr(0, name
 
 }  // namespace
 
-Footprints footprints(const CampaignProblem& problem, const FitResult& fit, const std::vector<std::string>& ids,
-                      const std::vector<std::string>& laws, int threads) {
+Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
+                      const std::vector<std::string>& ids, const std::vector<std::string>& laws,
+                      int threads) {
   Footprints out;
   out.fitted = problem.campaign().size();
   std::size_t width = out.fitted;
@@ -150,7 +152,8 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit, cons
     bool solved = true;
     for (std::size_t d = 0; d < derivatives.size() && solved; ++d) {
       const auto& derivative = derivatives[d];
-      const auto l = derivative.problem.linearise(derivative.problem.throws()[i], derivative.campaign, own, true);
+      const auto l =
+          derivative.problem.linearise(derivative.problem.throws()[i], derivative.campaign, own, true);
       solved = l.solved;
       if (!solved) break;
       if (d == 0) {
@@ -164,7 +167,8 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit, cons
     if (solved) base = problem.linearise(problem.throws()[i], fit.values(), own, false).residual;
     for (std::size_t d = 0; d < differences.size() && solved; ++d) {
       const auto& difference = differences[d];
-      const auto l = difference.problem.linearise(difference.problem.throws()[i], difference.campaign, own, false);
+      const auto l =
+          difference.problem.linearise(difference.problem.throws()[i], difference.campaign, own, false);
       if (l.solved)
         columns.col(static_cast<Eigen::Index>(difference_columns[d])) = (l.residual - base) / difference.step;
     }
@@ -172,12 +176,15 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit, cons
     if (!solved || base.size() != columns.rows()) return;
     Eigen::MatrixXd Hoo = own_columns.transpose() * own_columns;
     for (Eigen::Index k = 0; k < Hoo.rows(); ++k)
-      Hoo(k, k) += 1 / (fit.own_spread[static_cast<std::size_t>(k)] * fit.own_spread[static_cast<std::size_t>(k)]);
+      Hoo(k, k) +=
+          1 / (fit.own_spread[static_cast<std::size_t>(k)] * fit.own_spread[static_cast<std::size_t>(k)]);
     const Eigen::MatrixXd Hoc = own_columns.transpose() * columns;
     grams[n] = columns.transpose() * columns - Hoc.transpose() * Hoo.ldlt().solve(Hoc);
   });
   out.gram.setZero(w, w);
   for (const auto& gram : grams) out.gram += gram;
+  for (const std::size_t i : used)
+    out.samples += static_cast<double>(problem.throws()[i].observed.all.size());
   return out;
 }
 
@@ -241,21 +248,43 @@ std::vector<Score> scores(const Footprints& f) {
   return out;
 }
 
-double correlation(const Footprints& f, const Eigen::VectorXd& contribution, const Candidate& candidate) {
-  // The contribution as a column of its own: fitted columns that take part in it are not projected out.
-  std::vector<Eigen::Index> removed, part;
-  for (Eigen::Index k = 0; k < contribution.size(); ++k) (contribution[k] != 0 ? part : removed).push_back(k);
+namespace {
+
+/// Cosine between Σ y_k column_k over `part` and the span of `others`, with `removed` projected out.
+double cosine(const Eigen::MatrixXd& gram, const std::vector<Eigen::Index>& removed,
+              const std::vector<Eigen::Index>& part, const Eigen::VectorXd& y,
+              const std::vector<std::size_t>& others) {
   std::vector<Eigen::Index> kept = part;
-  for (const std::size_t k : candidate.columns) kept.push_back(static_cast<Eigen::Index>(k));
-  const Eigen::MatrixXd G = project(f.gram, removed, kept);
-  const auto n = static_cast<Eigen::Index>(part.size()), m = static_cast<Eigen::Index>(candidate.columns.size());
-  Eigen::VectorXd y(n);
-  for (Eigen::Index k = 0; k < n; ++k) y[k] = contribution[part[static_cast<std::size_t>(k)]];
+  for (const std::size_t k : others) kept.push_back(static_cast<Eigen::Index>(k));
+  const Eigen::MatrixXd G = project(gram, removed, kept);
+  const Eigen::Index n = y.size(), m = G.rows() - n;
   const double norm = y.dot(G.topLeftCorner(n, n) * y);
   if (!(norm > 0)) return 0;
   Eigen::VectorXd x;
   const double shared = solve(G.bottomRightCorner(m, m), G.bottomLeftCorner(m, n) * y, x);
   return std::sqrt(std::clamp(shared / norm, 0.0, 1.0));
+}
+
+}  // namespace
+
+double correlation(const Footprints& f, const Eigen::VectorXd& contribution, const Candidate& candidate) {
+  // Fitted columns that take part in the contribution are not projected out.
+  std::vector<Eigen::Index> removed, part;
+  for (Eigen::Index k = 0; k < contribution.size(); ++k) (contribution[k] != 0 ? part : removed).push_back(k);
+  return cosine(f.gram, removed, part, contribution(part), candidate.columns);
+}
+
+double between(const Footprints& f, const Candidate& a, const std::vector<double>& step, const Candidate& b) {
+  std::vector<Eigen::Index> part;
+  for (const std::size_t k : a.columns) part.push_back(static_cast<Eigen::Index>(k));
+  const Eigen::Map<const Eigen::VectorXd> y(step.data(), static_cast<Eigen::Index>(step.size()));
+  return cosine(f.gram, range(f.fitted), part, y, b.columns);
+}
+
+Eigen::VectorXd pseudo_solve(const Eigen::MatrixXd& C, const Eigen::VectorXd& d) {
+  Eigen::VectorXd x;
+  solve(C, d, x);
+  return x;
 }
 
 }  // namespace unhand::fitting

@@ -13,38 +13,47 @@ namespace unhand::fitting {
 /// A candidate for what a model lacks. `columns` index the Gram matrix; `values` are its parameters where a
 /// column is a difference (one-sided effects, contact laws) rather than a derivative.
 struct Candidate {
-  std::string id;                            ///< of the effect, or "contact.law:MODEL"
-  std::vector<std::string> parameters;       ///< one per column
+  std::string id;                       ///< of the effect, or "contact.law:MODEL"
+  std::vector<std::string> parameters;  ///< one per column
   std::vector<std::size_t> columns;
-  std::map<std::string, double> shape;       ///< the shape parameters' values that this candidate was taken at
-  std::vector<double> unit;                  ///< what a coefficient of one means for each parameter
+  std::map<std::string, double> shape;  ///< the shape parameters' values that this candidate was taken at
+  std::vector<double> unit;             ///< what a coefficient of one means for each parameter
 };
 
 /// Inner products, over all throws used, of whitened columns: the model's unknowns, the candidates', and last
 /// the residual. The throws' own unknowns are projected out of all of them, with their priors.
 struct Footprints {
   std::vector<Candidate> candidates;
-  std::size_t fitted{};   ///< the first columns: the unknowns of the model
+  std::size_t fitted{};  ///< the first columns: the unknowns of the model
   Eigen::MatrixXd gram;
+  double samples{};  ///< that the inner products run over
   std::size_t residual() const { return static_cast<std::size_t>(gram.rows()) - 1; }
 };
 
 /// At a fit of `problem`. Candidates: every effect of `ids` that the problem does not have, at each value of
 /// its shape parameters' grid, and every contact law of `laws`.
-Footprints footprints(const CampaignProblem& problem, const FitResult& fit, const std::vector<std::string>& ids,
-                      const std::vector<std::string>& laws, int threads);
+Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
+                      const std::vector<std::string>& ids, const std::vector<std::string>& laws, int threads);
 
 struct Score {
   std::size_t candidate{};
-  double gain{};              ///< the χ² that it would take away, to first order
-  std::vector<double> step;   ///< its parameters' values at that gain, from neutral
-  bool visible{true};         ///< false: no footprint is left once the fitted unknowns are projected out
+  double gain{};             ///< the χ² that it would take away, to first order
+  std::vector<double> step;  ///< its parameters' values at that gain, from neutral
+  bool visible{true};        ///< false: no footprint is left once the fitted unknowns are projected out
 };
 /// One per candidate, in their order.
 std::vector<Score> scores(const Footprints& footprints);
 
 /// Cosine, at most 1, between what `contribution` (coefficients of the fitted columns; the others are
 /// projected out) does and the nearest that a candidate can do.
-double correlation(const Footprints& footprints, const Eigen::VectorXd& contribution, const Candidate& candidate);
+double correlation(const Footprints& footprints, const Eigen::VectorXd& contribution,
+                   const Candidate& candidate);
+
+/// The same between two candidates, the first with its parameters at `step` from neutral.
+double between(const Footprints& footprints, const Candidate& a, const std::vector<double>& step,
+               const Candidate& b);
+
+/// C⁻¹ d for a covariance that may be singular.
+Eigen::VectorXd pseudo_solve(const Eigen::MatrixXd& C, const Eigen::VectorXd& d);
 
 }  // namespace unhand::fitting

@@ -27,7 +27,8 @@ void weigh(Linearisation& l, const CampaignThrow& thrown, const Weighting& weigh
 }
 
 NormalEquations normal_equations(const CampaignProblem& problem, const std::vector<std::size_t>& used,
-                                 const std::vector<double>& campaign, const std::vector<std::vector<double>>& own,
+                                 const std::vector<double>& campaign,
+                                 const std::vector<std::vector<double>>& own,
                                  const std::vector<double>& own_scale, const std::vector<double>& own_sigma,
                                  const Weighting& weighting, int threads) {
   NormalEquations out;

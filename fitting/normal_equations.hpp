@@ -20,7 +20,8 @@ struct Weighting {
   std::array<double, kPhaseCount * kChannelCount> group;
   Weighting() { group.fill(1.0); }
   double& of(Phase phase, experiment::Channel channel) {
-    return group[static_cast<std::size_t>(static_cast<int>(phase) * kChannelCount + static_cast<int>(channel))];
+    return group[static_cast<std::size_t>(static_cast<int>(phase) * kChannelCount +
+                                          static_cast<int>(channel))];
   }
   double of(Phase phase, experiment::Channel channel) const {
     return const_cast<Weighting*>(this)->of(phase, channel);
@@ -32,12 +33,12 @@ void weigh(Linearisation& l, const CampaignThrow& thrown, const Weighting& weigh
 
 /// One throw's part.
 struct ThrowEquations {
-  double chi2{};                ///< Σ r², robust
-  double weight{1};             ///< Huber's, of the whole throw
-  double detach{};              ///< [s], predicted
-  Eigen::VectorXd residual;     ///< not robust
-  Eigen::VectorXd own_variance; ///< of the throw's own unknowns, given the campaign's
-  Eigen::VectorXd gradient;     ///< for the campaign's unknowns, own eliminated
+  double chi2{};                 ///< Σ r², robust
+  double weight{1};              ///< Huber's, of the whole throw
+  double detach{};               ///< [s], predicted
+  Eigen::VectorXd residual;      ///< not robust
+  Eigen::VectorXd own_variance;  ///< of the throw's own unknowns, given the campaign's
+  Eigen::VectorXd gradient;      ///< for the campaign's unknowns, own eliminated
   std::vector<int> modes;
 };
 
@@ -48,7 +49,8 @@ struct NormalEquations {
 
 /// At the campaign's values and the throws' own (in units of own_scale), for the throws listed in `used`.
 NormalEquations normal_equations(const CampaignProblem& problem, const std::vector<std::size_t>& used,
-                                 const std::vector<double>& campaign, const std::vector<std::vector<double>>& own,
+                                 const std::vector<double>& campaign,
+                                 const std::vector<std::vector<double>>& own,
                                  const std::vector<double>& own_scale, const std::vector<double>& own_sigma,
                                  const Weighting& weighting, int threads);
 

@@ -10,8 +10,8 @@ namespace unhand::flight {
 /// drag plus `extra_drag`. J turns a vector by +90° (counter-clockwise).
 template <class S>
 struct Air {
-  S extra_drag{};         ///< k beyond the declared one [1/m]
-  S lift{};               ///< k_m [-]: Magnus
+  S extra_drag{};            ///< k beyond the declared one [1/m]
+  S lift{};                  ///< k_m [-]: Magnus
   dynamics::Vec2<S> wind{};  ///< w [m/s]
 };
 

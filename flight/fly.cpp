@@ -98,9 +98,9 @@ class Flying final : public dynamics::HybridSystemFrom<Flying<P>, 6> {
 
 template <class S>
 void validate(const FlightProblem<S>& p) {
-  for (const S* x : {&p.pose.x, &p.pose.z, &p.pose.theta, &p.twist.vx, &p.twist.vz, &p.twist.omega,
-                     &p.gravity.x, &p.gravity.z, &p.landing_height, &p.tracked.x, &p.tracked.z, &p.lift_km,
-                     &p.wind.x, &p.wind.z})
+  for (const S* x :
+       {&p.pose.x, &p.pose.z, &p.pose.theta, &p.twist.vx, &p.twist.vz, &p.twist.omega, &p.gravity.x,
+        &p.gravity.z, &p.landing_height, &p.tracked.x, &p.tracked.z, &p.lift_km, &p.wind.x, &p.wind.z})
     if (!std::isfinite(value_of(*x)))
       throw std::invalid_argument("flight: a component of the problem is not finite");
   if (!(value_of(p.drag_k) >= 0 && std::isfinite(value_of(p.drag_k))))
@@ -190,9 +190,8 @@ RecordedFlight<S> record_flight(const FlightProblem<S>& problem, double longest,
   dynamics::IntegratorOptions recorded = options;
   recorded.record = true;
   recorded.longest_step = std::max(options.longest_step, 0.05);
-  auto solution =
-      dynamics::integrate<S, 6>(Flying<S>(problem, false), Entry<S, 6>{kAbove, S(0), state_of(problem), S(0)},
-                                S(longest), recorded);
+  auto solution = dynamics::integrate<S, 6>(
+      Flying<S>(problem, false), Entry<S, 6>{kAbove, S(0), state_of(problem), S(0)}, S(longest), recorded);
   if (solution.outcome != dynamics::Outcome::horizon)
     throw std::runtime_error(fmt::format("flight: not solved ({})", to_string(solution.outcome)));
   return {std::move(solution.trajectory)};

@@ -44,7 +44,8 @@ std::span<const dynamics::EffectOn<Lateness>> lateness_effects() {
 
 DelayedForce::DelayedForce(const contact::NormalForce& base, const Dual& delay) : base_(base), delay_(delay) {
   if (!(std::abs(delay.a) <= 1))
-    throw std::invalid_argument(fmt::format("release.opening_delay: delay = {} is not in [-1, 1] s", delay.a));
+    throw std::invalid_argument(
+        fmt::format("release.opening_delay: delay = {} is not in [-1, 1] s", delay.a));
 }
 double DelayedForce::at(const Window& window, double t) const {
   return base_.at(shifted(window, delay_.a), t - delay_.a);

@@ -36,8 +36,8 @@ class DelayedForce final : public contact::NormalForce {
 };
 
 /// The hand behind a logged one by the first-order lag τ ẏ + y = y_log, in closed form: between the breaks of
-/// the log's polynomials y = Σ_k (−τ)^k dᵏ/dtᵏ y_log + C exp(−(t − t_i)/τ), with the C that keep y continuous;
-/// before the log begins the lag has settled (C = 0). `logged` must outlive it.
+/// the log's polynomials y = Σ_k (−τ)^k dᵏ/dtᵏ y_log + C exp(−(t − t_i)/τ), with the C that keep y
+/// continuous; before the log begins the lag has settled (C = 0). `logged` must outlive it.
 class LaggedHand final : public HandMotion {
  public:
   /// Throws std::invalid_argument unless 0 <= τ <= 1 s.
