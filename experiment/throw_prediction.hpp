@@ -4,20 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "contact/friction_effects.hpp"
-#include "dynamics/effect.hpp"
-#include "dynamics/gravity_effects.hpp"
 #include "experiment/observations.hpp"
 #include "experiment/prepared_throw.hpp"
-#include "experiment/sensing.hpp"
-#include "flight/effects.hpp"
-#include "release/effects.hpp"
-#include "release/simulate_release.hpp"
+#include "experiment/throw_setup.hpp"
 
 namespace unhand::experiment {
-
-/// The effects of all folders, in the order of their ids' first words.
-std::vector<dynamics::Effect> known_effects();
 
 /// The named values that a prediction reads, beside those of the effects ("contact.viscous.1/v_0"):
 ///   mu             friction coefficient [-]
