@@ -8,46 +8,75 @@
 #include "apps/command.hpp"
 #include "apps/output.hpp"
 #include "apps/progress.hpp"
+#include "apps/truth.hpp"
 #include "experiment/parallel.hpp"
 #include "experiment/synthetic_campaign.hpp"
+#include "experiment/throw_setup.hpp"
 
 namespace unhand::apps {
 namespace {
 
 struct Options {
-  std::string campaign, out, json;
+  std::string campaign, out, json, truth;
   std::uint64_t seed{1};
-  std::vector<std::string> effects;
+  std::vector<std::string> effects, without;
   int threads{0};
 };
 
-datasets::ThrowLog simulate(const experiment::CampaignDesign& design, const Options& options) {
-  datasets::ThrowLog log = experiment::campaign_header(design, options.seed);
-  log.throws.resize(static_cast<std::size_t>(design.throws()));
-  Progress progress("generate", log.throws.size());
-  experiment::parallel_for(log.throws.size(), options.threads, [&](std::size_t i) {
-    log.throws[i] = experiment::generate_throw(design, options.seed, static_cast<int>(i)).record;
-    progress.step();
-  });
-  return log;
-}
+constexpr const char* kRandomEffect = "random";
 
-void generate(const Options& options) {
+experiment::CampaignDesign design_of(const Options& options) {
   const auto names = experiment::campaign_names();
   if (std::find(names.begin(), names.end(), options.campaign) == names.end())
     throw WrongUsage(fmt::format("no campaign is called '{}': choose one of {}", options.campaign,
                                  fmt::join(names, ", ")));
-  if (!options.effects.empty())
-    throw WrongUsage(
-        fmt::format("--effect {}: no effects are registered yet; campaigns hold the base physics only",
-                    options.effects.front()));
-  require_writable(options.out);
-  require_writable(options.json);
-  const auto design = experiment::campaign_design(options.campaign);
-  const auto log = simulate(design, options);
+  auto design = experiment::campaign_design(options.campaign, options.seed);
+  for (const std::string& group : options.without) {
+    if (group == "ft") design.sensors.ft = false;
+    if (group == "wrench") design.sensors.wrench = false;
+    if (group == "mocap") design.sensors.mocap = false;
+    if (group == "landing") design.sensors.landing = false;
+  }
+  std::vector<std::string> objects;
+  for (const auto& object : design.objects) objects.push_back(object.name);
+  try {
+    for (const std::string& text : options.effects) {
+      if (text == kRandomEffect) {
+        design.effects.merge(experiment::random_effect(design, options.seed));
+      } else {
+        const auto [name, value] = experiment::parse_effect(text);
+        design.effects.insert_or_assign(name, value);
+      }
+    }
+    experiment::validate_effects(design.effects, objects);
+  } catch (const std::invalid_argument& error) {
+    throw WrongUsage(fmt::format("--effect: {}", error.what()));
+  }
+  return design;
+}
+
+std::vector<experiment::SyntheticThrow> simulate(const experiment::CampaignDesign& design,
+                                                 const Options& options) {
+  std::vector<experiment::SyntheticThrow> throws(static_cast<std::size_t>(design.throws()));
+  Progress progress("generate", throws.size());
+  experiment::parallel_for(throws.size(), options.threads, [&](std::size_t i) {
+    throws[i] = experiment::generate_throw(design, options.seed, static_cast<int>(i));
+    progress.step();
+  });
+  return throws;
+}
+
+void generate(const Options& options) {
+  const auto design = design_of(options);
+  for (const std::string& file : {options.out, options.json, options.truth}) require_writable(file);
+  auto throws = simulate(design, options);
+  Outputs outputs;
+  if (!options.truth.empty())
+    outputs.json(options.truth, truth_json(design, options.seed, options.out, throws));
+  auto log = experiment::campaign_header(design, options.seed);
+  for (auto& one : throws) log.throws.push_back(std::move(one.record));
   const auto test = std::count_if(log.throws.begin(), log.throws.end(),
                                   [](const auto& one) { return one.split == datasets::Split::test; });
-  Outputs outputs;
   outputs.log(options.out, log);
   if (!options.json.empty()) {
     Json report = json_head("generate");
@@ -67,6 +96,26 @@ void generate(const Options& options) {
              design.conditions(), options.seed);
 }
 
+std::string footer() {
+  std::string out =
+      "Examples:\n"
+      "  unhand generate batch180 --seed 7 --out campaign.h5\n"
+      "  unhand generate random --seed 3 --effect contact.stribeck=1.3 --effect contact.stribeck.v_s=0.01 "
+      "\\\n"
+      "      --out campaign.h5 --truth truth.json\n"
+      "  unhand generate random --seed 4 --effect random --without ft --out campaign.h5 --truth truth.json\n"
+      "Effects and their parameters (neutral, range):\n";
+  for (const auto& effect : experiment::known_effects()) {
+    std::vector<std::string> parameters;
+    for (const auto& p : effect.parameters)
+      parameters.push_back(fmt::format("{}{} ({}, {} .. {}{}{})", p.name, effect.per_object ? "[OBJECT]" : "",
+                                       p.neutral, p.low, p.high, p.unit == "-" ? "" : " ",
+                                       p.unit == "-" ? "" : p.unit));
+    out += fmt::format("  {}: {}\n      {}\n", effect.id, effect.mechanism, fmt::join(parameters, ", "));
+  }
+  return out;
+}
+
 }  // namespace
 
 Command generate_command(CLI::App& root) {
@@ -79,10 +128,20 @@ Command generate_command(CLI::App& root) {
   parser->add_option("--out", options->out, "The throw log to write (replaced if it exists)")->required();
   parser->add_option("--seed", options->seed, "Seed of everything random; the same seed gives the same log")
       ->capture_default_str();
-  parser->add_option("--effect", options->effects, "ID=value: an effect to add (none are registered yet)");
+  parser
+      ->add_option(
+          "--effect", options->effects,
+          "ID=value, ID.parameter=value or ID[object]=value: what the world or the sensors do and the "
+          "log does not say; 'random': one drawn with the seed. May be repeated")
+      ->allow_extra_args(false);
+  parser->add_option("--without", options->without, "Leave a sensor out: ft, wrench, mocap or landing")
+      ->check(CLI::IsMember({"ft", "wrench", "mocap", "landing"}))
+      ->allow_extra_args(false);
+  parser->add_option("--truth", options->truth,
+                     "Write the truth (parameters, effects, every throw) as JSON; the log never tells it");
   parser->add_option("--json", options->json, "Write what was made as JSON");
   add_threads(*parser, options->threads);
-  parser->footer("Example:\n  unhand generate batch180 --seed 7 --out campaign.h5");
+  parser->footer(footer());
   return {parser, [options] { generate(*options); }};
 }
 

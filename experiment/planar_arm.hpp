@@ -101,4 +101,8 @@ struct ThrowMotion {
 /// velocities are not determined).
 PlanarArmHand throw_motion(const PlanarArm& arm, const ThrowMotion& motion);
 
+/// A hand as polynomials in time: quintics of at most `longest` [s] that meet pose, twist and acceleration at
+/// their ends, with the same jumps.
+release::PolynomialHand polynomial_hand(const release::HandMotion& hand, double longest = 5e-3);
+
 }  // namespace unhand::experiment

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "contact/patch.hpp"
 #include "datasets/throw_log.hpp"
 #include "dynamics/rigid_body.hpp"
+#include "experiment/campaign_effects.hpp"
 #include "experiment/planar_arm.hpp"
 
 namespace unhand::experiment {
@@ -25,6 +27,7 @@ struct ThrownObject {
   dynamics::RigidBody<double> body;  ///< kg; kg m² about the CoM
   double com_offset{};               ///< pad centre to CoM [m]
   std::array<double, 3> dims{};      ///< bounding box [m]
+  double drag_k{};                   ///< quadratic drag [1/m], declared where it is not 0
 };
 
 /// A 92 g bar with a 154 g cylinder in the slot that puts the CoM `com_offset` [m] from the pads. D4.6 2.2.3
@@ -39,6 +42,8 @@ struct Posture {
   double speed{};               ///< of the hand [m/s]
   double elevation{};           ///< of its velocity above +x [rad]
   double omega{};               ///< of the hand [rad/s]
+  /// θ_O − θ_H [rad] instead of the campaign's
+  std::optional<double> grasp_angle{};
 };
 
 /// What differs from throw to throw, each 1 σ, normal and independent. None of it is in the log except where
@@ -53,6 +58,7 @@ struct ThrowVariation {
   double mu{0.02};                   ///< relative [-]
   double dead_time{1.0e-3};          ///< [s]
   double opening_time{1.0e-3};       ///< [s]
+  double grasp_offset{0};            ///< of the pads along the object's x axis [m]
 };
 
 /// Rates and noise (1 σ) of the sensors; a σ of 0 is a perfect channel, which declares no noise.
@@ -66,7 +72,11 @@ struct SensorSuite {
   std::array<double, 2> landing_sigma{1e-3, 0.5 * std::numbers::pi / 180};  ///< m, rad
   double landing_time_sigma{1e-3};                                          ///< [s]
 
-  /// The same rates without noise and without dropouts.
+  /// Which groups are written. Without `wrench` the F/T sensor reads the normal force alone: its wrench is
+  /// written as zeros. Without `mocap` the log declares the posture's grasp angle.
+  bool ft{true}, wrench{true}, mocap{true}, landing{true};
+
+  /// The same rates and groups without noise and without dropouts.
   SensorSuite perfect() const;
 };
 
@@ -88,6 +98,7 @@ struct CampaignDesign {
   double launch_acceleration{3.0};  ///< of the hand along its path before the switch [m/s²]
 
   contact::Patch<double> patch{0.5, 0.0106};  ///< mu is the campaign's mean
+  std::optional<double> declared_pad_radius;  ///< [m]; the true one if absent
   /// f₀ of one pad [N], dead and opening time [s] are the campaign's means; `open_command` [s] holds for all
   /// throws.
   contact::OpeningProfile<double> opening{0.025, 60.0, 0.010, 0.070, 2.0};
@@ -101,15 +112,27 @@ struct CampaignDesign {
   double train_share{0.5};
   ThrowVariation variation;
   SensorSuite sensors;
+  /// What the world or the sensors do and the log does not say: it declares the neutral values.
+  EffectSettings effects;
 
   int conditions() const;  ///< objects × postures × accelerations
   int throws() const;      ///< conditions × repetitions
+  /// f₀ of contact.soft_patch_radius [N]
+  double reference_force() const { return opening.grip_force; }
 };
 
-/// The designs by name: "batch180" (2 × 3 × 6 × 5, after D4.6 2.2.3) and "quick12" (2 × 1 × 3 × 2). Throws
-/// std::invalid_argument, listing the names, for any other.
-CampaignDesign campaign_design(std::string_view name);
+/// The designs by name: "batch180" (2 × 3 × 6 × 5, after D4.6 2.2.3), "quick12" (2 × 1 × 3 × 2) and
+/// "random", random_campaign(seed); the others do not depend on the seed. Throws std::invalid_argument,
+/// listing the names, for any other.
+CampaignDesign campaign_design(std::string_view name, std::uint64_t seed = 1);
 std::vector<std::string> campaign_names();
+
+/// A campaign of 48 to 60 throws as a lab might make them: a bar with its CoM 0.10, 0.12 or 0.16 m from the
+/// pads and another bar, a box or a light jar, three pitches, two or three release accelerations, under- or
+/// overhand; μ 0.45–0.6, patch radius 9.5–13 mm, declared up to 10 % wrong, grip 20–30 N (more where only
+/// that holds the bar), dead time 6–9 ms, opening 48–60 ms with shape 1 or 1.25; in every second campaign
+/// drag is declared. Bars are grasped where they balance until the gripper opens.
+CampaignDesign random_campaign(std::uint64_t seed);
 
 /// What the sensors do not tell.
 struct ThrowTruth {
@@ -117,6 +140,7 @@ struct ThrowTruth {
   contact::Patch<double> patch;
   contact::OpeningProfile<double> opening;
   double grasp_angle{};                  ///< [rad]
+  double grasp_offset{};                 ///< of the pads along the object's −x axis [m]
   double detach_time{};                  ///< [s]
   dynamics::Pose<double> detach_pose;    ///< of the CoM; m, m, rad
   dynamics::Twist<double> detach_twist;  ///< m/s, m/s, rad/s
@@ -143,12 +167,13 @@ struct SyntheticThrow {
 /// for an index outside the design.
 SyntheticThrow generate_throw(const CampaignDesign& design, std::uint64_t seed, int index);
 
-/// The log without its throws.
+/// The log without its throws. Declared are the objects' true mass, inertia and CoM, but where sensor.mass,
+/// sensor.inertia or sensor.com_offset say otherwise.
 datasets::ThrowLog campaign_header(const CampaignDesign& design, std::uint64_t seed);
 
 /// The whole campaign: a log whose title and source say that it is synthetic. The same design and seed give
-/// the same log, bit for bit. Throws std::invalid_argument for a design that makes no sense, and as
-/// generate_throw does.
+/// the same log, bit for bit. Nothing in the log tells the effects. Throws std::invalid_argument for a design
+/// that makes no sense, and as generate_throw does.
 datasets::ThrowLog generate_campaign(const CampaignDesign& design, std::uint64_t seed);
 
 }  // namespace unhand::experiment

@@ -140,7 +140,14 @@ TEST_F(Cli, WrongUsage) {
   EXPECT_EQ(run("compare").code, 2);
   EXPECT_EQ(run("inspect " + quick + " --threads -1").code, 2);
   expect_refusal("generate nonsense --out a.h5", 2, "batch180");
-  expect_refusal("generate quick12 --out a.h5 --effect flight.wind=1", 2, "no effects are registered");
+  expect_refusal("generate quick12 --out a.h5 --effect flight.winds=1", 2, "did you mean flight.wind?");
+  expect_refusal("generate quick12 --out a.h5 --effect breeze=1", 2, "contact.stribeck");
+  expect_refusal("generate quick12 --out a.h5 --effect flight.wind=31", 2, "w_x = 31 is not in [-30, 30] m/s");
+  expect_refusal("generate quick12 --out a.h5 --effect flight.wind.w_y=1", 2, "flight.wind has w_x, w_z");
+  expect_refusal("generate quick12 --out a.h5 --effect flight.wind=strong", 2, "not a number");
+  expect_refusal("generate quick12 --out a.h5 --effect flight.wind", 2, "ID=value");
+  expect_refusal("generate quick12 --out a.h5 --effect flight.quadratic_drag[jar]=0.1", 2, "bar-com100");
+  expect_refusal("generate quick12 --out a.h5 --effect sensor.mass[jar]=0.1", 2, "all objects share it");
   expect_refusal("import nonsense in.csv --out a.h5", 2, "cube-tosses");
   expect_refusal("compare " + quick + " --models sliding_pivot,wishful", 2, "wishful");
   expect_refusal("compare " + quick + " --models sliding_pivot,sliding_pivot", 2, "twice");
@@ -196,6 +203,29 @@ TEST_F(Cli, GenerateIsRepeatable) {
   EXPECT_NE(content(folder / "a.h5"), content(quick));
   EXPECT_EQ(read_json(folder / "a.json")["throws"], 12);
   EXPECT_THAT(files(), testing::ElementsAre("a.h5", "a.json"));
+}
+
+TEST_F(Cli, GenerateTellsTheTruthOnlyWhenAsked) {
+  ASSERT_EQ(run("generate quick12 --seed 3 --out a.h5 --effect sensor.ft_bias.fz=0 --truth a.json").code, 0);
+  EXPECT_EQ(content(folder / "a.h5"), content(quick)) << "a neutral effect is none";
+  ASSERT_EQ(run("generate quick12 --seed 3 --out a.h5 --effect flight.quadratic_drag=0.1 --effect "
+                "flight.quadratic_drag[bar-com160]=0.2 --without ft --without landing --truth a.json")
+                .code,
+            0);
+  EXPECT_EQ(content(folder / "a.h5").find("quadratic_drag"), std::string::npos);
+  const json truth = read_json(folder / "a.json");
+  EXPECT_EQ(truth["schema"], "truth");
+  EXPECT_EQ(truth["effects"]["flight.quadratic_drag.k"]["value"], 0.1);
+  EXPECT_EQ(truth["effects"]["flight.quadratic_drag.k[bar-com160]"]["value"], 0.2);
+  EXPECT_EQ(truth["effects"].size(), 2u);
+  EXPECT_EQ(truth["throws"].size(), 12u);
+  EXPECT_GT(truth["throws"]["001"]["landing"]["time"], truth["throws"]["001"]["detach"]["time"]);
+  const Answer log = run("inspect a.h5");
+  EXPECT_THAT(log.out, HasSubstr("mocap"));
+  EXPECT_THAT(log.out, testing::Not(HasSubstr("ft/wrench")));
+  EXPECT_THAT(log.out, HasSubstr("0 with a landing"));
+  ASSERT_EQ(run("generate random --seed 2 --effect random --out a.h5 --truth a.json").code, 0);
+  EXPECT_GE(read_json(folder / "a.json")["effects"].size(), 1u);
 }
 
 TEST_F(Cli, Inspect) {
