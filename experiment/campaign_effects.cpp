@@ -101,9 +101,13 @@ bool is_visible(const Effect& effect, const CampaignDesign& design) {
   return true;
 }
 
-double random_size(const EffectParameter& p, bool one_sided, RandomStream& random) {
-  const double size = p.typical * std::pow(20.0, random.uniform()) / 2;
-  const bool negative = random.uniform() < 0.5 && !one_sided && p.neutral - size >= p.low;
+/// What a random campaign can just detect, in typical steps: slip is slow, so viscous friction shows late.
+double least_steps(const Effect& effect) { return effect.id == "contact.viscous" ? 2.5 : 0.5; }
+
+double random_size(const Effect& effect, const EffectParameter& p, RandomStream& random) {
+  constexpr double kLargeOverLeast = 20;
+  const double size = p.typical * least_steps(effect) * std::pow(kLargeOverLeast, random.uniform());
+  const bool negative = random.uniform() < 0.5 && !effect.one_sided && p.neutral - size >= p.low;
   return std::min(p.high, p.neutral + (negative ? -size : size));
 }
 
@@ -161,7 +165,7 @@ EffectSettings random_effect(const CampaignDesign& design, std::uint64_t seed) {
   for (const EffectParameter& p : effect.parameters) {
     const auto draw = [&] {
       return p.is_shape() ? p.grid[static_cast<std::size_t>(random.index(static_cast<int>(p.grid.size())))]
-                          : random_size(p, effect.one_sided, random);
+                          : random_size(effect, p, random);
     };
     if (effect.per_object)
       for (const ThrownObject& object : design.objects)

@@ -22,7 +22,9 @@ template <class S>
 FeltForce<S> felt_force(const PreparedThrow& prepared, const ThrowSetup<S>& setup, const Values<S>& values) {
   if (prepared.normal_force) {
     FeltForce<S> force(*prepared.normal_force);
-    force.unbias(setup, prepared.open_command);
+    // The smoothing fades the bias out over the measured ramp, not from the command on.
+    const double start = prepared.force_fit.opening_start;
+    force.unbias(setup, std::isfinite(start) ? start : prepared.open_command);
     force.act(setup);
     return force;
   }

@@ -1,0 +1,498 @@
+// Effects in synthetic campaigns: each changes what it should, by as much as a closed form says, and nothing
+// else; and predictions with the true parameters see exactly what the generator makes.
+#include "experiment/campaign_effects.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <set>
+
+#include "experiment/parallel.hpp"
+#include "experiment/synthetic_campaign.hpp"
+#include "experiment/throw_prediction.hpp"
+
+namespace {
+
+using namespace unhand;
+using namespace unhand::experiment;
+using dynamics::Effect;
+using dynamics::Vec2;
+constexpr std::uint64_t kSeed = 7;
+constexpr double kDrag = 0.05;  // declared, so that wind has something to act on
+constexpr int kThrow = 8;       // bar-com160, released while the hand brakes
+
+CampaignDesign perfect(const EffectSettings& effects = {}) {
+  CampaignDesign design = campaign_design("quick12");
+  design.sensors = design.sensors.perfect();
+  design.effects = effects;
+  return design;
+}
+
+/// All parameters of an effect `size` typical steps from neutral.
+EffectSettings typical(const Effect& effect, double size = 1) {
+  EffectSettings out;
+  for (const auto& p : effect.parameters)
+    out[effect.full_name(p)] = p.is_shape() ? p.grid.back() : p.neutral + size * p.typical;
+  return out;
+}
+
+/// Effects that this law may not know yet: then the throw is as without them.
+bool is_optional(const std::string& id) {
+  return id == "contact.pressure_profile" || id == "contact.pad_compliance";
+}
+
+bool is_sensor(const Effect& effect) { return effect.id.starts_with("sensor."); }
+
+void expect_same_truth(const ThrowTruth& a, const ThrowTruth& b, const std::string& what) {
+  EXPECT_EQ(a.detach_time, b.detach_time) << what;
+  EXPECT_EQ(a.detach_pose.x, b.detach_pose.x) << what;
+  EXPECT_EQ(a.detach_twist.omega, b.detach_twist.omega) << what;
+  EXPECT_EQ(a.slip, b.slip) << what;
+  EXPECT_EQ(a.pivot, b.pivot) << what;
+  EXPECT_EQ(a.landing_time, b.landing_time) << what;
+  EXPECT_EQ(a.landing_pose.x, b.landing_pose.x) << what;
+  EXPECT_EQ(a.landing_pose.theta, b.landing_pose.theta) << what;
+}
+
+TEST(CampaignEffects, NeutralValuesGiveTheLogWithoutEffects) {
+  const auto plain = generate_throw(perfect(), kSeed, kThrow);
+  EffectSettings all;
+  for (const Effect& effect : known_effects())
+    for (const auto& p : effect.parameters) all[effect.full_name(p)] = p.neutral;
+  const CampaignDesign design = perfect(all);
+  const auto made = generate_throw(design, kSeed, kThrow);
+  EXPECT_TRUE(plain.record == made.record);
+  expect_same_truth(plain.truth, made.truth, "neutral");
+  EXPECT_TRUE(campaign_header(perfect(), kSeed) == campaign_header(design, kSeed));
+}
+
+TEST(CampaignEffects, AnyNumberOfThreadsMakesTheSameLog) {
+  CampaignDesign design = random_campaign(5);
+  design.effects = {{"release.hand_tracking_lag.tau", 0.003}, {"flight.quadratic_drag.k", 0.05}};
+  const auto make = [&](int threads) {
+    std::vector<datasets::Throw> out(12);
+    parallel_for(out.size(), threads,
+                 [&](std::size_t i) { out[i] = generate_throw(design, 5, 4 * static_cast<int>(i)).record; });
+    for (auto& one : out)  // lost samples are NaN, which is unequal to itself
+      for (double& x : one.mocap->pose.data)
+        if (std::isnan(x)) x = 0;
+    return out;
+  };
+  EXPECT_TRUE(make(1) == make(3));
+}
+
+TEST(CampaignEffects, SensorsLeaveTheTruthAlone) {
+  const auto plain = generate_throw(perfect(), kSeed, kThrow);
+  for (const Effect& effect : known_effects()) {
+    const CampaignDesign design = perfect(typical(effect));
+    const auto made = generate_throw(design, kSeed, kThrow);
+    EXPECT_TRUE(plain.record.hand == made.record.hand) << effect.id << ": the hand is logged as commanded";
+    if (!is_sensor(effect)) {
+      EXPECT_TRUE(campaign_header(perfect(), kSeed) == campaign_header(design, kSeed)) << effect.id;
+      EXPECT_EQ(plain.record.ft->normal_force.data, made.record.ft->normal_force.data) << effect.id;
+      continue;
+    }
+    expect_same_truth(plain.truth, made.truth, effect.id);
+    EXPECT_TRUE(!(plain.record == made.record) ||
+                !(campaign_header(perfect(), kSeed) == campaign_header(design, kSeed)))
+        << effect.id;
+  }
+}
+
+TEST(CampaignEffects, BiasesShowAsThemselves) {
+  const auto plain = generate_throw(perfect(), kSeed, kThrow).record;
+  const auto made = generate_throw(perfect({{"sensor.ft_bias.fx", 0.3},
+                                            {"sensor.ft_bias.fz", -0.2},
+                                            {"sensor.ft_bias.tau", 0.01},
+                                            {"sensor.normal_force_bias.bias", -0.5}}),
+                                   kSeed, kThrow)
+                        .record;
+  for (std::size_t k = 0; k < plain.ft->time.rows; ++k) {  // differences of numbers below 100: rounding
+    EXPECT_NEAR(made.ft->wrench(k, 0) - plain.ft->wrench(k, 0), 0.3, 1e-13);
+    EXPECT_NEAR(made.ft->wrench(k, 1) - plain.ft->wrench(k, 1), -0.2, 1e-13);
+    EXPECT_NEAR(made.ft->wrench(k, 2) - plain.ft->wrench(k, 2), 0.01, 1e-13);
+    EXPECT_NEAR(made.ft->normal_force(k) - plain.ft->normal_force(k), -0.5, 1e-13);
+  }
+  EXPECT_EQ(made.ft->normal_force(plain.ft->time.rows - 1), -0.5) << "after the release, below zero";
+  EXPECT_TRUE(plain.mocap == made.mocap);
+  EXPECT_TRUE(plain.landing == made.landing);
+}
+
+TEST(CampaignEffects, TheTrackerIsLateAndOffInScale) {
+  const auto plain = generate_throw(perfect(), kSeed, kThrow).record;
+  const auto made = generate_throw(
+      perfect({{"sensor.mocap_time_offset.offset", 0.004}, {"sensor.length_scale.scale", 0.01}}), kSeed,
+      kThrow);
+  const auto &a = *plain.mocap, &b = *made.record.mocap;
+  ASSERT_EQ(a.time.rows, b.time.rows);
+  for (std::size_t k = 0; k < a.time.rows; ++k) {
+    EXPECT_NEAR(b.time(k) - a.time(k), 0.004, 1e-15);
+    for (std::size_t c : {0u, 1u}) EXPECT_NEAR(b.pose(k, c), 1.01 * a.pose(k, c), 1e-13);
+    EXPECT_NEAR(b.pose(k, 2), a.pose(k, 2), 1e-13);
+  }
+  EXPECT_TRUE(plain.ft == made.record.ft);
+  EXPECT_TRUE(plain.landing == made.record.landing);
+  const auto tracked =
+      generate_throw(perfect({{"sensor.length_scale.scale", 0.01}, {"sensor.length_scale.landing_share", 1}}),
+                     kSeed, kThrow);
+  EXPECT_NEAR(tracked.record.landing->pose(0, 0), 1.01 * plain.landing->pose(0, 0), 1e-15);
+}
+
+TEST(CampaignEffects, DeclarationsAreOffAndTheTrackerFollowsTheDeclaredCoM) {
+  const double offset = 0.004;
+  const CampaignDesign design = perfect(
+      {{"sensor.mass.ratio", 0.1}, {"sensor.inertia.ratio", -0.2}, {"sensor.com_offset.offset", offset}});
+  const auto header = campaign_header(design, kSeed);
+  for (const auto& object : design.objects) {
+    const auto& declared = header.objects.at(object.name);
+    EXPECT_NEAR(1.1 * declared.mass, object.body.mass, 1e-15);
+    EXPECT_NEAR(0.8 * declared.inertia->front(), object.body.inertia, 1e-15);
+    EXPECT_NEAR(*declared.com_offset + offset, object.com_offset, 1e-15);
+  }
+  const auto plain = generate_throw(perfect(), kSeed, kThrow).record,
+             made = generate_throw(design, kSeed, kThrow).record;
+  EXPECT_TRUE(plain.ft == made.ft);
+  const auto &a = *plain.mocap, &b = *made.mocap;
+  for (std::size_t k = 0; k < std::min(a.time.rows, b.time.rows); ++k) {
+    EXPECT_NEAR(b.pose(k, 0), a.pose(k, 0) - offset * std::cos(a.pose(k, 2)), 1e-13);
+    EXPECT_NEAR(b.pose(k, 1), a.pose(k, 1) - offset * std::sin(a.pose(k, 2)), 1e-13);
+    EXPECT_NEAR(b.pose(k, 2), a.pose(k, 2), 1e-13);
+  }
+  // the landing is where that frame, not the CoM, passes the height: it lies up to the offset away
+  const double height = plain.landing->time(0) - made.landing->time(0);
+  EXPECT_LT(std::abs(height), 2 * offset / 3.0) << "falling at 3 m/s or more";
+  EXPECT_NE(height, 0);
+}
+
+TEST(CampaignEffects, TheForceComesLaterThanItsSensorSays) {
+  const auto plain = generate_throw(perfect(), kSeed, kThrow);
+  for (const double delay : {-0.003, 0.004}) {
+    const auto made = generate_throw(perfect({{"release.opening_delay.delay", delay}}), kSeed, kThrow);
+    EXPECT_NEAR(made.truth.detach_time, plain.truth.detach_time + delay, 1e-12);
+    EXPECT_EQ(plain.record.ft->normal_force.data, made.record.ft->normal_force.data);
+  }
+  const auto stuck = generate_throw(
+      perfect({{"contact.adhesion.f_adh", 0.5}, {"contact.adhesion.parting_time", 0.003}}), kSeed, kThrow);
+  EXPECT_NEAR(stuck.truth.detach_time, plain.truth.detach_time + 0.003, 1e-12);
+  EXPECT_EQ(plain.record.ft->normal_force.data, stuck.record.ft->normal_force.data);
+}
+
+// Held, the object turns with the true hand: τ θ' + θ = θ_log + grasp angle.
+TEST(CampaignEffects, TheHandLags) {
+  const double tau = 0.006;
+  CampaignDesign design = perfect({{"release.hand_tracking_lag.tau", tau}});
+  design.sensors.mocap_rate = 4000;
+  const auto [record, truth] = generate_throw(design, kSeed, 2);
+  const PlanarArmHand hand = throw_motion(design.arm, truth.motion);
+  const auto& mocap = *record.mocap;
+  int checked = 0;
+  for (std::size_t k = 1; k + 1 < mocap.time.rows && mocap.time(k + 1) < truth.motion.switch_time; ++k) {
+    const double t = mocap.time(k), rate = (mocap.pose(k + 1, 2) - mocap.pose(k - 1, 2)) /
+                                           (mocap.time(k + 1) - mocap.time(k - 1));
+    const double logged = hand.at({hand.begin(), truth.motion.switch_time}, t).pose.theta;
+    // h²/6 of the third derivative, some 100 rad/s³, times τ
+    EXPECT_NEAR(tau * rate + mocap.pose(k, 2), logged + truth.grasp_angle, 1e-8) << t;
+    ++checked;
+  }
+  EXPECT_GT(checked, 200);
+}
+
+TEST(CampaignEffects, GravityIsTilted) {
+  const double angle = 0.02;
+  CampaignDesign design = perfect({{"flight.gravity_tilt.angle", angle}}), level = perfect();
+  const auto [record, truth] = generate_throw(design, kSeed, kThrow);
+  const auto& mocap = *record.mocap;
+  const double h = 1 / design.sensors.mocap_rate;
+  std::size_t first = 0;
+  while (mocap.time(first) < truth.detach_time) ++first;
+  const auto second = [&](std::size_t k, std::size_t c) {
+    return (mocap.pose(k + 1, c) - 2 * mocap.pose(k, c) + mocap.pose(k - 1, c)) / (h * h);
+  };
+  for (std::size_t k = first + 1; k + 1 < mocap.time.rows; ++k) {  // rounding of 1e-16 m over h²
+    EXPECT_NEAR(second(k, 0), design.gravity * std::sin(angle), 1e-9);
+    EXPECT_NEAR(second(k, 1), -design.gravity * std::cos(angle), 1e-9);
+  }
+  // In the grasp nothing moves otherwise, so both pads together carry the difference.
+  const auto plain = generate_throw(level, kSeed, kThrow).record;
+  const PlanarArmHand hand = throw_motion(design.arm, truth.motion);
+  const double mass = design.objects[1].body.mass;
+  for (std::size_t k = 0; record.ft->time(k) < 0; ++k) {
+    const double t = record.ft->time(k);
+    const Vec2<double> d{2 * (record.ft->wrench(k, 0) - plain.ft->wrench(k, 0)),
+                         2 * (record.ft->wrench(k, 1) - plain.ft->wrench(k, 1))};
+    const auto world = dynamics::rotate(hand.at({hand.begin(), truth.motion.switch_time}, t).pose.theta, d);
+    EXPECT_NEAR(world.x, -mass * design.gravity * std::sin(angle), 1e-12);
+    EXPECT_NEAR(world.z, mass * design.gravity * (std::cos(angle) - 1), 1e-12);
+  }
+}
+
+/// How the landing x changes to first order under a small acceleration a(v) along the flight:
+/// δx = ∫ (T − t) a_x dt, δz alike, and a lower flight lands δz/v_z later.
+double shift(const CampaignDesign& design, const ThrowTruth& t,
+             const std::function<Vec2<double>(Vec2<double>)>& acceleration) {
+  const double longest = t.landing_time - t.detach_time, n = 2000;
+  double dx = 0, dz = 0;
+  for (double i = 0; i < n; ++i) {  // midpoint rule
+    const double s = (i + 0.5) / n * longest;
+    const auto a = acceleration({t.detach_twist.vx, t.detach_twist.vz - design.gravity * s});
+    dx += (longest - s) * a.x * longest / n;
+    dz += (longest - s) * a.z * longest / n;
+  }
+  return dx - dz * t.detach_twist.vx / (t.detach_twist.vz - design.gravity * longest);
+}
+
+TEST(CampaignEffects, AirMovesTheLandingAsPerturbationTheorySays) {
+  const CampaignDesign design = perfect();
+  const auto plain = generate_throw(design, kSeed, kThrow).truth;
+  const auto moved = [&](CampaignDesign with, const EffectSettings& effects) {
+    with.effects = effects;
+    return generate_throw(with, kSeed, kThrow).truth.landing_pose.x;
+  };
+  const double k = 1e-4;  // the second order is this times a flight of some metres
+  const double drag = shift(design, plain, [&](Vec2<double> v) { return -k * norm(v) * v; });
+  const double dragged = moved(design, {{"flight.quadratic_drag.k", k}}) - plain.landing_pose.x;
+  EXPECT_LT(dragged, 0);
+  EXPECT_NEAR(dragged / drag, 1, 2e-3);
+  const std::string own = "flight.quadratic_drag.k[" + design.objects[0].name + "]";
+  EXPECT_EQ(moved(design, {{own, k}}), plain.landing_pose.x) << "the other object's";
+
+  const double km = 1e-4, omega = plain.detach_twist.omega;
+  const double lift = shift(design, plain, [&](Vec2<double> v) { return km * omega * dynamics::perp(v); });
+  EXPECT_NEAR((moved(design, {{"flight.magnus_lift.k_m", km}}) - plain.landing_pose.x) / lift, 1, 2e-3);
+
+  CampaignDesign thin = design;
+  for (auto& object : thin.objects) object.drag_k = k;
+  const double still = generate_throw(thin, kSeed, kThrow).truth.landing_pose.x;
+  const Vec2<double> wind{-2, 0.5};
+  const double blown = shift(design, plain, [&](Vec2<double> v) {
+    const Vec2<double> u{v.x - wind.x, v.z - wind.z};
+    return -k * norm(u) * u + k * norm(v) * v;
+  });
+  const double seen = moved(thin, {{"flight.wind.w_x", wind.x}, {"flight.wind.w_z", wind.z}}) - still;
+  EXPECT_NEAR(seen / blown, 1, 2e-3);
+  EXPECT_EQ(moved(design, {{"flight.wind.w_x", 2}}), plain.landing_pose.x) << "no declared drag, no wind";
+}
+
+TEST(CampaignEffects, FrictionMattersOnlyOnceThePadsOpen) {
+  const auto plain = generate_throw(perfect(), kSeed, kThrow);
+  for (const Effect& effect : known_effects()) {
+    if (!effect.id.starts_with("contact.") || is_optional(effect.id)) continue;
+    const auto made = generate_throw(perfect(typical(effect)), kSeed, kThrow);
+    for (std::size_t k = 0; plain.record.ft->time(k) < plain.truth.motion.switch_time; ++k)
+      EXPECT_NEAR(made.record.ft->wrench(k, 2), plain.record.ft->wrench(k, 2), 1e-12) << effect.id;
+    EXPECT_NE(made.truth.landing_pose.x, plain.truth.landing_pose.x) << effect.id;
+  }
+}
+
+/// The worst residual of each channel, over a throw predicted with the parameters that made it.
+struct Worst {
+  std::array<double, kChannelCount> of{};
+  int observations{};
+};
+
+/// `told`: the prediction knows the effects.
+Worst consistency(const CampaignDesign& design, int index, bool exact_inputs, bool told) {
+  datasets::ThrowLog log = campaign_header(design, kSeed);
+  const auto [record, truth] = generate_throw(design, kSeed, index);
+  log.throws = {record};
+  PreparedThrow prepared = prepare(log, log.throws[0], "(in memory)");
+  Observations observed = observe(log, log.throws[0], prepared);
+  if (exact_inputs) {  // neither spline: the commanded hand itself, and the profile by its parameters
+    prepared.hand = polynomial_hand(throw_motion(design.arm, truth.motion));
+    prepared.normal_force.reset();
+  }
+  const OwnEffects effects(told ? design.effects : EffectSettings{}, record.object);
+  std::vector<std::string> names = effects.names();
+  std::vector<double> numbers = effects.numbers();
+  const auto add = [&](const char* name, double value) {
+    names.emplace_back(name);
+    numbers.push_back(value);
+  };
+  add("mu", truth.patch.mu);
+  add("length", truth.patch.length());
+  add("grip_force", truth.opening.grip_force);
+  add("dead_time", truth.opening.dead_time);
+  add("opening_time", truth.opening.opening_time);
+  add("shape", truth.opening.shape);
+  add("grasp_angle", truth.grasp_angle - prepared.grasp.angle);
+  add("grasp_offset", truth.grasp_offset);
+  const ThrowModel model{design.contact_model, truth.patch.pads, design.reference_force(), {}};
+  const auto predicted =
+      predict_channels(prepared, observed, model, dynamics::Values<double>(names, numbers));
+  Worst worst;
+  if (predicted.channels.size() != observed.all.size()) return worst;
+  for (std::size_t i = 0; i < observed.all.size(); ++i) {
+    double& w = worst.of[static_cast<std::size_t>(observed.all[i].channel)];
+    w = std::max(w, std::abs(predicted.channels[i] - observed.all[i].value));
+  }
+  worst.observations = static_cast<int>(observed.all.size());
+  return worst;
+}
+
+CampaignDesign with_everything(const std::string& law, const EffectSettings& effects) {
+  CampaignDesign design = perfect(effects);
+  design.contact_model = law;
+  for (auto& object : design.objects) object.drag_k = kDrag;
+  design.variation.grasp_offset = 0.3e-3;
+  return design;
+}
+
+/// By id, `size` typical steps from neutral.
+std::vector<std::pair<std::string, EffectSettings>> every_effect(double size) {
+  std::vector<std::pair<std::string, EffectSettings>> out{{"none", {}}};
+  for (const Effect& effect : known_effects()) out.emplace_back(effect.id, typical(effect, size));
+  return out;
+}
+
+// Hand and force given exactly, prediction and generator integrate the same equations with the same steps:
+// what is left are the quintics of the hand (1e-12 m) and rounding, which slip multiplies by a thousand.
+TEST(GeneratorAndPrediction, AgreeOnEveryChannelForEveryEffect) {
+  const std::array<double, kChannelCount> tolerance{1e-8,  1e-8,  1e-9,  1e-12, 1e-10,
+                                                    1e-10, 1e-10, 1e-10, 1e-10, 1e-10};
+  for (const std::string law : {"limit_surface_disc", "sliding_pivot"})
+    for (const double size : {1.0, 5.0})
+      for (const auto& [id, effects] : every_effect(size))
+        for (const int index : {2, kThrow}) {
+          const Worst worst = consistency(with_everything(law, effects), index, true, true);
+          EXPECT_GT(worst.observations, 800) << law << ", " << id;
+          for (std::size_t c = 0; c < kChannelCount; ++c)
+            EXPECT_LE(worst.of[c], tolerance[c])
+                << law << ", " << id << ", throw " << index << ": " << to_string(static_cast<Channel>(c));
+        }
+}
+
+// The same through the smoothing of the logged hand and normal force, in units of the noise that the
+// campaign's sensors would have. Without knowing the effect the prediction is off.
+TEST(GeneratorAndPrediction, AgreeThroughTheSmoothedLogOnlyIfTheEffectIsKnown) {
+  const SensorSuite noise;
+  const auto &w = noise.wrench_sigma, &m = noise.mocap_sigma;
+  const std::array<double, kChannelCount> sigma{w[0],
+                                                w[1],
+                                                w[2],
+                                                noise.normal_force_sigma,
+                                                m[0],
+                                                m[1],
+                                                m[2],
+                                                noise.landing_sigma[0],
+                                                noise.landing_sigma[1],
+                                                noise.landing_time_sigma};
+  const auto largest = [&](const Worst& worst) {
+    double most = 0;
+    for (std::size_t c = 0; c < kChannelCount; ++c) most = std::max(most, worst.of[c] / sigma[c]);
+    return most;
+  };
+  for (const auto& [id, effects] : every_effect(5)) {
+    CampaignDesign design = with_everything("limit_surface_disc", effects);
+    design.opening.shape = 1;  // other ramps are only smoothed to below the noise where a bias is on them
+    const Worst told = consistency(design, kThrow, false, true);
+    EXPECT_GT(told.observations, 800) << id;
+    EXPECT_LE(largest(told), 2e-3) << id;
+    if (!is_optional(id) && id != "none") {
+      EXPECT_GE(largest(consistency(design, kThrow, false, false)), 0.05) << id;
+    }
+  }
+}
+
+TEST(CampaignEffects, AreReadByName) {
+  using testing::HasSubstr;
+  EXPECT_EQ(parse_effect("contact.stribeck=1.25"),
+            std::pair(std::string("contact.stribeck.mu_s/mu_k"), 1.25));
+  EXPECT_EQ(parse_effect("contact.stribeck.v_s=1e-2"), std::pair(std::string("contact.stribeck.v_s"), 0.01));
+  EXPECT_EQ(parse_effect("flight.quadratic_drag[jar]=0.1"),
+            std::pair(std::string("flight.quadratic_drag.k[jar]"), 0.1));
+  const auto refusal = [](const char* text) -> std::string {
+    try {
+      parse_effect(text);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_THAT(refusal("contact.stribek=1"), HasSubstr("did you mean contact.stribeck?"));
+  EXPECT_THAT(refusal("stribeck=1"), HasSubstr("did you mean contact.stribeck?"));
+  EXPECT_THAT(refusal("flight.quadratic_drag=-1"), HasSubstr("k = -1 is not in [0, 10] 1/m"));
+  EXPECT_THAT(refusal("sensor.mass=nan"), HasSubstr("is not in [-0.9, 5]"));
+  EXPECT_THAT(refusal("sensor.mass=1kg"), HasSubstr("not a number"));
+  EXPECT_THAT(refusal("sensor.mass[jar=1"), HasSubstr("in brackets"));
+
+  const OwnEffects jar({{"flight.quadratic_drag.k", 0.1}, {"flight.quadratic_drag.k[jar]", 0.2}}, "jar");
+  EXPECT_EQ(jar.values().get("flight.quadratic_drag.k", 0), 0.2);
+  const OwnEffects box({{"flight.quadratic_drag.k", 0.1}, {"flight.quadratic_drag.k[jar]", 0.2}}, "box");
+  EXPECT_EQ(box.values().get("flight.quadratic_drag.k", 0), 0.1);
+}
+
+TEST(CampaignEffects, RandomOnesAreFromTheCatalogueAndVisible) {
+  std::set<std::string> ids, without_ft;
+  for (std::uint64_t seed = 1; seed <= 400; ++seed) {
+    CampaignDesign design = perfect();
+    for (auto& object : design.objects) object.drag_k = kDrag;
+    const auto effects = random_effect(design, seed);
+    EXPECT_EQ(effects, random_effect(design, seed));
+    for (const Effect& effect : known_effects())
+      for (const auto& p : effect.parameters)
+        for (const auto& [name, value] : effects) {
+          if (name.substr(0, name.find('[')) != effect.full_name(p)) continue;
+          ids.insert(effect.id);
+          if (!p.is_shape()) {
+            EXPECT_GE(std::abs(value - p.neutral), 0.499 * p.typical) << name;
+            EXPECT_LE(std::abs(value - p.neutral),
+                      (effect.id == "contact.viscous" ? 50.001 : 10.001) * p.typical)
+                << name;
+          }
+        }
+    design.sensors.ft = false;
+    for (const auto& [name, value] : random_effect(design, seed)) without_ft.insert(name);
+  }
+  EXPECT_EQ(ids.size(), known_effects().size());
+  for (const auto& name : without_ft) EXPECT_FALSE(name.starts_with("sensor.ft_bias")) << name;
+}
+
+TEST(RandomCampaign, IsHeldLandsAndKeepsItsPromises) {
+  std::set<std::string> names;
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    const CampaignDesign design = random_campaign(seed);
+    EXPECT_GE(design.throws(), 48);
+    EXPECT_LE(design.throws(), 60);
+    ASSERT_EQ(design.objects.size(), 2u);
+    for (const auto& object : design.objects) names.insert(object.name);
+    EXPECT_GE(design.opening.grip_force, 20);
+    EXPECT_LE(design.opening.grip_force, 40);
+    EXPECT_NEAR(*design.declared_pad_radius / design.patch.radius, 1, 0.1);
+    double farthest = 0;
+    for (int i = 0; i < design.throws(); i += design.repetitions) {
+      const auto [record, truth] =
+          generate_throw(design, seed, i);  // throws if it is not held or never lands
+      farthest = std::max(farthest, truth.landing_pose.x);
+      EXPECT_LT(truth.detach_time, design.follow_through);
+    }
+    EXPECT_GT(farthest, 1.2);
+    EXPECT_LT(farthest, 3);
+  }
+  EXPECT_EQ(names.size(), 5u);
+}
+
+TEST(RandomCampaign, SensorsCanBeLeftOut) {
+  CampaignDesign design = random_campaign(3);
+  const auto full = generate_throw(design, 3, 0).record;
+  design.sensors.ft = design.sensors.mocap = false;
+  const auto few = generate_throw(design, 3, 0).record;
+  EXPECT_FALSE(few.ft || few.mocap);
+  EXPECT_TRUE(few.grasp_angle.has_value());
+  EXPECT_FALSE(full.grasp_angle.has_value());
+  EXPECT_TRUE(full.landing == few.landing);
+  design.sensors.ft = true;
+  design.sensors.wrench = design.sensors.landing = false;
+  const auto deaf = generate_throw(design, 3, 0).record;
+  EXPECT_EQ(deaf.ft->normal_force.data, full.ft->normal_force.data)
+      << "its noise is that of the whole sensor";
+  for (const double x : deaf.ft->wrench.data) EXPECT_EQ(x, 0);
+  EXPECT_FALSE(deaf.landing);
+  datasets::ThrowLog log = campaign_header(design, 3);
+  log.throws = {deaf};
+  EXPECT_NO_THROW(datasets::validate(log));
+}
+
+}  // namespace
