@@ -107,7 +107,9 @@ double least_steps(const Effect& effect) { return effect.id == "contact.viscous"
 double random_size(const Effect& effect, const EffectParameter& p, RandomStream& random) {
   constexpr double kLargeOverLeast = 20;
   const double size = p.typical * least_steps(effect) * std::pow(kLargeOverLeast, random.uniform());
-  const bool negative = random.uniform() < 0.5 && !effect.one_sided && p.neutral - size >= p.low;
+  // A static friction below the kinetic one would not hold what the campaign's grip holds.
+  const bool two_sided = !effect.one_sided && effect.id != "contact.stribeck";
+  const bool negative = random.uniform() < 0.5 && two_sided && p.neutral - size >= p.low;
   return std::min(p.high, p.neutral + (negative ? -size : size));
 }
 
