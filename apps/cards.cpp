@@ -4,9 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <fstream>
 
 namespace unhand::apps {
 namespace {
@@ -31,7 +29,8 @@ class Reader {
     if (found == card_.parameters.end())
       fail("/parameters/" + name, fmt::format("is missing: {} takes it", card_.model));
     asked_.push_back(name);
-    const auto& [value, sigma, given] = found->second;
+    const double value = found->second.value;
+    const std::string& given = found->second.unit;
     if (given != unit) fail("/parameters/" + name + "/unit", fmt::format("is '{}', not '{}'", given, unit));
     if (!(value >= low && value <= high))
       fail("/parameters/" + name + "/value", fmt::format("{} is not in [{}, {}] {}", value, low, high, unit));
@@ -56,18 +55,6 @@ class Reader {
   std::vector<std::string> asked_;
 };
 
-/// FNV-1a of the file's bytes: tells logs apart, and is no protection.
-std::optional<std::string> checksum(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  std::array<char, 65536> block{};
-  while (in.read(block.data(), block.size()), in.gcount() > 0)
-    for (std::streamsize i = 0; i < in.gcount(); ++i)
-      hash = (hash ^ static_cast<unsigned char>(block[static_cast<std::size_t>(i)])) * 0x100000001b3u;
-  if (!in.eof()) return {};
-  return fmt::format("fnv1a64:{:016x}", hash);
-}
-
 }  // namespace
 
 std::vector<NamedValue> named_values(const std::string& model, const experiment::ModelParameters& p) {
@@ -80,8 +67,20 @@ std::vector<NamedValue> named_values(const std::string& model, const experiment:
   return {{"mu", "-", p.mu}, {"length", "m", p.length}, {"pads", "-", static_cast<double>(p.pads)}};
 }
 
+std::vector<NamedValue> named_values(const experiment::ModelComparison& model) {
+  if (model.named.empty()) return named_values(model.model, model.estimate.parameters);
+  std::vector<NamedValue> out;
+  for (const auto& [name, unit, value, sigma] : model.named) out.push_back({name, unit, value});
+  return out;
+}
+
 UsableCard read_usable_card(const fs::path& file) {
-  UsableCard out{datasets::read_model_card(file), {}};
+  UsableCard out{datasets::read_model_card(file), file.string(), false, {}};
+  if (fitting::is_fitted(out.card)) {
+    out.fitted = true;
+    fitting::options_of(out.card, out.file);
+    return out;
+  }
   Reader reader(file.string(), out.card);
   const auto models = experiment::release_model_names();
   if (std::find(models.begin(), models.end(), out.card.model) == models.end())
@@ -105,33 +104,44 @@ UsableCard read_usable_card(const fs::path& file) {
   return out;
 }
 
-std::vector<NamedValue> conditions_of(const experiment::PreparedThrow& one) {
-  std::vector<NamedValue> out{{"mass", "kg", one.body.mass}};
-  if (one.normal_force) out.push_back({"grip_force", "N", one.force_fit.grip_force});
-  if (one.measured.detach_twist)
-    out.push_back(
-        {"detach_speed", "m/s", std::hypot(one.measured.detach_twist->vx, one.measured.detach_twist->vz)});
-  return out;
-}
-
 ModelCard card_of(const experiment::ModelComparison& model, const fs::path& log_file,
                   const datasets::ThrowLog& log, const std::vector<experiment::PreparedThrow>& throws) {
   ModelCard card;
   card.model = model.model;
   for (const auto& [name, unit, value] : named_values(model.model, model.estimate.parameters))
     card.parameters[name] = {value, {}, unit};
-  card.log = {log_file.filename().string(), log.title, checksum(log_file)};
+  card.log = {log_file.filename().string(), log.title, fitting::checksum_of(log_file)};
   card.split = "train";
-  for (const auto& one : throws) {
-    if (one.split != datasets::Split::train) continue;
-    for (const auto& [name, unit, value] : conditions_of(one)) {
-      auto& range = card.valid_range.try_emplace(name, datasets::CardRange{value, value, unit}).first->second;
-      range.low = std::min(range.low, value);
-      range.high = std::max(range.high, value);
-    }
-  }
+  card.valid_range = fitting::valid_range_of(throws);
   card.library_version = UNHAND_VERSION;
   return card;
+}
+
+ModelCard card_of(const fitting::CampaignProblem& problem, const fitting::FitResult& fit,
+                  const experiment::ModelComparison& errors, const fs::path& log_file,
+                  const datasets::ThrowLog& log) {
+  ModelCard card = fitting::card_of(problem, fit);
+  card.log = {log_file.filename().string(), log.title, fitting::checksum_of(log_file)};
+  for (const auto& [split, name] :
+       {std::pair{datasets::Split::train, "train"}, {datasets::Split::test, "test"}})
+    if (auto found = fitting::errors_of(errors, split); !found.empty()) card.errors[name] = std::move(found);
+  card.library_version = UNHAND_VERSION;
+  return card;
+}
+
+CardPredictions predict_with(const UsableCard& card, const datasets::ThrowLog& log, const std::string& file,
+                             const fitting::EvaluateOptions& options,
+                             const dynamics::IntegratorOptions& integrator) {
+  auto campaign = fitting::options_of(card.card, card.file);
+  campaign.threads = options.threads;
+  campaign.integrator = integrator;
+  CardPredictions out{fitting::CampaignProblem(log, file, campaign), {}, {}};
+  const auto fit = fitting::fit_of(card.card, out.problem, card.file);
+  out.throws = fitting::predict_throws(out.problem, fit, options);
+  out.comparison = fitting::comparison_of(out.problem, fit, out.throws);
+  out.comparison.from_card = true;
+  out.comparison.estimate.method = "from the card";
+  return out;
 }
 
 }  // namespace unhand::apps

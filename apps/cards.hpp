@@ -7,6 +7,7 @@
 
 #include "datasets/model_card.hpp"
 #include "experiment/compare.hpp"
+#include "fitting/card.hpp"
 
 namespace unhand::apps {
 
@@ -18,15 +19,20 @@ struct NamedValue {
 
 /// What `model` reads of the parameters: mu [-], length [m] and pads [-], or delay [s] and delay_sigma [s].
 std::vector<NamedValue> named_values(const std::string& model, const experiment::ModelParameters& parameters);
+/// Those of a fitted model where it is one.
+std::vector<NamedValue> named_values(const experiment::ModelComparison& model);
 
-/// A card whose model and parameters are ones of experiment::predict.
+/// A card whose model and parameters are ones of experiment::predict or, if it comes from a fit, of
+/// fitting::predict_throws.
 struct UsableCard {
   datasets::ModelCard card;
-  experiment::ModelParameters parameters;
+  std::string file;
+  bool fitted{};
+  experiment::ModelParameters parameters;  ///< of cards that do not come from a fit
 };
 
-/// Throws datasets::CardError where the card cannot be read, its model is not one of releases, or a parameter
-/// is missing, unknown, in another unit or out of range.
+/// Throws datasets::CardError where the card cannot be read, its model is not one of releases, this library
+/// lacks one of its effects, or a parameter is missing, unknown, in another unit or out of range.
 UsableCard read_usable_card(const std::filesystem::path& file);
 
 /// The card of an estimate. `throws` are those of the log, for the valid range.
@@ -34,7 +40,19 @@ datasets::ModelCard card_of(const experiment::ModelComparison& model, const std:
                             const datasets::ThrowLog& log,
                             const std::vector<experiment::PreparedThrow>& throws);
 
-/// The conditions of a throw that a card's valid range speaks of, as far as they were measured.
-std::vector<NamedValue> conditions_of(const experiment::PreparedThrow& one);
+/// The card of a fit: fitting::card_of with where it comes from.
+datasets::ModelCard card_of(const fitting::CampaignProblem& problem, const fitting::FitResult& fit,
+                            const experiment::ModelComparison& errors, const std::filesystem::path& log_file,
+                            const datasets::ThrowLog& log);
+
+/// A fitted card's predictions of all throws of a log.
+struct CardPredictions {
+  fitting::CampaignProblem problem;
+  std::vector<fitting::PredictedThrow> throws;
+  experiment::ModelComparison comparison;
+};
+CardPredictions predict_with(const UsableCard& card, const datasets::ThrowLog& log, const std::string& file,
+                             const fitting::EvaluateOptions& options,
+                             const dynamics::IntegratorOptions& integrator);
 
 }  // namespace unhand::apps

@@ -33,6 +33,7 @@ Command generate_command(CLI::App& root);
 Command import_command(CLI::App& root);
 Command inspect_command(CLI::App& root);
 Command compare_command(CLI::App& root);
+Command fit_command(CLI::App& root);
 Command predict_command(CLI::App& root);
 
 /// --threads, the same in every subcommand.

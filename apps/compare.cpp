@@ -9,8 +9,8 @@
 #include <optional>
 #include <set>
 
-#include "apps/cards.hpp"
 #include "apps/command.hpp"
+#include "apps/compare_run.hpp"
 #include "apps/figure.hpp"
 #include "apps/progress.hpp"
 #include "experiment/free_flight.hpp"
@@ -58,14 +58,13 @@ std::vector<std::string> usual_models() {
 }
 
 /// The cards by model. Adds their models to `models` if the request names none.
-std::map<std::string, experiment::ModelParameters> read_cards(const CompareRequest& request,
-                                                              std::vector<std::string>& models) {
-  std::map<std::string, experiment::ModelParameters> out;
+std::map<std::string, UsableCard> read_cards(const CompareRequest& request,
+                                             std::vector<std::string>& models) {
+  std::map<std::string, UsableCard> out;
   for (const auto& file : request.cards) {
     const UsableCard card = read_usable_card(file);
     const std::string& model = card.card.model;
-    if (!out.emplace(model, card.parameters).second)
-      throw WrongUsage(fmt::format("two cards for model '{}'", model));
+    if (!out.emplace(model, card).second) throw WrongUsage(fmt::format("two cards for model '{}'", model));
     if (std::find(models.begin(), models.end(), model) != models.end()) continue;
     if (!request.models.empty())
       throw WrongUsage(fmt::format("{}: a card for '{}', which is not among --models", file, model));
@@ -87,23 +86,6 @@ std::vector<experiment::PreparedThrow> prepare_throws(const datasets::ThrowLog& 
   return out;
 }
 
-/// Model by model, for the sake of the progress bar.
-experiment::Comparison run_models(const datasets::ThrowLog& log,
-                                  const std::vector<experiment::PreparedThrow>& prepared,
-                                  experiment::CompareOptions options,
-                                  const std::vector<std::string>& models) {
-  Progress progress("simulate", models.size());
-  experiment::Comparison out;
-  for (const auto& model : models) {
-    options.models = {model};
-    auto one = experiment::compare(log, prepared, options);
-    if (!out.models.empty()) one.models.insert(one.models.begin(), out.models.begin(), out.models.end());
-    out = std::move(one);
-    progress.step();
-  }
-  return out;
-}
-
 /// Tells of predictions that failed; if none of any model succeeded, there is no answer.
 void report_failures(const experiment::Comparison& comparison) {
   bool any = false;
@@ -120,13 +102,18 @@ void report_failures(const experiment::Comparison& comparison) {
 
 void compare_releases(const CompareRequest& request, const datasets::ThrowLog& log) {
   auto models = request.models.empty() ? usual_models() : request.models;
-  experiment::CompareOptions options;
-  options.parameters = read_cards(request, models);
-  options.threads = request.threads;
-  options.naive = request.naive;
-  options.integrator.tolerances = {request.rtol, 0.01 * request.rtol};
+  const auto cards = read_cards(request, models);
   const auto prepared = prepare_throws(log, request);
-  const auto comparison = run_models(log, prepared, options, models);
+  ReleaseRun run(request, log, prepared);
+  {
+    Progress progress(request.fit ? "fit" : "simulate", models.size());
+    for (const auto& model : models) {
+      const auto card = cards.find(model);
+      run.add(model, card == cards.end() ? nullptr : &card->second);
+      progress.step();
+    }
+  }
+  const experiment::Comparison& comparison = run.comparison();
   report_failures(comparison);
 
   const ReleaseTables tables = release_tables(comparison, log, request.log);
@@ -137,10 +124,8 @@ void compare_releases(const CompareRequest& request, const datasets::ThrowLog& l
     write_release_report(comparison, tables, json, outputs.directory(request.report));
   if (!request.write_cards.empty()) {
     const auto directory = outputs.directory(request.write_cards);
-    for (const auto& model : comparison.models)
-      if (!model.from_card)
-        datasets::write_model_card(directory / (model.model + ".json"),
-                                   card_of(model, request.log, log, prepared));
+    for (const auto& [model, card] : run.cards())
+      datasets::write_model_card(directory / (model + ".json"), card);
   }
   outputs.commit();
   fmt::print("{}\n{}\n{}\nbias (predicted - measured)\n{}\nparameters\n{}", tables.heading,
@@ -165,10 +150,6 @@ void compare(const CompareRequest& request) {
     compare_slips(request);
     return;
   }
-  if (request.fit)
-    throw Unanswered(
-        "throws are not fitted in this version: leave out --fit to compare with estimated parameters or "
-        "cards");
   const auto log = datasets::read_throw_log(request.log);
   if (log.throws.empty()) throw Unanswered(fmt::format("{}: holds no throws", request.log));
   const bool flights =
@@ -191,6 +172,8 @@ void compare(const CompareRequest& request) {
                                            "is for free flights",
                                            model));
   }
+  if (flights && request.fit)
+    throw Unanswered("free flights hold nothing to fit here: leave out --fit, or use `unhand discover`");
   flights ? compare_flights(request, log) : compare_releases(request, log);
 }
 
@@ -214,14 +197,15 @@ Command compare_command(CLI::App& root) {
               "flights, projectile; for slip logs, all surfaces",
               fmt::join(known_models(), ", "), naive_model))
       ->delimiter(',');
-  parser->add_flag("--fit", request->fit, "Fit the models to the log: slip logs only, in this version");
+  parser->add_flag("--fit", request->fit,
+                   "Fit the models to the log's train throws (see `unhand fit`), or to its slips");
   parser->add_option("--card", request->cards,
                      "A model card: its parameters are used for its model; may be repeated");
   parser->add_option("--json", request->json, "Write the comparison as JSON");
   parser->add_option("--report", request->report,
                      "A directory for figures, tables (Markdown), per-throw errors (CSV) and the JSON");
   parser->add_option("--write-cards", request->write_cards,
-                     "A directory for the estimated parameters as model cards");
+                     "A directory for the estimated or fitted parameters as model cards");
   parser->add_option("--naive-step", request->naive.step, "Step of limit_surface_naive [s]")
       ->check(CLI::Range(1e-7, 0.1))
       ->capture_default_str();
@@ -237,6 +221,8 @@ Command compare_command(CLI::App& root) {
   parser->footer(
       "Parameters that no card gives are estimated from the train throws. Existing files are replaced.\n"
       "Examples:\n  unhand compare campaign.h5 --models sliding_pivot,limit_surface --report out\n"
+      "  unhand compare campaign.h5 --models sliding_pivot,limit_surface,gripper_delay --fit --json "
+      "out.json\n"
       "  unhand compare cubes.h5 --models projectile --json flights.json\n"
       "  unhand compare pushes.h5 --models ellipsoid,convex_quartic --fit --report out");
   return {parser, [request] { compare(*request); }};

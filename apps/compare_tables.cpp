@@ -88,7 +88,7 @@ ReleaseTables release_tables(const experiment::Comparison& comparison, const dat
   out.parameters = {{"model", "parameters", "how", "samples", "scatter"}, {}, 3};
   for (const auto& model : comparison.models) {
     std::string values;
-    for (const auto& [name, unit, value] : named_values(model.model, model.estimate.parameters))
+    for (const auto& [name, unit, value] : named_values(model))
       values += fmt::format("{}{} = {:.5g}{}", values.empty() ? "" : ", ", name, value,
                             unit == "-" ? "" : " " + unit);
     const bool sampled = model.estimate.samples > 0;
@@ -119,12 +119,13 @@ Json release_json(const experiment::Comparison& comparison, const CompareRequest
   for (const auto& model : comparison.models) {
     Json& one = models[model.model];
     Json parameters = Json::object(), units = Json::object();
-    for (const auto& [name, unit, value] : named_values(model.model, model.estimate.parameters)) {
+    for (const auto& [name, unit, value] : named_values(model)) {
       parameters[name] = value;
       units[name] = unit;
     }
     one["parameters"] = parameters;
     one["parameter_units"] = units;
+    for (const auto& [name, unit, value, sigma] : model.named) one["parameter_sigmas"][name] = sigma;
     one["estimate"] = {{"from_card", model.from_card},
                        {"method", model.estimate.method},
                        {"samples", model.estimate.samples},

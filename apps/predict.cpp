@@ -1,8 +1,8 @@
 // unhand predict: where a card's model says each throw goes.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <memory>
-#include <set>
 
 #include "apps/cards.hpp"
 #include "apps/command.hpp"
@@ -17,8 +17,11 @@ struct Options {
 };
 
 using experiment::kDegrees;
+/// By throw; nothing where a card tells no uncertainty.
+using Sigmas = std::vector<std::optional<fitting::OutcomeSigma>>;
 
-Json json_of(const experiment::ThrowComparison& one, const experiment::PreparedThrow& prepared) {
+Json json_of(const experiment::ThrowComparison& one, const experiment::PreparedThrow& prepared,
+             const std::optional<fitting::OutcomeSigma>& sigma, const datasets::ModelCard& card) {
   const auto& p = one.prediction;
   Json out{{"id", one.id},
            {"object", one.object},
@@ -39,6 +42,14 @@ Json json_of(const experiment::ThrowComparison& one, const experiment::PreparedT
     out["landing"] = {{"flight_time_s", p.landing.flight_time},
                       {"x_m", p.landing.pose.x},
                       {"theta_deg", p.landing.pose.theta * kDegrees}};
+  out["sigma"] = nullptr;
+  if (sigma)
+    out["sigma"] = {
+        {"detach_time_s", sigma->detach_time}, {"detach_vx_m_s", sigma->detach_vx},
+        {"detach_vz_m_s", sigma->detach_vz},   {"detach_omega_deg_s", sigma->detach_omega * kDegrees},
+        {"landing_x_m", sigma->landing_x},     {"landing_theta_deg", sigma->landing_theta * kDegrees},
+        {"flight_time_s", sigma->flight_time}};
+  out["outside_valid_range"] = fitting::outside_range(card, prepared);
   Json& measured = out["measured"] = Json::object();
   const auto& m = prepared.measured;
   if (m.detach_time) measured["detach_time_s"] = *m.detach_time;
@@ -55,37 +66,82 @@ Json json_of(const experiment::ThrowComparison& one, const experiment::PreparedT
   return out;
 }
 
-Table table_of(const experiment::ModelComparison& model) {
+Table table_of(const experiment::ModelComparison& model, const Sigmas& sigmas) {
   Table out{{"throw", "condition", "outcome", "detach vx [m/s]", "vz [m/s]", "omega [deg/s]", "landing x [m]",
              "error", "theta [deg]", "error"},
             {},
             3};
-  for (const auto& one : model.throws) {
+  for (std::size_t i = 0; i < model.throws.size(); ++i) {
+    const auto& one = model.throws[i];
     const auto& p = one.prediction;
     const bool detached = p.release == release::ReleaseOutcome::detached;
     const auto error = [&](int q, int decimals) {
       return one.error[q] ? fmt::format("{:+.{}f}", *one.error[q], decimals) : std::string("-");
     };
-    out.rows.push_back({one.id, one.condition, outcome_of(p), fixed(detached, p.detach.twist.vx, 4),
-                        fixed(detached, p.detach.twist.vz, 4),
-                        fixed(detached, p.detach.twist.omega * kDegrees, 2),
-                        fixed(p.landed(), p.landing.pose.x, 4), error(2, 4),
-                        fixed(p.landed(), p.landing.pose.theta * kDegrees, 2), error(3, 2)});
+    const auto value = [&](bool known, double v, double fitting::OutcomeSigma::*s, double unit,
+                           int decimals) {
+      return sigmas[i] ? plus_minus(known, v * unit, (*sigmas[i]).*s * unit, decimals)
+                       : fixed(known, v * unit, decimals);
+    };
+    using Sigma = fitting::OutcomeSigma;
+    out.rows.push_back(
+        {one.id, one.condition, outcome_of(p), value(detached, p.detach.twist.vx, &Sigma::detach_vx, 1, 4),
+         value(detached, p.detach.twist.vz, &Sigma::detach_vz, 1, 4),
+         value(detached, p.detach.twist.omega, &Sigma::detach_omega, kDegrees, 2),
+         value(p.landed(), p.landing.pose.x, &Sigma::landing_x, 1, 4), error(2, 4),
+         value(p.landed(), p.landing.pose.theta, &Sigma::landing_theta, kDegrees, 2), error(3, 2)});
+  }
+  return out;
+}
+
+/// The comparison's table with 1 σ beside it.
+Table csv_table(const experiment::Comparison& comparison, const Sigmas& sigmas) {
+  Table out = throw_table(comparison);
+  for (const char* name : {"detach_time_s", "detach_vx_m_s", "detach_vz_m_s", "detach_omega_deg_s",
+                           "landing_x_m", "landing_theta_deg"})
+    out.header.push_back(std::string("sigma_") + name);
+  for (std::size_t i = 0; i < out.rows.size(); ++i) {
+    const auto s = sigmas[i].value_or(fitting::OutcomeSigma{});
+    for (const double value : {s.detach_time, s.detach_vx, s.detach_vz, s.detach_omega * kDegrees,
+                               s.landing_x, s.landing_theta * kDegrees})
+      out.rows[i].push_back(sigmas[i] ? fmt::format("{}", value) : std::string());
   }
   return out;
 }
 
 /// Tells of throws outside the conditions that the card has been tried in.
 void warn_outside(const datasets::ModelCard& card, const std::vector<experiment::PreparedThrow>& throws) {
-  for (const auto& [name, range] : card.valid_range) {
-    int outside = 0;
-    for (const auto& one : throws)
-      for (const auto& value : conditions_of(one))
-        outside += value.name == name && value.unit == range.unit && !range.contains(value.value);
-    if (outside > 0)
-      fmt::print(stderr, "unhand: {} of {} throws lie outside the card's range of {}, [{:.4g}, {:.4g}] {}\n",
-                 outside, throws.size(), name, range.low, range.high, range.unit);
+  for (const auto& one : throws)
+    if (const auto why = fitting::outside_range(card, one); !why.empty())
+      fmt::print(stderr, "unhand: throw {} lies outside the card's valid range: {}\n", one.id,
+                 fmt::join(why, ", "));
+}
+
+/// The predictions of one card, plain or fitted.
+struct Predictions {
+  std::vector<experiment::PreparedThrow> prepared;
+  experiment::Comparison comparison;  ///< of one model
+  Sigmas sigmas;
+};
+
+Predictions predictions_of(const UsableCard& card, const datasets::ThrowLog& log, const Options& options) {
+  Predictions out;
+  if (card.fitted) {
+    auto predicted =
+        predict_with(card, log, options.log, {true, options.threads}, fitting::CampaignOptions{}.integrator);
+    for (const auto& one : predicted.problem.throws()) out.prepared.push_back(one.prepared);
+    for (const auto& one : predicted.throws) out.sigmas.push_back(one.sigma);
+    out.comparison.models.push_back(std::move(predicted.comparison));
+    return out;
   }
+  out.prepared = experiment::prepare_all(log, options.log, options.threads);
+  experiment::CompareOptions compare_options;
+  compare_options.models = {card.card.model};
+  compare_options.threads = options.threads;
+  compare_options.parameters.emplace(card.card.model, card.parameters);
+  out.comparison = experiment::compare(log, out.prepared, compare_options);
+  out.sigmas.resize(out.prepared.size());
+  return out;
 }
 
 void predict(const Options& options) {
@@ -97,13 +153,8 @@ void predict(const Options& options) {
     throw datasets::LogError(options.log, "/@schema", "is a slip-log, which holds no throws to predict");
   const auto log = datasets::read_throw_log(options.log);
   if (log.throws.empty()) throw Unanswered(fmt::format("{}: holds no throws", options.log));
-  const auto prepared = experiment::prepare_all(log, options.log, options.threads);
+  const auto [prepared, comparison, sigmas] = predictions_of(card, log, options);
   warn_outside(card.card, prepared);
-  experiment::CompareOptions compare_options;
-  compare_options.models = {model};
-  compare_options.threads = options.threads;
-  compare_options.parameters.emplace(model, card.parameters);
-  const auto comparison = experiment::compare(log, prepared, compare_options);
   const auto& result = comparison.models.front();
   if (result.failed == static_cast<int>(result.throws.size()))
     throw Unanswered(fmt::format("{} brings no throw to a landing: {}", model,
@@ -115,19 +166,20 @@ void predict(const Options& options) {
     json["log"] = options.log;
     json["card"] = options.card;
     json["model"] = model;
+    json["effects"] = card.card.effects;
     json["parameters"] = Json::object();
-    for (const auto& [name, unit, value] : named_values(model, card.parameters))
-      json["parameters"][name] = value;
+    for (const auto& [name, unit, value] : named_values(result)) json["parameters"][name] = value;
     json["failed"] = result.failed;
     json["throws"] = Json::array();
     for (std::size_t i = 0; i < prepared.size(); ++i)
-      json["throws"].push_back(json_of(result.throws[i], prepared[i]));
+      json["throws"].push_back(json_of(result.throws[i], prepared[i], sigmas[i], card.card));
     outputs.json(options.json, json);
   }
-  if (!options.csv.empty()) outputs.text(options.csv, throw_table(comparison).csv());
+  if (!options.csv.empty()) outputs.text(options.csv, csv_table(comparison, sigmas).csv());
   outputs.commit();
-  fmt::print("{}: {} throws with {} from {} (errors: predicted - measured)\n\n{}", options.log,
-             prepared.size(), model, options.card, table_of(result).text());
+  fmt::print("{}: {} throws with {}{}{} from {} (± 1 sigma; errors: predicted - measured)\n\n{}", options.log,
+             prepared.size(), model, card.card.effects.empty() ? "" : " with ",
+             fmt::join(card.card.effects, ", "), options.card, table_of(result, sigmas).text());
 }
 
 }  // namespace
@@ -142,7 +194,9 @@ Command predict_command(CLI::App& root) {
   parser->add_option("--csv", options->csv, "Write the predictions as CSV");
   add_threads(*parser, options->threads);
   parser->footer(
-      "Cards come from `unhand compare LOG --write-cards DIR`. Existing files are replaced.\n"
+      "Cards come from `unhand fit LOG --card FILE` (with uncertainties) and from `unhand compare LOG "
+      "--write-cards\n"
+      "DIR`. Existing files are replaced.\n"
       "Example:\n  unhand predict campaign.h5 --card cards/sliding_pivot.json --csv predictions.csv");
   return {parser, [options] { predict(*options); }};
 }

@@ -9,102 +9,23 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string_view>
-#include <vector>
 
-#include "datasets/near_miss.hpp"
+#include "datasets/json_fields.hpp"
 
 namespace unhand::datasets {
 namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
+using Fields = JsonFields;
 
 constexpr const char* schema_name = "model-card";
 constexpr int schema_version = 1;
 
-/// "/a~b" as JSON pointers spell it.
-std::string escaped(std::string_view key) {
-  std::string out;
-  for (const char c : key) {
-    if (c == '~')
-      out += "~0";
-    else if (c == '/')
-      out += "~1";
-    else
-      out += c;
-  }
-  return out;
+/// Objects whose keys are names that the card's owner chose.
+bool is_named_parts(const std::string& key) {
+  return key == "parameters" || key == "valid_range" || key == "own_spreads" || key == "errors";
 }
-
-/// An object of the card whose keys are taken out one by one; what is left is what this version does not
-/// know.
-class Fields {
- public:
-  Fields(std::string file, std::string path, Json object)
-      : file_(std::move(file)), path_(std::move(path)), object_(std::move(object)) {
-    if (!object_.is_object()) fail("", fmt::format("is {}, not an object", object_.type_name()));
-  }
-
-  [[noreturn]] void fail(const std::string& key, const std::string& why) const {
-    throw CardError(file_, key.empty() ? (path_.empty() ? "/" : path_) : path_ + "/" + escaped(key), why);
-  }
-
-  std::optional<Json> take(const std::string& key) {
-    const auto found = object_.find(key);
-    if (found == object_.end()) return {};
-    Json value = *found;
-    object_.erase(found);
-    return value;
-  }
-
-  template <class T>
-  T required(const std::string& key, std::optional<T> value) const {
-    if (value) return *std::move(value);
-    for (const auto& [name, ignored] : object_.items()) {
-      if (is_near_miss(name, key)) fail(key, fmt::format("is missing: is '{}' meant?", name));
-    }
-    fail(key, "is missing");
-  }
-
-  std::optional<double> number(const std::string& key) {
-    const auto value = take(key);
-    if (!value) return {};
-    if (!value->is_number()) fail(key, fmt::format("{} is not a number", value->dump()));
-    const auto real = value->get<double>();
-    if (!std::isfinite(real)) fail(key, "is not finite");
-    return real;
-  }
-
-  std::optional<std::string> text(const std::string& key) {
-    const auto value = take(key);
-    if (!value) return {};
-    if (!value->is_string()) fail(key, fmt::format("{} is not text", value->dump()));
-    return value->get<std::string>();
-  }
-
-  std::optional<Fields> object(const std::string& key) {
-    auto value = take(key);
-    if (!value) return {};
-    return Fields(file_, path_ + "/" + escaped(key), *std::move(value));
-  }
-
-  std::vector<std::string> names() const {
-    std::vector<std::string> out;
-    for (const auto& [name, ignored] : object_.items()) out.push_back(name);
-    return out;
-  }
-
-  /// Puts what is left of a part back, to be kept.
-  void keep(const std::string& key, const Fields& part) {
-    if (!part.object_.empty()) object_[key] = part.object_;
-  }
-
-  const Json& rest() const { return object_; }
-
- private:
-  std::string file_, path_;
-  Json object_;
-};
 
 /// Adds to `into` what it lacks; a part of the card that is gone takes its unknown keys with it.
 void add_missing(Json& into, const Json& extra, bool may_add) {
@@ -113,7 +34,7 @@ void add_missing(Json& into, const Json& extra, bool may_add) {
     if (found == into.end()) {
       if (may_add) into[key] = value;
     } else if (found->is_object() && value.is_object()) {
-      add_missing(*found, value, key != "parameters" && key != "valid_range");
+      add_missing(*found, value, !is_named_parts(key));
     }
   }
 }
@@ -139,6 +60,55 @@ CardParameter read_parameter(Fields& from) {
   out.sigma = from.number("sigma");
   if (out.sigma && *out.sigma < 0) from.fail("sigma", fmt::format("{} is below 0", *out.sigma));
   out.unit = from.required("unit", from.text("unit"));
+  out.determined = from.boolean("determined").value_or(true);
+  return out;
+}
+
+CardSpread read_spread(Fields& from) {
+  CardSpread out;
+  out.sigma = from.required("sigma", from.number("sigma"));
+  if (out.sigma < 0) from.fail("sigma", fmt::format("{} is below 0", out.sigma));
+  out.unit = from.required("unit", from.text("unit"));
+  return out;
+}
+
+CardStatistics read_statistics(Fields& from) {
+  CardStatistics out;
+  const double n = from.required("n", from.number("n"));
+  if (!(n >= 0 && n < 1e9 && n == std::floor(n))) from.fail("n", fmt::format("{} is no count", n));
+  out.n = static_cast<int>(n);
+  out.mae = from.required("mae", from.number("mae"));
+  out.std = from.required("std", from.number("std"));
+  out.bias = from.required("bias", from.number("bias"));
+  return out;
+}
+
+CardCovariance read_covariance(Fields& from, const std::map<std::string, CardParameter>& parameters) {
+  CardCovariance out;
+  out.names = from.texts("names");
+  for (const auto& name : out.names)
+    if (!parameters.contains(name)) from.fail("names", fmt::format("'{}' is no parameter of the card", name));
+  const auto matrix = from.required("matrix", from.take("matrix"));
+  const auto fail = [&] {
+    from.fail("matrix", fmt::format("is not {0} rows of {0} finite numbers", out.names.size()));
+  };
+  if (!matrix.is_array() || matrix.size() != out.names.size()) fail();
+  for (const auto& row : matrix) {
+    if (!row.is_array() || row.size() != out.names.size()) fail();
+    for (const auto& one : row) {
+      if (!one.is_number()) fail();
+      out.matrix.push_back(one.get<double>());
+    }
+  }
+  const std::size_t n = out.names.size();
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < n; ++j) {
+      if (!std::isfinite(out.matrix[i * n + j])) fail();
+      const double scale = std::sqrt(out.matrix[i * n + i] * out.matrix[j * n + j]);
+      if (!(std::abs(out.matrix[i * n + j] - out.matrix[j * n + i]) <= 1e-9 * scale) ||
+          out.matrix[i * n + i] < 0)
+        from.fail("matrix", "is no covariance: not symmetric, or negative on its diagonal");
+    }
   return out;
 }
 
@@ -149,6 +119,35 @@ CardRange read_range(Fields& from) {
   if (out.low > out.high) from.fail("low", fmt::format("{} lies above high, {}", out.low, out.high));
   out.unit = from.required("unit", from.text("unit"));
   return out;
+}
+
+/// An object whose keys are names. False if it is not there.
+template <class Part>
+bool read_parts(Fields& from, const std::string& key, std::map<std::string, Part>& into,
+                Part (*read)(Fields&)) {
+  auto parts = from.object(key);
+  if (!parts) return false;
+  for (const auto& name : parts->names()) {
+    Fields one = *parts->object(name);
+    into[name] = read(one);
+    parts->keep(name, one);
+  }
+  from.keep(key, *parts);
+  return true;
+}
+
+void write_covariance(const CardCovariance& covariance, Json& out) {
+  const std::size_t n = covariance.names.size();
+  if (covariance.matrix.size() != n * n)
+    throw CardError("(in memory)", "/covariance/matrix",
+                    fmt::format("{} numbers for {} names", covariance.matrix.size(), n));
+  Json rows = Json::array();
+  for (std::size_t i = 0; i < n; ++i) {
+    Json row = Json::array();
+    for (std::size_t j = 0; j < n; ++j) row.push_back(covariance.matrix[i * n + j]);
+    rows.push_back(std::move(row));
+  }
+  out["covariance"] = {{"names", covariance.names}, {"matrix", std::move(rows)}};
 }
 
 }  // namespace
@@ -164,27 +163,25 @@ ModelCard parse_model_card(const std::string& text, const std::string& file) {
   ModelCard card;
   card.model = root.required("model", root.text("model"));
   if (card.model.empty()) root.fail("model", "is empty text");
-  Fields parameters = root.required("parameters", root.object("parameters"));
-  for (const auto& name : parameters.names()) {
-    Fields one = *parameters.object(name);
-    card.parameters[name] = read_parameter(one);
-    parameters.keep(name, one);
+  card.effects = root.texts("effects");
+  if (!read_parts(root, "parameters", card.parameters, read_parameter))
+    root.required("parameters", root.object("parameters"));
+  if (auto covariance = root.object("covariance")) {
+    card.covariance = read_covariance(*covariance, card.parameters);
+    root.keep("covariance", *covariance);
   }
-  root.keep("parameters", parameters);
+  read_parts(root, "own_spreads", card.own_spreads, read_spread);
   Fields log = root.required("log", root.object("log"));
   card.log.file = log.required("file", log.text("file"));
   card.log.title = log.text("title").value_or("");
   card.log.checksum = log.text("checksum");
   root.keep("log", log);
   card.split = root.text("split");
-  if (auto ranges = root.object("valid_range")) {
-    for (const auto& name : ranges->names()) {
-      Fields one = *ranges->object(name);
-      card.valid_range[name] = read_range(one);
-      ranges->keep(name, one);
-    }
-    root.keep("valid_range", *ranges);
+  if (auto errors = root.object("errors")) {
+    for (const auto& name : errors->names()) read_parts(*errors, name, card.errors[name], read_statistics);
+    root.keep("errors", *errors);
   }
+  read_parts(root, "valid_range", card.valid_range, read_range);
   card.library_version = root.required("library_version", root.text("library_version"));
   if (!root.rest().empty()) card.extra = root.rest().dump();
   return card;
@@ -204,15 +201,25 @@ ModelCard read_model_card(const fs::path& file) {
 
 std::string to_json(const ModelCard& card) {
   Json out{{"schema", schema_name}, {"schema_version", schema_version}, {"model", card.model}};
+  if (!card.effects.empty()) out["effects"] = card.effects;
   Json& parameters = out["parameters"] = Json::object();
   for (const auto& [name, p] : card.parameters) {
     Json& one = parameters[name] = {{"value", p.value}};
     if (p.sigma) one["sigma"] = *p.sigma;
     one["unit"] = p.unit;
+    if (!p.determined) one["determined"] = false;
   }
+  if (card.covariance) write_covariance(*card.covariance, out);
+  for (const auto& [name, spread] : card.own_spreads)
+    out["own_spreads"][name] = {{"sigma", spread.sigma}, {"unit", spread.unit}};
   out["log"] = {{"file", card.log.file}, {"title", card.log.title}};
   if (card.log.checksum) out["log"]["checksum"] = *card.log.checksum;
   if (card.split) out["split"] = *card.split;
+  for (const auto& [split, quantities] : card.errors) {
+    Json& one = out["errors"][split] = Json::object();
+    for (const auto& [name, e] : quantities)
+      one[name] = {{"n", e.n}, {"mae", e.mae}, {"std", e.std}, {"bias", e.bias}};
+  }
   if (!card.valid_range.empty()) {
     Json& ranges = out["valid_range"] = Json::object();
     for (const auto& [name, r] : card.valid_range)

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "datasets/log_error.hpp"
 
@@ -14,7 +15,31 @@ struct CardParameter {
   double value = 0;
   std::optional<double> sigma;  // 1 σ, in the same unit
   std::string unit;             // "-" where it has none
+  bool determined = true;       // false: the log alone says nothing of it, sigma is what was known before
   bool operator==(const CardParameter&) const = default;
+};
+
+/// Of the estimated parameters: names.size() squared numbers, row by row, in the product of their units.
+struct CardCovariance {
+  std::vector<std::string> names;
+  std::vector<double> matrix;
+  bool operator==(const CardCovariance&) const = default;
+};
+
+/// 1 σ from throw to throw of a number that every throw has for itself ("grasp_angle").
+struct CardSpread {
+  double sigma = 0;
+  std::string unit;
+  bool operator==(const CardSpread&) const = default;
+};
+
+/// Errors, predicted minus measured, over n throws, in the unit that the quantity's name ends with.
+struct CardStatistics {
+  int n = 0;
+  double mae = 0;   // mean of the absolute error
+  double std = 0;   // standard deviation of the absolute error
+  double bias = 0;  // mean of the error
+  bool operator==(const CardStatistics&) const = default;
 };
 
 /// The log that the parameters were estimated from.
@@ -33,16 +58,27 @@ struct CardRange {
 };
 
 ///   {"schema": "model-card", "schema_version": 1, "model": "sliding_pivot",
+///    "effects": ["contact.viscous"],
 ///    "parameters": {"mu": {"value": 0.61, "sigma": 0.01, "unit": "-"}, ...},
-///    "log": {"file": "campaign.h5", "title": "...", "checksum": "..."},
-///    "split": "train", "valid_range": {"grip_force": {"low": 45, "high": 55, "unit": "N"}, ...},
+///    "covariance": {"names": ["mu", ...], "matrix": [[1e-4, ...], ...]},
+///    "own_spreads": {"mu_deviation": {"sigma": 0.02, "unit": "-"}, ...},
+///    "log": {"file": "campaign.h5", "title": "...", "checksum": "fnv1a64:..."},
+///    "split": "train",
+///    "errors": {"test": {"landing_x_m": {"n": 90, "mae": 0.003, "std": 0.002, "bias": 0.0}, ...}, ...},
+///    "valid_range": {"grip_force": {"low": 45, "high": 55, "unit": "N"}, ...},
 ///    "library_version": "0.1.0"}
-/// sigma, checksum, split and valid_range may be missing.
+/// Required: schema, schema_version, model, parameters (value and unit of each), log (file), library_version.
 struct ModelCard {
   std::string model;
+  std::vector<std::string>
+      effects;  // ids; their parameters are among `parameters`, as "id.name" or "id.name[object]"
   std::map<std::string, CardParameter> parameters;
+  std::optional<CardCovariance> covariance;
+  std::map<std::string, CardSpread> own_spreads;
   CardLog log;
   std::optional<std::string> split;  // the throws that were used: "train"
+  /// By split ("train", "test", "cross_validation"), then by quantity.
+  std::map<std::string, std::map<std::string, CardStatistics>> errors;
   std::map<std::string, CardRange> valid_range;
   std::string library_version;
   /// Keys that this version does not know, as the text of a JSON object in the card's own structure; they

@@ -41,9 +41,16 @@ struct ThrowComparison {
       error[kQuantityCount];  ///< in the units of kQuantities; absent if not measured or not predicted
 };
 
+/// A parameter's value in words' terms; sigma is NaN where it is not known.
+struct NamedParameter {
+  std::string name, unit;
+  double value{}, sigma{};
+};
+
 struct ModelComparison {
   std::string model;
   FrictionEstimate estimate;
+  std::vector<NamedParameter> named;  ///< of a fitted model, in place of estimate.parameters; else empty
   bool from_card{};
   std::vector<ThrowComparison> throws;
   int failed{};  ///< throws that the model does not bring to a landing; they are in no statistic

@@ -55,10 +55,13 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
   auto prepared = experiment::prepare_all(log, file, options.threads);
   std::vector<double> grips;
   for (const auto& p : prepared)
-    if (p.normal_force && p.force_fit.grip_force > 0) grips.push_back(p.force_fit.grip_force);
-  model_ = {options.model, log.gripper ? log.gripper->n_pads : 2, grips.empty() ? 20.0 : median(grips),
-            options.integrator};
-  if (!grips.empty() && options.model != "gripper_delay") {
+    if (p.split == datasets::Split::train && p.normal_force && p.force_fit.grip_force > 0)
+      grips.push_back(p.force_fit.grip_force);
+  model_ = {options.model, options.pads.value_or(log.gripper ? log.gripper->n_pads : 2),
+            options.reference_force.value_or(grips.empty() ? 20.0 : median(grips)), options.integrator};
+  if (options.predict_only) {
+    // nothing to start from
+  } else if (!grips.empty() && options.model != "gripper_delay") {
     try {
       first_guess_ = experiment::estimate_friction(log, prepared, options.model).parameters;
     } catch (const std::invalid_argument&) {  // too few samples: the default start has to do
@@ -78,7 +81,7 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
     notes_.insert(notes_.end(), t.observed.notes.begin(), t.observed.notes.end());
     throws_.push_back(std::move(t));
   }
-  if (observations == 0)
+  if (observations == 0 && !options.predict_only)
     throw std::invalid_argument(
         fmt::format("{}: nothing to fit to: no throw has F/T data, motion capture or a landing among the "
                     "channels asked for",

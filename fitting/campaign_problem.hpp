@@ -29,6 +29,11 @@ struct CampaignOptions {
   experiment::ObservationOptions observations;
   dynamics::IntegratorOptions integrator{.tolerances = {1e-6, 1e-9}};
   int threads{0};
+  /// For predictions with parameters from elsewhere: the log need hold no observations, starts are not looked
+  /// for, and the campaign's own numbers (ThrowModel) are these if given.
+  bool predict_only{false};
+  std::optional<int> pads{};
+  std::optional<double> reference_force{};  ///< [N]
 };
 
 /// One throw: its observations, and how its parameters are named and found among the unknowns.

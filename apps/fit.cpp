@@ -1,0 +1,200 @@
+// unhand fit: the parameters of a model from a log, and the card that carries them.
+#include "apps/fit.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <memory>
+#include <thread>
+
+#include "apps/cards.hpp"
+#include "apps/command.hpp"
+#include "apps/compare_figures.hpp"
+#include "apps/figure.hpp"
+#include "apps/progress.hpp"
+#include "fitting/slip_surface.hpp"
+
+namespace unhand::apps {
+namespace {
+
+constexpr int kDefaultFolds = 5;
+
+std::vector<std::string> surface_names() {
+  std::vector<std::string> out;
+  for (const auto model : fitting::surface_models) out.push_back(to_string(model));
+  return out;
+}
+
+bool among(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+void require_names(const FitRequest& request) {
+  const auto models = contact::contact_model_names();
+  if (!among(models, request.model) && !among(surface_names(), request.model))
+    throw WrongUsage(fmt::format("model '{}' cannot be fitted; for throws there are {}; for slip logs {}",
+                                 request.model, fmt::join(models, ", "), fmt::join(surface_names(), ", ")));
+  for (const auto& id : request.effects) {
+    try {
+      fitting::find_effect(id);
+    } catch (const std::invalid_argument& error) {
+      throw WrongUsage(fmt::format("--effects: {}", error.what()));
+    }
+    if (std::count(request.effects.begin(), request.effects.end(), id) > 1)
+      throw WrongUsage(fmt::format("--effects: {} is named twice", id));
+  }
+  if (request.kfold == 1) throw WrongUsage("--kfold 1: at least 2 folds, or 0 for none");
+}
+
+datasets::ModelCard made_card(const FitAnswer& answer, const FitRequest& request,
+                              const datasets::ThrowLog& log) {
+  datasets::ModelCard card = card_of(answer.problem, answer.fit, answer.errors, request.log, log);
+  if (answer.cross_validation) {
+    auto& errors = card.errors["cross_validation"];
+    for (int q = 0; q < experiment::kQuantityCount; ++q)
+      if (const auto s = answer.cross_validation->statistics(q); s.n > 0)
+        errors[experiment::kQuantities[q].key] = {s.n, s.mae, s.std, s.bias};
+  }
+  return card;
+}
+
+void write_report(const FitAnswer& answer, const FitRequest& request, const Json& json,
+                  const std::filesystem::path& directory) {
+  std::string pictures;
+  experiment::Comparison comparison;
+  comparison.models.push_back(answer.errors);
+  if (const auto figure = landing_figure(comparison)) {
+    draw(*figure, directory);
+    pictures = fmt::format("\n![Landing errors]({}.png)\n", figure->name);
+  }
+  write_text(directory / "report.md", fit_text(answer, request, true) + pictures);
+  write_text(directory / "throws.csv", fit_throw_table(answer).csv());
+  write_text(directory / "fit.json", json_text(json));
+}
+
+int conditions_of_train(const datasets::ThrowLog& log) {
+  std::vector<std::string> seen;
+  for (const auto& one : log.throws)
+    if (one.split == datasets::Split::train && !among(seen, one.condition)) seen.push_back(one.condition);
+  return static_cast<int>(seen.size());
+}
+
+void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
+  fitting::CampaignOptions campaign;
+  campaign.model = request.model;
+  campaign.effects = request.effects;
+  campaign.integrator.tolerances = {request.rtol, 1e-3 * request.rtol};
+  campaign.threads = request.threads;
+  fitting::FitOptions options;
+  options.threads = request.threads;
+  const bool has_test = std::any_of(log.throws.begin(), log.throws.end(),
+                                    [](const auto& one) { return one.split == datasets::Split::test; });
+  int folds = request.kfold > 0 ? request.kfold : has_test ? 0 : kDefaultFolds;
+  if (folds > 0 && conditions_of_train(log) < 2) {
+    if (request.kfold > 0)
+      throw Unanswered(fmt::format("{}: --kfold needs two conditions among the train throws", request.log));
+    fmt::print(stderr, "unhand: no test throws and one condition only: no held-out errors\n");
+    folds = 0;
+  }
+  Progress progress("fit", folds > 0 ? 5 : 3);
+  const fitting::CampaignProblem problem(log, request.log, campaign);
+  progress.step();
+  const auto fit = fitting::fit(problem, options);
+  if (fit.outcome == fitting::FitOutcome::no_start || fit.outcome == fitting::FitOutcome::not_solved)
+    throw Unanswered(fmt::format("{}: {}: {}", request.log, to_string(fit.outcome), fit.message));
+  progress.step();
+  FitAnswer answer{problem, fit, {}, {}, {}, 1};
+  answer.threads = request.threads > 0 ? request.threads
+                                       : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  answer.throws = fitting::predict_throws(problem, fit, {true, request.threads});
+  answer.errors = fitting::comparison_of(problem, fit, answer.throws);
+  progress.step();
+  if (folds > 0)
+    answer.cross_validation = fitting::cross_validate(log, request.log, campaign, options, folds);
+  if (fit.outcome == fitting::FitOutcome::iterations_spent)
+    fmt::print(stderr, "unhand: the fit stopped before it had converged: {}\n", fit.message);
+  for (const auto& note : problem.notes()) fmt::print(stderr, "unhand: {}\n", note);
+
+  const Json json = fit_json(answer, request);
+  Outputs outputs;
+  if (!request.json.empty()) outputs.json(request.json, json);
+  if (!request.report.empty()) write_report(answer, request, json, outputs.directory(request.report));
+  if (!request.card.empty()) outputs.text(request.card, datasets::to_json(made_card(answer, request, log)));
+  outputs.commit();
+  fmt::print("{}", fit_text(answer, request, false));
+}
+
+void fit(const FitRequest& request) {
+  require_names(request);
+  require_writable(request.json);
+  require_writable(request.card);
+  require_writable_directory(request.report);
+  if (!request.report.empty()) require_gnuplot();
+  const bool surface = among(surface_names(), request.model);
+  if (datasets::read_schema_name(request.log) == "slip-log") {
+    if (!surface)
+      throw datasets::LogError(request.log, "/surfaces",
+                               fmt::format("slips, which {} does not predict; there are {}", request.model,
+                                           fmt::join(surface_names(), ", ")));
+    if (!request.effects.empty()) throw WrongUsage("--effects are for throws");
+    fit_slips(request);
+    return;
+  }
+  if (surface)
+    throw datasets::LogError(
+        request.log, "/throws",
+        fmt::format("throws, which {} does not predict: it is for slip-logs", request.model));
+  const auto log = datasets::read_throw_log(request.log);
+  if (log.throws.empty()) throw Unanswered(fmt::format("{}: holds no throws", request.log));
+  if (std::none_of(log.throws.begin(), log.throws.end(),
+                   [](const auto& one) { return one.split == datasets::Split::train; }))
+    throw Unanswered(fmt::format("{}: holds no train throws to fit to", request.log));
+  fit_throws(request, log);
+}
+
+}  // namespace
+
+bool FitAnswer::has_test() const {
+  return std::any_of(errors.throws.begin(), errors.throws.end(),
+                     [](const auto& one) { return one.split == datasets::Split::test; });
+}
+
+Command fit_command(CLI::App& root) {
+  auto request = std::make_shared<FitRequest>();
+  CLI::App* parser = root.add_subcommand("fit", "Fit a model's parameters to a log and write its card");
+  parser->add_option("LOG", request->log, "A throw log or a slip log")->required();
+  parser
+      ->add_option(
+          "--model", request->model,
+          fmt::format("Which model: {}; for slip logs: {}", fmt::join(contact::contact_model_names(), ", "),
+                      fmt::join(surface_names(), ", ")))
+      ->required();
+  parser
+      ->add_option("--effects", request->effects,
+                   "Ids of effects whose parameters are fitted, too, separated by commas")
+      ->delimiter(',');
+  parser->add_option("--card", request->card, "Write the model card");
+  parser->add_option("--json", request->json, "Write the fit as JSON");
+  parser->add_option("--report", request->report,
+                     "A directory for the tables (Markdown), a figure, all throws (CSV) and the JSON");
+  parser
+      ->add_option(
+          "--kfold", request->kfold,
+          "Cross-validate over so many groups of conditions of the train throws; 0: with 5, and only "
+          "if the log has no test throws")
+      ->check(CLI::Range(0, 1000))
+      ->capture_default_str();
+  parser->add_option("--rtol", request->rtol, "Relative tolerance of the integrator")
+      ->check(CLI::Range(1e-12, 1e-3))
+      ->capture_default_str();
+  add_threads(*parser, request->threads);
+  parser->footer(
+      "Train throws only are fitted; the others are predicted. Existing files are replaced, each at once.\n"
+      "Examples:\n  unhand fit campaign.h5 --model limit_surface --card card.json --report out\n"
+      "  unhand fit campaign.h5 --model limit_surface_disc --effects flight.drag --card card.json\n"
+      "  unhand fit pushes.h5 --model convex_quartic --card felt.json");
+  return {parser, [request] { fit(*request); }};
+}
+
+}  // namespace unhand::apps

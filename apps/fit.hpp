@@ -1,0 +1,45 @@
+// What the parts of `unhand fit` hand to each other.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/output.hpp"
+#include "apps/table.hpp"
+#include "fitting/card.hpp"
+#include "fitting/evaluate.hpp"
+
+namespace unhand::apps {
+
+struct FitRequest {
+  std::string log, model;
+  std::vector<std::string> effects;
+  std::string json, card, report;  ///< destinations; empty: none
+  int threads{0}, kfold{0};        ///< kfold 0: only where the log has no test split
+  double rtol{1e-6};
+};
+
+/// A fit and everything that is said of it.
+struct FitAnswer {
+  const fitting::CampaignProblem& problem;
+  const fitting::FitResult& fit;
+  std::vector<fitting::PredictedThrow> throws;
+  experiment::ModelComparison errors;
+  std::optional<fitting::CrossValidation> cross_validation;
+  int threads{1};  ///< used
+
+  bool has_test() const;
+};
+
+/// The answer in words and tables; `markdown` for the report, otherwise aligned with spaces.
+std::string fit_text(const FitAnswer& answer, const FitRequest& request, bool markdown);
+Json fit_json(const FitAnswer& answer, const FitRequest& request);
+
+/// Every throw of the log: its part in the fit, its own unknowns, prediction with 1 σ, errors.
+Table fit_throw_table(const FitAnswer& answer);
+
+/// Slip logs: one surface of the model each.
+void fit_slips(const FitRequest& request);
+
+}  // namespace unhand::apps

@@ -1,0 +1,234 @@
+#include "fitting/card.hpp"
+
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+
+namespace unhand::fitting {
+
+using datasets::CardError;
+using datasets::CardRange;
+using datasets::ModelCard;
+
+namespace {
+
+constexpr const char* kDelayModel = "gripper_delay";
+
+/// What a model without effects may have on its card.
+struct BaseParameter {
+  const char *name, *unit;
+  double low, high;
+  bool of_pads;  ///< of models that follow the pads; otherwise of gripper_delay
+};
+constexpr BaseParameter kBase[] = {{"mu", "-", 0, 10, true},
+                                   {"length", "m", 1e-9, 2.0 / 3.0, true},
+                                   {"pads", "-", 1, 1000, true},
+                                   {"reference_force", "N", 1e-9, 1e6, true},
+                                   {"grip_force", "N", 1e-9, 1e6, true},
+                                   {"dead_time", "s", 0, 10, true},
+                                   {"opening_time", "s", 1e-9, 10, true},
+                                   {"shape", "-", 1e-3, 100, true},
+                                   {"delay", "s", 0, 10, false}};
+
+std::string without_object(const std::string& name) { return name.substr(0, name.find('[')); }
+
+void check(const std::string& file, const std::string& name, const datasets::CardParameter& p,
+           const std::string& unit, double low, double high) {
+  const std::string path = "/parameters/" + name;
+  if (p.unit != unit) throw CardError(file, path + "/unit", fmt::format("is '{}', not '{}'", p.unit, unit));
+  if (!(p.value >= low && p.value <= high))
+    throw CardError(file, path + "/value", fmt::format("{} is not in [{}, {}] {}", p.value, low, high, unit));
+}
+
+void widen(std::map<std::string, CardRange>& range, const experiment::PreparedThrow& prepared) {
+  if (prepared.split != datasets::Split::train) return;
+  for (const auto& [name, unit, value] : conditions_of(prepared)) {
+    auto& r = range.try_emplace(name, CardRange{value, value, unit}).first->second;
+    r.low = std::min(r.low, value);
+    r.high = std::max(r.high, value);
+  }
+}
+
+}  // namespace
+
+std::vector<Condition> conditions_of(const experiment::PreparedThrow& one) {
+  std::vector<Condition> out{{"mass", "kg", one.body.mass}, {"com_offset", "m", one.grasp.com_offset}};
+  if (one.open_command >= one.hand.begin() && one.open_command <= one.hand.end()) {
+    const auto hand = one.hand.at(dynamics::Window{one.hand.begin(), one.hand.end()}, one.open_command).twist;
+    out.push_back({"release_speed", "m/s", std::hypot(hand.vx, hand.vz)});
+    out.push_back({"release_omega", "rad/s", hand.omega});
+  }
+  if (one.normal_force) {
+    out.push_back({"grip_force", "N", one.force_fit.grip_force});
+    const double opening = one.force_fit.release_time - one.force_fit.opening_start;
+    if (std::isfinite(opening)) out.push_back({"opening_time", "s", opening});
+  }
+  if (const auto& twist = one.measured.detach_twist) {
+    out.push_back({"detach_speed", "m/s", std::hypot(twist->vx, twist->vz)});
+    out.push_back({"detach_omega", "rad/s", twist->omega});
+  }
+  return out;
+}
+
+std::map<std::string, CardRange> valid_range_of(const std::vector<experiment::PreparedThrow>& throws) {
+  std::map<std::string, CardRange> out;
+  for (const auto& one : throws) widen(out, one);
+  return out;
+}
+
+std::map<std::string, CardRange> valid_range_of(const CampaignProblem& problem) {
+  std::map<std::string, CardRange> out;
+  for (const auto& one : problem.throws()) widen(out, one.prepared);
+  return out;
+}
+
+std::vector<std::string> outside_range(const ModelCard& card, const experiment::PreparedThrow& prepared) {
+  std::vector<std::string> out;
+  for (const auto& [name, unit, value] : conditions_of(prepared)) {
+    const auto range = card.valid_range.find(name);
+    if (range == card.valid_range.end() || range->second.unit != unit || range->second.contains(value))
+      continue;
+    out.push_back(fmt::format("{} {:.4g} {} is outside [{:.4g}, {:.4g}]", name, value, unit,
+                              range->second.low, range->second.high));
+  }
+  return out;
+}
+
+std::optional<std::string> checksum_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  std::array<char, 65536> block{};
+  while (in.read(block.data(), block.size()), in.gcount() > 0)
+    for (std::streamsize i = 0; i < in.gcount(); ++i)
+      hash = (hash ^ static_cast<unsigned char>(block[static_cast<std::size_t>(i)])) * 0x100000001b3u;
+  if (!in.eof()) return {};
+  return fmt::format("fnv1a64:{:016x}", hash);
+}
+
+std::map<std::string, datasets::CardStatistics> errors_of(const experiment::ModelComparison& model,
+                                                          datasets::Split split) {
+  std::map<std::string, datasets::CardStatistics> out;
+  for (int q = 0; q < experiment::kQuantityCount; ++q)
+    if (const auto s = model.statistics(q, split); s.n > 0)
+      out[experiment::kQuantities[q].key] = {s.n, s.mae, s.std, s.bias};
+  return out;
+}
+
+ModelCard card_of(const CampaignProblem& problem, const FitResult& fit) {
+  ModelCard card;
+  card.model = problem.options().model;
+  card.effects = problem.options().effects;
+  auto& covariance = card.covariance.emplace();
+  for (const auto& u : fit.campaign) {
+    const bool determined = std::isfinite(u.data_sigma);
+    card.parameters[u.unknown.name] = {u.value, u.sigma, u.unknown.unit, determined};
+    covariance.names.push_back(u.unknown.name);
+  }
+  covariance.matrix = fit.covariance;
+  if (card.model != kDelayModel) {
+    card.parameters["pads"] = {static_cast<double>(problem.model().pads), {}, "-"};
+    card.parameters["reference_force"] = {problem.model().reference_force, {}, "N"};
+  }
+  for (std::size_t k = 0; k < fit.own_spread.size(); ++k)
+    card.own_spreads[problem.own()[k].name] = {fit.own_spread[k], problem.own()[k].unit};
+  card.split = "train";
+  card.valid_range = valid_range_of(problem);
+  return card;
+}
+
+bool is_fitted(const ModelCard& card) {
+  return !card.effects.empty() || !card.own_spreads.empty() || card.covariance.has_value();
+}
+
+CampaignOptions options_of(const ModelCard& card, const std::string& file) {
+  const auto models = contact::contact_model_names();
+  if (std::find(models.begin(), models.end(), card.model) == models.end())
+    throw CardError(
+        file, "/model",
+        fmt::format("'{}' is no model of releases; there are {}", card.model, fmt::join(models, ", ")));
+  std::vector<dynamics::Effect> effects;
+  for (std::size_t i = 0; i < card.effects.size(); ++i) {
+    try {
+      effects.push_back(find_effect(card.effects[i]));
+    } catch (const std::invalid_argument& error) {
+      throw CardError(file, fmt::format("/effects/{}", i), error.what());
+    }
+  }
+  const bool follows_pads = card.model != kDelayModel;
+  CampaignOptions out;
+  out.model = card.model;
+  out.effects = card.effects;
+  out.predict_only = true;
+  for (const auto& [name, parameter] : card.parameters) {
+    const auto base = std::find_if(
+        std::begin(kBase), std::end(kBase),
+        [&, &key = name](const BaseParameter& b) { return b.of_pads == follows_pads && key == b.name; });
+    bool known = base != std::end(kBase);
+    if (known) check(file, name, parameter, base->unit, base->low, base->high);
+    for (const auto& effect : effects)
+      for (const auto& p : effect.parameters)
+        if (without_object(name) == effect.full_name(p)) {
+          check(file, name, parameter, p.unit, p.low, p.high);
+          known = true;
+        }
+    if (!known)
+      throw CardError(file, "/parameters/" + name,
+                      fmt::format("is no parameter of {} or of the card's effects", card.model));
+  }
+  if (const auto pads = card.parameters.find("pads"); pads != card.parameters.end()) {
+    if (pads->second.value != std::floor(pads->second.value))
+      throw CardError(file, "/parameters/pads/value",
+                      fmt::format("{} is not a whole number", pads->second.value));
+    out.pads = static_cast<int>(pads->second.value);
+  }
+  if (const auto force = card.parameters.find("reference_force"); force != card.parameters.end())
+    out.reference_force = force->second.value;
+  return out;
+}
+
+FitResult fit_of(const ModelCard& card, const CampaignProblem& problem, const std::string& file) {
+  FitResult out;
+  std::vector<std::size_t> place;  // of the problem's unknowns in the card's covariance
+  const std::size_t none = card.covariance ? card.covariance->names.size() : 0;
+  for (const auto& u : problem.campaign()) {
+    const auto found = card.parameters.find(u.name);
+    if (found == card.parameters.end())
+      throw CardError(file, "/parameters/" + u.name,
+                      fmt::format("is missing: these throws with {} take it", card.model));
+    const auto& p = found->second;
+    out.campaign.push_back(
+        {u, p.value, p.sigma.value_or(0), p.determined ? p.sigma.value_or(0) : HUGE_VAL, false});
+    std::size_t k = none;
+    if (card.covariance)
+      k = static_cast<std::size_t>(
+          std::find(card.covariance->names.begin(), card.covariance->names.end(), u.name) -
+          card.covariance->names.begin());
+    place.push_back(k);
+  }
+  const std::size_t width = out.campaign.size();
+  for (std::size_t i = 0; i < width; ++i)
+    for (std::size_t j = 0; j < width; ++j) {
+      if (place[i] < none && place[j] < none)
+        out.covariance.push_back(card.covariance->matrix[place[i] * none + place[j]]);
+      else
+        out.covariance.push_back(i == j ? out.campaign[i].sigma * out.campaign[i].sigma : 0.0);
+    }
+  for (const auto& u : problem.own()) {
+    const auto spread = card.own_spreads.find(u.name);
+    const double sigma =
+        spread == card.own_spreads.end() ? u.prior_sigma.value_or(u.scale) : spread->second.sigma;
+    if (spread != card.own_spreads.end() && spread->second.unit != u.unit)
+      throw CardError(file, "/own_spreads/" + u.name + "/unit",
+                      fmt::format("is '{}', not '{}'", spread->second.unit, u.unit));
+    out.own_spread.push_back(std::max(sigma, 1e-9 * u.scale));
+  }
+  out.outcome = FitOutcome::converged;
+  out.message = "from a card";
+  return out;
+}
+
+}  // namespace unhand::fitting

@@ -1,0 +1,63 @@
+// Between fits and model cards.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "datasets/model_card.hpp"
+#include "fitting/evaluate.hpp"
+
+namespace unhand::fitting {
+
+/// A condition of a throw that a card's valid range speaks of.
+struct Condition {
+  std::string name, unit;
+  double value{};
+};
+
+/// As far as they are known of a throw:
+///   mass [kg], com_offset [m]     the object and the lever from the pads to its CoM
+///   release_speed [m/s], release_omega [rad/s]   of the hand when the gripper is told to open
+///   grip_force [N], opening_time [s]             of the measured normal force: before it falls, and its fall
+///   detach_speed [m/s], detach_omega [rad/s]     of the object, measured in flight
+std::vector<Condition> conditions_of(const experiment::PreparedThrow& prepared);
+
+/// Smallest and largest condition of the train throws among `throws`.
+std::map<std::string, datasets::CardRange> valid_range_of(
+    const std::vector<experiment::PreparedThrow>& throws);
+std::map<std::string, datasets::CardRange> valid_range_of(const CampaignProblem& problem);
+
+/// Where a throw lies outside a card's valid range, in words; empty: inside. Conditions that the throw does
+/// not tell are passed over.
+std::vector<std::string> outside_range(const datasets::ModelCard& card,
+                                       const experiment::PreparedThrow& prepared);
+
+/// "fnv1a64:" and 16 hexadecimal digits: the 64-bit FNV-1a hash of the file's bytes (offset basis
+/// cbf29ce484222325, prime 100000001b3). It tells logs apart and is no protection. Nothing if the file cannot
+/// be read.
+std::optional<std::string> checksum_of(const std::filesystem::path& file);
+
+/// Errors by quantity, of the throws of one split; quantities that were not measured are left out.
+std::map<std::string, datasets::CardStatistics> errors_of(const experiment::ModelComparison& model,
+                                                          datasets::Split split);
+
+/// The card of a fit. Beside the unknowns it holds what the model takes from the campaign: `pads`, and
+/// `reference_force`, f₀ of contact.soft_patch_radius. Errors, log and version are the caller's to add.
+datasets::ModelCard card_of(const CampaignProblem& problem, const FitResult& fit);
+
+/// Whether the card comes from a fit (it holds effects, spreads or a covariance), rather than from a plain
+/// estimate.
+bool is_fitted(const datasets::ModelCard& card);
+
+/// The problem's options that a fitted card asks for, to predict with it. Throws datasets::CardError, naming
+/// `file`, for a model, an effect or a parameter that this library lacks, a wrong unit or a value out of
+/// range.
+CampaignOptions options_of(const datasets::ModelCard& card, const std::string& file);
+
+/// The fit that a card holds, as predict_throws takes it, for a problem made with options_of. Throws
+/// datasets::CardError if an unknown of the problem (of an object that the card has not seen, say) is not on
+/// the card.
+FitResult fit_of(const datasets::ModelCard& card, const CampaignProblem& problem, const std::string& file);
+
+}  // namespace unhand::fitting
