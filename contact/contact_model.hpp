@@ -23,6 +23,13 @@ using dynamics::Vec2;
 using dynamics::Window;
 using dynamics::Wrench;
 
+/// The object against the hand where the pads carry no tangential load: at the start of a release.
+template <class S>
+struct Hold {
+  Vec2<S> arm;  ///< R(θ_O)ᵀ (p_WO − p_WH) [m]
+  S angle{};    ///< θ_O − θ_H [rad]
+};
+
 /// What a contact law sees of the world at an instant.
 template <class S>
 struct Scene {
@@ -32,9 +39,10 @@ struct Scene {
   Twist<S> hand_twist;                ///< m/s, m/s, rad/s
   Acceleration<S> hand_acceleration;  ///< m/s², m/s², rad/s²
   S normal_force{};                   ///< of one pad [N], >= 0
+  const Hold<S>* hold{};              ///< for pads that give; whoever makes the scene keeps it
 };
 
-/// The values, without derivatives: what decides between modes.
+/// The values, without derivatives and hold: what decides between modes.
 inline Scene<double> values(const Scene<double>& s) { return s; }
 inline Scene<double> values(const Scene<Dual>& s) {
   return {{s.body.mass.a, s.body.inertia.a},

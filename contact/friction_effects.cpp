@@ -124,7 +124,8 @@ AdhesiveForce::AdhesiveForce(const NormalForce& base, const Dual& adhesion, cons
 
 template <class S>
 S AdhesiveForce::at_(const Window& window, const S& t) const {
-  const double inside = std::clamp(value_of(t), window.begin + 1e-9, window.end - 1e-9);
+  const double snap = std::min(1e-9, 0.25 * (window.end - window.begin));
+  const double inside = std::clamp(value_of(t), window.begin + snap, window.end - snap);
   if (inside < parting_.a) return base_.at(window, t) + convert<S>(adhesion_);
   const S rest = 1.0 - (t - convert<S>(parting_)) / convert<S>(parting_time_);
   return value_of(rest) > 0 ? S(convert<S>(adhesion_) * rest) : S(0);

@@ -15,7 +15,7 @@ namespace unhand::contact {
 ///   f_max(f_N) = n μ f_N (1 + (μ_s/μ_k − 1) exp(−|u|²/v_s²)) (1 + |u|/v₀),   τ_max = L f_max  [N], [N m]
 ///
 /// with the symbols of FrictionVariation. A held patch has |u| = 0. Neutral values leave the limits of Patch,
-/// to the bit. The soft finger's f_N/f₀ is taken as sqrt((f_N/f₀)² + 10⁻⁸), so that L stays positive and
+/// to the bit. The soft finger's f_N/f₀ is taken as sqrt((f_N/f₀)² + 10⁻¹⁰), so that L stays positive and
 /// finite as f_N → 0; f_max (1 + |u|/v₀) is taken as 0 where it would be negative. With adhesion f_N is f_N +
 /// f_adh. [XydasKao1999] for γ, [ArmstrongHelouvryDupont1994] for the speeds.
 template <class S>
@@ -37,7 +37,7 @@ class FrictionLimits {
     using std::exp;
     using std::log;
     const S ratio = normal_force / variation_.reference_force;
-    return patch_.length() * exp(0.5 * variation_.softness * log(ratio * ratio + 1e-8));
+    return patch_.length() * exp(0.5 * variation_.softness * log(ratio * ratio + 1e-10));
   }
   /// f_max of a held patch [N]
   S held(const S& normal_force) const {

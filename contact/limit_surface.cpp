@@ -63,6 +63,8 @@ LimitSurface<Shape>::LimitSurface(std::string_view name, const Patch<Dual>& patc
       limits_dual_(patch, variation) {
   validate(limits_double_.patch());
   validate(variation);
+  pads_double_ = pad_compliance(limits_double_);
+  pads_dual_ = pad_compliance(limits_dual_);
 }
 
 template <class Shape>
@@ -75,13 +77,27 @@ const FrictionLimits<S>& LimitSurface<Shape>::limits() const {
 }
 
 template <class Shape>
+template <class S>
+const PadCompliance<S>& LimitSurface<Shape>::pads() const {
+  if constexpr (std::is_same_v<S, double>)
+    return *pads_double_;
+  else
+    return *pads_dual_;
+}
+
+template <class Shape>
 dynamics::Guard LimitSurface<Shape>::guard(int mode, int) const {
   using dynamics::Crossing;
-  return mode == kStick ? dynamics::Guard{"limit surface", Crossing::rising, false}
-                        : dynamics::Guard{"slip stops", Crossing::falling, true};
+  return mode != kSlip ? dynamics::Guard{"limit surface", Crossing::rising, false}
+                       : dynamics::Guard{"slip stops", Crossing::falling, true};
 }
 
 namespace {
+
+template <class S>
+bool slips(const Relative<S>& y) {
+  return value_of(y.slip.x) != 0 || value_of(y.slip.z) != 0 || value_of(y.spin) != 0;
+}
 
 /// u = (v_r, L ω_r)
 template <class S>
@@ -125,14 +141,20 @@ S gauge(const Shape& shape, const Scene<S>& scene, const Vec3<S>& w) {
 /// The Jacobian of resist at u.
 template <class Shape>
 Eigen::Matrix3d resist_jacobian(const Shape& shape, const Scene<double>& scene, const Vec3<double>& u) {
-  Scene<Dual> lifted;
-  lifted.hand.theta = Dual(scene.hand.theta);
-  Vec3<Dual> x;
-  for (int i = 0; i < 3; ++i) x[i] = dynamics::independent(u[i], i);
-  const Vec3<Dual> w = resist(shape, lifted, x);
   Eigen::Matrix3d J;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) J(i, j) = w[i].v[j];
+  if constexpr (requires { shape.resist_jacobian(u); }) {  // shapes that carry derivatives of their own
+    const Mat3 given = shape.resist_jacobian(u);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) J(i, j) = given[i][j];
+  } else {
+    Scene<Dual> lifted;
+    lifted.hand.theta = Dual(scene.hand.theta);
+    Vec3<Dual> x;
+    for (int i = 0; i < 3; ++i) x[i] = dynamics::independent(u[i], i);
+    const Vec3<Dual> w = resist(shape, lifted, x);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) J(i, j) = w[i].v[j];
+  }
   return J;
 }
 
@@ -226,7 +248,7 @@ Vec3<S> LimitSurface<Shape>::slip_acceleration(const Scene<S>& scene, const Rela
 template <class Shape>
 template <class S>
 Wrench<S> LimitSurface<Shape>::wrench_(int mode, const Scene<S>& scene, const Relative<S>& y) const {
-  if (mode == kStick) return sticking_wrench(scene, y);
+  if (mode != kSlip) return is_elastic(mode) ? pads<S>().wrench(scene, y) : sticking_wrench(scene, y);
   const S length = limits<S>().length(scene.normal_force);
   if (y.slip.x == S(0) && y.slip.z == S(0) && y.spin == S(0)) {
     // At the very onset of slip there is no direction yet: the demand, brought back to the surface.
@@ -249,12 +271,11 @@ void LimitSurface<Shape>::rate_(int mode, const Scene<S>& scene, const Relative<
   dy = relative_rate(scene, y, wrench_(mode, scene, y));
 }
 
-/// (demand against the surface) for a stick at `scene`.
+/// A demanded wrench against the surface at `scene`.
 template <class Shape>
 template <class S>
-S LimitSurface<Shape>::stick_margin(const Scene<S>& scene, const Relative<S>& y) const {
+S LimitSurface<Shape>::margin_of(const Wrench<S>& demand, const Scene<S>& scene) const {
   const S length = limits<S>().length(scene.normal_force), f_max = limits<S>().held(scene.normal_force);
-  const Wrench<S> demand = sticking_wrench(scene, y);
   const S size = gauge(shape_, scene, Vec3<S>{demand.fx, demand.fz, demand.tau / length});
   return margin(S(size * size), S(f_max * f_max));
 }
@@ -263,8 +284,9 @@ template <class Shape>
 template <class S>
 void LimitSurface<Shape>::guards_(const Phase& phase, const SceneSource& source, const S& t,
                                   const Relative<S>& y, S* g) const {
-  if (phase.mode == kStick) {
-    g[0] = stick_margin(source.scene(phase.window, t), y);
+  if (phase.mode != kSlip) {
+    const Scene<S> scene = source.scene(phase.window, t);
+    g[0] = margin_of(wrench_(phase.mode, scene, y), scene);
   } else {
     // Where L changes with f_N, L' ω_r is left out of u': of the order of kStopTime beside L ω_r' at a stop.
     State<S, 6> rate;
@@ -298,25 +320,24 @@ Entry<S, 6> LimitSurface<Shape>::onset(const Window& window, const SceneSource& 
   const S a0 = at_the_surface ? S(0) : size(acceleration(0));
   double delta = std::min(kOnset, 0.25 * (window.end - value_of(t)));
   if (value_of(a0) * delta > kOnsetSpeed) delta = kOnsetSpeed / value_of(a0);
-  if (!(delta > 0)) return {kStick, t, y.state(), S(0)};
+  if (!(delta > 0)) return {stick(), t, y.state(), S(0)};
   const S a1 = size(acceleration(0.5 * delta));
   const Vec3<S> end = acceleration(delta);
   const S a2 = size(end), speed = delta / 6 * (a0 + 4.0 * a1 + a2);
-  if (!(value_of(a2) > 0)) return {kStick, t, y.state(), S(0)};  // a demand that only touches the surface
+  if (!(value_of(a2) > 0)) return {stick(), t, y.state(), S(0)};  // a demand that only touches the surface
   const S k = speed / a2;
   y.slip = {k * end[0], k * end[1]};
   y.spin = k * end[2] / limits<S>().length(source.scene(window, S(t + delta)).normal_force);
   return {kSlip, S(t + delta), y.state(), S(delta)};
 }
 
+/// Along a straight line to zero slip, then decide anew.
 template <class Shape>
 template <class S>
-Entry<S, 6> LimitSurface<Shape>::on_guard_(const Phase& from, int /*guard*/, const SceneSource& source,
-                                           const S& t, const Relative<S>& at) const {
-  if (from.mode == kStick) return onset(from.window, source, t, at, true);
-  // Along a straight line to zero slip, then decide anew.
+Entry<S, 6> LimitSurface<Shape>::come_to_rest(const Window& window, const SceneSource& source, const S& t,
+                                              const Relative<S>& at) const {
   State<S, 6> dy;
-  const Scene<S> scene = source.scene(from.window, t);
+  const Scene<S> scene = source.scene(window, t);
   rate_(kSlip, scene, at, dy);
   const S length = limits<S>().length(scene.normal_force);
   const Vec3<S> u = normalised_slip(at, length), du{dy[3], dy[4], length * dy[5]};
@@ -326,24 +347,53 @@ Entry<S, 6> LimitSurface<Shape>::on_guard_(const Phase& from, int /*guard*/, con
   y.angle += 0.5 * left * y.spin;
   y.slip = {S(0), S(0)};
   y.spin = S(0);
-  return membership_(kStick, from.window, source, S(t + left), y);
+  return membership_(stick(), window, source, S(t + left), y);
+}
+
+/// From the springs at the surface: slip at the velocity of the moment, unless friction stops it at once.
+template <class Shape>
+template <class S>
+Entry<S, 6> LimitSurface<Shape>::let_go(const Window& window, const SceneSource& source, const S& t,
+                                        const Relative<S>& y) const {
+  if (!slips(y)) return membership_(stick(), window, source, t, y);
+  double stops;
+  guards_({kSlip, window}, source, value_of(t), values(y), &stops);
+  if (stops > 0) return {kSlip, t, y.state(), S(0)};
+  return come_to_rest(window, source, t, y);
+}
+
+template <class Shape>
+template <class S>
+Entry<S, 6> LimitSurface<Shape>::on_guard_(const Phase& from, int /*guard*/, const SceneSource& source,
+                                           const S& t, const Relative<S>& at) const {
+  if (is_elastic(from.mode)) return let_go(from.window, source, t, at);
+  return from.mode == kSlip ? come_to_rest(from.window, source, t, at)
+                            : onset(from.window, source, t, at, true);
 }
 
 template <class Shape>
 template <class S>
 Entry<S, 6> LimitSurface<Shape>::membership_(int mode, const Window& window, const SceneSource& source,
                                              const S& t, const Relative<S>& y) const {
-  const bool slips = value_of(y.slip.x) != 0 || value_of(y.slip.z) != 0 || value_of(y.spin) != 0;
-  if (mode == kSlip || slips) return {kSlip, t, y.state(), S(0)};
-  if (stick_margin(values(source.scene(window, t)), values(y)) < 0) return {kStick, t, y.state(), S(0)};
+  const bool start = mode < 0 && !slips(y);
+  if (is_elastic(mode) || (start && is_elastic(kHeld))) {
+    const Scene<S> scene = source.scene(window, t);
+    if (value_of(margin_of(wrench_(kHeld, scene, y), scene)) < 0) return {kHeld, t, y.state(), S(0)};
+    return let_go(window, source, t, y);
+  }
+  if (mode == kSlip || slips(y)) return {kSlip, t, y.state(), S(0)};
+  const Scene<double> scene = values(source.scene(window, t));
+  if (margin_of(sticking_wrench(scene, values(y)), scene) < 0) return {stick(), t, y.state(), S(0)};
   return onset(window, source, t, y, false);
 }
 
 template class ContactModelFrom<LimitSurface<Ellipsoid>>;
 template class ContactModelFrom<LimitSurface<UniformDisc>>;
+template class ContactModelFrom<LimitSurface<PressedDisc>>;
 template class ContactModelFrom<LimitSurface<ConvexQuartic>>;
 template class LimitSurface<Ellipsoid>;
 template class LimitSurface<UniformDisc>;
+template class LimitSurface<PressedDisc>;
 template class LimitSurface<ConvexQuartic>;
 
 }  // namespace unhand::contact

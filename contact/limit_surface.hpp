@@ -6,8 +6,9 @@
 
 #include "contact/contact_model.hpp"
 #include "contact/convex_quartic.hpp"
-#include "contact/friction_limits.hpp"
 #include "contact/limit_surface_shapes.hpp"
+#include "contact/pad_compliance.hpp"
+#include "contact/pressed_disc.hpp"
 
 namespace unhand::contact {
 
@@ -23,6 +24,13 @@ namespace unhand::contact {
 ///   slip   stiff (the wrench turns with the direction of a tiny slip), left when the slip comes to rest.
 /// At onset the slip leaves along a = W (f* − f_p), f* the projection of f_p onto the limit set in the metric
 /// of W: the minimum of the strictly convex ½ (a − b)ᵀ W⁻¹ (a − b) + σ(a), σ the surface's support function.
+///
+/// Pads that give (contact.pad_compliance, see PadCompliance) hold the object elastically until it first
+/// slips:
+///   elastic  the springs' wrench, left when it reaches the surface, with the velocities of the moment
+/// and rigidly after, at any later rest: what they would store then is not followed, a small energy since the
+/// pads are opening. The elastic work is booked with the friction's. Without compliance there is no such
+/// mode.
 ///
 /// All of this is done in the normalised coordinates of limit_surface_shapes.hpp, so a Shape is all that
 /// differs.
@@ -40,10 +48,13 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
       : LimitSurface(name, patch, Shape{}) {}
 
   std::string_view name() const override { return name_; }
-  int mode_count() const override { return 2; }
-  std::string_view mode_name(int mode) const override { return mode == kStick ? "stick" : "slip"; }
+  int mode_count() const override { return pads_dual_ ? 3 : 2; }
+  std::string_view mode_name(int mode) const override {
+    return mode == kSlip ? "slip" : is_elastic(mode) ? "elastic" : "stick";
+  }
   dynamics::FlowKind kind(int mode) const override {
-    return mode == kStick ? dynamics::FlowKind::frozen : dynamics::FlowKind::stiff;
+    using dynamics::FlowKind;
+    return mode == kSlip ? FlowKind::stiff : is_elastic(mode) ? FlowKind::mixed : FlowKind::frozen;
   }
   int guard_count(int) const override { return 1; }
   dynamics::Guard guard(int mode, int) const override;
@@ -62,14 +73,23 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
   Entry<S, 6> membership_(int mode, const Window&, const SceneSource&, const S& t, const Relative<S>&) const;
 
  private:
-  static constexpr int kStick = 0, kSlip = 1;
+  static constexpr int kHeld = 0, kSlip = 1, kStickAgain = 2;
+  bool is_elastic(int mode) const { return mode == kHeld && pads_dual_; }
+  /// The mode of an object that came to rest on the pads.
+  int stick() const { return pads_dual_ ? kStickAgain : kHeld; }
 
   template <class S>
   const FrictionLimits<S>& limits() const;
   template <class S>
-  S stick_margin(const Scene<S>&, const Relative<S>&) const;
+  const PadCompliance<S>& pads() const;
+  template <class S>
+  S margin_of(const Wrench<S>& demand, const Scene<S>&) const;
   template <class S>
   Vec3<S> slip_acceleration(const Scene<S>&, const Relative<S>&) const;
+  template <class S>
+  Entry<S, 6> come_to_rest(const Window&, const SceneSource&, const S& t, const Relative<S>&) const;
+  template <class S>
+  Entry<S, 6> let_go(const Window&, const SceneSource&, const S& t, const Relative<S>&) const;
   template <class S>
   Entry<S, 6> onset(const Window&, const SceneSource&, const S& t, const Relative<S>&,
                     bool at_the_surface) const;
@@ -78,13 +98,17 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
   Shape shape_;
   FrictionLimits<double> limits_double_;
   FrictionLimits<Dual> limits_dual_;
+  std::optional<PadCompliance<double>> pads_double_;
+  std::optional<PadCompliance<Dual>> pads_dual_;
 };
 
 extern template class ContactModelFrom<LimitSurface<Ellipsoid>>;
 extern template class ContactModelFrom<LimitSurface<UniformDisc>>;
+extern template class ContactModelFrom<LimitSurface<PressedDisc>>;
 extern template class ContactModelFrom<LimitSurface<ConvexQuartic>>;
 extern template class LimitSurface<Ellipsoid>;
 extern template class LimitSurface<UniformDisc>;
+extern template class LimitSurface<PressedDisc>;
 extern template class LimitSurface<ConvexQuartic>;
 
 }  // namespace unhand::contact

@@ -11,16 +11,6 @@ using dynamics::value_of;
 
 namespace {
 
-// ∇² at x of a function of (a, b) = (|x_xz|, |x_τ|), homogeneous of degree 1: in (a, b) it is λ (b, −a)(b,
-// −a)ᵀ, across the slide it is k, the slope in a over a. `cross` = (λ b² − k)/a², which stays finite at a =
-// 0.
-Mat3 isotropic_hessian(const Vec3<double>& x, double k, double cross, double lambda) {
-  const double xz = cross * x[0] * x[1], along = -lambda * x[2];
-  return {Vec3<double>{k + cross * x[0] * x[0], xz, along * x[0]},
-          Vec3<double>{xz, k + cross * x[1] * x[1], along * x[1]},
-          Vec3<double>{along * x[0], along * x[1], lambda * (x[0] * x[0] + x[1] * x[1])}};
-}
-
 // resist at u of ordinary size; the Jacobian too unless null.
 Vec3<double> disc_resist(const Vec3<double>& u, Mat3* jacobian) {
   const double slide = u[0] * u[0] + u[1] * u[1], spin = 2.25 * u[2] * u[2];  // v², (ωR)²

@@ -94,6 +94,16 @@ struct UniformDisc {
   Vec3<S> slip_direction(const Vec3<S>& w) const;
 };
 
+/// ∇² at x of a function of (a, b) = (|x_xz|, |x_τ|), homogeneous of degree 1: in (a, b) it is λ (b, −a)(b,
+/// −a)ᵀ, across the slide it is k, the slope in a over a. `cross` = (λ b² − k)/a², which stays finite at a =
+/// 0.
+inline Mat3 isotropic_hessian(const Vec3<double>& x, double k, double cross, double lambda) {
+  const double xz = cross * x[0] * x[1], along = -lambda * x[2];
+  return {Vec3<double>{k + cross * x[0] * x[0], xz, along * x[0]},
+          Vec3<double>{xz, k + cross * x[1] * x[1], along * x[1]},
+          Vec3<double>{along * x[0], along * x[1], lambda * (x[0] * x[0] + x[1] * x[1])}};
+}
+
 /// f(x) for a Dual x when f and its Jacobian are known at the value of x (the chain rule).
 inline Vec3<double> chain3(const Vec3<double>& /*x*/, const Vec3<double>& f, const Mat3& /*jacobian*/) {
   return f;

@@ -40,7 +40,11 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
                             public contact::SceneSource {
  public:
   explicit ReleaseSystem(const ReleaseProblem<P>& problem)
-      : problem_(problem), contact_(problem.contact), free_(contact_.mode_count()) {
+      : problem_(problem),
+        contact_(problem.contact),
+        free_(contact_.mode_count()),
+        hold_{{value_of(problem.grasp.com_offset), 0.0}, value_of(problem.grasp.angle)},
+        hold_dual_{{Dual(problem.grasp.com_offset), Dual(0.0)}, Dual(problem.grasp.angle)} {
     contact_.separation(problem.normal_force, separation_);
   }
 
@@ -118,7 +122,16 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
             hand.pose,
             hand.twist,
             hand.acceleration,
-            problem_.normal_force.at(window, t)};
+            problem_.normal_force.at(window, t),
+            &hold<S>()};
+  }
+
+  template <class S>
+  const contact::Hold<S>& hold() const {
+    if constexpr (std::is_same_v<S, double>)
+      return hold_;
+    else
+      return hold_dual_;
   }
 
   /// |(v_r, L ω_r)|
@@ -132,6 +145,8 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   const ReleaseProblem<P>& problem_;
   const contact::ContactModel& contact_;
   int free_;
+  contact::Hold<double> hold_;
+  contact::Hold<Dual> hold_dual_;
   P separation_{};
 };
 

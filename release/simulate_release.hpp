@@ -51,10 +51,11 @@ struct ModeEvent {
 /// Energy from the start to detach [J]: kinetic + potential change = hand + friction, and what is left is
 /// `residual`.
 struct EnergyLedger {
-  double mechanical_change{};   ///< ½ m v² + ½ I ω² − m g·p
-  double hand_work{};           ///< of the wrench through the hand's motion
-  double linear_friction{};     ///< ∫ f · v_r dt <= 0, without the part below
-  double torsional_friction{};  ///< ∫ τ ω_r dt <= 0
+  double mechanical_change{};  ///< ½ m v² + ½ I ω² − m g·p
+  double hand_work{};          ///< of the wrench through the hand's motion
+  double
+      linear_friction{};  ///< ∫ f · v_r dt <= 0, without the part below; plus what compliant pads give back
+  double torsional_friction{};  ///< ∫ τ ω_r dt <= 0, likewise
   double nonphysical_work{};    ///< ∫ max(f · v_r, 0) dt where the law is a surrogate that may feed energy
   double residual{};  ///< mechanical_change − all the others: the quadrature's and integrator's error
 };

@@ -1,0 +1,46 @@
+// Pads that give tangentially before they slip.
+#pragma once
+
+#include <optional>
+#include <stdexcept>
+
+#include "contact/contact_model.hpp"
+#include "contact/friction_limits.hpp"
+
+namespace unhand::contact {
+
+/// A disc of linear springs and dampers between the pads and the object, the wrench about the patch:
+///
+///   f = −k (δ + T v_r),   τ = −k ρ² (δθ + T ω_r),   k = 1/compliance [N/m],  ρ² = a²/2 [m²]
+///
+/// δ = R(θ_O) (arm − arm₀) [m] is how far the material point that the pads first held has moved against the
+/// hand, δθ = θ_O − θ_H − angle₀ [rad], T the loss time [s] and a the patch's radius [m] under the reference
+/// force. v_r is of the point that is at the hand now: it differs from δ' in the hand by ω_r J δ, of second
+/// order in the deflection.
+template <class S>
+struct PadCompliance {
+  S stiffness{};  ///< k [N/m]
+  S torsional{};  ///< k ρ² [N m/rad]
+  S loss_time{};  ///< T [s]
+
+  /// Throws std::invalid_argument where the scene does not say how the object is held.
+  Wrench<S> wrench(const Scene<S>& scene, const Relative<S>& y) const {
+    if (!scene.hold) throw std::invalid_argument("contact.pad_compliance: the scene has no hold");
+    const Hold<S>& hold = *scene.hold;
+    const Vec2<S> moved =
+        dynamics::rotate(S(scene.hand.theta + y.angle), Vec2<S>{y.arm.x - hold.arm.x, y.arm.z - hold.arm.z});
+    return {-stiffness * (moved.x + loss_time * y.slip.x), -stiffness * (moved.z + loss_time * y.slip.z),
+            -torsional * (y.angle - hold.angle + loss_time * y.spin)};
+  }
+};
+
+/// None where the pads are rigid.
+template <class S>
+std::optional<PadCompliance<S>> pad_compliance(const FrictionLimits<S>& limits) {
+  const auto& variation = limits.variation();
+  if (!(dynamics::value_of(variation.compliance) > 0)) return std::nullopt;
+  const S stiffness = 1.0 / variation.compliance, radius = limits.patch().radius;
+  return PadCompliance<S>{stiffness, 0.5 * stiffness * radius * radius, variation.loss_time};
+}
+
+}  // namespace unhand::contact

@@ -1,0 +1,107 @@
+// Air and tilt in flight: their derivatives through the landing, and what they must leave alone.
+#include "flight/effects.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "dynamics/gravity_effects.hpp"
+#include "flight/fly.hpp"
+
+namespace unhand::flight {
+namespace {
+
+using dynamics::Dual;
+
+constexpr int kParameters = 6;  // drag, lift, wind x, wind z, tilt, ω
+constexpr const char* kNames[] = {"k", "k_m", "w_x", "w_z", "tilt", "omega"};
+
+template <class S>
+std::array<S, 4> land(const std::array<S, kParameters>& p) {
+  dynamics::Gravity<S> gravity;
+  gravity.tilt = p[4];
+  FlightProblem<S> problem{{S(0.1), S(1.2), S(0.3)}, {S(2.5), S(1.7), p[5]}, gravity.at(9.81)};
+  problem.drag_k = p[0];
+  problem.lift_km = p[1];
+  problem.wind = {p[2], p[3]};
+  problem.tracked = {S(0.02), S(0)};
+  dynamics::IntegratorOptions options;
+  options.tolerances = {1e-12, 1e-13};
+  const auto flown = fly(problem, options);
+  EXPECT_EQ(flown.outcome, FlightOutcome::landed);
+  return {flown.landing.flight_time, flown.landing.pose.x, flown.landing.pose.theta, flown.landing.twist.vz};
+}
+
+void expect_gradient(const std::array<double, kParameters>& at, const char* where) {
+  std::array<Dual, kParameters> seeded;
+  for (int k = 0; k < kParameters; ++k) seeded[k] = dynamics::independent(at[k], k);
+  const auto exact = land(seeded);
+  for (int k = 0; k < kParameters; ++k) {
+    if (k == 0 && at[0] == 0) continue;  // drag is one-sided there
+    std::array<double, 4> best{1e300, 1e300, 1e300, 1e300};
+    for (const double h : {1e-3, 1e-4, 1e-5}) {
+      auto above = at, below = at;
+      above[k] += h;
+      below[k] -= h;
+      const auto a = land(above), b = land(below);
+      for (int j = 0; j < 4; ++j)
+        best[j] = std::min(best[j], std::abs((a[j] - b[j]) / (2 * h) - exact[j].v[k]));
+    }
+    for (int j = 0; j < 4; ++j)
+      EXPECT_LT(best[j], 1e-7 * std::max(1.0, std::abs(exact[j].v[k])))
+          << where << ": answer " << j << " by " << kNames[k] << ", slope " << exact[j].v[k];
+  }
+}
+
+TEST(AirEffects, GradientOfTheLandingIsTheCentralDifference) {
+  expect_gradient({0.06, 0.02, 0.7, -0.4, 0.03, -9}, "all at once");
+  expect_gradient({0.06, 0, 0, 0, 0, 5}, "drag alone");
+  expect_gradient({0, 0.05, 0, 0, 0.02, 5}, "lift alone");
+}
+
+TEST(AirEffects, DragAtNeutralHasItsOneSidedDerivative) {
+  std::array<Dual, kParameters> seeded{};
+  seeded[5] = Dual(5);
+  seeded[0] = dynamics::independent(0.0, 0);
+  const auto exact = land(seeded);
+  const auto base = land<double>({0, 0, 0, 0, 0, 5}), some = land<double>({1e-5, 0, 0, 0, 0, 5});
+  for (int j = 0; j < 4; ++j)
+    EXPECT_NEAR((some[j] - base[j]) / 1e-5, exact[j].v[0], 1e-3 * std::max(1.0, std::abs(exact[j].v[0])));
+}
+
+TEST(AirEffects, WindIsABoostedFrame) {
+  // In the frame of the air there is no wind; it moves on at w_x while the object flies.
+  const double w = 1.3;
+  FlightProblem<double> windy{{0.1, 1.2, 0.3}, {2.5, 1.7, -6}, {0, -9.81}};
+  windy.drag_k = 0.08;
+  windy.lift_km = 0.03;
+  auto boosted = windy;
+  windy.wind = {w, 0};
+  boosted.twist.vx -= w;
+  dynamics::IntegratorOptions options;
+  options.tolerances = {1e-12, 1e-13};
+  const auto a = fly(windy, options), b = fly(boosted, options);
+  ASSERT_EQ(a.outcome, FlightOutcome::landed);
+  ASSERT_EQ(b.outcome, FlightOutcome::landed);
+  EXPECT_NEAR(a.landing.flight_time, b.landing.flight_time, 1e-11);
+  EXPECT_NEAR(a.landing.pose.x, b.landing.pose.x + w * b.landing.flight_time, 1e-11);
+  EXPECT_NEAR(a.landing.twist.vx, b.landing.twist.vx + w, 1e-11);
+}
+
+TEST(AirEffects, WindWithoutDragOrLiftIsNothing) {
+  const auto calm = land<double>({0, 0, 0, 0, 0.02, 5}), windy = land<double>({0, 0, 2, -1, 0.02, 5});
+  EXPECT_EQ(calm, windy);
+}
+
+TEST(GravityTilt, TurnsGravityAlone) {
+  dynamics::Gravity<double> gravity;
+  EXPECT_EQ(gravity.at(9.81).x, 0);
+  EXPECT_EQ(gravity.at(9.81).z, -9.81);
+  gravity.tilt = 0.1;
+  const auto g = gravity.at(9.81);
+  EXPECT_DOUBLE_EQ(g.x, 9.81 * std::sin(0.1));
+  EXPECT_DOUBLE_EQ(g.z, -9.81 * std::cos(0.1));
+}
+
+}  // namespace
+}  // namespace unhand::flight
