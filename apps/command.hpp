@@ -35,6 +35,7 @@ Command inspect_command(CLI::App& root);
 Command compare_command(CLI::App& root);
 Command fit_command(CLI::App& root);
 Command predict_command(CLI::App& root);
+Command discover_command(CLI::App& root);
 
 /// --threads, the same in every subcommand.
 inline void add_threads(CLI::App& parser, int& threads) {

@@ -40,7 +40,8 @@ int main(int argc, char** argv) {
       "Exit codes: 0 done, 1 the computation could not answer, 2 wrong usage, 3 bad input.\n"
       "Existing outputs are replaced, each at once, and only if everything succeeded.");
   const std::array commands{generate_command(root), import_command(root), inspect_command(root),
-                            compare_command(root),  fit_command(root),    predict_command(root)};
+                            compare_command(root),  fit_command(root),    predict_command(root),
+                            discover_command(root)};
   try {
     root.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "experiment/parallel.hpp"
@@ -72,6 +73,16 @@ void solve(Stage& stage, const DiscoverOptions& options, std::vector<double> sta
   test.own_spread = stage.fit.own_spread;
   test.rounds = 2;
   stage.held_out = fit(stage.problem, test);
+}
+
+/// Fits again from the solution: the weights of the channels were learned while the effect was still missing.
+void polish(Stage& stage, const DiscoverOptions& options) {
+  for (int again = 0; again < 2; ++again) {
+    Stage next{stage.problem, {}, {}, stage.ids};
+    solve(next, options, stage.fit.values());
+    if (!next.solved() || next.bic() > stage.bic() - 1) return;
+    stage = std::move(next);
+  }
 }
 
 /// By how much a channel's misfit must exceed the noise before there is anything to explain.
@@ -290,6 +301,40 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   }
 }
 
+/// Bins of 5 ms from 100 ms before the release to 50 ms after, then of 20 ms.
+std::vector<ResidualBin> residual_over_time(const Stage& stage, int threads) {
+  const auto& throws = stage.problem.throws();
+  std::vector<Eigen::VectorXd> residuals(throws.size());
+  experiment::parallel_for(throws.size(), threads, [&](std::size_t i) {
+    if (!stage.fit.throws[i].used) return;
+    const auto l = stage.problem.linearise(throws[i], stage.fit.values(), stage.fit.throws[i].own, false);
+    if (l.solved) residuals[i] = l.residual;
+  });
+  std::map<std::pair<int, int>, ResidualBin> bins;
+  for (std::size_t i = 0; i < throws.size(); ++i) {
+    const double release = throws[i].release_or(throws[i].opening);
+    for (Eigen::Index j = 0; j < residuals[i].size(); ++j) {
+      const auto& o = throws[i].observed.all[static_cast<std::size_t>(j)];
+      if (o.channel == Channel::landing_x || o.channel == Channel::landing_theta || o.channel == Channel::landing_time)
+        continue;
+      const double since = o.time - release;
+      const int bin = since < 0.05 ? static_cast<int>(std::floor(since / 0.005)) : 10 + static_cast<int>((since - 0.05) / 0.02);
+      auto& b = bins[{static_cast<int>(o.channel), bin}];
+      b.channel = o.channel;
+      b.time = bin < 10 ? 0.005 * (bin + 0.5) : 0.05 + 0.02 * (bin - 10 + 0.5);
+      const double r = residuals[i][j];
+      b.n += 1, b.mean += r, b.rms += r * r;
+    }
+  }
+  std::vector<ResidualBin> out;
+  for (auto& [key, b] : bins) {
+    b.mean /= b.n;
+    b.rms = std::sqrt(b.rms / b.n);
+    out.push_back(b);
+  }
+  return out;
+}
+
 /// Values, significance and other names of what was accepted.
 void describe(const Stage& stage, const DiscoverOptions& options, Discovery& out) {
   const auto f = footprints(stage.problem, stage.fit, catalogue(options), options.laws, options.fit.threads);
@@ -367,6 +412,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
   out.before_train.chi2_per_dof = stage.fit.chi2_per_dof();
   out.before_test.chi2_per_dof = stage.held_out.chi2_per_dof();
   out.first = first_misfit(stage.fit, options);
+  out.residual_before = residual_over_time(stage, options.fit.threads);
 
   std::vector<std::pair<std::string, double>> rivals;
   for (int step = 0; step < options.most_effects; ++step) {
@@ -378,11 +424,13 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
     out.effects.back().test_error_ratio =
         before.trajectory_rms > 0 ? errors.trajectory_rms / before.trajectory_rms : 1;
     stage = std::move(*next);
+    polish(stage, options);
   }
   backward(stage, options, out);
   if (!out.effects.empty()) describe(stage, options, out);
   look_for_the_unexplained(stage, options, out);
 
+  out.residual_after = residual_over_time(stage, options.fit.threads);
   out.final = stage.fit;
   out.final_test = stage.held_out.misfit;
   out.model = stage.problem.options().model;
@@ -394,6 +442,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
   out.verdict = !out.effects.empty() ? Verdict::effect_found
                 : out.unexplained    ? Verdict::unexplained
                                      : Verdict::no_missing_effect;
+  out.problem = std::make_shared<const CampaignProblem>(std::move(stage.problem));
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return out;
 }

@@ -2,6 +2,7 @@
 // whether held-out throws agree.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -82,6 +83,14 @@ struct FirstMisfit {
   double chi2_per_sample{};
 };
 
+/// The whitened residual of a channel over time, of the train throws together.
+struct ResidualBin {
+  experiment::Channel channel{};
+  double time{};  ///< from the release [s], middle of the bin
+  int n{};
+  double mean{}, rms{};  ///< in σ
+};
+
 struct Discovery {
   Verdict verdict{};
   std::string message;
@@ -94,6 +103,8 @@ struct Discovery {
   std::vector<ChannelMisfit> base_test, final_test;  ///< misfit on held-out throws
   std::string model;                                 ///< of the answer (contact.law changes it)
   std::vector<std::string> active;                   ///< effects in it
+  std::vector<ResidualBin> residual_before, residual_after;
+  std::shared_ptr<const CampaignProblem> problem;  ///< of the answer
   double seconds{};
 };
 

@@ -1,0 +1,204 @@
+// unhand discover: what a model lacks, from the data.
+#include "apps/discover.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "apps/command.hpp"
+#include "apps/figure.hpp"
+#include "apps/table.hpp"
+#include "contact/registry.hpp"
+
+namespace unhand::apps {
+namespace {
+
+using fitting::Discovery;
+using fitting::OutcomeErrors;
+
+struct Options {
+  std::string log, model{"limit_surface_disc"}, report, json, card;
+  std::vector<std::string> forget;
+  double matters{0.1}, tolerance{1e-5};
+  int most{3}, threads{0};
+};
+
+/// JSON has no infinity and no NaN.
+Json number(double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
+
+Json json_of(const OutcomeErrors& e) {
+  return {{"n", e.n},
+          {"landing_x_mae_m", number(e.landing_x_mae)},
+          {"landing_theta_mae_deg", number(e.landing_theta_mae)},
+          {"detach_vx_mae_m_s", number(e.detach_vx_mae)},
+          {"detach_omega_mae_deg_s", number(e.detach_omega_mae)},
+          {"trajectory_rms_m", number(e.trajectory_rms)},
+          {"chi2_per_dof", number(e.chi2_per_dof)}};
+}
+
+Json json_of(const fitting::AcceptedEffect& effect) {
+  Json out{{"id", effect.id}, {"equivalent", Json::array()}, {"parameters", Json::object()}};
+  for (const auto& [id, correlation] : effect.equivalent) out["equivalent"].push_back(id);
+  for (const auto& p : effect.parameters)
+    out["parameters"][p.name] = {{"value", number(p.value)}, {"sigma", number(p.sigma)}, {"unit", p.unit}};
+  out["delta_bic"] = number(effect.delta_bic);
+  out["p_value"] = number(effect.p_value);
+  out["test_error_ratio"] = number(effect.test_error_ratio);
+  out["footprint_correlations"] = Json::object();
+  for (const auto& [id, correlation] : effect.equivalent) out["footprint_correlations"][id] = correlation;
+  out["why"] = effect.why;
+  return out;
+}
+
+Json misfit_json(const std::vector<fitting::ChannelMisfit>& misfit) {
+  Json out = Json::array();
+  for (const auto& m : misfit)
+    out.push_back({{"phase", to_string(m.phase)},
+                   {"channel", to_string(m.channel)},
+                   {"n", m.n},
+                   {"chi2_per_sample", number(m.chi2_per_sample())}});
+  return out;
+}
+
+void discover(const Options& options, const std::string& command) {
+  require_writable(options.json);
+  if (!options.report.empty()) {
+    require_writable_directory(options.report);
+    require_gnuplot();
+  }
+  if (datasets::read_schema_name(options.log) == "slip-log")
+    throw WrongUsage("a slip-log holds no throws; its law is found by `unhand compare LOG --fit`");
+  const auto log = datasets::read_throw_log(options.log);
+  if (log.throws.empty()) throw Unanswered(fmt::format("{}: holds no throws", options.log));
+  fitting::DiscoverOptions request;
+  request.campaign.model = options.model;
+  request.campaign.threads = request.fit.threads = options.threads;
+  request.campaign.integrator.tolerances = {options.tolerance, 1e-3 * options.tolerance};
+  request.matters = options.matters;
+  request.most_effects = options.most;
+  request.forget = options.forget;
+  for (const auto& id : options.forget) {
+    try {
+      fitting::find_effect(id);
+    } catch (const std::invalid_argument& error) {
+      throw WrongUsage(error.what());
+    }
+  }
+  const Discovery found = fitting::discover(log, options.log, request);
+  if (found.verdict == fitting::Verdict::not_answered) throw Unanswered(found.message);
+
+  Outputs outputs;
+  const Json json = discovery_json(found, options.log, options.model);
+  if (!options.json.empty()) outputs.json(options.json, json);
+  if (!options.report.empty())
+    write_discovery_report(found, options.log, command, json, outputs.directory(options.report));
+  outputs.commit();
+  fmt::print("{}", discovery_text(found, options.log));
+}
+
+}  // namespace
+
+Json discovery_json(const Discovery& found, const std::string& log, const std::string& model) {
+  Json out = json_head("discovery");
+  out["log"] = std::filesystem::path(log).filename().string();
+  out["base_model"] = model;
+  out["verdict"] = to_string(found.verdict);
+  out["effects"] = Json::array();
+  for (const auto& effect : found.effects) out["effects"].push_back(json_of(effect));
+  out["unexplained"] = nullptr;
+  if (found.unexplained)
+    out["unexplained"] = {{"phase", to_string(found.unexplained->phase)},
+                          {"channel", to_string(found.unexplained->channel)},
+                          {"chi2_per_dof", number(found.unexplained->chi2_per_dof)},
+                          {"description", found.unexplained->description}};
+  out["error"] = {{"before", {{"train", json_of(found.before_train)}, {"test", json_of(found.before_test)}}},
+                  {"after", {{"train", json_of(found.after_train)}, {"test", json_of(found.after_test)}}}};
+  out["ranking"] = Json::array();
+  for (const auto& r : found.ranking)
+    out["ranking"].push_back({{"id", r.id},
+                              {"score_p_value", number(r.p_value)},
+                              {"footprint_correlation_with_best", number(r.correlation_with_best)},
+                              {"chi2_gain", number(r.gain)},
+                              {"visible", r.visible},
+                              {"refitted", r.refitted},
+                              {"delta_bic", r.refitted ? number(r.delta_bic) : Json(nullptr)},
+                              {"held_out_gain", r.refitted ? number(r.held_out_gain) : Json(nullptr)}});
+  out["first_misfit"] = nullptr;
+  if (found.first.any)
+    out["first_misfit"] = {{"phase", to_string(found.first.phase)},
+                           {"channel", to_string(found.first.channel)},
+                           {"chi2_per_sample", number(found.first.chi2_per_sample)}};
+  out["misfit"] = {{"before", {{"train", misfit_json(found.base.misfit)}, {"test", misfit_json(found.base_test)}}},
+                   {"after", {{"train", misfit_json(found.final.misfit)}, {"test", misfit_json(found.final_test)}}}};
+  out["model"] = found.model;
+  out["parameters"] = Json::object();
+  for (const auto& u : found.final.campaign)
+    out["parameters"][u.unknown.name] = {{"value", number(u.value)}, {"sigma", number(u.sigma)}, {"unit", u.unknown.unit}};
+  return out;
+}
+
+std::string discovery_text(const Discovery& found, const std::string& log) {
+  std::string out = fmt::format("{}: {}\n", log, to_string(found.verdict));
+  if (found.first.any)
+    out += fmt::format("the residual first leaves the noise in the phase {}, channel {} ({:.3g} times its variance)\n",
+                       to_string(found.first.phase), to_string(found.first.channel), found.first.chi2_per_sample);
+  else
+    out += "no channel leaves the noise in any phase\n";
+  for (const auto& effect : found.effects) {
+    out += fmt::format("\n{}", effect.id);
+    for (const auto& [id, correlation] : effect.equivalent)
+      out += fmt::format("\n  or {} (footprints correlate by {:.4f})", id, correlation);
+    for (const auto& p : effect.parameters)
+      out += fmt::format("\n  {} = {:.6g} +- {:.2g} {}", p.name, p.value, p.sigma, p.unit);
+    out += fmt::format("\n  BIC {:+.1f}, p {:.2g}; held out: {}\n", effect.delta_bic, effect.p_value, effect.why);
+  }
+  if (found.unexplained) out += fmt::format("\nunexplained: {}\n", found.unexplained->description);
+  Table table{{"predicted before the throw", "landing x MAE [m]", "theta MAE [deg]", "detach vx MAE [m/s]",
+               "omega MAE [deg/s]", "trajectory RMS [m]", "chi2/dof"},
+              {},
+              1};
+  const auto row = [&](const std::string& name, const OutcomeErrors& e) {
+    table.rows.push_back({name, fmt::format("{:.5f}", e.landing_x_mae), fmt::format("{:.3f}", e.landing_theta_mae),
+                          fmt::format("{:.5f}", e.detach_vx_mae), fmt::format("{:.3f}", e.detach_omega_mae),
+                          fmt::format("{:.6f}", e.trajectory_rms), fmt::format("{:.3f}", e.chi2_per_dof)});
+  };
+  row(fmt::format("before, train ({})", found.before_train.n), found.before_train);
+  row(fmt::format("before, test ({})", found.before_test.n), found.before_test);
+  row(fmt::format("after, train ({})", found.after_train.n), found.after_train);
+  row(fmt::format("after, test ({})", found.after_test.n), found.after_test);
+  return out + "\n" + table.text() + fmt::format("\n{:.1f} s\n", found.seconds);
+}
+
+Command discover_command(CLI::App& root) {
+  auto options = std::make_shared<Options>();
+  CLI::App* parser = root.add_subcommand("discover", "Find what a model lacks: trace the residual to an effect, add it, "
+                                                     "and report the error before and after");
+  parser->add_option("LOG", options->log, "A throw log (dimension 2)")->required();
+  parser->add_option("--model", options->model, "The base model")
+      ->check(CLI::IsMember(contact::contact_model_names()))
+      ->capture_default_str();
+  parser->add_option("--report", options->report, "Directory for the page, its figures and discovery.json");
+  parser->add_option("--json", options->json, "Write the result as JSON");
+  parser->add_option("--forget", options->forget, "Effects that the catalogue is told to forget")->delimiter(',');
+  parser->add_option("--matters", options->matters,
+                     "Least fall of chi2 per sample on held-out throws for an effect to count")
+      ->check(CLI::Range(1e-3, 1e3))
+      ->capture_default_str();
+  parser->add_option("--most", options->most, "Most effects to add")->check(CLI::Range(0, 10))->capture_default_str();
+  parser->add_option("--rtol", options->tolerance, "Relative tolerance of the integration")
+      ->check(CLI::Range(1e-10, 1e-3))
+      ->capture_default_str();
+  add_threads(*parser, options->threads);
+  parser->footer(
+      "Verdicts: effect_found, no_missing_effect, unexplained.\n"
+      "Example:\n  unhand discover campaign.h5 --model limit_surface_disc --report out/ --json discovery.json");
+  return {parser, [options] {
+            std::string command = fmt::format("unhand discover {} --model {}", options->log, options->model);
+            for (const auto& id : options->forget) command += " --forget " + id;
+            discover(*options, command);
+          }};
+}
+
+}  // namespace unhand::apps

@@ -1,0 +1,22 @@
+// unhand discover: its JSON and its page.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "apps/output.hpp"
+#include "fitting/discover.hpp"
+
+namespace unhand::apps {
+
+/// discovery.json, schema "discovery" version 1.
+Json discovery_json(const fitting::Discovery& discovery, const std::string& log, const std::string& model);
+
+/// The answer in a few lines.
+std::string discovery_text(const fitting::Discovery& discovery, const std::string& log);
+
+/// A self-contained page (index.html), the figures with their data and scripts, and discovery.json.
+void write_discovery_report(const fitting::Discovery& discovery, const std::string& log, const std::string& command,
+                            const Json& json, const std::filesystem::path& directory);
+
+}  // namespace unhand::apps
