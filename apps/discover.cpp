@@ -130,20 +130,23 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
     out["first_misfit"] = {{"phase", to_string(found.first.phase)},
                            {"channel", to_string(found.first.channel)},
                            {"chi2_per_sample", number(found.first.chi2_per_sample)}};
-  out["misfit"] = {{"before", {{"train", misfit_json(found.base.misfit)}, {"test", misfit_json(found.base_test)}}},
-                   {"after", {{"train", misfit_json(found.final.misfit)}, {"test", misfit_json(found.final_test)}}}};
+  out["misfit"] = {
+      {"before", {{"train", misfit_json(found.base.misfit)}, {"test", misfit_json(found.base_test)}}},
+      {"after", {{"train", misfit_json(found.final.misfit)}, {"test", misfit_json(found.final_test)}}}};
   out["model"] = found.model;
   out["parameters"] = Json::object();
   for (const auto& u : found.final.campaign)
-    out["parameters"][u.unknown.name] = {{"value", number(u.value)}, {"sigma", number(u.sigma)}, {"unit", u.unknown.unit}};
+    out["parameters"][u.unknown.name] = {
+        {"value", number(u.value)}, {"sigma", number(u.sigma)}, {"unit", u.unknown.unit}};
   return out;
 }
 
 std::string discovery_text(const Discovery& found, const std::string& log) {
   std::string out = fmt::format("{}: {}\n", log, to_string(found.verdict));
   if (found.first.any)
-    out += fmt::format("the residual first leaves the noise in the phase {}, channel {} ({:.3g} times its variance)\n",
-                       to_string(found.first.phase), to_string(found.first.channel), found.first.chi2_per_sample);
+    out += fmt::format(
+        "the residual first leaves the noise in the phase {}, channel {} ({:.3g} times its variance)\n",
+        to_string(found.first.phase), to_string(found.first.channel), found.first.chi2_per_sample);
   else
     out += "no channel leaves the noise in any phase\n";
   for (const auto& effect : found.effects) {
@@ -152,7 +155,8 @@ std::string discovery_text(const Discovery& found, const std::string& log) {
       out += fmt::format("\n  or {} (footprints correlate by {:.4f})", id, correlation);
     for (const auto& p : effect.parameters)
       out += fmt::format("\n  {} = {:.6g} +- {:.2g} {}", p.name, p.value, p.sigma, p.unit);
-    out += fmt::format("\n  BIC {:+.1f}, p {:.2g}; held out: {}\n", effect.delta_bic, effect.p_value, effect.why);
+    out += fmt::format("\n  BIC {:+.1f}, p {:.2g}; held out: {}\n", effect.delta_bic, effect.p_value,
+                       effect.why);
   }
   if (found.unexplained) out += fmt::format("\nunexplained: {}\n", found.unexplained->description);
   Table table{{"predicted before the throw", "landing x MAE [m]", "theta MAE [deg]", "detach vx MAE [m/s]",
@@ -160,9 +164,10 @@ std::string discovery_text(const Discovery& found, const std::string& log) {
               {},
               1};
   const auto row = [&](const std::string& name, const OutcomeErrors& e) {
-    table.rows.push_back({name, fmt::format("{:.5f}", e.landing_x_mae), fmt::format("{:.3f}", e.landing_theta_mae),
-                          fmt::format("{:.5f}", e.detach_vx_mae), fmt::format("{:.3f}", e.detach_omega_mae),
-                          fmt::format("{:.6f}", e.trajectory_rms), fmt::format("{:.3f}", e.chi2_per_dof)});
+    table.rows.push_back({name, fmt::format("{:.5f}", e.landing_x_mae),
+                          fmt::format("{:.3f}", e.landing_theta_mae), fmt::format("{:.5f}", e.detach_vx_mae),
+                          fmt::format("{:.3f}", e.detach_omega_mae), fmt::format("{:.6f}", e.trajectory_rms),
+                          fmt::format("{:.3f}", e.chi2_per_dof)});
   };
   row(fmt::format("before, train ({})", found.before_train.n), found.before_train);
   row(fmt::format("before, test ({})", found.before_test.n), found.before_test);
@@ -173,27 +178,33 @@ std::string discovery_text(const Discovery& found, const std::string& log) {
 
 Command discover_command(CLI::App& root) {
   auto options = std::make_shared<Options>();
-  CLI::App* parser = root.add_subcommand("discover", "Find what a model lacks: trace the residual to an effect, add it, "
-                                                     "and report the error before and after");
+  CLI::App* parser = root.add_subcommand("discover",
+                                         "Find what a model lacks: trace the residual to an effect, add it, "
+                                         "and report the error before and after");
   parser->add_option("LOG", options->log, "A throw log (dimension 2)")->required();
   parser->add_option("--model", options->model, "The base model")
       ->check(CLI::IsMember(contact::contact_model_names()))
       ->capture_default_str();
   parser->add_option("--report", options->report, "Directory for the page, its figures and discovery.json");
   parser->add_option("--json", options->json, "Write the result as JSON");
-  parser->add_option("--forget", options->forget, "Effects that the catalogue is told to forget")->delimiter(',');
-  parser->add_option("--matters", options->matters,
-                     "Least fall of chi2 per sample on held-out throws for an effect to count")
+  parser->add_option("--forget", options->forget, "Effects that the catalogue is told to forget")
+      ->delimiter(',');
+  parser
+      ->add_option("--matters", options->matters,
+                   "Least fall of chi2 per sample on held-out throws for an effect to count")
       ->check(CLI::Range(1e-3, 1e3))
       ->capture_default_str();
-  parser->add_option("--most", options->most, "Most effects to add")->check(CLI::Range(0, 10))->capture_default_str();
+  parser->add_option("--most", options->most, "Most effects to add")
+      ->check(CLI::Range(0, 10))
+      ->capture_default_str();
   parser->add_option("--rtol", options->tolerance, "Relative tolerance of the integration")
       ->check(CLI::Range(1e-10, 1e-3))
       ->capture_default_str();
   add_threads(*parser, options->threads);
   parser->footer(
       "Verdicts: effect_found, no_missing_effect, unexplained.\n"
-      "Example:\n  unhand discover campaign.h5 --model limit_surface_disc --report out/ --json discovery.json");
+      "Example:\n  unhand discover campaign.h5 --model limit_surface_disc --report out/ --json "
+      "discovery.json");
   return {parser, [options] {
             std::string command = fmt::format("unhand discover {} --model {}", options->log, options->model);
             for (const auto& id : options->forget) command += " --forget " + id;

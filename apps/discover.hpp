@@ -16,7 +16,8 @@ Json discovery_json(const fitting::Discovery& discovery, const std::string& log,
 std::string discovery_text(const fitting::Discovery& discovery, const std::string& log);
 
 /// A self-contained page (index.html), the figures with their data and scripts, and discovery.json.
-void write_discovery_report(const fitting::Discovery& discovery, const std::string& log, const std::string& command,
-                            const Json& json, const std::filesystem::path& directory);
+void write_discovery_report(const fitting::Discovery& discovery, const std::string& log,
+                            const std::string& command, const Json& json,
+                            const std::filesystem::path& directory);
 
 }  // namespace unhand::apps

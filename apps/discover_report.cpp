@@ -34,7 +34,8 @@ std::string base64(const std::filesystem::path& file) {
 
 std::string escaped(const std::string& text) {
   std::string out;
-  for (const char c : text) out += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : std::string(1, c);
+  for (const char c : text)
+    out += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : std::string(1, c);
   return out;
 }
 
@@ -44,7 +45,8 @@ std::string html(const Table& table) {
   for (const auto& row : table.rows) {
     out += "</tr><tr>";
     for (std::size_t i = 0; i < row.size(); ++i)
-      out += fmt::format("<td{}>{}</td>", static_cast<int>(i) < table.left ? "" : " class=n", escaped(row[i]));
+      out +=
+          fmt::format("<td{}>{}</td>", static_cast<int>(i) < table.left ? "" : " class=n", escaped(row[i]));
   }
   return out + "</tr></table>\n";
 }
@@ -62,14 +64,18 @@ Figure residual_figure(const Discovery& found) {
   const int rows = (static_cast<int>(channels.size()) + columns - 1) / columns;
   Figure figure{"residual", 17, 1.4 + 3.6 * rows, {}, {}};
   double low = 0, high = 0.05;
-  for (const auto& bin : found.residual_before) low = std::min(low, bin.time), high = std::max(high, bin.time);
+  for (const auto& bin : found.residual_before)
+    low = std::min(low, bin.time), high = std::max(high, bin.time);
   std::string script = "set multiplot\nset key off\n";
   int index = 0, at = 0;
   for (const Channel channel : channels) {
     double top = 2;
     for (const auto* bins : {&found.residual_before, &found.residual_after}) {
-      DataBlock block{fmt::format("{} {}", to_string(channel), bins == &found.residual_before ? "before" : "after"),
-                      {"time from release [s]", "rms residual [sigma]", "mean residual [sigma]", "samples"}, {}, {}};
+      DataBlock block{
+          fmt::format("{} {}", to_string(channel), bins == &found.residual_before ? "before" : "after"),
+          {"time from release [s]", "rms residual [sigma]", "mean residual [sigma]", "samples"},
+          {},
+          {}};
       for (const auto& bin : *bins)
         if (bin.channel == channel) {
           block.rows.push_back({bin.time, std::max(bin.rms, 0.05), bin.mean, static_cast<double>(bin.n)});
@@ -87,8 +93,8 @@ Figure residual_figure(const Discovery& found) {
         "plot DATA index {} using 1:2 with linespoints pointtype 6 linecolor rgb '#d55e00', "
         "DATA index {} using 1:2 with linespoints pointtype 7 linecolor rgb '#0072b2'\n",
         plain(std::string(to_string(channel))), low, high, 1.5 * top,
-        at / columns == rows - 1 ? "set xlabel 'time from release [s]' offset 0,0.6\n" : "unset xlabel\n", 1.5 * top, low,
-        high, index, index + 1);
+        at / columns == rows - 1 ? "set xlabel 'time from release [s]' offset 0,0.6\n" : "unset xlabel\n",
+        1.5 * top, low, high, index, index + 1);
     index += 2;
     ++at;
   }
@@ -108,7 +114,8 @@ Figure ranking_figure(const Discovery& found) {
   double largest = 10;
   for (const auto& r : found.ranking) {
     if (!(r.gain > 1)) continue;
-    const bool accepted = std::any_of(found.effects.begin(), found.effects.end(), [&](const auto& e) { return e.id == r.id; });
+    const bool accepted =
+        std::any_of(found.effects.begin(), found.effects.end(), [&](const auto& e) { return e.id == r.id; });
     block.rows.push_back({r.gain, static_cast<double>(position), accepted ? 1.0 : 0.0});
     tics += fmt::format("{}'{}' {}", position ? ", " : "", plain(r.id), position);
     largest = std::max(largest, r.gain);
@@ -118,7 +125,8 @@ Figure ranking_figure(const Discovery& found) {
   figure.data.push_back(block);
   figure.script = fmt::format(
       "set key off\nset lmargin 32\nset logscale x\nset format x '10^{{%T}}'\nset xrange [1:{:.4g}]\n"
-      "set yrange [{}:-1]\nset ytics ({})\nset xlabel 'chi^2 that the effect would take away, to first order'\n"
+      "set yrange [{}:-1]\nset ytics ({})\nset xlabel 'chi^2 that the effect would take away, to first "
+      "order'\n"
       "set style fill solid 0.9\n"
       "plot DATA index 0 using (sqrt($1)):2:(0):1:($2-0.35):($2+0.35):($3 > 0 ? 0x0072b2 : 0xb0b0b0) "
       "with boxxyerror linecolor rgb variable\n",
@@ -127,12 +135,15 @@ Figure ranking_figure(const Discovery& found) {
 }
 
 Table error_table(const Discovery& found) {
-  Table table{{"predicted before the throw", "n", "landing x MAE [mm]", "theta MAE [deg]", "detach vx MAE [m/s]",
-               "detach omega MAE [deg/s]", "trajectory RMS [mm]", "chi2/dof"}, {}, 1};
+  Table table{{"predicted before the throw", "n", "landing x MAE [mm]", "theta MAE [deg]",
+               "detach vx MAE [m/s]", "detach omega MAE [deg/s]", "trajectory RMS [mm]", "chi2/dof"},
+              {},
+              1};
   const auto row = [&](const char* name, const OutcomeErrors& e) {
     table.rows.push_back({name, std::to_string(e.n), fmt::format("{:.2f}", 1e3 * e.landing_x_mae),
                           fmt::format("{:.3f}", e.landing_theta_mae), fmt::format("{:.5f}", e.detach_vx_mae),
-                          fmt::format("{:.3f}", e.detach_omega_mae), fmt::format("{:.3f}", 1e3 * e.trajectory_rms),
+                          fmt::format("{:.3f}", e.detach_omega_mae),
+                          fmt::format("{:.3f}", 1e3 * e.trajectory_rms),
                           fmt::format("{:.3f}", e.chi2_per_dof)});
   };
   row("before, train", found.before_train);
@@ -143,72 +154,90 @@ Table error_table(const Discovery& found) {
 }
 
 Table misfit_table(const Discovery& found) {
-  Table table{{"phase", "channel", "samples", "before, train", "after, train", "before, test", "after, test"}, {}, 2};
+  Table table{
+      {"phase", "channel", "samples", "before, train", "after, train", "before, test", "after, test"}, {}, 2};
   const auto find = [](const std::vector<fitting::ChannelMisfit>& all, const fitting::ChannelMisfit& like) {
     for (const auto& m : all)
-      if (m.channel == like.channel && m.phase == like.phase) return fmt::format("{:.3f}", m.chi2_per_sample());
+      if (m.channel == like.channel && m.phase == like.phase)
+        return fmt::format("{:.3f}", m.chi2_per_sample());
     return std::string("-");
   };
   for (const auto& m : found.base.misfit)
-    table.rows.push_back({std::string(to_string(m.phase)), std::string(to_string(m.channel)), std::to_string(m.n),
-                          find(found.base.misfit, m), find(found.final.misfit, m), find(found.base_test, m),
-                          find(found.final_test, m)});
+    table.rows.push_back({std::string(to_string(m.phase)), std::string(to_string(m.channel)),
+                          std::to_string(m.n), find(found.base.misfit, m), find(found.final.misfit, m),
+                          find(found.base_test, m), find(found.final_test, m)});
   return table;
 }
 
 Table ranking_table(const Discovery& found) {
-  Table table{{"candidate", "chi2 gain", "p", "correlation with the best", "refitted: BIC", "held-out fall"}, {}, 1};
+  Table table{
+      {"candidate", "chi2 gain", "p", "correlation with the best", "refitted: BIC", "held-out fall"}, {}, 1};
   for (const auto& r : found.ranking)
-    table.rows.push_back({r.id, r.visible ? fmt::format("{:.4g}", r.gain) : "no footprint", fmt::format("{:.2g}", r.p_value),
-                          fmt::format("{:.3f}", r.correlation_with_best),
-                          r.refitted ? fmt::format("{:+.1f}", r.delta_bic) : "", r.refitted ? fmt::format("{:.3g}", r.held_out_gain) : ""});
+    table.rows.push_back({r.id, r.visible ? fmt::format("{:.4g}", r.gain) : "no footprint",
+                          fmt::format("{:.2g}", r.p_value), fmt::format("{:.3f}", r.correlation_with_best),
+                          r.refitted ? fmt::format("{:+.1f}", r.delta_bic) : "",
+                          r.refitted ? fmt::format("{:.3g}", r.held_out_gain) : ""});
   return table;
 }
 
 }  // namespace
 
-void write_discovery_report(const Discovery& found, const std::string& log, const std::string& command, const Json& json,
-                            const std::filesystem::path& directory) {
+void write_discovery_report(const Discovery& found, const std::string& log, const std::string& command,
+                            const Json& json, const std::filesystem::path& directory) {
   const Figure residual = residual_figure(found), ranking = ranking_figure(found);
   draw(residual, directory);
   draw(ranking, directory);
   const auto picture = [&](const std::string& name) {
-    return fmt::format("<img src=\"data:image/png;base64,{}\" alt=\"{}\">\n", base64(directory / (name + ".png")), name);
+    return fmt::format("<img src=\"data:image/png;base64,{}\" alt=\"{}\">\n",
+                       base64(directory / (name + ".png")), name);
   };
   std::string answer;
   for (const auto& effect : found.effects) {
     answer += fmt::format("<h3>{}</h3><p>", escaped(effect.id));
     for (const auto& p : effect.parameters)
-      answer += fmt::format("{} = {:.6g} &plusmn; {:.2g} {} (95 %: {:.6g} to {:.6g})<br>", escaped(p.name), p.value, p.sigma,
-                            escaped(p.unit), p.value - 1.96 * p.sigma, p.value + 1.96 * p.sigma);
-    answer += fmt::format("BIC {:+.1f}, p = {:.2g}. On held-out throws: {}.</p>\n", effect.delta_bic, effect.p_value, escaped(effect.why));
+      answer +=
+          fmt::format("{} = {:.6g} &plusmn; {:.2g} {} (95 %: {:.6g} to {:.6g})<br>", escaped(p.name), p.value,
+                      p.sigma, escaped(p.unit), p.value - 1.96 * p.sigma, p.value + 1.96 * p.sigma);
+    answer += fmt::format("BIC {:+.1f}, p = {:.2g}. On held-out throws: {}.</p>\n", effect.delta_bic,
+                          effect.p_value, escaped(effect.why));
     for (const auto& [id, correlation] : effect.equivalent)
-      answer += fmt::format("<p>Not distinguishable here from <b>{}</b>: the footprints correlate by {:.4f}.</p>\n", escaped(id), correlation);
+      answer +=
+          fmt::format("<p>Not distinguishable here from <b>{}</b>: the footprints correlate by {:.4f}.</p>\n",
+                      escaped(id), correlation);
   }
-  if (found.unexplained) answer += fmt::format("<p><b>Unexplained:</b> {}.</p>\n", escaped(found.unexplained->description));
-  if (found.effects.empty() && !found.unexplained) answer += "<p>Nothing that the data show is missing in the model.</p>\n";
-  const std::string first =
-      found.first.any ? fmt::format("The residual first leaves the noise in the phase <b>{}</b>, channel <b>{}</b>, with {:.3g} times "
-                                    "the declared variance.",
-                                    to_string(found.first.phase), to_string(found.first.channel), found.first.chi2_per_sample)
-                      : "No channel leaves the noise in any phase.";
-  write_text(directory / "index.html",
-             fmt::format("<!DOCTYPE html><html lang=en><meta charset=utf-8><title>What the model lacks: {0}</title>\n"
-                         "<style>body{{font:15px/1.45 sans-serif;max-width:60em;margin:2em auto;padding:0 1em}}"
-                         "table{{border-collapse:collapse;margin:1em 0;font-size:13px}}td,th{{padding:.15em .7em;"
-                         "border-bottom:1px solid #ddd;text-align:left}}td.n{{text-align:right;font-variant-numeric:tabular-nums}}"
-                         "img{{max-width:100%}}code{{background:#f3f3f3;padding:.1em .3em}}</style>\n"
-                         "<h1>What the model lacks: {0}</h1>\n<p>Base model <code>{1}</code>. Verdict: <b>{2}</b>.</p>\n"
-                         "<h2>Where it starts</h2><p>{3}</p>\n{4}<h2>The answer</h2>\n{5}<h2>Errors before and after</h2>\n"
-                         "<p>Predicted from what is known before the throw, minus measured; chi2/dof with the throws' own "
-                         "unknowns fitted. Test throws took no part in any fit.</p>{6}"
-                         "<h2>Candidates</h2><p>From the footprint of each: the derivative of every predicted sample, with the "
-                         "model's own unknowns projected out.</p>{7}{8}"
-                         "<h2>Misfit by phase and channel</h2><p>chi2 per sample; 1 is the declared noise.</p>{9}"
-                         "<h2>Again</h2><p><code>{10}</code></p></html>\n",
-                         escaped(std::filesystem::path(log).filename().string()), escaped(json.at("base_model").get<std::string>()),
-                         to_string(found.verdict), first, picture("residual"), answer, html(error_table(found)),
-                         picture("ranking"), html(ranking_table(found)), html(misfit_table(found)), escaped(command)));
+  if (found.unexplained)
+    answer += fmt::format("<p><b>Unexplained:</b> {}.</p>\n", escaped(found.unexplained->description));
+  if (found.effects.empty() && !found.unexplained)
+    answer += "<p>Nothing that the data show is missing in the model.</p>\n";
+  const std::string first = found.first.any ? fmt::format(
+                                                  "The residual first leaves the noise in the phase "
+                                                  "<b>{}</b>, channel <b>{}</b>, with {:.3g} times "
+                                                  "the declared variance.",
+                                                  to_string(found.first.phase),
+                                                  to_string(found.first.channel), found.first.chi2_per_sample)
+                                            : "No channel leaves the noise in any phase.";
+  write_text(
+      directory / "index.html",
+      fmt::format(
+          "<!DOCTYPE html><html lang=en><meta charset=utf-8><title>What the model lacks: {0}</title>\n"
+          "<style>body{{font:15px/1.45 sans-serif;max-width:60em;margin:2em auto;padding:0 1em}}"
+          "table{{border-collapse:collapse;margin:1em 0;font-size:13px}}td,th{{padding:.15em .7em;"
+          "border-bottom:1px solid "
+          "#ddd;text-align:left}}td.n{{text-align:right;font-variant-numeric:tabular-nums}}"
+          "img{{max-width:100%}}code{{background:#f3f3f3;padding:.1em .3em}}</style>\n"
+          "<h1>What the model lacks: {0}</h1>\n<p>Base model <code>{1}</code>. Verdict: <b>{2}</b>.</p>\n"
+          "<h2>Where it starts</h2><p>{3}</p>\n{4}<h2>The answer</h2>\n{5}<h2>Errors before and after</h2>\n"
+          "<p>Predicted from what is known before the throw, minus measured; chi2/dof with the throws' own "
+          "unknowns fitted. Test throws took no part in any fit.</p>{6}"
+          "<h2>Candidates</h2><p>From the footprint of each: the derivative of every predicted sample, with "
+          "the "
+          "model's own unknowns projected out.</p>{7}{8}"
+          "<h2>Misfit by phase and channel</h2><p>chi2 per sample; 1 is the declared noise.</p>{9}"
+          "<h2>Again</h2><p><code>{10}</code></p></html>\n",
+          escaped(std::filesystem::path(log).filename().string()),
+          escaped(json.at("base_model").get<std::string>()), to_string(found.verdict), first,
+          picture("residual"), answer, html(error_table(found)), picture("ranking"),
+          html(ranking_table(found)), html(misfit_table(found)), escaped(command)));
   write_text(directory / "discovery.json", json_text(json));
 }
 

@@ -48,6 +48,9 @@ bool is_dead(const Series& series, std::size_t column) {
   return true;
 }
 
+/// What turns a force into a torque where a wrench is judged as a whole: c a of a finger's pad [m].
+constexpr double kPadLength = 0.007;
+
 /// The least σ that a channel is trusted to [SI]: the integration and the smoothed inputs are no better.
 constexpr double kLeastForce = 1e-4, kLeastTorque = 1e-6, kLeastLength = 1e-6, kLeastAngle = 1e-5;
 
@@ -74,10 +77,12 @@ void add_wrench(const datasets::FtLog& ft, const PreparedThrow& prepared, const 
     const double t = ft.time(i);
     if (t < prepared.hand.begin() || t > prepared.hand.end() || is_settling(jumps, t, options.settling))
       continue;
+    const double force = std::hypot(ft.wrench(i, 0), ft.wrench(i, 1));
+    const double size[3] = {force, force, std::hypot(ft.wrench(i, 2), kPadLength * force)};
     for (std::size_t c = 0; c < 3; ++c)
       if (sigma[c] > 0)
         out.all.push_back({next(Channel::wrench_fx, c), t, ft.wrench(i, c),
-                           std::hypot(sigma[c], options.wrench_trust * ft.wrench(i, c))});
+                           std::hypot(sigma[c], options.wrench_trust * size[c])});
   }
 }
 

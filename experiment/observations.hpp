@@ -47,9 +47,9 @@ struct ObservationOptions {
   /// Wrenches are not used for this long after the log begins and after a jump of the hand's acceleration
   /// [s]: real pads ring there (some micrometres under a held object of 0.2 kg: 30 ms), rigid ones jump.
   double settling{0.03};
-  /// To what share of its value a sample of a wrench is trusted, beside its noise [-]. The gain of an F/T
-  /// sensor and the shape of a friction law are good to a hundredth, and such an error stays for some twenty
-  /// samples, which would count as that many witnesses.
+  /// To what share of the whole wrench a sample of its parts is trusted, beside its noise [-]. The gain of an
+  /// F/T sensor and the shape of a friction law are good to a hundredth, and such an error stays for some
+  /// twenty samples, which would count as that many witnesses.
   double wrench_trust{0.04};
 };
 

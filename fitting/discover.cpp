@@ -315,10 +315,12 @@ std::vector<ResidualBin> residual_over_time(const Stage& stage, int threads) {
     const double release = throws[i].release_or(throws[i].opening);
     for (Eigen::Index j = 0; j < residuals[i].size(); ++j) {
       const auto& o = throws[i].observed.all[static_cast<std::size_t>(j)];
-      if (o.channel == Channel::landing_x || o.channel == Channel::landing_theta || o.channel == Channel::landing_time)
+      if (o.channel == Channel::landing_x || o.channel == Channel::landing_theta ||
+          o.channel == Channel::landing_time)
         continue;
       const double since = o.time - release;
-      const int bin = since < 0.05 ? static_cast<int>(std::floor(since / 0.005)) : 10 + static_cast<int>((since - 0.05) / 0.02);
+      const int bin = since < 0.05 ? static_cast<int>(std::floor(since / 0.005))
+                                   : 10 + static_cast<int>((since - 0.05) / 0.02);
       auto& b = bins[{static_cast<int>(o.channel), bin}];
       b.channel = o.channel;
       b.time = bin < 10 ? 0.005 * (bin + 0.5) : 0.05 + 0.02 * (bin - 10 + 0.5);
