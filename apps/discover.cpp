@@ -7,10 +7,12 @@
 #include <cmath>
 #include <memory>
 
+#include "apps/cards.hpp"
 #include "apps/command.hpp"
 #include "apps/figure.hpp"
 #include "apps/table.hpp"
 #include "contact/registry.hpp"
+#include "fitting/card.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -64,6 +66,7 @@ Json misfit_json(const std::vector<fitting::ChannelMisfit>& misfit) {
 
 void discover(const Options& options, const std::string& command) {
   require_writable(options.json);
+  require_writable(options.card);
   if (!options.report.empty()) {
     require_writable_directory(options.report);
     require_gnuplot();
@@ -92,6 +95,12 @@ void discover(const Options& options, const std::string& command) {
   Outputs outputs;
   const Json json = discovery_json(found, options.log, options.model);
   if (!options.json.empty()) outputs.json(options.json, json);
+  if (!options.card.empty()) {
+    const auto& problem = *found.problem;
+    const auto errors =
+        comparison_of(problem, found.final, predict_throws(problem, found.final, {false, options.threads}));
+    outputs.text(options.card, datasets::to_json(card_of(problem, found.final, errors, options.log, log)));
+  }
   if (!options.report.empty())
     write_discovery_report(found, options.log, command, json, outputs.directory(options.report));
   outputs.commit();
@@ -103,6 +112,7 @@ void discover(const Options& options, const std::string& command) {
 Json discovery_json(const Discovery& found, const std::string& log, const std::string& model) {
   Json out = json_head("discovery");
   out["log"] = std::filesystem::path(log).filename().string();
+  if (const auto checksum = fitting::checksum_of(log)) out["log_checksum"] = *checksum;
   out["base_model"] = model;
   out["verdict"] = to_string(found.verdict);
   out["effects"] = Json::array();
@@ -187,6 +197,7 @@ Command discover_command(CLI::App& root) {
       ->capture_default_str();
   parser->add_option("--report", options->report, "Directory for the page, its figures and discovery.json");
   parser->add_option("--json", options->json, "Write the result as JSON");
+  parser->add_option("--card", options->card, "Write the card of the extended model");
   parser->add_option("--forget", options->forget, "Effects that the catalogue is told to forget")
       ->delimiter(',');
   parser

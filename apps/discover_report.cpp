@@ -233,11 +233,12 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
           "the "
           "model's own unknowns projected out.</p>{7}{8}"
           "<h2>Misfit by phase and channel</h2><p>chi2 per sample; 1 is the declared noise.</p>{9}"
-          "<h2>Again</h2><p><code>{10}</code></p></html>\n",
+          "<h2>Again</h2><p><code>{10}</code><br>log checksum <code>{11}</code></p></html>\n",
           escaped(std::filesystem::path(log).filename().string()),
           escaped(json.at("base_model").get<std::string>()), to_string(found.verdict), first,
           picture("residual"), answer, html(error_table(found)), picture("ranking"),
-          html(ranking_table(found)), html(misfit_table(found)), escaped(command)));
+          html(ranking_table(found)), html(misfit_table(found)), escaped(command),
+          json.value("log_checksum", "unknown")));
   write_text(directory / "discovery.json", json_text(json));
 }
 

@@ -4,81 +4,56 @@
 #include <vector>
 
 #include "experiment/parallel.hpp"
+#include "fitting/evaluate.hpp"
 
 namespace unhand::fitting {
 
 using experiment::Channel;
 
-namespace {
-
-constexpr double kDegrees = 57.29577951308232;
-
-/// Slope over time, and the sum of squares.
-struct Line {
-  double n{}, t{}, y{}, tt{}, ty{}, yy{};
-  void add(double time, double value) {
-    n += 1, t += time, y += value, tt += time * time, ty += time * value, yy += value * value;
-  }
-  double slope() const {
-    const double spread = tt - t * t / n;
-    return n > 2 && spread > 0 ? (ty - t * y / n) / spread : NAN;
-  }
-};
-
-struct Errors {
-  double landing_x{NAN}, landing_theta{NAN}, vx{NAN}, omega{NAN}, squares{}, samples{};
-};
-
-}  // namespace
-
 OutcomeErrors outcome_errors(const CampaignProblem& problem, const FitResult& fit, Share share, int threads) {
-  const auto& throws = problem.throws();
-  std::vector<Errors> errors(throws.size());
+  std::vector<std::size_t> which;
+  for (std::size_t i = 0; i < problem.throws().size(); ++i)
+    if (share == Share::all ||
+        (share == Share::train) == (problem.throws()[i].prepared.split == datasets::Split::train))
+      which.push_back(i);
+  const auto predicted = predict_some(problem, fit, which, {false, threads});
+
+  // The position in flight, all samples of all throws together.
+  std::vector<double> squares(which.size(), 0), samples(which.size(), 0);
   const auto campaign = fit.values();
-  experiment::parallel_for(throws.size(), threads, [&](std::size_t i) {
-    const CampaignThrow& thrown = throws[i];
-    if (share != Share::all && (share == Share::train) != (thrown.prepared.split == datasets::Split::train))
-      return;
-    const auto predicted = problem.predict(thrown, campaign, own_before_release(problem, thrown, fit));
-    if (predicted.channels.size() != thrown.observed.all.size() || !predicted.landed()) return;
-    Line x, theta;
-    Errors& out = errors[i];
-    const double release = thrown.release_or(predicted.detach.time);
-    for (std::size_t j = 0; j < thrown.observed.all.size(); ++j) {
+  experiment::parallel_for(which.size(), threads, [&](std::size_t k) {
+    const CampaignThrow& thrown = problem.throws()[which[k]];
+    const auto channels = problem.predict(thrown, campaign, predicted[k].own).channels;
+    for (std::size_t j = 0; j < channels.size(); ++j) {
       const auto& o = thrown.observed.all[j];
-      const double error = predicted.channels[j] - o.value;
-      if (o.channel == Channel::landing_x) out.landing_x = error;
-      if (o.channel == Channel::landing_theta) out.landing_theta = error * kDegrees;
-      if (phase_of(o, thrown.opening, release) != Phase::flight) continue;
-      if (o.channel == Channel::mocap_x) x.add(o.time - release, error);
-      if (o.channel == Channel::mocap_theta) theta.add(o.time - release, error);
-      if (o.channel == Channel::mocap_x || o.channel == Channel::mocap_z) out.squares += error * error;
-      if (o.channel == Channel::mocap_x) out.samples += 1;
+      const double detach = thrown.release_or(predicted[k].comparison.prediction.detach.time);
+      if (phase_of(o, thrown.opening, detach) != Phase::flight) continue;
+      if (o.channel != Channel::mocap_x && o.channel != Channel::mocap_z) continue;
+      squares[k] += (channels[j] - o.value) * (channels[j] - o.value);
+      if (o.channel == Channel::mocap_x) samples[k] += 1;
     }
-    if (x.n > 2) out.vx = x.slope();
-    if (theta.n > 2) out.omega = theta.slope() * kDegrees;
   });
+
   OutcomeErrors out;
-  double n[4] = {}, sums[4] = {}, squares = 0, samples = 0;
-  for (const auto& e : errors) {
-    const double values[4] = {e.landing_x, e.landing_theta, e.vx, e.omega};
+  double square = 0, n = 0, counts[experiment::kQuantityCount] = {}, sums[experiment::kQuantityCount] = {};
+  for (std::size_t k = 0; k < which.size(); ++k) {
+    square += squares[k];
+    n += samples[k];
     bool any = false;
-    for (int k = 0; k < 4; ++k)
-      if (std::isfinite(values[k])) {
-        n[k] += 1;
-        sums[k] += std::abs(values[k]);
+    for (int q = 0; q < experiment::kQuantityCount; ++q)
+      if (const auto& error = predicted[k].comparison.error[q]) {
+        counts[q] += 1;
+        sums[q] += std::abs(*error);
         any = true;
       }
     out.n += any ? 1 : 0;
-    squares += e.squares;
-    samples += e.samples;
   }
-  const auto mean = [&](int k) { return n[k] > 0 ? sums[k] / n[k] : 0.0; };
-  out.landing_x_mae = mean(0);
-  out.landing_theta_mae = mean(1);
-  out.detach_vx_mae = mean(2);
-  out.detach_omega_mae = mean(3);
-  out.trajectory_rms = samples > 0 ? std::sqrt(squares / samples) : 0;
+  const auto mean = [&](int q) { return counts[q] > 0 ? sums[q] / counts[q] : 0.0; };
+  out.detach_vx_mae = mean(0);
+  out.detach_omega_mae = mean(1);
+  out.landing_x_mae = mean(2);
+  out.landing_theta_mae = mean(3);
+  out.trajectory_rms = n > 0 ? std::sqrt(square / n) : 0;
   return out;
 }
 

@@ -5,10 +5,8 @@
 
 namespace unhand::fitting {
 
-/// Predicted with what is known before the throw: the campaign's unknowns, and the throw's own from its
-/// samples before the gripper opens. The errors of the twist at detach are the slopes over time of (predicted
-/// − observed) in flight, which is the twist of the flight model fitted to motion capture, whatever that
-/// flight model is. Throws that are not predicted to land are left out.
+/// Of predict_throws (see there): with what is known before the throw. The trajectory is that of the tracked
+/// point in flight. Throws that are not predicted to land are left out.
 OutcomeErrors outcome_errors(const CampaignProblem& problem, const FitResult& fit, Share share, int threads);
 
 }  // namespace unhand::fitting
