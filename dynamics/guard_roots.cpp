@@ -11,12 +11,12 @@ double range_of(const double (&G)[4][kMaxGuards], int i) {
   return std::max({G[0][i], G[1][i], G[2][i], G[3][i]}) - std::min({G[0][i], G[1][i], G[2][i], G[3][i]});
 }
 
-template <class AnyStepper, class AnyState>
-void retake(AnyStepper& stepper, double h, AnyState& y) {
+template <class S, int N>
+void retake(Stepper<S, N>& stepper, double h, std::type_identity_t<State<double, N>>& y) {
   if (h > 0)
-    stepper.retake(h, y);
+    stepper.retake_values(h, y);
   else
-    y = stepper.y0();
+    y = values<S, N>(stepper.y0());
 }
 
 }  // namespace
@@ -96,10 +96,11 @@ bool GuardRoots<S, N>::touches(const Stepper<S, N>& stepper, const Samples& G, i
 
 template <class S, int N>
 bool GuardRoots<S, N>::sample(Stepper<S, N>& stepper, double theta, double* G) {
-  State<S, N> y;
-  if (theta >= 1) return watch_.evaluate(stepper.t1(), stepper.y1(), G);
-  stepper.interpolate(theta, y);
-  return watch_.evaluate(stepper.t0() + theta * (stepper.t1() - stepper.t0()), y, G);
+  const double t0 = value_of(stepper.t0()), t1 = value_of(stepper.t1());
+  if (theta >= 1) return watch_.evaluate(t1, values<S, N>(stepper.y1()), G);
+  State<double, N> y;
+  stepper.interpolate_values(theta, y);
+  return watch_.evaluate(t0 + theta * (t1 - t0), y, G);
 }
 template <class S, int N>
 double GuardRoots<S, N>::sample_one(Stepper<S, N>& stepper, double theta, int guard) {
@@ -228,7 +229,7 @@ template <class S, int N>
 Entry<S, N> GuardRoots<S, N>::polish(Stepper<S, N>& stepper, const Bracket& bracket) {
   const double t0 = value_of(stepper.t0()), length = value_of(stepper.t1()) - t0;
   double h = bracket.unsafe * length;
-  State<S, N> y;
+  State<double, N> y;
   double G[kMaxGuards];
   double slope = (sample_one(stepper, std::min(1.0, bracket.unsafe + 1e-3), bracket.guard) -
                   sample_one(stepper, std::max(0.0, bracket.unsafe - 1e-3), bracket.guard)) /
@@ -236,7 +237,7 @@ Entry<S, N> GuardRoots<S, N>::polish(Stepper<S, N>& stepper, const Bracket& brac
   double h_last = h, G_last = 0, h_best = h, G_best = std::numeric_limits<double>::infinity();
   for (int k = 0; k < 8 && bracket.safe < bracket.unsafe; ++k) {
     retake(stepper, h, y);
-    watch_.evaluate(stepper.t0() + h, y, G);
+    watch_.evaluate(t0 + h, y, G);
     const double now = G[bracket.guard];
     if (std::abs(now) < G_best) {
       G_best = std::abs(now);
@@ -252,8 +253,8 @@ Entry<S, N> GuardRoots<S, N>::polish(Stepper<S, N>& stepper, const Bracket& brac
     h = next;
   }
   h = h_best;
-  retake(stepper, h, y);
-  Entry<S, N> root{watch_.phase.mode, S(stepper.t0() + h), y, S(0)};
+  Entry<S, N> root{watch_.phase.mode, S(stepper.t0() + h), stepper.y0(), S(0)};
+  if (h > 0) stepper.retake(h, root.y);
   if constexpr (!std::is_same_v<S, double>) add_root_derivative(bracket.guard, root);
   return root;
 }

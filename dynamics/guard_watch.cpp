@@ -31,14 +31,8 @@ double GuardWatch<S, N>::longest_step(double t) const {
 }
 
 template <class S, int N>
-bool GuardWatch<S, N>::evaluate(const S& t, const State<S, N>& y, double* G) const {
-  if constexpr (std::is_same_v<S, double>) {
-    system_.guards(phase, t, y, G);
-  } else {
-    State<double, N> values;
-    for (int i = 0; i < N; ++i) values[i] = value_of(y[i]);
-    system_.guards(phase, value_of(t), values, G);
-  }
+bool GuardWatch<S, N>::evaluate(double t, const State<double, N>& y, double* G) const {
+  system_.guards(phase, t, y, G);
   bool all_finite = true;
   for (int i = 0; i < count; ++i) {
     all_finite = all_finite && std::isfinite(G[i]);
@@ -51,7 +45,7 @@ template <class S, int N>
 int GuardWatch<S, N>::arm(const Entry<S, N>& entry, bool same_mode) {
   if (count == 0) return kNone;
   double G[kMaxGuards];
-  if (!evaluate(entry.t, entry.y, G)) return kNotFinite;
+  if (!evaluate(value_of(entry.t), values<S, N>(entry.y), G)) return kNotFinite;
   std::optional<std::array<double, kMaxGuards>> slope;
   int immediate = kNone;
   short_until_ = short_step_ = std::numeric_limits<double>::infinity();

@@ -29,7 +29,7 @@ class GuardWatch {
   static constexpr int kNone = -1, kNotFinite = -2;
 
   /// The signed values at (t, y); false if one is not finite.
-  bool evaluate(const S& t, const State<S, N>& y, double* G) const;
+  bool evaluate(double t, const State<double, N>& y, double* G) const;
 
   /// dG/dt along the flow at the entry, exactly.
   std::array<double, kMaxGuards> slopes(const Entry<S, N>& entry) const;

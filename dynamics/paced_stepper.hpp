@@ -71,60 +71,58 @@ class PacedSystem final : public HybridSystem<N + 1> {
   }
 };
 
-/// Any stepper of the system in σ, seen from outside as one in t.
-template <class S, int N>
-class PacedStepper final : public Stepper<S, N> {
+/// Any stepper of the system in σ, seen from outside as one in t. Its steps are fractions of steps in σ.
+template <int N>
+class PacedStepper final : public Stepper<double, N> {
  public:
-  explicit PacedStepper(std::unique_ptr<Stepper<S, N + 1>> inner) : inner_(std::move(inner)) {}
+  explicit PacedStepper(std::unique_ptr<Stepper<double, N + 1>> inner) : inner_(std::move(inner)) {}
 
-  void start(const HybridSystem<N>& system, const Phase& phase, const S& t, const State<S, N>& y) override {
+  void start(const HybridSystem<N>& system, const Phase& phase, const double& t,
+             const State<double, N>& y) override {
     system_.system = &system;
     system_.phase = phase;
-    State<S, N + 1> augmented;
+    State<double, N + 1> augmented;
     std::copy_n(y.begin(), N, augmented.begin());
     augmented[N] = t;
     this->t1_ = t;
     this->y1_ = y;
-    inner_->suggest(
-        first_length(value_of(t), values<S, N>(y)));  // the last phase's length in σ says nothing here
-    inner_->start(system_, phase, S(0), augmented);
+    inner_->suggest(first_length(t, y));  // the last phase's length in σ says nothing here
+    inner_->start(system_, phase, 0.0, augmented);
   }
 
-  StepStatus step(const S& limit, double longest) override {
+  StepStatus step(const double& limit, double longest) override {
     this->t0_ = this->t1_;
     this->y0_ = this->y1_;
-    const double pace = system_.system->pace(system_.phase, value_of(this->t0_), values<S, N>(this->y0_));
-    const StepStatus status = inner_->step(S(kFar), longest / pace);
+    const double pace = system_.system->pace(system_.phase, this->t0_, this->y0_);
+    const StepStatus status = inner_->step(kFar, longest / pace);
     count();
     if (status != StepStatus::accepted) return status;
-    if (value_of(inner_->y1()[N]) < value_of(limit)) {
-      if constexpr (!std::is_same_v<S, double>) {
-        // The length in σ is taken to depend on the parameters so that the step ends at the same t for all of
-        // them: at fixed σ, derivatives along the flow would grow with the slip and drown the rest.
-        State<S, N + 1> end = inner_->y1(), rate;
-        system_.flow(system_.phase, S(0), end, rate);
-        for (int i = 0; i < N; ++i) end[i].v -= (value_of(rate[i]) / value_of(rate[N])) * end[N].v;
-        end[N].v.setZero();
-        inner_->redirect(end);
-      }
+    if (inner_->y1()[N] < limit) {
       this->t1_ = inner_->y1()[N];
       this->y1_ = PacedSystem<N>::state(inner_->y1());
-      return value_of(this->t1_) > value_of(this->t0_) ? StepStatus::accepted : StepStatus::too_small;
+      return this->t1_ > this->t0_ ? StepStatus::accepted : StepStatus::too_small;
     }
     land(limit, this->y1_);
     this->t1_ = limit;
     return StepStatus::accepted;
   }
 
-  void interpolate(double theta, State<S, N>& y) const override {
-    State<S, N + 1> augmented;
-    inner_->interpolate(
-        fraction_at(value_of(this->t0_) + theta * (value_of(this->t1_) - value_of(this->t0_))), augmented);
+  void interpolate(double theta, State<double, N>& y) const override {
+    State<double, N + 1> augmented;
+    inner_->interpolate(fraction_at(this->t0_ + theta * (this->t1_ - this->t0_)), augmented);
     y = PacedSystem<N>::state(augmented);
   }
 
-  void retake(double h, State<S, N>& y) override {
-    land(S(this->t0_ + h), y);
+  double fraction(double h) const override { return fraction_at(this->t0_ + h); }
+  StepPoint<N> point(double theta) const override {
+    State<double, N + 1> augmented;
+    inner_->interpolate(theta, augmented);
+    const State<double, N> y = PacedSystem<N>::state(augmented);
+    return {augmented[N], y, length() * system_.system->pace(system_.phase, augmented[N], y)};
+  }
+
+  void retake(double h, State<double, N>& y) override {
+    land(this->t0_ + h, y);
     count();
   }
 
@@ -145,7 +143,7 @@ class PacedStepper final : public Stepper<S, N> {
     return change > 0 && std::isfinite(change) ? 0.05 / change : 0.0;
   }
 
-  double length() const { return value_of(inner_->t1()) - value_of(inner_->t0()); }
+  double length() const { return inner_->t1() - inner_->t0(); }
   void count() {
     this->flow_evaluations_ = inner_->flow_evaluations();
     this->rejected_ = inner_->rejected_steps();
@@ -153,13 +151,13 @@ class PacedStepper final : public Stepper<S, N> {
 
   /// The fraction of the inner step at which its dense output passes t.
   double fraction_at(double t) const {
-    const double t0 = value_of(inner_->y0()[N]), t1 = value_of(inner_->y1()[N]);
+    const double t0 = inner_->y0()[N], t1 = inner_->y1()[N];
     if (t >= t1) return 1;
     double low = 0, high = 1, theta = (t - t0) / (t1 - t0), before = 0, passed_before = t0;
     for (int k = 0; k < 60; ++k) {
-      State<S, N + 1> y;
+      State<double, N + 1> y;
       inner_->interpolate(theta, y);
-      const double passed = value_of(y[N]);
+      const double passed = y[N];
       (passed < t ? low : high) = theta;
       if (std::abs(passed - t) <= 1e-15 * (t1 - t0) || high - low < 1e-15) break;
       const double slope = (passed - passed_before) / (theta - before);
@@ -172,24 +170,24 @@ class PacedStepper final : public Stepper<S, N> {
   }
 
   /// True steps from the start of the last one until t is met.
-  void land(const S& t, State<S, N>& y) {
-    State<S, N + 1> augmented;
-    double h = fraction_at(value_of(t)) * length();
+  void land(double t, State<double, N>& y) {
+    State<double, N + 1> augmented;
+    double h = fraction_at(t) * length();
     for (int k = 0; k < 4; ++k) {
       inner_->retake(h, augmented);
-      const double missed = value_of(t) - value_of(augmented[N]);
+      const double missed = t - augmented[N];
       y = PacedSystem<N>::state(augmented);
       if (std::abs(missed) < 1e-14) break;
-      h += missed / system_.system->pace(system_.phase, value_of(augmented[N]), values<S, N>(y));
+      h += missed / system_.system->pace(system_.phase, augmented[N], y);
     }
-    // What is left of t, in value and derivatives, along the flow.
-    State<S, N + 1> rate;
-    system_.flow(system_.phase, S(h), augmented, rate);
-    const S left = (t - augmented[N]) / rate[N];
+    // What is left of t, along the flow.
+    State<double, N + 1> rate;
+    system_.flow(system_.phase, h, augmented, rate);
+    const double left = (t - augmented[N]) / rate[N];
     for (int i = 0; i < N; ++i) y[i] += left * rate[i];
   }
 
-  std::unique_ptr<Stepper<S, N + 1>> inner_;
+  std::unique_ptr<Stepper<double, N + 1>> inner_;
   PacedSystem<N> system_;
 };
 

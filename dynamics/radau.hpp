@@ -1,5 +1,5 @@
-// Radau IIA of order 5, L-stable and stiffly accurate: the stepper of stiff flows, in values and in
-// derivatives.
+// Radau IIA of order 5, L-stable and stiffly accurate: an implicit stepper of another family, to compare
+// with.
 #pragma once
 
 #include <Eigen/LU>
@@ -18,34 +18,28 @@ namespace unhand::dynamics {
 ///
 /// Its stages are of high order themselves, so it keeps long steps where a flow follows a slowly moving
 /// equilibrium of its stiff part, as slip does, and where the linearisation at the start of a step (all that
-/// a Rosenbrock method knows) does not hold to its end. With S = Dual the iteration runs until the
-/// derivatives stand still too: by the implicit function theorem they are then those of the discrete
-/// solution, exactly, for the price of first derivatives only.
-template <class S, int N>
-class Radau final : public SingleStep<Radau<S, N>, S, N> {
+/// a Rosenbrock method knows) does not hold to its end.
+template <int N>
+class Radau final : public SingleStep<Radau<N>, double, N> {
  public:
   static constexpr bool kPredictive = true;
   static constexpr double kOrder = 4;
-  using SingleStep<Radau<S, N>, S, N>::SingleStep;
+  /// `seeded`: the parameters of the system carry derivatives of their own.
+  explicit Radau(const Tolerances& tolerances, bool seeded = false)
+      : SingleStep<Radau<N>, double, N>(tolerances), seeded_(seeded) {}
 
   void prepare(bool fresh) {
     State<double, N> ft;
-    flow_jacobian<N>(*this->system_, this->phase_, value_of(this->t0_), values<S, N>(this->y0_), f0_value_,
-                     jacobian_, ft, !std::is_same_v<S, double>);
+    flow_jacobian<N>(*this->system_, this->phase_, this->t0_, this->y0_, f0_, jacobian_, ft, seeded_);
     ++this->flow_evaluations_;
-    if constexpr (std::is_same_v<S, double>)
-      f0_ = f0_value_;
-    else
-      this->flow(this->t0_, this->y0_, f0_);
-    this->system_->error_scale(this->phase_, this->tolerances_, values<S, N>(this->y0_),
-                               values<S, N>(this->y0_), scale_);
+    this->system_->error_scale(this->phase_, this->tolerances_, this->y0_, this->y0_, scale_);
     extrapolate_ = !fresh;
     refine_ = fresh;
     factored_ = 0;
   }
-  double guess() const { return this->first_step(f0_value_); }
+  double guess() const { return this->first_step(f0_); }
 
-  double attempt(const S& h) {
+  double attempt(const double& h) {
     Stages z = start_values(h);
     if (!solve(h, z)) {
       extrapolate_ = false;
@@ -65,26 +59,25 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
     return error;
   }
 
-  void interpolate(double theta, State<S, N>& y) const override { collocation(theta, y); }
+  void interpolate(double theta, State<double, N>& y) const override { collocation(theta, y); }
 
-  void retake(double h, State<S, N>& y) override {
-    const double whole = value_of(h_before_);
+  void retake(double h, State<double, N>& y) override {
+    const double whole = h_before_;
     Stages z;
     for (int k = 0; k < 3; ++k) {
       collocation(kC[k] * h / whole, z[k]);
       for (int i = 0; i < N; ++i) z[k][i] -= this->y0_[i];
     }
-    if (solve(S(h), z))
+    if (solve(h, z))
       for (int i = 0; i < N; ++i) y[i] = this->y0_[i] + z[2][i];
     else
       collocation(h / whole, y);  // a shorter step than one that converged does too: not expected
   }
 
  private:
-  using Stages = std::array<State<S, N>, 3>;
+  using Stages = std::array<State<double, N>, 3>;
   using Matrix = Eigen::Matrix<double, N, N>;
   using ComplexMatrix = Eigen::Matrix<std::complex<double>, N, N>;
-  static constexpr int kParts = std::is_same_v<S, double> ? 1 : 1 + kDualSize;
   static constexpr double kRoot6 = 2.449489742783178;
   static constexpr double kC[3] = {(4 - kRoot6) / 10, (4 + kRoot6) / 10, 1};
   // The eigenvalues of the inverse Runge-Kutta matrix, γ and α ± iβ, and the transformation that shows them.
@@ -99,13 +92,8 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
       {-0.50287263494578687595, 2.5719269498556054292, -0.59603920482822492497}};
   static constexpr double kError[3] = {-(13 + 7 * kRoot6) / 3, (-13 + 7 * kRoot6) / 3, -1.0 / 3};
 
-  static double part(const double& x, int) { return x; }
-  static double part(const Dual& x, int k) { return k == 0 ? x.a : x.v[k - 1]; }
-  static void set_part(double& x, int, double value) { x = value; }
-  static void set_part(Dual& x, int k, double value) { (k == 0 ? x.a : x.v[k - 1]) = value; }
-
   /// The collocation polynomial of the accepted step: cubic through its start and its stages.
-  void collocation(double theta, State<S, N>& y) const {
+  void collocation(double theta, State<double, N>& y) const {
     constexpr double a = kC[0], b = kC[1];
     const double l1 = theta * (theta - b) * (theta - 1) / (a * (a - b) * (a - 1));
     const double l2 = theta * (theta - a) * (theta - 1) / (b * (b - a) * (b - 1));
@@ -114,10 +102,10 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
       y[i] = start_[i] + l1 * accepted_[0][i] + l2 * accepted_[1][i] + l3 * accepted_[2][i];
   }
 
-  Stages start_values(const S& h) const {
+  Stages start_values(double h) const {
     Stages z{};
     if (!extrapolate_) return z;
-    const double ratio = value_of(h) / value_of(h_before_);
+    const double ratio = h / h_before_;
     for (int k = 0; k < 3; ++k) {
       collocation(1 + kC[k] * ratio, z[k]);
       for (int i = 0; i < N; ++i) z[k][i] -= this->y0_[i];
@@ -137,101 +125,78 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
   }
 
   /// Simplified Newton iterations for the stage increments z. False if they do not converge.
-  bool solve(const S& h, Stages& z) {
-    constexpr int kMaxIterations = 12, kMaxDualIterations = 40;
-    const double hv = value_of(h);
-    factor(hv);
+  bool solve(double h, Stages& z) {
+    constexpr int kMaxIterations = 12;
+    factor(h);
     // A fiftieth of the error tolerance, or what rounding leaves.
     double target = 0.02;
     for (int i = 0; i < N; ++i)
-      target = std::max(target,
-                        1e-14 * (std::abs(value_of(this->y0_[i])) + std::abs(hv * f0_value_[i])) / scale_[i]);
+      target = std::max(target, 1e-14 * (std::abs(this->y0_[i]) + std::abs(h * f0_[i])) / scale_[i]);
     Stages w, f;
     transform(kInverse, z, w);
     double before = 0, contraction = 0.5;
-    bool values_converged = false;
-    for (int iteration = 0; iteration < (values_converged ? kMaxDualIterations : kMaxIterations);
-         ++iteration) {
+    for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
       for (int k = 0; k < 3; ++k) {
-        State<S, N> y;
+        State<double, N> y;
         for (int i = 0; i < N; ++i) y[i] = this->y0_[i] + z[k][i];
         this->flow(this->t0_ + kC[k] * h, y, f[k]);
       }
       Stages g;
       transform(kInverse, f, g);
       // g − (Λ/h) w is the defect of the transformed equations, Λ the real block form of the eigenvalues.
-      Eigen::Matrix<double, N, kParts> first;
-      Eigen::Matrix<std::complex<double>, N, kParts> second;
-      const S inverse = 1.0 / h;
+      Eigen::Matrix<double, N, 1> first;
+      Eigen::Matrix<std::complex<double>, N, 1> second;
       for (int i = 0; i < N; ++i) {
-        const S d0 = g[0][i] - kGamma * inverse * w[0][i];
-        const S d1 = g[1][i] - inverse * (kAlpha * w[1][i] - kBeta * w[2][i]);
-        const S d2 = g[2][i] - inverse * (kAlpha * w[2][i] + kBeta * w[1][i]);
-        for (int p = 0; p < kParts; ++p) {
-          first(i, p) = part(d0, p);
-          second(i, p) = {part(d1, p), part(d2, p)};
-        }
+        first[i] = g[0][i] - kGamma / h * w[0][i];
+        second[i] = {g[1][i] - (kAlpha * w[1][i] - kBeta * w[2][i]) / h,
+                     g[2][i] - (kAlpha * w[2][i] + kBeta * w[1][i]) / h};
       }
       first = real_.solve(first).eval();
       second = complex_.solve(second).eval();
-      double moved = 0, derivative_moved = 0, derivative_size = 0;
+      double moved = 0;
       for (int i = 0; i < N; ++i) {
-        for (int p = 0; p < kParts; ++p) {
-          const double add[3] = {first(i, p), second(i, p).real(), second(i, p).imag()};
-          for (int k = 0; k < 3; ++k) {
-            const double now = part(w[k][i], p) + add[k];
-            set_part(w[k][i], p, now);
-            if (p == 0) {
-              moved += (add[k] / scale_[i]) * (add[k] / scale_[i]);
-            } else {
-              derivative_moved =
-                  std::max(derivative_moved,
-                           std::abs(add[k]) / (1e-3 + std::abs(now) + std::abs(part(this->y0_[i], p))));
-              derivative_size = std::max(derivative_size, std::abs(now));
-            }
-          }
+        const double add[3] = {first[i], second[i].real(), second[i].imag()};
+        for (int k = 0; k < 3; ++k) {
+          w[k][i] += add[k];
+          moved += (add[k] / scale_[i]) * (add[k] / scale_[i]);
         }
       }
       transform(kT, w, z);
       moved = std::sqrt(moved / (3 * N));
-      finite_ = std::isfinite(moved) && std::isfinite(derivative_size);
+      finite_ = std::isfinite(moved);
       if (!finite_) return false;
       if (iteration > 0 && before > 0) contraction = std::max(moved / before, 1e-6);
-      if (!values_converged && iteration > 0 && contraction >= 0.99 && moved > target) return false;
+      if (iteration > 0 && contraction >= 0.99 && moved > target) return false;
       before = moved;
       const double left = contraction < 1 ? moved * contraction / (1 - contraction) : moved;
-      values_converged = values_converged || left <= target;
-      if (values_converged && (kParts == 1 || derivative_moved <= 1e-11)) return true;
+      if (left <= target) return true;
     }
-    return values_converged;
+    return false;
   }
 
   static void transform(const double (&matrix)[3][3], const Stages& from, Stages& to) {
     for (int i = 0; i < N; ++i) {
-      const S a = from[0][i], b = from[1][i], c = from[2][i];
+      const double a = from[0][i], b = from[1][i], c = from[2][i];
       for (int k = 0; k < 3; ++k) to[k][i] = matrix[k][0] * a + matrix[k][1] * b + matrix[k][2] * c;
     }
   }
 
-  double estimate(const S& h, const Stages& z) {
-    const double hv = value_of(h);
+  double estimate(double h, const Stages& z) {
     Eigen::Matrix<double, N, 1> combined, e;
     State<double, N> error;
     for (int i = 0; i < N; ++i)
-      combined[i] =
-          (kError[0] * value_of(z[0][i]) + kError[1] * value_of(z[1][i]) + kError[2] * value_of(z[2][i])) /
-          hv;
-    for (int i = 0; i < N; ++i) e[i] = combined[i] + f0_value_[i];
+      combined[i] = (kError[0] * z[0][i] + kError[1] * z[1][i] + kError[2] * z[2][i]) / h;
+    for (int i = 0; i < N; ++i) e[i] = combined[i] + f0_[i];
     e = real_.solve(e).eval();
     for (int i = 0; i < N; ++i) error[i] = e[i];
     double size = scaled(error);
     // On transients, where the estimate of a very stiff flow is too large: once more through the flow.
     if (size > 1 && refine_) {
-      State<S, N> y;
-      State<S, N> f;
+      State<double, N> y;
+      State<double, N> f;
       for (int i = 0; i < N; ++i) y[i] = this->y0_[i] + error[i];
       this->flow(this->t0_, y, f);
-      for (int i = 0; i < N; ++i) e[i] = combined[i] + value_of(f[i]);
+      for (int i = 0; i < N; ++i) e[i] = combined[i] + f[i];
       e = real_.solve(e).eval();
       for (int i = 0; i < N; ++i) error[i] = e[i];
       const double again = scaled(error);
@@ -242,20 +207,18 @@ class Radau final : public SingleStep<Radau<S, N>, S, N> {
 
   double scaled(const State<double, N>& error) const {
     State<double, N> scale;
-    this->system_->error_scale(this->phase_, this->tolerances_, values<S, N>(this->y0_),
-                               values<S, N>(this->y1_), scale);
+    this->system_->error_scale(this->phase_, this->tolerances_, this->y0_, this->y1_, scale);
     return scaled_norm<N>(error, scale);
   }
 
   Matrix jacobian_;
   Eigen::PartialPivLU<Matrix> real_;
   Eigen::PartialPivLU<ComplexMatrix> complex_;
-  State<double, N> f0_value_{}, scale_{};
-  State<S, N> f0_{}, start_{};
+  State<double, N> f0_{}, scale_{}, start_{};
   Stages accepted_{};
-  S h_before_{};
-  double factored_{};
+  double h_before_{}, factored_{};
   bool extrapolate_{}, refine_{}, finite_{true};
+  bool seeded_;
 };
 
 }  // namespace unhand::dynamics

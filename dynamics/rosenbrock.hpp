@@ -10,18 +10,21 @@ namespace unhand::dynamics {
 /// Rodas5P, [Steinebach2023]: one exact Jacobian, one inverse and eight evaluations a step; no
 /// Newton iteration, so nothing fails to converge. Dense output of order 4. Unlike RODAS ([HairerWanner1996]
 /// IV.7) it keeps its order where the solution follows a slowly moving equilibrium of the stiff part, which
-/// is what slip does: there RODAS needs ten times the steps. Values only: the tangent of a Rosenbrock step
-/// would need the derivative of its Jacobian (Radau carries derivatives through stiff phases).
+/// is what slip does: there RODAS needs ten times the steps. Values only: the exact
+/// tangent of a step would need the derivative of its Jacobian (TangentStepper carries derivatives beside
+/// it).
 template <int N>
 class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
  public:
   static constexpr bool kPredictive = true;
   static constexpr double kOrder = 5;
-  using SingleStep<Rosenbrock<N>, double, N>::SingleStep;
+  /// `seeded`: the parameters of the system carry derivatives of their own.
+  explicit Rosenbrock(const Tolerances& tolerances, bool seeded = false)
+      : SingleStep<Rosenbrock<N>, double, N>(tolerances), seeded_(seeded) {}
 
   void prepare(bool /*fresh*/) {
     ++this->flow_evaluations_;
-    flow_jacobian<N>(*this->system_, this->phase_, this->t0_, this->y0_, f0_, jacobian_, ft_);
+    flow_jacobian<N>(*this->system_, this->phase_, this->t0_, this->y0_, f0_, jacobian_, ft_, seeded_);
   }
   double guess() const { return this->first_step(f0_); }
 
@@ -136,6 +139,7 @@ class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
   alignas(16) double k_[kStages][kPadded]{}, kept_[kStages][kPadded]{};
   mutable std::array<State<double, N>, 3> bend_{};
   mutable bool bent_{};
+  bool seeded_;
 };
 
 }  // namespace unhand::dynamics

@@ -50,6 +50,9 @@ class SmallInverse {
       for (int i = 0; i < N; ++i) column_[from[j]][i] = work[i][N + j];
   }
 
+  /// An entry of A⁻¹.
+  double operator()(int row, int column) const { return column_[column][row]; }
+
   /// y = A⁻¹ x
   void multiply(const Vector& x, Vector& y) const {
     alignas(16) double sum[kPadded]{};

@@ -15,9 +15,28 @@ enum class StepStatus {
   not_finite,  ///< the flow returned NaN or infinity however short the step
 };
 
+template <class S, int N>
+State<double, N> values(const State<S, N>& y) {
+  if constexpr (std::is_same_v<S, double>) {
+    return y;
+  } else {
+    State<double, N> out;
+    for (int i = 0; i < N; ++i) out[i] = value_of(y[i]);
+    return out;
+  }
+}
+
+/// A point of a step: the time, the state and dt/dθ, θ the fraction of the step in the variable it is taken
+/// in.
+template <int N>
+struct StepPoint {
+  double t{};
+  State<double, N> y{};
+  double speed{};
+};
+
 /// Advances one phase. `start` fixes where; each `step` replaces the last accepted step [t0, t1] by the next
-/// one. With S = Dual, the values choose the step and the derivatives are those of the discrete solution,
-/// exactly.
+/// one. With S = Dual the values alone choose the step.
 template <class S, int N>
 class Stepper {
  public:
@@ -36,11 +55,30 @@ class Stepper {
   /// times are polished with.
   virtual void retake(double h, State<S, N>& y) = 0;
 
+  /// The values of both alone, as searches for roots need them.
+  virtual void interpolate_values(double theta, State<double, N>& y) const {
+    State<S, N> at;
+    interpolate(theta, at);
+    y = values<S, N>(at);
+  }
+  virtual void retake_values(double h, State<double, N>& y) {
+    State<S, N> at;
+    retake(h, at);
+    y = values<S, N>(at);
+  }
+
+  /// The last step in the variable that it was taken in: the fraction at which `h` has passed since t0, and
+  /// the point at a fraction.
+  virtual double fraction(double h) const { return h / (value_of(t1_) - value_of(t0_)); }
+  virtual StepPoint<N> point(double theta) const {
+    const double length = value_of(t1_) - value_of(t0_);
+    StepPoint<N> at{value_of(t0_) + theta * length, {}, length};
+    interpolate_values(theta, at.y);
+    return at;
+  }
+
   /// The length with which the next start tries its first step, instead of the one remembered.
   virtual void suggest(double /*h*/) {}
-
-  /// Gives the end of the last step other derivatives; its values stay.
-  void redirect(const State<S, N>& y1) { y1_ = y1; }
 
   const S& t0() const { return t0_; }
   const S& t1() const { return t1_; }
@@ -56,17 +94,6 @@ class Stepper {
   long flow_evaluations_{};
   long rejected_{};
 };
-
-template <class S, int N>
-State<double, N> values(const State<S, N>& y) {
-  if constexpr (std::is_same_v<S, double>) {
-    return y;
-  } else {
-    State<double, N> out;
-    for (int i = 0; i < N; ++i) out[i] = value_of(y[i]);
-    return out;
-  }
-}
 
 /// Root mean square of e_i / scale_i; NaN if anything is.
 template <int N>
@@ -185,9 +212,8 @@ class SingleStep : public Stepper<S, N> {
   Derived& self() { return static_cast<Derived&>(*this); }
 };
 
-/// The ways of stepping a flow; `automatic` takes dormand_prince for smooth modes; for stiff ones rosenbrock
-/// with double and radau with Dual; for mixed ones dormand_prince that goes over to rosenbrock, or radau with
-/// Dual.
+/// The ways of stepping a flow; `automatic` takes dormand_prince for smooth modes, rosenbrock for stiff ones,
+/// and dormand_prince that goes over to rosenbrock for mixed ones.
 enum class Method { automatic, dormand_prince, rosenbrock, radau, cvode };
 
 /// CVODE (SUNDIALS) behind the same interface: Adams for smooth, BDF with the exact Jacobian for the other

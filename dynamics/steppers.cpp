@@ -6,21 +6,39 @@
 #include "dynamics/paced_stepper.hpp"
 #include "dynamics/radau.hpp"
 #include "dynamics/switching_stepper.hpp"
+#include "dynamics/tangent_stepper.hpp"
 
 namespace unhand::dynamics {
 namespace {
 
-template <class S, int N>
-std::unique_ptr<Stepper<S, N>> make_stepper(Method method, FlowKind kind, const Tolerances& tolerances) {
-  if (method == Method::dormand_prince) return std::make_unique<DormandPrince<S, N>>(tolerances);
-  if (method == Method::radau) return std::make_unique<Radau<S, N>>(tolerances);
-  if constexpr (std::is_same_v<S, double>) {
-    if (method == Method::automatic) return std::make_unique<SwitchingStepper<N>>(tolerances);
-    if (method == Method::rosenbrock) return std::make_unique<Rosenbrock<N>>(tolerances);
-    return make_cvode_stepper<N>(tolerances, kind);
+template <int N>
+std::unique_ptr<Stepper<double, N>> make_stepper(Method method, FlowKind kind, const Tolerances& tolerances,
+                                                 bool seeded) {
+  switch (method) {
+    case Method::dormand_prince:
+      return std::make_unique<DormandPrince<double, N>>(tolerances);
+    case Method::rosenbrock:
+      return std::make_unique<Rosenbrock<N>>(tolerances, seeded);
+    case Method::radau:
+      return std::make_unique<Radau<N>>(tolerances, seeded);
+    case Method::cvode:
+      if (seeded)
+        throw std::invalid_argument("integrate: method cvode has no derivatives; use automatic with Dual");
+      return make_cvode_stepper<N>(tolerances, kind);
+    case Method::automatic:
+      break;
   }
-  throw std::invalid_argument(
-      "integrate: methods rosenbrock and cvode have no derivatives; use automatic with Dual");
+  return std::make_unique<SwitchingStepper<N>>(tolerances, seeded);
+}
+
+/// The values, in time or in the pace of the flow.
+template <int N>
+std::unique_ptr<Stepper<double, N>> make_stepper(Method method, FlowKind kind, const Tolerances& tolerances,
+                                                 bool seeded, bool paced) {
+  if constexpr (N + 2 <= kDualSize)
+    if (paced)
+      return std::make_unique<PacedStepper<N>>(make_stepper<N + 1>(method, kind, tolerances, seeded));
+  return make_stepper<N>(method, kind, tolerances, seeded);
 }
 
 }  // namespace
@@ -29,15 +47,17 @@ template <class S, int N>
 Stepper<S, N>& Steppers<S, N>::of(FlowKind kind, bool paced) {
   if (kind == FlowKind::frozen) return frozen_;
   auto& stepper = made_[static_cast<int>(kind)][paced];
-  if (!stepper) {
-    if constexpr (N + 2 <= kDualSize) {
-      if (paced) {
-        stepper = std::make_unique<PacedStepper<S, N>>(
-            make_stepper<S, N + 1>(method(kind), kind, options_.tolerances));
-        return *stepper;
-      }
-    }
-    stepper = make_stepper<S, N>(method(kind), kind, options_.tolerances);
+  if (stepper) return *stepper;
+  const Method how = method(kind);
+  constexpr bool seeded = !std::is_same_v<S, double>;
+  if constexpr (seeded) {
+    if (how == Method::dormand_prince && !paced)
+      stepper = std::make_unique<DormandPrince<S, N>>(options_.tolerances);
+    else
+      stepper =
+          std::make_unique<TangentStepper<N>>(make_stepper<N>(how, kind, options_.tolerances, seeded, paced));
+  } else {
+    stepper = make_stepper<N>(how, kind, options_.tolerances, seeded, paced);
   }
   return *stepper;
 }
@@ -56,8 +76,7 @@ template <class S, int N>
 Method Steppers<S, N>::method(FlowKind kind) const {
   if (options_.method != Method::automatic) return options_.method;
   if (kind == FlowKind::smooth) return Method::dormand_prince;
-  if (kind == FlowKind::mixed && std::is_same_v<S, double>) return Method::automatic;
-  return std::is_same_v<S, double> ? Method::rosenbrock : Method::radau;
+  return kind == FlowKind::mixed ? Method::automatic : Method::rosenbrock;
 }
 
 template class Steppers<double, 2>;

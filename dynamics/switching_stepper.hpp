@@ -13,7 +13,9 @@ namespace unhand::dynamics {
 template <int N>
 class SwitchingStepper final : public Stepper<double, N> {
  public:
-  explicit SwitchingStepper(const Tolerances& tolerances) : explicit_(tolerances), implicit_(tolerances) {}
+  /// `seeded`: the parameters of the system carry derivatives of their own.
+  explicit SwitchingStepper(const Tolerances& tolerances, bool seeded = false)
+      : explicit_(tolerances), implicit_(tolerances, seeded) {}
 
   void start(const HybridSystem<N>& system, const Phase& phase, const double& t,
              const State<double, N>& y) override {
