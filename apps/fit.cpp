@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <thread>
 
@@ -19,6 +20,7 @@ namespace unhand::apps {
 namespace {
 
 constexpr int kDefaultFolds = 5;
+constexpr double kWildMisfit = 900;  ///< χ² per sample of a channel that is told of: 30 σ
 
 std::vector<std::string> surface_names() {
   std::vector<std::string> out;
@@ -115,6 +117,14 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
   if (fit.outcome == fitting::FitOutcome::iterations_spent)
     fmt::print(stderr, "unhand: the fit stopped before it had converged: {}\n", fit.message);
   for (const auto& note : problem.notes()) fmt::print(stderr, "unhand: {}\n", note);
+
+  for (const auto& m : fit.misfit)
+    if (m.chi2_per_sample() > kWildMisfit)
+      fmt::print(
+          stderr,
+          "unhand: {} ({}) is off by {:.0f} sigma: it hardly counts in the fit. Another unit, clock or "
+          "frame, or not this model?\n",
+          to_string(m.channel), to_string(m.phase), std::sqrt(m.chi2_per_sample()));
 
   const Json json = fit_json(answer, request);
   Outputs outputs;

@@ -1,0 +1,201 @@
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+
+#include "fitting/evaluate.hpp"
+#include "tests/support/small_campaign.hpp"
+
+namespace unhand::fitting {
+namespace {
+
+using datasets::Split;
+using experiment::Channel;
+using testing::HasSubstr;
+using testing_support::small_design;
+using testing_support::truth_of;
+
+constexpr const char* kLaw = "limit_surface_disc";
+
+datasets::ThrowLog campaign(const std::string& model, std::uint64_t seed = 11) {
+  return experiment::generate_campaign(small_design(model), seed);
+}
+
+/// The campaign of the disc, made once.
+const datasets::ThrowLog& disc_log() {
+  static const datasets::ThrowLog log = campaign(kLaw);
+  return log;
+}
+
+CampaignProblem problem_of(const datasets::ThrowLog& log, const std::string& model = kLaw) {
+  CampaignOptions options;
+  options.model = model;
+  return CampaignProblem(log, "(in memory)", options);
+}
+
+FitResult fit_of_log(const datasets::ThrowLog& log, int threads = 0) {
+  FitOptions options;
+  options.threads = threads;
+  return fit(problem_of(log), options);
+}
+
+const FitResult& disc_fit() {
+  static const FitResult result = fit_of_log(disc_log());
+  return result;
+}
+
+void expect_truth(const FitResult& result, const std::string& model) {
+  for (const auto& u : result.campaign) {
+    const double truth = truth_of(small_design(model), u.unknown.name);
+    // One campaign, whose seed is fixed: three sigma, and a sigma that says something.
+    EXPECT_NEAR(u.value, truth, 3 * u.sigma) << u.unknown.name;
+    EXPECT_LT(u.sigma, 0.05 * truth) << u.unknown.name;
+    EXPECT_TRUE(std::isfinite(u.data_sigma)) << u.unknown.name;
+  }
+}
+
+/// Moves by less than `sigmas` of the fit to the log without damage.
+void expect_unmoved(const FitResult& result, double sigmas, const std::string& damage) {
+  ASSERT_EQ(result.outcome, FitOutcome::converged) << damage << ": " << result.message;
+  for (std::size_t k = 0; k < result.campaign.size(); ++k)
+    EXPECT_NEAR(result.campaign[k].value, disc_fit().campaign[k].value, sigmas * disc_fit().campaign[k].sigma)
+        << damage << ": " << result.campaign[k].unknown.name;
+}
+
+class EveryLaw : public testing::TestWithParam<const char*> {};
+
+TEST_P(EveryLaw, ParametersComeBack) {
+  const auto result = fit(problem_of(campaign(GetParam()), GetParam()));
+  ASSERT_EQ(result.outcome, FitOutcome::converged) << result.message;
+  EXPECT_EQ(result.throws.size(), 12u);
+  expect_truth(result, GetParam());
+  EXPECT_TRUE(result.open.empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(Throws, EveryLaw,
+                         testing::Values("limit_surface_disc", "limit_surface", "sliding_pivot",
+                                         "gripper_delay"));
+
+TEST(ThrowFit, NothingLeaksFromTestThrows) {
+  auto other = disc_log();
+  for (auto& one : other.throws) {
+    if (one.split != Split::test) continue;
+    for (double& x : one.ft->wrench.data) x *= 1.3;
+    for (double& x : one.ft->normal_force.data) x *= 0.9;
+    for (double& x : one.mocap->pose.data) x += 0.05;
+    for (double& x : one.landing->pose.data) x -= 0.2;
+  }
+  const auto result = fit_of_log(other);
+  EXPECT_EQ(result.values(), disc_fit().values());  // bit for bit
+  EXPECT_EQ(result.covariance, disc_fit().covariance);
+  EXPECT_EQ(result.own_spread, disc_fit().own_spread);
+}
+
+TEST(ThrowFit, ThreadsDoNotMatter) {
+  const auto one = fit_of_log(disc_log(), 1), two = fit_of_log(disc_log(), 2);
+  EXPECT_EQ(one.values(), two.values());
+  EXPECT_EQ(one.covariance, two.covariance);
+  const auto problem = problem_of(disc_log());
+  const auto a = predict_some(problem, one, {0, 5, 9}, {true, 1}),
+             b = predict_some(problem, one, {0, 5, 9}, {true, 2});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].comparison.prediction.landing.pose.x, b[i].comparison.prediction.landing.pose.x);
+    EXPECT_EQ(a[i].sigma->landing_theta, b[i].sigma->landing_theta);
+  }
+}
+
+TEST(ThrowFit, NanWhereMocapIsNotValidIsNotSeen) {
+  auto zero = disc_log(), nan = disc_log();
+  for (auto* log : {&zero, &nan})
+    for (auto& one : log->throws) {
+      auto& mocap = *one.mocap;
+      if (mocap.valid.empty()) mocap.valid.assign(mocap.time.rows, 1);
+      for (std::size_t i = 20; i < 24; ++i) {
+        mocap.valid[i] = 0;
+        for (std::size_t c = 0; c < 3; ++c)
+          mocap.pose.data[3 * i + c] = log == &nan ? std::numeric_limits<double>::quiet_NaN() : 0.0;
+      }
+    }
+  EXPECT_NO_THROW(datasets::validate(nan));
+  EXPECT_EQ(fit_of_log(nan).values(), fit_of_log(zero).values());
+  // Anywhere else it is an error of the log.
+  auto bad = disc_log();
+  bad.throws[3].ft->wrench.data[17] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(datasets::validate(bad), datasets::LogError);
+}
+
+TEST(ThrowFit, OneWildThrowCountsLess) {
+  auto wild = disc_log();
+  const auto bad =
+      static_cast<std::size_t>(std::find_if(wild.throws.begin(), wild.throws.end(),
+                                            [](const auto& t) { return t.split == Split::train; }) -
+                               wild.throws.begin());
+  for (double& x : wild.throws[bad].ft->wrench.data) x *= 1.5;
+  for (std::size_t i = 0; i < wild.throws[bad].mocap->time.rows; ++i)
+    wild.throws[bad].mocap->pose.data[3 * i + 2] *= 1.2;
+  wild.throws[bad].landing->pose.data[0] += 0.3;
+  const auto result = fit_of_log(wild);
+  // One throw in eight less, and what is left of its pull: no more than the uncertainty claimed.
+  expect_unmoved(result, 2, "wild throw");
+  EXPECT_LT(result.throws[bad].weight, 0.5);
+}
+
+TEST(ThrowFit, DeadForceChannelIsDropped) {
+  auto dead = disc_log();
+  for (auto& one : dead.throws)
+    for (std::size_t i = 0; i < one.ft->time.rows; ++i) one.ft->wrench.data[3 * i] = 0.125;
+  const auto problem = problem_of(dead);
+  EXPECT_THAT(problem.notes(), testing::Contains(HasSubstr("ft.fx is dead")));
+  for (const auto& t : problem.throws())
+    for (const auto& o : t.observed.all) ASSERT_NE(o.channel, Channel::wrench_fx);
+  expect_unmoved(fit(problem), 3, "dead channel");  // less data: another estimate, of the same thing
+}
+
+TEST(ThrowFit, MocapDropouts) {
+  auto gaps = disc_log();
+  for (auto& one : gaps.throws) {
+    auto& mocap = *one.mocap;
+    mocap.valid.assign(mocap.time.rows, 1);
+    for (std::size_t i = 0; i < mocap.time.rows; ++i) mocap.valid[i] = i % 10 < 3;
+  }
+  expect_unmoved(fit_of_log(gaps), 3, "seven of ten mocap samples lost");
+}
+
+TEST(ThrowFit, ChannelInAnotherUnitDoesNotMoveIt) {
+  auto grams = disc_log();
+  for (auto& one : grams.throws)
+    for (std::size_t i = 0; i < one.ft->time.rows; ++i) one.ft->wrench.data[3 * i + 2] *= 1000;  // N mm
+  const auto result = fit_of_log(grams);
+  bool seen = false;
+  for (const auto& m : result.misfit)
+    if (m.channel == Channel::wrench_tau && m.phase == Phase::release) {
+      seen = true;
+      EXPECT_LT(m.weight, 0.1);
+    }
+  EXPECT_TRUE(seen);
+  for (const auto& u : result.campaign)
+    EXPECT_NEAR(u.value, truth_of(small_design(kLaw), u.unknown.name), 0.2 * u.value) << u.unknown.name;
+}
+
+TEST(ThrowFit, SaysWhyThereIsNothingToFit) {
+  auto bare = disc_log();
+  for (auto& one : bare.throws) {
+    one.ft.reset();
+    one.mocap.reset();
+    one.landing.reset();
+    one.detach_time = 0.1;
+    one.grasp_angle = -0.7;
+  }
+  try {
+    problem_of(bare);
+    FAIL() << "accepted";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("nothing to fit to"));
+  }
+  auto test_only = disc_log();
+  for (auto& one : test_only.throws) one.split = Split::test;
+  EXPECT_EQ(fit_of_log(test_only).outcome, FitOutcome::no_start);
+}
+
+}  // namespace
+}  // namespace unhand::fitting
