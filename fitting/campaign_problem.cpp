@@ -63,7 +63,15 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
     // nothing to start from
   } else if (!grips.empty() && options.model != "gripper_delay") {
     try {
-      first_guess_ = experiment::estimate_friction(log, prepared, options.model).parameters;
+      const auto guess = experiment::estimate_friction(log, prepared, options.model).parameters;
+      const bool is_patch = guess.mu > 0.02 && guess.mu < 4 && guess.length > 2e-4 && guess.length < 0.1;
+      if (is_patch)
+        first_guess_ = guess;
+      else
+        notes_.push_back(
+            fmt::format("the pads' wrenches while the force vanishes say mu = {:.3g}, length = {:.3g} m, which is no "
+                        "patch: not used as a start",
+                        guess.mu, guess.length));
     } catch (const std::invalid_argument&) {  // too few samples: the default start has to do
     }
   } else if (options.model == "gripper_delay") {

@@ -1,15 +1,14 @@
 #include "fitting/fit.hpp"
 
-#include <ceres/ceres.h>
 #include <fmt/core.h>
 
 #include <Eigen/Dense>
-#include <atomic>
-#include <chrono>
 #include <cmath>
 
 #include "experiment/parallel.hpp"
+#include "fitting/misfit.hpp"
 #include "fitting/normal_equations.hpp"
+#include "fitting/throw_cost.hpp"
 
 namespace unhand::fitting {
 
@@ -47,139 +46,10 @@ double FitResult::correlation(std::size_t i, std::size_t j) const {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
-/// What all costs share: unknowns in units of their scales.
-struct Shared {
-  const CampaignProblem& problem;
-  const FitOptions& options;
-  std::vector<double> scale, own_scale, own_sigma;  ///< own_sigma: 1 σ of the throws' own unknowns
-  Weighting weighting;
-  std::atomic<long> jacobian_nanoseconds{0};
-
-  std::vector<double> unscaled(const double* x) const {
-    std::vector<double> out(scale.size());
-    for (std::size_t k = 0; k < out.size(); ++k) out[k] = x[k] * scale[k];
-    return out;
-  }
-  std::vector<double> own_unscaled(const double* x) const {
-    std::vector<double> out(own_scale.size());
-    for (std::size_t k = 0; k < out.size(); ++k) out[k] = x[k] * own_scale[k];
-    return out;
-  }
-};
-
-/// One throw's robust, whitened residual with the priors of its own unknowns below it.
-class ThrowCost final : public ceres::CostFunction {
- public:
-  ThrowCost(Shared& shared, const CampaignThrow& thrown) : shared_(shared), throw_(thrown) {
-    mutable_parameter_block_sizes()->push_back(static_cast<int>(shared.scale.size()));
-    mutable_parameter_block_sizes()->push_back(static_cast<int>(shared.own_scale.size()));
-    set_num_residuals(static_cast<int>(thrown.observed.all.size() + shared.own_scale.size()));
-  }
-
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    const auto begin = Clock::now();
-    const auto campaign = shared_.unscaled(parameters[0]), own = shared_.own_unscaled(parameters[1]);
-    Linearisation l;
-    try {
-      l = shared_.problem.linearise(throw_, campaign, own, jacobians != nullptr);
-    } catch (const std::invalid_argument&) {
-      return false;  // a trial step outside the physics
-    }
-    if (!l.solved) return false;
-    weigh(l, throw_, shared_.weighting);
-    const auto rows = static_cast<int>(l.residual.size()), width = static_cast<int>(campaign.size()),
-               n = static_cast<int>(own.size());
-    Eigen::Map<Eigen::VectorXd> r(residuals, rows + n);
-    r.head(rows) = l.residual;
-    for (int k = 0; k < n; ++k)
-      r[rows + k] = own[static_cast<std::size_t>(k)] / shared_.own_sigma[static_cast<std::size_t>(k)];
-    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    if (jacobians && jacobians[0]) {
-      Eigen::Map<RowMajor> J(jacobians[0], rows + n, width);
-      J.bottomRows(n).setZero();
-      for (int k = 0; k < width; ++k)
-        J.col(k).head(rows) = l.campaign.col(k) * shared_.scale[static_cast<std::size_t>(k)];
-    }
-    if (jacobians && jacobians[1]) {
-      Eigen::Map<RowMajor> J(jacobians[1], rows + n, n);
-      J.setZero();
-      for (int k = 0; k < n; ++k) {
-        const auto i = static_cast<std::size_t>(k);
-        J.col(k).head(rows) = l.own.col(k) * shared_.own_scale[i];
-        J(rows + k, k) = shared_.own_scale[i] / shared_.own_sigma[i];
-      }
-    }
-    if (jacobians) shared_.jacobian_nanoseconds += static_cast<long>(1e9 * seconds_since(begin));
-    return true;
-  }
-
- private:
-  Shared& shared_;
-  const CampaignThrow& throw_;
-};
-
-/// What is known of a campaign unknown without the log.
-class PriorCost final : public ceres::CostFunction {
- public:
-  PriorCost(int width, int index, double mean, double sigma)
-      : width_(width), index_(index), mean_(mean), sigma_(sigma) {
-    mutable_parameter_block_sizes()->push_back(width);
-    set_num_residuals(1);
-  }
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    residuals[0] = (parameters[0][index_] - mean_) / sigma_;
-    if (jacobians && jacobians[0]) {
-      std::fill(jacobians[0], jacobians[0] + width_, 0.0);
-      jacobians[0][index_] = 1 / sigma_;
-    }
-    return true;
-  }
-
- private:
-  int width_, index_;
-  double mean_, sigma_;
-};
-
 double median(std::vector<double> x) {
   std::nth_element(x.begin(), x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2), x.end());
   return x[x.size() / 2];
 }
-
-/// χ² by channel and phase.
-struct Misfit {
-  std::array<std::vector<double>, kPhaseCount * kChannelCount> squares;
-
-  void add(const CampaignThrow& thrown, const Eigen::VectorXd& residual, double detach) {
-    for (std::size_t j = 0; j < thrown.observed.all.size(); ++j) {
-      const auto& o = thrown.observed.all[j];
-      const Phase phase = phase_of(o, thrown.opening, thrown.release_or(detach));
-      const double r = residual[static_cast<Eigen::Index>(j)];
-      squares[static_cast<std::size_t>(static_cast<int>(phase) * kChannelCount + static_cast<int>(o.channel))]
-          .push_back(r * r);
-    }
-  }
-  /// The mean square without its largest hundredth, so that single outliers do not speak for a channel.
-  static double mean(std::vector<double> x) {
-    std::sort(x.begin(), x.end());
-    const std::size_t n = x.size() - x.size() / 100;
-    double sum = 0;
-    for (std::size_t i = 0; i < n; ++i) sum += x[i];
-    return n > 0 ? sum / static_cast<double>(n) : 0;
-  }
-  void weigh(Weighting& weighting) const {
-    for (std::size_t g = 0; g < squares.size(); ++g) {
-      if (squares[g].empty()) continue;
-      // A small group's mean scatters by itself.
-      const double allowed = 1 + 3 * std::sqrt(2.0 / static_cast<double>(squares[g].size()));
-      weighting.group[g] = std::sqrt(1 / std::max(1.0, mean(squares[g]) / allowed));
-    }
-  }
-};
 
 /// Which throws a fit uses: those of the train split (all if there is no other), as far as they can be
 /// simulated at the start.
@@ -196,7 +66,11 @@ std::vector<std::size_t> usable(const CampaignProblem& problem, const FitOptions
         (options.share == Share::train) != (throws[i].prepared.split == datasets::Split::train))
       return;
     if (throws[i].observed.all.empty()) return;
-    starts[i] = problem.linearise(throws[i], start, own, false);
+    try {
+      starts[i] = problem.linearise(throws[i], start, own, false);
+    } catch (const std::invalid_argument&) {
+      return;  // a start outside the physics
+    }
     ok[i] = starts[i].solved;
   });
   Misfit misfit;
@@ -255,6 +129,8 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
   const auto width = static_cast<int>(unknowns.size());
   const auto n_own = problem.own().size();
   std::vector<double> start = options.start.empty() ? problem.start() : options.start;
+  for (std::size_t k = 0; k < start.size(); ++k)
+    start[k] = std::clamp(start[k], unknowns[k].low, unknowns[k].high);
   Shared shared{problem, options, {}, {}, {}, {}, {}};
   shared.weighting.sample_limit = options.sample_limit;
   for (const auto& u : unknowns) shared.scale.push_back(u.scale);
@@ -283,9 +159,11 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
   }
 
   std::vector<double> x(start.size());
-  for (std::size_t k = 0; k < x.size(); ++k)
-    x[k] = std::clamp(start[k], unknowns[k].low, unknowns[k].high) / shared.scale[k];
+  for (std::size_t k = 0; k < x.size(); ++k) x[k] = start[k] / shared.scale[k];
   std::vector<std::vector<double>> own(used.size(), std::vector<double>(n_own, 0.0));
+  // One array: Ceres orders blocks by their addresses, which must be the throws' order in every run.
+  std::vector<double> own_blocks(used.size() * n_own, 0.0);
+  const auto own_of = [&](std::size_t i) { return own_blocks.data() + i * n_own; };
   std::vector<std::vector<int>> modes_before(used.size());
 
   ceres::Solver::Options solver;
@@ -295,26 +173,27 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
   solver.parameter_tolerance = 1e-9;
   solver.gradient_tolerance = 1e-12;
   solver.min_trust_region_radius = 1e-2;  // in scales: below, what is left is the integrator's own rounding
-  solver.num_threads = options.threads > 0
-                           ? options.threads
-                           : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  solver.num_threads = 1;                 // see AllThrows
   solver.logging_type = ceres::SILENT;
 
   NormalEquations equations;
   ceres::Solver::Summary summary;
   for (int round = 0; round < options.rounds; ++round) {
     const double limit = shared.weighting.throw_limit = options.throw_limit * median(chi2);
-    ceres::Problem::Options ownership;
-    ceres::Problem ceres_problem(ownership);
+    AllThrows all(shared, used, x, own_blocks);
+    ceres::Problem::Options problem_options;
+    problem_options.evaluation_callback = &all;
+    ceres::Problem ceres_problem(problem_options);
     auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
     for (std::size_t i = 0; i < used.size(); ++i) {
-      ceres_problem.AddResidualBlock(new ThrowCost(shared, problem.throws()[used[i]]),
-                                     new ceres::HuberLoss(std::sqrt(limit)), x.data(), own[i].data());
-      ordering->AddElementToGroup(own[i].data(), 0);
+      ceres_problem.AddResidualBlock(
+          new ThrowCost(shared, all, i, problem.throws()[used[i]].observed.all.size()),
+          new ceres::HuberLoss(std::sqrt(limit)), x.data(), own_of(i));
+      ordering->AddElementToGroup(own_of(i), 0);
       for (std::size_t k = 0; k < n_own; ++k) {
-        ceres_problem.SetParameterLowerBound(own[i].data(), static_cast<int>(k),
+        ceres_problem.SetParameterLowerBound(own_of(i), static_cast<int>(k),
                                              problem.own()[k].low / shared.own_scale[k]);
-        ceres_problem.SetParameterUpperBound(own[i].data(), static_cast<int>(k),
+        ceres_problem.SetParameterUpperBound(own_of(i), static_cast<int>(k),
                                              problem.own()[k].high / shared.own_scale[k]);
       }
     }
@@ -345,6 +224,7 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
       return out;
     }
 
+    for (std::size_t i = 0; i < used.size(); ++i) own[i].assign(own_of(i), own_of(i) + n_own);
     equations = normal_equations(problem, used, shared.unscaled(x.data()), own, shared.own_scale,
                                  shared.own_sigma, shared.weighting, options.threads);
     for (std::size_t i = 0; i < used.size(); ++i) {
@@ -362,12 +242,14 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
     // by.
     if (learns && round + 1 < options.rounds && used.size() >= 6)
       for (std::size_t k = 0; k < n_own; ++k) {
-        double square = 0;
+        double square = 0, weight = 0;
         for (std::size_t i = 0; i < used.size(); ++i) {
           const double v = own[i][k] * shared.own_scale[k];
-          square += (v * v + equations.throws[i].own_variance[static_cast<Eigen::Index>(k)]) /
-                    static_cast<double>(used.size());
+          const ThrowEquations& part = equations.throws[i];
+          square += part.weight * (v * v + part.own_variance[static_cast<Eigen::Index>(k)]);
+          weight += part.weight;
         }
+        square /= std::max(weight, 1e-300);
         const double prior = *problem.own()[k].prior_sigma;
         shared.own_sigma[k] = std::clamp(std::sqrt(square), 1e-3 * prior, 3 * prior);
       }
@@ -411,12 +293,12 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
   }
   for (int phase = 0; phase < kPhaseCount; ++phase)
     for (int channel = 0; channel < kChannelCount; ++channel) {
-      const auto& squares = total.squares[static_cast<std::size_t>(phase * kChannelCount + channel)];
-      if (squares.empty()) continue;
-      ChannelMisfit m{static_cast<Channel>(channel), static_cast<Phase>(phase),
-                      static_cast<int>(squares.size()), 0,
-                      shared.weighting.of(static_cast<Phase>(phase), static_cast<Channel>(channel))};
-      for (const double r2 : squares) m.chi2 += r2;
+      const auto& parts = total.parts[static_cast<std::size_t>(phase * kChannelCount + channel)];
+      if (parts.empty()) continue;
+      const Misfit::Part part = Misfit::total(parts);
+      const ChannelMisfit m{static_cast<Channel>(channel), static_cast<Phase>(phase),
+                            static_cast<int>(part.n), part.sum,
+                            shared.weighting.of(static_cast<Phase>(phase), static_cast<Channel>(channel))};
       out.chi2 += m.chi2;
       out.misfit.push_back(m);
     }

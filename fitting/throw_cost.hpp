@@ -1,0 +1,145 @@
+// The costs that Ceres sees. Internal to fitting.
+#pragma once
+
+#include <ceres/ceres.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <stdexcept>
+#include <vector>
+
+#include "experiment/parallel.hpp"
+#include "fitting/normal_equations.hpp"
+
+namespace unhand::fitting {
+
+using Clock = std::chrono::steady_clock;
+inline double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+/// What all costs share: unknowns in units of their scales.
+struct Shared {
+  const CampaignProblem& problem;
+  const FitOptions& options;
+  std::vector<double> scale, own_scale, own_sigma;  ///< own_sigma: 1 σ of the throws' own unknowns
+  Weighting weighting;
+  std::atomic<long> jacobian_nanoseconds{0};
+
+  std::vector<double> unscaled(const double* x) const {
+    std::vector<double> out(scale.size());
+    for (std::size_t k = 0; k < out.size(); ++k) out[k] = x[k] * scale[k];
+    return out;
+  }
+  std::vector<double> own_unscaled(const double* x) const {
+    std::vector<double> out(own_scale.size());
+    for (std::size_t k = 0; k < out.size(); ++k) out[k] = x[k] * own_scale[k];
+    return out;
+  }
+};
+
+/// Simulates all throws of one evaluation at once, on several threads, before Ceres asks for them one by one
+/// on a single one: its own threads would add up in an order that changes from run to run.
+class AllThrows final : public ceres::EvaluationCallback {
+ public:
+  AllThrows(Shared& shared, const std::vector<std::size_t>& used, const std::vector<double>& x,
+            const std::vector<double>& own)
+      : shared_(shared), used_(used), x_(x), own_(own), at_(used.size()) {}
+
+  void PrepareForEvaluation(bool jacobians, bool new_point) override {
+    if (!new_point && (complete_ || !jacobians)) return;
+    complete_ = jacobians;
+    const auto campaign = shared_.unscaled(x_.data());
+    experiment::parallel_for(used_.size(), shared_.options.threads, [&](std::size_t i) {
+      const auto begin = Clock::now();
+      const CampaignThrow& thrown = shared_.problem.throws()[used_[i]];
+      try {
+        at_[i] = shared_.problem.linearise(
+            thrown, campaign, shared_.own_unscaled(own_.data() + i * shared_.own_scale.size()), jacobians);
+      } catch (const std::invalid_argument&) {
+        at_[i] = {};  // a trial step outside the physics
+      }
+      if (at_[i].solved) weigh(at_[i], thrown, shared_.weighting);
+      if (jacobians) shared_.jacobian_nanoseconds += static_cast<long>(1e9 * seconds_since(begin));
+    });
+  }
+  const Linearisation& at(std::size_t i) const { return at_[i]; }
+
+ private:
+  Shared& shared_;
+  const std::vector<std::size_t>& used_;
+  const std::vector<double>& x_;
+  const std::vector<double>& own_;
+  std::vector<Linearisation> at_;
+  bool complete_{};
+};
+
+/// One throw's robust, whitened residual with the priors of its own unknowns below it.
+class ThrowCost final : public ceres::CostFunction {
+ public:
+  ThrowCost(const Shared& shared, const AllThrows& all, std::size_t index, std::size_t observations)
+      : shared_(shared), all_(all), index_(index) {
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(shared.scale.size()));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(shared.own_scale.size()));
+    set_num_residuals(static_cast<int>(observations + shared.own_scale.size()));
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const auto own = shared_.own_unscaled(parameters[1]);
+    const Linearisation& l = all_.at(index_);
+    if (!l.solved) return false;
+    const auto rows = static_cast<int>(l.residual.size()), width = static_cast<int>(shared_.scale.size()),
+               n = static_cast<int>(own.size());
+    Eigen::Map<Eigen::VectorXd> r(residuals, rows + n);
+    r.head(rows) = l.residual;
+    for (int k = 0; k < n; ++k)
+      r[rows + k] = own[static_cast<std::size_t>(k)] / shared_.own_sigma[static_cast<std::size_t>(k)];
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    if (jacobians && jacobians[0]) {
+      Eigen::Map<RowMajor> J(jacobians[0], rows + n, width);
+      J.bottomRows(n).setZero();
+      for (int k = 0; k < width; ++k)
+        J.col(k).head(rows) = l.campaign.col(k) * shared_.scale[static_cast<std::size_t>(k)];
+    }
+    if (jacobians && jacobians[1]) {
+      Eigen::Map<RowMajor> J(jacobians[1], rows + n, n);
+      J.setZero();
+      for (int k = 0; k < n; ++k) {
+        const auto i = static_cast<std::size_t>(k);
+        J.col(k).head(rows) = l.own.col(k) * shared_.own_scale[i];
+        J(rows + k, k) = shared_.own_scale[i] / shared_.own_sigma[i];
+      }
+    }
+    return true;
+  }
+
+ private:
+  const Shared& shared_;
+  const AllThrows& all_;
+  std::size_t index_;
+};
+
+/// What is known of a campaign unknown without the log.
+class PriorCost final : public ceres::CostFunction {
+ public:
+  PriorCost(int width, int index, double mean, double sigma)
+      : width_(width), index_(index), mean_(mean), sigma_(sigma) {
+    mutable_parameter_block_sizes()->push_back(width);
+    set_num_residuals(1);
+  }
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    residuals[0] = (parameters[0][index_] - mean_) / sigma_;
+    if (jacobians && jacobians[0]) {
+      std::fill(jacobians[0], jacobians[0] + width_, 0.0);
+      jacobians[0][index_] = 1 / sigma_;
+    }
+    return true;
+  }
+
+ private:
+  int width_, index_;
+  double mean_, sigma_;
+};
+
+}  // namespace unhand::fitting
