@@ -93,14 +93,14 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
   const bool has_test = std::any_of(log.throws.begin(), log.throws.end(),
                                     [](const auto& one) { return one.split == datasets::Split::test; });
   int folds = request.kfold > 0 ? request.kfold : has_test ? 0 : kDefaultFolds;
+  Progress progress("fit", folds > 0 ? 5 : 3);
+  const fitting::CampaignProblem problem(log, request.log, campaign);
   if (folds > 0 && conditions_of_train(log) < 2) {
     if (request.kfold > 0)
       throw Unanswered(fmt::format("{}: --kfold needs two conditions among the train throws", request.log));
     fmt::print(stderr, "unhand: no test throws and one condition only: no held-out errors\n");
     folds = 0;
   }
-  Progress progress("fit", folds > 0 ? 5 : 3);
-  const fitting::CampaignProblem problem(log, request.log, campaign);
   progress.step();
   const auto fit = fitting::fit(problem, options);
   if (fit.outcome == fitting::FitOutcome::no_start || fit.outcome == fitting::FitOutcome::not_solved)

@@ -13,14 +13,13 @@ using datasets::Split;
 using experiment::ErrorStatistics;
 using experiment::kDegrees;
 
-constexpr double kNormal95 = 1.959963984540054;
 constexpr int decimals[experiment::kQuantityCount] = {4, 2, 4, 2};
 
 struct Interval {
   double low{}, high{};
 };
-Interval interval95(const fitting::FittedUnknown& u) {
-  return {u.value - kNormal95 * u.sigma, u.value + kNormal95 * u.sigma};
+Interval interval95(const fitting::FittedUnknown& u, double factor) {
+  return {u.value - factor * u.sigma, u.value + factor * u.sigma};
 }
 
 /// A number as JSON, which knows neither NaN nor infinity.
@@ -36,7 +35,7 @@ std::string standing_of(const fitting::FittedUnknown& u) {
 Table parameter_table(const fitting::FitResult& fit) {
   Table out{{"parameter", "unit", "value", "1 sigma", "95 % interval", "determined"}, {}, 2};
   for (const auto& u : fit.campaign) {
-    const auto [low, high] = interval95(u);
+    const auto [low, high] = interval95(u, fitting::interval_factor(fit));
     out.rows.push_back({u.unknown.name, u.unknown.unit, fmt::format("{:.6g}", u.value),
                         fmt::format("{:.2g}", u.sigma), fmt::format("[{:.5g}, {:.5g}]", low, high),
                         standing_of(u)});
@@ -101,7 +100,7 @@ Json errors_json(int n, Statistics&& statistics) {
 Json parameters_json(const fitting::FitResult& fit) {
   Json out = Json::object();
   for (const auto& u : fit.campaign) {
-    const auto [low, high] = interval95(u);
+    const auto [low, high] = interval95(u, fitting::interval_factor(fit));
     Json& one = out[u.unknown.name] = {{"value", u.value},
                                        {"unit", u.unknown.unit},
                                        {"sigma", number(u.sigma)},

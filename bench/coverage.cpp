@@ -15,7 +15,7 @@
 
 #include "experiment/parallel.hpp"
 #include "experiment/synthetic_campaign.hpp"
-#include "fitting/fit.hpp"
+#include "fitting/advice.hpp"
 
 namespace {
 
@@ -34,7 +34,7 @@ struct Tally {
 
 struct Outcome {
   bool fitted{};
-  std::string why;
+  double factor{};                                         // half width of an interval in sigmas
   std::map<std::string, std::pair<double, double>> found;  // value, sigma
 };
 
@@ -51,7 +51,7 @@ Outcome one_campaign(const experiment::CampaignDesign& design, std::uint64_t see
   fitting::FitOptions options;
   options.threads = 1;
   const auto fit = fitting::fit(problem, options);
-  out.why = to_string(fit.outcome);
+  out.factor = fitting::interval_factor(fit);
   out.fitted =
       fit.outcome == fitting::FitOutcome::converged || fit.outcome == fitting::FitOutcome::iterations_spent;
   for (const auto& u : fit.campaign) out.found[u.unknown.name] = {u.value, u.sigma};
@@ -89,7 +89,7 @@ int main(int argc, char** argv) {
         const double truth = truth_of(design, name), error = (value.first - truth) / truth;
         Tally& t = tallies[name];
         ++t.n;
-        t.covered += std::abs(value.first - truth) <= 1.959963984540054 * value.second;
+        t.covered += std::abs(value.first - truth) <= outcome.factor * value.second;
         t.bias += error;
         t.square += error * error;
         t.claimed += value.second / truth;

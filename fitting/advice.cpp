@@ -47,6 +47,7 @@ std::string remedy_for(const CampaignProblem& problem, const std::string& name) 
     return "the force behind a pad while the object is held, or a weighing";
   if (name.starts_with("sensor.com_offset"))
     return mocap ? "grasps at other places on the object" : "motion capture of the turning flight";
+  if (name.ends_with(".landing_share")) return "landings measured by another instrument than the tracker";
   if (name.starts_with("sensor.")) return "motion capture while the object is held by a moving hand";
   if (name.starts_with("flight.")) return "motion capture of longer and faster flights";
   return "throws in which the pads slip for longer and at other speeds and forces: other accelerations, a "
@@ -78,6 +79,18 @@ std::vector<Correlation> strong_correlations(const FitResult& fit, double limit)
   std::sort(out.begin(), out.end(),
             [](const Correlation& a, const Correlation& b) { return std::abs(a.value) > std::abs(b.value); });
   return out;
+}
+
+double interval_factor(const FitResult& fit) {
+  const auto used =
+      std::count_if(fit.throws.begin(), fit.throws.end(), [](const ThrowFit& t) { return t.used; });
+  const auto n = static_cast<double>(used) - static_cast<double>(fit.campaign.size());
+  if (n < 1.5) return 12.706;
+  if (n < 2.5) return 4.303;
+  // Expansion in 1/n [AbramowitzStegun1964] 26.7.5: off by 1e-2 at n = 3, by 1e-4 at 10.
+  const double z = 1.959963984540054, z2 = z * z;
+  return z * (1 + (z2 + 1) / (4 * n) + ((5 * z2 + 16) * z2 + 3) / (96 * n * n) +
+              (((3 * z2 + 19) * z2 + 17) * z2 - 15) / (384 * n * n * n));
 }
 
 }  // namespace unhand::fitting

@@ -209,5 +209,19 @@ TEST(Advice, NamesWhatWouldFixIt) {
   EXPECT_NEAR(pairs[0].value, 0.95, 1e-15);
 }
 
+TEST(Advice, IntervalsAreStudents) {
+  FitResult made;
+  made.campaign.resize(2);
+  for (const auto& [throws, factor, close] : {std::tuple{3, 12.706, 1e-9},
+                                              {4, 4.303, 1e-9},
+                                              {5, 3.182, 2e-2},
+                                              {12, 2.228, 1e-3},
+                                              {102, 1.984, 1e-3}}) {
+    made.throws.assign(static_cast<std::size_t>(throws), {});
+    for (auto& one : made.throws) one.used = true;
+    EXPECT_NEAR(interval_factor(made), factor, close) << throws;  // tables of t
+  }
+}
+
 }  // namespace
 }  // namespace unhand::fitting
