@@ -62,7 +62,7 @@ Figure residual_figure(const Discovery& found) {
       }
   const int columns = channels.size() > 1 ? 2 : 1;
   const int rows = (static_cast<int>(channels.size()) + columns - 1) / columns;
-  Figure figure{"residual", 17, 1.4 + 3.6 * rows, {}, {}};
+  Figure figure{"residual", 17, 1.4 + 3.9 * rows, {}, {}};
   double low = 0, high = 0.05;
   for (const auto& bin : found.residual_before)
     low = std::min(low, bin.time), high = std::max(high, bin.time);
@@ -83,11 +83,12 @@ Figure residual_figure(const Discovery& found) {
         }
       figure.data.push_back(std::move(block));
     }
-    const double left = 1.6 + (at % columns) * 8.5, bottom = 1.9 + (rows - 1 - at / columns) * 3.6;
+    const double left = 1.9 + (at % columns) * 8.3, bottom = 1.9 + (rows - 1 - at / columns) * 3.9;
     script += place(figure, {left, left + 6.6, bottom, bottom + 2.5});
     script += fmt::format(
         "set title '{}' offset 0,-0.6\nset logscale y\nset xrange [{:.3f}:{:.3f}]\nset yrange [0.3:{:.4g}]\n"
-        "set format y '%g'\n{}set ylabel 'rms [{{/Symbol s}}]' offset 1.5\n"
+        "set format y '%g'\nset ytics (0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)\n{}set ylabel 'rms "
+        "[{{/Symbol s}}]' offset 0.5\n"
         "set arrow 1 from 0,0.3 to 0,{:.4g} nohead dashtype 3 linecolor rgb '#808080'\n"
         "set arrow 2 from {:.3f},1 to {:.3f},1 nohead linecolor rgb '#b0b0b0'\n"
         "plot DATA index {} using 1:2 with linespoints pointtype 6 linecolor rgb '#d55e00', "

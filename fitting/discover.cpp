@@ -87,7 +87,7 @@ void polish(Stage& stage, const DiscoverOptions& options) {
 
 /// By how much a channel's misfit must exceed the noise before there is anything to explain.
 bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options) {
-  if (is_wrench(m.channel)) return m.chi2_per_sample() > 2;
+  if (is_wrench(m.channel)) return m.chi2_per_sample() > options.wrench_misfit;
   return m.chi2_per_sample() > 1 + std::max(options.matters, 3 * std::sqrt(2.0 / m.n));
 }
 
@@ -105,7 +105,7 @@ Improvement improvement(const FitResult& before, const FitResult& after, const D
       const double was = b.chi2_per_sample(), fall = was - a.chi2_per_sample();
       double needed = std::max({options.matters, 0.1 * (was - 1), 2 * std::sqrt(2.0 / b.n)});
       if (is_wrench(b.channel)) {
-        if (was < 2) continue;
+        if (was < options.wrench_misfit) continue;
         needed = std::max(options.wrench_matters, 0.25 * (was - 1));
       }
       if (fall / needed <= out.matters) continue;

@@ -17,8 +17,9 @@ struct DiscoverOptions {
   /// An effect matters if, on held-out throws, it takes at least this much off the χ² per sample of some
   /// channel of the motion in some phase (1 is the noise), and a tenth of the misfit there.
   double matters{0.1};
-  /// The same for the F/T channels, whose misfit must also have been at least twice the noise.
-  double wrench_matters{0.5};
+  /// The same for the wrench channels, whose misfit must also have been so many times the noise: near the end
+  /// of a release a patch slips in parts, and no law of the catalogue follows its torque better.
+  double wrench_matters{1}, wrench_misfit{3};
   double false_discovery_rate{0.02};  ///< shared among the effects that were tried
   double equivalent{0.98};            ///< footprints that correlate by this much are one answer
   int refits{4};                      ///< candidates that are fitted in full, in every step
