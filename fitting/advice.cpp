@@ -87,7 +87,7 @@ double interval_factor(const FitResult& fit) {
   const auto n = static_cast<double>(used) - static_cast<double>(fit.campaign.size());
   if (n < 1.5) return 12.706;
   if (n < 2.5) return 4.303;
-  // Expansion in 1/n [AbramowitzStegun1964] 26.7.5: off by 1e-2 at n = 3, by 1e-4 at 10.
+  // Expansion in 1/n [AbramowitzStegun1964] 26.7.5: off by 2e-2 at n = 3, by 1e-3 at 10.
   const double z = 1.959963984540054, z2 = z * z;
   return z * (1 + (z2 + 1) / (4 * n) + ((5 * z2 + 16) * z2 + 3) / (96 * n * n) +
               (((3 * z2 + 19) * z2 + 17) * z2 - 15) / (384 * n * n * n));
