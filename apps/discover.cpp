@@ -23,7 +23,7 @@ using fitting::OutcomeErrors;
 struct Options {
   std::string log, model{"limit_surface_disc"}, report, json, card;
   std::vector<std::string> forget;
-  double matters{0.1}, tolerance{1e-5};
+  double matters{0.5}, tolerance{1e-5};
   int most{3}, threads{0};
 };
 

@@ -102,6 +102,7 @@ Improvement improvement(const FitResult& before, const FitResult& after, const D
   for (const auto& b : before.misfit)
     for (const auto& a : after.misfit) {
       if (a.channel != b.channel || a.phase != b.phase) continue;
+      if (b.phase == Phase::grasped && !is_wrench(b.channel)) continue;  // no prediction is the better for it
       const double was = b.chi2_per_sample(), fall = was - a.chi2_per_sample();
       double needed = std::max({options.matters, 0.1 * (was - 1), 2 * std::sqrt(2.0 / b.n)});
       if (is_wrench(b.channel)) {

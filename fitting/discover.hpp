@@ -16,7 +16,7 @@ struct DiscoverOptions {
   FitOptions fit;
   /// An effect matters if, on held-out throws, it takes at least this much off the χ² per sample of some
   /// channel of the motion in some phase (1 is the noise), and a tenth of the misfit there.
-  double matters{0.1};
+  double matters{0.5};
   /// The same for the wrench channels, whose misfit must also have been so many times the noise: near the end
   /// of a release a patch slips in parts, and no law of the catalogue follows its torque better.
   double wrench_matters{1}, wrench_misfit{3};

@@ -30,6 +30,14 @@ std::vector<std::map<std::string, double>> shapes_of(const Effect& effect) {
   return out;
 }
 
+template <class A, class B>
+std::vector<std::pair<A, B>> pairs_of(const std::vector<A>& a, const std::vector<B>& b) {
+  std::vector<std::pair<A, B>> out;
+  for (const A& x : a)
+    for (const B& y : b) out.push_back({x, y});
+  return out;
+}
+
 /// A column that is a difference of two simulations.
 struct Difference {
   CampaignProblem problem;
@@ -85,7 +93,10 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
     }
     auto effects = present;
     effects.push_back(id);
-    for (const auto& shape : shapes) {
+    // A one-sided footprint may change with the effect's size: it is taken at several.
+    const std::vector<double> sizes =
+        effect.one_sided ? std::vector<double>{1, 6, 36} : std::vector<double>{1};
+    for (const auto& [shape, size] : pairs_of(shapes, sizes)) {
       Candidate candidate{id, {}, {}, shape, {}};
       CampaignProblem extended = problem.with(problem.options().model, effects);
       auto campaign = carried(problem, fit.values(), extended);
@@ -99,7 +110,8 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
         candidate.unit.push_back(1);
         if (effect.one_sided) {
           auto stepped = campaign;
-          const double step = extended.campaign()[k].scale;
+          const Unknown& u = extended.campaign()[k];
+          const double step = std::min(size * u.scale, u.high - campaign[k]);
           stepped[k] += step;
           differences.push_back({extended, stepped, step});
           difference_columns.push_back(width);
