@@ -240,7 +240,8 @@ std::optional<Stage> forward(const Stage& stage, const DiscoverOptions& options,
   std::set<std::string> tried;
   std::optional<Stage> best;
   Improvement best_improvement;
-  const double least = all.empty() ? 0 : 0.05 * all.front().gain;
+  // What explains less than a third of what another footprint would is an imitation of it.
+  const double least = all.empty() ? 0 : all.front().gain / 3;
   rivals.clear();
   for (const Score& score : all) {
     const Candidate& candidate = f.candidates[score.candidate];
@@ -390,6 +391,9 @@ void look_for_the_unexplained(const Stage& stage, const DiscoverOptions& options
         "explains it on held-out throws",
         to_string(out.unexplained->channel), to_string(out.unexplained->phase),
         out.unexplained->chi2_per_dof);
+  if (out.unexplained && out.effects.empty() && !out.ranking.empty() && out.ranking.front().gain > 1)
+    out.unexplained->description +=
+        fmt::format("; the nearest footprint is that of {}", out.ranking.front().id);
 }
 
 }  // namespace
