@@ -1,7 +1,7 @@
 // How often the loop finds what is missing, on synthetic campaigns with a random effect, or with none:
 //   build/release/bench/discovery_study [CAMPAIGNS [FIRST_SEED [NULL_SHARE]]]
-// One line per campaign, then the rate by effect and by size (in typical steps of the effect's parameter), and
-// the false discoveries among the campaigns without an effect.
+// One line per campaign, then the rate by effect and by size (in typical steps of the effect's parameter),
+// and the false discoveries among the campaigns without an effect.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -66,17 +66,21 @@ int main(int argc, char** argv) {
     const std::string id = id_of(design.effects.begin()->first);
     const bool right = answer.find(id) != std::string::npos;
     const double size = size_of(design.effects);
-    const std::string decade = size < 1 ? "below 1" : size < 3 ? "1 to 3" : size < 10 ? "3 to 10" : "above 10";
+    const std::string decade = size < 1    ? "below 1"
+                               : size < 3  ? "1 to 3"
+                               : size < 10 ? "3 to 10"
+                                           : "above 10";
     for (auto* tally : {&by_effect[id], &by_size[decade]}) {
       tally->campaigns += 1;
       tally->found += right ? 1 : 0;
     }
-    fmt::print("seed {}: {} ({:.2f} typical steps) -> {} {}\n", seed, id, size, to_string(found.verdict), answer);
+    fmt::print("seed {}: {} ({:.2f} typical steps) -> {} {}\n", seed, id, size, to_string(found.verdict),
+               answer);
   }
   fmt::print("\n| effect | campaigns | found |\n| --- | ---: | ---: |\n");
   for (const auto& [id, t] : by_effect) fmt::print("| {} | {} | {} |\n", id, t.campaigns, t.found);
   fmt::print("\n| size in typical steps | campaigns | found |\n| --- | ---: | ---: |\n");
   for (const auto& [size, t] : by_size) fmt::print("| {} | {} | {} |\n", size, t.campaigns, t.found);
-  fmt::print("\nwithout an effect: {} campaigns, {} false discoveries; {:.1f} s per campaign\n", nulls.campaigns,
-             nulls.found, seconds / std::max(1, campaigns));
+  fmt::print("\nwithout an effect: {} campaigns, {} false discoveries; {:.1f} s per campaign\n",
+             nulls.campaigns, nulls.found, seconds / std::max(1, campaigns));
 }

@@ -68,10 +68,10 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
       if (is_patch)
         first_guess_ = guess;
       else
-        notes_.push_back(
-            fmt::format("the pads' wrenches while the force vanishes say mu = {:.3g}, length = {:.3g} m, which is no "
-                        "patch: not used as a start",
-                        guess.mu, guess.length));
+        notes_.push_back(fmt::format(
+            "the pads' wrenches while the force vanishes say mu = {:.3g}, length = {:.3g} m, which is no "
+            "patch: not used as a start",
+            guess.mu, guess.length));
     } catch (const std::invalid_argument&) {  // too few samples: the default start has to do
     }
   } else if (options.model == "gripper_delay") {

@@ -63,7 +63,8 @@ TEST(Discovery, AClockThatIsLateIsFoundAlreadyInTheGrasp) {
   EXPECT_EQ(found.first.phase, Phase::grasped);
   const AcceptedEffect* effect = named(found, "sensor.mocap_time_offset");
   ASSERT_NE(effect, nullptr) << found.effects.front().id;
-  EXPECT_NEAR(effect->parameters.front().value, kOffset, std::max(4 * effect->parameters.front().sigma, 2e-5));
+  EXPECT_NEAR(effect->parameters.front().value, kOffset,
+              std::max(4 * effect->parameters.front().sigma, 2e-5));
 }
 
 TEST(Discovery, AnEffectThatTheCatalogueForgetsIsUnexplainedOrDoesNotGoByItsName) {
