@@ -24,7 +24,10 @@ function(unhand_module name)
   endforeach()
   target_link_libraries(unhand_${name} PRIVATE $<BUILD_INTERFACE:unhand_warnings>)
   install(TARGETS unhand_${name} EXPORT unhandTargets)
-  install(FILES ${ARG_HEADERS} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/unhand/${name})
+  foreach(header IN LISTS ARG_HEADERS)
+    cmake_path(GET header PARENT_PATH folder)  # "arm" of arm/chain.hpp
+    install(FILES ${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/unhand/${name}/${folder})
+  endforeach()
 endfunction()
 
 # unhand_test(dynamics  integrator_test.cpp ... USES release)

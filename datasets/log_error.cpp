@@ -27,8 +27,8 @@ LogError::LogError(std::string file_name, std::string path_inside, std::string w
 LogError::LogError(std::string file_name, std::string path_inside, std::string why)
     : LogError(file_name, path_inside, why, fmt::format("{}: {}: {}", file_name, path_inside, why)) {}
 
-SkuError::SkuError(std::string file_name, int line_number, int column_number, std::string key,
-                   std::string why)
+TomlError::TomlError(std::string file_name, int line_number, int column_number, std::string key,
+                     std::string why)
     : LogError(file_name, key, why,
                line_number > 0
                    ? fmt::format("{}:{}:{}: {}: {}", file_name, line_number, column_number, key, why)

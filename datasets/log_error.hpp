@@ -24,10 +24,10 @@ class ImportError : public LogError {
   using LogError::LogError;
 };
 
-/// An SKU file with a mistake in it; what() is "FILE:LINE:COLUMN: KEY: REASON".
-class SkuError : public LogError {
+/// A TOML file with a mistake in it; what() is "FILE:LINE:COLUMN: KEY: REASON".
+class TomlError : public LogError {
  public:
-  SkuError(std::string file_name, int line_number, int column_number, std::string key, std::string why);
+  TomlError(std::string file_name, int line_number, int column_number, std::string key, std::string why);
 
   int line, column;
 };

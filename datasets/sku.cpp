@@ -2,135 +2,28 @@
 
 #include <fmt/format.h>
 
-#include <toml++/toml.h>
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <sstream>
 #include <stdexcept>
 #include <vector>
 
-#include "datasets/near_miss.hpp"
+#include "datasets/toml_keys.hpp"
 
 namespace unhand::datasets {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// Accepted values of a key, ends included unless open.
-struct Limits {
-  double low, high;
-  bool open_low;
-  const char* unit;
-
-  bool accept(double value) const { return value <= high && (open_low ? value > low : value >= low); }
-  std::string text() const { return fmt::format("{}{}, {}] {}", open_low ? "(" : "[", low, high, unit); }
-};
-
-constexpr Limits mass_limits{0, 1000, true, "kg"};
-constexpr Limits sigma_mass_limits{0, 1000, false, "kg"};
-constexpr Limits length_limits{0, 10, true, "m"};
-constexpr Limits offset_limits{-10, 10, false, "m"};
-constexpr Limits sigma_offset_limits{0, 10, false, "m"};
-constexpr Limits inertia_limits{0, 1e5, true, "kg m^2"};
-constexpr Limits sigma_inertia_limits{0, 1e5, false, "kg m^2"};
-constexpr Limits drag_limits{0, 100, false, "1/m"};
+constexpr TomlLimits mass_limits{0, 1000, true, "kg"};
+constexpr TomlLimits sigma_mass_limits{0, 1000, false, "kg"};
+constexpr TomlLimits length_limits{0, 10, true, "m"};
+constexpr TomlLimits offset_limits{-10, 10, false, "m"};
+constexpr TomlLimits sigma_offset_limits{0, 10, false, "m"};
+constexpr TomlLimits inertia_limits{0, 1e5, true, "kg m^2"};
+constexpr TomlLimits sigma_inertia_limits{0, 1e5, false, "kg m^2"};
+constexpr TomlLimits drag_limits{0, 100, false, "1/m"};
 
 constexpr std::string_view shape_names = "box, rod, cylinder, disc, sphere";
-
-/// A table whose keys are asked for one by one; a key nobody asked for is an error.
-class Keys {
- public:
-  Keys(std::string file, toml::table table) : file_(std::move(file)), table_(std::move(table)) {}
-
-  [[noreturn]] void fail(std::string_view key, const std::string& why) const {
-    const toml::node* node = table_.get(key);
-    const toml::source_position at = node != nullptr ? node->source().begin : toml::source_position{};
-    throw SkuError(file_, static_cast<int>(at.line), static_cast<int>(at.column), std::string(key), why);
-  }
-
-  std::optional<double> number(std::string_view key, const Limits& limits) {
-    const toml::node* node = ask(key);
-    if (node == nullptr) return {};
-    return checked(key, *node, limits);
-  }
-
-  std::optional<std::string> text(std::string_view key) {
-    const toml::node* node = ask(key);
-    if (node == nullptr) return {};
-    if (!node->is_string()) fail(key, fmt::format("{} is not text", shown(*node)));
-    std::string value = node->as_string()->get();
-    if (value.empty()) fail(key, "is empty text");
-    return value;
-  }
-
-  std::optional<std::array<double, 3>> triple(std::string_view key, const Limits& limits) {
-    const toml::node* node = ask(key);
-    if (node == nullptr) return {};
-    const toml::array* list = node->as_array();
-    if (list == nullptr || list->size() != 3)
-      fail(key, fmt::format("{} is not a list of 3 numbers", shown(*node)));
-    std::array<double, 3> values{};
-    for (std::size_t i = 0; i < 3; ++i) values[i] = checked(key, *list->get(i), limits);
-    return values;
-  }
-
-  template <class T>
-  T required(std::string_view key, std::optional<T> value) const {
-    if (!value) fail(key, "required key is missing");
-    return *std::move(value);
-  }
-
-  /// To be called once every key has been asked for.
-  void reject_unknown() const {
-    for (const auto& [key, node] : table_) {
-      const std::string_view name = key.str();
-      if (std::find(asked_.begin(), asked_.end(), name) != asked_.end()) continue;
-      const std::string_view meant = nearest_name(name, asked_);
-      std::string known;
-      for (const std::string_view k : asked_) known += fmt::format("{}{}", known.empty() ? "" : ", ", k);
-      fail(name, meant.empty() ? fmt::format("unknown key (known: {})", known)
-                               : fmt::format("unknown key: did you mean '{}'?", meant));
-    }
-  }
-
- private:
-  const toml::node* ask(std::string_view key) {
-    asked_.push_back(key);
-    return table_.get(key);
-  }
-
-  static std::string shown(const toml::node& node) {
-    std::ostringstream out;
-    node.visit([&](const auto& value) { out << value; });
-    return out.str();
-  }
-
-  double checked(std::string_view key, const toml::node& node, const Limits& limits) const {
-    const std::optional<double> value = node.is_number() ? node.value<double>() : std::nullopt;
-    if (!value) fail(key, fmt::format("{} is not a number; accepted: {}", shown(node), limits.text()));
-    if (!limits.accept(*value)) fail(key, fmt::format("{} is outside {}", shown(node), limits.text()));
-    return *value;
-  }
-
-  std::string file_;
-  toml::table table_;
-  std::vector<std::string_view> asked_;
-};
-
-toml::table parse(const fs::path& file) {
-  std::error_code error;
-  if (!fs::is_regular_file(file, error)) throw SkuError(file.string(), 0, 0, "file", "no such file");
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw SkuError(file.string(), 0, 0, "file", "cannot be opened");
-  try {
-    return toml::parse(in, file.string());
-  } catch (const toml::parse_error& bad) {
-    const toml::source_position at = bad.source().begin;
-    throw SkuError(file.string(), static_cast<int>(at.line), static_cast<int>(at.column), "syntax",
-                   std::string(bad.description()));
-  }
-}
 
 }  // namespace
 
@@ -145,7 +38,7 @@ double shape_inertia(const std::string& shape, double mass, const std::array<dou
 }
 
 Sku read_sku(const fs::path& file) {
-  Keys keys(file.string(), parse(file));
+  TomlKeys keys = TomlKeys::parse(file);
   Sku sku;
   const auto name = keys.text("name");
   const auto mass = keys.number("mass_kg", mass_limits);

@@ -42,7 +42,7 @@ struct Sku {
 /// The inertia of a uniform shape of that name (one of those above) [kg m²]. Throws std::invalid_argument.
 double shape_inertia(const std::string& shape, double mass, const std::array<double, 3>& dims);
 
-/// Reads an SKU file. name, mass_kg and surface are required. Throws SkuError with line, column, key, value
+/// Reads an SKU file. name, mass_kg and surface are required. Throws TomlError with line, column, key, value
 /// and range.
 Sku read_sku(const std::filesystem::path& file);
 

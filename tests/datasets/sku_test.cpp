@@ -94,10 +94,10 @@ TEST(Sku, SaysWhereAndWhatIsWrong) {
   const auto expect = [&](const std::string& text, int line, const std::string& key,
                           const std::string& reason) {
     put_bytes(file, text);
-    expect_error<SkuError>([&] { read_sku(file); }, file, key, reason);
+    expect_error<TomlError>([&] { read_sku(file); }, file, key, reason);
     try {
       read_sku(file);
-    } catch (const SkuError& error) {
+    } catch (const TomlError& error) {
       EXPECT_EQ(error.line, line) << error.what();
       const std::string place = line > 0 ? ":" + std::to_string(line) + ":" : ":";
       EXPECT_THAT(error.what(), testing::StartsWith(file + place));
@@ -122,7 +122,7 @@ TEST(Sku, SaysWhereAndWhatIsWrong) {
   expect("name = \n", 1, "syntax", "");
   expect("name = 'a'\nname = 'b'\n", 2, "syntax", "");
   std::filesystem::remove(file);
-  expect_error<SkuError>([&] { read_sku(file); }, file, "file", "no such file");
+  expect_error<TomlError>([&] { read_sku(file); }, file, "file", "no such file");
 }
 
 }  // namespace

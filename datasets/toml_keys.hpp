@@ -1,0 +1,66 @@
+// Tables of a TOML file, asked key by key; every mistake is told with line, column, value and accepted range.
+#pragma once
+
+#include <toml++/toml.h>
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "datasets/log_error.hpp"
+
+namespace unhand::datasets {
+
+/// Accepted values of a key, ends included unless open.
+struct TomlLimits {
+  double low, high;
+  bool open_low;
+  const char* unit;
+
+  bool accept(double value) const { return value <= high && (open_low ? value > low : value >= low); }
+  std::string text() const;
+};
+
+/// A table whose keys are asked for one by one; a key nobody asked for is an error. All throw TomlError.
+class TomlKeys {
+ public:
+  /// The table of a whole file.
+  static TomlKeys parse(const std::filesystem::path& file);
+
+  [[noreturn]] void fail(std::string_view key, const std::string& why) const;
+
+  std::optional<double> number(std::string_view key, const TomlLimits& limits);
+  std::optional<std::string> text(std::string_view key);
+  /// A list of as many numbers as `out` holds; false: there is none.
+  bool numbers(std::string_view key, const TomlLimits& limits, std::span<double> out);
+  std::optional<std::array<double, 3>> triple(std::string_view key, const TomlLimits& limits);
+  std::optional<TomlKeys> table(std::string_view key);
+  /// [[key]] … [[key]]
+  std::vector<TomlKeys> tables(std::string_view key);
+
+  template <class T>
+  T required(std::string_view key, std::optional<T> value) const {
+    if (!value) fail(key, "required key is missing");
+    return *std::move(value);
+  }
+
+  /// To be called once every key has been asked for.
+  void reject_unknown() const;
+
+ private:
+  TomlKeys(std::string file, std::shared_ptr<const toml::table> root, const toml::table& table)
+      : file_(std::move(file)), root_(std::move(root)), table_(&table) {}
+  const toml::node* ask(std::string_view key);
+  double checked(std::string_view key, const toml::node& node, const TomlLimits& limits) const;
+
+  std::string file_;
+  std::shared_ptr<const toml::table> root_;  // a copied table would forget where it stood
+  const toml::table* table_;
+  std::vector<std::string_view> asked_;
+};
+
+}  // namespace unhand::datasets
