@@ -60,7 +60,7 @@ Json truth_json(const experiment::CampaignDesign& design, std::uint64_t seed, co
                                    {"drag_k", object.drag_k}};
   out["effects"] = Json::object();
   for (const auto& [name, value] : design.effects) {
-    const auto* parameter = experiment::find_parameter(name.substr(0, name.find('[')));
+    const auto* parameter = experiment::find_parameter(experiment::without_object(name));
     out["effects"][name] = {{"value", value}, {"unit", parameter->unit}, {"neutral", parameter->neutral}};
   }
   out["throws"] = Json::object();

@@ -28,7 +28,7 @@ std::string id_of(const std::string& setting) { return setting.substr(0, setting
 double size_of(const experiment::EffectSettings& settings) {
   double out = 0;
   for (const auto& [name, value] : settings)
-    if (const auto* p = experiment::find_parameter(name.substr(0, name.find('['))); p && !p->is_shape())
+    if (const auto* p = experiment::find_parameter(experiment::without_object(name)); p && !p->is_shape())
       out = std::max(out, std::abs(value - p->neutral) / p->typical);
   return out;
 }

@@ -115,6 +115,8 @@ double random_size(const Effect& effect, const EffectParameter& p, RandomStream&
 
 }  // namespace
 
+std::string without_object(std::string_view name) { return std::string(name.substr(0, name.find('['))); }
+
 const EffectParameter* find_parameter(std::string_view name) { return find(name).parameter; }
 
 std::pair<std::string, double> parse_effect(std::string_view text) {

@@ -41,6 +41,9 @@ class OwnEffects {
   std::vector<double> values_;
 };
 
+/// "id.parameter" of "id.parameter[object]"; a name without brackets as it is.
+std::string without_object(std::string_view name);
+
 /// The parameter that a name means ("id.parameter", no brackets); null if there is none.
 const dynamics::EffectParameter* find_parameter(std::string_view name);
 

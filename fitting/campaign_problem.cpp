@@ -8,6 +8,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "dynamics/median.hpp"
 #include "experiment/compare.hpp"
 #include "experiment/parallel.hpp"
 
@@ -20,11 +21,6 @@ using dynamics::Values;
 namespace {
 
 constexpr double kUniform = 2.0 / 3.0;  // torque factor of a uniform disc
-
-double median(std::vector<double> x) {
-  std::nth_element(x.begin(), x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2), x.end());
-  return x[x.size() / 2];
-}
 
 /// "k[jar]" read as "k" by throws of the jar, and by no other.
 std::optional<std::string> name_for(const std::string& name, const std::string& object) {
@@ -58,7 +54,8 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
     if (p.split == datasets::Split::train && p.normal_force && p.force_fit.grip_force > 0)
       grips.push_back(p.force_fit.grip_force);
   model_ = {options.model, options.pads.value_or(log.gripper ? log.gripper->n_pads : 2),
-            options.reference_force.value_or(grips.empty() ? 20.0 : median(grips)), options.integrator};
+            options.reference_force.value_or(grips.empty() ? 20.0 : dynamics::median(grips)),
+            options.integrator};
   if (options.predict_only) {
     // nothing to start from
   } else if (!grips.empty() && options.model != "gripper_delay") {
@@ -78,8 +75,10 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
     first_guess_ = experiment::estimate_friction(log, prepared, options.model).parameters;
   }
   std::size_t observations = 0;
+  auto throws = std::make_shared<std::vector<CampaignThrow>>();
+  throws->reserve(prepared.size());
   for (std::size_t i = 0; i < prepared.size(); ++i) {
-    CampaignThrow t{std::move(prepared[i]), {}, {}, {}, 0, 0};
+    CampaignThrow t{std::move(prepared[i]), {}, 0, 0};
     t.observed = experiment::observe(log, log.throws[i], t.prepared, options.observations);
     t.opening = t.prepared.normal_force && std::isfinite(t.prepared.force_fit.opening_start)
                     ? t.prepared.force_fit.opening_start
@@ -87,8 +86,9 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
     t.release = t.prepared.measured.detach_time.value_or(NAN);
     observations += t.observed.all.size();
     notes_.insert(notes_.end(), t.observed.notes.begin(), t.observed.notes.end());
-    throws_.push_back(std::move(t));
+    throws->push_back(std::move(t));
   }
+  throws_ = std::move(throws);
   if (observations == 0 && !options.predict_only)
     throw std::invalid_argument(
         fmt::format("{}: nothing to fit to: no throw has F/T data, motion capture or a landing among the "
@@ -117,7 +117,7 @@ void CampaignProblem::name_unknowns(const std::vector<Effect>& effects) {
   const bool follows_pads = options_.model != "gripper_delay";
   bool all_forces = true;
   std::set<std::string> objects;
-  for (const auto& t : throws_) {
+  for (const auto& t : *throws_) {
     all_forces = all_forces && t.prepared.normal_force.has_value();
     objects.insert(t.prepared.object);
   }
@@ -157,17 +157,17 @@ void CampaignProblem::name_unknowns(const std::vector<Effect>& effects) {
         add("");
     }
   const int width = static_cast<int>(campaign_.size());
-  for (CampaignThrow& t : throws_) {
-    t.names.clear();
-    t.columns.clear();
+  layouts_.clear();
+  for (const auto& object : objects) {
+    Layout& layout = layouts_[object];
     for (int k = 0; k < width; ++k)
-      if (const auto name = name_for(campaign_[static_cast<std::size_t>(k)].name, t.prepared.object)) {
-        t.names.push_back(*name);
-        t.columns.push_back(k);
+      if (const auto name = name_for(campaign_[static_cast<std::size_t>(k)].name, object)) {
+        layout.names.push_back(*name);
+        layout.columns.push_back(k);
       }
     for (std::size_t k = 0; k < own_.size(); ++k) {
-      t.names.push_back(own_[k].name);
-      t.columns.push_back(width + static_cast<int>(k));
+      layout.names.push_back(own_[k].name);
+      layout.columns.push_back(width + static_cast<int>(k));
     }
   }
 }
@@ -178,76 +178,78 @@ std::vector<double> CampaignProblem::start() const {
   return out;
 }
 
-std::vector<double> CampaignProblem::values_of(const CampaignThrow& thrown, std::span<const double> campaign,
+std::vector<double> CampaignProblem::values_of(const Layout& layout, std::span<const double> campaign,
                                                std::span<const double> own) const {
   std::vector<double> out;
-  for (const int column : thrown.columns) {
+  for (const int column : layout.columns) {
     const auto c = static_cast<std::size_t>(column);
     out.push_back(c < campaign.size() ? campaign[c] : own[c - campaign.size()]);
   }
   return out;
 }
 
-experiment::ThrowPrediction<double> CampaignProblem::predict(const CampaignThrow& thrown,
+experiment::ThrowPrediction<double> CampaignProblem::predict(const experiment::PreparedThrow& prepared,
+                                                             const experiment::Observations& observed,
                                                              std::span<const double> campaign,
                                                              std::span<const double> own) const {
-  const auto values = values_of(thrown, campaign, own);
-  return experiment::predict_channels(thrown.prepared, thrown.observed, model_,
-                                      Values<double>(thrown.names, values));
+  const Layout& read = layout(prepared);
+  const auto values = values_of(read, campaign, own);
+  return experiment::predict_channels(prepared, observed, model_, Values<double>(read.names, values));
 }
 
-Linearisation CampaignProblem::linearise(const CampaignThrow& thrown, std::span<const double> campaign,
-                                         std::span<const double> own, bool derivatives) const {
-  const auto& observed = thrown.observed.all;
-  const auto rows = static_cast<Eigen::Index>(observed.size());
-  Linearisation out;
-  if (!derivatives) {
-    const auto predicted = predict(thrown, campaign, own);
-    out.modes = predicted.modes;
-    out.detach = dynamics::value_of(predicted.detach.time);
-    out.solved = predicted.channels.size() == observed.size() && predicted.landed();
-    if (!out.solved) return out;
-    out.residual.resize(rows);
-    for (std::size_t i = 0; i < observed.size(); ++i)
-      out.residual[static_cast<Eigen::Index>(i)] =
-          (predicted.channels[i] - observed[i].value) / observed[i].sigma;
-    out.solved = out.residual.allFinite();
-    return out;
-  }
-  const auto values = values_of(thrown, campaign, own);
-  const auto width = static_cast<int>(campaign.size());
-  out.residual.resize(rows);
-  out.campaign.setZero(rows, width);
-  out.own.setZero(rows, static_cast<Eigen::Index>(own.size()));
-  constexpr int kSize = dynamics::kDualSize;
-  for (int first = 0; first < static_cast<int>(values.size()); first += kSize) {
-    const int last = std::min(first + kSize, static_cast<int>(values.size()));
-    std::vector<Dual> duals;
-    for (int k = 0; k < static_cast<int>(values.size()); ++k) {
-      const double v = values[static_cast<std::size_t>(k)];
-      duals.push_back(k >= first && k < last ? dynamics::independent(v, k - first) : Dual(v));
-    }
+void CampaignProblem::differentiate(const experiment::PreparedThrow& prepared,
+                                    const experiment::Observations& observed,
+                                    std::span<const double> campaign, std::span<const double> own,
+                                    const UseOfDuals& use) const {
+  const Layout& read = layout(prepared);
+  const auto values = values_of(read, campaign, own);
+  constexpr std::size_t kSize = dynamics::kDualSize;
+  for (std::size_t first = 0; first < values.size(); first += kSize) {
+    const std::size_t last = std::min(first + kSize, values.size());
+    std::vector<Dual> duals(values.begin(), values.end());
+    for (std::size_t k = first; k < last; ++k)
+      duals[k] = dynamics::independent(values[k], static_cast<int>(k - first));
     const auto predicted = experiment::predict_channels(
-        thrown.prepared, thrown.observed, model_, Values<Dual>(thrown.names, std::span<const Dual>(duals)));
+        prepared, observed, model_, Values<Dual>(read.names, std::span<const Dual>(duals)));
+    if (!use(predicted, std::span(read.columns).subspan(first, last - first))) return;
+  }
+}
+
+Linearisation CampaignProblem::linearise(const experiment::PreparedThrow& prepared,
+                                         const experiment::Observations& observed,
+                                         std::span<const double> campaign, std::span<const double> own,
+                                         bool derivatives) const {
+  const auto& all = observed.all;
+  const auto rows = static_cast<Eigen::Index>(all.size());
+  Linearisation out;
+  out.residual.resize(rows);
+  const auto take = [&](const auto& predicted) {
     out.modes = predicted.modes;
     out.detach = dynamics::value_of(predicted.detach.time);
-    out.solved = predicted.channels.size() == observed.size() && predicted.landed();
-    if (!out.solved) return out;
-    for (std::size_t i = 0; i < observed.size(); ++i) {
-      const auto row = static_cast<Eigen::Index>(i);
-      const Dual& p = predicted.channels[i];
-      out.residual[row] = (p.a - observed[i].value) / observed[i].sigma;
-      for (int k = first; k < last; ++k) {
-        const int column = thrown.columns[static_cast<std::size_t>(k)];
-        const double d = p.v[k - first] / observed[i].sigma;
-        if (column < width)
-          out.campaign(row, column) = d;
-        else
-          out.own(row, column - width) = d;
-      }
-    }
+    out.solved = predicted.channels.size() == all.size() && predicted.landed();
+    for (std::size_t i = 0; out.solved && i < all.size(); ++i)
+      out.residual[static_cast<Eigen::Index>(i)] =
+          (dynamics::value_of(predicted.channels[i]) - all[i].value) / all[i].sigma;
+    return out.solved;
+  };
+  if (!derivatives) {
+    take(predict(prepared, observed, campaign, own));
+  } else {
+    const auto width = static_cast<int>(campaign.size());
+    out.campaign.setZero(rows, width);
+    out.own.setZero(rows, static_cast<Eigen::Index>(own.size()));
+    differentiate(prepared, observed, campaign, own, [&](const auto& predicted, std::span<const int> by) {
+      if (!take(predicted)) return false;
+      for (std::size_t i = 0; i < all.size(); ++i)
+        for (std::size_t k = 0; k < by.size(); ++k) {
+          const double d = predicted.channels[i].v[static_cast<int>(k)] / all[i].sigma;
+          const auto row = static_cast<Eigen::Index>(i);
+          (by[k] < width ? out.campaign(row, by[k]) : out.own(row, by[k] - width)) = d;
+        }
+      return true;
+    });
   }
-  out.solved = out.residual.allFinite() && out.campaign.allFinite() && out.own.allFinite();
+  out.solved = out.solved && out.residual.allFinite() && out.campaign.allFinite() && out.own.allFinite();
   return out;
 }
 

@@ -3,6 +3,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
+#include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -36,16 +39,20 @@ struct CampaignOptions {
   std::optional<double> reference_force{};  ///< [N]
 };
 
-/// One throw: its observations, and how its parameters are named and found among the unknowns.
+/// One throw and its observations.
 struct CampaignThrow {
   experiment::PreparedThrow prepared;
   experiment::Observations observed;
-  std::vector<std::string> names;  ///< of the values that it reads
-  std::vector<int> columns;        ///< where they are: campaign unknowns first, then the throw's own
   /// By observation: the phase's boundaries as the log has them [s], for choosing samples.
   double opening{}, release{};
   /// The measured release, or a predicted one where there is none.
   double release_or(double predicted) const { return release == release ? release : predicted; }
+};
+
+/// The values that the throws of one object read.
+struct Layout {
+  std::vector<std::string> names;
+  std::vector<int> columns;  ///< where they are: campaign unknowns first, then the throw's own
 };
 
 /// r = (predicted − observed)/σ, and its derivatives with respect to the campaign's unknowns and the throw's
@@ -64,38 +71,63 @@ class CampaignProblem {
   /// needs, std::invalid_argument for an unknown model or effect, or a log without any observation.
   CampaignProblem(const datasets::ThrowLog& log, const std::string& file, const CampaignOptions& options);
 
-  const std::vector<CampaignThrow>& throws() const { return throws_; }
+  const std::vector<CampaignThrow>& throws() const { return *throws_; }
   const std::vector<Unknown>& campaign() const { return campaign_; }
   const std::vector<Unknown>& own() const { return own_; }
   const experiment::ThrowModel& model() const { return model_; }
   const CampaignOptions& options() const { return options_; }
   const std::vector<std::string>& notes() const { return notes_; }
 
-  /// The same throws with other effects, or another contact model.
+  /// The same throws (shared, not copied) with other effects, or another contact model.
   CampaignProblem with(const std::string& model, const std::vector<std::string>& effects) const;
 
   /// Where a fit starts: the campaign's unknowns, in their order.
   std::vector<double> start() const;
 
-  /// The residual of one throw; with `derivatives`, through dual numbers, kDualSize unknowns at a time.
+  /// How a throw's values are named and found among the unknowns.
+  const Layout& layout(const experiment::PreparedThrow& prepared) const {
+    return layouts_.at(prepared.object);
+  }
+
+  /// The residual of one throw, of all its observations or of some; with `derivatives`, through dual numbers.
   Linearisation linearise(const CampaignThrow& thrown, std::span<const double> campaign,
-                          std::span<const double> own, bool derivatives) const;
+                          std::span<const double> own, bool derivatives) const {
+    return linearise(thrown.prepared, thrown.observed, campaign, own, derivatives);
+  }
+  Linearisation linearise(const experiment::PreparedThrow& prepared, const experiment::Observations& observed,
+                          std::span<const double> campaign, std::span<const double> own,
+                          bool derivatives) const;
 
   /// The prediction itself.
   experiment::ThrowPrediction<double> predict(const CampaignThrow& thrown, std::span<const double> campaign,
+                                              std::span<const double> own) const {
+    return predict(thrown.prepared, thrown.observed, campaign, own);
+  }
+  experiment::ThrowPrediction<double> predict(const experiment::PreparedThrow& prepared,
+                                              const experiment::Observations& observed,
+                                              std::span<const double> campaign,
                                               std::span<const double> own) const;
+
+  /// The prediction in dual numbers, kDualSize unknowns at a time: `use` is given each with the unknowns that
+  /// its derivatives are by (campaign first, then own), until it returns false.
+  using UseOfDuals =
+      std::function<bool(const experiment::ThrowPrediction<dynamics::Dual>&, std::span<const int> unknowns)>;
+  void differentiate(const experiment::PreparedThrow& prepared, const experiment::Observations& observed,
+                     std::span<const double> campaign, std::span<const double> own,
+                     const UseOfDuals& use) const;
 
  private:
   CampaignProblem() = default;
   void name_unknowns(const std::vector<dynamics::Effect>& effects);
-  std::vector<double> values_of(const CampaignThrow&, std::span<const double> campaign,
+  std::vector<double> values_of(const Layout&, std::span<const double> campaign,
                                 std::span<const double> own) const;
 
   datasets::ThrowLog header_;  // objects and gripper, without its throws
   CampaignOptions options_;
   experiment::ThrowModel model_;
   std::vector<Unknown> campaign_, own_;
-  std::vector<CampaignThrow> throws_;
+  std::shared_ptr<const std::vector<CampaignThrow>> throws_;
+  std::map<std::string, Layout> layouts_;  // by object
   std::vector<std::string> notes_;
   experiment::ModelParameters first_guess_;
 };

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <fstream>
 
+#include "experiment/campaign_effects.hpp"
+
 namespace unhand::fitting {
 
 using datasets::CardError;
@@ -33,8 +35,6 @@ constexpr BaseParameter kBase[] = {{"mu", "-", 0, 10, true},
                                    {"opening_time", "s", 1e-9, 10, true},
                                    {"shape", "-", 1e-3, 100, true},
                                    {"delay", "s", 0, 10, false}};
-
-std::string without_object(const std::string& name) { return name.substr(0, name.find('[')); }
 
 void check(const std::string& file, const std::string& name, const datasets::CardParameter& p,
            const std::string& unit, double low, double high) {
@@ -171,7 +171,7 @@ CampaignOptions options_of(const ModelCard& card, const std::string& file) {
     if (known) check(file, name, parameter, base->unit, base->low, base->high);
     for (const auto& effect : effects)
       for (const auto& p : effect.parameters)
-        if (without_object(name) == effect.full_name(p)) {
+        if (experiment::without_object(name) == effect.full_name(p)) {
           check(file, name, parameter, p.unit, p.low, p.high);
           known = true;
         }

@@ -9,13 +9,10 @@
 #include <stdexcept>
 
 #include "experiment/parallel.hpp"
-#include "fitting/normal_equations.hpp"
+#include "fitting/before_release.hpp"
 
 namespace unhand::fitting {
 
-using dynamics::Dual;
-using dynamics::value_of;
-using dynamics::Values;
 using experiment::Channel;
 using experiment::kDegrees;
 
@@ -23,16 +20,6 @@ namespace {
 
 using Matrix = Eigen::MatrixXd;
 using Index = Eigen::Index;
-
-std::vector<double> values_of(const CampaignThrow& thrown, const std::vector<double>& campaign,
-                              const std::vector<double>& own) {
-  std::vector<double> out;
-  for (const int column : thrown.columns) {
-    const auto c = static_cast<std::size_t>(column);
-    out.push_back(c < campaign.size() ? campaign[c] : own[c - campaign.size()]);
-  }
-  return out;
-}
 
 constexpr Index kOutcomes = 7;  // in the order of OutcomeSigma
 template <class S>
@@ -43,64 +30,27 @@ std::array<S, kOutcomes> outcomes_of(const experiment::ThrowPrediction<S>& p) {
 
 /// ∂(outcomes)/∂(campaign, own), or nothing where a simulation with dual numbers has no answer.
 std::optional<Matrix> slopes(const CampaignProblem& problem, const CampaignThrow& thrown,
-                             const std::vector<double>& values, Index width) {
-  const auto n = static_cast<int>(values.size());
-  Matrix out = Matrix::Zero(kOutcomes, width);
-  constexpr int kSize = dynamics::kDualSize;
-  for (int first = 0; first < n; first += kSize) {
-    const int last = std::min(first + kSize, n);
-    std::vector<Dual> duals;
-    for (int k = 0; k < n; ++k) {
-      const double v = values[static_cast<std::size_t>(k)];
-      duals.push_back(k >= first && k < last ? dynamics::independent(v, k - first) : Dual(v));
-    }
-    const auto p = experiment::predict_channels(thrown.prepared, {}, problem.model(),
-                                                Values<Dual>(thrown.names, std::span<const Dual>(duals)));
-    if (!p.landed()) return {};
+                             const std::vector<double>& campaign, const std::vector<double>& own) {
+  Matrix out = Matrix::Zero(kOutcomes, static_cast<Index>(campaign.size() + own.size()));
+  bool landed = true;
+  problem.differentiate(thrown.prepared, {}, campaign, own, [&](const auto& p, std::span<const int> by) {
+    landed = p.landed();
+    if (!landed) return false;
     const auto y = outcomes_of(p);
-    for (int k = first; k < last; ++k)
+    for (std::size_t k = 0; k < by.size(); ++k)
       for (Index i = 0; i < kOutcomes; ++i)
-        out(i, thrown.columns[static_cast<std::size_t>(k)]) = y[static_cast<std::size_t>(i)].v[k - first];
-  }
-  if (!out.allFinite()) return {};
+        out(i, by[k]) = y[static_cast<std::size_t>(i)].v[static_cast<Index>(k)];
+    return true;
+  });
+  if (!landed || !out.allFinite()) return {};
   return out;
 }
 
-/// What the samples before the opening leave open of a throw's own unknowns: H⁻¹, and how their estimate
-/// follows the campaign's unknowns.
-struct Before {
-  Matrix covariance, response;
-};
-Before before_release(const CampaignProblem& problem, const CampaignThrow& thrown, const FitResult& fit,
-                      const std::vector<double>& own) {
-  const auto width = static_cast<Index>(fit.campaign.size()), n = static_cast<Index>(own.size());
-  Matrix H = Matrix::Zero(n, n), coupling = Matrix::Zero(n, width);
-  for (Index k = 0; k < n; ++k) {
-    const double spread = fit.own_spread[static_cast<std::size_t>(k)];
-    H(k, k) = 1 / (spread * spread);
-  }
-  CampaignThrow held = thrown;
-  std::erase_if(held.observed.all, [&](const experiment::Observation& o) {
-    return phase_of(o, thrown.opening, HUGE_VAL) != Phase::grasped;
-  });
-  if (!held.observed.all.empty()) {
-    auto l = problem.linearise(held, fit.values(), own, true);
-    if (l.solved) {
-      weigh(l, held, Weighting{});
-      H += l.own.transpose() * l.own;
-      coupling = l.own.transpose() * l.campaign;
-    }
-  }
-  const Eigen::LDLT<Matrix> solver(H);
-  return {solver.solve(Matrix::Identity(n, n)), -solver.solve(coupling)};
-}
-
 std::optional<OutcomeSigma> sigma_of(const CampaignProblem& problem, const CampaignThrow& thrown,
-                                     const FitResult& fit, const std::vector<double>& own) {
-  const auto width = static_cast<Index>(fit.campaign.size()), n = static_cast<Index>(own.size());
-  const auto J = slopes(problem, thrown, values_of(thrown, fit.values(), own), width + n);
+                                     const FitResult& fit, const BeforeRelease& before) {
+  const auto width = static_cast<Index>(fit.campaign.size()), n = static_cast<Index>(before.own.size());
+  const auto J = slopes(problem, thrown, fit.values(), before.own);
   if (!J) return {};
-  const Before before = before_release(problem, thrown, fit, own);
   const Matrix T = J->leftCols(width) + J->rightCols(n) * before.response;
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   Matrix variance = J->rightCols(n) * before.covariance * J->rightCols(n).transpose();
@@ -169,11 +119,11 @@ PredictedThrow predict_one(const CampaignProblem& problem, const CampaignThrow& 
   PredictedThrow out;
   const auto& prepared = thrown.prepared;
   out.comparison = {prepared.id, prepared.object, prepared.condition, prepared.split, {}, {}};
-  out.own = own_before_release(problem, thrown, fit);
-  const auto values = values_of(thrown, fit.values(), out.own);
-  const Values<double> named(thrown.names, values);
+  const BeforeRelease before = before_release(problem, thrown, fit);
+  out.own = before.own;
+  const auto campaign = fit.values();
   const auto begin = Clock::now();
-  const auto bare = experiment::predict_channels(prepared, {}, problem.model(), named);
+  const auto bare = problem.predict(prepared, {}, campaign, out.own);
   out.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
   auto& prediction = out.comparison.prediction;
   prediction.release = bare.release;
@@ -183,11 +133,9 @@ PredictedThrow predict_one(const CampaignProblem& problem, const CampaignThrow& 
   prediction.events = static_cast<int>(bare.modes.size());
   const double from = std::max(thrown.release_or(bare.detach.time), bare.detach.time);
   const auto observed = bare.landed() ? outcome_channels(thrown, from) : experiment::Observations{};
-  judge(
-      prepared, observed,
-      observed.all.empty() ? bare : experiment::predict_channels(prepared, observed, problem.model(), named),
-      out.comparison);
-  if (uncertainty && bare.landed()) out.sigma = sigma_of(problem, thrown, fit, out.own);
+  judge(prepared, observed,
+        observed.all.empty() ? bare : problem.predict(prepared, observed, campaign, out.own), out.comparison);
+  if (uncertainty && bare.landed()) out.sigma = sigma_of(problem, thrown, fit, before);
   return out;
 }
 

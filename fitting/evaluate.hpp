@@ -29,8 +29,8 @@ struct EvaluateOptions {
 
 /// Predicts throws of `problem` with a fit of the same unknowns; all, or those listed.
 ///
-/// The throw's own unknowns o are what its samples before the opening and the learned spread say
-/// (own_before_release), for train throws, too: a prediction does not know the outcome.
+/// The throw's own unknowns o are what its samples before the opening and the learned spread say,
+/// for train throws, too: a prediction does not know the outcome.
 ///
 /// σ by exact derivatives, y(c, o(c)) with c the campaign's unknowns: T Σ_c Tᵀ + (∂y/∂o) H⁻¹ (∂y/∂o)ᵀ,
 /// T = ∂y/∂c − (∂y/∂o) H⁻¹ JᵒᵀJᶜ, H = JᵒᵀJᵒ + Λ of the samples before the opening. Noise of the logged hand

@@ -104,9 +104,4 @@ struct FitResult {
 /// with exact derivatives.
 FitResult fit(const CampaignProblem& problem, const FitOptions& options = {});
 
-/// The own unknowns of throws that took no part in a fit, from their samples before the gripper opens alone
-/// and from the learned spread: what is known of a throw before it is thrown.
-std::vector<double> own_before_release(const CampaignProblem& problem, const CampaignThrow& thrown,
-                                       const FitResult& fit);
-
 }  // namespace unhand::fitting

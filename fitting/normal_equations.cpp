@@ -8,9 +8,10 @@
 
 namespace unhand::fitting {
 
-void weigh(Linearisation& l, const CampaignThrow& thrown, const Weighting& weighting) {
+void weigh(Linearisation& l, const experiment::Observations& observed, const CampaignThrow& thrown,
+           const Weighting& weighting) {
   for (Eigen::Index i = 0; i < l.residual.size(); ++i) {
-    const auto& o = thrown.observed.all[static_cast<std::size_t>(i)];
+    const auto& o = observed.all[static_cast<std::size_t>(i)];
     double slope = weighting.of(phase_of(o, thrown.opening, thrown.release_or(l.detach)), o.channel);
     double r = slope * l.residual[i];
     const double size = std::abs(r), limit = weighting.sample_limit;
@@ -29,8 +30,8 @@ void weigh(Linearisation& l, const CampaignThrow& thrown, const Weighting& weigh
 NormalEquations normal_equations(const CampaignProblem& problem, const std::vector<std::size_t>& used,
                                  const std::vector<double>& campaign,
                                  const std::vector<std::vector<double>>& own,
-                                 const std::vector<double>& own_scale, const std::vector<double>& own_sigma,
-                                 const Weighting& weighting, int threads) {
+                                 const std::vector<double>& own_sigma, const Weighting& weighting,
+                                 int threads) {
   NormalEquations out;
   const auto width = static_cast<Eigen::Index>(campaign.size());
   out.information.setZero(width, width);
@@ -38,8 +39,7 @@ NormalEquations normal_equations(const CampaignProblem& problem, const std::vect
   std::vector<Eigen::MatrixXd> parts(used.size());
   experiment::parallel_for(used.size(), threads, [&](std::size_t i) {
     const CampaignThrow& thrown = problem.throws()[used[i]];
-    std::vector<double> values(own[i].size());
-    for (std::size_t k = 0; k < values.size(); ++k) values[k] = own[i][k] * own_scale[k];
+    const std::vector<double>& values = own[i];
     Linearisation l = problem.linearise(thrown, campaign, values, true);
     ThrowEquations& part = out.throws[i];
     part.modes = l.modes;
@@ -53,7 +53,7 @@ NormalEquations normal_equations(const CampaignProblem& problem, const std::vect
       return;
     }
     part.residual = l.residual;
-    weigh(l, thrown, weighting);
+    weigh(l, thrown.observed, thrown, weighting);
     part.chi2 = l.residual.squaredNorm();
     part.weight = part.chi2 > weighting.throw_limit ? std::sqrt(weighting.throw_limit / part.chi2) : 1.0;
     Eigen::MatrixXd Hoo = l.own.transpose() * l.own;

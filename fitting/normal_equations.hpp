@@ -28,8 +28,9 @@ struct Weighting {
   }
 };
 
-/// Weighs the samples of a throw, with their derivatives.
-void weigh(Linearisation& l, const CampaignThrow& thrown, const Weighting& weighting);
+/// Weighs samples of a throw, all or some, with their derivatives.
+void weigh(Linearisation& l, const experiment::Observations& observed, const CampaignThrow& thrown,
+           const Weighting& weighting);
 
 /// One throw's part.
 struct ThrowEquations {
@@ -47,12 +48,12 @@ struct NormalEquations {
   std::vector<ThrowEquations> throws;
 };
 
-/// At the campaign's values and the throws' own (in units of own_scale), for the throws listed in `used`.
+/// At the campaign's values and the throws' own, for the throws listed in `used`; own_sigma their spread.
 NormalEquations normal_equations(const CampaignProblem& problem, const std::vector<std::size_t>& used,
                                  const std::vector<double>& campaign,
                                  const std::vector<std::vector<double>>& own,
-                                 const std::vector<double>& own_scale, const std::vector<double>& own_sigma,
-                                 const Weighting& weighting, int threads);
+                                 const std::vector<double>& own_sigma, const Weighting& weighting,
+                                 int threads);
 
 /// H⁻¹ G H⁻¹ from the scatter of the throws' gradients, nowhere below H⁻¹; H = information + prior.
 Eigen::MatrixXd scatter_covariance(const NormalEquations& equations, const Eigen::MatrixXd& prior);

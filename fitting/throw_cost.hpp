@@ -60,7 +60,7 @@ class AllThrows final : public ceres::EvaluationCallback {
       } catch (const std::invalid_argument&) {
         at_[i] = {};  // a trial step outside the physics
       }
-      if (at_[i].solved) weigh(at_[i], thrown, shared_.weighting);
+      if (at_[i].solved) weigh(at_[i], thrown.observed, thrown, shared_.weighting);
       if (jacobians) shared_.jacobian_nanoseconds += static_cast<long>(1e9 * seconds_since(begin));
     });
   }

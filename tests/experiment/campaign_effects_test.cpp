@@ -434,7 +434,7 @@ TEST(CampaignEffects, RandomOnesAreFromTheCatalogueAndVisible) {
     for (const Effect& effect : known_effects())
       for (const auto& p : effect.parameters)
         for (const auto& [name, value] : effects) {
-          if (name.substr(0, name.find('[')) != effect.full_name(p)) continue;
+          if (without_object(name) != effect.full_name(p)) continue;
           ids.insert(effect.id);
           if (!p.is_shape()) {
             EXPECT_GE(std::abs(value - p.neutral), 0.499 * p.typical) << name;

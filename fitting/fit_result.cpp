@@ -1,0 +1,40 @@
+// Names, and what a fit's result answers by itself.
+#include <cmath>
+
+#include "fitting/fit.hpp"
+
+namespace unhand::fitting {
+
+using experiment::Channel;
+
+std::string_view to_string(Phase phase) {
+  constexpr std::string_view kNames[kPhaseCount] = {"grasped", "release", "flight", "landing"};
+  return kNames[static_cast<int>(phase)];
+}
+
+const char* to_string(FitOutcome outcome) {
+  constexpr const char* kNames[] = {"converged", "iterations_spent", "no_start", "not_solved"};
+  return kNames[static_cast<int>(outcome)];
+}
+
+Phase phase_of(const experiment::Observation& o, double opening, double release) {
+  if (o.channel == Channel::landing_x || o.channel == Channel::landing_theta ||
+      o.channel == Channel::landing_time)
+    return Phase::landing;
+  if (o.time < opening) return Phase::grasped;
+  return o.time < release ? Phase::release : Phase::flight;
+}
+
+std::vector<double> FitResult::values() const {
+  std::vector<double> out;
+  for (const auto& u : campaign) out.push_back(u.value);
+  return out;
+}
+
+double FitResult::correlation(std::size_t i, std::size_t j) const {
+  const std::size_t n = campaign.size();
+  const double scale = std::sqrt(covariance[i * n + i] * covariance[j * n + j]);
+  return scale > 0 ? covariance[i * n + j] / scale : 0;
+}
+
+}  // namespace unhand::fitting
