@@ -83,10 +83,22 @@ inline Relative<double> values(const Relative<Dual>& y) {
   return {{y.arm.x.a, y.arm.z.a}, y.angle.a, {y.slip.x.a, y.slip.z.a}, y.spin.a};
 }
 
-/// r = p_WO − p_WH in the world [m].
+/// How the object stands in the world: the cosine and sine of θ_O, and r = p_WO − p_WH [m].
+template <class S>
+struct Stance {
+  S c, s;
+  Vec2<S> r;
+};
+template <class S>
+Stance<S> stance(const Scene<S>& scene, const Relative<S>& y) {
+  using std::cos;
+  using std::sin;
+  const S angle = scene.hand.theta + y.angle, c = cos(angle), s = sin(angle);
+  return {c, s, {c * y.arm.x - s * y.arm.z, s * y.arm.x + c * y.arm.z}};
+}
 template <class S>
 Vec2<S> lever(const Scene<S>& scene, const Relative<S>& y) {
-  return dynamics::rotate(S(scene.hand.theta + y.angle), y.arm);
+  return stance(scene, y).r;
 }
 
 /// Pose and twist of the object's CoM, in the world.
@@ -104,11 +116,9 @@ Twist<S> object_twist(const Scene<S>& scene, const Relative<S>& y) {
 
 /// d/dt of the relative state under the wrench `patch` (about the patch, on the object, in the world).
 template <class S>
-State<S, 6> relative_rate(const Scene<S>& scene, const Relative<S>& y, const Wrench<S>& patch) {
-  using std::cos;
-  using std::sin;
-  const S angle = scene.hand.theta + y.angle, c = cos(angle), s = sin(angle);
-  const Vec2<S> r{c * y.arm.x - s * y.arm.z, s * y.arm.x + c * y.arm.z};
+State<S, 6> relative_rate(const Scene<S>& scene, const Relative<S>& y, const Stance<S>& stands,
+                          const Wrench<S>& patch) {
+  const auto& [c, s, r] = stands;
   const S omega = scene.hand_twist.omega + y.spin;
   const Acceleration<S> com = dynamics::acceleration_under(scene.body, patch, r, scene.gravity);
   const Acceleration<S> point = dynamics::acceleration_at_patch(com, omega, r);
@@ -118,6 +128,10 @@ State<S, 6> relative_rate(const Scene<S>& scene, const Relative<S>& y, const Wre
           point.ax - scene.hand_acceleration.ax + omega * y.slip.z,
           point.az - scene.hand_acceleration.az - omega * y.slip.x,
           com.alpha - scene.hand_acceleration.alpha};
+}
+template <class S>
+State<S, 6> relative_rate(const Scene<S>& scene, const Relative<S>& y, const Wrench<S>& patch) {
+  return relative_rate(scene, y, stance(scene, y), patch);
 }
 
 /// f_p: the wrench about the patch that makes the material point there and the object's rotation follow the

@@ -37,15 +37,17 @@ struct Law {
 };
 
 template <class S>
-Law<S> law_between(const FrictionLimits<S>& limits, const Scene<S>& scene, const Relative<S>& y);
+Law<S> law_between(const FrictionLimits<S>& limits, const Scene<S>& scene, const Relative<S>& y,
+                   const Vec2<S>& r);
 
+/// `r` is the lever of y in the scene.
 template <class S>
-Law<S> law(int mode, const FrictionLimits<S>& limits, const Scene<S>& scene, const Relative<S>& y) {
-  if (mode == kSlideBetween) return law_between(limits, scene, y);
+Law<S> law(int mode, const FrictionLimits<S>& limits, const Scene<S>& scene, const Relative<S>& y,
+           const Vec2<S>& r) {
+  if (mode == kSlideBetween) return law_between(limits, scene, y, r);
   const Translation translation = translation_of(mode);
   const Rotation rotation = rotation_of(mode);
   const auto& [m, I] = scene.body;
-  const Vec2<S> r = lever(scene, y);
   const S omega = scene.hand_twist.omega + y.spin;
   const S limit = limits.slipping(scene.normal_force, y.slip, y.spin);
   const S alpha_hand = scene.hand_acceleration.alpha;
@@ -77,9 +79,10 @@ Law<S> law(int mode, const FrictionLimits<S>& limits, const Scene<S>& scene, con
 /// Filippov's solution where slide+ decelerates and slide− accelerates the spin: the mixture λ, 1 − λ of
 /// their wrenches that leaves ω_r = 0. Force and torque stay within their limits, being between two that do.
 template <class S>
-Law<S> law_between(const FrictionLimits<S>& limits, const Scene<S>& scene, const Relative<S>& y) {
-  const Law<S> plus = law(mode_of(kSlide, kPositive), limits, scene, y);
-  const Law<S> minus = law(mode_of(kSlide, kNegative), limits, scene, y);
+Law<S> law_between(const FrictionLimits<S>& limits, const Scene<S>& scene, const Relative<S>& y,
+                   const Vec2<S>& r) {
+  const Law<S> plus = law(mode_of(kSlide, kPositive), limits, scene, y, r);
+  const Law<S> minus = law(mode_of(kSlide, kNegative), limits, scene, y, r);
   const S spread = minus.spin_acceleration - plus.spin_acceleration;  // vanishes with the normal force
   const S share = value_of(spread) > 0 ? S(minus.spin_acceleration / spread) : S(0.5), rest = 1.0 - share;
   return {share * plus.carrying_force + rest * minus.carrying_force,
@@ -110,10 +113,11 @@ int consistent_mode(const FrictionLimits<double>& limits, const Scene<double>& s
   const double force_limit = limits.slipping(scene.normal_force, y.slip, y.spin),
                torque_limit = limits.length(scene.normal_force) * force_limit;
   const bool slipping = y.slip.x != 0 || y.slip.z != 0;
+  const Vec2<double> r = lever(scene, y);
 
   auto translation_with = [&](Rotation rotation) {
     if (slipping && before == kBrake && slide_end == SlideEnd::latched_brake) return kBrake;
-    const double demand = norm(law(mode_of(kStuck, rotation), limits, scene, y).carrying_force);
+    const double demand = norm(law(mode_of(kStuck, rotation), limits, scene, y, r).carrying_force);
     if (slipping) return excluded.brake || (demand > force_limit && !excluded.slide) ? kSlide : kBrake;
     return excluded.stuck || (demand > force_limit && !excluded.slide) ? kSlide : kStuck;
   };
@@ -123,13 +127,13 @@ int consistent_mode(const FrictionLimits<double>& limits, const Scene<double>& s
     return mode_of(translation_with(rotation), rotation);
   }
   const int locked = mode_of(translation_with(kLocked), kLocked);
-  const double demand = law(locked, limits, scene, y).wrench.tau;
+  const double demand = law(locked, limits, scene, y, r).wrench.tau;
   if (!excluded.locked && std::abs(demand) <= torque_limit) return locked;
   const Rotation first = lagging(demand), second = first == kNegative ? kPositive : kNegative;
   const int modes[2] = {mode_of(translation_with(first), first), mode_of(translation_with(second), second)};
   double drive[2];  // how the spin of that sign would grow
   for (int k = 0; k < 2; ++k)
-    drive[k] = sign_of(k == 0 ? first : second) * law(modes[k], limits, scene, y).spin_acceleration;
+    drive[k] = sign_of(k == 0 ? first : second) * law(modes[k], limits, scene, y, r).spin_acceleration;
   if (excluded.between) return modes[drive[0] >= drive[1] ? 0 : 1];
   if (drive[0] > 0) return modes[0];
   if (drive[1] > 0) return modes[1];
@@ -138,7 +142,7 @@ int consistent_mode(const FrictionLimits<double>& limits, const Scene<double>& s
   if (slipping &&
       slides[0] != slides[1]) {  // one spin would brake: the braking force does not jump with the rotation
     const int braked = mode_of(kBrake, kLocked);
-    const double torque = law(braked, limits, scene, y).wrench.tau;
+    const double torque = law(braked, limits, scene, y, r).wrench.tau;
     return std::abs(torque) <= torque_limit ? braked : mode_of(kBrake, lagging(torque));
   }
   return modes[0];
@@ -210,7 +214,8 @@ void SlidingPivot::guards_(const Phase& phase, const SceneSource& source, const 
   const int mode = phase.mode;
   const Scene<S> scene = source.scene(phase.window, t);
   const FrictionLimits<S>& limits = this->limits<S>();
-  const Law<S> now = law(mode, limits, scene, y);
+  const Stance<S> stands = stance(scene, y);
+  const Law<S> now = law(mode, limits, scene, y, stands.r);
   const S force_limit = limits.slipping(scene.normal_force, y.slip, y.spin),
           torque_limit = limits.length(scene.normal_force) * force_limit;
   if (rotation_of(mode) != kLocked) {
@@ -219,17 +224,17 @@ void SlidingPivot::guards_(const Phase& phase, const SceneSource& source, const 
     g[kRotationGuard] = margin(S(now.wrench.tau * now.wrench.tau), S(torque_limit * torque_limit));
   }
   if (mode == kSlideBetween) {
-    const S plus = law(mode_of(kSlide, kPositive), limits, scene, y).spin_acceleration;
-    const S minus = law(mode_of(kSlide, kNegative), limits, scene, y).spin_acceleration;
+    const S plus = law(mode_of(kSlide, kPositive), limits, scene, y, stands.r).spin_acceleration;
+    const S minus = law(mode_of(kSlide, kNegative), limits, scene, y, stands.r).spin_acceleration;
     const S drive = plus > -minus ? plus : S(-minus);
     const S torque = scene.body.inertia * drive;
     g[kRotationGuard] = torque / (torque_limit + std::abs(value_of(torque)) + 1e-300);
-    const S demand = law(mode_of(kSlide, kLocked), limits, scene, y).wrench.tau;
+    const S demand = law(mode_of(kSlide, kLocked), limits, scene, y, stands.r).wrench.tau;
     g[kTorqueSuffices] = margin(S(demand * demand), S(torque_limit * torque_limit));
   }
   const S force = margin(dot(now.carrying_force, now.carrying_force), S(force_limit * force_limit));
   if (translation_of(mode) == kBrake) {
-    const State<S, 6> rate = relative_rate(scene, y, now.wrench);
+    const State<S, 6> rate = relative_rate(scene, y, stands, now.wrench);
     const S speed = norm(y.slip);
     g[kTranslationGuard] = stop_guard(speed, S((y.slip.x * rate[3] + y.slip.z * rate[4]) / speed));
     if (slide_end_ == SlideEnd::memoryless) g[kSlideAgain] = force;
@@ -240,16 +245,17 @@ void SlidingPivot::guards_(const Phase& phase, const SceneSource& source, const 
 
 template <class S>
 Wrench<S> SlidingPivot::wrench_(int mode, const Scene<S>& scene, const Relative<S>& y) const {
-  return law(mode, limits<S>(), scene, y).wrench;
+  return law(mode, limits<S>(), scene, y, lever(scene, y)).wrench;
 }
 
 template <class S>
 void SlidingPivot::rate_(int mode, const Scene<S>& scene, const Relative<S>& y, State<S, 6>& dy) const {
-  const Law<S> now = law(mode, limits<S>(), scene, y);
+  const Stance<S> stands = stance(scene, y);
+  const Law<S> now = law(mode, limits<S>(), scene, y, stands.r);
   if (translation_of(mode) == kStuck) {
     dy = {S(0), S(0), y.spin, S(0), S(0), now.spin_acceleration};
   } else {
-    dy = relative_rate(scene, y, now.wrench);
+    dy = relative_rate(scene, y, stands, now.wrench);
     dy[5] = now.spin_acceleration;  // exactly zero while locked
   }
 }

@@ -1,11 +1,15 @@
 #include "dynamics/guard_roots.hpp"
 
+#include <utility>
+
 namespace unhand::dynamics {
 namespace {
 
 constexpr double kNode[4] = {0, 1.0 / 3, 2.0 / 3, 1};  // where guards are sampled in a step
 constexpr double kGrazing = 1e-6;   // of a guard's range over a step: a peak this close to zero only touches
 constexpr double kTogether = 4e-9;  // of a step: roots this close on the dense output are one instant
+constexpr double kLocated = 1e-9;   // of a step: how far a guard's value may say that its root still is
+constexpr double kStraight = 1e-6;  // of a step: so near a root the rest is a straight line, bent by 1e-12
 
 double range_of(const double (&G)[4][kMaxGuards], int i) {
   return std::max({G[0][i], G[1][i], G[2][i], G[3][i]}) - std::min({G[0][i], G[1][i], G[2][i], G[3][i]});
@@ -48,8 +52,7 @@ bool GuardRoots<S, N>::find_first(Stepper<S, N>& stepper, bool first_step, Brack
         watch_.hidden[i] = false;
       } else if (watch_.armed[i] && !(watch_.hidden[i] && G[node][i] == 0)) {
         if (!watch_.hidden[i] && touches(stepper, G, i, node)) continue;
-        bracket.safe = kNode[node - 1];
-        bracket.unsafe = kNode[node];
+        bracket = {i, kNode[node - 1], kNode[node], std::min(G[node - 1][i], 0.0), G[node][i]};
         if (watch_.hidden[i]) {
           hidden_before = bracket.unsafe;
           if (!shrink_to_first_excursion(stepper, bracket)) continue;
@@ -61,14 +64,13 @@ bool GuardRoots<S, N>::find_first(Stepper<S, N>& stepper, bool first_step, Brack
     if (watch_.armed[i] && !watch_.hidden[i])
       found = find_hidden_peak(stepper, G, safe_from, found, bracket) || found;
     if (!found) continue;
-    double root = bisect(stepper, bracket);
-    if (hidden_before > 0 && !(slope_at(stepper, root, i) > 0)) {
+    if (bracket.safe < bracket.unsafe) locate(stepper, bracket);
+    if (hidden_before > 0 && !(slope_at(stepper, bracket.root, i) > 0)) {
       bracket.unsafe = hidden_before;
       if (!begin_of_rise(stepper, bracket)) continue;
-      root = bracket.unsafe;
     }
-    if (root < earliest * (1 - kTogether)) {
-      earliest = root;
+    if (bracket.root < earliest * (1 - kTogether)) {
+      earliest = bracket.root;
       first = bracket;
     }
   }
@@ -115,13 +117,15 @@ template <class S, int N>
 bool GuardRoots<S, N>::shrink_to_first_excursion(Stepper<S, N>& stepper, Bracket& bracket) {
   double theta = bracket.unsafe;
   for (int k = 0; k < 200; ++k) {
-    const double trial = 0.5 * theta;
-    if (sample_one(stepper, trial, bracket.guard) < 0) {
+    const double trial = 0.5 * theta, value = sample_one(stepper, trial, bracket.guard);
+    if (value < 0) {
       bracket.safe = trial;
+      bracket.at_safe = value;
       bracket.unsafe = theta;
       return true;
     }
     theta = trial;
+    bracket.at_unsafe = value;
   }
   return begin_of_rise(stepper, bracket);
 }
@@ -133,7 +137,8 @@ bool GuardRoots<S, N>::begin_of_rise(Stepper<S, N>& stepper, Bracket& bracket) c
   if (!(slope_at(stepper, bracket.unsafe, bracket.guard) > 0)) return false;
   for (int k = 0; k < 200 && slope_at(stepper, 0.5 * bracket.unsafe, bracket.guard) > 0; ++k)
     bracket.unsafe *= 0.5;
-  bracket.safe = bracket.unsafe;
+  bracket.safe = bracket.root = bracket.unsafe;
+  bracket.slope = 0;
   return true;
 }
 
@@ -186,10 +191,13 @@ bool GuardRoots<S, N>::find_hidden_peak(Stepper<S, N>& stepper, const Samples& G
         }
       }
     if (best > kGrazing) {
-      bracket.unsafe = peak;
-      bracket.safe = from;
+      bracket = {i, from, peak, 0, best * range};
       for (int node = 1; node < 3; ++node)
-        if (kNode[node] < peak && kNode[node] > from && G[node][i] < 0) bracket.safe = kNode[node];
+        if (kNode[node] < peak && kNode[node] > from && G[node][i] < 0) {
+          bracket.safe = kNode[node];
+          bracket.at_safe = G[node][i];
+        }
+      if (bracket.safe == from) bracket.at_safe = std::min(sample_one(stepper, from, i), 0.0);
       return true;
     }
     if (best > -kGrazing) ++grazings_;
@@ -197,64 +205,76 @@ bool GuardRoots<S, N>::find_hidden_peak(Stepper<S, N>& stepper, const Samples& G
   return false;
 }
 
-/// Narrows the bracket on the dense output (Illinois' false position, safeguarded) and returns the root's
-/// fraction.
+/// The root on the dense output, by inverse quadratic interpolation where three points are in line with it
+/// and bisection where they are not ([Chandrupatla1997]).
 template <class S, int N>
-double GuardRoots<S, N>::bisect(Stepper<S, N>& stepper, Bracket& bracket) {
-  double a = bracket.safe, b = bracket.unsafe;
-  double Ga =
-      a > 0 ? sample_one(stepper, a, bracket.guard) : std::min(sample_one(stepper, a, bracket.guard), 0.0);
-  double Gb = sample_one(stepper, b, bracket.guard);
-  double wa = Ga, wb = Gb;
-  for (int k = 0; k < 80 && b - a > 1e-9 * b && Gb > 0; ++k) {
-    double m = (k % 6 == 5 || !(wa < 0)) ? 0.5 * (a + b) : (a * wb - b * wa) / (wb - wa);
-    if (!(m > a && m < b)) m = 0.5 * (a + b);
-    const double Gm = sample_one(stepper, m, bracket.guard);
-    if (Gm < 0) {
-      a = m;
-      wa = Gm;
-      wb *= 0.5;
+void GuardRoots<S, N>::locate(Stepper<S, N>& stepper, Bracket& bracket) {
+  // a: the newest point, b: the last one on the other side of the root, c: the one before.
+  double a = bracket.unsafe, b = bracket.safe, c = b, Ga = bracket.at_unsafe, Gb = bracket.at_safe, Gc = Gb;
+  bracket.slope = (Ga - Gb) / (a - b);
+  double share = Gb < 0 ? Ga / (Ga - Gb) : 0.5;  // of the way from a to b
+  for (int k = 0; k < 100 && Ga != 0; ++k) {
+    const double m = a + share * (b - a), Gm = sample_one(stepper, m, bracket.guard), moved = m - a;
+    if ((Gm - Ga) / moved > 0) bracket.slope = (Gm - Ga) / moved;
+    if ((Gm < 0) == (Ga < 0)) {
+      c = a;
+      Gc = Ga;
     } else {
-      b = m;
-      Gb = wb = Gm;
-      wa *= 0.5;
+      c = std::exchange(b, a);
+      Gc = std::exchange(Gb, Ga);
     }
+    a = m;
+    Ga = Gm;
+    const double unsafe = std::max(a, b), width = std::abs(b - a), least = 0.5 * kLocated * unsafe;
+    // A guard may begin as near to zero as a root ends: only a short move tells that this is the root.
+    const bool at_root = std::abs(Ga) <= least * bracket.slope && std::abs(moved) < 1e-3 * unsafe;
+    if (at_root || width <= 2 * least) break;
+    const double xi = (a - b) / (c - b), phi = (Ga - Gb) / (Gc - Gb);
+    share = phi * phi < xi && (1 - phi) * (1 - phi) < 1 - xi
+                ? Ga / (Gb - Ga) * Gc / (Gb - Gc) + (c - a) / (b - a) * Ga / (Gc - Ga) * Gb / (Gc - Gb)
+                : 0.5;
+    share = std::clamp(share, least / width, 1 - least / width);
   }
-  bracket.safe = a;
-  bracket.unsafe = b;
-  return b;
+  bracket.root = a;
 }
 
 template <class S, int N>
 Entry<S, N> GuardRoots<S, N>::polish(Stepper<S, N>& stepper, const Bracket& bracket) {
   const double t0 = value_of(stepper.t0()), length = value_of(stepper.t1()) - t0;
-  double h = bracket.unsafe * length;
-  State<double, N> y;
-  double G[kMaxGuards];
-  double slope = (sample_one(stepper, std::min(1.0, bracket.unsafe + 1e-3), bracket.guard) -
-                  sample_one(stepper, std::max(0.0, bracket.unsafe - 1e-3), bracket.guard)) /
-                 ((std::min(1.0, bracket.unsafe + 1e-3) - std::max(0.0, bracket.unsafe - 1e-3)) * length);
-  double h_last = h, G_last = 0, h_best = h, G_best = std::numeric_limits<double>::infinity();
-  for (int k = 0; k < 8 && bracket.safe < bracket.unsafe; ++k) {
-    retake(stepper, h, y);
-    watch_.evaluate(t0 + h, y, G);
-    const double now = G[bracket.guard];
-    if (std::abs(now) < G_best) {
-      G_best = std::abs(now);
-      h_best = h;
+  const bool frozen = system_.kind(watch_.phase.mode) == FlowKind::frozen;
+  // A true step to `taken`, and from there `on` along a straight line.
+  double taken = bracket.root * length, on = 0, slope = bracket.slope / length, h_last = 0, G_last = 0;
+  State<double, N> base, rate{};
+  for (int k = 0; k < 16; ++k) {
+    if (k == 0 || std::abs(on) > kStraight * length) {
+      taken += std::exchange(on, 0);
+      retake(stepper, taken, base);
+      if (!frozen) system_.flow(watch_.phase, t0 + taken, base, rate);
     }
-    if (k > 0 && h != h_last && (now - G_last) / (h - h_last) > 0) slope = (now - G_last) / (h - h_last);
+    State<double, N> y;
+    for (int i = 0; i < N; ++i) y[i] = base[i] + on * rate[i];
+    double G[kMaxGuards];
+    watch_.evaluate(t0 + taken + on, y, G);
+    const double now = G[bracket.guard], h = taken + on;
+    if (k > 0 && (now - G_last) / (h - h_last) > 0) slope = (now - G_last) / (h - h_last);
     if (!(slope > 0) || !std::isfinite(now)) break;
-    const double move = std::clamp(-now / slope, -0.1 * length, 0.1 * length);
-    const double next = std::clamp(h + move, 0.0, length);
+    const double next = std::clamp(h + std::clamp(-now / slope, -0.1 * length, 0.1 * length), 0.0, length);
     if (std::abs(next - h) <= 1e-14 + 4e-16 * std::abs(t0)) break;
     h_last = h;
     G_last = now;
-    h = next;
+    on = next - taken;
   }
-  h = h_best;
-  Entry<S, N> root{watch_.phase.mode, S(stepper.t0() + h), stepper.y0(), S(0)};
-  if (h > 0) stepper.retake(h, root.y);
+  Entry<S, N> root{watch_.phase.mode, S(stepper.t0() + taken), {}, S(0)};
+  if constexpr (std::is_same_v<S, double>) {
+    for (int i = 0; i < N; ++i) root.y[i] = base[i] + on * rate[i];
+  } else {
+    root.y = stepper.y0();
+    if (taken > 0) stepper.retake(taken, root.y);
+    State<S, N> slopes{};
+    if (!frozen) system_.flow(watch_.phase, root.t, root.y, slopes);
+    for (int i = 0; i < N; ++i) root.y[i] += on * slopes[i];
+  }
+  root.t += on;
   if constexpr (!std::is_same_v<S, double>) add_root_derivative(bracket.guard, root);
   return root;
 }

@@ -5,10 +5,14 @@
 
 namespace unhand::dynamics {
 
-/// A root of one guard inside the last step: the fractions of the step on its safe and unsafe side.
+/// A root of one guard inside the last step, between the fractions of the step on its safe and unsafe side
+/// with the guard's values there; then the root itself on the dense output, with the guard's slope over the
+/// fraction. A root without a slope is as good as it gets.
 struct Bracket {
   int guard{-1};
   double safe{}, unsafe{};
+  double at_safe{}, at_unsafe{};
+  double root{}, slope{};
 };
 
 /// The search for roots: guards are sampled at the thirds of a step and through the cubic in between
@@ -39,7 +43,7 @@ class GuardRoots {
   bool begin_of_rise(Stepper<S, N>& stepper, Bracket& bracket) const;
   bool find_hidden_peak(Stepper<S, N>& stepper, const Samples& G, double safe_from, bool known,
                         Bracket& bracket);
-  double bisect(Stepper<S, N>& stepper, Bracket& bracket);
+  void locate(Stepper<S, N>& stepper, Bracket& bracket);
   void add_root_derivative(int guard, Entry<S, N>& root) const;
 
   const HybridSystem<N>& system_;

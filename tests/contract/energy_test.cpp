@@ -57,8 +57,10 @@ TEST_P(Energy, FrictionNeverDrives) {
   });
 }
 
-TEST_P(Energy, TheWrenchIsWithinItsLimits) {
-  if (carried()) GTEST_SKIP() << "carries whatever it takes";
+class Limits : public Energy {};
+UNHAND_EVERY_MODEL_WITH_FRICTION(Limits);
+
+TEST_P(Limits, HoldTheWrench) {
   on_random_throws(32, 60, [](const auto& s, const contact::Patch<double>& patch, const auto& thrown) {
     const double f_max = patch.f_max(s.normal_force), tau_max = patch.tau_max(s.normal_force);
     const double force = norm(s.wrench.force()) / f_max, torque = s.wrench.tau / tau_max;

@@ -5,6 +5,8 @@
 
 #include <memory>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include "contact/registry.hpp"
 #include "tests/support/simple_scenes.hpp"
@@ -21,9 +23,19 @@ class EveryModel : public testing::TestWithParam<std::string> {
   static bool surface() { return !carried() && !decoupled(); }
 };
 
-#define UNHAND_EVERY_MODEL(Name)                                                              \
-  INSTANTIATE_TEST_SUITE_P(, Name, testing::ValuesIn(unhand::contact::contact_model_names()), \
+/// The registered models whose contact is subject to friction: all but the one that carries whatever it
+/// takes.
+inline std::vector<std::string> models_with_friction() {
+  auto names = contact::contact_model_names();
+  std::erase(names, "gripper_delay");
+  return names;
+}
+
+#define UNHAND_MODELS(Name, names)                           \
+  INSTANTIATE_TEST_SUITE_P(, Name, testing::ValuesIn(names), \
                            [](const auto& model) { return std::string(model.param); })
+#define UNHAND_EVERY_MODEL(Name) UNHAND_MODELS(Name, unhand::contact::contact_model_names())
+#define UNHAND_EVERY_MODEL_WITH_FRICTION(Name) UNHAND_MODELS(Name, unhand::models_with_friction())
 
 /// The inputs of a random throw, for a failure's message.
 inline std::string describe(const support::RandomThrow& t) {

@@ -17,8 +17,10 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 class Outcomes : public EveryModel {};
 UNHAND_EVERY_MODEL(Outcomes);
 
-TEST_P(Outcomes, WithoutFrictionTheObjectIsFreeAtOnce) {
-  if (carried()) GTEST_SKIP() << "knows no friction";
+class WithoutFriction : public EveryModel {};
+UNHAND_EVERY_MODEL_WITH_FRICTION(WithoutFriction);
+
+TEST_P(WithoutFriction, TheObjectIsFreeAtOnce) {
   std::mt19937_64 random(51);
   for (int i = 0; i < 20; ++i) {
     const auto thrown = support::random_throw(random, i % 2);

@@ -142,11 +142,15 @@ class EveryMethod : public testing::TestWithParam<Method> {
   }
 };
 
-#define UNHAND_EVERY_METHOD(Suite)                                                                        \
-  INSTANTIATE_TEST_SUITE_P(, Suite,                                                                       \
-                           testing::Values(Method::automatic, Method::dormand_prince, Method::rosenbrock, \
-                                           Method::radau, Method::cvode),                                 \
+#define UNHAND_METHODS(Suite, ...)                                \
+  INSTANTIATE_TEST_SUITE_P(, Suite, testing::Values(__VA_ARGS__), \
                            [](const auto& test) { return name_of(test.param); })
+#define UNHAND_EVERY_METHOD(Suite)                                                                    \
+  UNHAND_METHODS(Suite, Method::automatic, Method::dormand_prince, Method::rosenbrock, Method::radau, \
+                 Method::cvode)
+/// CVODE's stepper carries values only.
+#define UNHAND_EVERY_METHOD_WITH_DERIVATIVES(Suite) \
+  UNHAND_METHODS(Suite, Method::automatic, Method::dormand_prince, Method::rosenbrock, Method::radau)
 
 template <class System>
 Solution<double, 2> run(const System& system, const State<double, 2>& y, double t_end,

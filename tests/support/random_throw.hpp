@@ -21,7 +21,13 @@ class SwayingHand final : public release::HandMotion {
   struct Coordinate {
     double p{}, v{}, a{}, amplitude{}, frequency{1}, phase{};
   };
-  SwayingHand(std::array<Coordinate, 3> coordinates, double end) : coordinates_(coordinates), end_(end) {}
+  SwayingHand(std::array<Coordinate, 3> coordinates, double end) : coordinates_(coordinates), end_(end) {
+    for (int i = 0; i < 3; ++i) {
+      const auto& c = coordinates_[i];
+      in_phase_[i] = c.amplitude * std::cos(c.phase);
+      in_quadrature_[i] = c.amplitude * std::sin(c.phase);
+    }
+  }
 
   release::HandState<double> at(const release::Window&, double t) const override { return at_(t); }
   release::HandState<release::Dual> at(const release::Window&, const release::Dual& t) const override {
@@ -37,20 +43,28 @@ class SwayingHand final : public release::HandMotion {
     using std::cos;
     using std::sin;
     std::array<S, 3> q, v, a;
+    S sine{}, cosine{};
+    double frequency = 0;  // of the sine at hand: one serves all coordinates that sway together
     for (int i = 0; i < 3; ++i) {
       const auto& c = coordinates_[i];
       q[i] = c.p + t * (c.v + 0.5 * c.a * t);
       v[i] = c.v + c.a * t;
       a[i] = S(c.a);
-      if (c.amplitude == 0) continue;  // sines would cost more than all the rest of a calm throw
-      const S s = c.amplitude * sin(c.frequency * t + c.phase);
-      q[i] += s;
-      v[i] += c.amplitude * c.frequency * cos(c.frequency * t + c.phase);
-      a[i] -= c.frequency * c.frequency * s;
+      if (c.amplitude == 0) continue;
+      if (c.frequency != frequency) {
+        frequency = c.frequency;
+        sine = sin(S(frequency * t));
+        cosine = cos(S(frequency * t));
+      }
+      const S sway = in_phase_[i] * sine + in_quadrature_[i] * cosine;
+      q[i] += sway;
+      v[i] += frequency * (in_phase_[i] * cosine - in_quadrature_[i] * sine);
+      a[i] -= frequency * frequency * sway;
     }
     return {{q[0], q[1], q[2]}, {v[0], v[1], v[2]}, {a[0], a[1], a[2]}};
   }
   std::array<Coordinate, 3> coordinates_;
+  std::array<double, 3> in_phase_{}, in_quadrature_{};  // amplitudes of sin w t and cos w t
   double end_;
 };
 
