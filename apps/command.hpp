@@ -36,6 +36,7 @@ Command compare_command(CLI::App& root);
 Command fit_command(CLI::App& root);
 Command predict_command(CLI::App& root);
 Command discover_command(CLI::App& root);
+Command plan_command(CLI::App& root);
 
 /// --threads, the same in every subcommand.
 inline void add_threads(CLI::App& parser, int& threads) {

@@ -632,5 +632,45 @@ TEST_F(Cli, ImportsPhonesAsFreeFlights) {
                  "lasts 0.600 s, less than 0.8 s");
 }
 
+TEST_F(Cli, PlansAThrowIntoABox) {
+  const Answer answer =
+      run("plan throw --target 1.3,0,-0.2 --samples 600 --draws 50 --json plan.json --report out");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("no acceleration"));
+  const auto plan = nlohmann::json::parse(content(folder / "plan.json"));
+  EXPECT_EQ(plan["schema"], "plan-throw");
+  EXPECT_EQ(plan["qdd_rad_s2"].size(), 7u);
+  EXPECT_EQ(plan["predicted"]["planned"]["landed"], 50);
+  for (const char* limit : {"position", "velocity", "acceleration", "jerk", "torque"})
+    EXPECT_LE(plan["limits"][limit]["fraction"], 1 + 1e-9) << limit;
+  EXPECT_THAT(content(folder / "out/trajectory.csv"), testing::StartsWith("time_s,q1_rad,"));
+  for (const char* file : {"tube.png", "motion.pdf", "landings.png", "landings.csv"})
+    EXPECT_TRUE(fs::exists(folder / "out" / file)) << file;
+
+  expect_refusal("plan throw --target 1.3,0", 2, "--target: '1.3,0' is not 3 numbers with ',' between");
+  expect_refusal("plan throw --target 1.3,0,0 --box 0x1", 2, "--box: '0x1' has no area");
+  expect_refusal("plan throw --target 1.3,0,0 --arm kuka", 2,
+                 "'kuka' is not panda, a .toml file or a .urdf file");
+  expect_refusal("plan throw --target 9,0,0 --samples 200 --json a.json", 1,
+                 "no_throw: no configuration reaches the box");
+  expect_refusal("plan throw --target 1.3,0,0 --arm none.toml", 3, "none.toml: file: no such file");
+  expect_refusal("plan throw --target 1.3,0,0 --card none.json", 3, "none.json");
+}
+
+TEST_F(Cli, PlansAThrowWithACard) {
+  ASSERT_EQ(run("compare " + quick + " --models sliding_pivot --write-cards cards").code, 0);
+  std::ofstream(folder / "bar.toml") << "name='bar'\nsurface='paper'\nmass_kg=0.246\ncom_offset_m=0.14\n"
+                                        "inertia_kg_m2=0.0024\n";
+  const Answer answer =
+      run("plan throw --target 1.3,0,-0.2 --samples 600 --draws 40 --card cards/sliding_pivot.json --sku "
+          "bar.toml --json plan.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("insensitive motion"));
+  const auto plan = nlohmann::json::parse(content(folder / "plan.json"));
+  EXPECT_LT(plan["predicted"]["insensitive motion"]["rms_m"],
+            plan["predicted"]["tube acceleration"]["rms_m"]);
+  EXPECT_TRUE(plan["release"]["contact_model"]["miss_m"].is_number());
+}
+
 }  // namespace
 }  // namespace unhand

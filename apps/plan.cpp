@@ -1,0 +1,18 @@
+// unhand plan: the subcommand of planners.
+#include "apps/plan.hpp"
+
+#include <vector>
+
+namespace unhand::apps {
+
+Command plan_command(CLI::App& root) {
+  CLI::App* parser = root.add_subcommand("plan", "Plan a throw");
+  parser->require_subcommand(1);
+  const std::vector<Command> planners{plan_throw_command(*parser)};
+  return {parser, [planners] {
+            for (const Command& planner : planners)
+              if (planner.parser->parsed()) planner.run();
+          }};
+}
+
+}  // namespace unhand::apps

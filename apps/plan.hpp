@@ -1,0 +1,10 @@
+// The planners that `unhand plan` knows: one function each, named in plan.cpp.
+#pragma once
+
+#include "apps/command.hpp"
+
+namespace unhand::apps {
+
+Command plan_throw_command(CLI::App& plan);
+
+}  // namespace unhand::apps

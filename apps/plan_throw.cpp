@@ -1,0 +1,265 @@
+// unhand plan throw: a motion of the arm that throws an object into a box, whenever exactly it leaves the
+// hand.
+#include "apps/plan_throw.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <random>
+#include <sstream>
+
+#include "apps/figure.hpp"
+#include "apps/plan.hpp"
+#include "datasets/model_card.hpp"
+#include "datasets/sku.hpp"
+#include "planners/arm/chain_file.hpp"
+#include "planners/tube/planar_hand.hpp"
+
+namespace unhand::apps {
+namespace {
+
+using planners::Chain;
+
+struct Options {
+  std::string arm{"panda"}, target, box{"0.15x0.15"}, card, sku, json, report;
+  double window{0.1}, drag{0}, gripper{0.15}, gripper_mass{0.9}, opening_spread{-1}, dead_spread{-1};
+  int draws{1000}, samples{3000};
+  std::uint64_t seed{1};
+  bool planar{false}, plain{false};
+};
+
+/// "1.3,0,-0.2" or "0.15x0.15": as many finite numbers as asked for.
+template <std::size_t N>
+std::array<double, N> numbers(const std::string& option, const std::string& text, char separator) {
+  std::array<double, N> out{};
+  std::istringstream in(text);
+  for (std::size_t i = 0; i < N; ++i) {
+    char between = separator;
+    if ((i > 0 && (!(in >> between) || between != separator)) || !(in >> out[i]) || !std::isfinite(out[i]))
+      throw WrongUsage(
+          fmt::format("{}: '{}' is not {} numbers with '{}' between", option, text, N, separator));
+  }
+  if (char rest{}; in >> rest)
+    throw WrongUsage(fmt::format("{}: '{}' has more than {} numbers", option, text, N));
+  return out;
+}
+
+/// The arm with its gripper: a tool of `length` along the flange's z, whose mass sits halfway.
+Chain armed(const Options& options) {
+  Chain arm;
+  try {
+    arm = planners::read_chain(options.arm);
+  } catch (const std::invalid_argument& error) {
+    throw WrongUsage(fmt::format("--{}", error.what()));
+  }
+  if (options.gripper_mass > 0) {
+    const double m = options.gripper_mass, l = options.gripper,
+                 across = m * (l * l + 0.1 * 0.1) / 12;  // a block 0.1 m wide
+    arm = planners::with_payload(
+        arm, {m, {0, 0, l / 2}, planners::symmetric(across, across, m * 0.02 / 12, 0, 0, 0)});
+  }
+  return planners::with_tool(arm, {Eigen::Matrix3d::Identity(), {0, 0, options.gripper}});
+}
+
+/// The joints of the Panda that stay where they are in a planar throw.
+void make_planar(planners::NominalOptions& search, const Chain& arm) {
+  if (arm.size() == 7) search.fixed = {{2, 0.0}, {4, 0.0}, {6, std::numbers::pi / 4}};
+  search.face_target = true;
+}
+
+planners::PlanOptions plan_options(const Options& options, const Chain& arm, bool planar) {
+  planners::PlanOptions out;
+  out.search.window = options.window;
+  out.search.medium.drag_k = options.drag;
+  out.search.samples = options.samples;
+  out.refine = !options.plain;
+  if (planar) make_planar(out.search, arm);
+  out.home = planners::middle_of(arm);
+  if (options.arm == "panda") {  // its usual ready pose
+    constexpr double pi = std::numbers::pi;
+    out.home = planners::JointVector<double>{{0, -pi / 4, 0, -3 * pi / 4, 0, pi / 2, pi / 4}};
+  }
+  return out;
+}
+
+/// Landings at delays drawn evenly from the window.
+PredictedLandings by_delay(const std::string& name, const ThrowAnswer& a,
+                           const planners::JointVector<double>& qdd, const Options& options) {
+  const planners::TubeProblem problem{
+      a.chain, a.plan.nominal.state, a.box.middle, a.window, {9.81, options.drag}};
+  const auto table = planners::landings_over_window(problem, qdd, 201);
+  std::mt19937_64 random(options.seed);
+  std::uniform_int_distribution<std::size_t> delay(0, table.size() - 1);
+  PredictedLandings out{name, {}, 0};
+  for (int i = 0; i < options.draws; ++i) {
+    const auto& at = table[delay(random)];
+    if (!at.lands) {
+      ++out.drawn.lost;
+      continue;
+    }
+    out.drawn.miss.push_back(at.forward);
+    out.hits += a.box.holds(at.x, at.y);
+  }
+  planners::summarise(out.drawn);
+  return out;
+}
+
+PredictedLandings by_release(const std::string& name, const ThrowAnswer& a,
+                             const planners::ReleaseThrow& release, const Options& options) {
+  PredictedLandings out{name, planners::draw_landings(release, options.draws, options.seed), 0};
+  const planners::ThrowPlane plane(planners::forward_kinematics(release.chain, release.start.q).p,
+                                   release.target);
+  for (const double miss : out.drawn.miss)
+    out.hits += a.box.holds(miss * plane.along.x(), miss * plane.along.y());
+  return out;
+}
+
+/// The plan made insensitive to what the card leaves open, where that is possible within the limits.
+void plan_release(ThrowAnswer& a, const Chain& pads, planners::ReleaseThrow release,
+                  const planners::PlanOptions& how, const Options& options) {
+  a.with_release = true;
+  a.real = planners::release_landing(release, planners::nominal_draw(release));
+  if (!a.real)
+    throw Unanswered(fmt::format(
+        "the object is not free of the pads within {} s, or never comes down to the target", release.hold));
+  a.rigid = planners::rigid_landing(release, release.object.com_offset.value, a.real->detach_time);
+  a.spread_before = planners::release_spread(release);
+  a.predicted.push_back(by_release("tube acceleration", a, release, options));
+  planners::InsensitiveOptions insensitive;
+  for (int i = 0; i < pads.size(); ++i)
+    if (std::abs(a.plan.nominal.state.qd[i]) > 1e-9) insensitive.joints.push_back(i);
+  const auto better = planners::make_insensitive(release, insensitive);
+  planners::MotionOptions motion = how.motion;
+  motion.window = release.hold;
+  for (const double share : {0.9, 0.65, 0.45, 0.3}) {
+    motion.acceleration_share = share;
+    auto moved = planners::throw_motion(pads, how.home, better.start, better.qdd, motion);
+    if (!moved) continue;
+    const auto limits = planners::check_limits(pads, *moved, how.check_step);
+    if (!limits.within()) continue;
+    a.plan.motion = std::move(*moved);
+    a.plan.limits = limits;
+    a.plan.nominal.state = release.start = better.start;
+    a.plan.qdd = release.qdd = better.qdd;
+    a.spread_after = planners::release_spread(release);
+    a.predicted.insert(a.predicted.begin(), by_release("insensitive motion", a, release, options));
+    return;
+  }
+  fmt::print(stderr,
+             "unhand: no motion to the insensitive throw stays within the limits; the tube's is kept\n");
+}
+
+void plan_throw(const Options& options) {
+  require_writable(options.json);
+  if (!options.report.empty()) {
+    require_writable_directory(options.report);
+    require_gnuplot();
+  }
+  const auto target = numbers<3>("--target", options.target, ',');
+  const auto box = numbers<2>("--box", options.box, 'x');
+  if (!(box[0] > 0 && box[1] > 0)) throw WrongUsage(fmt::format("--box: '{}' has no area", options.box));
+  ThrowAnswer answer;
+  answer.box = {{target[0], target[1], target[2]}, box[0], box[1]};
+  answer.window = options.window;
+  const Chain pads = armed(options);
+
+  std::optional<planners::ReleaseCard> card;
+  planners::HeldObject object;
+  object.com_offset = {0, 0.004};
+  if (!options.card.empty())
+    card = planners::release_card(datasets::read_model_card(options.card), options.card);
+  if (!options.sku.empty()) {
+    const auto sku = datasets::read_sku(options.sku);
+    if (!sku.inertia)
+      throw datasets::LogError(options.sku, "inertia_kg_m2", "is not known: give it, or a shape with dims_m");
+    object.mass = sku.mass, object.inertia = *sku.inertia;
+    object.com_offset = {sku.com_offset, sku.com_offset_sigma.value_or(0.004)};
+  }
+  if (card && options.window < 0.1 * card->opening_time.value)
+    throw WrongUsage("--window is shorter than a tenth of the card's opening");
+  answer.chain = planners::with_tool(pads, {Eigen::Matrix3d::Identity(), {0, 0, object.com_offset.value}});
+  auto how = plan_options(options, pads, options.planar || card.has_value());
+  const double latest = card ? card->dead_time.value + card->opening_time.value +
+                                   4 * std::hypot(card->dead_time.sigma, card->opening_time.sigma)
+                             : 0;
+  how.search.window = answer.window = std::max(options.window, latest);
+  auto result = planners::plan_throw(answer.chain, answer.box, how);
+  if (!result.plan) throw Unanswered(fmt::format("{}: {}", to_string(result.outcome), result.reason));
+  answer.plan = std::move(*result.plan);
+  if (card) {
+    planners::ReleaseThrow release{pads, answer.plan.nominal.state, answer.plan.qdd, answer.box.middle};
+    release.hold = answer.window + 1e-6;
+    release.card = *card;
+    release.object = object;
+    release.medium.drag_k = options.drag;
+    plan_release(answer, pads, release, how, options);
+  } else {
+    answer.predicted = {
+        by_delay("planned", answer, answer.plan.qdd, options),
+        by_delay("Tube-CVX", answer, answer.plan.tube.qdd, options),
+        by_delay("no acceleration", answer, planners::JointVector<double>::Zero(pads.size()), options)};
+  }
+
+  Outputs outputs;
+  if (!options.json.empty()) {
+    Json json = json_head("plan-throw");
+    json["arm"] = options.arm;
+    json["card"] = options.card.empty() ? Json(nullptr) : Json(options.card);
+    json.update(json_of(answer));
+    outputs.json(options.json, json);
+  }
+  if (!options.report.empty()) write_report(answer, outputs.directory(options.report));
+  outputs.commit();
+  fmt::print("{}", text_of(answer));
+}
+
+}  // namespace
+
+Command plan_throw_command(CLI::App& plan) {
+  auto o = std::make_shared<Options>();
+  CLI::App* parser =
+      plan.add_subcommand("throw", "Throw into a box, whenever exactly the object leaves the hand");
+  parser->add_option("--target", o->target, "Middle of the box in the base's frame, X,Y,Z [m]")->required();
+  parser->add_option("--box", o->box, "Opening of the box along x and y, AxB [m]")->capture_default_str();
+  parser->add_option("--arm", o->arm, "panda, a TOML chain or a URDF file")->capture_default_str();
+  parser->add_option("--gripper", o->gripper, "From the flange to the middle of the pads [m]")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  parser->add_option("--gripper-mass", o->gripper_mass, "Gripper and object [kg]")
+      ->check(CLI::Range(0.0, 10.0))
+      ->capture_default_str();
+  parser
+      ->add_option("--window", o->window, "The object may leave at any time up to this after the command [s]")
+      ->check(CLI::Range(0.01, 0.5))
+      ->capture_default_str();
+  parser->add_option("--drag", o->drag, "Quadratic drag of the flight, k in a = -k |v| v [1/m]")
+      ->check(CLI::Range(0.0, 10.0));
+  parser->add_option("--card", o->card,
+                     "A model card: the release follows its contact model (planar throws)");
+  parser->add_option("--sku", o->sku,
+                     "The object: mass, inertia, offset of its centre of mass from the pads");
+  parser->add_flag("--planar", o->planar, "Throw in the vertical plane of the target");
+  parser->add_flag("--tube-cvx", o->plain, "Stop at the convex problem, without refinement");
+  parser->add_option("--samples", o->samples, "Configurations searched")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  parser->add_option("--draws", o->draws, "Landings drawn")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  parser->add_option("--seed", o->seed, "Seed of the draws")->capture_default_str();
+  parser->add_option("--json", o->json, "Write the plan as JSON");
+  parser->add_option("--report", o->report, "Directory for trajectory.csv, landings.csv and figures");
+  parser->footer(
+      "Without a card, the object leaves at a delay that may be anything in the window. With one, it is let "
+      "go as the\n"
+      "card's contact model says, and the motion is the one whose landings depend least on friction, delay "
+      "and grasp.\n"
+      "Exit code 1 says why there is no plan. Example:\n"
+      "  unhand plan throw --target 1.3,0,-0.2 --box 0.15x0.15 --report out/throw");
+  return {parser, [o] { plan_throw(*o); }};
+}
+
+}  // namespace unhand::apps

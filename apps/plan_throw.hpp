@@ -1,0 +1,39 @@
+// What `unhand plan throw` found, and how it is told.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/output.hpp"
+#include "planners/tube/plan_throw.hpp"
+#include "planners/tube/release_throw.hpp"
+
+namespace unhand::apps {
+
+/// Landings of the same draws under one motion, forward of the target [m].
+struct PredictedLandings {
+  std::string name;  ///< "planned", "no acceleration", …
+  planners::Landings drawn;
+  int hits{};  ///< within the box, of all draws
+};
+
+struct ThrowAnswer {
+  planners::Chain chain;  ///< up to what lands: the object's centre of mass
+  planners::TargetBox box;
+  planners::ThrowPlan plan;
+  double window{};      ///< for which q̈ is held [s]
+  bool with_release{};  ///< the release follows a contact model, not a delay
+  std::optional<planners::ReleaseLanding> rigid,
+      real;  ///< of the tube's motion: carried until the detach, and as the model says
+  std::optional<planners::ReleaseSpread> spread_before, spread_after;
+  std::vector<PredictedLandings> predicted;  ///< the plan's first
+};
+
+std::string text_of(const ThrowAnswer& answer);
+Json json_of(const ThrowAnswer& answer);
+/// trajectory.csv, landings.csv, and the figures tube, motion and landings.
+void write_report(const ThrowAnswer& answer, const std::filesystem::path& directory);
+
+}  // namespace unhand::apps

@@ -1,0 +1,64 @@
+// Flights as a throw's planner sees them: where does a state in the throwing plane land, and which states
+// land in a box?
+//
+// The throwing plane is vertical, with its origin at the target: r forward along the throw, z up [m].
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "dynamics/scalar.hpp"
+
+namespace unhand::flight {
+
+/// ξ = (r, z, ṙ, ż) [m, m, m/s, m/s].
+template <class S>
+struct PlaneState {
+  S r{}, z{}, r_rate{}, z_rate{};
+};
+
+struct Medium {
+  double gravity{9.81};  ///< downward [m/s²], > 0
+  double drag_k{};       ///< quadratic drag, a = −k |v| v [1/m], >= 0
+};
+
+/// The state on the way down through z = 0; empty if the flight never gets there. Projectiles in closed form,
+/// drag by the integrator; derivatives pass through the landing. Instantiated for double and Dual.
+template <class S>
+std::optional<PlaneState<S>> landing_of(const PlaneState<S>& release, const Medium& medium);
+
+/// Φ(ξ) = r_land [m] and ∇Φ [-, -, s, s]: the flying flow map of [LiuBillard2024].
+struct FlowMap {
+  double landing{};
+  std::array<double, 4> gradient{};  ///< by r, z, ṙ, ż
+};
+std::optional<FlowMap> flow_map(const PlaneState<double>& release, const Medium& medium);
+
+/// Where and how fast a throw may come down: |r| <= half_length at z = 0, and both velocities in their
+/// ranges.
+struct LandingSet {
+  double half_length{};                    ///< [m], > 0
+  double r_rate_low{0}, r_rate_high{6};    ///< ṙ [m/s]
+  double z_rate_low{-10}, z_rate_high{0};  ///< ż [m/s], high <= 0
+};
+
+/// The backward reachable tube of a landing set in implicit form: f(ξ) < 0 inside, 0 on its boundary, > 0
+/// outside. f is the largest of |x − c|/h − 1 over the coordinates x of the landing state, c and h the middle
+/// and the half width of their ranges; where a flight never gets to z = 0, it is 1 plus what its apex lacks
+/// over half_length. [-]
+double tube_level(const PlaneState<double>& release, const LandingSet& set, const Medium& medium);
+
+/// The same tube by samples: states from which flights of up to `longest` [s] end in the set, found by flying
+/// backward from landings drawn from it. Every `boundary_every`-th sample comes from the set's boundary.
+struct TubeSampling {
+  int count{1000};
+  double longest{1.0};
+  int boundary_every{4};
+  std::uint64_t seed{1};
+};
+std::vector<PlaneState<double>> sample_tube(const LandingSet& set, const Medium& medium,
+                                            const TubeSampling& sampling = {});
+
+}  // namespace unhand::flight

@@ -1,0 +1,81 @@
+// Joint motions with piecewise constant jerk.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "planners/arm/chain.hpp"
+
+namespace unhand::planners {
+
+/// One joint at an instant [rad, rad/s, rad/s²] and the jerk from there on [rad/s³].
+struct JointSample {
+  double q{}, qd{}, qdd{}, jerk{};
+};
+
+/// A stretch of constant jerk [s, rad/s³].
+struct JerkPiece {
+  double duration{}, jerk{};
+};
+
+/// Position, velocity and acceleration of one joint, cubic in pieces.
+class JerkProfile {
+ public:
+  /// From (q, q̇, q̈) at t = 0.
+  explicit JerkProfile(const JointSample& start) : knots_{start}, times_{0.0} {}
+  void append(const std::vector<JerkPiece>& pieces);
+  /// Beyond its ends the motion stays at the end's state, with the end's velocity and no acceleration.
+  JointSample at(double t) const;
+  /// Appends the instants at which acceleration or velocity may be largest: the pieces' ends, and where the
+  /// acceleration passes through zero.
+  void extremes(std::vector<double>& out) const;
+  const JointSample& end() const { return knots_.back(); }
+  double duration() const { return times_.back(); }
+
+ private:
+  std::vector<JointSample> knots_;
+  std::vector<double> times_;
+};
+
+/// From rest to velocity `v` with acceleration `a` at the end, in three pieces (jerk, none, jerk): the peak
+/// acceleration follows from the duration. Empty where `duration` is too short for the limits.
+std::optional<std::vector<JerkPiece>> velocity_ramp(double v, double a, double duration,
+                                                    const JointLimits& limits);
+/// The shortest duration for which there is one. Infinite if |a| exceeds the limit.
+double shortest_ramp(double v, double a, const JointLimits& limits);
+
+/// From rest to rest over the distance 1 with limits of velocity, acceleration and jerk [1/s, 1/s², 1/s³]:
+/// the time-optimal seven pieces.
+std::vector<JerkPiece> rest_to_rest(double velocity, double acceleration, double jerk);
+
+/// All joints of a chain together, from `begin` [s] on.
+struct JointTrajectory {
+  double begin{};
+  std::vector<JerkProfile> joints;
+
+  double end() const { return begin + (joints.empty() ? 0.0 : joints.front().duration()); }
+  struct State {
+    JointVector<double> q, qd, qdd, jerk;
+  };
+  State at(double t) const;
+};
+
+/// The largest use of each limit over a trajectory, as a fraction of the limit (1: just reached); of the
+/// position, |q − middle| over half the range. Infinite limits are not used.
+struct LimitUse {
+  double fraction{};
+  int joint{};
+  double time{};
+};
+struct LimitCheck {
+  LimitUse position, velocity, acceleration, jerk, torque;
+  double lowest{};  ///< height of the lowest joint origin beyond the second, or the tip [m]
+  bool within(double tolerance = 1e-9) const;
+  /// The limit that is used most, in words.
+  std::string worst(const Chain& chain) const;
+};
+/// Looks every `step` [s], at the end, and where a velocity or an acceleration is largest. Torques are those
+/// of inverse dynamics, with friction.
+LimitCheck check_limits(const Chain& chain, const JointTrajectory& trajectory, double step = 1e-3);
+
+}  // namespace unhand::planners

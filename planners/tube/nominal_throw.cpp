@@ -1,0 +1,208 @@
+#include "planners/tube/nominal_throw.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+
+#include "planners/arm/kinematics.hpp"
+
+namespace unhand::planners {
+
+using Eigen::Vector2d, Eigen::Vector3d;
+
+double TargetBox::half_length(const Vector2d& direction) const {
+  const Vector2d d = direction.normalized();
+  const auto limit = [](double half, double part) {
+    return part != 0 ? half / std::abs(part) : std::numeric_limits<double>::infinity();
+  };
+  return std::min(limit(length_x / 2, d.x()), limit(length_y / 2, d.y()));
+}
+
+namespace {
+
+/// Points that fill the unit cube evenly, x_k = frac(½ + k α) with α_i = φ⁻ⁱ and φ^(d+1) = φ + 1
+/// [Roberts2018].
+class EvenPoints {
+ public:
+  explicit EvenPoints(int dimension) {
+    double phi = 2;
+    for (int i = 0; i < 40; ++i) phi = std::pow(1 + phi, 1.0 / (dimension + 1));
+    double power = 1;
+    for (int i = 0; i < dimension; ++i) steps_.push_back(power /= phi);
+  }
+  double at(int k, int i) const {
+    const double x = 0.5 + k * steps_[i];
+    return x - std::floor(x);
+  }
+
+ private:
+  std::vector<double> steps_;
+};
+
+class Search {
+ public:
+  Search(const Chain& chain, const TargetBox& box, const NominalOptions& options)
+      : chain_(chain), box_(box), options_(options) {
+    for (const auto& fixed : options.fixed) held_[fixed.joint] = true;
+    if (options.face_target) held_[0] = true;
+  }
+
+  /// The best throw from a configuration, if there is one.
+  std::optional<NominalThrow> best_at(const JointVector<double>& q) const {
+    const auto frames = frames_of(chain_, q);
+    const Vector3d p = frames.tip.p, e = box_.middle - p;
+    const double distance = e.head<2>().norm();
+    if (p.z() < options_.lowest_tip || p.head<2>().norm() < options_.nearest_tip ||
+        distance < options_.shortest_throw)
+      return {};
+    const Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, kMaxJoints> J =
+        jacobian(chain_, frames).topRows<3>();
+    Eigen::Matrix3d A = Eigen::Matrix3d::Zero();  // J W Jᵀ
+    for (int i = 0; i < chain_.size(); ++i)
+      if (!held_[i]) A += weight(i) * J.col(i) * J.col(i).transpose();
+    A += 1e-9 * A.trace() * Eigen::Matrix3d::Identity();  // a planar arm moves in its plane only
+    const Eigen::Matrix3d inverse = A.inverse();
+    const Vector2d along = e.head<2>() / distance;
+    std::optional<NominalThrow> best;
+    for (double degrees = 5; degrees < 70; degrees += 7.5) {
+      const double elevation = degrees * std::numbers::pi / 180;
+      const auto speed = speed_for(distance, p.z() - box_.middle.z(), elevation);
+      if (!speed) continue;
+      Vector3d v;
+      v << *speed * std::cos(elevation) * along, *speed * std::sin(elevation);
+      const Vector3d scaled = inverse * v;
+      JointVector<double> qd = JointVector<double>::Zero(chain_.size());
+      double use = 0;
+      for (int i = 0; i < chain_.size(); ++i)
+        if (!held_[i]) {
+          qd[i] = weight(i) * J.col(i).dot(scaled);
+          use = std::max(use, std::abs(qd[i]) / chain_.joints[i].limits.velocity);
+        }
+      const double speed_margin = 1 - options_.speed_reserve - use;
+      if (!(speed_margin > 0) || (best && best->margin >= speed_margin)) continue;
+      const double position_margin = room(q, qd);
+      if (!(position_margin > 0) || (best && best->margin >= position_margin)) continue;
+      if ((J * qd - v).norm() > 1e-6) continue;
+      flight::LandingSet landing = options_.landing;
+      landing.half_length = box_.half_length(along);
+      const double level = flight::tube_level({-distance, -e.z(), *speed * std::cos(elevation), v.z()},
+                                              landing, options_.medium);
+      const double margin = std::min({speed_margin, position_margin, -level});
+      if (margin > 0 && (!best || margin > best->margin))
+        best = NominalThrow{{q, qd}, margin, speed_margin, position_margin, -level, *speed, elevation};
+    }
+    return best;
+  }
+
+ private:
+  double weight(int i) const {
+    const double most = chain_.joints[i].limits.velocity;
+    return most * most;
+  }
+
+  /// The speed that lands `distance` ahead and `height` below.
+  std::optional<double> speed_for(double distance, double height, double elevation) const {
+    const double c = std::cos(elevation), s = std::sin(elevation), fall = distance * s / c + height;
+    if (!(fall > 0)) return {};
+    double speed = distance / c * std::sqrt(options_.medium.gravity / (2 * fall));
+    if (options_.medium.drag_k == 0) return speed;
+    for (int i = 0; i < 20; ++i) {  // Newton
+      const auto flow = flight::flow_map({-distance, height, speed * c, speed * s}, options_.medium);
+      if (!flow) return {};
+      const double step = flow->landing / (flow->gradient[2] * c + flow->gradient[3] * s);
+      speed -= step;
+      if (!(speed > 0)) return {};
+      if (std::abs(step) < 1e-10 * speed) return speed;
+    }
+    return {};
+  }
+
+  /// Room to the position limits, over half the range: speeding up and braking take v D/2 each, with D the
+  /// time that the slowest joint needs, and the window v T.
+  double room(const JointVector<double>& q, const JointVector<double>& qd) const {
+    double duration = 0;
+    for (int i = 0; i < chain_.size(); ++i)
+      duration = std::max(duration, std::abs(qd[i]) / chain_.joints[i].limits.acceleration);
+    duration = 1.1 * duration + 0.005;
+    double least = 1;
+    for (int i = 0; i < chain_.size(); ++i) {
+      const auto& [lower, upper, velocity, acceleration, jerk, torque] = chain_.joints[i].limits;
+      if (!std::isfinite(upper - lower)) continue;
+      for (const double at :
+           {q[i] - 0.5 * duration * qd[i], q[i] + (options_.window + 0.5 * duration) * qd[i]})
+        least = std::min(least, std::min(at - lower, upper - at) / (0.5 * (upper - lower)));
+    }
+    return least;
+  }
+
+  const Chain& chain_;
+  const TargetBox& box_;
+  const NominalOptions& options_;
+  std::array<bool, kMaxJoints> held_{};
+};
+
+double within(const JointLimits& l, double x) { return std::clamp(x, l.lower, l.upper); }
+
+void check(const Chain& chain, const TargetBox& box, const NominalOptions& options) {
+  validate(chain);
+  if (!(box.length_x > 0 && box.length_y > 0 && box.middle.allFinite()))
+    throw std::invalid_argument("target box: its middle must be finite and its lengths > 0 m");
+  for (const Joint& joint : chain.joints)
+    if (!std::isfinite(joint.limits.velocity) || !std::isfinite(joint.limits.acceleration) ||
+        !std::isfinite(joint.limits.jerk))
+      throw std::invalid_argument("chain '" + chain.name + "': joint '" + joint.name +
+                                  "' needs limits of velocity, acceleration and jerk to plan a throw");
+  for (const auto& fixed : options.fixed)
+    if (fixed.joint < 0 || fixed.joint >= chain.size())
+      throw std::invalid_argument("fixed joint " + std::to_string(fixed.joint) + " is not one of the chain");
+}
+
+}  // namespace
+
+std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box,
+                                      const NominalOptions& options) {
+  check(chain, box, options);
+  const int n = chain.size();
+  const Search search(chain, box, options);
+  const double azimuth = std::atan2(box.middle.y(), box.middle.x());
+  const auto hold = [&](JointVector<double>& q) {
+    for (const auto& fixed : options.fixed) q[fixed.joint] = fixed.angle;
+    if (options.face_target) q[0] = within(chain.joints[0].limits, azimuth);
+  };
+  std::vector<NominalThrow> found;
+  const EvenPoints points(n);
+  for (int k = 0; k < options.samples; ++k) {
+    JointVector<double> q(n);
+    for (int i = 0; i < n; ++i) {
+      const JointLimits& l = chain.joints[i].limits;
+      const double lower = std::max(l.lower, -std::numbers::pi), upper = std::min(l.upper, std::numbers::pi);
+      q[i] = lower + (0.05 + 0.9 * points.at(k, i)) * (upper - lower);
+    }
+    hold(q);
+    if (auto one = search.best_at(q)) found.push_back(std::move(*one));
+  }
+  const auto better = [](const NominalThrow& a, const NominalThrow& b) { return a.margin > b.margin; };
+  const auto kept = std::min(found.size(), static_cast<std::size_t>(std::max(options.candidates, 0)));
+  std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(kept), found.end(), better);
+  found.resize(kept);
+  for (std::size_t j = 0; j < std::min(found.size(), static_cast<std::size_t>(options.refined)); ++j) {
+    double size = 0.15;  // rad, halved where it does not help
+    for (int k = 0; k < 60; ++k) {
+      JointVector<double> q = found[j].state.q;
+      for (int i = 0; i < n; ++i)
+        q[i] = within(chain.joints[i].limits, q[i] + size * (2 * points.at(k + 7, i) - 1));
+      hold(q);
+      const auto one = search.best_at(q);
+      if (one && one->margin > found[j].margin)
+        found[j] = *one;
+      else if (k % 6 == 5)
+        size *= 0.7;
+    }
+  }
+  std::sort(found.begin(), found.end(), better);
+  return found;
+}
+
+}  // namespace unhand::planners

@@ -1,0 +1,59 @@
+// Where and how fast the arm should be when the gripper opens.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "flight/flow_map.hpp"
+#include "planners/tube/tube_cvx.hpp"
+
+namespace unhand::planners {
+
+/// A box to hit: its middle B in the base's frame [m], and its opening along the base's x and y [m].
+struct TargetBox {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  double length_x{0.15}, length_y{0.15};
+
+  /// Half of what the box allows along a level direction through its middle [m].
+  double half_length(const Eigen::Vector2d& direction) const;
+  bool holds(double off_x, double off_y) const {
+    return std::abs(off_x) <= length_x / 2 && std::abs(off_y) <= length_y / 2;
+  }
+};
+
+struct NominalOptions {
+  double window{0.1};  ///< the arm must be able to go on for so long [s]
+  flight::Medium medium{};
+  flight::LandingSet landing{.half_length = 1};  ///< velocities at the landing; its length is the box's
+  int samples{3000};                             ///< configurations looked at
+  int refined{10};                               ///< best ones improved by small steps
+  int candidates{40};                            ///< most that come back
+  double lowest_tip{0.15}, nearest_tip{0.25};    ///< height, and level distance from the base's z axis [m]
+  double shortest_throw{0.3};                    ///< level distance from the tip to the target [m]
+  double speed_reserve{0.02};                    ///< of the joints' velocity limits, kept free
+  /// The arm as a planar one: joints named here stay at the given angle, and the first turns to the target.
+  struct Fixed {
+    int joint;
+    double angle;
+  };
+  std::vector<Fixed> fixed;
+  bool face_target{false};
+};
+
+/// A throw, and what it leaves free: 1 − the largest use of a joint's velocity; the room that the joints have
+/// before and after for speeding up and braking, over half their range; and −f of the tube. The margin is the
+/// smallest of them.
+struct NominalThrow {
+  ThrowState state;
+  double margin{}, speed_margin{}, position_margin{}, tube_margin{};
+  double speed{}, elevation{};  ///< of the tip [m/s, rad]
+};
+
+/// Configurations from a low-discrepancy sequence; at each, elevations whose parabola (with drag: whose
+/// flight) ends in the box's middle, and of all joint velocities with that tip velocity the one that is
+/// smallest against the limits, q̇ = W Jᵀ (J W Jᵀ)⁻¹ v with W = diag(q̇_max²). Sorted, best first; only margins
+/// > 0. The same options give the same throws.
+std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box,
+                                      const NominalOptions& options = {});
+
+}  // namespace unhand::planners

@@ -1,0 +1,202 @@
+#include "planners/tube/plan_throw.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "planners/arm/kinematics.hpp"
+
+namespace unhand::planners {
+
+const char* to_string(PlanOutcome outcome) {
+  switch (outcome) {
+    case PlanOutcome::planned:
+      return "planned";
+    case PlanOutcome::no_throw:
+      return "no_throw";
+    case PlanOutcome::no_tube:
+      return "no_tube";
+    case PlanOutcome::no_motion:
+      return "no_motion";
+  }
+  return "unknown";
+}
+
+namespace {
+
+JointLimits share_of(JointLimits limits, const MotionOptions& options) {
+  limits.velocity *= options.velocity_share;
+  limits.acceleration *= options.acceleration_share;
+  limits.jerk *= options.acceleration_share;
+  return limits;
+}
+
+/// Ramps of all joints from rest to (v, a) in the time of the slowest.
+std::optional<std::vector<std::vector<JerkPiece>>> ramps(const Chain& chain, const JointVector<double>& v,
+                                                         const JointVector<double>& a,
+                                                         const MotionOptions& options) {
+  // What the window asks for may use the whole limit.
+  const auto limits = [&](int i) {
+    JointLimits l = share_of(chain.joints[i].limits, options);
+    l.acceleration = std::max(l.acceleration, std::min(std::abs(a[i]), chain.joints[i].limits.acceleration));
+    return l;
+  };
+  double longest = 0;
+  for (int i = 0; i < chain.size(); ++i) longest = std::max(longest, shortest_ramp(v[i], a[i], limits(i)));
+  std::vector<std::vector<JerkPiece>> out;
+  for (int i = 0; i < chain.size(); ++i) {
+    auto one = std::isfinite(longest) ? velocity_ramp(v[i], a[i], longest, limits(i)) : std::nullopt;
+    if (!one) return {};
+    out.push_back(std::move(*one));
+  }
+  return out;
+}
+
+}  // namespace
+
+std::optional<JointTrajectory> throw_motion(const Chain& chain, const JointVector<double>& home,
+                                            const ThrowState& state, const JointVector<double>& qdd,
+                                            const MotionOptions& options) {
+  const int n = chain.size();
+  const double T = options.window;
+  const JointVector<double> last = state.qd + T * qdd;
+  const auto swing = ramps(chain, state.qd, qdd, options);
+  // Braking is speeding up seen backwards: there the acceleration at the joint is −q̈.
+  const auto brake = ramps(chain, last, -qdd, options);
+  if (!swing || !brake) return {};
+  JointVector<double> start(n);
+  for (int i = 0; i < n; ++i) {
+    JerkProfile from({0, 0, 0, 0});
+    from.append((*swing)[i]);
+    start[i] = state.q[i] - from.end().q;
+  }
+  // The line from home: its own limits are the tightest of the joints'.
+  double velocity = JointLimits::kNone, acceleration = JointLimits::kNone, jerk = JointLimits::kNone;
+  for (int i = 0; i < n; ++i) {
+    const double length = std::abs(start[i] - home[i]);
+    if (!(length > 1e-12)) continue;
+    const JointLimits l = share_of(chain.joints[i].limits, options);
+    velocity = std::min(velocity, l.velocity / length);
+    acceleration = std::min(acceleration, l.acceleration / length);
+    jerk = std::min(jerk, l.jerk / length);
+  }
+  std::vector<JerkPiece> line;
+  if (std::isfinite(velocity)) line = rest_to_rest(velocity, acceleration, jerk);
+  JointTrajectory out;
+  for (int i = 0; i < n; ++i) {
+    JerkProfile profile({home[i], 0, 0, 0});
+    std::vector<JerkPiece> approach = line;
+    for (JerkPiece& piece : approach) piece.jerk *= start[i] - home[i];
+    profile.append(approach);
+    profile.append((*swing)[i]);
+    if (i == 0) out.begin = -profile.duration();
+    profile.append({{T, 0.0}});
+    profile.append({(*brake)[i].rbegin(), (*brake)[i].rend()});
+    out.joints.push_back(std::move(profile));
+  }
+  return out;
+}
+
+JointVector<double> middle_of(const Chain& chain) {
+  JointVector<double> out(chain.size());
+  for (int i = 0; i < chain.size(); ++i) {
+    const JointLimits& l = chain.joints[i].limits;
+    out[i] = std::isfinite(l.upper - l.lower) ? 0.5 * (l.lower + l.upper) : 0.0;
+  }
+  return out;
+}
+
+double largest_miss(const std::vector<LandingAt>& landings) {
+  double worst = 0;
+  for (const LandingAt& one : landings)
+    worst = one.lands ? std::max(worst, std::hypot(one.x, one.y)) : JointLimits::kNone;
+  return worst;
+}
+
+namespace {
+
+/// The motion to a throw, with as much acceleration as the torques allow.
+bool add_motion(const Chain& chain, const JointVector<double>& home, const PlanOptions& options,
+                ThrowPlan& plan, std::string& reason) {
+  MotionOptions motion = options.motion;
+  motion.window = options.search.window;
+  for (const double share : {1.0, 0.75, 0.55, 0.4}) {
+    motion.acceleration_share = share * options.motion.acceleration_share;
+    auto moved = throw_motion(chain, home, plan.nominal.state, plan.qdd, motion);
+    if (!moved) {
+      reason = "no ramp leads to the tube acceleration within the limits";
+      return false;
+    }
+    plan.limits = check_limits(chain, *moved, 10 * options.check_step);  // a coarse look is enough to refuse
+    if (plan.limits.within()) plan.limits = check_limits(chain, *moved, options.check_step);
+    plan.motion = std::move(*moved);
+    plan.acceleration_share = motion.acceleration_share;
+    if (plan.limits.within() && plan.limits.lowest > 0) return true;
+    reason = plan.limits.within() ? fmt::format("the arm would come down to {:.2f} m", plan.limits.lowest)
+                                  : plan.limits.worst(chain);
+    if (plan.limits.position.fraction > 1) return false;  // slower goes no less far
+  }
+  return false;
+}
+
+}  // namespace
+
+PlanResult plan_throw(const Chain& chain, const TargetBox& box, const PlanOptions& options) {
+  PlanResult out;
+  JointVector<double> home = options.home;
+  if (home.size() == 0) home = middle_of(chain);
+  if (home.size() != chain.size())
+    throw std::invalid_argument(
+        fmt::format("plan: home has {} angles for {} joints", home.size(), chain.size()));
+  const auto throws = find_throws(chain, box, options.search);
+  out.throws = static_cast<int>(throws.size());
+  out.outcome = PlanOutcome::no_throw;
+  out.reason = "no configuration reaches the box within the joints' limits";
+  for (const NominalThrow& nominal : throws) {
+    ++out.tried;
+    const TubeProblem problem{chain, nominal.state, box.middle, options.search.window, options.search.medium};
+    ThrowPlan plan;
+    plan.nominal = nominal;
+    std::string reason;
+    if (options.tube) {
+      plan.tube = solve_tube(problem);
+      reason = plan.tube.reason;
+    } else {
+      plan.tube.qdd = JointVector<double>::Zero(chain.size());
+    }
+    const bool first = out.outcome == PlanOutcome::no_throw;
+    if (plan.tube.outcome == TubeOutcome::solved) {
+      plan.qdd = options.tube && options.refine ? refine_tube(problem, plan.tube.qdd) : plan.tube.qdd;
+      const auto landings = [&](const JointVector<double>& qdd) {
+        return landings_over_window(problem, qdd, options.landing_samples);
+      };
+      plan.at_rest = landings(JointVector<double>::Zero(chain.size()));
+      plan.tube_landings = landings(plan.tube.qdd);
+      plan.landings = landings(plan.qdd);
+      const bool inside = std::all_of(plan.landings.begin(), plan.landings.end(),
+                                      [&](const LandingAt& at) { return at.lands && box.holds(at.x, at.y); });
+      if (inside || !options.tube) {
+        if (add_motion(chain, home, options, plan, reason)) {
+          out.outcome = PlanOutcome::planned;
+          out.reason.clear();
+          out.plan = std::move(plan);
+          return out;
+        }
+        if (out.outcome != PlanOutcome::no_motion) out.reason = reason;
+        out.outcome = PlanOutcome::no_motion;
+        continue;
+      }
+      reason =
+          fmt::format("the window's landings miss the middle by up to {:.3f} m", largest_miss(plan.landings));
+    }
+    if (first) {
+      out.outcome = PlanOutcome::no_tube;
+      out.reason = reason;
+    }
+  }
+  return out;
+}
+
+}  // namespace unhand::planners

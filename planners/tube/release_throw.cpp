@@ -1,0 +1,338 @@
+#include "planners/tube/release_throw.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <random>
+#include <stdexcept>
+
+#include "contact/registry.hpp"
+#include "flight/fly.hpp"
+#include "planners/tube/planar_hand.hpp"
+#include "release/simulate_release.hpp"
+
+namespace unhand::planners {
+
+using dynamics::independent;
+
+const char* name_of(Unknown unknown) {
+  switch (unknown) {
+    case kMu:
+      return "mu";
+    case kDeadTime:
+      return "dead_time";
+    case kOpeningTime:
+      return "opening_time";
+    case kComOffset:
+      return "com_offset";
+    case kUnknowns:
+      break;
+  }
+  return "unknown";
+}
+
+ReleaseCard release_card(const datasets::ModelCard& card, const std::string& file,
+                         const ReleaseCard& otherwise) {
+  if (card.model == "gripper_delay" || card.model == "limit_surface_naive" || card.model == "projectile")
+    throw datasets::CardError(file, "/model",
+                              fmt::format("'{}' does not say how the pads let go", card.model));
+  if (!card.effects.empty())
+    throw datasets::CardError(file, "/effects", "plans of throws take cards without effects");
+  ReleaseCard out = otherwise;
+  out.model = card.model;
+  const auto take = [&](const char* name, const char* unit, double& value, double* sigma) {
+    const auto found = card.parameters.find(name);
+    if (found == card.parameters.end()) return;
+    const std::string path = fmt::format("/parameters/{}", name);
+    if (found->second.unit != unit)
+      throw datasets::CardError(file, path + "/unit",
+                                fmt::format("is '{}', not '{}'", found->second.unit, unit));
+    if (!(found->second.value >= 0)) throw datasets::CardError(file, path + "/value", "is not >= 0");
+    value = found->second.value;
+    if (sigma != nullptr && found->second.sigma) *sigma = *found->second.sigma;
+  };
+  take("mu", "-", out.mu.value, &out.mu.sigma);
+  if (const auto own = card.own_spreads.find("mu_deviation"); own != card.own_spreads.end())
+    out.mu.sigma = std::hypot(out.mu.sigma, own->second.sigma * out.mu.value);  // a fraction of mu
+  take("length", "m", out.length, nullptr);
+  double pads = out.pads;
+  take("pads", "-", pads, nullptr);
+  out.pads = static_cast<int>(pads);
+  take("grip_force", "N", out.grip_force, nullptr);
+  take("dead_time", "s", out.dead_time.value, &out.dead_time.sigma);
+  take("opening_time", "s", out.opening_time.value, &out.opening_time.sigma);
+  take("shape", "-", out.shape, nullptr);
+  return out;
+}
+
+namespace {
+
+std::array<Uncertain, kUnknowns> unknowns_of(const ReleaseThrow& p) {
+  return {p.card.mu, p.card.dead_time, p.card.opening_time, p.object.com_offset};
+}
+
+template <class S>
+struct Thrown {
+  S miss{}, detach_time{};
+  double angle{}, speed{};
+};
+
+/// Which quantity carries derivatives is the caller's: hand, draw, or none.
+template <class S>
+std::optional<Thrown<S>> throw_once(const ReleaseThrow& p, const release::HandMotion& hand,
+                                    const std::array<S, kUnknowns>& draw) {
+  constexpr double kTorqueFactor = 2.0 / 3.0;  // of a uniform disc; only L = c a enters
+  contact::ContactParameters<S> pads;
+  pads.patch = {draw[kMu], S(p.card.length / kTorqueFactor), S(kTorqueFactor), p.card.pads};
+  const auto law = contact::make_contact_model(p.card.model, pads);
+  const contact::ProfileNormalForce force(contact::OpeningProfile<S>{
+      0.0, S(p.card.grip_force), draw[kDeadTime], draw[kOpeningTime], S(p.card.shape)});
+  const dynamics::Vec2<S> gravity{S(0.0), S(-p.medium.gravity)};
+  if (!(force.release_time() < hand.end())) return {};
+  const auto let_go = release::simulate_release<S>({hand,
+                                                    force,
+                                                    *law,
+                                                    {S(p.object.mass), S(p.object.inertia)},
+                                                    gravity,
+                                                    {draw[kComOffset], S(p.object.angle)},
+                                                    hand.begin(),
+                                                    {},
+                                                    S(0.0)});
+  if (let_go.outcome != release::ReleaseOutcome::detached) return {};
+  flight::FlightProblem<S> flight{let_go.detach.pose, let_go.detach.twist, gravity};
+  flight.drag_k = S(p.medium.drag_k);
+  flight.landing_height = S(p.target.z());
+  const auto flown = flight::fly(flight);
+  if (flown.outcome != flight::FlightOutcome::landed) return {};
+  const auto& twist = let_go.detach.twist;
+  return Thrown<S>{flown.landing.pose.x, let_go.detach.time,
+                   dynamics::value_of(let_go.relative.angle) - p.object.angle,
+                   std::hypot(dynamics::value_of(twist.vx), dynamics::value_of(twist.vz))};
+}
+
+JointVector<Dual> constant(const JointVector<double>& x) { return x.cast<Dual>(); }
+
+PlanarHand hand_of(const ReleaseThrow& p, const JointVector<Dual>& qd, const JointVector<Dual>& qdd) {
+  const ThrowPlane plane(forward_kinematics(p.chain, p.start.q).p, p.target);
+  return {p.chain, plane, p.start.q, qd, qdd, p.hold};
+}
+PlanarHand hand_of(const ReleaseThrow& p) { return hand_of(p, constant(p.start.qd), constant(p.qdd)); }
+
+}  // namespace
+
+Draw nominal_draw(const ReleaseThrow& problem) {
+  Draw out{};
+  const auto unknowns = unknowns_of(problem);
+  for (int k = 0; k < kUnknowns; ++k) out[k] = unknowns[k].value;
+  return out;
+}
+
+std::optional<ReleaseLanding> release_landing(const ReleaseThrow& problem, const Draw& draw) {
+  const auto thrown = throw_once<double>(problem, hand_of(problem), draw);
+  if (!thrown) return {};
+  return ReleaseLanding{thrown->miss, thrown->detach_time, thrown->angle, thrown->speed};
+}
+
+std::optional<ReleaseLanding> rigid_landing(const ReleaseThrow& problem, double com_offset, double delay) {
+  if (!(delay >= 0 && delay <= problem.hold))
+    throw std::invalid_argument(fmt::format("delay {} is not in [0, {}] s", delay, problem.hold));
+  const PlanarHand motion = hand_of(problem);
+  const auto hand = motion.at({0, problem.hold}, delay);
+  const double angle = hand.pose.theta + problem.object.angle, omega = hand.twist.omega;
+  const dynamics::Vec2<double> r = rotate(angle, dynamics::Vec2<double>{com_offset, 0});
+  flight::FlightProblem<double> flight{{hand.pose.x + r.x, hand.pose.z + r.z, angle},
+                                       {hand.twist.vx - omega * r.z, hand.twist.vz + omega * r.x, omega},
+                                       {0, -problem.medium.gravity}};
+  flight.drag_k = problem.medium.drag_k;
+  flight.landing_height = problem.target.z();
+  const auto flown = flight::fly(flight);
+  if (flown.outcome != flight::FlightOutcome::landed) return {};
+  return ReleaseLanding{flown.landing.pose.x, delay, 0, std::hypot(flight.twist.vx, flight.twist.vz)};
+}
+
+std::optional<ReleaseSpread> release_spread(const ReleaseThrow& problem) {
+  const auto unknowns = unknowns_of(problem);
+  std::array<Dual, kUnknowns> draw;
+  for (int k = 0; k < kUnknowns; ++k) draw[k] = independent(unknowns[k].value, k);
+  const auto thrown = throw_once<Dual>(problem, hand_of(problem), draw);
+  if (!thrown) return {};
+  ReleaseSpread out;
+  out.miss = thrown->miss.a;
+  for (int k = 0; k < kUnknowns; ++k) {
+    out.gradient[k] = thrown->miss.v[k];
+    out.spread = std::hypot(out.spread, out.gradient[k] * unknowns[k].sigma);
+  }
+  return out;
+}
+
+void summarise(Landings& out) {
+  out.mean = out.std = 0;
+  const auto n = static_cast<double>(out.miss.size());
+  for (const double x : out.miss) out.mean += x / n;
+  for (const double x : out.miss) out.std += (x - out.mean) * (x - out.mean) / std::max(1.0, n - 1);
+  out.std = std::sqrt(out.std);
+}
+
+Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t seed) {
+  const auto unknowns = unknowns_of(problem);
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  const PlanarHand hand = hand_of(problem);
+  Landings out;
+  for (int i = 0; i < count; ++i) {
+    Draw draw{};
+    for (int k = 0; k < kUnknowns; ++k) do
+        draw[k] = unknowns[k].value + unknowns[k].sigma * normal(random);
+      while (k != kComOffset && !(draw[k] > 0));
+    if (const auto thrown = throw_once<double>(problem, hand, draw))
+      out.miss.push_back(thrown->miss);
+    else
+      ++out.lost;
+  }
+  summarise(out);
+  return out;
+}
+
+namespace {
+
+/// The landings at ± √p σ of each unknown, weighed so that their squares add to the mean square.
+class Points {
+ public:
+  explicit Points(const ReleaseThrow& problem) {
+    const auto unknowns = unknowns_of(problem);
+    int p = 0;
+    for (const Uncertain& one : unknowns) p += one.sigma > 0;
+    if (p == 0) draws_.push_back(nominal_draw(problem));
+    for (int k = 0; k < kUnknowns; ++k)
+      for (const double side : {-1.0, 1.0}) {
+        if (!(unknowns[k].sigma > 0)) continue;
+        Draw draw = nominal_draw(problem);
+        draw[k] += side * std::sqrt(p) * unknowns[k].sigma;
+        if (k != kComOffset) draw[k] = std::max(draw[k], 0.05 * unknowns[k].value);
+        draws_.push_back(draw);
+      }
+  }
+  int size() const { return static_cast<int>(draws_.size()); }
+  double weight() const { return 1 / std::sqrt(static_cast<double>(draws_.size())); }
+
+  template <class S>
+  std::optional<std::vector<S>> residuals(const ReleaseThrow& problem, const PlanarHand& hand) const {
+    std::vector<S> out;
+    for (const Draw& draw : draws_) {
+      std::array<S, kUnknowns> given;
+      for (int k = 0; k < kUnknowns; ++k) given[k] = S(draw[k]);
+      const auto thrown = throw_once<S>(problem, hand, given);
+      if (!thrown) return {};
+      out.push_back(S(weight() * thrown->miss));
+    }
+    return out;
+  }
+
+ private:
+  std::vector<Draw> draws_;
+};
+
+/// Limits of what a step may change: rows of a quadratic program in (δq̇₀, δq̈).
+std::vector<QpConstraint> step_limits(const ReleaseThrow& p, const InsensitiveOptions& options) {
+  const int m = static_cast<int>(options.joints.size());
+  std::vector<QpConstraint> out;
+  for (int i = 0; i < m; ++i) {
+    const int joint = options.joints[i];
+    const JointLimits& l = p.chain.joints[joint].limits;
+    const double v = (1 - options.reserve) * l.velocity, a = (1 - options.reserve) * l.acceleration;
+    const double qd = p.start.qd[joint], qdd = p.qdd[joint];
+    const auto add = [&](double by_rate, double by_acceleration, double now, double most) {
+      for (const double side : {1.0, -1.0}) {
+        QpConstraint row{QpVector::Zero(2 * m), -most - side * now, false};
+        row.a[i] = side * by_rate;
+        row.a[m + i] = side * by_acceleration;
+        if (std::isfinite(most)) out.push_back(std::move(row));
+      }
+    };
+    add(1, 0, qd, v);
+    add(1, p.hold, qd + p.hold * qdd, v);
+    add(0, 1, qdd, a);
+  }
+  return out;
+}
+
+double square_sum(const std::vector<double>& r) {
+  double sum = 0;
+  for (const double x : r) sum += x * x;
+  return sum;
+}
+
+}  // namespace
+
+InsensitiveResult make_insensitive(const ReleaseThrow& problem, const InsensitiveOptions& options) {
+  const int m = static_cast<int>(options.joints.size()), n = 2 * m;
+  if (m < 1 || n > dynamics::kDualSize)
+    throw std::invalid_argument(
+        fmt::format("make_insensitive: {} joints named; accepted: 1 to {}", m, dynamics::kDualSize / 2));
+  for (const int joint : options.joints)
+    if (joint < 0 || joint >= problem.chain.size())
+      throw std::invalid_argument(fmt::format("make_insensitive: there is no joint {}", joint));
+  const Points points(problem);
+  const auto moved = [&](const ThrowState& start, const JointVector<double>& qdd) {
+    ReleaseThrow out = problem;
+    out.start = start;
+    out.qdd = qdd;
+    return out;
+  };
+  const auto cost_of = [&](const ThrowState& start, const JointVector<double>& qdd) {
+    const ReleaseThrow p = moved(start, qdd);
+    const auto r = points.residuals<double>(p, hand_of(p));
+    return r ? square_sum(*r) : std::numeric_limits<double>::infinity();
+  };
+  InsensitiveResult out{problem.start, problem.qdd, 0, 0, 0};
+  double cost = cost_of(out.start, out.qdd), damping = 1e-3;
+  out.before = out.after = std::sqrt(cost);
+  for (; std::isfinite(cost) && out.iterations < options.iterations; ++out.iterations) {
+    const ReleaseThrow at = moved(out.start, out.qdd);
+    JointVector<Dual> qd = constant(at.start.qd), qdd = constant(at.qdd);
+    for (int i = 0; i < m; ++i) {
+      qd[options.joints[i]].v[i] = 1;
+      qdd[options.joints[i]].v[m + i] = 1;
+    }
+    const auto residuals = points.residuals<Dual>(at, hand_of(at, qd, qdd));
+    if (!residuals) break;
+    QuadraticProgram step{QpMatrix::Zero(n, n), QpVector::Zero(n), step_limits(at, options)};
+    for (const Dual& r : *residuals)
+      for (int i = 0; i < n; ++i) {
+        step.c[i] += r.a * r.v[i];
+        for (int j = 0; j < n; ++j) step.H(i, j) += r.v[i] * r.v[j];
+      }
+    const QpMatrix hessian = step.H;
+    double tried = cost;
+    for (int attempt = 0; attempt < 6 && !(tried < cost); ++attempt) {
+      step.H = hessian;
+      for (int i = 0; i < m; ++i) {  // a step of a whole limit costs `damping` square decimetres
+        const JointLimits& l = problem.chain.joints[options.joints[i]].limits;
+        step.H(i, i) += damping * 1e-2 / (l.velocity * l.velocity);
+        step.H(m + i, m + i) += damping * 1e-2 / (l.acceleration * l.acceleration);
+      }
+      const QpSolution solution = solve(step);
+      if (solution.outcome != QpOutcome::solved) return out;
+      ThrowState start = at.start;
+      JointVector<double> acceleration = at.qdd;
+      for (int i = 0; i < m; ++i) {
+        start.qd[options.joints[i]] += solution.x[i];
+        acceleration[options.joints[i]] += solution.x[m + i];
+      }
+      tried = cost_of(start, acceleration);
+      damping *= tried < cost ? 0.3 : 8;
+      if (tried < cost) {
+        out.start = start;
+        out.qdd = acceleration;
+      }
+    }
+    if (!(tried < cost)) break;
+    const bool enough = tried > (1 - options.tolerance) * cost;
+    cost = tried;
+    if (enough) break;
+  }
+  out.after = std::sqrt(cost);
+  return out;
+}
+
+}  // namespace unhand::planners

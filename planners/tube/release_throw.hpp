@@ -1,0 +1,116 @@
+// A throw whose object leaves the hand as a contact model says: where it lands, and how sure that is.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "datasets/model_card.hpp"
+#include "planners/tube/tube_cvx.hpp"
+
+namespace unhand::planners {
+
+/// A number known up to a standard deviation, in the same unit.
+struct Uncertain {
+  double value{}, sigma{};
+};
+
+/// What is known of the release: a contact model, the friction of its pads, and how the gripper opens.
+struct ReleaseCard {
+  std::string model{"limit_surface"};
+  Uncertain mu{0.5, 0.05};  ///< friction coefficient [-]
+  double length{0.007};     ///< L = τ_max/f_max [m]
+  int pads{2};
+  double grip_force{40};                 ///< of one pad [N]
+  Uncertain dead_time{0.020, 0.005};     ///< from the command to the first change of the force [s]
+  Uncertain opening_time{0.060, 0.006};  ///< from there until the pads part [s]
+  double shape{1.0};                     ///< p of contact::OpeningProfile [-]
+};
+
+/// A model card's numbers, and those of `otherwise` where the card has none: mu (with its spread from throw
+/// to throw), length, pads, grip_force, dead_time, opening_time, shape. Throws datasets::CardError for a card
+/// of gripper_delay, or one with effects, which this planner does not take.
+ReleaseCard release_card(const datasets::ModelCard& card, const std::string& file,
+                         const ReleaseCard& otherwise = {});
+
+struct HeldObject {
+  double mass{0.246}, inertia{2.4e-3};  ///< [kg], about the centre of mass [kg m²]
+  Uncertain com_offset{0.14, 0.004};    ///< pads to centre of mass [m]
+  double angle{};  ///< of the object's x axis against the tip's z axis, in the plane [rad]
+};
+
+/// The uncertain numbers of one throw.
+enum Unknown { kMu, kDeadTime, kOpeningTime, kComOffset, kUnknowns };
+using Draw = std::array<double, kUnknowns>;
+const char* name_of(Unknown);
+
+/// A throw in the vertical plane through the tip and the target: a chain whose tip is the middle of the pads,
+/// its state when the gripper is told to open (t = 0), and the joint acceleration from then on.
+struct ReleaseThrow {
+  const Chain& chain;
+  ThrowState start;
+  JointVector<double> qdd;
+  Eigen::Vector3d target;  ///< [m]
+  double hold{0.13};       ///< q̈ is held until then [s]; the object is free before
+  ReleaseCard card{};
+  HeldObject object{};
+  flight::Medium medium{};
+};
+
+struct ReleaseLanding {
+  double miss{};         ///< of the centre of mass, forward of the target [m]
+  double detach_time{};  ///< [s]
+  double angle{};        ///< through which the object turns against the hand until it is free [rad]
+  double speed{};        ///< of the centre of mass when it is free [m/s]
+};
+
+/// Where a throw lands; empty if the object is not free by `hold` or never comes down to the target's height.
+/// Throws std::invalid_argument where the tip does not move in a vertical plane with the target.
+std::optional<ReleaseLanding> release_landing(const ReleaseThrow& problem, const Draw& draw);
+Draw nominal_draw(const ReleaseThrow& problem);
+
+/// The same with the object carried rigidly until `delay` and then free: the kinematic model.
+std::optional<ReleaseLanding> rigid_landing(const ReleaseThrow& problem, double com_offset, double delay);
+
+/// Landing and its exact derivatives by the unknowns, at their nominal values; spread² = Σ (∂x/∂θ σ)².
+struct ReleaseSpread {
+  double miss{}, spread{};
+  std::array<double, kUnknowns> gradient{};  ///< m per unit of the unknown
+};
+std::optional<ReleaseSpread> release_spread(const ReleaseThrow& problem);
+
+/// Landings of `count` draws from normal distributions (cut off at zero where the number must be positive).
+struct Landings {
+  std::vector<double> miss;  ///< of those that land [m]
+  int lost{};                ///< not free in time, or never down
+  double mean{}, std{};
+};
+/// Mean and standard deviation of what landed.
+void summarise(Landings& landings);
+Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t seed);
+
+struct InsensitiveOptions {
+  std::vector<int> joints;  ///< that move in the plane, at most 4
+  int iterations{15};
+  double reserve{0.02};    ///< of the limits of velocity and acceleration, kept free
+  double tolerance{1e-3};  ///< relative decrease of the cost at which it is enough
+};
+struct InsensitiveResult {
+  ThrowState start;
+  JointVector<double> qdd;
+  double before{}, after{};  ///< root mean square miss over the unknowns' spread [m]
+  int iterations{};
+};
+
+/// Chooses q̇₀ and q̈ so that landings miss least over the card's and the grasp's uncertainty: minimises
+///
+///   E[x²] ≈ 1/(2 p) Σ_k (x(θ ± √p σ_k e_k; q̇₀, q̈))²,   k = 1 … p
+///
+/// (exact for a landing that is cubic in its p unknowns) by Levenberg-Marquardt; the derivatives by q̇₀ and q̈
+/// pass exactly through hand, release with its events, and flight, and each step is a quadratic program
+/// within the limits of q̇₀, q̇₀ + hold q̈ and q̈. Throws std::invalid_argument unless 1 to 4 joints are named.
+InsensitiveResult make_insensitive(const ReleaseThrow& problem, const InsensitiveOptions& options);
+
+}  // namespace unhand::planners

@@ -1,0 +1,235 @@
+#include "planners/tube/small_qp.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace unhand::planners {
+
+const char* to_string(QpOutcome outcome) {
+  switch (outcome) {
+    case QpOutcome::solved:
+      return "solved";
+    case QpOutcome::infeasible:
+      return "infeasible";
+    case QpOutcome::not_solved:
+      return "not_solved";
+  }
+  return "unknown";
+}
+
+namespace {
+
+/// Lower L with L Lᵀ = H; false where H is not positive definite.
+bool factorise(QpMatrix& H) {
+  const int n = static_cast<int>(H.rows());
+  for (int j = 0; j < n; ++j) {
+    for (int k = 0; k < j; ++k) H(j, j) -= H(j, k) * H(j, k);
+    if (!(H(j, j) > 0)) return false;
+    H(j, j) = std::sqrt(H(j, j));
+    for (int i = j + 1; i < n; ++i) {
+      for (int k = 0; k < j; ++k) H(i, j) -= H(i, k) * H(j, k);
+      H(i, j) /= H(j, j);
+    }
+  }
+  return true;
+}
+/// L⁻¹ v
+QpVector forward(const QpMatrix& L, QpVector v) {
+  for (int i = 0; i < v.size(); ++i) {
+    for (int k = 0; k < i; ++k) v[i] -= L(i, k) * v[k];
+    v[i] /= L(i, i);
+  }
+  return v;
+}
+/// L⁻ᵀ v
+QpVector backward(const QpMatrix& L, QpVector v) {
+  for (int i = static_cast<int>(v.size()) - 1; i >= 0; --i) {
+    for (int k = i + 1; k < v.size(); ++k) v[i] -= L(k, i) * v[k];
+    v[i] /= L(i, i);
+  }
+  return v;
+}
+
+/// In y = Lᵀx, where the objective is ½ |y|² + const, with normals of length one.
+struct Scaled {
+  QpVector normal;
+  double offset{}, length{};
+};
+
+/// The active constraints: their normals N = Q R by Gram-Schmidt, twice for accuracy.
+class ActiveSet {
+ public:
+  explicit ActiveSet(int unknowns) : Q_(unknowns, 0), R_(0, 0) {}
+
+  struct Member {
+    int constraint;
+    QpVector normal;
+    double multiplier;
+    bool equality;
+    double sign;  ///< −1: an equality taken with its normal turned round
+  };
+  std::vector<Member> members;
+
+  /// What of n the active normals leave, and r with N r = the rest.
+  struct Split {
+    QpVector free;
+    QpVector r;
+  };
+  Split split(const QpVector& n) const {
+    const int k = static_cast<int>(Q_.cols());
+    Split out{n, QpVector::Zero(k)};
+    for (int pass = 0; pass < 2; ++pass)
+      for (int j = 0; j < k; ++j) {
+        const double part = Q_.col(j).dot(out.free);
+        out.free -= part * Q_.col(j);
+        out.r[j] += part;
+      }
+    for (int i = k - 1; i >= 0; --i) {
+      for (int j = i + 1; j < k; ++j) out.r[i] -= R_(i, j) * out.r[j];
+      out.r[i] /= R_(i, i);
+    }
+    return out;
+  }
+  void add(Member member) {
+    append(member.normal);
+    members.push_back(std::move(member));
+  }
+  void drop(int which) {
+    members.erase(members.begin() + which);
+    Q_.resize(Q_.rows(), 0);
+    R_.resize(0, 0);
+    for (const Member& m : members) append(m.normal);
+  }
+
+ private:
+  void append(const QpVector& n) {
+    const int k = static_cast<int>(Q_.cols());
+    QpVector free = n, part = QpVector::Zero(k + 1);
+    for (int pass = 0; pass < 2; ++pass)
+      for (int j = 0; j < k; ++j) {
+        const double p = Q_.col(j).dot(free);
+        free -= p * Q_.col(j);
+        part[j] += p;
+      }
+    part[k] = free.norm();
+    Q_.conservativeResize(Eigen::NoChange, k + 1);
+    R_.conservativeResize(k + 1, k + 1);
+    Q_.col(k) = free / part[k];
+    R_.row(k).setZero();
+    R_.col(k) = part;
+  }
+  QpMatrix Q_, R_;
+};
+
+void check(const QuadraticProgram& p) {
+  const auto n = p.c.size();
+  bool fits = n > 0 && p.H.rows() == n && p.H.cols() == n && p.H.allFinite() && p.c.allFinite();
+  for (const QpConstraint& k : p.constraints)
+    fits = fits && k.a.size() == n && k.a.allFinite() && std::isfinite(k.b);
+  if (!fits) throw std::invalid_argument("quadratic program: sizes do not match, or a number is not finite");
+}
+
+}  // namespace
+
+QpSolution solve(const QuadraticProgram& program, const QpOptions& options) {
+  check(program);
+  const int n = static_cast<int>(program.c.size()), m = static_cast<int>(program.constraints.size());
+  QpSolution out;
+  out.multipliers.assign(static_cast<std::size_t>(m), 0.0);
+  QpMatrix L = program.H;
+  if (!factorise(L)) {
+    out.outcome = QpOutcome::not_solved;
+    out.x = QpVector::Zero(n);
+    return out;
+  }
+  QpVector y = -forward(L, program.c);
+  std::vector<Scaled> scaled(static_cast<std::size_t>(m));
+  for (int k = 0; k < m; ++k) {
+    const QpConstraint& constraint = program.constraints[k];
+    QpVector a = forward(L, constraint.a);
+    const double length = a.norm();
+    if (length > 0) a /= length;
+    scaled[k] = {a, length > 0 ? constraint.b / length : constraint.b, length};
+  }
+  const auto slack = [&](int k) { return scaled[k].normal.dot(y) - scaled[k].offset; };
+  ActiveSet active(n);
+  std::vector<bool> settled(static_cast<std::size_t>(m), false);  // active, or following from what is
+  const auto finish = [&](QpOutcome outcome) {
+    out.outcome = outcome;
+    out.x = backward(L, y);
+    for (const auto& one : active.members)
+      out.multipliers[one.constraint] = one.sign * one.multiplier / scaled[one.constraint].length;
+    return out;
+  };
+
+  for (;;) {
+    // The constraint to add: any equality first, then the most violated.
+    int chosen = -1;
+    double worst = 0;
+    for (int k = 0; k < m; ++k) {
+      if (settled[k]) continue;
+      const double s = slack(k), tolerance = options.tolerance * (1 + std::abs(scaled[k].offset));
+      if (program.constraints[k].equality) {
+        chosen = k;
+        break;
+      }
+      if (s < -tolerance && s < worst) chosen = k, worst = s;
+    }
+    if (chosen < 0) return finish(QpOutcome::solved);
+    const double sign = program.constraints[chosen].equality && slack(chosen) > 0 ? -1 : 1;
+    const QpVector normal = sign * scaled[chosen].normal;
+    double multiplier = 0;
+    for (;;) {
+      if (++out.steps > options.max_steps) return finish(QpOutcome::not_solved);
+      const double s = sign * slack(chosen);
+      const auto [free, r] = active.split(normal);
+      const double room = free.squaredNorm();
+      const bool dependent = !(room > 1e-18);
+      if (dependent && program.constraints[chosen].equality &&
+          std::abs(s) <= options.tolerance * (1 + std::abs(scaled[chosen].offset)))
+        break;  // an equality that says what others say already
+      // How far the multipliers of the active inequalities allow, and how far it is to the constraint.
+      double step = dependent ? std::numeric_limits<double>::infinity() : -s / room;
+      int leaves = -1;
+      for (int j = 0; j < static_cast<int>(active.members.size()); ++j)
+        if (!active.members[j].equality && r[j] > 1e-14 && active.members[j].multiplier / r[j] < step)
+          step = active.members[j].multiplier / r[j], leaves = j;
+      if (!std::isfinite(step)) {
+        finish(QpOutcome::infeasible);
+        out.conflict = {chosen};
+        for (int j = 0; j < static_cast<int>(active.members.size()); ++j)
+          if (std::abs(r[j]) > 1e-9) out.conflict.push_back(active.members[j].constraint);
+        return out;
+      }
+      if (!dependent) y += step * free;
+      for (int j = 0; j < static_cast<int>(active.members.size()); ++j)
+        active.members[j].multiplier -= step * r[j];
+      multiplier += step;
+      if (leaves >= 0) {
+        settled[active.members[leaves].constraint] = false;
+        active.drop(leaves);
+        continue;
+      }
+      active.add({chosen, normal, multiplier, program.constraints[chosen].equality, sign});
+      break;
+    }
+    settled[chosen] = true;
+  }
+}
+
+double kkt_residual(const QuadraticProgram& program, const QpSolution& solution) {
+  QpVector gradient = program.H * solution.x + program.c;
+  double worst = 0;
+  for (std::size_t k = 0; k < program.constraints.size(); ++k) {
+    const QpConstraint& constraint = program.constraints[k];
+    const double slack = constraint.a.dot(solution.x) - constraint.b, lambda = solution.multipliers[k];
+    gradient -= lambda * constraint.a;
+    worst = std::max(worst, constraint.equality ? std::abs(slack) : std::max(-slack, 0.0));
+    if (!constraint.equality) worst = std::max({worst, -lambda, std::abs(lambda * slack)});
+  }
+  return std::max(worst, gradient.cwiseAbs().maxCoeff());
+}
+
+}  // namespace unhand::planners

@@ -1,0 +1,60 @@
+// Convex quadratic programs of a few unknowns, solved exactly.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace unhand::planners {
+
+inline constexpr int kMaxUnknowns = 8;
+
+using QpVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxUnknowns, 1>;
+using QpMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxUnknowns, kMaxUnknowns>;
+
+/// aᵀx = b or aᵀx >= b.
+struct QpConstraint {
+  QpVector a;
+  double b{};
+  bool equality{};
+};
+
+/// min ½ xᵀH x + cᵀx subject to the constraints; H symmetric positive definite.
+struct QuadraticProgram {
+  QpMatrix H;
+  QpVector c;
+  std::vector<QpConstraint> constraints;
+};
+
+enum class QpOutcome {
+  solved,
+  infeasible,  ///< `conflict` names constraints that no x obeys together
+  not_solved,  ///< H is not positive definite, or the budget is spent
+};
+const char* to_string(QpOutcome);
+
+struct QpOptions {
+  double tolerance{1e-10};  ///< of a constraint, of its normal scaled to length one
+  int max_steps{200};
+};
+
+struct QpSolution {
+  QpOutcome outcome{};
+  QpVector x;
+  /// λ with H x + c = Σ λ_k a_k; λ_k >= 0 of an inequality, zero where it is not active.
+  std::vector<double> multipliers;
+  std::vector<int> conflict;  ///< indices of constraints
+  int steps{};
+};
+
+/// The dual active-set method [GoldfarbIdnani1983]: starts at the free minimum and adds violated constraints
+/// one by one, the most violated first and equalities before all, dropping those whose multiplier would turn
+/// negative. It ends after finitely many steps at the solution, or with a certificate that there is none: a
+/// violated constraint whose normal is a non-negative combination of the active ones' opposites. Throws
+/// std::invalid_argument where sizes do not match or a number is not finite.
+QpSolution solve(const QuadraticProgram& program, const QpOptions& options = {});
+
+/// How far (x, λ) is from optimal: the largest of the stationarity residual, constraint violation, negative
+/// multiplier and complementarity |λ_k (a_kᵀx − b_k)|.
+double kkt_residual(const QuadraticProgram& program, const QpSolution& solution);
+
+}  // namespace unhand::planners

@@ -1,0 +1,93 @@
+// Tube acceleration: one joint acceleration with which a throw lands in the same place whenever, within a
+// window, the object leaves the hand.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "flight/flow_map.hpp"
+#include "planners/arm/chain.hpp"
+#include "planners/tube/small_qp.hpp"
+
+namespace unhand::planners {
+
+/// Where the arm is when the gripper is told to open: q₀ [rad], q̇₀ [rad/s].
+struct ThrowState {
+  JointVector<double> q, qd;
+};
+
+struct TubeProblem {
+  const Chain& chain;  ///< its tip carries the object's centre of mass
+  ThrowState start;
+  Eigen::Vector3d target;  ///< B, in the base [m]
+  double window{0.1};      ///< T [s]
+  flight::Medium medium{};
+};
+
+/// How the tip moves in the throwing plane of a state: ξ = (r, z, ṙ, ż) as in [LiuBillard2024], with
+/// r = −|e|, ṙ along e for e the level part of E → B, and what leaves the plane.
+struct PlaneView {
+  flight::PlaneState<double> state;
+  double across{};  ///< velocity across e [m/s], to the left
+};
+PlaneView plane_view(const Eigen::Vector3d& tip, const Eigen::Vector3d& velocity,
+                     const Eigen::Vector3d& target);
+
+enum class TubeOutcome {
+  solved,
+  infeasible,     ///< `reason` names the constraints that cannot hold together
+  never_reaches,  ///< with the velocity q̇₀ held, the flight does not come down to the target's height
+};
+const char* to_string(TubeOutcome);
+
+struct TubeSolution {
+  TubeOutcome outcome{};
+  JointVector<double> qdd;  ///< q̈_tube [rad/s²]
+  std::string reason;
+  QpSolution qp;
+  double landing_at_rest{};  ///< Φ(0): landing error of a release at T without acceleration, linear part's
+                             ///< base [m]
+};
+
+/// Problem Tube-CVX, [DarkoD46] Eq. 2: with q_T = q₀ + T q̇₀ a parameter and q̇_T = q̇₀ + T q̈, find q̈ with
+///
+///   v_T = J(q_T) q̇_T along E → B,   −Φ(0) = ∂Φ/∂ṙ (ṙ_T(q̈) − ṙ_T(0)) + ∂Φ/∂ż (ż_T(q̈) − ż_T(0)),
+///   q̇_min <= q̇_T <= q̇_max,   q̈_min <= q̈ <= q̈_max.
+///
+/// The problem only asks for a q̈; of all, the smallest ½ Σ (q̈_i/q̈_max,i)² is taken, which is a quadratic
+/// program with one solution. Beyond the printed constraints, q_T must obey the position limits, or the
+/// answer is infeasible. Throws std::invalid_argument for sizes that differ or a window outside (0, 1] s.
+TubeSolution solve_tube(const TubeProblem& problem);
+
+/// The program itself, for whoever wants to solve it otherwise.
+struct TubeProgram {
+  QuadraticProgram qp;
+  std::vector<std::string> names;  ///< of its constraints
+};
+TubeProgram tube_program(const TubeProblem& problem);
+
+/// Where the object really lands when it leaves at t under a constant q̈ (problem RTV, [DarkoD46] Eq. 1: q(t)
+/// is integrated, kinematics and flight are not linearised).
+struct LandingAt {
+  double time{};
+  double forward{}, across{};  ///< of the target, in the vertical plane from q₀'s tip to it [m]
+  double x{}, y{};             ///< of the target, in the base's axes [m]
+  bool lands{};
+};
+std::vector<LandingAt> landings_over_window(const TubeProblem& problem, const JointVector<double>& qdd,
+                                            int samples);
+
+/// Beyond problem Tube-CVX: the acceleration whose real landings, as landings_over_window finds them, miss
+/// least over the window,
+///
+///   min Σ_k |landing(t_k; q̈) − B|² + (1 mm)² Σ (q̈_i/q̈_max,i)²   with the same limits,
+///
+/// by Gauss-Newton from `start`, each step a quadratic program; t_k are `times` instants up to T. Derivatives
+/// are exact. Returns `start` where no step helps.
+struct RefineOptions {
+  int times{4}, iterations{6};
+};
+JointVector<double> refine_tube(const TubeProblem& problem, const JointVector<double>& start,
+                                const RefineOptions& options = {});
+
+}  // namespace unhand::planners

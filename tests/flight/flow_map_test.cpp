@@ -1,0 +1,118 @@
+// The planner's view of flights: the flow map with its gradient, and the backward reachable tube in two
+// forms.
+#include "flight/flow_map.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+#include <stdexcept>
+
+namespace unhand::flight {
+namespace {
+
+using State = PlaneState<double>;
+
+State random_state(std::mt19937_64& random) {
+  std::uniform_real_distribution<double> r(-2, -0.2), z(-0.3, 1), forward(0.5, 4), up(-2, 4);
+  return {r(random), z(random), forward(random), up(random)};
+}
+
+TEST(FlowMap, IsTheParabola) {
+  std::mt19937_64 random(1);
+  const double g = 9.81;
+  int landed = 0;
+  for (int n = 0; n < 200; ++n) {
+    const State s = random_state(random);
+    const auto flow = flow_map(s, {});
+    const double root = s.z_rate * s.z_rate + 2 * g * s.z;
+    const bool lands = root >= 0 && (s.z >= 0 || s.z_rate > 0);
+    ASSERT_EQ(flow.has_value(), lands) << n;
+    if (!lands) continue;
+    ++landed;
+    const double t = (s.z_rate + std::sqrt(root)) / g;
+    EXPECT_NEAR(flow->landing, s.r + s.r_rate * t, 1e-13);
+    EXPECT_EQ(flow->gradient[0], 1);
+    EXPECT_NEAR(flow->gradient[1], s.r_rate / std::sqrt(root), 1e-11 * (1 + 1 / std::sqrt(root)));
+    EXPECT_NEAR(flow->gradient[2], t, 1e-13);
+    EXPECT_NEAR(flow->gradient[3], s.r_rate * t / std::sqrt(root), 1e-11 * (1 + 1 / std::sqrt(root)));
+  }
+  EXPECT_GT(landed, 100);
+}
+
+TEST(FlowMap, GradientIsTheCentralDifferenceWithDrag) {
+  const State at{-1.2, 0.4, 2.5, 1.5};
+  for (const double k : {0.0, 0.2}) {
+    const Medium medium{9.81, k};
+    const auto flow = flow_map(at, medium);
+    ASSERT_TRUE(flow);
+    const std::array<double State::*, 4> members{&State::r, &State::z, &State::r_rate, &State::z_rate};
+    for (int i = 0; i < 4; ++i) {
+      double best = INFINITY;
+      for (double step = 1e-1; step > 0.5e-7; step *= 0.1) {
+        State up = at, down = at;
+        up.*members[i] += step;
+        down.*members[i] -= step;
+        const double slope = (flow_map(up, medium)->landing - flow_map(down, medium)->landing) / (2 * step);
+        best = std::min(best, std::abs(slope - flow->gradient[i]));
+      }
+      // The bottom of the V: the integrator's steps, chosen to 1e-8, scatter by some 1e-9 of the landing.
+      EXPECT_LT(best, k > 0 ? 1e-5 : 1e-8) << i;
+    }
+  }
+}
+
+TEST(ReachableTube, LevelIsNegativeWhereTheFlightLandsInTheSet) {
+  std::mt19937_64 random(2);
+  const LandingSet set{0.3, 1, 3.5, -5, -1};
+  for (const double k : {0.0, 0.15}) {
+    int inside = 0, never = 0;
+    for (int n = 0; n < 500; ++n) {
+      const State s = random_state(random);
+      const auto end = landing_of(s, {9.81, k});
+      const double level = tube_level(s, set, {9.81, k});
+      ASSERT_TRUE(std::isfinite(level));
+      const bool in = end && std::abs(end->r) < 0.3 && end->r_rate > 1 && end->r_rate < 3.5 &&
+                      end->z_rate > -5 && end->z_rate < -1;
+      EXPECT_EQ(level < 0, in) << n;
+      inside += in;
+      never += !end;
+      if (!end) {
+        EXPECT_GE(level, 1);
+      }
+    }
+    EXPECT_GT(inside, 15);
+    EXPECT_GT(never, 15);
+  }
+}
+
+TEST(ReachableTube, SampledAndImplicitFormsAgree) {
+  const LandingSet set{0.1, 0.8, 3.0, -5, -0.5};
+  for (const double k : {0.0, 0.15}) {
+    const Medium medium{9.81, k};
+    const auto samples = sample_tube(set, medium, {400, 0.9, 4, 3});
+    ASSERT_EQ(samples.size(), 400u);
+    // Flown back to the set: to the rounding of the closed form, or the integrator's 1e-8 over half widths of
+    // 0.1 m.
+    const double tolerance = k > 0 ? 1e-6 : 1e-9;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const double level = tube_level(samples[i], set, medium);
+      EXPECT_LE(level, tolerance) << i;
+      if (i % 4 == 0) {
+        EXPECT_NEAR(level, 0, tolerance) << i;  // from the set's boundary
+      } else {
+        EXPECT_LT(level, -1e-6) << i;
+      }
+    }
+  }
+}
+
+TEST(ReachableTube, RefusesWhatIsNoSet) {
+  EXPECT_THROW(tube_level({}, {0.0}, {}), std::invalid_argument);
+  EXPECT_THROW(tube_level({}, {0.1, 2, 1}, {}), std::invalid_argument);
+  EXPECT_THROW(tube_level({}, {0.1, 0, 1, -1, 1}, {}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace unhand::flight

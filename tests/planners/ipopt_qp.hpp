@@ -1,0 +1,100 @@
+// Quadratic programs by IPOPT: the oracle of the planners' own solver.
+#pragma once
+
+#include <coin/IpIpoptApplication.hpp>
+#include <coin/IpTNLP.hpp>
+
+#include "planners/tube/small_qp.hpp"
+
+namespace unhand::planners {
+
+class IpoptQp final : public Ipopt::TNLP {
+ public:
+  using Index = Ipopt::Index;
+  using Number = Ipopt::Number;
+
+  explicit IpoptQp(const QuadraticProgram& program) : p_(program), x(program.c.size()) {}
+
+  bool get_nlp_info(Index& n, Index& m, Index& jacobian, Index& hessian, IndexStyleEnum& style) override {
+    n = size(), m = static_cast<Index>(p_.constraints.size());
+    jacobian = n * m, hessian = n * (n + 1) / 2, style = C_STYLE;
+    return true;
+  }
+  bool get_bounds_info(Index n, Number* low, Number* high, Index m, Number* g_low, Number* g_high) override {
+    for (Index i = 0; i < n; ++i) low[i] = -1e19, high[i] = 1e19;
+    for (Index k = 0; k < m; ++k) {
+      g_low[k] = p_.constraints[k].b;
+      g_high[k] = p_.constraints[k].equality ? p_.constraints[k].b : 1e19;
+    }
+    return true;
+  }
+  bool get_starting_point(Index n, bool, Number* start, bool, Number*, Number*, Index, bool,
+                          Number*) override {
+    for (Index i = 0; i < n; ++i) start[i] = 0;
+    return true;
+  }
+  bool eval_f(Index, const Number* at, bool, Number& value) override {
+    value = 0.5 * vector(at).dot(p_.H * vector(at)) + p_.c.dot(vector(at));
+    return true;
+  }
+  bool eval_grad_f(Index n, const Number* at, bool, Number* out) override {
+    const QpVector gradient = p_.H * vector(at) + p_.c;
+    for (Index i = 0; i < n; ++i) out[i] = gradient[i];
+    return true;
+  }
+  bool eval_g(Index, const Number* at, bool, Index m, Number* out) override {
+    for (Index k = 0; k < m; ++k) out[k] = p_.constraints[k].a.dot(vector(at));
+    return true;
+  }
+  bool eval_jac_g(Index n, const Number*, bool, Index m, Index, Index* row, Index* column,
+                  Number* values) override {
+    for (Index k = 0, at = 0; k < m; ++k)
+      for (Index i = 0; i < n; ++i, ++at)
+        if (values == nullptr)
+          row[at] = k, column[at] = i;
+        else
+          values[at] = p_.constraints[k].a[i];
+    return true;
+  }
+  bool eval_h(Index n, const Number*, bool, Number factor, Index, const Number*, bool, Index, Index* row,
+              Index* column, Number* values) override {
+    for (Index i = 0, at = 0; i < n; ++i)
+      for (Index j = 0; j <= i; ++j, ++at)
+        if (values == nullptr)
+          row[at] = i, column[at] = j;
+        else
+          values[at] = factor * p_.H(i, j);
+    return true;
+  }
+  void finalize_solution(Ipopt::SolverReturn, Index n, const Number* at, const Number*, const Number*, Index,
+                         const Number*, const Number*, Number, const Ipopt::IpoptData*,
+                         Ipopt::IpoptCalculatedQuantities*) override {
+    for (Index i = 0; i < n; ++i) x[i] = at[i];
+  }
+
+ private:
+  Index size() const { return static_cast<Index>(p_.c.size()); }
+  QpVector vector(const Number* at) const { return Eigen::Map<const QpVector>(at, size()); }
+  const QuadraticProgram& p_;
+
+ public:
+  QpVector x;
+};
+
+struct IpoptAnswer {
+  Ipopt::ApplicationReturnStatus status;
+  QpVector x;
+};
+inline IpoptAnswer solve_by_ipopt(const QuadraticProgram& program) {
+  Ipopt::SmartPtr<Ipopt::IpoptApplication> solver = IpoptApplicationFactory();
+  solver->Options()->SetIntegerValue("print_level", 0);
+  solver->Options()->SetStringValue("sb", "yes");
+  solver->Options()->SetNumericValue("tol", 1e-12);
+  solver->Options()->SetNumericValue("bound_relax_factor", 0);
+  solver->Initialize();
+  Ipopt::SmartPtr<IpoptQp> problem = new IpoptQp(program);
+  const auto status = solver->OptimizeTNLP(problem);
+  return {status, problem->x};
+}
+
+}  // namespace unhand::planners

@@ -1,0 +1,113 @@
+// Jerk-limited motions: ends, limits, and the shortest times in closed form.
+#include "planners/arm/jerk_profile.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "planners/arm/panda.hpp"
+
+namespace unhand::planners {
+namespace {
+
+JointLimits limits(double a, double j) {
+  JointLimits out;
+  out.acceleration = a;
+  out.jerk = j;
+  return out;
+}
+
+TEST(VelocityRamp, EndsWhereItShouldWithinTheLimits) {
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> v(-2.5, 2.5), a(-15, 15), longer(1, 3);
+  for (int n = 0; n < 500; ++n) {
+    const JointLimits l = limits(15, 5000);
+    const double v1 = v(random), a1 = a(random), shortest = shortest_ramp(v1, a1, l);
+    for (const double duration : {shortest, shortest * longer(random)}) {
+      const auto ramp = velocity_ramp(v1, a1, duration, l);
+      ASSERT_TRUE(ramp) << v1 << ' ' << a1 << ' ' << duration;
+      JerkProfile profile({0.3, 0, 0, 0});
+      profile.append(*ramp);
+      EXPECT_NEAR(profile.duration(), duration, 1e-12);
+      EXPECT_NEAR(profile.end().qd, v1, 1e-8);
+      EXPECT_NEAR(profile.end().qdd, a1, 1e-8);
+      for (double t = 0; t < duration; t += duration / 37) {
+        EXPECT_LE(std::abs(profile.at(t).qdd), 15 * (1 + 1e-12));
+        EXPECT_LE(std::abs(profile.at(t).jerk), 5000 * (1 + 1e-12));
+      }
+    }
+    EXPECT_FALSE(velocity_ramp(v1, a1, 0.999 * shortest - 1e-6, l)) << v1 << ' ' << a1;
+  }
+}
+
+TEST(VelocityRamp, ShortestTimesFromRest) {
+  // To v without acceleration: v/a + a/j if the limit of acceleration is reached, else 2 √(v/j).
+  EXPECT_NEAR(shortest_ramp(2, 0, limits(10, 1000)), 2 / 10. + 10 / 1000., 1e-12);
+  EXPECT_NEAR(shortest_ramp(0.04, 0, limits(10, 1000)), 2 * std::sqrt(0.04 / 1000), 1e-12);
+  EXPECT_NEAR(shortest_ramp(-2, 0, limits(10, 1000)), 0.21, 1e-12);
+  // To v with the full acceleration: the first jerk and the rest of v.
+  EXPECT_NEAR(shortest_ramp(2, 10, limits(10, 1000)), 0.01 + (2 - 0.05) / 10, 1e-12);
+  EXPECT_EQ(shortest_ramp(0, 0, limits(10, 1000)), 0);
+  EXPECT_TRUE(std::isinf(shortest_ramp(1, 11, limits(10, 1000))));
+}
+
+TEST(RestToRest, CoversTheDistanceInTheShortestTime) {
+  // Seven, five, six and four pieces: duration in closed form.
+  const struct {
+    double v, a, j, duration;
+  } cases[]{{0.5, 2, 20, 1 / 0.5 + 0.5 / 2 + 2 / 20.},        // cruises, with full acceleration
+            {0.1, 2, 20, 1 / 0.1 + 2 * std::sqrt(0.1 / 20)},  // cruises, never reaches it
+            {50, 2, 20, 0.1 + std::sqrt(0.01 + 4 / 2.)},      // full acceleration, no cruise
+            {50, 200, 20, 4 * std::cbrt(1 / (2 * 20.))}};     // jerk alone
+  for (const auto& [v, a, j, duration] : cases) {
+    JerkProfile profile({0, 0, 0, 0});
+    profile.append(rest_to_rest(v, a, j));
+    EXPECT_NEAR(profile.duration(), duration, 1e-12);
+    EXPECT_NEAR(profile.end().q, 1, 1e-12);
+    EXPECT_NEAR(profile.end().qd, 0, 1e-12);
+    EXPECT_NEAR(profile.end().qdd, 0, 1e-12);
+    for (double t = 0; t <= duration; t += duration / 101) {
+      EXPECT_LE(std::abs(profile.at(t).qd), v * (1 + 1e-12));
+      EXPECT_LE(std::abs(profile.at(t).qdd), a * (1 + 1e-12));
+    }
+  }
+}
+
+TEST(JerkProfile, IsItsOwnDerivative) {
+  JerkProfile profile({1, 0.5, -2, 0});
+  profile.append({{0.1, 30}, {0.2, 0}, {0.05, -100}});
+  for (double t = 0.01; t < 0.35; t += 0.0237) {
+    const double h = 1e-5;
+    const auto at = profile.at(t), up = profile.at(t + h), down = profile.at(t - h);
+    EXPECT_NEAR((up.q - down.q) / (2 * h), at.qd, 1e-7);
+    EXPECT_NEAR((up.qd - down.qd) / (2 * h), at.qdd, 3e-3);  // a jump of the jerk within h
+  }
+  EXPECT_EQ(profile.at(-1).qd, 0.5);
+  EXPECT_EQ(profile.at(9).qd, profile.end().qd);
+}
+
+TEST(LimitCheck, FindsWhatIsExceeded) {
+  const Chain arm = panda();
+  JointTrajectory still;
+  for (int i = 0; i < 7; ++i) {
+    JerkProfile profile({0.5 * (arm.joints[i].limits.lower + arm.joints[i].limits.upper), 0, 0, 0});
+    profile.append({{0.01, 0}});
+    still.joints.push_back(profile);
+  }
+  const LimitCheck held = check_limits(arm, still);
+  EXPECT_TRUE(held.within());
+  EXPECT_LT(held.position.fraction, 1e-12);
+  EXPECT_GT(held.torque.fraction, 0.01);  // its own weight
+  JointTrajectory fast = still;
+  fast.joints[3] = JerkProfile({-1, 3, 0, 0});
+  fast.joints[3].append({{0.01, 0}});
+  const LimitCheck found = check_limits(arm, fast);
+  EXPECT_FALSE(found.within());
+  EXPECT_EQ(found.velocity.joint, 3);
+  EXPECT_NEAR(found.velocity.fraction, 3 / 2.175, 1e-12);
+  EXPECT_EQ(found.worst(arm).substr(0, 24), "velocity of panda_joint4");
+}
+
+}  // namespace
+}  // namespace unhand::planners

@@ -1,0 +1,163 @@
+// Throws whose object leaves as a contact model says: the hand, limits in closed form, derivatives, spread.
+#include "planners/tube/release_throw.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "planners/arm/panda.hpp"
+#include "planners/tube/plan_throw.hpp"
+#include "planners/tube/planar_hand.hpp"
+
+namespace unhand::planners {
+namespace {
+
+using Joints = JointVector<double>;
+
+Chain pads() { return with_tool(panda(), {Eigen::Matrix3d::Identity(), {0, 0, 0.15}}); }
+
+/// A planar swing of joints 2, 4 and 6 towards a box 1.3 m ahead.
+ReleaseThrow swing(const Chain& arm) {
+  ReleaseThrow out{arm,
+                   {Joints{{0, -0.98, 0, -0.68, 0, 2.25, 0.785}}, Joints{{0, 1.5, 0, -1.5, 0, -1.6, 0}}},
+                   Joints{{0, 0.5, 0, -0.8, 0, -0.4, 0}},
+                   {1.3, 0, -0.2}};
+  out.hold = 0.14;
+  return out;
+}
+
+TEST(PlanarHand, IsTheTipOfTheArm) {
+  const Chain arm = pads();
+  const ReleaseThrow p = swing(arm);
+  const ThrowPlane plane(forward_kinematics(arm, p.start.q).p, p.target);
+  const PlanarHand hand(arm, plane, p.start.q, p.start.qd.cast<Dual>(), p.qdd.cast<Dual>(), p.hold);
+  for (double t = 0; t <= p.hold; t += p.hold / 23) {
+    const Joints q = p.start.q + t * p.start.qd + 0.5 * t * t * p.qdd, qd = p.start.qd + t * p.qdd;
+    const auto tip = tip_motion(arm, q, qd, p.qdd);
+    const auto at = hand.at({0, p.hold}, t);
+    // The remainder of a polynomial of degree 8 over 0.14 s.
+    EXPECT_NEAR(at.pose.x, tip.frame.p.x() - 1.3, 1e-9);
+    EXPECT_NEAR(at.pose.z, tip.frame.p.z(), 1e-9);
+    EXPECT_NEAR(std::cos(at.pose.theta), tip.frame.R(0, 2), 1e-9);
+    EXPECT_NEAR(at.twist.vx, tip.velocity.x(), 1e-7);
+    EXPECT_NEAR(at.twist.vz, tip.velocity.z(), 1e-7);
+    EXPECT_NEAR(at.twist.omega, -tip.omega.y(), 1e-7);  // x to z turns about −y
+    EXPECT_NEAR(at.acceleration.ax, tip.acceleration.x(), 1e-5);
+    EXPECT_NEAR(at.acceleration.az, tip.acceleration.z(), 1e-5);
+    EXPECT_NEAR(at.acceleration.alpha, -tip.alpha.y(), 1e-5);
+  }
+}
+
+TEST(PlanarHand, RefusesAThrowOutOfThePlane) {
+  const Chain arm = pads();
+  ReleaseThrow p = swing(arm);
+  p.start.qd[0] = 0.5;
+  EXPECT_THROW(release_landing(p, nominal_draw(p)), std::invalid_argument);
+}
+
+TEST(ReleaseThrow, OfAGripperThatOpensAtOnceIsTheRigidOne) {
+  const Chain arm = pads();
+  ReleaseThrow p = swing(arm);
+  for (const char* model : {"sliding_pivot", "limit_surface"}) {
+    p.card.model = model;
+    double last = 0;
+    for (const double opening : {4e-3, 1e-3, 2.5e-4}) {
+      p.card.opening_time = {opening, 0};
+      p.card.grip_force = 400;  // so that it does not slip before
+      const auto real = release_landing(p, nominal_draw(p));
+      const auto rigid = rigid_landing(p, 0.14, 0.020 + opening);
+      ASSERT_TRUE(real && rigid);
+      const double apart = std::abs(real->miss - rigid->miss);
+      if (last > 0) {
+        EXPECT_LT(apart, 0.6 * last) << model;
+      }
+      last = apart;
+    }
+    EXPECT_LT(last, 2e-3) << model;
+  }
+}
+
+TEST(ReleaseThrow, DerivativesAreCentralDifferences) {
+  const Chain arm = pads();
+  ReleaseThrow p = swing(arm);
+  for (const char* model : {"sliding_pivot", "limit_surface"}) {
+    p.card.model = model;
+    const auto spread = release_spread(p);
+    ASSERT_TRUE(spread);
+    for (int k = 0; k < kUnknowns; ++k) {
+      const double size = nominal_draw(p)[k];
+      double best = INFINITY;
+      for (double step = 1e-1; step > 1e-6; step *= 0.1) {
+        Draw up = nominal_draw(p), down = up;
+        up[k] += step * size, down[k] -= step * size;
+        const auto a = release_landing(p, up), b = release_landing(p, down);
+        if (!a || !b) continue;
+        best = std::min(best, std::abs((a->miss - b->miss) / (2 * step) - spread->gradient[k] * size));
+      }
+      // Landings in m per 100 % of the unknown; the integrator's 1e-8 over the best step.
+      EXPECT_LT(best, 1e-4) << model << ' ' << name_of(static_cast<Unknown>(k));
+    }
+  }
+}
+
+TEST(ReleaseThrow, LinearSpreadIsThatOfDraws) {
+  const Chain arm = pads();
+  ReleaseThrow p = swing(arm);
+  p.card.mu.sigma *= 0.2, p.card.dead_time.sigma *= 0.2, p.card.opening_time.sigma *= 0.2;
+  p.object.com_offset.sigma *= 0.2;
+  const auto spread = release_spread(p);
+  const auto drawn = draw_landings(p, 400, 1);
+  ASSERT_TRUE(spread);
+  EXPECT_EQ(drawn.lost, 0);
+  // The standard deviation of 400 draws scatters by 1/√800 = 3.5 %; four of those and a little curvature.
+  EXPECT_NEAR(drawn.std, spread->spread, 0.18 * spread->spread);
+  EXPECT_NEAR(drawn.mean, spread->miss, 0.25 * spread->spread);
+}
+
+TEST(ReleaseThrow, InsensitiveMotionsMissLess) {
+  const Chain arm = pads();
+  ReleaseThrow p = swing(arm);
+  p.card.model = "sliding_pivot";
+  const auto result = make_insensitive(p, {{1, 3, 5}});
+  EXPECT_LT(result.after, 0.5 * result.before);
+  const auto before = draw_landings(p, 300, 1);
+  for (const int j : {1, 3, 5}) {
+    const JointLimits& l = arm.joints[j].limits;
+    EXPECT_LE(std::abs(result.start.qd[j]), l.velocity);
+    EXPECT_LE(std::abs(result.start.qd[j] + p.hold * result.qdd[j]), l.velocity);
+    EXPECT_LE(std::abs(result.qdd[j]), l.acceleration);
+  }
+  p.start = result.start;
+  p.qdd = result.qdd;
+  const auto after = draw_landings(p, 300, 1);
+  const auto rms = [](const Landings& l) { return std::hypot(l.mean, l.std); };
+  EXPECT_LT(rms(after), 0.6 * rms(before));
+  EXPECT_NEAR(rms(after), result.after, 0.3 * result.after);
+  EXPECT_THROW(make_insensitive(p, {{}}), std::invalid_argument);
+}
+
+TEST(ReleaseThrow, TakesModelCards) {
+  datasets::ModelCard card;
+  card.model = "sliding_pivot";
+  card.parameters = {
+      {"mu", {0.6, 0.03, "-"}}, {"length", {0.008, {}, "m"}}, {"opening_time", {0.05, 0.002, "s"}}};
+  card.own_spreads["mu_deviation"] = {0.1, "-"};
+  const ReleaseCard taken = release_card(card, "card.json");
+  EXPECT_EQ(taken.model, "sliding_pivot");
+  EXPECT_NEAR(taken.mu.sigma, std::hypot(0.03, 0.06), 1e-15);
+  EXPECT_EQ(taken.opening_time.sigma, 0.002);
+  EXPECT_EQ(taken.dead_time.value, ReleaseCard{}.dead_time.value);
+  card.parameters["mu"].unit = "N";
+  EXPECT_THROW(release_card(card, "card.json"), datasets::CardError);
+  card.parameters["mu"].unit = "-";
+  card.effects = {"contact.viscous"};
+  EXPECT_THROW(release_card(card, "card.json"), datasets::CardError);
+  card.effects.clear();
+  card.model = "gripper_delay";
+  EXPECT_THROW(release_card(card, "card.json"), datasets::CardError);
+}
+
+}  // namespace
+}  // namespace unhand::planners

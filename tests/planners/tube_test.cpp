@@ -1,0 +1,247 @@
+// Tube acceleration: the printed problem, its solution against IPOPT and the nonlinear problem, infeasible
+// answers.
+#include "planners/tube/tube_cvx.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+#include <random>
+
+#include "planners/arm/dynamics.hpp"
+#include "planners/arm/panda.hpp"
+#include "planners/tube/plan_throw.hpp"
+#include "tests/planners/ipopt_qp.hpp"
+
+namespace unhand::planners {
+namespace {
+
+using Joints = JointVector<double>;
+
+/// The Panda with a gripper of 0.15 m on its flange.
+Chain thrower() { return with_tool(panda(), {Eigen::Matrix3d::Identity(), {0, 0, 0.15}}); }
+TargetBox box_at(double x, double y, double z) { return {{x, y, z}, 0.15, 0.15}; }
+/// The boxes of [DarkoD46] Table 6.
+std::vector<TargetBox> boxes() {
+  return {box_at(1.3, 0, -0.2), box_at(1.1, 0, 0), box_at(1.3, 0, -0.3), box_at(0, -0.7, 0.7)};
+}
+NominalOptions planar() {
+  NominalOptions out;
+  out.fixed = {{2, 0.0}, {4, 0.0}, {6, std::numbers::pi / 4}};
+  out.face_target = true;
+  return out;
+}
+NominalOptions few() {
+  NominalOptions out;
+  out.samples = 600;
+  return out;
+}
+
+TEST(NominalThrow, LandsInTheMiddleWithinTheLimits) {
+  const Chain arm = thrower();
+  for (const TargetBox& box : boxes())
+    for (const double drag : {0.0, 0.1}) {
+      NominalOptions options = few();
+      options.samples = drag > 0 ? 60 : 600;
+      options.refined = drag > 0 ? 1 : 10;
+      options.medium.drag_k = drag;
+      const auto found = find_throws(arm, box, options);
+      ASSERT_FALSE(found.empty());
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        const NominalThrow& one = found[i];
+        if (i > 0) {
+          EXPECT_LE(one.margin, found[i - 1].margin);
+        }
+        EXPECT_GT(one.margin, 0);
+        for (int k = 0; k < 7; ++k) {
+          EXPECT_LT(std::abs(one.state.qd[k]), arm.joints[k].limits.velocity);
+          EXPECT_GT(one.state.q[k], arm.joints[k].limits.lower);
+          EXPECT_LT(one.state.q[k], arm.joints[k].limits.upper);
+        }
+        const TubeProblem problem{arm, one.state, box.middle, 0.1, options.medium};
+        const auto at = landings_over_window(problem, Joints::Zero(7), 1).front();
+        ASSERT_TRUE(at.lands);
+        // The speed is solved to 1e-10 with drag; the plane regularised by 1e-9.
+        EXPECT_LT(std::hypot(at.forward, at.across), drag > 0 ? 1e-5 : 1e-6);
+      }
+    }
+}
+
+TEST(NominalThrow, IsTheSameEveryTime) {
+  const auto a = find_throws(thrower(), boxes()[0], few()), b = find_throws(thrower(), boxes()[0], few());
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].state.q, b[i].state.q);
+}
+
+/// Throws of all kinds, with the box each is for.
+std::vector<std::pair<NominalThrow, TargetBox>> throws() {
+  std::vector<std::pair<NominalThrow, TargetBox>> out;
+  for (const TargetBox& box : boxes())
+    for (const auto& one : find_throws(thrower(), box, few())) out.emplace_back(one, box);
+  return out;
+}
+
+TEST(TubeCvx, SolvesThePrintedProblem) {
+  const Chain arm = thrower();
+  const double T = 0.1;
+  int solved = 0;
+  for (const auto& [one, box] : throws()) {
+    const TubeProblem problem{arm, one.state, box.middle, T};
+    const TubeSolution s = solve_tube(problem);
+    if (s.outcome != TubeOutcome::solved) continue;
+    ++solved;
+    // Eq. 2b to 2l spelt out with nothing but kinematics and the parabola.
+    const Joints q_T = one.state.q + T * one.state.qd, qd_T = one.state.qd + T * s.qdd;
+    const auto tip = forward_kinematics(arm, q_T);
+    const Eigen::Vector3d e = box.middle - tip.p, v = jacobian(arm, q_T).topRows<3>() * qd_T,
+                          still = jacobian(arm, q_T).topRows<3>() * one.state.qd;
+    EXPECT_NEAR(v.x() * -e.y() + v.y() * e.x(), 0, 1e-12);
+    EXPECT_GT(v.head<2>().dot(e.head<2>()), 0);
+    const double g = 9.81, speed = still.head<2>().norm(), z = tip.p.z() - box.middle.z(),
+                 root = std::sqrt(still.z() * still.z() + 2 * g * z), flight = (still.z() + root) / g;
+    const double phi = -e.head<2>().norm() + speed * flight;
+    EXPECT_NEAR(s.landing_at_rest, phi, 1e-12);
+    EXPECT_NEAR(-phi, flight * (v.head<2>().norm() - speed) + speed * flight / root * (v.z() - still.z()),
+                1e-10);
+    for (int i = 0; i < 7; ++i) {
+      EXPECT_LE(std::abs(qd_T[i]), arm.joints[i].limits.velocity * (1 + 1e-9));
+      EXPECT_LE(std::abs(s.qdd[i]), arm.joints[i].limits.acceleration * (1 + 1e-9));
+    }
+    EXPECT_LT(kkt_residual(tube_program(problem).qp, s.qp), 1e-9);
+  }
+  EXPECT_GT(solved, 40);
+}
+
+TEST(TubeCvx, AgreesWithIpopt) {
+  const auto all = throws();
+  int compared = 0;
+  for (std::size_t i = 0; i < all.size() && compared < 12; i += 5) {
+    const Chain arm = thrower();
+    const TubeProblem problem{arm, all[i].first.state, all[i].second.middle, 0.1};
+    const TubeSolution own = solve_tube(problem);
+    const auto other = solve_by_ipopt(tube_program(problem).qp);
+    EXPECT_EQ(own.outcome == TubeOutcome::solved, other.status <= Ipopt::Solved_To_Acceptable_Level)
+        << own.reason;
+    if (own.outcome != TubeOutcome::solved) continue;
+    ++compared;
+    EXPECT_LT((own.qdd - other.x).norm(),
+              1e-3 * (1 + own.qdd.norm()));  // an interior point stops short of the bounds
+  }
+  EXPECT_GT(compared, 3);
+}
+
+TEST(TubeCvx, ErrorOfTheConvexProblemIsOfSecondOrder) {
+  // What Tube-CVX leaves out, q̈ T²/2 in q_T and the flow map's curvature, is of second order in T, while the
+  // landing of an unaccelerated throw moves with the first.
+  const Chain arm = thrower();
+  int checked = 0;
+  for (const auto& one : find_throws(arm, boxes()[3], few())) {
+    double miss[3], still[3];
+    bool all = true;
+    for (int k = 0; k < 3; ++k) {
+      const TubeProblem problem{arm, one.state, boxes()[3].middle, 0.004 / (1 << k)};
+      const TubeSolution s = solve_tube(problem);
+      all = all && s.outcome == TubeOutcome::solved;
+      miss[k] = largest_miss(landings_over_window(problem, s.qdd, 2));
+      still[k] = largest_miss(landings_over_window(problem, Joints::Zero(7), 2));
+    }
+    if (!all) continue;
+    ++checked;
+    for (int k = 0; k < 2;
+         ++k) {  // the next order is some per cent of T = 4 ms, and more where the first is small
+      EXPECT_NEAR(miss[k] / miss[k + 1], 4, 0.5);
+      EXPECT_NEAR(still[k] / still[k + 1], 2, 0.3);
+    }
+  }
+  EXPECT_GT(checked, 5);
+}
+
+TEST(TubeCvx, RefinementNeverMissesMore) {
+  const Chain arm = thrower();
+  double before = 0, after = 0;
+  for (const auto& [one, box] : throws()) {
+    const TubeProblem problem{arm, one.state, box.middle, 0.1};
+    const TubeSolution s = solve_tube(problem);
+    if (s.outcome != TubeOutcome::solved) continue;
+    const Joints refined = refine_tube(problem, s.qdd);
+    const auto squares = [&](const Joints& qdd) {  // at the instants that refinement looks at, with its ease
+      double sum = 0;
+      for (const auto& at : landings_over_window(problem, qdd, 5)) sum += at.x * at.x + at.y * at.y;
+      for (int i = 0; i < 7; ++i) sum += 1e-6 * std::pow(qdd[i] / arm.joints[i].limits.acceleration, 2);
+      return sum;
+    };
+    EXPECT_LE(squares(refined), squares(s.qdd) * (1 + 1e-12));
+    for (int i = 0; i < 7; ++i) {
+      EXPECT_LE(std::abs(refined[i]), arm.joints[i].limits.acceleration * (1 + 1e-9));
+      EXPECT_LE(std::abs(one.state.qd[i] + 0.1 * refined[i]), arm.joints[i].limits.velocity * (1 + 1e-9));
+    }
+    before += largest_miss(landings_over_window(problem, s.qdd, 11));
+    after += largest_miss(landings_over_window(problem, refined, 11));
+  }
+  EXPECT_LT(after, 0.5 * before);
+}
+
+TEST(TubeCvx, SaysWhyThereIsNone) {
+  Chain arm = thrower();
+  const auto one = find_throws(arm, boxes()[0], planar()).front();
+  const auto answer = [&](const Chain& chain, const ThrowState& state, const Eigen::Vector3d& target) {
+    return solve_tube({chain, state, target, 0.1});
+  };
+  for (Joint& joint : arm.joints) joint.limits.acceleration = 1e-3;
+  const auto weak = answer(arm, one.state, boxes()[0].middle);
+  EXPECT_EQ(weak.outcome, TubeOutcome::infeasible);
+  EXPECT_THAT(weak.reason, testing::StartsWith("cannot hold together: the "));
+  EXPECT_THAT(weak.reason, testing::HasSubstr("the acceleration limit of panda_joint"));
+  EXPECT_THAT(weak.reason, testing::HasSubstr("the landing"));
+  arm = thrower();
+  JointLimits& second = arm.joints[1].limits;
+  ASSERT_GT(std::abs(one.state.qd[1]), 0.2);
+  (one.state.qd[1] > 0 ? second.upper : second.lower) =
+      one.state.q[1] + 0.01 * (one.state.qd[1] > 0 ? 1 : -1);
+  EXPECT_THAT(answer(arm, one.state, boxes()[0].middle).reason, testing::HasSubstr("panda_joint2 is at"));
+  arm = thrower();
+  const auto high = answer(arm, one.state, {1.3, 0, 2});
+  EXPECT_EQ(high.outcome, TubeOutcome::never_reaches);
+  EXPECT_THROW(solve_tube({arm, one.state, {1, 0, 0}, 0}), std::invalid_argument);
+  EXPECT_THROW(solve_tube({arm, {Joints::Zero(3), Joints::Zero(7)}, {1, 0, 0}}), std::invalid_argument);
+}
+
+TEST(PlanThrow, ReachesTheBoxesWithinTheLimits) {
+  const Chain arm = thrower();
+  PlanOptions options;
+  options.home = Joints{{0, -0.785, 0, -2.356, 0, 1.571, 0.785}};
+  for (const TargetBox& box : boxes())
+    for (const bool plane : {true, false}) {
+      options.search = plane ? planar() : NominalOptions{};
+      const auto result = plan_throw(arm, box, options);
+      ASSERT_EQ(result.outcome, PlanOutcome::planned) << result.reason;
+      const ThrowPlan& plan = *result.plan;
+      EXPECT_TRUE(check_limits(arm, plan.motion, 1e-4).within()) << plan.limits.worst(arm);
+      const auto open = plan.motion.at(0), last = plan.motion.at(0.1),
+                 home = plan.motion.at(plan.motion.begin), rest = plan.motion.at(plan.motion.end());
+      EXPECT_LT((open.q - plan.nominal.state.q).norm() + (open.qd - plan.nominal.state.qd).norm(), 1e-10);
+      EXPECT_LT((open.qdd - plan.qdd).norm(), 1e-6);
+      EXPECT_LT((last.qd - plan.nominal.state.qd - 0.1 * plan.qdd).norm(), 1e-10);
+      EXPECT_LT((home.q - options.home).norm() + home.qd.norm(), 1e-12);
+      EXPECT_LT(rest.qd.norm(), 1e-9);
+      EXPECT_LE(largest_miss(plan.landings), 0.075 * std::numbers::sqrt2);
+    }
+}
+
+TEST(PlanThrow, SaysWhyThereIsNone) {
+  PlanOptions options;
+  options.search = few();
+  EXPECT_EQ(plan_throw(thrower(), box_at(6, 0, 0), options).outcome, PlanOutcome::no_throw);
+  options.search = planar();
+  Chain arm = thrower();
+  for (Joint& joint : arm.joints) joint.limits.torque = 1;  // it cannot even hold itself
+  const auto weak = plan_throw(arm, boxes()[0], options);
+  EXPECT_EQ(weak.outcome, PlanOutcome::no_motion);
+  EXPECT_THAT(weak.reason, testing::HasSubstr("torque of panda_joint"));
+  arm = thrower();
+  arm.joints[0].limits.jerk = JointLimits::kNone;
+  EXPECT_THROW(plan_throw(arm, boxes()[0]), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace unhand::planners
