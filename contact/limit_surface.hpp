@@ -6,6 +6,7 @@
 
 #include "contact/contact_model.hpp"
 #include "contact/convex_quartic.hpp"
+#include "contact/isotropic_quartic.hpp"
 #include "contact/limit_surface_shapes.hpp"
 #include "contact/pad_compliance.hpp"
 #include "contact/pressed_disc.hpp"
@@ -85,8 +86,6 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
   template <class S>
   S margin_of(const Wrench<S>& demand, const Scene<S>&) const;
   template <class S>
-  Vec3<S> slip_acceleration(const Scene<S>&, const Relative<S>&) const;
-  template <class S>
   Entry<S, 6> come_to_rest(const Window&, const SceneSource&, const S& t, const Relative<S>&) const;
   template <class S>
   Entry<S, 6> let_go(const Window&, const SceneSource&, const S& t, const Relative<S>&) const;
@@ -106,9 +105,11 @@ extern template class ContactModelFrom<LimitSurface<Ellipsoid>>;
 extern template class ContactModelFrom<LimitSurface<UniformDisc>>;
 extern template class ContactModelFrom<LimitSurface<PressedDisc>>;
 extern template class ContactModelFrom<LimitSurface<ConvexQuartic>>;
+extern template class ContactModelFrom<LimitSurface<IsotropicQuartic>>;
 extern template class LimitSurface<Ellipsoid>;
 extern template class LimitSurface<UniformDisc>;
 extern template class LimitSurface<PressedDisc>;
 extern template class LimitSurface<ConvexQuartic>;
+extern template class LimitSurface<IsotropicQuartic>;
 
 }  // namespace unhand::contact

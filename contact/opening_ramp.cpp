@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "dynamics/median.hpp"
+
 namespace unhand::contact {
 namespace {
 
@@ -93,12 +95,6 @@ double refine(const ForceSeries& s, Ramp& ramp, std::size_t from, std::size_t to
   return variance > 0.0 ? variance : 0.0;
 }
 
-double median(std::vector<double> x) {
-  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
-  std::nth_element(x.begin(), middle, x.end());
-  return *middle;
-}
-
 double noise_limit(double target, double n) { return target * n + 4.0 * std::sqrt(2.0 * n); }
 
 }  // namespace
@@ -113,7 +109,7 @@ double scatter(std::span<const double> y) {
   std::vector<double> size;
   for (std::size_t i = 4; i < y.size(); ++i)
     size.push_back(std::abs(y[i] - 4.0 * y[i - 1] + 6.0 * y[i - 2] - 4.0 * y[i - 3] + y[i - 4]));
-  return size.empty() ? 0.0 : median(std::move(size)) / 0.6745 / std::sqrt(70.0);
+  return size.empty() ? 0.0 : dynamics::median(size) / 0.6745 / std::sqrt(70.0);
 }
 
 std::optional<Descent> last_descent(const ForceSeries& s, double noise, double tail, double peak) {
@@ -141,7 +137,7 @@ std::optional<Descent> last_descent(const ForceSeries& s, double noise, double t
   const double edge = crossing(tail + 0.9 * (top - tail));
   std::vector<double> grip;
   for (std::ptrdiff_t k = first; k <= last && s.time[k] <= edge; ++k) grip.push_back(s.value[k]);
-  const double level = grip.empty() ? top : median(std::move(grip));
+  const double level = grip.empty() ? top : dynamics::median(grip);
   const double high = crossing(tail + 0.8 * (level - tail)), low = crossing(tail + 0.2 * (level - tail));
   Descent best;
   best.plateau = static_cast<std::size_t>(first);

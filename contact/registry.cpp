@@ -34,9 +34,11 @@ constexpr std::pair<std::string_view, Maker> kModels[] = {
      }},
     {"limit_surface_quartic",
      [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
-       return std::make_unique<LimitSurface<ConvexQuartic>>(
-           "limit_surface_quartic", p.patch, p.quartic ? *p.quartic : ConvexQuartic::closest_to_disc(),
-           p.variation);
+       if (p.quartic)
+         return std::make_unique<LimitSurface<ConvexQuartic>>("limit_surface_quartic", p.patch, *p.quartic,
+                                                              p.variation);
+       return std::make_unique<LimitSurface<IsotropicQuartic>>(
+           "limit_surface_quartic", p.patch, IsotropicQuartic::closest_to_disc(), p.variation);
      }},
     {"gripper_delay",
      [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "contact/limit_surface_shapes.hpp"
+#include "dynamics/median.hpp"
 
 namespace unhand::experiment {
 
@@ -42,11 +43,6 @@ std::vector<Sample> slipping_samples(const datasets::ThrowLog& log,
   return out;
 }
 
-double median(std::vector<double> x) {
-  std::nth_element(x.begin(), x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2), x.end());
-  return x[x.size() / 2];
-}
-
 /// Gauss-Newton on (ln μ, ln L) with weights 1/max(1, |r|/k) and a damped step.
 template <class Shape>
 void solve(const Shape& shape, const std::vector<Sample>& samples, double& mu, double& length,
@@ -61,7 +57,7 @@ void solve(const Shape& shape, const std::vector<Sample>& samples, double& mu, d
       r[i] = shape.gauge(Vec3<Dual>{s.fx / mu_d, s.fz / mu_d, s.tau / (mu_d * length_d)}) - 1.0;
       residuals[i] = std::abs(r[i].a);
     }
-    scatter = 1.4826 * median(residuals);
+    scatter = 1.4826 * dynamics::median(residuals);
     const double k = 1.345 * std::max(scatter, 1e-9);
     for (std::size_t i = 0; i < samples.size(); ++i) {
       const double w = samples[i].weight * samples[i].weight / std::max(1.0, std::abs(r[i].a) / k);

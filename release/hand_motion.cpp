@@ -7,19 +7,13 @@
 #include <string>
 #include <utility>
 
+#include "dynamics/median.hpp"
 #include "dynamics/spline_fit.hpp"
 
 namespace unhand::release {
 namespace {
 
 using Columns = std::array<double, 3>;
-
-double median(std::vector<double> x) {
-  if (x.empty()) return 0.0;
-  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
-  std::nth_element(x.begin(), middle, x.end());
-  return *middle;
-}
 
 // Scatter of a column that no smooth motion makes: fourth differences of white noise have variance 70 σ², and
 // the median forgives the few that straddle a jump.
@@ -30,7 +24,7 @@ double high_frequency_scatter(std::span<const double> rows, int column) {
     const auto y = [&](std::size_t k) { return rows[(i - k) * 3 + column]; };
     size.push_back(std::abs(y(0) - 4.0 * y(1) + 6.0 * y(2) - 4.0 * y(3) + y(4)));
   }
-  return median(std::move(size)) / 0.6745 / std::sqrt(70.0);
+  return size.empty() ? 0.0 : dynamics::median(size) / 0.6745 / std::sqrt(70.0);
 }
 
 Columns sigma_to_use(std::span<const double> rows, const Columns& declared) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace unhand::release {
@@ -113,8 +114,20 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   }
 
  private:
+  /// The last scene is kept: a step, the guards at its end and the phase that follows ask for the same
+  /// instant.
+  Scene<double> scene_(const Window& window, double t) const {
+    if (t != scene_time_ || window.begin != scene_window_.begin || window.end != scene_window_.end) {
+      last_scene_ = scene_at(window, t);
+      scene_time_ = t;
+      scene_window_ = window;
+    }
+    return last_scene_;
+  }
+  Scene<Dual> scene_(const Window& window, const Dual& t) const { return scene_at(window, t); }
+
   template <class S>
-  Scene<S> scene_(const Window& window, const S& t) const {
+  Scene<S> scene_at(const Window& window, const S& t) const {
     const HandState<S> hand = problem_.hand.at(window, t);
     const auto& [m, I] = problem_.body;
     return {{convert<S>(m), convert<S>(I)},
@@ -148,11 +161,14 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   contact::Hold<double> hold_;
   contact::Hold<Dual> hold_dual_;
   P separation_{};
+  mutable Scene<double> last_scene_{};
+  mutable double scene_time_{std::numeric_limits<double>::quiet_NaN()};  // none yet
+  mutable Window scene_window_;
 };
 
 template <class S>
 void validate(const ReleaseProblem<S>& problem) {
-  const auto require = [](bool ok, const char* name, double value, const std::string& range) {
+  const auto require = [](bool ok, const char* name, double value, const char* range) {
     if (!ok) throw std::invalid_argument(fmt::format("release: {} = {} is not in {}", name, value, range));
   };
   const double m = value_of(problem.body.mass), I = value_of(problem.body.inertia);
@@ -169,9 +185,10 @@ void validate(const ReleaseProblem<S>& problem) {
   require(std::isfinite(value_of(problem.slip.x)), "slip x", value_of(problem.slip.x), "finite m/s");
   require(std::isfinite(value_of(problem.slip.z)), "slip z", value_of(problem.slip.z), "finite m/s");
   require(std::isfinite(value_of(problem.spin)), "spin", value_of(problem.spin), "finite rad/s");
-  require(
-      problem.start >= problem.hand.begin() && problem.start < problem.hand.end(), "start", problem.start,
-      fmt::format("[{}, {}) s, where the hand's motion is known", problem.hand.begin(), problem.hand.end()));
+  if (!(problem.start >= problem.hand.begin() && problem.start < problem.hand.end()))
+    throw std::invalid_argument(
+        fmt::format("release: start = {} is not in [{}, {}) s, where the hand's motion is known",
+                    problem.start, problem.hand.begin(), problem.hand.end()));
 }
 
 double mechanical_energy(const ReleaseProblem<double>& problem, const dynamics::Pose<double>& p,

@@ -9,6 +9,8 @@
 #include <random>
 #include <stdexcept>
 
+#include "contact/isotropic_quartic.hpp"
+
 namespace {
 
 using namespace unhand::contact;
@@ -60,6 +62,36 @@ TEST(ConvexQuartic, KappaOneIsTheEllipsoid) {
       EXPECT_LT((w[i].v - expected[i].v).norm(), 1e-12);
     }
   }
+}
+
+TEST(IsotropicQuartic, IsTheBlend) {
+  std::mt19937 random(5);
+  for (const double kappa : {0.05, 0.3, 1.0, 1.62, 2.5, 2.95}) {
+    const IsotropicQuartic quartic(kappa);
+    const ConvexQuartic blend = ConvexQuartic::isotropic_blend(kappa);
+    for (int k = 0; k < 600; ++k) {
+      Vec3<double> u = random_direction(random);
+      if (k % 3 == 1) u[2] *= 1e-3;  // near pure slide
+      if (k % 3 == 2) {              // near pure spin
+        u[0] *= 1e-4;
+        u[1] *= 1e-4;
+      }
+      const Vec3<Dual> dual{independent(u[0], 0), independent(u[1], 1), independent(u[2], 2)};
+      const auto w = quartic.resist(dual), expected = blend.resist(dual);
+      const auto n = quartic.slip_direction(dual), out = blend.slip_direction(dual);
+      const double steepest =
+          std::max({expected[0].v.norm(), expected[1].v.norm(), expected[2].v.norm(), 1.0});
+      EXPECT_NEAR(quartic.gauge(dual).a, blend.gauge(u), 1e-14) << kappa;
+      for (int i = 0; i < 3; ++i) {
+        // rounding, and for the slopes 1/|u| and the determinant of the Hessian, 0.15 at least, more of it
+        EXPECT_NEAR(w[i].a, expected[i].a, 2e-14) << kappa;
+        EXPECT_LT((w[i].v - expected[i].v).norm(), 1e-12 * steepest) << kappa;
+        EXPECT_NEAR(n[i].a, out[i].a, 1e-14) << kappa;
+      }
+    }
+  }
+  for (const double kappa : {-1e-9, 3.1, double{NAN}})
+    EXPECT_THROW(IsotropicQuartic{kappa}, std::invalid_argument);
 }
 
 TEST(ConvexQuartic, GeneralCoefficientsMeanWhatTheySay) {

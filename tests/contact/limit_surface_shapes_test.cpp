@@ -14,6 +14,7 @@
 
 #include "contact/convex_quartic.hpp"
 #include "contact/disc_friction.hpp"
+#include "contact/isotropic_quartic.hpp"
 
 namespace {
 
@@ -62,13 +63,17 @@ template <>
 ConvexQuartic make() {
   return ConvexQuartic::closest_to_disc();
 }
+template <>
+IsotropicQuartic make() {
+  return IsotropicQuartic::closest_to_disc();
+}
 
 template <class T>
 class Shapes : public testing::Test {
  protected:
   T shape = make<T>();
 };
-using All = testing::Types<Ellipsoid, UniformDisc, ConvexQuartic>;
+using All = testing::Types<Ellipsoid, UniformDisc, ConvexQuartic, IsotropicQuartic>;
 TYPED_TEST_SUITE(Shapes, All);
 
 TYPED_TEST(Shapes, MaximalDissipation) {

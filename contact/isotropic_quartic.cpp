@@ -1,0 +1,119 @@
+#include "contact/isotropic_quartic.hpp"
+
+#include <fmt/core.h>
+
+#include <stdexcept>
+#include <type_traits>
+
+#include "contact/convex_quartic.hpp"
+
+namespace unhand::contact {
+
+using dynamics::Dual;
+using dynamics::value_of;
+
+namespace {
+
+constexpr double kTiny = 1e-13;  // what a vanishing curvature of H counts as
+
+// The root of r³ − e κ r² + κ r − e in [0, 1], which rises there: Newton's method inside a bracket, some 4
+// steps.
+double ratio(double e, double kappa) {
+  double low = 0, high = 1, r = e;
+  for (int iteration = 0; iteration < 60; ++iteration) {
+    const double value = ((r - e * kappa) * r + kappa) * r - e;
+    (value > 0 ? high : low) = r;
+    double next = r - value / ((3 * r - 2 * e * kappa) * r + kappa);
+    if (!(next >= low && next <= high)) next = 0.5 * (low + high);
+    const bool last = std::abs(next - r) <= 1e-8 * next;  // squared: rounding
+    r = next;
+    if (last) break;
+  }
+  return r;
+}
+
+}  // namespace
+
+IsotropicQuartic::IsotropicQuartic(double kappa) : kappa_(kappa) {
+  if (!(kappa >= 0 && kappa <= 3))
+    throw std::invalid_argument(fmt::format("isotropic quartic: kappa = {} is not in [0, 3]", kappa));
+}
+
+IsotropicQuartic IsotropicQuartic::closest_to_disc() {
+  return IsotropicQuartic(ConvexQuartic::kappa_closest_to_disc());
+}
+
+// With σ(u) = −resist(u)·u, whose Hessian is λ (q, −p)(q, −p)ᵀ in (p, q) and k = a/p across the slide: the
+// larger of (a, b) is g = H(1, r)^(−1/4) and λ = (1 + κ r²)³ g⁵/D over the cube of the larger of (p, q), D
+// the determinant of ∇²H.
+Vec3<double> IsotropicQuartic::resist(const Vec3<double>& u, Mat3* jacobian) const {
+  const double p = std::sqrt(u[0] * u[0] + u[1] * u[1]), q = std::abs(u[2]);
+  const bool slides = q <= p;
+  const double most = slides ? p : q, r = ratio(slides ? q / p : p / q, kappa_), x = r * r;
+  const double g = 1 / std::sqrt(std::sqrt(1 + x * (2 * kappa_ + x))), sum = 1 + kappa_ * x;
+  // e = r (κ + r²)/(1 + κ r²), so a/p stays finite where p vanishes.
+  const double share = sum / std::max(kappa_ + x, kTiny), k = slides ? g / p : g * share / q;
+  if (jacobian) {
+    const double D = std::max(kappa_ + x * (3 - kappa_ * kappa_ + kappa_ * x), kTiny),
+                 cube = most * most * most;
+    const double lambda = sum * sum * sum * g * g * g * g * g / (D * cube);
+    // (λ q² − k)/p²; where q is the larger, both are near each other and their difference is divided by x.
+    const double square = kappa_ * kappa_ - 2,
+                 bend = square + x * (3 * kappa_ * square - x * (3 + kappa_ * x));
+    const double cross = slides ? (lambda * q * q - k) / (p * p)
+                                : share * share * share * g * g * g * g * g * bend / (D * cube);
+    *jacobian = isotropic_hessian(u, -k, -cross, -lambda);
+  }
+  return {-k * u[0], -k * u[1], std::copysign(slides ? g * r : g, -u[2])};
+}
+
+template <class S>
+Vec3<S> IsotropicQuartic::resist(const Vec3<S>& u) const {
+  Vec3<double> v{value_of(u[0]), value_of(u[1]), value_of(u[2])};
+  const double scale = scale_of(v);
+  if (scale == 0.0) return {S(0.0), S(0.0), S(0.0)};
+  if (scale != 1.0)
+    for (double& entry : v) entry /= scale;
+  if constexpr (std::is_same_v<S, double>) {
+    return resist(v, nullptr);
+  } else {
+    Mat3 jacobian;
+    const Vec3<double> w = resist(v, &jacobian);
+    if (scale != 1.0)
+      for (auto& row : jacobian)
+        for (double& entry : row) entry /= scale;
+    return chain3(u, w, jacobian);
+  }
+}
+
+template <class S>
+S IsotropicQuartic::gauge(const Vec3<S>& w) const {
+  using std::sqrt;
+  const double scale = scale_of(w);
+  if (scale == 0.0) return S(0.0);
+  const Vec3<S> v{w[0] / scale, w[1] / scale, w[2] / scale};
+  const S A = v[0] * v[0] + v[1] * v[1], B = v[2] * v[2];
+  return scale * sqrt(sqrt(S(A * A + 2 * kappa_ * (A * B) + B * B)));
+}
+
+// −∇H/|∇H|
+template <class S>
+Vec3<S> IsotropicQuartic::slip_direction(const Vec3<S>& w) const {
+  using std::sqrt;
+  const double scale = scale_of(w);
+  if (scale == 0.0) return {S(0.0), S(0.0), S(0.0)};
+  const Vec3<S> v{w[0] / scale, w[1] / scale, w[2] / scale};
+  const S A = v[0] * v[0] + v[1] * v[1], B = v[2] * v[2], flat = A + kappa_ * B, high = kappa_ * A + B;
+  const Vec3<S> n{v[0] * flat, v[1] * flat, v[2] * high};
+  const S k = -1.0 / sqrt(dot3(n, n));
+  return {k * n[0], k * n[1], k * n[2]};
+}
+
+template Vec3<double> IsotropicQuartic::resist(const Vec3<double>&) const;
+template Vec3<Dual> IsotropicQuartic::resist(const Vec3<Dual>&) const;
+template double IsotropicQuartic::gauge(const Vec3<double>&) const;
+template Dual IsotropicQuartic::gauge(const Vec3<Dual>&) const;
+template Vec3<double> IsotropicQuartic::slip_direction(const Vec3<double>&) const;
+template Vec3<Dual> IsotropicQuartic::slip_direction(const Vec3<Dual>&) const;
+
+}  // namespace unhand::contact

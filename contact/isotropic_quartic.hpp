@@ -1,0 +1,39 @@
+// The convex quartics that are round in the plane of sliding, in closed form but for one root.
+#pragma once
+
+#include "contact/limit_surface_shapes.hpp"
+
+namespace unhand::contact {
+
+/// {H ≤ 1}, H = a⁴ + 2κ a² b² + b⁴, a² = w_x² + w_z², b = w_τ: ConvexQuartic::isotropic_blend(κ) at a tenth
+/// of its price. [Zhou2016] κ = 1 is the ellipsoid.
+///
+/// A slip (p, q) = (|u_xz|, |u_τ|) is along ∇H, so r = b/a is the root in [0, 1] of
+///   r³ − e κ r² + κ r − e = 0,  e = q/p,  if q ≤ p;
+/// else a/b is, with e = p/q: H is symmetric in a and b. Derivatives are closed, as those of UniformDisc.
+/// Where the Hessian of H is singular (on the axes for κ = 0, at a = b for κ = 3) resist has no derivative,
+/// and its Dual carries a large finite one.
+class IsotropicQuartic {
+ public:
+  static constexpr bool isotropic = true;
+  static constexpr const char* name = "isotropic quartic";
+
+  /// Throws std::invalid_argument unless 0 ≤ κ ≤ 3, where H is convex.
+  explicit IsotropicQuartic(double kappa);
+  /// κ = ConvexQuartic::kappa_closest_to_disc().
+  static IsotropicQuartic closest_to_disc();
+
+  template <class S>
+  Vec3<S> resist(const Vec3<S>& u) const;
+  template <class S>
+  S gauge(const Vec3<S>& w) const;
+  template <class S>
+  Vec3<S> slip_direction(const Vec3<S>& w) const;
+
+ private:
+  Vec3<double> resist(const Vec3<double>& u, Mat3* jacobian) const;
+
+  double kappa_;
+};
+
+}  // namespace unhand::contact
