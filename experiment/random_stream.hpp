@@ -8,7 +8,17 @@
 namespace unhand::experiment {
 
 /// What a stream is for; adding a purpose at the end leaves the others as they were.
-enum class Purpose : std::uint64_t { variation, hand, force_torque, mocap, landing, split, design, effect };
+enum class Purpose : std::uint64_t {
+  variation,
+  hand,
+  force_torque,
+  mocap,
+  landing,
+  split,
+  design,
+  effect,
+  validation
+};
 
 /// A stream of random numbers. splitmix64 (Steele, Lea and Flood 2014), started from a hash of its key.
 class RandomStream {

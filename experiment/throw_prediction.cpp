@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "contact/registry.hpp"
+#include "experiment/outcome_slopes.hpp"
 
 namespace unhand::experiment {
 
@@ -35,11 +36,10 @@ FeltForce<S> felt_force(const PreparedThrow& prepared, const ThrowSetup<S>& setu
   return force;
 }
 
-}  // namespace
-
-template <class S>
-ThrowPrediction<S> predict_channels(const PreparedThrow& prepared, const Observations& observed,
-                                    const ThrowModel& model, const Values<S>& values) {
+/// Simulates the release and hands `use` what went into it and what came out.
+template <class S, class Use>
+auto with_release(const PreparedThrow& prepared, const ThrowModel& model, const Values<S>& values,
+                  bool record, const Use& use) {
   ThrowSetup<S> setup(values);
   setup.friction.reference_force = model.reference_force;
   const FeltForce<S> force = felt_force(prepared, setup, values);
@@ -72,64 +72,85 @@ ThrowPrediction<S> predict_channels(const PreparedThrow& prepared, const Observa
       {},
       S(0)};
   release::ReleaseOptions options{model.integrator, false};
-  options.integrator.record = !observed.all.empty();
-  const auto result = release::simulate_release(problem, options);
+  options.integrator.record = record;
+  return use(setup, problem, release::simulate_release(problem, options));
+}
 
-  ThrowPrediction<S> out;
-  out.release = result.outcome;
-  out.detach = result.detach;
-  for (const auto& event : result.events) out.modes.push_back(event.mode_after);
-  if (out.release != release::ReleaseOutcome::detached) return out;
+}  // namespace
 
-  const auto flight = flight_from(result.detach, gravity, prepared.drag_k, prepared.landing_height, setup);
-  const auto flown = flight::fly(flight, model.integrator);
-  out.flight = flown.outcome;
-  out.landing = flown.landing;
-  if (!out.landed()) return out;
+template <class S>
+ThrowPrediction<S> predict_channels(const PreparedThrow& prepared, const Observations& observed,
+                                    const ThrowModel& model, const Values<S>& values) {
+  const auto read = [&](const ThrowSetup<S>& setup, const release::ReleaseProblem<S>& problem,
+                        const release::ReleaseResult<S>& result) {
+    ThrowPrediction<S> out;
+    out.release = result.outcome;
+    out.detach = result.detach;
+    for (const auto& event : result.events) out.modes.push_back(event.mode_after);
+    if (out.release != release::ReleaseOutcome::detached) return out;
 
-  double last = value_of(result.detach.time);
-  for (const auto& o : observed.all) last = std::max(last, o.time);
-  ThrowReader<S> reader(problem, result, flight, setup, model.pads);
-  reader.fly(last - value_of(result.detach.time) + 0.1, model.integrator);
-  out.channels.reserve(observed.all.size());
-  dynamics::Wrench<S> wrench;
-  Pose<S> pose;
-  double wrench_at = NAN, pose_at = NAN;  // the columns of a sample share one evaluation
-  for (const auto& o : observed.all) {
-    switch (o.channel) {
-      case Channel::wrench_fx:
-      case Channel::wrench_fz:
-      case Channel::wrench_tau:
-        if (o.time != wrench_at) wrench = reader.wrench(o.time);
-        wrench_at = o.time;
-        out.channels.push_back(o.channel == Channel::wrench_fx   ? wrench.fx
-                               : o.channel == Channel::wrench_fz ? wrench.fz
-                                                                 : wrench.tau);
-        break;
-      case Channel::normal_force:
-        out.channels.push_back(sensing.normal_force_bias);
-        break;
-      case Channel::mocap_x:
-      case Channel::mocap_z:
-      case Channel::mocap_theta:
-        if (o.time != pose_at) pose = reader.mocap(o.time);
-        pose_at = o.time;
-        out.channels.push_back(o.channel == Channel::mocap_x   ? pose.x
-                               : o.channel == Channel::mocap_z ? pose.z
-                                                               : pose.theta);
-        break;
-      case Channel::landing_x:
-        out.channels.push_back(reader.landing_x(out.landing.pose.x));
-        break;
-      case Channel::landing_theta:
-        out.channels.push_back(out.landing.pose.theta);
-        break;
-      case Channel::landing_time:
-        out.channels.push_back(result.detach.time + out.landing.flight_time);
-        break;
+    const auto flight =
+        flight_from(result.detach, problem.gravity, prepared.drag_k, prepared.landing_height, setup);
+    const auto flown = flight::fly(flight, model.integrator);
+    out.flight = flown.outcome;
+    out.landing = flown.landing;
+    if (!out.landed()) return out;
+
+    double last = value_of(result.detach.time);
+    for (const auto& o : observed.all) last = std::max(last, o.time);
+    ThrowReader<S> reader(problem, result, flight, setup, model.pads);
+    reader.fly(last - value_of(result.detach.time) + 0.1, model.integrator);
+    out.channels.reserve(observed.all.size());
+    dynamics::Wrench<S> wrench;
+    Pose<S> pose;
+    double wrench_at = NAN, pose_at = NAN;  // the columns of a sample share one evaluation
+    for (const auto& o : observed.all) {
+      switch (o.channel) {
+        case Channel::wrench_fx:
+        case Channel::wrench_fz:
+        case Channel::wrench_tau:
+          if (o.time != wrench_at) wrench = reader.wrench(o.time);
+          wrench_at = o.time;
+          out.channels.push_back(o.channel == Channel::wrench_fx   ? wrench.fx
+                                 : o.channel == Channel::wrench_fz ? wrench.fz
+                                                                   : wrench.tau);
+          break;
+        case Channel::normal_force:
+          out.channels.push_back(setup.sensing.normal_force_bias);
+          break;
+        case Channel::mocap_x:
+        case Channel::mocap_z:
+        case Channel::mocap_theta:
+          if (o.time != pose_at) pose = reader.mocap(o.time);
+          pose_at = o.time;
+          out.channels.push_back(o.channel == Channel::mocap_x   ? pose.x
+                                 : o.channel == Channel::mocap_z ? pose.z
+                                                                 : pose.theta);
+          break;
+        case Channel::landing_x:
+          out.channels.push_back(reader.landing_x(out.landing.pose.x));
+          break;
+        case Channel::landing_theta:
+          out.channels.push_back(out.landing.pose.theta);
+          break;
+        case Channel::landing_time:
+          out.channels.push_back(result.detach.time + out.landing.flight_time);
+          break;
+      }
     }
-  }
-  return out;
+    return out;
+  };
+  return with_release(prepared, model, values, !observed.all.empty(), read);
+}
+
+bool grip_holds(const PreparedThrow& prepared, const ThrowModel& model, const Values<double>& values) {
+  const auto read = [&](const auto&, const auto&, const release::ReleaseResult<double>& result) {
+    return !result.slips_at_start &&
+           std::none_of(result.events.begin(), result.events.end(), [&](const auto& event) {
+             return event.mode_after != event.mode_before && event.t < prepared.open_command;
+           });
+  };
+  return with_release(prepared, model, values, false, read);
 }
 
 template ThrowPrediction<double> predict_channels(const PreparedThrow&, const Observations&,

@@ -126,7 +126,8 @@ class Cli : public testing::Test {
 TEST_F(Cli, HelpHasAnExampleEverywhere) {
   EXPECT_EQ(run("--help").code, 0);
   EXPECT_THAT(run("--version").out, HasSubstr("unhand "));
-  for (const std::string command : {"generate", "import", "inspect", "compare", "fit", "predict"}) {
+  for (const std::string command :
+       {"generate", "import", "inspect", "compare", "fit", "predict", "validate-sku"}) {
     const Answer answer = run(command + " --help");
     EXPECT_EQ(answer.code, 0) << command;
     for (const char* word : {"Example", "--json", "--threads"})
@@ -670,6 +671,48 @@ TEST_F(Cli, PlansAThrowWithACard) {
   EXPECT_LT(plan["predicted"]["insensitive motion"]["rms_m"],
             plan["predicted"]["tube acceleration"]["rms_m"]);
   EXPECT_TRUE(plan["release"]["contact_model"]["miss_m"].is_number());
+}
+
+TEST_F(Cli, ValidateSkuAnswersWithABudget) {
+  std::ofstream(folder / "bar.toml") << "name = 'bar-com100'\nmass_kg = 0.246\ncom_offset_m = 0.10\n"
+                                        "inertia_kg_m2 = 3.3e-3\nsurface = 'printed'\n";
+  std::ofstream(folder / "card.json")
+      << R"({"schema": "model-card", "schema_version": 1, "model": "sliding_pivot", "library_version": "0",
+             "parameters": {"mu": {"value": 0.5, "sigma": 0.005, "unit": "-"},
+                            "length": {"value": 0.007, "sigma": 1e-4, "unit": "m"}},
+             "covariance": {"names": ["mu", "length"], "matrix": [[2.5e-5, 0], [0, 1e-8]]},
+             "log": {"file": "a.h5"}})";
+  const Answer answer = run(
+      "validate-sku bar.toml --card card.json --samples 200 --json a.json --report out --tolerance 0.1,60");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json out = read_json(folder / "a.json");
+  EXPECT_EQ(out["schema"], "validate-sku");
+  EXPECT_NEAR(out["tolerance"]["landing_theta_deg"].get<double>(), 60, 1e-12);
+  double share = 0;
+  for (const auto& line : out["budget"]) share += line["share"].get<double>();
+  EXPECT_NEAR(share, 1, 1e-9);
+  EXPECT_THAT(answer.out, HasSubstr(out["measurements"][0]["measurement"].get<std::string>()));
+  EXPECT_TRUE(out["measured"].is_null());
+  for (const char* file : {"report.md", "validate-sku.json", "landings.png", "landings.pdf", "landings.dat",
+                           "landings.gp", "budget.png", "budget.pdf"})
+    EXPECT_TRUE(fs::exists(folder / "out" / file)) << file;
+
+  const Answer with_log =
+      run("validate-sku bar.toml --card card.json --samples 200 --log " + quick + " --json b.json");
+  ASSERT_EQ(with_log.code, 0) << with_log.err;
+  const json judged = read_json(folder / "b.json");
+  EXPECT_EQ(judged["candidates"].size(), 6u);  // the campaign's conditions, three for each of two objects
+  EXPECT_EQ(judged["measured"]["n"], 6);
+
+  const std::string asked = "validate-sku bar.toml --card card.json ";
+  expect_refusal(asked + "--tolerance 0.05", 2, "METRES,DEGREES");
+  expect_refusal(asked + "--tolerance 0.05,-1", 2, "METRES,DEGREES");
+  expect_refusal(asked + "--condition fast", 2, "--log");
+  expect_refusal(asked + "--condition fast --log " + quick, 2, "there are");
+  expect_refusal("validate-sku none.toml --card card.json", 3, "none.toml");
+  expect_refusal("validate-sku bar.toml --card none.json", 3, "none.json");
+  std::ofstream(folder / "bare.toml") << "name = 'x'\nmass_kg = 1\nsurface = 'steel'\n";
+  expect_refusal("validate-sku bare.toml --card card.json --json c.json", 3, "inertia_kg_m2");
 }
 
 }  // namespace

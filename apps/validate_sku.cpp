@@ -1,0 +1,119 @@
+// unhand validate-sku: whether an object can be thrown with a gripper so that it lands as predicted.
+#include "apps/validate_sku.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <memory>
+#include <numbers>
+#include <set>
+
+#include "apps/cards.hpp"
+
+namespace unhand::apps {
+namespace {
+
+struct Options {
+  std::string sku, card, log, condition, json, report;
+  std::vector<double> tolerance{0.05, 45};  ///< m, deg
+  fitting::SkuRequest request;
+};
+
+datasets::Sku read_throwable_sku(const std::string& file) {
+  auto sku = datasets::read_sku(file);
+  if (!sku.inertia)
+    throw datasets::TomlError(file, 0, 0, "inertia_kg_m2", "missing: it, or shape and dims_m, are needed");
+  return sku;
+}
+
+void write_report(const SkuQuestion& question, const fitting::SkuValidation& answer, const Json& json,
+                  const std::filesystem::path& directory) {
+  std::string pictures;
+  const auto add = [&](const Figure& figure, const char* title) {
+    draw(figure, directory);
+    pictures += fmt::format("\n![{}]({}.png)\n", title, figure.name);
+  };
+  if (!answer.samples.empty()) add(sku_landing_figure(question, answer), "Landings about the predicted one");
+  if (!answer.budget.empty()) add(sku_budget_figure(question, answer), "What the spread is made of");
+  write_text(directory / "report.md", sku_text(question, answer, true) + pictures);
+  write_text(directory / "validate-sku.json", json_text(json));
+}
+
+void validate(Options options) {
+  if (options.tolerance.size() != 2 || !(options.tolerance[0] > 0) || !(options.tolerance[1] > 0))
+    throw WrongUsage("--tolerance takes two positive numbers, METRES,DEGREES: 0.05,45");
+  require_writable(options.json);
+  require_writable_directory(options.report);
+  if (!options.report.empty()) require_gnuplot();
+  SkuQuestion question{options.sku, options.card, options.log, read_throwable_sku(options.sku), {}, {}};
+  question.card = read_usable_card(options.card).card;
+  std::optional<datasets::ThrowLog> log;
+  question.request = options.request;
+  auto& request = question.request;
+  request.tolerance = {options.tolerance[0], options.tolerance[1] * std::numbers::pi / 180};
+  if (!options.log.empty()) {
+    if (datasets::read_schema_name(options.log) == "slip-log")
+      throw datasets::LogError(options.log, "/@schema", "is a slip-log, which holds no throws");
+    log = datasets::read_throw_log(options.log);
+    if (log->throws.empty()) throw Unanswered(fmt::format("{}: holds no throws", options.log));
+    request.log = &*log;
+    request.log_file = options.log;
+  }
+  if (!options.condition.empty()) {
+    if (!log) throw WrongUsage("--condition names one of a log's: give --log, too");
+    std::set<std::string> known;
+    for (const auto& one : log->throws) known.insert(one.condition);
+    if (!known.contains(options.condition))
+      throw WrongUsage(fmt::format("--condition: {} has no '{}'; there are {}", options.log,
+                                   options.condition, fmt::join(known, ", ")));
+    request.condition = options.condition;
+  }
+  const auto answer = fitting::validate_sku(question.sku, question.card, options.card, request);
+  const Json json = sku_json(question, answer);
+  Outputs outputs;
+  if (!options.json.empty()) outputs.json(options.json, json);
+  if (!options.report.empty()) write_report(question, answer, json, outputs.directory(options.report));
+  outputs.commit();
+  fmt::print("{}", sku_text(question, answer, false));
+}
+
+}  // namespace
+
+Command validate_sku_command(CLI::App& root) {
+  auto options = std::make_shared<Options>();
+  auto& assumed = options->request.assumed;
+  CLI::App* parser = root.add_subcommand(
+      "validate-sku", "Can this object be thrown with this gripper, so that it lands as predicted?");
+  parser->add_option("SKU", options->sku, "The object as an SKU file (TOML)")->required();
+  parser->add_option("--card", options->card, "The gripper's model card, of `unhand fit`")->required();
+  parser->add_option("--log", options->log,
+                     "Throws whose motion and normal force are taken; those of this object are judged");
+  parser->add_option("--condition", options->condition,
+                     "Which of the log's conditions; otherwise that with the least spread");
+  parser->add_option("--tolerance", options->tolerance, "METRES,DEGREES about the predicted landing")
+      ->delimiter(',')
+      ->capture_default_str();
+  parser->add_option("--confidence", options->request.confidence, "Share of throws that must land within it")
+      ->check(CLI::Range(0.01, 0.9999))
+      ->capture_default_str();
+  parser
+      ->add_option("--other-surface", assumed.other_surface,
+                   "Relative 1 sigma of mu for a surface that the card's log did not have, 0.2 say")
+      ->check(CLI::Range(0.0, 2.0))
+      ->capture_default_str();
+  parser->add_option("--samples", options->request.samples, "Draws of the Monte Carlo")
+      ->check(CLI::Range(100, 1'000'000))
+      ->capture_default_str();
+  parser->add_option("--seed", options->request.seed, "Of the draws")->capture_default_str();
+  parser->add_option("--json", options->json, "Write the answer as JSON");
+  parser->add_option("--report", options->report, "A directory for the tables (Markdown), figures and JSON");
+  add_threads(*parser, options->request.threads);
+  parser->footer(
+      "Without --log, the motion is the middle flip of the synthetic campaign batch180 and the gripper opens "
+      "as\nthe card's valid range says. Existing files are replaced.\n"
+      "Examples:\n  unhand validate-sku jar.toml --card card.json --report out\n"
+      "  unhand validate-sku bar.toml --card card.json --log campaign.h5 --tolerance 0.05,45");
+  return {parser, [options] { validate(*options); }};
+}
+
+}  // namespace unhand::apps

@@ -1,0 +1,224 @@
+#include "fitting/sku_validation.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <filesystem>
+#include <numeric>
+
+#include "experiment/outcome_slopes.hpp"
+#include "experiment/reference_throw.hpp"
+#include "fitting/card.hpp"
+#include "tests/support/small_campaign.hpp"
+
+namespace unhand::fitting {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+/// The bar of the synthetic campaigns, as its SKU file would tell it.
+datasets::Sku bar(double com_offset = 0.10) {
+  const auto truth = experiment::loaded_bar("bar-com100", com_offset);
+  datasets::Sku sku;
+  sku.name = truth.name;
+  sku.mass = truth.body.mass;
+  sku.mass_sigma = 1e-3;
+  sku.inertia = truth.body.inertia;
+  sku.inertia_sigma = 0.01 * truth.body.inertia;
+  sku.com_offset = com_offset;
+  sku.com_offset_sigma = 1e-3;
+  sku.surface = "printed plastic";
+  return sku;
+}
+
+/// A gripper as `unhand fit` knows one.
+datasets::ModelCard card() {
+  datasets::ModelCard out;
+  out.model = "limit_surface_disc";
+  out.parameters = {{"mu", {0.5, 0.005, "-"}}, {"length", {7e-3, 7e-5, "m"}}, {"pads", {2, {}, "-"}}};
+  out.covariance = {{"length", "mu"}, {4.9e-9, -2.1e-7, -2.1e-7, 2.5e-5}};
+  out.own_spreads = {{"mu_deviation", {0.01, "-"}}, {"grasp_angle", {0.01, "rad"}}};
+  out.log.title = "a test's";
+  return out;
+}
+
+SkuRequest quick(int samples = 400) {
+  SkuRequest request;
+  request.samples = samples;
+  return request;
+}
+
+TEST(SkuValidation, DerivativesAreTheCentralDifferenceInEveryInput) {
+  const auto sku = bar();
+  const auto thrown = experiment::reference_throw(sku.name, datasets::to_object(sku));
+  const auto inputs = throw_inputs(sku, card(), "card.json", thrown);
+  const Eigen::MatrixXd slopes =
+      experiment::outcome_slopes(thrown, inputs.model, inputs.names, inputs.values).value() * inputs.mixing();
+  ASSERT_EQ(slopes.cols(), static_cast<Eigen::Index>(inputs.inputs.size()));
+  // A tighter integration than the model's for the differences: its noise over the step is their error.
+  auto model = inputs.model;
+  model.integrator.tolerances = {1e-11, 1e-13};
+  for (Eigen::Index k = 0; k < slopes.cols(); ++k) {
+    double best = HUGE_VAL;
+    for (const double share : {1e-1, 1e-2, 1e-3}) {
+      Eigen::VectorXd by = Eigen::VectorXd::Zero(slopes.cols());
+      by[k] = share * inputs.inputs[static_cast<std::size_t>(k)].sigma;
+      const auto landing = [&](const Eigen::VectorXd& moved) {
+        const auto values = inputs.moved(moved);
+        return experiment::predict_channels(thrown, {}, model, dynamics::Values<double>(inputs.names, values))
+            .landing.pose;
+      };
+      const auto up = landing(by), down = landing(-by);
+      const double x = (up.x - down.x) / (2 * by[k]), theta = (up.theta - down.theta) / (2 * by[k]);
+      best = std::min(best, std::hypot((x - slopes(experiment::kLandingX, k)) / std::abs(x),
+                                       (theta - slopes(experiment::kLandingTheta, k)) / std::abs(theta)));
+    }
+    // The derivatives run at the card's tolerance, 1e-6, which slip that creeps amplifies.
+    EXPECT_LT(best, 2e-3) << inputs.inputs[static_cast<std::size_t>(k)].name;
+  }
+}
+
+TEST(SkuValidation, MonteCarloAndDerivativesAgreeOnAPreciseObject) {
+  const auto answer = validate_sku(bar(), card(), "card.json", quick(1000));
+  EXPECT_TRUE(answer.agree) << answer.disagreement;
+  EXPECT_EQ(answer.lost, 0);
+  // Of the same inputs, 1000 draws: a sigma is known to 1/√2000 = 2.2 %; five of these.
+  EXPECT_NEAR(answer.monte_carlo.x / answer.linear.x, 1, 0.11);
+  EXPECT_NEAR(answer.monte_carlo.theta / answer.linear.theta, 1, 0.11);
+  EXPECT_EQ(answer.verdict, SkuVerdict::throwable) << answer.message;
+}
+
+TEST(SkuValidation, SaysWhereTheyDoNotAgree) {
+  auto sku = bar();
+  sku.com_offset_sigma = 0.04;  // the object may hang from the pads or hardly load them
+  const auto answer = validate_sku(sku, card(), "card.json", quick());
+  EXPECT_FALSE(answer.agree);
+  EXPECT_THAT(answer.disagreement, HasSubstr("com_offset"));
+  EXPECT_EQ(answer.budget.front().input.name, "com_offset");
+  EXPECT_EQ(answer.gains.front().measurement, "balance the object on an edge: its centre of mass");
+  EXPECT_EQ(answer.verdict, SkuVerdict::too_uncertain) << answer.message;
+}
+
+TEST(SkuValidation, SharesAddToOneAndKnowingAnInputTakesItsVarianceOff) {
+  const auto sku = bar();
+  const auto answer = validate_sku(sku, card(), "card.json", quick());
+  double sum = 0;
+  for (const auto& line : answer.budget) sum += line.share;
+  EXPECT_NEAR(sum, 1, 1e-12);
+  const auto offset = std::find_if(answer.budget.begin(), answer.budget.end(),
+                                   [](const BudgetLine& l) { return l.input.name == "com_offset"; });
+  const auto gain = std::find_if(answer.gains.begin(), answer.gains.end(), [](const MeasurementGain& g) {
+    return g.inputs == std::vector<std::string>{"com_offset"};
+  });
+  ASSERT_TRUE(offset != answer.budget.end() && gain != answer.gains.end());
+  // It is correlated with nothing: what knowing it takes off is its share.
+  EXPECT_NEAR(gain->share, offset->share, 1e-12);
+  auto known = sku;
+  known.com_offset_sigma = 0;
+  const auto& tolerance = SkuRequest{}.tolerance;
+  const auto variance = [&](const SkuValidation& a) {
+    return std::pow(a.linear.x / tolerance.x, 2) + std::pow(a.linear.theta / tolerance.theta, 2);
+  };
+  const auto less = validate_sku(known, card(), "card.json", quick());
+  EXPECT_NEAR(variance(less) / variance(answer), 1 - gain->share, 1e-9);
+}
+
+TEST(SkuValidation, AnswersDoNotDependOnThreads) {
+  auto one = quick(200), two = quick(200);
+  one.threads = 1;
+  two.threads = 2;
+  const auto a = validate_sku(bar(), card(), "card.json", one),
+             b = validate_sku(bar(), card(), "card.json", two);
+  EXPECT_EQ(a.monte_carlo.x, b.monte_carlo.x);
+  EXPECT_EQ(a.monte_carlo.theta, b.monte_carlo.theta);
+  EXPECT_EQ(a.within, b.within);
+}
+
+TEST(SkuValidation, AnObjectTooHeavyForTheGripIsToldWhatWouldHoldIt) {
+  auto sku = bar();
+  sku.mass *= 4;
+  *sku.inertia *= 4;
+  auto gripper = card();
+  const auto answer = validate_sku(sku, gripper, "card.json", quick());
+  ASSERT_EQ(answer.verdict, SkuVerdict::cannot_be_held) << answer.message;
+  ASSERT_TRUE(answer.needed_grip_force);
+  EXPECT_THAT(answer.samples, IsEmpty());
+  // With a little more than that it is held, with a little less it is not.
+  for (const double factor : {0.99, 1.01}) {
+    const double force = factor * *answer.needed_grip_force;
+    gripper.valid_range["grip_force"] = {force, force, "N"};
+    EXPECT_EQ(validate_sku(sku, gripper, "card.json", quick()).reference().held, factor > 1) << factor;
+  }
+}
+
+TEST(SkuValidation, AssumesWhatTheSkuDoesNotTell) {
+  auto sku = bar();
+  sku.mass_sigma = sku.inertia_sigma = sku.com_offset_sigma = std::nullopt;
+  const auto thrown = experiment::reference_throw(sku.name, datasets::to_object(sku));
+  const auto inputs = throw_inputs(sku, card(), "card.json", thrown);
+  int assumed = 0;
+  for (const auto& input : inputs.inputs) assumed += input.source == InputSource::assumed;
+  EXPECT_EQ(assumed, 3);
+  const auto told = throw_inputs(bar(), card(), "card.json", thrown);
+  for (const auto& input : told.inputs) EXPECT_NE(input.source, InputSource::assumed) << input.name;
+}
+
+TEST(SkuValidation, MeasuredThrowsConfirmTheRightSkuAndContradictAWrongOne) {
+  auto design = testing_support::small_design("limit_surface_disc");
+  design.objects = {experiment::loaded_bar("bar-com100", 0.10)};
+  const auto log = experiment::generate_campaign(design, 5);
+  auto gripper = card();
+  gripper.parameters["mu"].value = design.patch.mu;
+  gripper.parameters["length"].value = design.patch.length();
+  gripper.own_spreads["mu_deviation"].sigma = design.variation.mu;
+  auto request = quick(200);
+  request.log = &log;
+  request.log_file = "synthetic";
+  const auto right = validate_sku(bar(), gripper, "card.json", request);
+  ASSERT_TRUE(right.measured);
+  EXPECT_EQ(right.measured->throws.size(), log.throws.size());
+  EXPECT_TRUE(right.measured->confirmed) << right.measured->rms_z << " " << right.measured->within;
+  EXPECT_EQ(right.candidates.size(), 3u);  // the design's release accelerations
+
+  auto wrong = bar();
+  wrong.com_offset = 0.07;  // thirty of its sigmas off
+  const auto answer = validate_sku(wrong, gripper, "card.json", request);
+  ASSERT_TRUE(answer.measured);
+  EXPECT_FALSE(answer.measured->confirmed);
+  EXPECT_GT(answer.measured->rms_z, 2 * right.measured->rms_z);
+
+  request.condition = "no such";
+  EXPECT_THROW(validate_sku(bar(), gripper, "card.json", request), std::invalid_argument);
+}
+
+TEST(SkuValidation, EveryObjectOfTheCatalogueIsAnswered) {
+  namespace fs = std::filesystem;
+  int n = 0;
+  double mass = 0;
+  for (const auto& entry : fs::directory_iterator(UNHAND_SOURCE_DIR "/datasets/catalogue/darko-d4.6")) {
+    const auto sku = datasets::read_sku(entry.path());
+    EXPECT_EQ(sku.name, entry.path().stem());
+    EXPECT_THAT(sku.source.value(), HasSubstr("Table 5"));
+    const auto answer = validate_sku(sku, card(), "card.json", quick(100));
+    // Held at its centre of mass, nothing turns it in the grip: the hand's spin alone goes with it.
+    EXPECT_TRUE(answer.reference().held && answer.reference().landed) << sku.name << ": " << answer.message;
+    mass += sku.mass;
+    ++n;
+  }
+  EXPECT_EQ(n, 18);
+  EXPECT_NEAR(mass, 1.126, 1e-12);  // the table's column, added up by hand
+}
+
+TEST(SkuValidation, WrongRequestsAreNamed) {
+  auto sku = bar();
+  sku.inertia.reset();
+  EXPECT_THROW(validate_sku(sku, card(), "card.json"), std::invalid_argument);
+  auto request = quick();
+  request.tolerance.x = -1;
+  EXPECT_THROW(validate_sku(bar(), card(), "card.json", request), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace unhand::fitting
