@@ -8,9 +8,9 @@
 //   twist_err     largest error of the twist at detach [m/s, rad/s]
 // Throws: calm and hard have a hand and a force in closed form (hard: shaken, the sliding pivot changes mode
 // nine times or more), log is throw 150 of the campaign batch180 as experiment::prepare smooths it (splines
-// of degree six; the slip stops and sets in again). calm_scene etc. time one evaluation of the hand and the
-// force. The tolerance of each case is the loosest decade that keeps event times to 1e-9 s; absolute =
-// relative/100.
+// of degree six; the slip stops and sets in again), log_growing throw 0, whose slip only grows. calm_scene
+// etc. time one evaluation of the hand and the force. The tolerance of each case is the loosest decade that
+// keeps event times to 1e-9 s; absolute = relative/100.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -98,6 +98,10 @@ const Throw& hard() {
 
 const Throw& log() {
   static const LoggedThrow thrown(logged(experiment::campaign_design("batch180"), 150));
+  return thrown;
+}
+const Throw& log_growing() {
+  static const LoggedThrow thrown(logged(experiment::campaign_design("batch180"), 0));
   return thrown;
 }
 
@@ -204,7 +208,10 @@ struct Kind {
   const Throw& (*thrown)();
   double pivot, surface;  // tolerances
 };
-constexpr Kind kKinds[] = {{"calm", calm, 1e-6, 1e-4}, {"hard", hard, 1e-8, 1e-6}, {"log", log, 1e-6, 1e-5}};
+constexpr Kind kKinds[] = {{"calm", calm, 1e-6, 1e-4},
+                           {"hard", hard, 1e-8, 1e-6},
+                           {"log", log, 1e-6, 1e-5},
+                           {"log_growing", log_growing, 1e-6, 1e-4}};
 constexpr const char* kModels[] = {"sliding_pivot", "limit_surface", "limit_surface_disc",
                                    "limit_surface_quartic"};
 
