@@ -5,6 +5,7 @@
 
 namespace unhand::apps {
 
+Command plan_elastic_command(CLI::App& plan);
 Command plan_throw_command(CLI::App& plan);
 
 }  // namespace unhand::apps

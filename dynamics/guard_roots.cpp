@@ -298,6 +298,7 @@ void GuardRoots<S, N>::add_root_derivative(int guard, Entry<S, N>& root) const {
 template class GuardRoots<double, 2>;
 template class GuardRoots<double, 6>;
 template class GuardRoots<double, 7>;
+template class GuardRoots<double, 10>;
 template class GuardRoots<Dual, 2>;
 template class GuardRoots<Dual, 6>;
 template class GuardRoots<Dual, 7>;

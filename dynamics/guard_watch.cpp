@@ -111,6 +111,7 @@ std::array<double, kMaxGuards> GuardWatch<S, N>::slopes(const Entry<S, N>& entry
 template class GuardWatch<double, 2>;
 template class GuardWatch<double, 6>;
 template class GuardWatch<double, 7>;
+template class GuardWatch<double, 10>;
 template class GuardWatch<Dual, 2>;
 template class GuardWatch<Dual, 6>;
 template class GuardWatch<Dual, 7>;

@@ -255,6 +255,8 @@ template Solution<double, 6> integrate(const HybridSystem<6>&, const Entry<doubl
                                        const IntegratorOptions&);
 template Solution<double, 7> integrate(const HybridSystem<7>&, const Entry<double, 7>&, const double&,
                                        const IntegratorOptions&);
+template Solution<double, 10> integrate(const HybridSystem<10>&, const Entry<double, 10>&, const double&,
+                                        const IntegratorOptions&);
 template Solution<Dual, 2> integrate(const HybridSystem<2>&, const Entry<Dual, 2>&, const Dual&,
                                      const IntegratorOptions&);
 template Solution<Dual, 6> integrate(const HybridSystem<6>&, const Entry<Dual, 6>&, const Dual&,

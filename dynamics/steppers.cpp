@@ -14,21 +14,29 @@ namespace {
 template <int N>
 std::unique_ptr<Stepper<double, N>> make_stepper(Method method, FlowKind kind, const Tolerances& tolerances,
                                                  bool seeded) {
-  switch (method) {
-    case Method::dormand_prince:
-      return std::make_unique<DormandPrince<double, N>>(tolerances);
-    case Method::rosenbrock:
-      return std::make_unique<Rosenbrock<N>>(tolerances, seeded);
-    case Method::radau:
-      return std::make_unique<Radau<N>>(tolerances, seeded);
-    case Method::cvode:
-      if (seeded)
-        throw std::invalid_argument("integrate: method cvode has no derivatives; use automatic with Dual");
-      return make_cvode_stepper<N>(tolerances, kind);
-    case Method::automatic:
-      break;
+  if constexpr (N + 1 > kDualSize) {  // no exact Jacobian in one sweep of dual numbers
+    if (method != Method::dormand_prince)
+      throw std::invalid_argument(
+          "integrate: systems of this size are stepped explicitly only; no method but "
+          "dormand_prince, no flow but a smooth one");
+    return std::make_unique<DormandPrince<double, N>>(tolerances);
+  } else {
+    switch (method) {
+      case Method::dormand_prince:
+        return std::make_unique<DormandPrince<double, N>>(tolerances);
+      case Method::rosenbrock:
+        return std::make_unique<Rosenbrock<N>>(tolerances, seeded);
+      case Method::radau:
+        return std::make_unique<Radau<N>>(tolerances, seeded);
+      case Method::cvode:
+        if (seeded)
+          throw std::invalid_argument("integrate: method cvode has no derivatives; use automatic with Dual");
+        return make_cvode_stepper<N>(tolerances, kind);
+      case Method::automatic:
+        return std::make_unique<SwitchingStepper<N>>(tolerances, seeded);
+    }
+    throw std::invalid_argument("integrate: unknown method");
   }
-  return std::make_unique<SwitchingStepper<N>>(tolerances, seeded);
 }
 
 /// The values, in time or in the pace of the flow.
@@ -82,6 +90,7 @@ Method Steppers<S, N>::method(FlowKind kind) const {
 template class Steppers<double, 2>;
 template class Steppers<double, 6>;
 template class Steppers<double, 7>;
+template class Steppers<double, 10>;
 template class Steppers<Dual, 2>;
 template class Steppers<Dual, 6>;
 template class Steppers<Dual, 7>;

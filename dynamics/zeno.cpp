@@ -66,7 +66,9 @@ template std::optional<double> time_to_accumulation(const std::vector<Event<doub
 template bool stuck_at_instant(const std::vector<Event<double, 6>>&, int);
 template std::optional<double> time_to_accumulation(const std::vector<Event<double, 6>>&, double, double);
 template bool stuck_at_instant(const std::vector<Event<double, 7>>&, int);
+template bool stuck_at_instant(const std::vector<Event<double, 10>>&, int);
 template std::optional<double> time_to_accumulation(const std::vector<Event<double, 7>>&, double, double);
+template std::optional<double> time_to_accumulation(const std::vector<Event<double, 10>>&, double, double);
 template bool stuck_at_instant(const std::vector<Event<Dual, 2>>&, int);
 template std::optional<Dual> time_to_accumulation(const std::vector<Event<Dual, 2>>&, double, double);
 template bool stuck_at_instant(const std::vector<Event<Dual, 6>>&, int);

@@ -1,0 +1,286 @@
+// unhand plan elastic: throws of an arm whose last joint is a spring behind clutches.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <sstream>
+
+#include "apps/figure.hpp"
+#include "apps/output.hpp"
+#include "apps/plan.hpp"
+#include "apps/table.hpp"
+#include "planners/elastic/throw_table.hpp"
+
+namespace unhand::apps {
+namespace {
+
+namespace el = planners::elastic;
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string arm{"planners/elastic/bsa3.toml"}, json, report;
+  int starts{10}, intervals{16}, nodes{9}, checks{161};
+  double longest{0}, elevation{45}, target_x{0}, target_z{-0.5}, half_table{0.4}, box{0.5};
+  unsigned seed{1};
+};
+
+/// The pose from which targets are thrown at [rad]: lowered, elbow and wrist back.
+const el::Links<double> kReadyPose{0.2, -1.0, -0.5};
+
+struct Fastest {
+  el::Drive drive;
+  el::Basins basins;
+  std::vector<el::Replay> runs;  ///< of the basins
+};
+
+double speed_of(const el::TipState<double>& tip) { return std::hypot(tip.vx, tip.vz); }
+
+std::vector<std::vector<double>> history(const el::ClutchedArm& arm, const el::Replay& run) {
+  std::vector<std::vector<double>> rows;
+  for (const el::ReplaySample& s : run.samples)
+    rows.push_back({s.t, speed_of(el::tip_of<double>(arm, s.at.tail<3>(), s.rate.tail<3>())),
+                    s.at[0] - s.at[1], s.rate[0], s.rate[2], s.rate[3], s.rate[4], s.torque[0], s.torque[1],
+                    s.torque[2], 0.5 * arm.last.stiffness * std::pow(s.at[0] - s.at[1], 2)});
+  return rows;
+}
+const std::vector<std::string> kHistoryColumns{
+    "time [s]",    "tip speed [m/s]", "deflection [rad]", "motor speed [rad/s]",
+    "qd1 [rad/s]", "qd2 [rad/s]",     "qd3 [rad/s]",      "tau1 [N m]",
+    "tau2 [N m]",  "tau_m [N m]",     "spring energy [J]"};
+
+Json use_json(const el::LimitUse& use) {
+  return {{"angle", use.angle},
+          {"speed", use.speed},
+          {"torque", use.torque},
+          {"brake", use.brake},
+          {"motor_speed", use.motor_speed},
+          {"motor_torque", use.motor_torque},
+          {"deflection", use.deflection}};
+}
+
+void draw_speeds(const el::ClutchedArm& arm, const std::vector<Fastest>& all, const fs::path& folder) {
+  Figure figure{"speed", 17, 12, {}, ""};
+  const char* style[]{"lines lw 2 lc rgb '#0072b2' dt 1", "lines lw 2 lc rgb '#d55e00' dt 2",
+                      "lines lw 2 lc rgb '#555555' dt 4"};
+  std::string speed, deflection;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (all[i].runs.empty()) continue;
+    figure.data.push_back(
+        {el::to_string(all[i].drive), kHistoryColumns, history(arm, all[i].runs.front()), {}});
+    const auto index = figure.data.size() - 1;
+    speed += fmt::format("{}DATA index {} using 1:2 with {} title '{}'", index ? ", " : "plot ", index,
+                         style[i], plain(el::to_string(all[i].drive)));
+    deflection +=
+        fmt::format("{}DATA index {} using 1:3 with {} notitle", index ? ", " : "plot ", index, style[i]);
+  }
+  if (figure.data.empty()) return;
+  figure.script =
+      "set multiplot layout 2,1\nset grid\nset key left top\nset xlabel 'time [s]'\nset ylabel 'tip speed "
+      "[m/s]'\n" +
+      speed + "\nset ylabel 'spring deflection [rad]'\n" + deflection + "\nunset multiplot\n";
+  draw(figure, folder);
+}
+
+void draw_table(const std::vector<el::TableCheck>& checks, const fs::path& folder) {
+  Figure figure{"table",
+                17,
+                11,
+                {{"dense check", {"distance [m]", "miss [mm]", "largest share of a limit [-]"}, {}, {}}},
+                ""};
+  for (const auto& c : checks)
+    if (c.lands) figure.data[0].rows.push_back({c.distance, 1e3 * c.miss, c.limit_use});
+  if (figure.data[0].rows.empty()) return;
+  figure.script =
+      "set multiplot layout 2,1\nset grid\nunset key\nset xlabel 'distance of the target [m]'\nset ylabel "
+      "'miss [mm]'\n"
+      "plot DATA using 1:2 with lines lw 2 lc rgb '#0072b2'\nset ylabel 'largest share of a limit'\nset "
+      "yrange [0.8:1.02]\n"
+      "plot DATA using 1:3 with lines lw 2 lc rgb '#d55e00', 1 with lines lw 1 dt 2 lc rgb '#000000'\nunset "
+      "multiplot\n";
+  draw(figure, folder);
+}
+
+el::ThrowProgramOptions program_options(const Options& o) {
+  el::ThrowProgramOptions out;
+  out.intervals = o.intervals;
+  out.seed = o.seed;
+  return out;
+}
+
+void fastest(const el::ClutchedArm& arm, const Options& o, Outputs& outputs, Json& json) {
+  el::ThrowTask task;
+  task.longest = o.longest > 0 ? o.longest : 0.6;
+  task.elevation = o.elevation * M_PI / 180;
+  std::vector<Fastest> all;
+  Table table{
+      {"drive", "basin", "starts", "tip speed [m/s]", "re-simulated", "duration [s]", "limits used"}, {}, 2};
+  double longest = 0;
+  json["drives"] = Json::object();
+  for (const el::Drive drive : {el::Drive::clutched, el::Drive::series, el::Drive::rigid}) {
+    task.drive = drive;
+    Fastest one{drive, el::find_basins(arm, task, program_options(o), o.starts), {}};
+    longest = std::max(longest, one.basins.longest);
+    Json& j = json["drives"][el::to_string(drive)] = {{"failed_starts", one.basins.failed},
+                                                      {"basins", Json::array()}};
+    for (std::size_t k = 0; k < one.basins.found.size(); ++k) {
+      const el::Basin& basin = one.basins.found[k];
+      const el::Replay run = el::replay(arm, basin.best);
+      table.rows.push_back(
+          {k == 0 ? el::to_string(drive) : "", fmt::to_string(k + 1), fmt::to_string(basin.starts),
+           fmt::format("{:.3f}", basin.best.speed()),
+           run.spring_stop ? "spring at its stop" : fmt::format("{:.3f}", speed_of(run.release)),
+           fmt::format("{:.3f}", basin.best.duration()), fmt::format("{:.1f} %", 100 * run.use.largest())});
+      j["basins"].push_back({{"starts", basin.starts},
+                             {"speed_m_s", basin.best.speed()},
+                             {"resimulated_speed_m_s", speed_of(run.release)},
+                             {"spring_stop", run.spring_stop},
+                             {"duration_s", basin.best.duration()},
+                             {"limits", use_json(run.use)},
+                             {"energy_J",
+                              {{"motors", run.motor_work},
+                               {"damping", run.damping},
+                               {"friction", run.friction},
+                               {"impacts", run.impacts},
+                               {"gain", run.gain},
+                               {"unexplained", run.unexplained()}}}});
+      one.runs.push_back(run);
+    }
+    all.push_back(std::move(one));
+  }
+  json["longest_solve_s"] = longest;
+  fmt::print(
+      "{}\nlongest solve {:.2f} s of CPU time, {} random starts each\nas reported on hardware [DarkoD46] "
+      "4.3: 4.1 m/s with "
+      "BRK -> SEA and motors of 4.5 rad/s, on an arm whose lengths and masses are not published\n",
+      table.text(), longest, o.starts);
+  if (!o.report.empty()) {
+    const fs::path folder = outputs.directory(o.report);
+    draw_speeds(arm, all, folder);
+    write_text(folder / "speeds.md", table.markdown());
+  }
+}
+
+void to_target(const el::ClutchedArm& arm, const Options& o, Outputs& outputs, Json& json) {
+  el::ThrowTask task;
+  task.longest = o.longest > 0 ? o.longest : 1.0;
+  task.start = kReadyPose;
+  task.target = el::Target{o.target_x, o.target_z};
+  std::vector<double> distances;
+  for (int k = 0; k < o.nodes; ++k)
+    distances.push_back(o.target_x - o.half_table + 2 * o.half_table * k / (o.nodes - 1));
+  el::ThrowTable table;
+  try {
+    table = el::make_table(arm, task, distances, program_options(o), o.starts);
+  } catch (const std::runtime_error& error) {
+    throw Unanswered(error.what());
+  }
+  Table text{{"target [m]", "tip speed [m/s]", "duration [s]", "solve [s]", "miss, re-simulated [mm]",
+              "limits used"},
+             {},
+             1};
+  json["nodes"] = Json::array();
+  for (std::size_t k = 0; k < distances.size(); ++k) {
+    const el::ElasticThrow& one = table.throws[k];
+    const el::Replay run = el::replay(arm, one);
+    const double miss = el::landing_x(run.release, o.target_z).value_or(NAN) - distances[k];
+    text.rows.push_back({fmt::format("{:.2f}", distances[k]), fmt::format("{:.3f}", one.speed()),
+                         fmt::format("{:.3f}", one.duration()), fmt::format("{:.2f}", one.program.seconds),
+                         fmt::format("{:+.2f}", 1e3 * miss),
+                         fmt::format("{:.1f} %", 100 * run.use.largest())});
+    json["nodes"].push_back({{"target_m", distances[k]},
+                             {"speed_m_s", one.speed()},
+                             {"duration_s", one.duration()},
+                             {"solve_s", one.program.seconds},
+                             {"limits", use_json(run.use)}});
+  }
+  const auto checks = el::check_table(arm, table, o.checks);
+  double worst = 0, use = 0;
+  int lost = 0, hits = 0;
+  for (const auto& c : checks) {
+    lost += !c.lands;
+    hits += c.lands && std::abs(c.miss) <= o.box / 2;
+    worst = std::max(worst, std::abs(c.miss));
+    use = std::max(use, c.limit_use);
+  }
+  json["check"] = {{"targets", checks.size()},
+                   {"lost", lost},
+                   {"hits", hits},
+                   {"worst_miss_m", worst},
+                   {"largest_limit_use", use}};
+  fmt::print(
+      "{}\ninterpolated between the nodes at {} targets: {} land in the box of {:g} m, worst miss {:.2f} mm, "
+      "limits used at "
+      "most {:.1f} %\n",
+      text.text(), checks.size(), hits, o.box, 1e3 * worst, 100 * use);
+  if (!o.report.empty()) {
+    const fs::path folder = outputs.directory(o.report);
+    draw_table(checks, folder);
+    write_text(folder / "table.md", text.markdown());
+  }
+}
+
+void run(const Options& o) {
+  if (!o.report.empty()) {
+    require_gnuplot();
+    require_writable_directory(o.report);
+  }
+  require_writable(o.json);
+  const el::ClutchedArm arm = el::read_clutched_arm(o.arm);
+  Outputs outputs;
+  Json json = json_head("plan-elastic");
+  json["arm"] = arm.chain.name;
+  if (o.target_x > 0)
+    to_target(arm, o, outputs, json);
+  else
+    fastest(arm, o, outputs, json);
+  if (!o.json.empty()) outputs.json(o.json, json);
+  outputs.commit();
+}
+
+}  // namespace
+
+Command plan_elastic_command(CLI::App& plan) {
+  auto o = std::make_shared<Options>();
+  CLI::App* parser = plan.add_subcommand(
+      "elastic",
+      "Optimal throws of an arm with a clutched spring: the fastest, or a table of throws to targets");
+  parser->footer("Example: unhand plan elastic --target 2.2 --report out/elastic");
+  parser->add_option("--arm", o->arm, "Arm with a clutched last joint (TOML)")->capture_default_str();
+  parser
+      ->add_option("--target", o->target_x,
+                   "Distance of the target box [m]; none: the fastest throw of each drive")
+      ->check(CLI::Range(0.1, 20.0));
+  parser->add_option("--height", o->target_z, "Height of the box against the shoulder [m]")
+      ->capture_default_str();
+  parser->add_option("--box", o->box, "Length of the box along the throw [m]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  parser->add_option("--half-table", o->half_table, "The table covers the target -+ this [m]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  parser->add_option("--nodes", o->nodes, "Nodes of the table")
+      ->check(CLI::Range(4, 1000))
+      ->capture_default_str();
+  parser->add_option("--checks", o->checks, "Targets of the dense check")
+      ->check(CLI::Range(2, 100000))
+      ->capture_default_str();
+  parser->add_option("--starts", o->starts, "Random starts")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  parser->add_option("--intervals", o->intervals, "Collocation intervals per phase")
+      ->check(CLI::Range(2, 500))
+      ->capture_default_str();
+  parser
+      ->add_option("--longest", o->longest, "Longest motion [s]; 0: 0.6 for the fastest throw, 1 to a target")
+      ->check(CLI::Range(0.0, 10.0));
+  parser->add_option("--elevation", o->elevation, "Direction of the fastest throw [deg]")
+      ->check(CLI::Range(-89.0, 89.0))
+      ->capture_default_str();
+  parser->add_option("--seed", o->seed, "Seed of the random starts")->capture_default_str();
+  parser->add_option("--json", o->json, "Write the numbers here");
+  parser->add_option("--report", o->report, "Write tables and figures into this directory");
+  return {parser, [o] { run(*o); }};
+}
+
+}  // namespace unhand::apps

@@ -1,0 +1,148 @@
+#include "planners/control/task_controller.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace unhand::planners::control {
+namespace {
+
+using Joints = JointVector<double>;
+
+/// C(q, a) b of the Christoffel symbols; symmetric in a and b.
+Joints coriolis_between(const Chain& chain, const Joints& q, const Joints& a, const Joints& b) {
+  return 0.5 * (coriolis_torque<double>(chain, q, a + b) - coriolis_torque<double>(chain, q, a) -
+                coriolis_torque<double>(chain, q, b));
+}
+
+Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& R) {
+  const Eigen::AngleAxisd turn(R);
+  return turn.angle() * turn.axis();
+}
+
+}  // namespace
+
+AdaptiveController::AdaptiveController(const Chain& model, const Adaptation& adaptation)
+    : model_(model), adaptation_(adaptation) {
+  const auto refuse = [](const char* name, double value, const char* accepted) {
+    throw std::invalid_argument(fmt::format("adaptation: {} = {}; accepted: {}", name, value, accepted));
+  };
+  if (!(adaptation.gain.minCoeff() >= 0)) refuse("gain", adaptation.gain.minCoeff(), ">= 0");
+  if (!(adaptation.prediction >= 0)) refuse("prediction", adaptation.prediction, ">= 0");
+  if (!(adaptation.torque_weight > 0)) refuse("torque_weight", adaptation.torque_weight, "> 0");
+  if (!(adaptation.filter > 0)) refuse("filter", adaptation.filter, "> 0");
+}
+
+ControlStep AdaptiveController::joint_law(const JointReference& r, const JointGains& gains, const Joints& q,
+                                          const Joints& qd) const {
+  const int last = model_.size() - 1;
+  ControlStep out;
+  out.error.setZero();
+  out.velocity_error = r.qd - qd;
+  Y_r_ = torque_regressor<double>(model_, q, qd, r.qdd, kGravity, last);  // q̇_r = q̇
+  out.torque = model_torque(Y_r_, inverse_dynamics<double>(model_, q, qd, r.qdd)) +
+               friction_torque<double>(model_, qd) + gains.damping.cwiseProduct(out.velocity_error) +
+               gains.stiffness.cwiseProduct(r.q - q);
+  return out;
+}
+
+ControlStep AdaptiveController::task_law(const TaskReference& r, const TaskGains& gains, const Joints& q,
+                                         const Joints& qd) const {
+  const int n = model_.size(), last = n - 1;
+  const TipMotion<double> tip = tip_motion<double>(model_, q, qd, Joints::Zero(n));
+  const Jacobian<double> J = jacobian<double>(model_, q);
+  ControlStep out;
+  out.error << r.position - tip.frame.p, rotation_vector(r.orientation * tip.frame.R.transpose());
+  Eigen::Matrix<double, 6, 1> rate, acceleration, drift;
+  rate << r.velocity, Eigen::Vector3d::Zero();
+  acceleration << r.acceleration, Eigen::Vector3d::Zero();
+  drift << tip.acceleration, tip.alpha;  // J̇ q̇
+  // J⁺ = Jᵀ (J Jᵀ)⁻¹ and N = 1 − J⁺ J, applied.
+  const Eigen::Matrix<double, 6, 6> JJt = J * J.transpose();
+  const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> solver(JJt);
+  const auto reach = [&](const Eigen::Matrix<double, 6, 1>& x) {
+    return Joints(J.transpose() * solver.solve(x));
+  };
+  const auto null = [&](const Joints& x) { return Joints(x - reach(J * x)); };
+  const Joints beta = reach(rate) + null(gains.posture * (gains.rest - q));
+  const Joints alpha = reach(acceleration - drift) - gains.posture * null(qd);
+  out.velocity_error = beta - qd;
+  Y_r_ = slotine_li_regressor<double>(model_, q, qd, beta, alpha, kGravity, last);
+  const Joints nominal =
+      inverse_dynamics<double>(model_, q, Joints::Zero(n), alpha) + coriolis_between(model_, q, qd, beta);
+  Eigen::Matrix<double, 6, 1> pull = gains.stiffness * out.error;
+  pull.tail<3>() = gains.rotational * out.error.tail<3>();
+  out.torque = model_torque(Y_r_, nominal) + friction_torque<double>(model_, qd) +
+               gains.damping.cwiseProduct(out.velocity_error) + J.transpose() * pull;
+  return out;
+}
+
+void AdaptiveController::adapt(const ControlStep& step, const Joints& applied, const Joints& q,
+                               const Joints& qd, double dt) {
+  if (adaptation_.gain.maxCoeff() == 0) return;
+  const int last = model_.size() - 1;
+  LinkParameters rate = Y_r_.transpose() * step.velocity_error;
+  if (adaptation_.prediction > 0) {
+    const double l = adaptation_.filter;
+    const Regressor<double> momentum = momentum_regressor<double>(model_, q, qd, last),
+                            input = l * momentum - momentum_rest_regressor(model_, q, qd, kGravity, last);
+    // The known links: the same columns times their parameters, without forming them.
+    const JointMatrix<double> M = mass_matrix<double>(model_, q);
+    const Joints own = M * qd;
+    using Along = ceres::Jet<double, 1>;
+    JointVector<Along> moving(model_.size());
+    for (int i = 0; i < model_.size(); ++i) {
+      moving[i] = Along(q[i]);
+      moving[i].v[0] = qd[i];
+    }
+    const JointMatrix<Along> M_along = mass_matrix<Along>(model_, moving);
+    Joints M_rate_qd = Joints::Zero(model_.size());
+    for (int i = 0; i < model_.size(); ++i)
+      for (int j = 0; j < model_.size(); ++j) M_rate_qd[i] += M_along(i, j).v[0] * qd[j];
+    const Joints rest = bias_torque<double>(model_, q, qd) - M_rate_qd;  // h = g − Cᵀ q̇
+    // τ_f − Y_f π of the model: λ/(p + λ) (τ + λ p − h) − λ p
+    const Joints input_rest = applied - friction_torque<double>(model_, qd) + l * own - rest;
+    if (!started_) {
+      filtered_ = input;
+      filtered_rest_ = input_rest;
+      started_ = true;
+    }
+    const Regressor<double> Y_f = l * momentum - filtered_;
+    const Joints residual = filtered_rest_ - l * own - Y_f * estimate;
+    rate += adaptation_.prediction * adaptation_.torque_weight * (Y_f.transpose() * residual);
+    const double keep = std::exp(-l * dt);
+    filtered_ = keep * filtered_ + (1 - keep) * input;
+    filtered_rest_ = keep * filtered_rest_ + (1 - keep) * input_rest;
+  }
+  estimate += dt * adaptation_.gain.cwiseProduct(rate);
+}
+
+double lyapunov(const Chain& truth, const TaskGains& gains, const Adaptation& adaptation,
+                const ControlStep& step, const Joints& q, const LinkParameters& error) {
+  const Joints& s = step.velocity_error;
+  double out = 0.5 * s.dot(mass_matrix<double>(truth, q) * s) +
+               0.5 * gains.stiffness * step.error.head<3>().squaredNorm() +
+               0.5 * gains.rotational * step.error.tail<3>().squaredNorm();
+  for (int i = 0; i < kLinkParameters; ++i)
+    if (adaptation.gain[i] > 0) out += 0.5 * error[i] * error[i] / adaptation.gain[i];
+  return out;
+}
+
+TaskReference MinimumJerk::at(double t, const Eigen::Matrix3d& orientation) const {
+  const double T = duration, s = std::clamp(t / T, 0.0, 1.0);
+  const Eigen::Vector3d way = to - from, a = from_velocity * T, b = to_velocity * T;
+  // x(s) = from + a s + c3 s³ + c4 s⁴ + c5 s⁵ with accelerations zero at both ends
+  const Eigen::Vector3d c3 = 10 * way - 6 * a - 4 * b, c4 = -15 * way + 8 * a + 7 * b,
+                        c5 = 6 * way - 3 * a - 3 * b;
+  TaskReference out;
+  out.position = from + s * (a + s * s * (c3 + s * (c4 + s * c5)));
+  out.velocity = (a + s * s * (3 * c3 + s * (4 * c4 + s * 5 * c5))) / T;
+  out.acceleration = s * (6 * c3 + s * (12 * c4 + s * 20 * c5)) / (T * T);
+  out.orientation = orientation;
+  return out;
+}
+
+}  // namespace unhand::planners::control

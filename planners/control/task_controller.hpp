@@ -1,0 +1,99 @@
+// Computed torque with and without adaptation, in the joints and in the task, [DarkoD46] Eq. 31, 34, 35, 36.
+//
+// What is not known is a body in the hand: ten parameters π̃ of the last link beyond the model, estimated as π̂
+// from 0. No law here measures an acceleration or inverts an estimated mass matrix.
+#pragma once
+
+#include <optional>
+
+#include "planners/control/regressor.hpp"
+
+namespace unhand::planners::control {
+
+/// π̂' = R_p (Y_rᵀ s + γ Y_fᵀ R_t (τ_f − Y_f π̂)): s the velocity error, and the second term the prediction
+/// error. Eq. 34 and 36 print Y(q, q̇, q̈) there; its acceleration is avoided by filtering both sides of τ = Y
+/// π through λ/(p + λ), Y_f = λ Y_p − λ/(p + λ) (λ Y_p − Y_h) with the regressors of momentum and of its
+/// rest.
+struct Adaptation {
+  LinkParameters gain =
+      LinkParameters::Zero();  ///< R_p, diagonal: per entry of π̂, >= 0; zeros: no adaptation
+  double prediction{};         ///< γ [-], >= 0
+  double torque_weight{1};     ///< R_t = weight · 1 [1/(N m)², in the units of gain], > 0
+  double filter{50};           ///< λ [1/s], > 0
+};
+
+/// Errors in the joints: τ = M̂ q̈_d + Ĉ q̇ + ĝ + k_v ė + k_p e, Eq. 31.
+struct JointReference {
+  JointVector<double> q, qd, qdd;
+};
+/// Motion of the tip with its orientation kept.
+struct TaskReference {
+  Eigen::Vector3d position, velocity, acceleration;  ///< m, m/s, m/s²
+  Eigen::Matrix3d orientation;
+};
+
+struct JointGains {
+  JointVector<double> stiffness, damping;  ///< k_p [N m/rad], k_v [N m s/rad]; diagonal, > 0
+};
+struct TaskGains {
+  double stiffness{};           ///< k_ξ of the position [N/m], > 0
+  double rotational{};          ///< k_ξ of the orientation [N m/rad], > 0
+  JointVector<double> damping;  ///< k_v [N m s/rad], diagonal, > 0
+  double posture{2};            ///< ȧ_d = posture (q_rest − q) moves in the null space [1/s], >= 0
+  JointVector<double> rest;     ///< q_rest [rad]
+};
+
+/// Quantities of a step that a monitor asks for.
+struct ControlStep {
+  JointVector<double> torque;          ///< τ [N m], before limits
+  JointVector<double> velocity_error;  ///< s = β − q̇ or ė [rad/s]
+  Eigen::Matrix<double, 6, 1> error;  ///< e_ξ: position [m] and rotation vector [rad]; zero in the joint law
+};
+
+class AdaptiveController {
+ public:
+  /// `model`: the chain as it is known, without the unknown body; friction is compensated as the model has
+  /// it.
+  AdaptiveController(const Chain& model, const Adaptation& adaptation);
+
+  ControlStep joint_law(const JointReference& reference, const JointGains& gains,
+                        const JointVector<double>& q, const JointVector<double>& qd) const;
+  ControlStep task_law(const TaskReference& reference, const TaskGains& gains, const JointVector<double>& q,
+                       const JointVector<double>& qd) const;
+
+  /// Advances estimate and filters by dt [s] with the torque applied (after limits), by Euler's rule as a
+  /// controller does.
+  void adapt(const ControlStep& step, const JointVector<double>& applied, const JointVector<double>& q,
+             const JointVector<double>& qd, double dt);
+
+  LinkParameters estimate = LinkParameters::Zero();  ///< π̂
+
+  const Chain& model() const { return model_; }
+
+ private:
+  JointVector<double> model_torque(const Regressor<double>& Y, const JointVector<double>& nominal) const {
+    return nominal + Y * estimate;
+  }
+
+  Chain model_;
+  Adaptation adaptation_;
+  mutable Regressor<double> Y_r_;      ///< of the last step
+  Regressor<double> filtered_;         ///< λ/(p + λ) (λ Y_p − Y_h)
+  JointVector<double> filtered_rest_;  ///< λ/(p + λ) (τ + λ p − h), p and h of the model
+  bool started_{};
+};
+
+/// ½ sᵀ M s + ½ k |e_p|² + ½ k_r |e_r|² + ½ π̃ᵀ R_p⁻¹ π̃ over the adapted parameters, M of the true chain: it
+/// falls as −sᵀ k_v s − γ |Y_f π̃|²_R_t under the task law without noise, limits and friction left over.
+double lyapunov(const Chain& truth, const TaskGains& gains, const Adaptation& adaptation,
+                const ControlStep& step, const JointVector<double>& q, const LinkParameters& error);
+
+/// The quintic of least jerk between two states in `duration` [s], [FlashHogan1985]: position, velocity,
+/// acceleration at t, held beyond the ends.
+struct MinimumJerk {
+  Eigen::Vector3d from, from_velocity, to, to_velocity;
+  double duration{};
+  TaskReference at(double t, const Eigen::Matrix3d& orientation) const;
+};
+
+}  // namespace unhand::planners::control

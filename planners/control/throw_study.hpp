@@ -1,0 +1,86 @@
+// Throws of unknown objects by a Panda under adaptive and plain computed torque: [DarkoD46] 3.1.2 in
+// simulation.
+//
+// The robot is simulated: rigid links, friction, torque limits, noise of sensors and torques, control at 1
+// kHz. The hand holds a body that the controllers do not know; the object leaves at once at the release, with
+// the state of its centre of mass.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "planners/control/task_controller.hpp"
+
+namespace unhand::planners::control {
+
+/// What is thrown: mass [kg], and the width of a cube of its volume [m] for its inertia.
+struct Payload {
+  std::string name;
+  double mass{}, width{};
+};
+/// The objects of [DarkoD46] Fig. 24: masses as given there, widths chosen.
+std::vector<Payload> reported_payloads();
+
+struct ControllerChoice {
+  std::string name;
+  double stiffness{};   ///< k_ξ of the position [N/m], > 0
+  double rotational{};  ///< of the orientation [N m/rad], > 0
+  bool adaptive{};
+};
+/// Adaptive low gain (30 N/m), plain low gain (30 N/m), plain high gain (300 N/m).
+std::vector<ControllerChoice> reported_controllers();
+
+struct StudyOptions {
+  Eigen::Vector3d start{0.38, 0, 0.12};     ///< tip at rest [m]
+  Eigen::Vector3d release{0.52, 0, 0.30};   ///< tip at the release [m]
+  Eigen::Vector3d velocity{1.05, 0, 0.70};  ///< there [m/s]
+  double throw_time{0.7}, brake_time{0.2}, return_time{0.9},
+      hold_time{0.3};               ///< of the parts of a repetition [s]
+  int repetitions{4};               ///< without release, before the throw; >= 0
+  double landing_height{-0.3};      ///< [m]
+  Eigen::Vector2d box{0.20, 0.20};  ///< lengths along x and y [m]: chosen
+  double angle_noise{2e-5};         ///< 1 σ [rad]
+  double rate_noise{5e-3};          ///< [rad/s]
+  double torque_noise{0.05};        ///< [N m]
+  double friction_error{0.1};       ///< 1 σ of each joint's friction against the model's [-]
+  double grasp_offset{0.003};       ///< 1 σ of the object's centre in the hand, per axis [m]
+  double release_jitter{0.002};     ///< 1 σ [s]
+  Adaptation adaptation = default_adaptation();
+
+  static Adaptation default_adaptation();
+};
+
+struct TrackingSample {
+  double t{};
+  double position_error{}, velocity_error{};  ///< norms [m, m/s]
+  double lyapunov{};
+  double mass_estimate{};  ///< kg
+};
+
+struct StudyThrow {
+  Eigen::Vector2d miss{0, 0};  ///< landing − where the reference would land, along and across [m]
+  bool hit{}, lands{};
+  double release_position_error{}, release_velocity_error{};  ///< m, m/s
+  std::vector<double> rms_error;  ///< of the position per repetition, the throw last [m]
+  double torque_use{};            ///< largest share of a joint's torque limit that was asked for
+  int saturated{};                ///< control steps with a torque at its limit
+  LinkParameters estimate = LinkParameters::Zero();
+  std::vector<TrackingSample> history;  ///< every 10 ms, if asked for
+};
+
+/// One run: repetitions without release, then the throw. The same seed gives the same robot, object and noise
+/// to every controller. Throws std::invalid_argument for options out of range.
+StudyThrow run_throw(const ControllerChoice& controller, const Payload& payload, const StudyOptions& options,
+                     std::uint64_t seed, bool record = false);
+
+/// Landings of many seeds.
+struct Dispersion {
+  int throws{}, hits{}, lost{};
+  Eigen::Vector2d mean{0, 0}, std{0, 0};  ///< of the miss [m]
+  double rms{};                           ///< √(mean |miss|²): bias and scatter [m]
+  double largest_torque_use{};
+};
+Dispersion dispersion_of(const std::vector<StudyThrow>& throws);
+
+}  // namespace unhand::planners::control

@@ -1,0 +1,106 @@
+// A planned throw of a clutched arm, run by the event-detected integrator.
+#pragma once
+
+#include <vector>
+
+#include "dynamics/integrator.hpp"
+#include "planners/elastic/throw_program.hpp"
+
+namespace unhand::planners::elastic {
+
+/// (ξ, ξ̇)
+inline constexpr int kStates = 2 * kCoordinates;
+
+/// Motor torques over time: parabolas through three values per interval.
+struct TorqueInterval {
+  double begin{}, end{};  ///< s
+  MotorTorques<double> first, middle, last;
+};
+
+struct ScheduledPhase {
+  ClutchMode mode{};
+  double begin{};  ///< s: its clutches close here, with the impact that this takes
+};
+
+/// Torques and a schedule of clutch modes. The clutches switch at time events, where the rates become what
+/// `engage` leaves of them; a spring at its largest deflection ends the run.
+class ClutchedArmSystem final : public dynamics::HybridSystemFrom<ClutchedArmSystem, kStates> {
+ public:
+  template <class S>
+  using Full = dynamics::State<S, kStates>;
+
+  ClutchedArmSystem(const ClutchedArm& arm, std::vector<ScheduledPhase> phases,
+                    std::vector<TorqueInterval> torques);
+
+  int spring_stop() const { return static_cast<int>(phases_.size()); }  ///< the mode after the last phase
+
+  dynamics::FlowKind kind(int mode) const override;
+  std::string_view mode_name(int mode) const override;
+  int guard_count(int mode) const override { return mode == spring_stop() ? 0 : 1; }
+  dynamics::Guard guard(int, int) const override {
+    return {"spring at its stop", dynamics::Crossing::falling, false};
+  }
+
+  template <class S>
+  void time_events_(std::vector<S>& out) const {
+    out.clear();
+    for (const TorqueInterval& one : torques_) out.push_back(S(one.begin));
+  }
+  template <class S>
+  void flow_(const dynamics::Phase& phase, const S& t, const Full<S>& y, Full<S>& dy) const;
+  template <class S>
+  void guards_(const dynamics::Phase&, const S&, const Full<S>& y, S* g) const {
+    const S share = (y[0] - y[1]) / arm_.last.deflection;
+    g[0] = 1.0 - share * share;
+  }
+  template <class S>
+  dynamics::Entry<S, kStates> on_guard_(const dynamics::Phase&, int, const S& t, const Full<S>& y) const {
+    return {spring_stop(), t, y, S(0.0)};
+  }
+  template <class S>
+  dynamics::Entry<S, kStates> on_time_(int mode, const dynamics::Window& window, const S& t,
+                                       const Full<S>& y) const;
+
+  ClutchMode clutches(int mode) const { return phases_[mode].mode; }
+  /// The torques at t, in the interval that holds at the right of `begin`.
+  template <class S>
+  MotorTorques<S> torque_at(double begin, const S& t) const;
+
+ private:
+  ClutchedArm arm_;
+  std::vector<ScheduledPhase> phases_;
+  std::vector<TorqueInterval> torques_;
+};
+
+struct ReplaySample {
+  double t{};
+  ClutchMode mode{};
+  Coordinates<double> at, rate;
+  MotorTorques<double> torque;
+};
+
+/// The largest share of each limit that is used, 1 = at the limit.
+struct LimitUse {
+  double angle{}, speed{}, torque{}, motor_speed{}, motor_torque{}, deflection{}, brake{};
+  double largest() const;
+};
+
+struct Replay {
+  dynamics::Outcome outcome{};
+  bool spring_stop{};                 ///< the spring came to its largest deflection
+  std::vector<ReplaySample> samples;  ///< dense
+  TipState<double> release;
+  LimitUse use;
+  // Energy from start to end [J]: work of the motors − damping − friction − clutch impacts = gain, but for
+  // `unexplained`.
+  double motor_work{}, damping{}, friction{}, impacts{}, gain{};
+  double unexplained() const { return motor_work - damping - friction - impacts - gain; }
+};
+
+/// Runs the torques of a plan from its first state; `samples_per_interval` >= 1 of the record.
+Replay replay(const ClutchedArm& arm, const ElasticThrow& plan, int samples_per_interval = 20);
+
+/// Where the object comes down at the height z, released at the end; empty: it never gets there.
+std::optional<double> landing_x(const TipState<double>& release, double z, double gravity = 9.81);
+
+}  // namespace unhand::planners::elastic

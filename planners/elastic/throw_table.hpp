@@ -1,0 +1,52 @@
+// Many throws at once: the basins of one task, and a table of solutions over targets that a choice online
+// interpolates.
+#pragma once
+
+#include <vector>
+
+#include "planners/elastic/replay.hpp"
+
+namespace unhand::planners::elastic {
+
+/// Solutions of one task from random starts whose objectives agree within `share`.
+struct Basin {
+  ElasticThrow best;
+  int starts{};  ///< that ended here
+};
+struct Basins {
+  std::vector<Basin> found;  ///< best first
+  int failed{};              ///< starts that ended nowhere
+  double longest{};          ///< CPU time of the longest solve [s]
+  int failed_by_budget{};    ///< of those, spent iterations or time
+};
+Basins find_basins(const ClutchedArm& arm, const ThrowTask& task, const ThrowProgramOptions& options,
+                   int starts, double share = 0.01);
+
+/// Throws to targets at one height, by increasing distance.
+struct ThrowTable {
+  double height{};  ///< z of all targets [m]
+  std::vector<double> distances;
+  std::vector<ElasticThrow> throws;
+};
+
+/// Solves the task for each distance [m], increasing, at least four: the middle one from `starts` random
+/// starts (the best basin is taken), the others from their neighbour's solution, so that the table is of one
+/// family. Throws std::runtime_error naming the distance where there is none.
+ThrowTable make_table(const ClutchedArm& arm, ThrowTask task, const std::vector<double>& distances,
+                      const ThrowProgramOptions& options, int starts = 6);
+
+/// The throw to a target between nodes: durations, motor torques and states through the four nearest nodes by
+/// Lagrange's cubic. Throws std::invalid_argument outside the table.
+ElasticThrow interpolate(const ThrowTable& table, double distance);
+
+/// One target of a dense check: the interpolated throw run by the integrator.
+struct TableCheck {
+  double distance{};
+  double miss{};       ///< landing − target [m]
+  double limit_use{};  ///< largest share of any limit; <= 1: none is exceeded
+  bool lands{};        ///< the run came to its end and the object comes down to the height
+};
+std::vector<TableCheck> check_table(const ClutchedArm& arm, const ThrowTable& table, int count,
+                                    double gravity = 9.81);
+
+}  // namespace unhand::planners::elastic

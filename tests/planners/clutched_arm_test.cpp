@@ -1,0 +1,195 @@
+// The arm with a clutched spring: constraints, impacts, energy, and what a run by the integrator makes of a
+// plan.
+#include "planners/elastic/clutched_arm.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <random>
+
+#include "planners/elastic/replay.hpp"
+#include "planners/elastic/second_dual.hpp"
+
+namespace unhand::planners::elastic {
+namespace {
+
+constexpr ClutchMode kModes[]{ClutchMode::free, ClutchMode::hold, ClutchMode::sea, ClutchMode::brk,
+                              ClutchMode::rigid};
+
+ClutchedArm bsa3() { return read_clutched_arm(std::filesystem::path(UNHAND_ELASTIC_ARMS) / "bsa3.toml"); }
+
+struct RandomState {
+  Coordinates<double> at, rate;
+  MotorTorques<double> torque;
+};
+RandomState state_of(std::mt19937_64& random) {
+  std::uniform_real_distribution<double> one(-1, 1);
+  RandomState s;
+  for (int i = 0; i < kCoordinates; ++i) s.at[i] = one(random), s.rate[i] = 5 * one(random);
+  for (int i = 0; i < 3; ++i) s.torque[i] = 10 * one(random);
+  return s;
+}
+
+TEST(ClutchedArm, ClosingClutchesLosesTheEnergyOfTheLostVelocities) {
+  const ClutchedArm arm = bsa3();
+  std::mt19937_64 random(1);
+  for (const ClutchMode mode : kModes)
+    for (int k = 0; k < 50; ++k) {
+      const auto [at, rate, torque] = state_of(random);
+      const Coordinates<double> after = engage<double>(arm, mode, at, rate),
+                                again = engage<double>(arm, mode, at, after);
+      const auto P = inertia_of<double>(arm, at.tail<3>());
+      const auto Z = free_velocities(mode);
+      // Rounding of sums of order 10 with a reduced inertia of condition 1e3.
+      const Coordinates<double> taken = P * (rate - after);
+      double along_free = 0;
+      for (int c = 0; c < Z.cols(); ++c) along_free = std::max(along_free, std::abs(Z.col(c).dot(taken)));
+      EXPECT_LE(along_free, 1e-12 * (P * rate).norm()) << to_string(mode);
+      EXPECT_LE((again - after).norm(), 1e-11 * rate.norm()) << to_string(mode);
+      const Coordinates<double> lost = rate - after;
+      const double before_J = 0.5 * rate.dot(P * rate), after_J = 0.5 * after.dot(P * after),
+                   carnot = 0.5 * lost.dot(P * lost);
+      EXPECT_NEAR(before_J - after_J, carnot, 1e-12 * before_J) << to_string(mode);
+      if (mode == ClutchMode::free) {
+        EXPECT_LE(lost.norm(), 1e-11 * rate.norm());
+      }
+    }
+}
+
+TEST(ClutchedArm, ClutchesHoldWhatTheySay) {
+  const ClutchedArm arm = bsa3();
+  std::mt19937_64 random(2);
+  for (int k = 0; k < 50; ++k) {
+    const auto [at, rate, torque] = state_of(random);
+    const auto in = [&](ClutchMode mode) {
+      return acceleration_in<double>(arm, mode, at, engage<double>(arm, mode, at, rate), torque);
+    };
+    EXPECT_EQ(in(ClutchMode::hold)[1], 0);
+    EXPECT_EQ(in(ClutchMode::sea)[1], in(ClutchMode::sea)[4]);
+    EXPECT_EQ(in(ClutchMode::brk)[1], 0);
+    EXPECT_EQ(in(ClutchMode::brk)[4], 0);
+    EXPECT_EQ(in(ClutchMode::rigid)[0], in(ClutchMode::rigid)[4]);
+    // All open, the equations are those of the arm and of two bodies with a spring between them.
+    const Coordinates<double> a = in(ClutchMode::free);
+    const double spring = arm.last.stiffness * (at[0] - at[1]) + arm.last.damping * (rate[0] - rate[1]);
+    EXPECT_NEAR(arm.last.motor_inertia * a[0], torque[2] - spring, 1e-12 * (1 + std::abs(spring)));
+    EXPECT_NEAR(arm.last.spring_inertia * a[1], spring, 1e-12 * (1 + std::abs(spring)));
+    const Links<double> tau = joint_torque<double>(arm, at.tail<3>(), rate.tail<3>(), a.tail<3>());
+    EXPECT_NEAR(tau[0], torque[0], 1e-11 * (1 + tau.norm()));
+    EXPECT_NEAR(tau[1], torque[1], 1e-11 * (1 + tau.norm()));
+    EXPECT_NEAR(tau[2], 0, 1e-11 * (1 + tau.norm()));
+  }
+}
+
+/// A motion that goes through several modes, two of them entered with an impact.
+Replay tour(const ClutchedArm& arm, int intervals) {
+  ElasticThrow plan;
+  const double length = 0.05;
+  double t = 0;
+  for (const ClutchMode mode :
+       {ClutchMode::free, ClutchMode::sea, ClutchMode::hold, ClutchMode::brk, ClutchMode::sea}) {
+    ThrowPhase& phase = plan.phases.emplace_back();
+    phase.mode = mode;
+    for (int k = 0; k <= 2 * intervals; ++k) {
+      ThrowPoint p{t + length * k / (2 * intervals), Coordinates<double>::Zero(), Coordinates<double>::Zero(),
+                   Coordinates<double>::Zero(), MotorTorques<double>(12, 6, 1.5)};
+      p.at.tail<3>() << 0.4, 0.6, -0.3;
+      p.at[0] = p.at[1] = -0.3;
+      phase.points.push_back(p);
+    }
+    t += length;
+  }
+  return replay(arm, plan);
+}
+
+TEST(ClutchedArm, TheLedgerOfARunCloses) {
+  const Replay run = tour(bsa3(), 2);
+  EXPECT_EQ(run.outcome, dynamics::Outcome::horizon);
+  EXPECT_FALSE(run.spring_stop);
+  EXPECT_GT(run.impacts, 1e-3);  // two of the switches close clutches on moving parts
+  EXPECT_GT(run.motor_work, 0.1);
+  // The integrator's tolerance is 1e-10; Gauss's rule on its pieces of quartics is of order 6, pieces are
+  // below 5 ms.
+  EXPECT_NEAR(run.unexplained(), 0, 1e-6 * run.motor_work);
+}
+
+TEST(ClutchedArm, ASpringAtItsStopEndsTheRun) {
+  ClutchedArm arm = bsa3();
+  arm.last.deflection = 0.02;
+  const Replay run = tour(arm, 2);
+  EXPECT_EQ(run.outcome, dynamics::Outcome::finished);
+  EXPECT_TRUE(run.spring_stop);
+  const ReplaySample& last = run.samples.back();
+  EXPECT_NEAR(std::abs(last.at[0] - last.at[1]), 0.02, 1e-9);  // the polished root
+}
+
+TEST(ClutchedArm, TheTipMovesAsItsPositionDoes) {
+  const ClutchedArm arm = bsa3();
+  std::mt19937_64 random(4);
+  const auto [at, rate, torque] = state_of(random);
+  const Links<double> q = at.tail<3>(), qd = rate.tail<3>();
+  const auto tip = tip_of<double>(arm, q, qd);
+  double best = 1;
+  for (double h = 1e-2; h > 1e-8; h /= 10) {  // central differences over powers of ten
+    const auto a = tip_of<double>(arm, q + h * qd, qd), b = tip_of<double>(arm, q - h * qd, qd);
+    best = std::min(best, std::hypot((a.x - b.x) / (2 * h) - tip.vx, (a.z - b.z) / (2 * h) - tip.vz));
+  }
+  EXPECT_LT(best, 1e-8);  // h^2 against rounding/h meet near 1e-9
+}
+
+TEST(ClutchedArm, SecondDerivativesAreThoseOfTheFirst) {
+  const ClutchedArm arm = bsa3();
+  std::mt19937_64 random(5);
+  const auto [at, rate, torque] = state_of(random);
+  using Second = SecondDual<9>;
+  const auto law = [&](auto x) {  // the torque of joint 1
+    using S = std::decay_t<decltype(x[0])>;
+    return joint_torque<S>(arm, Links<S>(x[0], x[1], x[2]), Links<S>(x[3], x[4], x[5]),
+                           Links<S>(x[6], x[7], x[8]))[0];
+  };
+  std::array<double, 9> x{};
+  for (int i = 0; i < 3; ++i) x[i] = at[2 + i], x[3 + i] = rate[2 + i], x[6 + i] = 3.0 * torque[i];
+  std::array<Second, 9> seeded;
+  for (int i = 0; i < 9; ++i) seeded[i] = Second::independent(x[i], i);
+  const Second exact = law(seeded);
+  EXPECT_NEAR(exact.a, law(x), 1e-12 * std::abs(exact.a));
+  for (int i = 0, k = 0; i < 9; ++i)
+    for (int j = 0; j <= i; ++j, ++k) {
+      double best = 1e9;
+      for (double h = 1e-1; h > 1e-6; h /= 10) {  // of the gradient
+        auto a = seeded, b = seeded;
+        a[j].a += h;
+        b[j].a -= h;
+        best = std::min(best, std::abs((law(a).v[i] - law(b).v[i]) / (2 * h) - exact.h[k]));
+      }
+      EXPECT_LT(best, 1e-7 * (1 + std::abs(exact.h[k]))) << i << ' ' << j;
+    }
+}
+
+TEST(ClutchedArm, RefusesWhatIsNone) {
+  const auto refused = [](ClutchedArm arm, const char* why) {
+    try {
+      validate(arm);
+      ADD_FAILURE() << "accepted: " << why;
+    } catch (const std::invalid_argument& error) {
+      EXPECT_THAT(error.what(), testing::HasSubstr(why));
+    }
+  };
+  ClutchedArm arm = bsa3();
+  arm.last.stiffness = 0;
+  refused(arm, "stiffness = 0; accepted: > 0");
+  arm = bsa3();
+  arm.chain.joints.pop_back();
+  refused(arm, "2 joints; accepted: 3");
+  arm = bsa3();
+  arm.rotor_inertia[2] = 0.1;
+  refused(arm, "behind the spring");
+  arm = bsa3();
+  arm.chain.joints[0].origin.R.setIdentity();
+  refused(arm, "the axis of joint 'shoulder' is not");
+}
+
+}  // namespace
+}  // namespace unhand::planners::elastic

@@ -1,0 +1,126 @@
+// Throws as optimal control: known optima, agreement with the integrator, limits between the points, order of
+// the mesh.
+#include "planners/elastic/throw_program.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "planners/elastic/throw_table.hpp"
+
+namespace unhand::planners::elastic {
+namespace {
+
+ClutchedArm bsa3() { return read_clutched_arm(std::filesystem::path(UNHAND_ELASTIC_ARMS) / "bsa3.toml"); }
+
+struct Rosenbrock {
+  template <class S>
+  void operator()(const S* x, S* f) const {
+    const S a = x[1] - x[0] * x[0], b = 1.0 - x[0];
+    f[0] = 100.0 * a * a + b * b;
+  }
+};
+struct Circle {
+  template <class S>
+  void operator()(const S* x, S* f) const {
+    f[0] = x[0] * x[0] + x[1] * x[1];
+  }
+};
+
+TEST(NonlinearProgram, FindsKnownMinima) {
+  NonlinearProgram program;
+  program.add_variable(-10, 10, -1.2);
+  program.add_variable(-10, 10, 1);
+  program.minimise(std::make_unique<TermOf<2, 1, Rosenbrock>>(std::vector{0, 1}, Rosenbrock{}));
+  const ProgramSummary free = solve(program);
+  ASSERT_EQ(free.outcome, ProgramOutcome::solved);
+  EXPECT_NEAR(free.x[0], 1, 1e-6);  // the optimality error of 1e-7 over a curvature of 0.4 along the valley
+  EXPECT_NEAR(free.x[1], 1, 2e-6);
+  program.constrain(std::make_unique<TermOf<2, 1, Circle>>(std::vector{0, 1}, Circle{}), {0}, {1});
+  const ProgramSummary inside = solve(program);
+  ASSERT_EQ(inside.outcome, ProgramOutcome::solved);
+  // On the circle, x = cos a with the derivative along it zero: 0.786415, 0.617698 (a root found
+  // independently).
+  EXPECT_NEAR(inside.x[0], 0.7864151542, 1e-6);
+  EXPECT_NEAR(inside.x[1], 0.6176983125, 1e-6);
+}
+
+TEST(NonlinearProgram, SaysWhenNothingIsFeasible) {
+  NonlinearProgram program;
+  program.add_variable(-1, 1, 0);
+  program.add_variable(-1, 1, 0.1);
+  program.minimise(std::make_unique<TermOf<2, 1, Rosenbrock>>(std::vector{0, 1}, Rosenbrock{}));
+  program.constrain(std::make_unique<TermOf<2, 1, Circle>>(std::vector{0, 1}, Circle{}), {3}, {4});
+  EXPECT_EQ(solve(program).outcome, ProgramOutcome::infeasible);
+  program.lower[0] = 2;
+  EXPECT_THROW(solve(program), std::invalid_argument);
+}
+
+ElasticThrow planned(Drive drive, int intervals, std::optional<Target> target = {}) {
+  ThrowTask task;
+  task.drive = drive;
+  task.longest = 0.6;
+  task.target = target;
+  ThrowProgramOptions options;
+  options.intervals = intervals;
+  return plan_throw(bsa3(), task, options);
+}
+
+TEST(ElasticThrow, TheIntegratorAgreesAndNoLimitIsExceeded) {
+  for (const Drive drive : {Drive::clutched, Drive::series, Drive::rigid}) {
+    const ElasticThrow plan = planned(drive, 16);
+    ASSERT_TRUE(plan.solved()) << to_string(drive);
+    EXPECT_LT(plan.program.violation, 1e-6);
+    const Replay run = replay(bsa3(), plan);
+    EXPECT_EQ(run.outcome, dynamics::Outcome::horizon) << to_string(drive);
+    // Hermite-Simpson on 32 steps of 20 ms under torques with corners: some 1e-3 of the speed.
+    EXPECT_NEAR(std::hypot(run.release.vx, run.release.vz), plan.speed(), 0.01 * plan.speed())
+        << to_string(drive);
+    EXPECT_LE(run.use.largest(), 1) << to_string(drive);
+    EXPECT_NEAR(run.unexplained(), 0, 1e-6 * std::abs(run.motor_work)) << to_string(drive);
+    EXPECT_NEAR(plan.release.vz / plan.release.vx, 1, 1e-6);  // thrown at 45 degrees
+  }
+}
+
+TEST(ElasticThrow, TheSpringLetGoIsFasterThanTheRigidJoint) {
+  EXPECT_GT(planned(Drive::clutched, 10).speed(), 1.05 * planned(Drive::rigid, 10).speed());
+}
+
+TEST(ElasticThrow, LandsOnItsTarget) {
+  const ElasticThrow plan = planned(Drive::clutched, 12, Target{2.2, -0.5});
+  ASSERT_TRUE(plan.solved());
+  const auto x = landing_x(plan.release, -0.5);
+  ASSERT_TRUE(x);
+  EXPECT_NEAR(*x, 2.2, 1e-6);
+  const Replay run = replay(bsa3(), plan);
+  EXPECT_NEAR(landing_x(run.release, -0.5).value_or(0), 2.2, 0.02);  // collocation's error
+  EXPECT_LE(run.use.largest(), 1);
+}
+
+TEST(ElasticThrow, BetweenTheNodesOfATableNoLimitIsExceeded) {
+  ThrowTask task;
+  task.target = Target{2.2, -0.5};
+  task.start = Links<double>(0.2, -1.0, -0.5);
+  ThrowProgramOptions options;
+  options.intervals = 10;
+  const ThrowTable table = make_table(bsa3(), task, {2.0, 2.1, 2.2, 2.3, 2.4}, options, 2);
+  for (const TableCheck& check : check_table(bsa3(), table, 17)) {
+    EXPECT_TRUE(check.lands) << check.distance;
+    EXPECT_LE(check.limit_use, 1) << check.distance;
+    EXPECT_LT(std::abs(check.miss), 0.01)
+        << check.distance;  // collocation's error, and cubic between nodes of 10 cm
+  }
+  EXPECT_THROW(interpolate(table, 1.9), std::invalid_argument);
+}
+
+TEST(ElasticThrow, RefusesATaskWithoutSense) {
+  ThrowTask task;
+  task.margin = 0.7;
+  EXPECT_THAT([&] { plan_throw(bsa3(), task); },
+              testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("margin = 0.7")));
+}
+
+}  // namespace
+}  // namespace unhand::planners::elastic
