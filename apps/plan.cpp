@@ -8,7 +8,8 @@ namespace unhand::apps {
 Command plan_command(CLI::App& root) {
   CLI::App* parser = root.add_subcommand("plan", "Plan a throw");
   parser->require_subcommand(1);
-  const std::vector<Command> planners{plan_throw_command(*parser), plan_elastic_command(*parser)};
+  const std::vector<Command> planners{plan_throw_command(*parser), plan_control_command(*parser),
+                                      plan_elastic_command(*parser), plan_wrist_command(*parser)};
   return {parser, [planners] {
             for (const Command& planner : planners)
               if (planner.parser->parsed()) planner.run();

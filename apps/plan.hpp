@@ -5,6 +5,8 @@
 
 namespace unhand::apps {
 
+Command plan_control_command(CLI::App& plan);
+Command plan_wrist_command(CLI::App& plan);
 Command plan_elastic_command(CLI::App& plan);
 Command plan_throw_command(CLI::App& plan);
 

@@ -20,6 +20,10 @@ const char* to_string(ClutchMode mode) {
       return "SEA";
     case ClutchMode::brk:
       return "BRK";
+    case ClutchMode::still:
+      return "spring";
+    case ClutchMode::locked:
+      return "locked";
     case ClutchMode::rigid:
       break;
   }
@@ -49,6 +53,10 @@ Eigen::Matrix<double, kCoordinates, Eigen::Dynamic, 0, kCoordinates, kCoordinate
       return of({{0}, {1, 4}, {2}, {3}});
     case ClutchMode::brk:
       return of({{0}, {2}, {3}});
+    case ClutchMode::still:
+      return of({{1, 4}, {2}, {3}});
+    case ClutchMode::locked:
+      return of({{2}, {3}});
     case ClutchMode::rigid:
       break;
   }

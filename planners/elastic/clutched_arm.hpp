@@ -31,11 +31,13 @@ using MotorTorques = Eigen::Matrix<S, 3, 1>;
 
 /// Which clutches are engaged.
 enum class ClutchMode {
-  free,   ///< none: the link swings, the spring's far end oscillates by itself
-  hold,   ///< brake: ψ̇ = 0, the link swings
-  sea,    ///< link clutch: ψ̇ = q̇₃, a series elastic joint
-  brk,    ///< both: ψ̇ = q̇₃ = 0, the motor loads the spring while the link is held
-  rigid,  ///< motor and link locked across the spring: θ̇ = ψ̇ = q̇₃
+  free,    ///< none: the link swings, the spring's far end oscillates by itself
+  hold,    ///< brake: ψ̇ = 0, the link swings
+  sea,     ///< link clutch: ψ̇ = q̇₃, a series elastic joint
+  brk,     ///< both: ψ̇ = q̇₃ = 0, the motor loads the spring while the link is held
+  still,   ///< SEA with the motor held, θ̇ = 0: a passive spring
+  locked,  ///< BRK with the motor held: a rigid wrist
+  rigid,   ///< motor and link locked across the spring: θ̇ = ψ̇ = q̇₃
 };
 const char* to_string(ClutchMode);
 

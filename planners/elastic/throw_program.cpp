@@ -40,7 +40,7 @@ class ThrowProgram {
       add_phase(ClutchMode::brk, options.intervals);
       add_phase(ClutchMode::sea, options.intervals);
     } else {
-      add_phase(task.drive == Drive::series ? ClutchMode::sea : ClutchMode::rigid, 2 * options.intervals);
+      add_phase(mode_of(task.drive), 2 * options.intervals);
     }
     fix_start();
     constrain_release();
@@ -55,6 +55,19 @@ class ThrowProgram {
   }
 
  private:
+  static ClutchMode mode_of(Drive drive) {
+    switch (drive) {
+      case Drive::rigid:
+        return ClutchMode::rigid;
+      case Drive::passive:
+        return ClutchMode::still;
+      case Drive::locked:
+        return ClutchMode::locked;
+      default:
+        return ClutchMode::sea;
+    }
+  }
+
   double uniform(double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random_);
   }
@@ -103,8 +116,9 @@ class ThrowProgram {
     }
     PointVariables p;
     for (int i = 0; i < 4; ++i) {
-      const bool held = phase.mode == ClutchMode::brk && i == 2,
-                 locked = phase.mode == ClutchMode::rigid && i == 3;
+      const bool passive = phase.mode == ClutchMode::still || phase.mode == ClutchMode::locked,
+                 held = (phase.mode == ClutchMode::brk || phase.mode == ClutchMode::locked) && i == 2,
+                 fixed_motor = passive && i == 3, locked = phase.mode == ClutchMode::rigid && i == 3;
       double low = -kNone, high = kNone, speed = arm_.last.motor_speed;
       if (i < kLinks) {
         const JointLimits& l = arm_.chain.joints[i].limits;
@@ -115,6 +129,11 @@ class ThrowProgram {
       speed *= keep_;
       if (locked) {
         p.at[i] = p.rate[i] = p.acceleration[i] = kFixed;
+      } else if (fixed_motor) {
+        if (phase.mode == ClutchMode::locked) equilibrium_ = p.at[2];  // its spring is out of the game
+        p.at[i] = equilibrium_ =
+            equilibrium_ == kFixed ? program_.add_variable(low, high, at[i]) : equilibrium_;
+        p.rate[i] = p.acceleration[i] = kFixed;
       } else if (held) {
         p.at[i] = held_ = held_ == kFixed ? program_.add_variable(low, high, at[i]) : held_;
         p.rate[i] = p.acceleration[i] = kFixed;
@@ -124,7 +143,10 @@ class ThrowProgram {
                                                         : program_.add_variable(-speed, speed, rate[i]);
         if (shared && shared->rate[i] == kFixed)  // the held link is let go: it starts from rest
           program_.lower[p.rate[i]] = program_.upper[p.rate[i]] = program_.start[p.rate[i]] = 0;
-        p.acceleration[i] = program_.add_variable(-kNone, kNone, acceleration[i]);
+        const double most =
+            i < kLinks ? keep_ * arm_.chain.joints[i].limits.acceleration / kAcceleration : kNone;
+        p.acceleration[i] =
+            program_.add_variable(-std::min(most, kNone), std::min(most, kNone), acceleration[i]);
       }
     }
     return p;
@@ -171,6 +193,7 @@ class ThrowProgram {
         }
   }
 
+  /// A held motor gives nothing: its torque stays zero.
   void add_torques(PointVariables& p, const ThrowPoint* near) {
     const double limit[3]{arm_.chain.joints[0].limits.torque, arm_.chain.joints[1].limits.torque,
                           arm_.last.motor_torque};
@@ -192,6 +215,16 @@ class ThrowProgram {
       case ClutchMode::rigid:
         program_.constrain(rigid_torques(with_torques({q1, q2, q3, v1, v2, v3, a1, a2, a3}, 3), arm_),
                            {0, 0, 0}, {0, 0, 0});
+        return;
+      case ClutchMode::still:
+        program_.constrain(passive_torques(with_torques({q1, q2, q3, v1, v2, v3, a1, a2, a3, th}, 2), arm_),
+                           {0, 0, 0}, {0, 0, 0});
+        program_.constrain(linear({th, q3}, {1, -1}), {-keep_ * arm_.last.deflection},
+                           {keep_ * arm_.last.deflection});
+        return;
+      case ClutchMode::locked:
+        program_.constrain(locked_torques(with_torques({q1, q2, q3, v1, v2, a1, a2}, 2), arm_), {0, 0},
+                           {0, 0});
         return;
       case ClutchMode::brk: {
         const double brake = keep_ * arm_.last.brake_torque;
@@ -227,7 +260,8 @@ class ThrowProgram {
     if (task_.start)
       for (int i = 0; i < kLinks; ++i) fix(p.at[i], (*task_.start)[i]);
     if (phase.mode == ClutchMode::brk) program_.constrain(linear({p.at[3], p.at[2]}, {1, -1}), {0}, {0});
-    if (phase.mode == ClutchMode::sea)  // in equilibrium: a spring loaded beforehand would be a present
+    if (phase.mode == ClutchMode::sea ||
+        phase.mode == ClutchMode::still)  // in equilibrium: a spring loaded beforehand would be a present
       for (int i = 0; i < 4; ++i) fix(p.acceleration[i], 0);
   }
 
@@ -295,7 +329,7 @@ class ThrowProgram {
   std::mt19937_64 random_;
   Links<double> from_, to_;
   double load_{}, guess_duration_{};
-  int held_{kFixed};
+  int held_{kFixed}, equilibrium_{kFixed};  ///< the angle of a held link, and of a held motor
   NonlinearProgram program_;
   std::vector<PhasePlan> phases_;
 };
@@ -323,6 +357,10 @@ void check(const ClutchedArm& arm, const ThrowTask& task, const ThrowProgramOpti
 
 const char* to_string(Drive drive) {
   switch (drive) {
+    case Drive::passive:
+      return "spring";
+    case Drive::locked:
+      return "locked";
     case Drive::clutched:
       return "BRK -> SEA";
     case Drive::series:

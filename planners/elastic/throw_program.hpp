@@ -20,6 +20,8 @@ enum class Drive {
   clutched,  ///< BRK, then SEA: the spring is loaded while the other joints move, then let go
   series,    ///< SEA throughout, from rest
   rigid,     ///< motor and link locked
+  passive,   ///< a spring with a fixed equilibrium angle, chosen once: the elastic wrist of [DarkoD46] 3.2
+  locked,    ///< the last joint held at an angle, chosen once: a rigid wrist
 };
 const char* to_string(Drive);
 

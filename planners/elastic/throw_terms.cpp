@@ -22,15 +22,16 @@ struct HermiteSimpson {
 constexpr int kSlots = 9;
 
 /// (q, q̇, q̈/kAcceleration) -> joint torques
+template <int Outputs>
 struct JointTorques {
-  static constexpr int kOutputs = kLinks;
+  static constexpr int kOutputs = Outputs;
   const ClutchedArm* arm;
   template <class S>
   void operator()(const S* x, S* f) const {
     const Links<S> tau =
         joint_torque<S>(*arm, Links<S>(x[0], x[1], x[2]), Links<S>(x[3], x[4], x[5]),
                         Links<S>(kAcceleration * x[6], kAcceleration * x[7], kAcceleration * x[8]));
-    for (int i = 0; i < kLinks; ++i) f[i] = tau[i];
+    for (int i = 0; i < kOutputs; ++i) f[i] = tau[i];
   }
 };
 
@@ -167,8 +168,8 @@ TermPointer torques(std::vector<int> v, std::vector<int> slots, const ClutchedAr
                     std::vector<Linear> linear_part, int base, int motors) {
   const int sets = (static_cast<int>(v.size()) - base) / motors;
   for (int k = 0; k < sets * motors; ++k) linear_part.push_back({k % motors, base + k, -1.0 / sets});
-  return std::make_unique<SlotTerm<JointTorques>>(std::move(v), std::move(slots), JointTorques{&arm},
-                                                  std::move(linear_part));
+  return std::make_unique<SlotTerm<JointTorques<kLinks>>>(std::move(v), std::move(slots),
+                                                          JointTorques<kLinks>{&arm}, std::move(linear_part));
 }
 
 }  // namespace
@@ -187,6 +188,22 @@ TermPointer braked_torques(std::vector<int> v, const ClutchedArm& arm) {
   const ClutchedJoint& j = arm.last;
   return torques(std::move(v), {0, 1, 2, 3, 4, 6, 7}, arm,
                  {{2, 7, -j.stiffness}, {2, 2, j.stiffness}, {2, 8, -j.damping}}, 9, 2);
+}
+TermPointer passive_torques(std::vector<int> v, const ClutchedArm& arm) {
+  const ClutchedJoint& j = arm.last;
+  return torques(std::move(v), {0, 1, 2, 3, 4, 5, 6, 7, 8}, arm,
+                 {{2, 8, kAcceleration * j.spring_inertia},
+                  {2, 9, -j.stiffness},
+                  {2, 2, j.stiffness},
+                  {2, 5, j.damping}},
+                 10, 2);
+}
+TermPointer locked_torques(std::vector<int> v, const ClutchedArm& arm) {
+  std::vector<Linear> drives;
+  const int sets = (static_cast<int>(v.size()) - 7) / 2;
+  for (int k = 0; k < 2 * sets; ++k) drives.push_back({k % 2, 7 + k, -1.0 / sets});
+  return std::make_unique<SlotTerm<JointTorques<2>>>(std::move(v), std::vector{0, 1, 2, 3, 4, 6, 7},
+                                                     JointTorques<2>{&arm}, std::move(drives));
 }
 TermPointer rigid_torques(std::vector<int> v, const ClutchedArm& arm) {
   return torques(std::move(v), {0, 1, 2, 3, 4, 5, 6, 7, 8}, arm,

@@ -35,6 +35,10 @@ TermPointer series_torques(std::vector<int> variables, const ClutchedArm& arm);
 /// (q, q̇₁, q̇₂, q̈₁, q̈₂, θ, θ̇; τ₁, τ₂) -> what the torques lack, and the torque of the brake that holds the
 /// last link.
 TermPointer braked_torques(std::vector<int> variables, const ClutchedArm& arm);
+/// (q, q̇, q̈, θ; τ₁, τ₂) -> the same as series_torques with the motor held at θ.
+TermPointer passive_torques(std::vector<int> variables, const ClutchedArm& arm);
+/// (q, q̇₁, q̇₂, q̈₁, q̈₂; τ₁, τ₂) -> what the torques of joints 1 and 2 lack, the last link held.
+TermPointer locked_torques(std::vector<int> variables, const ClutchedArm& arm);
 /// (q, q̇, q̈; τ₁, τ₂, τ_m) -> what the torques lack, the last motor locked to its link.
 TermPointer rigid_torques(std::vector<int> variables, const ClutchedArm& arm);
 

@@ -1,0 +1,180 @@
+// unhand plan control: throws of unknown objects under adaptive and plain computed torque, in simulation.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+
+#include "apps/figure.hpp"
+#include "apps/output.hpp"
+#include "apps/plan.hpp"
+#include "apps/table.hpp"
+#include "experiment/parallel.hpp"
+#include "planners/control/throw_study.hpp"
+
+namespace unhand::apps {
+namespace {
+
+namespace ct = planners::control;
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string json, report;
+  int seeds{50}, repetitions{4}, threads{0};
+  double box{0.2};
+};
+
+struct Cell {
+  ct::Payload payload;
+  ct::ControllerChoice controller;
+  std::vector<ct::StudyThrow> throws;
+  ct::Dispersion landed;
+};
+
+const char* kLook[]{"pt 7 ps 0.5 lc rgb '#0072b2'", "pt 6 ps 0.6 lc rgb '#d55e00'",
+                    "pt 2 ps 0.6 lc rgb '#555555'"};
+const char* kLine[]{"lw 2 dt 1 lc rgb '#0072b2'", "lw 2 dt 2 lc rgb '#d55e00'", "lw 2 dt 4 lc rgb '#555555'"};
+
+void draw_landings(const std::vector<Cell>& cells, double box, const fs::path& folder) {
+  Figure figure{"landings", 17, 8, {}, ""};
+  std::string script =
+      "set multiplot layout 1,3\nset grid\nset size square\nset xlabel 'forward [cm]'\nset ylabel 'across "
+      "[cm]'\nset key off\n";
+  script +=
+      fmt::format("set object 1 rectangle from {0},{0} to {1},{1} fs empty border lc rgb '#000000' lw 1\n",
+                  -50 * box, 50 * box);
+  script += fmt::format("set yrange [{}:{}]\nset xrange [{}:{}]\n", -60 * box, 60 * box, -60 * box, 60 * box);
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    DataBlock block{
+        cells[i].payload.name + ", " + cells[i].controller.name, {"forward [cm]", "across [cm]"}, {}, {}};
+    for (const auto& one : cells[i].throws)
+      if (one.lands) block.rows.push_back({100 * one.miss.x(), 100 * one.miss.y()});
+    figure.data.push_back(block);
+    const std::size_t c = i % 3;
+    if (c == 0)
+      script += fmt::format("set title '{}, {:.0f} g'\n", plain(cells[i].payload.name),
+                            1e3 * cells[i].payload.mass);
+    script += fmt::format("{}DATA index {} using 1:2 with points {} title '{}'", c == 0 ? "plot " : ", ", i,
+                          kLook[c], plain(cells[i].controller.name));
+    if (c == 2) script += "\n";
+  }
+  figure.script = script + "unset multiplot\n";
+  draw(figure, folder);
+}
+
+void draw_errors(const std::vector<ct::StudyThrow>& recorded,
+                 const std::vector<ct::ControllerChoice>& controllers, const fs::path& folder) {
+  Figure figure{"errors", 17, 16, {}, ""};
+  std::string position, velocity, falls;
+  for (std::size_t i = 0; i < recorded.size(); ++i) {
+    DataBlock block{
+        controllers[i].name,
+        {"time [s]", "position error [cm]", "velocity error [m/s]", "V [J]", "mass estimate [kg]"},
+        {},
+        {}};
+    for (const auto& s : recorded[i].history)
+      block.rows.push_back({s.t, 100 * s.position_error, s.velocity_error, s.lyapunov, s.mass_estimate});
+    figure.data.push_back(block);
+    position += fmt::format("{}DATA index {} using 1:2 with lines {} title '{}'", i ? ", " : "plot ", i,
+                            kLine[i], plain(controllers[i].name));
+    velocity +=
+        fmt::format("{}DATA index {} using 1:3 with lines {} notitle", i ? ", " : "plot ", i, kLine[i]);
+  }
+  falls = fmt::format("plot DATA index 0 using 1:4 with lines {} notitle", kLine[0]);
+  figure.script =
+      "set multiplot layout 3,1\nset grid\nset key right top\nset xlabel 'time [s]'\nset ylabel 'position "
+      "error [cm]'\n" +
+      position + "\nset ylabel 'velocity error [m/s]'\n" + velocity +
+      "\nset ylabel 'V of the adaptive law [J]'\n" + falls + "\nunset multiplot\n";
+  draw(figure, folder);
+}
+
+void run(const Options& o) {
+  if (!o.report.empty()) {
+    require_gnuplot();
+    require_writable_directory(o.report);
+  }
+  require_writable(o.json);
+  ct::StudyOptions study;
+  study.repetitions = o.repetitions;
+  study.box = {o.box, o.box};
+  std::vector<Cell> cells;
+  for (const auto& payload : ct::reported_payloads())
+    for (const auto& controller : ct::reported_controllers())
+      cells.push_back({payload, controller, std::vector<ct::StudyThrow>(o.seeds), {}});
+  experiment::parallel_for(cells.size() * o.seeds, o.threads, [&](std::size_t i) {
+    Cell& cell = cells[i / o.seeds];
+    const std::size_t k = i % o.seeds;
+    cell.throws[k] = ct::run_throw(cell.controller, cell.payload, study, k + 1);
+  });
+  Table table{{"object", "controller", "in the box", "mean miss [mm]", "std along, across [mm]",
+               "rms miss [mm]", "error at the release [mm, mm/s]", "torque used"},
+              {},
+              2};
+  Json json = json_head("plan-control");
+  json["seeds"] = o.seeds;
+  json["cells"] = Json::array();
+  for (Cell& cell : cells) {
+    cell.landed = ct::dispersion_of(cell.throws);
+    const auto& d = cell.landed;
+    double position = 0, velocity = 0;
+    for (const auto& one : cell.throws)
+      position += one.release_position_error / o.seeds, velocity += one.release_velocity_error / o.seeds;
+    table.rows.push_back(
+        {fmt::format("{}, {:.0f} g", cell.payload.name, 1e3 * cell.payload.mass), cell.controller.name,
+         fmt::format("{}/{}", d.hits, d.throws), fmt::format("{:+.1f}", 1e3 * d.mean.x()),
+         fmt::format("{:.1f}, {:.1f}", 1e3 * d.std.x(), 1e3 * d.std.y()), fmt::format("{:.1f}", 1e3 * d.rms),
+         fmt::format("{:.1f}, {:.1f}", 1e3 * position, 1e3 * velocity),
+         fmt::format("{:.0f} %", 100 * d.largest_torque_use)});
+    json["cells"].push_back({{"object", cell.payload.name},
+                             {"mass_kg", cell.payload.mass},
+                             {"controller", cell.controller.name},
+                             {"throws", d.throws},
+                             {"hits", d.hits},
+                             {"lost", d.lost},
+                             {"mean_m", {d.mean.x(), d.mean.y()}},
+                             {"std_m", {d.std.x(), d.std.y()}},
+                             {"rms_m", d.rms},
+                             {"release_position_error_m", position},
+                             {"release_velocity_error_m_s", velocity},
+                             {"torque_use", d.largest_torque_use}});
+  }
+  fmt::print("{}\n{} simulated robots each, the same for every controller; {} repetitions before the throw\n",
+             table.text(), o.seeds, o.repetitions);
+  Outputs outputs;
+  if (!o.report.empty()) {
+    const fs::path folder = outputs.directory(o.report);
+    draw_landings(cells, o.box, folder);
+    std::vector<ct::StudyThrow> recorded;
+    const auto controllers = ct::reported_controllers();
+    for (const auto& controller : controllers)
+      recorded.push_back(ct::run_throw(controller, ct::reported_payloads().back(), study, 1, true));
+    draw_errors(recorded, controllers, folder);
+    write_text(folder / "landings.md", table.markdown());
+  }
+  if (!o.json.empty()) outputs.json(o.json, json);
+  outputs.commit();
+}
+
+}  // namespace
+
+Command plan_control_command(CLI::App& plan) {
+  auto o = std::make_shared<Options>();
+  CLI::App* parser =
+      plan.add_subcommand("control", "Throws of unknown objects under adaptive and plain computed torque");
+  parser->footer("Example: unhand plan control --report out/control");
+  parser->add_option("--seeds", o->seeds, "Simulated robots per object and controller")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  parser->add_option("--repetitions", o->repetitions, "Motions without release before the throw")
+      ->check(CLI::Range(0, 1000))
+      ->capture_default_str();
+  parser->add_option("--box", o->box, "Side of the box [m]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  parser->add_option("--json", o->json, "Write the numbers here");
+  parser->add_option("--report", o->report, "Write table and figures into this directory");
+  add_threads(*parser, o->threads);
+  return {parser, [o] { run(*o); }};
+}
+
+}  // namespace unhand::apps

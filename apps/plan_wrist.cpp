@@ -1,0 +1,168 @@
+// unhand plan wrist: what a spring in the wrist adds to a throw, against its stiffness.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+
+#include "apps/figure.hpp"
+#include "apps/output.hpp"
+#include "apps/plan.hpp"
+#include "apps/table.hpp"
+#include "planners/elastic/throw_table.hpp"
+
+namespace unhand::apps {
+namespace {
+
+namespace el = planners::elastic;
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string arm{"planners/elastic/vsa_wrist.toml"}, json, report;
+  double softest{0.5}, stiffest{64}, longest{1.0}, elevation{45};
+  int stiffnesses{8}, starts{4}, intervals{8};
+  unsigned seed{1};
+};
+
+/// The best throw with one stiffness, run by the integrator.
+struct Point {
+  double stiffness{}, speed{}, run_speed{};
+  el::Replay run;
+  double stored{};  ///< most energy in the spring on the way [J]
+};
+
+el::ThrowTask task_of(const Options& o, el::Drive drive) {
+  el::ThrowTask task;
+  task.drive = drive;
+  task.longest = o.longest;
+  task.elevation = o.elevation * M_PI / 180;
+  return task;
+}
+
+bool solve(const el::ClutchedArm& arm, const Options& o, el::Drive drive, Point& out) {
+  el::ThrowProgramOptions program;
+  program.intervals = o.intervals;
+  program.seed = o.seed;
+  const el::Basins basins = el::find_basins(arm, task_of(o, drive), program, o.starts);
+  if (basins.found.empty()) return false;
+  const el::ElasticThrow& best = basins.found.front().best;
+  out.stiffness = arm.last.stiffness;
+  out.speed = best.speed();
+  out.run = el::replay(arm, best);
+  out.run_speed = std::hypot(out.run.release.vx, out.run.release.vz);
+  for (const el::ReplaySample& s : out.run.samples)
+    out.stored = std::max(out.stored, 0.5 * arm.last.stiffness * std::pow(s.at[0] - s.at[1], 2));
+  return true;
+}
+
+void draw_gain(const std::vector<Point>& points, const Point& rigid, const fs::path& folder) {
+  Figure figure{
+      "gain",
+      15,
+      9,
+      {{"spring", {"stiffness [N m/rad]", "tip speed [m/s]", "gain over rigid [-]", "stored [J]"}, {}, {}}},
+      ""};
+  for (const Point& p : points)
+    figure.data[0].rows.push_back({p.stiffness, p.speed, p.speed / rigid.speed, p.stored});
+  figure.script = fmt::format(
+      "set grid\nset logscale x 2\nset key right top\nset xlabel 'stiffness of the wrist [N m/rad]'\nset "
+      "ylabel 'tip speed at the release "
+      "[m/s]'\nset yrange [0:*]\nplot DATA using 1:2 with linespoints pt 7 lw 2 lc rgb '#0072b2' title "
+      "'elastic wrist', {} with "
+      "lines lw 2 dt 2 lc rgb '#555555' title 'rigid wrist'\n",
+      rigid.speed);
+  draw(figure, folder);
+}
+
+void run(const Options& o) {
+  if (!o.report.empty()) {
+    require_gnuplot();
+    require_writable_directory(o.report);
+  }
+  require_writable(o.json);
+  if (!(o.softest < o.stiffest)) throw WrongUsage("--softest must be below --stiffest");
+  el::ClutchedArm arm = el::read_clutched_arm(o.arm);
+  Point rigid;
+  if (!solve(arm, o, el::Drive::locked, rigid)) throw Unanswered("no throw with the wrist locked was found");
+  std::vector<Point> points;
+  Table table{{"stiffness [N m/rad]", "tip speed [m/s]", "re-simulated", "gain", "stored [J]", "motors [J]",
+               "unexplained [J]", "limits used"},
+              {},
+              1};
+  const auto row = [&](const std::string& name, const Point& p) {
+    table.rows.push_back({name, fmt::format("{:.3f}", p.speed), fmt::format("{:.3f}", p.run_speed),
+                          fmt::format("{:.2f}", p.speed / rigid.speed), fmt::format("{:.2f}", p.stored),
+                          fmt::format("{:.2f}", p.run.motor_work),
+                          fmt::format("{:.0e}", std::abs(p.run.unexplained())),
+                          fmt::format("{:.1f} %", 100 * p.run.use.largest())});
+  };
+  row("rigid", rigid);
+  Json json = json_head("plan-wrist");
+  json["rigid_m_s"] = rigid.speed;
+  json["spring"] = Json::array();
+  const Point* best = nullptr;
+  for (int k = 0; k < o.stiffnesses; ++k) {
+    arm.last.stiffness =
+        o.softest * std::pow(o.stiffest / o.softest, static_cast<double>(k) / (o.stiffnesses - 1));
+    Point p;
+    if (!solve(arm, o, el::Drive::passive, p)) continue;
+    points.push_back(p);
+    row(fmt::format("{:.2f}", p.stiffness), p);
+    json["spring"].push_back({{"stiffness_n_m_rad", p.stiffness},
+                              {"speed_m_s", p.speed},
+                              {"resimulated_m_s", p.run_speed},
+                              {"gain", p.speed / rigid.speed},
+                              {"stored_J", p.stored},
+                              {"motors_J", p.run.motor_work},
+                              {"damping_J", p.run.damping},
+                              {"friction_J", p.run.friction},
+                              {"unexplained_J", p.run.unexplained()}});
+  }
+  if (points.empty()) throw Unanswered("no throw with the spring was found");
+  for (const Point& p : points)
+    if (!best || p.speed > best->speed) best = &p;
+  fmt::print("{}\nbest stiffness {:.2f} N m/rad: {:.2f} m/s, {:.2f} times the rigid wrist's {:.2f} m/s\n",
+             table.text(), best->stiffness, best->speed, best->speed / rigid.speed, rigid.speed);
+  Outputs outputs;
+  if (!o.report.empty()) {
+    const fs::path folder = outputs.directory(o.report);
+    draw_gain(points, rigid, folder);
+    write_text(folder / "gain.md", table.markdown());
+  }
+  if (!o.json.empty()) outputs.json(o.json, json);
+  outputs.commit();
+}
+
+}  // namespace
+
+Command plan_wrist_command(CLI::App& plan) {
+  auto o = std::make_shared<Options>();
+  CLI::App* parser = plan.add_subcommand(
+      "wrist", "What an elastic wrist adds to the speed of a throw, against its stiffness");
+  parser->footer("Example: unhand plan wrist --report out/wrist");
+  parser->add_option("--arm", o->arm, "Arm with an elastic last joint (TOML)")->capture_default_str();
+  parser->add_option("--softest", o->softest, "[N m/rad]")->check(CLI::PositiveNumber)->capture_default_str();
+  parser->add_option("--stiffest", o->stiffest, "[N m/rad]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  parser->add_option("--stiffnesses", o->stiffnesses, "How many")
+      ->check(CLI::Range(2, 1000))
+      ->capture_default_str();
+  parser->add_option("--starts", o->starts, "Random starts of each")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  parser->add_option("--intervals", o->intervals, "Half the collocation intervals")
+      ->check(CLI::Range(2, 500))
+      ->capture_default_str();
+  parser->add_option("--longest", o->longest, "Longest motion [s]")
+      ->check(CLI::Range(0.1, 10.0))
+      ->capture_default_str();
+  parser->add_option("--elevation", o->elevation, "Direction of the throw [deg]")
+      ->check(CLI::Range(-89.0, 89.0))
+      ->capture_default_str();
+  parser->add_option("--seed", o->seed, "Seed of the random starts")->capture_default_str();
+  parser->add_option("--json", o->json, "Write the numbers here");
+  parser->add_option("--report", o->report, "Write table and figure into this directory");
+  return {parser, [o] { run(*o); }};
+}
+
+}  // namespace unhand::apps
