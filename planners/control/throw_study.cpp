@@ -217,9 +217,10 @@ StudyThrow run_throw(const ControllerChoice& choice, const Payload& payload, con
   const double left = release_at - std::floor(release_at / kStep) * kStep;
   const Eigen::Vector3d p = object.frame.p + left * object.velocity;
   const TaskReference wanted = course.at(o.throw_time, orientation);
+  const TaskReference due = course.at(release_at - left, orientation);  // of the last control step
   const TipMotion<double> tip = tip_motion<double>(known, robot.q, robot.qd, Joints::Zero(7));
-  out.release_position_error = (tip.frame.p - wanted.position).norm();
-  out.release_velocity_error = (tip.velocity - wanted.velocity).norm();
+  out.release_position_error = (tip.frame.p - due.position).norm();
+  out.release_velocity_error = (tip.velocity - due.velocity).norm();
   Eigen::Vector2d target(0, 0), landed(0, 0);
   land(wanted.position, wanted.velocity, o.landing_height, target);
   out.lands = land(p, object.velocity, o.landing_height, landed);
