@@ -23,11 +23,13 @@ using dynamics::Vec2;
 using dynamics::Window;
 using dynamics::Wrench;
 
-/// The object against the hand where the pads carry no tangential load: at the start of a release.
+/// How the hand holds the object at the start of a release: where, and with which wrench. It has been held for
+/// long by then, so the wrench is the one that carries the object with the hand (sticking_wrench).
 template <class S>
 struct Hold {
-  Vec2<S> arm;  ///< R(θ_O)ᵀ (p_WO − p_WH) [m]
-  S angle{};    ///< θ_O − θ_H [rad]
+  Vec2<S> arm;       ///< R(θ_O)ᵀ (p_WO − p_WH) [m]
+  S angle{};         ///< θ_O − θ_H [rad]
+  Wrench<S> wrench;  ///< about the patch, on the object, in the hand's frame [N, N, N m]
 };
 
 /// What a contact law sees of the world at an instant.
@@ -193,6 +195,9 @@ class ContactModel {
 
   /// L above [m]; 0 where the spin does not turn the friction force.
   virtual double spin_length() const { return 0; }
+
+  /// True for pads that give: their scenes must say how the object is held.
+  virtual bool needs_hold() const { return false; }
 
   /// True if the law can feed energy through its linear slip in this mode (a surrogate, not a material law).
   virtual bool may_feed_energy(int /*mode*/) const { return false; }

@@ -60,6 +60,7 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
   int guard_count(int) const override { return 1; }
   dynamics::Guard guard(int mode, int) const override;
   bool is_homogeneous(int mode) const override { return mode == kSlip; }
+  bool needs_hold() const override { return pads_double_.has_value(); }
   double spin_length() const override { return limits_double_.patch().length(); }
 
   template <class S>

@@ -11,12 +11,13 @@ namespace unhand::contact {
 
 /// A disc of linear springs and dampers between the pads and the object, the wrench about the patch:
 ///
-///   f = −k (δ + T v_r),   τ = −k ρ² (δθ + T ω_r),   k = 1/compliance [N/m],  ρ² = a²/2 [m²]
+///   f = R(θ_H) f₀ − k (δ + T v_r),   τ = τ₀ − k ρ² (δθ + T ω_r),   k = 1/compliance [N/m],  ρ² = a²/2 [m²]
 ///
-/// δ = R(θ_O) (arm − arm₀) [m] is how far the material point that the pads first held has moved against the
-/// hand, δθ = θ_O − θ_H − angle₀ [rad], T the loss time [s] and a the patch's radius [m] under the reference
-/// force. v_r is of the point that is at the hand now: it differs from δ' in the hand by ω_r J δ, of second
-/// order in the deflection.
+/// (f₀, τ₀) is the wrench of the Hold, δ = R(θ_O) (arm − arm₀) [m] how far the material point that the pads
+/// first held has moved against the hand since, δθ = θ_O − θ_H − angle₀ [rad], T the loss time [s] and a the
+/// patch's radius [m] under the reference force. k does not change with f_N: rubber keeps its shear stiffness
+/// while the friction that it is held by fades. v_r is of the point that is at the hand now: it differs from
+/// δ' in the hand by ω_r J δ, of second order in the deflection.
 template <class S>
 struct PadCompliance {
   S stiffness{};  ///< k [N/m]
@@ -29,8 +30,10 @@ struct PadCompliance {
     const Hold<S>& hold = *scene.hold;
     const Vec2<S> moved =
         dynamics::rotate(S(scene.hand.theta + y.angle), Vec2<S>{y.arm.x - hold.arm.x, y.arm.z - hold.arm.z});
-    return {-stiffness * (moved.x + loss_time * y.slip.x), -stiffness * (moved.z + loss_time * y.slip.z),
-            -torsional * (y.angle - hold.angle + loss_time * y.spin)};
+    const Vec2<S> first = dynamics::rotate(scene.hand.theta, hold.wrench.force());
+    return {first.x - stiffness * (moved.x + loss_time * y.slip.x),
+            first.z - stiffness * (moved.z + loss_time * y.slip.z),
+            hold.wrench.tau - torsional * (y.angle - hold.angle + loss_time * y.spin)};
   }
 };
 

@@ -43,10 +43,11 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   explicit ReleaseSystem(const ReleaseProblem<P>& problem)
       : problem_(problem),
         contact_(problem.contact),
-        free_(contact_.mode_count()),
-        hold_{{value_of(problem.grasp.com_offset), 0.0}, value_of(problem.grasp.angle)},
-        hold_dual_{{Dual(problem.grasp.com_offset), Dual(0.0)}, Dual(problem.grasp.angle)} {
+        free_(contact_.mode_count()) {
     contact_.separation(problem.normal_force, separation_);
+    if (!contact_.needs_hold()) return;
+    hold_at_start(hold_dual_);
+    hold_at_start(hold_);
   }
 
   int free_mode() const { return free_; }
@@ -137,6 +138,19 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
             hand.acceleration,
             problem_.normal_force.at(window, t),
             &hold<S>()};
+  }
+
+  /// As the object is held at the start, by the wrench that makes it follow the hand.
+  template <class S>
+  void hold_at_start(contact::Hold<S>& hold) const {
+    const auto& [offset, angle] = problem_.grasp;
+    hold = {{convert<S>(offset), S(0)}, convert<S>(angle), {}};
+    const S start(problem_.start);
+    const Scene<S> scene = scene_(Window{problem_.start, problem_.hand.end()}, start);
+    const Wrench<S> wrench =
+        contact::sticking_wrench(scene, Relative<S>{hold.arm, hold.angle, {S(0), S(0)}, S(0)});
+    const dynamics::Vec2<S> force = dynamics::rotate(S(-scene.hand.theta), wrench.force());
+    hold.wrench = {force.x, force.z, wrench.tau};
   }
 
   template <class S>

@@ -1,0 +1,60 @@
+// Structure in a residual: is it noise, and if not, what does it depend on? Knows nothing of throws.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace unhand::fitting {
+
+/// P(χ²_k > x).
+double chi2_tail(double x, int degrees);
+/// P(F_{m,n} > x).
+double f_tail(double x, double m, double n);
+
+/// Residuals in units of their noise, with what they may depend on. The samples of a series follow each other
+/// in time; all vectors have the length of `value`.
+struct ResidualSamples {
+  std::vector<double> value;   ///< [σ]
+  std::vector<double> time;    ///< within the series [s]
+  std::vector<int> series;     ///< which recording the sample is from
+  std::vector<int> condition;  ///< recordings that repeat one experiment share it
+  struct State {
+    std::string name;           ///< "speed"
+    std::vector<double> value;  ///< one per sample; NaN where it is unknown
+  };
+  std::vector<State> states;
+};
+
+/// How much of a residual goes with something.
+struct Dependence {
+  std::string on;     ///< "condition", "time", or the state's name
+  double share{};     ///< of the residual's mean square that the group means explain, beyond what noise would
+  double p_value{1};  ///< of the F test of the group means against the scatter within groups
+};
+
+struct ResidualStructure {
+  int n{};
+  double chi2_per_sample{};
+  double chi2_p_value{1};      ///< of a mean square as large, were the residual white noise of unit variance
+  double autocorrelation{};    ///< of neighbours within a series
+  double autocorrelation_p{1}; ///< two-sided, against 0 ± 1/√pairs
+  std::vector<Dependence> depends;  ///< most significant first
+
+  /// The smallest of all p-values, times how many there are.
+  double p_value() const;
+  /// In words: "1.9 times the noise, neighbours correlate by 0.8; goes with speed (71 %), condition (20 %)".
+  std::string in_words() const;
+};
+
+struct StructureOptions {
+  int groups{10};      ///< of equal count, for time and states
+  double share{0.05};  ///< least share for a dependence to be named in words
+  double level{0.01};  ///< and the most that its p-value may be
+};
+
+/// Tests: χ² of the whole; the lag-one autocorrelation within series; one-way analyses of variance over
+/// conditions (with the mean of a series as its one witness, as throws differ as wholes), and over groups of
+/// equal count in time and in every state.
+ResidualStructure find_structure(const ResidualSamples& samples, const StructureOptions& options = {});
+
+}  // namespace unhand::fitting
