@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "fitting/fit.hpp"
+#include "fitting/missing_force.hpp"
+#include "fitting/residuals.hpp"
 
 namespace unhand::fitting {
 
@@ -49,9 +51,18 @@ struct Parameter {
   double value{}, sigma{};
 };
 
+/// An experiment that would tell an accepted effect from another name of its footprint.
+struct SeparatingExperiment {
+  std::string from;  ///< the other name
+  std::string what;  ///< to do, in words
+  double before{},
+      after{};  ///< correlation of the footprints: in this log, and with the experiment added to it
+};
+
 struct AcceptedEffect {
   std::string id;
   std::vector<std::pair<std::string, double>> equivalent;  ///< ids, with the correlation of the footprints
+  std::vector<SeparatingExperiment> separating;            ///< the most telling first, for each other name
   std::vector<Parameter> parameters;
   double delta_bic{}, p_value{}, test_error_ratio{};
   std::string why;  ///< where the held-out misfit fell, in words
@@ -69,11 +80,27 @@ struct Ranked {
   double held_out_gain{};  ///< largest fall of χ² per sample in a channel and phase
 };
 
+/// What is missing, without a form assumed: an acceleration in flight over the time since the detach [m/s²,
+/// m/s², rad/s²], or a pad's wrench in the hand's frame over the share of the opening that has passed [N, N,
+/// N m].
+enum class Correction { withheld, curve, candidate };
+struct MissingEstimate {
+  Phase phase{};
+  std::vector<std::pair<std::string, int>> groups;  ///< objects, and the group of their curve
+  std::vector<MissingCurve> curves;
+  MissingCandidate candidate;
+  /// What lowers the held-out error, if anything: else it is withheld.
+  Correction correction{};
+  double error_before{}, error_after{};  ///< rms, of the flight where it was seen, else of the landing
+  std::string error_unit;                ///< "m", or "sigma" of the landing
+};
+
 struct Unexplained {
   Phase phase{};
   experiment::Channel channel{};
   double chi2_per_dof{};
   std::string description;
+  std::optional<MissingEstimate> missing;
 };
 
 /// Where the residual first leaves the noise.
@@ -82,14 +109,6 @@ struct FirstMisfit {
   Phase phase{};
   experiment::Channel channel{};
   double chi2_per_sample{};
-};
-
-/// The whitened residual of a channel over time, of the train throws together.
-struct ResidualBin {
-  experiment::Channel channel{};
-  double time{};  ///< from the release [s], middle of the bin
-  int n{};
-  double mean{}, rms{};  ///< in σ
 };
 
 struct Discovery {
@@ -103,9 +122,9 @@ struct Discovery {
   FitResult base, final;
   std::vector<ChannelMisfit> base_test, final_test;  ///< misfit on held-out throws
   std::string model;                                 ///< of the answer (contact.law changes it)
-  std::vector<std::string> active;                   ///< effects in it
   std::vector<ResidualBin> residual_before, residual_after;
-  std::shared_ptr<const CampaignProblem> problem;  ///< of the answer
+  std::vector<ChannelStructure> structure_before, structure_after;  ///< of the train throws
+  std::shared_ptr<const CampaignProblem> problem;                   ///< of the answer
   double seconds{};
 };
 

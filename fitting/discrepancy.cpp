@@ -72,7 +72,7 @@ ThrowShare share_of(const CampaignProblem& problem, std::size_t index, const Fit
   ThrowShare out{none, {none, none, none, none}};
   Linearisation l = problem.linearise(thrown, campaign, fitted.own, true);
   if (!l.solved) return out;
-  weigh(l, thrown, weighting);
+  weigh(l, thrown.observed, thrown, weighting);
   std::array<std::vector<Eigen::Index>, kBlocks> rows;
   for (Eigen::Index i = 0; i < l.residual.size(); ++i) {
     const auto& o = thrown.observed.all[static_cast<std::size_t>(i)];
@@ -148,7 +148,8 @@ void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threa
     all.add(shares[i].whole, 1);
     for (std::size_t b = 0; b < kBlocks; ++b) without[b].add(shares[i].without[b], 1);
     const auto& prepared = problem.throws()[i].prepared;
-    const auto [at, first] = conditions.try_emplace(prepared.object + "/" + prepared.condition, shares[i].whole);
+    const auto [at, first] =
+        conditions.try_emplace(prepared.object + "/" + prepared.condition, shares[i].whole);
     if (!first) at->second.add(shares[i].whole, 1);
   }
   const Eigen::MatrixXd noise = inverse(all.H);

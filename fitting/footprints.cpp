@@ -45,25 +45,21 @@ struct Difference {
   double step;
 };
 
-/// The campaign's values of `from`, in the order of `to`, which has the same unknowns and more.
-std::vector<double> carried(const CampaignProblem& from, const std::vector<double>& values,
-                            const CampaignProblem& to) {
-  std::vector<double> out = to.start();
-  for (std::size_t k = 0; k < out.size(); ++k)
-    for (std::size_t j = 0; j < values.size(); ++j)
-      if (from.campaign()[j].name == to.campaign()[k].name) out[k] = values[j];
-  return out;
-}
-
 std::size_t index_of(const CampaignProblem& problem, const std::string& name) {
   for (std::size_t k = 0; k < problem.campaign().size(); ++k)
     if (problem.campaign()[k].name == name) return k;
   return problem.campaign().size();
 }
 
-std::string without_object(const std::string& name) { return name.substr(0, name.find('[')); }
-
 }  // namespace
+
+std::vector<double> carried(const FitResult& from, const CampaignProblem& to) {
+  std::vector<double> out = to.start();
+  for (std::size_t k = 0; k < out.size(); ++k)
+    for (const auto& fitted : from.campaign)
+      if (fitted.unknown.name == to.campaign()[k].name) out[k] = fitted.value;
+  return out;
+}
 
 Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
                       const std::vector<std::string>& ids, const std::vector<std::string>& laws,
@@ -97,9 +93,9 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
     const std::vector<double> sizes =
         effect.one_sided ? std::vector<double>{1, 6, 36} : std::vector<double>{1};
     for (const auto& [shape, size] : pairs_of(shapes, sizes)) {
-      Candidate candidate{id, {}, {}, shape, {}};
+      Candidate candidate{id, {}, {}, shape};
       CampaignProblem extended = problem.with(problem.options().model, effects);
-      auto campaign = carried(problem, fit.values(), extended);
+      auto campaign = carried(fit, extended);
       for (const auto& [name, value] : shape) campaign[index_of(extended, name)] = value;
       Derivative derivative{extended, campaign, {}};
       for (std::size_t k = out.fitted; k < campaign.size(); ++k) {
@@ -107,7 +103,6 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
         if (shape.contains(without_object(name))) continue;
         candidate.parameters.push_back(name);
         candidate.columns.push_back(width);
-        candidate.unit.push_back(1);
         if (effect.one_sided) {
           auto stepped = campaign;
           const Unknown& u = extended.campaign()[k];
@@ -127,16 +122,15 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
   auto effects = problem.options().effects;
   effects.insert(effects.end(), plain.begin(), plain.end());
   CampaignProblem extended = problem.with(problem.options().model, effects);
-  Derivative all{extended, carried(problem, fit.values(), extended), {}};
+  Derivative all{extended, carried(fit, extended), {}};
   for (std::size_t k = 0; k < out.fitted; ++k) all.columns.push_back({k, k});
   for (const auto& id : plain) {
-    Candidate candidate{id, {}, {}, {}, {}};
+    Candidate candidate{id, {}, {}, {}};
     for (std::size_t k = out.fitted; k < extended.campaign().size(); ++k) {
       const std::string& name = extended.campaign()[k].name;
       if (name.rfind(id + ".", 0) != 0) continue;
       candidate.parameters.push_back(name);
       candidate.columns.push_back(width);
-      candidate.unit.push_back(1);
       all.columns.push_back({k, width});
       ++width;
     }
@@ -145,7 +139,7 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
   derivatives.insert(derivatives.begin(), std::move(all));
   for (const auto& law : laws) {
     if (law == problem.options().model) continue;
-    out.candidates.push_back({"contact.law:" + law, {""}, {width}, {}, {1}});
+    out.candidates.push_back({"contact.law:" + law, {""}, {width}, {}});
     differences.push_back({problem.with(law, problem.options().effects), fit.values(), 1});
     difference_columns.push_back(width++);
   }
@@ -160,7 +154,6 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
     const std::size_t i = used[n];
     const auto& own = fit.throws[i].own;
     Eigen::MatrixXd columns, own_columns;
-    Eigen::VectorXd base;
     bool solved = true;
     for (std::size_t d = 0; d < derivatives.size() && solved; ++d) {
       const auto& derivative = derivatives[d];
@@ -176,16 +169,16 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
       for (const auto& [k, column] : derivative.columns)
         columns.col(static_cast<Eigen::Index>(column)) = l.campaign.col(static_cast<Eigen::Index>(k));
     }
-    if (solved) base = problem.linearise(problem.throws()[i], fit.values(), own, false).residual;
     for (std::size_t d = 0; d < differences.size() && solved; ++d) {
       const auto& difference = differences[d];
       const auto l =
           difference.problem.linearise(difference.problem.throws()[i], difference.campaign, own, false);
       if (l.solved)
-        columns.col(static_cast<Eigen::Index>(difference_columns[d])) = (l.residual - base) / difference.step;
+        columns.col(static_cast<Eigen::Index>(difference_columns[d])) =
+            (l.residual - columns.col(static_cast<Eigen::Index>(residual))) / difference.step;
     }
     grams[n].setZero(w, w);
-    if (!solved || base.size() != columns.rows()) return;
+    if (!solved) return;
     Eigen::MatrixXd Hoo = own_columns.transpose() * own_columns;
     for (Eigen::Index k = 0; k < Hoo.rows(); ++k)
       Hoo(k, k) +=

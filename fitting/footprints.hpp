@@ -6,18 +6,20 @@
 #include <string>
 #include <vector>
 
+#include "experiment/campaign_effects.hpp"
 #include "fitting/fit.hpp"
 
 namespace unhand::fitting {
 
-/// A candidate for what a model lacks. `columns` index the Gram matrix; `values` are its parameters where a
-/// column is a difference (one-sided effects, contact laws) rather than a derivative.
+using experiment::without_object;
+
+/// A candidate for what a model lacks. `columns` index the Gram matrix: derivatives, or for one-sided effects
+/// and contact laws differences per unit.
 struct Candidate {
   std::string id;                       ///< of the effect, or "contact.law:MODEL"
   std::vector<std::string> parameters;  ///< one per column
   std::vector<std::size_t> columns;
   std::map<std::string, double> shape;  ///< the shape parameters' values that this candidate was taken at
-  std::vector<double> unit;             ///< what a coefficient of one means for each parameter
 };
 
 /// Inner products, over all throws used, of whitened columns: the model's unknowns, the candidates', and last
@@ -52,6 +54,9 @@ double correlation(const Footprints& footprints, const Eigen::VectorXd& contribu
 /// The same between two candidates, the first with its parameters at `step` from neutral.
 double between(const Footprints& footprints, const Candidate& a, const std::vector<double>& step,
                const Candidate& b);
+
+/// The values of a fit's campaign unknowns where `to` has them too, and its starts for the rest.
+std::vector<double> carried(const FitResult& from, const CampaignProblem& to);
 
 /// C⁻¹ d for a covariance that may be singular.
 Eigen::VectorXd pseudo_solve(const Eigen::MatrixXd& C, const Eigen::VectorXd& d);

@@ -35,9 +35,9 @@ struct Dependence {
 struct ResidualStructure {
   int n{};
   double chi2_per_sample{};
-  double chi2_p_value{1};      ///< of a mean square as large, were the residual white noise of unit variance
-  double autocorrelation{};    ///< of neighbours within a series
-  double autocorrelation_p{1}; ///< two-sided, against 0 ± 1/√pairs
+  double chi2_p_value{1};       ///< of a mean square as large, were the residual white noise of unit variance
+  double autocorrelation{};     ///< of neighbours within a series
+  double autocorrelation_p{1};  ///< two-sided, against 0 ± 1/√pairs
   std::vector<Dependence> depends;  ///< most significant first
 
   /// The smallest of all p-values, times how many there are.

@@ -1,0 +1,74 @@
+// What is missing in a motion or a wrench, estimated without assuming a form, and a readable candidate for
+// it. Knows nothing of throws: plain series in, findings out.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace unhand::fitting {
+
+/// One recording: what was seen minus what was predicted, and the predicted state beside it. Three components
+/// (x, z, θ); NaN where nothing was seen.
+struct ResidualTrace {
+  int group{};               ///< recordings of a group share what is missing: an object, say
+  std::vector<double> time;  ///< increasing [s]
+  std::array<std::vector<double>, 3> residual;
+  struct State {
+    double vx{}, vz{}, omega{}, theta{};  ///< m/s, m/s, rad/s, rad
+    double normal_force{};                ///< [N]
+  };
+  std::vector<State> state;
+};
+
+/// A piecewise-linear function of time, shared by the traces of a group.
+struct MissingCurve {
+  int group{};
+  std::vector<double> knots;                        ///< [s]
+  std::array<std::vector<double>, 3> value, sigma;  ///< at the knots
+  double chi2_before{}, chi2_after{};               ///< of the residual around it
+  /// By linear interpolation, level beyond the ends.
+  std::array<double, 3> at(double time) const;
+};
+
+/// How the residual follows from what is missing: as it is (a wrench), or integrated twice over time (an
+/// acceleration that moves a position, whose start and velocity are each recording's own).
+enum class Response { direct, twice_integrated };
+
+struct MissingOptions {
+  std::array<double, 3> sigma{1, 1, 1};  ///< noise of the components
+  Response response{Response::direct};
+  int knots{7};  ///< per curve
+  int terms{2};  ///< most that a candidate may have
+};
+
+/// Least squares, one curve per group; each recording's own offset and slope are projected out where the
+/// response is integrated. A weak smoothness prior decides what the data do not.
+std::vector<MissingCurve> missing_curves(const std::vector<ResidualTrace>& traces,
+                                         const MissingOptions& options);
+
+/// A physical term and its size.
+struct MissingTerm {
+  std::string name;  ///< "|v| v", "omega J v", "1 (x)", ...
+  double coefficient{}, sigma{};
+  std::string unit;
+  std::function<std::array<double, 3>(const ResidualTrace::State&)> shape;  ///< of coefficient one
+};
+
+/// The few terms that explain most.
+struct MissingCandidate {
+  std::vector<MissingTerm> terms;
+  double explained{};  ///< share of the residual's χ² beyond noise that they take away
+  /// The missing quantity in a state; zero without terms.
+  std::array<double, 3> at(const ResidualTrace::State& state) const;
+  std::string in_words() const;
+};
+
+/// Sparse regression by forward selection: a term enters while it lowers χ² by more than 2 log n and by a
+/// fifth. Accelerations: |v| v, v, ω J v, a constant along x or z, one along the object's axes, and for the
+/// rotation a constant, ω, |ω| ω, sin θ and cos θ. Wrenches: a constant, f_N, and f_N² of each component, and
+/// |v| and ω for their dependence on the motion.
+MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const MissingOptions& options);
+
+}  // namespace unhand::fitting

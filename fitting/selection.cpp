@@ -1,0 +1,139 @@
+#include "fitting/selection.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "fitting/residual_structure.hpp"
+
+namespace unhand::fitting {
+
+namespace {
+
+/// Evidence that an effect needs before it is accepted or kept.
+constexpr double kDeltaBic = -10;
+
+/// What explains less than this share of what another footprint would is an imitation of it.
+constexpr double kImitation = 1.0 / 3.0;
+
+void rank(std::vector<Ranked>& ranking, const Footprints& f, const std::vector<Score>& all) {
+  const auto last = static_cast<Eigen::Index>(f.residual());
+  const Score* best = nullptr;
+  for (const auto& s : all)
+    if (!best || s.gain > best->gain) best = &s;
+  for (const auto& s : all) {
+    const Candidate& c = f.candidates[s.candidate];
+    auto found = std::find_if(ranking.begin(), ranking.end(), [&](const Ranked& r) { return r.id == c.id; });
+    if (found == ranking.end()) found = ranking.insert(ranking.end(), Ranked{c.id, -1});
+    if (s.gain <= found->gain) continue;
+    found->gain = s.gain;
+    found->visible = s.visible;
+    // What the best candidate leaves sets the scale of what is not noise.
+    const double scale = std::max(1.0, (f.gram(last, last) - best->gain) / std::max(1.0, f.samples));
+    found->p_value = chi2_tail(s.gain / scale, static_cast<int>(c.columns.size()));
+    found->correlation_with_best = between(f, f.candidates[best->candidate], best->step, c);
+  }
+  std::sort(ranking.begin(), ranking.end(), [](const Ranked& a, const Ranked& b) { return a.gain > b.gain; });
+}
+
+Ranked& named(std::vector<Ranked>& ranking, const std::string& id) {
+  return *std::find_if(ranking.begin(), ranking.end(), [&](const Ranked& r) { return r.id == id; });
+}
+
+/// The footprint's own names for `accepted`: candidates that could have left it as well.
+void find_other_names(const Footprints& f, const Eigen::VectorXd& contribution, double enough,
+                      AcceptedEffect& accepted) {
+  for (const Candidate& candidate : f.candidates) {
+    const double r = correlation(f, contribution, candidate);
+    if (r < enough) continue;
+    const auto known = std::find_if(accepted.equivalent.begin(), accepted.equivalent.end(),
+                                    [&](const auto& e) { return e.first == candidate.id; });
+    if (known == accepted.equivalent.end())
+      accepted.equivalent.push_back({candidate.id, r});
+    else
+      known->second = std::max(known->second, r);
+  }
+}
+
+}  // namespace
+
+std::optional<Stage> forward(const Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  const auto f = footprints(stage.problem, stage.fit, catalogue(options), options.laws, options.fit.threads);
+  auto all = scores(f);
+  if (all.empty()) return std::nullopt;
+  rank(out.ranking, f, all);
+  std::sort(all.begin(), all.end(), [](const Score& a, const Score& b) { return a.gain > b.gain; });
+  std::set<std::string> tried;
+  std::optional<Stage> best;
+  AcceptedEffect accepted;
+  for (const Score& score : all) {
+    const Candidate& candidate = f.candidates[score.candidate];
+    if (static_cast<int>(tried.size()) >= options.refits) break;
+    if (tried.contains(candidate.id) || !score.visible || score.gain < kImitation * all.front().gain)
+      continue;
+    tried.insert(candidate.id);
+    Stage next = extended(stage, candidate, score, options);
+    if (!next.solved()) continue;
+    const double delta = next.bic() - stage.bic();
+    const Improvement held_out = improvement(stage.held_out, next.held_out, out.base_test, options);
+    Ranked& ranked = named(out.ranking, candidate.id);
+    ranked.refitted = true;
+    ranked.delta_bic = delta;
+    ranked.held_out_gain = held_out.fall;
+    const double p = is_law(candidate.id) ? 0 : wald_p_value(next, find_effect(candidate.id));
+    const auto tries = static_cast<double>(f.candidates.size());
+    if (delta > kDeltaBic || held_out.matters < 1 || p > options.false_discovery_rate / tries) continue;
+    if (best && next.bic() >= best->bic()) continue;
+    accepted.id = candidate.id;
+    accepted.delta_bic = delta;
+    accepted.why = held_out.where;
+    best = std::move(next);
+  }
+  if (best) out.effects.push_back(std::move(accepted));
+  return best;
+}
+
+void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  for (bool removed = true; removed && stage.ids.size() > 1;) {
+    removed = false;
+    for (std::size_t i = 0; i + 1 < stage.ids.size() && !removed; ++i) {
+      if (is_law(stage.ids[i])) continue;
+      Stage without = reduced(stage, i, options);
+      if (!without.solved()) continue;
+      const bool needed = stage.bic() - without.bic() < kDeltaBic &&
+                          improvement(without.held_out, stage.held_out, out.base_test, options).matters >= 1;
+      if (needed) continue;
+      std::erase_if(out.effects, [&](const AcceptedEffect& e) { return e.id == stage.ids[i]; });
+      stage = std::move(without);
+      removed = true;
+    }
+  }
+}
+
+void describe(const Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  if (out.effects.empty()) return;
+  const auto f = footprints(stage.problem, stage.fit, catalogue(options), options.laws, options.fit.threads);
+  for (AcceptedEffect& accepted : out.effects) {
+    if (is_law(accepted.id)) {
+      for (const auto& u : stage.fit.campaign)
+        if (u.unknown.name == "mu" || u.unknown.name == "length")
+          accepted.parameters.push_back({u.unknown.name, u.unknown.unit, u.value, u.sigma});
+      continue;
+    }
+    const dynamics::Effect effect = find_effect(accepted.id);
+    accepted.p_value = wald_p_value(stage, effect);
+    Eigen::VectorXd contribution = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(f.fitted));
+    for (std::size_t k = 0; k < stage.fit.campaign.size(); ++k) {
+      const auto& u = stage.fit.campaign[k];
+      for (const auto& p : effect.parameters) {
+        if (without_object(u.unknown.name) != effect.full_name(p)) continue;
+        accepted.parameters.push_back(
+            {u.unknown.name.substr(accepted.id.size() + 1), u.unknown.unit, u.value, u.sigma});
+        if (!p.is_shape()) contribution[static_cast<Eigen::Index>(k)] = u.value - p.neutral;
+      }
+    }
+    find_other_names(f, contribution, options.equivalent, accepted);
+  }
+}
+
+}  // namespace unhand::fitting

@@ -1,0 +1,158 @@
+#include "fitting/stage.hpp"
+
+#include <fmt/core.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "fitting/discrepancy.hpp"
+#include "fitting/residual_structure.hpp"
+
+namespace unhand::fitting {
+
+using experiment::Channel;
+
+namespace {
+
+/// What a law leaves of an effect that it describes: a hundredth of its χ² is a tenth of its size.
+constexpr double kRest = 0.01;
+
+}  // namespace
+
+bool is_wrench(Channel c) {
+  return c == Channel::wrench_fx || c == Channel::wrench_fz || c == Channel::wrench_tau;
+}
+
+bool Stage::solved() const {
+  const auto ok = [](const FitResult& f) {
+    return f.outcome == FitOutcome::converged || f.outcome == FitOutcome::iterations_spent;
+  };
+  return ok(fit) && ok(held_out);
+}
+
+double Stage::bic() const {
+  double out = 0;
+  for (const auto& m : fit.misfit) {
+    const double variance = std::max(1.0, m.chi2_per_sample());
+    out += m.n * std::log(variance) + m.chi2 / variance;
+  }
+  return out + static_cast<double>(problem.campaign().size()) *
+                   std::log(static_cast<double>(std::max(2L, fit.samples)));
+}
+
+void solve(Stage& stage, const DiscoverOptions& options, std::vector<double> start) {
+  FitOptions train = options.fit;
+  train.start = std::move(start);
+  stage.fit = fit(stage.problem, train);
+  if (stage.fit.outcome == FitOutcome::no_start || stage.fit.outcome == FitOutcome::not_solved) return;
+  count_discrepancy(stage.problem, stage.fit, options.fit.threads);
+  FitOptions test = options.fit;
+  test.share = Share::test;
+  test.start = stage.fit.values();
+  test.all_fixed = true;
+  test.own_spread = stage.fit.own_spread;
+  test.rounds = 2;
+  stage.held_out = fit(stage.problem, test);
+}
+
+void polish(Stage& stage, const DiscoverOptions& options) {
+  for (int again = 0; again < 2; ++again) {
+    Stage next{stage.problem, {}, {}, stage.ids};
+    solve(next, options, stage.fit.values());
+    if (!next.solved() || next.bic() > stage.bic() - 1) return;
+    stage = std::move(next);
+  }
+}
+
+Stage extended(const Stage& stage, const Candidate& candidate, const Score& score,
+               const DiscoverOptions& options) {
+  auto effects = stage.problem.options().effects;
+  std::string law = stage.problem.options().model;
+  if (is_law(candidate.id))
+    law = candidate.id.substr(std::string("contact.law:").size());
+  else
+    effects.push_back(candidate.id);
+  Stage out{stage.problem.with(law, effects), {}, {}, stage.ids};
+  out.ids.push_back(candidate.id);
+  std::vector<double> start = carried(stage.fit, out.problem);
+  for (std::size_t k = 0; k < start.size(); ++k) {
+    const Unknown& u = out.problem.campaign()[k];
+    for (std::size_t j = 0; j < candidate.parameters.size(); ++j)
+      if (candidate.parameters[j] == u.name) start[k] = std::clamp(u.start + score.step[j], u.low, u.high);
+    if (const auto shape = candidate.shape.find(without_object(u.name)); shape != candidate.shape.end())
+      start[k] = shape->second;
+  }
+  solve(out, options, std::move(start));
+  return out;
+}
+
+Stage reduced(const Stage& stage, std::size_t index, const DiscoverOptions& options) {
+  auto effects = stage.problem.options().effects;
+  effects.erase(std::find(effects.begin(), effects.end(), stage.ids[index]));
+  Stage out{stage.problem.with(stage.problem.options().model, effects), {}, {}, stage.ids};
+  out.ids.erase(out.ids.begin() + static_cast<std::ptrdiff_t>(index));
+  solve(out, options, carried(stage.fit, out.problem));
+  return out;
+}
+
+bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options) {
+  if (is_wrench(m.channel)) return m.chi2_per_sample() > options.wrench_misfit;
+  return m.chi2_per_sample() > 1 + std::max(options.matters, 3 * std::sqrt(2.0 / m.n));
+}
+
+double misfit_in(const std::vector<ChannelMisfit>& misfit, Channel channel, Phase phase) {
+  for (const auto& m : misfit)
+    if (m.channel == channel && m.phase == phase) return m.chi2_per_sample();
+  return 1;
+}
+
+Improvement improvement(const FitResult& before, const FitResult& after,
+                        const std::vector<ChannelMisfit>& base, const DiscoverOptions& options) {
+  Improvement out;
+  for (const auto& b : before.misfit) {
+    if (b.phase == Phase::grasped && !is_wrench(b.channel)) continue;  // no prediction is the better for it
+    const double was = b.chi2_per_sample(), is = misfit_in(after.misfit, b.channel, b.phase);
+    double needed = std::max({options.matters, 0.1 * (was - 1), 2 * std::sqrt(2.0 / b.n)});
+    if (is_wrench(b.channel)) {
+      if (was < options.wrench_misfit) continue;
+      needed = std::max(options.wrench_matters, 0.25 * (was - 1));
+    }
+    needed = std::max(needed, kRest * (misfit_in(base, b.channel, b.phase) - 1));
+    if ((was - is) / needed <= out.matters) continue;
+    out.matters = (was - is) / needed;
+    out.fall = was - is;
+    out.where = fmt::format("{} in {}: {:.3g} to {:.3g} per sample", to_string(b.channel), to_string(b.phase),
+                            was, is);
+  }
+  return out;
+}
+
+double wald_p_value(const Stage& stage, const dynamics::Effect& effect) {
+  std::vector<Eigen::Index> index;
+  std::vector<double> away;
+  const auto& campaign = stage.fit.campaign;
+  for (std::size_t k = 0; k < campaign.size(); ++k)
+    for (const auto& p : effect.parameters)
+      if (!p.is_shape() && without_object(campaign[k].unknown.name) == effect.full_name(p)) {
+        index.push_back(static_cast<Eigen::Index>(k));
+        away.push_back(campaign[k].value - p.neutral);
+      }
+  if (index.empty()) return 1;
+  const auto width = static_cast<Eigen::Index>(campaign.size());
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  const Eigen::Map<const RowMajor> all(stage.fit.covariance.data(), width, width);
+  const Eigen::MatrixXd C = all(index, index);
+  const Eigen::Map<const Eigen::VectorXd> d(away.data(), static_cast<Eigen::Index>(away.size()));
+  return chi2_tail(d.dot(pseudo_solve(C, d)), static_cast<int>(away.size()));
+}
+
+std::vector<std::string> catalogue(const DiscoverOptions& options) {
+  std::vector<std::string> out;
+  for (const auto& effect : experiment::known_effects())
+    if (std::find(options.forget.begin(), options.forget.end(), effect.id) == options.forget.end())
+      out.push_back(effect.id);
+  return out;
+}
+
+}  // namespace unhand::fitting

@@ -1,0 +1,63 @@
+// A model in the loop: its fit, what it leaves of held-out throws, and how it compares with another one.
+// Internal to fitting.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fitting/discover.hpp"
+#include "fitting/footprints.hpp"
+
+namespace unhand::fitting {
+
+struct Stage {
+  CampaignProblem problem;
+  FitResult fit, held_out;
+  std::vector<std::string> ids;  ///< of what was added to the base, "contact.law:..." included
+
+  bool solved() const;
+  /// −2 log of the likelihood in which every channel of every phase has the variance that it shows, at least
+  /// the declared one, plus log(samples) for every unknown.
+  double bic() const;
+};
+
+inline bool is_law(const std::string& id) { return id.rfind("contact.law:", 0) == 0; }
+bool is_wrench(experiment::Channel);
+
+/// Fits the train throws from `start`, and the own unknowns of the test throws.
+void solve(Stage& stage, const DiscoverOptions& options, std::vector<double> start);
+
+/// Fits again from the solution while that helps: the weights of the channels were learned while the effect
+/// was still missing.
+void polish(Stage& stage, const DiscoverOptions& options);
+
+/// The stage with one candidate more, started from the step that its footprint asks for.
+Stage extended(const Stage& stage, const Candidate& candidate, const Score& score, const DiscoverOptions&);
+
+/// The stage without the effect `ids[index]`.
+Stage reduced(const Stage& stage, std::size_t index, const DiscoverOptions&);
+
+/// By how much a channel's misfit must exceed the noise before there is anything to explain.
+bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options);
+
+/// The misfit of a channel in a phase, 1 where there is none.
+double misfit_in(const std::vector<ChannelMisfit>& misfit, experiment::Channel, Phase);
+
+/// The channel and phase whose held-out misfit fell most, in units of what matters there (>= 1: it matters).
+/// `base` is the misfit before anything was added: of that, what is below a hundredth is the part of an
+/// effect that its law does not get right, and no other effect.
+struct Improvement {
+  double matters{};
+  double fall{};
+  std::string where;
+};
+Improvement improvement(const FitResult& before, const FitResult& after,
+                        const std::vector<ChannelMisfit>& base, const DiscoverOptions& options);
+
+/// Wald's test of an effect's size parameters against neutral, with the fit's covariance.
+double wald_p_value(const Stage& stage, const dynamics::Effect& effect);
+
+/// The ids of all effects but those that were forgotten.
+std::vector<std::string> catalogue(const DiscoverOptions& options);
+
+}  // namespace unhand::fitting
