@@ -51,6 +51,55 @@ Json json_of(const fitting::AcceptedEffect& effect) {
   out["footprint_correlations"] = Json::object();
   for (const auto& [id, correlation] : effect.equivalent) out["footprint_correlations"][id] = correlation;
   out["why"] = effect.why;
+  out["separating_experiments"] = Json::array();
+  for (const auto& e : effect.separating)
+    out["separating_experiments"].push_back({{"from", e.from},
+                                             {"experiment", e.what},
+                                             {"correlation_in_this_log", number(e.before)},
+                                             {"correlation_with_it", number(e.after)}});
+  return out;
+}
+
+Json structure_json(const std::vector<fitting::ChannelStructure>& structures) {
+  Json out = Json::array();
+  for (const auto& s : structures) {
+    Json depends = Json::array();
+    for (const auto& d : s.structure.depends)
+      depends.push_back({{"on", d.on}, {"share", number(d.share)}, {"p_value", number(d.p_value)}});
+    out.push_back({{"phase", to_string(s.phase)},
+                   {"channel", to_string(s.channel)},
+                   {"n", s.structure.n},
+                   {"chi2_per_sample", number(s.structure.chi2_per_sample)},
+                   {"chi2_p_value", number(s.structure.chi2_p_value)},
+                   {"autocorrelation", number(s.structure.autocorrelation)},
+                   {"autocorrelation_p_value", number(s.structure.autocorrelation_p)},
+                   {"depends", depends}});
+  }
+  return out;
+}
+
+Json json_of(const fitting::MissingEstimate& missing) {
+  const bool flight = missing.phase == fitting::Phase::flight;
+  Json out{{"quantity", flight ? "acceleration" : "wrench of one pad, hand frame"},
+           {"time", flight ? "since the detach, s" : "share of the opening"},
+           {"components", {"x", "z", "theta"}},
+           {"curves", Json::object()},
+           {"candidate", Json::array()},
+           {"candidate_explains", number(missing.candidate.explained)}};
+  for (const auto& [object, group] : missing.groups)
+    for (const auto& curve : missing.curves)
+      if (curve.group == group)
+        out["curves"][object] = {{"knots", curve.knots}, {"value", curve.value}, {"sigma", curve.sigma}};
+  for (const auto& t : missing.candidate.terms)
+    out["candidate"].push_back({{"term", t.name},
+                                {"coefficient", number(t.coefficient)},
+                                {"sigma", number(t.sigma)},
+                                {"unit", t.unit}});
+  constexpr const char* kCorrection[] = {"withheld", "curve", "candidate"};
+  out["correction"] = kCorrection[static_cast<int>(missing.correction)];
+  out["held_out_error"] = {{"before", number(missing.error_before)},
+                           {"after", number(missing.error_after)},
+                           {"unit", missing.error_unit}};
   return out;
 }
 
@@ -117,12 +166,15 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
   out["verdict"] = to_string(found.verdict);
   out["effects"] = Json::array();
   for (const auto& effect : found.effects) out["effects"].push_back(json_of(effect));
+  out["fitted_along"] = found.along;
   out["unexplained"] = nullptr;
-  if (found.unexplained)
+  if (found.unexplained) {
     out["unexplained"] = {{"phase", to_string(found.unexplained->phase)},
                           {"channel", to_string(found.unexplained->channel)},
                           {"chi2_per_dof", number(found.unexplained->chi2_per_dof)},
                           {"description", found.unexplained->description}};
+    if (found.unexplained->missing) out["unexplained"]["missing"] = json_of(*found.unexplained->missing);
+  }
   out["error"] = {{"before", {{"train", json_of(found.before_train)}, {"test", json_of(found.before_test)}}},
                   {"after", {{"train", json_of(found.after_train)}, {"test", json_of(found.after_test)}}}};
   out["ranking"] = Json::array();
@@ -143,6 +195,8 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
   out["misfit"] = {
       {"before", {{"train", misfit_json(found.base.misfit)}, {"test", misfit_json(found.base_test)}}},
       {"after", {{"train", misfit_json(found.final.misfit)}, {"test", misfit_json(found.final_test)}}}};
+  out["structure"] = {{"before", structure_json(found.structure_before)},
+                      {"after", structure_json(found.structure_after)}};
   out["model"] = found.model;
   out["parameters"] = Json::object();
   for (const auto& u : found.final.campaign)
@@ -159,6 +213,9 @@ std::string discovery_text(const Discovery& found, const std::string& log) {
         to_string(found.first.phase), to_string(found.first.channel), found.first.chi2_per_sample);
   else
     out += "no channel leaves the noise in any phase\n";
+  for (const auto& s : found.structure_before)
+    if (found.first.any && s.phase == found.first.phase && s.channel == found.first.channel)
+      out += fmt::format("  there: {}\n", s.structure.in_words());
   for (const auto& effect : found.effects) {
     out += fmt::format("\n{}", effect.id);
     for (const auto& [id, correlation] : effect.equivalent)
@@ -167,7 +224,12 @@ std::string discovery_text(const Discovery& found, const std::string& log) {
       out += fmt::format("\n  {} = {:.6g} +- {:.2g} {}", p.name, p.value, p.sigma, p.unit);
     out += fmt::format("\n  BIC {:+.1f}, p {:.2g}; held out: {}\n", effect.delta_bic, effect.p_value,
                        effect.why);
+    for (const auto& e : effect.separating)
+      out += fmt::format("  to tell it from {}: {} (correlation {:.4f} -> {:.4f})\n", e.from, e.what,
+                         e.before, e.after);
   }
+  for (const auto& id : found.along)
+    out += fmt::format("\nfitted along, too small to matter to a prediction: {}\n", id);
   if (found.unexplained) out += fmt::format("\nunexplained: {}\n", found.unexplained->description);
   Table table{{"predicted before the throw", "landing x MAE [m]", "theta MAE [deg]", "detach vx MAE [m/s]",
                "omega MAE [deg/s]", "trajectory RMS [m]", "chi2/dof"},

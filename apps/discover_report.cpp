@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <iterator>
@@ -135,6 +136,61 @@ Figure ranking_figure(const Discovery& found) {
   return figure;
 }
 
+/// What is missing, component by component; a curve for every object.
+Figure missing_figure(const fitting::MissingEstimate& missing) {
+  const bool flight = missing.phase == fitting::Phase::flight;
+  Figure figure{"missing", 17, 7.2, {}, {}};
+  const std::array<const char*, 3> unit =
+      flight ? std::array{"a_x [m/s^2]", "a_z [m/s^2]", "{/Symbol a} [rad/s^2]"}
+             : std::array{"f_x [N]", "f_z [N]", "{/Symbol t} [N m]"};
+  constexpr const char* kColour[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7"};
+  std::string script = "set multiplot\nset key off\n";
+  std::vector<KeyEntry> key;
+  for (std::size_t component = 0; component < 3; ++component) {
+    const double left = 2.0 + 5.2 * static_cast<double>(component);
+    script += place(figure, {left, left + 3.4, 1.9, 5.4});
+    script += fmt::format(
+        "set title '{}' offset 0,-0.5\nset xlabel '{}' offset 0,0.5\nset xtics auto\nplot 0 "
+        "with lines linecolor rgb '#808080'",
+        unit[component], flight ? "since the detach [s]" : "share of the opening");
+    int colour = 0;
+    for (const auto& [object, group] : missing.groups)
+      for (const auto& curve : missing.curves) {
+        if (curve.group != group) continue;
+        DataBlock block{fmt::format("{} {}", object, unit[component]), {"time", "value", "sigma"}, {}, {}};
+        for (std::size_t j = 0; j < curve.knots.size(); ++j)
+          block.rows.push_back({curve.knots[j], curve.value[component][j], curve.sigma[component][j]});
+        figure.data.push_back(std::move(block));
+        const std::string style =
+            fmt::format("with yerrorlines pointtype {} pointsize 0.6 linecolor rgb '{}'", 6 + colour % 4,
+                        kColour[colour % 4]);
+        script += fmt::format(", DATA index {} using 1:2:3 {}", figure.data.size() - 1, style);
+        if (component == 0)
+          key.push_back({fmt::format("with linespoints pointtype {} linecolor rgb '{}'", 6 + colour % 4,
+                                     kColour[colour % 4]),
+                         plain(object)});
+        ++colour;
+      }
+    script += "\n";
+  }
+  script += key_strip(figure, key, static_cast<int>(key.size()));
+  figure.script = script + "unset multiplot\n";
+  return figure;
+}
+
+Table structure_table(const Discovery& found) {
+  Table table{{"phase", "channel", "before", "after"}, {}, 2};
+  for (const auto& before : found.structure_before) {
+    std::string after = "-";
+    for (const auto& s : found.structure_after)
+      if (s.phase == before.phase && s.channel == before.channel) after = s.structure.in_words();
+    table.rows.push_back({std::string(to_string(before.phase)), std::string(to_string(before.channel)),
+                          before.structure.in_words(), found.effects.empty() ? "" : after});
+  }
+  table.left = 4;
+  return table;
+}
+
 Table error_table(const Discovery& found) {
   Table table{{"predicted before the throw", "n", "landing x MAE [mm]", "theta MAE [deg]",
                "detach vx MAE [m/s]", "detach omega MAE [deg/s]", "trajectory RMS [mm]", "chi2/dof"},
@@ -188,6 +244,8 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
   const Figure residual = residual_figure(found), ranking = ranking_figure(found);
   draw(residual, directory);
   draw(ranking, directory);
+  const bool estimated = found.unexplained && found.unexplained->missing;
+  if (estimated) draw(missing_figure(*found.unexplained->missing), directory);
   const auto picture = [&](const std::string& name) {
     return fmt::format("<img src=\"data:image/png;base64,{}\" alt=\"{}\">\n",
                        base64(directory / (name + ".png")), name);
@@ -205,9 +263,13 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
       answer +=
           fmt::format("<p>Not distinguishable here from <b>{}</b>: the footprints correlate by {:.4f}.</p>\n",
                       escaped(id), correlation);
+    for (const auto& e : effect.separating)
+      answer += fmt::format("<p>Would tell it from {}: {} (correlation {:.4f} to {:.4f}, simulated).</p>\n",
+                            escaped(e.from), escaped(e.what), e.before, e.after);
   }
   if (found.unexplained)
     answer += fmt::format("<p><b>Unexplained:</b> {}.</p>\n", escaped(found.unexplained->description));
+  if (estimated) answer += picture("missing");
   if (found.effects.empty() && !found.unexplained)
     answer += "<p>Nothing that the data show is missing in the model.</p>\n";
   const std::string first = found.first.any ? fmt::format(
@@ -234,12 +296,15 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
           "the "
           "model's own unknowns projected out.</p>{7}{8}"
           "<h2>Misfit by phase and channel</h2><p>chi2 per sample; 1 is the declared noise.</p>{9}"
-          "<h2>Again</h2><p><code>{10}</code><br>log checksum <code>{11}</code></p></html>\n",
+          "<h2>Structure of the residual</h2><p>Of the train throws: size, autocorrelation, and what it goes "
+          "with "
+          "(share of its mean square).</p>{12}<h2>Again</h2><p><code>{10}</code><br>log checksum "
+          "<code>{11}</code></p></html>\n",
           escaped(std::filesystem::path(log).filename().string()),
           escaped(json.at("base_model").get<std::string>()), to_string(found.verdict), first,
           picture("residual"), answer, html(error_table(found)), picture("ranking"),
           html(ranking_table(found)), html(misfit_table(found)), escaped(command),
-          json.value("log_checksum", "unknown")));
+          json.value("log_checksum", "unknown"), html(structure_table(found))));
   write_text(directory / "discovery.json", json_text(json));
 }
 

@@ -79,7 +79,7 @@ std::span<const dynamics::EffectOn<FrictionVariation>> friction_effects() {
        &stribeck<Dual>},
       {{"contact.viscous",
         "friction grows with slip speed, mu (1 + v/v_0)",
-        {{"1/v_0", "s/m", 0, -1, 50, 0.2}}},
+        {{"1/v_0", "s/m", 0, -1, 50, 1}}},
        &viscous<double>,
        &viscous<Dual>},
       {{"contact.soft_patch_radius",

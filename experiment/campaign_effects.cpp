@@ -89,24 +89,27 @@ std::string checked(std::string_view name, double value) {
   return object.empty() ? full : fmt::format("{}[{}]", full, object);
 }
 
-/// True where the sensors that are there could show it.
+/// True where the campaign's law and sensors could show it.
 bool is_visible(const Effect& effect, const CampaignDesign& design) {
   const SensorSuite& s = design.sensors;
   if (effect.id == "flight.wind")
     return std::any_of(design.objects.begin(), design.objects.end(),
                        [](const auto& o) { return o.drag_k > 0; });
+  if (effect.id == "contact.pad_compliance")
+    return design.contact_model != "sliding_pivot" && design.contact_model != "gripper_delay";
+  if (effect.id == "contact.pressure_profile") return design.contact_model == "limit_surface_disc";
   if (effect.id == "sensor.ft_bias") return s.ft && s.wrench;
   if (effect.id == "sensor.normal_force_bias" || effect.id == "release.opening_delay") return s.ft;
   if (effect.id == "sensor.mocap_time_offset" || effect.id == "sensor.length_scale") return s.mocap;
   return true;
 }
 
-/// What a random campaign can just detect, in typical steps: slip is slow, so viscous friction shows late.
-double least_steps(const Effect& effect) { return effect.id == "contact.viscous" ? 2.5 : 0.5; }
+/// What a random campaign can just detect, in typical steps.
+constexpr double kLeastSteps = 0.5;
 
 double random_size(const Effect& effect, const EffectParameter& p, RandomStream& random) {
   constexpr double kLargeOverLeast = 20;
-  const double size = p.typical * least_steps(effect) * std::pow(kLargeOverLeast, random.uniform());
+  const double size = p.typical * kLeastSteps * std::pow(kLargeOverLeast, random.uniform());
   // A static friction below the kinetic one would not hold what the campaign's grip holds.
   const bool two_sided = !effect.one_sided && effect.id != "contact.stribeck";
   const bool negative = random.uniform() < 0.5 && two_sided && p.neutral - size >= p.low;

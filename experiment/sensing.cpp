@@ -12,7 +12,7 @@ void mocap_time_offset(const EffectValues<S>& p, Sensing<S>& sensing) {
 }
 template <class S>
 void length_scale(const EffectValues<S>& p, Sensing<S>& sensing) {
-  sensing.length_scale = p["scale"];
+  sensing.length_scale = p["scale"] - 1.0;
   sensing.landing_share = p["landing_share"];
 }
 template <class S>
@@ -21,11 +21,11 @@ void com_offset(const EffectValues<S>& p, Sensing<S>& sensing) {
 }
 template <class S>
 void inertia(const EffectValues<S>& p, Sensing<S>& sensing) {
-  sensing.inertia = p["ratio"];
+  sensing.inertia = p["ratio"] - 1.0;
 }
 template <class S>
 void mass(const EffectValues<S>& p, Sensing<S>& sensing) {
-  sensing.mass = p["ratio"];
+  sensing.mass = p["ratio"] - 1.0;
 }
 template <class S>
 void ft_bias(const EffectValues<S>& p, Sensing<S>& sensing) {
@@ -49,7 +49,7 @@ std::span<const dynamics::EffectOn<Sensing>> sensor_effects() {
        &mocap_time_offset<Dual>},
       {{"sensor.length_scale",
         "the tracker's metric scale is off",
-        {{"scale", "-", 0, -0.2, 0.2, 2e-3}, {"landing_share", "-", 0, 0, 1, 0.1, {0, 1}}}},
+        {{"scale", "-", 1, 0.8, 1.2, 2e-3}, {"landing_share", "-", 0, 0, 1, 0.1, {0, 1}}}},
        &length_scale<double>,
        &length_scale<Dual>},
       {{"sensor.com_offset",
@@ -57,10 +57,10 @@ std::span<const dynamics::EffectOn<Sensing>> sensor_effects() {
         {{"offset", "m", 0, -0.1, 0.1, 1e-3}}},
        &com_offset<double>,
        &com_offset<Dual>},
-      {{"sensor.inertia", "the declared inertia is off", {{"ratio", "-", 0, -0.9, 5, 0.02}}},
+      {{"sensor.inertia", "the declared inertia is off", {{"ratio", "-", 1, 0.1, 6, 0.02}}},
        &inertia<double>,
        &inertia<Dual>},
-      {{"sensor.mass", "the declared mass is off", {{"ratio", "-", 0, -0.9, 5, 0.02}}},
+      {{"sensor.mass", "the declared mass is off", {{"ratio", "-", 1, 0.1, 6, 0.02}}},
        &mass<double>,
        &mass<Dual>},
       {{"sensor.ft_bias",

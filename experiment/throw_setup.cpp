@@ -76,7 +76,9 @@ flight::FlightProblem<S> flight_from(const release::DetachState<S>& detach, cons
                                      const ThrowSetup<S>& setup) {
   flight::FlightProblem<S> flight{detach.pose, detach.twist, gravity};
   flight.drag_k = declared_drag + setup.air.extra_drag;
-  flight.landing_height = S(landing_height);
+  // A tracker that tells the landing's place tells its height, too: at this true height it reads the declared
+  // one.
+  flight.landing_height = landing_height / (1.0 + setup.sensing.landing_share * setup.sensing.length_scale);
   flight.tracked = {-setup.sensing.com_offset, S(0)};
   flight.lift_km = setup.air.lift;
   flight.wind = setup.air.wind;

@@ -115,6 +115,7 @@ struct Discovery {
   Verdict verdict{};
   std::string message;
   std::vector<AcceptedEffect> effects;
+  std::vector<std::string> along;  ///< effects that are fitted along as nuisances, too small to matter
   std::optional<Unexplained> unexplained;
   FirstMisfit first;
   OutcomeErrors before_train, before_test, after_train, after_test;

@@ -110,6 +110,34 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   }
 }
 
+bool fit_along(Stage& stage, const DiscoverOptions& options) {
+  const std::string along = "contact.pad_compliance";
+  const auto& model = stage.problem.options().model;
+  auto effects = stage.problem.options().effects;
+  const bool has_pads = model.starts_with("limit_surface");
+  const bool asked = std::any_of(stage.ids.begin(), stage.ids.end(), [](const std::string& id) {
+    return id.starts_with("contact.") || id.starts_with("release.");
+  });
+  const auto known = catalogue(options);
+  if (!asked || !has_pads || std::find(effects.begin(), effects.end(), along) != effects.end() ||
+      std::find(known.begin(), known.end(), along) == known.end())
+    return false;
+  effects.push_back(along);
+  Stage next{stage.problem.with(model, effects), {}, {}, stage.ids};
+  std::vector<double> start = carried(stage.fit, next.problem);
+  constexpr double kGive = 3e-6;  // under the grip's friction limit [m]
+  double mu = 0.5;
+  for (const auto& u : stage.fit.campaign)
+    if (u.unknown.name == "mu") mu = u.value;
+  for (std::size_t k = 0; k < start.size(); ++k)
+    if (next.problem.campaign()[k].name == along + ".compliance")
+      start[k] = kGive / (stage.problem.model().pads * mu * stage.problem.model().reference_force);
+  solve(next, options, std::move(start));
+  if (!next.solved() || next.bic() - stage.bic() > kDeltaBic) return false;
+  stage = std::move(next);
+  return true;
+}
+
 void describe(const Stage& stage, const DiscoverOptions& options, Discovery& out) {
   if (out.effects.empty()) return;
   const auto f = footprints(stage.problem, stage.fit, catalogue(options), options.laws, options.fit.threads);

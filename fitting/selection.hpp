@@ -15,6 +15,12 @@ std::optional<Stage> forward(const Stage& stage, const DiscoverOptions& options,
 /// Effects that a later one has made superfluous are taken back.
 void backward(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
+/// No pads are rigid: a give of some micrometres before they slip bends what the slipping pads say of an
+/// effect on them, long before any prediction would be the better for knowing it. Where an effect on the
+/// contact or the release was accepted, contact.pad_compliance is fitted along if the evidence (BIC) is for
+/// it; then it is a nuisance of the answer, not a part of it. True if it is.
+bool fit_along(Stage& stage, const DiscoverOptions& options);
+
 /// Values, significance and other names of what was accepted.
 void describe(const Stage& stage, const DiscoverOptions& options, Discovery& out);
 

@@ -149,7 +149,7 @@ TEST_F(Cli, WrongUsage) {
   expect_refusal("generate quick12 --out a.h5 --effect flight.wind=strong", 2, "not a number");
   expect_refusal("generate quick12 --out a.h5 --effect flight.wind", 2, "ID=value");
   expect_refusal("generate quick12 --out a.h5 --effect flight.quadratic_drag[jar]=0.1", 2, "bar-com100");
-  expect_refusal("generate quick12 --out a.h5 --effect sensor.mass[jar]=0.1", 2, "all objects share it");
+  expect_refusal("generate quick12 --out a.h5 --effect sensor.mass[jar]=1.1", 2, "all objects share it");
   expect_refusal("import nonsense in.csv --out a.h5", 2, "cube-tosses");
   expect_refusal("compare " + quick + " --models sliding_pivot,wishful", 2, "wishful");
   expect_refusal("compare " + quick + " --models sliding_pivot,sliding_pivot", 2, "twice");

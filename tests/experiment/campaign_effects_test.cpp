@@ -124,7 +124,7 @@ TEST(CampaignEffects, BiasesShowAsThemselves) {
 TEST(CampaignEffects, TheTrackerIsLateAndOffInScale) {
   const auto plain = generate_throw(perfect(), kSeed, kThrow).record;
   const auto made = generate_throw(
-      perfect({{"sensor.mocap_time_offset.offset", 0.004}, {"sensor.length_scale.scale", 0.01}}), kSeed,
+      perfect({{"sensor.mocap_time_offset.offset", 0.004}, {"sensor.length_scale.scale", 1.01}}), kSeed,
       kThrow);
   const auto &a = *plain.mocap, &b = *made.record.mocap;
   ASSERT_EQ(a.time.rows, b.time.rows);
@@ -136,7 +136,7 @@ TEST(CampaignEffects, TheTrackerIsLateAndOffInScale) {
   EXPECT_TRUE(plain.ft == made.record.ft);
   EXPECT_TRUE(plain.landing == made.record.landing);
   const auto tracked =
-      generate_throw(perfect({{"sensor.length_scale.scale", 0.01}, {"sensor.length_scale.landing_share", 1}}),
+      generate_throw(perfect({{"sensor.length_scale.scale", 1.01}, {"sensor.length_scale.landing_share", 1}}),
                      kSeed, kThrow);
   EXPECT_NEAR(tracked.record.landing->pose(0, 0), 1.01 * plain.landing->pose(0, 0), 1e-15);
 }
@@ -144,7 +144,7 @@ TEST(CampaignEffects, TheTrackerIsLateAndOffInScale) {
 TEST(CampaignEffects, DeclarationsAreOffAndTheTrackerFollowsTheDeclaredCoM) {
   const double offset = 0.004;
   const CampaignDesign design = perfect(
-      {{"sensor.mass.ratio", 0.1}, {"sensor.inertia.ratio", -0.2}, {"sensor.com_offset.offset", offset}});
+      {{"sensor.mass.ratio", 1.1}, {"sensor.inertia.ratio", 0.8}, {"sensor.com_offset.offset", offset}});
   const auto header = campaign_header(design, kSeed);
   for (const auto& object : design.objects) {
     const auto& declared = header.objects.at(object.name);
@@ -414,7 +414,7 @@ TEST(CampaignEffects, AreReadByName) {
   EXPECT_THAT(refusal("contact.stribek=1"), HasSubstr("did you mean contact.stribeck?"));
   EXPECT_THAT(refusal("stribeck=1"), HasSubstr("did you mean contact.stribeck?"));
   EXPECT_THAT(refusal("flight.quadratic_drag=-1"), HasSubstr("k = -1 is not in [0, 10] 1/m"));
-  EXPECT_THAT(refusal("sensor.mass=nan"), HasSubstr("is not in [-0.9, 5]"));
+  EXPECT_THAT(refusal("sensor.mass=nan"), HasSubstr("is not in [0.1, 6]"));
   EXPECT_THAT(refusal("sensor.mass=1kg"), HasSubstr("not a number"));
   EXPECT_THAT(refusal("sensor.mass[jar=1"), HasSubstr("in brackets"));
 

@@ -1,0 +1,140 @@
+// Structure in plain residual series: what noise looks like, and what a dependence looks like.
+#include "fitting/residual_structure.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "experiment/random_stream.hpp"
+#include "fitting/missing_force.hpp"
+
+namespace unhand::fitting {
+namespace {
+
+using experiment::RandomStream;
+
+/// 40 series of 50 samples, eight conditions, a speed that varies; `systematic(condition, time, speed)` [σ].
+template <class Systematic>
+ResidualSamples samples(std::uint64_t seed, const Systematic& systematic) {
+  RandomStream random(seed, 0, experiment::Purpose::effect);
+  ResidualSamples out;
+  out.states = {{"speed", {}}};
+  for (int series = 0; series < 40; ++series)
+    for (int k = 0; k < 50; ++k) {
+      const double time = 0.01 * k, speed = 2 + random.uniform();
+      out.value.push_back(random.normal(0, 1) + systematic(series / 5, time, speed));
+      out.time.push_back(time);
+      out.series.push_back(series);
+      out.condition.push_back(series / 5);
+      out.states[0].value.push_back(speed);
+    }
+  return out;
+}
+
+TEST(ResidualStructure, TailsAreThoseOfTheTables) {
+  EXPECT_NEAR(chi2_tail(3.841459, 1), 0.05, 1e-7);
+  EXPECT_NEAR(chi2_tail(18.307038, 10), 0.05, 1e-7);
+  EXPECT_NEAR(chi2_tail(1074.6794, 1000), 0.05, 1e-5) << "Wilson and Hilferty's cube root";
+  EXPECT_NEAR(f_tail(4.9646027, 1, 10), 0.05, 1e-7);
+  EXPECT_NEAR(f_tail(2.3478775, 10, 20), 0.05, 1e-6);
+}
+
+TEST(ResidualStructure, NoiseHasNone) {
+  int structured = 0;
+  constexpr int kTries = 200;
+  for (int seed = 1; seed <= kTries; ++seed)
+    structured += find_structure(samples(static_cast<std::uint64_t>(seed), [](int, double, double) {
+                    return 0.0;
+                  })).p_value() < 0.05;
+  // Bonferroni: at most 5 %; 200 tries scatter by 1.5 %, three of which are allowed
+  EXPECT_LE(structured, static_cast<int>(0.095 * kTries));
+}
+
+TEST(ResidualStructure, WhatItGoesWithIsNamed) {
+  const auto strongest = [](const ResidualSamples& s) { return find_structure(s).depends.front(); };
+  const auto speed = strongest(samples(7, [](int, double, double v) { return 3 * (v - 2.5); }));
+  EXPECT_EQ(speed.on, "speed");
+  // 9/12 of a variance of 1 + 9/12 goes with it, less what ten groups do not resolve (1/100 of that)
+  EXPECT_NEAR(speed.share, 0.75 / 1.75, 0.04);
+  EXPECT_EQ(strongest(samples(8, [](int, double t, double) { return 4 * (t - 0.25); })).on, "time");
+  EXPECT_EQ(strongest(samples(9, [](int c, double, double) { return 0.3 * (c - 3.5); })).on, "condition");
+  const auto drifting = find_structure(samples(10, [](int, double t, double) { return std::sin(20 * t); }));
+  EXPECT_NEAR(drifting.autocorrelation, 0.5 / 1.5 * std::cos(0.2), 0.06);
+  EXPECT_LT(drifting.autocorrelation_p, 1e-6);
+}
+
+/// Residuals of flights that lack `missing`, an acceleration of the state, with noise of 0.2 mm.
+template <class Missing>
+std::vector<ResidualTrace> flights(const Missing& missing, int first = 0) {
+  std::vector<ResidualTrace> out;
+  for (int i = first; i < first + 12; ++i) {
+    RandomStream random(5, static_cast<std::uint64_t>(i), experiment::Purpose::effect);
+    ResidualTrace t;
+    ResidualTrace::State s{1.5 + 0.1 * (i % 6), 1 + 0.2 * (i % 3), i % 2 ? 4.0 : -2.0, 0.3 * i, 0};
+    std::array<double, 3> x{random.normal(0, 1e-3), random.normal(0, 1e-3), 0},
+        v{random.normal(0, 5e-3), 0, 0};
+    constexpr double kStep = 1.0 / 240;
+    for (int k = 0; k < 100; ++k) {
+      t.time.push_back(k * kStep);
+      t.state.push_back(s);
+      const auto a = missing(s);
+      for (std::size_t c = 0; c < 3; ++c) {
+        t.residual[c].push_back(x[c] + random.normal(0, 2e-4));
+        x[c] += kStep * v[c] + 0.5 * kStep * kStep * a[c];
+        v[c] += kStep * a[c];
+      }
+      s.vz -= 9.81 * kStep;
+      s.theta += s.omega * kStep;
+    }
+    out.push_back(std::move(t));
+  }
+  return out;
+}
+const MissingOptions kFlight{{2e-4, 2e-4, 2e-4}, Response::twice_integrated, 7, 2};
+
+TEST(MissingForce, DragIsReadFromFlightsWithoutBeingAskedFor) {
+  constexpr double k = 0.05;
+  const auto traces = flights([](const ResidualTrace::State& s) {
+    const double speed = std::hypot(s.vx, s.vz);
+    return std::array<double, 3>{-k * speed * s.vx, -k * speed * s.vz, 0};
+  });
+  const auto candidate = missing_terms(traces, kFlight);
+  ASSERT_EQ(candidate.terms.size(), 1u) << candidate.in_words();
+  EXPECT_EQ(candidate.terms[0].name, "|v| v");
+  EXPECT_NEAR(candidate.terms[0].coefficient, -k, 5 * candidate.terms[0].sigma + 0.01 * k);
+  EXPECT_GT(candidate.explained, 0.95);
+}
+
+TEST(MissingForce, LiftIsNotMistakenForDrag) {
+  constexpr double k = 0.02;
+  const auto candidate =
+      missing_terms(flights([](const ResidualTrace::State& s) {
+                      return std::array<double, 3>{-k * s.omega * s.vz, k * s.omega * s.vx, 0};
+                    }),
+                    kFlight);
+  ASSERT_FALSE(candidate.terms.empty());
+  EXPECT_EQ(candidate.terms[0].name, "omega J v");
+  EXPECT_NEAR(candidate.terms[0].coefficient, k, 5 * candidate.terms[0].sigma + 0.01 * k);
+}
+
+TEST(MissingForce, AConstantIsTheCurve) {
+  const auto traces = flights([](const ResidualTrace::State&) {
+    return std::array<double, 3>{0.3, -0.1, 2.0};
+  });
+  const auto curves = missing_curves(traces, kFlight);
+  ASSERT_EQ(curves.size(), 1u);
+  for (const double t : {0.05, 0.2, 0.35}) {
+    EXPECT_NEAR(curves[0].at(t)[0], 0.3, 0.06) << t;
+    EXPECT_NEAR(curves[0].at(t)[1], -0.1, 0.06) << t;
+    EXPECT_NEAR(curves[0].at(t)[2], 2.0, 0.06) << t;
+  }
+  EXPECT_LT(curves[0].chi2_after, 0.1 * curves[0].chi2_before);
+}
+
+TEST(MissingForce, NoiseHasNoCandidate) {
+  const auto traces = flights([](const ResidualTrace::State&) { return std::array<double, 3>{}; });
+  EXPECT_TRUE(missing_terms(traces, kFlight).terms.empty());
+}
+
+}  // namespace
+}  // namespace unhand::fitting
