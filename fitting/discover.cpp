@@ -95,13 +95,13 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
     if (!next) break;
     stage = std::move(*next);
     polish(stage, options);
+    if (fit_along(stage, out.base_test, options)) out.along.push_back("contact.pad_compliance");
     const OutcomeErrors now = errors_of(stage, Share::test, threads);
     out.effects.back().test_error_ratio = error_ratio(last, now);
     last = now;
   }
   const std::size_t accepted = out.effects.size();
   backward(stage, options, out);
-  if (fit_along(stage, options)) out.along.push_back("contact.pad_compliance");
   describe(stage, options, out);
   for (AcceptedEffect& effect : out.effects)
     for (const auto& [other, correlation] : effect.equivalent) {
@@ -118,7 +118,8 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
   out.final_test = stage.held_out.misfit;
   out.model = stage.problem.options().model;
   out.after_train = out.effects.empty() ? out.before_train : errors_of(stage, Share::train, threads);
-  out.after_test = out.effects.size() == accepted && out.along.empty() ? last : errors_of(stage, Share::test, threads);
+  out.after_test =
+      out.effects.size() == accepted && out.along.empty() ? last : errors_of(stage, Share::test, threads);
   out.verdict = !out.effects.empty() ? Verdict::effect_found
                 : out.unexplained    ? Verdict::unexplained
                                      : Verdict::no_missing_effect;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "fitting/discrepancy.hpp"
 #include "fitting/residual_structure.hpp"
 
 namespace unhand::fitting {
@@ -110,7 +111,7 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   }
 }
 
-bool fit_along(Stage& stage, const DiscoverOptions& options) {
+bool fit_along(Stage& stage, const std::vector<ChannelMisfit>& base, const DiscoverOptions& options) {
   const std::string along = "contact.pad_compliance";
   const auto& model = stage.problem.options().model;
   auto effects = stage.problem.options().effects;
@@ -134,13 +135,18 @@ bool fit_along(Stage& stage, const DiscoverOptions& options) {
       start[k] = kGive / (stage.problem.model().pads * mu * stage.problem.model().reference_force);
   solve(next, options, std::move(start));
   if (!next.solved() || next.bic() - stage.bic() > kDeltaBic) return false;
+  // Where it matters it is an effect like any other, and forward() will find it.
+  if (improvement(stage.held_out, next.held_out, base, options).matters >= 1) return false;
   stage = std::move(next);
   return true;
 }
 
-void describe(const Stage& stage, const DiscoverOptions& options, Discovery& out) {
+void describe(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   if (out.effects.empty()) return;
   const auto f = footprints(stage.problem, stage.fit, catalogue(options), options.laws, options.fit.threads);
+  for (AcceptedEffect& accepted : out.effects)
+    if (!is_law(accepted.id)) accepted.p_value = wald_p_value(stage, find_effect(accepted.id));
+  count_discrepancy(stage.problem, stage.fit, options.fit.threads);
   for (AcceptedEffect& accepted : out.effects) {
     if (is_law(accepted.id)) {
       for (const auto& u : stage.fit.campaign)
@@ -149,7 +155,6 @@ void describe(const Stage& stage, const DiscoverOptions& options, Discovery& out
       continue;
     }
     const dynamics::Effect effect = find_effect(accepted.id);
-    accepted.p_value = wald_p_value(stage, effect);
     Eigen::VectorXd contribution = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(f.fitted));
     for (std::size_t k = 0; k < stage.fit.campaign.size(); ++k) {
       const auto& u = stage.fit.campaign[k];

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fitting/discrepancy.hpp"
 #include "fitting/residual_structure.hpp"
 
 namespace unhand::fitting {
@@ -46,7 +45,6 @@ void solve(Stage& stage, const DiscoverOptions& options, std::vector<double> sta
   train.start = std::move(start);
   stage.fit = fit(stage.problem, train);
   if (stage.fit.outcome == FitOutcome::no_start || stage.fit.outcome == FitOutcome::not_solved) return;
-  count_discrepancy(stage.problem, stage.fit, options.fit.threads);
   FitOptions test = options.fit;
   test.share = Share::test;
   test.start = stage.fit.values();
