@@ -30,7 +30,8 @@ FeltForce<S> felt_force(const PreparedThrow& prepared, const ThrowSetup<S>& setu
     return force;
   }
   FeltForce<S> force(std::make_unique<contact::ProfileNormalForce>(contact::OpeningProfile<Dual>{
-      prepared.open_command, Dual(values.get("grip_force", 20)), Dual(values.get("dead_time", 0.01)),
+      prepared.open_command, Dual(values.get("grip_force", 20)),
+      Dual(values.get("dead_time", 0.01) + values.get("dead_time_deviation", 0)),
       Dual(values.get("opening_time", 0.05)), Dual(values.get("shape", 1))}));
   force.act(setup);
   return force;

@@ -140,6 +140,7 @@ void CampaignProblem::name_unknowns(const std::vector<Effect>& effects) {
       campaign_.push_back({"dead_time", "s", 0.01, 0, 0.2, 2e-3, {}});
       campaign_.push_back({"opening_time", "s", 0.05, 1e-3, 0.5, 5e-3, {}});
       campaign_.push_back({"shape", "-", 1, 0.3, 4, 0.2, {}});
+      own_.push_back({"dead_time_deviation", "s", 0, -0.05, 0.05, 1e-3, 2e-3});
     }
   } else {
     campaign_.push_back({"delay", "s", first_guess_.delay.mean(), 0, 1, 5e-3, {}});

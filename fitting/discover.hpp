@@ -22,6 +22,7 @@ struct DiscoverOptions {
   /// The same for the wrench channels, whose misfit must also have been so many times the noise: near the end
   /// of a release a patch slips in parts, and no law of the catalogue follows its torque better.
   double wrench_matters{1}, wrench_misfit{3};
+  double law_matters{0.005};          ///< another contact law: share of the held-out χ² as a whole
   double false_discovery_rate{0.02};  ///< shared among the effects that were tried
   double equivalent{0.98};            ///< footprints that correlate by this much are one answer
   int refits{4};                      ///< candidates that are fitted in full, in every step

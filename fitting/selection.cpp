@@ -58,6 +58,37 @@ void find_other_names(const Footprints& f, const Eigen::VectorXd& contribution, 
 
 }  // namespace
 
+namespace {
+
+/// A refit of one candidate against the stage that it would extend.
+struct Trial {
+  Stage next;
+  double delta_bic{};
+  Improvement held_out;
+  bool convinces{};
+};
+
+std::optional<Trial> try_out(const Stage& stage, const Footprints& f, const Score& score,
+                             const DiscoverOptions& options, Discovery& out) {
+  const Candidate& candidate = f.candidates[score.candidate];
+  Trial trial{extended(stage, candidate, score, options), 0, {}, false};
+  if (!trial.next.solved()) return std::nullopt;
+  trial.delta_bic = trial.next.bic() - stage.bic();
+  const bool law = is_law(candidate.id);
+  trial.held_out = law ? law_improvement(stage.held_out, trial.next.held_out, options)
+                       : improvement(stage.held_out, trial.next.held_out, out.base_test, options);
+  Ranked& ranked = named(out.ranking, candidate.id);
+  ranked.refitted = true;
+  ranked.delta_bic = trial.delta_bic;
+  ranked.held_out_gain = trial.held_out.fall;
+  const double p = law ? 0 : wald_p_value(trial.next, find_effect(candidate.id));
+  const double share = options.false_discovery_rate / static_cast<double>(f.candidates.size());
+  trial.convinces = trial.delta_bic <= kDeltaBic && trial.held_out.matters >= 1 && p <= share;
+  return trial;
+}
+
+}  // namespace
+
 std::optional<Stage> forward(const Stage& stage, const DiscoverOptions& options, Discovery& out) {
   const auto f = footprints(stage.problem, stage.fit, catalogue(options), options.laws, options.fit.threads);
   auto all = scores(f);
@@ -65,33 +96,38 @@ std::optional<Stage> forward(const Stage& stage, const DiscoverOptions& options,
   rank(out.ranking, f, all);
   std::sort(all.begin(), all.end(), [](const Score& a, const Score& b) { return a.gain > b.gain; });
   std::set<std::string> tried;
-  std::optional<Stage> best;
+  std::optional<Trial> best;
+  const Score* of_best = nullptr;
+  const auto consider = [&](const Score& score) {
+    if (!score.visible || !tried.insert(f.candidates[score.candidate].id).second) return;
+    auto trial = try_out(stage, f, score, options, out);
+    if (!trial || !trial->convinces || (best && trial->next.bic() >= best->next.bic())) return;
+    best = std::move(trial);
+    of_best = &score;
+  };
+  for (const Score& score : all)
+    if (static_cast<int>(tried.size()) < options.refits && score.gain >= kImitation * all.front().gain)
+      consider(score);
+  const auto id_of = [&](const Score& score) { return f.candidates[score.candidate].id; };
+  // Laws are alternatives to each other: where one convinces, all are tried. And where nothing convinced,
+  // another law may still be the better one.
+  if (!best || is_law(id_of(*of_best)))
+    for (const Score& score : all)
+      if (is_law(id_of(score))) consider(score);
+  if (!best) return std::nullopt;
   AcceptedEffect accepted;
-  for (const Score& score : all) {
-    const Candidate& candidate = f.candidates[score.candidate];
-    if (static_cast<int>(tried.size()) >= options.refits) break;
-    if (tried.contains(candidate.id) || !score.visible || score.gain < kImitation * all.front().gain)
-      continue;
-    tried.insert(candidate.id);
-    Stage next = extended(stage, candidate, score, options);
-    if (!next.solved()) continue;
-    const double delta = next.bic() - stage.bic();
-    const Improvement held_out = improvement(stage.held_out, next.held_out, out.base_test, options);
-    Ranked& ranked = named(out.ranking, candidate.id);
-    ranked.refitted = true;
-    ranked.delta_bic = delta;
-    ranked.held_out_gain = held_out.fall;
-    const double p = is_law(candidate.id) ? 0 : wald_p_value(next, find_effect(candidate.id));
-    const auto tries = static_cast<double>(f.candidates.size());
-    if (delta > kDeltaBic || held_out.matters < 1 || p > options.false_discovery_rate / tries) continue;
-    if (best && next.bic() >= best->bic()) continue;
-    accepted.id = candidate.id;
-    accepted.delta_bic = delta;
-    accepted.why = held_out.where;
-    best = std::move(next);
-  }
-  if (best) out.effects.push_back(std::move(accepted));
-  return best;
+  accepted.id = id_of(*of_best);
+  accepted.delta_bic = best->delta_bic;
+  accepted.why = best->held_out.where;
+  if (is_law(accepted.id))
+    for (const Score& score : all)
+      if (is_law(id_of(score)) && id_of(score) != accepted.id) {
+        const double r =
+            between(f, f.candidates[of_best->candidate], of_best->step, f.candidates[score.candidate]);
+        if (r >= options.equivalent) accepted.equivalent.push_back({id_of(score), r});
+      }
+  out.effects.push_back(std::move(accepted));
+  return std::move(best->next);
 }
 
 void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {

@@ -126,6 +126,12 @@ Improvement improvement(const FitResult& before, const FitResult& after,
   return out;
 }
 
+Improvement law_improvement(const FitResult& before, const FitResult& after, const DiscoverOptions& options) {
+  const double was = before.chi2_per_dof(), is = after.chi2_per_dof();
+  return {(was - is) / (options.law_matters * was), was - is,
+          fmt::format("chi2 of all channels: {:.4g} to {:.4g} per degree of freedom", was, is)};
+}
+
 double wald_p_value(const Stage& stage, const dynamics::Effect& effect) {
   std::vector<Eigen::Index> index;
   std::vector<double> away;
