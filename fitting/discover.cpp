@@ -95,7 +95,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
     if (!next) break;
     stage = std::move(*next);
     polish(stage, options);
-    if (fit_along(stage, out.base_test, options)) out.along.push_back("contact.pad_compliance");
+    if (fit_along(stage, options)) out.along.push_back("contact.pad_compliance");
     const OutcomeErrors now = errors_of(stage, Share::test, threads);
     out.effects.back().test_error_ratio = error_ratio(last, now);
     last = now;

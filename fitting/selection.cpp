@@ -147,7 +147,7 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   }
 }
 
-bool fit_along(Stage& stage, const std::vector<ChannelMisfit>& base, const DiscoverOptions& options) {
+bool fit_along(Stage& stage, const DiscoverOptions& options) {
   const std::string along = "contact.pad_compliance";
   const auto& model = stage.problem.options().model;
   auto effects = stage.problem.options().effects;
@@ -162,17 +162,18 @@ bool fit_along(Stage& stage, const std::vector<ChannelMisfit>& base, const Disco
   effects.push_back(along);
   Stage next{stage.problem.with(model, effects), {}, {}, stage.ids};
   std::vector<double> start = carried(stage.fit, next.problem);
-  constexpr double kGive = 3e-6;  // under the grip's friction limit [m]
+  // Under the grip's friction limit [m]: to start with, and from where on it is an effect like any other.
+  constexpr double kGive = 3e-6, kMostGive = 3e-5;
   double mu = 0.5;
   for (const auto& u : stage.fit.campaign)
     if (u.unknown.name == "mu") mu = u.value;
+  const double per_compliance = stage.problem.model().pads * mu * stage.problem.model().reference_force;
   for (std::size_t k = 0; k < start.size(); ++k)
-    if (next.problem.campaign()[k].name == along + ".compliance")
-      start[k] = kGive / (stage.problem.model().pads * mu * stage.problem.model().reference_force);
+    if (next.problem.campaign()[k].name == along + ".compliance") start[k] = kGive / per_compliance;
   solve(next, options, std::move(start));
   if (!next.solved() || next.bic() - stage.bic() > kDeltaBic) return false;
-  // Where it matters it is an effect like any other, and forward() will find it.
-  if (improvement(stage.held_out, next.held_out, base, options).matters >= 1) return false;
+  for (const auto& u : next.fit.campaign)
+    if (u.unknown.name == along + ".compliance" && u.value > kMostGive / per_compliance) return false;
   stage = std::move(next);
   return true;
 }

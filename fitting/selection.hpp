@@ -18,8 +18,8 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out);
 /// No pads are rigid: a give of some micrometres before they slip bends what the slipping pads say of an
 /// effect on them, long before any prediction would be the better for knowing it. Where an effect on the
 /// contact or the release was accepted, contact.pad_compliance is fitted along if the evidence (BIC) is for
-/// it; then it is a nuisance of the answer, not a part of it. True if it is. `base` as for improvement().
-bool fit_along(Stage& stage, const std::vector<ChannelMisfit>& base, const DiscoverOptions& options);
+/// it; then it is a nuisance of the answer, not a part of it. True if it is.
+bool fit_along(Stage& stage, const DiscoverOptions& options);
 
 /// Values, significance and other names of what was accepted. The intervals of the fit count its misfit from
 /// here on (count_discrepancy).

@@ -7,6 +7,7 @@
 
 #include "experiment/campaign_effects.hpp"
 #include "experiment/synthetic_campaign.hpp"
+#include "fitting/discrepancy.hpp"
 #include "fitting/footprints.hpp"
 
 namespace unhand::fitting {
@@ -67,11 +68,78 @@ TEST(Discovery, AClockThatIsLateIsFoundAlreadyInTheGrasp) {
               std::max(4 * effect->parameters.front().sigma, 2e-5));
 }
 
-TEST(Discovery, AnEffectThatTheCatalogueForgetsIsUnexplainedOrDoesNotGoByItsName) {
-  const Discovery found = found_in(campaign({{"flight.magnus_lift.k_m", 0.03}}), {"flight.magnus_lift"});
+TEST(Discovery, AnEffectThatTheCatalogueForgetsIsUnexplainedWithAReadableCandidate) {
+  constexpr double kLift = 0.03;
+  const Discovery found = found_in(campaign({{"flight.magnus_lift.k_m", kLift}}), {"flight.magnus_lift"});
   EXPECT_EQ(named(found, "flight.magnus_lift"), nullptr);
-  EXPECT_NE(found.verdict, Verdict::no_missing_effect);
   EXPECT_EQ(found.first.phase, Phase::flight);
+  ASSERT_TRUE(found.unexplained.has_value()) << to_string(found.verdict);
+  EXPECT_EQ(found.unexplained->phase, Phase::flight);
+  ASSERT_TRUE(found.unexplained->missing.has_value());
+  const MissingEstimate& missing = *found.unexplained->missing;
+  ASSERT_FALSE(missing.candidate.terms.empty()) << found.unexplained->description;
+  EXPECT_EQ(missing.candidate.terms.front().name, "omega J v") << found.unexplained->description;
+  EXPECT_NE(missing.correction, Correction::withheld);
+  EXPECT_LT(missing.error_after, 0.7 * missing.error_before) << "on throws that it has not seen";
+}
+
+TEST(Discovery, TwoEffectsAtOnceAreBothFound) {
+  const Discovery found =
+      found_in(campaign({{"flight.gravity_tilt.angle", 0.02}, {"sensor.mocap_time_offset.offset", 0.005}}));
+  EXPECT_NE(named(found, "flight.gravity_tilt"), nullptr);
+  EXPECT_NE(named(found, "sensor.mocap_time_offset"), nullptr);
+  EXPECT_EQ(found.effects.size(), 2u);
+}
+
+TEST(Discovery, OfTheWrongLawTheRightOneIsMissing) {
+  DiscoverOptions options;
+  options.campaign.model = "sliding_pivot";
+  options.campaign.integrator.tolerances = {1e-5, 1e-8};
+  const Discovery found = discover(campaign({}), "synthetic", options);
+  ASSERT_EQ(found.verdict, Verdict::effect_found);
+  EXPECT_EQ(found.effects.front().id, "contact.law:limit_surface_disc");
+  EXPECT_EQ(found.model, "limit_surface_disc");
+  EXPECT_FALSE(found.unexplained.has_value());
+}
+
+TEST(Discovery, LogsWithChannelsMissingAreAnswered) {
+  for (const char* missing : {"ft", "mocap", "landing"}) {
+    experiment::CampaignDesign design = experiment::campaign_design("quick12");
+    design.repetitions = 4;
+    const std::string without(missing);
+    design.sensors.ft = without != "ft";
+    design.sensors.mocap = without != "mocap";
+    design.sensors.landing = without != "landing";
+    const Discovery found = found_in(experiment::generate_campaign(design, 5));
+    EXPECT_EQ(found.verdict, Verdict::no_missing_effect) << missing;
+  }
+}
+
+/// A laboratory's law is not this library's: intervals must know.
+TEST(Discrepancy, IntervalsStayOnGoodCampaignsAndWidenWhereSensorsDisagree) {
+  CampaignOptions options;
+  options.effects = {"sensor.inertia"};
+  options.integrator.tolerances = {1e-5, 1e-8};
+  const auto widened = [&](const experiment::EffectSettings& effects) {
+    const CampaignProblem problem(campaign(effects), "synthetic", options);
+    FitResult result = fit(problem);
+    std::vector<double> before;
+    for (const auto& u : result.campaign) before.push_back(u.sigma);
+    count_discrepancy(problem, result, 0);
+    double most = 0;
+    for (std::size_t k = 0; k < before.size(); ++k) {
+      EXPECT_GE(result.campaign[k].sigma, before[k]);
+      EXPECT_NEAR(result.covariance[k * before.size() + k], std::pow(result.campaign[k].sigma, 2),
+                  1e-9 * std::pow(result.campaign[k].sigma, 2));
+      most = std::max(most, result.campaign[k].sigma / before[k]);
+    }
+    return most;
+  };
+  // Six conditions: Student's factor is 1.3, and a jackknife of six scatters by a third.
+  EXPECT_LT(widened({}), 4);
+  // Friction that falls with the slip bends what the wrenches say of mu, and what the motion says of the
+  // inertia.
+  EXPECT_GT(widened({{"contact.stribeck.mu_s/mu_k", 1.5}, {"contact.stribeck.v_s", 0.02}}), 4);
 }
 
 TEST(Footprints, TheStepOfTheTrueEffectIsItsSizeToFirstOrder) {
