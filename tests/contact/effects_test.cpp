@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "tests/support/effect_releases.hpp"
 
@@ -116,18 +117,22 @@ TEST_P(ContactEffect, DerivativeIsTheCentralDifference) {
 
 TEST_P(ContactEffect, OfTheLimitsAreSeenInTheMotion) {
   std::mt19937_64 random(73);
-  const auto thrown = support::random_throw(random, 0);
-  const auto base = detach(GetParam(), thrown, FrictionVariation<double>{}, 1e-9);
-  for (const Place& place : kPlaces) {
-    FrictionVariation<double> v;
-    v.reference_force = 20;
-    Place::set(place.name, place.at, v);
-    const auto changed = detach(GetParam(), thrown, v, 1e-9);
-    if (matters(place.name, GetParam()))
-      EXPECT_GT(std::abs(changed.state[5] - base.state[5]), 1e-4) << place.name;
-    else
-      EXPECT_EQ(changed.state, base.state) << place.name;
+  // Pads that give show only where the grip holds at first: in some throw.
+  std::map<std::string_view, double> most;
+  for (int i = 0; i < 5; ++i) {
+    const auto thrown = support::random_throw(random, 0);
+    const auto base = detach(GetParam(), thrown, FrictionVariation<double>{}, 1e-9);
+    for (const Place& place : kPlaces) {
+      FrictionVariation<double> v;
+      v.reference_force = 20;
+      Place::set(place.name, place.at, v);
+      const auto changed = detach(GetParam(), thrown, v, 1e-9);
+      most[place.name] = std::max(most[place.name], std::abs(changed.state[5] - base.state[5]));
+      if (!matters(place.name, GetParam())) EXPECT_EQ(changed.state, base.state) << place.name;
+    }
   }
+  for (const Place& place : kPlaces)
+    if (matters(place.name, GetParam())) EXPECT_GT(most[place.name], 1e-4) << place.name;
 }
 
 /// The object against the hand t [s] after the hand, which was at rest, starts to accelerate, on pads of 1e-5
@@ -149,7 +154,8 @@ contact::Relative<double> on_compliant_pads(const dynamics::Acceleration<double>
   options.integrator.record = true;
   const auto result = simulate_release(problem, options);
   EXPECT_FALSE(result.slips_at_start);
-  for (const auto& event : result.events) EXPECT_EQ(event.mode_after, event.mode_before) << "holds throughout";
+  for (const auto& event : result.events)
+    EXPECT_EQ(event.mode_after, event.mode_before) << "holds throughout";
   EXPECT_EQ(model->mode_name(result.trajectory.piece_at(kRest + t).phase.mode), "elastic");
   return contact::Relative<double>::from(result.trajectory.at(kRest + t));
 }

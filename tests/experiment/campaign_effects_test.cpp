@@ -348,9 +348,10 @@ std::vector<std::pair<std::string, EffectSettings>> every_effect(double size) {
 }
 
 // Hand and force given exactly, prediction and generator integrate the same equations with the same steps:
-// what is left are the quintics of the hand (1e-12 m) and rounding, which slip multiplies by a thousand.
+// what is left are the quintics of the hand (1e-12 m) and rounding, which slip multiplies by a thousand, and
+// which compliant pads of 4e4 to 2e5 N/m turn into forces of 1e-7 N at most.
 TEST(GeneratorAndPrediction, AgreeOnEveryChannelForEveryEffect) {
-  const std::array<double, kChannelCount> tolerance{1e-8,  1e-8,  1e-9,  1e-12, 1e-10,
+  const std::array<double, kChannelCount> tolerance{1e-7,  1e-7,  1e-9,  1e-12, 1e-10,
                                                     1e-10, 1e-10, 1e-10, 1e-10, 1e-10};
   for (const std::string law : {"limit_surface_disc", "sliding_pivot"})
     for (const double size : {1.0, 5.0})
