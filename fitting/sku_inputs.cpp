@@ -121,8 +121,8 @@ void add_object(const datasets::Sku& sku, const AssumedTolerances& assumed, Coll
   const bool shaped = sku.shape && sku.dims && sku.inertia &&
                       *sku.inertia == datasets::shape_inertia(*sku.shape, sku.mass, *sku.dims);
   const auto source = [](bool told) { return told ? InputSource::sku : InputSource::assumed; };
-  const std::size_t mass = collect.value("sensor.mass.ratio", 0),
-                    inertia = collect.value("sensor.inertia.ratio", 0),
+  const std::size_t mass = collect.value("sensor.mass.ratio", 1),
+                    inertia = collect.value("sensor.inertia.ratio", 1),
                     offset = collect.value("grasp_offset", 0);
   UncertainInput weight{"mass",
                         "kg",
