@@ -25,7 +25,7 @@ using planners::Chain;
 
 struct Options {
   std::string arm{"panda"}, target, box{"0.15x0.15"}, card, sku, json, report;
-  double window{0.1}, drag{0}, gripper{0.15}, gripper_mass{0.9}, opening_spread{-1}, dead_spread{-1};
+  double window{0.1}, drag{0}, gripper{0.15}, gripper_mass{0.9};
   int draws{1000}, samples{3000};
   std::uint64_t seed{1};
   bool planar{false}, plain{false};
@@ -144,6 +144,13 @@ void plan_release(ThrowAnswer& a, const Chain& pads, planners::ReleaseThrow rele
     a.plan.limits = limits;
     a.plan.nominal.state = release.start = better.start;
     a.plan.qdd = release.qdd = better.qdd;
+    const planners::TubeProblem rigid{a.chain, better.start, a.box.middle, a.window, {9.81, options.drag}};
+    const auto landings = [&](const planners::JointVector<double>& qdd) {
+      return planners::landings_over_window(rigid, qdd, how.landing_samples);
+    };
+    a.plan.landings = landings(better.qdd);
+    a.plan.tube_landings.clear();  // of another throw
+    a.plan.at_rest = landings(planners::JointVector<double>::Zero(pads.size()));
     a.spread_after = planners::release_spread(release);
     a.predicted.insert(a.predicted.begin(), by_release("insensitive motion", a, release, options));
     return;
@@ -178,8 +185,6 @@ void plan_throw(const Options& options) {
     object.mass = sku.mass, object.inertia = *sku.inertia;
     object.com_offset = {sku.com_offset, sku.com_offset_sigma.value_or(0.004)};
   }
-  if (card && options.window < 0.1 * card->opening_time.value)
-    throw WrongUsage("--window is shorter than a tenth of the card's opening");
   answer.chain = planners::with_tool(pads, {Eigen::Matrix3d::Identity(), {0, 0, object.com_offset.value}});
   auto how = plan_options(options, pads, options.planar || card.has_value());
   const double latest = card ? card->dead_time.value + card->opening_time.value +

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "apps/figure.hpp"
 #include "apps/plan_throw.hpp"
@@ -66,12 +67,16 @@ std::string percent(int part, std::size_t all) {
 
 std::string text_of(const ThrowAnswer& a) {
   const auto& plan = a.plan;
+  const auto tip = planners::tip_motion<double>(a.chain, plan.nominal.state.q, plan.nominal.state.qd,
+                                                JointVector<double>::Zero(a.chain.size()));
   std::string out = fmt::format(
       "box {:g} x {:g} m at ({:g}, {:g}, {:g}) m; the object may leave up to {:.0f} ms after the command\n"
-      "margin {:.3f} (speed {:.3f}, position {:.3f}, tube {:.3f}); tip {:.2f} m/s at {:.1f} deg\n\n",
+      "margin of the throw found {:.3f} (speed {:.3f}, position {:.3f}, tube {:.3f}); the object moves at "
+      "{:.2f} m/s, {:.1f} deg upward\n\n",
       a.box.length_x, a.box.length_y, a.box.middle.x(), a.box.middle.y(), a.box.middle.z(), 1e3 * a.window,
       plan.nominal.margin, plan.nominal.speed_margin, plan.nominal.position_margin, plan.nominal.tube_margin,
-      plan.nominal.speed, plan.nominal.elevation * 180 / M_PI);
+      tip.velocity.norm(),
+      std::atan2(tip.velocity.z(), tip.velocity.head<2>().norm()) * 180 / std::numbers::pi);
   Table joints{{"joint", "q0 [rad]", "qd0 [rad/s]", "qdd [rad/s2]"}, {}, 1};
   for (int i = 0; i < a.chain.size(); ++i)
     joints.rows.push_back({a.chain.joints[i].name, fmt::format("{:.4f}", plan.nominal.state.q[i]),
@@ -224,15 +229,16 @@ Figure tube_figure(const ThrowAnswer& a) {
     }
   out.script = fmt::format(
       "set xlabel 'forward of the target [m]'; set ylabel 'above the target [m]'\n"
-      "set key outside bottom center horizontal; set grid linecolor rgb '#dddddd'\n"
+      "set key outside top center horizontal; set grid linecolor rgb '#dddddd'\n"
       "plot for [i=8:12] DATA index i with lines linecolor rgb '{2}' dashtype 2 title (i==8 ? 'flights "
       "without acceleration' : ''), \\\n"
-      "     for [i=3:7] DATA index i with lines linecolor rgb '{0}' linewidth 1.2 title (i==3 ? 'flights of "
-      "the planned motion' : ''), \\\n"
+      "     for [i=3:7] DATA index i with lines linecolor rgb '{0}' linewidth 1.2 title (i==3 ? '{3}' : ''), "
+      "\\\n"
       "     DATA index 0 with lines linecolor rgb '#555555' linewidth 1.5 title 'path of the swing', \\\n"
       "     DATA index 1 with lines linecolor rgb '{1}' linewidth 4 title 'where the object may leave', \\\n"
       "     DATA index 2 with lines linecolor rgb 'black' linewidth 6 title 'box'\n",
-      ink, other, quiet);
+      ink, other, quiet,
+      a.with_release ? "flights if carried rigidly until then" : "flights of the planned motion");
   return out;
 }
 
