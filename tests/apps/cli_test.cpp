@@ -715,5 +715,18 @@ TEST_F(Cli, ValidateSkuAnswersWithABudget) {
   expect_refusal("validate-sku bare.toml --card card.json --json c.json", 3, "inertia_kg_m2");
 }
 
+TEST_F(Cli, FigureDrawsWhatIsAskedFor) {
+  const Answer answer = run("figure all --log " + quick + " --models sliding_pivot,limit_surface --out f");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  for (const char* name :
+       {"landing_errors", "conditions", "mae", "modes", "wrench", "pivot", "phase", "flight"})
+    for (const char* ending : {".png", ".pdf", ".dat", ".gp"})
+      EXPECT_TRUE(fs::exists(folder / "f" / (std::string(name) + ending))) << name << ending;
+  expect_refusal("figure portrait --log " + quick + " --out g", 2, "landing-errors");
+  expect_refusal("figure modes --throw 999 --log " + quick + " --out g", 2, "no throw '999'");
+  expect_refusal("figure modes --models wishful --log " + quick + " --out g", 2, "wishful");
+  expect_refusal("figure modes --log none.h5 --out g", 3, "none.h5");
+}
+
 }  // namespace
 }  // namespace unhand

@@ -1,0 +1,277 @@
+#include "apps/release_figures.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "contact/disc_friction.hpp"
+
+namespace unhand::apps {
+namespace {
+
+constexpr double kDegrees = 57.29577951308232, kMillimetres = 1000, kMilliseconds = 1000;
+
+/// The modes' colours, of the palette of Okabe and Ito; they differ in lightness, too.
+struct ModeLook {
+  const char *mode, *colour;
+};
+constexpr ModeLook kModes[] = {{"stick", "#f0f0f0"},  {"pivot", "#56b4e9"}, {"slip", "#e69f00"},
+                               {"slide", "#d55e00"},  {"brake", "#009e73"}, {"carried", "#cccccc"},
+                               {"elastic", "#cc79a7"}};
+
+const char* colour_of(const std::string& mode) {
+  for (const ModeLook& look : kModes)
+    if (mode == look.mode) return look.colour;
+  return "#777777";
+}
+
+std::string line_style(const std::string& model) {
+  const Style style = style_of(model);
+  return fmt::format("with lines linecolor rgb '{}' linewidth 1.6 dashtype {}", style.colour, style.dash);
+}
+
+std::vector<KeyEntry> key_of(const std::vector<ReleaseTrace>& traces) {
+  std::vector<KeyEntry> out;
+  for (const auto& trace : traces) out.push_back({line_style(trace.model), trace.model});
+  return out;
+}
+
+/// One block per trace with the columns that `row` makes of an instant.
+template <class Row>
+std::vector<DataBlock> blocks(const std::vector<ReleaseTrace>& traces,
+                              const std::vector<std::string>& columns, Row row) {
+  std::vector<DataBlock> out;
+  for (const auto& trace : traces) {
+    out.push_back({trace.model, columns, {}, {}});
+    for (const auto& r : trace.rows) out.back().rows.push_back(row(r));
+  }
+  return out;
+}
+
+/// "plot DATA index 0 using 1:2 STYLE, ..." of every trace.
+std::string plot_all(const std::vector<ReleaseTrace>& traces, const char* columns, std::size_t first = 0) {
+  std::string out;
+  for (std::size_t i = 0; i < traces.size(); ++i)
+    out += fmt::format("{}DATA index {} using {} {}", i > 0 ? ", \\\n     " : "", first + i, columns,
+                       line_style(traces[i].model));
+  return out;
+}
+
+double milliseconds(double t) { return kMilliseconds * t; }
+
+}  // namespace
+
+ReleaseTrace trace_of(const release::ReleaseProblem<double>& problem,
+                      const release::ReleaseResult<double>& result, const contact::Patch<double>& patch,
+                      int samples) {
+  if (result.outcome != release::ReleaseOutcome::detached || result.trajectory.empty())
+    throw std::invalid_argument("trace_of: the release is not detached, or was not recorded");
+  ReleaseTrace out;
+  out.model = problem.contact.name();
+  auto events = release::mode_events(problem, result);
+  const auto first = release::sample_release(problem, result, problem.start);
+  events.insert(events.begin(), {problem.start, "start", std::string(first.mode)});
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    const double end = i + 1 < events.size() ? events[i + 1].time : result.detach.time;
+    if (end - events[i].time < 1e-9) continue;
+    // The sense of a pivot or a slide is not told apart.
+    const std::string mode = events[i].mode.substr(0, events[i].mode.find_first_of("+- "));
+    if (!out.modes.empty() && out.modes.back().mode == mode)
+      out.modes.back().end = end;
+    else
+      out.modes.push_back({mode, events[i].time, end});
+  }
+  const double begin = problem.start, end = result.detach.time;
+  double angle = 0;
+  for (int i = 0; i < samples; ++i) {
+    // Not the very end, where the limits vanish.
+    const double t = begin + (end - begin) * (1 - 1e-9) * i / (samples - 1);
+    const auto s = release::sample_release(problem, result, t);
+    if (i == 0) angle = s.relative.angle;
+    const double f = patch.f_max(s.normal_force), tau = patch.tau_max(s.normal_force);
+    out.rows.push_back({t, s.normal_force, f > 0 ? std::hypot(s.wrench.fx, s.wrench.fz) / f : 0,
+                        tau > 0 ? s.wrench.tau / tau : 0, norm(s.relative.slip), s.relative.spin,
+                        s.relative.angle - angle});
+  }
+  return out;
+}
+
+Figure mode_figure(const std::vector<ReleaseTrace>& traces) {
+  const auto n = static_cast<double>(traces.size());
+  Figure figure{"modes", 17, 7.2 + 0.9 * n, {}, {}};
+  figure.data = blocks({traces.front()}, {"time [ms]", "normal force of a pad [N]"}, [](const TraceRow& r) {
+    return std::vector<double>{milliseconds(r.time), r.normal_force};
+  });
+  double begin = traces.front().rows.front().time, end = begin;
+  std::vector<std::string> seen;
+  for (std::size_t i = 0; i < traces.size(); ++i) {
+    DataBlock block{traces[i].model + ", modes", {"from [ms]", "to [ms]", "line", "mode"}, {}, {}};
+    for (const auto& span : traces[i].modes) {
+      block.rows.push_back({milliseconds(span.begin), milliseconds(span.end), static_cast<double>(i)});
+      block.labels.push_back(span.mode);
+      end = std::max(end, span.end);
+      if (std::find(seen.begin(), seen.end(), span.mode) == seen.end()) seen.push_back(span.mode);
+    }
+    figure.data.push_back(std::move(block));
+  }
+  std::string tics, ribbons;
+  for (std::size_t i = 0; i < traces.size(); ++i) {
+    tics += fmt::format("{}'{}' {}", i > 0 ? ", " : "", plain(traces[i].model), i);
+    for (const auto& mode : seen)
+      ribbons += fmt::format(
+          "{}DATA index {} using (strcol(4) eq '{}' ? 0.5*($1+$2) : NaN):3:(0.5*($2-$1)):(0.38) with "
+          "boxxyerror "
+          "fillcolor rgb '{}' linecolor rgb '#404040' linewidth 0.6",
+          ribbons.empty() ? "" : ", \\\n     ", i + 1, mode, colour_of(mode));
+  }
+  const double left = 4.2, key = 0.9, low = 1.7 + key, ribbon = low + 0.9 * n;
+  std::vector<KeyEntry> modes;
+  for (const auto& mode : seen)
+    modes.push_back(
+        {fmt::format("with boxes fillstyle solid 1 border rgb '#404040' fillcolor rgb '{}'", colour_of(mode)),
+         mode});
+  std::string& s = figure.script;
+  s = fmt::format("set multiplot\nunset key\nset xrange [{:.6g}:{:.6g}]\n", milliseconds(begin),
+                  milliseconds(end));
+  s += place(figure, {left, figure.width - 0.5, ribbon + 0.3, figure.height - 0.5});
+  s += "set ylabel 'normal force of a pad [N]'\nset yrange [0:*]; set format x ''\n"
+       "plot DATA index 0 using 1:2 with lines linecolor rgb '#000000' linewidth 1.6\n";
+  s += place(figure, {left, figure.width - 0.5, low, ribbon});
+  s += fmt::format(
+      "set format x; unset ylabel; set xlabel 'time [ms]'\nset yrange [{}:-0.5]\nset ytics ({}) scale 0\n"
+      "set style fill solid 1 border rgb '#404040'\nunset grid\nplot {}\n",
+      n - 0.5, tics, ribbons);
+  s += key_strip(figure, modes, static_cast<int>(std::max<std::size_t>(1, modes.size()))) +
+       "unset multiplot\n";
+  return figure;
+}
+
+Figure wrench_figure(const std::vector<ReleaseTrace>& traces) {
+  Figure figure{"wrench", 13, 12, {}, {}};
+  figure.data = blocks(traces, {"|f|/f_max", "|tau|/tau_max"}, [](const TraceRow& r) {
+    return std::vector<double>{r.force, std::abs(r.torque)};
+  });
+  DataBlock ellipse{"ellipse", {"|f|/f_max", "|tau|/tau_max"}, {}, {}}, disc = ellipse;
+  disc.title = "exact disc";
+  constexpr int kSteps = 200;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double angle = 0.5 * M_PI * i / kSteps;
+    ellipse.rows.push_back({std::cos(angle), std::sin(angle)});
+    const auto d = contact::disc_friction(std::tan(0.5 * M_PI * (kSteps - i) / kSteps * (1 - 1e-9)));
+    disc.rows.push_back({d.force, d.torque / (2.0 / 3.0)});
+  }
+  figure.data.push_back(std::move(ellipse));
+  figure.data.push_back(std::move(disc));
+  auto key = key_of(traces);
+  const char *ellipse_style = "with lines linecolor rgb '#808080' linewidth 2.6",
+             *disc_style = "with lines linecolor rgb '#c0c0c0' linewidth 2.6 dashtype 2",
+             *box_style = "with lines linecolor rgb '#a0a0a0' linewidth 1 dashtype 3";
+  key.push_back({ellipse_style, "ellipse"});
+  key.push_back({disc_style, "exact disc"});
+  key.push_back({box_style, "separate limits"});
+  constexpr int columns = 2;
+  std::string& s = figure.script;
+  s = "set multiplot\nunset key\nset xrange [0:1.12]; set yrange [0:1.12]\n"
+      "set xlabel 'force on the pads over its limit, |f|/f_{max}'\n"
+      "set ylabel 'torque over its limit, |{/Symbol t}|/{/Symbol t}_{max}'\n"
+      "set arrow from 0,1 to 1,1 nohead linecolor rgb '#a0a0a0' linewidth 1 dashtype 3\n"
+      "set arrow from 1,0 to 1,1 nohead linecolor rgb '#a0a0a0' linewidth 1 dashtype 3\n";
+  s += place(figure, {1.9, figure.width - 0.5, 1.8 + key_height(key.size(), columns), figure.height - 0.4});
+  s += fmt::format("plot DATA index {} using 1:2 {}, \\\n     DATA index {} using 1:2 {}, \\\n     {}\n",
+                   traces.size(), ellipse_style, traces.size() + 1, disc_style, plot_all(traces, "1:2"));
+  s += key_strip(figure, key, columns) + "unset multiplot\n";
+  return figure;
+}
+
+Figure pivot_figure(const std::vector<ReleaseTrace>& traces) {
+  Figure figure{"pivot", 17, 8.5, {}, {}};
+  figure.data = blocks(
+      traces, {"time [ms]", "angle against the hand [deg]", "relative spin [deg/s]"}, [](const TraceRow& r) {
+        return std::vector<double>{milliseconds(r.time), r.pivot * kDegrees, r.spin * kDegrees};
+      });
+  const auto key = key_of(traces);
+  constexpr int columns = 3;
+  const double bottom = 1.8 + key_height(key.size(), columns), top = figure.height - 0.4,
+               middle = 0.5 * figure.width;
+  const auto& rows = traces.front().rows;
+  std::string& s = figure.script;
+  s = fmt::format(
+      "set multiplot\nunset key\nset xlabel 'time [ms]'\nset xrange [{:.6g}:{:.6g}]\n"
+      "set xzeroaxis linetype 1 linecolor rgb '#808080' linewidth 0.6\n"
+      "set ylabel 'angle against the hand [deg]'\n",
+      milliseconds(rows.front().time), milliseconds(rows.back().time));
+  s += place(figure, {1.9, middle - 0.2, bottom, top}) + "plot " + plot_all(traces, "1:2") + "\n";
+  s += "set ylabel 'spin against the hand [deg/s]'\n";
+  s += place(figure, {middle + 2.1, figure.width - 0.5, bottom, top}) + "plot " + plot_all(traces, "1:3") +
+       "\n";
+  s += key_strip(figure, key, columns) + "unset multiplot\n";
+  return figure;
+}
+
+Figure phase_figure(const std::vector<ReleaseTrace>& traces, double length) {
+  Figure figure{"phase", 13, 10.5, {}, {}};
+  figure.data =
+      blocks(traces, {"L omega_r [mm/s]", "slip speed of the patch [mm/s]"}, [&](const TraceRow& r) {
+        return std::vector<double>{kMillimetres * length * r.spin, kMillimetres * r.slip};
+      });
+  DataBlock ends{"where they part", {"L omega_r [mm/s]", "slip speed [mm/s]"}, {}, {}};
+  for (const auto& trace : traces)
+    ends.rows.push_back(
+        {kMillimetres * length * trace.rows.back().spin, kMillimetres * trace.rows.back().slip});
+  figure.data.push_back(std::move(ends));
+  const auto key = key_of(traces);
+  constexpr int columns = 2;
+  std::string& s = figure.script;
+  s = "set multiplot\nunset key\nset yrange [0:*]\n"
+      "set xlabel 'relative spin, L {/Symbol w}_r [mm/s]'\nset ylabel 'slip of the patch, |v_r| [mm/s]'\n";
+  s += place(figure, {1.9, figure.width - 0.6, 1.8 + key_height(key.size(), columns), figure.height - 0.4});
+  s += fmt::format(
+      "plot {}, \\\n     DATA index {} using 1:2 with points pointtype 6 linecolor rgb '#000000' linewidth "
+      "1.2\n",
+      plot_all(traces, "1:2"), traces.size());
+  s += key_strip(figure, key, columns) + "unset multiplot\n";
+  return figure;
+}
+
+Figure flight_figure(const FlightOverlay& overlay) {
+  Figure figure{"flight", 17, 9, {}, {}};
+  DataBlock block{
+      overlay.model,
+      {"time [s]", "x predicted [m]", "z predicted [m]", "theta predicted [deg]", "x measured [m]",
+       "z measured [m]", "theta measured [deg]", "measured - predicted x [mm]", "z [mm]", "theta [deg]"},
+      {},
+      {}};
+  for (std::size_t i = 0; i < overlay.time.size(); ++i) {
+    const auto &p = overlay.predicted[i], &m = overlay.measured[i];
+    block.rows.push_back({overlay.time[i], p.x, p.z, p.theta * kDegrees, m.x, m.z, m.theta * kDegrees,
+                          kMillimetres * (m.x - p.x), kMillimetres * (m.z - p.z),
+                          kDegrees * (m.theta - p.theta)});
+  }
+  figure.data.push_back(std::move(block));
+  const std::vector<KeyEntry> key{
+      {"with lines linecolor rgb '#0072b2' linewidth 1.8", overlay.model},
+      {"with points pointtype 6 linecolor rgb '#000000'", "motion capture"},
+      {"with points pointtype 7 linecolor rgb '#d55e00'", "residual x [mm]"},
+      {"with points pointtype 4 linecolor rgb '#000000'", "residual z [mm]"},
+      {"with points pointtype 2 linecolor rgb '#0072b2'", "residual theta [deg]"}};
+  constexpr int columns = 3;
+  const double bottom = 1.8 + key_height(key.size(), columns), top = figure.height - 0.9, middle = 8.6;
+  std::string& s = figure.script;
+  s = "set multiplot\nunset key\nset title 'path' offset 0,-0.5\nset xlabel 'x [m]'; set ylabel 'z [m]'\n";
+  s += place(figure, {1.9, middle, bottom, top});
+  s += "plot DATA index 0 using 5:6 every 3 with points pointtype 6 linecolor rgb '#000000', \\\n"
+       "     DATA index 0 using 2:3 with lines linecolor rgb '#0072b2' linewidth 1.8\n";
+  s += "set title 'measured - predicted' offset 0,-0.5\nset xlabel 'time [s]'; set ylabel 'mm, deg' offset "
+       "1,0\n"
+       "set xzeroaxis linetype 1 linecolor rgb '#808080' linewidth 0.6\n";
+  s += place(figure, {middle + 1.9, figure.width - 0.5, bottom, top});
+  s += "plot DATA index 0 using 1:8 with points pointtype 7 pointsize 0.45 linecolor rgb '#d55e00', \\\n"
+       "     DATA index 0 using 1:9 with points pointtype 4 pointsize 0.45 linecolor rgb '#000000', \\\n"
+       "     DATA index 0 using 1:10 with points pointtype 2 pointsize 0.45 linecolor rgb '#0072b2'\n";
+  s += key_strip(figure, key, columns) + "unset multiplot\n";
+  return figure;
+}
+
+}  // namespace unhand::apps
