@@ -81,10 +81,12 @@ struct Ranked {
   double held_out_gain{};  ///< largest fall of χ² per sample in a channel and phase
 };
 
+/// How a prediction may use what is estimated to be missing.
+enum class Correction { withheld, curve, candidate };
+
 /// What is missing, without a form assumed: an acceleration in flight over the time since the detach [m/s²,
 /// m/s², rad/s²], or a pad's wrench in the hand's frame over the share of the opening that has passed [N, N,
 /// N m].
-enum class Correction { withheld, curve, candidate };
 struct MissingEstimate {
   Phase phase{};
   std::vector<std::pair<std::string, int>> groups;  ///< objects, and the group of their curve

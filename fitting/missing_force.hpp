@@ -15,6 +15,7 @@ struct ResidualTrace {
   int group{};               ///< recordings of a group share what is missing: an object, say
   std::vector<double> time;  ///< increasing [s]
   std::array<std::vector<double>, 3> residual;
+  /// The predicted motion at a sample, and the normal force of a pad.
   struct State {
     double vx{}, vz{}, omega{}, theta{};  ///< m/s, m/s, rad/s, rad
     double normal_force{};                ///< [N]
@@ -36,6 +37,7 @@ struct MissingCurve {
 /// acceleration that moves a position, whose start and velocity are each recording's own).
 enum class Response { direct, twice_integrated };
 
+/// How the estimate is made.
 struct MissingOptions {
   std::array<double, 3> sigma{1, 1, 1};  ///< noise of the components
   Response response{Response::direct};

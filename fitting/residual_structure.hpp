@@ -18,6 +18,7 @@ struct ResidualSamples {
   std::vector<double> time;    ///< within the series [s]
   std::vector<int> series;     ///< which recording the sample is from
   std::vector<int> condition;  ///< recordings that repeat one experiment share it
+  /// Something that the residual may depend on.
   struct State {
     std::string name;           ///< "speed"
     std::vector<double> value;  ///< one per sample; NaN where it is unknown
@@ -32,6 +33,7 @@ struct Dependence {
   double p_value{1};  ///< of the F test of the group means against the scatter within groups
 };
 
+/// What the tests say of one residual.
 struct ResidualStructure {
   int n{};
   double chi2_per_sample{};
@@ -46,6 +48,7 @@ struct ResidualStructure {
   std::string in_words() const;
 };
 
+/// Groups of the analyses, and what is named in words.
 struct StructureOptions {
   int groups{10};      ///< of equal count, for time and states
   double share{0.05};  ///< least share for a dependence to be named in words

@@ -10,6 +10,7 @@
 
 namespace unhand::fitting {
 
+/// One model with its fit to the train throws and what it leaves of the others.
 struct Stage {
   CampaignProblem problem;
   FitResult fit, held_out;
