@@ -45,7 +45,7 @@ TomlKeys TomlKeys::parse(const fs::path& file) {
 
 void TomlKeys::fail(std::string_view key, const std::string& why) const {
   const toml::node* node = table_->get(key);
-  toml::source_position at;  // of a missing key: where its table stands, if it is not the whole file
+  toml::source_position at{};  // of a missing key: where its table stands, if it is not the whole file
   if (node != nullptr)
     at = node->source().begin;
   else if (table_ != root_.get())
