@@ -263,7 +263,8 @@ Figure flight_figure(const FlightOverlay& overlay) {
   s += place(figure, {1.9, middle, bottom, top});
   s += "plot DATA index 0 using 5:6 every 3 with points pointtype 6 linecolor rgb '#000000', \\\n"
        "     DATA index 0 using 2:3 with lines linecolor rgb '#0072b2' linewidth 1.8\n";
-  s += "set title 'measured - predicted' offset 0,-0.5\nset xlabel 'time [s]'; set ylabel 'mm, deg' offset "
+  s += "set title 'measured - predicted' offset 0,-0.5\nset xtics 0.1; set xlabel 'time [s]'; set ylabel "
+       "'mm, deg' offset "
        "1,0\n"
        "set xzeroaxis linetype 1 linecolor rgb '#808080' linewidth 0.6\n";
   s += place(figure, {middle + 1.9, figure.width - 0.5, bottom, top});

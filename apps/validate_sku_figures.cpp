@@ -38,7 +38,7 @@ std::vector<std::vector<double>> ellipse(const SkuValidation& answer, double sig
 
 Figure sku_landing_figure(const SkuQuestion& question, const SkuValidation& answer) {
   const double tx = 100 * question.request.tolerance.x, tt = question.request.tolerance.theta * kDegrees;
-  Figure figure{"landings", 13, 11, {}, {}};
+  Figure figure{"landings", 16, 11, {}, {}};
   double x = 1.15 * tx, theta = 1.15 * tt;
   DataBlock drawn{"Monte Carlo", {"landing x about the predicted [cm]", "landing theta [deg]"}, {}, {}};
   constexpr std::size_t kMost = 2000;
@@ -102,7 +102,7 @@ Figure sku_budget_figure(const SkuQuestion& question, const SkuValidation& answe
                         to_string(line.input.source), 100 * line.share, i);
   }
   figure.data.push_back(std::move(block));
-  constexpr double left = 5.6, gap = 0.5;
+  constexpr double left = 6.6, gap = 0.5;
   figure.height = 2.7 + 0.62 * static_cast<double>(n);
   const double middle = (left + figure.width) / 2, bottom = 1.5, top = figure.height - 1.0;
   std::string& s = figure.script;
@@ -113,9 +113,16 @@ Figure sku_budget_figure(const SkuQuestion& question, const SkuValidation& answe
       "set yrange [{}:-0.7]\nset ytics ({}) scale 0\n",
       plain(question.sku.name), 1 - 0.5 / figure.height, static_cast<double>(n) - 0.3, tics);
   const auto panel = [&](const char* label, int column, const char* colour) {
+    double high = 0;
+    for (const auto& row : figure.data.front().rows)
+      high = std::max(high, row[static_cast<std::size_t>(column) - 1]);
+    const double decade = high > 0 ? std::pow(10, std::floor(std::log10(high))) : 1, tens = high / decade;
     return fmt::format(
-        "set xrange [0:*]; set xlabel '{}'\n"
+        "set xrange [0:*]; set xtics {:.6g}; set xlabel '{}'\n"
         "plot DATA index 0 using (0.5*${}):1:(0.5*${}):(0.3) with boxxyerror linecolor rgb '{}'\n",
+        decade * (tens > 5     ? 2
+                  : tens > 2.5 ? 1
+                               : 0.5),
         label, column, column, colour);
   };
   s += place(figure, {left, middle - gap / 2, bottom, top}) + panel("landing x [cm]", 2, "#0072b2");
