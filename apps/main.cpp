@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command.hpp"
+#include "apps/crosscheck.hpp"
 #include "apps/figure_command.hpp"
 #include "apps/validate_sku.hpp"
 #include "datasets/log_error.hpp"
@@ -41,10 +42,10 @@ int main(int argc, char** argv) {
   root.footer(
       "Exit codes: 0 done, 1 the computation could not answer, 2 wrong usage, 3 bad input.\n"
       "Existing outputs are replaced, each at once, and only if everything succeeded.");
-  const std::array commands{generate_command(root), import_command(root), inspect_command(root),
-                            compare_command(root),  fit_command(root),    predict_command(root),
-                            discover_command(root), plan_command(root),   validate_sku_command(root),
-                            figure_command(root)};
+  const std::array commands{generate_command(root), import_command(root),    inspect_command(root),
+                            compare_command(root),  fit_command(root),       predict_command(root),
+                            discover_command(root), plan_command(root),      validate_sku_command(root),
+                            figure_command(root),   crosscheck_command(root)};
   try {
     root.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -6,6 +6,7 @@
 #include <climits>
 #include <filesystem>
 
+#include "datasets/hdf5_driver.hpp"
 #include "datasets/near_miss.hpp"
 
 namespace unhand::datasets::hdf5 {
@@ -60,6 +61,8 @@ Node Node::open_file(const std::string& file) {
 #if H5_VERSION_GE(1, 10, 7)
   H5Pset_file_locking(access.id(), false, true);  // reading must work on a read-only disk
 #endif
+  if (read_plainly(access.id()) < 0)
+    throw LogError(file, "/", fmt::format("cannot be opened ({})", last_message()));
   Handle opened = file_handle(H5Fopen(file.c_str(), H5F_ACC_RDONLY, access.id()));
   if (!opened) throw LogError(file, "/", fmt::format("is truncated or damaged ({})", last_message()));
   Handle root = group_handle(H5Gopen2(opened.id(), "/", H5P_DEFAULT));

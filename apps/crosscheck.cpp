@@ -1,0 +1,344 @@
+// unhand crosscheck: another engine on the throws of a log, beside the library's models.
+#include "apps/crosscheck.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <map>
+#include <memory>
+
+#include "apps/cards.hpp"
+#include "apps/command.hpp"
+#include "apps/output.hpp"
+#include "apps/progress.hpp"
+#include "apps/table.hpp"
+#include "crosscheck/bullet_release.hpp"
+#include "crosscheck/distributed_patch.hpp"
+#include "experiment/friction_estimate.hpp"
+#include "experiment/parallel.hpp"
+#include "flight/fly.hpp"
+
+namespace unhand::apps {
+namespace {
+
+using crosscheck::BulletFriction;
+using crosscheck::BulletPads;
+using experiment::kDegrees;
+using experiment::Prediction;
+
+struct Options {
+  std::string log, engine{"bullet"}, card, json;
+  std::vector<std::string> models{"limit_surface_disc", "limit_surface", "sliding_pivot"};
+  std::vector<double> steps;
+  BulletPads pads{BulletPads::pins};
+  BulletFriction friction{BulletFriction::along};
+  int rings{3};
+  int threads{0};
+};
+
+/// The engine's answers at one setting, throw by throw; for cvode one model's.
+struct Setting {
+  std::string words;
+  std::string model;  ///< of cvode; otherwise the engine's answers are held against every model
+  Json json;
+  std::vector<Prediction> throws;
+};
+
+using Throws = std::vector<experiment::PreparedThrow>;
+
+experiment::ModelParameters parameters_of(const Options& options, const datasets::ThrowLog& log,
+                                          const Throws& prepared, std::string& from) {
+  if (!options.card.empty()) {
+    const UsableCard card = read_usable_card(options.card);
+    experiment::ModelParameters out = card.parameters;
+    if (card.fitted) {
+      const auto value = [&](const char* name) {
+        const auto found = card.card.parameters.find(name);
+        if (found == card.card.parameters.end())
+          throw WrongUsage(fmt::format("{}: has no {}", options.card, name));
+        return found->second.value;
+      };
+      out.mu = value("mu"), out.length = value("length");
+      if (log.gripper) out.pads = log.gripper->n_pads;
+    }
+    from = options.card;
+    return out;
+  }
+  const auto estimate = experiment::estimate_friction(log, prepared, options.models.front());
+  from = fmt::format("estimated for {}", options.models.front());
+  return estimate.parameters;
+}
+
+template <class Predict>
+std::vector<Prediction> all(const Throws& throws, int threads, Progress& progress, Predict&& one) {
+  std::vector<Prediction> out(throws.size());
+  experiment::parallel_for(throws.size(), threads, [&](std::size_t i) {
+    out[i] = one(throws[i]);
+    progress.step();
+  });
+  return out;
+}
+
+/// Runs an engine on the release of a throw and flies on from there.
+template <class Engine>
+Prediction from_engine(const experiment::PreparedThrow& thrown, const experiment::ModelParameters& parameters,
+                       Engine&& engine) {
+  const auto unused = experiment::contact_model_for(thrown, "limit_surface", parameters);
+  const auto result = engine(experiment::release_problem(thrown, *unused));
+  Prediction out;
+  out.release = result.outcome;
+  out.detach = result.detach;
+  if (out.release != release::ReleaseOutcome::detached) return out;
+  const auto flown = flight::fly<double>(
+      {out.detach.pose, out.detach.twist, thrown.gravity, thrown.drag_k, thrown.landing_height, {}, 30});
+  out.flight = flown.outcome;
+  out.landing = flown.landing;
+  return out;
+}
+
+std::vector<Setting> run_engine(const Options& options, const Throws& throws,
+                                const experiment::ModelParameters& p) {
+  std::vector<Setting> out;
+  const contact::Patch<double> patch{p.mu, 1.5 * p.length, 2.0 / 3,
+                                     p.pads};  // a uniform disc of the same limits
+  if (options.engine == "cvode") {
+    Progress progress("cvode", throws.size() * options.models.size());
+    for (const auto& model : options.models) {
+      dynamics::IntegratorOptions integrator;
+      integrator.tolerances = {1e-10, 1e-12};
+      integrator.method = dynamics::Method::cvode;
+      out.push_back({fmt::format("CVODE, tolerance 1e-10"), model, Json{{"rtol", 1e-10}, {"atol", 1e-12}},
+                     all(throws, options.threads, progress,
+                         [&](const auto& one) { return experiment::predict(one, model, p, integrator); })});
+    }
+    return out;
+  }
+  auto steps = options.steps;
+  if (steps.empty()) steps = options.engine == "bullet" ? std::vector{1e-3, 1e-4} : std::vector{4e-5};
+  Progress progress(options.engine, throws.size() * steps.size());
+  for (const double step : steps) {
+    Setting setting;
+    setting.json = {{"step_s", step}};
+    if (options.engine == "bullet") {
+      setting.words = fmt::format("Bullet, step {:g} ms, pads {}, friction rows {}", 1e3 * step,
+                                  to_string(options.pads), to_string(options.friction));
+      setting.json["pads"] = to_string(options.pads);
+      setting.json["friction_rows"] = to_string(options.friction);
+    } else {
+      setting.words =
+          fmt::format("patch of {} points, step {:g} ms", 3 * options.rings * options.rings, 1e3 * step);
+    }
+    setting.json["rings"] = options.rings;
+    const crosscheck::DistributedPatch points{patch.mu, patch.radius, crosscheck::disc_points(options.rings),
+                                              patch.pads};
+    setting.throws = all(throws, options.threads, progress, [&](const auto& one) {
+      return from_engine(one, p, [&](const release::ReleaseProblem<double>& problem) {
+        if (options.engine == "patch") {
+          crosscheck::PatchOptions patch_options;
+          patch_options.step = step;
+          const auto r = crosscheck::simulate_distributed_patch(problem, points, patch_options);
+          return crosscheck::BulletResult{r.outcome, r.detach, {}, 0};
+        }
+        return crosscheck::simulate_in_bullet(problem, patch,
+                                              {step, options.pads, options.rings, 50, options.friction});
+      });
+    });
+    out.push_back(std::move(setting));
+  }
+  return out;
+}
+
+/// Engine minus reference, in the units of kQuantities; over the throws that both bring to a landing.
+struct Differences {
+  std::vector<double> of[experiment::kQuantityCount];
+  void add(const std::optional<double> (&difference)[experiment::kQuantityCount]) {
+    for (int q = 0; q < experiment::kQuantityCount; ++q)
+      if (difference[q]) of[q].push_back(*difference[q]);
+  }
+  double worst(int q) const {
+    double out = 0;
+    for (const double d : of[q]) out = std::max(out, std::abs(d));
+    return out;
+  }
+};
+
+Differences against_model(const std::vector<Prediction>& engine, const std::vector<Prediction>& model) {
+  Differences out;
+  for (std::size_t i = 0; i < engine.size(); ++i) {
+    const auto &a = engine[i], &b = model[i];
+    if (!a.landed() || !b.landed()) continue;
+    out.add({a.detach.twist.vx - b.detach.twist.vx, (a.detach.twist.omega - b.detach.twist.omega) * kDegrees,
+             a.landing.pose.x - b.landing.pose.x, (a.landing.pose.theta - b.landing.pose.theta) * kDegrees});
+  }
+  return out;
+}
+
+Differences against_measured(const std::vector<Prediction>& engine, const Throws& throws) {
+  Differences out;
+  for (std::size_t i = 0; i < engine.size(); ++i) {
+    const auto& a = engine[i];
+    const auto& m = throws[i].measured;
+    if (!a.landed()) continue;
+    std::optional<double> d[experiment::kQuantityCount];
+    if (m.detach_twist) d[0] = a.detach.twist.vx - m.detach_twist->vx;
+    if (m.detach_twist) d[1] = (a.detach.twist.omega - m.detach_twist->omega) * kDegrees;
+    if (m.landing_x) d[2] = a.landing.pose.x - *m.landing_x;
+    if (m.landing_theta) d[3] = (a.landing.pose.theta - *m.landing_theta) * kDegrees;
+    out.add(d);
+  }
+  return out;
+}
+
+Json json_of(const Differences& differences) {
+  Json out = Json::object();
+  for (int q = 0; q < experiment::kQuantityCount; ++q) {
+    const auto s = experiment::statistics_of(differences.of[q]);
+    out[experiment::kQuantities[q].key] = {
+        {"n", s.n}, {"mae", s.mae}, {"std", s.std}, {"bias", s.bias}, {"max", differences.worst(q)}};
+  }
+  return out;
+}
+
+void add_row(Table& table, const std::string& title, const Differences& differences, bool worst) {
+  std::vector<std::string> row{title};
+  for (int q = 0; q < experiment::kQuantityCount; ++q) {
+    const auto s = experiment::statistics_of(differences.of[q]);
+    const auto number = [](double x) {
+      return x < 1e-3 ? fmt::format("{:.1e}", x) : fmt::format("{:.4f}", x);
+    };
+    row.push_back(s.n == 0 ? "-" : number(s.mae));
+    if (worst) row.push_back(s.n == 0 ? "-" : number(differences.worst(q)));
+  }
+  table.rows.push_back(row);
+}
+
+Json throws_json(const Setting& setting, const Throws& throws) {
+  Json out = Json::array();
+  for (std::size_t i = 0; i < throws.size(); ++i) {
+    const auto& p = setting.throws[i];
+    Json one{{"id", throws[i].id}, {"landed", p.landed()}};
+    if (p.landed()) {
+      one["detach_vx_m_s"] = p.detach.twist.vx, one["detach_vz_m_s"] = p.detach.twist.vz;
+      one["detach_omega_deg_s"] = p.detach.twist.omega * kDegrees;
+      one["landing_x_m"] = p.landing.pose.x, one["landing_theta_deg"] = p.landing.pose.theta * kDegrees;
+    }
+    out.push_back(one);
+  }
+  return out;
+}
+
+void check(const Options& options) {
+  require_writable(options.json);
+  const auto known = contact::contact_model_names();
+  for (const auto& model : options.models)
+    if (std::find(known.begin(), known.end(), model) == known.end())
+      throw WrongUsage(fmt::format("model '{}' is unknown; there are {}", model, fmt::join(known, ", ")));
+  if (options.engine == "bullet" && !crosscheck::has_bullet())
+    throw Unanswered("built without Bullet (Debian package libbullet-dev)");
+  if (datasets::read_schema_name(options.log) == "slip-log")
+    throw datasets::LogError(options.log, "/@schema", "is a slip-log, which holds no throws");
+  const auto log = datasets::read_throw_log(options.log);
+  if (log.throws.empty()) throw Unanswered(fmt::format("{}: holds no throws", options.log));
+  const auto throws = experiment::prepare_all(log, options.log, options.threads);
+  std::string from;
+  const auto parameters = parameters_of(options, log, throws, from);
+
+  dynamics::IntegratorOptions tight;
+  tight.tolerances = {1e-9, 1e-11};
+  std::map<std::string, std::vector<Prediction>> models;
+  {
+    Progress progress("models", throws.size() * options.models.size());
+    for (const auto& model : options.models)
+      models[model] = all(throws, options.threads, progress, [&](const auto& one) {
+        return experiment::predict(one, model, parameters, tight);
+      });
+  }
+  const auto settings = run_engine(options, throws, parameters);
+
+  Json json = json_head("crosscheck");
+  json["log"] = options.log;
+  json["engine"] = options.engine;
+  json["parameters"] = {
+      {"mu", parameters.mu}, {"length_m", parameters.length}, {"pads", parameters.pads}, {"from", from}};
+  json["settings"] = Json::array();
+  std::string text;
+  bool any = false;
+  for (const auto& setting : settings) {
+    Table table{{setting.model.empty() ? "engine - model" : "CVODE - own steppers"}, {}, 1};
+    const bool worst = !setting.model.empty();
+    for (const auto& quantity : experiment::kQuantities) {
+      table.header.push_back(quantity.title);
+      if (worst) table.header.push_back("worst");
+    }
+    Json one{{"setting", setting.json}, {"models", Json::object()}};
+    for (const auto& [name, predictions] : models) {
+      if (!setting.model.empty() && name != setting.model) continue;
+      const auto differences = against_model(setting.throws, predictions);
+      any = any || !differences.of[0].empty();
+      one["models"][name] = json_of(differences);
+      if (worst) {
+        int other = 0;
+        for (std::size_t i = 0; i < throws.size(); ++i)
+          other += setting.throws[i].events != predictions[i].events;
+        one["models"][name]["other_number_of_events"] = other;
+      }
+      add_row(table, name, differences, worst);
+    }
+    const auto measured = against_measured(setting.throws, throws);
+    one["measured"] = json_of(measured);
+    add_row(table, "measured", measured, worst);
+    one["throws"] = throws_json(setting, throws);
+    json["settings"].push_back(one);
+    text += fmt::format("\n{}{}\n{}", setting.words, setting.model.empty() ? "" : ", " + setting.model,
+                        table.text());
+  }
+  if (!any) throw Unanswered(fmt::format("{}: {} brings no throw to a landing", options.log, options.engine));
+  Outputs outputs;
+  if (!options.json.empty()) outputs.json(options.json, json);
+  outputs.commit();
+  fmt::print("{}: {} throws; mean absolute differences; mu {:.4f}, length {:.3f} mm, {} pads ({})\n{}",
+             options.log, throws.size(), parameters.mu, 1e3 * parameters.length, parameters.pads, from, text);
+}
+
+}  // namespace
+
+Command crosscheck_command(CLI::App& root) {
+  auto options = std::make_shared<Options>();
+  CLI::App* parser = root.add_subcommand("crosscheck", "Another engine on a log's throws, beside the models");
+  parser->add_option("LOG", options->log, "A throw log")->required();
+  parser
+      ->add_option(
+          "--engine", options->engine,
+          "bullet: rigid bodies in double-precision Bullet; cvode: the same models, integrated by SUNDIALS; "
+          "patch: points with bristles")
+      ->check(CLI::IsMember({"bullet", "cvode", "patch"}))
+      ->capture_default_str();
+  parser->add_option("--models", options->models, "Models to hold it against, separated by commas")
+      ->delimiter(',')
+      ->capture_default_str();
+  parser->add_option("--card", options->card,
+                     "Friction from a model card; without it, estimated from the log for the first model");
+  parser->add_option("--steps", options->steps, "Steps of bullet or patch [s], separated by commas")
+      ->delimiter(',')
+      ->check(CLI::Range(1e-6, 1e-3));
+  parser->add_option("--pads", options->pads, "Bullet: how the pads touch")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, BulletPads>{
+          {"pins", BulletPads::pins}, {"point", BulletPads::point}, {"cylinder", BulletPads::cylinder}}));
+  parser->add_option("--friction", options->friction, "Bullet: its friction rows at a contact")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, BulletFriction>{{"along", BulletFriction::along},
+                                                                        {"across", BulletFriction::across},
+                                                                        {"fixed", BulletFriction::fixed}}));
+  parser->add_option("--rings", options->rings, "Rings of points of a pad: 3 n^2 points")
+      ->check(CLI::Range(1, 10))
+      ->capture_default_str();
+  parser->add_option("--json", options->json, "Write every throw and the differences as JSON");
+  add_threads(*parser, options->threads);
+  parser->footer(
+      "All get the same hand, normal force and friction, so that differences are the engine's.\n"
+      "Example:\n  unhand crosscheck campaign.h5 --engine bullet --steps 1e-3,1e-4 --json bullet.json");
+  return {parser, [options] { check(*options); }};
+}
+
+}  // namespace unhand::apps

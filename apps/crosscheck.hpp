@@ -1,0 +1,10 @@
+// unhand crosscheck: other engines on a log's throws.
+#pragma once
+
+#include "apps/command.hpp"
+
+namespace unhand::apps {
+
+Command crosscheck_command(CLI::App& root);
+
+}  // namespace unhand::apps

@@ -1,0 +1,99 @@
+#include "tests/fuzz/readers.hpp"
+
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <stdexcept>
+
+#include "datasets/import_columns.hpp"
+#include "datasets/import_cube_tosses.hpp"
+#include "datasets/import_motive.hpp"
+#include "datasets/import_phyphox.hpp"
+#include "datasets/model_card.hpp"
+#include "datasets/planar_push_file.hpp"
+#include "datasets/sku.hpp"
+#include "datasets/slip_log.hpp"
+#include "datasets/throw_log.hpp"
+
+namespace unhand::fuzz {
+namespace {
+
+using Path = std::filesystem::path;
+
+/// Columns by their own names, in SI units.
+datasets::ColumnMap plain(const std::vector<std::string>& channels) {
+  datasets::ColumnMap map;
+  for (const auto& channel : channels) map.columns[channel] = channel;
+  const std::map<std::string, std::string> units{
+      {"time", "s"}, {"x", "m"},         {"z", "m"},      {"theta", "rad"}, {"vx", "m/s"},
+      {"vz", "m/s"}, {"omega", "rad/s"}, {"ax", "m/s^2"}, {"az", "m/s^2"},  {"alpha", "rad/s^2"},
+      {"fx", "N"},   {"fz", "N"},        {"tau", "N m"},  {"normal", "N"}};
+  for (const auto& channel : channels) map.units[channel] = units.at(channel);
+  return map;
+}
+
+const std::map<std::string, std::function<void(const Path&)>>& readers() {
+  static const std::map<std::string, std::function<void(const Path&)>> all{
+      {"throw_log", [](const Path& file) { datasets::read_throw_log(file); }},
+      {"slip_log", [](const Path& file) { datasets::read_slip_log(file); }},
+      {"model_card", [](const Path& file) { datasets::read_model_card(file); }},
+      {"sku", [](const Path& file) { datasets::read_sku(file); }},
+      {"hand_csv", [](const Path& file) { datasets::read_hand_csv(file, plain(datasets::hand_channels())); }},
+      {"ft_csv", [](const Path& file) { datasets::read_ft_csv(file, plain(datasets::ft_channels())); }},
+      {"motive_csv", [](const Path& file) { datasets::read_motive_csv(file); }},
+      {"phyphox", [](const Path& file) { datasets::read_phyphox(file); }},
+      {"cube_tosses", [](const Path& file) { datasets::import_cube_tosses(file); }},
+      {"planar_pushes", [](const Path& file) { datasets::read_push_file(file); }}};
+  return all;
+}
+
+/// A file of its own, in memory where there is such a place. (A memfd has no path that HDF5 accepts.)
+class ScratchFile {
+ public:
+  ScratchFile(const std::uint8_t* data, std::size_t size) {
+    const Path memory = "/dev/shm";
+    path_ = ((std::filesystem::exists(memory) ? memory : std::filesystem::temp_directory_path()) /
+             "unhand-XXXXXX")
+                .string();
+    const int descriptor = mkstemp(path_.data());
+    if (descriptor < 0) throw std::runtime_error("no scratch file: " + path_);
+    for (std::size_t done = 0; done < size;) {
+      const ssize_t n = ::write(descriptor, data + done, size - done);
+      if (n <= 0) break;
+      done += static_cast<std::size_t>(n);
+    }
+    ::close(descriptor);
+  }
+  ScratchFile(const ScratchFile&) = delete;
+  ScratchFile& operator=(const ScratchFile&) = delete;
+  ~ScratchFile() { ::unlink(path_.c_str()); }
+  Path path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+}  // namespace
+
+std::vector<std::string> reader_names() {
+  std::vector<std::string> names;
+  for (const auto& [name, reader] : readers()) names.push_back(name);
+  return names;
+}
+
+Reading read(const std::string& reader, const std::uint8_t* data, std::size_t size) {
+  const auto found = readers().find(reader);
+  if (found == readers().end()) throw std::invalid_argument("no reader is called " + reader);
+  const ScratchFile file(data, size);
+  try {
+    found->second(file.path());
+    return Reading::accepted;
+  } catch (const datasets::LogError&) {
+    return Reading::refused;
+  }
+}
+
+}  // namespace unhand::fuzz
