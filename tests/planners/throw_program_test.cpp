@@ -70,12 +70,12 @@ ElasticThrow planned(Drive drive, int intervals, std::optional<Target> target = 
 
 TEST(ElasticThrow, TheIntegratorAgreesAndNoLimitIsExceeded) {
   for (const Drive drive : {Drive::clutched, Drive::series, Drive::rigid}) {
-    const ElasticThrow plan = planned(drive, 16);
+    const ElasticThrow plan = planned(drive, 12);
     ASSERT_TRUE(plan.solved()) << to_string(drive);
     EXPECT_LT(plan.program.violation, 1e-6);
     const Replay run = replay(bsa3(), plan);
     EXPECT_EQ(run.outcome, dynamics::Outcome::horizon) << to_string(drive);
-    // Hermite-Simpson on 32 steps of 20 ms under torques with corners: some 1e-3 of the speed.
+    // Hermite-Simpson on 24 steps of 25 ms under torques with corners: some 1e-3 of the speed.
     EXPECT_NEAR(std::hypot(run.release.vx, run.release.vz), plan.speed(), 0.01 * plan.speed())
         << to_string(drive);
     EXPECT_LE(run.use.largest(), 1) << to_string(drive);
@@ -86,6 +86,24 @@ TEST(ElasticThrow, TheIntegratorAgreesAndNoLimitIsExceeded) {
 
 TEST(ElasticThrow, TheSpringLetGoIsFasterThanTheRigidJoint) {
   EXPECT_GT(planned(Drive::clutched, 10).speed(), 1.05 * planned(Drive::rigid, 10).speed());
+}
+
+TEST(ElasticThrow, ASpringInTheWristIsFasterThanNone) {
+  const auto wrist = [](Drive drive) {
+    ThrowTask task;
+    task.drive = drive;
+    ThrowProgramOptions options;
+    options.intervals = 6;
+    const ClutchedArm arm = read_clutched_arm(std::filesystem::path(UNHAND_ELASTIC_ARMS) / "vsa_wrist.toml");
+    const ElasticThrow plan = plan_throw(arm, task, options);
+    EXPECT_TRUE(plan.solved());
+    const Replay run = replay(arm, plan);
+    EXPECT_NEAR(std::hypot(run.release.vx, run.release.vz), plan.speed(),
+                0.02 * plan.speed());  // 12 intervals
+    EXPECT_NEAR(run.unexplained(), 0, 1e-6 * std::abs(run.motor_work));
+    return plan.speed();
+  };
+  EXPECT_GT(wrist(Drive::passive), 1.2 * wrist(Drive::locked));
 }
 
 TEST(ElasticThrow, LandsOnItsTarget) {
