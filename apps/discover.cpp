@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "apps/cards.hpp"
 #include "apps/command.hpp"
+#include "apps/discover_measured.hpp"
 #include "apps/figure.hpp"
 #include "apps/table.hpp"
 #include "contact/registry.hpp"
@@ -23,8 +25,9 @@ using fitting::OutcomeErrors;
 struct Options {
   std::string log, model{"limit_surface_disc"}, report, json, card;
   std::vector<std::string> forget;
-  double matters{0.5}, tolerance{1e-5};
-  int most{3}, threads{0};
+  double matters{0.5}, tolerance{1e-5}, floor{0};
+  std::optional<int> most;
+  int threads{0};
 };
 
 /// JSON has no infinity and no NaN.
@@ -120,8 +123,13 @@ void discover(const Options& options, const std::string& command) {
     require_writable_directory(options.report);
     require_gnuplot();
   }
-  if (datasets::read_schema_name(options.log) == "slip-log")
-    throw WrongUsage("a slip-log holds no throws; its law is found by `unhand compare LOG --fit`");
+  if (const auto kind = measured_kind(options.log))
+    return discover_measured(*kind,
+                             {options.log, options.model, options.report, options.json, options.card, command,
+                              options.forget, options.floor, options.most.value_or(6), options.threads});
+  const auto& others = measured_models();
+  if (std::find(others.begin(), others.end(), options.model) != others.end())
+    throw WrongUsage(fmt::format("--model {}: {} holds planar throws", options.model, options.log));
   const auto log = datasets::read_throw_log(options.log);
   if (log.throws.empty()) throw Unanswered(fmt::format("{}: holds no throws", options.log));
   fitting::DiscoverOptions request;
@@ -129,7 +137,7 @@ void discover(const Options& options, const std::string& command) {
   request.campaign.threads = request.fit.threads = options.threads;
   request.campaign.integrator.tolerances = {options.tolerance, 1e-3 * options.tolerance};
   request.matters = options.matters;
-  request.most_effects = options.most;
+  request.most_effects = options.most.value_or(3);
   request.forget = options.forget;
   for (const auto& id : options.forget) {
     try {
@@ -248,14 +256,29 @@ std::string discovery_text(const Discovery& found, const std::string& log) {
   return out + "\n" + table.text() + fmt::format("\n{:.1f} s\n", found.seconds);
 }
 
+namespace {
+
+/// Of throws, then of free flights, falls and slips.
+std::vector<std::string> base_models() {
+  auto out = contact::contact_model_names();
+  out.insert(out.end(), measured_models().begin(), measured_models().end());
+  return out;
+}
+
+}  // namespace
+
 Command discover_command(CLI::App& root) {
   auto options = std::make_shared<Options>();
   CLI::App* parser = root.add_subcommand("discover",
                                          "Find what a model lacks: trace the residual to an effect, add it, "
                                          "and report the error before and after");
-  parser->add_option("LOG", options->log, "A throw log (dimension 2)")->required();
+  parser
+      ->add_option("LOG", options->log,
+                   "A log of planar throws, of free flights or accelerometers in free fall (dimension 3), or "
+                   "a slip-log")
+      ->required();
   parser->add_option("--model", options->model, "The base model")
-      ->check(CLI::IsMember(contact::contact_model_names()))
+      ->check(CLI::IsMember(base_models()))
       ->capture_default_str();
   parser->add_option("--report", options->report, "Directory for the page, its figures and discovery.json");
   parser->add_option("--json", options->json, "Write the result as JSON");
@@ -267,8 +290,12 @@ Command discover_command(CLI::App& root) {
                    "Least fall of chi2 per sample on held-out throws for an effect to count")
       ->check(CLI::Range(1e-3, 1e3))
       ->capture_default_str();
-  parser->add_option("--most", options->most, "Most effects to add")
-      ->check(CLI::Range(0, 10))
+  parser->add_option("--most", options->most, "Most effects to add (3 for planar throws, 6 for other logs)")
+      ->check(CLI::Range(0, 10));
+  parser
+      ->add_option("--floor", options->floor,
+                   "Free flights: height of the floor that boxes come to rest on [m]")
+      ->check(CLI::Range(-1e3, 1e3))
       ->capture_default_str();
   parser->add_option("--rtol", options->tolerance, "Relative tolerance of the integration")
       ->check(CLI::Range(1e-10, 1e-3))

@@ -4,11 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 
 #include "apps/discover.hpp"
 #include "apps/figure.hpp"
+#include "apps/report_page.hpp"
 #include "apps/table.hpp"
 
 namespace unhand::apps {
@@ -17,40 +16,6 @@ namespace {
 using experiment::Channel;
 using fitting::Discovery;
 using fitting::OutcomeErrors;
-
-std::string base64(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  const std::string bytes((std::istreambuf_iterator<char>(in)), {});
-  constexpr char kAlphabet[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    unsigned block = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      block = block << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
-    for (std::size_t k = 0; k < 4; ++k)
-      out += i + k <= bytes.size() ? kAlphabet[block >> (18 - 6 * k) & 63] : '=';
-  }
-  return out;
-}
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text)
-    out += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : std::string(1, c);
-  return out;
-}
-
-std::string html(const Table& table) {
-  std::string out = "<table><tr>";
-  for (const auto& cell : table.header) out += "<th>" + escaped(cell) + "</th>";
-  for (const auto& row : table.rows) {
-    out += "</tr><tr>";
-    for (std::size_t i = 0; i < row.size(); ++i)
-      out +=
-          fmt::format("<td{}>{}</td>", static_cast<int>(i) < table.left ? "" : " class=n", escaped(row[i]));
-  }
-  return out + "</tr></table>\n";
-}
 
 /// Residuals over time, before and after, a panel for each channel that has any.
 Figure residual_figure(const Discovery& found) {
@@ -247,8 +212,7 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
   const bool estimated = found.unexplained && found.unexplained->missing;
   if (estimated) draw(missing_figure(*found.unexplained->missing), directory);
   const auto picture = [&](const std::string& name) {
-    return fmt::format("<img src=\"data:image/png;base64,{}\" alt=\"{}\">\n",
-                       base64(directory / (name + ".png")), name);
+    return html_picture(directory / (name + ".png"), name);
   };
   std::string answer;
   for (const auto& effect : found.effects) {

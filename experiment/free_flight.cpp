@@ -6,17 +6,16 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <stdexcept>
 
+#include "experiment/flight_samples.hpp"
 #include "experiment/least_squares.hpp"
 #include "experiment/parallel.hpp"
 #include "flight/point_flight.hpp"
 
 namespace unhand::experiment {
 
-using datasets::MocapLog;
 using datasets::Object;
 using datasets::Throw;
 using datasets::ThrowLog;
@@ -45,60 +44,6 @@ const char* to_string(FreeFlightOutcome outcome) {
 
 namespace {
 
-/// The valid samples of a flight, times from the first.
-struct Samples {
-  std::vector<double> elapsed;
-  std::vector<Vec3<double>> position;
-  std::vector<Quaternion<double>> attitude;  // spatial
-  std::vector<double> theta;                 // planar
-  std::vector<int> axes;                     // of the world, that were measured
-  Vec3<double> sigma{1, 1, 1};               // [m], or ones
-  double sigma_angle{1};                     // [rad], or one
-  bool declared{};
-};
-
-void read_sigma(const datasets::Series& pose, Samples& out) {
-  const std::vector<double>& s = pose.sigma;
-  out.declared = s.size() == pose.cols && std::all_of(s.begin(), s.end(), [](double x) { return x > 0; });
-  if (!out.declared) return;
-  const std::size_t n = out.axes.size();
-  for (std::size_t j = 0; j < n; ++j) out.sigma[static_cast<std::size_t>(out.axes[j])] = s[j];
-  if (pose.cols == 7) {
-    double squares = 0;
-    for (std::size_t j = 3; j < 7; ++j) squares += s[j] * s[j];
-    out.sigma_angle = 2 * std::sqrt(squares / 4);  // a rotation by θ moves a quaternion by θ/2
-  } else if (n == 2) {
-    out.sigma_angle = s[2];
-  }
-}
-
-Samples read_samples(const ThrowLog& log, const Throw& one, std::vector<double>& times) {
-  const MocapLog& mocap = *one.mocap;
-  const bool planar = log.dimension == 2;
-  const double infinity = std::numeric_limits<double>::infinity();
-  const auto [begin, end] = one.free_flight.value_or(std::pair{-infinity, infinity});
-  Samples out;
-  out.axes = planar ? std::vector<int>{0, 2} : std::vector<int>{0, 1, 2};
-  read_sigma(mocap.pose, out);
-  for (std::size_t i = 0; i < mocap.time.rows; ++i) {
-    const double t = mocap.time(i);
-    if (!mocap.is_valid(i) || t < begin - 1e-9 || t > end + 1e-9)
-      continue;  // the bounds are sample times themselves
-    const auto p = [&](std::size_t j) { return mocap.pose(i, j); };
-    times.push_back(t);
-    out.elapsed.push_back(t - times.front());
-    if (planar) {
-      out.position.push_back({p(0), 0, p(1)});
-      out.theta.push_back(p(2));
-    } else {
-      out.position.push_back({p(0), p(1), p(2)});
-      if (mocap.pose.cols == 7)
-        out.attitude.push_back(flight::normalised(Quaternion<double>{p(3), p(4), p(5), p(6)}));
-    }
-  }
-  return out;
-}
-
 void place(const MatrixXd& covariance, const std::vector<int>& axes, Eigen::Matrix<double, 6, 6>& out) {
   const int n = static_cast<int>(axes.size());
   for (int a = 0; a < 2 * n; ++a)
@@ -113,7 +58,7 @@ const dynamics::IntegratorOptions kFine = [] {
 }();
 
 /// The flight of the CoM. With drag the closed form without it is where Gauss-Newton begins.
-bool fit_translation(const Samples& s, const Vec3<double>& gravity, double drag_k, std::size_t n,
+bool fit_translation(const FlightSamples& s, const Vec3<double>& gravity, double drag_k, std::size_t n,
                      FreeFlightFit& fit) {
   const std::vector<double> fitted(s.elapsed.begin(), s.elapsed.begin() + static_cast<long>(n));
   for (const int a : s.axes) {
@@ -173,7 +118,7 @@ bool fit_translation(const Samples& s, const Vec3<double>& gravity, double drag_
 
 /// Torque-free rotation in space. The window grows from the first few samples: however many turns the flight
 /// has, the start is good to a fraction of one by then.
-bool fit_rotation(const Samples& s, const Vec3<double>& inertia, std::size_t n, FreeFlightFit& fit) {
+bool fit_rotation(const FlightSamples& s, const Vec3<double>& inertia, std::size_t n, FreeFlightFit& fit) {
   const Vec3<Dual> inertia_dual{Dual(inertia[0]), Dual(inertia[1]), Dual(inertia[2])};
   RotationState<double> x{s.attitude[0], flight::rotation_between(s.attitude[0], s.attitude[1])};
   for (double& w : x.omega) w /= s.elapsed[1];
@@ -219,7 +164,7 @@ bool fit_rotation(const Samples& s, const Vec3<double>& inertia, std::size_t n, 
   return true;
 }
 
-void fit_angle(const Samples& s, std::size_t n, FreeFlightFit& fit) {
+void fit_angle(const FlightSamples& s, std::size_t n, FreeFlightFit& fit) {
   const FittedLine line = fit_line(std::span(s.elapsed).first(n), std::span(s.theta).first(n), s.sigma_angle);
   fit.theta = line.p;
   fit.rotation = {flight::exp(Vec3<double>{0, -line.p, 0}), {0, -line.v, 0}};
@@ -254,7 +199,8 @@ FreeFlightFit fit_projectile(const ThrowLog& log, const Throw& one, double fract
   if (!one.mocap) return stop(FreeFlightOutcome::no_tracking, "no mocap");
   if (one.hand && !one.free_flight)
     return stop(FreeFlightOutcome::not_free, "a hand and no free_flight: it is not known when it flies");
-  const Samples s = read_samples(log, one, fit.times);
+  const FlightSamples s = read_flight_samples(log, one);
+  fit.times = s.times;
   if (fit.times.size() < kFewestFlightSamples)
     return stop(FreeFlightOutcome::too_short, fmt::format("{} valid samples in free flight, fewer than {}",
                                                           fit.times.size(), kFewestFlightSamples));

@@ -21,8 +21,9 @@ namespace {
 template <class P>
 class Turning final : public dynamics::HybridSystemFrom<Turning<P>, 7> {
  public:
-  explicit Turning(const Vec3<P>& inertia)
-      : ratios_{P((inertia[1] - inertia[2]) / inertia[0]), P((inertia[2] - inertia[0]) / inertia[1]),
+  Turning(const Vec3<P>& inertia, const P& damping)
+      : damping_(damping),
+        ratios_{P((inertia[1] - inertia[2]) / inertia[0]), P((inertia[2] - inertia[0]) / inertia[1]),
                 P((inertia[0] - inertia[1]) / inertia[2])} {}
   dynamics::FlowKind kind(int) const override { return dynamics::FlowKind::smooth; }
   std::string_view mode_name(int) const override { return "turning"; }
@@ -36,9 +37,9 @@ class Turning final : public dynamics::HybridSystemFrom<Turning<P>, 7> {
           0.5 * rate.x,
           0.5 * rate.y,
           0.5 * rate.z,
-          convert<S>(ratios_[0]) * y[5] * y[6],
-          convert<S>(ratios_[1]) * y[6] * y[4],
-          convert<S>(ratios_[2]) * y[4] * y[5]};
+          convert<S>(ratios_[0]) * y[5] * y[6] - convert<S>(damping_) * y[4],
+          convert<S>(ratios_[1]) * y[6] * y[4] - convert<S>(damping_) * y[5],
+          convert<S>(ratios_[2]) * y[4] * y[5] - convert<S>(damping_) * y[6]};
   }
   template <class S>
   void guards_(const Phase&, const S&, const State<S, 7>&, S*) const {}
@@ -48,6 +49,7 @@ class Turning final : public dynamics::HybridSystemFrom<Turning<P>, 7> {
   }
 
  private:
+  P damping_;
   Vec3<P> ratios_;
 };
 
@@ -74,35 +76,53 @@ bool is_zero(const Dual& x) { return x.a == 0 && x.v.isZero(); }
 }  // namespace
 
 template <class S>
-std::vector<RotationState<S>> rotate_freely(const Vec3<S>& inertia, const RotationState<S>& start,
-                                            const std::vector<double>& times,
-                                            const dynamics::IntegratorOptions& options) {
-  validate(inertia, start, times);
-  const Quaternion<S> attitude = normalised(start.attitude);
-  std::vector<RotationState<S>> out;
-  out.reserve(times.size());
+Rotation<S>::Rotation(const Vec3<S>& inertia, const RotationState<S>& start, const S& damping, double last,
+                      const dynamics::IntegratorOptions& options) {
+  validate(inertia, start, {last});
+  if (!std::isfinite(value_of(damping)))
+    throw std::invalid_argument("free rotation: the damping is not finite");
+  attitude_ = normalised(start.attitude);
+  omega_ = start.omega;
   // A difference of zero may still carry a derivative; then the closed form would lose it.
-  if (is_zero(S(inertia[0] - inertia[1])) && is_zero(S(inertia[1] - inertia[2]))) {
-    for (const double t : times) out.push_back({attitude * exp(scaled(S(t), start.omega)), start.omega});
-    return out;
-  }
-  const double last = times.empty() ? 0 : *std::max_element(times.begin(), times.end());
+  closed_form_ =
+      (is_zero(S(inertia[0] - inertia[1])) && is_zero(S(inertia[1] - inertia[2])) && is_zero(damping)) ||
+      !(last > 0);
+  if (closed_form_) return;
   dynamics::IntegratorOptions recorded = options;
   recorded.record = true;
   recorded.longest_step =
       std::max(options.longest_step, last);  // no guards: the error alone chooses the step
-  const State<S, 7> y{S(1), S(0), S(0), S(0), start.omega[0], start.omega[1], start.omega[2]};
-  const auto solution =
-      dynamics::integrate<S, 7>(Turning<S>(inertia), Entry<S, 7>{0, S(0), y, S(0)}, S(last), recorded);
+  const State<S, 7> y{S(1), S(0), S(0), S(0), omega_[0], omega_[1], omega_[2]};
+  auto solution = dynamics::integrate<S, 7>(Turning<S>(inertia, damping), Entry<S, 7>{0, S(0), y, S(0)},
+                                            S(last), recorded);
   if (solution.outcome != dynamics::Outcome::horizon)
     throw std::runtime_error(fmt::format("free rotation: not solved ({})", to_string(solution.outcome)));
-  for (const double t : times) {
-    const State<S, 7> at = t > 0 ? solution.trajectory.at(S(t)) : y;
-    out.push_back({attitude * normalised(Quaternion<S>{at[0], at[1], at[2], at[3]}), {at[4], at[5], at[6]}});
-  }
+  trajectory_ = std::move(solution.trajectory);
+}
+
+template <class S>
+RotationState<S> Rotation<S>::at(const S& t) const {
+  if (closed_form_) return {attitude_ * exp(scaled(t, omega_)), omega_};
+  if (!(value_of(t) > 0)) return {attitude_, omega_};
+  const State<S, 7> y = trajectory_.at(t);
+  return {attitude_ * normalised(Quaternion<S>{y[0], y[1], y[2], y[3]}), {y[4], y[5], y[6]}};
+}
+
+template <class S>
+std::vector<RotationState<S>> rotate_freely(const Vec3<S>& inertia, const RotationState<S>& start,
+                                            const std::vector<double>& times,
+                                            const dynamics::IntegratorOptions& options) {
+  validate(inertia, start, times);
+  const double last = times.empty() ? 0 : *std::max_element(times.begin(), times.end());
+  const Rotation<S> rotation(inertia, start, S(0), last, options);
+  std::vector<RotationState<S>> out;
+  out.reserve(times.size());
+  for (const double t : times) out.push_back(rotation.at(S(t)));
   return out;
 }
 
+template class Rotation<double>;
+template class Rotation<Dual>;
 template std::vector<RotationState<double>> rotate_freely(const Vec3<double>&, const RotationState<double>&,
                                                           const std::vector<double>&,
                                                           const dynamics::IntegratorOptions&);

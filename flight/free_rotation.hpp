@@ -31,6 +31,24 @@ std::vector<RotationState<S>> rotate_freely(const Vec3<S>& inertia, const Rotati
                                             const std::vector<double>& times,
                                             const dynamics::IntegratorOptions& options = {});
 
+/// The same rotation, to be read at any instant, and with air that brakes it: I ω̇ = … − c I ω, so that the
+/// spin of a body with equal moments dies as exp(−c t); c [1/s].
+template <class S>
+class Rotation {
+ public:
+  /// From 0 to `last` [s]. Throws as rotate_freely does, and when c is not finite.
+  Rotation(const Vec3<S>& inertia, const RotationState<S>& start, const S& damping, double last,
+           const dynamics::IntegratorOptions& options = {});
+  /// `t` [s] after the start, in [0, last].
+  RotationState<S> at(const S& t) const;
+
+ private:
+  Quaternion<S> attitude_;
+  Vec3<S> omega_;
+  bool closed_form_{};
+  dynamics::Trajectory<S, 7> trajectory_;
+};
+
 /// Kinetic energy ½ ω·Iω [J if I is in kg m²].
 template <class S>
 S rotational_energy(const Vec3<S>& inertia, const Vec3<S>& omega) {

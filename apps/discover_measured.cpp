@@ -1,0 +1,104 @@
+#include "apps/discover_measured.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "apps/command.hpp"
+#include "apps/figure.hpp"
+#include "apps/measured_report.hpp"
+#include "fitting/card.hpp"
+
+namespace unhand::apps {
+namespace {
+
+using fitting::MeasuredDiscovery;
+
+const char* default_model(MeasuredKind kind) {
+  return kind == MeasuredKind::flights ? "projectile"
+         : kind == MeasuredKind::falls ? "free_fall"
+                                       : "ellipsoid";
+}
+
+/// The parameters that were found, for `unhand predict` and others to read.
+datasets::ModelCard card_of(const MeasuredDiscovery& found, const datasets::ThrowLog& log,
+                            const std::string& file) {
+  datasets::ModelCard card;
+  card.model = found.model;
+  for (const auto& effect : found.effects) {
+    card.effects.push_back(effect.id);
+    for (const auto& p : effect.parameters)
+      card.parameters[effect.id + "." + p.name] = {p.value, p.sigma, p.unit, true};
+  }
+  if (!found.parameters.empty())
+    card.covariance = datasets::CardCovariance{found.parameters, found.covariance};
+  card.log = {std::filesystem::path(file).filename().string(), log.title, fitting::checksum_of(file)};
+  card.split = "train";
+  card.library_version = UNHAND_VERSION;
+  return card;
+}
+
+}  // namespace
+
+std::optional<MeasuredKind> measured_kind(const std::string& log) {
+  if (datasets::read_schema_name(log) == "slip-log") return MeasuredKind::slips;
+  const auto read = datasets::read_throw_log(log);
+  if (read.dimension != 3 || read.throws.empty()) return {};
+  const auto has = [&](const auto& what) {
+    return std::any_of(read.throws.begin(), read.throws.end(), what);
+  };
+  if (has([](const datasets::Throw& t) { return t.mocap.has_value(); })) return MeasuredKind::flights;
+  if (has([](const datasets::Throw& t) { return t.imu.has_value(); })) return MeasuredKind::falls;
+  return {};
+}
+
+const std::vector<std::string>& measured_models() {
+  static const std::vector<std::string> names{"projectile", "free_fall", "ellipsoid"};
+  return names;
+}
+
+void discover_measured(MeasuredKind kind, const MeasuredRequest& request) {
+  const bool is_default =
+      std::find(measured_models().begin(), measured_models().end(), request.model) == measured_models().end();
+  if (!is_default && request.model != default_model(kind))
+    throw WrongUsage(
+        fmt::format("--model {}: the base model of this log is {}", request.model, default_model(kind)));
+  if (kind == MeasuredKind::slips && !request.card.empty())
+    throw WrongUsage("--card: limit surfaces of a slip-log get theirs from `unhand fit LOG --card FILE`");
+  MeasuredResult result;
+  result.log = request.log;
+  result.command = request.command;
+  std::optional<datasets::ThrowLog> log;
+  if (kind == MeasuredKind::slips) {
+    fitting::SurfaceDiscoveryOptions options;
+    options.forget = request.forget;
+    options.comparison.threads = request.threads;
+    auto found = fitting::discover_surfaces(datasets::read_slip_log(request.log), options);
+    result.answer = std::move(found.answer);
+    result.surfaces = std::move(found.evidence);
+  } else {
+    log = datasets::read_throw_log(request.log);
+    fitting::MeasuredOptions options;
+    options.search.forget = request.forget;
+    options.search.most_effects = request.most;
+    options.search.fit.threads = request.threads;
+    options.floor = request.floor;
+    try {
+      result.answer = kind == MeasuredKind::flights ? fitting::discover_flights(*log, options)
+                                                    : fitting::discover_falls(*log, options);
+    } catch (const std::invalid_argument& error) {
+      throw Unanswered(fmt::format("{}: {}", request.log, error.what()));
+    }
+  }
+  if (result.answer.verdict == fitting::Verdict::not_answered) throw Unanswered(result.answer.message);
+  Outputs outputs;
+  const Json json = measured_json(result);
+  if (!request.json.empty()) outputs.json(request.json, json);
+  if (!request.card.empty())
+    outputs.text(request.card, datasets::to_json(card_of(result.answer, *log, request.log)));
+  if (!request.report.empty()) write_measured_report(result, json, outputs.directory(request.report));
+  outputs.commit();
+  fmt::print("{}", measured_text(result));
+}
+
+}  // namespace unhand::apps

@@ -1,0 +1,27 @@
+// The JSON, the text and the page of unhand discover on measured logs.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "apps/output.hpp"
+#include "fitting/surface_discovery.hpp"
+
+namespace unhand::apps {
+
+/// A result with what stands beside it.
+struct MeasuredResult {
+  fitting::MeasuredDiscovery answer;
+  std::vector<fitting::SurfaceEvidence> surfaces;  ///< slips only
+  std::string log, command;
+};
+
+/// discovery.json, schema "discovery" version 1.
+Json measured_json(const MeasuredResult& result);
+std::string measured_text(const MeasuredResult& result);
+/// A self-contained page (index.html), the figures with their data and scripts, and discovery.json.
+void write_measured_report(const MeasuredResult& result, const Json& json,
+                           const std::filesystem::path& directory);
+
+}  // namespace unhand::apps

@@ -1,0 +1,78 @@
+#include "experiment/flight_samples.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace unhand::experiment {
+namespace {
+
+void read_sigma(const datasets::Series& pose, FlightSamples& out) {
+  const std::vector<double>& s = pose.sigma;
+  out.declared = s.size() == pose.cols && std::all_of(s.begin(), s.end(), [](double x) { return x > 0; });
+  if (!out.declared) return;
+  const std::size_t n = out.axes.size();
+  for (std::size_t j = 0; j < n; ++j) out.sigma[static_cast<std::size_t>(out.axes[j])] = s[j];
+  if (pose.cols == 7) {
+    double squares = 0;
+    for (std::size_t j = 3; j < 7; ++j) squares += s[j] * s[j];
+    out.sigma_angle = 2 * std::sqrt(squares / 4);  // a rotation by θ moves a quaternion by θ/2
+  } else if (n == 2) {
+    out.sigma_angle = s[2];
+  }
+}
+
+}  // namespace
+
+FlightSamples read_flight_samples(const datasets::ThrowLog& log, const datasets::Throw& one) {
+  const datasets::MocapLog& mocap = *one.mocap;
+  const bool planar = log.dimension == 2;
+  const double infinity = std::numeric_limits<double>::infinity();
+  const auto [begin, end] = one.free_flight.value_or(std::pair{-infinity, infinity});
+  FlightSamples out;
+  out.axes = planar ? std::vector<int>{0, 2} : std::vector<int>{0, 1, 2};
+  read_sigma(mocap.pose, out);
+  for (std::size_t i = 0; i < mocap.time.rows; ++i) {
+    const double t = mocap.time(i);
+    if (!mocap.is_valid(i) || t < begin - 1e-9 || t > end + 1e-9)
+      continue;  // the bounds are sample times themselves
+    const auto p = [&](std::size_t j) { return mocap.pose(i, j); };
+    out.times.push_back(t);
+    out.elapsed.push_back(t - out.times.front());
+    if (planar) {
+      out.position.push_back({p(0), 0, p(1)});
+      out.theta.push_back(p(2));
+    } else {
+      out.position.push_back({p(0), p(1), p(2)});
+      if (mocap.pose.cols == 7)
+        out.attitude.push_back(flight::normalised(flight::Quaternion<double>{p(3), p(4), p(5), p(6)}));
+    }
+  }
+  return out;
+}
+
+FlightScatter scatter_of(const FlightSamples& s) {
+  FlightScatter out;
+  const auto third = [](double a, double b, double c, double d) {
+    return std::pow(d - 3 * c + 3 * b - a, 2) / 20;
+  };
+  std::vector<flight::Vec3<double>> turns;  // between neighbours: their second differences are third ones
+  for (std::size_t i = 1; i < s.attitude.size(); ++i)
+    turns.push_back(flight::rotation_between(s.attitude[i - 1], s.attitude[i]));
+  for (std::size_t i = 3; i < s.position.size(); ++i) {
+    ++out.n;
+    for (std::size_t a = 0; a < 3; ++a) {
+      out.position[a] +=
+          third(s.position[i - 3][a], s.position[i - 2][a], s.position[i - 1][a], s.position[i][a]);
+      if (i < s.attitude.size())
+        out.angle += std::pow(turns[i - 1][a] - 2 * turns[i - 2][a] + turns[i - 3][a], 2) / 60;
+    }
+    if (i < s.theta.size()) out.angle += third(s.theta[i - 3], s.theta[i - 2], s.theta[i - 1], s.theta[i]);
+  }
+  if (out.n == 0) return out;
+  for (double& x : out.position) x = std::sqrt(x / static_cast<double>(out.n));
+  out.angle = std::sqrt(out.angle / static_cast<double>(out.n));
+  return out;
+}
+
+}  // namespace unhand::experiment

@@ -1,0 +1,35 @@
+// The tracked samples of a free flight.
+#pragma once
+
+#include <vector>
+
+#include "datasets/throw_log.hpp"
+#include "flight/quaternion.hpp"
+
+namespace unhand::experiment {
+
+/// The valid samples within `free_flight`, or all valid ones. A planar flight lies in the plane y = 0.
+struct FlightSamples {
+  std::vector<double> times, elapsed;                // [s]: as logged, and from the first
+  std::vector<flight::Vec3<double>> position;        // [m]
+  std::vector<flight::Quaternion<double>> attitude;  // spatial, where it was tracked
+  std::vector<double> theta;                         // planar [rad]
+  std::vector<int> axes;                             // of the world, that were measured
+  flight::Vec3<double> sigma{1, 1, 1};               // [m], or ones
+  double sigma_angle{1};                             // [rad], or one; a quaternion's sigma is half an angle's
+  bool declared{};                                   // the log declares sigma
+};
+
+/// Of a throw with `mocap`.
+FlightSamples read_flight_samples(const datasets::ThrowLog& log, const datasets::Throw& one);
+
+/// What scatters from sample to sample, 1 σ: third differences of a smooth series keep 20 σ² (1 + 9 + 9 + 1).
+/// Of position [m] per axis and of a small rotation about any axis [rad]; 0 where the series is too short.
+struct FlightScatter {
+  flight::Vec3<double> position{};
+  double angle{};
+  std::size_t n{};  // third differences
+};
+FlightScatter scatter_of(const FlightSamples& samples);
+
+}  // namespace unhand::experiment

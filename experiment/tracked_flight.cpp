@@ -1,0 +1,95 @@
+#include "experiment/tracked_flight.hpp"
+
+namespace unhand::experiment {
+
+using dynamics::Dual;
+using dynamics::EffectValues;
+using flight::Vec3;
+
+namespace {
+
+template <class S>
+void length_scale(const EffectValues<S>& p, Tracking<S>& tracking) {
+  tracking.length_scale = p["scale"] - 1.0;
+}
+template <class S>
+void time_scale(const EffectValues<S>& p, Tracking<S>& tracking) {
+  tracking.time_scale = p["scale"] - 1.0;
+}
+template <class S>
+void com_offset(const EffectValues<S>& p, Tracking<S>& tracking) {
+  tracking.com_offset = {p["x"], p["y"], p["z"]};
+}
+template <class S>
+void inertia(const EffectValues<S>& p, Tracking<S>& tracking) {
+  tracking.inertia_y = p["ratio_y"] - 1.0;
+  tracking.inertia_z = p["ratio_z"] - 1.0;
+}
+
+}  // namespace
+
+std::span<const dynamics::EffectOn<Tracking>> tracking_effects() {
+  static const dynamics::EffectOn<Tracking> table[] = {
+      {{"sensor.length_scale", "the tracker's metric scale is off", {{"scale", "-", 1, 0.8, 1.2, 2e-3}}},
+       &length_scale<double>,
+       &length_scale<Dual>},
+      {{"sensor.time_scale", "the tracker's clock runs fast or slow", {{"scale", "-", 1, 0.8, 1.2, 1e-3}}},
+       &time_scale<double>,
+       &time_scale<Dual>},
+      {{"sensor.com_offset",
+        "the tracked point is not the CoM: true - declared CoM in body axes",
+        {{"x", "m", 0, -0.1, 0.1, 1e-3}, {"y", "m", 0, -0.1, 0.1, 1e-3}, {"z", "m", 0, -0.1, 0.1, 1e-3}},
+        true},
+       &com_offset<double>,
+       &com_offset<Dual>},
+      {{"sensor.inertia",
+        "the declared ratios of the moments of inertia are off",
+        {{"ratio_y", "-", 1, 0.2, 5, 0.02}, {"ratio_z", "-", 1, 0.2, 5, 0.02}},
+        true},
+       &inertia<double>,
+       &inertia<Dual>},
+  };
+  return table;
+}
+
+std::vector<dynamics::Effect> known_flight_effects() {
+  std::vector<dynamics::Effect> out;
+  for (const auto& entry : tracking_effects()) out.push_back(entry.effect);
+  for (const auto& entry : flight::spatial_effects()) out.push_back(entry.effect);
+  return out;
+}
+
+template <class S>
+std::vector<TrackedPose<S>> tracked_poses(const TrackedFlight<S>& declared, const dynamics::Values<S>& values,
+                                          const std::vector<double>& times,
+                                          const dynamics::IntegratorOptions& options) {
+  Tracking<S> tracking;
+  dynamics::apply_effects(tracking_effects(), values, tracking);
+  flight::SpatialAir<S> air;
+  air.gravity = {S(0.0), S(0.0), S(-declared.gravity)};
+  air.drag_k = S(declared.drag_k);
+  dynamics::apply_effects(flight::spatial_effects(), values, air);
+  flight::SpatialStart<S> start = declared.start;
+  start.inertia[1] *= 1.0 + tracking.inertia_y;
+  start.inertia[2] *= 1.0 + tracking.inertia_z;
+  std::vector<S> true_times;
+  for (const double t : times) true_times.push_back(t / (1.0 + tracking.time_scale));
+  std::vector<TrackedPose<S>> out;
+  for (const auto& state : flight::fly_in_space(start, air, true_times, options)) {
+    const Vec3<S> point =
+        flight::difference(state.position, rotate(state.rotation.attitude, tracking.com_offset));
+    out.push_back({flight::scaled(S(1.0 + tracking.length_scale), point), state.rotation.attitude});
+  }
+  return out;
+}
+
+template std::vector<TrackedPose<double>> tracked_poses(const TrackedFlight<double>&,
+                                                        const dynamics::Values<double>&,
+                                                        const std::vector<double>&,
+                                                        const dynamics::IntegratorOptions&);
+template std::vector<TrackedPose<Dual>> tracked_poses(const TrackedFlight<Dual>&,
+                                                      const dynamics::Values<Dual>&,
+                                                      const std::vector<double>&,
+                                                      const dynamics::IntegratorOptions&);
+
+}  // namespace unhand::experiment

@@ -1,0 +1,55 @@
+// Forward search for effects over groups: which one leaves such a residual, and do held-out groups agree?
+#pragma once
+
+#include <optional>
+
+#include "fitting/discover.hpp"
+#include "fitting/grouped_fit.hpp"
+
+namespace unhand::fitting {
+
+struct EffectSearchOptions {
+  GroupedFitOptions fit;
+  double false_discovery_rate{0.02};  ///< shared among the candidates of a step
+  double equivalent{0.98};            ///< footprints that correlate by this much are one answer
+  /// An effect matters if, of some channel, it takes away this share of what the held-out χ² per sample
+  /// exceeds the noise by.
+  double matters{0.1};
+  int refits{4};  ///< candidates fitted in full, in every step
+  int most_effects{6};
+  std::vector<std::string> forget;
+};
+
+/// One parameter from one half of the groups against the other, split at the median of a covariate.
+struct Stability {
+  std::string parameter, covariate;
+  double split_at{};
+  double low{}, low_sigma{}, high{}, high_sigma{};
+  double z() const { return (high - low) / std::hypot(low_sigma, high_sigma); }
+};
+
+struct EffectSearch {
+  bool solved{};
+  std::string message;
+  std::vector<AcceptedEffect> effects;  ///< in order of acceptance
+  std::vector<Ranked> ranking;          ///< best first
+  GroupedFit base, base_test, final, final_test;
+  std::vector<Stability> stability;
+};
+
+/// Fits the train groups without effects; then, step by step, takes the footprints of all effects of
+/// problem.effects() (the groups' own unknowns and what is fitted already projected out), fits the leading
+/// ones in full and accepts the best if
+///  - Wald's test with the scatter between groups (F distribution) rejects its absence at the rate divided by
+///    the number of candidates,
+///  - on held-out groups χ² falls, by a one-sided paired t-test over groups at 5 %, and
+///  - it matters there.
+/// Candidates whose footprints are the same are fitted once, under the name that problem.effects() lists
+/// first; those that correlate by `equivalent` with what was accepted are listed as its other names. At the
+/// end, what has become dispensable is taken away.
+EffectSearch search_effects(const GroupedProblem& problem, const EffectSearchOptions& options);
+
+/// The objects that the groups have, sorted.
+std::vector<std::string> objects_of(const GroupedProblem& problem);
+
+}  // namespace unhand::fitting

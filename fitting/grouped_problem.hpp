@@ -1,0 +1,132 @@
+// Measurements in groups (throws, drops): what the groups share is asked for, each has unknowns of its own.
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "datasets/throw_log.hpp"
+#include "dynamics/effect.hpp"
+
+namespace unhand::fitting {
+
+/// Rows of this channel hold what is known of a group's own unknowns beforehand; they are no measurements.
+inline constexpr int kPriorChannel = -1;
+
+struct GroupRow {
+  int channel{};  ///< index into channels(), or kPriorChannel
+  double time{};  ///< from the start of the group [s]
+};
+
+struct Group {
+  std::string id, object, condition;
+  datasets::Split split{};
+  std::vector<GroupRow> rows;
+  std::vector<double> start;  ///< of its own unknowns
+  /// What the group is like, for asking whether an answer depends on it: one value per covariate of the
+  /// problem.
+  std::vector<double> covariates;
+};
+
+/// (predicted − measured)/σ of a group, by row, with derivatives where they were asked for.
+struct GroupEquations {
+  bool solved{};
+  Eigen::VectorXd residual;
+  Eigen::MatrixXd shared, own;
+};
+
+class GroupedProblem {
+ public:
+  virtual ~GroupedProblem() = default;
+  const std::vector<Group>& groups() const { return groups_; }
+  const std::vector<std::string>& channels() const { return channels_; }
+  const std::vector<std::string>& covariates() const { return covariates_; }
+  /// Groups that were left out, with the reason.
+  const std::vector<std::pair<std::string, std::string>>& skipped() const { return skipped_; }
+
+  /// The effects that can be asked for; where two are the same in the data, the first one's name is given.
+  virtual std::vector<dynamics::Effect> effects() const = 0;
+  /// At the values of shared parameters ("id.parameter" or "id.parameter[object]"; what is not named is
+  /// neutral) and of the group's own unknowns.
+  virtual GroupEquations equations(std::size_t group, std::span<const std::string> names,
+                                   std::span<const double> values, const Eigen::VectorXd& own,
+                                   bool derivatives) const = 0;
+
+ protected:
+  std::vector<Group> groups_;
+  std::vector<std::string> channels_, covariates_;
+  std::vector<std::pair<std::string, std::string>> skipped_;
+};
+
+/// A parameter that groups share.
+struct SharedParameter {
+  std::string name, effect, short_name, unit;  ///< short_name: without the effect's id
+  double neutral{}, low{}, high{}, typical{};
+  bool shape{};
+};
+/// An effect's parameters over these objects.
+std::vector<SharedParameter> shared_parameters(const dynamics::Effect& effect,
+                                               const std::vector<std::string>& objects);
+
+/// A log's split; where it has none, every fifth throw of each condition is held out.
+std::vector<datasets::Split> splits_of(const datasets::ThrowLog& log);
+
+/// The shared values as a group of one object reads them: names without brackets, and the position of each
+/// in the list it came from; those of other objects are left out.
+struct OwnNames {
+  std::vector<std::string> names;
+  std::vector<std::size_t> from;
+  OwnNames(std::span<const std::string> all, const std::string& object);
+  std::vector<double> values(std::span<const double> all) const;
+  /// Derivatives for `names` become derivatives for the whole list.
+  void spread(GroupEquations& equations, std::size_t all) const;
+};
+
+/// Derivatives of f(shared, own) in sweeps of dynamics::kDualSize parameters: f takes two vectors of a scalar
+/// and returns the residual in it. `shared` are the values that the group reads.
+template <class F>
+GroupEquations swept(const std::vector<double>& shared, const Eigen::VectorXd& own, bool derivatives,
+                     const F& f) {
+  using dynamics::Dual;
+  GroupEquations out;
+  const auto n_shared = shared.size(), n_own = static_cast<std::size_t>(own.size()), n = n_shared + n_own;
+  if (!derivatives) {
+    const std::vector<double> r = f(shared, std::vector<double>(own.data(), own.data() + own.size()));
+    out.residual = Eigen::Map<const Eigen::VectorXd>(r.data(), static_cast<Eigen::Index>(r.size()));
+    out.solved = out.residual.allFinite();
+    return out;
+  }
+  for (std::size_t first = 0; first < n || first == 0; first += dynamics::kDualSize) {
+    std::vector<Dual> s, o;
+    const auto seed = [&](double value, std::size_t k) {
+      return k >= first && k < first + dynamics::kDualSize
+                 ? dynamics::independent(value, static_cast<int>(k - first))
+                 : Dual(value);
+    };
+    for (std::size_t k = 0; k < n_shared; ++k) s.push_back(seed(shared[k], k));
+    for (std::size_t k = 0; k < n_own; ++k)
+      o.push_back(seed(own[static_cast<Eigen::Index>(k)], n_shared + k));
+    const std::vector<Dual> r = f(s, o);
+    const auto rows = static_cast<Eigen::Index>(r.size());
+    if (first == 0) {
+      out.residual.resize(rows);
+      out.shared.resize(rows, static_cast<Eigen::Index>(n_shared));
+      out.own.resize(rows, static_cast<Eigen::Index>(n_own));
+    }
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      const Dual& x = r[static_cast<std::size_t>(i)];
+      out.residual[i] = x.a;
+      for (std::size_t k = first; k < std::min(n, first + dynamics::kDualSize); ++k)
+        (k < n_shared ? out.shared(i, static_cast<Eigen::Index>(k))
+                      : out.own(i, static_cast<Eigen::Index>(k - n_shared))) =
+            x.v[static_cast<Eigen::Index>(k - first)];
+    }
+  }
+  out.solved = out.residual.allFinite() && out.shared.allFinite() && out.own.allFinite();
+  return out;
+}
+
+}  // namespace unhand::fitting

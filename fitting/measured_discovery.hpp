@@ -1,0 +1,77 @@
+// What the loop says of logs that are no planar throws: free flights in space, accelerometers in free fall,
+// slips.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "datasets/slip_log.hpp"
+#include "fitting/effect_search.hpp"
+#include "fitting/residual_tests.hpp"
+
+namespace unhand::fitting {
+
+/// An error of a model, with its unit in the name ("trajectory_rms_m").
+using NamedErrors = std::vector<std::pair<std::string, double>>;
+
+struct MeasuredMisfit {
+  std::string channel;
+  int n{};
+  double before_train{}, before_test{}, after_train{}, after_test{};  ///< χ² per sample
+};
+
+/// Something else that the log says about an answer.
+struct Evidence {
+  std::string about;  ///< an effect's id, or empty
+  std::string text;
+  bool against{};  ///< it speaks against the answer
+};
+
+struct MeasuredUnexplained {
+  std::string phase, channel;
+  double chi2_per_dof{};
+  std::string description;
+};
+
+struct MeasuredDiscovery {
+  std::string kind, model, phase;  ///< "free flights", "projectile", "flight"
+  Verdict verdict{};
+  std::string message;
+  std::vector<AcceptedEffect> effects;
+  std::vector<Ranked> ranking;
+  std::optional<MeasuredUnexplained> unexplained;
+  LeavesNoise first;
+  int train{}, test{};                  ///< groups
+  std::vector<std::string> parameters;  ///< full names of the fitted ones
+  std::vector<double> covariance;       ///< row by row
+  NamedErrors before_train, before_test, after_train, after_test;
+  std::vector<MeasuredMisfit> misfit;
+  std::vector<Autocorrelation> autocorrelation_before, autocorrelation_after;  ///< held-out groups
+  std::vector<ResidualProfile> profile_before, profile_after;                  ///< train groups
+  std::vector<Stability> stability;
+  std::vector<Evidence> evidence;
+  std::vector<std::pair<std::string, std::string>>
+      separating;  ///< effect, what would tell it from its equivalents
+  std::vector<std::pair<std::string, std::string>> skipped;  ///< groups, with the reason
+  double seconds{};
+};
+
+struct MeasuredOptions {
+  EffectSearchOptions search;
+  double unexplained{
+      1.5};         ///< χ² per sample of a channel on held-out groups from which on something is missing
+  double floor{0};  ///< height of the floor that boxes come to rest on [m]
+};
+
+/// Free flights of dimension 3. Throws std::invalid_argument as FlightProblem does.
+MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const MeasuredOptions& options);
+/// Accelerometers in free fall. Throws std::invalid_argument as FallProblem does.
+MeasuredDiscovery discover_falls(const datasets::ThrowLog& log, const MeasuredOptions& options);
+
+/// The part that flights and falls share: the search, residual tests, the verdict.
+EffectSearch run_search(const GroupedProblem& problem, const MeasuredOptions& options,
+                        MeasuredDiscovery& out);
+
+}  // namespace unhand::fitting

@@ -1,0 +1,39 @@
+// Is what a fit leaves noise? Tests over groups, each group's own unknowns allowed for.
+#pragma once
+
+#include "fitting/grouped_fit.hpp"
+
+namespace unhand::fitting {
+
+/// Correlation of neighbouring residuals of a channel, minus what the groups' own unknowns cause by
+/// themselves (a fit to white noise leaves neighbours slightly against each other).
+struct Autocorrelation {
+  std::string channel;
+  double lag1{};  ///< [-]
+  double z{};     ///< in standard deviations of white noise
+};
+std::vector<Autocorrelation> autocorrelation(const GroupedProblem& problem, const GroupedFit& fit);
+
+/// The residual of a channel over the share of the group's duration that has passed.
+struct ResidualProfile {
+  std::string channel;
+  double share{};  ///< 0 … 1, middle of the bin
+  int n{};
+  double mean{}, rms{};  ///< in σ
+  double z{};            ///< of the mean, from the scatter between groups
+};
+std::vector<ResidualProfile> residual_profile(const GroupedProblem& problem, const GroupedFit& fit,
+                                              int bins = 20);
+
+/// The shortest time from the start of the groups over which the model is told from one that is right: own
+/// unknowns are fitted to the samples up to there, and χ² per degree of freedom of some channel exceeds
+/// `limit` and one by three standard errors (from the scatter between groups).
+struct LeavesNoise {
+  bool any{};
+  double time{};  ///< [s]
+  std::string channel;
+  double chi2_per_dof{};
+};
+LeavesNoise leaves_noise(const GroupedProblem& problem, const GroupedFit& fit, double limit, int threads);
+
+}  // namespace unhand::fitting

@@ -1,0 +1,26 @@
+// What a box of known size says about a tracker by coming to rest: its scale, and where the tracked point is.
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "datasets/throw_log.hpp"
+
+namespace unhand::fitting {
+
+/// The last samples of tracked boxes that lie still on a face, on a level floor. The tracked height on face
+/// ±i is floor + (1 + scale) (half side_i ± offset_i): opposite faces give the offset of the tracked point
+/// from the box's middle, and their mean, if the floor's height is known, the scale.
+struct RestHeights {
+  int n{};         ///< throws at rest
+  double scale{};  ///< reported/true − 1 [-], if the floor is where it was said to be
+  double sigma{};  ///< from the scatter between axes, or between throws if that is larger [-]
+  std::array<std::optional<double>, 3> offset;  ///< from the middle to the tracked point, body axes [m]
+  std::array<double, 3> offset_sigma{};
+};
+/// Of one object with `dims`, spatial log with orientation. Empty if fewer than five throws come to rest, or
+/// none on some axis' faces.
+std::optional<RestHeights> rest_heights(const datasets::ThrowLog& log, const std::string& object,
+                                        double floor);
+
+}  // namespace unhand::fitting

@@ -1,0 +1,157 @@
+#include "flight/spatial_flight.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "flight/aerodynamics.hpp"
+
+namespace unhand::flight {
+
+using dynamics::convert;
+using dynamics::Dual;
+using dynamics::Entry;
+using dynamics::Phase;
+using dynamics::State;
+using dynamics::value_of;
+
+namespace {
+
+template <class S, class P>
+Vec3<S> convert3(const Vec3<P>& a) {
+  return {convert<S>(a[0]), convert<S>(a[1]), convert<S>(a[2])};
+}
+
+bool is_zero(double x) { return x == 0; }
+bool is_zero(const Dual& x) { return x.a == 0 && x.v.isZero(); }
+
+template <class S>
+bool is_still(const SpatialAir<S>& a) {
+  return is_zero(a.drag_k) && is_zero(a.linear_drag) && is_zero(a.lift) && is_zero(a.axis_drag_x) &&
+         is_zero(a.axis_drag_y) && is_zero(a.cubic_drag);
+}
+
+/// κ (Σ n_i⁴ − 3/5) |u| u and |u| A u in body axes.
+template <class S>
+Vec3<S> shape_drag(const S& x, const S& y, const S& cubic, const Vec3<S>& u) {
+  using std::sqrt;
+  const S square = dot(u, u);
+  if (value_of(square) == 0) return {S(0), S(0), S(0)};
+  const S speed = sqrt(square);
+  S fourth(0.0);
+  for (const S& c : u) fourth += c * c * c * c;
+  const S isotropic = cubic * (fourth / (square * square) - 0.6);
+  return {speed * (x + isotropic) * u[0], speed * (y + isotropic) * u[1], speed * (isotropic - x - y) * u[2]};
+}
+
+/// State: position and velocity of the CoM; the rotation is known.
+template <class P>
+class Flying final : public dynamics::HybridSystemFrom<Flying<P>, 6> {
+ public:
+  /// The rotation is known up to `last` [s]; a trial step may look past it.
+  Flying(const SpatialAir<P>& air, const Rotation<P>& rotation, double last)
+      : air_(air), rotation_(rotation), last_(last) {
+    turns_ = !(is_zero(air.lift) && is_zero(air.axis_drag_x) && is_zero(air.axis_drag_y) &&
+               is_zero(air.cubic_drag));
+  }
+  dynamics::FlowKind kind(int) const override { return dynamics::FlowKind::smooth; }
+  std::string_view mode_name(int) const override { return "flying"; }
+  int guard_count(int) const override { return 0; }
+  dynamics::Guard guard(int, int) const override { return {}; }
+
+  template <class S>
+  void flow_(const Phase&, const S& t, const State<S, 6>& y, State<S, 6>& dy) const {
+    const Vec3<S> u = difference(Vec3<S>{y[3], y[4], y[5]}, convert3<S>(air_.wind));
+    Vec3<S> a = sum(convert3<S>(air_.gravity), quadratic_drag(convert<S>(air_.drag_k), u));
+    a = difference(a, scaled(convert<S>(air_.linear_drag), u));
+    if (turns_) {
+      const RotationState<P> now = rotation_.at(value_of(t) < last_ ? convert<P>(t) : P(last_));
+      const Quaternion<S> q{convert<S>(now.attitude.w), convert<S>(now.attitude.x),
+                            convert<S>(now.attitude.y), convert<S>(now.attitude.z)};
+      const Vec3<S> omega = rotate(q, convert3<S>(now.omega));
+      a = sum(a, scaled(convert<S>(air_.lift), cross(omega, u)));
+      a = difference(a, rotate(q, shape_drag(convert<S>(air_.axis_drag_x), convert<S>(air_.axis_drag_y),
+                                             convert<S>(air_.cubic_drag), rotate(conjugate(q), u))));
+    }
+    for (int i = 0; i < 3; ++i) {
+      dy[i] = y[3 + i];
+      dy[3 + i] = a[static_cast<std::size_t>(i)];
+    }
+  }
+  template <class S>
+  void guards_(const Phase&, const S&, const State<S, 6>&, S*) const {}
+  template <class S>
+  Entry<S, 6> on_guard_(const Phase& from, int, const S& t, const State<S, 6>& y) const {
+    return {from.mode, t, y, S(0)};
+  }
+
+ private:
+  const SpatialAir<P>& air_;
+  const Rotation<P>& rotation_;
+  double last_{};
+  bool turns_{};
+};
+
+template <class S>
+void validate(const SpatialStart<S>& start, const SpatialAir<S>& air, const std::vector<S>& times) {
+  for (const Vec3<S>* v : {&start.position, &start.velocity, &air.gravity, &air.wind})
+    for (const S& x : *v)
+      if (!std::isfinite(value_of(x)))
+        throw std::invalid_argument("spatial flight: a component is not finite");
+  for (const S* x :
+       {&air.drag_k, &air.linear_drag, &air.lift, &air.axis_drag_x, &air.axis_drag_y, &air.cubic_drag})
+    if (!std::isfinite(value_of(*x)))
+      throw std::invalid_argument("spatial flight: a coefficient of the air is not finite");
+  for (const S& t : times)
+    if (!(value_of(t) >= 0 && std::isfinite(value_of(t))))
+      throw std::invalid_argument(fmt::format("spatial flight: time {} s is not in [0, inf)", value_of(t)));
+}
+
+}  // namespace
+
+template <class S>
+std::vector<SpatialState<S>> fly_in_space(const SpatialStart<S>& start, const SpatialAir<S>& air,
+                                          const std::vector<S>& times,
+                                          const dynamics::IntegratorOptions& options) {
+  validate(start, air, times);
+  double last = 0;
+  for (const S& t : times) last = std::max(last, value_of(t));
+  const Rotation<S> rotation(start.inertia, start.rotation, air.spin_damping, last, options);
+  const Vec3<S>&p = start.position, &v = start.velocity;
+  std::vector<SpatialState<S>> out;
+  out.reserve(times.size());
+  if (is_still(air) || !(last > 0)) {
+    for (const S& t : times)
+      out.push_back({sum(p, scaled(t, sum(v, scaled(S(0.5 * t), air.gravity)))), rotation.at(t)});
+    return out;
+  }
+  dynamics::IntegratorOptions recorded = options;
+  recorded.record = true;
+  recorded.longest_step =
+      std::max(options.longest_step, last);  // no guards: the error alone chooses the step
+  const auto solution = dynamics::integrate<S, 6>(
+      Flying<S>(air, rotation, last), Entry<S, 6>{0, S(0), {p[0], p[1], p[2], v[0], v[1], v[2]}, S(0)},
+      S(last), recorded);
+  if (solution.outcome != dynamics::Outcome::horizon)
+    throw std::runtime_error(fmt::format("spatial flight: not solved ({})", to_string(solution.outcome)));
+  for (const S& t : times) {
+    if (!(value_of(t) > 0)) {
+      out.push_back({sum(p, scaled(t, v)), rotation.at(t)});
+      continue;
+    }
+    const State<S, 6> at = solution.trajectory.at(t);
+    out.push_back({{at[0], at[1], at[2]}, rotation.at(t)});
+  }
+  return out;
+}
+
+template std::vector<SpatialState<double>> fly_in_space(const SpatialStart<double>&,
+                                                        const SpatialAir<double>&, const std::vector<double>&,
+                                                        const dynamics::IntegratorOptions&);
+template std::vector<SpatialState<Dual>> fly_in_space(const SpatialStart<Dual>&, const SpatialAir<Dual>&,
+                                                      const std::vector<Dual>&,
+                                                      const dynamics::IntegratorOptions&);
+
+}  // namespace unhand::flight

@@ -1,0 +1,52 @@
+// Flight of a rigid body in space, with whatever the air may do to it.
+#pragma once
+
+#include <vector>
+
+#include "flight/free_rotation.hpp"
+
+namespace unhand::flight {
+
+/// What acts on a body in flight. With u the velocity against the air, u_b = Rᵀ u in body axes, n = u_b/|u|
+/// and ω in the world,
+///
+///   a = g − k |u| u − c u + k_m ω × u − |u| R A Rᵀ u − κ (Σ n_i⁴ − 3/5) |u| u,   A = diag(a_x, a_y, −a_x −
+///   a_y).
+///
+/// A is drag by axis (its mean is in k). κ is what is left for a cube, whose A is zero: the lowest harmonic
+/// of its symmetry, 1 along a face's normal and 1/3 along a diagonal, with mean 3/5 over all directions.
+template <class S>
+struct SpatialAir {
+  Vec3<S> gravity{};                     ///< g [m/s²]
+  S drag_k{0.0};                         ///< k [1/m]
+  S linear_drag{0.0};                    ///< c [1/s]
+  S lift{0.0};                           ///< k_m [-]: Magnus
+  S axis_drag_x{0.0}, axis_drag_y{0.0};  ///< a_x, a_y [1/m]
+  S cubic_drag{0.0};                     ///< κ [1/m]
+  S spin_damping{0.0};                   ///< the spin dies as exp(−c_ω t) [1/s]
+  Vec3<S> wind{};                        ///< velocity of the air [m/s]
+};
+
+template <class S>
+struct SpatialStart {
+  Vec3<S> position{}, velocity{};  ///< of the CoM [m, m/s]
+  RotationState<S> rotation;
+  Vec3<S> inertia{S(1), S(1), S(1)};  ///< about the principal axes, which are the body's; any unit
+};
+
+template <class S>
+struct SpatialState {
+  Vec3<S> position{};  ///< of the CoM [m]
+  RotationState<S> rotation;
+};
+
+/// States at `times` [s] after the start, each >= 0 (in any order; they may carry derivatives). Without air:
+/// closed form for the CoM and rotate_freely; otherwise by the integrator. Throws std::invalid_argument when
+/// an input is not finite or a time is negative, std::runtime_error when the integrator stops. Instantiated
+/// for double and Dual.
+template <class S>
+std::vector<SpatialState<S>> fly_in_space(const SpatialStart<S>& start, const SpatialAir<S>& air,
+                                          const std::vector<S>& times,
+                                          const dynamics::IntegratorOptions& options = {});
+
+}  // namespace unhand::flight

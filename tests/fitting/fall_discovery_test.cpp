@@ -1,0 +1,132 @@
+// The loop on synthetic accelerometers in free fall, and on slips, whose missing piece is known.
+#include "fitting/fall_discovery.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "fitting/measured_discovery.hpp"
+#include "fitting/surface_discovery.hpp"
+#include "slip_simulator.hpp"
+
+namespace unhand::fitting {
+namespace {
+
+struct Truth {
+  double bias_x{}, bias_y{}, bias_z{}, drag{}, drift_z{};
+};
+
+/// Drops and (every third) throws upwards: held still for 0.6 s, let go or pushed, flying for 0.6 s.
+datasets::ThrowLog falls(const Truth& truth, int n, unsigned seed) {
+  constexpr double g = 9.81, rate = 200, sigma = 0.03, push = 0.25, thrust = 12;
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  datasets::ThrowLog log;
+  log.dimension = 3;
+  log.title = "synthetic falls";
+  log.source = "synthetic";
+  log.gravity = g;
+  datasets::Object phone;
+  phone.mass = 0.2;
+  log.objects.emplace("phone", phone);
+  for (int k = 0; k < n; ++k) {
+    datasets::Throw one;
+    one.id = "fall-" + std::to_string(1000 + k);
+    one.object = "phone";
+    one.condition = k % 3 == 2 ? "up" : "fall";
+    one.repetition = k;
+    one.split = k % 4 == 3 ? datasets::Split::test : datasets::Split::train;
+    auto& imu = one.imu.emplace();
+    imu.time.cols = 1, imu.specific_force.cols = 3;
+    imu.specific_force.sigma = {sigma, sigma, sigma};
+    const bool up = k % 3 == 2;
+    const double still = 0.6, free = still + (up ? push : 0), end = free + 0.6;
+    double v = up ? thrust * push : 0, begin = 0, last = 0;
+    for (int i = 0; i / rate < end + 0.1; ++i) {
+      const double t = i / rate;
+      double along = t < still ? g : t < free ? g + thrust : 0;
+      if (t >= free && t <= end) {
+        if (begin == 0) begin = t;
+        last = t;
+        along = -truth.drag * std::abs(v) * v;
+        for (int s = 0; s < 10; ++s) v += (-g - truth.drag * std::abs(v) * v) / rate / 10;  // Euler: 5 µm/s
+      }
+      if (t > end) along = 60;
+      imu.time.data.push_back(t);
+      const double drift = t >= free && t <= end ? truth.drift_z * (t - begin) : 0;
+      imu.specific_force.data.insert(
+          imu.specific_force.data.end(),
+          {truth.bias_x + sigma * normal(random), truth.bias_y + sigma * normal(random),
+           truth.bias_z + drift + along + sigma * normal(random)});
+    }
+    imu.time.rows = imu.time.data.size();
+    imu.specific_force.rows = imu.time.rows;
+    one.free_flight = {begin, last};
+    log.throws.push_back(std::move(one));
+  }
+  return log;
+}
+
+const AcceptedEffect* named(const MeasuredDiscovery& found, const std::string& id) {
+  for (const auto& e : found.effects)
+    if (e.id == id) return &e;
+  return nullptr;
+}
+double value_of(const AcceptedEffect& effect, const std::string& name) {
+  for (const auto& p : effect.parameters)
+    if (p.name == name) return p.value;
+  return std::nan("");
+}
+
+TEST(FallDiscovery, APerfectSensorInAVacuumReadsZero) {
+  const auto found = discover_falls(falls({}, 30, 1), {});
+  EXPECT_EQ(found.verdict, Verdict::no_missing_effect);
+}
+
+TEST(FallDiscovery, BiasAndDragAreToldApart) {
+  const auto found = discover_falls(falls({-0.9, 0.4, 0.05, 0.045, 0}, 30, 2), {});
+  ASSERT_EQ(found.verdict, Verdict::effect_found);
+  const auto *bias = named(found, "sensor.accelerometer_bias"), *drag = named(found, "flight.quadratic_drag");
+  ASSERT_NE(bias, nullptr);
+  ASSERT_NE(drag, nullptr);
+  EXPECT_EQ(found.effects.size(), 2U);
+  // The bias tilts the vertical that the sensor shows at rest by a tenth: drag along it is off by 1 - cos.
+  EXPECT_NEAR(value_of(*drag, "k[phone]"), 0.045, 0.002);
+  EXPECT_NEAR(value_of(*bias, "x"), -0.9, 0.02);
+  EXPECT_NEAR(value_of(*bias, "y"), 0.4, 0.02);
+  EXPECT_NEAR(value_of(*bias, "z"), 0.05, 0.02);
+}
+
+TEST(FallDiscovery, ADriftIsNotDrag) {
+  const auto found = discover_falls(falls({0, 0, 0, 0, 1.0}, 30, 3), {});
+  ASSERT_EQ(found.verdict, Verdict::effect_found);
+  const auto* drift = named(found, "sensor.accelerometer_drift");
+  ASSERT_NE(drift, nullptr) << found.effects.front().id;
+  EXPECT_NEAR(value_of(*drift, "z"), 1.0, 0.03);
+  EXPECT_EQ(named(found, "flight.quadratic_drag"), nullptr);
+}
+
+TEST(SurfaceDiscovery, AnEllipsoidMissesNothing) {
+  const Eigen::Matrix3d diagonal = Eigen::Vector3d(1 / 16.0, 1 / 9.0, 1 / 25.0).asDiagonal();
+  SurfaceDiscoveryOptions options;
+  options.comparison.null_draws = 1;
+  const auto found =
+      discover_surfaces({test::simulate(test::ellipsoid(diagonal), 50, 0.15, 0.1, 21)}, options);
+  EXPECT_EQ(found.answer.verdict, Verdict::no_missing_effect);
+}
+
+TEST(SurfaceDiscovery, AQuarticIsFound) {
+  const SlipSurface truth = test::quartic(contact::ConvexQuartic::isotropic_blend(2.8), 4.0);
+  SurfaceDiscoveryOptions options;
+  options.comparison.null_draws = 1;
+  const auto found = discover_surfaces({test::simulate(truth, 60, 0.05, 0.03, 22)}, options);
+  ASSERT_EQ(found.answer.verdict, Verdict::effect_found);
+  EXPECT_EQ(found.answer.effects.front().id, "contact.law:convex_quartic");
+  EXPECT_LT(found.answer.effects.front().test_error_ratio, 0.8);
+}
+
+}  // namespace
+}  // namespace unhand::fitting
