@@ -51,8 +51,8 @@ TEST(FlightDiscovery, NothingIsFoundWhereNothingIsMissing) {
   EXPECT_EQ(found.verdict, Verdict::no_missing_effect);
   EXPECT_TRUE(found.effects.empty()) << found.effects.front().id;
   EXPECT_FALSE(found.first.any);
-  for (const auto& m : found.misfit)
-    EXPECT_NEAR(m.before_test, 1, 0.2) << m.channel;  // less what the start takes
+  // The start takes 6 of 120 numbers; 8 flights of 40 samples scatter by √(2/320) = 0.08: four of them.
+  for (const auto& m : found.misfit) EXPECT_NEAR(m.before_test, 0.95, 0.32) << m.channel;
   for (const auto& a : found.autocorrelation_before) EXPECT_LT(std::abs(a.z), 4) << a.channel;
 }
 
