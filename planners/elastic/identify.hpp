@@ -1,0 +1,67 @@
+// Identification of an arm's inertial parameters and of its spring from logs, [DarkoD46] section 4.3.
+#pragma once
+
+#include <vector>
+
+#include "planners/control/regressor.hpp"
+
+namespace unhand::planners::elastic {
+
+/// A periodic motion of all joints: q_i(t) = c_i + Σ_k (a_ik sin kωt + b_ik cos kωt).
+struct Excitation {
+  double period{};               ///< s
+  JointVector<double> centre;    ///< rad
+  Eigen::MatrixXd sine, cosine;  ///< one row per joint, one column per harmonic [rad]
+
+  void at(double t, JointVector<double>& q, JointVector<double>& qd, JointVector<double>& qdd) const;
+};
+
+struct ExcitationOptions {
+  double period{4};  ///< s, > 0
+  int harmonics{3};  ///< >= 1
+  int samples{60};   ///< instants per period that the condition number looks at
+  int trials{300};   ///< of a random search that narrows around the best
+  unsigned seed{1};
+};
+struct DesignedExcitation {
+  Excitation motion;
+  double first_condition{},
+      condition{};  ///< of the regressor's identifiable part: of the first trial, of the best
+};
+/// The motion within the limits of angle and speed whose regressor has the smallest condition number among
+/// the trials.
+DesignedExcitation design_excitation(const Chain& chain, const ExcitationOptions& options = {});
+
+/// One line of a log.
+struct MotionSample {
+  JointVector<double> q, qd, qdd, torque;  ///< rad, rad/s, rad/s², N m; friction taken away
+};
+
+/// What a log determines: combinations βᵀ = πᵀ V of the parameters, orthonormal columns V.
+struct IdentifiedInertia {
+  Eigen::MatrixXd combinations;     ///< V
+  Eigen::VectorXd estimate, sigma;  ///< of β, with its standard deviation
+  double torque_noise{};            ///< 1 σ of the residual [N m]
+  double condition{};
+  Chain feasible;            ///< the chain with inertias that bodies can have, nearest to the estimate
+  double feasible_misfit{};  ///< √(mean ((β_feasible − estimate)/σ)²): of order one if the log is consistent
+                             ///< with bodies
+};
+/// Least squares for the identifiable combinations, then bodies for them: each link's pseudo-inertia is J = U
+/// Uᵀ with an upper triangular U of positive diagonal (log-Cholesky, [RuckerWensing2022]), so that no
+/// estimate is unphysical; what the log does not determine stays near `prior`. Throws std::invalid_argument
+/// for fewer samples than parameters, or a prior with no mass.
+IdentifiedInertia identify_inertia(const Chain& prior, const std::vector<MotionSample>& log);
+
+/// One line of a log in a coupled mode, the link held: deflection θ − ψ, θ̇, θ̈ and the motor's torque.
+struct SpringSample {
+  double deflection{}, rate{}, acceleration{}, torque{};
+};
+struct IdentifiedSpring {
+  double stiffness{}, damping{}, inertia{};                    ///< N m/rad, N m s/rad, kg m²
+  double stiffness_sigma{}, damping_sigma{}, inertia_sigma{};  ///< 1 σ
+};
+/// τ = B θ̈ + D θ̇ + K (θ − ψ), by least squares.
+IdentifiedSpring identify_spring(const std::vector<SpringSample>& log);
+
+}  // namespace unhand::planners::elastic

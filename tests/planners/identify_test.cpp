@@ -1,0 +1,88 @@
+// Identification: what is put into a simulated log comes back within its intervals, as bodies can have it.
+#include "planners/elastic/identify.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <random>
+
+#include "planners/arm/chain_file.hpp"
+
+namespace unhand::planners::elastic {
+namespace {
+
+Chain arm() { return read_toml_chain(std::filesystem::path(UNHAND_ELASTIC_ARMS) / "bsa3_chain.toml"); }
+
+TEST(Identify, InertiaComesBackWithinItsIntervals) {
+  const Chain prior = arm();
+  ExcitationOptions design;
+  design.trials = 100;
+  const DesignedExcitation excitation = design_excitation(prior, design);
+  EXPECT_LT(excitation.condition, 0.7 * excitation.first_condition);
+  Chain truth = prior;  // other masses and centres than the drawing says
+  for (int i = 0; i < 3; ++i) {
+    truth.joints[i].link.mass *= 1.1 + 0.1 * i;
+    truth.joints[i].link.com[0] *= 0.9;
+    truth.joints[i].link.com[1] += 0.01;
+  }
+  const Eigen::VectorXd parameters = control::parameters_of(truth);
+  int inside = 0, all = 0;
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    std::vector<MotionSample> log;
+    for (int k = 0; k < 400; ++k) {
+      MotionSample s{JointVector<double>(3), JointVector<double>(3), JointVector<double>(3),
+                     JointVector<double>(3)};
+      excitation.motion.at(excitation.motion.period * k / 400, s.q, s.qd, s.qdd);
+      for (int i = 0; i < 3; ++i) {
+        EXPECT_LE(std::abs(s.qd[i]), prior.joints[i].limits.velocity);
+        EXPECT_GE(s.q[i], prior.joints[i].limits.lower);
+        EXPECT_LE(s.q[i], prior.joints[i].limits.upper);
+      }
+      s.torque = inverse_dynamics<double>(truth, s.q, s.qd, s.qdd);
+      for (int i = 0; i < 3; ++i) s.torque[i] += 0.05 * normal(random);
+      log.push_back(s);
+    }
+    const IdentifiedInertia found = identify_inertia(prior, log);
+    EXPECT_NEAR(found.torque_noise, 0.05, 0.005);  // 1200 residuals: 2 % of scatter
+    const Eigen::VectorXd miss =
+        (found.combinations.transpose() * parameters - found.estimate).cwiseQuotient(found.sigma).cwiseAbs();
+    for (const double one : miss) inside += one < 1.96, ++all;
+    for (const Joint& joint : found.feasible.joints) EXPECT_TRUE(is_feasible(joint.link)) << joint.name;
+    EXPECT_LT(found.feasible_misfit, 3);
+    if (seed > 1) continue;
+    // The bodies found move as the true ones do, elsewhere too.
+    const JointVector<double> q{{1, 0.5, -0.7}}, qd{{2, -1, 3}}, qdd{{5, -3, 10}};
+    const Eigen::VectorXd a = inverse_dynamics<double>(found.feasible, q, qd, qdd),
+                          b = inverse_dynamics<double>(truth, q, qd, qdd);
+    EXPECT_LT((a - b).norm(), 0.03 * b.norm());
+  }
+  // 95 % of some 160 intervals, three of the binomial's sigmas.
+  EXPECT_NEAR(static_cast<double>(inside) / all, 0.95, 3 * std::sqrt(0.95 * 0.05 / all));
+}
+
+TEST(Identify, SpringComesBackWithinItsIntervals) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  std::vector<SpringSample> log;
+  for (int k = 0; k < 500; ++k) {  // the motor swings against the held link
+    const double t = 0.004 * k, w = 6;
+    SpringSample s{0.3 * std::sin(w * t), 0.3 * w * std::cos(w * t), -0.3 * w * w * std::sin(w * t), 0};
+    s.deflection += 0.1 * std::sin(2.7 * t);
+    s.rate += 0.27 * std::cos(2.7 * t);
+    s.acceleration -= 0.729 * std::sin(2.7 * t);
+    s.torque = 8.0 * s.deflection + 0.02 * s.rate + 0.05 * s.acceleration + 0.02 * normal(random);
+    log.push_back(s);
+  }
+  const IdentifiedSpring found = identify_spring(log);
+  EXPECT_NEAR(found.stiffness, 8.0, 3 * found.stiffness_sigma);
+  EXPECT_NEAR(found.damping, 0.02, 3 * found.damping_sigma);
+  EXPECT_NEAR(found.inertia, 0.05, 3 * found.inertia_sigma);
+  EXPECT_LT(found.stiffness_sigma, 0.05);
+  EXPECT_THROW(identify_spring({}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace unhand::planners::elastic
