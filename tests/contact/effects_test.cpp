@@ -128,11 +128,15 @@ TEST_P(ContactEffect, OfTheLimitsAreSeenInTheMotion) {
       Place::set(place.name, place.at, v);
       const auto changed = detach(GetParam(), thrown, v, 1e-9);
       most[place.name] = std::max(most[place.name], std::abs(changed.state[5] - base.state[5]));
-      if (!matters(place.name, GetParam())) EXPECT_EQ(changed.state, base.state) << place.name;
+      if (!matters(place.name, GetParam())) {
+        EXPECT_EQ(changed.state, base.state) << place.name;
+      }
     }
   }
   for (const Place& place : kPlaces)
-    if (matters(place.name, GetParam())) EXPECT_GT(most[place.name], 1e-4) << place.name;
+    if (matters(place.name, GetParam())) {
+      EXPECT_GT(most[place.name], 1e-4) << place.name;
+    }
 }
 
 /// The object against the hand t [s] after the hand, which was at rest, starts to accelerate, on pads of 1e-5
