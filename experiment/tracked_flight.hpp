@@ -32,6 +32,7 @@ struct TrackedFlight {
   double drag_k{};                ///< [1/m]
 };
 
+/// What a tracker reports of a body in flight, in its own axes and scale.
 template <class S>
 struct TrackedPose {
   flight::Vec3<S> position{};  ///< as reported [m]

@@ -8,6 +8,7 @@
 
 namespace unhand::fitting {
 
+/// When an effect is believed, and how much is tried.
 struct EffectSearchOptions {
   GroupedFitOptions fit;
   double false_discovery_rate{0.02};  ///< shared among the candidates of a step
@@ -28,6 +29,7 @@ struct Stability {
   double z() const { return (high - low) / std::hypot(low_sigma, high_sigma); }
 };
 
+/// What a search over effects found: the accepted ones, all scores, and the fits before and after.
 struct EffectSearch {
   bool solved{};
   std::string message;

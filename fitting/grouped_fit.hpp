@@ -7,6 +7,7 @@
 
 namespace unhand::fitting {
 
+/// Budget and robustness of a fit.
 struct GroupedFitOptions {
   int iterations{20};
   /// Samples beyond this many times the scatter of their channel count linearly, and so do groups whose χ²
@@ -22,6 +23,7 @@ struct GroupedWeights {
   std::vector<double> group;          ///< factor on every group's part
 };
 
+/// One group at the solution: its own unknowns and its whitened residual.
 struct GroupFit {
   bool used{}, solved{};
   Eigen::VectorXd own, residual;
@@ -29,6 +31,7 @@ struct GroupFit {
   int n{};        ///< measurements
 };
 
+/// The shared parameters with their covariance, and every group's fit. Not converging is an outcome.
 struct GroupedFit {
   bool solved{};
   std::string message;

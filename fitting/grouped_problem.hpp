@@ -16,11 +16,13 @@ namespace unhand::fitting {
 /// Rows of this channel hold what is known of a group's own unknowns beforehand; they are no measurements.
 inline constexpr int kPriorChannel = -1;
 
+/// One measurement of a group.
 struct GroupRow {
   int channel{};  ///< index into channels(), or kPriorChannel
   double time{};  ///< from the start of the group [s]
 };
 
+/// Measurements that share unknowns of their own: a flight, a fall.
 struct Group {
   std::string id, object, condition;
   datasets::Split split{};
@@ -38,6 +40,7 @@ struct GroupEquations {
   Eigen::MatrixXd shared, own;
 };
 
+/// Groups of measurements under one model: unknowns that all groups share, and some of each group's own.
 class GroupedProblem {
  public:
   virtual ~GroupedProblem() = default;

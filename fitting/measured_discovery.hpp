@@ -16,6 +16,7 @@ namespace unhand::fitting {
 /// An error of a model, with its unit in the name ("trajectory_rms_m").
 using NamedErrors = std::vector<std::pair<std::string, double>>;
 
+/// Misfit of a channel before and after the accepted effects, on train and held-out groups.
 struct MeasuredMisfit {
   std::string channel;
   int n{};
@@ -29,12 +30,15 @@ struct Evidence {
   bool against{};  ///< it speaks against the answer
 };
 
+/// Where structure remains that no effect accounts for.
 struct MeasuredUnexplained {
   std::string phase, channel;
   double chi2_per_dof{};
   std::string description;
 };
 
+/// The answer of the loop on a log without a hand: what is missing, the errors before and after, and what is
+/// left.
 struct MeasuredDiscovery {
   std::string kind, model, phase;  ///< "free flights", "projectile", "flight"
   Verdict verdict{};
@@ -58,6 +62,7 @@ struct MeasuredDiscovery {
   double seconds{};
 };
 
+/// Options of the loop on logs without a hand.
 struct MeasuredOptions {
   EffectSearchOptions search;
   double unexplained{

@@ -6,6 +6,7 @@
 
 namespace unhand::fitting {
 
+/// When another limit surface is believed.
 struct SurfaceDiscoveryOptions {
   SurfaceComparisonOptions comparison;
   SurfaceModel base{SurfaceModel::ellipsoid};
@@ -30,6 +31,7 @@ struct SurfaceEvidence {
   double beyond_null_deg() const { return gain_deg - (null_base_deg - null_law_deg); }
 };
 
+/// The answer of the loop on measured slips, with each law's evidence on each surface.
 struct SurfaceDiscovery {
   MeasuredDiscovery answer;
   std::vector<SurfaceEvidence> evidence;  ///< by surface, then law; the base's own row holds what it leaves

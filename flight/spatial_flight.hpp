@@ -27,6 +27,7 @@ struct SpatialAir {
   Vec3<S> wind{};                        ///< velocity of the air [m/s]
 };
 
+/// A rigid body as it is let go, in space.
 template <class S>
 struct SpatialStart {
   Vec3<S> position{}, velocity{};  ///< of the CoM [m, m/s]
@@ -34,6 +35,7 @@ struct SpatialStart {
   Vec3<S> inertia{S(1), S(1), S(1)};  ///< about the principal axes, which are the body's; any unit
 };
 
+/// A rigid body on its flight.
 template <class S>
 struct SpatialState {
   Vec3<S> position{};  ///< of the CoM [m]
