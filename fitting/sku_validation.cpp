@@ -96,8 +96,8 @@ std::vector<Motion> motions(const datasets::Sku& sku, const datasets::ModelCard&
   return out;
 }
 
-Candidate candidate_of(const Motion& motion) {
-  Candidate out;
+ThrowCandidate candidate_of(const Motion& motion) {
+  ThrowCandidate out;
   out.condition = motion.prepared.condition;
   const auto nominal = motion.predict(motion.inputs.values);
   out.held = motion.held(motion.inputs.values);
@@ -118,9 +118,9 @@ double scaled(const LandingSpread& s, const LandingTolerance& tolerance) {
 }
 
 /// The one that is held, lands, and scatters least.
-std::size_t best(const std::vector<Candidate>& candidates, const LandingTolerance& tolerance) {
+std::size_t best(const std::vector<ThrowCandidate>& candidates, const LandingTolerance& tolerance) {
   std::size_t out = 0;
-  const auto rank = [&](const Candidate& c) {
+  const auto rank = [&](const ThrowCandidate& c) {
     return c.held && c.landed ? scaled(c.linear, tolerance) : c.landed ? 1e6 : 2e6;
   };
   for (std::size_t i = 1; i < candidates.size(); ++i)
@@ -228,7 +228,7 @@ struct Draw {
   LandingSample sample;
 };
 
-Draw draw(const Motion& motion, const Candidate& nominal, const MatrixXd& J, const MatrixXd& root,
+Draw draw(const Motion& motion, const ThrowCandidate& nominal, const MatrixXd& J, const MatrixXd& root,
           const SkuRequest& request, std::uint64_t index) {
   experiment::RandomStream random(request.seed, index, experiment::Purpose::validation);
   const auto& t = request.tolerance;
@@ -303,7 +303,7 @@ void monte_carlo(const Motion& motion, const MatrixXd& J, const SkuRequest& requ
 }
 
 void decide(const SkuRequest& request, SkuValidation& out) {
-  const Candidate& c = out.reference();
+  const ThrowCandidate& c = out.reference();
   if (!c.landed) {
     out.verdict = SkuVerdict::does_not_land;
     out.message = "no motion that was tried brings this object to a landing";

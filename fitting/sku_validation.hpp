@@ -62,7 +62,7 @@ struct MeasurementGain {
 };
 
 /// One motion with this object.
-struct Candidate {
+struct ThrowCandidate {
   std::string condition;
   bool held{}, landed{};
   double landing_x{}, landing_theta{};  ///< nominal [m, rad]
@@ -96,7 +96,7 @@ struct SkuValidation {
   SkuVerdict verdict{};
   std::string message;  ///< the verdict in words
   std::vector<std::string> notes;
-  std::vector<Candidate> candidates;
+  std::vector<ThrowCandidate> candidates;
   std::size_t chosen{};                     ///< among the candidates
   std::optional<double> needed_grip_force;  ///< where the grip of a profile slips: the least that holds [N]
 
@@ -110,7 +110,7 @@ struct SkuValidation {
   std::vector<LandingSample> samples;
   std::optional<MeasuredVerdict> measured;
 
-  const Candidate& reference() const { return candidates[chosen]; }
+  const ThrowCandidate& reference() const { return candidates[chosen]; }
 };
 
 /// The landing of the nominal throw and how it scatters, to first order by exact derivatives,
