@@ -23,8 +23,8 @@ using dynamics::Vec2;
 using dynamics::Window;
 using dynamics::Wrench;
 
-/// How the hand holds the object at the start of a release: where, and with which wrench. It has been held for
-/// long by then, so the wrench is the one that carries the object with the hand (sticking_wrench).
+/// How the hand holds the object at the start of a release: where, and with which wrench. It has been held
+/// for long by then, so the wrench is the one that carries the object with the hand (sticking_wrench).
 template <class S>
 struct Hold {
   Vec2<S> arm;       ///< R(θ_O)ᵀ (p_WO − p_WH) [m]

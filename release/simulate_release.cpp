@@ -41,9 +41,7 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
                             public contact::SceneSource {
  public:
   explicit ReleaseSystem(const ReleaseProblem<P>& problem)
-      : problem_(problem),
-        contact_(problem.contact),
-        free_(contact_.mode_count()) {
+      : problem_(problem), contact_(problem.contact), free_(contact_.mode_count()) {
     contact_.separation(problem.normal_force, separation_);
     if (!contact_.needs_hold()) return;
     hold_at_start(hold_dual_);
