@@ -41,10 +41,17 @@ Ranked& named(std::vector<Ranked>& ranking, const std::string& id) {
   return *std::find_if(ranking.begin(), ranking.end(), [&](const Ranked& r) { return r.id == id; });
 }
 
-/// The footprint's own names for `accepted`: candidates that could have left it as well.
+/// The footprint's own names for `accepted`: candidates that could have left it as well. What had no
+/// footprint of its own before anything was accepted could not: a wind acts through the drag that has just
+/// been found.
 void find_other_names(const Footprints& f, const Eigen::VectorXd& contribution, double enough,
-                      AcceptedEffect& accepted) {
+                      const std::vector<Ranked>& at_base, AcceptedEffect& accepted) {
+  const auto has_footprint = [&](const std::string& id) {
+    return std::any_of(at_base.begin(), at_base.end(),
+                       [&](const Ranked& r) { return r.id == id && r.gain > 0; });
+  };
   for (const Candidate& candidate : f.candidates) {
+    if (!has_footprint(candidate.id)) continue;
     const double r = correlation(f, contribution, candidate);
     if (r < enough) continue;
     const auto known = std::find_if(accepted.equivalent.begin(), accepted.equivalent.end(),
@@ -202,7 +209,7 @@ void describe(Stage& stage, const DiscoverOptions& options, Discovery& out) {
         if (!p.is_shape()) contribution[static_cast<Eigen::Index>(k)] = u.value - p.neutral;
       }
     }
-    find_other_names(f, contribution, options.equivalent, accepted);
+    find_other_names(f, contribution, options.equivalent, out.ranking, accepted);
   }
 }
 
