@@ -269,14 +269,18 @@ class ThrowProgram {
     const PhasePlan& phase = phases_.back();
     const PointVariables& p = phase.points.back();
     Links<double> q, qd;
-    for (int i = 0; i < kLinks; ++i) q[i] = program_.start[p.at[i]], qd[i] = program_.start[p.rate[i]];
+    std::array<int, kLinks> rate{};
+    for (int i = 0; i < kLinks; ++i) {
+      rate[i] =
+          p.rate[i] == kFixed ? program_.add_variable(0, 0, 0) : p.rate[i];  // a link that is held rests
+      q[i] = program_.start[p.at[i]], qd[i] = program_.start[rate[i]];
+    }
     const TipState<double> tip = tip_of<double>(arm_, q, qd);
     const int x = program_.add_variable(-kNone, kNone, tip.x),
               z = program_.add_variable(-kNone, kNone, tip.z), vx = program_.add_variable(0, kNone, tip.vx),
               vz = program_.add_variable(-kNone, kNone, tip.vz);
-    program_.constrain(
-        tip_state({p.at[0], p.at[1], p.at[2], p.rate[0], p.rate[1], p.rate[2], x, z, vx, vz}, arm_),
-        {0, 0, 0, 0}, {0, 0, 0, 0});
+    program_.constrain(tip_state({p.at[0], p.at[1], p.at[2], rate[0], rate[1], rate[2], x, z, vx, vz}, arm_),
+                       {0, 0, 0, 0}, {0, 0, 0, 0});
     if (task_.target) {
       const int flight = program_.add_variable(0.05, 3.0, 0.6);
       program_.constrain(miss({x, z, vx, vz, flight}, *task_.target, task_.gravity), {0, 0}, {0, 0});
