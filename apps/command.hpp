@@ -1,10 +1,11 @@
 // What the subcommands share: options, errors with their exit codes, and how a subcommand is registered.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <stdexcept>
 #include <string>
+
+#include "apps/parser.hpp"
 
 namespace unhand::apps {
 
@@ -25,24 +26,22 @@ class WrongUsage : public std::runtime_error {
 
 /// A subcommand: what the parser knows of it, and what to do when it is chosen.
 struct Command {
-  CLI::App* parser{};
+  const Parser* parser{};
   std::function<void()> run;
 };
 
-Command generate_command(CLI::App& root);
-Command import_command(CLI::App& root);
-Command inspect_command(CLI::App& root);
-Command compare_command(CLI::App& root);
-Command fit_command(CLI::App& root);
-Command predict_command(CLI::App& root);
-Command discover_command(CLI::App& root);
-Command plan_command(CLI::App& root);
+Command generate_command(Parser& root);
+Command import_command(Parser& root);
+Command inspect_command(Parser& root);
+Command compare_command(Parser& root);
+Command fit_command(Parser& root);
+Command predict_command(Parser& root);
+Command discover_command(Parser& root);
+Command plan_command(Parser& root);
 
 /// --threads, the same in every subcommand.
-inline void add_threads(CLI::App& parser, int& threads) {
-  parser.add_option("--threads", threads, "Threads to use; 0: one per core")
-      ->check(CLI::Range(0, 1024))
-      ->capture_default_str();
+inline void add_threads(Parser& parser, int& threads) {
+  parser.option("--threads", threads, "Threads to use; 0: one per core").range(0, 1024).with_default();
 }
 
 }  // namespace unhand::apps

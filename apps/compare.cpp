@@ -185,47 +185,45 @@ std::string outcome_of(const experiment::Prediction& prediction) {
                                                                  : to_string(prediction.release);
 }
 
-Command compare_command(CLI::App& root) {
+Command compare_command(Parser& root) {
   auto request = std::make_shared<CompareRequest>();
-  CLI::App* parser = root.add_subcommand("compare", "Models against the measured outcomes of a log");
-  parser->add_option("LOG", request->log, "A throw log or a slip log")->required();
+  Parser& parser = root.subcommand("compare", "Models against the measured outcomes of a log");
+  parser.option("LOG", request->log, "A throw log or a slip log").required();
   parser
-      ->add_option(
-          "--models", request->models,
-          fmt::format(
-              "Which models, separated by commas: {}. Without it, all release models but {}; for free "
-              "flights, projectile; for slip logs, all surfaces",
-              fmt::join(known_models(), ", "), naive_model))
-      ->delimiter(',');
-  parser->add_flag("--fit", request->fit,
-                   "Fit the models to the log's train throws (see `unhand fit`), or to its slips");
-  parser->add_option("--card", request->cards,
-                     "A model card: its parameters are used for its model; may be repeated");
-  parser->add_option("--json", request->json, "Write the comparison as JSON");
-  parser->add_option("--report", request->report,
-                     "A directory for figures, tables (Markdown), per-throw errors (CSV) and the JSON");
-  parser->add_option("--write-cards", request->write_cards,
-                     "A directory for the estimated or fitted parameters as model cards");
-  parser->add_option("--naive-step", request->naive.step, "Step of limit_surface_naive [s]")
-      ->check(CLI::Range(1e-7, 0.1))
-      ->capture_default_str();
+      .option("--models", request->models,
+              fmt::format(
+                  "Which models, separated by commas: {}. Without it, all release models but {}; for free "
+                  "flights, projectile; for slip logs, all surfaces",
+                  fmt::join(known_models(), ", "), naive_model))
+      .with_commas();
+  parser.flag("--fit", request->fit,
+              "Fit the models to the log's train throws (see `unhand fit`), or to its slips");
+  parser.option("--card", request->cards,
+                "A model card: its parameters are used for its model; may be repeated");
+  parser.option("--json", request->json, "Write the comparison as JSON");
+  parser.option("--report", request->report,
+                "A directory for figures, tables (Markdown), per-throw errors (CSV) and the JSON");
+  parser.option("--write-cards", request->write_cards,
+                "A directory for the estimated or fitted parameters as model cards");
+  parser.option("--naive-step", request->naive.step, "Step of limit_surface_naive [s]")
+      .range(1e-7, 0.1)
+      .with_default();
   parser
-      ->add_option("--naive-smoothing", request->naive.smoothing,
-                   "Viscous smoothing of limit_surface_naive [m/s]")
-      ->check(CLI::Range(0.0, 10.0))
-      ->capture_default_str();
-  parser->add_option("--rtol", request->rtol, "Relative tolerance of the integrator")
-      ->check(CLI::Range(1e-13, 1e-2))
-      ->capture_default_str();
-  add_threads(*parser, request->threads);
-  parser->footer(
+      .option("--naive-smoothing", request->naive.smoothing, "Viscous smoothing of limit_surface_naive [m/s]")
+      .range(0.0, 10.0)
+      .with_default();
+  parser.option("--rtol", request->rtol, "Relative tolerance of the integrator")
+      .range(1e-13, 1e-2)
+      .with_default();
+  add_threads(parser, request->threads);
+  parser.footer(
       "Parameters that no card gives are estimated from the train throws. Existing files are replaced.\n"
       "Examples:\n  unhand compare campaign.h5 --models sliding_pivot,limit_surface --report out\n"
       "  unhand compare campaign.h5 --models sliding_pivot,limit_surface,gripper_delay --fit --json "
       "out.json\n"
       "  unhand compare cubes.h5 --models projectile --json flights.json\n"
       "  unhand compare pushes.h5 --models ellipsoid,convex_quartic --fit --report out");
-  return {parser, [request] { compare(*request); }};
+  return {&parser, [request] { compare(*request); }};
 }
 
 }  // namespace unhand::apps

@@ -303,42 +303,43 @@ void check(const Options& options) {
 
 }  // namespace
 
-Command crosscheck_command(CLI::App& root) {
+Command crosscheck_command(Parser& root) {
   auto options = std::make_shared<Options>();
-  CLI::App* parser = root.add_subcommand("crosscheck", "Another engine on a log's throws, beside the models");
-  parser->add_option("LOG", options->log, "A throw log")->required();
+  Parser& parser = root.subcommand("crosscheck", "Another engine on a log's throws, beside the models");
+  parser.option("LOG", options->log, "A throw log").required();
   parser
-      ->add_option(
+      .option(
           "--engine", options->engine,
           "bullet: rigid bodies in double-precision Bullet; cvode: the same models, integrated by SUNDIALS; "
           "patch: points with bristles")
-      ->check(CLI::IsMember({"bullet", "cvode", "patch"}))
-      ->capture_default_str();
-  parser->add_option("--models", options->models, "Models to hold it against, separated by commas")
-      ->delimiter(',')
-      ->capture_default_str();
-  parser->add_option("--card", options->card,
-                     "Friction from a model card; without it, estimated from the log for the first model");
-  parser->add_option("--steps", options->steps, "Steps of bullet or patch [s], separated by commas")
-      ->delimiter(',')
-      ->check(CLI::Range(1e-6, 1e-3));
-  parser->add_option("--pads", options->pads, "Bullet: how the pads touch")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, BulletPads>{
-          {"pins", BulletPads::pins}, {"point", BulletPads::point}, {"cylinder", BulletPads::cylinder}}));
-  parser->add_option("--friction", options->friction, "Bullet: its friction rows at a contact")
-      ->transform(
-          CLI::CheckedTransformer(std::map<std::string, BulletFriction>{{"along", BulletFriction::along},
-                                                                        {"across", BulletFriction::across},
-                                                                        {"fixed", BulletFriction::fixed}}));
-  parser->add_option("--rings", options->rings, "Rings of points of a pad: 3 n^2 points")
-      ->check(CLI::Range(1, 10))
-      ->capture_default_str();
-  parser->add_option("--json", options->json, "Write every throw and the differences as JSON");
-  add_threads(*parser, options->threads);
-  parser->footer(
+      .one_of({"bullet", "cvode", "patch"})
+      .with_default();
+  parser.option("--models", options->models, "Models to hold it against, separated by commas")
+      .with_commas()
+      .with_default();
+  parser.option("--card", options->card,
+                "Friction from a model card; without it, estimated from the log for the first model");
+  parser.option("--steps", options->steps, "Steps of bullet or patch [s], separated by commas")
+      .with_commas()
+      .range(1e-6, 1e-3);
+  parser.choice<BulletPads>(
+      "--pads", options->pads,
+      {{"pins", BulletPads::pins}, {"point", BulletPads::point}, {"cylinder", BulletPads::cylinder}},
+      "Bullet: how the pads touch");
+  parser.choice<BulletFriction>("--friction", options->friction,
+                                {{"along", BulletFriction::along},
+                                 {"across", BulletFriction::across},
+                                 {"fixed", BulletFriction::fixed}},
+                                "Bullet: its friction rows at a contact");
+  parser.option("--rings", options->rings, "Rings of points of a pad: 3 n^2 points")
+      .range(1, 10)
+      .with_default();
+  parser.option("--json", options->json, "Write every throw and the differences as JSON");
+  add_threads(parser, options->threads);
+  parser.footer(
       "All get the same hand, normal force and friction, so that differences are the engine's.\n"
       "Example:\n  unhand crosscheck campaign.h5 --engine bullet --steps 1e-3,1e-4 --json bullet.json");
-  return {parser, [options] { check(*options); }};
+  return {&parser, [options] { check(*options); }};
 }
 
 }  // namespace unhand::apps

@@ -5,6 +5,6 @@
 
 namespace unhand::apps {
 
-Command crosscheck_command(CLI::App& root);
+Command crosscheck_command(Parser& root);
 
 }  // namespace unhand::apps

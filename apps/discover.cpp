@@ -12,6 +12,7 @@
 #include "apps/command.hpp"
 #include "apps/discover_measured.hpp"
 #include "apps/figure.hpp"
+#include "apps/ranking.hpp"
 #include "apps/table.hpp"
 #include "contact/registry.hpp"
 #include "fitting/card.hpp"
@@ -29,9 +30,6 @@ struct Options {
   std::optional<int> most;
   int threads{0};
 };
-
-/// JSON has no infinity and no NaN.
-Json number(double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
 
 Json json_of(const OutcomeErrors& e) {
   return {{"n", e.n},
@@ -185,16 +183,7 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
   }
   out["error"] = {{"before", {{"train", json_of(found.before_train)}, {"test", json_of(found.before_test)}}},
                   {"after", {{"train", json_of(found.after_train)}, {"test", json_of(found.after_test)}}}};
-  out["ranking"] = Json::array();
-  for (const auto& r : found.ranking)
-    out["ranking"].push_back({{"id", r.id},
-                              {"score_p_value", number(r.p_value)},
-                              {"footprint_correlation_with_best", number(r.correlation_with_best)},
-                              {"chi2_gain", number(r.gain)},
-                              {"visible", r.visible},
-                              {"refitted", r.refitted},
-                              {"delta_bic", r.refitted ? number(r.delta_bic) : Json(nullptr)},
-                              {"held_out_gain", r.refitted ? number(r.held_out_gain) : Json(nullptr)}});
+  out["ranking"] = ranking_json(found.ranking);
   out["first_misfit"] = nullptr;
   if (found.first.any)
     out["first_misfit"] = {{"phase", to_string(found.first.phase)},
@@ -267,45 +256,40 @@ std::vector<std::string> base_models() {
 
 }  // namespace
 
-Command discover_command(CLI::App& root) {
+Command discover_command(Parser& root) {
   auto options = std::make_shared<Options>();
-  CLI::App* parser = root.add_subcommand("discover",
-                                         "Find what a model lacks: trace the residual to an effect, add it, "
-                                         "and report the error before and after");
+  Parser& parser = root.subcommand("discover",
+                                   "Find what a model lacks: trace the residual to an effect, add it, "
+                                   "and report the error before and after");
   parser
-      ->add_option("LOG", options->log,
-                   "A log of planar throws, of free flights or accelerometers in free fall (dimension 3), or "
-                   "a slip-log")
-      ->required();
-  parser->add_option("--model", options->model, "The base model")
-      ->check(CLI::IsMember(base_models()))
-      ->capture_default_str();
-  parser->add_option("--report", options->report, "Directory for the page, its figures and discovery.json");
-  parser->add_option("--json", options->json, "Write the result as JSON");
-  parser->add_option("--card", options->card, "Write the card of the extended model");
-  parser->add_option("--forget", options->forget, "Effects that the catalogue is told to forget")
-      ->delimiter(',');
+      .option("LOG", options->log,
+              "A log of planar throws, of free flights or accelerometers in free fall (dimension 3), or "
+              "a slip-log")
+      .required();
+  parser.option("--model", options->model, "The base model").one_of(base_models()).with_default();
+  parser.option("--report", options->report, "Directory for the page, its figures and discovery.json");
+  parser.option("--json", options->json, "Write the result as JSON");
+  parser.option("--card", options->card, "Write the card of the extended model");
+  parser.option("--forget", options->forget, "Effects that the catalogue is told to forget").with_commas();
   parser
-      ->add_option("--matters", options->matters,
-                   "Least fall of chi2 per sample on held-out throws for an effect to count")
-      ->check(CLI::Range(1e-3, 1e3))
-      ->capture_default_str();
-  parser->add_option("--most", options->most, "Most effects to add (3 for planar throws, 6 for other logs)")
-      ->check(CLI::Range(0, 10));
-  parser
-      ->add_option("--floor", options->floor,
-                   "Free flights: height of the floor that boxes come to rest on [m]")
-      ->check(CLI::Range(-1e3, 1e3))
-      ->capture_default_str();
-  parser->add_option("--rtol", options->tolerance, "Relative tolerance of the integration")
-      ->check(CLI::Range(1e-10, 1e-3))
-      ->capture_default_str();
-  add_threads(*parser, options->threads);
-  parser->footer(
+      .option("--matters", options->matters,
+              "Least fall of chi2 per sample on held-out throws for an effect to count")
+      .range(1e-3, 1e3)
+      .with_default();
+  parser.option("--most", options->most, "Most effects to add (3 for planar throws, 6 for other logs)")
+      .range(0, 10);
+  parser.option("--floor", options->floor, "Free flights: height of the floor that boxes come to rest on [m]")
+      .range(-1e3, 1e3)
+      .with_default();
+  parser.option("--rtol", options->tolerance, "Relative tolerance of the integration")
+      .range(1e-10, 1e-3)
+      .with_default();
+  add_threads(parser, options->threads);
+  parser.footer(
       "Verdicts: effect_found, no_missing_effect, unexplained.\n"
       "Example:\n  unhand discover campaign.h5 --model limit_surface_disc --report out/ --json "
       "discovery.json");
-  return {parser, [options] {
+  return {&parser, [options] {
             std::string command = fmt::format("unhand discover {} --model {}", options->log, options->model);
             for (const auto& id : options->forget) command += " --forget " + id;
             discover(*options, command);

@@ -7,6 +7,7 @@
 
 #include "apps/discover.hpp"
 #include "apps/figure.hpp"
+#include "apps/ranking.hpp"
 #include "apps/report_page.hpp"
 #include "apps/table.hpp"
 
@@ -70,34 +71,6 @@ Figure residual_figure(const Discovery& found) {
                        {"with linespoints pointtype 7 linecolor rgb '#0072b2'", "after"}},
                       2);
   figure.script = script + "unset multiplot\n";
-  return figure;
-}
-
-Figure ranking_figure(const Discovery& found) {
-  Figure figure{"ranking", 17, 10, {}, {}};
-  DataBlock block{"first-order gain of chi2 by candidate", {"gain", "position", "accepted"}, {}, {}};
-  std::string tics;
-  int position = 0;
-  double largest = 10;
-  for (const auto& r : found.ranking) {
-    if (!(r.gain > 1)) continue;
-    const bool accepted =
-        std::any_of(found.effects.begin(), found.effects.end(), [&](const auto& e) { return e.id == r.id; });
-    block.rows.push_back({r.gain, static_cast<double>(position), accepted ? 1.0 : 0.0});
-    tics += fmt::format("{}'{}' {}", position ? ", " : "", plain(r.id), position);
-    largest = std::max(largest, r.gain);
-    ++position;
-  }
-  figure.height = 2 + 0.55 * std::max(1, position);
-  figure.data.push_back(block);
-  figure.script = fmt::format(
-      "set key off\nset lmargin 32\nset logscale x\nset format x '10^{{%T}}'\nset xrange [1:{:.4g}]\n"
-      "set yrange [{}:-1]\nset ytics ({})\nset xlabel 'chi^2 that the effect would take away, to first "
-      "order'\n"
-      "set style fill solid 0.9\n"
-      "plot DATA index 0 using (sqrt($1)):2:(0):1:($2-0.35):($2+0.35):($3 > 0 ? 0x0072b2 : 0xb0b0b0) "
-      "with boxxyerror linecolor rgb variable\n",
-      2 * largest, position, tics.empty() ? "'' 0" : tics);
   return figure;
 }
 
@@ -206,7 +179,7 @@ Table ranking_table(const Discovery& found) {
 
 void write_discovery_report(const Discovery& found, const std::string& log, const std::string& command,
                             const Json& json, const std::filesystem::path& directory) {
-  const Figure residual = residual_figure(found), ranking = ranking_figure(found);
+  const Figure residual = residual_figure(found), ranking = ranking_figure(found.ranking, found.effects);
   draw(residual, directory);
   draw(ranking, directory);
   const bool estimated = found.unexplained && found.unexplained->missing;

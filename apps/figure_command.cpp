@@ -237,29 +237,26 @@ void figure(const Options& options) {
 
 }  // namespace
 
-Command figure_command(CLI::App& root) {
+Command figure_command(Parser& root) {
   auto options = std::make_shared<Options>();
-  CLI::App* parser = root.add_subcommand("figure", "Draw one figure, or all, of a log");
+  Parser& parser = root.subcommand("figure", "Draw one figure, or all, of a log");
   std::string listed = "Which:";
   for (const Kind& kind : kinds()) listed += fmt::format("\n{}: {}", kind.name, kind.what);
-  parser->add_option("NAME", options->name, listed + "\nall: every one")->required();
-  parser->add_option("--log", options->log, "A throw log; without one, the synthetic campaign quick12");
-  parser->add_option("--throw", options->thrown,
-                     "Id of the throw for figures of one; the first if not given");
-  parser->add_option("--models", options->models, "Models, separated by commas")
-      ->delimiter(',')
-      ->capture_default_str();
-  parser->add_option("--out", options->out, "Directory for NAME.png, NAME.pdf, NAME.dat and NAME.gp")
-      ->capture_default_str();
-  add_threads(*parser, options->threads);
-  parser->footer(
+  parser.option("NAME", options->name, listed + "\nall: every one").required();
+  parser.option("--log", options->log, "A throw log; without one, the synthetic campaign quick12");
+  parser.option("--throw", options->thrown, "Id of the throw for figures of one; the first if not given");
+  parser.option("--models", options->models, "Models, separated by commas").with_commas().with_default();
+  parser.option("--out", options->out, "Directory for NAME.png, NAME.pdf, NAME.dat and NAME.gp")
+      .with_default();
+  add_threads(parser, options->threads);
+  parser.footer(
       "Friction is estimated from the log as `unhand compare` does. The residual of a model before and after "
       "an "
       "effect\nis drawn by `unhand discover --report`, the limit surface of measured slips by `unhand "
       "compare` on a slip log.\n"
       "Examples:\n  unhand figure modes --log campaign.h5 --throw 017 --out figures\n"
       "  unhand figure all --log campaign.h5 --models sliding_pivot,limit_surface --out figures");
-  return {parser, [options] { figure(*options); }};
+  return {&parser, [options] { figure(*options); }};
 }
 
 }  // namespace unhand::apps

@@ -5,6 +5,6 @@
 
 namespace unhand::apps {
 
-Command figure_command(CLI::App& root);
+Command figure_command(Parser& root);
 
 }  // namespace unhand::apps

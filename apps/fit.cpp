@@ -170,41 +170,39 @@ bool FitAnswer::has_test() const {
                      [](const auto& one) { return one.split == datasets::Split::test; });
 }
 
-Command fit_command(CLI::App& root) {
+Command fit_command(Parser& root) {
   auto request = std::make_shared<FitRequest>();
-  CLI::App* parser = root.add_subcommand("fit", "Fit a model's parameters to a log and write its card");
-  parser->add_option("LOG", request->log, "A throw log or a slip log")->required();
+  Parser& parser = root.subcommand("fit", "Fit a model's parameters to a log and write its card");
+  parser.option("LOG", request->log, "A throw log or a slip log").required();
   parser
-      ->add_option(
-          "--model", request->model,
-          fmt::format("Which model: {}; for slip logs: {}", fmt::join(contact::contact_model_names(), ", "),
-                      fmt::join(surface_names(), ", ")))
-      ->required();
+      .option("--model", request->model,
+              fmt::format("Which model: {}; for slip logs: {}",
+                          fmt::join(contact::contact_model_names(), ", "), fmt::join(surface_names(), ", ")))
+      .required();
   parser
-      ->add_option("--effects", request->effects,
-                   "Ids of effects whose parameters are fitted, too, separated by commas")
-      ->delimiter(',');
-  parser->add_option("--card", request->card, "Write the model card");
-  parser->add_option("--json", request->json, "Write the fit as JSON");
-  parser->add_option("--report", request->report,
-                     "A directory for the tables (Markdown), a figure, all throws (CSV) and the JSON");
+      .option("--effects", request->effects,
+              "Ids of effects whose parameters are fitted, too, separated by commas")
+      .with_commas();
+  parser.option("--card", request->card, "Write the model card");
+  parser.option("--json", request->json, "Write the fit as JSON");
+  parser.option("--report", request->report,
+                "A directory for the tables (Markdown), a figure, all throws (CSV) and the JSON");
   parser
-      ->add_option(
-          "--kfold", request->kfold,
-          "Cross-validate over so many groups of conditions of the train throws; 0: with 5, and only "
-          "if the log has no test throws")
-      ->check(CLI::Range(0, 1000))
-      ->capture_default_str();
-  parser->add_option("--rtol", request->rtol, "Relative tolerance of the integrator")
-      ->check(CLI::Range(1e-12, 1e-3))
-      ->capture_default_str();
-  add_threads(*parser, request->threads);
-  parser->footer(
+      .option("--kfold", request->kfold,
+              "Cross-validate over so many groups of conditions of the train throws; 0: with 5, and only "
+              "if the log has no test throws")
+      .range(0, 1000)
+      .with_default();
+  parser.option("--rtol", request->rtol, "Relative tolerance of the integrator")
+      .range(1e-12, 1e-3)
+      .with_default();
+  add_threads(parser, request->threads);
+  parser.footer(
       "Train throws only are fitted; the others are predicted. Existing files are replaced, each at once.\n"
       "Examples:\n  unhand fit campaign.h5 --model limit_surface --card card.json --report out\n"
       "  unhand fit campaign.h5 --model limit_surface_disc --effects flight.drag --card card.json\n"
       "  unhand fit pushes.h5 --model convex_quartic --card felt.json");
-  return {parser, [request] { fit(*request); }};
+  return {&parser, [request] { fit(*request); }};
 }
 
 }  // namespace unhand::apps

@@ -22,9 +22,6 @@ Interval interval95(const fitting::FittedUnknown& u, double factor) {
   return {u.value - factor * u.sigma, u.value + factor * u.sigma};
 }
 
-/// A number as JSON, which knows neither NaN nor infinity.
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 std::string standing_of(const fitting::FittedUnknown& u) {
   if (u.at_bound) return "at its bound";
   if (!std::isfinite(u.data_sigma)) return "not by this log";

@@ -118,31 +118,30 @@ std::string footer() {
 
 }  // namespace
 
-Command generate_command(CLI::App& root) {
+Command generate_command(Parser& root) {
   auto options = std::make_shared<Options>();
-  CLI::App* parser = root.add_subcommand("generate", "Make the throw log of a synthetic campaign");
+  Parser& parser = root.subcommand("generate", "Make the throw log of a synthetic campaign");
   parser
-      ->add_option("CAMPAIGN", options->campaign,
-                   fmt::format("Which campaign: {}", fmt::join(experiment::campaign_names(), ", ")))
-      ->required();
-  parser->add_option("--out", options->out, "The throw log to write (replaced if it exists)")->required();
-  parser->add_option("--seed", options->seed, "Seed of everything random; the same seed gives the same log")
-      ->capture_default_str();
+      .option("CAMPAIGN", options->campaign,
+              fmt::format("Which campaign: {}", fmt::join(experiment::campaign_names(), ", ")))
+      .required();
+  parser.option("--out", options->out, "The throw log to write (replaced if it exists)").required();
+  parser.option("--seed", options->seed, "Seed of everything random; the same seed gives the same log")
+      .with_default();
   parser
-      ->add_option(
-          "--effect", options->effects,
-          "ID=value, ID.parameter=value or ID[object]=value: what the world or the sensors do and the "
-          "log does not say; 'random': one drawn with the seed. May be repeated")
-      ->allow_extra_args(false);
-  parser->add_option("--without", options->without, "Leave a sensor out: ft, wrench, mocap or landing")
-      ->check(CLI::IsMember({"ft", "wrench", "mocap", "landing"}))
-      ->allow_extra_args(false);
-  parser->add_option("--truth", options->truth,
-                     "Write the truth (parameters, effects, every throw) as JSON; the log never tells it");
-  parser->add_option("--json", options->json, "Write what was made as JSON");
-  add_threads(*parser, options->threads);
-  parser->footer(footer());
-  return {parser, [options] { generate(*options); }};
+      .option("--effect", options->effects,
+              "ID=value, ID.parameter=value or ID[object]=value: what the world or the sensors do and the "
+              "log does not say; 'random': one drawn with the seed. May be repeated")
+      .one_value_each();
+  parser.option("--without", options->without, "Leave a sensor out: ft, wrench, mocap or landing")
+      .one_of({"ft", "wrench", "mocap", "landing"})
+      .one_value_each();
+  parser.option("--truth", options->truth,
+                "Write the truth (parameters, effects, every throw) as JSON; the log never tells it");
+  parser.option("--json", options->json, "Write what was made as JSON");
+  add_threads(parser, options->threads);
+  parser.footer(footer());
+  return {&parser, [options] { generate(*options); }};
 }
 
 }  // namespace unhand::apps

@@ -143,18 +143,18 @@ void import(Options& options) {
 
 }  // namespace
 
-Command import_command(CLI::App& root) {
+Command import_command(Parser& root) {
   auto options = std::make_shared<Options>();
-  CLI::App* parser = root.add_subcommand("import", "Make a log from measured data in another format");
-  parser->add_option("FORMAT", options->format, "Which format:" + known_formats())->required();
-  parser->add_option("INPUT", options->inputs, "The files to read")->required();
-  parser->add_option("--out", options->out,
-                     "The log to write (replaced if it exists); --into, where that is given");
-  parser->add_option("--json", options->json, "Write what was read, kept and dropped as JSON");
-  add_threads(*parser, options->threads);
-  add_lab_options(*parser, options->lab);
-  parser->footer(examples());
-  return {parser, [options] { import(*options); }};
+  Parser& parser = root.subcommand("import", "Make a log from measured data in another format");
+  parser.option("FORMAT", options->format, "Which format:" + known_formats()).required();
+  parser.option("INPUT", options->inputs, "The files to read").required();
+  parser.option("--out", options->out,
+                "The log to write (replaced if it exists); --into, where that is given");
+  parser.option("--json", options->json, "Write what was read, kept and dropped as JSON");
+  add_threads(parser, options->threads);
+  add_lab_options(parser, options->lab);
+  parser.footer(examples());
+  return {&parser, [options] { import(*options); }};
 }
 
 }  // namespace unhand::apps

@@ -28,7 +28,7 @@ struct Reading {
   Json details;
 };
 
-bool given(const LabOptions& options, const char* name) { return options.parser->count(name) > 0; }
+bool given(const LabOptions& options, const char* name) { return options.parser->given(name); }
 
 /// "a=b,c=d"; a part without '=' belongs to the value before it, so that values may hold commas.
 std::map<std::string, std::string> parse_pairs(const char* option, const std::string& text) {

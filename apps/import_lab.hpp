@@ -1,11 +1,11 @@
 // unhand import: the formats of a lab's own instruments, each file a throw or one part of it.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
 
 #include "apps/output.hpp"
+#include "apps/parser.hpp"
 
 namespace unhand::apps {
 
@@ -24,7 +24,7 @@ struct LabOptions {
   std::vector<double> origin, com, free_flight;
   bool landing{};
   double min_fall{0.4}, fall_threshold{5};  // [s], [m/s^2]
-  const CLI::App* parser{};                 // knows which of them were given
+  const Parser* parser{};                   // knows which of them were given
 };
 
 struct LabImport {
@@ -33,7 +33,7 @@ struct LabImport {
 };
 
 /// The options that these formats share, in groups of the help.
-void add_lab_options(CLI::App& parser, LabOptions& options);
+void add_lab_options(Parser& parser, LabOptions& options);
 
 /// Throws WrongUsage if one of these options is given: `format` takes none of them.
 void refuse_lab_options(const std::string& format, const LabOptions& options);

@@ -1,63 +1,37 @@
 // The options of unhand import for the files of a lab.
-#include <fmt/format.h>
-
-#include <cmath>
 
 #include "apps/command.hpp"
 #include "apps/import_lab.hpp"
 
 namespace unhand::apps {
-namespace {
-
-/// A check of a number, with a message that says what is accepted.
-CLI::Validator number_check(const char* accepted, bool (*accept)(double)) {
-  return CLI::Validator(
-      [=](std::string& text) -> std::string {
-        double value = 0;
-        if (CLI::detail::lexical_cast(text, value) && accept(value)) return {};
-        return fmt::format("{} is not {}", text, accepted);
-      },
-      "");
-}
-
-}  // namespace
-
-void add_lab_options(CLI::App& parser, LabOptions& options) {
+void add_lab_options(Parser& parser, LabOptions& options) {
   options.parser = &parser;
-  const CLI::Validator positive =
-      number_check("a number > 0", [](double x) { return x > 0 && std::isfinite(x); });
-  const CLI::Validator not_negative =
-      number_check("a number >= 0", [](double x) { return x >= 0 && std::isfinite(x); });
   const auto add = [&](const char* group, const char* name, auto& value, const char* text) {
-    return parser.add_option(name, value, text)->group(group);
+    return parser.option(name, value, text).group(group);
   };
   const char* one = "A log to add to (motive-csv, hand-csv, ft-csv)";
   add(one, "--into", options.into,
       "Add to the throws of this log that are named like the files; it is --out if that is not given");
-  parser.add_flag("--replace", options.replace, "Where a throw has such data already, replace it")
-      ->group(one);
+  parser.flag("--replace", options.replace, "Where a throw has such data already, replace it").group(one);
   const char* fresh = "A new log (motive-csv, hand-csv, ft-csv, phyphox)";
   add(fresh, "--sku", options.sku, "The object as an SKU file (TOML): mass, inertia, offset of the CoM");
-  add(fresh, "--mass", options.mass, "[kg] The object's mass, where there is no SKU file")->check(positive);
+  add(fresh, "--mass", options.mass, "[kg] The object's mass, where there is no SKU file").positive();
   add(fresh, "--object", options.object, "The object's name; else the SKU file's");
   add(fresh, "--title", options.title, "The campaign's title");
   add(fresh, "--source", options.source, "Where the data are from");
   add(fresh, "--licence", options.licence, "Their licence");
-  add(fresh, "--gravity", options.gravity, "[m/s^2] Gravity")->capture_default_str()->check(not_negative);
-  add(fresh, "--landing-height", options.landing_height, "[m] Where a throw counts as landed")
-      ->capture_default_str();
-  add(fresh, "--pads", options.pads, "Pads of the gripper")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 1000));
-  add(fresh, "--pad-radius", options.pad_radius, "[m] Their radius")->check(positive);
+  add(fresh, "--gravity", options.gravity, "[m/s^2] Gravity").with_default().not_negative();
+  add(fresh, "--landing-height", options.landing_height, "[m] Where a throw counts as landed").with_default();
+  add(fresh, "--pads", options.pads, "Pads of the gripper").with_default().range(1, 1000);
+  add(fresh, "--pad-radius", options.pad_radius, "[m] Their radius").positive();
   add(fresh, "--opening-time", options.opening_time,
       "[s] When the gripper is told to open, on the robot's clock");
   add(fresh, "--condition", options.condition,
       "What these throws repeat; else the file's name without its number");
   add(fresh, "--test-every", options.test_every, "Hold out every so-manieth throw of each condition; 0: none")
-      ->capture_default_str();
+      .with_default();
   add(fresh, "--test-conditions", options.test_conditions, "Hold out these conditions as a whole")
-      ->delimiter(',');
+      .with_commas();
   const char* files = "What is in the files (motive-csv, hand-csv, ft-csv)";
   add(files, "--throw", options.throw_id, "The throw's name; else the file's");
   add(files, "--time-offset", options.time_offset,
@@ -72,30 +46,28 @@ void add_lab_options(CLI::App& parser, LabOptions& options) {
   const char* motive = "Motive (motive-csv)";
   add(motive, "--body", options.body, "The rigid body; else the only one");
   add(motive, "--dimension", options.dimension, "3: free flights in space; 2: throws in a plane")
-      ->capture_default_str()
-      ->check(CLI::IsMember({2, 3}));
+      .with_default()
+      .one_of({"2", "3"});
   add(motive, "--heading", options.heading,
       "[deg] Of the throw in Motive's floor, from its X axis, counter-clockwise seen from above");
   add(motive, "--origin", options.origin, "[m] X,Y,Z of the robot's base in Motive's frame")
-      ->delimiter(',')
-      ->expected(3);
+      .with_commas()
+      .expected(3, 3);
   add(motive, "--com", options.com, "[m] X,Y,Z of the CoM in the rigid body's frame")
-      ->delimiter(',')
-      ->expected(3);
+      .with_commas()
+      .expected(3, 3);
   add(motive, "--free-flight", options.free_flight, "[s] T0,T1 between which the object touches nothing")
-      ->delimiter(',')
-      ->expected(2);
+      .with_commas()
+      .expected(2, 2);
   parser
-      .add_flag("--landing", options.landing,
-                "Take the landing from the track, where it passes the landing height")
-      ->group(motive);
+      .flag("--landing", options.landing,
+            "Take the landing from the track, where it passes the landing height")
+      .group(motive);
   const char* phone = "Phones (phyphox)";
-  add(phone, "--min-fall", options.min_fall, "[s] The shortest free fall")
-      ->capture_default_str()
-      ->check(positive);
+  add(phone, "--min-fall", options.min_fall, "[s] The shortest free fall").with_default().positive();
   add(phone, "--fall-threshold", options.fall_threshold, "[m/s^2] The specific force in a fall is below it")
-      ->capture_default_str()
-      ->check(positive);
+      .with_default()
+      .positive();
 }
 
 }  // namespace unhand::apps

@@ -156,19 +156,18 @@ void inspect(const Options& options) {
 
 }  // namespace
 
-Command inspect_command(CLI::App& root) {
+Command inspect_command(Parser& root) {
   auto options = std::make_shared<Options>();
-  CLI::App* parser =
-      root.add_subcommand("inspect", "Show what is in a log: units, rates, gaps, noise, schema errors");
-  parser->add_option("LOG", options->log, "A throw log or slip log")->required();
-  CLI::Option* json =
-      parser->add_option("--json", options->json, "Write it as JSON; without a file name, JSON on stdout")
-          ->expected(0, 1);
-  add_threads(*parser, options->threads);
-  parser->footer(
-      "Examples:\n  unhand inspect campaign.h5\n  unhand inspect campaign.h5 --json campaign.json");
-  return {parser, [options, json] {
-            options->json_wanted = json->count() > 0;
+  Parser& parser =
+      root.subcommand("inspect", "Show what is in a log: units, rates, gaps, noise, schema errors");
+  parser.option("LOG", options->log, "A throw log or slip log").required();
+  const Option json =
+      parser.option("--json", options->json, "Write it as JSON; without a file name, JSON on stdout")
+          .expected(0, 1);
+  add_threads(parser, options->threads);
+  parser.footer("Examples:\n  unhand inspect campaign.h5\n  unhand inspect campaign.h5 --json campaign.json");
+  return {&parser, [options, json] {
+            options->json_wanted = json.given();
             inspect(*options);
           }};
 }

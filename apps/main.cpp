@@ -36,9 +36,9 @@ int run(const Command& command) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App root{"unhand: the physics of letting go. Predicts where released objects land.", "unhand"};
-  root.set_version_flag("--version", "unhand " UNHAND_VERSION);
-  root.require_subcommand(1);
+  Parser root{"unhand: the physics of letting go. Predicts where released objects land.", "unhand",
+              "unhand " UNHAND_VERSION};
+  root.require_subcommand();
   root.footer(
       "Exit codes: 0 done, 1 the computation could not answer, 2 wrong usage, 3 bad input.\n"
       "Existing outputs are replaced, each at once, and only if everything succeeded.");
@@ -46,12 +46,15 @@ int main(int argc, char** argv) {
                             compare_command(root),  fit_command(root),       predict_command(root),
                             discover_command(root), plan_command(root),      validate_sku_command(root),
                             figure_command(root),   crosscheck_command(root)};
-  try {
-    root.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return root.exit(error) == 0 ? done : wrong_usage;
+  switch (root.parse(argc, argv)) {
+    case Parser::Parsed::helped:
+      return done;
+    case Parser::Parsed::wrong_usage:
+      return wrong_usage;
+    case Parser::Parsed::run:
+      break;
   }
   for (const Command& command : commands)
-    if (command.parser->parsed()) return run(command);
+    if (command.parser->chosen()) return run(command);
   return wrong_usage;
 }

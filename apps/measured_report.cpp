@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "apps/figure.hpp"
+#include "apps/ranking.hpp"
 #include "apps/report_page.hpp"
 #include "fitting/card.hpp"
 
@@ -14,8 +15,6 @@ namespace {
 
 using fitting::MeasuredDiscovery;
 using fitting::NamedErrors;
-
-Json number(double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
 
 Json json_of(const NamedErrors& errors, int n) {
   // The fields that every discovery has; null where the log has no such outcome.
@@ -197,35 +196,6 @@ Figure surface_figure(const MeasuredResult& result) {
   return figure;
 }
 
-Figure ranking_figure(const MeasuredDiscovery& found) {
-  Figure figure{"ranking", 17, 10, {}, {}};
-  DataBlock block{"first-order gain of chi2 by candidate", {"gain", "position", "accepted"}, {}, {}};
-  std::string tics;
-  int position = 0;
-  double largest = 10;
-  for (const auto& r : found.ranking) {
-    if (!(r.gain > 1)) continue;
-    const bool accepted =
-        std::any_of(found.effects.begin(), found.effects.end(), [&](const auto& e) { return e.id == r.id; });
-    block.rows.push_back({r.gain, static_cast<double>(position), accepted ? 1.0 : 0.0});
-    tics += fmt::format("{}'{}' {}", position ? ", " : "", plain(r.id), position);
-    largest = std::max(largest, r.gain);
-    ++position;
-  }
-  if (position == 0) block.rows.push_back({1, 0, 0}), tics = "'none' 0";
-  figure.height = 2 + 0.55 * std::max(1, position);
-  figure.data.push_back(block);
-  figure.script = fmt::format(
-      "set key off\nset lmargin 32\nset logscale x\nset format x '10^{{%T}}'\nset xrange [1:{:.4g}]\n"
-      "set yrange [{}:-1]\nset ytics ({})\nset xlabel 'chi^2 that the effect would take away, to first "
-      "order'\n"
-      "set style fill solid 0.9\n"
-      "plot DATA index 0 using (sqrt($1)):2:(0):1:($2-0.35):($2+0.35):($3 > 0 ? 0x0072b2 : 0xb0b0b0) "
-      "with boxxyerror linecolor rgb variable\n",
-      2 * largest, std::max(1, position), tics);
-  return figure;
-}
-
 std::string first_text(const MeasuredDiscovery& found) {
   if (!found.first.any) return "No channel leaves the noise.";
   if (found.first.time > 0)
@@ -275,16 +245,7 @@ Json measured_json(const MeasuredResult& result) {
                   {"after",
                    {{"train", json_of(found.after_train, found.train)},
                     {"test", json_of(found.after_test, found.test)}}}};
-  out["ranking"] = Json::array();
-  for (const auto& r : found.ranking)
-    out["ranking"].push_back({{"id", r.id},
-                              {"score_p_value", number(r.p_value)},
-                              {"footprint_correlation_with_best", number(r.correlation_with_best)},
-                              {"chi2_gain", number(r.gain)},
-                              {"visible", r.visible},
-                              {"refitted", r.refitted},
-                              {"delta_bic", r.refitted ? number(r.delta_bic) : Json(nullptr)},
-                              {"held_out_gain", r.refitted ? number(r.held_out_gain) : Json(nullptr)}});
+  out["ranking"] = ranking_json(found.ranking);
   out["first_misfit"] = nullptr;
   if (found.first.any)
     out["first_misfit"] = {{"phase", found.phase},
@@ -360,7 +321,7 @@ void write_measured_report(const MeasuredResult& result, const Json& json,
   const MeasuredDiscovery& found = result.answer;
   const bool slips = !result.surfaces.empty();
   const Figure residual = slips ? surface_figure(result) : residual_figure(found),
-               ranking = ranking_figure(found);
+               ranking = ranking_figure(found.ranking, found.effects);
   draw(residual, directory);
   draw(ranking, directory);
   const auto picture = [&](const Figure& figure) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <fstream>
 
 #include "apps/command.hpp"
@@ -48,6 +49,8 @@ void put_in_place(const fs::path& made, const fs::path& destination) {
 }
 
 }  // namespace
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 void write_text(const fs::path& file, const std::string& content) {
   std::ofstream out(file, std::ios::binary);

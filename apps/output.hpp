@@ -14,6 +14,9 @@ namespace unhand::apps {
 
 using Json = nlohmann::ordered_json;
 
+/// A number as JSON, which knows neither NaN nor infinity: those are null.
+Json number(double value);
+
 inline std::string json_text(const Json& value) { return value.dump(1) + "\n"; }
 
 /// Writes a file in place, for directories that are not in place yet. Throws Unanswered.

@@ -5,14 +5,14 @@
 
 namespace unhand::apps {
 
-Command plan_command(CLI::App& root) {
-  CLI::App* parser = root.add_subcommand("plan", "Plan a throw");
-  parser->require_subcommand(1);
-  const std::vector<Command> planners{plan_throw_command(*parser), plan_control_command(*parser),
-                                      plan_elastic_command(*parser), plan_wrist_command(*parser)};
-  return {parser, [planners] {
+Command plan_command(Parser& root) {
+  Parser& parser = root.subcommand("plan", "Plan a throw");
+  parser.require_subcommand();
+  const std::vector<Command> planners{plan_throw_command(parser), plan_control_command(parser),
+                                      plan_elastic_command(parser), plan_wrist_command(parser)};
+  return {&parser, [planners] {
             for (const Command& planner : planners)
-              if (planner.parser->parsed()) planner.run();
+              if (planner.parser->chosen()) planner.run();
           }};
 }
 

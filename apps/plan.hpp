@@ -5,9 +5,9 @@
 
 namespace unhand::apps {
 
-Command plan_control_command(CLI::App& plan);
-Command plan_wrist_command(CLI::App& plan);
-Command plan_elastic_command(CLI::App& plan);
-Command plan_throw_command(CLI::App& plan);
+Command plan_control_command(Parser& plan);
+Command plan_wrist_command(Parser& plan);
+Command plan_elastic_command(Parser& plan);
+Command plan_throw_command(Parser& plan);
 
 }  // namespace unhand::apps

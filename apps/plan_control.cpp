@@ -157,24 +157,22 @@ void run(const Options& o) {
 
 }  // namespace
 
-Command plan_control_command(CLI::App& plan) {
+Command plan_control_command(Parser& plan) {
   auto o = std::make_shared<Options>();
-  CLI::App* parser =
-      plan.add_subcommand("control", "Throws of unknown objects under adaptive and plain computed torque");
-  parser->footer("Example: unhand plan control --report out/control");
-  parser->add_option("--seeds", o->seeds, "Simulated robots per object and controller")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  parser->add_option("--repetitions", o->repetitions, "Motions without release before the throw")
-      ->check(CLI::Range(0, 1000))
-      ->capture_default_str();
-  parser->add_option("--box", o->box, "Side of the box [m]")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  parser->add_option("--json", o->json, "Write the numbers here");
-  parser->add_option("--report", o->report, "Write table and figures into this directory");
-  add_threads(*parser, o->threads);
-  return {parser, [o] { run(*o); }};
+  Parser& parser =
+      plan.subcommand("control", "Throws of unknown objects under adaptive and plain computed torque");
+  parser.footer("Example: unhand plan control --report out/control");
+  parser.option("--seeds", o->seeds, "Simulated robots per object and controller")
+      .range(1, 100000)
+      .with_default();
+  parser.option("--repetitions", o->repetitions, "Motions without release before the throw")
+      .range(0, 1000)
+      .with_default();
+  parser.option("--box", o->box, "Side of the box [m]").positive().with_default();
+  parser.option("--json", o->json, "Write the numbers here");
+  parser.option("--report", o->report, "Write table and figures into this directory");
+  add_threads(parser, o->threads);
+  return {&parser, [o] { run(*o); }};
 }
 
 }  // namespace unhand::apps

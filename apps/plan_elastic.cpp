@@ -240,47 +240,35 @@ void run(const Options& o) {
 
 }  // namespace
 
-Command plan_elastic_command(CLI::App& plan) {
+Command plan_elastic_command(Parser& plan) {
   auto o = std::make_shared<Options>();
-  CLI::App* parser = plan.add_subcommand(
+  Parser& parser = plan.subcommand(
       "elastic",
       "Optimal throws of an arm with a clutched spring: the fastest, or a table of throws to targets");
-  parser->footer("Example: unhand plan elastic --target 2.2 --report out/elastic");
-  parser->add_option("--arm", o->arm, "Arm with a clutched last joint (TOML)")->capture_default_str();
+  parser.footer("Example: unhand plan elastic --target 2.2 --report out/elastic");
+  parser.option("--arm", o->arm, "Arm with a clutched last joint (TOML)").with_default();
   parser
-      ->add_option("--target", o->target_x,
-                   "Distance of the target box [m]; none: the fastest throw of each drive")
-      ->check(CLI::Range(0.1, 20.0));
-  parser->add_option("--height", o->target_z, "Height of the box against the shoulder [m]")
-      ->capture_default_str();
-  parser->add_option("--box", o->box, "Length of the box along the throw [m]")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  parser->add_option("--half-table", o->half_table, "The table covers the target -+ this [m]")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  parser->add_option("--nodes", o->nodes, "Nodes of the table")
-      ->check(CLI::Range(4, 1000))
-      ->capture_default_str();
-  parser->add_option("--checks", o->checks, "Targets of the dense check")
-      ->check(CLI::Range(2, 100000))
-      ->capture_default_str();
-  parser->add_option("--starts", o->starts, "Random starts")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  parser->add_option("--intervals", o->intervals, "Collocation intervals per phase")
-      ->check(CLI::Range(2, 500))
-      ->capture_default_str();
-  parser
-      ->add_option("--longest", o->longest, "Longest motion [s]; 0: 0.6 for the fastest throw, 1 to a target")
-      ->check(CLI::Range(0.0, 10.0));
-  parser->add_option("--elevation", o->elevation, "Direction of the fastest throw [deg]")
-      ->check(CLI::Range(-89.0, 89.0))
-      ->capture_default_str();
-  parser->add_option("--seed", o->seed, "Seed of the random starts")->capture_default_str();
-  parser->add_option("--json", o->json, "Write the numbers here");
-  parser->add_option("--report", o->report, "Write tables and figures into this directory");
-  return {parser, [o] { run(*o); }};
+      .option("--target", o->target_x,
+              "Distance of the target box [m]; none: the fastest throw of each drive")
+      .range(0.1, 20.0);
+  parser.option("--height", o->target_z, "Height of the box against the shoulder [m]").with_default();
+  parser.option("--box", o->box, "Length of the box along the throw [m]").positive().with_default();
+  parser.option("--half-table", o->half_table, "The table covers the target -+ this [m]")
+      .positive()
+      .with_default();
+  parser.option("--nodes", o->nodes, "Nodes of the table").range(4, 1000).with_default();
+  parser.option("--checks", o->checks, "Targets of the dense check").range(2, 100000).with_default();
+  parser.option("--starts", o->starts, "Random starts").range(1, 1000).with_default();
+  parser.option("--intervals", o->intervals, "Collocation intervals per phase").range(2, 500).with_default();
+  parser.option("--longest", o->longest, "Longest motion [s]; 0: 0.6 for the fastest throw, 1 to a target")
+      .range(0.0, 10.0);
+  parser.option("--elevation", o->elevation, "Direction of the fastest throw [deg]")
+      .range(-89.0, 89.0)
+      .with_default();
+  parser.option("--seed", o->seed, "Seed of the random starts").with_default();
+  parser.option("--json", o->json, "Write the numbers here");
+  parser.option("--report", o->report, "Write tables and figures into this directory");
+  return {&parser, [o] { run(*o); }};
 }
 
 }  // namespace unhand::apps

@@ -223,48 +223,37 @@ void plan_throw(const Options& options) {
 
 }  // namespace
 
-Command plan_throw_command(CLI::App& plan) {
+Command plan_throw_command(Parser& plan) {
   auto o = std::make_shared<Options>();
-  CLI::App* parser =
-      plan.add_subcommand("throw", "Throw into a box, whenever exactly the object leaves the hand");
-  parser->add_option("--target", o->target, "Middle of the box in the base's frame, X,Y,Z [m]")->required();
-  parser->add_option("--box", o->box, "Opening of the box along x and y, AxB [m]")->capture_default_str();
-  parser->add_option("--arm", o->arm, "panda, a TOML chain or a URDF file")->capture_default_str();
-  parser->add_option("--gripper", o->gripper, "From the flange to the middle of the pads [m]")
-      ->check(CLI::Range(0.0, 1.0))
-      ->capture_default_str();
-  parser->add_option("--gripper-mass", o->gripper_mass, "Gripper and object [kg]")
-      ->check(CLI::Range(0.0, 10.0))
-      ->capture_default_str();
-  parser
-      ->add_option("--window", o->window, "The object may leave at any time up to this after the command [s]")
-      ->check(CLI::Range(0.01, 0.5))
-      ->capture_default_str();
-  parser->add_option("--drag", o->drag, "Quadratic drag of the flight, k in a = -k |v| v [1/m]")
-      ->check(CLI::Range(0.0, 10.0));
-  parser->add_option("--card", o->card,
-                     "A model card: the release follows its contact model (planar throws)");
-  parser->add_option("--sku", o->sku,
-                     "The object: mass, inertia, offset of its centre of mass from the pads");
-  parser->add_flag("--planar", o->planar, "Throw in the vertical plane of the target");
-  parser->add_flag("--tube-cvx", o->plain, "Stop at the convex problem, without refinement");
-  parser->add_option("--samples", o->samples, "Configurations searched")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
-  parser->add_option("--draws", o->draws, "Landings drawn")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
-  parser->add_option("--seed", o->seed, "Seed of the draws")->capture_default_str();
-  parser->add_option("--json", o->json, "Write the plan as JSON");
-  parser->add_option("--report", o->report, "Directory for trajectory.csv, landings.csv and figures");
-  parser->footer(
+  Parser& parser = plan.subcommand("throw", "Throw into a box, whenever exactly the object leaves the hand");
+  parser.option("--target", o->target, "Middle of the box in the base's frame, X,Y,Z [m]").required();
+  parser.option("--box", o->box, "Opening of the box along x and y, AxB [m]").with_default();
+  parser.option("--arm", o->arm, "panda, a TOML chain or a URDF file").with_default();
+  parser.option("--gripper", o->gripper, "From the flange to the middle of the pads [m]")
+      .range(0.0, 1.0)
+      .with_default();
+  parser.option("--gripper-mass", o->gripper_mass, "Gripper and object [kg]").range(0.0, 10.0).with_default();
+  parser.option("--window", o->window, "The object may leave at any time up to this after the command [s]")
+      .range(0.01, 0.5)
+      .with_default();
+  parser.option("--drag", o->drag, "Quadratic drag of the flight, k in a = -k |v| v [1/m]").range(0.0, 10.0);
+  parser.option("--card", o->card, "A model card: the release follows its contact model (planar throws)");
+  parser.option("--sku", o->sku, "The object: mass, inertia, offset of its centre of mass from the pads");
+  parser.flag("--planar", o->planar, "Throw in the vertical plane of the target");
+  parser.flag("--tube-cvx", o->plain, "Stop at the convex problem, without refinement");
+  parser.option("--samples", o->samples, "Configurations searched").range(1, 1000000).with_default();
+  parser.option("--draws", o->draws, "Landings drawn").range(1, 1000000).with_default();
+  parser.option("--seed", o->seed, "Seed of the draws").with_default();
+  parser.option("--json", o->json, "Write the plan as JSON");
+  parser.option("--report", o->report, "Directory for trajectory.csv, landings.csv and figures");
+  parser.footer(
       "Without a card, the object leaves at a delay that may be anything in the window. With one, it is let "
       "go as the\n"
       "card's contact model says, and the motion is the one whose landings depend least on friction, delay "
       "and grasp.\n"
       "Exit code 1 says why there is no plan. Example:\n"
       "  unhand plan throw --target 1.3,0,-0.2 --box 0.15x0.15 --report out/throw");
-  return {parser, [o] { plan_throw(*o); }};
+  return {&parser, [o] { plan_throw(*o); }};
 }
 
 }  // namespace unhand::apps

@@ -134,35 +134,25 @@ void run(const Options& o) {
 
 }  // namespace
 
-Command plan_wrist_command(CLI::App& plan) {
+Command plan_wrist_command(Parser& plan) {
   auto o = std::make_shared<Options>();
-  CLI::App* parser = plan.add_subcommand(
-      "wrist", "What an elastic wrist adds to the speed of a throw, against its stiffness");
-  parser->footer("Example: unhand plan wrist --report out/wrist");
-  parser->add_option("--arm", o->arm, "Arm with an elastic last joint (TOML)")->capture_default_str();
-  parser->add_option("--softest", o->softest, "[N m/rad]")->check(CLI::PositiveNumber)->capture_default_str();
-  parser->add_option("--stiffest", o->stiffest, "[N m/rad]")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  parser->add_option("--stiffnesses", o->stiffnesses, "How many")
-      ->check(CLI::Range(2, 1000))
-      ->capture_default_str();
-  parser->add_option("--starts", o->starts, "Random starts of each")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  parser->add_option("--intervals", o->intervals, "Half the collocation intervals")
-      ->check(CLI::Range(2, 500))
-      ->capture_default_str();
-  parser->add_option("--longest", o->longest, "Longest motion [s]")
-      ->check(CLI::Range(0.1, 10.0))
-      ->capture_default_str();
-  parser->add_option("--elevation", o->elevation, "Direction of the throw [deg]")
-      ->check(CLI::Range(-89.0, 89.0))
-      ->capture_default_str();
-  parser->add_option("--seed", o->seed, "Seed of the random starts")->capture_default_str();
-  parser->add_option("--json", o->json, "Write the numbers here");
-  parser->add_option("--report", o->report, "Write table and figure into this directory");
-  return {parser, [o] { run(*o); }};
+  Parser& parser =
+      plan.subcommand("wrist", "What an elastic wrist adds to the speed of a throw, against its stiffness");
+  parser.footer("Example: unhand plan wrist --report out/wrist");
+  parser.option("--arm", o->arm, "Arm with an elastic last joint (TOML)").with_default();
+  parser.option("--softest", o->softest, "[N m/rad]").positive().with_default();
+  parser.option("--stiffest", o->stiffest, "[N m/rad]").positive().with_default();
+  parser.option("--stiffnesses", o->stiffnesses, "How many").range(2, 1000).with_default();
+  parser.option("--starts", o->starts, "Random starts of each").range(1, 1000).with_default();
+  parser.option("--intervals", o->intervals, "Half the collocation intervals").range(2, 500).with_default();
+  parser.option("--longest", o->longest, "Longest motion [s]").range(0.1, 10.0).with_default();
+  parser.option("--elevation", o->elevation, "Direction of the throw [deg]")
+      .range(-89.0, 89.0)
+      .with_default();
+  parser.option("--seed", o->seed, "Seed of the random starts").with_default();
+  parser.option("--json", o->json, "Write the numbers here");
+  parser.option("--report", o->report, "Write table and figure into this directory");
+  return {&parser, [o] { run(*o); }};
 }
 
 }  // namespace unhand::apps

@@ -184,21 +184,21 @@ void predict(const Options& options) {
 
 }  // namespace
 
-Command predict_command(CLI::App& root) {
+Command predict_command(Parser& root) {
   auto options = std::make_shared<Options>();
-  CLI::App* parser =
-      root.add_subcommand("predict", "Predict each throw of a log with a card's model and parameters");
-  parser->add_option("LOG", options->log, "A throw log; outcomes need not be in it")->required();
-  parser->add_option("--card", options->card, "The model card")->required();
-  parser->add_option("--json", options->json, "Write the predictions as JSON");
-  parser->add_option("--csv", options->csv, "Write the predictions as CSV");
-  add_threads(*parser, options->threads);
-  parser->footer(
+  Parser& parser =
+      root.subcommand("predict", "Predict each throw of a log with a card's model and parameters");
+  parser.option("LOG", options->log, "A throw log; outcomes need not be in it").required();
+  parser.option("--card", options->card, "The model card").required();
+  parser.option("--json", options->json, "Write the predictions as JSON");
+  parser.option("--csv", options->csv, "Write the predictions as CSV");
+  add_threads(parser, options->threads);
+  parser.footer(
       "Cards come from `unhand fit LOG --card FILE` (with uncertainties) and from `unhand compare LOG "
       "--write-cards\n"
       "DIR`. Existing files are replaced.\n"
       "Example:\n  unhand predict campaign.h5 --card cards/sliding_pivot.json --csv predictions.csv");
-  return {parser, [options] { predict(*options); }};
+  return {&parser, [options] { predict(*options); }};
 }
 
 }  // namespace unhand::apps

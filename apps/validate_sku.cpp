@@ -79,41 +79,41 @@ void validate(Options options) {
 
 }  // namespace
 
-Command validate_sku_command(CLI::App& root) {
+Command validate_sku_command(Parser& root) {
   auto options = std::make_shared<Options>();
   auto& assumed = options->request.assumed;
-  CLI::App* parser = root.add_subcommand(
+  Parser& parser = root.subcommand(
       "validate-sku", "Can this object be thrown with this gripper, so that it lands as predicted?");
-  parser->add_option("SKU", options->sku, "The object as an SKU file (TOML)")->required();
-  parser->add_option("--card", options->card, "The gripper's model card, of `unhand fit`")->required();
-  parser->add_option("--log", options->log,
-                     "Throws whose motion and normal force are taken; those of this object are judged");
-  parser->add_option("--condition", options->condition,
-                     "Which of the log's conditions; otherwise that with the least spread");
-  parser->add_option("--tolerance", options->tolerance, "METRES,DEGREES about the predicted landing")
-      ->delimiter(',')
-      ->capture_default_str();
-  parser->add_option("--confidence", options->request.confidence, "Share of throws that must land within it")
-      ->check(CLI::Range(0.01, 0.9999))
-      ->capture_default_str();
+  parser.option("SKU", options->sku, "The object as an SKU file (TOML)").required();
+  parser.option("--card", options->card, "The gripper's model card, of `unhand fit`").required();
+  parser.option("--log", options->log,
+                "Throws whose motion and normal force are taken; those of this object are judged");
+  parser.option("--condition", options->condition,
+                "Which of the log's conditions; otherwise that with the least spread");
+  parser.option("--tolerance", options->tolerance, "METRES,DEGREES about the predicted landing")
+      .with_commas()
+      .with_default();
+  parser.option("--confidence", options->request.confidence, "Share of throws that must land within it")
+      .range(0.01, 0.9999)
+      .with_default();
   parser
-      ->add_option("--other-surface", assumed.other_surface,
-                   "Relative 1 sigma of mu for a surface that the card's log did not have, 0.2 say")
-      ->check(CLI::Range(0.0, 2.0))
-      ->capture_default_str();
-  parser->add_option("--samples", options->request.samples, "Draws of the Monte Carlo")
-      ->check(CLI::Range(100, 1'000'000))
-      ->capture_default_str();
-  parser->add_option("--seed", options->request.seed, "Of the draws")->capture_default_str();
-  parser->add_option("--json", options->json, "Write the answer as JSON");
-  parser->add_option("--report", options->report, "A directory for the tables (Markdown), figures and JSON");
-  add_threads(*parser, options->request.threads);
-  parser->footer(
+      .option("--other-surface", assumed.other_surface,
+              "Relative 1 sigma of mu for a surface that the card's log did not have, 0.2 say")
+      .range(0.0, 2.0)
+      .with_default();
+  parser.option("--samples", options->request.samples, "Draws of the Monte Carlo")
+      .range(100, 1'000'000)
+      .with_default();
+  parser.option("--seed", options->request.seed, "Of the draws").with_default();
+  parser.option("--json", options->json, "Write the answer as JSON");
+  parser.option("--report", options->report, "A directory for the tables (Markdown), figures and JSON");
+  add_threads(parser, options->request.threads);
+  parser.footer(
       "Without --log, the motion is the middle flip of the synthetic campaign batch180 and the gripper opens "
       "as\nthe card's valid range says. Existing files are replaced.\n"
       "Examples:\n  unhand validate-sku jar.toml --card card.json --report out\n"
       "  unhand validate-sku bar.toml --card card.json --log campaign.h5 --tolerance 0.05,45");
-  return {parser, [options] { validate(*options); }};
+  return {&parser, [options] { validate(*options); }};
 }
 
 }  // namespace unhand::apps

@@ -11,7 +11,7 @@
 
 namespace unhand::apps {
 
-Command validate_sku_command(CLI::App& root);
+Command validate_sku_command(Parser& root);
 
 /// What was asked, for the report.
 struct SkuQuestion {

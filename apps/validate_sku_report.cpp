@@ -14,8 +14,6 @@ using fitting::SkuValidation;
 
 namespace {
 
-Json number(double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
-
 Json json_of(const fitting::LandingSpread& s) {
   return {{"landing_x_m", s.x},
           {"landing_theta_deg", s.theta * kDegrees},

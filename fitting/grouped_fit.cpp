@@ -222,7 +222,9 @@ class Solver {
       Eigen::ColPivHouseholderQR<MatrixXd> qr(e.own * unit.asDiagonal());
       qr.setThreshold(1e-10);
       part.own_step = unit.asDiagonal() * VectorXd(qr.solve(-e.residual));
-      part.own_per_shared = unit.asDiagonal() * MatrixXd(qr.solve(-e.shared));
+      part.own_per_shared = MatrixXd::Zero(e.own.cols(), e.shared.cols());
+      if (e.shared.cols() > 0)  // Eigen's solve reads the first column of the right-hand side
+        part.own_per_shared = unit.asDiagonal() * MatrixXd(qr.solve(-e.shared));
       const MatrixXd F = e.shared + e.own * part.own_per_shared;
       const VectorXd r = e.residual + e.own * part.own_step;
       part.information = F.transpose() * F;

@@ -1,0 +1,102 @@
+#include "apps/parser.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+
+namespace unhand::apps {
+namespace {
+
+/// Finite numbers that `accept` lets pass; `accepted` completes "... is not".
+template <class Accept>
+CLI::Validator finite_number(const std::string& accepted, const std::string& in_help, Accept accept) {
+  return CLI::Validator(
+      [=](std::string& text) -> std::string {
+        double value = 0;
+        if (CLI::detail::lexical_cast(text, value) && std::isfinite(value) && accept(value)) return {};
+        return fmt::format("{} is not {}", text, accepted);
+      },
+      in_help);
+}
+
+}  // namespace
+
+Option Option::required() { return option_->required(), *this; }
+Option Option::range(double low, double high) {
+  const auto bounds = fmt::format("{:g} to {:g}", low, high);
+  return option_->check(finite_number("a number from " + bounds, bounds,
+                                      [=](double x) { return low <= x && x <= high; })),
+         *this;
+}
+Option Option::positive() {
+  return option_->check(finite_number("a number > 0", "> 0", [](double x) { return x > 0; })), *this;
+}
+Option Option::not_negative() {
+  return option_->check(finite_number("a number >= 0", ">= 0", [](double x) { return x >= 0; })), *this;
+}
+Option Option::one_of(std::vector<std::string> values) {
+  return option_->check(CLI::IsMember(std::move(values))), *this;
+}
+Option Option::with_commas() { return option_->delimiter(','), *this; }
+Option Option::expected(int least, int most) { return option_->expected(least, most), *this; }
+Option Option::one_value_each() { return option_->allow_extra_args(false), *this; }
+Option Option::with_default() { return option_->capture_default_str(), *this; }
+Option Option::group(const std::string& name) { return option_->group(name), *this; }
+bool Option::given() const { return option_->count() > 0; }
+
+Parser::Parser(const std::string& description, const std::string& name, const std::string& version)
+    : root_(std::make_unique<CLI::App>(description, name)), app_(root_.get()) {
+  root_->set_version_flag("--version", version);
+}
+Parser::Parser(CLI::App* subcommand) : app_(subcommand) {}
+Parser::~Parser() = default;
+
+Parser& Parser::subcommand(const std::string& name, const std::string& description) {
+  subcommands_.push_back(std::unique_ptr<Parser>(new Parser(app_->add_subcommand(name, description))));
+  return *subcommands_.back();
+}
+void Parser::require_subcommand() { app_->require_subcommand(1); }
+void Parser::footer(const std::string& text) { app_->footer(text); }
+
+template <class T>
+Option Parser::option(const std::string& name, T& value, const std::string& help) {
+  return Option(app_->add_option(name, value, help));
+}
+template Option Parser::option(const std::string&, std::string&, const std::string&);
+template Option Parser::option(const std::string&, double&, const std::string&);
+template Option Parser::option(const std::string&, int&, const std::string&);
+template Option Parser::option(const std::string&, unsigned&, const std::string&);
+template Option Parser::option(const std::string&, std::uint64_t&, const std::string&);
+template Option Parser::option(const std::string&, std::optional<int>&, const std::string&);
+template Option Parser::option(const std::string&, std::vector<std::string>&, const std::string&);
+template Option Parser::option(const std::string&, std::vector<double>&, const std::string&);
+
+Option Parser::flag(const std::string& name, bool& value, const std::string& help) {
+  return Option(app_->add_flag(name, value, help));
+}
+
+Option Parser::choice(const std::string& name, const std::vector<std::string>& names,
+                      std::function<void(std::size_t)> choose, const std::string& help) {
+  const auto chosen = [names, choose](const std::string& text) {
+    choose(static_cast<std::size_t>(std::find(names.begin(), names.end(), text) - names.begin()));
+  };
+  return Option(app_->add_option_function<std::string>(name, chosen, help)->check(CLI::IsMember(names)));
+}
+
+bool Parser::chosen() const { return app_->parsed(); }
+bool Parser::given(const std::string& option) const { return app_->count(option) > 0; }
+
+Parser::Parsed Parser::parse(int argc, char** argv) {
+  try {
+    app_->parse(argc, argv);
+    return Parsed::run;
+  } catch (const CLI::ParseError& error) {
+    return app_->exit(error) == 0 ? Parsed::helped : Parsed::wrong_usage;
+  }
+}
+
+}  // namespace unhand::apps

@@ -1,0 +1,53 @@
+#include "apps/ranking.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace unhand::apps {
+
+Json ranking_json(std::span<const fitting::Ranked> ranking) {
+  Json out = Json::array();
+  for (const auto& r : ranking)
+    out.push_back({{"id", r.id},
+                   {"score_p_value", number(r.p_value)},
+                   {"footprint_correlation_with_best", number(r.correlation_with_best)},
+                   {"chi2_gain", number(r.gain)},
+                   {"visible", r.visible},
+                   {"refitted", r.refitted},
+                   {"delta_bic", r.refitted ? number(r.delta_bic) : Json(nullptr)},
+                   {"held_out_gain", r.refitted ? number(r.held_out_gain) : Json(nullptr)}});
+  return out;
+}
+
+Figure ranking_figure(std::span<const fitting::Ranked> ranking,
+                      std::span<const fitting::AcceptedEffect> accepted) {
+  Figure figure{"ranking", 17, 10, {}, {}};
+  DataBlock block{"first-order gain of chi2 by candidate", {"gain", "position", "accepted"}, {}, {}};
+  std::string tics;
+  int position = 0;
+  double largest = 10;
+  for (const auto& r : ranking) {
+    if (!(r.gain > 1)) continue;
+    const bool taken =
+        std::any_of(accepted.begin(), accepted.end(), [&](const auto& e) { return e.id == r.id; });
+    block.rows.push_back({r.gain, static_cast<double>(position), taken ? 1.0 : 0.0});
+    tics += fmt::format("{}'{}' {}", position ? ", " : "", plain(r.id), position);
+    largest = std::max(largest, r.gain);
+    ++position;
+  }
+  if (position == 0) block.rows.push_back({1, 0, 0}), tics = "'none' 0";
+  figure.height = 2 + 0.55 * std::max(1, position);
+  figure.data.push_back(block);
+  figure.script = fmt::format(
+      "set key off\nset lmargin 32\nset logscale x\nset format x '10^{{%T}}'\nset xrange [1:{:.4g}]\n"
+      "set yrange [{}:-1]\nset ytics ({})\nset xlabel 'chi^2 that the effect would take away, to first "
+      "order'\n"
+      "set style fill solid 0.9\n"
+      "plot DATA index 0 using (sqrt($1)):2:(0):1:($2-0.35):($2+0.35):($3 > 0 ? 0x0072b2 : 0xb0b0b0) "
+      "with boxxyerror linecolor rgb variable\n",
+      2 * largest, std::max(1, position), tics);
+  return figure;
+}
+
+}  // namespace unhand::apps
