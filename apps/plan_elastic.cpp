@@ -19,7 +19,7 @@ namespace el = planners::elastic;
 namespace fs = std::filesystem;
 
 struct Options {
-  std::string arm{"planners/elastic/bsa3.toml"}, json, report;
+  std::string arm{"bsa3"}, json, report;
   int starts{10}, intervals{16}, nodes{9}, checks{161};
   double longest{0}, elevation{45}, target_x{0}, target_z{-0.5}, half_table{0.4}, box{0.5};
   unsigned seed{1};
@@ -246,7 +246,7 @@ Command plan_elastic_command(Parser& plan) {
       "elastic",
       "Optimal throws of an arm with a clutched spring: the fastest, or a table of throws to targets");
   parser.footer("Example: unhand plan elastic --target 2.2 --report out/elastic");
-  parser.option("--arm", o->arm, "Arm with a clutched last joint (TOML)").with_default();
+  parser.option("--arm", o->arm, "bsa3, or a TOML file: an arm with a clutched last joint").with_default();
   parser
       .option("--target", o->target_x,
               "Distance of the target box [m]; none: the fastest throw of each drive")

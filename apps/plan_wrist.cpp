@@ -17,7 +17,7 @@ namespace el = planners::elastic;
 namespace fs = std::filesystem;
 
 struct Options {
-  std::string arm{"planners/elastic/vsa_wrist.toml"}, json, report;
+  std::string arm{"vsa_wrist"}, json, report;
   double softest{0.5}, stiffest{64}, longest{1.0}, elevation{45};
   int stiffnesses{8}, starts{4}, intervals{8};
   unsigned seed{1};
@@ -139,7 +139,8 @@ Command plan_wrist_command(Parser& plan) {
   Parser& parser =
       plan.subcommand("wrist", "What an elastic wrist adds to the speed of a throw, against its stiffness");
   parser.footer("Example: unhand plan wrist --report out/wrist");
-  parser.option("--arm", o->arm, "Arm with an elastic last joint (TOML)").with_default();
+  parser.option("--arm", o->arm, "vsa_wrist, or a TOML file: an arm with an elastic last joint")
+      .with_default();
   parser.option("--softest", o->softest, "[N m/rad]").positive().with_default();
   parser.option("--stiffest", o->stiffest, "[N m/rad]").positive().with_default();
   parser.option("--stiffnesses", o->stiffnesses, "How many").range(2, 1000).with_default();

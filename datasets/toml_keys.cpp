@@ -35,11 +35,15 @@ TomlKeys TomlKeys::parse(const fs::path& file) {
   if (!fs::is_regular_file(file, error)) throw TomlError(file.string(), 0, 0, "file", "no such file");
   std::ifstream in(file, std::ios::binary);
   if (!in) throw TomlError(file.string(), 0, 0, "file", "cannot be opened");
+  return parse_text(std::string(std::istreambuf_iterator<char>(in), {}), file.string());
+}
+
+TomlKeys TomlKeys::parse_text(std::string_view text, const std::string& name) {
   try {
-    auto root = std::make_shared<const toml::table>(toml::parse(in, file.string()));
-    return {file.string(), root, *root};
+    auto root = std::make_shared<const toml::table>(toml::parse(text, name));
+    return {name, root, *root};
   } catch (const toml::parse_error& bad) {
-    throw error_at(file.string(), bad.source().begin, "syntax", std::string(bad.description()));
+    throw error_at(name, bad.source().begin, "syntax", std::string(bad.description()));
   }
 }
 

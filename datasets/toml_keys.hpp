@@ -30,6 +30,8 @@ class TomlKeys {
  public:
   /// The table of a whole file.
   static TomlKeys parse(const std::filesystem::path& file);
+  /// The same of text that comes with the library; `name` stands for the file in errors.
+  static TomlKeys parse_text(std::string_view text, const std::string& name);
 
   [[noreturn]] void fail(std::string_view key, const std::string& why) const;
 

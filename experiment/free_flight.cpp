@@ -75,16 +75,23 @@ bool fit_translation(const FlightSamples& s, const Vec3<double>& gravity, double
       Vec3<double> p, v;
     };
     const int axes = static_cast<int>(s.axes.size());
-    const auto evaluate = [&](const Start& x, VectorXd& r, MatrixXd& J) {
+    Start x{fit.position, fit.velocity};
+    const auto moved = [&](const VectorXd& d) {
+      Start out = x;
+      for (int j = 0; j < axes; ++j) out.p[s.axes[j]] += d[j], out.v[s.axes[j]] += d[axes + j];
+      return out;
+    };
+    const auto evaluate = [&](const VectorXd& d, VectorXd& r, MatrixXd& J) {
+      const Start at = moved(d);
       flight::PointFlight<Dual> flight;
       for (int a = 0; a < 3; ++a)
-        flight.position[a] = Dual(x.p[a]), flight.velocity[a] = Dual(x.v[a]),
+        flight.position[a] = Dual(at.p[a]), flight.velocity[a] = Dual(at.v[a]),
         flight.gravity[a] = Dual(gravity[a]);
       flight.drag_k = Dual(drag_k);
       for (int j = 0; j < axes; ++j) {
         const int a = s.axes[j];
-        flight.position[a] = dynamics::independent(x.p[a], j);
-        flight.velocity[a] = dynamics::independent(x.v[a], axes + j);
+        flight.position[a] = dynamics::independent(at.p[a], j);
+        flight.velocity[a] = dynamics::independent(at.v[a], axes + j);
       }
       const auto predicted = flight::positions(flight, fitted, kFine);
       r.resize(static_cast<long>(n) * axes);
@@ -97,13 +104,10 @@ bool fit_translation(const FlightSamples& s, const Vec3<double>& gravity, double
           J.row(row) = predicted[i][a].v.head(2 * axes).transpose() / s.sigma[a];
         }
     };
-    const auto move = [&](Start x, const VectorXd& d) {
-      for (int j = 0; j < axes; ++j) x.p[s.axes[j]] += d[j], x.v[s.axes[j]] += d[axes + j];
-      return x;
-    };
-    Start x{fit.position, fit.velocity};
     MatrixXd covariance;
-    if (!gauss_newton(x, evaluate, move, *std::min_element(s.sigma.begin(), s.sigma.end()), covariance))
+    if (!gauss_newton(
+            evaluate, [&](const VectorXd& d) { x = moved(d); }, 2 * axes,
+            *std::min_element(s.sigma.begin(), s.sigma.end()), covariance))
       return false;
     fit.position = x.p;
     fit.velocity = x.v;
@@ -123,7 +127,14 @@ bool fit_rotation(const FlightSamples& s, const Vec3<double>& inertia, std::size
   RotationState<double> x{s.attitude[0], flight::rotation_between(s.attitude[0], s.attitude[1])};
   for (double& w : x.omega) w /= s.elapsed[1];
   std::vector<double> window;
-  const auto evaluate = [&](const RotationState<double>& state, VectorXd& r, MatrixXd& J) {
+  const auto moved = [&x](const VectorXd& d) {
+    RotationState<double> out = x;
+    out.attitude = flight::normalised(out.attitude * flight::exp(Vec3<double>{d[0], d[1], d[2]}));
+    for (int a = 0; a < 3; ++a) out.omega[a] += d[3 + a];
+    return out;
+  };
+  const auto evaluate = [&](const VectorXd& d, VectorXd& r, MatrixXd& J) {
+    const RotationState<double> state = moved(d);
     const Quaternion<double>& q = state.attitude;
     const Vec3<Dual> turn{dynamics::independent(0, 0), dynamics::independent(0, 1),
                           dynamics::independent(0, 2)};
@@ -145,15 +156,12 @@ bool fit_rotation(const FlightSamples& s, const Vec3<double>& inertia, std::size
       }
     }
   };
-  const auto move = [](RotationState<double> state, const VectorXd& d) {
-    state.attitude = flight::normalised(state.attitude * flight::exp(Vec3<double>{d[0], d[1], d[2]}));
-    for (int a = 0; a < 3; ++a) state.omega[a] += d[3 + a];
-    return state;
-  };
   MatrixXd covariance;
   for (std::size_t size = std::min<std::size_t>(3, n);; size = std::min(4 * size, n)) {
     window.assign(s.elapsed.begin(), s.elapsed.begin() + static_cast<long>(size));
-    if (!gauss_newton(x, evaluate, move, s.sigma_angle, covariance)) return false;
+    if (!gauss_newton(
+            evaluate, [&](const VectorXd& d) { x = moved(d); }, 6, s.sigma_angle, covariance))
+      return false;
     if (size == n) break;
   }
   fit.rotation = x;

@@ -61,10 +61,7 @@ Joint joint_of(TomlKeys& keys) {
   return joint;
 }
 
-}  // namespace
-
-Chain read_toml_chain(const std::filesystem::path& file) {
-  TomlKeys keys = TomlKeys::parse(file);
+Chain chain_of(TomlKeys keys) {
   Chain out;
   out.name = keys.required("name", keys.text("name"));
   keys.text("source");
@@ -81,6 +78,13 @@ Chain read_toml_chain(const std::filesystem::path& file) {
     keys.fail("joint", error.what());
   }
   return out;
+}
+
+}  // namespace
+
+Chain read_toml_chain(const std::filesystem::path& file) { return chain_of(TomlKeys::parse(file)); }
+Chain toml_chain(std::string_view text, const std::string& name) {
+  return chain_of(TomlKeys::parse_text(text, name));
 }
 
 Chain read_chain(const std::string& name_or_file) {

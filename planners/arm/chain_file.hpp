@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "planners/arm/chain.hpp"
 
@@ -30,6 +31,8 @@ namespace unhand::planners {
 ///
 /// Keys `source` and `notes` are free text. Throws datasets::TomlError.
 Chain read_toml_chain(const std::filesystem::path& file);
+/// The same from text; `name` stands for the file in errors.
+Chain toml_chain(std::string_view text, const std::string& name);
 
 /// The chain from link `base` to link `tip` of a URDF file; empty names: the only root, the only leaf. Joints
 /// may be revolute or continuous, about any axis (frames are turned so that it is z), and fixed: a link fixed

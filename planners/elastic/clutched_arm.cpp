@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <filesystem>
 #include <stdexcept>
 
 #include "datasets/toml_keys.hpp"
 #include "planners/arm/chain_file.hpp"
+#include "planners/elastic/built_in_arms.hpp"
 
 namespace unhand::planners::elastic {
 
@@ -100,14 +102,20 @@ void validate(const ClutchedArm& arm) {
     throw std::invalid_argument(fmt::format("clutched arm: damping = {}; accepted: >= 0", j.damping));
 }
 
-ClutchedArm read_clutched_arm(const std::filesystem::path& file) {
+ClutchedArm read_clutched_arm(const std::string& name_or_file) {
   using datasets::TomlKeys;
-  TomlKeys keys = TomlKeys::parse(file);
+  const BuiltInArm* built_in = nullptr;
+  for (const BuiltInArm& one : built_in_arms())
+    if (one.name == name_or_file) built_in = &one;
+  TomlKeys keys =
+      built_in ? TomlKeys::parse_text(built_in->arm, name_or_file) : TomlKeys::parse(name_or_file);
   const auto positive = [](const char* unit) { return datasets::TomlLimits{0, 1e6, true, unit}; };
   keys.text("source");
   keys.text("notes");
   ClutchedArm arm;
-  arm.chain = read_toml_chain(file.parent_path() / keys.required("chain", keys.text("chain")));
+  const std::string chain = keys.required("chain", keys.text("chain"));
+  arm.chain = built_in ? toml_chain(built_in->chain, chain)
+                       : read_toml_chain(std::filesystem::path(name_or_file).parent_path() / chain);
   double rotors[2]{};
   keys.numbers("rotor_inertia_kg_m2", {0, 1e6, false, "kg m^2"}, rotors);
   arm.rotor_inertia = {rotors[0], rotors[1], 0};

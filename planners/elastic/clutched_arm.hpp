@@ -64,8 +64,9 @@ struct ClutchedArm {
 void validate(const ClutchedArm& arm);
 
 /// From TOML: `chain` (a chain file beside it), `rotor_inertia_kg_m2` (two numbers), the table [last] with
-/// the fields of ClutchedJoint. Throws datasets::TomlError.
-ClutchedArm read_clutched_arm(const std::filesystem::path& file);
+/// the fields of ClutchedJoint. "bsa3" and "vsa_wrist" are arms that come with the library. Throws
+/// datasets::TomlError.
+ClutchedArm read_clutched_arm(const std::string& name_or_file);
 
 /// The generalized inertia Π(ξ) [kg m²].
 template <class S>

@@ -6,9 +6,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 #include <random>
 
+#include "datasets/log_error.hpp"
 #include "planners/elastic/replay.hpp"
 #include "planners/elastic/second_dual.hpp"
 
@@ -18,7 +18,7 @@ namespace {
 constexpr ClutchMode kModes[]{ClutchMode::free, ClutchMode::hold, ClutchMode::sea, ClutchMode::brk,
                               ClutchMode::rigid};
 
-ClutchedArm bsa3() { return read_clutched_arm(std::filesystem::path(UNHAND_ELASTIC_ARMS) / "bsa3.toml"); }
+ClutchedArm bsa3() { return read_clutched_arm("bsa3"); }
 
 struct RandomState {
   Coordinates<double> at, rate;
@@ -30,6 +30,17 @@ RandomState state_of(std::mt19937_64& random) {
   for (int i = 0; i < kCoordinates; ++i) s.at[i] = one(random), s.rate[i] = 5 * one(random);
   for (int i = 0; i < 3; ++i) s.torque[i] = 10 * one(random);
   return s;
+}
+
+TEST(ClutchedArm, AnArmOfTheLibraryIsItsFile) {
+  const auto read = read_clutched_arm(std::string(UNHAND_ELASTIC_ARMS) + "/vsa_wrist.toml");
+  const auto named = read_clutched_arm("vsa_wrist");
+  EXPECT_EQ(read.last.stiffness, named.last.stiffness);
+  EXPECT_EQ(read.last.deflection, named.last.deflection);
+  ASSERT_EQ(read.chain.size(), named.chain.size());
+  for (int i = 0; i < read.chain.size(); ++i)
+    EXPECT_EQ(read.chain.joints[i].link.mass, named.chain.joints[i].link.mass);
+  EXPECT_THROW(read_clutched_arm("bsa4"), datasets::TomlError);
 }
 
 TEST(ClutchedArm, ClosingClutchesLosesTheEnergyOfTheLostVelocities) {

@@ -6,14 +6,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 
 #include "planners/elastic/throw_table.hpp"
 
 namespace unhand::planners::elastic {
 namespace {
 
-ClutchedArm bsa3() { return read_clutched_arm(std::filesystem::path(UNHAND_ELASTIC_ARMS) / "bsa3.toml"); }
+ClutchedArm bsa3() { return read_clutched_arm("bsa3"); }
 
 struct Rosenbrock {
   template <class S>
@@ -94,7 +93,7 @@ TEST(ElasticThrow, ASpringInTheWristIsFasterThanNone) {
     task.drive = drive;
     ThrowProgramOptions options;
     options.intervals = 6;
-    const ClutchedArm arm = read_clutched_arm(std::filesystem::path(UNHAND_ELASTIC_ARMS) / "vsa_wrist.toml");
+    const ClutchedArm arm = read_clutched_arm("vsa_wrist");
     const ElasticThrow plan = plan_throw(arm, task, options);
     EXPECT_TRUE(plan.solved());
     const Replay run = replay(arm, plan);

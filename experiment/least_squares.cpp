@@ -1,0 +1,69 @@
+#include "experiment/least_squares.hpp"
+
+#include <Eigen/Dense>
+#include <cmath>
+
+namespace unhand::experiment {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+FittedLine fit_line(std::span<const double> t, std::span<const double> y, double sigma) {
+  const auto n = static_cast<double>(t.size());
+  double t_mean = 0, y_mean = 0, tt = 0, ty = 0;
+  for (std::size_t i = 0; i < t.size(); ++i) t_mean += t[i] / n, y_mean += y[i] / n;
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    tt += (t[i] - t_mean) * (t[i] - t_mean);
+    ty += (t[i] - t_mean) * (y[i] - y_mean);
+  }
+  FittedLine line;
+  line.v = ty / tt;
+  line.p = y_mean - line.v * t_mean;
+  line.covariance << 1 / n + t_mean * t_mean / tt, -t_mean / tt, -t_mean / tt, 1 / tt;
+  line.covariance *= sigma * sigma;
+  return line;
+}
+
+bool gauss_newton(const std::function<void(const VectorXd&, VectorXd&, MatrixXd&)>& evaluate,
+                  const std::function<void(const VectorXd&)>& accept, int unknowns, double sigma,
+                  MatrixXd& covariance) {
+  constexpr int kSteps = 40, kHalvings = 12;
+  constexpr double kSolved = 1e-9;  // [m] or [rad]: what the integrator leaves of a state
+  VectorXd r, moved_r;
+  MatrixXd J, moved_J;
+  evaluate(VectorXd::Zero(unknowns), r, J);
+  for (int step = 0; step < kSteps; ++step) {
+    const Eigen::ColPivHouseholderQR<MatrixXd> qr(J);
+    if (qr.rank() < J.cols()) return false;
+    const VectorXd d = qr.solve(-r);
+    const double cost = r.squaredNorm(), predicted = (J * d).squaredNorm();
+    if (!std::isfinite(predicted)) return false;
+    const double floor = static_cast<double>(r.size()) * (kSolved / sigma) * (kSolved / sigma);
+    if (predicted <= 1e-12 * cost + 1e-2 * floor) {  // a millionth of the scatter
+      accept(d);
+    } else {
+      double k = 1;
+      int halving = 0;
+      for (; halving < kHalvings; ++halving, k *= 0.5) {
+        evaluate(k * d, moved_r, moved_J);
+        if (moved_r.squaredNorm() < cost) break;
+      }
+      if (halving < kHalvings) {
+        accept(k * d);
+        r = moved_r;
+        J = moved_J;
+        continue;
+      }
+      if (predicted > 1e-8 * cost + 1e2 * floor) return false;  // not a minimum that rounding hides
+    }
+    const MatrixXd root = qr.colsPermutation() * MatrixXd(qr.matrixR()
+                                                              .topLeftCorner(J.cols(), J.cols())
+                                                              .triangularView<Eigen::Upper>()
+                                                              .solve(MatrixXd::Identity(J.cols(), J.cols())));
+    covariance = root * root.transpose();  // J P = Q R
+    return true;
+  }
+  return false;
+}
+
+}  // namespace unhand::experiment
