@@ -118,7 +118,9 @@ inline double error_of(const Truth& truth, double position, double angle) {
 }
 
 std::vector<Work> run_unhand();
+// Each empty where the engine is not installed.
 std::vector<Work> run_bullet();
 std::vector<Work> run_mujoco();
+std::vector<Work> run_siconos();
 
 }  // namespace unhand::bench

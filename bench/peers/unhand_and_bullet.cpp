@@ -40,7 +40,7 @@ struct Scene {
 
 std::vector<Work> run_unhand() {
   std::vector<Work> out;
-  for (const double tolerance : {1e-3, 1e-6, 1e-9}) {
+  for (const double tolerance : {1e-3, 1e-6, 1e-9, 1e-12}) {
     const std::string setting = fmt::format("rtol {:g}", tolerance);
     for (const Truth& truth : truths()) {
       const Scene scene(truth);

@@ -2,7 +2,7 @@
 // of ten.
 #include <functional>
 
-#include "tests/dynamics/toy_systems.hpp"
+#include "tests/dynamics/every_method.hpp"
 
 namespace unhand::dynamics {
 namespace {

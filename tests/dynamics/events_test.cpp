@@ -1,7 +1,7 @@
 // Events: where they are, that they fire once, and that everything awkward ends in a typed outcome.
 #include <random>
 
-#include "tests/dynamics/toy_systems.hpp"
+#include "tests/dynamics/every_method.hpp"
 
 namespace unhand::dynamics {
 namespace {
@@ -49,16 +49,8 @@ TEST_P(Events, OnlyTheDeclaredDirectionFires) {
 
 TEST_P(Events, PendulumPeriodIsTheEllipticIntegralAndEnergyIsKept) {
   constexpr double kStart = 2.5;  // [rad], far from small
-  const Toy pendulum(
-      {{FlowKind::smooth, {{"down", Crossing::falling}}}},
-      [](int, const auto&, const auto& y, auto& dy) {
-        using std::sin;
-        dy[0] = y[1];
-        dy[1] = -sin(y[0]);
-      },
-      [](int, const auto&, const auto& y, auto* g) { g[0] = y[0]; }, enter(0));
   const double period = 4 * std::comp_ellint_1(std::sin(kStart / 2));
-  const auto end = run(pendulum, {kStart, 0.0}, 5 * period, options());
+  const auto end = run(pendulum(), {kStart, 0.0}, 5 * period, options());
   ASSERT_EQ(end.outcome, Outcome::horizon);
   ASSERT_EQ(end.events.size(), 5u);
   // Each step may err by 1e-12 of the state; the phase collects that over some 10,000 steps.

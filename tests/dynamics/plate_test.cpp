@@ -1,40 +1,9 @@
 // A block with dry friction on a plate shaken sinusoidally: where it never sticks, where it always does, and
 // that a stuck block does not creep.
-#include "tests/dynamics/toy_systems.hpp"
+#include "tests/dynamics/every_method.hpp"
 
 namespace unhand::dynamics {
 namespace {
-
-/// Relative to a plate of acceleration sin t, in units of its amplitude: u'' = −sin t − s ρ with ρ = μ g/A
-/// and s the direction of slip. Modes: slip forward (0), slip back (1), stick (2). y = (u, u').
-auto plate(Dual rho) {
-  return Toy(
-      {{FlowKind::smooth, {{"stops", Crossing::falling}}},
-       {FlowKind::smooth, {{"stops", Crossing::rising}}},
-       {FlowKind::frozen, {{"forward", Crossing::falling}, {"back", Crossing::rising}}}},
-      [rho](int mode, const auto& t, const auto& y, auto& dy) {
-        using S = std::decay_t<decltype(t)>;
-        using std::sin;
-        dy[0] = y[1];
-        dy[1] = -sin(t) + (mode == 0 ? -1.0 : 1.0) * as<S>(rho);
-      },
-      [rho](int mode, const auto& t, const auto& y, auto* g) {
-        using S = std::decay_t<decltype(t)>;
-        using std::sin;
-        if (mode != 2) {
-          g[0] = y[1];
-        } else {
-          g[0] = sin(t) + as<S>(rho);  // forward slip where −sin t > ρ
-          g[1] = sin(t) - as<S>(rho);
-        }
-      },
-      [rho](int mode, int guard, const auto& t, const auto& y) {
-        using S = std::decay_t<decltype(t)>;
-        if (mode == 2) return Entry<S, 2>{guard, t, {y[0], S(0)}, S(0)};
-        const double demand = -std::sin(value_of(t)), grip = rho.a;
-        return Entry<S, 2>{demand > grip ? 0 : demand < -grip ? 1 : 2, t, {y[0], S(0)}, S(0)};
-      });
-}
 
 class Plate : public EveryMethod {
  protected:
@@ -47,9 +16,7 @@ class Plate : public EveryMethod {
     o.longest_step = 0.05;  // the shaking has a period of 2π
     const auto end = shake(rho, 400.0, o);
     EXPECT_EQ(end.outcome, Outcome::horizon) << rho;
-    int late = 0;
-    for (const auto& event : end.events) late += event.t > 300 && event.mode_after == 2;
-    return late > 0;
+    return sticks_late(end);
   }
 };
 UNHAND_EVERY_METHOD(Plate);

@@ -4,7 +4,7 @@
 #include "dynamics/rosenbrock.hpp"
 #include "dynamics/switching_stepper.hpp"
 #include "dynamics/tangent_stepper.hpp"
-#include "tests/dynamics/toy_systems.hpp"
+#include "tests/dynamics/every_method.hpp"
 
 namespace unhand::dynamics {
 namespace {

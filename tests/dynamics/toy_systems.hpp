@@ -1,8 +1,6 @@
 // Small hybrid systems written in place: a flow, the guards and what they do, as generic lambdas.
 #pragma once
 
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <string>
 #include <utility>
@@ -114,43 +112,56 @@ inline auto bouncing_ball(Dual gravity, Dual restitution, bool rests = true) {
   return ball;
 }
 
-inline std::string name_of(Method method) {
-  switch (method) {
-    case Method::automatic:
-      return "automatic";
-    case Method::dormand_prince:
-      return "dormand_prince";
-    case Method::rosenbrock:
-      return "rosenbrock";
-    case Method::radau:
-      return "radau";
-    case Method::cvode:
-      return "cvode";
-  }
-  return "unknown";
+/// A pendulum in units of √(length/gravity): passes its lowest point falling (0).
+inline auto pendulum() {
+  return Toy(
+      std::vector<ToyMode>{{FlowKind::smooth, {{"down", Crossing::falling}}}},
+      [](int, const auto&, const auto& y, auto& dy) {
+        using std::sin;
+        dy[0] = y[1];
+        dy[1] = -sin(y[0]);
+      },
+      [](int, const auto&, const auto& y, auto* g) { g[0] = y[0]; }, enter(0));
 }
 
-/// Tests of this kind run once with every method.
-class EveryMethod : public testing::TestWithParam<Method> {
- protected:
-  /// CVODE's events are found on its interpolant, which is as good as its tolerance: that sets these.
-  static IntegratorOptions options() {
-    IntegratorOptions options;
-    options.method = GetParam();
-    options.tolerances = {1e-12, 1e-13};
-    return options;
-  }
-};
+/// A block with dry friction on a shaken plate, relative to a plate of acceleration sin t, in units of its
+/// amplitude: u'' = −sin t − s ρ with ρ = μ g/A and s the direction of slip. Modes: slip forward (0), slip
+/// back (1), stick (2). y = (u, u').
+inline auto plate(Dual rho) {
+  return Toy(
+      std::vector<ToyMode>{{FlowKind::smooth, {{"stops", Crossing::falling}}},
+                           {FlowKind::smooth, {{"stops", Crossing::rising}}},
+                           {FlowKind::frozen, {{"forward", Crossing::falling}, {"back", Crossing::rising}}}},
+      [rho](int mode, const auto& t, const auto& y, auto& dy) {
+        using S = std::decay_t<decltype(t)>;
+        using std::sin;
+        dy[0] = y[1];
+        dy[1] = -sin(t) + (mode == 0 ? -1.0 : 1.0) * as<S>(rho);
+      },
+      [rho](int mode, const auto& t, const auto& y, auto* g) {
+        using S = std::decay_t<decltype(t)>;
+        using std::sin;
+        if (mode != 2) {
+          g[0] = y[1];
+        } else {
+          g[0] = sin(t) + as<S>(rho);  // forward slip where −sin t > ρ
+          g[1] = sin(t) - as<S>(rho);
+        }
+      },
+      [rho](int mode, int guard, const auto& t, const auto& y) {
+        using S = std::decay_t<decltype(t)>;
+        if (mode == 2) return Entry<S, 2>{guard, t, {y[0], S(0)}, S(0)};
+        const double demand = -std::sin(value_of(t)), grip = rho.a;
+        return Entry<S, 2>{demand > grip ? 0 : demand < -grip ? 1 : 2, t, {y[0], S(0)}, S(0)};
+      });
+}
 
-#define UNHAND_METHODS(Suite, ...)                                \
-  INSTANTIATE_TEST_SUITE_P(, Suite, testing::Values(__VA_ARGS__), \
-                           [](const auto& test) { return name_of(test.param); })
-#define UNHAND_EVERY_METHOD(Suite)                                                                    \
-  UNHAND_METHODS(Suite, Method::automatic, Method::dormand_prince, Method::rosenbrock, Method::radau, \
-                 Method::cvode)
-/// CVODE's stepper carries values only.
-#define UNHAND_EVERY_METHOD_WITH_DERIVATIVES(Suite) \
-  UNHAND_METHODS(Suite, Method::automatic, Method::dormand_prince, Method::rosenbrock, Method::radau)
+/// Whether the block on the plate still sticks once the start is forgotten: after t = 300.
+inline bool sticks_late(const Solution<double, 2>& plate) {
+  for (const auto& event : plate.events)
+    if (event.t > 300 && event.mode_after == 2) return true;
+  return false;
+}
 
 template <class System>
 Solution<double, 2> run(const System& system, const State<double, 2>& y, double t_end,

@@ -1,5 +1,5 @@
 // Accumulating events: the limit is found where there is one, and nothing falls through the floor before it.
-#include "tests/dynamics/toy_systems.hpp"
+#include "tests/dynamics/every_method.hpp"
 
 namespace unhand::dynamics {
 namespace {

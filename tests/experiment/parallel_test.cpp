@@ -1,0 +1,40 @@
+// The loop over independent items: each once, whatever the number of threads, and an exception comes out.
+#include "experiment/parallel.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <stdexcept>
+
+namespace unhand::experiment {
+namespace {
+
+TEST(ParallelFor, EveryItemOnceForAnyNumberOfThreads) {
+  for (const std::size_t n : {0u, 1u, 2u, 1000u})
+    for (const int threads : {0, 1, 2, 7, 64}) {
+      std::vector<int> times(
+          n);  // each item writes its own: no lock, and the thread sanitizer has nothing to say
+      parallel_for(n, threads, [&](std::size_t i) { ++times[i]; });
+      EXPECT_EQ(std::accumulate(times.begin(), times.end(), 0), static_cast<int>(n)) << threads;
+      for (const int count : times) EXPECT_EQ(count, 1);
+    }
+}
+
+TEST(ParallelFor, TheFirstExceptionComesOutAfterAllThreadsHaveStopped) {
+  for (const int threads : {1, 2, 8}) {
+    std::atomic<int> running{0};
+    const auto work = [&](std::size_t i) {
+      ++running;
+      if (i % 10 == 3) {
+        --running;
+        throw std::runtime_error("item");
+      }
+      --running;
+    };
+    EXPECT_THROW(parallel_for(1000, threads, work), std::runtime_error) << threads;
+    EXPECT_EQ(running, 0);
+  }
+}
+
+}  // namespace
+}  // namespace unhand::experiment
