@@ -39,9 +39,19 @@ void add_missing(Json& into, const Json& extra, bool may_add) {
   }
 }
 
+constexpr int kDeepest = 64;  ///< of objects and arrays within each other; a card has five
+
 Json parse_json(const std::string& text, const std::string& file) {
+  const auto shallow = [&](int depth, Json::parse_event_t, const Json&) {
+    if (depth > kDeepest)
+      throw CardError(file, "/", fmt::format("objects and arrays are nested deeper than {}", kDeepest));
+    return true;
+  };
   try {
-    return Json::parse(text);
+    return Json::parse(text, shallow);
+  } catch (const Json::out_of_range& bad) {  // a number that no double holds
+    const std::string why = bad.what();
+    throw CardError(file, "/", why.substr(std::min(why.find("number"), why.size())));
   } catch (const Json::parse_error& bad) {
     const std::size_t at = bad.byte > 0 ? std::min(bad.byte - 1, text.size()) : 0;
     const std::string_view before = std::string_view(text).substr(0, at);

@@ -1,6 +1,7 @@
 // Files cut short or with flipped bits: a LogError or the right answer, never a crash.
 #include <random>
 
+#include "datasets/hdf5_global_heap.hpp"
 #include "hdf5_tools.hpp"
 #include "log_samples.hpp"
 
@@ -56,6 +57,36 @@ TEST(Damage, AFlippedBitInTheDataIsALogError) {
     put_bytes(bad, flipped);
     expect_error([&] { read_throw_log(bad); }, bad, "/throws/002/ft/wrench", "damaged data or checksum");
   }
+}
+
+// Text of variable length lies in a heap whose objects say themselves where the next one begins.
+TEST(Damage, AHeapThatDoesNotAddUpIsFound) {
+  for (const std::size_t length_size : {4u, 8u}) {
+    const auto sound = [&](std::initializer_list<std::pair<int, int>> objects, std::uint64_t size) {
+      std::vector<std::uint8_t> heap(size, 0);
+      std::size_t at = 16;
+      for (const auto& [index, length] : objects) {
+        heap[at] = static_cast<std::uint8_t>(index);
+        heap[at + 8] = static_cast<std::uint8_t>(length);
+        at += static_cast<std::size_t>(index == 0 ? length : 16 + (length + 7) / 8 * 8);
+      }
+      return hdf5::heap_objects_are_sound(
+          size, length_size, [&](std::uint64_t from, std::span<std::uint8_t> out) {
+            std::copy_n(heap.begin() + static_cast<long>(from), out.size(), out.begin());
+            return true;
+          });
+    };
+    EXPECT_TRUE(sound({{1, 5}, {2, 8}, {0, 48}}, 16 + 24 + 24 + 48));
+    EXPECT_TRUE(sound({{1, 5}}, 16 + 24 + 8));  // too little left for an object
+    EXPECT_FALSE(sound({{1, 5}, {0, 0}}, 16 + 24 + 48));
+    EXPECT_FALSE(sound({{1, 60}}, 16 + 24));
+    EXPECT_FALSE(sound({{1, 5}, {0, 49}}, 16 + 24 + 48));
+  }
+  std::vector<std::uint8_t> first{'G', 'C', 'O', 'L', 1, 0, 0, 0, 0, 16, 0, 0, 0, 0, 0, 0};
+  EXPECT_EQ(hdf5::heap_collection_size(first, 8), 4096u);
+  EXPECT_EQ(hdf5::heap_collection_size(first, 4), 4096u);
+  first[0] = 'g';
+  EXPECT_EQ(hdf5::heap_collection_size(first, 8), 0u);
 }
 
 }  // namespace

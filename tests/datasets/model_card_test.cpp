@@ -102,6 +102,26 @@ TEST(ModelCard, KeepsKeysItDoesNotKnow) {
   EXPECT_EQ(nlohmann::json::parse(to_json(card)), json);
 }
 
+/// The small card with one more key, whose value is this text.
+std::string card_with(const std::string& value) {
+  std::string text = to_json(small_card());
+  return text.insert(text.rfind('}'), ", \"notes\": " + value);
+}
+
+TEST(ModelCard, RefusesANumberThatNoDoubleHolds) {
+  EXPECT_THAT(refusal(card_with("88e881")), HasSubstr("c.json: /: number overflow parsing '88e881'"));
+}
+
+TEST(ModelCard, RefusesNestingWithoutEnd) {
+  // copies of nested values recurse, which would end with the stack
+  const auto nested = [](std::size_t depth) {
+    return card_with(std::string(depth, '[') + std::string(depth, ']'));
+  };
+  EXPECT_EQ(refusal(nested(20)), "accepted");
+  for (const std::size_t depth : {100u, 1000000u})
+    EXPECT_THAT(refusal(nested(depth)), HasSubstr("c.json: /: objects and arrays are nested deeper than 64"));
+}
+
 TEST(ModelCard, NamesThePlaceOfAMistake) {
   using Json = nlohmann::json;
   EXPECT_THAT(refusal_after([](Json& j) { j["schema"] = "throw-log"; }),
