@@ -9,7 +9,8 @@ Command plan_command(Parser& root) {
   Parser& parser = root.subcommand("plan", "Plan a throw");
   parser.require_subcommand();
   const std::vector<Command> planners{plan_throw_command(parser), plan_control_command(parser),
-                                      plan_elastic_command(parser), plan_wrist_command(parser)};
+                                      plan_elastic_command(parser), plan_wrist_command(parser),
+                                      plan_flip_command(parser)};
   return {&parser, [planners] {
             for (const Command& planner : planners)
               if (planner.parser->chosen()) planner.run();

@@ -8,6 +8,7 @@ namespace unhand::apps {
 Command plan_control_command(Parser& plan);
 Command plan_wrist_command(Parser& plan);
 Command plan_elastic_command(Parser& plan);
+Command plan_flip_command(Parser& plan);
 Command plan_throw_command(Parser& plan);
 
 }  // namespace unhand::apps

@@ -673,6 +673,42 @@ TEST_F(Cli, PlansAThrowWithACard) {
   EXPECT_TRUE(plan["release"]["contact_model"]["miss_m"].is_number());
 }
 
+TEST_F(Cli, LearnsToThrowFlipAndGoesOnAfterAKill) {
+  const std::string robot = UNHAND_FLIP_ROBOT;
+  const std::string what =
+      "plan flip --target 1.2,180 --robot " + robot + " --seed 3 --iterations 2 --repeats 1 --report out ";
+  const Answer answer = run(what + "--learner m2 --json flip.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("m2: target 1.20 m, 180 degrees"));
+  const auto flip = nlohmann::json::parse(content(folder / "flip.json"));
+  EXPECT_EQ(flip["schema"], "plan-flip");
+  EXPECT_EQ(flip["iterations"].size(), 2u);
+  EXPECT_EQ(flip["iterations"][0]["trials"].size(), 3u);
+  EXPECT_EQ(flip["population"].size(), 27u);
+  for (const char* file : {"path.png", "progress.png", "population.pdf", "path.md", "session.json"})
+    EXPECT_TRUE(fs::exists(folder / "out" / file)) << file;
+
+  // As a kill leaves it: some throws are there, the report is not. The rest comes out as before.
+  const auto trials = folder / "out/trials";
+  const auto count = [&] { return std::distance(fs::directory_iterator(trials), fs::directory_iterator()); };
+  EXPECT_EQ(count(), 27 + 12 + 6);
+  fs::remove(folder / "flip.json");
+  for (const char* gone : {"path-0001.json", "path-0005.json", "support-0011.json", "population-0020.json"})
+    ASSERT_TRUE(fs::remove(trials / gone)) << gone;
+  const Answer again = run(what + "--learner m2 --json flip.json");
+  ASSERT_EQ(again.code, 0) << again.err;
+  EXPECT_THAT(again.out, HasSubstr("41 throws recalled, 4 thrown now"));
+  EXPECT_EQ(nlohmann::json::parse(content(folder / "flip.json")), flip);
+
+  expect_refusal(what + "--learner m1", 3, "session.json: /settings/learner: another session lies there");
+  std::ofstream(trials / "path-0002.json") << "{\"command\": {";
+  expect_refusal(what + "--learner m2", 3, "path-0002.json");
+  const std::string other = "plan flip --robot " + robot + " --learner ";
+  expect_refusal(other + "m3 --target 1.2,180", 2, "--com-offset is missing");
+  expect_refusal(other + "m2 --target 1.2", 2, "--target: '1.2' is not X,DEGREES");
+  expect_refusal("plan flip --target 1.2,180 --robot none.toml", 3, "none.toml");
+}
+
 TEST_F(Cli, ValidateSkuAnswersWithABudget) {
   std::ofstream(folder / "bar.toml") << "name = 'bar-com100'\nmass_kg = 0.246\ncom_offset_m = 0.10\n"
                                         "inertia_kg_m2 = 3.3e-3\nsurface = 'printed'\n";

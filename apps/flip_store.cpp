@@ -1,0 +1,131 @@
+#include "apps/flip_store.hpp"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <utility>
+
+#include "apps/command.hpp"
+#include "datasets/log_error.hpp"
+
+namespace unhand::apps {
+namespace {
+
+namespace fs = std::filesystem;
+namespace fl = planners::flip;
+
+Json read_json(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw datasets::LogError(file.string(), "file", "cannot be read");
+  try {
+    return Json::parse(in);
+  } catch (const Json::exception& error) {
+    throw datasets::LogError(file.string(), "/", error.what());
+  }
+}
+
+Json command_json(const fl::FlipCommand& u) {
+  return {{"pitch_rad", u.pitch}, {"speed", u.speed}, {"damping_n_m_s", u.damping}};
+}
+Json bar_json(const fl::Bar& b) {
+  return {{"mass_kg", b.mass}, {"inertia_kg_m2", b.inertia}, {"com_offset_m", b.com_offset}};
+}
+
+/// The throw in a file, of the command and bar that are asked for.
+fl::FlipTrial trial_of(const fs::path& file, const fl::TrialRequest& request) {
+  const Json json = read_json(file);
+  fl::FlipTrial out;
+  const auto refuse = [&](const char* where, const std::string& why) {
+    throw datasets::LogError(file.string(), where, why);
+  };
+  try {
+    if (json.at("command") != command_json(request.command))
+      refuse("/command", "is not the command that the learner asks for now");
+    if (json.at("bar") != bar_json(request.bar)) refuse("/bar", "is not the bar that is thrown now");
+    out.command = request.command;
+    const std::string outcome = json.at("outcome");
+    for (const auto one :
+         {fl::FlipOutcome::landed, fl::FlipOutcome::not_let_go, fl::FlipOutcome::never_lands})
+      if (outcome == to_string(one)) {
+        out.outcome = one;
+        const Json& use = json.at("use");
+        out.use = {use.at("position"), use.at("velocity"), use.at("torque"), use.at("cut_torque"),
+                   use.at("cut_rate")};
+        if (one != fl::FlipOutcome::landed) return out;
+        out.hand = json.at("hand").get<std::array<double, 6>>();
+        out.detach = json.at("detach").get<std::array<double, 6>>();
+        out.landing = {json.at("landing").at("x_m"), json.at("landing").at("angle_rad")};
+        return out;
+      }
+    refuse("/outcome", fmt::format("'{}' is no outcome", outcome));
+  } catch (const Json::exception& error) {
+    refuse("/", error.what());
+  }
+  return out;
+}
+
+}  // namespace
+
+Json json_of(const fl::FlipTrial& t) {
+  Json out{{"command", command_json(t.command)}, {"outcome", to_string(t.outcome)}};
+  if (t.outcome == fl::FlipOutcome::landed) {
+    out["hand"] = t.hand;
+    out["detach"] = t.detach;
+    out["landing"] = {{"x_m", t.landing.x}, {"angle_rad", t.landing.angle}};
+  }
+  out["use"] = {{"position", t.use.position},
+                {"velocity", t.use.velocity},
+                {"torque", t.use.torque},
+                {"cut_torque", t.use.cut_torque},
+                {"cut_rate", t.use.cut_rate}};
+  return out;
+}
+
+FlipStore::FlipStore(fs::path directory, const Json& settings) : directory_(std::move(directory)) {
+  std::error_code error;
+  fs::create_directories(directory_ / "trials", error);
+  if (error) throw Unanswered(fmt::format("{}: cannot be made: {}", directory_.string(), error.message()));
+  const fs::path file = directory_ / "session.json";
+  if (!fs::exists(file)) {
+    Json head = json_head("plan-flip-session");
+    head["settings"] = settings;
+    Outputs outputs;
+    outputs.json(file, head);
+    outputs.commit();
+    return;
+  }
+  const Json there = read_json(file);
+  const auto found = there.find("settings");
+  if (found == there.end() || !found->is_object())
+    throw datasets::LogError(file.string(), "/settings", "required key is missing");
+  for (const auto& [key, value] : settings.items()) {
+    const auto old = found->find(key);
+    if (old == found->end() || *old != value)
+      throw datasets::LogError(file.string(), "/settings/" + key,
+                               fmt::format("another session lies there: {} instead of {}",
+                                           old == found->end() ? "nothing" : old->dump(), value.dump()));
+  }
+}
+
+fl::Thrower FlipStore::over(fl::Thrower plant) {
+  return [this, plant = std::move(plant)](const fl::TrialRequest& request) {
+    const fs::path file = directory_ / "trials" / fmt::format("{}-{:04}.json", request.stage, request.index);
+    if (fs::exists(file)) {
+      ++recalled_;
+      return trial_of(file, request);
+    }
+    const fl::FlipTrial trial = plant(request);
+    Json json = json_head("plan-flip-trial");
+    json["stage"] = request.stage;
+    json["index"] = request.index;
+    json["bar"] = bar_json(request.bar);
+    json.update(json_of(trial));
+    Outputs outputs;
+    outputs.json(file, json);
+    outputs.commit();
+    ++thrown_;
+    return trial;
+  };
+}
+
+}  // namespace unhand::apps

@@ -1,0 +1,33 @@
+// The throws of a throw-flip session as files: each in place as a whole or not there, so that a session that
+// was killed goes on where it was.
+#pragma once
+
+#include <filesystem>
+
+#include "apps/output.hpp"
+#include "planners/flip/session.hpp"
+
+namespace unhand::apps {
+
+Json json_of(const planners::flip::FlipTrial& trial);
+
+/// DIRECTORY/session.json says what is thrown; DIRECTORY/trials/STAGE-INDEX.json is one throw.
+class FlipStore {
+ public:
+  /// Creates the session, or goes on with the one that is there. Throws datasets::LogError, naming the
+  /// setting, where another session lies there, or its file cannot be read.
+  FlipStore(std::filesystem::path directory, const Json& settings);
+
+  /// Recalls the throws that are there, and keeps those that `plant` makes. A recalled throw must be of the
+  /// same command and bar; otherwise throws datasets::LogError.
+  planners::flip::Thrower over(planners::flip::Thrower plant);
+
+  int recalled() const { return recalled_; }
+  int thrown() const { return thrown_; }
+
+ private:
+  std::filesystem::path directory_;
+  int recalled_{}, thrown_{};
+};
+
+}  // namespace unhand::apps

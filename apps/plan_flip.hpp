@@ -1,0 +1,29 @@
+// What `unhand plan flip` learned, and how it is told.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "apps/output.hpp"
+#include "planners/flip/session.hpp"
+
+namespace unhand::apps {
+
+struct FlipAnswer {
+  std::string learner;
+  planners::flip::FlipTarget target;
+  planners::flip::Bar bar;
+  std::vector<planners::flip::FlipDatum> known;  ///< what the learner began with
+  planners::flip::LearningPath path;
+  int throws{};  ///< of each command
+  std::optional<planners::flip::Gathered> population;
+  std::string card;  ///< a model card's JSON, of m4
+};
+
+std::string text_of(const FlipAnswer& answer);
+Json json_of(const FlipAnswer& answer);
+/// path.md, flip.json, and the figures path, progress and, if it was thrown, population.
+void write_report(const FlipAnswer& answer, const std::filesystem::path& directory);
+
+}  // namespace unhand::apps

@@ -1,0 +1,62 @@
+// What the declared robot would do: hand motions of the arm as it is declared, and a release card for the
+// pads. The physics of model 4.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "planners/flip/learner.hpp"
+#include "planners/tube/release_throw.hpp"
+
+namespace unhand::planners::flip {
+
+/// Hand motions of the declared arm with one bar, held rigidly, on a mesh of commands. They depend on nothing
+/// that is learned, so all learners may share them. Building it takes some 3 ms for each mesh point.
+class HandLibrary {
+ public:
+  HandLibrary(const FlipRobot& robot, const Bar& bar, int per_side = 7);
+
+  const FlipRobot& robot() const { return robot_; }
+  const Bar& bar() const { return bar_; }
+  const std::vector<FlipCommand>& commands() const { return commands_; }
+  const release::PolynomialHand& hand(std::size_t i) const { return hands_[i]; }
+  double spacing() const { return spacing_; }  ///< of the mesh, as a fraction of the range
+  /// Of any command; simulated now.
+  release::PolynomialHand simulate(const FlipCommand& u) const;
+
+ private:
+  const FlipRobot& robot_;
+  Bar bar_;
+  double spacing_{};
+  std::vector<FlipCommand> commands_;
+  std::vector<release::PolynomialHand> hands_;
+};
+
+/// The declared gripper and pads as a card: what is known before any throw, with the spread between robots as
+/// its uncertainty. `law` is the contact model that the card names.
+ReleaseCard prior_card(const FlipRobot& robot, const std::string& law = "sliding_pivot");
+
+/// The release of a bar that a card predicts for a hand's motion.
+std::optional<FlipRelease> predicted_release(const release::HandMotion& hand, const ReleaseCard& card,
+                                             const Bar& bar);
+
+/// How far detach states of the declared robot and a real one may differ for reasons that the card does not
+/// have, 1 σ of x, z [m], θ [rad] and their rates [m/s, m/s, rad/s].
+inline constexpr DetachVector kDiscrepancy{0.01, 0.01, 0.15, 0.05, 0.05, 0.6};
+
+struct ReleaseFit {
+  ReleaseCard card;       ///< σ: posterior, of the parameters that are Uncertain
+  double length_sigma{};  ///< of card.length [m]
+  int iterations{};
+  double cost_before{}, cost_after{};  ///< sum of squares in σ, prior included
+};
+/// The card that explains throws of the library's bar best: mu, length, dead time and opening time by
+/// Gauss-Newton with step control on the mean detach states, weighted with kDiscrepancy, and the prior.
+/// Length's prior: 15 %. (grip_force enters only as mu grip_force and is kept.)
+ReleaseFit fit_release(const HandLibrary& library, const ReleaseCard& prior, std::span<const FlipDatum> data);
+
+/// The fit as a model card, for `unhand plan throw --card` and as the prior of another session.
+datasets::ModelCard model_card_of(const ReleaseFit& fit, const std::string& source);
+
+}  // namespace unhand::planners::flip

@@ -1,0 +1,123 @@
+// Learning to throw-flip: which command to try next.
+//
+// [LiuDaCostaBillard2025]; where the text leaves a choice, docs/throw-flip.md says which was taken.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "planners/flip/flip_throw.hpp"
+#include "planners/flip/plant.hpp"
+
+namespace unhand::planners::flip {
+
+struct FlipTarget {
+  FlipPose pose;
+  double tolerance_x{0.05};                     ///< ε_x [m]
+  double tolerance_angle{0.78539816339744831};  ///< ε_θ [rad]
+};
+
+/// e = |((x − x*)/ε_x, (θ − θ*)/ε_θ)| [-]
+double normalized_error(const FlipPose& landing, const FlipTarget& target);
+/// Both within their tolerances.
+bool hits(const FlipPose& landing, const FlipTarget& target);
+
+/// What is kept of the throws of one command: means over those that landed.
+struct FlipDatum {
+  FlipCommand command;
+  DetachVector detach{};
+  FlipPose landing;
+  int throws{};  ///< that landed
+};
+/// Empty where none landed.
+std::optional<FlipDatum> mean_of(std::span<const FlipTrial> trials);
+
+class FlipLearner {
+ public:
+  virtual ~FlipLearner() = default;
+  /// The command to execute next; empty where the learner has nothing to go by.
+  virtual std::optional<FlipCommand> next() = 0;
+  /// The throws of the command last asked for.
+  virtual void observe(std::span<const FlipTrial> trials) = 0;
+};
+
+/// How landings of commands between known ones are predicted.
+enum class ForwardModel {
+  landing,  ///< model 1, Eq. 27: the landing pose is taken as locally linear in the command
+  detach,   ///< model 2, Eq. 28: the detach state is, and flight follows
+};
+
+/// The plane of commands through u_1 that (α_1, α_2) span: u = u_1 + Σ α_i (u_{i+1} − u_1).
+struct ConeSearch {
+  double reach{2.5};  ///< |α_i| at most
+  double mesh{0.05};  ///< between mesh points
+};
+
+/// What Σ α_i (y_{i+1} − y_1) is added to, and its prediction, at the best mesh point.
+struct ConeStep {
+  FlipCommand command;
+  FlipPose predicted;
+  double error{};
+};
+/// Searches the mesh for the command whose prediction is nearest to the target; commands out of range, and
+/// those in `tried`, are passed over. Deltas come from `simplex`, prediction and command start at `base` (the
+/// simplex's first entry, but for model 3). Empty where no mesh point remains, or the simplex is degenerate.
+std::optional<ConeStep> cone_search(ForwardModel model, const FlipDatum& base,
+                                    std::span<const FlipDatum, 3> simplex, const FlipTarget& target,
+                                    const CommandRange& range, const ConeSearch& search,
+                                    std::span<const FlipCommand> tried = {});
+
+/// Models 1 and 2 with Algorithm 1. The neighbours are the best datum and two others, the nearest three
+/// first; re-selection takes the nearest three that have not been searched yet, so it acts exactly when the
+/// last throws changed nothing about which those are.
+class ConeLearner final : public FlipLearner {
+ public:
+  ConeLearner(ForwardModel model, std::vector<FlipDatum> support, const FlipTarget& target,
+              const CommandRange& range, const ConeSearch& search = {});
+  std::optional<FlipCommand> next() override;
+  void observe(std::span<const FlipTrial> trials) override;
+  const std::vector<FlipDatum>& data() const { return data_; }
+
+ private:
+  ForwardModel model_;
+  std::vector<FlipDatum> data_;  ///< in the order in which they came
+  std::vector<FlipCommand> tried_;
+  std::set<std::array<std::size_t, 3>> searched_;  ///< triples of data, the base first
+  FlipTarget target_;
+  CommandRange range_;
+  ConeSearch search_;
+};
+
+/// (q^o, v^o) of a bar whose centre of mass lies Δh [m] further from the pads, the twist of the bar
+/// unchanged.
+DetachVector shifted(const DetachVector& detach, double shift);
+/// The data as they would be with the centre of mass shifted; those that then never land are left out.
+std::vector<FlipDatum> transferred(std::span<const FlipDatum> data, double shift);
+
+/// Model 3: transfer under a shift of the centre of mass, three opening iterations, then model 2 on their
+/// data.
+class TransferLearner final : public FlipLearner {
+ public:
+  /// `past` are throws of the old bar. Throws std::invalid_argument for fewer than four that can be
+  /// transferred.
+  TransferLearner(std::span<const FlipDatum> past, double shift, const FlipTarget& target,
+                  const CommandRange& range, const ConeSearch& search = {});
+  std::optional<FlipCommand> next() override;
+  void observe(std::span<const FlipTrial> trials) override;
+
+ private:
+  std::vector<FlipDatum> past_;  ///< transferred, nearest to the target first
+  std::vector<FlipDatum> own_;
+  std::vector<FlipCommand> tried_;
+  FlipTarget target_;
+  CommandRange range_;
+  ConeSearch search_;
+  int iteration_{};
+  std::unique_ptr<ConeLearner> after_;
+};
+
+}  // namespace unhand::planners::flip

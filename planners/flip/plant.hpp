@@ -1,0 +1,61 @@
+// The simulated hardware: one robot, whose own numbers nobody is told, throwing bars.
+#pragma once
+
+#include <cstdint>
+
+#include "planners/flip/arm_throw.hpp"
+#include "planners/flip/flip_throw.hpp"
+
+namespace unhand::planners::flip {
+
+enum class FlipOutcome {
+  landed,
+  not_let_go,   ///< the bar was not free in time, or the release was not solved
+  never_lands,  ///< it does not come down to height 0
+};
+const char* to_string(FlipOutcome);
+
+/// What a throw shows, with the sensors' noise; [LiuDaCostaBillard2025]'s (u, q^h, v^h, q^o, v^o, q^land).
+struct FlipTrial {
+  FlipCommand command;
+  FlipOutcome outcome{};
+  std::array<double, 6> hand{};  ///< pose and twist of the hand at detach
+  DetachVector detach{};
+  FlipPose landing;
+  ArmUse use;  ///< of the joints' limits, as the robot reports it
+};
+
+struct PlantOptions {
+  ArmOptions arm{1, 1.0};
+  int reaction_passes{1};  ///< the hand's motion is found again under the wrench that the bar exerts on it
+};
+
+/// One robot: the declared one with masses, friction, motors, gripper, pads and bar off by [robots], drawn by
+/// the seed.
+///
+/// The arm first brakes with the bar held rigidly, which gives a wrench at the pads; with `reaction_passes` >
+/// 0 it brakes again under that wrench, with the bar's inertia gone (a fixed point of hand and bar moving
+/// each other; the bar weighs a tenth of what the wrist turns, so one pass is enough, see the tests).
+class FlipPlant {
+ public:
+  /// Keeps a reference to `robot`. Throws std::invalid_argument where the corners of the command's range
+  /// leave the joints' limits.
+  FlipPlant(const FlipRobot& robot, std::uint64_t seed);
+
+  /// Throws the bar once. Equal seeds give equal throws. Throws std::invalid_argument for a command out of
+  /// range.
+  FlipTrial throw_bar(const FlipCommand& u, const Bar& declared, std::uint64_t trial_seed,
+                      const PlantOptions& options = {}) const;
+
+ private:
+  const FlipRobot& robot_;
+  ArmBody body_;
+  Gripper gripper_;
+  Pads pads_;
+  double com_error_{};
+};
+
+/// A seed made of others (splitmix64 of each in turn).
+std::uint64_t seed_of(std::initializer_list<std::uint64_t> parts);
+
+}  // namespace unhand::planners::flip

@@ -1,0 +1,262 @@
+#include "planners/flip/release_learner.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <numeric>
+
+namespace unhand::planners::flip {
+namespace {
+
+/// What throws scatter by before any has been seen, 1 σ.
+constexpr double kScatterX = 0.03, kScatterAngle = 0.25;
+constexpr DetachVector kScatterDetach{0.003, 0.003, 0.05, 0.04, 0.04, 0.5};
+constexpr int kScatterFreedom = 4;
+
+double kernel(const LeftOver& a, const std::array<double, 3>& at, double com_offset) {
+  constexpr double reach = 0.6, other_bar = 0.8;
+  double d = 0;
+  for (std::size_t i = 0; i < 3; ++i) d += (a.at[i] - at[i]) * (a.at[i] - at[i]);
+  const double same = std::abs(a.com_offset - com_offset) < 1e-6 ? 1.0 : other_bar;
+  return same * (0.5 + 0.5 * std::exp(-0.5 * d / (reach * reach)));
+}
+
+/// Probability that a normal variable lies within ± half of `middle`.
+double within(double mean, double sigma, double middle, double half) {
+  const auto phi = [&](double x) { return 0.5 * std::erfc(-(x - mean) / (sigma * std::numbers::sqrt2)); };
+  return std::max(0.0, phi(middle + half) - phi(middle - half));
+}
+
+}  // namespace
+
+std::vector<LeftOver> left_over(const HandLibrary& library, const ReleaseCard& card,
+                                std::span<const FlipDatum> data) {
+  std::vector<LeftOver> out;
+  const double l = library.bar().com_offset;
+  for (const FlipDatum& one : data) {
+    const auto release = predicted_release(library.simulate(one.command), card, library.bar());
+    if (!release) continue;
+    const DetachVector seen = shifted(one.detach, -l), predicted = shifted(release->detach, -l);
+    LeftOver left{library.robot().motion.range.fractions(one.command), l, {}, one.throws};
+    for (std::size_t j = 0; j < 6; ++j) left.value[j] = seen[j] - predicted[j];
+    out.push_back(left);
+  }
+  return out;
+}
+
+ThrowScatter scatter_of(std::span<const FlipTrial> trials, double com_offset) {
+  ThrowScatter out{kScatterX * kScatterX * kScatterFreedom,
+                   kScatterAngle * kScatterAngle * kScatterFreedom,
+                   {},
+                   kScatterFreedom};
+  for (std::size_t j = 0; j < 6; ++j) out.detach[j] = kScatterDetach[j] * kScatterDetach[j] * kScatterFreedom;
+  for (std::size_t begin = 0; begin < trials.size();) {
+    std::size_t end = begin;
+    while (end < trials.size() && trials[end].command == trials[begin].command) ++end;
+    const auto group = trials.subspan(begin, end - begin);
+    begin = end;
+    const auto mean = mean_of(group);
+    if (!mean || mean->throws < 2) continue;
+    DetachVector middle{};
+    for (const FlipTrial& t : group) {
+      if (t.outcome != FlipOutcome::landed) continue;
+      const DetachVector d = shifted(t.detach, -com_offset);
+      for (std::size_t j = 0; j < 6; ++j) middle[j] += d[j] / mean->throws;
+    }
+    for (const FlipTrial& t : group) {
+      if (t.outcome != FlipOutcome::landed) continue;
+      const DetachVector d = shifted(t.detach, -com_offset);
+      out.x += std::pow(t.landing.x - mean->landing.x, 2);
+      out.angle += std::pow(t.landing.angle - mean->landing.angle, 2);
+      for (std::size_t j = 0; j < 6; ++j) out.detach[j] += std::pow(d[j] - middle[j], 2);
+    }
+    out.freedom += mean->throws - 1;
+  }
+  out.x /= out.freedom;
+  out.angle /= out.freedom;
+  for (double& v : out.detach) v /= out.freedom;
+  return out;
+}
+
+void LeftOverField::set(std::vector<LeftOver> samples, const DetachVector& throw_variance) {
+  samples_ = std::move(samples);
+  const Eigen::Index n = static_cast<Eigen::Index>(samples_.size());
+  if (n == 0) return;
+  Eigen::MatrixXd K(n, n);
+  for (Eigen::Index a = 0; a < n; ++a)
+    for (Eigen::Index b = 0; b < n; ++b) {
+      const LeftOver& other = samples_[static_cast<std::size_t>(b)];
+      K(a, b) = kernel(samples_[static_cast<std::size_t>(a)], other.at, other.com_offset);
+    }
+  for (std::size_t j = 0; j < 6; ++j) {
+    Eigen::VectorXd y(n), noise(n);
+    for (Eigen::Index a = 0; a < n; ++a) {
+      const LeftOver& one = samples_[static_cast<std::size_t>(a)];
+      y[a] = one.value[j];
+      noise[a] = throw_variance[j] / std::max(1, one.throws);
+    }
+    double best = -std::numeric_limits<double>::infinity();
+    for (double factor = 0.125; factor < 5; factor *= 2) {
+      const double sigma = factor * kDiscrepancy[j];
+      Eigen::MatrixXd A = sigma * sigma * K;
+      A.diagonal() += noise;
+      const Eigen::LLT<Eigen::MatrixXd> llt(A);
+      const Eigen::VectorXd weights = llt.solve(y);
+      const double evidence = -0.5 * y.dot(weights) - llt.matrixLLT().diagonal().array().log().sum();
+      if (!(evidence > best)) continue;
+      best = evidence;
+      sigma_[j] = sigma;
+      factor_[j] = llt;
+      weights_[j] = weights;
+    }
+  }
+}
+
+LeftOverField::At LeftOverField::at(const std::array<double, 3>& fractions, double com_offset) const {
+  At out;
+  const Eigen::Index n = static_cast<Eigen::Index>(samples_.size());
+  Eigen::VectorXd k(n);
+  for (Eigen::Index a = 0; a < n; ++a)
+    k[a] = kernel(samples_[static_cast<std::size_t>(a)], fractions, com_offset);
+  for (std::size_t j = 0; j < 6; ++j) {
+    const double s2 = sigma_[j] * sigma_[j];
+    out.variance[j] = s2;
+    if (n == 0) continue;
+    out.mean[j] = s2 * k.dot(weights_[j]);
+    const Eigen::VectorXd half = factor_[j].matrixL().solve(k);
+    out.variance[j] = std::max(0.0, s2 - s2 * s2 * half.squaredNorm());
+  }
+  return out;
+}
+
+ReleaseLearner::ReleaseLearner(const HandLibrary& library, const ReleaseCard& card,
+                               std::vector<LeftOver> known, const ThrowScatter& scatter,
+                               const FlipTarget& target, int throws)
+    : library_(library),
+      card_(card),
+      samples_(std::move(known)),
+      scatter_(scatter),
+      target_(target),
+      throws_(throws) {
+  for (std::size_t i = 0; i < library_.commands().size(); ++i) {
+    const auto release = predicted_release(library_.hand(i), card_, library_.bar());
+    mesh_.push_back(release ? std::optional(release->detach) : std::nullopt);
+  }
+  field_.set(samples_, scatter_.detach);
+}
+
+std::optional<FlipForecast> ReleaseLearner::forecast(const std::array<double, 3>& fractions,
+                                                     const DetachVector& predicted) const {
+  const double l = library_.bar().com_offset;
+  const LeftOverField::At left = field_.at(fractions, l);
+  DetachVector pads = shifted(predicted, -l);
+  for (std::size_t j = 0; j < 6; ++j) pads[j] += left.mean[j];
+  const auto land = [&](const DetachVector& d) { return fly_flip(shifted(d, l)); };
+  const auto mean = land(pads);
+  if (!mean) return {};
+  FlipForecast out{*mean, 0, 0, 0, 0};
+  double cross = 0;
+  for (std::size_t j = 0; j < 6; ++j) {
+    const double sigma = std::sqrt(left.variance[j]);
+    if (!(sigma > 0)) continue;
+    DetachVector up = pads, down = pads;  // a σ each way: the flight is mildly curved
+    up[j] += sigma;
+    down[j] -= sigma;
+    const auto a = land(up), b = land(down);
+    if (!a || !b) return {};
+    const double dx = 0.5 * (a->x - b->x), da = 0.5 * (a->angle - b->angle);
+    out.sigma_x += dx * dx;
+    out.sigma_angle += da * da;
+    cross += dx * da;
+  }
+  out.sigma_x = std::sqrt(out.sigma_x);
+  out.sigma_angle = std::sqrt(out.sigma_angle);
+  const double product = out.sigma_x * out.sigma_angle;
+  out.correlation = product > 0 ? std::clamp(cross / product, -1.0, 1.0) : 0.0;
+  // All throws share the unknown mean and scatter about it: E[p^throws] by Gauss-Hermite's five points.
+  constexpr double nodes[]{0, 1.3556261799742659, -1.3556261799742659, 2.8569700138728056,
+                           -2.8569700138728056};
+  constexpr double weights[]{0.53333333333333333, 0.22207592200561266, 0.22207592200561266,
+                             0.011257411327720689, 0.011257411327720689};
+  const double scatter_x = std::sqrt(scatter_.x), scatter_angle = std::sqrt(scatter_.angle),
+               rest = std::sqrt(std::max(0.0, 1 - out.correlation * out.correlation));
+  for (int i = 0; i < 5; ++i) {
+    const double px =
+        within(mean->x + nodes[i] * out.sigma_x, scatter_x, target_.pose.x, target_.tolerance_x);
+    for (int j = 0; j < 5; ++j) {
+      const double angle = mean->angle + out.sigma_angle * (out.correlation * nodes[i] + rest * nodes[j]);
+      const double p = px * within(angle, scatter_angle, target_.pose.angle, target_.tolerance_angle);
+      out.probability += weights[i] * weights[j] * std::pow(p, throws_);
+    }
+  }
+  return out;
+}
+
+std::optional<FlipForecast> ReleaseLearner::forecast(const FlipCommand& u) const {
+  const auto release = predicted_release(library_.simulate(u), card_, library_.bar());
+  if (!release) return {};
+  return forecast(library_.robot().motion.range.fractions(u), release->detach);
+}
+
+/// The probability; far from the target, where it is zero everywhere, the error decides.
+double ReleaseLearner::worth(const std::optional<FlipForecast>& forecast) const {
+  if (!forecast) return -1;
+  return forecast->probability - 1e-3 * std::min(1e2, normalized_error(forecast->mean, target_));
+}
+
+std::optional<FlipCommand> ReleaseLearner::next() {
+  const CommandRange& range = library_.robot().motion.range;
+  struct Point {
+    std::array<double, 3> at;
+    double worth;
+  };
+  std::vector<Point> points;
+  for (std::size_t i = 0; i < mesh_.size(); ++i) {
+    if (!mesh_[i]) continue;
+    const auto at = range.fractions(library_.commands()[i]);
+    points.push_back({at, worth(forecast(at, *mesh_[i]))});
+  }
+  if (points.empty()) return {};
+  // The best mesh points, no two of them neighbours, and a compass search from each.
+  std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) { return a.worth > b.worth; });
+  std::vector<Point> starts;
+  for (const Point& p : points) {
+    const bool close = std::any_of(starts.begin(), starts.end(), [&](const Point& s) {
+      return std::hypot(s.at[0] - p.at[0], s.at[1] - p.at[1], s.at[2] - p.at[2]) < 1.9 * library_.spacing();
+    });
+    if (!close) starts.push_back(p);
+    if (starts.size() == 2) break;
+  }
+  Point best = starts.front();
+  for (Point at : starts) {
+    double step = 0.5 * library_.spacing();
+    for (int round = 0; round < 12 && step > library_.spacing() / 10; ++round) {
+      bool moved = false;
+      for (std::size_t k = 0; k < 3; ++k)
+        for (const double side : {step, -step}) {
+          Point tried = at;
+          tried.at[k] = std::clamp(tried.at[k] + side, 0.0, 1.0);
+          if (tried.at[k] == at.at[k]) continue;
+          tried.worth = worth(forecast(range.clamp(range.at(tried.at[0], tried.at[1], tried.at[2]))));
+          if (!(tried.worth > at.worth)) continue;
+          at = tried;
+          moved = true;
+          break;
+        }
+      if (!moved) step /= 2;
+    }
+    if (at.worth > best.worth) best = at;
+  }
+  return range.clamp(range.at(best.at[0], best.at[1], best.at[2]));
+}
+
+void ReleaseLearner::observe(std::span<const FlipTrial> trials) {
+  const auto mean = mean_of(trials);
+  if (!mean) return;
+  const std::vector<FlipDatum> one{*mean};
+  for (const LeftOver& left : left_over(library_, card_, one)) samples_.push_back(left);
+  field_.set(samples_, scatter_.detach);
+}
+
+}  // namespace unhand::planners::flip

@@ -1,0 +1,87 @@
+// Model 4: the release's physics predicts, what is left over is learned with its uncertainty, and the next
+// command is the one that most probably lands within the tolerances.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <map>
+
+#include "planners/flip/forecast.hpp"
+
+namespace unhand::planners::flip {
+
+/// Observed minus predicted, of the state at detach carried back to the bar's point between the pads
+/// (`shifted` by −com_offset): there it does not depend on where the bar's centre of mass lies, as far as
+/// the wrench does not. Units as DetachVector.
+struct LeftOver {
+  std::array<double, 3> at{};  ///< the command, as fractions of the range
+  double com_offset{};         ///< of the bar [m]
+  DetachVector value{};
+  int throws{1};  ///< that it is the mean of
+};
+std::vector<LeftOver> left_over(const HandLibrary& library, const ReleaseCard& card,
+                                std::span<const FlipDatum> data);
+
+/// Pooled variances of throws of one command about their mean, and how many degrees of freedom they have.
+/// A prior counts for four.
+struct ThrowScatter {
+  double x{}, angle{};    ///< of the landing [m², rad²]
+  DetachVector detach{};  ///< of the bar's point between the pads
+  int freedom{};
+};
+ThrowScatter scatter_of(std::span<const FlipTrial> trials, double com_offset);
+
+/// A Gaussian process for each component of what is left over:
+///   cov = σ_j² (½ + ½ exp(−|u − u'|²/(2 ℓ²))) ρ^[other bar]
+/// u in fractions of the range, ℓ = 0.6, ρ = 0.8; σ_j is the multiple of kDiscrepancy, from 1/8 to 4 by
+/// factors of two, with the largest evidence.
+class LeftOverField {
+ public:
+  void set(std::vector<LeftOver> samples, const DetachVector& throw_variance);
+  struct At {
+    DetachVector mean{}, variance{};
+  };
+  At at(const std::array<double, 3>& fractions, double com_offset) const;
+  const DetachVector& sigma() const { return sigma_; }
+
+ private:
+  std::vector<LeftOver> samples_;
+  DetachVector sigma_ = kDiscrepancy;
+  std::array<Eigen::LLT<Eigen::MatrixXd>, 6> factor_;
+  std::array<Eigen::VectorXd, 6> weights_;
+};
+
+/// What model 4 says of a command.
+struct FlipForecast {
+  FlipPose mean;
+  double sigma_x{}, sigma_angle{}, correlation{};  ///< of what is not known of the command's mean landing
+  double probability{};                            ///< that all throws of it land within the tolerances
+};
+
+class ReleaseLearner final : public FlipLearner {
+ public:
+  /// `known`: what was left over of earlier throws, of this bar or another one. `throws`: of each command.
+  /// Keeps a reference to `library`.
+  ReleaseLearner(const HandLibrary& library, const ReleaseCard& card, std::vector<LeftOver> known,
+                 const ThrowScatter& scatter, const FlipTarget& target, int throws);
+  std::optional<FlipCommand> next() override;
+  void observe(std::span<const FlipTrial> trials) override;
+  /// Empty where the physics predicts no landing.
+  std::optional<FlipForecast> forecast(const FlipCommand& u) const;
+
+ private:
+  std::optional<FlipForecast> forecast(const std::array<double, 3>& fractions,
+                                       const DetachVector& predicted) const;
+  double worth(const std::optional<FlipForecast>& forecast) const;
+
+  const HandLibrary& library_;
+  ReleaseCard card_;
+  std::vector<LeftOver> samples_;
+  ThrowScatter scatter_;
+  FlipTarget target_;
+  int throws_;
+  LeftOverField field_;
+  std::vector<std::optional<DetachVector>> mesh_;  ///< predicted, of the library's commands
+};
+
+}  // namespace unhand::planners::flip

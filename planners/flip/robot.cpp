@@ -1,0 +1,201 @@
+#include "planners/flip/robot.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "contact/registry.hpp"
+#include "datasets/toml_keys.hpp"
+#include "planners/arm/chain_file.hpp"
+
+namespace unhand::planners::flip {
+namespace {
+
+using datasets::TomlKeys;
+using datasets::TomlLimits;
+
+constexpr double kMost = 1e6;
+constexpr TomlLimits positive(const char* unit) { return {0, kMost, true, unit}; }
+constexpr TomlLimits not_negative(const char* unit) { return {0, kMost, false, unit}; }
+constexpr TomlLimits any(const char* unit) { return {-kMost, kMost, false, unit}; }
+
+/// One table of the file, every key of it required.
+class Section {
+ public:
+  Section(TomlKeys& file, const char* name) : keys_(file.required(name, file.table(name))) {
+    keys_.text("source");
+    keys_.text("notes");
+  }
+  double number(const char* key, const TomlLimits& limits) {
+    return keys_.required(key, keys_.number(key, limits));
+  }
+  std::string text(const char* key) { return keys_.required(key, keys_.text(key)); }
+  std::array<double, 2> range(const char* key, const TomlLimits& limits) {
+    std::array<double, 2> out{};
+    if (!keys_.numbers(key, limits, out)) keys_.fail(key, "required key is missing");
+    if (!(out[0] < out[1])) keys_.fail(key, fmt::format("{} is not below {}", out[0], out[1]));
+    return out;
+  }
+  Joints joints(const char* key, int count, const TomlLimits& limits) {
+    Joints out(count);
+    if (!keys_.numbers(key, limits, {out.data(), static_cast<std::size_t>(count)}))
+      keys_.fail(key, "required key is missing");
+    return out;
+  }
+  [[noreturn]] void fail(const char* key, const std::string& why) const { keys_.fail(key, why); }
+  void done() const { keys_.reject_unknown(); }
+
+ private:
+  TomlKeys keys_;
+};
+
+FlipMotion motion_of(Section keys, const Chain& chain) {
+  const int n = chain.size();
+  FlipMotion out;
+  out.pose = keys.joints("pose_rad", n, any("rad"));
+  out.rate = keys.joints("rate_rad_s", n, any("rad/s"));
+  if (!(out.rate.norm() > 0)) keys.fail("rate_rad_s", "no joint moves");
+  out.duration = keys.number("duration_s", {0.05, 10, false, "s"});
+  out.window = keys.number("window_s", {0.02, 1, false, "s"});
+  const auto pitch = keys.range("pitch_rad", any("rad")), speed = keys.range("speed", positive("")),
+             damping = keys.range("damping_n_m_s", not_negative("N m s/rad"));
+  out.range = {{pitch[0], speed[0], damping[0]}, {pitch[1], speed[1], damping[1]}};
+  keys.done();
+  return out;
+}
+
+FlipControl control_of(Section keys, int n) {
+  FlipControl out;
+  out.stiffness = keys.joints("stiffness_n_m", n, not_negative("N m/rad"));
+  out.damping = keys.joints("damping_n_m_s", n, not_negative("N m s/rad"));
+  out.brake_stiffness = keys.joints("brake_stiffness_n_m", n, not_negative("N m/rad"));
+  out.brake_damping = keys.joints("brake_damping_n_m_s", n, not_negative("N m s/rad"));
+  out.brake_share = keys.joints("brake_share", n, not_negative(""));
+  out.torque_rate = keys.number("torque_rate_n_m_s", positive("N m/s"));
+  keys.done();
+  return out;
+}
+
+Pads pads_of(Section keys) {
+  Pads out;
+  out.law = keys.text("law");
+  const auto known = contact::contact_model_names();
+  if (out.law == "gripper_delay" || std::find(known.begin(), known.end(), out.law) == known.end())
+    keys.fail("law", fmt::format("'{}' is no contact model that says how the pads let go", out.law));
+  out.mu = keys.number("mu", {0, 10, true, ""});
+  out.length = keys.number("length_m", {0, 0.5, true, "m"});
+  out.count = static_cast<int>(keys.number("pads", {1, 8, false, ""}));
+  keys.done();
+  return out;
+}
+
+}  // namespace
+
+bool CommandRange::holds(const FlipCommand& u) const {
+  const auto in = [](double x, double a, double b) { return x >= a && x <= b; };
+  return in(u.pitch, low.pitch, high.pitch) && in(u.speed, low.speed, high.speed) &&
+         in(u.damping, low.damping, high.damping);
+}
+FlipCommand CommandRange::clamp(const FlipCommand& u) const {
+  return {std::clamp(u.pitch, low.pitch, high.pitch), std::clamp(u.speed, low.speed, high.speed),
+          std::clamp(u.damping, low.damping, high.damping)};
+}
+FlipCommand CommandRange::at(double pitch, double speed, double damping) const {
+  return {std::lerp(low.pitch, high.pitch, pitch), std::lerp(low.speed, high.speed, speed),
+          std::lerp(low.damping, high.damping, damping)};
+}
+std::array<double, 3> CommandRange::fractions(const FlipCommand& u) const {
+  return {(u.pitch - low.pitch) / (high.pitch - low.pitch), (u.speed - low.speed) / (high.speed - low.speed),
+          (u.damping - low.damping) / (high.damping - low.damping)};
+}
+
+Chain carrying(const Chain& chain, const Bar& bar) {
+  const double along = 0.02 * bar.inertia;  // about its own axis; nothing turns about it
+  return with_payload(
+      chain, {bar.mass, {0, 0, bar.com_offset}, symmetric(bar.inertia, bar.inertia, along, 0, 0, 0)});
+}
+
+FlipRobot read_flip_robot(const std::filesystem::path& file) {
+  TomlKeys keys = TomlKeys::parse(file);
+  FlipRobot out;
+  out.name = keys.required("name", keys.text("name"));
+  keys.text("source");
+  keys.text("notes");
+  const std::string arm = keys.required("arm", keys.text("arm"));
+  const auto beside = [&](const std::string& name) {
+    return name == "panda" ? name : (file.parent_path() / name).string();
+  };
+  try {
+    out.chain = read_chain(beside(arm));
+  } catch (const std::invalid_argument& error) {
+    keys.fail("arm", error.what());
+  }
+  {
+    Section hand(keys, "hand");
+    const double mass = hand.number("mass_kg", positive("kg")),
+                 length = hand.number("length_m", positive("m")),
+                 across = hand.number("inertia_across_kg_m2", positive("kg m^2")),
+                 along = hand.number("inertia_along_kg_m2", positive("kg m^2"));
+    hand.done();
+    out.chain =
+        with_payload(out.chain, {mass, {0, 0, length / 2}, symmetric(across, across, along, 0, 0, 0)});
+    out.chain = with_tool(out.chain, {Eigen::Matrix3d::Identity(), {0, 0, length}});
+  }
+  out.motion = motion_of({keys, "motion"}, out.chain);
+  out.control = control_of({keys, "control"}, out.chain.size());
+  {
+    Section k(keys, "gripper");
+    out.gripper = {k.number("grip_force_n", positive("N")), k.number("dead_time_s", not_negative("s")),
+                   k.number("opening_time_s", positive("s")), k.number("shape", {0.1, 10, false, ""})};
+    k.done();
+  }
+  out.pads = pads_of({keys, "pads"});
+  {
+    Section k(keys, "bar");
+    out.bar = {k.number("mass_kg", positive("kg")), k.number("inertia_kg_m2", positive("kg m^2")),
+               k.number("com_offset_m", not_negative("m"))};
+    k.done();
+  }
+  const TomlLimits share{0, 0.5, false, ""};
+  {
+    Section k(keys, "robots");
+    out.robots = {k.number("link_mass", share),
+                  k.number("friction", share),
+                  k.number("torque_gain", share),
+                  k.number("mu", share),
+                  k.number("length", share),
+                  k.number("grip_force", share),
+                  k.number("shape", share),
+                  k.number("dead_time_s", not_negative("s")),
+                  k.number("opening_time_s", not_negative("s")),
+                  k.number("com_offset_m", not_negative("m"))};
+    k.done();
+  }
+  {
+    Section k(keys, "throws");
+    out.throws = {k.number("mu", share),
+                  k.number("grip_force", share),
+                  k.number("dead_time_s", not_negative("s")),
+                  k.number("opening_time_s", not_negative("s")),
+                  k.number("grasp_offset_m", not_negative("m")),
+                  k.number("grasp_angle_rad", not_negative("rad")),
+                  k.number("torque_noise", share)};
+    k.done();
+  }
+  {
+    Section k(keys, "sensors");
+    out.sensors = {
+        k.number("angle_rad", not_negative("rad")), k.number("rate_rad_s", not_negative("rad/s")),
+        k.number("position_m", not_negative("m")),  k.number("turn_rad", not_negative("rad")),
+        k.number("speed_m_s", not_negative("m/s")), k.number("omega_rad_s", not_negative("rad/s")),
+        k.number("landing_m", not_negative("m")),   k.number("landing_turn_rad", not_negative("rad"))};
+    k.done();
+  }
+  keys.reject_unknown();
+  return out;
+}
+
+}  // namespace unhand::planners::flip
