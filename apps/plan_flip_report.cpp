@@ -166,7 +166,6 @@ std::string text_of(const FlipAnswer& a) {
 }
 
 Json json_of(const FlipAnswer& a) {
-  const auto number = [](double x) { return std::isfinite(x) ? Json(x) : Json(); };
   Json out = json_head("plan-flip");
   out["learner"] = a.learner;
   out["target"] = {{"x_m", a.target.pose.x},
