@@ -6,6 +6,7 @@
 
 #include "contact/contact_model.hpp"
 #include "contact/convex_quartic.hpp"
+#include "contact/giving_points.hpp"
 #include "contact/isotropic_quartic.hpp"
 #include "contact/limit_surface_shapes.hpp"
 #include "contact/pad_compliance.hpp"
@@ -26,17 +27,19 @@ namespace unhand::contact {
 /// At onset the slip leaves along a = W (f* − f_p), f* the projection of f_p onto the limit set in the metric
 /// of W: the minimum of the strictly convex ½ (a − b)ᵀ W⁻¹ (a − b) + σ(a), σ the surface's support function.
 ///
-/// Pads that give (contact.pad_compliance, see PadCompliance) hold the object elastically until it first
+/// Pads that give (contact.pad_compliance): on the discs every point gives and slips by itself
+/// (giving_points.hpp), which the release integrates without modes. Shapes that say nothing of where the
+/// pressure is have one spring for the whole patch (PadCompliance), which holds the object until it first
 /// slips:
-///   elastic  the springs' wrench, left when it reaches the surface, with the velocities of the moment
-/// and rigidly after, at any later rest: what they would store then is not followed, a small energy since the
+///   elastic  the spring's wrench, left when it reaches the surface, with the velocities of the moment
+/// and rigidly after, at any later rest: what it would store then is not followed, a small energy since the
 /// pads are opening. The elastic work is booked with the friction's. Without compliance there is no such
 /// mode.
 ///
 /// All of this is done in the normalised coordinates of limit_surface_shapes.hpp, so a Shape is all that
 /// differs.
 template <class Shape>
-class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
+class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>>, public GivesAtPoints {
  public:
   /// Throws std::invalid_argument as the validations of Patch and FrictionVariation do.
   LimitSurface(std::string_view name, const Patch<Dual>& patch, Shape shape,
@@ -62,6 +65,12 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>> {
   bool is_homogeneous(int mode) const override { return mode == kSlip; }
   bool needs_hold() const override { return pads_double_.has_value(); }
   double spin_length() const override { return limits_double_.patch().length(); }
+  bool gives_at_points() const override {
+    constexpr bool disc = std::is_same_v<Shape, UniformDisc> || std::is_same_v<Shape, PressedDisc>;
+    return disc && pads_double_.has_value();
+  }
+  const FrictionLimits<double>& point_limits(double) const override { return limits_double_; }
+  const FrictionLimits<Dual>& point_limits(const Dual&) const override { return limits_dual_; }
 
   template <class S>
   Wrench<S> wrench_(int mode, const Scene<S>&, const Relative<S>&) const;

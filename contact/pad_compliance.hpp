@@ -1,4 +1,4 @@
-// Pads that give tangentially before they slip.
+// Pads that give tangentially as a whole, for laws that know no points; see giving_points.hpp.
 #pragma once
 
 #include <optional>

@@ -32,6 +32,7 @@ void validate(const DistributedPatch& patch, const PatchOptions& options) {
   require(patch.reference_force > 0, "reference_force", patch.reference_force, "(0, ...) N");
   require(options.step > 0 && options.step <= 1e-3, "step", options.step, "(0, 1e-3] s");
   require(options.elastic_slip > 0, "elastic_slip", options.elastic_slip, "(0, ...) m");
+  require(options.loss_time >= 0, "loss_time", options.loss_time, "[0, ...) s");
 }
 
 /// The steps of the coarser run: every kink of hand and force is a step's end.
@@ -75,7 +76,7 @@ class Run {
   bool step(double from, double to) {
     const dynamics::Window window{from, to};
     const auto hand = problem_.hand.at(window, to);
-    const double h = to - from, normal = problem_.normal_force.at(window, to);
+    const double h = to - from, g = h + options_.loss_time, normal = problem_.normal_force.at(window, to);
     const double limit = patch_.pads * patch_.mu * normal;
     const double a = patch_.radius *
                      (patch_.softness > 0 ? std::pow(normal / patch_.reference_force, patch_.softness) : 1);
@@ -88,16 +89,16 @@ class Run {
       const Vec2<double>& p = patch_.points[i].position;
       const double x = a * (c * p.x - s * p.z), z = a * (s * p.x + c * p.z);  // from the hand
       offset_x_[i] = hx + x, offset_z_[i] = hz + z;
-      drive_x_[i] = c * stretch_x_[i] - s * stretch_z_[i] - h * (hand.twist.vx - omega * z);
-      drive_z_[i] = s * stretch_x_[i] + c * stretch_z_[i] - h * (hand.twist.vz + omega * x);
+      drive_x_[i] = c * stretch_x_[i] - s * stretch_z_[i] - g * (hand.twist.vx - omega * z);
+      drive_z_[i] = s * stretch_x_[i] + c * stretch_z_[i] - g * (hand.twist.vz + omega * x);
     }
     const Eigen::Vector3d before = twist_;
     const Eigen::Vector3d weight{problem_.body.mass * problem_.gravity.x,
                                  problem_.body.mass * problem_.gravity.z, 0};
     // The start: as before, or carried by the hand, whichever is lower.
-    Potential here = potential(twist_, before, weight, h, limit);
+    Potential here = potential(twist_, before, weight, h, g, limit);
     const Eigen::Vector3d carried{hand.twist.vx + omega * hz, hand.twist.vz - omega * hx, omega};
-    if (const Potential other = potential(carried, before, weight, h, limit); other.value < here.value)
+    if (const Potential other = potential(carried, before, weight, h, g, limit); other.value < here.value)
       twist_ = carried, here = other;
     bool solved = false;
     for (int k = 0; k < options_.newton_budget && !solved; ++k, ++iterations_) {
@@ -110,12 +111,12 @@ class Run {
         break;
       }
       double reach = 1;
-      Potential there = potential(twist_ + direction, before, weight, h, limit);
+      Potential there = potential(twist_ + direction, before, weight, h, g, limit);
       for (int halving = 0;
            halving < 40 && there.value > here.value + 1e-4 * reach * slope + 1e-12 * std::abs(here.value);
            ++halving) {
         reach *= 0.5;
-        there = potential(twist_ + reach * direction, before, weight, h, limit);
+        there = potential(twist_ + reach * direction, before, weight, h, g, limit);
       }
       const double moved = reach * direction.norm();
       twist_ += reach * direction;
@@ -126,10 +127,13 @@ class Run {
     const double most = limit / stiffness_;
     // The bristles as the new twist leaves them, in the hand's frame.
     for (std::size_t i = 0; i < count_; ++i) {
-      const double x = drive_x_[i] + h * (twist_[0] - twist_[2] * offset_z_[i]);
-      const double z = drive_z_[i] + h * (twist_[1] + twist_[2] * offset_x_[i]);
+      const double ex = drive_x_[i] + g * (twist_[0] - twist_[2] * offset_z_[i]);
+      const double ez = drive_z_[i] + g * (twist_[1] + twist_[2] * offset_x_[i]);
+      // e = s₀ + g v, and the bristle itself goes to s₀ + h v
+      const double x = stretch_x_[i] + h / g * (c * ex + s * ez - stretch_x_[i]);
+      const double z = stretch_z_[i] + h / g * (c * ez - s * ex - stretch_z_[i]);
       const double size = std::hypot(x, z), kept = size > most ? most / size : 1.0;
-      stretch_x_[i] = kept * (c * x + s * z), stretch_z_[i] = kept * (c * z - s * x);
+      stretch_x_[i] = kept * x, stretch_z_[i] = kept * z;
     }
     return solved;
   }
@@ -144,11 +148,11 @@ class Run {
     Eigen::Matrix3d hessian;
   };
 
-  /// Φ(V) = (V − V₀)ᵀ M (V − V₀)/(2h) − m g·V + Σ ψ_i,  ψ_i = K w_i |s|²/(2h) up to the yield, linear beyond
-  /// it. Without a branch, so that the compiler takes several points at once.
+  /// Φ(V) = (V − V₀)ᵀ M (V − V₀)/(2h) − m g·V + Σ ψ_i,  ψ_i = K w_i |e|²/(2g) up to the yield, linear beyond
+  /// it, with e = s + g v, g = h + T. Without a branch, so that the compiler takes several points at once.
   Potential potential(const Eigen::Vector3d& twist, const Eigen::Vector3d& before,
-                      const Eigen::Vector3d& weight, double h, double limit) const {
-    const double vx = h * twist[0], vz = h * twist[1], turn = h * twist[2], most = limit / stiffness_;
+                      const Eigen::Vector3d& weight, double h, double g, double limit) const {
+    const double vx = g * twist[0], vz = g * twist[1], turn = g * twist[2], most = limit / stiffness_;
     double energy = 0, fx = 0, fz = 0, tau = 0, xx = 0, xz = 0, zz = 0, xt = 0, zt = 0, tt = 0;
     for (std::size_t i = 0; i < count_; ++i) {
       const double x = offset_x_[i], z = offset_z_[i];
@@ -164,10 +168,10 @@ class Run {
       xx += axx, xz += axz, zz += azz, xt += ax, zt += az, tt += x * az - z * ax;
     }
     const Eigen::Vector3d change = twist - before, momentum = mass_.cwiseProduct(change) / h;
-    Potential out{0.5 * change.dot(momentum) - weight.dot(twist) + stiffness_ * energy / h,
+    Potential out{0.5 * change.dot(momentum) - weight.dot(twist) + stiffness_ * energy / g,
                   momentum - weight + stiffness_ * Eigen::Vector3d(fx, fz, tau), Eigen::Matrix3d()};
     out.hessian << xx, xz, xt, xz, zz, zt, xt, zt, tt;
-    out.hessian = stiffness_ * h * out.hessian + Eigen::Matrix3d((mass_ / h).asDiagonal());
+    out.hessian = stiffness_ * g * out.hessian + Eigen::Matrix3d((mass_ / h).asDiagonal());
     return out;
   }
 

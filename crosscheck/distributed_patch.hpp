@@ -25,7 +25,7 @@ std::vector<PatchPoint> disc_points(int rings, double pressure_exponent = 0);
 /// Coulomb friction at every point i, |f_i| <= n μ f_N w_i [N], through a bristle of the stiffness K w_i:
 ///
 ///   ṡ_i = v_i while |K w_i s_i| is below the limit, otherwise the bristle slides at the limit;  f_i = −K w_i
-///   s_i
+///   (s_i + T v_i), cut at the limit
 ///
 /// with v_i [m/s] the slip of the object against the pads at the point. Stick is elastic, never a mode;
 /// nothing is assumed of how force and torque are coupled.
@@ -43,6 +43,7 @@ struct PatchOptions {
   /// n μ f₀/K, by how much a bristle stretches before it slides [m]; f₀ the normal force at the start. Its
   /// own vibration is shorter than the step and damped by it.
   double elastic_slip{1e-11};
+  double loss_time{0};     ///< T, of the bristles [s]
   int newton_budget{100};  ///< iterations per step
 };
 

@@ -7,6 +7,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "release/giving_release.hpp"
+
 namespace unhand::release {
 
 using contact::Relative;
@@ -50,6 +52,14 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
 
   int free_mode() const { return free_; }
   double separation() const { return value_of(separation_); }
+  /// How the object is held at the start, for pads that give.
+  template <class S>
+  const contact::Hold<S>& hold() const {
+    if constexpr (std::is_same_v<S, double>)
+      return hold_;
+    else
+      return hold_dual_;
+  }
 
   Scene<double> scene(const Window& window, double t) const override { return scene_(window, t); }
   Scene<Dual> scene(const Window& window, const Dual& t) const override { return scene_(window, t); }
@@ -151,14 +161,6 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
     hold.wrench = {force.x, force.z, wrench.tau};
   }
 
-  template <class S>
-  const contact::Hold<S>& hold() const {
-    if constexpr (std::is_same_v<S, double>)
-      return hold_;
-    else
-      return hold_dual_;
-  }
-
   /// |(v_r, L ω_r)|
   template <class S>
   S slip_size(const State<S, 6>& y) const {
@@ -210,6 +212,20 @@ double mechanical_energy(const ReleaseProblem<double>& problem, const dynamics::
          m * dot(problem.gravity, p.position());
 }
 
+/// The contact model, if its pads give at every point.
+const contact::GivesAtPoints* giving(const contact::ContactModel& model) {
+  const auto* points = dynamic_cast<const contact::GivesAtPoints*>(&model);
+  return points && points->gives_at_points() ? points : nullptr;
+}
+
+/// The wrench on the object about the patch, in the world, at `fraction` of a recorded piece.
+template <class S>
+Wrench<S> wrench_at(const contact::ContactModel& model, const dynamics::TrajectoryPiece<S, 6>& piece,
+                    const S& fraction, const Scene<S>& scene) {
+  if (giving(model)) return wrench_of_motion(piece, fraction, scene);
+  return model.wrench(piece.phase.mode, scene, Relative<S>::from(piece.at_fraction(fraction)));
+}
+
 /// Four-point Gauss-Legendre quadrature of the powers over every recorded step.
 EnergyLedger book(const ReleaseProblem<double>& problem, const ReleaseSystem<double>& system,
                   const ReleaseResult<double>& result) {
@@ -223,7 +239,7 @@ EnergyLedger book(const ReleaseProblem<double>& problem, const ReleaseSystem<dou
     for (int k = 0; k < 4; ++k) {
       const Scene<double> scene = system.scene(piece.phase.window, piece.t0 + kNode[k] * length);
       const auto y = Relative<double>::from(piece.at_fraction(kNode[k]));
-      const Wrench<double> f = problem.contact.wrench(piece.phase.mode, scene, y);
+      const Wrench<double> f = wrench_at(problem.contact, piece, kNode[k], scene);
       const double weight = kWeight[k] * length;
       ledger.hand_work +=
           weight * (dot(f.force(), scene.hand_twist.linear()) + f.tau * scene.hand_twist.omega);
@@ -266,6 +282,18 @@ ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const Releas
 
   dynamics::IntegratorOptions integrator = options.integrator;
   integrator.record = integrator.record || options.ledger;
+  if (const auto* pads = giving(problem.contact); pads && problem.start < system.separation()) {
+    std::vector<S> events;
+    system.time_events(events);
+    const GivingStart<S> start{held, system.template hold<S>(), std::move(events), system.separation(),
+                               system.free_mode()};
+    const bool slips = result.slips_at_start;
+    result = simulate_giving_release(problem, *pads, system, start, {integrator, options.ledger});
+    result.slips_at_start = slips;
+    if constexpr (std::is_same_v<S, double>)
+      if (options.ledger && !result.trajectory.empty()) result.ledger = book(problem, system, result);
+    return result;
+  }
   // A release at the very end of the log still counts: the horizon lies one instant after.
   const double horizon = std::max(
       problem.hand.end(), std::isfinite(system.separation()) && system.separation() <= problem.hand.end()
@@ -322,12 +350,14 @@ ReleaseSample<S> sample_release(const ReleaseProblem<S>& problem, const ReleaseR
                                 const S& t) {
   const ReleaseSystem<S> system(problem);
   const auto& piece = result.trajectory.piece_at(value_of(t));
-  const auto y = Relative<S>::from(result.trajectory.at(t));
+  const S length = piece.t1 - piece.t0;
+  const S fraction = value_of(length) > 0 ? S((t - piece.t0) / length) : S(1);
+  const auto y = Relative<S>::from(piece.at_fraction(fraction));
   const Scene<S> scene = system.scene(piece.phase.window, t);
   return {system.mode_name(piece.phase.mode),
           object_pose(scene, y),
           object_twist(scene, y),
-          problem.contact.wrench(piece.phase.mode, scene, y),
+          wrench_at(problem.contact, piece, fraction, scene),
           {scene.hand, scene.hand_twist, scene.hand_acceleration},
           scene.normal_force,
           y};

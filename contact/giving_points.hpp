@@ -1,0 +1,108 @@
+// Pads that give at every point of a round patch before that point slips.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "contact/friction_limits.hpp"
+#include "contact/limit_surface_shapes.hpp"
+
+namespace unhand::contact {
+
+/// Points of the unit disc with the share of its area that each stands for, Σ area = 1: rings at the Radau
+/// nodes of ∫ · 2ρ dρ, so that force, torque and torsional stiffness (∫ 1, ρ, ρ² over the disc) are exact.
+struct DiscPoints {
+  std::vector<double> x, z, area;  ///< [-]
+};
+/// `counts` points on each ring, from the centre outwards.
+DiscPoints disc_quadrature(const std::vector<int>& counts);
+
+/// How far the pads are stretched under each point [m], in the hand's frame, with derivatives where S is
+/// Dual.
+template <class S>
+struct Stretch {
+  using Gradient = std::array<double, dynamics::kDualSize>;
+  std::vector<double> x, z;
+  std::vector<Gradient> dx, dz;  ///< empty where S is double
+};
+
+/// A patch of points i, at a p_i in the hand's frame, with the share w_i of the area and λ_i w_i of the load.
+/// Between pad and object each has a spring with a slider and a damper,
+///
+///   s_i' = v_i = v_r + ω_r J a p_i while |s_i| < δ λ_i, no further than that otherwise,
+///   f_i = −k w_i (s_i + T v_i), no more than n μ f_N w_i λ_i;   δ = n μ f_N/k
+///
+/// k = 1/compliance [N/m], T the loss time [s], a and μ as of FrictionLimits (the patch may shrink, friction
+/// may depend on the slip's speed): the elasto-plastic friction of [DupontHaywardArmstrongAltpeter2002] at
+/// every point, with Coulomb's limit on the whole of a point's force. The outer points slip before the inner
+/// ones; what creeps before the patch slips as a whole is theirs. As k grows, the sum tends to the limit
+/// surface of the disc; its torque limit is that of FrictionLimits exactly.
+///
+/// Nothing here is a mode or an event. A step of the implicit Euler method is a convex problem in the slip
+/// q = (v_r, ω_r) at its end, in the hand's frame,
+///
+///   min ½ (q − q_free)ᵀ N (q − q_free)/h + k/(h+T) Σ w_i ψ_i(s_i + (h+T) B_i q),   B_i q = v_r + ω_r J a p_i
+///
+/// N = (G M⁻¹ Gᵀ)⁻¹, ψ_i(u) = |u|²/2 up to δ λ_i and linear beyond it.
+template <class S>
+class GivingPoints {
+ public:
+  using Slip = Vec3<S>;                    ///< m/s, m/s, rad/s
+  using Inertia = std::array<Vec3<S>, 3>;  ///< kg, kg m, kg m²
+
+  /// `limits` must have a compliance > 0.
+  explicit GivingPoints(const FrictionLimits<S>& limits);
+
+  Stretch<S> zero() const;
+  /// Static: the stretches under which the points carry `wrench` [N, N, N m] in the hand's frame, with limits
+  /// n μ f_N [N] and L(f_N) [m]. Where they cannot, they carry what they can.
+  void hold(const Vec3<S>& wrench, const S& force_limit, const S& length, Stretch<S>& to);
+
+  struct Step {
+    S h;              ///< [s]
+    S force_limit;    ///< n μ f_N [N] at the end
+    S length;         ///< L(f_N) [m] at the end
+    Inertia inertia;  ///< N
+    Slip free;        ///< the slip at the end without the points' wrench
+  };
+  /// From `from` to `to` (not the same); `slip` is the first guess and the answer, `wrench` [N, N, N m] what
+  /// acts on the object at the end. False if the iteration spends its budget.
+  bool step(const Step& step, const Stretch<S>& from, Stretch<S>& to, Slip& slip, Vec3<S>& wrench);
+
+  /// 2 fine − coarse: of second order, where both are of first.
+  static void extrapolate(const Stretch<S>& coarse, const Stretch<S>& fine, Stretch<S>& to);
+
+ private:
+  struct Sum {
+    double energy;
+    Vec3<double> moment;            ///< Σ w Bᵀ e
+    std::array<double, 6> bending;  ///< Σ w Bᵀ C B: xx, xz, zz, xτ, zτ, ττ
+  };
+  Sum sum(const Stretch<S>& from, const Vec3<double>& slip, double gain, double radius, double yield) const;
+  bool solve(const Step& problem, const Stretch<S>& from, const S& gain, const S& radius, const S& yield,
+             Slip& slip, Vec3<S>& wrench);
+  void move(const Stretch<S>& from, const Slip& slip, const S& radius, const S& yield, const S& h,
+            Stretch<S>& to) const;
+  Eigen::Matrix<double, dynamics::kDualSize, 1> limit_gradient(const dynamics::Dual& yield,
+                                                               std::size_t i) const;
+
+  DiscPoints points_;
+  std::vector<double> load_;                              ///< λ_i
+  std::vector<typename Stretch<S>::Gradient> load_dual_;  ///< empty where it does not vary
+  S stiffness_, loss_time_, torque_factor_;
+};
+
+extern template class GivingPoints<double>;
+extern template class GivingPoints<dynamics::Dual>;
+
+/// Contact models whose pads may give at every point.
+class GivesAtPoints {
+ public:
+  virtual ~GivesAtPoints() = default;
+  virtual bool gives_at_points() const = 0;
+  virtual const FrictionLimits<double>& point_limits(double) const = 0;
+  virtual const FrictionLimits<dynamics::Dual>& point_limits(const dynamics::Dual&) const = 0;
+};
+
+}  // namespace unhand::contact

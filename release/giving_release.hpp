@@ -1,0 +1,38 @@
+// The release from pads that give at every point: time steps without events. Internal to release.
+#pragma once
+
+#include "contact/giving_points.hpp"
+#include "release/simulate_release.hpp"
+
+namespace unhand::release {
+
+/// What a simulation of `simulate_release` starts from, in the order of its own preparations.
+template <class S>
+struct GivingStart {
+  contact::Relative<S> relative;
+  contact::Hold<S> hold;
+  std::vector<S> time_events;  ///< [s], increasing: kinks of hand and force, and the separation
+  double separation{};         ///< [s]; +infinity for never
+  int free_mode{};
+};
+
+/// Steps the points (contact::GivingPoints) with the rigid body by the implicit Euler method in the object's
+/// motion against the hand,
+///
+///   N (q₁ − q₀ − h b)/h = f(q₁),   q = (v_r, ω_r),   b its rate without friction, N = (G M⁻¹ Gᵀ)⁻¹,
+///
+/// twice with h/2 and once with h, which are extrapolated: second order, L-stable, whatever the springs. h
+/// follows from the tolerances and the time events alone, so that derivatives are those of the steps. The
+/// recorded trajectory has the rate at the ends of its pieces that the points' wrench there gives.
+template <class S>
+ReleaseResult<S> simulate_giving_release(const ReleaseProblem<S>& problem, const contact::GivesAtPoints& pads,
+                                         const contact::SceneSource& scenes, const GivingStart<S>& start,
+                                         const ReleaseOptions& options);
+
+/// The wrench about the patch [N, N, N m] that moves the object as the recorded piece says at `fraction` of
+/// it.
+template <class S>
+dynamics::Wrench<S> wrench_of_motion(const dynamics::TrajectoryPiece<S, 6>& piece, const S& fraction,
+                                     const contact::Scene<S>& scene);
+
+}  // namespace unhand::release

@@ -1,0 +1,180 @@
+// Pads that give at every point: against the closed forms of a disc, the exact disc that they tend to, and
+// many bristles of a simulator that shares no equation with them.
+#include "contact/giving_points.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "contact/disc_friction.hpp"
+#include "contact/registry.hpp"
+#include "crosscheck/distributed_patch.hpp"
+#include "tests/support/effect_releases.hpp"
+
+namespace unhand {
+namespace {
+
+using contact::FrictionVariation;
+using contact::GivingPoints;
+using dynamics::Twist;
+
+constexpr double kMu = 0.5, kRadius = 0.012, kNormal = 20, kForce = 2 * kMu * kNormal;
+
+contact::FrictionLimits<double> limits(double compliance, double loss_time) {
+  FrictionVariation<double> v;
+  v.compliance = compliance;
+  v.loss_time = loss_time;
+  return {{kMu, kRadius}, v};
+}
+
+/// The wrench [N, N, N m] of points that are dragged by `slip` for h [s], whatever they say.
+contact::Vec3<double> dragged(GivingPoints<double>& points, contact::Stretch<double>& stretch,
+                              const contact::Vec3<double>& slip, double h) {
+  constexpr double kHeavy = 1e6;
+  contact::Stretch<double> to = stretch;
+  contact::Vec3<double> at = slip, wrench;
+  const GivingPoints<double>::Step step{
+      h, kForce, 2.0 / 3 * kRadius, {{{kHeavy, 0, 0}, {0, kHeavy, 0}, {0, 0, kHeavy}}}, slip};
+  EXPECT_TRUE(points.step(step, stretch, to, at, wrench));
+  stretch = to;
+  return wrench;
+}
+
+TEST(GivingPoints, TheQuadratureKeepsForceTorqueAndStiffness) {
+  const auto p = contact::disc_quadrature({3, 5, 7});
+  double area = 0, first = 0, second = 0, x = 0, z = 0;
+  for (std::size_t i = 0; i < p.x.size(); ++i) {
+    const double rho = std::hypot(p.x[i], p.z[i]);
+    area += p.area[i], first += p.area[i] * rho, second += p.area[i] * rho * rho;
+    x += p.area[i] * p.x[i], z += p.area[i] * p.z[i];
+  }
+  EXPECT_EQ(p.x.size(), 15u);
+  EXPECT_NEAR(area, 1, 1e-14);
+  EXPECT_NEAR(first, 2.0 / 3, 1e-14);
+  EXPECT_NEAR(second, 0.5, 1e-14);
+  EXPECT_NEAR(std::hypot(x, z), 0, 1e-14);
+}
+
+TEST(GivingPoints, ADiscTwistedSlipsFromItsRimInwards) {
+  // Elastic up to the rim's yield at φ = 1, φ = k a θ/(n μ f_N); beyond it, with ρ = 1/φ the border,
+  // τ = τ_max (1 − 1/(4 φ³)).
+  constexpr double kCompliance = 2e-5;
+  GivingPoints<double> points(limits(kCompliance, 0));
+  auto stretch = points.zero();
+  const double torque = 2.0 / 3 * kRadius * kForce, unit = kForce * kCompliance / kRadius;  // rad
+  for (int k = 1; k <= 40; ++k) {
+    const double phi = 0.1 * k;
+    const auto wrench = dragged(points, stretch, {0, 0, 0.1 * unit / 1e-3}, 1e-3);
+    const double exact = phi <= 1 ? 0.75 * phi : 1 - 0.25 / (phi * phi * phi);
+    EXPECT_NEAR(-wrench[2] / torque, exact, phi <= 0.9 ? 1e-3 : 0.02) << phi;  // of four rings
+    EXPECT_NEAR(std::hypot(wrench[0], wrench[1]) / kForce, 0, 1e-3);
+  }
+}
+
+TEST(GivingPoints, TheirSlidingWrenchIsTheDiscs) {
+  GivingPoints<double> points(limits(1e-9, 0));
+  double worst = 0;
+  for (const double epsilon : {0.1, 0.3, 0.5, 0.653, 0.8, 1.0, 1.3, 2.0, 5.0}) {
+    auto stretch = points.zero();
+    const auto wrench = dragged(points, stretch, {epsilon * kRadius * 3, 0, 3}, 1e-2);
+    const auto exact = contact::disc_friction(epsilon);
+    const double error = std::max(std::abs(-wrench[0] / kForce - exact.force),
+                                  std::abs(-wrench[2] / (kForce * kRadius) - exact.torque));
+    worst = std::max(worst, error);
+    // where the instantaneous centre lies outside the disc, no point is near it
+    if (epsilon > 1.2) {
+      EXPECT_LT(error, 1e-4) << epsilon;
+    }
+  }
+  EXPECT_LT(worst, 0.02) << "at the centre's chance distance from one of the points";
+}
+
+double distance(const Twist<double>& a, const Twist<double>& b) {
+  return std::max(std::hypot(a.vx - b.vx, a.vz - b.vz), 0.1 * std::abs(a.omega - b.omega));  // m/s, at 10 cm
+}
+
+TEST(GivingPoints, StiffPadsAreTheExactDisc) {
+  std::mt19937_64 random(75);
+  double mean = 0, worst = 0;
+  constexpr int kThrows = 8;
+  for (int i = 0; i < kThrows; ++i) {
+    const auto thrown = support::random_throw(random, 0);
+    FrictionVariation<double> stiff;
+    stiff.compliance = 1e-11;
+    const auto points = support::detach("limit_surface_disc", thrown, stiff, 1e-9);
+    const auto disc = support::detach("limit_surface_disc", thrown, FrictionVariation<double>{}, 1e-9);
+    const double error = distance({points.state[3], points.state[4], points.state[5]},
+                                  {disc.state[3], disc.state[4], disc.state[5]});
+    mean += error / kThrows, worst = std::max(worst, error);
+  }
+  std::printf("stiff points against the disc: mean %.2e, worst %.2e m/s\n", mean, worst);
+  EXPECT_LT(mean, 3e-4);  // of some 2 m/s
+}
+
+/// A hand that starts at rest without load, launches and brakes while the pads open. No gravity: the bristles
+/// of the oracle start unstretched.
+struct Launch {
+  release::PolynomialHand hand = release::PolynomialHand::segments(
+      0, {0, 0, 0}, {1.5, 1.0, 2},
+      {{0.03, {0, 0, 0}, {100, 150, -900}}, {0.06, {3, 4.5, -27}}, {0.2, {3, 4.5, -27}, {-300, -500, 3000}}});
+  contact::ProfileNormalForce force;
+  dynamics::RigidBody<double> body{0.15, 6e-4};
+  release::Grasp<double> grasp{0.09, 0.2};
+
+  Launch() : force(profile()) {}
+  static contact::OpeningProfile<double> profile() {
+    contact::OpeningProfile<double> p;
+    p.open_command = 0.04, p.grip_force = kNormal, p.dead_time = 0.008, p.opening_time = 0.05, p.shape = 1.2;
+    return p;
+  }
+  release::ReleaseProblem<double> problem(const contact::ContactModel& model) const {
+    return {hand, force, model, body, {0, 0}, grasp, 0.0, {}, 0.0};
+  }
+};
+
+TEST(GivingPoints, ThrowAsManyBristlesDo) {
+  // With losses, as pads have: vibrations that nothing damps, the steps of both would damp.
+  const Launch launch;
+  for (const double slip : {3e-6, 3e-4, 1e-3})
+    for (const double loss : {1e-3, 5e-3}) {
+      contact::ContactParameters<double> p;
+      p.patch = {kMu, kRadius};
+      p.variation.compliance = slip / kForce;
+      p.variation.loss_time = loss;
+      const auto model = contact::make_contact_model("limit_surface_disc", p);
+      const auto problem = launch.problem(*model);
+      release::ReleaseOptions usual, fine;
+      usual.integrator.tolerances = {1e-5, 1e-8};
+      fine.integrator.tolerances = {1e-7, 1e-10};
+      const auto ours = simulate_release(problem, usual), finer = simulate_release(problem, fine);
+      crosscheck::PatchOptions options;
+      options.elastic_slip = slip;
+      options.loss_time = loss;
+      const auto many =
+          simulate_distributed_patch(problem, {kMu, kRadius, crosscheck::disc_points(12)}, options);
+      ASSERT_EQ(ours.outcome, release::ReleaseOutcome::detached);
+      ASSERT_EQ(many.outcome, release::ReleaseOutcome::detached);
+      // 432 bristles are 4e-5 m/s from the disc (distributed_patch_test.cpp)
+      EXPECT_LT(distance(finer.detach.twist, many.detach.twist), 5e-5) << slip << ' ' << loss;
+      EXPECT_LT(distance(ours.detach.twist, finer.detach.twist), 2e-4) << slip << ' ' << loss;
+    }
+}
+
+TEST(GivingPoints, TheLedgerClosesAndPadsNeverFeed) {
+  const Launch launch;
+  contact::ContactParameters<double> p;
+  p.patch = {kMu, kRadius};
+  p.variation.compliance = 3e-4 / kForce;
+  p.variation.loss_time = 3e-3;
+  const auto model = contact::make_contact_model("limit_surface_disc", p);
+  release::ReleaseOptions options;
+  options.integrator = support::tight(1e-7, 1e-10);
+  options.ledger = true;
+  const auto result = simulate_release(launch.problem(*model), options);
+  const auto& l = result.ledger;
+  EXPECT_NEAR(l.residual, 0, 1e-5 * std::abs(l.hand_work)) << l.hand_work;
+  EXPECT_LT(l.linear_friction + l.torsional_friction, 0);
+}
+
+}  // namespace
+}  // namespace unhand
