@@ -22,7 +22,7 @@ namespace fl = planners::flip;
 namespace fs = std::filesystem;
 
 struct Options {
-  std::string target, learner{"m4"}, robot{"planners/flip/robot.toml"}, card, json, report;
+  std::string target, learner{"m4"}, robot{"panda-flip"}, card, json, report;
   std::uint64_t seed{1};
   int iterations{5}, throws{3}, repeats{5};
   double com_offset{-1};
@@ -96,7 +96,7 @@ void run(const Options& o) {
   if (!o.report.empty()) {
     Json settings{{"target", {answer.target.pose.x, answer.target.pose.angle}},
                   {"learner", o.learner},
-                  {"robot", fitting::checksum_of(o.robot).value_or("")},
+                  {"robot", fitting::checksum_of(o.robot).value_or(o.robot)},
                   {"seed", o.seed},
                   {"throws", o.throws},
                   {"repeats", o.repeats},
@@ -128,7 +128,7 @@ Command plan_flip_command(Parser& plan) {
   Parser& parser = plan.subcommand(
       "flip", "Learn to throw a bar so that it lands at a place and an angle, on a simulated robot");
   parser.footer(
-      "Example: unhand plan flip --target 1.2,180 --learner m4 --robot planners/flip/robot.toml --seed 7 "
+      "Example: unhand plan flip --target 1.2,180 --learner m4 --robot robot.toml --seed 7 "
       "--report out/flip\n"
       "A run that was killed goes on where it was when it is given the same --report.");
   parser
@@ -141,7 +141,8 @@ Command plan_flip_command(Parser& plan) {
           "m4: release physics and what is left over")
       .one_of({"m1", "m2", "m3", "m4"})
       .with_default();
-  parser.option("--robot", o->robot, "The robot as it is declared (TOML)").with_default();
+  parser.option("--robot", o->robot, "The robot as it is declared: panda-flip, or a TOML file")
+      .with_default();
   parser.option("--seed", o->seed, "Which robot: each seed draws its own hidden numbers").with_default();
   parser
       .option("--com-offset", o->com_offset,

@@ -4,6 +4,7 @@
 //   does
 #include <fmt/format.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -33,6 +34,35 @@ struct Spread {
   double mean() const { return sum / n; }
   double variance() const { return n > 1 ? (squares - sum * sum / n) / (n - 1) : 0; }
 };
+
+/// How far a linear map of the commands misses the landings of a population: of the landing itself (model 1),
+/// and of the detach state with flight behind it (model 2); normalised errors, root mean square.
+struct Curvature {
+  double landing{}, detach{};
+};
+Curvature curvature(const FlipRobot& robot, const std::vector<FlipDatum>& data) {
+  const Eigen::Index n = static_cast<Eigen::Index>(data.size());
+  Eigen::MatrixXd A(n, 4), y(n, 8);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const FlipDatum& one = data[static_cast<std::size_t>(i)];
+    const auto f = robot.motion.range.fractions(one.command);
+    A.row(i) << 1, f[0], f[1], f[2];
+    for (Eigen::Index j = 0; j < 6; ++j) y(i, j) = one.detach[static_cast<std::size_t>(j)];
+    y(i, 6) = one.landing.x, y(i, 7) = one.landing.angle;
+  }
+  const Eigen::MatrixXd fitted = A * A.householderQr().solve(y);
+  Curvature out;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const FlipTarget seen{data[static_cast<std::size_t>(i)].landing};
+    DetachVector d{};
+    for (Eigen::Index j = 0; j < 6; ++j) d[static_cast<std::size_t>(j)] = fitted(i, j);
+    const auto flown = fly_flip(d);
+    if (!flown) continue;
+    out.landing += std::pow(normalized_error({fitted(i, 6), fitted(i, 7)}, seen), 2) / static_cast<double>(n);
+    out.detach += std::pow(normalized_error(*flown, seen), 2) / static_cast<double>(n);
+  }
+  return {std::sqrt(out.landing), std::sqrt(out.detach)};
+}
 
 void population(const FlipRobot& robot, std::uint64_t seed) {
   const FlipPlant plant(robot, seed);
@@ -89,6 +119,11 @@ void population(const FlipRobot& robot, std::uint64_t seed) {
     fmt::print("damping {:.1f}: turned {:.0f} degrees at most\n", grid[static_cast<std::size_t>(d)].damping,
                most / kDegree);
   }
+  const Curvature curved = curvature(robot, thrown.data);
+  fmt::print(
+      "linear over the whole range: landings missed by {:.2f} (landing linear), {:.2f} (detach state "
+      "linear)\n",
+      curved.landing, curved.detach);
   fmt::print(
       "repetitions scatter by {:.1f} cm and {:.1f} degrees (pooled 1 sigma); {} of {} throws lost\n"
       "limits used: position {:.0f} %, velocity {:.0f} %, torque {:.0f} %; {:.2f} ms a throw\n",
@@ -107,6 +142,17 @@ class Paths {
     three_.push_back(path.reached(3));
   }
   double initial() const { return mean(initial_); }
+  /// Mean of this minus the other on the same robots and targets, with its standard error.
+  std::string against(const Paths& other) const {
+    Spread first, minimum;
+    for (std::size_t i = 0; i < first_.size(); ++i) {
+      first.add(std::min(first_[i], 20.0) - std::min(other.first_[i], 20.0));
+      minimum.add(minimum_[i] - other.minimum_[i]);
+    }
+    return fmt::format("{:+.3f} ± {:.3f} after one iteration, {:+.3f} ± {:.3f} at the minimum", first.mean(),
+                       std::sqrt(first.variance() / first.n), minimum.mean(),
+                       std::sqrt(minimum.variance() / minimum.n));
+  }
   std::string row() const {
     return fmt::format("{:.2f} | {:.2f} ± {:.2f} | {:.2f} ± {:.2f} | {} | {} | {} | {}", initial(),
                        mean(first_), error(first_), mean(minimum_), error(minimum_), reached(two_),
@@ -189,17 +235,18 @@ void targets(const FlipRobot& robot, std::size_t robots) {
              Paths::header());
   for (std::size_t t = 0; t < 4; ++t)
     for (std::size_t m = 0; m < 3; ++m) {
-      Paths all;
-      for (const auto& one : paths) all.add(one[m][t]);
-      fmt::print("| {} | {} | {} |\n", kTargetNames[t], names[m], all.row());
+      Paths at;
+      for (const auto& one : paths) at.add(one[m][t]);
+      fmt::print("| {} | {} | {} |\n", kTargetNames[t], names[m], at.row());
     }
+  Paths all[3];
   for (std::size_t m = 0; m < 3; ++m) {
-    Paths all;
     for (const auto& one : paths)
-      for (const LearningPath& path : one[m]) all.add(path);
-    fmt::print("| all | {} | {} |\n", names[m], all.row());
+      for (const LearningPath& path : one[m]) all[m].add(path);
+    fmt::print("| all | {} | {} |\n", names[m], all[m].row());
   }
-  fmt::print("\n{} robots, {:.0f} s\n", robots, seconds() - begin);
+  fmt::print("\nmodel 2 - model 1: {}\nmodel 4 - model 2: {}\n{} robots, {:.0f} s\n", all[1].against(all[0]),
+             all[2].against(all[1]), robots, seconds() - begin);
 }
 
 void shift(const FlipRobot& robot, std::size_t robots) {
@@ -235,26 +282,27 @@ void shift(const FlipRobot& robot, std::size_t robots) {
     }
   });
   fmt::print("| learner | {} |\n| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n", Paths::header());
+  Paths all[4];
   for (std::size_t m = 0; m < 4; ++m) {
-    Paths all;
     for (const auto& one : paths)
-      for (const LearningPath& path : one[m]) all.add(path);
-    fmt::print("| {} | {} |\n", names[m], all.row());
+      for (const LearningPath& path : one[m]) all[m].add(path);
+    fmt::print("| {} | {} |\n", names[m], all[m].row());
   }
   for (std::size_t t = 0; t < 4; ++t)
     for (std::size_t m = 0; m < 4; ++m) {
-      Paths all;
-      for (const auto& one : paths) all.add(one[m][t]);
-      fmt::print("| {}: {} | {} |\n", kTargetNames[t], names[m], all.row());
+      Paths at;
+      for (const auto& one : paths) at.add(one[m][t]);
+      fmt::print("| {}: {} | {} |\n", kTargetNames[t], names[m], at.row());
     }
-  fmt::print("\n{} robots, {:.0f} s\n", robots, seconds() - begin);
+  fmt::print("\nmodel 3 - model 2: {}\nmodel 4 - model 3: {}\n{} robots, {:.0f} s\n", all[1].against(all[0]),
+             all[2].against(all[1]), robots, seconds() - begin);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   const std::string_view what = argc > 1 ? argv[1] : "";
-  const FlipRobot robot = read_flip_robot(UNHAND_FLIP_ROBOT);
+  const FlipRobot robot = read_flip_robot("panda-flip");
   const std::uint64_t number = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 0;
   if (what == "population")
     population(robot, number > 0 ? number : 1);

@@ -226,7 +226,7 @@ std::optional<FlipCommand> ReleaseLearner::next() {
       return std::hypot(s.at[0] - p.at[0], s.at[1] - p.at[1], s.at[2] - p.at[2]) < 1.9 * library_.spacing();
     });
     if (!close) starts.push_back(p);
-    if (starts.size() == 2) break;
+    if (starts.size() == 2 || (!starts.empty() && starts.front().worth > 0.5)) break;
   }
   Point best = starts.front();
   for (Point at : starts) {

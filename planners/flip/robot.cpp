@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <stdexcept>
 
@@ -118,15 +119,16 @@ Chain carrying(const Chain& chain, const Bar& bar) {
       chain, {bar.mass, {0, 0, bar.com_offset}, symmetric(bar.inertia, bar.inertia, along, 0, 0, 0)});
 }
 
-FlipRobot read_flip_robot(const std::filesystem::path& file) {
-  TomlKeys keys = TomlKeys::parse(file);
+FlipRobot read_flip_robot(const std::string& name_or_file) {
+  TomlKeys keys = name_or_file == "panda-flip" ? TomlKeys::parse_text(built_in_robot(), name_or_file)
+                                               : TomlKeys::parse(name_or_file);
   FlipRobot out;
   out.name = keys.required("name", keys.text("name"));
   keys.text("source");
   keys.text("notes");
   const std::string arm = keys.required("arm", keys.text("arm"));
   const auto beside = [&](const std::string& name) {
-    return name == "panda" ? name : (file.parent_path() / name).string();
+    return name == "panda" ? name : (std::filesystem::path(name_or_file).parent_path() / name).string();
   };
   try {
     out.chain = read_chain(beside(arm));

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <array>
-#include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "planners/arm/chain.hpp"
 
@@ -102,10 +102,13 @@ struct FlipRobot {
   FlipSensors sensors;
 };
 
-/// From TOML; planners/flip/robot.toml is the example, and says what each key means. `arm` is as for
-/// read_chain, a file's name relative to the TOML file. All keys but `source` and `notes` are required.
-/// Throws datasets::TomlError.
-FlipRobot read_flip_robot(const std::filesystem::path& file);
+/// The text of planners/flip/robot.toml, which comes with the library as "panda-flip" and says what each key
+/// means.
+std::string_view built_in_robot();
+
+/// "panda-flip", or a TOML file with the same keys; all but `source` and `notes` are required. `arm` is as
+/// for read_chain, a file's name relative to the TOML file. Throws datasets::TomlError.
+FlipRobot read_flip_robot(const std::string& name_or_file);
 
 /// The chain with the bar held rigidly along the tip's z axis: a thin rod's inertia across it.
 Chain carrying(const Chain& chain, const Bar& bar);

@@ -674,9 +674,7 @@ TEST_F(Cli, PlansAThrowWithACard) {
 }
 
 TEST_F(Cli, LearnsToThrowFlipAndGoesOnAfterAKill) {
-  const std::string robot = UNHAND_FLIP_ROBOT;
-  const std::string what =
-      "plan flip --target 1.2,180 --robot " + robot + " --seed 3 --iterations 2 --repeats 1 --report out ";
+  const std::string what = "plan flip --target 1.2,180 --seed 3 --iterations 2 --repeats 1 --report out ";
   const Answer answer = run(what + "--learner m2 --json flip.json");
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.out, HasSubstr("m2: target 1.20 m, 180 degrees"));
@@ -703,7 +701,7 @@ TEST_F(Cli, LearnsToThrowFlipAndGoesOnAfterAKill) {
   expect_refusal(what + "--learner m1", 3, "session.json: /settings/learner: another session lies there");
   std::ofstream(trials / "path-0002.json") << "{\"command\": {";
   expect_refusal(what + "--learner m2", 3, "path-0002.json");
-  const std::string other = "plan flip --robot " + robot + " --learner ";
+  const std::string other = "plan flip --learner ";
   expect_refusal(other + "m3 --target 1.2,180", 2, "--com-offset is missing");
   expect_refusal(other + "m2 --target 1.2", 2, "--target: '1.2' is not X,DEGREES");
   expect_refusal("plan flip --target 1.2,180 --robot none.toml", 3, "none.toml");

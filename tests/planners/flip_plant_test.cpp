@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <numbers>
 
@@ -13,7 +14,7 @@ namespace unhand::planners::flip {
 namespace {
 
 const FlipRobot& robot() {
-  static const FlipRobot it = read_flip_robot(UNHAND_FLIP_ROBOT);
+  static const FlipRobot it = read_flip_robot("panda-flip");
   return it;
 }
 /// The declared robot, without anything hidden, random or noisy.
@@ -217,14 +218,13 @@ TEST(FlipPopulation, Trends) {
 TEST(FlipRobotFile, TellsWhatIsWrong) {
   const auto path = std::filesystem::temp_directory_path() / "flip_robot_test.toml";
   const auto refusal = [&](const std::string& from, const std::string& to) -> std::string {
-    std::ifstream in(UNHAND_FLIP_ROBOT);
-    std::string text{std::istreambuf_iterator<char>(in), {}};
+    std::string text(built_in_robot());
     const auto at = text.find(from);
     EXPECT_NE(at, std::string::npos) << from;
     text.replace(at, from.size(), to);
     std::ofstream(path) << text;
     try {
-      read_flip_robot(path);
+      read_flip_robot(path.string());
     } catch (const datasets::TomlError& error) {
       return error.what();
     }
