@@ -42,9 +42,11 @@ std::string reached(const fl::LearningPath& path, int hits) {
 
 std::string target_box(const fl::FlipTarget& t) {
   return fmt::format(
-      "set object 1 rectangle from {},{} to {},{} fs solid 0.25 noborder fc rgb '#55aa55' behind\n",
+      "set object 1 rectangle from {0},{1} to {2},{3} fs solid 0.25 noborder fc rgb '#55aa55' behind\n"
+      "set xrange [*<{4}:{5}<*]\nset yrange [*<{1}:{3}<*]\n",
       t.pose.x - t.tolerance_x, (t.pose.angle - t.tolerance_angle) / kDegree, t.pose.x + t.tolerance_x,
-      (t.pose.angle + t.tolerance_angle) / kDegree);
+      (t.pose.angle + t.tolerance_angle) / kDegree, t.pose.x - 1.2 * t.tolerance_x,
+      t.pose.x + 1.2 * t.tolerance_x);
 }
 
 /// Landings of every iteration around the target.
@@ -78,7 +80,8 @@ void draw_path(const FlipAnswer& a, const std::filesystem::path& folder) {
   }
   if (figure.data.empty()) return;
   figure.script =
-      "set grid\nset key outside bottom center horizontal\nset xlabel 'landing x [m]'\nset ylabel 'angle "
+      "set grid\nset key outside bottom center horizontal samplen 1\nset xlabel 'landing x [m]'\nset ylabel "
+      "'angle "
       "from "
       "hanging [deg]'\nset offsets graph 0.05, graph 0.05, graph 0.05, graph 0.05\n" +
       target_box(a.target) + plots + "\n";
@@ -141,11 +144,13 @@ void draw_population(const FlipAnswer& a, const std::filesystem::path& folder) {
       }
   if (figure.data.empty()) return;
   const char* names[]{"low", "middle", "high"};
-  for (std::size_t i = 0; i < 3; ++i)
-    plots += fmt::format(
-        ", NaN with points pt {} lc rgb '#444444' title 'pitch {}', NaN with points pt 7 ps {} lc rgb "
-        "'#444444' title 'speed {}', NaN with points pt 7 lc rgb '{}' title 'damping {}'",
-        kMarkers[i], names[i], kSizes[i], names[i], kColours[i], names[i]);
+  const auto key = [&](const char* what, std::size_t i, int marker, double size, const char* colour) {
+    plots += fmt::format(", NaN with points pt {} ps {} lc rgb '{}' title '{} {}'", marker, size, colour,
+                         what, names[i]);
+  };
+  for (std::size_t i = 0; i < 3; ++i) key("pitch", i, kMarkers[i], 0.8, "#444444");
+  for (std::size_t i = 0; i < 3; ++i) key("speed", i, 7, kSizes[i], "#444444");
+  for (std::size_t i = 0; i < 3; ++i) key("damping", i, 7, 0.8, kColours[i]);
   figure.script =
       "set grid\nset key outside right\nset xlabel 'landing x [m]'\nset ylabel 'angle from hanging "
       "[deg]'\nset ytics 90\n" +

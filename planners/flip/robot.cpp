@@ -70,9 +70,9 @@ FlipMotion motion_of(Section keys, const Chain& chain) {
 
 FlipControl control_of(Section keys, int n) {
   FlipControl out;
-  out.stiffness = keys.joints("stiffness_n_m", n, not_negative("N m/rad"));
+  out.stiffness = keys.joints("stiffness_n_m_rad", n, not_negative("N m/rad"));
   out.damping = keys.joints("damping_n_m_s", n, not_negative("N m s/rad"));
-  out.brake_stiffness = keys.joints("brake_stiffness_n_m", n, not_negative("N m/rad"));
+  out.brake_stiffness = keys.joints("brake_stiffness_n_m_rad", n, not_negative("N m/rad"));
   out.brake_damping = keys.joints("brake_damping_n_m_s", n, not_negative("N m s/rad"));
   out.brake_share = keys.joints("brake_share", n, not_negative(""));
   out.torque_rate = keys.number("torque_rate_n_m_s", positive("N m/s"));

@@ -123,6 +123,31 @@ TEST(FlipPlant, ReactionOfTheBarConverges) {
   EXPECT_LT(std::abs(two.angle - one.angle), 0.08);
 }
 
+// The wrench that carries a rigidly held bar, given to the bare hand, moves it as the bar itself does.
+TEST(FlipPlant, ReactionOfAHeldBarIsItsInertia) {
+  const Bar& bar = robot().bar;
+  const ArmBody body = declared_body(robot(), bar);
+  const ThrowingArm arm(robot(), body, robot().motion.range.at(0.5, 0.8, 0.6), 1);
+  const auto carried = arm.brake().hand;
+  const dynamics::Window all{carried.begin(), carried.end()};
+  std::vector<dynamics::Wrench<double>> on_bar;
+  for (double t = 0.5 * kControlStep; t < carried.end(); t += kControlStep) {  // of the step's middle
+    const auto h = carried.at(all, t);
+    const double rx = bar.com_offset * std::cos(h.pose.theta), rz = bar.com_offset * std::sin(h.pose.theta),
+                 w2 = h.twist.omega * h.twist.omega;
+    const double fx = bar.mass * (h.acceleration.ax - h.acceleration.alpha * rz - w2 * rx),
+                 fz = bar.mass * (h.acceleration.az + h.acceleration.alpha * rx - w2 * rz + 9.81);
+    on_bar.push_back({fx, fz, bar.inertia * h.acceleration.alpha + rx * fz - rz * fx});
+  }
+  const auto loaded = arm.brake(on_bar).hand, bare = arm.brake({}).hand;
+  for (const double t : {0.03, 0.065}) {
+    const auto a = carried.at(all, t), b = loaded.at(all, t), c = bare.at(all, t);
+    EXPECT_GT(std::abs(c.twist.omega - a.twist.omega), 0.05) << t;  // there is something to see
+    EXPECT_LT(std::abs(b.twist.omega - a.twist.omega), 0.06 * std::abs(c.twist.omega - a.twist.omega)) << t;
+    EXPECT_LT(std::abs(b.pose.z - a.pose.z), 0.06 * std::abs(c.pose.z - a.pose.z)) << t;
+  }
+}
+
 // Momentum: what the pads give in the window of the release is what the bar carries away.
 TEST(FlipPlant, ImpulseOfThePadsIsTheBarsMomentum) {
   const ArmBody body = declared_body(robot(), robot().bar);
