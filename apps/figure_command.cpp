@@ -131,7 +131,8 @@ Figure mae_figure(const experiment::Comparison& comparison) {
   for (std::size_t i = 0; i < n; ++i)
     tics += fmt::format("{}'{}' {}", i > 0 ? ", " : "", plain(comparison.models[i].model), i);
   figure.height = 5 + 1.1 * static_cast<double>(n);
-  const double left = 4.4, width = (figure.width - left - 0.5 - 0.5) / 2, panel = (figure.height - 2.6) / 2;
+  const double left = 4.4, gap = 1.1, width = (figure.width - left - gap - 0.5) / 2,
+               panel = (figure.height - 2.6) / 2;
   for (int q = 0; q < experiment::kQuantityCount; ++q) {
     DataBlock block{
         experiment::kQuantities[q].title, {"line", "MAE", "STD of the absolute error", "n", "model"}, {}, {}};
@@ -144,7 +145,7 @@ Figure mae_figure(const experiment::Comparison& comparison) {
       high = std::max(high, s.mae + s.std);
     }
     figure.data.push_back(std::move(block));
-    const double x = left + (q % 2) * (width + 0.5), y = 1.3 + (1 - q / 2) * (panel + 1.3);
+    const double x = left + (q % 2) * (width + gap), y = 1.3 + (1 - q / 2) * (panel + 1.3);
     body += place(figure, {x, x + width, y, y + panel - 0.7});
     body += fmt::format(
         "set ytics ({}) scale 0\n", q % 2 == 0 ? tics : [&] {
