@@ -90,10 +90,11 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
   campaign.threads = request.threads;
   fitting::FitOptions options;
   options.threads = request.threads;
+  options.profile = true;
   const bool has_test = std::any_of(log.throws.begin(), log.throws.end(),
                                     [](const auto& one) { return one.split == datasets::Split::test; });
   int folds = request.kfold > 0 ? request.kfold : has_test ? 0 : kDefaultFolds;
-  Progress progress("fit", folds > 0 ? 5 : 3);
+  Progress progress("fit", 3 + (folds > 0 ? 1 : 0) + (request.floor > 0 ? 1 : 0));
   const fitting::CampaignProblem problem(log, request.log, campaign);
   if (folds > 0 && conditions_of_train(log) < 2) {
     if (request.kfold > 0)
@@ -106,7 +107,7 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
   if (fit.outcome == fitting::FitOutcome::no_start || fit.outcome == fitting::FitOutcome::not_solved)
     throw Unanswered(fmt::format("{}: {}: {}", request.log, to_string(fit.outcome), fit.message));
   progress.step();
-  FitAnswer answer{problem, fit, {}, {}, {}, 1};
+  FitAnswer answer{problem, fit, {}, {}, {}, {}, fitting::gradient_cost(problem, fit), 1};
   answer.threads = request.threads > 0 ? request.threads
                                        : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   answer.throws = fitting::predict_throws(problem, fit, {true, request.threads});
@@ -114,6 +115,8 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
   progress.step();
   if (folds > 0)
     answer.cross_validation = fitting::cross_validate(log, request.log, campaign, options, folds);
+  if (request.floor > 0)
+    answer.floor = fitting::error_floor(log, request.log, problem, fit, options, request.floor);
   if (fit.outcome == fitting::FitOutcome::iterations_spent)
     fmt::print(stderr, "unhand: the fit stopped before it had converged: {}\n", fit.message);
   for (const auto& note : problem.notes()) fmt::print(stderr, "unhand: {}\n", note);
@@ -191,6 +194,12 @@ Command fit_command(Parser& root) {
       .option("--kfold", request->kfold,
               "Cross-validate over so many groups of conditions of the train throws; 0: with 5, and only "
               "if the log has no test throws")
+      .range(0, 1000)
+      .with_default();
+  parser
+      .option("--floor", request->floor,
+              "Simulate so many twins of the campaign with the fitted model and the declared noise, fit and "
+              "predict them alike, and set the errors beside theirs")
       .range(0, 1000)
       .with_default();
   parser.option("--rtol", request->rtol, "Relative tolerance of the integrator")

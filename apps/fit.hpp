@@ -9,6 +9,8 @@
 #include "apps/table.hpp"
 #include "fitting/card.hpp"
 #include "fitting/evaluate.hpp"
+#include "fitting/gradient_cost.hpp"
+#include "fitting/twin.hpp"
 
 namespace unhand::apps {
 
@@ -17,6 +19,7 @@ struct FitRequest {
   std::vector<std::string> effects;
   std::string json, card, report;  ///< destinations; empty: none
   int threads{0}, kfold{0};        ///< kfold 0: only where the log has no test split
+  int floor{0};                    ///< twins to fit for the errors' floor
   double rtol{1e-6};
 };
 
@@ -27,9 +30,15 @@ struct FitAnswer {
   std::vector<fitting::PredictedThrow> throws;
   experiment::ModelComparison errors;
   std::optional<fitting::CrossValidation> cross_validation;
+  std::optional<fitting::ErrorFloor> floor;
+  fitting::GradientCost gradients;
   int threads{1};  ///< used
 
   bool has_test() const;
+  /// Of the fit's time, over all threads.
+  double jacobian_share() const {
+    return fit.seconds > 0 ? fit.jacobian_seconds / (fit.seconds * threads) : 0;
+  }
 };
 
 /// The answer in words and tables; `markdown` for the report, otherwise aligned with spaces.

@@ -1,4 +1,4 @@
-// The answer of `unhand fit` on throws, as text and as JSON.
+// The answer of `unhand fit` on throws, as text.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -15,13 +15,6 @@ using experiment::kDegrees;
 
 constexpr int decimals[experiment::kQuantityCount] = {4, 2, 4, 2};
 
-struct Interval {
-  double low{}, high{};
-};
-Interval interval95(const fitting::FittedUnknown& u, double factor) {
-  return {u.value - factor * u.sigma, u.value + factor * u.sigma};
-}
-
 std::string standing_of(const fitting::FittedUnknown& u) {
   if (u.at_bound) return "at its bound";
   if (!std::isfinite(u.data_sigma)) return "not by this log";
@@ -32,10 +25,10 @@ std::string standing_of(const fitting::FittedUnknown& u) {
 Table parameter_table(const fitting::FitResult& fit) {
   Table out{{"parameter", "unit", "value", "1 sigma", "95 % interval", "determined"}, {}, 2};
   for (const auto& u : fit.campaign) {
-    const auto [low, high] = interval95(u, fitting::interval_factor(fit));
-    out.rows.push_back({u.unknown.name, u.unknown.unit, fmt::format("{:.6g}", u.value),
-                        fmt::format("{:.2g}", u.sigma), fmt::format("[{:.5g}, {:.5g}]", low, high),
-                        standing_of(u)});
+    const auto [low, high] = u.interval95();
+    out.rows.push_back(
+        {u.unknown.name, u.unknown.unit, fmt::format("{:.6g}", u.value), fmt::format("{:.2g}", u.sigma),
+         fmt::format("[{:.5g}, {:.5g}]{}", low, high, u.profile ? " of the profile" : ""), standing_of(u)});
   }
   return out;
 }
@@ -57,6 +50,7 @@ Table misfit_table(const fitting::FitResult& fit) {
   return out;
 }
 
+/// Errors, and beside them those of twins that obey the model.
 Table error_table(const FitAnswer& a) {
   Table out{{"throws", "n"}, {}, 1};
   for (const auto& quantity : experiment::kQuantities) out.header.push_back(quantity.title);
@@ -74,75 +68,21 @@ Table error_table(const FitAnswer& a) {
     const auto n =
         static_cast<std::size_t>(std::count_if(a.errors.throws.begin(), a.errors.throws.end(),
                                                [s = split](const auto& one) { return one.split == s; }));
-    if (n > 0) add(name, n, [&, s = split](int q) { return a.errors.statistics(q, s); });
+    if (n == 0) continue;
+    add(name, n, [&, s = split](int q) { return a.errors.statistics(q, s); });
+    if (!a.floor || a.floor->twins == 0) continue;
+    const auto floor = [&, s = split](int q) { return a.floor->statistics(q, s); };
+    add("  its floor", n, floor);
+    std::vector<std::string> ratio{"  over it", ""};
+    for (int q = 0; q < experiment::kQuantityCount; ++q) {
+      const double least = floor(q).mae, mae = a.errors.statistics(q, split).mae;
+      ratio.push_back(least > 0 ? fmt::format("{:.2f}", mae / least) : "-");
+    }
+    out.rows.push_back(std::move(ratio));
   }
   if (const auto& cv = a.cross_validation)
     add("cross-validated", cv->throws.size(), [&](int q) { return cv->statistics(q); });
   return out;
-}
-
-Json statistics_json(const ErrorStatistics& s) {
-  if (s.n == 0) return {{"n", 0}, {"mae", nullptr}, {"std", nullptr}, {"bias", nullptr}};
-  return {{"n", s.n}, {"mae", s.mae}, {"std", s.std}, {"bias", s.bias}};
-}
-
-template <class Statistics>
-Json errors_json(int n, Statistics&& statistics) {
-  Json out{{"n", n}};
-  for (int q = 0; q < experiment::kQuantityCount; ++q)
-    out[experiment::kQuantities[q].key] = statistics_json(statistics(q));
-  return out;
-}
-
-Json parameters_json(const fitting::FitResult& fit) {
-  Json out = Json::object();
-  for (const auto& u : fit.campaign) {
-    const auto [low, high] = interval95(u, fitting::interval_factor(fit));
-    Json& one = out[u.unknown.name] = {{"value", u.value},
-                                       {"unit", u.unknown.unit},
-                                       {"sigma", number(u.sigma)},
-                                       {"interval95", {number(low), number(high)}},
-                                       {"data_sigma", number(u.data_sigma)},
-                                       {"determined", std::isfinite(u.data_sigma)},
-                                       {"at_bound", u.at_bound},
-                                       {"prior", nullptr}};
-    if (u.unknown.prior_sigma) one["prior"] = {{"mean", u.unknown.start}, {"sigma", *u.unknown.prior_sigma}};
-  }
-  return out;
-}
-
-Json open_json(const FitAnswer& a) {
-  Json out = Json::array();
-  for (const auto& open : a.fit.open) {
-    Json direction = Json::object();
-    for (std::size_t k = 0; k < open.direction.size(); ++k)
-      direction[a.fit.campaign[k].unknown.name] = open.direction[k] * a.fit.campaign[k].unknown.scale;
-    out.push_back({{"meaning", open.meaning},
-                   {"direction", direction},
-                   {"sigma", number(open.sigma)},
-                   {"would_fix_it", fitting::remedy(a.problem, open)}});
-  }
-  return out;
-}
-
-Json throws_json(const FitAnswer& a) {
-  Json out = Json::array();
-  for (std::size_t i = 0; i < a.fit.throws.size(); ++i) {
-    const auto& t = a.fit.throws[i];
-    Json own = Json::object();
-    for (std::size_t k = 0; k < t.own.size(); ++k) own[a.problem.own()[k].name] = t.own[k];
-    out.push_back({{"id", t.id},
-                   {"split", a.throws[i].comparison.split == Split::train ? "train" : "test"},
-                   {"used", t.used},
-                   {"weight", t.weight},
-                   {"chi2", number(t.chi2)},
-                   {"own", own}});
-  }
-  return out;
-}
-
-double jacobian_share(const FitAnswer& a) {
-  return a.fit.seconds > 0 ? a.fit.jacobian_seconds / (a.fit.seconds * a.threads) : 0;
 }
 
 }  // namespace
@@ -190,72 +130,23 @@ std::string fit_text(const FitAnswer& a, const FitRequest& request, bool markdow
     out += fmt::format("cross-validated: {} folds of whole conditions of the train throws\n", cv->folds);
     for (const auto& failure : cv->failed) out += failure + "\n";
   }
+  if (a.floor)
+    out += fmt::format(
+        "floor: the mean of {} synthetic twins, simulated with the model as fitted and the declared noise, "
+        "then "
+        "fitted and predicted alike\n",
+        a.floor->twins);
   if (a.errors.failed > 0) out += fmt::format("{} throws are not brought to a landing\n", a.errors.failed);
   out += fmt::format("\n{:.2f} s on {} threads, Jacobian {:.0f} %\n", fit.seconds, a.threads,
-                     100 * jacobian_share(a));
-  return out;
-}
-
-Json fit_json(const FitAnswer& a, const FitRequest& request) {
-  const auto& fit = a.fit;
-  Json out = json_head("fit");
-  out["log"] = request.log;
-  out["checksum"] = nullptr;
-  if (const auto sum = fitting::checksum_of(request.log)) out["checksum"] = *sum;
-  out["model"] = request.model;
-  out["effects"] = request.effects;
-  out["settings"] = {{"rtol", request.rtol}, {"kfold", request.kfold}};
-  out["outcome"] = to_string(fit.outcome);
-  out["message"] = fit.message;
-  out["parameters"] = parameters_json(fit);
-  Json names = Json::array(), matrix = Json::array();
-  for (std::size_t i = 0; i < fit.campaign.size(); ++i) {
-    names.push_back(fit.campaign[i].unknown.name);
-    Json row = Json::array();
-    for (std::size_t j = 0; j < fit.campaign.size(); ++j)
-      row.push_back(number(fit.covariance[i * fit.campaign.size() + j]));
-    matrix.push_back(std::move(row));
-  }
-  out["covariance"] = {{"names", names}, {"matrix", matrix}};
-  Json& correlations = out["correlations"] = Json::array();
-  for (const auto& pair : fitting::strong_correlations(fit))
-    correlations.push_back({{"first", pair.first}, {"second", pair.second}, {"value", pair.value}});
-  out["open_directions"] = open_json(a);
-  Json& spreads = out["own_spreads"] = Json::object();
-  for (std::size_t k = 0; k < fit.own_spread.size(); ++k)
-    spreads[a.problem.own()[k].name] = {{"sigma", fit.own_spread[k]}, {"unit", a.problem.own()[k].unit}};
-  out["chi2"] = {{"value", fit.chi2},
-                 {"samples", fit.samples},
-                 {"degrees_of_freedom", fit.degrees_of_freedom},
-                 {"per_degree_of_freedom", fit.chi2_per_dof()}};
-  Json& misfit = out["chi2_by_channel"] = Json::array();
-  for (const auto& m : fit.misfit)
-    misfit.push_back({{"phase", to_string(m.phase)},
-                      {"channel", to_string(m.channel)},
-                      {"samples", m.n},
-                      {"chi2", m.chi2},
-                      {"weight", m.weight}});
-  out["iterations"] = fit.iterations;
-  out["mode_changes"] = fit.mode_changes;
-  out["throws"] = throws_json(a);
-  out["notes"] = a.problem.notes();
-  for (const auto& [split, name] : {std::pair{Split::train, "train"}, {Split::test, "test"}}) {
-    const auto n = static_cast<int>(std::count_if(a.errors.throws.begin(), a.errors.throws.end(),
-                                                  [s = split](const auto& one) { return one.split == s; }));
-    out[name] = errors_json(n, [&, s = split](int q) { return a.errors.statistics(q, s); });
-  }
-  out["cross_validation"] = nullptr;
-  if (const auto& cv = a.cross_validation) {
-    out["cross_validation"] =
-        errors_json(static_cast<int>(cv->throws.size()), [&](int q) { return cv->statistics(q); });
-    out["cross_validation"]["folds"] = cv->folds;
-    out["cross_validation"]["failed_folds"] = cv->failed;
-  }
-  out["failed"] = a.errors.failed;
-  out["time"] = {{"seconds", fit.seconds},
-                 {"jacobian_seconds", fit.jacobian_seconds},
-                 {"threads", a.threads},
-                 {"jacobian_share", jacobian_share(a)}};
+                     100 * a.jacobian_share());
+  const auto& g = a.gradients;
+  if (g.plain > 0)
+    out += fmt::format(
+        "a throw's derivatives by {} unknowns: {:.2f} ms exact, {:.1f} plain predictions; {:.2f} ms by "
+        "central "
+        "differences, {:.1f} of them (median deviation {:.1g})\n",
+        g.unknowns, 1e3 * g.exact / static_cast<double>(used), g.exact / g.plain,
+        1e3 * g.central / static_cast<double>(used), g.central / g.plain, g.deviation);
   return out;
 }
 

@@ -15,7 +15,7 @@
 
 #include "experiment/parallel.hpp"
 #include "experiment/synthetic_campaign.hpp"
-#include "fitting/advice.hpp"
+#include "fitting/fit.hpp"
 
 namespace {
 
@@ -34,8 +34,7 @@ struct Tally {
 
 struct Outcome {
   bool fitted{};
-  double factor{};                                         // half width of an interval in sigmas
-  std::map<std::string, std::pair<double, double>> found;  // value, sigma
+  std::map<std::string, fitting::FittedUnknown> found;
 };
 
 Outcome one_campaign(const experiment::CampaignDesign& design, std::uint64_t seed) {
@@ -51,10 +50,9 @@ Outcome one_campaign(const experiment::CampaignDesign& design, std::uint64_t see
   fitting::FitOptions options;
   options.threads = 1;
   const auto fit = fitting::fit(problem, options);
-  out.factor = fitting::interval_factor(fit);
   out.fitted =
       fit.outcome == fitting::FitOutcome::converged || fit.outcome == fitting::FitOutcome::iterations_spent;
-  for (const auto& u : fit.campaign) out.found[u.unknown.name] = {u.value, u.sigma};
+  for (const auto& u : fit.campaign) out.found[u.unknown.name] = u;
   return out;
 }
 
@@ -85,14 +83,15 @@ int main(int argc, char** argv) {
     for (const auto& outcome : outcomes) {
       failed += !outcome.fitted;
       if (!outcome.fitted) continue;
-      for (const auto& [name, value] : outcome.found) {
-        const double truth = truth_of(design, name), error = (value.first - truth) / truth;
+      for (const auto& [name, u] : outcome.found) {
+        const double truth = truth_of(design, name), error = (u.value - truth) / truth;
+        const auto [low, high] = u.interval95();
         Tally& t = tallies[name];
         ++t.n;
-        t.covered += std::abs(value.first - truth) <= outcome.factor * value.second;
+        t.covered += low <= truth && truth <= high;
         t.bias += error;
         t.square += error * error;
-        t.claimed += value.second / truth;
+        t.claimed += u.sigma / truth;
       }
     }
     for (const auto& [name, t] : tallies) {

@@ -71,6 +71,12 @@ CardParameter read_parameter(Fields& from) {
   if (out.sigma && *out.sigma < 0) from.fail("sigma", fmt::format("{} is below 0", *out.sigma));
   out.unit = from.required("unit", from.text("unit"));
   out.determined = from.boolean("determined").value_or(true);
+  out.low95 = from.number("low95");
+  out.high95 = from.number("high95");
+  if (out.low95 && *out.low95 > out.value)
+    from.fail("low95", fmt::format("{} lies above the value", *out.low95));
+  if (out.high95 && *out.high95 < out.value)
+    from.fail("high95", fmt::format("{} lies below the value", *out.high95));
   return out;
 }
 
@@ -218,6 +224,8 @@ std::string to_json(const ModelCard& card) {
     if (p.sigma) one["sigma"] = *p.sigma;
     one["unit"] = p.unit;
     if (!p.determined) one["determined"] = false;
+    if (p.low95) one["low95"] = *p.low95;
+    if (p.high95) one["high95"] = *p.high95;
   }
   if (card.covariance) write_covariance(*card.covariance, out);
   for (const auto& [name, spread] : card.own_spreads)

@@ -16,6 +16,9 @@ struct CardParameter {
   std::optional<double> sigma;  // 1 σ, in the same unit
   std::string unit;             // "-" where it has none
   bool determined = true;       // false: the log alone says nothing of it, sigma is what was known before
+  // The ends of the 95 % interval where it is not even about the value; an end that is missing beside the
+  // other is open.
+  std::optional<double> low95 = {}, high95 = {};
   bool operator==(const CardParameter&) const = default;
 };
 
@@ -59,7 +62,9 @@ struct CardRange {
 
 ///   {"schema": "model-card", "schema_version": 1, "model": "sliding_pivot",
 ///    "effects": ["contact.viscous"],
-///    "parameters": {"mu": {"value": 0.61, "sigma": 0.01, "unit": "-"}, ...},
+///    "parameters": {"mu": {"value": 0.61, "sigma": 0.01, "unit": "-"},
+///                   "length": {"value": 0.007, "sigma": 0.001, "unit": "m", "low95": 0.0062, "high95":
+///                   0.011}, ...},
 ///    "covariance": {"names": ["mu", ...], "matrix": [[1e-4, ...], ...]},
 ///    "own_spreads": {"mu_deviation": {"sigma": 0.02, "unit": "-"}, ...},
 ///    "log": {"file": "campaign.h5", "title": "...", "checksum": "fnv1a64:..."},

@@ -23,6 +23,7 @@ template <class S>
 FeltForce<S> felt_force(const PreparedThrow& prepared, const ThrowSetup<S>& setup, const Values<S>& values) {
   if (prepared.normal_force) {
     FeltForce<S> force(*prepared.normal_force);
+    force.doubt(prepared.force_fit, values.get("force_deviation", 0));
     // The smoothing fades the bias out over the measured ramp, not from the command on.
     const double start = prepared.force_fit.opening_start;
     force.unbias(setup, std::isfinite(start) ? start : prepared.open_command);
@@ -57,6 +58,9 @@ auto with_release(const PreparedThrow& prepared, const ThrowModel& model, const 
   parameters.open_command = prepared.open_command;
   parameters.delay = Dual(values.get("delay", 0.05) + values.get("delay_deviation", 0));
   parameters.variation = contact::constant(setup.friction);
+  if (model.contact_model == "limit_surface_quartic")
+    parameters.quartic = contact::ConvexQuartic::isotropic_blend(
+        Dual(values.get("kappa", contact::ConvexQuartic::kappa_closest_to_disc())));
   const auto contact = contact::make_contact_model(model.contact_model, parameters);
 
   const Vec2<S> gravity = setup.gravity.at(-prepared.gravity.z);

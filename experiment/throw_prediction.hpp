@@ -13,11 +13,13 @@ namespace unhand::experiment {
 /// The named values that a prediction reads, beside those of the effects ("contact.viscous.1/v_0"):
 ///   mu             friction coefficient [-]
 ///   length         L = c a = τ_max/f_max [m]
+///   kappa          limit_surface_quartic: of its blend (contact::ConvexQuartic) [-]
 ///   grip_force, dead_time, opening_time, shape   contact::OpeningProfile where no normal force was measured
 ///   delay          gripper_delay: from the opening command to the release [s]
 ///   grasp_angle    of this throw, beyond the prepared one [rad]
 ///   grasp_offset   of this throw: the pads hold a point that much nearer to the tip [m]
 ///   mu_deviation   of this throw: its μ is mu (1 + mu_deviation) [-]
+///   force_deviation  of this throw: of its measured normal force, in σ of the smoothing (DoubtfulForce) [-]
 ///   delay_deviation  of this throw, beyond `delay` [s]
 struct ThrowModel {
   std::string contact_model;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "experiment/doubtful_force.hpp"
+
 namespace unhand::experiment {
 
 using dynamics::Dual;
@@ -54,6 +56,11 @@ template <class S>
 void FeltForce<S>::wrap(std::unique_ptr<contact::NormalForce> outer) {
   force_ = outer.get();
   owned_.push_back(std::move(outer));
+}
+template <class S>
+void FeltForce<S>::doubt(const contact::NormalForceSummary& ramp, const S& deviation) {
+  if (is_active(deviation) && DoubtfulForce::applies_to(ramp))
+    wrap(std::make_unique<DoubtfulForce>(*force_, ramp, Dual(deviation)));
 }
 template <class S>
 void FeltForce<S>::unbias(const ThrowSetup<S>& setup, double opening_start) {

@@ -44,6 +44,8 @@ class FeltForce {
   explicit FeltForce(const contact::NormalForce& base) : force_(&base) {}
   explicit FeltForce(std::unique_ptr<contact::NormalForce> base) { wrap(std::move(base)); }
 
+  /// Moves the release of a measured ramp by `deviation` standard deviations, if its smoothing knows them.
+  void doubt(const contact::NormalForceSummary& ramp, const S& deviation);
   /// Takes the sensor's bias off a measured force whose opening starts at `opening_start` [s].
   void unbias(const ThrowSetup<S>& setup, double opening_start);
   /// What comes between sensor and object: release.opening_delay, then contact.adhesion.

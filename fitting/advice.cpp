@@ -35,6 +35,8 @@ std::string remedy_for(const CampaignProblem& problem, const std::string& name) 
     if (!torque) return "the torque behind a pad while the gripper opens";
     return "throws in which the object pivots in the grip: a CoM further from the pads";
   }
+  if (name == "kappa")
+    return "throws whose pads slide and turn at once, with force and torque measured behind a pad";
   if (name == "dead_time" || name == "opening_time" || name == "shape")
     return "the pads' normal force while they open";
   if (name == "delay")
@@ -81,16 +83,19 @@ std::vector<Correlation> strong_correlations(const FitResult& fit, double limit)
   return out;
 }
 
-double interval_factor(const FitResult& fit) {
-  const auto used =
-      std::count_if(fit.throws.begin(), fit.throws.end(), [](const ThrowFit& t) { return t.used; });
-  const auto n = static_cast<double>(used) - static_cast<double>(fit.campaign.size());
+double student_factor(double n) {
   if (n < 1.5) return 12.706;
   if (n < 2.5) return 4.303;
   // Expansion in 1/n [AbramowitzStegun1964] 26.7.5: off by 2e-2 at n = 3, by 1e-3 at 10.
   const double z = 1.959963984540054, z2 = z * z;
   return z * (1 + (z2 + 1) / (4 * n) + ((5 * z2 + 16) * z2 + 3) / (96 * n * n) +
               (((3 * z2 + 19) * z2 + 17) * z2 - 15) / (384 * n * n * n));
+}
+
+std::array<double, 2> FittedUnknown::interval95() const {
+  if (profile) return *profile;
+  const double half = student_factor(degrees_of_freedom) * sigma;
+  return {value - half, value + half};
 }
 
 }  // namespace unhand::fitting

@@ -8,6 +8,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "contact/convex_quartic.hpp"
 #include "dynamics/median.hpp"
 #include "experiment/compare.hpp"
 #include "experiment/parallel.hpp"
@@ -115,10 +116,11 @@ void CampaignProblem::name_unknowns(const std::vector<Effect>& effects) {
   campaign_.clear();
   own_ = {{"grasp_angle", "rad", 0, -1, 1, 0.01, 0.05}, {"grasp_offset", "m", 0, -0.02, 0.02, 1e-3, 1e-3}};
   const bool follows_pads = options_.model != "gripper_delay";
-  bool all_forces = true;
+  bool all_forces = true, any_force = false;
   std::set<std::string> objects;
   for (const auto& t : *throws_) {
     all_forces = all_forces && t.prepared.normal_force.has_value();
+    any_force = any_force || t.prepared.normal_force.has_value();
     objects.insert(t.prepared.object);
   }
   if (follows_pads) {
@@ -133,7 +135,14 @@ void CampaignProblem::name_unknowns(const std::vector<Effect>& effects) {
     if (guessed || radius) length_prior = kHeld * length;
     campaign_.push_back({"mu", "-", first_guess_.mu, 0.01, 5, 0.05, mu_prior});
     campaign_.push_back({"length", "m", length, 1e-4, 0.2, 0.1 * length, length_prior});
+    if (options_.model == "limit_surface_quartic") {
+      // The disc's, and about as far from it as the ellipsoid's 1 is likely. Convex for 0 to 3, singular at
+      // both.
+      const double disc = contact::ConvexQuartic::kappa_closest_to_disc();
+      campaign_.push_back({"kappa", "-", disc, 0.05, 2.95, 0.2, 0.3});
+    }
     own_.push_back({"mu_deviation", "-", 0, -0.5, 0.5, 0.02, 0.03});
+    if (any_force) own_.push_back({"force_deviation", "-", 0, -6, 6, 1, 1, true});
     if (!all_forces) {
       // μ and f₀ enter only as their product: f₀ is known to a factor of two, no better.
       campaign_.push_back({"grip_force", "N", 20, 0.5, 500, 10, 10});

@@ -24,6 +24,8 @@ struct Unknown {
   double scale{};  ///< a change of it that matters
   /// 1 σ of what is known of it without this log, about `start`.
   std::optional<double> prior_sigma{};
+  /// Of what the smoothing of an input leaves open: its prior is what the smoothing says, not to be learned.
+  bool of_input{false};
 };
 
 struct CampaignOptions {

@@ -28,6 +28,7 @@ struct BaseParameter {
 };
 constexpr BaseParameter kBase[] = {{"mu", "-", 0, 10, true},
                                    {"length", "m", 1e-9, 2.0 / 3.0, true},
+                                   {"kappa", "-", 0, 3, true},
                                    {"pads", "-", 1, 1000, true},
                                    {"reference_force", "N", 1e-9, 1e6, true},
                                    {"grip_force", "N", 1e-9, 1e6, true},
@@ -125,7 +126,9 @@ ModelCard card_of(const CampaignProblem& problem, const FitResult& fit) {
   auto& covariance = card.covariance.emplace();
   for (const auto& u : fit.campaign) {
     const bool determined = std::isfinite(u.data_sigma);
-    card.parameters[u.unknown.name] = {u.value, u.sigma, u.unknown.unit, determined};
+    auto& one = card.parameters[u.unknown.name] = {u.value, u.sigma, u.unknown.unit, determined, {}, {}};
+    if (u.profile && std::isfinite((*u.profile)[0])) one.low95 = (*u.profile)[0];
+    if (u.profile && std::isfinite((*u.profile)[1])) one.high95 = (*u.profile)[1];
     covariance.names.push_back(u.unknown.name);
   }
   covariance.matrix = fit.covariance;
@@ -201,7 +204,7 @@ FitResult fit_of(const ModelCard& card, const CampaignProblem& problem, const st
                       fmt::format("is missing: these throws with {} take it", card.model));
     const auto& p = found->second;
     out.campaign.push_back(
-        {u, p.value, p.sigma.value_or(0), p.determined ? p.sigma.value_or(0) : HUGE_VAL, false});
+        {u, p.value, p.sigma.value_or(0), p.determined ? p.sigma.value_or(0) : HUGE_VAL, false, 0, {}});
     std::size_t k = none;
     if (card.covariance)
       k = static_cast<std::size_t>(

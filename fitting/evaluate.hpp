@@ -33,8 +33,9 @@ struct EvaluateOptions {
 /// for train throws, too: a prediction does not know the outcome.
 ///
 /// σ by exact derivatives, y(c, o(c)) with c the campaign's unknowns: T Σ_c Tᵀ + (∂y/∂o) H⁻¹ (∂y/∂o)ᵀ,
-/// T = ∂y/∂c − (∂y/∂o) H⁻¹ JᵒᵀJᶜ, H = JᵒᵀJᵒ + Λ of the samples before the opening. Noise of the logged hand
-/// and normal force, and of the sensors that measure the outcome, is not in it.
+/// T = ∂y/∂c − (∂y/∂o) H⁻¹ JᵒᵀJᶜ, H = JᵒᵀJᵒ + Λ of the samples before the opening. Noise of the measured
+/// normal force is in it (force_deviation); that of the logged hand and of the sensors that measure the
+/// outcome is not.
 ///
 /// Errors are predicted minus measured. Of the landing: the channels as the tracker would report them. Of
 /// vx and ω at detach: minus the slope over time of (observed − predicted) mocap x and θ in flight, from the

@@ -8,6 +8,7 @@
 
 #include "fitting/fit_rounds.hpp"
 #include "fitting/misfit.hpp"
+#include "fitting/profile.hpp"
 
 namespace unhand::fitting {
 
@@ -55,7 +56,7 @@ void describe_campaign(const CampaignProblem& problem, const FitRounds& rounds, 
     if (u.prior_sigma) prior(k, k) = 1 / (*u.prior_sigma * *u.prior_sigma);
     if (rounds.is_fixed(u)) prior(k, k) = 1e30 / (u.scale * u.scale);
   }
-  const Eigen::MatrixXd covariance = scatter_covariance(equations, prior);
+  const auto [covariance, degrees_of_freedom] = scatter_covariance(equations, prior);
   const Eigen::MatrixXd data = guarded_inverse(equations.information, scale);
   const auto values = rounds.campaign();
   for (Eigen::Index k = 0; k < width; ++k) {
@@ -64,6 +65,7 @@ void describe_campaign(const CampaignProblem& problem, const FitRounds& rounds, 
     fitted.value = values[static_cast<std::size_t>(k)];
     fitted.sigma = std::sqrt(covariance(k, k));
     fitted.data_sigma = std::sqrt(data(k, k));
+    fitted.degrees_of_freedom = degrees_of_freedom[k];
     const double margin = 1e-6 * (u.high - u.low);
     fitted.at_bound = fitted.value < u.low + margin || fitted.value > u.high - margin;
     for (Eigen::Index j = 0; j < width; ++j) out.covariance.push_back(covariance(k, j));
@@ -73,7 +75,7 @@ void describe_campaign(const CampaignProblem& problem, const FitRounds& rounds, 
 
 /// Every throw's part, and the misfit by channel and phase.
 void describe_throws(const CampaignProblem& problem, const FitRounds& rounds, FitResult& out) {
-  const auto& weighting = rounds.shared().weighting;
+  const auto& weight = rounds.shared().weighting.group;
   Misfit total;
   for (std::size_t i = 0; i < rounds.used().size(); ++i) {
     const auto& part = rounds.equations().throws[i];
@@ -87,16 +89,27 @@ void describe_throws(const CampaignProblem& problem, const FitRounds& rounds, Fi
     out.samples += static_cast<long>(thrown.observed.all.size());
     total.add(thrown, part.residual, part.detach);
   }
-  for (int phase = 0; phase < kPhaseCount; ++phase)
-    for (int channel = 0; channel < kChannelCount; ++channel) {
-      const auto& parts = total.parts[static_cast<std::size_t>(phase * kChannelCount + channel)];
-      if (parts.empty()) continue;
-      const Misfit::Part part = Misfit::total(parts);
-      out.misfit.push_back({static_cast<Channel>(channel), static_cast<Phase>(phase),
-                            static_cast<int>(part.n), part.sum,
-                            weighting.of(static_cast<Phase>(phase), static_cast<Channel>(channel))});
-      out.chi2 += part.sum;
+  std::array<ChannelMisfit, kPhaseCount * kChannelCount> groups;
+  for (int part = 0; part < kPartCount; ++part)
+    for (int c = 0; c < kChannelCount; ++c) {
+      const auto channel = static_cast<Channel>(c);
+      const std::size_t g = group_of(part, channel);
+      const Phase phase = phase_of_part(part);
+      ChannelMisfit& m = groups[static_cast<std::size_t>(static_cast<int>(phase) * kChannelCount + c)];
+      m.channel = channel;
+      m.phase = phase;
+      for (const auto& one : total.parts[g]) {
+        m.n += static_cast<int>(one.n);
+        m.chi2 += one.squares;
+        m.weight += one.n * weight[g] * weight[g];
+      }
     }
+  for (ChannelMisfit& m : groups) {
+    if (m.n == 0) continue;
+    m.weight = std::sqrt((m.weight - 1) / m.n);  // it starts at 1
+    out.chi2 += m.chi2;
+    out.misfit.push_back(m);
+  }
   out.degrees_of_freedom = out.samples - static_cast<long>(out.campaign.size()) -
                            static_cast<long>(rounds.used().size() * problem.own().size());
 }
@@ -110,7 +123,7 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
   std::vector<double> start = options.start.empty() ? problem.start() : options.start;
   for (std::size_t k = 0; k < start.size(); ++k)
     start[k] = std::clamp(start[k], unknowns[k].low, unknowns[k].high);
-  for (const auto& u : unknowns) out.campaign.push_back({u, u.start, 0, 0, false});
+  for (const auto& u : unknowns) out.campaign.push_back({u, u.start, 0, 0, false, 0, {}});
   for (const auto& thrown : problem.throws()) {
     auto& one = out.throws.emplace_back();
     one.id = thrown.prepared.id;
@@ -126,19 +139,19 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
     const bool last = round + 1 == options.rounds;
     const bool usable = rounds.solve(last);
     out.iterations = rounds.iterations();
-    out.message = rounds.summary().message;
+    out.message = rounds.solution().message;
     if (!usable) {
       out.outcome = FitOutcome::not_solved;
       return out;
     }
     if (!last) rounds.learn();
   }
-  out.outcome = rounds.summary().termination_type == ceres::CONVERGENCE ? FitOutcome::converged
-                                                                        : FitOutcome::iterations_spent;
+  out.outcome = rounds.solution().converged ? FitOutcome::converged : FitOutcome::iterations_spent;
   out.own_spread = rounds.shared().own_sigma;
   out.mode_changes = rounds.mode_changes();
   describe_campaign(problem, rounds, out);
   describe_throws(problem, rounds, out);
+  if (options.profile) profile(rounds, out);
   out.seconds = seconds_since(begin);
   out.jacobian_seconds = 1e-9 * static_cast<double>(rounds.shared().jacobian_nanoseconds.load());
   return out;

@@ -1,7 +1,9 @@
 // The fit of a model to a campaign, and what it is worth.
 #pragma once
 
+#include <array>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -25,7 +27,7 @@ struct FitOptions {
   Share share{Share::train};
   int iterations{25};  ///< of the solver, in every round
   /// Rounds in which the spread of the throws' own unknowns is learned, and the weight of every channel in
-  /// every phase: where its misfit is m > 1 times the noise it counts for 1/m.
+  /// every phase (and quarter of the release): where the model cannot follow, it counts for what it knows.
   int rounds{4};
   double sample_limit{5};  ///< residuals beyond this many σ count linearly [-]
   double throw_limit{3};   ///< a throw whose χ² exceeds this many medians counts less [-]
@@ -36,6 +38,8 @@ struct FitOptions {
   std::vector<std::string> fixed;
   bool all_fixed{false};
   std::vector<double> own_spread;  ///< 1 σ of the throws' own unknowns, if it is known; empty: learned
+  /// Whether unknowns whose cost may not be a parabola are given the interval of their profile.
+  bool profile{false};
 };
 
 enum class FitOutcome { converged, iterations_spent, no_start, not_solved };
@@ -47,6 +51,13 @@ struct FittedUnknown {
   double sigma{};       ///< 1 σ, from the scatter between throws (see covariance)
   double data_sigma{};  ///< 1 σ without the prior; infinite where the log does not determine it
   bool at_bound{};
+  double degrees_of_freedom{};  ///< of sigma: it comes from the scatter between throws
+  /// The 95 % interval of the profile, where it departs from value ± t sigma: there, with everything else
+  /// fitted again, the cost has risen by as much as it would at ± t sigma if it were a parabola. An end
+  /// beyond the accepted range is infinite.
+  std::optional<std::array<double, 2>> profile{};
+  /// The 95 % interval: the profile's, or value ± t sigma, Student's t.
+  std::array<double, 2> interval95() const;
 };
 
 /// A direction in the space of the campaign's unknowns that the log leaves open.
@@ -62,7 +73,7 @@ struct ChannelMisfit {
   Phase phase{};
   int n{};
   double chi2{};
-  double weight{1};  ///< factor on its residuals in the fit
+  double weight{1};  ///< factor on its residuals in the fit (of the release's quarters, the root mean square)
   double chi2_per_sample() const { return n > 0 ? chi2 / n : 0; }
 };
 
@@ -81,8 +92,9 @@ struct FitResult {
   std::string message;
   std::vector<FittedUnknown> campaign;
   /// Covariance of the campaign's unknowns, row by row. H⁻¹ G H⁻¹ with H the Gauss-Newton matrix after the
-  /// throws' own unknowns are eliminated and G the scatter of the throws' gradients (times n/(n − p)): it
-  /// holds when the noise within a throw is correlated or the law is not quite right. Not below H⁻¹.
+  /// throws' own unknowns are eliminated and G the scatter of the throws' gradients, each enlarged by what
+  /// the fit has taken out of it [BellMcCaffrey2002]: it holds when the noise within a throw is correlated or
+  /// the law is not quite right. Not below H⁻¹.
   std::vector<double> covariance;
   std::vector<double> own_spread;  ///< learned 1 σ of the throws' own unknowns
   std::vector<OpenDirection> open;

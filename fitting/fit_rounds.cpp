@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "dynamics/median.hpp"
 #include "experiment/parallel.hpp"
 #include "fitting/misfit.hpp"
+#include "fitting/throw_cost.hpp"
 
 namespace unhand::fitting {
 
@@ -58,67 +60,67 @@ bool FitRounds::is_fixed(const Unknown& unknown) const {
          std::find(options_.fixed.begin(), options_.fixed.end(), unknown.name) != options_.fixed.end();
 }
 
-void FitRounds::add_throws(ceres::Problem& problem, const AllThrows& all,
-                           ceres::ParameterBlockOrdering& ordering) {
+FitRounds::Solution FitRounds::minimise(double tolerance, std::optional<std::size_t> held) {
+  AllThrows all(shared_, used_, x_, own_);
+  ceres::Problem::Options problem_options;
+  problem_options.evaluation_callback = &all;
+  ceres::Problem problem(problem_options);
+  auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (std::size_t i = 0; i < used_.size(); ++i) {
     double* own = own_at(i);
     problem.AddResidualBlock(new ThrowCost(shared_, all, i, problem_.throws()[used_[i]].observed.all.size()),
                              new ceres::HuberLoss(std::sqrt(shared_.weighting.throw_limit)), x_.data(), own);
-    ordering.AddElementToGroup(own, 0);
+    ordering->AddElementToGroup(own, 0);
     for (std::size_t k = 0; k < shared_.own_scale.size(); ++k) {
       const Unknown& u = problem_.own()[k];
       problem.SetParameterLowerBound(own, static_cast<int>(k), u.low / shared_.own_scale[k]);
       problem.SetParameterUpperBound(own, static_cast<int>(k), u.high / shared_.own_scale[k]);
     }
   }
-  ordering.AddElementToGroup(x_.data(), 1);
-}
+  ordering->AddElementToGroup(x_.data(), 1);
 
-void FitRounds::add_campaign(ceres::Problem& problem) {
   const auto width = static_cast<int>(x_.size());
   std::vector<int> constant;
   for (int k = 0; k < width; ++k) {
-    const Unknown& u = problem_.campaign()[static_cast<std::size_t>(k)];
-    const double scale = shared_.scale[static_cast<std::size_t>(k)];
+    const auto i = static_cast<std::size_t>(k);
+    const Unknown& u = problem_.campaign()[i];
+    const double scale = shared_.scale[i];
     problem.SetParameterLowerBound(x_.data(), k, u.low / scale);
     problem.SetParameterUpperBound(x_.data(), k, u.high / scale);
     if (u.prior_sigma)
       problem.AddResidualBlock(new PriorCost(width, k, u.start / scale, *u.prior_sigma / scale), nullptr,
                                x_.data());
-    if (is_fixed(u)) constant.push_back(k);
+    if (is_fixed(u) || held == i) constant.push_back(k);
   }
-  if (static_cast<int>(constant.size()) == width)
+  const bool all_constant = static_cast<int>(constant.size()) == width;
+  if (all_constant)
     problem.SetParameterBlockConstant(x_.data());
   else if (!constant.empty())
     problem.SetManifold(x_.data(), new ceres::SubsetManifold(width, constant));
-}
 
-bool FitRounds::solve(bool last) {
-  shared_.weighting.throw_limit = options_.throw_limit * dynamics::median(chi2_);
   ceres::Solver::Options solver;
   // With the campaign's unknowns fixed, nothing couples the throws.
-  solver.linear_solver_type = options_.all_fixed ? ceres::SPARSE_NORMAL_CHOLESKY : ceres::DENSE_SCHUR;
+  solver.linear_solver_type = all_constant ? ceres::SPARSE_NORMAL_CHOLESKY : ceres::DENSE_SCHUR;
+  if (!all_constant) solver.linear_solver_ordering = ordering;
   solver.max_num_iterations = options_.iterations;
+  solver.function_tolerance = tolerance;
   solver.parameter_tolerance = 1e-9;
   solver.gradient_tolerance = 1e-12;
   solver.min_trust_region_radius = 1e-2;  // in scales: below, what is left is the integrator's own rounding
   solver.num_threads = 1;                 // see AllThrows
   solver.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver, &problem, &summary);
+  return {summary.IsSolutionUsable(), summary.termination_type == ceres::CONVERGENCE, summary.final_cost,
+          static_cast<int>(summary.iterations.size()), summary.message};
+}
+
+bool FitRounds::solve(bool last) {
+  shared_.weighting.throw_limit = options_.throw_limit * dynamics::median(chi2_);
   // What a round learns needs no more than a coarse solution.
-  solver.function_tolerance = last ? options_.accuracy : 1e-3;
-
-  AllThrows all(shared_, used_, x_, own_);
-  ceres::Problem::Options problem_options;
-  problem_options.evaluation_callback = &all;
-  ceres::Problem problem(problem_options);
-  auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-  add_throws(problem, all, *ordering);
-  add_campaign(problem);
-  if (!options_.all_fixed) solver.linear_solver_ordering = ordering;
-  ceres::Solve(solver, &problem, &summary_);
-  iterations_ += static_cast<int>(summary_.iterations.size());
-  if (!summary_.IsSolutionUsable()) return false;
-
+  solution_ = minimise(last ? options_.accuracy : 1e-3, {});
+  iterations_ += solution_.iterations;
+  if (!solution_.usable) return false;
   std::vector<std::vector<double>> own;
   for (std::size_t i = 0; i < used_.size(); ++i) own.push_back(this->own(i));
   equations_ = normal_equations(problem_, used_, campaign(), own, shared_.own_sigma, shared_.weighting,
@@ -132,6 +134,15 @@ bool FitRounds::solve(bool last) {
   return true;
 }
 
+double FitRounds::cost_with(std::size_t k, double value) {
+  const auto x = x_, own = own_;
+  x_[k] = value / shared_.scale[k];
+  const Solution held = minimise(options_.accuracy, k);
+  x_ = x;
+  own_ = own;
+  return held.usable ? held.cost : HUGE_VAL;
+}
+
 void FitRounds::learn() {
   Misfit misfit;
   for (std::size_t i = 0; i < used_.size(); ++i)
@@ -140,16 +151,42 @@ void FitRounds::learn() {
   constexpr std::size_t kFewest = 6;  // throws that have a spread
   if (!options_.own_spread.empty() || used_.size() < kFewest) return;
   for (std::size_t k = 0; k < shared_.own_sigma.size(); ++k) {
-    double square = 0, weight = 0;
-    for (std::size_t i = 0; i < used_.size(); ++i) {
-      const ThrowEquations& part = equations_.throws[i];
-      const double value = own(i)[k];
-      square += part.weight * (value * value + part.own_variance[static_cast<Eigen::Index>(k)]);
-      weight += part.weight;
-    }
-    const double prior = *problem_.own()[k].prior_sigma;
-    shared_.own_sigma[k] = std::clamp(std::sqrt(square / std::max(weight, 1e-300)), 1e-3 * prior, 3 * prior);
+    const Unknown& u = problem_.own()[k];
+    if (u.of_input) continue;
+    shared_.own_sigma[k] = std::clamp(std::sqrt(spread_of(k)), 1e-3 * *u.prior_sigma, 3 * *u.prior_sigma);
   }
+}
+
+double FitRounds::spread_of(std::size_t k) const {
+  struct Sum {
+    double weight{}, value{}, square{}, uncertain{}, n{};
+  };
+  std::map<std::string, Sum> conditions;
+  for (std::size_t i = 0; i < used_.size(); ++i) {
+    const ThrowEquations& part = equations_.throws[i];
+    const double value = own(i)[k];
+    for (const auto& key : {problem_.throws()[used_[i]].prepared.condition, std::string()}) {
+      Sum& sum = conditions[key];  // "": all together
+      sum.weight += part.weight;
+      sum.value += part.weight * value;
+      sum.square += part.weight * value * value;
+      sum.uncertain += part.weight * part.own_variance[static_cast<Eigen::Index>(k)];
+      sum.n += 1;
+    }
+  }
+  const Sum all = conditions[""];
+  conditions.erase("");
+  double square = 0, weight = 0, degrees = 0;
+  for (const auto& [name, sum] : conditions) {
+    if (sum.n < 2 || !(sum.weight > 0)) continue;
+    const double rest = 1 - 1 / sum.n;
+    square += sum.square - sum.value * sum.value / sum.weight + rest * sum.uncertain;
+    weight += rest * sum.weight;
+    degrees += sum.n - 1;
+  }
+  constexpr double kEnough = 10;  // a spread is then known to a quarter
+  if (degrees >= kEnough && weight > 0) return square / weight;
+  return (all.square + all.uncertain) / std::max(all.weight, 1e-300);
 }
 
 }  // namespace unhand::fitting

@@ -1,10 +1,11 @@
 // The rounds of a fit: least squares, then what the solution teaches of weights and spreads. Internal.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "fitting/throw_cost.hpp"
+#include "fitting/fit_state.hpp"
 
 namespace unhand::fitting {
 
@@ -21,15 +22,24 @@ class FitRounds {
   /// Least squares with the weights and spreads as they are, and the normal equations at its solution; false
   /// where Ceres gives up.
   bool solve(bool last);
-  /// The weights of channels, and (empirical Bayes) the spread of the throws' own unknowns: what they show
-  /// plus what each is uncertain by.
+  /// The weights of channels, and (empirical Bayes) the spread of the throws' own unknowns.
   void learn();
+  /// The least cost with unknown k held at `value`, everything else as the last round left it; infinite where
+  /// there is none. The state stays as it is.
+  double cost_with(std::size_t k, double value);
 
   std::vector<double> campaign() const { return shared_.unscaled(x_.data()); }
   std::vector<double> own(std::size_t i) const { return shared_.own_unscaled(own_at(i)); }
   const Shared& shared() const { return shared_; }
   const NormalEquations& equations() const { return equations_; }
-  const ceres::Solver::Summary& summary() const { return summary_; }
+
+  struct Solution {
+    bool usable{}, converged{};
+    double cost{};  ///< ½ Σ ρ(r²), priors included
+    int iterations{};
+    std::string message;
+  };
+  const Solution& solution() const { return solution_; }
   int iterations() const { return iterations_; }
   /// Throws whose sequence of modes changed in the last round.
   int mode_changes() const { return mode_changes_; }
@@ -37,9 +47,13 @@ class FitRounds {
  private:
   const double* own_at(std::size_t i) const { return own_.data() + i * shared_.own_scale.size(); }
   double* own_at(std::size_t i) { return own_.data() + i * shared_.own_scale.size(); }
+  /// The variance of own unknown k: what the throws show plus what each is uncertain by; about the mean of
+  /// their condition, if there are repetitions enough. What all repetitions share is no scatter: it is where
+  /// the model fails, and own unknowns that were given it would hide that from the campaign's.
+  double spread_of(std::size_t k) const;
   void choose_throws(const std::vector<double>& start);
-  void add_throws(ceres::Problem& problem, const AllThrows& all, ceres::ParameterBlockOrdering& ordering);
-  void add_campaign(ceres::Problem& problem);
+  /// Moves x_ and own_ to the least; `held` keeps its value, too.
+  Solution minimise(double tolerance, std::optional<std::size_t> held);
 
   const CampaignProblem& problem_;
   const FitOptions& options_;
@@ -51,7 +65,7 @@ class FitRounds {
   std::vector<double> chi2_;
   std::vector<std::vector<int>> modes_;
   NormalEquations equations_;
-  ceres::Solver::Summary summary_;
+  Solution solution_;
   int iterations_{}, mode_changes_{};
 };
 

@@ -4,54 +4,63 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include "fitting/normal_equations.hpp"
 
 namespace unhand::fitting {
 
-/// χ² by channel and phase, of every throw for itself.
+/// χ² by channel and part, of every throw for itself.
 struct Misfit {
   struct Part {
-    double sum{}, n{};
-    double mean() const { return sum / n; }
+    double n{}, sum{}, squares{};  ///< samples, Σ r, Σ r²
+    double mean_square() const { return squares / n; }
+    /// What the mean's square is to that of white noise of σ = 1: up to n where residuals stay the same.
+    double of_mean() const { return sum * sum / n; }
   };
-  std::array<std::vector<Part>, kPhaseCount * kChannelCount> parts;
+  std::array<std::vector<Part>, kPartCount * kChannelCount> parts;
 
   void add(const CampaignThrow& thrown, const Eigen::VectorXd& residual, double detach) {
-    std::array<Part, kPhaseCount * kChannelCount> own{};
+    std::array<Part, kPartCount * kChannelCount> own{};
     for (std::size_t j = 0; j < thrown.observed.all.size(); ++j) {
       const auto& o = thrown.observed.all[j];
-      const Phase phase = phase_of(o, thrown.opening, thrown.release_or(detach));
       const double r = residual[static_cast<Eigen::Index>(j)];
-      Part& part = own[static_cast<std::size_t>(static_cast<int>(phase) * kChannelCount +
-                                                static_cast<int>(o.channel))];
-      part.sum += r * r;
+      Part& part = own[group_of(part_of(o, thrown, detach), o.channel)];
       part.n += 1;
+      part.sum += r;
+      part.squares += r * r;
     }
     for (std::size_t g = 0; g < own.size(); ++g)
       if (own[g].n > 0) parts[g].push_back(own[g]);
   }
-  static Part total(const std::vector<Part>& of) {
-    Part out;
-    for (const Part& part : of) out.sum += part.sum, out.n += part.n;
-    return out;
-  }
-  /// Without the tenth of the throws (from five on, at least one) that fit worst: a throw that went wrong
-  /// must not speak for a channel.
-  static Part trimmed(std::vector<Part> of) {
-    std::sort(of.begin(), of.end(), [](const Part& a, const Part& b) { return a.mean() < b.mean(); });
-    if (of.size() >= 5) of.resize(of.size() - std::max<std::size_t>(1, of.size() / 10));
-    return total(of);
+
+  /// The factor w on the residuals of a group, w² = 1/max(1, m², V): m² the mean square, and V that of the
+  /// throws' means in units of 1/n. White noise of the declared σ has m² = V = 1. A law that cannot follow
+  /// errs in one direction for a whole group: its n residuals are one witness, not n, and then V = n m².
+  static double factor(const std::vector<Part>& of) {
+    double samples = 0;
+    for (const Part& part : of) samples += part.n;
+    // Means scatter by themselves: three σ are allowed.
+    const auto allowed = [](double n) { return 1 + 3 * std::sqrt(2 / n); };
+    const double square = trimmed_mean(of, &Part::mean_square) / allowed(samples),
+                 mean = trimmed_mean(of, &Part::of_mean) / allowed(static_cast<double>(of.size()));
+    return 1 / std::sqrt(std::max({1.0, square, mean}));
   }
   void weigh(Weighting& weighting) const {
-    for (std::size_t g = 0; g < parts.size(); ++g) {
-      if (parts[g].empty()) continue;
-      const Part part = trimmed(parts[g]);
-      // A small group's mean scatters by itself.
-      const double allowed = 1 + 3 * std::sqrt(2.0 / part.n);
-      weighting.group[g] = std::sqrt(1 / std::max(1.0, part.mean() / allowed));
-    }
+    for (std::size_t g = 0; g < parts.size(); ++g)
+      if (!parts[g].empty()) weighting.group[g] = factor(parts[g]);
+  }
+
+ private:
+  /// Without the largest tenth (from five on, at least one): a throw that went wrong must not speak for a
+  /// channel.
+  static double trimmed_mean(const std::vector<Part>& of, double (Part::*value)() const) {
+    std::vector<double> x;
+    for (const Part& part : of) x.push_back((part.*value)());
+    std::sort(x.begin(), x.end());
+    if (x.size() >= 5) x.resize(x.size() - std::max<std::size_t>(1, x.size() / 10));
+    return std::accumulate(x.begin(), x.end(), 0.0) / static_cast<double>(x.size());
   }
 };
 

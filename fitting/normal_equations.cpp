@@ -8,11 +8,25 @@
 
 namespace unhand::fitting {
 
+int part_of(const experiment::Observation& o, const CampaignThrow& thrown, double detach) {
+  const double release = thrown.release_or(detach);
+  const Phase phase = phase_of(o, thrown.opening, release);
+  if (phase < Phase::release) return static_cast<int>(phase);
+  if (phase > Phase::release) return static_cast<int>(phase) + kQuarters - 1;
+  const double share = (o.time - thrown.opening) / (release - thrown.opening);
+  return static_cast<int>(phase) + std::clamp(static_cast<int>(kQuarters * share), 0, kQuarters - 1);
+}
+
+Phase phase_of_part(int part) {
+  const int release = static_cast<int>(Phase::release);
+  return static_cast<Phase>(part <= release ? part : std::max(release, part - kQuarters + 1));
+}
+
 void weigh(Linearisation& l, const experiment::Observations& observed, const CampaignThrow& thrown,
            const Weighting& weighting) {
   for (Eigen::Index i = 0; i < l.residual.size(); ++i) {
     const auto& o = observed.all[static_cast<std::size_t>(i)];
-    double slope = weighting.of(phase_of(o, thrown.opening, thrown.release_or(l.detach)), o.channel);
+    double slope = weighting.group[group_of(part_of(o, thrown, l.detach), o.channel)];
     double r = slope * l.residual[i];
     const double size = std::abs(r), limit = weighting.sample_limit;
     if (size > limit) {
@@ -36,7 +50,6 @@ NormalEquations normal_equations(const CampaignProblem& problem, const std::vect
   const auto width = static_cast<Eigen::Index>(campaign.size());
   out.information.setZero(width, width);
   out.throws.resize(used.size());
-  std::vector<Eigen::MatrixXd> parts(used.size());
   experiment::parallel_for(used.size(), threads, [&](std::size_t i) {
     const CampaignThrow& thrown = problem.throws()[used[i]];
     const std::vector<double>& values = own[i];
@@ -46,7 +59,7 @@ NormalEquations normal_equations(const CampaignProblem& problem, const std::vect
     part.detach = l.detach;
     part.gradient.setZero(width);
     part.own_variance.setZero(static_cast<Eigen::Index>(values.size()));
-    parts[i].setZero(width, width);
+    part.information.setZero(width, width);
     if (!l.solved) {
       part.weight = 0;
       part.residual.setZero(static_cast<Eigen::Index>(thrown.observed.all.size()));
@@ -65,39 +78,62 @@ NormalEquations normal_equations(const CampaignProblem& problem, const std::vect
     }
     const Eigen::MatrixXd Hco = l.campaign.transpose() * l.own;
     const Eigen::LDLT<Eigen::MatrixXd> solver(Hoo);
-    parts[i] = part.weight * (l.campaign.transpose() * l.campaign - Hco * solver.solve(Hco.transpose()));
+    part.information =
+        part.weight * (l.campaign.transpose() * l.campaign - Hco * solver.solve(Hco.transpose()));
     part.gradient = part.weight * (l.campaign.transpose() * l.residual - Hco * solver.solve(go));
     part.own_variance = solver.solve(Eigen::MatrixXd::Identity(Hoo.rows(), Hoo.cols())).diagonal();
   });
-  for (const auto& part : parts) out.information += part;  // in the throws' order, whatever the threads did
+  for (const auto& part : out.throws)
+    out.information += part.information;  // in the throws' order, whatever the threads did
   return out;
 }
 
-Eigen::MatrixXd scatter_covariance(const NormalEquations& equations, const Eigen::MatrixXd& prior) {
+ScatterCovariance scatter_covariance(const NormalEquations& equations, const Eigen::MatrixXd& prior) {
   const Eigen::Index width = equations.information.rows();
   // In units in which the diagonal is one: parameters differ by orders of magnitude.
   Eigen::MatrixXd H = equations.information + prior;
-  Eigen::VectorXd unit = H.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::VectorXd unit = H.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   H = unit.asDiagonal() * H * unit.asDiagonal();
-  Eigen::MatrixXd G = Eigen::MatrixXd::Zero(width, width);
-  double n = 0;
-  for (const auto& part : equations.throws) {
-    if (!(part.weight > 0)) continue;
-    const Eigen::VectorXd g = unit.asDiagonal() * part.gradient;
-    G += g * g.transpose();
-    n += 1;
-  }
-  const double correction = n > static_cast<double>(width) + 1 ? n / (n - static_cast<double>(width)) : 2.0;
-  G *= correction;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(H);
   const double floor = 1e-12 * std::max(1e-300, eigen.eigenvalues().maxCoeff());
   const Eigen::VectorXd root = eigen.eigenvalues().cwiseMax(floor).cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd whiten = eigen.eigenvectors() * root.asDiagonal();  // whitenᵀ H whiten = 1
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> scatter(whiten.transpose() * G * whiten);
+  const Eigen::MatrixXd whiten =  // whitenᵀ (information + prior) whiten = 1
+      unit.asDiagonal() * eigen.eigenvectors() * root.asDiagonal();
+
+  std::vector<Eigen::MatrixXd> share, adjust;
+  Eigen::MatrixXd G = Eigen::MatrixXd::Zero(width, width);
+  for (const auto& part : equations.throws) {
+    if (!(part.weight > 0)) continue;
+    share.push_back(whiten.transpose() * part.information * whiten);
+    constexpr double kLeastRest = 0.1;  // a throw that alone determines a direction leaves no residual there
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> own(share.back());
+    const Eigen::VectorXd rest = (1 - own.eigenvalues().array()).cwiseMax(kLeastRest).rsqrt();
+    adjust.push_back(own.eigenvectors() * rest.asDiagonal() * own.eigenvectors().transpose());
+    const Eigen::VectorXd g = adjust.back() * (whiten.transpose() * part.gradient);
+    G += g * g.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> scatter(G);
   const Eigen::MatrixXd inflate = whiten * scatter.eigenvectors();
-  const Eigen::MatrixXd covariance =
-      inflate * scatter.eigenvalues().cwiseMax(1.0).asDiagonal() * inflate.transpose();
-  return unit.asDiagonal() * covariance * unit.asDiagonal();
+  ScatterCovariance out;
+  out.covariance = inflate * scatter.eigenvalues().cwiseMax(1.0).asDiagonal() * inflate.transpose();
+
+  const auto n = static_cast<Eigen::Index>(share.size());
+  out.degrees_of_freedom.setOnes(width);
+  for (Eigen::Index k = 0; k < width; ++k) {
+    const Eigen::VectorXd c = whiten.row(k);
+    Eigen::MatrixXd toward(width, n), shared(width, n);  // A_i c and H_i A_i c
+    double trace = 0;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      toward.col(i) = adjust[static_cast<std::size_t>(i)] * c;
+      shared.col(i) = share[static_cast<std::size_t>(i)] * toward.col(i);
+    }
+    Eigen::MatrixXd B = -shared.transpose() * shared;
+    for (Eigen::Index i = 0; i < n; ++i) B(i, i) += toward.col(i).dot(shared.col(i));
+    trace = B.trace();
+    if (const double square = B.squaredNorm(); square > 0)
+      out.degrees_of_freedom[k] = std::max(1.0, trace * trace / square);
+  }
+  return out;
 }
 
 Eigen::MatrixXd guarded_inverse(const Eigen::MatrixXd& information, const std::vector<double>& scale) {

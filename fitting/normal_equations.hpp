@@ -11,21 +11,22 @@ namespace unhand::fitting {
 
 using experiment::kChannelCount;
 
+/// Where a sample weighs: its channel, and its phase; of the release one of four quarters by time, since laws
+/// part company as the normal force falls.
+inline constexpr int kQuarters = 4, kPartCount = kPhaseCount + kQuarters - 1;
+int part_of(const experiment::Observation& observation, const CampaignThrow& thrown, double detach);
+Phase phase_of_part(int part);
+inline std::size_t group_of(int part, experiment::Channel channel) {
+  return static_cast<std::size_t>(part * kChannelCount + static_cast<int>(channel));
+}
+
 /// What a residual counts for.
 struct Weighting {
   double sample_limit{5};  ///< Huber's loss on every sample: beyond it a residual counts linearly [σ]
   double throw_limit{};    ///< Huber's loss on the χ² of a throw [-]
-  /// Factors on the residuals of a channel in a phase, <= 1: where the model fails, its failure must not bend
-  /// the rest.
-  std::array<double, kPhaseCount * kChannelCount> group;
+  /// Factors on the residuals of a group, <= 1: where the model fails, its failure must not bend the rest.
+  std::array<double, kPartCount * kChannelCount> group;
   Weighting() { group.fill(1.0); }
-  double& of(Phase phase, experiment::Channel channel) {
-    return group[static_cast<std::size_t>(static_cast<int>(phase) * kChannelCount +
-                                          static_cast<int>(channel))];
-  }
-  double of(Phase phase, experiment::Channel channel) const {
-    return const_cast<Weighting*>(this)->of(phase, channel);
-  }
 };
 
 /// Weighs samples of a throw, all or some, with their derivatives.
@@ -40,6 +41,7 @@ struct ThrowEquations {
   Eigen::VectorXd residual;      ///< not robust
   Eigen::VectorXd own_variance;  ///< of the throw's own unknowns, given the campaign's
   Eigen::VectorXd gradient;      ///< for the campaign's unknowns, own eliminated
+  Eigen::MatrixXd information;   ///< its part of NormalEquations::information
   std::vector<int> modes;
 };
 
@@ -55,8 +57,17 @@ NormalEquations normal_equations(const CampaignProblem& problem, const std::vect
                                  const std::vector<double>& own_sigma, const Weighting& weighting,
                                  int threads);
 
-/// H⁻¹ G H⁻¹ from the scatter of the throws' gradients, nowhere below H⁻¹; H = information + prior.
-Eigen::MatrixXd scatter_covariance(const NormalEquations& equations, const Eigen::MatrixXd& prior);
+/// A covariance that rests on the scatter between throws.
+struct ScatterCovariance {
+  Eigen::MatrixXd covariance;
+  Eigen::VectorXd degrees_of_freedom;  ///< of every unknown's variance
+};
+/// H⁻¹ G H⁻¹, nowhere below H⁻¹; H = information + prior, G = Σ g̃_i g̃_iᵀ over the throws' gradients g_i,
+/// g̃_i = (1 − H_i H⁻¹)^(−1/2) g_i: the fit follows a throw by its share H_i of the information, which makes
+/// its gradient that much too small. If the noise is as declared, E[G] = H whatever the shares: "CR2" of
+/// [BellMcCaffrey2002]. With c the row of H⁻¹ that belongs to an unknown and B_ij = Cov(cᵀg̃_i, cᵀg̃_j), the
+/// degrees of freedom of its variance are (tr B)²/tr B², as there.
+ScatterCovariance scatter_covariance(const NormalEquations& equations, const Eigen::MatrixXd& prior);
 
 /// The inverse in units of `scale`, with +infinity on the diagonal of what is not determined.
 Eigen::MatrixXd guarded_inverse(const Eigen::MatrixXd& information, const std::vector<double>& scale);

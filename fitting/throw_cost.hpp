@@ -4,40 +4,13 @@
 #include <ceres/ceres.h>
 
 #include <algorithm>
-#include <atomic>
-#include <chrono>
 #include <stdexcept>
 #include <vector>
 
 #include "experiment/parallel.hpp"
-#include "fitting/normal_equations.hpp"
+#include "fitting/fit_state.hpp"
 
 namespace unhand::fitting {
-
-using Clock = std::chrono::steady_clock;
-inline double seconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
-/// What all costs share: unknowns in units of their scales.
-struct Shared {
-  const CampaignProblem& problem;
-  const FitOptions& options;
-  std::vector<double> scale, own_scale, own_sigma;  ///< own_sigma: 1 σ of the throws' own unknowns
-  Weighting weighting;
-  std::atomic<long> jacobian_nanoseconds{0};
-
-  std::vector<double> unscaled(const double* x) const {
-    std::vector<double> out(scale.size());
-    for (std::size_t k = 0; k < out.size(); ++k) out[k] = x[k] * scale[k];
-    return out;
-  }
-  std::vector<double> own_unscaled(const double* x) const {
-    std::vector<double> out(own_scale.size());
-    for (std::size_t k = 0; k < out.size(); ++k) out[k] = x[k] * own_scale[k];
-    return out;
-  }
-};
 
 /// Simulates all throws of one evaluation at once, on several threads, before Ceres asks for them one by one
 /// on a single one: its own threads would add up in an order that changes from run to run.

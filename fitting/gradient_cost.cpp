@@ -1,0 +1,59 @@
+#include "fitting/gradient_cost.hpp"
+
+#include <cmath>
+#include <ctime>
+#include <vector>
+
+#include "dynamics/median.hpp"
+
+namespace unhand::fitting {
+
+namespace {
+
+/// Adds the time that `work` takes.
+template <class Work>
+auto timed(double& seconds, Work&& work) {
+  const std::clock_t begin = std::clock();
+  auto out = work();
+  seconds += static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  return out;
+}
+
+}  // namespace
+
+GradientCost gradient_cost(const CampaignProblem& problem, const FitResult& fit) {
+  GradientCost out;
+  const auto campaign = fit.values();
+  const auto width = campaign.size();
+  std::vector<double> deviations;
+  for (std::size_t i = 0; i < fit.throws.size(); ++i) {
+    if (!fit.throws[i].used) continue;
+    const CampaignThrow& thrown = problem.throws()[i];
+    const auto& own = fit.throws[i].own;
+    out.unknowns = static_cast<int>(width + own.size());
+    timed(out.plain, [&] { return problem.linearise(thrown, campaign, own, false); });
+    const auto exact = timed(out.exact, [&] { return problem.linearise(thrown, campaign, own, true); });
+    for (std::size_t k = 0; k < width + own.size(); ++k) {
+      auto c = campaign;
+      auto o = own;
+      double& x = k < width ? c[k] : o[k - width];
+      const double middle = x,
+                   step = 1e-3 * (k < width ? problem.campaign()[k] : problem.own()[k - width]).scale;
+      x = middle + step;
+      const auto above = timed(out.central, [&] { return problem.linearise(thrown, c, o, false); });
+      x = middle - step;
+      const auto below = timed(out.central, [&] { return problem.linearise(thrown, c, o, false); });
+      if (!exact.solved || !above.solved || !below.solved) continue;
+      const Eigen::VectorXd slope = k < width ? exact.campaign.col(static_cast<Eigen::Index>(k))
+                                              : exact.own.col(static_cast<Eigen::Index>(k - width));
+      const double size = slope.cwiseAbs().maxCoeff();
+      if (size > 0)
+        deviations.push_back(((above.residual - below.residual) / (2 * step) - slope).cwiseAbs().maxCoeff() /
+                             size);
+    }
+  }
+  if (!deviations.empty()) out.deviation = dynamics::median(deviations);
+  return out;
+}
+
+}  // namespace unhand::fitting

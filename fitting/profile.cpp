@@ -1,0 +1,77 @@
+#include "fitting/profile.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fitting/advice.hpp"
+
+namespace unhand::fitting {
+
+namespace {
+
+bool is_weak(const FittedUnknown& u, double half) {
+  return u.at_bound || half > 0.2 * std::abs(u.value) || !std::isfinite(u.data_sigma) ||
+         (u.unknown.prior_sigma && u.data_sigma > 0.5 * *u.unknown.prior_sigma);
+}
+
+/// How far unknown k lies from its fit at `value`, in sigmas, by the rise of the cost. `unit` is the rise at
+/// one sigma.
+double distance(FitRounds& rounds, std::size_t k, double value, double unit) {
+  return std::sqrt(std::max(0.0, rounds.cost_with(k, value) - rounds.solution().cost) / unit);
+}
+
+/// Where the profile is t sigmas away, on the side of `sign`: by secants on the distance, which is a straight
+/// line for a parabola. Infinite if that is beyond the range.
+double end_of(FitRounds& rounds, std::size_t k, const FittedUnknown& u, double t, double unit, double sign) {
+  const double bound = sign > 0 ? u.unknown.high : u.unknown.low;
+  const auto clipped = [&](double v) { return sign > 0 ? std::min(v, bound) : std::max(v, bound); };
+  double near = u.value, z_near = 0, far = clipped(u.value + sign * t * u.sigma);
+  for (int step = 0; step < 8; ++step) {
+    if (far == near) return sign * HUGE_VAL;
+    const double z = distance(rounds, k, far, unit);
+    if (std::abs(z - t) < 0.02 * t) return far;
+    if (z < t && far == bound) return sign * HUGE_VAL;
+    // Where a simulation fails the distance is infinite: half way.
+    double slope = (z - z_near) / (far - near),
+           next = std::isfinite(z) && slope * sign > 0 ? far + (t - z) / slope : 0.5 * (near + far);
+    if (z < t) {
+      next = clipped(sign * std::min(sign * next, sign * (far + 2 * (far - u.value))));
+      near = far;
+      z_near = z;
+    } else {
+      next = sign * std::max(sign * next, sign * (near + 0.1 * (far - near)));
+    }
+    far = next;
+  }
+  return far;
+}
+
+}  // namespace
+
+void profile(FitRounds& rounds, FitResult& fit) {
+  const Eigen::Index width = rounds.equations().information.rows();
+  for (std::size_t k = 0; k < fit.campaign.size(); ++k) {
+    FittedUnknown& u = fit.campaign[k];
+    const double t = student_factor(u.degrees_of_freedom);
+    if (rounds.is_fixed(u.unknown) || !is_weak(u, t * u.sigma) || !(u.sigma > 0)) continue;
+    // The cost's own curvature claims a smaller sigma where throws scatter beyond the noise.
+    Eigen::MatrixXd H = rounds.equations().information;
+    for (Eigen::Index j = 0; j < width; ++j)
+      if (const auto& prior = fit.campaign[static_cast<std::size_t>(j)].unknown.prior_sigma)
+        H(j, j) += 1 / (*prior * *prior);
+    std::vector<double> scale = rounds.shared().scale;
+    const auto i = static_cast<Eigen::Index>(k);
+    const double claimed = guarded_inverse(H, scale)(i, i);
+    if (!std::isfinite(claimed) || !(claimed > 0)) {
+      u.profile = {-HUGE_VAL, HUGE_VAL};
+      continue;
+    }
+    const double unit = 0.5 * u.sigma * u.sigma / claimed;
+    const std::array<double, 2> found{end_of(rounds, k, u, t, unit, -1), end_of(rounds, k, u, t, unit, 1)};
+    const double half = t * u.sigma;
+    if (std::abs(u.value - half - found[0]) > 0.1 * half || std::abs(u.value + half - found[1]) > 0.1 * half)
+      u.profile = found;
+  }
+}
+
+}  // namespace unhand::fitting

@@ -1,0 +1,79 @@
+// What the scatter between throws says: closed forms for a mean of n numbers, and for residuals that stay.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "fitting/misfit.hpp"
+
+namespace unhand::fitting {
+namespace {
+
+TEST(ScatterCovariance, OfAMeanIsTheTextbooks) {
+  // Throws that say y_i with information 1 each: the fit is the mean, its variance s^2/n, n - 1 degrees.
+  const std::vector<double> y{3, -1, 4, 1, -5, 9, -2, 6};
+  const double n = static_cast<double>(y.size()), mean = std::accumulate(y.begin(), y.end(), 0.0) / n;
+  NormalEquations equations;
+  equations.information = Eigen::MatrixXd::Constant(1, 1, n);
+  double square = 0;
+  for (const double one : y) {
+    ThrowEquations part;
+    part.gradient = Eigen::VectorXd::Constant(1, mean - one);
+    part.information = Eigen::MatrixXd::Constant(1, 1, 1);
+    equations.throws.push_back(part);
+    square += (one - mean) * (one - mean);
+  }
+  const auto found = scatter_covariance(equations, Eigen::MatrixXd::Zero(1, 1));
+  EXPECT_NEAR(found.covariance(0, 0), square / (n - 1) / n, 1e-12);
+  EXPECT_NEAR(found.degrees_of_freedom[0], n - 1, 1e-9);
+}
+
+TEST(ScatterCovariance, UnequalSharesLeaveFewerDegrees) {
+  // One throw that holds as much as all others: its residual is half followed, and it speaks for few.
+  NormalEquations equations;
+  equations.information = Eigen::MatrixXd::Constant(1, 1, 20);
+  for (int i = 0; i < 11; ++i) {
+    ThrowEquations part;
+    const double share = i == 0 ? 10 : 1;
+    part.gradient = Eigen::VectorXd::Constant(1, 0.1 * share);  // all within the noise
+    part.information = Eigen::MatrixXd::Constant(1, 1, share);
+    equations.throws.push_back(part);
+  }
+  const auto found = scatter_covariance(equations, Eigen::MatrixXd::Zero(1, 1));
+  EXPECT_LT(found.degrees_of_freedom[0], 5);
+  EXPECT_NEAR(found.covariance(0, 0), 1.0 / 20, 1e-12);  // not below the inverse of the information
+}
+
+Misfit::Part part_of_residuals(const std::vector<double>& r) {
+  Misfit::Part out;
+  for (const double x : r) out.n += 1, out.sum += x, out.squares += x * x;
+  return out;
+}
+
+TEST(Misfit, NoiseCountsAsDeclared) {
+  const std::vector<Misfit::Part> noise(10, part_of_residuals({1, -1, 1, -1, 1, -1, 1, -1}));
+  EXPECT_EQ(Misfit::factor(noise), 1);
+}
+
+TEST(Misfit, AnErrorThatStaysIsOneWitness) {
+  // n residuals of 7 sigma each, in each of k throws: their mean, 7, has the weight of one sample of 7 sigma.
+  const double k = 1000, n = 25, size = 7;
+  const std::vector<Misfit::Part> stays(
+      static_cast<std::size_t>(k), part_of_residuals(std::vector<double>(static_cast<std::size_t>(n), size)));
+  const double allowed = 1 + 3 * std::sqrt(2 / k);
+  EXPECT_NEAR(Misfit::factor(stays), std::sqrt(allowed / n) / size, 1e-12);
+  // White, and as large: n witnesses.
+  std::vector<double> white;
+  for (int i = 0; i < static_cast<int>(n) - 1; ++i) white.push_back(i % 2 ? size : -size);
+  const std::vector<Misfit::Part> large(static_cast<std::size_t>(k), part_of_residuals(white));
+  EXPECT_NEAR(Misfit::factor(large), std::sqrt(1 + 3 * std::sqrt(2 / (k * (n - 1)))) / size, 1e-12);
+}
+
+TEST(Misfit, OneWildThrowDoesNotSpeak) {
+  std::vector<Misfit::Part> parts(10, part_of_residuals({1, -1, 1, -1}));
+  parts[3] = part_of_residuals({100, 100, 100, 100});
+  EXPECT_EQ(Misfit::factor(parts), 1);
+}
+
+}  // namespace
+}  // namespace unhand::fitting

@@ -1,0 +1,69 @@
+#include "fitting/twin.hpp"
+
+#include <gmock/gmock.h>
+
+#include "tests/support/small_campaign.hpp"
+
+namespace unhand::fitting {
+namespace {
+
+using datasets::Split;
+using testing::HasSubstr;
+using testing_support::small_design;
+
+constexpr const char* kLaw = "limit_surface_disc";
+
+const datasets::ThrowLog& log_of_disc() {
+  static const datasets::ThrowLog log = experiment::generate_campaign(small_design(kLaw), 11);
+  return log;
+}
+const CampaignProblem& disc() {
+  static const CampaignProblem problem(log_of_disc(), "(in memory)", {});
+  return problem;
+}
+const FitResult& disc_fit() {
+  static const FitResult result = fit(disc());
+  return result;
+}
+
+TEST(Twin, HasTheSameSamplesAndNewNoise) {
+  const auto& log = log_of_disc();
+  const auto twin = twin_of(log, disc(), disc_fit(), 5), again = twin_of(log, disc(), disc_fit(), 5),
+             other = twin_of(log, disc(), disc_fit(), 6);
+  EXPECT_THAT(twin.title, HasSubstr("synthetic"));
+  ASSERT_EQ(twin.throws.size(), log.throws.size());
+  EXPECT_NO_THROW(datasets::validate(twin));
+  double square = 0, n = 0;
+  for (std::size_t i = 0; i < log.throws.size(); ++i) {
+    const auto &a = log.throws[i], &b = twin.throws[i];
+    EXPECT_EQ(a.ft->time.data, b.ft->time.data);
+    EXPECT_EQ(a.mocap->time.data, b.mocap->time.data);
+    EXPECT_EQ(a.split, b.split);
+    EXPECT_EQ(b.ft->wrench.data, again.throws[i].ft->wrench.data);
+    EXPECT_NE(b.ft->wrench.data, other.throws[i].ft->wrench.data);
+    const double sigma = a.ft->wrench.sigma[0];
+    for (std::size_t k = 0; k < a.ft->time.rows; ++k) {
+      const double d = (a.ft->wrench(k, 0) - b.ft->wrench(k, 0)) / sigma;
+      if (a.ft->time(k) < 0.2) continue;  // after every detach: noise against noise
+      square += d * d;
+      n += 1;
+    }
+  }
+  EXPECT_NEAR(square / n, 2, 6 * std::sqrt(8 / n));  // each with variance 1; six sigma of a mean square
+}
+
+TEST(Twin, FloorOfATrueModelIsItsError) {
+  const auto throws = predict_throws(disc(), disc_fit(), {false, 0});
+  const auto errors = comparison_of(disc(), disc_fit(), throws);
+  const auto floor = error_floor(log_of_disc(), "(in memory)", disc(), disc_fit(), {}, 4);
+  ASSERT_EQ(floor.twins, 4);
+  for (int q = 0; q < experiment::kQuantityCount; ++q) {
+    const double mae = errors.statistics(q, Split::test).mae, least = floor.statistics(q, Split::test).mae;
+    // Four test throws against sixteen of the twins: half-normal errors scatter by 0.75/sqrt(4).
+    EXPECT_LT(mae, 2.2 * least) << q;
+    EXPECT_GT(mae, least / 3) << q;
+  }
+}
+
+}  // namespace
+}  // namespace unhand::fitting
