@@ -139,6 +139,7 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
   derivatives.insert(derivatives.begin(), std::move(all));
   for (const auto& law : laws) {
     if (law == problem.options().model) continue;
+    out.candidates.push_back({"contact.law:" + law, {""}, {width}, {}});
     CampaignProblem other = problem.with(law, problem.options().effects);
     auto campaign = carried(fit, other);
     differences.push_back({std::move(other), std::move(campaign), 1});
