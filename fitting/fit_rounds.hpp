@@ -33,6 +33,7 @@ class FitRounds {
   const Shared& shared() const { return shared_; }
   const NormalEquations& equations() const { return equations_; }
 
+  /// How the last round ended.
   struct Solution {
     bool usable{}, converged{};
     double cost{};  ///< ½ Σ ρ(r²), priors included
