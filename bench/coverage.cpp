@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "contact/convex_quartic.hpp"
 #include "experiment/parallel.hpp"
 #include "experiment/synthetic_campaign.hpp"
 #include "fitting/fit.hpp"
@@ -24,6 +25,7 @@ using namespace unhand;
 double truth_of(const experiment::CampaignDesign& design, const std::string& unknown) {
   if (unknown == "mu") return design.patch.mu;
   if (unknown == "length") return design.patch.length();
+  if (unknown == "kappa") return contact::ConvexQuartic::kappa_closest_to_disc();
   return design.opening.dead_time + design.opening.opening_time;  // "delay"
 }
 
@@ -49,6 +51,7 @@ Outcome one_campaign(const experiment::CampaignDesign& design, std::uint64_t see
   const fitting::CampaignProblem problem(log, "campaign", campaign);
   fitting::FitOptions options;
   options.threads = 1;
+  options.profile = true;
   const auto fit = fitting::fit(problem, options);
   out.fitted =
       fit.outcome == fitting::FitOutcome::converged || fit.outcome == fitting::FitOutcome::iterations_spent;
@@ -63,7 +66,9 @@ int main(int argc, char** argv) {
   const auto first = static_cast<std::uint64_t>(argc > 2 ? std::atoi(argv[2]) : 1);
   const int threads = argc > 3 ? std::atoi(argv[3]) : 0;
   std::vector<std::string> models(argv + std::min(argc, 4), argv + argc);
-  if (models.empty()) models = {"limit_surface_disc", "limit_surface", "sliding_pivot", "gripper_delay"};
+  if (models.empty())
+    models = {"limit_surface_disc", "limit_surface", "limit_surface_quartic", "sliding_pivot",
+              "gripper_delay"};
   if (campaigns < 1) {
     fmt::print(stderr, "usage: coverage [campaigns per model] [first seed] [threads] [model ...]\n");
     return 2;

@@ -141,19 +141,19 @@ void CampaignProblem::name_unknowns(const std::vector<Effect>& effects) {
       const double disc = contact::ConvexQuartic::kappa_closest_to_disc();
       campaign_.push_back({"kappa", "-", disc, 0.05, 2.95, 0.2, 0.3});
     }
-    own_.push_back({"mu_deviation", "-", 0, -0.5, 0.5, 0.02, 0.03});
-    if (any_force) own_.push_back({"force_deviation", "-", 0, -6, 6, 1, 1, true});
+    own_.push_back({"mu_deviation", "-", 0, -0.5, 0.5, 0.02, 0.03, Unknown::Kind::scatter});
+    if (any_force) own_.push_back({"force_deviation", "-", 0, -6, 6, 1, 1, Unknown::Kind::smoothing});
     if (!all_forces) {
       // μ and f₀ enter only as their product: f₀ is known to a factor of two, no better.
       campaign_.push_back({"grip_force", "N", 20, 0.5, 500, 10, 10});
       campaign_.push_back({"dead_time", "s", 0.01, 0, 0.2, 2e-3, {}});
       campaign_.push_back({"opening_time", "s", 0.05, 1e-3, 0.5, 5e-3, {}});
       campaign_.push_back({"shape", "-", 1, 0.3, 4, 0.2, {}});
-      own_.push_back({"dead_time_deviation", "s", 0, -0.05, 0.05, 1e-3, 2e-3});
+      own_.push_back({"dead_time_deviation", "s", 0, -0.05, 0.05, 1e-3, 2e-3, Unknown::Kind::scatter});
     }
   } else {
     campaign_.push_back({"delay", "s", first_guess_.delay.mean(), 0, 1, 5e-3, {}});
-    own_.push_back({"delay_deviation", "s", 0, -0.1, 0.1, 5e-3, 5e-3});
+    own_.push_back({"delay_deviation", "s", 0, -0.1, 0.1, 5e-3, 5e-3, Unknown::Kind::scatter});
   }
   for (const Effect& effect : effects)
     for (const auto& p : effect.parameters) {

@@ -19,13 +19,23 @@ namespace unhand::fitting {
 
 /// An unknown: of the campaign, or of every throw.
 struct Unknown {
+  /// Of a throw's own unknown: what its spread is learned from.
+  enum class Kind {
+    /// Where the object was held; about zero. Its zero is what the log's sensors say: a clock or a hand's
+    /// pose
+    /// that is off moves it for whole conditions, and the throw must be free to take that back.
+    placement,
+    /// What differs between repetitions by itself; about the mean of their condition. What all of them share
+    /// is where the law fails, and must not be hidden from the campaign's unknowns.
+    scatter,
+    smoothing  ///< what the smoothing of an input leaves open: as that says, not learned
+  };
   std::string name, unit;
   double start{}, low{}, high{};
   double scale{};  ///< a change of it that matters
   /// 1 σ of what is known of it without this log, about `start`.
   std::optional<double> prior_sigma{};
-  /// Of what the smoothing of an input leaves open: its prior is what the smoothing says, not to be learned.
-  bool of_input{false};
+  Kind kind{Kind::placement};
 };
 
 struct CampaignOptions {

@@ -128,9 +128,7 @@ void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threa
   const auto campaign = fit.values();
   const auto width = static_cast<Eigen::Index>(campaign.size());
   Weighting weighting;
-  for (const auto& m : fit.misfit)
-    for (int part = 0; part < kPartCount; ++part)
-      if (phase_of_part(part) == m.phase) weighting.group[group_of(part, m.channel)] = m.weight;
+  std::copy(fit.group_weight.begin(), fit.group_weight.end(), weighting.group.begin());
   std::vector<ThrowShare> shares(fit.throws.size());
   experiment::parallel_for(fit.throws.size(), threads, [&](std::size_t i) {
     if (fit.throws[i].used) shares[i] = share_of(problem, i, fit, campaign, weighting);

@@ -76,6 +76,7 @@ void describe_campaign(const CampaignProblem& problem, const FitRounds& rounds, 
 /// Every throw's part, and the misfit by channel and phase.
 void describe_throws(const CampaignProblem& problem, const FitRounds& rounds, FitResult& out) {
   const auto& weight = rounds.shared().weighting.group;
+  out.group_weight.assign(weight.begin(), weight.end());
   Misfit total;
   for (std::size_t i = 0; i < rounds.used().size(); ++i) {
     const auto& part = rounds.equations().throws[i];

@@ -23,12 +23,23 @@ Phase phase_of(const experiment::Observation& observation, double opening, doubl
 /// Which throws take part.
 enum class Share { train, test, all };
 
+/// What a channel that the model cannot follow counts for.
+enum class Weigh {
+  /// As many witnesses as its errors are independent: an error that stays for a stretch is one. For
+  /// parameters and predictions of a law that is not quite right.
+  witnesses,
+  /// 1/(the variance that it shows) in each phase: maximises the likelihood that has such variances, by which
+  /// models are compared (Stage::bic). Of two nested ones the larger is then never worse.
+  variances
+};
+
 struct FitOptions {
   Share share{Share::train};
   int iterations{25};  ///< of the solver, in every round
   /// Rounds in which the spread of the throws' own unknowns is learned, and the weight of every channel in
   /// every phase (and quarter of the release): where the model cannot follow, it counts for what it knows.
   int rounds{4};
+  Weigh weigh{Weigh::witnesses};
   double sample_limit{5};  ///< residuals beyond this many σ count linearly [-]
   double throw_limit{3};   ///< a throw whose χ² exceeds this many medians counts less [-]
   double accuracy{1e-6};   ///< relative change of the cost at which a round ends
@@ -100,6 +111,7 @@ struct FitResult {
   std::vector<OpenDirection> open;
   std::vector<ThrowFit> throws;
   std::vector<ChannelMisfit> misfit;  ///< of the throws used
+  std::vector<double> group_weight;   ///< factor on the residuals of every group_of(part, channel)
   double chi2{};
   long samples{}, degrees_of_freedom{};
   int iterations{},

@@ -48,7 +48,7 @@ void FitRounds::choose_throws(const std::vector<double>& start) {
       used_.push_back(i);
       misfit.add(throws[i], starts[i].residual, starts[i].detach);
     }
-  misfit.weigh(shared_.weighting);
+  misfit.weigh(shared_.weighting, options_.weigh);
   for (const std::size_t i : used_) {
     weigh(starts[i], throws[i].observed, throws[i], shared_.weighting);
     chi2_.push_back(starts[i].residual.squaredNorm());
@@ -147,12 +147,12 @@ void FitRounds::learn() {
   Misfit misfit;
   for (std::size_t i = 0; i < used_.size(); ++i)
     misfit.add(problem_.throws()[used_[i]], equations_.throws[i].residual, equations_.throws[i].detach);
-  misfit.weigh(shared_.weighting);
+  misfit.weigh(shared_.weighting, options_.weigh);
   constexpr std::size_t kFewest = 6;  // throws that have a spread
   if (!options_.own_spread.empty() || used_.size() < kFewest) return;
   for (std::size_t k = 0; k < shared_.own_sigma.size(); ++k) {
     const Unknown& u = problem_.own()[k];
-    if (u.of_input) continue;
+    if (u.kind == Unknown::Kind::smoothing) continue;
     shared_.own_sigma[k] = std::clamp(std::sqrt(spread_of(k)), 1e-3 * *u.prior_sigma, 3 * *u.prior_sigma);
   }
 }
@@ -175,6 +175,8 @@ double FitRounds::spread_of(std::size_t k) const {
     }
   }
   const Sum all = conditions[""];
+  const double about_zero = (all.square + all.uncertain) / std::max(all.weight, 1e-300);
+  if (problem_.own()[k].kind == Unknown::Kind::placement) return about_zero;
   conditions.erase("");
   double square = 0, weight = 0, degrees = 0;
   for (const auto& [name, sum] : conditions) {
@@ -186,7 +188,7 @@ double FitRounds::spread_of(std::size_t k) const {
   }
   constexpr double kEnough = 10;  // a spread is then known to a quarter
   if (degrees >= kEnough && weight > 0) return square / weight;
-  return (all.square + all.uncertain) / std::max(all.weight, 1e-300);
+  return about_zero;
 }
 
 }  // namespace unhand::fitting

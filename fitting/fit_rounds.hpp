@@ -48,9 +48,8 @@ class FitRounds {
  private:
   const double* own_at(std::size_t i) const { return own_.data() + i * shared_.own_scale.size(); }
   double* own_at(std::size_t i) { return own_.data() + i * shared_.own_scale.size(); }
-  /// The variance of own unknown k: what the throws show plus what each is uncertain by; about the mean of
-  /// their condition, if there are repetitions enough. What all repetitions share is no scatter: it is where
-  /// the model fails, and own unknowns that were given it would hide that from the campaign's.
+  /// The variance of own unknown k: what the throws show plus what each is uncertain by; about zero or the
+  /// mean of their condition, as Unknown::Kind says, the latter if there are repetitions enough.
   double spread_of(std::size_t k) const;
   void choose_throws(const std::vector<double>& start);
   /// Moves x_ and own_ to the least; `held` keeps its value, too.

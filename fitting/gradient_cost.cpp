@@ -1,5 +1,6 @@
 #include "fitting/gradient_cost.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <ctime>
 #include <vector>
@@ -37,19 +38,20 @@ GradientCost gradient_cost(const CampaignProblem& problem, const FitResult& fit)
       auto c = campaign;
       auto o = own;
       double& x = k < width ? c[k] : o[k - width];
-      const double middle = x,
-                   step = 1e-3 * (k < width ? problem.campaign()[k] : problem.own()[k - width]).scale;
-      x = middle + step;
+      const Unknown& u = k < width ? problem.campaign()[k] : problem.own()[k - width];
+      // At a bound the difference has one side.
+      const double step = 1e-3 * u.scale, low = std::max(x - step, u.low), high = std::min(x + step, u.high);
+      x = high;
       const auto above = timed(out.central, [&] { return problem.linearise(thrown, c, o, false); });
-      x = middle - step;
+      x = low;
       const auto below = timed(out.central, [&] { return problem.linearise(thrown, c, o, false); });
       if (!exact.solved || !above.solved || !below.solved) continue;
       const Eigen::VectorXd slope = k < width ? exact.campaign.col(static_cast<Eigen::Index>(k))
                                               : exact.own.col(static_cast<Eigen::Index>(k - width));
       const double size = slope.cwiseAbs().maxCoeff();
       if (size > 0)
-        deviations.push_back(((above.residual - below.residual) / (2 * step) - slope).cwiseAbs().maxCoeff() /
-                             size);
+        deviations.push_back(
+            ((above.residual - below.residual) / (high - low) - slope).cwiseAbs().maxCoeff() / size);
     }
   }
   if (!deviations.empty()) out.deviation = dynamics::median(deviations);

@@ -38,18 +38,30 @@ struct Misfit {
   /// The factor w on the residuals of a group, w² = 1/max(1, m², V): m² the mean square, and V that of the
   /// throws' means in units of 1/n. White noise of the declared σ has m² = V = 1. A law that cannot follow
   /// errs in one direction for a whole group: its n residuals are one witness, not n, and then V = n m².
-  static double factor(const std::vector<Part>& of) {
+  /// Weigh::variances leaves V out.
+  static double factor(const std::vector<Part>& of, Weigh weigh) {
     double samples = 0;
     for (const Part& part : of) samples += part.n;
     // Means scatter by themselves: three σ are allowed.
     const auto allowed = [](double n) { return 1 + 3 * std::sqrt(2 / n); };
-    const double square = trimmed_mean(of, &Part::mean_square) / allowed(samples),
-                 mean = trimmed_mean(of, &Part::of_mean) / allowed(static_cast<double>(of.size()));
-    return 1 / std::sqrt(std::max({1.0, square, mean}));
+    double square = std::max(1.0, trimmed_mean(of, &Part::mean_square) / allowed(samples));
+    if (weigh == Weigh::witnesses)
+      square = std::max(square, trimmed_mean(of, &Part::of_mean) / allowed(static_cast<double>(of.size())));
+    return 1 / std::sqrt(square);
   }
-  void weigh(Weighting& weighting) const {
-    for (std::size_t g = 0; g < parts.size(); ++g)
-      if (!parts[g].empty()) weighting.group[g] = factor(parts[g]);
+  /// By channel and part; for variances by channel and phase.
+  void weigh(Weighting& weighting, Weigh weigh) const {
+    for (int part = 0; part < kPartCount; ++part)
+      for (int c = 0; c < kChannelCount; ++c) {
+        const auto channel = static_cast<experiment::Channel>(c);
+        std::vector<Part> of;
+        for (int other = 0; other < kPartCount; ++other) {
+          const auto& there = parts[group_of(other, channel)];
+          if (other == part || (weigh == Weigh::variances && phase_of_part(other) == phase_of_part(part)))
+            of.insert(of.end(), there.begin(), there.end());
+        }
+        if (!of.empty()) weighting.group[group_of(part, channel)] = factor(of, weigh);
+      }
   }
 
  private:

@@ -82,7 +82,7 @@ std::optional<Trial> try_out(const Stage& stage, const Footprints& f, const Scor
   if (!trial.next.solved()) return std::nullopt;
   trial.delta_bic = trial.next.bic() - stage.bic();
   const bool law = is_law(candidate.id);
-  trial.held_out = law ? law_improvement(stage.held_out, trial.next.held_out, options)
+  trial.held_out = law ? law_improvement(stage.held_out, trial.next.held_out, out.base_test, options)
                        : improvement(stage.held_out, trial.next.held_out, out.base_test, options);
   Ranked& ranked = named(out.ranking, candidate.id);
   ranked.refitted = true;

@@ -43,9 +43,10 @@ double Stage::bic() const {
 void solve(Stage& stage, const DiscoverOptions& options, std::vector<double> start) {
   FitOptions train = options.fit;
   train.start = std::move(start);
+  train.weigh = Weigh::variances;  // as bic() compares
   stage.fit = fit(stage.problem, train);
   if (stage.fit.outcome == FitOutcome::no_start || stage.fit.outcome == FitOutcome::not_solved) return;
-  FitOptions test = options.fit;
+  FitOptions test = train;
   test.share = Share::test;
   test.start = stage.fit.values();
   test.all_fixed = true;
@@ -126,10 +127,18 @@ Improvement improvement(const FitResult& before, const FitResult& after,
   return out;
 }
 
-Improvement law_improvement(const FitResult& before, const FitResult& after, const DiscoverOptions& options) {
-  const double was = before.chi2_per_dof(), is = after.chi2_per_dof();
-  return {(was - is) / (options.law_matters * was), was - is,
-          fmt::format("chi2 of all channels: {:.4g} to {:.4g} per degree of freedom", was, is)};
+Improvement law_improvement(const FitResult& before, const FitResult& after,
+                            const std::vector<ChannelMisfit>& base, const DiscoverOptions& options) {
+  double fall = 0;
+  for (const auto& b : before.misfit) {
+    const double left = b.chi2_per_sample() - 1, at_base = misfit_in(base, b.channel, b.phase) - 1;
+    if (at_base > 0 && left < kRest * at_base) continue;  // explained
+    fall += b.n * (b.chi2_per_sample() - misfit_in(after.misfit, b.channel, b.phase));
+  }
+  fall /= static_cast<double>(std::max(1L, before.degrees_of_freedom));
+  const double was = before.chi2_per_dof();
+  return {fall / (options.law_matters * was), fall,
+          fmt::format("chi2 of all channels: {:.4g} to {:.4g} per degree of freedom", was, was - fall)};
 }
 
 double wald_p_value(const Stage& stage, const dynamics::Effect& effect) {

@@ -55,9 +55,10 @@ struct Improvement {
 Improvement improvement(const FitResult& before, const FitResult& after,
                         const std::vector<ChannelMisfit>& base, const DiscoverOptions& options);
 
-/// Of another law, which has no more parameters to bend: it matters if the held-out χ² as a whole falls by
-/// half a per cent.
-Improvement law_improvement(const FitResult& before, const FitResult& after, const DiscoverOptions& options);
+/// Of another law, which has next to no parameters to bend: it matters if the held-out χ² as a whole falls by
+/// half a per cent, channels apart of which not a hundredth of the base's misfit is left.
+Improvement law_improvement(const FitResult& before, const FitResult& after,
+                            const std::vector<ChannelMisfit>& base, const DiscoverOptions& options);
 
 /// Wald's test of an effect's size parameters against neutral, with the fit's covariance.
 double wald_p_value(const Stage& stage, const dynamics::Effect& effect);

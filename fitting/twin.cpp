@@ -107,7 +107,9 @@ std::optional<datasets::Throw> twin_throw(const datasets::ThrowLog& log, const d
   for (std::size_t k = 0; k < problem.own().size(); ++k) {
     const Unknown& u = problem.own()[k];
     // The smoothed inputs are the twin's truth.
-    own.push_back(u.of_input ? 0.0 : std::clamp(random.normal(0, fit.own_spread[k]), u.low, u.high));
+    own.push_back(u.kind == Unknown::Kind::smoothing
+                      ? 0.0
+                      : std::clamp(random.normal(0, fit.own_spread[k]), u.low, u.high));
   }
   experiment::ObservationOptions every;
   every.settling = every.wrench_trust = 0;

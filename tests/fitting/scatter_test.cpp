@@ -52,7 +52,7 @@ Misfit::Part part_of_residuals(const std::vector<double>& r) {
 
 TEST(Misfit, NoiseCountsAsDeclared) {
   const std::vector<Misfit::Part> noise(10, part_of_residuals({1, -1, 1, -1, 1, -1, 1, -1}));
-  EXPECT_EQ(Misfit::factor(noise), 1);
+  EXPECT_EQ(Misfit::factor(noise, Weigh::witnesses), 1);
 }
 
 TEST(Misfit, AnErrorThatStaysIsOneWitness) {
@@ -61,18 +61,21 @@ TEST(Misfit, AnErrorThatStaysIsOneWitness) {
   const std::vector<Misfit::Part> stays(
       static_cast<std::size_t>(k), part_of_residuals(std::vector<double>(static_cast<std::size_t>(n), size)));
   const double allowed = 1 + 3 * std::sqrt(2 / k);
-  EXPECT_NEAR(Misfit::factor(stays), std::sqrt(allowed / n) / size, 1e-12);
+  EXPECT_NEAR(Misfit::factor(stays, Weigh::witnesses), std::sqrt(allowed / n) / size, 1e-12);
+  EXPECT_NEAR(Misfit::factor(stays, Weigh::variances), std::sqrt(1 + 3 * std::sqrt(2 / (k * n))) / size,
+              1e-12);
   // White, and as large: n witnesses.
   std::vector<double> white;
   for (int i = 0; i < static_cast<int>(n) - 1; ++i) white.push_back(i % 2 ? size : -size);
   const std::vector<Misfit::Part> large(static_cast<std::size_t>(k), part_of_residuals(white));
-  EXPECT_NEAR(Misfit::factor(large), std::sqrt(1 + 3 * std::sqrt(2 / (k * (n - 1)))) / size, 1e-12);
+  EXPECT_NEAR(Misfit::factor(large, Weigh::witnesses), std::sqrt(1 + 3 * std::sqrt(2 / (k * (n - 1)))) / size,
+              1e-12);
 }
 
 TEST(Misfit, OneWildThrowDoesNotSpeak) {
   std::vector<Misfit::Part> parts(10, part_of_residuals({1, -1, 1, -1}));
   parts[3] = part_of_residuals({100, 100, 100, 100});
-  EXPECT_EQ(Misfit::factor(parts), 1);
+  EXPECT_EQ(Misfit::factor(parts, Weigh::witnesses), 1);
 }
 
 }  // namespace
