@@ -42,9 +42,9 @@ void zeno(Section& out) {
 /// A block on a plate shaken with the acceleration sin t; ρ = μ g over the amplitude.
 void plate(Section& out) {
   const dynamics::Entry<double, 2> start{2, 0.0, {0.0, 0.0}, 0.0};
-  const auto shake = [&](double rho, double t_end, double longest_step) {
+  const auto shake = [&](double rho, double t_end, double guard_interval) {
     auto options = tight();
-    options.longest_step = longest_step;
+    options.guard_interval = guard_interval;
     return dynamics::integrate<double, 2>(dynamics::plate(Dual(rho)), start, t_end, options);
   };
   const auto slid = shake(0.8, 3.9, 0.1);

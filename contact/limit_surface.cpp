@@ -146,6 +146,7 @@ Entry<S, 6> LimitSurface<Shape>::onset(const Window& window, const SceneSource& 
   Relative<S> y = rest;
   y.slip = {S(0), S(0)};
   y.spin = S(0);
+  const State<S, 6> at_rest = y.state();
   const auto acceleration = [&](double after) {
     return slip_acceleration(shape_, limits<S>(), source.scene(window, S(t + after)), y);
   };
@@ -164,7 +165,7 @@ Entry<S, 6> LimitSurface<Shape>::onset(const Window& window, const SceneSource& 
   const S k = speed / a2;
   y.slip = {k * end[0], k * end[1]};
   y.spin = k * end[2] / limits<S>().length(source.scene(window, S(t + delta)).normal_force);
-  return {kSlip, S(t + delta), y.state(), S(delta)};
+  return {kSlip, S(t + delta), y.state(), S(delta), at_rest};
 }
 
 /// Along a straight line to zero slip, then decide anew.

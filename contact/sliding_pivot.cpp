@@ -310,7 +310,7 @@ Entry<S, 6> SlidingPivot::spin_onset(int mode, const Phase& from, const SceneSou
   for (int i = 0; i < 6; ++i) y[i] = y0[i] + 0.5 * delta * dy[i];
   rate_(mode, source.scene(from.window, S(t + 0.5 * delta)), Relative<S>::from(y), dy);
   for (int i = 0; i < 6; ++i) y[i] = y0[i] + delta * dy[i];
-  if (sign_of(rotation_of(mode)) * value_of(y[5]) > 0) return {mode, S(t + delta), y, S(delta)};
+  if (sign_of(rotation_of(mode)) * value_of(y[5]) > 0) return {mode, S(t + delta), y, S(delta), y0};
   return {mode_of(translation_of(mode), kLocked), t, y0, S(0)};
 }
 

@@ -1,42 +1,49 @@
-// Explicit Runge-Kutta of order 5(4) with dense output of order 4: the stepper of smooth flows.
+// Explicit Runge-Kutta of order 8(5,3) with dense output of order 7: the stepper of smooth flows.
 #pragma once
 
+#include <utility>
+
+#include "dynamics/dormand_prince_coefficients.hpp"
 #include "dynamics/stepper.hpp"
 
 namespace unhand::dynamics {
 
-/// [DormandPrince1980]; dense output after [HairerNorsettWanner1993] II.6. Six evaluations a step (the last
-/// is the first of the next).
+/// DOP853 of [HairerNorsettWanner1993] II.10. Twelve evaluations a step (the last is the first of the next),
+/// and three more where the dense output is asked for.
 template <class S, int N>
 class DormandPrince final : public SingleStep<DormandPrince<S, N>, S, N> {
  public:
   static constexpr bool kPredictive = false;
-  static constexpr double kOrder = 5;
+  static constexpr double kOrder = 8;
   using SingleStep<DormandPrince<S, N>, S, N>::SingleStep;
 
   void prepare(bool fresh) {
     if (fresh)
       this->flow(this->t0_, this->y0_, k_[0]);
     else
-      k_[0] = k_[6];
+      k_[0] = k_[kEnd];
   }
-  double guess() const { return this->first_step(values<S, N>(k_[0])); }
+  double guess() { return this->first_step(values<S, N>(k_[0])); }
 
   double attempt(const S& h) {
-    advance(h, this->y1_, true);
-    State<S, N> error;
-    for (int i = 0; i < N; ++i)
-      error[i] = h * (71.0 / 57600 * k_[0][i] - 71.0 / 16695 * k_[2][i] + 71.0 / 1920 * k_[3][i] -
-                      17253.0 / 339200 * k_[4][i] + 22.0 / 525 * k_[5][i] - 1.0 / 40 * k_[6][i]);
     h_ = h;
-    return this->error_norm(error);
+    bent_ = false;
+    advance(h, this->y1_);
+    this->flow(this->t0_ + h, this->y1_, k_[kEnd]);
+    State<S, N> error5, error3;
+    for (int i = 0; i < N; ++i) {
+      error5[i] = h * weighted<kEnd>(dop853::kError5, i);
+      error3[i] = h * weighted<kEnd>(dop853::kError3, i);
+    }
+    const double e5 = this->error_norm(error5), e3 = this->error_norm(error3);
+    return e5 > 0 ? e5 * e5 / std::sqrt(e5 * e5 + 0.01 * e3 * e3) : e5;
   }
 
   /// h |λ| of the last step's fastest direction, from the flow at its end and at the stage before.
   double stiffness() const {
     double rates = 0, states = 0;
     for (int i = 0; i < N; ++i) {
-      const double rate = value_of(k_[6][i]) - value_of(k_[5][i]);
+      const double rate = value_of(k_[kEnd][i]) - value_of(k_[kEnd - 1][i]);
       const double state = value_of(this->y1_[i]) - value_of(last_stage_[i]);
       rates += rate * rate;
       states += state * state;
@@ -44,56 +51,72 @@ class DormandPrince final : public SingleStep<DormandPrince<S, N>, S, N> {
     return states > 0 ? std::abs(value_of(h_)) * std::sqrt(rates / states) : 0.0;
   }
 
+  int parts() const override { return 3; }
   void interpolate(double theta, State<S, N>& y) const override {
+    if (!bent_) bend();
     const double one = 1 - theta;
     for (int i = 0; i < N; ++i) {
-      const S dy = this->y1_[i] - this->y0_[i];
-      const S bend = h_ * k_[0][i] - dy;
-      const S twist = dy - h_ * k_[6][i] - bend;
-      const S d = h_ * (-12715105075.0 / 11282082432.0 * k_[0][i] + 87487479700.0 / 32700410799.0 * k_[2][i] -
-                        10690763975.0 / 1880347072.0 * k_[3][i] + 701980252875.0 / 199316789632.0 * k_[4][i] -
-                        1453857185.0 / 822651844.0 * k_[5][i] + 69997945.0 / 29380423.0 * k_[6][i]);
-      y[i] = this->y0_[i] + theta * (dy + one * (bend + theta * (twist + one * d)));
+      const auto& [dy, b0, b1, b2, b3, b4, b5] = bend_[i];
+      const S end = b2 + theta * (b3 + one * (b4 + theta * b5));
+      y[i] = this->y0_[i] + theta * (dy + one * (b0 + theta * (b1 + one * end)));
     }
   }
 
   void retake(double h, State<S, N>& y) override {
-    // The stages of the accepted step are still needed by the dense output.
-    const auto kept = k_;
-    advance(S(h), y, false);
+    const auto kept = k_;  // the stages of the step are still needed by its dense output
+    advance(S(h), y);
     k_ = kept;
   }
 
  private:
-  void advance(const S& h, State<S, N>& y1, bool with_last) {
-    const S& t = this->t0_;
-    const State<S, N>& y0 = this->y0_;
+  static constexpr int kEnd = 12,
+                       kStages = 16;  // of the flow at the end of the step; with the dense output's
+
+  /// Σ_j weight_j k_j of component i over the first `Count` stages; zeros cost nothing.
+  template <int Count, std::size_t Size>
+  S weighted(const double (&weight)[Size], int i) const {
+    S sum = weight[0] * k_[0][i];
+    for (int j = 1; j < Count; ++j)
+      if (weight[j] != 0) sum += weight[j] * k_[j][i];
+    return sum;
+  }
+  template <int Stage>
+  void stage_state(const S& h, State<S, N>& y) const {
+    for (int i = 0; i < N; ++i) y[i] = this->y0_[i] + h * weighted<Stage>(dop853::kA[Stage], i);
+  }
+  template <int Stage>
+  void stage(const S& h) const {
     State<S, N> y;
-    for (int i = 0; i < N; ++i) y[i] = y0[i] + h * (1.0 / 5 * k_[0][i]);
-    this->flow(t + 1.0 / 5 * h, y, k_[1]);
-    for (int i = 0; i < N; ++i) y[i] = y0[i] + h * (3.0 / 40 * k_[0][i] + 9.0 / 40 * k_[1][i]);
-    this->flow(t + 3.0 / 10 * h, y, k_[2]);
-    for (int i = 0; i < N; ++i)
-      y[i] = y0[i] + h * (44.0 / 45 * k_[0][i] - 56.0 / 15 * k_[1][i] + 32.0 / 9 * k_[2][i]);
-    this->flow(t + 4.0 / 5 * h, y, k_[3]);
-    for (int i = 0; i < N; ++i)
-      y[i] = y0[i] + h * (19372.0 / 6561 * k_[0][i] - 25360.0 / 2187 * k_[1][i] + 64448.0 / 6561 * k_[2][i] -
-                          212.0 / 729 * k_[3][i]);
-    this->flow(t + 8.0 / 9 * h, y, k_[4]);
-    for (int i = 0; i < N; ++i)
-      y[i] = y0[i] + h * (9017.0 / 3168 * k_[0][i] - 355.0 / 33 * k_[1][i] + 46732.0 / 5247 * k_[2][i] +
-                          49.0 / 176 * k_[3][i] - 5103.0 / 18656 * k_[4][i]);
-    this->flow(t + h, y, k_[5]);
-    for (int i = 0; i < N; ++i)
-      y1[i] = y0[i] + h * (35.0 / 384 * k_[0][i] + 500.0 / 1113 * k_[2][i] + 125.0 / 192 * k_[3][i] -
-                           2187.0 / 6784 * k_[4][i] + 11.0 / 84 * k_[5][i]);
-    if (!with_last) return;
-    this->flow(t + h, y1, k_[6]);
-    last_stage_ = y;
+    stage_state<Stage>(h, y);
+    this->flow(this->t0_ + dop853::kNode[Stage] * h, y, k_[Stage]);
+    if constexpr (Stage == kEnd - 1) last_stage_ = y;
   }
 
-  std::array<State<S, N>, 7> k_{};
-  State<S, N> last_stage_{};
+  void advance(const S& h, State<S, N>& y1) {
+    [&]<int... Stage>(std::integer_sequence<int, Stage...>) { (stage<Stage + 1>(h), ...); }
+    (std::make_integer_sequence<int, kEnd - 1>());
+    stage_state<kEnd>(h, y1);
+  }
+
+  /// The dense output's stages and coefficients, when it is first asked for.
+  void bend() const {
+    stage<13>(h_);
+    stage<14>(h_);
+    stage<15>(h_);
+    for (int i = 0; i < N; ++i) {
+      const S dy = this->y1_[i] - this->y0_[i], begin = h_ * k_[0][i] - dy;
+      bend_[i][0] = dy;
+      bend_[i][1] = begin;
+      bend_[i][2] = dy - h_ * k_[kEnd][i] - begin;
+      for (int row = 0; row < 4; ++row) bend_[i][3 + row] = h_ * weighted<kStages>(dop853::kBend[row], i);
+    }
+    bent_ = true;
+  }
+
+  mutable std::array<State<S, N>, kStages> k_{};
+  mutable State<S, N> last_stage_{};
+  mutable std::array<std::array<S, 7>, N> bend_{};
+  mutable bool bent_{};
   S h_{};
 };
 

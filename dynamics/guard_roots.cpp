@@ -5,10 +5,11 @@
 namespace unhand::dynamics {
 namespace {
 
-constexpr double kNode[4] = {0, 1.0 / 3, 2.0 / 3, 1};  // where guards are sampled in a step
-constexpr double kGrazing = 1e-6;   // of a guard's range over a step: a peak this close to zero only touches
-constexpr double kTogether = 4e-9;  // of a step: roots this close on the dense output are one instant
-constexpr double kLocated = 1e-9;   // of a step: how far a guard's value may say that its root still is
+constexpr double kNode[4] = {0, 1.0 / 3, 2.0 / 3, 1};  // where guards are sampled in a stretch
+constexpr double kGrazing =
+    1e-6;  // of a guard's range over a stretch: a peak this close to zero only touches
+constexpr double kTogether = 4e-9;  // of a stretch: roots this close on the dense output are one instant
+constexpr double kLocated = 1e-9;   // of a stretch: how far a guard's value may say that its root still is
 constexpr double kStraight = 1e-6;  // of a step: so near a root the rest is a straight line, bent by 1e-12
 
 double range_of(const double (&G)[4][kMaxGuards], int i) {
@@ -27,13 +28,56 @@ void retake(Stepper<S, N>& stepper, double h, std::type_identity_t<State<double,
 
 template <class S, int N>
 bool GuardRoots<S, N>::find_first(Stepper<S, N>& stepper, bool first_step, Bracket& first) {
-  first_step_ = first_step;
+  const double t0 = value_of(stepper.t0()), length = value_of(stepper.t1()) - t0;
+  const double stretches = watch_.monotone ? 1 : std::max(1.0, std::ceil(length / interval_ * (1 - 1e-9)));
+  whole_ = stepper.fraction(length);
+  span_ = whole_ / stretches;
+  begin_ = t0;
+  if (first_step) past_.count = 0;
+  for (int k = 0; k < stretches && first.guard < 0; ++k) {
+    from_ = k * span_;
+    first_stretch_ = first_step && k == 0;
+    if (!search(stepper, first)) return false;
+  }
+  if (first.guard < 0) return true;
+  const StepPoint<N> at = point(stepper, first.root);
+  first.root = at.t - t0;
+  first.slope = at.speed > 0 ? first.slope / (span_ * at.speed) : 0;
+  return true;
+}
+
+/// Whether no guard can have fired by what the ends of the stretch say.
+template <class S, int N>
+bool GuardRoots<S, N>::is_quiet(const Samples& G, double t0, double t1) const {
+  for (int i = 0; i < watch_.count; ++i)
+    if (!watch_.armed[i] || watch_.hidden[i] || !(G[3][i] < 0)) return false;
+  if (watch_.monotone) return true;
+  if (past_.count < 2 || 3 * (t1 - t0) > interval_) return false;
+  const auto& [ta, tb] = past_.t;
+  for (int i = 0; i < watch_.count; ++i) {
+    // Newton's form of the cubic: what it can rise above the chord, with room for as much again.
+    const double chord = (G[3][i] - G[0][i]) / (t1 - t0), before = (G[0][i] - past_.G[0][i]) / (t0 - ta),
+                 earlier = (past_.G[0][i] - past_.G[1][i]) / (ta - tb);
+    const double bend = (chord - before) / (t1 - ta), bend_before = (before - earlier) / (t0 - tb);
+    const double rise = 0.25 * (t1 - t0) * (t1 - t0) *
+                        (std::abs(bend) + std::abs((bend - bend_before) / (t1 - tb)) * (t1 - ta));
+    if (!(std::max(G[0][i], G[3][i]) + 2 * rise < 0)) return false;
+  }
+  return true;
+}
+
+template <class S, int N>
+bool GuardRoots<S, N>::search(Stepper<S, N>& stepper, Bracket& first) {
   double G[4][kMaxGuards];
   std::copy_n(watch_.start.begin(), watch_.count, G[0]);
   if (!sample(stepper, 1, G[3])) return false;
-  bool quiet = watch_.monotone;
-  for (int i = 0; i < watch_.count; ++i) quiet = quiet && watch_.armed[i] && !watch_.hidden[i] && G[3][i] < 0;
+  const double begin = std::exchange(begin_, sampled_at_);
+  const bool quiet = is_quiet(G, begin, sampled_at_);
   std::copy_n(G[3], watch_.count, watch_.start.begin());
+  past_.t[1] = std::exchange(past_.t[0], begin);
+  std::copy_n(past_.G[0], watch_.count, past_.G[1]);
+  std::copy_n(G[0], watch_.count, past_.G[0]);
+  past_.count = std::min(past_.count + 1, 2);
   if (quiet) return true;
   for (int node = 1; node <= 2; ++node)
     if (!sample(stepper, kNode[node], G[node])) return false;
@@ -91,21 +135,27 @@ bool GuardRoots<S, N>::touches(const Stepper<S, N>& stepper, const Samples& G, i
   if (G[node][guard] > kGrazing * range || !(G[node - 1][guard] < 0)) return false;
   if (node < 3) return G[node + 1][guard] < 0;
   const double bend = G[3][guard] - 2 * G[2][guard] + G[1][guard];
-  const double length = value_of(stepper.t1()) - value_of(stepper.t0());
-  return bend < 0 &&
-         watch_.slopes({watch_.phase.mode, stepper.t1(), stepper.y1(), S(0)})[guard] * length < 2e-3 * range;
+  return bend < 0 && slope_at(stepper, 1, guard) * (point(stepper, 1).t - point(stepper, 0).t) < 2e-3 * range;
+}
+
+/// The point at a fraction of the stretch.
+template <class S, int N>
+StepPoint<N> GuardRoots<S, N>::point(const Stepper<S, N>& stepper, double theta) const {
+  return stepper.point(from_ + theta * span_);
 }
 
 template <class S, int N>
-bool GuardRoots<S, N>::sample(Stepper<S, N>& stepper, double theta, double* G) {
-  const double t0 = value_of(stepper.t0()), t1 = value_of(stepper.t1());
-  if (theta >= 1) return watch_.evaluate(t1, values<S, N>(stepper.y1()), G);
-  State<double, N> y;
-  stepper.interpolate_values(theta, y);
-  return watch_.evaluate(t0 + theta * (t1 - t0), y, G);
+bool GuardRoots<S, N>::sample(const Stepper<S, N>& stepper, double theta, double* G) {
+  if (from_ + theta * span_ >= whole_ * (1 - 1e-15)) {
+    sampled_at_ = value_of(stepper.t1());
+    return watch_.evaluate(sampled_at_, values<S, N>(stepper.y1()), G);
+  }
+  const StepPoint<N> at = point(stepper, theta);
+  sampled_at_ = at.t;
+  return watch_.evaluate(at.t, at.y, G);
 }
 template <class S, int N>
-double GuardRoots<S, N>::sample_one(Stepper<S, N>& stepper, double theta, int guard) {
+double GuardRoots<S, N>::sample_one(const Stepper<S, N>& stepper, double theta, int guard) {
   double G[kMaxGuards];
   sample(stepper, theta, G);
   return G[guard];
@@ -114,7 +164,7 @@ double GuardRoots<S, N>::sample_one(Stepper<S, N>& stepper, double theta, int gu
 /// The guard began at zero and is unsafe at a node: its excursion to the safe side, if any, ended in
 /// between. False if it has not set out yet: what an event leaves of a guard takes an instant to pass.
 template <class S, int N>
-bool GuardRoots<S, N>::shrink_to_first_excursion(Stepper<S, N>& stepper, Bracket& bracket) {
+bool GuardRoots<S, N>::shrink_to_first_excursion(const Stepper<S, N>& stepper, Bracket& bracket) {
   double theta = bracket.unsafe;
   for (int k = 0; k < 200; ++k) {
     const double trial = 0.5 * theta, value = sample_one(stepper, trial, bracket.guard);
@@ -133,7 +183,7 @@ bool GuardRoots<S, N>::shrink_to_first_excursion(Stepper<S, N>& stepper, Bracket
 /// There was no excursion, or one too small for the dense output: the root is where the guard rises from
 /// then on.
 template <class S, int N>
-bool GuardRoots<S, N>::begin_of_rise(Stepper<S, N>& stepper, Bracket& bracket) const {
+bool GuardRoots<S, N>::begin_of_rise(const Stepper<S, N>& stepper, Bracket& bracket) const {
   if (!(slope_at(stepper, bracket.unsafe, bracket.guard) > 0)) return false;
   for (int k = 0; k < 200 && slope_at(stepper, 0.5 * bracket.unsafe, bracket.guard) > 0; ++k)
     bracket.unsafe *= 0.5;
@@ -144,15 +194,16 @@ bool GuardRoots<S, N>::begin_of_rise(Stepper<S, N>& stepper, Bracket& bracket) c
 
 template <class S, int N>
 double GuardRoots<S, N>::slope_at(const Stepper<S, N>& stepper, double theta, int guard) const {
-  Entry<S, N> at{watch_.phase.mode, S(stepper.t0() + theta * (stepper.t1() - stepper.t0())), {}, S(0)};
-  stepper.interpolate(theta, at.y);
-  return watch_.slopes(at)[guard];
+  const StepPoint<N> at = point(stepper, theta);
+  Entry<S, N> entry{watch_.phase.mode, S(at.t), {}, S(0)};
+  for (int i = 0; i < N; ++i) entry.y[i] = S(at.y[i]);
+  return watch_.slopes(entry)[guard];
 }
 
 /// Between safe nodes the cubic through the four may still pass zero twice. `true`, with the bracket, if
 /// the guard really does after `safe_from` and, where a crossing is `known`, before that one.
 template <class S, int N>
-bool GuardRoots<S, N>::find_hidden_peak(Stepper<S, N>& stepper, const Samples& G, double safe_from,
+bool GuardRoots<S, N>::find_hidden_peak(const Stepper<S, N>& stepper, const Samples& G, double safe_from,
                                         bool known, Bracket& bracket) {
   const int i = bracket.guard;
   const double range = range_of(G, i);
@@ -173,8 +224,8 @@ bool GuardRoots<S, N>::find_hidden_peak(Stepper<S, N>& stepper, const Samples& G
   } else if (q1 != 0) {
     roots[count++] = -q0 / q1;
   }
-  // A peak at the joint of two steps belongs to the first of them.
-  const double from = std::max(safe_from, first_step_ ? 0.0 : 1e-3), to = known ? bracket.safe : 1.001;
+  // A peak at the joint of two stretches belongs to the first of them.
+  const double from = std::max(safe_from, first_stretch_ ? 0.0 : 1e-3), to = known ? bracket.safe : 1.001;
   for (int k = 0; k < count; ++k) {  // a cubic has one maximum
     if (!(roots[k] > 3 * from && roots[k] < 3 * to) || q1 + 2 * q2 * roots[k] >= 0) continue;
     double peak = std::min(roots[k] / 3, 1.0), width = 1.0 / 12;
@@ -208,7 +259,7 @@ bool GuardRoots<S, N>::find_hidden_peak(Stepper<S, N>& stepper, const Samples& G
 /// The root on the dense output, by inverse quadratic interpolation where three points are in line with it
 /// and bisection where they are not ([Chandrupatla1997]).
 template <class S, int N>
-void GuardRoots<S, N>::locate(Stepper<S, N>& stepper, Bracket& bracket) {
+void GuardRoots<S, N>::locate(const Stepper<S, N>& stepper, Bracket& bracket) {
   // a: the newest point, b: the last one on the other side of the root, c: the one before.
   double a = bracket.unsafe, b = bracket.safe, c = b, Ga = bracket.at_unsafe, Gb = bracket.at_safe, Gc = Gb;
   bracket.slope = (Ga - Gb) / (a - b);
@@ -243,7 +294,7 @@ Entry<S, N> GuardRoots<S, N>::polish(Stepper<S, N>& stepper, const Bracket& brac
   const double t0 = value_of(stepper.t0()), length = value_of(stepper.t1()) - t0;
   const bool frozen = system_.kind(watch_.phase.mode) == FlowKind::frozen;
   // A true step to `taken`, and from there `on` along a straight line.
-  double taken = bracket.root * length, on = 0, slope = bracket.slope / length, h_last = 0, G_last = 0;
+  double taken = bracket.root, on = 0, slope = bracket.slope, h_last = 0, G_last = 0;
   State<double, N> base, rate{};
   for (int k = 0; k < 16; ++k) {
     if (k == 0 || std::abs(on) > kStraight * length) {

@@ -48,13 +48,16 @@ struct Phase {
 };
 
 /// Where a phase begins: the mode with its state at t. Where the first instants after an event are known in
-/// closed form, t lies `lead` after the event.
+/// closed form, t lies `lead` after the event, and `at_event` is the state there.
 template <class S, int N>
 struct Entry {
   int mode{};
   S t{};
   State<S, N> y{};
   S lead{};
+  State<S, N> at_event{};
+
+  const State<S, N>& event_state() const { return value_of(lead) > 0 ? at_event : y; }
 };
 
 /// Everything the integrator knows of a system. One overload serves double and one Dual (virtual functions

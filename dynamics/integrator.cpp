@@ -43,7 +43,7 @@ class Run {
         options_(options),
         steppers_(options),
         watch_(system, options.method),
-        roots_(system, watch_, solution_.statistics.grazings) {}
+        roots_(system, watch_, options.guard_interval, solution_.statistics.grazings) {}
 
   Solution<S, N> operator()(const Entry<S, N>& start, const S& t_end) {
     solution_.events.reserve(32);
@@ -88,7 +88,7 @@ class Run {
     ++next_time_;
     window_ = {value_of(t), value_of(window_end())};
     Departure departure{system_.on_time(mode, window_, t, y), {}};
-    record_lead(departure.at, y);
+    record_lead(departure.at);
     log(EventKind::time, index, mode, departure.at);
     return departure;
   }
@@ -97,6 +97,7 @@ class Run {
 
   Departure run_phase(const Entry<S, N>& entry) {
     const bool same_mode = entry.mode == phase_.mode;
+    const bool goes_on = same_mode && phase_.window.end == window_.begin && value_of(entry.lead) == 0;
     if (!same_mode) watch_.fired = watch_.kNone;
     phase_ = {entry.mode, window_};
     watch_.enter(phase_);
@@ -109,6 +110,7 @@ class Run {
     if (immediate >= 0) return transition(immediate, entry.t, entry.y);
 
     Stepper<S, N>& stepper = steppers_.of(system_.kind(entry.mode), system_.is_paced(entry.mode));
+    if (goes_on) stepper.goes_on();
     stepper.start(system_, phase_, entry.t, entry.y);
     for (bool first_step = true;; first_step = false) {
       if (++solution_.statistics.steps > options_.step_budget)
@@ -132,18 +134,20 @@ class Run {
   }
 
   double longest_step(const Stepper<S, N>& stepper) const {
-    if (system_.kind(phase_.mode) == FlowKind::frozen || system_.is_paced(phase_.mode))
-      return options_.longest_step;
+    double longest = options_.longest_step;
+    if (watch_.count > 0 && !watch_.monotone)
+      longest = std::min(longest, (options_.method == Method::cvode ? 1 : 16) * options_.guard_interval);
+    if (system_.kind(phase_.mode) == FlowKind::frozen || system_.is_paced(phase_.mode)) return longest;
     State<double, N> y;
     for (int i = 0; i < N; ++i) y[i] = value_of(stepper.y1()[i]);
     const double bound = system_.max_step(phase_, value_of(stepper.t1()), y);
-    return std::min({options_.longest_step, bound, watch_.longest_step(value_of(stepper.t1()))});
+    return std::min({longest, bound, watch_.longest_step(value_of(stepper.t1()))});
   }
 
   Departure transition(int guard, const S& t, const State<S, N>& y) {
     Departure departure{system_.on_guard(phase_, guard, t, y), {}};
-    record_straight(phase_, t, y, departure.at.t - departure.at.lead, departure.at.y);
-    record_lead(departure.at, y);
+    record_straight(phase_, t, y, departure.at.t - departure.at.lead, departure.at.event_state());
+    record_lead(departure.at);
     watch_.fired = guard;
     log(EventKind::guard, guard, phase_.mode, departure.at);
     if (static_cast<int>(solution_.events.size()) >= options_.event_budget)
@@ -175,21 +179,34 @@ class Run {
   // ---------------------------------------------------------------- log and end
 
   void log(EventKind kind, int index, int before, const Entry<S, N>& after) {
-    solution_.events.push_back({kind, index, before, after.mode, S(after.t - after.lead), after.y});
+    solution_.events.push_back(
+        {kind, index, before, after.mode, S(after.t - after.lead), after.event_state()});
   }
 
+  /// Where a step was not taken in time its dense output is no polynomial of time: then in parts.
   void record(const Stepper<S, N>& stepper, const S& until) {
     if (!options_.record) return;
-    const double whole = value_of(stepper.t1()) - value_of(stepper.t0());
-    const double part = whole > 0 ? (value_of(until) - value_of(stepper.t0())) / whole : 0.0;
+    const double t0 = value_of(stepper.t0()), length = value_of(stepper.t1()) - t0;
+    const double end = length > 0 ? (value_of(until) - t0) / length : 0.0;
+    const int parts = system_.is_paced(phase_.mode) ? stepper.parts() : 1;
+    const double whole = parts > 1 ? stepper.fraction(end * length) : 0;
     // The nodes lie at fixed fractions of the step: their times have the derivatives of the step, not of
     // `until`.
-    S last = until;
-    if constexpr (!std::is_same_v<S, double>)
-      last.v = (stepper.t0() + part * (stepper.t1() - stepper.t0())).v;
-    TrajectoryPiece<S, N> piece{stepper.t0(), last, phase_, {}};
-    for (int k = 0; k < 5; ++k) stepper.interpolate(0.25 * k * part, piece.nodes[k]);
-    solution_.trajectory.pieces.push_back(piece);
+    const auto time = [&](double fraction) {
+      S t = fraction < end ? S(t0 + fraction * length) : until;
+      if constexpr (!std::is_same_v<S, double>)
+        t.v = (stepper.t0() + fraction * (stepper.t1() - stepper.t0())).v;
+      return t;
+    };
+    double from = 0;
+    for (int part = 1; part <= parts; ++part) {
+      const double to = part < parts ? (stepper.point(whole * part / parts).t - t0) / length : end;
+      TrajectoryPiece<S, N> piece{time(from), time(to), phase_, {}};
+      for (int k = 0; k < piece.kNodes; ++k)
+        stepper.interpolate(from + k * (to - from) / (piece.kNodes - 1), piece.nodes[k]);
+      solution_.trajectory.pieces.push_back(piece);
+      from = to;
+    }
   }
 
   /// The first instants of an entry, or the last ones before an event, that a transition knew in closed form.
@@ -197,12 +214,13 @@ class Run {
                        const State<S, N>& y1) {
     if (!options_.record || !(value_of(t1) > value_of(t0))) return;
     TrajectoryPiece<S, N> piece{t0, t1, phase, {}};
-    for (int k = 0; k < 5; ++k)
-      for (int i = 0; i < N; ++i) piece.nodes[k][i] = y0[i] + 0.25 * k * (y1[i] - y0[i]);
+    for (int k = 0; k < piece.kNodes; ++k)
+      for (int i = 0; i < N; ++i)
+        piece.nodes[k][i] = y0[i] + static_cast<double>(k) / (piece.kNodes - 1) * (y1[i] - y0[i]);
     solution_.trajectory.pieces.push_back(piece);
   }
-  void record_lead(const Entry<S, N>& entry, const State<S, N>& before) {
-    record_straight({entry.mode, window_}, entry.t - entry.lead, before, entry.t, entry.y);
+  void record_lead(const Entry<S, N>& entry) {
+    record_straight({entry.mode, window_}, entry.t - entry.lead, entry.event_state(), entry.t, entry.y);
   }
 
   static bool finite(const Entry<S, N>& entry) {

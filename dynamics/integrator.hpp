@@ -14,9 +14,10 @@ namespace unhand::dynamics {
 struct IntegratorOptions {
   Method method{Method::automatic};
   Tolerances tolerances;
-  /// Longest step [s]; guards are sampled at thirds of a step and through the cubic in between, so two roots
-  /// closer than about a ninth of this may be missed.
-  double longest_step{5e-3};
+  /// Guards are sampled at least every third of this [s], and through the cubic in between: two roots closer
+  /// than about a ninth of it may be missed.
+  double guard_interval{5e-3};
+  double longest_step{0.05};  ///< [s]; steps with guards are no longer than sixteen guard intervals
   long step_budget{200'000};
   int event_budget{10'000};
   int events_per_instant{24};  ///< mode changes without time passing, before the answer is `mode_cycle`

@@ -86,7 +86,10 @@ class PacedStepper final : public Stepper<double, N> {
     augmented[N] = t;
     this->t1_ = t;
     this->y1_ = y;
-    inner_->suggest(first_length(t, y));  // the last phase's length in σ says nothing here
+    if (!std::exchange(goes_on_, false)) {  // the last phase's length in σ says nothing here
+      growth_ = growth(t, y);
+      inner_->suggest(growth_ != 0 ? kFirst / std::abs(growth_) : 0);
+    }
     inner_->start(system_, phase, 0.0, augmented);
   }
 
@@ -94,12 +97,13 @@ class PacedStepper final : public Stepper<double, N> {
     this->t0_ = this->t1_;
     this->y0_ = this->y1_;
     const double pace = system_.system->pace(system_.phase, this->t0_, this->y0_);
-    const StepStatus status = inner_->step(kFar, longest / pace);
+    const StepStatus status = inner_->step(kFar, std::min(longest / pace, length_to(limit, pace)));
     count();
     if (status != StepStatus::accepted) return status;
     if (inner_->y1()[N] < limit) {
       this->t1_ = inner_->y1()[N];
       this->y1_ = PacedSystem<N>::state(inner_->y1());
+      growth_ = (system_.system->pace(system_.phase, this->t1_, this->y1_) - pace) / (this->t1_ - this->t0_);
       return this->t1_ > this->t0_ ? StepStatus::accepted : StepStatus::too_small;
     }
     land(limit, this->y1_);
@@ -121,6 +125,11 @@ class PacedStepper final : public Stepper<double, N> {
     return {augmented[N], y, length() * system_.system->pace(system_.phase, augmented[N], y)};
   }
 
+  int parts() const override { return inner_->parts(); }
+  void goes_on() override {
+    goes_on_ = true;
+    inner_->goes_on();
+  }
   void retake(double h, State<double, N>& y) override {
     land(this->t0_ + h, y);
     count();
@@ -128,10 +137,13 @@ class PacedStepper final : public Stepper<double, N> {
 
  private:
   static constexpr double kFar = 1e300;
+  static constexpr double kFirst = 0.05;      // by which the pace changes in the first step of a phase
+  static constexpr double kBeyond = 1.03;     // of the time to a limit
+  static constexpr double kStraight = 1e-11;  // s: so near an instant the rest is a straight line
 
-  /// The length in σ over which the pace changes by a twentieth.
-  double first_length(double t, const State<double, N>& y) const {
-    constexpr double kProbe = 1e-6;  // of that length
+  /// d(pace)/dt along the flow, which is d ln(pace)/dσ.
+  double growth(double t, const State<double, N>& y) const {
+    constexpr double kProbe = 1e-6;  // of the time in which the state changes by the pace
     State<double, N> rate, ahead;
     system_.system->flow(system_.phase, t, y, rate);
     const double pace = system_.system->pace(system_.phase, t, y);
@@ -139,8 +151,16 @@ class PacedStepper final : public Stepper<double, N> {
     for (int i = 0; i < N; ++i) fastest = std::max(fastest, std::abs(rate[i]));
     const double dt = kProbe * pace / std::max(fastest, 1e-300);
     for (int i = 0; i < N; ++i) ahead[i] = y[i] + dt * rate[i];
-    const double change = std::abs(system_.system->pace(system_.phase, t, ahead) - pace) / dt;
-    return change > 0 && std::isfinite(change) ? 0.05 / change : 0.0;
+    const double growth = (system_.system->pace(system_.phase, t, ahead) - pace) / dt;
+    return std::isfinite(growth) ? growth : 0;
+  }
+
+  /// The length in σ until a little after `limit` if the pace goes on as it did: what lies beyond the limit
+  /// belongs to other data.
+  double length_to(double limit, double pace) const {
+    const double steady = (kBeyond * (limit - this->t0_) + kStraight) / pace, grown = steady * growth_;
+    if (std::abs(grown) < 1e-3) return steady;
+    return grown > -1 ? std::log1p(grown) / growth_ : kFar;
   }
 
   double length() const { return inner_->t1() - inner_->t0(); }
@@ -177,7 +197,7 @@ class PacedStepper final : public Stepper<double, N> {
       inner_->retake(h, augmented);
       const double missed = t - augmented[N];
       y = PacedSystem<N>::state(augmented);
-      if (std::abs(missed) < 1e-14) break;
+      if (std::abs(missed) < kStraight) break;
       h += missed / system_.system->pace(system_.phase, augmented[N], y);
     }
     // What is left of t, along the flow.
@@ -189,6 +209,8 @@ class PacedStepper final : public Stepper<double, N> {
 
   std::unique_ptr<Stepper<double, N + 1>> inner_;
   PacedSystem<N> system_;
+  bool goes_on_{};
+  double growth_{};  // of the pace in the last step [1/s of pace]
 };
 
 }  // namespace unhand::dynamics

@@ -37,7 +37,7 @@ class Radau final : public SingleStep<Radau<N>, double, N> {
     refine_ = fresh;
     factored_ = 0;
   }
-  double guess() const { return this->first_step(f0_); }
+  double guess() { return this->first_step(f0_); }
 
   double attempt(const double& h) {
     Stages z = start_values(h);

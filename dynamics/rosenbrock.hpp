@@ -1,6 +1,8 @@
 // A Rosenbrock method of order 5(4), L-stable and stiffly accurate: the stepper of stiff flows.
 #pragma once
 
+#include <utility>
+
 #include "dynamics/jacobian.hpp"
 #include "dynamics/small_inverse.hpp"
 #include "dynamics/stepper.hpp"
@@ -24,16 +26,34 @@ class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
 
   void prepare(bool /*fresh*/) {
     ++this->flow_evaluations_;
-    flow_jacobian<N>(*this->system_, this->phase_, this->t0_, this->y0_, f0_, jacobian_, ft_, seeded_);
+    State<double, N> ft;
+    flow_jacobian<N>(*this->system_, this->phase_, this->t0_, this->y0_, f0_, jacobian_, ft, seeded_);
+    for (int i = 0; i < N; ++i) ft_[i] = ft[i];
   }
-  double guess() const { return this->first_step(f0_); }
+  double guess() { return this->first_step(f0_); }
 
   double attempt(const double& h) {
     State<double, N> error;
     advance(h, this->y1_, error);
-    std::copy_n(&k_[0][0], kStages * kPadded, &kept_[0][0]);
     bent_ = false;
     return this->error_norm(error);
+  }
+
+  /// h |λ| of the last step's fastest direction: power iteration, one product a step.
+  double stiffness() {
+    double before = 0, after = 0;
+    State<double, N> image{};
+    for (int i = 0; i < N; ++i) before += fastest_[i] * fastest_[i];
+    if (!(before > 0) || !std::isfinite(before)) {
+      before = N;
+      fastest_.fill(1);
+    }
+    for (int j = 0; j < N; ++j)
+      for (int i = 0; i < N; ++i) image[i] += jacobian_(i, j) * fastest_[j];
+    for (int i = 0; i < N; ++i) after += image[i] * image[i];
+    const double rate = std::sqrt(after / before);
+    for (int i = 0; i < N; ++i) fastest_[i] = image[i] / std::max(rate, 1e-300);
+    return (this->t1_ - this->t0_) * rate;
   }
 
   void interpolate(double s, State<double, N>& y) const override {
@@ -45,12 +65,15 @@ class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
   }
 
   void retake(double h, State<double, N>& y) override {
+    if (!bent_) bend();  // the stages of the step are still needed by its dense output
     State<double, N> error;
     advance(h, y, error);
   }
 
  private:
   static constexpr int kStages = 8, kPadded = SmallInverse<N>::kPadded;
+  using Vector = typename SmallInverse<N>::Vector;
+  using Packed = Eigen::Matrix<double, kPadded, 1>;
   static constexpr double kGamma = 0.21193756319429014;
   static constexpr double kNode[kStages] = {
       0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716, 0.4288403609558664, 1, 1, 1};
@@ -97,7 +120,7 @@ class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
     for (int row = 0; row < 3; ++row)
       for (int i = 0; i < N; ++i) {
         bend_[row][i] = 0;
-        for (int j = 0; j < kStages; ++j) bend_[row][i] += kH[row][j] * kept_[j][i];
+        for (int j = 0; j < kStages; ++j) bend_[row][i] += kH[row][j] * k_[j][i];
       }
     bent_ = true;
   }
@@ -109,34 +132,49 @@ class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
       matrix[i][i] += 1 / (h * kGamma);
     }
     inverse_.compute(matrix);
-    const double rate = 1 / h;
-    State<double, N> y = this->y0_, f = f0_;
-    for (int stage = 0; stage < kStages; ++stage) {
-      if (stage > 5) {
-        for (int i = 0; i < N; ++i) y[i] += k_[stage - 1][i];
-      } else if (stage > 0) {
-        alignas(16) double sum[kPadded]{};
-        for (int j = 0; j < stage; ++j)
-          for (int i = 0; i < kPadded; ++i) sum[i] += kA[stage][j] * k_[j][i];
-        for (int i = 0; i < N; ++i) y[i] = this->y0_[i] + sum[i];
-      }
-      if (stage > 0) this->flow(this->t0_ + kNode[stage] * h, y, f);
-      alignas(16) double rhs[kPadded]{};
-      for (int j = 0; j < stage; ++j)
-        for (int i = 0; i < kPadded; ++i) rhs[i] += kC[stage][j] * k_[j][i];
-      for (int i = 0; i < N; ++i) rhs[i] = f[i] + kTimeWeight[stage] * h * ft_[i] + rhs[i] * rate;
-      inverse_.multiply(rhs, k_[stage]);
-    }
+    State<double, N> y = this->y0_;
+    [&]<int... Stage>(std::integer_sequence<int, Stage...>) { (advance_stage<Stage>(h, y), ...); }
+    (std::make_integer_sequence<int, kStages>());
     for (int i = 0; i < N; ++i) {
       error[i] = k_[kStages - 1][i];
       y1[i] = y[i] + k_[kStages - 1][i];
     }
   }
 
+  template <int Stage>
+  void advance_stage(double h, State<double, N>& y) {
+    State<double, N> f = f0_;
+    if constexpr (Stage > 5) {
+      for (int i = 0; i < N; ++i) y[i] += k_[Stage - 1][i];
+    } else if constexpr (Stage > 0) {
+      const Packed sum = weighted<Stage>(kA[Stage]);
+      for (int i = 0; i < N; ++i) y[i] = this->y0_[i] + sum[i];
+    }
+    if constexpr (Stage > 0) this->flow(this->t0_ + kNode[Stage] * h, y, f);
+    alignas(16) Vector rhs;
+    auto packed = Eigen::Map<Packed, Eigen::Aligned16>(rhs);
+    packed = (kTimeWeight[Stage] * h) * ft_;
+    if constexpr (Stage > 0) packed += (1 / h) * weighted<Stage>(kC[Stage]);
+    for (int i = 0; i < N; ++i) rhs[i] += f[i];
+    inverse_.multiply(rhs, k_[Stage]);
+  }
+
+  /// Σ_j weight_j k_j over the first `Count` stages.
+  template <int Count, std::size_t Size>
+  Packed weighted(const double (&weight)[Size]) const {
+    Packed sum = weight[0] * stage(0);
+    for (int j = 1; j < Count; ++j) sum += weight[j] * stage(j);
+    return sum;
+  }
+  Eigen::Map<const Packed, Eigen::Aligned16> stage(int j) const {
+    return Eigen::Map<const Packed, Eigen::Aligned16>(k_[j]);
+  }
+
   Eigen::Matrix<double, N, N> jacobian_;
   SmallInverse<N> inverse_;
-  State<double, N> f0_{}, ft_{};
-  alignas(16) double k_[kStages][kPadded]{}, kept_[kStages][kPadded]{};
+  State<double, N> f0_{}, fastest_{};
+  Packed ft_ = Packed::Zero();
+  alignas(16) double k_[kStages][kPadded]{};
   mutable std::array<State<double, N>, 3> bend_{};
   mutable bool bent_{};
   bool seeded_;

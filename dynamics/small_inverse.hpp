@@ -1,14 +1,16 @@
 // The inverse of a small dense matrix, for solving with it many times.
 #pragma once
 
+#include <Eigen/Core>
 #include <cmath>
 #include <utility>
 
 namespace unhand::dynamics {
 
-/// A⁻¹ by Gauss-Jordan elimination with row pivoting, its columns padded to whole SIMD registers. Below some
-/// ten unknowns, multiplying by the inverse takes a third of the time of two triangular solves, whose every
-/// row waits for the one before; the error is of the same order, ε cond(A).
+/// A⁻¹ by Gauss-Jordan elimination in place, its columns padded to whole SIMD registers. Pivots are taken
+/// from the diagonal while they are no smaller than a hundredth of what lies below them, else by rows. Below
+/// some ten unknowns, multiplying by the inverse takes a third of the time of two triangular solves, whose
+/// every row waits for the one before; the error is of the same order, ε cond(A).
 template <int N>
 class SmallInverse {
  public:
@@ -17,37 +19,11 @@ class SmallInverse {
 
   /// Inverts a[row][column]. A singular matrix gives entries that are not finite.
   void compute(const double (&a)[N][N]) {
-    // [A | I] side by side. At pivot k only the N + 1 columns from k on matter: what is left of A, and what
-    // has come into I. They are handled in whole registers, never mixing narrow stores with wide loads, which
-    // stalls.
-    alignas(16) double work[N][kColumns]{};
-    int from[N];
-    for (int i = 0; i < N; ++i) {
-      from[i] = i;
-      for (int j = 0; j < N; ++j) work[i][j] = a[i][j];
-      work[i][N + i] = 1;
-    }
-    for (int k = 0; k < N; ++k) {
-      int pivot = k;
-      for (int i = k + 1; i < N; ++i)
-        if (std::abs(work[i][k]) > std::abs(work[pivot][k])) pivot = i;
-      if (pivot != k) {  // the exchange of the rest of I is kept in `from`
-        std::swap(from[k], from[pivot]);
-        for (int j = 0; j < N + k; ++j) std::swap(work[k][j], work[pivot][j]);
-      }
-      const int first = k / 2 * 2;
-      const double scale = 1 / work[k][k];
-      alignas(16) double row[kWindow];
-      for (int j = 0; j < kWindow; ++j) row[j] = work[k][first + j] * scale;
-      for (int j = 0; j < kWindow; ++j) work[k][first + j] = row[j];
-      for (int i = 0; i < N; ++i) {
-        const double factor = work[i][k];
-        if (i == k || factor == 0) continue;  // Jacobians are sparse
-        for (int j = 0; j < kWindow; ++j) work[i][first + j] -= factor * row[j];
-      }
-    }
-    for (int j = 0; j < N; ++j)
-      for (int i = 0; i < N; ++i) column_[from[j]][i] = work[i][N + j];
+    // The transpose is inverted, so that its rows are the columns of A⁻¹.
+    fill(a);
+    if (eliminate(kDiagonal)) return;
+    fill(a);
+    eliminate(kByRows);
   }
 
   /// An entry of A⁻¹.
@@ -55,17 +31,56 @@ class SmallInverse {
 
   /// y = A⁻¹ x
   void multiply(const Vector& x, Vector& y) const {
-    alignas(16) double sum[kPadded]{};
-    for (int j = 0; j < N; ++j)
-      for (int i = 0; i < kPadded; ++i) sum[i] += x[j] * column_[j][i];
-    for (int i = 0; i < kPadded; ++i) y[i] = sum[i];
+    Packed sum = x[0] * column_[0];
+    for (int j = 1; j < N; ++j) sum += x[j] * column_[j];
+    Eigen::Map<Packed>{y} = sum;
   }
 
  private:
-  static constexpr int kWindow = (N + 3) / 2 * 2;  ///< N + 1 columns from an even one on, in whole registers
-  static constexpr int kColumns = N / 2 * 2 + kWindow;
+  // Eigen's vectors, since the compiler on its own takes sums of this length apart again.
+  using Packed = Eigen::Matrix<double, kPadded, 1>;
+  enum Pivots { kDiagonal, kByRows };
 
-  alignas(16) double column_[N][kPadded]{};
+  void fill(const double (&a)[N][N]) {
+    for (int j = 0; j < N; ++j)
+      for (int i = 0; i < kPadded; ++i) column_[j][i] = i < N ? a[i][j] : 0;
+  }
+
+  /// False if a pivot on the diagonal is too small.
+  bool eliminate(Pivots pivots) {
+    int from[N];
+    for (int k = 0; k < N; ++k) {
+      int most = k;
+      double largest = std::abs(column_[k][k]);
+      for (int i = k + 1; i < N; ++i)
+        if (std::abs(column_[i][k]) > largest) {
+          largest = std::abs(column_[i][k]);
+          most = i;
+        }
+      if (pivots == kDiagonal) {
+        if (!(std::abs(column_[k][k]) >= 0.01 * largest)) return false;
+      } else {
+        from[k] = most;
+        if (most != k) column_[k].swap(column_[most]);
+      }
+      const double pivot = 1 / column_[k][k];
+      column_[k][k] = 1;
+      column_[k] *= pivot;
+      for (int i = 0; i < N; ++i) {
+        const double factor = column_[i][k];
+        if (i == k || factor == 0) continue;  // Jacobians are sparse
+        column_[i][k] = 0;
+        column_[i] -= factor * column_[k];
+      }
+    }
+    if (pivots == kByRows)  // rows exchanged before are columns exchanged after
+      for (int k = N; k-- > 0;)
+        if (from[k] != k)
+          for (int i = 0; i < N; ++i) std::swap(column_[i][k], column_[i][from[k]]);
+    return true;
+  }
+
+  Packed column_[N];  // of A⁻¹
 };
 
 }  // namespace unhand::dynamics

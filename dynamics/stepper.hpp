@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <utility>
 
 #include "dynamics/hybrid_system.hpp"
 
@@ -67,6 +68,10 @@ class Stepper {
     y = values<S, N>(at);
   }
 
+  /// Into how many parts the last step is to be cut for a method of order five to resolve it as well, at most
+  /// three.
+  virtual int parts() const { return 1; }
+
   /// The last step in the variable that it was taken in: the fraction at which `h` has passed since t0, and
   /// the point at a fraction.
   virtual double fraction(double h) const { return h / (value_of(t1_) - value_of(t0_)); }
@@ -76,6 +81,9 @@ class Stepper {
     interpolate_values(theta, at.y);
     return at;
   }
+
+  /// The next start only follows the same flow past a time event: what was learnt of it still holds.
+  virtual void goes_on() {}
 
   /// The length with which the next start tries its first step, instead of the one remembered.
   virtual void suggest(double /*h*/) {}
@@ -91,7 +99,7 @@ class Stepper {
  protected:
   S t0_{}, t1_{};
   State<S, N> y0_{}, y1_{};
-  long flow_evaluations_{};
+  mutable long flow_evaluations_{};  // dense output may be worked out when it is first asked for
   long rejected_{};
 };
 
@@ -174,13 +182,15 @@ class SingleStep : public Stepper<S, N> {
       }
       ++this->rejected_;
       const bool finite = std::isfinite(error);
-      h = value_of(length) * (finite ? std::min(step_factor(error, Derived::kOrder), 0.9) : 0.1);
+      // An error that shrinks more slowly than the order says is not to be chased by small cuts.
+      h = value_of(length) *
+          (finite ? std::min(step_factor(error, Derived::kOrder), rejected ? 0.5 : 0.8) : 0.1);
       if (h < shortest_step(t)) return finite ? StepStatus::too_small : StepStatus::not_finite;
     }
   }
 
  protected:
-  void flow(const S& t, const State<S, N>& y, State<S, N>& dy) {
+  void flow(const S& t, const State<S, N>& y, State<S, N>& dy) const {
     ++this->flow_evaluations_;
     system_->flow(phase_, t, y, dy);
   }
@@ -191,14 +201,22 @@ class SingleStep : public Stepper<S, N> {
     return scaled_norm<N>(values<S, N>(error), scale);
   }
 
-  /// A first step length from the sizes of the state and its rate ([HairerNorsettWanner1993] II.4, without
-  /// the trial step: error control corrects a poor guess at the price of one rejection).
-  double first_step(const State<double, N>& rate) const {
+  /// A first step length from the sizes of the state, its rate and the change of its rate over a trial step
+  /// ([HairerNorsettWanner1993] II.4).
+  double first_step(const State<double, N>& rate) {
     const State<double, N> y = values<S, N>(this->y0_);
     State<double, N> scale;
     system_->error_scale(phase_, tolerances_, y, y, scale);
     const double d0 = scaled_norm<N>(y, scale), d1 = scaled_norm<N>(rate, scale);
-    return d0 > 1e-5 && d1 > 1e-5 ? 0.01 * d0 / d1 : 1e-6;
+    const double trial = d0 > 1e-5 && d1 > 1e-5 ? 0.01 * d0 / d1 : 1e-6;
+    State<double, N> ahead, change;
+    for (int i = 0; i < N; ++i) ahead[i] = y[i] + trial * rate[i];
+    ++this->flow_evaluations_;
+    system_->flow(phase_, value_of(this->t0_) + trial, ahead, change);
+    for (int i = 0; i < N; ++i) change[i] -= rate[i];
+    const double most = std::max(d1, scaled_norm<N>(change, scale) / trial);
+    if (!(most > 1e-15) || !std::isfinite(most)) return trial;
+    return std::min(1e3 * trial, std::pow(0.01 / most, 1 / Derived::kOrder));
   }
 
   const HybridSystem<N>* system_{};

@@ -33,7 +33,7 @@ std::unique_ptr<Stepper<double, N>> make_stepper(Method method, FlowKind kind, c
           throw std::invalid_argument("integrate: method cvode has no derivatives; use automatic with Dual");
         return make_cvode_stepper<N>(tolerances, kind);
       case Method::automatic:
-        return std::make_unique<SwitchingStepper<N>>(tolerances, seeded);
+        return std::make_unique<SwitchingStepper<N>>(tolerances, seeded, kind);
     }
     throw std::invalid_argument("integrate: unknown method");
   }
@@ -84,7 +84,7 @@ template <class S, int N>
 Method Steppers<S, N>::method(FlowKind kind) const {
   if (options_.method != Method::automatic) return options_.method;
   if (kind == FlowKind::smooth) return Method::dormand_prince;
-  return kind == FlowKind::mixed ? Method::automatic : Method::rosenbrock;
+  return Method::automatic;
 }
 
 template class Steppers<double, 2>;

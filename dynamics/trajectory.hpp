@@ -1,4 +1,4 @@
-// A recorded trajectory: the dense output of every step, as quartics.
+// A recorded trajectory: the dense output of every step, as polynomials.
 #pragma once
 
 #include <algorithm>
@@ -9,24 +9,34 @@
 
 namespace unhand::dynamics {
 
-/// One step: the state at five equally spaced instants of [t0, t1], which fixes the dense output of every
-/// stepper.
+/// One step: the state at equally spaced instants of [t0, t1], as many as fix the dense output of every
+/// stepper in time.
 template <class S, int N>
 struct TrajectoryPiece {
+  static constexpr int kNodes = 8;
   S t0{}, t1{};
   Phase phase;
-  std::array<State<S, N>, 5> nodes{};
+  std::array<State<S, N>, kNodes> nodes{};
 
-  /// The state at the fraction θ of the piece.
+  /// The state at the fraction θ of the piece: Lagrange's polynomial on the nodes.
   State<S, N> at_fraction(const S& theta) const {
-    const S u = 4.0 * theta;
-    // Lagrange's polynomials on the nodes 0..4.
-    const S u1 = u - 1.0, u2 = u - 2.0, u3 = u - 3.0, u4 = u - 4.0;
-    const std::array<S, 5> weight{u1 * u2 * u3 * u4 / 24.0, -u * u2 * u3 * u4 / 6.0, u * u1 * u3 * u4 / 4.0,
-                                  -u * u1 * u2 * u4 / 6.0, u * u1 * u2 * u3 / 24.0};
+    const S u = (kNodes - 1.0) * theta;
+    std::array<S, kNodes> weight;  // Π_{j≠k} (u − j)/(k − j)
+    S below(1.0);
+    double scale = 1;  // (kNodes − 1)!
+    for (int k = 0; k < kNodes; ++k) {
+      weight[k] = below;
+      below *= u - static_cast<double>(k);
+      if (k > 0) scale *= k;
+    }
+    S above(1.0);
     State<S, N> y{};
-    for (int k = 0; k < 5; ++k)
-      for (int i = 0; i < N; ++i) y[i] += weight[k] * nodes[k][i];
+    for (int k = kNodes - 1; k >= 0; --k) {
+      const S share = weight[k] * above / ((kNodes - 1 - k) % 2 == 0 ? scale : -scale);
+      for (int i = 0; i < N; ++i) y[i] += share * nodes[k][i];
+      above *= u - static_cast<double>(k);
+      if (k > 0) scale *= static_cast<double>(kNodes - k) / k;
+    }
     return y;
   }
 };
@@ -49,7 +59,7 @@ class Trajectory {
   State<S, N> at(const S& t) const {
     const TrajectoryPiece<S, N>& piece = piece_at(value_of(t));
     const S length = piece.t1 - piece.t0;
-    if (!(value_of(length) > 0)) return piece.nodes[4];
+    if (!(value_of(length) > 0)) return piece.nodes.back();
     return piece.at_fraction((t - piece.t0) / length);
   }
 

@@ -144,8 +144,8 @@ FlightResult<S> fly(const FlightProblem<S>& problem, const dynamics::IntegratorO
   }
   const Flying<S> system(problem, true);
   dynamics::IntegratorOptions smooth = options;
-  smooth.longest_step =
-      std::max(options.longest_step, 0.05);  // the guard is a smooth height: no need for fine samples
+  smooth.guard_interval =
+      std::max(options.guard_interval, 0.05);  // the guard is a smooth height: no need for fine samples
   const Pose<S> start = tracked_point(Landing<S>{S(0), problem.pose, problem.twist}, problem.tracked).pose;
   const int mode = value_of(start.z) < value_of(problem.landing_height) ? kBelow : kAbove;
   const auto solution = dynamics::integrate<S, 6>(system, Entry<S, 6>{mode, S(0), state_of(problem), S(0)},

@@ -125,7 +125,7 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
  private:
   /// The last scene is kept: a step, the guards at its end and the phase that follows ask for the same
   /// instant.
-  Scene<double> scene_(const Window& window, double t) const {
+  const Scene<double>& scene_(const Window& window, double t) const {
     if (t != scene_time_ || window.begin != scene_window_.begin || window.end != scene_window_.end) {
       last_scene_ = scene_at(window, t);
       scene_time_ = t;
@@ -226,21 +226,25 @@ Wrench<S> wrench_at(const contact::ContactModel& model, const dynamics::Trajecto
   return model.wrench(piece.phase.mode, scene, Relative<S>::from(piece.at_fraction(fraction)));
 }
 
-/// Four-point Gauss-Legendre quadrature of the powers over every recorded step.
+/// Four-point Gauss-Legendre quadrature of the powers over every recorded step, in panels of at most 2 ms: a
+/// shaken hand changes them faster than the state.
 EnergyLedger book(const ReleaseProblem<double>& problem, const ReleaseSystem<double>& system,
                   const ReleaseResult<double>& result) {
   constexpr double kNode[4] = {0.0694318442029737, 0.3300094782075719, 0.6699905217924281,
                                0.9305681557970263};
   constexpr double kWeight[4] = {0.1739274225687269, 0.3260725774312731, 0.3260725774312731,
                                  0.1739274225687269};
+  constexpr double kPanel = 2e-3;  // s
   EnergyLedger ledger;
   for (const auto& piece : result.trajectory.pieces) {
     const double length = piece.t1 - piece.t0;
-    for (int k = 0; k < 4; ++k) {
-      const Scene<double> scene = system.scene(piece.phase.window, piece.t0 + kNode[k] * length);
-      const auto y = Relative<double>::from(piece.at_fraction(kNode[k]));
-      const Wrench<double> f = wrench_at(problem.contact, piece, kNode[k], scene);
-      const double weight = kWeight[k] * length;
+    const int panels = std::max(1, static_cast<int>(std::ceil(length / kPanel)));
+    for (int k = 0; k < 4 * panels; ++k) {
+      const double fraction = (k / 4 + kNode[k % 4]) / panels;
+      const Scene<double> scene = system.scene(piece.phase.window, piece.t0 + fraction * length);
+      const auto y = Relative<double>::from(piece.at_fraction(fraction));
+      const Wrench<double> f = wrench_at(problem.contact, piece, fraction, scene);
+      const double weight = kWeight[k % 4] * length / panels;
       ledger.hand_work +=
           weight * (dot(f.force(), scene.hand_twist.linear()) + f.tau * scene.hand_twist.omega);
       ledger.torsional_friction += weight * f.tau * y.spin;
@@ -306,8 +310,8 @@ ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const Releas
   result.trajectory = std::move(solution.trajectory);
   result.statistics = solution.statistics;
   if (entry.lead != S(0) || result.slips_at_start)
-    result.events.insert(result.events.begin(),
-                         {dynamics::EventKind::time, -1, 0, entry.mode, S(problem.start), entry.y});
+    result.events.insert(result.events.begin(), {dynamics::EventKind::time, -1, 0, entry.mode,
+                                                 S(problem.start), entry.event_state()});
   switch (solution.outcome) {
     case dynamics::Outcome::finished:
       result.outcome = ReleaseOutcome::detached;

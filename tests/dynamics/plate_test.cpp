@@ -13,7 +13,7 @@ class Plate : public EveryMethod {
   /// Whether the block sticks once the start is forgotten.
   static bool sticks(double rho) {
     auto o = options();
-    o.longest_step = 0.05;  // the shaking has a period of 2π
+    o.guard_interval = 0.05;  // the shaking has a period of 2π
     const auto end = shake(rho, 400.0, o);
     EXPECT_EQ(end.outcome, Outcome::horizon) << rho;
     return sticks_late(end);

@@ -99,5 +99,45 @@ TEST(PivotLimit, TheMotionTendsToTheDecoupledPivot) {
   EXPECT_LT(error_before, 1e-3);  // rad/s
 }
 
+// A radius of zero is refused (tests/contract/outcomes_test.cpp); what patches shrink to is a point contact:
+// its torque goes to zero with the radius, and the throw to that of a point, from a micrometre down to a
+// nanometre.
+TEST(PivotLimit, AShrinkingPatchTendsToAPointContact) {
+  for (const char* name : {"sliding_pivot", "limit_surface", "limit_surface_disc", "limit_surface_quartic"})
+    for (int seed = 80; seed < 83; ++seed) {
+      std::mt19937_64 random(seed);
+      const auto thrown = support::random_throw(random, 0.5 * (seed - 80));
+      const auto spin = [&](double radius) {
+        auto p = support::parameters_of(thrown);
+        p.patch.radius = radius;
+        const auto model = make_contact_model(name, p);
+        const auto result = simulate_release(support::problem_of(thrown, *model), options());
+        EXPECT_EQ(result.outcome, release::ReleaseOutcome::detached) << name << ' ' << seed << ' ' << radius;
+        return result.detach.twist.omega;
+      };
+      const double point = spin(1e-9), near = spin(1e-6) - point, far = spin(1e-5) - point;
+      // Linear in the radius, 0.1 to 0.2 rad/s a millimetre; a limit surface slips with ρ too, which bends
+      // it.
+      EXPECT_NEAR(far / near, 10, 1) << name << ' ' << seed;
+      EXPECT_LT(std::abs(near), 1e-3) << name << ' ' << seed;
+    }
+}
+
+// Where even the slip of a spinning patch is beyond double's resolution the answer is typed and finite.
+TEST(PivotLimit, APatchOfAnAtomsSizeEndsTyped) {
+  for (const char* name : {"sliding_pivot", "limit_surface", "limit_surface_disc", "limit_surface_quartic"})
+    for (int seed = 80; seed < 83; ++seed) {
+      std::mt19937_64 random(seed);
+      const auto thrown = support::random_throw(random, 0.5 * (seed - 80));
+      auto p = support::parameters_of(thrown);
+      p.patch.radius = 1e-12;
+      const auto model = make_contact_model(name, p);
+      const auto result = simulate_release(support::problem_of(thrown, *model));
+      EXPECT_TRUE(std::isfinite(result.detach.twist.omega)) << name << ' ' << seed;
+      EXPECT_LE(result.statistics.steps, dynamics::IntegratorOptions{}.step_budget);
+      EXPECT_LE(result.events.size(), static_cast<std::size_t>(dynamics::IntegratorOptions{}.event_budget));
+    }
+}
+
 }  // namespace
 }  // namespace unhand::contact
