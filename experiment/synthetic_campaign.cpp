@@ -201,7 +201,7 @@ SyntheticThrow make_throw(const CampaignDesign& design, const std::vector<bool>&
                                                   setup.gravity.at(design.gravity),
                                                   {object.com_offset + truth.grasp_offset, truth.grasp_angle},
                                                   commanded.begin()};
-    release::ReleaseOptions options;
+    release::ReleaseOptions options{design.integrator, false};
     options.integrator.record = true;
     const auto result = release::simulate_release(problem, options);
     if (result.outcome != release::ReleaseOutcome::detached)
@@ -217,7 +217,7 @@ SyntheticThrow make_throw(const CampaignDesign& design, const std::vector<bool>&
         flight_from(result.detach, problem.gravity, object.drag_k, design.landing_height, setup);
     auto of_com = flight;
     of_com.tracked = {};
-    const auto landed = flight::fly(of_com), seen = flight::fly(flight);
+    const auto landed = flight::fly(of_com, design.integrator), seen = flight::fly(flight, design.integrator);
     for (const auto* flown : {&landed, &seen})
       if (flown->outcome != flight::FlightOutcome::landed)
         throw fail(flown->outcome == flight::FlightOutcome::never_reaches

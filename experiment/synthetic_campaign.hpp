@@ -15,6 +15,7 @@
 #include "contact/normal_force.hpp"
 #include "contact/patch.hpp"
 #include "datasets/throw_log.hpp"
+#include "dynamics/integrator.hpp"
 #include "dynamics/rigid_body.hpp"
 #include "experiment/campaign_effects.hpp"
 #include "experiment/planar_arm.hpp"
@@ -114,6 +115,7 @@ struct CampaignDesign {
   SensorSuite sensors;
   /// What the world or the sensors do and the log does not say: it declares the neutral values.
   EffectSettings effects;
+  dynamics::IntegratorOptions integrator{};  ///< of the true release and flight
 
   int conditions() const;  ///< objects × postures × accelerations
   int throws() const;      ///< conditions × repetitions

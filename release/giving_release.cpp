@@ -102,8 +102,8 @@ void record(dynamics::Trajectory<S, 6>& trajectory, const S& t0, const S& t1, co
             const State<S, 6>& rate1) {
   dynamics::TrajectoryPiece<S, 6> piece{t0, t1, {0, window}, {}};
   const S h = t1 - t0;
-  for (int k = 0; k < 5; ++k) {
-    const double u = 0.25 * k, v = 1 - u;
+  for (int k = 0; k < piece.kNodes; ++k) {
+    const double u = static_cast<double>(k) / (piece.kNodes - 1), v = 1 - u;
     for (int i = 0; i < 6; ++i)
       piece.nodes[static_cast<std::size_t>(k)][i] = v * v * (1 + 2 * u) * y0[i] +
                                                     u * u * (1 + 2 * v) * y1[i] +
