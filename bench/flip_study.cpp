@@ -134,7 +134,12 @@ void population(const FlipRobot& robot, std::uint64_t seed) {
 /// Many learning paths of one learner at one target.
 class Paths {
  public:
-  void add(const LearningPath& path) {
+  void add(const LearningPath& path, const CommandRange& range) {
+    for (const PathIteration& one : path.iterations) {
+      const auto f = range.fractions(one.command);
+      ++commands_;
+      at_edge_ += std::any_of(f.begin(), f.end(), [](double x) { return x < 0.01 || x > 0.99; });
+    }
     initial_.push_back(path.initial);
     first_.push_back(path.first());
     minimum_.push_back(path.minimum());
@@ -154,13 +159,14 @@ class Paths {
                        std::sqrt(minimum.variance() / minimum.n));
   }
   std::string row() const {
-    return fmt::format("{:.2f} | {:.2f} ± {:.2f} | {:.2f} ± {:.2f} | {} | {} | {} | {}", initial(),
+    return fmt::format("{:.2f} | {:.2f} ± {:.2f} | {:.2f} ± {:.2f} | {} | {} | {} | {} | {:.0f} %", initial(),
                        mean(first_), error(first_), mean(minimum_), error(minimum_), reached(two_),
-                       median(two_), reached(three_), median(three_));
+                       median(two_), reached(three_), median(three_),
+                       100.0 * at_edge_ / std::max(1, commands_));
   }
   static const char* header() {
     return "initial error | after 1 iteration | minimum | 2/3 reached | median iterations | 3/3 reached | "
-           "median iterations";
+           "median iterations | commands at an edge";
   }
 
  private:
@@ -190,6 +196,7 @@ class Paths {
 
   std::vector<double> initial_, first_, minimum_;
   std::vector<int> two_, three_;
+  int commands_{}, at_edge_{};  ///< of all; those within a hundredth of a limit of the range
 };
 
 const FlipTarget kTargets[]{
@@ -231,18 +238,19 @@ void targets(const FlipRobot& robot, std::size_t robots) {
       paths[k][2][t] = path(m4);
     }
   });
-  fmt::print("| target | learner | {} |\n| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n",
-             Paths::header());
+  fmt::print(
+      "| target | learner | {} |\n| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n",
+      Paths::header());
   for (std::size_t t = 0; t < 4; ++t)
     for (std::size_t m = 0; m < 3; ++m) {
       Paths at;
-      for (const auto& one : paths) at.add(one[m][t]);
+      for (const auto& one : paths) at.add(one[m][t], range);
       fmt::print("| {} | {} | {} |\n", kTargetNames[t], names[m], at.row());
     }
   Paths all[3];
   for (std::size_t m = 0; m < 3; ++m) {
     for (const auto& one : paths)
-      for (const LearningPath& path : one[m]) all[m].add(path);
+      for (const LearningPath& path : one[m]) all[m].add(path, range);
     fmt::print("| all | {} | {} |\n", names[m], all[m].row());
   }
   fmt::print("\nmodel 2 - model 1: {}\nmodel 4 - model 2: {}\n{} robots, {:.0f} s\n", all[1].against(all[0]),
@@ -281,17 +289,18 @@ void shift(const FlipRobot& robot, std::size_t robots) {
       paths[k][3][t] = path(m4_few, known_few);
     }
   });
-  fmt::print("| learner | {} |\n| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n", Paths::header());
+  fmt::print("| learner | {} |\n| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n",
+             Paths::header());
   Paths all[4];
   for (std::size_t m = 0; m < 4; ++m) {
     for (const auto& one : paths)
-      for (const LearningPath& path : one[m]) all[m].add(path);
+      for (const LearningPath& path : one[m]) all[m].add(path, range);
     fmt::print("| {} | {} |\n", names[m], all[m].row());
   }
   for (std::size_t t = 0; t < 4; ++t)
     for (std::size_t m = 0; m < 4; ++m) {
       Paths at;
-      for (const auto& one : paths) at.add(one[m][t]);
+      for (const auto& one : paths) at.add(one[m][t], range);
       fmt::print("| {}: {} | {} |\n", kTargetNames[t], names[m], at.row());
     }
   fmt::print("\nmodel 3 - model 2: {}\nmodel 4 - model 3: {}\n{} robots, {:.0f} s\n", all[1].against(all[0]),
