@@ -1,7 +1,9 @@
 // Numbers of docs/throw-flip.md.
 //
-//   flip_study population [SEED]   landing poses of 27 commands, five throws each, and what each parameter
-//   does
+//   flip_study population [SEED]   27 commands, five throws each: landings, and what each parameter does
+//   flip_study targets [ROBOTS]    models 1, 2 and 4 at the four targets
+//   flip_study support [ROBOTS]    models 1 and 2 by how far the four support commands are drawn in
+//   flip_study shift [ROBOTS]      models 2, 3 and 4 after the centre of mass moved from 12 to 18 cm
 #include <fmt/format.h>
 
 #include <Eigen/QR>
@@ -257,6 +259,34 @@ void targets(const FlipRobot& robot, std::size_t robots) {
              all[2].against(all[1]), robots, seconds() - begin);
 }
 
+void support(const FlipRobot& robot, std::size_t robots) {
+  const CommandRange& range = robot.motion.range;
+  fmt::print(
+      "| drawn in by | learner | {} |\n| ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: "
+      "|\n",
+      Paths::header());
+  for (const double inset : {0.0, 0.1, 0.25}) {
+    std::vector<std::array<std::array<LearningPath, 4>, 2>> paths(robots);
+    unhand::experiment::parallel_for(robots, 0, [&](std::size_t k) {
+      const FlipPlant plant(robot, k + 1);
+      const Thrower thrower = thrower_of(plant, k + 1);
+      const Gathered known = gather(thrower, "support", support_simplex(range, inset), 3, robot.bar);
+      for (std::size_t t = 0; t < 4; ++t)
+        for (std::size_t m = 0; m < 2; ++m) {
+          ConeLearner learner(m == 0 ? ForwardModel::landing : ForwardModel::detach, known.data, kTargets[t],
+                              range);
+          paths[k][m][t] = learn(learner, kTargets[t], known.data, robot.bar, thrower, {5, 3, false});
+        }
+    });
+    for (std::size_t m = 0; m < 2; ++m) {
+      Paths all;
+      for (const auto& one : paths)
+        for (const LearningPath& path : one[m]) all.add(path, range);
+      fmt::print("| {} | model {} | {} |\n", inset, m + 1, all.row());
+    }
+  }
+}
+
 void shift(const FlipRobot& robot, std::size_t robots) {
   const double begin = seconds();
   const CommandRange& range = robot.motion.range;
@@ -317,8 +347,13 @@ int main(int argc, char** argv) {
     population(robot, number > 0 ? number : 1);
   else if (what == "targets")
     targets(robot, number > 0 ? number : 100);
+  else if (what == "support")
+    support(robot, number > 0 ? number : 20);
   else if (what == "shift")
     shift(robot, number > 0 ? number : 100);
   else
-    return fmt::print(stderr, "usage: flip_study population [SEED] | targets [ROBOTS] | shift [ROBOTS]\n"), 2;
+    return fmt::print(stderr,
+                      "usage: flip_study population [SEED] | targets [ROBOTS] | support [ROBOTS] | shift "
+                      "[ROBOTS]\n"),
+           2;
 }

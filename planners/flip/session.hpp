@@ -24,7 +24,7 @@ Thrower thrower_of(const FlipPlant& plant, std::uint64_t seed);
 /// The grid of 3 x 3 x 3 commands: ends and middle of the range.
 std::vector<FlipCommand> population_grid(const CommandRange& range);
 /// Four commands that form a simplex: every other corner of the range, drawn in by `inset` of it.
-std::vector<FlipCommand> support_simplex(const CommandRange& range, double inset = 0);
+std::vector<FlipCommand> support_simplex(const CommandRange& range, double inset = 0.25);
 
 /// Throws each command `repeats` times and keeps means (of those commands that landed at all).
 struct Gathered {
