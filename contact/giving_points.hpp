@@ -59,6 +59,7 @@ class GivingPoints {
   /// n μ f_N [N] and L(f_N) [m]. Where they cannot, they carry what they can.
   void hold(const Vec3<S>& wrench, const S& force_limit, const S& length, Stretch<S>& to);
 
+  /// One implicit step of object and points.
   struct Step {
     S h;              ///< [s]
     S force_limit;    ///< n μ f_N [N] at the end
