@@ -69,12 +69,13 @@ bool right_phase(const std::string& id, fitting::Phase phase) {
 std::string answer_of(const fitting::Discovery& found) {
   std::string out = to_string(found.verdict);
   for (const auto& effect : found.effects) {
-    out += " " + effect.id;
+    out += fmt::format(" {} ({})", effect.id, effect.why);
     for (const auto& [id, correlation] : effect.equivalent) out += " = " + id;
   }
   if (found.unexplained)
-    out += fmt::format(" unexplained {} in {}", to_string(found.unexplained->channel),
-                       to_string(found.unexplained->phase));
+    out +=
+        fmt::format(" unexplained {} in {} ({:.3g} times the noise)", to_string(found.unexplained->channel),
+                    to_string(found.unexplained->phase), found.unexplained->chi2_per_dof);
   return out;
 }
 

@@ -102,6 +102,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
   }
   const std::size_t accepted = out.effects.size();
   backward(stage, options, out);
+  withdraw(stage, options, out);
   describe(stage, options, out);
   for (AcceptedEffect& effect : out.effects)
     for (const auto& [other, correlation] : effect.equivalent) {

@@ -67,6 +67,7 @@ struct AcceptedEffect {
   std::vector<Parameter> parameters;
   double delta_bic{}, p_value{}, test_error_ratio{};
   std::string why;  ///< where the held-out misfit fell, in words
+  Phase phase{};    ///< where it fell most
 };
 
 /// One candidate, as it was scored in the step in which it came nearest to being accepted.
@@ -118,7 +119,8 @@ struct Discovery {
   Verdict verdict{};
   std::string message;
   std::vector<AcceptedEffect> effects;
-  std::vector<std::string> along;  ///< effects that are fitted along as nuisances, too small to matter
+  std::vector<std::string> imitations;  ///< accepted at first, and withdrawn since too much was left
+  std::vector<std::string> along;       ///< effects that are fitted along as nuisances, too small to matter
   std::optional<Unexplained> unexplained;
   FirstMisfit first;
   OutcomeErrors before_train, before_test, after_train, after_test;

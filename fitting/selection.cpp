@@ -17,6 +17,9 @@ constexpr double kDeltaBic = -10;
 /// What explains less than this share of what another footprint would is an imitation of it.
 constexpr double kImitation = 1.0 / 3.0;
 
+/// What is left of the misfit where an effect acts, from which on it is an imitation of another.
+constexpr double kLeft = 0.1;
+
 void rank(std::vector<Ranked>& ranking, const Footprints& f, const std::vector<Score>& all) {
   const auto last = static_cast<Eigen::Index>(f.residual());
   const Score* best = nullptr;
@@ -126,6 +129,7 @@ std::optional<Stage> forward(const Stage& stage, const DiscoverOptions& options,
   accepted.id = id_of(*of_best);
   accepted.delta_bic = best->delta_bic;
   accepted.why = best->held_out.where;
+  accepted.phase = best->held_out.phase;
   if (is_law(accepted.id))
     for (const Score& score : all)
       if (is_law(id_of(score)) && id_of(score) != accepted.id) {
@@ -152,6 +156,42 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
       removed = true;
     }
   }
+}
+
+void withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  const auto in_air = [](Phase phase) { return phase == Phase::flight || phase == Phase::landing; };
+  const auto imitates = [&](const AcceptedEffect& effect) {
+    return std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(), [&](const ChannelMisfit& m) {
+      const double before = misfit_in(out.base.misfit, m.channel, m.phase);
+      return !is_wrench(m.channel) && is_misfit(m, options) && in_air(m.phase) == in_air(effect.phase) &&
+             m.chi2_per_sample() >= options.unexplained && m.chi2_per_sample() - 1 > kLeft * (before - 1);
+    });
+  };
+  std::vector<std::string> ids;
+  auto effects = stage.problem.options().effects;
+  std::string model = out.model;
+  for (const AcceptedEffect& effect : out.effects) {
+    if (imitates(effect)) {
+      out.imitations.push_back(effect.id);
+      std::erase(effects, effect.id);
+    } else {
+      ids.push_back(effect.id);
+      if (is_law(effect.id)) model = stage.problem.options().model;
+    }
+  }
+  if (out.imitations.empty()) return;
+  if (ids.empty()) effects.clear();  // what was fitted along went with them
+  Stage without{stage.problem.with(model, effects), {}, {}, ids};
+  solve(without, options, carried(stage.fit, without.problem));
+  if (!without.solved()) {
+    out.imitations.clear();
+    return;
+  }
+  std::erase_if(out.effects, [&](const AcceptedEffect& effect) {
+    return std::find(ids.begin(), ids.end(), effect.id) == ids.end();
+  });
+  if (effects.empty()) out.along.clear();
+  stage = std::move(without);
 }
 
 bool fit_along(Stage& stage, const DiscoverOptions& options) {

@@ -15,6 +15,11 @@ std::optional<Stage> forward(const Stage& stage, const DiscoverOptions& options,
 /// Effects that a later one has made superfluous are taken back.
 void backward(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
+/// An effect that still leaves a tenth of the base model's misfit (a third of its size) where it was said to
+/// act is an imitation of something that is not in the catalogue: it is withdrawn, and named in
+/// `out.imitations`.
+void withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out);
+
 /// No pads are rigid: a give of some micrometres before they slip bends what the slipping pads say of an
 /// effect on them, long before any prediction would be the better for knowing it. Where an effect on the
 /// contact or the release was accepted, contact.pad_compliance is fitted along if the evidence (BIC) is for

@@ -123,6 +123,7 @@ Improvement improvement(const FitResult& before, const FitResult& after,
     out.fall = was - is;
     out.where = fmt::format("{} in {}: {:.3g} to {:.3g} per sample", to_string(b.channel), to_string(b.phase),
                             was, is);
+    out.phase = b.phase;
   }
   return out;
 }

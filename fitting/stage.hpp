@@ -51,6 +51,7 @@ struct Improvement {
   double matters{};
   double fall{};
   std::string where;
+  Phase phase{Phase::release};
 };
 Improvement improvement(const FitResult& before, const FitResult& after,
                         const std::vector<ChannelMisfit>& base, const DiscoverOptions& options);

@@ -17,7 +17,7 @@ using dynamics::Wrench;
 namespace {
 
 /// The step [s] at a relative tolerance of 1e-5; the error is of second order in it.
-constexpr double kStep = 1e-3, kStepTolerance = 1e-5, kShortest = 2.5e-5;
+constexpr double kStep = 5e-4, kStepTolerance = 1e-5, kShortest = 2.5e-5;
 
 double step_for(const dynamics::IntegratorOptions& options) {
   const double step = kStep * std::sqrt(options.tolerances.relative / kStepTolerance);
