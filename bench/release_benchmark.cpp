@@ -1,7 +1,7 @@
 // One release with its flight, per contact model and kind of throw, beside CVODE on the same throw in the
 // same run:
 //   build/release/bench/release_benchmark [--benchmark_filter=limit_surface]
-// One row a case: the median of nine repetitions. Columns:
+// Two rows a case: the median and the minimum of nine repetitions. Columns:
 //   cvode_us      CVODE's median CPU time [us], at a tenth of the tolerance (its local error makes some ten
 //   times the global) ratio         CVODE's time over ours events        mode changes;  steps: accepted steps
 //   event_err_s   largest error of an event's time [s] against a run at 1e-12;  cvode_err_s: CVODE's
@@ -191,14 +191,15 @@ void campaign_case(benchmark::State& state) {
         benchmark::DoNotOptimize(experiment::predict(thrown, model, {}, options));
 }
 
-/// Of the aggregates, the medians only.
+/// Of the aggregates, the medians and the minima: other processes may be at work.
 class MedianReporter final : public benchmark::ConsoleReporter {
  public:
   MedianReporter() : ConsoleReporter(OO_Tabular) {}
   void ReportRuns(const std::vector<Run>& runs) override {
     std::vector<Run> medians;
-    std::copy_if(runs.begin(), runs.end(), std::back_inserter(medians),
-                 [](const Run& run) { return run.aggregate_name == "median"; });
+    std::copy_if(runs.begin(), runs.end(), std::back_inserter(medians), [](const Run& run) {
+      return run.aggregate_name == "median" || run.aggregate_name == "min";
+    });
     ConsoleReporter::ReportRuns(medians);
   }
 };
@@ -208,8 +209,8 @@ struct Kind {
   const Throw& (*thrown)();
   double pivot, surface;  // tolerances
 };
-constexpr Kind kKinds[] = {{"calm", calm, 1e-6, 1e-4},
-                           {"hard", hard, 1e-8, 1e-6},
+constexpr Kind kKinds[] = {{"calm", calm, 1e-4, 1e-4},
+                           {"hard", hard, 1e-5, 1e-6},
                            {"log", log, 1e-6, 1e-5},
                            {"log_growing", log_growing, 1e-6, 1e-4}};
 constexpr const char* kModels[] = {"sliding_pivot", "limit_surface", "limit_surface_disc",
@@ -217,7 +218,8 @@ constexpr const char* kModels[] = {"sliding_pivot", "limit_surface", "limit_surf
 
 void register_all() {
   const auto median = [](benchmark::internal::Benchmark* b) {
-    b->Repetitions(9)->ReportAggregatesOnly(true);
+    b->Repetitions(9)->ReportAggregatesOnly(true)->ComputeStatistics(
+        "min", [](const std::vector<double>& x) { return *std::min_element(x.begin(), x.end()); });
   };
   for (const Kind& kind : kKinds)
     for (const char* model : kModels) {
