@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "experiment/campaign_effects.hpp"
 #include "fitting/fit_rounds.hpp"
 #include "fitting/misfit.hpp"
 #include "fitting/profile.hpp"
@@ -115,13 +116,28 @@ void describe_throws(const CampaignProblem& problem, const FitRounds& rounds, Fi
                            static_cast<long>(rounds.used().size() * problem.own().size());
 }
 
+/// One-sided effects a typical step from neutral: they may have no derivative there, and a fit could not
+/// leave.
+std::vector<double> start_of(const CampaignProblem& problem) {
+  std::vector<double> out = problem.start();
+  for (const auto& id : problem.options().effects) {
+    const dynamics::Effect effect = find_effect(id);
+    for (const auto& p : effect.parameters)
+      for (std::size_t k = 0; k < out.size(); ++k)
+        if (effect.one_sided && !p.is_shape() &&
+            experiment::without_object(problem.campaign()[k].name) == effect.full_name(p))
+          out[k] += p.typical;
+  }
+  return out;
+}
+
 }  // namespace
 
 FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
   const auto begin = Clock::now();
   FitResult out;
   const auto& unknowns = problem.campaign();
-  std::vector<double> start = options.start.empty() ? problem.start() : options.start;
+  std::vector<double> start = options.start.empty() ? start_of(problem) : options.start;
   for (std::size_t k = 0; k < start.size(); ++k)
     start[k] = std::clamp(start[k], unknowns[k].low, unknowns[k].high);
   for (const auto& u : unknowns) out.campaign.push_back({u, u.start, 0, 0, false, 0, {}});

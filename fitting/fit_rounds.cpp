@@ -48,7 +48,7 @@ void FitRounds::choose_throws(const std::vector<double>& start) {
       used_.push_back(i);
       misfit.add(throws[i], starts[i].residual, starts[i].detach);
     }
-  misfit.weigh(shared_.weighting, options_.weigh);
+  misfit.weigh(shared_.weighting, Weigh::variances);
   for (const std::size_t i : used_) {
     weigh(starts[i], throws[i].observed, throws[i], shared_.weighting);
     chi2_.push_back(starts[i].residual.squaredNorm());
@@ -147,7 +147,9 @@ void FitRounds::learn() {
   Misfit misfit;
   for (std::size_t i = 0; i < used_.size(); ++i)
     misfit.add(problem_.throws()[used_[i]], equations_.throws[i].residual, equations_.throws[i].detach);
-  misfit.weigh(shared_.weighting, options_.weigh);
+  // Far from the solution even the right law errs steadily, and would never come near as one witness.
+  constexpr int kNear = 2;  // rounds
+  misfit.weigh(shared_.weighting, ++learned_ < kNear ? Weigh::variances : options_.weigh);
   constexpr std::size_t kFewest = 6;  // throws that have a spread
   if (!options_.own_spread.empty() || used_.size() < kFewest) return;
   for (std::size_t k = 0; k < shared_.own_sigma.size(); ++k) {

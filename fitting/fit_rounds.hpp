@@ -66,7 +66,7 @@ class FitRounds {
   std::vector<std::vector<int>> modes_;
   NormalEquations equations_;
   Solution solution_;
-  int iterations_{}, mode_changes_{};
+  int iterations_{}, mode_changes_{}, learned_{};
 };
 
 }  // namespace unhand::fitting

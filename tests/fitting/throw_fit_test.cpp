@@ -77,6 +77,19 @@ INSTANTIATE_TEST_SUITE_P(Throws, EveryLaw,
                          testing::Values("limit_surface_disc", "limit_surface", "sliding_pivot",
                                          "gripper_delay"));
 
+TEST(ThrowFit, ParametersComeBackFromWhateverTheStartIs) {
+  // The plain estimate puts the sliding pivot's start far off in some campaigns. Seven of them, two unknowns:
+  // all within 4 sigma of eight throws.
+  for (std::uint64_t seed = 1; seed <= 7; ++seed) {
+    const auto result = fit(problem_of(campaign("sliding_pivot", seed), "sliding_pivot"));
+    for (const auto& u : result.campaign) {
+      const double truth = truth_of(small_design("sliding_pivot"), u.unknown.name);
+      EXPECT_NEAR(u.value, truth, 4 * u.sigma) << u.unknown.name << ", seed " << seed;
+      EXPECT_LT(u.sigma, 0.05 * truth) << u.unknown.name << ", seed " << seed;
+    }
+  }
+}
+
 TEST(ThrowFit, NothingLeaksFromTestThrows) {
   auto other = disc_log();
   for (auto& one : other.throws) {
@@ -229,6 +242,23 @@ TEST(ThrowFit, ProfilesWhatTheLogHardlyKnows) {
   }
   for (const auto& u : disc_fit().campaign) EXPECT_FALSE(u.profile) << u.unknown.name;
   RecordProperty("profiled", any ? "yes" : "no");
+}
+
+TEST(ThrowFit, AnEffectWithoutADerivativeAtNeutralIsNotStuckThere) {
+  constexpr double kCompliance =
+      5e-6;  // m/N: rigid pads are a law of their own, of which 0 has no derivative
+  auto design = small_design(kLaw);
+  design.effects = {{"contact.pad_compliance.compliance", kCompliance}};
+  CampaignOptions options;
+  options.model = kLaw;
+  options.effects = {"contact.pad_compliance"};
+  options.integrator.tolerances = {1e-5, 1e-8};
+  const auto result = fit(CampaignProblem(experiment::generate_campaign(design, 7), "(in memory)", options));
+  ASSERT_EQ(result.outcome, FitOutcome::converged) << result.message;
+  const auto& compliance = result.campaign.at(2);
+  ASSERT_EQ(compliance.unknown.name, "contact.pad_compliance.compliance");
+  EXPECT_NEAR(compliance.value, kCompliance, 3 * compliance.sigma);
+  EXPECT_LT(compliance.sigma, 0.2 * kCompliance);
 }
 
 TEST(ThrowFit, SaysWhyThereIsNothingToFit) {
