@@ -218,7 +218,7 @@ std::optional<FlipCommand> ReleaseLearner::next() {
     points.push_back({at, worth(forecast(at, *mesh_[i]))});
   }
   if (points.empty()) return {};
-  // The best mesh points, no two of them neighbours, and a compass search from each.
+  // The best points of the mesh that are not neighbours, each improved along the axes by halved steps.
   std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) { return a.worth > b.worth; });
   std::vector<Point> starts;
   for (const Point& p : points) {
