@@ -59,6 +59,7 @@ inline Scene<double> values(const Scene<Dual>& s) {
 class SceneSource {
  public:
   virtual ~SceneSource() = default;
+  /// The world at t [s], on the branch of the window.
   virtual Scene<double> scene(const Window&, double t) const = 0;
   virtual Scene<Dual> scene(const Window&, const Dual& t) const = 0;
 };
@@ -76,10 +77,13 @@ struct Relative {
   Vec2<S> slip;  ///< v_r: material point of the object at the patch against the hand, in the world [m/s]
   S spin{};      ///< ω_r = ω_O − ω_H [rad/s]
 
+  /// From the integrator's state (arm, angle, slip, spin).
   static Relative from(const State<S, 6>& y) { return {{y[0], y[1]}, y[2], {y[3], y[4]}, y[5]}; }
+  /// As the integrator's state, in the same order.
   State<S, 6> state() const { return {arm.x, arm.z, angle, slip.x, slip.z, spin}; }
 };
 
+/// The relative state without derivatives.
 inline Relative<double> values(const Relative<double>& y) { return y; }
 inline Relative<double> values(const Relative<Dual>& y) {
   return {{y.arm.x.a, y.arm.z.a}, y.angle.a, {y.slip.x.a, y.slip.z.a}, y.spin.a};
@@ -88,9 +92,10 @@ inline Relative<double> values(const Relative<Dual>& y) {
 /// How the object stands in the world: the cosine and sine of θ_O, and r = p_WO − p_WH [m].
 template <class S>
 struct Stance {
-  S c, s;
-  Vec2<S> r;
+  S c, s;     ///< cos θ_O, sin θ_O
+  Vec2<S> r;  ///< from the hand to the CoM, in the world [m]
 };
+/// The stance of the object at a relative state.
 template <class S>
 Stance<S> stance(const Scene<S>& scene, const Relative<S>& y) {
   using std::cos;
@@ -98,6 +103,7 @@ Stance<S> stance(const Scene<S>& scene, const Relative<S>& y) {
   const S angle = scene.hand.theta + y.angle, c = cos(angle), s = sin(angle);
   return {c, s, {c * y.arm.x - s * y.arm.z, s * y.arm.x + c * y.arm.z}};
 }
+/// r = p_WO − p_WH, in the world [m].
 template <class S>
 Vec2<S> lever(const Scene<S>& scene, const Relative<S>& y) {
   return stance(scene, y).r;
@@ -109,6 +115,7 @@ Pose<S> object_pose(const Scene<S>& scene, const Relative<S>& y) {
   const Vec2<S> r = lever(scene, y);
   return {scene.hand.x + r.x, scene.hand.z + r.z, scene.hand.theta + y.angle};
 }
+/// Twist of the CoM, in the world.
 template <class S>
 Twist<S> object_twist(const Scene<S>& scene, const Relative<S>& y) {
   const Twist<S> patch{scene.hand_twist.vx + y.slip.x, scene.hand_twist.vz + y.slip.z,
@@ -131,6 +138,7 @@ State<S, 6> relative_rate(const Scene<S>& scene, const Relative<S>& y, const Sta
           point.az - scene.hand_acceleration.az - omega * y.slip.x,
           com.alpha - scene.hand_acceleration.alpha};
 }
+/// The same, the stance being worked out.
 template <class S>
 State<S, 6> relative_rate(const Scene<S>& scene, const Relative<S>& y, const Wrench<S>& patch) {
   return relative_rate(scene, y, stance(scene, y), patch);
@@ -152,22 +160,31 @@ class ContactModel {
  public:
   virtual ~ContactModel() = default;
 
+  /// The name by which cards and the command line choose it.
   virtual std::string_view name() const = 0;
 
   // Which modes?
+  /// Modes, numbered from 0.
   virtual int mode_count() const = 0;
+  /// What event logs call a mode.
   virtual std::string_view mode_name(int mode) const = 0;
+  /// What the mode's flow asks of a stepper.
   virtual dynamics::FlowKind kind(int mode) const = 0;
 
   // Which wrench on the object, about the patch, in the world [N, N, N m]?
+  /// The wrench on the object about the patch, in the world [N, N, N m].
   virtual Wrench<double> wrench(int mode, const Scene<double>&, const Relative<double>&) const = 0;
   virtual Wrench<Dual> wrench(int mode, const Scene<Dual>&, const Relative<Dual>&) const = 0;
+  /// d/dt of the relative state in the mode.
   virtual void rate(int mode, const Scene<double>&, const Relative<double>&, State<double, 6>&) const = 0;
   virtual void rate(int mode, const Scene<Dual>&, const Relative<Dual>&, State<Dual, 6>&) const = 0;
 
   // Which guards leave a mode?
+  /// Guards that leave a mode.
   virtual int guard_count(int mode) const = 0;
+  /// A guard's name and direction; 0 <= index < guard_count(mode).
   virtual dynamics::Guard guard(int mode, int index) const = 0;
+  /// The values of the mode's guards at t [s], of order one.
   virtual void guards(const Phase&, const SceneSource&, double t, const Relative<double>&,
                       double* g) const = 0;
   virtual void guards(const Phase&, const SceneSource&, const Dual& t, const Relative<Dual>&,
@@ -175,10 +192,12 @@ class ContactModel {
 
   // What happens at a guard, and which mode holds at an instant (after a time event, or at the start: mode <
   // 0)?
+  /// Where the mode that follows begins when `guard` of the phase fires at t [s].
   virtual Entry<double, 6> on_guard(const Phase&, int guard, const SceneSource&, double t,
                                     const Relative<double>&) const = 0;
   virtual Entry<Dual, 6> on_guard(const Phase&, int guard, const SceneSource&, const Dual& t,
                                   const Relative<Dual>&) const = 0;
+  /// The mode that holds at t [s], after a time event in `mode`, or at the start (mode < 0).
   virtual Entry<double, 6> membership(int mode, const Window&, const SceneSource&, double t,
                                       const Relative<double>&) const = 0;
   virtual Entry<Dual, 6> membership(int mode, const Window&, const SceneSource&, const Dual& t,
@@ -220,20 +239,26 @@ void force_release(const NormalForce& force, S& t) {
 template <class Derived>
 class ContactModelFrom : public ContactModel {
  public:
+  /// As ContactModel says, from the templates of Derived.
   Wrench<double> wrench(int, const Scene<double>&, const Relative<double>&) const final;
   Wrench<Dual> wrench(int, const Scene<Dual>&, const Relative<Dual>&) const final;
+  /// From rate_.
   void rate(int, const Scene<double>&, const Relative<double>&, State<double, 6>&) const final;
   void rate(int, const Scene<Dual>&, const Relative<Dual>&, State<Dual, 6>&) const final;
+  /// From guards_.
   void guards(const Phase&, const SceneSource&, double, const Relative<double>&, double*) const final;
   void guards(const Phase&, const SceneSource&, const Dual&, const Relative<Dual>&, Dual*) const final;
+  /// From on_guard_.
   Entry<double, 6> on_guard(const Phase&, int, const SceneSource&, double,
                             const Relative<double>&) const final;
   Entry<Dual, 6> on_guard(const Phase&, int, const SceneSource&, const Dual&,
                           const Relative<Dual>&) const final;
+  /// From membership_.
   Entry<double, 6> membership(int, const Window&, const SceneSource&, double,
                               const Relative<double>&) const final;
   Entry<Dual, 6> membership(int, const Window&, const SceneSource&, const Dual&,
                             const Relative<Dual>&) const final;
+  /// The release of the normal force, unless overridden.
   void separation(const NormalForce& force, double& t) const override { force_release(force, t); }
   void separation(const NormalForce& force, Dual& t) const override { force_release(force, t); }
 };

@@ -14,9 +14,9 @@ namespace unhand::contact {
 /// has no derivative: the wrench turns infinitely fast. There its Dual carries a large finite one.
 class ConvexQuartic {
  public:
-  static constexpr bool isotropic = false;
-  static constexpr const char* name = "convex quartic";
-  static constexpr int kCoefficients = 15;
+  static constexpr bool isotropic = false;  ///< has directions of its own: lives in the hand's frame
+  static constexpr const char* name = "convex quartic";  ///< as messages call it
+  static constexpr int kCoefficients = 15;               ///< monomials of degree four in three variables
 
   /// Throws std::invalid_argument naming the coefficient, or the place, unless the coefficients are finite, H
   /// is positive and H is convex to rounding: the least of yᵀ∇²H(x)y over unit x, y is not below −1e-10 of
@@ -38,15 +38,20 @@ class ConvexQuartic {
   /// arctan ε spread evenly between spin and slide. κ = 1.6219; its radius is within 0.70 % of the disc's,
   /// where the ellipsoid's is up to 7.04 % too large.
   static ConvexQuartic closest_to_disc();
+  /// The κ of closest_to_disc [-].
   static double kappa_closest_to_disc();
 
+  /// The wrench that opposes the slip u: as limit_surface_shapes.hpp says.
   template <class S>
   Vec3<S> resist(const Vec3<S>& u) const;
+  /// H(w)^(1/4)
   template <class S>
   S gauge(const Vec3<S>& w) const;
+  /// −∇H/|∇H| at w: the unit slip that a wrench there opposes.
   template <class S>
   Vec3<S> slip_direction(const Vec3<S>& w) const;
 
+  /// c_k in the order of the monomials above [-].
   const std::array<double, kCoefficients>& coefficients() const { return coefficients_; }
 
  private:

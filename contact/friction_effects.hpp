@@ -67,6 +67,7 @@ class AdhesiveForce final : public NormalForce {
 /// was seen. b [N] is reported minus true. `base` must outlive it.
 class BiasedForce final : public NormalForce {
  public:
+  /// `bias` b [N], at most 1000 N in size; `opening_start` [s], when the grip begins to open.
   BiasedForce(const NormalForce& base, const Dual& bias, double opening_start);
   double at(const Window& window, double t) const override { return at_(window, t); }
   Dual at(const Window& window, const Dual& t) const override { return at_(window, t); }

@@ -21,6 +21,7 @@ namespace unhand::contact {
 template <class S>
 class FrictionLimits {
  public:
+  /// Both are copied; validate them first.
   FrictionLimits(const Patch<S>& patch, const FrictionVariation<S>& variation)
       : patch_(patch),
         variation_(variation),
@@ -28,7 +29,9 @@ class FrictionLimits {
         stribeck_(is_active(variation.static_ratio - 1.0)),
         viscous_(is_active(variation.viscous)) {}
 
+  /// The patch under Coulomb's law.
   const Patch<S>& patch() const { return patch_; }
+  /// How the limits depart from it.
   const FrictionVariation<S>& variation() const { return variation_; }
 
   /// L [m]

@@ -22,8 +22,9 @@ DiscPoints disc_quadrature(const std::vector<int>& counts);
 /// Dual.
 template <class S>
 struct Stretch {
+  /// With respect to each of a Dual's parameters.
   using Gradient = std::array<double, dynamics::kDualSize>;
-  std::vector<double> x, z;
+  std::vector<double> x, z;      ///< m, by point
   std::vector<Gradient> dx, dz;  ///< empty where S is double
 };
 
@@ -54,6 +55,7 @@ class GivingPoints {
   /// `limits` must have a compliance > 0.
   explicit GivingPoints(const FrictionLimits<S>& limits);
 
+  /// Nothing stretched: where an unloaded patch starts.
   Stretch<S> zero() const;
   /// Static: the stretches under which the points carry `wrench` [N, N, N m] in the hand's frame, with limits
   /// n μ f_N [N] and L(f_N) [m]. Where they cannot, they carry what they can.
@@ -101,7 +103,9 @@ extern template class GivingPoints<dynamics::Dual>;
 class GivesAtPoints {
  public:
   virtual ~GivesAtPoints() = default;
+  /// Whether these pads do, by their parameters.
   virtual bool gives_at_points() const = 0;
+  /// The friction limits that the points share; the argument only says which scalar.
   virtual const FrictionLimits<double>& point_limits(double) const = 0;
   virtual const FrictionLimits<dynamics::Dual>& point_limits(const dynamics::Dual&) const = 0;
 };

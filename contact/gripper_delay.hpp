@@ -12,18 +12,27 @@ namespace unhand::contact {
 /// The distribution is given by its quantile function at equally likely midpoints, which is what predictions
 /// need: the mean over `quantiles(n)` is a quadrature of the expectation.
 struct DelayDistribution {
-  enum class Kind { number, uniform, truncated_normal };
-  Kind kind{Kind::number};
-  double centre{};      ///< the number; the mean of the normal before truncation [s]
-  double spread{};      ///< standard deviation before truncation [s]
-  double longest{0.1};  ///< T: the distribution lives on [0, T] [s]
+  /// A number, or a distribution.
+  enum class Kind {
+    number,            ///< `centre`, known
+    uniform,           ///< on [0, longest]
+    truncated_normal,  ///< cut off at 0 and `longest`
+  };
+  Kind kind{Kind::number};  ///< which of them
+  double centre{};          ///< the number; the mean of the normal before truncation [s]
+  double spread{};          ///< standard deviation before truncation [s]
+  double longest{0.1};      ///< T: the distribution lives on [0, T] [s]
 
+  /// A known delay [s], >= 0.
   static DelayDistribution number(double delay) { return {Kind::number, delay, 0, delay}; }
+  /// Uniform on [0, longest] [s].
   static DelayDistribution uniform(double longest) { return {Kind::uniform, 0.5 * longest, 0, longest}; }
+  /// Normal of the given mean and standard deviation before truncation, cut off at 0 and `longest`; all [s].
   static DelayDistribution normal(double mean, double deviation, double longest) {
     return {Kind::truncated_normal, mean, deviation, longest};
   }
 
+  /// Mean after truncation [s].
   double mean() const;
   /// The delays at probabilities (k + ½)/n, k = 0 … n − 1 [s], increasing. A number gives itself once.
   std::vector<double> quantiles(int n) const;
@@ -50,6 +59,8 @@ class GripperDelay final : public ContactModelFrom<GripperDelay> {
   void separation(const NormalForce&, double& t) const override { t = open_command_ + delay_.a; }
   void separation(const NormalForce&, Dual& t) const override { t = open_command_ + delay_; }
 
+  /// ContactModel's functions for either scalar, made virtual by ContactModelFrom.
+  /// @{
   template <class S>
   Wrench<S> wrench_(int, const Scene<S>& scene, const Relative<S>& y) const {
     return sticking_wrench(scene, y);
@@ -67,6 +78,7 @@ class GripperDelay final : public ContactModelFrom<GripperDelay> {
   template <class S>
   Entry<S, 6> membership_(int, const Window&, const SceneSource&, const S& t, const Relative<S>& y) const {
     return {0, t, Relative<S>{y.arm, y.angle, {S(0), S(0)}, S(0)}.state(), S(0)};
+    /// @}
   }
 
  private:

@@ -15,18 +15,21 @@ namespace unhand::contact {
 /// and its Dual carries a large finite one.
 class IsotropicQuartic {
  public:
-  static constexpr bool isotropic = true;
-  static constexpr const char* name = "isotropic quartic";
+  static constexpr bool isotropic = true;                   ///< round in the plane of sliding: needs no frame
+  static constexpr const char* name = "isotropic quartic";  ///< as messages call it
 
   /// Throws std::invalid_argument unless 0 ≤ κ ≤ 3, where H is convex.
   explicit IsotropicQuartic(double kappa);
   /// κ = ConvexQuartic::kappa_closest_to_disc().
   static IsotropicQuartic closest_to_disc();
 
+  /// The wrench that opposes the slip u: as limit_surface_shapes.hpp says.
   template <class S>
   Vec3<S> resist(const Vec3<S>& u) const;
+  /// H(w)^(1/4)
   template <class S>
   S gauge(const Vec3<S>& w) const;
+  /// −∇H/|∇H| at w: the unit slip that a wrench there opposes.
   template <class S>
   Vec3<S> slip_direction(const Vec3<S>& w) const;
 

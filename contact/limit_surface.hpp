@@ -69,9 +69,12 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>>, public 
     constexpr bool disc = std::is_same_v<Shape, UniformDisc> || std::is_same_v<Shape, PressedDisc>;
     return disc && pads_double_.has_value();
   }
+  /// The friction limits that the points share.
   const FrictionLimits<double>& point_limits(double) const override { return limits_double_; }
   const FrictionLimits<Dual>& point_limits(const Dual&) const override { return limits_dual_; }
 
+  /// ContactModel's functions for either scalar, made virtual by ContactModelFrom.
+  /// @{
   template <class S>
   Wrench<S> wrench_(int mode, const Scene<S>&, const Relative<S>&) const;
   template <class S>
@@ -82,6 +85,7 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>>, public 
   Entry<S, 6> on_guard_(const Phase&, int guard, const SceneSource&, const S& t, const Relative<S>&) const;
   template <class S>
   Entry<S, 6> membership_(int mode, const Window&, const SceneSource&, const S& t, const Relative<S>&) const;
+  /// @}
 
  private:
   static constexpr int kHeld = 0, kSlip = 1, kStickAgain = 2;

@@ -19,10 +19,13 @@
 
 namespace unhand::contact {
 
+/// Normalised components: along x, along z, of the spin.
 template <class S>
 using Vec3 = std::array<S, 3>;
+/// A matrix by rows.
 using Mat3 = std::array<Vec3<double>, 3>;
 
+/// a · b
 template <class S>
 S dot3(const Vec3<S>& a, const Vec3<S>& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -43,8 +46,8 @@ double scale_of(const Vec3<S>& x) {
 
 /// The unit ball, that is fᵀ D⁻¹ f ≤ 1 with D = diag(f_max², f_max², τ_max²). [HoweCutkosky1996]
 struct Ellipsoid {
-  static constexpr bool isotropic = true;
-  static constexpr const char* name = "ellipsoid";
+  static constexpr bool isotropic = true;           ///< round in the plane of sliding: needs no frame
+  static constexpr const char* name = "ellipsoid";  ///< as messages call it
 
   /// w = −u/|u|
   template <class S>
@@ -67,6 +70,7 @@ struct Ellipsoid {
       return scale * gauge(Vec3<S>{w[0] / scale, w[1] / scale, w[2] / scale});
     return sqrt(dot3(w, w));
   }
+  /// −w/|w|
   template <class S>
   Vec3<S> slip_direction(const Vec3<S>& w) const {
     return resist(w);
@@ -83,13 +87,16 @@ struct Ellipsoid {
 /// degree 1, which leaves one curvature λ and the slope over |x_xz|; ∇resist = −∇²σ. Error of resist and
 /// gauge below 1e-14. Instantiated for double and Dual.
 struct UniformDisc {
-  static constexpr bool isotropic = true;
-  static constexpr const char* name = "uniform disc";
+  static constexpr bool isotropic = true;              ///< round in the plane of sliding: needs no frame
+  static constexpr const char* name = "uniform disc";  ///< as messages call it
 
+  /// The wrench that opposes the slip u.
   template <class S>
   Vec3<S> resist(const Vec3<S>& u) const;
+  /// 1 on the surface, homogeneous of degree 1.
   template <class S>
   S gauge(const Vec3<S>& w) const;
+  /// Unit slip that a wrench w on the surface opposes.
   template <class S>
   Vec3<S> slip_direction(const Vec3<S>& w) const;
 };

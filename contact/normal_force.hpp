@@ -22,12 +22,14 @@ using dynamics::Window;
 class NormalForce {
  public:
   virtual ~NormalForce() = default;
+  /// f_N [N] at t [s]; the branch at a kink is the window's.
   virtual double at(const Window&, double t) const = 0;
   virtual Dual at(const Window&, const Dual& t) const = 0;
   /// Appends the instants [s], increasing, at which f_N or its slope jumps; the last is the release, if there
   /// is one. As Dual they carry the derivatives with respect to the parameters of the force.
   virtual void kinks(std::vector<double>& out) const = 0;
   virtual void kinks(std::vector<Dual>& out) const = 0;
+  /// The instants alone [s].
   std::vector<double> kinks() const {
     std::vector<double> out;
     kinks(out);
@@ -81,10 +83,12 @@ class ProfileNormalForce final : public NormalForce {
 
   double at(const Window& window, double t) const override { return opening_profile(values_, window, t); }
   Dual at(const Window& window, const Dual& t) const override { return opening_profile(profile_, window, t); }
+  /// The instants alone [s].
   using NormalForce::kinks;
   void kinks(std::vector<double>& out) const override;
   void kinks(std::vector<Dual>& out) const override;
   double release_time() const override;
+  /// The profile, with its derivatives.
   const OpeningProfile<Dual>& profile() const { return profile_; }
 
  private:
@@ -95,7 +99,7 @@ class ProfileNormalForce final : public NormalForce {
 /// A smoothed measured series: polynomial pieces, >= 0 everywhere, exactly 0 from the release on.
 class SampledNormalForce final : public NormalForce {
  public:
-  using Polynomial = dynamics::PiecewisePolynomial<1, 5>;
+  using Polynomial = dynamics::PiecewisePolynomial<1, 5>;  ///< N over s
 
   /// `kinks` [s], increasing: the breaks of `force` [N] at which the force or its slope jumps. `release` [s]
   /// is the last of them, or +infinity. Values below zero are cut off at zero.
@@ -108,10 +112,12 @@ class SampledNormalForce final : public NormalForce {
     const Dual f = force_.value(window, t)[0];
     return f.a > 0.0 ? f : Dual(0.0);
   }
+  /// The instants alone [s].
   using NormalForce::kinks;
   void kinks(std::vector<double>& out) const override;
   void kinks(std::vector<Dual>& out) const override;
   double release_time() const override { return release_; }
+  /// The pieces, before values below zero are cut off.
   const Polynomial& force() const { return force_; }
 
  private:
@@ -120,6 +126,7 @@ class SampledNormalForce final : public NormalForce {
   double release_;
 };
 
+/// How closely a measured force is followed.
 struct NormalForceOptions {
   /// χ² per degree of freedom up to which the residual counts as noise, beside its own statistical scatter.
   double chi2_target = 1.1;
@@ -151,9 +158,10 @@ struct NormalForceSummary {
       std::numeric_limits<double>::infinity()};  ///< 1 σ of it [N]; infinite without samples there
 };
 
+/// A smoothed normal force and how it was found.
 struct NormalForceFit {
-  SampledNormalForce force;
-  NormalForceSummary summary;
+  SampledNormalForce force;    ///< from the first sample on; constant before it
+  NormalForceSummary summary;  ///< release, level, and how well the curve explains the series
 };
 
 /// Smooths a measured normal force [N] at `time` [s]; `sigma` is its declared noise [N] (0 or NaN: estimated

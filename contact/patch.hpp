@@ -15,12 +15,15 @@ struct Patch {
   S torque_factor{2.0 / 3.0};  ///< c, (0, 1]
   int pads{2};                 ///< n >= 1
 
+  /// n μ f_N [N] for f_N of one pad [N]
   S f_max(const S& normal_force) const { return static_cast<double>(pads) * mu * normal_force; }
+  /// c a n μ f_N [N m] for f_N of one pad [N]
   S tau_max(const S& normal_force) const { return length() * f_max(normal_force); }
   /// L = τ_max/f_max = c a [m]
   S length() const { return torque_factor * radius; }
 };
 
+/// The patch without derivatives.
 inline Patch<double> values(const Patch<double>& p) { return p; }
 inline Patch<double> values(const Patch<dynamics::Dual>& p) {
   return {p.mu.a, p.radius.a, p.torque_factor.a, p.pads};

@@ -23,8 +23,8 @@ namespace unhand::contact {
 /// respect to s below 1e-6; at s = 0 the values are those of UniformDisc's closed forms.
 class PressedDisc {
  public:
-  static constexpr bool isotropic = true;
-  static constexpr const char* name = "pressed disc";
+  static constexpr bool isotropic = true;              ///< round in the plane of sliding: needs no frame
+  static constexpr const char* name = "pressed disc";  ///< as messages call it
 
   /// Derivatives of the exponent enter those of resist and gauge. Throws std::invalid_argument unless −0.4 <=
   /// s <= 3.
@@ -36,8 +36,10 @@ class PressedDisc {
   /// As limit_surface_shapes.hpp says. Instantiated for double and Dual, the direction for double alone.
   template <class S>
   Vec3<S> resist(const Vec3<S>& u) const;
+  /// 1 on the surface, homogeneous of degree 1.
   template <class S>
   S gauge(const Vec3<S>& w) const;
+  /// Unit slip that a wrench w on the surface opposes.
   Vec3<double> slip_direction(const Vec3<double>& w) const;
   /// Of resist with respect to u.
   Mat3 resist_jacobian(const Vec3<double>& u) const;

@@ -14,16 +14,18 @@ PressedProfile pressed_profile_exact(bool inner, double m, double s);
 
 /// Coefficients in (1 − m)^(1/4) at one exponent.
 struct PressedSeries {
-  static constexpr int kOrder = 32;
-  std::array<PressedProfile, kOrder> inner, outer;
+  static constexpr int kOrder = 32;                 ///< coefficients of a series
+  std::array<PressedProfile, kOrder> inner, outer;  ///< of the functions at m = ε² and at m = 1/ε²
 };
+/// The series at one exponent s and their derivatives by s.
 struct PressedSeriesAt {
-  PressedSeries value, by_exponent;
+  PressedSeries value, by_exponent;  ///< the series; d/ds of them
 };
 
 /// From the table over s, −0.4 <= s <= 3.
 PressedSeriesAt pressed_series(double s);
 
+/// The sum of a series at 0 <= m <= 1.
 PressedProfile evaluate(const std::array<PressedProfile, PressedSeries::kOrder>& series, double m);
 
 }  // namespace unhand::contact

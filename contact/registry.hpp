@@ -18,7 +18,7 @@ namespace unhand::contact {
 /// Everything that some contact model takes. Each model reads what it needs.
 template <class S>
 struct ContactParameters {
-  Patch<S> patch;
+  Patch<S> patch;                               ///< the limits, for all but gripper_delay
   SlideEnd slide_end{SlideEnd::latched_brake};  ///< sliding_pivot
   std::optional<ConvexQuartic> quartic;  ///< limit_surface_quartic; the closest to a uniform disc if absent
   double open_command{};                 ///< gripper_delay: when the gripper is told to open [s]

@@ -55,6 +55,8 @@ class SlidingPivot final : public ContactModelFrom<SlidingPivot> {
   bool may_feed_energy(int mode) const override;
   bool is_homogeneous(int mode) const override;
 
+  /// ContactModel's functions for either scalar, made virtual by ContactModelFrom.
+  /// @{
   template <class S>
   Wrench<S> wrench_(int mode, const Scene<S>&, const Relative<S>&) const;
   template <class S>
@@ -65,6 +67,7 @@ class SlidingPivot final : public ContactModelFrom<SlidingPivot> {
   Entry<S, 6> on_guard_(const Phase&, int guard, const SceneSource&, const S& t, const Relative<S>&) const;
   template <class S>
   Entry<S, 6> membership_(int mode, const Window&, const SceneSource&, const S& t, const Relative<S>&) const;
+  /// @}
 
  private:
   template <class S>

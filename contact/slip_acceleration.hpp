@@ -24,15 +24,18 @@ Vec3<S> in_hand_frame(const S& hand_angle, const Vec3<S>& world, Function&& func
   }
 }
 
+/// The wrench [-] that opposes the slip u, both in the world and normalised.
 template <class Shape, class S>
 Vec3<S> resist(const Shape& shape, const Scene<S>& scene, const Vec3<S>& u) {
   return in_hand_frame<Shape, S>(scene.hand.theta, u, [&](const Vec3<S>& x) { return shape.resist(x); });
 }
+/// The unit slip that the wrench w opposes, both in the world and normalised.
 template <class Shape>
 Vec3<double> slip_direction(const Shape& shape, const Scene<double>& scene, const Vec3<double>& w) {
   return in_hand_frame<Shape, double>(scene.hand.theta, w,
                                       [&](const Vec3<double>& x) { return shape.slip_direction(x); });
 }
+/// The shape's gauge of the wrench w [-], given in the world: above 1 the patch cannot hold it.
 template <class Shape, class S>
 S gauge(const Shape& shape, const Scene<S>& scene, const Vec3<S>& w) {
   if constexpr (Shape::isotropic) {
@@ -63,6 +66,7 @@ std::array<Vec3<S>, 3> normalised_inertia(const Scene<S>& scene, const Vec2<S>& 
   return {{{m, S(0), zx}, {S(0), m, zz}, {zx, zz, (I + m * dot(r, r)) / (length * length)}}};
 }
 
+/// A x, A given by rows.
 template <class S>
 Vec3<S> times(const std::array<Vec3<S>, 3>& A, const Vec3<S>& x) {
   return {dot3(A[0], x), dot3(A[1], x), dot3(A[2], x)};

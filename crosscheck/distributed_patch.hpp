@@ -11,8 +11,8 @@ namespace unhand::crosscheck {
 
 /// A point of the patch: where it is, in radii, in the hand's frame; and its share of the normal force.
 struct PatchPoint {
-  dynamics::Vec2<double> position;
-  double load{};
+  dynamics::Vec2<double> position;  ///< radii of the patch [-]
+  double load{};                    ///< w_i [-]; Σ w_i = 1
 };
 
 /// 3 n² points of equal load on the unit disc, on n rings of 3, 9, 15, ... points (1 <= rings <= 1000).
@@ -30,14 +30,15 @@ std::vector<PatchPoint> disc_points(int rings, double pressure_exponent = 0);
 /// with v_i [m/s] the slip of the object against the pads at the point. Stick is elastic, never a mode;
 /// nothing is assumed of how force and torque are coupled.
 struct DistributedPatch {
-  double mu{};      ///< friction coefficient, [0, 10]
-  double radius{};  ///< a [m], (0, 1]
-  std::vector<PatchPoint> points;
-  int pads{2};                ///< n >= 1
+  double mu{};                     ///< friction coefficient, [0, 10]
+  double radius{};                 ///< a [m], (0, 1]
+  std::vector<PatchPoint> points;  ///< as disc_points makes them
+  int pads{2};                     ///< n >= 1
   double softness{0};         ///< γ: the radius is a (f_N/f₀)^γ, the patch shrinks as it is let go [-]
   double reference_force{1};  ///< f₀ > 0 [N]
 };
 
+/// How finely the patch is integrated.
 struct PatchOptions {
   double step{4e-5};  ///< h of the coarser of two runs [s], (0, 1e-3]
   /// n μ f₀/K, by how much a bristle stretches before it slides [m]; f₀ the normal force at the start. Its
@@ -47,11 +48,12 @@ struct PatchOptions {
   int newton_budget{100};  ///< iterations per step
 };
 
+/// How a release from the patch ended.
 struct PatchResult {
   release::ReleaseOutcome outcome{};    ///< not_solved: a step's iteration spent its budget
   release::DetachState<double> detach;  ///< at the end of the hand's motion, if the pads never part
   double time_error{};  ///< largest difference between the finer run and the extrapolated twist [m/s, rad/s]
-  int newton_iterations{};
+  int newton_iterations{};  ///< Newton steps in all
 };
 
 /// Integrates pose and twist of the CoM in the world by the implicit Euler method with steps h and h/2 that

@@ -13,16 +13,17 @@ namespace unhand::datasets {
 /// a number at its end is a condition by itself, repetition 0. Files that phyphox names ("Raw Data.csv") take
 /// the name of their folder.
 struct ThrowName {
-  std::string id, condition;
-  int repetition = 0;
+  std::string id, condition;  ///< of the throw; of what it repeats
+  int repetition = 0;         ///< as the name counts
 };
+/// The name of the throw that a file holds.
 ThrowName name_of(const std::filesystem::path& file);
 
 /// Which throws are held out, the same for the same names every time: every `test_every`-th throw of each
 /// condition, in the order of repetitions, and the whole of each condition in `test_conditions`.
 struct SplitRule {
-  int test_every = 5;  // >= 2; 0: none
-  std::vector<std::string> test_conditions;
+  int test_every = 5;                        // >= 2; 0: none
+  std::vector<std::string> test_conditions;  ///< held out as a whole
 };
 /// Throws std::invalid_argument for a rule out of range, or a condition that the log does not have.
 void split_throws(ThrowLog& log, const SplitRule& rule);

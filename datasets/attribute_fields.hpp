@@ -16,6 +16,7 @@
 
 namespace unhand::datasets {
 
+/// Accepted values of an attribute.
 struct Range {
   double low, high;  // both belong to the range
   std::string_view text;

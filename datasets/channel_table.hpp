@@ -17,6 +17,7 @@ struct ColumnLayout {
   bool operator==(const ColumnLayout&) const = default;
 };
 
+/// What a channel of a log holds.
 enum class ChannelKind {
   time,  // strictly increasing; opens its group and sets the number of rows
   real,  // finite

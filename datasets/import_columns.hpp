@@ -40,6 +40,7 @@ std::vector<std::string> ft_channels();
 /// it never steps by more than π. Throws ImportError naming file, line and column, and std::invalid_argument
 /// for a map with names of channels that there are not, or without those that are needed.
 HandLog read_hand_csv(const std::filesystem::path& file, const ColumnMap& map);
+/// The same for the sensor behind one pad.
 FtLog read_ft_csv(const std::filesystem::path& file, const ColumnMap& map);
 
 /// What is wrong with a map for these channels, or nothing: to say so before any file is read.

@@ -30,14 +30,16 @@ struct CubeTossOptions {
   int test_every = 5;   // toss numbers n with n % test_every == test_every − 1 are held out: 4 to 1
 };
 
+/// A toss that was not kept, and why.
 struct DroppedToss {
-  int toss = 0, samples = 0;
-  std::string reason;
+  int toss = 0, samples = 0;  ///< its number; samples before contact
+  std::string reason;         ///< in words
 };
 
+/// What the importer read, kept and dropped.
 struct ImportReport {
-  int rows = 0, tosses = 0, kept = 0, train = 0, test = 0;
-  std::vector<DroppedToss> dropped;
+  int rows = 0, tosses = 0, kept = 0, train = 0, test = 0;  ///< rows read; tosses read, kept, by split
+  std::vector<DroppedToss> dropped;                         ///< in the order of the file
 };
 
 /// A spatial log with one object, "cube", and one throw per kept toss: id "toss-0042", condition "toss",

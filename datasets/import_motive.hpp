@@ -26,18 +26,19 @@ struct MotiveOptions {
   double time_offset = 0;          ///< [s] added to Motive's time, to bring it to the clock of the robot
   /// Declared noise, 1 σ: of a position [m] and of an angle [rad] (σ/2 of a quaternion's components); both or
   /// neither where the file has rotations. 0: none.
-  double sigma_position = 0, sigma_angle = 0;
+  double sigma_position = 0, sigma_angle = 0;  ///< m; rad
 };
 
+/// One take of a Motive export: times, poses, lost frames.
 struct MotiveTake {
-  std::string name, version, body;
+  std::string name, version, body;  ///< of the take; of the file format ("1.23"); of the rigid body
   std::vector<std::string> bodies;  ///< all that the file holds
   double frame_rate = 0;            ///< [Hz] as the header says; 0: it does not
   MocapLog mocap;                   ///< lost frames: valid = 0, pose NaN
-  std::size_t lost = 0;
+  std::size_t lost = 0;             ///< frames without a pose
   /// Planar: how far the track leaves the plane through its first sample [m], and the largest angle between
   /// the body's x axis and the plane [rad].
-  double out_of_plane = 0, out_of_plane_angle = 0;
+  double out_of_plane = 0, out_of_plane_angle = 0;  ///< m; rad
 };
 
 /// Reads the exported rotation and position of one rigid body. Lengths in millimetres, centimetres or metres,

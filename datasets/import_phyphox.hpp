@@ -24,15 +24,16 @@ struct PhyphoxOptions {
 /// A stretch of small specific force that is no free fall, and why.
 struct DroppedFall {
   double begin = 0, end = 0;  ///< [s]
-  std::string reason;
+  std::string reason;         ///< in words
 };
 
+/// The free falls of one recording.
 struct PhyphoxRecording {
   /// The falls in order, one throw each: `imu` and `free_flight` (on the clock of the imu), nothing else. A
   /// recording with several is cut half way between them; together they hold every sample of it.
   std::vector<Throw> falls;
-  std::vector<DroppedFall> dropped;
-  std::size_t samples = 0;
+  std::vector<DroppedFall> dropped;  ///< what looks like a fall and is none
+  std::size_t samples = 0;           ///< in the file
 };
 
 /// Reads time and specific force [m/s²] in the phone's frame, and its angular rate where the file has it

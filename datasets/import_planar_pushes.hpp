@@ -56,17 +56,19 @@ struct PlanarPushOptions {
   int test_every = 5;  // push numbers n, from 0, with n % test_every == test_every − 1 are held out: 4 to 1
 };
 
+/// A push that was not kept, and why.
 struct DroppedPush {
-  std::string surface;
-  int push = 0;  // from 0
-  std::string reason;
+  std::string surface;  ///< as the log will name it
+  int push = 0;         // from 0
+  std::string reason;   ///< in words
 };
 
+/// What was read of planar pushes, kept and dropped.
 struct PlanarPushReport {
-  int pushes = 0, kept = 0, train = 0, test = 0;
-  std::size_t samples = 0, dropped_samples = 0;  // intervals of kept pushes
-  int borrowed_offsets = 0;                      // kept pushes that begin in contact
-  std::vector<DroppedPush> dropped;
+  int pushes = 0, kept = 0, train = 0, test = 0;  ///< read, kept, by split
+  std::size_t samples = 0, dropped_samples = 0;   // intervals of kept pushes
+  int borrowed_offsets = 0;                       // kept pushes that begin in contact
+  std::vector<DroppedPush> dropped;               ///< in the order read
 };
 
 /// One surface per log, named by the folder that the log is in (with the file's stem where a folder holds

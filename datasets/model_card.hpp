@@ -11,34 +11,35 @@
 
 namespace unhand::datasets {
 
+/// A parameter on a card.
 struct CardParameter {
-  double value = 0;
+  double value = 0;             ///< in `unit`
   std::optional<double> sigma;  // 1 σ, in the same unit
   std::string unit;             // "-" where it has none
   bool determined = true;       // false: the log alone says nothing of it, sigma is what was known before
   // The ends of the 95 % interval where it is not even about the value; an end that is missing beside the
   // other is open.
-  std::optional<double> low95 = {}, high95 = {};
+  std::optional<double> low95 = {}, high95 = {};  ///< in `unit`
   bool operator==(const CardParameter&) const = default;
 };
 
 /// Of the estimated parameters: names.size() squared numbers, row by row, in the product of their units.
 struct CardCovariance {
-  std::vector<std::string> names;
-  std::vector<double> matrix;
+  std::vector<std::string> names;  ///< of the estimated parameters, a row and column each
+  std::vector<double> matrix;      ///< row by row
   bool operator==(const CardCovariance&) const = default;
 };
 
 /// 1 σ from throw to throw of a number that every throw has for itself ("grasp_angle").
 struct CardSpread {
-  double sigma = 0;
-  std::string unit;
+  double sigma = 0;  ///< in `unit`, > 0
+  std::string unit;  ///< "-" where it has none
   bool operator==(const CardSpread&) const = default;
 };
 
 /// Errors, predicted minus measured, over n throws, in the unit that the quantity's name ends with.
 struct CardStatistics {
-  int n = 0;
+  int n = 0;        ///< throws
   double mae = 0;   // mean of the absolute error
   double std = 0;   // standard deviation of the absolute error
   double bias = 0;  // mean of the error
@@ -47,15 +48,16 @@ struct CardStatistics {
 
 /// The log that the parameters were estimated from.
 struct CardLog {
-  std::string file, title;
-  std::optional<std::string> checksum;
+  std::string file, title;              ///< name of the file, without its folder; the log's title
+  std::optional<std::string> checksum;  ///< "fnv1a64:" and 16 digits, as checksum_of makes it
   bool operator==(const CardLog&) const = default;
 };
 
 /// The interval of a condition, ends included, in which the card has been tried.
 struct CardRange {
-  double low = 0, high = 0;
-  std::string unit;
+  double low = 0, high = 0;  ///< in `unit`
+  std::string unit;          ///< "-" where it has none
+  /// True in the interval, its ends included.
   bool contains(double value) const { return low <= value && value <= high; }
   bool operator==(const CardRange&) const = default;
 };
@@ -74,18 +76,18 @@ struct CardRange {
 ///    "library_version": "0.1.0"}
 /// Required: schema, schema_version, model, parameters (value and unit of each), log (file), library_version.
 struct ModelCard {
-  std::string model;
+  std::string model;  ///< name of the contact model
   std::vector<std::string>
       effects;  // ids; their parameters are among `parameters`, as "id.name" or "id.name[object]"
-  std::map<std::string, CardParameter> parameters;
-  std::optional<CardCovariance> covariance;
-  std::map<std::string, CardSpread> own_spreads;
-  CardLog log;
-  std::optional<std::string> split;  // the throws that were used: "train"
+  std::map<std::string, CardParameter> parameters;  ///< by name: "mu", "length", "contact.viscous.1/v_0", ...
+  std::optional<CardCovariance> covariance;         ///< of those that were estimated
+  std::map<std::string, CardSpread> own_spreads;    ///< by the name of a throw's own unknown
+  CardLog log;                                      ///< what it was estimated from
+  std::optional<std::string> split;                 // the throws that were used: "train"
   /// By split ("train", "test", "cross_validation"), then by quantity.
   std::map<std::string, std::map<std::string, CardStatistics>> errors;
-  std::map<std::string, CardRange> valid_range;
-  std::string library_version;
+  std::map<std::string, CardRange> valid_range;  ///< by condition: "grip_force", ...
+  std::string library_version;                   ///< that wrote the card
   /// Keys that this version does not know, as the text of a JSON object in the card's own structure; they
   /// return to their places when the card is written. Empty: none.
   std::string extra;
@@ -96,7 +98,7 @@ struct ModelCard {
 /// the file is no JSON.
 class CardError : public LogError {
  public:
-  using LogError::LogError;
+  using LogError::LogError;  ///< with the three parts
 };
 
 /// Throws CardError.

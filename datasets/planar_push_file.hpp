@@ -19,6 +19,7 @@ struct TimedForce {
   std::array<double, 2> force{};
 };
 
+/// One push as its text file has it.
 struct RawPush {
   std::array<double, 7> before{}, after{};  // the object: x, y, z [mm], qw, qx, qy, qz
   std::vector<TimedForce> forces;           // at least two, times strictly rising

@@ -7,19 +7,20 @@ namespace unhand::datasets {
 
 /// Mean absolute error and the standard deviation of the absolute error.
 struct ReportedError {
-  double mae, std;
+  double mae, std;  ///< in the unit that the quantity's name ends with
 };
 
 /// One model's errors over a campaign, as reported.
 struct ReportedModel {
-  std::string_view model, label;
-  ReportedError detach_vx_m_s, detach_omega_deg_s, landing_x_m, landing_theta_deg;
+  std::string_view model, label;  ///< name in this library; name in tables
+  ReportedError detach_vx_m_s, detach_omega_deg_s, landing_x_m, landing_theta_deg;  ///< by quantity
 };
 
+/// A table of errors that others report of their hardware.
 struct ReportedTable {
-  std::string_view title, source, campaign;
-  int throws;
-  ReportedModel models[2];
+  std::string_view title, source, campaign;  ///< of the table; where it is printed; what was thrown
+  int throws;                                ///< in the campaign
+  ReportedModel models[2];                   ///< as reported
 };
 
 /// The limit surface as it was integrated there, and the sliding pivot.
@@ -33,9 +34,10 @@ inline constexpr ReportedTable release_models_as_reported{
 
 /// The later conference version gives the sliding pivot's landing errors alone.
 struct ReportedLanding {
-  std::string_view label, source;
-  double landing_x_m, landing_theta_deg;
+  std::string_view label, source;         ///< name in tables; where it is printed
+  double landing_x_m, landing_theta_deg;  ///< mean absolute errors
 };
+/// Mean absolute errors as reported, in m and degrees.
 inline constexpr ReportedLanding sliding_pivot_as_reported_later{
     "SP, as reported", "the conference version, ICRA 2026", 0.024, 15.4};
 

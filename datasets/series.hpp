@@ -10,11 +10,13 @@ namespace unhand::datasets {
 /// rows × cols numbers, row after row. An empty series (no rows) is one that was not recorded.
 /// sigma: the declared 1-σ noise of each column, in the column's unit; empty where none was declared.
 struct Series {
-  std::size_t rows = 0, cols = 1;
-  std::vector<double> data;
-  std::vector<double> sigma;
+  std::size_t rows = 0, cols = 1;  ///< samples; numbers in each
+  std::vector<double> data;        ///< row after row, SI units
+  std::vector<double> sigma;       ///< 1 σ by column; empty: not declared
 
+  /// True if it was not recorded.
   bool empty() const { return rows == 0; }
+  /// Row i, column j.
   double operator()(std::size_t i, std::size_t j = 0) const { return data[i * cols + j]; }
   double& operator()(std::size_t i, std::size_t j = 0) { return data[i * cols + j]; }
   bool operator==(const Series&) const = default;

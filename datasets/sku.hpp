@@ -26,17 +26,17 @@ namespace unhand::datasets {
 ///   disc      m r²/2                  axis along y, r = x/2
 ///   sphere    2 m r²/5                r = x/2
 struct Sku {
-  std::string name;
-  double mass = 0;                            // [kg]
-  std::optional<double> mass_sigma;           // [kg]
-  std::optional<std::array<double, 3>> dims;  // [m]
-  double com_offset = 0;                      // [m] pad centre to CoM, along the object's x
-  std::optional<double> com_offset_sigma;     // [m]
-  std::optional<std::string> shape;
+  std::string name;                              ///< free text
+  double mass = 0;                               // [kg]
+  std::optional<double> mass_sigma;              // [kg]
+  std::optional<std::array<double, 3>> dims;     // [m]
+  double com_offset = 0;                         // [m] pad centre to CoM, along the object's x
+  std::optional<double> com_offset_sigma;        // [m]
+  std::optional<std::string> shape;              ///< box, rod, cylinder, disc or sphere
   std::optional<double> inertia, inertia_sigma;  // [kg m²]
   std::optional<double> drag_k;                  // [1/m]
-  std::string surface;
-  std::optional<std::string> source, notes;
+  std::string surface;                           ///< what the pads touch, in the words of a card's log
+  std::optional<std::string> source, notes;      ///< where the numbers are from; anything else
 };
 
 /// The inertia of a uniform shape of that name (one of those above) [kg m²]. Throws std::invalid_argument.

@@ -12,7 +12,7 @@ namespace unhand::datasets {
 /// One group ("hand", "ft", "mocap", "imu") of one throw on its own clock. Rates are 0 where there is one
 /// sample only.
 struct ChannelSummary {
-  std::string group;
+  std::string group;                   ///< its name in the log
   std::size_t rows = 0, lost = 0;      // lost: samples flagged invalid
   double start = 0, end = 0;           // [s]
   double rate = 0;                     // [Hz] 1 / median step
@@ -21,42 +21,45 @@ struct ChannelSummary {
   std::size_t longest_loss = 0;        // most invalid samples in a row
 };
 
+/// What `unhand inspect` says of one throw.
 struct ThrowSummary {
-  std::string id, object, condition;
-  Split split = Split::train;
-  bool landing = false;
-  std::vector<ChannelSummary> channels;
+  std::string id, object, condition;     ///< as in the log
+  Split split = Split::train;            ///< whether it may be fitted to
+  bool landing = false;                  ///< whether the landing was measured
+  std::vector<ChannelSummary> channels;  ///< one per group that the throw has
 };
 
 /// One group over all throws that carry it.
 struct GroupSummary {
-  std::string group;
-  std::size_t throws = 0, rows = 0, lost = 0;
-  double lowest_rate = 0, highest_rate = 0;  // [Hz]
-  double worst_gap_ratio = 0;                // longest gap over median step
-  std::string worst_gap_throw;
+  std::string group;                           ///< its name in the log
+  std::size_t throws = 0, rows = 0, lost = 0;  ///< that carry it; samples; flagged invalid
+  double lowest_rate = 0, highest_rate = 0;    // [Hz]
+  double worst_gap_ratio = 0;                  // longest gap over median step
+  std::string worst_gap_throw;                 ///< id of the throw with that gap
 };
 
 /// The declared noise of one dataset: [lowest, highest] per column over all throws; empty where none declares
 /// any.
 struct NoiseSummary {
-  std::string dataset;  // "mocap/pose"
-  std::size_t throws = 0, declared = 0;
-  std::vector<double> lowest, highest;
+  std::string dataset;                   // "mocap/pose"
+  std::size_t throws = 0, declared = 0;  ///< that carry the dataset; that declare its noise
+  std::vector<double> lowest, highest;   ///< 1 σ by column, SI units
 };
 
+/// What `unhand inspect` says of a log.
 struct LogSummary {
-  int dimension = 2;
-  std::string title, source, licence;
-  double gravity = 0, landing_height = 0;
-  std::size_t throws = 0, train = 0, test = 0, free_flights = 0;
-  std::vector<std::string> objects;
-  std::map<std::string, std::size_t> conditions;  // throws in each
-  std::vector<GroupSummary> groups;
-  std::vector<NoiseSummary> noise;
-  std::vector<ThrowSummary> each;
+  int dimension = 2;                                              ///< 2: in a plane, 3: in space
+  std::string title, source, licence;                             ///< as declared
+  double gravity = 0, landing_height = 0;                         ///< m/s²; m
+  std::size_t throws = 0, train = 0, test = 0, free_flights = 0;  ///< how many; those that fly free
+  std::vector<std::string> objects;                               ///< ids
+  std::map<std::string, std::size_t> conditions;                  // throws in each
+  std::vector<GroupSummary> groups;                               ///< one per group
+  std::vector<NoiseSummary> noise;                                ///< one per dataset
+  std::vector<ThrowSummary> each;                                 ///< in the order of the log
 };
 
+/// Counts, rates, gaps and declared noise of a log.
 LogSummary summarise(const ThrowLog& log);
 
 /// {"schema": "inspect", "schema_version": 1, ...}, indented, with a line break at the end.

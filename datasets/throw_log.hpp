@@ -19,18 +19,20 @@
 
 namespace unhand::datasets {
 
+/// A thrown object as its log declares it.
 struct Object {
   double mass = 0;                             // [kg]
   std::optional<std::vector<double>> inertia;  // [kg m²] about the CoM: 1 value out of plane, 3 when spatial
   std::optional<double> com_offset;            // [m] pad centre to CoM, along the object's x
   std::optional<std::array<double, 3>> dims;   // [m]
-  std::optional<std::string> surface, sku;
-  std::optional<double> drag_k;  // [1/m] declared drag, a = −k |v| v: part of the base model
+  std::optional<std::string> surface, sku;     ///< what the pads touch; name of the SKU file
+  std::optional<double> drag_k;                // [1/m] declared drag, a = −k |v| v: part of the base model
   bool operator==(const Object&) const = default;
 };
 
+/// The gripper that all throws of a log have in common.
 struct Gripper {
-  int n_pads = 2;
+  int n_pads = 2;                              ///< pads that press, 1 … 1000
   std::optional<double> pad_radius;            // [m] nominal
   std::optional<double> opening_command_time;  // [s] robot clock
   bool operator==(const Gripper&) const = default;
@@ -39,22 +41,23 @@ struct Gripper {
 /// The hand frame (midway between the pads) on the robot clock. Where the acceleration jumps it holds the
 /// later value.
 struct HandLog {
-  Series time, pose, twist, acceleration;
+  Series time, pose, twist, acceleration;  ///< (N) [s]; (N,3) each, SI units
   bool operator==(const HandLog&) const = default;
 };
 
 /// The sensor behind one pad: the wrench this pad applies to the object, in the hand frame, about the pad
 /// centre.
 struct FtLog {
-  Series time, wrench, normal_force;
+  Series time, wrench, normal_force;  ///< (N) [s]; (N,3) [N, N, N m]; (N) [N], > 0 where it presses
   bool operator==(const FtLog&) const = default;
 };
 
 /// The tracked object frame on the motion-capture clock. An empty `valid` means that every sample is good; a
 /// pose may be NaN where valid is 0.
 struct MocapLog {
-  Series time, pose;
-  Flags valid;
+  Series time, pose;  ///< (N) [s]; (N,3) planar, (N,7) or (N,3) spatial
+  Flags valid;        ///< 1: tracked, 0: lost
+  /// Whether sample i was tracked.
   bool is_valid(std::size_t i) const { return valid.empty() || valid[i] != 0; }
   bool operator==(const MocapLog&) const = default;
 };
@@ -62,44 +65,50 @@ struct MocapLog {
 /// Where the tracked frame passes the landing height downwards: [x, theta] planar, [x, y, z] spatial; one
 /// row.
 struct LandingLog {
-  Series time, pose;
+  Series time, pose;  ///< (1) [s]; m, and rad where planar
   bool operator==(const LandingLog&) const = default;
 };
 
 /// Inside the object, in its frame: specific force [m/s²] (zero in free fall) and angular rate [rad/s] (may
 /// be empty).
 struct ImuLog {
-  Series time, specific_force, angular_rate;
+  Series time, specific_force, angular_rate;  ///< (N) [s]; (N,3) [m/s²]; (N,3) [rad/s]
   bool operator==(const ImuLog&) const = default;
 };
 
-enum class Split { train, test };
+/// Whether a throw may be fitted to, or judges.
+enum class Split {
+  train,  ///< may be fitted to
+  test,   ///< held out: only judges
+};
 
+/// One throw of a log: what was measured, by sensor.
 struct Throw {
-  std::string id, object, condition;  // `condition` groups repetitions
-  int repetition = 0;
-  Split split = Split::train;
+  std::string id, object, condition;    // `condition` groups repetitions
+  int repetition = 0;                   ///< of the condition, >= 0
+  Split split = Split::train;           ///< whether it may be fitted to
   std::optional<double> detach_time;    // [s] annotated by hand
   std::optional<double> grasp_angle;    // [rad] object x axis against the hand's, before opening
   std::vector<double> hand_jump_times;  // [s]
   std::optional<std::pair<double, double>> free_flight;  // [s] mocap clock (imu, if no mocap): flies free
-  std::optional<HandLog> hand;
-  std::optional<FtLog> ft;
-  std::optional<MocapLog> mocap;
-  std::optional<LandingLog> landing;
-  std::optional<ImuLog> imu;
+  std::optional<HandLog> hand;                           ///< absent where the object flew without a robot
+  std::optional<FtLog> ft;                               ///< absent where it was not recorded
+  std::optional<MocapLog> mocap;                         ///< absent where it was not recorded
+  std::optional<LandingLog> landing;                     ///< absent where it was not recorded
+  std::optional<ImuLog> imu;                             ///< absent where it was not recorded
   bool operator==(const Throw&) const = default;
 };
 
+/// A campaign of throws, as in docs/log-format.md.
 struct ThrowLog {
-  int dimension = 2;
-  std::string title, source;
-  std::optional<std::string> licence;
-  double gravity = 9.81;      // [m/s²] declared
-  double landing_height = 0;  // [m]
-  std::map<std::string, Object> objects;
-  std::optional<Gripper> gripper;
-  std::vector<Throw> throws;  // sorted by id when read
+  int dimension = 2;                      ///< 2: in a plane, 3: in space
+  std::string title, source;              ///< free text; whose throws they are, and how made
+  std::optional<std::string> licence;     ///< of the data
+  double gravity = 9.81;                  // [m/s²] declared
+  double landing_height = 0;              // [m]
+  std::map<std::string, Object> objects;  ///< by id
+  std::optional<Gripper> gripper;         ///< absent where no robot threw
+  std::vector<Throw> throws;              // sorted by id when read
   bool operator==(const ThrowLog&) const = default;
 };
 
@@ -122,9 +131,10 @@ std::string read_schema_name(const std::filesystem::path& file);
 
 /// One line of the layout for documentation: path inside a throw, shape, columns and SI units.
 struct LayoutRow {
-  std::string path, shape, columns, units;
-  bool optional = false;
+  std::string path, shape, columns, units;  ///< as in a file
+  bool optional = false;                    ///< a log may do without
 };
+/// The whole layout of a throw, 2 <= dimension <= 3, in the order of docs/log-format.md.
 std::vector<LayoutRow> throw_log_layout(int dimension);
 
 }  // namespace unhand::datasets

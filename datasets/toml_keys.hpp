@@ -17,11 +17,13 @@ namespace unhand::datasets {
 
 /// Accepted values of a key, ends included unless open.
 struct TomlLimits {
-  double low, high;
-  bool open_low;
-  const char* unit;
+  double low, high;  ///< in `unit`
+  bool open_low;     ///< `low` itself is not accepted
+  const char* unit;  ///< for the message
 
+  /// True for an accepted value; false for NaN.
   bool accept(double value) const { return value <= high && (open_low ? value > low : value >= low); }
+  /// "(0, 10] m"
   std::string text() const;
 };
 
@@ -33,17 +35,23 @@ class TomlKeys {
   /// The same of text that comes with the library; `name` stands for the file in errors.
   static TomlKeys parse_text(std::string_view text, const std::string& name);
 
+  /// Throws TomlError with the place of `key`, or of its table where the key is missing.
   [[noreturn]] void fail(std::string_view key, const std::string& why) const;
 
+  /// The number of that key, if it is there; an integer counts as one.
   std::optional<double> number(std::string_view key, const TomlLimits& limits);
+  /// The text of that key, if it is there.
   std::optional<std::string> text(std::string_view key);
   /// A list of as many numbers as `out` holds; false: there is none.
   bool numbers(std::string_view key, const TomlLimits& limits, std::span<double> out);
+  /// A list of three numbers, if it is there.
   std::optional<std::array<double, 3>> triple(std::string_view key, const TomlLimits& limits);
+  /// [key], if it is there.
   std::optional<TomlKeys> table(std::string_view key);
   /// [[key]] … [[key]]
   std::vector<TomlKeys> tables(std::string_view key);
 
+  /// The value, or TomlError where it is missing.
   template <class T>
   T required(std::string_view key, std::optional<T> value) const {
     if (!value) fail(key, "required key is missing");

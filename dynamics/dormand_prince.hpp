@@ -13,18 +13,21 @@ namespace unhand::dynamics {
 template <class S, int N>
 class DormandPrince final : public SingleStep<DormandPrince<S, N>, S, N> {
  public:
-  static constexpr bool kPredictive = false;
-  static constexpr double kOrder = 8;
+  static constexpr bool kPredictive = false;  ///< the controller looks at one step
+  static constexpr double kOrder = 8;         ///< of the error estimate [-]
   using SingleStep<DormandPrince<S, N>, S, N>::SingleStep;
 
+  /// The first stage, which after a step is the last of the one before.
   void prepare(bool fresh) {
     if (fresh)
       this->flow(this->t0_, this->y0_, k_[0]);
     else
       k_[0] = k_[kEnd];
   }
+  /// A first step length [s].
   double guess() { return this->first_step(values<S, N>(k_[0])); }
 
+  /// Takes the step of length h [s] and returns its error norm.
   double attempt(const S& h) {
     h_ = h;
     bent_ = false;

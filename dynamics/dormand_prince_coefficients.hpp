@@ -50,7 +50,7 @@ inline constexpr double kA[16][15] = {
     {-0.42889630158379194, 0, 0, 0, 0, -4.697621415361164, 7.683421196062599, 4.06898981839711,
      0.3567271874552811, 0, 0, 0, -0.0013990241651590145, 2.9475147891527724, -9.15095847217987}};
 
-/// The solution less those of order 5 and 3.
+/// The solution less that of order 5.
 inline constexpr double kError5[12] = {0.01312004499419488,
                                        0,
                                        0,
@@ -63,6 +63,7 @@ inline constexpr double kError5[12] = {0.01312004499419488,
                                        0.3341791187130175,
                                        0.08192320648511571,
                                        -0.022355307863886294};
+/// The solution less that of order 3.
 inline constexpr double kError3[12] = {-0.18980075407240762,
                                        0,
                                        0,

@@ -18,7 +18,7 @@ namespace unhand::dynamics {
 /// One parameter of an effect. With all parameters at their neutral values the equations are the base
 /// model's.
 struct EffectParameter {
-  std::string name;
+  std::string name;      ///< "v_s": unique within its effect
   std::string unit;      ///< "-" where it has none
   double neutral{};      ///< where the effect is absent
   double low{}, high{};  ///< accepted range, ends included
@@ -26,14 +26,16 @@ struct EffectParameter {
   /// Values to try for a parameter that has no influence while the effect is absent (a Stribeck speed, say).
   /// Empty: the parameter measures the effect's size.
   std::vector<double> grid{};
+  /// True if the parameter only shapes an effect that another parameter switches on.
   bool is_shape() const { return !grid.empty(); }
 };
 
+/// The descriptor of one effect: what it is called, what it models, and which parameters it has.
 struct Effect {
-  std::string id;         ///< "contact.stribeck"
-  std::string mechanism;  ///< one line
-  std::vector<EffectParameter> parameters;
-  bool per_object{false};  ///< every object has its own values, named "k[jar]"
+  std::string id;                           ///< "contact.stribeck"
+  std::string mechanism;                    ///< one line
+  std::vector<EffectParameter> parameters;  ///< one or more; the order is that of reports and cards
+  bool per_object{false};                   ///< every object has its own values, named "k[jar]"
   /// No two-sided derivative at neutral: its footprint is taken at neutral + typical, over the grid.
   bool one_sided{false};
   /// "id.name"
@@ -45,12 +47,15 @@ template <class S>
 class Values {
  public:
   Values() = default;
+  /// Both of one length, kept by the caller as long as this is used.
   Values(std::span<const std::string> names, std::span<const S> values) : names_(names), values_(values) {}
+  /// The value under the full name ("contact.stribeck.v_s"), or `otherwise`.
   S get(std::string_view name, double otherwise) const {
     for (std::size_t i = 0; i < names_.size(); ++i)
       if (names_[i] == name) return values_[i];
     return S(otherwise);
   }
+  /// Whether any name begins with `prefix` and a dot: whether an effect is switched on.
   bool has_prefix(std::string_view prefix) const {
     for (const auto& name : names_)
       if (name.size() > prefix.size() && name.compare(0, prefix.size(), prefix) == 0 &&
@@ -68,7 +73,9 @@ class Values {
 template <class S>
 class EffectValues {
  public:
+  /// Both are kept by reference.
   EffectValues(const Effect& effect, const Values<S>& all) : effect_(effect), all_(all) {}
+  /// The value of the effect's parameter `name`, without the id. Throws std::logic_error if it has none such.
   S operator[](std::string_view name) const {
     for (const EffectParameter& p : effect_.parameters)
       if (p.name == name) return all_.get(effect_.full_name(p), p.neutral);
@@ -86,9 +93,10 @@ class EffectValues {
 /// An effect and how it enters what it changes.
 template <template <class> class Setup>
 struct EffectOn {
-  Effect effect;
-  void (*apply)(const EffectValues<double>&, Setup<double>&);
-  void (*apply_dual)(const EffectValues<Dual>&, Setup<Dual>&);
+  Effect effect;  ///< the descriptor
+  void (*apply)(const EffectValues<double>&,
+                Setup<double>&);  ///< writes the parameters into the setup, SI units
+  void (*apply_dual)(const EffectValues<Dual>&, Setup<Dual>&);  ///< the same with derivatives
 };
 
 /// Writes the parameters of all effects of `table` that `values` names into `setup`.

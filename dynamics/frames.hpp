@@ -10,27 +10,33 @@
 
 namespace unhand::dynamics {
 
+/// A vector of the vertical plane, x forward and z up; the unit is that of what it stands for.
 template <class S>
 struct Vec2 {
-  S x{}, z{};
+  S x{}, z{};  ///< components along the axes of the frame it is given in
 };
 
+/// Componentwise sum; both in one frame.
 template <class S>
 Vec2<S> operator+(const Vec2<S>& a, const Vec2<S>& b) {
   return {a.x + b.x, a.z + b.z};
 }
+/// Componentwise difference; both in one frame.
 template <class S>
 Vec2<S> operator-(const Vec2<S>& a, const Vec2<S>& b) {
   return {a.x - b.x, a.z - b.z};
 }
+/// k a
 template <class S>
 Vec2<S> operator*(const S& k, const Vec2<S>& a) {
   return {k * a.x, k * a.z};
 }
+/// a · b
 template <class S>
 S dot(const Vec2<S>& a, const Vec2<S>& b) {
   return a.x * b.x + a.z * b.z;
 }
+/// |a|. Its derivative at a = 0 is not finite: compare squares there.
 template <class S>
 S norm(const Vec2<S>& a) {
   using std::sqrt;
@@ -53,28 +59,32 @@ Vec2<S> rotate(const S& theta, const Vec2<S>& a) {
 /// Position [m, m] and angle [rad].
 template <class S>
 struct Pose {
-  S x{}, z{}, theta{};
+  S x{}, z{}, theta{};  ///< m, m; rad, counter-clockwise, not wrapped
+  /// (x, z) [m]
   Vec2<S> position() const { return {x, z}; }
 };
 
 /// Linear velocity of the frame's origin [m/s] and angular velocity [rad/s], in the world.
 template <class S>
 struct Twist {
-  S vx{}, vz{}, omega{};
+  S vx{}, vz{}, omega{};  ///< m/s, m/s; rad/s, counter-clockwise
+  /// (vx, vz) [m/s]
   Vec2<S> linear() const { return {vx, vz}; }
 };
 
 /// Linear acceleration of the frame's origin [m/s²] and angular acceleration [rad/s²], in the world.
 template <class S>
 struct Acceleration {
-  S ax{}, az{}, alpha{};
+  S ax{}, az{}, alpha{};  ///< m/s², m/s²; rad/s², counter-clockwise
+  /// (ax, az) [m/s²]
   Vec2<S> linear() const { return {ax, az}; }
 };
 
 /// Force [N] and torque about the named point [N m], in the world.
 template <class S>
 struct Wrench {
-  S fx{}, fz{}, tau{};
+  S fx{}, fz{}, tau{};  ///< N, N; N m, counter-clockwise
+  /// (fx, fz) [N]
   Vec2<S> force() const { return {fx, fz}; }
 };
 

@@ -13,6 +13,7 @@ namespace unhand::dynamics {
 template <class S>
 struct Gravity {
   S tilt{};  ///< α [rad]
+  /// The gravity vector (x, z) [m/s²] for the declared g > 0 [m/s²].
   Vec2<S> at(double g) const {
     using std::cos;
     using std::sin;

@@ -10,10 +10,10 @@ namespace unhand::dynamics {
 /// first in fractions of the stretch, in the answer of find_first in seconds since the step began. A root
 /// without a slope is as good as it gets.
 struct Bracket {
-  int guard{-1};
-  double safe{}, unsafe{};
-  double at_safe{}, at_unsafe{};
-  double root{}, slope{};
+  int guard{-1};                  ///< its index; −1 for none
+  double safe{}, unsafe{};        ///< ends of the bracket [-]
+  double at_safe{}, at_unsafe{};  ///< the guard's signed values there, <= 0 and >= 0
+  double root{}, slope{};         ///< where it passes zero, and its slope there, per unit of `root`
 };
 
 /// The search for roots. A step is searched in stretches no longer than the guard interval: guards are

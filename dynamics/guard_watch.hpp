@@ -8,6 +8,7 @@
 
 namespace unhand::dynamics {
 
+/// The most guards that a mode may have.
 inline constexpr int kMaxGuards = 8;
 
 /// What is known of the guards of the phase at hand. Values are signed so that every guard fires upwards:
@@ -15,6 +16,7 @@ inline constexpr int kMaxGuards = 8;
 template <class S, int N>
 class GuardWatch {
  public:
+  /// The system is kept by reference; `method` says how finely guards must be sampled.
   GuardWatch(const HybridSystem<N>& system, Method method) : system_(system), method_(method) {}
 
   /// Begins the phase. Throws std::logic_error where a mode has more than kMaxGuards guards.
@@ -26,7 +28,7 @@ class GuardWatch {
   /// its unsafe side waits until it has been seen on the safe side. kNone if none fires, kNotFinite if a
   /// guard is not finite.
   int arm(const Entry<S, N>& entry, bool same_mode);
-  static constexpr int kNone = -1, kNotFinite = -2;
+  static constexpr int kNone = -1, kNotFinite = -2;  ///< answers of `arm` that are no index of a guard
 
   /// The signed values at (t, y); false if one is not finite.
   bool evaluate(double t, const State<double, N>& y, double* G) const;
@@ -37,8 +39,8 @@ class GuardWatch {
   /// The longest step [s] from t with which a guard's return to zero is not missed.
   double longest_step(double t) const;
 
-  Phase phase;
-  int count{};
+  Phase phase;                                     ///< the phase at hand
+  int count{};                                     ///< its guards, at most kMaxGuards
   bool monotone{};                                 ///< all of them: sampled at the ends of steps only
   std::array<double, kMaxGuards> sign{}, start{};  ///< start: the values where the next step begins
   std::array<bool, kMaxGuards> armed{}, hidden{};  ///< hidden: began at zero, no node has told where it went

@@ -13,13 +13,14 @@
 
 namespace unhand::dynamics {
 
+/// The state of a system with N components, SI units.
 template <class S, int N>
 using State = std::array<S, N>;
 
 /// Local error per step: see HybridSystem::error_scale; the norm is the root mean square over the components.
 struct Tolerances {
-  double relative{1e-8};
-  double absolute{1e-10};
+  double relative{1e-8};   ///< of the size of each component [-]
+  double absolute{1e-10};  ///< in the unit of each component (m, rad, m/s, rad/s)
 };
 
 /// What the flow of a mode asks of a stepper.
@@ -32,31 +33,36 @@ enum class FlowKind {
 };
 
 /// A guard g(t, y) fires where it passes zero in this direction, once, on (t0, t1].
-enum class Crossing { rising, falling };
+enum class Crossing {
+  rising,   ///< from below zero to above
+  falling,  ///< from above zero to below
+};
 
+/// An event function of a mode: its name, its direction, and whether it can turn back.
 struct Guard {
-  std::string_view name;
-  Crossing crossing{};
+  std::string_view name;  ///< what the event log calls it; must outlive the system
+  Crossing crossing{};    ///< the direction in which it fires
   bool monotone{
       false};  ///< passes zero at most once in a step, however long: sampled at the ends of steps only
 };
 
 /// A mode inside a window of smooth data.
 struct Phase {
-  int mode{};
-  Window window;
+  int mode{};     ///< index of the mode
+  Window window;  ///< the data in force
 };
 
 /// Where a phase begins: the mode with its state at t. Where the first instants after an event are known in
 /// closed form, t lies `lead` after the event, and `at_event` is the state there.
 template <class S, int N>
 struct Entry {
-  int mode{};
-  S t{};
-  State<S, N> y{};
-  S lead{};
-  State<S, N> at_event{};
+  int mode{};              ///< index of the mode
+  S t{};                   ///< s
+  State<S, N> y{};         ///< state at t
+  S lead{};                ///< s, >= 0; 0 where nothing is known in closed form
+  State<S, N> at_event{};  ///< state at t − lead; only read where lead > 0
 
+  /// The state at the event itself, t − lead.
   const State<S, N>& event_state() const { return value_of(lead) > 0 ? at_event : y; }
 };
 
@@ -67,9 +73,13 @@ class HybridSystem {
  public:
   virtual ~HybridSystem() = default;
 
+  /// What the flow of a mode asks of a stepper.
   virtual FlowKind kind(int mode) const = 0;
+  /// What the event log calls a mode.
   virtual std::string_view mode_name(int mode) const = 0;
+  /// Guards of a mode, at most kMaxGuards.
   virtual int guard_count(int mode) const = 0;
+  /// The descriptor of a guard; 0 <= index < guard_count(mode).
   virtual Guard guard(int mode, int index) const = 0;
 
   /// Instants [s], increasing, at which data jump or kink; the integrator steps exactly to each.
@@ -96,6 +106,7 @@ class HybridSystem {
 
   /// The state at an accumulation point of events at t. Only asked for when `has_limit` says so.
   virtual bool has_limit(int /*mode*/, int /*guard*/) const { return false; }
+  /// The state at an accumulation point t [s] of events, whose last phase is `from`.
   virtual Entry<double, N> at_limit(const Phase& from, double t, const State<double, N>& y) const {
     return {from.mode, t, y, 0.0};
   }
@@ -106,6 +117,7 @@ class HybridSystem {
   /// dt/dσ > 0 of the variable σ in which the flow of a mode is regular, if `is_paced`; see
   /// paced_stepper.hpp.
   virtual bool is_paced(int /*mode*/) const { return false; }
+  /// dt/dσ at (t, y), > 0: the unit is that of whatever σ the system chose.
   virtual double pace(const Phase&, double /*t*/, const State<double, N>&) const { return 1; }
   virtual Dual pace(const Phase&, const Dual& /*t*/, const State<Dual, N>&) const { return Dual(1.0); }
 
@@ -163,14 +175,17 @@ class HybridSystemFrom : public HybridSystem<N> {
   }
 
  protected:
+  /// The default: no time events.
   template <class S>
   void time_events_(std::vector<S>& out) const {
     out.clear();
   }
+  /// The default: mode and state go on unchanged across a time event.
   template <class S>
   Entry<S, N> on_time_(int mode, const Window&, const S& t, const State<S, N>& y) const {
     return {mode, t, y, S(0)};
   }
+  /// The default, for systems without accumulation points: the state as it is.
   template <class S>
   Entry<S, N> at_limit_(const Phase& from, const S& t, const State<S, N>& y) const {
     return {from.mode, t, y, S(0)};

@@ -11,15 +11,16 @@
 
 namespace unhand::dynamics {
 
+/// Tolerances and budgets of an integration.
 struct IntegratorOptions {
-  Method method{Method::automatic};
-  Tolerances tolerances;
+  Method method{Method::automatic};  ///< `automatic` unless methods are compared
+  Tolerances tolerances;             ///< of the local error
   /// Guards are sampled at least every third of this [s], and through the cubic in between: two roots closer
   /// than about a ninth of it may be missed.
   double guard_interval{5e-3};
-  double longest_step{0.05};  ///< [s]; steps with guards are no longer than sixteen guard intervals
-  long step_budget{200'000};
-  int event_budget{10'000};
+  double longest_step{0.05};   ///< [s]; steps with guards are no longer than sixteen guard intervals
+  long step_budget{200'000};   ///< steps in all, before the answer is `step_budget_spent`
+  int event_budget{10'000};    ///< events in all, before the answer is `event_budget_spent`
   int events_per_instant{24};  ///< mode changes without time passing, before the answer is `mode_cycle`
   /// Events accumulate at t∞: jump there when what is left of the state's change is below this (SI units).
   double zeno_tolerance{1e-7};
@@ -28,44 +29,52 @@ struct IntegratorOptions {
 
 /// How an integration ended. Only the first two are answers; the rest say why there is none.
 enum class Outcome {
-  finished,  ///< a mode of kind `finished` was entered
-  horizon,   ///< t_end was reached
-  zeno,      ///< events accumulate at the returned time and the system knows no state there
-  event_budget_spent,
-  step_budget_spent,
-  mode_cycle,  ///< no mode is consistent at the returned instant
-  step_too_small,
-  not_finite,  ///< a flow or a guard returned NaN or infinity
+  finished,            ///< a mode of kind `finished` was entered
+  horizon,             ///< t_end was reached
+  zeno,                ///< events accumulate at the returned time and the system knows no state there
+  event_budget_spent,  ///< more events than the options allow
+  step_budget_spent,   ///< more steps than the options allow
+  mode_cycle,          ///< no mode is consistent at the returned instant
+  step_too_small,      ///< the tolerances cannot be met above the spacing of representable times
+  not_finite,          ///< a flow or a guard returned NaN or infinity
 };
+/// The outcome's name, as it is written above.
 const char* to_string(Outcome);
 
-enum class EventKind { guard, time, limit };
+/// Why an event happened.
+enum class EventKind {
+  guard,  ///< a guard passed zero
+  time,   ///< data jump or kink at an instant known in advance
+  limit,  ///< events accumulated here
+};
 
 /// One entry of the event log: what fired, when, and the mode and state right after.
 template <class S, int N>
 struct Event {
-  EventKind kind{};
-  int index{};  ///< the guard's or time event's index in the mode left
-  int mode_before{}, mode_after{};
-  S t{};
-  State<S, N> y{};
+  EventKind kind{};                 ///< why it happened
+  int index{};                      ///< the guard's or time event's index in the mode left
+  int mode_before{}, mode_after{};  ///< indices of the modes
+  S t{};                            ///< s; with Dual, its derivatives are those of the event's time
+  State<S, N> y{};                  ///< the state right after
 };
 
+/// What an integration cost.
 struct IntegratorStatistics {
-  long steps{}, rejected_steps{}, flow_evaluations{};
+  long steps{}, rejected_steps{}, flow_evaluations{};  ///< accepted; rejected; calls of the flow
   int grazings{};  ///< guards that came within tolerance of zero without passing it: derivatives there are
                    ///< one-sided
 };
 
+/// How an integration ended, where, and what happened on the way.
 template <class S, int N>
 struct Solution {
-  Outcome outcome{};
-  int mode{};
-  S t{};
-  State<S, N> y{};
-  std::vector<Event<S, N>> events;
-  Trajectory<S, N> trajectory;  ///< empty unless options.record
-  IntegratorStatistics statistics;
+  Outcome outcome{};                ///< only `finished` and `horizon` are answers
+  int mode{};                       ///< index of the last mode
+  S t{};                            ///< s: where it ended
+  State<S, N> y{};                  ///< the state there
+  std::vector<Event<S, N>> events;  ///< in order of time
+  Trajectory<S, N> trajectory;      ///< empty unless options.record
+  IntegratorStatistics statistics;  ///< what it cost
 };
 
 /// Integrates from `start` to `t_end` [s] or to a finished mode.

@@ -14,9 +14,11 @@ namespace unhand::dynamics {
 template <int N>
 class PacedSystem final : public HybridSystem<N + 1> {
  public:
-  const HybridSystem<N>* system{};
-  Phase phase;
+  const HybridSystem<N>* system{};  ///< the system in time
+  Phase phase;                      ///< its mode and window
 
+  /// As HybridSystem says, of the system in σ: no guards and no events of its own.
+  /// @{
   FlowKind kind(int mode) const override { return system->kind(mode); }
   std::string_view mode_name(int mode) const override { return system->mode_name(mode); }
   int guard_count(int) const override { return 0; }
@@ -43,6 +45,7 @@ class PacedSystem final : public HybridSystem<N + 1> {
   Entry<Dual, N + 1> on_time(int, const Window&, const Dual&, const State<Dual, N + 1>&) const override {
     return {};
   }
+  /// @}
 
   void error_scale(const Phase&, const Tolerances& tolerances, const State<double, N + 1>& y0,
                    const State<double, N + 1>& y1, State<double, N + 1>& scale) const override {
@@ -52,6 +55,7 @@ class PacedSystem final : public HybridSystem<N + 1> {
     scale[N] = 0.1 * tolerances.absolute;  // of the time itself [s]
   }
 
+  /// y without the time.
   template <class S>
   static State<S, N> state(const State<S, N + 1>& y) {
     State<S, N> out;
@@ -75,6 +79,7 @@ class PacedSystem final : public HybridSystem<N + 1> {
 template <int N>
 class PacedStepper final : public Stepper<double, N> {
  public:
+  /// `inner` steps a PacedSystem.
   explicit PacedStepper(std::unique_ptr<Stepper<double, N + 1>> inner) : inner_(std::move(inner)) {}
 
   void start(const HybridSystem<N>& system, const Phase& phase, const double& t,

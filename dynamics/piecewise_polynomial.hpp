@@ -21,7 +21,7 @@ namespace unhand::dynamics {
 /// unit.
 template <class S, int Channels>
 struct Jet2 {
-  std::array<S, Channels> value{}, first{}, second{};
+  std::array<S, Channels> value{}, first{}, second{};  ///< u, u/s, u/s²
 };
 
 /// Piece i on [b_i, b_{i+1}] is p_i(t) = Σ_k c_{i,k} (t − b_i)^k, k = 0 … Degree; before the first break and
@@ -52,9 +52,13 @@ class PiecewisePolynomial {
     per_second_ = static_cast<double>(pieces_.size()) / (breaks_.back() - breaks_.front());
   }
 
+  /// Where pieces begin and end [s], strictly increasing, one more than pieces.
   const std::vector<double>& breaks() const { return breaks_; }
+  /// The coefficients of every piece.
   const std::vector<Coefficients>& pieces() const { return pieces_; }
+  /// The first break [s].
   double begin() const { return breaks_.front(); }
+  /// The last break [s].
   double end() const { return breaks_.back(); }
 
   /// Index of the piece that holds at t inside the window: where t is a break, the right one at window.begin

@@ -22,12 +22,13 @@ namespace unhand::dynamics {
 template <int N>
 class Radau final : public SingleStep<Radau<N>, double, N> {
  public:
-  static constexpr bool kPredictive = true;
-  static constexpr double kOrder = 4;
+  static constexpr bool kPredictive = true;  ///< the controller looks at two steps
+  static constexpr double kOrder = 4;        ///< of the error estimate, plus one [-]
   /// `seeded`: the parameters of the system carry derivatives of their own.
   explicit Radau(const Tolerances& tolerances, bool seeded = false)
       : SingleStep<Radau<N>, double, N>(tolerances), seeded_(seeded) {}
 
+  /// The Jacobian and the flow where the step begins.
   void prepare(bool fresh) {
     State<double, N> ft;
     flow_jacobian<N>(*this->system_, this->phase_, this->t0_, this->y0_, f0_, jacobian_, ft, seeded_);
@@ -37,8 +38,11 @@ class Radau final : public SingleStep<Radau<N>, double, N> {
     refine_ = fresh;
     factored_ = 0;
   }
+  /// A first step length [s].
   double guess() { return this->first_step(f0_); }
 
+  /// Takes the step of length h [s] and returns its error norm: 32 where the iterations do not converge, NaN
+  /// where the flow is not finite.
   double attempt(const double& h) {
     Stages z = start_values(h);
     if (!solve(h, z)) {

@@ -8,7 +8,7 @@ namespace unhand::dynamics {
 /// Mass m [kg] and moment of inertia I about the CoM, out of the plane [kg m²]; both > 0.
 template <class S>
 struct RigidBody {
-  S mass{}, inertia{};
+  S mass{}, inertia{};  ///< kg; kg m²
 };
 
 /// The gravity vector of a level base: (0, −g) [m/s²].

@@ -18,20 +18,23 @@ namespace unhand::dynamics {
 template <int N>
 class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
  public:
-  static constexpr bool kPredictive = true;
-  static constexpr double kOrder = 5;
+  static constexpr bool kPredictive = true;  ///< the controller looks at two steps
+  static constexpr double kOrder = 5;        ///< of the error estimate [-]
   /// `seeded`: the parameters of the system carry derivatives of their own.
   explicit Rosenbrock(const Tolerances& tolerances, bool seeded = false)
       : SingleStep<Rosenbrock<N>, double, N>(tolerances), seeded_(seeded) {}
 
+  /// The Jacobian and the flow where the step begins.
   void prepare(bool /*fresh*/) {
     ++this->flow_evaluations_;
     State<double, N> ft;
     flow_jacobian<N>(*this->system_, this->phase_, this->t0_, this->y0_, f0_, jacobian_, ft, seeded_);
     for (int i = 0; i < N; ++i) ft_[i] = ft[i];
   }
+  /// A first step length [s].
   double guess() { return this->first_step(f0_); }
 
+  /// Takes the step of length h [s] and returns its error norm.
   double attempt(const double& h) {
     State<double, N> error;
     advance(h, this->y1_, error);

@@ -16,6 +16,7 @@ inline constexpr int kDualSize = 8;
 /// A value with its first derivatives: `.a` the value, `.v` the gradient.
 using Dual = ceres::Jet<double, kDualSize>;
 
+/// The value without its derivatives: what decides between branches.
 inline double value_of(double x) { return x; }
 inline double value_of(const Dual& x) { return x.a; }
 

@@ -14,8 +14,8 @@ namespace unhand::dynamics {
 template <int N>
 class SmallInverse {
  public:
-  static constexpr int kPadded = (N + 1) / 2 * 2;
-  using Vector = double[kPadded];  ///< entries beyond N are ignored on input, zero on output
+  static constexpr int kPadded = (N + 1) / 2 * 2;  ///< N rounded up to whole registers of two
+  using Vector = double[kPadded];                  ///< entries beyond N are ignored on input, zero on output
 
   /// Inverts a[row][column]. A singular matrix gives entries that are not finite.
   void compute(const double (&a)[N][N]) {

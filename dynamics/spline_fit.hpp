@@ -32,12 +32,14 @@ struct SplineBreak {
 /// except at `breaks`. A sample exactly at a break belongs to the piece on its right.
 template <int Channels, int Degree>
 struct SplineProblem {
-  double begin{}, end{};
+  double begin{}, end{};            ///< s
   std::vector<SplineBreak> breaks;  ///< increasing, strictly inside (begin, end)
-  std::vector<SplineObservations<Channels>> observations;
+  std::vector<SplineObservations<Channels>>
+      observations;  ///< one per measured derivative; all are fitted together
   std::optional<std::array<double, Channels>> end_value{};  ///< value prescribed at `end`, if any
 };
 
+/// How closely a spline follows its samples.
 struct SplineOptions {
   /// Intervals in each stretch between breaks to begin with.
   int initial_intervals = 1;
@@ -49,6 +51,7 @@ struct SplineOptions {
   int min_samples_per_interval = 3;
 };
 
+/// How a spline was found, and how well it follows its samples.
 template <int Channels>
 struct SplineSummary {
   /// Mean square of residual/σ per observed series (in the order given) and channel.
@@ -59,10 +62,11 @@ struct SplineSummary {
   bool noise_reached{};            ///< no interval has a certain misfit (4.5 standard deviations)
 };
 
+/// A smoothing spline and its summary.
 template <int Channels, int Degree>
 struct SplineFit {
-  PiecewisePolynomial<Channels, Degree> polynomial;
-  SplineSummary<Channels> summary;
+  PiecewisePolynomial<Channels, Degree> polynomial;  ///< on [begin, end] of the problem
+  SplineSummary<Channels> summary;                   ///< residuals and knots
 };
 
 /// Minimises Σ ((f^(k)(t_n) − y_n)/σ)² over the splines of the problem. Knots: each stretch between breaks

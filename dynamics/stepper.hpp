@@ -10,12 +10,14 @@
 
 namespace unhand::dynamics {
 
+/// How a step ended.
 enum class StepStatus {
-  accepted,
+  accepted,    ///< its error is within the tolerances
   too_small,   ///< the error cannot be met above the spacing of representable times
   not_finite,  ///< the flow returned NaN or infinity however short the step
 };
 
+/// The components without their derivatives.
 template <class S, int N>
 State<double, N> values(const State<S, N>& y) {
   if constexpr (std::is_same_v<S, double>) {
@@ -31,9 +33,9 @@ State<double, N> values(const State<S, N>& y) {
 /// in.
 template <int N>
 struct StepPoint {
-  double t{};
-  State<double, N> y{};
-  double speed{};
+  double t{};            ///< s
+  State<double, N> y{};  ///< state at t
+  double speed{};        ///< dt/dθ [s]: the step's length where it is taken in time
 };
 
 /// Advances one phase. `start` fixes where; each `step` replaces the last accepted step [t0, t1] by the next
@@ -62,6 +64,7 @@ class Stepper {
     interpolate(theta, at);
     y = values<S, N>(at);
   }
+  /// As retake, values alone.
   virtual void retake_values(double h, State<double, N>& y) {
     State<S, N> at;
     retake(h, at);
@@ -75,6 +78,7 @@ class Stepper {
   /// The last step in the variable that it was taken in: the fraction at which `h` has passed since t0, and
   /// the point at a fraction.
   virtual double fraction(double h) const { return h / (value_of(t1_) - value_of(t0_)); }
+  /// The time, state and dt/dθ at the fraction `theta` of the last step, in the variable it was taken in.
   virtual StepPoint<N> point(double theta) const {
     const double length = value_of(t1_) - value_of(t0_);
     StepPoint<N> at{value_of(t0_) + theta * length, {}, length};
@@ -88,19 +92,25 @@ class Stepper {
   /// The length with which the next start tries its first step, instead of the one remembered.
   virtual void suggest(double /*h*/) {}
 
+  /// Where the last step began [s].
   const S& t0() const { return t0_; }
+  /// Where it ended [s].
   const S& t1() const { return t1_; }
+  /// The state where it began.
   const State<S, N>& y0() const { return y0_; }
+  /// The state where it ended.
   const State<S, N>& y1() const { return y1_; }
 
+  /// Evaluations of the flow since the stepper was made; a Jacobian, or one in dual numbers, counts as one.
   long flow_evaluations() const { return flow_evaluations_; }
+  /// Steps tried and found too inaccurate since the stepper was made.
   long rejected_steps() const { return rejected_; }
 
  protected:
-  S t0_{}, t1_{};
-  State<S, N> y0_{}, y1_{};
+  S t0_{}, t1_{};                    ///< s: ends of the last step
+  State<S, N> y0_{}, y1_{};          ///< states there
   mutable long flow_evaluations_{};  // dense output may be worked out when it is first asked for
-  long rejected_{};
+  long rejected_{};                  ///< steps rejected
 };
 
 /// Root mean square of e_i / scale_i; NaN if anything is.
@@ -130,6 +140,7 @@ inline double step_factor(double error, double order) {
 template <class Derived, class S, int N>
 class SingleStep : public Stepper<S, N> {
  public:
+  /// Errors are judged by `tolerances` through HybridSystem::error_scale.
   explicit SingleStep(const Tolerances& tolerances) : tolerances_(tolerances) {}
 
   void start(const HybridSystem<N>& system, const Phase& phase, const S& t, const State<S, N>& y) override {
@@ -190,11 +201,13 @@ class SingleStep : public Stepper<S, N> {
   }
 
  protected:
+  /// dy/dt of the phase at (t, y), counted.
   void flow(const S& t, const State<S, N>& y, State<S, N>& dy) const {
     ++this->flow_evaluations_;
     system_->flow(phase_, t, y, dy);
   }
 
+  /// Norm of a step's local error against the system's error_scale: accepted where <= 1.
   double error_norm(const State<S, N>& error) const {
     State<double, N> scale;
     system_->error_scale(phase_, tolerances_, values<S, N>(this->y0_), values<S, N>(this->y1_), scale);
@@ -219,12 +232,12 @@ class SingleStep : public Stepper<S, N> {
     return std::min(1e3 * trial, std::pow(0.01 / most, 1 / Derived::kOrder));
   }
 
-  const HybridSystem<N>* system_{};
-  Phase phase_;
-  Tolerances tolerances_;
-  double h_next_{};
-  double error_before_{}, taken_before_{};
-  bool fresh_{true};
+  const HybridSystem<N>* system_{};         ///< the system whose phase is integrated
+  Phase phase_;                             ///< its mode and window
+  Tolerances tolerances_;                   ///< of the local error
+  double h_next_{};                         ///< s: the length to try next; 0 before the first
+  double error_before_{}, taken_before_{};  ///< the last accepted step: error norm [-], and length [s]
+  bool fresh_{true};                        ///< a phase has begun and no step of it been taken
 
  private:
   Derived& self() { return static_cast<Derived&>(*this); }
@@ -232,7 +245,13 @@ class SingleStep : public Stepper<S, N> {
 
 /// The ways of stepping a flow; `automatic` takes dormand_prince for smooth modes, rosenbrock for stiff ones,
 /// and dormand_prince that goes over to rosenbrock for mixed ones.
-enum class Method { automatic, dormand_prince, rosenbrock, radau, cvode };
+enum class Method {
+  automatic,       ///< by the kind of each mode
+  dormand_prince,  ///< explicit, order 8: smooth flows
+  rosenbrock,      ///< linearly implicit, order 5: stiff flows
+  radau,           ///< implicit, order 5, to compare with
+  cvode,           ///< multistep (SUNDIALS), to compare with; double only
+};
 
 /// CVODE (SUNDIALS) behind the same interface: Adams for smooth, BDF with the exact Jacobian for the other
 /// modes. It is the oracle of the other steppers; double only.

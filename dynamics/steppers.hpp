@@ -34,9 +34,12 @@ class Frozen final : public Stepper<S, N> {
 template <class S, int N>
 class Steppers {
  public:
+  /// The options are kept by reference.
   explicit Steppers(const IntegratorOptions& options) : options_(options) {}
 
+  /// The stepper for modes of one kind; it stays this object's.
   Stepper<S, N>& of(FlowKind kind, bool paced);
+  /// Writes the work of all steppers so far into `statistics`.
   void count(IntegratorStatistics& statistics) const;
 
  private:

@@ -14,6 +14,7 @@ namespace unhand::dynamics {
 template <int N>
 class TangentStepper final : public Stepper<Dual, N> {
  public:
+  /// `inner` decides the steps and the values.
   explicit TangentStepper(std::unique_ptr<Stepper<double, N>> inner) : inner_(std::move(inner)) {}
 
   void start(const HybridSystem<N>& system, const Phase& phase, const Dual& t,

@@ -13,10 +13,10 @@ namespace unhand::dynamics {
 /// stepper in time.
 template <class S, int N>
 struct TrajectoryPiece {
-  static constexpr int kNodes = 8;
-  S t0{}, t1{};
-  Phase phase;
-  std::array<State<S, N>, kNodes> nodes{};
+  static constexpr int kNodes = 8;          ///< equally spaced, both ends included
+  S t0{}, t1{};                             ///< s: where the step begins and ends
+  Phase phase;                              ///< mode and window
+  std::array<State<S, N>, kNodes> nodes{};  ///< states, the first at t0 and the last at t1
 
   /// The state at the fraction θ of the piece: Lagrange's polynomial on the nodes.
   State<S, N> at_fraction(const S& theta) const {
@@ -41,9 +41,11 @@ struct TrajectoryPiece {
   }
 };
 
+/// The states of an integration over time, step by step, through every event.
 template <class S, int N>
 class Trajectory {
  public:
+  /// True if nothing was recorded.
   bool empty() const { return pieces.empty(); }
 
   /// The piece that holds t; at an event the later one. t outside the trajectory throws std::out_of_range.
@@ -63,7 +65,8 @@ class Trajectory {
     return piece.at_fraction((t - piece.t0) / length);
   }
 
-  std::vector<TrajectoryPiece<S, N>> pieces;
+  std::vector<TrajectoryPiece<S, N>> pieces;  ///< in order of time; neighbours share an end, and an event's
+                                              ///< two states are on both sides of it
 };
 
 }  // namespace unhand::dynamics

@@ -16,9 +16,9 @@ using Sensitivity = std::array<std::array<double, kDualSize>, N>;
 /// f, f_y and f_p at a point of the solution.
 template <int N>
 struct FlowDerivative {
-  State<double, N> f{};
-  std::array<std::array<double, N>, N> y{};
-  Sensitivity<N> p{};
+  State<double, N> f{};                      ///< f(t, y), state units per second
+  std::array<std::array<double, N>, N> y{};  ///< ∂f_i/∂y_j, [component][component]
+  Sensitivity<N> p{};                        ///< ∂f_i/∂p_k at fixed y, [component][parameter]
 
   /// Two Dual evaluations: the derivatives that the system's parameters carry alone, and with those of y.
   void evaluate(const HybridSystem<N>& system, const Phase& phase, double t, const State<double, N>& at) {
@@ -43,8 +43,10 @@ struct FlowDerivative {
 template <int N>
 class VariationalStep {
  public:
-  static constexpr double kRoot6 = 2.449489742783178;
-  static constexpr double kNode[3] = {(4 - kRoot6) / 10, (4 + kRoot6) / 10, 1};
+  static constexpr double kRoot6 = 2.449489742783178;  ///< √6
+  static constexpr double kNode[3] = {
+      (4 - kRoot6) / 10, (4 + kRoot6) / 10,
+      1};  ///< where the flow's derivatives are needed, as fractions of the step
 
   /// From S0 over the step's length in θ; `at` and `speed` are the derivatives of the flow and dt/dθ at the
   /// nodes.
@@ -104,6 +106,7 @@ class VariationalStep {
     multiply(inverse_[0], r[0], z1);
   }
 
+  /// ∂y/∂p where the step ends.
   Sensitivity<N> end() const {
     Sensitivity<N> s = start_;
     for (int i = 0; i < N; ++i) add(s[i], 1, stage_[2][i]);

@@ -6,8 +6,8 @@ namespace unhand::dynamics {
 /// Two neighbouring time events [s]. Whatever is evaluated for a step inside the window takes the branch that
 /// holds there: at `begin` the limit from the right, at `end` the limit from the left.
 struct Window {
-  double begin{};
-  double end{};
+  double begin{};  ///< s
+  double end{};    ///< s, > begin
 };
 
 }  // namespace unhand::dynamics

@@ -30,10 +30,13 @@ void validate_effects(const EffectSettings& settings, const std::vector<std::str
 /// The settings as a throw of one object reads them: without brackets.
 class OwnEffects {
  public:
+  /// Of all settings, those that a throw of `object` reads.
   OwnEffects(const EffectSettings& settings, const std::string& object);
   /// Valid as long as this object.
   dynamics::Values<double> values() const { return {names_, values_}; }
+  /// "id.parameter", no brackets.
   const std::vector<std::string>& names() const { return names_; }
+  /// In the order of `names`.
   const std::vector<double>& numbers() const { return values_; }
 
  private:

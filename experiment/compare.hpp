@@ -13,11 +13,12 @@ namespace unhand::experiment {
 
 /// Errors are predicted minus measured.
 struct ErrorStatistics {
-  int n{};
+  int n{};        ///< errors
   double mae{};   ///< mean of the absolute error
   double std{};   ///< standard deviation of the absolute error
   double bias{};  ///< mean of the error
 };
+/// Of any number of errors; zeros without one.
 ErrorStatistics statistics_of(const std::vector<double>& errors);
 
 /// The compared quantities, in the order of the table.
@@ -26,36 +27,40 @@ struct Quantity {
   const char* title;  ///< in tables
   double per_unit;    ///< from SI
 };
-inline constexpr double kDegrees = 57.29577951308232;
+inline constexpr double kDegrees = 57.29577951308232;  ///< per radian
+/// What models are compared by.
 inline constexpr Quantity kQuantities[] = {{"detach_vx_m_s", "detach vx [m/s]", 1},
                                            {"detach_omega_deg_s", "detach omega [deg/s]", kDegrees},
                                            {"landing_x_m", "landing x [m]", 1},
                                            {"landing_theta_deg", "landing theta [deg]", kDegrees}};
-inline constexpr int kQuantityCount = 4;
+inline constexpr int kQuantityCount = 4;  ///< of quantities
 
+/// One throw's prediction and its errors.
 struct ThrowComparison {
-  std::string id, object, condition;
-  datasets::Split split{};
-  Prediction prediction;
+  std::string id, object, condition;  ///< as in the log
+  datasets::Split split{};            ///< whether it may be fitted to
+  Prediction prediction;              ///< what the model says
   std::optional<double>
       error[kQuantityCount];  ///< in the units of kQuantities; absent if not measured or not predicted
 };
 
 /// A parameter's value in words' terms; sigma is NaN where it is not known.
 struct NamedParameter {
-  std::string name, unit;
-  double value{}, sigma{};
+  std::string name, unit;   ///< as a card has them
+  double value{}, sigma{};  ///< in `unit`; 1 σ
 };
 
+/// One model's predictions and errors, throw by throw.
 struct ModelComparison {
-  std::string model;
-  FrictionEstimate estimate;
-  std::vector<NamedParameter> named;  ///< of a fitted model, in place of estimate.parameters; else empty
-  bool from_card{};
-  std::vector<ThrowComparison> throws;
+  std::string model;                    ///< its name
+  FrictionEstimate estimate;            ///< where its parameters are from, unless a card gave them
+  std::vector<NamedParameter> named;    ///< of a fitted model, in place of estimate.parameters; else empty
+  bool from_card{};                     ///< the parameters are a card's
+  std::vector<ThrowComparison> throws;  ///< in the order of the log
   int failed{};  ///< throws that the model does not bring to a landing; they are in no statistic
   double microseconds_per_throw{};  ///< release and flight, one thread's time
 
+  /// Over the throws of one split; `quantity` is a place in kQuantities.
   ErrorStatistics statistics(int quantity, datasets::Split split) const;
   /// The same over all throws of one condition.
   ErrorStatistics of_condition(int quantity, const std::string& condition) const;
@@ -64,25 +69,27 @@ struct ModelComparison {
 /// How far repetitions of a condition scatter about their mean: the floor of any model that does not know
 /// what differs between them.
 struct RepetitionScatter {
-  int conditions{};
+  int conditions{};        ///< with at least two repetitions
   double landing_x{};      ///< pooled standard deviation [m]
   double landing_theta{};  ///< [deg]
 };
 
+/// Models against the measured outcomes of a campaign.
 struct Comparison {
-  std::vector<std::string> conditions;  ///< in order of appearance
-  std::vector<ModelComparison> models;
-  RepetitionScatter repetitions;
+  std::vector<std::string> conditions;          ///< in order of appearance
+  std::vector<ModelComparison> models;          ///< in the order asked for
+  RepetitionScatter repetitions;                ///< the floor under all of them
   double worst_hand_chi2{}, mean_force_chi2{};  ///< how well the smoothed inputs explain the logged ones
 };
 
+/// Which models are compared, and with which parameters.
 struct CompareOptions {
-  std::vector<std::string> models;
-  int threads{0};
-  dynamics::IntegratorOptions integrator;
+  std::vector<std::string> models;         ///< names of release_model_names()
+  int threads{0};                          ///< 0: one per core; the answer does not depend on it
+  dynamics::IntegratorOptions integrator;  ///< of release and flight
   std::map<std::string, ModelParameters>
-      parameters;  ///< by model, from cards; otherwise estimated from the log
-  release::NaiveOptions naive;
+      parameters;               ///< by model, from cards; otherwise estimated from the log
+  release::NaiveOptions naive;  ///< of limit_surface_naive
 };
 
 /// All throws prepared, on several threads. `file` names the log in errors. Throws datasets::LogError.

@@ -19,11 +19,13 @@ class DoubtfulForce final : public contact::NormalForce {
   /// half its length.
   DoubtfulForce(const contact::NormalForce& base, const contact::NormalForceSummary& ramp,
                 const dynamics::Dual& deviation);
+  /// f [N] at t [s].
   double at(const dynamics::Window& window, double t) const override { return at_(window, t); }
   dynamics::Dual at(const dynamics::Window& window, const dynamics::Dual& t) const override {
     return at_(window, t);
   }
   using NormalForce::kinks;
+  /// Those of the base, moved [s].
   void kinks(std::vector<double>& out) const override { kinks_(out); }
   void kinks(std::vector<dynamics::Dual>& out) const override { kinks_(out); }
   double release_time() const override;

@@ -26,10 +26,11 @@ FlightSamples read_flight_samples(const datasets::ThrowLog& log, const datasets:
 /// What scatters from sample to sample, 1 σ: third differences of a smooth series keep 20 σ² (1 + 9 + 9 + 1).
 /// Of position [m] per axis and of a small rotation about any axis [rad]; 0 where the series is too short.
 struct FlightScatter {
-  flight::Vec3<double> position{};
-  double angle{};
-  std::size_t n{};  // third differences
+  flight::Vec3<double> position{};  ///< 1 σ by world axis [m]
+  double angle{};                   ///< 1 σ [rad]
+  std::size_t n{};                  // third differences
 };
+/// The scatter of a flight's samples; see FlightScatter.
 FlightScatter scatter_of(const FlightSamples& samples);
 
 }  // namespace unhand::experiment

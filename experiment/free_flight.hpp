@@ -13,13 +13,15 @@
 
 namespace unhand::experiment {
 
+/// How a fit of a free flight ended.
 enum class FreeFlightOutcome {
-  fitted,
+  fitted,       ///< the start was found, and the residuals say how good it is
   no_tracking,  ///< the throw has no mocap
   not_free,     ///< it has a hand and no `free_flight` says when it touches nothing
   too_short,    ///< fewer than kFewestFlightSamples valid samples
   not_solved,   ///< the fit did not converge
 };
+/// The outcome's name, as it is written above.
 const char* to_string(FreeFlightOutcome);
 
 /// Two for the first half: the fewest that fix a position and a velocity.
@@ -28,7 +30,7 @@ inline constexpr std::size_t kFewestFlightSamples = 4;
 /// The start of a flight, fitted to its first samples, and what it says of all of them. Planar flights lie in
 /// the plane y = 0 and turn about −y: their θ runs from +x to +z.
 struct FreeFlightFit {
-  FreeFlightOutcome outcome{};
+  FreeFlightOutcome outcome{};                  ///< only `fitted` has an answer
   std::string reason;                           ///< why it was not fitted, in words
   std::vector<double> times;                    ///< of the valid samples of the flight [s]
   std::size_t fitted{};                         ///< the first so many were fitted
@@ -43,8 +45,8 @@ struct FreeFlightFit {
   Eigen::Matrix<double, 6, 6> rotation_covariance = Eigen::Matrix<double, 6, 6>::Zero();
   /// Σ (residual/sigma)² over the fitted samples and its degrees of freedom; no chi2 without a declared
   /// sigma.
-  std::optional<double> translation_chi2, rotation_chi2;
-  int translation_dof{}, rotation_dof{};
+  std::optional<double> translation_chi2, rotation_chi2;    ///< sums of squares [-]
+  int translation_dof{}, rotation_dof{};                    ///< measured numbers minus fitted ones
   std::vector<flight::Vec3<double>> position_residuals;     ///< measured − predicted, every sample [m]
   std::vector<flight::Vec3<double>> orientation_residuals;  ///< from predicted to measured, in the body [rad]
 };
@@ -59,9 +61,10 @@ FreeFlightFit fit_free_flight(const datasets::ThrowLog& log, const datasets::Thr
 
 /// A model of free flight, by name.
 struct FlightModel {
-  std::string_view name, summary;
-  FreeFlightFit (*fit)(const datasets::ThrowLog&, const datasets::Throw&, double fraction);
+  std::string_view name, summary;  ///< as --models names it; in one line
+  FreeFlightFit (*fit)(const datasets::ThrowLog&, const datasets::Throw&, double fraction);  ///< its fit
 };
+/// All models there are.
 std::span<const FlightModel> flight_models();
 /// Throws std::invalid_argument that lists the names there are.
 const FlightModel& flight_model(std::string_view name);
@@ -70,37 +73,40 @@ const FlightModel& flight_model(std::string_view name);
 /// what the model lacks. `half` has the start fitted on the first half: its last residual is the error of a
 /// prediction.
 struct FreeFlightErrors {
-  std::string id;
-  datasets::Split split{};
-  FreeFlightOutcome outcome{};
-  std::string reason;
+  std::string id;               ///< as in the log
+  datasets::Split split{};      ///< whether it may be fitted to
+  FreeFlightOutcome outcome{};  ///< only `fitted` has errors
+  std::string reason;           ///< why it was not fitted, in words
   std::vector<double>
-      normalised_time;  ///< 0 at the first sample, 1 at the last: for figures, beside the residuals
-  FreeFlightFit whole, half;
-  double trajectory_rms{};                      ///< root mean square distance over the flight, of `whole` [m]
-  double end_position_error{};                  ///< distance at the last sample, of `half` [m]
+      normalised_time;          ///< 0 at the first sample, 1 at the last: for figures, beside the residuals
+  FreeFlightFit whole, half;    ///< fitted on all samples; on the first half
+  double trajectory_rms{};      ///< root mean square distance over the flight, of `whole` [m]
+  double end_position_error{};  ///< distance at the last sample, of `half` [m]
   std::optional<double> end_orientation_error;  ///< angle at the last sample, of `half` [rad]
 };
+/// The errors of one flight model on one throw.
 FreeFlightErrors free_flight_errors(const FlightModel& model, const datasets::ThrowLog& log,
                                     const datasets::Throw& one);
 
 /// Of a sample of errors; std with n − 1 (0 for n < 2).
 struct Spread {
-  std::size_t n{};
-  double median{}, mean{}, std{};
+  std::size_t n{};                 ///< errors in the sample
+  double median{}, mean{}, std{};  ///< in the unit of the errors
 };
 
+/// Errors over the free flights of one split.
 struct FreeFlightStatistics {
   std::size_t n{};                                         ///< throws
   double trajectory_rms_m{};                               ///< pooled over their samples
   Spread end_position_error_m, end_orientation_error_deg;  ///< the latter over the throws with orientation
 };
 
+/// A flight model against every free flight of a log.
 struct FreeFlightComparison {
-  std::string model;
-  FreeFlightStatistics train, test;
-  std::size_t skipped{};  ///< throws that were not fitted: their `each` says why
-  double microseconds_per_throw{};
+  std::string model;                   ///< its name
+  FreeFlightStatistics train, test;    ///< over the fitted throws of each split
+  std::size_t skipped{};               ///< throws that were not fitted: their `each` says why
+  double microseconds_per_throw{};     ///< both fits, one thread's time
   std::vector<FreeFlightErrors> each;  ///< in the order of the log
 };
 

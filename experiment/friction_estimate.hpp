@@ -8,9 +8,10 @@
 
 namespace unhand::experiment {
 
+/// A model's parameters as a log's wrenches, or its detach times, first suggest them.
 struct FrictionEstimate {
-  ModelParameters parameters;
-  int samples{};       ///< F/T samples used
+  ModelParameters parameters;  ///< with what was not estimated at its default
+  int samples{};               ///< F/T samples used
   double scatter{};    ///< robust 1 σ of gauge − 1 over them [-]: how well they lie on one limit surface
   std::string method;  ///< in words, for reports
 };

@@ -15,9 +15,9 @@ namespace unhand::experiment {
 
 /// Campaign parameters of a model; each model reads what it needs.
 struct ModelParameters {
-  double mu{0.5};        ///< friction coefficient [-]
-  double length{0.007};  ///< L = c a = τ_max/f_max [m]
-  int pads{2};
+  double mu{0.5};                                                              ///< friction coefficient [-]
+  double length{0.007};                                                        ///< L = c a = τ_max/f_max [m]
+  int pads{2};                                                                 ///< n >= 1
   contact::SlideEnd slide_end{contact::SlideEnd::latched_brake};               ///< sliding_pivot
   contact::DelayDistribution delay{contact::DelayDistribution::number(0.05)};  ///< gripper_delay
   release::NaiveOptions naive{};                                               ///< limit_surface_naive
@@ -29,13 +29,15 @@ std::vector<std::string> release_model_names();
 /// Throws std::invalid_argument, listing the names, unless `name` is one of them.
 void require_release_model(const std::string& name);
 
+/// One throw through one model.
 struct Prediction {
-  release::ReleaseOutcome release{};
-  flight::FlightOutcome flight{flight::FlightOutcome::not_solved};
-  release::DetachState<double> detach;
-  flight::Landing<double> landing;
-  int events{};  ///< mode changes; for limit_surface_naive, reversals of the slip
-  bool slips_at_start{};
+  release::ReleaseOutcome release{};                                ///< how the release ended
+  flight::FlightOutcome flight{flight::FlightOutcome::not_solved};  ///< how the flight ended
+  release::DetachState<double> detach;                              ///< the CoM where the pads part
+  flight::Landing<double> landing;                                  ///< of the CoM
+  int events{};           ///< mode changes; for limit_surface_naive, reversals of the slip
+  bool slips_at_start{};  ///< the grip cannot hold the object even before it opens
+  /// Whether release and flight have an answer.
   bool landed() const {
     return release == release::ReleaseOutcome::detached && flight == flight::FlightOutcome::landed;
   }

@@ -15,35 +15,39 @@ namespace unhand::experiment {
 /// A measured quantity. Wrenches are one pad's, in the hand frame; poses are the tracked frame's, in the
 /// world.
 enum class Channel {
-  wrench_fx,
-  wrench_fz,
-  wrench_tau,
-  normal_force,  ///< of one pad, after the release only: before, it is an input
-  mocap_x,
-  mocap_z,
-  mocap_theta,
-  landing_x,
-  landing_theta,
-  landing_time,
+  wrench_fx,      ///< N
+  wrench_fz,      ///< N
+  wrench_tau,     ///< N m
+  normal_force,   ///< of one pad, after the release only: before, it is an input
+  mocap_x,        ///< m
+  mocap_z,        ///< m
+  mocap_theta,    ///< rad
+  landing_x,      ///< m
+  landing_theta,  ///< rad
+  landing_time,   ///< s
 };
+/// How many channels there are.
 inline constexpr int kChannelCount = 10;
+/// The channel's name as reports have it: "mocap_theta".
 std::string_view to_string(Channel);
 
+/// One measured number with its noise.
 struct Observation {
-  Channel channel{};
-  double time{};  ///< as stamped [s]: the robot's clock, for mocap its own
-  double value{}, sigma{};
+  Channel channel{};        ///< which sensor's, and which component
+  double time{};            ///< as stamped [s]: the robot's clock, for mocap its own
+  double value{}, sigma{};  ///< in the channel's unit; 1 σ, > 0
 };
 
 /// The observations of one throw. The three columns of a wrench or a mocap sample follow each other, with one
 /// time.
 struct Observations {
-  std::vector<Observation> all;
+  std::vector<Observation> all;    ///< channel by channel, in order of time
   std::vector<std::string> notes;  ///< what was left out, and why
 };
 
+/// Which channels are taken, and how far they are trusted.
 struct ObservationOptions {
-  bool wrench{true}, normal_force{true}, mocap{true}, landing{true};
+  bool wrench{true}, normal_force{true}, mocap{true}, landing{true};  ///< whether these are taken
   /// Wrenches are not used for this long after the log begins and after a jump of the hand's acceleration
   /// [s]: real pads ring there (some micrometres under a held object of 0.2 kg: 30 ms), rigid ones jump.
   double settling{0.03};

@@ -16,6 +16,7 @@ namespace unhand::experiment {
 inline constexpr int kOutcomeCount = 7;
 inline constexpr int kLandingX = 4, kLandingTheta = 5;  ///< their places
 
+/// The outcomes of a prediction that landed.
 template <class S>
 std::array<S, kOutcomeCount> outcomes_of(const ThrowPrediction<S>& p) {
   return {p.detach.time,    p.detach.twist.vx,    p.detach.twist.vz,    p.detach.twist.omega,

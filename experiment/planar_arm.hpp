@@ -68,7 +68,9 @@ class PlanarArmHand final : public release::HandMotion {
   std::vector<double> jumps() const override { return jumps_; }
   double begin() const override { return joints_.begin(); }
   double end() const override { return joints_.end(); }
+  /// The arm's links and shoulder.
   const PlanarArm& arm() const { return arm_; }
+  /// The joints over time [rad].
   const JointPath& joints() const { return joints_; }
 
  private:

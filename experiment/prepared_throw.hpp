@@ -16,27 +16,29 @@ namespace unhand::experiment {
 /// What the log says about the outcome. The twist at detach is that of the flight model fitted to the motion
 /// capture after the normal force has fallen below 3 σ, evaluated at detach.
 struct MeasuredOutcome {
-  std::optional<double> detach_time;  ///< [s]
-  std::optional<dynamics::Pose<double>> detach_pose;
-  std::optional<dynamics::Twist<double>> detach_twist;
-  std::optional<double> landing_x, landing_theta;  ///< m, rad (unwrapped)
+  std::optional<double> detach_time;                    ///< [s]
+  std::optional<dynamics::Pose<double>> detach_pose;    ///< of the CoM; m, m, rad
+  std::optional<dynamics::Twist<double>> detach_twist;  ///< of the CoM; m/s, m/s, rad/s
+  std::optional<double> landing_x, landing_theta;       ///< m, rad (unwrapped)
 };
 
+/// A logged throw, ready to be simulated.
 struct PreparedThrow {
-  std::string id, object, condition;
-  datasets::Split split{};
-  release::PolynomialHand hand;
-  release::HandFitSummary hand_fit;
+  std::string id, object, condition;                        ///< as in the log
+  datasets::Split split{};                                  ///< whether it may be fitted to
+  release::PolynomialHand hand;                             ///< smoothed
+  release::HandFitSummary hand_fit;                         ///< how well it explains the logged hand
   std::optional<contact::SampledNormalForce> normal_force;  ///< of one pad; absent if it was not measured
-  contact::NormalForceSummary force_fit;
-  dynamics::RigidBody<double> body;
-  dynamics::Vec2<double> gravity;
-  double drag_k{};          ///< declared [1/m]
-  double landing_height{};  ///< [m]
-  release::Grasp<double> grasp;
-  double start{};         ///< [s]
-  double open_command{};  ///< when the gripper is told to open [s]
-  MeasuredOutcome measured;
+  contact::NormalForceSummary
+      force_fit;                     ///< how well it explains the logged force; without a force, its defaults
+  dynamics::RigidBody<double> body;  ///< declared; kg, kg m²
+  dynamics::Vec2<double> gravity;    ///< declared [m/s²]
+  double drag_k{};                   ///< declared [1/m]
+  double landing_height{};           ///< [m]
+  release::Grasp<double> grasp;      ///< CoM and angle against the hand
+  double start{};                    ///< [s]
+  double open_command{};             ///< when the gripper is told to open [s]
+  MeasuredOutcome measured;          ///< what the model is to predict
 };
 
 /// Smooths the hand and the normal force, finds the grasp and the measured outcome.

@@ -9,23 +9,25 @@ namespace unhand::experiment {
 
 /// What a stream is for; adding a purpose at the end leaves the others as they were.
 enum class Purpose : std::uint64_t {
-  variation,
-  hand,
-  force_torque,
-  mocap,
-  landing,
-  split,
-  design,
-  effect,
-  validation
+  variation,     ///< what differs from throw to throw
+  hand,          ///< noise of the hand's log
+  force_torque,  ///< noise of the force/torque sensor
+  mocap,         ///< noise and losses of motion capture
+  landing,       ///< noise of the landing's sensor
+  split,         ///< which conditions are trained on
+  design,        ///< a random campaign
+  effect,        ///< a random effect
+  validation     ///< draws of validate_sku
 };
 
 /// A stream of random numbers. splitmix64 (Steele, Lea and Flood 2014), started from a hash of its key.
 class RandomStream {
  public:
+  /// The same three give the same stream.
   RandomStream(std::uint64_t seed, std::uint64_t index, Purpose purpose)
       : state_(mix(mix(mix(seed) ^ (index + 1)) ^ (static_cast<std::uint64_t>(purpose) + 1))) {}
 
+  /// 64 random bits.
   std::uint64_t bits() { return mix(state_ += kGolden); }
   /// In [0, 1), 53 bits.
   double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }

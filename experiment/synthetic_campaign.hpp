@@ -24,7 +24,7 @@ namespace unhand::experiment {
 
 /// A thrown object: held near its tip, its CoM `com_offset` further along its x axis.
 struct ThrownObject {
-  std::string name;
+  std::string name;                  ///< its id in the log
   dynamics::RigidBody<double> body;  ///< kg; kg m² about the CoM
   double com_offset{};               ///< pad centre to CoM [m]
   std::array<double, 3> dims{};      ///< bounding box [m]
@@ -38,7 +38,7 @@ ThrownObject loaded_bar(std::string name, double com_offset);
 
 /// The hand at the switch of its acceleration, one of the campaign's postures.
 struct Posture {
-  std::string name;
+  std::string name;             ///< for names of conditions
   dynamics::Pose<double> hand;  ///< m, m, rad (the pitch)
   double speed{};               ///< of the hand [m/s]
   double elevation{};           ///< of its velocity above +x [rad]
@@ -75,7 +75,7 @@ struct SensorSuite {
 
   /// Which groups are written. Without `wrench` the F/T sensor reads the normal force alone: its wrench is
   /// written as zeros. Without `mocap` the log declares the posture's grasp angle.
-  bool ft{true}, wrench{true}, mocap{true}, landing{true};
+  bool ft{true}, wrench{true}, mocap{true}, landing{true};  ///< whether these are written
 
   /// The same rates and groups without noise and without dropouts.
   SensorSuite perfect() const;
@@ -88,13 +88,13 @@ using ContactFactory = std::function<std::unique_ptr<contact::ContactModel>(
 /// A full factorial campaign, objects × postures × release accelerations × repetitions, and everything that
 /// determines it but the seed. World x forward, z up, angles from +x to +z.
 struct CampaignDesign {
-  std::string name;
-  std::vector<ThrownObject> objects;
-  std::vector<Posture> postures;
+  std::string name;                           ///< for the log's title
+  std::vector<ThrownObject> objects;          ///< factor of the campaign
+  std::vector<Posture> postures;              ///< factor of the campaign
   std::vector<double> release_accelerations;  ///< of the hand along its path after the switch [m/s²]
-  int repetitions{5};
+  int repetitions{5};                         ///< of every condition
 
-  PlanarArm arm;
+  PlanarArm arm;                                                             ///< that carries the hand
   double begin{-0.05}, switch_time{0.020}, follow_through{0.16}, end{0.30};  ///< of the hand's motion [s]
   double launch_acceleration{3.0};  ///< of the hand along its path before the switch [m/s²]
 
@@ -111,8 +111,8 @@ struct CampaignDesign {
   double landing_height{0.0};  ///< [m]
   /// Share of each object's conditions that goes into the training split, whole conditions at a time.
   double train_share{0.5};
-  ThrowVariation variation;
-  SensorSuite sensors;
+  ThrowVariation variation;  ///< from throw to throw
+  SensorSuite sensors;       ///< what is written, and how noisy
   /// What the world or the sensors do and the log does not say: it declares the neutral values.
   EffectSettings effects;
   dynamics::IntegratorOptions integrator{};  ///< of the true release and flight
@@ -127,6 +127,7 @@ struct CampaignDesign {
 /// "random", random_campaign(seed); the others do not depend on the seed. Throws std::invalid_argument,
 /// listing the names, for any other.
 CampaignDesign campaign_design(std::string_view name, std::uint64_t seed = 1);
+/// The names that campaign_design knows.
 std::vector<std::string> campaign_names();
 
 /// A campaign of 48 to 60 throws as a lab might make them: a bar with its CoM 0.10, 0.12 or 0.16 m from the
@@ -138,24 +139,25 @@ CampaignDesign random_campaign(std::uint64_t seed);
 
 /// What the sensors do not tell.
 struct ThrowTruth {
-  ThrowMotion motion;
-  contact::Patch<double> patch;
-  contact::OpeningProfile<double> opening;
-  double grasp_angle{};                  ///< [rad]
-  double grasp_offset{};                 ///< of the pads along the object's −x axis [m]
-  double detach_time{};                  ///< [s]
-  dynamics::Pose<double> detach_pose;    ///< of the CoM; m, m, rad
-  dynamics::Twist<double> detach_twist;  ///< m/s, m/s, rad/s
-  double slip{};                         ///< of the CoM against the pads, in the object, at detach [m]
-  double pivot{};                        ///< change of the angle against the hand, at detach [rad]
-  double landing_time{};                 ///< [s]
-  dynamics::Pose<double> landing_pose;   ///< of the CoM; m, m, rad
-  std::string contact_model;
+  ThrowMotion motion;                       ///< of the hand, as it truly moved
+  contact::Patch<double> patch;             ///< of this throw
+  contact::OpeningProfile<double> opening;  ///< of this throw
+  double grasp_angle{};                     ///< [rad]
+  double grasp_offset{};                    ///< of the pads along the object's −x axis [m]
+  double detach_time{};                     ///< [s]
+  dynamics::Pose<double> detach_pose;       ///< of the CoM; m, m, rad
+  dynamics::Twist<double> detach_twist;     ///< m/s, m/s, rad/s
+  double slip{};                            ///< of the CoM against the pads, in the object, at detach [m]
+  double pivot{};                           ///< change of the angle against the hand, at detach [rad]
+  double landing_time{};                    ///< [s]
+  dynamics::Pose<double> landing_pose;      ///< of the CoM; m, m, rad
+  std::string contact_model;                ///< the law that the throw obeyed
 };
 
+/// A synthetic record and the truth behind it.
 struct SyntheticThrow {
-  datasets::Throw record;
-  ThrowTruth truth;
+  datasets::Throw record;  ///< what the sensors wrote
+  ThrowTruth truth;        ///< what happened
 };
 
 /// The throw number `index` (0-based; repetitions fastest, then accelerations, postures, objects). Each throw

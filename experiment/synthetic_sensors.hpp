@@ -14,12 +14,12 @@ namespace unhand::experiment {
 struct SensedThrow {
   const PlanarArmHand& commanded;            ///< the hand as its controller logs it
   const contact::NormalForce& normal_force;  ///< of one pad, before any lateness
-  const ThrowReader<double>& reader;
-  double start{};                       ///< [s]
-  double landing_time{};                ///< of the tracked frame [s]
-  dynamics::Pose<double> landing_pose;  ///< of the tracked frame; m, m, rad
-  double normal_force_bias{};           ///< [N]
-  double mocap_time_offset{};           ///< [s]
+  const ThrowReader<double>& reader;         ///< what the sensors would see without noise
+  double start{};                            ///< [s]
+  double landing_time{};                     ///< of the tracked frame [s]
+  dynamics::Pose<double> landing_pose;       ///< of the tracked frame; m, m, rad
+  double normal_force_bias{};                ///< [N]
+  double mocap_time_offset{};                ///< [s]
 };
 
 /// Writes the groups that the suite has into `record`. Each sensor draws from its own stream of (seed,

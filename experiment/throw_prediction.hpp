@@ -22,20 +22,22 @@ namespace unhand::experiment {
 ///   force_deviation  of this throw: of its measured normal force, in σ of the smoothing (DoubtfulForce) [-]
 ///   delay_deviation  of this throw, beyond `delay` [s]
 struct ThrowModel {
-  std::string contact_model;
-  int pads{2};
+  std::string contact_model;   ///< a name that contact::make_contact_model knows
+  int pads{2};                 ///< n >= 1: the friction limits are those of all
   double reference_force{20};  ///< f₀ of contact.soft_patch_radius: the campaign's median grip force [N]
-  dynamics::IntegratorOptions integrator{};
+  dynamics::IntegratorOptions integrator{};  ///< of release and flight
 };
 
+/// One throw through a model and its effects, channel by channel.
 template <class S>
 struct ThrowPrediction {
-  release::ReleaseOutcome release{};
-  flight::FlightOutcome flight{flight::FlightOutcome::not_solved};
-  release::DetachState<S> detach;
-  flight::Landing<S> landing;  ///< of the tracked point
-  std::vector<S> channels;     ///< one per observation, in its order and units
-  std::vector<int> modes;      ///< the modes entered, in order
+  release::ReleaseOutcome release{};                                ///< how the release ended
+  flight::FlightOutcome flight{flight::FlightOutcome::not_solved};  ///< how the flight ended
+  release::DetachState<S> detach;                                   ///< the CoM where the pads part
+  flight::Landing<S> landing;                                       ///< of the tracked point
+  std::vector<S> channels;  ///< one per observation, in its order and units
+  std::vector<int> modes;   ///< the modes entered, in order
+  /// Whether release and flight have an answer.
   bool landed() const {
     return release == release::ReleaseOutcome::detached && flight == flight::FlightOutcome::landed;
   }

@@ -22,11 +22,11 @@ std::vector<dynamics::Effect> known_effects();
 /// Everything that effects may change, each folder's part in its own struct.
 template <class S>
 struct ThrowSetup {
-  contact::FrictionVariation<S> friction;
-  release::Lateness<S> late;
-  dynamics::Gravity<S> gravity;
-  flight::Air<S> air;
-  Sensing<S> sensing;
+  contact::FrictionVariation<S> friction;  ///< contact.*
+  release::Lateness<S> late;               ///< release.*
+  dynamics::Gravity<S> gravity;            ///< flight.gravity_tilt
+  flight::Air<S> air;                      ///< flight.*, of the air
+  Sensing<S> sensing;                      ///< sensor.*
 
   /// Reads the values of all effects that `values` names; the others stay neutral.
   explicit ThrowSetup(const dynamics::Values<S>& values);
@@ -51,6 +51,7 @@ class FeltForce {
   /// What comes between sensor and object: release.opening_delay, then contact.adhesion.
   void act(const ThrowSetup<S>& setup);
 
+  /// The force with all that was wrapped around it.
   const contact::NormalForce& operator*() const { return *force_; }
 
  private:
@@ -69,6 +70,7 @@ flight::FlightProblem<S> flight_from(const release::DetachState<S>& detach, cons
 template <class S>
 class ThrowReader {
  public:
+  /// `pads` share the wrench on the object evenly.
   ThrowReader(const release::ReleaseProblem<S>& problem, const release::ReleaseResult<S>& result,
               const flight::FlightProblem<S>& flight, const ThrowSetup<S>& setup, int pads);
 

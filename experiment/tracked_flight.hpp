@@ -35,8 +35,8 @@ struct TrackedFlight {
 /// What a tracker reports of a body in flight, in its own axes and scale.
 template <class S>
 struct TrackedPose {
-  flight::Vec3<S> position{};  ///< as reported [m]
-  flight::Quaternion<S> attitude;
+  flight::Vec3<S> position{};      ///< as reported [m]
+  flight::Quaternion<S> attitude;  ///< body to world, as reported
 };
 
 /// The tracked poses at reported `times` [s] from the start, with the effects that `values` names. Throws as

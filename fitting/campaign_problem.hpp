@@ -30,64 +30,72 @@ struct Unknown {
     scatter,
     smoothing  ///< what the smoothing of an input leaves open: as that says, not learned
   };
-  std::string name, unit;
-  double start{}, low{}, high{};
-  double scale{};  ///< a change of it that matters
+  std::string name, unit;         ///< of the parameter; "-" where it has none
+  double start{}, low{}, high{};  ///< where fits start; accepted range, ends included
+  double scale{};                 ///< a change of it that matters
   /// 1 σ of what is known of it without this log, about `start`.
   std::optional<double> prior_sigma{};
-  Kind kind{Kind::placement};
+  Kind kind{Kind::placement};  ///< of a throw's own unknown
 };
 
+/// Which model, effects and channels a campaign's problem has.
 struct CampaignOptions {
-  std::string model{"limit_surface_disc"};
-  std::vector<std::string> effects;  ///< ids whose parameters are unknowns, too
-  experiment::ObservationOptions observations;
-  dynamics::IntegratorOptions integrator{.tolerances = {1e-6, 1e-9}};
-  int threads{0};
+  std::string model{"limit_surface_disc"};      ///< a name that contact::make_contact_model knows
+  std::vector<std::string> effects;             ///< ids whose parameters are unknowns, too
+  experiment::ObservationOptions observations;  ///< which channels, how far trusted
+  dynamics::IntegratorOptions integrator{.tolerances = {1e-6, 1e-9}};  ///< of release and flight
+  int threads{0};  ///< 0: one per core; the answer does not depend on it
   /// For predictions with parameters from elsewhere: the log need hold no observations, starts are not looked
   /// for, and the campaign's own numbers (ThrowModel) are these if given.
   bool predict_only{false};
-  std::optional<int> pads{};
+  std::optional<int> pads{};                ///< n >= 1
   std::optional<double> reference_force{};  ///< [N]
 };
 
 /// One throw and its observations.
 struct CampaignThrow {
-  experiment::PreparedThrow prepared;
-  experiment::Observations observed;
+  experiment::PreparedThrow prepared;  ///< its inputs
+  experiment::Observations observed;   ///< what was measured
   /// By observation: the phase's boundaries as the log has them [s], for choosing samples.
-  double opening{}, release{};
+  double opening{}, release{};  ///< s; release is NaN where none was measured
   /// The measured release, or a predicted one where there is none.
   double release_or(double predicted) const { return release == release ? release : predicted; }
 };
 
 /// The values that the throws of one object read.
 struct Layout {
-  std::vector<std::string> names;
-  std::vector<int> columns;  ///< where they are: campaign unknowns first, then the throw's own
+  std::vector<std::string> names;  ///< "mu", "contact.viscous.1/v_0", ...
+  std::vector<int> columns;        ///< where they are: campaign unknowns first, then the throw's own
 };
 
 /// r = (predicted − observed)/σ, and its derivatives with respect to the campaign's unknowns and the throw's
 /// own.
 struct Linearisation {
-  bool solved{};
-  Eigen::VectorXd residual;
-  Eigen::MatrixXd campaign, own;
-  std::vector<int> modes;
-  double detach{};  ///< [s]
+  bool solved{};                  ///< false: release or flight has no answer, and what follows is empty
+  Eigen::VectorXd residual;       ///< one per observation [σ]
+  Eigen::MatrixXd campaign, own;  ///< derivatives of the residual: a row each, a column per unknown
+  std::vector<int> modes;         ///< the modes entered, in order
+  double detach{};                ///< [s]
 };
 
+/// A campaign with a model: unknowns, residuals and their derivatives.
 class CampaignProblem {
  public:
   /// Prepares every throw, on several threads. Throws datasets::LogError for throws that lack what a release
   /// needs, std::invalid_argument for an unknown model or effect, or a log without any observation.
   CampaignProblem(const datasets::ThrowLog& log, const std::string& file, const CampaignOptions& options);
 
+  /// In the order of the log.
   const std::vector<CampaignThrow>& throws() const { return *throws_; }
+  /// The unknowns that all throws share.
   const std::vector<Unknown>& campaign() const { return campaign_; }
+  /// The unknowns that every throw has for itself; their values are one list per throw.
   const std::vector<Unknown>& own() const { return own_; }
+  /// What predictions are made with.
   const experiment::ThrowModel& model() const { return model_; }
+  /// As they were given.
   const CampaignOptions& options() const { return options_; }
+  /// What was left out of the log, and why.
   const std::vector<std::string>& notes() const { return notes_; }
 
   /// The same throws (shared, not copied) with other effects, or another contact model.
@@ -124,6 +132,7 @@ class CampaignProblem {
   /// its derivatives are by (campaign first, then own), until it returns false.
   using UseOfDuals =
       std::function<bool(const experiment::ThrowPrediction<dynamics::Dual>&, std::span<const int> unknowns)>;
+  /// Calls `use` for one sweep of derivatives after the other.
   void differentiate(const experiment::PreparedThrow& prepared, const experiment::Observations& observed,
                      std::span<const double> campaign, std::span<const double> own,
                      const UseOfDuals& use) const;

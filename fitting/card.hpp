@@ -12,8 +12,8 @@ namespace unhand::fitting {
 
 /// A condition of a throw that a card's valid range speaks of.
 struct Condition {
-  std::string name, unit;
-  double value{};
+  std::string name, unit;  ///< as in the card's valid range
+  double value{};          ///< in `unit`
 };
 
 /// As far as they are known of a throw:

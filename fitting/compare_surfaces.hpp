@@ -9,6 +9,7 @@
 
 namespace unhand::fitting {
 
+/// How identified surfaces are cross-validated.
 struct SurfaceComparisonOptions {
   int folds = 5;               ///< >= 2; slip number n is left out in fold n % folds
   int null_draws = 4;          ///< simulated data sets of the null control; 0: none
@@ -17,17 +18,19 @@ struct SurfaceComparisonOptions {
   std::function<void()> step;  ///< called after each of surface_comparison_steps, from any thread
 };
 
+/// Errors of one model on one surface.
 struct SurfaceScore {
-  SurfaceModel model{};
-  SurfaceFit fit;  ///< to all slips
+  SurfaceModel model{};  ///< which family
+  SurfaceFit fit;        ///< to all slips
   /// Of the cross-validation, the null control included: the first fit that failed, or fitted.
   SurfaceOutcome outcome{SurfaceOutcome::not_converged};
-  std::string reason;
-  std::vector<double> errors_deg;  ///< per sample, predicted by the fold that left its slip out
-  double mean_deg{}, median_deg{};
+  std::string reason;               ///< why the outcome is none, in words
+  std::vector<double> errors_deg;   ///< per sample, predicted by the fold that left its slip out
+  double mean_deg{}, median_deg{};  ///< of the errors
   /// The same mean on data simulated from the surface's fitted axis-aligned ellipsoid, a member of every
   /// family: what a model loses to noise alone. Mean over the draws.
   double null_control_deg{};
+  /// Whether there are errors to speak of.
   bool scored() const { return outcome == SurfaceOutcome::fitted; }
 };
 
@@ -42,6 +45,7 @@ struct SurfaceScore {
 std::vector<std::vector<SurfaceScore>> compare_surfaces(const std::vector<SlipSamples>& surfaces,
                                                         const std::vector<SurfaceModel>& models,
                                                         const SurfaceComparisonOptions& options = {});
+/// How many calls of `step` a comparison makes.
 std::size_t surface_comparison_steps(std::size_t surfaces, std::size_t models,
                                      const SurfaceComparisonOptions& options);
 

@@ -13,32 +13,41 @@
 
 namespace unhand::fitting {
 
+/// What the loop may try, and what convinces it.
 struct DiscoverOptions {
-  CampaignOptions campaign;
-  FitOptions fit;
+  CampaignOptions campaign;  ///< model to begin with, and channels
+  FitOptions fit;            ///< how every fit runs
   /// An effect matters if, on held-out throws, it takes at least this much off the χ² per sample of some
   /// channel of the motion in some phase (1 is the noise), and a tenth of the misfit there.
   double matters{0.5};
   /// The same for the wrench channels, whose misfit must also have been so many times the noise: near the end
   /// of a release a patch slips in parts, and no law of the catalogue follows its torque better.
-  double wrench_matters{1}, wrench_misfit{3};
-  double law_matters{0.005};          ///< another contact law: share of the held-out χ² as a whole
-  double false_discovery_rate{0.02};  ///< shared among the effects that were tried
-  double equivalent{0.98};            ///< footprints that correlate by this much are one answer
-  int refits{4};                      ///< candidates that are fitted in full, in every step
-  int most_effects{3};
+  double wrench_matters{1}, wrench_misfit{3};  ///< as above [χ² per sample]; times the noise
+  double law_matters{0.005};                   ///< another contact law: share of the held-out χ² as a whole
+  double false_discovery_rate{0.02};           ///< shared among the effects that were tried
+  double equivalent{0.98};                     ///< footprints that correlate by this much are one answer
+  int refits{4};                               ///< candidates that are fitted in full, in every step
+  int most_effects{3};                         ///< accepted in all
   double unexplained{1.5};  ///< χ² per sample of a channel in a phase from which on something is missing
   std::vector<std::string> forget;  ///< effects that are not in the catalogue today
-  std::vector<std::string> laws{"limit_surface", "limit_surface_disc", "limit_surface_quartic",
+  std::vector<std::string> laws{"limit_surface", "limit_surface_disc",
+                                "limit_surface_quartic",  ///< contact laws that are tried
                                 "sliding_pivot"};
 };
 
-enum class Verdict { effect_found, no_missing_effect, unexplained, not_answered };
+/// What the loop says of a log.
+enum class Verdict {
+  effect_found,       ///< an effect, or another law, explains what was missing
+  no_missing_effect,  ///< nothing is missing beyond noise
+  unexplained,        ///< something is missing, and no effect of the catalogue is it
+  not_answered,       ///< the log does not determine a fit
+};
+/// The verdict's name, as it is written above.
 const char* to_string(Verdict);
 
 /// Errors of the outcome, predicted before the throw (own unknowns from the grasp alone) minus measured.
 struct OutcomeErrors {
-  int n{};
+  int n{};                     ///< throws
   double landing_x_mae{};      ///< [m]
   double landing_theta_mae{};  ///< [deg]
   double detach_vx_mae{};      ///< [m/s]
@@ -47,91 +56,100 @@ struct OutcomeErrors {
   double chi2_per_dof{};       ///< with the throws' own unknowns fitted
 };
 
+/// A parameter of an accepted effect.
 struct Parameter {
-  std::string name, unit;
-  double value{}, sigma{};
+  std::string name, unit;   ///< "id.parameter", with "[object]" for effects that every object has its own of
+  double value{}, sigma{};  ///< in `unit`; 1 σ
 };
 
 /// An experiment that would tell an accepted effect from another name of its footprint.
 struct SeparatingExperiment {
-  std::string from;  ///< the other name
-  std::string what;  ///< to do, in words
-  double before{},
-      after{};  ///< correlation of the footprints: in this log, and with the experiment added to it
+  std::string from;          ///< the other name
+  std::string what;          ///< to do, in words
+  double before{}, after{};  ///< correlation of the footprints: in this log; with the experiment's throws
 };
 
+/// An effect that the data made believable.
 struct AcceptedEffect {
-  std::string id;
+  std::string id;                                          ///< of the effect, or "contact.law"
   std::vector<std::pair<std::string, double>> equivalent;  ///< ids, with the correlation of the footprints
   std::vector<SeparatingExperiment> separating;            ///< the most telling first, for each other name
-  std::vector<Parameter> parameters;
-  double delta_bic{}, p_value{}, test_error_ratio{};
-  std::string why;  ///< where the held-out misfit fell, in words
-  Phase phase{};    ///< where it fell most
+  std::vector<Parameter> parameters;                       ///< as fitted
+  double delta_bic{};         ///< of the model with it against without: negative speaks for it
+  double p_value{};           ///< of its absence
+  double test_error_ratio{};  ///< held-out error with it over without [-]
+  std::string why;            ///< where the held-out misfit fell, in words
+  Phase phase{};              ///< where it fell most
 };
 
 /// One candidate, as it was scored in the step in which it came nearest to being accepted.
 struct Ranked {
-  std::string id;
-  double gain{};      ///< of χ², to first order
-  double p_value{1};  ///< of the gain, in units of what is left unexplained
-  double correlation_with_best{};
-  bool visible{true};
-  bool refitted{false};
-  double delta_bic{};
-  double held_out_gain{};  ///< largest fall of χ² per sample in a channel and phase
+  std::string id;                  ///< of the effect, or "contact.law:MODEL"
+  double gain{};                   ///< of χ², to first order
+  double p_value{1};               ///< of the gain, in units of what is left unexplained
+  double correlation_with_best{};  ///< of the footprints
+  bool visible{true};              ///< something of its footprint is left beside the fitted unknowns
+  bool refitted{false};            ///< it was fitted in full
+  double delta_bic{};              ///< negative: for the effect; of the refit
+  double held_out_gain{};          ///< largest fall of χ² per sample in a channel and phase
 };
 
 /// How a prediction may use what is estimated to be missing.
-enum class Correction { withheld, curve, candidate };
+enum class Correction {
+  withheld,   ///< none: it does not lower the held-out error
+  curve,      ///< the curve over time
+  candidate,  ///< the physical terms
+};
 
 /// What is missing, without a form assumed: an acceleration in flight over the time since the detach [m/s²,
 /// m/s², rad/s²], or a pad's wrench in the hand's frame over the share of the opening that has passed [N, N,
 /// N m].
 struct MissingEstimate {
-  Phase phase{};
+  Phase phase{};                                    ///< in flight, or during the release
   std::vector<std::pair<std::string, int>> groups;  ///< objects, and the group of their curve
-  std::vector<MissingCurve> curves;
-  MissingCandidate candidate;
+  std::vector<MissingCurve> curves;                 ///< one per group
+  MissingCandidate candidate;                       ///< physical terms that follow the curves
   /// What lowers the held-out error, if anything: else it is withheld.
-  Correction correction{};
+  Correction correction{};               ///< what is used
   double error_before{}, error_after{};  ///< rms, of the flight where it was seen, else of the landing
   std::string error_unit;                ///< "m", or "sigma" of the landing
 };
 
+/// Structure that no effect of the catalogue accounts for.
 struct Unexplained {
-  Phase phase{};
-  experiment::Channel channel{};
-  double chi2_per_dof{};
-  std::string description;
-  std::optional<MissingEstimate> missing;
+  Phase phase{};                           ///< where it is largest
+  experiment::Channel channel{};           ///< of which sensor
+  double chi2_per_dof{};                   ///< on held-out throws; 1 is the noise
+  std::string description;                 ///< in words
+  std::optional<MissingEstimate> missing;  ///< absent where no force can be read from it
 };
 
 /// Where the residual first leaves the noise.
 struct FirstMisfit {
-  bool any{false};
-  Phase phase{};
-  experiment::Channel channel{};
-  double chi2_per_sample{};
+  bool any{false};                ///< false: it stays in the noise
+  Phase phase{};                  ///< of the throw
+  experiment::Channel channel{};  ///< of which sensor
+  double chi2_per_sample{};       ///< 1 is the noise
 };
 
+/// The loop's answer.
 struct Discovery {
-  Verdict verdict{};
-  std::string message;
-  std::vector<AcceptedEffect> effects;
+  Verdict verdict{};                    ///< found, nothing missing, unexplained, or no answer
+  std::string message;                  ///< the answer in words
+  std::vector<AcceptedEffect> effects;  ///< in order of acceptance
   std::vector<std::string> imitations;  ///< accepted at first, and withdrawn since too much was left
   std::vector<std::string> along;       ///< effects that are fitted along as nuisances, too small to matter
-  std::optional<Unexplained> unexplained;
-  FirstMisfit first;
-  OutcomeErrors before_train, before_test, after_train, after_test;
-  std::vector<Ranked> ranking;  ///< best first
-  FitResult base, final;
-  std::vector<ChannelMisfit> base_test, final_test;  ///< misfit on held-out throws
-  std::string model;                                 ///< of the answer (contact.law changes it)
-  std::vector<ResidualBin> residual_before, residual_after;
+  std::optional<Unexplained> unexplained;                            ///< what is left, if anything
+  FirstMisfit first;                                                 ///< of the base model
+  OutcomeErrors before_train, before_test, after_train, after_test;  ///< base model; the answer
+  std::vector<Ranked> ranking;                                       ///< best first
+  FitResult base, final;  ///< of the train throws: by the base model and by the answer
+  std::vector<ChannelMisfit> base_test, final_test;          ///< misfit on held-out throws
+  std::string model;                                         ///< of the answer (contact.law changes it)
+  std::vector<ResidualBin> residual_before, residual_after;  ///< of the train throws
   std::vector<ChannelStructure> structure_before, structure_after;  ///< of the train throws
   std::shared_ptr<const CampaignProblem> problem;                   ///< of the answer
-  double seconds{};
+  double seconds{};                                                 ///< of the whole loop
 };
 
 /// Runs the loop. A log without a test split is split by condition, every other one of an object held out.

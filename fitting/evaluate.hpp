@@ -11,10 +11,11 @@ namespace unhand::fitting {
 
 /// 1 σ of a prediction, SI units.
 struct OutcomeSigma {
-  double detach_time{}, detach_vx{}, detach_vz{}, detach_omega{};
-  double landing_x{}, landing_theta{}, flight_time{};
+  double detach_time{}, detach_vx{}, detach_vz{}, detach_omega{};  ///< s, m/s, m/s, rad/s
+  double landing_x{}, landing_theta{}, flight_time{};              ///< m, rad, s
 };
 
+/// A throw predicted by a fit, with its uncertainty.
 struct PredictedThrow {
   experiment::ThrowComparison comparison;  ///< the prediction, and its errors where something was measured
   std::optional<OutcomeSigma> sigma;       ///< absent where the throw does not land
@@ -22,9 +23,10 @@ struct PredictedThrow {
   double seconds{};                        ///< of one simulation of release and flight
 };
 
+/// Whether uncertainty is wanted, and threads.
 struct EvaluateOptions {
-  bool uncertainty{true};
-  int threads{0};
+  bool uncertainty{true};  ///< else sigma is absent
+  int threads{0};          ///< 0: one per core; the answer does not depend on it
 };
 
 /// Predicts throws of `problem` with a fit of the same unknowns; all, or those listed.
@@ -45,6 +47,7 @@ struct EvaluateOptions {
 /// four samples there, the measured twist is used as experiment::compare does.
 std::vector<PredictedThrow> predict_throws(const CampaignProblem& problem, const FitResult& fit,
                                            const EvaluateOptions& options = {});
+/// The same for the throws at these places only.
 std::vector<PredictedThrow> predict_some(const CampaignProblem& problem, const FitResult& fit,
                                          const std::vector<std::size_t>& which,
                                          const EvaluateOptions& options = {});
@@ -53,10 +56,12 @@ std::vector<PredictedThrow> predict_some(const CampaignProblem& problem, const F
 experiment::ModelComparison comparison_of(const CampaignProblem& problem, const FitResult& fit,
                                           const std::vector<PredictedThrow>& throws);
 
+/// Predictions by fits that have not seen their conditions.
 struct CrossValidation {
-  int folds{};
+  int folds{};                         ///< made
   std::vector<PredictedThrow> throws;  ///< each predicted by a fit that has not seen its condition
   std::vector<std::string> failed;     ///< folds without an answer, and why
+  /// Over all throws predicted; `quantity` is a place in experiment::kQuantities.
   experiment::ErrorStatistics statistics(int quantity) const;
 };
 

@@ -41,12 +41,13 @@ std::vector<dynamics::Effect> known_fall_effects();
 
 /// Errors over the falls of a split: what is left of the reading, and where one is after integrating it.
 struct FallErrors {
-  int n{};
+  int n{};                      ///< falls
   double specific_force_rms{};  ///< of the vector [m/s²]
   double end_speed_mae{};       ///< |∫ residual dt| at the end of the fall [m/s]
   double end_position_mae{};    ///< |∬ residual dt²| [m]
-  double chi2_per_dof{};
+  double chi2_per_dof{};        ///< 1 is the noise
 };
+/// The errors over the falls that `fit` used.
 FallErrors fall_errors(const FallProblem& problem, const GroupedFit& fit);
 
 }  // namespace unhand::fitting

@@ -14,14 +14,25 @@
 namespace unhand::fitting {
 
 /// The part of a throw that an observation belongs to.
-enum class Phase { grasped, release, flight, landing };
+enum class Phase {
+  grasped,  ///< until the gripper opens
+  release,  ///< from then until detach
+  flight,   ///< from detach on
+  landing,  ///< channels of the landing
+};
+/// How many phases there are.
 inline constexpr int kPhaseCount = 4;
+/// The phase's name, as it is written above.
 std::string_view to_string(Phase);
 /// By the channel, and by the time between the opening and the detach.
 Phase phase_of(const experiment::Observation& observation, double opening, double release);
 
 /// Which throws take part.
-enum class Share { train, test, all };
+enum class Share {
+  train,  ///< those of the train split
+  test,   ///< those of the test split
+  all,    ///< both
+};
 
 /// What a channel that the model cannot follow counts for.
 enum class Weigh {
@@ -33,35 +44,44 @@ enum class Weigh {
   variances
 };
 
+/// How a fit runs.
 struct FitOptions {
-  Share share{Share::train};
-  int iterations{25};  ///< of the solver, in every round
+  Share share{Share::train};  ///< of the log that is fitted to
+  int iterations{25};         ///< of the solver, in every round
   /// Rounds in which the spread of the throws' own unknowns is learned, and the weight of every channel in
   /// every phase (and quarter of the release): where the model cannot follow, it counts for what it knows.
   int rounds{4};
-  Weigh weigh{Weigh::witnesses};
-  double sample_limit{5};  ///< residuals beyond this many σ count linearly [-]
-  double throw_limit{3};   ///< a throw whose χ² exceeds this many medians counts less [-]
-  double accuracy{1e-6};   ///< relative change of the cost at which a round ends
-  int threads{0};
-  std::vector<double> start;  ///< of the campaign's unknowns; empty: the problem's
+  Weigh weigh{Weigh::witnesses};  ///< of channels that the model cannot follow
+  double sample_limit{5};         ///< residuals beyond this many σ count linearly [-]
+  double throw_limit{3};          ///< a throw whose χ² exceeds this many medians counts less [-]
+  double accuracy{1e-6};          ///< relative change of the cost at which a round ends
+  int threads{0};                 ///< 0: one per core; the answer does not depend on it
+  std::vector<double> start;      ///< of the campaign's unknowns; empty: the problem's
   /// Campaign unknowns that keep their start, by name; `all_fixed` for every one.
   std::vector<std::string> fixed;
-  bool all_fixed{false};
+  bool all_fixed{false};           ///< nothing of the campaign is fitted, only the throws' own unknowns
   std::vector<double> own_spread;  ///< 1 σ of the throws' own unknowns, if it is known; empty: learned
   /// Whether unknowns whose cost may not be a parabola are given the interval of their profile.
   bool profile{false};
 };
 
-enum class FitOutcome { converged, iterations_spent, no_start, not_solved };
+/// How a fit ended.
+enum class FitOutcome {
+  converged,         ///< within `accuracy`
+  iterations_spent,  ///< an answer, but short of `accuracy`
+  no_start,          ///< no throw can be simulated at the start
+  not_solved,        ///< the solver failed
+};
+/// The outcome's name, as it is written above.
 const char* to_string(FitOutcome);
 
+/// An unknown's value and how sure it is.
 struct FittedUnknown {
-  Unknown unknown;
-  double value{};
-  double sigma{};       ///< 1 σ, from the scatter between throws (see covariance)
-  double data_sigma{};  ///< 1 σ without the prior; infinite where the log does not determine it
-  bool at_bound{};
+  Unknown unknown;              ///< name, unit, range
+  double value{};               ///< in the unknown's unit
+  double sigma{};               ///< 1 σ, from the scatter between throws (see covariance)
+  double data_sigma{};          ///< 1 σ without the prior; infinite where the log does not determine it
+  bool at_bound{};              ///< the value is at an end of its range: sigma says little
   double degrees_of_freedom{};  ///< of sigma: it comes from the scatter between throws
   /// The 95 % interval of the profile, where it departs from value ± t sigma: there, with everything else
   /// fitted again, the cost has risen by as much as it would at ± t sigma if it were a parabola. An end
@@ -80,47 +100,53 @@ struct OpenDirection {
 
 /// χ² of one channel in one phase.
 struct ChannelMisfit {
-  experiment::Channel channel{};
-  Phase phase{};
-  int n{};
-  double chi2{};
+  experiment::Channel channel{};  ///< of which sensor
+  Phase phase{};                  ///< of the throw
+  int n{};                        ///< samples
+  double chi2{};                  ///< of the residuals, not weighted
   double weight{1};  ///< factor on its residuals in the fit (of the release's quarters, the root mean square)
+  /// 1 where the model explains the channel to its noise.
   double chi2_per_sample() const { return n > 0 ? chi2 / n : 0; }
 };
 
+/// One throw's part in a fit.
 struct ThrowFit {
-  std::string id;
-  bool used{};
-  bool solved{};
-  double weight{1};  ///< below 1: an outlier that counts less
-  double chi2{};
+  std::string id;           ///< as in the log
+  bool used{};              ///< of the share that is fitted to, with observations
+  bool solved{};            ///< it can be simulated at the answer
+  double weight{1};         ///< below 1: an outlier that counts less
+  double chi2{};            ///< of its observations, not weighted
   std::vector<double> own;  ///< its own unknowns
-  std::vector<int> modes;
+  std::vector<int> modes;   ///< the modes entered, in order
 };
 
+/// A fit: values, covariance, what is open, misfit by channel.
 struct FitResult {
-  FitOutcome outcome{};
-  std::string message;
-  std::vector<FittedUnknown> campaign;
+  FitOutcome outcome{};                 ///< only `converged` and `iterations_spent` are answers
+  std::string message;                  ///< in words
+  std::vector<FittedUnknown> campaign;  ///< in the problem's order
   /// Covariance of the campaign's unknowns, row by row. H⁻¹ G H⁻¹ with H the Gauss-Newton matrix after the
   /// throws' own unknowns are eliminated and G the scatter of the throws' gradients, each enlarged by what
   /// the fit has taken out of it [BellMcCaffrey2002]: it holds when the noise within a throw is correlated or
   /// the law is not quite right. Not below H⁻¹.
   std::vector<double> covariance;
-  std::vector<double> own_spread;  ///< learned 1 σ of the throws' own unknowns
-  std::vector<OpenDirection> open;
-  std::vector<ThrowFit> throws;
-  std::vector<ChannelMisfit> misfit;  ///< of the throws used
-  std::vector<double> group_weight;   ///< factor on the residuals of every group_of(part, channel)
-  double chi2{};
-  long samples{}, degrees_of_freedom{};
-  int iterations{},
-      mode_changes{};  ///< throws whose modes differ between the start and the end of the last round
+  std::vector<double> own_spread;        ///< learned 1 σ of the throws' own unknowns
+  std::vector<OpenDirection> open;       ///< directions without an answer
+  std::vector<ThrowFit> throws;          ///< in the order of the log
+  std::vector<ChannelMisfit> misfit;     ///< of the throws used
+  std::vector<double> group_weight;      ///< factor on the residuals of every group_of(part, channel)
+  double chi2{};                         ///< of the throws used, not weighted
+  long samples{}, degrees_of_freedom{};  ///< observations used; those minus unknowns
+  int iterations{};                      ///< of the solver, over all rounds
+  int mode_changes{};  ///< throws whose modes differ between the start and the end of the last round
   double seconds{}, jacobian_seconds{};  ///< the second summed over threads
+  /// 1 where the model explains everything to its noise.
   double chi2_per_dof() const {
     return degrees_of_freedom > 0 ? chi2 / static_cast<double>(degrees_of_freedom) : 0;
   }
+  /// Of the campaign's unknowns, in their order and units.
   std::vector<double> values() const;
+  /// Of unknowns i and j, −1 … 1; 0 where either is not determined.
   double correlation(std::size_t i, std::size_t j) const;
 };
 

@@ -22,6 +22,7 @@ class FlightProblem final : public GroupedProblem {
 
   /// 1 σ of a row's channel, in m or rad.
   double sigma(std::size_t group, int channel) const;
+  /// Whether the flight's orientation was tracked.
   bool oriented(std::size_t group) const { return !flights_[group].samples.attitude.empty(); }
 
  private:
@@ -38,12 +39,13 @@ class FlightProblem final : public GroupedProblem {
 /// Errors of the flights of a split: `fit` holds the shared parameters and the own unknowns of whole flights;
 /// predictions at the end have the start fitted to the first half of the time.
 struct FlightErrors {
-  int n{};
+  int n{};                                                 ///< flights
   double trajectory_rms{};                                 ///< [m]
   double end_position_mae{}, end_position_median{};        ///< [m]
   double end_orientation_mae{}, end_orientation_median{};  ///< [deg]; 0 where orientation was not tracked
-  double chi2_per_dof{};
+  double chi2_per_dof{};                                   ///< 1 is the noise
 };
+/// The errors over the flights that `fit` used.
 FlightErrors flight_errors(const FlightProblem& problem, const GroupedFit& fit, int threads);
 
 }  // namespace unhand::fitting

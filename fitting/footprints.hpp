@@ -18,17 +18,18 @@ using experiment::without_object;
 struct Candidate {
   std::string id;                       ///< of the effect, or "contact.law:MODEL"
   std::vector<std::string> parameters;  ///< one per column
-  std::vector<std::size_t> columns;
+  std::vector<std::size_t> columns;     ///< of the Gram matrix
   std::map<std::string, double> shape;  ///< the shape parameters' values that this candidate was taken at
 };
 
 /// Inner products, over all throws used, of whitened columns: the model's unknowns, the candidates', and last
 /// the residual. The throws' own unknowns are projected out of all of them, with their priors.
 struct Footprints {
-  std::vector<Candidate> candidates;
-  std::size_t fitted{};  ///< the first columns: the unknowns of the model
-  Eigen::MatrixXd gram;
-  double samples{};  ///< that the inner products run over
+  std::vector<Candidate> candidates;  ///< in no order of merit
+  std::size_t fitted{};               ///< the first columns: the unknowns of the model
+  Eigen::MatrixXd gram;               ///< inner products [-]
+  double samples{};                   ///< that the inner products run over
+  /// The column of the residual.
   std::size_t residual() const { return static_cast<std::size_t>(gram.rows()) - 1; }
 };
 
@@ -37,8 +38,9 @@ struct Footprints {
 Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
                       const std::vector<std::string>& ids, const std::vector<std::string>& laws, int threads);
 
+/// What an effect would take off χ², to first order.
 struct Score {
-  std::size_t candidate{};
+  std::size_t candidate{};   ///< its place among the candidates
   double gain{};             ///< the χ² that it would take away, to first order
   std::vector<double> step;  ///< its parameters' values at that gain, from neutral
   bool visible{true};        ///< false: no footprint is left once the fitted unknowns are projected out

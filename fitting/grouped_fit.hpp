@@ -9,12 +9,12 @@ namespace unhand::fitting {
 
 /// Budget and robustness of a fit.
 struct GroupedFitOptions {
-  int iterations{20};
+  int iterations{20};  ///< of the solver
   /// Samples beyond this many times the scatter of their channel count linearly, and so do groups whose χ²
   /// per sample exceeds `group_limit` medians.
-  double sample_limit{6}, group_limit{3};
-  bool robust{true};
-  int threads{0};
+  double sample_limit{6}, group_limit{3};  ///< in scatters; in medians
+  bool robust{true};                       ///< else all samples count alike
+  int threads{0};                          ///< 0: one per core; the answer does not depend on it
 };
 
 /// What a row and a group count for; learned from a fit.
@@ -25,31 +25,34 @@ struct GroupedWeights {
 
 /// One group at the solution: its own unknowns and its whitened residual.
 struct GroupFit {
-  bool used{}, solved{};
-  Eigen::VectorXd own, residual;
-  double chi2{};  ///< of the measurements, not robust
-  int n{};        ///< measurements
+  bool used{}, solved{};          ///< took part; has equations at the answer
+  Eigen::VectorXd own, residual;  ///< own unknowns; (predicted − measured)/σ by row
+  double chi2{};                  ///< of the measurements, not robust
+  int n{};                        ///< measurements
 };
 
 /// The shared parameters with their covariance, and every group's fit. Not converging is an outcome.
 struct GroupedFit {
-  bool solved{};
-  std::string message;
-  std::vector<SharedParameter> shared;
-  Eigen::VectorXd values;
+  bool solved{};                        ///< false: `message` says why
+  std::string message;                  ///< in words
+  std::vector<SharedParameter> shared;  ///< the parameters
+  Eigen::VectorXd values;               ///< theirs, in their order
   /// A⁻¹ B A⁻¹ n/(n − p): A the information with the groups' own unknowns eliminated, B the scatter of the
   /// groups' scores (the infinitesimal jackknife over groups). It holds when the noise within a group is
   /// correlated and when the model is not quite right. Not below A⁻¹.
   Eigen::MatrixXd covariance;
-  std::vector<GroupFit> groups;
-  GroupedWeights weights;
-  double chi2{};
-  long samples{}, degrees_of_freedom{};
-  int used{}, iterations{};
+  std::vector<GroupFit> groups;          ///< one per group of the problem
+  GroupedWeights weights;                ///< as at the answer
+  double chi2{};                         ///< of the groups used, not robust
+  long samples{}, degrees_of_freedom{};  ///< measurements; those minus unknowns
+  int used{}, iterations{};              ///< groups
+  /// Of the shared parameters.
   std::vector<std::string> names() const;
+  /// 1 σ of shared parameter k; from the covariance.
   double sigma(std::size_t k) const {
     return std::sqrt(covariance(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(k)));
   }
+  /// 1 where the model explains everything to its noise.
   double chi2_per_dof() const {
     return degrees_of_freedom > 0 ? chi2 / static_cast<double>(degrees_of_freedom) : 0;
   }
@@ -71,21 +74,24 @@ GroupFit fit_own_part(const GroupedProblem& problem, std::size_t group, const Gr
 /// Weighted equations with the own unknowns projected out of every column: F̃ = F − O (OᵀO)⁺ Oᵀ F. Returns the
 /// factor on rows, too.
 struct ProjectedEquations {
-  bool solved{};
+  bool solved{};              ///< false: the equations are not finite
   Eigen::MatrixXd columns;    ///< shared, then the residual last
   Eigen::MatrixXd own_basis;  ///< orthonormal, of what the own unknowns can do
 };
+/// The projected equations of one group at these values.
 ProjectedEquations projected(const GroupedProblem& problem, std::size_t group,
                              std::span<const std::string> names, std::span<const double> values,
                              const Eigen::VectorXd& own, const GroupedWeights& weights, double sample_limit);
 
 /// χ² per sample of a channel over the groups used.
 struct GroupedMisfit {
-  std::string channel;
-  int n{};
-  double chi2{};
+  std::string channel;  ///< which
+  int n{};              ///< measurements
+  double chi2{};        ///< not robust
+  /// 1 where the model explains the channel to its noise.
   double chi2_per_sample() const { return n > 0 ? chi2 / n : 0; }
 };
+/// By channel.
 std::vector<GroupedMisfit> misfit(const GroupedProblem& problem, const GroupedFit& fit);
 
 }  // namespace unhand::fitting

@@ -24,10 +24,10 @@ struct GroupRow {
 
 /// Measurements that share unknowns of their own: a flight, a fall.
 struct Group {
-  std::string id, object, condition;
-  datasets::Split split{};
-  std::vector<GroupRow> rows;
-  std::vector<double> start;  ///< of its own unknowns
+  std::string id, object, condition;  ///< as in the log
+  datasets::Split split{};            ///< whether it may be fitted to
+  std::vector<GroupRow> rows;         ///< its measurements, and what is known beforehand
+  std::vector<double> start;          ///< of its own unknowns
   /// What the group is like, for asking whether an answer depends on it: one value per covariate of the
   /// problem.
   std::vector<double> covariates;
@@ -35,17 +35,20 @@ struct Group {
 
 /// (predicted − measured)/σ of a group, by row, with derivatives where they were asked for.
 struct GroupEquations {
-  bool solved{};
-  Eigen::VectorXd residual;
-  Eigen::MatrixXd shared, own;
+  bool solved{};                ///< false: they are not finite
+  Eigen::VectorXd residual;     ///< one per row [σ]
+  Eigen::MatrixXd shared, own;  ///< derivatives: a row each, a column per unknown
 };
 
 /// Groups of measurements under one model: unknowns that all groups share, and some of each group's own.
 class GroupedProblem {
  public:
   virtual ~GroupedProblem() = default;
+  /// In the order of the log.
   const std::vector<Group>& groups() const { return groups_; }
+  /// Names of the measured channels.
   const std::vector<std::string>& channels() const { return channels_; }
+  /// Names of what groups are described by.
   const std::vector<std::string>& covariates() const { return covariates_; }
   /// Groups that were left out, with the reason.
   const std::vector<std::pair<std::string, std::string>>& skipped() const { return skipped_; }
@@ -59,16 +62,16 @@ class GroupedProblem {
                                    bool derivatives) const = 0;
 
  protected:
-  std::vector<Group> groups_;
-  std::vector<std::string> channels_, covariates_;
-  std::vector<std::pair<std::string, std::string>> skipped_;
+  std::vector<Group> groups_;                                 ///< filled by the problem's constructor
+  std::vector<std::string> channels_, covariates_;            ///< likewise
+  std::vector<std::pair<std::string, std::string>> skipped_;  ///< id and reason
 };
 
 /// A parameter that groups share.
 struct SharedParameter {
   std::string name, effect, short_name, unit;  ///< short_name: without the effect's id
-  double neutral{}, low{}, high{}, typical{};
-  bool shape{};
+  double neutral{}, low{}, high{}, typical{};  ///< without effect; accepted range; a step that matters
+  bool shape{};  ///< it only shapes an effect that another parameter switches on
 };
 /// An effect's parameters over these objects.
 std::vector<SharedParameter> shared_parameters(const dynamics::Effect& effect,
@@ -80,9 +83,11 @@ std::vector<datasets::Split> splits_of(const datasets::ThrowLog& log);
 /// The shared values as a group of one object reads them: names without brackets, and the position of each
 /// in the list it came from; those of other objects are left out.
 struct OwnNames {
-  std::vector<std::string> names;
-  std::vector<std::size_t> from;
+  std::vector<std::string> names;  ///< without brackets
+  std::vector<std::size_t> from;   ///< their places in the whole list
+  /// Of all shared names, those that a group of `object` reads.
   OwnNames(std::span<const std::string> all, const std::string& object);
+  /// The values of `names`.
   std::vector<double> values(std::span<const double> all) const;
   /// Derivatives for `names` become derivatives for the whole list.
   void spread(GroupEquations& equations, std::size_t all) const;

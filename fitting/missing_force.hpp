@@ -14,18 +14,18 @@ namespace unhand::fitting {
 struct ResidualTrace {
   int group{};               ///< recordings of a group share what is missing: an object, say
   std::vector<double> time;  ///< increasing [s]
-  std::array<std::vector<double>, 3> residual;
+  std::array<std::vector<double>, 3> residual;  ///< x, z, θ: m, m, rad, or N, N, N m
   /// The predicted motion at a sample, and the normal force of a pad.
   struct State {
     double vx{}, vz{}, omega{}, theta{};  ///< m/s, m/s, rad/s, rad
     double normal_force{};                ///< [N]
   };
-  std::vector<State> state;
+  std::vector<State> state;  ///< one per time
 };
 
 /// A piecewise-linear function of time, shared by the traces of a group.
 struct MissingCurve {
-  int group{};
+  int group{};                                      ///< of the traces that share it
   std::vector<double> knots;                        ///< [s]
   std::array<std::vector<double>, 3> value, sigma;  ///< at the knots
   double chi2_before{}, chi2_after{};               ///< of the residual around it
@@ -35,14 +35,17 @@ struct MissingCurve {
 
 /// How the residual follows from what is missing: as it is (a wrench), or integrated twice over time (an
 /// acceleration that moves a position, whose start and velocity are each recording's own).
-enum class Response { direct, twice_integrated };
+enum class Response {
+  direct,            ///< as it is: a wrench
+  twice_integrated,  ///< over time: an acceleration
+};
 
 /// How the estimate is made.
 struct MissingOptions {
   std::array<double, 3> sigma{1, 1, 1};  ///< noise of the components
-  Response response{Response::direct};
-  int knots{7};  ///< per curve
-  int terms{2};  ///< most that a candidate may have
+  Response response{Response::direct};   ///< of the residual to what is missing
+  int knots{7};                          ///< per curve
+  int terms{2};                          ///< most that a candidate may have
 };
 
 /// Least squares, one curve per group; each recording's own offset and slope are projected out where the
@@ -52,18 +55,19 @@ std::vector<MissingCurve> missing_curves(const std::vector<ResidualTrace>& trace
 
 /// A physical term and its size.
 struct MissingTerm {
-  std::string name;  ///< "|v| v", "omega J v", "1 (x)", ...
-  double coefficient{}, sigma{};
-  std::string unit;
+  std::string name;               ///< "|v| v", "omega J v", "1 (x)", ...
+  double coefficient{}, sigma{};  ///< in `unit`; 1 σ
+  std::string unit;               ///< of the coefficient
   std::function<std::array<double, 3>(const ResidualTrace::State&)> shape;  ///< of coefficient one
 };
 
 /// The few terms that explain most.
 struct MissingCandidate {
-  std::vector<MissingTerm> terms;
-  double explained{};  ///< share of the residual's χ² beyond noise that they take away
+  std::vector<MissingTerm> terms;  ///< strongest first
+  double explained{};              ///< share of the residual's χ² beyond noise that they take away
   /// The missing quantity in a state; zero without terms.
   std::array<double, 3> at(const ResidualTrace::State& state) const;
+  /// The terms with their sizes, for reports.
   std::string in_words() const;
 };
 

@@ -23,7 +23,7 @@ struct ResidualSamples {
     std::string name;           ///< "speed"
     std::vector<double> value;  ///< one per sample; NaN where it is unknown
   };
-  std::vector<State> states;
+  std::vector<State> states;  ///< what the residual may depend on
 };
 
 /// How much of a residual goes with something.
@@ -35,8 +35,8 @@ struct Dependence {
 
 /// What the tests say of one residual.
 struct ResidualStructure {
-  int n{};
-  double chi2_per_sample{};
+  int n{};                      ///< samples
+  double chi2_per_sample{};     ///< 1 is the noise
   double chi2_p_value{1};       ///< of a mean square as large, were the residual white noise of unit variance
   double autocorrelation{};     ///< of neighbours within a series
   double autocorrelation_p{1};  ///< two-sided, against 0 ± 1/√pairs

@@ -16,7 +16,7 @@ struct RestHeights {
   double scale{};  ///< reported/true − 1 [-], if the floor is where it was said to be
   double sigma{};  ///< from the scatter between axes, or between throws if that is larger [-]
   std::array<std::optional<double>, 3> offset;  ///< from the middle to the tracked point, body axes [m]
-  std::array<double, 3> offset_sigma{};
+  std::array<double, 3> offset_sigma{};         ///< 1 σ [m]
 };
 /// Of one object with `dims`, spatial log with orientation. Empty if fewer than five throws come to rest, or
 /// none on some axis' faces.

@@ -20,13 +20,14 @@ enum class InputSource {
   sku,             ///< the SKU file's tolerance
   assumed,         ///< the SKU file gives none
 };
+/// The source's name, as it is written above.
 const char* to_string(InputSource);
 
 /// One independent or, between card inputs, correlated number.
 struct UncertainInput {
-  std::string name, unit;
+  std::string name, unit;   ///< of the number; "-" where it has none
   double value{}, sigma{};  ///< 1 σ
-  InputSource source{};
+  InputSource source{};     ///< who says how uncertain it is
   std::string measurement;  ///< what would make it better known; empty: nothing does before the throw
   /// The values that it moves, by their place, and how far per unit of it.
   std::vector<std::pair<std::size_t, double>> moves;
@@ -46,12 +47,12 @@ struct AssumedTolerances {
 
 /// The values of a throw as experiment::predict_channels reads them, and what is uncertain about them.
 struct ThrowInputs {
-  experiment::ThrowModel model;
-  std::vector<std::string> names;
-  std::vector<double> values;
-  std::vector<UncertainInput> inputs;
-  Eigen::MatrixXd covariance;      ///< of the inputs
-  std::vector<std::string> notes;  ///< what was left out, and why
+  experiment::ThrowModel model;        ///< contact law and pads
+  std::vector<std::string> names;      ///< as experiment::ThrowModel says
+  std::vector<double> values;          ///< one per name, SI units
+  std::vector<UncertainInput> inputs;  ///< what is uncertain
+  Eigen::MatrixXd covariance;          ///< of the inputs
+  std::vector<std::string> notes;      ///< what was left out, and why
 
   /// The values with the inputs moved by so much.
   std::vector<double> moved(const Eigen::VectorXd& by) const;

@@ -17,11 +17,12 @@ struct SlipSample {
   int slip{};                         ///< index into SlipSamples::slips
 };
 
+/// The samples of one surface.
 struct SlipSamples {
-  std::string surface;
-  double characteristic_length{};  ///< L [m]
-  std::vector<std::string> slips;  ///< ids; samples of one slip belong together
-  std::vector<SlipSample> samples;
+  std::string surface;              ///< its name in the log
+  double characteristic_length{};   ///< L [m]
+  std::vector<std::string> slips;   ///< ids; samples of one slip belong together
+  std::vector<SlipSample> samples;  ///< in order of slips
 };
 
 /// The samples of one surface, in the log's order. A slip is cut where the twist has turned by more than

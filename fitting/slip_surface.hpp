@@ -16,14 +16,17 @@ enum class SurfaceModel {
   ellipsoid_full,  ///< wᵀ A w, A positive definite: 6
   convex_quartic   ///< homogeneous of degree four and convex: 15 [Zhou2016]
 };
+/// All of them, those with the fewest coefficients first.
 inline constexpr SurfaceModel surface_models[] = {SurfaceModel::ellipsoid, SurfaceModel::ellipsoid_full,
                                                   SurfaceModel::convex_quartic};
+/// The model's name, as it is written above.
 std::string to_string(SurfaceModel model);
 /// Throws std::invalid_argument, listing the names.
 SurfaceModel surface_model(const std::string& name);
 
+/// A limit surface identified from slips.
 struct SlipSurface {
-  SurfaceModel model{};
+  SurfaceModel model{};            ///< which family
   double characteristic_length{};  ///< L [m]
   /// Ellipsoids: A_xx, A_xy, A_xτ, A_yy, A_yτ, A_ττ [1/N²]. Quartic: the 15 coefficients [1/N⁴] in the order
   /// of contact::ConvexQuartic.
@@ -35,26 +38,31 @@ struct SlipSurface {
   std::array<double, 3> normal(const std::array<double, 3>& w) const;
   /// The least and the largest force on the surface with τ = 0, and the torque [N m] with f = 0.
   struct Extremes {
-    double least_force{}, largest_force{}, torque{};
+    double least_force{}, largest_force{}, torque{};  ///< N, N, N m
   };
+  /// From a search over directions.
   Extremes extremes() const;
 };
 
+/// How a fit of a limit surface ended.
 enum class SurfaceOutcome {
-  fitted,
+  fitted,                  ///< an answer
   too_few_slips,           ///< fewer than the model has coefficients, or than 5
   directions_do_not_span,  ///< all twists in one direction, or all in a plane
-  not_converged
+  not_converged            ///< the solver failed, or its budget was spent
 };
+/// The outcome's name, as it is written above.
 std::string to_string(SurfaceOutcome outcome);
 
+/// A fitted surface and how its fit ended.
 struct SurfaceFit {
-  SurfaceOutcome outcome{SurfaceOutcome::not_converged};
-  std::string reason;  ///< names the surface; empty if fitted
-  SlipSurface surface;
-  double sigma_direction{};  ///< noise of a direction, per component [rad]
-  double sigma_level{};      ///< noise of the gauge [-]
-  int iterations{};
+  SurfaceOutcome outcome{SurfaceOutcome::not_converged};  ///< only `fitted` has a surface
+  std::string reason;                                     ///< names the surface; empty if fitted
+  SlipSurface surface;                                    ///< the answer
+  double sigma_direction{};                               ///< noise of a direction, per component [rad]
+  double sigma_level{};                                   ///< noise of the gauge [-]
+  int iterations{};                                       ///< of the solver, over all rounds
+  /// Whether there is a surface.
   bool fitted() const { return outcome == SurfaceOutcome::fitted; }
 };
 

@@ -8,9 +8,9 @@ namespace unhand::fitting {
 
 /// When another limit surface is believed.
 struct SurfaceDiscoveryOptions {
-  SurfaceComparisonOptions comparison;
-  SurfaceModel base{SurfaceModel::ellipsoid};
-  double false_discovery_rate{0.02};  ///< shared among the laws that are tried
+  SurfaceComparisonOptions comparison;         ///< folds and null control
+  SurfaceModel base{SurfaceModel::ellipsoid};  ///< the law to begin with
+  double false_discovery_rate{0.02};           ///< shared among the laws that are tried
   double matters{0.05};  ///< share of the base's held-out direction error that a law must take away
   /// Neighbouring wrenches of different slips whose residual directions correlate by this much (and by three
   /// standard errors) say that something is left.
@@ -20,9 +20,9 @@ struct SurfaceDiscoveryOptions {
 
 /// One law on one surface against the base.
 struct SurfaceEvidence {
-  std::string surface;
-  SurfaceModel law{};
-  int slips{};
+  std::string surface;                     ///< its name in the log
+  SurfaceModel law{};                      ///< against the base
+  int slips{};                             ///< predicted
   double base_deg{}, law_deg{};            ///< mean held-out direction error
   double null_base_deg{}, null_law_deg{};  ///< the same on data simulated from the base's fit
   double gain_deg{}, gain_sigma{};         ///< mean over slips, paired, and its standard error
@@ -33,7 +33,7 @@ struct SurfaceEvidence {
 
 /// The answer of the loop on measured slips, with each law's evidence on each surface.
 struct SurfaceDiscovery {
-  MeasuredDiscovery answer;
+  MeasuredDiscovery answer;               ///< as for the other logs
   std::vector<SurfaceEvidence> evidence;  ///< by surface, then law; the base's own row holds what it leaves
 };
 

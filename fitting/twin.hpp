@@ -24,6 +24,7 @@ struct ErrorFloor {
   /// The mean over the twins of each statistic.
   experiment::ErrorStatistics statistics(int quantity, datasets::Split split) const;
 };
+/// Makes `twins` twins, from seeds derived from `seed`, and fits and predicts each.
 ErrorFloor error_floor(const datasets::ThrowLog& log, const std::string& file, const CampaignProblem& problem,
                        const FitResult& fit, const FitOptions& options, int twins, std::uint64_t seed = 1);
 

@@ -16,9 +16,10 @@ namespace unhand::flight {
 /// ξ = (r, z, ṙ, ż) [m, m, m/s, m/s].
 template <class S>
 struct PlaneState {
-  S r{}, z{}, r_rate{}, z_rate{};
+  S r{}, z{}, r_rate{}, z_rate{};  ///< m, m, m/s, m/s
 };
 
+/// What acts on an object in flight.
 struct Medium {
   double gravity{9.81};  ///< downward [m/s²], > 0
   double drag_k{};       ///< quadratic drag, a = −k |v| v [1/m], >= 0
@@ -31,9 +32,10 @@ std::optional<PlaneState<S>> landing_of(const PlaneState<S>& release, const Medi
 
 /// Φ(ξ) = r_land [m] and ∇Φ [-, -, s, s]: the flying flow map of [LiuBillard2024].
 struct FlowMap {
-  double landing{};
+  double landing{};                  ///< r_land [m]
   std::array<double, 4> gradient{};  ///< by r, z, ṙ, ż
 };
+/// The flow map at a state; empty if the flight never gets down to z = 0.
 std::optional<FlowMap> flow_map(const PlaneState<double>& release, const Medium& medium);
 
 /// Where and how fast a throw may come down: |r| <= half_length at z = 0, and both velocities in their
@@ -53,11 +55,12 @@ double tube_level(const PlaneState<double>& release, const LandingSet& set, cons
 /// The same tube by samples: states from which flights of up to `longest` [s] end in the set, found by flying
 /// backward from landings drawn from it. Every `boundary_every`-th sample comes from the set's boundary.
 struct TubeSampling {
-  int count{1000};
-  double longest{1.0};
-  int boundary_every{4};
-  std::uint64_t seed{1};
+  int count{1000};        ///< samples, >= 0
+  double longest{1.0};    ///< s
+  int boundary_every{4};  ///< every how many samples one lies on the boundary
+  std::uint64_t seed{1};  ///< the same seed gives the same samples
 };
+/// States of the tube, in the order drawn.
 std::vector<PlaneState<double>> sample_tube(const LandingSet& set, const Medium& medium,
                                             const TubeSampling& sampling = {});
 

@@ -12,8 +12,8 @@ namespace unhand::flight {
 /// with the landing as an event.
 template <class S>
 struct FlightProblem {
-  dynamics::Pose<S> pose;  ///< of the CoM
-  dynamics::Twist<S> twist;
+  dynamics::Pose<S> pose;     ///< of the CoM
+  dynamics::Twist<S> twist;   ///< of the CoM [m/s, m/s, rad/s]
   dynamics::Vec2<S> gravity;  ///< m/s²
   S drag_k{};                 ///< quadratic drag, a = −k |v| v [1/m]
   S landing_height{};         ///< [m]
@@ -24,14 +24,22 @@ struct FlightProblem {
   dynamics::Vec2<S> wind{};  ///< velocity of the air [m/s]; drag and lift see v − wind
 };
 
-enum class FlightOutcome { landed, never_reaches, not_solved };
+/// How a flight ended.
+enum class FlightOutcome {
+  landed,         ///< passed the landing height on its way down
+  never_reaches,  ///< starts below it and does not rise above it, or `longest` passed
+  not_solved,     ///< the integrator stopped
+};
+/// The outcome's name, as it is written above.
 const char* to_string(FlightOutcome);
 
+/// How a flight ended, and where.
 template <class S>
 struct FlightResult {
-  FlightOutcome outcome{};
-  dynamics::Outcome integration{dynamics::Outcome::finished};
-  Landing<S> landing;  ///< pose and twist of the tracked point, if it landed
+  FlightOutcome outcome{};  ///< only `landed` has a landing
+  dynamics::Outcome integration{
+      dynamics::Outcome::finished};  ///< how the integrator ended, where it was needed
+  Landing<S> landing;                ///< pose and twist of the tracked point, if it landed
 };
 
 /// Flies to the landing. Throws std::invalid_argument when an input is not finite or drag_k < 0. Instantiated

@@ -11,8 +11,8 @@ namespace unhand::flight {
 /// Orientation (body to world) and angular velocity in body axes [rad/s].
 template <class S>
 struct RotationState {
-  Quaternion<S> attitude;
-  Vec3<S> omega{};
+  Quaternion<S> attitude;  ///< body to world
+  Vec3<S> omega{};         ///< body axes [rad/s]
 };
 
 /// Torque-free rotation in the principal axes of the body,

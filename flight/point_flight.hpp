@@ -12,8 +12,8 @@ namespace unhand::flight {
 /// quadratic drag a = −k |v| v, k [1/m] >= 0.
 template <class S>
 struct PointFlight {
-  Vec3<S> position{}, velocity{}, gravity{};
-  S drag_k{0.0};
+  Vec3<S> position{}, velocity{}, gravity{};  ///< m, m/s, m/s²
+  S drag_k{0.0};                              ///< k [1/m]
 };
 
 /// Positions [m] at `times` [s] after the start, each >= 0 (in any order): p + v t + ½ g t² without drag,

@@ -12,9 +12,9 @@ namespace unhand::flight {
 /// Where the flight ends: on the way down through the landing height.
 template <class S>
 struct Landing {
-  S flight_time{};         ///< from the state given [s]
-  dynamics::Pose<S> pose;  ///< θ is not wrapped: it counts the flips
-  dynamics::Twist<S> twist;
+  S flight_time{};           ///< from the state given [s]
+  dynamics::Pose<S> pose;    ///< θ is not wrapped: it counts the flips
+  dynamics::Twist<S> twist;  ///< at the landing [m/s, m/s, rad/s]
 };
 
 /// The state of the CoM after `t` [s] under constant gravity [m/s²].

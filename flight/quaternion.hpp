@@ -10,7 +10,7 @@ namespace unhand::flight {
 /// The rotation from body to world, (w, x, y, z) with w first [1]; q and −q are the same orientation.
 template <class S>
 struct Quaternion {
-  S w{1.0}, x{0.0}, y{0.0}, z{0.0};
+  S w{1.0}, x{0.0}, y{0.0}, z{0.0};  ///< unit length
 };
 
 /// Hamilton's product: first b, then a.
@@ -24,6 +24,7 @@ template <class S>
 Quaternion<S> conjugate(const Quaternion<S>& q) {
   return {q.w, -q.x, -q.y, -q.z};
 }
+/// q/|q|; q = 0 gives NaN.
 template <class S>
 Quaternion<S> normalised(const Quaternion<S>& q) {
   using std::sqrt;

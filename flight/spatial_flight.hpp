@@ -30,16 +30,16 @@ struct SpatialAir {
 /// A rigid body as it is let go, in space.
 template <class S>
 struct SpatialStart {
-  Vec3<S> position{}, velocity{};  ///< of the CoM [m, m/s]
-  RotationState<S> rotation;
+  Vec3<S> position{}, velocity{};     ///< of the CoM [m, m/s]
+  RotationState<S> rotation;          ///< at the start
   Vec3<S> inertia{S(1), S(1), S(1)};  ///< about the principal axes, which are the body's; any unit
 };
 
 /// A rigid body on its flight.
 template <class S>
 struct SpatialState {
-  Vec3<S> position{};  ///< of the CoM [m]
-  RotationState<S> rotation;
+  Vec3<S> position{};         ///< of the CoM [m]
+  RotationState<S> rotation;  ///< orientation and spin
 };
 
 /// States at `times` [s] after the start, each >= 0 (in any order; they may carry derivatives). Without air:

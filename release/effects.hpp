@@ -23,6 +23,7 @@ std::span<const dynamics::EffectOn<Lateness>> lateness_effects();
 /// f_N(t − delay), |delay| <= 1 s. `base` must outlive it.
 class DelayedForce final : public contact::NormalForce {
  public:
+  /// `delay` [s], positive where the force acts later than logged. Throws std::invalid_argument.
   DelayedForce(const contact::NormalForce& base, const dynamics::Dual& delay);
   double at(const Window& window, double t) const override;
   Dual at(const Window& window, const Dual& t) const override;

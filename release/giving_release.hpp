@@ -9,11 +9,11 @@ namespace unhand::release {
 /// What a simulation of `simulate_release` starts from, in the order of its own preparations.
 template <class S>
 struct GivingStart {
-  contact::Relative<S> relative;
-  contact::Hold<S> hold;
-  std::vector<S> time_events;  ///< [s], increasing: kinks of hand and force, and the separation
-  double separation{};         ///< [s]; +infinity for never
-  int free_mode{};
+  contact::Relative<S> relative;  ///< the object against the hand at the start
+  contact::Hold<S> hold;          ///< how it is held there
+  std::vector<S> time_events;     ///< [s], increasing: kinks of hand and force, and the separation
+  double separation{};            ///< [s]; +infinity for never
+  int free_mode{};                ///< the mode in which the object is free
 };
 
 /// Steps the points (contact::GivingPoints) with the rigid body by the implicit Euler method in the object's

@@ -9,8 +9,8 @@ namespace unhand::release {
 /// the CoM; `angle` is θ_O − θ_H [rad].
 template <class S>
 struct Grasp {
-  S com_offset{};
-  S angle{};
+  S com_offset{};  ///< m; positive: the CoM is ahead of the pads along the object's x axis
+  S angle{};       ///< rad
 };
 
 }  // namespace unhand::release

@@ -24,22 +24,25 @@ struct HandState {
   dynamics::Acceleration<S> acceleration;  ///< m/s², m/s², rad/s²
 };
 
+/// Pose, twist and acceleration of the hand over time.
 class HandMotion {
  public:
   virtual ~HandMotion() = default;
+  /// The hand at t [s]; where the acceleration jumps, the window says which side.
   virtual HandState<double> at(const Window&, double t) const = 0;
   virtual HandState<Dual> at(const Window&, const Dual& t) const = 0;
   /// Instants [s], increasing, strictly inside (begin, end), at which the acceleration jumps.
   virtual std::vector<double> jumps() const = 0;
   /// First and last instant [s] at which the motion is known.
   virtual double begin() const = 0;
+  /// Last instant at which the motion is known [s].
   virtual double end() const = 0;
 };
 
 /// A stretch of motion with a linear acceleration profile, a(t) = acceleration + jerk (t − t_start), until
 /// t_end [s].
 struct HandSegment {
-  double t_end{};
+  double t_end{};                               ///< s
   dynamics::Acceleration<double> acceleration;  ///< at the start of the stretch; m/s², m/s², rad/s²
   dynamics::Acceleration<double> jerk{};        ///< m/s³, m/s³, rad/s³
 };
@@ -49,7 +52,7 @@ struct HandSegment {
 /// `jumps()` only.
 class PolynomialHand final : public HandMotion {
  public:
-  using Polynomial = dynamics::PiecewisePolynomial<3, 5>;
+  using Polynomial = dynamics::PiecewisePolynomial<3, 5>;  ///< m, m, rad over s
 
   /// `jumps` [s]: the breaks at which the acceleration is not continuous. Each must be an interior break of
   /// `path`; otherwise std::invalid_argument.
@@ -66,6 +69,7 @@ class PolynomialHand final : public HandMotion {
   std::vector<double> jumps() const override { return jumps_; }
   double begin() const override { return path_.begin(); }
   double end() const override { return path_.end(); }
+  /// The polynomials of (x, z, θ).
   const Polynomial& path() const { return path_; }
 
  private:
@@ -88,9 +92,10 @@ struct HandSeries {
   std::span<const double> twist;         ///< N × 3, m/s, m/s, rad/s
   std::span<const double> acceleration;  ///< N × 3, m/s², m/s², rad/s²
   /// Declared noise, 1 σ, per column in the units of the column; 0, NaN or infinite where none is declared.
-  std::array<double, 3> pose_sigma{}, twist_sigma{}, acceleration_sigma{};
+  std::array<double, 3> pose_sigma{}, twist_sigma{}, acceleration_sigma{};  ///< m, m, rad; per s; per s²
 };
 
+/// How closely a logged hand is followed.
 struct HandFitOptions {
   /// χ² per degree of freedom up to which the residual counts as noise, beside its own statistical scatter.
   double chi2_target = 1.1;
@@ -109,7 +114,7 @@ struct HandFitSummary {
   /// Mean square of the whitened residual, per column: 1 is noise as declared, less is a pessimistic σ, more
   /// means that the series is not what its siblings say (a pose that is not the integral of the twist, say),
   /// or that the knots were not allowed to be dense enough. Never an error.
-  std::array<double, 3> pose_chi2{}, twist_chi2{}, acceleration_chi2{};
+  std::array<double, 3> pose_chi2{}, twist_chi2{}, acceleration_chi2{};     ///< columns x, z, θ [-]
   std::array<double, 3> pose_sigma{}, twist_sigma{}, acceleration_sigma{};  ///< the σ used
   double chi2_per_dof{};                                                    ///< of everything together
   double max_whitened_residual{};                                           ///< largest |residual|/σ
@@ -117,9 +122,10 @@ struct HandFitSummary {
   bool noise_reached{};  ///< no stretch has a misfit beyond doubt (4.5 standard deviations)
 };
 
+/// A smooth hand motion and how it was found.
 struct HandFit {
-  PolynomialHand motion;
-  HandFitSummary summary;
+  PolynomialHand motion;      ///< begins and ends with the log
+  HandFitSummary summary;     ///< how well it explains each series
   std::vector<double> jumps;  ///< instants [s] at which the acceleration may jump; = motion.jumps()
 };
 

@@ -13,11 +13,12 @@ struct NaiveOptions {
   double smoothing{0.0};  ///< v_s, viscous smoothing of the sign law [m/s]; 0 is the sign law itself
 };
 
+/// How a naive release ended.
 struct NaiveResult {
-  ReleaseOutcome outcome{};
-  DetachState<double> detach;
-  int steps{};
-  int reversals{};  ///< steps after which the slip points against the one before: the chatter
+  ReleaseOutcome outcome{};    ///< `detached` or `never_separated`
+  DetachState<double> detach;  ///< the answer, if detached
+  int steps{};                 ///< Euler steps taken
+  int reversals{};             ///< steps after which the slip points against the one before: the chatter
 };
 
 /// The ellipsoidal limit surface as [LiuBillard2025] describes it in use, for comparison only: without a

@@ -15,35 +15,37 @@ namespace unhand::release {
 /// the mode that its grip allows; one that slips already starts slipping.
 template <class S>
 struct ReleaseProblem {
-  const HandMotion& hand;
-  const contact::NormalForce& normal_force;
-  const contact::ContactModel& contact;
-  dynamics::RigidBody<S> body;
-  dynamics::Vec2<S> gravity;  ///< m/s²
-  Grasp<S> grasp;
-  double start{};            ///< [s]
-  dynamics::Vec2<S> slip{};  ///< of the patch at the start [m/s]; zero: held
-  S spin{};                  ///< ω_O − ω_H at the start [rad/s]
+  const HandMotion& hand;                    ///< in the world
+  const contact::NormalForce& normal_force;  ///< of one pad [N]
+  const contact::ContactModel& contact;      ///< the friction law and its modes
+  dynamics::RigidBody<S> body;               ///< kg, kg m²
+  dynamics::Vec2<S> gravity;                 ///< m/s²
+  Grasp<S> grasp;                            ///< where the pads hold the object
+  double start{};                            ///< [s]
+  dynamics::Vec2<S> slip{};                  ///< of the patch at the start [m/s]; zero: held
+  S spin{};                                  ///< ω_O − ω_H at the start [rad/s]
 };
 
+/// How a release ended.
 enum class ReleaseOutcome {
   detached,         ///< free: the state at detach is the answer
   never_separated,  ///< the normal force is still there at the end of the hand's motion
   not_solved,       ///< the integrator stopped, see `integration`
 };
+/// The outcome's name, as it is written above.
 const char* to_string(ReleaseOutcome);
 
 /// The one value that flight gets.
 template <class S>
 struct DetachState {
-  S time{};                ///< [s]
-  dynamics::Pose<S> pose;  ///< of the CoM, in the world
-  dynamics::Twist<S> twist;
+  S time{};                  ///< [s]
+  dynamics::Pose<S> pose;    ///< of the CoM, in the world
+  dynamics::Twist<S> twist;  ///< of the CoM, in the world [m/s, m/s, rad/s]
 };
 
 /// What happened, in order: the mode entered at `time`, and why.
 struct ModeEvent {
-  double time{};
+  double time{};      ///< s
   std::string cause;  ///< the guard's name, "start", "time" or "limit"
   std::string mode;   ///< the mode entered
 };
@@ -60,22 +62,24 @@ struct EnergyLedger {
   double residual{};  ///< mechanical_change − all the others: the quadrature's and integrator's error
 };
 
+/// How the release is integrated, and what is kept.
 struct ReleaseOptions {
-  dynamics::IntegratorOptions integrator{};
-  bool ledger{false};  ///< book the energy (records the trajectory)
+  dynamics::IntegratorOptions integrator{};  ///< tolerances, budgets, method
+  bool ledger{false};                        ///< book the energy (records the trajectory)
 };
 
+/// How a release ended: state at detach, events, energy.
 template <class S>
 struct ReleaseResult {
-  ReleaseOutcome outcome{};
-  dynamics::Outcome integration{};
-  bool slips_at_start{};  ///< the grip cannot hold the object even before it opens
-  DetachState<S> detach;
-  contact::Relative<S> relative;  ///< the object against the hand at detach
-  std::vector<dynamics::Event<S, 6>> events;
-  dynamics::Trajectory<S, 6> trajectory;  ///< relative states, if recorded
-  dynamics::IntegratorStatistics statistics;
-  EnergyLedger ledger;
+  ReleaseOutcome outcome{};                   ///< only `detached` has a state to fly from
+  dynamics::Outcome integration{};            ///< how the integrator ended
+  bool slips_at_start{};                      ///< the grip cannot hold the object even before it opens
+  DetachState<S> detach;                      ///< the answer, if detached
+  contact::Relative<S> relative;              ///< the object against the hand at detach
+  std::vector<dynamics::Event<S, 6>> events;  ///< in order of time; mode_events puts them into words
+  dynamics::Trajectory<S, 6> trajectory;      ///< relative states, if recorded
+  dynamics::IntegratorStatistics statistics;  ///< what the integration cost
+  EnergyLedger ledger;                        ///< zero unless options.ledger
 };
 
 /// Simulates from `problem.start` to detach. Throws std::invalid_argument when an input is not finite or out
@@ -90,14 +94,15 @@ std::vector<ModeEvent> mode_events(const ReleaseProblem<S>& problem, const Relea
 /// A recorded release at t: pose, twist, and the wrench about the patch, all of the object in the world.
 template <class S>
 struct ReleaseSample {
-  std::string_view mode;
-  dynamics::Pose<S> pose;
-  dynamics::Twist<S> twist;
-  dynamics::Wrench<S> wrench;
-  HandState<S> hand;
-  S normal_force{};
-  contact::Relative<S> relative;
+  std::string_view mode;          ///< the mode in force
+  dynamics::Pose<S> pose;         ///< of the CoM [m, m, rad]
+  dynamics::Twist<S> twist;       ///< of the CoM [m/s, m/s, rad/s]
+  dynamics::Wrench<S> wrench;     ///< by the pads, about the patch [N, N, N m]
+  HandState<S> hand;              ///< the hand at that instant
+  S normal_force{};               ///< of one pad [N]
+  contact::Relative<S> relative;  ///< the object against the hand
 };
+/// The release at t [s], start <= t <= detach; needs a recorded trajectory, throws std::out_of_range without.
 template <class S>
 ReleaseSample<S> sample_release(const ReleaseProblem<S>& problem, const ReleaseResult<S>& result, const S& t);
 

@@ -69,8 +69,9 @@ JointVector<S> friction_torque(const Chain& chain, const JointVector<S>& qd) {
 /// ½ q̇ᵀ M q̇ and −Σ m g·p [J]; the potential is zero in the base's origin.
 template <class S>
 struct ChainEnergy {
-  S kinetic{}, potential{};
+  S kinetic{}, potential{};  ///< J
 };
+/// The energies of the chain at (q, q̇).
 template <class S>
 ChainEnergy<S> energy_of(const Chain& chain, const JointVector<S>& q, const JointVector<S>& qd,
                          const Eigen::Vector3d& gravity = kGravity);

@@ -10,12 +10,12 @@ namespace unhand::planners {
 
 /// One joint at an instant [rad, rad/s, rad/s²] and the jerk from there on [rad/s³].
 struct JointSample {
-  double q{}, qd{}, qdd{}, jerk{};
+  double q{}, qd{}, qdd{}, jerk{};  ///< rad, rad/s, rad/s², rad/s³
 };
 
 /// A stretch of constant jerk [s, rad/s³].
 struct JerkPiece {
-  double duration{}, jerk{};
+  double duration{}, jerk{};  ///< s; rad/s³
 };
 
 /// Position, velocity and acceleration of one joint, cubic in pieces.
@@ -23,13 +23,16 @@ class JerkProfile {
  public:
   /// From (q, q̇, q̈) at t = 0.
   explicit JerkProfile(const JointSample& start) : knots_{start}, times_{0.0} {}
+  /// Adds stretches after the last one; durations >= 0 [s].
   void append(const std::vector<JerkPiece>& pieces);
   /// Beyond its ends the motion stays at the end's state, with the end's velocity and no acceleration.
   JointSample at(double t) const;
   /// Appends the instants at which acceleration or velocity may be largest: the pieces' ends, and where the
   /// acceleration passes through zero.
   void extremes(std::vector<double>& out) const;
+  /// The state at the end of the last stretch.
   const JointSample& end() const { return knots_.back(); }
+  /// From the start to the end of the last stretch [s].
   double duration() const { return times_.back(); }
 
  private:
@@ -50,26 +53,31 @@ std::vector<JerkPiece> rest_to_rest(double velocity, double acceleration, double
 
 /// All joints of a chain together, from `begin` [s] on.
 struct JointTrajectory {
-  double begin{};
-  std::vector<JerkProfile> joints;
+  double begin{};                   ///< s
+  std::vector<JerkProfile> joints;  ///< all of the same duration
 
+  /// s
   double end() const { return begin + (joints.empty() ? 0.0 : joints.front().duration()); }
+  /// All joints at an instant.
   struct State {
-    JointVector<double> q, qd, qdd, jerk;
+    JointVector<double> q, qd, qdd, jerk;  ///< rad, rad/s, rad/s², rad/s³
   };
+  /// At t [s].
   State at(double t) const;
 };
 
 /// The largest use of each limit over a trajectory, as a fraction of the limit (1: just reached); of the
 /// position, |q − middle| over half the range. Infinite limits are not used.
 struct LimitUse {
-  double fraction{};
-  int joint{};
-  double time{};
+  double fraction{};  ///< of the limit; above 1 it is broken
+  int joint{};        ///< index
+  double time{};      ///< s
 };
+/// The use of all limits over a trajectory.
 struct LimitCheck {
-  LimitUse position, velocity, acceleration, jerk, torque;
+  LimitUse position, velocity, acceleration, jerk, torque;  ///< the largest of each
   double lowest{};  ///< height of the lowest joint origin beyond the second, or the tip [m]
+  /// Whether every fraction is at most 1 + tolerance.
   bool within(double tolerance = 1e-9) const;
   /// The limit that is used most, in words.
   std::string worst(const Chain& chain) const;

@@ -36,9 +36,10 @@ Matrix3<S> joint_rotation(const Eigen::Matrix3d& R, const S& q) {
 /// The frames of all links and of the tip, seen from the base.
 template <class S>
 struct ChainFrames {
-  std::array<Transform<S>, kMaxJoints> links;
-  Transform<S> tip;
+  std::array<Transform<S>, kMaxJoints> links;  ///< m
+  Transform<S> tip;                            ///< m
 };
+/// From the base outwards at q [rad].
 template <class S>
 ChainFrames<S> frames_of(const Chain& chain, const JointVector<S>& q);
 
@@ -65,6 +66,7 @@ struct TipMotion {
   Vector3<S> velocity, omega;      ///< m/s, rad/s
   Vector3<S> acceleration, alpha;  ///< m/s², rad/s²
 };
+/// At (q, q̇, q̈) [rad, rad/s, rad/s²].
 template <class S>
 TipMotion<S> tip_motion(const Chain& chain, const JointVector<S>& q, const JointVector<S>& qd,
                         const JointVector<S>& qdd);

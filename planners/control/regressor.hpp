@@ -8,14 +8,17 @@
 
 namespace unhand::planners::control {
 
+/// m [kg], m c [kg m], and I about the frame's origin: xx, yy, zz, xy, xz, yz [kg m²].
 inline constexpr int kLinkParameters = 10;
 
 /// One row per joint, ten columns per link.
 template <class S>
 using Regressor =
     Eigen::Matrix<S, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxJoints, kLinkParameters * kMaxJoints>;
+/// Of one link.
 using LinkParameters = Eigen::Matrix<double, kLinkParameters, 1>;
 
+/// The parameters of a body, seen from the link's frame.
 LinkParameters parameters_of(const Inertia& body);
 /// The body that has these parameters; mass > 0.
 Inertia inertia_from(const LinkParameters& parameters);

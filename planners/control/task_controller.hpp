@@ -24,17 +24,19 @@ struct Adaptation {
 
 /// Errors in the joints: τ = M̂ q̈_d + Ĉ q̇ + ĝ + k_v ė + k_p e, Eq. 31.
 struct JointReference {
-  JointVector<double> q, qd, qdd;
+  JointVector<double> q, qd, qdd;  ///< rad, rad/s, rad/s²
 };
 /// Motion of the tip with its orientation kept.
 struct TaskReference {
   Eigen::Vector3d position, velocity, acceleration;  ///< m, m/s, m/s²
-  Eigen::Matrix3d orientation;
+  Eigen::Matrix3d orientation;                       ///< axes of the tip as columns
 };
 
+/// Gains of the law in the joints.
 struct JointGains {
   JointVector<double> stiffness, damping;  ///< k_p [N m/rad], k_v [N m s/rad]; diagonal, > 0
 };
+/// Gains of the law in the task.
 struct TaskGains {
   double stiffness{};           ///< k_ξ of the position [N/m], > 0
   double rotational{};          ///< k_ξ of the orientation [N m/rad], > 0
@@ -50,14 +52,17 @@ struct ControlStep {
   Eigen::Matrix<double, 6, 1> error;  ///< e_ξ: position [m] and rotation vector [rad]; zero in the joint law
 };
 
+/// The two laws with one estimate of the unknown body.
 class AdaptiveController {
  public:
   /// `model`: the chain as it is known, without the unknown body; friction is compensated as the model has
   /// it.
   AdaptiveController(const Chain& model, const Adaptation& adaptation);
 
+  /// Torques of Eq. 31.
   ControlStep joint_law(const JointReference& reference, const JointGains& gains,
                         const JointVector<double>& q, const JointVector<double>& qd) const;
+  /// Torques of Eq. 35: impedance in the task, posture in its null space.
   ControlStep task_law(const TaskReference& reference, const TaskGains& gains, const JointVector<double>& q,
                        const JointVector<double>& qd) const;
 
@@ -68,6 +73,7 @@ class AdaptiveController {
 
   LinkParameters estimate = LinkParameters::Zero();  ///< π̂
 
+  /// The chain as the controller knows it, without the estimate.
   const Chain& model() const { return model_; }
 
  private:
@@ -91,8 +97,9 @@ double lyapunov(const Chain& truth, const TaskGains& gains, const Adaptation& ad
 /// The quintic of least jerk between two states in `duration` [s], [FlashHogan1985]: position, velocity,
 /// acceleration at t, held beyond the ends.
 struct MinimumJerk {
-  Eigen::Vector3d from, from_velocity, to, to_velocity;
-  double duration{};
+  Eigen::Vector3d from, from_velocity, to, to_velocity;  ///< m, m/s
+  double duration{};                                     ///< s, > 0
+  /// The motion at t [s], with the orientation given.
   TaskReference at(double t, const Eigen::Matrix3d& orientation) const;
 };
 

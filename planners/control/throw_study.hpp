@@ -16,57 +16,61 @@ namespace unhand::planners::control {
 
 /// What is thrown: mass [kg], and the width of a cube of its volume [m] for its inertia.
 struct Payload {
-  std::string name;
-  double mass{}, width{};
+  std::string name;        ///< as in [DarkoD46]
+  double mass{}, width{};  ///< kg; m
 };
 /// The objects of [DarkoD46] Fig. 24: masses as given there, widths chosen.
 std::vector<Payload> reported_payloads();
 
+/// A controller, by its gains.
 struct ControllerChoice {
-  std::string name;
+  std::string name;     ///< for tables
   double stiffness{};   ///< k_ξ of the position [N/m], > 0
   double rotational{};  ///< of the orientation [N m/rad], > 0
-  bool adaptive{};
+  bool adaptive{};      ///< with Adaptation; else its gains are zero
 };
 /// Adaptive low gain (30 N/m), plain low gain (30 N/m), plain high gain (300 N/m).
 std::vector<ControllerChoice> reported_controllers();
 
+/// The motion, the noise and the tolerances of the study.
 struct StudyOptions {
-  Eigen::Vector3d start{0.38, 0, 0.12};     ///< tip at rest [m]
-  Eigen::Vector3d release{0.52, 0, 0.30};   ///< tip at the release [m]
-  Eigen::Vector3d velocity{1.05, 0, 0.70};  ///< there [m/s]
-  double throw_time{0.7}, brake_time{0.2}, return_time{0.9},
-      hold_time{0.3};               ///< of the parts of a repetition [s]
-  int repetitions{4};               ///< without release, before the throw; >= 0
-  double landing_height{-0.3};      ///< [m]
-  Eigen::Vector2d box{0.20, 0.20};  ///< lengths along x and y [m]: chosen
-  double angle_noise{2e-5};         ///< 1 σ [rad]
-  double rate_noise{5e-3};          ///< [rad/s]
-  double torque_noise{0.05};        ///< [N m]
-  double friction_error{0.1};       ///< 1 σ of each joint's friction against the model's [-]
-  double grasp_offset{0.003};       ///< 1 σ of the object's centre in the hand, per axis [m]
-  double release_jitter{0.002};     ///< 1 σ [s]
-  Adaptation adaptation = default_adaptation();
+  Eigen::Vector3d start{0.38, 0, 0.12};                                       ///< tip at rest [m]
+  Eigen::Vector3d release{0.52, 0, 0.30};                                     ///< tip at the release [m]
+  Eigen::Vector3d velocity{1.05, 0, 0.70};                                    ///< there [m/s]
+  double throw_time{0.7}, brake_time{0.2}, return_time{0.9}, hold_time{0.3};  ///< of a repetition [s]
+  int repetitions{4};                            ///< without release, before the throw; >= 0
+  double landing_height{-0.3};                   ///< [m]
+  Eigen::Vector2d box{0.20, 0.20};               ///< lengths along x and y [m]: chosen
+  double angle_noise{2e-5};                      ///< 1 σ [rad]
+  double rate_noise{5e-3};                       ///< [rad/s]
+  double torque_noise{0.05};                     ///< [N m]
+  double friction_error{0.1};                    ///< 1 σ of each joint's friction against the model's [-]
+  double grasp_offset{0.003};                    ///< 1 σ of the object's centre in the hand, per axis [m]
+  double release_jitter{0.002};                  ///< 1 σ [s]
+  Adaptation adaptation = default_adaptation();  ///< of the adaptive controller
 
+  /// Gains as docs/adaptive-control.md gives them.
   static Adaptation default_adaptation();
 };
 
+/// One instant of a run.
 struct TrackingSample {
-  double t{};
+  double t{};                                 ///< s
   double position_error{}, velocity_error{};  ///< norms [m, m/s]
-  double lyapunov{};
-  double mass_estimate{};  ///< kg
+  double lyapunov{};                          ///< of Lyapunov's function
+  double mass_estimate{};                     ///< kg
 };
 
+/// One run: how it landed, and how the controller did.
 struct StudyThrow {
   Eigen::Vector2d miss{0, 0};  ///< landing − where the reference would land, along and across [m]
-  bool hit{}, lands{};
+  bool hit{}, lands{};         ///< in the box; comes down to the landing height at all
   double release_position_error{}, release_velocity_error{};  ///< m, m/s
   std::vector<double> rms_error;  ///< of the position per repetition, the throw last [m]
   double torque_use{};            ///< largest share of a joint's torque limit that was asked for
   int saturated{};                ///< control steps with a torque at its limit
-  LinkParameters estimate = LinkParameters::Zero();
-  std::vector<TrackingSample> history;  ///< every 10 ms, if asked for
+  LinkParameters estimate = LinkParameters::Zero();  ///< π̂ at the release
+  std::vector<TrackingSample> history;               ///< every 10 ms, if asked for
 };
 
 /// One run: repetitions without release, then the throw. The same seed gives the same robot, object and noise
@@ -76,11 +80,12 @@ StudyThrow run_throw(const ControllerChoice& controller, const Payload& payload,
 
 /// Landings of many seeds.
 struct Dispersion {
-  int throws{}, hits{}, lost{};
+  int throws{}, hits{}, lost{};           ///< runs; landed in the box; never landed
   Eigen::Vector2d mean{0, 0}, std{0, 0};  ///< of the miss [m]
   double rms{};                           ///< √(mean |miss|²): bias and scatter [m]
-  double largest_torque_use{};
+  double largest_torque_use{};            ///< share of a joint's limit
 };
+/// Over runs with different seeds.
 Dispersion dispersion_of(const std::vector<StudyThrow>& throws);
 
 }  // namespace unhand::planners::control

@@ -6,9 +6,11 @@
 
 namespace unhand::planners::elastic {
 
+/// An arm that comes with the library.
 struct BuiltInArm {
   std::string_view name, arm, chain;  ///< text of NAME.toml and NAME_chain.toml
 };
+/// All of them.
 const std::array<BuiltInArm, 2>& built_in_arms();
 
 }  // namespace unhand::planners::elastic

@@ -18,11 +18,13 @@
 
 namespace unhand::planners::elastic {
 
-inline constexpr int kLinks = 3;
-inline constexpr int kCoordinates = kLinks + 2;
+inline constexpr int kLinks = 3;                 ///< joints of the arm
+inline constexpr int kCoordinates = kLinks + 2;  ///< q₁ … q₃ and the spring's two
 
+/// (θ, ψ, q₁, q₂, q₃), or their rates.
 template <class S>
 using Coordinates = Eigen::Matrix<S, kCoordinates, 1>;
+/// (q₁, q₂, q₃), or what belongs to the links.
 template <class S>
 using Links = Eigen::Matrix<S, kLinks, 1>;
 /// Torques of the motors of joint 1, joint 2 and of the last joint's [N m].
@@ -39,6 +41,7 @@ enum class ClutchMode {
   locked,  ///< BRK with the motor held: a rigid wrist
   rigid,   ///< motor and link locked across the spring: θ̇ = ψ̇ = q̇₃
 };
+/// The mode's name, as it is written above.
 const char* to_string(ClutchMode);
 
 /// The last joint. Inertias are reflected to the joint.
@@ -53,10 +56,11 @@ struct ClutchedJoint {
   double brake_torque{};    ///< what the brake can hold [N m], > 0
 };
 
+/// An arm with such a last joint.
 struct ClutchedArm {
   Chain chain;  ///< three joints about parallel axes; its tip is where the object is held
   Links<double> rotor_inertia{0, 0, 0};  ///< B₁, B₂, and 0: the last joint has its own [kg m²]
-  ClutchedJoint last;
+  ClutchedJoint last;                    ///< motor, spring and clutches
 };
 
 /// Throws std::invalid_argument naming what is wrong: three joints in one vertical plane (axes along −y),

@@ -13,20 +13,22 @@ struct Excitation {
   JointVector<double> centre;    ///< rad
   Eigen::MatrixXd sine, cosine;  ///< one row per joint, one column per harmonic [rad]
 
+  /// Angles, rates and accelerations at t [s].
   void at(double t, JointVector<double>& q, JointVector<double>& qd, JointVector<double>& qdd) const;
 };
 
+/// What motion is looked for, and how long.
 struct ExcitationOptions {
   double period{4};  ///< s, > 0
   int harmonics{3};  ///< >= 1
   int samples{60};   ///< instants per period that the condition number looks at
   int trials{300};   ///< of a random search that narrows around the best
-  unsigned seed{1};
+  unsigned seed{1};  ///< of the random search
 };
+/// A motion, and how well it shows the parameters.
 struct DesignedExcitation {
-  Excitation motion;
-  double first_condition{},
-      condition{};  ///< of the regressor's identifiable part: of the first trial, of the best
+  Excitation motion;                      ///< the best of the trials
+  double first_condition{}, condition{};  ///< of the regressor's identifiable part: first trial, best [-]
 };
 /// The motion within the limits of angle and speed whose regressor has the smallest condition number among
 /// the trials.
@@ -42,8 +44,8 @@ struct IdentifiedInertia {
   Eigen::MatrixXd combinations;     ///< V
   Eigen::VectorXd estimate, sigma;  ///< of β, with its standard deviation
   double torque_noise{};            ///< 1 σ of the residual [N m]
-  double condition{};
-  Chain feasible;            ///< the chain with inertias that bodies can have, nearest to the estimate
+  double condition{};               ///< of the regressor [-]
+  Chain feasible;                   ///< the chain with inertias that bodies can have, nearest to the estimate
   double feasible_misfit{};  ///< √(mean ((β_feasible − estimate)/σ)²): of order one if the log is consistent
                              ///< with bodies
 };
@@ -55,8 +57,9 @@ IdentifiedInertia identify_inertia(const Chain& prior, const std::vector<MotionS
 
 /// One line of a log in a coupled mode, the link held: deflection θ − ψ, θ̇, θ̈ and the motor's torque.
 struct SpringSample {
-  double deflection{}, rate{}, acceleration{}, torque{};
+  double deflection{}, rate{}, acceleration{}, torque{};  ///< rad, rad/s, rad/s², N m
 };
+/// What a log says of a spring.
 struct IdentifiedSpring {
   double stiffness{}, damping{}, inertia{};                    ///< N m/rad, N m s/rad, kg m²
   double stiffness_sigma{}, damping_sigma{}, inertia_sigma{};  ///< 1 σ

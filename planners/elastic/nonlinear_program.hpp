@@ -14,11 +14,15 @@ namespace unhand::planners::elastic {
 /// A function of some of the program's variables.
 class Term {
  public:
+  /// `variables`: indices into the program's.
   explicit Term(std::vector<int> variables) : variables_(std::move(variables)) {}
   virtual ~Term() = default;
 
+  /// Indices into the program's, in the order in which value() reads them.
   const std::vector<int>& variables() const { return variables_; }
+  /// How many numbers value() writes.
   virtual int outputs() const = 0;
+  /// f(x), x the values of `variables`.
   virtual void value(const double* x, double* f) const = 0;
   /// ∂f/∂x, row by row.
   virtual void jacobian(const double* x, double* J) const = 0;
@@ -34,9 +38,12 @@ class Term {
 template <int Inputs, int Outputs, class Law>
 class TermOf final : public Term {
  public:
+  /// `variables` as many as Inputs.
   TermOf(std::vector<int> variables, Law law) : Term(std::move(variables)), law_(std::move(law)) {}
 
+  /// As Term says.
   int outputs() const override { return Outputs; }
+  /// As Term says.
   void value(const double* x, double* f) const override { law_(x, f); }
   void jacobian(const double* x, double* J) const override {
     using First = ceres::Jet<double, Inputs>;
@@ -62,45 +69,53 @@ class TermOf final : public Term {
 /// min Σ f over the objective's terms, subject to bounds of the variables and of the constraints' terms.
 class NonlinearProgram {
  public:
+  /// A term between bounds.
   struct Constraint {
-    std::unique_ptr<Term> term;
-    std::vector<double> lower, upper;
+    std::unique_ptr<Term> term;        ///< its outputs
+    std::vector<double> lower, upper;  ///< one per output; ±1e19 and beyond: unbounded
   };
 
+  /// Adds a variable and returns its index.
   int add_variable(double lower, double upper, double start);
+  /// Adds a term of one output to the objective.
   void minimise(std::unique_ptr<Term> term) { objective.push_back(std::move(term)); }
+  /// Adds a constraint, one bound per output.
   void constrain(std::unique_ptr<Term> term, std::vector<double> low, std::vector<double> high) {
     constraints.push_back({std::move(term), std::move(low), std::move(high)});
   }
 
-  std::vector<double> lower, upper, start;  ///< of the variables; ±1e19 and beyond: unbounded
-  std::vector<std::unique_ptr<Term>> objective;
-  std::vector<Constraint> constraints;
+  std::vector<double> lower, upper, start;       ///< of the variables; ±1e19 and beyond: unbounded
+  std::vector<std::unique_ptr<Term>> objective;  ///< terms of one output each
+  std::vector<Constraint> constraints;           ///< in order of their addition
 };
 
+/// Tolerance and budgets.
 struct ProgramOptions {
-  int iterations{400};
+  int iterations{400};     ///< at most
   double tolerance{1e-7};  ///< of the scaled optimality error
   double seconds{30};      ///< budget of CPU time
   bool warm{false};        ///< the start is near a solution: begin with a small barrier
 };
 
+/// How a program ended.
 enum class ProgramOutcome {
-  solved,
-  infeasible,  ///< converged to a point that violates the constraints least
-  iterations_spent,
-  time_spent,
-  failed,  ///< the functions could not be evaluated, or the linear algebra broke down
+  solved,            ///< `x` is a local minimum
+  infeasible,        ///< converged to a point that violates the constraints least
+  iterations_spent,  ///< more than the options allow
+  time_spent,        ///< more CPU time than the options allow
+  failed,            ///< the functions could not be evaluated, or the linear algebra broke down
 };
+/// The outcome's name, as it is written above.
 const char* to_string(ProgramOutcome);
 
+/// The minimum, or how far it got.
 struct ProgramSummary {
-  ProgramOutcome outcome{ProgramOutcome::failed};
-  std::vector<double> x;
-  double objective{};
-  double violation{};  ///< largest of the constraints, in their own units
-  int iterations{};
-  double seconds{};  ///< of CPU time
+  ProgramOutcome outcome{ProgramOutcome::failed};  ///< only `solved` has a minimum
+  std::vector<double> x;                           ///< the program's variables
+  double objective{};                              ///< there
+  double violation{};                              ///< largest of the constraints, in their own units
+  int iterations{};                                ///< of the interior point
+  double seconds{};                                ///< of CPU time
 };
 
 /// Solves with IPOPT [WaechterBiegler2006], exact sparse Jacobian and Hessian. Throws std::invalid_argument

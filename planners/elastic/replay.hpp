@@ -13,22 +13,25 @@ inline constexpr int kStates = 2 * kCoordinates;
 
 /// Motor torques over time: parabolas through three values per interval.
 struct TorqueInterval {
-  double begin{}, end{};  ///< s
-  MotorTorques<double> first, middle, last;
+  double begin{}, end{};                     ///< s
+  MotorTorques<double> first, middle, last;  ///< N m, at the begin, middle and end
 };
 
+/// A phase of the schedule.
 struct ScheduledPhase {
-  ClutchMode mode{};
-  double begin{};  ///< s: its clutches close here, with the impact that this takes
+  ClutchMode mode{};  ///< clutches that are engaged
+  double begin{};     ///< s: its clutches close here, with the impact that this takes
 };
 
 /// Torques and a schedule of clutch modes. The clutches switch at time events, where the rates become what
 /// `engage` leaves of them; a spring at its largest deflection ends the run.
 class ClutchedArmSystem final : public dynamics::HybridSystemFrom<ClutchedArmSystem, kStates> {
  public:
+  /// (ξ, ξ̇) [rad, rad/s]
   template <class S>
   using Full = dynamics::State<S, kStates>;
 
+  /// The arm is kept by reference; phases and intervals in order of time.
   ClutchedArmSystem(const ClutchedArm& arm, std::vector<ScheduledPhase> phases,
                     std::vector<TorqueInterval> torques);
 
@@ -41,26 +44,32 @@ class ClutchedArmSystem final : public dynamics::HybridSystemFrom<ClutchedArmSys
     return {"spring at its stop", dynamics::Crossing::falling, false};
   }
 
+  /// The begins of phases and intervals [s].
   template <class S>
   void time_events_(std::vector<S>& out) const {
     out.clear();
     for (const TorqueInterval& one : torques_) out.push_back(S(one.begin));
   }
+  /// d/dt (ξ, ξ̇) in the phase's mode.
   template <class S>
   void flow_(const dynamics::Phase& phase, const S& t, const Full<S>& y, Full<S>& dy) const;
+  /// The spring's deflection against its largest one.
   template <class S>
   void guards_(const dynamics::Phase&, const S&, const Full<S>& y, S* g) const {
     const S share = (y[0] - y[1]) / arm_.last.deflection;
     g[0] = 1.0 - share * share;
   }
+  /// To the mode after the last phase, which ends the run.
   template <class S>
   dynamics::Entry<S, kStates> on_guard_(const dynamics::Phase&, int, const S& t, const Full<S>& y) const {
     return {spring_stop(), t, y, S(0.0)};
   }
+  /// The next phase, its clutches closing by `engage`.
   template <class S>
   dynamics::Entry<S, kStates> on_time_(int mode, const dynamics::Window& window, const S& t,
                                        const Full<S>& y) const;
 
+  /// The clutches of a phase; the arm's own modes are phases.
   ClutchMode clutches(int mode) const { return phases_[mode].mode; }
   /// The torques at t, in the interval that holds at the right of `begin`.
   template <class S>
@@ -72,28 +81,32 @@ class ClutchedArmSystem final : public dynamics::HybridSystemFrom<ClutchedArmSys
   std::vector<TorqueInterval> torques_;
 };
 
+/// One instant of a run.
 struct ReplaySample {
-  double t{};
-  ClutchMode mode{};
-  Coordinates<double> at, rate;
-  MotorTorques<double> torque;
+  double t{};                    ///< s
+  ClutchMode mode{};             ///< clutches that are engaged
+  Coordinates<double> at, rate;  ///< ξ [rad]; ξ̇ [rad/s]
+  MotorTorques<double> torque;   ///< N m
 };
 
 /// The largest share of each limit that is used, 1 = at the limit.
 struct LimitUse {
-  double angle{}, speed{}, torque{}, motor_speed{}, motor_torque{}, deflection{}, brake{};
+  double angle{}, speed{}, torque{}, motor_speed{}, motor_torque{}, deflection{}, brake{};  ///< shares [-]
+  /// The largest of them.
   double largest() const;
 };
 
+/// How a run ended, and what it used.
 struct Replay {
-  dynamics::Outcome outcome{};
+  dynamics::Outcome outcome{};        ///< how the integrator ended
   bool spring_stop{};                 ///< the spring came to its largest deflection
   std::vector<ReplaySample> samples;  ///< dense
-  TipState<double> release;
-  LimitUse use;
+  TipState<double> release;           ///< the tip at the end
+  LimitUse use;                       ///< over the run
   // Energy from start to end [J]: work of the motors − damping − friction − clutch impacts = gain, but for
   // `unexplained`.
-  double motor_work{}, damping{}, friction{}, impacts{}, gain{};
+  double motor_work{}, damping{}, friction{}, impacts{}, gain{};  ///< J
+  /// What the balance lacks [J]: the error of quadrature and integrator.
   double unexplained() const { return motor_work - damping - friction - impacts - gain; }
 };
 

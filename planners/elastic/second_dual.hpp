@@ -11,11 +11,11 @@ namespace unhand::planners::elastic {
 /// row by row, (0,0), (1,0), (1,1), (2,0), ...
 template <int N>
 struct SecondDual {
-  static constexpr int kPairs = N * (N + 1) / 2;
+  static constexpr int kPairs = N * (N + 1) / 2;  ///< entries of the packed triangle
 
-  double a{};
-  std::array<double, N> v{};
-  std::array<double, kPairs> h{};
+  double a{};                      ///< the value
+  std::array<double, N> v{};       ///< the gradient
+  std::array<double, kPairs> h{};  ///< the Hessian, packed
 
   SecondDual() = default;
   SecondDual(double value) : a(value) {}  // NOLINT: a constant is a number
@@ -26,6 +26,8 @@ struct SecondDual {
     return out;
   }
 
+  /// Sum, product and quotient, with both derivatives.
+  /// @{
   SecondDual& operator+=(const SecondDual& b) {
     a += b.a;
     for (int i = 0; i < N; ++i) v[i] += b.v[i];
@@ -46,6 +48,7 @@ struct SecondDual {
   }
   SecondDual& operator*=(const SecondDual& b) { return *this = *this * b; }
   SecondDual& operator/=(const SecondDual& b) { return *this = *this / b; }
+  /// @}
 
   /// f(x) from f, f' and f'' at x.
   SecondDual chain(double f, double df, double ddf) const {
@@ -56,6 +59,8 @@ struct SecondDual {
     return out;
   }
 
+  /// Arithmetic, with both derivatives; comparisons look at the value alone.
+  /// @{
   friend SecondDual operator+(SecondDual x, const SecondDual& y) { return x += y; }
   friend SecondDual operator-(SecondDual x, const SecondDual& y) { return x -= y; }
   friend SecondDual operator-(SecondDual x) { return x *= -1; }
@@ -77,7 +82,10 @@ struct SecondDual {
   friend bool operator<(const SecondDual& x, const SecondDual& y) { return x.a < y.a; }
   friend bool operator>(const SecondDual& x, const SecondDual& y) { return x.a > y.a; }
   friend bool operator==(const SecondDual& x, const SecondDual& y) { return x.a == y.a; }
+  /// @}
 
+  /// Functions, with both derivatives.
+  /// @{
   friend SecondDual sin(const SecondDual& x) {
     const double s = std::sin(x.a), c = std::cos(x.a);
     return x.chain(s, c, -s);
@@ -94,17 +102,22 @@ struct SecondDual {
     const double e = std::exp(x.a);
     return x.chain(e, e, e);
   }
+  /// @}
 };
 
 }  // namespace unhand::planners::elastic
 
 namespace Eigen {
 
+/// Lets Eigen take SecondDual for a scalar.
 template <int N>
 struct NumTraits<unhand::planners::elastic::SecondDual<N>> : GenericNumTraits<double> {
+  /// As Eigen asks.
+  /// @{
   using Real = unhand::planners::elastic::SecondDual<N>;
   using NonInteger = Real;
   using Nested = Real;
+  /// @}
   enum {
     IsComplex = 0,
     IsInteger = 0,
@@ -115,12 +128,16 @@ struct NumTraits<unhand::planners::elastic::SecondDual<N>> : GenericNumTraits<do
     MulCost = N * N
   };
 };
+/// Products with constants.
 template <int N, class Op>
 struct ScalarBinaryOpTraits<unhand::planners::elastic::SecondDual<N>, double, Op> {
+  /// As Eigen asks.
   using ReturnType = unhand::planners::elastic::SecondDual<N>;
 };
+/// Products with constants.
 template <int N, class Op>
 struct ScalarBinaryOpTraits<double, unhand::planners::elastic::SecondDual<N>, Op> {
+  /// As Eigen asks.
   using ReturnType = unhand::planners::elastic::SecondDual<N>;
 };
 

@@ -23,10 +23,12 @@ enum class Drive {
   passive,   ///< a spring with a fixed equilibrium angle, chosen once: the elastic wrist of [DarkoD46] 3.2
   locked,    ///< the last joint held at an angle, chosen once: a rigid wrist
 };
+/// The drive's name, as it is written above.
 const char* to_string(Drive);
 
+/// What throw is asked for.
 struct ThrowTask {
-  Drive drive{Drive::clutched};
+  Drive drive{Drive::clutched};  ///< how the last joint is driven
   std::optional<Target>
       target;  ///< none: the tip's speed is maximised; else the smoothest throw to it is sought
   std::optional<Links<double>> start;  ///< pose at the start [rad]; none: free. The arm starts at rest, its
@@ -41,33 +43,38 @@ struct ThrowTask {
 
 struct ElasticThrow;
 
+/// How the program is made and solved.
 struct ThrowProgramOptions {
   int intervals{16};  ///< per phase of the clutched drive; one phase of twice as many for the others. >= 2
   unsigned seed{1};   ///< of the random start
   const ElasticThrow* near{};  ///< start from this solution of a neighbouring task instead
-  ProgramOptions program;
+  ProgramOptions program;      ///< tolerance and budgets
 };
 
 /// One collocation point.
 struct ThrowPoint {
-  double t{};  ///< s
-  Coordinates<double> at, rate, acceleration;
-  MotorTorques<double> torque;  ///< N m
+  double t{};                                  ///< s
+  Coordinates<double> at, rate, acceleration;  ///< ξ, ξ̇, ξ̈ [rad, rad/s, rad/s²]
+  MotorTorques<double> torque;                 ///< N m
 };
 
 /// One phase: 2 n + 1 points, nodes and middles in turn.
 struct ThrowPhase {
-  ClutchMode mode{};
-  std::vector<ThrowPoint> points;
+  ClutchMode mode{};               ///< clutches that are engaged
+  std::vector<ThrowPoint> points;  ///< in order of time
 };
 
+/// A planned throw.
 struct ElasticThrow {
-  ProgramSummary program;
-  std::vector<ThrowPhase> phases;
-  TipState<double> release;
+  ProgramSummary program;          ///< how the solver ended
+  std::vector<ThrowPhase> phases;  ///< in order of time
+  TipState<double> release;        ///< the tip at the end
 
+  /// Whether the solver found a local minimum.
   bool solved() const { return program.outcome == ProgramOutcome::solved; }
+  /// Of the tip at the release [m/s].
   double speed() const { return std::hypot(release.vx, release.vz); }
+  /// From rest to the release [s].
   double duration() const { return phases.back().points.back().t; }
 };
 

@@ -10,23 +10,25 @@ namespace unhand::planners::elastic {
 
 /// Solutions of one task from random starts whose objectives agree within `share`.
 struct Basin {
-  ElasticThrow best;
-  int starts{};  ///< that ended here
+  ElasticThrow best;  ///< of its solutions
+  int starts{};       ///< that ended here
 };
+/// The local minima that random starts lead to.
 struct Basins {
   std::vector<Basin> found;  ///< best first
   int failed{};              ///< starts that ended nowhere
   double longest{};          ///< CPU time of the longest solve [s]
   int failed_by_budget{};    ///< of those, spent iterations or time
 };
+/// Solves from `starts` random starts.
 Basins find_basins(const ClutchedArm& arm, const ThrowTask& task, const ThrowProgramOptions& options,
                    int starts, double share = 0.01);
 
 /// Throws to targets at one height, by increasing distance.
 struct ThrowTable {
-  double height{};  ///< z of all targets [m]
-  std::vector<double> distances;
-  std::vector<ElasticThrow> throws;
+  double height{};                   ///< z of all targets [m]
+  std::vector<double> distances;     ///< of the targets, increasing [m]
+  std::vector<ElasticThrow> throws;  ///< one per distance
 };
 
 /// Solves the task for each distance [m], increasing, at least four: the middle one from `starts` random
@@ -41,11 +43,12 @@ ElasticThrow interpolate(const ThrowTable& table, double distance);
 
 /// One target of a dense check: the interpolated throw run by the integrator.
 struct TableCheck {
-  double distance{};
+  double distance{};   ///< of the target [m]
   double miss{};       ///< landing − target [m]
   double limit_use{};  ///< largest share of any limit; <= 1: none is exceeded
   bool lands{};        ///< the run came to its end and the object comes down to the height
 };
+/// At `count` distances spread evenly over the table.
 std::vector<TableCheck> check_table(const ClutchedArm& arm, const ThrowTable& table, int count,
                                     double gravity = 9.81);
 

@@ -9,6 +9,7 @@
 
 namespace unhand::planners::elastic {
 
+/// A term, owned by the program that it is added to.
 using TermPointer = std::unique_ptr<Term>;
 
 /// Accelerations enter the program divided by this [rad/s²], so that all unknowns are of order one.
@@ -16,12 +17,13 @@ inline constexpr double kAcceleration = 50;
 
 /// Where the object is to come down, released from the tip at once: [m] in the arm's plane.
 struct Target {
-  double x{}, z{};
+  double x{}, z{};  ///< m
 };
 
 /// (x₀, x_m, x₁, ẋ₀, ẋ_m, ẋ₁, h), ẋ given in units of `scale`: x₁ − x₀ − h/6 (ẋ₀ + 4 ẋ_m + ẋ₁) and
 /// x_m − ½ (x₀ + x₁) − h/8 (ẋ₀ − ẋ₁) [HargravesParis1987].
 TermPointer hermite_simpson(std::vector<int> variables, double scale);
+/// (x) -> weight x².
 TermPointer weighted_square(std::vector<int> variables, double weight);
 /// Rows of factors times the variables.
 TermPointer linear(std::vector<int> variables, std::vector<double> factors);

@@ -27,8 +27,9 @@ ArmBody declared_body(const FlipRobot& robot, const Bar& bar);
 /// The reference while accelerating, t from 0 to `duration`: q̇_r = s q̇_s (3 τ² − 2 τ³), τ = t/duration, so
 /// that it ends in (q_d, s q̇_s) without acceleration; it starts at rest, at q_d − ½ s q̇_s duration.
 struct FlipReference {
-  Joints q, qd;
+  Joints q, qd;  ///< rad; rad/s
 };
+/// The reference at t [s].
 FlipReference reference_at(const FlipMotion& motion, const FlipCommand& u, double t);
 /// q_d = q_s + γ/N, over the N joints that throw.
 Joints throwing_pose(const FlipMotion& motion, const FlipCommand& u);
@@ -37,6 +38,7 @@ Joints throwing_pose(const FlipMotion& motion, const FlipCommand& u);
 /// limits of position, velocity or acceleration.
 void check_reference(const FlipRobot& robot, const FlipCommand& u);
 
+/// How finely the arm is integrated.
 struct ArmOptions {
   int substeps{1};  ///< integration steps in a control step
   double noise{0};  ///< factor on the sensors' and torques' noise
@@ -48,10 +50,11 @@ struct ArmUse {
   int cut_torque{}, cut_rate{};             ///< control steps in which a joint's command was
 };
 
+/// The hand's motion, and what it took.
 struct ArmThrow {
   release::PolynomialHand hand;  ///< in the vertical plane y = 0; t = 0 is the brake's start
-  ArmUse use;
-  double beside{};  ///< most that the pads were beside the plane after the brake's start [m]
+  ArmUse use;                    ///< over acceleration and brake
+  double beside{};               ///< most that the pads were beside the plane after the brake's start [m]
 };
 
 /// Simulates to the brake's start once; braking can then be simulated with different loads on the hand.
@@ -61,6 +64,7 @@ struct ArmThrow {
 /// are held over a control step. Commands are cut to the torque limits and to `torque_rate`.
 class ThrowingArm {
  public:
+  /// Simulates the acceleration. Equal seeds give equal noise.
   ThrowingArm(const FlipRobot& robot, const ArmBody& body, const FlipCommand& u, std::uint64_t noise_seed,
               const ArmOptions& options = {});
 

@@ -19,7 +19,7 @@ using DetachVector = std::array<double, 6>;
 /// Where the bar lands: x forward of the robot's base [m] at height 0, and its angle from hanging straight
 /// down, θ + π/2, not wrapped [rad]; [LiuDaCostaBillard2025] counts it so.
 struct FlipPose {
-  double x{}, angle{};
+  double x{}, angle{};  ///< m; rad
 };
 inline constexpr double kFromHanging = 1.5707963267948966;  ///< [rad]
 
@@ -28,15 +28,16 @@ std::optional<FlipPose> fly_flip(const DetachVector& detach);
 
 /// How one bar is held and let go.
 struct HeldBar {
-  Bar bar;
-  double angle{};  ///< of the bar against the hand [rad]
-  Gripper gripper;
-  Pads pads;
+  Bar bar;          ///< what is held
+  double angle{};   ///< of the bar against the hand [rad]
+  Gripper gripper;  ///< how it opens
+  Pads pads;        ///< what holds
 };
 
+/// How a bar left the hand.
 struct FlipRelease {
-  double time{};  ///< of the detach, after the gripper's command [s]
-  DetachVector detach{};
+  double time{};                 ///< of the detach, after the gripper's command [s]
+  DetachVector detach{};         ///< m, m, rad, m/s, m/s, rad/s
   std::array<double, 6> hand{};  ///< pose and twist of the hand then, in the same order
   double turned{};               ///< of the bar against the hand until then [rad]
 };

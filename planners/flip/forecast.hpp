@@ -15,11 +15,16 @@ namespace unhand::planners::flip {
 /// that is learned, so all learners may share them. Building it takes some 3 ms for each mesh point.
 class HandLibrary {
  public:
+  /// Simulates `per_side`³ commands; the robot is kept by reference.
   HandLibrary(const FlipRobot& robot, const Bar& bar, int per_side = 7);
 
+  /// The declared robot.
   const FlipRobot& robot() const { return robot_; }
+  /// The bar that its hands hold.
   const Bar& bar() const { return bar_; }
+  /// The mesh.
   const std::vector<FlipCommand>& commands() const { return commands_; }
+  /// The motion of the hand for command i of the mesh.
   const release::PolynomialHand& hand(std::size_t i) const { return hands_[i]; }
   double spacing() const { return spacing_; }  ///< of the mesh, as a fraction of the range
   /// Of any command; simulated now.
@@ -45,10 +50,11 @@ std::optional<FlipRelease> predicted_release(const release::HandMotion& hand, co
 /// have, 1 σ of x, z [m], θ [rad] and their rates [m/s, m/s, rad/s].
 inline constexpr DetachVector kDiscrepancy{0.01, 0.01, 0.15, 0.05, 0.05, 0.6};
 
+/// The card that explains throws best.
 struct ReleaseFit {
-  ReleaseCard card;       ///< σ: posterior, of the parameters that are Uncertain
-  double length_sigma{};  ///< of card.length [m]
-  int iterations{};
+  ReleaseCard card;                    ///< σ: posterior, of the parameters that are Uncertain
+  double length_sigma{};               ///< of card.length [m]
+  int iterations{};                    ///< of Gauss-Newton
   double cost_before{}, cost_after{};  ///< sum of squares in σ, prior included
 };
 /// The card that explains throws of the library's bar best: mu, length, dead time and opening time by

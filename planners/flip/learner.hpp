@@ -15,8 +15,9 @@
 
 namespace unhand::planners::flip {
 
+/// Where a bar is to land, and how exactly.
 struct FlipTarget {
-  FlipPose pose;
+  FlipPose pose;                                ///< x* [m], θ* [rad]
   double tolerance_x{0.05};                     ///< ε_x [m]
   double tolerance_angle{0.78539816339744831};  ///< ε_θ [rad]
 };
@@ -28,14 +29,15 @@ bool hits(const FlipPose& landing, const FlipTarget& target);
 
 /// What is kept of the throws of one command: means over those that landed.
 struct FlipDatum {
-  FlipCommand command;
-  DetachVector detach{};
-  FlipPose landing;
-  int throws{};  ///< that landed
+  FlipCommand command;    ///< thrown
+  DetachVector detach{};  ///< m, m, rad, m/s, m/s, rad/s
+  FlipPose landing;       ///< m, rad
+  int throws{};           ///< that landed
 };
 /// Empty where none landed.
 std::optional<FlipDatum> mean_of(std::span<const FlipTrial> trials);
 
+/// Something that says which command to try next.
 class FlipLearner {
  public:
   virtual ~FlipLearner() = default;
@@ -59,9 +61,9 @@ struct ConeSearch {
 
 /// What Σ α_i (y_{i+1} − y_1) is added to, and its prediction, at the best mesh point.
 struct ConeStep {
-  FlipCommand command;
-  FlipPose predicted;
-  double error{};
+  FlipCommand command;  ///< to try
+  FlipPose predicted;   ///< its landing
+  double error{};       ///< normalised, of the prediction [-]
 };
 /// Searches the mesh for the command whose prediction is nearest to the target; commands out of range, and
 /// those in `tried`, are passed over. Deltas come from `simplex`, prediction and command start at `base` (the
@@ -76,10 +78,12 @@ std::optional<ConeStep> cone_search(ForwardModel model, const FlipDatum& base,
 /// last throws changed nothing about which those are.
 class ConeLearner final : public FlipLearner {
  public:
+  /// `support`: what is known before, at least three throws of different commands.
   ConeLearner(ForwardModel model, std::vector<FlipDatum> support, const FlipTarget& target,
               const CommandRange& range, const ConeSearch& search = {});
   std::optional<FlipCommand> next() override;
   void observe(std::span<const FlipTrial> trials) override;
+  /// All data so far, in the order of arrival.
   const std::vector<FlipDatum>& data() const { return data_; }
 
  private:

@@ -8,25 +8,28 @@
 
 namespace unhand::planners::flip {
 
+/// How a throw ended.
 enum class FlipOutcome {
-  landed,
+  landed,       ///< at height 0
   not_let_go,   ///< the bar was not free in time, or the release was not solved
   never_lands,  ///< it does not come down to height 0
 };
+/// The outcome's name, as it is written above.
 const char* to_string(FlipOutcome);
 
 /// What a throw shows, with the sensors' noise; [LiuDaCostaBillard2025]'s (u, q^h, v^h, q^o, v^o, q^land).
 struct FlipTrial {
-  FlipCommand command;
-  FlipOutcome outcome{};
+  FlipCommand command;           ///< as given
+  FlipOutcome outcome{};         ///< only `landed` has a landing
   std::array<double, 6> hand{};  ///< pose and twist of the hand at detach
-  DetachVector detach{};
-  FlipPose landing;
-  ArmUse use;  ///< of the joints' limits, as the robot reports it
+  DetachVector detach{};         ///< m, m, rad, m/s, m/s, rad/s
+  FlipPose landing;              ///< m, rad
+  ArmUse use;                    ///< of the joints' limits, as the robot reports it
 };
 
+/// How the plant is simulated.
 struct PlantOptions {
-  ArmOptions arm{1, 1.0};
+  ArmOptions arm{1, 1.0};  ///< integration steps and noise
   int reaction_passes{1};  ///< the hand's motion is found again under the wrench that the bar exerts on it
 };
 

@@ -16,9 +16,10 @@ namespace unhand::planners::flip {
 struct LeftOver {
   std::array<double, 3> at{};  ///< the command, as fractions of the range
   double com_offset{};         ///< of the bar [m]
-  DetachVector value{};
-  int throws{1};  ///< that it is the mean of
+  DetachVector value{};        ///< observed minus predicted
+  int throws{1};               ///< that it is the mean of
 };
+/// Of data with a predicted release.
 std::vector<LeftOver> left_over(const HandLibrary& library, const ReleaseCard& card,
                                 std::span<const FlipDatum> data);
 
@@ -27,8 +28,9 @@ std::vector<LeftOver> left_over(const HandLibrary& library, const ReleaseCard& c
 struct ThrowScatter {
   double x{}, angle{};    ///< of the landing [m², rad²]
   DetachVector detach{};  ///< of the bar's point between the pads
-  int freedom{};
+  int freedom{};          ///< degrees of freedom
 };
+/// Of throws of any commands, `com_offset` [m] that of their bar.
 ThrowScatter scatter_of(std::span<const FlipTrial> trials, double com_offset);
 
 /// A Gaussian process for each component of what is left over:
@@ -37,11 +39,15 @@ ThrowScatter scatter_of(std::span<const FlipTrial> trials, double com_offset);
 /// factors of two, with the largest evidence.
 class LeftOverField {
  public:
+  /// Takes new samples, `throw_variance` that of one throw, and chooses σ_j again.
   void set(std::vector<LeftOver> samples, const DetachVector& throw_variance);
+  /// What is expected to be left over, and its variance.
   struct At {
-    DetachVector mean{}, variance{};
+    DetachVector mean{}, variance{};  ///< in DetachVector's units, and squared
   };
+  /// At a command, in fractions of the range, for a bar of that `com_offset` [m].
   At at(const std::array<double, 3>& fractions, double com_offset) const;
+  /// σ_j as chosen, in DetachVector's units.
   const DetachVector& sigma() const { return sigma_; }
 
  private:
@@ -53,11 +59,12 @@ class LeftOverField {
 
 /// What model 4 says of a command.
 struct FlipForecast {
-  FlipPose mean;
+  FlipPose mean;                                   ///< of the landings
   double sigma_x{}, sigma_angle{}, correlation{};  ///< of what is not known of the command's mean landing
   double probability{};                            ///< that all throws of it land within the tolerances
 };
 
+/// Model 4: tries the command that most probably lands within the tolerances.
 class ReleaseLearner final : public FlipLearner {
  public:
   /// `known`: what was left over of earlier throws, of this bar or another one. `throws`: of each command.

@@ -9,22 +9,27 @@
 
 namespace unhand::planners::flip {
 
+/// One number per joint, in the chain's order.
 using Joints = JointVector<double>;
 
 /// u = (γ, s, D) [LiuDaCostaBillard2025]: pitch [rad], speed [-], damping of the brake [N m s/rad].
 struct FlipCommand {
-  double pitch{}, speed{}, damping{};
+  double pitch{}, speed{}, damping{};  ///< rad; -; N m s/rad
+  /// (pitch, speed, damping)
   std::array<double, 3> array() const { return {pitch, speed, damping}; }
   bool operator==(const FlipCommand&) const = default;
 };
 
 /// The commands that may be given, ends included.
 struct CommandRange {
-  FlipCommand low, high;
+  FlipCommand low, high;  ///< low <= high in each
+  /// Whether a command is in the range.
   bool holds(const FlipCommand& u) const;
+  /// The nearest command of the range.
   FlipCommand clamp(const FlipCommand& u) const;
   /// The command at fractions of the range, each from 0 to 1, and back.
   FlipCommand at(double pitch, double speed, double damping) const;
+  /// Where in the range a command is, 0 to 1 in each.
   std::array<double, 3> fractions(const FlipCommand& u) const;
 };
 
@@ -37,10 +42,10 @@ struct Bar {
 
 /// The motion family: accelerate to (q_d, s q̇_s), q_d = q_s + γ/N over the N joints that throw, then brake.
 struct FlipMotion {
-  Joints pose, rate;  ///< q_s [rad], q̇_s [rad/s]; the joints that throw are those with q̇_s ≠ 0
-  double duration{};  ///< of the acceleration [s]
-  double window{};    ///< from the brake's start; the bar must be free before [s]
-  CommandRange range;
+  Joints pose, rate;   ///< q_s [rad], q̇_s [rad/s]; the joints that throw are those with q̇_s ≠ 0
+  double duration{};   ///< of the acceleration [s]
+  double window{};     ///< from the brake's start; the bar must be free before [s]
+  CommandRange range;  ///< that may be given
 };
 
 /// Joint impedance control, τ = K (q_r − q) + D (q̇_r − q̇) + what the model says of gravity and Coriolis.
@@ -51,6 +56,7 @@ struct FlipControl {
   double torque_rate{};               ///< of each joint's command, at most [N m/s]
 };
 
+/// How the gripper opens.
 struct Gripper {
   double grip_force{};    ///< of one pad [N]
   double dead_time{};     ///< from the command to the first change of the force [s]
@@ -58,11 +64,12 @@ struct Gripper {
   double shape{};         ///< p of contact::OpeningProfile [-]
 };
 
+/// What holds the bar.
 struct Pads {
   std::string law;  ///< a contact model's name
   double mu{};      ///< [-]
   double length{};  ///< L = τ_max/f_max [m]
-  int count{2};
+  int count{2};     ///< n >= 1
 };
 
 /// 1 σ of what differs from robot to robot and stays as it is for one. Shares are of the declared value.
@@ -89,17 +96,18 @@ struct FlipSensors {
   double landing{}, landing_turn{};             ///< [m, rad]
 };
 
+/// All that is declared of a robot and of how robots differ.
 struct FlipRobot {
-  std::string name;
-  Chain chain;  ///< with the hand, up to the middle of the pads, without a bar
-  FlipMotion motion;
-  FlipControl control;
-  Gripper gripper;
-  Pads pads;
-  Bar bar;
-  RobotSpread robots;
-  ThrowSpread throws;
-  FlipSensors sensors;
+  std::string name;     ///< for reports
+  Chain chain;          ///< with the hand, up to the middle of the pads, without a bar
+  FlipMotion motion;    ///< how it throws
+  FlipControl control;  ///< how its joints are driven
+  Gripper gripper;      ///< how it opens
+  Pads pads;            ///< what holds
+  Bar bar;              ///< what it throws
+  RobotSpread robots;   ///< between robots
+  ThrowSpread throws;   ///< between throws
+  FlipSensors sensors;  ///< of what is measured
 };
 
 /// The text of planners/flip/robot.toml, which comes with the library as "panda-flip" and says what each key

@@ -12,11 +12,12 @@ namespace unhand::planners::flip {
 /// throws within it: together with the robot's seed they determine the throw's luck, the same for every
 /// learner.
 struct TrialRequest {
-  std::string stage;
-  int index{};
-  FlipCommand command;
-  Bar bar;
+  std::string stage;    ///< part of the work
+  int index{};          ///< of the throw within the stage, from 0
+  FlipCommand command;  ///< to execute
+  Bar bar;              ///< in the hand
 };
+/// Executes a request and says what was seen.
 using Thrower = std::function<FlipTrial(const TrialRequest&)>;
 /// A thrower that asks the plant.
 Thrower thrower_of(const FlipPlant& plant, std::uint64_t seed);
@@ -28,30 +29,34 @@ std::vector<FlipCommand> support_simplex(const CommandRange& range, double inset
 
 /// Throws each command `repeats` times and keeps means (of those commands that landed at all).
 struct Gathered {
-  std::vector<FlipDatum> data;
-  std::vector<FlipTrial> trials;
+  std::vector<FlipDatum> data;    ///< one per command that landed
+  std::vector<FlipTrial> trials;  ///< all of them
 };
+/// See Gathered.
 Gathered gather(const Thrower& thrower, const std::string& stage, std::span<const FlipCommand> commands,
                 int repeats, const Bar& bar);
 
+/// How long a session lasts.
 struct PathOptions {
-  int iterations{5};
-  int throws{3};  ///< of each command
-  bool stop_at_success{false};
+  int iterations{5};            ///< commands tried
+  int throws{3};                ///< of each command
+  bool stop_at_success{false};  ///< once an iteration's mean is within the tolerances
 };
 
+/// One iteration of a learner.
 struct PathIteration {
-  FlipCommand command;
-  std::vector<FlipTrial> trials;
-  std::optional<FlipPose> mean;  ///< of the landings; empty where none landed
-  double error{};                ///< normalised, of the mean; infinite where none landed
-  int hits{};                    ///< throws within the tolerances
+  FlipCommand command;            ///< tried
+  std::vector<FlipTrial> trials;  ///< its throws
+  std::optional<FlipPose> mean;   ///< of the landings; empty where none landed
+  double error{};                 ///< normalised, of the mean; infinite where none landed
+  int hits{};                     ///< throws within the tolerances
 };
 
+/// What a learner reached, iteration by iteration.
 struct LearningPath {
-  double initial{};  ///< lowest error of what was known before
-  std::vector<PathIteration> iterations;
-  bool gave_up{};  ///< the learner had no command left to try
+  double initial{};                       ///< lowest error of what was known before
+  std::vector<PathIteration> iterations;  ///< in order
+  bool gave_up{};                         ///< the learner had no command left to try
 
   double first() const;    ///< error after the first iteration
   double minimum() const;  ///< lowest error, the initial one included
@@ -59,6 +64,7 @@ struct LearningPath {
   int reached(int hits) const;
 };
 
+/// Lets a learner try commands one after the other; `known` is what its target's error is counted against.
 LearningPath learn(FlipLearner& learner, const FlipTarget& target, std::span<const FlipDatum> known,
                    const Bar& bar, const Thrower& thrower, const PathOptions& options = {});
 

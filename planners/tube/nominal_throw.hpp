@@ -11,19 +11,21 @@ namespace unhand::planners {
 
 /// A box to hit: its middle B in the base's frame [m], and its opening along the base's x and y [m].
 struct TargetBox {
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  double length_x{0.15}, length_y{0.15};
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();  ///< m, in the base's frame
+  double length_x{0.15}, length_y{0.15};             ///< m, > 0
 
   /// Half of what the box allows along a level direction through its middle [m].
   double half_length(const Eigen::Vector2d& direction) const;
+  /// Whether a landing that is off by so much [m] is in the box.
   bool holds(double off_x, double off_y) const {
     return std::abs(off_x) <= length_x / 2 && std::abs(off_y) <= length_y / 2;
   }
 };
 
+/// What throws are looked for, and how long.
 struct NominalOptions {
-  double window{0.1};  ///< the arm must be able to go on for so long [s]
-  flight::Medium medium{};
+  double window{0.1};                            ///< the arm must be able to go on for so long [s]
+  flight::Medium medium{};                       ///< of the flight
   flight::LandingSet landing{.half_length = 1};  ///< velocities at the landing; its length is the box's
   int samples{3000};                             ///< configurations looked at
   int refined{10};                               ///< best ones improved by small steps
@@ -33,20 +35,20 @@ struct NominalOptions {
   double speed_reserve{0.02};                    ///< of the joints' velocity limits, kept free
   /// The arm as a planar one: joints named here stay at the given angle, and the first turns to the target.
   struct Fixed {
-    int joint;
-    double angle;
+    int joint;     ///< index
+    double angle;  ///< rad
   };
-  std::vector<Fixed> fixed;
-  bool face_target{false};
+  std::vector<Fixed> fixed;  ///< joints that do not move
+  bool face_target{false};   ///< whether the first joint turns to the target
 };
 
 /// A throw, and what it leaves free: 1 − the largest use of a joint's velocity; the room that the joints have
 /// before and after for speeding up and braking, over half their range; and −f of the tube. The margin is the
 /// smallest of them.
 struct NominalThrow {
-  ThrowState state;
-  double margin{}, speed_margin{}, position_margin{}, tube_margin{};
-  double speed{}, elevation{};  ///< of the tip [m/s, rad]
+  ThrowState state;                                                   ///< when the gripper is told to open
+  double margin{}, speed_margin{}, position_margin{}, tube_margin{};  ///< [-]; the first is the least
+  double speed{}, elevation{};                                        ///< of the tip [m/s, rad]
 };
 
 /// Configurations from a low-discrepancy sequence; at each, elevations whose parabola (with drag: whose

@@ -10,6 +10,7 @@
 
 namespace unhand::planners {
 
+/// How the arm moves before and after the window.
 struct MotionOptions {
   double window{0.1};              ///< T [s], from the instant at which the gripper is told to open
   double velocity_share{0.95};     ///< of the joints' limits that speeding up and braking use
@@ -23,33 +24,37 @@ std::optional<JointTrajectory> throw_motion(const Chain& chain, const JointVecto
                                             const ThrowState& state, const JointVector<double>& qdd,
                                             const MotionOptions& options = {});
 
+/// What a whole throw may be.
 struct PlanOptions {
   NominalOptions search;     ///< window and medium are those of all parts
   MotionOptions motion;      ///< its window is the search's
   JointVector<double> home;  ///< where the arm rests before; empty: middle_of
   bool tube{true};           ///< false: no acceleration in the window, for comparison
   bool refine{true};         ///< go on from Tube-CVX to refine_tube
-  int landing_samples{21};
-  double check_step{1e-3};  ///< of the dense check of limits [s]
+  int landing_samples{21};   ///< instants of the window at which landings are reported
+  double check_step{1e-3};   ///< of the dense check of limits [s]
 };
 
+/// How planning ended.
 enum class PlanOutcome {
-  planned,
+  planned,    ///< a plan was found
   no_throw,   ///< no configuration reaches the box within the limits
   no_tube,    ///< none of the throws has a tube acceleration that lands in the box from the whole window
   no_motion,  ///< no motion to any of them stays within the limits
 };
+/// The outcome's name, as it is written above.
 const char* to_string(PlanOutcome);
 
+/// A whole throw, and how it lands.
 struct ThrowPlan {
-  NominalThrow nominal;
-  TubeSolution tube;        ///< of Tube-CVX
-  JointVector<double> qdd;  ///< what the motion holds: q̈_tube, refined, or none
-  JointTrajectory motion;
+  NominalThrow nominal;                           ///< the state that it was planned for
+  TubeSolution tube;                              ///< of Tube-CVX
+  JointVector<double> qdd;                        ///< what the motion holds: q̈_tube, refined, or none
+  JointTrajectory motion;                         ///< from rest to rest
   LimitCheck limits;                              ///< of the motion, looked at densely
   std::vector<LandingAt> landings;                ///< over the window, with qdd
   std::vector<LandingAt> tube_landings, at_rest;  ///< the same with q̈_tube, and with none
-  double acceleration_share{};
+  double acceleration_share{};  ///< share of the limits that speeding up and braking used [-]
 };
 
 /// The middle of all joints' ranges; 0 where there is none.
@@ -58,12 +63,13 @@ JointVector<double> middle_of(const Chain& chain);
 /// Largest distance of a landing from the middle [m]; infinite if one does not land.
 double largest_miss(const std::vector<LandingAt>& landings);
 
+/// A plan, or why there is none.
 struct PlanResult {
-  PlanOutcome outcome{};
-  std::string reason;  ///< of the best throw that failed, where nothing was planned
-  std::optional<ThrowPlan> plan;
-  int throws{};  ///< found by the search
-  int tried{};   ///< of them, until one went all the way
+  PlanOutcome outcome{};          ///< only `planned` has a plan
+  std::string reason;             ///< of the best throw that failed, where nothing was planned
+  std::optional<ThrowPlan> plan;  ///< the answer
+  int throws{};                   ///< found by the search
+  int tried{};                    ///< of them, until one went all the way
 };
 
 /// Tries the throws of find_throws in order of their margin. The same options give the same plan.

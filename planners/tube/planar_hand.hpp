@@ -12,8 +12,8 @@ namespace unhand::planners {
 /// The vertical plane through a tip and its target, as the release's world: x forward of the target, z the
 /// height in the base's frame [m].
 struct ThrowPlane {
-  Eigen::Vector2d along{1, 0};  ///< in the base's x and y
-  Eigen::Vector3d target = Eigen::Vector3d::Zero();
+  Eigen::Vector2d along{1, 0};                       ///< in the base's x and y
+  Eigen::Vector3d target = Eigen::Vector3d::Zero();  ///< in the base's frame [m]
 
   /// Throws std::invalid_argument where the tip is right above the target.
   ThrowPlane(const Eigen::Vector3d& tip, const Eigen::Vector3d& target_);
@@ -32,7 +32,7 @@ struct ThrowPlane {
 /// q̈.
 class PlanarHand final : public release::HandMotion {
  public:
-  static constexpr int kPoints = 9;
+  static constexpr int kPoints = 9;  ///< Chebyshev points: the degree is one less
 
   /// Throws std::invalid_argument where the tip leaves the plane by more than 1 mm, or its z axis by more
   /// than 0.01.

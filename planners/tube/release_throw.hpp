@@ -14,15 +14,15 @@ namespace unhand::planners {
 
 /// A number known up to a standard deviation, in the same unit.
 struct Uncertain {
-  double value{}, sigma{};
+  double value{}, sigma{};  ///< 1 σ
 };
 
 /// What is known of the release: a contact model, the friction of its pads, and how the gripper opens.
 struct ReleaseCard {
-  std::string model{"limit_surface"};
-  Uncertain mu{0.5, 0.05};  ///< friction coefficient [-]
-  double length{0.007};     ///< L = τ_max/f_max [m]
-  int pads{2};
+  std::string model{"limit_surface"};    ///< a name that contact::make_contact_model knows
+  Uncertain mu{0.5, 0.05};               ///< friction coefficient [-]
+  double length{0.007};                  ///< L = τ_max/f_max [m]
+  int pads{2};                           ///< n >= 1
   double grip_force{40};                 ///< of one pad [N]
   Uncertain dead_time{0.020, 0.005};     ///< from the command to the first change of the force [s]
   Uncertain opening_time{0.060, 0.006};  ///< from there until the pads part [s]
@@ -35,6 +35,7 @@ struct ReleaseCard {
 ReleaseCard release_card(const datasets::ModelCard& card, const std::string& file,
                          const ReleaseCard& otherwise = {});
 
+/// What the hand holds, and how.
 struct HeldObject {
   double mass{0.246}, inertia{2.4e-3};  ///< [kg], about the centre of mass [kg m²]
   Uncertain com_offset{0.14, 0.004};    ///< pads to centre of mass [m]
@@ -42,23 +43,32 @@ struct HeldObject {
 };
 
 /// The uncertain numbers of one throw.
-enum Unknown { kMu, kDeadTime, kOpeningTime, kComOffset, kUnknowns };
+enum Unknown {
+  kMu,           ///< friction coefficient [-]
+  kDeadTime,     ///< of the gripper [s]
+  kOpeningTime,  ///< of the gripper [s]
+  kComOffset,    ///< of the object [m]
+  kUnknowns      ///< how many there are
+};
+/// A value of every unknown, in its own unit, by kMu … kComOffset.
 using Draw = std::array<double, kUnknowns>;
+/// The name that a card has for it: "dead_time".
 const char* name_of(Unknown);
 
 /// A throw in the vertical plane through the tip and the target: a chain whose tip is the middle of the pads,
 /// its state when the gripper is told to open (t = 0), and the joint acceleration from then on.
 struct ReleaseThrow {
-  const Chain& chain;
-  ThrowState start;
-  JointVector<double> qdd;
-  Eigen::Vector3d target;  ///< [m]
-  double hold{0.13};       ///< q̈ is held until then [s]; the object is free before
-  ReleaseCard card{};
-  HeldObject object{};
-  flight::Medium medium{};
+  const Chain& chain;       ///< kept by reference
+  ThrowState start;         ///< when the gripper is told to open
+  JointVector<double> qdd;  ///< rad/s²
+  Eigen::Vector3d target;   ///< [m]
+  double hold{0.13};        ///< q̈ is held until then [s]; the object is free before
+  ReleaseCard card{};       ///< pads and gripper
+  HeldObject object{};      ///< what is thrown
+  flight::Medium medium{};  ///< of the flight
 };
 
+/// One landing, and the release before it.
 struct ReleaseLanding {
   double miss{};         ///< of the centre of mass, forward of the target [m]
   double detach_time{};  ///< [s]
@@ -69,6 +79,7 @@ struct ReleaseLanding {
 /// Where a throw lands; empty if the object is not free by `hold` or never comes down to the target's height.
 /// Throws std::invalid_argument where the tip does not move in a vertical plane with the target.
 std::optional<ReleaseLanding> release_landing(const ReleaseThrow& problem, const Draw& draw);
+/// The unknowns at their nominal values.
 Draw nominal_draw(const ReleaseThrow& problem);
 
 /// The same with the object carried rigidly until `delay` and then free: the kinematic model.
@@ -76,32 +87,36 @@ std::optional<ReleaseLanding> rigid_landing(const ReleaseThrow& problem, double 
 
 /// Landing and its exact derivatives by the unknowns, at their nominal values; spread² = Σ (∂x/∂θ σ)².
 struct ReleaseSpread {
-  double miss{}, spread{};
+  double miss{}, spread{};                   ///< nominal landing, forward of the target; its 1 σ [m]
   std::array<double, kUnknowns> gradient{};  ///< m per unit of the unknown
 };
+/// Nothing where the nominal throw does not land.
 std::optional<ReleaseSpread> release_spread(const ReleaseThrow& problem);
 
 /// Landings of `count` draws from normal distributions (cut off at zero where the number must be positive).
 struct Landings {
   std::vector<double> miss;  ///< of those that land [m]
   int lost{};                ///< not free in time, or never down
-  double mean{}, std{};
+  double mean{}, std{};      ///< of those that land [m]
 };
 /// Mean and standard deviation of what landed.
 void summarise(Landings& landings);
+/// Equal seeds give equal draws.
 Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t seed);
 
+/// How the search for an insensitive throw runs.
 struct InsensitiveOptions {
   std::vector<int> joints;  ///< that move in the plane, at most 4
-  int iterations{15};
-  double reserve{0.02};    ///< of the limits of velocity and acceleration, kept free
-  double tolerance{1e-3};  ///< relative decrease of the cost at which it is enough
+  int iterations{15};       ///< at most
+  double reserve{0.02};     ///< of the limits of velocity and acceleration, kept free
+  double tolerance{1e-3};   ///< relative decrease of the cost at which it is enough
 };
+/// A throw that depends little on what is not known.
 struct InsensitiveResult {
-  ThrowState start;
-  JointVector<double> qdd;
+  ThrowState start;          ///< q̇₀ as chosen
+  JointVector<double> qdd;   ///< q̈ as chosen [rad/s²]
   double before{}, after{};  ///< root mean square miss over the unknowns' spread [m]
-  int iterations{};
+  int iterations{};          ///< taken
 };
 
 /// Chooses q̇₀ and q̈ so that landings miss least over the card's and the grasp's uncertainty: minimises

@@ -6,44 +6,50 @@
 
 namespace unhand::planners {
 
-inline constexpr int kMaxUnknowns = 8;
+inline constexpr int kMaxUnknowns = 8;  ///< unknowns of a program, at most
 
+/// At most kMaxUnknowns numbers, without heap.
 using QpVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxUnknowns, 1>;
+/// The same, in rows and columns.
 using QpMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxUnknowns, kMaxUnknowns>;
 
 /// aᵀx = b or aᵀx >= b.
 struct QpConstraint {
-  QpVector a;
-  double b{};
-  bool equality{};
+  QpVector a;       ///< a
+  double b{};       ///< b
+  bool equality{};  ///< aᵀx = b, else aᵀx >= b
 };
 
 /// min ½ xᵀH x + cᵀx subject to the constraints; H symmetric positive definite.
 struct QuadraticProgram {
-  QpMatrix H;
-  QpVector c;
-  std::vector<QpConstraint> constraints;
+  QpMatrix H;                             ///< symmetric, positive definite
+  QpVector c;                             ///< c
+  std::vector<QpConstraint> constraints;  ///< in any order
 };
 
+/// How a program ended.
 enum class QpOutcome {
-  solved,
+  solved,      ///< `x` is the minimum
   infeasible,  ///< `conflict` names constraints that no x obeys together
   not_solved,  ///< H is not positive definite, or the budget is spent
 };
+/// The outcome's name, as it is written above.
 const char* to_string(QpOutcome);
 
+/// Tolerance and budget.
 struct QpOptions {
   double tolerance{1e-10};  ///< of a constraint, of its normal scaled to length one
-  int max_steps{200};
+  int max_steps{200};       ///< constraints added, at most
 };
 
+/// The minimum, or why there is none.
 struct QpSolution {
-  QpOutcome outcome{};
-  QpVector x;
+  QpOutcome outcome{};  ///< only `solved` has an x
+  QpVector x;           ///< the minimum
   /// λ with H x + c = Σ λ_k a_k; λ_k >= 0 of an inequality, zero where it is not active.
   std::vector<double> multipliers;
   std::vector<int> conflict;  ///< indices of constraints
-  int steps{};
+  int steps{};                ///< constraints added
 };
 
 /// The dual active-set method [GoldfarbIdnani1983]: starts at the free minimum and adds violated constraints

@@ -13,38 +13,43 @@ namespace unhand::planners {
 
 /// Where the arm is when the gripper is told to open: q₀ [rad], q̇₀ [rad/s].
 struct ThrowState {
-  JointVector<double> q, qd;
+  JointVector<double> q, qd;  ///< rad; rad/s
 };
 
+/// What the tube acceleration is asked for.
 struct TubeProblem {
-  const Chain& chain;  ///< its tip carries the object's centre of mass
-  ThrowState start;
-  Eigen::Vector3d target;  ///< B, in the base [m]
-  double window{0.1};      ///< T [s]
-  flight::Medium medium{};
+  const Chain& chain;       ///< its tip carries the object's centre of mass
+  ThrowState start;         ///< when the gripper is told to open
+  Eigen::Vector3d target;   ///< B, in the base [m]
+  double window{0.1};       ///< T [s]
+  flight::Medium medium{};  ///< of the flight
 };
 
 /// How the tip moves in the throwing plane of a state: ξ = (r, z, ṙ, ż) as in [LiuBillard2024], with
 /// r = −|e|, ṙ along e for e the level part of E → B, and what leaves the plane.
 struct PlaneView {
-  flight::PlaneState<double> state;
-  double across{};  ///< velocity across e [m/s], to the left
+  flight::PlaneState<double> state;  ///< ξ [m, m, m/s, m/s]
+  double across{};                   ///< velocity across e [m/s], to the left
 };
+/// The tip's position and velocity [m, m/s] as the throwing plane sees them.
 PlaneView plane_view(const Eigen::Vector3d& tip, const Eigen::Vector3d& velocity,
                      const Eigen::Vector3d& target);
 
+/// How the problem ended.
 enum class TubeOutcome {
-  solved,
+  solved,         ///< `qdd` is the answer
   infeasible,     ///< `reason` names the constraints that cannot hold together
   never_reaches,  ///< with the velocity q̇₀ held, the flight does not come down to the target's height
 };
+/// The outcome's name, as it is written above.
 const char* to_string(TubeOutcome);
 
+/// The tube acceleration, or why there is none.
 struct TubeSolution {
-  TubeOutcome outcome{};
-  JointVector<double> qdd;  ///< q̈_tube [rad/s²]
-  std::string reason;
-  QpSolution qp;
+  TubeOutcome outcome{};     ///< only `solved` has a q̈
+  JointVector<double> qdd;   ///< q̈_tube [rad/s²]
+  std::string reason;        ///< in words
+  QpSolution qp;             ///< of the program
   double landing_at_rest{};  ///< Φ(0): landing error of a release at T without acceleration, linear part's
                              ///< base [m]
 };
@@ -61,19 +66,21 @@ TubeSolution solve_tube(const TubeProblem& problem);
 
 /// The program itself, for whoever wants to solve it otherwise.
 struct TubeProgram {
-  QuadraticProgram qp;
+  QuadraticProgram qp;             ///< unknowns q̈
   std::vector<std::string> names;  ///< of its constraints
 };
+/// Throws as solve_tube does.
 TubeProgram tube_program(const TubeProblem& problem);
 
 /// Where the object really lands when it leaves at t under a constant q̈ (problem RTV, [DarkoD46] Eq. 1: q(t)
 /// is integrated, kinematics and flight are not linearised).
 struct LandingAt {
-  double time{};
+  double time{};               ///< of the release, from the gripper's command [s]
   double forward{}, across{};  ///< of the target, in the vertical plane from q₀'s tip to it [m]
   double x{}, y{};             ///< of the target, in the base's axes [m]
-  bool lands{};
+  bool lands{};                ///< the flight comes down to the target's height
 };
+/// At `samples` >= 2 instants from 0 to T.
 std::vector<LandingAt> landings_over_window(const TubeProblem& problem, const JointVector<double>& qdd,
                                             int samples);
 
@@ -85,8 +92,9 @@ std::vector<LandingAt> landings_over_window(const TubeProblem& problem, const Jo
 /// by Gauss-Newton from `start`, each step a quadratic program; t_k are `times` instants up to T. Derivatives
 /// are exact. Returns `start` where no step helps.
 struct RefineOptions {
-  int times{4}, iterations{6};
+  int times{4}, iterations{6};  ///< instants of the window; Gauss-Newton steps
 };
+/// See RefineOptions.
 JointVector<double> refine_tube(const TubeProblem& problem, const JointVector<double>& start,
                                 const RefineOptions& options = {});
 
