@@ -39,6 +39,7 @@ void draw_landings(const std::vector<Cell>& cells, double box, const fs::path& f
   std::string script =
       "set multiplot layout 1,3\nset grid\nset size square\nset xlabel 'forward [cm]'\nset ylabel 'across "
       "[cm]'\nset key off\n";
+  std::vector<KeyEntry> key;
   script +=
       fmt::format("set object 1 rectangle from {0},{0} to {1},{1} fs empty border lc rgb '#000000' lw 1\n",
                   -50 * box, 50 * box);
@@ -56,8 +57,9 @@ void draw_landings(const std::vector<Cell>& cells, double box, const fs::path& f
     script += fmt::format("{}DATA index {} using 1:2 with points {} title '{}'", c == 0 ? "plot " : ", ", i,
                           kLook[c], plain(cells[i].controller.name));
     if (c == 2) script += "\n";
+    if (i < 3) key.push_back({fmt::format("with points {}", kLook[c]), cells[i].controller.name});
   }
-  figure.script = script + "unset multiplot\n";
+  figure.script = script + "set size nosquare\n" + key_strip(figure, key, 3) + "unset multiplot\n";
   draw(figure, folder);
 }
 
@@ -81,7 +83,8 @@ void draw_errors(const std::vector<ct::StudyThrow>& recorded,
   }
   falls = fmt::format("plot DATA index 0 using 1:4 with lines {} notitle", kLine[0]);
   figure.script =
-      "set multiplot layout 3,1\nset grid\nset key right top\nset xlabel 'time [s]'\nset ylabel 'position "
+      "set multiplot layout 3,1\nset grid\nset key outside top center horizontal samplen 4\nset xlabel 'time "
+      "[s]'\nset ylabel 'position "
       "error [cm]'\n" +
       position + "\nset ylabel 'velocity error [m/s]'\n" + velocity +
       "\nset ylabel 'V of the adaptive law [J]'\n" + falls + "\nunset multiplot\n";

@@ -80,7 +80,7 @@ void draw_path(const FlipAnswer& a, const std::filesystem::path& folder) {
   }
   if (figure.data.empty()) return;
   figure.script =
-      "set grid\nset key outside bottom center horizontal samplen 1\nset xlabel 'landing x [m]'\nset ylabel "
+      "set grid\nset key outside top center horizontal samplen 1\nset xlabel 'landing x [m]'\nset ylabel "
       "'angle "
       "from "
       "hanging [deg]'\nset offsets graph 0.05, graph 0.05, graph 0.05, graph 0.05\n" +

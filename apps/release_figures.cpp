@@ -13,13 +13,13 @@ namespace {
 
 constexpr double kDegrees = 57.29577951308232, kMillimetres = 1000, kMilliseconds = 1000;
 
-/// The modes' colours, of the palette of Okabe and Ito; they differ in lightness, too.
+/// The modes' colours, after the palette of Okabe and Ito; in grey they differ by their lightness.
 struct ModeLook {
   const char *mode, *colour;
 };
-constexpr ModeLook kModes[] = {{"stick", "#f0f0f0"},  {"pivot", "#56b4e9"}, {"slip", "#e69f00"},
-                               {"slide", "#d55e00"},  {"brake", "#009e73"}, {"carried", "#cccccc"},
-                               {"elastic", "#cc79a7"}};
+constexpr ModeLook kModes[] = {{"stick", "#f0f0f0"},  {"pivot", "#a6dbf5"}, {"slip", "#e69f00"},
+                               {"slide", "#d55e00"},  {"brake", "#00553d"}, {"carried", "#dddddd"},
+                               {"elastic", "#8e4585"}};
 
 const char* colour_of(const std::string& mode) {
   for (const ModeLook& look : kModes)
