@@ -43,6 +43,10 @@ function(unhand_test name)
   endforeach()
   target_link_libraries(test_${name} PRIVATE unhand_warnings GTest::gmock GTest::gtest_main)
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR})
+  if(NOT CMAKE_CXX_COMPILER_LAUNCHER)  # a compiler cache does better without
+    target_precompile_headers(test_${name} PRIVATE <gmock/gmock.h> <gtest/gtest.h>)
+  endif()
+  target_compile_options(test_${name} PRIVATE $<$<CONFIG:Release>:-O1>)  # what takes time at run time is in the library
   gtest_discover_tests(test_${name} TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60
     PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS ${name})
 endfunction()

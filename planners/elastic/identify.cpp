@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <Eigen/SVD>
 #include <cmath>
 #include <numbers>
@@ -72,6 +73,23 @@ void evaluate(const Eigen::VectorXd& phi, Eigen::VectorXd& pi, Eigen::MatrixXd& 
   }
 }
 
+/// Singular values and right vectors of W, of full size even where its rank is less, and Uᵀ tau; by way of
+/// W = Q R, for W is tall.
+struct Decomposition {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd right;
+  Eigen::VectorXd left_times_tau;
+};
+Decomposition decompose(const Eigen::MatrixXd& W, const Eigen::VectorXd& tau) {
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(W);
+  const Eigen::MatrixXd R = qr.matrixQR().topRows(W.cols()).triangularView<Eigen::Upper>();
+  const Eigen::JacobiSVD<Eigen::MatrixXd, Eigen::NoQRPreconditioner> svd(
+      R, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::VectorXd turned = tau;
+  turned.applyOnTheLeft(qr.householderQ().adjoint());
+  return {svd.singularValues(), svd.matrixV(), svd.matrixU().transpose() * turned.head(W.cols())};
+}
+
 double condition_of(const Eigen::VectorXd& s) {
   double least = s[0];
   for (const double one : s)
@@ -139,7 +157,7 @@ DesignedExcitation design_excitation(const Chain& chain, const ExcitationOptions
       one.centre[i] = 0.5 * (upper + lower) - 0.5 * shrink * (high[i] + low[i]);
     }
     const double condition =
-        condition_of(Eigen::BDCSVD<Eigen::MatrixXd>(stacked(chain, one, o.samples)).singularValues());
+        condition_of(decompose(stacked(chain, one, o.samples), Eigen::VectorXd::Zero(n * o.samples)).values);
     if (trial == 0) out.first_condition = condition;
     if (trial == 0 || condition < out.condition) {
       out.condition = condition;
@@ -162,14 +180,14 @@ IdentifiedInertia identify_inertia(const Chain& prior, const std::vector<MotionS
         control::torque_regressor<double>(prior, log[k].q, log[k].qd, log[k].qdd);
     tau.segment(n * static_cast<int>(k), n) = log[k].torque;
   }
-  const Eigen::BDCSVD<Eigen::MatrixXd> svd(W, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  const Eigen::VectorXd& s = svd.singularValues();
+  const Decomposition svd = decompose(W, tau);
+  const Eigen::VectorXd& s = svd.values;
   int rank = 0;
   while (rank < s.size() && s[rank] > kRank * s[0]) ++rank;
   IdentifiedInertia out;
   out.condition = condition_of(s);
-  out.combinations = svd.matrixV().leftCols(rank);
-  out.estimate = (svd.matrixU().leftCols(rank).transpose() * tau).cwiseQuotient(s.head(rank));
+  out.combinations = svd.right.leftCols(rank);
+  out.estimate = svd.left_times_tau.head(rank).cwiseQuotient(s.head(rank));
   out.torque_noise =
       (tau - W * (out.combinations * out.estimate)).norm() / std::sqrt(static_cast<double>(rows - rank));
   out.sigma = out.torque_noise * s.head(rank).cwiseInverse();
