@@ -1,9 +1,10 @@
 #include "fitting/before_release.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
+#include "fitting/dense_solve.hpp"
 #include "fitting/normal_equations.hpp"
 
 namespace unhand::fitting {
@@ -30,13 +31,12 @@ BeforeRelease before_release(const CampaignProblem& problem, const CampaignThrow
     auto l = problem.linearise(thrown.prepared, held, campaign, out.own, true);
     if (!l.solved) return unknown;
     weigh(l, held, thrown, Weighting{});
-    Eigen::MatrixXd H = l.own.transpose() * l.own;
-    H.diagonal() += precision;
-    const Eigen::LDLT<Eigen::MatrixXd> solver(H);
-    out.covariance = solver.solve(Eigen::MatrixXd::Identity(n, n));
-    out.response = -solver.solve(l.own.transpose() * l.campaign);
-    const Eigen::Map<const Eigen::VectorXd> own(out.own.data(), n);
-    const Eigen::VectorXd d = -solver.solve(l.own.transpose() * l.residual + precision.cwiseProduct(own));
+    const auto width = static_cast<Eigen::Index>(campaign.size());
+    const Eigen::MatrixXd G = throw_gram(l.own, campaign_columns(l), out.own, fit.own_spread);
+    out.covariance = definite_inverse(G.topLeftCorner(n, n));
+    const Eigen::MatrixXd step_of = -definite_solve(G.topLeftCorner(n, n), G.topRightCorner(n, width + 1));
+    out.response = step_of.leftCols(width);
+    const Eigen::VectorXd d = step_of.col(width);
     if (!d.allFinite()) return unknown;
     double change = 0;
     for (Eigen::Index k = 0; k < n; ++k)

@@ -19,6 +19,15 @@ const char* to_string(Verdict verdict) {
   return kNames[static_cast<int>(verdict)];
 }
 
+void AcceptedEffect::add_other_name(const std::string& other, double correlation) {
+  for (auto& [name, known] : equivalent)
+    if (name == other) {
+      known = std::max(known, correlation);
+      return;
+    }
+  equivalent.push_back({other, correlation});
+}
+
 namespace {
 
 FirstMisfit first_misfit(const FitResult& fit, const DiscoverOptions& options) {

@@ -80,6 +80,9 @@ struct AcceptedEffect {
   double test_error_ratio{};  ///< held-out error with it over without [-]
   std::string why;            ///< where the held-out misfit fell, in words
   Phase phase{};              ///< where it fell most
+
+  /// Another name that the data cannot tell from this one; of several correlations the largest counts.
+  void add_other_name(const std::string& other, double correlation);
 };
 
 /// One candidate, as it was scored in the step in which it came nearest to being accepted.

@@ -1,6 +1,6 @@
 #include "fitting/discrepancy.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "experiment/parallel.hpp"
+#include "fitting/dense_solve.hpp"
 #include "fitting/normal_equations.hpp"
 
 namespace unhand::fitting {
@@ -27,28 +28,20 @@ Block block_of(Channel channel, Phase phase) {
              : kWrench;
 }
 
-/// The normal equations of some samples: campaign unknowns c, the throw's own o.
-struct Part {
-  Eigen::MatrixXd cc, co, oo;
-  Eigen::VectorXd c, o;
+/// Information and, in the last column, gradient of the campaign's unknowns.
+using Equations = Eigen::MatrixXd;
 
-  Part(Eigen::Index width, Eigen::Index own)
-      : cc(Eigen::MatrixXd::Zero(width, width)),
-        co(Eigen::MatrixXd::Zero(width, own)),
-        oo(Eigen::MatrixXd::Zero(own, own)),
-        c(Eigen::VectorXd::Zero(width)),
-        o(Eigen::VectorXd::Zero(own)) {}
-  void add(const Part& other, double sign) {
-    cc += sign * other.cc, co += sign * other.co, oo += sign * other.oo;
-    c += sign * other.c, o += sign * other.o;
+Equations no_equations(Eigen::Index width) { return Equations::Zero(width + 1, width + 1); }
+
+/// The covariance that equations leave, and the step that they ask for.
+struct Answer {
+  Eigen::MatrixXd covariance;
+  Eigen::VectorXd step;
+  explicit Answer(const Equations& e) {
+    const Eigen::Index width = e.cols() - 1;
+    covariance = pseudo_inverse(e.topLeftCorner(width, width));
+    step = covariance * e.col(width).head(width);
   }
-};
-
-/// H and gradient of the campaign's unknowns.
-struct Equations {
-  Eigen::MatrixXd H;
-  Eigen::VectorXd g;
-  void add(const Equations& other, double sign) { H += sign * other.H, g += sign * other.g; }
 };
 
 /// One throw: all of its samples, and without each block; its own unknowns eliminated.
@@ -57,52 +50,30 @@ struct ThrowShare {
   std::array<Equations, kBlocks> without;
 };
 
-Equations eliminated(const Part& part) {
-  const Eigen::LDLT<Eigen::MatrixXd> solver(part.oo);
-  return {part.cc - part.co * solver.solve(part.co.transpose()), part.c - part.co * solver.solve(part.o)};
-}
-
 ThrowShare share_of(const CampaignProblem& problem, std::size_t index, const FitResult& fit,
                     const std::vector<double>& campaign, const Weighting& weighting) {
   const CampaignThrow& thrown = problem.throws()[index];
   const ThrowFit& fitted = fit.throws[index];
-  const auto width = static_cast<Eigen::Index>(campaign.size()),
-             n = static_cast<Eigen::Index>(fitted.own.size());
-  const Equations none{Eigen::MatrixXd::Zero(width, width), Eigen::VectorXd::Zero(width)};
+  const auto n = static_cast<Eigen::Index>(fitted.own.size());
+  const Equations none = no_equations(static_cast<Eigen::Index>(campaign.size()));
   ThrowShare out{none, {none, none, none, none}};
   Linearisation l = problem.linearise(thrown, campaign, fitted.own, true);
   if (!l.solved) return out;
   weigh(l, thrown.observed, thrown, weighting);
+  const Eigen::MatrixXd columns = campaign_columns(l);
+  const Eigen::MatrixXd all = throw_gram(l.own, columns, fitted.own, fit.own_spread);
   std::array<std::vector<Eigen::Index>, kBlocks> rows;
   for (Eigen::Index i = 0; i < l.residual.size(); ++i) {
     const auto& o = thrown.observed.all[static_cast<std::size_t>(i)];
     rows[block_of(o.channel, phase_of(o, thrown.opening, thrown.release_or(l.detach)))].push_back(i);
   }
-  std::vector<Part> parts;
-  Part all(width, n);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const auto i = static_cast<std::size_t>(k);
-    const double precision = 1 / (fit.own_spread[i] * fit.own_spread[i]);
-    all.oo(k, k) = precision;
-    all.o[k] = precision * fitted.own[i];
+  out.whole = fitted.weight * eliminated(all, n);
+  for (std::size_t b = 0; b < kBlocks; ++b) {
+    Eigen::MatrixXd block(static_cast<Eigen::Index>(rows[b].size()), n + columns.cols());
+    block.leftCols(n) = l.own(rows[b], Eigen::all);
+    block.rightCols(columns.cols()) = columns(rows[b], Eigen::all);
+    out.without[b] = fitted.weight * eliminated(all - gram(block), n);
   }
-  for (const auto& of : rows) {
-    Part part(width, n);
-    const Eigen::MatrixXd C = l.campaign(of, Eigen::all), O = l.own(of, Eigen::all);
-    const Eigen::VectorXd r = l.residual(of);
-    part.cc = C.transpose() * C, part.co = C.transpose() * O, part.oo = O.transpose() * O;
-    part.c = C.transpose() * r, part.o = O.transpose() * r;
-    all.add(part, 1);
-    parts.push_back(std::move(part));
-  }
-  out.whole = eliminated(all);
-  for (int b = 0; b < kBlocks; ++b) {
-    Part rest = all;
-    rest.add(parts[static_cast<std::size_t>(b)], -1);
-    out.without[static_cast<std::size_t>(b)] = eliminated(rest);
-  }
-  out.whole.H *= fitted.weight, out.whole.g *= fitted.weight;
-  for (auto& e : out.without) e.H *= fitted.weight, e.g *= fitted.weight;
   return out;
 }
 
@@ -112,14 +83,6 @@ double student_factor(double n) {
   return 1 + ((z3 + z) / 4 / n + (5 * z5 + 16 * z3 + 3 * z) / 96 / (n * n) +
               (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / 384 / (n * n * n)) /
                  z;
-}
-
-/// Inverse in units in which the diagonal is one; directions that are not determined have none.
-Eigen::MatrixXd inverse(const Eigen::MatrixXd& H) {
-  const Eigen::VectorXd unit = H.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd scaled = unit.asDiagonal() * H * unit.asDiagonal();
-  const Eigen::MatrixXd inverse = scaled.completeOrthogonalDecomposition().pseudoInverse();
-  return unit.asDiagonal() * inverse * unit.asDiagonal();
 }
 
 }  // namespace
@@ -133,51 +96,44 @@ void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threa
   experiment::parallel_for(fit.throws.size(), threads, [&](std::size_t i) {
     if (fit.throws[i].used) shares[i] = share_of(problem, i, fit, campaign, weighting);
   });
-  Equations all{Eigen::MatrixXd::Zero(width, width), Eigen::VectorXd::Zero(width)};
+  Equations all = no_equations(width);
   for (Eigen::Index k = 0; k < width; ++k) {
     const Unknown& u = fit.campaign[static_cast<std::size_t>(k)].unknown;
     if (!u.prior_sigma) continue;
-    all.H(k, k) = 1 / (*u.prior_sigma * *u.prior_sigma);
-    all.g[k] = (campaign[static_cast<std::size_t>(k)] - u.start) * all.H(k, k);
+    all(k, k) = 1 / (*u.prior_sigma * *u.prior_sigma);
+    all(k, width) = (campaign[static_cast<std::size_t>(k)] - u.start) * all(k, k);
   }
-  const Equations prior = all;
-  std::array<Equations, kBlocks> without{prior, prior, prior, prior};
+  std::array<Equations, kBlocks> without{all, all, all, all};
   std::map<std::string, Equations> conditions;
   for (std::size_t i = 0; i < shares.size(); ++i) {
     if (!fit.throws[i].used) continue;
-    all.add(shares[i].whole, 1);
-    for (std::size_t b = 0; b < kBlocks; ++b) without[b].add(shares[i].without[b], 1);
+    all += shares[i].whole;
+    for (std::size_t b = 0; b < kBlocks; ++b) without[b] += shares[i].without[b];
     const auto& prepared = problem.throws()[i].prepared;
     const auto [at, first] =
         conditions.try_emplace(prepared.object + "/" + prepared.condition, shares[i].whole);
-    if (!first) at->second.add(shares[i].whole, 1);
+    if (!first) at->second += shares[i].whole;
   }
-  const Eigen::MatrixXd noise = inverse(all.H);
-  const Eigen::VectorXd left = noise * all.g;  // what the solver has not gone yet
+  const Answer whole(all);  // its step: what the solver has not gone yet
+  const Eigen::VectorXd noise = whole.covariance.diagonal();
 
-  Eigen::VectorXd variance = noise.diagonal();
+  Eigen::VectorXd variance = noise;
   const auto count = static_cast<double>(conditions.size());
   if (count >= 3) {
     Eigen::VectorXd jackknife = Eigen::VectorXd::Zero(width);
-    for (const auto& [name, of] : conditions) {
-      Equations rest = all;
-      rest.add(of, -1);
-      const Eigen::VectorXd step = inverse(rest.H) * rest.g - left;
-      jackknife += step.cwiseAbs2();
-    }
+    for (const auto& [name, of] : conditions) jackknife += (Answer(all - of).step - whole.step).cwiseAbs2();
     const double t = student_factor(count - 1);
     variance = variance.cwiseMax((count - 1) / count * t * t * jackknife);
   }
   Eigen::VectorXd excess = Eigen::VectorXd::Zero(width);
   for (const Equations& rest : without) {
-    const Eigen::MatrixXd of = inverse(rest.H);
-    const Eigen::VectorXd step = of * rest.g - left;
+    const Answer of(rest);
     for (Eigen::Index k = 0; k < width; ++k) {
-      const double inflated = variance[k] / std::max(noise(k, k), 1e-300);
-      const double expected = std::max(0.0, of(k, k) - noise(k, k)) * inflated;
+      const double inflated = variance[k] / std::max(noise[k], 1e-300), step = of.step[k] - whole.step[k];
+      const double expected = std::max(0.0, of.covariance(k, k) - noise[k]) * inflated;
       // Ten times as uncertain without the block: the rest has no say of its own.
-      if (!(rest.H(k, k) > 0) || of(k, k) > 100 * noise(k, k)) continue;
-      excess[k] = std::max(excess[k], step[k] * step[k] - expected);
+      if (!(rest(k, k) > 0) || of.covariance(k, k) > 100 * noise[k]) continue;
+      excess[k] = std::max(excess[k], step * step - expected);
     }
   }
   variance += excess;

@@ -52,7 +52,4 @@ struct EffectSearch {
 /// end, what has become dispensable is taken away.
 EffectSearch search_effects(const GroupedProblem& problem, const EffectSearchOptions& options);
 
-/// The objects that the groups have, sorted.
-std::vector<std::string> objects_of(const GroupedProblem& problem);
-
 }  // namespace unhand::fitting

@@ -2,11 +2,12 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 #include "experiment/campaign_effects.hpp"
+#include "fitting/dense_solve.hpp"
 #include "fitting/fit_rounds.hpp"
 #include "fitting/misfit.hpp"
 #include "fitting/profile.hpp"
@@ -24,14 +25,14 @@ void describe_open_directions(const Eigen::MatrixXd& information, const Campaign
   for (Eigen::Index i = 0; i < n; ++i)
     for (Eigen::Index j = 0; j < n; ++j)
       scaled(i, j) *= scale[static_cast<std::size_t>(i)] * scale[static_cast<std::size_t>(j)];
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
+  const Spectrum spectrum = spectrum_of(scaled);
   constexpr double kOpen = 3;  // a direction known to no better than three changes that matter
   for (Eigen::Index k = 0; k < n; ++k) {
-    const double sigma = eigen.eigenvalues()[k] > 0 ? 1 / std::sqrt(eigen.eigenvalues()[k]) : HUGE_VAL;
+    const double sigma = spectrum.values[k] > 0 ? 1 / std::sqrt(spectrum.values[k]) : HUGE_VAL;
     if (sigma < kOpen) continue;
     OpenDirection open;
     open.sigma = sigma;
-    Eigen::VectorXd v = eigen.eigenvectors().col(k);
+    Eigen::VectorXd v = spectrum.vectors.col(k);
     Eigen::Index largest = 0;
     v.cwiseAbs().maxCoeff(&largest);
     if (v[largest] < 0) v = -v;

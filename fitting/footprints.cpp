@@ -1,10 +1,12 @@
 #include "fitting/footprints.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 #include "experiment/parallel.hpp"
+#include "fitting/dense_solve.hpp"
+#include "fitting/normal_equations.hpp"
 
 namespace unhand::fitting {
 
@@ -181,12 +183,8 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
     }
     grams[n].setZero(w, w);
     if (!solved) return;
-    Eigen::MatrixXd Hoo = own_columns.transpose() * own_columns;
-    for (Eigen::Index k = 0; k < Hoo.rows(); ++k)
-      Hoo(k, k) +=
-          1 / (fit.own_spread[static_cast<std::size_t>(k)] * fit.own_spread[static_cast<std::size_t>(k)]);
-    const Eigen::MatrixXd Hoc = own_columns.transpose() * columns;
-    grams[n] = columns.transpose() * columns - Hoc.transpose() * Hoo.ldlt().solve(Hoc);
+    const std::vector<double> nothing(own.size(), 0.0);
+    grams[n] = eliminated(throw_gram(own_columns, columns, nothing, fit.own_spread), own_columns.cols());
   });
   out.gram.setZero(w, w);
   for (const auto& gram : grams) out.gram += gram;
@@ -208,7 +206,7 @@ Eigen::MatrixXd project(const Eigen::MatrixXd& gram, const std::vector<Eigen::In
     R = unit.asDiagonal() * R * unit.asDiagonal();
     R.diagonal().array() += 1e-12;
     const Eigen::MatrixXd cross = unit.asDiagonal() * Eigen::MatrixXd(gram(removed, kept));
-    G -= cross.transpose() * R.ldlt().solve(cross);
+    G -= inner_products(cross, definite_solve(R, cross));
   }
   for (Eigen::Index k = 0; k < G.rows(); ++k)
     if (!(G(k, k) > 1e-6 * gram(kept[static_cast<std::size_t>(k)], kept[static_cast<std::size_t>(k)]))) {
@@ -216,16 +214,6 @@ Eigen::MatrixXd project(const Eigen::MatrixXd& gram, const std::vector<Eigen::In
       G.col(k).setZero();
     }
   return G;
-}
-
-/// x minimising xᵀAx − 2 bᵀx where A may be singular; returns bᵀx.
-double solve(const Eigen::MatrixXd& A, const Eigen::VectorXd& b, Eigen::VectorXd& x) {
-  const Eigen::VectorXd unit = A.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd scaled = unit.asDiagonal() * A * unit.asDiagonal();
-  x = unit.asDiagonal() * scaled.completeOrthogonalDecomposition().solve(unit.asDiagonal() * b);
-  for (Eigen::Index k = 0; k < x.size(); ++k)
-    if (!(A(k, k) > 0)) x[k] = 0;
-  return b.dot(x);
 }
 
 std::vector<Eigen::Index> range(std::size_t n) {
@@ -244,10 +232,10 @@ std::vector<Score> scores(const Footprints& f) {
     kept.push_back(static_cast<Eigen::Index>(f.residual()));
     const Eigen::MatrixXd G = project(f.gram, range(f.fitted), kept);
     const Eigen::Index n = G.rows() - 1;
-    Eigen::VectorXd x;
+    const Eigen::VectorXd b = -G.col(n).head(n), x = pseudo_solve(G.topLeftCorner(n, n), b);
     Score score;
     score.candidate = c;
-    score.gain = solve(G.topLeftCorner(n, n), -G.col(n).head(n), x);
+    score.gain = b.dot(x);
     score.visible = G.diagonal().head(n).maxCoeff() > 0;
     score.step.assign(x.data(), x.data() + x.size());
     out.push_back(std::move(score));
@@ -267,8 +255,8 @@ double cosine(const Eigen::MatrixXd& gram, const std::vector<Eigen::Index>& remo
   const Eigen::Index n = y.size(), m = G.rows() - n;
   const double norm = y.dot(G.topLeftCorner(n, n) * y);
   if (!(norm > 0)) return 0;
-  Eigen::VectorXd x;
-  const double shared = solve(G.bottomRightCorner(m, m), G.bottomLeftCorner(m, n) * y, x);
+  const Eigen::VectorXd b = G.bottomLeftCorner(m, n) * y;
+  const double shared = b.dot(pseudo_solve(G.bottomRightCorner(m, m), b));
   return std::sqrt(std::clamp(shared / norm, 0.0, 1.0));
 }
 
@@ -286,12 +274,6 @@ double between(const Footprints& f, const Candidate& a, const std::vector<double
   for (const std::size_t k : a.columns) part.push_back(static_cast<Eigen::Index>(k));
   const Eigen::Map<const Eigen::VectorXd> y(step.data(), static_cast<Eigen::Index>(step.size()));
   return cosine(f.gram, range(f.fitted), part, y, b.columns);
-}
-
-Eigen::VectorXd pseudo_solve(const Eigen::MatrixXd& C, const Eigen::VectorXd& d) {
-  Eigen::VectorXd x;
-  solve(C, d, x);
-  return x;
 }
 
 }  // namespace unhand::fitting

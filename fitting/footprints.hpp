@@ -60,7 +60,4 @@ double between(const Footprints& footprints, const Candidate& a, const std::vect
 /// The values of a fit's campaign unknowns where `to` has them too, and its starts for the rest.
 std::vector<double> carried(const FitResult& from, const CampaignProblem& to);
 
-/// C⁻¹ d for a covariance that may be singular.
-Eigen::VectorXd pseudo_solve(const Eigen::MatrixXd& C, const Eigen::VectorXd& d);
-
 }  // namespace unhand::fitting

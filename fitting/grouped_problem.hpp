@@ -77,6 +77,9 @@ struct SharedParameter {
 std::vector<SharedParameter> shared_parameters(const dynamics::Effect& effect,
                                                const std::vector<std::string>& objects);
 
+/// The objects that the groups have, sorted.
+std::vector<std::string> objects_of(const GroupedProblem& problem);
+
 /// A log's split; where it has none, every fifth throw of each condition is held out.
 std::vector<datasets::Split> splits_of(const datasets::ThrowLog& log);
 

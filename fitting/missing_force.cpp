@@ -2,10 +2,12 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <set>
+
+#include "fitting/dense_solve.hpp"
 
 namespace unhand::fitting {
 
@@ -38,8 +40,7 @@ class Rows {
       Eigen::MatrixXd line(static_cast<Eigen::Index>(rows_.size()), 2);
       for (std::size_t k = 0; k < rows_.size(); ++k)
         line.row(static_cast<Eigen::Index>(k)) << 1, trace.time[rows_[k]] - trace.time[rows_.front()];
-      if (rows_.size() >= 3)
-        own_ = line.householderQr().householderQ() * Eigen::MatrixXd::Identity(line.rows(), 2);
+      if (rows_.size() >= 3) own_ = orthonormal_basis(line);
     }
     seen_ = whitened(r, false);
   }
@@ -200,8 +201,8 @@ std::vector<MissingCurve> missing_curves(const std::vector<ResidualTrace>& trace
           for (const double t : trace.time) basis.push_back(hat(curve.knots, j, t));
           columns.col(static_cast<Eigen::Index>(j)) = rows.response(basis);
         }
-        H += columns.transpose() * columns;
-        g += columns.transpose() * rows.seen();
+        H += gram(columns);
+        g += inner_products(columns, rows.seen());
         squares += rows.seen().squaredNorm();
       }
       auto& value = curve.value[static_cast<std::size_t>(component)];
@@ -212,11 +213,10 @@ std::vector<MissingCurve> missing_curves(const std::vector<ResidualTrace>& trace
       // Second differences cost a thousandth of what the best determined knot is worth.
       Eigen::MatrixXd D = Eigen::MatrixXd::Zero(std::max<Eigen::Index>(width - 2, 0), width);
       for (Eigen::Index k = 0; k + 2 < width; ++k) D(k, k) = 1, D(k, k + 1) = -2, D(k, k + 2) = 1;
-      H += 1e-3 * H.diagonal().maxCoeff() * (D.transpose() * D);
+      H += 1e-3 * H.diagonal().maxCoeff() * gram(D);
       H.diagonal().array() += 1e-9 * H.diagonal().maxCoeff();
-      const Eigen::LDLT<Eigen::MatrixXd> solver(H);
-      const Eigen::VectorXd a = solver.solve(g);
-      const Eigen::MatrixXd covariance = solver.solve(Eigen::MatrixXd::Identity(width, width));
+      const Eigen::VectorXd a = definite_solve(H, g);
+      const Eigen::MatrixXd covariance = definite_inverse(H);
       curve.chi2_after -= a.dot(g);
       for (std::size_t j = 0; j < n; ++j) {
         value[j] = a[static_cast<Eigen::Index>(j)];
@@ -263,8 +263,8 @@ MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const M
           series.push_back(terms[j].at(s)[static_cast<std::size_t>(component)]);
         columns.col(static_cast<Eigen::Index>(j)) = rows.response(series);
       }
-      H += columns.transpose() * columns;
-      g += columns.transpose() * rows.seen();
+      H += gram(columns);
+      g += inner_products(columns, rows.seen());
       squares += rows.seen().squaredNorm();
       samples += static_cast<double>(rows.seen().size());
     }
@@ -274,9 +274,9 @@ MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const M
   Eigen::VectorXd x;
   double gain = 0;
   const auto solved = [&](const std::vector<Eigen::Index>& of, Eigen::VectorXd& at) {
-    const Eigen::MatrixXd A = H(of, of);
-    at = A.completeOrthogonalDecomposition().solve(Eigen::VectorXd(g(of)));
-    return at.dot(Eigen::VectorXd(g(of)));
+    const Eigen::VectorXd b = g(of);
+    at = pseudo_solve(H(of, of), b);
+    return at.dot(b);
   };
   while (static_cast<int>(chosen.size()) < options.terms) {
     Eigen::Index best = -1;
@@ -296,8 +296,7 @@ MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const M
   }
   if (chosen.empty()) return out;
   const double scatter = std::max(1.0, (squares - gain) / samples);
-  const Eigen::MatrixXd A = H(chosen, chosen);
-  const Eigen::MatrixXd covariance = A.completeOrthogonalDecomposition().pseudoInverse() * scatter;
+  const Eigen::MatrixXd covariance = pseudo_inverse(H(chosen, chosen)) * scatter;
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(k);
     const Term& term = terms[static_cast<std::size_t>(chosen[k])];

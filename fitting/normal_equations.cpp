@@ -1,10 +1,11 @@
 #include "fitting/normal_equations.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 #include "experiment/parallel.hpp"
+#include "fitting/dense_solve.hpp"
 
 namespace unhand::fitting {
 
@@ -41,6 +42,31 @@ void weigh(Linearisation& l, const experiment::Observations& observed, const Cam
   }
 }
 
+Eigen::MatrixXd throw_gram(const Eigen::MatrixXd& own_columns, const Eigen::MatrixXd& columns,
+                           const std::vector<double>& own, const std::vector<double>& own_sigma) {
+  const auto n = static_cast<Eigen::Index>(own.size());
+  Eigen::MatrixXd all(columns.rows(), n + columns.cols());
+  all.leftCols(n) = own_columns;
+  all.rightCols(columns.cols()) = columns;
+  Eigen::MatrixXd out = gram(all);
+  const Eigen::Index r = out.cols() - 1;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    const double precision = 1 / (own_sigma[i] * own_sigma[i]);
+    out(k, k) += precision;
+    out(k, r) += precision * own[i], out(r, k) = out(k, r);
+    out(r, r) += precision * own[i] * own[i];
+  }
+  return out;
+}
+
+Eigen::MatrixXd campaign_columns(const Linearisation& l) {
+  Eigen::MatrixXd out(l.residual.size(), l.campaign.cols() + 1);
+  out.leftCols(l.campaign.cols()) = l.campaign;
+  out.rightCols(1) = l.residual;
+  return out;
+}
+
 NormalEquations normal_equations(const CampaignProblem& problem, const std::vector<std::size_t>& used,
                                  const std::vector<double>& campaign,
                                  const std::vector<std::vector<double>>& own,
@@ -69,19 +95,12 @@ NormalEquations normal_equations(const CampaignProblem& problem, const std::vect
     weigh(l, thrown.observed, thrown, weighting);
     part.chi2 = l.residual.squaredNorm();
     part.weight = part.chi2 > weighting.throw_limit ? std::sqrt(weighting.throw_limit / part.chi2) : 1.0;
-    Eigen::MatrixXd Hoo = l.own.transpose() * l.own;
-    Eigen::VectorXd go = l.own.transpose() * l.residual;
-    for (std::size_t k = 0; k < values.size(); ++k) {
-      const double precision = 1 / (own_sigma[k] * own_sigma[k]);
-      Hoo(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(k)) += precision;
-      go[static_cast<Eigen::Index>(k)] += precision * values[k];
-    }
-    const Eigen::MatrixXd Hco = l.campaign.transpose() * l.own;
-    const Eigen::LDLT<Eigen::MatrixXd> solver(Hoo);
-    part.information =
-        part.weight * (l.campaign.transpose() * l.campaign - Hco * solver.solve(Hco.transpose()));
-    part.gradient = part.weight * (l.campaign.transpose() * l.residual - Hco * solver.solve(go));
-    part.own_variance = solver.solve(Eigen::MatrixXd::Identity(Hoo.rows(), Hoo.cols())).diagonal();
+    const auto n = static_cast<Eigen::Index>(values.size());
+    const Eigen::MatrixXd all = throw_gram(l.own, campaign_columns(l), values, own_sigma);
+    const Eigen::MatrixXd rest = part.weight * eliminated(all, n);
+    part.information = rest.topLeftCorner(width, width);
+    part.gradient = rest.col(width).head(width);
+    part.own_variance = definite_inverse(all.topLeftCorner(n, n)).diagonal();
   });
   for (const auto& part : out.throws)
     out.information += part.information;  // in the throws' order, whatever the threads did
@@ -94,28 +113,27 @@ ScatterCovariance scatter_covariance(const NormalEquations& equations, const Eig
   Eigen::MatrixXd H = equations.information + prior;
   const Eigen::VectorXd unit = H.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   H = unit.asDiagonal() * H * unit.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(H);
-  const double floor = 1e-12 * std::max(1e-300, eigen.eigenvalues().maxCoeff());
-  const Eigen::VectorXd root = eigen.eigenvalues().cwiseMax(floor).cwiseSqrt().cwiseInverse();
+  const Spectrum spectrum = spectrum_of(H);
+  const double floor = 1e-12 * std::max(1e-300, spectrum.values.maxCoeff());
+  const Eigen::VectorXd root = spectrum.values.cwiseMax(floor).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd whiten =  // whitenᵀ (information + prior) whiten = 1
-      unit.asDiagonal() * eigen.eigenvectors() * root.asDiagonal();
+      unit.asDiagonal() * spectrum.vectors * root.asDiagonal();
 
   std::vector<Eigen::MatrixXd> share, adjust;
   Eigen::MatrixXd G = Eigen::MatrixXd::Zero(width, width);
   for (const auto& part : equations.throws) {
     if (!(part.weight > 0)) continue;
-    share.push_back(whiten.transpose() * part.information * whiten);
+    share.push_back(congruent(whiten.transpose(), part.information));
     constexpr double kLeastRest = 0.1;  // a throw that alone determines a direction leaves no residual there
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> own(share.back());
-    const Eigen::VectorXd rest = (1 - own.eigenvalues().array()).cwiseMax(kLeastRest).rsqrt();
-    adjust.push_back(own.eigenvectors() * rest.asDiagonal() * own.eigenvectors().transpose());
+    const Spectrum own = spectrum_of(share.back());
+    const Eigen::VectorXd rest = (1 - own.values.array()).cwiseMax(kLeastRest).rsqrt();
+    adjust.push_back(congruent(own.vectors, rest.asDiagonal()));
     const Eigen::VectorXd g = adjust.back() * (whiten.transpose() * part.gradient);
     G += g * g.transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> scatter(G);
-  const Eigen::MatrixXd inflate = whiten * scatter.eigenvectors();
+  const Spectrum scatter = spectrum_of(G);
   ScatterCovariance out;
-  out.covariance = inflate * scatter.eigenvalues().cwiseMax(1.0).asDiagonal() * inflate.transpose();
+  out.covariance = congruent(product(whiten, scatter.vectors), scatter.values.cwiseMax(1.0).asDiagonal());
 
   const auto n = static_cast<Eigen::Index>(share.size());
   out.degrees_of_freedom.setOnes(width);
@@ -127,7 +145,7 @@ ScatterCovariance scatter_covariance(const NormalEquations& equations, const Eig
       toward.col(i) = adjust[static_cast<std::size_t>(i)] * c;
       shared.col(i) = share[static_cast<std::size_t>(i)] * toward.col(i);
     }
-    Eigen::MatrixXd B = -shared.transpose() * shared;
+    Eigen::MatrixXd B = -gram(shared);
     for (Eigen::Index i = 0; i < n; ++i) B(i, i) += toward.col(i).dot(shared.col(i));
     trace = B.trace();
     if (const double square = B.squaredNorm(); square > 0)
@@ -140,17 +158,17 @@ Eigen::MatrixXd guarded_inverse(const Eigen::MatrixXd& information, const std::v
   const Eigen::Index n = information.rows();
   Eigen::VectorXd s(n);
   for (Eigen::Index i = 0; i < n; ++i) s[i] = scale[static_cast<std::size_t>(i)];
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(s.asDiagonal() * information * s.asDiagonal());
+  const Spectrum spectrum = spectrum_of(s.asDiagonal() * information * s.asDiagonal());
   Eigen::MatrixXd out = Eigen::MatrixXd::Zero(n, n);
-  const double none = 1e-14 * std::max(1e-300, eigen.eigenvalues().cwiseAbs().maxCoeff());
+  const double none = 1e-14 * std::max(1e-300, spectrum.values.cwiseAbs().maxCoeff());
   for (Eigen::Index k = 0; k < n; ++k) {
-    const Eigen::VectorXd v = s.asDiagonal() * eigen.eigenvectors().col(k);
-    if (eigen.eigenvalues()[k] > none) {
-      out += v * v.transpose() / eigen.eigenvalues()[k];
+    const Eigen::VectorXd v = s.asDiagonal() * spectrum.vectors.col(k);
+    if (spectrum.values[k] > none) {
+      out += v * v.transpose() / spectrum.values[k];
       continue;
     }
     for (Eigen::Index i = 0; i < n; ++i)
-      if (std::abs(eigen.eigenvectors()(i, k)) > 1e-3) out(i, i) = HUGE_VAL;
+      if (std::abs(spectrum.vectors(i, k)) > 1e-3) out(i, i) = HUGE_VAL;
   }
   return out;
 }

@@ -33,6 +33,13 @@ struct Weighting {
 void weigh(Linearisation& l, const experiment::Observations& observed, const CampaignThrow& thrown,
            const Weighting& weighting);
 
+/// Inner products of one throw's columns: those of its own unknowns first, whose priors (0, sigma) count as
+/// measurements, then `columns`, the last of which is the residual. `own`: the unknowns' values.
+Eigen::MatrixXd throw_gram(const Eigen::MatrixXd& own_columns, const Eigen::MatrixXd& columns,
+                           const std::vector<double>& own, const std::vector<double>& own_sigma);
+/// The columns of a linearisation besides its own unknowns: the campaign's, then the residual.
+Eigen::MatrixXd campaign_columns(const Linearisation& l);
+
 /// One throw's part.
 struct ThrowEquations {
   double chi2{};                 ///< Σ r², robust

@@ -57,12 +57,7 @@ void find_other_names(const Footprints& f, const Eigen::VectorXd& contribution, 
     if (!has_footprint(candidate.id)) continue;
     const double r = correlation(f, contribution, candidate);
     if (r < enough) continue;
-    const auto known = std::find_if(accepted.equivalent.begin(), accepted.equivalent.end(),
-                                    [&](const auto& e) { return e.first == candidate.id; });
-    if (known == accepted.equivalent.end())
-      accepted.equivalent.push_back({candidate.id, r});
-    else
-      known->second = std::max(known->second, r);
+    accepted.add_other_name(candidate.id, r);
   }
 }
 

@@ -2,7 +2,7 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +10,8 @@
 #include <optional>
 
 #include "experiment/parallel.hpp"
+#include "fitting/dense_solve.hpp"
+#include "fitting/normal_equations.hpp"
 
 namespace unhand::fitting {
 
@@ -72,12 +74,8 @@ class Pair {
         columns.col(w + k) = (m.residual - l.residual) / step;
       }
     }
-    Eigen::MatrixXd Hoo = l.own.transpose() * l.own;
-    const auto& spread = stage_.fit.own_spread;
-    for (Eigen::Index k = 0; k < Hoo.rows(); ++k)
-      Hoo(k, k) += 1 / (spread[static_cast<std::size_t>(k)] * spread[static_cast<std::size_t>(k)]);
-    const Eigen::MatrixXd Hoc = l.own.transpose() * columns;
-    return columns.transpose() * columns - Hoc.transpose() * Hoo.ldlt().solve(Hoc);
+    const std::vector<double> nothing(own.size(), 0.0);
+    return eliminated(throw_gram(l.own, columns, nothing, stage_.fit.own_spread), l.own.cols());
   }
 
   double correlation_in(const Eigen::MatrixXd& gram, const AcceptedEffect& accepted) const {

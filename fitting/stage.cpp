@@ -2,10 +2,11 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
+#include "fitting/dense_solve.hpp"
 #include "fitting/residual_structure.hpp"
 
 namespace unhand::fitting {

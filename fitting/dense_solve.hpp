@@ -1,0 +1,47 @@
+// Small dense linear algebra, compiled once: inverses of normal equations that may be singular, elimination,
+// spectra, least squares. Empty matrices give empty answers. Internal to fitting.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace unhand::fitting {
+
+/// The Moore-Penrose inverse of a symmetric positive semidefinite A in units in which its diagonal is one,
+/// since parameters differ by orders of magnitude: D (D A D)⁺ D, D = diag(A)^(-1/2). Directions that A does
+/// not determine have none: zero there.
+Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& A);
+
+/// The least x, in the same units, that minimises xᵀAx − 2 bᵀx; zero where A's diagonal is.
+Eigen::VectorXd pseudo_solve(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
+
+/// H⁻¹ B for a symmetric positive definite H (LDLᵀ). Where H is singular the answer is not finite or large:
+/// callers add a prior to H's diagonal, or ask allFinite().
+Eigen::MatrixXd definite_solve(const Eigen::MatrixXd& H, const Eigen::MatrixXd& B);
+Eigen::MatrixXd definite_inverse(const Eigen::MatrixXd& H);
+
+/// A B, AᵀA, AᵀB and A B Aᵀ.
+Eigen::MatrixXd product(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
+Eigen::MatrixXd gram(const Eigen::MatrixXd& A);
+Eigen::MatrixXd inner_products(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
+Eigen::MatrixXd congruent(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
+
+/// The Gram matrix of the columns that remain when the first n are eliminated: G_ff − G_fo G_oo⁻¹ G_of. Of
+/// normal equations, the residual being the last column, this is information and gradient without the first n
+/// unknowns. G_oo is definite: priors are in it as measurements.
+Eigen::MatrixXd eliminated(const Eigen::MatrixXd& G, Eigen::Index n);
+
+/// Eigenvalues in increasing order and their orthonormal vectors (columns) of a symmetric matrix.
+struct Spectrum {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd vectors;
+};
+Spectrum spectrum_of(const Eigen::MatrixXd& A);
+
+/// The X that minimises |A X − B| column by column; A's columns are scaled to one first, and what of them
+/// depends on others to 1e-10 gets zero.
+Eigen::MatrixXd least_squares(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
+
+/// An orthonormal basis of the span of A's columns, of as many columns as A has rank (by the same measure).
+Eigen::MatrixXd orthonormal_basis(const Eigen::MatrixXd& A);
+
+}  // namespace unhand::fitting

@@ -1,0 +1,76 @@
+// What the small solvers promise: in the units of the unknowns, where something is not determined, and of
+// nothing at all.
+#include "fitting/dense_solve.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+
+namespace {
+
+using namespace unhand::fitting;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// A symmetric matrix of rank 2 over unknowns whose units differ by 1e8.
+MatrixXd singular() {
+  MatrixXd F(2, 3);
+  F << 1e4, 2e-4, 1, -2e4, 1e-4, 3;
+  return gram(F);
+}
+
+TEST(DenseSolve, ThePseudoInverseInvertsWhatIsDetermined) {
+  const MatrixXd A = singular(), P = pseudo_inverse(A);
+  const VectorXd unit = A.diagonal().cwiseSqrt().cwiseInverse();
+  const MatrixXd left = unit.asDiagonal() * MatrixXd(A * P * A - A) * unit.asDiagonal();
+  EXPECT_LT(left.cwiseAbs().maxCoeff(), 1e-12);  // rounding, in units in which A's diagonal is one
+  EXPECT_LT(MatrixXd(P - P.transpose()).norm(), 1e-12 * P.norm());
+}
+
+TEST(DenseSolve, AnUnknownThatNothingDependsOnStaysAtZero) {
+  MatrixXd A = MatrixXd::Zero(3, 3);
+  A(0, 0) = 4, A(2, 2) = 1e-12;
+  VectorXd b(3);
+  b << 8, 5, 3e-12;
+  const VectorXd x = pseudo_solve(A, b);
+  EXPECT_NEAR(x[0], 2, 1e-12);
+  EXPECT_EQ(x[1], 0);
+  EXPECT_NEAR(x[2], 3, 1e-12);
+}
+
+TEST(DenseSolve, EliminationLeavesTheBlockOfTheInverse) {
+  MatrixXd F(5, 4);
+  F << 1, 2, 0, 1, 0, 1, 3, 2, 2, 0, 1, 1, 1, 1, 1, 0, 0, 2, 1, 4;
+  const MatrixXd G = gram(F);
+  const MatrixXd rest = eliminated(G, 2), covariance = G.inverse().bottomRightCorner(2, 2);
+  EXPECT_LT(MatrixXd(rest * covariance - MatrixXd::Identity(2, 2)).norm(), 1e-12);
+  EXPECT_EQ(eliminated(G, 0), G);
+}
+
+TEST(DenseSolve, LeastSquaresLeavesTheResidualNormalToTheColumns) {
+  MatrixXd A(4, 3);
+  A << 1, 1e6, 1, 1, 2e6, 1, 1, 3e6, 1, 1, 5e6, 1;  // the last column is the first again
+  VectorXd b(4);
+  b << 1, 0, 2, 5;
+  const VectorXd x = least_squares(A, b), left = b - A * x;
+  EXPECT_LT(std::abs(A.col(0).dot(left)), 1e-12);
+  EXPECT_LT(std::abs(A.col(1).dot(left)), 1e-6);
+  const MatrixXd Q = orthonormal_basis(A);
+  ASSERT_EQ(Q.cols(), 2);
+  EXPECT_LT(MatrixXd(gram(Q) - MatrixXd::Identity(2, 2)).norm(), 1e-14);
+  EXPECT_LT(VectorXd(Q.transpose() * left).norm(), 1e-12);
+}
+
+TEST(DenseSolve, OfNothingComesNothing) {
+  const MatrixXd none(0, 0), columns(3, 0);
+  EXPECT_EQ(pseudo_inverse(none).size(), 0);
+  EXPECT_EQ(pseudo_solve(none, VectorXd()).size(), 0);
+  EXPECT_EQ(spectrum_of(none).values.size(), 0);
+  EXPECT_EQ(gram(columns).size(), 0);
+  EXPECT_EQ(least_squares(columns, VectorXd::Ones(3)).rows(), 0);
+  EXPECT_EQ(orthonormal_basis(columns).cols(), 0);
+  EXPECT_EQ(definite_solve(MatrixXd::Identity(2, 2), MatrixXd::Zero(2, 0)).cols(), 0);
+  EXPECT_EQ(product(columns, MatrixXd::Zero(0, 2)), MatrixXd(MatrixXd::Zero(3, 2)));
+}
+
+}  // namespace
