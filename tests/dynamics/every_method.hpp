@@ -9,6 +9,19 @@
 
 namespace unhand::dynamics {
 
+inline constexpr double kGravity = 9.81;  // m/s²
+
+/// y = (height, velocity) under gravity, and the guard that is the height.
+inline auto free_fall() {
+  return [](int, const auto&, const auto& y, auto& dy) {
+    dy[0] = y[1];
+    dy[1] = decltype(y[1] + 0.0)(-kGravity);
+  };
+}
+inline auto falling_floor() {
+  return [](int, const auto&, const auto& y, auto* g) { g[0] = y[0]; };
+}
+
 inline std::string name_of(Method method) {
   switch (method) {
     case Method::automatic:

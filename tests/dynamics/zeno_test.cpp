@@ -4,8 +4,6 @@
 namespace unhand::dynamics {
 namespace {
 
-constexpr double kGravity = 9.81;
-
 class Zeno : public EveryMethod {
  protected:
   /// At the jump flights are 1e-15 m high: CVODE sees them only with an absolute tolerance below that. (The
