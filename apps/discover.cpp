@@ -41,26 +41,6 @@ Json json_of(const OutcomeErrors& e) {
           {"chi2_per_dof", number(e.chi2_per_dof)}};
 }
 
-Json json_of(const fitting::AcceptedEffect& effect) {
-  Json out{{"id", effect.id}, {"equivalent", Json::array()}, {"parameters", Json::object()}};
-  for (const auto& [id, correlation] : effect.equivalent) out["equivalent"].push_back(id);
-  for (const auto& p : effect.parameters)
-    out["parameters"][p.name] = {{"value", number(p.value)}, {"sigma", number(p.sigma)}, {"unit", p.unit}};
-  out["delta_bic"] = number(effect.delta_bic);
-  out["p_value"] = number(effect.p_value);
-  out["test_error_ratio"] = number(effect.test_error_ratio);
-  out["footprint_correlations"] = Json::object();
-  for (const auto& [id, correlation] : effect.equivalent) out["footprint_correlations"][id] = correlation;
-  out["why"] = effect.why;
-  out["separating_experiments"] = Json::array();
-  for (const auto& e : effect.separating)
-    out["separating_experiments"].push_back({{"from", e.from},
-                                             {"experiment", e.what},
-                                             {"correlation_in_this_log", number(e.before)},
-                                             {"correlation_with_it", number(e.after)}});
-  return out;
-}
-
 Json structure_json(const std::vector<fitting::ChannelStructure>& structures) {
   Json out = Json::array();
   for (const auto& s : structures) {
@@ -171,7 +151,7 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
   out["base_model"] = model;
   out["verdict"] = to_string(found.verdict);
   out["effects"] = Json::array();
-  for (const auto& effect : found.effects) out["effects"].push_back(json_of(effect));
+  for (const auto& effect : found.effects) out["effects"].push_back(effect_json(effect));
   out["fitted_along"] = found.along;
   out["unexplained"] = nullptr;
   if (found.unexplained) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/figure.hpp"
 #include "apps/output.hpp"
 #include "fitting/surface_discovery.hpp"
 
@@ -20,6 +21,10 @@ struct MeasuredResult {
 /// discovery.json, schema "discovery" version 1.
 Json measured_json(const MeasuredResult& result);
 std::string measured_text(const MeasuredResult& result);
+/// Residuals over the share of the duration, a panel for each channel.
+Figure measured_residual_figure(const fitting::MeasuredDiscovery& found);
+/// Held-out direction errors by surface, and those of the null control.
+Figure surface_figure(const MeasuredResult& result);
 /// A self-contained page (index.html), the figures with their data and scripts, and discovery.json.
 void write_measured_report(const MeasuredResult& result, const Json& json,
                            const std::filesystem::path& directory);

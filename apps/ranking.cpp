@@ -50,4 +50,24 @@ Figure ranking_figure(std::span<const fitting::Ranked> ranking,
   return figure;
 }
 
+Json effect_json(const fitting::AcceptedEffect& effect) {
+  Json out{{"id", effect.id}, {"equivalent", Json::array()}, {"parameters", Json::object()}};
+  for (const auto& [id, correlation] : effect.equivalent) out["equivalent"].push_back(id);
+  for (const auto& p : effect.parameters)
+    out["parameters"][p.name] = {{"value", number(p.value)}, {"sigma", number(p.sigma)}, {"unit", p.unit}};
+  out["delta_bic"] = number(effect.delta_bic);
+  out["p_value"] = number(effect.p_value);
+  out["test_error_ratio"] = number(effect.test_error_ratio);
+  out["footprint_correlations"] = Json::object();
+  for (const auto& [id, correlation] : effect.equivalent) out["footprint_correlations"][id] = correlation;
+  out["why"] = effect.why;
+  out["separating_experiments"] = Json::array();
+  for (const auto& e : effect.separating)
+    out["separating_experiments"].push_back({{"from", e.from},
+                                             {"experiment", e.what},
+                                             {"correlation_in_this_log", number(e.before)},
+                                             {"correlation_with_it", number(e.after)}});
+  return out;
+}
+
 }  // namespace unhand::apps

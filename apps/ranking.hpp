@@ -15,4 +15,7 @@ Json ranking_json(std::span<const fitting::Ranked> ranking);
 Figure ranking_figure(std::span<const fitting::Ranked> ranking,
                       std::span<const fitting::AcceptedEffect> accepted);
 
+/// An accepted effect as `effects` of discovery.json lists it.
+Json effect_json(const fitting::AcceptedEffect& effect);
+
 }  // namespace unhand::apps

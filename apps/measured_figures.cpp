@@ -1,0 +1,106 @@
+// The figures of unhand discover on measured logs.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "apps/measured_report.hpp"
+
+namespace unhand::apps {
+
+using fitting::MeasuredDiscovery;
+
+namespace {
+
+constexpr const char *kBefore = "with linespoints pointtype 6 linecolor rgb '#d55e00'",
+                     *kAfter = "with linespoints pointtype 7 linecolor rgb '#0072b2'";
+
+}  // namespace
+
+// Residuals over the share of the duration, a panel for each channel.
+Figure measured_residual_figure(const MeasuredDiscovery& found) {
+  std::vector<std::string> channels;
+  for (const auto& m : found.misfit) channels.push_back(m.channel);
+  const int columns = 3, rows = (static_cast<int>(channels.size()) + columns - 1) / columns;
+  Figure figure{"residual", 17, 2.2 + 3.9 * rows, {}, {}};
+  std::string script = "set multiplot\nset key off\nset xrange [0:1]\nset xtics 0,0.25,1 format '%g'\n";
+  int at = 0, index = 0;
+  for (const auto& channel : channels) {
+    double top = 2;
+    for (const auto* profile : {&found.profile_before, &found.profile_after}) {
+      DataBlock block{channel + (profile == &found.profile_before ? " before" : " after"),
+                      {"share of the duration", "rms residual [sigma]", "mean residual [sigma]", "samples"},
+                      {},
+                      {}};
+      for (const auto& bin : *profile)
+        if (bin.channel == channel) {
+          block.rows.push_back({bin.share, std::max(bin.rms, 0.05), bin.mean, static_cast<double>(bin.n)});
+          top = std::max(top, bin.rms);
+        }
+      figure.data.push_back(std::move(block));
+    }
+    const double left = 1.8 + (at % columns) * 5.2, bottom = 2.3 + (rows - 1 - at / columns) * 3.9;
+    script += place(figure, {left, left + 4.2, bottom, bottom + 2.5});
+    script += fmt::format(
+        "set title '{}' offset 0,-0.6\nset logscale y\nset yrange [0.5:{:.4g}]\nset format y '%g'\n"
+        "set ytics (0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)\nset ylabel '{}' offset 0.5\n"
+        "set arrow 2 from 0,1 to 1,1 nohead linecolor rgb '#b0b0b0'\nset xlabel '{}' offset 0,0.6\n"
+        "plot DATA index {} using 1:2 {}, DATA index {} using 1:2 {}\n",
+        plain(channel), 1.5 * top, at % columns == 0 ? "rms [{/Symbol s}]" : "",
+        at / columns == rows - 1 ? "share of the duration" : "", index, kBefore, index + 1, kAfter);
+    index += 2;
+    ++at;
+  }
+  script += key_strip(figure, {{kBefore, "before"}, {kAfter, "after"}}, 2);
+  figure.script = script + "unset multiplot\n";
+  return figure;
+}
+
+// Held-out direction errors by surface, and those of the null control.
+Figure surface_figure(const MeasuredResult& result) {
+  std::vector<std::string> laws, surfaces;
+  for (const auto& e : result.surfaces) {
+    if (std::find(surfaces.begin(), surfaces.end(), e.surface) == surfaces.end())
+      surfaces.push_back(e.surface);
+    if (const auto law = to_string(e.law); std::find(laws.begin(), laws.end(), law) == laws.end())
+      laws.push_back(law);
+  }
+  Figure figure{"surfaces", 17, 3.2 + 0.6 * static_cast<double>(surfaces.size()), {}, {}};
+  std::string tics, plots;
+  for (std::size_t i = 0; i < surfaces.size(); ++i)
+    tics += fmt::format("{}'{}' {}", i ? ", " : "", plain(surfaces[i]), i);
+  std::vector<KeyEntry> key;
+  const char* colours[] = {"#d55e00", "#009e73", "#0072b2", "#cc79a7"};
+  double largest = 1;
+  for (std::size_t k = 0; k < laws.size(); ++k) {
+    DataBlock block{laws[k], {"held-out error [deg]", "surface", "null control [deg]"}, {}, {}};
+    for (const auto& e : result.surfaces)
+      if (to_string(e.law) == laws[k]) {
+        const auto at = std::find(surfaces.begin(), surfaces.end(), e.surface) - surfaces.begin();
+        block.rows.push_back({e.law_deg, static_cast<double>(at), e.null_law_deg});
+        largest = std::max({largest, e.law_deg, e.null_law_deg});
+      }
+    figure.data.push_back(std::move(block));
+    const std::string filled =
+        fmt::format("with points pointtype {} pointsize 1.1 linecolor rgb '{}'", 5 + 2 * k, colours[k % 4]);
+    const std::string open =
+        fmt::format("with points pointtype {} pointsize 0.8 linecolor rgb '{}'", 4 + 2 * k, colours[k % 4]);
+    plots += fmt::format("{}DATA index {} using 1:2 {}, DATA index {} using 3:2 {}", k ? ", " : "", k, filled,
+                         k, open);
+    key.push_back({filled, plain(laws[k])});
+    key.push_back({open, plain(laws[k]) + ", null control"});
+  }
+  const double count = static_cast<double>(surfaces.size());
+  figure.height += key_height(key.size(), 2);
+  figure.script = "set multiplot\nset key off\n" +
+                  place(figure, {6.2, 16.5, 2.2 + key_height(key.size(), 2), figure.height - 0.4}) +
+                  fmt::format(
+                      "set xrange [0:{:.4g}]\nset yrange [{:.1f}:-0.5]\nset ytics ({})\nset grid xtics ytics "
+                      "linecolor rgb '#e0e0e0'\n"
+                      "set xlabel 'mean angle between predicted and measured sliding [deg], slips not seen "
+                      "by the fit'\nplot {}\n",
+                      1.08 * largest, count - 0.5, tics, plots) +
+                  key_strip(figure, key, 2) + "unset multiplot\n";
+  return figure;
+}
+
+}  // namespace unhand::apps

@@ -1,0 +1,109 @@
+// discovery.json of unhand discover on measured logs.
+#include "apps/measured_report.hpp"
+#include "apps/ranking.hpp"
+#include "fitting/card.hpp"
+
+namespace unhand::apps {
+namespace {
+
+using fitting::MeasuredDiscovery;
+using fitting::NamedErrors;
+
+Json json_of(const NamedErrors& errors, int n) {
+  // The fields that every discovery has; null where the log has no such outcome.
+  Json out{{"n", n},
+           {"landing_x_mae_m", nullptr},
+           {"landing_theta_mae_deg", nullptr},
+           {"detach_vx_mae_m_s", nullptr},
+           {"detach_omega_mae_deg_s", nullptr},
+           {"trajectory_rms_m", nullptr},
+           {"chi2_per_dof", nullptr}};
+  for (const auto& [name, value] : errors) out[name] = number(value);
+  return out;
+}
+
+Json json_of(const std::vector<fitting::Autocorrelation>& all) {
+  Json out = Json::object();
+  for (const auto& a : all) out[a.channel] = {{"lag1", number(a.lag1)}, {"z", number(a.z)}};
+  return out;
+}
+
+}  // namespace
+
+Json measured_json(const MeasuredResult& result) {
+  const MeasuredDiscovery& found = result.answer;
+  Json out = json_head("discovery");
+  out["log"] = std::filesystem::path(result.log).filename().string();
+  if (const auto checksum = fitting::checksum_of(result.log)) out["log_checksum"] = *checksum;
+  out["base_model"] = found.model;
+  out["kind"] = found.kind;
+  out["verdict"] = to_string(found.verdict);
+  out["effects"] = Json::array();
+  for (const auto& effect : found.effects) {
+    Json one = effect_json(effect);
+    for (const auto& [id, text] : found.separating)
+      if (id == effect.id) one["separated_by"] = text;
+    out["effects"].push_back(std::move(one));
+  }
+  out["unexplained"] = nullptr;
+  if (found.unexplained)
+    out["unexplained"] = {{"phase", found.unexplained->phase},
+                          {"channel", found.unexplained->channel},
+                          {"chi2_per_dof", number(found.unexplained->chi2_per_dof)},
+                          {"description", found.unexplained->description}};
+  out["error"] = {{"before",
+                   {{"train", json_of(found.before_train, found.train)},
+                    {"test", json_of(found.before_test, found.test)}}},
+                  {"after",
+                   {{"train", json_of(found.after_train, found.train)},
+                    {"test", json_of(found.after_test, found.test)}}}};
+  out["ranking"] = ranking_json(found.ranking);
+  out["first_misfit"] = nullptr;
+  if (found.first.any)
+    out["first_misfit"] = {{"phase", found.phase},
+                           {"channel", found.first.channel},
+                           {"chi2_per_sample", number(found.first.chi2_per_dof)},
+                           {"time_s", number(found.first.time)}};
+  out["misfit"] = Json::array();
+  for (const auto& m : found.misfit)
+    out["misfit"].push_back({{"channel", m.channel},
+                             {"n", m.n},
+                             {"before_train", number(m.before_train)},
+                             {"before_test", number(m.before_test)},
+                             {"after_train", number(m.after_train)},
+                             {"after_test", number(m.after_test)}});
+  out["autocorrelation"] = {{"before", json_of(found.autocorrelation_before)},
+                            {"after", json_of(found.autocorrelation_after)}};
+  out["evidence"] = Json::array();
+  for (const auto& e : found.evidence)
+    out["evidence"].push_back({{"about", e.about}, {"text", e.text}, {"speaks_against", e.against}});
+  out["stability"] = Json::array();
+  for (const auto& s : found.stability)
+    out["stability"].push_back({{"parameter", s.parameter},
+                                {"covariate", s.covariate},
+                                {"split_at", number(s.split_at)},
+                                {"below", {{"value", number(s.low)}, {"sigma", number(s.low_sigma)}}},
+                                {"above", {{"value", number(s.high)}, {"sigma", number(s.high_sigma)}}},
+                                {"apart_sigma", number(s.z())}});
+  if (!result.surfaces.empty()) {
+    out["surfaces"] = Json::array();
+    for (const auto& e : result.surfaces)
+      out["surfaces"].push_back({{"surface", e.surface},
+                                 {"law", to_string(e.law)},
+                                 {"slips", e.slips},
+                                 {"cv_direction_error_deg", number(e.law_deg)},
+                                 {"base_direction_error_deg", number(e.base_deg)},
+                                 {"null_control_deg", number(e.null_law_deg)},
+                                 {"null_control_base_deg", number(e.null_base_deg)},
+                                 {"gain_deg", number(e.gain_deg)},
+                                 {"gain_sigma_deg", number(e.gain_sigma)},
+                                 {"neighbour_correlation", number(e.left)},
+                                 {"neighbour_correlation_sigma", number(e.left_sigma)}});
+  }
+  out["skipped"] = Json::array();
+  for (const auto& [id, reason] : found.skipped) out["skipped"].push_back({{"id", id}, {"reason", reason}});
+  out["command"] = result.command;
+  return out;
+}
+
+}  // namespace unhand::apps
