@@ -27,22 +27,20 @@ Json read_json(const fs::path& file) {
 Json command_json(const fl::FlipCommand& u) {
   return {{"pitch_rad", u.pitch}, {"speed", u.speed}, {"damping_n_m_s", u.damping}};
 }
-Json bar_json(const fl::Bar& b) {
-  return {{"mass_kg", b.mass}, {"inertia_kg_m2", b.inertia}, {"com_offset_m", b.com_offset}};
-}
 
-/// The throw in a file, of the command and bar that are asked for.
-fl::FlipTrial trial_of(const fs::path& file, const fl::TrialRequest& request) {
+/// The throw in a file, which must bear this label.
+fl::FlipTrial trial_of(const fs::path& file, const Json& label, const fl::FlipCommand& command) {
   const Json json = read_json(file);
   fl::FlipTrial out;
-  const auto refuse = [&](const char* where, const std::string& why) {
+  const auto refuse = [&](const std::string& where, const std::string& why) {
     throw datasets::LogError(file.string(), where, why);
   };
   try {
-    if (json.at("command") != command_json(request.command))
-      refuse("/command", "is not the command that the learner asks for now");
-    if (json.at("bar") != bar_json(request.bar)) refuse("/bar", "is not the bar that is thrown now");
-    out.command = request.command;
+    for (const auto& [key, value] : label.items())
+      if (const Json& found = json.at(key); found != value)
+        refuse("/" + key, fmt::format("not the throw that this session asks for: {} instead of {}",
+                                      found.dump(), value.dump()));
+    out.command = command;
     const std::string outcome = json.at("outcome");
     for (const auto one :
          {fl::FlipOutcome::landed, fl::FlipOutcome::not_let_go, fl::FlipOutcome::never_lands})
@@ -66,6 +64,10 @@ fl::FlipTrial trial_of(const fs::path& file, const fl::TrialRequest& request) {
 
 }  // namespace
 
+Json json_of(const fl::Bar& b) {
+  return {{"mass_kg", b.mass}, {"inertia_kg_m2", b.inertia}, {"com_offset_m", b.com_offset}};
+}
+
 Json json_of(const fl::FlipTrial& t) {
   Json out{{"command", command_json(t.command)}, {"outcome", to_string(t.outcome)}};
   if (t.outcome == fl::FlipOutcome::landed) {
@@ -81,10 +83,14 @@ Json json_of(const fl::FlipTrial& t) {
   return out;
 }
 
-FlipStore::FlipStore(fs::path directory, const Json& settings) : directory_(std::move(directory)) {
+FlipStore::FlipStore(fs::path directory, const Json& settings)
+    : directory_(std::move(directory)), robot_(settings.at("robot")), seed_(settings.at("seed")) {
   std::error_code error;
   fs::create_directories(directory_ / "trials", error);
   if (error) throw Unanswered(fmt::format("{}: cannot be made: {}", directory_.string(), error.message()));
+  const fs::path whole = fs::weakly_canonical(directory_, error);
+  remove_leftovers(whole.parent_path(), whole.filename().string());
+  for (const fs::path& folder : {directory_, directory_ / "trials"}) remove_leftovers(folder);
   const fs::path file = directory_ / "session.json";
   if (!fs::exists(file)) {
     Json head = json_head("plan-flip-session");
@@ -107,18 +113,26 @@ FlipStore::FlipStore(fs::path directory, const Json& settings) : directory_(std:
   }
 }
 
+Json FlipStore::label_of(const fl::TrialRequest& request) const {
+  return {{"robot", robot_},
+          {"seed", seed_},
+          {"stage", request.stage},
+          {"index", request.index},
+          {"bar", json_of(request.bar)},
+          {"command", command_json(request.command)}};
+}
+
 fl::Thrower FlipStore::over(fl::Thrower plant) {
   return [this, plant = std::move(plant)](const fl::TrialRequest& request) {
     const fs::path file = directory_ / "trials" / fmt::format("{}-{:04}.json", request.stage, request.index);
+    const Json label = label_of(request);
     if (fs::exists(file)) {
       ++recalled_;
-      return trial_of(file, request);
+      return trial_of(file, label, request.command);
     }
     const fl::FlipTrial trial = plant(request);
     Json json = json_head("plan-flip-trial");
-    json["stage"] = request.stage;
-    json["index"] = request.index;
-    json["bar"] = bar_json(request.bar);
+    json.update(label);
     json.update(json_of(trial));
     Outputs outputs;
     outputs.json(file, json);

@@ -1,9 +1,13 @@
 #include "apps/output.hpp"
 
 #include <fmt/format.h>
+#include <signal.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cmath>
+#include <cstdlib>
+#include <cstring>
 #include <fstream>
 
 #include "apps/command.hpp"
@@ -17,6 +21,8 @@ namespace {
 [[noreturn]] void refuse(const fs::path& file, const std::string& why) {
   throw Unanswered(fmt::format("{}: cannot be written: {}", file.string(), why));
 }
+
+constexpr const char* kPart = ".part-";  // .NAME.part-PROCESS-NUMBER, beside NAME
 
 fs::path parent_of(const fs::path& file) {
   return file.has_parent_path() ? file.parent_path() : fs::path(".");
@@ -65,7 +71,8 @@ Outputs::~Outputs() {
 }
 
 fs::path Outputs::part_of(const fs::path& destination) {
-  const auto name = fmt::format(".{}.part-{}-{}", destination.filename().string(), getpid(), parts_.size());
+  const auto name =
+      fmt::format(".{}{}{}-{}", destination.filename().string(), kPart, getpid(), parts_.size());
   return nearest_existing(parent_of(destination)) / name;
 }
 
@@ -129,6 +136,20 @@ void require_writable(const fs::path& file) {
 void require_writable_directory(const fs::path& directory) {
   if (directory.empty()) return;
   require_directory(directory, nearest_existing(trimmed(directory)));
+}
+
+void remove_leftovers(const fs::path& directory, const std::string& file_name) {
+  std::error_code error;
+  std::vector<fs::path> dead;
+  for (const auto& entry : fs::directory_iterator(directory, error)) {
+    const std::string name = entry.path().filename().string();
+    const std::size_t at = name.rfind(kPart);
+    if (at == std::string::npos || at == 0 || name.front() != '.') continue;
+    if (!file_name.empty() && name.substr(1, at - 1) != file_name) continue;
+    const pid_t process = std::atoi(name.c_str() + at + std::strlen(kPart));
+    if (process > 0 && kill(process, 0) != 0 && errno == ESRCH) dead.push_back(entry.path());
+  }
+  for (const fs::path& one : dead) fs::remove_all(one, error);
 }
 
 Json json_head(const std::string& schema) {

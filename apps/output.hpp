@@ -62,6 +62,10 @@ void require_writable(const std::filesystem::path& file);
 /// The same of a directory, which need not exist yet.
 void require_writable_directory(const std::filesystem::path& directory);
 
+/// Removes from a directory what runs that were killed left of outputs with that file name, or of any: parts
+/// of processes that no longer live.
+void remove_leftovers(const std::filesystem::path& directory, const std::string& file_name = "");
+
 /// {"schema": name, "schema_version": 1, "software": {...}}: the head of every JSON file.
 Json json_head(const std::string& schema);
 

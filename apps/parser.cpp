@@ -4,9 +4,12 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
+#include <type_traits>
 
 namespace unhand::apps {
 namespace {
@@ -21,6 +24,19 @@ CLI::Validator finite_number(const std::string& accepted, const std::string& in_
         return fmt::format("{} is not {}", text, accepted);
       },
       in_help);
+}
+
+CLI::Validator whole_number() {
+  return CLI::Validator(
+      [](std::string& text) -> std::string {
+        std::uint64_t value = 0;
+        const char* end = text.data() + text.size();
+        const auto read = std::from_chars(text.data(), end, value);
+        if (read.ec == std::errc{} && read.ptr == end) return {};
+        return fmt::format("{} is not a whole number from 0 to {}", text,
+                           std::numeric_limits<std::uint64_t>::max());
+      },
+      "");
 }
 
 }  // namespace
@@ -64,7 +80,9 @@ void Parser::footer(const std::string& text) { app_->footer(text); }
 
 template <class T>
 Option Parser::option(const std::string& name, T& value, const std::string& help) {
-  return Option(app_->add_option(name, value, help));
+  CLI::Option* const out = app_->add_option(name, value, help);
+  if constexpr (std::is_same_v<T, std::uint64_t>) out->check(whole_number());  // CLI11 lets -1 wrap around
+  return Option(out);
 }
 template Option Parser::option(const std::string&, std::string&, const std::string&);
 template Option Parser::option(const std::string&, double&, const std::string&);

@@ -3,15 +3,17 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
-#include <cmath>
+#include <algorithm>
+#include <limits>
 #include <memory>
 #include <numbers>
 
 #include "apps/figure.hpp"
 #include "apps/flip_store.hpp"
+#include "apps/numbers.hpp"
 #include "apps/plan.hpp"
 #include "datasets/log_error.hpp"
+#include "datasets/sku.hpp"
 #include "fitting/card.hpp"
 #include "planners/flip/release_learner.hpp"
 
@@ -19,25 +21,75 @@ namespace unhand::apps {
 namespace {
 
 namespace fl = planners::flip;
-namespace fs = std::filesystem;
+
+constexpr double kDegree = std::numbers::pi / 180;
 
 struct Options {
-  std::string target, learner{"m4"}, robot{"panda-flip"}, card, json, report;
+  std::string target, learner{"m4"}, robot{"panda-flip"}, sku, card, json, report;
   std::uint64_t seed{1};
   int iterations{5}, throws{3}, repeats{5};
   double com_offset{-1};
+  /// Model 3 is about a shift; without one named, it is the paper's.
+  bool paper_shift() const { return learner == "m3" && sku.empty() && com_offset < 0; }
 };
 
+/// From 12 to 18 cm [LiuDaCostaBillard2025].
+constexpr double kPaperShift = 0.06;
+
 fl::FlipTarget target_of(const std::string& text) {
-  double x = 0, angle = 0;
-  const char* end = text.data() + text.size();
-  const auto first = std::from_chars(text.data(), end, x);
-  if (first.ec != std::errc{} || first.ptr == end || *first.ptr != ',')
-    throw WrongUsage(fmt::format("--target: '{}' is not X,DEGREES", text));
-  const auto second = std::from_chars(first.ptr + 1, end, angle);
-  if (second.ec != std::errc{} || second.ptr != end || !std::isfinite(x) || !std::isfinite(angle))
-    throw WrongUsage(fmt::format("--target: '{}' is not X,DEGREES", text));
-  return {{x, angle * std::numbers::pi / 180}};
+  const auto [x, degrees] = numbers<2>("--target", text, ',');
+  return {{x, degrees * kDegree}};
+}
+
+/// The bar that is thrown.
+fl::Bar bar_of(const Options& o, const fl::FlipRobot& robot) {
+  fl::Bar out = robot.bar;
+  if (!o.sku.empty()) {
+    const datasets::Sku sku = datasets::read_sku(o.sku);
+    if (!sku.inertia)
+      throw datasets::LogError(o.sku, "inertia_kg_m2", "is not known: give it, or a shape with dims_m");
+    out = {sku.mass, *sku.inertia, sku.com_offset};
+    if (const std::string why = fl::complaint_of(out); !why.empty())
+      throw datasets::LogError(o.sku, "object", why);
+  }
+  if (o.com_offset >= 0) out.com_offset = o.com_offset;
+  if (o.paper_shift()) out.com_offset += kPaperShift;
+  return out;
+}
+
+/// Refuses a target beyond whatever a robot of this kind could reach, and says on stderr where it is
+/// doubtful.
+void check_reach(const fl::FlipTarget& target, const fl::HandLibrary& library) {
+  constexpr double most = std::numeric_limits<double>::infinity(), beyond_x = 0.3,
+                   beyond_angle = 90 * kDegree;
+  fl::FlipPose low{most, most}, high{-most, -most}, nearest;
+  double error = most;
+  for (const auto& one : fl::declared_landings(library)) {
+    if (!one) continue;
+    low = {std::min(low.x, one->x), std::min(low.angle, one->angle)};
+    high = {std::max(high.x, one->x), std::max(high.angle, one->angle)};
+    if (const double e = fl::normalized_error(*one, target); e < error) error = e, nearest = *one;
+  }
+  const auto& [x, angle] = target.pose;
+  if (error == most)
+    throw Unanswered(
+        fmt::format("{}: as declared it lands this bar with none of its commands (it must be free within "
+                    "window_s = {:g} s after the brake's start)",
+                    library.robot().name, library.robot().motion.window));
+  if (!(x >= low.x - beyond_x && x <= high.x + beyond_x && angle >= low.angle - beyond_angle &&
+        angle <= high.angle + beyond_angle))
+    throw WrongUsage(fmt::format(
+        "--target: {:g} m, {:g} degrees; accepted: {:.2f} to {:.2f} m and {:.0f} to {:.0f} degrees (the "
+        "robot "
+        "as declared lands this bar at {:.2f} to {:.2f} m and {:.0f} to {:.0f} degrees)",
+        x, angle / kDegree, low.x - beyond_x, high.x + beyond_x, (low.angle - beyond_angle) / kDegree,
+        (high.angle + beyond_angle) / kDegree, low.x, high.x, low.angle / kDegree, high.angle / kDegree));
+  if (error > std::numbers::sqrt2)
+    fmt::print(
+        stderr,
+        "unhand: note: out of reach of the robot as declared; nearest to the target it lands this bar at "
+        "{:.2f} m, {:.0f} degrees\n",
+        nearest.x, nearest.angle / kDegree);
 }
 
 /// The learner, and what it knows: throws of this bar ("support"), or of the old one ("population").
@@ -45,23 +97,26 @@ std::unique_ptr<fl::FlipLearner> learner_of(const Options& o, const fl::FlipRobo
                                             std::optional<fl::HandLibrary>& library,
                                             const fl::Thrower& thrower, FlipAnswer& answer) {
   const fl::CommandRange& range = robot.motion.range;
+  const double shift = answer.bar.com_offset - robot.bar.com_offset;
   if (o.learner == "m3") {
-    const double shift = answer.bar.com_offset - robot.bar.com_offset;
+    answer.known_throws = static_cast<int>(answer.population->trials.size());
     answer.known = fl::transferred(answer.population->data, shift);
     return std::make_unique<fl::TransferLearner>(answer.population->data, shift, answer.target, range);
   }
   // Models 1 and 2 begin anew with a new bar; model 4 takes what it learned of the old one along.
-  const bool anew = o.learner != "m4";
+  if (o.learner != "m4") answer.known_bar = answer.bar;
   const fl::Gathered support =
-      fl::gather(thrower, "support", fl::support_simplex(range), o.throws, anew ? answer.bar : robot.bar);
-  if (support.data.size() < (anew ? 3u : 1u)) throw Unanswered("too few of the support throws landed");
-  if (anew) {
+      fl::gather(thrower, "support", fl::support_simplex(range), o.throws, answer.known_bar);
+  answer.known_throws = static_cast<int>(support.trials.size());
+  if (support.data.size() < (o.learner == "m4" ? 1u : 3u))
+    throw Unanswered("too few of the support throws landed");
+  if (o.learner != "m4") {
     answer.known = support.data;
     return std::make_unique<fl::ConeLearner>(
         o.learner == "m1" ? fl::ForwardModel::landing : fl::ForwardModel::detach, support.data, answer.target,
         range);
   }
-  answer.known = fl::transferred(support.data, answer.bar.com_offset - robot.bar.com_offset);
+  answer.known = fl::transferred(support.data, shift);
   fl::HandLibrary old(robot, robot.bar, 2);
   const planners::ReleaseCard prior =
       o.card.empty()
@@ -76,6 +131,7 @@ std::unique_ptr<fl::FlipLearner> learner_of(const Options& o, const fl::FlipRobo
 }
 
 void run(const Options& o) {
+  if (!o.card.empty() && o.learner != "m4") throw WrongUsage("--card: only --learner m4 begins from a card");
   if (!o.report.empty()) {
     require_gnuplot();
     require_writable_directory(o.report);
@@ -86,11 +142,11 @@ void run(const Options& o) {
   answer.throws = o.throws;
   answer.target = target_of(o.target);
   const fl::FlipRobot robot = fl::read_flip_robot(o.robot);
-  answer.bar = robot.bar;
-  if (o.com_offset >= 0) answer.bar.com_offset = o.com_offset;
-  if (o.learner == "m3" && o.com_offset < 0)
-    throw WrongUsage("--learner m3 transfers to a bar with another centre of mass: --com-offset is missing");
+  answer.bar = bar_of(o, robot);
+  answer.declared_bar = answer.known_bar = robot.bar;
+  answer.paper_shift = o.paper_shift();
   const fl::FlipPlant plant(robot, o.seed);
+  check_reach(answer.target, {robot, answer.bar, 5});
   std::optional<FlipStore> store;
   fl::Thrower thrower = fl::thrower_of(plant, o.seed);
   if (!o.report.empty()) {
@@ -100,7 +156,7 @@ void run(const Options& o) {
                   {"seed", o.seed},
                   {"throws", o.throws},
                   {"repeats", o.repeats},
-                  {"com_offset_m", answer.bar.com_offset},
+                  {"bar", json_of(answer.bar)},
                   {"card", o.card.empty() ? "" : fitting::checksum_of(o.card).value_or("")}};
     store.emplace(o.report, settings);
     thrower = store->over(std::move(thrower));
@@ -110,8 +166,8 @@ void run(const Options& o) {
         fl::gather(thrower, "population", fl::population_grid(robot.motion.range), o.repeats, robot.bar);
   std::optional<fl::HandLibrary> library;
   const auto learner = learner_of(o, robot, library, thrower, answer);
-  answer.path =
-      fl::learn(*learner, answer.target, answer.known, answer.bar, thrower, {o.iterations, o.throws, false});
+  answer.path = fl::learn(*learner, answer.target, answer.known, answer.bar, thrower,
+                          {o.iterations, o.throws, !(answer.known_bar == answer.bar)});
   fmt::print("{}", text_of(answer));
   if (store && store->recalled() > 0)
     fmt::print("{} throws recalled, {} thrown now\n", store->recalled(), store->thrown());
@@ -146,8 +202,10 @@ Command plan_flip_command(Parser& plan) {
   parser.option("--seed", o->seed, "Which robot: each seed draws its own hidden numbers").with_default();
   parser
       .option("--com-offset", o->com_offset,
-              "Throw a bar with its centre of mass there [m]; m3 and m4 know throws of the robot file's")
+              "Throw a bar with its centre of mass there [m]; m3 and m4 know throws of the robot file's. Not "
+              "given, m3 moves it by 0.06, as the paper does")
       .range(0, 1);
+  parser.option("--sku", o->sku, "Throw this object: mass, inertia and centre of mass of an SKU file");
   parser.option("--card", o->card, "Model card to begin from (m4)");
   parser.option("--iterations", o->iterations, "Commands to try").range(1, 1000).with_default();
   parser.option("--throws", o->throws, "Of each command").range(1, 100).with_default();

@@ -13,8 +13,12 @@ namespace unhand::apps {
 struct FlipAnswer {
   std::string learner;
   planners::flip::FlipTarget target;
-  planners::flip::Bar bar;
-  std::vector<planners::flip::FlipDatum> known;  ///< what the learner began with
+  planners::flip::Bar declared_bar;  ///< of the robot file; the population's
+  planners::flip::Bar bar;           ///< that is thrown
+  planners::flip::Bar known_bar;     ///< whose throws the learner began with
+  bool paper_shift{};                ///< the bar is the paper's shift away, since nobody named one
+  std::vector<planners::flip::FlipDatum> known;  ///< what the learner began with, transferred to `bar`
+  int known_throws{};
   planners::flip::LearningPath path;
   int throws{};  ///< of each command
   std::optional<planners::flip::Gathered> population;

@@ -49,69 +49,109 @@ std::string target_box(const fl::FlipTarget& t) {
       t.pose.x + 1.2 * t.tolerance_x);
 }
 
-/// Landings of every iteration around the target.
+/// One label for each cluster of means, "2, 4" where numbers would lie on each other.
+DataBlock labels_of(const std::vector<std::vector<double>>& means, double reach_x, double reach_angle) {
+  DataBlock out{"iterations", {"x [m]", "angle [deg]", "numbers"}, {}, {}};
+  for (const auto& one : means) {
+    const auto near = std::find_if(out.rows.begin(), out.rows.end(), [&](const auto& row) {
+      return std::abs(row[0] - one[0]) < reach_x && std::abs(row[1] - one[1]) < reach_angle;
+    });
+    const std::string number = fmt::format("{:.0f}", one[2]);
+    if (near == out.rows.end()) {
+      out.rows.push_back({one[0], one[1]});
+      out.labels.push_back(number);
+    } else {
+      out.labels[static_cast<std::size_t>(near - out.rows.begin())] += ", " + number;
+    }
+  }
+  return out;
+}
+
+/// Landings of every iteration around the target, and those known before that are no farther from it.
 void draw_path(const FlipAnswer& a, const std::filesystem::path& folder) {
   Figure figure{"path", 12, 9, {}, ""};
   DataBlock known{"known before", {"x [m]", "angle [deg]"}, {}, {}},
       means{"means by iteration", {"x [m]", "angle [deg]", "iteration"}, {}, {}},
       throws{"throws", {"x [m]", "angle [deg]", "iteration"}, {}, {}};
-  for (const auto& one : a.known) known.rows.push_back({one.landing.x, one.landing.angle / kDegree});
+  double farthest = std::isfinite(a.path.initial) ? std::max(3.0, a.path.initial) : 3.0;
   for (std::size_t i = 0; i < a.path.iterations.size(); ++i) {
     const auto& one = a.path.iterations[i];
     const double k = static_cast<double>(i + 1);
-    if (one.mean) means.rows.push_back({one.mean->x, one.mean->angle / kDegree, k});
+    if (!one.mean) continue;
+    farthest = std::max(farthest, one.error);
+    means.rows.push_back({one.mean->x, one.mean->angle / kDegree, k});
     for (const auto& t : one.trials)
       if (t.outcome == fl::FlipOutcome::landed)
         throws.rows.push_back({t.landing.x, t.landing.angle / kDegree, k});
   }
+  for (const auto& one : a.known)
+    if (fl::normalized_error(one.landing, a.target) <= farthest)
+      known.rows.push_back({one.landing.x, one.landing.angle / kDegree});
+  double low[]{a.target.pose.x - a.target.tolerance_x,
+               (a.target.pose.angle - a.target.tolerance_angle) / kDegree},
+      high[]{a.target.pose.x + a.target.tolerance_x,
+             (a.target.pose.angle + a.target.tolerance_angle) / kDegree};
+  for (const DataBlock* block : {&known, &means, &throws})
+    for (const auto& row : block->rows)
+      for (std::size_t k = 0; k < 2; ++k)
+        low[k] = std::min(low[k], row[k]), high[k] = std::max(high[k], row[k]);
+  const DataBlock labels = labels_of(means.rows, 0.06 * (high[0] - low[0]), 0.05 * (high[1] - low[1]));
   struct Series {
     const DataBlock& block;
-    const char* style;
+    std::string style;
   };
   std::string plots;
   for (const Series& one :
-       {Series{known, "using 1:2 with points pt 2 ps 0.8 lc rgb '#888888' title 'known before'"},
+       {Series{known, fmt::format("using 1:2 with points pt 2 ps 0.8 lc rgb '#888888' title '{}'",
+                                  a.path.initial_is_seen ? "known before" : "expected")},
         Series{throws, "using 1:2 with points pt 6 ps 0.6 lc rgb '#56b4e9' title 'throws'"},
         Series{means, "using 1:2 with linespoints pt 7 ps 0.7 lc rgb '#0072b2' title 'means'"},
-        Series{means, "using 1:2:(sprintf('%d', int($3))) with labels offset 0.9,0.6 notitle"}}) {
+        Series{labels, "using 1:2:3 with labels left offset 0.7,0.7 notitle"}}) {
     if (one.block.rows.empty()) continue;
     plots += fmt::format("{}DATA index {} {}", plots.empty() ? "plot " : ", ", figure.data.size(), one.style);
     figure.data.push_back(one.block);
   }
   if (figure.data.empty()) return;
   figure.script =
-      "set grid\nset key outside top center horizontal samplen 1\nset xlabel 'landing x [m]'\nset ylabel "
-      "'angle "
-      "from "
-      "hanging [deg]'\nset offsets graph 0.05, graph 0.05, graph 0.05, graph 0.05\n" +
+      "set grid\nset key outside top center horizontal Left reverse samplen 1.5\nset xlabel 'landing x [m]'\n"
+      "set ylabel 'angle from hanging [deg]'\nset offsets graph 0.05, graph 0.08, graph 0.08, graph 0.05\n" +
       target_box(a.target) + plots + "\n";
   draw(figure, folder);
 }
 
-/// The error over the iterations; * two of three throws hit, T all of them.
+/// The error over the iterations; * two of three throws hit, T all of them. An error that was only expected
+/// is hollow.
 void draw_progress(const FlipAnswer& a, const std::filesystem::path& folder) {
   Figure figure{"progress", 10, 7, {}, ""};
-  DataBlock errors{"normalised error", {"iteration", "error"}, {}, {}};
-  if (std::isfinite(a.path.initial)) errors.rows.push_back({0, a.path.initial});
+  DataBlock before{"before", {"iteration", "error"}, {}, {}}, errors{"after", {"iteration", "error"}, {}, {}},
+      all{"all", {"iteration", "error"}, {}, {}};
+  if (std::isfinite(a.path.initial)) before.rows.push_back({0, a.path.initial});
+  const int most = (2 * a.throws + 2) / 3;
   std::string marks;
   for (std::size_t i = 0; i < a.path.iterations.size(); ++i) {
     const auto& one = a.path.iterations[i];
     if (!std::isfinite(one.error)) continue;
     const int k = static_cast<int>(i) + 1;
     errors.rows.push_back({static_cast<double>(k), one.error});
-    const std::string mark = k == a.path.reached(a.throws)                 ? "T"
-                             : k == a.path.reached((2 * a.throws + 2) / 3) ? "*"
-                                                                           : "";
+    const std::string mark = k == a.path.reached(a.throws) ? "T" : k == a.path.reached(most) ? "*" : "";
     if (!mark.empty()) marks += fmt::format("set label '{}' at {},{} offset 0.4,0.6\n", mark, k, one.error);
   }
   if (errors.rows.empty()) return;
-  figure.data = {errors};
+  all.rows = before.rows;
+  all.rows.insert(all.rows.end(), errors.rows.begin(), errors.rows.end());
+  figure.data = {all, errors};
+  std::string plots =
+      "plot DATA index 0 with lines lc rgb '#0072b2', DATA index 1 with points pt 7 lc rgb '#0072b2'";
+  if (!before.rows.empty()) {
+    figure.data.push_back(before);
+    plots += fmt::format(", DATA index 2 with points pt {} lc rgb '#0072b2'", a.path.initial_is_seen ? 7 : 6);
+  }
   figure.script = fmt::format(
-      "set grid\nset key off\nset xtics 1\nset yrange [0:*]\nset xrange [-0.3:{}]\nset xlabel "
-      "'iteration'\nset ylabel 'normalised error [-]'\n{}plot DATA index 0 using 1:2 with linespoints pt 7 "
-      "lc "
-      "rgb '#0072b2'\n",
-      static_cast<double>(a.path.iterations.size()) + 0.3, marks);
+      "set grid\nset key off\nset xtics 1\nset yrange [0:*]\nset offsets 0,0,graph 0.08,0\nset xrange "
+      "[-0.3:{}]\nset xlabel 'iteration (0: before; *: {} of {} hit, T: all)'\nset ylabel 'normalised "
+      "error "
+      "[-]'\n{}{}\n",
+      static_cast<double>(a.path.iterations.size()) + 0.3, most, a.throws, marks, plots);
   draw(figure, folder);
 }
 
@@ -151,24 +191,37 @@ void draw_population(const FlipAnswer& a, const std::filesystem::path& folder) {
   for (std::size_t i = 0; i < 3; ++i) key("pitch", i, kMarkers[i], 0.8, "#444444");
   for (std::size_t i = 0; i < 3; ++i) key("speed", i, 7, kSizes[i], "#444444");
   for (std::size_t i = 0; i < 3; ++i) key("damping", i, 7, 0.8, kColours[i]);
-  figure.script =
-      "set grid\nset key outside right\nset xlabel 'landing x [m]'\nset ylabel 'angle from hanging "
-      "[deg]'\nset ytics 90\n" +
-      target_box(a.target) + plots + "\n";
+  figure.script = fmt::format(
+      "set grid\nset key outside right Left reverse\nset xlabel 'landing x [m], centre of mass {:.1f} cm "
+      "from the "
+      "pads'\nset ylabel 'angle from hanging [deg]'\nset ytics 90\n{}{}\n",
+      100 * a.declared_bar.com_offset, target_box(a.target), plots);
   draw(figure, folder);
+}
+
+/// What was thrown, what was known before, and what came of it.
+std::string summary(const FlipAnswer& a) {
+  const double own = 100 * a.bar.com_offset, known = 100 * a.known_bar.com_offset;
+  std::string out = fmt::format(
+      "{}: target {:.2f} m, {:.0f} degrees; a bar with its centre of mass {:.1f} cm from the pads", a.learner,
+      a.target.pose.x, a.target.pose.angle / kDegree, own);
+  out += a.known_bar == a.bar
+             ? fmt::format(", known from {} throws of it", a.known_throws)
+             : fmt::format(", known from {} throws of another one ({:.1f} cm{})", a.known_throws, known,
+                           a.paper_shift ? "; the paper's shift, as no --com-offset was given" : "");
+  const int most = (2 * a.throws + 2) / 3;
+  return out + fmt::format(
+                   "\nError {:.2f} before{}, {:.2f} after one iteration, {:.2f} at least; {} of {} throws "
+                   "within the tolerances {}, all {} {}{}\n",
+                   a.path.initial, a.path.initial_is_seen ? "" : " (expected, not seen)", a.path.first(),
+                   a.path.minimum(), most, a.throws, reached(a.path, most), a.throws,
+                   reached(a.path, a.throws),
+                   a.path.gave_up ? "; the learner had no command left to try" : "");
 }
 
 }  // namespace
 
-std::string text_of(const FlipAnswer& a) {
-  return fmt::format(
-      "{}\n{}: target {:.2f} m, {:.0f} degrees; error {:.2f} before, {:.2f} after one iteration, {:.2f} at "
-      "least; {} of {} throws within the tolerances {}, all {}{}\n",
-      table_of(a).text(), a.learner, a.target.pose.x, a.target.pose.angle / kDegree, a.path.initial,
-      a.path.first(), a.path.minimum(), (2 * a.throws + 2) / 3, a.throws,
-      reached(a.path, (2 * a.throws + 2) / 3), reached(a.path, a.throws),
-      a.path.gave_up ? "; the learner had no command left to try" : "");
-}
+std::string text_of(const FlipAnswer& a) { return table_of(a).text() + "\n" + summary(a); }
 
 Json json_of(const FlipAnswer& a) {
   Json out = json_head("plan-flip");
@@ -177,8 +230,11 @@ Json json_of(const FlipAnswer& a) {
                    {"angle_rad", a.target.pose.angle},
                    {"tolerance_x_m", a.target.tolerance_x},
                    {"tolerance_angle_rad", a.target.tolerance_angle}};
-  out["com_offset_m"] = a.bar.com_offset;
+  out["bar"] = json_of(a.bar);
+  out["known_bar"] = json_of(a.known_bar);
+  out["known_throws"] = a.known_throws;
   out["initial_error"] = number(a.path.initial);
+  out["initial_error_is_seen"] = a.path.initial_is_seen;
   out["first_error"] = number(a.path.first());
   out["minimum_error"] = number(a.path.minimum());
   out["iterations_to_two_thirds"] = a.path.reached((2 * a.throws + 2) / 3);
@@ -205,7 +261,7 @@ void write_report(const FlipAnswer& a, const std::filesystem::path& folder) {
   draw_path(a, folder);
   draw_progress(a, folder);
   if (a.population) draw_population(a, folder);
-  write_text(folder / "path.md", table_of(a).markdown());
+  write_text(folder / "path.md", summary(a) + "\n" + table_of(a).markdown());
   write_text(folder / "flip.json", json_text(json_of(a)));
   if (!a.card.empty()) write_text(folder / "card.json", a.card);
 }

@@ -9,9 +9,9 @@
 #include <memory>
 #include <numbers>
 #include <random>
-#include <sstream>
 
 #include "apps/figure.hpp"
+#include "apps/numbers.hpp"
 #include "apps/plan.hpp"
 #include "datasets/model_card.hpp"
 #include "datasets/sku.hpp"
@@ -30,22 +30,6 @@ struct Options {
   std::uint64_t seed{1};
   bool planar{false}, plain{false};
 };
-
-/// "1.3,0,-0.2" or "0.15x0.15": as many finite numbers as asked for.
-template <std::size_t N>
-std::array<double, N> numbers(const std::string& option, const std::string& text, char separator) {
-  std::array<double, N> out{};
-  std::istringstream in(text);
-  for (std::size_t i = 0; i < N; ++i) {
-    char between = separator;
-    if ((i > 0 && (!(in >> between) || between != separator)) || !(in >> out[i]) || !std::isfinite(out[i]))
-      throw WrongUsage(
-          fmt::format("{}: '{}' is not {} numbers with '{}' between", option, text, N, separator));
-  }
-  if (char rest{}; in >> rest)
-    throw WrongUsage(fmt::format("{}: '{}' has more than {} numbers", option, text, N));
-  return out;
-}
 
 /// The arm with its gripper: a tool of `length` along the flange's z, whose mass sits halfway.
 Chain armed(const Options& options) {

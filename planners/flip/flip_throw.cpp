@@ -36,7 +36,7 @@ std::optional<FlipRelease> release_bar(const release::HandMotion& hand, const He
                                                 {},
                                                 0.0};
   release::ReleaseOptions options;
-  options.ledger = on_bar != nullptr;
+  options.integrator.record = on_bar != nullptr;
   const auto result = release::simulate_release<double>(problem, options);
   if (result.outcome != release::ReleaseOutcome::detached) return {};
   const auto& detach = result.detach;

@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -29,7 +30,7 @@ ReleaseCard moved(const ReleaseCard& prior, const Vector4& p, const Vector4& sig
 }  // namespace
 
 HandLibrary::HandLibrary(const FlipRobot& robot, const Bar& bar, int per_side)
-    : robot_(robot), bar_(bar), spacing_(1.0 / (per_side - 1)) {
+    : robot_(robot), bar_(bar), per_side_(per_side), spacing_(1.0 / (per_side - 1)) {
   if (per_side < 2 || per_side > 64)
     throw std::invalid_argument(fmt::format("hand library: per_side = {}; accepted: 2 to 64", per_side));
   for (int i = 0; i < per_side; ++i)
@@ -38,6 +39,30 @@ HandLibrary::HandLibrary(const FlipRobot& robot, const Bar& bar, int per_side)
         commands_.push_back(robot.motion.range.at(i * spacing_, j * spacing_, k * spacing_));
   hands_.reserve(commands_.size());
   for (const FlipCommand& u : commands_) hands_.push_back(simulate(u));
+}
+
+std::optional<DetachVector> HandLibrary::between(const std::vector<std::optional<DetachVector>>& values,
+                                                 const std::array<double, 3>& fractions) const {
+  std::array<int, 3> cell{};
+  std::array<double, 3> part{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double at = std::clamp(fractions[k], 0.0, 1.0) / spacing_;
+    cell[k] = std::min(static_cast<int>(at), per_side_ - 2);
+    part[k] = at - cell[k];
+  }
+  DetachVector out{};
+  for (int corner = 0; corner < 8; ++corner) {
+    std::size_t index = 0;
+    double weight = 1;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const int up = corner >> k & 1;
+      index = index * static_cast<std::size_t>(per_side_) + static_cast<std::size_t>(cell[k] + up);
+      weight *= up ? part[k] : 1 - part[k];
+    }
+    if (!values[index]) return {};
+    for (std::size_t j = 0; j < 6; ++j) out[j] += weight * (*values[index])[j];
+  }
+  return out;
 }
 
 release::PolynomialHand HandLibrary::simulate(const FlipCommand& u) const {
@@ -66,6 +91,16 @@ std::optional<FlipRelease> predicted_release(const release::HandMotion& hand, co
                             0.0,
                             {card.grip_force, card.dead_time.value, card.opening_time.value, card.shape},
                             {card.model, card.mu.value, card.length, card.pads}});
+}
+
+std::vector<std::optional<FlipPose>> declared_landings(const HandLibrary& library) {
+  const ReleaseCard card = prior_card(library.robot(), library.robot().pads.law);
+  std::vector<std::optional<FlipPose>> out;
+  for (std::size_t i = 0; i < library.commands().size(); ++i) {
+    const auto release = predicted_release(library.hand(i), card, library.bar());
+    out.push_back(release ? fly_flip(release->detach) : std::nullopt);
+  }
+  return out;
 }
 
 ReleaseFit fit_release(const HandLibrary& library, const ReleaseCard& prior,

@@ -27,12 +27,17 @@ class HandLibrary {
   /// The motion of the hand for command i of the mesh.
   const release::PolynomialHand& hand(std::size_t i) const { return hands_[i]; }
   double spacing() const { return spacing_; }  ///< of the mesh, as a fraction of the range
+  /// Between the values at the mesh points around a command (fractions of its range), linear in each of its
+  /// parameters. Empty where one of them is.
+  std::optional<DetachVector> between(const std::vector<std::optional<DetachVector>>& values,
+                                      const std::array<double, 3>& fractions) const;
   /// Of any command; simulated now.
   release::PolynomialHand simulate(const FlipCommand& u) const;
 
  private:
   const FlipRobot& robot_;
   Bar bar_;
+  int per_side_;
   double spacing_{};
   std::vector<FlipCommand> commands_;
   std::vector<release::PolynomialHand> hands_;
@@ -45,6 +50,10 @@ ReleaseCard prior_card(const FlipRobot& robot, const std::string& law = "sliding
 /// The release of a bar that a card predicts for a hand's motion.
 std::optional<FlipRelease> predicted_release(const release::HandMotion& hand, const ReleaseCard& card,
                                              const Bar& bar);
+
+/// Where the robot as it is declared, pads and all, lands the library's bar without noise: one entry for each
+/// of the library's commands, empty where the bar is not let go in time or never lands.
+std::vector<std::optional<FlipPose>> declared_landings(const HandLibrary& library);
 
 /// How far detach states of the declared robot and a real one may differ for reasons that the card does not
 /// have, 1 σ of x, z [m], θ [rad] and their rates [m/s, m/s, rad/s].

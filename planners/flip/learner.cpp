@@ -153,27 +153,32 @@ TransferLearner::TransferLearner(std::span<const FlipDatum> past, double shift, 
   sort_by_error(past_, target_);
 }
 
+/// The nearest command of the past that has not been executed yet.
+std::optional<FlipCommand> TransferLearner::nearest_left() {
+  for (const FlipDatum& one : past_)
+    if (std::find(tried_.begin(), tried_.end(), one.command) == tried_.end()) return one.command;
+  return {};
+}
+
 std::optional<FlipCommand> TransferLearner::next() {
-  if (after_) return after_->next();
-  if (own_.empty()) {  // the next nearest, should the nearest not have landed
-    const std::size_t at = std::min(tried_.size(), past_.size() - 1);
-    tried_.push_back(past_[at].command);
-    return tried_.back();
+  std::optional<FlipCommand> command;
+  if (after_) {
+    command = after_->next();
+  } else if (!own_.empty()) {
+    const FlipDatum& third = own_.size() == 1 ? past_[2] : past_[3];
+    const std::array<FlipDatum, 3> simplex{past_[0], past_[1], third};
+    if (const auto step =
+            cone_search(ForwardModel::detach, own_.back(), simplex, target_, range_, search_, tried_))
+      command = step->command;
   }
-  const FlipDatum& fourth = iteration_ == 1 ? past_[2] : past_[3];
-  const std::array<FlipDatum, 3> simplex{past_[0], past_[1], fourth};
-  const auto step = cone_search(ForwardModel::detach, own_.back(), simplex, target_, range_, search_, tried_);
-  tried_.push_back(step ? step->command
-                        : past_[std::min<std::size_t>(tried_.size(), past_.size() - 1)].command);
-  return tried_.back();
+  if (!command) command = nearest_left();
+  if (command) tried_.push_back(*command);
+  return command;
 }
 
 void TransferLearner::observe(std::span<const FlipTrial> trials) {
   if (after_) return after_->observe(trials);
-  if (const auto mean = mean_of(trials)) {
-    own_.push_back(*mean);
-    ++iteration_;
-  }
+  if (const auto mean = mean_of(trials)) own_.push_back(*mean);
   if (own_.size() == 3)
     after_ = std::make_unique<ConeLearner>(ForwardModel::detach, own_, target_, range_, search_);
 }

@@ -103,7 +103,8 @@ DetachVector shifted(const DetachVector& detach, double shift);
 std::vector<FlipDatum> transferred(std::span<const FlipDatum> data, double shift);
 
 /// Model 3: transfer under a shift of the centre of mass, three opening iterations, then model 2 on their
-/// data.
+/// data. Where a step finds no command, as when the commands executed so far lie on a line, the nearest
+/// command of the past that has not been executed is.
 class TransferLearner final : public FlipLearner {
  public:
   /// `past` are throws of the old bar. Throws std::invalid_argument for fewer than four that can be
@@ -114,13 +115,14 @@ class TransferLearner final : public FlipLearner {
   void observe(std::span<const FlipTrial> trials) override;
 
  private:
+  std::optional<FlipCommand> nearest_left();
+
   std::vector<FlipDatum> past_;  ///< transferred, nearest to the target first
   std::vector<FlipDatum> own_;
   std::vector<FlipCommand> tried_;
   FlipTarget target_;
   CommandRange range_;
   ConeSearch search_;
-  int iteration_{};
   std::unique_ptr<ConeLearner> after_;
 };
 

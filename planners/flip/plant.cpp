@@ -47,9 +47,6 @@ std::uint64_t seed_of(std::initializer_list<std::uint64_t> parts) {
 }
 
 FlipPlant::FlipPlant(const FlipRobot& robot, std::uint64_t seed) : robot_(robot) {
-  for (const FlipCommand& u : {robot.motion.range.low, robot.motion.range.high})
-    for (const FlipCommand& v : {robot.motion.range.low, robot.motion.range.high})
-      check_reference(robot, {u.pitch, v.speed, u.damping});
   Draws draws(seed_of({seed, 1}));
   const RobotSpread& spread = robot.robots;
   body_ = declared_body(robot, robot.bar);

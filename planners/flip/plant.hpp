@@ -41,8 +41,7 @@ struct PlantOptions {
 /// each other; the bar weighs a tenth of what the wrist turns, so one pass is enough, see the tests).
 class FlipPlant {
  public:
-  /// Keeps a reference to `robot`. Throws std::invalid_argument where the corners of the command's range
-  /// leave the joints' limits.
+  /// Keeps a reference to `robot`.
   FlipPlant(const FlipRobot& robot, std::uint64_t seed);
 
   /// Throws the bar once. Equal seeds give equal throws. Throws std::invalid_argument for a command out of

@@ -14,11 +14,11 @@ constexpr double kScatterX = 0.03, kScatterAngle = 0.25;
 constexpr DetachVector kScatterDetach{0.003, 0.003, 0.05, 0.04, 0.04, 0.5};
 constexpr int kScatterFreedom = 4;
 
-double kernel(const LeftOver& a, const std::array<double, 3>& at, double com_offset) {
+double kernel(const LeftOver& a, const std::array<double, 3>& at, const Bar& bar) {
   constexpr double reach = 0.6, other_bar = 0.8;
   double d = 0;
   for (std::size_t i = 0; i < 3; ++i) d += (a.at[i] - at[i]) * (a.at[i] - at[i]);
-  const double same = std::abs(a.com_offset - com_offset) < 1e-6 ? 1.0 : other_bar;
+  const double same = a.bar == bar ? 1.0 : other_bar;
   return same * (0.5 + 0.5 * std::exp(-0.5 * d / (reach * reach)));
 }
 
@@ -38,7 +38,7 @@ std::vector<LeftOver> left_over(const HandLibrary& library, const ReleaseCard& c
     const auto release = predicted_release(library.simulate(one.command), card, library.bar());
     if (!release) continue;
     const DetachVector seen = shifted(one.detach, -l), predicted = shifted(release->detach, -l);
-    LeftOver left{library.robot().motion.range.fractions(one.command), l, {}, one.throws};
+    LeftOver left{library.robot().motion.range.fractions(one.command), library.bar(), {}, one.throws};
     for (std::size_t j = 0; j < 6; ++j) left.value[j] = seen[j] - predicted[j];
     out.push_back(left);
   }
@@ -87,7 +87,7 @@ void LeftOverField::set(std::vector<LeftOver> samples, const DetachVector& throw
   for (Eigen::Index a = 0; a < n; ++a)
     for (Eigen::Index b = 0; b < n; ++b) {
       const LeftOver& other = samples_[static_cast<std::size_t>(b)];
-      K(a, b) = kernel(samples_[static_cast<std::size_t>(a)], other.at, other.com_offset);
+      K(a, b) = kernel(samples_[static_cast<std::size_t>(a)], other.at, other.bar);
     }
   for (std::size_t j = 0; j < 6; ++j) {
     Eigen::VectorXd y(n), noise(n);
@@ -113,12 +113,11 @@ void LeftOverField::set(std::vector<LeftOver> samples, const DetachVector& throw
   }
 }
 
-LeftOverField::At LeftOverField::at(const std::array<double, 3>& fractions, double com_offset) const {
+LeftOverField::At LeftOverField::at(const std::array<double, 3>& fractions, const Bar& bar) const {
   At out;
   const Eigen::Index n = static_cast<Eigen::Index>(samples_.size());
   Eigen::VectorXd k(n);
-  for (Eigen::Index a = 0; a < n; ++a)
-    k[a] = kernel(samples_[static_cast<std::size_t>(a)], fractions, com_offset);
+  for (Eigen::Index a = 0; a < n; ++a) k[a] = kernel(samples_[static_cast<std::size_t>(a)], fractions, bar);
   for (std::size_t j = 0; j < 6; ++j) {
     const double s2 = sigma_[j] * sigma_[j];
     out.variance[j] = s2;
@@ -146,10 +145,16 @@ ReleaseLearner::ReleaseLearner(const HandLibrary& library, const ReleaseCard& ca
   field_.set(samples_, scatter_.detach);
 }
 
+ReleaseLearner ReleaseLearner::aimed_at(const FlipTarget& target) const {
+  ReleaseLearner out = *this;
+  out.target_ = target;
+  return out;
+}
+
 std::optional<FlipForecast> ReleaseLearner::forecast(const std::array<double, 3>& fractions,
                                                      const DetachVector& predicted) const {
   const double l = library_.bar().com_offset;
-  const LeftOverField::At left = field_.at(fractions, l);
+  const LeftOverField::At left = field_.at(fractions, library_.bar());
   DetachVector pads = shifted(predicted, -l);
   for (std::size_t j = 0; j < 6; ++j) pads[j] += left.mean[j];
   const auto land = [&](const DetachVector& d) { return fly_flip(shifted(d, l)); };
@@ -226,19 +231,20 @@ std::optional<FlipCommand> ReleaseLearner::next() {
       return std::hypot(s.at[0] - p.at[0], s.at[1] - p.at[1], s.at[2] - p.at[2]) < 1.9 * library_.spacing();
     });
     if (!close) starts.push_back(p);
-    if (starts.size() == 2 || (!starts.empty() && starts.front().worth > 0.5)) break;
+    if (starts.size() == 2) break;
   }
   Point best = starts.front();
   for (Point at : starts) {
     double step = 0.5 * library_.spacing();
-    for (int round = 0; round < 12 && step > library_.spacing() / 10; ++round) {
+    for (int round = 0; round < 12 && step > 0.01; ++round) {
       bool moved = false;
       for (std::size_t k = 0; k < 3; ++k)
         for (const double side : {step, -step}) {
           Point tried = at;
           tried.at[k] = std::clamp(tried.at[k] + side, 0.0, 1.0);
           if (tried.at[k] == at.at[k]) continue;
-          tried.worth = worth(forecast(range.clamp(range.at(tried.at[0], tried.at[1], tried.at[2]))));
+          const auto predicted = library_.between(mesh_, tried.at);
+          tried.worth = worth(predicted ? forecast(tried.at, *predicted) : std::nullopt);
           if (!(tried.worth > at.worth)) continue;
           at = tried;
           moved = true;

@@ -15,7 +15,7 @@ namespace unhand::planners::flip {
 /// the wrench does not. Units as DetachVector.
 struct LeftOver {
   std::array<double, 3> at{};  ///< the command, as fractions of the range
-  double com_offset{};         ///< of the bar [m]
+  Bar bar;                     ///< that was thrown
   DetachVector value{};        ///< observed minus predicted
   int throws{1};               ///< that it is the mean of
 };
@@ -45,8 +45,8 @@ class LeftOverField {
   struct At {
     DetachVector mean{}, variance{};  ///< in DetachVector's units, and squared
   };
-  /// At a command, in fractions of the range, for a bar of that `com_offset` [m].
-  At at(const std::array<double, 3>& fractions, double com_offset) const;
+  /// At a command, in fractions of the range, for a bar.
+  At at(const std::array<double, 3>& fractions, const Bar& bar) const;
   /// σ_j as chosen, in DetachVector's units.
   const DetachVector& sigma() const { return sigma_; }
 
@@ -71,6 +71,9 @@ class ReleaseLearner final : public FlipLearner {
   /// Keeps a reference to `library`.
   ReleaseLearner(const HandLibrary& library, const ReleaseCard& card, std::vector<LeftOver> known,
                  const ThrowScatter& scatter, const FlipTarget& target, int throws);
+  /// With the same knowledge at another target.
+  ReleaseLearner aimed_at(const FlipTarget& target) const;
+  /// Searched on the library's mesh, and from its best points on between mesh points.
   std::optional<FlipCommand> next() override;
   void observe(std::span<const FlipTrial> trials) override;
   /// Empty where the physics predicts no landing.

@@ -11,6 +11,7 @@
 #include "contact/registry.hpp"
 #include "datasets/toml_keys.hpp"
 #include "planners/arm/chain_file.hpp"
+#include "planners/flip/arm_throw.hpp"
 
 namespace unhand::planners::flip {
 namespace {
@@ -18,10 +19,12 @@ namespace {
 using datasets::TomlKeys;
 using datasets::TomlLimits;
 
-constexpr double kMost = 1e6;
-constexpr TomlLimits positive(const char* unit) { return {0, kMost, true, unit}; }
-constexpr TomlLimits not_negative(const char* unit) { return {0, kMost, false, unit}; }
-constexpr TomlLimits any(const char* unit) { return {-kMost, kMost, false, unit}; }
+// What an arm with a hand and a bar may have; beyond, the simulation would answer, but mean nothing.
+constexpr TomlLimits positive(double most, const char* unit) { return {0, most, true, unit}; }
+constexpr TomlLimits not_negative(double most, const char* unit) { return {0, most, false, unit}; }
+constexpr TomlLimits around_zero(double most, const char* unit) { return {-most, most, false, unit}; }
+constexpr TomlLimits kBarMass{1e-3, 10, false, "kg"}, kBarInertia{1e-6, 1, false, "kg m^2"},
+    kComOffset{0, 1, false, "m"};
 
 /// One table of the file, every key of it required.
 class Section {
@@ -56,13 +59,14 @@ class Section {
 FlipMotion motion_of(Section keys, const Chain& chain) {
   const int n = chain.size();
   FlipMotion out;
-  out.pose = keys.joints("pose_rad", n, any("rad"));
-  out.rate = keys.joints("rate_rad_s", n, any("rad/s"));
+  out.pose = keys.joints("pose_rad", n, around_zero(10, "rad"));
+  out.rate = keys.joints("rate_rad_s", n, around_zero(50, "rad/s"));
   if (!(out.rate.norm() > 0)) keys.fail("rate_rad_s", "no joint moves");
   out.duration = keys.number("duration_s", {0.05, 10, false, "s"});
   out.window = keys.number("window_s", {0.02, 1, false, "s"});
-  const auto pitch = keys.range("pitch_rad", any("rad")), speed = keys.range("speed", positive("")),
-             damping = keys.range("damping_n_m_s", not_negative("N m s/rad"));
+  const auto pitch = keys.range("pitch_rad", around_zero(10, "rad")),
+             speed = keys.range("speed", positive(10, "")),
+             damping = keys.range("damping_n_m_s", not_negative(500, "N m s/rad"));
   out.range = {{pitch[0], speed[0], damping[0]}, {pitch[1], speed[1], damping[1]}};
   keys.done();
   return out;
@@ -70,12 +74,12 @@ FlipMotion motion_of(Section keys, const Chain& chain) {
 
 FlipControl control_of(Section keys, int n) {
   FlipControl out;
-  out.stiffness = keys.joints("stiffness_n_m_rad", n, not_negative("N m/rad"));
-  out.damping = keys.joints("damping_n_m_s", n, not_negative("N m s/rad"));
-  out.brake_stiffness = keys.joints("brake_stiffness_n_m_rad", n, not_negative("N m/rad"));
-  out.brake_damping = keys.joints("brake_damping_n_m_s", n, not_negative("N m s/rad"));
-  out.brake_share = keys.joints("brake_share", n, not_negative(""));
-  out.torque_rate = keys.number("torque_rate_n_m_s", positive("N m/s"));
+  out.stiffness = keys.joints("stiffness_n_m_rad", n, not_negative(5000, "N m/rad"));
+  out.damping = keys.joints("damping_n_m_s", n, not_negative(500, "N m s/rad"));
+  out.brake_stiffness = keys.joints("brake_stiffness_n_m_rad", n, not_negative(5000, "N m/rad"));
+  out.brake_damping = keys.joints("brake_damping_n_m_s", n, not_negative(500, "N m s/rad"));
+  out.brake_share = keys.joints("brake_share", n, not_negative(1, ""));
+  out.torque_rate = keys.number("torque_rate_n_m_s", positive(1e5, "N m/s"));
   keys.done();
   return out;
 }
@@ -88,7 +92,9 @@ Pads pads_of(Section keys) {
     keys.fail("law", fmt::format("'{}' is no contact model that says how the pads let go", out.law));
   out.mu = keys.number("mu", {0, 10, true, ""});
   out.length = keys.number("length_m", {0, 0.5, true, "m"});
-  out.count = static_cast<int>(keys.number("pads", {1, 8, false, ""}));
+  const double pads = keys.number("pads", {1, 8, false, ""});
+  if (pads != std::floor(pads)) keys.fail("pads", fmt::format("{} is not a whole number", pads));
+  out.count = static_cast<int>(pads);
   keys.done();
   return out;
 }
@@ -137,10 +143,10 @@ FlipRobot read_flip_robot(const std::string& name_or_file) {
   }
   {
     Section hand(keys, "hand");
-    const double mass = hand.number("mass_kg", positive("kg")),
-                 length = hand.number("length_m", positive("m")),
-                 across = hand.number("inertia_across_kg_m2", positive("kg m^2")),
-                 along = hand.number("inertia_along_kg_m2", positive("kg m^2"));
+    const double mass = hand.number("mass_kg", positive(20, "kg")),
+                 length = hand.number("length_m", positive(1, "m")),
+                 across = hand.number("inertia_across_kg_m2", positive(1, "kg m^2")),
+                 along = hand.number("inertia_along_kg_m2", positive(1, "kg m^2"));
     hand.done();
     out.chain =
         with_payload(out.chain, {mass, {0, 0, length / 2}, symmetric(across, across, along, 0, 0, 0)});
@@ -150,15 +156,16 @@ FlipRobot read_flip_robot(const std::string& name_or_file) {
   out.control = control_of({keys, "control"}, out.chain.size());
   {
     Section k(keys, "gripper");
-    out.gripper = {k.number("grip_force_n", positive("N")), k.number("dead_time_s", not_negative("s")),
-                   k.number("opening_time_s", positive("s")), k.number("shape", {0.1, 10, false, ""})};
+    out.gripper = {k.number("grip_force_n", positive(1000, "N")),
+                   k.number("dead_time_s", not_negative(1, "s")),
+                   k.number("opening_time_s", positive(1, "s")), k.number("shape", {0.1, 10, false, ""})};
     k.done();
   }
   out.pads = pads_of({keys, "pads"});
   {
     Section k(keys, "bar");
-    out.bar = {k.number("mass_kg", positive("kg")), k.number("inertia_kg_m2", positive("kg m^2")),
-               k.number("com_offset_m", not_negative("m"))};
+    out.bar = {k.number("mass_kg", kBarMass), k.number("inertia_kg_m2", kBarInertia),
+               k.number("com_offset_m", kComOffset)};
     k.done();
   }
   const TomlLimits share{0, 0.5, false, ""};
@@ -171,33 +178,51 @@ FlipRobot read_flip_robot(const std::string& name_or_file) {
                   k.number("length", share),
                   k.number("grip_force", share),
                   k.number("shape", share),
-                  k.number("dead_time_s", not_negative("s")),
-                  k.number("opening_time_s", not_negative("s")),
-                  k.number("com_offset_m", not_negative("m"))};
+                  k.number("dead_time_s", not_negative(0.1, "s")),
+                  k.number("opening_time_s", not_negative(0.1, "s")),
+                  k.number("com_offset_m", not_negative(0.1, "m"))};
     k.done();
   }
   {
     Section k(keys, "throws");
     out.throws = {k.number("mu", share),
                   k.number("grip_force", share),
-                  k.number("dead_time_s", not_negative("s")),
-                  k.number("opening_time_s", not_negative("s")),
-                  k.number("grasp_offset_m", not_negative("m")),
-                  k.number("grasp_angle_rad", not_negative("rad")),
+                  k.number("dead_time_s", not_negative(0.1, "s")),
+                  k.number("opening_time_s", not_negative(0.1, "s")),
+                  k.number("grasp_offset_m", not_negative(0.1, "m")),
+                  k.number("grasp_angle_rad", not_negative(1, "rad")),
                   k.number("torque_noise", share)};
     k.done();
   }
   {
     Section k(keys, "sensors");
-    out.sensors = {
-        k.number("angle_rad", not_negative("rad")), k.number("rate_rad_s", not_negative("rad/s")),
-        k.number("position_m", not_negative("m")),  k.number("turn_rad", not_negative("rad")),
-        k.number("speed_m_s", not_negative("m/s")), k.number("omega_rad_s", not_negative("rad/s")),
-        k.number("landing_m", not_negative("m")),   k.number("landing_turn_rad", not_negative("rad"))};
+    out.sensors = {k.number("angle_rad", not_negative(0.1, "rad")),
+                   k.number("rate_rad_s", not_negative(1, "rad/s")),
+                   k.number("position_m", not_negative(1, "m")),
+                   k.number("turn_rad", not_negative(1, "rad")),
+                   k.number("speed_m_s", not_negative(1, "m/s")),
+                   k.number("omega_rad_s", not_negative(10, "rad/s")),
+                   k.number("landing_m", not_negative(1, "m")),
+                   k.number("landing_turn_rad", not_negative(1, "rad"))};
     k.done();
   }
   keys.reject_unknown();
+  try {
+    for (const FlipCommand& u : {out.motion.range.low, out.motion.range.high})
+      for (const FlipCommand& v : {out.motion.range.low, out.motion.range.high})
+        check_reference(out, {u.pitch, v.speed, u.damping});
+  } catch (const std::invalid_argument& error) {
+    keys.fail("motion", error.what());
+  }
   return out;
+}
+
+std::string complaint_of(const Bar& bar) {
+  const auto outside = [](const char* what, double value, const TomlLimits& limits) {
+    return limits.accept(value) ? "" : fmt::format("{}: {} is outside {}", what, value, limits.text());
+  };
+  return outside("mass_kg", bar.mass, kBarMass) + outside("inertia_kg_m2", bar.inertia, kBarInertia) +
+         outside("com_offset_m", bar.com_offset, kComOffset);
 }
 
 }  // namespace unhand::planners::flip

@@ -38,6 +38,7 @@ struct Bar {
   double mass{};        ///< [kg]
   double inertia{};     ///< about the centre of mass, out of the plane [kg m²]
   double com_offset{};  ///< [m]
+  bool operator==(const Bar&) const = default;
 };
 
 /// The motion family: accelerate to (q_d, s q̇_s), q_d = q_s + γ/N over the N joints that throw, then brake.
@@ -114,8 +115,12 @@ struct FlipRobot {
 /// means.
 std::string_view built_in_robot();
 
+/// Which of a bar's numbers no robot here could throw, and what is accepted; empty: all may be thrown.
+std::string complaint_of(const Bar& bar);
+
 /// "panda-flip", or a TOML file with the same keys; all but `source` and `notes` are required. `arm` is as
-/// for read_chain, a file's name relative to the TOML file. Throws datasets::TomlError.
+/// for read_chain, a file's name relative to the TOML file. Throws datasets::TomlError, also where the
+/// reference of a command would leave the joints' limits.
 FlipRobot read_flip_robot(const std::string& name_or_file);
 
 /// The chain with the bar held rigidly along the tip's z axis: a thin rod's inertia across it.

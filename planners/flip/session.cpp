@@ -42,9 +42,10 @@ Gathered gather(const Thrower& thrower, const std::string& stage, std::span<cons
 double LearningPath::first() const {
   return iterations.empty() ? std::numeric_limits<double>::infinity() : iterations.front().error;
 }
-double LearningPath::minimum() const {
-  double out = initial;
-  for (const PathIteration& one : iterations) out = std::min(out, one.error);
+double LearningPath::lowest(std::size_t count) const {
+  double out = initial_is_seen ? initial : std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < std::min(count, iterations.size()); ++i)
+    out = std::min(out, iterations[i].error);
   return out;
 }
 int LearningPath::reached(int hits) const {
@@ -57,6 +58,7 @@ LearningPath learn(FlipLearner& learner, const FlipTarget& target, std::span<con
                    const Bar& bar, const Thrower& thrower, const PathOptions& options) {
   LearningPath out;
   out.initial = std::numeric_limits<double>::infinity();
+  out.initial_is_seen = !options.transferred;
   for (const FlipDatum& one : known)
     out.initial = std::min(out.initial, normalized_error(one.landing, target));
   for (int i = 0; i < options.iterations; ++i) {
@@ -75,9 +77,7 @@ LearningPath learn(FlipLearner& learner, const FlipTarget& target, std::span<con
       now.error = normalized_error(mean->landing, target);
     }
     learner.observe(now.trials);
-    const bool success = now.hits == options.throws;
     out.iterations.push_back(std::move(now));
-    if (success && options.stop_at_success) break;
   }
   return out;
 }

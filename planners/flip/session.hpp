@@ -38,9 +38,10 @@ Gathered gather(const Thrower& thrower, const std::string& stage, std::span<cons
 
 /// How long a session lasts.
 struct PathOptions {
-  int iterations{5};            ///< commands tried
-  int throws{3};                ///< of each command
-  bool stop_at_success{false};  ///< once an iteration's mean is within the tolerances
+  int iterations{5};  ///< commands tried
+  int throws{3};      ///< of each command
+  /// What is known are landings that a transfer from another bar predicts; nobody has seen them.
+  bool transferred{false};
 };
 
 /// One iteration of a learner.
@@ -55,11 +56,15 @@ struct PathIteration {
 /// What a learner reached, iteration by iteration.
 struct LearningPath {
   double initial{};                       ///< lowest error of what was known before
+  bool initial_is_seen{true};             ///< not only predicted
   std::vector<PathIteration> iterations;  ///< in order
   bool gave_up{};                         ///< the learner had no command left to try
 
-  double first() const;    ///< error after the first iteration
-  double minimum() const;  ///< lowest error, the initial one included
+  double first() const;  ///< error after the first iteration
+  /// Lowest error that was seen until the end of that many iterations, the initial one included where it was
+  /// seen.
+  double lowest(std::size_t iterations) const;
+  double minimum() const { return lowest(iterations.size()); }
   /// The first iteration, counted from 1, in which at least `hits` throws hit; 0: none.
   int reached(int hits) const;
 };

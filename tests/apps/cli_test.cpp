@@ -699,12 +699,69 @@ TEST_F(Cli, LearnsToThrowFlipAndGoesOnAfterAKill) {
   EXPECT_EQ(nlohmann::json::parse(content(folder / "flip.json")), flip);
 
   expect_refusal(what + "--learner m1", 3, "session.json: /settings/learner: another session lies there");
+  // A throw of another robot, under a name that this session asks for.
+  const std::string kept = content(trials / "population-0002.json");
+  auto foreign = nlohmann::json::parse(kept);
+  foreign["seed"] = 4;
+  std::ofstream(trials / "population-0002.json") << foreign;
+  expect_refusal(what + "--learner m2", 3, "population-0002.json: /seed: not the throw");
+  std::ofstream(trials / "population-0002.json") << content(trials / "population-0001.json");
+  expect_refusal(what + "--learner m2", 3, "population-0002.json: /index: not the throw");
+  std::ofstream(trials / "population-0002.json") << kept;
   std::ofstream(trials / "path-0002.json") << "{\"command\": {";
   expect_refusal(what + "--learner m2", 3, "path-0002.json");
-  const std::string other = "plan flip --learner ";
-  expect_refusal(other + "m3 --target 1.2,180", 2, "--com-offset is missing");
-  expect_refusal(other + "m2 --target 1.2", 2, "--target: '1.2' is not X,DEGREES");
-  expect_refusal("plan flip --target 1.2,180 --robot none.toml", 3, "none.toml");
+  // What a kill in the middle of writing leaves is gone after the next run; the parts of live processes stay.
+  fs::remove(trials / "path-0002.json");
+  const fs::path dead = trials / ".path-0002.json.part-999999999-0", live = folder / ".out.part-1-0";
+  std::ofstream(dead) << "{";
+  fs::create_directory(folder / ".out.part-999999999-0");
+  fs::create_directory(live);
+  EXPECT_EQ(run(what + "--learner m2").code, 0);
+  EXPECT_FALSE(fs::exists(dead));
+  EXPECT_FALSE(fs::exists(folder / ".out.part-999999999-0"));
+  EXPECT_TRUE(fs::exists(live));
+}
+
+TEST_F(Cli, ThrowFlipTransfersToAnotherBar) {
+  const std::string what = "plan flip --target 1.3,180 --seed 3 --iterations 2 --repeats 1 --json flip.json ";
+  const Answer shifted = run(what + "--learner m3");
+  ASSERT_EQ(shifted.code, 0) << shifted.err;
+  EXPECT_THAT(shifted.out,
+              HasSubstr("18.0 cm from the pads, known from 27 throws of another one (12.0 cm; the "
+                        "paper's shift, as no --com-offset was given)"));
+  EXPECT_THAT(shifted.out, HasSubstr("(expected, not seen)"));
+  const auto flip = nlohmann::json::parse(content(folder / "flip.json"));
+  EXPECT_EQ(flip["bar"]["com_offset_m"], 0.18);
+  EXPECT_EQ(flip["known_bar"]["com_offset_m"], 0.12);
+  EXPECT_EQ(flip["initial_error_is_seen"], false);
+
+  std::ofstream(folder / "sku.toml") << "name = 'b'\nmass_kg = 0.3\ninertia_kg_m2 = 2e-3\n"
+                                        "com_offset_m = 0.15\nsurface = 'printed'\n";
+  const Answer sku = run(what + "--learner m4 --sku sku.toml");
+  ASSERT_EQ(sku.code, 0) << sku.err;
+  EXPECT_THAT(sku.out, HasSubstr("15.0 cm from the pads, known from 12 throws of another one (12.0 cm)"));
+  EXPECT_EQ(nlohmann::json::parse(content(folder / "flip.json"))["bar"]["mass_kg"], 0.3);
+}
+
+TEST_F(Cli, ThrowFlipRefusesWhatItCannotDo) {
+  const std::string other = "plan flip --learner ", aim = other + "m2 --target 1.2,180 ";
+  expect_refusal(other + "m2 --target 1.2", 2, "--target: '1.2' is not 2 numbers");
+  expect_refusal(other + "m2 --target 5,180", 2, "--target: 5 m, 180 degrees; accepted: ");
+  expect_refusal(other + "m2 --target -1,180", 2, "--target: -1 m, 180 degrees; accepted: ");
+  expect_refusal(other + "m2 --target 1.2,900", 2, "--target: 1.2 m, 900 degrees; accepted: ");
+  expect_refusal(other + "m5 --target 1.2,180", 2, "m5 not in {m1,m2,m3,m4}");
+  expect_refusal(aim + "--seed abc", 2, "abc is not a whole number from 0 to");
+  expect_refusal(aim + "--seed -1", 2, "-1 is not a whole number from 0 to");
+  expect_refusal(aim + "--card card.json", 2, "--card: only --learner m4");
+  expect_refusal(aim + "--com-offset 0.9", 1, "lands this bar with none of its commands");
+  expect_refusal(aim + "--robot none.toml", 3, "none.toml");
+  std::ofstream(folder / "sku.toml") << "name = 'b'\nmass_kg = 0.3\ninertia_kg_m2 = 1e-9\n"
+                                        "com_offset_m = 0.15\nsurface = 'printed'\n";
+  expect_refusal(aim + "--sku sku.toml", 3,
+                 "sku.toml: object: inertia_kg_m2: 1e-09 is outside [1e-06, 1] kg m^2");
+  const Answer far = run(other + "m2 --target 1.8,360 --iterations 1");
+  EXPECT_EQ(far.code, 0);
+  EXPECT_THAT(far.err, HasSubstr("note: out of reach of the robot as declared"));
 }
 
 TEST_F(Cli, ValidateSkuAnswersWithABudget) {

@@ -78,7 +78,7 @@ TEST(ConeLearner, IsExactInOneStepWhereItsModelHolds) {
     const auto support = gather(plant, "support", support_simplex(kRange), 1, kBar).data;
     const FlipTarget target = target_on_mesh(plant, support, 0.3, 0.25, support[3].landing);
     ConeLearner learner(landing ? ForwardModel::landing : ForwardModel::detach, support, target, kRange);
-    const LearningPath path = learn(learner, target, support, kBar, plant, {1, 1, false});
+    const LearningPath path = learn(learner, target, support, kBar, plant, {1, 1});
     EXPECT_LT(path.first(), 1e-9) << landing;
     EXPECT_EQ(path.reached(1), 1);
   }
@@ -90,7 +90,7 @@ TEST(ConeLearner, Model1MissesOnTheCurvedFlight) {
   const auto support = gather(plant, "support", support_simplex(kRange), 1, kBar).data;
   const FlipTarget target = target_on_mesh(plant, support, 0.6, 0.5, support[3].landing);
   ConeLearner learner(ForwardModel::landing, support, target, kRange);
-  EXPECT_GT(learn(learner, target, support, kBar, plant, {1, 1, false}).first(), 0.05);
+  EXPECT_GT(learn(learner, target, support, kBar, plant, {1, 1}).first(), 0.05);
 }
 
 TEST(ConeLearner, NeverTriesACommandTwiceAndStaysInRange) {
@@ -98,7 +98,7 @@ TEST(ConeLearner, NeverTriesACommandTwiceAndStaysInRange) {
   const auto support = gather(plant, "support", support_simplex(kRange), 1, kBar).data;
   const FlipTarget far{{4.0, 30}};  // out of reach: the error must stagnate
   ConeLearner learner(ForwardModel::detach, support, far, kRange);
-  const LearningPath path = learn(learner, far, support, kBar, plant, {25, 1, false});
+  const LearningPath path = learn(learner, far, support, kBar, plant, {25, 1});
   for (std::size_t i = 0; i < path.iterations.size(); ++i) {
     EXPECT_TRUE(kRange.holds(path.iterations[i].command));
     for (std::size_t k = 0; k < i; ++k)
@@ -127,7 +127,7 @@ TEST(ConeLearner, ReSelectionTakesOtherNeighbours) {
 TEST(ConeLearner, GivesUpWithoutNeighbours) {
   ConeLearner learner(ForwardModel::detach, {}, {{1.2, 3}}, kRange);
   EXPECT_FALSE(learner.next());
-  const LearningPath path = learn(learner, {{1.2, 3}}, {}, kBar, LinearPlant{}, {3, 1, false});
+  const LearningPath path = learn(learner, {{1.2, 3}}, {}, kBar, LinearPlant{}, {3, 1});
   EXPECT_TRUE(path.gave_up);
   EXPECT_TRUE(std::isinf(path.minimum()));
 }
@@ -153,11 +153,29 @@ TEST(Transfer, IsExactInItsFirstTwoIterationsWhereItsAssumptionHolds) {
   const FlipTarget target = target_on_mesh(now, as_now, 0.4, 0.3, {1.35, 4.0});
   TransferLearner learner(past, 0.06, target, kRange);
   const Bar bar{kBar.mass, kBar.inertia, 0.18};
-  const LearningPath path = learn(learner, target, as_now, bar, now, {4, 1, false});
+  const LearningPath path = learn(learner, target, as_now, bar, now, {4, 1, true});
   ASSERT_EQ(path.iterations.size(), 4u);
   EXPECT_NEAR(path.iterations[0].error, path.initial, 1e-9);  // the nearest command of the past
   EXPECT_LT(path.iterations[1].error, 0.15);                  // linear: only the mesh's spacing is left
   EXPECT_LT(path.minimum(), 0.1);
+}
+
+// The nearest of the past differ in one parameter only, so that its three opening commands span no plane.
+TEST(Transfer, GoesOnWhereItsCommandsLieOnALine) {
+  const LinearPlant plant{false};
+  std::vector<FlipCommand> past;
+  for (const double speed : {0.4, 0.5, 0.6, 0.7}) past.push_back(kRange.at(0.5, speed, 0.5));
+  past.push_back(kRange.at(0.9, 0.1, 0.1));
+  past.push_back(kRange.at(0.1, 0.9, 0.9));
+  const auto data = gather(plant, "population", past, 1, kBar).data;
+  const FlipTarget target{plant({"", 0, kRange.at(0.5, 0.55, 0.52), kBar}).landing};
+  TransferLearner learner(data, 0.0, target, kRange);
+  const LearningPath path = learn(learner, target, data, kBar, plant, {9, 1});
+  EXPECT_FALSE(path.gave_up);
+  ASSERT_EQ(path.iterations.size(), 9u);
+  for (std::size_t i = 0; i < 9; ++i)
+    for (std::size_t k = 0; k < i; ++k)
+      EXPECT_FALSE(path.iterations[i].command == path.iterations[k].command) << i << " " << k;
 }
 
 TEST(Transfer, NeedsFourThrows) {
@@ -177,6 +195,12 @@ TEST(Path, CountsIterationsToTheThreshold) {
   EXPECT_EQ(path.reached(4), 0);
   EXPECT_EQ(path.first(), 4);
   EXPECT_EQ(path.minimum(), 0.5);
+  EXPECT_EQ(path.lowest(1), 3);
+  path.initial = 0.2;
+  EXPECT_EQ(path.minimum(), 0.2);
+  path.initial_is_seen = false;  // a landing that was only predicted is no success
+  EXPECT_EQ(path.minimum(), 0.5);
+  EXPECT_EQ(path.lowest(1), 4);
 }
 
 }  // namespace

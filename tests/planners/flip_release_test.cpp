@@ -17,7 +17,7 @@ const FlipRobot& robot() {
   return it;
 }
 const HandLibrary& library() {
-  static const HandLibrary it(robot(), robot().bar, 5);
+  static const HandLibrary it(robot(), robot().bar);  // as fine as that of `unhand plan flip`
   return it;
 }
 /// The declared arm with pads that obey a card, and states at detach that differ by an offset at the pads.
@@ -88,23 +88,27 @@ TEST(ReleaseFit, CardComesBackAsItWasWritten) {
 TEST(LeftOverField, KnowsWhatItSawAndDoubtsTheRest) {
   LeftOverField field;
   field.set({}, {});
-  const auto nothing = field.at({0.5, 0.5, 0.5}, 0.12);
+  const Bar bar = robot().bar, longer{bar.mass, bar.inertia, 0.18},
+            heavier{2 * bar.mass, bar.inertia, bar.com_offset};
+  const auto nothing = field.at({0.5, 0.5, 0.5}, bar);
   for (std::size_t j = 0; j < 6; ++j) {
     EXPECT_EQ(nothing.mean[j], 0);
     EXPECT_DOUBLE_EQ(nothing.variance[j], kDiscrepancy[j] * kDiscrepancy[j]);
   }
-  LeftOver one{{0.5, 0.5, 0.5}, 0.12, {0.01, -0.01, 0.2, 0.05, -0.05, 1}, 3};
+  LeftOver one{{0.5, 0.5, 0.5}, bar, {0.01, -0.01, 0.2, 0.05, -0.05, 1}, 3};
   DetachVector noise{};
   for (double& v : noise) v = 1e-8;
   field.set({one}, noise);
-  const auto here = field.at({0.5, 0.5, 0.5}, 0.12), away = field.at({0.9, 0.1, 0.9}, 0.12),
-             other_bar = field.at({0.5, 0.5, 0.5}, 0.18);
+  const auto here = field.at({0.5, 0.5, 0.5}, bar), away = field.at({0.9, 0.1, 0.9}, bar);
   for (std::size_t j = 0; j < 6; ++j) {
     EXPECT_NEAR(here.mean[j], one.value[j], 1e-3 * std::abs(one.value[j]));
     EXPECT_LT(std::abs(away.mean[j]), std::abs(one.value[j]));
     EXPECT_LT(here.variance[j], 1e-3 * away.variance[j]);
-    EXPECT_NEAR(other_bar.mean[j], 0.8 * one.value[j], 1e-3 * std::abs(one.value[j]));
-    EXPECT_GT(other_bar.variance[j], here.variance[j]);
+    for (const Bar& other : {longer, heavier}) {
+      const auto there = field.at({0.5, 0.5, 0.5}, other);
+      EXPECT_NEAR(there.mean[j], 0.8 * one.value[j], 1e-3 * std::abs(one.value[j]));
+      EXPECT_GT(there.variance[j], here.variance[j]);
+    }
   }
 }
 
@@ -113,7 +117,7 @@ TEST(ReleaseLearner, HitsAtOnceWhereThePhysicsIsRight) {
   for (const FlipPose& pose : {FlipPose{1.2, kTurn / 2}, FlipPose{1.3, 0.9 * kTurn}}) {
     const FlipTarget target{pose};
     ReleaseLearner learner(library(), plant.card, {}, scatter_of({}, 0.12), target, 3);
-    const LearningPath path = learn(learner, target, {}, robot().bar, plant, {1, 1, false});
+    const LearningPath path = learn(learner, target, {}, robot().bar, plant, {1, 1});
     EXPECT_LT(path.first(), 0.5);
     EXPECT_EQ(path.reached(1), 1);
   }
@@ -123,7 +127,7 @@ TEST(ReleaseLearner, LearnsWhatThePhysicsLacks) {
   const CardPlant plant{prior_card(robot()), {0, 0, 0.3, 0.15, 0.1, 1.5}};
   const FlipTarget target{{1.3, 0.8 * kTurn}};
   ReleaseLearner learner(library(), prior_card(robot()), {}, scatter_of({}, 0.12), target, 3);
-  const LearningPath path = learn(learner, target, {}, robot().bar, plant, {4, 1, false});
+  const LearningPath path = learn(learner, target, {}, robot().bar, plant, {4, 1});
   EXPECT_GT(path.first(), 1.5);  // what it does not know yet
   EXPECT_LT(path.minimum(), 0.3);
 }
