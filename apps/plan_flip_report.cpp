@@ -49,21 +49,36 @@ std::string target_box(const fl::FlipTarget& t) {
       t.pose.x + 1.2 * t.tolerance_x);
 }
 
-/// One label for each cluster of means, "2, 4" where numbers would lie on each other.
+/// "1, 3–6": ascending numbers, three and more in a row as a range.
+std::string listed(const std::vector<int>& numbers) {
+  std::string out;
+  for (std::size_t i = 0; i < numbers.size();) {
+    std::size_t end = i + 1;
+    while (end < numbers.size() && numbers[end] == numbers[end - 1] + 1) ++end;
+    if (end - i < 3) end = i + 1;
+    out += fmt::format("{}{}", out.empty() ? "" : ", ", numbers[i]);
+    if (end > i + 1) out += fmt::format("–{}", numbers[end - 1]);
+    i = end;
+  }
+  return out;
+}
+
+/// One label for each cluster of means, where numbers would lie on each other.
 DataBlock labels_of(const std::vector<std::vector<double>>& means, double reach_x, double reach_angle) {
   DataBlock out{"iterations", {"x [m]", "angle [deg]", "numbers"}, {}, {}};
+  std::vector<std::vector<int>> numbers;
   for (const auto& one : means) {
     const auto near = std::find_if(out.rows.begin(), out.rows.end(), [&](const auto& row) {
       return std::abs(row[0] - one[0]) < reach_x && std::abs(row[1] - one[1]) < reach_angle;
     });
-    const std::string number = fmt::format("{:.0f}", one[2]);
+    const auto at = static_cast<std::size_t>(near - out.rows.begin());
     if (near == out.rows.end()) {
       out.rows.push_back({one[0], one[1]});
-      out.labels.push_back(number);
-    } else {
-      out.labels[static_cast<std::size_t>(near - out.rows.begin())] += ", " + number;
+      numbers.emplace_back();
     }
+    numbers[at].push_back(static_cast<int>(one[2]));
   }
+  for (const auto& cluster : numbers) out.labels.push_back(listed(cluster));
   return out;
 }
 
@@ -95,7 +110,7 @@ void draw_path(const FlipAnswer& a, const std::filesystem::path& folder) {
     for (const auto& row : block->rows)
       for (std::size_t k = 0; k < 2; ++k)
         low[k] = std::min(low[k], row[k]), high[k] = std::max(high[k], row[k]);
-  const DataBlock labels = labels_of(means.rows, 0.06 * (high[0] - low[0]), 0.05 * (high[1] - low[1]));
+  const DataBlock labels = labels_of(means.rows, 0.08 * (high[0] - low[0]), 0.05 * (high[1] - low[1]));
   struct Series {
     const DataBlock& block;
     std::string style;
@@ -106,7 +121,7 @@ void draw_path(const FlipAnswer& a, const std::filesystem::path& folder) {
                                   a.path.initial_is_seen ? "known before" : "expected")},
         Series{throws, "using 1:2 with points pt 6 ps 0.6 lc rgb '#56b4e9' title 'throws'"},
         Series{means, "using 1:2 with linespoints pt 7 ps 0.7 lc rgb '#0072b2' title 'means'"},
-        Series{labels, "using 1:2:3 with labels left offset 0.7,0.7 notitle"}}) {
+        Series{labels, "using 1:2:3 with labels left offset 0.7,0.7 font ',8' notitle"}}) {
     if (one.block.rows.empty()) continue;
     plots += fmt::format("{}DATA index {} {}", plots.empty() ? "plot " : ", ", figure.data.size(), one.style);
     figure.data.push_back(one.block);

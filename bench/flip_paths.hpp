@@ -77,12 +77,14 @@ class Paths {
                        first_.mean(), first_.error(), minimum_.mean(), minimum_.error(), reached(two_),
                        reached(three_), 100 * at_edge_.mean());
   }
+  /// `what`: the columns before those of row().
   static std::string header(const std::string& what) {
+    std::string rule = "|";
+    for (auto n = std::count(what.begin(), what.end(), '|'); n >= 0; --n) rule += " --- |";
     return "| " + what +
            " | initial error | after 1 iteration | minimum | 2/3 reached | median iterations | 3/3 reached | "
-           "median iterations | commands at an edge |\n| --- | ---: | ---: | ---: | ---: | ---: | ---: | "
-           "---: "
-           "| ---: |\n";
+           "median iterations | commands at an edge |\n" +
+           rule + " ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n";
   }
   /// A command whose throws never landed counts 20.
   static double capped(double error) { return std::min(error, 20.0); }
@@ -128,7 +130,6 @@ class Contest {
 
   std::string table() const {
     std::string out = Paths::header("target | learner");
-    out.insert(out.find("\n| ---") + 1, "| --- ");
     for (std::size_t t = 0; t < targets_.size(); ++t)
       for (std::size_t m = 0; m < learners_.size(); ++m)
         out += fmt::format("| {} | {} | {} |\n", targets_[t].name, learners_[m], over(m, t, t + 1).row());
