@@ -112,13 +112,15 @@ class Run {
     Stepper<S, N>& stepper = steppers_.of(system_.kind(entry.mode), system_.is_paced(entry.mode));
     if (goes_on) stepper.goes_on();
     stepper.start(system_, phase_, entry.t, entry.y);
-    for (bool first_step = true;; first_step = false) {
+    for (bool first_step = true;;) {
       if (++solution_.statistics.steps > options_.step_budget)
         return {{entry.mode, stepper.t1(), stepper.y1(), S(0)}, Outcome::step_budget_spent};
       const StepStatus status = stepper.step(window_end(), longest_step(stepper));
       if (status != StepStatus::accepted)
         return {{entry.mode, stepper.t0(), stepper.y0(), S(0)},
                 status == StepStatus::too_small ? Outcome::step_too_small : Outcome::not_finite};
+      // A guess at a first step that is below the spacing of times: the next ones grow fivefold.
+      if (!(value_of(stepper.t1()) > value_of(stepper.t0()))) continue;
       Bracket first;
       if (watch_.count > 0 && !roots_.find_first(stepper, first_step, first))
         return {{entry.mode, stepper.t0(), stepper.y0(), S(0)}, Outcome::not_finite};
@@ -130,6 +132,7 @@ class Run {
       record(stepper, stepper.t1());
       if (!(value_of(window_end()) - value_of(stepper.t1()) > shortest_step(value_of(stepper.t1()))))
         return leave_window(entry.mode, stepper.y1());
+      first_step = false;
     }
   }
 

@@ -442,5 +442,28 @@ TEST_P(Events, ABreakawayStartsWithoutSlopeAndGoesOn) {
   }
 }
 
+TEST(FirstStep, MayBeGuessedBelowTheSpacingOfTimes) {
+  // At the breakaway the rate is rounding, so the guess looks far ahead, where a polynomial of the data is
+  // beyond everything: the first steps are then too short to move t. y₁ = 65 Δ² meets 1e-3 at √(1e-3/65).
+  constexpr double kBegin = 0.07;
+  const auto toy = until_guard(
+      {{"level", Crossing::rising}},
+      [](int, const auto& t, const auto&, auto& dy) {
+        const auto delta = t - kBegin;
+        auto far = delta;
+        for (int k = 1; k < 14; ++k) far = far * delta;
+        dy[0] = decltype(delta + 0.0)(0.0);
+        dy[1] = 2e-14 + 130.0 * delta + 1e6 * far;
+      },
+      [](int, const auto&, const auto& y, auto* g) { g[0] = y[1] - 1e-3; });
+  for (const Method method : {Method::automatic, Method::dormand_prince, Method::rosenbrock, Method::radau}) {
+    IntegratorOptions options;
+    options.method = method;
+    const auto end = integrate<double, 2>(toy, {0, kBegin, {0.14, 0.0}, 0.0}, kBegin + 0.01, options);
+    EXPECT_EQ(end.outcome, Outcome::finished) << name_of(method);
+    EXPECT_NEAR(end.t - kBegin, std::sqrt(1e-3 / 65), kEventTime) << name_of(method);
+  }
+}
+
 }  // namespace
 }  // namespace unhand::dynamics
