@@ -17,7 +17,7 @@ namespace {
 namespace fl = planners::flip;
 
 constexpr double kDegree = std::numbers::pi / 180;
-const char* kColours[]{"#762a83", "#0072b2", "#e69f00"};  // of damping: low, middle, high
+const char* kColours[]{"#440154", "#21918c", "#e69f00"};  // of damping: low, middle, high
 const int kMarkers[]{7, 5, 9};                            // of pitch: circle, square, triangle
 const double kSizes[]{0.5, 0.75, 1.0};                    // of speed
 
@@ -110,7 +110,7 @@ void draw_path(const FlipAnswer& a, const std::filesystem::path& folder) {
     for (const auto& row : block->rows)
       for (std::size_t k = 0; k < 2; ++k)
         low[k] = std::min(low[k], row[k]), high[k] = std::max(high[k], row[k]);
-  const DataBlock labels = labels_of(means.rows, 0.08 * (high[0] - low[0]), 0.05 * (high[1] - low[1]));
+  const DataBlock labels = labels_of(means.rows, 0.11 * (high[0] - low[0]), 0.06 * (high[1] - low[1]));
   struct Series {
     const DataBlock& block;
     std::string style;
