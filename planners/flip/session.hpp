@@ -64,7 +64,7 @@ struct LearningPath {
   /// Lowest error that was seen until the end of that many iterations, the initial one included where it was
   /// seen.
   double lowest(std::size_t iterations) const;
-  double minimum() const { return lowest(iterations.size()); }
+  double minimum() const { return lowest(iterations.size()); }  ///< of all iterations
   /// The first iteration, counted from 1, in which at least `hits` throws hit; 0: none.
   int reached(int hits) const;
 };
