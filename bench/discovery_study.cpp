@@ -1,9 +1,11 @@
 // How often the loop finds what is missing, on this library's own synthetic campaigns:
-//   build/release/bench/discovery_study KIND [CAMPAIGNS [FIRST_SEED]]
+//   build/release/bench/discovery_study KIND [CAMPAIGNS [FIRST_SEED [WITHOUT]]]
 // KIND: `one` effect of random size, from about what a campaign can show to twenty times that; `none`; `two`
 // at once; `forgotten`, one effect that the catalogue is told to forget. One line per campaign, then tables:
 // the detection rate by effect and size (in typical steps of its parameter), how many sizes came back within
-// their intervals, and false discoveries.
+// their intervals, and false discoveries. Of `two`, an effect that was missed is asked for again in the same
+// campaign without the other one: was it too small to be seen there, or did the other one hide it? WITHOUT:
+// "ft", "mocap", "landing" or several of them, sensors that the campaigns do not have.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -79,19 +81,31 @@ std::string answer_of(const fitting::Discovery& found) {
   return out;
 }
 
+/// The parameters of one of the effects.
+EffectSettings only(const EffectSettings& settings, const std::string& id) {
+  EffectSettings out;
+  for (const auto& setting : settings)
+    if (id_of(setting.first) == id) out.insert(setting);
+  return out;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   const std::string kind = argc > 1 ? argv[1] : "one";
   const int campaigns = argc > 2 ? std::atoi(argv[2]) : 20;
   const auto first = static_cast<std::uint64_t>(argc > 3 ? std::atoll(argv[3]) : 1);
+  const std::string without = argc > 4 ? argv[4] : "";
   constexpr const char* kSizes[] = {"below 1", "1 to 3", "3 to 10", "above 10"};
   std::map<std::string, std::map<std::string, Tally>> by_effect;
-  Tally all, nothing_wrong, within_95, within_3_sigma;
+  Tally all, nothing_wrong, within_95, within_3_sigma, missed_alone;
   double seconds = 0, longest = 0;
   for (int k = 0; k < campaigns; ++k) {
     const std::uint64_t seed = first + static_cast<std::uint64_t>(k);
     auto design = experiment::random_campaign(seed);
+    design.sensors.ft = without.find("ft") == std::string::npos;
+    design.sensors.mocap = without.find("mocap") == std::string::npos;
+    design.sensors.landing = without.find("landing") == std::string::npos;
     if (kind != "none") design.effects = experiment::random_effect(design, seed);
     for (std::uint64_t more = 1; kind == "two" && more < 20; ++more) {
       const auto second = experiment::random_effect(design, seed + 1'000'000 * more);
@@ -124,6 +138,12 @@ int main(int argc, char** argv) {
                                           : names(found, id);
       by_effect[id][kSizes[size < 1 ? 0 : size < 3 ? 1 : size < 10 ? 2 : 3]].add(ok);
       all.add(ok);
+      if (kind != "two" || ok) continue;
+      auto alone = design;
+      alone.effects = only(design.effects, id);
+      const auto again = fitting::discover(experiment::generate_campaign(alone, seed), "synthetic", options);
+      fmt::print("  {} alone -> {}\n", id, answer_of(again));
+      missed_alone.add(!names(again, id));
     }
     for (const auto& effect : found.effects)
       for (const auto& p : effect.parameters) {
@@ -145,6 +165,8 @@ int main(int argc, char** argv) {
       fmt::print("\n");
     }
     fmt::print("\nall together {}; ", all.text());
+    if (missed_alone.campaigns > 0)
+      fmt::print("of those that were missed, missed alone, too {}; ", missed_alone.text());
   }
   fmt::print(
       "campaigns without a false name {}; sizes within 95 % {}, within 3 sigma {}; {:.1f} s per campaign, "

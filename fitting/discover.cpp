@@ -81,6 +81,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
   Discovery out;
   Stage stage{CampaignProblem(log, file, options.campaign), {}, {}, {}};
   solve(stage, options, {});
+  if (stage.solved()) polish(stage, options);
   out.base = stage.fit;
   out.model = options.campaign.model;
   if (!stage.solved()) {

@@ -99,9 +99,11 @@ void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threa
   Equations all = no_equations(width);
   for (Eigen::Index k = 0; k < width; ++k) {
     const Unknown& u = fit.campaign[static_cast<std::size_t>(k)].unknown;
+    if (!(fit.campaign[static_cast<std::size_t>(k)].sigma > 1e-9 * u.scale))
+      all(k, k) = 1e30 / (u.scale * u.scale);  // held
     if (!u.prior_sigma) continue;
-    all(k, k) = 1 / (*u.prior_sigma * *u.prior_sigma);
-    all(k, width) = (campaign[static_cast<std::size_t>(k)] - u.start) * all(k, k);
+    all(k, k) += 1 / (*u.prior_sigma * *u.prior_sigma);
+    all(k, width) = (campaign[static_cast<std::size_t>(k)] - u.start) / (*u.prior_sigma * *u.prior_sigma);
   }
   std::array<Equations, kBlocks> without{all, all, all, all};
   std::map<std::string, Equations> conditions;

@@ -183,8 +183,7 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
     }
     grams[n].setZero(w, w);
     if (!solved) return;
-    const std::vector<double> nothing(own.size(), 0.0);
-    grams[n] = eliminated(throw_gram(own_columns, columns, nothing, fit.own_spread), own_columns.cols());
+    grams[n] = eliminated(throw_gram(own_columns, columns, own, fit.own_spread), own_columns.cols());
   });
   out.gram.setZero(w, w);
   for (const auto& gram : grams) out.gram += gram;

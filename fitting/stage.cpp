@@ -18,18 +18,21 @@ namespace {
 /// What a law leaves of an effect that it describes: a hundredth of its χ² is a tenth of its size.
 constexpr double kRest = 0.01;
 
+/// Channels and phases of a full log: wrench and mocap before, during and after the release, the sensor's own
+/// force, the landing.
+constexpr int kSeries = 3 * 3 + 3 * 3 + 1 + 3;
+
+bool is_answer(const FitResult& f) {
+  return f.outcome == FitOutcome::converged || f.outcome == FitOutcome::iterations_spent;
+}
+
 }  // namespace
 
 bool is_wrench(Channel c) {
   return c == Channel::wrench_fx || c == Channel::wrench_fz || c == Channel::wrench_tau;
 }
 
-bool Stage::solved() const {
-  const auto ok = [](const FitResult& f) {
-    return f.outcome == FitOutcome::converged || f.outcome == FitOutcome::iterations_spent;
-  };
-  return ok(fit) && ok(held_out);
-}
+bool Stage::solved() const { return is_answer(fit) && is_answer(held_out); }
 
 double Stage::bic() const {
   double out = 0;
@@ -41,12 +44,43 @@ double Stage::bic() const {
                    std::log(static_cast<double>(std::max(2L, fit.samples)));
 }
 
+namespace {
+
+/// Shape parameters that a fit leaves open over their whole grid: indices into the campaign's unknowns.
+std::vector<std::size_t> open_shapes(const CampaignProblem& problem, const FitResult& fit) {
+  std::vector<std::size_t> out;
+  for (const auto& id : problem.options().effects) {
+    const dynamics::Effect effect = find_effect(id);
+    for (const auto& p : effect.parameters) {
+      if (!p.is_shape()) continue;
+      const auto [low, high] = std::minmax_element(p.grid.begin(), p.grid.end());
+      for (std::size_t k = 0; k < fit.campaign.size(); ++k)
+        if (without_object(fit.campaign[k].unknown.name) == effect.full_name(p) &&
+            !(fit.campaign[k].data_sigma <= *high - *low))
+          out.push_back(k);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
 void solve(Stage& stage, const DiscoverOptions& options, std::vector<double> start) {
+  if (start.empty()) start = stage.problem.start();
   FitOptions train = options.fit;
-  train.start = std::move(start);
+  train.start = start;
   train.weigh = Weigh::variances;  // as bic() compares
   stage.fit = fit(stage.problem, train);
-  if (stage.fit.outcome == FitOutcome::no_start || stage.fit.outcome == FitOutcome::not_solved) return;
+  if (!is_answer(stage.fit)) return;
+  if (const auto open = open_shapes(stage.problem, stage.fit); !open.empty()) {
+    train.start = stage.fit.values();
+    for (const std::size_t k : open) {
+      train.start[k] = start[k];
+      train.fixed.push_back(stage.fit.campaign[k].unknown.name);
+    }
+    stage.fit = fit(stage.problem, train);
+    if (!is_answer(stage.fit)) return;
+  }
   FitOptions test = train;
   test.share = Share::test;
   test.start = stage.fit.values();
@@ -97,8 +131,9 @@ Stage reduced(const Stage& stage, std::size_t index, const DiscoverOptions& opti
 }
 
 bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options) {
-  if (is_wrench(m.channel)) return m.chi2_per_sample() > options.wrench_misfit;
-  return m.chi2_per_sample() > 1 + std::max(options.matters, 3 * std::sqrt(2.0 / m.n));
+  const bool slips = is_wrench(m.channel) && m.phase != Phase::grasped;
+  if (m.chi2_per_sample() <= (slips ? options.wrench_misfit : 1 + options.matters)) return false;
+  return chi2_tail(m.chi2, m.n) < options.false_discovery_rate / kSeries;
 }
 
 double misfit_in(const std::vector<ChannelMisfit>& misfit, Channel channel, Phase phase) {
@@ -115,7 +150,7 @@ Improvement improvement(const FitResult& before, const FitResult& after,
     const double was = b.chi2_per_sample(), is = misfit_in(after.misfit, b.channel, b.phase);
     double needed = std::max({options.matters, 0.1 * (was - 1), 2 * std::sqrt(2.0 / b.n)});
     if (is_wrench(b.channel)) {
-      if (was < options.wrench_misfit) continue;
+      if (was < (b.phase == Phase::grasped ? 1 + options.matters : options.wrench_misfit)) continue;
       needed = std::max(options.wrench_matters, 0.25 * (was - 1));
     }
     needed = std::max(needed, kRest * (misfit_in(base, b.channel, b.phase) - 1));

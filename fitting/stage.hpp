@@ -25,7 +25,10 @@ struct Stage {
 inline bool is_law(const std::string& id) { return id.rfind("contact.law:", 0) == 0; }
 bool is_wrench(experiment::Channel);
 
-/// Fits the train throws from `start`, and the own unknowns of the test throws.
+/// Fits the train throws from `start`, and the own unknowns of the test throws. A shape
+/// parameter that the log leaves open over its whole range (a speed at which friction changes, while the
+/// friction hardly does; the landing's share of a tracker's scale, where nothing was tracked) keeps its
+/// start, which the grid of its footprint gave it: the size beside it is then known for that shape.
 void solve(Stage& stage, const DiscoverOptions& options, std::vector<double> start);
 
 /// Fits again from the solution while that helps: the weights of the channels were learned while the effect
@@ -38,7 +41,10 @@ Stage extended(const Stage& stage, const Candidate& candidate, const Score& scor
 /// The stage without the effect `ids[index]`.
 Stage reduced(const Stage& stage, std::size_t index, const DiscoverOptions&);
 
-/// By how much a channel's misfit must exceed the noise before there is anything to explain.
+/// Whether a channel leaves anything to explain in a phase: more than `matters` beyond the noise, and more
+/// than chance leaves (χ², at the false discovery rate shared among all channels and phases of a log). The
+/// wrench while the pads still slip or may: more than `wrench_misfit`. In the firm grasp no friction law
+/// takes part, only Newton and Euler: there it is a channel like any other.
 bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options);
 
 /// The misfit of a channel in a phase, 1 where there is none.

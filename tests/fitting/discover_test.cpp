@@ -9,6 +9,7 @@
 #include "experiment/synthetic_campaign.hpp"
 #include "fitting/discrepancy.hpp"
 #include "fitting/footprints.hpp"
+#include "fitting/stage.hpp"
 
 namespace unhand::fitting {
 namespace {
@@ -114,6 +115,52 @@ TEST(Discovery, LogsWithChannelsMissingAreAnswered) {
     const Discovery found = found_in(experiment::generate_campaign(design, 5));
     EXPECT_EQ(found.verdict, Verdict::no_missing_effect) << missing;
   }
+}
+
+// Without a tracker only the product of its scale's error and the landing's share of it shows. At the share
+// that the footprint's grid gave, the error is known; free, the share would leave it open.
+TEST(Stage, AShapeThatTheLogLeavesOpenIsHeldAndTheSizeIsKnownForIt) {
+  constexpr double kScale = 1.017;
+  experiment::CampaignDesign design = experiment::campaign_design("quick12");
+  design.sensors.mocap = false;
+  design.effects = {{"sensor.length_scale.scale", kScale}, {"sensor.length_scale.landing_share", 1}};
+  DiscoverOptions options;
+  options.campaign.effects = {"sensor.length_scale"};
+  options.campaign.integrator.tolerances = {1e-5, 1e-8};
+  const auto log = experiment::generate_campaign(design, 8);
+  Stage stage{CampaignProblem(log, "synthetic", options.campaign), {}, {}, {}};
+  auto start = stage.problem.start();
+  for (std::size_t k = 0; k < start.size(); ++k)
+    if (stage.problem.campaign()[k].name == "sensor.length_scale.landing_share") start[k] = 1;
+  solve(stage, options, start);
+  ASSERT_EQ(stage.fit.outcome, FitOutcome::converged);
+  for (const auto& u : stage.fit.campaign) {
+    if (u.unknown.name == "sensor.length_scale.landing_share") {
+      EXPECT_EQ(u.value, 1);
+    }
+    if (u.unknown.name == "sensor.length_scale.scale") {
+      EXPECT_NEAR(u.value, kScale, 4 * u.sigma);
+      EXPECT_LT(u.sigma, 0.5 * (kScale - 1));
+    }
+  }
+  EXPECT_LT(wald_p_value(stage, find_effect("sensor.length_scale")), 1e-3);
+}
+
+// Thirty landings whose chi-square is 1.78 per sample: one in two hundred by chance, and a log has 22 such
+// series to look at.
+TEST(Misfit, IsJudgedByItsChanceAndByTheSeriesThatAreLookedAt) {
+  const DiscoverOptions options;
+  const auto misfit = [&](experiment::Channel channel, Phase phase, int n, double per_sample) {
+    ChannelMisfit m;
+    m.channel = channel, m.phase = phase, m.n = n, m.chi2 = n * per_sample;
+    return is_misfit(m, options);
+  };
+  EXPECT_FALSE(misfit(experiment::Channel::landing_time, Phase::landing, 30, 1.78));
+  EXPECT_TRUE(misfit(experiment::Channel::landing_time, Phase::landing, 30, 2.3));
+  EXPECT_TRUE(misfit(experiment::Channel::landing_time, Phase::landing, 90, 1.78));
+  // A firm grasp has no friction law that could be off; slipping pads do.
+  EXPECT_TRUE(misfit(experiment::Channel::wrench_fx, Phase::grasped, 1000, 1.9));
+  EXPECT_FALSE(misfit(experiment::Channel::wrench_fx, Phase::release, 1000, 1.9));
 }
 
 /// A laboratory's law is not this library's: intervals must know.
