@@ -103,10 +103,13 @@ std::optional<Stage> forward(const Stage& stage, const DiscoverOptions& options,
   std::set<std::string> tried;
   std::optional<Trial> best;
   const Score* of_best = nullptr;
+  std::vector<std::pair<const Score*, double>> convincing;  // with the criterion of the refit
   const auto consider = [&](const Score& score) {
     if (!score.visible || !tried.insert(f.candidates[score.candidate].id).second) return;
     auto trial = try_out(stage, f, score, options, out);
-    if (!trial || !trial->convinces || (best && trial->next.bic() >= best->next.bic())) return;
+    if (!trial || !trial->convinces) return;
+    convincing.push_back({&score, trial->next.bic()});
+    if (best && trial->next.bic() >= best->next.bic()) return;
     best = std::move(trial);
     of_best = &score;
   };
@@ -132,6 +135,10 @@ std::optional<Stage> forward(const Stage& stage, const DiscoverOptions& options,
             between(f, f.candidates[of_best->candidate], of_best->step, f.candidates[score.candidate]);
         if (r >= options.equivalent) accepted.equivalent.push_back({id_of(score), r});
       }
+  for (const auto& [score, bic] : convincing)
+    if (score != of_best && !is_law(id_of(*score)) && bic < best->next.bic() - kDeltaBic)
+      accepted.add_other_name(id_of(*score), between(f, f.candidates[of_best->candidate], of_best->step,
+                                                     f.candidates[score->candidate]));
   out.effects.push_back(std::move(accepted));
   return std::move(best->next);
 }

@@ -9,7 +9,9 @@
 namespace unhand::fitting {
 
 /// One step forward: the candidate that explains most, if it convinces. Writes its scores into `out.ranking`
-/// and what it accepted into `out.effects`. Empty if none convinces.
+/// and what it accepted into `out.effects`, with the names of other effects that convince as well and whose
+/// evidence is not less by what an effect needs to be accepted (ten of the criterion). Empty if none
+/// convinces.
 std::optional<Stage> forward(const Stage& stage, const DiscoverOptions& options, Discovery& out);
 
 /// Effects that a later one has made superfluous are taken back.
