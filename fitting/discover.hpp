@@ -21,8 +21,9 @@ struct DiscoverOptions {
   /// channel of the motion in some phase (1 is the noise), and a tenth of the misfit there.
   double matters{0.5};
   /// The same for the wrench channels, whose misfit once the pads open must also have been so many times the
-  /// noise: near the end of a release a patch slips in parts, and no law of the catalogue follows its torque
-  /// better. In the firm grasp only the body's inertia speaks, and they are channels like others.
+  /// noise, or vanish altogether: near the end of a release a patch slips in parts, and no law of the
+  /// catalogue follows its torque better. In the firm grasp only the body's inertia speaks, and they are
+  /// channels like others.
   double wrench_matters{1}, wrench_misfit{3};  ///< as above [χ² per sample]; times the noise
   double law_matters{0.005};                   ///< another contact law: share of the held-out χ² as a whole
   double false_discovery_rate{0.02};           ///< shared among the effects that were tried

@@ -150,7 +150,9 @@ Improvement improvement(const FitResult& before, const FitResult& after,
     const double was = b.chi2_per_sample(), is = misfit_in(after.misfit, b.channel, b.phase);
     double needed = std::max({options.matters, 0.1 * (was - 1), 2 * std::sqrt(2.0 / b.n)});
     if (is_wrench(b.channel)) {
-      if (was < (b.phase == Phase::grasped ? 1 + options.matters : options.wrench_misfit)) continue;
+      const double from = b.phase == Phase::grasped ? 1 + options.matters : options.wrench_misfit;
+      const bool explained = was > 1 + options.matters && is < 1 + kRest * (was - 1);
+      if (was < from && !explained) continue;
       needed = std::max(options.wrench_matters, 0.25 * (was - 1));
     }
     needed = std::max(needed, kRest * (misfit_in(base, b.channel, b.phase) - 1));
