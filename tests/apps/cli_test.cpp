@@ -699,7 +699,7 @@ TEST_F(Cli, LearnsToThrowFlipAndGoesOnAfterAKill) {
   EXPECT_EQ(nlohmann::json::parse(content(folder / "flip.json")), flip);
 
   expect_refusal(what + "--learner m1", 3, "session.json: /settings/learner: another session lies there");
-  // A throw of another robot, under a name that this session asks for.
+  // A throw of another robot, under a name that this run asks for.
   const std::string kept = content(trials / "population-0002.json");
   auto foreign = nlohmann::json::parse(kept);
   foreign["seed"] = 4;
