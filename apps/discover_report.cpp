@@ -36,20 +36,14 @@ Figure residual_figure(const Discovery& found) {
   std::string script = "set multiplot\nset key off\n";
   int index = 0, at = 0;
   for (const Channel channel : channels) {
-    double top = 2;
-    for (const auto* bins : {&found.residual_before, &found.residual_after}) {
-      DataBlock block{
-          fmt::format("{} {}", to_string(channel), bins == &found.residual_before ? "before" : "after"),
-          {"time from release [s]", "rms residual [sigma]", "mean residual [sigma]", "samples"},
-          {},
-          {}};
-      for (const auto& bin : *bins)
-        if (bin.channel == channel) {
-          block.rows.push_back({bin.time, std::max(bin.rms, 0.05), bin.mean, static_cast<double>(bin.n)});
-          top = std::max(top, bin.rms);
-        }
-      figure.data.push_back(std::move(block));
-    }
+    const auto points = [&](const auto& bins) {
+      std::vector<ResidualPoint> out;
+      for (const auto& bin : bins)
+        if (bin.channel == channel) out.push_back({bin.time, bin.rms, bin.mean, static_cast<int>(bin.n)});
+      return out;
+    };
+    const double top = add_residuals(figure, std::string(to_string(channel)), "time from release [s]",
+                                     points(found.residual_before), points(found.residual_after));
     const double left = 1.9 + (at % columns) * 8.3, bottom = 1.9 + (rows - 1 - at / columns) * 3.9;
     script += place(figure, {left, left + 6.6, bottom, bottom + 2.5});
     script += fmt::format(
@@ -58,18 +52,14 @@ Figure residual_figure(const Discovery& found) {
         "[{{/Symbol s}}]' offset 0.5\n"
         "set arrow 1 from 0,0.3 to 0,{:.4g} nohead dashtype 3 linecolor rgb '#808080'\n"
         "set arrow 2 from {:.3f},1 to {:.3f},1 nohead linecolor rgb '#b0b0b0'\n"
-        "plot DATA index {} using 1:2 with linespoints pointtype 6 linecolor rgb '#d55e00', "
-        "DATA index {} using 1:2 with linespoints pointtype 7 linecolor rgb '#0072b2'\n",
+        "plot DATA index {} using 1:2 {}, DATA index {} using 1:2 {}\n",
         plain(std::string(to_string(channel))), low, high, 1.5 * top,
         at / columns == rows - 1 ? "set xlabel 'time from release [s]' offset 0,0.6\n" : "unset xlabel\n",
-        1.5 * top, low, high, index, index + 1);
+        1.5 * top, low, high, index, kBefore, index + 1, kAfter);
     index += 2;
     ++at;
   }
-  script += key_strip(figure,
-                      {{"with linespoints pointtype 6 linecolor rgb '#d55e00'", "before"},
-                       {"with linespoints pointtype 7 linecolor rgb '#0072b2'", "after"}},
-                      2);
+  script += key_strip(figure, {{kBefore, "before"}, {kAfter, "after"}}, 2);
   figure.script = script + "unset multiplot\n";
   return figure;
 }

@@ -4,17 +4,11 @@
 #include <algorithm>
 
 #include "apps/measured_report.hpp"
+#include "apps/ranking.hpp"
 
 namespace unhand::apps {
 
 using fitting::MeasuredDiscovery;
-
-namespace {
-
-constexpr const char *kBefore = "with linespoints pointtype 6 linecolor rgb '#d55e00'",
-                     *kAfter = "with linespoints pointtype 7 linecolor rgb '#0072b2'";
-
-}  // namespace
 
 // Residuals over the share of the duration, a panel for each channel.
 Figure measured_residual_figure(const MeasuredDiscovery& found) {
@@ -25,19 +19,14 @@ Figure measured_residual_figure(const MeasuredDiscovery& found) {
   std::string script = "set multiplot\nset key off\nset xrange [0:1]\nset xtics 0,0.25,1 format '%g'\n";
   int at = 0, index = 0;
   for (const auto& channel : channels) {
-    double top = 2;
-    for (const auto* profile : {&found.profile_before, &found.profile_after}) {
-      DataBlock block{channel + (profile == &found.profile_before ? " before" : " after"),
-                      {"share of the duration", "rms residual [sigma]", "mean residual [sigma]", "samples"},
-                      {},
-                      {}};
-      for (const auto& bin : *profile)
-        if (bin.channel == channel) {
-          block.rows.push_back({bin.share, std::max(bin.rms, 0.05), bin.mean, static_cast<double>(bin.n)});
-          top = std::max(top, bin.rms);
-        }
-      figure.data.push_back(std::move(block));
-    }
+    const auto points = [&](const auto& profile) {
+      std::vector<ResidualPoint> out;
+      for (const auto& bin : profile)
+        if (bin.channel == channel) out.push_back({bin.share, bin.rms, bin.mean, static_cast<int>(bin.n)});
+      return out;
+    };
+    const double top = add_residuals(figure, channel, "share of the duration", points(found.profile_before),
+                                     points(found.profile_after));
     const double left = 1.8 + (at % columns) * 5.2, bottom = 2.3 + (rows - 1 - at / columns) * 3.9;
     script += place(figure, {left, left + 4.2, bottom, bottom + 2.5});
     script += fmt::format(

@@ -70,4 +70,21 @@ Json effect_json(const fitting::AcceptedEffect& effect) {
   return out;
 }
 
+double add_residuals(Figure& figure, const std::string& channel, const std::string& x,
+                     const std::vector<ResidualPoint>& before, const std::vector<ResidualPoint>& after) {
+  double top = 2;
+  for (const auto* points : {&before, &after}) {
+    DataBlock block{channel + (points == &before ? " before" : " after"),
+                    {x, "rms residual [sigma]", "mean residual [sigma]", "samples"},
+                    {},
+                    {}};
+    for (const auto& p : *points) {
+      block.rows.push_back({p.x, std::max(p.rms, 0.05), p.mean, static_cast<double>(p.samples)});
+      top = std::max(top, p.rms);
+    }
+    figure.data.push_back(std::move(block));
+  }
+  return top;
+}
+
 }  // namespace unhand::apps

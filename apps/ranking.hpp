@@ -1,7 +1,9 @@
-// The candidates that a discovery tried, as JSON and as a figure: the same for throws and for measured logs.
+// What every discovery reports, of throws and of measured logs: the candidates, accepted effects, residuals.
 #pragma once
 
 #include <span>
+#include <string>
+#include <vector>
 
 #include "apps/figure.hpp"
 #include "apps/output.hpp"
@@ -17,5 +19,19 @@ Figure ranking_figure(std::span<const fitting::Ranked> ranking,
 
 /// An accepted effect as `effects` of discovery.json lists it.
 Json effect_json(const fitting::AcceptedEffect& effect);
+
+/// Styles of the base model's residuals and of the answer's.
+inline constexpr const char *kBefore = "with linespoints pointtype 6 linecolor rgb '#d55e00'",
+                            *kAfter = "with linespoints pointtype 7 linecolor rgb '#0072b2'";
+
+/// Residuals of a channel in a bin of `x`, in sigma.
+struct ResidualPoint {
+  double x{}, rms{}, mean{};
+  int samples{};
+};
+
+/// Adds a channel's residuals before and after as data of the figure. Returns the largest rms, at least 2.
+double add_residuals(Figure& figure, const std::string& channel, const std::string& x,
+                     const std::vector<ResidualPoint>& before, const std::vector<ResidualPoint>& after);
 
 }  // namespace unhand::apps
