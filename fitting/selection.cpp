@@ -61,10 +61,6 @@ void find_other_names(const Footprints& f, const Eigen::VectorXd& contribution, 
   }
 }
 
-}  // namespace
-
-namespace {
-
 /// A refit of one candidate against the stage that it would extend.
 struct Trial {
   Stage next;
