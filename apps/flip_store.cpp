@@ -38,8 +38,8 @@ fl::FlipTrial trial_of(const fs::path& file, const Json& label, const fl::FlipCo
   try {
     for (const auto& [key, value] : label.items())
       if (const Json& found = json.at(key); found != value)
-        refuse("/" + key, fmt::format("not the throw that this run asks for: {} instead of {}",
-                                      found.dump(), value.dump()));
+        refuse("/" + key, fmt::format("not the throw that this run asks for: {} instead of {}", found.dump(),
+                                      value.dump()));
     out.command = command;
     const std::string outcome = json.at("outcome");
     for (const auto one :
