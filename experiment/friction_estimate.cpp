@@ -43,6 +43,17 @@ std::vector<Sample> slipping_samples(const datasets::ThrowLog& log,
   return out;
 }
 
+/// The sliding pivot's, whose limits of force and torque know nothing of each other.
+struct Decoupled {
+  template <class S>
+  S gauge(const Vec3<S>& w) const {
+    using std::abs;
+    using std::hypot;
+    const S force = hypot(w[0], w[1]), torque = abs(w[2]);
+    return force < torque ? torque : force;
+  }
+};
+
 /// Gauss-Newton on (ln μ, ln L) with weights 1/max(1, |r|/k) and a damped step.
 template <class Shape>
 void solve(const Shape& shape, const std::vector<Sample>& samples, double& mu, double& length,
@@ -76,6 +87,15 @@ void solve(const Shape& shape, const std::vector<Sample>& samples, double& mu, d
     length *= std::exp(d1);
     if (std::abs(d0) + std::abs(d1) < 1e-10) break;
   }
+}
+
+/// The surface of the two on which the samples lie better: real pads follow no rectangle, and the ellipsoid's
+/// values serve the sliding pivot better there than those of a rectangle through all samples.
+void solve_sliding_pivot(const std::vector<Sample>& samples, double& mu, double& length, double& scatter) {
+  double own_mu = mu, own_length = length, own_scatter = 0;
+  solve(Decoupled{}, samples, own_mu, own_length, own_scatter);
+  solve(contact::Ellipsoid{}, samples, mu, length, scatter);
+  if (own_scatter < scatter) mu = own_mu, length = own_length, scatter = own_scatter;
 }
 
 void estimate_delay(const std::vector<PreparedThrow>& throws, ModelParameters& parameters) {
@@ -129,6 +149,8 @@ FrictionEstimate estimate_friction(const datasets::ThrowLog& log, const std::vec
     solve(contact::UniformDisc{}, samples, mu, length, out.scatter);
   else if (model == "limit_surface_quartic")
     solve(contact::ConvexQuartic::closest_to_disc(), samples, mu, length, out.scatter);
+  else if (model == "sliding_pivot")
+    solve_sliding_pivot(samples, mu, length, out.scatter);
   else
     solve(contact::Ellipsoid{}, samples, mu, length, out.scatter);
   out.parameters.mu = mu;

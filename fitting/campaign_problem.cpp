@@ -62,14 +62,17 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
   } else if (!grips.empty() && options.model != "gripper_delay") {
     try {
       const auto guess = experiment::estimate_friction(log, prepared, options.model).parameters;
-      const bool is_patch = guess.mu > 0.02 && guess.mu < 4 && guess.length > 2e-4 && guess.length < 0.1;
+      // Declared or not, a pad's size is known to a factor of two.
+      const auto radius = log.gripper ? log.gripper->pad_radius : std::nullopt;
+      const double least = radius ? 0.5 * kUniform * *radius : 2e-4, most = radius ? 4 * least : 0.1;
+      const bool is_patch = guess.mu > 0.02 && guess.mu < 4 && guess.length > least && guess.length < most;
       if (is_patch)
         first_guess_ = guess;
       else
         notes_.push_back(fmt::format(
             "the pads' wrenches while the force vanishes say mu = {:.3g}, length = {:.3g} m, which is no "
-            "patch: not used as a start",
-            guess.mu, guess.length));
+            "patch{}: not used as a start",
+            guess.mu, guess.length, radius ? fmt::format(" of the declared radius, {:.3g} m", *radius) : ""));
     } catch (const std::invalid_argument&) {  // too few samples: the default start has to do
     }
   } else if (options.model == "gripper_delay") {

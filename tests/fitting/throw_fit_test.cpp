@@ -73,6 +73,15 @@ TEST_P(EveryLaw, ParametersComeBack) {
   EXPECT_TRUE(result.open.empty());
 }
 
+TEST_P(EveryLaw, StartsNearTheTruth) {
+  // Priors sit at the start, as wide as a fifth of it: from a start far off they pull at the answer.
+  auto design = small_design(GetParam());
+  design.sensors.ft_rate = 1000;  // samples enough for the plain estimate of friction
+  const auto problem = problem_of(experiment::generate_campaign(design, 3), GetParam());
+  for (const auto& u : problem.campaign())
+    EXPECT_NEAR(u.start, truth_of(small_design(GetParam()), u.name), 0.1 * u.start) << u.name;
+}
+
 INSTANTIATE_TEST_SUITE_P(Throws, EveryLaw,
                          testing::Values("limit_surface_disc", "limit_surface", "sliding_pivot",
                                          "gripper_delay"));
