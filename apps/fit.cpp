@@ -119,7 +119,6 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
     answer.floor = fitting::error_floor(log, request.log, problem, fit, options, request.floor);
   if (fit.outcome == fitting::FitOutcome::iterations_spent)
     fmt::print(stderr, "unhand: the fit stopped before it had converged: {}\n", fit.message);
-  for (const auto& note : problem.notes()) fmt::print(stderr, "unhand: {}\n", note);
 
   for (const auto& m : fit.misfit)
     if (m.chi2_per_sample() > kWildMisfit)

@@ -1,7 +1,5 @@
 #include "experiment/observations.hpp"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <cmath>
 
@@ -69,8 +67,7 @@ void add_wrench(const datasets::FtLog& ft, const PreparedThrow& prepared, const 
     sigma[c] = sigma_of(ft.wrench, c, least[c]);
     if (is_dead(ft.wrench, c)) {
       sigma[c] = 0;
-      out.notes.push_back(fmt::format("throw {}: {} is dead (always {}): not used", prepared.id,
-                                      to_string(next(Channel::wrench_fx, c)), ft.wrench(0, c)));
+      out.dead.push_back(next(Channel::wrench_fx, c));
     }
   }
   for (std::size_t i = 0; i < ft.time.rows; ++i) {

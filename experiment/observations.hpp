@@ -41,8 +41,8 @@ struct Observation {
 /// The observations of one throw. The three columns of a wrench or a mocap sample follow each other, with one
 /// time.
 struct Observations {
-  std::vector<Observation> all;    ///< channel by channel, in order of time
-  std::vector<std::string> notes;  ///< what was left out, and why
+  std::vector<Observation> all;  ///< channel by channel, in order of time
+  std::vector<Channel> dead;     ///< no two samples differ: left out
 };
 
 /// Which channels are taken, and how far they are trusted.
@@ -57,10 +57,9 @@ struct ObservationOptions {
   double wrench_trust{0.04};
 };
 
-/// All that the throw's log holds of the channels asked for. Left out: wrenches that settle; with a
-/// note: samples outside the hand's motion, motion capture after the landing, and a wrench channel that is
-/// dead (no two samples of it differ). A channel without a declared σ takes it from its own scatter (third
-/// differences).
+/// All that the throw's log holds of the channels asked for. Left out: wrenches that settle, samples outside
+/// the hand's motion, motion capture after the landing, and a wrench channel that is dead. A channel without
+/// a declared σ takes it from its own scatter (third differences).
 Observations observe(const datasets::ThrowLog& log, const datasets::Throw& logged,
                      const PreparedThrow& prepared, const ObservationOptions& options = {});
 

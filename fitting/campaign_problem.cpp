@@ -79,6 +79,7 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
     first_guess_ = experiment::estimate_friction(log, prepared, options.model).parameters;
   }
   std::size_t observations = 0;
+  std::map<experiment::Channel, int> dead;
   auto throws = std::make_shared<std::vector<CampaignThrow>>();
   throws->reserve(prepared.size());
   for (std::size_t i = 0; i < prepared.size(); ++i) {
@@ -89,9 +90,12 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
                     : t.prepared.open_command;
     t.release = t.prepared.measured.detach_time.value_or(NAN);
     observations += t.observed.all.size();
-    notes_.insert(notes_.end(), t.observed.notes.begin(), t.observed.notes.end());
+    for (const auto channel : t.observed.dead) ++dead[channel];
     throws->push_back(std::move(t));
   }
+  for (const auto& [channel, n] : dead)
+    notes_.push_back(fmt::format("{} is dead (always the same) in {} of {} throws: not used there",
+                                 to_string(channel), n, throws->size()));
   throws_ = std::move(throws);
   if (observations == 0 && !options.predict_only)
     throw std::invalid_argument(
