@@ -26,9 +26,12 @@ Table parameter_table(const fitting::FitResult& fit) {
   Table out{{"parameter", "unit", "value", "1 sigma", "95 % interval", "determined"}, {}, 2};
   for (const auto& u : fit.campaign) {
     const auto [low, high] = u.interval95();
-    out.rows.push_back(
-        {u.unknown.name, u.unknown.unit, fmt::format("{:.6g}", u.value), fmt::format("{:.2g}", u.sigma),
-         fmt::format("[{:.5g}, {:.5g}]{}", low, high, u.profile ? " of the profile" : ""), standing_of(u)});
+    out.rows.push_back({u.unknown.name, u.unknown.unit, fmt::format("{:.6g}", u.value),
+                        fmt::format("{:.2g}", u.sigma),
+                        std::isfinite(low) || std::isfinite(high)
+                            ? fmt::format("[{:.5g}, {:.5g}]{}", low, high, u.profile ? " of the profile" : "")
+                            : "open",
+                        standing_of(u)});
   }
   return out;
 }

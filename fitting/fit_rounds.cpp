@@ -134,12 +134,13 @@ bool FitRounds::solve(bool last) {
   return true;
 }
 
-double FitRounds::cost_with(std::size_t k, double value) {
-  const auto x = x_, own = own_;
-  x_[k] = value / shared_.scale[k];
+double FitRounds::cost_with(std::size_t k, double value, Point& from) {
+  from.campaign[k] = value / shared_.scale[k];
+  std::swap(x_, from.campaign);
+  std::swap(own_, from.own);
   const Solution held = minimise(options_.accuracy, k);
-  x_ = x;
-  own_ = own;
+  std::swap(x_, from.campaign);
+  std::swap(own_, from.own);
   return held.usable ? held.cost : HUGE_VAL;
 }
 

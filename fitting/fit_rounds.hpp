@@ -24,9 +24,15 @@ class FitRounds {
   bool solve(bool last);
   /// The weights of channels, and (empirical Bayes) the spread of the throws' own unknowns.
   void learn();
-  /// The least cost with unknown k held at `value`, everything else as the last round left it; infinite where
-  /// there is none. The state stays as it is.
-  double cost_with(std::size_t k, double value);
+  /// Values of all unknowns, in units of their scales.
+  struct Point {
+    std::vector<double> campaign, own;
+  };
+  /// Where the last round ended.
+  Point solution_point() const { return {x_, own_}; }
+  /// The least cost with unknown k held at `value`, weights and spreads as the last round left them; infinite
+  /// where there is none. Starts from `from`, which becomes the place of the least; the state stays as it is.
+  double cost_with(std::size_t k, double value, Point& from);
 
   std::vector<double> campaign() const { return shared_.unscaled(x_.data()); }
   std::vector<double> own(std::size_t i) const { return shared_.own_unscaled(own_at(i)); }

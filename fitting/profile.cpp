@@ -14,21 +14,19 @@ bool is_weak(const FittedUnknown& u, double half) {
          (u.unknown.prior_sigma && u.data_sigma > 0.5 * *u.unknown.prior_sigma);
 }
 
-/// How far unknown k lies from its fit at `value`, in sigmas, by the rise of the cost. `unit` is the rise at
-/// one sigma.
-double distance(FitRounds& rounds, std::size_t k, double value, double unit) {
-  return std::sqrt(std::max(0.0, rounds.cost_with(k, value) - rounds.solution().cost) / unit);
-}
-
-/// Where the profile is t sigmas away, on the side of `sign`: by secants on the distance, which is a straight
-/// line for a parabola. Infinite if that is beyond the range.
+/// Where the profile is t sigmas away, on the side of `sign`: by secants on the distance in sigmas, which is
+/// a straight line for a parabola; `unit` is the rise of the cost at one sigma. Infinite if that is beyond
+/// the range.
 double end_of(FitRounds& rounds, std::size_t k, const FittedUnknown& u, double t, double unit, double sign) {
   const double bound = sign > 0 ? u.unknown.high : u.unknown.low;
   const auto clipped = [&](double v) { return sign > 0 ? std::min(v, bound) : std::max(v, bound); };
   double near = u.value, z_near = 0, far = clipped(u.value + sign * t * u.sigma);
+  FitRounds::Point point = rounds.solution_point();  // of the last solution: the next is near it
   for (int step = 0; step < 8; ++step) {
     if (far == near) return sign * HUGE_VAL;
-    const double z = distance(rounds, k, far, unit);
+    const double rise = rounds.cost_with(k, far, point) - rounds.solution().cost;
+    const double z = std::sqrt(std::max(0.0, rise) / unit);
+    if (!std::isfinite(z)) point = rounds.solution_point();
     if (std::abs(z - t) < 0.02 * t) return far;
     if (z < t && far == bound) return sign * HUGE_VAL;
     // Where a simulation fails the distance is infinite: half way.
@@ -54,6 +52,11 @@ void profile(FitRounds& rounds, FitResult& fit) {
     FittedUnknown& u = fit.campaign[k];
     const double t = student_factor(u.degrees_of_freedom);
     if (rounds.is_fixed(u.unknown) || !is_weak(u, t * u.sigma) || !(u.sigma > 0)) continue;
+    if (!(u.data_sigma <
+          u.unknown.high - u.unknown.low)) {  // the log has no say: a profile would be the prior's
+      u.profile = {-HUGE_VAL, HUGE_VAL};
+      continue;
+    }
     // The cost's own curvature claims a smaller sigma where throws scatter beyond the noise.
     Eigen::MatrixXd H = rounds.equations().information;
     for (Eigen::Index j = 0; j < width; ++j)

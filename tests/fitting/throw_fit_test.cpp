@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "contact/limit_surface.hpp"
 #include "fitting/evaluate.hpp"
@@ -262,6 +263,32 @@ TEST(ThrowFit, ProfilesWhatTheLogHardlyKnows) {
   }
   for (const auto& u : disc_fit().campaign) EXPECT_FALSE(u.profile) << u.unknown.name;
   RecordProperty("profiled", any ? "yes" : "no");
+}
+
+TEST(ThrowFit, WithoutANormalForceOnlyTheProductOfGripAndFrictionIsKnown) {
+  auto log = disc_log();
+  for (auto& one : log.throws) one.ft.reset();
+  FitOptions profiled;
+  profiled.profile = true;
+  const auto result = fit(problem_of(log), profiled);
+  const auto& opening = small_design(kLaw).opening;
+  const std::map<std::string, double> truth{
+      {"mu", truth_of(small_design(kLaw), "mu")}, {"length", truth_of(small_design(kLaw), "length")},
+      {"grip_force", opening.grip_force},         {"dead_time", opening.dead_time},
+      {"opening_time", opening.opening_time},     {"shape", opening.shape}};
+  double product = 1;
+  for (const auto& u : result.campaign) {
+    const auto [low, high] = u.interval95();
+    EXPECT_LT(low, truth.at(u.unknown.name)) << u.unknown.name;
+    EXPECT_GT(high, truth.at(u.unknown.name)) << u.unknown.name;
+    const bool scales = u.unknown.name == "mu" || u.unknown.name == "grip_force";
+    EXPECT_EQ(scales, std::isinf(low) && std::isinf(high)) << u.unknown.name;
+    if (scales) product *= u.value / truth.at(u.unknown.name);
+  }
+  // Eight throws whose grip and friction scatter by 3 and 2 % each.
+  EXPECT_NEAR(product, 1, 4 * std::sqrt((0.03 * 0.03 + 0.02 * 0.02) / 8));
+  ASSERT_EQ(result.open.size(), 1u);
+  EXPECT_THAT(result.open.front().meaning, HasSubstr("mu"));
 }
 
 TEST(ThrowFit, AnEffectWithoutADerivativeAtNeutralIsNotStuckThere) {
