@@ -1,48 +1,23 @@
 // Effects in synthetic campaigns: each changes what it should, by as much as a closed form says, and nothing
-// else; and predictions with the true parameters see exactly what the generator makes.
+// else.
 #include "experiment/campaign_effects.hpp"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <functional>
 #include <numbers>
-#include <set>
 
 #include "experiment/parallel.hpp"
-#include "experiment/synthetic_campaign.hpp"
-#include "experiment/throw_prediction.hpp"
+#include "tests/support/perfect_campaign.hpp"
 
 namespace {
 
 using namespace unhand;
 using namespace unhand::experiment;
+using namespace unhand::testing_support;
 using dynamics::Effect;
 using dynamics::Vec2;
-constexpr std::uint64_t kSeed = 7;
-constexpr double kDrag = 0.05;  // declared, so that wind has something to act on
-constexpr int kThrow = 8;       // bar-com160, released while the hand brakes
-
-CampaignDesign perfect(const EffectSettings& effects = {}) {
-  CampaignDesign design = campaign_design("quick12");
-  design.sensors = design.sensors.perfect();
-  design.effects = effects;
-  return design;
-}
-
-/// All parameters of an effect `size` typical steps from neutral.
-EffectSettings typical(const Effect& effect, double size = 1) {
-  EffectSettings out;
-  for (const auto& p : effect.parameters)
-    out[effect.full_name(p)] = p.is_shape() ? p.grid.back() : p.neutral + size * p.typical;
-  return out;
-}
-
-/// Effects that this law may not know yet: then the throw is as without them.
-bool is_optional(const std::string& id) {
-  return id == "contact.pressure_profile" || id == "contact.pad_compliance";
-}
 
 bool is_sensor(const Effect& effect) { return effect.id.starts_with("sensor."); }
 
@@ -285,216 +260,6 @@ TEST(CampaignEffects, FrictionMattersOnlyOnceThePadsOpen) {
       EXPECT_NEAR(made.record.ft->wrench(k, 2), plain.record.ft->wrench(k, 2), 1e-12) << effect.id;
     EXPECT_NE(made.truth.landing_pose.x, plain.truth.landing_pose.x) << effect.id;
   }
-}
-
-/// The worst residual of each channel, over a throw predicted with the parameters that made it.
-struct Worst {
-  std::array<double, kChannelCount> of{};
-  int observations{};
-};
-
-/// `told`: the prediction knows the effects.
-Worst consistency(const CampaignDesign& design, int index, bool exact_inputs, bool told) {
-  datasets::ThrowLog log = campaign_header(design, kSeed);
-  const auto [record, truth] = generate_throw(design, kSeed, index);
-  log.throws = {record};
-  PreparedThrow prepared = prepare(log, log.throws[0], "(in memory)");
-  Observations observed = observe(log, log.throws[0], prepared);
-  if (exact_inputs) {  // neither spline: the commanded hand itself, and the profile by its parameters
-    prepared.hand = polynomial_hand(throw_motion(design.arm, truth.motion));
-    prepared.normal_force.reset();
-  }
-  const OwnEffects effects(told ? design.effects : EffectSettings{}, record.object);
-  std::vector<std::string> names = effects.names();
-  std::vector<double> numbers = effects.numbers();
-  const auto add = [&](const char* name, double value) {
-    names.emplace_back(name);
-    numbers.push_back(value);
-  };
-  add("mu", truth.patch.mu);
-  add("length", truth.patch.length());
-  add("grip_force", truth.opening.grip_force);
-  add("dead_time", truth.opening.dead_time);
-  add("opening_time", truth.opening.opening_time);
-  add("shape", truth.opening.shape);
-  add("grasp_angle", truth.grasp_angle - prepared.grasp.angle);
-  add("grasp_offset", truth.grasp_offset);
-  const ThrowModel model{design.contact_model, truth.patch.pads, design.reference_force(), design.integrator};
-  const auto predicted =
-      predict_channels(prepared, observed, model, dynamics::Values<double>(names, numbers));
-  Worst worst;
-  if (predicted.channels.size() != observed.all.size()) return worst;
-  for (std::size_t i = 0; i < observed.all.size(); ++i) {
-    double& w = worst.of[static_cast<std::size_t>(observed.all[i].channel)];
-    w = std::max(w, std::abs(predicted.channels[i] - observed.all[i].value));
-  }
-  worst.observations = static_cast<int>(observed.all.size());
-  return worst;
-}
-
-CampaignDesign with_everything(const std::string& law, const EffectSettings& effects) {
-  CampaignDesign design = perfect(effects);
-  design.contact_model = law;
-  for (auto& object : design.objects) object.drag_k = kDrag;
-  design.variation.grasp_offset = 0.3e-3;
-  design.integrator.tolerances = {1e-11, 1e-13};  // what differs is not what the integrators leave
-  return design;
-}
-
-/// By id, `size` typical steps from neutral.
-std::vector<std::pair<std::string, EffectSettings>> every_effect(double size) {
-  std::vector<std::pair<std::string, EffectSettings>> out{{"none", {}}};
-  for (const Effect& effect : known_effects()) out.emplace_back(effect.id, typical(effect, size));
-  return out;
-}
-
-// Hand and force given exactly, prediction and generator integrate the same equations with the same steps:
-// what is left are the quintics of the hand (1e-12 m) and rounding, which slip multiplies by a thousand, and
-// which compliant pads of 4e4 to 2e5 N/m turn into forces of 1e-7 N at most.
-TEST(GeneratorAndPrediction, AgreeOnEveryChannelForEveryEffect) {
-  const std::array<double, kChannelCount> tolerance{1e-7,  1e-7,  1e-9,  1e-12, 1e-10,
-                                                    1e-10, 1e-10, 1e-10, 1e-10, 1e-10};
-  for (const std::string law : {"limit_surface_disc", "sliding_pivot"})
-    for (const double size : {1.0, 5.0})
-      for (const auto& [id, effects] : every_effect(size))
-        for (const int index : {2, kThrow}) {
-          const Worst worst = consistency(with_everything(law, effects), index, true, true);
-          EXPECT_GT(worst.observations, 800) << law << ", " << id;
-          for (std::size_t c = 0; c < kChannelCount; ++c)
-            EXPECT_LE(worst.of[c], tolerance[c])
-                << law << ", " << id << ", throw " << index << ": " << to_string(static_cast<Channel>(c));
-        }
-}
-
-// The same through the smoothing of the logged hand and normal force, in units of the noise that the
-// campaign's sensors would have. Without knowing the effect the prediction is off.
-TEST(GeneratorAndPrediction, AgreeThroughTheSmoothedLogOnlyIfTheEffectIsKnown) {
-  const SensorSuite noise;
-  const auto &w = noise.wrench_sigma, &m = noise.mocap_sigma;
-  const std::array<double, kChannelCount> sigma{w[0],
-                                                w[1],
-                                                w[2],
-                                                noise.normal_force_sigma,
-                                                m[0],
-                                                m[1],
-                                                m[2],
-                                                noise.landing_sigma[0],
-                                                noise.landing_sigma[1],
-                                                noise.landing_time_sigma};
-  const auto largest = [&](const Worst& worst) {
-    double most = 0;
-    for (std::size_t c = 0; c < kChannelCount; ++c) most = std::max(most, worst.of[c] / sigma[c]);
-    return most;
-  };
-  for (const auto& [id, effects] : every_effect(5)) {
-    CampaignDesign design = with_everything("limit_surface_disc", effects);
-    design.opening.shape = 1;  // other ramps are only smoothed to below the noise where a bias is on them
-    const Worst told = consistency(design, kThrow, false, true);
-    EXPECT_GT(told.observations, 800) << id;
-    EXPECT_LE(largest(told), 2e-3) << id;
-    if (!is_optional(id) && id != "none") {
-      EXPECT_GE(largest(consistency(design, kThrow, false, false)), 0.05) << id;
-    }
-  }
-}
-
-TEST(CampaignEffects, AreReadByName) {
-  using testing::HasSubstr;
-  EXPECT_EQ(parse_effect("contact.stribeck=1.25"),
-            std::pair(std::string("contact.stribeck.mu_s/mu_k"), 1.25));
-  EXPECT_EQ(parse_effect("contact.stribeck.v_s=1e-2"), std::pair(std::string("contact.stribeck.v_s"), 0.01));
-  EXPECT_EQ(parse_effect("flight.quadratic_drag[jar]=0.1"),
-            std::pair(std::string("flight.quadratic_drag.k[jar]"), 0.1));
-  const auto refusal = [](const char* text) -> std::string {
-    try {
-      parse_effect(text);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "no error";
-  };
-  EXPECT_THAT(refusal("contact.stribek=1"), HasSubstr("did you mean contact.stribeck?"));
-  EXPECT_THAT(refusal("stribeck=1"), HasSubstr("did you mean contact.stribeck?"));
-  EXPECT_THAT(refusal("flight.quadratic_drag=-1"), HasSubstr("k = -1 is not in [0, 10] 1/m"));
-  EXPECT_THAT(refusal("sensor.mass=nan"), HasSubstr("is not in [0.1, 6]"));
-  EXPECT_THAT(refusal("sensor.mass=1kg"), HasSubstr("not a number"));
-  EXPECT_THAT(refusal("sensor.mass[jar=1"), HasSubstr("in brackets"));
-
-  const OwnEffects jar({{"flight.quadratic_drag.k", 0.1}, {"flight.quadratic_drag.k[jar]", 0.2}}, "jar");
-  EXPECT_EQ(jar.values().get("flight.quadratic_drag.k", 0), 0.2);
-  const OwnEffects box({{"flight.quadratic_drag.k", 0.1}, {"flight.quadratic_drag.k[jar]", 0.2}}, "box");
-  EXPECT_EQ(box.values().get("flight.quadratic_drag.k", 0), 0.1);
-}
-
-TEST(CampaignEffects, RandomOnesAreFromTheCatalogueAndVisible) {
-  std::set<std::string> ids, without_ft;
-  for (std::uint64_t seed = 1; seed <= 400; ++seed) {
-    CampaignDesign design = perfect();
-    for (auto& object : design.objects) object.drag_k = kDrag;
-    const auto effects = random_effect(design, seed);
-    EXPECT_EQ(effects, random_effect(design, seed));
-    for (const Effect& effect : known_effects())
-      for (const auto& p : effect.parameters)
-        for (const auto& [name, value] : effects) {
-          if (without_object(name) != effect.full_name(p)) continue;
-          ids.insert(effect.id);
-          if (!p.is_shape()) {
-            EXPECT_GE(std::abs(value - p.neutral), 0.499 * p.typical) << name;
-            EXPECT_LE(std::abs(value - p.neutral),
-                      (effect.id == "contact.viscous" ? 50.001 : 10.001) * p.typical)
-                << name;
-          }
-        }
-    design.sensors.ft = false;
-    for (const auto& [name, value] : random_effect(design, seed)) without_ft.insert(name);
-  }
-  EXPECT_EQ(ids.size(), known_effects().size());
-  for (const auto& name : without_ft) EXPECT_FALSE(name.starts_with("sensor.ft_bias")) << name;
-}
-
-TEST(RandomCampaign, IsHeldLandsAndKeepsItsPromises) {
-  std::set<std::string> names;
-  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
-    const CampaignDesign design = random_campaign(seed);
-    EXPECT_GE(design.throws(), 48);
-    EXPECT_LE(design.throws(), 60);
-    ASSERT_EQ(design.objects.size(), 2u);
-    for (const auto& object : design.objects) names.insert(object.name);
-    EXPECT_GE(design.opening.grip_force, 20);
-    EXPECT_LE(design.opening.grip_force, 40);
-    EXPECT_NEAR(*design.declared_pad_radius / design.patch.radius, 1, 0.1);
-    double farthest = 0;
-    for (int i = 0; i < design.throws(); i += design.repetitions) {
-      const auto [record, truth] =
-          generate_throw(design, seed, i);  // throws if it is not held or never lands
-      farthest = std::max(farthest, truth.landing_pose.x);
-      EXPECT_LT(truth.detach_time, design.follow_through);
-    }
-    EXPECT_GT(farthest, 1.2);
-    EXPECT_LT(farthest, 3);
-  }
-  EXPECT_EQ(names.size(), 5u);
-}
-
-TEST(RandomCampaign, SensorsCanBeLeftOut) {
-  CampaignDesign design = random_campaign(3);
-  const auto full = generate_throw(design, 3, 0).record;
-  design.sensors.ft = design.sensors.mocap = false;
-  const auto few = generate_throw(design, 3, 0).record;
-  EXPECT_FALSE(few.ft || few.mocap);
-  EXPECT_TRUE(few.grasp_angle.has_value());
-  EXPECT_FALSE(full.grasp_angle.has_value());
-  EXPECT_TRUE(full.landing == few.landing);
-  design.sensors.ft = true;
-  design.sensors.wrench = design.sensors.landing = false;
-  const auto deaf = generate_throw(design, 3, 0).record;
-  EXPECT_EQ(deaf.ft->normal_force.data, full.ft->normal_force.data)
-      << "its noise is that of the whole sensor";
-  for (const double x : deaf.ft->wrench.data) EXPECT_EQ(x, 0);
-  EXPECT_FALSE(deaf.landing);
-  datasets::ThrowLog log = campaign_header(design, 3);
-  log.throws = {deaf};
-  EXPECT_NO_THROW(datasets::validate(log));
 }
 
 }  // namespace
