@@ -6,14 +6,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/gripper_delay.hpp"
+
 namespace unhand::apps {
 namespace {
 
 namespace fs = std::filesystem;
 using datasets::CardError;
 using datasets::ModelCard;
-
-constexpr const char* delay_model = "gripper_delay";
 
 /// The parameters of a card, asked for by name.
 class Reader {
@@ -58,7 +58,7 @@ class Reader {
 }  // namespace
 
 std::vector<NamedValue> named_values(const std::string& model, const experiment::ModelParameters& p) {
-  if (model == delay_model) {
+  if (model == contact::kGripperDelay) {
     std::vector<NamedValue> out{{"delay", "s", p.delay.centre}};
     if (p.delay.kind == contact::DelayDistribution::Kind::truncated_normal)
       out.push_back({"delay_sigma", "s", p.delay.spread});
@@ -87,7 +87,7 @@ UsableCard read_usable_card(const fs::path& file) {
     reader.fail("/model", fmt::format("'{}' is no model of releases; there are {}", out.card.model,
                                       fmt::join(models, ", ")));
   auto& p = out.parameters;
-  if (out.card.model == delay_model) {
+  if (out.card.model == contact::kGripperDelay) {
     const double delay = reader.take("delay", "s", 0, 10),
                  sigma = reader.take_or("delay_sigma", "s", 0, 10, 0);
     p.delay = sigma > 0 ? contact::DelayDistribution::normal(delay, sigma, std::max(0.1, 2 * delay))

@@ -41,6 +41,9 @@ struct DelayDistribution {
 /// Throws std::invalid_argument, naming parameter, value and accepted range.
 void validate(const DelayDistribution&);
 
+/// The model's name in the registry.
+inline constexpr const char* kGripperDelay = "gripper_delay";
+
 /// One mode, in which the object is part of the hand; released at `open_command + delay` with the twist of
 /// its CoM. [LiuBillard2024] uses it with a delay distribution; D4.6 2.1.4 states its limit (grasps off the
 /// CoM).
@@ -49,7 +52,7 @@ class GripperDelay final : public ContactModelFrom<GripperDelay> {
   /// `open_command` [s] on the robot's clock, `delay` [s] >= 0. Throws std::invalid_argument.
   GripperDelay(double open_command, const Dual& delay);
 
-  std::string_view name() const override { return "gripper_delay"; }
+  std::string_view name() const override { return kGripperDelay; }
   int mode_count() const override { return 1; }
   std::string_view mode_name(int) const override { return "carried"; }
   dynamics::FlowKind kind(int) const override { return dynamics::FlowKind::frozen; }

@@ -40,7 +40,7 @@ constexpr std::pair<std::string_view, Maker> kModels[] = {
        return std::make_unique<LimitSurface<IsotropicQuartic>>(
            "limit_surface_quartic", p.patch, IsotropicQuartic::closest_to_disc(), p.variation);
      }},
-    {"gripper_delay",
+    {kGripperDelay,
      [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
        return std::make_unique<GripperDelay>(p.open_command, p.delay);
      }},

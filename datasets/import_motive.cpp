@@ -20,11 +20,10 @@ using Eigen::AngleAxisd;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double pi = std::numbers::pi;
-constexpr double norm_tolerance = 1e-3;  // of a quaternion: six printed decimals leave 1e-6
+constexpr double take_quaternion_tolerance = 1e-3;  // of a quaternion: six printed decimals leave 1e-6
 
 /// The first line: names and values in turn.
-struct Header {
+struct TakeHeader {
   std::string version, take, rotation;
   double frame_rate = 0;
   const Unit* length = nullptr;
@@ -36,16 +35,16 @@ std::optional<std::size_t> cell_of(const CsvLine& line, std::string_view name) {
   return static_cast<std::size_t>(found - line.cells.begin()) + 1;
 }
 
-Header parse_header(const CsvLine& line) {
+TakeHeader parse_take_header(const CsvLine& line) {
   const auto text = [&](std::string_view name) {
     const auto i = cell_of(line, name);
     return i ? line.cells[*i] : std::string();
   };
-  Header out;
+  TakeHeader out;
   if (line.cells.front() != "Format Version")
-    line.fail(
-        "",
-        "expected Motive's header, 'Format Version,1.23,Take Name,...': export with Header Information on");
+    line.fail("",
+              "expected Motive's header, 'Format Version,1.23,Take Name,...': export with TakeHeader "
+              "Information on");
   out.version = text("Format Version");
   if (out.version.size() < 4 || !out.version.starts_with("1.2"))
     line.fail("Format Version", fmt::format("'{}' is not supported, expected 1.20 to 1.29", out.version));
@@ -72,7 +71,7 @@ Header parse_header(const CsvLine& line) {
 }
 
 /// Where the body's numbers stand in a row.
-struct Columns {
+struct TakeColumns {
   std::size_t time = 0, width = 0;
   std::array<std::size_t, 3> position{};
   std::vector<std::size_t> rotation;  // X Y Z W, X Y Z, or none
@@ -82,7 +81,7 @@ struct Columns {
 
 /// The rows between the header and the data: types, names, IDs, perhaps parents, then what a column is, then
 /// its axis beside "Frame" and "Time (Seconds)".
-Columns find_columns(CsvReader& reader, const std::string& wanted) {
+TakeColumns find_columns(CsvReader& reader, const std::string& wanted) {
   std::vector<CsvLine> rows(1);
   while (reader.next(rows.back()) && rows.back().cells.front() != "Frame") {
     if (rows.size() > 8)
@@ -97,7 +96,7 @@ Columns find_columns(CsvReader& reader, const std::string& wanted) {
   const CsvLine &types = rows[0], &names = rows[1], &kinds = rows[rows.size() - 2];
   for (const CsvLine* row : {&types, &names, &kinds}) row->expect_cells(axes.cells.size());
 
-  Columns out;
+  TakeColumns out;
   out.width = axes.cells.size();
   const auto clock = std::find_if(axes.cells.begin(), axes.cells.end(),
                                   [](const std::string& cell) { return cell.starts_with("Time ("); });
@@ -139,7 +138,7 @@ Columns find_columns(CsvReader& reader, const std::string& wanted) {
 /// Position and rotation in Motive's axes, for the rows of one file.
 class Pose {
  public:
-  Pose(const CsvLine& header, const Header& facts, const Columns& columns)
+  Pose(const CsvLine& header, const TakeHeader& facts, const TakeColumns& columns)
       : facts_(facts), columns_(columns) {
     if (columns.rotation.empty()) return;
     const std::string& type = facts.rotation;
@@ -178,12 +177,13 @@ class Pose {
       Quaterniond q = Quaterniond::Identity();
       for (std::size_t k = 0; k < 3; ++k) {
         const auto axis = facts_.rotation[k] - 'X';
-        q = q * Quaterniond(AngleAxisd(v[static_cast<std::size_t>(axis)] * pi / 180, Vector3d::Unit(axis)));
+        q = q * Quaterniond(AngleAxisd(v[static_cast<std::size_t>(axis)] * std::numbers::pi / 180,
+                                       Vector3d::Unit(axis)));
       }
       return q;
     }
     const Quaterniond q(v[3], v[0], v[1], v[2]);
-    if (!(std::abs(q.norm() - 1) <= norm_tolerance))
+    if (!(std::abs(q.norm() - 1) <= take_quaternion_tolerance))
       line.fail(column("Rotation", 0), fmt::format("quaternion of norm {:.6g}, expected 1", q.norm()));
     return q.normalized();
   }
@@ -193,8 +193,8 @@ class Pose {
     return fmt::format("{} {} {}", columns_.body, kind, "XYZW"[j]);
   }
 
-  const Header& facts_;
-  const Columns& columns_;
+  const TakeHeader& facts_;
+  const TakeColumns& columns_;
   bool euler_ = false;
 };
 
@@ -246,7 +246,7 @@ class Track {
     if (options_.dimension == 2) {
       const Vector3d x = q * Vector3d::UnitX();
       double theta = std::atan2(x.z(), x.x());
-      if (seen_) theta -= 2 * pi * std::round((theta - theta_) / (2 * pi));
+      if (seen_) theta -= 2 * std::numbers::pi * std::round((theta - theta_) / (2 * std::numbers::pi));
       if (!seen_) first_y_ = p.y();
       take_.out_of_plane = std::max(take_.out_of_plane, std::abs(p.y() - first_y_));
       take_.out_of_plane_angle =
@@ -287,8 +287,8 @@ MotiveTake read_motive_csv(const std::filesystem::path& file, const MotiveOption
   CsvReader reader(file);
   CsvLine header, line;
   if (!reader.next(header)) reader.fail(1, "is empty, expected Motive's header 'Format Version,1.23,...'");
-  const Header facts = parse_header(header);
-  const Columns columns = find_columns(reader, options.body);
+  const TakeHeader facts = parse_take_header(header);
+  const TakeColumns columns = find_columns(reader, options.body);
   const Pose pose(header, facts, columns);
   if (columns.rotation.empty() && (options.dimension == 2 || options.com != std::array<double, 3>{}))
     header.fail(

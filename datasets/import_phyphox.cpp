@@ -12,9 +12,9 @@
 namespace unhand::datasets {
 namespace {
 
-constexpr double norm_tolerance = 1e-3;  // relative, of the absolute value that a file carries
+constexpr double absolute_tolerance = 1e-3;  // relative, of the absolute value that a file carries
 
-struct Columns {
+struct ExportColumns {
   std::size_t width = 0;
   std::size_t time = 0;
   std::array<std::size_t, 3> force{1, 2, 3};
@@ -23,8 +23,8 @@ struct Columns {
   std::optional<std::size_t> absolute;
 };
 
-Columns columns_of(const CsvLine& line) {
-  Columns out;
+ExportColumns columns_of(const CsvLine& line) {
+  ExportColumns out;
   out.width = line.cells.size();
   for (const std::string& cell : line.cells)
     if (cell.starts_with("Linear Acceleration") || cell.starts_with("Linear acceleration"))
@@ -47,8 +47,8 @@ Columns columns_of(const CsvLine& line) {
 }
 
 /// A file without a header is believed only if it looks like one of phyphox's.
-Columns columns_without_header(const CsvLine& line) {
-  Columns out;
+ExportColumns columns_without_header(const CsvLine& line) {
+  ExportColumns out;
   out.width = line.cells.size();
   if (out.width != 4 && out.width != 5)
     line.fail("",
@@ -65,7 +65,7 @@ ImuLog read_imu(const std::filesystem::path& file) {
   if (!reader.next(line))
     reader.fail(1, "is empty, expected phyphox's header 'Time (s),Acceleration x (m/s^2),...'");
   const bool is_row = line.is_number(0);
-  const Columns columns = is_row ? columns_without_header(line) : columns_of(line);
+  const ExportColumns columns = is_row ? columns_without_header(line) : columns_of(line);
   ImuLog imu{{0, 1, {}, {}}, {0, 3, {}, {}}, {0, 3, {}, {}}};
   for (bool more = is_row || reader.next(line); more; more = reader.next(line)) {
     line.expect_cells(columns.width);
@@ -84,7 +84,7 @@ ImuLog read_imu(const std::filesystem::path& file) {
     ++imu.specific_force.rows;
     if (columns.absolute) {
       const double said = line.real(*columns.absolute, "5");
-      if (!(std::abs(said - std::sqrt(square)) <= norm_tolerance * (1 + said)))
+      if (!(std::abs(said - std::sqrt(square)) <= absolute_tolerance * (1 + said)))
         line.fail(
             "5",
             fmt::format("{} is not the absolute value of columns 2 to 4, {:.6g}: is this a file of phyphox?",

@@ -11,6 +11,7 @@
 
 #include "datasets/log_error.hpp"
 #include "datasets/planar_push_file.hpp"
+#include "dynamics/median.hpp"
 
 namespace unhand::datasets {
 namespace {
@@ -31,19 +32,13 @@ Vec2 turn(double angle, Vec2 a) {
 double yaw(const std::array<double, 7>& pose) { return 2 * std::atan2(pose[6], pose[3]); }
 Vec2 position(const std::array<double, 7>& pose) { return {1e-3 * pose[0], 1e-3 * pose[1]}; }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 Vec2 median_of(const std::vector<Vec2>& values) {
   std::vector<double> x, y;
   for (const Vec2& v : values) {
     x.push_back(v[0]);
     y.push_back(v[1]);
   }
-  return {median(std::move(x)), median(std::move(y))};
+  return {dynamics::median(x), dynamics::median(y)};
 }
 
 /// The screw that carries the block's centre frame from one pose to the other: body twist (v, ω) over the

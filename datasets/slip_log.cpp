@@ -11,7 +11,7 @@ namespace unhand::datasets {
 namespace {
 
 constexpr int slip_log_version = 1;
-constexpr int dimension = 2;
+constexpr int planar = 2;
 
 constexpr std::array<ColumnLayout, 1> time_columns{{{"t", "s"}}};
 constexpr std::array<ColumnLayout, 1> wrench_columns{{{"fx,fy,tau", "N,N,N m"}}};
@@ -22,7 +22,7 @@ constexpr Channel<Slip> table[] = {
     {"", "wrench", ChannelKind::real, true, false, wrench_columns, {}, slot_of<&Slip::wrench, Slip>},
     {"", "twist", ChannelKind::real, true, false, twist_columns, {}, slot_of<&Slip::twist, Slip>},
 };
-const std::span<const Channel<Slip>> channels{table};
+const std::span<const Channel<Slip>> slip_channels{table};
 constexpr std::string_view surface_attributes[] = {"mass", "characteristic_length", "description", "licence"};
 constexpr std::string_view slip_attributes[] = {"split"};
 
@@ -46,7 +46,7 @@ void validate(const SlipLog& log, const std::string& file) {
     std::set<std::string_view> ids;
     for (const Slip& slip : surface.slips) {
       check_name(file, path + "/slips", slip.id);
-      check_channels<Slip>(file, path + "/slips/" + slip.id, slip, channels, dimension);
+      check_channels<Slip>(file, path + "/slips/" + slip.id, slip, slip_channels, planar);
       if (!ids.insert(slip.id).second) fail_at(file, path + "/slips/" + slip.id, "the id is used twice");
     }
   }
@@ -70,7 +70,7 @@ SlipLog read_slip_log(const std::filesystem::path& file) {
     for (const std::string& id : slips.children()) {
       const hdf5::Node home = slips.group(id);
       Slip slip;
-      hdf5::read_channels<Slip>(home, channels, dimension, slip_attributes, slip);
+      hdf5::read_channels<Slip>(home, slip_channels, planar, slip_attributes, slip);
       slip.id = id;
       hdf5::AttributeReader{home}("split", slip.split);
       surface.slips.push_back(std::move(slip));
@@ -94,7 +94,7 @@ void write_slip_log(const std::filesystem::path& file, const SlipLog& log) {
       for (const Slip& slip : surface.slips) {
         const hdf5::Output out = slips.group(slip.id);
         hdf5::AttributeWriter{out}("split", slip.split);
-        hdf5::write_channels<Slip>(out, channels, dimension, slip);
+        hdf5::write_channels<Slip>(out, slip_channels, planar, slip);
       }
     }
   });

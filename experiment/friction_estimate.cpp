@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "contact/gripper_delay.hpp"
 #include "contact/limit_surface_shapes.hpp"
 #include "dynamics/median.hpp"
 
@@ -123,7 +124,7 @@ FrictionEstimate estimate_friction(const datasets::ThrowLog& log, const std::vec
   require_release_model(model);
   FrictionEstimate out;
   if (log.gripper) out.parameters.pads = log.gripper->n_pads;
-  if (model == "gripper_delay") {
+  if (model == contact::kGripperDelay) {
     estimate_delay(throws, out.parameters);
     out.method = "delay: mean of detach minus opening command over the train throws";
     return out;

@@ -52,7 +52,7 @@ void require_release_model(const std::string& name) {
 std::unique_ptr<contact::ContactModel> contact_model_for(const PreparedThrow& throw_,
                                                          const std::string& model, const ModelParameters& p) {
   if (model == kNaive) return nullptr;
-  if (model != "gripper_delay" && !throw_.normal_force)
+  if (model != contact::kGripperDelay && !throw_.normal_force)
     throw std::invalid_argument(fmt::format(
         "throw {}: {} needs the normal force, which was not measured (no ft group)", throw_.id, model));
   return contact::make_contact_model(

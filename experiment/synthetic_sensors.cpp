@@ -13,7 +13,7 @@ using dynamics::Pose;
 namespace {
 
 /// Samples nearer than this to an event [s] count as after it: what decimal times leave of rounding.
-constexpr double kSnap = 1e-9;
+constexpr double kAtSample = 1e-9;
 
 /// A series of the given columns; σ is declared where there is noise.
 Series series(std::size_t cols, std::vector<double> sigma = {}) {
@@ -41,7 +41,8 @@ std::array<double, 3> row(const Pose<double>& p) { return {p.x, p.z, p.theta}; }
 /// The multiples of 1/rate inside [begin, end].
 std::vector<double> sample_times(double begin, double end, double rate) {
   std::vector<double> out;
-  for (double k = std::ceil((begin - kSnap) * rate); k <= (end + kSnap) * rate; ++k) out.push_back(k / rate);
+  for (double k = std::ceil((begin - kAtSample) * rate); k <= (end + kAtSample) * rate; ++k)
+    out.push_back(k / rate);
   return out;
 }
 
@@ -50,7 +51,7 @@ std::vector<double> sample_times(double begin, double end, double rate) {
 dynamics::Window window_at(double begin, double end, const std::vector<double>& kinks, double t) {
   dynamics::Window window{begin, end};
   for (const double kink : kinks) {
-    if (kink <= t + kSnap) {
+    if (kink <= t + kAtSample) {
       window.begin = std::max(begin, kink);
     } else {
       window.end = std::min(end, kink);

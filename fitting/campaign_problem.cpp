@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "contact/convex_quartic.hpp"
+#include "contact/gripper_delay.hpp"
 #include "dynamics/median.hpp"
 #include "experiment/compare.hpp"
 #include "experiment/parallel.hpp"
@@ -59,7 +60,7 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
             options.integrator};
   if (options.predict_only) {
     // nothing to start from
-  } else if (!grips.empty() && options.model != "gripper_delay") {
+  } else if (!grips.empty() && options.model != contact::kGripperDelay) {
     try {
       const auto guess = experiment::estimate_friction(log, prepared, options.model).parameters;
       // Declared or not, a pad's size is known to a factor of two.
@@ -75,7 +76,7 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
             guess.mu, guess.length, radius ? fmt::format(" of the declared radius, {:.3g} m", *radius) : ""));
     } catch (const std::invalid_argument&) {  // too few samples: the default start has to do
     }
-  } else if (options.model == "gripper_delay") {
+  } else if (options.model == contact::kGripperDelay) {
     first_guess_ = experiment::estimate_friction(log, prepared, options.model).parameters;
   }
   std::size_t observations = 0;
@@ -122,7 +123,7 @@ CampaignProblem CampaignProblem::with(const std::string& model,
 void CampaignProblem::name_unknowns(const std::vector<Effect>& effects) {
   campaign_.clear();
   own_ = {{"grasp_angle", "rad", 0, -1, 1, 0.01, 0.05}, {"grasp_offset", "m", 0, -0.02, 0.02, 1e-3, 1e-3}};
-  const bool follows_pads = options_.model != "gripper_delay";
+  const bool follows_pads = options_.model != contact::kGripperDelay;
   bool all_forces = true, any_force = false;
   std::set<std::string> objects;
   for (const auto& t : *throws_) {

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "contact/gripper_delay.hpp"
 #include "experiment/campaign_effects.hpp"
 
 namespace unhand::fitting {
@@ -17,8 +18,6 @@ using datasets::CardRange;
 using datasets::ModelCard;
 
 namespace {
-
-constexpr const char* kDelayModel = "gripper_delay";
 
 /// What a model without effects may have on its card.
 struct BaseParameter {
@@ -132,7 +131,7 @@ ModelCard card_of(const CampaignProblem& problem, const FitResult& fit) {
     covariance.names.push_back(u.unknown.name);
   }
   covariance.matrix = fit.covariance;
-  if (card.model != kDelayModel) {
+  if (card.model != contact::kGripperDelay) {
     card.parameters["pads"] = {static_cast<double>(problem.model().pads), {}, "-"};
     card.parameters["reference_force"] = {problem.model().reference_force, {}, "N"};
   }
@@ -161,7 +160,7 @@ CampaignOptions options_of(const ModelCard& card, const std::string& file) {
       throw CardError(file, fmt::format("/effects/{}", i), error.what());
     }
   }
-  const bool follows_pads = card.model != kDelayModel;
+  const bool follows_pads = card.model != contact::kGripperDelay;
   CampaignOptions out;
   out.model = card.model;
   out.effects = card.effects;

@@ -9,6 +9,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "dynamics/median.hpp"
 #include "experiment/parallel.hpp"
 
 namespace unhand::fitting {
@@ -16,14 +17,14 @@ namespace {
 
 constexpr double degrees = 180 / std::numbers::pi;
 
-struct CrossValidation {
+struct SlipCrossValidation {
   SurfaceOutcome outcome{SurfaceOutcome::fitted};
   std::string reason;
   std::vector<double> errors_deg;
 };
 
-CrossValidation cross_validate(const SlipSamples& slips, SurfaceModel model, int folds) {
-  CrossValidation out;
+SlipCrossValidation cross_validate(const SlipSamples& slips, SurfaceModel model, int folds) {
+  SlipCrossValidation out;
   out.errors_deg.resize(slips.samples.size());
   for (int fold = 0; fold < folds; ++fold) {
     SlipSamples seen = slips;
@@ -43,12 +44,6 @@ CrossValidation cross_validate(const SlipSamples& slips, SurfaceModel model, int
 
 double mean_of(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
-
-double median_of(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return (values[(n - 1) / 2] + values[n / 2]) / 2;
 }
 
 /// The same for the same names, whatever else is in the log. FNV-1a.
@@ -114,7 +109,7 @@ std::vector<std::vector<SurfaceScore>> compare_surfaces(const std::vector<SlipSa
 
   // One job: a model on a surface's data, measured (round 0) or simulated.
   std::vector<SurfaceFit> fits(surfaces.size() * models.size());
-  std::vector<CrossValidation> results(fits.size() * rounds);
+  std::vector<SlipCrossValidation> results(fits.size() * rounds);
   experiment::parallel_for(results.size(), options.threads, [&](std::size_t job) {
     const std::size_t pair = job / rounds, round = job % rounds, i = pair / models.size();
     const SurfaceModel model = models[pair % models.size()];
@@ -135,7 +130,7 @@ std::vector<std::vector<SurfaceScore>> compare_surfaces(const std::vector<SlipSa
     score.outcome = score.fit.outcome;
     score.reason = score.fit.reason;
     for (std::size_t round = 0; round < rounds && score.scored(); ++round) {
-      const CrossValidation& one = results[pair * rounds + round];
+      const SlipCrossValidation& one = results[pair * rounds + round];
       score.outcome = one.outcome;
       score.reason = one.reason;
       if (!score.scored()) break;
@@ -144,7 +139,7 @@ std::vector<std::vector<SurfaceScore>> compare_surfaces(const std::vector<SlipSa
       } else {
         score.errors_deg = one.errors_deg;
         score.mean_deg = mean_of(one.errors_deg);
-        score.median_deg = median_of(one.errors_deg);
+        score.median_deg = dynamics::median(one.errors_deg);
       }
     }
     out[pair / models.size()].push_back(std::move(score));

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/median.hpp"
+
 namespace unhand::fitting {
 
 using Eigen::Index;
@@ -12,13 +14,6 @@ namespace {
 
 /// Huber: the factor on a residual whose size is `r` in units of `limit`.
 double huber(double r) { return r > 1 ? std::sqrt(1 / r) : 1; }
-
-double median_of(std::vector<double> x) {
-  if (x.empty()) return 0;
-  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
-  std::nth_element(x.begin(), middle, x.end());
-  return *middle;
-}
 
 }  // namespace
 
@@ -64,8 +59,8 @@ GroupedWeights learned_weights(const GroupedProblem& problem, const GroupedFit& 
     if (g.n > 0) means.push_back(g.chi2 / g.n);
   }
   for (std::size_t c = 0; c < sizes.size(); ++c)
-    out.channel_scale[c] = std::max(1.0, 1.4826 * median_of(std::move(sizes[c])));
-  const double limit = options.group_limit * std::max(1.0, median_of(means));
+    out.channel_scale[c] = std::max(1.0, 1.4826 * dynamics::median(sizes[c]));
+  const double limit = options.group_limit * std::max(1.0, dynamics::median(means));
   for (std::size_t i = 0; i < fit.groups.size(); ++i)
     if (const GroupFit& g = fit.groups[i]; g.used && g.n > 0 && g.chi2 / g.n > limit)
       out.group[i] = limit / (g.chi2 / g.n);

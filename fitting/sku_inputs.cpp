@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/gripper_delay.hpp"
 #include "experiment/synthetic_campaign.hpp"
 #include "fitting/card.hpp"
 
 namespace unhand::fitting {
 namespace {
 
-constexpr const char* kDelayModel = "gripper_delay";
 constexpr const char* kLocate = "see where the object sits in the hand before the throw";
 constexpr const char* kForce = "measure the pads' normal force while they open";
 
@@ -198,7 +198,7 @@ ThrowInputs throw_inputs(const datasets::Sku& sku, const datasets::ModelCard& ca
   Eigen::MatrixXd of_card;
   add_card(sku, card, collect, out, of_card);
   add_spreads(card, collect);
-  const bool follows_pads = card.model != kDelayModel;
+  const bool follows_pads = card.model != contact::kGripperDelay;
   if (follows_pads && !thrown.normal_force) add_opening(card, assumed, collect);
   add_object(sku, assumed, collect);
   if (const auto mu = card.parameters.find("mu"); mu != card.parameters.end())

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "contact/convex_quartic.hpp"
+#include "dynamics/median.hpp"
 #include "fitting/slip_surface_solver.hpp"
 
 namespace unhand::fitting {
@@ -133,7 +134,7 @@ SurfaceFit fit_surface(const SlipSamples& slips, SurfaceModel model) {
   std::vector<double> sizes;
   for (const SlipSample& s : slips.samples)
     sizes.push_back(std::hypot(s.wrench[0], s.wrench[1], s.wrench[2]));
-  const double force = median_of(sizes);
+  const double force = dynamics::median(sizes);
   std::vector<SlipSample> samples = slips.samples;
   for (SlipSample& s : samples)
     for (double& w : s.wrench) w /= force;

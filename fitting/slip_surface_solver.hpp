@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "dynamics/median.hpp"
 #include "fitting/slip_samples.hpp"
 #include "fitting/slip_surface_terms.hpp"
 
@@ -81,12 +82,6 @@ inline Solved solve(ceres::Problem& problem, int most_iterations) {
   return {summary.IsSolutionUsable(), static_cast<int>(summary.iterations.size())};
 }
 
-inline double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// From the medians of the residuals: 1.1774 σ is the median of two Gauss components' length, 0.6745 σ that
 /// of one's.
 template <class Terms>
@@ -100,7 +95,8 @@ SurfaceNoise noise_of(const std::vector<SlipSample>& samples, const double* p) {
     level.push_back(std::abs(r[0]));
   }
   constexpr double floor = 1e-4;
-  return {std::max(median_of(direction) / 1.1774, floor), std::max(median_of(level) / 0.6745, floor)};
+  return {std::max(dynamics::median(direction) / 1.1774, floor),
+          std::max(dynamics::median(level) / 0.6745, floor)};
 }
 
 /// Whether the noise has settled, so that another turn would change nothing that matters.

@@ -133,7 +133,7 @@ struct MinusSquaredSpeed {
   }
 };
 
-struct Miss {
+struct MissOfBox {
   Target target;
   double gravity;
   template <class S>
@@ -215,7 +215,7 @@ TermPointer tip_state(std::vector<int> v, const ClutchedArm& arm) {
 }
 TermPointer minus_squared_speed(std::vector<int> v) { return term<2, 1>(std::move(v), MinusSquaredSpeed{}); }
 TermPointer miss(std::vector<int> v, const Target& target, double gravity) {
-  return term<5, 2>(std::move(v), Miss{target, gravity});
+  return term<5, 2>(std::move(v), MissOfBox{target, gravity});
 }
 
 }  // namespace unhand::planners::elastic

@@ -8,6 +8,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "contact/gripper_delay.hpp"
 #include "contact/registry.hpp"
 #include "datasets/toml_keys.hpp"
 #include "planners/arm/chain_file.hpp"
@@ -88,7 +89,7 @@ Pads pads_of(Section keys) {
   Pads out;
   out.law = keys.text("law");
   const auto known = contact::contact_model_names();
-  if (out.law == "gripper_delay" || std::find(known.begin(), known.end(), out.law) == known.end())
+  if (out.law == contact::kGripperDelay || std::find(known.begin(), known.end(), out.law) == known.end())
     keys.fail("law", fmt::format("'{}' is no contact model that says how the pads let go", out.law));
   out.mu = keys.number("mu", {0, 10, true, ""});
   out.length = keys.number("length_m", {0, 0.5, true, "m"});

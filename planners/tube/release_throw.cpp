@@ -6,6 +6,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "contact/gripper_delay.hpp"
 #include "contact/registry.hpp"
 #include "flight/fly.hpp"
 #include "planners/tube/planar_hand.hpp"
@@ -33,7 +34,8 @@ const char* name_of(Unknown unknown) {
 
 ReleaseCard release_card(const datasets::ModelCard& card, const std::string& file,
                          const ReleaseCard& otherwise) {
-  if (card.model == "gripper_delay" || card.model == "limit_surface_naive" || card.model == "projectile")
+  if (card.model == contact::kGripperDelay || card.model == "limit_surface_naive" ||
+      card.model == "projectile")
     throw datasets::CardError(file, "/model",
                               fmt::format("'{}' does not say how the pads let go", card.model));
   if (!card.effects.empty())
