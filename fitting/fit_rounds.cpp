@@ -61,7 +61,7 @@ bool FitRounds::is_fixed(const Unknown& unknown) const {
 }
 
 FitRounds::Solution FitRounds::minimise(double tolerance, std::optional<std::size_t> held) {
-  AllThrows all(shared_, used_, x_, own_);
+  AllThrows all(shared_, simulated_, used_, x_, own_);
   ceres::Problem::Options problem_options;
   problem_options.evaluation_callback = &all;
   ceres::Problem problem(problem_options);
@@ -123,8 +123,8 @@ bool FitRounds::solve(bool last) {
   if (!solution_.usable) return false;
   std::vector<std::vector<double>> own;
   for (std::size_t i = 0; i < used_.size(); ++i) own.push_back(this->own(i));
-  equations_ = normal_equations(problem_, used_, campaign(), own, shared_.own_sigma, shared_.weighting,
-                                options_.threads);
+  equations_ = normal_equations(problem_, used_, simulated_.at(x_, own_, true), own, shared_.own_sigma,
+                                shared_.weighting, options_.threads);
   mode_changes_ = 0;
   for (std::size_t i = 0; i < used_.size(); ++i) {
     chi2_[i] = equations_.throws[i].chi2;

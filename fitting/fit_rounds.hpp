@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "fitting/fit_state.hpp"
+#include "fitting/simulated_throws.hpp"
 
 namespace unhand::fitting {
 
@@ -15,6 +15,9 @@ class FitRounds {
   /// Takes the throws of the options' share that can be simulated at `start`; where they fit badly from the
   /// beginning, channels are weighed accordingly.
   FitRounds(const CampaignProblem& problem, const FitOptions& options, const std::vector<double>& start);
+
+  FitRounds(const FitRounds&) = delete;  // parts of it refer to each other
+  FitRounds& operator=(const FitRounds&) = delete;
 
   const std::vector<std::size_t>& used() const { return used_; }
   bool is_fixed(const Unknown& unknown) const;
@@ -65,6 +68,7 @@ class FitRounds {
   const FitOptions& options_;
   Shared shared_;
   std::vector<std::size_t> used_;
+  SimulatedThrows simulated_{shared_, used_};
   std::vector<double> x_;
   // One array: Ceres orders blocks by their addresses, which must be the throws' order in every run.
   std::vector<double> own_;

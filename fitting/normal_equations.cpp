@@ -68,18 +68,18 @@ Eigen::MatrixXd campaign_columns(const Linearisation& l) {
 }
 
 NormalEquations normal_equations(const CampaignProblem& problem, const std::vector<std::size_t>& used,
-                                 const std::vector<double>& campaign,
+                                 const std::vector<Linearisation>& linearised,
                                  const std::vector<std::vector<double>>& own,
                                  const std::vector<double>& own_sigma, const Weighting& weighting,
                                  int threads) {
   NormalEquations out;
-  const auto width = static_cast<Eigen::Index>(campaign.size());
+  const auto width = static_cast<Eigen::Index>(problem.campaign().size());
   out.information.setZero(width, width);
   out.throws.resize(used.size());
   experiment::parallel_for(used.size(), threads, [&](std::size_t i) {
     const CampaignThrow& thrown = problem.throws()[used[i]];
     const std::vector<double>& values = own[i];
-    Linearisation l = problem.linearise(thrown, campaign, values, true);
+    Linearisation l = linearised[i];
     ThrowEquations& part = out.throws[i];
     part.modes = l.modes;
     part.detach = l.detach;

@@ -57,9 +57,10 @@ struct NormalEquations {
   std::vector<ThrowEquations> throws;
 };
 
-/// At the campaign's values and the throws' own, for the throws listed in `used`; own_sigma their spread.
+/// Of the throws listed in `used`, from their linearisations (not weighted) and the values of their own
+/// unknowns there; own_sigma is the spread of these.
 NormalEquations normal_equations(const CampaignProblem& problem, const std::vector<std::size_t>& used,
-                                 const std::vector<double>& campaign,
+                                 const std::vector<Linearisation>& linearised,
                                  const std::vector<std::vector<double>>& own,
                                  const std::vector<double>& own_sigma, const Weighting& weighting,
                                  int threads);

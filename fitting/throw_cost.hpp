@@ -4,11 +4,10 @@
 #include <ceres/ceres.h>
 
 #include <algorithm>
-#include <stdexcept>
 #include <vector>
 
 #include "experiment/parallel.hpp"
-#include "fitting/fit_state.hpp"
+#include "fitting/simulated_throws.hpp"
 
 namespace unhand::fitting {
 
@@ -16,36 +15,26 @@ namespace unhand::fitting {
 /// on a single one: its own threads would add up in an order that changes from run to run.
 class AllThrows final : public ceres::EvaluationCallback {
  public:
-  AllThrows(Shared& shared, const std::vector<std::size_t>& used, const std::vector<double>& x,
-            const std::vector<double>& own)
-      : shared_(shared), used_(used), x_(x), own_(own), at_(used.size()) {}
+  AllThrows(const Shared& shared, SimulatedThrows& simulated, const std::vector<std::size_t>& used,
+            const std::vector<double>& x, const std::vector<double>& own)
+      : shared_(shared), simulated_(simulated), used_(used), x_(x), own_(own) {}
 
-  void PrepareForEvaluation(bool jacobians, bool new_point) override {
-    if (!new_point && (complete_ || !jacobians)) return;
-    complete_ = jacobians;
-    const auto campaign = shared_.unscaled(x_.data());
+  void PrepareForEvaluation(bool jacobians, bool /*new_point*/) override {
+    at_ = simulated_.at(x_, own_, jacobians);
     experiment::parallel_for(used_.size(), shared_.options.threads, [&](std::size_t i) {
-      const auto begin = Clock::now();
       const CampaignThrow& thrown = shared_.problem.throws()[used_[i]];
-      try {
-        at_[i] = shared_.problem.linearise(
-            thrown, campaign, shared_.own_unscaled(own_.data() + i * shared_.own_scale.size()), jacobians);
-      } catch (const std::invalid_argument&) {
-        at_[i] = {};  // a trial step outside the physics
-      }
       if (at_[i].solved) weigh(at_[i], thrown.observed, thrown, shared_.weighting);
-      if (jacobians) shared_.jacobian_nanoseconds += static_cast<long>(1e9 * seconds_since(begin));
     });
   }
   const Linearisation& at(std::size_t i) const { return at_[i]; }
 
  private:
-  Shared& shared_;
+  const Shared& shared_;
+  SimulatedThrows& simulated_;
   const std::vector<std::size_t>& used_;
   const std::vector<double>& x_;
   const std::vector<double>& own_;
   std::vector<Linearisation> at_;
-  bool complete_{};
 };
 
 /// One throw's robust, whitened residual with the priors of its own unknowns below it.
