@@ -38,6 +38,19 @@ function(unhand_module name)
   endforeach()
 endfunction()
 
+# What every test is compiled with.
+function(unhand_test_options)
+  add_library(unhand_test_options INTERFACE)
+  target_link_libraries(unhand_test_options INTERFACE unhand_warnings GTest::gmock GTest::gtest_main)
+  target_compile_options(unhand_test_options INTERFACE $<$<CONFIG:Release>:-O1>)  # what takes time at run time is in the library
+  if(NOT CMAKE_CXX_COMPILER_LAUNCHER)  # a compiler cache does better without
+    add_executable(test_headers ${PROJECT_SOURCE_DIR}/cmake/empty.cpp)
+    target_link_libraries(test_headers PRIVATE unhand_test_options)
+    target_compile_features(test_headers PRIVATE cxx_std_20)
+    target_precompile_headers(test_headers PRIVATE <gmock/gmock.h> <gtest/gtest.h>)
+  endif()
+endfunction()
+
 # unhand_test(dynamics  integrator_test.cpp ... USES release)
 # makes the executable test_<name> from tests/<name>/*.cpp and registers each test case.
 function(unhand_test name)
@@ -49,15 +62,11 @@ function(unhand_test name)
   foreach(used IN LISTS ARG_USES)
     target_link_libraries(test_${name} PRIVATE unhand::${used})
   endforeach()
-  target_link_libraries(test_${name} PRIVATE unhand_warnings GTest::gmock GTest::gtest_main)
+  target_link_libraries(test_${name} PRIVATE unhand_test_options)
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR})
-  if(NOT CMAKE_CXX_COMPILER_LAUNCHER)  # a compiler cache does better without
-    target_precompile_headers(test_${name} PRIVATE <gmock/gmock.h> <gtest/gtest.h>)
+  if(TARGET test_headers)
+    target_precompile_headers(test_${name} REUSE_FROM test_headers)
   endif()
-  target_compile_options(test_${name} PRIVATE
-    $<$<CONFIG:Release>:-O1>  # what takes time at run time is in the library
-    # GCC 12 at -O1 sees a copy beyond the end in std::string(...) + "literal" (its bug 105651)
-    $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-array-bounds>)
   gtest_discover_tests(test_${name} TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60
     PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS ${name})
 endfunction()

@@ -65,7 +65,8 @@ TEST(Csv, SaysWhereAndWhat) {
       "\xff\xfe"
       "1,2\n",
       "line 1", "UTF-16");
-  expect(std::string(60, 'x') + ",2\n", "line 1, column t", "xxx...' is not a number");
+  const std::string long_cell(60, 'x');
+  expect(long_cell + ",2\n", "line 1, column t", "xxx...' is not a number");
   expect_error<ImportError>([&] { lines_of(scratch / "none.csv"); }, scratch / "none.csv", "line 0",
                             "no such file");
 }
