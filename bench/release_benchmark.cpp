@@ -210,7 +210,7 @@ struct Kind {
   double pivot, surface;  // tolerances
 };
 constexpr Kind kKinds[] = {{"calm", calm, 1e-4, 1e-4},
-                           {"hard", hard, 1e-5, 1e-6},
+                           {"hard", hard, 1e-6, 1e-6},
                            {"log", log, 1e-6, 1e-5},
                            {"log_growing", log_growing, 1e-6, 1e-4}};
 constexpr const char* kModels[] = {"sliding_pivot", "limit_surface", "limit_surface_disc",

@@ -9,7 +9,8 @@
 namespace unhand::dynamics {
 
 /// DOP853 of [HairerNorsettWanner1993] II.10. Twelve evaluations a step (the last is the first of the next),
-/// and three more where the dense output is asked for.
+/// and three more where the dense output is asked for. Its two estimates are combined component by component,
+/// not as two norms, as there: see SingleStep::error_norm.
 template <class S, int N>
 class DormandPrince final : public SingleStep<DormandPrince<S, N>, S, N> {
  public:
@@ -38,8 +39,7 @@ class DormandPrince final : public SingleStep<DormandPrince<S, N>, S, N> {
       error5[i] = h * weighted<kEnd>(dop853::kError5, i);
       error3[i] = h * weighted<kEnd>(dop853::kError3, i);
     }
-    const double e5 = this->error_norm(error5), e3 = this->error_norm(error3);
-    return e5 > 0 ? e5 * e5 / std::sqrt(e5 * e5 + 0.01 * e3 * e3) : e5;
+    return this->error_norm(error5, error3);
   }
 
   /// h |λ| of the last step's fastest direction, from the flow at its end and at the stage before.

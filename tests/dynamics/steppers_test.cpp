@@ -115,6 +115,42 @@ TYPED_TEST(SingleSteps, TheErrorFollowsTheTolerance) {
   }
 }
 
+TYPED_TEST(SingleSteps, AKinkInOneComponentIsSeenBesideAnotherThatSways) {
+  // y0 sways; y1 is pushed by a force that ends as (t1 − t)^p, or by a spline with a jump in its second
+  // derivative at a knot, as hands and normal forces do. Each over places of the end in the rhythm of the
+  // steps. The bounds: a knot inside a step errs by at most 3.5 times the finer of DormandPrince's estimates,
+  // of which at least a tenth is counted, over √2 (the norm) and of at most 1.4 tolerances: 70.
+  for (const double tolerance : {1e-7, 1e-9}) {
+    for (int k = 0; k < 40; ++k) {
+      const double end = 3.0 + 0.017 * k, power = 1.1 + 0.01 * k;
+      const auto released = free_flow([&](int, const auto& t, const auto& y, auto& dy) {
+        using std::cos, std::pow;
+        using S = std::decay_t<decltype(y[0])>;
+        dy[0] = 5.0 * cos(5.0 * t);
+        const S left = end - t;
+        dy[1] = left > 0.0 ? S(pow(left, power)) : S(0.0);
+      });
+      TypeParam stepper(Tolerances{tolerance, tolerance});
+      stepper.start(released, kPhase, 0.0, {0, 0});
+      while (stepper.t1() < end) ASSERT_EQ(stepper.step(end, 10.0), StepStatus::accepted);
+      const double pushed = std::pow(end, power + 1) / (power + 1);
+      EXPECT_NEAR(stepper.y1()[1], pushed, 20 * tolerance * (1 + pushed)) << "power " << power;
+
+      const double knot = 1.0 + 0.023 * k;
+      const auto knotted = free_flow([&](int, const auto& t, const auto& y, auto& dy) {
+        using std::cos;
+        using S = std::decay_t<decltype(y[0])>;
+        dy[0] = 5.0 * cos(5.0 * t);
+        const S past = t - knot;
+        dy[1] = past > 0.0 ? S(past * past) : S(0.0);
+      });
+      stepper.start(knotted, kPhase, 0.0, {0, 0});
+      while (stepper.t1() < 2.0) ASSERT_EQ(stepper.step(2.0, 10.0), StepStatus::accepted);
+      EXPECT_NEAR(stepper.y1()[1], std::pow(2 - knot, 3) / 3, 70 * tolerance) << "knot " << knot;
+    }
+  }
+}
+
 TYPED_TEST(SingleSteps, TheDenseOutputIsOfOrderThreeOrBetter) {
   // Worst error inside one step of length h: falls at least with h⁴ (a polynomial of degree three), with h⁸
   // where the method is of order eight, and both ends meet.
