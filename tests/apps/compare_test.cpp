@@ -1,0 +1,156 @@
+// compare, its report and its cards; predict with them.
+#include "tests/apps/cli.hpp"
+
+namespace unhand::cli {
+namespace {
+
+TEST_F(Cli, CompareReleases) {
+  const std::string models = "compare " + quick + " --models sliding_pivot,limit_surface,gripper_delay ";
+  ASSERT_EQ(run(models + "--threads 1 --json one.json").code, 0);
+  const Answer answer = run(models + "--threads 2 --json two.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("landing theta [deg]"));
+  EXPECT_THAT(answer.err, IsEmpty());
+  const json one = read_json(folder / "one.json");
+  EXPECT_EQ(timeless(one), timeless(read_json(folder / "two.json")));
+  EXPECT_EQ(one["schema"], "compare");
+  EXPECT_EQ(one["schema_version"], 1);
+  EXPECT_TRUE(one.contains("log"));
+  ASSERT_EQ(one["models"].size(), 3u);
+  for (const auto& [name, model] : one["models"].items()) {
+    EXPECT_FALSE(model["parameters"].empty()) << name;
+    EXPECT_GT(model["microseconds_per_throw"], 0) << name;
+    EXPECT_EQ(model["train"]["n"].get<int>() + model["test"]["n"].get<int>(), 12) << name;
+    for (const char* split : {"train", "test"})
+      for (const char* quantity : {"detach_vx_m_s", "detach_omega_deg_s", "landing_x_m", "landing_theta_deg"})
+        for (const char* statistic : {"mae", "std", "bias"})
+          EXPECT_TRUE(model[split][quantity][statistic].is_number())
+              << name << split << quantity << statistic;
+  }
+}
+
+TEST_F(Cli, NoTestThrowsNoNumbers) {
+  auto log = datasets::read_throw_log(quick);
+  for (auto& one : log.throws) one.split = datasets::Split::train;
+  datasets::write_throw_log(folder / "train.h5", log);
+  const Answer answer = run("compare train.h5 --models gripper_delay --json a.json --report r");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json test = read_json(folder / "a.json")["models"]["gripper_delay"]["test"];
+  EXPECT_EQ(test["n"], 0);
+  EXPECT_TRUE(test["landing_x_m"]["mae"].is_null());
+  for (const auto& text : {answer.out, content(folder / "a.json"), content(folder / "r/report.md"),
+                           content(folder / "r/throws.csv"), content(folder / "r/conditions.dat")}) {
+    EXPECT_THAT(text, Not(HasSubstr("nan")));
+    EXPECT_THAT(text, Not(HasSubstr("NaN")));
+  }
+}
+
+TEST_F(Cli, ReportIsComplete) {
+  const Answer answer = run("compare " + quick + " --models sliding_pivot,gripper_delay --report new/report");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  for (const std::string name : {"landing_errors", "conditions"})
+    for (const char* ending : {".png", ".pdf", ".gp", ".dat"})
+      EXPECT_GT(fs::file_size(folder / "new/report" / (name + ending)), 0u) << name << ending;
+  EXPECT_EQ(read_json(folder / "new/report/compare.json")["schema"], "compare");
+  const std::string csv = content(folder / "new/report/throws.csv");
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 2 * 12);
+  EXPECT_EQ(files().size(), 2u + 8 + 3);  // two folders
+  // Again over the old one, which keeps what is not ours.
+  std::ofstream(folder / "new/report/mine.txt") << "mine";
+  ASSERT_EQ(run("compare " + quick + " --models gripper_delay --report new/report/").code, 0);
+  EXPECT_EQ(content(folder / "new/report/mine.txt"), "mine");
+  EXPECT_EQ(files().size(), 2u + 8 + 3 + 1);
+}
+
+TEST_F(Cli, MissingGnuplotIsSaid) {
+  fs::create_directory(folder / "bin");
+  const Answer answer = run("compare " + quick + " --models gripper_delay --report r --json a.json",
+                            "PATH='" + (folder / "bin").string() + "'");
+  EXPECT_EQ(answer.code, 1);
+  EXPECT_THAT(answer.err, HasSubstr("gnuplot-nox"));
+  EXPECT_THAT(files(), testing::ElementsAre("bin"));
+}
+
+TEST_F(Cli, BrokenGnuplotLeavesNothing) {
+  fs::create_directory(folder / "bin");
+  std::ofstream(folder / "bin/gnuplot") << "#!/bin/sh\necho 'no terminal for you' >&2\nexit 1\n";
+  fs::permissions(folder / "bin/gnuplot", fs::perms::owner_all);
+  const Answer answer =
+      run("compare " + quick + " --models gripper_delay --report r --json a.json --write-cards c",
+          "PATH='" + (folder / "bin").string() + "':$PATH");
+  EXPECT_EQ(answer.code, 1);
+  EXPECT_THAT(answer.err, HasSubstr("no terminal for you"));
+  EXPECT_THAT(files(), testing::ElementsAre("bin", "bin/gnuplot"));
+}
+
+TEST_F(Cli, CardsCarryAnEstimate) {
+  ASSERT_EQ(
+      run("compare " + quick + " --models sliding_pivot,gripper_delay --write-cards cards --json a.json")
+          .code,
+      0);
+  EXPECT_THAT(files(), testing::ElementsAre("a.json", "cards", "cards/gripper_delay.json",
+                                            "cards/sliding_pivot.json"));
+  for (const std::string model : {"sliding_pivot", "gripper_delay"}) {
+    const Answer answer =
+        run("predict " + quick + " --card cards/" + model + ".json --json p.json --csv p.csv --threads 2");
+    ASSERT_EQ(answer.code, 0) << answer.err;
+    const json predicted = read_json(folder / "p.json");
+    EXPECT_EQ(predicted["schema"], "predict");
+    EXPECT_EQ(predicted["throws"].size(), 12u);
+    EXPECT_TRUE(predicted["throws"][0]["landing"]["x_m"].is_number());
+    ASSERT_EQ(
+        run("compare " + quick + " --models " + model + " --card cards/" + model + ".json --json b.json")
+            .code,
+        0);
+    const json again = timeless(read_json(folder / "b.json"))["models"][model];
+    const json first = timeless(read_json(folder / "a.json"))["models"][model];
+    EXPECT_EQ(again["test"], first["test"]);
+    EXPECT_EQ(again["train"], first["train"]);
+    EXPECT_TRUE(again["estimate"]["from_card"]);
+  }
+}
+
+TEST_F(Cli, BadCards) {
+  ASSERT_EQ(run("compare " + quick + " --models sliding_pivot --write-cards .").code, 0);
+  const json good = read_json(folder / "sliding_pivot.json");
+  const auto expect = [&](const json& card, const std::string& reason) {
+    std::ofstream(folder / "bad.json") << card.dump();
+    expect_refusal("predict " + quick + " --card bad.json --json p.json", 3, "bad.json: " + reason);
+  };
+  json bad = good;
+  bad["model"] = "wishful";
+  expect(bad, "/model");
+  bad = good;
+  bad["parameters"].erase("mu");
+  expect(bad, "/parameters/mu");
+  bad = good;
+  bad["parameters"]["mu"]["value"] = -1;
+  expect(bad, "/parameters/mu/value");
+  bad = good;
+  bad["parameters"]["length"]["unit"] = "mm";
+  expect(bad, "/parameters/length/unit");
+  bad = good;
+  bad["parameters"]["luck"] = bad["parameters"]["mu"];
+  expect(bad, "/parameters/luck");
+  std::ofstream(folder / "bad.json") << "{\"schema\": }";
+  expect_refusal("predict " + quick + " --card bad.json", 3, "bad.json: line 1, column 12");
+  expect_refusal("predict " + quick + " --card none.json", 3, "none.json");
+  expect_refusal("compare " + quick + " --models gripper_delay --card sliding_pivot.json", 2,
+                 "sliding_pivot");
+}
+
+TEST_F(Cli, FreeFlights) {
+  const Answer answer = run("compare " + flights + " --json a.json --report r --threads 1");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  ASSERT_EQ(run("compare " + flights + " --models projectile --json b.json --threads 2").code, 0);
+  const json one = read_json(folder / "a.json");
+  EXPECT_EQ(timeless(one), timeless(read_json(folder / "b.json")));
+  const json& model = one["models"]["projectile"];
+  EXPECT_EQ(model["train"]["n"], 4);
+  EXPECT_EQ(model["test"]["n"], 1);
+  EXPECT_LT(model["test"]["trajectory_rms_m"], 1e-6);  // the motion is the model's, rounded
+  EXPECT_GT(fs::file_size(folder / "r/residuals_projectile.png"), 0u);
+}
+
+}  // namespace
+}  // namespace unhand::cli

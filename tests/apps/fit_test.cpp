@@ -1,0 +1,142 @@
+// fit, and what its cards foretell.
+#include "tests/apps/cli.hpp"
+
+namespace unhand::cli {
+namespace {
+
+TEST_F(Cli, FitThenPredict) {
+  const Answer answer =
+      run("fit " + quick + " --model limit_surface_disc --card c.json --json f.json --report r");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.err, IsEmpty());
+  for (const char* words : {"95 % interval", "chi2/sample", "no outlier throws", "Jacobian"})
+    EXPECT_THAT(answer.out, HasSubstr(words));
+  EXPECT_THAT(files(),
+              testing::IsSupersetOf({"c.json", "f.json", "r/fit.json", "r/report.md", "r/throws.csv"}));
+  const json fitted = read_json(folder / "f.json"), card = read_json(folder / "c.json");
+  EXPECT_EQ(fitted["schema"], "fit");
+  EXPECT_EQ(fitted["schema_version"], 1);
+  EXPECT_EQ(fitted["outcome"], "converged");
+  EXPECT_NEAR(fitted["parameters"]["mu"]["value"].get<double>(), 0.5, 0.03);  // 3 sigma of eight throws' mu
+  EXPECT_TRUE(fitted["cross_validation"].is_null());                          // there is a test split
+  for (const char* split : {"train", "test"})
+    for (const char* quantity : {"detach_vx_m_s", "detach_omega_deg_s", "landing_x_m", "landing_theta_deg"})
+      EXPECT_EQ(card["errors"][split][quantity]["mae"], fitted[split][quantity]["mae"]) << split << quantity;
+  EXPECT_LT(card["errors"]["test"]["landing_x_m"]["mae"].get<double>(), 0.01);
+  EXPECT_EQ(card["log"]["checksum"], fitted["checksum"]);
+  EXPECT_TRUE(card["valid_range"].contains("release_speed"));
+
+  const Answer predicted = run("predict " + quick + " --card c.json --json p.json --csv p.csv");
+  ASSERT_EQ(predicted.code, 0) << predicted.err;
+  EXPECT_THAT(predicted.out, HasSubstr("±"));
+  EXPECT_THAT(content(folder / "p.csv"), HasSubstr("sigma_landing_x_m"));
+  const json throws = read_json(folder / "p.json")["throws"];
+  ASSERT_EQ(throws.size(), 12u);
+  double mae = 0;
+  int n = 0;
+  for (const auto& one : throws) {
+    EXPECT_GT(one["sigma"]["landing_x_m"].get<double>(), 0);
+    const bool outside = !one["outside_valid_range"].empty();
+    EXPECT_EQ(
+        predicted.err.find("throw " + one["id"].get<std::string>() + " lies outside") != std::string::npos,
+        outside);
+    if (one["split"] == "train") {
+      EXPECT_FALSE(outside);
+    } else {
+      mae += std::abs(one["error"]["landing_x_m"].get<double>());
+      ++n;
+    }
+  }
+  EXPECT_NEAR(mae / n, fitted["test"]["landing_x_m"]["mae"].get<double>(), 1e-12);  // summed in another order
+  ASSERT_EQ(run("compare " + quick + " --models limit_surface_disc --card c.json --json k.json").code, 0);
+  const json compared = read_json(folder / "k.json")["models"]["limit_surface_disc"];
+  EXPECT_TRUE(compared["estimate"]["from_card"]);
+  EXPECT_NEAR(compared["test"]["landing_x_m"]["mae"].get<double>(), mae / n, 1e-5);  // another rtol
+
+  json foreign = card;
+  foreign["effects"] = {"flight.sorcery"};
+  std::ofstream(folder / "bad.json") << foreign.dump();
+  expect_refusal("predict " + quick + " --card bad.json", 3, "bad.json: /effects/0");
+  foreign = card;
+  foreign["model"] = "convex_quartic";
+  std::ofstream(folder / "bad.json") << foreign.dump();
+  expect_refusal("predict " + quick + " --card bad.json", 3, "bad.json: /model");
+}
+
+TEST_F(Cli, FitAnswersOrSaysWhyNot) {
+  std::ofstream(folder / "c.json") << "the old card";
+  const std::string card = " --card c.json --json f.json";
+  expect_refusal("fit " + quick + " --model wishful" + card, 2, "'wishful' cannot be fitted");
+  expect_refusal("fit " + quick + " --model limit_surface_naive" + card, 2, "cannot be fitted");
+  expect_refusal("fit " + quick + " --model gripper_delay --effects flight.sorcery" + card, 2,
+                 "flight.sorcery");
+  expect_refusal("fit " + quick + " --model gripper_delay --kfold 1" + card, 2, "at least 2 folds");
+  expect_refusal("fit none.h5 --model gripper_delay" + card, 3, "none.h5");
+  expect_refusal("fit " + quick + " --model ellipsoid" + card, 3, "slip-logs");
+  expect_refusal("fit " + quick + " --model gripper_delay --json f.json --card none/c.json", 1,
+                 "cannot be written");
+  auto log = datasets::read_throw_log(quick);
+  for (auto& one : log.throws) one.split = datasets::Split::test;
+  datasets::write_throw_log(folder / "test.h5", log);
+  expect_refusal("fit test.h5 --model gripper_delay" + card, 1, "no train throws");
+  for (auto& one : log.throws) {
+    one.split = datasets::Split::train;
+    one.hand.reset();
+    one.condition = "same";
+  }
+  datasets::write_throw_log(folder / "handless.h5", log);
+  expect_refusal("fit handless.h5 --model gripper_delay" + card, 3, "/hand: missing");
+  EXPECT_EQ(content(folder / "c.json"), "the old card");
+}
+
+TEST_F(Cli, KilledFitLeavesTheOldCard) {
+  std::ofstream(folder / "c.json") << "the old card";
+  const std::string fit = "fit " + quick + " --model gripper_delay --card c.json --threads 1";
+  for (const char* after : {"0.05", "0.3"}) {
+    const std::string command = "cd '" + folder.string() + "' && timeout -s KILL " + after +
+                                " '" UNHAND_BINARY "' " + fit + " >/dev/null 2>&1 </dev/null";
+    const int status = std::system(command.c_str());
+    const std::string now = content(folder / "c.json");
+    const bool was_done = WIFEXITED(status) && WEXITSTATUS(status) == 0;  // a fast machine
+    if (was_done || now != "the old card") {
+      EXPECT_EQ(json::parse(now)["schema"], "model-card");
+    }
+  }
+  ASSERT_EQ(run(fit).code, 0);
+  EXPECT_EQ(read_json(folder / "c.json")["model"], "gripper_delay");
+}
+
+TEST_F(Cli, FitCrossValidatesWithoutTestThrows) {
+  auto log = datasets::read_throw_log(quick);
+  for (auto& one : log.throws) one.split = datasets::Split::train;
+  datasets::write_throw_log(folder / "train.h5", log);
+  const Answer answer = run("fit train.h5 --model gripper_delay --json f.json --card c.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("cross-validated"));
+  const json fitted = read_json(folder / "f.json");
+  EXPECT_EQ(fitted["cross_validation"]["folds"], 5);
+  EXPECT_EQ(fitted["cross_validation"]["n"], 12);
+  EXPECT_TRUE(read_json(folder / "c.json")["errors"].contains("cross_validation"));
+}
+
+TEST_F(Cli, CompareFitsTheModels) {
+  const Answer answer =
+      run("compare " + quick +
+          " --models limit_surface,limit_surface_naive,gripper_delay --fit --json a.json --write-cards c");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json models = read_json(folder / "a.json")["models"];
+  ASSERT_EQ(models.size(), 3u);
+  for (const auto& [name, model] : models.items()) {
+    EXPECT_THAT(model["estimate"]["method"].get<std::string>(), HasSubstr("fitted")) << name;
+    EXPECT_FALSE(model["parameters"].empty()) << name;
+    EXPECT_EQ(model["train"]["n"].get<int>() + model["test"]["n"].get<int>(), 12) << name;
+    EXPECT_TRUE(model["test"]["landing_x_m"]["mae"].is_number()) << name;
+  }
+  for (const char* name : {"mu", "length"})
+    EXPECT_EQ(models["limit_surface_naive"]["parameters"][name], models["limit_surface"]["parameters"][name]);
+  EXPECT_LT(models["limit_surface"]["test"]["landing_x_m"]["mae"].get<double>(), 0.01);
+  EXPECT_TRUE(read_json(folder / "c/limit_surface.json").contains("covariance"));
+}
+
+}  // namespace
+}  // namespace unhand::cli

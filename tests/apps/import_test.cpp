@@ -1,0 +1,115 @@
+// import: a lab's own files and phones.
+#include "tests/apps/cli.hpp"
+
+namespace unhand::cli {
+namespace {
+
+/// Files of a lab: a hand, a sensor and a tracker saw the same throw.
+void write_lab_files(const fs::path& folder) {
+  fs::create_directories(folder / "hand");
+  fs::create_directories(folder / "ft");
+  fs::create_directories(folder / "takes");
+  std::ofstream(folder / "bar.toml")
+      << "name = \"bar\"\nmass_kg = 0.25\ninertia_kg_m2 = 2.4e-3\nsurface = \"steel\"\n";
+  for (const std::string name : {"slow_01", "slow_02"}) {
+    std::ofstream hand(folder / "hand" / (name + ".csv")), ft(folder / "ft" / (name + ".csv"));
+    std::ofstream take(folder / "takes" / (name + ".csv"));
+    hand << "t,X,Z,pitch,VX,VZ,Q,AX,AZ,DQ\n";
+    ft << "t (s),Fx (N),Fz (N),Ty (N mm),Fy (N)\n";
+    take << "Format Version,1.23,Take Name," << name
+         << ",Rotation Type,Quaternion,Length Units,Millimeters\n\n"
+         << ",Type,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body\n"
+         << ",Name,bar,bar,bar,bar,bar,bar,bar\n,,Rotation,Rotation,Rotation,Rotation,Position,Position,"
+            "Position\n"
+         << "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z\n";
+    for (int k = 0; k < 251; ++k) {
+      const double t = 1e-3 * k, force = 40 * std::max(0.0, 1 - std::max(0.0, t - 0.11) / 0.04);
+      hand << k << ',' << 500 + 1.5 * k << ',' << 800 + 1.5 * k << ",15,1.5,1.5,0,0,0,0\n";
+      ft << t << ",0,-1.2,0," << force << '\n';
+    }
+    for (int k = 0; k < 240; ++k) {
+      const double t = k / 240.0, fall = std::max(0.0, t - 0.15), half = 0.13 + 2 * fall;
+      take << k << ',' << t << ",0,0," << std::sin(half) << ',' << std::cos(half) << ',' << 500 + 1500 * t
+           << ',' << 800 + 1500 * t - 500 * 9.81 * fall * fall << ",0\n";
+    }
+  }
+}
+
+TEST_F(Cli, ImportsTheFilesOfALab) {
+  write_lab_files(folder);
+  const std::string hand =
+      "hand-csv hand/slow_01.csv hand/slow_02.csv --columns "
+      "time=t,x=X,z=Z,theta=pitch,vx=VX,vz=VZ,omega=Q,ax=AX,az=AZ,alpha=DQ --units "
+      "time=ms,x=mm,z=mm,theta=deg,vx=m/s,vz=m/s,omega=deg/s,ax=m/s^2,az=m/s^2,alpha=deg/s^2 ";
+  const std::string ft =
+      "ft-csv ft/slow_01.csv ft/slow_02.csv --columns time=t,fx=-Fx,fz=-Fz,tau=-Ty,normal=Fy ";
+  const std::string motive =
+      "motive-csv takes/slow_01.csv takes/slow_02.csv --sigma position=2e-4,angle=3e-3 ";
+  for (const std::string& step :
+       {hand + "--sku bar.toml --opening-time 0.1 --test-every 2 --out log.h5", ft + "--into log.h5",
+        motive + "--landing --into log.h5 --out full.h5 --json full.json"}) {
+    const Answer answer = run("import " + step);
+    ASSERT_EQ(answer.code, 0) << answer.err;
+    EXPECT_THAT(answer.out, HasSubstr("2 throws (1 train, 1 test)"));
+  }
+  EXPECT_EQ(read_json(folder / "full.json")["files"][1]["landing"], true);
+  const auto log = datasets::read_throw_log(folder / "full.h5");
+  ASSERT_EQ(log.throws.size(), 2u);
+  const datasets::Throw& one = log.throws[1];
+  EXPECT_EQ(one.condition, "slow");
+  EXPECT_EQ(one.split, datasets::Split::test);
+  EXPECT_NEAR(one.hand->pose(10, 2), std::acos(-1) / 12, 1e-12);
+  EXPECT_EQ(one.ft->wrench(0, 1), 1.2);
+  EXPECT_NEAR(one.mocap->pose(0, 2), 0.26, 1e-5);
+  EXPECT_NEAR(one.landing->pose(0, 0), 0.5 + 1.5 * one.landing->time(0), 1e-5);
+  EXPECT_FALSE(
+      datasets::read_throw_log(folder / "log.h5").throws[0].mocap);  // --into alone is left as it was
+  EXPECT_EQ(run("compare full.h5 --models gripper_delay").code, 0);
+
+  expect_refusal("import " + ft + "--into full.h5", 3, "full.h5: /throws/slow_01/ft: is there already");
+  EXPECT_EQ(run("import " + ft + "--into full.h5 --replace").code, 0);
+  expect_refusal("import " + ft + "--into none.h5", 3, "none.h5");
+  expect_refusal("import " + ft + "--into full.h5 --throw slow_01", 2, "--throw goes with one input");
+  expect_refusal("import " + ft + "--into full.h5 --sku bar.toml", 2, "--sku is for a new log");
+  expect_refusal("import " + ft + "--out a.h5", 2, "--sku FILE or --mass KG");
+  expect_refusal("import " + ft + "--mass 0.25", 2, "--out is required");
+  expect_refusal("import " + ft + "--mass 0.25 --out a.h5 --body bar", 2, "--body is not for ft-csv");
+  expect_refusal("import cube-tosses t.csv --out a.h5 --mass 0.25", 2, "--mass is not for cube-tosses");
+  expect_refusal("import ft-csv ft/slow_01.csv --mass 1 --out a.h5 --columns fx", 2,
+                 "--columns: 'fx' is not NAME=VALUE");
+  expect_refusal("import ft-csv ft/slow_01.csv --mass 1 --out a.h5 --columns nromal=Fx", 2,
+                 "did you mean 'normal'?");
+  expect_refusal("import " + motive + "--body bra --mass 1 --out a.h5", 3, "did you mean 'bar'?");
+  expect_refusal("import " + motive + "--mass 1 --out a.h5 --test-conditions fast", 2,
+                 "there is no condition 'fast'");
+  std::string cut = content(folder / "takes/slow_02.csv");
+  std::ofstream(folder / "takes/slow_02.csv") << cut.substr(0, cut.size() - 20);
+  expect_refusal("import " + motive + "--mass 1 --out a.h5 --json a.json", 3, "takes/slow_02.csv: line 246");
+}
+
+TEST_F(Cli, ImportsPhonesAsFreeFlights) {
+  std::ofstream phone(folder / "fall_1.csv");
+  phone << "Time (s),Acceleration x (m/s^2),Acceleration y (m/s^2),Acceleration z (m/s^2)\n";
+  for (int k = 0; k < 800; ++k) {
+    const double t = 0.005 * k;
+    phone << t << ",0.1,-0.1," << (t < 1 || t > 1.65 ? 9.8 : t > 1.6 ? 150 : 0.3 * (t - 1)) << '\n';
+  }
+  phone.close();
+  const Answer answer = run("import phyphox fall_1.csv --mass 0.2 --out falls.h5");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("800 samples, 1 free fall"));
+  const Answer seen = run("inspect falls.h5");
+  EXPECT_EQ(seen.code, 0) << seen.err;
+  EXPECT_THAT(seen.out, HasSubstr("imu/specific_force"));
+  EXPECT_THAT(seen.out, HasSubstr("1 free flight"));
+  expect_refusal("import phyphox fall_1.csv --out a.h5", 2, "--sku FILE or --mass KG");
+  expect_refusal("import phyphox fall_1.csv --mass -1 --out a.h5", 2, "-1 is not a number > 0");
+  std::ofstream(folder / "still.csv") << "0,0,0,9.8\n0.005,0,0,9.8\n";
+  expect_refusal("import phyphox still.csv --mass 0.2 --out a.h5", 3,
+                 "still.csv: line 1: holds no free fall");
+  expect_refusal("import phyphox fall_1.csv --mass 0.2 --out a.h5 --min-fall 0.8", 3,
+                 "lasts 0.600 s, less than 0.8 s");
+}
+
+}  // namespace
+}  // namespace unhand::cli

@@ -1,0 +1,181 @@
+// Throws planned and learnt, and new objects.
+#include "tests/apps/cli.hpp"
+
+namespace unhand::cli {
+namespace {
+
+TEST_F(Cli, PlansAThrowIntoABox) {
+  const Answer answer =
+      run("plan throw --target 1.3,0,-0.2 --samples 600 --draws 50 --json plan.json --report out");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("no acceleration"));
+  const auto plan = nlohmann::json::parse(content(folder / "plan.json"));
+  EXPECT_EQ(plan["schema"], "plan-throw");
+  EXPECT_EQ(plan["qdd_rad_s2"].size(), 7u);
+  EXPECT_EQ(plan["predicted"]["planned"]["landed"], 50);
+  for (const char* limit : {"position", "velocity", "acceleration", "jerk", "torque"})
+    EXPECT_LE(plan["limits"][limit]["fraction"], 1 + 1e-9) << limit;
+  EXPECT_THAT(content(folder / "out/trajectory.csv"), testing::StartsWith("time_s,q1_rad,"));
+  for (const char* file : {"tube.png", "motion.pdf", "landings.png", "landings.csv"})
+    EXPECT_TRUE(fs::exists(folder / "out" / file)) << file;
+
+  expect_refusal("plan throw --target 1.3,0", 2, "--target: '1.3,0' is not 3 numbers with ',' between");
+  expect_refusal("plan throw --target 1.3,0,0 --box 0x1", 2, "--box: '0x1' has no area");
+  expect_refusal("plan throw --target 1.3,0,0 --arm kuka", 2,
+                 "'kuka' is not panda, a .toml file or a .urdf file");
+  expect_refusal("plan throw --target 9,0,0 --samples 200 --json a.json", 1,
+                 "no_throw: no configuration reaches the box");
+  expect_refusal("plan throw --target 1.3,0,0 --arm none.toml", 3, "none.toml: file: no such file");
+  expect_refusal("plan throw --target 1.3,0,0 --card none.json", 3, "none.json");
+}
+
+TEST_F(Cli, PlansAThrowWithACard) {
+  ASSERT_EQ(run("compare " + quick + " --models sliding_pivot --write-cards cards").code, 0);
+  std::ofstream(folder / "bar.toml") << "name='bar'\nsurface='paper'\nmass_kg=0.246\ncom_offset_m=0.14\n"
+                                        "inertia_kg_m2=0.0024\n";
+  const Answer answer =
+      run("plan throw --target 1.3,0,-0.2 --samples 600 --draws 40 --card cards/sliding_pivot.json --sku "
+          "bar.toml --json plan.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("insensitive motion"));
+  const auto plan = nlohmann::json::parse(content(folder / "plan.json"));
+  EXPECT_LT(plan["predicted"]["insensitive motion"]["rms_m"],
+            plan["predicted"]["tube acceleration"]["rms_m"]);
+  EXPECT_TRUE(plan["release"]["contact_model"]["miss_m"].is_number());
+}
+
+TEST_F(Cli, LearnsToThrowFlipAndGoesOnAfterAKill) {
+  const std::string what = "plan flip --target 1.2,180 --seed 3 --iterations 2 --repeats 1 --report out ";
+  const Answer answer = run(what + "--learner m2 --json flip.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("m2: target 1.20 m, 180 degrees"));
+  const auto flip = nlohmann::json::parse(content(folder / "flip.json"));
+  EXPECT_EQ(flip["schema"], "plan-flip");
+  EXPECT_EQ(flip["iterations"].size(), 2u);
+  EXPECT_EQ(flip["iterations"][0]["trials"].size(), 3u);
+  EXPECT_EQ(flip["population"].size(), 27u);
+  for (const char* file : {"path.png", "progress.png", "population.pdf", "path.md", "session.json"})
+    EXPECT_TRUE(fs::exists(folder / "out" / file)) << file;
+
+  // As a kill leaves it: some throws are there, the report is not. The rest comes out as before.
+  const auto trials = folder / "out/trials";
+  const auto count = [&] { return std::distance(fs::directory_iterator(trials), fs::directory_iterator()); };
+  EXPECT_EQ(count(), 27 + 12 + 6);
+  fs::remove(folder / "flip.json");
+  for (const char* gone : {"path-0001.json", "path-0005.json", "support-0011.json", "population-0020.json"})
+    ASSERT_TRUE(fs::remove(trials / gone)) << gone;
+  const Answer again = run(what + "--learner m2 --json flip.json");
+  ASSERT_EQ(again.code, 0) << again.err;
+  EXPECT_THAT(again.out, HasSubstr("41 throws recalled, 4 thrown now"));
+  EXPECT_EQ(nlohmann::json::parse(content(folder / "flip.json")), flip);
+
+  expect_refusal(what + "--learner m1", 3, "session.json: /settings/learner: another session lies there");
+  // A throw of another robot, under a name that this run asks for.
+  const std::string kept = content(trials / "population-0002.json");
+  auto foreign = nlohmann::json::parse(kept);
+  foreign["seed"] = 4;
+  std::ofstream(trials / "population-0002.json") << foreign;
+  expect_refusal(what + "--learner m2", 3, "population-0002.json: /seed: not the throw");
+  std::ofstream(trials / "population-0002.json") << content(trials / "population-0001.json");
+  expect_refusal(what + "--learner m2", 3, "population-0002.json: /index: not the throw");
+  std::ofstream(trials / "population-0002.json") << kept;
+  std::ofstream(trials / "path-0002.json") << "{\"command\": {";
+  expect_refusal(what + "--learner m2", 3, "path-0002.json");
+  // What a kill in the middle of writing leaves is gone after the next run; the parts of live processes stay.
+  fs::remove(trials / "path-0002.json");
+  const fs::path dead = trials / ".path-0002.json.part-999999999-0", live = folder / ".out.part-1-0";
+  std::ofstream(dead) << "{";
+  fs::create_directory(folder / ".out.part-999999999-0");
+  fs::create_directory(live);
+  EXPECT_EQ(run(what + "--learner m2").code, 0);
+  EXPECT_FALSE(fs::exists(dead));
+  EXPECT_FALSE(fs::exists(folder / ".out.part-999999999-0"));
+  EXPECT_TRUE(fs::exists(live));
+}
+
+TEST_F(Cli, ThrowFlipTransfersToAnotherBar) {
+  const std::string what = "plan flip --target 1.3,180 --seed 3 --iterations 2 --repeats 1 --json flip.json ";
+  const Answer shifted = run(what + "--learner m3");
+  ASSERT_EQ(shifted.code, 0) << shifted.err;
+  EXPECT_THAT(shifted.out,
+              HasSubstr("18.0 cm from the pads, known from 27 throws of another one (12.0 cm; the "
+                        "paper's shift, as no --com-offset was given)"));
+  EXPECT_THAT(shifted.out, HasSubstr("(expected, not seen)"));
+  const auto flip = nlohmann::json::parse(content(folder / "flip.json"));
+  EXPECT_EQ(flip["bar"]["com_offset_m"], 0.18);
+  EXPECT_EQ(flip["known_bar"]["com_offset_m"], 0.12);
+  EXPECT_EQ(flip["initial_error_is_seen"], false);
+
+  std::ofstream(folder / "sku.toml") << "name = 'b'\nmass_kg = 0.3\ninertia_kg_m2 = 2e-3\n"
+                                        "com_offset_m = 0.15\nsurface = 'printed'\n";
+  const Answer sku = run(what + "--learner m4 --sku sku.toml");
+  ASSERT_EQ(sku.code, 0) << sku.err;
+  EXPECT_THAT(sku.out, HasSubstr("15.0 cm from the pads, known from 12 throws of another one (12.0 cm)"));
+  EXPECT_EQ(nlohmann::json::parse(content(folder / "flip.json"))["bar"]["mass_kg"], 0.3);
+}
+
+TEST_F(Cli, ThrowFlipRefusesWhatItCannotDo) {
+  const std::string other = "plan flip --learner ", aim = other + "m2 --target 1.2,180 ";
+  expect_refusal(other + "m2 --target 1.2", 2, "--target: '1.2' is not 2 numbers");
+  expect_refusal(other + "m2 --target 5,180", 2, "--target: 5 m, 180 degrees; accepted: ");
+  expect_refusal(other + "m2 --target -1,180", 2, "--target: -1 m, 180 degrees; accepted: ");
+  expect_refusal(other + "m2 --target 1.2,900", 2, "--target: 1.2 m, 900 degrees; accepted: ");
+  expect_refusal(other + "m5 --target 1.2,180", 2, "m5 not in {m1,m2,m3,m4}");
+  expect_refusal(aim + "--seed abc", 2, "abc is not a whole number from 0 to");
+  expect_refusal(aim + "--seed -1", 2, "-1 is not a whole number from 0 to");
+  expect_refusal(aim + "--card card.json", 2, "--card: only --learner m4");
+  expect_refusal(aim + "--com-offset 0.9", 1, "lands this bar with none of its commands");
+  expect_refusal(aim + "--robot none.toml", 3, "none.toml");
+  std::ofstream(folder / "sku.toml") << "name = 'b'\nmass_kg = 0.3\ninertia_kg_m2 = 1e-9\n"
+                                        "com_offset_m = 0.15\nsurface = 'printed'\n";
+  expect_refusal(aim + "--sku sku.toml", 3,
+                 "sku.toml: object: inertia_kg_m2: 1e-09 is outside [1e-06, 1] kg m^2");
+  const Answer far = run(other + "m2 --target 1.8,360 --iterations 1");
+  EXPECT_EQ(far.code, 0);
+  EXPECT_THAT(far.err, HasSubstr("note: out of reach of the robot as declared"));
+}
+
+TEST_F(Cli, ValidateSkuAnswersWithABudget) {
+  std::ofstream(folder / "bar.toml") << "name = 'bar-com100'\nmass_kg = 0.246\ncom_offset_m = 0.10\n"
+                                        "inertia_kg_m2 = 3.3e-3\nsurface = 'printed'\n";
+  std::ofstream(folder / "card.json")
+      << R"({"schema": "model-card", "schema_version": 1, "model": "sliding_pivot", "library_version": "0",
+             "parameters": {"mu": {"value": 0.5, "sigma": 0.005, "unit": "-"},
+                            "length": {"value": 0.007, "sigma": 1e-4, "unit": "m"}},
+             "covariance": {"names": ["mu", "length"], "matrix": [[2.5e-5, 0], [0, 1e-8]]},
+             "log": {"file": "a.h5"}})";
+  const Answer answer = run(
+      "validate-sku bar.toml --card card.json --samples 200 --json a.json --report out --tolerance 0.1,60");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json out = read_json(folder / "a.json");
+  EXPECT_EQ(out["schema"], "validate-sku");
+  EXPECT_NEAR(out["tolerance"]["landing_theta_deg"].get<double>(), 60, 1e-12);
+  double share = 0;
+  for (const auto& line : out["budget"]) share += line["share"].get<double>();
+  EXPECT_NEAR(share, 1, 1e-9);
+  EXPECT_THAT(answer.out, HasSubstr(out["measurements"][0]["measurement"].get<std::string>()));
+  EXPECT_TRUE(out["measured"].is_null());
+  for (const char* file : {"report.md", "validate-sku.json", "landings.png", "landings.pdf", "landings.dat",
+                           "landings.gp", "budget.png", "budget.pdf"})
+    EXPECT_TRUE(fs::exists(folder / "out" / file)) << file;
+
+  const Answer with_log =
+      run("validate-sku bar.toml --card card.json --samples 200 --log " + quick + " --json b.json");
+  ASSERT_EQ(with_log.code, 0) << with_log.err;
+  const json judged = read_json(folder / "b.json");
+  EXPECT_EQ(judged["candidates"].size(), 6u);  // the campaign's conditions, three for each of two objects
+  EXPECT_EQ(judged["measured"]["n"], 6);
+
+  const std::string asked = "validate-sku bar.toml --card card.json ";
+  expect_refusal(asked + "--tolerance 0.05", 2, "METRES,DEGREES");
+  expect_refusal(asked + "--tolerance 0.05,-1", 2, "METRES,DEGREES");
+  expect_refusal(asked + "--condition fast", 2, "--log");
+  expect_refusal(asked + "--condition fast --log " + quick, 2, "there are");
+  expect_refusal("validate-sku none.toml --card card.json", 3, "none.toml");
+  expect_refusal("validate-sku bar.toml --card none.json", 3, "none.json");
+  std::ofstream(folder / "bare.toml") << "name = 'x'\nmass_kg = 1\nsurface = 'steel'\n";
+  expect_refusal("validate-sku bare.toml --card card.json --json c.json", 3, "inertia_kg_m2");
+}
+
+}  // namespace
+}  // namespace unhand::cli

@@ -1,0 +1,136 @@
+// Help, refusals and the commands that make and show logs.
+#include "tests/apps/cli.hpp"
+
+namespace unhand::cli {
+namespace {
+
+TEST_F(Cli, HelpHasAnExampleEverywhere) {
+  EXPECT_EQ(run("--help").code, 0);
+  EXPECT_THAT(run("--version").out, HasSubstr("unhand "));
+  for (const std::string command :
+       {"generate", "import", "inspect", "compare", "fit", "predict", "validate-sku"}) {
+    const Answer answer = run(command + " --help");
+    EXPECT_EQ(answer.code, 0) << command;
+    for (const char* word : {"Example", "--json", "--threads"})
+      EXPECT_THAT(answer.out, HasSubstr(word)) << command;
+  }
+}
+
+TEST_F(Cli, WrongUsage) {
+  EXPECT_EQ(run("").code, 2);
+  EXPECT_EQ(run("juggle").code, 2);
+  EXPECT_EQ(run("compare").code, 2);
+  EXPECT_EQ(run("inspect " + quick + " --threads -1").code, 2);
+  expect_refusal("generate nonsense --out a.h5", 2, "batch180");
+  expect_refusal("generate quick12 --out a.h5 --effect flight.winds=1", 2, "did you mean flight.wind?");
+  expect_refusal("generate quick12 --out a.h5 --effect breeze=1", 2, "contact.stribeck");
+  expect_refusal("generate quick12 --out a.h5 --effect flight.wind=31", 2,
+                 "w_x = 31 is not in [-30, 30] m/s");
+  expect_refusal("generate quick12 --out a.h5 --effect flight.wind.w_y=1", 2, "flight.wind has w_x, w_z");
+  expect_refusal("generate quick12 --out a.h5 --effect flight.wind=strong", 2, "not a number");
+  expect_refusal("generate quick12 --out a.h5 --effect flight.wind", 2, "ID=value");
+  expect_refusal("generate quick12 --out a.h5 --effect flight.quadratic_drag[jar]=0.1", 2, "bar-com100");
+  expect_refusal("generate quick12 --out a.h5 --effect sensor.mass[jar]=1.1", 2, "all objects share it");
+  expect_refusal("import nonsense in.csv --out a.h5", 2, "cube-tosses");
+  expect_refusal("compare " + quick + " --models sliding_pivot,wishful", 2, "wishful");
+  expect_refusal("compare " + quick + " --models sliding_pivot,sliding_pivot", 2, "twice");
+  expect_refusal("compare " + quick + " --rtol 7", 2, "rtol");
+}
+
+TEST_F(Cli, BadInput) {
+  std::ofstream(folder / "text.h5") << "this is no HDF5";
+  std::ofstream(folder / "empty.h5");
+  const std::string whole = content(quick);
+  std::ofstream(folder / "half.h5", std::ios::binary) << whole.substr(0, whole.size() / 2);
+  datasets::SlipLog slips;
+  slips.surfaces["felt"] = {1.0, 0.05, "felt", {}, {}};
+  slips.surfaces["felt"].slips.push_back({"001",
+                                          datasets::Split::train,
+                                          {2, 1, {0, 0.1}, {}},
+                                          {2, 3, {1, 0, 0, 1, 0, 0}, {}},
+                                          {2, 3, {1, 0, 0, 1, 0, 0}, {}}});
+  datasets::write_slip_log(folder / "slips.h5", slips);
+  for (const std::string file : {"none.h5", "text.h5", "empty.h5", "half.h5"}) {
+    expect_refusal("inspect " + file + " --json a.json", 3, file + ": ");
+    expect_refusal("compare " + file + " --json a.json --report r", 3, file + ": ");
+  }
+  expect_refusal("compare slips.h5 --json a.json", 3, "slips.h5: /@schema: is a slip-log");
+  expect_refusal("compare " + flights + " --models sliding_pivot", 3, "free flights");
+  expect_refusal("compare " + quick + " --models projectile", 3, "projectile");
+  expect_refusal("import cube-tosses none.csv --out a.h5", 3, "none.csv: ");
+  const Answer slip = run("inspect slips.h5 --json slips.json");
+  EXPECT_EQ(slip.code, 0) << slip.err;
+  EXPECT_EQ(read_json(folder / "slips.json")["surfaces"]["felt"]["slips"], 1);
+}
+
+TEST_F(Cli, UnwritableOutputs) {
+  std::ofstream(folder / "file") << "in the way";
+  fs::create_directory(folder / "folder");
+  const std::string models = " --models gripper_delay";
+  expect_refusal("generate quick12 --out none/a.h5", 1, "none/a.h5: cannot be written");
+  expect_refusal("generate quick12 --out folder", 1, "it is a directory");
+  expect_refusal("inspect " + quick + " --json none/a.json", 1, "cannot be written");
+  expect_refusal("compare " + quick + models + " --json none/a.json --report r", 1, "cannot be written");
+  expect_refusal("compare " + quick + models + " --json a.json --report file/r", 1, "cannot be written");
+  expect_refusal("compare " + quick + models + " --json a.json --write-cards file", 1, "cannot be written");
+}
+
+TEST_F(Cli, GenerateIsRepeatable) {
+  ASSERT_EQ(run("generate quick12 --seed 3 --threads 1 --out a.h5 --json a.json").code, 0);
+  EXPECT_EQ(content(folder / "a.h5"), content(quick));
+  ASSERT_EQ(run("generate quick12 --seed 4 --out a.h5").code, 0);  // replaced
+  EXPECT_NE(content(folder / "a.h5"), content(quick));
+  EXPECT_EQ(read_json(folder / "a.json")["throws"], 12);
+  EXPECT_THAT(files(), testing::ElementsAre("a.h5", "a.json"));
+}
+
+TEST_F(Cli, GenerateTellsTheTruthOnlyWhenAsked) {
+  ASSERT_EQ(run("generate quick12 --seed 3 --out a.h5 --effect sensor.ft_bias.fz=0 --truth a.json").code, 0);
+  EXPECT_EQ(content(folder / "a.h5"), content(quick)) << "a neutral effect is none";
+  ASSERT_EQ(run("generate quick12 --seed 3 --out a.h5 --effect flight.quadratic_drag=0.1 --effect "
+                "flight.quadratic_drag[bar-com160]=0.2 --without ft --without landing --truth a.json")
+                .code,
+            0);
+  EXPECT_EQ(content(folder / "a.h5").find("quadratic_drag"), std::string::npos);
+  const json truth = read_json(folder / "a.json");
+  EXPECT_EQ(truth["schema"], "truth");
+  EXPECT_EQ(truth["effects"]["flight.quadratic_drag.k"]["value"], 0.1);
+  EXPECT_EQ(truth["effects"]["flight.quadratic_drag.k[bar-com160]"]["value"], 0.2);
+  EXPECT_EQ(truth["effects"].size(), 2u);
+  EXPECT_EQ(truth["throws"].size(), 12u);
+  EXPECT_GT(truth["throws"]["001"]["landing"]["time"], truth["throws"]["001"]["detach"]["time"]);
+  const Answer log = run("inspect a.h5");
+  EXPECT_THAT(log.out, HasSubstr("mocap"));
+  EXPECT_THAT(log.out, testing::Not(HasSubstr("ft/wrench")));
+  EXPECT_THAT(log.out, HasSubstr("0 with a landing"));
+  ASSERT_EQ(run("generate random --seed 2 --effect random --out a.h5 --truth a.json").code, 0);
+  EXPECT_GE(read_json(folder / "a.json")["effects"].size(), 1u);
+}
+
+TEST_F(Cli, Inspect) {
+  const Answer answer = run("inspect " + quick + " --json a.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("12 throws"));
+  EXPECT_THAT(answer.out, HasSubstr("mocap"));
+  EXPECT_THAT(answer.err, IsEmpty());  // no progress bar in a pipe
+  const json seen = read_json(folder / "a.json");
+  EXPECT_EQ(seen["schema"], "inspect");
+  EXPECT_EQ(seen["throws"], 12);
+  EXPECT_EQ(json::parse(run("inspect " + quick + " --json").out), seen);
+}
+
+TEST_F(Cli, FigureDrawsWhatIsAskedFor) {
+  const Answer answer = run("figure all --log " + quick + " --models sliding_pivot,limit_surface --out f");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  for (const char* name :
+       {"landing_errors", "conditions", "mae", "modes", "wrench", "pivot", "phase", "flight"})
+    for (const char* ending : {".png", ".pdf", ".dat", ".gp"})
+      EXPECT_TRUE(fs::exists(folder / "f" / (std::string(name) + ending))) << name << ending;
+  expect_refusal("figure portrait --log " + quick + " --out g", 2, "landing-errors");
+  expect_refusal("figure modes --throw 999 --log " + quick + " --out g", 2, "no throw '999'");
+  expect_refusal("figure modes --models wishful --log " + quick + " --out g", 2, "wishful");
+  expect_refusal("figure modes --log none.h5 --out g", 3, "none.h5");
+}
+
+}  // namespace
+}  // namespace unhand::cli
