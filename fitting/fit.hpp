@@ -128,7 +128,7 @@ struct FitResult {
   /// Covariance of the campaign's unknowns, row by row. H⁻¹ G H⁻¹ with H the Gauss-Newton matrix after the
   /// throws' own unknowns are eliminated and G the scatter of the throws' gradients, each enlarged by what
   /// the fit has taken out of it [BellMcCaffrey2002]: it holds when the noise within a throw is correlated or
-  /// the law is not quite right. Not below H⁻¹.
+  /// the law is not quite right. To throws that agree too well, one that scatters as its noise is added.
   std::vector<double> covariance;
   std::vector<double> own_spread;        ///< learned 1 σ of the throws' own unknowns
   std::vector<OpenDirection> open;       ///< directions without an answer

@@ -131,10 +131,7 @@ ScatterCovariance scatter_covariance(const NormalEquations& equations, const Eig
     const Eigen::VectorXd g = adjust.back() * (whiten.transpose() * part.gradient);
     G += g * g.transpose();
   }
-  const Spectrum scatter = spectrum_of(G);
   ScatterCovariance out;
-  out.covariance = congruent(product(whiten, scatter.vectors), scatter.values.cwiseMax(1.0).asDiagonal());
-
   const auto n = static_cast<Eigen::Index>(share.size());
   out.degrees_of_freedom.setOnes(width);
   for (Eigen::Index k = 0; k < width; ++k) {
@@ -151,6 +148,11 @@ ScatterCovariance scatter_covariance(const NormalEquations& equations, const Eig
     if (const double square = B.squaredNorm(); square > 0)
       out.degrees_of_freedom[k] = std::max(1.0, trace * trace / square);
   }
+  Spectrum scatter = spectrum_of(G);
+  const double seen = width > 0 ? out.degrees_of_freedom.minCoeff() : 0;
+  for (double& x : scatter.values)
+    if (x < 1) x = (1 + seen * std::max(0.0, x)) / (1 + seen);
+  out.covariance = congruent(product(whiten, scatter.vectors), scatter.values.asDiagonal());
   return out;
 }
 

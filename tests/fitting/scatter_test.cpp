@@ -41,7 +41,25 @@ TEST(ScatterCovariance, UnequalSharesLeaveFewerDegrees) {
   }
   const auto found = scatter_covariance(equations, Eigen::MatrixXd::Zero(1, 1));
   EXPECT_LT(found.degrees_of_freedom[0], 5);
-  EXPECT_NEAR(found.covariance(0, 0), 1.0 / 20, 1e-12);  // not below the inverse of the information
+}
+
+TEST(ScatterCovariance, ThrowsThatAgreeTooWellAreNotQuiteBelieved) {
+  // n throws of information 1 with residuals s, and one more of variance 1.
+  constexpr int kThrows = 5;
+  for (const double s : {0.0, 0.3, 0.9, 2.0}) {
+    NormalEquations equations;
+    equations.information = Eigen::MatrixXd::Constant(1, 1, kThrows);
+    for (int i = 0; i < kThrows; ++i) {
+      ThrowEquations part;
+      part.gradient = Eigen::VectorXd::Constant(1, i % 2 ? s : -s);
+      part.information = Eigen::MatrixXd::Constant(1, 1, 1);
+      equations.throws.push_back(part);
+    }
+    const double n = kThrows, own = s * s * n / (n - 1);  // the textbook's variance of one throw
+    const double expected = own < 1 ? (1 + (n - 1) * own) / n : own;
+    const auto found = scatter_covariance(equations, Eigen::MatrixXd::Zero(1, 1));
+    EXPECT_NEAR(found.covariance(0, 0), expected / n, 1e-12) << s;
+  }
 }
 
 Misfit::Part part_of_residuals(const std::vector<double>& r) {
