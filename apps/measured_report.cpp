@@ -57,7 +57,7 @@ Table ranking_table(const MeasuredDiscovery& found) {
     table.rows.push_back({r.id, r.visible ? fmt::format("{:.4g}", r.gain) : "no footprint",
                           fmt::format("{:.2g}", r.p_value), fmt::format("{:.3f}", r.correlation_with_best),
                           r.refitted ? fmt::format("{:+.1f}", r.delta_bic) : "",
-                          r.refitted ? fmt::format("{:.3g}", r.held_out_gain) : ""});
+                          r.held_out_gain ? fmt::format("{:.3g}", *r.held_out_gain) : ""});
   return table;
 }
 

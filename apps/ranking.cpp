@@ -16,7 +16,7 @@ Json ranking_json(std::span<const fitting::Ranked> ranking) {
                    {"visible", r.visible},
                    {"refitted", r.refitted},
                    {"delta_bic", r.refitted ? number(r.delta_bic) : Json(nullptr)},
-                   {"held_out_gain", r.refitted ? number(r.held_out_gain) : Json(nullptr)}});
+                   {"held_out_gain", r.held_out_gain ? number(*r.held_out_gain) : Json(nullptr)}});
   return out;
 }
 

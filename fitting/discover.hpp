@@ -96,7 +96,9 @@ struct Ranked {
   bool visible{true};              ///< something of its footprint is left beside the fitted unknowns
   bool refitted{false};            ///< it was fitted in full
   double delta_bic{};              ///< negative: for the effect; of the refit
-  double held_out_gain{};          ///< largest fall of χ² per sample in a channel and phase
+  /// Largest fall of the held-out χ² per sample in a channel and phase; of refits with evidence on the train
+  /// throws.
+  std::optional<double> held_out_gain{};
 };
 
 /// How a prediction may use what is estimated to be missing.

@@ -17,6 +17,9 @@ constexpr double kDeltaBic = -10;
 /// What explains less than this share of what another footprint would is an imitation of it.
 constexpr double kImitation = 1.0 / 3.0;
 
+/// Where nothing is left but noise, footprints are small and a refit gains what they say, within this factor.
+constexpr double kFirstOrder = 3;
+
 /// What is left of the misfit where an effect acts, from which on it is an imitation of another.
 constexpr double kLeft = 0.1;
 
@@ -66,25 +69,29 @@ struct Trial {
   Stage next;
   double delta_bic{};
   Improvement held_out;
-  bool convinces{};
 };
 
+/// The refit, if it convinces: evidence on the train throws, and then an improvement that matters on the
+/// others.
 std::optional<Trial> try_out(const Stage& stage, const Footprints& f, const Score& score,
                              const DiscoverOptions& options, Discovery& out) {
   const Candidate& candidate = f.candidates[score.candidate];
-  Trial trial{extended(stage, candidate, score, options), 0, {}, false};
-  if (!trial.next.solved()) return std::nullopt;
+  Trial trial{extended(stage, candidate, score, options), 0, {}};
+  if (!trial.next.is_fitted()) return std::nullopt;
   trial.delta_bic = trial.next.bic() - stage.bic();
   const bool law = is_law(candidate.id);
-  trial.held_out = law ? law_improvement(stage.held_out, trial.next.held_out, out.base_test, options)
-                       : improvement(stage.held_out, trial.next.held_out, out.base_test, options);
   Ranked& ranked = named(out.ranking, candidate.id);
   ranked.refitted = true;
   ranked.delta_bic = trial.delta_bic;
-  ranked.held_out_gain = trial.held_out.fall;
+  ranked.held_out_gain.reset();
   const double p = law ? 0 : wald_p_value(trial.next, find_effect(candidate.id));
   const double share = options.false_discovery_rate / static_cast<double>(f.candidates.size());
-  trial.convinces = trial.delta_bic <= kDeltaBic && trial.held_out.matters >= 1 && p <= share;
+  if (!(trial.delta_bic <= kDeltaBic) || !(p <= share)) return std::nullopt;
+  if (!solve_held_out(trial.next, options)) return std::nullopt;
+  trial.held_out = law ? law_improvement(stage.held_out, trial.next.held_out, out.base_test, options)
+                       : improvement(stage.held_out, trial.next.held_out, out.base_test, options);
+  ranked.held_out_gain = trial.held_out.fall;
+  if (!(trial.held_out.matters >= 1)) return std::nullopt;
   return trial;
 }
 
@@ -100,10 +107,16 @@ std::optional<Stage> forward(const Stage& stage, const DiscoverOptions& options,
   std::optional<Trial> best;
   const Score* of_best = nullptr;
   std::vector<std::pair<const Score*, double>> convincing;  // with the criterion of the refit
+  const bool noise = !std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(),
+                                  [&](const ChannelMisfit& m) { return is_misfit(m, options); });
+  const auto in_reach = [&](const Score& score) {
+    const double columns = static_cast<double>(f.candidates[score.candidate].columns.size());
+    return !noise || kFirstOrder * score.gain >= columns * std::log(f.samples) - kDeltaBic;
+  };
   const auto consider = [&](const Score& score) {
-    if (!score.visible || !tried.insert(f.candidates[score.candidate].id).second) return;
+    if (!score.visible || !in_reach(score) || !tried.insert(f.candidates[score.candidate].id).second) return;
     auto trial = try_out(stage, f, score, options, out);
-    if (!trial || !trial->convinces) return;
+    if (!trial) return;
     convincing.push_back({&score, trial->next.bic()});
     if (best && trial->next.bic() >= best->next.bic()) return;
     best = std::move(trial);

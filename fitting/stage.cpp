@@ -32,7 +32,9 @@ bool is_wrench(Channel c) {
   return c == Channel::wrench_fx || c == Channel::wrench_fz || c == Channel::wrench_tau;
 }
 
-bool Stage::solved() const { return is_answer(fit) && is_answer(held_out); }
+bool Stage::is_fitted() const { return is_answer(fit); }
+
+bool Stage::solved() const { return is_fitted() && is_answer(held_out); }
 
 double Stage::bic() const {
   double out = 0;
@@ -65,13 +67,13 @@ std::vector<std::size_t> open_shapes(const CampaignProblem& problem, const FitRe
 
 }  // namespace
 
-void solve(Stage& stage, const DiscoverOptions& options, std::vector<double> start) {
+bool solve_train(Stage& stage, const DiscoverOptions& options, std::vector<double> start) {
   if (start.empty()) start = stage.problem.start();
   FitOptions train = options.fit;
   train.start = start;
   train.weigh = Weigh::variances;  // as bic() compares
   stage.fit = fit(stage.problem, train);
-  if (!is_answer(stage.fit)) return;
+  if (!is_answer(stage.fit)) return false;
   if (const auto open = open_shapes(stage.problem, stage.fit); !open.empty()) {
     train.start = stage.fit.values();
     for (const std::size_t k : open) {
@@ -79,22 +81,31 @@ void solve(Stage& stage, const DiscoverOptions& options, std::vector<double> sta
       train.fixed.push_back(stage.fit.campaign[k].unknown.name);
     }
     stage.fit = fit(stage.problem, train);
-    if (!is_answer(stage.fit)) return;
   }
-  FitOptions test = train;
+  return stage.is_fitted();
+}
+
+bool solve_held_out(Stage& stage, const DiscoverOptions& options) {
+  FitOptions test = options.fit;
+  test.weigh = Weigh::variances;
   test.share = Share::test;
   test.start = stage.fit.values();
   test.all_fixed = true;
   test.own_spread = stage.fit.own_spread;
   test.rounds = 2;
   stage.held_out = fit(stage.problem, test);
+  return is_answer(stage.held_out);
+}
+
+void solve(Stage& stage, const DiscoverOptions& options, std::vector<double> start) {
+  if (solve_train(stage, options, std::move(start))) solve_held_out(stage, options);
 }
 
 void polish(Stage& stage, const DiscoverOptions& options) {
   for (int again = 0; again < 2; ++again) {
     Stage next{stage.problem, {}, {}, stage.ids};
-    solve(next, options, stage.fit.values());
-    if (!next.solved() || next.bic() > stage.bic() - 1) return;
+    if (!solve_train(next, options, stage.fit.values()) || next.bic() > stage.bic() - 1) return;
+    if (!solve_held_out(next, options)) return;
     stage = std::move(next);
   }
 }
@@ -117,7 +128,7 @@ Stage extended(const Stage& stage, const Candidate& candidate, const Score& scor
     if (const auto shape = candidate.shape.find(without_object(u.name)); shape != candidate.shape.end())
       start[k] = shape->second;
   }
-  solve(out, options, std::move(start));
+  solve_train(out, options, std::move(start));
   return out;
 }
 

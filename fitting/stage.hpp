@@ -16,7 +16,8 @@ struct Stage {
   FitResult fit, held_out;
   std::vector<std::string> ids;  ///< of what was added to the base, "contact.law:..." included
 
-  bool solved() const;
+  bool is_fitted() const;  ///< to the train throws
+  bool solved() const;     ///< and so are the own unknowns of the others
   /// −2 log of the likelihood in which every channel of every phase has the variance that it shows, at least
   /// the declared one, plus log(samples) for every unknown.
   double bic() const;
@@ -25,17 +26,21 @@ struct Stage {
 inline bool is_law(const std::string& id) { return id.rfind("contact.law:", 0) == 0; }
 bool is_wrench(experiment::Channel);
 
-/// Fits the train throws from `start`, and the own unknowns of the test throws. A shape
+/// Fits the train throws from `start`; whether there is an answer. A shape
 /// parameter that the log leaves open over its whole range (a speed at which friction changes, while the
 /// friction hardly does; the landing's share of a tracker's scale, where nothing was tracked) keeps its
 /// start, which the grid of its footprint gave it: the size beside it is then known for that shape.
+bool solve_train(Stage& stage, const DiscoverOptions& options, std::vector<double> start);
+/// With that, the own unknowns of the test throws; whether there is an answer.
+bool solve_held_out(Stage& stage, const DiscoverOptions& options);
+/// Both.
 void solve(Stage& stage, const DiscoverOptions& options, std::vector<double> start);
 
 /// Fits again from the solution while that helps: the weights of the channels were learned while the effect
 /// was still missing.
 void polish(Stage& stage, const DiscoverOptions& options);
 
-/// The stage with one candidate more, started from the step that its footprint asks for.
+/// The stage with one candidate more, fitted to the train throws from the step that its footprint asks for.
 Stage extended(const Stage& stage, const Candidate& candidate, const Score& score, const DiscoverOptions&);
 
 /// The stage without the effect `ids[index]`.
