@@ -153,6 +153,14 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
   out["effects"] = Json::array();
   for (const auto& effect : found.effects) out["effects"].push_back(effect_json(effect));
   out["fitted_along"] = found.along;
+  out["evident_but_small"] = nullptr;
+  if (const auto& small = found.small)
+    out["evident_but_small"] = {{"id", small->id},
+                                {"delta_bic", number(small->delta_bic)},
+                                {"p_value", number(small->p_value)},
+                                {"held_out_gain", number(small->held_out_fall)},
+                                {"test_rms_before_m", number(small->rms_before)},
+                                {"test_rms_after_m", number(small->rms_after)}};
   out["unexplained"] = nullptr;
   if (found.unexplained) {
     out["unexplained"] = {{"phase", to_string(found.unexplained->phase)},
@@ -205,8 +213,14 @@ std::string discovery_text(const Discovery& found, const std::string& log) {
       out += fmt::format("  to tell it from {}: {} (correlation {:.4f} -> {:.4f})\n", e.from, e.what,
                          e.before, e.after);
   }
-  for (const auto& id : found.along)
-    out += fmt::format("\nfitted along, too small to matter to a prediction: {}\n", id);
+  for (const auto& id : found.along) out += fmt::format("\nfitted along, since no pads are rigid: {}\n", id);
+  if (const auto& small = found.small)
+    out += fmt::format(
+        "\nevident, but {}: {} (BIC {:+.1f}, p {:.2g}; rms predicted before the throw, test: {:.3g} to "
+        "{:.3g} "
+        "mm)\n",
+        small->any_pads ? "no pads are without it" : "too small to matter", small->id, small->delta_bic,
+        small->p_value, 1e3 * small->rms_before, 1e3 * small->rms_after);
   if (found.unexplained) out += fmt::format("\nunexplained: {}\n", found.unexplained->description);
   Table table{{"predicted before the throw", "landing x MAE [m]", "theta MAE [deg]", "detach vx MAE [m/s]",
                "omega MAE [deg/s]", "trajectory RMS [m]", "chi2/dof"},

@@ -100,17 +100,29 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
 
   OutcomeErrors last = out.before_test;
   for (int step = 0; step < options.most_effects; ++step) {
-    if (step > 0 && !first_misfit(stage.fit, options).any) break;
+    if (!out.effects.empty() && !first_misfit(stage.fit, options).any) break;
     auto next = forward(stage, options, out);
-    if (!next) break;
+    if (!next) {
+      // The give of the pads may hide what else there is: with it, unless it predicts worse, one more look.
+      const Stage rigid = stage;
+      if (!out.small || !out.small->any_pads || !fit_along(stage, options, out)) break;
+      const PredictionGain gain = prediction_gain(rigid, stage, options);
+      if (!(gain.after < gain.before) || !held_out_confirms(rigid, stage)) {
+        stage = rigid;
+        out.along.clear();
+        break;
+      }
+      out.small.reset();
+      last = errors_of(stage, Share::test, threads);
+      continue;
+    }
     stage = std::move(*next);
     polish(stage, options);
-    if (fit_along(stage, options)) out.along.push_back("contact.pad_compliance");
+    if (acts_on_pads(stage)) fit_along(stage, options, out);
     const OutcomeErrors now = errors_of(stage, Share::test, threads);
     out.effects.back().test_error_ratio = error_ratio(last, now);
     last = now;
   }
-  const std::size_t accepted = out.effects.size();
   backward(stage, options, out);
   withdraw(stage, options, out);
   describe(stage, options, out);
@@ -120,17 +132,16 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
       effect.separating.insert(effect.separating.end(), experiments.begin(), experiments.end());
     }
 
-  const auto residuals_after =
-      out.effects.empty() ? residuals_before : residuals_of(stage.problem, stage.fit, threads);
+  const bool unchanged = out.effects.empty() && out.along.empty();
+  const auto residuals_after = unchanged ? residuals_before : residuals_of(stage.problem, stage.fit, threads);
   out.residual_after = residual_over_time(stage.problem, residuals_after);
   out.structure_after = structures(stage.problem, residuals_after);
   out.unexplained = unexplained(stage, out, options);
   out.final = stage.fit;
   out.final_test = stage.held_out.misfit;
   out.model = stage.problem.options().model;
-  out.after_train = out.effects.empty() ? out.before_train : errors_of(stage, Share::train, threads);
-  out.after_test =
-      out.effects.size() == accepted && out.along.empty() ? last : errors_of(stage, Share::test, threads);
+  out.after_train = unchanged ? out.before_train : errors_of(stage, Share::train, threads);
+  out.after_test = unchanged ? out.before_test : errors_of(stage, Share::test, threads);
   out.verdict = !out.effects.empty() ? Verdict::effect_found
                 : out.unexplained    ? Verdict::unexplained
                                      : Verdict::no_missing_effect;

@@ -25,11 +25,13 @@ struct DiscoverOptions {
   /// catalogue follows its torque better. In the firm grasp only the body's inertia speaks, and they are
   /// channels like others.
   double wrench_matters{1}, wrench_misfit{3};  ///< as above [χ² per sample]; times the noise
-  double law_matters{0.005};                   ///< another contact law: share of the held-out χ² as a whole
-  double false_discovery_rate{0.02};           ///< shared among the effects that were tried
-  double equivalent{0.98};                     ///< footprints that correlate by this much are one answer
-  int refits{4};                               ///< candidates that are fitted in full, in every step
-  int most_effects{3};                         ///< accepted in all
+  /// Or if the held-out throws are predicted that much better before they are made: rms before over after.
+  double prediction_matters{1.15};
+  double law_matters{0.005};          ///< another contact law: share of the held-out χ² as a whole
+  double false_discovery_rate{0.02};  ///< shared among the effects that were tried
+  double equivalent{0.98};            ///< footprints that correlate by this much are one answer
+  int refits{4};                      ///< candidates that are fitted in full, in every step
+  int most_effects{3};                ///< accepted in all
   double unexplained{1.5};  ///< χ² per sample of a channel in a phase from which on something is missing
   std::vector<std::string> forget;  ///< effects that are not in the catalogue today
   std::vector<std::string> laws{"limit_surface", "limit_surface_disc",
@@ -85,6 +87,17 @@ struct AcceptedEffect {
 
   /// Another name that the data cannot tell from this one; of several correlations the largest counts.
   void add_other_name(const std::string& other, double correlation);
+};
+
+/// An effect for which the evidence is, and which is no part of the answer.
+struct SmallEffect {
+  std::string id;          ///< of the effect
+  double delta_bic{};      ///< with it against without
+  double p_value{};        ///< of its absence
+  double held_out_fall{};  ///< largest, of χ² per sample in a channel and phase
+  double rms_before{},
+      rms_after{};  ///< of held-out predictions before the throw, as PredictionGain has it [m]
+  bool any_pads{};  ///< it is a give of the pads that no pads are without
 };
 
 /// One candidate, as it was scored in the step in which it came nearest to being accepted.
@@ -146,6 +159,7 @@ struct Discovery {
   std::vector<AcceptedEffect> effects;  ///< in order of acceptance
   std::vector<std::string> imitations;  ///< accepted at first, and withdrawn since too much was left
   std::vector<std::string> along;       ///< effects that are fitted along as nuisances, too small to matter
+  std::optional<SmallEffect> small;     ///< the most evident of what was too small to matter
   std::optional<Unexplained> unexplained;                            ///< what is left, if anything
   FirstMisfit first;                                                 ///< of the base model
   OutcomeErrors before_train, before_test, after_train, after_test;  ///< base model; the answer

@@ -9,4 +9,13 @@ namespace unhand::fitting {
 /// point in flight. Throws that are not predicted to land are left out.
 OutcomeErrors outcome_errors(const CampaignProblem& problem, const FitResult& fit, Share share, int threads);
 
+/// What one model's predictions of the same throws are better by than another's: rms of the tracked position
+/// in flight, of landing x where nothing is tracked [m]; zeros where nothing can be compared.
+struct PredictionGain {
+  double before{}, after{};
+};
+PredictionGain prediction_gain(const CampaignProblem& problem, const FitResult& fit,
+                               const CampaignProblem& other, const FitResult& other_fit, Share share,
+                               int threads);
+
 }  // namespace unhand::fitting

@@ -36,14 +36,41 @@ bool Stage::is_fitted() const { return is_answer(fit); }
 
 bool Stage::solved() const { return is_fitted() && is_answer(held_out); }
 
-double Stage::bic() const {
+double deviance(const FitResult& fit) {
   double out = 0;
   for (const auto& m : fit.misfit) {
     const double variance = std::max(1.0, m.chi2_per_sample());
     out += m.n * std::log(variance) + m.chi2 / variance;
   }
-  return out + static_cast<double>(problem.campaign().size()) *
-                   std::log(static_cast<double>(std::max(2L, fit.samples)));
+  return out;
+}
+
+double Stage::bic() const {
+  return deviance(fit) + static_cast<double>(problem.campaign().size()) *
+                             std::log(static_cast<double>(std::max(2L, fit.samples)));
+}
+
+PredictionGain prediction_gain(const Stage& before, const Stage& after, const DiscoverOptions& options) {
+  return prediction_gain(before.problem, before.fit, after.problem, after.fit, Share::test,
+                         options.fit.threads);
+}
+
+bool held_out_confirms(const Stage& before, const Stage& after) {
+  constexpr double kConfirmed = 20;  // times as likely
+  return deviance(before.held_out) - deviance(after.held_out) > 2 * std::log(kConfirmed);
+}
+
+double give_per_compliance(const Stage& stage) {
+  double mu = 0.5;
+  for (const auto& u : stage.fit.campaign)
+    if (u.unknown.name == "mu") mu = u.value;
+  return stage.problem.model().pads * mu * stage.problem.model().reference_force;
+}
+
+double give_of(const Stage& stage) {
+  for (const auto& u : stage.fit.campaign)
+    if (u.unknown.name == "contact.pad_compliance.compliance") return u.value * give_per_compliance(stage);
+  return 0;
 }
 
 namespace {

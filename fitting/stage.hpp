@@ -7,6 +7,7 @@
 
 #include "fitting/discover.hpp"
 #include "fitting/footprints.hpp"
+#include "fitting/outcome_errors.hpp"
 
 namespace unhand::fitting {
 
@@ -18,10 +19,31 @@ struct Stage {
 
   bool is_fitted() const;  ///< to the train throws
   bool solved() const;     ///< and so are the own unknowns of the others
-  /// −2 log of the likelihood in which every channel of every phase has the variance that it shows, at least
-  /// the declared one, plus log(samples) for every unknown.
+  /// The deviance of the fit plus log(samples) for every unknown.
   double bic() const;
 };
+
+/// −2 log of the likelihood in which every channel of every phase has the variance that it shows, at least
+/// the declared one.
+double deviance(const FitResult& fit);
+
+/// Of the held-out throws.
+PredictionGain prediction_gain(const Stage& before, const Stage& after, const DiscoverOptions& options);
+
+/// Whether held-out throws make an improvement no chance: neither model has seen them, so under the first one
+/// the second is twenty times as likely at most once in twenty logs.
+bool held_out_confirms(const Stage& before, const Stage& after);
+
+/// Evidence (difference of Bayes' criterion) that an effect needs before it is accepted or kept.
+inline constexpr double kDeltaBic = -10;
+
+/// The give of pads before they slip, under the grip's friction limit, from where on it is an effect like any
+/// other [m].
+inline constexpr double kMostGive = 3e-5;
+/// That give per contact.pad_compliance [N]: the friction limit of all pads at the campaign's grip force.
+double give_per_compliance(const Stage& stage);
+/// The give of a fit's pads [m]; 0 where it has no contact.pad_compliance.
+double give_of(const Stage& stage);
 
 inline bool is_law(const std::string& id) { return id.rfind("contact.law:", 0) == 0; }
 bool is_wrench(experiment::Channel);

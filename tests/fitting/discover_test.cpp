@@ -104,6 +104,35 @@ TEST(Discovery, OfTheWrongLawTheRightOneIsMissing) {
   EXPECT_FALSE(found.unexplained.has_value());
 }
 
+// Friction that grows by half with the slip's speed: refitted, it hides below the noise of every channel, and
+// still all of a throw's errors add up in its prediction.
+TEST(Discovery, WhatMattersToThePredictionAloneIsFound) {
+  constexpr double kViscous = 5;  // s/m
+  experiment::CampaignDesign design = experiment::campaign_design("quick12");
+  design.effects = {{"contact.viscous.1/v_0", kViscous}};
+  const Discovery found = found_in(experiment::generate_campaign(design, 4));
+  EXPECT_FALSE(found.first.any) << "no channel alone would show it";
+  const AcceptedEffect* effect = named(found, "contact.viscous");
+  ASSERT_NE(effect, nullptr) << to_string(found.verdict);
+  EXPECT_NEAR(effect->parameters.front().value, kViscous, 3 * effect->parameters.front().sigma);
+  EXPECT_LT(found.after_test.trajectory_rms, 0.7 * found.before_test.trajectory_rms);
+}
+
+// Pads that give by three micrometres, which no pads are without, are no missing effect and no unexplained
+// one either: the answer's model has them, and predicts the better for it.
+TEST(Discovery, TheGiveOfAnyPadsIsFittedAlongAndNoPartOfTheAnswer) {
+  experiment::CampaignDesign design = experiment::campaign_design("batch180");
+  design.repetitions = 2;
+  constexpr double kGive = 3e-6;  // m, at the friction limit of two pads
+  design.effects = {
+      {"contact.pad_compliance.compliance", kGive / (2 * design.patch.mu * design.opening.grip_force)}};
+  const Discovery found = found_in(experiment::generate_campaign(design, 6));
+  EXPECT_EQ(found.verdict, Verdict::no_missing_effect);
+  EXPECT_EQ(found.along, std::vector<std::string>{"contact.pad_compliance"});
+  EXPECT_FALSE(found.unexplained.has_value());
+  EXPECT_LT(found.after_test.trajectory_rms, found.before_test.trajectory_rms);
+}
+
 TEST(Discovery, LogsWithChannelsMissingAreAnswered) {
   for (const char* missing : {"ft", "mocap", "landing"}) {
     experiment::CampaignDesign design = experiment::campaign_design("quick12");
