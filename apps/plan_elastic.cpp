@@ -1,6 +1,7 @@
 // unhand plan elastic: throws of an arm whose last joint is a spring behind clutches.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -10,6 +11,7 @@
 #include "apps/output.hpp"
 #include "apps/plan.hpp"
 #include "apps/table.hpp"
+#include "planners/elastic/throw_refinement.hpp"
 #include "planners/elastic/throw_table.hpp"
 
 namespace unhand::apps {
@@ -113,8 +115,10 @@ void fastest(const el::ClutchedArm& arm, const Options& o, Outputs& outputs, Jso
   task.longest = o.longest > 0 ? o.longest : 0.6;
   task.elevation = o.elevation * M_PI / 180;
   std::vector<Fastest> all;
-  Table table{
-      {"drive", "basin", "starts", "tip speed [m/s]", "re-simulated", "duration [s]", "limits used"}, {}, 2};
+  Table table{{"drive", "basin", "starts", "tip speed [m/s]", "re-simulated", "duration [s]", "limits used",
+               "intervals"},
+              {},
+              2};
   double longest = 0;
   json["drives"] = Json::object();
   for (const el::Drive drive : {el::Drive::clutched, el::Drive::series, el::Drive::rigid}) {
@@ -123,19 +127,30 @@ void fastest(const el::ClutchedArm& arm, const Options& o, Outputs& outputs, Jso
     longest = std::max(longest, one.basins.longest);
     Json& j = json["drives"][el::to_string(drive)] = {{"failed_starts", one.basins.failed},
                                                       {"basins", Json::array()}};
-    for (std::size_t k = 0; k < one.basins.found.size(); ++k) {
-      const el::Basin& basin = one.basins.found[k];
-      const el::Replay run = el::replay(arm, basin.best);
+    std::vector<std::pair<el::ConfirmedThrow, int>> found;  // with the starts that led there
+    for (const el::Basin& basin : one.basins.found) {
+      found.emplace_back(el::confirm(arm, task, basin.best, program_options(o)), basin.starts);
+      longest = std::max(longest, found.back().first.longest_solve);
+    }
+    std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) {
+      return a.first.plan.speed() > b.first.plan.speed();
+    });
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      const auto& [best, starts] = found[k];
+      const el::Replay& run = best.run;
       table.rows.push_back(
-          {k == 0 ? el::to_string(drive) : "", fmt::to_string(k + 1), fmt::to_string(basin.starts),
-           fmt::format("{:.3f}", basin.best.speed()),
+          {k == 0 ? el::to_string(drive) : "", fmt::to_string(k + 1), fmt::to_string(starts),
+           fmt::format("{:.3f}", best.plan.speed()),
            run.spring_stop ? "spring at its stop" : fmt::format("{:.3f}", speed_of(run.release)),
-           fmt::format("{:.3f}", basin.best.duration()), fmt::format("{:.1f} %", 100 * run.use.largest())});
-      j["basins"].push_back({{"starts", basin.starts},
-                             {"speed_m_s", basin.best.speed()},
+           fmt::format("{:.3f}", best.plan.duration()), fmt::format("{:.1f} %", 100 * run.use.largest()),
+           fmt::to_string(2 * best.intervals) + (best.confirmed ? "" : ", not confirmed")});
+      j["basins"].push_back({{"starts", starts},
+                             {"speed_m_s", best.plan.speed()},
+                             {"intervals", 2 * best.intervals},
+                             {"confirmed", best.confirmed},
                              {"resimulated_speed_m_s", speed_of(run.release)},
                              {"spring_stop", run.spring_stop},
-                             {"duration_s", basin.best.duration()},
+                             {"duration_s", best.plan.duration()},
                              {"limits", use_json(run.use)},
                              {"energy_J",
                               {{"motors", run.motor_work},

@@ -137,14 +137,18 @@ Replay replay(const ClutchedArm& arm, const ElasticThrow& plan, int samples_per_
   split<double>(solution.y, at, rate);
   out.release = tip_of<double>(arm, at.tail<3>(), rate.tail<3>());
   out.gain = energy_of<double>(arm, at, rate) - energy_of<double>(arm, first.at, first.rate);
-  // Power over the pieces of the trajectory, by Gauss's rule of three points.
-  constexpr double node[3]{0.1127016653792583, 0.5, 0.8872983346207417},
-      weight[3]{5.0 / 18, 8.0 / 18, 5.0 / 18};
+  // Power over the pieces of the trajectory, by Gauss's rule of five points: order 10, as the pieces are of
+  // order 8.
+  constexpr int kNodes = 5;
+  constexpr double node[kNodes]{0.04691007703066800, 0.23076534494715845, 0.5, 0.76923465505284155,
+                                0.95308992296933200},
+      weight[kNodes]{0.11846344252809454, 0.23931433524968324, 0.28444444444444444, 0.23931433524968324,
+                     0.11846344252809454};
   for (const auto& piece : solution.trajectory.pieces) {
     const int mode = piece.phase.mode;
     if (mode >= system.spring_stop()) break;
     const double length = piece.t1 - piece.t0;
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < kNodes; ++k) {
       split<double>(piece.at_fraction(node[k]), at, rate);
       const MotorTorques<double> tau =
           system.torque_at<double>(piece.phase.window.begin, piece.t0 + node[k] * length);

@@ -7,6 +7,7 @@
 
 #include <cmath>
 
+#include "planners/elastic/throw_refinement.hpp"
 #include "planners/elastic/throw_table.hpp"
 
 namespace unhand::planners::elastic {
@@ -103,6 +104,40 @@ TEST(ElasticThrow, ASpringInTheWristIsFasterThanNone) {
     return plan.speed();
   };
   EXPECT_GT(wrist(Drive::passive), 1.2 * wrist(Drive::locked));
+}
+
+// On a coarse mesh the plan of a stiff wrist promises a speed that the run does not reach; refined, it does.
+TEST(ElasticThrow, IsRefinedUntilTheIntegratorConfirmsIt) {
+  ClutchedArm arm = read_clutched_arm("vsa_wrist");
+  arm.last.stiffness = 16;
+  ThrowTask task;
+  task.drive = Drive::passive;
+  ThrowProgramOptions options;
+  options.intervals = 4;
+  const ElasticThrow coarse = plan_throw(arm, task, options);
+  ASSERT_TRUE(coarse.solved());
+  const auto shortfall = [&](const ElasticThrow& plan, const Replay& run) {
+    return std::abs(plan.speed() - std::hypot(run.release.vx, run.release.vz)) / plan.speed();
+  };
+  ASSERT_GT(shortfall(coarse, replay(arm, coarse)), 5e-3);
+  const ConfirmedThrow fine = confirm(arm, task, coarse, options);
+  EXPECT_TRUE(fine.confirmed);
+  EXPECT_GT(fine.intervals, 4);
+  EXPECT_LE(shortfall(fine.plan, fine.run), 5.1e-3);
+  EXPECT_LE(fine.run.use.largest(), 1);
+  EXPECT_NEAR(fine.run.unexplained(), 0, 1e-9 * fine.run.motor_work);
+  Refinement none;
+  none.finest = 4;
+  EXPECT_FALSE(confirm(arm, task, coarse, options, none).confirmed);
+}
+
+TEST(ElasticThrow, AFinerMeshHoldsTheSameMotion) {
+  const ElasticThrow plan = planned(Drive::clutched, 12), finer = on_finer_mesh(plan);
+  for (std::size_t i = 0; i < plan.phases.size(); ++i)
+    ASSERT_EQ(finer.phases[i].points.size(), 2 * plan.phases[i].points.size() - 1);
+  const Replay a = replay(bsa3(), plan), b = replay(bsa3(), finer);  // straight lines of torque are kept
+  EXPECT_NEAR(a.release.vx, b.release.vx, 1e-8);
+  EXPECT_NEAR(a.release.vz, b.release.vz, 1e-8);
 }
 
 TEST(ElasticThrow, LandsOnItsTarget) {
