@@ -1,6 +1,7 @@
 // unhand plan wrist: what a spring in the wrist adds to a throw, against its stiffness.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -24,12 +25,10 @@ struct Options {
   unsigned seed{1};
 };
 
-/// The fastest confirmed throw with one stiffness. Speeds are the run's, not the plan's.
+/// The fastest confirmed throw with one stiffness. Its speed is the run's, not the plan's.
 struct Point {
-  double stiffness{}, plan_speed{}, speed{};
-  int intervals{};
-  el::Replay run;
-  double stored{};  ///< most energy in the spring on the way [J]
+  double stiffness{}, speed{};
+  el::ConfirmedThrow best;
 };
 
 el::ThrowTask task_of(const Options& o, el::Drive drive) {
@@ -40,26 +39,46 @@ el::ThrowTask task_of(const Options& o, el::Drive drive) {
   return task;
 }
 
-bool solve(const el::ClutchedArm& arm, const Options& o, el::Drive drive, Point& out) {
+/// Takes the plan, refined, if its run confirms it and is faster.
+void consider(const el::ClutchedArm& arm, const el::ThrowTask& task, const el::ElasticThrow& plan,
+              const el::ThrowProgramOptions& program, Point& out) {
+  if (!plan.solved()) return;
+  el::ConfirmedThrow one = el::confirm(arm, task, plan, program);
+  const double speed = std::hypot(one.run.release.vx, one.run.release.vz);
+  if (!one.confirmed || speed <= out.speed) return;
+  out.speed = speed;
+  out.best = std::move(one);
+}
+
+/// From random starts.
+Point solve(const el::ClutchedArm& arm, const Options& o, el::Drive drive) {
+  Point out;
+  out.stiffness = arm.last.stiffness;
   el::ThrowProgramOptions program;
   program.intervals = o.intervals;
   program.seed = o.seed;
-  const el::Basins basins = el::find_basins(arm, task_of(o, drive), program, o.starts);
-  bool any = false;
-  for (const el::Basin& basin : basins.found) {
-    el::ConfirmedThrow one = el::confirm(arm, task_of(o, drive), basin.best, program);
-    const double speed = std::hypot(one.run.release.vx, one.run.release.vz);
-    if (!one.confirmed || (any && speed <= out.speed)) continue;
-    any = true;
-    out.plan_speed = one.plan.speed();
-    out.speed = speed;
-    out.intervals = one.intervals;
-    out.run = std::move(one.run);
-  }
-  out.stiffness = arm.last.stiffness;
-  for (const el::ReplaySample& s : out.run.samples)
-    out.stored = std::max(out.stored, 0.5 * arm.last.stiffness * std::pow(s.at[0] - s.at[1], 2));
-  return any;
+  const el::ThrowTask task = task_of(o, drive);
+  for (const el::Basin& basin : el::find_basins(arm, task, program, o.starts).found)
+    consider(arm, task, basin.best, program, out);
+  return out;
+}
+
+/// From the solution with a neighbouring stiffness: random starts miss what a neighbour has found.
+void follow(el::ClutchedArm arm, const Options& o, const Point& from, Point& to) {
+  if (from.speed == 0) return;
+  arm.last.stiffness = to.stiffness;
+  el::ThrowProgramOptions program;
+  program.intervals = from.best.intervals;
+  program.near = &from.best.plan;
+  const el::ThrowTask task = task_of(o, el::Drive::passive);
+  consider(arm, task, el::plan_throw(arm, task, program), program, to);
+}
+
+double most_stored(const Point& p) {
+  double out = 0;
+  for (const el::ReplaySample& s : p.best.run.samples)
+    out = std::max(out, 0.5 * p.stiffness * std::pow(s.at[0] - s.at[1], 2));
+  return out;
 }
 
 void draw_gain(const std::vector<Point>& points, const Point& rigid, const fs::path& folder) {
@@ -70,9 +89,9 @@ void draw_gain(const std::vector<Point>& points, const Point& rigid, const fs::p
       {{"spring", {"stiffness [N m/rad]", "tip speed [m/s]", "gain over rigid [-]", "stored [J]"}, {}, {}}},
       ""};
   for (const Point& p : points)
-    figure.data[0].rows.push_back({p.stiffness, p.speed, p.speed / rigid.speed, p.stored});
+    figure.data[0].rows.push_back({p.stiffness, p.speed, p.speed / rigid.speed, most_stored(p)});
   figure.script = fmt::format(
-      "set grid\nset logscale x 2\nset key right top\nset xlabel 'stiffness of the wrist [N m/rad]'\nset "
+      "set grid\nset logscale x 2\nset key right bottom\nset xlabel 'stiffness of the wrist [N m/rad]'\nset "
       "ylabel 'tip speed at the release "
       "[m/s]'\nset yrange [0:*]\nplot DATA using 1:2 with linespoints pt 7 lw 2 lc rgb '#0072b2' title "
       "'elastic wrist', {} with "
@@ -89,51 +108,55 @@ void run(const Options& o) {
   require_writable(o.json);
   if (!(o.softest < o.stiffest)) throw WrongUsage("--softest must be below --stiffest");
   el::ClutchedArm arm = el::read_clutched_arm(o.arm);
-  Point rigid;
-  if (!solve(arm, o, el::Drive::locked, rigid))
-    throw Unanswered("no throw with the wrist locked was found that its run confirms");
+  const Point rigid = solve(arm, o, el::Drive::locked);
+  if (rigid.speed == 0) throw Unanswered("no throw with the wrist locked was found that its run confirms");
   std::vector<Point> points;
+  for (int k = 0; k < o.stiffnesses; ++k) {
+    arm.last.stiffness =
+        o.softest * std::pow(o.stiffest / o.softest, static_cast<double>(k) / (o.stiffnesses - 1));
+    points.push_back(solve(arm, o, el::Drive::passive));
+  }
+  for (std::size_t k = points.size() - 1; k > 0; --k) follow(arm, o, points[k], points[k - 1]);
+  for (std::size_t k = 1; k < points.size(); ++k) follow(arm, o, points[k - 1], points[k]);
+  for (const Point& p : points)
+    if (p.speed == 0)
+      fmt::print(stderr, "{:.2f} N m/rad: no throw was found that its run confirms\n", p.stiffness);
+  std::erase_if(points, [](const Point& p) { return p.speed == 0; });
+  if (points.empty()) throw Unanswered("no throw with the spring was found that its run confirms");
+
   Table table{{"stiffness [N m/rad]", "tip speed [m/s]", "planned", "gain", "stored [J]", "motors [J]",
                "unexplained [J]", "limits used", "intervals"},
               {},
               1};
-  const auto row = [&](const std::string& name, const Point& p) {
+  const auto row = [&](const std::string& name, const Point& p, double stored) {
+    const el::Replay& run = p.best.run;
     table.rows.push_back(
-        {name, fmt::format("{:.3f}", p.speed), fmt::format("{:.3f}", p.plan_speed),
-         fmt::format("{:.2f}", p.speed / rigid.speed), fmt::format("{:.2f}", p.stored),
-         fmt::format("{:.2f}", p.run.motor_work), fmt::format("{:.0e}", std::abs(p.run.unexplained())),
-         fmt::format("{:.1f} %", 100 * p.run.use.largest()), fmt::to_string(2 * p.intervals)});
+        {name, fmt::format("{:.3f}", p.speed), fmt::format("{:.3f}", p.best.plan.speed()),
+         fmt::format("{:.2f}", p.speed / rigid.speed), fmt::format("{:.2f}", stored),
+         fmt::format("{:.2f}", run.motor_work), fmt::format("{:.0e}", std::abs(run.unexplained())),
+         fmt::format("{:.1f} %", 100 * run.use.largest()), fmt::to_string(2 * p.best.intervals)});
   };
-  row("rigid", rigid);
+  row("rigid", rigid, 0);
   Json json = json_head("plan-wrist");
   json["rigid_m_s"] = rigid.speed;
   json["spring"] = Json::array();
-  const Point* best = nullptr;
-  for (int k = 0; k < o.stiffnesses; ++k) {
-    arm.last.stiffness =
-        o.softest * std::pow(o.stiffest / o.softest, static_cast<double>(k) / (o.stiffnesses - 1));
-    Point p;
-    if (!solve(arm, o, el::Drive::passive, p)) {
-      fmt::print(stderr, "{:.2f} N m/rad: no throw was found that its run confirms\n", arm.last.stiffness);
-      continue;
-    }
-    points.push_back(p);
-    row(fmt::format("{:.2f}", p.stiffness), p);
+  for (const Point& p : points) {
+    const el::Replay& run = p.best.run;
+    row(fmt::format("{:.2f}", p.stiffness), p, most_stored(p));
     json["spring"].push_back({{"stiffness_n_m_rad", p.stiffness},
                               {"speed_m_s", p.speed},
-                              {"planned_m_s", p.plan_speed},
+                              {"planned_m_s", p.best.plan.speed()},
                               {"gain", p.speed / rigid.speed},
-                              {"intervals", 2 * p.intervals},
-                              {"largest_limit_use", p.run.use.largest()},
-                              {"stored_J", p.stored},
-                              {"motors_J", p.run.motor_work},
-                              {"damping_J", p.run.damping},
-                              {"friction_J", p.run.friction},
-                              {"unexplained_J", p.run.unexplained()}});
+                              {"intervals", 2 * p.best.intervals},
+                              {"largest_limit_use", run.use.largest()},
+                              {"stored_J", most_stored(p)},
+                              {"motors_J", run.motor_work},
+                              {"damping_J", run.damping},
+                              {"friction_J", run.friction},
+                              {"unexplained_J", run.unexplained()}});
   }
-  if (points.empty()) throw Unanswered("no throw with the spring was found that its run confirms");
-  for (const Point& p : points)
-    if (!best || p.speed > best->speed) best = &p;
+  const Point* best = &*std::max_element(points.begin(), points.end(),
+                                         [](const Point& a, const Point& b) { return a.speed < b.speed; });
   fmt::print("{}\nbest stiffness {:.2f} N m/rad: {:.2f} m/s, {:.2f} times the rigid wrist's {:.2f} m/s\n",
              table.text(), best->stiffness, best->speed, best->speed / rigid.speed, rigid.speed);
   Outputs outputs;
