@@ -22,8 +22,9 @@ struct FrictionEstimate {
 /// pad slips and its wrench lies on the limit surface: gauge(f/(μ f_N), τ/(L μ f_N)) = 1 for the model's own
 /// surface, solved for μ and L by least squares with a loss that grows linearly (samples that still stick lie
 /// inside). Samples: smoothed f_N between 8 σ and 20 % of the grip force, on the falling ramp. The naive
-/// limit surface takes the ellipsoid's values, and so does the sliding pivot, unless the samples lie better on
-/// its own surface, max(|f|/(μ f_N), |τ|/(L μ f_N)) = 1: its throws would drive an ellipsoid's μ to infinity.
+/// limit surface takes the ellipsoid's values, and so does the sliding pivot, unless the samples lie better
+/// on its own surface, max(|f|/(μ f_N), |τ|/(L μ f_N)) = 1: its throws would drive an ellipsoid's μ to
+/// infinity.
 ///
 /// Delay: mean and scatter over the train throws of (detach − opening command).
 ///
