@@ -95,9 +95,9 @@ struct SmallEffect {
   double delta_bic{};      ///< with it against without
   double p_value{};        ///< of its absence
   double held_out_fall{};  ///< largest, of χ² per sample in a channel and phase
-  double rms_before{},
-      rms_after{};  ///< of held-out predictions before the throw, as PredictionGain has it [m]
-  bool any_pads{};  ///< it is a give of the pads that no pads are without
+  double rms_before{};     ///< of held-out predictions without it, as PredictionGain has it [m]
+  double rms_after{};      ///< and with it [m]
+  bool any_pads{};         ///< it is a give of the pads that no pads are without
 };
 
 /// One candidate, as it was scored in the step in which it came nearest to being accepted.

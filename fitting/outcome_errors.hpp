@@ -12,8 +12,11 @@ OutcomeErrors outcome_errors(const CampaignProblem& problem, const FitResult& fi
 /// What one model's predictions of the same throws are better by than another's: rms of the tracked position
 /// in flight, of landing x where nothing is tracked [m]; zeros where nothing can be compared.
 struct PredictionGain {
-  double before{}, after{};
+  double before{};  ///< rms of the first model [m]
+  double after{};   ///< rms of the other [m]
 };
+/// Of the throws of `share`, each predicted before it is made; both problems hold the same throws in the same
+/// order.
 PredictionGain prediction_gain(const CampaignProblem& problem, const FitResult& fit,
                                const CampaignProblem& other, const FitResult& other_fit, Share share,
                                int threads);
