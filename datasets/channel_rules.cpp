@@ -9,7 +9,6 @@
 namespace unhand::datasets {
 namespace {
 
-constexpr double quaternion_tolerance = 1e-3;  // of the norm: what six printed decimals and a filter leave
 constexpr double quaternion_rounding = 1e-12;  // below this the quaternion is taken as it is, bit for bit
 
 double quaternion_norm(const Series& pose, std::size_t i) {
@@ -69,10 +68,10 @@ void check_values(const ChannelCheck& check, const Series& series) {
     }
     if (check.kind == ChannelKind::pose && series.cols == 7) {
       const double norm = quaternion_norm(series, i);
-      if (std::abs(norm - 1) > quaternion_tolerance) {
+      if (std::abs(norm - 1) > kQuaternionTolerance) {
         fail_at(check.file, check.path,
                 fmt::format("row {}: quaternion of norm {:.6g}, expected 1 within {}", i, norm,
-                            quaternion_tolerance));
+                            kQuaternionTolerance));
       }
     }
   }

@@ -9,6 +9,9 @@
 
 namespace unhand::datasets {
 
+/// What the norm of a logged quaternion may differ by from 1 [-]: six printed decimals and a filter.
+inline constexpr double kQuaternionTolerance = 1e-3;
+
 /// What one channel is checked against. `mask` and `time` may be null.
 struct ChannelCheck {
   std::string file, path;

@@ -18,7 +18,6 @@ namespace {
 constexpr std::string_view header =
     "toss,k,t_s,x_m,y_m,z_m,qw,qx,qy,qz,vx,vy,vz,wx_body,wy_body,wz_body,before_first_contact";
 constexpr std::size_t n_columns = 17;
-constexpr double toss_norm_tolerance = 1e-3;  // six printed decimals leave 1e-6
 
 struct Row {
   int toss = 0, k = 0;
@@ -47,7 +46,7 @@ Row parse_row(const CsvLine& line) {
   double norm = 0;
   for (std::size_t j = 3; j < 7; ++j) norm += row.pose[j] * row.pose[j];
   norm = std::sqrt(norm);
-  if (std::abs(norm - 1) > toss_norm_tolerance)
+  if (std::abs(norm - 1) > kQuaternionTolerance)
     line.fail("qw", fmt::format("quaternion of norm {:.6g}, expected 1", norm));
   return row;
 }

@@ -10,6 +10,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "datasets/channel_rules.hpp"
 #include "datasets/csv.hpp"
 #include "datasets/units.hpp"
 
@@ -19,8 +20,6 @@ namespace {
 using Eigen::AngleAxisd;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
-
-constexpr double take_quaternion_tolerance = 1e-3;  // of a quaternion: six printed decimals leave 1e-6
 
 /// The first line: names and values in turn.
 struct TakeHeader {
@@ -183,7 +182,7 @@ class Pose {
       return q;
     }
     const Quaterniond q(v[3], v[0], v[1], v[2]);
-    if (!(std::abs(q.norm() - 1) <= take_quaternion_tolerance))
+    if (!(std::abs(q.norm() - 1) <= kQuaternionTolerance))
       line.fail(column("Rotation", 0), fmt::format("quaternion of norm {:.6g}, expected 1", q.norm()));
     return q.normalized();
   }
