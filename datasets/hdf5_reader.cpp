@@ -47,7 +47,7 @@ herr_t keep(const char* name, void* out) noexcept {
 Node::Node(std::shared_ptr<Shared> shared, Handle object, std::string path)
     : shared_(std::move(shared)), object_(std::move(object)), path_(std::move(path)) {}
 
-Node Node::open_file(const std::string& file) {
+Node Node::open_file(const std::string& file, Place* place) {
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
   if (!fs::exists(status)) throw LogError(file, "/", "no such file");
@@ -67,7 +67,7 @@ Node Node::open_file(const std::string& file) {
   if (!opened) throw LogError(file, "/", fmt::format("is truncated or damaged ({})", last_message()));
   Handle root = group_handle(H5Gopen2(opened.id(), "/", H5P_DEFAULT));
   if (!root) throw LogError(file, "/", fmt::format("is truncated or damaged ({})", last_message()));
-  auto shared = std::make_shared<Shared>(Shared{file, element_budget, std::move(opened)});
+  auto shared = std::make_shared<Shared>(Shared{file, place, element_budget, std::move(opened)});
   return {std::move(shared), std::move(root), "/"};
 }
 
@@ -79,7 +79,12 @@ void Node::fail_attribute(std::string_view name, const std::string& reason) cons
   throw LogError(shared_->file, path_ + "@" + std::string(name), reason);
 }
 
+void Node::note(const std::string& path) const {
+  if (shared_->place) shared_->place->note(path);
+}
+
 std::vector<std::string> Node::children() const {
+  note(path_);
   const auto visit = [](hid_t, const char* name, const H5L_info_t*, void* out) -> herr_t {
     return keep(name, out);
   };
@@ -91,6 +96,7 @@ std::vector<std::string> Node::children() const {
 }
 
 std::vector<std::string> Node::attributes() const {
+  note(path_);
   const auto visit = [](hid_t, const char* name, const H5A_info_t*, void* out) -> herr_t {
     return keep(name, out);
   };
@@ -134,6 +140,7 @@ void Node::check_link(std::string_view name) const {
 }
 
 Node Node::group(std::string_view name) const {
+  note(join(path_, name));
   if (!has(name)) fail(name, "required group is missing");
   check_link(name);
   Handle object = object_handle(H5Oopen(object_.id(), std::string(name).c_str(), H5P_DEFAULT));
@@ -143,6 +150,7 @@ Node Node::group(std::string_view name) const {
 }
 
 Handle Node::open_attribute(std::string_view name, H5T_class_t& kind, std::size_t& count) const {
+  note(path_ + "@" + std::string(name));
   if (!has_attribute(name)) fail_attribute(name, "required attribute is missing");
   Handle attribute = attribute_handle(H5Aopen(object_.id(), std::string(name).c_str(), H5P_DEFAULT));
   if (!attribute) fail_attribute(name, fmt::format("cannot be opened ({})", last_message()));

@@ -9,6 +9,7 @@
 
 #include "datasets/attribute_fields.hpp"
 #include "datasets/channel_rules.hpp"
+#include "datasets/hdf5_apart.hpp"
 #include "datasets/hdf5_handles.hpp"
 
 namespace unhand::datasets::hdf5 {
@@ -20,8 +21,9 @@ inline constexpr std::size_t element_budget = 50'000'000;
 /// One open group or dataset.
 class Node {
  public:
-  /// Opens the file read-only and checks that it is one: present, regular, HDF5, whole.
-  static Node open_file(const std::string& file);
+  /// Opens the file read-only and checks that it is one: present, regular, HDF5, whole. What is read of it
+  /// is noted in `place` where there is one.
+  static Node open_file(const std::string& file, Place* place);
 
   const std::string& path() const { return path_; }
   const std::string& file() const { return shared_->file; }
@@ -49,11 +51,13 @@ class Node {
  private:
   struct Shared {
     std::string file;
+    Place* place = nullptr;
     std::size_t budget = element_budget;
     Handle handle;
   };
   struct Table;
   Node(std::shared_ptr<Shared> shared, Handle object, std::string path);
+  void note(const std::string& path) const;  // what is read now
   void check_link(std::string_view name) const;
   Handle open_attribute(std::string_view name, H5T_class_t& kind, std::size_t& count) const;
   Table open_table(std::string_view name) const;

@@ -65,6 +65,7 @@ struct Node::Table {
 };
 
 Node::Table Node::open_table(std::string_view name) const {
+  note(join(path_, name));
   if (!has(name)) fail(name, "required dataset is missing");
   check_link(name);
   Handle object = object_handle(H5Oopen(object_.id(), std::string(name).c_str(), H5P_DEFAULT));

@@ -4,8 +4,10 @@
 #include <set>
 
 #include "datasets/channel_rules.hpp"
+#include "datasets/hdf5_apart.hpp"
 #include "datasets/hdf5_reader.hpp"
 #include "datasets/hdf5_writer.hpp"
+#include "datasets/parse_log.hpp"
 
 namespace unhand::datasets {
 namespace {
@@ -34,6 +36,18 @@ void surface_fields(Visitor&& visit, Patch& surface) {
   visit("licence", surface.licence);
 }
 
+constexpr auto bring_slip_log = [](auto& pipe, SlipLog& log) {
+  const AttributeCarrier<std::remove_reference_t<decltype(pipe)>> visit{pipe};
+  carry_map(pipe, log.surfaces, [&](Surface& surface) {
+    surface_fields(visit, surface);
+    carry_list(pipe, surface.slips, [&](Slip& slip) {
+      carry(pipe, slip.id);
+      carry(pipe, slip.split);
+      carry_channels(pipe, slip_channels, slip);
+    });
+  });
+};
+
 }  // namespace
 
 void validate(const SlipLog& log, const std::string& file) {
@@ -52,10 +66,9 @@ void validate(const SlipLog& log, const std::string& file) {
   }
 }
 
-SlipLog read_slip_log(const std::filesystem::path& file) {
-  const hdf5::Session session;
-  const hdf5::Node root = hdf5::Node::open_file(file.string());
-  hdf5::check_schema(root, "slip-log", slip_log_version);
+SlipLog hdf5::parse_slip_log(const std::string& file, Place* place) {
+  const Node root = Node::open_file(file, place);
+  check_schema(root, "slip-log", slip_log_version);
   const std::string_view groups[] = {"surfaces"}, inner[] = {"slips"};
   root.reject_misspelt(groups, {});
 
@@ -77,7 +90,12 @@ SlipLog read_slip_log(const std::filesystem::path& file) {
     }
     log.surfaces.emplace(name, std::move(surface));
   }
-  validate(log, root.file());
+  return log;
+}
+
+SlipLog read_slip_log(const std::filesystem::path& file) {
+  auto log = hdf5::value_apart<SlipLog>(file.string(), hdf5::parse_slip_log, bring_slip_log);
+  validate(log, file.string());
   return log;
 }
 

@@ -6,8 +6,10 @@
 #include <set>
 
 #include "datasets/channel_rules.hpp"
+#include "datasets/hdf5_apart.hpp"
 #include "datasets/hdf5_reader.hpp"
 #include "datasets/hdf5_writer.hpp"
+#include "datasets/parse_log.hpp"
 #include "datasets/throw_log_table.hpp"
 
 namespace unhand::datasets {
@@ -62,6 +64,21 @@ void check_throw(const std::string& file, const ThrowLog& log, const Throw& toss
   }
 }
 
+constexpr auto bring_throw_log = [](auto& pipe, ThrowLog& log) {
+  const AttributeCarrier<std::remove_reference_t<decltype(pipe)>> visit{pipe};
+  log_fields(visit, log);
+  carry_map(pipe, log.objects, [&](Object& object) { object_fields(visit, object, log.dimension); });
+  if (carry_flag(pipe, log.gripper.has_value())) {
+    if (!log.gripper) log.gripper.emplace();
+    gripper_fields(visit, *log.gripper);
+  }
+  carry_list(pipe, log.throws, [&](Throw& toss) {
+    carry(pipe, toss.id);
+    throw_fields(visit, toss);
+    carry_channels(pipe, channels, toss);
+  });
+};
+
 }  // namespace
 
 void validate(const ThrowLog& log, const std::string& file) {
@@ -80,9 +97,8 @@ void validate(const ThrowLog& log, const std::string& file) {
   }
 }
 
-ThrowLog read_throw_log(const std::filesystem::path& file) {
-  const hdf5::Session session;
-  const hdf5::Node root = hdf5::Node::open_file(file.string());
+ThrowLog hdf5::parse_throw_log(const std::string& file, Place* place) {
+  const Node root = Node::open_file(file, place);
   hdf5::check_schema(root, "throw-log", throw_log_version);
 
   ThrowLog log;
@@ -101,7 +117,12 @@ ThrowLog read_throw_log(const std::filesystem::path& file) {
   for (const std::string& id : throws.children()) {
     log.throws.push_back(read_throw(throws.group(id), id, log.dimension));
   }
-  validate(log, root.file());
+  return log;
+}
+
+ThrowLog read_throw_log(const std::filesystem::path& file) {
+  auto log = hdf5::value_apart<ThrowLog>(file.string(), hdf5::parse_throw_log, bring_throw_log);
+  validate(log, file.string());
   for (Throw& toss : log.throws) {
     if (toss.mocap) normalise_quaternions(toss.mocap->pose, toss.mocap->valid);
   }
@@ -134,11 +155,14 @@ void write_throw_log(const std::filesystem::path& file, const ThrowLog& log) {
 }
 
 std::string read_schema_name(const std::filesystem::path& file) {
-  const hdf5::Session session;
-  const hdf5::Node root = hdf5::Node::open_file(file.string());
-  const std::string_view known[] = {"schema", "schema_version"};
-  root.reject_misspelt({}, known);
-  return root.text("schema");
+  const auto parse = [](const std::string& name, hdf5::Place* place) {
+    const hdf5::Node root = hdf5::Node::open_file(name, place);
+    const std::string_view known[] = {"schema", "schema_version"};
+    root.reject_misspelt({}, known);
+    return root.text("schema");
+  };
+  return hdf5::value_apart<std::string>(file.string(), parse,
+                                        [](auto& pipe, std::string& name) { carry(pipe, name); });
 }
 
 std::vector<LayoutRow> throw_log_layout(int dimension) {

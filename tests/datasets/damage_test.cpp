@@ -89,5 +89,40 @@ TEST(Damage, AHeapThatDoesNotAddUpIsFound) {
   EXPECT_EQ(hdf5::heap_collection_size(first, 8), 0u);
 }
 
+// Text of variable length is a length, the address of a heap and a number in it. libhdf5 1.10 does not check
+// the number, and the process that reads the file dies: of 8-byte addresses of a heap, each followed by such
+// a number, all are spoilt in turn.
+TEST(Damage, ATextThatIsNotInItsHeapIsALogError) {
+  const Scratch scratch;
+  const std::string good = scratch / "good.h5", bad = scratch / "bad.h5";
+  write_throw_log(good, planar_log());
+  {
+    const Editor edit(good);
+    const hid_t text = H5Tcopy(H5T_C_S1);
+    H5Tset_size(text, H5T_VARIABLE);
+    const char* value = "made up for a test";
+    edit.attribute("/", "source", text, &value);
+    edit.attribute("/throws/002", "condition", text, &value);
+    H5Tclose(text);
+  }
+  EXPECT_EQ(read_throw_log(good).source, "made up for a test");
+  const std::string bytes = bytes_of(good);
+  int references = 0;
+  for (std::size_t heap = bytes.find("GCOL"); heap != std::string::npos;
+       heap = bytes.find("GCOL", heap + 4)) {
+    std::string address(8, '\0');
+    for (std::size_t i = 0; i < 8; ++i) address[i] = static_cast<char>(heap >> (8 * i) & 0xff);
+    for (std::size_t at = bytes.find(address); at != std::string::npos; at = bytes.find(address, at + 8)) {
+      if (bytes.substr(at - 4, 4) != std::string({18, 0, 0, 0})) continue;
+      ++references;
+      std::string spoilt = bytes;
+      spoilt[at + 11] = static_cast<char>(0xff);
+      put_bytes(bad, spoilt);
+      EXPECT_THROW(read_throw_log(bad), LogError) << "at byte " << at + 11;
+    }
+  }
+  EXPECT_GE(references, 2);
+}
+
 }  // namespace
 }  // namespace unhand::datasets::test

@@ -3,6 +3,6 @@
 #include "tests/fuzz/readers.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  unhand::fuzz::read(UNHAND_READER, data, size);
+  unhand::fuzz::read(UNHAND_READER, data, size, unhand::fuzz::Process::this_one);
   return 0;
 }
