@@ -12,7 +12,7 @@ namespace unhand {
 using experiment::EffectSettings;
 using nlohmann::json;
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Planted, id, size, right, asked_alone, right_alone)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Planted, id, size, right, asked_alone, right_alone, evident)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Estimated, name, truth, value, sigma)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StudyRecord, kind, without, seed, answer, made, false_name, unexplained,
                                    effects, estimates, cpu_seconds, seconds)
@@ -55,7 +55,7 @@ std::size_t size_class(double steps) { return steps < 1 ? 0 : steps < 3 ? 1 : st
 void print_table(const std::string& kind, const std::vector<StudyRecord>& records) {
   std::map<std::string, std::array<Tally, kSizes.size()>> by_effect;
   std::array<Tally, kSizes.size()> by_size;
-  Tally all, nothing_false, silent, within_95, within_3_sigma, right_alone;
+  Tally all, nothing_false, silent, within_95, within_3_sigma, right_alone, evident;
   int not_made = 0;
   std::vector<double> cpu;
   for (const auto& r : records) {
@@ -70,6 +70,7 @@ void print_table(const std::string& kind, const std::vector<StudyRecord>& record
       by_effect[effect.id][size_class(effect.size)].add(effect.right);
       by_size[size_class(effect.size)].add(effect.right);
       all.add(effect.right);
+      if (kind == "one" && !effect.right) evident.add(effect.evident);
       if (effect.asked_alone) right_alone.add(effect.right_alone);
     }
     for (const auto& e : r.estimates) {
@@ -92,6 +93,8 @@ void print_table(const std::string& kind, const std::vector<StudyRecord>& record
     }
     fmt::print("\nfound {}; ", all.text());
   }
+  if (evident.campaigns > 0)
+    fmt::print("of those that were missed, called evident but too small to matter {}; ", evident.text());
   if (right_alone.campaigns > 0)
     fmt::print("of those that were missed, found alone {}; ", right_alone.text());
   fmt::print("campaigns without a false name {}", nothing_false.text());
@@ -133,7 +136,7 @@ void StudyRecord::judge(const EffectSettings& truth, const fitting::Discovery& f
   for (const auto& [id, size] : sizes) {
     const bool right = kind == "forgotten" ? found.unexplained && right_phase(id, found.unexplained->phase)
                                            : names(found, id);
-    effects.push_back({id, size, right, false, false});
+    effects.push_back({id, size, right, false, false, !right && found.small && found.small->id == id});
   }
   for (const auto& effect : found.effects) {
     false_name = false_name || std::none_of(sizes.begin(), sizes.end(),

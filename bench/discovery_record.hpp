@@ -20,6 +20,7 @@ struct Planted {
   bool right{};        ///< it was named, or the catalogue had to forget it and its phase is unexplained
   bool asked_alone{};  ///< it was missed beside another, and looked for again without that one
   bool right_alone{};  ///< and named then
+  bool evident{};      ///< it was missed, but said to be evident and too small to matter
 };
 
 /// A size that the loop gave, and the true one.

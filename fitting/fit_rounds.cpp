@@ -108,6 +108,9 @@ FitRounds::Solution FitRounds::minimise(double tolerance, std::optional<std::siz
   solver.gradient_tolerance = 1e-12;
   solver.min_trust_region_radius = 1e-2;  // in scales: below, what is left is the integrator's own rounding
   solver.num_threads = 1;                 // see AllThrows
+  // Bounds would have Ceres search every step's length, with a gradient of all throws at each: a step that
+  // does not help is halved and asked for again by the trust region at a plain simulation's price.
+  solver.max_num_line_search_step_size_iterations = 0;
   solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);

@@ -188,8 +188,10 @@ Improvement improvement(const FitResult& before, const FitResult& after,
     const double was = b.chi2_per_sample(), is = misfit_in(after.misfit, b.channel, b.phase);
     double needed = std::max({options.matters, 0.1 * (was - 1), 2 * std::sqrt(2.0 / b.n)});
     if (is_wrench(b.channel)) {
+      // Most of a wrench's variance is trust, not noise: one that is explained falls below 1, and what
+      // matters is by how much.
       const double from = b.phase == Phase::grasped ? 1 + options.matters : options.wrench_misfit;
-      const bool explained = was > 1 + options.matters && is < 1 + kRest * (was - 1);
+      const bool explained = is < 1 + kRest * (was - 1);
       if (was < from && !explained) continue;
       needed = std::max(options.wrench_matters, 0.25 * (was - 1));
     }

@@ -192,6 +192,26 @@ TEST(Misfit, IsJudgedByItsChanceAndByTheSeriesThatAreLookedAt) {
   EXPECT_FALSE(misfit(experiment::Channel::wrench_fx, Phase::release, 1000, 1.9));
 }
 
+// The torque of slipping pads is trusted to 4 % of its size, which is most of its variance: a model that errs
+// by as much as the trust has a misfit of 1, and one that does not, of much less.
+TEST(Improvement, AWrenchThatVanishesMattersByHowMuchItFell) {
+  const DiscoverOptions options;
+  const auto matters = [&](double was, double is) {
+    const auto torque = [](double per_sample) {
+      FitResult out;
+      auto& m = out.misfit.emplace_back();
+      m.channel = experiment::Channel::wrench_tau, m.phase = Phase::release, m.n = 500,
+      m.chi2 = 500 * per_sample;
+      return out;
+    };
+    return improvement(torque(was), torque(is), {}, options).matters >= 1;
+  };
+  EXPECT_TRUE(matters(1.26, 0.16));
+  EXPECT_FALSE(matters(1.26, 0.4)) << "a fall of less than wrench_matters";
+  EXPECT_FALSE(matters(2.6, 1.4)) << "slipping pads leave as much under any law";
+  EXPECT_TRUE(matters(4.5, 1.4)) << "more than slipping pads leave";
+}
+
 /// A laboratory's law is not this library's: intervals must know.
 TEST(Discrepancy, IntervalsStayOnGoodCampaignsAndWidenWhereSensorsDisagree) {
   CampaignOptions options;
