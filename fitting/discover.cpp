@@ -86,8 +86,10 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
   out.model = options.campaign.model;
   if (!stage.solved()) {
     out.verdict = Verdict::not_answered;
-    out.message = fmt::format("the base model could not be fitted: {}",
-                              stage.fit.message.empty() ? stage.held_out.message : stage.fit.message);
+    out.message =
+        stage.is_fitted()
+            ? fmt::format("there are no held-out throws to judge the fit by: {}", stage.held_out.message)
+            : fmt::format("the base model could not be fitted: {}", stage.fit.message);
     return out;
   }
   out.base_test = stage.held_out.misfit;
