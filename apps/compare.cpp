@@ -13,6 +13,7 @@
 #include "apps/compare_run.hpp"
 #include "apps/figure.hpp"
 #include "apps/progress.hpp"
+#include "apps/throws.hpp"
 #include "experiment/free_flight.hpp"
 #include "experiment/parallel.hpp"
 #include "fitting/slip_surface.hpp"
@@ -150,8 +151,7 @@ void compare(const CompareRequest& request) {
     compare_slips(request);
     return;
   }
-  const auto log = datasets::read_throw_log(request.log);
-  if (log.throws.empty()) throw Unanswered(fmt::format("{}: holds no throws", request.log));
+  const auto log = read_throws(request.log);
   const bool flights =
       log.dimension == 3 || std::none_of(log.throws.begin(), log.throws.end(),
                                          [](const auto& one) { return one.hand.has_value(); });

@@ -13,6 +13,7 @@
 #include "apps/output.hpp"
 #include "apps/progress.hpp"
 #include "apps/table.hpp"
+#include "apps/throws.hpp"
 #include "crosscheck/bullet_release.hpp"
 #include "crosscheck/distributed_patch.hpp"
 #include "experiment/friction_estimate.hpp"
@@ -236,10 +237,7 @@ void check(const Options& options) {
       throw WrongUsage(fmt::format("model '{}' is unknown; there are {}", model, fmt::join(known, ", ")));
   if (options.engine == "bullet" && !crosscheck::has_bullet())
     throw Unanswered("built without Bullet (Debian package libbullet-dev)");
-  if (datasets::read_schema_name(options.log) == "slip-log")
-    throw datasets::LogError(options.log, "/@schema", "is a slip-log, which holds no throws");
-  const auto log = datasets::read_throw_log(options.log);
-  if (log.throws.empty()) throw Unanswered(fmt::format("{}: holds no throws", options.log));
+  const auto log = read_throws(options.log);
   const auto throws = experiment::prepare_all(log, options.log, options.threads);
   std::string from;
   const auto parameters = parameters_of(options, log, throws, from);

@@ -14,6 +14,7 @@
 #include "apps/figure.hpp"
 #include "apps/ranking.hpp"
 #include "apps/table.hpp"
+#include "apps/throws.hpp"
 #include "contact/registry.hpp"
 #include "fitting/card.hpp"
 
@@ -108,8 +109,7 @@ void discover(const Options& options, const std::string& command) {
   const auto& others = measured_models();
   if (std::find(others.begin(), others.end(), options.model) != others.end())
     throw WrongUsage(fmt::format("--model {}: {} holds planar throws", options.model, options.log));
-  const auto log = datasets::read_throw_log(options.log);
-  if (log.throws.empty()) throw Unanswered(fmt::format("{}: holds no throws", options.log));
+  const auto log = read_throws(options.log);
   fitting::DiscoverOptions request;
   request.campaign.model = options.model;
   request.campaign.threads = request.fit.threads = options.threads;

@@ -13,6 +13,7 @@
 #include "apps/output.hpp"
 #include "apps/release_figures.hpp"
 #include "apps/table.hpp"
+#include "apps/throws.hpp"
 #include "experiment/compare.hpp"
 #include "experiment/synthetic_campaign.hpp"
 
@@ -32,17 +33,12 @@ struct Source {
 };
 
 Source source_of(const Options& options) {
-  if (!options.log.empty()) {
-    if (datasets::read_schema_name(options.log) == "slip-log")
-      throw datasets::LogError(options.log, "/@schema", "is a slip-log, which holds no throws");
-    return {options.log, datasets::read_throw_log(options.log)};
-  }
+  if (!options.log.empty()) return {options.log, read_throws(options.log)};
   fmt::print(stderr, "unhand: no --log: drawn from the synthetic campaign quick12, seed 1\n");
   return {"quick12 (synthetic)", experiment::generate_campaign(experiment::campaign_design("quick12"), 1)};
 }
 
 const datasets::Throw& chosen(const Source& source, const Options& options) {
-  if (source.log.throws.empty()) throw Unanswered(source.file + ": holds no throws");
   if (options.thrown.empty()) return source.log.throws.front();
   for (const auto& one : source.log.throws)
     if (one.id == options.thrown) return one;

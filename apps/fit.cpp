@@ -14,6 +14,7 @@
 #include "apps/compare_figures.hpp"
 #include "apps/figure.hpp"
 #include "apps/progress.hpp"
+#include "apps/throws.hpp"
 #include "fitting/slip_surface.hpp"
 
 namespace unhand::apps {
@@ -157,8 +158,7 @@ void fit(const FitRequest& request) {
     throw datasets::LogError(
         request.log, "/throws",
         fmt::format("throws, which {} does not predict: it is for slip-logs", request.model));
-  const auto log = datasets::read_throw_log(request.log);
-  if (log.throws.empty()) throw Unanswered(fmt::format("{}: holds no throws", request.log));
+  const auto log = read_throws(request.log);
   if (std::none_of(log.throws.begin(), log.throws.end(),
                    [](const auto& one) { return one.split == datasets::Split::train; }))
     throw Unanswered(fmt::format("{}: holds no train throws to fit to", request.log));

@@ -9,6 +9,7 @@
 #include "apps/table.hpp"
 #include "datasets/slip_log.hpp"
 #include "datasets/summary.hpp"
+#include "experiment/unit_check.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -89,6 +90,8 @@ Inspection inspect_throws(const std::string& file) {
                   plural(summary.free_flights, "free flight"));
   out.text += groups_of(summary).text() + "\n" + datasets_of(summary).text();
   out.text += "\nno schema errors; times in s, values in SI units and radians as read\n";
+  for (const auto& doubt : experiment::unit_doubts(log))
+    out.text += fmt::format("doubtful: {}: {}\n", doubt.path, doubt.reason);
   return out;
 }
 

@@ -7,6 +7,7 @@
 #include "apps/cards.hpp"
 #include "apps/command.hpp"
 #include "apps/compare.hpp"
+#include "apps/throws.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -149,10 +150,7 @@ void predict(const Options& options) {
   require_writable(options.csv);
   const UsableCard card = read_usable_card(options.card);
   const std::string& model = card.card.model;
-  if (datasets::read_schema_name(options.log) == "slip-log")
-    throw datasets::LogError(options.log, "/@schema", "is a slip-log, which holds no throws to predict");
-  const auto log = datasets::read_throw_log(options.log);
-  if (log.throws.empty()) throw Unanswered(fmt::format("{}: holds no throws", options.log));
+  const auto log = read_throws(options.log);
   const auto [prepared, comparison, sigmas] = predictions_of(card, log, options);
   warn_outside(card.card, prepared);
   const auto& result = comparison.models.front();

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "apps/cards.hpp"
+#include "apps/throws.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -52,10 +53,7 @@ void validate(Options options) {
   auto& request = question.request;
   request.tolerance = {options.tolerance[0], options.tolerance[1] * std::numbers::pi / 180};
   if (!options.log.empty()) {
-    if (datasets::read_schema_name(options.log) == "slip-log")
-      throw datasets::LogError(options.log, "/@schema", "is a slip-log, which holds no throws");
-    log = datasets::read_throw_log(options.log);
-    if (log->throws.empty()) throw Unanswered(fmt::format("{}: holds no throws", options.log));
+    log = read_throws(options.log);
     request.log = &*log;
     request.log_file = options.log;
   }

@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <set>
 #include <sstream>
 
@@ -80,6 +81,18 @@ class Cli : public testing::Test {
     for (const auto& entry : fs::recursive_directory_iterator(folder))
       names.insert(fs::relative(entry.path(), folder).string());
     return names;
+  }
+
+  /// The tiny campaign with every throw changed, as a file in the test's folder.
+  template <class Change>
+  void write_changed(const std::string& name, Change&& change) const {
+    auto log = datasets::read_throw_log(quick);
+    for (auto& one : log.throws) change(one);
+    datasets::write_throw_log(folder / name, log);
+  }
+  /// The tiny campaign without held-out throws.
+  void write_all_train(const std::string& name) const {
+    write_changed(name, [](datasets::Throw& one) { one.split = datasets::Split::train; });
   }
 
   /// One line on stderr, nothing on stdout, nothing written.

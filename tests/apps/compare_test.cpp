@@ -30,9 +30,7 @@ TEST_F(Cli, CompareReleases) {
 }
 
 TEST_F(Cli, NoTestThrowsNoNumbers) {
-  auto log = datasets::read_throw_log(quick);
-  for (auto& one : log.throws) one.split = datasets::Split::train;
-  datasets::write_throw_log(folder / "train.h5", log);
+  write_all_train("train.h5");
   const Answer answer = run("compare train.h5 --models gripper_delay --json a.json --report r");
   ASSERT_EQ(answer.code, 0) << answer.err;
   const json test = read_json(folder / "a.json")["models"]["gripper_delay"]["test"];

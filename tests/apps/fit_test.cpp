@@ -75,18 +75,41 @@ TEST_F(Cli, FitAnswersOrSaysWhyNot) {
   expect_refusal("fit " + quick + " --model ellipsoid" + card, 3, "slip-logs");
   expect_refusal("fit " + quick + " --model gripper_delay --json f.json --card none/c.json", 1,
                  "cannot be written");
-  auto log = datasets::read_throw_log(quick);
-  for (auto& one : log.throws) one.split = datasets::Split::test;
-  datasets::write_throw_log(folder / "test.h5", log);
+  write_changed("test.h5", [](datasets::Throw& one) { one.split = datasets::Split::test; });
   expect_refusal("fit test.h5 --model gripper_delay" + card, 1, "no train throws");
-  for (auto& one : log.throws) {
+  write_changed("handless.h5", [](datasets::Throw& one) {
     one.split = datasets::Split::train;
     one.hand.reset();
     one.condition = "same";
-  }
-  datasets::write_throw_log(folder / "handless.h5", log);
+  });
   expect_refusal("fit handless.h5 --model gripper_delay" + card, 3, "/hand: missing");
   EXPECT_EQ(content(folder / "c.json"), "the old card");
+}
+
+TEST_F(Cli, AnotherUnitIsNamed) {
+  constexpr double kDegree = 180 / std::numbers::pi, kGravity = 9.80665;
+  write_changed("deg.h5", [](datasets::Throw& one) {
+    auto& pose = one.mocap->pose;
+    for (std::size_t i = 0; i < pose.rows; ++i) pose(i, 2) *= kDegree;
+  });
+  ASSERT_EQ(run("compare " + quick + " --models limit_surface_disc --write-cards .").code, 0);
+  for (const std::string command :
+       {"fit deg.h5 --model limit_surface_disc --card c.json", "compare deg.h5",
+        "discover deg.h5 --json d.json", "predict deg.h5 --card limit_surface_disc.json",
+        "figure landing-errors --log deg.h5 --out f"})
+    expect_refusal(command, 3, "/throws/*/mocap/pose: theta is 57.");
+  EXPECT_THAT(run("inspect deg.h5").out, HasSubstr("doubtful: /throws/*/mocap/pose: theta is 57."));
+
+  // Of the normal force only the product with friction is determined: no other channel knows its unit.
+  for (const auto& [unit, factor] : {std::pair{"kgf", 1 / kGravity}, {"mN", 1e3}}) {
+    write_changed("force.h5", [factor = factor](datasets::Throw& one) {
+      auto& force = one.ft->normal_force;
+      for (double& f : force.data) f *= factor;
+      for (double& s : force.sigma) s *= factor;
+    });
+    expect_refusal("fit force.h5 --model limit_surface_disc --card c.json", 3, "/throws/*/ft/normal_force: ");
+    expect_refusal("compare force.h5 --models limit_surface_disc", 3, unit);
+  }
 }
 
 TEST_F(Cli, KilledFitLeavesTheOldCard) {
@@ -107,9 +130,7 @@ TEST_F(Cli, KilledFitLeavesTheOldCard) {
 }
 
 TEST_F(Cli, FitCrossValidatesWithoutTestThrows) {
-  auto log = datasets::read_throw_log(quick);
-  for (auto& one : log.throws) one.split = datasets::Split::train;
-  datasets::write_throw_log(folder / "train.h5", log);
+  write_all_train("train.h5");
   const Answer answer = run("fit train.h5 --model gripper_delay --json f.json --card c.json");
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.out, HasSubstr("cross-validated"));

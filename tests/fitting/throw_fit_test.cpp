@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 
@@ -187,22 +188,31 @@ TEST(ThrowFit, MocapDropouts) {
 }
 
 TEST(ThrowFit, ChannelInAnotherUnitDoesNotMoveIt) {
-  const std::pair<Channel, double> units[] = {{Channel::wrench_tau, 1e3},  // N mm for N m
-                                              {Channel::wrench_fx, 1e-3},  // kN for N
-                                              {Channel::mocap_x, 1e3}};    // mm for m
-  for (const auto& [channel, factor] : units) {
+  using datasets::Throw;
+  const auto wrench = [](Throw& t) -> datasets::Series& { return t.ft->wrench; };
+  const auto mocap = [](Throw& t) -> datasets::Series& { return t.mocap->pose; };
+  const auto landing = [](Throw& t) -> datasets::Series& { return t.landing->pose; };
+  struct Unit {
+    Channel channel;
+    std::function<datasets::Series&(Throw&)> series;
+    std::size_t column;
+    double factor;
+  };
+  const Unit units[] = {{Channel::wrench_tau, wrench, 2, 1e3},                     // N mm for N m
+                        {Channel::wrench_fx, wrench, 0, 1e-3},                     // kN for N
+                        {Channel::mocap_x, mocap, 0, 1e3},                         // mm for m
+                        {Channel::landing_x, landing, 0, 1e3},                     // mm for m
+                        {Channel::landing_theta, landing, 1, 57.29577951308232}};  // degrees for rad
+  for (const auto& [channel, series_of, column, factor] : units) {
     auto wrong = disc_log();
     for (auto& one : wrong.throws) {
-      const bool wrench = channel < Channel::mocap_x;
-      auto& series = wrench ? one.ft->wrench : one.mocap->pose;
-      const auto first = static_cast<int>(wrench ? Channel::wrench_fx : Channel::mocap_x);
-      for (std::size_t i = 0; i < series.rows; ++i)
-        series.data[3 * i + static_cast<std::size_t>(static_cast<int>(channel) - first)] *= factor;
+      auto& series = series_of(one);
+      for (std::size_t i = 0; i < series.rows; ++i) series(i, column) *= factor;
     }
     const auto result = fit_of_log(wrong);
     bool seen = false;
     for (const auto& m : result.misfit)
-      if (m.channel == channel && m.phase == Phase::release) {
+      if (m.channel == channel && (m.phase == Phase::release || m.phase == Phase::landing)) {
         seen = true;
         EXPECT_LT(m.weight, 0.1) << to_string(channel);
       }

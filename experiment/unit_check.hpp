@@ -1,0 +1,49 @@
+// Is a channel in the unit that its file says? Channels of one throw measure each other.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "datasets/throw_log.hpp"
+
+namespace unhand::experiment {
+
+/// A column that is as many times too large as another unit would make it.
+struct UnitDoubt {
+  std::string path;    ///< in the log: "/throws/*/mocap/pose"
+  std::string column;  ///< "theta"
+  double ratio{};      ///< its size over what the other channels say, median over throws; of the normal
+                       ///< force: the friction that the wrenches take of it
+  int throws{};        ///< that show it
+  std::string reason;  ///< in words, with the unit that would explain it
+};
+
+/// Least friction coefficient that pads may have [-]: below PTFE's 0.04, the least of any dry pair in the
+/// tables.
+inline constexpr double kLeastFriction = 0.01;
+/// Most friction coefficient that pads may have [-]: above rubber's 2, the most of any.
+inline constexpr double kMostFriction = 3;
+
+/// The columns of a planar log of releases whose size contradicts other channels by about the factor of a
+/// unit in use (mm, cm, inch; degrees; kgf, lbf, mN, kN; N mm, N cm, kgf cm; ms; g). Compared are
+///
+/// - the hand's pose with the sum of its twist, the twist with the sum of the acceleration;
+/// - the object's motion with the hand's while it is held;
+/// - the wrench of all pads with what the held body's mass, inertia and lever need (Newton and Euler);
+/// - the landing with the hand's state at the opening (as a free flight from there: to a factor of three)
+///   and with the attitude that motion capture saw last;
+/// - the clocks of the groups with each other;
+/// - the wrench with the normal force while that falls through its last fifth and the pads slip: no
+///   channel knows the unit of the normal force, of which only the product with friction is determined, but
+///   in another one friction lies outside [kLeastFriction, kMostFriction].
+///
+/// A throw has a say where the two are proportional (cosine of at least 0.9 over its samples) and what is
+/// expected is large enough to show. The median over throws must lie within a factor of 1.5 (clocks and
+/// landing_x: 3 to 4) of a unit's factor, the smallest of which is 4.4: no scale or bias that a sensor may
+/// have comes near. Logs of free flights and of dimension 3 raise no doubt.
+std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log);
+
+/// Throws datasets::LogError, naming the columns, if unit_doubts has any.
+void require_units(const datasets::ThrowLog& log, const std::string& file);
+
+}  // namespace unhand::experiment

@@ -1,0 +1,228 @@
+#include "experiment/unit_evidence.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "dynamics/frames.hpp"
+#include "dynamics/median.hpp"
+
+namespace unhand::experiment {
+
+using datasets::Series;
+using dynamics::Vec2;
+
+namespace {
+
+/// Numbers of two columns that should be equal.
+class Pairs {
+ public:
+  void add(double seen, double expected) {
+    ss_ += seen * seen, se_ += seen * expected, ee_ += expected * expected;
+    n_ += 1;
+  }
+  /// Seen over expected by least squares, where both go together and either is of a size that shows.
+  std::optional<double> ratio(double shows) const {
+    constexpr double kTogether = 0.9;
+    if (n_ == 0 || ss_ < n_ * shows * shows || ee_ < n_ * shows * shows) return {};
+    if (!(se_ > kTogether * std::sqrt(ss_ * ee_))) return {};
+    return se_ / ee_;
+  }
+
+ private:
+  double ss_{}, se_{}, ee_{}, n_{};
+};
+
+// What shows: far above any sensor's noise.
+constexpr double kShift = 0.02, kTurn = 0.02, kSpeed = 0.1, kSpin = 0.1, kNewton = 0.1, kNewtonMetre = 2e-3;
+
+/// Every sample of `value` minus the first, beside its derivative added up (trapezoids).
+std::optional<double> ratio_to_integral(const Series& time, const Series& value, const Series& rate,
+                                        std::size_t first, std::size_t last, double shows) {
+  Pairs pairs;
+  std::vector<double> sum(last - first, 0.0);
+  for (std::size_t i = 1; i < time.rows; ++i)
+    for (std::size_t c = first; c < last; ++c) {
+      sum[c - first] += 0.5 * (rate(i, c) + rate(i - 1, c)) * (time(i) - time(i - 1));
+      pairs.add(value(i, c) - value(0, c), sum[c - first]);
+    }
+  return pairs.ratio(shows);
+}
+
+void keep(SizeRatios& out, SizedColumn column, std::optional<double> ratio) {
+  if (ratio && std::isfinite(*ratio)) out[column].push_back(*ratio);
+}
+
+void check_hand(const datasets::HandLog& hand, SizeRatios& out) {
+  const auto shift = ratio_to_integral(hand.time, hand.pose, hand.twist, 0, 2, kShift),
+             turn = ratio_to_integral(hand.time, hand.pose, hand.twist, 2, 3, kTurn),
+             speed = ratio_to_integral(hand.time, hand.twist, hand.acceleration, 0, 2, kSpeed),
+             spin = ratio_to_integral(hand.time, hand.twist, hand.acceleration, 2, 3, kSpin);
+  // A wrong clock makes every sum wrong alike.
+  if (shift && speed) keep(out, SizedColumn::hand_clock, 1 / std::sqrt(*shift * *speed));
+  keep(out, SizedColumn::hand_shift, shift);
+  keep(out, SizedColumn::hand_turn, turn);
+  keep(out, SizedColumn::hand_speed, speed);
+  keep(out, SizedColumn::hand_spin, spin);
+}
+
+/// The hand's columns at a time within its own, by straight lines.
+std::array<double, 3> at(const Series& time, const Series& values, double t) {
+  const auto after = std::upper_bound(time.data.begin() + 1, time.data.end() - 1, t);
+  const auto b = static_cast<std::size_t>(after - time.data.begin()), a = b - 1;
+  const double s = std::clamp((t - time(a)) / (time(b) - time(a)), 0.0, 1.0);
+  std::array<double, 3> out{};
+  for (std::size_t c = 0; c < 3; ++c) out[c] = values(a, c) + s * (values(b, c) - values(a, c));
+  return out;
+}
+
+/// A throw while its object is held.
+struct Held {
+  const datasets::ThrowLog& log;
+  const datasets::Throw& logged;
+  const datasets::HandLog& hand;
+  double begin, end;  ///< [s]
+
+  const datasets::Object& object() const { return log.objects.at(logged.object); }
+  /// From the pads' centre to the CoM [m], as far as anyone has said.
+  double lever() const { return object().com_offset.value_or(0.1); }
+  bool covers(double t) const { return t >= begin && t <= end; }
+};
+
+/// θ_O − θ_H while the object is held: motion capture's word, else the log's [rad].
+std::optional<double> check_mocap(const Held& held, SizeRatios& out) {
+  if (!held.logged.mocap) return held.logged.grasp_angle;
+  const auto& mocap = *held.logged.mocap;
+  Pairs shift, turn;
+  double farthest = 0, widest = 0, angle = 0, n = 0;
+  std::optional<std::pair<std::size_t, std::array<double, 3>>> first;
+  for (std::size_t i = 0; i < mocap.time.rows; ++i) {
+    if (!mocap.is_valid(i) || !held.covers(mocap.time(i))) continue;
+    const auto pose = at(held.hand.time, held.hand.pose, mocap.time(i));
+    angle += mocap.pose(i, 2) - pose[2], n += 1;
+    if (!first) first = {i, pose};
+    const auto& [i0, from] = *first;
+    for (std::size_t c = 0; c < 2; ++c) shift.add(mocap.pose(i, c) - mocap.pose(i0, c), pose[c] - from[c]);
+    turn.add(mocap.pose(i, 2) - mocap.pose(i0, 2), pose[2] - from[2]);
+    farthest = std::max(farthest, std::hypot(pose[0] - from[0], pose[1] - from[1]));
+    widest = std::max(widest, std::abs(pose[2] - from[2]));
+  }
+  // Where the hand hardly moves but turns, the object moves by its lever.
+  if (farthest > held.lever() * std::min(widest, 2.0))
+    keep(out, SizedColumn::held_shift, shift.ratio(kShift));
+  keep(out, SizedColumn::held_turn, turn.ratio(kTurn));
+  return n > 0 ? std::optional(angle / n) : held.logged.grasp_angle;
+}
+
+/// Newton and Euler for the held body, about the pads' centre, in the hand frame.
+void check_wrench(const Held& held, std::optional<double> grasp_angle, SizeRatios& out) {
+  const auto& object = held.object();
+  const auto& ft = *held.logged.ft;
+  const double pads = held.log.gripper ? held.log.gripper->n_pads : 2;
+  Pairs force, torque;
+  for (std::size_t i = 0; i < ft.time.rows; ++i) {
+    if (!held.covers(ft.time(i))) continue;
+    const auto pose = at(held.hand.time, held.hand.pose, ft.time(i)),
+               twist = at(held.hand.time, held.hand.twist, ft.time(i)),
+               a = at(held.hand.time, held.hand.acceleration, ft.time(i));
+    // d: from the pads' centre to the CoM, in the hand frame.
+    const Vec2<double> d = grasp_angle && object.com_offset
+                               ? dynamics::rotate(*grasp_angle, Vec2<double>{*object.com_offset, 0})
+                               : Vec2<double>{0, 0};
+    const Vec2<double> free = dynamics::rotate(-pose[2], Vec2<double>{a[0], a[1] + held.log.gravity});
+    const double w2 = twist[2] * twist[2];
+    const Vec2<double> f{object.mass * (free.x - a[2] * d.z - w2 * d.x),
+                         object.mass * (free.z + a[2] * d.x - w2 * d.z)};
+    force.add(pads * ft.wrench(i, 0), f.x);
+    force.add(pads * ft.wrench(i, 1), f.z);
+    if (grasp_angle && object.com_offset && object.inertia && object.inertia->size() == 1)
+      torque.add(pads * ft.wrench(i, 2), object.inertia->front() * a[2] + d.x * f.z - d.z * f.x);
+  }
+  keep(out, SizedColumn::force, force.ratio(kNewton));
+  keep(out, SizedColumn::torque, torque.ratio(kNewtonMetre));
+}
+
+/// A free flight of the pads' centre from the end of the grasp.
+void check_landing(const Held& held, SizeRatios& out) {
+  const auto& landing = *held.logged.landing;
+  const auto from = at(held.hand.time, held.hand.pose, held.end),
+             with = at(held.hand.time, held.hand.twist, held.end);
+  const double g = held.log.gravity, drop = from[1] - held.log.landing_height,
+               under = with[1] * with[1] + 2 * g * drop;
+  if (!(under >= 0) || !(g > 0) || landing.pose.empty()) return;
+  const double fall = (with[1] + std::sqrt(under)) / g;
+  Pairs x;
+  x.add(landing.pose(0, 0), from[0] + with[0] * fall);
+  keep(out, SizedColumn::landing_x, x.ratio(5 * kShift));
+  if (landing.time.empty()) return;
+  if (held.end + fall > 0) keep(out, SizedColumn::landing_clock, landing.time(0) / (held.end + fall));
+  if (!held.logged.mocap) return;
+  // On from the last two samples that lie far enough apart for a rate.
+  const auto& mocap = *held.logged.mocap;
+  constexpr double kApart = 0.02;  // s
+  std::optional<std::size_t> last;
+  for (std::size_t i = mocap.time.rows; i-- > 0;) {
+    if (!mocap.is_valid(i) || mocap.time(i) > landing.time(0) || mocap.time(i) < held.end) continue;
+    if (!last) last = i;
+    const double apart = mocap.time(*last) - mocap.time(i), left = landing.time(0) - mocap.time(*last);
+    if (apart < kApart) continue;
+    if (left > 5 * kApart) return;
+    const double rate = (mocap.pose(*last, 2) - mocap.pose(i, 2)) / apart;
+    Pairs turn;
+    turn.add(landing.pose(0, 1), mocap.pose(*last, 2) + rate * left);
+    keep(out, SizedColumn::landing_turn, turn.ratio(10 * kTurn));
+    return;
+  }
+}
+
+/// The pads slip while the normal force falls through its last fifth. Their torque, where a declared radius
+/// tells what it counts for, uses up friction, too: of an ellipsoid, and within sqrt(2) of any other law.
+void check_friction(const datasets::ThrowLog& log, const datasets::FtLog& ft, double opening,
+                    SizeRatios& out) {
+  const double length = 2.0 / 3.0 * (log.gripper ? log.gripper->pad_radius.value_or(HUGE_VAL) : HUGE_VAL);
+  const auto& force = ft.normal_force;
+  const double most = *std::max_element(force.data.begin(), force.data.end()),
+               sigma = force.sigma.empty() ? 0 : force.sigma.front(), low = std::max(0.02 * most, 4 * sigma);
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < ft.time.rows; ++i)
+    if (ft.time(i) > opening && force(i) > low && force(i) < 0.2 * most)
+      ratios.push_back(std::hypot(ft.wrench(i, 0), ft.wrench(i, 1), ft.wrench(i, 2) / length) / force(i));
+  if (!ratios.empty()) keep(out, SizedColumn::slip_force, dynamics::median(ratios));
+}
+
+/// When the gripper opens: the command, else where the normal force has fallen to half [s].
+std::optional<double> opening_of(const datasets::ThrowLog& log, const datasets::Throw& logged) {
+  if (log.gripper && log.gripper->opening_command_time) return log.gripper->opening_command_time;
+  if (!logged.ft) return logged.detach_time;
+  const auto& force = logged.ft->normal_force.data;
+  const auto most = std::max_element(force.begin(), force.end());
+  const auto half = std::find_if(most, force.end(), [&](double f) { return f < 0.5 * *most; });
+  if (half == force.end()) return logged.detach_time;
+  return logged.ft->time(static_cast<std::size_t>(half - force.begin()));
+}
+
+}  // namespace
+
+void compare_sizes(const datasets::ThrowLog& log, const datasets::Throw& logged, SizeRatios& out) {
+  if (!logged.hand || logged.hand->time.rows < 3) return;
+  const auto& hand = *logged.hand;
+  check_hand(hand, out);
+  const double begin = hand.time(0), end = hand.time(hand.time.rows - 1);
+  for (const auto& [rule, time] :
+       {std::pair{SizedColumn::ft_clock, logged.ft ? &logged.ft->time : nullptr},
+        std::pair{SizedColumn::mocap_clock, logged.mocap ? &logged.mocap->time : nullptr}})
+    if (time && time->rows > 1) keep(out, rule, ((*time)(time->rows - 1) - (*time)(0)) / (end - begin));
+  const auto opening = opening_of(log, logged);
+  if (!opening || *opening <= begin || *opening > end) return;
+  const Held held{log, logged, hand, begin, *opening};
+  const auto grasp_angle = check_mocap(held, out);
+  if (logged.ft) {
+    check_wrench(held, grasp_angle, out);
+    check_friction(log, *logged.ft, *opening, out);
+  }
+  if (logged.landing) check_landing(held, out);
+}
+
+}  // namespace unhand::experiment

@@ -1,0 +1,36 @@
+// What the channels of a throw say of each other's size. Internal to unit_check.
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "datasets/throw_log.hpp"
+
+namespace unhand::experiment {
+
+/// A column whose size another source tells, too.
+enum class SizedColumn {
+  hand_clock,     ///< against the sums of twist and acceleration over it
+  ft_clock,       ///< against the hand's, by what they span
+  mocap_clock,    ///< the same
+  landing_clock,  ///< against a free fall from the opening
+  hand_shift,     ///< pose against the sum of the twist
+  hand_turn,      ///< the same of the angle
+  hand_speed,     ///< twist against the sum of the acceleration
+  hand_spin,      ///< the same of the rate
+  held_shift,     ///< the object's position against the hand's while it is held
+  held_turn,      ///< the same of the angle
+  force,          ///< against Newton's law of the held body
+  torque,         ///< against Euler's
+  landing_x,      ///< against a free flight from the opening
+  landing_turn,   ///< against the angle that motion capture saw last
+  slip_force,     ///< tangential over normal force where the pads slip: a friction coefficient
+};
+
+/// Size over what the other source tells, one number per throw that has a say.
+using SizeRatios = std::map<SizedColumn, std::vector<double>>;
+
+/// Adds what a throw from a hand, of a planar log, shows.
+void compare_sizes(const datasets::ThrowLog& log, const datasets::Throw& logged, SizeRatios& out);
+
+}  // namespace unhand::experiment

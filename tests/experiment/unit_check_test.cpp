@@ -1,0 +1,187 @@
+#include "experiment/unit_check.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <numbers>
+
+#include "tests/support/small_campaign.hpp"
+
+namespace unhand::experiment {
+namespace {
+
+using datasets::Series;
+using datasets::Throw;
+using datasets::ThrowLog;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr double kDegree = 180 / std::numbers::pi, kGravity = 9.80665;
+
+const ThrowLog& campaign() {
+  static const ThrowLog log = generate_campaign(testing_support::small_design("limit_surface_disc"), 5);
+  return log;
+}
+
+/// Columns first to last − 1 times `factor`.
+void scale(Series& series, double factor, std::size_t first = 0, std::size_t last = 1) {
+  for (std::size_t i = 0; i < series.rows; ++i)
+    for (std::size_t c = first; c < last; ++c) series(i, c) *= factor;
+}
+
+struct Mistake {
+  const char* name;
+  std::function<void(Throw&)> make;
+  const char *path, *column, *unit;
+};
+
+// What a lab's export may do to all throws of a log alike.
+const Mistake kMistakes[] = {
+    {"motion capture in mm", [](Throw& t) { scale(t.mocap->pose, 1e3, 0, 2); }, "/throws/*/mocap/pose",
+     "position", "mm for m"},
+    {"motion capture in inches", [](Throw& t) { scale(t.mocap->pose, 1 / 0.0254, 0, 2); },
+     "/throws/*/mocap/pose", "position", "inches for m"},
+    {"motion capture in degrees", [](Throw& t) { scale(t.mocap->pose, kDegree, 2, 3); },
+     "/throws/*/mocap/pose", "theta", "degrees for rad"},
+    {"motion capture in mm and degrees",
+     [](Throw& t) {
+       scale(t.mocap->pose, 1e3, 0, 2);
+       scale(t.mocap->pose, kDegree, 2, 3);
+     },
+     "/throws/*/mocap/pose", "theta", "degrees for rad"},
+    {"motion capture's clock in ms", [](Throw& t) { scale(t.mocap->time, 1e3); }, "/throws/*/mocap/time",
+     "time", "ms for s"},
+    {"the hand's pose in mm", [](Throw& t) { scale(t.hand->pose, 1e3, 0, 2); }, "/throws/*/hand/pose",
+     "position", "mm for m"},
+    {"the hand's pose in degrees", [](Throw& t) { scale(t.hand->pose, kDegree, 2, 3); },
+     "/throws/*/hand/pose", "theta", "degrees for rad"},
+    {"the hand's twist in degrees", [](Throw& t) { scale(t.hand->twist, kDegree, 2, 3); },
+     "/throws/*/hand/twist", "omega", "deg/s for rad/s"},
+    {"the hand's twist in mm", [](Throw& t) { scale(t.hand->twist, 1e3, 0, 2); }, "/throws/*/hand/twist",
+     "velocity", "mm/s for m/s"},
+    {"the hand's acceleration in g", [](Throw& t) { scale(t.hand->acceleration, 1 / kGravity, 0, 2); },
+     "/throws/*/hand/acceleration", "a", "g for m/s^2"},
+    {"all of the hand in degrees",
+     [](Throw& t) {
+       for (auto* series : {&t.hand->pose, &t.hand->twist, &t.hand->acceleration})
+         scale(*series, kDegree, 2, 3);
+     },
+     "/throws/*/hand/pose", "theta", "degrees for rad"},
+    {"the hand's clock in ms", [](Throw& t) { scale(t.hand->time, 1e3); }, "/throws/*/hand/time", "time",
+     "ms for s"},
+    {"all clocks in ms",
+     [](Throw& t) {
+       for (auto* time : {&t.hand->time, &t.ft->time, &t.mocap->time, &t.landing->time}) scale(*time, 1e3);
+     },
+     "/throws/*/hand/time", "time", "ms for s"},
+    {"the F/T clock in ms", [](Throw& t) { scale(t.ft->time, 1e3); }, "/throws/*/ft/time", "time",
+     "ms for s"},
+    {"wrenches in kgf and kgf m", [](Throw& t) { scale(t.ft->wrench, 1 / kGravity, 0, 3); },
+     "/throws/*/ft/wrench", "force", "kgf for N"},
+    {"forces in mN", [](Throw& t) { scale(t.ft->wrench, 1e3, 0, 2); }, "/throws/*/ft/wrench", "force",
+     "mN for N"},
+    {"forces in lbf", [](Throw& t) { scale(t.ft->wrench, 1 / 4.4482216, 0, 2); }, "/throws/*/ft/wrench",
+     "force", "lbf for N"},
+    {"torques in N mm", [](Throw& t) { scale(t.ft->wrench, 1e3, 2, 3); }, "/throws/*/ft/wrench", "tau",
+     "N mm for N m"},
+    {"torques in N cm", [](Throw& t) { scale(t.ft->wrench, 100, 2, 3); }, "/throws/*/ft/wrench", "tau",
+     "N cm for N m"},
+    {"normal force in kgf", [](Throw& t) { scale(t.ft->normal_force, 1 / kGravity); },
+     "/throws/*/ft/normal_force", "f_N", "kgf"},
+    {"normal force in mN", [](Throw& t) { scale(t.ft->normal_force, 1e3); }, "/throws/*/ft/normal_force",
+     "f_N", "mN for N"},
+    {"landings in mm", [](Throw& t) { scale(t.landing->pose, 1e3, 0, 1); }, "/throws/*/landing/pose", "x",
+     "mm for m"},
+    {"landings in degrees", [](Throw& t) { scale(t.landing->pose, kDegree, 1, 2); }, "/throws/*/landing/pose",
+     "theta", "degrees for rad"},
+    {"landings in ms", [](Throw& t) { scale(t.landing->time, 1e3); }, "/throws/*/landing/time", "time",
+     "ms for s"},
+};
+
+TEST(UnitCheck, NamesTheColumnAndTheUnitOfEveryMistake) {
+  for (const auto& mistake : kMistakes) {
+    auto log = campaign();
+    for (auto& one : log.throws) mistake.make(one);
+    const auto doubts = unit_doubts(log);
+    ASSERT_FALSE(doubts.empty()) << mistake.name;
+    bool named = false;
+    for (const auto& doubt : doubts)
+      named = named || (doubt.path == mistake.path && doubt.column == mistake.column &&
+                        doubt.reason.find(mistake.unit) != std::string::npos);
+    EXPECT_TRUE(named) << mistake.name << ": " << doubts.front().path << ": " << doubts.front().reason;
+    try {
+      require_units(log, "log.h5");
+      FAIL() << mistake.name;
+    } catch (const datasets::LogError& error) {
+      EXPECT_THAT(error.what(), AllOf(HasSubstr("log.h5: /throws/*/"), HasSubstr(mistake.unit)))
+          << mistake.name;
+    }
+  }
+}
+
+TEST(UnitCheck, MassesInGramsShowInTheForce) {
+  auto log = campaign();
+  for (auto& [name, object] : log.objects) object.mass *= 1e3;
+  try {
+    require_units(log, "log.h5");
+    FAIL();
+  } catch (const datasets::LogError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("mass in g"));
+  }
+}
+
+TEST(UnitCheck, WithoutAnOpeningCommandTheForceTellsWhenItOpens) {
+  auto log = campaign();
+  log.gripper->opening_command_time.reset();
+  EXPECT_THAT(unit_doubts(log), IsEmpty());
+  for (auto& one : log.throws) scale(one.mocap->pose, kDegree, 2, 3);
+  EXPECT_FALSE(unit_doubts(log).empty());
+}
+
+TEST(UnitCheck, CampaignsInSiUnitsRaiseNoDoubt) {
+  for (const auto& name : campaign_names()) {
+    auto design = campaign_design(name);
+    design.sensors.ft_rate = 250;
+    design.sensors.mocap_rate = 120;
+    for (std::uint64_t seed = 1; seed <= 2; ++seed)
+      for (const auto& doubt : unit_doubts(generate_campaign(design, seed)))
+        ADD_FAILURE() << name << ", seed " << seed << ": " << doubt.path << ": " << doubt.reason;
+  }
+}
+
+TEST(UnitCheck, TheDataFolderRaisesNoDoubt) {
+  const char* folder = std::getenv("UNHAND_DATA");
+  if (folder == nullptr || *folder == '\0') GTEST_SKIP() << "UNHAND_DATA is not set";
+  int logs = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (entry.path().extension() != ".h5" || datasets::read_schema_name(entry.path()) != "throw-log")
+      continue;
+    ++logs;
+    for (const auto& doubt : unit_doubts(datasets::read_throw_log(entry.path())))
+      ADD_FAILURE() << entry.path() << ": " << doubt.path << ": " << doubt.reason;
+  }
+  EXPECT_GT(logs, 0);
+}
+
+TEST(UnitCheck, WhatASensorMayHaveRaisesNoDoubt) {
+  auto log = campaign();
+  for (auto& one : log.throws) {
+    scale(one.ft->wrench, 1.5, 0, 3);   // another gain
+    scale(one.mocap->pose, 1.2, 0, 2);  // another length of the wand
+    for (double& t : one.mocap->time.data) t += 0.02;
+    for (std::size_t i = 0; i < one.ft->wrench.rows; ++i) one.ft->wrench(i, 0) = 0.125;  // dead
+  }
+  for (const auto& doubt : unit_doubts(log)) ADD_FAILURE() << doubt.path << ": " << doubt.reason;
+}
+
+TEST(UnitCheck, OneThrowOfTwelveIsNotTheLog) {
+  auto log = campaign();
+  scale(log.throws[3].mocap->pose, kDegree, 2, 3);
+  EXPECT_THAT(unit_doubts(log), IsEmpty());
+}
+
+}  // namespace
+}  // namespace unhand::experiment
