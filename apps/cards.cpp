@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "contact/gripper_delay.hpp"
+#include "fitting/measured_card.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -76,12 +77,17 @@ std::vector<NamedValue> named_values(const experiment::ModelComparison& model) {
 
 UsableCard read_usable_card(const fs::path& file) {
   UsableCard out{datasets::read_model_card(file), file.string(), false, {}};
+  Reader reader(file.string(), out.card);
+  if (fitting::is_of_free_motion(out.card))
+    reader.fail("/model",
+                fmt::format("'{}' knows neither a hand nor how a flight starts, and predicts no throw: "
+                            "`unhand compare LOG --card FILE` holds it against a log of its kind",
+                            out.card.model));
   if (fitting::is_fitted(out.card)) {
     out.fitted = true;
     fitting::options_of(out.card, out.file);
     return out;
   }
-  Reader reader(file.string(), out.card);
   const auto models = experiment::release_model_names();
   if (std::find(models.begin(), models.end(), out.card.model) == models.end())
     reader.fail("/model", fmt::format("'{}' is no model of releases; there are {}", out.card.model,

@@ -174,7 +174,8 @@ void compare(const CompareRequest& request) {
   }
   if (flights && request.fit)
     throw Unanswered("free flights hold nothing to fit here: leave out --fit, or use `unhand discover`");
-  flights ? compare_flights(request, log) : compare_releases(request, log);
+  if (!flights) return compare_releases(request, log);
+  request.cards.empty() ? compare_flights(request, log) : compare_with_card(request, log);
 }
 
 }  // namespace
@@ -198,8 +199,10 @@ Command compare_command(Parser& root) {
       .with_commas();
   parser.flag("--fit", request->fit,
               "Fit the models to the log's train throws (see `unhand fit`), or to its slips");
-  parser.option("--card", request->cards,
-                "A model card: its parameters are used for its model; may be repeated");
+  parser.option(
+      "--card", request->cards,
+      "A model card: its parameters are used for its model; may be repeated (free flights and falls: "
+      "one, of `unhand discover --card`)");
   parser.option("--json", request->json, "Write the comparison as JSON");
   parser.option("--report", request->report,
                 "A directory for figures, tables (Markdown), per-throw errors (CSV) and the JSON");
@@ -222,6 +225,7 @@ Command compare_command(Parser& root) {
       "  unhand compare campaign.h5 --models sliding_pivot,limit_surface,gripper_delay --fit --json "
       "out.json\n"
       "  unhand compare cubes.h5 --models projectile --json flights.json\n"
+      "  unhand compare cubes.h5 --card discovered.json\n"
       "  unhand compare pushes.h5 --models ellipsoid,convex_quartic --fit --report out");
   return {&parser, [request] { compare(*request); }};
 }

@@ -25,6 +25,9 @@ struct CompareRequest {
 /// Free flights: every throw through the flight models.
 void compare_flights(const CompareRequest& request, const datasets::ThrowLog& log);
 
+/// Free flights or falls with the card of one of their models: errors without its effects and with them.
+void compare_with_card(const CompareRequest& request, const datasets::ThrowLog& log);
+
 /// Slip logs: limit surfaces identified from measured slips, cross-validated.
 void compare_slips(const CompareRequest& request);
 

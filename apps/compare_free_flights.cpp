@@ -209,8 +209,10 @@ Figure residual_figure(const FreeFlightComparison& model, bool planar) {
 }  // namespace
 
 void compare_flights(const CompareRequest& request, const datasets::ThrowLog& log) {
-  if (!request.cards.empty() || !request.write_cards.empty())
-    throw WrongUsage("models of free flight take no parameters: neither --card nor --write-cards");
+  if (!request.write_cards.empty())
+    throw WrongUsage(
+        "--write-cards: models of free flight take no parameters; what they lack goes on the card of `unhand "
+        "discover LOG --card FILE`");
   const auto names = request.models.empty() ? std::vector<std::string>{"projectile"} : request.models;
   std::vector<FreeFlightComparison> models;
   {

@@ -20,7 +20,7 @@ const char* default_model(MeasuredKind kind) {
                                        : "ellipsoid";
 }
 
-/// The parameters that were found, for `unhand predict` and others to read.
+/// The parameters that were found, for `unhand compare` to read.
 datasets::ModelCard card_of(const MeasuredDiscovery& found, const datasets::ThrowLog& log,
                             const std::string& file) {
   datasets::ModelCard card;

@@ -12,13 +12,6 @@
 namespace unhand::fitting {
 namespace {
 
-NamedErrors named(const FallErrors& e) {
-  return {{"specific_force_rms_m_s2", e.specific_force_rms},
-          {"end_speed_mae_m_s", e.end_speed_mae},
-          {"end_position_mae_m", e.end_position_mae},
-          {"chi2_per_dof", e.chi2_per_dof}};
-}
-
 /// How far the mean residual of a fall scatters from fall to fall [m/s²].
 std::array<double, 3> scatter_between_falls(const FallProblem& problem, const GroupedFit& fit) {
   std::array<double, 3> out{};
@@ -78,6 +71,14 @@ void explain(const datasets::ThrowLog& log, const FallProblem& problem, const Ef
 
 }  // namespace
 
+NamedErrors named_errors(const FallProblem& problem, const GroupedFit& fit) {
+  const FallErrors e = fall_errors(problem, fit);
+  return {{"specific_force_rms_m_s2", e.specific_force_rms},
+          {"end_speed_mae_m_s", e.end_speed_mae},
+          {"end_position_mae_m", e.end_position_mae},
+          {"chi2_per_dof", e.chi2_per_dof}};
+}
+
 MeasuredDiscovery discover_falls(const datasets::ThrowLog& log, const MeasuredOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
   MeasuredDiscovery out;
@@ -87,10 +88,10 @@ MeasuredDiscovery discover_falls(const datasets::ThrowLog& log, const MeasuredOp
   const FallProblem problem(log);
   const EffectSearch search = run_search(problem, options, out);
   if (out.verdict == Verdict::not_answered) return out;
-  out.before_train = named(fall_errors(problem, search.base));
-  out.before_test = named(fall_errors(problem, search.base_test));
-  out.after_train = named(fall_errors(problem, search.final));
-  out.after_test = named(fall_errors(problem, search.final_test));
+  out.before_train = named_errors(problem, search.base);
+  out.before_test = named_errors(problem, search.base_test);
+  out.after_train = named_errors(problem, search.final);
+  out.after_test = named_errors(problem, search.final_test);
   explain(log, problem, search, out);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return out;

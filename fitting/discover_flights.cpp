@@ -14,15 +14,6 @@ namespace {
 constexpr const char *kScale = "sensor.length_scale", *kClock = "sensor.time_scale",
                      *kGravity = "flight.gravity";
 
-NamedErrors named(const FlightErrors& e) {
-  return {{"trajectory_rms_m", e.trajectory_rms},
-          {"end_position_mae_m", e.end_position_mae},
-          {"end_position_median_m", e.end_position_median},
-          {"end_orientation_mae_deg", e.end_orientation_mae},
-          {"end_orientation_median_deg", e.end_orientation_median},
-          {"chi2_per_dof", e.chi2_per_dof}};
-}
-
 constexpr double kMostScale = 0.2;  // beyond it, it is the floor that is elsewhere
 
 bool is_one_of_the_scales(const std::string& id) { return id == kScale || id == kClock || id == kGravity; }
@@ -132,6 +123,16 @@ void weigh_drag(const datasets::ThrowLog& log, MeasuredDiscovery& out) {
 
 }  // namespace
 
+NamedErrors named_errors(const FlightProblem& problem, const GroupedFit& fit, int threads) {
+  const FlightErrors e = flight_errors(problem, fit, threads);
+  return {{"trajectory_rms_m", e.trajectory_rms},
+          {"end_position_mae_m", e.end_position_mae},
+          {"end_position_median_m", e.end_position_median},
+          {"end_orientation_mae_deg", e.end_orientation_mae},
+          {"end_orientation_median_deg", e.end_orientation_median},
+          {"chi2_per_dof", e.chi2_per_dof}};
+}
+
 MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const MeasuredOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
   const int threads = options.search.fit.threads;
@@ -142,10 +143,10 @@ MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const Measured
   const FlightProblem problem(log, threads);
   const EffectSearch search = run_search(problem, options, out);
   if (out.verdict == Verdict::not_answered) return out;
-  out.before_train = named(flight_errors(problem, search.base, threads));
-  out.before_test = named(flight_errors(problem, search.base_test, threads));
-  out.after_train = named(flight_errors(problem, search.final, threads));
-  out.after_test = named(flight_errors(problem, search.final_test, threads));
+  out.before_train = named_errors(problem, search.base, threads);
+  out.before_test = named_errors(problem, search.base_test, threads);
+  out.after_train = named_errors(problem, search.final, threads);
+  out.after_test = named_errors(problem, search.final_test, threads);
   weigh_scales(log, options, out);
   weigh_drag(log, out);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

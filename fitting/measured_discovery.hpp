@@ -16,6 +16,12 @@ namespace unhand::fitting {
 /// An error of a model, with its unit in the name ("trajectory_rms_m").
 using NamedErrors = std::vector<std::pair<std::string, double>>;
 
+class FlightProblem;
+class FallProblem;
+/// FlightErrors or FallErrors by name.
+NamedErrors named_errors(const FlightProblem& problem, const GroupedFit& fit, int threads);
+NamedErrors named_errors(const FallProblem& problem, const GroupedFit& fit);
+
 /// Misfit of a channel before and after the accepted effects, on train and held-out groups.
 struct MeasuredMisfit {
   std::string channel;                                                ///< which

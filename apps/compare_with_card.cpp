@@ -1,0 +1,79 @@
+// unhand compare on free flights and falls with the card that unhand discover wrote of such.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "apps/command.hpp"
+#include "apps/compare.hpp"
+#include "fitting/measured_card.hpp"
+
+namespace unhand::apps {
+namespace {
+
+using fitting::CardComparison;
+using fitting::NamedErrors;
+
+Json json_of(const NamedErrors& errors) {
+  Json out = Json::object();
+  for (const auto& [name, value] : errors) out[name] = number(value);
+  return out;
+}
+
+std::string value_of(const NamedErrors& errors, std::size_t k) {
+  return k < errors.size() ? fmt::format("{:.4g}", errors[k].second) : "";
+}
+
+}  // namespace
+
+void compare_with_card(const CompareRequest& request, const datasets::ThrowLog& log) {
+  if (request.cards.size() != 1)
+    throw WrongUsage("free flights and falls are compared with one --card at a time");
+  const std::string& file = request.cards.front();
+  const auto card = datasets::read_model_card(file);
+  if (!request.models.empty() && request.models != std::vector{card.model})
+    throw WrongUsage(fmt::format("{}: a card for '{}', which is not what --models names", file, card.model));
+  if (!request.write_cards.empty())
+    throw WrongUsage(
+        "--write-cards: free flights and falls get theirs from `unhand discover LOG --card FILE`");
+  CardComparison found;
+  try {
+    found = fitting::compare_with_card(card, file, log, request.threads);
+  } catch (const std::invalid_argument& error) {
+    throw Unanswered(fmt::format("{}: {}", request.log, error.what()));
+  }
+  if (found.train + found.test == 0)
+    throw Unanswered(fmt::format("{}: no throw could be fitted", request.log));
+  for (const auto& [id, reason] : found.skipped) fmt::print(stderr, "unhand: throw {}: {}\n", id, reason);
+
+  Json json = json_head("compare");
+  json["log"] = request.log;
+  json["card"] = file;
+  json["model"] = card.model;
+  json["effects"] = card.effects;
+  json["parameters"] = Json::object();
+  for (const auto& [name, p] : card.parameters) json["parameters"][name] = p.value;
+  json["base"] = {{"train", json_of(found.base_train)}, {"test", json_of(found.base_test)}};
+  json["with_card"] = {{"train", json_of(found.card_train)}, {"test", json_of(found.card_test)}};
+  json["train"] = found.train, json["test"] = found.test;
+
+  Table table{{"error", card.model + ", train", "test", "card, train", "test"}, {}, 1};
+  const NamedErrors& names = found.train > 0 ? found.base_train : found.base_test;
+  for (std::size_t k = 0; k < names.size(); ++k)
+    table.rows.push_back({names[k].first, value_of(found.base_train, k), value_of(found.base_test, k),
+                          value_of(found.card_train, k), value_of(found.card_test, k)});
+  const std::string heading = fmt::format(
+      "{}: {}\n{} {}, {} of them held out; each one's start is fitted, {} from {}\n", request.log, log.title,
+      found.train + found.test, found.kind, found.test,
+      card.effects.empty() ? "without effects" : fmt::format("{}", fmt::join(card.effects, ", ")), file);
+  Outputs outputs;
+  if (!request.json.empty()) outputs.json(request.json, json);
+  if (!request.report.empty()) {
+    const auto directory = outputs.directory(request.report);
+    write_text(directory / "report.md",
+               fmt::format("# A card against a log\n\n{}\n{}", heading, table.markdown()));
+    write_text(directory / "compare.json", json_text(json));
+  }
+  outputs.commit();
+  fmt::print("{}\n{}", heading, table.text());
+}
+
+}  // namespace unhand::apps
