@@ -59,5 +59,35 @@ TEST_P(Corpus, DamagedFilesHaveAnAnswer) {
   }
 }
 
+/// One byte of a seed, and the value with which libhdf5 1.10 ends the process that reads it: numbers of text
+/// in its heap, lengths of names and sizes of types.
+struct Killer {
+  const char *reader, *seed;
+  std::size_t at;
+  std::uint8_t value;
+};
+
+TEST(Killers, AreRefused) {
+  constexpr Killer kKillers[] = {{"throw_log", "seed-spatial.h5", 894, 128},
+                                 {"throw_log", "seed-spatial.h5", 8940, 255},
+                                 {"throw_log", "seed-spatial.h5", 8959, 1},
+                                 {"throw_log", "seed-spatial.h5", 8976, 129},
+                                 {"throw_log", "seed-spatial.h5", 24910, 128},
+                                 {"throw_log", "seed-spatial.h5", 38133, 1},
+                                 {"slip_log", "seed.h5", 895, 8},
+                                 {"slip_log", "seed.h5", 6935, 255},
+                                 {"slip_log", "seed.h5", 11302, 1},
+                                 {"slip_log", "seed.h5", 16310, 255},
+                                 {"slip_log", "seed.h5", 16311, 255},
+                                 {"slip_log", "seed.h5", 19365, 255}};
+  for (const Killer& killer : kKillers) {
+    auto bytes = bytes_of(fs::path(UNHAND_CORPUS) / killer.reader / killer.seed);
+    ASSERT_GT(bytes.size(), killer.at);
+    bytes[killer.at] = killer.value;
+    EXPECT_EQ(read(killer.reader, bytes.data(), bytes.size()), Reading::refused)
+        << killer.reader << ", byte " << killer.at;
+  }
+}
+
 }  // namespace
 }  // namespace unhand::fuzz
