@@ -202,13 +202,7 @@ std::string discovery_text(const Discovery& found, const std::string& log) {
     if (found.first.any && s.phase == found.first.phase && s.channel == found.first.channel)
       out += fmt::format("  there: {}\n", s.structure.in_words());
   for (const auto& effect : found.effects) {
-    out += fmt::format("\n{}", effect.id);
-    for (const auto& [id, correlation] : effect.equivalent)
-      out += fmt::format("\n  or {} (footprints correlate by {:.4f})", id, correlation);
-    for (const auto& p : effect.parameters)
-      out += fmt::format("\n  {} = {:.6g} +- {:.2g} {}", p.name, p.value, p.sigma, p.unit);
-    out += fmt::format("\n  BIC {:+.1f}, p {:.2g}; held out: {}\n", effect.delta_bic, effect.p_value,
-                       effect.why);
+    out += effect_text(effect);
     for (const auto& e : effect.separating)
       out += fmt::format("  to tell it from {}: {} (correlation {:.4f} -> {:.4f})\n", e.from, e.what,
                          e.before, e.after);

@@ -154,17 +154,6 @@ Table misfit_table(const Discovery& found) {
   return table;
 }
 
-Table ranking_table(const Discovery& found) {
-  Table table{
-      {"candidate", "chi2 gain", "p", "correlation with the best", "refitted: BIC", "held-out fall"}, {}, 1};
-  for (const auto& r : found.ranking)
-    table.rows.push_back({r.id, r.visible ? fmt::format("{:.4g}", r.gain) : "no footprint",
-                          fmt::format("{:.2g}", r.p_value), fmt::format("{:.3f}", r.correlation_with_best),
-                          r.refitted ? fmt::format("{:+.1f}", r.delta_bic) : "",
-                          r.held_out_gain ? fmt::format("{:.3g}", *r.held_out_gain) : ""});
-  return table;
-}
-
 }  // namespace
 
 void write_discovery_report(const Discovery& found, const std::string& log, const std::string& command,
@@ -230,7 +219,7 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
           escaped(std::filesystem::path(log).filename().string()),
           escaped(json.at("base_model").get<std::string>()), to_string(found.verdict), first,
           picture("residual"), answer, html(error_table(found)), picture("ranking"),
-          html(ranking_table(found)), html(misfit_table(found)), escaped(command),
+          html(ranking_table(found.ranking)), html(misfit_table(found)), escaped(command),
           json.value("log_checksum", "unknown"), html(structure_table(found))));
   write_text(directory / "discovery.json", json_text(json));
 }

@@ -50,17 +50,6 @@ Table misfit_table(const MeasuredDiscovery& found) {
   return table;
 }
 
-Table ranking_table(const MeasuredDiscovery& found) {
-  Table table{
-      {"candidate", "chi2 gain", "p", "correlation with the best", "refitted: BIC", "held-out fall"}, {}, 1};
-  for (const auto& r : found.ranking)
-    table.rows.push_back({r.id, r.visible ? fmt::format("{:.4g}", r.gain) : "no footprint",
-                          fmt::format("{:.2g}", r.p_value), fmt::format("{:.3f}", r.correlation_with_best),
-                          r.refitted ? fmt::format("{:+.1f}", r.delta_bic) : "",
-                          r.held_out_gain ? fmt::format("{:.3g}", *r.held_out_gain) : ""});
-  return table;
-}
-
 Table stability_table(const MeasuredDiscovery& found) {
   Table table{{"parameter", "split at the median of", "at", "below", "above", "apart [sigma]"}, {}, 2};
   for (const auto& s : found.stability)
@@ -103,15 +92,7 @@ std::string measured_text(const MeasuredResult& result) {
   std::string out = fmt::format("{}: {}\n{}, base model {}, {} train and {} held out\n{}\n", result.log,
                                 to_string(found.verdict), found.kind, found.model, found.train, found.test,
                                 first_text(found));
-  for (const auto& effect : found.effects) {
-    out += fmt::format("\n{}", effect.id);
-    for (const auto& [id, correlation] : effect.equivalent)
-      out += fmt::format("\n  or {} (footprints correlate by {:.4f})", id, correlation);
-    for (const auto& p : effect.parameters)
-      out += fmt::format("\n  {} = {:.6g} +- {:.2g} {}", p.name, p.value, p.sigma, p.unit);
-    out += fmt::format("\n  BIC {:+.1f}, p {:.2g}; held out: {}\n", effect.delta_bic, effect.p_value,
-                       effect.why);
-  }
+  for (const auto& effect : found.effects) out += effect_text(effect);
   if (found.unexplained) out += fmt::format("\nunexplained: {}\n", found.unexplained->description);
   for (const auto& e : found.evidence)
     out += fmt::format("\n{} {}{}{}\n", e.against ? "against:" : "note:", e.about,
@@ -168,7 +149,7 @@ void write_measured_report(const MeasuredResult& result, const Json& json,
   if (!notes.empty()) body += "<h2>What else the log says</h2>\n" + notes;
   body += "<h2>Errors before and after</h2>\n" + html(error_table(found));
   if (slips) body += "<h2>By surface</h2>\n" + html(surface_table(result));
-  body += "<h2>Candidates</h2>\n" + picture(ranking) + html(ranking_table(found));
+  body += "<h2>Candidates</h2>\n" + picture(ranking) + html(ranking_table(found.ranking));
   if (!found.stability.empty())
     body +=
         "<h2>Does the answer depend on where one looks?</h2><p>The same parameters from halves of the train "

@@ -20,6 +20,17 @@ Json ranking_json(std::span<const fitting::Ranked> ranking) {
   return out;
 }
 
+Table ranking_table(std::span<const fitting::Ranked> ranking) {
+  Table table{
+      {"candidate", "chi2 gain", "p", "correlation with the best", "refitted: BIC", "held-out fall"}, {}, 1};
+  for (const auto& r : ranking)
+    table.rows.push_back({r.id, r.visible ? fmt::format("{:.4g}", r.gain) : "no footprint",
+                          fmt::format("{:.2g}", r.p_value), fmt::format("{:.3f}", r.correlation_with_best),
+                          r.refitted ? fmt::format("{:+.1f}", r.delta_bic) : "",
+                          r.held_out_gain ? fmt::format("{:.3g}", *r.held_out_gain) : ""});
+  return table;
+}
+
 Figure ranking_figure(std::span<const fitting::Ranked> ranking,
                       std::span<const fitting::AcceptedEffect> accepted) {
   Figure figure{"ranking", 17, 10, {}, {}};
@@ -48,6 +59,16 @@ Figure ranking_figure(std::span<const fitting::Ranked> ranking,
       "with boxxyerror linecolor rgb variable\n",
       2 * largest, std::max(1, position), tics);
   return figure;
+}
+
+std::string effect_text(const fitting::AcceptedEffect& effect) {
+  std::string out = "\n" + effect.id;
+  for (const auto& [id, correlation] : effect.equivalent)
+    out += fmt::format("\n  or {} (footprints correlate by {:.4f})", id, correlation);
+  for (const auto& p : effect.parameters)
+    out += fmt::format("\n  {} = {:.6g} +- {:.2g} {}", p.name, p.value, p.sigma, p.unit);
+  return out + fmt::format("\n  BIC {:+.1f}, p {:.2g}; held out: {}\n", effect.delta_bic, effect.p_value,
+                           effect.why);
 }
 
 Json effect_json(const fitting::AcceptedEffect& effect) {

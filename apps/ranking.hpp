@@ -7,11 +7,15 @@
 
 #include "apps/figure.hpp"
 #include "apps/output.hpp"
+#include "apps/table.hpp"
 #include "fitting/discover.hpp"
 
 namespace unhand::apps {
 
 Json ranking_json(std::span<const fitting::Ranked> ranking);
+
+/// The candidates, best first: what each would take away, and what a refit showed.
+Table ranking_table(std::span<const fitting::Ranked> ranking);
 
 /// Bars of the fall of chi-square to first order; those of the accepted effects are blue.
 Figure ranking_figure(std::span<const fitting::Ranked> ranking,
@@ -19,6 +23,9 @@ Figure ranking_figure(std::span<const fitting::Ranked> ranking,
 
 /// An accepted effect as `effects` of discovery.json lists it.
 Json effect_json(const fitting::AcceptedEffect& effect);
+
+/// The same in words: its other names, its parameters, and the evidence.
+std::string effect_text(const fitting::AcceptedEffect& effect);
 
 /// Styles of the base model's residuals and of the answer's.
 inline constexpr const char *kBefore = "with linespoints pointtype 6 linecolor rgb '#d55e00'",

@@ -5,15 +5,14 @@
 #include <limits>
 #include <utility>
 
+#include "experiment/sample_window.hpp"
+
 namespace unhand::experiment {
 
 using datasets::Series;
 using dynamics::Pose;
 
 namespace {
-
-/// Samples nearer than this to an event [s] count as after it: what decimal times leave of rounding.
-constexpr double kAtSample = 1e-9;
 
 /// A series of the given columns; σ is declared where there is noise.
 Series series(std::size_t cols, std::vector<double> sigma = {}) {
@@ -44,21 +43,6 @@ std::vector<double> sample_times(double begin, double end, double rate) {
   for (double k = std::ceil((begin - kAtSample) * rate); k <= (end + kAtSample) * rate; ++k)
     out.push_back(k / rate);
   return out;
-}
-
-/// The stretch of [begin, end] between two of `kinks` that holds t; at a kink the later one, which is what a
-/// log holds.
-dynamics::Window window_at(double begin, double end, const std::vector<double>& kinks, double t) {
-  dynamics::Window window{begin, end};
-  for (const double kink : kinks) {
-    if (kink <= t + kAtSample) {
-      window.begin = std::max(begin, kink);
-    } else {
-      window.end = std::min(end, kink);
-      break;
-    }
-  }
-  return window;
 }
 
 datasets::HandLog log_hand(const PlanarArmHand& hand, const SensorSuite& sensors, RandomStream random) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "experiment/doubtful_force.hpp"
+#include "experiment/sample_window.hpp"
 
 namespace unhand::experiment {
 
@@ -13,9 +14,6 @@ using dynamics::value_of;
 using dynamics::Vec2;
 
 namespace {
-
-/// Nearer to an event than this [s] counts as after it.
-constexpr double kSnap = 1e-9;
 
 template <class Table>
 void append(std::vector<dynamics::Effect>& out, const Table& table) {
@@ -108,12 +106,12 @@ template <class S>
 dynamics::Wrench<S> ThrowReader<S>::wrench(double t) const {
   const auto& s = setup_.sensing;
   dynamics::Wrench<S> out{s.bias_fx, s.bias_fz, s.bias_tau};
-  if (t >= value_of(result_.detach.time) - kSnap || result_.trajectory.empty()) return out;
+  if (t >= value_of(result_.detach.time) - kAtSample || result_.trajectory.empty()) return out;
   const double held = std::max(t, first());
   auto sample = sample_release(problem_, result_, S(held));
   // Where slip sets in at this very instant, its direction exists only as the limit from the right.
   if (!std::isfinite(value_of(sample.wrench.fx) + value_of(sample.wrench.fz) + value_of(sample.wrench.tau)))
-    sample = sample_release(problem_, result_, S(held + kSnap));
+    sample = sample_release(problem_, result_, S(held + kAtSample));
   const double share = 1.0 / pads_;
   const Vec2<S> f = dynamics::rotate(S(-sample.hand.pose.theta), sample.wrench.force());
   out.fx += share * f.x;

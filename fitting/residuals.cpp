@@ -14,10 +14,8 @@ using experiment::Channel;
 
 namespace {
 
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-
 double normal_force(const CampaignThrow& thrown, double t) {
-  if (!thrown.prepared.normal_force) return kUnknown;
+  if (!thrown.prepared.normal_force) return NAN;
   const double inf = std::numeric_limits<double>::infinity();
   return thrown.prepared.normal_force->at(dynamics::Window{-inf, inf}, t);
 }
@@ -87,7 +85,7 @@ StateSeries states_of(const CampaignThrow& thrown, const Eigen::VectorXd& residu
 }
 
 ResidualTrace::State StateSeries::at(const CampaignThrow& thrown, double t) const {
-  if (time.empty()) return {kUnknown, kUnknown, kUnknown, kUnknown, normal_force(thrown, t)};
+  if (time.empty()) return {NAN, NAN, NAN, NAN, normal_force(thrown, t)};
   const auto after = std::lower_bound(time.begin(), time.end(), t);
   const std::size_t b =
       std::min<std::size_t>(static_cast<std::size_t>(after - time.begin()), time.size() - 1);
@@ -122,7 +120,7 @@ std::vector<ChannelStructure> structures(const CampaignProblem& problem,
       of.condition.push_back(condition);
       of.states[0].value.push_back(std::hypot(state.vx, state.vz));
       of.states[1].value.push_back(state.omega);
-      of.states[2].value.push_back(o.time < release ? state.normal_force : kUnknown);
+      of.states[2].value.push_back(o.time < release ? state.normal_force : NAN);
     }
   }
   std::vector<ChannelStructure> out;

@@ -9,6 +9,7 @@
 
 #include "experiment/parallel.hpp"
 #include "experiment/random_stream.hpp"
+#include "experiment/sample_window.hpp"
 
 namespace unhand::fitting {
 
@@ -27,25 +28,13 @@ double sigma_of(const Series& series, std::size_t column, double otherwise) {
   return series.sigma[series.sigma.size() == 1 ? 0 : column];
 }
 
-/// The window between two jumps of the hand that a sample at t belongs to: at a jump the later one.
-Window window_at(const release::HandMotion& hand, const std::vector<double>& jumps, double t) {
-  constexpr double kSnap = 1e-9;
-  Window out{hand.begin(), hand.end()};
-  for (const double jump : jumps) {
-    if (jump <= t + kSnap)
-      out.begin = std::max(out.begin, jump);
-    else
-      out.end = std::min(out.end, jump);
-  }
-  return out;
-}
-
 void write_hand(const experiment::PreparedThrow& prepared, RandomStream random, datasets::HandLog& log) {
   const auto jumps = prepared.hand.jumps();
   for (std::size_t i = 0; i < log.time.rows; ++i) {
     const double t = log.time(i);
     if (t < prepared.hand.begin() || t > prepared.hand.end()) continue;
-    const auto state = prepared.hand.at(window_at(prepared.hand, jumps, t), t);
+    const auto state =
+        prepared.hand.at(experiment::window_at(prepared.hand.begin(), prepared.hand.end(), jumps, t), t);
     const auto put = [&](Series& series, double a, double b, double c) {
       const double row[3] = {a, b, c};
       for (std::size_t k = 0; k < 3 && !series.data.empty(); ++k)

@@ -19,8 +19,6 @@ namespace {
 using Vector3 = std::array<double, 3>;
 using State = ResidualTrace::State;
 
-constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
-
 /// The residual (observed minus predicted, SI units) of three channels that follow each other, in one phase.
 ResidualTrace trace_of(const CampaignThrow& thrown, const Eigen::VectorXd& residual, Channel first,
                        Phase phase, double origin, double scale) {
@@ -35,7 +33,7 @@ ResidualTrace trace_of(const CampaignThrow& thrown, const Eigen::VectorXd& resid
     if (out.time.empty() || time != out.time.back()) {
       out.time.push_back(time);
       out.state.push_back(states.at(thrown, o.time));
-      for (auto& r : out.residual) r.push_back(kNothing);
+      for (auto& r : out.residual) r.push_back(NAN);
     }
     out.residual[static_cast<std::size_t>(component)].back() =
         -residual[static_cast<Eigen::Index>(j)] * o.sigma;

@@ -70,9 +70,6 @@ void validate(const Vec3<S>& inertia, const RotationState<S>& start, const std::
       throw std::invalid_argument(fmt::format("free rotation: time {} s is not in [0, inf)", t));
 }
 
-bool is_zero(double x) { return x == 0; }
-bool is_zero(const Dual& x) { return x.a == 0 && x.v.isZero(); }
-
 }  // namespace
 
 template <class S>

@@ -61,9 +61,6 @@ void validate(const PointFlight<S>& f, const std::vector<double>& times) {
       throw std::invalid_argument(fmt::format("point flight: time {} s is not in [0, inf)", t));
 }
 
-bool is_zero(double x) { return x == 0; }
-bool is_zero(const Dual& x) { return x.a == 0 && x.v.isZero(); }
-
 }  // namespace
 
 template <class S>

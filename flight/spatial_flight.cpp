@@ -24,9 +24,6 @@ Vec3<S> convert3(const Vec3<P>& a) {
   return {convert<S>(a[0]), convert<S>(a[1]), convert<S>(a[2])};
 }
 
-bool is_zero(double x) { return x == 0; }
-bool is_zero(const Dual& x) { return x.a == 0 && x.v.isZero(); }
-
 template <class S>
 bool is_still(const SpatialAir<S>& a) {
   return is_zero(a.drag_k) && is_zero(a.linear_drag) && is_zero(a.lift) && is_zero(a.axis_drag_x) &&

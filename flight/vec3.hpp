@@ -8,6 +8,10 @@
 
 namespace unhand::flight {
 
+/// Whether a number and all of its derivatives are zero: a term that has it as a factor may be left out.
+inline bool is_zero(double x) { return x == 0; }
+inline bool is_zero(const dynamics::Dual& x) { return x.a == 0 && x.v.isZero(); }
+
 /// World: x forward, y to the left, z up.
 template <class S>
 using Vec3 = std::array<S, 3>;
