@@ -110,12 +110,17 @@ Table csv_table(const experiment::Comparison& comparison, const Sigmas& sigmas) 
   return out;
 }
 
-/// Tells of throws outside the conditions that the card has been tried in.
+/// Tells of throws outside the conditions that the card has been tried in: of the first few one by one.
 void warn_outside(const datasets::ModelCard& card, const std::vector<experiment::PreparedThrow>& throws) {
+  constexpr int kTold = 10;
+  int outside = 0;
   for (const auto& one : throws)
-    if (const auto why = fitting::outside_range(card, one); !why.empty())
+    if (const auto why = fitting::outside_range(card, one); !why.empty() && ++outside <= kTold)
       fmt::print(stderr, "unhand: throw {} lies outside the card's valid range: {}\n", one.id,
                  fmt::join(why, ", "));
+  if (outside > kTold)
+    fmt::print(stderr, "unhand: and {} more of {} throws (--json FILE has them all)\n", outside - kTold,
+               throws.size());
 }
 
 /// The predictions of one card, plain or fitted.
