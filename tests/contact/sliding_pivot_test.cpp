@@ -52,6 +52,16 @@ class World final : public SceneSource {
 constexpr double kForce = 10, kTorque = 0.1, kMass = 0.2, kInertia = 1e-3;
 constexpr Window kWindow{0, 1};
 
+/// Numbers of one seed.
+class Uniform {
+ public:
+  explicit Uniform(unsigned seed) : random_(seed) {}
+  double operator()(double a, double b) { return std::uniform_real_distribution<double>(a, b)(random_); }
+
+ private:
+  std::mt19937_64 random_;
+};
+
 class Pivot : public testing::Test {
  protected:
   Pivot() {
@@ -76,6 +86,17 @@ class Pivot : public testing::Test {
     State<double, 6> dy;
     model.rate(mode, world.now, y, dy);
     return dy;
+  }
+
+  /// A hand that turns, with accelerations up to those given [m/s², rad/s²].
+  const Scene<double>& turn_at_random(Uniform& uniform, double acceleration, double alpha) {
+    auto& s = world.now;
+    s.gravity = {0, -9.81};
+    s.hand.theta = uniform(-3, 3);
+    s.hand_twist.omega = uniform(-5, 5);
+    s.hand_acceleration = {uniform(-acceleration, acceleration), uniform(-acceleration, acceleration),
+                           uniform(-alpha, alpha)};
+    return s;
   }
 
   World world;
@@ -203,10 +224,7 @@ TEST_F(Pivot, ThePrintedExceptionIsNotThere) {
 
 TEST_F(Pivot, AccelerationAtTheOnsetOfAPivot) {
   // α_r = −sgn(τ_p)(|τ_p| − τ_max)/(m l² + I), at random poses and motions of the hand
-  std::mt19937_64 random(81);
-  const auto uniform = [&](double a, double b) {
-    return std::uniform_real_distribution<double>(a, b)(random);
-  };
+  Uniform uniform(81);
   int seen = 0;
   for (int i = 0; i < 2000; ++i) {
     auto& s = world.now;
@@ -231,16 +249,9 @@ TEST_F(Pivot, AccelerationAtTheOnsetOfAPivot) {
 
 TEST_F(Pivot, ThePivotEquationIsNewtonsLaw) {
   // The wrench of the pivot moves the CoM so that the contact point goes with the hand.
-  std::mt19937_64 random(82);
-  const auto uniform = [&](double a, double b) {
-    return std::uniform_real_distribution<double>(a, b)(random);
-  };
+  Uniform uniform(82);
   for (int i = 0; i < 200; ++i) {
-    auto& s = world.now;
-    s.gravity = {0, -9.81};
-    s.hand.theta = uniform(-3, 3);
-    s.hand_twist.omega = uniform(-5, 5);
-    s.hand_acceleration = {uniform(-10, 10), uniform(-10, 10), uniform(-80, 80)};
+    const auto& s = turn_at_random(uniform, 10, 80);
     const Relative<double> y{{uniform(0, 0.15), 0}, 0.1, {0, 0}, uniform(0.1, 5)};
     const auto dy = relative_rate(s, y, wrench(kPivotPlus, y));
     EXPECT_NEAR(dy[3], 0, 1e-11) << "sample " << i << " of seed 82";
@@ -252,16 +263,9 @@ TEST_F(Pivot, ThePivotEquationIsNewtonsLaw) {
 TEST_F(Pivot, TheForceIsContinuousAtTheOnsetOfSlide) {
   // At |f_p| = f_max pivot and slide have the same force, so the object's acceleration does not jump; f_p
   // takes the pivot's own α, not the hand's.
-  std::mt19937_64 random(83);
-  const auto uniform = [&](double a, double b) {
-    return std::uniform_real_distribution<double>(a, b)(random);
-  };
+  Uniform uniform(83);
   for (int i = 0; i < 200; ++i) {
-    auto& s = world.now;
-    s.gravity = {0, -9.81};
-    s.hand.theta = uniform(-3, 3);
-    s.hand_twist.omega = uniform(-5, 5);
-    s.hand_acceleration = {uniform(-10, 10), uniform(-10, 10), uniform(-80, 80)};
+    const auto& s = turn_at_random(uniform, 10, 80);
     const int spin = i % 2 ? 1 : -1;
     const Relative<double> y{{uniform(0.01, 0.15), 0}, 0.1, {0, 0}, spin * uniform(0.1, 5)};
     const auto f = wrench(spin > 0 ? kPivotPlus : kPivotMinus, y);
@@ -306,17 +310,10 @@ TEST_F(Pivot, AZeroSpinThatAttractsFromBothSidesIsHeld) {
   // In slide f_p jumps with the rotation, so both spins may be driven back to zero where holding would take
   // more than τ_max by the hand's α. The rotation then stays at rest, by a torque and a force that friction
   // has.
-  std::mt19937_64 random(84);
-  const auto uniform = [&](double a, double b) {
-    return std::uniform_real_distribution<double>(a, b)(random);
-  };
+  Uniform uniform(84);
   int attracting = 0;
   for (int i = 0; i < 20000; ++i) {
-    auto& s = world.now;
-    s.gravity = {0, -9.81};
-    s.hand.theta = uniform(-3, 3);
-    s.hand_twist.omega = uniform(-5, 5);
-    s.hand_acceleration = {uniform(-100, 100), uniform(-100, 100), uniform(-300, 300)};
+    turn_at_random(uniform, 100, 300);
     const Relative<double> y{{uniform(0.01, 0.15), 0}, 0, {uniform(-1, 1), uniform(-1, 1)}, 0};
     const int mode = start(y);
     if (!model.mode_name(mode).starts_with("slide")) continue;

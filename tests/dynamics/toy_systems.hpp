@@ -86,6 +86,15 @@ auto until_guard(std::vector<Guard> list, Flow flow, Guards guards, FlowKind kin
 inline auto no_guards() {
   return [](int, const auto&, const auto&, auto*) {};
 }
+/// The only phase of a run without events.
+inline constexpr Phase kPhase{0, {0, 100}};
+
+/// One flow, no guards.
+template <class Flow>
+auto free_flow(Flow flow, FlowKind kind = FlowKind::smooth) {
+  return Toy({{kind, {}}}, flow, no_guards(), enter(0));
+}
+
 /// x'' = -x.
 inline auto oscillator() {
   return [](int, const auto&, const auto& y, auto& dy) {

@@ -1,0 +1,100 @@
+// Derivatives through the landing against differences.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <functional>
+
+#include "flight/fly.hpp"
+
+namespace unhand::flight {
+namespace {
+
+using dynamics::Dual;
+using dynamics::independent;
+constexpr double g = 9.81;
+
+dynamics::IntegratorOptions tight() {
+  dynamics::IntegratorOptions options;
+  options.tolerances = {1e-12, 1e-13};
+  return options;
+}
+
+/// The smallest distance of a central difference from `derivative` over steps of 1e-1 to 1e-7.
+double best_difference(const std::function<double(double)>& f, double x, double derivative) {
+  double best = INFINITY;
+  for (double step = 1e-1; step > 0.5e-7; step *= 0.1)
+    best = std::min(best, std::abs((f(x + step) - f(x - step)) / (2 * step) - derivative));
+  return best;
+}
+
+struct DerivativeCase {
+  const char* name;
+  double drag, tracked;
+};
+class LandingDerivatives : public testing::TestWithParam<DerivativeCase> {};
+INSTANTIATE_TEST_SUITE_P(, LandingDerivatives,
+                         testing::Values(DerivativeCase{"Projectile", 0, 0}, DerivativeCase{"Drag", 0.3, 0},
+                                         DerivativeCase{"TrackedPoint", 0, 0.08},
+                                         DerivativeCase{"Both", 0.3, 0.08}),
+                         [](const auto& test) { return test.param.name; });
+
+TEST_P(LandingDerivatives, AgreeWithCentralDifferences) {
+  // z, vx, vz, omega, g_x, g_z, drag, tracked x; theta and the height in a second sweep.
+  const std::array<double, 10> p{1.1, 1.5, 2.0, 6.0, 0.4, -g, GetParam().drag, GetParam().tracked, 0.3, 0.05};
+  const auto land = [&](const std::array<Dual, 10>& x) {
+    FlightProblem<Dual> problem;
+    problem.pose = {Dual(0.1), x[0], x[8]};
+    problem.twist = {x[1], x[2], x[3]};
+    problem.gravity = {x[4], x[5]};
+    problem.drag_k = x[6];
+    problem.tracked = {x[7], Dual(0)};
+    problem.landing_height = x[9];
+    const auto result = fly(problem, tight());
+    EXPECT_EQ(result.outcome, FlightOutcome::landed);
+    const auto& l = result.landing;
+    return std::array<Dual, 7>{l.flight_time, l.pose.x,   l.pose.z,     l.pose.theta,
+                               l.twist.vx,    l.twist.vz, l.twist.omega};
+  };
+  for (const int first : {0, 8}) {
+    const int last = first == 0 ? 8 : 10;
+    std::array<Dual, 10> seeded;
+    for (int k = 0; k < 10; ++k)
+      seeded[k] = k >= first && k < last ? independent(p[k], k - first) : Dual(p[k]);
+    const auto end = land(seeded);
+    for (int k = first; k < last; ++k) {
+      if (k == 6 && p[k] == 0) continue;  // drag has one side at zero: below
+      for (int i = 0; i < 7; ++i) {
+        const auto f = [&](double value) {
+          std::array<Dual, 10> x;
+          for (int j = 0; j < 10; ++j) x[j] = Dual(j == k ? value : p[j]);
+          return land(x)[i].a;
+        };
+        // The bottom of the V: truncation of order 10 step², noise of the steps' choice 1e-12 over the step.
+        EXPECT_LT(best_difference(f, p[k], end[i].v[k - first]), 5e-7)
+            << "parameter " << k << " component " << i;
+      }
+    }
+  }
+}
+
+TEST(LandingDerivative, ByDragAtNoDrag) {
+  FlightProblem<Dual> p;
+  p.pose = {Dual(0.0), Dual(1.0), Dual(0.0)};
+  p.twist = {Dual(2.0), Dual(1.5), Dual(3.0)};
+  p.gravity = {Dual(0.0), Dual(-g)};
+  p.drag_k = independent(0.0, 0);
+  const Dual x = fly(p, tight()).landing.pose.x;
+  const auto at = [&](double k) {
+    p.drag_k = Dual(k);
+    return fly(p, tight()).landing.pose.x.a;
+  };
+  double best = INFINITY;  // one-sided, of second order
+  for (double step = 1e-2; step > 1e-7; step *= 0.1)
+    best = std::min(best, std::abs((4 * at(step) - at(2 * step) - 3 * at(0)) / (2 * step) - x.v[0]));
+  EXPECT_LT(best, 1e-6);
+  EXPECT_LT(x.v[0], 0);
+}
+
+}  // namespace
+}  // namespace unhand::flight
