@@ -9,7 +9,7 @@ namespace unhand::fitting {
 /// A fall of the held-out χ², over groups.
 struct HeldOutFall {
   double was{}, is{};  ///< χ² per sample
-  double p{1};         ///< one-sided, paired over groups
+  double p{1};         ///< of a fall by chance: one-sided, jackknife over groups
   double share{};      ///< the largest share of a channel's misfit beyond the noise that goes
   double fall() const { return was - is; }
 };
