@@ -35,13 +35,12 @@ constexpr OtherUnit kForces[] = {{1e3, "mN for N, or the object's mass in t"},
 constexpr OtherUnit kTorques[] = {{1e3, "N mm for N m"},
                                   {100, "N cm for N m"},
                                   {100 / kStandardGravity, "kgf cm for N m"},
-                                  {1 / kStandardGravity, "kgf m for N m"},
-                                  {1e-3, "kN m for N m, or the object's com_offset in mm"}};
+                                  {1 / kStandardGravity, "kgf m for N m"}};
 constexpr OtherUnit kTimes[] = {{1e3, "ms for s"}, {1e6, "us for s"}, {1e9, "ns for s"}};
 
 /// One side of a comparison.
 struct Side {
-  const char *path, *column;
+  const char *path, *column;  ///< the path inside a throw, or from the root
   std::span<const OtherUnit> units;
 };
 /// Two columns that say the same of a throw.
@@ -73,6 +72,10 @@ const std::map<SizedColumn, Rule> kRules{
      {{"mocap/pose", "position", kLengths}, {"hand/pose", "position", kLengths}, "while the object is held"}},
     {SizedColumn::held_turn,
      {{"mocap/pose", "theta", kAngles}, {"hand/pose", "theta", kAngles}, "while the object is held"}},
+    {SizedColumn::lever,
+     {{"/objects/*@com_offset", "com_offset", kLengths},
+      kDeclared,
+      "motion capture sees between hand and held object"}},
     {SizedColumn::force,
      {{"ft/wrench", "force", kForces}, kDeclared, "mass and motion of the held object need"}},
     {SizedColumn::torque,
@@ -82,6 +85,10 @@ const std::map<SizedColumn, Rule> kRules{
     {SizedColumn::landing_turn,
      {{"landing/pose", "theta", kAngles}, {"mocap/pose", "theta", kAngles}, "just before the landing"}},
 };
+
+std::string path_of(const Side& side) {
+  return side.path[0] == '/' ? side.path : fmt::format("/throws/*/{}", side.path);
+}
 
 const OtherUnit* explains(const Side& side, double ratio, double within) {
   const OtherUnit* nearest = nullptr;
@@ -106,7 +113,7 @@ std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log) {
     const auto doubt = [&](const Side& side, const Side& other, double size) {
       const OtherUnit* unit = explains(side, size, rule.within);
       if (!unit) return;
-      const std::string path = fmt::format("/throws/*/{}", side.path);
+      const std::string path = path_of(side);
       if (std::any_of(out.begin(), out.end(),
                       [&](const auto& told) { return told.path == path && told.column == side.column; }))
         return;
@@ -121,6 +128,15 @@ std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log) {
     doubt(rule.expected, rule.seen, 1 / ratio);
     if (column == SizedColumn::hand_clock && !out.empty()) return out;  // it is behind all that follows
   }
+  std::vector<double> angles;
+  for (const auto& one : log.throws)
+    if (one.grasp_angle) angles.push_back(std::abs(*one.grasp_angle));
+  if (const double turn = angles.empty() ? 0 : dynamics::median(angles); turn > 2 * std::numbers::pi)
+    out.push_back(
+        {"/throws/*@grasp_angle", "grasp_angle", turn, static_cast<int>(angles.size()),
+         fmt::format("grasp_angle is {:.3g} rad (median of {} throws), more than a whole turn: degrees "
+                     "for rad?",
+                     turn, angles.size())});
   const auto& friction = ratios[SizedColumn::slip_force];
   const double mu = friction.empty() ? kMostFriction : dynamics::median(friction);
   if (out.empty() && (mu < kLeastFriction || mu > kMostFriction))

@@ -13,7 +13,7 @@ struct UnitDoubt {
   std::string path;    ///< in the log: "/throws/*/mocap/pose"
   std::string column;  ///< "theta"
   double ratio{};      ///< its size over what the other channels say, median over throws; of the normal
-                       ///< force: the friction that the wrenches take of it
+                       ///< force: the friction that the wrenches take of it; of grasp_angle: itself
   int throws{};        ///< that show it
   std::string reason;  ///< in words, with the unit that would explain it
 };
@@ -28,11 +28,12 @@ inline constexpr double kMostFriction = 3;
 /// unit in use (mm, cm, inch; degrees; kgf, lbf, mN, kN; N mm, N cm, kgf cm; ms; g). Compared are
 ///
 /// - the hand's pose with the sum of its twist, the twist with the sum of the acceleration;
-/// - the object's motion with the hand's while it is held;
+/// - the object's motion with the hand's while it is held, and its declared com_offset with its distance
+/// then;
 /// - the wrench of all pads with what the held body's mass, inertia and lever need (Newton and Euler);
 /// - the landing with the hand's state at the opening (as a free flight from there: to a factor of three)
 ///   and with the attitude that motion capture saw last;
-/// - the clocks of the groups with each other;
+/// - the clocks of the groups with each other; a declared grasp_angle with a whole turn;
 /// - the wrench with the normal force while that falls through its last fifth and the pads slip: no
 ///   channel knows the unit of the normal force, of which only the product with friction is determined, but
 ///   in another one friction lies outside [kLeastFriction, kMostFriction].

@@ -36,7 +36,8 @@ class Pairs {
 };
 
 // What shows: far above any sensor's noise.
-constexpr double kShift = 0.02, kTurn = 0.02, kSpeed = 0.1, kSpin = 0.1, kNewton = 0.1, kNewtonMetre = 2e-3;
+constexpr double kShift = 0.02, kTurn = 0.02, kSpeed = 0.1, kSpin = 0.1, kNewton = 0.1, kNewtonMetre = 2e-3,
+                 kLever = 5e-3;
 
 /// Every sample of `value` minus the first, beside its derivative added up (trapezoids).
 std::optional<double> ratio_to_integral(const Series& time, const Series& value, const Series& rate,
@@ -96,12 +97,13 @@ std::optional<double> check_mocap(const Held& held, SizeRatios& out) {
   if (!held.logged.mocap) return held.logged.grasp_angle;
   const auto& mocap = *held.logged.mocap;
   Pairs shift, turn;
-  double farthest = 0, widest = 0, angle = 0, n = 0;
+  double farthest = 0, widest = 0, angle = 0, distance = 0, n = 0;
   std::optional<std::pair<std::size_t, std::array<double, 3>>> first;
   for (std::size_t i = 0; i < mocap.time.rows; ++i) {
     if (!mocap.is_valid(i) || !held.covers(mocap.time(i))) continue;
     const auto pose = at(held.hand.time, held.hand.pose, mocap.time(i));
     angle += mocap.pose(i, 2) - pose[2], n += 1;
+    distance += std::hypot(mocap.pose(i, 0) - pose[0], mocap.pose(i, 1) - pose[1]);
     if (!first) first = {i, pose};
     const auto& [i0, from] = *first;
     for (std::size_t c = 0; c < 2; ++c) shift.add(mocap.pose(i, c) - mocap.pose(i0, c), pose[c] - from[c]);
@@ -113,6 +115,8 @@ std::optional<double> check_mocap(const Held& held, SizeRatios& out) {
   if (farthest > held.lever() * std::min(widest, 2.0))
     keep(out, SizedColumn::held_shift, shift.ratio(kShift));
   keep(out, SizedColumn::held_turn, turn.ratio(kTurn));
+  if (const auto offset = held.object().com_offset; offset && n > 0 && distance > n * kLever)
+    keep(out, SizedColumn::lever, std::abs(*offset) * n / distance);
   return n > 0 ? std::optional(angle / n) : held.logged.grasp_angle;
 }
 

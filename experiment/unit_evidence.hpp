@@ -20,6 +20,7 @@ enum class SizedColumn {
   hand_spin,      ///< the same of the rate
   held_shift,     ///< the object's position against the hand's while it is held
   held_turn,      ///< the same of the angle
+  lever,          ///< declared com_offset against the distance at which motion capture sees the object
   force,          ///< against Newton's law of the held body
   torque,         ///< against Euler's
   landing_x,      ///< against a free flight from the opening

@@ -133,6 +133,28 @@ TEST(UnitCheck, MassesInGramsShowInTheForce) {
   }
 }
 
+TEST(UnitCheck, LeversInMillimetresShowInTheDistanceOfTheObject) {
+  auto log = campaign();
+  for (auto& [name, object] : log.objects) *object.com_offset *= 1e3;
+  try {
+    require_units(log, "log.h5");
+    FAIL();
+  } catch (const datasets::LogError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("/objects/*@com_offset"), HasSubstr("mm for m")));
+  }
+}
+
+TEST(UnitCheck, AGraspAngleBeyondAWholeTurnIsInDegrees) {
+  auto log = campaign();
+  for (auto& one : log.throws) one.mocap.reset(), one.grasp_angle = -22;
+  try {
+    require_units(log, "log.h5");
+    FAIL();
+  } catch (const datasets::LogError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("@grasp_angle"), HasSubstr("degrees for rad")));
+  }
+}
+
 TEST(UnitCheck, WithoutAnOpeningCommandTheForceTellsWhenItOpens) {
   auto log = campaign();
   log.gripper->opening_command_time.reset();
