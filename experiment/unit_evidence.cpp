@@ -187,6 +187,7 @@ void check_friction(const datasets::ThrowLog& log, const datasets::FtLog& ft, do
                     SizeRatios& out) {
   const double length = 2.0 / 3.0 * (log.gripper ? log.gripper->pad_radius.value_or(HUGE_VAL) : HUGE_VAL);
   const auto& force = ft.normal_force;
+  if (force.empty()) return;
   const double most = *std::max_element(force.data.begin(), force.data.end()),
                sigma = force.sigma.empty() ? 0 : force.sigma.front(), low = std::max(0.02 * most, 4 * sigma);
   std::vector<double> ratios;
@@ -199,7 +200,7 @@ void check_friction(const datasets::ThrowLog& log, const datasets::FtLog& ft, do
 /// When the gripper opens: the command, else where the normal force has fallen to half [s].
 std::optional<double> opening_of(const datasets::ThrowLog& log, const datasets::Throw& logged) {
   if (log.gripper && log.gripper->opening_command_time) return log.gripper->opening_command_time;
-  if (!logged.ft) return logged.detach_time;
+  if (!logged.ft || logged.ft->normal_force.empty()) return logged.detach_time;
   const auto& force = logged.ft->normal_force.data;
   const auto most = std::max_element(force.begin(), force.end());
   const auto half = std::find_if(most, force.end(), [&](double f) { return f < 0.5 * *most; });
