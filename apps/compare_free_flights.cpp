@@ -26,7 +26,7 @@ struct SplitOf {
   const char* name;
   const FreeFlightStatistics FreeFlightComparison::*statistics;
 };
-constexpr SplitOf splits[] = {{Split::train, "train", &FreeFlightComparison::train},
+constexpr SplitOf kFlightSplits[] = {{Split::train, "train", &FreeFlightComparison::train},
                               {Split::test, "test", &FreeFlightComparison::test}};
 
 Json json_of(const experiment::Spread& s) {
@@ -53,7 +53,7 @@ Json flights_json(const std::vector<FreeFlightComparison>& models, const Compare
     Json& one = all[model.model];
     one["parameters"] = Json::object();
     one["failed"] = model.skipped;
-    for (const auto& [split, name, member] : splits) {
+    for (const auto& [split, name, member] : kFlightSplits) {
       const FreeFlightStatistics& s = model.*member;
       one[name] = {{"n", s.n}, {"trajectory_rms_m", nullptr}};
       if (s.n > 0) one[name]["trajectory_rms_m"] = s.trajectory_rms_m;
@@ -70,7 +70,7 @@ Table flights_table(const std::vector<FreeFlightComparison>& models) {
              "end orientation [deg]", "median", "us/throw"},
             {},
             2};
-  for (const auto& [split, name, member] : splits)
+  for (const auto& [split, name, member] : kFlightSplits)
     for (const auto& model : models) {
       const FreeFlightStatistics& s = model.*member;
       const auto &p = s.end_position_error_m, &a = s.end_orientation_error_deg;

@@ -15,7 +15,7 @@ using experiment::ErrorStatistics;
 using experiment::ModelComparison;
 
 constexpr int decimals[experiment::kQuantityCount] = {4, 2, 4, 2};
-constexpr std::pair<Split, const char*> splits[] = {{Split::train, "train"}, {Split::test, "test"}};
+constexpr std::pair<Split, const char*> kThrowSplits[] = {{Split::train, "train"}, {Split::test, "test"}};
 
 struct Count {
   int throws{}, failed{};
@@ -61,7 +61,7 @@ ReleaseTables release_tables(const experiment::Comparison& comparison, const dat
     out.bias.header.push_back(quantity.title);
   }
   out.errors.header.push_back("us/throw");
-  for (const auto& [split, name] : splits) {
+  for (const auto& [split, name] : kThrowSplits) {
     for (const auto& model : comparison.models) {
       const Count counted = count(model, split);
       std::vector<std::string> row{model.model, name, fmt::to_string(counted.throws),
@@ -131,7 +131,7 @@ Json release_json(const experiment::Comparison& comparison, const CompareRequest
                        {"samples", model.estimate.samples},
                        {"scatter", model.estimate.scatter}};
     one["failed"] = model.failed;
-    for (const auto& [split, name] : splits) one[name] = split_json(model, split);
+    for (const auto& [split, name] : kThrowSplits) one[name] = split_json(model, split);
     one["microseconds_per_throw"] = model.microseconds_per_throw;
   }
   return out;

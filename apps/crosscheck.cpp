@@ -28,7 +28,7 @@ using crosscheck::BulletPads;
 using experiment::kDegrees;
 using experiment::Prediction;
 
-struct Options {
+struct CrosscheckOptions {
   std::string log, engine{"bullet"}, card, json;
   std::vector<std::string> models{"limit_surface_disc", "limit_surface", "sliding_pivot"};
   std::vector<double> steps;
@@ -48,7 +48,7 @@ struct Setting {
 
 using Throws = std::vector<experiment::PreparedThrow>;
 
-experiment::ModelParameters parameters_of(const Options& options, const datasets::ThrowLog& log,
+experiment::ModelParameters parameters_of(const CrosscheckOptions& options, const datasets::ThrowLog& log,
                                           const Throws& prepared, std::string& from) {
   if (!options.card.empty()) {
     const UsableCard card = read_usable_card(options.card);
@@ -98,7 +98,7 @@ Prediction from_engine(const experiment::PreparedThrow& thrown, const experiment
   return out;
 }
 
-std::vector<Setting> run_engine(const Options& options, const Throws& throws,
+std::vector<Setting> run_engine(const CrosscheckOptions& options, const Throws& throws,
                                 const experiment::ModelParameters& p) {
   std::vector<Setting> out;
   const contact::Patch<double> patch{p.mu, 1.5 * p.length, 2.0 / 3,
@@ -229,7 +229,7 @@ Json throws_json(const Setting& setting, const Throws& throws) {
   return out;
 }
 
-void check(const Options& options) {
+void check(const CrosscheckOptions& options) {
   require_writable(options.json);
   const auto known = contact::contact_model_names();
   for (const auto& model : options.models)
@@ -302,7 +302,7 @@ void check(const Options& options) {
 }  // namespace
 
 Command crosscheck_command(Parser& root) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CrosscheckOptions>();
   Parser& parser = root.subcommand("crosscheck", "Another engine on a log's throws, beside the models");
   parser.option("LOG", options->log, "A throw log").required();
   parser

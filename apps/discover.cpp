@@ -24,7 +24,7 @@ namespace {
 using fitting::Discovery;
 using fitting::OutcomeErrors;
 
-struct Options {
+struct DiscoverOptions {
   std::string log, model{"limit_surface_disc"}, report, json, card;
   std::vector<std::string> forget;
   double matters{0.5}, tolerance{1e-5}, floor{0};
@@ -95,7 +95,7 @@ Json misfit_json(const std::vector<fitting::ChannelMisfit>& misfit) {
   return out;
 }
 
-void discover(const Options& options, const std::string& command) {
+void discover(const DiscoverOptions& options, const std::string& command) {
   require_writable(options.json);
   require_writable(options.card);
   if (!options.report.empty()) {
@@ -245,7 +245,7 @@ std::vector<std::string> base_models() {
 }  // namespace
 
 Command discover_command(Parser& root) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DiscoverOptions>();
   Parser& parser = root.subcommand("discover",
                                    "Find what a model lacks: trace the residual to an effect, add it, "
                                    "and report the error before and after");

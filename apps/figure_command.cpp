@@ -20,7 +20,7 @@
 namespace unhand::apps {
 namespace {
 
-struct Options {
+struct FigureCommandOptions {
   std::string name, log, thrown, out{"."};
   std::vector<std::string> models{"limit_surface_disc", "limit_surface", "sliding_pivot"};
   int threads{0};
@@ -32,13 +32,13 @@ struct Source {
   datasets::ThrowLog log;
 };
 
-Source source_of(const Options& options) {
+Source source_of(const FigureCommandOptions& options) {
   if (!options.log.empty()) return {options.log, read_throws(options.log)};
   fmt::print(stderr, "unhand: no --log: drawn from the synthetic campaign quick12, seed 1\n");
   return {"quick12 (synthetic)", experiment::generate_campaign(experiment::campaign_design("quick12"), 1)};
 }
 
-const datasets::Throw& chosen(const Source& source, const Options& options) {
+const datasets::Throw& chosen(const Source& source, const FigureCommandOptions& options) {
   if (options.thrown.empty()) return source.log.throws.front();
   for (const auto& one : source.log.throws)
     if (one.id == options.thrown) return one;
@@ -46,7 +46,7 @@ const datasets::Throw& chosen(const Source& source, const Options& options) {
 }
 
 /// One throw through every model, recorded.
-std::vector<ReleaseTrace> traces_of(const Source& source, const Options& options) {
+std::vector<ReleaseTrace> traces_of(const Source& source, const FigureCommandOptions& options) {
   const auto all = experiment::prepare_all(source.log, source.file, options.threads);
   const auto& one = chosen(source, options);
   const auto& prepared = *std::find_if(all.begin(), all.end(), [&](const auto& p) { return p.id == one.id; });
@@ -68,7 +68,7 @@ std::vector<ReleaseTrace> traces_of(const Source& source, const Options& options
   return out;
 }
 
-experiment::Comparison compared(const Source& source, const Options& options) {
+experiment::Comparison compared(const Source& source, const FigureCommandOptions& options) {
   experiment::CompareOptions request;
   request.models = options.models;
   request.threads = options.threads;
@@ -76,7 +76,7 @@ experiment::Comparison compared(const Source& source, const Options& options) {
 }
 
 /// Predicted from the twist at detach that the first model says.
-FlightOverlay overlay_of(const Source& source, const Options& options) {
+FlightOverlay overlay_of(const Source& source, const FigureCommandOptions& options) {
   const auto comparison = compared(
       source,
       {options.name, options.log, options.thrown, options.out, {options.models.front()}, options.threads});
@@ -169,37 +169,41 @@ Figure required(std::optional<Figure> figure, const Source& source) {
 
 struct Kind {
   const char *name, *what;
-  std::function<Figure(const Source&, const Options&)> make;
+  std::function<Figure(const Source&, const FigureCommandOptions&)> make;
 };
 
 const std::vector<Kind>& kinds() {
   static const std::vector<Kind> all{
       {"landing-errors", "landing errors of each model, theta against x",
-       [](const Source& s, const Options& o) { return required(landing_figure(compared(s, o)), s); }},
+       [](const Source& s, const FigureCommandOptions& o) {
+         return required(landing_figure(compared(s, o)), s);
+       }},
       {"conditions", "mean landing errors of each condition",
-       [](const Source& s, const Options& o) { return required(condition_figure(compared(s, o)), s); }},
+       [](const Source& s, const FigureCommandOptions& o) {
+         return required(condition_figure(compared(s, o)), s);
+       }},
       {"mae", "table of mean absolute errors with their standard deviation",
-       [](const Source& s, const Options& o) { return mae_figure(compared(s, o)); }},
+       [](const Source& s, const FigureCommandOptions& o) { return mae_figure(compared(s, o)); }},
       {"modes", "normal force and modes of one throw over time",
-       [](const Source& s, const Options& o) { return mode_figure(traces_of(s, o)); }},
+       [](const Source& s, const FigureCommandOptions& o) { return mode_figure(traces_of(s, o)); }},
       {"wrench", "the wrench of one throw on the limit surface",
-       [](const Source& s, const Options& o) { return wrench_figure(traces_of(s, o)); }},
+       [](const Source& s, const FigureCommandOptions& o) { return wrench_figure(traces_of(s, o)); }},
       {"pivot", "the object of one throw turning in the hand",
-       [](const Source& s, const Options& o) { return pivot_figure(traces_of(s, o)); }},
+       [](const Source& s, const FigureCommandOptions& o) { return pivot_figure(traces_of(s, o)); }},
       {"phase", "slip against relative spin of one throw",
-       [](const Source& s, const Options& o) {
+       [](const Source& s, const FigureCommandOptions& o) {
          const auto throws = experiment::prepare_all(s.log, s.file, o.threads);
          return phase_figure(
              traces_of(s, o),
              experiment::estimate_friction(s.log, throws, o.models.front()).parameters.length);
        }},
       {"flight", "one flight, predicted and tracked, with the residual",
-       [](const Source& s, const Options& o) { return flight_figure(overlay_of(s, o)); }},
+       [](const Source& s, const FigureCommandOptions& o) { return flight_figure(overlay_of(s, o)); }},
   };
   return all;
 }
 
-void figure(const Options& options) {
+void figure(const FigureCommandOptions& options) {
   require_gnuplot();
   require_writable_directory(options.out);
   for (const auto& model : options.models) {
@@ -235,7 +239,7 @@ void figure(const Options& options) {
 }  // namespace
 
 Command figure_command(Parser& root) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<FigureCommandOptions>();
   Parser& parser = root.subcommand("figure", "Draw one figure, or all, of a log");
   std::string listed = "Which:";
   for (const Kind& kind : kinds()) listed += fmt::format("\n{}: {}", kind.name, kind.what);

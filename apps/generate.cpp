@@ -16,7 +16,7 @@
 namespace unhand::apps {
 namespace {
 
-struct Options {
+struct GenerateOptions {
   std::string campaign, out, json, truth;
   std::uint64_t seed{1};
   std::vector<std::string> effects, without;
@@ -25,7 +25,7 @@ struct Options {
 
 constexpr const char* kRandomEffect = "random";
 
-experiment::CampaignDesign design_of(const Options& options) {
+experiment::CampaignDesign design_of(const GenerateOptions& options) {
   const auto names = experiment::campaign_names();
   if (std::find(names.begin(), names.end(), options.campaign) == names.end())
     throw WrongUsage(fmt::format("no campaign is called '{}': choose one of {}", options.campaign,
@@ -56,7 +56,7 @@ experiment::CampaignDesign design_of(const Options& options) {
 }
 
 std::vector<experiment::SyntheticThrow> simulate(const experiment::CampaignDesign& design,
-                                                 const Options& options) {
+                                                 const GenerateOptions& options) {
   std::vector<experiment::SyntheticThrow> throws(static_cast<std::size_t>(design.throws()));
   Progress progress("generate", throws.size());
   experiment::parallel_for(throws.size(), options.threads, [&](std::size_t i) {
@@ -66,7 +66,7 @@ std::vector<experiment::SyntheticThrow> simulate(const experiment::CampaignDesig
   return throws;
 }
 
-void generate(const Options& options) {
+void generate(const GenerateOptions& options) {
   const auto design = design_of(options);
   for (const std::string& file : {options.out, options.json, options.truth}) require_writable(file);
   auto throws = simulate(design, options);
@@ -119,7 +119,7 @@ std::string footer() {
 }  // namespace
 
 Command generate_command(Parser& root) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<GenerateOptions>();
   Parser& parser = root.subcommand("generate", "Make the throw log of a synthetic campaign");
   parser
       .option("CAMPAIGN", options->campaign,

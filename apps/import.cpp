@@ -12,7 +12,7 @@
 namespace unhand::apps {
 namespace {
 
-struct Options {
+struct ImportOptions {
   std::string format, out, json;
   std::vector<std::string> inputs;
   LabOptions lab;
@@ -25,7 +25,7 @@ struct Imported {
   Json details;
 };
 
-Imported import_cubes(const Options& options, Outputs& outputs) {
+Imported import_cubes(const ImportOptions& options, Outputs& outputs) {
   if (options.inputs.size() != 1)
     throw WrongUsage(fmt::format("cube-tosses takes one CSV file, not {}", options.inputs.size()));
   datasets::ImportReport report;
@@ -45,12 +45,12 @@ Imported import_cubes(const Options& options, Outputs& outputs) {
   return out;
 }
 
-Imported import_lab_files(const Options& options, Outputs& outputs) {
+Imported import_lab_files(const ImportOptions& options, Outputs& outputs) {
   LabImport imported = import_lab(options.format, options.inputs, options.out, options.lab, outputs);
   return {std::move(imported.text), std::move(imported.details)};
 }
 
-Imported import_pushes(const Options& options, Outputs& outputs) {
+Imported import_pushes(const ImportOptions& options, Outputs& outputs) {
   const std::vector<std::filesystem::path> inputs(options.inputs.begin(), options.inputs.end());
   datasets::PlanarPushReport report;
   const auto log = datasets::import_planar_pushes(inputs, {}, &report);
@@ -79,7 +79,7 @@ Imported import_pushes(const Options& options, Outputs& outputs) {
 
 struct Format {
   const char *name, *summary, *example;
-  Imported (*read)(const Options&, Outputs&);
+  Imported (*read)(const ImportOptions&, Outputs&);
 };
 /// An importer is one line here.
 constexpr Format formats[] = {
@@ -116,7 +116,7 @@ std::string examples() {
   return out;
 }
 
-void import(Options& options) {
+void import(ImportOptions& options) {
   if (options.out.empty()) options.out = options.lab.into;
   if (options.out.empty()) throw WrongUsage("--out is required: the log to write");
   for (const Format& format : formats) {
@@ -144,7 +144,7 @@ void import(Options& options) {
 }  // namespace
 
 Command import_command(Parser& root) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ImportOptions>();
   Parser& parser = root.subcommand("import", "Make a log from measured data in another format");
   parser.option("FORMAT", options->format, "Which format:" + known_formats()).required();
   parser.option("INPUT", options->inputs, "The files to read").required();

@@ -14,7 +14,7 @@
 namespace unhand::apps {
 namespace {
 
-struct Options {
+struct InspectOptions {
   std::string log;
   std::string json;
   bool json_wanted{};
@@ -141,7 +141,7 @@ Inspection inspect_slips(const std::string& file) {
   return out;
 }
 
-void inspect(const Options& options) {
+void inspect(const InspectOptions& options) {
   require_writable(options.json);
   const Inspection seen = datasets::read_schema_name(options.log) == "slip-log" ? inspect_slips(options.log)
                                                                                 : inspect_throws(options.log);
@@ -160,7 +160,7 @@ void inspect(const Options& options) {
 }  // namespace
 
 Command inspect_command(Parser& root) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<InspectOptions>();
   Parser& parser =
       root.subcommand("inspect", "Show what is in a log: units, rates, gaps, noise, schema errors");
   parser.option("LOG", options->log, "A throw log or slip log").required();

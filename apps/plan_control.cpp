@@ -17,7 +17,7 @@ namespace {
 namespace ct = planners::control;
 namespace fs = std::filesystem;
 
-struct Options {
+struct PlanControlOptions {
   std::string json, report;
   int seeds{50}, repetitions{4}, threads{0};
   double box{0.2};
@@ -91,7 +91,7 @@ void draw_errors(const std::vector<ct::StudyThrow>& recorded,
   draw(figure, folder);
 }
 
-void run(const Options& o) {
+void run(const PlanControlOptions& o) {
   if (!o.report.empty()) {
     require_gnuplot();
     require_writable_directory(o.report);
@@ -161,7 +161,7 @@ void run(const Options& o) {
 }  // namespace
 
 Command plan_control_command(Parser& plan) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<PlanControlOptions>();
   Parser& parser =
       plan.subcommand("control", "Throws of unknown objects under adaptive and plain computed torque");
   parser.footer("Example: unhand plan control --report out/control");

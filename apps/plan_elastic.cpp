@@ -20,7 +20,7 @@ namespace {
 namespace el = planners::elastic;
 namespace fs = std::filesystem;
 
-struct Options {
+struct PlanElasticOptions {
   std::string arm{"bsa3"}, json, report;
   int starts{10}, intervals{16}, nodes{9}, checks{161};
   double longest{0}, elevation{45}, target_x{0}, target_z{-0.5}, half_table{0.4}, box{0.5};
@@ -103,14 +103,14 @@ void draw_table(const std::vector<el::TableCheck>& checks, const fs::path& folde
   draw(figure, folder);
 }
 
-el::ThrowProgramOptions program_options(const Options& o) {
+el::ThrowProgramOptions program_options(const PlanElasticOptions& o) {
   el::ThrowProgramOptions out;
   out.intervals = o.intervals;
   out.seed = o.seed;
   return out;
 }
 
-void fastest(const el::ClutchedArm& arm, const Options& o, Outputs& outputs, Json& json) {
+void fastest(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs& outputs, Json& json) {
   el::ThrowTask task;
   task.longest = o.longest > 0 ? o.longest : 0.6;
   task.elevation = o.elevation * M_PI / 180;
@@ -176,7 +176,7 @@ void fastest(const el::ClutchedArm& arm, const Options& o, Outputs& outputs, Jso
   }
 }
 
-void to_target(const el::ClutchedArm& arm, const Options& o, Outputs& outputs, Json& json) {
+void to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs& outputs, Json& json) {
   el::ThrowTask task;
   task.longest = o.longest > 0 ? o.longest : 1.0;
   task.start = kReadyPose;
@@ -235,7 +235,7 @@ void to_target(const el::ClutchedArm& arm, const Options& o, Outputs& outputs, J
   }
 }
 
-void run(const Options& o) {
+void run(const PlanElasticOptions& o) {
   if (!o.report.empty()) {
     require_gnuplot();
     require_writable_directory(o.report);
@@ -256,7 +256,7 @@ void run(const Options& o) {
 }  // namespace
 
 Command plan_elastic_command(Parser& plan) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<PlanElasticOptions>();
   Parser& parser = plan.subcommand(
       "elastic",
       "Optimal throws of an arm with a clutched spring: the fastest, or a table of throws to targets");

@@ -22,9 +22,7 @@ namespace {
 
 namespace fl = planners::flip;
 
-constexpr double kDegree = std::numbers::pi / 180;
-
-struct Options {
+struct PlanFlipOptions {
   std::string target, learner{"m4"}, robot{"panda-flip"}, sku, card, json, report;
   std::uint64_t seed{1};
   int iterations{5}, throws{3}, repeats{5};
@@ -42,7 +40,7 @@ fl::FlipTarget target_of(const std::string& text) {
 }
 
 /// The bar that is thrown.
-fl::Bar bar_of(const Options& o, const fl::FlipRobot& robot) {
+fl::Bar bar_of(const PlanFlipOptions& o, const fl::FlipRobot& robot) {
   fl::Bar out = robot.bar;
   if (!o.sku.empty()) {
     const datasets::Sku sku = datasets::read_sku(o.sku);
@@ -93,7 +91,7 @@ void check_reach(const fl::FlipTarget& target, const fl::HandLibrary& library) {
 }
 
 /// The learner, and what it knows: throws of this bar ("support"), or of the old one ("population").
-std::unique_ptr<fl::FlipLearner> learner_of(const Options& o, const fl::FlipRobot& robot,
+std::unique_ptr<fl::FlipLearner> learner_of(const PlanFlipOptions& o, const fl::FlipRobot& robot,
                                             std::optional<fl::HandLibrary>& library,
                                             const fl::Thrower& thrower, FlipAnswer& answer) {
   const fl::CommandRange& range = robot.motion.range;
@@ -130,7 +128,7 @@ std::unique_ptr<fl::FlipLearner> learner_of(const Options& o, const fl::FlipRobo
                                               answer.target, o.throws);
 }
 
-void run(const Options& o) {
+void run(const PlanFlipOptions& o) {
   if (!o.card.empty() && o.learner != "m4") throw WrongUsage("--card: only --learner m4 begins from a card");
   if (!o.report.empty()) {
     require_gnuplot();
@@ -180,7 +178,7 @@ void run(const Options& o) {
 }  // namespace
 
 Command plan_flip_command(Parser& plan) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<PlanFlipOptions>();
   Parser& parser = plan.subcommand(
       "flip", "Learn to throw a bar so that it lands at a place and an angle, on a simulated robot");
   parser.footer(

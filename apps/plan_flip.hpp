@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <numbers>
 #include <optional>
 #include <string>
 
@@ -9,6 +10,8 @@
 #include "planners/flip/session.hpp"
 
 namespace unhand::apps {
+
+inline constexpr double kDegree = std::numbers::pi / 180;  ///< rad
 
 struct FlipAnswer {
   std::string learner;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <set>
 
 #include "apps/figure.hpp"
@@ -16,7 +15,6 @@ namespace {
 
 namespace fl = planners::flip;
 
-constexpr double kDegree = std::numbers::pi / 180;
 const char* kColours[]{"#440154", "#21918c", "#e69f00"};  // of damping: low, middle, high
 const int kMarkers[]{7, 5, 9};                            // of pitch: circle, square, triangle
 const double kSizes[]{0.5, 0.75, 1.0};                    // of speed

@@ -23,7 +23,7 @@ namespace {
 
 using planners::Chain;
 
-struct Options {
+struct PlanThrowOptions {
   std::string arm{"panda"}, target, box{"0.15x0.15"}, card, sku, json, report;
   double window{0.1}, drag{0}, gripper{0.15}, gripper_mass{0.9};
   int draws{1000}, samples{3000};
@@ -32,7 +32,7 @@ struct Options {
 };
 
 /// The arm with its gripper: a tool of `length` along the flange's z, whose mass sits halfway.
-Chain armed(const Options& options) {
+Chain armed(const PlanThrowOptions& options) {
   Chain arm;
   try {
     arm = planners::read_chain(options.arm);
@@ -54,7 +54,7 @@ void make_planar(planners::NominalOptions& search, const Chain& arm) {
   search.face_target = true;
 }
 
-planners::PlanOptions plan_options(const Options& options, const Chain& arm, bool planar) {
+planners::PlanOptions plan_options(const PlanThrowOptions& options, const Chain& arm, bool planar) {
   planners::PlanOptions out;
   out.search.window = options.window;
   out.search.medium.drag_k = options.drag;
@@ -71,7 +71,7 @@ planners::PlanOptions plan_options(const Options& options, const Chain& arm, boo
 
 /// Landings at delays drawn evenly from the window.
 PredictedLandings by_delay(const std::string& name, const ThrowAnswer& a,
-                           const planners::JointVector<double>& qdd, const Options& options) {
+                           const planners::JointVector<double>& qdd, const PlanThrowOptions& options) {
   const planners::TubeProblem problem{
       a.chain, a.plan.nominal.state, a.box.middle, a.window, {9.81, options.drag}};
   const auto table = planners::landings_over_window(problem, qdd, 201);
@@ -92,7 +92,7 @@ PredictedLandings by_delay(const std::string& name, const ThrowAnswer& a,
 }
 
 PredictedLandings by_release(const std::string& name, const ThrowAnswer& a,
-                             const planners::ReleaseThrow& release, const Options& options) {
+                             const planners::ReleaseThrow& release, const PlanThrowOptions& options) {
   PredictedLandings out{name, planners::draw_landings(release, options.draws, options.seed), 0};
   const planners::ThrowPlane plane(planners::forward_kinematics(release.chain, release.start.q).p,
                                    release.target);
@@ -103,7 +103,7 @@ PredictedLandings by_release(const std::string& name, const ThrowAnswer& a,
 
 /// The plan made insensitive to what the card leaves open, where that is possible within the limits.
 void plan_release(ThrowAnswer& a, const Chain& pads, planners::ReleaseThrow release,
-                  const planners::PlanOptions& how, const Options& options) {
+                  const planners::PlanOptions& how, const PlanThrowOptions& options) {
   a.with_release = true;
   a.real = planners::release_landing(release, planners::nominal_draw(release));
   if (!a.real)
@@ -143,7 +143,7 @@ void plan_release(ThrowAnswer& a, const Chain& pads, planners::ReleaseThrow rele
              "unhand: no motion to the insensitive throw stays within the limits; the tube's is kept\n");
 }
 
-void plan_throw(const Options& options) {
+void plan_throw(const PlanThrowOptions& options) {
   require_writable(options.json);
   if (!options.report.empty()) {
     require_writable_directory(options.report);
@@ -208,7 +208,7 @@ void plan_throw(const Options& options) {
 }  // namespace
 
 Command plan_throw_command(Parser& plan) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<PlanThrowOptions>();
   Parser& parser = plan.subcommand("throw", "Throw into a box, whenever exactly the object leaves the hand");
   parser.option("--target", o->target, "Middle of the box in the base's frame, X,Y,Z [m]").required();
   parser.option("--box", o->box, "Opening of the box along x and y, AxB [m]").with_default();

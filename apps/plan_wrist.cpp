@@ -18,7 +18,7 @@ namespace {
 namespace el = planners::elastic;
 namespace fs = std::filesystem;
 
-struct Options {
+struct PlanWristOptions {
   std::string arm{"vsa_wrist"}, json, report;
   double softest{0.5}, stiffest{64}, longest{1.0}, elevation{45};
   int stiffnesses{8}, starts{4}, intervals{8};
@@ -31,7 +31,7 @@ struct Point {
   el::ConfirmedThrow best;
 };
 
-el::ThrowTask task_of(const Options& o, el::Drive drive) {
+el::ThrowTask task_of(const PlanWristOptions& o, el::Drive drive) {
   el::ThrowTask task;
   task.drive = drive;
   task.longest = o.longest;
@@ -51,7 +51,7 @@ void consider(const el::ClutchedArm& arm, const el::ThrowTask& task, const el::E
 }
 
 /// From random starts.
-Point solve(const el::ClutchedArm& arm, const Options& o, el::Drive drive) {
+Point solve(const el::ClutchedArm& arm, const PlanWristOptions& o, el::Drive drive) {
   Point out;
   out.stiffness = arm.last.stiffness;
   el::ThrowProgramOptions program;
@@ -64,7 +64,7 @@ Point solve(const el::ClutchedArm& arm, const Options& o, el::Drive drive) {
 }
 
 /// From the solution with a neighbouring stiffness: random starts miss what a neighbour has found.
-void follow(el::ClutchedArm arm, const Options& o, const Point& from, Point& to) {
+void follow(el::ClutchedArm arm, const PlanWristOptions& o, const Point& from, Point& to) {
   if (from.speed == 0) return;
   arm.last.stiffness = to.stiffness;
   el::ThrowProgramOptions program;
@@ -100,7 +100,7 @@ void draw_gain(const std::vector<Point>& points, const Point& rigid, const fs::p
   draw(figure, folder);
 }
 
-void run(const Options& o) {
+void run(const PlanWristOptions& o) {
   if (!o.report.empty()) {
     require_gnuplot();
     require_writable_directory(o.report);
@@ -172,7 +172,7 @@ void run(const Options& o) {
 }  // namespace
 
 Command plan_wrist_command(Parser& plan) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<PlanWristOptions>();
   Parser& parser =
       plan.subcommand("wrist", "What an elastic wrist adds to the speed of a throw, against its stiffness");
   parser.footer("Example: unhand plan wrist --report out/wrist");

@@ -12,7 +12,7 @@
 namespace unhand::apps {
 namespace {
 
-struct Options {
+struct PredictOptions {
   std::string log, card, json, csv;
   int threads{0};
 };
@@ -130,7 +130,8 @@ struct Predictions {
   Sigmas sigmas;
 };
 
-Predictions predictions_of(const UsableCard& card, const datasets::ThrowLog& log, const Options& options) {
+Predictions predictions_of(const UsableCard& card, const datasets::ThrowLog& log,
+                           const PredictOptions& options) {
   Predictions out;
   if (card.fitted) {
     auto predicted =
@@ -150,7 +151,7 @@ Predictions predictions_of(const UsableCard& card, const datasets::ThrowLog& log
   return out;
 }
 
-void predict(const Options& options) {
+void predict(const PredictOptions& options) {
   require_writable(options.json);
   require_writable(options.csv);
   const UsableCard card = read_usable_card(options.card);
@@ -188,7 +189,7 @@ void predict(const Options& options) {
 }  // namespace
 
 Command predict_command(Parser& root) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<PredictOptions>();
   Parser& parser =
       root.subcommand("predict", "Predict each throw of a log with a card's model and parameters");
   parser.option("LOG", options->log, "A throw log; outcomes need not be in it").required();

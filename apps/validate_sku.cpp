@@ -14,7 +14,7 @@
 namespace unhand::apps {
 namespace {
 
-struct Options {
+struct ValidateSkuOptions {
   std::string sku, card, log, condition, json, report;
   std::vector<double> tolerance{0.05, 45};  ///< m, deg
   fitting::SkuRequest request;
@@ -40,7 +40,7 @@ void write_report(const SkuQuestion& question, const fitting::SkuValidation& ans
   write_text(directory / "validate-sku.json", json_text(json));
 }
 
-void validate(Options options) {
+void validate(ValidateSkuOptions options) {
   if (options.tolerance.size() != 2 || !(options.tolerance[0] > 0) || !(options.tolerance[1] > 0))
     throw WrongUsage("--tolerance takes two positive numbers, METRES,DEGREES: 0.05,45");
   require_writable(options.json);
@@ -78,7 +78,7 @@ void validate(Options options) {
 }  // namespace
 
 Command validate_sku_command(Parser& root) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ValidateSkuOptions>();
   auto& assumed = options->request.assumed;
   Parser& parser = root.subcommand(
       "validate-sku", "Can this object be thrown with this gripper, so that it lands as predicted?");

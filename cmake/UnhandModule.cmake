@@ -1,3 +1,15 @@
+# With UNHAND_UNITY, `size` sources of the target are compiled as one, so that headers are read once; but never those
+# named ALONE. Names in unnamed namespaces must be unique in the target.
+function(unhand_batches target size)
+  cmake_parse_arguments(ARG "" "" "ALONE" ${ARGN})
+  if(UNHAND_UNITY)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${size})
+    if(ARG_ALONE)
+      set_source_files_properties(${ARG_ALONE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+    endif()
+  endif()
+endfunction()
+
 # One folder = one target unhand::<folder> = one namespace unhand::<folder>.
 #
 #   unhand_module(contact
@@ -5,18 +17,15 @@
 #     HEADERS limit_surface.hpp ...
 #     USES    dynamics              # the modules of architecture this one may include
 #     LINKS   SUNDIALS::cvode_shared  # private third-party libraries
-#     BATCH   5                     # with UNHAND_UNITY, so many sources are compiled as one
-#     ALONE   registry.cpp)         # but never these
+#     BATCH   5                     # as unhand_batches
+#     ALONE   registry.cpp)
 function(unhand_module name)
   cmake_parse_arguments(ARG "" "BATCH" "SOURCES;HEADERS;USES;LINKS;ALONE" ${ARGN})
   add_library(unhand_${name} ${ARG_SOURCES})
   add_library(unhand::${name} ALIAS unhand_${name})
   set_target_properties(unhand_${name} PROPERTIES EXPORT_NAME ${name})
-  if(UNHAND_UNITY AND ARG_BATCH)
-    set_target_properties(unhand_${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${ARG_BATCH})
-    if(ARG_ALONE)
-      set_source_files_properties(${ARG_ALONE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
-    endif()
+  if(ARG_BATCH)
+    unhand_batches(unhand_${name} ${ARG_BATCH} ALONE ${ARG_ALONE})
   endif()
   target_compile_features(unhand_${name} PUBLIC cxx_std_20)
   target_include_directories(unhand_${name} PUBLIC
@@ -51,10 +60,10 @@ function(unhand_test_options)
   endif()
 endfunction()
 
-# unhand_test(dynamics  integrator_test.cpp ... USES release)
+# unhand_test(dynamics SOURCES integrator_test.cpp ... USES release BATCH 4)
 # makes the executable test_<name> from tests/<name>/*.cpp and registers each test case.
 function(unhand_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;USES" ${ARGN})
+  cmake_parse_arguments(ARG "" "TIMEOUT;BATCH" "SOURCES;USES;ALONE" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 1500)  # the sanitizers are an order of magnitude slower
   endif()
@@ -62,6 +71,9 @@ function(unhand_test name)
   foreach(used IN LISTS ARG_USES)
     target_link_libraries(test_${name} PRIVATE unhand::${used})
   endforeach()
+  if(ARG_BATCH)
+    unhand_batches(test_${name} ${ARG_BATCH} ALONE ${ARG_ALONE})
+  endif()
   target_link_libraries(test_${name} PRIVATE unhand_test_options)
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR})
   if(TARGET test_headers)

@@ -35,13 +35,13 @@ TEST(SlipLog, ConvertsUnits) {
   EXPECT_EQ(slip.twist(3, 0), sample().surfaces.at("feet").slips[0].twist(3, 0) / 1000);
 }
 
-struct Case {
+struct SpoiledSlip {
   const char* name;
   Spoil spoil;
   const char *path, *reason;
 };
-void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
-class Slips : public testing::TestWithParam<Case> {};
+void PrintTo(const SpoiledSlip& c, std::ostream* out) { *out << c.name; }
+class Slips : public testing::TestWithParam<SpoiledSlip> {};
 
 TEST_P(Slips, IsRefused) {
   const Scratch scratch;
@@ -52,7 +52,7 @@ TEST_P(Slips, IsRefused) {
 }
 
 const std::string first = "/surfaces/feet/slips/1";
-const Case cases[] = {
+const SpoiledSlip cases[] = {
     {"schema", [](const Editor& f) { f.text("/", "schema", "throw-log"); }, "/@schema",
      "'throw-log', expected 'slip-log'"},
     {"version", [](const Editor& f) { f.integer("/", "schema_version", 7); }, "/@schema_version",
@@ -82,8 +82,8 @@ const Case cases[] = {
     {"split", [](const Editor& f) { f.text(first, "split", "Train"); }, "/surfaces/feet/slips/1@split",
      "'Train'"},
 };
-const auto name_of = [](const auto& case_info) { return std::string(case_info.param.name); };
-INSTANTIATE_TEST_SUITE_P(Rejection, Slips, testing::ValuesIn(cases), name_of);
+const auto name_of_spoiled = [](const auto& case_info) { return std::string(case_info.param.name); };
+INSTANTIATE_TEST_SUITE_P(Rejection, Slips, testing::ValuesIn(cases), name_of_spoiled);
 
 TEST(SlipLog, WritingRefusesABadLog) {
   const Scratch scratch;

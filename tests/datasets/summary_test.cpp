@@ -24,12 +24,12 @@ TEST(Summary, CountsRatesGapsAndNoise) {
   std::vector<std::string> channels;
   for (const ChannelSummary& c : s.each[1].channels) channels.push_back(c.group);
   EXPECT_THAT(channels, testing::ElementsAre("hand", "mocap", "imu"));
-  const ChannelSummary& mocap = s.each[1].channels[1];
-  EXPECT_NEAR(mocap.rate, 240, 1e-9);
-  EXPECT_NEAR(mocap.longest_gap, 0.05 + 1.0 / 240, 1e-12);
-  EXPECT_EQ(mocap.gap_at, time(19));
-  EXPECT_EQ(mocap.lost, 2U);
-  EXPECT_EQ(mocap.longest_loss, 2U);
+  const ChannelSummary& poses = s.each[1].channels[1];
+  EXPECT_NEAR(poses.rate, 240, 1e-9);
+  EXPECT_NEAR(poses.longest_gap, 0.05 + 1.0 / 240, 1e-12);
+  EXPECT_EQ(poses.gap_at, time(19));
+  EXPECT_EQ(poses.lost, 2U);
+  EXPECT_EQ(poses.longest_loss, 2U);
 
   const auto group =
       std::find_if(s.groups.begin(), s.groups.end(), [](const auto& g) { return g.group == "mocap"; });

@@ -3,9 +3,12 @@
 #include <functional>
 
 #include "tests/dynamics/every_method.hpp"
+#include "tests/support/best_difference.hpp"
 
 namespace unhand::dynamics {
 namespace {
+
+using support::best_difference;
 
 class Derivatives : public testing::TestWithParam<Method> {
  protected:
@@ -20,16 +23,6 @@ INSTANTIATE_TEST_SUITE_P(, Derivatives,
                          testing::Values(Method::automatic, Method::dormand_prince, Method::rosenbrock,
                                          Method::radau),
                          [](const auto& test) { return name_of(test.param); });
-
-/// The smallest error of a central difference of f against `derivative` over steps of 1e-1 to 1e-7: as a
-/// function of the step it falls with its square until rounding takes over, so a true derivative shows at the
-/// bottom.
-double best_difference(const std::function<double(double)>& f, double x, double derivative) {
-  double best = INFINITY;
-  for (double step = 1e-1; step > 0.5e-7; step *= 0.1)
-    best = std::min(best, std::abs((f(x + step) - f(x - step)) / (2 * step) - derivative));
-  return best;
-}
 
 TEST_P(Derivatives, DropBounceAndTime) {
   // Height and speed at t = 1 s of a ball dropped from h: one bounce at sqrt(2h/g).

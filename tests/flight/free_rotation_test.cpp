@@ -1,5 +1,6 @@
 // Torque-free rotation against closed forms, and the quaternion's logarithm where it is delicate.
 #include "flight/free_rotation.hpp"
+#include "tests/support/best_difference.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,11 +12,13 @@
 namespace unhand::flight {
 namespace {
 
+using support::best_difference;
+
 using dynamics::Dual;
 using dynamics::independent;
 constexpr double kPi = std::numbers::pi;
 
-dynamics::IntegratorOptions tight() {
+dynamics::IntegratorOptions sharp() {
   dynamics::IntegratorOptions options;
   options.tolerances = {1e-13, 1e-14};
   return options;
@@ -31,7 +34,7 @@ Vec3<double> random_vector(std::mt19937_64& random, double size) {
 }
 
 RotationState<double> after(const Vec3<double>& inertia, const RotationState<double>& start, double t) {
-  return rotate_freely(inertia, start, {t}, tight())[0];
+  return rotate_freely(inertia, start, {t}, sharp())[0];
 }
 
 // ---------------------------------------------------------------- quaternions
@@ -114,7 +117,7 @@ TEST(FreeRotation, ASymmetricTopPrecesses) {
     const Vec3<double> L = angular_momentum(inertia, start);
     const double rate = (I3 - 1) * start.omega[2];
     const std::vector<double> times{0.01, 0.37, 1.0, 4.0};
-    const auto states = rotate_freely(inertia, start, times, tight());
+    const auto states = rotate_freely(inertia, start, times, sharp());
     for (std::size_t i = 0; i < times.size(); ++i) {
       const double t = times[i], c = std::cos(rate * t), s = std::sin(rate * t);
       EXPECT_NEAR(states[i].omega[0], c * 1.5 + s * 0.5, 1e-10);  // tolerance 1e-13 a step, some 200 steps
@@ -137,7 +140,7 @@ TEST(FreeRotation, EnergyAndAngularMomentumAreKept) {
     const RotationState<double> start{exp(random_vector(random, 1)), random_vector(random, 8)};
     const Vec3<double> L = angular_momentum(inertia, start);
     const double E = rotational_energy(inertia, start.omega);
-    for (const auto& state : rotate_freely(inertia, start, {0.1, 0.5, 3.0}, tight())) {
+    for (const auto& state : rotate_freely(inertia, start, {0.1, 0.5, 3.0}, sharp())) {
       EXPECT_NEAR(rotational_energy(inertia, state.omega) / E, 1, 1e-9) << n;
       EXPECT_LT(norm(difference(angular_momentum(inertia, state), L)) / norm(L), 1e-9) << n;
       const Quaternion<double>& q = state.attitude;
@@ -183,14 +186,6 @@ TEST(FreeRotation, TheWorldMayBeTurned) {
   EXPECT_LT(angle_between(turn * a.attitude, b.attitude), 1e-14);
 }
 
-/// The smallest distance of a central difference from `derivative` over steps of 1e-1 to 1e-7.
-double best_difference(const std::function<double(double)>& f, double x, double derivative) {
-  double best = INFINITY;
-  for (double step = 1e-1; step > 0.5e-7; step *= 0.1)
-    best = std::min(best, std::abs((f(x + step) - f(x - step)) / (2 * step) - derivative));
-  return best;
-}
-
 TEST(FreeRotation, DerivativesByOmegaAndInertia) {
   // The second body is a sphere, where a difference of zero between moments still has a derivative.
   for (const Vec3<double>& inertia : {Vec3<double>{1, 1.3, 2}, Vec3<double>{1, 1, 1}}) {
@@ -198,7 +193,7 @@ TEST(FreeRotation, DerivativesByOmegaAndInertia) {
     const Quaternion<double> q0 = exp(Vec3<double>{0.3, -0.2, 0.9});
     const auto end = [&](const std::array<Dual, 6>& x) {
       const RotationState<Dual> start{{Dual(q0.w), Dual(q0.x), Dual(q0.y), Dual(q0.z)}, {x[0], x[1], x[2]}};
-      const auto state = rotate_freely<Dual>({x[3], x[4], x[5]}, start, {0.6}, tight())[0];
+      const auto state = rotate_freely<Dual>({x[3], x[4], x[5]}, start, {0.6}, sharp())[0];
       return std::array<Dual, 7>{state.attitude.w, state.attitude.x, state.attitude.y, state.attitude.z,
                                  state.omega[0],   state.omega[1],   state.omega[2]};
     };

@@ -6,9 +6,12 @@
 #include <functional>
 
 #include "flight/fly.hpp"
+#include "tests/support/best_difference.hpp"
 
 namespace unhand::flight {
 namespace {
+
+using support::best_difference;
 
 using dynamics::Dual;
 using dynamics::independent;
@@ -18,14 +21,6 @@ dynamics::IntegratorOptions tight() {
   dynamics::IntegratorOptions options;
   options.tolerances = {1e-12, 1e-13};
   return options;
-}
-
-/// The smallest distance of a central difference from `derivative` over steps of 1e-1 to 1e-7.
-double best_difference(const std::function<double(double)>& f, double x, double derivative) {
-  double best = INFINITY;
-  for (double step = 1e-1; step > 0.5e-7; step *= 0.1)
-    best = std::min(best, std::abs((f(x + step) - f(x - step)) / (2 * step) - derivative));
-  return best;
 }
 
 struct DerivativeCase {

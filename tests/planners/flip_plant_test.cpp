@@ -10,14 +10,11 @@
 #include "datasets/log_error.hpp"
 #include "planners/flip/forecast.hpp"
 #include "planners/flip/session.hpp"
+#include "tests/planners/flip_robot.hpp"
 
 namespace unhand::planners::flip {
 namespace {
 
-const FlipRobot& robot() {
-  static const FlipRobot it = read_flip_robot("panda-flip");
-  return it;
-}
 /// The declared robot, without anything hidden, random or noisy.
 const FlipRobot& exact_robot() {
   static const FlipRobot it = [] {

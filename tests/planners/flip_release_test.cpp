@@ -6,16 +6,13 @@
 
 #include "planners/flip/release_learner.hpp"
 #include "planners/flip/session.hpp"
+#include "tests/planners/flip_robot.hpp"
 
 namespace unhand::planners::flip {
 namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;
 
-const FlipRobot& robot() {
-  static const FlipRobot it = read_flip_robot("panda-flip");
-  return it;
-}
 const HandLibrary& library() {
   static const HandLibrary it(robot(), robot().bar);  // as fine as that of `unhand plan flip`
   return it;

@@ -13,7 +13,7 @@ namespace {
 using Variation = FrictionVariation<double>;
 
 // n μ N₀ = 16 N on 0.25 kg, τ₀ = c a 16 N on 4e-4 kg m²; linear release in T.
-constexpr double kGrip = 20, kForce = 16, kTorque = 16 * 0.01 * 2 / 3, kT = 0.05, kMass = 0.25,
+constexpr double kFullGrip = 20, kForce = 16, kTorque = 16 * 0.01 * 2 / 3, kT = 0.05, kBodyMass = 0.25,
                  kInertia = 4e-4;
 
 class FrictionVariationTruth : public testing::TestWithParam<const char*> {
@@ -32,8 +32,8 @@ class FrictionVariationTruth : public testing::TestWithParam<const char*> {
                const NormalForce& force) {
     const auto hand = support::accelerating_hand(a, 0.1);
     const auto model = law(variation);
-    const release::ReleaseProblem<double> problem{hand, force, *model, {kMass, kInertia}, {0, 0}, {0, 0.3},
-                                                  0.0,  {},    0.0};
+    const release::ReleaseProblem<double> problem{
+        hand, force, *model, {kBodyMass, kInertia}, {0, 0}, {0, 0.3}, 0.0, {}, 0.0};
     release::ReleaseOptions options;
     options.integrator = support::tight(1e-10, 1e-12);
     const auto result = simulate_release(problem, options);
@@ -45,17 +45,17 @@ class FrictionVariationTruth : public testing::TestWithParam<const char*> {
   /// The block's path and speed [m, m/s] after `t`, thrown at `speed` across pads at rest that never open.
   std::pair<double, double> slide(double speed, const Variation& variation, double t) {
     const auto hand = support::still_hand(t);
-    const support::ConstantForce force(kGrip);
+    const support::ConstantForce force(kFullGrip);
     const auto model = law(variation);
-    const release::ReleaseProblem<double> problem{hand, force,      *model, {kMass, kInertia}, {0, 0}, {0, 0},
-                                                  0.0,  {speed, 0}, 0.0};
+    const release::ReleaseProblem<double> problem{
+        hand, force, *model, {kBodyMass, kInertia}, {0, 0}, {0, 0}, 0.0, {speed, 0}, 0.0};
     release::ReleaseOptions options;
     options.integrator = support::tight(1e-10, 1e-12);
     options.integrator.record = true;
     const auto result = simulate_release(problem, options);
     return {lever(Scene<double>{}, result.relative).x, result.relative.slip.x};
   }
-  const ProfileNormalForce opening{OpeningProfile<double>{0, kGrip, 0, kT, 1}};
+  const ProfileNormalForce opening{OpeningProfile<double>{0, kFullGrip, 0, kT, 1}};
 };
 INSTANTIATE_TEST_SUITE_P(, FrictionVariationTruth,
                          testing::Values("sliding_pivot", "limit_surface", "limit_surface_disc",
@@ -66,13 +66,13 @@ TEST_P(FrictionVariationTruth, ASoftPatchPivotsLaterOrEarlierAndSlidesAsEver) {
   for (const double gamma : {-0.5, 0.33, 1.0, 2.0}) {
     Variation soft;
     soft.softness = gamma;
-    soft.reference_force = kGrip;
+    soft.reference_force = kFullGrip;
     // 1e-8: L is positive at f_N = 0, which adds (10⁻⁵ f₀/f_N)² γ/2 to it
     for (const double tau : {0.002, 0.02, 0.08})
       EXPECT_NEAR(release({0, 0, tau / kInertia}, soft, opening).slip,
                   kT * (1 - std::pow(tau / kTorque, 1 / (1 + gamma))), 1e-8)
           << gamma << ' ' << tau;
-    EXPECT_NEAR(release({6 / kMass, 0, 0}, soft, opening).slip, kT * (1 - 6 / kForce), 1e-9);
+    EXPECT_NEAR(release({6 / kBodyMass, 0, 0}, soft, opening).slip, kT * (1 - 6 / kForce), 1e-9);
   }
 }
 
@@ -80,7 +80,7 @@ TEST_P(FrictionVariationTruth, AStribeckPatchHoldsToItsStaticLimit) {
   Variation stribeck;
   stribeck.static_ratio = 1.25;
   stribeck.stribeck_speed = 0.02;
-  EXPECT_NEAR(release({6 / kMass, 0, 0}, stribeck, opening).slip, kT * (1 - 6 / (1.25 * kForce)), 1e-9);
+  EXPECT_NEAR(release({6 / kBodyMass, 0, 0}, stribeck, opening).slip, kT * (1 - 6 / (1.25 * kForce)), 1e-9);
   EXPECT_NEAR(release({0, 0, 0.03 / kInertia}, stribeck, opening).slip, kT * (1 - 0.03 / (1.25 * kTorque)),
               1e-9);
 }
@@ -88,16 +88,18 @@ TEST_P(FrictionVariationTruth, AStribeckPatchHoldsToItsStaticLimit) {
 TEST_P(FrictionVariationTruth, AStickyPatchHoldsBeyondItsNormalForce) {
   const double adhesion = 1.5, parting = 0.004;  // μ n f_adh = 1.2 N
   const AdhesiveForce sticky(opening, Dual(adhesion), Dual(parting));
-  const auto strong = release({6 / kMass, 0, 0}, {}, sticky), weak = release({0.3 / kMass, 0, 0}, {}, sticky);
-  EXPECT_NEAR(strong.slip, kT * (1 - (6 / (kForce / kGrip) - adhesion) / kGrip), 1e-9);
-  EXPECT_NEAR(weak.slip, kT + parting * (1 - 0.3 / (kForce / kGrip) / adhesion), 1e-9) << "while it parts";
+  const auto strong = release({6 / kBodyMass, 0, 0}, {}, sticky),
+             weak = release({0.3 / kBodyMass, 0, 0}, {}, sticky);
+  EXPECT_NEAR(strong.slip, kT * (1 - (6 / (kForce / kFullGrip) - adhesion) / kFullGrip), 1e-9);
+  EXPECT_NEAR(weak.slip, kT + parting * (1 - 0.3 / (kForce / kFullGrip) / adhesion), 1e-9)
+      << "while it parts";
   EXPECT_NEAR(strong.detach, kT + parting, 1e-12);
   EXPECT_NEAR(weak.detach, kT + parting, 1e-12);
 }
 
 TEST_P(FrictionVariationTruth, AViscousSlideDecaysExponentially) {
   // v' = −A (1 + v/v₀): v = (V + v₀) exp(−A t/v₀) − v₀, at rest after (v₀/A) ln(1 + V/v₀)
-  const double A = kForce / kMass, V = 1.5;
+  const double A = kForce / kBodyMass, V = 1.5;
   for (const double v0 : {0.5, 4.0}) {
     Variation viscous;
     viscous.viscous = 1 / v0;
@@ -113,7 +115,7 @@ TEST_P(FrictionVariationTruth, AViscousSlideDecaysExponentially) {
 
 TEST_P(FrictionVariationTruth, AStribeckSlideStopsWhereTheIntegralSays) {
   // ∫ v dv/(A (1 + (r − 1) exp(−(v/v_s)²))) from 0 to V, by Simpson's rule
-  const double A = kForce / kMass, V = 0.6;
+  const double A = kForce / kBodyMass, V = 0.6;
   for (const double ratio : {0.7, 1.4}) {
     Variation stribeck;
     stribeck.static_ratio = ratio;
