@@ -21,8 +21,6 @@
 namespace unhand::apps {
 namespace {
 
-constexpr const char* naive_model = "limit_surface_naive";
-
 std::vector<std::string> surface_model_names() {
   std::vector<std::string> names;
   for (const auto model : fitting::surface_models) names.push_back(to_string(model));

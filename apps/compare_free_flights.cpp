@@ -27,7 +27,7 @@ struct SplitOf {
   const FreeFlightStatistics FreeFlightComparison::*statistics;
 };
 constexpr SplitOf kFlightSplits[] = {{Split::train, "train", &FreeFlightComparison::train},
-                              {Split::test, "test", &FreeFlightComparison::test}};
+                                     {Split::test, "test", &FreeFlightComparison::test}};
 
 Json json_of(const experiment::Spread& s) {
   if (s.n == 0) return {{"n", 0}, {"mean", nullptr}, {"median", nullptr}, {"std", nullptr}};

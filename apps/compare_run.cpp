@@ -8,7 +8,6 @@
 namespace unhand::apps {
 namespace {
 
-constexpr const char* naive_model = "limit_surface_naive";
 constexpr const char* naive_law = "limit_surface";
 
 double value_of(const experiment::ModelComparison& model, const std::string& name) {
