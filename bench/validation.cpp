@@ -86,6 +86,10 @@ int main() {
       "- Measured data, which none of this replaces: [measured-data.md](measured-data.md).\n"
       "- Every law on random and extreme input: energy, cone, symmetry, derivatives, typed outcomes\n"
       "  (`ctest --preset release -L contract`); readers on damaged files (`-L fuzz`) and under libFuzzer "
-      "([tests/fuzz/run](../tests/fuzz/run)).\n");
+      "([tests/fuzz/run](../tests/fuzz/run);\n  executions and findings: "
+      "[tests/fuzz](../tests/fuzz/README.md)).\n"
+      "- Threads: the parallel paths under the thread sanitizer without a report (`cmake --preset tsan`, "
+      "target\n"
+      "  `test_fitting`, `--gtest_filter='*Thread*:Twin.*:Corner*'`).\n");
   return count.holds == count.all ? 0 : 1;
 }

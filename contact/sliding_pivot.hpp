@@ -31,6 +31,11 @@ enum class SlideEnd {
 /// from both sides: a tenth mode slides between the two, with the mixture of their wrenches that keeps ω_r =
 /// 0 (Filippov's solution).
 ///
+/// Where a spin stops in slide, locked and spinning back may both be consistent, for the same reason: the law
+/// is two-valued there, and locked is taken if its torque suffices. Where it just suffices the release is not
+/// continuous in its parameters: an onset of spin appears or vanishes, and the twist at detach jumps by the
+/// little that was spun until then.
+///
 /// Departures from the print: Eq. 21, 22, 25 have sgn(|τ_p|), always +1, and the sign of the reaction, and
 /// Eq. 22 lets a pivoting object feel no friction when |τ_p| < τ_max; Eq. 23's left side is the CoM's
 /// absolute acceleration; in Eq. 24 the lost lever torque is divided by I, since the pivot's constraint is
