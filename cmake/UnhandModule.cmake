@@ -1,5 +1,5 @@
 # With UNHAND_UNITY, `size` sources of the target are compiled as one, so that headers are read once; but never those
-# named ALONE. Names in unnamed namespaces must be unique in the target.
+# named ALONE. Names in unnamed namespaces must be unique in the target (or overloads whose parameters do not convert).
 function(unhand_batches target size)
   cmake_parse_arguments(ARG "" "" "ALONE" ${ARGN})
   if(UNHAND_UNITY)

@@ -15,7 +15,7 @@ namespace unhand::fitting {
 namespace {
 
 /// 24 throws of two bars, six conditions each, two repetitions.
-datasets::ThrowLog campaign(const experiment::EffectSettings& effects, std::uint64_t seed = 3) {
+datasets::ThrowLog loop_campaign(const experiment::EffectSettings& effects, std::uint64_t seed = 3) {
   experiment::CampaignDesign design = experiment::campaign_design("batch180");
   design.name = "loop";
   design.postures.resize(2);
@@ -41,7 +41,7 @@ const AcceptedEffect* named(const Discovery& found, const std::string& id) {
 }
 
 TEST(Discovery, NothingIsFoundWhereNothingIsMissing) {
-  const Discovery found = found_in(campaign({}));
+  const Discovery found = found_in(loop_campaign({}));
   EXPECT_EQ(found.verdict, Verdict::no_missing_effect);
   EXPECT_TRUE(found.effects.empty());
   EXPECT_FALSE(found.unexplained.has_value());
@@ -49,7 +49,7 @@ TEST(Discovery, NothingIsFoundWhereNothingIsMissing) {
 
 TEST(Discovery, DragIsFoundWithItsSize) {
   constexpr double kDrag = 0.05;  // 1/m: a few centimetres over a throw of two metres
-  const Discovery found = found_in(campaign({{"flight.quadratic_drag.k", kDrag}}));
+  const Discovery found = found_in(loop_campaign({{"flight.quadratic_drag.k", kDrag}}));
   ASSERT_EQ(found.verdict, Verdict::effect_found);
   EXPECT_EQ(found.effects.front().id, "flight.quadratic_drag");
   EXPECT_TRUE(found.effects.front().equivalent.empty()) << "a wind needs a drag to act through";
@@ -61,7 +61,7 @@ TEST(Discovery, DragIsFoundWithItsSize) {
 
 TEST(Discovery, AClockThatIsLateIsFoundAlreadyInTheGrasp) {
   constexpr double kOffset = 0.004;
-  const Discovery found = found_in(campaign({{"sensor.mocap_time_offset.offset", kOffset}}));
+  const Discovery found = found_in(loop_campaign({{"sensor.mocap_time_offset.offset", kOffset}}));
   ASSERT_EQ(found.verdict, Verdict::effect_found);
   EXPECT_EQ(found.first.phase, Phase::grasped);
   const AcceptedEffect* effect = named(found, "sensor.mocap_time_offset");
@@ -72,7 +72,8 @@ TEST(Discovery, AClockThatIsLateIsFoundAlreadyInTheGrasp) {
 
 TEST(Discovery, AnEffectThatTheCatalogueForgetsIsUnexplainedWithAReadableCandidate) {
   constexpr double kLift = 0.03;
-  const Discovery found = found_in(campaign({{"flight.magnus_lift.k_m", kLift}}), {"flight.magnus_lift"});
+  const Discovery found =
+      found_in(loop_campaign({{"flight.magnus_lift.k_m", kLift}}), {"flight.magnus_lift"});
   EXPECT_EQ(named(found, "flight.magnus_lift"), nullptr);
   EXPECT_EQ(found.first.phase, Phase::flight);
   ASSERT_TRUE(found.unexplained.has_value()) << to_string(found.verdict);
@@ -86,8 +87,8 @@ TEST(Discovery, AnEffectThatTheCatalogueForgetsIsUnexplainedWithAReadableCandida
 }
 
 TEST(Discovery, TwoEffectsAtOnceAreBothFound) {
-  const Discovery found =
-      found_in(campaign({{"flight.gravity_tilt.angle", 0.02}, {"sensor.mocap_time_offset.offset", 0.005}}));
+  const Discovery found = found_in(
+      loop_campaign({{"flight.gravity_tilt.angle", 0.02}, {"sensor.mocap_time_offset.offset", 0.005}}));
   EXPECT_NE(named(found, "flight.gravity_tilt"), nullptr);
   EXPECT_NE(named(found, "sensor.mocap_time_offset"), nullptr);
   EXPECT_EQ(found.effects.size(), 2u);
@@ -97,7 +98,7 @@ TEST(Discovery, OfTheWrongLawTheRightOneIsMissing) {
   DiscoverOptions options;
   options.campaign.model = "sliding_pivot";
   options.campaign.integrator.tolerances = {1e-5, 1e-8};
-  const Discovery found = discover(campaign({}), "synthetic", options);
+  const Discovery found = discover(loop_campaign({}), "synthetic", options);
   ASSERT_EQ(found.verdict, Verdict::effect_found);
   EXPECT_EQ(found.effects.front().id, "contact.law:limit_surface_disc");
   EXPECT_EQ(found.model, "limit_surface_disc");
@@ -218,7 +219,7 @@ TEST(Discrepancy, IntervalsStayOnGoodCampaignsAndWidenWhereSensorsDisagree) {
   options.effects = {"sensor.inertia"};
   options.integrator.tolerances = {1e-5, 1e-8};
   const auto widened = [&](const experiment::EffectSettings& effects) {
-    const CampaignProblem problem(campaign(effects), "synthetic", options);
+    const CampaignProblem problem(loop_campaign(effects), "synthetic", options);
     FitResult result = fit(problem);
     std::vector<double> before;
     for (const auto& u : result.campaign) before.push_back(u.sigma);
@@ -244,7 +245,7 @@ TEST(Footprints, TheStepOfTheTrueEffectIsItsSizeToFirstOrder) {
   constexpr double kTilt = 0.01;
   CampaignOptions options;
   options.integrator.tolerances = {1e-5, 1e-8};
-  const CampaignProblem problem(campaign({{"flight.gravity_tilt.angle", kTilt}}), "synthetic", options);
+  const CampaignProblem problem(loop_campaign({{"flight.gravity_tilt.angle", kTilt}}), "synthetic", options);
   const FitResult base = fit(problem);
   const Footprints f = footprints(problem, base, {"flight.gravity_tilt", "flight.wind"}, {}, 0);
   for (const Score& score : scores(f)) {
