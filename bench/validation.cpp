@@ -88,7 +88,8 @@ int main() {
       "  (`ctest --preset release -L contract`); readers on damaged files (`-L fuzz`) and under libFuzzer "
       "([tests/fuzz/run](../tests/fuzz/run);\n  executions and findings: "
       "[tests/fuzz](../tests/fuzz/README.md)).\n"
-      "- Threads: the parallel paths under the thread sanitizer without a report (`cmake --preset tsan`, "
+      "- Threads: fits, the twin and the corners of fit and discover under the thread sanitizer without a "
+      "report (`cmake --preset tsan`, "
       "target\n"
       "  `test_fitting`, `--gtest_filter='*Thread*:Twin.*:Corner*'`).\n");
   return count.holds == count.all ? 0 : 1;
