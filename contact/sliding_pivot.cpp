@@ -98,55 +98,7 @@ constexpr Rotation lagging(double demanded_torque) { return demanded_torque > 0 
 /// Time after the onset of spin [s] at which its sign is beyond rounding: at the onset ω_r and its rate are
 /// both zero.
 constexpr double kOnset = 1e-6;
-
-/// Which branches a transition has just left, and so must not choose again.
-struct Excluded {
-  bool locked{}, stuck{}, slide{}, brake{}, between{};
-};
-
-/// The first consistent mode at an instant: locked if the torque it takes is within the limit, else the spin
-/// that its own acceleration produces. In slide, where f_p jumps with the rotation, neither may be: then ω_r
-/// = 0 attracts from both sides.
-int consistent_mode(const FrictionLimits<double>& limits, const Scene<double>& scene,
-                    const Relative<double>& y, Translation before, SlideEnd slide_end,
-                    const Excluded& excluded) {
-  const double force_limit = limits.slipping(scene.normal_force, y.slip, y.spin),
-               torque_limit = limits.length(scene.normal_force) * force_limit;
-  const bool slipping = y.slip.x != 0 || y.slip.z != 0;
-  const Vec2<double> r = lever(scene, y);
-
-  auto translation_with = [&](Rotation rotation) {
-    if (slipping && before == kBrake && slide_end == SlideEnd::latched_brake) return kBrake;
-    const double demand = norm(law(mode_of(kStuck, rotation), limits, scene, y, r).carrying_force);
-    if (slipping) return excluded.brake || (demand > force_limit && !excluded.slide) ? kSlide : kBrake;
-    return excluded.stuck || (demand > force_limit && !excluded.slide) ? kSlide : kStuck;
-  };
-
-  if (y.spin != 0) {
-    const Rotation rotation = y.spin > 0 ? kPositive : kNegative;
-    return mode_of(translation_with(rotation), rotation);
-  }
-  const int locked = mode_of(translation_with(kLocked), kLocked);
-  const double demand = law(locked, limits, scene, y, r).wrench.tau;
-  if (!excluded.locked && std::abs(demand) <= torque_limit) return locked;
-  const Rotation first = lagging(demand), second = first == kNegative ? kPositive : kNegative;
-  const int modes[2] = {mode_of(translation_with(first), first), mode_of(translation_with(second), second)};
-  double drive[2];  // how the spin of that sign would grow
-  for (int k = 0; k < 2; ++k)
-    drive[k] = sign_of(k == 0 ? first : second) * law(modes[k], limits, scene, y, r).spin_acceleration;
-  if (excluded.between) return modes[drive[0] >= drive[1] ? 0 : 1];
-  if (drive[0] > 0) return modes[0];
-  if (drive[1] > 0) return modes[1];
-  const bool slides[2] = {translation_of(modes[0]) == kSlide, translation_of(modes[1]) == kSlide};
-  if (slides[0] && slides[1] && drive[0] < 0 && drive[1] < 0) return kSlideBetween;
-  if (slipping &&
-      slides[0] != slides[1]) {  // one spin would brake: the braking force does not jump with the rotation
-    const int braked = mode_of(kBrake, kLocked);
-    const double torque = law(braked, limits, scene, y, r).wrench.tau;
-    return std::abs(torque) <= torque_limit ? braked : mode_of(kBrake, lagging(torque));
-  }
-  return modes[0];
-}
+constexpr double kTurned = 0.1;  // of the time in which a brake turns or stops its slip
 
 }  // namespace
 
@@ -260,12 +212,67 @@ void SlidingPivot::rate_(int mode, const Scene<S>& scene, const Relative<S>& y, 
   }
 }
 
+/// Which branches a transition has just left, and so must not choose again.
+struct SlidingPivot::Excluded {
+  bool locked{}, stuck{}, slide{}, brake{}, between{};
+};
+
+/// A time and the state at it.
+template <class S>
+struct SlidingPivot::Instant {
+  S t;
+  Relative<S> y;
+};
+
+/// The first consistent mode at an instant: locked if the torque it takes is within the limit, else the spin
+/// that its own acceleration produces. In slide, where f_p jumps with the rotation, neither may be: then ω_r
+/// = 0 attracts from both sides.
+int SlidingPivot::consistent_mode(const Scene<double>& scene, const Relative<double>& y, int before,
+                                  const Excluded& excluded) const {
+  const FrictionLimits<double>& limits = limits_double_;
+  const double force_limit = limits.slipping(scene.normal_force, y.slip, y.spin),
+               torque_limit = limits.length(scene.normal_force) * force_limit;
+  const bool slipping = y.slip.x != 0 || y.slip.z != 0;
+  const Vec2<double> r = lever(scene, y);
+
+  auto translation_with = [&](Rotation rotation) {
+    if (slipping && before == kBrake && slide_end_ == SlideEnd::latched_brake) return kBrake;
+    const double demand = norm(law(mode_of(kStuck, rotation), limits, scene, y, r).carrying_force);
+    if (slipping) return excluded.brake || (demand > force_limit && !excluded.slide) ? kSlide : kBrake;
+    return excluded.stuck || (demand > force_limit && !excluded.slide) ? kSlide : kStuck;
+  };
+
+  if (y.spin != 0) {
+    const Rotation rotation = y.spin > 0 ? kPositive : kNegative;
+    return mode_of(translation_with(rotation), rotation);
+  }
+  const int locked = mode_of(translation_with(kLocked), kLocked);
+  const double demand = law(locked, limits, scene, y, r).wrench.tau;
+  if (!excluded.locked && std::abs(demand) <= torque_limit) return locked;
+  const Rotation first = lagging(demand), second = first == kNegative ? kPositive : kNegative;
+  const int modes[2] = {mode_of(translation_with(first), first), mode_of(translation_with(second), second)};
+  double drive[2];  // how the spin of that sign would grow
+  for (int k = 0; k < 2; ++k)
+    drive[k] = sign_of(k == 0 ? first : second) * law(modes[k], limits, scene, y, r).spin_acceleration;
+  if (excluded.between) return modes[drive[0] >= drive[1] ? 0 : 1];
+  if (drive[0] > 0) return modes[0];
+  if (drive[1] > 0) return modes[1];
+  const bool slides[2] = {translation_of(modes[0]) == kSlide, translation_of(modes[1]) == kSlide};
+  if (slides[0] && slides[1] && drive[0] < 0 && drive[1] < 0) return kSlideBetween;
+  if (slipping &&
+      slides[0] != slides[1]) {  // one spin would brake: the braking force does not jump with the rotation
+    const int braked = mode_of(kBrake, kLocked);
+    const double torque = law(braked, limits, scene, y, r).wrench.tau;
+    return std::abs(torque) <= torque_limit ? braked : mode_of(kBrake, lagging(torque));
+  }
+  return modes[0];
+}
+
 template <class S>
 Entry<S, 6> SlidingPivot::on_guard_(const Phase& from, int guard, const SceneSource& source, const S& t,
                                     const Relative<S>& at) const {
   const Translation translation = translation_of(from.mode);
-  Relative<S> y = at;
-  S now = t;
+  Instant<S> now{t, at};
   Excluded excluded;
   if (from.mode == kSlideBetween && guard != kTranslationGuard) {
     excluded.locked = excluded.between = guard == kRotationGuard;
@@ -273,29 +280,47 @@ Entry<S, 6> SlidingPivot::on_guard_(const Phase& from, int guard, const SceneSou
     if (rotation_of(from.mode) == kLocked)
       excluded.locked = true;
     else
-      y.spin = S(0);
+      now.y.spin = S(0);
   } else if (guard == kSlideAgain) {
     excluded.brake = true;
   } else if (translation == kStuck) {
     excluded.stuck = true;
   } else if (translation == kSlide) {
     excluded.slide = true;
-  } else {  // brake: along a straight line to zero slip
-    State<S, 6> dy;
-    rate_(from.mode, source.scene(from.window, t), y, dy);
-    const S speed = norm(y.slip);
-    const S left = -speed * speed / (y.slip.x * dy[3] + y.slip.z * dy[4]);
-    y.arm = y.arm + (0.5 * left) * Vec2<S>{dy[0], dy[1]};
-    y.angle += left * y.spin;
-    y.spin += left * dy[5];
-    y.slip = {S(0), S(0)};
-    now += left;
+  } else {
+    come_to_rest(from, source, now);
   }
-  const Scene<S> scene = source.scene(from.window, now);
-  const int mode =
-      consistent_mode(limits_double_, values(scene), values(y), translation, slide_end_, excluded);
-  if (rotation_of(mode) == kLocked || value_of(y.spin) != 0) return {mode, now, y.state(), S(0)};
-  return spin_onset(mode, from, source, now, y);
+  const int mode = enter(from.window, source, translation, excluded, now);
+  if (rotation_of(mode) == kLocked || value_of(now.y.spin) != 0) return {mode, now.t, now.y.state(), S(0)};
+  return spin_onset(mode, from, source, now.t, now.y);
+}
+
+/// The mode that follows. A brake whose slip is within kStopTime of rest when it begins is at rest.
+template <class S>
+int SlidingPivot::enter(const Window& window, const SceneSource& source, int before, const Excluded& excluded,
+                        Instant<S>& now) const {
+  const int mode = consistent_mode(values(source.scene(window, now.t)), values(now.y), before, excluded);
+  if (translation_of(mode) != kBrake) return mode;
+  double G[3];
+  guards_({mode, window}, source, value_of(now.t), values(now.y), G);
+  if (G[kTranslationGuard] > 0) return mode;
+  come_to_rest({mode, window}, source, now);
+  return consistent_mode(values(source.scene(window, now.t)), values(now.y), kBrake, {});
+}
+
+/// A brake's slip along a straight line to zero.
+template <class S>
+void SlidingPivot::come_to_rest(const Phase& brake, const SceneSource& source, Instant<S>& now) const {
+  auto& [t, y] = now;
+  State<S, 6> dy;
+  rate_(brake.mode, source.scene(brake.window, t), y, dy);
+  const S speed = norm(y.slip);
+  const S left = -speed * speed / (y.slip.x * dy[3] + y.slip.z * dy[4]);
+  y.arm = y.arm + (0.5 * left) * Vec2<S>{dy[0], dy[1]};
+  y.angle += left * y.spin;
+  y.spin += left * dy[5];
+  y.slip = {S(0), S(0)};
+  t += left;
 }
 
 /// The first instants of a spin, by the midpoint rule. A demand that only touches its limit leaves no spin.
@@ -304,11 +329,15 @@ Entry<S, 6> SlidingPivot::on_guard_(const Phase& from, int guard, const SceneSou
 template <class S>
 Entry<S, 6> SlidingPivot::spin_onset(int mode, const Phase& from, const SceneSource& source, const S& t,
                                      const Relative<S>& rest) const {
-  const double delta = std::min(kOnset, 0.25 * (from.window.end - value_of(t)));
+  double delta = std::min(kOnset, 0.25 * (from.window.end - value_of(t)));
   const State<S, 6> y0 = rest.state();
   if (!(delta > 0)) return {mode, t, y0, S(0)};
   State<S, 6> dy, y = y0;
   rate_(mode, source.scene(from.window, t), rest, dy);
+  if (translation_of(mode) == kBrake) {  // its force turns with the slip, the faster the smaller that is
+    const double slip = value_of(norm(rest.slip)), rate = std::hypot(value_of(dy[3]), value_of(dy[4]));
+    delta = std::min(delta, kTurned * slip / rate);
+  }
   for (int i = 0; i < 6; ++i) y[i] = y0[i] + 0.5 * delta * dy[i];
   rate_(mode, source.scene(from.window, S(t + 0.5 * delta)), Relative<S>::from(y), dy);
   for (int i = 0; i < 6; ++i) y[i] = y0[i] + delta * dy[i];
@@ -319,10 +348,9 @@ Entry<S, 6> SlidingPivot::spin_onset(int mode, const Phase& from, const SceneSou
 template <class S>
 Entry<S, 6> SlidingPivot::membership_(int mode, const Window& window, const SceneSource& source, const S& t,
                                       const Relative<S>& y) const {
-  const Translation before = mode < 0 ? kStuck : translation_of(mode);
-  const Scene<S> scene = source.scene(window, t);
-  return {consistent_mode(limits_double_, values(scene), values(y), before, slide_end_, {}), t, y.state(),
-          S(0)};
+  Instant<S> now{t, y};
+  const int next = enter(window, source, mode < 0 ? kStuck : translation_of(mode), {}, now);
+  return {next, now.t, now.y.state(), S(0)};
 }
 
 template class ContactModelFrom<SlidingPivot>;

@@ -77,6 +77,14 @@ class SlidingPivot final : public ContactModelFrom<SlidingPivot> {
  private:
   template <class S>
   const FrictionLimits<S>& limits() const;
+  struct Excluded;
+  template <class S>
+  struct Instant;
+  int consistent_mode(const Scene<double>&, const Relative<double>&, int before, const Excluded&) const;
+  template <class S>
+  int enter(const Window&, const SceneSource&, int before, const Excluded&, Instant<S>&) const;
+  template <class S>
+  void come_to_rest(const Phase& brake, const SceneSource&, Instant<S>&) const;
   template <class S>
   Entry<S, 6> spin_onset(int mode, const Phase& from, const SceneSource&, const S& t,
                          const Relative<S>& rest) const;

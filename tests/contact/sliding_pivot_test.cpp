@@ -177,6 +177,28 @@ TEST_F(Pivot, APivotKeepsItsSpinThroughSlideAndBrake) {
   EXPECT_EQ(leave(kBrakeMinus, kTranslation, at(0, 1e-9, 0, -3)).mode, kPivotMinus);
 }
 
+TEST_F(Pivot, TheSpinThatABrakeStartsIsTheSameForSlowSlips) {
+  // 10 N at a lever of 0.1 m, against a torque limit of 0.1 N m; the slip ends within |v|/(150 m/s²).
+  for (const double speed : {1e-1, 1e-3, 1e-4, 1e-5, 3e-6}) {
+    const auto entry = leave(kBrake, kRotation, at(0.1, 0, speed));
+    EXPECT_EQ(entry.mode, kBrakePlus) << speed << " m/s";
+    EXPECT_GT(entry.y[5], 0) << speed << " m/s";
+    EXPECT_GT(entry.y[4], 0.8 * speed) << "followed past its stop from " << speed << " m/s";
+  }
+}
+
+TEST_F(Pivot, ABrakeThatBeginsAtRestIsOver) {
+  // 1e-8 m/s at 150 m/s² is at rest within kStopTime: what is left is the spin that its last instants made.
+  const auto entry = leave(kBrake, kRotation, at(0.1, 0, 1e-8));
+  EXPECT_EQ(entry.mode, kPivotPlus);
+  EXPECT_EQ(entry.y[4], 0.0);
+  EXPECT_LT(entry.t, kStopTime);
+  EXPECT_LT(std::abs(entry.y[5]), kForce * 0.1 / kInertia * kStopTime);
+  const auto between = model.membership(kBrakeMinus, kWindow, world, 0, at(0.1, 0, 1e-8));
+  EXPECT_EQ(between.mode, kPivotPlus);
+  EXPECT_EQ(between.y[4], 0.0);
+}
+
 TEST_F(Pivot, BothReadingsOfASlidesEnd) {
   // |f_p| grows beyond f_max again while the patch still slips.
   const SlidingPivot memoryless(patch, SlideEnd::memoryless);
