@@ -35,16 +35,17 @@ apps::Figure figure(const std::vector<Work>& all) {
       if (!block.rows.empty()) out.data.push_back(block);
     }
   std::string& s = out.script;
-  s += "set multiplot\nunset key\nset logscale xy\nset format x '10^{%T}'\nset format y '10^{%T}'\n"
+  s += "set multiplot\nunset key\nset logscale xy\nset format x '10^{%T}'\n"
        "set xtics 1e-6,100\nset ytics 1e-13,1000\nset mxtics 1\nset mytics 1\n";
   const double width = 4.3, height = 3.9;
   for (std::size_t m = 0; m < kMotions.size(); ++m) {
     const double x = 1.8 + static_cast<double>(m % 3) * (width + 0.75);
     const double y =
-        1.5 + apps::key_height(engines.size(), 3) + static_cast<double>(1 - m / 3) * (height + 1.1);
+        1.5 + apps::key_height(engines.size(), 3) + static_cast<double>(1 - m / 3) * (height + 1.4);
     s += apps::place(out, {x, x + width, y, y + height});
     s += fmt::format("set title '{}' offset 0,-0.6\n", kMotions[m]);
-    s += m % 3 == 0 ? "set ylabel 'error [m]' offset 1,0\n" : "unset ylabel\n";
+    s += m % 3 == 0 ? "set ylabel 'error [m]' offset 1,0\nset format y '10^{%T}'\n"
+                    : "unset ylabel\nset format y ''\n";
     s += m >= 3 ? "set xlabel 'time per simulated second' offset 0,0.5\n" : "unset xlabel\n";
     s += "plot [1e-6:30] [5e-14:3]";
     bool first = true;
