@@ -324,8 +324,9 @@ void SlidingPivot::come_to_rest(const Phase& brake, const SceneSource& source, I
 }
 
 /// The first instants of a spin, by the midpoint rule. A demand that only touches its limit leaves no spin.
-/// Known limitation: a brake whose slip is so small that its force turns within less than kOnset is not
-/// resolved here, may go on locked, ask again at once, and end as not solved.
+/// Beside a brake they are no longer than a share of the time in which its force turns: else the spin would
+/// have the sign of a force that has long turned, and a torque in excess would leave no spin, again and
+/// again.
 template <class S>
 Entry<S, 6> SlidingPivot::spin_onset(int mode, const Phase& from, const SceneSource& source, const S& t,
                                      const Relative<S>& rest) const {

@@ -125,16 +125,16 @@ void check_wrench(const Held& held, std::optional<double> grasp_angle, SizeRatio
   const auto& object = held.object();
   const auto& ft = *held.logged.ft;
   const double pads = held.log.gripper ? held.log.gripper->n_pads : 2;
+  // d: from the pads' centre to the CoM, in the hand frame.
+  const Vec2<double> d = grasp_angle && object.com_offset
+                             ? dynamics::rotate(*grasp_angle, Vec2<double>{*object.com_offset, 0})
+                             : Vec2<double>{0, 0};
   Pairs force, torque;
   for (std::size_t i = 0; i < ft.time.rows; ++i) {
     if (!held.covers(ft.time(i))) continue;
     const auto pose = at(held.hand.time, held.hand.pose, ft.time(i)),
                twist = at(held.hand.time, held.hand.twist, ft.time(i)),
                a = at(held.hand.time, held.hand.acceleration, ft.time(i));
-    // d: from the pads' centre to the CoM, in the hand frame.
-    const Vec2<double> d = grasp_angle && object.com_offset
-                               ? dynamics::rotate(*grasp_angle, Vec2<double>{*object.com_offset, 0})
-                               : Vec2<double>{0, 0};
     const Vec2<double> free = dynamics::rotate(-pose[2], Vec2<double>{a[0], a[1] + held.log.gravity});
     const double w2 = twist[2] * twist[2];
     const Vec2<double> f{object.mass * (free.x - a[2] * d.z - w2 * d.x),
