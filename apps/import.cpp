@@ -101,7 +101,7 @@ constexpr Format formats[] = {
      "  unhand import motive-csv ball_01.csv --mass 0.057 --free-flight 1.20,1.85 --out flights.h5",
      &import_lab_files},
     {"phyphox", "a phone's accelerometer, cut into its free falls",
-     "unhand import phyphox fall_*/'Raw Data.csv' --mass 0.2 --out falls.h5", &import_lab_files},
+     "unhand import phyphox fall_* --mass 0.2 --out falls.h5", &import_lab_files},
 };
 
 std::string known_formats() {

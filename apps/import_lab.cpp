@@ -240,6 +240,13 @@ Reading read_phone(const std::string& file, const LabOptions& options) {
   return out;
 }
 
+std::vector<std::string> phone_files(const std::vector<std::string>& named) {
+  const std::vector<std::filesystem::path> paths(named.begin(), named.end());
+  std::vector<std::string> out;
+  for (const auto& file : datasets::phyphox_files(paths)) out.push_back(file.string());
+  return out;
+}
+
 Reading read(const std::string& format, const std::string& file, const ThrowLog& log,
              const LabOptions& options) {
   if (format == "motive-csv") return read_motive(file, log, options);
@@ -261,9 +268,10 @@ void refuse_lab_options(const std::string& format, const LabOptions& options) {
     if (given(options, name)) throw WrongUsage(fmt::format("{} is not for {}", name, format));
 }
 
-LabImport import_lab(const std::string& format, const std::vector<std::string>& inputs,
-                     const std::string& out, const LabOptions& options, Outputs& outputs) {
+LabImport import_lab(const std::string& format, const std::vector<std::string>& named, const std::string& out,
+                     const LabOptions& options, Outputs& outputs) {
   require_options(format, options);
+  const std::vector<std::string> inputs = format == "phyphox" ? phone_files(named) : named;
   for (const char* single : {"--throw", "--free-flight"})
     if (inputs.size() != 1 && given(options, single))
       throw WrongUsage(fmt::format("{} goes with one input, not {}", single, inputs.size()));

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "datasets/csv.hpp"
+#include "datasets/import_phyphox.hpp"
 
 namespace unhand::datasets {
 namespace {
@@ -40,8 +41,7 @@ double usual_step(const Series& time) {
 
 ThrowName name_of(const std::filesystem::path& file) {
   std::string stem = file.stem().string();
-  const bool phyphox = stem == "Raw Data" || stem == "Accelerometer" || stem == "Acceleration";
-  if (phyphox && file.has_parent_path() && !file.parent_path().filename().empty())
+  if (phyphox_names_it(file) && file.has_parent_path() && !file.parent_path().filename().empty())
     stem = file.parent_path().filename().string();
   ThrowName out{stem, stem, 0};
   std::size_t digits = stem.size();

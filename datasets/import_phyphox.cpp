@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <optional>
 #include <stdexcept>
 
@@ -184,6 +185,31 @@ void check_options(const PhyphoxOptions& options) {
 }
 
 }  // namespace
+
+bool phyphox_names_it(const std::filesystem::path& file) {
+  const std::string stem = file.stem().string();
+  return stem == "Raw Data" || stem == "Accelerometer" || stem == "Acceleration";
+}
+
+std::vector<std::filesystem::path> phyphox_files(std::span<const std::filesystem::path> inputs) {
+  std::vector<std::filesystem::path> out;
+  for (const std::filesystem::path& input : inputs) {
+    std::error_code error;
+    if (!std::filesystem::is_directory(input, error)) {
+      out.push_back(input);
+      continue;
+    }
+    std::vector<std::filesystem::path> found;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(input))
+      if (entry.is_regular_file() && entry.path().extension() == ".csv" && phyphox_names_it(entry.path()))
+        found.push_back(entry.path());
+    if (found.empty())
+      throw ImportError(input.string(), "line 0", "a folder without phyphox's 'Raw Data.csv'");
+    std::sort(found.begin(), found.end());
+    out.insert(out.end(), found.begin(), found.end());
+  }
+  return out;
+}
 
 PhyphoxRecording read_phyphox(const std::filesystem::path& file, const PhyphoxOptions& options) {
   check_options(options);

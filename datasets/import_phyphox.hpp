@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -43,5 +44,12 @@ struct PhyphoxRecording {
 /// phone has taken what it believes gravity to be, is refused. Throws ImportError naming file, line and
 /// column; a recording without a fall is not an error.
 PhyphoxRecording read_phyphox(const std::filesystem::path& file, const PhyphoxOptions& options = {});
+
+/// Whether phyphox itself names an export so ("Raw Data.csv"), always the same: the folder tells which it is.
+bool phyphox_names_it(const std::filesystem::path& file);
+
+/// The recordings that `inputs` name: files as they are, and of a folder every file below it that phyphox
+/// named, by path. Throws ImportError for a folder without any.
+std::vector<std::filesystem::path> phyphox_files(std::span<const std::filesystem::path> inputs);
 
 }  // namespace unhand::datasets

@@ -258,6 +258,13 @@ class Search {
   std::vector<dynamics::Effect> catalogue_;
 };
 
+std::string why_not(const GroupedProblem& problem, Split split) {
+  const char* name = split == Split::test ? "test" : "train";
+  for (const auto& group : problem.groups())
+    if (group.split == split) return fmt::format("no throw of split '{}' could be fitted", name);
+  return fmt::format("no throw has the split '{}': effects are found on train, and judged on test", name);
+}
+
 }  // namespace
 
 EffectSearch search_effects(const GroupedProblem& problem, const EffectSearchOptions& options) {
@@ -265,7 +272,7 @@ EffectSearch search_effects(const GroupedProblem& problem, const EffectSearchOpt
   out.base = fit_groups(problem, Split::train, {}, VectorXd(), options.fit);
   out.base_test = fit_own(problem, Split::test, out.base, options.fit);
   if (!out.base.solved || !out.base_test.solved) {
-    out.message = out.base.solved ? "no held-out group could be fitted" : "no train group could be fitted";
+    out.message = why_not(problem, out.base.solved ? Split::test : Split::train);
     return out;
   }
   out.solved = true;

@@ -69,6 +69,23 @@ TEST(Phyphox, SeveralFallsAreSeveralThrows) {
   EXPECT_GT(recording.falls[1].free_flight->first, b.time.data.front());
 }
 
+TEST(Phyphox, AFolderStandsForTheExportsBelowIt) {
+  const Scratch scratch;
+  namespace fs = std::filesystem;
+  const fs::path folder = scratch / "raw";
+  for (const char* one : {"fall_2", "fall_1"}) {
+    fs::create_directories(folder / one / "meta");
+    put_bytes((folder / one / "Raw Data.csv").string(), header + Script{{{1, 1.6}}}.rows());
+    put_bytes((folder / one / "meta" / "device.csv").string(), "property,value\n");
+  }
+  const fs::path single = scratch / "fall_9.txt", empty = folder / "fall_1" / "meta";
+  EXPECT_THAT(
+      phyphox_files(std::vector{single, folder}),
+      testing::ElementsAre(single, folder / "fall_1" / "Raw Data.csv", folder / "fall_2" / "Raw Data.csv"));
+  expect_error<ImportError>([&] { phyphox_files(std::vector{empty}); }, empty.string(), "line 0",
+                            "a folder without phyphox's 'Raw Data.csv'");
+}
+
 TEST(Phyphox, WhatIsNoFall) {
   EXPECT_TRUE(read(header + Script{}.rows()).falls.empty());
   const auto reason = [](const Script& script, const PhyphoxOptions& options = {}) {
