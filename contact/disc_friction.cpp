@@ -7,25 +7,25 @@
 namespace unhand::contact {
 namespace {
 
-constexpr int kPower = 64;  // terms of a power series on [0, 1/2]: the rest is below 2⁻⁶⁴
+constexpr int kTerms = 64;  // terms of a power series on [0, 1/2]: the rest is below 2⁻⁶⁴
 constexpr int kEconomy = 20;  // terms once economised: the Chebyshev coefficients fall as (3+√8)⁻ᵏ, to 5e-16
 
-using Power = std::array<long double, kPower>;
+using Power = std::array<long double, kTerms>;
 using Economy = std::array<double, kEconomy>;
 
 // Σ cₙ mⁿ on [0, 1/2] as a shorter polynomial in x = 4m − 1 ∈ [−1, 1]: written in Chebyshev polynomials, cut,
 // and written in powers of x again.
 constexpr Economy economise(const Power& c) {
   Power cheb{};
-  for (int n = kPower; n-- > 0;) {  // Horner: cheb ← cheb (1 + x)/4 + cₙ, with x Tₖ = (Tₖ₊₁ + T|ₖ₋₁|)/2
+  for (int n = kTerms; n-- > 0;) {  // Horner: cheb ← cheb (1 + x)/4 + cₙ, with x Tₖ = (Tₖ₊₁ + T|ₖ₋₁|)/2
     Power next{};
-    for (int k = 0; k < kPower; ++k) {
+    for (int k = 0; k < kTerms; ++k) {
       next[k] += cheb[k] / 4;
       if (k == 0) {
         next[1] += cheb[0] / 4;
       } else {
         next[k - 1] += cheb[k] / 8;
-        if (k + 1 < kPower) next[k + 1] += cheb[k] / 8;
+        if (k + 1 < kTerms) next[k + 1] += cheb[k] / 8;
       }
     }
     next[0] += c[n];
@@ -85,7 +85,7 @@ constexpr long double kPi = std::numbers::pi_v<long double>;
 constexpr Bundle<2> small_tables() {
   Power b{}, c{};
   long double a = kPi / 2;
-  for (int n = 0; n < kPower; ++n) {
+  for (int n = 0; n < kTerms; ++n) {
     const long double ratio = (2 * n + 1) / (2.0L * n + 2);
     b[n] = a / (2 * n + 2);
     a *= ratio * ratio;
@@ -102,11 +102,11 @@ constexpr Bundle<4> large_tables() {
   Power k{}, e{}, k_log{}, e_log{};
   e[0] = 1;
   long double a = 1, q = 0.5L, d = 2 * std::numbers::ln2_v<long double>;
-  for (int n = 0; n < kPower; ++n) {
+  for (int n = 0; n < kTerms; ++n) {
     const long double odd = 2 * n + 1, even = 2 * n + 2;
     k[n] = a * d;
     k_log[n] = -a / 2;
-    if (n + 1 < kPower) {
+    if (n + 1 < kTerms) {
       e[n + 1] = q * (d - 1 / (odd * even));
       e_log[n + 1] = -q / 2;
     }
@@ -116,7 +116,7 @@ constexpr Bundle<4> large_tables() {
   }
   Power b{}, y{}, b_log{}, y_log{};
   long double b_sum = 0, y_sum = 0, b_log_sum = 0, y_log_sum = 0;
-  for (int n = 0; n < kPower; ++n) {
+  for (int n = 0; n < kTerms; ++n) {
     b[n] = b_sum += e[n] - (n ? k[n - 1] : 0);
     y[n] = y_sum += n ? k[n - 1] - e[n - 1] : 0;
     b_log[n] = b_log_sum += e_log[n] - (n ? k_log[n - 1] : 0);

@@ -80,8 +80,11 @@ class Radau final : public SingleStep<Radau<N>, double, N> {
 
  private:
   using Stages = std::array<State<double, N>, 3>;
-  using Matrix = Eigen::Matrix<double, N, N>;
-  using ComplexMatrix = Eigen::Matrix<std::complex<double>, N, N>;
+  // Of one size for every N, so that the factorisations are compiled once.
+  template <class T>
+  using Square = Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic, 0, kDualSize, kDualSize>;
+  template <class T>
+  using Column = Eigen::Matrix<T, Eigen::Dynamic, 1, 0, kDualSize, 1>;
   static constexpr double kRoot6 = 2.449489742783178;
   static constexpr double kC[3] = {(4 - kRoot6) / 10, (4 + kRoot6) / 10, 1};
   // The eigenvalues of the inverse Runge-Kutta matrix, γ and α ± iβ, and the transformation that shows them.
@@ -119,10 +122,10 @@ class Radau final : public SingleStep<Radau<N>, double, N> {
 
   void factor(double h) {
     if (factored_ == h) return;
-    Matrix real = -jacobian_;
+    Square<double> real = -jacobian_;
     real.diagonal().array() += kGamma / h;
     real_.compute(real);
-    ComplexMatrix complex = -jacobian_.template cast<std::complex<double>>();
+    Square<std::complex<double>> complex = -jacobian_.template cast<std::complex<double>>();
     complex.diagonal().array() += std::complex<double>(kAlpha / h, kBeta / h);
     complex_.compute(complex);
     factored_ = h;
@@ -148,8 +151,8 @@ class Radau final : public SingleStep<Radau<N>, double, N> {
       Stages g;
       transform(kInverse, f, g);
       // g − (Λ/h) w is the defect of the transformed equations, Λ the real block form of the eigenvalues.
-      Eigen::Matrix<double, N, 1> first;
-      Eigen::Matrix<std::complex<double>, N, 1> second;
+      Column<double> first(N);
+      Column<std::complex<double>> second(N);
       for (int i = 0; i < N; ++i) {
         first[i] = g[0][i] - kGamma / h * w[0][i];
         second[i] = {g[1][i] - (kAlpha * w[1][i] - kBeta * w[2][i]) / h,
@@ -186,7 +189,7 @@ class Radau final : public SingleStep<Radau<N>, double, N> {
   }
 
   double estimate(double h, const Stages& z) {
-    Eigen::Matrix<double, N, 1> combined, e;
+    Column<double> combined(N), e(N);
     State<double, N> error;
     for (int i = 0; i < N; ++i)
       combined[i] = (kError[0] * z[0][i] + kError[1] * z[1][i] + kError[2] * z[2][i]) / h;
@@ -215,9 +218,9 @@ class Radau final : public SingleStep<Radau<N>, double, N> {
     return scaled_norm<N>(error, scale);
   }
 
-  Matrix jacobian_;
-  Eigen::PartialPivLU<Matrix> real_;
-  Eigen::PartialPivLU<ComplexMatrix> complex_;
+  Eigen::Matrix<double, N, N> jacobian_;
+  Eigen::PartialPivLU<Square<double>> real_;
+  Eigen::PartialPivLU<Square<std::complex<double>>> complex_;
   State<double, N> f0_{}, scale_{}, start_{};
   Stages accepted_{};
   double h_before_{}, factored_{};

@@ -1,6 +1,6 @@
 #include "experiment/least_squares.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/QR>
 #include <cmath>
 
 namespace unhand::experiment {

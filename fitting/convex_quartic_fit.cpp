@@ -1,6 +1,7 @@
 // The convex quartic of fit_surface: an augmented Lagrangian keeps it convex, a mixture makes it exactly so.
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
+#include "fitting/dense_solve.hpp"
 #include "fitting/slip_surface_solver.hpp"
 
 namespace unhand::fitting {
@@ -27,19 +28,17 @@ struct ConvexityResidual {
   Sym3 multiplier = Sym3::Zero();
   double penalty = 1;
 
-  Eigen::SelfAdjointEigenSolver<Sym3> spectrum(const Sym3& s) const {
-    return Eigen::SelfAdjointEigenSolver<Sym3>(multiplier / penalty - s);
-  }
+  Spectrum spectrum(const Sym3& s) const { return spectrum_of(multiplier / penalty - s); }
   template <class T>
   bool operator()(const T* p, T* r) const {
     const std::array<T, 6> s = adjugate_sum(p);
     std::array<double, 6> value;
     for (std::size_t i = 0; i < 6; ++i) value[i] = value_of(s[i]);
-    const auto found = spectrum(sym_of(value));
+    const Spectrum found = spectrum(sym_of(value));
     for (int k = 0; k < 3; ++k) {
       r[k] = T(0);
-      if (!(found.eigenvalues()[k] > 0)) continue;
-      const Eigen::Vector3d v = found.eigenvectors().col(k);
+      if (!(found.values[k] > 0)) continue;
+      const Eigen::Vector3d v = found.vectors.col(k);
       const T turned = v[0] * v[0] * s[0] + v[1] * v[1] * s[3] + v[2] * v[2] * s[5] +
                        2.0 * (v[0] * v[1] * s[1] + v[0] * v[2] * s[2] + v[1] * v[2] * s[4]);
       r[k] = std::sqrt(penalty) * (v.dot(multiplier * v) / penalty - turned);
@@ -48,9 +47,8 @@ struct ConvexityResidual {
   }
   /// The next multiplier.
   void update(const Sym3& s) {
-    const auto found = spectrum(s);
-    multiplier = penalty * found.eigenvectors() * found.eigenvalues().cwiseMax(0.0).asDiagonal() *
-                 found.eigenvectors().transpose();
+    const Spectrum found = spectrum(s);
+    multiplier = penalty * congruent(found.vectors, found.values.cwiseMax(0.0).asDiagonal());
   }
 };
 
@@ -77,17 +75,14 @@ Matrix6 gram_of(const Squares& p) {
 
 /// The symmetric root.
 Squares squares_of(const Matrix6& gram) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6> found(gram);
+  const Spectrum found = spectrum_of(gram);
   Squares p{};
-  Eigen::Map<Matrix6>(p.data()) = found.eigenvectors() *
-                                  found.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
-                                  found.eigenvectors().transpose();
+  Eigen::Map<Matrix6>(p.data()) =
+      congruent(found.vectors, found.values.cwiseMax(0.0).cwiseSqrt().asDiagonal());
   return p;
 }
 
-double least_eigenvalue(const Sym3& s) {
-  return Eigen::SelfAdjointEigenSolver<Sym3>(s, Eigen::EigenvaluesOnly).eigenvalues()[0];
-}
+double least_eigenvalue(const Sym3& s) { return spectrum_of(s).values[0]; }
 
 /// The Gram matrix of |Bw|⁴, and of a sum of six squares that spreads evenly about it.
 struct Ball {

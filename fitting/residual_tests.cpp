@@ -1,6 +1,6 @@
 #include "fitting/residual_tests.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,6 +1,6 @@
 #include "fitting/sku_measured.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 

@@ -2,12 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <set>
 #include <stdexcept>
 
 #include "contact/convex_quartic.hpp"
 #include "dynamics/median.hpp"
+#include "fitting/dense_solve.hpp"
 #include "fitting/slip_surface_solver.hpp"
 
 namespace unhand::fitting {
@@ -59,10 +60,7 @@ SurfaceFit check(const SlipSamples& slips, SurfaceModel model) {
     return refused(SurfaceOutcome::too_few_slips,
                    fmt::format("surface '{}': {} slips with motion under force, {} needs {}", slips.surface,
                                used.size(), to_string(model), least));
-  const Eigen::Vector3d values =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread / static_cast<double>(slips.samples.size()),
-                                                     Eigen::EigenvaluesOnly)
-          .eigenvalues();
+  const Eigen::Vector3d values = spectrum_of(spread / static_cast<double>(slips.samples.size())).values;
   if (values[1] < least_spread || values[0] < least_spread)
     return refused(SurfaceOutcome::directions_do_not_span,
                    fmt::format("surface '{}': all twists are in one {}: they do not determine a surface",

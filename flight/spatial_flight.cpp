@@ -45,10 +45,10 @@ Vec3<S> shape_drag(const S& x, const S& y, const S& cubic, const Vec3<S>& u) {
 
 /// State: position and velocity of the CoM; the rotation is known.
 template <class P>
-class Flying final : public dynamics::HybridSystemFrom<Flying<P>, 6> {
+class SpatialPath final : public dynamics::HybridSystemFrom<SpatialPath<P>, 6> {
  public:
   /// The rotation is known up to `last` [s]; a trial step may look past it.
-  Flying(const SpatialAir<P>& air, const Rotation<P>& rotation, double last)
+  SpatialPath(const SpatialAir<P>& air, const Rotation<P>& rotation, double last)
       : air_(air), rotation_(rotation), last_(last) {
     turns_ = !(is_zero(air.lift) && is_zero(air.axis_drag_x) && is_zero(air.axis_drag_y) &&
                is_zero(air.cubic_drag));
@@ -129,7 +129,7 @@ std::vector<SpatialState<S>> fly_in_space(const SpatialStart<S>& start, const Sp
   recorded.longest_step =
       std::max(options.longest_step, last);  // no guards: the error alone chooses the step
   const auto solution = dynamics::integrate<S, 6>(
-      Flying<S>(air, rotation, last), Entry<S, 6>{0, S(0), {p[0], p[1], p[2], v[0], v[1], v[2]}, S(0)},
+      SpatialPath<S>(air, rotation, last), Entry<S, 6>{0, S(0), {p[0], p[1], p[2], v[0], v[1], v[2]}, S(0)},
       S(last), recorded);
   if (solution.outcome != dynamics::Outcome::horizon)
     throw std::runtime_error(fmt::format("spatial flight: not solved ({})", to_string(solution.outcome)));

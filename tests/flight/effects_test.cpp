@@ -7,6 +7,7 @@
 
 #include "dynamics/gravity_effects.hpp"
 #include "flight/fly.hpp"
+#include "tests/flight/tight.hpp"
 
 namespace unhand::flight {
 namespace {
@@ -25,9 +26,7 @@ std::array<S, 4> land(const std::array<S, kParameters>& p) {
   problem.lift_km = p[1];
   problem.wind = {p[2], p[3]};
   problem.tracked = {S(0.02), S(0)};
-  dynamics::IntegratorOptions options;
-  options.tolerances = {1e-12, 1e-13};
-  const auto flown = fly(problem, options);
+  const auto flown = fly(problem, kTight);
   EXPECT_EQ(flown.outcome, FlightOutcome::landed);
   return {flown.landing.flight_time, flown.landing.pose.x, flown.landing.pose.theta, flown.landing.twist.vz};
 }
@@ -78,9 +77,7 @@ TEST(AirEffects, WindIsABoostedFrame) {
   auto boosted = windy;
   windy.wind = {w, 0};
   boosted.twist.vx -= w;
-  dynamics::IntegratorOptions options;
-  options.tolerances = {1e-12, 1e-13};
-  const auto a = fly(windy, options), b = fly(boosted, options);
+  const auto a = fly(windy, kTight), b = fly(boosted, kTight);
   ASSERT_EQ(a.outcome, FlightOutcome::landed);
   ASSERT_EQ(b.outcome, FlightOutcome::landed);
   EXPECT_NEAR(a.landing.flight_time, b.landing.flight_time, 1e-11);
@@ -98,9 +95,9 @@ TEST(GravityTilt, TurnsGravityAlone) {
   EXPECT_EQ(gravity.at(9.81).x, 0);
   EXPECT_EQ(gravity.at(9.81).z, -9.81);
   gravity.tilt = 0.1;
-  const auto g = gravity.at(9.81);
-  EXPECT_DOUBLE_EQ(g.x, 9.81 * std::sin(0.1));
-  EXPECT_DOUBLE_EQ(g.z, -9.81 * std::cos(0.1));
+  const auto down = gravity.at(9.81);
+  EXPECT_DOUBLE_EQ(down.x, 9.81 * std::sin(0.1));
+  EXPECT_DOUBLE_EQ(down.z, -9.81 * std::cos(0.1));
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "flight/point_flight.hpp"
+#include "tests/flight/tight.hpp"
 
 namespace unhand::flight {
 namespace {
@@ -18,12 +19,6 @@ using dynamics::Vec2;
 constexpr double g = 9.81;
 
 using Problem = FlightProblem<double>;
-
-dynamics::IntegratorOptions tight() {
-  dynamics::IntegratorOptions options;
-  options.tolerances = {1e-12, 1e-13};
-  return options;
-}
 
 Problem thrown(double z, double vz) {
   Problem p;
@@ -66,7 +61,7 @@ TEST(Projectile, TheLandingAngleCountsTheFlips) {
   const auto result = fly(p);
   EXPECT_GT(result.landing.pose.theta, 10 * std::numbers::pi);
   EXPECT_NEAR(result.landing.pose.theta, 0.4 + 40 * result.landing.flight_time, 1e-13);
-  EXPECT_NEAR(fly(by_integrator(p), tight()).landing.pose.theta, result.landing.pose.theta, 1e-10);
+  EXPECT_NEAR(fly(by_integrator(p), kTight).landing.pose.theta, result.landing.pose.theta, 1e-10);
 }
 
 TEST(Projectile, TheIntegratorAgrees) {
@@ -75,7 +70,7 @@ TEST(Projectile, TheIntegratorAgrees) {
   for (int n = 0; n < 50; ++n) {
     Problem p = thrown(height(random), speed(random));
     p.gravity.x = tilt(random);
-    const auto closed = fly(p), integrated = fly(by_integrator(p), tight());
+    const auto closed = fly(p), integrated = fly(by_integrator(p), kTight);
     ASSERT_EQ(closed.outcome, FlightOutcome::landed) << n;
     ASSERT_EQ(integrated.outcome, FlightOutcome::landed) << n;
     expect_near(integrated.landing, closed.landing, 1e-11);
@@ -86,7 +81,7 @@ TEST(Projectile, StartsBelowTheHeightAndLandsOnTheWayDown) {
   for (const double vz : {3.2, 3.14, 5.0}) {  // apexes 21.9 mm and 2.5 mm above zero, and far above
     const Problem p = thrown(-0.5, vz);
     const double t = (vz + std::sqrt(vz * vz - g)) / g;
-    const auto closed = fly(p), integrated = fly(by_integrator(p), tight());
+    const auto closed = fly(p), integrated = fly(by_integrator(p), kTight);
     ASSERT_EQ(closed.outcome, FlightOutcome::landed);
     ASSERT_EQ(integrated.outcome, FlightOutcome::landed);
     EXPECT_NEAR(closed.landing.flight_time, t, 1e-15);
@@ -99,7 +94,7 @@ TEST(Projectile, AShortVisitAboveTheHeightIsSeen) {
   // Above zero for 2 √(2 h/g), 0.3 ms to 9 ms, wherever in a step of up to 50 ms that falls.
   for (const double h : {1e-4, 1e-5, 1e-6, 1e-7})
     for (double z = -0.8; z < -0.3; z += 0.0013) {
-      const auto result = fly(by_integrator(thrown(z, std::sqrt(2 * g * (h - z)))), tight());
+      const auto result = fly(by_integrator(thrown(z, std::sqrt(2 * g * (h - z)))), kTight);
       ASSERT_EQ(result.outcome, FlightOutcome::landed) << h << " above, from " << z;
       // 1e-12 m of the integrator's at the apex.
       EXPECT_NEAR(result.landing.twist.vz, -std::sqrt(2 * g * h), 1e-12 * g / std::sqrt(2 * g * h) + 1e-10)
@@ -125,7 +120,7 @@ TEST(Projectile, NeverReachesAHeightAboveItsApex) {
 
 TEST(Projectile, AtTheHeightItself) {
   EXPECT_NEAR(fly(thrown(0, 2)).landing.flight_time, 4 / g, 1e-15);
-  EXPECT_NEAR(fly(by_integrator(thrown(0, 2)), tight()).landing.flight_time, 4 / g, 1e-10);
+  EXPECT_NEAR(fly(by_integrator(thrown(0, 2)), kTight).landing.flight_time, 4 / g, 1e-10);
   for (const Problem& p : {thrown(0, -2), by_integrator(thrown(0, -2))}) {
     const auto result = fly(p);
     EXPECT_EQ(result.outcome, FlightOutcome::landed);
@@ -137,7 +132,7 @@ TEST(Projectile, WithoutGravityOnlyAFallingObjectLands) {
   for (const double pull : {0.0, -0.5, 1e-18}) {
     Problem p = thrown(1, -2);
     p.gravity.z = -pull;
-    const auto closed = fly(p), integrated = fly(by_integrator(p), tight());
+    const auto closed = fly(p), integrated = fly(by_integrator(p), kTight);
     ASSERT_EQ(closed.outcome, FlightOutcome::landed) << pull;
     expect_near(integrated.landing, closed.landing, 1e-11);
     EXPECT_NEAR(closed.landing.pose.z, 0, 1e-15);
@@ -169,7 +164,7 @@ TEST(Drag, VerticalDrop) {
   p.twist.vx = 0;
   p.drag_k = 0.4;
   const double v_end = std::sqrt(g / 0.4), t = v_end / g * std::acosh(std::exp(3 * g / (v_end * v_end)));
-  const auto result = fly(p, tight());
+  const auto result = fly(p, kTight);
   ASSERT_EQ(result.outcome, FlightOutcome::landed);
   EXPECT_NEAR(result.landing.flight_time, t, 1e-11);
   EXPECT_NEAR(result.landing.twist.vz, -v_end * std::tanh(g * t / v_end), 1e-10);
@@ -182,14 +177,14 @@ TEST(Drag, UpAndDownAgain) {
   p.twist.vx = 0;
   p.drag_k = 0.4;
   const double square = g / 0.4;
-  const auto result = fly(p, tight());
+  const auto result = fly(p, kTight);
   EXPECT_NEAR(result.landing.twist.vz, -4 / std::sqrt(1 + 16 / square), 1e-10);
   p.pose.z = -square / (2 * g) * std::log1p(16 / square);  // the apex is the landing height
   p.pose.z -= 1e-4;
   p.longest = 5;
-  EXPECT_EQ(fly(p, tight()).outcome, FlightOutcome::never_reaches);
+  EXPECT_EQ(fly(p, kTight).outcome, FlightOutcome::never_reaches);
   p.pose.z += 2e-4;
-  EXPECT_EQ(fly(p, tight()).outcome, FlightOutcome::landed);
+  EXPECT_EQ(fly(p, kTight).outcome, FlightOutcome::landed);
 }
 
 TEST(Drag, EndsAtTheTerminalVelocity) {
@@ -207,7 +202,7 @@ TEST(Drag, EnergyOnlyFalls) {
   double last = 0.5 * (1.5 * 1.5 + 25);
   for (double height = 0.7; height > -10; height -= 0.5) {
     p.landing_height = height;
-    const auto result = fly(p, tight());
+    const auto result = fly(p, kTight);
     ASSERT_EQ(result.outcome, FlightOutcome::landed) << height;
     const auto& v = result.landing.twist;
     const double energy = 0.5 * (v.vx * v.vx + v.vz * v.vz) + g * height;
@@ -231,7 +226,7 @@ TEST(TrackedPoint, LandsInsteadOfTheCentreOfMass) {
     const auto z = [&](double t) { return com(t).pose.z + dynamics::rotate(com(t).pose.theta, p.tracked).z; };
     double t = 0;
     while (!(z(t) > 0 && z(t + 2e-5) <= 0)) t += 2e-5;
-    const auto result = fly(p, tight());
+    const auto result = fly(p, kTight);
     ASSERT_EQ(result.outcome, FlightOutcome::landed) << n;
     const auto& landing = result.landing;
     EXPECT_NEAR(landing.flight_time, t + 1e-5, 1.1e-5) << n << " omega " << p.twist.omega;
@@ -248,7 +243,7 @@ TEST(TrackedPoint, IsWhatFlyThroughReports) {
   Problem p = thrown(1, 2);
   p.tracked = {0.05, -0.02};
   const std::vector<double> times{0.3, 0.0, 0.7};
-  const auto closed = fly_through(p, times), integrated = fly_through(by_integrator(p), times, tight());
+  const auto closed = fly_through(p, times), integrated = fly_through(by_integrator(p), times, kTight);
   for (std::size_t i = 0; i < times.size(); ++i) {
     const auto at = ballistic(p.pose, p.twist, p.gravity, times[i]);
     const Vec2<double> d = dynamics::rotate(at.pose.theta, p.tracked);
@@ -266,10 +261,10 @@ TEST(PointFlight, IsThePlanarFlightInItsPlane) {
   Problem p = thrown(1, 2);
   p.drag_k = 0.3;
   const std::vector<double> times{0.5, 0.0, 0.2};
-  const auto planar = fly_through(p, times, tight());
+  const auto planar = fly_through(p, times, kTight);
   const double turn = 0.7, c = std::cos(turn), s = std::sin(turn);  // the plane, about the vertical
   const PointFlight<double> flight{{0.2 * c, 0.2 * s, 1}, {1.5 * c, 1.5 * s, 2}, {0, 0, -g}, 0.3};
-  const auto spatial = positions(flight, times, tight());
+  const auto spatial = positions(flight, times, kTight);
   for (std::size_t i = 0; i < times.size(); ++i) {
     EXPECT_NEAR(spatial[i][0], planar[i].x * c, 1e-11);
     EXPECT_NEAR(spatial[i][1], planar[i].x * s, 1e-11);
@@ -282,7 +277,7 @@ TEST(PointFlight, DragAtNoDragIsTheParabolaWithADerivative) {
       {Dual(0), Dual(0), Dual(1)}, {Dual(1), Dual(2), Dual(3)}, {Dual(0), Dual(0), Dual(-g)}, Dual(0)};
   const auto parabola = positions(flight, {0.4});
   flight.drag_k = independent(0, 0);
-  const auto with = positions(flight, {0.4}, tight());
+  const auto with = positions(flight, {0.4}, kTight);
   for (int i = 0; i < 3; ++i) {
     EXPECT_NEAR(with[0][i].a, parabola[0][i].a, 1e-12);
     EXPECT_LT(with[0][i].v[0], 0);  // all three velocities are positive most of the way

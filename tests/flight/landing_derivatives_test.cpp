@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "flight/fly.hpp"
+#include "tests/flight/tight.hpp"
 #include "tests/support/best_difference.hpp"
 
 namespace unhand::flight {
@@ -15,13 +16,6 @@ using support::best_difference;
 
 using dynamics::Dual;
 using dynamics::independent;
-constexpr double g = 9.81;
-
-dynamics::IntegratorOptions tight() {
-  dynamics::IntegratorOptions options;
-  options.tolerances = {1e-12, 1e-13};
-  return options;
-}
 
 struct DerivativeCase {
   const char* name;
@@ -36,7 +30,8 @@ INSTANTIATE_TEST_SUITE_P(, LandingDerivatives,
 
 TEST_P(LandingDerivatives, AgreeWithCentralDifferences) {
   // z, vx, vz, omega, g_x, g_z, drag, tracked x; theta and the height in a second sweep.
-  const std::array<double, 10> p{1.1, 1.5, 2.0, 6.0, 0.4, -g, GetParam().drag, GetParam().tracked, 0.3, 0.05};
+  const std::array<double, 10> p{1.1, 1.5, 2.0, 6.0, 0.4, -9.81, GetParam().drag, GetParam().tracked,
+                                 0.3, 0.05};
   const auto land = [&](const std::array<Dual, 10>& x) {
     FlightProblem<Dual> problem;
     problem.pose = {Dual(0.1), x[0], x[8]};
@@ -45,7 +40,7 @@ TEST_P(LandingDerivatives, AgreeWithCentralDifferences) {
     problem.drag_k = x[6];
     problem.tracked = {x[7], Dual(0)};
     problem.landing_height = x[9];
-    const auto result = fly(problem, tight());
+    const auto result = fly(problem, kTight);
     EXPECT_EQ(result.outcome, FlightOutcome::landed);
     const auto& l = result.landing;
     return std::array<Dual, 7>{l.flight_time, l.pose.x,   l.pose.z,     l.pose.theta,
@@ -77,12 +72,12 @@ TEST(LandingDerivative, ByDragAtNoDrag) {
   FlightProblem<Dual> p;
   p.pose = {Dual(0.0), Dual(1.0), Dual(0.0)};
   p.twist = {Dual(2.0), Dual(1.5), Dual(3.0)};
-  p.gravity = {Dual(0.0), Dual(-g)};
+  p.gravity = {Dual(0.0), Dual(-9.81)};
   p.drag_k = independent(0.0, 0);
-  const Dual x = fly(p, tight()).landing.pose.x;
+  const Dual x = fly(p, kTight).landing.pose.x;
   const auto at = [&](double k) {
     p.drag_k = Dual(k);
-    return fly(p, tight()).landing.pose.x.a;
+    return fly(p, kTight).landing.pose.x.a;
   };
   double best = INFINITY;  // one-sided, of second order
   for (double step = 1e-2; step > 1e-7; step *= 0.1)
