@@ -107,6 +107,21 @@ void LimitSurface<Shape>::rate_(int mode, const Scene<S>& scene, const Relative<
   dy = relative_rate(scene, y, wrench_(mode, scene, y));
 }
 
+/// u̇/u of the slip [1/s], judged by its energy ½ uᵀ W⁻¹ u, so (f − f_p)·u / (uᵀ W⁻¹ u). Friction's power f·u
+/// is stationary in the slip's direction, so an error in the direction counts by its square here; in |u| it
+/// counts by f_max W, which lets a tiny patch under a light object look as if it stopped. Where the direction
+/// stays, and so at a stop, both say the same.
+template <class Shape>
+template <class S>
+S LimitSurface<Shape>::growth(const Scene<S>& scene, const Relative<S>& y) const {
+  State<S, 6> rate;
+  rate_(kSlip, scene, y, rate);
+  const S length = limits<S>().length(scene.normal_force);
+  const Vec3<S> u = normalised_slip(y, length), du{rate[3], rate[4], length * rate[5]};
+  const Vec3<S> momentum = times(normalised_inertia(scene, lever(scene, y), length), u);
+  return dot3(momentum, du) / dot3(momentum, u);
+}
+
 /// A demanded wrench against the surface at `scene`.
 template <class Shape>
 template <class S>
@@ -125,13 +140,10 @@ void LimitSurface<Shape>::guards_(const Phase& phase, const SceneSource& source,
     g[0] = margin_of(wrench_(phase.mode, scene, y), scene);
   } else {
     // Where L changes with f_N, L' ω_r is left out of u': of the order of kStopTime beside L ω_r' at a stop.
-    State<S, 6> rate;
     const Scene<S> scene = source.scene(phase.window, t);
-    rate_(kSlip, scene, y, rate);
-    const S length = limits<S>().length(scene.normal_force);
-    const Vec3<S> u = normalised_slip(y, length), du{rate[3], rate[4], length * rate[5]};
+    const Vec3<S> u = normalised_slip(y, limits<S>().length(scene.normal_force));
     const S speed = sqrt(dot3(u, u));
-    g[0] = stop_guard(speed, S(dot3(u, du) / speed));
+    g[0] = stop_guard(speed, S(speed * growth(scene, y)));
   }
 }
 
@@ -173,12 +185,10 @@ template <class Shape>
 template <class S>
 Entry<S, 6> LimitSurface<Shape>::come_to_rest(const Window& window, const SceneSource& source, const S& t,
                                               const Relative<S>& at) const {
-  State<S, 6> dy;
   const Scene<S> scene = source.scene(window, t);
+  const S left = -1.0 / growth(scene, at);
+  State<S, 6> dy;
   rate_(kSlip, scene, at, dy);
-  const S length = limits<S>().length(scene.normal_force);
-  const Vec3<S> u = normalised_slip(at, length), du{dy[3], dy[4], length * dy[5]};
-  const S left = -dot3(u, u) / dot3(u, du);
   Relative<S> y = at;
   y.arm = y.arm + (0.5 * left) * Vec2<S>{dy[0], dy[1]};
   y.angle += 0.5 * left * y.spin;

@@ -98,6 +98,8 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>>, public 
   template <class S>
   const PadCompliance<S>& pads() const;
   template <class S>
+  S growth(const Scene<S>&, const Relative<S>&) const;
+  template <class S>
   S margin_of(const Wrench<S>& demand, const Scene<S>&) const;
   template <class S>
   Entry<S, 6> come_to_rest(const Window&, const SceneSource&, const S& t, const Relative<S>&) const;

@@ -1,24 +1,20 @@
 #include "tests/fuzz/readers.hpp"
 
-#include <unistd.h>
-
-#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <map>
 #include <stdexcept>
 
-#include "datasets/hdf5_handles.hpp"
 #include "datasets/import_columns.hpp"
 #include "datasets/import_cube_tosses.hpp"
 #include "datasets/import_motive.hpp"
 #include "datasets/import_phyphox.hpp"
 #include "datasets/model_card.hpp"
-#include "datasets/parse_log.hpp"
 #include "datasets/planar_push_file.hpp"
 #include "datasets/sku.hpp"
 #include "datasets/slip_log.hpp"
 #include "datasets/throw_log.hpp"
+#include "tests/fuzz/scratch_file.hpp"
 
 namespace unhand::fuzz {
 namespace {
@@ -52,47 +48,6 @@ const std::map<std::string, std::function<void(const Path&)>>& readers() {
   return all;
 }
 
-/// The readers that have a process of their own, without it.
-const std::map<std::string, std::function<void(const Path&)>>& readers_here() {
-  static const std::map<std::string, std::function<void(const Path&)>> all{
-      {"throw_log",
-       [](const Path& file) {
-         const datasets::hdf5::Session session;
-         validate(datasets::hdf5::parse_throw_log(file.string(), nullptr));
-       }},
-      {"slip_log", [](const Path& file) {
-         const datasets::hdf5::Session session;
-         validate(datasets::hdf5::parse_slip_log(file.string(), nullptr));
-       }}};
-  return all;
-}
-
-/// A file of its own, in memory where there is such a place. (A memfd has no path that HDF5 accepts.)
-class ScratchFile {
- public:
-  ScratchFile(const std::uint8_t* data, std::size_t size) {
-    const Path memory = "/dev/shm";
-    path_ = ((std::filesystem::exists(memory) ? memory : std::filesystem::temp_directory_path()) /
-             "unhand-XXXXXX")
-                .string();
-    const int descriptor = mkstemp(path_.data());
-    if (descriptor < 0) throw std::runtime_error("no scratch file: " + path_);
-    for (std::size_t done = 0; done < size;) {
-      const ssize_t n = ::write(descriptor, data + done, size - done);
-      if (n <= 0) break;
-      done += static_cast<std::size_t>(n);
-    }
-    ::close(descriptor);
-  }
-  ScratchFile(const ScratchFile&) = delete;
-  ScratchFile& operator=(const ScratchFile&) = delete;
-  ~ScratchFile() { ::unlink(path_.c_str()); }
-  Path path() const { return path_; }
-
- private:
-  std::string path_;
-};
-
 }  // namespace
 
 std::vector<std::string> reader_names() {
@@ -101,11 +56,9 @@ std::vector<std::string> reader_names() {
   return names;
 }
 
-Reading read(const std::string& reader, const std::uint8_t* data, std::size_t size, Process process) {
-  const bool here = process == Process::this_one && readers_here().contains(reader);
-  const auto& choice = here ? readers_here() : readers();
-  const auto found = choice.find(reader);
-  if (found == choice.end()) throw std::invalid_argument("no reader is called " + reader);
+Reading read(const std::string& reader, const std::uint8_t* data, std::size_t size) {
+  const auto found = readers().find(reader);
+  if (found == readers().end()) throw std::invalid_argument("no reader is called " + reader);
   const ScratchFile file(data, size);
   try {
     found->second(file.path());

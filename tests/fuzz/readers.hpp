@@ -15,12 +15,8 @@ std::vector<std::string> reader_names();
 
 enum class Reading { accepted, refused };
 
-/// HDF5 files: read by a child process, as users have it, or in this one, where a fuzzer sees it.
-enum class Process { of_its_own, this_one };
-
 /// Hands the bytes to the reader as a file. A reader may accept them or refuse them with datasets::LogError;
 /// any other exception leaves this function. Throws std::invalid_argument for an unknown name.
-Reading read(const std::string& reader, const std::uint8_t* data, std::size_t size,
-             Process process = Process::of_its_own);
+Reading read(const std::string& reader, const std::uint8_t* data, std::size_t size);
 
 }  // namespace unhand::fuzz
