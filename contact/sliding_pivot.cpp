@@ -290,9 +290,29 @@ Entry<S, 6> SlidingPivot::on_guard_(const Phase& from, int guard, const SceneSou
   } else {
     come_to_rest(from, source, now);
   }
+  const auto begin = [&](int mode) -> Entry<S, 6> {
+    if (rotation_of(mode) == kLocked || value_of(now.y.spin) != 0) return {mode, now.t, now.y.state(), S(0)};
+    return spin_onset(mode, from, source, now.t, now.y);
+  };
   const int mode = enter(from.window, source, translation, excluded, now);
-  if (rotation_of(mode) == kLocked || value_of(now.y.spin) != 0) return {mode, now.t, now.y.state(), S(0)};
-  return spin_onset(mode, from, source, now.t, now.y);
+  const Entry<S, 6> begun = begin(mode);
+  if (translation_holds(from.window, source, begun)) return begun;
+  // The patch, too, starts or ceases to slide within the first instants of the spin: both at once.
+  excluded = {};
+  (translation_of(mode) == kStuck ? excluded.stuck : excluded.slide) = true;
+  return begin(enter(from.window, source, translation, excluded, now));
+}
+
+/// Whether what the patch does at the begin of a phase has not ended during its lead: a guard that begins on
+/// its unsafe side would wait for ever.
+template <class S>
+bool SlidingPivot::translation_holds(const Window& window, const SceneSource& source,
+                                     const Entry<S, 6>& entry) const {
+  const Translation translation = translation_of(entry.mode);
+  if (!(value_of(entry.lead) > 0) || translation == kBrake) return true;
+  double G[3];
+  guards_({entry.mode, window}, source, value_of(entry.t), values(Relative<S>::from(entry.y)), G);
+  return (translation == kSlide) == (G[kTranslationGuard] > 0);
 }
 
 /// The mode that follows. A brake whose slip is within kStopTime of rest when it begins is at rest.

@@ -86,6 +86,8 @@ class SlidingPivot final : public ContactModelFrom<SlidingPivot> {
   template <class S>
   void come_to_rest(const Phase& brake, const SceneSource&, Instant<S>&) const;
   template <class S>
+  bool translation_holds(const Window&, const SceneSource&, const Entry<S, 6>&) const;
+  template <class S>
   Entry<S, 6> spin_onset(int mode, const Phase& from, const SceneSource&, const S& t,
                          const Relative<S>& rest) const;
 
