@@ -11,6 +11,7 @@ using namespace datasets::hdf5;
 
 const std::string kTexts[] = {"",        "Würfe",        "W\xfcrfe", std::string(60'000, 'x'),
                               "a\tb\nc", "\xed\xa0\x80", "None"};
+constexpr char kNotText = '\xff';
 constexpr bool kIsUtf8[] = {true, true, false, true, true, false, true};
 
 }  // namespace
@@ -37,6 +38,7 @@ Composer::Composer(const std::string& file, Choices& choices) : choices_(choices
 
 Handle Composer::group(hid_t owner, const std::string& name, bool required) {
   const auto make = [&](const std::string& as) {
+    if (as.find(kNotText) != std::string::npos) harm();
     Handle made = group_handle(H5Gcreate2(owner, as.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
     must(bool(made));
     return made;
@@ -103,8 +105,7 @@ std::string Composer::name(const std::string& plain) {
     case 3:
       return "\xf0\x9f\xa4\xbe" + plain;
     case 4:
-      harm();
-      return "\xff" + plain;
+      return kNotText + plain;
   }
 }
 
