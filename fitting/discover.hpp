@@ -157,7 +157,7 @@ struct Discovery {
   Verdict verdict{};                    ///< found, nothing missing, unexplained, or no answer
   std::string message;                  ///< the answer in words
   std::vector<AcceptedEffect> effects;  ///< in order of acceptance
-  std::vector<std::string> imitations;  ///< accepted at first, and withdrawn since too much was left
+  std::vector<std::string> imitations;  ///< accepted at first, and withdrawn (selection.hpp)
   std::vector<std::string> along;       ///< effects that are fitted along as nuisances, too small to matter
   std::optional<SmallEffect> small;     ///< the most evident of what was too small to matter
   std::optional<Unexplained> unexplained;                            ///< what is left, if anything

@@ -103,7 +103,7 @@ class ForwardStep {
     ranked.refitted = true;
     ranked.delta_bic = trial.delta_bic;
     ranked.held_out_gain.reset();
-    trial.p_value = law ? 0 : wald_p_value(trial.next, find_effect(candidate.id));
+    trial.p_value = law ? 0 : wald_p_value(trial.next.fit, find_effect(candidate.id));
     const double share = options_.false_discovery_rate / static_cast<double>(f_.candidates.size());
     if (!(trial.delta_bic <= kDeltaBic) || !(trial.p_value <= share)) return std::nullopt;
     if (!solve_held_out(trial.next, options_)) return std::nullopt;

@@ -1,6 +1,7 @@
 #include "fitting/selection.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "fitting/discrepancy.hpp"
@@ -11,6 +12,11 @@ namespace {
 
 /// What is left of the misfit where an effect acts, from which on it is an imitation of another.
 constexpr double kLeft = 0.1;
+
+/// The level at which an effect's size must be told from none by its own interval.
+constexpr double kToldFromNone = 0.05;
+
+bool in_air(Phase phase) { return phase == Phase::flight || phase == Phase::landing; }
 
 /// The footprint's own names for `accepted`: candidates that could have left it as well. What had no
 /// footprint of its own before anything was accepted could not: a wind acts through the drag that has just
@@ -27,6 +33,32 @@ void find_other_names(const Footprints& f, const Eigen::VectorXd& contribution, 
     if (r < enough) continue;
     accepted.add_other_name(candidate.id, r);
   }
+}
+
+/// Whether an effect acts in the air, or in the hand: where the misfit fell most, and an effect on the pads
+/// in the hand wherever that was.
+bool acts(const AcceptedEffect& effect, bool air) {
+  return in_air(effect.phase) == air || (!air && acts_on_pads(effect.id));
+}
+
+/// Whether too much is left in the half of the throw where an effect acts.
+bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisfit>& base,
+                     const std::vector<ChannelMisfit>& now, const DiscoverOptions& options) {
+  return std::any_of(now.begin(), now.end(), [&](const ChannelMisfit& m) {
+    return is_misfit(m, options) && acts(effect, in_air(m.phase)) &&
+           m.chi2_per_sample() >= unexplained_from(m.channel, options) &&
+           m.chi2_per_sample() - 1 > kLeft * (misfit_in(base, m.channel, m.phase) - 1);
+  });
+}
+
+/// An accepted effect that is the shadow of something else. Either conditions and blocks of sensors do not
+/// agree on its size, so that its interval, which counts that (`counted`), has none in it. Or it leaves too
+/// much where it acts: of the throws that it was fitted to, or of those that it has not seen.
+bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const FitResult& counted,
+                  const Discovery& so_far, const DiscoverOptions& options) {
+  return (!is_law(effect.id) && wald_p_value(counted, find_effect(effect.id)) > kToldFromNone) ||
+         leaves_too_much(effect, so_far.base.misfit, stage.fit.misfit, options) ||
+         leaves_too_much(effect, so_far.base_test, stage.held_out.misfit, options);
 }
 
 }  // namespace
@@ -56,45 +88,44 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
 }
 
 void withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out) {
-  const auto in_air = [](Phase phase) { return phase == Phase::flight || phase == Phase::landing; };
-  const auto imitates = [&](const AcceptedEffect& effect) {
-    return std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(), [&](const ChannelMisfit& m) {
-      const double before = misfit_in(out.base.misfit, m.channel, m.phase);
-      return !is_wrench(m.channel) && is_misfit(m, options) && in_air(m.phase) == in_air(effect.phase) &&
-             m.chi2_per_sample() >= options.unexplained && m.chi2_per_sample() - 1 > kLeft * (before - 1);
-    });
-  };
-  std::vector<std::string> ids;
+  if (out.effects.empty()) return;
+  FitResult counted = stage.fit;
+  count_discrepancy(stage.problem, counted, options.fit.threads);
+  std::vector<std::string> ids, gone;
   auto effects = stage.problem.options().effects;
   std::string model = out.model;
+  std::array<bool, 2> misled{};  // in the hand, in the air
   for (const AcceptedEffect& effect : out.effects) {
-    if (imitates(effect)) {
-      out.imitations.push_back(effect.id);
+    const bool here =
+        misled[in_air(effect.phase) ? 1 : 0] || is_imitation(effect, stage, counted, out, options);
+    for (const bool air : {false, true}) misled[air ? 1 : 0] |= here && acts(effect, air);
+    if (here) {
+      gone.push_back(effect.id);
       std::erase(effects, effect.id);
     } else {
       ids.push_back(effect.id);
       if (is_law(effect.id)) model = stage.problem.options().model;
     }
   }
-  if (out.imitations.empty()) return;
+  if (gone.empty()) return;
   if (ids.empty()) effects.clear();  // what was fitted along went with them
   Stage without{stage.problem.with(model, effects), {}, {}, ids};
   solve(without, options, carried(stage.fit, without.problem));
-  if (!without.solved()) {
-    out.imitations.clear();
-    return;
-  }
+  if (!without.solved()) return;
+  out.imitations.insert(out.imitations.end(), gone.begin(), gone.end());
   std::erase_if(out.effects, [&](const AcceptedEffect& effect) {
     return std::find(ids.begin(), ids.end(), effect.id) == ids.end();
   });
   if (effects.empty()) out.along.clear();
   stage = std::move(without);
+  withdraw(stage, options, out);
 }
 
+bool acts_on_pads(const std::string& id) { return id.starts_with("contact.") || id.starts_with("release."); }
+
 bool acts_on_pads(const Stage& stage) {
-  return std::any_of(stage.ids.begin(), stage.ids.end(), [](const std::string& id) {
-    return id.starts_with("contact.") || id.starts_with("release.");
-  });
+  return std::any_of(stage.ids.begin(), stage.ids.end(),
+                     [](const std::string& id) { return acts_on_pads(id); });
 }
 
 bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out) {
@@ -124,7 +155,7 @@ void describe(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   if (out.effects.empty()) return;
   const auto f = footprints(stage.problem, stage.fit, catalogue(options), options.laws, options.fit.threads);
   for (AcceptedEffect& accepted : out.effects)
-    if (!is_law(accepted.id)) accepted.p_value = wald_p_value(stage, find_effect(accepted.id));
+    if (!is_law(accepted.id)) accepted.p_value = wald_p_value(stage.fit, find_effect(accepted.id));
   count_discrepancy(stage.problem, stage.fit, options.fit.threads);
   for (AcceptedEffect& accepted : out.effects) {
     if (is_law(accepted.id)) {

@@ -22,9 +22,12 @@ bool predicts_better(const Stage& before, const Stage& after, const DiscoverOpti
 /// Effects that a later one has made superfluous are taken back.
 void backward(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
-/// An effect that still leaves a tenth of the base model's misfit (a third of its size) where it was said to
-/// act is an imitation of something that is not in the catalogue: it is withdrawn, and named in
-/// `out.imitations`.
+/// Withdraws imitations of something that is not in the catalogue, and names them in `out.imitations`: an
+/// effect whose size is not told from none by its own interval, which counts by how much conditions and
+/// blocks of sensors disagree on it (count_discrepancy); and one that leaves a tenth of the base model's
+/// misfit (a third of its size) in the half of the throw where it was said to act, the wrenches included, on
+/// train or on held-out throws. What was accepted after it in that half goes with it: it was judged in its
+/// company.
 void withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
 /// No pads are rigid: a give of some micrometres before they slip bends what the slipping pads say of an
@@ -32,7 +35,9 @@ void withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out);
 /// below kMostGive; then it is a nuisance of the answer, not a part of it, and in `out.along`. True if it is.
 bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
-/// Whether an effect on the contact or the release was added.
+/// Whether an effect is one on the contact or the release.
+bool acts_on_pads(const std::string& id);
+/// Whether such an effect was added.
 bool acts_on_pads(const Stage& stage);
 
 /// Values, significance and other names of what was accepted. The intervals of the fit count its misfit from

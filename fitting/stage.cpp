@@ -147,15 +147,28 @@ Stage extended(const Stage& stage, const Candidate& candidate, const Score& scor
     effects.push_back(candidate.id);
   Stage out{stage.problem.with(law, effects), {}, {}, stage.ids};
   out.ids.push_back(candidate.id);
-  std::vector<double> start = carried(stage.fit, out.problem);
+  std::vector<double> start = carried(stage.fit, out.problem), typical = out.problem.start();
   for (std::size_t k = 0; k < start.size(); ++k) {
     const Unknown& u = out.problem.campaign()[k];
-    for (std::size_t j = 0; j < candidate.parameters.size(); ++j)
-      if (candidate.parameters[j] == u.name) start[k] = std::clamp(u.start + score.step[j], u.low, u.high);
+    for (std::size_t j = 0; j < candidate.parameters.size(); ++j) {
+      if (candidate.parameters[j] != u.name) continue;
+      start[k] = std::clamp(u.start + score.step[j], u.low, u.high);
+      const double by = std::copysign(u.scale, score.step[j]);
+      typical[k] = std::clamp(u.start + by, u.low, u.high);
+      if (typical[k] == u.start) typical[k] = std::clamp(u.start - by, u.low, u.high);  // one-sided
+    }
     if (const auto shape = candidate.shape.find(without_object(u.name)); shape != candidate.shape.end())
       start[k] = shape->second;
   }
   solve_train(out, options, std::move(start));
+  if (is_law(candidate.id) || (out.is_fitted() && deviance(out.fit) <= deviance(stage.fit))) return out;
+  // The larger of two nested models fits worse: its search went astray, since the smaller one had bent what
+  // they share to make up for what it lacks. Once more, from what the log itself suggests of that and with an
+  // effect of a typical size.
+  Stage again{out.problem, {}, {}, out.ids};
+  if (solve_train(again, options, std::move(typical)) &&
+      (!out.is_fitted() || deviance(again.fit) < deviance(out.fit)))
+    return again;
   return out;
 }
 
@@ -172,6 +185,10 @@ bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options) {
   const bool slips = is_wrench(m.channel) && m.phase != Phase::grasped;
   if (m.chi2_per_sample() <= (slips ? options.wrench_misfit : 1 + options.matters)) return false;
   return chi2_tail(m.chi2, m.n) < options.false_discovery_rate / kSeries;
+}
+
+double unexplained_from(Channel channel, const DiscoverOptions& options) {
+  return is_wrench(channel) ? 2 * options.unexplained : options.unexplained;
 }
 
 double misfit_in(const std::vector<ChannelMisfit>& misfit, Channel channel, Phase phase) {
@@ -220,10 +237,10 @@ Improvement law_improvement(const FitResult& before, const FitResult& after,
           fmt::format("chi2 of all channels: {:.4g} to {:.4g} per degree of freedom", was, was - fall)};
 }
 
-double wald_p_value(const Stage& stage, const dynamics::Effect& effect) {
+double wald_p_value(const FitResult& fit, const dynamics::Effect& effect) {
   std::vector<Eigen::Index> index;
   std::vector<double> away;
-  const auto& campaign = stage.fit.campaign;
+  const auto& campaign = fit.campaign;
   for (std::size_t k = 0; k < campaign.size(); ++k)
     for (const auto& p : effect.parameters)
       if (!p.is_shape() && without_object(campaign[k].unknown.name) == effect.full_name(p)) {
@@ -233,7 +250,7 @@ double wald_p_value(const Stage& stage, const dynamics::Effect& effect) {
   if (index.empty()) return 1;
   const auto width = static_cast<Eigen::Index>(campaign.size());
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  const Eigen::Map<const RowMajor> all(stage.fit.covariance.data(), width, width);
+  const Eigen::Map<const RowMajor> all(fit.covariance.data(), width, width);
   const Eigen::MatrixXd C = all(index, index);
   const Eigen::Map<const Eigen::VectorXd> d(away.data(), static_cast<Eigen::Index>(away.size()));
   return chi2_tail(d.dot(pseudo_solve(C, d)), static_cast<int>(away.size()));

@@ -74,6 +74,10 @@ Stage reduced(const Stage& stage, std::size_t index, const DiscoverOptions&);
 /// takes part, only Newton and Euler: there it is a channel like any other.
 bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options);
 
+/// χ² per sample of a channel from where on something is missing there; of a wrench twice as much, most of
+/// whose variance is trust.
+double unexplained_from(experiment::Channel, const DiscoverOptions& options);
+
 /// The misfit of a channel in a phase, 1 where there is none.
 double misfit_in(const std::vector<ChannelMisfit>& misfit, experiment::Channel, Phase);
 
@@ -95,7 +99,7 @@ Improvement law_improvement(const FitResult& before, const FitResult& after,
                             const std::vector<ChannelMisfit>& base, const DiscoverOptions& options);
 
 /// Wald's test of an effect's size parameters against neutral, with the fit's covariance.
-double wald_p_value(const Stage& stage, const dynamics::Effect& effect);
+double wald_p_value(const FitResult& fit, const dynamics::Effect& effect);
 
 /// The ids of all effects but those that were forgotten.
 std::vector<std::string> catalogue(const DiscoverOptions& options);

@@ -235,7 +235,7 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
   constexpr double kRest = 0.01;
   for (const auto& m : stage.fit.misfit) {
     const double before = misfit_in(so_far.base.misfit, m.channel, m.phase);
-    const double limit = std::max(is_wrench(m.channel) ? 2 * options.unexplained : options.unexplained,
+    const double limit = std::max(unexplained_from(m.channel, options),
                                   so_far.effects.empty() ? 0.0 : 1 + kRest * (before - 1));
     if (!is_misfit(m, options) || m.chi2_per_sample() < limit) continue;
     if (!is_confirmed(stage.held_out, m)) continue;
@@ -250,7 +250,7 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
     if (s.channel == out->channel && s.phase == out->phase) words = s.structure.in_words();
   out->description += words + "; no effect of the catalogue explains it on held-out throws";
   for (const auto& id : so_far.imitations)
-    out->description += fmt::format("; {} imitates it and leaves too much", id);
+    out->description += fmt::format("; {} imitates it", id);
   if (so_far.effects.empty() && so_far.imitations.empty() && !so_far.ranking.empty() &&
       so_far.ranking.front().gain > 1)
     out->description += fmt::format("; the nearest footprint is that of {}", so_far.ranking.front().id);

@@ -86,6 +86,32 @@ TEST(Discovery, AnEffectThatTheCatalogueForgetsIsUnexplainedWithAReadableCandida
   EXPECT_LT(missing.error_after, 0.7 * missing.error_before) << "on throws that it has not seen";
 }
 
+// A bias of the sensor is a force that does not turn with the hand. In one component of the wrench another
+// mass does nearly the same (gravity and the hand's acceleration are much the same in all throws), and lowers
+// its misfit on held-out throws fourfold. But conditions do not agree on that mass, and the rest stays.
+TEST(Discovery, WhatImitatesAForgottenEffectInTheWrenchIsWithdrawn) {
+  experiment::CampaignDesign design = experiment::campaign_design("quick12");
+  design.effects = {
+      {"sensor.ft_bias.fx", 0.25}, {"sensor.ft_bias.fz", -0.18}, {"sensor.ft_bias.tau", 4.5e-3}};
+  const Discovery found = found_in(experiment::generate_campaign(design, 4), {"sensor.ft_bias"});
+  EXPECT_EQ(found.verdict, Verdict::unexplained);
+  EXPECT_TRUE(found.effects.empty()) << found.effects.front().id;
+  ASSERT_TRUE(found.unexplained.has_value());
+  EXPECT_EQ(found.unexplained->phase, Phase::grasped) << "the bias is there from the beginning";
+  EXPECT_TRUE(is_wrench(found.unexplained->channel)) << to_string(found.unexplained->channel);
+}
+
+// A patch that grows with the force is not friction that falls with speed. Stribeck's law brings the flight
+// to its noise, where it was seen most, and leaves the torque of the release at many times its own.
+TEST(Discovery, AnEffectOnThePadsAnswersForTheHandWhereverItWasSeen) {
+  experiment::CampaignDesign design = experiment::campaign_design("quick12");
+  design.effects = {{"contact.soft_patch_radius.gamma", 0.25}};
+  const Discovery found = found_in(experiment::generate_campaign(design, 4), {"contact.soft_patch_radius"});
+  EXPECT_EQ(named(found, "contact.stribeck"), nullptr);
+  ASSERT_TRUE(found.unexplained.has_value());
+  EXPECT_TRUE(found.unexplained->phase == Phase::release || found.unexplained->phase == Phase::grasped);
+}
+
 TEST(Discovery, TwoEffectsAtOnceAreBothFound) {
   const Discovery found = found_in(
       loop_campaign({{"flight.gravity_tilt.angle", 0.02}, {"sensor.mocap_time_offset.offset", 0.005}}));
@@ -173,7 +199,7 @@ TEST(Stage, AShapeThatTheLogLeavesOpenIsHeldAndTheSizeIsKnownForIt) {
       EXPECT_LT(u.sigma, 0.5 * (kScale - 1));
     }
   }
-  EXPECT_LT(wald_p_value(stage, find_effect("sensor.length_scale")), 1e-3);
+  EXPECT_LT(wald_p_value(stage.fit, find_effect("sensor.length_scale")), 1e-3);
 }
 
 // Thirty landings whose chi-square is 1.78 per sample: one in two hundred by chance, and a log has 22 such
