@@ -59,6 +59,17 @@ double onset(const dynamics::Acceleration<double>& a, double lever) {
   return std::nan("");
 }
 
+/// 0.2 kg held level on a lever of 1 cm, which is the patches' length as well; two pads of μ 0.5 open from 30
+/// N to nothing in 0.1 s. The twist at detach. (tests/truth/both_limits_test.cpp)
+dynamics::Twist<double> level_bar() {
+  const auto hand = support::still_hand(0.2);
+  const contact::ProfileNormalForce force({0.02, 30, 0, 0.1, 1});
+  const auto model = contact::make_contact_model("sliding_pivot", pads(0.5, 0.015));
+  const release::ReleaseProblem<double> problem{hand,      force, *model, {0.2, 1e-5}, {0, -9.81},
+                                                {0.01, 0}, 0.0,   {},     0.0};
+  return simulate_release(problem, tight()).detach.twist;
+}
+
 }  // namespace
 
 Section friction_and_release() {
@@ -89,6 +100,10 @@ Section friction_and_release() {
           onset({8, 0, 0}, 0), 1e-9);
   out.row("linear release, pivots at T (1 − τ/τ₀) [s]", "closed form", 0.1 * (1 - 0.1 / 0.2),
           onset({0, 0, 100}, 0), 1e-9);
+  const auto bar = level_bar();
+  out.row("a level bar's force and torque reach their limits together: v_z at detach, −g τ/2 [m/s]",
+          "closed form, `sliding_pivot`", -9.81 * 0.1 * 0.2 * 9.81 / 30 / 2, bar.vz, 1e-9);
+  out.row("and its spin [rad/s]", "the force that is left just holds it", 0, bar.omega, 1e-9);
   {
     const auto hand = support::still_hand(10);
     const support::ConstantForce force(4);

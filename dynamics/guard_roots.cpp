@@ -296,12 +296,13 @@ Entry<S, N> GuardRoots<S, N>::polish(Stepper<S, N>& stepper, const Bracket& brac
   // A true step to `taken`, and from there `on` along a straight line.
   double taken = bracket.root, on = 0, slope = bracket.slope, h_last = 0, G_last = 0;
   State<double, N> base, rate{};
+  const auto step_there = [&] {
+    taken += std::exchange(on, 0);
+    retake(stepper, taken, base);
+    if (!frozen) system_.flow(watch_.phase, t0 + taken, base, rate);
+  };
   for (int k = 0; k < 16; ++k) {
-    if (k == 0 || std::abs(on) > kStraight * length) {
-      taken += std::exchange(on, 0);
-      retake(stepper, taken, base);
-      if (!frozen) system_.flow(watch_.phase, t0 + taken, base, rate);
-    }
+    if (k == 0 || std::abs(on) > kStraight * length) step_there();
     State<double, N> y;
     for (int i = 0; i < N; ++i) y[i] = base[i] + on * rate[i];
     double G[kMaxGuards];
@@ -315,6 +316,7 @@ Entry<S, N> GuardRoots<S, N>::polish(Stepper<S, N>& stepper, const Bracket& brac
     G_last = now;
     on = next - taken;
   }
+  if (std::abs(on) > kStraight * length) step_there();  // a guard of rounding's size has no better root
   Entry<S, N> root{watch_.phase.mode, S(stepper.t0() + taken), {}, S(0)};
   if constexpr (std::is_same_v<S, double>) {
     for (int i = 0; i < N; ++i) root.y[i] = base[i] + on * rate[i];
