@@ -88,9 +88,12 @@ int main() {
       "  (`ctest --preset release -L contract`); readers on damaged files (`-L fuzz`) and under libFuzzer "
       "([tests/fuzz/run](../tests/fuzz/run);\n  executions and findings: "
       "[tests/fuzz](../tests/fuzz/README.md)).\n"
-      "- Threads: fits, the twin and the corners of fit and discover under the thread sanitizer without a "
-      "report (`cmake --preset tsan`, "
-      "target\n"
-      "  `test_fitting`, `--gtest_filter='*Thread*:Twin.*:Corner*'`).\n");
+      "- Threads: fits, the twin, the corners of fit and discover, campaigns, comparisons, the planners and "
+      "the child that reads HDF5\n"
+      "  under the thread sanitizer without a report (`cmake --preset tsan`; `test_fitting "
+      "--gtest_filter='*Thread*:Twin.*:Corner*'`,\n"
+      "  `test_experiment --gtest_filter='Parallel*:*ampaign*:FreeFlight*'`, `test_planners`, `test_flip`, "
+      "`test_datasets`).\n"
+      "- Lines that the tests run, by folder: [coverage.md](coverage.md).\n");
   return count.holds == count.all ? 0 : 1;
 }

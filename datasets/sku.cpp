@@ -86,7 +86,10 @@ std::optional<std::vector<double>> spatial_inertia(const Sku& sku) {
   const double about_y = shape_inertia(*sku.shape, sku.mass, *sku.dims);
   if (std::abs(about_y - sku.inertia.value_or(0)) > 1e-12 * about_y) return {};
   if (*sku.shape == "sphere") return {{about_y, about_y, about_y}};
-  if (*sku.shape == "disc") return {{about_y / 2, about_y, about_y / 2}};
+  if (*sku.shape == "disc") {
+    const double across = about_y / 2 + sku.mass * y * y / 12;
+    return {{across, about_y, across}};
+  }
   if (*sku.shape == "cylinder") return {{sku.mass * z * z / 8, about_y, about_y}};
   return {{sku.mass * (y * y + z * z) / 12, about_y, sku.mass * (x * x + y * y) / 12}};
 }

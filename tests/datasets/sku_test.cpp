@@ -53,9 +53,10 @@ TEST(Sku, NeedsLittle) {
   EXPECT_FALSE(sku.inertia || sku.dims || sku.shape);
 }
 
-/// ∫ρ(x² + z²)dV over a body by midpoints, for unit mass; `inside` says what belongs to it.
+/// ∫ρ(r² − r_a²)dV over a body by midpoints, about the axis a (0, 1, 2: x, y, z), for unit mass; `inside`
+/// says what belongs to it.
 template <class Inside>
-double integrated(const std::array<double, 3>& d, Inside inside) {
+double integrated(const std::array<double, 3>& d, Inside inside, int axis = 1) {
   const int n = 80;
   double mass = 0, sum = 0;
   for (int i = 0; i < n; ++i) {
@@ -65,7 +66,7 @@ double integrated(const std::array<double, 3>& d, Inside inside) {
                      z = d[2] * ((k + 0.5) / n - 0.5);
         if (!inside(x, y, z)) continue;
         mass += 1;
-        sum += x * x + z * z;
+        sum += (axis != 0 ? x * x : 0) + (axis != 1 ? y * y : 0) + (axis != 2 ? z * z : 0);
       }
     }
   }
@@ -86,6 +87,35 @@ TEST(Sku, ShapeInertiaIsTheIntegral) {
   near(shape_inertia("rod", 1, {0.2, 1e-3, 1e-3}),
        integrated({0.2, 1e-3, 1e-3}, [](auto...) { return true; }));
   EXPECT_THROW(shape_inertia("cone", 1, {1, 1, 1}), std::invalid_argument);
+}
+
+TEST(Sku, SpatialInertiaIsTheIntegralAboutEveryAxis) {
+  struct Body {
+    const char* shape;
+    std::array<double, 3> dims;
+    bool (*inside)(double, double, double);
+  };
+  const Body bodies[] = {
+      {"box", {0.2, 0.1, 0.3}, [](double, double, double) { return true; }},
+      {"cylinder", {0.2, 0.1, 0.1}, [](double, double y, double z) { return y * y + z * z < 0.05 * 0.05; }},
+      {"disc", {0.2, 0.05, 0.2}, [](double x, double, double z) { return x * x + z * z < 0.1 * 0.1; }},
+      {"sphere", {0.2, 0.2, 0.2}, [](double x, double y, double z) {
+         return x * x + y * y + z * z < 0.1 * 0.1;
+       }}};
+  for (const Body& body : bodies) {
+    Sku sku;
+    sku.mass = 0.4;
+    sku.shape = body.shape;
+    sku.dims = body.dims;
+    sku.inertia = shape_inertia(body.shape, sku.mass, body.dims);
+    const Object object = to_object(sku, 3);
+    ASSERT_TRUE(object.inertia && object.inertia->size() == 3) << body.shape;
+    for (int axis = 0; axis < 3; ++axis)
+      EXPECT_NEAR((*object.inertia)[axis] / (0.4 * integrated(body.dims, body.inside, axis)), 1, 0.01)
+          << body.shape << ' ' << axis;
+    sku.inertia = 1.1 * *sku.inertia;  // measured: the other two are then open
+    EXPECT_FALSE(to_object(sku, 3).inertia) << body.shape;
+  }
 }
 
 TEST(Sku, SaysWhereAndWhatIsWrong) {
