@@ -167,22 +167,7 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
     return html_picture(directory / (name + ".png"), name);
   };
   std::string answer;
-  for (const auto& effect : found.effects) {
-    answer += fmt::format("<h3>{}</h3><p>", escaped(effect.id));
-    for (const auto& p : effect.parameters)
-      answer +=
-          fmt::format("{} = {:.6g} &plusmn; {:.2g} {} (95 %: {:.6g} to {:.6g})<br>", escaped(p.name), p.value,
-                      p.sigma, escaped(p.unit), p.value - 1.96 * p.sigma, p.value + 1.96 * p.sigma);
-    answer += fmt::format("BIC {:+.1f}, p = {:.2g}. On held-out throws: {}.</p>\n", effect.delta_bic,
-                          effect.p_value, escaped(effect.why));
-    for (const auto& [id, correlation] : effect.equivalent)
-      answer +=
-          fmt::format("<p>Not distinguishable here from <b>{}</b>: the footprints correlate by {:.4f}.</p>\n",
-                      escaped(id), correlation);
-    for (const auto& e : effect.separating)
-      answer += fmt::format("<p>Would tell it from {}: {} (correlation {:.4f} to {:.4f}, simulated).</p>\n",
-                            escaped(e.from), escaped(e.what), e.before, e.after);
-  }
+  for (const auto& effect : found.effects) answer += effect_html(effect);
   if (found.unexplained)
     answer += fmt::format("<p><b>Unexplained:</b> {}.</p>\n", escaped(found.unexplained->description));
   if (estimated) answer += picture("missing");

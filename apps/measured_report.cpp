@@ -114,17 +114,7 @@ void write_measured_report(const MeasuredResult& result, const Json& json,
   };
   std::string answer, notes;
   for (const auto& effect : found.effects) {
-    answer += fmt::format("<h3>{}</h3><p>", escaped(effect.id));
-    for (const auto& p : effect.parameters)
-      answer +=
-          fmt::format("{} = {:.6g} &plusmn; {:.2g} {} (95 %: {:.6g} to {:.6g})<br>", escaped(p.name), p.value,
-                      p.sigma, escaped(p.unit), p.value - 1.96 * p.sigma, p.value + 1.96 * p.sigma);
-    answer += fmt::format("BIC {:+.1f}, p = {:.2g}. On held-out data: {}.</p>\n", effect.delta_bic,
-                          effect.p_value, escaped(effect.why));
-    for (const auto& [id, correlation] : effect.equivalent)
-      answer +=
-          fmt::format("<p>Not distinguishable here from <b>{}</b>: the footprints correlate by {:.4f}.</p>\n",
-                      escaped(id), correlation);
+    answer += effect_html(effect);
     for (const auto& [id, text] : found.separating)
       if (id == effect.id) answer += fmt::format("<p>What would separate them: {}.</p>\n", escaped(text));
   }

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "apps/report_page.hpp"
+
 namespace unhand::apps {
 
 Json ranking_json(std::span<const fitting::Ranked> ranking) {
@@ -69,6 +71,23 @@ std::string effect_text(const fitting::AcceptedEffect& effect) {
     out += fmt::format("\n  {} = {:.6g} +- {:.2g} {}", p.name, p.value, p.sigma, p.unit);
   return out + fmt::format("\n  BIC {:+.1f}, p {:.2g}; held out: {}\n", effect.delta_bic, effect.p_value,
                            effect.why);
+}
+
+std::string effect_html(const fitting::AcceptedEffect& effect) {
+  std::string out = fmt::format("<h3>{}</h3><p>", escaped(effect.id));
+  for (const auto& p : effect.parameters)
+    out += fmt::format("{} = {:.6g} &plusmn; {:.2g} {} (95 %: {:.6g} to {:.6g})<br>", escaped(p.name),
+                       p.value, p.sigma, escaped(p.unit), p.value - 1.96 * p.sigma, p.value + 1.96 * p.sigma);
+  out += fmt::format("BIC {:+.1f}, p = {:.2g}. On held-out data: {}.</p>\n", effect.delta_bic, effect.p_value,
+                     escaped(effect.why));
+  for (const auto& [id, correlation] : effect.equivalent)
+    out +=
+        fmt::format("<p>Not distinguishable here from <b>{}</b>: the footprints correlate by {:.4f}.</p>\n",
+                    escaped(id), correlation);
+  for (const auto& e : effect.separating)
+    out += fmt::format("<p>Would tell it from {}: {} (correlation {:.4f} to {:.4f}, simulated).</p>\n",
+                       escaped(e.from), escaped(e.what), e.before, e.after);
+  return out;
 }
 
 Json effect_json(const fitting::AcceptedEffect& effect) {

@@ -27,6 +27,9 @@ Json effect_json(const fitting::AcceptedEffect& effect);
 /// The same in words: its other names, its parameters, and the evidence.
 std::string effect_text(const fitting::AcceptedEffect& effect);
 
+/// The same as HTML, with what would separate it from its other names.
+std::string effect_html(const fitting::AcceptedEffect& effect);
+
 /// Styles of the base model's residuals and of the answer's.
 inline constexpr const char *kBefore = "with linespoints pointtype 6 linecolor rgb '#d55e00'",
                             *kAfter = "with linespoints pointtype 7 linecolor rgb '#0072b2'";
