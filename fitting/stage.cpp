@@ -161,9 +161,10 @@ Stage extended(const Stage& stage, const Candidate& candidate, const Score& scor
       start[k] = shape->second;
   }
   solve_train(out, options, std::move(start));
-  if (is_law(candidate.id) || (out.is_fitted() && deviance(out.fit) <= deviance(stage.fit))) return out;
-  // The larger of two nested models fits worse: its search went astray, since the smaller one had bent what
-  // they share to make up for what it lacks. Once more, from what the log itself suggests of that and with an
+  const bool astray = !out.is_fitted() || deviance(out.fit) > deviance(stage.fit);
+  if (is_law(candidate.id) || !stage.ids.empty() || !astray) return out;
+  // The larger of two nested models fits worse: its search went astray, since the base had bent what they
+  // share to make up for what it lacks. Once more, from what the log itself suggests of that and with an
   // effect of a typical size.
   Stage again{out.problem, {}, {}, out.ids};
   if (solve_train(again, options, std::move(typical)) &&
