@@ -161,11 +161,13 @@ Stage extended(const Stage& stage, const Candidate& candidate, const Score& scor
       start[k] = shape->second;
   }
   solve_train(out, options, std::move(start));
-  const bool astray = !out.is_fitted() || deviance(out.fit) > deviance(stage.fit);
-  if (is_law(candidate.id) || !stage.ids.empty() || !astray) return out;
-  // The larger of two nested models fits worse: its search went astray, since the base had bent what they
-  // share to make up for what it lacks. Once more, from what the log itself suggests of that and with an
-  // effect of a typical size.
+  const bool in_vain = !out.is_fitted() || out.bic() - stage.bic() > kDeltaBic;
+  const bool misfit = std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(),
+                                  [&](const ChannelMisfit& m) { return is_misfit(m, options); });
+  if (is_law(candidate.id) || !stage.ids.empty() || !misfit || !in_vain) return out;
+  // Something is missing, and a leading candidate gains nothing: its search may have gone astray, since the
+  // base had bent what they share to make up for what it lacks. Once more, from what the log itself suggests
+  // of that and with an effect of a typical size.
   Stage again{out.problem, {}, {}, out.ids};
   if (solve_train(again, options, std::move(typical)) &&
       (!out.is_fitted() || deviance(again.fit) < deviance(out.fit)))

@@ -62,7 +62,8 @@ void solve(Stage& stage, const DiscoverOptions& options, std::vector<double> sta
 /// was still missing.
 void polish(Stage& stage, const DiscoverOptions& options);
 
-/// The stage with one candidate more, fitted to the train throws from the step that its footprint asks for.
+/// The stage with one candidate more, fitted to the train throws from the step that its footprint asks for;
+/// where that gains nothing over a base with a misfit, once more from the problem's own start.
 Stage extended(const Stage& stage, const Candidate& candidate, const Score& score, const DiscoverOptions&);
 
 /// The stage without the effect `ids[index]`.

@@ -249,8 +249,7 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
   for (const auto& s : so_far.structure_after)
     if (s.channel == out->channel && s.phase == out->phase) words = s.structure.in_words();
   out->description += words + "; no effect of the catalogue explains it on held-out throws";
-  for (const auto& id : so_far.imitations)
-    out->description += fmt::format("; {} imitates it", id);
+  for (const auto& id : so_far.imitations) out->description += fmt::format("; {} imitates it", id);
   if (so_far.effects.empty() && so_far.imitations.empty() && !so_far.ranking.empty() &&
       so_far.ranking.front().gain > 1)
     out->description += fmt::format("; the nearest footprint is that of {}", so_far.ranking.front().id);
