@@ -1,4 +1,5 @@
-// For counters of coverage: a child that ends by _exit leaves its counts, too. Included ahead of such a source.
+// For counters of coverage: a child that ends by _exit leaves its counts, too. Included ahead of such a
+// source.
 #pragma once
 
 #include <unistd.h>
