@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "contact/gripper_delay.hpp"
-#include "fitting/measured_card.hpp"
+#include "fitting/measured/measured_card.hpp"
 
 namespace unhand::apps {
 namespace {

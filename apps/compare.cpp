@@ -16,7 +16,7 @@
 #include "apps/throws.hpp"
 #include "experiment/free_flight.hpp"
 #include "experiment/parallel.hpp"
-#include "fitting/slip_surface.hpp"
+#include "fitting/slips/slip_surface.hpp"
 
 namespace unhand::apps {
 namespace {

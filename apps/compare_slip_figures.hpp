@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "apps/figure.hpp"
-#include "fitting/compare_surfaces.hpp"
+#include "fitting/slips/compare_surfaces.hpp"
 
 namespace unhand::apps {
 

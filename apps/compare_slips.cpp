@@ -8,7 +8,7 @@
 #include "apps/compare_slip_figures.hpp"
 #include "apps/figure.hpp"
 #include "apps/progress.hpp"
-#include "fitting/compare_surfaces.hpp"
+#include "fitting/slips/compare_surfaces.hpp"
 
 namespace unhand::apps {
 namespace {

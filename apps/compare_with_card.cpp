@@ -4,7 +4,7 @@
 
 #include "apps/command.hpp"
 #include "apps/compare.hpp"
-#include "fitting/measured_card.hpp"
+#include "fitting/measured/measured_card.hpp"
 
 namespace unhand::apps {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "apps/output.hpp"
-#include "fitting/discover.hpp"
+#include "fitting/discovery/discover.hpp"
 
 namespace unhand::apps {
 

@@ -15,7 +15,7 @@
 #include "apps/figure.hpp"
 #include "apps/progress.hpp"
 #include "apps/throws.hpp"
-#include "fitting/slip_surface.hpp"
+#include "fitting/slips/slip_surface.hpp"
 
 namespace unhand::apps {
 namespace {

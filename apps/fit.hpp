@@ -8,9 +8,9 @@
 #include "apps/output.hpp"
 #include "apps/table.hpp"
 #include "fitting/card.hpp"
+#include "fitting/discovery/twin.hpp"
 #include "fitting/evaluate.hpp"
 #include "fitting/gradient_cost.hpp"
-#include "fitting/twin.hpp"
 
 namespace unhand::apps {
 

@@ -5,7 +5,7 @@
 
 #include "apps/command.hpp"
 #include "apps/fit.hpp"
-#include "fitting/compare_surfaces.hpp"
+#include "fitting/slips/compare_surfaces.hpp"
 
 namespace unhand::apps {
 namespace {

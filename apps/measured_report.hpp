@@ -7,7 +7,7 @@
 
 #include "apps/figure.hpp"
 #include "apps/output.hpp"
-#include "fitting/surface_discovery.hpp"
+#include "fitting/slips/surface_discovery.hpp"
 
 namespace unhand::apps {
 

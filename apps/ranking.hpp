@@ -8,7 +8,7 @@
 #include "apps/figure.hpp"
 #include "apps/output.hpp"
 #include "apps/table.hpp"
-#include "fitting/discover.hpp"
+#include "fitting/discovery/discover.hpp"
 
 namespace unhand::apps {
 

@@ -7,7 +7,7 @@
 #include "apps/figure.hpp"
 #include "apps/output.hpp"
 #include "datasets/sku.hpp"
-#include "fitting/sku_validation.hpp"
+#include "fitting/sku/sku_validation.hpp"
 
 namespace unhand::apps {
 

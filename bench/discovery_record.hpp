@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "experiment/campaign_effects.hpp"
-#include "fitting/discover.hpp"
+#include "fitting/discovery/discover.hpp"
 
 namespace unhand {
 

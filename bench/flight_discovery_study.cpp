@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "fitting/measured_discovery.hpp"
+#include "fitting/measured/measured_discovery.hpp"
 #include "tests/support/spatial_flights.hpp"
 
 namespace {

@@ -1,4 +1,4 @@
-#include "fitting/compare_surfaces.hpp"
+#include "fitting/slips/compare_surfaces.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

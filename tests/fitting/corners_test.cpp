@@ -7,7 +7,7 @@
 #include <functional>
 #include <stdexcept>
 
-#include "fitting/discover.hpp"
+#include "fitting/discovery/discover.hpp"
 #include "tests/support/small_campaign.hpp"
 
 namespace unhand::fitting {

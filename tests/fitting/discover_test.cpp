@@ -1,5 +1,5 @@
 // The loop on synthetic campaigns whose missing effect is known.
-#include "fitting/discover.hpp"
+#include "fitting/discovery/discover.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,9 +7,9 @@
 
 #include "experiment/campaign_effects.hpp"
 #include "experiment/synthetic_campaign.hpp"
-#include "fitting/discrepancy.hpp"
-#include "fitting/footprints.hpp"
-#include "fitting/stage.hpp"
+#include "fitting/discovery/discrepancy.hpp"
+#include "fitting/discovery/footprints.hpp"
+#include "fitting/discovery/stage.hpp"
 
 namespace unhand::fitting {
 namespace {

@@ -1,5 +1,5 @@
 // The loop on synthetic accelerometers in free fall, and on slips, whose missing piece is known.
-#include "fitting/fall_discovery.hpp"
+#include "fitting/measured/fall_discovery.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,8 @@
 #include <cmath>
 #include <random>
 
-#include "fitting/measured_discovery.hpp"
-#include "fitting/surface_discovery.hpp"
+#include "fitting/measured/measured_discovery.hpp"
+#include "fitting/slips/surface_discovery.hpp"
 #include "slip_simulator.hpp"
 
 namespace unhand::fitting {

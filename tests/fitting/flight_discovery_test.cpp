@@ -8,8 +8,8 @@
 #include <filesystem>
 
 #include "datasets/import_cube_tosses.hpp"
-#include "fitting/flight_discovery.hpp"
-#include "fitting/measured_discovery.hpp"
+#include "fitting/measured/flight_discovery.hpp"
+#include "fitting/measured/measured_discovery.hpp"
 #include "tests/support/spatial_flights.hpp"
 
 namespace unhand::fitting {

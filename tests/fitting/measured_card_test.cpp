@@ -1,5 +1,5 @@
 // Cards of free motion against synthetic flights whose missing effect is known.
-#include "fitting/measured_card.hpp"
+#include "fitting/measured/measured_card.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

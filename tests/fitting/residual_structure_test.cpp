@@ -1,12 +1,12 @@
 // Structure in plain residual series: what noise looks like, and what a dependence looks like.
-#include "fitting/residual_structure.hpp"
+#include "fitting/discovery/residual_structure.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "experiment/random_stream.hpp"
-#include "fitting/missing_force.hpp"
+#include "fitting/discovery/missing_force.hpp"
 
 namespace unhand::fitting {
 namespace {

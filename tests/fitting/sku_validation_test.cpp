@@ -1,4 +1,4 @@
-#include "fitting/sku_validation.hpp"
+#include "fitting/sku/sku_validation.hpp"
 
 #include <gmock/gmock.h>
 

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "contact/convex_quartic.hpp"
-#include "fitting/slip_surface.hpp"
+#include "fitting/slips/slip_surface.hpp"
 
 namespace unhand::fitting::test {
 

@@ -1,4 +1,4 @@
-#include "fitting/slip_surface.hpp"
+#include "fitting/slips/slip_surface.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "fitting/twin.hpp"
+#include "fitting/discovery/twin.hpp"
 
 #include <gmock/gmock.h>
 

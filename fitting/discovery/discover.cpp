@@ -1,0 +1,155 @@
+#include "fitting/discovery/discover.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <map>
+
+#include "fitting/discovery/outcome_errors.hpp"
+#include "fitting/discovery/selection.hpp"
+#include "fitting/discovery/separating.hpp"
+#include "fitting/discovery/unexplained.hpp"
+
+namespace unhand::fitting {
+
+const char* to_string(Verdict verdict) {
+  constexpr const char* kNames[] = {"effect_found", "no_missing_effect", "unexplained", "not_answered"};
+  return kNames[static_cast<int>(verdict)];
+}
+
+void AcceptedEffect::add_other_name(const std::string& other, double correlation) {
+  for (auto& [name, known] : equivalent)
+    if (name == other) {
+      known = std::max(known, correlation);
+      return;
+    }
+  equivalent.push_back({other, correlation});
+}
+
+namespace {
+
+FirstMisfit first_misfit(const FitResult& fit, const DiscoverOptions& options) {
+  FirstMisfit out;
+  for (const auto& m : fit.misfit) {
+    if (!is_misfit(m, options)) continue;
+    if (out.any && m.phase != out.phase) break;  // misfits are in the order of the phases
+    if (out.any && m.chi2_per_sample() <= out.chi2_per_sample) continue;
+    out = {true, m.phase, m.channel, m.chi2_per_sample()};
+  }
+  return out;
+}
+
+/// A split where the log has none: every other condition of an object is held out.
+datasets::ThrowLog with_split(datasets::ThrowLog log) {
+  bool train = false, test = false;
+  for (const auto& t : log.throws) (t.split == datasets::Split::train ? train : test) = true;
+  if (train && test) return log;
+  std::map<std::string, std::vector<std::string>> conditions;
+  for (const auto& t : log.throws) {
+    auto& of = conditions[t.object];
+    if (std::find(of.begin(), of.end(), t.condition) == of.end()) of.push_back(t.condition);
+  }
+  for (auto& t : log.throws) {
+    const auto& of = conditions[t.object];
+    const auto at = std::find(of.begin(), of.end(), t.condition) - of.begin();
+    t.split = at % 2 == 0 ? datasets::Split::train : datasets::Split::test;
+  }
+  return log;
+}
+
+OutcomeErrors errors_of(const Stage& stage, Share share, int threads) {
+  OutcomeErrors out = outcome_errors(stage.problem, stage.fit, share, threads);
+  out.chi2_per_dof = (share == Share::test ? stage.held_out : stage.fit).chi2_per_dof();
+  return out;
+}
+
+/// Trajectory RMS after over before, of held-out throws; the landing's where the flight was not seen.
+double error_ratio(const OutcomeErrors& before, const OutcomeErrors& after) {
+  if (before.trajectory_rms > 0) return after.trajectory_rms / before.trajectory_rms;
+  return before.landing_x_mae > 0 ? after.landing_x_mae / before.landing_x_mae : 1;
+}
+
+}  // namespace
+
+Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
+                   const DiscoverOptions& options) {
+  const auto begin = std::chrono::steady_clock::now();
+  const int threads = options.fit.threads;
+  const datasets::ThrowLog log = with_split(logged);
+  Discovery out;
+  Stage stage{CampaignProblem(log, file, options.campaign), {}, {}, {}};
+  solve(stage, options, {});
+  if (stage.solved()) polish(stage, options);
+  out.base = stage.fit;
+  out.model = options.campaign.model;
+  if (!stage.solved()) {
+    out.verdict = Verdict::not_answered;
+    out.message =
+        stage.is_fitted()
+            ? fmt::format("there are no held-out throws to judge the fit by: {}", stage.held_out.message)
+            : fmt::format("the base model could not be fitted: {}", stage.fit.message);
+    return out;
+  }
+  out.base_test = stage.held_out.misfit;
+  out.before_train = errors_of(stage, Share::train, threads);
+  out.before_test = errors_of(stage, Share::test, threads);
+  out.first = first_misfit(stage.fit, options);
+  const auto residuals_before = residuals_of(stage.problem, stage.fit, threads);
+  out.residual_before = residual_over_time(stage.problem, residuals_before);
+  out.structure_before = structures(stage.problem, residuals_before);
+
+  OutcomeErrors last = out.before_test;
+  for (int step = 0; step < options.most_effects; ++step) {
+    if (!out.effects.empty() && !first_misfit(stage.fit, options).any) break;
+    auto next = forward(stage, options, out);
+    if (!next) {
+      // The give of the pads may hide what else there is: with it, unless it predicts worse, one more look.
+      const Stage rigid = stage;
+      if (!out.small || !out.small->any_pads || !fit_along(stage, options, out)) break;
+      const PredictionGain gain = prediction_gain(rigid, stage, options);
+      if (!(gain.after < gain.before) || !held_out_confirms(rigid, stage)) {
+        stage = rigid;
+        out.along.clear();
+        break;
+      }
+      out.small.reset();
+      last = errors_of(stage, Share::test, threads);
+      continue;
+    }
+    stage = std::move(*next);
+    polish(stage, options);
+    if (acts_on_pads(stage)) fit_along(stage, options, out);
+    const OutcomeErrors now = errors_of(stage, Share::test, threads);
+    out.effects.back().test_error_ratio = error_ratio(last, now);
+    last = now;
+  }
+  backward(stage, options, out);
+  withdraw(stage, options, out);
+  describe(stage, options, out);
+  for (AcceptedEffect& effect : out.effects)
+    for (const auto& [other, correlation] : effect.equivalent) {
+      const auto experiments = separating_experiments(stage, effect, other, options);
+      effect.separating.insert(effect.separating.end(), experiments.begin(), experiments.end());
+    }
+
+  const bool unchanged = out.effects.empty() && out.along.empty();
+  const auto residuals_after = unchanged ? residuals_before : residuals_of(stage.problem, stage.fit, threads);
+  out.residual_after = residual_over_time(stage.problem, residuals_after);
+  out.structure_after = structures(stage.problem, residuals_after);
+  out.unexplained = unexplained(stage, out, options);
+  out.final = stage.fit;
+  out.final_test = stage.held_out.misfit;
+  out.model = stage.problem.options().model;
+  out.after_train = unchanged ? out.before_train : errors_of(stage, Share::train, threads);
+  out.after_test = unchanged ? out.before_test : errors_of(stage, Share::test, threads);
+  out.verdict = !out.effects.empty() ? Verdict::effect_found
+                : out.unexplained    ? Verdict::unexplained
+                                     : Verdict::no_missing_effect;
+  out.problem = std::make_shared<const CampaignProblem>(std::move(stage.problem));
+  out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return out;
+}
+
+}  // namespace unhand::fitting

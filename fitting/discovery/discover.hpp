@@ -1,0 +1,180 @@
+// Closing the loop: where a model's residual leaves the noise, which effect leaves such a footprint, and
+// whether held-out throws agree.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fitting/discovery/missing_force.hpp"
+#include "fitting/discovery/residuals.hpp"
+#include "fitting/fit.hpp"
+
+namespace unhand::fitting {
+
+/// What the loop may try, and what convinces it.
+struct DiscoverOptions {
+  CampaignOptions campaign;  ///< model to begin with, and channels
+  FitOptions fit;            ///< how every fit runs
+  /// An effect matters if, on held-out throws, it takes at least this much off the χ² per sample of some
+  /// channel of the motion in some phase (1 is the noise), and a tenth of the misfit there.
+  double matters{0.5};
+  /// The same for the wrench channels, whose misfit once the pads open must also have been so many times the
+  /// noise, or vanish altogether: near the end of a release a patch slips in parts, and no law of the
+  /// catalogue follows its torque better. In the firm grasp only the body's inertia speaks, and they are
+  /// channels like others.
+  double wrench_matters{1}, wrench_misfit{3};  ///< as above [χ² per sample]; times the noise
+  /// Or if the held-out throws are predicted that much better before they are made: rms before over after.
+  double prediction_matters{1.15};
+  double law_matters{0.005};          ///< another contact law: share of the held-out χ² as a whole
+  double false_discovery_rate{0.02};  ///< shared among the effects that were tried
+  double equivalent{0.98};            ///< footprints that correlate by this much are one answer
+  int refits{4};                      ///< candidates that are fitted in full, in every step
+  int most_effects{3};                ///< accepted in all
+  double unexplained{1.5};  ///< χ² per sample of a channel in a phase from which on something is missing
+  std::vector<std::string> forget;  ///< effects that are not in the catalogue today
+  std::vector<std::string> laws{"limit_surface", "limit_surface_disc",
+                                "limit_surface_quartic",  ///< contact laws that are tried
+                                "sliding_pivot"};
+};
+
+/// What the loop says of a log.
+enum class Verdict {
+  effect_found,       ///< an effect, or another law, explains what was missing
+  no_missing_effect,  ///< nothing is missing beyond noise
+  unexplained,        ///< something is missing, and no effect of the catalogue is it
+  not_answered,       ///< the log does not determine a fit
+};
+/// The verdict's name, as it is written above.
+const char* to_string(Verdict);
+
+/// Errors of the outcome, predicted before the throw (own unknowns from the grasp alone) minus measured.
+struct OutcomeErrors {
+  int n{};                     ///< throws
+  double landing_x_mae{};      ///< [m]
+  double landing_theta_mae{};  ///< [deg]
+  double detach_vx_mae{};      ///< [m/s]
+  double detach_omega_mae{};   ///< [deg/s]
+  double trajectory_rms{};     ///< of the position in flight [m]
+  double chi2_per_dof{};       ///< with the throws' own unknowns fitted
+};
+
+/// A parameter of an accepted effect.
+struct Parameter {
+  std::string name, unit;   ///< "id.parameter", with "[object]" for effects that every object has its own of
+  double value{}, sigma{};  ///< in `unit`; 1 σ
+};
+
+/// An experiment that would tell an accepted effect from another name of its footprint.
+struct SeparatingExperiment {
+  std::string from;          ///< the other name
+  std::string what;          ///< to do, in words
+  double before{}, after{};  ///< correlation of the footprints: in this log; with the experiment's throws
+};
+
+/// An effect that the data made believable.
+struct AcceptedEffect {
+  std::string id;                                          ///< of the effect, or "contact.law"
+  std::vector<std::pair<std::string, double>> equivalent;  ///< ids, with the correlation of the footprints
+  std::vector<SeparatingExperiment> separating;            ///< the most telling first, for each other name
+  std::vector<Parameter> parameters;                       ///< as fitted
+  double delta_bic{};         ///< of the model with it against without: negative speaks for it
+  double p_value{};           ///< of its absence
+  double test_error_ratio{};  ///< held-out error with it over without [-]
+  std::string why;            ///< where the held-out misfit fell, in words
+  Phase phase{};              ///< where it fell most
+
+  /// Another name that the data cannot tell from this one; of several correlations the largest counts.
+  void add_other_name(const std::string& other, double correlation);
+};
+
+/// An effect for which the evidence is, and which is no part of the answer.
+struct SmallEffect {
+  std::string id;          ///< of the effect
+  double delta_bic{};      ///< with it against without
+  double p_value{};        ///< of its absence
+  double held_out_fall{};  ///< largest, of χ² per sample in a channel and phase
+  double rms_before{};     ///< of held-out predictions without it, as PredictionGain has it [m]
+  double rms_after{};      ///< and with it [m]
+  bool any_pads{};         ///< it is a give of the pads that no pads are without
+};
+
+/// One candidate, as it was scored in the step in which it came nearest to being accepted.
+struct Ranked {
+  std::string id;                  ///< of the effect, or "contact.law:MODEL"
+  double gain{};                   ///< of χ², to first order
+  double p_value{1};               ///< of the gain, in units of what is left unexplained
+  double correlation_with_best{};  ///< of the footprints
+  bool visible{true};              ///< something of its footprint is left beside the fitted unknowns
+  bool refitted{false};            ///< it was fitted in full
+  double delta_bic{};              ///< negative: for the effect; of the refit
+  /// Largest fall of the held-out χ² per sample in a channel and phase; of refits with evidence on the train
+  /// throws.
+  std::optional<double> held_out_gain{};
+};
+
+/// How a prediction may use what is estimated to be missing.
+enum class Correction {
+  withheld,   ///< none: it does not lower the held-out error
+  curve,      ///< the curve over time
+  candidate,  ///< the physical terms
+};
+
+/// What is missing, without a form assumed: an acceleration in flight over the time since the detach [m/s²,
+/// m/s², rad/s²], or a pad's wrench in the hand's frame over the share of the opening that has passed [N, N,
+/// N m].
+struct MissingEstimate {
+  Phase phase{};                                    ///< in flight, or during the release
+  std::vector<std::pair<std::string, int>> groups;  ///< objects, and the group of their curve
+  std::vector<MissingCurve> curves;                 ///< one per group
+  MissingCandidate candidate;                       ///< physical terms that follow the curves
+  /// What lowers the held-out error, if anything: else it is withheld.
+  Correction correction{};               ///< what is used
+  double error_before{}, error_after{};  ///< rms, of the flight where it was seen, else of the landing
+  std::string error_unit;                ///< "m", or "sigma" of the landing
+};
+
+/// Structure that no effect of the catalogue accounts for.
+struct Unexplained {
+  Phase phase{};                           ///< where it is largest
+  experiment::Channel channel{};           ///< of which sensor
+  double chi2_per_dof{};                   ///< on held-out throws; 1 is the noise
+  std::string description;                 ///< in words
+  std::optional<MissingEstimate> missing;  ///< absent where no force can be read from it
+};
+
+/// Where the residual first leaves the noise.
+struct FirstMisfit {
+  bool any{false};                ///< false: it stays in the noise
+  Phase phase{};                  ///< of the throw
+  experiment::Channel channel{};  ///< of which sensor
+  double chi2_per_sample{};       ///< 1 is the noise
+};
+
+/// The loop's answer.
+struct Discovery {
+  Verdict verdict{};                    ///< found, nothing missing, unexplained, or no answer
+  std::string message;                  ///< the answer in words
+  std::vector<AcceptedEffect> effects;  ///< in order of acceptance
+  std::vector<std::string> imitations;  ///< accepted at first, and withdrawn (selection.hpp)
+  std::vector<std::string> along;       ///< effects that are fitted along as nuisances, too small to matter
+  std::optional<SmallEffect> small;     ///< the most evident of what was too small to matter
+  std::optional<Unexplained> unexplained;                            ///< what is left, if anything
+  FirstMisfit first;                                                 ///< of the base model
+  OutcomeErrors before_train, before_test, after_train, after_test;  ///< base model; the answer
+  std::vector<Ranked> ranking;                                       ///< best first
+  FitResult base, final;  ///< of the train throws: by the base model and by the answer
+  std::vector<ChannelMisfit> base_test, final_test;          ///< misfit on held-out throws
+  std::string model;                                         ///< of the answer (contact.law changes it)
+  std::vector<ResidualBin> residual_before, residual_after;  ///< of the train throws
+  std::vector<ChannelStructure> structure_before, structure_after;  ///< of the train throws
+  std::shared_ptr<const CampaignProblem> problem;                   ///< of the answer
+  double seconds{};                                                 ///< of the whole loop
+};
+
+/// Runs the loop. A log without a test split is split by condition, every other one of an object held out.
+/// Throws as CampaignProblem does.
+Discovery discover(const datasets::ThrowLog& log, const std::string& file, const DiscoverOptions& options);
+
+}  // namespace unhand::fitting

@@ -1,0 +1,194 @@
+// One step forward of the loop: which candidate explains most, and whether that convinces.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "fitting/discovery/residual_structure.hpp"
+#include "fitting/discovery/selection.hpp"
+
+namespace unhand::fitting {
+
+namespace {
+
+/// What explains less than this share of what another footprint would is an imitation of it.
+constexpr double kImitation = 1.0 / 3.0;
+
+/// Where nothing is left but noise, footprints are small and a refit gains what they say, within this factor.
+constexpr double kFirstOrder = 3;
+
+void rank(std::vector<Ranked>& ranking, const Footprints& f, const std::vector<Score>& all) {
+  const auto last = static_cast<Eigen::Index>(f.residual());
+  const Score* best = nullptr;
+  for (const auto& s : all)
+    if (!best || s.gain > best->gain) best = &s;
+  for (const auto& s : all) {
+    const Candidate& c = f.candidates[s.candidate];
+    auto found = std::find_if(ranking.begin(), ranking.end(), [&](const Ranked& r) { return r.id == c.id; });
+    if (found == ranking.end()) found = ranking.insert(ranking.end(), Ranked{c.id, -1});
+    if (s.gain <= found->gain) continue;
+    found->gain = s.gain;
+    found->visible = s.visible;
+    // What the best candidate leaves sets the scale of what is not noise.
+    const double scale = std::max(1.0, (f.gram(last, last) - best->gain) / std::max(1.0, f.samples));
+    found->p_value = chi2_tail(s.gain / scale, static_cast<int>(c.columns.size()));
+    found->correlation_with_best = between(f, f.candidates[best->candidate], best->step, c);
+  }
+  std::sort(ranking.begin(), ranking.end(), [](const Ranked& a, const Ranked& b) { return a.gain > b.gain; });
+}
+
+Ranked& named(std::vector<Ranked>& ranking, const std::string& id) {
+  return *std::find_if(ranking.begin(), ranking.end(), [&](const Ranked& r) { return r.id == id; });
+}
+
+/// A refit of one candidate against the stage that it would extend, with evidence on the train throws.
+struct Trial {
+  const Score* score{};
+  Stage next;
+  double delta_bic{}, p_value{};
+  Improvement held_out;
+};
+
+class ForwardStep {
+ public:
+  ForwardStep(const Stage& stage, const DiscoverOptions& options, Discovery& out)
+      : stage_(stage),
+        options_(options),
+        out_(out),
+        f_(footprints(stage.problem, stage.fit, catalogue(options), options.laws, options.fit.threads)),
+        all_(scores(f_)),
+        noise_(std::none_of(stage.fit.misfit.begin(), stage.fit.misfit.end(),
+                            [&](const ChannelMisfit& m) { return is_misfit(m, options); })) {}
+
+  std::optional<Stage> run() {
+    if (all_.empty()) return std::nullopt;
+    rank(out_.ranking, f_, all_);
+    std::sort(all_.begin(), all_.end(), [](const Score& a, const Score& b) { return a.gain > b.gain; });
+    for (const Score& score : all_)
+      if (static_cast<int>(tried_.size()) < options_.refits && score.gain >= kImitation * all_.front().gain)
+        consider(score);
+    // Laws are alternatives to each other: where one convinces, all are tried. And where nothing convinced,
+    // another law may still be the better one.
+    if (!best_ || is_law(id_of(*best_->score)))
+      for (const Score& score : all_)
+        if (is_law(id_of(score))) consider(score);
+    if (best_) {
+      const std::string why = best_->held_out.where;
+      return accept(std::move(*best_), why, convincing_);
+    }
+    return small_ ? weigh_small() : std::nullopt;
+  }
+
+ private:
+  using WithCriterion = std::vector<std::pair<const Score*, double>>;  // Bayes' criterion of the refit
+
+  const std::string& id_of(const Score& score) const { return f_.candidates[score.candidate].id; }
+  double between_footprints(const Score& a, const Score& b) const {
+    return between(f_, f_.candidates[a.candidate], a.step, f_.candidates[b.candidate]);
+  }
+
+  bool in_reach(const Score& score) const {
+    const auto columns = static_cast<double>(f_.candidates[score.candidate].columns.size());
+    return !noise_ || kFirstOrder * score.gain >= columns * std::log(f_.samples) - kDeltaBic;
+  }
+
+  std::optional<Trial> try_out(const Score& score) {
+    const Candidate& candidate = f_.candidates[score.candidate];
+    Trial trial{&score, extended(stage_, candidate, score, options_), 0, 0, {}};
+    if (!trial.next.is_fitted()) return std::nullopt;
+    trial.delta_bic = trial.next.bic() - stage_.bic();
+    const bool law = is_law(candidate.id);
+    Ranked& ranked = named(out_.ranking, candidate.id);
+    ranked.refitted = true;
+    ranked.delta_bic = trial.delta_bic;
+    ranked.held_out_gain.reset();
+    trial.p_value = law ? 0 : wald_p_value(trial.next.fit, find_effect(candidate.id));
+    const double share = options_.false_discovery_rate / static_cast<double>(f_.candidates.size());
+    if (!(trial.delta_bic <= kDeltaBic) || !(trial.p_value <= share)) return std::nullopt;
+    if (!solve_held_out(trial.next, options_)) return std::nullopt;
+    trial.held_out = law ? law_improvement(stage_.held_out, trial.next.held_out, out_.base_test, options_)
+                         : improvement(stage_.held_out, trial.next.held_out, out_.base_test, options_);
+    ranked.held_out_gain = trial.held_out.fall;
+    return trial;
+  }
+
+  void consider(const Score& score) {
+    if (!score.visible || !in_reach(score) || !tried_.insert(id_of(score)).second) return;
+    auto trial = try_out(score);
+    if (!trial) return;
+    const double bic = trial->next.bic();
+    const bool matters = trial->held_out.matters >= 1;
+    if (!matters && is_law(id_of(score))) return;
+    (matters ? convincing_ : evident_).push_back({&score, bic});
+    auto& leader = matters ? best_ : small_;
+    if (!leader || bic < leader->next.bic()) leader = std::move(trial);
+  }
+
+  /// What matters to no channel may matter to a prediction, where all of a throw's errors add up. Not a give
+  /// of the pads that no pads are without, nor what imitates that.
+  std::optional<Stage> weigh_small() {
+    try_give();
+    const PredictionGain gain = prediction_gain(stage_, small_->next, options_);
+    const std::string& id = id_of(*small_->score);
+    const bool give = id == kPads && give_of(small_->next) <= kMostGive;
+    if (!give && predicts_better(stage_, small_->next, options_))
+      return accept(std::move(*small_),
+                    fmt::format("predicted before the throw: {:.3g} to {:.3g} mm rms", 1e3 * gain.before,
+                                1e3 * gain.after),
+                    evident_);
+    if (out_.small && out_.small->delta_bic <= small_->delta_bic) return std::nullopt;
+    out_.small = {id,  small_->delta_bic, small_->p_value, small_->held_out.fall, gain.before, gain.after,
+                  give};
+    return std::nullopt;
+  }
+
+  /// Where a give of the pads explains more than what there is evidence for, it takes its place.
+  void try_give() {
+    const auto score =
+        std::find_if(all_.begin(), all_.end(), [&](const Score& s) { return id_of(s) == kPads; });
+    if (score == all_.end() || !score->visible || !tried_.insert(kPads).second) return;
+    auto trial = try_out(*score);
+    if (trial && trial->next.bic() < small_->next.bic() && give_of(trial->next) <= kMostGive)
+      small_ = std::move(trial);
+  }
+
+  Stage accept(Trial trial, const std::string& why, const WithCriterion& rivals) {
+    AcceptedEffect accepted;
+    accepted.id = id_of(*trial.score);
+    accepted.delta_bic = trial.delta_bic;
+    accepted.why = why;
+    accepted.phase = trial.held_out.phase;
+    if (is_law(accepted.id))
+      for (const Score& score : all_)
+        if (is_law(id_of(score)) && id_of(score) != accepted.id) {
+          const double r = between_footprints(*trial.score, score);
+          if (r >= options_.equivalent) accepted.equivalent.push_back({id_of(score), r});
+        }
+    for (const auto& [score, bic] : rivals)
+      if (score != trial.score && !is_law(id_of(*score)) && bic < trial.next.bic() - kDeltaBic)
+        accepted.add_other_name(id_of(*score), between_footprints(*trial.score, *score));
+    out_.effects.push_back(std::move(accepted));
+    return std::move(trial.next);
+  }
+
+  static constexpr const char* kPads = "contact.pad_compliance";
+
+  const Stage& stage_;
+  const DiscoverOptions& options_;
+  Discovery& out_;
+  Footprints f_;
+  std::vector<Score> all_;
+  bool noise_;  // nothing but that is left
+  std::set<std::string> tried_;
+  std::optional<Trial> best_, small_;  // of those that matter to a channel, and of those that do not
+  WithCriterion convincing_, evident_;
+};
+
+}  // namespace
+
+std::optional<Stage> forward(const Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  return ForwardStep(stage, options, out).run();
+}
+
+}  // namespace unhand::fitting

@@ -1,0 +1,309 @@
+#include "fitting/discovery/missing_force.hpp"
+
+#include <fmt/core.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "fitting/dense_solve.hpp"
+
+namespace unhand::fitting {
+
+namespace {
+
+using State = ResidualTrace::State;
+using Vector3 = std::array<double, 3>;
+
+/// x(t) of x'' = a(t), a linear between the times, from rest at zero.
+std::vector<double> twice_integrated(const std::vector<double>& time, const std::vector<double>& a) {
+  std::vector<double> x(time.size(), 0.0);
+  double v = 0;
+  for (std::size_t k = 1; k < time.size(); ++k) {
+    const double h = time[k] - time[k - 1];
+    x[k] = x[k - 1] + h * v + h * h * (2 * a[k - 1] + a[k]) / 6;
+    v += 0.5 * h * (a[k - 1] + a[k]);
+  }
+  return x;
+}
+
+/// The rows in which something was seen, with offset and slope projected out if they are the recording's own.
+class Rows {
+ public:
+  Rows(const ResidualTrace& trace, int component, const MissingOptions& options)
+      : trace_(trace), options_(options), scale_(1 / options.sigma[static_cast<std::size_t>(component)]) {
+    const auto& r = trace.residual[static_cast<std::size_t>(component)];
+    for (std::size_t k = 0; k < r.size(); ++k)
+      if (std::isfinite(r[k])) rows_.push_back(k);
+    if (options.response == Response::twice_integrated && !rows_.empty()) {
+      Eigen::MatrixXd line(static_cast<Eigen::Index>(rows_.size()), 2);
+      for (std::size_t k = 0; k < rows_.size(); ++k)
+        line.row(static_cast<Eigen::Index>(k)) << 1, trace.time[rows_[k]] - trace.time[rows_.front()];
+      if (rows_.size() >= 3) own_ = orthonormal_basis(line);
+    }
+    seen_ = whitened(r, false);
+  }
+  bool enough() const { return rows_.size() >= 3; }
+  const Eigen::VectorXd& seen() const { return seen_; }
+  /// What a missing quantity, given at every time of the trace, would do to the residual.
+  Eigen::VectorXd response(const std::vector<double>& missing) const {
+    return whitened(missing, options_.response == Response::twice_integrated);
+  }
+
+ private:
+  Eigen::VectorXd whitened(const std::vector<double>& series, bool integrate) const {
+    const std::vector<double> full = integrate ? twice_integrated(trace_.time, series) : series;
+    Eigen::VectorXd out(static_cast<Eigen::Index>(rows_.size()));
+    for (std::size_t k = 0; k < rows_.size(); ++k)
+      out[static_cast<Eigen::Index>(k)] = scale_ * full[rows_[k]];
+    if (own_.size() > 0) out -= own_ * (own_.transpose() * out);
+    return out;
+  }
+  const ResidualTrace& trace_;
+  const MissingOptions& options_;
+  double scale_;
+  std::vector<std::size_t> rows_;
+  Eigen::MatrixXd own_;
+  Eigen::VectorXd seen_;
+};
+
+double hat(const std::vector<double>& knots, std::size_t j, double t) {
+  if (j > 0 && t < knots[j]) return std::max(0.0, (t - knots[j - 1]) / (knots[j] - knots[j - 1]));
+  if (j + 1 < knots.size() && t > knots[j])
+    return std::max(0.0, (knots[j + 1] - t) / (knots[j + 1] - knots[j]));
+  return 1;
+}
+
+struct Term {
+  std::string name, unit;
+  std::function<Vector3(const State&)> at;
+};
+
+std::vector<Term> acceleration_terms() {
+  const auto speed = [](const State& s) { return std::hypot(s.vx, s.vz); };
+  return {{"|v| v", "1/m",
+           [=](const State& s) {
+             return Vector3{speed(s) * s.vx, speed(s) * s.vz, 0};
+           }},
+          {"v", "1/s",
+           [](const State& s) {
+             return Vector3{s.vx, s.vz, 0};
+           }},
+          {"omega J v", "-",
+           [](const State& s) {
+             return Vector3{-s.omega * s.vz, s.omega * s.vx, 0};
+           }},
+          {"1 along x", "m/s^2",
+           [](const State&) {
+             return Vector3{1, 0, 0};
+           }},
+          {"1 along z", "m/s^2",
+           [](const State&) {
+             return Vector3{0, 1, 0};
+           }},
+          {"1 along the object's x", "m/s^2",
+           [](const State& s) {
+             return Vector3{std::cos(s.theta), std::sin(s.theta), 0};
+           }},
+          {"1 along the object's z", "m/s^2",
+           [](const State& s) {
+             return Vector3{-std::sin(s.theta), std::cos(s.theta), 0};
+           }},
+          {"omega^2 along the object's x", "m",
+           [](const State& s) {
+             return Vector3{s.omega * s.omega * std::cos(s.theta), s.omega * s.omega * std::sin(s.theta), 0};
+           }},
+          {"1 in rotation", "rad/s^2",
+           [](const State&) {
+             return Vector3{0, 0, 1};
+           }},
+          {"omega in rotation", "1/s",
+           [](const State& s) {
+             return Vector3{0, 0, s.omega};
+           }},
+          {"|omega| omega in rotation", "1/rad",
+           [](const State& s) {
+             return Vector3{0, 0, std::abs(s.omega) * s.omega};
+           }},
+          {"sin theta in rotation", "rad/s^2",
+           [](const State& s) {
+             return Vector3{0, 0, std::sin(s.theta)};
+           }},
+          {"cos theta in rotation", "rad/s^2", [](const State& s) {
+             return Vector3{0, 0, std::cos(s.theta)};
+           }}};
+}
+
+std::vector<Term> wrench_terms() {
+  std::vector<Term> out;
+  constexpr const char* kOf[] = {"fx", "fz", "tau"};
+  constexpr const char* kUnit[] = {"N", "N", "N m"};
+  for (std::size_t c = 0; c < 3; ++c) {
+    const auto add = [&](const std::string& what, const std::string& per, auto size) {
+      out.push_back({fmt::format("{} in {}", what, kOf[c]), kUnit[c] + per, [=](const State& s) {
+                       Vector3 v{};
+                       v[c] = size(s);
+                       return v;
+                     }});
+    };
+    add("1", "", [](const State&) { return 1.0; });
+    add("f_N", "/N", [](const State& s) { return s.normal_force; });
+    add("f_N^2", "/N^2", [](const State& s) { return s.normal_force * s.normal_force; });
+    add("|v|", " s/m", [](const State& s) { return std::hypot(s.vx, s.vz); });
+    add("omega", " s/rad", [](const State& s) { return s.omega; });
+  }
+  return out;
+}
+
+std::vector<Term> terms_for(Response response) {
+  return response == Response::direct ? wrench_terms() : acceleration_terms();
+}
+
+}  // namespace
+
+std::array<double, 3> MissingCurve::at(double time) const {
+  std::array<double, 3> out{};
+  for (std::size_t c = 0; c < 3; ++c)
+    for (std::size_t j = 0; j < knots.size(); ++j)
+      out[c] += value[c][j] * hat(knots, j, std::clamp(time, knots.front(), knots.back()));
+  return out;
+}
+
+std::vector<MissingCurve> missing_curves(const std::vector<ResidualTrace>& traces,
+                                         const MissingOptions& options) {
+  std::set<int> groups;
+  for (const auto& t : traces) groups.insert(t.group);
+  std::vector<MissingCurve> out;
+  const auto n = static_cast<std::size_t>(std::max(2, options.knots));
+  for (const int group : groups) {
+    MissingCurve curve;
+    curve.group = group;
+    double begin = HUGE_VAL, end = -HUGE_VAL;
+    for (const auto& t : traces)
+      if (t.group == group && t.time.size() >= 3)
+        begin = std::min(begin, t.time.front()), end = std::max(end, t.time.back());
+    if (!(end > begin)) continue;
+    for (std::size_t j = 0; j < n; ++j)
+      curve.knots.push_back(begin + (end - begin) * static_cast<double>(j) / static_cast<double>(n - 1));
+    const auto width = static_cast<Eigen::Index>(n);
+    for (int component = 0; component < 3; ++component) {
+      Eigen::MatrixXd H = Eigen::MatrixXd::Zero(width, width);
+      Eigen::VectorXd g = Eigen::VectorXd::Zero(width);
+      double squares = 0;
+      for (const auto& trace : traces) {
+        if (trace.group != group) continue;
+        const Rows rows(trace, component, options);
+        if (!rows.enough()) continue;
+        Eigen::MatrixXd columns(rows.seen().size(), width);
+        for (std::size_t j = 0; j < n; ++j) {
+          std::vector<double> basis;
+          for (const double t : trace.time) basis.push_back(hat(curve.knots, j, t));
+          columns.col(static_cast<Eigen::Index>(j)) = rows.response(basis);
+        }
+        H += gram(columns);
+        g += inner_products(columns, rows.seen());
+        squares += rows.seen().squaredNorm();
+      }
+      auto& value = curve.value[static_cast<std::size_t>(component)];
+      auto& sigma = curve.sigma[static_cast<std::size_t>(component)];
+      value.assign(n, 0.0), sigma.assign(n, 0.0);
+      curve.chi2_before += squares, curve.chi2_after += squares;
+      if (!(H.diagonal().maxCoeff() > 0)) continue;
+      // Second differences cost a thousandth of what the best determined knot is worth.
+      Eigen::MatrixXd D = Eigen::MatrixXd::Zero(std::max<Eigen::Index>(width - 2, 0), width);
+      for (Eigen::Index k = 0; k + 2 < width; ++k) D(k, k) = 1, D(k, k + 1) = -2, D(k, k + 2) = 1;
+      H += 1e-3 * H.diagonal().maxCoeff() * gram(D);
+      H.diagonal().array() += 1e-9 * H.diagonal().maxCoeff();
+      const Eigen::VectorXd a = definite_solve(H, g);
+      const Eigen::MatrixXd covariance = definite_inverse(H);
+      curve.chi2_after -= a.dot(g);
+      for (std::size_t j = 0; j < n; ++j) {
+        value[j] = a[static_cast<Eigen::Index>(j)];
+        sigma[j] =
+            std::sqrt(std::max(0.0, covariance(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(j))));
+      }
+    }
+    out.push_back(std::move(curve));
+  }
+  return out;
+}
+
+std::array<double, 3> MissingCandidate::at(const State& state) const {
+  std::array<double, 3> out{};
+  for (const MissingTerm& term : terms) {
+    const Vector3 v = term.shape(state);
+    for (std::size_t c = 0; c < 3; ++c) out[c] += term.coefficient * v[c];
+  }
+  return out;
+}
+
+std::string MissingCandidate::in_words() const {
+  std::string out;
+  for (const auto& t : terms)
+    out += fmt::format("{}({:.4g} +- {:.2g}) {} [{}]", out.empty() ? "" : " + ", t.coefficient, t.sigma,
+                       t.name, t.unit);
+  return out;
+}
+
+MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const MissingOptions& options) {
+  const auto terms = terms_for(options.response);
+  const auto width = static_cast<Eigen::Index>(terms.size());
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(width, width);
+  Eigen::VectorXd g = Eigen::VectorXd::Zero(width);
+  double squares = 0, samples = 0;
+  for (const auto& trace : traces)
+    for (int component = 0; component < 3; ++component) {
+      const Rows rows(trace, component, options);
+      if (!rows.enough()) continue;
+      Eigen::MatrixXd columns(rows.seen().size(), width);
+      for (std::size_t j = 0; j < terms.size(); ++j) {
+        std::vector<double> series;
+        for (const State& s : trace.state)
+          series.push_back(terms[j].at(s)[static_cast<std::size_t>(component)]);
+        columns.col(static_cast<Eigen::Index>(j)) = rows.response(series);
+      }
+      H += gram(columns);
+      g += inner_products(columns, rows.seen());
+      squares += rows.seen().squaredNorm();
+      samples += static_cast<double>(rows.seen().size());
+    }
+  MissingCandidate out;
+  if (!(samples > 0)) return out;
+  std::vector<Eigen::Index> chosen;
+  Eigen::VectorXd x;
+  double gain = 0;
+  const auto solved = [&](const std::vector<Eigen::Index>& of, Eigen::VectorXd& at) {
+    const Eigen::VectorXd b = g(of);
+    at = pseudo_solve(H(of, of), b);
+    return at.dot(b);
+  };
+  while (static_cast<int>(chosen.size()) < options.terms) {
+    Eigen::Index best = -1;
+    double best_gain = gain;
+    for (Eigen::Index j = 0; j < width; ++j) {
+      if (std::find(chosen.begin(), chosen.end(), j) != chosen.end() || !(H(j, j) > 0)) continue;
+      auto with = chosen;
+      with.push_back(j);
+      Eigen::VectorXd at;
+      const double of = solved(with, at);
+      if (of > best_gain) best_gain = of, best = j;
+    }
+    if (best < 0 || best_gain - gain < std::max(2 * std::log(samples), 0.2 * (squares - gain - samples)))
+      break;
+    chosen.push_back(best);
+    gain = solved(chosen, x);
+  }
+  if (chosen.empty()) return out;
+  const double scatter = std::max(1.0, (squares - gain) / samples);
+  const Eigen::MatrixXd covariance = pseudo_inverse(H(chosen, chosen)) * scatter;
+  for (std::size_t k = 0; k < chosen.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    const Term& term = terms[static_cast<std::size_t>(chosen[k])];
+    out.terms.push_back({term.name, x[i], std::sqrt(std::max(0.0, covariance(i, i))), term.unit, term.at});
+  }
+  out.explained = std::clamp(gain / std::max(1e-300, squares - samples), 0.0, 1.0);
+  return out;
+}
+
+}  // namespace unhand::fitting

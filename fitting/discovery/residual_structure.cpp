@@ -1,0 +1,176 @@
+#include "fitting/discovery/residual_structure.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+namespace unhand::fitting {
+
+namespace {
+
+/// Regularised incomplete beta function I_x(a, b) by its continued fraction (Lentz).
+double incomplete_beta(double a, double b, double x) {
+  if (!(x > 0)) return 0;
+  if (!(x < 1)) return 1;
+  if (x > (a + 1) / (a + b + 2)) return 1 - incomplete_beta(b, a, 1 - x);
+  const double front =
+      std::exp(std::lgamma(a + b) - std::lgamma(a) - std::lgamma(b) + a * std::log(x) + b * std::log1p(-x)) /
+      a;
+  constexpr double kTiny = 1e-300;
+  double c = 1, d = 1 - (a + b) * x / (a + 1);
+  d = 1 / (std::abs(d) < kTiny ? kTiny : d);
+  double f = d;
+  for (int m = 1; m <= 300; ++m) {
+    for (const double term : {m * (b - m) * x / ((a + 2 * m - 1) * (a + 2 * m)),
+                              -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1))}) {
+      d = 1 + term * d;
+      d = 1 / (std::abs(d) < kTiny ? kTiny : d);
+      c = 1 + term / c;
+      if (std::abs(c) < kTiny) c = kTiny;
+      f *= c * d;
+    }
+    if (std::abs(c * d - 1) < 1e-14) break;
+  }
+  return std::clamp(front * f, 0.0, 1.0);
+}
+
+/// One-way analysis of variance: witnesses in groups.
+Dependence analyse(std::string on, const std::vector<double>& value, const std::vector<int>& group) {
+  struct Group {
+    double n{}, sum{};
+  };
+  std::map<int, Group> groups;
+  double total = 0, squares = 0;
+  const auto n = static_cast<double>(value.size());
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    groups[group[i]].n += 1, groups[group[i]].sum += value[i];
+    total += value[i], squares += value[i] * value[i];
+  }
+  Dependence out{std::move(on), 0, 1};
+  const auto k = static_cast<double>(groups.size());
+  if (k < 2 || n - k < 2 || !(squares > 0)) return out;
+  double between = -total * total / n;
+  for (const auto& [id, g] : groups) between += g.sum * g.sum / g.n;
+  const double within = std::max(squares - total * total / n - between, 1e-12 * squares);
+  const double noise = within / (n - k);
+  out.p_value = f_tail(between / (k - 1) / noise, k - 1, n - k);
+  out.share = std::max(0.0, between - (k - 1) * noise) / squares;
+  return out;
+}
+
+/// The number of the group of equal count that each value falls in.
+std::vector<int> quantile_groups(const std::vector<double>& value, int groups) {
+  std::vector<std::size_t> order(value.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return value[a] < value[b]; });
+  std::vector<int> out(value.size());
+  for (std::size_t i = 0; i < order.size(); ++i)
+    out[order[i]] = static_cast<int>(i * static_cast<std::size_t>(groups) / order.size());
+  return out;
+}
+
+Dependence over_groups(const std::string& on, const std::vector<double>& residual,
+                       const std::vector<double>& variable, int groups) {
+  std::vector<double> r, x;
+  for (std::size_t i = 0; i < residual.size(); ++i)
+    if (std::isfinite(variable[i])) r.push_back(residual[i]), x.push_back(variable[i]);
+  if (r.size() < 4) return {on, 0, 1};
+  const auto [low, high] = std::minmax_element(x.begin(), x.end());
+  if (!(*high - *low > 1e-9 * std::max(std::abs(*high), std::abs(*low)))) return {on, 0, 1};
+  const int most = static_cast<int>(r.size()) / 4;
+  return analyse(on, r, quantile_groups(x, std::clamp(groups, 2, std::max(2, most))));
+}
+
+Dependence over_conditions(const ResidualSamples& samples) {
+  struct Series {
+    double n{}, sum{};
+    int condition{};
+  };
+  std::map<int, Series> series;
+  for (std::size_t i = 0; i < samples.value.size(); ++i) {
+    Series& s = series[samples.series[i]];
+    s.n += 1, s.sum += samples.value[i], s.condition = samples.condition[i];
+  }
+  std::vector<double> mean;
+  std::vector<int> condition;
+  for (const auto& [id, s] : series) mean.push_back(s.sum / s.n), condition.push_back(s.condition);
+  Dependence out = analyse("condition", mean, condition);
+  // As a share of the residual's mean square, not of its means'.
+  double squares = 0, of_means = 0;
+  for (const double r : samples.value) squares += r * r;
+  for (const auto& [id, s] : series) of_means += s.sum * s.sum / s.n;
+  if (squares > 0) out.share *= of_means / squares;
+  return out;
+}
+
+}  // namespace
+
+double chi2_tail(double x, int k) {
+  if (!(x > 0)) return 1;
+  if (k > 200) {  // [WilsonHilferty1931]
+    const double v = 2.0 / (9.0 * k);
+    return 0.5 * std::erfc((std::cbrt(x / k) - (1 - v)) / std::sqrt(2 * v));
+  }
+  // Q_{k+2} = Q_k + (x/2)^(k/2) e^(−x/2)/Γ(k/2 + 1)
+  double q = k % 2 == 1 ? std::erfc(std::sqrt(x / 2)) : std::exp(-x / 2);
+  for (int j = k % 2 == 1 ? 1 : 2; j < k; j += 2)
+    q += std::exp(0.5 * j * std::log(x / 2) - x / 2 - std::lgamma(0.5 * j + 1));
+  return std::min(1.0, q);
+}
+
+double f_tail(double x, double m, double n) {
+  if (!(x > 0)) return 1;
+  return incomplete_beta(n / 2, m / 2, n / (n + m * x));
+}
+
+double ResidualStructure::p_value() const {
+  double least = std::min(chi2_p_value, autocorrelation_p);
+  for (const Dependence& d : depends) least = std::min(least, d.p_value);
+  return std::min(1.0, least * static_cast<double>(2 + depends.size()));
+}
+
+std::string ResidualStructure::in_words() const {
+  const StructureOptions limits;
+  std::string out = fmt::format("{:.3g} times the variance of the noise", chi2_per_sample);
+  if (autocorrelation_p < limits.level)
+    out += fmt::format(", neighbours correlate by {:.2f}", autocorrelation);
+  std::string with;
+  for (const Dependence& d : depends)
+    if (d.p_value < limits.level && d.share > limits.share)
+      with += fmt::format("{}{} ({:.0f} %)", with.empty() ? "" : ", ", d.on, 100 * d.share);
+  if (!with.empty()) out += "; goes with " + with;
+  return out;
+}
+
+ResidualStructure find_structure(const ResidualSamples& samples, const StructureOptions& options) {
+  ResidualStructure out;
+  out.n = static_cast<int>(samples.value.size());
+  if (out.n == 0) return out;
+  double squares = 0, products = 0, pairs = 0;
+  for (std::size_t i = 0; i < samples.value.size(); ++i) {
+    squares += samples.value[i] * samples.value[i];
+    if (i == 0 || samples.series[i] != samples.series[i - 1]) continue;
+    products += samples.value[i] * samples.value[i - 1];
+    pairs += 1;
+  }
+  out.chi2_per_sample = squares / out.n;
+  out.chi2_p_value = chi2_tail(squares, out.n);
+  if (pairs > 0 && squares > 0) {
+    out.autocorrelation = products / pairs / out.chi2_per_sample;
+    out.autocorrelation_p = std::erfc(std::abs(out.autocorrelation) * std::sqrt(pairs / 2));
+  }
+  out.depends.push_back(over_conditions(samples));
+  out.depends.push_back(over_groups("time", samples.value, samples.time, options.groups));
+  for (const auto& state : samples.states)
+    out.depends.push_back(over_groups(state.name, samples.value, state.value, options.groups));
+  std::stable_sort(out.depends.begin(), out.depends.end(), [](const Dependence& a, const Dependence& b) {
+    return a.p_value != b.p_value ? a.p_value < b.p_value : a.share > b.share;
+  });
+  return out;
+}
+
+}  // namespace unhand::fitting

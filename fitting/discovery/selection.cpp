@@ -1,0 +1,182 @@
+#include "fitting/discovery/selection.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "fitting/discovery/discrepancy.hpp"
+
+namespace unhand::fitting {
+
+namespace {
+
+/// What is left of the misfit where an effect acts, from which on it is an imitation of another.
+constexpr double kLeft = 0.1;
+
+/// The level at which an effect's size must be told from none by its own interval.
+constexpr double kToldFromNone = 0.05;
+
+bool in_air(Phase phase) { return phase == Phase::flight || phase == Phase::landing; }
+
+/// The footprint's own names for `accepted`: candidates that could have left it as well. What had no
+/// footprint of its own before anything was accepted could not: a wind acts through the drag that has just
+/// been found.
+void find_other_names(const Footprints& f, const Eigen::VectorXd& contribution, double enough,
+                      const std::vector<Ranked>& at_base, AcceptedEffect& accepted) {
+  const auto has_footprint = [&](const std::string& id) {
+    return std::any_of(at_base.begin(), at_base.end(),
+                       [&](const Ranked& r) { return r.id == id && r.gain > 0; });
+  };
+  for (const Candidate& candidate : f.candidates) {
+    if (!has_footprint(candidate.id)) continue;
+    const double r = correlation(f, contribution, candidate);
+    if (r < enough) continue;
+    accepted.add_other_name(candidate.id, r);
+  }
+}
+
+/// Whether an effect acts in the air, or in the hand: where the misfit fell most, and an effect on the pads
+/// in the hand wherever that was.
+bool acts(const AcceptedEffect& effect, bool air) {
+  return in_air(effect.phase) == air || (!air && acts_on_pads(effect.id));
+}
+
+/// Whether too much is left in the half of the throw where an effect acts.
+bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisfit>& base,
+                     const std::vector<ChannelMisfit>& now, const DiscoverOptions& options) {
+  return std::any_of(now.begin(), now.end(), [&](const ChannelMisfit& m) {
+    return is_misfit(m, options) && acts(effect, in_air(m.phase)) &&
+           m.chi2_per_sample() >= unexplained_from(m.channel, options) &&
+           m.chi2_per_sample() - 1 > kLeft * (misfit_in(base, m.channel, m.phase) - 1);
+  });
+}
+
+/// An accepted effect that is the shadow of something else. Either conditions and blocks of sensors do not
+/// agree on its size, so that its interval, which counts that (`counted`), has none in it. Or it leaves too
+/// much where it acts: of the throws that it was fitted to, or of those that it has not seen.
+bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const FitResult& counted,
+                  const Discovery& so_far, const DiscoverOptions& options) {
+  return (!is_law(effect.id) && wald_p_value(counted, find_effect(effect.id)) > kToldFromNone) ||
+         leaves_too_much(effect, so_far.base.misfit, stage.fit.misfit, options) ||
+         leaves_too_much(effect, so_far.base_test, stage.held_out.misfit, options);
+}
+
+}  // namespace
+
+bool predicts_better(const Stage& before, const Stage& after, const DiscoverOptions& options) {
+  const PredictionGain gain = prediction_gain(before, after, options);
+  return gain.before > options.prediction_matters * gain.after && held_out_confirms(before, after);
+}
+
+void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  for (bool removed = true; removed && stage.ids.size() > 1;) {
+    removed = false;
+    for (std::size_t i = 0; i + 1 < stage.ids.size() && !removed; ++i) {
+      if (is_law(stage.ids[i])) continue;
+      Stage without = reduced(stage, i, options);
+      if (!without.solved()) continue;
+      const bool needed =
+          stage.bic() - without.bic() < kDeltaBic &&
+          (improvement(without.held_out, stage.held_out, out.base_test, options).matters >= 1 ||
+           predicts_better(without, stage, options));
+      if (needed) continue;
+      std::erase_if(out.effects, [&](const AcceptedEffect& e) { return e.id == stage.ids[i]; });
+      stage = std::move(without);
+      removed = true;
+    }
+  }
+}
+
+void withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  if (out.effects.empty()) return;
+  FitResult counted = stage.fit;
+  count_discrepancy(stage.problem, counted, options.fit.threads);
+  std::vector<std::string> ids, gone;
+  auto effects = stage.problem.options().effects;
+  std::string model = out.model;
+  std::array<bool, 2> misled{};  // in the hand, in the air
+  for (const AcceptedEffect& effect : out.effects) {
+    const bool here =
+        misled[in_air(effect.phase) ? 1 : 0] || is_imitation(effect, stage, counted, out, options);
+    for (const bool air : {false, true}) misled[air ? 1 : 0] |= here && acts(effect, air);
+    if (here) {
+      gone.push_back(effect.id);
+      std::erase(effects, effect.id);
+    } else {
+      ids.push_back(effect.id);
+      if (is_law(effect.id)) model = stage.problem.options().model;
+    }
+  }
+  if (gone.empty()) return;
+  if (ids.empty()) effects.clear();  // what was fitted along went with them
+  Stage without{stage.problem.with(model, effects), {}, {}, ids};
+  solve(without, options, carried(stage.fit, without.problem));
+  if (!without.solved()) return;
+  out.imitations.insert(out.imitations.end(), gone.begin(), gone.end());
+  std::erase_if(out.effects, [&](const AcceptedEffect& effect) {
+    return std::find(ids.begin(), ids.end(), effect.id) == ids.end();
+  });
+  if (effects.empty()) out.along.clear();
+  stage = std::move(without);
+  withdraw(stage, options, out);
+}
+
+bool acts_on_pads(const std::string& id) { return id.starts_with("contact.") || id.starts_with("release."); }
+
+bool acts_on_pads(const Stage& stage) {
+  return std::any_of(stage.ids.begin(), stage.ids.end(),
+                     [](const std::string& id) { return acts_on_pads(id); });
+}
+
+bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  const std::string along = "contact.pad_compliance";
+  const auto& model = stage.problem.options().model;
+  auto effects = stage.problem.options().effects;
+  const bool has_pads = model.starts_with("limit_surface");
+  const auto known = catalogue(options);
+  if (!has_pads || std::find(effects.begin(), effects.end(), along) != effects.end() ||
+      std::find(known.begin(), known.end(), along) == known.end())
+    return false;
+  effects.push_back(along);
+  Stage next{stage.problem.with(model, effects), {}, {}, stage.ids};
+  std::vector<double> start = carried(stage.fit, next.problem);
+  constexpr double kGive = 3e-6;  // to start with [m]
+  for (std::size_t k = 0; k < start.size(); ++k)
+    if (next.problem.campaign()[k].name == along + ".compliance")
+      start[k] = kGive / give_per_compliance(stage);
+  solve(next, options, std::move(start));
+  if (!next.solved() || next.bic() - stage.bic() > kDeltaBic || give_of(next) > kMostGive) return false;
+  stage = std::move(next);
+  out.along.push_back(along);
+  return true;
+}
+
+void describe(Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  if (out.effects.empty()) return;
+  const auto f = footprints(stage.problem, stage.fit, catalogue(options), options.laws, options.fit.threads);
+  for (AcceptedEffect& accepted : out.effects)
+    if (!is_law(accepted.id)) accepted.p_value = wald_p_value(stage.fit, find_effect(accepted.id));
+  count_discrepancy(stage.problem, stage.fit, options.fit.threads);
+  for (AcceptedEffect& accepted : out.effects) {
+    if (is_law(accepted.id)) {
+      for (const auto& u : stage.fit.campaign)
+        if (u.unknown.name == "mu" || u.unknown.name == "length")
+          accepted.parameters.push_back({u.unknown.name, u.unknown.unit, u.value, u.sigma});
+      continue;
+    }
+    const dynamics::Effect effect = find_effect(accepted.id);
+    Eigen::VectorXd contribution = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(f.fitted));
+    for (std::size_t k = 0; k < stage.fit.campaign.size(); ++k) {
+      const auto& u = stage.fit.campaign[k];
+      for (const auto& p : effect.parameters) {
+        if (without_object(u.unknown.name) != effect.full_name(p)) continue;
+        accepted.parameters.push_back(
+            {u.unknown.name.substr(accepted.id.size() + 1), u.unknown.unit, u.value, u.sigma});
+        if (!p.is_shape()) contribution[static_cast<Eigen::Index>(k)] = u.value - p.neutral;
+      }
+    }
+    find_other_names(f, contribution, options.equivalent, out.ranking, accepted);
+  }
+}
+
+}  // namespace unhand::fitting

@@ -1,0 +1,47 @@
+// Which effects a model lacks: forward steps, a backward check, and other names of what was accepted.
+// Internal to fitting.
+#pragma once
+
+#include <optional>
+
+#include "fitting/discovery/stage.hpp"
+
+namespace unhand::fitting {
+
+/// One step forward: the candidate that explains most, if it convinces. Writes its scores into `out.ranking`
+/// and what it accepted into `out.effects`, with the names of other effects that convince as well and whose
+/// evidence is not less by what an effect needs to be accepted (ten of the criterion). Convincing is evidence
+/// on the train throws, and on held-out ones an improvement that matters: to a channel (Improvement), or,
+/// where no candidate's does, to the predictions made before the throw (PredictionGain). The most evident one
+/// that matters to neither is left in `out.small`. Empty if none convinces.
+std::optional<Stage> forward(const Stage& stage, const DiscoverOptions& options, Discovery& out);
+
+/// Whether held-out throws are predicted better before they are made, by as much as the options ask for.
+bool predicts_better(const Stage& before, const Stage& after, const DiscoverOptions& options);
+
+/// Effects that a later one has made superfluous are taken back.
+void backward(Stage& stage, const DiscoverOptions& options, Discovery& out);
+
+/// Withdraws imitations of something that is not in the catalogue, and names them in `out.imitations`: an
+/// effect whose size is not told from none by its own interval, which counts by how much conditions and
+/// blocks of sensors disagree on it (count_discrepancy); and one that leaves a tenth of the base model's
+/// misfit (a third of its size) in the half of the throw where it was said to act, the wrenches included, on
+/// train or on held-out throws. What was accepted after it in that half goes with it: it was judged in its
+/// company.
+void withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out);
+
+/// No pads are rigid: a give of some micrometres before they slip bends what the slipping pads say of an
+/// effect on them. contact.pad_compliance is fitted along if the evidence (BIC) is for it and the give stays
+/// below kMostGive; then it is a nuisance of the answer, not a part of it, and in `out.along`. True if it is.
+bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out);
+
+/// Whether an effect is one on the contact or the release.
+bool acts_on_pads(const std::string& id);
+/// Whether such an effect was added.
+bool acts_on_pads(const Stage& stage);
+
+/// Values, significance and other names of what was accepted. The intervals of the fit count its misfit from
+/// here on (count_discrepancy).
+void describe(Stage& stage, const DiscoverOptions& options, Discovery& out);
+
+}  // namespace unhand::fitting

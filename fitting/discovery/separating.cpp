@@ -1,0 +1,270 @@
+#include "fitting/discovery/separating.hpp"
+
+#include <fmt/core.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "experiment/parallel.hpp"
+#include "fitting/dense_solve.hpp"
+#include "fitting/normal_equations.hpp"
+
+namespace unhand::fitting {
+
+using experiment::Channel;
+
+namespace {
+
+constexpr double kRepetitions = 10;
+
+/// The footprints of the model's unknowns and of one effect or law more.
+class Pair {
+ public:
+  Pair(const Stage& stage, const std::string& other)
+      : stage_(stage), values_(stage.fit.values()), other_(stage.problem), width_(values_.size()) {
+    auto effects = stage.problem.options().effects;
+    std::string law = stage.problem.options().model;
+    if (is_law(other)) {
+      law = other.substr(std::string("contact.law:").size());
+    } else {
+      effects.push_back(other);
+      differs_ = find_effect(other).one_sided;
+    }
+    other_ = stage.problem.with(law, effects);
+    other_values_ = carried(stage.fit, other_);
+    differs_ = differs_ || is_law(other);
+    for (std::size_t k = values_.size(); k < other_values_.size(); ++k) {
+      const auto effect = find_effect(other);
+      const auto& name = other_.campaign()[k].name;
+      for (const auto& p : effect.parameters)
+        if (without_object(name) == effect.full_name(p) && !p.is_shape()) added_.push_back(k);
+    }
+  }
+  /// Columns besides the model's own.
+  std::size_t added() const { return is_law_alone() ? 1 : added_.size(); }
+
+  /// JᵀJ with the throw's own unknowns eliminated; zero columns for the residual. Empty if it cannot be
+  /// simulated.
+  std::optional<Eigen::MatrixXd> gram(const CampaignThrow& thrown, const std::vector<double>& own) const {
+    const auto l = stage_.problem.linearise(thrown, values_, own, true);
+    if (!l.solved) return std::nullopt;
+    const auto w = static_cast<Eigen::Index>(width_), n = static_cast<Eigen::Index>(added());
+    Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(l.residual.size(), w + n + 1);
+    columns.leftCols(w) = l.campaign;
+    if (!differs_) {
+      const auto m = other_.linearise(thrown, other_values_, own, true);
+      if (!m.solved) return std::nullopt;
+      for (Eigen::Index k = 0; k < n; ++k)
+        columns.col(w + k) = m.campaign.col(static_cast<Eigen::Index>(added_[static_cast<std::size_t>(k)]));
+    } else {
+      for (Eigen::Index k = 0; k < n; ++k) {
+        auto stepped = other_values_;
+        double step = 1;
+        if (!is_law_alone()) {
+          const std::size_t at = added_[static_cast<std::size_t>(k)];
+          step = other_.campaign()[at].scale;
+          stepped[at] += step;
+        }
+        const auto m = other_.linearise(thrown, stepped, own, false);
+        if (!m.solved) return std::nullopt;
+        columns.col(w + k) = (m.residual - l.residual) / step;
+      }
+    }
+    const std::vector<double> nothing(own.size(), 0.0);
+    return eliminated(throw_gram(l.own, columns, nothing, stage_.fit.own_spread), l.own.cols());
+  }
+
+  double correlation_in(const Eigen::MatrixXd& gram, const AcceptedEffect& accepted) const {
+    Footprints f;
+    f.fitted = width_;
+    f.gram = gram;
+    Candidate candidate;
+    for (std::size_t k = 0; k < added(); ++k) candidate.columns.push_back(width_ + k);
+    const dynamics::Effect effect = find_effect(accepted.id);
+    Eigen::VectorXd contribution = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(width_));
+    for (std::size_t k = 0; k < width_; ++k)
+      for (const auto& p : effect.parameters)
+        if (!p.is_shape() && without_object(stage_.fit.campaign[k].unknown.name) == effect.full_name(p))
+          contribution[static_cast<Eigen::Index>(k)] = values_[k] - p.neutral;
+    return correlation(f, contribution, candidate);
+  }
+
+ private:
+  bool is_law_alone() const { return other_values_.size() == values_.size(); }
+
+  const Stage& stage_;
+  std::vector<double> values_;
+  CampaignProblem other_;
+  std::size_t width_;
+  std::vector<double> other_values_;
+  std::vector<std::size_t> added_;
+  bool differs_{};
+};
+
+/// The motion `speed` times as fast, about the pose at which the gripper is told to open. Wrenches and poses
+/// that were seen before the motion now begins, or after it ends, are dropped.
+CampaignThrow at_speed(const CampaignThrow& thrown, double speed) {
+  CampaignThrow out = thrown;
+  const double origin = thrown.prepared.open_command;
+  const auto warped = [&](double t) { return origin + (t - origin) / speed; };
+  const auto& path = thrown.prepared.hand.path();
+  auto breaks = path.breaks();
+  for (double& t : breaks) t = warped(t);
+  auto pieces = path.pieces();
+  for (auto& piece : pieces) {
+    double factor = 1;
+    for (auto& power : piece) {
+      for (double& c : power) c *= factor;
+      factor *= speed;
+    }
+  }
+  auto jumps = thrown.prepared.hand.jumps();
+  for (double& t : jumps) t = warped(t);
+  out.prepared.hand = release::PolynomialHand(release::PolynomialHand::Polynomial(breaks, pieces), jumps);
+  out.prepared.start = warped(thrown.prepared.start);
+  std::erase_if(out.observed.all, [&](const auto& o) {
+    return phase_of(o, thrown.opening, HUGE_VAL) != Phase::landing &&
+           (o.time < out.prepared.start || (is_wrench(o.channel) && o.time > out.prepared.hand.end()));
+  });
+  return out;
+}
+
+/// Held and let go by the same gripper, but another object.
+CampaignThrow with_object(const CampaignThrow& thrown, const CampaignThrow& of) {
+  CampaignThrow out = thrown;
+  out.prepared.object = of.prepared.object;
+  out.prepared.body = of.prepared.body;
+  out.prepared.drag_k = of.prepared.drag_k;
+  out.prepared.grasp.com_offset = of.prepared.grasp.com_offset;
+  return out;
+}
+
+struct Sensor {
+  const char* name;
+  Channel first;
+  int channels;
+  double rate;                  ///< [1/s]; 0: once, at the landing
+  std::array<double, 3> sigma;  ///< of a common one
+};
+constexpr Sensor kSensors[] = {
+    {"the pads' wrench (F/T)", Channel::wrench_fx, 3, 500, {0.02, 0.02, 2e-4}},
+    {"motion capture", Channel::mocap_x, 3, 240, {2e-4, 2e-4, 3.5e-3}},
+    {"the landing's place and time", Channel::landing_x, 3, 0, {1e-3, 9e-3, 1e-3}}};
+
+bool has(const CampaignThrow& thrown, Channel channel) {
+  return std::any_of(thrown.observed.all.begin(), thrown.observed.all.end(),
+                     [&](const auto& o) { return o.channel == channel; });
+}
+
+CampaignThrow with_sensor(const CampaignThrow& thrown, const Sensor& sensor) {
+  CampaignThrow out = thrown;
+  const double begin = thrown.prepared.start, release = thrown.release_or(thrown.opening + 0.05);
+  const double end = sensor.first == Channel::wrench_fx ? release : release + 0.3;
+  const auto add = [&](double t) {
+    for (int c = 0; c < sensor.channels; ++c)
+      out.observed.all.push_back({static_cast<Channel>(static_cast<int>(sensor.first) + c), t, 0,
+                                  sensor.sigma[static_cast<std::size_t>(c)]});
+  };
+  if (sensor.rate == 0) {
+    add(end);
+    return out;
+  }
+  for (double t = begin + 0.5 / sensor.rate; t < end; t += 1 / sensor.rate) add(t);
+  return out;
+}
+
+}  // namespace
+
+std::vector<SeparatingExperiment> separating_experiments(const Stage& stage, const AcceptedEffect& accepted,
+                                                         const std::string& other,
+                                                         const DiscoverOptions& options) {
+  std::vector<SeparatingExperiment> out;
+  if (is_law(accepted.id)) return out;
+  const Pair pair(stage, other);
+  if (pair.added() == 0) return out;
+  const auto& throws = stage.problem.throws();
+  std::vector<std::size_t> used;
+  for (std::size_t i = 0; i < throws.size(); ++i)
+    if (stage.fit.throws[i].used) used.push_back(i);
+
+  struct Trial {
+    std::string what;
+    CampaignThrow thrown;
+    std::vector<double> own;
+    double weight;
+    int experiment;  ///< trials of one number are one experiment
+    std::optional<Eigen::MatrixXd> gram;
+  };
+  std::vector<Trial> trials;
+  for (const std::size_t i : used) trials.push_back({"", throws[i], stage.fit.throws[i].own, 1, -1, {}});
+  int count = 0;
+  std::map<std::string, std::size_t> conditions, objects;
+  for (const std::size_t i : used) {
+    conditions.try_emplace(throws[i].prepared.object + ", condition " + throws[i].prepared.condition, i);
+    objects.try_emplace(throws[i].prepared.object, i);
+  }
+  const std::vector<double> none(stage.problem.own().size(), 0.0);
+  for (const auto& [name, i] : conditions) {
+    for (const double speed : {0.5, 0.8, 1.25})
+      trials.push_back(
+          {fmt::format("{:.0f} throws of {} with the hand {:.2f} times as fast", kRepetitions, name, speed),
+           at_speed(throws[i], speed),
+           none,
+           kRepetitions,
+           count++,
+           {}});
+    for (const auto& [object, of] : objects)
+      if (object != throws[i].prepared.object)
+        trials.push_back({fmt::format("{:.0f} throws of {} moved as {}", kRepetitions, object, name),
+                          with_object(throws[i], throws[of]),
+                          none,
+                          kRepetitions,
+                          count++,
+                          {}});
+  }
+  for (const Sensor& sensor : kSensors) {
+    if (has(throws[used.front()], sensor.first)) continue;
+    for (const std::size_t i : used)
+      trials.push_back({fmt::format("add {} to the throws of this log", sensor.name),
+                        with_sensor(throws[i], sensor),
+                        stage.fit.throws[i].own,
+                        1,
+                        count,
+                        {}});
+    ++count;
+  }
+  experiment::parallel_for(trials.size(), options.fit.threads, [&](std::size_t k) {
+    try {
+      trials[k].gram = pair.gram(trials[k].thrown, trials[k].own);
+    } catch (const std::invalid_argument&) {  // an experiment that is outside the physics
+    }
+  });
+  Eigen::MatrixXd now;
+  std::map<int, std::pair<std::string, Eigen::MatrixXd>> after;
+  for (const Trial& trial : trials) {
+    if (!trial.gram) continue;
+    if (trial.experiment < 0) {
+      if (now.size() == 0)
+        now = *trial.gram;
+      else
+        now += *trial.gram;
+      continue;
+    }
+    const auto [at, first] = after.try_emplace(trial.experiment, trial.what, trial.weight * *trial.gram);
+    if (!first) at->second.second += trial.weight * *trial.gram;
+  }
+  if (now.size() == 0) return out;
+  const double before = pair.correlation_in(now, accepted);
+  for (const auto& [number, experiment] : after)
+    out.push_back({other, experiment.first, before, pair.correlation_in(now + experiment.second, accepted)});
+  std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.after < b.after; });
+  constexpr std::size_t kShown = 3;
+  if (out.size() > kShown) out.resize(kShown);
+  return out;
+}
+
+}  // namespace unhand::fitting

@@ -1,0 +1,108 @@
+// A model in the loop: its fit, what it leaves of held-out throws, and how it compares with another one.
+// Internal to fitting.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fitting/discovery/discover.hpp"
+#include "fitting/discovery/footprints.hpp"
+#include "fitting/discovery/outcome_errors.hpp"
+
+namespace unhand::fitting {
+
+/// One model with its fit to the train throws and what it leaves of the others.
+struct Stage {
+  CampaignProblem problem;
+  FitResult fit, held_out;
+  std::vector<std::string> ids;  ///< of what was added to the base, "contact.law:..." included
+
+  bool is_fitted() const;  ///< to the train throws
+  bool solved() const;     ///< and so are the own unknowns of the others
+  /// The deviance of the fit plus log(samples) for every unknown.
+  double bic() const;
+};
+
+/// −2 log of the likelihood in which every channel of every phase has the variance that it shows, at least
+/// the declared one.
+double deviance(const FitResult& fit);
+
+/// Of the held-out throws.
+PredictionGain prediction_gain(const Stage& before, const Stage& after, const DiscoverOptions& options);
+
+/// Whether held-out throws make an improvement no chance: neither model has seen them, so under the first one
+/// the second is twenty times as likely at most once in twenty logs.
+bool held_out_confirms(const Stage& before, const Stage& after);
+
+/// Evidence (difference of Bayes' criterion) that an effect needs before it is accepted or kept.
+inline constexpr double kDeltaBic = -10;
+
+/// The give of pads before they slip, under the grip's friction limit, from where on it is an effect like any
+/// other [m].
+inline constexpr double kMostGive = 3e-5;
+/// That give per contact.pad_compliance [N]: the friction limit of all pads at the campaign's grip force.
+double give_per_compliance(const Stage& stage);
+/// The give of a fit's pads [m]; 0 where it has no contact.pad_compliance.
+double give_of(const Stage& stage);
+
+inline bool is_law(const std::string& id) { return id.rfind("contact.law:", 0) == 0; }
+bool is_wrench(experiment::Channel);
+
+/// Fits the train throws from `start`; whether there is an answer. A shape
+/// parameter that the log leaves open over its whole range (a speed at which friction changes, while the
+/// friction hardly does; the landing's share of a tracker's scale, where nothing was tracked) keeps its
+/// start, which the grid of its footprint gave it: the size beside it is then known for that shape.
+bool solve_train(Stage& stage, const DiscoverOptions& options, std::vector<double> start);
+/// With that, the own unknowns of the test throws; whether there is an answer.
+bool solve_held_out(Stage& stage, const DiscoverOptions& options);
+/// Both.
+void solve(Stage& stage, const DiscoverOptions& options, std::vector<double> start);
+
+/// Fits again from the solution while that helps: the weights of the channels were learned while the effect
+/// was still missing.
+void polish(Stage& stage, const DiscoverOptions& options);
+
+/// The stage with one candidate more, fitted to the train throws from the step that its footprint asks for;
+/// where that gains nothing over a base with a misfit, once more from the problem's own start.
+Stage extended(const Stage& stage, const Candidate& candidate, const Score& score, const DiscoverOptions&);
+
+/// The stage without the effect `ids[index]`.
+Stage reduced(const Stage& stage, std::size_t index, const DiscoverOptions&);
+
+/// Whether a channel leaves anything to explain in a phase: more than `matters` beyond the noise, and more
+/// than chance leaves (χ², at the false discovery rate shared among all channels and phases of a log). The
+/// wrench while the pads still slip or may: more than `wrench_misfit`. In the firm grasp no friction law
+/// takes part, only Newton and Euler: there it is a channel like any other.
+bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options);
+
+/// χ² per sample of a channel from where on something is missing there; of a wrench twice as much, most of
+/// whose variance is trust.
+double unexplained_from(experiment::Channel, const DiscoverOptions& options);
+
+/// The misfit of a channel in a phase, 1 where there is none.
+double misfit_in(const std::vector<ChannelMisfit>& misfit, experiment::Channel, Phase);
+
+/// The channel and phase whose held-out misfit fell most, in units of what matters there (>= 1: it matters).
+/// `base` is the misfit before anything was added: of that, what is below a hundredth is the part of an
+/// effect that its law does not get right, and no other effect.
+struct Improvement {
+  double matters{};
+  double fall{};
+  std::string where;
+  Phase phase{Phase::release};
+};
+Improvement improvement(const FitResult& before, const FitResult& after,
+                        const std::vector<ChannelMisfit>& base, const DiscoverOptions& options);
+
+/// Of another law, which has next to no parameters to bend: it matters if the held-out χ² as a whole falls by
+/// half a per cent, channels apart of which not a hundredth of the base's misfit is left.
+Improvement law_improvement(const FitResult& before, const FitResult& after,
+                            const std::vector<ChannelMisfit>& base, const DiscoverOptions& options);
+
+/// Wald's test of an effect's size parameters against neutral, with the fit's covariance.
+double wald_p_value(const FitResult& fit, const dynamics::Effect& effect);
+
+/// The ids of all effects but those that were forgotten.
+std::vector<std::string> catalogue(const DiscoverOptions& options);
+
+}  // namespace unhand::fitting

@@ -1,0 +1,270 @@
+#include "fitting/discovery/unexplained.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "experiment/parallel.hpp"
+#include "fitting/evaluate.hpp"
+
+namespace unhand::fitting {
+
+using experiment::Channel;
+
+namespace {
+
+using Vector3 = std::array<double, 3>;
+using State = ResidualTrace::State;
+
+/// The residual (observed minus predicted, SI units) of three channels that follow each other, in one phase.
+ResidualTrace trace_of(const CampaignThrow& thrown, const Eigen::VectorXd& residual, Channel first,
+                       Phase phase, double origin, double scale) {
+  ResidualTrace out;
+  const StateSeries states = states_of(thrown, residual);
+  const double release = thrown.release_or(thrown.opening);
+  for (std::size_t j = 0; j < thrown.observed.all.size(); ++j) {
+    const auto& o = thrown.observed.all[j];
+    const int component = static_cast<int>(o.channel) - static_cast<int>(first);
+    if (component < 0 || component > 2 || phase_of(o, thrown.opening, release) != phase) continue;
+    const double time = (o.time - origin) / scale;
+    if (out.time.empty() || time != out.time.back()) {
+      out.time.push_back(time);
+      out.state.push_back(states.at(thrown, o.time));
+      for (auto& r : out.residual) r.push_back(NAN);
+    }
+    out.residual[static_cast<std::size_t>(component)].back() =
+        -residual[static_cast<Eigen::Index>(j)] * o.sigma;
+  }
+  return out;
+}
+
+/// 1 σ of each of three channels, where they are there.
+Vector3 sigmas_of(const CampaignProblem& problem, Channel first) {
+  Vector3 out{1, 1, 1};
+  for (const auto& thrown : problem.throws())
+    for (const auto& o : thrown.observed.all) {
+      const int component = static_cast<int>(o.channel) - static_cast<int>(first);
+      if (component < 0 || component > 2) continue;
+      out[static_cast<std::size_t>(component)] = o.sigma;
+      if (component == 2) return out;
+    }
+  return out;
+}
+
+/// Time as the estimate knows it: since the detach [s], or the share of the opening that has passed.
+struct Clock {
+  double origin, scale;
+  static Clock of(const CampaignThrow& thrown, Phase phase) {
+    const double release = thrown.release_or(thrown.opening);
+    if (phase == Phase::flight) return {release, 1};
+    return {thrown.opening, std::max(1e-6, release - thrown.opening)};
+  }
+};
+
+/// How the missing quantity moves one throw against its prediction, on a grid of time.
+class Displacement {
+ public:
+  template <class Missing>
+  Displacement(const CampaignProblem& problem, const CampaignThrow& thrown, const StateSeries& states,
+               Phase phase, double end, const Missing& missing) {
+    const Clock clock = Clock::of(thrown, phase);
+    const double release = thrown.release_or(thrown.opening);
+    const double inf = std::numeric_limits<double>::infinity();
+    const auto& body = thrown.prepared.body;
+    Vector3 velocity{}, position{}, last{};
+    for (double t = clock.origin; t <= end + kStep; t += kStep) {
+      Vector3 a{};
+      const bool acts = phase == Phase::flight || t < release;
+      if (acts) a = missing((t - clock.origin) / clock.scale, states.at(thrown, t));
+      if (acts && phase == Phase::release) {  // a pad's wrench in the hand's frame
+        const auto hand = thrown.prepared.hand.at(dynamics::Window{-inf, inf}, t);
+        const auto f = dynamics::rotate(hand.pose.theta, dynamics::Vec2<double>{a[0], a[1]});
+        const State s = states.at(thrown, t);
+        const double lever = thrown.prepared.grasp.com_offset, pads = problem.model().pads;
+        const double rx = lever * std::cos(s.theta), rz = lever * std::sin(s.theta);
+        a = {pads * f.x / body.mass, pads * f.z / body.mass,
+             pads * (a[2] + rz * f.x - rx * f.z) / body.inertia};
+      }
+      if (!time_.empty())
+        for (std::size_t c = 0; c < 3; ++c) {
+          position[c] += kStep * velocity[c] + kStep * kStep * (2 * last[c] + a[c]) / 6;
+          velocity[c] += 0.5 * kStep * (last[c] + a[c]);
+        }
+      last = a;
+      time_.push_back(t);
+      at_.push_back(position);
+    }
+  }
+  Vector3 at(double t) const {
+    if (time_.empty() || t <= time_.front()) return {};
+    const auto k = std::min(static_cast<std::size_t>((t - time_.front()) / kStep), time_.size() - 1);
+    return at_[k];
+  }
+
+ private:
+  static constexpr double kStep = 1e-3;  // [s]
+  std::vector<double> time_;
+  std::vector<Vector3> at_;
+};
+
+/// Mean square errors of one throw's prediction: in flight [m²] and of the landing [σ²].
+struct OutcomeSquares {
+  double flight{}, samples{}, landing{};
+};
+
+template <class Missing>
+OutcomeSquares squares_with(const CampaignProblem& problem, const CampaignThrow& thrown,
+                            const Eigen::VectorXd& residual, Phase phase, const Missing& missing) {
+  OutcomeSquares out;
+  const StateSeries states = states_of(thrown, residual);
+  double end = thrown.release_or(thrown.opening);
+  for (const auto& o : thrown.observed.all) end = std::max(end, o.time);
+  const Displacement moved(problem, thrown, states, phase, end, missing);
+  const double release = thrown.release_or(thrown.opening), g = -thrown.prepared.gravity.z;
+  for (std::size_t j = 0; j < thrown.observed.all.size(); ++j) {
+    const auto& o = thrown.observed.all[j];
+    const double error = residual[static_cast<Eigen::Index>(j)] * o.sigma;
+    const Phase in = phase_of(o, thrown.opening, release);
+    const Vector3 by = moved.at(o.time);
+    if (in == Phase::flight && (o.channel == Channel::mocap_x || o.channel == Channel::mocap_z)) {
+      const double e = error + by[o.channel == Channel::mocap_x ? 0 : 1];
+      out.flight += e * e;
+      if (o.channel == Channel::mocap_x) out.samples += 1;
+    }
+    if (o.channel == Channel::landing_x || o.channel == Channel::landing_theta) {
+      State s = states.at(thrown, o.time);
+      if (!states.time.empty()) s.vz -= g * (o.time - states.time.back());
+      const double later = s.vz < -0.1 ? -by[1] / s.vz : 0;  // it passes the height that much later
+      const double e =
+          o.channel == Channel::landing_x ? error + by[0] + s.vx * later : error + by[2] + s.omega * later;
+      out.landing += e * e / (o.sigma * o.sigma);
+    }
+  }
+  return out;
+}
+
+/// Held-out throws show it, too: at 5 % their χ² in the same channel and phase is no noise.
+bool is_confirmed(const FitResult& held_out, const ChannelMisfit& of) {
+  return std::any_of(held_out.misfit.begin(), held_out.misfit.end(), [&](const ChannelMisfit& m) {
+    return m.channel == of.channel && m.phase == of.phase && chi2_tail(m.chi2, m.n) < 0.05;
+  });
+}
+
+}  // namespace
+
+std::optional<MissingEstimate> estimate_missing(const Stage& stage, Phase phase,
+                                                const DiscoverOptions& options) {
+  if (phase == Phase::landing) phase = Phase::flight;
+  if (phase == Phase::grasped) return std::nullopt;
+  const auto& problem = stage.problem;
+  const Channel first = phase == Phase::flight ? Channel::mocap_x : Channel::wrench_fx;
+  MissingEstimate out;
+  out.phase = phase;
+  MissingOptions how;
+  how.sigma = sigmas_of(problem, first);
+  how.response = phase == Phase::flight ? Response::twice_integrated : Response::direct;
+  std::map<std::string, int> objects;
+  std::vector<ResidualTrace> traces;
+  const auto residuals = residuals_of(problem, stage.fit, options.fit.threads);
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    if (residuals[i].size() == 0) continue;
+    const CampaignThrow& thrown = problem.throws()[i];
+    const Clock clock = Clock::of(thrown, phase);
+    ResidualTrace trace = trace_of(thrown, residuals[i], first, phase, clock.origin, clock.scale);
+    if (trace.time.size() < 4) continue;
+    trace.group = objects.try_emplace(thrown.prepared.object, static_cast<int>(objects.size())).first->second;
+    traces.push_back(std::move(trace));
+  }
+  if (traces.size() < 4) return std::nullopt;
+  for (const auto& [name, number] : objects) out.groups.push_back({name, number});
+  out.curves = missing_curves(traces, how);
+  out.candidate = missing_terms(traces, how);
+
+  // As a correction, on held-out throws that are predicted from what is known before the throw.
+  std::vector<std::size_t> held_out;
+  for (std::size_t i = 0; i < problem.throws().size(); ++i)
+    if (stage.held_out.throws[i].used) held_out.push_back(i);
+  const auto predicted = predict_some(problem, stage.fit, held_out, {false, options.fit.threads});
+  constexpr int kTried = 3;
+  std::vector<std::array<OutcomeSquares, kTried>> squares(held_out.size());
+  experiment::parallel_for(held_out.size(), options.fit.threads, [&](std::size_t k) {
+    const CampaignThrow& thrown = problem.throws()[held_out[k]];
+    const auto l = problem.linearise(thrown, stage.fit.values(), predicted[k].own, false);
+    if (!l.solved) return;
+    const auto group = objects.find(thrown.prepared.object);
+    const auto curve = std::find_if(out.curves.begin(), out.curves.end(), [&](const MissingCurve& c) {
+      return group != objects.end() && c.group == group->second;
+    });
+    squares[k][0] =
+        squares_with(problem, thrown, l.residual, phase, [](double, const State&) { return Vector3{}; });
+    squares[k][1] = squares_with(problem, thrown, l.residual, phase, [&](double t, const State&) {
+      return curve == out.curves.end() ? Vector3{} : curve->at(t);
+    });
+    squares[k][2] = squares_with(problem, thrown, l.residual, phase,
+                                 [&](double, const State& s) { return out.candidate.at(s); });
+  });
+  std::array<OutcomeSquares, kTried> sum{};
+  for (const auto& of : squares)
+    for (std::size_t c = 0; c < kTried; ++c) {
+      sum[c].flight += of[c].flight, sum[c].samples += of[c].samples, sum[c].landing += of[c].landing;
+    }
+  // Of the motion in flight where it was seen, of the landing otherwise.
+  const bool seen = sum[0].samples > 0;
+  const auto error = [&](std::size_t c) {
+    return seen ? std::sqrt(sum[c].flight / sum[c].samples)
+                : std::sqrt(sum[c].landing / std::max<double>(1, static_cast<double>(held_out.size())));
+  };
+  constexpr double kLower = 0.98;
+  out.error_before = out.error_after = error(0);
+  out.error_unit = seen ? "m" : "sigma";
+  for (std::size_t c = 1; c < kTried; ++c) {
+    if (c == 2 && out.candidate.terms.empty()) continue;
+    if (!(error(c) < out.error_after * (out.correction == Correction::withheld ? kLower : 1.0))) continue;
+    out.error_after = error(c);
+    out.correction = c == 1 ? Correction::curve : Correction::candidate;
+  }
+  return out;
+}
+
+std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_far,
+                                       const DiscoverOptions& options) {
+  std::optional<Unexplained> out;
+  constexpr double kRest = 0.01;
+  for (const auto& m : stage.fit.misfit) {
+    const double before = misfit_in(so_far.base.misfit, m.channel, m.phase);
+    const double limit = std::max(unexplained_from(m.channel, options),
+                                  so_far.effects.empty() ? 0.0 : 1 + kRest * (before - 1));
+    if (!is_misfit(m, options) || m.chi2_per_sample() < limit) continue;
+    if (!is_confirmed(stage.held_out, m)) continue;
+    // The first phase in which something is left; there, the channel in which most is.
+    if (out && (m.phase != out->phase || m.chi2_per_sample() <= out->chi2_per_dof)) continue;
+    out = Unexplained{m.phase, m.channel, m.chi2_per_sample(), {}, {}};
+  }
+  if (!out) return out;
+  out->description = fmt::format("{} in {}: ", to_string(out->channel), to_string(out->phase));
+  std::string words = fmt::format("{:.3g} times the variance of the noise", out->chi2_per_dof);
+  for (const auto& s : so_far.structure_after)
+    if (s.channel == out->channel && s.phase == out->phase) words = s.structure.in_words();
+  out->description += words + "; no effect of the catalogue explains it on held-out throws";
+  for (const auto& id : so_far.imitations) out->description += fmt::format("; {} imitates it", id);
+  if (so_far.effects.empty() && so_far.imitations.empty() && !so_far.ranking.empty() &&
+      so_far.ranking.front().gain > 1)
+    out->description += fmt::format("; the nearest footprint is that of {}", so_far.ranking.front().id);
+  out->missing = estimate_missing(stage, out->phase, options);
+  if (!out->missing) return out;
+  const MissingEstimate& missing = *out->missing;
+  const char* quantity = missing.phase == Phase::flight ? "acceleration" : "wrench of a pad";
+  if (!missing.candidate.terms.empty())
+    out->description += fmt::format("; the missing {} looks like {}", quantity, missing.candidate.in_words());
+  out->description +=
+      missing.correction == Correction::withheld
+          ? "; as a correction it does not lower the held-out error and is withheld"
+          : fmt::format("; as a correction it lowers the held-out error from {:.3g} to {:.3g} {}",
+                        missing.error_before, missing.error_after, missing.error_unit);
+  return out;
+}
+
+}  // namespace unhand::fitting

@@ -1,0 +1,23 @@
+// What no effect of the catalogue explains: where it is, and an estimate of it that assumes no form. Internal
+// to fitting.
+#pragma once
+
+#include <optional>
+
+#include "fitting/discovery/discover.hpp"
+#include "fitting/discovery/stage.hpp"
+
+namespace unhand::fitting {
+
+/// The first phase in which the stage leaves more than noise, and the channel in which most is left; of what
+/// an accepted effect has taken away, a hundredth may stay. With the estimate of what is missing there.
+std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_far,
+                                       const DiscoverOptions& options);
+
+/// What is missing in flight (an acceleration, from the tracked motion) or during the release (a wrench, from
+/// the pads' sensors), from the train throws; as a correction of predictions it is tried on the held-out
+/// ones. Empty where the sensors for it are missing.
+std::optional<MissingEstimate> estimate_missing(const Stage& stage, Phase phase,
+                                                const DiscoverOptions& options);
+
+}  // namespace unhand::fitting

@@ -1,0 +1,100 @@
+// The loop on accelerometers in free fall.
+#include <fmt/format.h>
+
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <map>
+
+#include "fitting/measured/fall_discovery.hpp"
+#include "fitting/measured/measured_discovery.hpp"
+
+namespace unhand::fitting {
+namespace {
+
+/// How far the mean residual of a fall scatters from fall to fall [m/s²].
+std::array<double, 3> scatter_between_falls(const FallProblem& problem, const GroupedFit& fit) {
+  std::array<double, 3> out{};
+  double falls = 0;
+  for (std::size_t i = 0; i < fit.groups.size(); ++i) {
+    if (!fit.groups[i].used || !fit.groups[i].solved) continue;
+    std::array<double, 3> mean{};
+    double n = 0;
+    const auto& rows = problem.groups()[i].rows;
+    for (std::size_t j = 0; j < rows.size(); ++j)
+      if (rows[j].channel >= 0) {
+        const auto a = static_cast<std::size_t>(rows[j].channel);
+        mean[a] += fit.groups[i].residual[static_cast<Eigen::Index>(j)] * problem.sigma(i)[a];
+        n += 1.0 / 3;
+      }
+    for (std::size_t a = 0; a < 3; ++a) out[a] += std::pow(mean[a] / n, 2);
+    falls += 1;
+  }
+  for (double& x : out) x = falls > 0 ? std::sqrt(x / falls) : 0;
+  return out;
+}
+
+void explain(const datasets::ThrowLog& log, const FallProblem& problem, const EffectSearch& search,
+             MeasuredDiscovery& out) {
+  const auto scatter = scatter_between_falls(problem, search.final);
+  const double largest = std::max({scatter[0], scatter[1], scatter[2]});
+  out.evidence.push_back(
+      {"sensor.accelerometer_bias",
+       fmt::format(
+           "From fall to fall the mean of what is left scatters by ({:.3f}, {:.3f}, {:.3f}) m/s²; a turn of "
+           "{:.1f} rad/s about an axis 5 cm from the sensor would do that, and only a gyroscope could say",
+           scatter[0], scatter[1], scatter[2], std::sqrt(largest / 0.05)),
+       largest > 0.02});
+  for (const auto& effect : out.effects) {
+    if (effect.id == "flight.quadratic_drag") {
+      for (const auto& p : effect.parameters)
+        out.evidence.push_back({effect.id,
+                                fmt::format("{} = {:.4f} 1/m is a terminal speed of {:.1f} m/s", p.name,
+                                            p.value, std::sqrt(log.gravity / std::max(1e-12, p.value))),
+                                false});
+      out.separating.push_back(
+          {effect.id,
+           "drag in proportion to v² or to v, or a bias that drifts with time: falls from different heights, "
+           "or throws upwards, where drag changes its sign at the apex and a drift does not"});
+    }
+    if (effect.id == "sensor.accelerometer_bias")
+      out.separating.push_back(
+          {effect.id,
+           "a bias and a steady turn about an axis off the sensor: a gyroscope in the same recording"});
+  }
+  std::map<std::string, int> conditions;
+  for (const auto& g : problem.groups()) ++conditions[g.condition];
+  std::string text;
+  for (const auto& [name, n] : conditions) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", n, name);
+  out.evidence.push_back({"", "Falls by condition: " + text, false});
+}
+
+}  // namespace
+
+NamedErrors named_errors(const FallProblem& problem, const GroupedFit& fit) {
+  const FallErrors e = fall_errors(problem, fit);
+  return {{"specific_force_rms_m_s2", e.specific_force_rms},
+          {"end_speed_mae_m_s", e.end_speed_mae},
+          {"end_position_mae_m", e.end_position_mae},
+          {"chi2_per_dof", e.chi2_per_dof}};
+}
+
+MeasuredDiscovery discover_falls(const datasets::ThrowLog& log, const MeasuredOptions& options) {
+  const auto begin = std::chrono::steady_clock::now();
+  MeasuredDiscovery out;
+  out.kind = "accelerometers in free fall";
+  out.model = "free_fall";
+  out.phase = "flight";
+  const FallProblem problem(log);
+  const EffectSearch search = run_search(problem, options, out);
+  if (out.verdict == Verdict::not_answered) return out;
+  out.before_train = named_errors(problem, search.base);
+  out.before_test = named_errors(problem, search.base_test);
+  out.after_train = named_errors(problem, search.final);
+  out.after_test = named_errors(problem, search.final_test);
+  explain(log, problem, search, out);
+  out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return out;
+}
+
+}  // namespace unhand::fitting

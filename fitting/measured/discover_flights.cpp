@@ -1,0 +1,156 @@
+// The loop on free flights in space.
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+
+#include "fitting/measured/flight_discovery.hpp"
+#include "fitting/measured/measured_discovery.hpp"
+#include "fitting/measured/rest_heights.hpp"
+
+namespace unhand::fitting {
+namespace {
+
+constexpr const char *kScale = "sensor.length_scale", *kClock = "sensor.time_scale",
+                     *kGravity = "flight.gravity";
+
+constexpr double kMostScale = 0.2;  // beyond it, it is the floor that is elsewhere
+
+bool is_one_of_the_scales(const std::string& id) { return id == kScale || id == kClock || id == kGravity; }
+
+/// What reported g t²/2 would be if nothing but this effect were there, relative to the declared one.
+double apparent_gravity(const AcceptedEffect& effect) {
+  const double x = effect.parameters.front().value - 1;
+  return effect.id == kClock ? 1 / ((1 + x) * (1 + x)) - 1 : x;
+}
+
+void weigh_scales(const datasets::ThrowLog& log, const MeasuredOptions& options, MeasuredDiscovery& out) {
+  for (auto& effect : out.effects) {
+    if (!is_one_of_the_scales(effect.id)) continue;
+    const double apparent = apparent_gravity(effect), sigma = effect.parameters.front().sigma;
+    out.evidence.push_back(
+        {effect.id,
+         fmt::format("Read as gravity, the flights say {:.4f} ± {:.4f} m/s² where {:.4f} is declared",
+                     log.gravity * (1 + apparent), log.gravity * sigma, log.gravity),
+         false});
+    out.separating.push_back(
+        {effect.id,
+         "in free flight a metric scale, a clock and gravity all scale g t²/2 and nothing else: they are "
+         "separated by the pose of a hand that held the object, a known length in the tracker's volume, a "
+         "second clock, or a box of known size at rest on a floor of known height"});
+    for (const auto& [name, object] : log.objects) {
+      const auto rest = rest_heights(log, name, options.floor);
+      if (rest && std::abs(rest->scale) > kMostScale) {
+        out.evidence.push_back(
+            {effect.id,
+             fmt::format(
+                 "{} throws of {} end at rest on a face, {:.4g} m above where its size puts them: the "
+                 "floor is not at {:.4g} m, and with its height (--floor) they would say the scale",
+                 rest->n, name, 0.5 * rest->scale * (*object.dims)[0], options.floor),
+             false});
+      } else if (rest) {
+        const double apart = (rest->scale - apparent) / std::hypot(rest->sigma, sigma);
+        const bool scaled = std::abs(rest->scale) > 4 * rest->sigma && rest->scale * apparent > 0;
+        const bool enough = std::abs(rest->scale - apparent) < 0.5 * std::abs(apparent);
+        out.evidence.push_back(
+            {effect.id,
+             fmt::format("{} throws of {} end at rest on a face: if the floor is at {:.4g} m, its known size "
+                         "makes the metric scale "
+                         "{:+.4f} ± {:.4f} (the flights would need {:+.4f} ± {:.4f}; {:.1f} sigma apart). {}",
+                         rest->n, name, options.floor, rest->scale, rest->sigma, apparent, sigma,
+                         std::abs(apart),
+                         scaled && enough ? "That is a metric scale, not gravity and not the clock"
+                         : scaled         ? "The scale is off, but not by what the flights need"
+                                          : "The scale is not off: gravity or the clock is"),
+             !(scaled && enough)});
+        if (!scaled && effect.id == kScale && 3 * rest->sigma < std::abs(apparent)) {
+          // The box says that the scale is right: the answer goes by the next name.
+          for (auto& [id, correlation] : effect.equivalent)
+            if (id == kGravity) {
+              std::swap(effect.id, id);
+              for (auto& p : effect.parameters) p.name = "ratio";
+              break;
+            }
+        }
+        std::string where;
+        for (std::size_t a = 0; a < 3; ++a)
+          if (rest->offset[a])
+            where += fmt::format("{}{:+.2f} ± {:.2f}", where.empty() ? "" : ", ", 1e3 * *rest->offset[a],
+                                 1e3 * rest->offset_sigma[a]);
+        out.evidence.push_back({"sensor.com_offset",
+                                fmt::format("At rest, the tracked point of {} lies ({}) mm from the middle "
+                                            "of the box: what the flights say beyond that is "
+                                            "the distance of the CoM from the middle",
+                                            name, where),
+                                false});
+      }
+      if (object.dims && object.mass > 0) {
+        constexpr double kAir = 1.2, kAddedMass = 0.67;  // kg/m³; of a cube, in units of the air it displaces
+        const double share = kAir * (*object.dims)[0] * (*object.dims)[1] * (*object.dims)[2] / object.mass;
+        out.evidence.push_back({effect.id,
+                                fmt::format("Air that {} displaces weighs {:.2f} % of it: buoyancy and the "
+                                            "added mass (of a cube) make gravity seem {:.2f} % "
+                                            "smaller, and no flight tells that from a scale",
+                                            name, 100 * share, 100 * share * (1 + kAddedMass)),
+                                std::abs(share * (1 + kAddedMass)) > 2 * sigma});
+      }
+    }
+  }
+}
+
+/// A drag that no box of that size has is not the whole truth.
+void weigh_drag(const datasets::ThrowLog& log, MeasuredDiscovery& out) {
+  constexpr double kAir = 1.2, kLargest = 1.3;  // kg/m³; tumbling cubes are reported at about 1
+  for (const auto& effect : out.effects) {
+    if (effect.id != "flight.quadratic_drag") continue;
+    out.separating.push_back({effect.id, "drag in proportion to v² or to v: throws at twice the speed"});
+    for (const auto& [name, object] : log.objects)
+      for (const auto& p : effect.parameters) {
+        if (p.name != "k[" + name + "]" || !object.dims || !(object.mass > 0)) continue;
+        const auto& d = *object.dims;
+        const double area =
+            0.5 * (d[0] * d[1] + d[1] * d[2] + d[2] * d[0]);  // Cauchy: a quarter of the surface
+        const double factor = 2 * object.mass / (kAir * area);
+        out.evidence.push_back({effect.id,
+                                fmt::format("k = {:.4f} ± {:.4f} 1/m is a drag coefficient of {:.2f} ± "
+                                            "{:.2f} on the mean area that a turning "
+                                            "box of its size shows; boxes are known for about 1",
+                                            p.value, p.sigma, factor * p.value, factor * p.sigma),
+                                factor * p.value > kLargest});
+      }
+  }
+}
+
+}  // namespace
+
+NamedErrors named_errors(const FlightProblem& problem, const GroupedFit& fit, int threads) {
+  const FlightErrors e = flight_errors(problem, fit, threads);
+  return {{"trajectory_rms_m", e.trajectory_rms},
+          {"end_position_mae_m", e.end_position_mae},
+          {"end_position_median_m", e.end_position_median},
+          {"end_orientation_mae_deg", e.end_orientation_mae},
+          {"end_orientation_median_deg", e.end_orientation_median},
+          {"chi2_per_dof", e.chi2_per_dof}};
+}
+
+MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const MeasuredOptions& options) {
+  const auto begin = std::chrono::steady_clock::now();
+  const int threads = options.search.fit.threads;
+  MeasuredDiscovery out;
+  out.kind = "free flights";
+  out.model = "projectile";
+  out.phase = "flight";
+  const FlightProblem problem(log, threads);
+  const EffectSearch search = run_search(problem, options, out);
+  if (out.verdict == Verdict::not_answered) return out;
+  out.before_train = named_errors(problem, search.base, threads);
+  out.before_test = named_errors(problem, search.base_test, threads);
+  out.after_train = named_errors(problem, search.final, threads);
+  out.after_test = named_errors(problem, search.final_test, threads);
+  weigh_scales(log, options, out);
+  weigh_drag(log, out);
+  out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return out;
+}
+
+}  // namespace unhand::fitting

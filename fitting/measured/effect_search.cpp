@@ -1,0 +1,291 @@
+#include "fitting/measured/effect_search.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "fitting/dense_solve.hpp"
+#include "fitting/measured/effect_trial.hpp"
+#include "fitting/measured/grouped_footprints.hpp"
+
+namespace unhand::fitting {
+
+using datasets::Split;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+/// Footprints that correlate by this much need not be fitted both: the data cannot prefer one.
+constexpr double kSame = 0.9999;
+
+std::vector<Index> indices(const std::vector<std::size_t>& from) {
+  std::vector<Index> out;
+  for (const std::size_t k : from) out.push_back(static_cast<Index>(k));
+  return out;
+}
+
+std::vector<std::size_t> all_of(std::size_t n) {
+  std::vector<std::size_t> out;
+  for (std::size_t i = 0; i < n; ++i) out.push_back(i);
+  return out;
+}
+
+Ranked& entry_of(std::vector<Ranked>& ranking, const std::string& id) {
+  const auto found =
+      std::find_if(ranking.begin(), ranking.end(), [&](const Ranked& r) { return r.id == id; });
+  if (found != ranking.end()) return *found;
+  ranking.push_back({id, -1});
+  return ranking.back();
+}
+
+class Search {
+ public:
+  Search(const GroupedProblem& problem, const EffectSearchOptions& options, EffectSearch& out)
+      : problem_(problem), options_(options), out_(out) {
+    for (auto& effect : problem.effects())
+      if (std::find(options.forget.begin(), options.forget.end(), effect.id) == options.forget.end())
+        catalogue_.push_back(std::move(effect));
+  }
+
+  bool forward() {
+    const auto effects = inactive();
+    if (effects.empty()) return false;
+    const auto f = grouped_footprints(problem_, out_.final, effects, options_.fit);
+    const auto all = scores(f.total);
+    struct Scored {
+      std::size_t candidate;
+      double gain, p;
+      VectorXd step;
+    };
+    std::vector<Scored> scored;
+    for (const auto& s : all) {
+      const Candidate& c = f.total.candidates[s.candidate];
+      std::vector<Index> columns;
+      for (std::size_t k = 0; k < f.total.fitted; ++k) columns.push_back(static_cast<Index>(k));
+      const auto own = indices(c.columns);
+      columns.insert(columns.end(), own.begin(), own.end());
+      Scored one{s.candidate, s.gain, 1,
+                 Eigen::Map<const VectorXd>(s.step.data(), static_cast<Index>(s.step.size()))};
+      if (s.visible) {
+        const LinearStep step = linear_step(f.parts, all_of(f.parts.size()), columns);
+        const auto p = static_cast<Index>(own.size());
+        const VectorXd x = step.value.tail(p);
+        const MatrixXd covariance = step.covariance.bottomRightCorner(p, p);
+        one.p = Wald{x.dot(pseudo_solve(covariance, x)), p}.p_value(out_.final);
+        if (!allowed(c, x)) one.gain = 0, one.p = 1;
+      }
+      scored.push_back(one);
+      Ranked& r = entry_of(out_.ranking, c.id);
+      if (one.gain <= r.gain) continue;
+      r.gain = one.gain, r.p_value = one.p, r.visible = s.visible;
+    }
+    std::sort(scored.begin(), scored.end(), [](const Scored& a, const Scored& b) { return a.gain > b.gain; });
+    for (const auto& s : scored) {
+      const Candidate &best = f.total.candidates[scored.front().candidate],
+                      &c = f.total.candidates[s.candidate];
+      Ranked& r = entry_of(out_.ranking, c.id);
+      if (r.gain == s.gain && scored.front().gain > 0)
+        r.correlation_with_best =
+            between(f.total, best,
+                    {scored.front().step.data(), scored.front().step.data() + scored.front().step.size()}, c);
+    }
+    // Leaders: of candidates with the same footprint, the one that the catalogue lists first.
+    const double level = options_.false_discovery_rate / static_cast<double>(scored.size());
+    std::vector<Scored> leaders;
+    for (const auto& s : scored) {
+      if (!(s.p < 10 * level) || !(s.gain > 0)) continue;  // the full fit decides; this is to first order
+      const Candidate& c = f.total.candidates[s.candidate];
+      bool known = false;
+      for (auto& leader : leaders) {
+        const Candidate& l = f.total.candidates[leader.candidate];
+        if (l.id == c.id) known = true;
+        if (known ||
+            between(f.total, l, {leader.step.data(), leader.step.data() + leader.step.size()}, c) < kSame)
+          continue;
+        known = true;
+        if (order_of(c.id) < order_of(l.id) && s.gain > 0.9 * leader.gain) leader = s;
+        break;
+      }
+      if (!known && static_cast<int>(leaders.size()) < options_.refits) leaders.push_back(s);
+    }
+    std::optional<EffectTrial> best;
+    for (const auto& s : leaders) {
+      const Candidate& c = f.total.candidates[s.candidate];
+      const auto effect =
+          std::find_if(effects.begin(), effects.end(), [&](const auto& e) { return e.id == c.id; });
+      auto trial = try_effect(problem_, out_.final, out_.final_test, c, s.step, *effect, options_.fit);
+      Ranked& r = entry_of(out_.ranking, c.id);
+      r.refitted = true, r.delta_bic = trial.delta_bic, r.held_out_gain = trial.held.fall();
+      if (!trial.fit.solved || !(trial.p < level) || !(trial.held.p < 0.05)) continue;
+      if (!(trial.held.share > options_.matters)) continue;
+      if (!best || trial.delta_bic < best->delta_bic) best = std::move(trial);
+    }
+    if (!best) return false;
+    AcceptedEffect effect;
+    effect.id = best->id;
+    effect.delta_bic = best->delta_bic;
+    effect.test_error_ratio = std::sqrt(best->held.is / best->held.was);
+    effect.why = fmt::format("chi2 per sample falls from {:.4g} to {:.4g} (p {:.1g})", best->held.was,
+                             best->held.is, best->held.p);
+    out_.effects.push_back(std::move(effect));
+    out_.final = std::move(best->fit);
+    out_.final_test = std::move(best->test);
+    return true;
+  }
+
+  void backward() {
+    for (bool removed = true; removed && out_.effects.size() > 1;) {
+      removed = false;
+      for (std::size_t i = 0; i < out_.effects.size() && !removed; ++i) {
+        const std::string id = out_.effects[i].id;
+        if (wald_of(out_.final, id).p_value(out_.final) <
+            options_.false_discovery_rate / static_cast<double>(catalogue_.size()))
+          continue;
+        std::vector<SharedParameter> shared;
+        std::vector<double> values;
+        for (std::size_t k = 0; k < out_.final.shared.size(); ++k)
+          if (out_.final.shared[k].effect != id)
+            shared.push_back(out_.final.shared[k]),
+                values.push_back(out_.final.values[static_cast<Index>(k)]);
+        out_.final = fit_groups(problem_, Split::train, shared,
+                                Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size())),
+                                options_.fit);
+        out_.final_test = fit_own(problem_, Split::test, out_.final, options_.fit);
+        out_.effects.erase(out_.effects.begin() + static_cast<std::ptrdiff_t>(i));
+        removed = true;
+      }
+    }
+  }
+
+  /// Values, other names and how they hold up in halves of the groups.
+  void describe() {
+    if (out_.effects.empty()) return;
+    const auto f = grouped_footprints(problem_, out_.final, inactive(), options_.fit);
+    for (AcceptedEffect& accepted : out_.effects) {
+      const Wald wald = wald_of(out_.final, accepted.id);
+      accepted.p_value = wald.p_value(out_.final);
+      accepted.delta_bic = wald.delta_bic(out_.final);
+      VectorXd contribution = VectorXd::Zero(static_cast<Index>(f.total.fitted));
+      for (std::size_t k = 0; k < out_.final.shared.size(); ++k) {
+        const auto& p = out_.final.shared[k];
+        if (p.effect != accepted.id) continue;
+        const double value = out_.final.values[static_cast<Index>(k)];
+        accepted.parameters.push_back({p.short_name, p.unit, value, out_.final.sigma(k)});
+        if (!p.shape) contribution[static_cast<Index>(k)] = value - p.neutral;
+      }
+      for (const Candidate& candidate : f.total.candidates) {
+        const double r = correlation(f.total, contribution, candidate);
+        if (r < options_.equivalent || is_spoken_for(f.total, accepted.id, candidate)) continue;
+        accepted.add_other_name(candidate.id, r);
+      }
+    }
+    halves(f);
+  }
+
+ private:
+  std::size_t order_of(const std::string& id) const {
+    for (std::size_t k = 0; k < catalogue_.size(); ++k)
+      if (catalogue_[k].id == id) return k;
+    return catalogue_.size();
+  }
+  /// What the other accepted effects do already leaves (almost) nothing of the candidate's footprint.
+  bool is_spoken_for(const Footprints& f, const std::string& accepted, const Candidate& candidate) const {
+    std::vector<Index> others;
+    for (std::size_t k = 0; k < f.fitted; ++k)
+      if (out_.final.shared[k].effect != accepted) others.push_back(static_cast<Index>(k));
+    if (others.empty()) return false;
+    const auto own = indices(candidate.columns);
+    const MatrixXd cross = f.gram(others, own), whole = f.gram(own, own);
+    const MatrixXd taken = congruent(cross.transpose(), pseudo_inverse(f.gram(others, others)));
+    return whole.trace() - taken.trace() < 1e-2 * whole.trace();
+  }
+  std::vector<dynamics::Effect> inactive() const {
+    std::vector<dynamics::Effect> out;
+    for (const auto& effect : catalogue_)
+      if (std::none_of(out_.effects.begin(), out_.effects.end(),
+                       [&](const auto& e) { return e.id == effect.id; }))
+        out.push_back(effect);
+    return out;
+  }
+  /// A parameter that cannot go below (or above) neutral must not want to.
+  bool allowed(const Candidate& c, const VectorXd& step) const {
+    for (const auto& effect : catalogue_) {
+      if (effect.id != c.id) continue;
+      for (std::size_t j = 0; j < c.parameters.size(); ++j)
+        for (const auto& p : effect.parameters) {
+          if (c.parameters[j].substr(0, c.parameters[j].find('[')) != effect.full_name(p)) continue;
+          const double x = step[static_cast<Index>(j)];
+          if (c.parameters.size() == 1 && ((p.low >= p.neutral && x < 0) || (p.high <= p.neutral && x > 0)))
+            return false;
+        }
+    }
+    return true;
+  }
+
+  void halves(const GroupedFootprints& f) {
+    std::vector<std::size_t> used;
+    for (std::size_t i = 0; i < out_.final.groups.size(); ++i)
+      if (out_.final.groups[i].used && out_.final.groups[i].solved) used.push_back(i);
+    std::vector<Index> columns;
+    for (std::size_t k = 0; k < f.total.fitted; ++k) columns.push_back(static_cast<Index>(k));
+    for (std::size_t c = 0; c < problem_.covariates().size(); ++c) {
+      std::vector<double> x;
+      for (const std::size_t i : used) x.push_back(problem_.groups()[i].covariates[c]);
+      auto sorted = x;
+      std::sort(sorted.begin(), sorted.end());
+      if (sorted.empty() || !(sorted.back() > sorted.front())) continue;
+      const double at = sorted[sorted.size() / 2];
+      std::vector<std::size_t> low, high;
+      for (std::size_t n = 0; n < used.size(); ++n) (x[n] < at ? low : high).push_back(n);
+      if (low.size() < 2 * columns.size() + 2 || high.size() < 2 * columns.size() + 2) continue;
+      const LinearStep a = linear_step(f.parts, low, columns), b = linear_step(f.parts, high, columns);
+      for (std::size_t k = 0; k < f.total.fitted; ++k) {
+        const auto j = static_cast<Index>(k);
+        if (out_.final.shared[k].shape) continue;
+        out_.stability.push_back({out_.final.shared[k].name, problem_.covariates()[c], at,
+                                  out_.final.values[j] + a.value[j], a.sigma[j],
+                                  out_.final.values[j] + b.value[j], b.sigma[j]});
+      }
+    }
+  }
+
+  const GroupedProblem& problem_;
+  const EffectSearchOptions& options_;
+  EffectSearch& out_;
+  std::vector<dynamics::Effect> catalogue_;
+};
+
+std::string why_not(const GroupedProblem& problem, Split split) {
+  const char* name = split == Split::test ? "test" : "train";
+  for (const auto& group : problem.groups())
+    if (group.split == split) return fmt::format("no throw of split '{}' could be fitted", name);
+  return fmt::format("no throw has the split '{}': effects are found on train, and judged on test", name);
+}
+
+}  // namespace
+
+EffectSearch search_effects(const GroupedProblem& problem, const EffectSearchOptions& options) {
+  EffectSearch out;
+  out.base = fit_groups(problem, Split::train, {}, VectorXd(), options.fit);
+  out.base_test = fit_own(problem, Split::test, out.base, options.fit);
+  if (!out.base.solved || !out.base_test.solved) {
+    out.message = why_not(problem, out.base.solved ? Split::test : Split::train);
+    return out;
+  }
+  out.solved = true;
+  out.final = out.base;
+  out.final_test = out.base_test;
+  Search search(problem, options, out);
+  while (static_cast<int>(out.effects.size()) < options.most_effects && search.forward()) {
+  }
+  search.backward();
+  search.describe();
+  std::sort(out.ranking.begin(), out.ranking.end(),
+            [](const Ranked& a, const Ranked& b) { return a.gain > b.gain; });
+  return out;
+}
+
+}  // namespace unhand::fitting

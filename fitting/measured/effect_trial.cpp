@@ -1,0 +1,128 @@
+#include "fitting/measured/effect_trial.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fitting/dense_solve.hpp"
+#include "fitting/distributions.hpp"
+
+namespace unhand::fitting {
+
+using datasets::Split;
+using Eigen::Index;
+using Eigen::VectorXd;
+
+double Wald::delta_bic(const GroupedFit& fit) const {
+  return static_cast<double>(parameters) * std::log(std::max(2, fit.used)) - statistic;
+}
+
+double Wald::p_value(const GroupedFit& fit) const {
+  const auto p = static_cast<double>(parameters), n = static_cast<double>(fit.used);
+  if (!(n > p + 1)) return 1;
+  return f_tail(statistic * (n - p) / (p * (n - 1)), p, n - p);
+}
+
+Wald wald_of(const GroupedFit& fit, const std::string& id) {
+  std::vector<Index> at;
+  std::vector<double> away;
+  for (std::size_t k = 0; k < fit.shared.size(); ++k)
+    if (fit.shared[k].effect == id && !fit.shared[k].shape) {
+      at.push_back(static_cast<Index>(k));
+      away.push_back(fit.values[at.back()] - fit.shared[k].neutral);
+    }
+  const Eigen::Map<const VectorXd> d(away.data(), static_cast<Index>(away.size()));
+  return {d.dot(pseudo_solve(fit.covariance(at, at), d)), d.size()};
+}
+
+namespace {
+
+/// Of one held-out group, by what the effect changes in its residual r, g = r_before − r_after: g·r_before
+/// and g·g, times the group's weight.
+struct Along {
+  double residual{}, change{};
+};
+Along along(const Group& group, const GroupFit& before, const GroupFit& after, double weight) {
+  Along out;
+  for (Index j = 0; j < before.residual.size(); ++j) {
+    if (group.rows[static_cast<std::size_t>(j)].channel == kPriorChannel) continue;
+    const double change = before.residual[j] - after.residual[j];
+    out.residual += weight * change * before.residual[j];
+    out.change += weight * change * change;
+  }
+  return out;
+}
+
+/// That an effect lowers the χ² of groups which no fit has seen. The slope Σ g·r / Σ g·g is 1 where they show
+/// it as the train groups do and 0 where there is none, and χ² falls where it exceeds a half; its σ is the
+/// jackknife over groups. Groups that show an effect by different amounts are no doubt of it: a paired test
+/// of their χ² would take them for that, of the largest effect as of the smallest.
+double p_of_slope(const std::vector<Along>& groups) {
+  Along all;
+  for (const Along& g : groups) all.residual += g.residual, all.change += g.change;
+  if (!(all.change > 0)) return 1;
+  const auto n = static_cast<double>(groups.size());
+  double mean = 0, square = 0;
+  for (const Along& g : groups) {
+    const double rest = all.change - g.change;
+    if (!(rest > 1e-9 * all.change)) return 1;  // one group has all there is to see
+    const double without = (all.residual - g.residual) / rest;
+    mean += without / n, square += without * without;
+  }
+  const double variance = (n - 1) / n * std::max(square - n * mean * mean, 0.0);
+  const double slope = all.residual / all.change;
+  constexpr double kFalls = 0.5;
+  if (!(slope > kFalls)) return 1;
+  return 0.5 * f_tail((slope - kFalls) * (slope - kFalls) / std::max(variance, 1e-300), 1, n - 1);
+}
+
+HeldOutFall held_out(const GroupedProblem& problem, const GroupedFit& before, const GroupedFit& after) {
+  std::vector<Along> groups;
+  double was = 0, is = 0, samples = 0;
+  for (std::size_t i = 0; i < before.groups.size(); ++i) {
+    const GroupFit &b = before.groups[i], &a = after.groups[i];
+    if (!(b.used && b.solved && a.used && a.solved)) continue;
+    const double w = before.weights.group[i];
+    groups.push_back(along(problem.groups()[i], b, a, w));
+    was += w * b.chi2, is += w * a.chi2, samples += w * b.n;
+  }
+  HeldOutFall out;
+  if (groups.size() < 3 || !(samples > 0)) return out;
+  out.was = was / samples, out.is = is / samples;
+  if (!(out.was > out.is)) return out;
+  out.p = p_of_slope(groups);
+  const auto b = misfit(problem, before), a = misfit(problem, after);
+  for (std::size_t c = 0; c < b.size(); ++c) {
+    const double excess = b[c].chi2_per_sample() - 1, fall = b[c].chi2_per_sample() - a[c].chi2_per_sample();
+    if (b[c].n > 0 && fall > 0) out.share = std::max(out.share, excess > fall ? fall / excess : 1);
+  }
+  return out;
+}
+
+}  // namespace
+
+EffectTrial try_effect(const GroupedProblem& problem, const GroupedFit& fit, const GroupedFit& test,
+                       const Candidate& candidate, const VectorXd& step, const dynamics::Effect& effect,
+                       const GroupedFitOptions& options) {
+  auto shared = fit.shared;
+  std::vector<double> values(fit.values.data(), fit.values.data() + fit.values.size());
+  for (auto& p : shared_parameters(effect, objects_of(problem))) {
+    double start = p.neutral;
+    if (const auto at = candidate.shape.find(p.name); at != candidate.shape.end()) start = at->second;
+    for (std::size_t j = 0; j < candidate.parameters.size(); ++j)
+      if (candidate.parameters[j] == p.name) start += step[static_cast<Index>(j)];
+    values.push_back(std::clamp(start, p.low, p.high));
+    shared.push_back(std::move(p));
+  }
+  EffectTrial out{effect.id, {}, {}, 1, 0, {}};
+  out.fit = fit_groups(problem, Split::train, shared,
+                       Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size())), options);
+  if (!out.fit.solved) return out;
+  out.test = fit_own(problem, Split::test, out.fit, options);
+  const Wald wald = wald_of(out.fit, effect.id);
+  out.p = wald.p_value(out.fit);
+  out.delta_bic = wald.delta_bic(out.fit);
+  if (out.test.solved) out.held = held_out(problem, test, out.test);
+  return out;
+}
+
+}  // namespace unhand::fitting

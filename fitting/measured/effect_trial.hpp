@@ -1,0 +1,39 @@
+// One effect refitted over groups, and whether the held-out groups agree. Internal to fitting.
+#pragma once
+
+#include "fitting/discovery/footprints.hpp"
+#include "fitting/measured/grouped_fit.hpp"
+
+namespace unhand::fitting {
+
+/// A fall of the held-out χ², over groups.
+struct HeldOutFall {
+  double was{}, is{};  ///< χ² per sample
+  double p{1};         ///< of a fall by chance: one-sided, jackknife over groups
+  double share{};      ///< the largest share of a channel's misfit beyond the noise that goes
+  double fall() const { return was - is; }
+};
+
+/// A fit with one effect more, on the train groups and, its shared parameters held, on the test groups.
+struct EffectTrial {
+  std::string id;
+  GroupedFit fit, test;
+  double p{1}, delta_bic{};
+  HeldOutFall held;
+};
+/// Starts at `step` from neutral, the shape parameters at the candidate's.
+EffectTrial try_effect(const GroupedProblem& problem, const GroupedFit& fit, const GroupedFit& test,
+                       const Candidate& candidate, const Eigen::VectorXd& step,
+                       const dynamics::Effect& effect, const GroupedFitOptions& options);
+
+/// (θ − neutral)ᵀ V⁻¹ (θ − neutral) of an effect's size parameters, and Bayes' criterion by it.
+struct Wald {
+  double statistic{};
+  Eigen::Index parameters{};
+  double delta_bic(const GroupedFit& fit) const;
+  /// Against F, over the groups used.
+  double p_value(const GroupedFit& fit) const;
+};
+Wald wald_of(const GroupedFit& fit, const std::string& id);
+
+}  // namespace unhand::fitting

@@ -1,0 +1,264 @@
+#include "fitting/measured/fall_discovery.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+#include "flight/quaternion.hpp"
+
+namespace unhand::fitting {
+
+using flight::Vec3;
+
+namespace {
+
+constexpr double kTurningRate = 0.5;  // [rad/s] that an object let go by hand may turn with
+constexpr double kLongestMemory = 3;  // [s] before a fall in which it may have been at rest
+
+/// The last quiet stretch before a fall, and the speed gained from there on.
+struct BeforeFall {
+  Vec3<double> up{0, 0, 1};
+  double speed{}, speed_sigma{3}, tilt_sigma{0.3};
+};
+
+BeforeFall before_fall(const datasets::ImuLog& imu, std::size_t first, double g) {
+  constexpr double kWindow = 0.2, kQuiet = 0.6;  // [s], [m/s²]
+  BeforeFall out;
+  const auto mean_over = [&](std::size_t i, std::size_t j, Vec3<double>& mean, double& scatter) {
+    mean = {};
+    scatter = 0;
+    const auto n = static_cast<double>(j - i);
+    for (std::size_t k = i; k < j; ++k)
+      for (std::size_t a = 0; a < 3; ++a) mean[a] += imu.specific_force(k, a) / n;
+    for (std::size_t k = i; k < j; ++k)
+      for (std::size_t a = 0; a < 3; ++a) scatter += std::pow(imu.specific_force(k, a) - mean[a], 2) / n;
+    scatter = std::sqrt(scatter);
+  };
+  for (std::size_t end = first; end-- > 0;) {
+    if (imu.time(first) - imu.time(end) > kLongestMemory) break;
+    std::size_t begin = end;
+    while (begin > 0 && imu.time(end) - imu.time(begin) < kWindow) --begin;
+    if (imu.time(end) - imu.time(begin) < kWindow) break;
+    Vec3<double> mean;
+    double scatter = 0;
+    mean_over(begin, end, mean, scatter);
+    const double size = flight::norm(mean);
+    if (scatter > kQuiet || std::abs(size - g) > kQuiet) continue;
+    for (std::size_t a = 0; a < 3; ++a) out.up[a] = mean[a] / size;
+    for (std::size_t k = end; k < first; ++k) {
+      const double dt = imu.time(k + 1) - imu.time(k);
+      for (const std::size_t i : {k, k + 1})
+        out.speed += 0.5 * dt *
+                     (imu.specific_force(i, 0) * out.up[0] + imu.specific_force(i, 1) * out.up[1] +
+                      imu.specific_force(i, 2) * out.up[2] - size);
+    }
+    const double moving = imu.time(first) - imu.time(end);
+    out.speed_sigma = 0.1 + 0.3 * moving;
+    out.tilt_sigma = 0.03 + 0.1 * moving;
+    return out;
+  }
+  // Never at rest: the vertical is that of the mean force.
+  Vec3<double> mean;
+  double scatter = 0;
+  if (first > 1) {
+    mean_over(0, first, mean, scatter);
+    if (const double size = flight::norm(mean); size > 0.3 * g)
+      for (std::size_t a = 0; a < 3; ++a) out.up[a] = mean[a] / size;
+  }
+  return out;
+}
+
+/// Third differences of a smooth series keep 20 σ².
+double scatter_of(const std::vector<Vec3<double>>& x, std::size_t axis) {
+  double sum = 0;
+  for (std::size_t i = 3; i < x.size(); ++i)
+    sum += std::pow(x[i][axis] - 3 * x[i - 1][axis] + 3 * x[i - 2][axis] - x[i - 3][axis], 2) / 20;
+  return std::sqrt(sum / static_cast<double>(x.size() - 3));
+}
+
+}  // namespace
+
+std::vector<dynamics::Effect> known_fall_effects() {
+  const auto xyz = [](const std::string& stem, const std::string& unit, double limit, double typical) {
+    std::vector<dynamics::EffectParameter> out;
+    for (const char axis : {'x', 'y', 'z'}) out.push_back({stem + axis, unit, 0, -limit, limit, typical});
+    return out;
+  };
+  auto settling = xyz("", "m/s^2", 50, 0.1);
+  settling.push_back({"tau", "s", 0.05, 2e-3, 2, 0.02, {0.02, 0.08, 0.3}});
+  return {
+      {"sensor.accelerometer_bias", "constant bias of the accelerometer, body axes",
+       xyz("", "m/s^2", 20, 0.1)},
+      {"flight.quadratic_drag", "quadratic drag, a = -k |v| v", {{"k", "1/m", 0, 0, 10, 0.02}}, true},
+      {"flight.linear_drag", "drag in proportion to speed, a = -c v", {{"c", "1/s", 0, 0, 10, 0.02}}, true},
+      {"flight.drag_by_axis",
+       "drag depends on the body axis along which the air comes, a = -|v| A v, A = diag(a_x, a_y, -a_x - "
+       "a_y)",
+       {{"a_x", "1/m", 0, -10, 10, 0.02}, {"a_y", "1/m", 0, -10, 10, 0.02}},
+       true},
+      {"sensor.accelerometer_drift", "the bias changes during a fall", xyz("", "m/s^3", 50, 0.1)},
+      {"sensor.settling", "the sensor recovers from the time before the fall, s exp(-t/tau)", settling},
+      {"sensor.lever_arm", "the sensor is not at the CoM: w x (w x r) + dw/dt x r", xyz("", "m", 1, 0.01)},
+  };
+}
+
+FallProblem::FallProblem(const datasets::ThrowLog& log) : gravity_(log.gravity) {
+  channels_ = {"force_x", "force_y", "force_z"};
+  covariates_ = {"speed at the start [m/s]", "duration [s]", "vertical along body z [-]", "order"};
+  const auto splits = splits_of(log);
+  for (std::size_t n = 0; n < log.throws.size(); ++n) {
+    const auto& one = log.throws[n];
+    if (!one.imu || !one.free_flight) {
+      skipped_.push_back({one.id, !one.imu ? "no imu" : "no free_flight: it is not known when it falls"});
+      continue;
+    }
+    const auto& imu = *one.imu;
+    Fall fall;
+    std::optional<std::size_t> first;
+    for (std::size_t i = 0; i < imu.time.rows; ++i) {
+      if (imu.time(i) < one.free_flight->first - 1e-9 || imu.time(i) > one.free_flight->second + 1e-9)
+        continue;
+      if (!first) first = i;
+      fall.time.push_back(imu.time(i) - imu.time(*first));
+      fall.force.push_back({imu.specific_force(i, 0), imu.specific_force(i, 1), imu.specific_force(i, 2)});
+      if (imu.angular_rate.empty()) continue;
+      fall.rate.push_back({imu.angular_rate(i, 0), imu.angular_rate(i, 1), imu.angular_rate(i, 2)});
+      Vec3<double> turned{};
+      if (fall.turned.size() > 0)
+        for (std::size_t a = 0; a < 3; ++a)
+          turned[a] = fall.turned.back()[a] + 0.5 * (fall.time.back() - fall.time[fall.time.size() - 2]) *
+                                                  (fall.rate.back()[a] + fall.rate[fall.rate.size() - 2][a]);
+      fall.turned.push_back(turned);
+    }
+    if (fall.time.size() < 12) {
+      skipped_.push_back({one.id, fmt::format("{} samples in free fall, fewer than 12", fall.time.size())});
+      continue;
+    }
+    const bool declared = imu.specific_force.sigma.size() == 3;
+    for (std::size_t a = 0; a < 3; ++a)
+      fall.sigma[a] = std::max(1e-6, declared && imu.specific_force.sigma[a] > 0 ? imu.specific_force.sigma[a]
+                                                                                 : scatter_of(fall.force, a));
+    const BeforeFall before = before_fall(imu, *first, gravity_);
+    fall.up = before.up, fall.speed = before.speed;
+    fall.speed_sigma = before.speed_sigma, fall.tilt_sigma = before.tilt_sigma;
+    Group group{one.id, one.object, one.condition, splits[n], {}, {}, {}};
+    group.start = {fall.speed, 0, 0, 0, 0, 0, 0};
+    for (const double t : fall.time)
+      for (int c = 0; c < 3; ++c) group.rows.push_back({c, t});
+    for (int k = 0; k < 7; ++k) group.rows.push_back({kPriorChannel, 0});
+    group.covariates = {fall.speed, fall.time.back(), fall.up[2], static_cast<double>(groups_.size())};
+    groups_.push_back(std::move(group));
+    falls_.push_back(std::move(fall));
+  }
+  if (groups_.empty())
+    throw std::invalid_argument("falls: no throw is one" +
+                                (skipped_.empty() ? "" : ": " + skipped_.front().second));
+}
+
+std::vector<dynamics::Effect> FallProblem::effects() const { return known_fall_effects(); }
+
+GroupEquations FallProblem::equations(std::size_t group, std::span<const std::string> names,
+                                      std::span<const double> values, const Eigen::VectorXd& own,
+                                      bool derivatives) const {
+  const Fall& fall = falls_[group];
+  const OwnNames mine(names, groups_[group].object);
+  const auto residual = [&]<class S>(const std::vector<S>& effects, const std::vector<S>& x) {
+    const dynamics::Values<S> given(mine.names, effects);
+    const auto value = [&](const char* name, double neutral = 0) { return given.get(name, neutral); };
+    const auto vector = [&](const std::string& id) {
+      return Vec3<S>{given.get(id + ".x", 0), given.get(id + ".y", 0), given.get(id + ".z", 0)};
+    };
+    const S k = value("flight.quadratic_drag.k"), c = value("flight.linear_drag.c"),
+            a_x = value("flight.drag_by_axis.a_x"), a_y = value("flight.drag_by_axis.a_y"),
+            tau = value("sensor.settling.tau", 0.05);
+    const Vec3<S> along{k + a_x, k + a_y, k - a_x - a_y},
+        bias = vector("sensor.accelerometer_bias"), drift = vector("sensor.accelerometer_drift"),
+        settling = vector("sensor.settling"), lever = vector("sensor.lever_arm");
+    const Vec3<S> up0 = flight::rotate(flight::exp(Vec3<S>{x[1], x[2], x[3]}),
+                                       Vec3<S>{S(fall.up[0]), S(fall.up[1]), S(fall.up[2])});
+    const Vec3<S> spin{x[4], x[5], x[6]};
+    const auto up_at = [&](std::size_t i) {  // the vertical turns against the body
+      Vec3<S> turned = flight::scaled(S(-fall.time[i]), spin);
+      if (!fall.turned.empty())
+        for (std::size_t a = 0; a < 3; ++a) turned[a] -= fall.turned[i][a];
+      return flight::rotate(flight::exp(turned), up0);
+    };
+    const auto deceleration = [&](const S& v, const Vec3<S>& up) {
+      const S size = dynamics::value_of(v) < 0 ? S(-v) : v;
+      return size * v * (along[0] * up[0] * up[0] + along[1] * up[1] * up[1] + along[2] * up[2] * up[2]) +
+             c * v;
+    };
+    std::vector<S> out;
+    out.reserve(groups_[group].rows.size());
+    S v = x[0];
+    for (std::size_t i = 0; i < fall.time.size(); ++i) {
+      const Vec3<S> up = up_at(i);
+      if (i > 0) {  // Heun: drag changes by a hundredth of itself from sample to sample
+        const double dt = fall.time[i] - fall.time[i - 1];
+        const S slope = -gravity_ - deceleration(v, up), ahead = v + dt * slope;
+        v += 0.5 * dt * (slope - gravity_ - deceleration(ahead, up));
+      }
+      const S size = dynamics::value_of(v) < 0 ? S(-v) : v;
+      using std::exp;
+      const S decay = exp(-fall.time[i] / tau);
+      Vec3<S> f;
+      for (std::size_t a = 0; a < 3; ++a)
+        f[a] = -(along[a] * size + c) * v * up[a] + bias[a] + drift[a] * fall.time[i] + settling[a] * decay;
+      if (!fall.rate.empty()) {
+        const std::size_t before = i > 0 ? i - 1 : 0, after = std::min(i + 1, fall.time.size() - 1);
+        Vec3<S> w, dw;
+        for (std::size_t a = 0; a < 3; ++a) {
+          w[a] = S(fall.rate[i][a]);
+          dw[a] = S((fall.rate[after][a] - fall.rate[before][a]) / (fall.time[after] - fall.time[before]));
+        }
+        f = flight::sum(f, flight::sum(flight::cross(w, flight::cross(w, lever)), flight::cross(dw, lever)));
+      }
+      for (std::size_t a = 0; a < 3; ++a) out.push_back((f[a] - fall.force[i][a]) / fall.sigma[a]);
+    }
+    out.push_back((x[0] - fall.speed) / fall.speed_sigma);
+    for (std::size_t a = 1; a < 4; ++a) out.push_back(x[a] / fall.tilt_sigma);
+    for (std::size_t a = 4; a < 7; ++a) out.push_back(x[a] / (fall.rate.empty() ? kTurningRate : 0.02));
+    return out;
+  };
+  GroupEquations out = swept(mine.values(values), own, derivatives, residual);
+  if (derivatives) mine.spread(out, names.size());
+  return out;
+}
+
+FallErrors fall_errors(const FallProblem& problem, const GroupedFit& fit) {
+  FallErrors out;
+  double squares = 0, n = 0;
+  for (std::size_t i = 0; i < fit.groups.size(); ++i) {
+    const GroupFit& g = fit.groups[i];
+    if (!g.used || !g.solved) continue;
+    const auto& rows = problem.groups()[i].rows;
+    Vec3<double> speed{}, position{}, last{};
+    double before = 0;
+    for (std::size_t j = 0; j + 2 < rows.size() && rows[j].channel >= 0; j += 3) {
+      const double dt = rows[j].time - before;
+      before = rows[j].time;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const double r = g.residual[static_cast<Eigen::Index>(j + a)] * problem.sigma(i)[a];
+        squares += r * r;
+        position[a] += dt * (speed[a] + 0.25 * dt * (r + last[a]));
+        speed[a] += 0.5 * dt * (r + last[a]);
+        last[a] = r;
+      }
+      n += 1;
+    }
+    ++out.n;
+    out.end_speed_mae += flight::norm(speed);
+    out.end_position_mae += flight::norm(position);
+  }
+  if (out.n == 0) return out;
+  out.specific_force_rms = std::sqrt(squares / n);
+  out.end_speed_mae /= out.n;
+  out.end_position_mae /= out.n;
+  out.chi2_per_dof = fit.chi2_per_dof();
+  return out;
+}
+
+}  // namespace unhand::fitting

@@ -1,0 +1,53 @@
+// Accelerometers in free fall as groups: the speed at the start of each fall is its own, effects are shared.
+#pragma once
+
+#include "fitting/measured/grouped_fit.hpp"
+#include "flight/vec3.hpp"
+
+namespace unhand::fitting {
+
+/// Throws with `imu` and `free_flight`, dimension 3. In free fall a perfect accelerometer reads zero; what it
+/// reads of an object that moves along the vertical u (in body axes) with v [m/s, up], v̇ = −g − (drag), is
+///
+///   f = −(k + A) |v| v u − c v u + b + d t + s exp(−t/τ) + ω × (ω × r) + ω̇ × r.
+///
+/// Own unknowns of a fall: v at its first sample, a turn of u against where it stood at rest before, and its
+/// turning rate; each known beforehand to what the recording before the fall says of it. A gyroscope, where
+/// there is one, gives ω; without, ω of the last term is taken as zero.
+class FallProblem final : public GroupedProblem {
+ public:
+  /// Throws std::invalid_argument when no throw can be used.
+  explicit FallProblem(const datasets::ThrowLog& log);
+  std::vector<dynamics::Effect> effects() const override;
+  GroupEquations equations(std::size_t group, std::span<const std::string> names,
+                           std::span<const double> values, const Eigen::VectorXd& own,
+                           bool derivatives) const override;
+  const flight::Vec3<double>& sigma(std::size_t group) const { return falls_[group].sigma; }  ///< [m/s²]
+
+ private:
+  struct Fall {
+    std::vector<double> time;                        // from the first sample [s]
+    std::vector<flight::Vec3<double>> force;         // [m/s²]
+    std::vector<flight::Vec3<double>> rate, turned;  // gyroscope: ω, and its integral as a rotation vector
+    flight::Vec3<double> sigma{}, up{};
+    double speed{}, speed_sigma{}, tilt_sigma{};
+  };
+  std::vector<Fall> falls_;
+  double gravity_{};
+};
+
+/// The effects on an accelerometer in free fall.
+std::vector<dynamics::Effect> known_fall_effects();
+
+/// Errors over the falls of a split: what is left of the reading, and where one is after integrating it.
+struct FallErrors {
+  int n{};                      ///< falls
+  double specific_force_rms{};  ///< of the vector [m/s²]
+  double end_speed_mae{};       ///< |∫ residual dt| at the end of the fall [m/s]
+  double end_position_mae{};    ///< |∬ residual dt²| [m]
+  double chi2_per_dof{};        ///< 1 is the noise
+};
+/// The errors over the falls that `fit` used.
+FallErrors fall_errors(const FallProblem& problem, const GroupedFit& fit);
+
+}  // namespace unhand::fitting

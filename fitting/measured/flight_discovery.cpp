@@ -1,0 +1,229 @@
+#include "fitting/measured/flight_discovery.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <stdexcept>
+
+#include "experiment/free_flight.hpp"
+#include "experiment/parallel.hpp"
+#include "experiment/tracked_flight.hpp"
+
+namespace unhand::fitting {
+
+using datasets::ThrowLog;
+using flight::Quaternion;
+using flight::Vec3;
+
+namespace {
+
+constexpr int kPositionChannels = 3;
+
+const dynamics::IntegratorOptions kFine = [] {
+  dynamics::IntegratorOptions options;
+  options.tolerances = {1e-8, 1e-10};  // m, rad: far below any tracker
+  return options;
+}();
+
+template <class S>
+Quaternion<S> converted(const Quaternion<double>& q) {
+  return {S(q.w), S(q.x), S(q.y), S(q.z)};
+}
+
+}  // namespace
+
+FlightProblem::FlightProblem(const ThrowLog& log, int threads) : gravity_(log.gravity) {
+  if (log.dimension != 3)
+    throw std::invalid_argument(fmt::format("free flights: dimension {} is not 3", log.dimension));
+  channels_ = {"position_x", "position_y", "position_z", "rotation_x", "rotation_y", "rotation_z"};
+  covariates_ = {"launch speed [m/s]", "spin [rad/s]", "duration [s]", "start height [m]",
+                 "start x [m]",        "start y [m]",  "order"};
+  const auto splits = splits_of(log);
+  std::vector<experiment::FreeFlightFit> starts(log.throws.size());
+  experiment::parallel_for(starts.size(), threads, [&](std::size_t i) {
+    starts[i] = experiment::fit_free_flight(log, log.throws[i], 1.0);
+  });
+  // Where no sigma is declared: the scatter from sample to sample, of all flights of an object together.
+  std::map<std::string, std::vector<experiment::FlightScatter>> scatter;
+  for (std::size_t i = 0; i < log.throws.size(); ++i)
+    if (starts[i].outcome == experiment::FreeFlightOutcome::fitted)
+      scatter[log.throws[i].object].push_back(
+          experiment::scatter_of(experiment::read_flight_samples(log, log.throws[i])));
+  for (std::size_t i = 0; i < log.throws.size(); ++i) {
+    const auto& one = log.throws[i];
+    const auto& fit = starts[i];
+    if (fit.outcome != experiment::FreeFlightOutcome::fitted || fit.times.size() < 6) {
+      skipped_.push_back({one.id, fit.reason.empty() ? "fewer than 6 samples" : fit.reason});
+      continue;
+    }
+    Flight flight;
+    flight.samples = experiment::read_flight_samples(log, one);
+    auto& s = flight.samples;
+    if (!s.declared) {
+      double n = 0, angle = 0;
+      Vec3<double> position{};
+      for (const auto& x : scatter[one.object]) {
+        const auto m = static_cast<double>(x.n);
+        n += m, angle += m * x.angle * x.angle;
+        for (std::size_t a = 0; a < 3; ++a) position[a] += m * x.position[a] * x.position[a];
+      }
+      for (std::size_t a = 0; a < 3; ++a)
+        s.sigma[a] = std::max(1e-9, std::sqrt(position[a] / std::max(1.0, n)));
+      s.sigma_angle = std::max(1e-9, std::sqrt(angle / std::max(1.0, n)));
+    }
+    const auto& object = log.objects.at(one.object);
+    flight.drag_k = object.drag_k.value_or(0);
+    if (object.inertia && object.inertia->size() == 3)
+      std::copy_n(object.inertia->begin(), 3, flight.inertia.begin());
+    flight.reference = fit.rotation.attitude;
+    Group group{one.id, one.object, one.condition, splits[i], {}, {}, {}};
+    group.start = {fit.position[0], fit.position[1], fit.position[2],
+                   fit.velocity[0], fit.velocity[1], fit.velocity[2]};
+    const bool turns = !s.attitude.empty();
+    if (turns)
+      group.start.insert(group.start.end(),
+                         {0, 0, 0, fit.rotation.omega[0], fit.rotation.omega[1], fit.rotation.omega[2]});
+    for (const double t : s.elapsed)
+      for (int c = 0; c < (turns ? 6 : kPositionChannels); ++c) group.rows.push_back({c, t});
+    group.covariates = {flight::norm(fit.velocity),
+                        turns ? flight::norm(fit.rotation.omega) : 0,
+                        s.elapsed.back(),
+                        fit.position[2],
+                        fit.position[0],
+                        fit.position[1],
+                        static_cast<double>(groups_.size())};
+    groups_.push_back(std::move(group));
+    flights_.push_back(std::move(flight));
+  }
+  if (groups_.empty())
+    throw std::invalid_argument("free flights: no throw is one" +
+                                (skipped_.empty() ? "" : ": " + skipped_.front().second));
+}
+
+std::vector<dynamics::Effect> FlightProblem::effects() const {
+  auto out = experiment::known_flight_effects();
+  // Wind acts through the declared drag.
+  if (std::none_of(flights_.begin(), flights_.end(), [](const Flight& f) { return f.drag_k > 0; }))
+    std::erase_if(out, [](const dynamics::Effect& e) { return e.id == "flight.wind"; });
+  // What needs to know how the body lies or turns.
+  if (std::all_of(flights_.begin(), flights_.end(),
+                  [](const Flight& f) { return f.samples.attitude.empty(); }))
+    std::erase_if(out, [](const dynamics::Effect& e) {
+      for (const char* id : {"sensor.com_offset", "sensor.inertia", "flight.magnus_lift",
+                             "flight.drag_by_axis", "flight.cubic_drag", "flight.spin_damping"})
+        if (e.id == id) return true;
+      return false;
+    });
+  return out;
+}
+
+double FlightProblem::sigma(std::size_t group, int channel) const {
+  const auto& s = flights_[group].samples;
+  return channel < kPositionChannels ? s.sigma[static_cast<std::size_t>(channel)] : s.sigma_angle;
+}
+
+GroupEquations FlightProblem::equations(std::size_t group, std::span<const std::string> names,
+                                        std::span<const double> values, const Eigen::VectorXd& own,
+                                        bool derivatives) const {
+  const Flight& flight = flights_[group];
+  const OwnNames mine(names, groups_[group].object);
+  const std::vector<double> shared = mine.values(values);
+  const auto residual = [&]<class S>(const std::vector<S>& effects, const std::vector<S>& x) {
+    experiment::TrackedFlight<S> declared;
+    declared.gravity = gravity_;
+    declared.drag_k = flight.drag_k;
+    for (std::size_t a = 0; a < 3; ++a) {
+      declared.start.position[a] = x[a];
+      declared.start.velocity[a] = x[3 + a];
+      declared.start.inertia[a] = S(flight.inertia[a]);
+    }
+    const bool turns = x.size() > 6;
+    if (turns)
+      declared.start.rotation = {converted<S>(flight.reference) * flight::exp(Vec3<S>{x[6], x[7], x[8]}),
+                                 {x[9], x[10], x[11]}};
+    const auto& s = flight.samples;
+    const auto poses =
+        experiment::tracked_poses(declared, dynamics::Values<S>(mine.names, effects), s.elapsed, kFine);
+    std::vector<S> out;
+    out.reserve(poses.size() * 6);
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      for (std::size_t a = 0; a < 3; ++a)
+        out.push_back((poses[i].position[a] - s.position[i][a]) / s.sigma[a]);
+      if (!turns) continue;
+      const Vec3<S> error = flight::rotation_between(converted<S>(s.attitude[i]), poses[i].attitude);
+      for (const S& e : error) out.push_back(e / s.sigma_angle);
+    }
+    return out;
+  };
+  GroupEquations out;
+  try {
+    out = swept(shared, own, derivatives, residual);
+  } catch (const std::runtime_error&) {
+    return {};  // the flight could not be integrated
+  } catch (const std::invalid_argument&) {
+    return {};  // a step led where no flight is
+  }
+  if (derivatives) mine.spread(out, names.size());
+  return out;
+}
+
+FlightErrors flight_errors(const FlightProblem& problem, const GroupedFit& fit, int threads) {
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  FlightErrors out;
+  std::vector<std::size_t> used;
+  for (std::size_t i = 0; i < fit.groups.size(); ++i)
+    if (fit.groups[i].used && fit.groups[i].solved) used.push_back(i);
+  struct One {
+    double squares{}, n{}, position{}, angle{};
+    bool solved{}, oriented{};
+  };
+  std::vector<One> each(used.size());
+  experiment::parallel_for(used.size(), threads, [&](std::size_t k) {
+    const std::size_t i = used[k];
+    const auto& group = problem.groups()[i];
+    One& one = each[k];
+    const auto size = [&](const Eigen::VectorXd& residual, std::size_t row) {
+      return residual[static_cast<Eigen::Index>(row)] * problem.sigma(i, group.rows[row].channel);
+    };
+    for (std::size_t j = 0; j < group.rows.size(); ++j)
+      if (group.rows[j].channel < kPositionChannels)
+        one.squares += std::pow(size(fit.groups[i].residual, j), 2), one.n += 1.0 / 3;
+    const double half = 0.5 * group.rows.back().time + 1e-9;
+    const GroupFit part =
+        fit_own_part(problem, i, fit, [&](const GroupRow& row) { return row.time <= half; });
+    one.solved = part.solved;
+    if (!part.solved) return;
+    one.oriented = problem.oriented(i);
+    const std::size_t width = one.oriented ? 6 : 3;
+    double position = 0, angle = 0;
+    for (std::size_t j = group.rows.size() - width; j < group.rows.size(); ++j)
+      (group.rows[j].channel < kPositionChannels ? position : angle) += std::pow(size(part.residual, j), 2);
+    one.position = std::sqrt(position);
+    one.angle = kDegrees * std::sqrt(angle);
+  });
+  double squares = 0, n = 0;
+  std::vector<double> position, angle;
+  for (const One& one : each) {
+    squares += one.squares, n += one.n;
+    if (!one.solved) continue;
+    position.push_back(one.position);
+    if (one.oriented) angle.push_back(one.angle);
+  }
+  const auto mean_median = [](std::vector<double> x, double& mean, double& median) {
+    if (x.empty()) return;
+    std::sort(x.begin(), x.end());
+    median = 0.5 * (x[(x.size() - 1) / 2] + x[x.size() / 2]);
+    for (const double v : x) mean += v / static_cast<double>(x.size());
+  };
+  out.n = static_cast<int>(used.size());
+  out.trajectory_rms = n > 0 ? std::sqrt(squares / n) : 0;
+  mean_median(std::move(position), out.end_position_mae, out.end_position_median);
+  mean_median(std::move(angle), out.end_orientation_mae, out.end_orientation_median);
+  out.chi2_per_dof = fit.chi2_per_dof();
+  return out;
+}
+
+}  // namespace unhand::fitting

@@ -1,0 +1,51 @@
+// Free flights in space as groups: the start of each is its own, effects are shared.
+#pragma once
+
+#include "experiment/flight_samples.hpp"
+#include "fitting/measured/grouped_fit.hpp"
+
+namespace unhand::fitting {
+
+/// Throws without a hand, dimension 3. Own unknowns: position and velocity of the CoM at the first sample,
+/// and where orientation was tracked a rotation vector from its first fit and ω in the body. Channels
+/// position_x … and rotation_x … (body axes). Whitened with the declared sigma, or with the scatter from
+/// sample to sample where there is none. A log without a test split holds every fifth throw of each condition
+/// out.
+class FlightProblem final : public GroupedProblem {
+ public:
+  /// Throws std::invalid_argument when the log is not of dimension 3 or no throw is a free flight.
+  FlightProblem(const datasets::ThrowLog& log, int threads);
+  std::vector<dynamics::Effect> effects() const override;
+  GroupEquations equations(std::size_t group, std::span<const std::string> names,
+                           std::span<const double> values, const Eigen::VectorXd& own,
+                           bool derivatives) const override;
+
+  /// 1 σ of a row's channel, in m or rad.
+  double sigma(std::size_t group, int channel) const;
+  /// Whether the flight's orientation was tracked.
+  bool oriented(std::size_t group) const { return !flights_[group].samples.attitude.empty(); }
+
+ private:
+  struct Flight {
+    experiment::FlightSamples samples;
+    flight::Quaternion<double> reference;
+    flight::Vec3<double> inertia{1, 1, 1};
+    double drag_k{};
+  };
+  std::vector<Flight> flights_;
+  double gravity_{};
+};
+
+/// Errors of the flights of a split: `fit` holds the shared parameters and the own unknowns of whole flights;
+/// predictions at the end have the start fitted to the first half of the time.
+struct FlightErrors {
+  int n{};                                                 ///< flights
+  double trajectory_rms{};                                 ///< [m]
+  double end_position_mae{}, end_position_median{};        ///< [m]
+  double end_orientation_mae{}, end_orientation_median{};  ///< [deg]; 0 where orientation was not tracked
+  double chi2_per_dof{};                                   ///< 1 is the noise
+};
+/// The errors over the flights that `fit` used.
+FlightErrors flight_errors(const FlightProblem& problem, const GroupedFit& fit, int threads);
+
+}  // namespace unhand::fitting

@@ -1,0 +1,147 @@
+#include "fitting/measured/grouped_fit.hpp"
+
+#include "fitting/dense_solve.hpp"
+#include "fitting/measured/grouped_solver.hpp"
+#include "fitting/measured/grouped_weights.hpp"
+
+namespace unhand::fitting {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+std::vector<std::string> GroupedFit::names() const {
+  std::vector<std::string> out;
+  for (const auto& p : shared) out.push_back(p.name);
+  return out;
+}
+
+namespace {
+
+GroupedFit begin(const GroupedProblem& problem, datasets::Split split) {
+  GroupedFit fit;
+  fit.groups.resize(problem.groups().size());
+  for (std::size_t i = 0; i < fit.groups.size(); ++i) {
+    const Group& g = problem.groups()[i];
+    fit.groups[i].used = g.split == split;
+    fit.groups[i].own = Eigen::Map<const VectorXd>(g.start.data(), static_cast<Index>(g.start.size()));
+  }
+  return fit;
+}
+
+void solve(const GroupedProblem& problem, GroupedFit& fit, const GroupedFitOptions& options) {
+  if (fit.weights.group.empty()) fit.weights = neutral_weights(problem);
+  for (int round = 0; round < (options.robust ? 2 : 1); ++round) {
+    solve_shared(problem, fit, options);
+    if (!fit.solved) return;
+    if (round == 0 && options.robust) fit.weights = learned_weights(problem, fit, options);
+  }
+}
+
+}  // namespace
+
+GroupedFit fit_groups(const GroupedProblem& problem, datasets::Split split,
+                      const std::vector<SharedParameter>& shared, const VectorXd& values,
+                      const GroupedFitOptions& options) {
+  GroupedFit fit = begin(problem, split);
+  fit.shared = shared;
+  fit.values = values;
+  solve(problem, fit, options);
+  return fit;
+}
+
+namespace {
+
+/// The same problem with its shared parameters at fixed values.
+class Held final : public GroupedProblem {
+ public:
+  Held(const GroupedProblem& problem, const GroupedFit& fit) : problem_(problem), names_(fit.names()) {
+    groups_ = problem.groups();
+    channels_ = problem.channels();
+    values_.assign(fit.values.data(), fit.values.data() + fit.values.size());
+  }
+  std::vector<dynamics::Effect> effects() const override { return {}; }
+  GroupEquations equations(std::size_t group, std::span<const std::string>, std::span<const double>,
+                           const VectorXd& own, bool derivatives) const override {
+    auto out = problem_.equations(group, names_, values_, own, derivatives);
+    out.shared = MatrixXd::Zero(out.residual.size(), 0);
+    return out;
+  }
+
+ private:
+  const GroupedProblem& problem_;
+  std::vector<std::string> names_;
+  std::vector<double> values_;
+};
+
+}  // namespace
+
+GroupedFit fit_own(const GroupedProblem& problem, datasets::Split split, const GroupedFit& fit,
+                   const GroupedFitOptions& options) {
+  const Held held(problem, fit);
+  GroupedFit out = begin(problem, split);
+  solve(held, out, options);
+  out.shared = fit.shared;
+  out.values = fit.values;
+  out.covariance = fit.covariance;
+  return out;
+}
+
+GroupFit fit_own_part(const GroupedProblem& problem, std::size_t group, const GroupedFit& fit,
+                      const std::function<bool(const GroupRow&)>& use) {
+  const Group& g = problem.groups()[group];
+  const auto names = fit.names();
+  const std::vector<double> values(fit.values.data(), fit.values.data() + fit.values.size());
+  GroupFit out = fit.groups[group];
+  if (out.own.size() == 0)
+    out.own = Eigen::Map<const VectorXd>(g.start.data(), static_cast<Index>(g.start.size()));
+  std::vector<Index> rows;
+  for (std::size_t i = 0; i < g.rows.size(); ++i)
+    if (g.rows[i].channel == kPriorChannel || use(g.rows[i])) rows.push_back(static_cast<Index>(i));
+  out.solved = false;
+  for (int k = 0; k < 8; ++k) {
+    const auto e = problem.equations(group, names, values, out.own, true);
+    if (!e.solved) return out;
+    const MatrixXd O = e.own(rows, Eigen::all);
+    const VectorXd r = e.residual(rows), step = least_squares(O, -r);
+    out.own += step;
+    if ((O * step).squaredNorm() < 1e-8) break;
+  }
+  const auto e = problem.equations(group, names, values, out.own, false);
+  out.residual = e.residual;
+  out.solved = e.solved;
+  return out;
+}
+
+ProjectedEquations projected(const GroupedProblem& problem, std::size_t group,
+                             std::span<const std::string> names, std::span<const double> values,
+                             const VectorXd& own, const GroupedWeights& weights, double sample_limit) {
+  ProjectedEquations out;
+  auto e = problem.equations(group, names, values, own, true);
+  if (!e.solved) return out;
+  weigh_rows(e, problem.groups()[group], weights, sample_limit);
+  MatrixXd columns(e.residual.size(), e.shared.cols() + 1);
+  columns << e.shared, e.residual;
+  out.own_basis = orthonormal_basis(e.own);
+  const MatrixXd along = inner_products(out.own_basis, columns);
+  out.columns = columns - product(out.own_basis, along);
+  out.solved = true;
+  return out;
+}
+
+std::vector<GroupedMisfit> misfit(const GroupedProblem& problem, const GroupedFit& fit) {
+  std::vector<GroupedMisfit> out;
+  for (const auto& name : problem.channels()) out.push_back({name, 0, 0});
+  for (std::size_t i = 0; i < fit.groups.size(); ++i) {
+    const GroupFit& g = fit.groups[i];
+    if (!g.used || !g.solved) continue;
+    for (Index j = 0; j < g.residual.size(); ++j)
+      if (const int c = problem.groups()[i].rows[static_cast<std::size_t>(j)].channel; c >= 0) {
+        out[static_cast<std::size_t>(c)].n += 1;
+        out[static_cast<std::size_t>(c)].chi2 += g.residual[j] * g.residual[j];
+      }
+  }
+  return out;
+}
+
+}  // namespace unhand::fitting

@@ -1,0 +1,97 @@
+// Least squares over groups, with each group's own unknowns eliminated.
+#pragma once
+
+#include <functional>
+
+#include "fitting/measured/grouped_problem.hpp"
+
+namespace unhand::fitting {
+
+/// Budget and robustness of a fit.
+struct GroupedFitOptions {
+  int iterations{20};  ///< of the solver
+  /// Samples beyond this many times the scatter of their channel count linearly, and so do groups whose χ²
+  /// per sample exceeds `group_limit` medians.
+  double sample_limit{6}, group_limit{3};  ///< in scatters; in medians
+  bool robust{true};                       ///< else all samples count alike
+  int threads{0};                          ///< 0: one per core; the answer does not depend on it
+};
+
+/// What a row and a group count for; learned from a fit.
+struct GroupedWeights {
+  std::vector<double> channel_scale;  ///< robust scatter by channel, at least 1 [σ]
+  std::vector<double> group;          ///< factor on every group's part
+};
+
+/// One group at the solution: its own unknowns and its whitened residual.
+struct GroupFit {
+  bool used{}, solved{};          ///< took part; has equations at the answer
+  Eigen::VectorXd own, residual;  ///< own unknowns; (predicted − measured)/σ by row
+  double chi2{};                  ///< of the measurements, not robust
+  int n{};                        ///< measurements
+};
+
+/// The shared parameters with their covariance, and every group's fit. Not converging is an outcome.
+struct GroupedFit {
+  bool solved{};                        ///< false: `message` says why
+  std::string message;                  ///< in words
+  std::vector<SharedParameter> shared;  ///< the parameters
+  Eigen::VectorXd values;               ///< theirs, in their order
+  /// A⁻¹ B A⁻¹ n/(n − p): A the information with the groups' own unknowns eliminated, B the scatter of the
+  /// groups' scores (the infinitesimal jackknife over groups). It holds when the noise within a group is
+  /// correlated and when the model is not quite right. Not below A⁻¹.
+  Eigen::MatrixXd covariance;
+  std::vector<GroupFit> groups;          ///< one per group of the problem
+  GroupedWeights weights;                ///< as at the answer
+  double chi2{};                         ///< of the groups used, not robust
+  long samples{}, degrees_of_freedom{};  ///< measurements; those minus unknowns
+  int used{}, iterations{};              ///< groups
+  /// Of the shared parameters.
+  std::vector<std::string> names() const;
+  /// 1 σ of shared parameter k; from the covariance.
+  double sigma(std::size_t k) const {
+    return std::sqrt(covariance(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(k)));
+  }
+  /// 1 where the model explains everything to its noise.
+  double chi2_per_dof() const {
+    return degrees_of_freedom > 0 ? chi2 / static_cast<double>(degrees_of_freedom) : 0;
+  }
+};
+
+/// Fits `shared` (from `values`) and the own unknowns of all groups of the split.
+GroupedFit fit_groups(const GroupedProblem& problem, datasets::Split split,
+                      const std::vector<SharedParameter>& shared, const Eigen::VectorXd& values,
+                      const GroupedFitOptions& options = {});
+
+/// The own unknowns alone, the shared ones as in `fit`; of the groups of another split, or the same.
+GroupedFit fit_own(const GroupedProblem& problem, datasets::Split split, const GroupedFit& fit,
+                   const GroupedFitOptions& options = {});
+
+/// The own unknowns of one group fitted to the rows for which `use(row)`: for predicting the others.
+GroupFit fit_own_part(const GroupedProblem& problem, std::size_t group, const GroupedFit& fit,
+                      const std::function<bool(const GroupRow&)>& use);
+
+/// Weighted equations with the own unknowns projected out of every column: F̃ = F − O (OᵀO)⁺ Oᵀ F. Returns the
+/// factor on rows, too.
+struct ProjectedEquations {
+  bool solved{};              ///< false: the equations are not finite
+  Eigen::MatrixXd columns;    ///< shared, then the residual last
+  Eigen::MatrixXd own_basis;  ///< orthonormal, of what the own unknowns can do
+};
+/// The projected equations of one group at these values.
+ProjectedEquations projected(const GroupedProblem& problem, std::size_t group,
+                             std::span<const std::string> names, std::span<const double> values,
+                             const Eigen::VectorXd& own, const GroupedWeights& weights, double sample_limit);
+
+/// χ² per sample of a channel over the groups used.
+struct GroupedMisfit {
+  std::string channel;  ///< which
+  int n{};              ///< measurements
+  double chi2{};        ///< not robust
+  /// 1 where the model explains the channel to its noise.
+  double chi2_per_sample() const { return n > 0 ? chi2 / n : 0; }
+};
+/// By channel.
+std::vector<GroupedMisfit> misfit(const GroupedProblem& problem, const GroupedFit& fit);
+
+}  // namespace unhand::fitting

@@ -1,0 +1,117 @@
+#include "fitting/measured/grouped_footprints.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "experiment/parallel.hpp"
+#include "fitting/dense_solve.hpp"
+
+namespace unhand::fitting {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+/// Candidates with the values at which their footprints are taken; those of one call of equations().
+struct Call {
+  std::vector<std::string> names;
+  std::vector<double> values;
+  std::vector<std::size_t> columns;  ///< of the Gram matrix, one per name
+};
+
+}  // namespace
+
+GroupedFootprints grouped_footprints(const GroupedProblem& problem, const GroupedFit& fit,
+                                     const std::vector<dynamics::Effect>& effects,
+                                     const GroupedFitOptions& options) {
+  GroupedFootprints out;
+  Footprints& f = out.total;
+  f.fitted = fit.shared.size();
+  std::size_t width = f.fitted;
+  std::vector<Call> calls(1);
+  calls[0].names = fit.names();
+  calls[0].values.assign(fit.values.data(), fit.values.data() + fit.values.size());
+  for (std::size_t k = 0; k < f.fitted; ++k) calls[0].columns.push_back(k);
+  const auto objects = objects_of(problem);
+  for (const auto& effect : effects) {
+    const auto parameters = shared_parameters(effect, objects);
+    std::vector<double> grid{0};
+    const SharedParameter* shape = nullptr;
+    for (const auto& p : parameters)
+      if (p.shape) shape = &p;
+    if (shape)
+      for (const auto& p : effect.parameters)
+        if (p.is_shape()) grid = p.grid;
+    for (const double at : grid) {
+      Candidate candidate{effect.id, {}, {}, {}};
+      Call own = calls[0];
+      own.names.resize(f.fitted), own.values.resize(f.fitted), own.columns.resize(f.fitted);
+      Call& call = shape ? own : calls[0];
+      if (shape) {
+        candidate.shape[shape->name] = at;
+        call.names.push_back(shape->name), call.values.push_back(at), call.columns.push_back(SIZE_MAX);
+      }
+      for (const auto& p : parameters) {
+        if (p.shape) continue;
+        candidate.parameters.push_back(p.name);
+        candidate.columns.push_back(width);
+        call.names.push_back(p.name), call.values.push_back(p.neutral), call.columns.push_back(width++);
+      }
+      f.candidates.push_back(std::move(candidate));
+      if (shape) calls.push_back(std::move(own));
+    }
+  }
+  const auto w = static_cast<Index>(width) + 1;
+  std::vector<std::size_t> used;
+  for (std::size_t i = 0; i < fit.groups.size(); ++i)
+    if (fit.groups[i].used && fit.groups[i].solved) used.push_back(i);
+  out.parts.assign(used.size(), MatrixXd());
+  experiment::parallel_for(used.size(), options.threads, [&](std::size_t n) {
+    const std::size_t i = used[n];
+    MatrixXd columns = MatrixXd::Zero(static_cast<Index>(problem.groups()[i].rows.size()), w);
+    bool solved = true;
+    for (std::size_t c = 0; c < calls.size() && solved; ++c) {
+      const auto e = projected(problem, i, calls[c].names, calls[c].values, fit.groups[i].own, fit.weights,
+                               options.sample_limit);
+      solved = e.solved;
+      if (!solved) break;
+      if (c == 0) columns.col(w - 1) = e.columns.col(e.columns.cols() - 1);
+      for (std::size_t k = c == 0 ? 0 : f.fitted; k < calls[c].columns.size(); ++k)
+        if (calls[c].columns[k] != SIZE_MAX)
+          columns.col(static_cast<Index>(calls[c].columns[k])) = e.columns.col(static_cast<Index>(k));
+    }
+    out.parts[n] = solved ? MatrixXd(fit.weights.group[i] * gram(columns)) : MatrixXd::Zero(w, w);
+  });
+  f.gram = MatrixXd::Zero(w, w);
+  for (const auto& part : out.parts) f.gram += part;
+  f.samples = static_cast<double>(fit.samples);
+  return out;
+}
+
+LinearStep linear_step(const std::vector<MatrixXd>& parts, const std::vector<std::size_t>& which,
+                       const std::vector<Index>& columns) {
+  const auto p = static_cast<Index>(columns.size()), r = parts.front().rows() - 1;
+  MatrixXd A = MatrixXd::Zero(p, p), B = A;
+  VectorXd b = VectorXd::Zero(p);
+  for (const std::size_t n : which) {
+    A += parts[n](columns, columns);
+    b += parts[n](columns, std::vector<Index>{r});
+  }
+  const MatrixXd inverse = pseudo_inverse(A);
+  LinearStep out;
+  out.value = -inverse * b;
+  double used = 0;
+  for (const std::size_t n : which) {
+    const VectorXd score =
+        VectorXd(parts[n](columns, std::vector<Index>{r})) + MatrixXd(parts[n](columns, columns)) * out.value;
+    B += score * score.transpose();
+    used += parts[n](r, r) > 0 ? 1 : 0;
+  }
+  out.covariance = congruent(inverse, B) * (used / std::max(1.0, used - static_cast<double>(p)));
+  out.sigma = out.covariance.diagonal().cwiseMax(inverse.diagonal()).cwiseSqrt();
+  return out;
+}
+
+}  // namespace unhand::fitting

@@ -1,0 +1,70 @@
+#include "fitting/measured/grouped_weights.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/median.hpp"
+
+namespace unhand::fitting {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+/// Huber: the factor on a residual whose size is `r` in units of `limit`.
+double huber(double r) { return r > 1 ? std::sqrt(1 / r) : 1; }
+
+}  // namespace
+
+double cost_of(const VectorXd& residual, const Group& group, const GroupedWeights& weights, double limit) {
+  double out = 0;
+  for (Index i = 0; i < residual.size(); ++i) {
+    const int c = group.rows[static_cast<std::size_t>(i)].channel;
+    const double scale = c >= 0 ? weights.channel_scale[static_cast<std::size_t>(c)] : 1,
+                 r = std::abs(residual[i]) / scale;
+    out += (r <= limit ? r * r : 2 * limit * r - limit * limit) * scale * scale;
+  }
+  return out;
+}
+
+void weigh_rows(GroupEquations& e, const Group& group, const GroupedWeights& weights, double limit) {
+  for (Index i = 0; i < e.residual.size(); ++i) {
+    const int c = group.rows[static_cast<std::size_t>(i)].channel;
+    const double scale = c >= 0 ? weights.channel_scale[static_cast<std::size_t>(c)] : 1;
+    const double w = huber(std::abs(e.residual[i]) / (limit * scale));
+    if (w == 1) continue;
+    e.residual[i] *= w;
+    if (e.shared.size() > 0) e.shared.row(i) *= w;
+    if (e.own.size() > 0) e.own.row(i) *= w;
+  }
+}
+
+GroupedWeights neutral_weights(const GroupedProblem& problem) {
+  return {std::vector<double>(problem.channels().size(), 1e6),
+          std::vector<double>(problem.groups().size(), 1.0)};
+}
+
+GroupedWeights learned_weights(const GroupedProblem& problem, const GroupedFit& fit,
+                               const GroupedFitOptions& options) {
+  GroupedWeights out = neutral_weights(problem);
+  std::vector<std::vector<double>> sizes(problem.channels().size());
+  std::vector<double> means;
+  for (std::size_t i = 0; i < fit.groups.size(); ++i) {
+    const GroupFit& g = fit.groups[i];
+    if (!g.used || !g.solved) continue;
+    for (Index j = 0; j < g.residual.size(); ++j)
+      if (const int c = problem.groups()[i].rows[static_cast<std::size_t>(j)].channel; c >= 0)
+        sizes[static_cast<std::size_t>(c)].push_back(std::abs(g.residual[j]));
+    if (g.n > 0) means.push_back(g.chi2 / g.n);
+  }
+  for (std::size_t c = 0; c < sizes.size(); ++c)
+    out.channel_scale[c] = std::max(1.0, 1.4826 * dynamics::median(sizes[c]));
+  const double limit = options.group_limit * std::max(1.0, dynamics::median(means));
+  for (std::size_t i = 0; i < fit.groups.size(); ++i)
+    if (const GroupFit& g = fit.groups[i]; g.used && g.n > 0 && g.chi2 / g.n > limit)
+      out.group[i] = limit / (g.chi2 / g.n);
+  return out;
+}
+
+}  // namespace unhand::fitting

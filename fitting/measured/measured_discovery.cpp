@@ -1,0 +1,90 @@
+#include "fitting/measured/measured_discovery.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace unhand::fitting {
+namespace {
+
+void look_for_the_unexplained(const MeasuredOptions& options, MeasuredDiscovery& out) {
+  for (const auto& m : out.misfit) {
+    const double allowed = 1 + 3 * std::sqrt(2.0 / std::max(1, m.n));
+    if (m.after_test < std::max(options.unexplained, allowed)) continue;
+    if (out.unexplained && out.unexplained->chi2_per_dof >= m.after_test) continue;
+    out.unexplained = MeasuredUnexplained{out.phase, m.channel, m.after_test, {}};
+  }
+  if (!out.unexplained) return;
+  auto& u = *out.unexplained;
+  u.description = fmt::format("{} in {}: {:.3g} times the variance of the noise is left on held-out groups",
+                              u.channel, out.phase, u.chi2_per_dof);
+  for (const auto& a : out.autocorrelation_after)
+    if (a.channel == u.channel)
+      u.description +=
+          std::abs(a.z) > 3
+              ? fmt::format(
+                    "; neighbouring residuals correlate by {:.2f}: a slow error of the model or the sensor",
+                    a.lag1)
+              : std::string("; neighbouring residuals do not correlate: more noise than was declared");
+  const ResidualProfile* largest = nullptr;
+  for (const auto& p : out.profile_after)
+    if (p.channel == u.channel && (!largest || std::abs(p.z) > std::abs(largest->z))) largest = &p;
+  if (largest)
+    u.description += fmt::format(
+        "; its mean is largest at {:.0f} % of the duration ({:+.2g} sigma, {:.1f} standard errors)",
+        100 * largest->share, largest->mean, std::abs(largest->z));
+}
+
+/// An answer that depends on where one looks is not the whole truth.
+void look_for_instability(MeasuredDiscovery& out) {
+  const double tests = std::max<double>(1, static_cast<double>(out.stability.size()));
+  for (const auto& s : out.stability) {
+    if (std::erfc(std::abs(s.z()) / std::sqrt(2.0)) > 0.05 / tests) continue;
+    out.evidence.push_back(
+        {s.parameter.substr(0, s.parameter.rfind('.')),
+         fmt::format(
+             "{} depends on {}: {:.4g} ± {:.2g} below {:.3g}, {:.4g} ± {:.2g} above ({:.1f} sigma apart)",
+             s.parameter, s.covariate, s.low, s.low_sigma, s.split_at, s.high, s.high_sigma, std::abs(s.z())),
+         true});
+  }
+}
+
+}  // namespace
+
+EffectSearch run_search(const GroupedProblem& problem, const MeasuredOptions& options,
+                        MeasuredDiscovery& out) {
+  EffectSearch search = search_effects(problem, options.search);
+  out.skipped = problem.skipped();
+  if (!search.solved) {
+    out.verdict = Verdict::not_answered;
+    out.message = search.message;
+    return search;
+  }
+  out.effects = search.effects;
+  out.ranking = search.ranking;
+  out.stability = search.stability;
+  out.parameters = search.final.names();
+  out.covariance.assign(search.final.covariance.data(),
+                        search.final.covariance.data() + search.final.covariance.size());
+  out.train = search.base.used, out.test = search.base_test.used;
+  const auto a = misfit(problem, search.base), b = misfit(problem, search.base_test),
+             c = misfit(problem, search.final), d = misfit(problem, search.final_test);
+  for (std::size_t k = 0; k < a.size(); ++k)
+    if (a[k].n + b[k].n > 0)
+      out.misfit.push_back({a[k].channel, a[k].n + b[k].n, a[k].chi2_per_sample(), b[k].chi2_per_sample(),
+                            c[k].chi2_per_sample(), d[k].chi2_per_sample()});
+  out.first = leaves_noise(problem, search.base, 1.2, options.search.fit.threads);
+  out.autocorrelation_before = autocorrelation(problem, search.base_test);
+  out.autocorrelation_after = autocorrelation(problem, search.final_test);
+  out.profile_before = residual_profile(problem, search.base);
+  out.profile_after = residual_profile(problem, search.final);
+  look_for_the_unexplained(options, out);
+  look_for_instability(out);
+  out.verdict = !out.effects.empty() ? Verdict::effect_found
+                : out.unexplained    ? Verdict::unexplained
+                                     : Verdict::no_missing_effect;
+  return search;
+}
+
+}  // namespace unhand::fitting

@@ -1,0 +1,120 @@
+#include "fitting/sku/sku_validation.hpp"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "experiment/compare.hpp"
+#include "fitting/card.hpp"
+#include "fitting/sku/sku_measured.hpp"
+#include "fitting/sku/sku_scatter.hpp"
+
+namespace unhand::fitting {
+
+using experiment::kDegrees;
+
+namespace {
+
+void require(const SkuRequest& request) {
+  const auto check = [](bool ok, const char* name, double value, const char* range) {
+    if (!ok)
+      throw std::invalid_argument(fmt::format("validate_sku: {} = {} is not in {}", name, value, range));
+  };
+  check(request.tolerance.x > 0 && request.tolerance.x <= 100, "tolerance x", request.tolerance.x,
+        "(0, 100] m");
+  check(request.tolerance.theta > 0 && request.tolerance.theta <= 1000, "tolerance theta",
+        request.tolerance.theta, "(0, 1000] rad");
+  check(request.confidence > 0 && request.confidence < 1, "confidence", request.confidence, "(0, 1)");
+  check(request.samples >= 100 && request.samples <= 1'000'000, "samples", request.samples, "[100, 1000000]");
+}
+
+/// A plain card's scatter of the delay, as fitted cards have it.
+datasets::ModelCard with_spread(datasets::ModelCard card) {
+  if (const auto found = card.parameters.find("delay_sigma"); found != card.parameters.end()) {
+    card.own_spreads["delay_deviation"] = {found->second.value, "s"};
+    card.parameters.erase(found);
+  }
+  return card;
+}
+
+double scaled(const LandingSpread& s, const LandingTolerance& tolerance) {
+  return std::hypot(s.x / tolerance.x, s.theta / tolerance.theta);
+}
+
+/// The one that is held, lands, and scatters least.
+std::size_t best(const std::vector<ThrowCandidate>& candidates, const LandingTolerance& tolerance) {
+  std::size_t out = 0;
+  const auto rank = [&](const ThrowCandidate& c) {
+    return c.held && c.landed ? scaled(c.linear, tolerance) : c.landed ? 1e6 : 2e6;
+  };
+  for (std::size_t i = 1; i < candidates.size(); ++i)
+    if (rank(candidates[i]) < rank(candidates[out])) out = i;
+  return out;
+}
+
+void decide(const SkuRequest& request, SkuValidation& out) {
+  const ThrowCandidate& c = out.reference();
+  if (!c.landed) {
+    out.verdict = SkuVerdict::does_not_land;
+    out.message = "no motion that was tried brings this object to a landing";
+  } else if (!c.held) {
+    out.verdict = SkuVerdict::cannot_be_held;
+    out.message = "the grip lets the object slip before the gripper opens";
+    if (out.needed_grip_force)
+      out.message += fmt::format(": this motion needs at least {:.3g} N per pad", *out.needed_grip_force);
+  } else {
+    const bool enough = out.within >= request.confidence;
+    out.verdict = enough ? SkuVerdict::throwable : SkuVerdict::too_uncertain;
+    out.message = fmt::format(
+        "{:.1f} % of its landings lie within {:.3g} m and {:.3g} deg of the predicted one; "
+        "asked for are {:.3g} %",
+        100 * out.within, request.tolerance.x, request.tolerance.theta * kDegrees, 100 * request.confidence);
+  }
+}
+
+}  // namespace
+
+const char* to_string(SkuVerdict verdict) {
+  switch (verdict) {
+    case SkuVerdict::throwable:
+      return "throwable";
+    case SkuVerdict::too_uncertain:
+      return "too_uncertain";
+    case SkuVerdict::cannot_be_held:
+      return "cannot_be_held";
+    case SkuVerdict::does_not_land:
+      return "does_not_land";
+  }
+  return "?";
+}
+
+SkuValidation validate_sku(const datasets::Sku& sku, const datasets::ModelCard& given,
+                           const std::string& card_file, const SkuRequest& request) {
+  require(request);
+  if (!sku.inertia)
+    throw std::invalid_argument("validate_sku: " + sku.name +
+                                " has no inertia: inertia_kg_m2, or shape and dims_m, are needed");
+  const auto card = with_spread(given);
+  const auto tried = motions_of(sku, card, card_file, request);
+  SkuValidation out;
+  for (const SkuMotion& motion : tried) out.candidates.push_back(candidate_of(motion));
+  out.chosen = best(out.candidates, request.tolerance);
+  const SkuMotion& motion = tried[out.chosen];
+  out.notes = motion.inputs.notes;
+  for (const auto& why : outside_range(card, motion.prepared))
+    out.notes.push_back("outside the card's valid range: " + why);
+  out.linear = out.reference().linear;
+  if (out.reference().landed && !out.reference().held) out.needed_grip_force = needed_grip(motion);
+  if (out.reference().landed && out.reference().held) {
+    const Eigen::MatrixXd J = *motion.slopes();
+    out.budget = budget_of(motion, J, request.tolerance);
+    out.gains = gains_of(motion.inputs, J, request.tolerance);
+    monte_carlo(motion, J, request, out);
+  }
+  decide(request, out);
+  if (request.log != nullptr) out.measured = measured_verdict(sku, card, card_file, request);
+  return out;
+}
+
+}  // namespace unhand::fitting

@@ -1,0 +1,48 @@
+// The loop on slips: is the ellipsoid the limit surface that the patches have?
+#pragma once
+
+#include "fitting/measured/measured_discovery.hpp"
+#include "fitting/slips/compare_surfaces.hpp"
+
+namespace unhand::fitting {
+
+/// When another limit surface is believed.
+struct SurfaceDiscoveryOptions {
+  SurfaceComparisonOptions comparison;         ///< folds and null control
+  SurfaceModel base{SurfaceModel::ellipsoid};  ///< the law to begin with
+  double false_discovery_rate{0.02};           ///< shared among the laws that are tried
+  double matters{0.05};  ///< share of the base's held-out direction error that a law must take away
+  /// Neighbouring wrenches of different slips whose residual directions correlate by this much (and by three
+  /// standard errors) say that something is left.
+  double unexplained{0.15};
+  std::vector<std::string> forget;  ///< "contact.law:convex_quartic", ...
+};
+
+/// One law on one surface against the base.
+struct SurfaceEvidence {
+  std::string surface;                     ///< its name in the log
+  SurfaceModel law{};                      ///< against the base
+  int slips{};                             ///< predicted
+  double base_deg{}, law_deg{};            ///< mean held-out direction error
+  double null_base_deg{}, null_law_deg{};  ///< the same on data simulated from the base's fit
+  double gain_deg{}, gain_sigma{};         ///< mean over slips, paired, and its standard error
+  double left{}, left_sigma{};             ///< correlation of the residual directions of neighbours
+  /// What the law gains beyond what noise alone makes of it.
+  double beyond_null_deg() const { return gain_deg - (null_base_deg - null_law_deg); }
+};
+
+/// The answer of the loop on measured slips, with each law's evidence on each surface.
+struct SurfaceDiscovery {
+  MeasuredDiscovery answer;               ///< as for the other logs
+  std::vector<SurfaceEvidence> evidence;  ///< by surface, then law; the base's own row holds what it leaves
+};
+
+/// A law is accepted if over all slips of all surfaces (every slip one observation, predicted by the fold
+/// that left it out) it lowers the direction error by a one-sided paired t-test, by at least `matters`, and
+/// by more than on the null control; the law with the least error wins, and of those within a twentieth of it
+/// the one with the fewest coefficients.
+SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
+                                   const SurfaceDiscoveryOptions& options);
+SurfaceDiscovery discover_surfaces(const datasets::SlipLog& log, const SurfaceDiscoveryOptions& options);
+
+}  // namespace unhand::fitting
