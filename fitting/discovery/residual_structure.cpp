@@ -150,17 +150,19 @@ ResidualStructure find_structure(const ResidualSamples& samples, const Structure
   ResidualStructure out;
   out.n = static_cast<int>(samples.value.size());
   if (out.n == 0) return out;
-  double squares = 0, products = 0, pairs = 0;
+  double squares = 0, products = 0, pairs = 0, of_former = 0, of_latter = 0;
   for (std::size_t i = 0; i < samples.value.size(); ++i) {
     squares += samples.value[i] * samples.value[i];
     if (i == 0 || samples.series[i] != samples.series[i - 1]) continue;
     products += samples.value[i] * samples.value[i - 1];
+    of_former += samples.value[i - 1] * samples.value[i - 1];
+    of_latter += samples.value[i] * samples.value[i];
     pairs += 1;
   }
   out.chi2_per_sample = squares / out.n;
   out.chi2_p_value = chi2_tail(squares, out.n);
-  if (pairs > 0 && squares > 0) {
-    out.autocorrelation = products / pairs / out.chi2_per_sample;
+  if (of_former > 0 && of_latter > 0) {
+    out.autocorrelation = products / std::sqrt(of_former * of_latter);
     out.autocorrelation_p = std::erfc(std::abs(out.autocorrelation) * std::sqrt(pairs / 2));
   }
   out.depends.push_back(over_conditions(samples));

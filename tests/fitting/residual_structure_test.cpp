@@ -63,6 +63,12 @@ TEST(ResidualStructure, WhatItGoesWithIsNamed) {
   EXPECT_LT(drifting.autocorrelation_p, 1e-6);
 }
 
+TEST(ResidualStructure, NeighboursThatAreTheSameCorrelateByOne) {
+  // Large in the one series that has neighbours, small in the recordings of a single sample.
+  const ResidualSamples s{{9, 9, 9, 0.1, -0.1}, {0, 0.1, 0.2, 0, 0}, {0, 0, 0, 1, 2}, {0, 0, 0, 1, 1}, {}};
+  EXPECT_DOUBLE_EQ(find_structure(s).autocorrelation, 1);
+}
+
 /// Residuals of flights that lack `missing`, an acceleration of the state, with noise of 0.2 mm.
 template <class Missing>
 std::vector<ResidualTrace> flights(const Missing& missing, int first = 0) {
