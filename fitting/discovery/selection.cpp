@@ -41,11 +41,13 @@ bool acts(const AcceptedEffect& effect, bool air) {
   return in_air(effect.phase) == air || (!air && acts_on_pads(effect.id));
 }
 
-/// Whether too much is left in the half of the throw where an effect acts.
+/// Whether too much is left in the half of the throw where an effect acts, of what the base model's fit left
+/// there in the other throws (`other`: train against held-out ones) as well.
 bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisfit>& base,
-                     const std::vector<ChannelMisfit>& now, const DiscoverOptions& options) {
+                     const std::vector<ChannelMisfit>& other, const std::vector<ChannelMisfit>& now,
+                     const DiscoverOptions& options) {
   return std::any_of(now.begin(), now.end(), [&](const ChannelMisfit& m) {
-    return is_misfit(m, options) && acts(effect, in_air(m.phase)) &&
+    return is_misfit(m, options) && acts(effect, in_air(m.phase)) && is_confirmed(other, m) &&
            m.chi2_per_sample() >= unexplained_from(m.channel, options) &&
            m.chi2_per_sample() - 1 > kLeft * (misfit_in(base, m.channel, m.phase) - 1);
   });
@@ -57,8 +59,8 @@ bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisf
 bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const FitResult& counted,
                   const Discovery& so_far, const DiscoverOptions& options) {
   return (!is_law(effect.id) && wald_p_value(counted, find_effect(effect.id)) > kToldFromNone) ||
-         leaves_too_much(effect, so_far.base.misfit, stage.fit.misfit, options) ||
-         leaves_too_much(effect, so_far.base_test, stage.held_out.misfit, options);
+         leaves_too_much(effect, so_far.base.misfit, so_far.base_test, stage.fit.misfit, options) ||
+         leaves_too_much(effect, so_far.base_test, so_far.base.misfit, stage.held_out.misfit, options);
 }
 
 }  // namespace

@@ -26,8 +26,8 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out);
 /// effect whose size is not told from none by its own interval, which counts by how much conditions and
 /// blocks of sensors disagree on it (count_discrepancy); and one that leaves a tenth of the base model's
 /// misfit (a third of its size) in the half of the throw where it was said to act, the wrenches included, on
-/// train or on held-out throws. What was accepted after it in that half goes with it: it was judged in its
-/// company.
+/// train or on held-out throws, if the base model's fit left something there in both. What was accepted after
+/// it in that half goes with it: it was judged in its company.
 void withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
 /// No pads are rigid: a give of some micrometres before they slip bends what the slipping pads say of an

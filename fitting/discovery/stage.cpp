@@ -190,6 +190,12 @@ bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options) {
   return chi2_tail(m.chi2, m.n) < options.false_discovery_rate / kSeries;
 }
 
+bool is_confirmed(const std::vector<ChannelMisfit>& other_half, const ChannelMisfit& misfit) {
+  return std::any_of(other_half.begin(), other_half.end(), [&](const ChannelMisfit& m) {
+    return m.channel == misfit.channel && m.phase == misfit.phase && chi2_tail(m.chi2, m.n) < 0.05;
+  });
+}
+
 double unexplained_from(Channel channel, const DiscoverOptions& options) {
   return is_wrench(channel) ? 2 * options.unexplained : options.unexplained;
 }

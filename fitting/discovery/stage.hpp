@@ -75,6 +75,10 @@ Stage reduced(const Stage& stage, std::size_t index, const DiscoverOptions&);
 /// takes part, only Newton and Euler: there it is a channel like any other.
 bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options);
 
+/// Whether the other half of the throws shows a misfit of the same channel and phase as well, at 5 %: chance
+/// does not strike twice.
+bool is_confirmed(const std::vector<ChannelMisfit>& other_half, const ChannelMisfit& misfit);
+
 /// χ² per sample of a channel from where on something is missing there; of a wrench twice as much, most of
 /// whose variance is trust.
 double unexplained_from(experiment::Channel, const DiscoverOptions& options);

@@ -147,12 +147,6 @@ OutcomeSquares squares_with(const CampaignProblem& problem, const CampaignThrow&
 }
 
 /// Held-out throws show it, too: at 5 % their χ² in the same channel and phase is no noise.
-bool is_confirmed(const FitResult& held_out, const ChannelMisfit& of) {
-  return std::any_of(held_out.misfit.begin(), held_out.misfit.end(), [&](const ChannelMisfit& m) {
-    return m.channel == of.channel && m.phase == of.phase && chi2_tail(m.chi2, m.n) < 0.05;
-  });
-}
-
 }  // namespace
 
 std::optional<MissingEstimate> estimate_missing(const Stage& stage, Phase phase,
@@ -238,7 +232,7 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
     const double limit = std::max(unexplained_from(m.channel, options),
                                   so_far.effects.empty() ? 0.0 : 1 + kRest * (before - 1));
     if (!is_misfit(m, options) || m.chi2_per_sample() < limit) continue;
-    if (!is_confirmed(stage.held_out, m)) continue;
+    if (!is_confirmed(stage.held_out.misfit, m)) continue;
     // The first phase in which something is left; there, the channel in which most is.
     if (out && (m.phase != out->phase || m.chi2_per_sample() <= out->chi2_per_dof)) continue;
     out = Unexplained{m.phase, m.channel, m.chi2_per_sample(), {}, {}};
