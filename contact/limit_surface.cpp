@@ -113,9 +113,7 @@ void LimitSurface<Shape>::rate_(int mode, const Scene<S>& scene, const Relative<
 /// stays, and so at a stop, both say the same.
 template <class Shape>
 template <class S>
-S LimitSurface<Shape>::growth(const Scene<S>& scene, const Relative<S>& y) const {
-  State<S, 6> rate;
-  rate_(kSlip, scene, y, rate);
+S LimitSurface<Shape>::growth(const Scene<S>& scene, const Relative<S>& y, const State<S, 6>& rate) const {
   const S length = limits<S>().length(scene.normal_force);
   const Vec3<S> u = normalised_slip(y, length), du{rate[3], rate[4], length * rate[5]};
   const Vec3<S> momentum = times(normalised_inertia(scene, lever(scene, y), length), u);
@@ -141,9 +139,11 @@ void LimitSurface<Shape>::guards_(const Phase& phase, const SceneSource& source,
   } else {
     // Where L changes with f_N, L' ω_r is left out of u': of the order of kStopTime beside L ω_r' at a stop.
     const Scene<S> scene = source.scene(phase.window, t);
+    State<S, 6> rate;
+    rate_(kSlip, scene, y, rate);
     const Vec3<S> u = normalised_slip(y, limits<S>().length(scene.normal_force));
     const S speed = sqrt(dot3(u, u));
-    g[0] = stop_guard(speed, S(speed * growth(scene, y)));
+    g[0] = stop_guard(speed, S(speed * growth(scene, y, rate)));
   }
 }
 
@@ -186,9 +186,9 @@ template <class S>
 Entry<S, 6> LimitSurface<Shape>::come_to_rest(const Window& window, const SceneSource& source, const S& t,
                                               const Relative<S>& at) const {
   const Scene<S> scene = source.scene(window, t);
-  const S left = -1.0 / growth(scene, at);
   State<S, 6> dy;
   rate_(kSlip, scene, at, dy);
+  const S left = -1.0 / growth(scene, at, dy);
   Relative<S> y = at;
   y.arm = y.arm + (0.5 * left) * Vec2<S>{dy[0], dy[1]};
   y.angle += 0.5 * left * y.spin;

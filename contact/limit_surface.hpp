@@ -98,7 +98,7 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>>, public 
   template <class S>
   const PadCompliance<S>& pads() const;
   template <class S>
-  S growth(const Scene<S>&, const Relative<S>&) const;
+  S growth(const Scene<S>&, const Relative<S>&, const State<S, 6>& rate) const;
   template <class S>
   S margin_of(const Wrench<S>& demand, const Scene<S>&) const;
   template <class S>

@@ -126,8 +126,8 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
     last = now;
   }
   backward(stage, options, out);
-  withdraw(stage, options, out);
-  describe(stage, options, out);
+  FitResult counted = withdraw(stage, options, out);
+  describe(stage, std::move(counted), options, out);
   for (AcceptedEffect& effect : out.effects)
     for (const auto& [other, correlation] : effect.equivalent) {
       const auto experiments = separating_experiments(stage, effect, other, options);

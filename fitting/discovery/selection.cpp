@@ -89,8 +89,8 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   }
 }
 
-void withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out) {
-  if (out.effects.empty()) return;
+FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  if (out.effects.empty()) return stage.fit;
   FitResult counted = stage.fit;
   count_discrepancy(stage.problem, counted, options.fit.threads);
   std::vector<std::string> ids, gone;
@@ -109,18 +109,18 @@ void withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out) {
       if (is_law(effect.id)) model = stage.problem.options().model;
     }
   }
-  if (gone.empty()) return;
+  if (gone.empty()) return counted;
   if (ids.empty()) effects.clear();  // what was fitted along went with them
   Stage without{stage.problem.with(model, effects), {}, {}, ids};
   solve(without, options, carried(stage.fit, without.problem));
-  if (!without.solved()) return;
+  if (!without.solved()) return counted;
   out.imitations.insert(out.imitations.end(), gone.begin(), gone.end());
   std::erase_if(out.effects, [&](const AcceptedEffect& effect) {
     return std::find(ids.begin(), ids.end(), effect.id) == ids.end();
   });
   if (effects.empty()) out.along.clear();
   stage = std::move(without);
-  withdraw(stage, options, out);
+  return withdraw(stage, options, out);
 }
 
 bool acts_on_pads(const std::string& id) { return id.starts_with("contact.") || id.starts_with("release."); }
@@ -153,12 +153,12 @@ bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   return true;
 }
 
-void describe(Stage& stage, const DiscoverOptions& options, Discovery& out) {
+void describe(Stage& stage, FitResult counted, const DiscoverOptions& options, Discovery& out) {
   if (out.effects.empty()) return;
   const auto f = footprints(stage.problem, stage.fit, catalogue(options), options.laws, options.fit.threads);
   for (AcceptedEffect& accepted : out.effects)
     if (!is_law(accepted.id)) accepted.p_value = wald_p_value(stage.fit, find_effect(accepted.id));
-  count_discrepancy(stage.problem, stage.fit, options.fit.threads);
+  stage.fit = std::move(counted);
   for (AcceptedEffect& accepted : out.effects) {
     if (is_law(accepted.id)) {
       for (const auto& u : stage.fit.campaign)

@@ -27,8 +27,9 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out);
 /// blocks of sensors disagree on it (count_discrepancy); and one that leaves a tenth of the base model's
 /// misfit (a third of its size) in the half of the throw where it was said to act, the wrenches included, on
 /// train or on held-out throws, if the base model's fit left something there in both. What was accepted after
-/// it in that half goes with it: it was judged in its company.
-void withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out);
+/// it in that half goes with it: it was judged in its company. Returns the stage's fit
+/// with intervals that count its misfit.
+FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
 /// No pads are rigid: a give of some micrometres before they slip bends what the slipping pads say of an
 /// effect on them. contact.pad_compliance is fitted along if the evidence (BIC) is for it and the give stays
@@ -40,8 +41,8 @@ bool acts_on_pads(const std::string& id);
 /// Whether such an effect was added.
 bool acts_on_pads(const Stage& stage);
 
-/// Values, significance and other names of what was accepted. The intervals of the fit count its misfit from
-/// here on (count_discrepancy).
-void describe(Stage& stage, const DiscoverOptions& options, Discovery& out);
+/// Values, significance and other names of what was accepted. From here on the fit of the stage is `counted`,
+/// what withdraw returned.
+void describe(Stage& stage, FitResult counted, const DiscoverOptions& options, Discovery& out);
 
 }  // namespace unhand::fitting
