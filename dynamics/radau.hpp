@@ -2,11 +2,8 @@
 // with.
 #pragma once
 
-#include <Eigen/LU>
-
-#include <complex>
-
 #include "dynamics/jacobian.hpp"
+#include "dynamics/small_inverse.hpp"
 #include "dynamics/stepper.hpp"
 
 namespace unhand::dynamics {
@@ -80,11 +77,6 @@ class Radau final : public SingleStep<Radau<N>, double, N> {
 
  private:
   using Stages = std::array<State<double, N>, 3>;
-  // Of one size for every N, so that the factorisations are compiled once.
-  template <class T>
-  using Square = Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic, 0, kDualSize, kDualSize>;
-  template <class T>
-  using Column = Eigen::Matrix<T, Eigen::Dynamic, 1, 0, kDualSize, 1>;
   static constexpr double kRoot6 = 2.449489742783178;
   static constexpr double kC[3] = {(4 - kRoot6) / 10, (4 + kRoot6) / 10, 1};
   // The eigenvalues of the inverse Runge-Kutta matrix, γ and α ± iβ, and the transformation that shows them.
@@ -122,12 +114,17 @@ class Radau final : public SingleStep<Radau<N>, double, N> {
 
   void factor(double h) {
     if (factored_ == h) return;
-    Square<double> real = -jacobian_;
-    real.diagonal().array() += kGamma / h;
+    double real[N][N], pair[2 * N][2 * N];  // x + iy of the complex system as (x, y)
+    for (int i = 0; i < N; ++i)
+      for (int j = 0; j < N; ++j) {
+        const double one = i == j;
+        real[i][j] = kGamma / h * one - jacobian_(i, j);
+        pair[i][j] = pair[N + i][N + j] = kAlpha / h * one - jacobian_(i, j);
+        pair[N + i][j] = kBeta / h * one;
+        pair[i][N + j] = -kBeta / h * one;
+      }
     real_.compute(real);
-    Square<std::complex<double>> complex = -jacobian_.template cast<std::complex<double>>();
-    complex.diagonal().array() += std::complex<double>(kAlpha / h, kBeta / h);
-    complex_.compute(complex);
+    pair_.compute(pair);
     factored_ = h;
   }
 
@@ -151,18 +148,18 @@ class Radau final : public SingleStep<Radau<N>, double, N> {
       Stages g;
       transform(kInverse, f, g);
       // g − (Λ/h) w is the defect of the transformed equations, Λ the real block form of the eigenvalues.
-      Column<double> first(N);
-      Column<std::complex<double>> second(N);
+      typename SmallInverse<N>::Vector first, add_first;
+      typename SmallInverse<2 * N>::Vector second, add_second;
       for (int i = 0; i < N; ++i) {
         first[i] = g[0][i] - kGamma / h * w[0][i];
-        second[i] = {g[1][i] - (kAlpha * w[1][i] - kBeta * w[2][i]) / h,
-                     g[2][i] - (kAlpha * w[2][i] + kBeta * w[1][i]) / h};
+        second[i] = g[1][i] - (kAlpha * w[1][i] - kBeta * w[2][i]) / h;
+        second[N + i] = g[2][i] - (kAlpha * w[2][i] + kBeta * w[1][i]) / h;
       }
-      first = real_.solve(first).eval();
-      second = complex_.solve(second).eval();
+      real_.multiply(first, add_first);
+      pair_.multiply(second, add_second);
       double moved = 0;
       for (int i = 0; i < N; ++i) {
-        const double add[3] = {first[i], second[i].real(), second[i].imag()};
+        const double add[3] = {add_first[i], add_second[i], add_second[N + i]};
         for (int k = 0; k < 3; ++k) {
           w[k][i] += add[k];
           moved += (add[k] / scale_[i]) * (add[k] / scale_[i]);
@@ -189,13 +186,13 @@ class Radau final : public SingleStep<Radau<N>, double, N> {
   }
 
   double estimate(double h, const Stages& z) {
-    Column<double> combined(N), e(N);
-    State<double, N> error;
+    typename SmallInverse<N>::Vector e, solved;
+    State<double, N> combined, error;
     for (int i = 0; i < N; ++i)
       combined[i] = (kError[0] * z[0][i] + kError[1] * z[1][i] + kError[2] * z[2][i]) / h;
     for (int i = 0; i < N; ++i) e[i] = combined[i] + f0_[i];
-    e = real_.solve(e).eval();
-    for (int i = 0; i < N; ++i) error[i] = e[i];
+    real_.multiply(e, solved);
+    for (int i = 0; i < N; ++i) error[i] = solved[i];
     double size = scaled(error);
     // On transients, where the estimate of a very stiff flow is too large: once more through the flow.
     if (size > 1 && refine_) {
@@ -204,8 +201,8 @@ class Radau final : public SingleStep<Radau<N>, double, N> {
       for (int i = 0; i < N; ++i) y[i] = this->y0_[i] + error[i];
       this->flow(this->t0_, y, f);
       for (int i = 0; i < N; ++i) e[i] = combined[i] + f[i];
-      e = real_.solve(e).eval();
-      for (int i = 0; i < N; ++i) error[i] = e[i];
+      real_.multiply(e, solved);
+      for (int i = 0; i < N; ++i) error[i] = solved[i];
       const double again = scaled(error);
       if (std::isfinite(again)) size = again;
     }
@@ -219,8 +216,8 @@ class Radau final : public SingleStep<Radau<N>, double, N> {
   }
 
   Eigen::Matrix<double, N, N> jacobian_;
-  Eigen::PartialPivLU<Square<double>> real_;
-  Eigen::PartialPivLU<Square<std::complex<double>>> complex_;
+  SmallInverse<N> real_;      // (γ/h − J)⁻¹
+  SmallInverse<2 * N> pair_;  // ((α + iβ)/h − J)⁻¹
   State<double, N> f0_{}, scale_{}, start_{};
   Stages accepted_{};
   double h_before_{}, factored_{};
