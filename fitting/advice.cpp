@@ -1,4 +1,5 @@
 #include "fitting/advice.hpp"
+#include "fitting/distributions.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -81,15 +82,6 @@ std::vector<Correlation> strong_correlations(const FitResult& fit, double limit)
   std::sort(out.begin(), out.end(),
             [](const Correlation& a, const Correlation& b) { return std::abs(a.value) > std::abs(b.value); });
   return out;
-}
-
-double student_factor(double n) {
-  if (n < 1.5) return 12.706;
-  if (n < 2.5) return 4.303;
-  // Expansion in 1/n [AbramowitzStegun1964] 26.7.5: off by 2e-2 at n = 3, by 1e-3 at 10.
-  const double z = 1.959963984540054, z2 = z * z;
-  return z * (1 + (z2 + 1) / (4 * n) + ((5 * z2 + 16) * z2 + 3) / (96 * n * n) +
-              (((3 * z2 + 19) * z2 + 17) * z2 - 15) / (384 * n * n * n));
 }
 
 std::array<double, 2> FittedUnknown::interval95() const {

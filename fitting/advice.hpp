@@ -19,7 +19,4 @@ struct Correlation {
 /// Pairs of campaign unknowns with |correlation| > limit, the strongest first.
 std::vector<Correlation> strong_correlations(const FitResult& fit, double limit = 0.9);
 
-/// Half the width of a 95 % interval in sigmas: Student's t for so many degrees of freedom.
-double student_factor(double degrees_of_freedom);
-
 }  // namespace unhand::fitting

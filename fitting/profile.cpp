@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fitting/advice.hpp"
+#include "fitting/distributions.hpp"
 
 namespace unhand::fitting {
 

@@ -10,6 +10,7 @@
 
 #include "experiment/parallel.hpp"
 #include "fitting/dense_solve.hpp"
+#include "fitting/distributions.hpp"
 #include "fitting/normal_equations.hpp"
 
 namespace unhand::fitting {
@@ -77,14 +78,6 @@ ThrowShare share_of(const CampaignProblem& problem, std::size_t index, const Fit
   return out;
 }
 
-/// t₀.₉₇₅ of n degrees of freedom over 1.96 (Cornish and Fisher's expansion; n = 2 is 6 % low).
-double student_factor(double n) {
-  constexpr double z = 1.959964, z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z;
-  return 1 + ((z3 + z) / 4 / n + (5 * z5 + 16 * z3 + 3 * z) / 96 / (n * n) +
-              (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / 384 / (n * n * n)) /
-                 z;
-}
-
 }  // namespace
 
 void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threads) {
@@ -124,7 +117,7 @@ void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threa
   if (count >= 3) {
     Eigen::VectorXd jackknife = Eigen::VectorXd::Zero(width);
     for (const auto& [name, of] : conditions) jackknife += (Answer(all - of).step - whole.step).cwiseAbs2();
-    const double t = student_factor(count - 1);
+    const double t = student_factor(count - 1) / kNormal95;
     variance = variance.cwiseMax((count - 1) / count * t * t * jackknife);
   }
   Eigen::VectorXd excess = Eigen::VectorXd::Zero(width);

@@ -7,6 +7,7 @@
 
 #include "fitting/discovery/residual_structure.hpp"
 #include "fitting/discovery/selection.hpp"
+#include "fitting/distributions.hpp"
 
 namespace unhand::fitting {
 

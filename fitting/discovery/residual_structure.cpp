@@ -7,35 +7,11 @@
 #include <map>
 #include <numeric>
 
+#include "fitting/distributions.hpp"
+
 namespace unhand::fitting {
 
 namespace {
-
-/// Regularised incomplete beta function I_x(a, b) by its continued fraction (Lentz).
-double incomplete_beta(double a, double b, double x) {
-  if (!(x > 0)) return 0;
-  if (!(x < 1)) return 1;
-  if (x > (a + 1) / (a + b + 2)) return 1 - incomplete_beta(b, a, 1 - x);
-  const double front =
-      std::exp(std::lgamma(a + b) - std::lgamma(a) - std::lgamma(b) + a * std::log(x) + b * std::log1p(-x)) /
-      a;
-  constexpr double kTiny = 1e-300;
-  double c = 1, d = 1 - (a + b) * x / (a + 1);
-  d = 1 / (std::abs(d) < kTiny ? kTiny : d);
-  double f = d;
-  for (int m = 1; m <= 300; ++m) {
-    for (const double term : {m * (b - m) * x / ((a + 2 * m - 1) * (a + 2 * m)),
-                              -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1))}) {
-      d = 1 + term * d;
-      d = 1 / (std::abs(d) < kTiny ? kTiny : d);
-      c = 1 + term / c;
-      if (std::abs(c) < kTiny) c = kTiny;
-      f *= c * d;
-    }
-    if (std::abs(c * d - 1) < 1e-14) break;
-  }
-  return std::clamp(front * f, 0.0, 1.0);
-}
 
 /// One-way analysis of variance: witnesses in groups.
 Dependence analyse(std::string on, const std::vector<double>& value, const std::vector<int>& group) {
@@ -109,24 +85,6 @@ Dependence over_conditions(const ResidualSamples& samples) {
 
 }  // namespace
 
-double chi2_tail(double x, int k) {
-  if (!(x > 0)) return 1;
-  if (k > 200) {  // [WilsonHilferty1931]
-    const double v = 2.0 / (9.0 * k);
-    return 0.5 * std::erfc((std::cbrt(x / k) - (1 - v)) / std::sqrt(2 * v));
-  }
-  // Q_{k+2} = Q_k + (x/2)^(k/2) e^(−x/2)/Γ(k/2 + 1)
-  double q = k % 2 == 1 ? std::erfc(std::sqrt(x / 2)) : std::exp(-x / 2);
-  for (int j = k % 2 == 1 ? 1 : 2; j < k; j += 2)
-    q += std::exp(0.5 * j * std::log(x / 2) - x / 2 - std::lgamma(0.5 * j + 1));
-  return std::min(1.0, q);
-}
-
-double f_tail(double x, double m, double n) {
-  if (!(x > 0)) return 1;
-  return incomplete_beta(n / 2, m / 2, n / (n + m * x));
-}
-
 double ResidualStructure::p_value() const {
   double least = std::min(chi2_p_value, autocorrelation_p);
   for (const Dependence& d : depends) least = std::min(least, d.p_value);
@@ -163,7 +121,7 @@ ResidualStructure find_structure(const ResidualSamples& samples, const Structure
   out.chi2_p_value = chi2_tail(squares, out.n);
   if (of_former > 0 && of_latter > 0) {
     out.autocorrelation = products / std::sqrt(of_former * of_latter);
-    out.autocorrelation_p = std::erfc(std::abs(out.autocorrelation) * std::sqrt(pairs / 2));
+    out.autocorrelation_p = normal_two_sided(out.autocorrelation * std::sqrt(pairs));
   }
   out.depends.push_back(over_conditions(samples));
   out.depends.push_back(over_groups("time", samples.value, samples.time, options.groups));

@@ -6,11 +6,6 @@
 
 namespace unhand::fitting {
 
-/// P(χ²_k > x).
-double chi2_tail(double x, int degrees);
-/// P(F_{m,n} > x).
-double f_tail(double x, double m, double n);
-
 /// Residuals in units of their noise, with what they may depend on. The samples of a series follow each other
 /// in time; all vectors have the length of `value`.
 struct ResidualSamples {

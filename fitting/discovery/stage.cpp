@@ -8,6 +8,7 @@
 
 #include "fitting/dense_solve.hpp"
 #include "fitting/discovery/residual_structure.hpp"
+#include "fitting/distributions.hpp"
 
 namespace unhand::fitting {
 

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fitting/distributions.hpp"
+
 namespace unhand::fitting {
 namespace {
 
@@ -40,7 +42,7 @@ void look_for_the_unexplained(const MeasuredOptions& options, MeasuredDiscovery&
 void look_for_instability(MeasuredDiscovery& out) {
   const double tests = std::max<double>(1, static_cast<double>(out.stability.size()));
   for (const auto& s : out.stability) {
-    if (std::erfc(std::abs(s.z()) / std::sqrt(2.0)) > 0.05 / tests) continue;
+    if (normal_two_sided(s.z()) > 0.05 / tests) continue;
     out.evidence.push_back(
         {s.parameter.substr(0, s.parameter.rfind('.')),
          fmt::format(

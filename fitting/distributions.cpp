@@ -1,0 +1,35 @@
+#include "fitting/distributions.hpp"
+
+#include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/fisher_f.hpp>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <limits>
+
+namespace unhand::fitting {
+namespace {
+
+using Policy = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
+using Students = boost::math::students_t_distribution<double, Policy>;
+using ChiSquared = boost::math::chi_squared_distribution<double, Policy>;
+using FisherF = boost::math::fisher_f_distribution<double, Policy>;
+constexpr double kLargest = std::numeric_limits<double>::max();
+
+}  // namespace
+
+double student_factor(double n) { return quantile(Students(std::max(1.0, n)), 0.975); }
+
+double normal_two_sided(double z) { return std::erfc(std::abs(z) / std::sqrt(2.0)); }
+
+double chi2_tail(double x, int k) {
+  if (!(x > 0) || k < 1) return 1;
+  return cdf(complement(ChiSquared(k), std::min(x, kLargest)));
+}
+
+double f_tail(double x, double p, double q) {
+  if (!(x > 0) || !(p > 0) || !(q > 0)) return 1;
+  return cdf(complement(FisherF(p, q), std::min(x, kLargest)));
+}
+
+}  // namespace unhand::fitting
