@@ -17,10 +17,11 @@ endfunction()
 #     HEADERS limit_surface.hpp ...
 #     USES    dynamics              # the modules of architecture this one may include
 #     LINKS   SUNDIALS::cvode_shared  # private third-party libraries
+#     LEVEL   -O2                   # of optimisation in a Release build, where its time goes into other modules
 #     BATCH   5                     # as unhand_batches
 #     ALONE   registry.cpp)
 function(unhand_module name)
-  cmake_parse_arguments(ARG "" "BATCH" "SOURCES;HEADERS;USES;LINKS;ALONE" ${ARGN})
+  cmake_parse_arguments(ARG "" "BATCH;LEVEL" "SOURCES;HEADERS;USES;LINKS;ALONE" ${ARGN})
   add_library(unhand_${name} ${ARG_SOURCES})
   add_library(unhand::${name} ALIAS unhand_${name})
   set_target_properties(unhand_${name} PROPERTIES EXPORT_NAME ${name})
@@ -40,6 +41,7 @@ function(unhand_module name)
     endif()
   endforeach()
   target_link_libraries(unhand_${name} PRIVATE $<BUILD_INTERFACE:unhand_warnings>)
+  target_compile_options(unhand_${name} PRIVATE $<$<CONFIG:Release>:${ARG_LEVEL}>)
   install(TARGETS unhand_${name} EXPORT unhandTargets)
   foreach(header IN LISTS ARG_HEADERS)
     cmake_path(GET header PARENT_PATH folder)  # "arm" of arm/chain.hpp
