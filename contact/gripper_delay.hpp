@@ -81,8 +81,8 @@ class GripperDelay final : public ContactModelFrom<GripperDelay> {
   template <class S>
   Entry<S, 6> membership_(int, const Window&, const SceneSource&, const S& t, const Relative<S>& y) const {
     return {0, t, Relative<S>{y.arm, y.angle, {S(0), S(0)}, S(0)}.state(), S(0)};
-    /// @}
   }
+  /// @}
 
  private:
   double open_command_;

@@ -18,8 +18,8 @@ enum class SlideEnd {
 ///
 /// A mode is a pair of what the patch does and what the rotation does:
 ///   patch     stuck     the contact point is carried with the hand
-///             slide     |f_p| > f_max: force f_max f_p/|f_p| (along the required force, not against the
-///             slip) brake     |f_p| <= f_max but still slipping: force −f_max v_r/|v_r|
+///             slide     |f_p| > f_max: force f_max f_p/|f_p|, along the required force
+///             brake     |f_p| <= f_max but still slipping: force −f_max v_r/|v_r|
 ///   rotation  locked    ω_r = 0, torque whatever keeps α_O = α_H, up to τ_max
 ///             + or −    the sign of ω_r: torque −τ_max sgn(ω_r)
 /// (stuck, locked) is sticking, (stuck, ±) pivoting about the contact:

@@ -36,7 +36,7 @@ struct Effect {
   std::string mechanism;                    ///< one line
   std::vector<EffectParameter> parameters;  ///< one or more; the order is that of reports and cards
   bool per_object{false};                   ///< every object has its own values, named "k[jar]"
-  /// No two-sided derivative at neutral: its footprint is taken at neutral + typical, over the grid.
+  /// No two-sided derivative at neutral: its footprint is a difference, at several sizes, over the grid.
   bool one_sided{false};
   /// "id.name"
   std::string full_name(const EffectParameter& parameter) const { return id + "." + parameter.name; }

@@ -261,8 +261,8 @@ class SingleStep : public Stepper<S, N> {
   Derived& self() { return static_cast<Derived&>(*this); }
 };
 
-/// The ways of stepping a flow; `automatic` takes dormand_prince for smooth modes, rosenbrock for stiff ones,
-/// and dormand_prince that goes over to rosenbrock for mixed ones.
+/// The ways of stepping a flow; `automatic` takes dormand_prince for smooth modes, and for the others
+/// whichever of dormand_prince and rosenbrock goes, a stiff one beginning with rosenbrock (SwitchingStepper).
 enum class Method {
   automatic,       ///< by the kind of each mode
   dormand_prince,  ///< explicit, order 8: smooth flows

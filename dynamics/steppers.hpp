@@ -28,9 +28,8 @@ class Frozen final : public Stepper<S, N> {
 };
 
 /// One stepper per kind of flow, paced or not, each made when first needed; Method::automatic takes
-/// DormandPrince for smooth flows, Rosenbrock for stiff and SwitchingStepper for mixed ones. With Dual,
-/// DormandPrince steps in dual numbers, and all others carry derivatives in a TangentStepper. Instantiated as
-/// `integrate` is.
+/// DormandPrince for smooth flows, SwitchingStepper for the others. With Dual, DormandPrince steps in dual
+/// numbers, and all others carry derivatives in a TangentStepper. Instantiated as `integrate` is.
 template <class S, int N>
 class Steppers {
  public:

@@ -10,8 +10,8 @@ namespace unhand::dynamics {
 /// explicit to implicit once stability has set the length of kStiffSteps steps in a row ([HairerWanner1996]
 /// IV.2: h |λ| from two evaluations at the end of a step, near the boundary of stability, 6.1 for this
 /// method). From implicit to explicit once an explicit step of the same length would have been stable
-/// kSmoothSteps times in a row, by the Jacobian's fastest eigenvalue. An explicit step costs half of an
-/// implicit one.
+/// kSmoothSteps times in a row, by the Jacobian's fastest eigenvalue. An explicit step costs some two
+/// thirds of an implicit one (docs/integrator.md).
 template <int N>
 class SwitchingStepper final : public Stepper<double, N> {
  public:

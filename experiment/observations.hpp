@@ -28,7 +28,7 @@ enum class Channel {
 };
 /// How many channels there are.
 inline constexpr int kChannelCount = 10;
-/// The channel's name as reports have it: "mocap_theta".
+/// The channel's name as reports have it: "mocap.theta".
 std::string_view to_string(Channel);
 
 /// One measured number with its noise.

@@ -21,7 +21,7 @@ std::array<double, 3> sigma_of(const Series& series) {
   return {0, 0, 0};
 }
 
-/// Weighted straight line y ≈ a + b t.
+/// Straight line y ≈ a + b t.
 struct Line {
   double a{}, b{};
 };

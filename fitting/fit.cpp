@@ -84,7 +84,7 @@ void describe_throws(const CampaignProblem& problem, const FitRounds& rounds, Fi
     const auto& part = rounds.equations().throws[i];
     const CampaignThrow& thrown = problem.throws()[rounds.used()[i]];
     ThrowFit& one = out.throws[rounds.used()[i]];
-    one.used = one.solved = true;
+    one.used = true;
     one.weight = part.weight;
     one.chi2 = part.chi2;
     one.own = rounds.own(i);

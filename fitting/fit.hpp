@@ -113,9 +113,8 @@ struct ChannelMisfit {
 struct ThrowFit {
   std::string id;           ///< as in the log
   bool used{};              ///< of the share that is fitted to, with observations
-  bool solved{};            ///< it can be simulated at the answer
   double weight{1};         ///< below 1: an outlier that counts less
-  double chi2{};            ///< of its observations, not weighted
+  double chi2{};            ///< of its observations, weighted by group and robust (Huber)
   std::vector<double> own;  ///< its own unknowns
   std::vector<int> modes;   ///< the modes entered, in order
 };

@@ -143,7 +143,7 @@ struct HandFit {
 /// If it is empty, they are detected: between two samples, the one-sided extrapolations of the acceleration
 /// from left and right must differ by more than `jump_significance` σ of that difference and by more than
 /// curvature explains. A jump between samples k − 1 and k is put at t_k, as the log holds the later value
-/// there.
+/// there, unless the twists tell that it was earlier: a jump by Δa at t_k − s leaves them ahead by Δa s.
 ///
 /// Throws std::invalid_argument for fewer than four samples, shapes that do not match, times that do not
 /// increase, or a value that is not finite.

@@ -82,7 +82,7 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
     for (const double t : problem_.hand.jumps()) out.push_back(S(t));
     if (std::isfinite(separation())) out.push_back(convert<S>(separation_));
     std::sort(out.begin(), out.end(), [](const S& a, const S& b) { return value_of(a) < value_of(b); });
-    // The separation may be one of the kinks; of two events at one instant the one with derivatives stays.
+    // The separation may be one of the kinks: of two events at one instant the one sorted last stays.
     for (std::size_t i = 1; i < out.size();) {
       if (value_of(out[i]) - value_of(out[i - 1]) < 1e-12)
         out.erase(out.begin() + static_cast<std::ptrdiff_t>(i) - 1);

@@ -20,18 +20,22 @@ struct DiscoverOptions {
   /// An effect matters if, on held-out throws, it takes at least this much off the χ² per sample of some
   /// channel of the motion in some phase (1 is the noise), and a tenth of the misfit there.
   double matters{0.5};
-  /// The same for the wrench channels, whose misfit once the pads open must also have been so many times the
-  /// noise, or vanish altogether: near the end of a release a patch slips in parts, and no law of the
-  /// catalogue follows its torque better. In the firm grasp only the body's inertia speaks, and they are
-  /// channels like others.
+  /// For the wrench channels: this much, and a quarter of the misfit there. Once the pads open it must also
+  /// have been so many times the noise, or vanish altogether: near the end of a release a patch slips in
+  /// parts, and no law of the catalogue follows its torque better. In the firm grasp only the body's inertia
+  /// speaks, and they are channels like others.
   double wrench_matters{1}, wrench_misfit{3};  ///< as above [χ² per sample]; times the noise
   /// Or if the held-out throws are predicted that much better before they are made: rms before over after.
   double prediction_matters{1.15};
-  double law_matters{0.005};          ///< another contact law: share of the held-out χ² as a whole
-  double false_discovery_rate{0.02};  ///< shared among the effects that were tried
-  double equivalent{0.98};            ///< footprints that correlate by this much are one answer
-  int refits{4};                      ///< candidates that are fitted in full, in every step
-  int most_effects{3};                ///< accepted in all
+  double law_matters{0.005};  ///< another contact law: share of the held-out χ² as a whole
+  /// Shared among the candidates of a step, every shape and size at which a footprint was taken being one;
+  /// and of misfits among the channels and phases of a log.
+  double false_discovery_rate{0.02};
+  double equivalent{0.98};  ///< footprints that correlate by this much are one answer
+  /// Leading candidates that are fitted in full, in every step. Beyond them all laws, where none but a law
+  /// convinced, and the give of the pads, where an effect with evidence matters to no channel.
+  int refits{4};
+  int most_effects{3};      ///< accepted in all
   double unexplained{1.5};  ///< χ² per sample of a channel in a phase from which on something is missing
   std::vector<std::string> forget;  ///< effects that are not in the catalogue today
   std::vector<std::string> laws{"limit_surface", "limit_surface_disc",
@@ -62,7 +66,7 @@ struct OutcomeErrors {
 
 /// A parameter of an accepted effect.
 struct Parameter {
-  std::string name, unit;   ///< "id.parameter", with "[object]" for effects that every object has its own of
+  std::string name, unit;   ///< without the effect's id, with "[object]" where every object has its own
   double value{}, sigma{};  ///< in `unit`; 1 σ
 };
 
@@ -75,7 +79,7 @@ struct SeparatingExperiment {
 
 /// An effect that the data made believable.
 struct AcceptedEffect {
-  std::string id;                                          ///< of the effect, or "contact.law"
+  std::string id;                                          ///< of the effect, or "contact.law:MODEL"
   std::vector<std::pair<std::string, double>> equivalent;  ///< ids, with the correlation of the footprints
   std::vector<SeparatingExperiment> separating;            ///< the most telling first, for each other name
   std::vector<Parameter> parameters;                       ///< as fitted
@@ -100,7 +104,8 @@ struct SmallEffect {
   bool any_pads{};         ///< it is a give of the pads that no pads are without
 };
 
-/// One candidate, as it was scored in the step in which it came nearest to being accepted.
+/// One candidate: gain, p-value, correlation and visibility of the step in which its gain was largest, the
+/// rest of its last refit.
 struct Ranked {
   std::string id;                  ///< of the effect, or "contact.law:MODEL"
   double gain{};                   ///< of χ², to first order

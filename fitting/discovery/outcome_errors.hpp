@@ -6,7 +6,8 @@
 namespace unhand::fitting {
 
 /// Of predict_throws (see there): with what is known before the throw. The trajectory is that of the tracked
-/// point in flight. Throws that are not predicted to land are left out.
+/// point in flight. Of throws that are not predicted to land only the errors at the detach count, where they
+/// were measured.
 OutcomeErrors outcome_errors(const CampaignProblem& problem, const FitResult& fit, Share share, int threads);
 
 /// What one model's predictions of the same throws are better by than another's: rms of the tracked position

@@ -30,8 +30,10 @@ double deviance(const FitResult& fit);
 /// Of the held-out throws.
 PredictionGain prediction_gain(const Stage& before, const Stage& after, const DiscoverOptions& options);
 
-/// Whether held-out throws make an improvement no chance: neither model has seen them, so under the first one
-/// the second is twenty times as likely at most once in twenty logs.
+/// Whether held-out throws speak for an improvement: their likelihood is twenty times as large. A threshold,
+/// and no bound on how often chance gets there: each model fits the held-out throws' own unknowns and takes
+/// the variances of their channels from them, and Markov's inequality does not hold for likelihoods that are
+/// maximised.
 bool held_out_confirms(const Stage& before, const Stage& after);
 
 /// Evidence (difference of Bayes' criterion) that an effect needs before it is accepted or kept.

@@ -146,7 +146,6 @@ OutcomeSquares squares_with(const CampaignProblem& problem, const CampaignThrow&
   return out;
 }
 
-/// Held-out throws show it, too: at 5 % their χ² in the same channel and phase is no noise.
 }  // namespace
 
 std::optional<MissingEstimate> estimate_missing(const Stage& stage, Phase phase,

@@ -100,7 +100,7 @@ std::vector<ResidualProfile> residual_profile(const GroupedProblem& problem, con
 }
 
 LeavesNoise leaves_noise(const GroupedProblem& problem, const GroupedFit& fit, double limit, int threads) {
-  constexpr std::size_t kMostGroups = 100;  // a random choice of them says it as well
+  constexpr std::size_t kMostGroups = 100;  // evenly spaced ones say it as well
   constexpr std::array kShares{0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0};
   auto used = used_groups(fit);
   if (used.size() > kMostGroups) {

@@ -27,8 +27,6 @@ struct SurfaceEvidence {
   double null_base_deg{}, null_law_deg{};  ///< the same on data simulated from the base's fit
   double gain_deg{}, gain_sigma{};         ///< mean over slips, paired, and its standard error
   double left{}, left_sigma{};             ///< correlation of the residual directions of neighbours
-  /// What the law gains beyond what noise alone makes of it.
-  double beyond_null_deg() const { return gain_deg - (null_base_deg - null_law_deg); }
 };
 
 /// The answer of the loop on measured slips, with each law's evidence on each surface.
