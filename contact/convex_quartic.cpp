@@ -91,13 +91,6 @@ Vec3<double> spread(int k, int count) {
   return {r * std::cos(phi), r * std::sin(phi), z};
 }
 
-// ∂H/∂κ and ∂∇H/∂κ of the blend: H = … + 2κ a² b².
-double blend_by_kappa(const Vec3<double>& w) { return 2.0 * (w[0] * w[0] + w[1] * w[1]) * w[2] * w[2]; }
-Vec3<double> blend_gradient_by_kappa(const Vec3<double>& w) {
-  const double a2 = w[0] * w[0] + w[1] * w[1], b2 = w[2] * w[2];
-  return {4.0 * w[0] * b2, 4.0 * w[1] * b2, 4.0 * a2 * w[2]};
-}
-
 [[noreturn]] void refuse(const char* what, double value, const Vec3<double>& w) {
   throw std::invalid_argument(
       fmt::format("convex quartic: {} = {} at w = ({:.6g}, {:.6g}, {:.6g}); it must not be negative, and H "
@@ -174,12 +167,6 @@ double ConvexQuartic::kappa_closest_to_disc() {
   return kappa;
 }
 
-ConvexQuartic ConvexQuartic::isotropic_blend(const Dual& kappa) {
-  ConvexQuartic out = isotropic_blend(kappa.a);
-  out.kappa_slope_ = kappa.v;
-  return out;
-}
-
 ConvexQuartic ConvexQuartic::closest_to_disc() { return isotropic_blend(kappa_closest_to_disc()); }
 
 // ∇²H(w); by Euler's theorem ∇H = ∇²H w/3 and H = wᵀ∇²H w/12.
@@ -206,9 +193,7 @@ S ConvexQuartic::gauge(const Vec3<S>& w) const {
     return scale * g;
   } else {
     const double k = 1.0 / (12.0 * g * g * g);
-    S out(scale * g, k * (third[0] * w[0].v + third[1] * w[1].v + third[2] * w[2].v));
-    if (has_slope()) out.v += (scale * blend_by_kappa(v) / (4.0 * g * g * g)) * kappa_slope_;
-    return out;
+    return S(scale * g, k * (third[0] * w[0].v + third[1] * w[1].v + third[2] * w[2].v));
   }
 }
 
@@ -274,18 +259,7 @@ Vec3<S> ConvexQuartic::resist(const Vec3<S>& u) const {
       const double radial = dot3(n, column);
       for (int i = 0; i < 3; ++i) jacobian[i][j] = column[i] - w[i] * radial;
     }
-    Vec3<S> out = chain3(u, w, jacobian);
-    if (has_slope()) {
-      // ∇H(w) = −λû and H(w) = 1, by κ: dw = c + μw with c = −(∇²H)⁻¹ ∂∇H, since (∇²H)⁻¹û is along w.
-      const Vec3<double> by_kappa = blend_gradient_by_kappa(w);
-      Vec3<double> c = Factored(hessian(w)).solve(by_kappa);
-      for (double& entry : c) entry = -entry;
-      Vec3<double> normal = times(hessian(w), w);
-      for (double& entry : normal) entry /= 12.0;  // ∇gauge on the surface
-      const double along = -0.25 * blend_by_kappa(w) - dot3(normal, c);
-      for (int i = 0; i < 3; ++i) out[i].v += (c[i] + along * w[i]) * kappa_slope_;
-    }
-    return out;
+    return chain3(u, w, jacobian);
   }
 }
 
@@ -308,13 +282,7 @@ Vec3<S> ConvexQuartic::slip_direction(const Vec3<S>& w) const {
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) jacobian[i][j] = -k * (h[i][j] - n[i] * nh[j]);
     }
-    Vec3<S> out = chain3(w, n, jacobian);
-    if (has_slope()) {
-      const Vec3<double> by_kappa = blend_gradient_by_kappa(v);
-      const double along = dot3(n, by_kappa);
-      for (int i = 0; i < 3; ++i) out[i].v -= (3.0 * inverse * (by_kappa[i] - along * n[i])) * kappa_slope_;
-    }
-    return out;
+    return chain3(w, n, jacobian);
   }
 }
 

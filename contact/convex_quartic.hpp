@@ -30,9 +30,6 @@ class ConvexQuartic {
   /// curvature, 4a² + 4κb², agrees: convex for 0 ≤ κ ≤ 3 and for no other κ. κ = 1 is the ellipsoid. Throws
   /// std::invalid_argument outside.
   static ConvexQuartic isotropic_blend(double kappa);
-  /// With the derivatives of κ in those of resist, gauge and slip_direction. Every quartic that is isotropic
-  /// in (x, z) and even in τ is such a blend but for the scales of force and torque.
-  static ConvexQuartic isotropic_blend(const dynamics::Dual& kappa);
 
   /// The blend that is nearest to the uniform disc: least squares of H − 1 over the disc's surface, at angles
   /// arctan ε spread evenly between spin and slide. κ = 1.6219; its radius is within 0.70 % of the disc's,
@@ -58,12 +55,10 @@ class ConvexQuartic {
   struct Unchecked {};
   ConvexQuartic(const std::array<double, kCoefficients>& coefficients, Unchecked);
   Mat3 hessian(const Vec3<double>& w) const;
-  bool has_slope() const { return !kappa_slope_.isZero(); }
 
   std::array<double, kCoefficients> coefficients_;
   std::array<double, kCoefficients>
       tensor_;  // 12 × the entries of the symmetric tensor of H: ∇²H is linear in it
-  decltype(dynamics::Dual::v) kappa_slope_ = decltype(dynamics::Dual::v)::Zero();  // of a blend: dκ
 };
 
 }  // namespace unhand::contact

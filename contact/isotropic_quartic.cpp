@@ -34,9 +34,9 @@ double ratio(double e, double kappa) {
 
 }  // namespace
 
-IsotropicQuartic::IsotropicQuartic(double kappa) : kappa_(kappa) {
-  if (!(kappa >= 0 && kappa <= 3))
-    throw std::invalid_argument(fmt::format("isotropic quartic: kappa = {} is not in [0, 3]", kappa));
+IsotropicQuartic::IsotropicQuartic(const Dual& kappa) : kappa_(kappa) {
+  if (!(kappa.a >= 0 && kappa.a <= 3))
+    throw std::invalid_argument(fmt::format("isotropic quartic: kappa = {} is not in [0, 3]", kappa.a));
 }
 
 IsotropicQuartic IsotropicQuartic::closest_to_disc() {
@@ -45,24 +45,29 @@ IsotropicQuartic IsotropicQuartic::closest_to_disc() {
 
 // With σ(u) = −resist(u)·u, whose Hessian is λ (q, −p)(q, −p)ᵀ in (p, q) and k = a/p across the slide: the
 // larger of (a, b) is g = H(1, r)^(−1/4) and λ = (1 + κ r²)³ g⁵/D over the cube of the larger of (p, q), D
-// the determinant of ∇²H.
-Vec3<double> IsotropicQuartic::resist(const Vec3<double>& u, Mat3* jacobian) const {
+// the determinant of ∇²H. By the implicit function theorem ∂r/∂κ = −r (1 − r⁴)/D.
+Vec3<double> IsotropicQuartic::resist(const Vec3<double>& u, Slopes* slopes) const {
+  const double kappa = kappa_.a;
   const double p = std::sqrt(u[0] * u[0] + u[1] * u[1]), q = std::abs(u[2]);
   const bool slides = q <= p;
-  const double most = slides ? p : q, r = ratio(slides ? q / p : p / q, kappa_), x = r * r;
-  const double g = 1 / std::sqrt(std::sqrt(1 + x * (2 * kappa_ + x))), sum = 1 + kappa_ * x;
+  const double most = slides ? p : q, r = ratio(slides ? q / p : p / q, kappa), x = r * r;
+  const double g = 1 / std::sqrt(std::sqrt(1 + x * (2 * kappa + x))), sum = 1 + kappa * x;
   // e = r (κ + r²)/(1 + κ r²), so a/p stays finite where p vanishes.
-  const double share = sum / std::max(kappa_ + x, kTiny), k = slides ? g / p : g * share / q;
-  if (jacobian) {
-    const double D = std::max(kappa_ + x * (3 - kappa_ * kappa_ + kappa_ * x), kTiny),
-                 cube = most * most * most;
-    const double lambda = sum * sum * sum * g * g * g * g * g / (D * cube);
+  const double share = sum / std::max(kappa + x, kTiny), k = slides ? g / p : g * share / q;
+  if (slopes) {
+    const double D = std::max(kappa + x * (3 - kappa * kappa + kappa * x), kTiny), cube = most * most * most;
+    const double g5 = g * g * g * g * g, lambda = sum * sum * sum * g5 / (D * cube);
     // (λ q² − k)/p²; where q is the larger, both are near each other and their difference is divided by x.
-    const double square = kappa_ * kappa_ - 2,
-                 bend = square + x * (3 * kappa_ * square - x * (3 + kappa_ * x));
-    const double cross = slides ? (lambda * q * q - k) / (p * p)
-                                : share * share * share * g * g * g * g * g * bend / (D * cube);
-    *jacobian = isotropic_hessian(u, -k, -cross, -lambda);
+    const double square = kappa * kappa - 2, bend = square + x * (3 * kappa * square - x * (3 + kappa * x));
+    const double cross =
+        slides ? (lambda * q * q - k) / (p * p) : share * share * share * g5 * bend / (D * cube);
+    slopes->by_slip = isotropic_hessian(u, -k, -cross, -lambda);
+    // Of the larger of (a, b), and of the smaller over r.
+    const double turn = -(1 - x * x) / D, by_kappa = -g5 * x * (0.5 + (kappa + x) * turn),
+                 lesser = by_kappa + g * turn;
+    const double along = slides ? by_kappa / p : lesser * share / q;
+    const double sign = std::copysign(1.0, u[2]);
+    slopes->by_kappa = {-along * u[0], -along * u[1], -sign * (slides ? r * lesser : by_kappa)};
   }
   return {-k * u[0], -k * u[1], std::copysign(slides ? g * r : g, -u[2])};
 }
@@ -77,12 +82,14 @@ Vec3<S> IsotropicQuartic::resist(const Vec3<S>& u) const {
   if constexpr (std::is_same_v<S, double>) {
     return resist(v, nullptr);
   } else {
-    Mat3 jacobian;
-    const Vec3<double> w = resist(v, &jacobian);
+    Slopes slopes;
+    const Vec3<double> w = resist(v, &slopes);
     if (scale != 1.0)
-      for (auto& row : jacobian)
+      for (auto& row : slopes.by_slip)
         for (double& entry : row) entry /= scale;
-    return chain3(u, w, jacobian);
+    Vec3<S> out = chain3(u, w, slopes.by_slip);
+    for (std::size_t i = 0; i < 3; ++i) out[i].v += slopes.by_kappa[i] * kappa_.v;
+    return out;
   }
 }
 
@@ -92,8 +99,8 @@ S IsotropicQuartic::gauge(const Vec3<S>& w) const {
   const double scale = scale_of(w);
   if (scale == 0.0) return S(0.0);
   const Vec3<S> v{w[0] / scale, w[1] / scale, w[2] / scale};
-  const S A = v[0] * v[0] + v[1] * v[1], B = v[2] * v[2];
-  return scale * sqrt(sqrt(S(A * A + 2 * kappa_ * (A * B) + B * B)));
+  const S A = v[0] * v[0] + v[1] * v[1], B = v[2] * v[2], kappa = dynamics::convert<S>(kappa_);
+  return scale * sqrt(sqrt(S(A * A + 2.0 * kappa * (A * B) + B * B)));
 }
 
 // −∇H/|∇H|
@@ -103,7 +110,8 @@ Vec3<S> IsotropicQuartic::slip_direction(const Vec3<S>& w) const {
   const double scale = scale_of(w);
   if (scale == 0.0) return {S(0.0), S(0.0), S(0.0)};
   const Vec3<S> v{w[0] / scale, w[1] / scale, w[2] / scale};
-  const S A = v[0] * v[0] + v[1] * v[1], B = v[2] * v[2], flat = A + kappa_ * B, high = kappa_ * A + B;
+  const S A = v[0] * v[0] + v[1] * v[1], B = v[2] * v[2], kappa = dynamics::convert<S>(kappa_);
+  const S flat = A + kappa * B, high = kappa * A + B;
   const Vec3<S> n{v[0] * flat, v[1] * flat, v[2] * high};
   const S k = -1.0 / sqrt(dot3(n, n));
   return {k * n[0], k * n[1], k * n[2]};

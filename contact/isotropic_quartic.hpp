@@ -10,16 +10,19 @@ namespace unhand::contact {
 ///
 /// A slip (p, q) = (|u_xz|, |u_τ|) is along ∇H, so r = b/a is the root in [0, 1] of
 ///   r³ − e κ r² + κ r − e = 0,  e = q/p,  if q ≤ p;
-/// else a/b is, with e = p/q: H is symmetric in a and b. Derivatives are closed, as those of UniformDisc.
-/// Where the Hessian of H is singular (on the axes for κ = 0, at a = b for κ = 3) resist has no derivative,
-/// and its Dual carries a large finite one.
+/// else a/b is, with e = p/q: H is symmetric in a and b. Every quartic that is isotropic in (x, z) and even
+/// in τ is such a one but for the scales of force and torque. Derivatives are closed, as those of
+/// UniformDisc. Where the Hessian of H is singular (on the axes for κ = 0, at a = b for κ = 3) resist has no
+/// derivative, and its Dual carries a large finite one.
 class IsotropicQuartic {
  public:
   static constexpr bool isotropic = true;                   ///< round in the plane of sliding: needs no frame
   static constexpr const char* name = "isotropic quartic";  ///< as messages call it
 
-  /// Throws std::invalid_argument unless 0 ≤ κ ≤ 3, where H is convex.
-  explicit IsotropicQuartic(double kappa);
+  /// Throws std::invalid_argument unless 0 ≤ κ ≤ 3, where H is convex. Derivatives of κ go into those of
+  /// resist, gauge and slip_direction in Dual.
+  explicit IsotropicQuartic(const dynamics::Dual& kappa);
+  explicit IsotropicQuartic(double kappa) : IsotropicQuartic(dynamics::Dual(kappa)) {}
   /// κ = ConvexQuartic::kappa_closest_to_disc().
   static IsotropicQuartic closest_to_disc();
 
@@ -34,9 +37,14 @@ class IsotropicQuartic {
   Vec3<S> slip_direction(const Vec3<S>& w) const;
 
  private:
-  Vec3<double> resist(const Vec3<double>& u, Mat3* jacobian) const;
+  /// Its derivatives by u and by κ, unless null.
+  struct Slopes {
+    Mat3 by_slip;
+    Vec3<double> by_kappa;
+  };
+  Vec3<double> resist(const Vec3<double>& u, Slopes* slopes) const;
 
-  double kappa_;
+  dynamics::Dual kappa_;
 };
 
 }  // namespace unhand::contact

@@ -34,11 +34,9 @@ constexpr std::pair<std::string_view, Maker> kModels[] = {
      }},
     {"limit_surface_quartic",
      [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
-       if (p.quartic)
-         return std::make_unique<LimitSurface<ConvexQuartic>>("limit_surface_quartic", p.patch, *p.quartic,
-                                                              p.variation);
-       return std::make_unique<LimitSurface<IsotropicQuartic>>(
-           "limit_surface_quartic", p.patch, IsotropicQuartic::closest_to_disc(), p.variation);
+       const auto shape = p.kappa ? IsotropicQuartic(*p.kappa) : IsotropicQuartic::closest_to_disc();
+       return std::make_unique<LimitSurface<IsotropicQuartic>>("limit_surface_quartic", p.patch, shape,
+                                                               p.variation);
      }},
     {kGripperDelay,
      [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
@@ -64,8 +62,9 @@ std::unique_ptr<ContactModel> make_contact_model(std::string_view name,
 
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name, const ContactParameters<double>& p) {
   return make_contact_model(
-      name, ContactParameters<Dual>{constant(p.patch), p.slide_end, p.quartic, p.open_command, Dual(p.delay),
-                                    constant(p.variation)});
+      name, ContactParameters<Dual>{constant(p.patch), p.slide_end,
+                                    p.kappa ? std::optional<Dual>(*p.kappa) : std::nullopt, p.open_command,
+                                    Dual(p.delay), constant(p.variation)});
 }
 
 }  // namespace unhand::contact

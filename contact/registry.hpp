@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "contact/contact_model.hpp"
-#include "contact/convex_quartic.hpp"
 #include "contact/friction_effects.hpp"
 #include "contact/patch.hpp"
 #include "contact/sliding_pivot.hpp"
@@ -20,10 +19,10 @@ template <class S>
 struct ContactParameters {
   Patch<S> patch;                               ///< the limits, for all but gripper_delay
   SlideEnd slide_end{SlideEnd::latched_brake};  ///< sliding_pivot
-  std::optional<ConvexQuartic> quartic;  ///< limit_surface_quartic; the closest to a uniform disc if absent
-  double open_command{};                 ///< gripper_delay: when the gripper is told to open [s]
-  S delay{};                             ///< gripper_delay: from the command to the release [s]
-  FrictionVariation<S> variation{};      ///< departures of the friction limits; neutral by default
+  std::optional<S> kappa;            ///< limit_surface_quartic; the closest to a uniform disc if absent [-]
+  double open_command{};             ///< gripper_delay: when the gripper is told to open [s]
+  S delay{};                         ///< gripper_delay: from the command to the release [s]
+  FrictionVariation<S> variation{};  ///< departures of the friction limits; neutral by default
 };
 
 /// The names that make_contact_model knows.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "contact/convex_quartic.hpp"
 #include "contact/gripper_delay.hpp"
 #include "contact/limit_surface_shapes.hpp"
 #include "dynamics/median.hpp"

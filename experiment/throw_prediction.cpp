@@ -5,6 +5,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "contact/convex_quartic.hpp"
 #include "contact/registry.hpp"
 #include "experiment/outcome_slopes.hpp"
 
@@ -59,8 +60,7 @@ auto with_release(const PreparedThrow& prepared, const ThrowModel& model, const 
   parameters.delay = Dual(values.get("delay", 0.05) + values.get("delay_deviation", 0));
   parameters.variation = contact::constant(setup.friction);
   if (model.contact_model == "limit_surface_quartic")
-    parameters.quartic = contact::ConvexQuartic::isotropic_blend(
-        Dual(values.get("kappa", contact::ConvexQuartic::kappa_closest_to_disc())));
+    parameters.kappa = Dual(values.get("kappa", contact::ConvexQuartic::kappa_closest_to_disc()));
   const auto contact = contact::make_contact_model(model.contact_model, parameters);
 
   const Vec2<S> gravity = setup.gravity.at(-prepared.gravity.z);

@@ -1,6 +1,7 @@
 // A linear release, N = N₀ (1 − t/T), under a constant demand: when the grip gives way.
 #include <gtest/gtest.h>
 
+#include "contact/limit_surface_shapes.hpp"
 #include "tests/support/simple_scenes.hpp"
 
 namespace unhand::contact {
