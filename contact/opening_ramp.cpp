@@ -105,13 +105,6 @@ double chi2(const ForceSeries& s, const Ramp& ramp, std::size_t from, std::size_
   return sum;
 }
 
-double scatter(std::span<const double> y) {
-  std::vector<double> size;
-  for (std::size_t i = 4; i < y.size(); ++i)
-    size.push_back(std::abs(y[i] - 4.0 * y[i - 1] + 6.0 * y[i - 2] - 4.0 * y[i - 3] + y[i - 4]));
-  return size.empty() ? 0.0 : dynamics::median(size) / 0.6745 / std::sqrt(70.0);
-}
-
 std::optional<Descent> last_descent(const ForceSeries& s, double noise, double tail, double peak) {
   const auto n = static_cast<std::ptrdiff_t>(s.size());
   std::ptrdiff_t last = n - 1;

@@ -35,9 +35,6 @@ double chi2(const ForceSeries&, const Ramp&, std::size_t from, std::size_t to);
 /// The first sample at or after t [s].
 std::size_t index_of(const ForceSeries&, double t);
 
-/// σ from fourth differences (variance 70 σ² for white noise) [N].
-double scatter(std::span<const double> value);
-
 /// The last descent of the series from a plateau to the tail: a first guess, and where its plateau begins.
 struct Descent {
   Ramp ramp;

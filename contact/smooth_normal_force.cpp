@@ -5,6 +5,8 @@
 
 #include "contact/opening_ramp.hpp"
 #include "dynamics/spline_fit.hpp"
+#include "dynamics/straight_line.hpp"
+#include "dynamics/white_noise.hpp"
 
 namespace unhand::contact {
 namespace {
@@ -116,17 +118,9 @@ NormalForceFit without_release(const ForceSeries& s, const NormalForceOptions& o
   problem.end = s.time.back();
   const std::array<double, 1> sigma = {s.sigma};
   if (s.size() < 8) {  // too few for a quintic: a straight line
-    double mean_t = 0.0, mean_f = 0.0, cross = 0.0, square = 0.0;
-    for (std::size_t k = 0; k < s.size(); ++k) {
-      mean_t += s.time[k] / static_cast<double>(s.size());
-      mean_f += s.value[k] / static_cast<double>(s.size());
-    }
-    for (std::size_t k = 0; k < s.size(); ++k) {
-      cross += (s.time[k] - mean_t) * (s.value[k] - mean_f);
-      square += (s.time[k] - mean_t) * (s.time[k] - mean_t);
-    }
-    Polynomial::Coefficients line = constant(mean_f + cross / square * (problem.begin - mean_t));
-    line[1][0] = cross / square;
+    const auto fitted = dynamics::fit_line(s.time, s.value);
+    Polynomial::Coefficients line = constant(fitted.at(problem.begin));
+    line[1][0] = fitted.slope;
     Pieces p{{problem.begin, problem.end}, {line}, {}};
     p.kinks = sign_changes(Polynomial(p.breaks, p.pieces), problem.begin, problem.end);
     NormalForceFit fit{assemble(s, std::move(p), kInfinity), {}};
@@ -264,7 +258,7 @@ NormalForceFit smooth_normal_force(std::span<const double> time, std::span<const
   std::vector<double> sorted(value.begin(), value.end());
   std::sort(sorted.begin(), sorted.end());
   const double peak = sorted[sorted.size() * 9 / 10];
-  const double natural = scatter(value);
+  const double natural = dynamics::white_noise(value);
   const ForceSeries s{
       time, value,
       std::isfinite(sigma) && sigma > 0.0 ? sigma : std::max(natural, 1e-6 * std::max(1.0, std::abs(peak)))};

@@ -22,6 +22,15 @@ ErrorStatistics statistics_of(const std::vector<double>& errors) {
   return out;
 }
 
+void judge_detach(const PreparedThrow& prepared, ThrowComparison& comparison) {
+  const Prediction& prediction = comparison.prediction;
+  const auto& measured = prepared.measured;
+  if (prediction.release != release::ReleaseOutcome::detached || !measured.detach_twist) return;
+  const double wait = measured.detach_time ? *measured.detach_time - prediction.detach.time : 0.0;
+  comparison.error[0] = prediction.detach.twist.vx + wait * prepared.gravity.x - measured.detach_twist->vx;
+  comparison.error[1] = (prediction.detach.twist.omega - measured.detach_twist->omega) * kDegrees;
+}
+
 namespace {
 
 template <class Keep>
@@ -35,13 +44,7 @@ ErrorStatistics collect(const std::vector<ThrowComparison>& throws, int quantity
 ThrowComparison judge(const PreparedThrow& prepared, const Prediction& prediction) {
   ThrowComparison out{prepared.id, prepared.object, prepared.condition, prepared.split, prediction, {}};
   const MeasuredOutcome& measured = prepared.measured;
-  if (prediction.release == release::ReleaseOutcome::detached && measured.detach_twist) {
-    // A model may let go earlier or later than the pads did: both twists are then compared at the measured
-    // detach, to which the predicted one is carried by gravity (ω does not change in flight).
-    const double wait = measured.detach_time ? *measured.detach_time - prediction.detach.time : 0.0;
-    out.error[0] = prediction.detach.twist.vx + wait * prepared.gravity.x - measured.detach_twist->vx;
-    out.error[1] = (prediction.detach.twist.omega - measured.detach_twist->omega) * kDegrees;
-  }
+  judge_detach(prepared, out);
   if (prediction.landed()) {
     if (measured.landing_x) out.error[2] = prediction.landing.pose.x - *measured.landing_x;
     if (measured.landing_theta)

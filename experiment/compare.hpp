@@ -44,6 +44,11 @@ struct ThrowComparison {
       error[kQuantityCount];  ///< in the units of kQuantities; absent if not measured or not predicted
 };
 
+/// The errors at the detach from the prediction there, if both are known. A model may let go earlier or later
+/// than the pads did: the twists are compared at the measured detach, to which gravity carries the predicted
+/// one (ω does not change in flight).
+void judge_detach(const PreparedThrow& prepared, ThrowComparison& comparison);
+
 /// A parameter's value in words' terms; sigma is NaN where it is not known.
 struct NamedParameter {
   std::string name, unit;   ///< as a card has them
@@ -57,7 +62,7 @@ struct ModelComparison {
   std::vector<NamedParameter> named;    ///< of a fitted model, in place of estimate.parameters; else empty
   bool from_card{};                     ///< the parameters are a card's
   std::vector<ThrowComparison> throws;  ///< in the order of the log
-  int failed{};  ///< throws that the model does not bring to a landing; they are in no statistic
+  int failed{};  ///< throws without a predicted landing: at most their detach is in a statistic
   double microseconds_per_throw{};  ///< release and flight, one thread's time
 
   /// Over the throws of one split; `quantity` is a place in kQuantities.

@@ -3,23 +3,18 @@
 #include <Eigen/QR>
 #include <cmath>
 
+#include "dynamics/straight_line.hpp"
+
 namespace unhand::experiment {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 FittedLine fit_line(std::span<const double> t, std::span<const double> y, double sigma) {
-  const auto n = static_cast<double>(t.size());
-  double t_mean = 0, y_mean = 0, tt = 0, ty = 0;
-  for (std::size_t i = 0; i < t.size(); ++i) t_mean += t[i] / n, y_mean += y[i] / n;
-  for (std::size_t i = 0; i < t.size(); ++i) {
-    tt += (t[i] - t_mean) * (t[i] - t_mean);
-    ty += (t[i] - t_mean) * (y[i] - y_mean);
-  }
-  FittedLine line;
-  line.v = ty / tt;
-  line.p = y_mean - line.v * t_mean;
-  line.covariance << 1 / n + t_mean * t_mean / tt, -t_mean / tt, -t_mean / tt, 1 / tt;
+  const dynamics::StraightLine fitted = dynamics::fit_line(t, y);
+  const double n = static_cast<double>(t.size()), mean = fitted.mean_time, spread = fitted.spread;
+  FittedLine line{fitted.at(0), fitted.slope, {}};
+  line.covariance << 1 / n + mean * mean / spread, -mean / spread, -mean / spread, 1 / spread;
   line.covariance *= sigma * sigma;
   return line;
 }

@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
+
+#include "dynamics/straight_line.hpp"
 
 namespace unhand::experiment {
 
@@ -19,23 +20,6 @@ std::array<double, 3> sigma_of(const Series& series) {
   if (series.sigma.size() == 3) return {series.sigma[0], series.sigma[1], series.sigma[2]};
   if (series.sigma.size() == 1) return {series.sigma[0], series.sigma[0], series.sigma[0]};
   return {0, 0, 0};
-}
-
-/// Straight line y ≈ a + b t.
-struct Line {
-  double a{}, b{};
-};
-Line fit_line(const std::vector<double>& t, const std::vector<double>& y) {
-  const double n = static_cast<double>(t.size());
-  const double tm = std::accumulate(t.begin(), t.end(), 0.0) / n,
-               ym = std::accumulate(y.begin(), y.end(), 0.0) / n;
-  double tt = 0, ty = 0;
-  for (std::size_t i = 0; i < t.size(); ++i) {
-    tt += (t[i] - tm) * (t[i] - tm);
-    ty += (t[i] - tm) * (y[i] - ym);
-  }
-  const double b = ty / tt;
-  return {ym - b * tm, b};
 }
 
 /// The state at `detach` of the free flight that explains the motion capture from `from` on. Drag enters as a
@@ -63,9 +47,10 @@ void measure_flight(const datasets::Throw& logged, double from, double detach, P
       xs[i] = x[i] - drag_x[i] - 0.5 * out.gravity.x * t[i] * t[i];
       zs[i] = z[i] - drag_z[i] - 0.5 * out.gravity.z * t[i] * t[i];
     }
-    const Line lx = fit_line(t, xs), lz = fit_line(t, zs), lt = fit_line(t, theta);
-    pose = {lx.a, lz.a, lt.a};
-    twist = {lx.b, lz.b, lt.b};
+    const auto lx = dynamics::fit_line(t, xs), lz = dynamics::fit_line(t, zs),
+               lt = dynamics::fit_line(t, theta);
+    pose = {lx.at(0), lz.at(0), lt.at(0)};
+    twist = {lx.slope, lz.slope, lt.slope};
     if (out.drag_k <= 0) break;
     const flight::FlightProblem<double> with{pose, twist, out.gravity, out.drag_k, out.landing_height,
                                              {},   30};

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "dynamics/straight_line.hpp"
+#include "experiment/outcome_slopes.hpp"
 #include "experiment/parallel.hpp"
 #include "fitting/before_release.hpp"
 
@@ -21,25 +23,18 @@ namespace {
 using Matrix = Eigen::MatrixXd;
 using Index = Eigen::Index;
 
-constexpr Index kOutcomes = 7;  // in the order of OutcomeSigma
-template <class S>
-std::array<S, kOutcomes> outcomes_of(const experiment::ThrowPrediction<S>& p) {
-  return {p.detach.time,    p.detach.twist.vx,    p.detach.twist.vz,    p.detach.twist.omega,
-          p.landing.pose.x, p.landing.pose.theta, p.landing.flight_time};
-}
-
 /// ∂(outcomes)/∂(campaign, own), or nothing where a simulation with dual numbers has no answer.
 std::optional<Matrix> slopes(const CampaignProblem& problem, const CampaignThrow& thrown,
                              const std::vector<double>& campaign, const std::vector<double>& own) {
-  Matrix out = Matrix::Zero(kOutcomes, static_cast<Index>(campaign.size() + own.size()));
+  Matrix out = Matrix::Zero(experiment::kOutcomeCount, static_cast<Index>(campaign.size() + own.size()));
   bool landed = true;
   problem.differentiate(thrown.prepared, {}, campaign, own, [&](const auto& p, std::span<const int> by) {
     landed = p.landed();
     if (!landed) return false;
-    const auto y = outcomes_of(p);
+    const auto y = experiment::outcomes_of(p);
     for (std::size_t k = 0; k < by.size(); ++k)
-      for (Index i = 0; i < kOutcomes; ++i)
-        out(i, by[k]) = y[static_cast<std::size_t>(i)].v[static_cast<Index>(k)];
+      for (std::size_t i = 0; i < y.size(); ++i)
+        out(static_cast<Index>(i), by[k]) = y[i].v[static_cast<Index>(k)];
     return true;
   });
   if (!landed || !out.allFinite()) return {};
@@ -59,20 +54,6 @@ std::optional<OutcomeSigma> sigma_of(const CampaignProblem& problem, const Campa
   const Eigen::VectorXd s = variance.diagonal().cwiseMax(0.0).cwiseSqrt();
   if (!s.allFinite()) return {};
   return OutcomeSigma{s[0], s[1], s[2], s[3], s[4], s[5], s[6]};
-}
-
-double slope(const std::vector<double>& t, const std::vector<double>& y) {
-  const auto n = static_cast<double>(t.size());
-  double tm = 0, ym = 0, tt = 0, ty = 0;
-  for (std::size_t i = 0; i < t.size(); ++i) {
-    tm += t[i] / n;
-    ym += y[i] / n;
-  }
-  for (std::size_t i = 0; i < t.size(); ++i) {
-    tt += (t[i] - tm) * (t[i] - tm);
-    ty += (t[i] - tm) * (y[i] - ym);
-  }
-  return ty / tt;
 }
 
 /// Mocap of the flight and the landing: what errors are read from.
@@ -102,14 +83,11 @@ void judge(const experiment::PreparedThrow& prepared, const experiment::Observat
     }
   }
   const bool seen = time[0].size() >= 4;
-  const auto& twist = prepared.measured.detach_twist;
   if (seen) {
-    out.error[0] = slope(time[0], residual[0]);
-    out.error[1] = slope(time[1], residual[1]) * kDegrees;
-  } else if (p.release == release::ReleaseOutcome::detached && twist) {
-    const double wait = prepared.measured.detach_time ? *prepared.measured.detach_time - p.detach.time : 0.0;
-    out.error[0] = p.detach.twist.vx + wait * prepared.gravity.x - twist->vx;
-    out.error[1] = (p.detach.twist.omega - twist->omega) * kDegrees;
+    out.error[0] = dynamics::fit_line(time[0], residual[0]).slope;
+    out.error[1] = dynamics::fit_line(time[1], residual[1]).slope * kDegrees;
+  } else {
+    experiment::judge_detach(prepared, out);
   }
 }
 

@@ -7,32 +7,20 @@
 #include <string>
 #include <utility>
 
-#include "dynamics/median.hpp"
 #include "dynamics/spline_fit.hpp"
+#include "dynamics/white_noise.hpp"
 
 namespace unhand::release {
 namespace {
 
 using Columns = std::array<double, 3>;
 
-// Scatter of a column that no smooth motion makes: fourth differences of white noise have variance 70 σ², and
-// the median forgives the few that straddle a jump.
-double high_frequency_scatter(std::span<const double> rows, int column) {
-  const std::size_t n = rows.size() / 3;
-  std::vector<double> size;
-  for (std::size_t i = 4; i < n; ++i) {
-    const auto y = [&](std::size_t k) { return rows[(i - k) * 3 + column]; };
-    size.push_back(std::abs(y(0) - 4.0 * y(1) + 6.0 * y(2) - 4.0 * y(3) + y(4)));
-  }
-  return size.empty() ? 0.0 : dynamics::median(size) / 0.6745 / std::sqrt(70.0);
-}
-
 Columns sigma_to_use(std::span<const double> rows, const Columns& declared) {
   Columns out;
   for (int c = 0; c < 3; ++c)
     out[c] = std::isfinite(declared[c]) && declared[c] > 0.0
                  ? declared[c]
-                 : std::max(1e-6, high_frequency_scatter(rows, c));
+                 : std::max(1e-6, dynamics::white_noise(rows, c, 3));
   return out;
 }
 
@@ -281,7 +269,7 @@ HandFit fit_hand_motion(const HandSeries& s, std::span<const double> declared,
     // A declaration may be too optimistic; a false jump would be worse than a missed one.
     Columns cautious = sigma_a;
     for (int c = 0; c < 3; ++c)
-      cautious[c] = std::max(cautious[c], high_frequency_scatter(s.acceleration, c));
+      cautious[c] = std::max(cautious[c], dynamics::white_noise(s.acceleration, c, 3));
     const std::vector<Found> found = find_jumps(s, cautious, options);
     for (std::size_t i = 0; i < found.size(); ++i) {
       const std::size_t least = i > 0 ? found[i - 1].gap : 0,

@@ -1,0 +1,45 @@
+// Small tools on series: the straight line, and the noise on a smooth quantity.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "dynamics/straight_line.hpp"
+#include "dynamics/white_noise.hpp"
+
+namespace {
+
+using namespace unhand::dynamics;
+
+TEST(StraightLine, MinimisesTheSquares) {
+  const std::vector<double> t{0.1, 0.4, 0.5, 1.2}, y{1, 3, 2, 5};
+  const StraightLine line = fit_line(t, y);
+  double sum = 0, moment = 0;  // the residuals are orthogonal to 1 and t
+  for (std::size_t i = 0; i < t.size(); ++i) {
+    sum += y[i] - line.at(t[i]);
+    moment += (y[i] - line.at(t[i])) * t[i];
+  }
+  EXPECT_NEAR(sum, 0, 1e-14);
+  EXPECT_NEAR(moment, 0, 1e-14);
+  EXPECT_NEAR(line.at(1) - line.at(0), line.slope, 1e-14);
+}
+
+TEST(WhiteNoise, IsToldFromASmoothMotionWithAJump) {
+  constexpr double kSigma = 0.01;
+  constexpr int kCount = 4000;
+  std::mt19937 random(7);
+  std::normal_distribution<double> noise(0, kSigma);
+  std::vector<double> both;  // two columns: noisy, and not
+  for (int i = 0; i < kCount; ++i) {
+    const double t = 1e-3 * i, smooth = std::sin(5 * t) + (t > 2 ? 1 : 0);
+    both.push_back(smooth + noise(random));
+    both.push_back(smooth);
+  }
+  // The median of n correlated differences is known to some 2/sqrt(n).
+  EXPECT_NEAR(white_noise(both, 0, 2), kSigma, 3 * 2 / std::sqrt(kCount) * kSigma);
+  EXPECT_LT(white_noise(both, 1, 2), 1e-6 * kSigma);
+  EXPECT_EQ(white_noise(std::vector<double>{1, 2, 3, 4}), 0);
+}
+
+}  // namespace
