@@ -24,6 +24,9 @@ Columns sigma_to_use(std::span<const double> rows, const Columns& declared) {
   return out;
 }
 
+// Samples on each side of a jump: of strong ones, and of weak but noisy ones.
+constexpr std::array<std::size_t, 3> kReaches = {6, 14, 32};
+
 // Polynomials of degree < kTerms fitted to samples [first, last) of the three columns, in an orthonormal
 // basis of those samples, and extrapolated to one instant.
 constexpr int kTerms = 4;
@@ -41,7 +44,7 @@ LocalFit fit_locally(const HandSeries& s, std::span<const double> rows, const Co
   // three-term recurrence: p_{k+1} = (x − a_k) p_k − b_k p_{k−1}
   const double origin = s.time[first], scale = 1.0 / (s.time[last - 1] - s.time[first]);
   const std::size_t n = last - first;
-  std::array<double, 64> p, q{};
+  std::array<double, 3 * kReaches.back()> p, q{};  // twice the reach, and a jump sought one reach aside
   p.fill(1.0);
   double pa = 1.0, qa = 0.0, norm_before = 1.0;
   const double x_at = (at - origin) * scale;
@@ -106,9 +109,6 @@ Step step_at(const HandSeries& s, std::span<const double> rows, const Columns& s
   }
   return step;
 }
-
-constexpr std::array<std::size_t, 3> kReaches = {
-    6, 14, 32};  // samples on each side: strong, and weak but noisy jumps
 
 // Gaps k (between samples k − 1 and k) where the acceleration jumps, with the reach that showed each.
 struct Found {

@@ -135,6 +135,20 @@ TEST(FitHandMotion, FindsWeakJumps) {
   EXPECT_NEAR(fit.jumps[0], 0.05, 1e-12);
 }
 
+TEST(FitHandMotion, FindsJumpsThatOnlyTheLongestStretchesShow) {
+  std::mt19937_64 random(13);
+  constexpr int kRuns = 40;
+  int found = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    Swing swing;
+    swing.t_jump = 0.15;
+    swing.after = swing.before + 12.0 * 0.05;  // 8 σ of the difference of two cubics through 14 samples each
+    const HandFit fit = fit_hand_motion(record(swing, -0.01, 311, {1e-4, 2e-3, 0.05}, &random).series());
+    found += fit.jumps.size() == 1 && std::abs(fit.jumps[0] - 0.15) < 0.01;
+  }
+  EXPECT_GE(found, kRuns - 2);
+}
+
 TEST(FitHandMotion, FindsJumpsInNoiseWithoutInventingAny) {
   std::mt19937_64 random(11);
   int found = 0, misplaced = 0, invented = 0;
