@@ -45,7 +45,7 @@ const ReleaseRun::Fitted& ReleaseRun::fitted(const std::string& model) {
   out.card = card_of(problem, fit, out.comparison, request_.log, log_);
   out.comparison.estimate.method = fmt::format("fitted to the train throws: {}", to_string(fit.outcome));
   out.comparison.estimate.samples = static_cast<int>(fit.samples);
-  out.comparison.estimate.scatter = std::sqrt(fit.chi2_per_dof());
+  out.comparison.estimate.scatter = std::sqrt(fit.chi2_per_dof().value_or(1));
   return fitted_.emplace(model, std::move(out)).first->second;
 }
 

@@ -224,7 +224,7 @@ std::string discovery_text(const Discovery& found, const std::string& log) {
     table.rows.push_back({name, fmt::format("{:.5f}", e.landing_x_mae),
                           fmt::format("{:.3f}", e.landing_theta_mae), fmt::format("{:.5f}", e.detach_vx_mae),
                           fmt::format("{:.3f}", e.detach_omega_mae), fmt::format("{:.6f}", e.trajectory_rms),
-                          fmt::format("{:.3f}", e.chi2_per_dof)});
+                          fixed(e.chi2_per_dof, 3)});
   };
   row(fmt::format("before, train ({})", found.before_train.n), found.before_train);
   row(fmt::format("before, test ({})", found.before_test.n), found.before_test);

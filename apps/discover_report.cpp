@@ -128,8 +128,7 @@ Table error_table(const Discovery& found) {
     table.rows.push_back({name, std::to_string(e.n), fmt::format("{:.2f}", 1e3 * e.landing_x_mae),
                           fmt::format("{:.3f}", e.landing_theta_mae), fmt::format("{:.5f}", e.detach_vx_mae),
                           fmt::format("{:.3f}", e.detach_omega_mae),
-                          fmt::format("{:.3f}", 1e3 * e.trajectory_rms),
-                          fmt::format("{:.3f}", e.chi2_per_dof)});
+                          fmt::format("{:.3f}", 1e3 * e.trajectory_rms), fixed(e.chi2_per_dof, 3)});
   };
   row("before, train", found.before_train);
   row("before, test", found.before_test);

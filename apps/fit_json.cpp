@@ -105,7 +105,7 @@ Json fit_json(const FitAnswer& a, const FitRequest& request) {
   out["chi2"] = {{"value", fit.chi2},
                  {"samples", fit.samples},
                  {"degrees_of_freedom", fit.degrees_of_freedom},
-                 {"per_degree_of_freedom", fit.chi2_per_dof()}};
+                 {"per_degree_of_freedom", number(fit.chi2_per_dof())}};
   Json& misfit = out["chi2_by_channel"] = Json::array();
   for (const auto& m : fit.misfit)
     misfit.push_back({{"phase", to_string(m.phase)},

@@ -114,8 +114,8 @@ std::string fit_text(const FitAnswer& a, const FitRequest& request, bool markdow
     out += fmt::format("correlated: {} and {}, {:+.3f}\n", pair.first, pair.second, pair.value);
   if (!fit.open.empty() || !fitting::strong_correlations(fit).empty()) out += "\n";
   out += table(spread_table(a)) + "\n";
-  out += fmt::format("{}\nchi2 {:.6g} for {} degrees of freedom: {:.3f} each\n", table(misfit_table(fit)),
-                     fit.chi2, fit.degrees_of_freedom, fit.chi2_per_dof());
+  out += fmt::format("{}\nchi2 {:.6g} for {} degrees of freedom: {} each\n", table(misfit_table(fit)),
+                     fit.chi2, fit.degrees_of_freedom, fixed(fit.chi2_per_dof(), 3));
   if (fit.mode_changes > 0)
     out += fmt::format("{} throws changed their sequence of modes in the last round\n", fit.mode_changes);
   std::string outliers;

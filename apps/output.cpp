@@ -57,6 +57,10 @@ void put_in_place(const fs::path& made, const fs::path& destination) {
 }  // namespace
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+Json number(const std::optional<double>& value) { return value ? number(*value) : Json(nullptr); }
+std::string fixed(const std::optional<double>& value, int digits) {
+  return value ? fmt::format("{:.{}f}", *value, digits) : "-";
+}
 
 void write_text(const fs::path& file, const std::string& content) {
   std::ofstream out(file, std::ios::binary);

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,6 +17,9 @@ using Json = nlohmann::ordered_json;
 
 /// A number as JSON, which knows neither NaN nor infinity: those are null.
 Json number(double value);
+Json number(const std::optional<double>& value);
+/// With so many digits after the point; "-" where there is none.
+std::string fixed(const std::optional<double>& value, int digits);
 
 inline std::string json_text(const Json& value) { return value.dump(1) + "\n"; }
 

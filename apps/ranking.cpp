@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "apps/report_page.hpp"
+#include "fitting/distributions.hpp"
 
 namespace unhand::apps {
 
@@ -69,16 +70,18 @@ std::string effect_text(const fitting::AcceptedEffect& effect) {
     out += fmt::format("\n  or {} (footprints correlate by {:.4f})", id, correlation);
   for (const auto& p : effect.parameters)
     out += fmt::format("\n  {} = {:.6g} +- {:.2g} {}", p.name, p.value, p.sigma, p.unit);
-  return out + fmt::format("\n  BIC {:+.1f}, p {:.2g}; held out: {}\n", effect.delta_bic, effect.p_value,
-                           effect.why);
+  const std::string p = effect.p_value ? fmt::format(", p {:.2g}", *effect.p_value) : "";
+  return out + fmt::format("\n  BIC {:+.1f}{}; held out: {}\n", effect.delta_bic, p, effect.why);
 }
 
 std::string effect_html(const fitting::AcceptedEffect& effect) {
   std::string out = fmt::format("<h3>{}</h3><p>", escaped(effect.id));
   for (const auto& p : effect.parameters)
     out += fmt::format("{} = {:.6g} &plusmn; {:.2g} {} (95 %: {:.6g} to {:.6g})<br>", escaped(p.name),
-                       p.value, p.sigma, escaped(p.unit), p.value - 1.96 * p.sigma, p.value + 1.96 * p.sigma);
-  out += fmt::format("BIC {:+.1f}, p = {:.2g}. On held-out data: {}.</p>\n", effect.delta_bic, effect.p_value,
+                       p.value, p.sigma, escaped(p.unit), p.value - fitting::kNormal95 * p.sigma,
+                       p.value + fitting::kNormal95 * p.sigma);
+  const std::string p_value = effect.p_value ? fmt::format(", p = {:.2g}", *effect.p_value) : "";
+  out += fmt::format("BIC {:+.1f}{}. On held-out data: {}.</p>\n", effect.delta_bic, p_value,
                      escaped(effect.why));
   for (const auto& [id, correlation] : effect.equivalent)
     out +=

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -49,6 +50,29 @@ VectorXd pseudo_solve(const MatrixXd& A, const VectorXd& b) {
   VectorXd x = pseudo_inverse(A) * b;
   for (Index k = 0; k < x.size(); ++k)
     if (!(A(k, k) > 0)) x[k] = 0;
+  return x;
+}
+
+VectorXd pseudo_solve(const MatrixXd& A, const VectorXd& b, const std::vector<int>& sides) {
+  VectorXd x = pseudo_solve(A, b);
+  const auto allowed = [&](Index k, double value) {
+    return sides[static_cast<std::size_t>(k)] * value < 0 ? 0 : value;
+  };
+  bool outside = false;
+  for (Index k = 0; k < x.size(); ++k) outside |= allowed(k, x[k]) != x[k];
+  if (!outside) return x;
+  for (Index k = 0; k < x.size(); ++k) x[k] = allowed(k, x[k]);
+  constexpr int kMostSweeps = 500;
+  for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
+    double moved = 0;  // the largest step, by what it takes off the minimum
+    for (Index k = 0; k < x.size(); ++k) {
+      if (!(A(k, k) > 0)) continue;
+      const double next = allowed(k, x[k] + (b[k] - A.row(k).dot(x)) / A(k, k));
+      moved = std::max(moved, A(k, k) * (next - x[k]) * (next - x[k]));
+      x[k] = next;
+    }
+    if (!(moved > 1e-20 * std::abs(b.dot(x)))) break;
+  }
   return x;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 namespace unhand::fitting {
 
@@ -13,6 +14,11 @@ Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& A);
 
 /// The least x, in the same units, that minimises xᵀAx − 2 bᵀx; zero where A's diagonal is.
 Eigen::VectorXd pseudo_solve(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
+
+/// The same where x_k may not be negative (`sides[k]` 1), not positive (−1), or is free (0): by coordinate
+/// descent, which converges, since the problem is convex.
+Eigen::VectorXd pseudo_solve(const Eigen::MatrixXd& A, const Eigen::VectorXd& b,
+                             const std::vector<int>& sides);
 
 /// H⁻¹ B for a symmetric positive definite H (LDLᵀ). Where H is singular the answer is not finite or large:
 /// callers add a prior to H's diagonal, or ask allFinite().

@@ -139,9 +139,11 @@ struct FitResult {
   int iterations{};                      ///< of the solver, over all rounds
   int mode_changes{};  ///< throws whose modes differ between the start and the end of the last round
   double seconds{}, jacobian_seconds{};  ///< the second summed over threads
-  /// 1 where the model explains everything to its noise.
-  double chi2_per_dof() const {
-    return degrees_of_freedom > 0 ? chi2 / static_cast<double>(degrees_of_freedom) : 0;
+  /// 1 where the model explains everything to its noise; none where there are no more observations than
+  /// unknowns.
+  std::optional<double> chi2_per_dof() const {
+    if (degrees_of_freedom <= 0) return std::nullopt;
+    return chi2 / static_cast<double>(degrees_of_freedom);
   }
   /// Of the campaign's unknowns, in their order and units.
   std::vector<double> values() const;

@@ -59,18 +59,6 @@ datasets::ThrowLog with_split(datasets::ThrowLog log) {
   return log;
 }
 
-OutcomeErrors errors_of(const Stage& stage, Share share, int threads) {
-  OutcomeErrors out = outcome_errors(stage.problem, stage.fit, share, threads);
-  out.chi2_per_dof = (share == Share::test ? stage.held_out : stage.fit).chi2_per_dof();
-  return out;
-}
-
-/// Trajectory RMS after over before, of held-out throws; the landing's where the flight was not seen.
-double error_ratio(const OutcomeErrors& before, const OutcomeErrors& after) {
-  if (before.trajectory_rms > 0) return after.trajectory_rms / before.trajectory_rms;
-  return before.landing_x_mae > 0 ? after.landing_x_mae / before.landing_x_mae : 1;
-}
-
 }  // namespace
 
 Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
@@ -100,7 +88,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
   out.residual_before = residual_over_time(stage.problem, residuals_before);
   out.structure_before = structures(stage.problem, residuals_before);
 
-  OutcomeErrors last = out.before_test;
+  const Stage base = stage;
   for (int step = 0; step < options.most_effects; ++step) {
     if (!out.effects.empty() && !first_misfit(stage.fit, options).any) break;
     auto next = forward(stage, options, out);
@@ -115,18 +103,15 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
         break;
       }
       out.small.reset();
-      last = errors_of(stage, Share::test, threads);
       continue;
     }
     stage = std::move(*next);
     polish(stage, options);
     if (acts_on_pads(stage)) fit_along(stage, options, out);
-    const OutcomeErrors now = errors_of(stage, Share::test, threads);
-    out.effects.back().test_error_ratio = error_ratio(last, now);
-    last = now;
   }
   backward(stage, options, out);
   FitResult counted = withdraw(stage, options, out);
+  judge(stage, base, options, out);
   describe(stage, std::move(counted), options, out);
   for (AcceptedEffect& effect : out.effects)
     for (const auto& [other, correlation] : effect.equivalent) {

@@ -61,7 +61,8 @@ struct OutcomeErrors {
   double detach_vx_mae{};      ///< [m/s]
   double detach_omega_mae{};   ///< [deg/s]
   double trajectory_rms{};     ///< of the position in flight [m]
-  double chi2_per_dof{};       ///< with the throws' own unknowns fitted
+  std::optional<double>
+      chi2_per_dof;  ///< with the throws' own unknowns fitted, where observations outnumber them
 };
 
 /// A parameter of an accepted effect.
@@ -83,11 +84,11 @@ struct AcceptedEffect {
   std::vector<std::pair<std::string, double>> equivalent;  ///< ids, with the correlation of the footprints
   std::vector<SeparatingExperiment> separating;            ///< the most telling first, for each other name
   std::vector<Parameter> parameters;                       ///< as fitted
-  double delta_bic{};         ///< of the model with it against without: negative speaks for it
-  double p_value{};           ///< of its absence
-  double test_error_ratio{};  ///< held-out error with it over without [-]
-  std::string why;            ///< where the held-out misfit fell, in words
-  Phase phase{};              ///< where it fell most
+  double delta_bic{};             ///< of the model with it against without: negative speaks for it
+  std::optional<double> p_value;  ///< of its absence; none for a law, which replaces another
+  double test_error_ratio{};      ///< held-out error with it over without [-]
+  std::string why;                ///< where the held-out misfit fell, in words
+  Phase phase{};                  ///< where it fell most
 
   /// Another name that the data cannot tell from this one; of several correlations the largest counts.
   void add_other_name(const std::string& other, double correlation);

@@ -53,6 +53,12 @@ std::size_t index_of(const CampaignProblem& problem, const std::string& name) {
   return problem.campaign().size();
 }
 
+void add_column(Candidate& candidate, const Unknown& u, std::size_t column) {
+  candidate.parameters.push_back(u.name);
+  candidate.columns.push_back(column);
+  candidate.sides.push_back(side_of(u.start, u.low, u.high));
+}
+
 }  // namespace
 
 std::vector<double> carried(const FitResult& from, const CampaignProblem& to) {
@@ -95,7 +101,7 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
     const std::vector<double> sizes =
         effect.one_sided ? std::vector<double>{1, 6, 36} : std::vector<double>{1};
     for (const auto& [shape, size] : pairs_of(shapes, sizes)) {
-      Candidate candidate{id, {}, {}, shape};
+      Candidate candidate{id, {}, {}, shape, {}};
       CampaignProblem extended = problem.with(problem.options().model, effects);
       auto campaign = carried(fit, extended);
       for (const auto& [name, value] : shape) campaign[index_of(extended, name)] = value;
@@ -103,8 +109,7 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
       for (std::size_t k = out.fitted; k < campaign.size(); ++k) {
         const std::string& name = extended.campaign()[k].name;
         if (shape.contains(without_object(name))) continue;
-        candidate.parameters.push_back(name);
-        candidate.columns.push_back(width);
+        add_column(candidate, extended.campaign()[k], width);
         if (effect.one_sided) {
           auto stepped = campaign;
           const Unknown& u = extended.campaign()[k];
@@ -127,12 +132,11 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
   Derivative all{extended, carried(fit, extended), {}};
   for (std::size_t k = 0; k < out.fitted; ++k) all.columns.push_back({k, k});
   for (const auto& id : plain) {
-    Candidate candidate{id, {}, {}, {}};
+    Candidate candidate{id, {}, {}, {}, {}};
     for (std::size_t k = out.fitted; k < extended.campaign().size(); ++k) {
       const std::string& name = extended.campaign()[k].name;
       if (name.rfind(id + ".", 0) != 0) continue;
-      candidate.parameters.push_back(name);
-      candidate.columns.push_back(width);
+      add_column(candidate, extended.campaign()[k], width);
       all.columns.push_back({k, width});
       ++width;
     }
@@ -141,7 +145,7 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
   derivatives.insert(derivatives.begin(), std::move(all));
   for (const auto& law : laws) {
     if (law == problem.options().model) continue;
-    out.candidates.push_back({"contact.law:" + law, {""}, {width}, {}});
+    out.candidates.push_back({std::string(kLaw) + law, {""}, {width}, {}, {1}});
     CampaignProblem other = problem.with(law, problem.options().effects);
     auto campaign = carried(fit, other);
     differences.push_back({std::move(other), std::move(campaign), 1});
@@ -231,7 +235,8 @@ std::vector<Score> scores(const Footprints& f) {
     kept.push_back(static_cast<Eigen::Index>(f.residual()));
     const Eigen::MatrixXd G = project(f.gram, range(f.fitted), kept);
     const Eigen::Index n = G.rows() - 1;
-    const Eigen::VectorXd b = -G.col(n).head(n), x = pseudo_solve(G.topLeftCorner(n, n), b);
+    const Eigen::VectorXd b = -G.col(n).head(n),
+                          x = pseudo_solve(G.topLeftCorner(n, n), b, f.candidates[c].sides);
     Score score;
     score.candidate = c;
     score.gain = b.dot(x);
@@ -244,18 +249,18 @@ std::vector<Score> scores(const Footprints& f) {
 
 namespace {
 
-/// Cosine between Σ y_k column_k over `part` and the span of `others`, with `removed` projected out.
+/// Cosine between Σ y_k column_k over `part` and the nearest that `other` can do, with `removed` projected
+/// out.
 double cosine(const Eigen::MatrixXd& gram, const std::vector<Eigen::Index>& removed,
-              const std::vector<Eigen::Index>& part, const Eigen::VectorXd& y,
-              const std::vector<std::size_t>& others) {
+              const std::vector<Eigen::Index>& part, const Eigen::VectorXd& y, const Candidate& other) {
   std::vector<Eigen::Index> kept = part;
-  for (const std::size_t k : others) kept.push_back(static_cast<Eigen::Index>(k));
+  for (const std::size_t k : other.columns) kept.push_back(static_cast<Eigen::Index>(k));
   const Eigen::MatrixXd G = project(gram, removed, kept);
   const Eigen::Index n = y.size(), m = G.rows() - n;
   const double norm = y.dot(G.topLeftCorner(n, n) * y);
   if (!(norm > 0)) return 0;
   const Eigen::VectorXd b = G.bottomLeftCorner(m, n) * y;
-  const double shared = b.dot(pseudo_solve(G.bottomRightCorner(m, m), b));
+  const double shared = b.dot(pseudo_solve(G.bottomRightCorner(m, m), b, other.sides));
   return std::sqrt(std::clamp(shared / norm, 0.0, 1.0));
 }
 
@@ -265,14 +270,14 @@ double correlation(const Footprints& f, const Eigen::VectorXd& contribution, con
   // Fitted columns that take part in the contribution are not projected out.
   std::vector<Eigen::Index> removed, part;
   for (Eigen::Index k = 0; k < contribution.size(); ++k) (contribution[k] != 0 ? part : removed).push_back(k);
-  return cosine(f.gram, removed, part, contribution(part), candidate.columns);
+  return cosine(f.gram, removed, part, contribution(part), candidate);
 }
 
 double between(const Footprints& f, const Candidate& a, const std::vector<double>& step, const Candidate& b) {
   std::vector<Eigen::Index> part;
   for (const std::size_t k : a.columns) part.push_back(static_cast<Eigen::Index>(k));
   const Eigen::Map<const Eigen::VectorXd> y(step.data(), static_cast<Eigen::Index>(step.size()));
-  return cosine(f.gram, range(f.fitted), part, y, b.columns);
+  return cosine(f.gram, range(f.fitted), part, y, b);
 }
 
 }  // namespace unhand::fitting

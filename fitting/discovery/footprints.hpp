@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "experiment/campaign_effects.hpp"
@@ -13,6 +14,10 @@ namespace unhand::fitting {
 
 using experiment::without_object;
 
+/// The candidate "contact.law:MODEL" is another contact law in place of the model's.
+inline constexpr std::string_view kLaw = "contact.law:";
+inline bool is_law(const std::string& id) { return id.starts_with(kLaw); }
+
 /// A candidate for what a model lacks. `columns` index the Gram matrix: derivatives, or for one-sided effects
 /// and contact laws differences per unit.
 struct Candidate {
@@ -20,7 +25,15 @@ struct Candidate {
   std::vector<std::string> parameters;  ///< one per column
   std::vector<std::size_t> columns;     ///< of the Gram matrix
   std::map<std::string, double> shape;  ///< the shape parameters' values that this candidate was taken at
+  /// Per column, on which side of neutral the parameter may be: 1 above, −1 below, 0 either. A law may only
+  /// be gone towards.
+  std::vector<int> sides;
 };
+
+/// For Candidate::sides, from a parameter's accepted range.
+inline int side_of(double neutral, double low, double high) {
+  return low >= neutral ? 1 : high <= neutral ? -1 : 0;
+}
 
 /// Inner products, over all throws used, of whitened columns: the model's unknowns, the candidates', and last
 /// the residual. The throws' own unknowns are projected out of all of them, with their priors.
@@ -38,7 +51,7 @@ struct Footprints {
 Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
                       const std::vector<std::string>& ids, const std::vector<std::string>& laws, int threads);
 
-/// What an effect would take off χ², to first order.
+/// What an effect would take off χ², to first order, with parameters of sizes that there may be.
 struct Score {
   std::size_t candidate{};   ///< its place among the candidates
   double gain{};             ///< the χ² that it would take away, to first order

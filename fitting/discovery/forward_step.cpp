@@ -169,11 +169,13 @@ class ForwardStep {
     for (const auto& [score, bic] : rivals)
       if (score != trial.score && !is_law(id_of(*score)) && bic < trial.next.bic() - kDeltaBic)
         accepted.add_other_name(id_of(*score), between_footprints(*trial.score, *score));
+    if (is_law(accepted.id)) {  // it takes the place of a former one
+      std::erase_if(out_.effects, [](const AcceptedEffect& e) { return is_law(e.id); });
+      std::erase_if(trial.next.ids, [&](const std::string& id) { return is_law(id) && id != accepted.id; });
+    }
     out_.effects.push_back(std::move(accepted));
     return std::move(trial.next);
   }
-
-  static constexpr const char* kPads = "contact.pad_compliance";
 
   const Stage& stage_;
   const DiscoverOptions& options_;

@@ -98,8 +98,8 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   std::string model = out.model;
   std::array<bool, 2> misled{};  // in the hand, in the air
   for (const AcceptedEffect& effect : out.effects) {
-    const bool here =
-        misled[in_air(effect.phase) ? 1 : 0] || is_imitation(effect, stage, counted, out, options);
+    const bool in_company = (misled[0] && acts(effect, false)) || (misled[1] && acts(effect, true));
+    const bool here = in_company || is_imitation(effect, stage, counted, out, options);
     for (const bool air : {false, true}) misled[air ? 1 : 0] |= here && acts(effect, air);
     if (here) {
       gone.push_back(effect.id);
@@ -131,7 +131,7 @@ bool acts_on_pads(const Stage& stage) {
 }
 
 bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out) {
-  const std::string along = "contact.pad_compliance";
+  const std::string along = kPads;
   const auto& model = stage.problem.options().model;
   auto effects = stage.problem.options().effects;
   const bool has_pads = model.starts_with("limit_surface");
@@ -151,6 +151,19 @@ bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   stage = std::move(next);
   out.along.push_back(along);
   return true;
+}
+
+void judge(const Stage& stage, const Stage& base, const DiscoverOptions& options, Discovery& out) {
+  const OutcomeErrors with = errors_of(stage, Share::test, options.fit.threads);
+  const bool alone = stage.ids.size() == 1 && out.along.empty();
+  for (AcceptedEffect& accepted : out.effects) {
+    const auto index = static_cast<std::size_t>(std::find(stage.ids.begin(), stage.ids.end(), accepted.id) -
+                                                stage.ids.begin());
+    const Stage without = alone ? base : reduced(stage, index, options);
+    if (!without.solved()) continue;  // what it was accepted for stands
+    accepted.delta_bic = stage.bic() - without.bic();
+    accepted.test_error_ratio = error_ratio(errors_of(without, Share::test, options.fit.threads), with);
+  }
 }
 
 void describe(Stage& stage, FitResult counted, const DiscoverOptions& options, Discovery& out) {

@@ -41,6 +41,10 @@ bool acts_on_pads(const std::string& id);
 /// Whether such an effect was added.
 bool acts_on_pads(const Stage& stage);
 
+/// What speaks for every accepted effect in the end: the answer with it against the answer without it, which
+/// is `base` where there is no other.
+void judge(const Stage& stage, const Stage& base, const DiscoverOptions& options, Discovery& out);
+
 /// Values, significance and other names of what was accepted. From here on the fit of the stage is `counted`,
 /// what withdraw returned.
 void describe(Stage& stage, FitResult counted, const DiscoverOptions& options, Discovery& out);

@@ -25,27 +25,23 @@ constexpr double kRepetitions = 10;
 class Pair {
  public:
   Pair(const Stage& stage, const std::string& other)
-      : stage_(stage), values_(stage.fit.values()), other_(stage.problem), width_(values_.size()) {
-    auto effects = stage.problem.options().effects;
-    std::string law = stage.problem.options().model;
-    if (is_law(other)) {
-      law = other.substr(std::string("contact.law:").size());
-    } else {
-      effects.push_back(other);
-      differs_ = find_effect(other).one_sided;
-    }
-    other_ = stage.problem.with(law, effects);
-    other_values_ = carried(stage.fit, other_);
-    differs_ = differs_ || is_law(other);
+      : stage_(stage),
+        values_(stage.fit.values()),
+        other_(extended_problem(stage.problem, other)),
+        width_(values_.size()),
+        other_values_(carried(stage.fit, other_)),
+        law_(is_law(other)) {
+    if (law_) return;
+    const auto effect = find_effect(other);
+    differs_ = effect.one_sided;
     for (std::size_t k = values_.size(); k < other_values_.size(); ++k) {
-      const auto effect = find_effect(other);
       const auto& name = other_.campaign()[k].name;
       for (const auto& p : effect.parameters)
         if (without_object(name) == effect.full_name(p) && !p.is_shape()) added_.push_back(k);
     }
   }
   /// Columns besides the model's own.
-  std::size_t added() const { return is_law_alone() ? 1 : added_.size(); }
+  std::size_t added() const { return law_ ? 1 : added_.size(); }
 
   /// JᵀJ with the throw's own unknowns eliminated; zero columns for the residual. Empty if it cannot be
   /// simulated.
@@ -55,7 +51,7 @@ class Pair {
     const auto w = static_cast<Eigen::Index>(width_), n = static_cast<Eigen::Index>(added());
     Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(l.residual.size(), w + n + 1);
     columns.leftCols(w) = l.campaign;
-    if (!differs_) {
+    if (!law_ && !differs_) {
       const auto m = other_.linearise(thrown, other_values_, own, true);
       if (!m.solved) return std::nullopt;
       for (Eigen::Index k = 0; k < n; ++k)
@@ -64,7 +60,7 @@ class Pair {
       for (Eigen::Index k = 0; k < n; ++k) {
         auto stepped = other_values_;
         double step = 1;
-        if (!is_law_alone()) {
+        if (!law_) {
           const std::size_t at = added_[static_cast<std::size_t>(k)];
           step = other_.campaign()[at].scale;
           stepped[at] += step;
@@ -83,7 +79,15 @@ class Pair {
     f.fitted = width_;
     f.gram = gram;
     Candidate candidate;
-    for (std::size_t k = 0; k < added(); ++k) candidate.columns.push_back(width_ + k);
+    for (std::size_t k = 0; k < added(); ++k) {
+      candidate.columns.push_back(width_ + k);
+      if (law_) {
+        candidate.sides.push_back(1);
+        continue;
+      }
+      const Unknown& u = other_.campaign()[added_[k]];
+      candidate.sides.push_back(side_of(u.start, u.low, u.high));
+    }
     const dynamics::Effect effect = find_effect(accepted.id);
     Eigen::VectorXd contribution = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(width_));
     for (std::size_t k = 0; k < width_; ++k)
@@ -94,15 +98,14 @@ class Pair {
   }
 
  private:
-  bool is_law_alone() const { return other_values_.size() == values_.size(); }
-
   const Stage& stage_;
   std::vector<double> values_;
   CampaignProblem other_;
   std::size_t width_;
   std::vector<double> other_values_;
-  std::vector<std::size_t> added_;
-  bool differs_{};
+  bool law_;                        // one column: what the other law would do, at its start
+  std::vector<std::size_t> added_;  // an effect's unknowns
+  bool differs_{};                  // their footprints are differences
 };
 
 /// The motion `speed` times as fast, about the pose at which the gripper is told to open. Wrenches and poses

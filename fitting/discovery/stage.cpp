@@ -56,6 +56,17 @@ PredictionGain prediction_gain(const Stage& before, const Stage& after, const Di
                          options.fit.threads);
 }
 
+OutcomeErrors errors_of(const Stage& stage, Share share, int threads) {
+  OutcomeErrors out = outcome_errors(stage.problem, stage.fit, share, threads);
+  out.chi2_per_dof = (share == Share::test ? stage.held_out : stage.fit).chi2_per_dof();
+  return out;
+}
+
+double error_ratio(const OutcomeErrors& before, const OutcomeErrors& after) {
+  if (before.trajectory_rms > 0) return after.trajectory_rms / before.trajectory_rms;
+  return before.landing_x_mae > 0 ? after.landing_x_mae / before.landing_x_mae : 1;
+}
+
 bool held_out_confirms(const Stage& before, const Stage& after) {
   constexpr double kConfirmed = 20;  // times as likely
   return deviance(before.held_out) - deviance(after.held_out) > 2 * std::log(kConfirmed);
@@ -70,7 +81,7 @@ double give_per_compliance(const Stage& stage) {
 
 double give_of(const Stage& stage) {
   for (const auto& u : stage.fit.campaign)
-    if (u.unknown.name == "contact.pad_compliance.compliance") return u.value * give_per_compliance(stage);
+    if (u.unknown.name == std::string(kPads) + ".compliance") return u.value * give_per_compliance(stage);
   return 0;
 }
 
@@ -138,15 +149,17 @@ void polish(Stage& stage, const DiscoverOptions& options) {
   }
 }
 
+CampaignProblem extended_problem(const CampaignProblem& problem, const std::string& id) {
+  const auto& options = problem.options();
+  if (is_law(id)) return problem.with(id.substr(kLaw.size()), options.effects);
+  auto effects = options.effects;
+  effects.push_back(id);
+  return problem.with(options.model, effects);
+}
+
 Stage extended(const Stage& stage, const Candidate& candidate, const Score& score,
                const DiscoverOptions& options) {
-  auto effects = stage.problem.options().effects;
-  std::string law = stage.problem.options().model;
-  if (is_law(candidate.id))
-    law = candidate.id.substr(std::string("contact.law:").size());
-  else
-    effects.push_back(candidate.id);
-  Stage out{stage.problem.with(law, effects), {}, {}, stage.ids};
+  Stage out{extended_problem(stage.problem, candidate.id), {}, {}, stage.ids};
   out.ids.push_back(candidate.id);
   std::vector<double> start = carried(stage.fit, out.problem), typical = out.problem.start();
   for (std::size_t k = 0; k < start.size(); ++k) {
@@ -178,8 +191,10 @@ Stage extended(const Stage& stage, const Candidate& candidate, const Score& scor
 
 Stage reduced(const Stage& stage, std::size_t index, const DiscoverOptions& options) {
   auto effects = stage.problem.options().effects;
-  effects.erase(std::find(effects.begin(), effects.end(), stage.ids[index]));
-  Stage out{stage.problem.with(stage.problem.options().model, effects), {}, {}, stage.ids};
+  std::erase(effects, stage.ids[index]);
+  const std::string& model =
+      is_law(stage.ids[index]) ? options.campaign.model : stage.problem.options().model;
+  Stage out{stage.problem.with(model, effects), {}, {}, stage.ids};
   out.ids.erase(out.ids.begin() + static_cast<std::ptrdiff_t>(index));
   solve(out, options, carried(stage.fit, out.problem));
   return out;
@@ -241,10 +256,10 @@ Improvement law_improvement(const FitResult& before, const FitResult& after,
     if (at_base > 0 && left < kRest * at_base) continue;  // explained
     fall += b.n * (b.chi2_per_sample() - misfit_in(after.misfit, b.channel, b.phase));
   }
-  fall /= static_cast<double>(std::max(1L, before.degrees_of_freedom));
-  const double was = before.chi2_per_dof();
-  return {fall / (options.law_matters * was), fall,
-          fmt::format("chi2 of all channels: {:.4g} to {:.4g} per degree of freedom", was, was - fall)};
+  const double was = before.chi2, per = static_cast<double>(std::max(1L, before.samples));
+  if (!(was > 0)) return {};
+  return {fall / (options.law_matters * was), fall / per,
+          fmt::format("chi2 of all channels: {:.4g} to {:.4g} per sample", was / per, (was - fall) / per)};
 }
 
 double wald_p_value(const FitResult& fit, const dynamics::Effect& effect) {

@@ -30,6 +30,11 @@ double deviance(const FitResult& fit);
 /// Of the held-out throws.
 PredictionGain prediction_gain(const Stage& before, const Stage& after, const DiscoverOptions& options);
 
+/// What the stage predicts wrongly, and χ² per degree of freedom.
+OutcomeErrors errors_of(const Stage& stage, Share share, int threads);
+/// Trajectory rms after over before; the landing's where the flight was not seen.
+double error_ratio(const OutcomeErrors& before, const OutcomeErrors& after);
+
 /// Whether held-out throws speak for an improvement: their likelihood is twenty times as large. A threshold,
 /// and no bound on how often chance gets there: each model fits the held-out throws' own unknowns and takes
 /// the variances of their channels from them, and Markov's inequality does not hold for likelihoods that are
@@ -39,15 +44,19 @@ bool held_out_confirms(const Stage& before, const Stage& after);
 /// Evidence (difference of Bayes' criterion) that an effect needs before it is accepted or kept.
 inline constexpr double kDeltaBic = -10;
 
+/// The give of the pads.
+inline constexpr const char* kPads = "contact.pad_compliance";
 /// The give of pads before they slip, under the grip's friction limit, from where on it is an effect like any
 /// other [m].
 inline constexpr double kMostGive = 3e-5;
-/// That give per contact.pad_compliance [N]: the friction limit of all pads at the campaign's grip force.
+/// That give per unit of the effect [N]: the friction limit of all pads at the campaign's grip force.
 double give_per_compliance(const Stage& stage);
-/// The give of a fit's pads [m]; 0 where it has no contact.pad_compliance.
+/// The give of a fit's pads [m]; 0 where it has none.
 double give_of(const Stage& stage);
 
-inline bool is_law(const std::string& id) { return id.rfind("contact.law:", 0) == 0; }
+/// The problem with an effect more, or with another contact law.
+CampaignProblem extended_problem(const CampaignProblem& problem, const std::string& id);
+
 bool is_wrench(experiment::Channel);
 
 /// Fits the train throws from `start`; whether there is an answer. A shape
@@ -68,7 +77,7 @@ void polish(Stage& stage, const DiscoverOptions& options);
 /// where that gains nothing over a base with a misfit, once more from the problem's own start.
 Stage extended(const Stage& stage, const Candidate& candidate, const Score& score, const DiscoverOptions&);
 
-/// The stage without the effect `ids[index]`.
+/// The stage without `ids[index]`: an effect, or the law that took the place of the model to begin with.
 Stage reduced(const Stage& stage, std::size_t index, const DiscoverOptions&);
 
 /// Whether a channel leaves anything to explain in a phase: more than `matters` beyond the noise, and more

@@ -65,17 +65,22 @@ class Search {
       const Candidate& c = f.total.candidates[s.candidate];
       std::vector<Index> columns;
       for (std::size_t k = 0; k < f.total.fitted; ++k) columns.push_back(static_cast<Index>(k));
-      const auto own = indices(c.columns);
+      std::vector<std::size_t> inside;  // parameters that do not want to where there are none
+      std::vector<int> sides;
+      for (std::size_t j = 0; j < c.columns.size(); ++j)
+        if (c.sides[j] == 0 || s.step[j] != 0) inside.push_back(c.columns[j]), sides.push_back(c.sides[j]);
+      const auto own = indices(inside);
       columns.insert(columns.end(), own.begin(), own.end());
       Scored one{s.candidate, s.gain, 1,
                  Eigen::Map<const VectorXd>(s.step.data(), static_cast<Index>(s.step.size()))};
-      if (s.visible) {
+      if (s.visible && !own.empty()) {
         const LinearStep step = linear_step(f.parts, all_of(f.parts.size()), columns);
         const auto p = static_cast<Index>(own.size());
         const VectorXd x = step.value.tail(p);
         const MatrixXd covariance = step.covariance.bottomRightCorner(p, p);
         one.p = Wald{x.dot(pseudo_solve(covariance, x)), p}.p_value(out_.final);
-        if (!allowed(c, x)) one.gain = 0, one.p = 1;
+        for (Index j = 0; j < p; ++j)
+          if (sides[static_cast<std::size_t>(j)] * x[j] < 0) one.gain = 0, one.p = 1;
       }
       scored.push_back(one);
       Ranked& r = entry_of(out_.ranking, c.id);
@@ -150,10 +155,14 @@ class Search {
           if (out_.final.shared[k].effect != id)
             shared.push_back(out_.final.shared[k]),
                 values.push_back(out_.final.values[static_cast<Index>(k)]);
-        out_.final = fit_groups(problem_, Split::train, shared,
-                                Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size())),
-                                options_.fit);
-        out_.final_test = fit_own(problem_, Split::test, out_.final, options_.fit);
+        auto without = fit_groups(
+            problem_, Split::train, shared,
+            Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size())), options_.fit);
+        if (!without.solved) continue;
+        auto held_out = fit_own(problem_, Split::test, without, options_.fit);
+        if (!held_out.solved) continue;
+        out_.final = std::move(without);
+        out_.final_test = std::move(held_out);
         out_.effects.erase(out_.effects.begin() + static_cast<std::ptrdiff_t>(i));
         removed = true;
       }
@@ -210,21 +219,6 @@ class Search {
         out.push_back(effect);
     return out;
   }
-  /// A parameter that cannot go below (or above) neutral must not want to.
-  bool allowed(const Candidate& c, const VectorXd& step) const {
-    for (const auto& effect : catalogue_) {
-      if (effect.id != c.id) continue;
-      for (std::size_t j = 0; j < c.parameters.size(); ++j)
-        for (const auto& p : effect.parameters) {
-          if (c.parameters[j].substr(0, c.parameters[j].find('[')) != effect.full_name(p)) continue;
-          const double x = step[static_cast<Index>(j)];
-          if (c.parameters.size() == 1 && ((p.low >= p.neutral && x < 0) || (p.high <= p.neutral && x > 0)))
-            return false;
-        }
-    }
-    return true;
-  }
-
   void halves(const GroupedFootprints& f) {
     std::vector<std::size_t> used;
     for (std::size_t i = 0; i < out_.final.groups.size(); ++i)

@@ -45,7 +45,7 @@ GroupedFootprints grouped_footprints(const GroupedProblem& problem, const Groupe
       for (const auto& p : effect.parameters)
         if (p.is_shape()) grid = p.grid;
     for (const double at : grid) {
-      Candidate candidate{effect.id, {}, {}, {}};
+      Candidate candidate{effect.id, {}, {}, {}, {}};
       Call own = calls[0];
       own.names.resize(f.fitted), own.values.resize(f.fitted), own.columns.resize(f.fitted);
       Call& call = shape ? own : calls[0];
@@ -57,6 +57,7 @@ GroupedFootprints grouped_footprints(const GroupedProblem& problem, const Groupe
         if (p.shape) continue;
         candidate.parameters.push_back(p.name);
         candidate.columns.push_back(width);
+        candidate.sides.push_back(side_of(p.neutral, p.low, p.high));
         call.names.push_back(p.name), call.values.push_back(p.neutral), call.columns.push_back(width++);
       }
       f.candidates.push_back(std::move(candidate));
