@@ -77,7 +77,7 @@ Json json_of(const fitting::MissingEstimate& missing) {
                                 {"coefficient", number(t.coefficient)},
                                 {"sigma", number(t.sigma)},
                                 {"unit", t.unit}});
-  constexpr const char* kCorrection[] = {"withheld", "curve", "candidate"};
+  constexpr const char* kCorrection[] = {"withheld", "curve", "candidate", "not_judged"};
   out["correction"] = kCorrection[static_cast<int>(missing.correction)];
   out["held_out_error"] = {{"before", number(missing.error_before)},
                            {"after", number(missing.error_after)},

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <map>
 
 #include "experiment/parallel.hpp"
 
@@ -53,18 +54,22 @@ ThrowComparison judge(const PreparedThrow& prepared, const Prediction& predictio
   return out;
 }
 
-RepetitionScatter scatter_of(const std::vector<PreparedThrow>& throws,
-                             const std::vector<std::string>& conditions) {
+RepetitionScatter scatter_of(const std::vector<PreparedThrow>& throws) {
   RepetitionScatter out;
+  struct Landings {
+    std::vector<double> x, theta;
+  };
+  std::map<std::string, Landings> repetitions;
+  for (const auto& t : throws)
+    if (t.measured.landing_x && t.measured.landing_theta) {
+      Landings& of = repetitions[t.experiment()];
+      of.x.push_back(*t.measured.landing_x);
+      of.theta.push_back(*t.measured.landing_theta * kDegrees);
+    }
   double x_square = 0, theta_square = 0;
   int freedom = 0;
-  for (const auto& condition : conditions) {
-    std::vector<double> x, theta;
-    for (const auto& t : throws)
-      if (t.condition == condition && t.measured.landing_x && t.measured.landing_theta) {
-        x.push_back(*t.measured.landing_x);
-        theta.push_back(*t.measured.landing_theta * kDegrees);
-      }
+  for (const auto& [experiment, landings] : repetitions) {
+    const auto& [x, theta] = landings;
     if (x.size() < 2) continue;
     ++out.conditions;
     freedom += static_cast<int>(x.size()) - 1;
@@ -117,7 +122,7 @@ Comparison compare(const datasets::ThrowLog& log, const std::vector<PreparedThro
     out.worst_hand_chi2 = std::max(out.worst_hand_chi2, t.hand_fit.chi2_per_dof);
     out.mean_force_chi2 += t.force_fit.chi2_per_dof / static_cast<double>(prepared.size());
   }
-  out.repetitions = scatter_of(prepared, out.conditions);
+  out.repetitions = scatter_of(prepared);
 
   for (const auto& model : options.models) {
     ModelComparison result;

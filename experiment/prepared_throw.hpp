@@ -24,7 +24,9 @@ struct MeasuredOutcome {
 
 /// A logged throw, ready to be simulated.
 struct PreparedThrow {
-  std::string id, object, condition;                        ///< as in the log
+  std::string id, object, condition;  ///< as in the log
+  /// What throws share that repeat one experiment: objects may use the same names of conditions.
+  std::string experiment() const { return object + ", condition " + condition; }
   datasets::Split split{};                                  ///< whether it may be fitted to
   release::PolynomialHand hand;                             ///< smoothed
   release::HandFitSummary hand_fit;                         ///< how well it explains the logged hand

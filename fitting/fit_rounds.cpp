@@ -171,7 +171,7 @@ double FitRounds::spread_of(std::size_t k) const {
   for (std::size_t i = 0; i < used_.size(); ++i) {
     const ThrowEquations& part = equations_.throws[i];
     const double value = own(i)[k];
-    for (const auto& key : {problem_.throws()[used_[i]].prepared.condition, std::string()}) {
+    for (const auto& key : {problem_.throws()[used_[i]].prepared.experiment(), std::string()}) {
       Sum& sum = conditions[key];  // "": all together
       sum.weight += part.weight;
       sum.value += part.weight * value;

@@ -15,8 +15,10 @@ using dynamics::Wrench;
 
 NaiveResult simulate_release_naive(const ReleaseProblem<double>& problem, const contact::Patch<double>& patch,
                                    const NaiveOptions& options) {
-  if (!(options.step > 0 && options.step <= 0.1))
-    throw std::invalid_argument(fmt::format("naive release: step = {} is not in (0, 0.1] s", options.step));
+  constexpr double kLeast = 1e-7;  // [s]: a release of 0.1 s then takes a million steps
+  if (!(options.step >= kLeast && options.step <= 0.1))
+    throw std::invalid_argument(
+        fmt::format("naive release: step = {} is not in [{}, 0.1] s", options.step, kLeast));
   validate(patch);
   const double release = problem.normal_force.release_time(), L = patch.length();
   double t = problem.start;

@@ -122,9 +122,10 @@ struct Ranked {
 
 /// How a prediction may use what is estimated to be missing.
 enum class Correction {
-  withheld,   ///< none: it does not lower the held-out error
-  curve,      ///< the curve over time
-  candidate,  ///< the physical terms
+  withheld,    ///< none: it does not lower the held-out error
+  curve,       ///< the curve over time
+  candidate,   ///< the physical terms
+  not_judged,  ///< none: no held-out motion was tracked, so that nobody knows where it would act
 };
 
 /// What is missing, without a form assumed: an acceleration in flight over the time since the detach [m/s²,
@@ -137,7 +138,8 @@ struct MissingEstimate {
   MissingCandidate candidate;                       ///< physical terms that follow the curves
   /// What lowers the held-out error, if anything: else it is withheld.
   Correction correction{};               ///< what is used
-  double error_before{}, error_after{};  ///< rms, of the flight where it was seen, else of the landing
+  /// rms, of the flight where it was seen, else of the landing; none where it is not judged.
+  std::optional<double> error_before, error_after;
   std::string error_unit;                ///< "m", or "sigma" of the landing
 };
 

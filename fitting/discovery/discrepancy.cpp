@@ -105,8 +105,7 @@ void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threa
     all += shares[i].whole;
     for (std::size_t b = 0; b < kBlocks; ++b) without[b] += shares[i].without[b];
     const auto& prepared = problem.throws()[i].prepared;
-    const auto [at, first] =
-        conditions.try_emplace(prepared.object + "/" + prepared.condition, shares[i].whole);
+    const auto [at, first] = conditions.try_emplace(prepared.experiment(), shares[i].whole);
     if (!first) at->second += shares[i].whole;
   }
   const Answer whole(all);  // its step: what the solver has not gone yet

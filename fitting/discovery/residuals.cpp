@@ -105,10 +105,9 @@ std::vector<ChannelStructure> structures(const CampaignProblem& problem,
     const CampaignThrow& thrown = problem.throws()[i];
     const double release = thrown.release_or(thrown.opening);
     const StateSeries states = states_of(thrown, residuals[i]);
-    const int condition = conditions
-                              .try_emplace(thrown.prepared.object + "/" + thrown.prepared.condition,
-                                           static_cast<int>(conditions.size()))
-                              .first->second;
+    const int condition =
+        conditions.try_emplace(thrown.prepared.experiment(), static_cast<int>(conditions.size()))
+            .first->second;
     for (std::size_t j = 0; j < thrown.observed.all.size(); ++j) {
       const auto& o = thrown.observed.all[j];
       ResidualSamples& of = groups[{phase_of(o, thrown.opening, release), o.channel}];

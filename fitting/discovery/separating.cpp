@@ -207,7 +207,7 @@ std::vector<SeparatingExperiment> separating_experiments(const Stage& stage, con
   int count = 0;
   std::map<std::string, std::size_t> conditions, objects;
   for (const std::size_t i : used) {
-    conditions.try_emplace(throws[i].prepared.object + ", condition " + throws[i].prepared.condition, i);
+    conditions.try_emplace(throws[i].prepared.experiment(), i);
     objects.try_emplace(throws[i].prepared.object, i);
   }
   const std::vector<double> none(stage.problem.own().size(), 0.0);

@@ -16,9 +16,6 @@ using experiment::Channel;
 
 namespace {
 
-/// What a law leaves of an effect that it describes: a hundredth of its χ² is a tenth of its size.
-constexpr double kRest = 0.01;
-
 /// Channels and phases of a full log: wrench and mocap before, during and after the release, the sensor's own
 /// force, the landing.
 constexpr int kSeries = 3 * 3 + 3 * 3 + 1 + 3;

@@ -41,6 +41,9 @@ double error_ratio(const OutcomeErrors& before, const OutcomeErrors& after);
 /// maximised.
 bool held_out_confirms(const Stage& before, const Stage& after);
 
+/// What a law leaves of an effect that it describes: a hundredth of its χ² is a tenth of its size.
+inline constexpr double kRest = 0.01;
+
 /// Evidence (difference of Bayes' criterion) that an effect needs before it is accepted or kept.
 inline constexpr double kDeltaBic = -10;
 

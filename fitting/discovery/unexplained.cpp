@@ -112,7 +112,7 @@ class Displacement {
 
 /// Mean square errors of one throw's prediction: in flight [m²] and of the landing [σ²].
 struct OutcomeSquares {
-  double flight{}, samples{}, landing{};
+  double flight{}, samples{}, landing{}, landings{};
 };
 
 template <class Missing>
@@ -120,6 +120,7 @@ OutcomeSquares squares_with(const CampaignProblem& problem, const CampaignThrow&
                             const Eigen::VectorXd& residual, Phase phase, const Missing& missing) {
   OutcomeSquares out;
   const StateSeries states = states_of(thrown, residual);
+  if (states.time.empty()) return out;  // where it moved, and how fast, is not known
   double end = thrown.release_or(thrown.opening);
   for (const auto& o : thrown.observed.all) end = std::max(end, o.time);
   const Displacement moved(problem, thrown, states, phase, end, missing);
@@ -136,11 +137,12 @@ OutcomeSquares squares_with(const CampaignProblem& problem, const CampaignThrow&
     }
     if (o.channel == Channel::landing_x || o.channel == Channel::landing_theta) {
       State s = states.at(thrown, o.time);
-      if (!states.time.empty()) s.vz -= g * (o.time - states.time.back());
+      s.vz -= g * (o.time - states.time.back());
       const double later = s.vz < -0.1 ? -by[1] / s.vz : 0;  // it passes the height that much later
       const double e =
           o.channel == Channel::landing_x ? error + by[0] + s.vx * later : error + by[2] + s.omega * later;
       out.landing += e * e / (o.sigma * o.sigma);
+      out.landings += 1;
     }
   }
   return out;
@@ -202,20 +204,24 @@ std::optional<MissingEstimate> estimate_missing(const Stage& stage, Phase phase,
   std::array<OutcomeSquares, kTried> sum{};
   for (const auto& of : squares)
     for (std::size_t c = 0; c < kTried; ++c) {
-      sum[c].flight += of[c].flight, sum[c].samples += of[c].samples, sum[c].landing += of[c].landing;
+      sum[c].flight += of[c].flight, sum[c].samples += of[c].samples;
+      sum[c].landing += of[c].landing, sum[c].landings += of[c].landings;
     }
   // Of the motion in flight where it was seen, of the landing otherwise.
   const bool seen = sum[0].samples > 0;
+  if (!seen && !(sum[0].landings > 0)) {
+    out.correction = Correction::not_judged;
+    return out;
+  }
   const auto error = [&](std::size_t c) {
-    return seen ? std::sqrt(sum[c].flight / sum[c].samples)
-                : std::sqrt(sum[c].landing / std::max<double>(1, static_cast<double>(held_out.size())));
+    return seen ? std::sqrt(sum[c].flight / sum[c].samples) : std::sqrt(sum[c].landing / sum[c].landings);
   };
   constexpr double kLower = 0.98;
   out.error_before = out.error_after = error(0);
   out.error_unit = seen ? "m" : "sigma";
   for (std::size_t c = 1; c < kTried; ++c) {
     if (c == 2 && out.candidate.terms.empty()) continue;
-    if (!(error(c) < out.error_after * (out.correction == Correction::withheld ? kLower : 1.0))) continue;
+    if (!(error(c) < *out.error_after * (out.correction == Correction::withheld ? kLower : 1.0))) continue;
     out.error_after = error(c);
     out.correction = c == 1 ? Correction::curve : Correction::candidate;
   }
@@ -225,7 +231,6 @@ std::optional<MissingEstimate> estimate_missing(const Stage& stage, Phase phase,
 std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_far,
                                        const DiscoverOptions& options) {
   std::optional<Unexplained> out;
-  constexpr double kRest = 0.01;
   for (const auto& m : stage.fit.misfit) {
     const double before = misfit_in(so_far.base.misfit, m.channel, m.phase);
     const double limit = std::max(unexplained_from(m.channel, options),
@@ -252,11 +257,13 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
   const char* quantity = missing.phase == Phase::flight ? "acceleration" : "wrench of a pad";
   if (!missing.candidate.terms.empty())
     out->description += fmt::format("; the missing {} looks like {}", quantity, missing.candidate.in_words());
-  out->description +=
-      missing.correction == Correction::withheld
-          ? "; as a correction it does not lower the held-out error and is withheld"
-          : fmt::format("; as a correction it lowers the held-out error from {:.3g} to {:.3g} {}",
-                        missing.error_before, missing.error_after, missing.error_unit);
+  if (missing.correction == Correction::withheld)
+    out->description += "; as a correction it does not lower the held-out error and is withheld";
+  else if (missing.correction == Correction::not_judged)
+    out->description += "; no held-out motion was tracked to judge it by as a correction";
+  else
+    out->description += fmt::format("; as a correction it lowers the held-out error from {:.3g} to {:.3g} {}",
+                                    *missing.error_before, *missing.error_after, missing.error_unit);
   return out;
 }
 

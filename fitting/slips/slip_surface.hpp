@@ -46,10 +46,10 @@ struct SlipSurface {
 
 /// How a fit of a limit surface ended.
 enum class SurfaceOutcome {
-  fitted,                  ///< an answer
+  fitted,                  ///< an answer: converged, or the best that the budget allowed
   too_few_slips,           ///< fewer than the model has coefficients, or than 5
   directions_do_not_span,  ///< all twists in one direction, or all in a plane
-  not_converged            ///< the solver failed, or its budget was spent
+  not_converged            ///< the solver failed
 };
 /// The outcome's name, as it is written above.
 std::string to_string(SurfaceOutcome outcome);

@@ -66,7 +66,7 @@ TEST(Naive, RefusesAStepThatIsNone) {
   std::mt19937_64 random(74);
   const auto thrown = support::random_throw(random, 0);
   const auto model = contact::make_contact_model("limit_surface", support::parameters_of(thrown));
-  for (const double step : {0.0, -1e-3, 0.2, std::nan("")})
+  for (const double step : {0.0, -1e-3, 1e-20, 0.2, std::nan("")})
     EXPECT_THROW(simulate_release_naive(support::problem_of(thrown, *model), thrown.patch, {step, 0}),
                  std::invalid_argument);
 }

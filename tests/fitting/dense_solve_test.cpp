@@ -38,6 +38,28 @@ TEST(DenseSolve, AnUnknownThatNothingDependsOnStaysAtZero) {
   EXPECT_NEAR(x[2], 3, 1e-12);
 }
 
+// The minimum on a cone: no allowed step is downhill (Karush, Kuhn and Tucker).
+TEST(DenseSolve, SidedUnknownsStayOnTheirSide) {
+  MatrixXd F(5, 3);
+  F << 1, 2, 0, 0, 1, 3, 2, 0, 1, 1, 1, 1, 0, 2, 1;
+  VectorXd y(5);
+  y << 1, -4, 2, 0, -3;
+  const MatrixXd A = gram(F);
+  const VectorXd b = F.transpose() * y;
+  for (const std::vector<int>& sides :
+       {std::vector<int>{0, 0, 0}, {1, 1, 1}, {-1, 1, 0}, {-1, -1, -1}, {1, 0, 1}}) {
+    const VectorXd x = pseudo_solve(A, b, sides), slope = A * x - b;
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      const int side = sides[static_cast<std::size_t>(k)];
+      EXPECT_GE(side * x[k], 0);
+      if (side == 0 || x[k] != 0)
+        EXPECT_NEAR(slope[k], 0, 1e-8) << k;
+      else
+        EXPECT_GE(side * slope[k], 0) << k;
+    }
+  }
+}
+
 TEST(DenseSolve, EliminationLeavesTheBlockOfTheInverse) {
   MatrixXd F(5, 4);
   F << 1, 2, 0, 1, 0, 1, 3, 2, 2, 0, 1, 1, 1, 1, 1, 0, 0, 2, 1, 4;

@@ -1,0 +1,215 @@
+// What the loop is made of: misfits, improvements, footprints, intervals, experiments.
+#include "fitting/discovery/stage.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "fitting/discovery/discrepancy.hpp"
+#include "fitting/discovery/footprints.hpp"
+#include "fitting/discovery/separating.hpp"
+#include "tests/fitting/loop_campaign.hpp"
+
+namespace unhand::fitting {
+namespace {
+
+// Without a tracker only the product of its scale's error and the landing's share of it shows. At the share
+// that the footprint's grid gave, the error is known; free, the share would leave it open.
+TEST(Stage, AShapeThatTheLogLeavesOpenIsHeldAndTheSizeIsKnownForIt) {
+  constexpr double kScale = 1.017;
+  experiment::CampaignDesign design = experiment::campaign_design("quick12");
+  design.sensors.mocap = false;
+  design.effects = {{"sensor.length_scale.scale", kScale}, {"sensor.length_scale.landing_share", 1}};
+  DiscoverOptions options;
+  options.campaign.effects = {"sensor.length_scale"};
+  options.campaign.integrator.tolerances = {1e-5, 1e-8};
+  const auto log = experiment::generate_campaign(design, 8);
+  Stage stage{CampaignProblem(log, "synthetic", options.campaign), {}, {}, {}};
+  auto start = stage.problem.start();
+  for (std::size_t k = 0; k < start.size(); ++k)
+    if (stage.problem.campaign()[k].name == "sensor.length_scale.landing_share") start[k] = 1;
+  solve(stage, options, start);
+  ASSERT_EQ(stage.fit.outcome, FitOutcome::converged);
+  for (const auto& u : stage.fit.campaign) {
+    if (u.unknown.name == "sensor.length_scale.landing_share") {
+      EXPECT_EQ(u.value, 1);
+    }
+    if (u.unknown.name == "sensor.length_scale.scale") {
+      EXPECT_NEAR(u.value, kScale, 4 * u.sigma);
+      EXPECT_LT(u.sigma, 0.5 * (kScale - 1));
+    }
+  }
+  EXPECT_LT(wald_p_value(stage.fit, find_effect("sensor.length_scale")), 1e-3);
+}
+
+// Thirty landings whose chi-square is 1.78 per sample: one in two hundred by chance, and a log has 22 such
+// series to look at.
+TEST(Misfit, IsJudgedByItsChanceAndByTheSeriesThatAreLookedAt) {
+  const DiscoverOptions options;
+  const auto misfit = [&](experiment::Channel channel, Phase phase, int n, double per_sample) {
+    ChannelMisfit m;
+    m.channel = channel, m.phase = phase, m.n = n, m.chi2 = n * per_sample;
+    return is_misfit(m, options);
+  };
+  EXPECT_FALSE(misfit(experiment::Channel::landing_time, Phase::landing, 30, 1.78));
+  EXPECT_TRUE(misfit(experiment::Channel::landing_time, Phase::landing, 30, 2.3));
+  EXPECT_TRUE(misfit(experiment::Channel::landing_time, Phase::landing, 90, 1.78));
+  // A firm grasp has no friction law that could be off; slipping pads do.
+  EXPECT_TRUE(misfit(experiment::Channel::wrench_fx, Phase::grasped, 1000, 1.9));
+  EXPECT_FALSE(misfit(experiment::Channel::wrench_fx, Phase::release, 1000, 1.9));
+}
+
+// The torque of slipping pads is trusted to 4 % of its size, which is most of its variance: a model that errs
+// by as much as the trust has a misfit of 1, and one that does not, of much less.
+TEST(Improvement, AWrenchThatVanishesMattersByHowMuchItFell) {
+  const DiscoverOptions options;
+  const auto matters = [&](double was, double is) {
+    const auto torque = [](double per_sample) {
+      FitResult out;
+      auto& m = out.misfit.emplace_back();
+      m.channel = experiment::Channel::wrench_tau, m.phase = Phase::release, m.n = 500,
+      m.chi2 = 500 * per_sample;
+      return out;
+    };
+    return improvement(torque(was), torque(is), {}, options).matters >= 1;
+  };
+  EXPECT_TRUE(matters(1.26, 0.16));
+  EXPECT_FALSE(matters(1.26, 0.4)) << "a fall of less than wrench_matters";
+  EXPECT_FALSE(matters(2.6, 1.4)) << "slipping pads leave as much under any law";
+  EXPECT_TRUE(matters(4.5, 1.4)) << "more than slipping pads leave";
+}
+
+/// A laboratory's law is not this library's: intervals must know.
+TEST(Discrepancy, IntervalsStayOnGoodCampaignsAndWidenWhereSensorsDisagree) {
+  CampaignOptions options;
+  options.effects = {"sensor.inertia"};
+  options.integrator.tolerances = {1e-5, 1e-8};
+  const auto widened = [&](const experiment::EffectSettings& effects) {
+    const CampaignProblem problem(support::loop_campaign(effects), "synthetic", options);
+    FitResult result = fit(problem);
+    std::vector<double> before;
+    for (const auto& u : result.campaign) before.push_back(u.sigma);
+    count_discrepancy(problem, result, 0);
+    double most = 0;
+    for (std::size_t k = 0; k < before.size(); ++k) {
+      EXPECT_GE(result.campaign[k].sigma, before[k]);
+      EXPECT_NEAR(result.covariance[k * before.size() + k], std::pow(result.campaign[k].sigma, 2),
+                  1e-9 * std::pow(result.campaign[k].sigma, 2));
+      most = std::max(most, result.campaign[k].sigma / before[k]);
+    }
+    return most;
+  };
+  const double good = widened({});
+  // Six conditions: Student's factor is 1.3, and a jackknife of six scatters by a third.
+  EXPECT_LT(good, 4);
+  // Friction that falls with the slip bends what the wrenches say of mu, and what the motion says of the
+  // inertia.
+  EXPECT_GT(widened({{"contact.stribeck.mu_s/mu_k", 1.5}, {"contact.stribeck.v_s", 0.02}}), good);
+}
+
+// Two columns that pull in opposite ways on one residual: only the one whose parameter may be positive can
+// explain it, and they are no names of each other.
+TEST(Footprints, ASizeThatThereIsNotExplainsNothing) {
+  Footprints f;
+  Eigen::MatrixXd columns(4, 3);  // two candidates, and the residual
+  columns << 1, -1, -2, 2, -2, -4, 0, 0.1, 0, 1, -1, -2;
+  f.gram = columns.transpose() * columns;
+  f.candidates = {{"grows", {"a"}, {0}, {}, {1}}, {"shrinks", {"b"}, {1}, {}, {1}}};
+  const auto all = scores(f);
+  EXPECT_NEAR(all[0].step.front(), 2, 1e-9);
+  EXPECT_NEAR(all[0].gain, 24, 1e-9);
+  EXPECT_EQ(all[1].step.front(), 0);
+  EXPECT_EQ(all[1].gain, 0);
+  EXPECT_EQ(between(f, f.candidates[0], all[0].step, f.candidates[1]), 0);
+  f.candidates[1].sides = {0};
+  EXPECT_GT(between(f, f.candidates[0], all[0].step, f.candidates[1]), 0.99);
+}
+
+// A clock of the cameras that is early shifts the motion as no lag of the hand behind its log can.
+TEST(Footprints, AClockThatIsOffTheOtherWayIsNoLagOfTheHand) {
+  CampaignOptions options;
+  options.effects = {"sensor.mocap_time_offset"};
+  options.integrator.tolerances = {1e-5, 1e-8};
+  for (const double offset : {-4e-3, 4e-3}) {
+    const CampaignProblem problem(support::loop_campaign({{"sensor.mocap_time_offset.offset", offset}}),
+                                  "synthetic", options);
+    const FitResult result = fit(problem);
+    const Footprints f = footprints(problem, result, {"release.hand_tracking_lag"}, {}, 0);
+    Eigen::VectorXd contribution = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(f.fitted));
+    for (std::size_t k = 0; k < f.fitted; ++k)
+      if (result.campaign[k].unknown.name == "sensor.mocap_time_offset.offset")
+        contribution[static_cast<Eigen::Index>(k)] = result.campaign[k].value;
+    const double r = correlation(f, contribution, f.candidates.front());
+    if (offset < 0) {
+      EXPECT_LT(r, 0.5);
+    } else {
+      EXPECT_GT(r, 0.9);
+    }
+  }
+}
+
+// The quartic has an unknown that the ellipsoid has not, and the other way round.
+TEST(Separating, ALawIsToldFromAnEffectByExperiments) {
+  for (const char* law : {"limit_surface", "limit_surface_quartic"}) {
+    DiscoverOptions options;
+    options.campaign.model = law;
+    options.campaign.effects = {"contact.viscous"};
+    options.campaign.integrator.tolerances = {1e-5, 1e-8};
+    Stage stage{CampaignProblem(support::loop_campaign({{"contact.viscous.1/v_0", 2}}), "synthetic",
+                                options.campaign),
+                {},
+                {},
+                {"contact.viscous"}};
+    ASSERT_TRUE(solve_train(stage, options, {}));
+    AcceptedEffect accepted;
+    accepted.id = "contact.viscous";
+    for (const char* other : {"contact.law:limit_surface_quartic", "contact.law:limit_surface",
+                              "contact.law:limit_surface_disc"}) {
+      if (other == std::string(kLaw) + law) continue;
+      const auto experiments = separating_experiments(stage, accepted, other, options);
+      ASSERT_FALSE(experiments.empty()) << law << " against " << other;
+      for (const auto& e : experiments) {
+        EXPECT_GE(e.before, 0);
+        EXPECT_LE(e.before, 1);
+        EXPECT_LE(e.after, 1);
+      }
+    }
+  }
+}
+
+// Landings alone leave fewer numbers than a throw has unknowns. A law that takes a thousandth off does not
+// matter then either.
+TEST(Improvement, OfALawIsJudgedWithoutDegreesOfFreedom) {
+  const DiscoverOptions options;
+  const auto landings = [](double per_sample) {
+    FitResult out;
+    auto& m = out.misfit.emplace_back();
+    m.channel = experiment::Channel::landing_x, m.phase = Phase::landing, m.n = 40, m.chi2 = 40 * per_sample;
+    out.samples = 40, out.degrees_of_freedom = -10, out.chi2 = m.chi2;
+    return out;
+  };
+  EXPECT_FALSE(landings(1).chi2_per_dof());
+  EXPECT_LT(law_improvement(landings(2), landings(1.998), {}, options).matters, 1);
+  EXPECT_NEAR(law_improvement(landings(2), landings(1.9), {}, options).matters, 0.05 / options.law_matters,
+              1e-9);
+}
+
+TEST(Footprints, TheStepOfTheTrueEffectIsItsSizeToFirstOrder) {
+  constexpr double kTilt = 0.01;
+  CampaignOptions options;
+  options.integrator.tolerances = {1e-5, 1e-8};
+  const CampaignProblem problem(support::loop_campaign({{"flight.gravity_tilt.angle", kTilt}}), "synthetic",
+                                options);
+  const FitResult base = fit(problem);
+  const Footprints f = footprints(problem, base, {"flight.gravity_tilt", "flight.wind"}, {}, 0);
+  for (const Score& score : scores(f)) {
+    if (f.candidates[score.candidate].id == "flight.gravity_tilt") {
+      EXPECT_NEAR(score.step.front(), kTilt, 0.1 * kTilt);
+    } else {
+      EXPECT_FALSE(score.visible) << "no drag is declared, so wind leaves no footprint";
+    }
+  }
+}
+
+}  // namespace
+}  // namespace unhand::fitting
