@@ -279,7 +279,7 @@ bool GivingPoints<S>::step(const Step& p, const Stretch<S>& from, Stretch<S>& to
 }
 
 template <class S>
-void GivingPoints<S>::hold(const Vec3<S>& wrench, const S& force_limit, const S& length, Stretch<S>& to) {
+bool GivingPoints<S>::hold(const Vec3<S>& wrench, const S& force_limit, const S& length, Stretch<S>& to) {
   const Stretch<S> from = zero();
   const S one(1.0), radius = length / torque_factor_, yield = force_limit / stiffness_;
   const S side = kBeside * stiffness_, turn = 0.5 * side * radius * radius;
@@ -290,8 +290,9 @@ void GivingPoints<S>::hold(const Vec3<S>& wrench, const S& force_limit, const S&
                {-wrench[0], -wrench[1], -wrench[2]}};
   Slip moved{S(0), S(0), S(0)};
   Vec3<S> carried;
-  solve(p, from, one, radius, yield, moved, carried);
+  const bool solved = solve(p, from, one, radius, yield, moved, carried);
   move(from, moved, radius, yield, one, to);
+  return solved;
 }
 
 template class GivingPoints<double>;

@@ -58,8 +58,8 @@ class GivingPoints {
   /// Nothing stretched: where an unloaded patch starts.
   Stretch<S> zero() const;
   /// Static: the stretches under which the points carry `wrench` [N, N, N m] in the hand's frame, with limits
-  /// n μ f_N [N] and L(f_N) [m]. Where they cannot, they carry what they can.
-  void hold(const Vec3<S>& wrench, const S& force_limit, const S& length, Stretch<S>& to);
+  /// n μ f_N [N] and L(f_N) [m]. Where they cannot, they carry what they can. Whether it was found.
+  bool hold(const Vec3<S>& wrench, const S& force_limit, const S& length, Stretch<S>& to);
 
   /// One implicit step of object and points.
   struct Step {

@@ -94,7 +94,9 @@ NormalEquations normal_equations(const CampaignProblem& problem, const std::vect
     part.residual = l.residual;
     weigh(l, thrown.observed, thrown, weighting);
     part.chi2 = l.residual.squaredNorm();
-    part.weight = part.chi2 > weighting.throw_limit ? std::sqrt(weighting.throw_limit / part.chi2) : 1.0;
+    double cost = part.chi2;  // with the priors of its own unknowns, as the solver's loss has it
+    for (std::size_t k = 0; k < values.size(); ++k) cost += std::pow(values[k] / own_sigma[k], 2);
+    part.weight = cost > weighting.throw_limit ? std::sqrt(weighting.throw_limit / cost) : 1.0;
     const auto n = static_cast<Eigen::Index>(values.size());
     const Eigen::MatrixXd all = throw_gram(l.own, campaign_columns(l), values, own_sigma);
     const Eigen::MatrixXd rest = part.weight * eliminated(all, n);

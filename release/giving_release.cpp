@@ -36,12 +36,13 @@ class Stepper {
  public:
   Stepper(const contact::FrictionLimits<S>& limits) : limits_(limits), points_(limits) {}
 
-  Moving<S> start(const Scene<S>& scene, const GivingStart<S>& from) {
-    Moving<S> out{
-        from.relative, points_.zero(), {from.hold.wrench.fx, from.hold.wrench.fz, from.hold.wrench.tau}};
-    points_.hold(out.wrench, limits_.held(scene.normal_force), limits_.length(scene.normal_force),
-                 out.stretch);
-    return out;
+  Moving<S> unloaded(const GivingStart<S>& from) const {
+    return {from.relative, points_.zero(), {from.hold.wrench.fx, from.hold.wrench.fz, from.hold.wrench.tau}};
+  }
+  /// Stretches the points as far as they carry the wrench; whether that was found.
+  bool load(const Scene<S>& scene, Moving<S>& at) {
+    return points_.hold(at.wrench, limits_.held(scene.normal_force), limits_.length(scene.normal_force),
+                        at.stretch);
   }
 
   /// One implicit step of length h to `scene`, the world at its end.
@@ -140,8 +141,7 @@ ReleaseResult<S> simulate_giving_release(const ReleaseProblem<S>& problem, const
   Stepper<S> stepper(pads.point_limits(S(0)));
   S t(problem.start);
   dynamics::Window window{problem.start, value_of(stops.front())};
-  Moving<S> at = stepper.start(scene_at(scenes, window, t), start);
-  Moving<S> coarse = at, half = at, fine = at;
+  Moving<S> at = stepper.unloaded(start);
   const double longest = step_for(options.integrator);
   const auto ended = [&](Outcome outcome) {
     result.integration = outcome;
@@ -149,6 +149,11 @@ ReleaseResult<S> simulate_giving_release(const ReleaseProblem<S>& problem, const
     const Scene<S> scene = scene_at(scenes, window, t);
     result.detach = {t, object_pose(scene, at.relative), object_twist(scene, at.relative)};
   };
+  if (!stepper.load(scene_at(scenes, window, t), at)) {
+    ended(Outcome::step_budget_spent);
+    return result;
+  }
+  Moving<S> coarse = at, half = at, fine = at;
   for (const S& stop : stops) {
     const S from = t;
     window = {value_of(from), value_of(stop)};

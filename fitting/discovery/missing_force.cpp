@@ -302,7 +302,7 @@ MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const M
     const Term& term = terms[static_cast<std::size_t>(chosen[k])];
     out.terms.push_back({term.name, x[i], std::sqrt(std::max(0.0, covariance(i, i))), term.unit, term.at});
   }
-  out.explained = std::clamp(gain / std::max(1e-300, squares - samples), 0.0, 1.0);
+  if (squares > samples) out.explained = std::clamp(gain / (squares - samples), 0.0, 1.0);
   return out;
 }
 
