@@ -81,8 +81,11 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
     problem_.normal_force.kinks(out);
     for (const double t : problem_.hand.jumps()) out.push_back(S(t));
     if (std::isfinite(separation())) out.push_back(convert<S>(separation_));
-    std::sort(out.begin(), out.end(), [](const S& a, const S& b) { return value_of(a) < value_of(b); });
-    // The separation may be one of the kinks: of two events at one instant the one sorted last stays.
+    std::stable_sort(out.begin(), out.end(),
+                     [](const S& a, const S& b) { return value_of(a) < value_of(b); });
+    // Of events at one instant the one sorted last stays. The separation, which may be a kink: its
+    // derivatives are the detach's. A jump of the hand rather than a kink: no parameter moves what jumps, and
+    // where the force only kinks the flow is continuous, so that the kink's own derivatives do not count.
     for (std::size_t i = 1; i < out.size();) {
       if (value_of(out[i]) - value_of(out[i - 1]) < 1e-12)
         out.erase(out.begin() + static_cast<std::ptrdiff_t>(i) - 1);
