@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/outcome_errors.hpp"
 #include "fitting/discovery/selection.hpp"
 #include "fitting/discovery/separating.hpp"

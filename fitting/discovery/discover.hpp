@@ -137,10 +137,12 @@ struct MissingEstimate {
   std::vector<MissingCurve> curves;                 ///< one per group
   MissingCandidate candidate;                       ///< physical terms that follow the curves
   /// What lowers the held-out error, if anything: else it is withheld.
-  Correction correction{};               ///< what is used
-  /// rms, of the flight where it was seen, else of the landing; none where it is not judged.
-  std::optional<double> error_before, error_after;
-  std::string error_unit;                ///< "m", or "sigma" of the landing
+  Correction correction{};  ///< what is used
+  /// rms without the correction, of the flight where it was seen, else of the landing; none where it is not
+  /// judged.
+  std::optional<double> error_before;
+  std::optional<double> error_after;  ///< with it
+  std::string error_unit;             ///< "m", or "sigma" of the landing
 };
 
 /// Structure that no effect of the catalogue accounts for.
@@ -165,7 +167,7 @@ struct Discovery {
   Verdict verdict{};                    ///< found, nothing missing, unexplained, or no answer
   std::string message;                  ///< the answer in words
   std::vector<AcceptedEffect> effects;  ///< in order of acceptance
-  std::vector<std::string> imitations;  ///< accepted at first, and withdrawn (selection.hpp)
+  std::vector<std::string> imitations;  ///< accepted at first, and withdrawn (acceptance.hpp)
   std::vector<std::string> along;       ///< effects that are fitted along as nuisances, too small to matter
   std::optional<SmallEffect> small;     ///< the most evident of what was too small to matter
   std::optional<Unexplained> unexplained;                            ///< what is left, if anything

@@ -16,6 +16,7 @@ using experiment::without_object;
 
 /// The candidate "contact.law:MODEL" is another contact law in place of the model's.
 inline constexpr std::string_view kLaw = "contact.law:";
+/// Whether a candidate is one.
 inline bool is_law(const std::string& id) { return id.starts_with(kLaw); }
 
 /// A candidate for what a model lacks. `columns` index the Gram matrix: derivatives, or for one-sided effects

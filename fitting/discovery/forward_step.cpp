@@ -5,19 +5,13 @@
 #include <cmath>
 #include <set>
 
-#include "fitting/discovery/residual_structure.hpp"
+#include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/selection.hpp"
 #include "fitting/distributions.hpp"
 
 namespace unhand::fitting {
 
 namespace {
-
-/// What explains less than this share of what another footprint would is an imitation of it.
-constexpr double kImitation = 1.0 / 3.0;
-
-/// Where nothing is left but noise, footprints are small and a refit gains what they say, within this factor.
-constexpr double kFirstOrder = 3;
 
 void rank(std::vector<Ranked>& ranking, const Footprints& f, const std::vector<Score>& all) {
   const auto last = static_cast<Eigen::Index>(f.residual());

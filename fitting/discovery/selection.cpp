@@ -4,19 +4,12 @@
 #include <array>
 #include <cmath>
 
+#include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/discrepancy.hpp"
 
 namespace unhand::fitting {
 
 namespace {
-
-/// What is left of the misfit where an effect acts, from which on it is an imitation of another.
-constexpr double kLeft = 0.1;
-
-/// The level at which an effect's size must be told from none by its own interval.
-constexpr double kToldFromNone = 0.05;
-
-bool in_air(Phase phase) { return phase == Phase::flight || phase == Phase::landing; }
 
 /// The footprint's own names for `accepted`: candidates that could have left it as well. What had no
 /// footprint of its own before anything was accepted could not: a wind acts through the drag that has just
@@ -35,40 +28,7 @@ void find_other_names(const Footprints& f, const Eigen::VectorXd& contribution, 
   }
 }
 
-/// Whether an effect acts in the air, or in the hand: where the misfit fell most, and an effect on the pads
-/// in the hand wherever that was.
-bool acts(const AcceptedEffect& effect, bool air) {
-  return in_air(effect.phase) == air || (!air && acts_on_pads(effect.id));
-}
-
-/// Whether too much is left in the half of the throw where an effect acts, of what the base model's fit left
-/// there in the other throws (`other`: train against held-out ones) as well.
-bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisfit>& base,
-                     const std::vector<ChannelMisfit>& other, const std::vector<ChannelMisfit>& now,
-                     const DiscoverOptions& options) {
-  return std::any_of(now.begin(), now.end(), [&](const ChannelMisfit& m) {
-    return is_misfit(m, options) && acts(effect, in_air(m.phase)) && is_confirmed(other, m) &&
-           m.chi2_per_sample() >= unexplained_from(m.channel, options) &&
-           m.chi2_per_sample() - 1 > kLeft * (misfit_in(base, m.channel, m.phase) - 1);
-  });
-}
-
-/// An accepted effect that is the shadow of something else. Either conditions and blocks of sensors do not
-/// agree on its size, so that its interval, which counts that (`counted`), has none in it. Or it leaves too
-/// much where it acts: of the throws that it was fitted to, or of those that it has not seen.
-bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const FitResult& counted,
-                  const Discovery& so_far, const DiscoverOptions& options) {
-  return (!is_law(effect.id) && wald_p_value(counted, find_effect(effect.id)) > kToldFromNone) ||
-         leaves_too_much(effect, so_far.base.misfit, so_far.base_test, stage.fit.misfit, options) ||
-         leaves_too_much(effect, so_far.base_test, so_far.base.misfit, stage.held_out.misfit, options);
-}
-
 }  // namespace
-
-bool predicts_better(const Stage& before, const Stage& after, const DiscoverOptions& options) {
-  const PredictionGain gain = prediction_gain(before, after, options);
-  return gain.before > options.prediction_matters * gain.after && held_out_confirms(before, after);
-}
 
 void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   for (bool removed = true; removed && stage.ids.size() > 1;) {
@@ -122,8 +82,6 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   stage = std::move(without);
   return withdraw(stage, options, out);
 }
-
-bool acts_on_pads(const std::string& id) { return id.starts_with("contact.") || id.starts_with("release."); }
 
 bool acts_on_pads(const Stage& stage) {
   return std::any_of(stage.ids.begin(), stage.ids.end(),

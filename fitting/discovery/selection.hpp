@@ -16,9 +16,6 @@ namespace unhand::fitting {
 /// that matters to neither is left in `out.small`. Empty if none convinces.
 std::optional<Stage> forward(const Stage& stage, const DiscoverOptions& options, Discovery& out);
 
-/// Whether held-out throws are predicted better before they are made, by as much as the options ask for.
-bool predicts_better(const Stage& before, const Stage& after, const DiscoverOptions& options);
-
 /// Effects that a later one has made superfluous are taken back.
 void backward(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
@@ -36,8 +33,6 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
 /// below kMostGive; then it is a nuisance of the answer, not a part of it, and in `out.along`. True if it is.
 bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
-/// Whether an effect is one on the contact or the release.
-bool acts_on_pads(const std::string& id);
 /// Whether such an effect was added.
 bool acts_on_pads(const Stage& stage);
 

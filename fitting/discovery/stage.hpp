@@ -35,23 +35,8 @@ OutcomeErrors errors_of(const Stage& stage, Share share, int threads);
 /// Trajectory rms after over before; the landing's where the flight was not seen.
 double error_ratio(const OutcomeErrors& before, const OutcomeErrors& after);
 
-/// Whether held-out throws speak for an improvement: their likelihood is twenty times as large. A threshold,
-/// and no bound on how often chance gets there: each model fits the held-out throws' own unknowns and takes
-/// the variances of their channels from them, and Markov's inequality does not hold for likelihoods that are
-/// maximised.
-bool held_out_confirms(const Stage& before, const Stage& after);
-
-/// What a law leaves of an effect that it describes: a hundredth of its χ² is a tenth of its size.
-inline constexpr double kRest = 0.01;
-
-/// Evidence (difference of Bayes' criterion) that an effect needs before it is accepted or kept.
-inline constexpr double kDeltaBic = -10;
-
 /// The give of the pads.
 inline constexpr const char* kPads = "contact.pad_compliance";
-/// The give of pads before they slip, under the grip's friction limit, from where on it is an effect like any
-/// other [m].
-inline constexpr double kMostGive = 3e-5;
 /// That give per unit of the effect [N]: the friction limit of all pads at the campaign's grip force.
 double give_per_compliance(const Stage& stage);
 /// The give of a fit's pads [m]; 0 where it has none.
@@ -82,43 +67,6 @@ Stage extended(const Stage& stage, const Candidate& candidate, const Score& scor
 
 /// The stage without `ids[index]`: an effect, or the law that took the place of the model to begin with.
 Stage reduced(const Stage& stage, std::size_t index, const DiscoverOptions&);
-
-/// Whether a channel leaves anything to explain in a phase: more than `matters` beyond the noise, and more
-/// than chance leaves (χ², at the false discovery rate shared among all channels and phases of a log). The
-/// wrench while the pads still slip or may: more than `wrench_misfit`. In the firm grasp no friction law
-/// takes part, only Newton and Euler: there it is a channel like any other.
-bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options);
-
-/// Whether the other half of the throws shows a misfit of the same channel and phase as well, at 5 %: chance
-/// does not strike twice.
-bool is_confirmed(const std::vector<ChannelMisfit>& other_half, const ChannelMisfit& misfit);
-
-/// χ² per sample of a channel from where on something is missing there; of a wrench twice as much, most of
-/// whose variance is trust.
-double unexplained_from(experiment::Channel, const DiscoverOptions& options);
-
-/// The misfit of a channel in a phase, 1 where there is none.
-double misfit_in(const std::vector<ChannelMisfit>& misfit, experiment::Channel, Phase);
-
-/// The channel and phase whose held-out misfit fell most, in units of what matters there (>= 1: it matters).
-/// `base` is the misfit before anything was added: of that, what is below a hundredth is the part of an
-/// effect that its law does not get right, and no other effect.
-struct Improvement {
-  double matters{};
-  double fall{};
-  std::string where;
-  Phase phase{Phase::release};
-};
-Improvement improvement(const FitResult& before, const FitResult& after,
-                        const std::vector<ChannelMisfit>& base, const DiscoverOptions& options);
-
-/// Of another law, which has next to no parameters to bend: it matters if the held-out χ² as a whole falls by
-/// half a per cent, channels apart of which not a hundredth of the base's misfit is left.
-Improvement law_improvement(const FitResult& before, const FitResult& after,
-                            const std::vector<ChannelMisfit>& base, const DiscoverOptions& options);
-
-/// Wald's test of an effect's size parameters against neutral, with the fit's covariance.
-double wald_p_value(const FitResult& fit, const dynamics::Effect& effect);
 
 /// The ids of all effects but those that were forgotten.
 std::vector<std::string> catalogue(const DiscoverOptions& options);

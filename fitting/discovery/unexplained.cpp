@@ -8,6 +8,7 @@
 #include <map>
 
 #include "experiment/parallel.hpp"
+#include "fitting/discovery/acceptance.hpp"
 #include "fitting/evaluate.hpp"
 
 namespace unhand::fitting {

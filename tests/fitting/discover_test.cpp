@@ -71,7 +71,8 @@ TEST(Discovery, AnEffectThatTheCatalogueForgetsIsUnexplainedWithAReadableCandida
   ASSERT_FALSE(missing.candidate.terms.empty()) << found.unexplained->description;
   EXPECT_EQ(missing.candidate.terms.front().name, "omega J v") << found.unexplained->description;
   EXPECT_NE(missing.correction, Correction::withheld);
-  EXPECT_LT(missing.error_after.value(), 0.7 * missing.error_before.value()) << "on throws that it has not seen";
+  EXPECT_LT(missing.error_after.value(), 0.7 * missing.error_before.value())
+      << "on throws that it has not seen";
 }
 
 // A bias of the sensor is a force that does not turn with the hand. In one component of the wrench another

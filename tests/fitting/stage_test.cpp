@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/discrepancy.hpp"
 #include "fitting/discovery/footprints.hpp"
 #include "fitting/discovery/separating.hpp"

@@ -1,0 +1,137 @@
+#include "fitting/discovery/acceptance.hpp"
+
+#include <fmt/core.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+
+#include "fitting/dense_solve.hpp"
+#include "fitting/distributions.hpp"
+
+namespace unhand::fitting {
+
+using experiment::Channel;
+
+bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options) {
+  const bool slips = is_wrench(m.channel) && m.phase != Phase::grasped;
+  if (m.chi2_per_sample() <= (slips ? options.wrench_misfit : 1 + options.matters)) return false;
+  return chi2_tail(m.chi2, m.n) < options.false_discovery_rate / kSeries;
+}
+
+bool is_confirmed(const std::vector<ChannelMisfit>& other_half, const ChannelMisfit& misfit) {
+  return std::any_of(other_half.begin(), other_half.end(), [&](const ChannelMisfit& m) {
+    return m.channel == misfit.channel && m.phase == misfit.phase && chi2_tail(m.chi2, m.n) < kConfirmedAt;
+  });
+}
+
+double unexplained_from(Channel channel, const DiscoverOptions& options) {
+  return is_wrench(channel) ? 2 * options.unexplained : options.unexplained;
+}
+
+double misfit_in(const std::vector<ChannelMisfit>& misfit, Channel channel, Phase phase) {
+  for (const auto& m : misfit)
+    if (m.channel == channel && m.phase == phase) return m.chi2_per_sample();
+  return 1;
+}
+
+Improvement improvement(const FitResult& before, const FitResult& after,
+                        const std::vector<ChannelMisfit>& base, const DiscoverOptions& options) {
+  Improvement out;
+  for (const auto& b : before.misfit) {
+    if (b.phase == Phase::grasped && !is_wrench(b.channel)) continue;  // no prediction is the better for it
+    const double was = b.chi2_per_sample(), is = misfit_in(after.misfit, b.channel, b.phase);
+    double needed = std::max({options.matters, kShare * (was - 1), 2 * std::sqrt(2.0 / b.n)});
+    if (is_wrench(b.channel)) {
+      // Most of a wrench's variance is trust, not noise: one that is explained falls below 1, and what
+      // matters is by how much.
+      const double from = b.phase == Phase::grasped ? 1 + options.matters : options.wrench_misfit;
+      const bool explained = is < 1 + kRest * (was - 1);
+      if (was < from && !explained) continue;
+      needed = std::max(options.wrench_matters, kWrenchShare * (was - 1));
+    }
+    needed = std::max(needed, kRest * (misfit_in(base, b.channel, b.phase) - 1));
+    if ((was - is) / needed <= out.matters) continue;
+    out.matters = (was - is) / needed;
+    out.fall = was - is;
+    out.where = fmt::format("{} in {}: {:.3g} to {:.3g} per sample", to_string(b.channel), to_string(b.phase),
+                            was, is);
+    out.phase = b.phase;
+  }
+  return out;
+}
+
+Improvement law_improvement(const FitResult& before, const FitResult& after,
+                            const std::vector<ChannelMisfit>& base, const DiscoverOptions& options) {
+  double fall = 0;
+  for (const auto& b : before.misfit) {
+    const double left = b.chi2_per_sample() - 1, at_base = misfit_in(base, b.channel, b.phase) - 1;
+    if (at_base > 0 && left < kRest * at_base) continue;  // explained
+    fall += b.n * (b.chi2_per_sample() - misfit_in(after.misfit, b.channel, b.phase));
+  }
+  const double was = before.chi2, per = static_cast<double>(std::max(1L, before.samples));
+  if (!(was > 0)) return {};
+  return {fall / (options.law_matters * was), fall / per,
+          fmt::format("chi2 of all channels: {:.4g} to {:.4g} per sample", was / per, (was - fall) / per)};
+}
+
+bool held_out_confirms(const Stage& before, const Stage& after) {
+  return deviance(before.held_out) - deviance(after.held_out) > 2 * std::log(kTimesAsLikely);
+}
+
+bool predicts_better(const Stage& before, const Stage& after, const DiscoverOptions& options) {
+  const PredictionGain gain = prediction_gain(before, after, options);
+  return gain.before > options.prediction_matters * gain.after && held_out_confirms(before, after);
+}
+
+double wald_p_value(const FitResult& fit, const dynamics::Effect& effect) {
+  std::vector<Eigen::Index> index;
+  std::vector<double> away;
+  const auto& campaign = fit.campaign;
+  for (std::size_t k = 0; k < campaign.size(); ++k)
+    for (const auto& p : effect.parameters)
+      if (!p.is_shape() && without_object(campaign[k].unknown.name) == effect.full_name(p)) {
+        index.push_back(static_cast<Eigen::Index>(k));
+        away.push_back(campaign[k].value - p.neutral);
+      }
+  if (index.empty()) return 1;
+  const auto width = static_cast<Eigen::Index>(campaign.size());
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  const Eigen::Map<const RowMajor> all(fit.covariance.data(), width, width);
+  const Eigen::MatrixXd C = all(index, index);
+  const Eigen::Map<const Eigen::VectorXd> d(away.data(), static_cast<Eigen::Index>(away.size()));
+  return chi2_tail(d.dot(pseudo_solve(C, d)), static_cast<int>(away.size()));
+}
+
+bool in_air(Phase phase) { return phase == Phase::flight || phase == Phase::landing; }
+
+bool acts_on_pads(const std::string& id) { return id.starts_with("contact.") || id.starts_with("release."); }
+
+bool acts(const AcceptedEffect& effect, bool air) {
+  return in_air(effect.phase) == air || (!air && acts_on_pads(effect.id));
+}
+
+namespace {
+
+/// Whether too much is left in the half of the throw where an effect acts, of what the base model's fit left
+/// there in the other throws (`other`: train against held-out ones) as well.
+bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisfit>& base,
+                     const std::vector<ChannelMisfit>& other, const std::vector<ChannelMisfit>& now,
+                     const DiscoverOptions& options) {
+  return std::any_of(now.begin(), now.end(), [&](const ChannelMisfit& m) {
+    return is_misfit(m, options) && acts(effect, in_air(m.phase)) && is_confirmed(other, m) &&
+           m.chi2_per_sample() >= unexplained_from(m.channel, options) &&
+           m.chi2_per_sample() - 1 > kLeft * (misfit_in(base, m.channel, m.phase) - 1);
+  });
+}
+
+}  // namespace
+
+bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const FitResult& counted,
+                  const Discovery& so_far, const DiscoverOptions& options) {
+  return (!is_law(effect.id) && wald_p_value(counted, find_effect(effect.id)) > kToldFromNone) ||
+         leaves_too_much(effect, so_far.base.misfit, so_far.base_test, stage.fit.misfit, options) ||
+         leaves_too_much(effect, so_far.base_test, so_far.base.misfit, stage.held_out.misfit, options);
+}
+
+}  // namespace unhand::fitting

@@ -1,0 +1,119 @@
+// Every rule by which the loop believes something, with its threshold: what docs/closing-the-loop.md says in
+// words under "Refits". Thresholds that the user may set are in DiscoverOptions. Internal to fitting.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fitting/discovery/stage.hpp"
+
+namespace unhand::fitting {
+
+/// @name What is a misfit
+/// @{
+
+/// Channels and phases of a full log, which share the false discovery rate: wrench and mocap before, during
+/// and after the release, the sensor's own force, the landing.
+inline constexpr int kSeries = 3 * 3 + 3 * 3 + 1 + 3;
+/// The level at which the other half of the throws confirms a misfit.
+inline constexpr double kConfirmedAt = 0.05;
+
+/// Whether a channel leaves anything to explain in a phase: more than `matters` beyond the noise, and more
+/// than chance leaves (χ², at the false discovery rate shared among all channels and phases of a log). The
+/// wrench while the pads still slip or may: more than `wrench_misfit`. In the firm grasp no friction law
+/// takes part, only Newton and Euler: there it is a channel like any other.
+bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options);
+
+/// Whether the other half of the throws shows a misfit of the same channel and phase as well: chance does not
+/// strike twice.
+bool is_confirmed(const std::vector<ChannelMisfit>& other_half, const ChannelMisfit& misfit);
+
+/// χ² per sample of a channel from where on something is missing there; of a wrench twice as much, most of
+/// whose variance is trust.
+double unexplained_from(experiment::Channel, const DiscoverOptions& options);
+
+/// The misfit of a channel in a phase, 1 where there is none.
+double misfit_in(const std::vector<ChannelMisfit>& misfit, experiment::Channel, Phase);
+
+/// @}
+/// @name What a refit must show
+/// @{
+
+/// What explains less than this share of what another footprint would is an imitation of it.
+inline constexpr double kImitation = 1.0 / 3.0;
+
+/// Where nothing is left but noise, footprints are small and a refit gains what they say, within this factor.
+inline constexpr double kFirstOrder = 3;
+
+/// Evidence (difference of Bayes' criterion) that an effect needs before it is accepted or kept.
+inline constexpr double kDeltaBic = -10;
+
+/// What a law leaves of an effect that it describes: a hundredth of its χ² is a tenth of its size.
+inline constexpr double kRest = 0.01;
+
+/// A fall of the held-out χ² per sample matters if it takes this much of the misfit away; of a wrench's,
+/// which slipping pads trust least, more.
+inline constexpr double kShare = 0.1, kWrenchShare = 0.25;
+
+/// The channel and phase whose held-out misfit fell most, in units of what matters there (>= 1: it matters).
+/// `base` is the misfit before anything was added: of that, what is below a hundredth is the part of an
+/// effect that its law does not get right, and no other effect.
+struct Improvement {
+  double matters{};
+  double fall{};
+  std::string where;
+  Phase phase{Phase::release};
+};
+Improvement improvement(const FitResult& before, const FitResult& after,
+                        const std::vector<ChannelMisfit>& base, const DiscoverOptions& options);
+
+/// Of another law, which has next to no parameters to bend: it matters if the held-out χ² as a whole falls by
+/// half a per cent, channels apart of which not a hundredth of the base's misfit is left.
+Improvement law_improvement(const FitResult& before, const FitResult& after,
+                            const std::vector<ChannelMisfit>& base, const DiscoverOptions& options);
+
+/// How many times as large the held-out throws' likelihood must be, where predictions decide.
+inline constexpr double kTimesAsLikely = 20;
+/// Whether held-out throws speak for an improvement: their likelihood is kTimesAsLikely as large. A
+/// threshold, and no bound on how often chance gets there: each model fits the held-out throws' own unknowns
+/// and takes the variances of their channels from them, and Markov's inequality does not hold for likelihoods
+/// that are maximised.
+bool held_out_confirms(const Stage& before, const Stage& after);
+
+/// Whether held-out throws are predicted better before they are made, by as much as the options ask for.
+bool predicts_better(const Stage& before, const Stage& after, const DiscoverOptions& options);
+
+/// The give of pads before they slip, under the grip's friction limit, from where on it is an effect like any
+/// other [m].
+inline constexpr double kMostGive = 3e-5;
+
+/// @}
+/// @name What is withdrawn
+/// @{
+
+/// What is left of the misfit where an effect acts, from which on it is an imitation of another.
+inline constexpr double kLeft = 0.1;
+
+/// The level at which an effect's size must be told from none by its own interval.
+inline constexpr double kToldFromNone = 0.05;
+
+/// Wald's test of an effect's size parameters against neutral, with the fit's covariance.
+double wald_p_value(const FitResult& fit, const dynamics::Effect& effect);
+
+/// In flight or at the landing, not in the hand.
+bool in_air(Phase phase);
+/// Whether an effect is one on the contact or the release.
+bool acts_on_pads(const std::string& id);
+/// Whether an effect acts in the air, or in the hand: where the misfit fell most, and an effect on the pads
+/// in the hand wherever that was.
+bool acts(const AcceptedEffect& effect, bool air);
+
+/// An accepted effect that is the shadow of something else. Either conditions and blocks of sensors do not
+/// agree on its size, so that its interval, which counts that (`counted`), has none in it. Or it leaves too
+/// much where it acts: of the throws that it was fitted to, or of those that it has not seen.
+bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const FitResult& counted,
+                  const Discovery& so_far, const DiscoverOptions& options);
+
+/// @}
+
+}  // namespace unhand::fitting
