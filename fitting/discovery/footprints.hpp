@@ -62,6 +62,10 @@ struct Score {
 /// One per candidate, in their order.
 std::vector<Score> scores(const Footprints& footprints);
 
+/// What an effect of the fitted model does: how far its size parameters are from neutral, per unknown of the
+/// campaign; zero for all others.
+Eigen::VectorXd contribution_of(const FitResult& fit, const dynamics::Effect& effect);
+
 /// Cosine, at most 1, between what `contribution` (coefficients of the fitted columns; the others are
 /// projected out) does and the nearest that a candidate can do.
 double correlation(const Footprints& footprints, const Eigen::VectorXd& contribution,

@@ -138,17 +138,12 @@ void describe(Stage& stage, FitResult counted, const DiscoverOptions& options, D
       continue;
     }
     const dynamics::Effect effect = find_effect(accepted.id);
-    Eigen::VectorXd contribution = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(f.fitted));
-    for (std::size_t k = 0; k < stage.fit.campaign.size(); ++k) {
-      const auto& u = stage.fit.campaign[k];
-      for (const auto& p : effect.parameters) {
-        if (without_object(u.unknown.name) != effect.full_name(p)) continue;
-        accepted.parameters.push_back(
-            {u.unknown.name.substr(accepted.id.size() + 1), u.unknown.unit, u.value, u.sigma});
-        if (!p.is_shape()) contribution[static_cast<Eigen::Index>(k)] = u.value - p.neutral;
-      }
-    }
-    find_other_names(f, contribution, options.equivalent, out.ranking, accepted);
+    for (const auto& u : stage.fit.campaign)
+      for (const auto& p : effect.parameters)
+        if (without_object(u.unknown.name) == effect.full_name(p))
+          accepted.parameters.push_back(
+              {u.unknown.name.substr(accepted.id.size() + 1), u.unknown.unit, u.value, u.sigma});
+    find_other_names(f, contribution_of(stage.fit, effect), options.equivalent, out.ranking, accepted);
   }
 }
 

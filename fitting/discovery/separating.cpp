@@ -10,8 +10,7 @@
 #include <optional>
 
 #include "experiment/parallel.hpp"
-#include "fitting/dense_solve.hpp"
-#include "fitting/normal_equations.hpp"
+#include "fitting/discovery/footprint_columns.hpp"
 
 namespace unhand::fitting {
 
@@ -21,92 +20,25 @@ namespace {
 
 constexpr double kRepetitions = 10;
 
-/// The footprints of the model's unknowns and of one effect or law more.
-class Pair {
- public:
-  Pair(const Stage& stage, const std::string& other)
-      : stage_(stage),
-        values_(stage.fit.values()),
-        other_(extended_problem(stage.problem, other)),
-        width_(values_.size()),
-        other_values_(carried(stage.fit, other_)),
-        law_(is_law(other)) {
-    if (law_) return;
-    const auto effect = find_effect(other);
-    differs_ = effect.one_sided;
-    for (std::size_t k = values_.size(); k < other_values_.size(); ++k) {
-      const auto& name = other_.campaign()[k].name;
-      for (const auto& p : effect.parameters)
-        if (without_object(name) == effect.full_name(p) && !p.is_shape()) added_.push_back(k);
-    }
-  }
-  /// Columns besides the model's own.
-  std::size_t added() const { return law_ ? 1 : added_.size(); }
+FootprintColumns columns_of(const Stage& stage, const std::string& other) {
+  FootprintColumns out(stage.problem, stage.fit);
+  if (is_law(other))
+    out.add_law(other.substr(kLaw.size()));
+  else
+    out.add_effects({other});
+  return out;
+}
 
-  /// JᵀJ with the throw's own unknowns eliminated; zero columns for the residual. Empty if it cannot be
-  /// simulated.
-  std::optional<Eigen::MatrixXd> gram(const CampaignThrow& thrown, const std::vector<double>& own) const {
-    const auto l = stage_.problem.linearise(thrown, values_, own, true);
-    if (!l.solved) return std::nullopt;
-    const auto w = static_cast<Eigen::Index>(width_), n = static_cast<Eigen::Index>(added());
-    Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(l.residual.size(), w + n + 1);
-    columns.leftCols(w) = l.campaign;
-    if (!law_ && !differs_) {
-      const auto m = other_.linearise(thrown, other_values_, own, true);
-      if (!m.solved) return std::nullopt;
-      for (Eigen::Index k = 0; k < n; ++k)
-        columns.col(w + k) = m.campaign.col(static_cast<Eigen::Index>(added_[static_cast<std::size_t>(k)]));
-    } else {
-      for (Eigen::Index k = 0; k < n; ++k) {
-        auto stepped = other_values_;
-        double step = 1;
-        if (!law_) {
-          const std::size_t at = added_[static_cast<std::size_t>(k)];
-          step = other_.campaign()[at].scale;
-          stepped[at] += step;
-        }
-        const auto m = other_.linearise(thrown, stepped, own, false);
-        if (!m.solved) return std::nullopt;
-        columns.col(w + k) = (m.residual - l.residual) / step;
-      }
-    }
-    const std::vector<double> nothing(own.size(), 0.0);
-    return eliminated(throw_gram(l.own, columns, nothing, stage_.fit.own_spread), l.own.cols());
-  }
-
-  double correlation_in(const Eigen::MatrixXd& gram, const AcceptedEffect& accepted) const {
-    Footprints f;
-    f.fitted = width_;
-    f.gram = gram;
-    Candidate candidate;
-    for (std::size_t k = 0; k < added(); ++k) {
-      candidate.columns.push_back(width_ + k);
-      if (law_) {
-        candidate.sides.push_back(1);
-        continue;
-      }
-      const Unknown& u = other_.campaign()[added_[k]];
-      candidate.sides.push_back(side_of(u.start, u.low, u.high));
-    }
-    const dynamics::Effect effect = find_effect(accepted.id);
-    Eigen::VectorXd contribution = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(width_));
-    for (std::size_t k = 0; k < width_; ++k)
-      for (const auto& p : effect.parameters)
-        if (!p.is_shape() && without_object(stage_.fit.campaign[k].unknown.name) == effect.full_name(p))
-          contribution[static_cast<Eigen::Index>(k)] = values_[k] - p.neutral;
-    return correlation(f, contribution, candidate);
-  }
-
- private:
-  const Stage& stage_;
-  std::vector<double> values_;
-  CampaignProblem other_;
-  std::size_t width_;
-  std::vector<double> other_values_;
-  bool law_;                        // one column: what the other law would do, at its start
-  std::vector<std::size_t> added_;  // an effect's unknowns
-  bool differs_{};                  // their footprints are differences
-};
+/// Between what `accepted` does and the nearest that the candidates of `columns` can do.
+double correlation_in(const FootprintColumns& columns, const Eigen::MatrixXd& gram, const Stage& stage,
+                      const AcceptedEffect& accepted) {
+  const Footprints f{columns.candidates(), columns.fitted(), gram, 0};
+  const Eigen::VectorXd contribution = contribution_of(stage.fit, find_effect(accepted.id));
+  double out = 0;
+  for (const Candidate& candidate : f.candidates)
+    out = std::max(out, correlation(f, contribution, candidate));
+  return out;
+}
 
 /// The motion `speed` times as fast, about the pose at which the gripper is told to open. Wrenches and poses
 /// that were seen before the motion now begins, or after it ends, are dropped.
@@ -187,8 +119,8 @@ std::vector<SeparatingExperiment> separating_experiments(const Stage& stage, con
                                                          const DiscoverOptions& options) {
   std::vector<SeparatingExperiment> out;
   if (is_law(accepted.id)) return out;
-  const Pair pair(stage, other);
-  if (pair.added() == 0) return out;
+  const FootprintColumns columns = columns_of(stage, other);
+  if (columns.candidates().empty()) return out;
   const auto& throws = stage.problem.throws();
   std::vector<std::size_t> used;
   for (std::size_t i = 0; i < throws.size(); ++i)
@@ -242,7 +174,8 @@ std::vector<SeparatingExperiment> separating_experiments(const Stage& stage, con
   }
   experiment::parallel_for(trials.size(), options.fit.threads, [&](std::size_t k) {
     try {
-      trials[k].gram = pair.gram(trials[k].thrown, trials[k].own);
+      auto gram = columns.gram(trials[k].thrown, trials[k].own);
+      if (gram.complete) trials[k].gram = std::move(gram.products);
     } catch (const std::invalid_argument&) {  // an experiment that is outside the physics
     }
   });
@@ -261,9 +194,10 @@ std::vector<SeparatingExperiment> separating_experiments(const Stage& stage, con
     if (!first) at->second.second += trial.weight * *trial.gram;
   }
   if (now.size() == 0) return out;
-  const double before = pair.correlation_in(now, accepted);
+  const double before = correlation_in(columns, now, stage, accepted);
   for (const auto& [number, experiment] : after)
-    out.push_back({other, experiment.first, before, pair.correlation_in(now + experiment.second, accepted)});
+    out.push_back(
+        {other, experiment.first, before, correlation_in(columns, now + experiment.second, stage, accepted)});
   std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.after < b.after; });
   constexpr std::size_t kShown = 3;
   if (out.size() > kShown) out.resize(kShown);

@@ -1,0 +1,147 @@
+#include "fitting/discovery/footprint_columns.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "fitting/dense_solve.hpp"
+#include "fitting/normal_equations.hpp"
+
+namespace unhand::fitting {
+
+using dynamics::Effect;
+using dynamics::EffectParameter;
+
+namespace {
+
+/// A one-sided footprint may change with the effect's size: it is taken at these, in typical steps.
+constexpr std::array kSizes = {1.0, 6.0, 36.0};
+
+/// All combinations of the shape parameters' grids.
+std::vector<std::map<std::string, double>> shapes_of(const Effect& effect) {
+  std::vector<std::map<std::string, double>> out{{}};
+  for (const EffectParameter& p : effect.parameters) {
+    if (!p.is_shape()) continue;
+    std::vector<std::map<std::string, double>> next;
+    for (const auto& shape : out)
+      for (const double value : p.grid) {
+        auto extended = shape;
+        extended[effect.full_name(p)] = value;
+        next.push_back(std::move(extended));
+      }
+    out = std::move(next);
+  }
+  return out;
+}
+
+}  // namespace
+
+FootprintColumns::FootprintColumns(const CampaignProblem& problem, const FitResult& fit)
+    : problem_(problem), fit_(fit), fitted_(problem.campaign().size()), width_(fitted_) {
+  derivatives_.push_back({problem, fit.values(), {}});
+  for (std::size_t k = 0; k < fitted_; ++k) derivatives_.front().columns.push_back({k, k});
+}
+
+void FootprintColumns::add_effects(const std::vector<std::string>& ids) {
+  const auto& present = problem_.options().effects;
+  std::vector<std::string> plain;
+  for (const auto& id : ids) {
+    if (std::find(present.begin(), present.end(), id) != present.end()) continue;
+    const Effect effect = find_effect(id);
+    const auto shapes = shapes_of(effect);
+    if (!effect.one_sided && shapes.size() == 1) {
+      plain.push_back(id);
+      continue;
+    }
+    for (const auto& shape : shapes)
+      for (const double size : kSizes) {
+        add_alone(effect, shape, size);
+        if (!effect.one_sided) break;  // derivatives have no size
+      }
+  }
+  add_together(plain);
+}
+
+void FootprintColumns::add_law(const std::string& law) {
+  CampaignProblem other = problem_.with(law, problem_.options().effects);
+  auto at = carried(fit_, other);
+  candidates_.push_back({std::string(kLaw) + law, {""}, {width_}, {}, {1}});
+  differences_.push_back({std::move(other), std::move(at), 1, width_++});
+}
+
+void FootprintColumns::add_alone(const Effect& effect, const Shape& shape, double size) {
+  auto effects = problem_.options().effects;
+  effects.push_back(effect.id);
+  CampaignProblem extended = problem_.with(problem_.options().model, effects);
+  Derivatives derivatives{extended, carried(fit_, extended), {}};
+  const auto shape_of = [&](std::size_t k) {
+    return shape.find(without_object(extended.campaign()[k].name));
+  };
+  for (std::size_t k = fitted_; k < derivatives.at.size(); ++k)
+    if (const auto found = shape_of(k); found != shape.end()) derivatives.at[k] = found->second;
+  Candidate candidate{effect.id, {}, {}, shape, {}};
+  for (std::size_t k = fitted_; k < derivatives.at.size(); ++k) {
+    if (shape_of(k) != shape.end()) continue;
+    const Unknown& u = extended.campaign()[k];
+    const std::size_t column = add_column(candidate, u);
+    if (!effect.one_sided) {
+      derivatives.columns.push_back({k, column});
+      continue;
+    }
+    Difference difference{extended, derivatives.at, std::min(size * u.scale, u.high - derivatives.at[k]),
+                          column};
+    difference.at[k] += difference.step;
+    differences_.push_back(std::move(difference));
+  }
+  if (!effect.one_sided) derivatives_.push_back(std::move(derivatives));
+  candidates_.push_back(std::move(candidate));
+}
+
+void FootprintColumns::add_together(const std::vector<std::string>& ids) {
+  auto effects = problem_.options().effects;
+  effects.insert(effects.end(), ids.begin(), ids.end());
+  Derivatives& all = derivatives_.front();
+  all.problem = problem_.with(problem_.options().model, effects);
+  all.at = carried(fit_, all.problem);
+  for (const auto& id : ids) {
+    Candidate candidate{id, {}, {}, {}, {}};
+    for (std::size_t k = fitted_; k < all.at.size(); ++k)
+      if (all.problem.campaign()[k].name.starts_with(id + "."))
+        all.columns.push_back({k, add_column(candidate, all.problem.campaign()[k])});
+    candidates_.push_back(std::move(candidate));
+  }
+}
+
+std::size_t FootprintColumns::add_column(Candidate& candidate, const Unknown& u) {
+  candidate.parameters.push_back(u.name);
+  candidate.columns.push_back(width_);
+  candidate.sides.push_back(side_of(u.start, u.low, u.high));
+  return width_++;
+}
+
+FootprintColumns::Gram FootprintColumns::gram(const CampaignThrow& thrown,
+                                              const std::vector<double>& own) const {
+  Gram out{Eigen::MatrixXd::Zero(width(), width()), false, false};
+  Eigen::MatrixXd columns, own_columns;
+  for (const Derivatives& d : derivatives_) {
+    const auto l = d.problem.linearise(thrown, d.at, own, true);
+    if (!l.solved) return out;
+    if (&d == &derivatives_.front()) {
+      columns.setZero(l.residual.size(), width());
+      columns.col(residual()) = l.residual;
+      own_columns = l.own;
+    }
+    for (const auto& [k, column] : d.columns)
+      columns.col(static_cast<Eigen::Index>(column)) = l.campaign.col(static_cast<Eigen::Index>(k));
+  }
+  out.solved = out.complete = true;
+  for (const Difference& d : differences_) {
+    const auto l = d.problem.linearise(thrown, d.at, own, false);
+    out.complete = out.complete && l.solved;
+    if (l.solved)
+      columns.col(static_cast<Eigen::Index>(d.column)) = (l.residual - columns.col(residual())) / d.step;
+  }
+  out.products = eliminated(throw_gram(own_columns, columns, own, fit_.own_spread), own_columns.cols());
+  return out;
+}
+
+}  // namespace unhand::fitting
