@@ -139,7 +139,8 @@ std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log) {
                      turn, angles.size())});
   const auto& friction = ratios[SizedColumn::slip_force];
   const double mu = friction.empty() ? kMostFriction : dynamics::median(friction);
-  if (out.empty() && (mu < kLeastFriction || mu > kMostFriction))
+  const bool dead = mu == 0;  // a wrench that says nothing is no unit
+  if (out.empty() && !dead && (mu < kLeastFriction || mu > kMostFriction))
     out.push_back(
         {"/throws/*/ft/normal_force", "f_N", mu, static_cast<int>(friction.size()),
          fmt::format("where the pads slip their wrench takes a friction of {:.3g} of it (median of {} "

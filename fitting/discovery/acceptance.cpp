@@ -25,8 +25,8 @@ bool is_confirmed(const std::vector<ChannelMisfit>& other_half, const ChannelMis
   });
 }
 
-double unexplained_from(Channel channel, const DiscoverOptions& options) {
-  return is_wrench(channel) ? 2 * options.unexplained : options.unexplained;
+double unexplained_from(Channel channel, Phase phase, const DiscoverOptions& options) {
+  return is_wrench(channel) && phase != Phase::grasped ? 2 * options.unexplained : options.unexplained;
 }
 
 double misfit_in(const std::vector<ChannelMisfit>& misfit, Channel channel, Phase phase) {
@@ -107,6 +107,11 @@ bool in_air(Phase phase) { return phase == Phase::flight || phase == Phase::land
 
 bool acts_on_pads(const std::string& id) { return id.starts_with("contact.") || id.starts_with("release."); }
 
+bool acts_on_pads(const Stage& stage) {
+  return std::any_of(stage.ids.begin(), stage.ids.end(),
+                     [](const std::string& id) { return acts_on_pads(id); });
+}
+
 bool acts(const AcceptedEffect& effect, bool air) {
   return in_air(effect.phase) == air || (!air && acts_on_pads(effect.id));
 }
@@ -120,7 +125,7 @@ bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisf
                      const DiscoverOptions& options) {
   return std::any_of(now.begin(), now.end(), [&](const ChannelMisfit& m) {
     return is_misfit(m, options) && acts(effect, in_air(m.phase)) && is_confirmed(other, m) &&
-           m.chi2_per_sample() >= unexplained_from(m.channel, options) &&
+           m.chi2_per_sample() >= unexplained_from(m.channel, m.phase, options) &&
            m.chi2_per_sample() - 1 > kLeft * (misfit_in(base, m.channel, m.phase) - 1);
   });
 }
@@ -132,6 +137,17 @@ bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const FitRes
   return (!is_law(effect.id) && wald_p_value(counted, find_effect(effect.id)) > kToldFromNone) ||
          leaves_too_much(effect, so_far.base.misfit, so_far.base_test, stage.fit.misfit, options) ||
          leaves_too_much(effect, so_far.base_test, so_far.base.misfit, stage.held_out.misfit, options);
+}
+
+bool spoils(const Stage& stage, const Discovery& so_far, const DiscoverOptions& options) {
+  const auto& now = stage.fit.misfit;
+  return std::any_of(now.begin(), now.end(), [&](const ChannelMisfit& m) {
+    const double from = unexplained_from(m.channel, m.phase, options);
+    return is_misfit(m, options) && m.chi2_per_sample() >= from &&
+           misfit_in(stage.held_out.misfit, m.channel, m.phase) >= from &&
+           misfit_in(so_far.base.misfit, m.channel, m.phase) < from &&
+           misfit_in(so_far.base_test, m.channel, m.phase) < from;
+  });
 }
 
 }  // namespace unhand::fitting

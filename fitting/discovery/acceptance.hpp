@@ -28,9 +28,9 @@ bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options);
 /// strike twice.
 bool is_confirmed(const std::vector<ChannelMisfit>& other_half, const ChannelMisfit& misfit);
 
-/// χ² per sample of a channel from where on something is missing there; of a wrench twice as much, most of
-/// whose variance is trust.
-double unexplained_from(experiment::Channel, const DiscoverOptions& options);
+/// χ² per sample of a channel in a phase from where on something is missing there; of a wrench once the pads
+/// open twice as much, most of whose variance is trust.
+double unexplained_from(experiment::Channel, Phase, const DiscoverOptions& options);
 
 /// The misfit of a channel in a phase, 1 where there is none.
 double misfit_in(const std::vector<ChannelMisfit>& misfit, experiment::Channel, Phase);
@@ -104,6 +104,8 @@ double wald_p_value(const FitResult& fit, const dynamics::Effect& effect);
 bool in_air(Phase phase);
 /// Whether an effect is one on the contact or the release.
 bool acts_on_pads(const std::string& id);
+/// Whether such an effect was added.
+bool acts_on_pads(const Stage& stage);
 /// Whether an effect acts in the air, or in the hand: where the misfit fell most, and an effect on the pads
 /// in the hand wherever that was.
 bool acts(const AcceptedEffect& effect, bool air);
@@ -113,6 +115,10 @@ bool acts(const AcceptedEffect& effect, bool air);
 /// much where it acts: of the throws that it was fitted to, or of those that it has not seen.
 bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const FitResult& counted,
                   const Discovery& so_far, const DiscoverOptions& options);
+
+/// Whether the answer has spoilt what the base model left clean: a channel in a phase with a misfit in both
+/// halves of the throws that had one in neither. What was accepted last is then the shadow of something else.
+bool spoils(const Stage& stage, const Discovery& so_far, const DiscoverOptions& options);
 
 /// @}
 

@@ -68,6 +68,13 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
   const int threads = options.fit.threads;
   const datasets::ThrowLog log = with_split(logged);
   Discovery out;
+  if (!log.throws.empty() && std::none_of(log.throws.begin(), log.throws.end(), [](const datasets::Throw& t) {
+        return t.split == datasets::Split::test;
+      })) {
+    out.verdict = Verdict::not_answered;
+    out.message = "no test throws and one condition only: nothing can be held out to judge an effect by";
+    return out;
+  }
   Stage stage{CampaignProblem(log, file, options.campaign), {}, {}, {}};
   solve(stage, options, {});
   if (stage.solved()) polish(stage, options);
@@ -125,6 +132,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
   out.residual_after = residual_over_time(stage.problem, residuals_after);
   out.structure_after = structures(stage.problem, residuals_after);
   out.unexplained = unexplained(stage, out, options);
+  if (out.unexplained) out.small.reset();  // beside that, nobody knows what it imitates
   out.final = stage.fit;
   out.final_test = stage.held_out.misfit;
   out.model = stage.problem.options().model;

@@ -59,7 +59,9 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   std::array<bool, 2> misled{};  // in the hand, in the air
   for (const AcceptedEffect& effect : out.effects) {
     const bool in_company = (misled[0] && acts(effect, false)) || (misled[1] && acts(effect, true));
-    const bool here = in_company || is_imitation(effect, stage, counted, out, options);
+    const bool last = effect.id == out.effects.back().id;
+    const bool here = in_company || is_imitation(effect, stage, counted, out, options) ||
+                      (last && spoils(stage, out, options));
     for (const bool air : {false, true}) misled[air ? 1 : 0] |= here && acts(effect, air);
     if (here) {
       gone.push_back(effect.id);
@@ -81,11 +83,6 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   if (effects.empty()) out.along.clear();
   stage = std::move(without);
   return withdraw(stage, options, out);
-}
-
-bool acts_on_pads(const Stage& stage) {
-  return std::any_of(stage.ids.begin(), stage.ids.end(),
-                     [](const std::string& id) { return acts_on_pads(id); });
 }
 
 bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out) {

@@ -33,9 +33,6 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
 /// below kMostGive; then it is a nuisance of the answer, not a part of it, and in `out.along`. True if it is.
 bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
-/// Whether such an effect was added.
-bool acts_on_pads(const Stage& stage);
-
 /// What speaks for every accepted effect in the end: the answer with it against the answer without it, which
 /// is `base` where there is no other.
 void judge(const Stage& stage, const Stage& base, const DiscoverOptions& options, Discovery& out);

@@ -232,10 +232,12 @@ std::optional<MissingEstimate> estimate_missing(const Stage& stage, Phase phase,
 std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_far,
                                        const DiscoverOptions& options) {
   std::optional<Unexplained> out;
+  // No law of pads is quite right; of flight and of sensors they are.
+  const double rest = acts_on_pads(stage) ? kRest : 0;
   for (const auto& m : stage.fit.misfit) {
     const double before = misfit_in(so_far.base.misfit, m.channel, m.phase);
-    const double limit = std::max(unexplained_from(m.channel, options),
-                                  so_far.effects.empty() ? 0.0 : 1 + kRest * (before - 1));
+    const double limit = std::max(unexplained_from(m.channel, m.phase, options),
+                                  so_far.effects.empty() ? 0.0 : 1 + rest * (before - 1));
     if (!is_misfit(m, options) || m.chi2_per_sample() < limit) continue;
     if (!is_confirmed(stage.held_out.misfit, m)) continue;
     // The first phase in which something is left; there, the channel in which most is.

@@ -163,6 +163,12 @@ TEST(UnitCheck, WithoutAnOpeningCommandTheForceTellsWhenItOpens) {
   EXPECT_FALSE(unit_doubts(log).empty());
 }
 
+TEST(UnitCheck, AWrenchThatSaysNothingIsNoUnit) {
+  auto log = campaign();
+  for (auto& one : log.throws) scale(one.ft->wrench, 0, 0, 3);
+  EXPECT_THAT(unit_doubts(log), IsEmpty());
+}
+
 TEST(UnitCheck, CampaignsInSiUnitsRaiseNoDoubt) {
   for (const auto& name : campaign_names()) {
     auto design = campaign_design(name);
