@@ -102,7 +102,12 @@ const OtherUnit* explains(const Side& side, double ratio, double within) {
 
 std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log) {
   std::vector<UnitDoubt> out;
-  if (log.dimension != 2) return out;
+  constexpr double kMostGravity = 100;  // [m/s²]
+  if (log.gravity > kMostGravity)
+    out.push_back({"/@gravity", "gravity", log.gravity, 1,
+                   fmt::format("gravity is {:.6g} m/s², more than {}: mm/s² or cm/s² for m/s²?", log.gravity,
+                               kMostGravity)});
+  if (log.dimension != 2 || !out.empty()) return out;
   SizeRatios ratios;
   for (const auto& one : log.throws) compare_sizes(log, one, ratios);
   for (const auto& [column, all] : ratios) {

@@ -144,6 +144,17 @@ TEST(UnitCheck, LeversInMillimetresShowInTheDistanceOfTheObject) {
   }
 }
 
+TEST(UnitCheck, NoPlanetPullsWithTenThousand) {
+  auto log = campaign();
+  log.gravity *= 1e3;
+  try {
+    require_units(log, "log.h5");
+    FAIL();
+  } catch (const datasets::LogError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("/@gravity"), HasSubstr("mm/s²")));
+  }
+}
+
 TEST(UnitCheck, AGraspAngleBeyondAWholeTurnIsInDegrees) {
   auto log = campaign();
   for (auto& one : log.throws) one.mocap.reset(), one.grasp_angle = -22;
