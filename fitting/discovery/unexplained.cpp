@@ -259,7 +259,8 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
   const MissingEstimate& missing = *out->missing;
   const char* quantity = missing.phase == Phase::flight ? "acceleration" : "wrench of a pad";
   if (!missing.candidate.terms.empty())
-    out->description += fmt::format("; the missing {} looks like {}", quantity, missing.candidate.in_words());
+    out->description += fmt::format("; of the forms tried, the missing {} is nearest to {}", quantity,
+                                    missing.candidate.in_words());
   if (missing.correction == Correction::withheld)
     out->description += "; as a correction it does not lower the held-out error and is withheld";
   else if (missing.correction == Correction::not_judged)
