@@ -234,9 +234,18 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
   std::optional<Unexplained> out;
   // No law of pads is quite right; of flight and of sensors they are.
   const double rest = acts_on_pads(stage) ? kRest : 0;
+  const auto limit_of = [&](const ChannelMisfit& m) {
+    return is_wrench(m.channel) ? 2 * options.unexplained : unexplained_from(m.channel, m.phase, options);
+  };
+  // Wrenches of the firm grasp speak where nothing else does: the fit bends them for what is missing
+  // elsewhere.
+  const bool elsewhere = std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(), [&](const auto& m) {
+    return is_misfit(m, options) && m.chi2_per_sample() >= limit_of(m) &&
+           is_confirmed(stage.held_out.misfit, m);
+  });
   for (const auto& m : stage.fit.misfit) {
     const double before = misfit_in(so_far.base.misfit, m.channel, m.phase);
-    const double limit = std::max(unexplained_from(m.channel, m.phase, options),
+    const double limit = std::max(elsewhere ? limit_of(m) : unexplained_from(m.channel, m.phase, options),
                                   so_far.effects.empty() ? 0.0 : 1 + rest * (before - 1));
     if (!is_misfit(m, options) || m.chi2_per_sample() < limit) continue;
     if (!is_confirmed(stage.held_out.misfit, m)) continue;
