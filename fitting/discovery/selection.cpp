@@ -109,6 +109,7 @@ bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out) {
 }
 
 void judge(const Stage& stage, const Stage& base, const DiscoverOptions& options, Discovery& out) {
+  if (out.effects.empty()) return;
   const OutcomeErrors with = errors_of(stage, Share::test, options.fit.threads);
   const bool alone = stage.ids.size() == 1 && out.along.empty();
   for (AcceptedEffect& accepted : out.effects) {
