@@ -25,14 +25,15 @@ std::array<double, 3> sigma_of(const Series& series) {
 /// The state at `detach` of the free flight that explains the motion capture from `from` on. Drag enters as a
 /// correction to the samples, by iteration: the difference of the flights with and without it from the same
 /// state.
-void measure_flight(const datasets::Throw& logged, double from, double detach, PreparedThrow& out) {
+void measure_flight(const datasets::ThrowLog& log, const datasets::Throw& logged, double from, double detach,
+                    PreparedThrow& out) {
   std::vector<double> t, x, z, theta;
   const auto& mocap = *logged.mocap;
   const double until = logged.landing && !logged.landing->time.empty()
                            ? logged.landing->time(0) + 1e-9
-                           : mocap.time(mocap.time.rows - 1) + 1e-9;
+                           : first_below_landing(log, mocap, out.open_command);
   for (std::size_t i = 0; i < mocap.time.rows; ++i) {
-    if (!mocap.is_valid(i) || mocap.time(i) < from || mocap.time(i) > until) continue;
+    if (!mocap.is_valid(i) || mocap.time(i) < from || mocap.time(i) >= until) continue;
     t.push_back(mocap.time(i) - detach);
     x.push_back(mocap.pose(i, 0));
     z.push_back(mocap.pose(i, 1));
@@ -66,6 +67,13 @@ void measure_flight(const datasets::Throw& logged, double from, double detach, P
 }
 
 }  // namespace
+
+double first_below_landing(const datasets::ThrowLog& log, const datasets::MocapLog& mocap, double opening) {
+  for (std::size_t i = 0; i < mocap.time.rows; ++i)
+    if (mocap.time(i) > opening && mocap.is_valid(i) && mocap.pose(i, 1) < log.landing_height)
+      return mocap.time(i);
+  return HUGE_VAL;
+}
 
 PreparedThrow prepare(const datasets::ThrowLog& log, const datasets::Throw& logged, const std::string& file) {
   const std::string path = "/throws/" + logged.id;
@@ -173,7 +181,7 @@ PreparedThrow prepare(const datasets::ThrowLog& log, const datasets::Throw& logg
     out.measured.detach_time = flight_from = *logged.detach_time;
   }
   if (logged.mocap && out.measured.detach_time)
-    measure_flight(logged, flight_from, *out.measured.detach_time, out);
+    measure_flight(log, logged, flight_from, *out.measured.detach_time, out);
   if (logged.landing) {
     out.measured.landing_x = logged.landing->pose(0, 0);
     out.measured.landing_theta = logged.landing->pose(0, 1);

@@ -14,7 +14,8 @@
 namespace unhand::experiment {
 
 /// What the log says about the outcome. The twist at detach is that of the flight model fitted to the motion
-/// capture after the normal force has fallen below 3 σ, evaluated at detach.
+/// capture after the normal force has fallen below 3 σ and up to the landing (where none was logged, up to
+/// first_below_landing), evaluated at detach.
 struct MeasuredOutcome {
   std::optional<double> detach_time;                    ///< [s]
   std::optional<dynamics::Pose<double>> detach_pose;    ///< of the CoM; m, m, rad
@@ -53,5 +54,9 @@ struct PreparedThrow {
 /// Throws datasets::LogError, naming the path inside `file`, when the throw lacks what a release needs: the
 /// hand, the planar inertia, a grasp, an opening time.
 PreparedThrow prepare(const datasets::ThrowLog& log, const datasets::Throw& logged, const std::string& file);
+
+/// When motion capture first sees the object below the landing height after `opening` [s]: from there on it
+/// may have touched the ground. Infinite where it never does. `mocap` is planar.
+double first_below_landing(const datasets::ThrowLog& log, const datasets::MocapLog& mocap, double opening);
 
 }  // namespace unhand::experiment
