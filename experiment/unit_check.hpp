@@ -10,7 +10,7 @@ namespace unhand::experiment {
 
 /// A column that is as many times too large as another unit would make it.
 struct UnitDoubt {
-  std::string path;    ///< in the log: "/throws/*/mocap/pose"
+  std::string path;    ///< in the log: "/throws/*/mocap/pose", or of one throw: "/throws/017/mocap/pose"
   std::string column;  ///< "theta"
   double ratio{};      ///< its size over what the other channels say, median over throws; of the normal
                        ///< force: the friction that the wrenches take of it; of grasp_angle: itself
@@ -24,7 +24,12 @@ inline constexpr double kLeastFriction = 0.01;
 /// Most friction coefficient that pads may have [-]: above rubber's 2, the most of any.
 inline constexpr double kMostFriction = 3;
 
-/// The columns of a planar log of releases whose size contradicts other channels by about the factor of a
+/// Factor by which a single throw's column must differ from what the others say to be told of [-]: sensors
+/// and repetitions differ by less than 2, units by 10 and more (pound-force, 4.4, is told only of a whole
+/// log).
+inline constexpr double kLeastOutlier = 5;
+
+/// The columns of a log whose size contradicts other channels by about the factor of a
 /// unit in use (mm, cm, inch; degrees; kgf, lbf, mN, kN; N mm, N cm, kgf cm; ms; g). Compared are
 ///
 /// - the hand's pose with the sum of its twist, the twist with the sum of the acceleration;
@@ -38,10 +43,17 @@ inline constexpr double kMostFriction = 3;
 ///   channel knows the unit of the normal force, of which only the product with friction is determined, but
 ///   in another one friction lies outside [kLeastFriction, kMostFriction].
 ///
+/// - the landing height with where free flights are at landing/time, and with the highest point of all throws
+///   (to a metre);
+/// - the height of a free flight with what gravity makes of it: the only one of logs without a hand, and of
+///   dimension 3.
+///
 /// A throw has a say where the two are proportional (cosine of at least 0.9 over its samples) and what is
 /// expected is large enough to show. The median over throws must lie within a factor of 1.5 (clocks and
 /// landing_x: 3 to 4) of a unit's factor, the smallest of which is 4.4: no scale or bias that a sensor may
-/// have comes near. Logs of free flights and of dimension 3 raise no doubt.
+/// have comes near. Where no median does, single throws are looked at the same way, and by the size of their
+/// columns in the other throws of their condition: those are told by their own path
+/// ("/throws/017/mocap/pose") with what is accepted.
 std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log);
 
 /// Throws datasets::LogError, naming the columns, if unit_doubts has any.

@@ -8,6 +8,7 @@
 
 #include "dynamics/frames.hpp"
 #include "dynamics/median.hpp"
+#include "experiment/unit_rules.hpp"
 
 namespace unhand::experiment {
 
@@ -35,10 +36,6 @@ class Pairs {
   double ss_{}, se_{}, ee_{}, n_{};
 };
 
-// What shows: far above any sensor's noise.
-constexpr double kShift = 0.02, kTurn = 0.02, kSpeed = 0.1, kSpin = 0.1, kNewton = 0.1, kNewtonMetre = 2e-3,
-                 kLever = 5e-3;
-
 /// Every sample of `value` minus the first, beside its derivative added up (trapezoids).
 std::optional<double> ratio_to_integral(const Series& time, const Series& value, const Series& rate,
                                         std::size_t first, std::size_t last, double shows) {
@@ -53,14 +50,14 @@ std::optional<double> ratio_to_integral(const Series& time, const Series& value,
 }
 
 void keep(SizeRatios& out, SizedColumn column, std::optional<double> ratio) {
-  if (ratio && std::isfinite(*ratio)) out[column].push_back(*ratio);
+  if (ratio && std::isfinite(*ratio)) out[column] = *ratio;
 }
 
 void check_hand(const datasets::HandLog& hand, SizeRatios& out) {
-  const auto shift = ratio_to_integral(hand.time, hand.pose, hand.twist, 0, 2, kShift),
-             turn = ratio_to_integral(hand.time, hand.pose, hand.twist, 2, 3, kTurn),
-             speed = ratio_to_integral(hand.time, hand.twist, hand.acceleration, 0, 2, kSpeed),
-             spin = ratio_to_integral(hand.time, hand.twist, hand.acceleration, 2, 3, kSpin);
+  const auto shift = ratio_to_integral(hand.time, hand.pose, hand.twist, 0, 2, kShowsShift),
+             turn = ratio_to_integral(hand.time, hand.pose, hand.twist, 2, 3, kShowsTurn),
+             speed = ratio_to_integral(hand.time, hand.twist, hand.acceleration, 0, 2, kShowsSpeed),
+             spin = ratio_to_integral(hand.time, hand.twist, hand.acceleration, 2, 3, kShowsSpin);
   // A wrong clock makes every sum wrong alike.
   if (shift && speed) keep(out, SizedColumn::hand_clock, 1 / std::sqrt(*shift * *speed));
   keep(out, SizedColumn::hand_shift, shift);
@@ -113,9 +110,9 @@ std::optional<double> check_mocap(const Held& held, SizeRatios& out) {
   }
   // Where the hand hardly moves but turns, the object moves by its lever.
   if (farthest > held.lever() * std::min(widest, 2.0))
-    keep(out, SizedColumn::held_shift, shift.ratio(kShift));
-  keep(out, SizedColumn::held_turn, turn.ratio(kTurn));
-  if (const auto offset = held.object().com_offset; offset && n > 0 && distance > n * kLever)
+    keep(out, SizedColumn::held_shift, shift.ratio(kShowsShift));
+  keep(out, SizedColumn::held_turn, turn.ratio(kShowsTurn));
+  if (const auto offset = held.object().com_offset; offset && n > 0 && distance > n * kShowsLever)
     keep(out, SizedColumn::lever, std::abs(*offset) * n / distance);
   return n > 0 ? std::optional(angle / n) : held.logged.grasp_angle;
 }
@@ -144,8 +141,38 @@ void check_wrench(const Held& held, std::optional<double> grasp_angle, SizeRatio
     if (grasp_angle && object.com_offset && object.inertia && object.inertia->size() == 1)
       torque.add(pads * ft.wrench(i, 2), object.inertia->front() * a[2] + d.x * f.z - d.z * f.x);
   }
-  keep(out, SizedColumn::force, force.ratio(kNewton));
-  keep(out, SizedColumn::torque, torque.ratio(kNewtonMetre));
+  keep(out, SizedColumn::force, force.ratio(kShowsNewton));
+  keep(out, SizedColumn::torque, torque.ratio(kShowsNewtonMetre));
+}
+
+/// The bend of the height over time, beside gravity's; what is straight of both is taken out.
+void check_fall(const datasets::ThrowLog& log, const datasets::Throw& logged, SizeRatios& out) {
+  const auto& mocap = *logged.mocap;
+  const std::size_t z = log.dimension == 2 ? 1 : 2;
+  std::vector<std::array<double, 3>> samples;  // t, height, fall
+  for (std::size_t i = 0; i < mocap.time.rows; ++i) {
+    const double t = mocap.time(i);
+    if (!mocap.is_valid(i)) continue;
+    if (logged.free_flight && (t < logged.free_flight->first || t > logged.free_flight->second)) continue;
+    const double since = samples.empty() ? 0 : t - samples.front()[0];
+    samples.push_back({t, mocap.pose(i, z), -0.5 * log.gravity * since * since});
+  }
+  constexpr std::size_t kEnough = 8;
+  if (samples.size() < kEnough) return;
+  std::array<double, 3> mean{};
+  for (const auto& s : samples)
+    for (std::size_t c = 0; c < 3; ++c) mean[c] += s[c] / static_cast<double>(samples.size());
+  double tt = 0, th = 0, tf = 0;
+  for (const auto& s : samples) {
+    const double t = s[0] - mean[0];
+    tt += t * t, th += t * (s[1] - mean[1]), tf += t * (s[2] - mean[2]);
+  }
+  Pairs bend;
+  for (const auto& s : samples) {
+    const double t = s[0] - mean[0];
+    bend.add(s[1] - mean[1] - th / tt * t, s[2] - mean[2] - tf / tt * t);
+  }
+  keep(out, SizedColumn::fall, bend.ratio(kShowsBend));
 }
 
 /// A free flight of the pads' centre from the end of the grasp.
@@ -159,7 +186,7 @@ void check_landing(const Held& held, SizeRatios& out) {
   const double fall = (with[1] + std::sqrt(under)) / g;
   Pairs x;
   x.add(landing.pose(0, 0), from[0] + with[0] * fall);
-  keep(out, SizedColumn::landing_x, x.ratio(5 * kShift));
+  keep(out, SizedColumn::landing_x, x.ratio(5 * kShowsShift));
   if (landing.time.empty()) return;
   if (held.end + fall > 0) keep(out, SizedColumn::landing_clock, landing.time(0) / (held.end + fall));
   if (!held.logged.mocap) return;
@@ -176,7 +203,7 @@ void check_landing(const Held& held, SizeRatios& out) {
     const double rate = (mocap.pose(*last, 2) - mocap.pose(i, 2)) / apart;
     Pairs turn;
     turn.add(landing.pose(0, 1), mocap.pose(*last, 2) + rate * left);
-    keep(out, SizedColumn::landing_turn, turn.ratio(10 * kTurn));
+    keep(out, SizedColumn::landing_turn, turn.ratio(10 * kShowsTurn));
     return;
   }
 }
@@ -210,8 +237,10 @@ std::optional<double> opening_of(const datasets::ThrowLog& log, const datasets::
 
 }  // namespace
 
-void compare_sizes(const datasets::ThrowLog& log, const datasets::Throw& logged, SizeRatios& out) {
-  if (!logged.hand || logged.hand->time.rows < 3) return;
+SizeRatios compare_sizes(const datasets::ThrowLog& log, const datasets::Throw& logged) {
+  SizeRatios out;
+  if (!logged.hand && logged.mocap) check_fall(log, logged, out);
+  if (log.dimension != 2 || !logged.hand || logged.hand->time.rows < 3) return out;
   const auto& hand = *logged.hand;
   check_hand(hand, out);
   const double begin = hand.time(0), end = hand.time(hand.time.rows - 1);
@@ -220,7 +249,7 @@ void compare_sizes(const datasets::ThrowLog& log, const datasets::Throw& logged,
         std::pair{SizedColumn::mocap_clock, logged.mocap ? &logged.mocap->time : nullptr}})
     if (time && time->rows > 1) keep(out, rule, ((*time)(time->rows - 1) - (*time)(0)) / (end - begin));
   const auto opening = opening_of(log, logged);
-  if (!opening || *opening <= begin || *opening > end) return;
+  if (!opening || *opening <= begin || *opening > end) return out;
   const Held held{log, logged, hand, begin, *opening};
   const auto grasp_angle = check_mocap(held, out);
   if (logged.ft) {
@@ -228,6 +257,34 @@ void compare_sizes(const datasets::ThrowLog& log, const datasets::Throw& logged,
     check_friction(log, *logged.ft, *opening, out);
   }
   if (logged.landing) check_landing(held, out);
+  return out;
+}
+
+std::optional<TimedLanding> timed_landing(const datasets::ThrowLog& log, const datasets::Throw& logged) {
+  if (!logged.hand || logged.hand->time.rows < 3 || !logged.landing || logged.landing->time.empty())
+    return {};
+  const auto& hand = *logged.hand;
+  const auto opening = opening_of(log, logged);
+  if (!opening || *opening <= hand.time(0) || *opening > hand.time(hand.time.rows - 1)) return {};
+  const double t = logged.landing->time(0) - *opening;
+  if (!(t > 0)) return {};
+  const double z = at(hand.time, hand.pose, *opening)[1], vz = at(hand.time, hand.twist, *opening)[1],
+               fall = 0.5 * log.gravity * t * t;
+  return TimedLanding{z + vz * t - fall, 1 + 0.5 * fall};
+}
+
+std::optional<double> highest_point(const datasets::ThrowLog& log, const datasets::Throw& logged) {
+  std::optional<double> out;
+  const auto at_least = [&](double z) { out = std::max(out.value_or(z), z); };
+  if (logged.mocap)
+    for (std::size_t i = 0; i < logged.mocap->time.rows; ++i)
+      if (logged.mocap->is_valid(i)) at_least(logged.mocap->pose(i, log.dimension == 2 ? 1 : 2));
+  if (log.dimension == 2 && logged.hand)
+    for (std::size_t i = 0; i < logged.hand->time.rows; ++i) {
+      const double rise = std::max(0.0, logged.hand->twist(i, 1));
+      at_least(logged.hand->pose(i, 1) + (log.gravity > 0 ? rise * rise / (2 * log.gravity) : 0.0));
+    }
+  return out;
 }
 
 }  // namespace unhand::experiment

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <map>
-#include <vector>
+#include <optional>
 
 #include "datasets/throw_log.hpp"
 
@@ -18,6 +18,7 @@ enum class SizedColumn {
   hand_turn,      ///< the same of the angle
   hand_speed,     ///< twist against the sum of the acceleration
   hand_spin,      ///< the same of the rate
+  fall,           ///< the height of a free flight against gravity
   held_shift,     ///< the object's position against the hand's while it is held
   held_turn,      ///< the same of the angle
   lever,          ///< declared com_offset against the distance at which motion capture sees the object
@@ -28,10 +29,21 @@ enum class SizedColumn {
   slip_force,     ///< tangential over normal force where the pads slip: a friction coefficient
 };
 
-/// Size over what the other source tells, one number per throw that has a say.
-using SizeRatios = std::map<SizedColumn, std::vector<double>>;
+/// Size over what the other source tells, where the throw has a say.
+using SizeRatios = std::map<SizedColumn, double>;
 
-/// Adds what a throw from a hand, of a planar log, shows.
-void compare_sizes(const datasets::ThrowLog& log, const datasets::Throw& logged, SizeRatios& out);
+/// What a throw shows: from a hand if the log is planar, and the height of a free flight in either.
+SizeRatios compare_sizes(const datasets::ThrowLog& log, const datasets::Throw& logged);
+
+/// Where a throw lands by its landing/time.
+struct TimedLanding {
+  double height;     ///< of a free flight of the pads' centre at that time [m]
+  double tolerance;  ///< the object's size, and the air for half of the fall [m]
+};
+/// Nothing if the throw does not tell.
+std::optional<TimedLanding> timed_landing(const datasets::ThrowLog& log, const datasets::Throw& logged);
+
+/// The highest point that a throw is seen at or could reach from the hand's state [m].
+std::optional<double> highest_point(const datasets::ThrowLog& log, const datasets::Throw& logged);
 
 }  // namespace unhand::experiment
