@@ -5,8 +5,10 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "fitting/dense_solve.hpp"
+#include "fitting/discovery/traces.hpp"
 #include "fitting/distributions.hpp"
 
 namespace unhand::fitting {
@@ -148,6 +150,64 @@ bool spoils(const Stage& stage, const Discovery& so_far, const DiscoverOptions& 
            misfit_in(so_far.base.misfit, m.channel, m.phase) < from &&
            misfit_in(so_far.base_test, m.channel, m.phase) < from;
   });
+}
+
+namespace {
+
+/// Whether something is left in the tracked flights of both halves.
+bool leaves_flights(const Stage& stage, const DiscoverOptions& options) {
+  return std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(), [&](const ChannelMisfit& m) {
+    return m.phase == Phase::flight && is_misfit(m, options) &&
+           m.chi2_per_sample() >= unexplained_from(m.channel, m.phase, options) &&
+           is_confirmed(stage.held_out.misfit, m);
+  });
+}
+
+/// One candidate for every object, from its own flights.
+std::map<int, MissingCandidate> candidates_of(const PhaseTraces& train) {
+  std::map<int, std::vector<ResidualTrace>> of_object;
+  for (const ResidualTrace& trace : train.all) of_object[trace.group].push_back(trace);
+  std::map<int, MissingCandidate> out;
+  for (const auto& [object, traces] : of_object) out[object] = missing_terms(traces, train.how);
+  return out;
+}
+
+/// What candidates leave, a candidate for each object; one that is not there says nothing.
+double beyond_noise(const PhaseTraces& flights, const std::map<int, MissingCandidate>& candidates) {
+  double out = 0;
+  for (const ResidualTrace& trace : flights.all) {
+    const auto candidate = candidates.find(trace.group);
+    const Rest rest = rest_around(
+        {trace}, candidate == candidates.end() ? MissingCandidate{} : candidate->second, flights.how);
+    out += rest.chi2 - static_cast<double>(rest.samples);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<std::string> outdone_by_a_form(const Stage& stage, const Discovery& so_far,
+                                           const DiscoverOptions& options) {
+  std::vector<std::string> accepted;
+  for (const AcceptedEffect& effect : so_far.effects)
+    if (in_air(effect.phase) && !is_law(effect.id) && !acts_on_pads(effect.id)) accepted.push_back(effect.id);
+  if (accepted.empty() || !leaves_flights(stage, options)) return {};
+  const Stage less = without(stage, accepted, options);
+  if (!less.solved()) return {};
+  const int threads = options.fit.threads;
+  const auto flights = [&](const Stage& of, const FitResult& half) {
+    return traces_of(of.problem, half, Phase::flight, threads);
+  };
+  const PhaseTraces train = flights(less, less.fit);
+  const auto candidates = candidates_of(train);
+  const bool outdone =
+      beyond_noise(train, candidates) < kOutdone * beyond_noise(flights(stage, stage.fit), {}) &&
+      beyond_noise(flights(less, less.held_out), candidates) <
+          kOutdone * beyond_noise(flights(stage, stage.held_out), {});
+  if (!outdone) return {};
+  for (const auto& [object, candidate] : candidates)
+    for (const MissingTerm& term : candidate.terms) std::erase(accepted, term.form_of);
+  return accepted;
 }
 
 }  // namespace unhand::fitting

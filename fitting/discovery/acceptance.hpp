@@ -120,6 +120,17 @@ bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const FitRes
 /// halves of the throws that had one in neither. What was accepted last is then the shadow of something else.
 bool spoils(const Stage& stage, const Discovery& so_far, const DiscoverOptions& options);
 
+/// What a form that no effect has may leave of what the accepted effects leave of the tracked flights.
+inline constexpr double kOutdone = 0.5;
+
+/// The accepted effects of the air that are the shadow of something unlisted. The laws of flight and of
+/// sensors are exact, so that something left in flight means that something else acts: beside them, or in
+/// their place. They are outdone where a few terms (missing_terms, one candidate an object), fitted to the
+/// train throws in their place, leave less than kOutdone of what they leave, beyond noise, in both halves of
+/// the throws. An effect whose own form is among those terms stays.
+std::vector<std::string> outdone_by_a_form(const Stage& stage, const Discovery& so_far,
+                                           const DiscoverOptions& options);
+
 /// @}
 
 }  // namespace unhand::fitting

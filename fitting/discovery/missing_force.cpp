@@ -78,6 +78,7 @@ double hat(const std::vector<double>& knots, std::size_t j, double t) {
 struct Term {
   std::string name, unit;
   std::function<Vector3(const State&)> at;
+  std::string form_of{};
 };
 
 std::vector<Term> acceleration_terms() {
@@ -85,7 +86,8 @@ std::vector<Term> acceleration_terms() {
   return {{"|v| v", "1/m",
            [=](const State& s) {
              return Vector3{speed(s) * s.vx, speed(s) * s.vz, 0};
-           }},
+           },
+           "flight.quadratic_drag"},
           {"v", "1/s",
            [](const State& s) {
              return Vector3{s.vx, s.vz, 0};
@@ -93,15 +95,18 @@ std::vector<Term> acceleration_terms() {
           {"omega J v", "-",
            [](const State& s) {
              return Vector3{-s.omega * s.vz, s.omega * s.vx, 0};
-           }},
+           },
+           "flight.magnus_lift"},
           {"1 along x", "m/s^2",
            [](const State&) {
              return Vector3{1, 0, 0};
-           }},
+           },
+           "flight.gravity_tilt"},
           {"1 along z", "m/s^2",
            [](const State&) {
              return Vector3{0, 1, 0};
-           }},
+           },
+           "sensor.length_scale"},
           {"1 along the object's x", "m/s^2",
            [](const State& s) {
              return Vector3{std::cos(s.theta), std::sin(s.theta), 0};
@@ -113,7 +118,8 @@ std::vector<Term> acceleration_terms() {
           {"omega^2 along the object's x", "m",
            [](const State& s) {
              return Vector3{s.omega * s.omega * std::cos(s.theta), s.omega * s.omega * std::sin(s.theta), 0};
-           }},
+           },
+           "sensor.com_offset"},
           {"1 in rotation", "rad/s^2",
            [](const State&) {
              return Vector3{0, 0, 1};
@@ -300,9 +306,26 @@ MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const M
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(k);
     const Term& term = terms[static_cast<std::size_t>(chosen[k])];
-    out.terms.push_back({term.name, x[i], std::sqrt(std::max(0.0, covariance(i, i))), term.unit, term.at});
+    out.terms.push_back(
+        {term.name, x[i], std::sqrt(std::max(0.0, covariance(i, i))), term.unit, term.form_of, term.at});
   }
   if (squares > samples) out.explained = std::clamp(gain / (squares - samples), 0.0, 1.0);
+  return out;
+}
+
+Rest rest_around(const std::vector<ResidualTrace>& traces, const MissingCandidate& candidate,
+                 const MissingOptions& options) {
+  Rest out;
+  for (const auto& trace : traces)
+    for (int component = 0; component < 3; ++component) {
+      const Rows rows(trace, component, options);
+      if (!rows.enough()) continue;
+      std::vector<double> missing;
+      for (const State& s : trace.state)
+        missing.push_back(candidate.at(s)[static_cast<std::size_t>(component)]);
+      out.chi2 += (rows.seen() - rows.response(missing)).squaredNorm();
+      out.samples += rows.seen().size();
+    }
   return out;
 }
 

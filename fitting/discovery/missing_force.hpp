@@ -58,6 +58,7 @@ struct MissingTerm {
   std::string name;               ///< "|v| v", "omega J v", "1 (x)", ...
   double coefficient{}, sigma{};  ///< in `unit`; 1 σ
   std::string unit;               ///< of the coefficient
+  std::string form_of;            ///< id of the effect that has this form; empty where none has
   std::function<std::array<double, 3>(const ResidualTrace::State&)> shape;  ///< of coefficient one
 };
 
@@ -76,5 +77,15 @@ struct MissingCandidate {
 /// along its x (a reference point off the CoM), and for the rotation a constant, ω, |ω| ω, sin θ and cos θ.
 /// Wrenches: a constant, f_N, and f_N² of each component, and |v| and ω for their dependence on the motion.
 MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const MissingOptions& options);
+
+/// χ² of the traces around what a candidate says, each recording's own offset and slope projected out where
+/// the response is integrated; and the samples that it is of.
+struct Rest {
+  double chi2{};   ///< sum over all components
+  long samples{};  ///< that were seen
+};
+/// What the candidate leaves; of one without terms, what there is.
+Rest rest_around(const std::vector<ResidualTrace>& traces, const MissingCandidate& candidate,
+                 const MissingOptions& options);
 
 }  // namespace unhand::fitting

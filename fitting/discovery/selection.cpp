@@ -35,15 +35,14 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
     removed = false;
     for (std::size_t i = 0; i + 1 < stage.ids.size() && !removed; ++i) {
       if (is_law(stage.ids[i])) continue;
-      Stage without = reduced(stage, i, options);
-      if (!without.solved()) continue;
-      const bool needed =
-          stage.bic() - without.bic() < kDeltaBic &&
-          (improvement(without.held_out, stage.held_out, out.base_test, options).matters >= 1 ||
-           predicts_better(without, stage, options));
+      Stage less = without(stage, {stage.ids[i]}, options);
+      if (!less.solved()) continue;
+      const bool needed = stage.bic() - less.bic() < kDeltaBic &&
+                          (improvement(less.held_out, stage.held_out, out.base_test, options).matters >= 1 ||
+                           predicts_better(less, stage, options));
       if (needed) continue;
       std::erase_if(out.effects, [&](const AcceptedEffect& e) { return e.id == stage.ids[i]; });
-      stage = std::move(without);
+      stage = std::move(less);
       removed = true;
     }
   }
@@ -56,12 +55,14 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   std::vector<std::string> ids, gone;
   auto effects = stage.problem.options().effects;
   std::string model = out.model;
+  const std::vector<std::string> outdone = outdone_by_a_form(stage, out, options);
   std::array<bool, 2> misled{};  // in the hand, in the air
   for (const AcceptedEffect& effect : out.effects) {
     const bool in_company = (misled[0] && acts(effect, false)) || (misled[1] && acts(effect, true));
     const bool last = effect.id == out.effects.back().id;
     const bool here = in_company || is_imitation(effect, stage, counted, out, options) ||
-                      (last && spoils(stage, out, options));
+                      (last && spoils(stage, out, options)) ||
+                      std::find(outdone.begin(), outdone.end(), effect.id) != outdone.end();
     for (const bool air : {false, true}) misled[air ? 1 : 0] |= here && acts(effect, air);
     if (here) {
       gone.push_back(effect.id);
@@ -113,12 +114,10 @@ void judge(const Stage& stage, const Stage& base, const DiscoverOptions& options
   const OutcomeErrors with = errors_of(stage, Share::test, options.fit.threads);
   const bool alone = stage.ids.size() == 1 && out.along.empty();
   for (AcceptedEffect& accepted : out.effects) {
-    const auto index = static_cast<std::size_t>(std::find(stage.ids.begin(), stage.ids.end(), accepted.id) -
-                                                stage.ids.begin());
-    const Stage without = alone ? base : reduced(stage, index, options);
-    if (!without.solved()) continue;  // what it was accepted for stands
-    accepted.delta_bic = stage.bic() - without.bic();
-    accepted.test_error_ratio = error_ratio(errors_of(without, Share::test, options.fit.threads), with);
+    const Stage less = alone ? base : without(stage, {accepted.id}, options);
+    if (!less.solved()) continue;  // what it was accepted for stands
+    accepted.delta_bic = stage.bic() - less.bic();
+    accepted.test_error_ratio = error_ratio(errors_of(less, Share::test, options.fit.threads), with);
   }
 }
 

@@ -175,13 +175,16 @@ Stage extended(const Stage& stage, const Candidate& candidate, const Score& scor
   return out;
 }
 
-Stage reduced(const Stage& stage, std::size_t index, const DiscoverOptions& options) {
+Stage without(const Stage& stage, const std::vector<std::string>& gone, const DiscoverOptions& options) {
   auto effects = stage.problem.options().effects;
-  std::erase(effects, stage.ids[index]);
-  const std::string& model =
-      is_law(stage.ids[index]) ? options.campaign.model : stage.problem.options().model;
-  Stage out{stage.problem.with(model, effects), {}, {}, stage.ids};
-  out.ids.erase(out.ids.begin() + static_cast<std::ptrdiff_t>(index));
+  std::string model = stage.problem.options().model;
+  std::vector<std::string> ids = stage.ids;
+  for (const std::string& id : gone) {
+    std::erase(effects, id);
+    std::erase(ids, id);
+    if (is_law(id)) model = options.campaign.model;
+  }
+  Stage out{stage.problem.with(model, effects), {}, {}, std::move(ids)};
   solve(out, options, carried(stage.fit, out.problem));
   return out;
 }

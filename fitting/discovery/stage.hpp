@@ -65,8 +65,9 @@ void polish(Stage& stage, const DiscoverOptions& options);
 /// where that gains nothing over a base with a misfit, once more from the problem's own start.
 Stage extended(const Stage& stage, const Candidate& candidate, const Score& score, const DiscoverOptions&);
 
-/// The stage without `ids[index]`: an effect, or the law that took the place of the model to begin with.
-Stage reduced(const Stage& stage, std::size_t index, const DiscoverOptions&);
+/// The stage fitted again without some of its ids: effects, or the law that took the place of the model to
+/// begin with.
+Stage without(const Stage& stage, const std::vector<std::string>& gone, const DiscoverOptions&);
 
 /// The ids of all effects but those that were forgotten.
 std::vector<std::string> catalogue(const DiscoverOptions& options);

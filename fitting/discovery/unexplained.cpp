@@ -9,6 +9,7 @@
 
 #include "experiment/parallel.hpp"
 #include "fitting/discovery/acceptance.hpp"
+#include "fitting/discovery/traces.hpp"
 #include "fitting/evaluate.hpp"
 
 namespace unhand::fitting {
@@ -20,58 +21,13 @@ namespace {
 using Vector3 = std::array<double, 3>;
 using State = ResidualTrace::State;
 
-/// The residual (observed minus predicted, SI units) of three channels that follow each other, in one phase.
-ResidualTrace trace_of(const CampaignThrow& thrown, const Eigen::VectorXd& residual, Channel first,
-                       Phase phase, double origin, double scale) {
-  ResidualTrace out;
-  const StateSeries states = states_of(thrown, residual);
-  const double release = thrown.release_or(thrown.opening);
-  for (std::size_t j = 0; j < thrown.observed.all.size(); ++j) {
-    const auto& o = thrown.observed.all[j];
-    const int component = static_cast<int>(o.channel) - static_cast<int>(first);
-    if (component < 0 || component > 2 || phase_of(o, thrown.opening, release) != phase) continue;
-    const double time = (o.time - origin) / scale;
-    if (out.time.empty() || time != out.time.back()) {
-      out.time.push_back(time);
-      out.state.push_back(states.at(thrown, o.time));
-      for (auto& r : out.residual) r.push_back(NAN);
-    }
-    out.residual[static_cast<std::size_t>(component)].back() =
-        -residual[static_cast<Eigen::Index>(j)] * o.sigma;
-  }
-  return out;
-}
-
-/// 1 σ of each of three channels, where they are there.
-Vector3 sigmas_of(const CampaignProblem& problem, Channel first) {
-  Vector3 out{1, 1, 1};
-  for (const auto& thrown : problem.throws())
-    for (const auto& o : thrown.observed.all) {
-      const int component = static_cast<int>(o.channel) - static_cast<int>(first);
-      if (component < 0 || component > 2) continue;
-      out[static_cast<std::size_t>(component)] = o.sigma;
-      if (component == 2) return out;
-    }
-  return out;
-}
-
-/// Time as the estimate knows it: since the detach [s], or the share of the opening that has passed.
-struct Clock {
-  double origin, scale;
-  static Clock of(const CampaignThrow& thrown, Phase phase) {
-    const double release = thrown.release_or(thrown.opening);
-    if (phase == Phase::flight) return {release, 1};
-    return {thrown.opening, std::max(1e-6, release - thrown.opening)};
-  }
-};
-
 /// How the missing quantity moves one throw against its prediction, on a grid of time.
 class Displacement {
  public:
   template <class Missing>
   Displacement(const CampaignProblem& problem, const CampaignThrow& thrown, const StateSeries& states,
                Phase phase, double end, const Missing& missing) {
-    const Clock clock = Clock::of(thrown, phase);
+    const PhaseClock clock = phase_clock(thrown, phase);
     const double release = thrown.release_or(thrown.opening);
     const double inf = std::numeric_limits<double>::infinity();
     const auto& body = thrown.prepared.body;
@@ -156,28 +112,13 @@ std::optional<MissingEstimate> estimate_missing(const Stage& stage, Phase phase,
   if (phase == Phase::landing) phase = Phase::flight;
   if (phase == Phase::grasped) return std::nullopt;
   const auto& problem = stage.problem;
-  const Channel first = phase == Phase::flight ? Channel::mocap_x : Channel::wrench_fx;
   MissingEstimate out;
   out.phase = phase;
-  MissingOptions how;
-  how.sigma = sigmas_of(problem, first);
-  how.response = phase == Phase::flight ? Response::twice_integrated : Response::direct;
-  std::map<std::string, int> objects;
-  std::vector<ResidualTrace> traces;
-  const auto residuals = residuals_of(problem, stage.fit, options.fit.threads);
-  for (std::size_t i = 0; i < residuals.size(); ++i) {
-    if (residuals[i].size() == 0) continue;
-    const CampaignThrow& thrown = problem.throws()[i];
-    const Clock clock = Clock::of(thrown, phase);
-    ResidualTrace trace = trace_of(thrown, residuals[i], first, phase, clock.origin, clock.scale);
-    if (trace.time.size() < 4) continue;
-    trace.group = objects.try_emplace(thrown.prepared.object, static_cast<int>(objects.size())).first->second;
-    traces.push_back(std::move(trace));
-  }
-  if (traces.size() < 4) return std::nullopt;
-  for (const auto& [name, number] : objects) out.groups.push_back({name, number});
-  out.curves = missing_curves(traces, how);
-  out.candidate = missing_terms(traces, how);
+  const PhaseTraces seen = traces_of(stage.problem, stage.fit, phase, options.fit.threads);
+  if (seen.all.size() < 4) return std::nullopt;
+  for (const auto& [name, number] : seen.objects) out.groups.push_back({name, number});
+  out.curves = missing_curves(seen.all, seen.how);
+  out.candidate = missing_terms(seen.all, seen.how);
 
   // As a correction, on held-out throws that are predicted from what is known before the throw.
   std::vector<std::size_t> held_out;
@@ -190,10 +131,9 @@ std::optional<MissingEstimate> estimate_missing(const Stage& stage, Phase phase,
     const CampaignThrow& thrown = problem.throws()[held_out[k]];
     const auto l = problem.linearise(thrown, stage.fit.values(), predicted[k].own, false);
     if (!l.solved) return;
-    const auto group = objects.find(thrown.prepared.object);
-    const auto curve = std::find_if(out.curves.begin(), out.curves.end(), [&](const MissingCurve& c) {
-      return group != objects.end() && c.group == group->second;
-    });
+    const int group = seen.objects.at(thrown.prepared.object);
+    const auto curve = std::find_if(out.curves.begin(), out.curves.end(),
+                                    [&](const MissingCurve& c) { return c.group == group; });
     squares[k][0] =
         squares_with(problem, thrown, l.residual, phase, [](double, const State&) { return Vector3{}; });
     squares[k][1] = squares_with(problem, thrown, l.residual, phase, [&](double t, const State&) {
@@ -209,17 +149,17 @@ std::optional<MissingEstimate> estimate_missing(const Stage& stage, Phase phase,
       sum[c].landing += of[c].landing, sum[c].landings += of[c].landings;
     }
   // Of the motion in flight where it was seen, of the landing otherwise.
-  const bool seen = sum[0].samples > 0;
-  if (!seen && !(sum[0].landings > 0)) {
+  const bool tracked = sum[0].samples > 0;
+  if (!tracked && !(sum[0].landings > 0)) {
     out.correction = Correction::not_judged;
     return out;
   }
   const auto error = [&](std::size_t c) {
-    return seen ? std::sqrt(sum[c].flight / sum[c].samples) : std::sqrt(sum[c].landing / sum[c].landings);
+    return tracked ? std::sqrt(sum[c].flight / sum[c].samples) : std::sqrt(sum[c].landing / sum[c].landings);
   };
   constexpr double kLower = 0.98;
   out.error_before = out.error_after = error(0);
-  out.error_unit = seen ? "m" : "sigma";
+  out.error_unit = tracked ? "m" : "sigma";
   for (std::size_t c = 1; c < kTried; ++c) {
     if (c == 2 && out.candidate.terms.empty()) continue;
     if (!(error(c) < *out.error_after * (out.correction == Correction::withheld ? kLower : 1.0))) continue;

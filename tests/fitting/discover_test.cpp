@@ -75,6 +75,31 @@ TEST(Discovery, AnEffectThatTheCatalogueForgetsIsUnexplainedWithAReadableCandida
       << "on throws that it has not seen";
 }
 
+// Quadratic drag takes all but a few thousandths of it, as speeds do not differ by much. But the laws of
+// flight are exact: what is left says that something else acts, and a drag that grows with v explains it all.
+TEST(Discovery, ADragThatNoEffectHasIsNotTakenForTheNearestOne) {
+  constexpr double c = 0.3;  // 1/s
+  const Discovery found = found_in(support::loop_campaign_in_linear_drag(c));
+  EXPECT_EQ(found.verdict, Verdict::unexplained);
+  EXPECT_TRUE(found.effects.empty()) << found.effects.front().id;
+  ASSERT_TRUE(found.unexplained.has_value());
+  EXPECT_EQ(found.unexplained->phase, Phase::flight);
+  const MissingCandidate& candidate = found.unexplained->missing->candidate;
+  ASSERT_FALSE(candidate.terms.empty());
+  EXPECT_EQ(candidate.terms.front().name, "v") << candidate.in_words();
+  EXPECT_NEAR(candidate.terms.front().coefficient, -c, 0.1 * c) << candidate.in_words();
+}
+
+// A drag of the catalogue beside a push that is not in it: the rest is unexplained, and the drag stays.
+TEST(Discovery, AListedEffectBesideAnUnlistedOneStays) {
+  const Discovery found =
+      found_in(support::loop_campaign({{"flight.quadratic_drag.k", 0.05}, {"flight.magnus_lift.k_m", 0.02}}),
+               {"flight.magnus_lift"});
+  EXPECT_NE(named(found, "flight.quadratic_drag"), nullptr) << to_string(found.verdict);
+  ASSERT_TRUE(found.unexplained.has_value());
+  EXPECT_EQ(found.unexplained->phase, Phase::flight);
+}
+
 // A bias of the sensor is a force that does not turn with the hand. In one component of the wrench another
 // mass does nearly the same (gravity and the hand's acceleration are much the same in all throws), and lowers
 // its misfit on held-out throws fourfold. But conditions do not agree on that mass, and the rest stays.

@@ -1,6 +1,8 @@
 // A small campaign for the loop.
 #pragma once
 
+#include <array>
+#include <cmath>
 #include <cstdint>
 
 #include "experiment/campaign_effects.hpp"
@@ -9,14 +11,52 @@
 namespace unhand::fitting::support {
 
 /// 24 throws of two bars, six conditions each, two repetitions.
-inline datasets::ThrowLog loop_campaign(const experiment::EffectSettings& effects, std::uint64_t seed = 3) {
+inline experiment::CampaignDesign loop_design() {
   experiment::CampaignDesign design = experiment::campaign_design("batch180");
   design.name = "loop";
   design.postures.resize(2);
   design.release_accelerations.resize(3);
   design.repetitions = 2;
+  return design;
+}
+
+inline datasets::ThrowLog loop_campaign(const experiment::EffectSettings& effects, std::uint64_t seed = 3) {
+  experiment::CampaignDesign design = loop_design();
   design.effects = effects;
   return experiment::generate_campaign(design, seed);
+}
+
+/// The same under a drag that no effect has, a = −c v, c [1/s]: from its true detach on, each flight is moved
+/// by what the exact solution differs from the parabola. The noise stays.
+inline datasets::ThrowLog loop_campaign_in_linear_drag(double c, std::uint64_t seed = 3) {
+  const experiment::CampaignDesign design = loop_design();
+  datasets::ThrowLog log = experiment::campaign_header(design, seed);
+  for (int i = 0; i < design.throws(); ++i) {
+    auto [record, truth] = experiment::generate_throw(design, seed, i);
+    const double g = design.gravity, vx = truth.detach_twist.vx, vz = truth.detach_twist.vz;
+    const auto moved = [&](double t) {  // after t [s] of flight: by (x, z) [m]
+      const double lag = -std::expm1(-c * t) / c;
+      return std::array<double, 2>{vx * (lag - t), (vz + g / c) * lag - g * t / c - vz * t + 0.5 * g * t * t};
+    };
+    for (std::size_t k = 0; k < record.mocap->time.rows; ++k) {
+      const double t = record.mocap->time(k) - truth.detach_time;
+      if (t <= 0) continue;
+      const auto by = moved(t);
+      record.mocap->pose(k, 0) += by[0];
+      record.mocap->pose(k, 1) += by[1];
+    }
+    double landed = truth.landing_time - truth.detach_time;
+    const double before = landed;
+    for (int iteration = 0; iteration < 20; ++iteration) {  // Newton, on its parabola and what moves it
+      const double z = truth.detach_pose.z + vz * landed - 0.5 * g * landed * landed + moved(landed)[1];
+      landed += (z - design.landing_height) / (g * landed - vz);
+    }
+    record.landing->time(0) += landed - before;
+    record.landing->pose(0, 0) += vx * (landed - before) + moved(landed)[0];
+    record.landing->pose(0, 1) += truth.detach_twist.omega * (landed - before);
+    log.throws.push_back(std::move(record));
+  }
+  return log;
 }
 
 }  // namespace unhand::fitting::support

@@ -124,6 +124,32 @@ TEST(MissingForce, LiftIsNotMistakenForDrag) {
   EXPECT_NEAR(candidate.terms[0].coefficient, k, 5 * candidate.terms[0].sigma + 0.01 * k);
 }
 
+// What is left around the right form is noise: χ² of its degrees of freedom, on throws that it has not seen.
+TEST(MissingForce, TheRightFormLeavesNoiseAndANearOneDoesNot) {
+  const auto drag = [](const ResidualTrace::State& s) {
+    return std::array<double, 3>{-0.4 * s.vx, -0.4 * s.vz, 0};
+  };
+  const auto seen = flights(drag), unseen = flights(drag, 100);
+  const MissingCandidate candidate = missing_terms(seen, kFlight);
+  ASSERT_FALSE(candidate.terms.empty());
+  EXPECT_EQ(candidate.terms.front().name, "v");
+  const auto per_sample = [&](const std::vector<ResidualTrace>& traces, const MissingCandidate& around) {
+    const Rest rest = rest_around(traces, around, kFlight);
+    return rest.chi2 / static_cast<double>(rest.samples);
+  };
+  EXPECT_GT(per_sample(seen, {}), 50);
+  // Offset and slope of each of 36 series of 100 samples are projected out.
+  EXPECT_NEAR(per_sample(seen, candidate), 0.98, 0.1);
+  EXPECT_NEAR(per_sample(unseen, candidate), 0.98, 0.1);
+  MissingCandidate near = candidate;
+  near.terms.resize(1);
+  near.terms[0].shape = [](const ResidualTrace::State& s) {
+    const double speed = std::hypot(s.vx, s.vz) / 2.2;
+    return std::array<double, 3>{speed * s.vx, speed * s.vz, 0};
+  };
+  EXPECT_GT(per_sample(seen, near), 2);
+}
+
 TEST(MissingForce, AConstantIsTheCurve) {
   const auto traces = flights([](const ResidualTrace::State&) {
     return std::array<double, 3>{0.3, -0.1, 2.0};
