@@ -27,6 +27,27 @@ void check(const OpeningProfile<double>& q) {
   require(q.shape > 0.0, "shape", q.shape, "> 0");
 }
 
+/// f_N of the profile at t, as ProfileNormalForce says.
+template <class S>
+S opening_profile(const OpeningProfile<S>& q, const Window& window, const S& t) {
+  using dynamics::value_of;
+  const double start = q.open_command + value_of(q.dead_time), end = start + value_of(q.opening_time);
+  // A point well inside the window decides for the branch at its limits.
+  const double snap = std::min(1e-9, 0.25 * (window.end - window.begin));
+  const double inside = std::min(std::max(value_of(t), window.begin + snap), window.end - snap);
+  if (inside <= start) return q.grip_force;
+  if (inside >= end) return S(0.0);
+  const S rest = 1.0 - (t - q.open_command - q.dead_time) / q.opening_time;
+  const double u = std::clamp(value_of(rest), 0.0, 1.0), p = value_of(q.shape), f0 = value_of(q.grip_force);
+  const double power = p == 1.0 ? u : std::pow(u, p);
+  if constexpr (std::is_same_v<S, double>) {
+    return f0 * power;
+  } else {
+    const double v = std::max(u, 1e-9), slope = p == 1.0 ? 1.0 : p * std::pow(v, p - 1.0);
+    return S(f0 * power, power * q.grip_force.v + f0 * slope * rest.v + f0 * power * std::log(v) * q.shape.v);
+  }
+}
+
 }  // namespace
 
 ProfileNormalForce::ProfileNormalForce(const OpeningProfile<Dual>& profile)
@@ -38,6 +59,13 @@ ProfileNormalForce::ProfileNormalForce(const OpeningProfile<Dual>& profile)
 
 ProfileNormalForce::ProfileNormalForce(const OpeningProfile<double>& profile)
     : ProfileNormalForce(with_derivatives(profile)) {}
+
+double ProfileNormalForce::at(const Window& window, double t) const {
+  return opening_profile(values_, window, t);
+}
+Dual ProfileNormalForce::at(const Window& window, const Dual& t) const {
+  return opening_profile(profile_, window, t);
+}
 
 void ProfileNormalForce::kinks(std::vector<double>& out) const {
   out.push_back(values_.open_command + values_.dead_time);

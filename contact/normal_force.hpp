@@ -49,40 +49,21 @@ struct OpeningProfile {
   S shape{1.0};           ///< p > 0; 1 is a linear ramp [-]
 };
 
-/// s = (t − t_open − δ)/T;  f_N = f₀ for s <= 0,  f₀ (1 − s)^p for 0 < s < 1,  0 for s >= 1.
+/// The normal force of an OpeningProfile:
+///
+///   s = (t − t_open − δ)/T;  f_N = f₀ for s <= 0,  f₀ (1 − s)^p for 0 < s < 1,  0 for s >= 1.
 ///
 /// The branch is that of the window: inside a window that ends at a kink the limit from the left holds. For p
 /// < 1 the slope is unbounded at s → 1: the value is exact up to the end, derivatives are taken no nearer to
 /// it than 1 − s = 1e-9.
-template <class S>
-S opening_profile(const OpeningProfile<S>& q, const Window& window, const S& t) {
-  using dynamics::value_of;
-  const double start = q.open_command + value_of(q.dead_time), end = start + value_of(q.opening_time);
-  // A point well inside the window decides for the branch at its limits.
-  const double snap = std::min(1e-9, 0.25 * (window.end - window.begin));
-  const double inside = std::min(std::max(value_of(t), window.begin + snap), window.end - snap);
-  if (inside <= start) return q.grip_force;
-  if (inside >= end) return S(0.0);
-  const S rest = 1.0 - (t - q.open_command - q.dead_time) / q.opening_time;
-  const double u = std::clamp(value_of(rest), 0.0, 1.0), p = value_of(q.shape), f0 = value_of(q.grip_force);
-  const double power = p == 1.0 ? u : std::pow(u, p);
-  if constexpr (std::is_same_v<S, double>) {
-    return f0 * power;
-  } else {
-    const double v = std::max(u, 1e-9), slope = p == 1.0 ? 1.0 : p * std::pow(v, p - 1.0);
-    return S(f0 * power, power * q.grip_force.v + f0 * slope * rest.v + f0 * power * std::log(v) * q.shape.v);
-  }
-}
-
-/// The normal force of an OpeningProfile.
 class ProfileNormalForce final : public NormalForce {
  public:
   /// Throws std::invalid_argument, naming parameter, value and range.
   explicit ProfileNormalForce(const OpeningProfile<Dual>& profile);
   explicit ProfileNormalForce(const OpeningProfile<double>& profile);
 
-  double at(const Window& window, double t) const override { return opening_profile(values_, window, t); }
-  Dual at(const Window& window, const Dual& t) const override { return opening_profile(profile_, window, t); }
+  double at(const Window& window, double t) const override;
+  Dual at(const Window& window, const Dual& t) const override;
   /// The instants alone [s].
   using NormalForce::kinks;
   void kinks(std::vector<double>& out) const override;

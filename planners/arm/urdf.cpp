@@ -145,7 +145,10 @@ std::vector<const XMLElement*> path_between(const Urdf& urdf, const std::string&
 
 /// The rotation that takes z to the axis.
 Eigen::Matrix3d onto(const Eigen::Vector3d& axis) {
-  return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), axis).toRotationMatrix();
+  const Eigen::Vector3d turn = Eigen::Vector3d::UnitZ().cross(axis);
+  const Eigen::Vector3d about =
+      turn.norm() > 0 ? Eigen::Vector3d(turn.normalized()) : Eigen::Vector3d::UnitX();
+  return Eigen::AngleAxisd(std::atan2(turn.norm(), axis.z()), about).toRotationMatrix();
 }
 
 }  // namespace
