@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <map>
 
 #include "fitting/discovery/acceptance.hpp"
+#include "fitting/discovery/held_out_split.hpp"
 #include "fitting/discovery/outcome_errors.hpp"
 #include "fitting/discovery/selection.hpp"
 #include "fitting/discovery/separating.hpp"
@@ -42,31 +42,13 @@ FirstMisfit first_misfit(const FitResult& fit, const DiscoverOptions& options) {
   return out;
 }
 
-/// A split where the log has none: every other condition of an object is held out.
-datasets::ThrowLog with_split(datasets::ThrowLog log) {
-  bool train = false, test = false;
-  for (const auto& t : log.throws) (t.split == datasets::Split::train ? train : test) = true;
-  if (train && test) return log;
-  std::map<std::string, std::vector<std::string>> conditions;
-  for (const auto& t : log.throws) {
-    auto& of = conditions[t.object];
-    if (std::find(of.begin(), of.end(), t.condition) == of.end()) of.push_back(t.condition);
-  }
-  for (auto& t : log.throws) {
-    const auto& of = conditions[t.object];
-    const auto at = std::find(of.begin(), of.end(), t.condition) - of.begin();
-    t.split = at % 2 == 0 ? datasets::Split::train : datasets::Split::test;
-  }
-  return log;
-}
-
 }  // namespace
 
 Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
                    const DiscoverOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
   const int threads = options.fit.threads;
-  const datasets::ThrowLog log = with_split(logged);
+  const datasets::ThrowLog log = with_held_out(logged);
   Discovery out;
   if (!log.throws.empty() && std::none_of(log.throws.begin(), log.throws.end(), [](const datasets::Throw& t) {
         return t.split == datasets::Split::test;

@@ -183,7 +183,7 @@ struct Discovery {
   double seconds{};                                                 ///< of the whole loop
 };
 
-/// Runs the loop. A log without a test split is split by condition, every other one of an object held out.
+/// Runs the loop. A log without a test split is split as with_held_out does.
 /// Throws as CampaignProblem does.
 Discovery discover(const datasets::ThrowLog& log, const std::string& file, const DiscoverOptions& options);
 

@@ -9,8 +9,8 @@ namespace unhand::fitting {
 /// Throws without a hand, dimension 3. Own unknowns: position and velocity of the CoM at the first sample,
 /// and where orientation was tracked a rotation vector from its first fit and ω in the body. Channels
 /// position_x … and rotation_x … (body axes). Whitened with the declared sigma, or with the scatter from
-/// sample to sample where there is none. A log without a test split holds every fifth throw of each condition
-/// out.
+/// sample to sample where there is none. A log without a test split holds every fifth throw out
+/// (splits_of).
 class FlightProblem final : public GroupedProblem {
  public:
   /// Throws std::invalid_argument when the log is not of dimension 3 or no throw is a free flight.

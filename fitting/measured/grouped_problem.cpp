@@ -50,12 +50,17 @@ void OwnNames::spread(GroupEquations& equations, std::size_t all) const {
 std::vector<datasets::Split> splits_of(const datasets::ThrowLog& log) {
   bool train = false, test = false;
   for (const auto& t : log.throws) (t.split == datasets::Split::train ? train : test) = true;
-  std::vector<datasets::Split> out;
-  std::map<std::string, int> seen;
-  for (const auto& t : log.throws)
-    out.push_back(train && test                  ? t.split
-                  : ++seen[t.condition] % 5 == 0 ? datasets::Split::test
-                                                 : datasets::Split::train);
+  std::vector<datasets::Split> out(log.throws.size(), datasets::Split::train);
+  std::map<std::string, std::vector<std::size_t>> conditions;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    conditions[log.throws[i].condition].push_back(i);
+    if (train && test) out[i] = log.throws[i].split;
+  }
+  if (train && test) return out;
+  int seen = 0;  // on from condition to condition, since each may have few
+  for (const auto& [condition, throws] : conditions)
+    for (const std::size_t i : throws)
+      if (++seen % 5 == 0) out[i] = datasets::Split::test;
   return out;
 }
 

@@ -80,7 +80,7 @@ std::vector<SharedParameter> shared_parameters(const dynamics::Effect& effect,
 /// The objects that the groups have, sorted.
 std::vector<std::string> objects_of(const GroupedProblem& problem);
 
-/// A log's split; where it has none, every fifth throw of each condition is held out.
+/// A log's split; where it has none, every fifth throw is held out, counted condition by condition.
 std::vector<datasets::Split> splits_of(const datasets::ThrowLog& log);
 
 /// The shared values as a group of one object reads them: names without brackets, and the position of each
