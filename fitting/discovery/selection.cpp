@@ -28,6 +28,24 @@ void find_other_names(const Footprints& f, const Eigen::VectorXd& contribution, 
   }
 }
 
+/// What was accepted in the company of something that has been withdrawn, another law included, must have its
+/// evidence alone.
+void drop_without_evidence(Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  for (std::size_t i = out.effects.size(); i-- > 0;) {
+    const std::string id = out.effects[i].id;
+    Stage less = without(stage, {id}, options);
+    if (!less.solved() || stage.bic() - less.bic() <= kDeltaBic) continue;
+    out.imitations.push_back(id);
+    out.effects.erase(out.effects.begin() + static_cast<std::ptrdiff_t>(i));
+    stage = std::move(less);
+  }
+  if (!out.effects.empty() || out.along.empty()) return;
+  Stage less = without(stage, out.along, options);  // what was fitted along went with them
+  if (!less.solved()) return;
+  stage = std::move(less);
+  out.along.clear();
+}
+
 }  // namespace
 
 void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
@@ -83,6 +101,7 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   });
   if (effects.empty()) out.along.clear();
   stage = std::move(without);
+  drop_without_evidence(stage, options, out);
   return withdraw(stage, options, out);
 }
 

@@ -8,6 +8,7 @@
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/discrepancy.hpp"
 #include "fitting/discovery/footprints.hpp"
+#include "fitting/discovery/selection.hpp"
 #include "fitting/discovery/separating.hpp"
 #include "tests/fitting/loop_campaign.hpp"
 
@@ -41,6 +42,36 @@ TEST(Stage, AShapeThatTheLogLeavesOpenIsHeldAndTheSizeIsKnownForIt) {
     }
   }
   EXPECT_LT(wald_p_value(stage.fit, find_effect("sensor.length_scale")), 1e-3);
+}
+
+// A law that was accepted in the company of a lift which turns out to be none, on throws of another law: once
+// the lift is withdrawn, nothing speaks for the law, and it goes, too.
+TEST(Selection, WhatHasNoEvidenceWithoutWhatIsWithdrawnGoesWithIt) {
+  const auto log = support::loop_campaign({});  // of the disc
+  DiscoverOptions options;
+  options.campaign.model = "limit_surface_disc";
+  options.campaign.integrator.tolerances = {1e-5, 1e-8};
+  Stage base{CampaignProblem(log, "synthetic", options.campaign), {}, {}, {}};
+  solve(base, options, {});
+  const std::string law = std::string(kLaw) + "limit_surface", lift = "flight.magnus_lift";
+  Stage stage{base.problem.with("limit_surface", {lift}), {}, {}, {law, lift}};
+  solve(stage, options, {});
+  ASSERT_TRUE(base.solved() && stage.solved());
+  ASSERT_GT(stage.bic(), base.bic());
+  Discovery out;
+  out.model = options.campaign.model;
+  out.base = base.fit, out.base_test = base.held_out.misfit;
+  for (const std::string& id : stage.ids) {
+    AcceptedEffect effect;
+    effect.id = id;
+    effect.phase = id == lift ? Phase::flight : Phase::release;
+    out.effects.push_back(effect);
+  }
+  withdraw(stage, options, out);
+  EXPECT_TRUE(out.effects.empty()) << out.effects.front().id;
+  EXPECT_EQ(out.imitations, (std::vector<std::string>{lift, law}));
+  EXPECT_EQ(stage.problem.options().model, options.campaign.model);
+  EXPECT_NEAR(stage.bic(), base.bic(), 1);
 }
 
 // Thirty landings whose chi-square is 1.78 per sample: one in two hundred by chance, and a log has 22 such
