@@ -251,7 +251,7 @@ Command discover_command(Parser& root) {
                                    "and report the error before and after");
   parser
       .option("LOG", options->log,
-              "A log of planar throws, of free flights or accelerometers in free fall (dimension 3), or "
+              "A log of planar throws, of free flights, of accelerometers in free fall (dimension 3), or "
               "a slip-log")
       .required();
   parser.option("--model", options->model, "The base model").one_of(base_models()).with_default();

@@ -7,6 +7,7 @@
 #include "apps/command.hpp"
 #include "apps/figure.hpp"
 #include "apps/measured_report.hpp"
+#include "apps/throws.hpp"
 #include "fitting/card.hpp"
 
 namespace unhand::apps {
@@ -43,12 +44,14 @@ datasets::ModelCard card_of(const MeasuredDiscovery& found, const datasets::Thro
 std::optional<MeasuredKind> measured_kind(const std::string& log) {
   if (datasets::read_schema_name(log) == "slip-log") return MeasuredKind::slips;
   const auto read = datasets::read_throw_log(log);
-  if (read.dimension != 3 || read.throws.empty()) return {};
+  if (read.throws.empty()) return {};
   const auto has = [&](const auto& what) {
     return std::any_of(read.throws.begin(), read.throws.end(), what);
   };
+  if (read.dimension == 2 && has([](const datasets::Throw& t) { return t.hand.has_value(); })) return {};
   if (has([](const datasets::Throw& t) { return t.mocap.has_value(); })) return MeasuredKind::flights;
-  if (has([](const datasets::Throw& t) { return t.imu.has_value(); })) return MeasuredKind::falls;
+  if (read.dimension == 3 && has([](const datasets::Throw& t) { return t.imu.has_value(); }))
+    return MeasuredKind::falls;
   return {};
 }
 
@@ -77,7 +80,7 @@ void discover_measured(MeasuredKind kind, const MeasuredRequest& request) {
     result.answer = std::move(found.answer);
     result.surfaces = std::move(found.evidence);
   } else {
-    log = datasets::read_throw_log(request.log);
+    log = read_throws(request.log);
     fitting::MeasuredOptions options;
     options.search.forget = request.forget;
     options.search.most_effects = request.most;

@@ -1,4 +1,4 @@
-// unhand discover on logs that are no planar throws: free flights, falling accelerometers, slips.
+// unhand discover on logs that are no throws from a hand: free flights, falling accelerometers, slips.
 #pragma once
 
 #include <optional>

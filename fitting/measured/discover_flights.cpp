@@ -1,4 +1,4 @@
-// The loop on free flights in space.
+// The loop on free flights.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -104,6 +104,7 @@ void weigh_drag(const datasets::ThrowLog& log, MeasuredDiscovery& out) {
   for (const auto& effect : out.effects) {
     if (effect.id != "flight.quadratic_drag") continue;
     out.separating.push_back({effect.id, "drag in proportion to v² or to v: throws at twice the speed"});
+    if (log.dimension != 3) continue;  // in a plane a box does not show all its sides
     for (const auto& [name, object] : log.objects)
       for (const auto& p : effect.parameters) {
         if (p.name != "k[" + name + "]" || !object.dims || !(object.mass > 0)) continue;

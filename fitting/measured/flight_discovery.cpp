@@ -20,8 +20,6 @@ using flight::Vec3;
 
 namespace {
 
-constexpr int kPositionChannels = 3;
-
 const dynamics::IntegratorOptions kFine = [] {
   dynamics::IntegratorOptions options;
   options.tolerances = {1e-8, 1e-10};  // m, rad: far below any tracker
@@ -33,14 +31,34 @@ Quaternion<S> converted(const Quaternion<double>& q) {
   return {S(q.w), S(q.x), S(q.y), S(q.z)};
 }
 
+/// What a flight in the plane x, z cannot tell goes: the ratios of a torque-free rotation about one axis, a
+/// cube's harmonic (drag by axis says what its section does), and all along y. Drag by axis keeps a_x = −a_z.
+void restrict_to_plane(std::vector<dynamics::Effect>& effects) {
+  std::erase_if(effects, [](const dynamics::Effect& e) {
+    return e.id == "sensor.inertia" || e.id == "flight.cubic_drag";
+  });
+  for (auto& e : effects)
+    std::erase_if(e.parameters, [](const dynamics::EffectParameter& p) {
+      for (const char* across : {"y", "w_y", "toward_y", "a_y"})
+        if (p.name == across) return true;
+      return false;
+    });
+}
+
 }  // namespace
 
 FlightProblem::FlightProblem(const ThrowLog& log, int threads) : gravity_(log.gravity) {
-  if (log.dimension != 3)
-    throw std::invalid_argument(fmt::format("free flights: dimension {} is not 3", log.dimension));
-  channels_ = {"position_x", "position_y", "position_z", "rotation_x", "rotation_y", "rotation_z"};
-  covariates_ = {"launch speed [m/s]", "spin [rad/s]", "duration [s]", "start height [m]",
-                 "start x [m]",        "start y [m]",  "order"};
+  const bool planar = log.dimension == 2;
+  if (planar) {
+    axes_ = {0, 2}, turns_ = {1}, turn_sign_ = -1;
+    channels_ = {"position_x", "position_z", "theta"};
+  } else {
+    axes_ = turns_ = {0, 1, 2};
+    channels_ = {"position_x", "position_y", "position_z", "rotation_x", "rotation_y", "rotation_z"};
+  }
+  covariates_ = {"launch speed [m/s]", "spin [rad/s]", "duration [s]", "start height [m]", "start x [m]"};
+  if (!planar) covariates_.push_back("start y [m]");
+  covariates_.push_back("order");
   const auto splits = splits_of(log);
   std::vector<experiment::FreeFlightFit> starts(log.throws.size());
   experiment::parallel_for(starts.size(), threads, [&](std::size_t i) {
@@ -79,22 +97,22 @@ FlightProblem::FlightProblem(const ThrowLog& log, int threads) : gravity_(log.gr
     if (object.inertia && object.inertia->size() == 3)
       std::copy_n(object.inertia->begin(), 3, flight.inertia.begin());
     flight.reference = fit.rotation.attitude;
+    for (const double theta : s.theta) s.attitude.push_back(flight::exp(Vec3<double>{0, -theta, 0}));
     Group group{one.id, one.object, one.condition, splits[i], {}, {}, {}};
-    group.start = {fit.position[0], fit.position[1], fit.position[2],
-                   fit.velocity[0], fit.velocity[1], fit.velocity[2]};
     const bool turns = !s.attitude.empty();
-    if (turns)
-      group.start.insert(group.start.end(),
-                         {0, 0, 0, fit.rotation.omega[0], fit.rotation.omega[1], fit.rotation.omega[2]});
+    for (const auto* start : {&fit.position, &fit.velocity})
+      for (const std::size_t a : axes_) group.start.push_back((*start)[a]);
+    if (turns) {
+      group.start.insert(group.start.end(), turns_.size(), 0.0);
+      for (const std::size_t a : turns_) group.start.push_back(fit.rotation.omega[a]);
+    }
     for (const double t : s.elapsed)
-      for (int c = 0; c < (turns ? 6 : kPositionChannels); ++c) group.rows.push_back({c, t});
-    group.covariates = {flight::norm(fit.velocity),
-                        turns ? flight::norm(fit.rotation.omega) : 0,
-                        s.elapsed.back(),
-                        fit.position[2],
-                        fit.position[0],
-                        fit.position[1],
-                        static_cast<double>(groups_.size())};
+      for (int c = 0; c < (turns ? static_cast<int>(channels_.size()) : position_channels()); ++c)
+        group.rows.push_back({c, t});
+    group.covariates = {flight::norm(fit.velocity), turns ? flight::norm(fit.rotation.omega) : 0,
+                        s.elapsed.back(), fit.position[2], fit.position[0]};
+    if (!planar) group.covariates.push_back(fit.position[1]);
+    group.covariates.push_back(static_cast<double>(groups_.size()));
     groups_.push_back(std::move(group));
     flights_.push_back(std::move(flight));
   }
@@ -117,12 +135,13 @@ std::vector<dynamics::Effect> FlightProblem::effects() const {
         if (e.id == id) return true;
       return false;
     });
+  if (axes_.size() == 2) restrict_to_plane(out);
   return out;
 }
 
 double FlightProblem::sigma(std::size_t group, int channel) const {
   const auto& s = flights_[group].samples;
-  return channel < kPositionChannels ? s.sigma[static_cast<std::size_t>(channel)] : s.sigma_angle;
+  return channel < position_channels() ? s.sigma[axes_[static_cast<std::size_t>(channel)]] : s.sigma_angle;
 }
 
 GroupEquations FlightProblem::equations(std::size_t group, std::span<const std::string> names,
@@ -135,26 +154,31 @@ GroupEquations FlightProblem::equations(std::size_t group, std::span<const std::
     experiment::TrackedFlight<S> declared;
     declared.gravity = gravity_;
     declared.drag_k = flight.drag_k;
-    for (std::size_t a = 0; a < 3; ++a) {
-      declared.start.position[a] = x[a];
-      declared.start.velocity[a] = x[3 + a];
-      declared.start.inertia[a] = S(flight.inertia[a]);
+    for (std::size_t a = 0; a < 3; ++a) declared.start.inertia[a] = S(flight.inertia[a]);
+    const std::size_t axes = axes_.size(), turns = turns_.size();
+    for (std::size_t k = 0; k < axes; ++k) {
+      declared.start.position[axes_[k]] = x[k];
+      declared.start.velocity[axes_[k]] = x[axes + k];
     }
-    const bool turns = x.size() > 6;
-    if (turns)
-      declared.start.rotation = {converted<S>(flight.reference) * flight::exp(Vec3<S>{x[6], x[7], x[8]}),
-                                 {x[9], x[10], x[11]}};
+    const bool oriented = x.size() > 2 * axes;
+    if (oriented) {
+      Vec3<S> turn{S(0.0), S(0.0), S(0.0)}, omega = turn;
+      for (std::size_t k = 0; k < turns; ++k) {
+        turn[turns_[k]] = x[2 * axes + k];
+        omega[turns_[k]] = x[2 * axes + turns + k];
+      }
+      declared.start.rotation = {converted<S>(flight.reference) * flight::exp(turn), omega};
+    }
     const auto& s = flight.samples;
     const auto poses =
         experiment::tracked_poses(declared, dynamics::Values<S>(mine.names, effects), s.elapsed, kFine);
     std::vector<S> out;
-    out.reserve(poses.size() * 6);
+    out.reserve(poses.size() * channels_.size());
     for (std::size_t i = 0; i < poses.size(); ++i) {
-      for (std::size_t a = 0; a < 3; ++a)
-        out.push_back((poses[i].position[a] - s.position[i][a]) / s.sigma[a]);
-      if (!turns) continue;
+      for (const std::size_t a : axes_) out.push_back((poses[i].position[a] - s.position[i][a]) / s.sigma[a]);
+      if (!oriented) continue;
       const Vec3<S> error = flight::rotation_between(converted<S>(s.attitude[i]), poses[i].attitude);
-      for (const S& e : error) out.push_back(e / s.sigma_angle);
+      for (const std::size_t a : turns_) out.push_back(turn_sign_ * error[a] / s.sigma_angle);
     }
     return out;
   };
@@ -172,6 +196,7 @@ GroupEquations FlightProblem::equations(std::size_t group, std::span<const std::
 
 FlightErrors flight_errors(const FlightProblem& problem, const GroupedFit& fit, int threads) {
   constexpr double kDegrees = 180 / std::numbers::pi;
+  const int positions = problem.position_channels();
   FlightErrors out;
   std::vector<std::size_t> used;
   for (std::size_t i = 0; i < fit.groups.size(); ++i)
@@ -189,18 +214,18 @@ FlightErrors flight_errors(const FlightProblem& problem, const GroupedFit& fit, 
       return residual[static_cast<Eigen::Index>(row)] * problem.sigma(i, group.rows[row].channel);
     };
     for (std::size_t j = 0; j < group.rows.size(); ++j)
-      if (group.rows[j].channel < kPositionChannels)
-        one.squares += std::pow(size(fit.groups[i].residual, j), 2), one.n += 1.0 / 3;
+      if (group.rows[j].channel < positions)
+        one.squares += std::pow(size(fit.groups[i].residual, j), 2), one.n += 1.0 / positions;
     const double half = 0.5 * group.rows.back().time + 1e-9;
     const GroupFit part =
         fit_own_part(problem, i, fit, [&](const GroupRow& row) { return row.time <= half; });
     one.solved = part.solved;
     if (!part.solved) return;
     one.oriented = problem.oriented(i);
-    const std::size_t width = one.oriented ? 6 : 3;
+    const std::size_t width = one.oriented ? problem.channels().size() : static_cast<std::size_t>(positions);
     double position = 0, angle = 0;
     for (std::size_t j = group.rows.size() - width; j < group.rows.size(); ++j)
-      (group.rows[j].channel < kPositionChannels ? position : angle) += std::pow(size(part.residual, j), 2);
+      (group.rows[j].channel < positions ? position : angle) += std::pow(size(part.residual, j), 2);
     one.position = std::sqrt(position);
     one.angle = kDegrees * std::sqrt(angle);
   });

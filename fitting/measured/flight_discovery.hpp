@@ -1,4 +1,4 @@
-// Free flights in space as groups: the start of each is its own, effects are shared.
+// Free flights as groups: the start of each is its own, effects are shared.
 #pragma once
 
 #include "experiment/flight_samples.hpp"
@@ -6,14 +6,15 @@
 
 namespace unhand::fitting {
 
-/// Throws without a hand, dimension 3. Own unknowns: position and velocity of the CoM at the first sample,
-/// and where orientation was tracked a rotation vector from its first fit and ω in the body. Channels
-/// position_x … and rotation_x … (body axes). Whitened with the declared sigma, or with the scatter from
-/// sample to sample where there is none. A log without a test split holds every fifth throw out
-/// (splits_of).
+/// Throws without a hand. Own unknowns: position and velocity of the CoM at the first sample, and where
+/// orientation was tracked a rotation vector from its first fit and ω in the body. Channels position_x … and
+/// rotation_x … (body axes). A planar flight is one in the plane y = 0 that turns about −y: it has the
+/// unknowns, channels and effects' parameters of that plane alone (theta is the angle, with its sign).
+/// Whitened with the declared sigma, or with the scatter from sample to sample where there is none. A log
+/// without a test split holds every fifth throw out (splits_of).
 class FlightProblem final : public GroupedProblem {
  public:
-  /// Throws std::invalid_argument when the log is not of dimension 3 or no throw is a free flight.
+  /// Throws std::invalid_argument when no throw is a free flight.
   FlightProblem(const datasets::ThrowLog& log, int threads);
   std::vector<dynamics::Effect> effects() const override;
   GroupEquations equations(std::size_t group, std::span<const std::string> names,
@@ -24,6 +25,8 @@ class FlightProblem final : public GroupedProblem {
   double sigma(std::size_t group, int channel) const;
   /// Whether the flight's orientation was tracked.
   bool oriented(std::size_t group) const { return !flights_[group].samples.attitude.empty(); }
+  /// Measured axes, the first channels; those of the rotation follow.
+  int position_channels() const { return static_cast<int>(axes_.size()); }
 
  private:
   struct Flight {
@@ -34,6 +37,8 @@ class FlightProblem final : public GroupedProblem {
   };
   std::vector<Flight> flights_;
   double gravity_{};
+  std::vector<std::size_t> axes_, turns_;  ///< of the world and of the body, that a flight has
+  double turn_sign_{1};                    ///< of the angle about turns_: a planar one is about −y
 };
 
 /// Errors of the flights of a split: `fit` holds the shared parameters and the own unknowns of whole flights;

@@ -1,4 +1,4 @@
-// What the loop says of logs that are no planar throws: free flights in space, accelerometers in free fall,
+// What the loop says of logs that are no throws from a hand: free flights, accelerometers in free fall,
 // slips.
 #pragma once
 
@@ -76,7 +76,7 @@ struct MeasuredOptions {
   double floor{0};  ///< height of the floor that boxes come to rest on [m]
 };
 
-/// Free flights of dimension 3. Throws std::invalid_argument as FlightProblem does.
+/// Free flights, in space or in a plane. Throws std::invalid_argument as FlightProblem does.
 MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const MeasuredOptions& options);
 /// Accelerometers in free fall. Throws std::invalid_argument as FallProblem does.
 MeasuredDiscovery discover_falls(const datasets::ThrowLog& log, const MeasuredOptions& options);
