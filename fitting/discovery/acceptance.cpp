@@ -83,7 +83,16 @@ bool held_out_confirms(const Stage& before, const Stage& after) {
 
 bool predicts_better(const Stage& before, const Stage& after, const DiscoverOptions& options) {
   const PredictionGain gain = prediction_gain(before, after, options);
-  return gain.before > options.prediction_matters * gain.after && held_out_confirms(before, after);
+  if (!(gain.before > options.prediction_matters * gain.after) || !held_out_confirms(before, after))
+    return false;
+  const auto was = errors_of(before, Share::test, options.fit.threads),
+             is = errors_of(after, Share::test, options.fit.threads);
+  const auto holds = [&](double OutcomeErrors::*outcome) {
+    return !(is.*outcome > options.prediction_matters * was.*outcome);
+  };
+  return holds(&OutcomeErrors::landing_x_mae) && holds(&OutcomeErrors::landing_theta_mae) &&
+         holds(&OutcomeErrors::detach_vx_mae) && holds(&OutcomeErrors::detach_omega_mae) &&
+         holds(&OutcomeErrors::trajectory_rms);
 }
 
 double wald_p_value(const FitResult& fit, const dynamics::Effect& effect) {
@@ -141,14 +150,25 @@ bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const FitRes
          leaves_too_much(effect, so_far.base_test, so_far.base.misfit, stage.held_out.misfit, options);
 }
 
-bool spoils(const Stage& stage, const Discovery& so_far, const DiscoverOptions& options) {
-  const auto& now = stage.fit.misfit;
-  return std::any_of(now.begin(), now.end(), [&](const ChannelMisfit& m) {
-    const double from = unexplained_from(m.channel, m.phase, options);
-    return is_misfit(m, options) && m.chi2_per_sample() >= from &&
-           misfit_in(stage.held_out.misfit, m.channel, m.phase) >= from &&
-           misfit_in(so_far.base.misfit, m.channel, m.phase) < from &&
-           misfit_in(so_far.base_test, m.channel, m.phase) < from;
+namespace {
+
+/// Whether a channel is noisier in `now` than in `before`, beyond chance.
+bool is_noisier(const ChannelMisfit& now, const std::vector<ChannelMisfit>& before) {
+  const double chance = 3 * std::sqrt(2.0 / now.n);
+  return now.chi2_per_sample() > (1 + std::max(kNoisier, chance)) * misfit_in(before, now.channel, now.phase);
+}
+
+}  // namespace
+
+bool spoils(const Stage& stage, const Discovery& so_far) {
+  const auto& train = stage.fit.misfit;
+  const auto& held_out = stage.held_out.misfit;
+  return std::any_of(train.begin(), train.end(), [&](const ChannelMisfit& m) {
+    return is_noisier(m, so_far.base.misfit) &&
+           std::any_of(held_out.begin(), held_out.end(), [&](const ChannelMisfit& other) {
+             return other.channel == m.channel && other.phase == m.phase &&
+                    is_noisier(other, so_far.base_test);
+           });
   });
 }
 

@@ -80,7 +80,8 @@ inline constexpr double kTimesAsLikely = 20;
 /// that are maximised.
 bool held_out_confirms(const Stage& before, const Stage& after);
 
-/// Whether held-out throws are predicted better before they are made, by as much as the options ask for.
+/// Whether held-out throws are predicted better before they are made, by as much as the options ask for, and
+/// no outcome (detach, landing, trajectory) by as much worse.
 bool predicts_better(const Stage& before, const Stage& after, const DiscoverOptions& options);
 
 /// The give of pads before they slip, under the grip's friction limit, from where on it is an effect like any
@@ -116,9 +117,13 @@ bool acts(const AcceptedEffect& effect, bool air);
 bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const FitResult& counted,
                   const Discovery& so_far, const DiscoverOptions& options);
 
-/// Whether the answer has spoilt what the base model left clean: a channel in a phase with a misfit in both
-/// halves of the throws that had one in neither. What was accepted last is then the shadow of something else.
-bool spoils(const Stage& stage, const Discovery& so_far, const DiscoverOptions& options);
+/// By what share of its χ² an answer may leave a channel noisier than the base model did.
+inline constexpr double kNoisier = 0.25;
+
+/// Whether the answer has spoilt a channel in a phase: in both halves of the throws its χ² has grown by more
+/// than kNoisier, and by more than three σ of chance. A true cause makes no channel noisier; one that takes
+/// the place of another bends what they do not share, in wrenches well below what they are trusted to.
+bool spoils(const Stage& stage, const Discovery& so_far);
 
 /// What a form that no effect has may leave of what the accepted effects leave of the tracked flights.
 inline constexpr double kOutdone = 0.5;

@@ -174,11 +174,12 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
   std::optional<Unexplained> out;
   // No law of pads is quite right; of flight and of sensors they are.
   const double rest = acts_on_pads(stage) ? kRest : 0;
+  // In the firm grasp the fit bends each throw's own grasp for what is missing elsewhere: there a channel
+  // speaks for itself where nothing else does.
   const auto limit_of = [&](const ChannelMisfit& m) {
-    return is_wrench(m.channel) ? 2 * options.unexplained : unexplained_from(m.channel, m.phase, options);
+    return is_wrench(m.channel) || m.phase == Phase::grasped ? 2 * options.unexplained
+                                                             : unexplained_from(m.channel, m.phase, options);
   };
-  // Wrenches of the firm grasp speak where nothing else does: the fit bends them for what is missing
-  // elsewhere.
   const bool elsewhere = std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(), [&](const auto& m) {
     return is_misfit(m, options) && m.chi2_per_sample() >= limit_of(m) &&
            is_confirmed(stage.held_out.misfit, m);
