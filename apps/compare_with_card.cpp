@@ -4,6 +4,8 @@
 
 #include "apps/command.hpp"
 #include "apps/compare.hpp"
+#include "apps/figure.hpp"
+#include "apps/measured_report.hpp"
 #include "fitting/measured/measured_card.hpp"
 
 namespace unhand::apps {
@@ -68,8 +70,14 @@ void compare_with_card(const CompareRequest& request, const datasets::ThrowLog& 
   if (!request.json.empty()) outputs.json(request.json, json);
   if (!request.report.empty()) {
     const auto directory = outputs.directory(request.report);
-    write_text(directory / "report.md",
-               fmt::format("# A card against a log\n\n{}\n{}", heading, table.markdown()));
+    const Figure figure =
+        measured_residual_figure(found.base_profile, found.card_profile, card.model, "with the card");
+    draw(figure, directory);
+    write_text(
+        directory / "report.md",
+        fmt::format("# A card against a log\n\n{}\n{}\nResiduals of the {} throws over their duration, "
+                    "each with its start fitted; 1 is the noise.\n\n![Residuals]({}.png)\n",
+                    heading, table.markdown(), found.test > 0 ? "held-out" : "train", figure.name));
     write_text(directory / "compare.json", json_text(json));
   }
   outputs.commit();

@@ -33,6 +33,8 @@ Figure residual_figure(const Discovery& found) {
   double low = 0, high = 0.05;
   for (const auto& bin : found.residual_before)
     low = std::min(low, bin.time), high = std::max(high, bin.time);
+  const double margin = 0.02 * (high - low);  // for the markers at the ends
+  low -= margin, high += margin;
   std::string script = "set multiplot\nset key off\n";
   int index = 0, at = 0;
   for (const Channel channel : channels) {
@@ -44,16 +46,16 @@ Figure residual_figure(const Discovery& found) {
     };
     const double top = add_residuals(figure, std::string(to_string(channel)), "time from release [s]",
                                      points(found.residual_before), points(found.residual_after));
-    const double left = 1.9 + (at % columns) * 8.3, bottom = 1.9 + (rows - 1 - at / columns) * 3.9;
-    script += place(figure, {left, left + 6.6, bottom, bottom + 2.5});
+    const double left = 1.9 + (at % columns) * 8.2, bottom = 1.9 + (rows - 1 - at / columns) * 3.9;
+    script += place(figure, {left, left + 6.3, bottom, bottom + 2.5});
     script += fmt::format(
         "set title '{}' offset 0,-0.6\nset logscale y\nset xrange [{:.3f}:{:.3f}]\nset yrange [0.3:{:.4g}]\n"
-        "set format y '%g'\nset ytics (0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)\n{}set ylabel 'rms "
+        "set format y '%g'\n{}{}set ylabel 'rms "
         "[{{/Symbol s}}]' offset 0.5\n"
         "set arrow 1 from 0,0.3 to 0,{:.4g} nohead dashtype 3 linecolor rgb '#808080'\n"
         "set arrow 2 from {:.3f},1 to {:.3f},1 nohead linecolor rgb '#b0b0b0'\n"
         "plot DATA index {} using 1:2 {}, DATA index {} using 1:2 {}\n",
-        plain(std::string(to_string(channel))), low, high, 1.5 * top,
+        plain(std::string(to_string(channel))), low, high, 1.5 * top, residual_tics(top),
         at / columns == rows - 1 ? "set xlabel 'time from release [s]' offset 0,0.6\n" : "unset xlabel\n",
         1.5 * top, low, high, index, kBefore, index + 1, kAfter);
     index += 2;

@@ -8,12 +8,14 @@
 
 namespace unhand::apps {
 
-using fitting::MeasuredDiscovery;
-
 // Residuals over the share of the duration, a panel for each channel.
-Figure measured_residual_figure(const MeasuredDiscovery& found) {
+Figure measured_residual_figure(const std::vector<fitting::ResidualProfile>& base,
+                                const std::vector<fitting::ResidualProfile>& answer,
+                                const std::string& base_name, const std::string& answer_name) {
   std::vector<std::string> channels;
-  for (const auto& m : found.misfit) channels.push_back(m.channel);
+  for (const auto& bin : base)
+    if (std::find(channels.begin(), channels.end(), bin.channel) == channels.end())
+      channels.push_back(bin.channel);
   const int columns = 3, rows = (static_cast<int>(channels.size()) + columns - 1) / columns;
   Figure figure{"residual", 17, 2.2 + 3.9 * rows, {}, {}};
   std::string script = "set multiplot\nset key off\nset xrange [0:1]\nset xtics 0,0.25,1 format '%g'\n";
@@ -25,21 +27,20 @@ Figure measured_residual_figure(const MeasuredDiscovery& found) {
         if (bin.channel == channel) out.push_back({bin.share, bin.rms, bin.mean, static_cast<int>(bin.n)});
       return out;
     };
-    const double top = add_residuals(figure, channel, "share of the duration", points(found.profile_before),
-                                     points(found.profile_after));
+    const double top = add_residuals(figure, channel, "share of the duration", points(base), points(answer));
     const double left = 1.8 + (at % columns) * 5.2, bottom = 2.3 + (rows - 1 - at / columns) * 3.9;
     script += place(figure, {left, left + 4.2, bottom, bottom + 2.5});
     script += fmt::format(
         "set title '{}' offset 0,-0.6\nset logscale y\nset yrange [0.5:{:.4g}]\nset format y '%g'\n"
-        "set ytics (0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)\nset ylabel '{}' offset 0.5\n"
+        "{}set ylabel '{}' offset 0.5\n"
         "set arrow 2 from 0,1 to 1,1 nohead linecolor rgb '#b0b0b0'\nset xlabel '{}' offset 0,0.6\n"
         "plot DATA index {} using 1:2 {}, DATA index {} using 1:2 {}\n",
-        plain(channel), 1.5 * top, at % columns == 0 ? "rms [{/Symbol s}]" : "",
+        plain(channel), 1.5 * top, residual_tics(top), at % columns == 0 ? "rms [{/Symbol s}]" : "",
         at / columns == rows - 1 ? "share of the duration" : "", index, kBefore, index + 1, kAfter);
     index += 2;
     ++at;
   }
-  script += key_strip(figure, {{kBefore, "before"}, {kAfter, "after"}}, 2);
+  script += key_strip(figure, {{kBefore, base_name}, {kAfter, answer_name}}, 2);
   figure.script = script + "unset multiplot\n";
   return figure;
 }

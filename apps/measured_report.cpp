@@ -105,7 +105,9 @@ void write_measured_report(const MeasuredResult& result, const Json& json,
                            const std::filesystem::path& directory) {
   const MeasuredDiscovery& found = result.answer;
   const bool slips = !result.surfaces.empty();
-  const Figure residual = slips ? surface_figure(result) : measured_residual_figure(found),
+  const Figure residual = slips ? surface_figure(result)
+                                : measured_residual_figure(found.profile_before, found.profile_after,
+                                                           "before", "after"),
                ranking = ranking_figure(found.ranking, found.effects);
   draw(residual, directory);
   draw(ranking, directory);

@@ -21,8 +21,11 @@ struct MeasuredResult {
 /// discovery.json, schema "discovery" version 1.
 Json measured_json(const MeasuredResult& result);
 std::string measured_text(const MeasuredResult& result);
-/// Residuals over the share of the duration, a panel for each channel.
-Figure measured_residual_figure(const fitting::MeasuredDiscovery& found);
+/// Residuals over the share of the duration, a panel for each channel: of the base model and of an answer,
+/// with what the key calls them.
+Figure measured_residual_figure(const std::vector<fitting::ResidualProfile>& base,
+                                const std::vector<fitting::ResidualProfile>& answer,
+                                const std::string& base_name, const std::string& answer_name);
 /// Held-out direction errors by surface, and those of the null control.
 Figure surface_figure(const MeasuredResult& result);
 /// A self-contained page (index.html), the figures with their data and scripts, and discovery.json.

@@ -16,6 +16,7 @@ Json ranking_json(std::span<const fitting::Ranked> ranking) {
                    {"score_p_value", number(r.p_value)},
                    {"footprint_correlation_with_best", number(r.correlation_with_best)},
                    {"chi2_gain", number(r.gain)},
+                   {"step", r.step},
                    {"visible", r.visible},
                    {"refitted", r.refitted},
                    {"delta_bic", r.refitted ? number(r.delta_bic) : Json(nullptr)},
@@ -24,11 +25,14 @@ Json ranking_json(std::span<const fitting::Ranked> ranking) {
 }
 
 Table ranking_table(std::span<const fitting::Ranked> ranking) {
-  Table table{
-      {"candidate", "chi2 gain", "p", "correlation with the best", "refitted: BIC", "held-out fall"}, {}, 1};
+  Table table{{"candidate", "chi2 gain", "in step", "p", "correlation with the best", "refitted: BIC",
+               "held-out fall"},
+              {},
+              1};
   for (const auto& r : ranking)
     table.rows.push_back({r.id, r.visible ? fmt::format("{:.4g}", r.gain) : "no footprint",
-                          fmt::format("{:.2g}", r.p_value), fmt::format("{:.3f}", r.correlation_with_best),
+                          std::to_string(r.step), fmt::format("{:.2g}", r.p_value),
+                          fmt::format("{:.3f}", r.correlation_with_best),
                           r.refitted ? fmt::format("{:+.1f}", r.delta_bic) : "",
                           r.held_out_gain ? fmt::format("{:.3g}", *r.held_out_gain) : ""});
   return table;
@@ -37,20 +41,25 @@ Table ranking_table(std::span<const fitting::Ranked> ranking) {
 Figure ranking_figure(std::span<const fitting::Ranked> ranking,
                       std::span<const fitting::AcceptedEffect> accepted) {
   Figure figure{"ranking", 17, 10, {}, {}};
-  DataBlock block{"first-order gain of chi2 by candidate", {"gain", "position", "accepted"}, {}, {}};
+  DataBlock block{"first-order gain of chi2 by candidate", {"gain", "position", "accepted", "step"}, {}, {}};
+  std::vector<fitting::Ranked> by_step(ranking.begin(), ranking.end());
+  std::stable_sort(by_step.begin(), by_step.end(),
+                   [](const auto& a, const auto& b) { return a.step < b.step; });
   std::string tics;
   int position = 0;
   double largest = 10;
-  for (const auto& r : ranking) {
+  for (const auto& r : by_step) {
     if (!(r.gain > 1)) continue;
     const bool taken =
         std::any_of(accepted.begin(), accepted.end(), [&](const auto& e) { return e.id == r.id; });
-    block.rows.push_back({r.gain, static_cast<double>(position), taken ? 1.0 : 0.0});
-    tics += fmt::format("{}'{}' {}", position ? ", " : "", plain(r.id), position);
+    block.rows.push_back(
+        {r.gain, static_cast<double>(position), taken ? 1.0 : 0.0, static_cast<double>(r.step)});
+    const std::string step = r.step > 1 ? fmt::format(" (step {})", r.step) : "";
+    tics += fmt::format("{}'{}{}' {}", position ? ", " : "", plain(r.id), step, position);
     largest = std::max(largest, r.gain);
     ++position;
   }
-  if (position == 0) block.rows.push_back({1, 0, 0}), tics = "'none' 0";
+  if (position == 0) block.rows.push_back({1, 0, 0, 1}), tics = "'none' 0";
   figure.height = 2 + 0.55 * std::max(1, position);
   figure.data.push_back(block);
   figure.script = fmt::format(
@@ -111,6 +120,11 @@ Json effect_json(const fitting::AcceptedEffect& effect) {
                                              {"correlation_in_this_log", number(e.before)},
                                              {"correlation_with_it", number(e.after)}});
   return out;
+}
+
+std::string residual_tics(double top) {
+  return top > 60 ? "set ytics (1, 10, 100, 1000, '10^4' 1e4, '10^5' 1e5, '10^6' 1e6)\n"
+                  : "set ytics (0.5, 1, 2, 5, 10, 20, 50)\n";
 }
 
 double add_residuals(Figure& figure, const std::string& channel, const std::string& x,

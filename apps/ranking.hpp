@@ -17,7 +17,8 @@ Json ranking_json(std::span<const fitting::Ranked> ranking);
 /// The candidates, best first: what each would take away, and what a refit showed.
 Table ranking_table(std::span<const fitting::Ranked> ranking);
 
-/// Bars of the fall of chi-square to first order; those of the accepted effects are blue.
+/// Bars of the fall of chi-square to first order, by the step of the search that they are of; those of the
+/// accepted effects are blue.
 Figure ranking_figure(std::span<const fitting::Ranked> ranking,
                       std::span<const fitting::AcceptedEffect> accepted);
 
@@ -39,6 +40,9 @@ struct ResidualPoint {
   double x{}, rms{}, mean{};
   int samples{};
 };
+
+/// Marks of a logarithmic axis of residuals from 0.5 to `top` that do not overlap, for gnuplot.
+std::string residual_tics(double top);
 
 /// Adds a channel's residuals before and after as data of the figure. Returns the largest rms, at least 2.
 double add_residuals(Figure& figure, const std::string& channel, const std::string& x,

@@ -113,6 +113,7 @@ struct Ranked {
   double p_value{1};               ///< of the gain, in units of what is left unexplained
   double correlation_with_best{};  ///< of the footprints
   bool visible{true};              ///< something of its footprint is left beside the fitted unknowns
+  int step{1};                     ///< of the search, that the gain is of: 1 is beside the base model
   bool refitted{false};            ///< it was fitted in full
   double delta_bic{};              ///< negative: for the effect; of the refit
   /// Largest fall of the held-out χ² per sample in a channel and phase; of refits with evidence on the train

@@ -13,7 +13,7 @@ namespace unhand::fitting {
 
 namespace {
 
-void rank(std::vector<Ranked>& ranking, const Footprints& f, const std::vector<Score>& all) {
+void rank(std::vector<Ranked>& ranking, int step, const Footprints& f, const std::vector<Score>& all) {
   const auto last = static_cast<Eigen::Index>(f.residual());
   const Score* best = nullptr;
   for (const auto& s : all)
@@ -24,6 +24,7 @@ void rank(std::vector<Ranked>& ranking, const Footprints& f, const std::vector<S
     if (found == ranking.end()) found = ranking.insert(ranking.end(), Ranked{c.id, -1});
     if (s.gain <= found->gain) continue;
     found->gain = s.gain;
+    found->step = step;
     found->visible = s.visible;
     // What the best candidate leaves sets the scale of what is not noise.
     const double scale = std::max(1.0, (f.gram(last, last) - best->gain) / std::max(1.0, f.samples));
@@ -58,7 +59,7 @@ class ForwardStep {
 
   std::optional<Stage> run() {
     if (all_.empty()) return std::nullopt;
-    rank(out_.ranking, f_, all_);
+    rank(out_.ranking, 1 + static_cast<int>(out_.effects.size()), f_, all_);
     std::sort(all_.begin(), all_.end(), [](const Score& a, const Score& b) { return a.gain > b.gain; });
     for (const Score& score : all_)
       if (static_cast<int>(tried_.size()) < options_.refits && score.gain >= kImitation * all_.front().gain)

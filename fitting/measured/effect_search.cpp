@@ -86,6 +86,7 @@ class Search {
       Ranked& r = entry_of(out_.ranking, c.id);
       if (one.gain <= r.gain) continue;
       r.gain = one.gain, r.p_value = one.p, r.visible = s.visible;
+      r.step = 1 + static_cast<int>(out_.effects.size());
     }
     std::sort(scored.begin(), scored.end(), [](const Scored& a, const Scored& b) { return a.gain > b.gain; });
     for (const auto& s : scored) {

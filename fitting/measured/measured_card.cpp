@@ -66,14 +66,18 @@ CardComparison compared(const GroupedProblem& problem, const GroupedFit& card, i
   options.threads = threads;
   CardComparison out;
   out.skipped = problem.skipped();
-  const auto of = [&](const GroupedFit& model, Split split, int& groups) {
+  const auto of = [&](const GroupedFit& model, Split split, int& groups,
+                      std::vector<ResidualProfile>& profile) {
     const GroupedFit fit = fit_own(problem, split, model, options);
     groups = fit.used;
+    if (fit.used > 0) profile = residual_profile(problem, fit);  // of the held-out ones, which come last
     return fit.used > 0 ? errors(fit) : NamedErrors{};
   };
   const GroupedFit base;
-  out.base_train = of(base, Split::train, out.train), out.base_test = of(base, Split::test, out.test);
-  out.card_train = of(card, Split::train, out.train), out.card_test = of(card, Split::test, out.test);
+  out.base_train = of(base, Split::train, out.train, out.base_profile);
+  out.base_test = of(base, Split::test, out.test, out.base_profile);
+  out.card_train = of(card, Split::train, out.train, out.card_profile);
+  out.card_test = of(card, Split::test, out.test, out.card_profile);
   return out;
 }
 

@@ -16,6 +16,8 @@ struct CardComparison {
   NamedErrors base_train, base_test;  ///< of the base model, as discover_flights and discover_falls name them
   NamedErrors card_train, card_test;  ///< with the card's effects
   std::vector<std::pair<std::string, std::string>> skipped;  ///< groups, with the reason
+  /// Of the held-out groups, or of the train groups where none is held out.
+  std::vector<ResidualProfile> base_profile, card_profile;
 };
 
 /// Whether a card is of free flights or falls.

@@ -150,5 +150,19 @@ TEST_F(Cli, FreeFlights) {
   EXPECT_GT(fs::file_size(folder / "r/residuals_projectile.png"), 0u);
 }
 
+TEST_F(Cli, ACardOfFlightsIsShownInAFigure) {
+  std::ofstream(folder / "card.json")
+      << R"({"schema": "model-card", "schema_version": 1, "model": "projectile",
+    "parameters": {"sensor.length_scale.scale": {"value": 1.02, "sigma": 0.001, "unit": "-"}},
+    "effects": ["sensor.length_scale"], "errors": {}, "split": "train", "library_version": "0"})";
+  const Answer answer = run("compare " + flights + " --card card.json --json a.json --report r");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json errors = read_json(folder / "a.json");  // the motion has no such scale
+  EXPECT_GT(errors["with_card"]["test"]["trajectory_rms_m"], errors["base"]["test"]["trajectory_rms_m"]);
+  EXPECT_GT(fs::file_size(folder / "r/residual.png"), 0u);
+  std::ifstream report(folder / "r/report.md");
+  EXPECT_THAT(std::string(std::istreambuf_iterator<char>(report), {}), testing::HasSubstr("(residual.png)"));
+}
+
 }  // namespace
 }  // namespace unhand::cli

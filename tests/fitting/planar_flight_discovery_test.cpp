@@ -125,6 +125,12 @@ TEST_P(PlanarFlights, TheMissingEffectIsFoundWithItsSize) {
     EXPECT_TRUE(named) << effect.parameters.front().name;
   }
   for (const auto& m : found.misfit) EXPECT_LT(m.after_test, 1.3) << m.channel;
+  for (const auto& r : found.ranking) {  // beside the base model, or beside the effect that was found
+    EXPECT_LE(r.step, 2) << r.id;
+    if (r.id == effect.id) {
+      EXPECT_EQ(r.step, 1);
+    }
+  }
   EXPECT_LT(found.after_test.front().second, found.before_test.front().second);
 }
 
