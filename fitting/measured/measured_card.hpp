@@ -17,7 +17,8 @@ struct CardComparison {
   NamedErrors card_train, card_test;  ///< with the card's effects
   std::vector<std::pair<std::string, std::string>> skipped;  ///< groups, with the reason
   /// Of the held-out groups, or of the train groups where none is held out.
-  std::vector<ResidualProfile> base_profile, card_profile;
+  std::vector<ResidualProfile> base_profile;
+  std::vector<ResidualProfile> card_profile;  ///< likewise, with the card's effects
 };
 
 /// Whether a card is of free flights or falls.
