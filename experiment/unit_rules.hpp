@@ -10,23 +10,30 @@
 
 namespace unhand::experiment {
 
-// What shows: far above any sensor's noise.
-inline constexpr double kShowsShift = 0.02, kShowsTurn = 0.02, kShowsSpeed = 0.1, kShowsSpin = 0.1,
-                        kShowsNewton = 0.1, kShowsNewtonMetre = 2e-3, kShowsLever = 5e-3, kShowsBend = 1e-3;
+// Sizes that show: far above any sensor's noise.
+inline constexpr double kShowsShift = 0.02;  ///< of a position [m]
+inline constexpr double kShowsTurn = 0.02;   ///< of an angle [rad]
+inline constexpr double kShowsSpeed = 0.1;   ///< of a velocity [m/s]; of an acceleration [m/s²]
+inline constexpr double kShowsSpin = 0.1;    ///< of a rate [rad/s]; of an angular acceleration [rad/s²]
+inline constexpr double kShowsNewton = 0.1;  ///< of a force [N]
+inline constexpr double kShowsNewtonMetre = 2e-3;  ///< of a torque [N m]
+inline constexpr double kShowsLever = 5e-3;        ///< of a lever [m]
+inline constexpr double kShowsBend = 1e-3;         ///< of a flight's path from a straight line, rms [m]
 
-/// A quantity in this unit has `factor` times the number that it has in SI units.
+/// A unit that is not SI.
 struct OtherUnit {
-  double factor;
-  const char* words;
+  double factor;      ///< numbers in it are so many times those in SI units [-]
+  const char* words;  ///< "mm for m"
 };
 /// One side of a comparison.
 struct ColumnSide {
-  const char *path, *column;  ///< the path inside a throw, or from the root
-  std::span<const OtherUnit> units;
+  const char *path, *column;         ///< the path inside a throw, or from the root
+  std::span<const OtherUnit> units;  ///< that it may be in; none: not in question
 };
 /// Two columns that say the same of a throw.
 struct UnitRule {
-  ColumnSide seen, expected;
+  ColumnSide seen;      ///< its size over that of `expected` is the ratio
+  ColumnSide expected;  ///< what it is compared with
   const char* where;    ///< they are compared
   double within = 1.5;  ///< a factor of a unit's, to be taken for it
 };
@@ -36,10 +43,10 @@ const std::map<SizedColumn, UnitRule>& unit_rules();
 
 /// A column by itself: repetitions of a condition share its size.
 struct PlainColumn {
-  ColumnSide side;
+  ColumnSide side;                                            ///< where it is, and its units
   const datasets::Series* (*series)(const datasets::Throw&);  ///< null where the throw has none
-  std::size_t first, last;                                    ///< its columns, first to last − 1
-  double shows;                                               ///< a size far above any sensor's noise, SI
+  std::size_t first, last;                                    ///< its columns, first to last - 1
+  double shows;                                               ///< a size that shows, SI
   bool grip = false;  ///< alike in all conditions of a log, and no other channel tells it
 };
 /// All of a planar throw.
