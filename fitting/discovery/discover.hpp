@@ -175,7 +175,8 @@ struct Discovery {
   FirstMisfit first;                                                 ///< of the base model
   OutcomeErrors before_train, before_test, after_train, after_test;  ///< base model; the answer
   std::vector<Ranked> ranking;                                       ///< best first
-  FitResult base, final;  ///< of the train throws: by the base model and by the answer
+  std::vector<std::string> silent;  ///< candidates of which no channel shows anything under the base model
+  FitResult base, final;            ///< of the train throws: by the base model and by the answer
   std::vector<ChannelMisfit> base_test, final_test;          ///< misfit on held-out throws
   std::string model;                                         ///< of the answer (contact.law changes it)
   std::vector<ResidualBin> residual_before, residual_after;  ///< of the train throws

@@ -42,6 +42,21 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
   return out;
 }
 
+std::vector<std::string> silent_ids(const Footprints& f) {
+  const auto shows = [&](const Candidate& candidate) {
+    return std::any_of(candidate.columns.begin(), candidate.columns.end(), [&](std::size_t k) {
+      return f.gram(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(k)) > 0;
+    });
+  };
+  std::vector<std::string> out;
+  for (const Candidate& candidate : f.candidates)
+    if (std::none_of(f.candidates.begin(), f.candidates.end(),
+                     [&](const Candidate& other) { return other.id == candidate.id && shows(other); }) &&
+        std::find(out.begin(), out.end(), candidate.id) == out.end())
+      out.push_back(candidate.id);
+  return out;
+}
+
 namespace {
 
 /// The Gram matrix of `kept` columns after `removed` ones are projected out; a column that keeps less than

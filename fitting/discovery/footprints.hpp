@@ -47,6 +47,10 @@ struct Footprints {
   std::size_t residual() const { return static_cast<std::size_t>(gram.rows()) - 1; }
 };
 
+/// The candidates' ids of which no channel shows anything: a wind where no drag is declared. In the order of
+/// the candidates.
+std::vector<std::string> silent_ids(const Footprints& footprints);
+
 /// At a fit of `problem`. Candidates: every effect of `ids` that the problem does not have, at each value of
 /// its shape parameters' grid, and every contact law of `laws`.
 Footprints footprints(const CampaignProblem& problem, const FitResult& fit,

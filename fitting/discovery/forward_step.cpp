@@ -59,6 +59,7 @@ class ForwardStep {
 
   std::optional<Stage> run() {
     if (all_.empty()) return std::nullopt;
+    if (out_.ranking.empty()) out_.silent = silent_ids(f_);
     rank(out_.ranking, 1 + static_cast<int>(out_.effects.size()), f_, all_);
     std::sort(all_.begin(), all_.end(), [](const Score& a, const Score& b) { return a.gain > b.gain; });
     for (const Score& score : all_)
@@ -82,6 +83,11 @@ class ForwardStep {
   const std::string& id_of(const Score& score) const { return f_.candidates[score.candidate].id; }
   double between_footprints(const Score& a, const Score& b) const {
     return between(f_, f_.candidates[a.candidate], a.step, f_.candidates[b.candidate]);
+  }
+
+  /// Under the base model: it is no other name for anything.
+  bool is_silent(const std::string& id) const {
+    return std::find(out_.silent.begin(), out_.silent.end(), id) != out_.silent.end();
   }
 
   bool in_reach(const Score& score) const {
@@ -162,7 +168,8 @@ class ForwardStep {
           if (r >= options_.equivalent) accepted.equivalent.push_back({id_of(score), r});
         }
     for (const auto& [score, bic] : rivals)
-      if (score != trial.score && !is_law(id_of(*score)) && bic < trial.next.bic() - kDeltaBic)
+      if (score != trial.score && !is_law(id_of(*score)) && !is_silent(id_of(*score)) &&
+          bic < trial.next.bic() - kDeltaBic)
         accepted.add_other_name(id_of(*score), between_footprints(*trial.score, *score));
     if (is_law(accepted.id)) {  // it takes the place of a former one
       std::erase_if(out_.effects, [](const AcceptedEffect& e) { return is_law(e.id); });

@@ -11,17 +11,12 @@ namespace unhand::fitting {
 
 namespace {
 
-/// The footprint's own names for `accepted`: candidates that could have left it as well. What had no
-/// footprint of its own before anything was accepted could not: a wind acts through the drag that has just
-/// been found.
+/// The footprint's own names for `accepted`: candidates that could have left it as well. What is silent under
+/// the base model could not: a wind acts through the drag or the lift that has just been found.
 void find_other_names(const Footprints& f, const Eigen::VectorXd& contribution, double enough,
-                      const std::vector<Ranked>& at_base, AcceptedEffect& accepted) {
-  const auto has_footprint = [&](const std::string& id) {
-    return std::any_of(at_base.begin(), at_base.end(),
-                       [&](const Ranked& r) { return r.id == id && r.gain > 0; });
-  };
+                      const std::vector<std::string>& silent, AcceptedEffect& accepted) {
   for (const Candidate& candidate : f.candidates) {
-    if (!has_footprint(candidate.id)) continue;
+    if (std::find(silent.begin(), silent.end(), candidate.id) != silent.end()) continue;
     const double r = correlation(f, contribution, candidate);
     if (r < enough) continue;
     accepted.add_other_name(candidate.id, r);
@@ -159,7 +154,7 @@ void describe(Stage& stage, FitResult counted, const DiscoverOptions& options, D
         if (without_object(u.unknown.name) == effect.full_name(p))
           accepted.parameters.push_back(
               {u.unknown.name.substr(accepted.id.size() + 1), u.unknown.unit, u.value, u.sigma});
-    find_other_names(f, contribution_of(stage.fit, effect), options.equivalent, out.ranking, accepted);
+    find_other_names(f, contribution_of(stage.fit, effect), options.equivalent, out.silent, accepted);
   }
 }
 

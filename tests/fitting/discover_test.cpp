@@ -41,6 +41,7 @@ TEST(Discovery, DragIsFoundWithItsSize) {
   ASSERT_EQ(found.verdict, Verdict::effect_found);
   EXPECT_EQ(found.effects.front().id, "flight.quadratic_drag");
   EXPECT_TRUE(found.effects.front().equivalent.empty()) << "a wind needs a drag to act through";
+  EXPECT_EQ(found.silent, std::vector<std::string>{"flight.wind"}) << "none was declared";
   EXPECT_EQ(found.first.phase, Phase::flight) << "drag acts in flight, and first there";
   for (const auto& p : found.effects.front().parameters)
     EXPECT_NEAR(p.value, kDrag, std::max(4 * p.sigma, 1e-4)) << p.name;
