@@ -80,7 +80,6 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
 
   const Stage base = stage;
   for (int step = 0; step < options.most_effects; ++step) {
-    if (!out.effects.empty() && !first_misfit(stage.fit, options).any) break;
     auto next = forward(stage, options, out);
     if (!next) {
       // The give of the pads may hide what else there is: with it, unless it predicts worse, one more look.
