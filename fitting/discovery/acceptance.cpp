@@ -160,14 +160,19 @@ bool is_noisier(const ChannelMisfit& now, const std::vector<ChannelMisfit>& befo
 
 }  // namespace
 
-bool spoils(const Stage& stage, const Discovery& so_far) {
+bool spoils(const AcceptedEffect& effect, const Stage& stage, const Discovery& so_far,
+            const DiscoverOptions& options) {
+  const auto spoilt = [&](const ChannelMisfit& m, const std::vector<ChannelMisfit>& before) {
+    const bool misfit =
+        is_misfit(m, options) && m.chi2_per_sample() >= unexplained_from(m.channel, m.phase, options);
+    return is_noisier(m, before) && (misfit || acts(effect, in_air(m.phase)));
+  };
   const auto& train = stage.fit.misfit;
   const auto& held_out = stage.held_out.misfit;
   return std::any_of(train.begin(), train.end(), [&](const ChannelMisfit& m) {
-    return is_noisier(m, so_far.base.misfit) &&
+    return spoilt(m, so_far.base.misfit) &&
            std::any_of(held_out.begin(), held_out.end(), [&](const ChannelMisfit& other) {
-             return other.channel == m.channel && other.phase == m.phase &&
-                    is_noisier(other, so_far.base_test);
+             return other.channel == m.channel && other.phase == m.phase && spoilt(other, so_far.base_test);
            });
   });
 }

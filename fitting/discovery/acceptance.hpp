@@ -120,10 +120,13 @@ bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const FitRes
 /// By what share of its χ² an answer may leave a channel noisier than the base model did.
 inline constexpr double kNoisier = 0.25;
 
-/// Whether the answer has spoilt a channel in a phase: in both halves of the throws its χ² has grown by more
-/// than kNoisier, and by more than three σ of chance. A true cause makes no channel noisier; one that takes
-/// the place of another bends what they do not share, in wrenches well below what they are trusted to.
-bool spoils(const Stage& stage, const Discovery& so_far);
+/// Whether an accepted effect has spoilt a channel in a phase: in both halves of the throws its χ² has grown
+/// by more than kNoisier and three σ of chance, and that in the half of the throw where the effect acts, or
+/// to a misfit. A true cause makes no channel noisier; one that takes the place of another bends what they do
+/// not share, in wrenches well below what they are trusted to. (A true drag, though, frees friction of what
+/// it was bent by, and may show how little that describes a torque.)
+bool spoils(const AcceptedEffect& effect, const Stage& stage, const Discovery& so_far,
+            const DiscoverOptions& options);
 
 /// What a form that no effect has may leave of what the accepted effects leave of the tracked flights.
 inline constexpr double kOutdone = 0.5;

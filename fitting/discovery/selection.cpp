@@ -74,7 +74,7 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
     const bool in_company = (misled[0] && acts(effect, false)) || (misled[1] && acts(effect, true));
     const bool last = effect.id == out.effects.back().id;
     const bool here = in_company || is_imitation(effect, stage, counted, out, options) ||
-                      (last && spoils(stage, out)) ||
+                      (last && spoils(effect, stage, out, options)) ||
                       std::find(outdone.begin(), outdone.end(), effect.id) != outdone.end();
     for (const bool air : {false, true}) misled[air ? 1 : 0] |= here && acts(effect, air);
     if (here) {

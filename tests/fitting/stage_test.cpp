@@ -210,8 +210,9 @@ TEST(Separating, ALawIsToldFromAnEffectByExperiments) {
 }
 
 // A drag and a wind that together pass for a third law of the air bend the motion in the hand; a mass that
-// takes in a torque's gain makes the forces noisier, far below what they are trusted to. A channel that only
-// one half of the throws shows is not spoilt, nor one that chance moves.
+// takes in a torque's gain makes the forces noisier, far below what they are trusted to. A drag that does so
+// frees friction of what had bent it. What only one half of the throws shows is not spoilt, nor what chance
+// moves.
 TEST(Spoils, IsAChannelThatTheAnswerLeavesNoisier) {
   const auto misfit = [](double grasped, double flight, int n = 1000) {
     FitResult out;
@@ -221,18 +222,23 @@ TEST(Spoils, IsAChannelThatTheAnswerLeavesNoisier) {
     }
     return out;
   };
-  const auto spoilt = [&](const FitResult& base, const FitResult& train, const FitResult& held_out) {
+  AcceptedEffect drag, mass;
+  drag.id = "flight.quadratic_drag", drag.phase = Phase::flight;
+  mass.id = "sensor.mass", mass.phase = Phase::grasped;
+  const auto spoilt = [&](const AcceptedEffect& by, const FitResult& base, const FitResult& train,
+                          const FitResult& held_out) {
     Discovery so_far;
     so_far.base = base, so_far.base_test = base.misfit;
     const CampaignProblem problem(support::loop_campaign({}), "synthetic", {});
-    return spoils(Stage{problem, train, held_out, {}}, so_far);
+    return spoils(by, Stage{problem, train, held_out, {}}, so_far, {});
   };
-  EXPECT_TRUE(spoilt(misfit(1.1, 9000), misfit(3, 17), misfit(3, 17)));
-  EXPECT_FALSE(spoilt(misfit(1.1, 9000), misfit(1.1, 17), misfit(1.1, 17)));
-  EXPECT_FALSE(spoilt(misfit(2.5, 9000), misfit(3, 17), misfit(3, 17)));
-  EXPECT_FALSE(spoilt(misfit(1.1, 9000), misfit(3, 17), misfit(1, 17)));
-  EXPECT_TRUE(spoilt(misfit(0.2, 9), misfit(0.4, 1), misfit(0.35, 1)));
-  EXPECT_FALSE(spoilt(misfit(1.1, 9000), misfit(1.6, 17, 30), misfit(1.6, 17, 30)));
+  EXPECT_TRUE(spoilt(drag, misfit(1.1, 9000), misfit(3, 17), misfit(3, 17)));
+  EXPECT_FALSE(spoilt(drag, misfit(1.1, 9000), misfit(1.1, 17), misfit(1.1, 17)));
+  EXPECT_FALSE(spoilt(drag, misfit(2.5, 9000), misfit(3, 17), misfit(3, 17)));
+  EXPECT_FALSE(spoilt(drag, misfit(1.1, 9000), misfit(3, 17), misfit(1, 17)));
+  EXPECT_TRUE(spoilt(mass, misfit(0.2, 9), misfit(0.4, 1), misfit(0.35, 1)));
+  EXPECT_FALSE(spoilt(drag, misfit(0.2, 9), misfit(0.4, 1), misfit(0.35, 1)));
+  EXPECT_FALSE(spoilt(mass, misfit(1.1, 9000), misfit(1.6, 17, 30), misfit(1.6, 17, 30)));
 }
 
 // Landings alone leave fewer numbers than a throw has unknowns. A law that takes a thousandth off does not
