@@ -42,28 +42,35 @@ ReleaseCard release_card(const datasets::ModelCard& card, const std::string& fil
     throw datasets::CardError(file, "/effects", "plans of throws take cards without effects");
   ReleaseCard out = otherwise;
   out.model = card.model;
-  const auto take = [&](const char* name, const char* unit, double& value, double* sigma) {
+  const auto take = [&](const char* name, const char* unit, bool may_be_zero, double& value, double* sigma) {
     const auto found = card.parameters.find(name);
     if (found == card.parameters.end()) return;
     const std::string path = fmt::format("/parameters/{}", name);
     if (found->second.unit != unit)
       throw datasets::CardError(file, path + "/unit",
                                 fmt::format("is '{}', not '{}'", found->second.unit, unit));
-    if (!(found->second.value >= 0)) throw datasets::CardError(file, path + "/value", "is not >= 0");
     value = found->second.value;
+    if (!(value > 0 || (may_be_zero && value == 0)) || !std::isfinite(value))
+      throw datasets::CardError(
+          file, path + "/value",
+          fmt::format("is {}; accepted: finite, {} 0", value, may_be_zero ? ">=" : ">"));
     if (sigma != nullptr && found->second.sigma) *sigma = *found->second.sigma;
   };
-  take("mu", "-", out.mu.value, &out.mu.sigma);
+  take("mu", "-", false, out.mu.value, &out.mu.sigma);
   if (const auto own = card.own_spreads.find("mu_deviation"); own != card.own_spreads.end())
     out.mu.sigma = std::hypot(out.mu.sigma, own->second.sigma * out.mu.value);  // a fraction of mu
-  take("length", "m", out.length, nullptr);
+  take("length", "m", false, out.length, nullptr);
+  constexpr int kMostPads = 100;
   double pads = out.pads;
-  take("pads", "-", pads, nullptr);
+  take("pads", "-", false, pads, nullptr);
+  if (pads != std::floor(pads) || pads > kMostPads)
+    throw datasets::CardError(file, "/parameters/pads/value",
+                              fmt::format("is {}; accepted: whole numbers from 1 to {}", pads, kMostPads));
   out.pads = static_cast<int>(pads);
-  take("grip_force", "N", out.grip_force, nullptr);
-  take("dead_time", "s", out.dead_time.value, &out.dead_time.sigma);
-  take("opening_time", "s", out.opening_time.value, &out.opening_time.sigma);
-  take("shape", "-", out.shape, nullptr);
+  take("grip_force", "N", false, out.grip_force, nullptr);
+  take("dead_time", "s", true, out.dead_time.value, &out.dead_time.sigma);
+  take("opening_time", "s", false, out.opening_time.value, &out.opening_time.sigma);
+  take("shape", "-", false, out.shape, nullptr);
   return out;
 }
 
@@ -175,6 +182,19 @@ void summarise(Landings& out) {
   out.std = std::sqrt(out.std);
 }
 
+namespace {
+
+/// A draw of the unknown. One that has no sign is drawn again while it is negative: of a normal distribution
+/// about a value >= 0 at least every second draw is not, so that the last resort, the value, is never needed.
+template <class Normal>
+double drawn(const Uncertain& one, bool has_sign, Normal&& normal) {
+  for (int attempt = 0; attempt < 1000; ++attempt)
+    if (const double x = one.value + one.sigma * normal(); has_sign || x >= 0) return x;
+  return one.value;
+}
+
+}  // namespace
+
 Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t seed) {
   const auto unknowns = unknowns_of(problem);
   std::mt19937_64 random(seed);
@@ -183,9 +203,8 @@ Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t see
   Landings out;
   for (int i = 0; i < count; ++i) {
     Draw draw{};
-    for (int k = 0; k < kUnknowns; ++k) do
-        draw[k] = unknowns[k].value + unknowns[k].sigma * normal(random);
-      while (k != kComOffset && !(draw[k] > 0));
+    for (int k = 0; k < kUnknowns; ++k)
+      draw[k] = drawn(unknowns[k], k == kComOffset, [&] { return normal(random); });
     if (const auto thrown = throw_once<double>(problem, hand, draw))
       out.miss.push_back(thrown->miss);
     else
@@ -314,7 +333,7 @@ InsensitiveResult make_insensitive(const ReleaseThrow& problem, const Insensitiv
         step.H(m + i, m + i) += damping * 1e-2 / (l.acceleration * l.acceleration);
       }
       const QpSolution solution = solve(step);
-      if (solution.outcome != QpOutcome::solved) return out;
+      if (solution.outcome != QpOutcome::solved) break;
       ThrowState start = at.start;
       JointVector<double> acceleration = at.qdd;
       for (int i = 0; i < m; ++i) {

@@ -159,5 +159,44 @@ TEST(ReleaseThrow, TakesModelCards) {
   EXPECT_THROW(release_card(card, "card.json"), datasets::CardError);
 }
 
+TEST(ReleaseCard, RefusesNumbersThatNoGripperHas) {
+  const auto refused = [](const std::string& name, const std::string& unit, double value) {
+    datasets::ModelCard card;
+    card.model = "limit_surface";
+    card.parameters[name] = {value, {}, unit};
+    try {
+      release_card(card, "card.json");
+    } catch (const datasets::CardError& error) {
+      const std::string what = error.what();
+      return what.find("card.json") != std::string::npos &&
+             what.find("/parameters/" + name + "/value") != std::string::npos;
+    }
+    return false;
+  };
+  EXPECT_TRUE(refused("mu", "-", 0));
+  EXPECT_TRUE(refused("mu", "-", std::nan("")));
+  EXPECT_TRUE(refused("length", "m", -1e-3));
+  EXPECT_TRUE(refused("opening_time", "s", 0));
+  EXPECT_TRUE(refused("dead_time", "s", -1e-3));
+  EXPECT_TRUE(refused("shape", "-", 0));
+  for (const double pads : {0.0, 0.5, 2.5, 1e300}) EXPECT_TRUE(refused("pads", "-", pads)) << pads;
+  EXPECT_FALSE(refused("dead_time", "s", 0));  // of a gripper that opens at once
+  EXPECT_FALSE(refused("pads", "-", 1));
+}
+
+TEST(ReleaseThrow, OfAGripperWithoutDeadTimeIsDrawn) {
+  const Chain arm = pads();
+  ReleaseThrow p = swing(arm);
+  p.card.dead_time = {0, 0};
+  p.card.mu.sigma = p.card.opening_time.sigma = p.object.com_offset.sigma = 0;
+  const Landings same = draw_landings(p, 3, 1);
+  const auto nominal = release_landing(p, nominal_draw(p));
+  ASSERT_TRUE(nominal);
+  ASSERT_EQ(same.miss.size(), 3u);
+  for (const double miss : same.miss) EXPECT_EQ(miss, nominal->miss);
+  p.card.dead_time.sigma = 0.005;  // half of the normal distribution has no meaning
+  EXPECT_EQ(draw_landings(p, 20, 1).miss.size(), 20u);
+}
+
 }  // namespace
 }  // namespace unhand::planners
