@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <initializer_list>
 #include <stdexcept>
 #include <string>
 
@@ -23,6 +24,13 @@ class WrongUsage : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
+
+/// Throws WrongUsage for options that the command line gives although they mean nothing here: `why`.
+inline void refuse_options(const Parser& parser, std::initializer_list<const char*> options,
+                           const std::string& why) {
+  for (const char* option : options)
+    if (parser.given(option)) throw WrongUsage(std::string(option) + ": " + why);
+}
 
 /// A subcommand: what the parser knows of it, and what to do when it is chosen.
 struct Command {

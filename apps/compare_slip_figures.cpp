@@ -93,9 +93,6 @@ Figure section_figure(const fitting::SlipSamples& slips, const std::vector<Surfa
     s += "NaN notitle\nunset label 1\n";
     left += 9.2;
   }
-  // Blocks without rows would shift gnuplot's index: give them a point that is outside.
-  for (DataBlock& block : figure.data)
-    if (block.rows.empty()) block.rows.push_back({10 * extent, 10 * extent, 0, 0});
   s += "set size noratio\n" + key_strip(figure, key, 2) + "unset multiplot\n";
   return figure;
 }

@@ -14,6 +14,7 @@
 #include "apps/progress.hpp"
 #include "apps/table.hpp"
 #include "apps/throws.hpp"
+#include "contact/gripper_delay.hpp"
 #include "crosscheck/bullet_release.hpp"
 #include "crosscheck/distributed_patch.hpp"
 #include "experiment/friction_estimate.hpp"
@@ -53,11 +54,16 @@ experiment::ModelParameters parameters_of(const CrosscheckOptions& options, cons
   if (!options.card.empty()) {
     const UsableCard card = read_usable_card(options.card);
     experiment::ModelParameters out = card.parameters;
+    if (!card.card.effects.empty())
+      throw datasets::CardError(options.card, "/effects", "other engines have none of them: not accepted");
+    if (!card.fitted && card.card.model == contact::kGripperDelay)
+      throw datasets::CardError(options.card, "/model",
+                                fmt::format("'{}' has no friction", contact::kGripperDelay));
     if (card.fitted) {
       const auto value = [&](const char* name) {
         const auto found = card.card.parameters.find(name);
         if (found == card.card.parameters.end())
-          throw WrongUsage(fmt::format("{}: has no {}", options.card, name));
+          throw datasets::CardError(options.card, fmt::format("/parameters/{}", name), "is missing");
         return found->second.value;
       };
       out.mu = value("mu"), out.length = value("length");
@@ -196,7 +202,10 @@ Json json_of(const Differences& differences) {
   for (int q = 0; q < experiment::kQuantityCount; ++q) {
     const auto s = experiment::statistics_of(differences.of[q]);
     out[experiment::kQuantities[q].key] = {
-        {"n", s.n}, {"mae", s.mae}, {"std", s.std}, {"bias", s.bias}, {"max", differences.worst(q)}};
+        {"n", s.n}, {"mae", nullptr}, {"std", nullptr}, {"bias", nullptr}, {"max", nullptr}};
+    if (s.n > 0)
+      out[experiment::kQuantities[q].key] = {
+          {"n", s.n}, {"mae", s.mae}, {"std", s.std}, {"bias", s.bias}, {"max", differences.worst(q)}};
   }
   return out;
 }
@@ -229,9 +238,14 @@ Json throws_json(const Setting& setting, const Throws& throws) {
   return out;
 }
 
-void check(const CrosscheckOptions& options) {
+void check(const CrosscheckOptions& options, const Parser& parser) {
+  if (options.engine == "cvode")
+    refuse_options(parser, {"--steps", "--pads", "--friction", "--rings"}, "cvode integrates the models");
+  if (options.engine == "patch")
+    refuse_options(parser, {"--pads", "--friction"}, "of bullet; patch has points with bristles");
   require_writable(options.json);
-  const auto known = contact::contact_model_names();
+  auto known = contact::contact_model_names();
+  std::erase(known, contact::kGripperDelay);  // it has no pads that another engine could be given
   for (const auto& model : options.models)
     if (std::find(known.begin(), known.end(), model) == known.end())
       throw WrongUsage(fmt::format("model '{}' is unknown; there are {}", model, fmt::join(known, ", ")));
@@ -337,7 +351,7 @@ Command crosscheck_command(Parser& root) {
   parser.footer(
       "All get the same hand, normal force and friction, so that differences are the engine's.\n"
       "Example:\n  unhand crosscheck campaign.h5 --engine bullet --steps 1e-3,1e-4 --json bullet.json");
-  return {&parser, [options] { check(*options); }};
+  return {&parser, [options, &parser] { check(*options, parser); }};
 }
 
 }  // namespace unhand::apps

@@ -96,7 +96,10 @@ std::string data_text(const Figure& figure) {
       if (!block.labels.empty()) out += quoted(block.labels[i]);
       out += "\n";
     }
-    if (block.rows.empty()) out += "# no rows\n";
+    // gnuplot's index skips blocks without rows and so would draw the next one in this one's place.
+    if (block.rows.empty())
+      for (std::size_t k = 0; k <= block.columns.size(); ++k)
+        out += k < block.columns.size() ? "NaN " : "# no rows\n";
   }
   return out;
 }

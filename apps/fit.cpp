@@ -138,7 +138,7 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
   fmt::print("{}", fit_text(answer, request, false));
 }
 
-void fit(const FitRequest& request) {
+void fit(const FitRequest& request, const Parser& parser) {
   require_names(request);
   require_writable(request.json);
   require_writable(request.card);
@@ -150,7 +150,8 @@ void fit(const FitRequest& request) {
       throw datasets::LogError(request.log, "/surfaces",
                                fmt::format("slips, which {} does not predict; there are {}", request.model,
                                            fmt::join(surface_names(), ", ")));
-    if (!request.effects.empty()) throw WrongUsage("--effects are for throws");
+    refuse_options(parser, {"--effects", "--floor", "--rtol"},
+                   fmt::format("is for throws; {} holds slips", request.log));
     fit_slips(request);
     return;
   }
@@ -210,7 +211,7 @@ Command fit_command(Parser& root) {
       "Examples:\n  unhand fit campaign.h5 --model limit_surface --card card.json --report out\n"
       "  unhand fit campaign.h5 --model limit_surface_disc --effects flight.quadratic_drag --card card.json\n"
       "  unhand fit pushes.h5 --model convex_quartic --card felt.json");
-  return {&parser, [request] { fit(*request); }};
+  return {&parser, [request, &parser] { fit(*request, parser); }};
 }
 
 }  // namespace unhand::apps

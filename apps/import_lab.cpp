@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <map>
 #include <numbers>
 #include <stdexcept>
@@ -56,8 +57,8 @@ std::map<std::string, double> parse_numbers(const char* option, const std::strin
   std::map<std::string, double> out;
   for (const auto& [name, value] : parse_pairs(option, text)) {
     const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), out[name]);
-    if (error != std::errc{} || end != value.data() + value.size())
-      throw WrongUsage(fmt::format("{}: '{}' of {} is not a number", option, value, name));
+    if (error != std::errc{} || end != value.data() + value.size() || !std::isfinite(out[name]))
+      throw WrongUsage(fmt::format("{}: '{}' of {} is not a finite number", option, value, name));
   }
   return out;
 }

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cstdio>
 #include <exception>
 #include <nlohmann/json.hpp>
 
@@ -23,6 +24,8 @@ int say(ExitCode code, const std::exception& error) {
 int run(const Command& command) {
   try {
     command.run();
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+      throw Unanswered("the answer cannot be written to the standard output");
     return done;
   } catch (const WrongUsage& error) {
     return say(wrong_usage, error);

@@ -80,18 +80,26 @@ fs::path Outputs::part_of(const fs::path& destination) {
   return nearest_existing(parent_of(destination)) / name;
 }
 
+fs::path Outputs::add(const fs::path& destination, bool is_directory) {
+  std::error_code error;
+  for (const Part& part : parts_)
+    if (fs::weakly_canonical(part.destination, error) == fs::weakly_canonical(destination, error))
+      throw WrongUsage(fmt::format("two outputs are to be {}", destination.string()));
+  parts_.push_back({part_of(destination), destination, is_directory});
+  return parts_.back().made;
+}
+
 void Outputs::text(const fs::path& file, const std::string& content) {
   require_writable(file);
-  parts_.push_back({part_of(file), file, false});
-  write_text(parts_.back().made, content);
+  write_text(add(file, false), content);
 }
 
 template <class Write>
 void Outputs::made_by(const fs::path& file, Write&& write) {
   require_writable(file);
-  parts_.push_back({part_of(file), file, false});
+  const fs::path made = add(file, false);
   try {
-    write(parts_.back().made);
+    write(made);
   } catch (const datasets::LogError& error) {
     refuse(file, fmt::format("{}: {}", error.path, error.reason));
   }
@@ -108,10 +116,10 @@ void Outputs::log(const fs::path& file, const datasets::SlipLog& log) {
 fs::path Outputs::directory(const fs::path& destination) {
   require_writable_directory(destination);
   const fs::path wanted = trimmed(destination);
-  parts_.push_back({part_of(wanted), wanted, true});
+  const fs::path made = add(wanted, true);
   std::error_code error;
-  if (!fs::create_directory(parts_.back().made, error) || error) refuse(destination, error.message());
-  return parts_.back().made;
+  if (!fs::create_directory(made, error) || error) refuse(destination, error.message());
+  return made;
 }
 
 void Outputs::commit() {

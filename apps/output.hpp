@@ -56,6 +56,8 @@ class Outputs {
   template <class Write>
   void made_by(const std::filesystem::path& file, Write&& write);
   std::filesystem::path part_of(const std::filesystem::path& destination);
+  /// Where to make what goes to `destination`. Throws WrongUsage for one that another output goes to.
+  std::filesystem::path add(const std::filesystem::path& destination, bool is_directory);
 
   std::vector<Part> parts_;
 };

@@ -149,6 +149,12 @@ Reading read_push(const RawPush& push, Vec2 offset, const std::vector<Edge>& edg
   slip.wrench.cols = slip.twist.cols = 3;
   double s = reached(screw, edge, gap, finger_at(push, begin)), pressed = 0;
   auto next = push.forces.begin();
+  constexpr double kMostIntervals = 1e6;
+  if (!((end - begin) / options.step <= kMostIntervals)) {
+    out.reason = fmt::format("lasts {:.3g} s, more than {:.0f} intervals of {:.3g} s", end - begin,
+                             kMostIntervals, options.step);
+    return out;
+  }
   const auto intervals = static_cast<int>(std::floor((end - begin) / options.step));
   for (int k = 0; k < intervals; ++k) {
     const double from = begin + k * options.step, to = from + options.step;

@@ -2,7 +2,9 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace unhand::release {
@@ -15,12 +17,18 @@ using dynamics::Wrench;
 
 NaiveResult simulate_release_naive(const ReleaseProblem<double>& problem, const contact::Patch<double>& patch,
                                    const NaiveOptions& options) {
-  constexpr double kLeast = 1e-7;  // [s]: a release of 0.1 s then takes a million steps
-  if (!(options.step >= kLeast && options.step <= 0.1))
-    throw std::invalid_argument(
-        fmt::format("naive release: step = {} is not in [{}, 0.1] s", options.step, kLeast));
-  validate(patch);
+  constexpr double kLeast = 1e-7;     // [s]: a release of 0.1 s then takes a million steps
+  constexpr double kMostSteps = 1e8;  // some seconds of computing
+  constexpr double kSpacings = 8;     // of representable times that a step must be long
   const double release = problem.normal_force.release_time(), L = patch.length();
+  const double last_time = std::min(release, problem.hand.end());
+  const double spacing =
+      std::numeric_limits<double>::epsilon() * std::max(std::abs(problem.start), std::abs(last_time));
+  const double least = std::max({kLeast, kSpacings * spacing, (last_time - problem.start) / kMostSteps});
+  if (!(options.step >= least && options.step <= 0.1))
+    throw std::invalid_argument(
+        fmt::format("naive release: step = {} is not in [{}, 0.1] s", options.step, least));
+  validate(patch);
   double t = problem.start;
   HandState<double> hand = problem.hand.at({t, t + options.step}, t);
   const double theta = hand.pose.theta + problem.grasp.angle;

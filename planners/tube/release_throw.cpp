@@ -60,7 +60,7 @@ ReleaseCard release_card(const datasets::ModelCard& card, const std::string& fil
   if (const auto own = card.own_spreads.find("mu_deviation"); own != card.own_spreads.end())
     out.mu.sigma = std::hypot(out.mu.sigma, own->second.sigma * out.mu.value);  // a fraction of mu
   take("length", "m", false, out.length, nullptr);
-  constexpr int kMostPads = 100;
+  constexpr int kMostPads = 1000;
   double pads = out.pads;
   take("pads", "-", false, pads, nullptr);
   if (pads != std::floor(pads) || pads > kMostPads)

@@ -153,6 +153,7 @@ TEST_F(Cli, FreeFlights) {
 TEST_F(Cli, ACardOfFlightsIsShownInAFigure) {
   std::ofstream(folder / "card.json")
       << R"({"schema": "model-card", "schema_version": 1, "model": "projectile",
+    "log": {"file": "flights.h5", "title": "flights"},
     "parameters": {"sensor.length_scale.scale": {"value": 1.02, "sigma": 0.001, "unit": "-"}},
     "effects": ["sensor.length_scale"], "errors": {}, "split": "train", "library_version": "0"})";
   const Answer answer = run("compare " + flights + " --card card.json --json a.json --report r");

@@ -41,6 +41,9 @@ TEST_F(Cli, CrosscheckRefuses) {
   expect_refusal("crosscheck " + quick + " --engine ode", 2, "cvode");
   expect_refusal("crosscheck " + quick + " --engine cvode --models wishful", 2, "wishful");
   expect_refusal("crosscheck " + quick + " --engine patch --steps 1", 2, "steps");
+  expect_refusal("crosscheck " + quick + " --engine patch --pads point", 2, "--pads: of bullet");
+  expect_refusal("crosscheck " + quick + " --engine cvode --steps 1e-3", 2, "--steps: cvode integrates");
+  expect_refusal("crosscheck " + quick + " --engine cvode --models gripper_delay", 2, "gripper_delay");
   expect_refusal("crosscheck none.h5 --engine cvode", 3, "none.h5");
   expect_refusal("crosscheck " + flights + " --engine cvode", 3, flights);
 }

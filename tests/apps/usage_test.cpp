@@ -35,6 +35,29 @@ TEST_F(Cli, WrongUsage) {
   expect_refusal("compare " + quick + " --models sliding_pivot,wishful", 2, "wishful");
   expect_refusal("compare " + quick + " --models sliding_pivot,sliding_pivot", 2, "twice");
   expect_refusal("compare " + quick + " --rtol 7", 2, "rtol");
+  expect_refusal("compare " + quick + " --rtol nan", 2, "finite");
+  expect_refusal("fit " + quick + " --model sliding_pivot --card a.json --json a.json", 2, "two outputs");
+}
+
+// A block without rows keeps its place: gnuplot's index would draw the next one in it.
+TEST_F(Cli, AFigureWithoutLandingsDrawsTheOthersWhereTheyBelong) {
+  ASSERT_EQ(run("generate quick12 --seed 3 --without landing --out blind.h5").code, 0);
+  ASSERT_EQ(run("figure mae --log blind.h5 --models sliding_pivot --out f").code, 0);
+  std::istringstream data(content(folder / "f/mae.dat"));
+  int blocks = 1, blank = 0;
+  bool rows = false;
+  for (std::string line; std::getline(data, line);) {
+    if (line.empty()) {
+      if (++blank == 2) {
+        EXPECT_TRUE(rows) << "block " << blocks;
+        ++blocks, rows = false;
+      }
+      continue;
+    }
+    blank = 0;
+    rows = rows || line.front() != '#';
+  }
+  EXPECT_GT(blocks, 1);
 }
 
 TEST_F(Cli, BadInput) {

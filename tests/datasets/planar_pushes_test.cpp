@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <numbers>
 #include <sstream>
 
@@ -123,6 +125,22 @@ TEST(PlanarPushes, DropsWhatIsNoPush) {
   EXPECT_THAT(report.dropped[1].reason, testing::HasSubstr("pulls"));
   EXPECT_EQ(log.surfaces.at("felt").slips.back().id, "push-04");
   EXPECT_EQ(log.surfaces.at("felt").slips.back().split, Split::test);
+}
+
+// A time stamp that went wrong makes a push of years.
+TEST(PlanarPushes, DropsAPushWithoutEnd) {
+  const Scratch scratch;
+  Push push;
+  std::string text = push.text();
+  const std::string last =
+      fmt::format("\n{}", 1000 + 0.01 * static_cast<int>((push.rest + push.moves / 2.5) * 100));
+  const auto at = text.find(last);
+  ASSERT_NE(at, std::string::npos) << text;
+  text.replace(at + 1, last.size() - 1, "1e18");
+  PlanarPushReport report;
+  import_text(scratch, "4\n" + text + log_of({{}, {}, {}}).substr(2), &report);
+  ASSERT_EQ(report.dropped.size(), 1U);
+  EXPECT_THAT(report.dropped[0].reason, testing::HasSubstr("lasts 1e+18 s"));
 }
 
 TEST(PlanarPushes, SeveralLogsAndARoundTrip) {
