@@ -95,13 +95,28 @@ Json misfit_json(const std::vector<fitting::ChannelMisfit>& misfit) {
   return out;
 }
 
-void discover(const DiscoverOptions& options, const std::string& command) {
+/// The command line that finds the same again: what it gave, but for outputs and threads.
+std::string command_of(const DiscoverOptions& options, const Parser& parser) {
+  std::string out = fmt::format("unhand discover {} --model {}", options.log, options.model);
+  const auto add = [&](const char* name, const auto& value) {
+    if (parser.given(name)) out += fmt::format(" {} {}", name, value);
+  };
+  for (const auto& id : options.forget) add("--forget", id);
+  add("--matters", options.matters);
+  add("--most", options.most.value_or(0));
+  add("--floor", options.floor);
+  add("--rtol", options.tolerance);
+  return out;
+}
+
+void discover(const DiscoverOptions& options, const Parser& parser) {
   require_writable(options.json);
   require_writable(options.card);
   if (!options.report.empty()) {
     require_writable_directory(options.report);
     require_gnuplot();
   }
+  const std::string command = command_of(options, parser);
   if (const auto kind = measured_kind(options.log))
     return discover_measured(*kind,
                              {options.log, options.model, options.report, options.json, options.card, command,
@@ -277,11 +292,7 @@ Command discover_command(Parser& root) {
       "Verdicts: effect_found, no_missing_effect, unexplained.\n"
       "Example:\n  unhand discover campaign.h5 --model limit_surface_disc --report out/ --json "
       "discovery.json");
-  return {&parser, [options] {
-            std::string command = fmt::format("unhand discover {} --model {}", options->log, options->model);
-            for (const auto& id : options->forget) command += " --forget " + id;
-            discover(*options, command);
-          }};
+  return {&parser, [options, &parser] { discover(*options, parser); }};
 }
 
 }  // namespace unhand::apps

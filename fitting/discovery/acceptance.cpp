@@ -225,10 +225,11 @@ std::vector<std::string> outdone_by_a_form(const Stage& stage, const Discovery& 
   };
   const PhaseTraces train = flights(less, less.fit);
   const auto candidates = candidates_of(train);
-  const bool outdone =
-      beyond_noise(train, candidates) < kOutdone * beyond_noise(flights(stage, stage.fit), {}) &&
-      beyond_noise(flights(less, less.held_out), candidates) <
-          kOutdone * beyond_noise(flights(stage, stage.held_out), {});
+  const double left = beyond_noise(flights(stage, stage.fit), {});
+  if (!(left < kOutdone * beyond_noise(train, {}))) return {};  // they have no part in the flights
+  const bool outdone = beyond_noise(train, candidates) < kOutdone * left &&
+                       beyond_noise(flights(less, less.held_out), candidates) <
+                           kOutdone * beyond_noise(flights(stage, stage.held_out), {});
   if (!outdone) return {};
   for (const auto& [object, candidate] : candidates)
     for (const MissingTerm& term : candidate.terms) std::erase(accepted, term.form_of);

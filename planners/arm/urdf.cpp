@@ -30,7 +30,8 @@ class Urdf {
     if (robot == nullptr) throw datasets::ImportError(file_, "line 1", "no <robot> element");
     name = attribute(*robot, "name");
     for (auto* e = robot->FirstChildElement("link"); e; e = e->NextSiblingElement("link"))
-      links.emplace(attribute(*e, "name"), e);
+      if (!links.emplace(attribute(*e, "name"), e).second)
+        fail(*e, fmt::format("there is another link '{}'", attribute(*e, "name")));
     for (auto* e = robot->FirstChildElement("joint"); e; e = e->NextSiblingElement("joint")) {
       const std::string child = attribute(child_of(*e, "child"), "link");
       if (!links.contains(child)) fail(*e, fmt::format("there is no link '{}'", child));
@@ -54,9 +55,12 @@ class Urdf {
     return found;
   }
   double number(const XMLElement& of, const char* attribute_name) const {
+    const std::string text = attribute(of, attribute_name);
+    std::istringstream in(text);
     double value = 0;
-    if (of.QueryDoubleAttribute(attribute_name, &value) != tinyxml2::XML_SUCCESS || !std::isfinite(value))
-      fail(of, fmt::format("{} is not a number", attribute_name));
+    std::string rest;
+    if (!(in >> value) || (in >> rest) || !std::isfinite(value))
+      fail(of, fmt::format("{}=\"{}\" is not a number", attribute_name, text));
     return value;
   }
   /// The attribute if it is there.
@@ -88,8 +92,10 @@ class Urdf {
   Inertia inertia_of(const std::string& link) const {
     const XMLElement* inertial = links.at(link)->FirstChildElement("inertial");
     if (inertial == nullptr) return {};
-    const XMLElement& i = child_of(*inertial, "inertia");
-    const Inertia own{number(child_of(*inertial, "mass"), "value"), Eigen::Vector3d::Zero(),
+    const XMLElement &i = child_of(*inertial, "inertia"), &heavy = child_of(*inertial, "mass");
+    const double mass = number(heavy, "value");
+    if (mass < 0) fail(heavy, fmt::format("a mass of {} kg, accepted are 0 and more", mass));
+    const Inertia own{mass, Eigen::Vector3d::Zero(),
                       symmetric(number(i, "ixx"), number(i, "iyy"), number(i, "izz"), number(i, "ixy"),
                                 number(i, "ixz"), number(i, "iyz"))};
     return seen_from(origin_of(*inertial), own);

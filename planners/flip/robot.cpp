@@ -12,6 +12,7 @@
 #include "contact/registry.hpp"
 #include "datasets/toml_keys.hpp"
 #include "planners/arm/chain_file.hpp"
+#include "planners/arm/dynamics.hpp"
 #include "planners/flip/arm_throw.hpp"
 
 namespace unhand::planners::flip {
@@ -100,6 +101,22 @@ Pads pads_of(Section keys) {
   return out;
 }
 
+/// Why torques do not tell how the arm moves; empty where they do.
+std::string why_not_simulable(const Chain& chain) {
+  for (const Joint& joint : chain.joints)
+    if (!std::isfinite(joint.limits.torque))
+      return fmt::format("joint '{}' declares no limit of its torque", joint.name);
+  constexpr double kQuickest = 1e6;  // rad/s² under 1 N m at one joint
+  const int n = chain.size();
+  const JointMatrix<double> M = mass_matrix<double>(chain, JointVector<double>::Constant(n, 0.5));
+  for (int i = 0; i < n; ++i) {
+    const JointVector<double> under = solve_positive<double>(M, JointVector<double>::Unit(n, i));
+    if (!under.allFinite() || under.cwiseAbs().maxCoeff() > kQuickest)
+      return fmt::format("its links are too light for joint '{}' to have an inertia", chain.joints[i].name);
+  }
+  return "";
+}
+
 }  // namespace
 
 bool CommandRange::holds(const FlipCommand& u) const {
@@ -153,6 +170,7 @@ FlipRobot read_flip_robot(const std::string& name_or_file) {
         with_payload(out.chain, {mass, {0, 0, length / 2}, symmetric(across, across, along, 0, 0, 0)});
     out.chain = with_tool(out.chain, {Eigen::Matrix3d::Identity(), {0, 0, length}});
   }
+  if (const std::string why = why_not_simulable(out.chain); !why.empty()) keys.fail("arm", why);
   out.motion = motion_of({keys, "motion"}, out.chain);
   out.control = control_of({keys, "control"}, out.chain.size());
   {

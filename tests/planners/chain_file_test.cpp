@@ -162,6 +162,9 @@ TEST_F(ChainFile, UrdfMistakesAreToldWhereTheyAre) {
   refused("xyz=\"0 -2 0\"", "xyz=\"0 0 0\"", "line 11: its axis has no direction");
   refused("xyz=\"0 0 0.4\"", "xyz=\"0 0\"", "xyz=\"0 0\" is not three numbers");
   refused("link=\"hand\"/>", "link=\"paw\"/>", "there is no link 'paw'");
+  refused("mass value=\"1.5\"", "mass value=\"-1.5\"", "a mass of -1.5 kg");
+  refused("velocity=\"3\"", "velocity=\"3,0\"", "velocity=\"3,0\" is not a number");
+  refused("link name=\"hand\"", "link name=\"upper\"", "there is another link 'upper'");
   refused("", "", "the tip is 'hand' or 'upper_mass' or another: name it");
   refused("</robot>", "", "bad.urdf: line");
   EXPECT_THROW(read_urdf_chain(folder / "none.urdf"), datasets::ImportError);

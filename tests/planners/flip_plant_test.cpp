@@ -1,5 +1,6 @@
 // The simulated robot that throw-flips: its motion, the braking hinge, what its integration costs in
 // accuracy.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -293,6 +294,18 @@ TEST(FlipRobotFile, TellsWhatIsWrong) {
             std::string::npos);
   EXPECT_NE(refusal("speed = [0.62, 0.97]", "speed = [0.62, 1.9]").find("panda_joint"), std::string::npos);
   EXPECT_EQ(refusal("arm = \"panda\"", "arm = \"panda\""), "");
+  // Arms of seven joints that move, but not by torques.
+  const auto arm = path.parent_path() / "flip_arm_test.toml";
+  for (const auto& [joint, why] :
+       {std::pair{"mass_kg = 1", "no limit of its torque"}, {"torque_n_m = 50", "too light for joint"}}) {
+    std::string text = "name = \"seven\"\n";
+    for (int i = 0; i < 7; ++i)
+      text += fmt::format("[[joint]]\nname = \"j{}\"\na_m = 0.1\nalpha_deg = 90\n{}\n", i, joint);
+    std::ofstream(arm) << text;
+    EXPECT_NE(refusal("arm = \"panda\"", "arm = \"flip_arm_test.toml\"").find(why), std::string::npos)
+        << refusal("arm = \"panda\"", "arm = \"flip_arm_test.toml\"");
+  }
+  std::filesystem::remove(arm);
   std::filesystem::remove(path);
 }
 
