@@ -171,6 +171,18 @@ TEST(Discovery, WhatMattersToThePredictionAloneIsFound) {
   EXPECT_LT(found.after_test.trajectory_rms, 0.7 * found.before_test.trajectory_rms);
 }
 
+// The same friction beside a tilt: once that is found, no channel shows it.
+TEST(Discovery, ASecondEffectIsLookedForWhereNoChannelShowsIt) {
+  experiment::CampaignDesign design = experiment::campaign_design("quick12");
+  design.effects = {{"contact.viscous.1/v_0", 5}, {"flight.gravity_tilt.angle", 0.02}};
+  const Discovery found = found_in(experiment::generate_campaign(design, 4));
+  ASSERT_EQ(found.effects.size(), 2u) << to_string(found.verdict);
+  EXPECT_EQ(found.effects.front().id, "flight.gravity_tilt");
+  const AcceptedEffect* viscous = named(found, "contact.viscous");
+  ASSERT_NE(viscous, nullptr) << found.effects.back().id;
+  EXPECT_NEAR(viscous->parameters.front().value, 5, 3 * viscous->parameters.front().sigma);
+}
+
 // Pads that give by three micrometres, which no pads are without, are no missing effect and no unexplained
 // one either: the answer's model has them, and predicts the better for it.
 TEST(Discovery, TheGiveOfAnyPadsIsFittedAlongAndNoPartOfTheAnswer) {
