@@ -129,14 +129,18 @@ bool acts(const AcceptedEffect& effect, bool air) {
 
 namespace {
 
+/// Whether so much is left in a channel that something is missing there.
+bool is_left(const ChannelMisfit& m, const DiscoverOptions& options) {
+  return is_misfit(m, options) && m.chi2_per_sample() >= unexplained_from(m.channel, m.phase, options);
+}
+
 /// Whether too much is left in the half of the throw where an effect acts, of what the base model's fit left
 /// there in the other throws (`other`: train against held-out ones) as well.
 bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisfit>& base,
                      const std::vector<ChannelMisfit>& other, const std::vector<ChannelMisfit>& now,
                      const DiscoverOptions& options) {
   return std::any_of(now.begin(), now.end(), [&](const ChannelMisfit& m) {
-    return is_misfit(m, options) && acts(effect, in_air(m.phase)) && is_confirmed(other, m) &&
-           m.chi2_per_sample() >= unexplained_from(m.channel, m.phase, options) &&
+    return is_left(m, options) && acts(effect, in_air(m.phase)) && is_confirmed(other, m) &&
            m.chi2_per_sample() - 1 > kLeft * (misfit_in(base, m.channel, m.phase) - 1);
   });
 }
@@ -163,9 +167,7 @@ bool is_noisier(const ChannelMisfit& now, const std::vector<ChannelMisfit>& befo
 bool spoils(const AcceptedEffect& effect, const Stage& stage, const Discovery& so_far,
             const DiscoverOptions& options) {
   const auto spoilt = [&](const ChannelMisfit& m, const std::vector<ChannelMisfit>& before) {
-    const bool misfit =
-        is_misfit(m, options) && m.chi2_per_sample() >= unexplained_from(m.channel, m.phase, options);
-    return is_noisier(m, before) && (misfit || acts(effect, in_air(m.phase)));
+    return is_noisier(m, before) && (is_left(m, options) || acts(effect, in_air(m.phase)));
   };
   const auto& train = stage.fit.misfit;
   const auto& held_out = stage.held_out.misfit;
@@ -182,9 +184,7 @@ namespace {
 /// Whether something is left in the tracked flights of both halves.
 bool leaves_flights(const Stage& stage, const DiscoverOptions& options) {
   return std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(), [&](const ChannelMisfit& m) {
-    return m.phase == Phase::flight && is_misfit(m, options) &&
-           m.chi2_per_sample() >= unexplained_from(m.channel, m.phase, options) &&
-           is_confirmed(stage.held_out.misfit, m);
+    return m.phase == Phase::flight && is_left(m, options) && is_confirmed(stage.held_out.misfit, m);
   });
 }
 

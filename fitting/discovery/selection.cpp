@@ -65,9 +65,7 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   if (out.effects.empty()) return stage.fit;
   FitResult counted = stage.fit;
   count_discrepancy(stage.problem, counted, options.fit.threads);
-  std::vector<std::string> ids, gone;
-  auto effects = stage.problem.options().effects;
-  std::string model = out.model;
+  std::vector<std::string> gone;
   const std::vector<std::string> outdone = outdone_by_a_form(stage, out, options);
   std::array<bool, 2> misled{};  // in the hand, in the air
   for (const AcceptedEffect& effect : out.effects) {
@@ -77,25 +75,20 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
                       (last && spoils(effect, stage, out, options)) ||
                       std::find(outdone.begin(), outdone.end(), effect.id) != outdone.end();
     for (const bool air : {false, true}) misled[air ? 1 : 0] |= here && acts(effect, air);
-    if (here) {
-      gone.push_back(effect.id);
-      std::erase(effects, effect.id);
-    } else {
-      ids.push_back(effect.id);
-      if (is_law(effect.id)) model = stage.problem.options().model;
-    }
+    if (here) gone.push_back(effect.id);
   }
   if (gone.empty()) return counted;
-  if (ids.empty()) effects.clear();  // what was fitted along went with them
-  Stage without{stage.problem.with(model, effects), {}, {}, ids};
-  solve(without, options, carried(stage.fit, without.problem));
-  if (!without.solved()) return counted;
-  out.imitations.insert(out.imitations.end(), gone.begin(), gone.end());
+  std::vector<std::string> taken = gone;
+  const bool all = gone.size() == out.effects.size();
+  if (all) taken.insert(taken.end(), out.along.begin(), out.along.end());  // it was fitted for their sake
+  Stage less = without(stage, taken, options);
+  if (!less.solved()) return counted;
   std::erase_if(out.effects, [&](const AcceptedEffect& effect) {
-    return std::find(ids.begin(), ids.end(), effect.id) == ids.end();
+    return std::find(gone.begin(), gone.end(), effect.id) != gone.end();
   });
-  if (effects.empty()) out.along.clear();
-  stage = std::move(without);
+  if (all) out.along.clear();
+  out.imitations.insert(out.imitations.end(), gone.begin(), gone.end());
+  stage = std::move(less);
   drop_without_evidence(stage, options, out);
   return withdraw(stage, options, out);
 }
