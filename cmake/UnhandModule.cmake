@@ -56,9 +56,9 @@ function(unhand_test_options)
   target_compile_options(unhand_test_options INTERFACE $<$<CONFIG:Release>:-O1>)  # what takes time at run time is in the library
   if(NOT CMAKE_CXX_COMPILER_LAUNCHER)  # a compiler cache does better without
     add_executable(test_headers ${PROJECT_SOURCE_DIR}/cmake/empty.cpp)
-    target_link_libraries(test_headers PRIVATE unhand_test_options)
+    target_link_libraries(test_headers PRIVATE unhand_test_options Eigen3::Eigen)
     target_compile_features(test_headers PRIVATE cxx_std_20)
-    target_precompile_headers(test_headers PRIVATE <gmock/gmock.h> <gtest/gtest.h>)
+    target_precompile_headers(test_headers PRIVATE <gmock/gmock.h> <gtest/gtest.h> <ceres/jet.h> <random>)
   endif()
 endfunction()
 

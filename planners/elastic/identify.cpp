@@ -74,20 +74,21 @@ void evaluate(const Eigen::VectorXd& phi, Eigen::VectorXd& pi, Eigen::MatrixXd& 
 }
 
 /// Singular values and right vectors of W, of full size even where its rank is less, and Uᵀ tau; by way of
-/// W = Q R, for W is tall.
+/// W = Q R, for W is tall, with tau as its last column.
 struct Decomposition {
   Eigen::VectorXd values;
   Eigen::MatrixXd right;
   Eigen::VectorXd left_times_tau;
 };
 Decomposition decompose(const Eigen::MatrixXd& W, const Eigen::VectorXd& tau) {
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(W);
-  const Eigen::MatrixXd R = qr.matrixQR().topRows(W.cols()).triangularView<Eigen::Upper>();
+  const Eigen::Index n = W.cols();
+  Eigen::MatrixXd both(W.rows(), n + 1);
+  both << W, tau;
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(both);
+  const Eigen::MatrixXd R = qr.matrixQR().topLeftCorner(n, n).triangularView<Eigen::Upper>();
   const Eigen::JacobiSVD<Eigen::MatrixXd, Eigen::NoQRPreconditioner> svd(
       R, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::VectorXd turned = tau;
-  turned.applyOnTheLeft(qr.householderQ().adjoint());
-  return {svd.singularValues(), svd.matrixV(), svd.matrixU().transpose() * turned.head(W.cols())};
+  return {svd.singularValues(), svd.matrixV(), svd.matrixU().transpose() * qr.matrixQR().col(n).head(n)};
 }
 
 double condition_of(const Eigen::VectorXd& s) {
@@ -240,13 +241,13 @@ IdentifiedSpring identify_spring(const std::vector<SpringSample>& log) {
   const int rows = static_cast<int>(log.size());
   if (rows < 10)
     throw std::invalid_argument(fmt::format("identify_spring: {} samples; accepted: at least 10", rows));
-  Eigen::MatrixXd W(rows, 3);
+  Eigen::Matrix<double, Eigen::Dynamic, 3> W(rows, 3);
   Eigen::VectorXd tau(rows);
   for (int k = 0; k < rows; ++k) {
     W.row(k) << log[k].deflection, log[k].rate, log[k].acceleration;
     tau[k] = log[k].torque;
   }
-  const Eigen::Matrix3d inverse = (W.transpose() * W).inverse();
+  const Eigen::Matrix3d information = W.transpose() * W, inverse = information.inverse();
   const Eigen::Vector3d x = inverse * (W.transpose() * tau);
   const double noise = (tau - W * x).norm() / std::sqrt(rows - 3.0);
   if (!x.allFinite()) throw std::invalid_argument("identify_spring: the log does not move the motor");
