@@ -88,7 +88,7 @@ FitRounds::Solution FitRounds::minimise(double tolerance, std::optional<std::siz
     problem.SetParameterLowerBound(x_.data(), k, u.low / scale);
     problem.SetParameterUpperBound(x_.data(), k, u.high / scale);
     if (u.prior_sigma)
-      problem.AddResidualBlock(new PriorCost(width, k, u.start / scale, *u.prior_sigma / scale), nullptr,
+      problem.AddResidualBlock(new PriorCost(all, width, k, u.start / scale, *u.prior_sigma / scale), nullptr,
                                x_.data());
     if (is_fixed(u) || held == i) constant.push_back(k);
   }
