@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 #include <optional>
+#include <set>
 
 #include "dynamics/median.hpp"
 #include "experiment/unit_rules.hpp"
@@ -25,20 +26,18 @@ class Doubts {
  public:
   void add(const Throw& one, const ColumnSide& side, double ratio, std::string reason) {
     const std::string path = fmt::format("/throws/{}{}{}", one.id, side.path[0] == '@' ? "" : "/", side.path);
-    if (!has(path, side.column)) out_.push_back({path, side.column, ratio, 1, std::move(reason)});
+    if (!told_.insert({path, side.column}).second) return;
+    if (side.path[0] != '@') throws_.insert(one.id);
+    out_.push_back({path, side.column, ratio, 1, std::move(reason)});
   }
-  bool has(const std::string& path, const std::string& column) const {
-    return std::any_of(out_.begin(), out_.end(),
-                       [&](const auto& told) { return told.path == path && told.column == column; });
-  }
-  bool of(const Throw& one) const {
-    const std::string begin = fmt::format("/throws/{}/", one.id);
-    return std::any_of(out_.begin(), out_.end(), [&](const auto& d) { return d.path.starts_with(begin); });
-  }
+  /// Of one of the throw's series.
+  bool of(const Throw& one) const { return throws_.contains(one.id); }
   std::vector<UnitDoubt> take() { return std::move(out_); }
 
  private:
   std::vector<UnitDoubt> out_;
+  std::set<std::pair<std::string, std::string>> told_;  // path and column
+  std::set<std::string> throws_;                        // ids
 };
 
 /// What the throw's own channels say.
@@ -96,12 +95,16 @@ void check_repetitions(const std::vector<const Throw*>& alike, const PlainColumn
   for (const auto* one : alike)
     if (const auto size = size_of(column, *one)) all.push_back({one, *size});
   if (all.size() < kEnoughThrows) return;
+  std::vector<double> sizes;
+  for (const auto& [one, size] : all) sizes.push_back(size);
+  std::sort(sizes.begin(), sizes.end());
   for (const auto& [one, size] : all) {
-    std::vector<double> others;
-    for (const auto& other : all)
-      if (other.one != one) others.push_back(other.size);
-    const auto [least, most] = std::minmax_element(others.begin(), others.end());
-    const double median = dynamics::median(others), low = *least / apart, high = *most * apart;
+    const auto self =
+        static_cast<std::size_t>(std::lower_bound(sizes.begin(), sizes.end(), size) - sizes.begin());
+    const auto other = [&](std::size_t rank) { return sizes[rank < self ? rank : rank + 1]; };
+    const std::size_t others = all.size() - 1;
+    const double least = other(0), most = other(others - 1), median = other(others / 2);
+    const double low = least / apart, high = most * apart;
     if (!(std::max(size, median) > column.shows) || !(median > 0) || (size >= low && size <= high)) continue;
     constexpr double kWithin = 2;  // repetitions differ
     const auto* unit = explaining_unit(column.side.units, size / median, kWithin);
@@ -109,7 +112,7 @@ void check_repetitions(const std::vector<const Throw*>& alike, const PlainColumn
     out.add(*one, column.side, size / median,
             fmt::format("in this throw {} reaches {:.3g}, and {:.3g} to {:.3g} in {} others like "
                         "it, accepted are {:.3g} to {:.3g}: {}?",
-                        column.side.column, size, *least, *most, others.size(), low, high, unit->words));
+                        column.side.column, size, least, most, others, low, high, unit->words));
   }
 }
 
