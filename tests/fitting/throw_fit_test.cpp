@@ -7,6 +7,7 @@
 
 #include "contact/limit_surface.hpp"
 #include "fitting/evaluate.hpp"
+#include "fitting/fit_rounds.hpp"
 #include "tests/support/small_campaign.hpp"
 
 namespace unhand::fitting {
@@ -316,6 +317,32 @@ TEST(ThrowFit, AnEffectWithoutADerivativeAtNeutralIsNotStuckThere) {
   ASSERT_EQ(compliance.unknown.name, "contact.pad_compliance.compliance");
   EXPECT_NEAR(compliance.value, kCompliance, 3 * compliance.sigma);
   EXPECT_LT(compliance.sigma, 0.2 * kCompliance);
+}
+
+TEST(ThrowFit, UnknownsAtTheirBoundsDoNotStopTheOthers) {
+  // Pads that part later than the force says would have the smoothing's deviation beyond its range.
+  auto design = small_design(kLaw);
+  design.effects = {{"release.opening_delay.delay", 0.006}};
+  const auto problem = problem_of(experiment::generate_campaign(design, 11));
+  FitOptions options;
+  options.weigh = Weigh::variances;
+  FitRounds rounds(problem, options, problem.start());
+  for (int round = 0; round < options.rounds; ++round) {
+    const bool last = round + 1 == options.rounds;
+    ASSERT_TRUE(rounds.solve(last)) << rounds.solution().message;
+    if (!last) rounds.learn();
+  }
+  ASSERT_EQ(problem.own()[3].name, "force_deviation");
+  int at_bound = 0;
+  for (std::size_t i = 0; i < rounds.used().size(); ++i)
+    at_bound += std::abs(rounds.own(i)[3]) == problem.own()[3].high;
+  EXPECT_GT(at_bound, 2);
+  // The least is the same from wherever the other unknowns start.
+  for (const double by : {-2.0, -0.5, 0.5, 2.0}) {
+    FitRounds::Point away = rounds.solution_point();
+    away.campaign[1] += by;
+    EXPECT_NEAR(rounds.cost_with(0, rounds.campaign()[0], away) / rounds.solution().cost, 1, 1e-4) << by;
+  }
 }
 
 TEST(ThrowFit, SaysWhyThereIsNothingToFit) {
