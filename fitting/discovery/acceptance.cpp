@@ -217,7 +217,7 @@ std::vector<std::string> outdone_by_a_form(const Stage& stage, const Discovery& 
   for (const AcceptedEffect& effect : so_far.effects)
     if (in_air(effect.phase) && !is_law(effect.id) && !acts_on_pads(effect.id)) accepted.push_back(effect.id);
   if (accepted.empty() || !leaves_flights(stage, options)) return {};
-  const Stage less = without(stage, accepted, options);
+  const Stage& less = without(stage, accepted, options);
   if (!less.solved()) return {};
   const int threads = options.fit.threads;
   const auto flights = [&](const Stage& of, const FitResult& half) {

@@ -28,16 +28,16 @@ void find_other_names(const Footprints& f, const Eigen::VectorXd& contribution, 
 void drop_without_evidence(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   for (std::size_t i = out.effects.size(); i-- > 0;) {
     const std::string id = out.effects[i].id;
-    Stage less = without(stage, {id}, options);
+    const Stage& less = without(stage, {id}, options);
     if (!less.solved() || stage.bic() - less.bic() <= kDeltaBic) continue;
     out.imitations.push_back(id);
     out.effects.erase(out.effects.begin() + static_cast<std::ptrdiff_t>(i));
-    stage = std::move(less);
+    stage = Stage(less);
   }
   if (!out.effects.empty() || out.along.empty()) return;
-  Stage less = without(stage, out.along, options);  // what was fitted along went with them
+  const Stage& less = without(stage, out.along, options);  // what was fitted along went with them
   if (!less.solved()) return;
-  stage = std::move(less);
+  stage = Stage(less);
   out.along.clear();
 }
 
@@ -48,14 +48,14 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
     removed = false;
     for (std::size_t i = 0; i + 1 < stage.ids.size() && !removed; ++i) {
       if (is_law(stage.ids[i])) continue;
-      Stage less = without(stage, {stage.ids[i]}, options);
+      const Stage& less = without(stage, {stage.ids[i]}, options);
       if (!less.solved()) continue;
       const bool needed = stage.bic() - less.bic() < kDeltaBic &&
                           (improvement(less.held_out, stage.held_out, out.base_test, options).matters >= 1 ||
                            predicts_better(less, stage, options));
       if (needed) continue;
       std::erase_if(out.effects, [&](const AcceptedEffect& e) { return e.id == stage.ids[i]; });
-      stage = std::move(less);
+      stage = Stage(less);
       removed = true;
     }
   }
@@ -81,14 +81,14 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   std::vector<std::string> taken = gone;
   const bool all = gone.size() == out.effects.size();
   if (all) taken.insert(taken.end(), out.along.begin(), out.along.end());  // it was fitted for their sake
-  Stage less = without(stage, taken, options);
+  const Stage& less = without(stage, taken, options);
   if (!less.solved()) return counted;
   std::erase_if(out.effects, [&](const AcceptedEffect& effect) {
     return std::find(gone.begin(), gone.end(), effect.id) != gone.end();
   });
   if (all) out.along.clear();
   out.imitations.insert(out.imitations.end(), gone.begin(), gone.end());
-  stage = std::move(less);
+  stage = Stage(less);
   drop_without_evidence(stage, options, out);
   return withdraw(stage, options, out);
 }
@@ -121,7 +121,7 @@ void judge(const Stage& stage, const Stage& base, const DiscoverOptions& options
   const OutcomeErrors with = errors_of(stage, Share::test, options.fit.threads);
   const bool alone = stage.ids.size() == 1 && out.along.empty();
   for (AcceptedEffect& accepted : out.effects) {
-    const Stage less = alone ? base : without(stage, {accepted.id}, options);
+    const Stage& less = alone ? base : without(stage, {accepted.id}, options);
     if (!less.solved()) continue;  // what it was accepted for stands
     accepted.delta_bic = stage.bic() - less.bic();
     accepted.test_error_ratio = error_ratio(errors_of(less, Share::test, options.fit.threads), with);

@@ -175,7 +175,9 @@ Stage extended(const Stage& stage, const Candidate& candidate, const Score& scor
   return out;
 }
 
-Stage without(const Stage& stage, const std::vector<std::string>& gone, const DiscoverOptions& options) {
+const Stage& without(const Stage& stage, const std::vector<std::string>& gone,
+                     const DiscoverOptions& options) {
+  if (const auto known = stage.less.find(gone); known != stage.less.end()) return *known->second;
   auto effects = stage.problem.options().effects;
   std::string model = stage.problem.options().model;
   std::vector<std::string> ids = stage.ids;
@@ -186,7 +188,7 @@ Stage without(const Stage& stage, const std::vector<std::string>& gone, const Di
   }
   Stage out{stage.problem.with(model, effects), {}, {}, std::move(ids)};
   solve(out, options, carried(stage.fit, out.problem));
-  return out;
+  return *stage.less.emplace(gone, std::make_shared<const Stage>(std::move(out))).first->second;
 }
 
 std::vector<std::string> catalogue(const DiscoverOptions& options) {

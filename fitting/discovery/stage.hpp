@@ -2,6 +2,8 @@
 // Internal to fitting.
 #pragma once
 
+#include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -16,6 +18,8 @@ struct Stage {
   CampaignProblem problem;
   FitResult fit, held_out;
   std::vector<std::string> ids;  ///< of what was added to the base, "contact.law:..." included
+  /// What without() has fitted: checks ask for the same removals one after the other.
+  mutable std::map<std::vector<std::string>, std::shared_ptr<const Stage>> less{};
 
   bool is_fitted() const;  ///< to the train throws
   bool solved() const;     ///< and so are the own unknowns of the others
@@ -66,8 +70,8 @@ void polish(Stage& stage, const DiscoverOptions& options);
 Stage extended(const Stage& stage, const Candidate& candidate, const Score& score, const DiscoverOptions&);
 
 /// The stage fitted again without some of its ids: effects, or the law that took the place of the model to
-/// begin with.
-Stage without(const Stage& stage, const std::vector<std::string>& gone, const DiscoverOptions&);
+/// begin with. Every removal is fitted once.
+const Stage& without(const Stage& stage, const std::vector<std::string>& gone, const DiscoverOptions&);
 
 /// The ids of all effects but those that were forgotten.
 std::vector<std::string> catalogue(const DiscoverOptions& options);
