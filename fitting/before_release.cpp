@@ -10,7 +10,7 @@
 namespace unhand::fitting {
 
 BeforeRelease before_release(const CampaignProblem& problem, const CampaignThrow& thrown,
-                             const FitResult& fit) {
+                             const FitResult& fit, DerivativesBy derivatives) {
   const auto n = static_cast<Eigen::Index>(problem.own().size());
   const auto campaign = fit.values();
   Eigen::VectorXd precision(n);
@@ -28,7 +28,7 @@ BeforeRelease before_release(const CampaignProblem& problem, const CampaignThrow
   const BeforeRelease unknown = out;
   constexpr int kSteps = 4;
   for (int step = 0; step < kSteps; ++step) {
-    auto l = problem.linearise(thrown.prepared, held, campaign, out.own, true);
+    auto l = problem.linearise(thrown.prepared, held, campaign, out.own, derivatives);
     if (!l.solved) return unknown;
     weigh(l, held, thrown, Weighting{});
     const auto width = static_cast<Eigen::Index>(campaign.size());

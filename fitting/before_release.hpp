@@ -13,9 +13,10 @@ namespace unhand::fitting {
 struct BeforeRelease {
   std::vector<double> own;     ///< o
   Eigen::MatrixXd covariance;  ///< H⁻¹, H = JᵒᵀJᵒ + Λ
-  Eigen::MatrixXd response;    ///< do/dc = −H⁻¹ JᵒᵀJᶜ
+  Eigen::MatrixXd response;    ///< do/dc = −H⁻¹ JᵒᵀJᶜ, of DerivativesBy::all; else zero
 };
+/// `derivatives`: all or own.
 BeforeRelease before_release(const CampaignProblem& problem, const CampaignThrow& thrown,
-                             const FitResult& fit);
+                             const FitResult& fit, DerivativesBy derivatives);
 
 }  // namespace unhand::fitting

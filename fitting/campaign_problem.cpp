@@ -218,11 +218,13 @@ experiment::ThrowPrediction<double> CampaignProblem::predict(const experiment::P
 void CampaignProblem::differentiate(const experiment::PreparedThrow& prepared,
                                     const experiment::Observations& observed,
                                     std::span<const double> campaign, std::span<const double> own,
-                                    const UseOfDuals& use) const {
+                                    DerivativesBy derivatives, const UseOfDuals& use) const {
   const Layout& read = layout(prepared);
   const auto values = values_of(read, campaign, own);
   constexpr std::size_t kSize = dynamics::kDualSize;
-  for (std::size_t first = 0; first < values.size(); first += kSize) {
+  std::size_t first =
+      derivatives == DerivativesBy::own ? values.size() - own.size() : 0;  // they are the last
+  for (; first < values.size(); first += kSize) {
     const std::size_t last = std::min(first + kSize, values.size());
     std::vector<Dual> duals(values.begin(), values.end());
     for (std::size_t k = first; k < last; ++k)
@@ -236,7 +238,7 @@ void CampaignProblem::differentiate(const experiment::PreparedThrow& prepared,
 Linearisation CampaignProblem::linearise(const experiment::PreparedThrow& prepared,
                                          const experiment::Observations& observed,
                                          std::span<const double> campaign, std::span<const double> own,
-                                         bool derivatives) const {
+                                         DerivativesBy derivatives) const {
   const auto& all = observed.all;
   const auto rows = static_cast<Eigen::Index>(all.size());
   Linearisation out;
@@ -250,13 +252,13 @@ Linearisation CampaignProblem::linearise(const experiment::PreparedThrow& prepar
           (dynamics::value_of(predicted.channels[i]) - all[i].value) / all[i].sigma;
     return out.solved;
   };
-  if (!derivatives) {
+  if (derivatives == DerivativesBy::nothing) {
     take(predict(prepared, observed, campaign, own));
   } else {
     const auto width = static_cast<int>(campaign.size());
     out.campaign.setZero(rows, width);
     out.own.setZero(rows, static_cast<Eigen::Index>(own.size()));
-    differentiate(prepared, observed, campaign, own, [&](const auto& predicted, std::span<const int> by) {
+    const auto read = [&](const auto& predicted, std::span<const int> by) {
       if (!take(predicted)) return false;
       for (std::size_t i = 0; i < all.size(); ++i)
         for (std::size_t k = 0; k < by.size(); ++k) {
@@ -265,7 +267,8 @@ Linearisation CampaignProblem::linearise(const experiment::PreparedThrow& prepar
           (by[k] < width ? out.campaign(row, by[k]) : out.own(row, by[k] - width)) = d;
         }
       return true;
-    });
+    };
+    differentiate(prepared, observed, campaign, own, derivatives, read);
   }
   out.solved = out.solved && out.residual.allFinite() && out.campaign.allFinite() && out.own.allFinite();
   return out;

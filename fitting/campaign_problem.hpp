@@ -68,14 +68,22 @@ struct Layout {
   std::vector<int> columns;        ///< where they are: campaign unknowns first, then the throw's own
 };
 
+/// Derivatives of a linearisation: every sweep of dual numbers has room for a few, and is a simulation.
+enum class DerivativesBy {
+  nothing,
+  own,  ///< by the throw's own unknowns
+  all,  ///< and by the campaign's
+};
+
 /// r = (predicted − observed)/σ, and its derivatives with respect to the campaign's unknowns and the throw's
 /// own.
 struct Linearisation {
-  bool solved{};                  ///< false: release or flight has no answer, and what follows is empty
-  Eigen::VectorXd residual;       ///< one per observation [σ]
-  Eigen::MatrixXd campaign, own;  ///< derivatives of the residual: a row each, a column per unknown
-  std::vector<int> modes;         ///< the modes entered, in order
-  double detach{};                ///< [s]
+  bool solved{};             ///< false: release or flight has no answer, and what follows is empty
+  Eigen::VectorXd residual;  ///< one per observation [σ]
+  /// Derivatives of the residual: a row each, a column per unknown; zero by what was not asked for.
+  Eigen::MatrixXd campaign, own;
+  std::vector<int> modes;  ///< the modes entered, in order
+  double detach{};         ///< [s]
 };
 
 /// A campaign with a model: unknowns, residuals and their derivatives.
@@ -109,14 +117,14 @@ class CampaignProblem {
     return layouts_.at(prepared.object);
   }
 
-  /// The residual of one throw, of all its observations or of some; with `derivatives`, through dual numbers.
+  /// The residual of one throw, of all its observations or of some; its derivatives through dual numbers.
   Linearisation linearise(const CampaignThrow& thrown, std::span<const double> campaign,
-                          std::span<const double> own, bool derivatives) const {
+                          std::span<const double> own, DerivativesBy derivatives) const {
     return linearise(thrown.prepared, thrown.observed, campaign, own, derivatives);
   }
   Linearisation linearise(const experiment::PreparedThrow& prepared, const experiment::Observations& observed,
                           std::span<const double> campaign, std::span<const double> own,
-                          bool derivatives) const;
+                          DerivativesBy derivatives) const;
 
   /// The prediction itself.
   experiment::ThrowPrediction<double> predict(const CampaignThrow& thrown, std::span<const double> campaign,
@@ -132,9 +140,10 @@ class CampaignProblem {
   /// its derivatives are by (campaign first, then own), until it returns false.
   using UseOfDuals =
       std::function<bool(const experiment::ThrowPrediction<dynamics::Dual>&, std::span<const int> unknowns)>;
-  /// Calls `use` for one sweep of derivatives after the other.
+  /// Calls `use` for one sweep of derivatives after the other, of `all` or those by the throw's `own`
+  /// unknowns.
   void differentiate(const experiment::PreparedThrow& prepared, const experiment::Observations& observed,
-                     std::span<const double> campaign, std::span<const double> own,
+                     std::span<const double> campaign, std::span<const double> own, DerivativesBy derivatives,
                      const UseOfDuals& use) const;
 
  private:

@@ -28,7 +28,7 @@ std::optional<Matrix> slopes(const CampaignProblem& problem, const CampaignThrow
                              const std::vector<double>& campaign, const std::vector<double>& own) {
   Matrix out = Matrix::Zero(experiment::kOutcomeCount, static_cast<Index>(campaign.size() + own.size()));
   bool landed = true;
-  problem.differentiate(thrown.prepared, {}, campaign, own, [&](const auto& p, std::span<const int> by) {
+  const auto read = [&](const auto& p, std::span<const int> by) {
     landed = p.landed();
     if (!landed) return false;
     const auto y = experiment::outcomes_of(p);
@@ -36,7 +36,8 @@ std::optional<Matrix> slopes(const CampaignProblem& problem, const CampaignThrow
       for (std::size_t i = 0; i < y.size(); ++i)
         out(static_cast<Index>(i), by[k]) = y[i].v[static_cast<Index>(k)];
     return true;
-  });
+  };
+  problem.differentiate(thrown.prepared, {}, campaign, own, DerivativesBy::all, read);
   if (!landed || !out.allFinite()) return {};
   return out;
 }
@@ -97,7 +98,8 @@ PredictedThrow predict_one(const CampaignProblem& problem, const CampaignThrow& 
   PredictedThrow out;
   const auto& prepared = thrown.prepared;
   out.comparison = {prepared.id, prepared.object, prepared.condition, prepared.split, {}, {}};
-  const BeforeRelease before = before_release(problem, thrown, fit);
+  const BeforeRelease before =
+      before_release(problem, thrown, fit, uncertainty ? DerivativesBy::all : DerivativesBy::own);
   out.own = before.own;
   const auto campaign = fit.values();
   const auto begin = Clock::now();

@@ -72,7 +72,8 @@ void describe_campaign(const CampaignProblem& problem, const FitRounds& rounds, 
     fitted.at_bound = fitted.value < u.low + margin || fitted.value > u.high - margin;
     for (Eigen::Index j = 0; j < width; ++j) out.covariance.push_back(covariance(k, j));
   }
-  describe_open_directions(equations.information, problem, scale, out);
+  if (!rounds.shared().options.all_fixed)
+    describe_open_directions(equations.information, problem, scale, out);
 }
 
 /// Every throw's part, and the misfit by channel and phase.

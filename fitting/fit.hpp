@@ -59,7 +59,8 @@ struct FitOptions {
   std::vector<double> start;      ///< of the campaign's unknowns; empty: the problem's
   /// Campaign unknowns that keep their start, by name; `all_fixed` for every one.
   std::vector<std::string> fixed;
-  bool all_fixed{false};           ///< nothing of the campaign is fitted, only the throws' own unknowns
+  /// Nothing of the campaign is fitted, only the throws' own unknowns; what the log says of it is not asked.
+  bool all_fixed{false};
   std::vector<double> own_spread;  ///< 1 σ of the throws' own unknowns, if it is known; empty: learned
   /// Whether unknowns whose cost may not be a parabola are given the interval of their profile.
   bool profile{false};

@@ -37,7 +37,7 @@ void FitRounds::choose_throws(const std::vector<double>& start) {
         (options_.share == Share::train) == (throws[i].prepared.split == datasets::Split::train);
     if (!shared || throws[i].observed.all.empty()) return;
     try {
-      starts[i] = problem_.linearise(throws[i], start, own, false);
+      starts[i] = problem_.linearise(throws[i], start, own, DerivativesBy::nothing);
     } catch (const std::invalid_argument&) {
       // a start outside the physics
     }

@@ -32,8 +32,9 @@ GradientCost gradient_cost(const CampaignProblem& problem, const FitResult& fit)
     const CampaignThrow& thrown = problem.throws()[i];
     const auto& own = fit.throws[i].own;
     out.unknowns = static_cast<int>(width + own.size());
-    timed(out.plain, [&] { return problem.linearise(thrown, campaign, own, false); });
-    const auto exact = timed(out.exact, [&] { return problem.linearise(thrown, campaign, own, true); });
+    timed(out.plain, [&] { return problem.linearise(thrown, campaign, own, DerivativesBy::nothing); });
+    const auto exact =
+        timed(out.exact, [&] { return problem.linearise(thrown, campaign, own, DerivativesBy::all); });
     for (std::size_t k = 0; k < width + own.size(); ++k) {
       auto c = campaign;
       auto o = own;
@@ -42,9 +43,11 @@ GradientCost gradient_cost(const CampaignProblem& problem, const FitResult& fit)
       // At a bound the difference has one side.
       const double step = 1e-3 * u.scale, low = std::max(x - step, u.low), high = std::min(x + step, u.high);
       x = high;
-      const auto above = timed(out.central, [&] { return problem.linearise(thrown, c, o, false); });
+      const auto above =
+          timed(out.central, [&] { return problem.linearise(thrown, c, o, DerivativesBy::nothing); });
       x = low;
-      const auto below = timed(out.central, [&] { return problem.linearise(thrown, c, o, false); });
+      const auto below =
+          timed(out.central, [&] { return problem.linearise(thrown, c, o, DerivativesBy::nothing); });
       if (!exact.solved || !above.solved || !below.solved) continue;
       const Eigen::VectorXd slope = k < width ? exact.campaign.col(static_cast<Eigen::Index>(k))
                                               : exact.own.col(static_cast<Eigen::Index>(k - width));

@@ -22,11 +22,14 @@ const std::vector<Linearisation>& SimulatedThrows::at(const std::vector<double>&
   last_.throws.resize(used_.size());
   const auto values = shared_.unscaled(campaign.data());
   const std::size_t width = shared_.own_scale.size();
+  const auto asked = !derivatives                ? DerivativesBy::nothing
+                     : shared_.options.all_fixed ? DerivativesBy::own
+                                                 : DerivativesBy::all;
   experiment::parallel_for(used_.size(), shared_.options.threads, [&](std::size_t i) {
     const auto begin = Clock::now();
     try {
       last_.throws[i] = shared_.problem.linearise(shared_.problem.throws()[used_[i]], values,
-                                                  shared_.own_unscaled(own.data() + i * width), derivatives);
+                                                  shared_.own_unscaled(own.data() + i * width), asked);
     } catch (const std::invalid_argument&) {
       last_.throws[i] = {};  // a trial step outside the physics
     }

@@ -58,7 +58,7 @@ ThrowShare share_of(const CampaignProblem& problem, std::size_t index, const Fit
   const auto n = static_cast<Eigen::Index>(fitted.own.size());
   const Equations none = no_equations(static_cast<Eigen::Index>(campaign.size()));
   ThrowShare out{none, {none, none, none, none}};
-  Linearisation l = problem.linearise(thrown, campaign, fitted.own, true);
+  Linearisation l = problem.linearise(thrown, campaign, fitted.own, DerivativesBy::all);
   if (!l.solved) return out;
   weigh(l, thrown.observed, thrown, weighting);
   const Eigen::MatrixXd columns = campaign_columns(l);

@@ -123,7 +123,7 @@ FootprintColumns::Gram FootprintColumns::gram(const CampaignThrow& thrown,
   Gram out{Eigen::MatrixXd::Zero(width(), width()), false, false};
   Eigen::MatrixXd columns, own_columns;
   for (const Derivatives& d : derivatives_) {
-    const auto l = d.problem.linearise(thrown, d.at, own, true);
+    const auto l = d.problem.linearise(thrown, d.at, own, DerivativesBy::all);
     if (!l.solved) return out;
     if (&d == &derivatives_.front()) {
       columns.setZero(l.residual.size(), width());
@@ -135,7 +135,7 @@ FootprintColumns::Gram FootprintColumns::gram(const CampaignThrow& thrown,
   }
   out.solved = out.complete = true;
   for (const Difference& d : differences_) {
-    const auto l = d.problem.linearise(thrown, d.at, own, false);
+    const auto l = d.problem.linearise(thrown, d.at, own, DerivativesBy::nothing);
     out.complete = out.complete && l.solved;
     if (l.solved)
       columns.col(static_cast<Eigen::Index>(d.column)) = (l.residual - columns.col(residual())) / d.step;

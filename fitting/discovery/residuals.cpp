@@ -27,7 +27,7 @@ std::vector<Eigen::VectorXd> residuals_of(const CampaignProblem& problem, const 
   std::vector<Eigen::VectorXd> out(throws.size());
   experiment::parallel_for(throws.size(), threads, [&](std::size_t i) {
     if (!fit.throws[i].used) return;
-    auto l = problem.linearise(throws[i], fit.values(), fit.throws[i].own, false);
+    auto l = problem.linearise(throws[i], fit.values(), fit.throws[i].own, DerivativesBy::nothing);
     if (l.solved) out[i] = std::move(l.residual);
   });
   return out;

@@ -129,7 +129,7 @@ std::optional<MissingEstimate> estimate_missing(const Stage& stage, Phase phase,
   std::vector<std::array<OutcomeSquares, kTried>> squares(held_out.size());
   experiment::parallel_for(held_out.size(), options.fit.threads, [&](std::size_t k) {
     const CampaignThrow& thrown = problem.throws()[held_out[k]];
-    const auto l = problem.linearise(thrown, stage.fit.values(), predicted[k].own, false);
+    const auto l = problem.linearise(thrown, stage.fit.values(), predicted[k].own, DerivativesBy::nothing);
     if (!l.solved) return;
     const int group = seen.objects.at(thrown.prepared.object);
     const auto curve = std::find_if(out.curves.begin(), out.curves.end(),
