@@ -92,6 +92,7 @@ MeasuredDiscovery discover_falls(const datasets::ThrowLog& log, const MeasuredOp
   out.before_test = named_errors(problem, search.base_test);
   out.after_train = named_errors(problem, search.final);
   out.after_test = named_errors(problem, search.final_test);
+  weigh_stability(out);
   explain(log, problem, search, out);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return out;

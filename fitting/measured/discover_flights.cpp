@@ -1,6 +1,7 @@
 // The loop on free flights.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -22,6 +23,43 @@ bool is_one_of_the_scales(const std::string& id) { return id == kScale || id == 
 double apparent_gravity(const AcceptedEffect& effect) {
   const double x = effect.parameters.front().value - 1;
   return effect.id == kClock ? 1 / ((1 + x) * (1 + x)) - 1 : x;
+}
+
+bool is_scaled(const RestHeights& rest, double apparent) {
+  return std::abs(rest.scale) > 4 * rest.sigma && rest.scale * apparent > 0;
+}
+
+/// The answer goes by another of its names, in everything that names its parameter.
+void rename(AcceptedEffect& effect, const char* id, const char* parameter, MeasuredDiscovery& out) {
+  const std::string was = effect.id + "." + effect.parameters.front().name,
+                    is = std::string(id) + "." + parameter;
+  for (auto& [other, correlation] : effect.equivalent)
+    if (other == id) other = effect.id;
+  effect.id = id;
+  effect.parameters.front().name = parameter;
+  std::replace(out.parameters.begin(), out.parameters.end(), was, is);
+  for (auto& s : out.stability)
+    if (s.parameter == was) s.parameter = is;
+}
+
+/// Where a box at rest says that the tracker's scale is right, the scale that flights show is gravity's (or the
+/// clock's).
+void name_scale(const datasets::ThrowLog& log, const MeasuredOptions& options, MeasuredDiscovery& out) {
+  for (auto& effect : out.effects) {
+    const auto other_name = [&](const auto& other) { return other.first == kGravity; };
+    if (effect.id != kScale ||
+        std::none_of(effect.equivalent.begin(), effect.equivalent.end(), other_name))
+      continue;
+    const double apparent = apparent_gravity(effect);
+    for (const auto& [name, object] : log.objects) {
+      const auto rest = rest_heights(log, name, options.floor);
+      if (!rest || std::abs(rest->scale) > kMostScale || is_scaled(*rest, apparent) ||
+          3 * rest->sigma >= std::abs(apparent))
+        continue;
+      rename(effect, kGravity, "ratio", out);
+      break;
+    }
+  }
 }
 
 void weigh_scales(const datasets::ThrowLog& log, const MeasuredOptions& options, MeasuredDiscovery& out) {
@@ -50,7 +88,7 @@ void weigh_scales(const datasets::ThrowLog& log, const MeasuredOptions& options,
              false});
       } else if (rest) {
         const double apart = (rest->scale - apparent) / std::hypot(rest->sigma, sigma);
-        const bool scaled = std::abs(rest->scale) > 4 * rest->sigma && rest->scale * apparent > 0;
+        const bool scaled = is_scaled(*rest, apparent);
         const bool enough = std::abs(rest->scale - apparent) < 0.5 * std::abs(apparent);
         out.evidence.push_back(
             {effect.id,
@@ -63,15 +101,6 @@ void weigh_scales(const datasets::ThrowLog& log, const MeasuredOptions& options,
                          : scaled         ? "The scale is off, but not by what the flights need"
                                           : "The scale is not off: gravity or the clock is"),
              !(scaled && enough)});
-        if (!scaled && effect.id == kScale && 3 * rest->sigma < std::abs(apparent)) {
-          // The box says that the scale is right: the answer goes by the next name.
-          for (auto& [id, correlation] : effect.equivalent)
-            if (id == kGravity) {
-              std::swap(effect.id, id);
-              for (auto& p : effect.parameters) p.name = "ratio";
-              break;
-            }
-        }
         std::string where;
         for (std::size_t a = 0; a < 3; ++a)
           if (rest->offset[a])
@@ -148,6 +177,8 @@ MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const Measured
   out.before_test = named_errors(problem, search.base_test, threads);
   out.after_train = named_errors(problem, search.final, threads);
   out.after_test = named_errors(problem, search.final_test, threads);
+  name_scale(log, options, out);
+  weigh_stability(out);
   weigh_scales(log, options, out);
   weigh_drag(log, out);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

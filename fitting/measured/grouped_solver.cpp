@@ -99,10 +99,11 @@ class Solver {
     const MatrixXd inverse = pseudo_inverse(A);
     const double n = fit_.used;
     fit_.covariance = congruent(inverse, B) * (n / std::max(1.0, n - static_cast<double>(p)));
+    VectorXd widened = VectorXd::Ones(p);  // no parameter is surer than independent noise would let it be
     for (Index j = 0; j < p; ++j)
       if (fit_.covariance(j, j) < inverse(j, j))
-        fit_.covariance.row(j) *= std::sqrt(inverse(j, j) / std::max(1e-300, fit_.covariance(j, j))),
-            fit_.covariance.col(j) *= std::sqrt(inverse(j, j) / std::max(1e-300, fit_.covariance(j, j)));
+        widened[j] = std::sqrt(inverse(j, j) / std::max(1e-300, fit_.covariance(j, j)));
+    fit_.covariance = widened.asDiagonal() * fit_.covariance * widened.asDiagonal();
     if (!fit_.covariance.allFinite())
       fit_.solved = false, fit_.message = "the shared parameters are not determined";
   }

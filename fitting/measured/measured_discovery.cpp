@@ -38,20 +38,6 @@ void look_for_the_unexplained(const MeasuredOptions& options, MeasuredDiscovery&
         100 * largest->share, largest->mean, std::abs(largest->z));
 }
 
-/// An answer that depends on where one looks is not the whole truth.
-void look_for_instability(MeasuredDiscovery& out) {
-  const double tests = std::max<double>(1, static_cast<double>(out.stability.size()));
-  for (const auto& s : out.stability) {
-    if (normal_two_sided(s.z()) > 0.05 / tests) continue;
-    out.evidence.push_back(
-        {s.parameter.substr(0, s.parameter.rfind('.')),
-         fmt::format(
-             "{} depends on {}: {:.4g} ± {:.2g} below {:.3g}, {:.4g} ± {:.2g} above ({:.1f} sigma apart)",
-             s.parameter, s.covariate, s.low, s.low_sigma, s.split_at, s.high, s.high_sigma, std::abs(s.z())),
-         true});
-  }
-}
-
 }  // namespace
 
 EffectSearch run_search(const GroupedProblem& problem, const MeasuredOptions& options,
@@ -82,11 +68,23 @@ EffectSearch run_search(const GroupedProblem& problem, const MeasuredOptions& op
   out.profile_before = residual_profile(problem, search.base);
   out.profile_after = residual_profile(problem, search.final);
   look_for_the_unexplained(options, out);
-  look_for_instability(out);
   out.verdict = !out.effects.empty() ? Verdict::effect_found
                 : out.unexplained    ? Verdict::unexplained
                                      : Verdict::no_missing_effect;
   return search;
+}
+
+void weigh_stability(MeasuredDiscovery& out) {
+  const double tests = std::max<double>(1, static_cast<double>(out.stability.size()));
+  for (const auto& s : out.stability) {
+    if (normal_two_sided(s.z()) > 0.05 / tests) continue;
+    out.evidence.push_back(
+        {s.parameter.substr(0, s.parameter.rfind('.')),
+         fmt::format(
+             "{} depends on {}: {:.4g} ± {:.2g} below {:.3g}, {:.4g} ± {:.2g} above ({:.1f} sigma apart)",
+             s.parameter, s.covariate, s.low, s.low_sigma, s.split_at, s.high, s.high_sigma, std::abs(s.z())),
+         true});
+  }
 }
 
 }  // namespace unhand::fitting

@@ -84,5 +84,7 @@ MeasuredDiscovery discover_falls(const datasets::ThrowLog& log, const MeasuredOp
 /// The part that flights and falls share: the search, residual tests, the verdict.
 EffectSearch run_search(const GroupedProblem& problem, const MeasuredOptions& options,
                         MeasuredDiscovery& out);
+/// An answer that depends on where one looks is not the whole truth: evidence from out.stability.
+void weigh_stability(MeasuredDiscovery& out);
 
 }  // namespace unhand::fitting
