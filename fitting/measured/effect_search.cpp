@@ -41,6 +41,18 @@ Ranked& entry_of(std::vector<Ranked>& ranking, const std::string& id) {
   return ranking.back();
 }
 
+/// A shape parameter that ends at the border of its range: it would like to be another effect, as a decay
+/// without end is a constant.
+bool shape_is_open(const GroupedFit& fit, const std::string& id) {
+  for (std::size_t k = 0; k < fit.shared.size(); ++k) {
+    const SharedParameter& p = fit.shared[k];
+    const double value = fit.values[static_cast<Index>(k)], inside = std::min(value - p.low, p.high - value);
+    if (p.effect == id && p.shape && !(inside > std::max(2 * fit.sigma(k), 1e-3 * (p.high - p.low))))
+      return true;
+  }
+  return false;
+}
+
 class Search {
  public:
   Search(const GroupedProblem& problem, const EffectSearchOptions& options, EffectSearch& out)
@@ -63,6 +75,10 @@ class Search {
     std::vector<Scored> scored;
     for (const auto& s : all) {
       const Candidate& c = f.total.candidates[s.candidate];
+      if (!s.visible) {  // nothing for it to act through yet: a wind before there is a drag
+        if (Ranked& r = entry_of(out_.ranking, c.id); r.gain < 0) r.gain = 0, r.visible = false;
+        continue;
+      }
       std::vector<Index> columns;
       for (std::size_t k = 0; k < f.total.fitted; ++k) columns.push_back(static_cast<Index>(k));
       std::vector<std::size_t> inside;  // parameters that do not want to where there are none
@@ -73,7 +89,7 @@ class Search {
       columns.insert(columns.end(), own.begin(), own.end());
       Scored one{s.candidate, s.gain, 1,
                  Eigen::Map<const VectorXd>(s.step.data(), static_cast<Index>(s.step.size()))};
-      if (s.visible && !own.empty()) {
+      if (!own.empty()) {
         const LinearStep step = linear_step(f.parts, all_of(f.parts.size()), columns);
         const auto p = static_cast<Index>(own.size());
         const VectorXd x = step.value.tail(p);
@@ -85,9 +101,10 @@ class Search {
       scored.push_back(one);
       Ranked& r = entry_of(out_.ranking, c.id);
       if (one.gain <= r.gain) continue;
-      r.gain = one.gain, r.p_value = one.p, r.visible = s.visible;
+      r.gain = one.gain, r.p_value = one.p, r.visible = true;
       r.step = 1 + static_cast<int>(out_.effects.size());
     }
+    if (scored.empty()) return false;
     std::sort(scored.begin(), scored.end(), [](const Scored& a, const Scored& b) { return a.gain > b.gain; });
     for (const auto& s : scored) {
       const Candidate &best = f.total.candidates[scored.front().candidate],
@@ -126,7 +143,7 @@ class Search {
       Ranked& r = entry_of(out_.ranking, c.id);
       r.refitted = true, r.delta_bic = trial.delta_bic, r.held_out_gain = trial.held.fall();
       if (!trial.fit.solved || !(trial.p < level) || !(trial.held.p < 0.05)) continue;
-      if (!(trial.held.share > options_.matters)) continue;
+      if (!(trial.held.share > options_.matters) || shape_is_open(trial.fit, c.id)) continue;
       if (!best || trial.delta_bic < best->delta_bic) best = std::move(trial);
     }
     if (!best) return false;

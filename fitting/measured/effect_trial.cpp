@@ -36,7 +36,9 @@ Wald wald_of(const GroupedFit& fit, const std::string& id) {
 
 namespace {
 
-/// Of one held-out group, by what the effect changes in its residual r, g = r_before − r_after: g·r_before
+constexpr std::size_t kFewest = 3;  // groups that can say how much they scatter
+
+/// Of one group, by what the effect changes in its residual r, g = r_before − r_after: g·r_before
 /// and g·g, times the group's weight.
 struct Along {
   double residual{}, change{};
@@ -52,44 +54,74 @@ Along along(const Group& group, const GroupFit& before, const GroupFit& after, d
   return out;
 }
 
-/// That an effect lowers the χ² of groups which no fit has seen. The slope Σ g·r / Σ g·g is 1 where they show
-/// it as the train groups do and 0 where there is none, and χ² falls where it exceeds a half; its σ is the
-/// jackknife over groups. Groups that show an effect by different amounts are no doubt of it: a paired test
-/// of their χ² would take them for that, of the largest effect as of the smallest.
-double p_of_slope(const std::vector<Along>& groups) {
+/// The slope Σ g·r / Σ g·g of groups, and its variance: the jackknife over them.
+struct Slope {
+  double value{}, change{}, variance{}, groups{};
+  bool known{};  ///< the variance
+};
+Slope slope_of(const std::vector<Along>& groups) {
   Along all;
   for (const Along& g : groups) all.residual += g.residual, all.change += g.change;
-  if (!(all.change > 0)) return 1;
-  const auto n = static_cast<double>(groups.size());
+  Slope out;
+  out.change = all.change, out.groups = static_cast<double>(groups.size());
+  if (!(all.change > 0)) return out;
+  out.value = all.residual / all.change;
+  if (groups.size() < kFewest) return out;
   double mean = 0, square = 0;
   for (const Along& g : groups) {
     const double rest = all.change - g.change;
-    if (!(rest > 1e-9 * all.change)) return 1;  // one group has all there is to see
+    if (!(rest > 1e-9 * all.change)) return out;  // one group has all there is to see
     const double without = (all.residual - g.residual) / rest;
-    mean += without / n, square += without * without;
+    mean += without / out.groups, square += without * without;
   }
-  const double variance = (n - 1) / n * std::max(square - n * mean * mean, 0.0);
-  const double slope = all.residual / all.change;
-  constexpr double kFalls = 0.5;
-  if (!(slope > kFalls)) return 1;
-  return 0.5 * f_tail((slope - kFalls) * (slope - kFalls) / std::max(variance, 1e-300), 1, n - 1);
+  out.variance = (out.groups - 1) / out.groups * std::max(square - out.groups * mean * mean, 0.0);
+  out.known = true;
+  return out;
 }
 
-HeldOutFall held_out(const GroupedProblem& problem, const GroupedFit& before, const GroupedFit& after) {
-  std::vector<Along> groups;
+/// That an effect lowers the χ² of groups which no fit has seen. The slope is 1 where they show it as the
+/// train groups do and 0 where there is none, and χ² falls where it exceeds a half. Groups that show an
+/// effect by different amounts are no doubt of it: a paired test of their χ² would take them for that, of the
+/// largest effect as of the smallest. Where fewer than kFewest are held out, the train groups say how much
+/// slopes scatter: of less change, or of fewer groups, by as much more.
+double p_of_slope(const Slope& held_out, const Slope& train) {
+  constexpr double kFalls = 0.5;
+  if (!(held_out.change > 0) || !(held_out.value > kFalls)) return 1;
+  const bool few = held_out.groups < kFewest;
+  const Slope& scatter = few ? train : held_out;
+  if (!scatter.known) return 1;
+  const double more = few ? std::max(train.change / held_out.change, train.groups / held_out.groups) : 1;
+  const double variance = std::max(more * scatter.variance, 1e-300),
+               t2 = std::pow(held_out.value - kFalls, 2);
+  return 0.5 * f_tail(t2 / variance, 1, scatter.groups - 1);
+}
+
+/// Of the groups that both fits could be made of.
+std::vector<Along> all_along(const GroupedProblem& problem, const GroupedFit& before,
+                             const GroupedFit& after) {
+  std::vector<Along> out;
+  for (std::size_t i = 0; i < before.groups.size(); ++i) {
+    const GroupFit &b = before.groups[i], &a = after.groups[i];
+    if (b.used && b.solved && a.used && a.solved)
+      out.push_back(along(problem.groups()[i], b, a, before.weights.group[i]));
+  }
+  return out;
+}
+
+HeldOutFall held_out(const GroupedProblem& problem, const GroupedFit& before, const GroupedFit& after,
+                     const Slope& train) {
   double was = 0, is = 0, samples = 0;
   for (std::size_t i = 0; i < before.groups.size(); ++i) {
     const GroupFit &b = before.groups[i], &a = after.groups[i];
     if (!(b.used && b.solved && a.used && a.solved)) continue;
     const double w = before.weights.group[i];
-    groups.push_back(along(problem.groups()[i], b, a, w));
     was += w * b.chi2, is += w * a.chi2, samples += w * b.n;
   }
   HeldOutFall out;
-  if (groups.size() < 3 || !(samples > 0)) return out;
+  if (!(samples > 0)) return out;
   out.was = was / samples, out.is = is / samples;
   if (!(out.was > out.is)) return out;
-  out.p = p_of_slope(groups);
+  out.p = p_of_slope(slope_of(all_along(problem, before, after)), train);
   const auto b = misfit(problem, before), a = misfit(problem, after);
   for (std::size_t c = 0; c < b.size(); ++c) {
     const double excess = b[c].chi2_per_sample() - 1, fall = b[c].chi2_per_sample() - a[c].chi2_per_sample();
@@ -121,7 +153,8 @@ EffectTrial try_effect(const GroupedProblem& problem, const GroupedFit& fit, con
   const Wald wald = wald_of(out.fit, effect.id);
   out.p = wald.p_value(out.fit);
   out.delta_bic = wald.delta_bic(out.fit);
-  if (out.test.solved) out.held = held_out(problem, test, out.test);
+  if (out.test.solved)
+    out.held = held_out(problem, test, out.test, slope_of(all_along(problem, fit, out.fit)));
   return out;
 }
 

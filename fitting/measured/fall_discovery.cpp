@@ -18,15 +18,17 @@ namespace {
 constexpr double kTurningRate = 0.5;  // [rad/s] that an object let go by hand may turn with
 constexpr double kLongestMemory = 3;  // [s] before a fall in which it may have been at rest
 
-/// The last quiet stretch before a fall, and the speed gained from there on.
+/// The last quiet stretch before a fall, and the speed gained from there on. `rest` is what the sensor reads
+/// there, a bias included: the vertical, once the bias is taken off.
 struct BeforeFall {
-  Vec3<double> up{0, 0, 1};
+  Vec3<double> rest{0, 0, 1};
   double speed{}, speed_sigma{3}, tilt_sigma{0.3};
 };
 
 BeforeFall before_fall(const datasets::ImuLog& imu, std::size_t first, double g) {
   constexpr double kWindow = 0.2, kQuiet = 0.6;  // [s], [m/s²]
   BeforeFall out;
+  out.rest[2] = g;
   const auto mean_over = [&](std::size_t i, std::size_t j, Vec3<double>& mean, double& scatter) {
     mean = {};
     scatter = 0;
@@ -47,13 +49,13 @@ BeforeFall before_fall(const datasets::ImuLog& imu, std::size_t first, double g)
     mean_over(begin, end, mean, scatter);
     const double size = flight::norm(mean);
     if (scatter > kQuiet || std::abs(size - g) > kQuiet) continue;
-    for (std::size_t a = 0; a < 3; ++a) out.up[a] = mean[a] / size;
+    out.rest = mean;
     for (std::size_t k = end; k < first; ++k) {
       const double dt = imu.time(k + 1) - imu.time(k);
-      for (const std::size_t i : {k, k + 1})
-        out.speed += 0.5 * dt *
-                     (imu.specific_force(i, 0) * out.up[0] + imu.specific_force(i, 1) * out.up[1] +
-                      imu.specific_force(i, 2) * out.up[2] - size);
+      for (const std::size_t i : {k, k + 1}) {
+        const Vec3<double> f{imu.specific_force(i, 0), imu.specific_force(i, 1), imu.specific_force(i, 2)};
+        out.speed += 0.5 * dt * (flight::dot(f, mean) / size - size);
+      }
     }
     const double moving = imu.time(first) - imu.time(end);
     out.speed_sigma = 0.1 + 0.3 * moving;
@@ -65,8 +67,7 @@ BeforeFall before_fall(const datasets::ImuLog& imu, std::size_t first, double g)
   double scatter = 0;
   if (first > 1) {
     mean_over(0, first, mean, scatter);
-    if (const double size = flight::norm(mean); size > 0.3 * g)
-      for (std::size_t a = 0; a < 3; ++a) out.up[a] = mean[a] / size;
+    if (flight::norm(mean) > 0.3 * g) out.rest = mean;
   }
   return out;
 }
@@ -142,14 +143,15 @@ FallProblem::FallProblem(const datasets::ThrowLog& log) : gravity_(log.gravity) 
       fall.sigma[a] = std::max(1e-6, declared && imu.specific_force.sigma[a] > 0 ? imu.specific_force.sigma[a]
                                                                                  : scatter_of(fall.force, a));
     const BeforeFall before = before_fall(imu, *first, gravity_);
-    fall.up = before.up, fall.speed = before.speed;
+    fall.rest = before.rest, fall.speed = before.speed;
     fall.speed_sigma = before.speed_sigma, fall.tilt_sigma = before.tilt_sigma;
     Group group{one.id, one.object, one.condition, splits[n], {}, {}, {}};
     group.start = {fall.speed, 0, 0, 0, 0, 0, 0};
     for (const double t : fall.time)
       for (int c = 0; c < 3; ++c) group.rows.push_back({c, t});
     for (int k = 0; k < 7; ++k) group.rows.push_back({kPriorChannel, 0});
-    group.covariates = {fall.speed, fall.time.back(), fall.up[2], static_cast<double>(groups_.size())};
+    group.covariates = {fall.speed, fall.time.back(), fall.rest[2] / flight::norm(fall.rest),
+                        static_cast<double>(groups_.size())};
     groups_.push_back(std::move(group));
     falls_.push_back(std::move(fall));
   }
@@ -177,8 +179,10 @@ GroupEquations FallProblem::equations(std::size_t group, std::span<const std::st
     const Vec3<S> along{k + a_x, k + a_y, k - a_x - a_y},
         bias = vector("sensor.accelerometer_bias"), drift = vector("sensor.accelerometer_drift"),
         settling = vector("sensor.settling"), lever = vector("sensor.lever_arm");
+    Vec3<S> rest;
+    for (std::size_t a = 0; a < 3; ++a) rest[a] = fall.rest[a] - bias[a];
     const Vec3<S> up0 = flight::rotate(flight::exp(Vec3<S>{x[1], x[2], x[3]}),
-                                       Vec3<S>{S(fall.up[0]), S(fall.up[1]), S(fall.up[2])});
+                                       flight::scaled(S(1.0 / flight::norm(rest)), rest));
     const Vec3<S> spin{x[4], x[5], x[6]};
     const auto up_at = [&](std::size_t i) {  // the vertical turns against the body
       Vec3<S> turned = flight::scaled(S(-fall.time[i]), spin);

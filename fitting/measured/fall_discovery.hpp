@@ -12,8 +12,9 @@ namespace unhand::fitting {
 ///   f = −(k + A) |v| v u − c v u + b + d t + s exp(−t/τ) + ω × (ω × r) + ω̇ × r.
 ///
 /// Own unknowns of a fall: v at its first sample, a turn of u against where it stood at rest before, and its
-/// turning rate; each known beforehand to what the recording before the fall says of it. A gyroscope, where
-/// there is one, gives ω; without, ω of the last term is taken as zero.
+/// turning rate; each known beforehand to what the recording before the fall says of it. (The vertical is
+/// what the sensor reads at rest without its bias.) A gyroscope, where there is one, gives ω; without, ω of
+/// the last term is taken as zero.
 class FallProblem final : public GroupedProblem {
  public:
   /// Throws std::invalid_argument when no throw can be used.
@@ -29,7 +30,7 @@ class FallProblem final : public GroupedProblem {
     std::vector<double> time;                        // from the first sample [s]
     std::vector<flight::Vec3<double>> force;         // [m/s²]
     std::vector<flight::Vec3<double>> rate, turned;  // gyroscope: ω, and its integral as a rotation vector
-    flight::Vec3<double> sigma{}, up{};
+    flight::Vec3<double> sigma{}, rest{};            // rest: read before the fall [m/s²]
     double speed{}, speed_sigma{}, tilt_sigma{};
   };
   std::vector<Fall> falls_;

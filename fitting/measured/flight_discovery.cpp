@@ -123,9 +123,6 @@ FlightProblem::FlightProblem(const ThrowLog& log, int threads) : gravity_(log.gr
 
 std::vector<dynamics::Effect> FlightProblem::effects() const {
   auto out = experiment::known_flight_effects();
-  // Wind acts through the declared drag.
-  if (std::none_of(flights_.begin(), flights_.end(), [](const Flight& f) { return f.drag_k > 0; }))
-    std::erase_if(out, [](const dynamics::Effect& e) { return e.id == "flight.wind"; });
   // What needs to know how the body lies or turns.
   if (std::all_of(flights_.begin(), flights_.end(),
                   [](const Flight& f) { return f.samples.attitude.empty(); }))
