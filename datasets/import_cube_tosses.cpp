@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <span>
 #include <stdexcept>
 #include <string_view>
 
 #include "datasets/channel_rules.hpp"
 #include "datasets/channel_table.hpp"
 #include "datasets/csv.hpp"
+#include "datasets/sample_noise.hpp"
 
 namespace unhand::datasets {
 namespace {
@@ -83,7 +85,42 @@ std::vector<Toss> read_tosses(const std::filesystem::path& csv, int& rows) {
   return tosses;
 }
 
-Throw make_throw(const Toss& toss, const CubeTossOptions& options) {
+/// Half the rotation vector that turns one row's attitude into the other's, as its quaternion's noise has it.
+std::array<double, 3> half_turn(const Row& from, const Row& to) {
+  const std::span<const double, 4> p(from.pose.data() + 3, 4), q(to.pose.data() + 3, 4);
+  const double w = p[0] * q[0] + p[1] * q[1] + p[2] * q[2] + p[3] * q[3];
+  std::array<double, 3> v{p[0] * q[1] - p[1] * q[0] - p[2] * q[3] + p[3] * q[2],
+                          p[0] * q[2] - p[2] * q[0] - p[3] * q[1] + p[1] * q[3],
+                          p[0] * q[3] - p[3] * q[0] - p[1] * q[2] + p[2] * q[1]};
+  const double sine = std::hypot(v[0], v[1], v[2]);
+  const double factor = sine > 1e-12 ? std::atan2(sine, std::abs(w)) / sine : 1;
+  for (double& x : v) x *= w < 0 ? -factor : factor;
+  return v;
+}
+
+/// x, y, z and every part of the quaternion: what was found of the published tosses, or more where the
+/// samples in the air scatter by more.
+std::vector<double> sigma_of(const std::vector<Toss>& tosses, const CubeTossOptions& options) {
+  std::array<SampleNoise, 3> position;
+  SampleNoise attitude;
+  for (const Toss& toss : tosses)
+    for (std::size_t i = 3; i < toss.flight; ++i) {
+      const Row* row = &toss.rows[i - 3];
+      const std::array<double, 4> times{row[0].t, row[1].t, row[2].t, row[3].t};
+      std::array<std::array<double, 3>, 4> turns;
+      for (std::size_t k = 0; k < 4; ++k) turns[k] = half_turn(row[0], row[k]);
+      for (std::size_t a = 0; a < 3; ++a) {
+        position[a].add(times, {row[0].pose[a], row[1].pose[a], row[2].pose[a], row[3].pose[a]});
+        attitude.add(times, {turns[0][a], turns[1][a], turns[2][a], turns[3][a]});
+      }
+    }
+  std::vector<double> out;
+  for (const SampleNoise& axis : position) out.push_back(std::max(options.sigma_position, axis.sigma()));
+  out.resize(7, std::max(options.sigma_quaternion, attitude.sigma()));
+  return out;
+}
+
+Throw make_throw(const Toss& toss, const CubeTossOptions& options, const std::vector<double>& sigma) {
   const std::size_t n = toss.rows.size();
   Throw out;
   out.repetition = toss.rows.front().toss;
@@ -92,9 +129,8 @@ Throw make_throw(const Toss& toss, const CubeTossOptions& options) {
   out.condition = "toss";
   out.split = out.repetition % options.test_every == options.test_every - 1 ? Split::test : Split::train;
   MocapLog& mocap = out.mocap.emplace();
-  const double p = options.sigma_position, q = options.sigma_quaternion;
   mocap.time = {n, 1, {}, {}};
-  mocap.pose = {n, 7, {}, {p, p, p, q, q, q, q}};
+  mocap.pose = {n, 7, {}, sigma};
   const double start = toss.rows.front().t;
   for (const Row& row : toss.rows) {
     mocap.time.data.push_back(row.t - start);
@@ -138,6 +174,7 @@ ThrowLog import_cube_tosses(const std::filesystem::path& csv, const CubeTossOpti
   cube.dims = {options.side, options.side, options.side};
   log.objects.emplace("cube", cube);
 
+  const std::vector<double> sigma = sigma_of(tosses, options);
   for (const Toss& toss : tosses) {
     const int number = toss.rows.front().toss;
     if (toss.flight < static_cast<std::size_t>(options.min_samples)) {
@@ -146,7 +183,7 @@ ThrowLog import_cube_tosses(const std::filesystem::path& csv, const CubeTossOpti
            fmt::format("{} samples before contact, fewer than {}", toss.flight, options.min_samples)});
       continue;
     }
-    log.throws.push_back(make_throw(toss, options));
+    log.throws.push_back(make_throw(toss, options, sigma));
     ++(log.throws.back().split == Split::train ? counts.train : counts.test);
   }
   counts.kept = static_cast<int>(log.throws.size());

@@ -19,13 +19,14 @@ namespace unhand::datasets {
 /// The noise is declared by this importer, since the source names none: the scatter about a parabola per toss
 /// and axis before contact is 0.03 mm (pooled over the tosses), that of a quaternion's components 2e-4 about
 /// a smooth curve. These are the fast, independent part only: scale and alignment errors of the tracker are
-/// not in them.
+/// not in them. Where the samples of a file scatter by more (third differences over time in the air), that is
+/// declared.
 struct CubeTossOptions {
   double mass = 0.37, side = 0.1048;                         // [kg], [m]
   std::array<double, 3> inertia{0.00081, 0.00081, 0.00081};  // [kg m²]
   double gravity = 9.81;                                     // [m/s²]
-  double sigma_position = 3e-5;                              // [m]
-  double sigma_quaternion = 2e-4;                            // [1]
+  double sigma_position = 3e-5;                              // [m], at least
+  double sigma_quaternion = 2e-4;                            // [1], at least
   int min_samples = 8;  // before the first contact; fewer do not pin down a flight
   int test_every = 5;   // toss numbers n with n % test_every == test_every − 1 are held out: 4 to 1
 };

@@ -25,10 +25,6 @@ double apparent_gravity(const AcceptedEffect& effect) {
   return effect.id == kClock ? 1 / ((1 + x) * (1 + x)) - 1 : x;
 }
 
-bool is_scaled(const RestHeights& rest, double apparent) {
-  return std::abs(rest.scale) > 4 * rest.sigma && rest.scale * apparent > 0;
-}
-
 /// The answer goes by another of its names, in everything that names its parameter.
 void rename(AcceptedEffect& effect, const char* id, const char* parameter, MeasuredDiscovery& out) {
   const std::string was = effect.id + "." + effect.parameters.front().name,
@@ -42,20 +38,18 @@ void rename(AcceptedEffect& effect, const char* id, const char* parameter, Measu
     if (s.parameter == was) s.parameter = is;
 }
 
-/// Where a box at rest says that the tracker's scale is right, the scale that flights show is gravity's (or the
-/// clock's).
+/// Where boxes at rest put the tracker's scale nearer to none than to what the flights need, that is
+/// gravity's (or the clock's).
 void name_scale(const datasets::ThrowLog& log, const MeasuredOptions& options, MeasuredDiscovery& out) {
   for (auto& effect : out.effects) {
     const auto other_name = [&](const auto& other) { return other.first == kGravity; };
-    if (effect.id != kScale ||
-        std::none_of(effect.equivalent.begin(), effect.equivalent.end(), other_name))
+    if (effect.id != kScale || std::none_of(effect.equivalent.begin(), effect.equivalent.end(), other_name))
       continue;
     const double apparent = apparent_gravity(effect);
     for (const auto& [name, object] : log.objects) {
       const auto rest = rest_heights(log, name, options.floor);
-      if (!rest || std::abs(rest->scale) > kMostScale || is_scaled(*rest, apparent) ||
-          3 * rest->sigma >= std::abs(apparent))
-        continue;
+      if (!rest || std::abs(rest->scale) > kMostScale || 3 * rest->sigma >= std::abs(apparent)) continue;
+      if (std::abs(rest->scale) >= std::abs(rest->scale - apparent)) continue;
       rename(effect, kGravity, "ratio", out);
       break;
     }
@@ -88,7 +82,7 @@ void weigh_scales(const datasets::ThrowLog& log, const MeasuredOptions& options,
              false});
       } else if (rest) {
         const double apart = (rest->scale - apparent) / std::hypot(rest->sigma, sigma);
-        const bool scaled = is_scaled(*rest, apparent);
+        const bool scaled = std::abs(rest->scale) > 4 * rest->sigma && rest->scale * apparent > 0;
         const bool enough = std::abs(rest->scale - apparent) < 0.5 * std::abs(apparent);
         out.evidence.push_back(
             {effect.id,

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "fitting/dense_solve.hpp"
 #include "fitting/measured/effect_trial.hpp"
@@ -20,6 +22,26 @@ namespace {
 
 /// Footprints that correlate by this much need not be fitted both: the data cannot prefer one.
 constexpr double kSame = 0.9999;
+/// Bayes' criteria that are no further apart cannot tell two effects from each other.
+constexpr double kAlike = 10;
+/// χ² per sample above which rivals are followed, and the factor by which one has to lower it.
+constexpr double kMisfit = 1.2, kBetter = 0.9;
+
+double left(const GroupedFit& fit) {
+  return fit.samples > 0 ? fit.chi2 / static_cast<double>(fit.samples) : 0;
+}
+
+void accept(const EffectTrial& trial, EffectSearch& to) {
+  AcceptedEffect effect;
+  effect.id = trial.id;
+  effect.delta_bic = trial.delta_bic;
+  effect.test_error_ratio = std::sqrt(trial.held.is / trial.held.was);
+  effect.why = fmt::format("chi2 per sample falls from {:.4g} to {:.4g} (p {:.1g})", trial.held.was,
+                           trial.held.is, trial.held.p);
+  to.effects.push_back(std::move(effect));
+  to.final = trial.fit;
+  to.final_test = trial.test;
+}
 
 std::vector<Index> indices(const std::vector<std::size_t>& from) {
   std::vector<Index> out;
@@ -62,7 +84,8 @@ class Search {
         catalogue_.push_back(std::move(effect));
   }
 
-  bool forward() {
+  /// One step: false if nothing convinces. `refits`: candidates fitted in full.
+  bool forward(int refits) {
     const auto effects = inactive();
     if (effects.empty()) return false;
     const auto f = grouped_footprints(problem_, out_.final, effects, options_.fit);
@@ -79,6 +102,7 @@ class Search {
         if (Ranked& r = entry_of(out_.ranking, c.id); r.gain < 0) r.gain = 0, r.visible = false;
         continue;
       }
+      shown_from_.try_emplace(c.id, out_.effects.size());
       std::vector<Index> columns;
       for (std::size_t k = 0; k < f.total.fitted; ++k) columns.push_back(static_cast<Index>(k));
       std::vector<std::size_t> inside;  // parameters that do not want to where there are none
@@ -132,9 +156,9 @@ class Search {
         if (order_of(c.id) < order_of(l.id) && s.gain > 0.9 * leader.gain) leader = s;
         break;
       }
-      if (!known && static_cast<int>(leaders.size()) < options_.refits) leaders.push_back(s);
+      if (!known && static_cast<int>(leaders.size()) < refits) leaders.push_back(s);
     }
-    std::optional<EffectTrial> best;
+    std::vector<EffectTrial> trials;  // the most evident one first
     for (const auto& s : leaders) {
       const Candidate& c = f.total.candidates[s.candidate];
       const auto effect =
@@ -142,21 +166,39 @@ class Search {
       auto trial = try_effect(problem_, out_.final, out_.final_test, c, s.step, *effect, options_.fit);
       Ranked& r = entry_of(out_.ranking, c.id);
       r.refitted = true, r.delta_bic = trial.delta_bic, r.held_out_gain = trial.held.fall();
-      if (!trial.fit.solved || !(trial.p < level) || !(trial.held.p < 0.05)) continue;
-      if (!(trial.held.share > options_.matters) || shape_is_open(trial.fit, c.id)) continue;
-      if (!best || trial.delta_bic < best->delta_bic) best = std::move(trial);
+      if (!trial.fit.solved || !(trial.p < level) || shape_is_open(trial.fit, c.id)) continue;
+      if (trial.held.share > options_.matters) trials.push_back(std::move(trial));
     }
-    if (!best) return false;
-    AcceptedEffect effect;
-    effect.id = best->id;
-    effect.delta_bic = best->delta_bic;
-    effect.test_error_ratio = std::sqrt(best->held.is / best->held.was);
-    effect.why = fmt::format("chi2 per sample falls from {:.4g} to {:.4g} (p {:.1g})", best->held.was,
-                             best->held.is, best->held.p);
-    out_.effects.push_back(std::move(effect));
-    out_.final = std::move(best->fit);
-    out_.final_test = std::move(best->test);
+    std::sort(trials.begin(), trials.end(),
+              [](const EffectTrial& a, const EffectTrial& b) { return a.delta_bic < b.delta_bic; });
+    const auto best = std::find_if(trials.begin(), trials.end(),
+                                   [](const EffectTrial& trial) { return trial.held.p < 0.05; });
+    if (best == trials.end()) return false;
+    for (const EffectTrial& trial : trials)
+      if (trial.id != best->id && trial.delta_bic < best->delta_bic + kAlike) {
+        rivals_.push_back(out_);
+        accept(trial, rivals_.back());
+      }
+    accept(*best, out_);
     return true;
+  }
+
+  /// As far as forward() goes. A step may not have known which of two effects it was: both are as evident,
+  /// and what the other one makes room for (a wind acts through the drag) may be needed before held-out
+  /// groups show it. Where a misfit is left, the others are followed too, and taken where all groups are
+  /// explained the better for it.
+  void follow() {
+    climb();
+    const auto rivals = std::move(rivals_);
+    for (const EffectSearch& rival : rivals) {
+      if (!(left(out_.final_test) > kMisfit)) return;
+      if (static_cast<int>(rival.effects.size()) >= options_.most_effects) continue;
+      EffectSearch first = std::exchange(out_, rival);
+      if (forward(1)) climb();  // by what it makes room for
+      const bool better = left(out_.final_test) < kBetter * left(first.final_test) &&
+                          left(out_.final) < kBetter * left(first.final);
+      if (!better) out_ = std::move(first);
+    }
   }
 
   void backward() {
@@ -191,7 +233,8 @@ class Search {
   void describe() {
     if (out_.effects.empty()) return;
     const auto f = grouped_footprints(problem_, out_.final, inactive(), options_.fit);
-    for (AcceptedEffect& accepted : out_.effects) {
+    for (std::size_t i = 0; i < out_.effects.size(); ++i) {
+      AcceptedEffect& accepted = out_.effects[i];
       const Wald wald = wald_of(out_.final, accepted.id);
       accepted.p_value = wald.p_value(out_.final);
       accepted.delta_bic = wald.delta_bic(out_.final);
@@ -204,6 +247,8 @@ class Search {
         if (!p.shape) contribution[static_cast<Index>(k)] = value - p.neutral;
       }
       for (const Candidate& candidate : f.total.candidates) {
+        const auto shown = shown_from_.find(candidate.id);
+        if (shown == shown_from_.end() || shown->second > i) continue;  // it needs what was found later
         const double r = correlation(f.total, contribution, candidate);
         if (r < options_.equivalent || is_spoken_for(f.total, accepted.id, candidate)) continue;
         accepted.add_other_name(candidate.id, r);
@@ -213,6 +258,10 @@ class Search {
   }
 
  private:
+  void climb() {
+    while (static_cast<int>(out_.effects.size()) < options_.most_effects && forward(options_.refits)) {
+    }
+  }
   std::size_t order_of(const std::string& id) const {
     for (std::size_t k = 0; k < catalogue_.size(); ++k)
       if (catalogue_[k].id == id) return k;
@@ -268,6 +317,8 @@ class Search {
   const EffectSearchOptions& options_;
   EffectSearch& out_;
   std::vector<dynamics::Effect> catalogue_;
+  std::map<std::string, std::size_t> shown_from_;  ///< after how many effects one first had a footprint
+  std::vector<EffectSearch> rivals_;  ///< with another effect, as evident, in the place of the accepted one
 };
 
 std::string why_not(const GroupedProblem& problem, Split split) {
@@ -291,8 +342,7 @@ EffectSearch search_effects(const GroupedProblem& problem, const EffectSearchOpt
   out.final = out.base;
   out.final_test = out.base_test;
   Search search(problem, options, out);
-  while (static_cast<int>(out.effects.size()) < options.most_effects && search.forward()) {
-  }
+  search.follow();
   search.backward();
   search.describe();
   std::sort(out.ranking.begin(), out.ranking.end(),

@@ -1,5 +1,8 @@
 #include "datasets/import_cube_tosses.hpp"
 
+#include <cmath>
+#include <iomanip>
+#include <random>
 #include <sstream>
 #include <stdexcept>
 
@@ -54,6 +57,35 @@ TEST(CubeTosses, KeepsWhatFliesLongEnough) {
   EXPECT_EQ(last.free_flight->first, 0);
   EXPECT_DOUBLE_EQ(last.free_flight->second, 0.006757 * 16);
   EXPECT_EQ(last.mocap->pose(4, 1), 0.04);
+}
+
+// What a set scatters by is declared of it, whatever the times between its samples are; a glitch is no noise.
+TEST(CubeTosses, DeclaresTheScatterOfTheSamples) {
+  const Scratch scratch;
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  constexpr double sigma = 4e-4, sigma_q = 1.5e-3;
+  std::ostringstream out;
+  out << header << std::setprecision(12);
+  for (int n = 0; n < 60; ++n) {
+    double t = 0;
+    for (int k = 0; k < 20; ++k, t += k % 5 == 2 ? 0.02 : 0.004 + 0.002 * (k % 3)) {
+      const double half = 3 * t / 2, glitch = k == 9 && n % 10 == 0 ? 0.05 : 0;
+      double q[4] = {std::cos(half), 0, std::sin(half), 0}, norm = 0;
+      for (double& x : q) x += sigma_q * normal(random), norm += x * x;
+      out << n << ',' << k << ',' << t << ',' << 2 * t + glitch + sigma * normal(random) << ','
+          << sigma * normal(random) << ',' << 1 - 4.905 * t * t + sigma * normal(random);
+      for (const double x : q) out << ',' << (n % 2 == 0 ? 1 : -1) * x / std::sqrt(norm);
+      out << ",0,0,0,0,3,0,1\n";
+    }
+  }
+  put_bytes(scratch / "t.csv", out.str());
+  const ThrowLog log = import_cube_tosses(scratch / "t.csv");
+  const auto& declared = log.throws.front().mocap->pose.sigma;
+  ASSERT_EQ(declared.size(), 7U);
+  // 1020 differences per axis, three of four samples shared: σ is known to 4 %.
+  for (std::size_t a = 0; a < 3; ++a) EXPECT_NEAR(declared[a], sigma, 0.15 * sigma);
+  for (std::size_t a = 3; a < 7; ++a) EXPECT_NEAR(declared[a], sigma_q, 0.15 * sigma_q);
 }
 
 TEST(CubeTosses, ResultIsALogThatRoundTrips) {

@@ -220,6 +220,54 @@ TEST(FlightProblem, DerivativesAreThoseOfTheResidual) {
   }
 }
 
+// Boxes that come to rest at the height of their size say that the tracker's scale is right. The same holds
+// for whatever else names the parameter: a card's covariance, what halves of the flights say.
+TEST(FlightDiscovery, AScaleThatBoxesAtRestRefuteIsGravityByEveryName) {
+  auto log = spatial_flights({.gravity_ratio = 0.02}, {}, 41);
+  constexpr double side = 0.06;
+  log.objects.at("body").dims = {side, side, side};
+  std::size_t n = 0;
+  for (auto& one : log.throws) {  // on each of the faces in turn
+    constexpr double h = 0.70710678118654752;
+    constexpr double faces[6][4] = {{1, 0, 0, 0},  {0, 1, 0, 0}, {h, h, 0, 0},
+                                    {h, -h, 0, 0}, {h, 0, h, 0}, {h, 0, -h, 0}};
+    const auto& q = faces[n++ % 6];
+    auto& mocap = *one.mocap;
+    for (int i = 0; i < 8; ++i) {
+      mocap.time.data.push_back(mocap.time.data.back() + 0.01);
+      const double noise = (i % 2 == 0 ? 1e-5 : -1e-5) + 1e-6 * static_cast<double>(n % 5);
+      mocap.pose.data.insert(mocap.pose.data.end(), {1, 1, side / 2 + noise, q[0], q[1], q[2], q[3]});
+    }
+    mocap.time.rows = mocap.pose.rows = mocap.time.data.size();
+  }
+  const auto found = found_in(log);
+  expect_value(found, "flight.gravity", "ratio", 1.02);
+  EXPECT_EQ(found.effects.front().id, "flight.gravity");
+  EXPECT_EQ(found.parameters, std::vector<std::string>{"flight.gravity.ratio"});
+  EXPECT_FALSE(found.stability.empty());
+  for (const Stability& s : found.stability) EXPECT_EQ(s.parameter, "flight.gravity.ratio");
+}
+
+// Air that moves acts through a drag, whether it was declared or has been found.
+TEST(FlightDiscovery, AWindIsFoundThroughADragThatWasFound) {
+  SpatialTruth truth;
+  truth.drag = 0.1, truth.wind = {1.5, -0.5, 0};
+  const auto found = found_in(spatial_flights(truth, {}, 43));
+  expect_value(found, "flight.quadratic_drag", "k[body]", 0.1);
+  expect_value(found, "flight.wind", "w_x", 1.5);
+  expect_value(found, "flight.wind", "w_y", -0.5);
+  EXPECT_EQ(found.effects.size(), 2U);
+  EXPECT_FALSE(found.unexplained.has_value()) << found.unexplained->description;
+}
+
+// Two held-out flights cannot say how much they scatter; those that were fitted can.
+TEST(FlightDiscovery, TwoHeldOutFlightsAreEnoughForALargeEffect) {
+  SpatialDesign few;
+  few.flights = 10;
+  expect_value(found_in(spatial_flights({.drag = 0.1}, few, 44)), "flight.quadratic_drag", "k[body]", 0.1);
+  EXPECT_EQ(found_in(spatial_flights({}, few, 45)).verdict, Verdict::no_missing_effect);
+}
+
 TEST(FlightDiscovery, MeasuredCubeTosses) {
   const char* folder = std::getenv("UNHAND_DATA");
   if (folder == nullptr || *folder == '\0')

@@ -17,7 +17,8 @@ struct SpatialTruth {
   Eigen::Vector3d com{0, 0, 0};                                        // m
   Eigen::Vector3d axis_drag{0, 0, 0};                                  // 1/m, traceless
   Eigen::Vector3d inertia{1, 1, 1};                                    // of the body; declared are equal ones
-  double side_force{};  ///< m/s², along body x: what no catalogue lists
+  double side_force{};            ///< m/s², along body x: what no catalogue lists
+  Eigen::Vector3d wind{0, 0, 0};  // m/s
 };
 
 struct SpatialDesign {
@@ -53,15 +54,16 @@ inline datasets::ThrowLog spatial_flights(const SpatialTruth& truth, const Spati
     Vector3d w;
   };
   const auto flow = [&](const State& s) {
-    const double g = 9.81 * (1 + truth.gravity_ratio), speed = s.v.norm();
+    const Vector3d u = s.v - truth.wind;
+    const double g = 9.81 * (1 + truth.gravity_ratio), speed = u.norm();
     Vector3d a(g * std::sin(truth.tilt_x) * std::cos(truth.tilt_y), g * std::sin(truth.tilt_y),
                -g * std::cos(truth.tilt_x) * std::cos(truth.tilt_y));
-    const Vector3d body_v = s.q.conjugate() * s.v;
-    a -= (truth.drag * speed + truth.linear_drag) * s.v;
-    a += truth.lift * (s.q * s.w).cross(s.v);
+    const Vector3d body_v = s.q.conjugate() * u;
+    a -= (truth.drag * speed + truth.linear_drag) * u;
+    a += truth.lift * (s.q * s.w).cross(u);
     a -= speed * (s.q * truth.axis_drag.cwiseProduct(body_v));
     const double fourth = body_v.array().pow(4).sum() / std::pow(speed, 4);
-    a -= truth.cubic_drag * (fourth - 0.6) * speed * s.v;
+    a -= truth.cubic_drag * (fourth - 0.6) * speed * u;
     a += truth.side_force * (s.q * Vector3d::UnitX());
     const Vector3d I = truth.inertia;
     const Vector3d w_dot = (-s.w.cross(I.cwiseProduct(s.w))).cwiseQuotient(I) - truth.spin_damping * s.w;

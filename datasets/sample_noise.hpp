@@ -1,0 +1,26 @@
+// The independent noise of samples of a smooth motion, from the samples themselves. Private to importers.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace unhand::datasets {
+
+/// Gathers third divided differences of series whose samples need not be equally spaced. Four samples x_i at
+/// t_i: Σ w_i x_i with w_i = 1/Π_{j≠i} (t_i − t_j) is zero for every parabola, and for noise of variance σ²
+/// it has σ² Σ w_i².
+class SampleNoise {
+ public:
+  /// Four samples at rising times [s].
+  void add(const std::array<double, 4>& times, const std::array<double, 4>& values);
+  /// σ, in the unit of the values; 0 of nothing. Differences beyond five of their typical size are glitches
+  /// of a tracker and left out.
+  double sigma() const;
+
+ private:
+  std::vector<double> squares_;
+};
+
+}  // namespace unhand::datasets
