@@ -77,10 +77,16 @@ std::vector<double> quartic_of(const std::array<double, 15>& c, double force) {
   return out;
 }
 
-contact::ConvexQuartic quartic(const std::vector<double>& coefficients) {
+/// Convex, and zero at no wrench but zero.
+bool is_quartic(const std::vector<double>& coefficients) {
   std::array<double, 15> c{};
   std::copy(coefficients.begin(), coefficients.end(), c.begin());
-  return contact::ConvexQuartic(c);
+  try {
+    contact::ConvexQuartic{c};
+  } catch (const std::invalid_argument&) {
+    return false;
+  }
+  return true;
 }
 
 }  // namespace
@@ -163,7 +169,7 @@ SurfaceFit fit_surface(const SlipSamples& slips, SurfaceModel model) {
       if (!solution.usable) return failed();
       noise = solution.noise;
       c = quartic_of(quartic_coefficients(solution.p.data()), force);
-      quartic(c);  // refuses what is not convex
+      if (!is_quartic(c)) return failed();  // slips that no surface has may flatten it without end
     }
   }
   out.sigma_direction = noise.direction;

@@ -145,5 +145,22 @@ TEST(SlipSamples, OneSampleWhileTheTwistKeepsItsDirection) {
   EXPECT_EQ(out.slips, std::vector<std::string>{"a"});
 }
 
+// Twists that have nothing to do with the wrenches (a push log read with the outline of another object): no
+// limit surface has them. A fit of them ends or says that it did not; it does not end the comparison of the
+// others.
+TEST(SlipSurface, SlipsOfNoSurfaceAreNoError) {
+  constexpr unsigned seed = 17;  // of forty, the first whose quartic tends to one that vanishes somewhere
+  const Eigen::Matrix3d flat = Eigen::Vector3d(1, 1, 1e-6).asDiagonal();
+  auto slips = test::simulate(test::ellipsoid(flat), 20, 0.0, 2.0, seed);
+  std::mt19937_64 random(seed);
+  for (auto& sample : slips.samples) {
+    const Eigen::Vector3d u = test::gauss(random).normalized();
+    sample.direction = {u[0], u[1], u[2]};
+  }
+  SurfaceFit fit;
+  ASSERT_NO_THROW(fit = fit_surface(slips, SurfaceModel::convex_quartic));
+  EXPECT_EQ(fit.outcome, SurfaceOutcome::not_converged);
+}
+
 }  // namespace
 }  // namespace unhand::fitting::test
