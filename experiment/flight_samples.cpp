@@ -7,6 +7,45 @@
 namespace unhand::experiment {
 namespace {
 
+/// How far sample `member` of the four from `first` on lies off the parabola through the other three, and its
+/// σ for samples of σ = 1.
+struct Off {
+  double size{}, sigma{};
+};
+Off off_parabola(const FlightSamples& s, std::size_t axis, std::size_t first, std::size_t member) {
+  double sum = 0, squares = 0, own = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    double w = 1;
+    for (std::size_t j = 0; j < 4; ++j)
+      if (j != i) w *= (s.times[first + 3] - s.times[first]) / (s.times[first + i] - s.times[first + j]);
+    sum += w * s.position[first + i][axis], squares += w * w;
+    if (i == member) own = w;
+  }
+  return {sum / own, std::sqrt(squares) / std::abs(own)};
+}
+
+bool is_glitch(const FlightSamples& s, std::size_t i) {
+  constexpr double kFar = 8;
+  for (const int axis : s.axes) {
+    const auto a = static_cast<std::size_t>(axis);
+    const Off after = off_parabola(s, a, i - 1, 1), before = off_parabola(s, a, i - 2, 2);
+    const double x = std::abs(after.size), y = std::abs(before.size);
+    if (x > kFar * after.sigma * s.sigma[a] && y > kFar * before.sigma * s.sigma[a] &&
+        std::abs(after.size - before.size) < 0.25 * (x + y))
+      return true;
+  }
+  return false;
+}
+
+template <class T>
+void keep(std::vector<T>& values, const std::vector<bool>& good) {
+  if (values.empty()) return;
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < good.size(); ++i)
+    if (good[i]) values[n++] = values[i];
+  values.resize(n);
+}
+
 void read_sigma(const datasets::Series& pose, FlightSamples& out) {
   const std::vector<double>& s = pose.sigma;
   out.declared = s.size() == pose.cols && std::all_of(s.begin(), s.end(), [](double x) { return x > 0; });
@@ -73,6 +112,20 @@ FlightScatter scatter_of(const FlightSamples& s) {
   for (double& x : out.position) x = std::sqrt(x / static_cast<double>(out.n));
   out.angle = std::sqrt(out.angle / static_cast<double>(out.n));
   return out;
+}
+
+std::size_t remove_glitches(FlightSamples& s) {
+  std::vector<bool> good(s.times.size(), true);
+  std::size_t removed = 0;
+  for (std::size_t i = 2; i + 3 < s.times.size(); ++i)  // the last frames may have met the ground
+    if (is_glitch(s, i)) good[i] = false, ++removed;
+  if (removed == 0) return 0;
+  keep(s.times, good);
+  keep(s.elapsed, good);
+  keep(s.position, good);
+  keep(s.attitude, good);
+  keep(s.theta, good);
+  return removed;
 }
 
 }  // namespace unhand::experiment

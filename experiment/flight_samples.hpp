@@ -33,4 +33,9 @@ struct FlightScatter {
 /// The scatter of a flight's samples; see FlightScatter.
 FlightScatter scatter_of(const FlightSamples& samples);
 
+/// Takes out the frames in which a tracker was elsewhere for once: positions that lie off the parabolas
+/// through both sets of three neighbours around them, by more than eight of their sigmas and by the same
+/// distance. Neither a force nor an impact does that to one frame. Returns how many.
+std::size_t remove_glitches(FlightSamples& samples);
+
 }  // namespace unhand::experiment

@@ -175,6 +175,12 @@ MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const Measured
   weigh_stability(out);
   weigh_scales(log, options, out);
   weigh_drag(log, out);
+  if (problem.glitches() > 0)
+    out.evidence.push_back(
+        {"",
+         fmt::format("{} frames in which the tracker was elsewhere for once were taken out",
+                     problem.glitches()),
+         false});
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return out;
 }

@@ -92,6 +92,7 @@ FlightProblem::FlightProblem(const ThrowLog& log, int threads) : gravity_(log.gr
         s.sigma[a] = std::max(1e-9, std::sqrt(position[a] / std::max(1.0, n)));
       s.sigma_angle = std::max(1e-9, std::sqrt(angle / std::max(1.0, n)));
     }
+    glitches_ += experiment::remove_glitches(s);
     const auto& object = log.objects.at(one.object);
     flight.drag_k = object.drag_k.value_or(0);
     if (object.inertia && object.inertia->size() == 3)

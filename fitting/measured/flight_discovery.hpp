@@ -27,6 +27,8 @@ class FlightProblem final : public GroupedProblem {
   bool oriented(std::size_t group) const { return !flights_[group].samples.attitude.empty(); }
   /// Measured axes, the first channels; those of the rotation follow.
   int position_channels() const { return static_cast<int>(axes_.size()); }
+  /// Frames that were taken out as the tracker's glitches (experiment::remove_glitches).
+  std::size_t glitches() const { return glitches_; }
 
  private:
   struct Flight {
@@ -37,6 +39,7 @@ class FlightProblem final : public GroupedProblem {
   };
   std::vector<Flight> flights_;
   double gravity_{};
+  std::size_t glitches_{};
   std::vector<std::size_t> axes_, turns_;  ///< of the world and of the body, that a flight has
   double turn_sign_{1};                    ///< of the angle about turns_: a planar one is about −y
 };

@@ -268,6 +268,19 @@ TEST(FlightDiscovery, TwoHeldOutFlightsAreEnoughForALargeEffect) {
   EXPECT_EQ(found_in(spatial_flights({}, few, 45)).verdict, Verdict::no_missing_effect);
 }
 
+// A tracker that is elsewhere for single frames is neither an effect nor a misfit.
+TEST(FlightDiscovery, SingleGlitchedFramesAreNoMisfit) {
+  auto log = spatial_flights({}, {}, 46);
+  int glitches = 0;
+  for (std::size_t k = 0; k < log.throws.size(); k += 3, ++glitches)
+    log.throws[k].mocap->pose(10 + k % 20, k % 2) += k % 4 < 2 ? 0.02 : -0.01;
+  const auto found = found_in(log);
+  EXPECT_EQ(found.verdict, Verdict::no_missing_effect);
+  EXPECT_TRUE(std::any_of(found.evidence.begin(), found.evidence.end(), [&](const Evidence& e) {
+    return e.text.starts_with(std::to_string(glitches) + " frames");
+  }));
+}
+
 TEST(FlightDiscovery, MeasuredCubeTosses) {
   const char* folder = std::getenv("UNHAND_DATA");
   if (folder == nullptr || *folder == '\0')
