@@ -42,9 +42,9 @@ void look_for_the_unexplained(const GroupedProblem& problem, const GroupedFit& h
     const auto channel =
         static_cast<std::size_t>(std::find(names.begin(), names.end(), m.channel) - names.begin());
     const double left = without_strays(problem, held_out, channel),
-                 allowed = 1 + 3 * std::sqrt(2.0 / std::max(1, m.n));
-    if (left < std::max(options.unexplained, allowed)) {
-      if (m.after_test > left)
+                 most = std::max(options.unexplained, 1 + 3 * std::sqrt(2.0 / std::max(1, m.n)));
+    if (left < most) {
+      if (m.after_test >= most)
         out.evidence.push_back(
             {"",
              fmt::format("{}: a few stray samples make {:.3g} of {:.3g} times the variance "
