@@ -100,18 +100,6 @@ TEST(FallDiscovery, BiasAndDragAreToldApart) {
   EXPECT_NEAR(value_of(*bias, "z"), 0.05, 0.02);
 }
 
-// The sensor's vertical at rest leans by the bias, and drag along it with it: no drift is needed for that.
-TEST(FallDiscovery, ABiasLeansTheVerticalAtRest) {
-  const auto found = discover_falls(falls({-1.8, 0.6, 0, 0.06, 0}, 60, 4), {});
-  ASSERT_NE(named(found, "flight.quadratic_drag"), nullptr);
-  ASSERT_NE(named(found, "sensor.accelerometer_bias"), nullptr);
-  EXPECT_EQ(found.effects.size(), 2U) << found.effects.back().id;
-  const auto& k = named(found, "flight.quadratic_drag")->parameters.front();
-  EXPECT_NEAR(k.value, 0.06, 4 * k.sigma);
-  const auto& x = named(found, "sensor.accelerometer_bias")->parameters.front();
-  EXPECT_NEAR(x.value, -1.8, 4 * x.sigma);
-}
-
 /// Nothing but noise between falls: the scatter between them may be smaller than what independent noise
 /// allows, of some parameters and not of others.
 TEST(FallDiscovery, TheCovarianceOfAConstantBiasIsOne) {
