@@ -72,8 +72,7 @@ planners::PlanOptions plan_options(const PlanThrowOptions& options, const Chain&
 /// Landings at delays drawn evenly from the window.
 PredictedLandings by_delay(const std::string& name, const ThrowAnswer& a,
                            const planners::JointVector<double>& qdd, const PlanThrowOptions& options) {
-  const planners::TubeProblem problem{
-      a.chain, a.plan.nominal.state, a.box.middle, a.window, {9.81, options.drag}};
+  const planners::TubeProblem problem{a.chain, a.plan.nominal.state, a.box.middle, a.window, a.medium};
   const auto table = planners::landings_over_window(problem, qdd, 201);
   std::mt19937_64 random(options.seed);
   std::uniform_int_distribution<std::size_t> delay(0, table.size() - 1);
@@ -128,7 +127,7 @@ void plan_release(ThrowAnswer& a, const Chain& pads, planners::ReleaseThrow rele
     a.plan.limits = limits;
     a.plan.nominal.state = release.start = better.start;
     a.plan.qdd = release.qdd = better.qdd;
-    const planners::TubeProblem rigid{a.chain, better.start, a.box.middle, a.window, {9.81, options.drag}};
+    const planners::TubeProblem rigid{a.chain, better.start, a.box.middle, a.window, a.medium};
     const auto landings = [&](const planners::JointVector<double>& qdd) {
       return planners::landings_over_window(rigid, qdd, how.landing_samples);
     };
@@ -178,12 +177,13 @@ void plan_throw(const PlanThrowOptions& options) {
   auto result = planners::plan_throw(answer.chain, answer.box, how);
   if (!result.plan) throw Unanswered(fmt::format("{}: {}", to_string(result.outcome), result.reason));
   answer.plan = std::move(*result.plan);
+  answer.medium = how.search.medium;
   if (card) {
     planners::ReleaseThrow release{pads, answer.plan.nominal.state, answer.plan.qdd, answer.box.middle};
     release.hold = answer.window + 1e-6;
     release.card = *card;
     release.object = object;
-    release.medium.drag_k = options.drag;
+    release.medium = answer.medium;
     plan_release(answer, pads, release, how, options);
   } else {
     answer.predicted = {

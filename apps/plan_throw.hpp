@@ -23,8 +23,9 @@ struct ThrowAnswer {
   planners::Chain chain;  ///< up to what lands: the object's centre of mass
   planners::TargetBox box;
   planners::ThrowPlan plan;
-  double window{};      ///< for which q̈ is held [s]
-  bool with_release{};  ///< the release follows a contact model, not a delay
+  double window{};        ///< for which q̈ is held [s]
+  flight::Medium medium;  ///< of the flight
+  bool with_release{};    ///< the release follows a contact model, not a delay
   std::optional<planners::ReleaseLanding> rigid,
       real;  ///< of the tube's motion: carried until the detach, and as the model says
   std::optional<planners::ReleaseSpread> spread_before, spread_after;

@@ -8,6 +8,7 @@
 #include "apps/figure.hpp"
 #include "apps/plan_throw.hpp"
 #include "apps/table.hpp"
+#include "flight/fly.hpp"
 #include "planners/arm/kinematics.hpp"
 
 namespace unhand::apps {
@@ -25,7 +26,9 @@ Json list(const JointVector<double>& v) {
   return out;
 }
 
+/// null where no landings were worked out: those of the tube's acceleration, once the motion is another's.
 Json window_json(const std::vector<LandingAt>& landings) {
+  if (landings.empty()) return nullptr;
   Json out{{"largest_miss_m", planners::largest_miss(landings)},
            {"time_s", Json::array()},
            {"forward_m", Json::array()},
@@ -193,12 +196,23 @@ Rows flight_from(const ThrowAnswer& a, double t, const JointVector<double>& qdd)
   const JointVector<double> q = a.plan.nominal.state.q + t * a.plan.nominal.state.qd + 0.5 * t * t * qdd,
                             qd = a.plan.nominal.state.qd + t * qdd;
   const auto tip = planners::tip_motion<double>(a.chain, q, qd, JointVector<double>::Zero(a.chain.size()));
-  const double fall = tip.velocity.z() * tip.velocity.z() + 2 * 9.81 * (tip.frame.p.z() - a.box.middle.z());
-  const double time = (tip.velocity.z() + std::sqrt(std::max(0.0, fall))) / 9.81;
+  const Eigen::Vector2d level = tip.velocity.head<2>();  // the flight stays in the vertical plane of it
+  flight::FlightProblem<double> flight;
+  flight.pose = {0, tip.frame.p.z(), 0};
+  flight.twist = {level.norm(), tip.velocity.z(), 0};
+  flight.gravity = {0, -a.medium.gravity};
+  flight.drag_k = a.medium.drag_k;
+  flight.landing_height = a.box.middle.z();
+  const auto flown = flight::fly(flight);
   Rows out;
-  for (int k = 0; k <= 40; ++k) {
-    const double s = time * k / 40;
-    out.push_back(side_view(a, tip.frame.p + s * tip.velocity - Eigen::Vector3d(0, 0, 0.5 * 9.81 * s * s)));
+  if (flown.outcome != flight::FlightOutcome::landed) return out;
+  std::vector<double> times;
+  for (int k = 0; k <= 40; ++k) times.push_back(flown.landing.flight_time * k / 40);
+  for (const auto& pose : flight::fly_through(flight, times)) {
+    Eigen::Vector3d at = tip.frame.p;
+    at.head<2>() += pose.x * level.normalized();
+    at.z() = pose.z;
+    out.push_back(side_view(a, at));
   }
   return out;
 }

@@ -29,6 +29,26 @@ TEST_F(Cli, PlansAThrowIntoABox) {
   expect_refusal("plan throw --target 1.3,0,0 --card none.json", 3, "none.json");
 }
 
+/// The last row of a block of a figure's data.
+std::string last_row(const std::string& data, const std::string& title) {
+  std::istringstream lines(data.substr(data.find(title)));
+  std::string line, row;
+  std::getline(lines, line);
+  while (std::getline(lines, line) && !line.empty()) row = line;
+  return row;
+}
+
+TEST_F(Cli, DrawsTheFlightsOfAThrowWithTheirDrag) {
+  const Answer answer =
+      run("plan throw --target 1.3,0,-0.2 --samples 100 --drag 0.1 --json plan.json --report out");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const auto landings =
+      nlohmann::json::parse(content(folder / "plan.json"))["window_landings"]["no_acceleration"]["forward_m"];
+  const std::string data = content(folder / "out/tube.dat");
+  EXPECT_NEAR(std::stod(last_row(data, "flight from 0.000 s, no")), landings.front().get<double>(), 1e-6);
+  EXPECT_NEAR(std::stod(last_row(data, "flight from 0.100 s, no")), landings.back().get<double>(), 1e-6);
+}
+
 TEST_F(Cli, PlansAThrowWithACard) {
   ASSERT_EQ(run("compare " + quick + " --models sliding_pivot --write-cards cards").code, 0);
   std::ofstream(folder / "bar.toml") << "name='bar'\nsurface='paper'\nmass_kg=0.246\ncom_offset_m=0.14\n"
