@@ -70,20 +70,19 @@ struct Layout {
 
 /// Derivatives of a linearisation: every sweep of dual numbers has room for a few, and is a simulation.
 enum class DerivativesBy {
-  nothing,
-  own,  ///< by the throw's own unknowns
-  all,  ///< and by the campaign's
+  nothing,  ///< values alone
+  own,      ///< by the throw's own unknowns
+  all,      ///< and by the campaign's
 };
 
 /// r = (predicted − observed)/σ, and its derivatives with respect to the campaign's unknowns and the throw's
 /// own.
 struct Linearisation {
-  bool solved{};             ///< false: release or flight has no answer, and what follows is empty
-  Eigen::VectorXd residual;  ///< one per observation [σ]
-  /// Derivatives of the residual: a row each, a column per unknown; zero by what was not asked for.
-  Eigen::MatrixXd campaign, own;
-  std::vector<int> modes;  ///< the modes entered, in order
-  double detach{};         ///< [s]
+  bool solved{};                  ///< false: release or flight has no answer, and what follows is empty
+  Eigen::VectorXd residual;       ///< one per observation [σ]
+  Eigen::MatrixXd campaign, own;  ///< its derivatives, a column per unknown; 0 by what was not asked for
+  std::vector<int> modes;         ///< the modes entered, in order
+  double detach{};                ///< [s]
 };
 
 /// A campaign with a model: unknowns, residuals and their derivatives.
