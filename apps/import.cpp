@@ -16,8 +16,27 @@ struct ImportOptions {
   std::string format, out, json;
   std::vector<std::string> inputs;
   LabOptions lab;
+  double cube_side{}, cube_mass{}, cube_inertia{};  // [m], [kg], [kg m^2]; 0: not given
   int threads{0};
+
+  bool another_cube() const { return cube_side > 0 || cube_mass > 0 || cube_inertia > 0; }
 };
+
+/// Another cube than the published one: homogeneous, unless its inertia is given.
+datasets::CubeTossOptions cube_of(const ImportOptions& options) {
+  datasets::CubeTossOptions out;
+  if (!options.another_cube()) return out;
+  if (!(options.cube_side > 0 && options.cube_mass > 0))
+    throw WrongUsage("--cube-side and --cube-mass are needed for another cube than the published one");
+  const bool known = options.cube_inertia > 0;
+  out.side = options.cube_side;
+  out.mass = options.cube_mass;
+  out.inertia.fill(known ? options.cube_inertia : out.mass * out.side * out.side / 6);
+  out.source = fmt::format("measured; mass and side as given, inertia {}",
+                           known ? "as given" : "of a homogeneous cube");
+  out.licence.clear();
+  return out;
+}
 
 /// What an importer says of its inputs.
 struct Imported {
@@ -29,7 +48,7 @@ Imported import_cubes(const ImportOptions& options, Outputs& outputs) {
   if (options.inputs.size() != 1)
     throw WrongUsage(fmt::format("cube-tosses takes one CSV file, not {}", options.inputs.size()));
   datasets::ImportReport report;
-  const auto log = datasets::import_cube_tosses(options.inputs.front(), {}, &report);
+  const auto log = datasets::import_cube_tosses(options.inputs.front(), cube_of(options), &report);
   outputs.log(options.out, log);
   Imported out;
   out.text = fmt::format("{}: {} of {} tosses ({} train, {} test)\n", options.out, report.kept, report.tosses,
@@ -122,6 +141,9 @@ void import(ImportOptions& options) {
   for (const Format& format : formats) {
     if (options.format != format.name) continue;
     if (format.read != &import_lab_files) refuse_lab_options(options.format, options.lab);
+    if (format.read != &import_cubes && options.another_cube())
+      throw WrongUsage(
+          fmt::format("--cube-side, --cube-mass and --cube-inertia are not for {}", options.format));
     require_writable(options.out);
     require_writable(options.json);
     Outputs outputs;
@@ -152,6 +174,13 @@ Command import_command(Parser& root) {
                 "The log to write (replaced if it exists); --into, where that is given");
   parser.option("--json", options->json, "Write what was read, kept and dropped as JSON");
   add_threads(parser, options->threads);
+  const char* cube = "Another cube than the published one (cube-tosses)";
+  parser.option("--cube-side", options->cube_side, "[m] Its side").group(cube).positive();
+  parser.option("--cube-mass", options->cube_mass, "[kg] Its mass").group(cube).positive();
+  parser
+      .option("--cube-inertia", options->cube_inertia, "[kg m^2] About its middle; else a homogeneous cube's")
+      .group(cube)
+      .positive();
   add_lab_options(parser, options->lab);
   parser.footer(examples());
   return {&parser, [options] { import(*options); }};

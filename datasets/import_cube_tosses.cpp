@@ -142,6 +142,11 @@ Throw make_throw(const Toss& toss, const CubeTossOptions& options, const std::ve
 }
 
 void check_options(const CubeTossOptions& options) {
+  const auto& [ix, iy, iz] = options.inertia;
+  for (const auto& [name, value] :
+       {std::pair{"mass", options.mass}, {"side", options.side}, {"inertia", std::min({ix, iy, iz})}})
+    if (!(value > 0 && std::isfinite(value)))
+      throw std::invalid_argument(fmt::format("{}: {} is not > 0", name, value));
   if (options.min_samples < 2) {
     throw std::invalid_argument(fmt::format("min_samples: {} is not >= 2", options.min_samples));
   }
@@ -162,10 +167,9 @@ ThrowLog import_cube_tosses(const std::filesystem::path& csv, const CubeTossOpti
   log.dimension = 3;
   log.title = "cube tosses";
   log.source =
-      "measured: DAIRLab contact-nets (Pfrommer, Halm, Posa, CoRL 2020); mass, side and inertia as "
-      "published; sigma "
-      "estimated by the importer from the scatter about a smooth flight, not stated by the source";
-  log.licence = "BSD-3-Clause";
+      options.source +
+      "; sigma estimated by the importer from the scatter about a smooth flight, not stated by the source";
+  log.licence = options.licence;
   log.gravity = options.gravity;
   log.landing_height = std::sqrt(3.0) / 2 * options.side;
   Object cube;

@@ -87,6 +87,30 @@ TEST_F(Cli, ImportsTheFilesOfALab) {
   expect_refusal("import " + motive + "--mass 1 --out a.h5 --json a.json", 3, "takes/slow_02.csv: line 246");
 }
 
+TEST_F(Cli, ImportsTossesOfAnotherCube) {
+  std::ofstream tosses(folder / "t.csv");
+  tosses << "toss,k,t_s,x_m,y_m,z_m,qw,qx,qy,qz,vx,vy,vz,wx_body,wy_body,wz_body,before_first_contact\n";
+  for (int toss = 0; toss < 5; ++toss)
+    for (int k = 0; k < 12; ++k) {
+      const double t = 0.01 * k;
+      tosses << toss << ',' << k << ',' << t << ',' << t << ",0," << 0.6 + t - 4.905 * t * t
+             << ",1,0,0,0,0,0,0,0,0,0," << (k < 11) << '\n';
+    }
+  tosses.close();
+  const std::string what = "import cube-tosses t.csv --out cubes.h5 ";
+  ASSERT_EQ(run(what + "--cube-side 0.06 --cube-mass 0.1").code, 0);
+  const auto log = datasets::read_throw_log(folder / "cubes.h5");
+  const datasets::Object& cube = log.objects.at("cube");
+  EXPECT_EQ(cube.mass, 0.1);
+  EXPECT_NEAR(log.landing_height, 0.06 * std::sqrt(0.75), 1e-12);
+  for (const double inertia : *cube.inertia) EXPECT_NEAR(inertia, 0.1 * 0.06 * 0.06 / 6, 1e-15);
+  EXPECT_THAT(log.source, testing::Not(HasSubstr("DAIRLab")));
+  EXPECT_EQ(run(what + "--cube-side 0.06 --cube-mass 0.1 --cube-inertia 7e-5").code, 0);
+  EXPECT_EQ(datasets::read_throw_log(folder / "cubes.h5").objects.at("cube").inertia->at(1), 7e-5);
+  expect_refusal("import cube-tosses t.csv --out a.h5 --cube-side 0.06", 2, "--cube-side and --cube-mass");
+  expect_refusal("import phyphox t.csv --mass 1 --out a.h5 --cube-side 0.06", 2, "are not for phyphox");
+}
+
 TEST_F(Cli, ImportsPhonesAsFreeFlights) {
   std::ofstream phone(folder / "fall_1.csv");
   phone << "Time (s),Acceleration x (m/s^2),Acceleration y (m/s^2),Acceleration z (m/s^2)\n";
