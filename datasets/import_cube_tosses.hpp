@@ -24,9 +24,12 @@ namespace unhand::datasets {
 struct CubeTossOptions {
   double mass = 0.37, side = 0.1048;                         // [kg], [m]
   std::array<double, 3> inertia{0.00081, 0.00081, 0.00081};  // [kg m²]
+  /// Where the tosses and the cube's numbers are from, and the licence of the data.
+  /// @{
   std::string source =
       "measured: DAIRLab contact-nets (Pfrommer, Halm, Posa, CoRL 2020); mass, side and inertia as published";
   std::string licence = "BSD-3-Clause";
+  /// @}
   double gravity = 9.81;           // [m/s²]
   double sigma_position = 3e-5;    // [m], at least
   double sigma_quaternion = 2e-4;  // [1], at least
