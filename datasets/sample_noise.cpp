@@ -3,17 +3,14 @@
 #include <cmath>
 
 #include "dynamics/median.hpp"
+#include "dynamics/third_difference.hpp"
 
 namespace unhand::datasets {
 
 void SampleNoise::add(const std::array<double, 4>& times, const std::array<double, 4>& values) {
+  const auto weight = dynamics::third_difference_weights(times);
   double sum = 0, weights = 0;
-  for (std::size_t i = 0; i < 4; ++i) {
-    double w = 1;
-    for (std::size_t j = 0; j < 4; ++j)
-      if (j != i) w /= (times[i] - times[j]) / (times[3] - times[0]);
-    sum += w * values[i], weights += w * w;
-  }
+  for (std::size_t i = 0; i < 4; ++i) sum += weight[i] * values[i], weights += weight[i] * weight[i];
   squares_.push_back(sum * sum / weights);
 }
 

@@ -2,15 +2,11 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
-#include <span>
 #include <vector>
 
 namespace unhand::datasets {
 
-/// Gathers third divided differences of series whose samples need not be equally spaced. Four samples x_i at
-/// t_i: Σ w_i x_i with w_i = 1/Π_{j≠i} (t_i − t_j) is zero for every parabola, and for noise of variance σ²
-/// it has σ² Σ w_i².
+/// Gathers third differences of series whose samples need not be equally spaced.
 class SampleNoise {
  public:
   /// Four samples at rising times [s].

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "dynamics/third_difference.hpp"
+
 namespace unhand::experiment {
 namespace {
 
@@ -13,14 +15,12 @@ struct Off {
   double size{}, sigma{};
 };
 Off off_parabola(const FlightSamples& s, std::size_t axis, std::size_t first, std::size_t member) {
-  double sum = 0, squares = 0, own = 0;
-  for (std::size_t i = 0; i < 4; ++i) {
-    double w = 1;
-    for (std::size_t j = 0; j < 4; ++j)
-      if (j != i) w *= (s.times[first + 3] - s.times[first]) / (s.times[first + i] - s.times[first + j]);
-    sum += w * s.position[first + i][axis], squares += w * w;
-    if (i == member) own = w;
-  }
+  const double* t = &s.times[first];
+  const auto weight = dynamics::third_difference_weights({t[0], t[1], t[2], t[3]});
+  double sum = 0, squares = 0;
+  for (std::size_t i = 0; i < 4; ++i)
+    sum += weight[i] * s.position[first + i][axis], squares += weight[i] * weight[i];
+  const double own = weight[member];
   return {sum / own, std::sqrt(squares) / std::abs(own)};
 }
 

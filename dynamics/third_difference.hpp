@@ -1,0 +1,19 @@
+// What four samples of a smooth motion say of their noise.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace unhand::dynamics {
+
+/// w_i = Π_{j≠i} (t₃ − t₀)/(t_i − t_j) [-] of four different times: Σ w_i x(t_i) is zero for every parabola,
+/// however the times are spaced, and for noise of variance σ² it has σ² Σ w_i².
+inline std::array<double, 4> third_difference_weights(const std::array<double, 4>& times) {
+  std::array<double, 4> out{1, 1, 1, 1};
+  for (std::size_t i = 0; i < 4; ++i)
+    for (std::size_t j = 0; j < 4; ++j)
+      if (j != i) out[i] *= (times[3] - times[0]) / (times[i] - times[j]);
+  return out;
+}
+
+}  // namespace unhand::dynamics
