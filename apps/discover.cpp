@@ -33,13 +33,21 @@ struct DiscoverOptions {
 };
 
 Json json_of(const OutcomeErrors& e) {
+  Json lacks = Json::array();
+  for (const auto& [outcome, fit] : e.lacks)
+    lacks.push_back({{"outcome", to_string(outcome)},
+                     {"unit", unit_of(outcome)},
+                     {"rms", number(std::sqrt(fit.repetitions + fit.shared))},
+                     {"repetitions_rms", number(std::sqrt(fit.repetitions))},
+                     {"p_value", number(fit.p_value)}});
   return {{"n", e.n},
           {"landing_x_mae_m", number(e.landing_x_mae)},
           {"landing_theta_mae_deg", number(e.landing_theta_mae)},
           {"detach_vx_mae_m_s", number(e.detach_vx_mae)},
           {"detach_omega_mae_deg_s", number(e.detach_omega_mae)},
           {"trajectory_rms_m", number(e.trajectory_rms)},
-          {"chi2_per_dof", number(e.chi2_per_dof)}};
+          {"chi2_per_dof", number(e.chi2_per_dof)},
+          {"lack_of_fit", lacks}};
 }
 
 Json structure_json(const std::vector<fitting::ChannelStructure>& structures) {

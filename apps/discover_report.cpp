@@ -139,6 +139,23 @@ Table error_table(const Discovery& found) {
   return table;
 }
 
+/// Whether the errors go with the condition: rms over what repetitions scatter by, outcome by outcome.
+Table lack_table(const Discovery& found) {
+  Table table{{"prediction errors over repetitions' scatter"}, {}, 1};
+  for (const auto& lack : found.before_train.lacks) table.header.push_back(to_string(lack.outcome));
+  const auto row = [&](const char* name, const OutcomeErrors& e) {
+    table.rows.push_back({name});
+    for (const auto& [outcome, fit] : e.lacks)
+      table.rows.back().push_back(
+          fit.repetitions > 0 ? fmt::format("{:.2f} (p {:.1g})", std::sqrt(fit.ratio()), fit.p_value) : "-");
+  };
+  row("before, train", found.before_train);
+  row("before, test", found.before_test);
+  row("after, train", found.after_train);
+  row("after, test", found.after_test);
+  return table;
+}
+
 Table misfit_table(const Discovery& found) {
   Table table{
       {"phase", "channel", "samples", "before, train", "after, train", "before, test", "after, test"}, {}, 2};
@@ -193,7 +210,9 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
           "<h1>What the model lacks: {0}</h1>\n<p>Base model <code>{1}</code>. Verdict: <b>{2}</b>.</p>\n"
           "<h2>Where it starts</h2><p>{3}</p>\n{4}<h2>The answer</h2>\n{5}<h2>Errors before and after</h2>\n"
           "<p>Predicted from what is known before the throw, minus measured; chi2/dof with the throws' own "
-          "unknowns fitted. Test throws took no part in any fit.</p>{6}"
+          "unknowns fitted. Test throws took no part in any fit. Below, the rms of these errors over what "
+          "repetitions of a condition scatter by about their mean: above 1.4 most of the error goes with the "
+          "condition, and a better model would take it away.</p>{6}"
           "<h2>Candidates</h2><p>From the footprint of each: the derivative of every predicted sample, with "
           "the "
           "model's own unknowns projected out.</p>{7}{8}"
@@ -204,7 +223,7 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
           "<code>{11}</code></p></html>\n",
           escaped(std::filesystem::path(log).filename().string()),
           escaped(json.at("base_model").get<std::string>()), to_string(found.verdict), first,
-          picture("residual"), answer, html(error_table(found)), picture("ranking"),
+          picture("residual"), answer, html(error_table(found)) + html(lack_table(found)), picture("ranking"),
           html(ranking_table(found.ranking)), html(misfit_table(found)), escaped(command),
           json.value("log_checksum", "unknown"), html(structure_table(found))));
   write_text(directory / "discovery.json", json_text(json));

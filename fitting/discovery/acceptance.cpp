@@ -82,17 +82,36 @@ bool held_out_confirms(const Stage& before, const Stage& after) {
 }
 
 bool predicts_better(const Stage& before, const Stage& after, const DiscoverOptions& options) {
-  const PredictionGain gain = prediction_gain(before, after, options);
+  const auto outcomes_before = outcomes_of(before, Share::test, options.fit.threads),
+             outcomes_after = outcomes_of(after, Share::test, options.fit.threads);
+  const PredictionGain gain = prediction_gain(outcomes_before, outcomes_after);
   if (!(gain.before > options.prediction_matters * gain.after) || !held_out_confirms(before, after))
     return false;
-  const auto was = errors_of(before, Share::test, options.fit.threads),
-             is = errors_of(after, Share::test, options.fit.threads);
+  const OutcomeErrors was = outcome_errors(outcomes_before), is = outcome_errors(outcomes_after);
   const auto holds = [&](double OutcomeErrors::*outcome) {
     return !(is.*outcome > options.prediction_matters * was.*outcome);
   };
   return holds(&OutcomeErrors::landing_x_mae) && holds(&OutcomeErrors::landing_theta_mae) &&
          holds(&OutcomeErrors::detach_vx_mae) && holds(&OutcomeErrors::detach_omega_mae) &&
          holds(&OutcomeErrors::trajectory_rms);
+}
+
+bool is_lacking(const LackOfFit& fit, double level) { return fit.ratio() >= kLacking && fit.p_value < level; }
+
+LackOfFit lack_in(const OutcomeErrors& all, Outcome outcome) {
+  for (const OutcomeLack& lack : all.lacks)
+    if (lack.outcome == outcome) return lack.fit;
+  return {};
+}
+
+std::vector<OutcomeLack> lacking(const OutcomeErrors& train, const OutcomeErrors& held_out,
+                                 const DiscoverOptions& options) {
+  std::vector<OutcomeLack> out;
+  for (const OutcomeLack& lack : train.lacks)
+    if (is_lacking(lack.fit, options.false_discovery_rate / kOutcomes) &&
+        is_lacking(lack_in(held_out, lack.outcome), kConfirmedAt))
+      out.push_back(lack);
+  return out;
 }
 
 double wald_p_value(const FitResult& fit, const dynamics::Effect& effect) {
@@ -145,11 +164,24 @@ bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisf
   });
 }
 
+/// Whether predictions lack so much of what the base model's lacked, in both halves of the throws.
+bool leaves_lacking(const BothErrors& errors, const Discovery& so_far, const DiscoverOptions& options) {
+  const auto share = [](const LackOfFit& now, const LackOfFit& base) {
+    return now.shared > kLeft * base.shared;
+  };
+  const auto all = lacking(errors.train, errors.held_out, options);
+  return std::any_of(all.begin(), all.end(), [&](const OutcomeLack& lack) {
+    return share(lack.fit, lack_in(so_far.before_train, lack.outcome)) &&
+           share(lack_in(errors.held_out, lack.outcome), lack_in(so_far.before_test, lack.outcome));
+  });
+}
+
 }  // namespace
 
-bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const FitResult& counted,
-                  const Discovery& so_far, const DiscoverOptions& options) {
-  return (!is_law(effect.id) && wald_p_value(counted, find_effect(effect.id)) > kToldFromNone) ||
+bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const BothErrors& errors,
+                  const FitResult& counted, const Discovery& so_far, const DiscoverOptions& options) {
+  return (acts(effect, false) && leaves_lacking(errors, so_far, options)) ||
+         (!is_law(effect.id) && wald_p_value(counted, find_effect(effect.id)) > kToldFromNone) ||
          leaves_too_much(effect, so_far.base.misfit, so_far.base_test, stage.fit.misfit, options) ||
          leaves_too_much(effect, so_far.base_test, so_far.base.misfit, stage.held_out.misfit, options);
 }

@@ -84,6 +84,19 @@ bool held_out_confirms(const Stage& before, const Stage& after);
 /// no outcome (detach, landing, trajectory) by as much worse.
 bool predicts_better(const Stage& before, const Stage& after, const DiscoverOptions& options);
 
+/// How many times what repetitions scatter by the mean square of prediction errors is where a model lacks
+/// something: most of the error then goes with the condition, and a better model would take it away.
+inline constexpr double kLacking = 2;
+/// Outcomes that share the false discovery rate.
+inline constexpr int kOutcomes = 4;
+/// Whether an outcome's errors say so, and a chance of `level` does not.
+bool is_lacking(const LackOfFit& fit, double level);
+/// The outcomes that the train throws are predicted so badly in, where the held-out throws confirm it.
+std::vector<OutcomeLack> lacking(const OutcomeErrors& train, const OutcomeErrors& held_out,
+                                 const DiscoverOptions& options);
+/// An outcome's errors in `all`; none where it was not predicted.
+LackOfFit lack_in(const OutcomeErrors& all, Outcome outcome);
+
 /// The give of pads before they slip, under the grip's friction limit, from where on it is an effect like any
 /// other [m].
 inline constexpr double kMostGive = 3e-5;
@@ -113,9 +126,10 @@ bool acts(const AcceptedEffect& effect, bool air);
 
 /// An accepted effect that is the shadow of something else. Either conditions and blocks of sensors do not
 /// agree on its size, so that its interval, which counts that (`counted`), has none in it. Or it leaves too
-/// much where it acts: of the throws that it was fitted to, or of those that it has not seen.
-bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const FitResult& counted,
-                  const Discovery& so_far, const DiscoverOptions& options);
+/// much where it acts: of the throws that it was fitted to, or of those that it has not seen. Or, acting in
+/// the hand, it leaves predictions lacking (`errors` are the stage's) by too much of what the base's lacked.
+bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const BothErrors& errors,
+                  const FitResult& counted, const Discovery& so_far, const DiscoverOptions& options);
 
 /// By what share of its χ² an answer may leave a channel noisier than the base model did.
 inline constexpr double kNoisier = 0.25;

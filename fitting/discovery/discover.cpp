@@ -20,6 +20,16 @@ const char* to_string(Verdict verdict) {
   return kNames[static_cast<int>(verdict)];
 }
 
+const char* to_string(Outcome outcome) {
+  constexpr const char* kNames[] = {"position in flight", "orientation in flight", "landing x",
+                                    "landing theta"};
+  return kNames[static_cast<int>(outcome)];
+}
+
+const char* unit_of(Outcome outcome) {
+  return outcome == Outcome::orientation || outcome == Outcome::landing_theta ? "rad" : "m";
+}
+
 void AcceptedEffect::add_other_name(const std::string& other, double correlation) {
   for (auto& [name, known] : equivalent)
     if (name == other) {
@@ -85,7 +95,8 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
       // The give of the pads may hide what else there is: with it, unless it predicts worse, one more look.
       const Stage rigid = stage;
       if (!out.small || !out.small->any_pads || !fit_along(stage, options, out)) break;
-      const PredictionGain gain = prediction_gain(rigid, stage, options);
+      const PredictionGain gain =
+          prediction_gain(outcomes_of(rigid, Share::test, threads), outcomes_of(stage, Share::test, threads));
       if (!(gain.after < gain.before) || !held_out_confirms(rigid, stage)) {
         stage = rigid;
         out.along.clear();
@@ -112,13 +123,13 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
   const auto residuals_after = unchanged ? residuals_before : residuals_of(stage.problem, stage.fit, threads);
   out.residual_after = residual_over_time(stage.problem, residuals_after);
   out.structure_after = structures(stage.problem, residuals_after);
-  out.unexplained = unexplained(stage, out, options);
-  if (out.unexplained) out.small.reset();  // beside that, nobody knows what it imitates
   out.final = stage.fit;
   out.final_test = stage.held_out.misfit;
   out.model = stage.problem.options().model;
   out.after_train = unchanged ? out.before_train : errors_of(stage, Share::train, threads);
   out.after_test = unchanged ? out.before_test : errors_of(stage, Share::test, threads);
+  out.unexplained = unexplained(stage, out, options);
+  if (out.unexplained) out.small.reset();  // beside that, nobody knows what it imitates
   out.verdict = !out.effects.empty() ? Verdict::effect_found
                 : out.unexplained    ? Verdict::unexplained
                                      : Verdict::no_missing_effect;

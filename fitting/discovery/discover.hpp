@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "fitting/discovery/lack_of_fit.hpp"
 #include "fitting/discovery/missing_force.hpp"
 #include "fitting/discovery/residuals.hpp"
 #include "fitting/fit.hpp"
@@ -53,6 +54,24 @@ enum class Verdict {
 /// The verdict's name, as it is written above.
 const char* to_string(Verdict);
 
+/// What predictions are judged by, throw by throw.
+enum class Outcome {
+  position,       ///< of the tracked frame, mean over the flight
+  orientation,    ///< the same of its angle
+  landing_x,      ///< of the landing
+  landing_theta,  ///< of the landing
+};
+/// The outcome's name in words.
+const char* to_string(Outcome);
+/// "m" or "rad".
+const char* unit_of(Outcome);
+
+/// Whether an outcome's errors go with the condition.
+struct OutcomeLack {
+  Outcome outcome{};
+  LackOfFit fit;  ///< mean squares in m² or rad²
+};
+
 /// Errors of the outcome, predicted before the throw (own unknowns from the grasp alone) minus measured.
 struct OutcomeErrors {
   int n{};                     ///< throws
@@ -63,6 +82,7 @@ struct OutcomeErrors {
   double trajectory_rms{};     ///< of the position in flight [m]
   std::optional<double>
       chi2_per_dof;  ///< with the throws' own unknowns fitted, where observations outnumber them
+  std::vector<OutcomeLack> lacks;  ///< of every outcome
 };
 
 /// A parameter of an accepted effect.
@@ -148,9 +168,11 @@ struct MissingEstimate {
 
 /// Structure that no effect of the catalogue accounts for.
 struct Unexplained {
-  Phase phase{};                           ///< where it is largest
-  experiment::Channel channel{};           ///< of which sensor
-  double chi2_per_dof{};                   ///< on held-out throws; 1 is the noise
+  Phase phase{};                  ///< where it is largest
+  experiment::Channel channel{};  ///< of which sensor
+  /// On the train throws: χ² per sample; of predictions, their errors' mean square over what repetitions
+  /// scatter by. 1 is the noise.
+  double chi2_per_dof{};
   std::string description;                 ///< in words
   std::optional<MissingEstimate> missing;  ///< absent where no force can be read from it
 };

@@ -131,7 +131,9 @@ class ForwardStep {
   /// of the pads that no pads are without, nor what imitates that.
   std::optional<Stage> weigh_small() {
     try_give();
-    const PredictionGain gain = prediction_gain(stage_, small_->next, options_);
+    const int threads = options_.fit.threads;
+    const PredictionGain gain = prediction_gain(outcomes_of(stage_, Share::test, threads),
+                                                outcomes_of(small_->next, Share::test, threads));
     const std::string& id = id_of(*small_->score);
     const bool give = id == kPads && give_of(small_->next) <= kMostGive;
     if (!give && predicts_better(stage_, small_->next, options_))

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
-#include <vector>
+#include <map>
+#include <string>
 
 #include "experiment/parallel.hpp"
 #include "fitting/evaluate.hpp"
@@ -14,50 +14,104 @@ using experiment::Channel;
 
 namespace {
 
-/// Throws as predicted, and for each the squares of the position's errors in flight.
-struct Predicted {
-  std::vector<PredictedThrow> throws;
-  std::vector<double> squares, samples;  ///< Σ (Δx² + Δz²) [m²], and how many
+constexpr int kLandingX = 2, kLandingTheta = 3;  // of kQuantities
+
+/// What is tracked in flight of a predicted throw.
+void follow_flight(const CampaignProblem& problem, const CampaignThrow& thrown,
+                   const std::vector<double>& campaign, const PredictedThrow& predicted,
+                   PredictedOutcome& out) {
+  const auto channels = problem.predict(thrown, campaign, predicted.own).channels;
+  const double detach = thrown.release_or(predicted.comparison.prediction.detach.time);
+  std::array<double, 3> sum{}, n{};
+  for (std::size_t j = 0; j < channels.size(); ++j) {
+    const auto& o = thrown.observed.all[j];
+    if (phase_of(o, thrown.opening, detach) != Phase::flight) continue;
+    const std::size_t k = o.channel == Channel::mocap_x       ? 0
+                          : o.channel == Channel::mocap_z     ? 1
+                          : o.channel == Channel::mocap_theta ? 2
+                                                              : 3;
+    if (k == 3) continue;
+    const double error = channels[j] - o.value;
+    sum[k] += error, n[k] += 1;
+    if (k < 2) out.squares += error * error;
+  }
+  out.samples = n[0];
+  if (n[0] > 0 && n[1] > 0 && n[2] > 0) out.flight = {sum[0] / n[0], sum[1] / n[1], sum[2] / n[2]};
+}
+
+/// Where the errors of all throws are compared by condition.
+class ByCondition {
+ public:
+  explicit ByCondition(const std::vector<PredictedOutcome>& throws) : throws_(throws) {}
+  /// `read` gives a throw's error, or nothing.
+  template <class Read>
+  LackOfFit operator()(const Read& read) const {
+    std::vector<std::array<double, 2>> error;
+    std::vector<int> condition;
+    for (const PredictedOutcome& thrown : throws_)
+      if (const std::optional<std::array<double, 2>> e = read(thrown))
+        error.push_back(*e), condition.push_back(thrown.condition);
+    return lack_of_fit(error, condition);
+  }
+
+ private:
+  const std::vector<PredictedOutcome>& throws_;
 };
 
-Predicted predicted(const CampaignProblem& problem, const FitResult& fit, Share share, int threads) {
+std::vector<OutcomeLack> lacks(const std::vector<PredictedOutcome>& throws) {
+  using Error = std::optional<std::array<double, 2>>;
+  const ByCondition of(throws);
+  const auto landing = [](int quantity, double unit) {
+    return [=](const PredictedOutcome& t) {
+      const auto& e = t.error[static_cast<std::size_t>(quantity)];
+      return e ? Error{{*e * unit, 0}} : Error{};
+    };
+  };
+  return {{Outcome::position, of([](const PredictedOutcome& t) {
+             return t.flight ? Error{{(*t.flight)[0], (*t.flight)[1]}} : Error{};
+           })},
+          {Outcome::orientation, of([](const PredictedOutcome& t) {
+             return t.flight ? Error{{(*t.flight)[2], 0}} : Error{};
+           })},
+          {Outcome::landing_x, of(landing(kLandingX, 1))},
+          {Outcome::landing_theta, of(landing(kLandingTheta, 1 / experiment::kDegrees))}};
+}
+
+}  // namespace
+
+std::vector<PredictedOutcome> predicted_outcomes(const CampaignProblem& problem, const FitResult& fit,
+                                                 Share share, int threads) {
   std::vector<std::size_t> which;
   for (std::size_t i = 0; i < problem.throws().size(); ++i)
     if (share == Share::all ||
         (share == Share::train) == (problem.throws()[i].prepared.split == datasets::Split::train))
       which.push_back(i);
-  Predicted out{predict_some(problem, fit, which, {false, threads}), std::vector<double>(which.size(), 0),
-                std::vector<double>(which.size(), 0)};
+  const auto predicted = predict_some(problem, fit, which, {false, threads});
   const auto campaign = fit.values();
+  std::map<std::string, int> conditions;
+  std::vector<PredictedOutcome> out(which.size());
+  for (std::size_t k = 0; k < which.size(); ++k)
+    out[k].condition = conditions
+                           .try_emplace(problem.throws()[which[k]].prepared.experiment(),
+                                        static_cast<int>(conditions.size()))
+                           .first->second;
   experiment::parallel_for(which.size(), threads, [&](std::size_t k) {
-    const CampaignThrow& thrown = problem.throws()[which[k]];
-    const auto channels = problem.predict(thrown, campaign, out.throws[k].own).channels;
-    for (std::size_t j = 0; j < channels.size(); ++j) {
-      const auto& o = thrown.observed.all[j];
-      const double detach = thrown.release_or(out.throws[k].comparison.prediction.detach.time);
-      if (phase_of(o, thrown.opening, detach) != Phase::flight) continue;
-      if (o.channel != Channel::mocap_x && o.channel != Channel::mocap_z) continue;
-      out.squares[k] += (channels[j] - o.value) * (channels[j] - o.value);
-      if (o.channel == Channel::mocap_x) out.samples[k] += 1;
-    }
+    std::copy(std::begin(predicted[k].comparison.error), std::end(predicted[k].comparison.error),
+              out[k].error.begin());
+    follow_flight(problem, problem.throws()[which[k]], campaign, predicted[k], out[k]);
   });
   return out;
 }
 
-constexpr int kLandingX = 2;  // of kQuantities
-
-}  // namespace
-
-OutcomeErrors outcome_errors(const CampaignProblem& problem, const FitResult& fit, Share share, int threads) {
-  const Predicted of = predicted(problem, fit, share, threads);
+OutcomeErrors outcome_errors(const std::vector<PredictedOutcome>& throws) {
   OutcomeErrors out;
   double square = 0, n = 0, counts[experiment::kQuantityCount] = {}, sums[experiment::kQuantityCount] = {};
-  for (std::size_t k = 0; k < of.throws.size(); ++k) {
-    square += of.squares[k];
-    n += of.samples[k];
+  for (const PredictedOutcome& thrown : throws) {
+    square += thrown.squares;
+    n += thrown.samples;
     bool any = false;
-    for (int q = 0; q < experiment::kQuantityCount; ++q)
-      if (const auto& error = of.throws[k].comparison.error[q]) {
+    for (std::size_t q = 0; q < thrown.error.size(); ++q)
+      if (const auto& error = thrown.error[q]) {
         counts[q] += 1;
         sums[q] += std::abs(*error);
         any = true;
@@ -68,29 +122,28 @@ OutcomeErrors outcome_errors(const CampaignProblem& problem, const FitResult& fi
   out.detach_vx_mae = mean(0);
   out.detach_omega_mae = mean(1);
   out.landing_x_mae = mean(kLandingX);
-  out.landing_theta_mae = mean(3);
+  out.landing_theta_mae = mean(kLandingTheta);
   out.trajectory_rms = n > 0 ? std::sqrt(square / n) : 0;
+  out.lacks = lacks(throws);
   return out;
 }
 
-PredictionGain prediction_gain(const CampaignProblem& problem, const FitResult& fit,
-                               const CampaignProblem& other, const FitResult& other_fit, Share share,
-                               int threads) {
-  const Predicted a = predicted(problem, fit, share, threads),
-                  b = predicted(other, other_fit, share, threads);
-  const bool tracked = std::any_of(a.samples.begin(), a.samples.end(), [](double n) { return n > 0; });
-  const auto square_of = [&](const Predicted& of, std::size_t k) -> std::optional<double> {
-    if (tracked) return of.samples[k] > 0 ? std::optional(of.squares[k] / of.samples[k]) : std::nullopt;
-    const auto& error = of.throws[k].comparison.error[kLandingX];
+PredictionGain prediction_gain(const std::vector<PredictedOutcome>& before,
+                               const std::vector<PredictedOutcome>& after) {
+  const bool tracked =
+      std::any_of(before.begin(), before.end(), [](const PredictedOutcome& t) { return t.samples > 0; });
+  const auto square_of = [&](const PredictedOutcome& t) -> std::optional<double> {
+    if (tracked) return t.samples > 0 ? std::optional(t.squares / t.samples) : std::nullopt;
+    const auto& error = t.error[kLandingX];
     return error ? std::optional(*error * *error) : std::nullopt;
   };
-  double n = 0, before = 0, after = 0;
-  for (std::size_t k = 0; k < a.throws.size(); ++k) {
-    const auto was = square_of(a, k), is = square_of(b, k);
-    if (was && is) n += 1, before += *was, after += *is;
+  double n = 0, sum_before = 0, sum_after = 0;
+  for (std::size_t k = 0; k < before.size(); ++k) {
+    const auto was = square_of(before[k]), is = square_of(after[k]);
+    if (was && is) n += 1, sum_before += *was, sum_after += *is;
   }
   if (!(n > 0)) return {};
-  return {std::sqrt(before / n), std::sqrt(after / n)};
+  return {std::sqrt(sum_before / n), std::sqrt(sum_after / n)};
 }
 
 }  // namespace unhand::fitting

@@ -1,14 +1,33 @@
 // How far a fitted model's predictions of the outcome are from what was measured.
 #pragma once
 
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "experiment/compare.hpp"
 #include "fitting/discovery/discover.hpp"
 
 namespace unhand::fitting {
 
-/// Of predict_throws (see there): with what is known before the throw. The trajectory is that of the tracked
+/// One throw, predicted with what is known before it is made (predict_throws): predicted minus measured.
+struct PredictedOutcome {
+  int condition{};  ///< throws that repeat one experiment share it
+  std::array<std::optional<double>, experiment::kQuantityCount> error;  ///< as experiment::kQuantities
+  double samples{};                                                     ///< of the tracked position in flight
+  double squares{};  ///< Σ (Δx² + Δz²) over them [m²]
+  /// Mean error of the tracked pose in flight [m, m, rad]; none where it was not tracked.
+  std::optional<std::array<double, 3>> flight;
+};
+
+/// Of the throws of `share`, in the order of the log.
+std::vector<PredictedOutcome> predicted_outcomes(const CampaignProblem& problem, const FitResult& fit,
+                                                 Share share, int threads);
+
+/// Means over throws, and whether the errors go with the condition. The trajectory is that of the tracked
 /// point in flight. Of throws that are not predicted to land only the errors at the detach count, where they
 /// were measured.
-OutcomeErrors outcome_errors(const CampaignProblem& problem, const FitResult& fit, Share share, int threads);
+OutcomeErrors outcome_errors(const std::vector<PredictedOutcome>& throws);
 
 /// What one model's predictions of the same throws are better by than another's: rms of the tracked position
 /// in flight, of landing x where nothing is tracked [m]; zeros where nothing can be compared.
@@ -16,10 +35,8 @@ struct PredictionGain {
   double before{};  ///< rms of the first model [m]
   double after{};   ///< rms of the other [m]
 };
-/// Of the throws of `share`, each predicted before it is made; both problems hold the same throws in the same
-/// order.
-PredictionGain prediction_gain(const CampaignProblem& problem, const FitResult& fit,
-                               const CampaignProblem& other, const FitResult& other_fit, Share share,
-                               int threads);
+/// Both hold the same throws in the same order.
+PredictionGain prediction_gain(const std::vector<PredictedOutcome>& before,
+                               const std::vector<PredictedOutcome>& after);
 
 }  // namespace unhand::fitting

@@ -65,13 +65,14 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   if (out.effects.empty()) return stage.fit;
   FitResult counted = stage.fit;
   count_discrepancy(stage.problem, counted, options.fit.threads);
+  const BothErrors errors = errors_of(stage, options.fit.threads);
   std::vector<std::string> gone;
   const std::vector<std::string> outdone = outdone_by_a_form(stage, out, options);
   std::array<bool, 2> misled{};  // in the hand, in the air
   for (const AcceptedEffect& effect : out.effects) {
     const bool in_company = (misled[0] && acts(effect, false)) || (misled[1] && acts(effect, true));
     const bool last = effect.id == out.effects.back().id;
-    const bool here = in_company || is_imitation(effect, stage, counted, out, options) ||
+    const bool here = in_company || is_imitation(effect, stage, errors, counted, out, options) ||
                       (last && spoils(effect, stage, out, options)) ||
                       std::find(outdone.begin(), outdone.end(), effect.id) != outdone.end();
     for (const bool air : {false, true}) misled[air ? 1 : 0] |= here && acts(effect, air);

@@ -42,15 +42,18 @@ double Stage::bic() const {
                              std::log(static_cast<double>(std::max(2L, fit.samples)));
 }
 
-PredictionGain prediction_gain(const Stage& before, const Stage& after, const DiscoverOptions& options) {
-  return prediction_gain(before.problem, before.fit, after.problem, after.fit, Share::test,
-                         options.fit.threads);
+std::vector<PredictedOutcome> outcomes_of(const Stage& stage, Share share, int threads) {
+  return predicted_outcomes(stage.problem, stage.fit, share, threads);
 }
 
 OutcomeErrors errors_of(const Stage& stage, Share share, int threads) {
-  OutcomeErrors out = outcome_errors(stage.problem, stage.fit, share, threads);
+  OutcomeErrors out = outcome_errors(outcomes_of(stage, share, threads));
   out.chi2_per_dof = (share == Share::test ? stage.held_out : stage.fit).chi2_per_dof();
   return out;
+}
+
+BothErrors errors_of(const Stage& stage, int threads) {
+  return {errors_of(stage, Share::train, threads), errors_of(stage, Share::test, threads)};
 }
 
 double error_ratio(const OutcomeErrors& before, const OutcomeErrors& after) {

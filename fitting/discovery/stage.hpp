@@ -31,11 +31,16 @@ struct Stage {
 /// the declared one.
 double deviance(const FitResult& fit);
 
-/// Of the held-out throws.
-PredictionGain prediction_gain(const Stage& before, const Stage& after, const DiscoverOptions& options);
+/// Throws as the stage predicts them.
+std::vector<PredictedOutcome> outcomes_of(const Stage& stage, Share share, int threads);
 
 /// What the stage predicts wrongly, and χ² per degree of freedom.
 OutcomeErrors errors_of(const Stage& stage, Share share, int threads);
+/// Of both halves of the throws.
+struct BothErrors {
+  OutcomeErrors train, held_out;
+};
+BothErrors errors_of(const Stage& stage, int threads);
 /// Trajectory rms after over before; the landing's where the flight was not seen.
 double error_ratio(const OutcomeErrors& before, const OutcomeErrors& after);
 

@@ -10,6 +10,7 @@
 #include "experiment/parallel.hpp"
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/traces.hpp"
+#include "fitting/distributions.hpp"
 #include "fitting/evaluate.hpp"
 
 namespace unhand::fitting {
@@ -169,11 +170,29 @@ std::optional<MissingEstimate> estimate_missing(const Stage& stage, Phase phase,
   return out;
 }
 
-std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_far,
-                                       const DiscoverOptions& options) {
+namespace {
+
+bool is_tracked(Channel c) {
+  return c == Channel::mocap_x || c == Channel::mocap_z || c == Channel::mocap_theta;
+}
+
+/// Whether tracked flights lack no acceleration, of whatever form, that chance would not show: what is off in
+/// them then is how they begin, and has its cause before the detach.
+bool lacks_no_acceleration(const Stage& stage, const DiscoverOptions& options) {
+  const PhaseTraces flights = traces_of(stage.problem, stage.fit, Phase::flight, options.fit.threads);
+  double fall = 0;
+  int values = 0;
+  for (const MissingCurve& curve : missing_curves(flights.all, flights.how)) {
+    fall += curve.chi2_before - curve.chi2_after;
+    values += 3 * static_cast<int>(curve.knots.size());
+  }
+  return values > 0 && chi2_tail(fall, values) > options.false_discovery_rate;
+}
+
+/// Where a channel leaves more than noise: the first phase, and in it the channel in which most is left.
+std::optional<Unexplained> left_in_channels(const Stage& stage, const Discovery& so_far, double rest,
+                                            const DiscoverOptions& options) {
   std::optional<Unexplained> out;
-  // No law of pads is quite right; of flight and of sensors they are.
-  const double rest = acts_on_pads(stage) ? kRest : 0;
   // In the firm grasp the fit bends each throw's own grasp for what is missing elsewhere: there a channel
   // speaks for itself where nothing else does.
   const auto limit_of = [&](const ChannelMisfit& m) {
@@ -190,7 +209,6 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
                                   so_far.effects.empty() ? 0.0 : 1 + rest * (before - 1));
     if (!is_misfit(m, options) || m.chi2_per_sample() < limit) continue;
     if (!is_confirmed(stage.held_out.misfit, m)) continue;
-    // The first phase in which something is left; there, the channel in which most is.
     if (out && (m.phase != out->phase || m.chi2_per_sample() <= out->chi2_per_dof)) continue;
     out = Unexplained{m.phase, m.channel, m.chi2_per_sample(), {}, {}};
   }
@@ -199,7 +217,55 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
   std::string words = fmt::format("{:.3g} times the variance of the noise", out->chi2_per_dof);
   for (const auto& s : so_far.structure_after)
     if (s.channel == out->channel && s.phase == out->phase) words = s.structure.in_words();
-  out->description += words + "; no effect of the catalogue explains it on held-out throws";
+  out->description += words;
+  if (out->phase == Phase::flight && is_tracked(out->channel) && lacks_no_acceleration(stage, options)) {
+    out->phase = Phase::release;
+    out->description += ", from how flights begin: they lack no acceleration";
+  }
+  return out;
+}
+
+/// Where every channel is noise once a throw's own unknowns follow it, but predictions made before the throw
+/// are off by what repetitions share: something acts before the detach that those unknowns take up.
+std::optional<Unexplained> left_in_predictions(const Discovery& so_far, double rest,
+                                               const DiscoverOptions& options) {
+  std::optional<OutcomeLack> most;
+  for (const OutcomeLack& lack : lacking(so_far.after_train, so_far.after_test, options)) {
+    if (!so_far.effects.empty() && lack.fit.shared < rest * lack_in(so_far.before_train, lack.outcome).shared)
+      continue;
+    const bool tracked = lack.outcome == Outcome::position || lack.outcome == Outcome::orientation;
+    if (most && (!tracked || lack.fit.ratio() <= most->fit.ratio())) continue;
+    most = lack;
+  }
+  if (!most) return std::nullopt;
+  constexpr Channel kShown[] = {Channel::mocap_x, Channel::mocap_theta, Channel::landing_x,
+                                Channel::landing_theta};
+  const Channel channel = kShown[static_cast<int>(most->outcome)];
+  const bool tracked = most->outcome == Outcome::position || most->outcome == Outcome::orientation;
+  const bool angle = most->outcome == Outcome::orientation || most->outcome == Outcome::landing_theta;
+  const double unit = angle ? experiment::kDegrees : 1e3;
+  return Unexplained{
+      tracked ? Phase::release : Phase::landing,
+      channel,
+      most->fit.ratio(),
+      fmt::format("{}, predicted before the throw: {:.3g} times the mean square that repetitions scatter by "
+                  "({:.3g} instead of {:.3g} {} rms): the errors go with the condition",
+                  to_string(most->outcome), most->fit.ratio(),
+                  unit * std::sqrt(most->fit.repetitions + most->fit.shared),
+                  unit * std::sqrt(most->fit.repetitions), angle ? "deg" : "mm"),
+      {}};
+}
+
+}  // namespace
+
+std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_far,
+                                       const DiscoverOptions& options) {
+  // No law of pads is quite right; of flight and of sensors they are.
+  const double rest = acts_on_pads(stage) ? kRest : 0;
+  std::optional<Unexplained> out = left_in_channels(stage, so_far, rest, options);
+  if (!out) out = left_in_predictions(so_far, rest, options);
+  if (!out) return out;
+  out->description += "; no effect of the catalogue explains it on held-out throws";
   for (const auto& id : so_far.imitations) out->description += fmt::format("; {} imitates it", id);
   if (so_far.effects.empty() && so_far.imitations.empty() && !so_far.ranking.empty() &&
       so_far.ranking.front().gain > 1)

@@ -9,8 +9,10 @@
 
 namespace unhand::fitting {
 
-/// The first phase in which the stage leaves more than noise, and the channel in which most is left; of what
-/// an accepted effect has taken away, a hundredth may stay. With the estimate of what is missing there.
+/// The first phase in which the stage leaves more than noise, and the channel in which most is left; where
+/// none does, the outcome whose predictions go with the condition. Of what an accepted effect on the pads has
+/// taken away, a hundredth may stay. With the estimate of what is missing there. `so_far` has the answer's
+/// errors already.
 std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_far,
                                        const DiscoverOptions& options);
 

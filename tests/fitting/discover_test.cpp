@@ -171,6 +171,31 @@ TEST(Discovery, WhatMattersToThePredictionAloneIsFound) {
   EXPECT_LT(found.after_test.trajectory_rms, 0.7 * found.before_test.trajectory_rms);
 }
 
+// Not listed, no name can be right; that predictions could be better is told without one: repetitions scatter
+// by far less than conditions are off.
+TEST(Discovery, WhatMattersToThePredictionAloneIsUnexplainedWhereTheCatalogueForgetsIt) {
+  experiment::CampaignDesign design = experiment::random_campaign(3017);  // conditions five times
+  design.effects = {{"sensor.inertia.ratio", 1.11}};
+  const Discovery found = found_in(experiment::generate_campaign(design, 3017), {"sensor.inertia"});
+  EXPECT_TRUE(found.effects.empty()) << found.effects.front().id;
+  EXPECT_FALSE(found.first.any) << "no channel alone would show it";
+  ASSERT_TRUE(found.unexplained.has_value());
+  EXPECT_EQ(found.unexplained->phase, Phase::release);
+  EXPECT_GT(found.unexplained->chi2_per_dof, 2) << found.unexplained->description;
+}
+
+// Pads that stick let go later than the normal force does, and so do pads that open later: the delay brings
+// every channel to its noise. But it is later by the same time in every condition, and sticking pads are not.
+TEST(Discovery, WhatLeavesPredictionsOffByConditionIsWithdrawn) {
+  experiment::CampaignDesign design = experiment::random_campaign(3024);
+  design.effects = {{"contact.adhesion.f_adh", 0.2226}, {"contact.adhesion.parting_time", 0.003}};
+  const Discovery found = found_in(experiment::generate_campaign(design, 3024), {"contact.adhesion"});
+  EXPECT_EQ(named(found, "release.opening_delay"), nullptr);
+  EXPECT_EQ(found.imitations, std::vector<std::string>{"release.opening_delay"});
+  ASSERT_TRUE(found.unexplained.has_value());
+  EXPECT_EQ(found.unexplained->phase, Phase::release) << "flights lack no acceleration";
+}
+
 // The same friction beside a tilt: once that is found, no channel shows it.
 TEST(Discovery, ASecondEffectIsLookedForWhereNoChannelShowsIt) {
   experiment::CampaignDesign design = experiment::campaign_design("quick12");
