@@ -118,28 +118,25 @@ void describe_throws(const CampaignProblem& problem, const FitRounds& rounds, Fi
                            static_cast<long>(rounds.used().size() * problem.own().size());
 }
 
-/// One-sided effects a typical step from neutral: they may have no derivative there, and a fit could not
-/// leave.
-std::vector<double> start_of(const CampaignProblem& problem) {
-  std::vector<double> out = problem.start();
+/// The sizes of one-sided effects among the campaign's unknowns. At their neutral values they may have no
+/// derivative, so that a fit that is there cannot leave.
+std::vector<std::size_t> one_sided_sizes(const CampaignProblem& problem) {
+  std::vector<std::size_t> out;
   for (const auto& id : problem.options().effects) {
     const dynamics::Effect effect = find_effect(id);
     for (const auto& p : effect.parameters)
-      for (std::size_t k = 0; k < out.size(); ++k)
+      for (std::size_t k = 0; k < problem.campaign().size(); ++k)
         if (effect.one_sided && !p.is_shape() &&
             experiment::without_object(problem.campaign()[k].name) == effect.full_name(p))
-          out[k] += p.typical;
+          out.push_back(k);
   }
   return out;
 }
 
-}  // namespace
-
-FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
+FitResult fit_from(std::vector<double> start, const CampaignProblem& problem, const FitOptions& options) {
   const auto begin = Clock::now();
   FitResult out;
   const auto& unknowns = problem.campaign();
-  std::vector<double> start = options.start.empty() ? start_of(problem) : options.start;
   for (std::size_t k = 0; k < start.size(); ++k)
     start[k] = std::clamp(start[k], unknowns[k].low, unknowns[k].high);
   for (const auto& u : unknowns) out.campaign.push_back({u, u.start, 0, 0, false, 0, {}});
@@ -173,6 +170,34 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
   if (options.profile) profile(rounds, out);
   out.seconds = seconds_since(begin);
   out.jacobian_seconds = 1e-9 * static_cast<double>(rounds.shared().jacobian_nanoseconds.load());
+  return out;
+}
+
+}  // namespace
+
+FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
+  if (!options.start.empty()) return fit_from(options.start, problem, options);
+  const std::vector<std::size_t> sizes = one_sided_sizes(problem);
+  const auto start = [&](double share) {  // of a typical step
+    std::vector<double> out = problem.start();
+    for (const std::size_t k : sizes) out[k] += share * problem.campaign()[k].scale;
+    return out;
+  };
+  FitResult out = fit_from(start(1), problem, options);
+  // Where a typical size is far too large, the first step overshoots to neutral and stays there. Pads give by
+  // anything from micrometres to a millimetre.
+  const auto is_stuck = [&] {
+    return out.is_answer() && std::any_of(sizes.begin(), sizes.end(), [&](std::size_t k) {
+             return out.campaign[k].at_bound && out.campaign[k].value < problem.campaign()[k].scale;
+           });
+  };
+  for (const double share : {0.1, 0.01}) {
+    if (!is_stuck()) break;
+    FitResult smaller = fit_from(start(share), problem, options);
+    smaller.seconds += out.seconds;
+    smaller.jacobian_seconds += out.jacobian_seconds;
+    if (smaller.is_answer() && smaller.deviance() < out.deviance()) out = std::move(smaller);
+  }
   return out;
 }
 

@@ -146,6 +146,11 @@ struct FitResult {
     if (degrees_of_freedom <= 0) return std::nullopt;
     return chi2 / static_cast<double>(degrees_of_freedom);
   }
+  /// Whether the values mean anything: converged, or short of it by the iterations allowed.
+  bool is_answer() const;
+  /// −2 log of the likelihood in which every channel of every phase has the variance that it shows, at least
+  /// the declared one.
+  double deviance() const;
   /// Of the campaign's unknowns, in their order and units.
   std::vector<double> values() const;
   /// Of unknowns i and j, −1 … 1; 0 where either is not determined.
@@ -153,7 +158,8 @@ struct FitResult {
 };
 
 /// Least squares by Ceres (Levenberg-Marquardt; the throws' own unknowns eliminated by Schur's complement)
-/// with exact derivatives.
+/// with exact derivatives. Without `options.start` from the problem's own, one-sided effects a typical step
+/// from neutral, and from smaller ones where they end at neutral: of those the likeliest.
 FitResult fit(const CampaignProblem& problem, const FitOptions& options = {});
 
 }  // namespace unhand::fitting

@@ -1,4 +1,5 @@
 // Names, and what a fit's result answers by itself.
+#include <algorithm>
 #include <cmath>
 
 #include "fitting/fit.hpp"
@@ -23,6 +24,19 @@ Phase phase_of(const experiment::Observation& o, double opening, double release)
     return Phase::landing;
   if (o.time < opening) return Phase::grasped;
   return o.time < release ? Phase::release : Phase::flight;
+}
+
+bool FitResult::is_answer() const {
+  return outcome == FitOutcome::converged || outcome == FitOutcome::iterations_spent;
+}
+
+double FitResult::deviance() const {
+  double out = 0;
+  for (const auto& m : misfit) {
+    const double variance = std::max(1.0, m.chi2_per_sample());
+    out += m.n * std::log(variance) + m.chi2 / variance;
+  }
+  return out;
 }
 
 std::vector<double> FitResult::values() const {

@@ -78,7 +78,7 @@ Improvement law_improvement(const FitResult& before, const FitResult& after,
 }
 
 bool held_out_confirms(const Stage& before, const Stage& after) {
-  return deviance(before.held_out) - deviance(after.held_out) > 2 * std::log(kTimesAsLikely);
+  return before.held_out.deviance() - after.held_out.deviance() > 2 * std::log(kTimesAsLikely);
 }
 
 bool predicts_better(const Stage& before, const Stage& after, const DiscoverOptions& options) {

@@ -12,34 +12,17 @@ namespace unhand::fitting {
 
 using experiment::Channel;
 
-namespace {
-
-bool is_answer(const FitResult& f) {
-  return f.outcome == FitOutcome::converged || f.outcome == FitOutcome::iterations_spent;
-}
-
-}  // namespace
-
 bool is_wrench(Channel c) {
   return c == Channel::wrench_fx || c == Channel::wrench_fz || c == Channel::wrench_tau;
 }
 
-bool Stage::is_fitted() const { return is_answer(fit); }
+bool Stage::is_fitted() const { return fit.is_answer(); }
 
-bool Stage::solved() const { return is_fitted() && is_answer(held_out); }
-
-double deviance(const FitResult& fit) {
-  double out = 0;
-  for (const auto& m : fit.misfit) {
-    const double variance = std::max(1.0, m.chi2_per_sample());
-    out += m.n * std::log(variance) + m.chi2 / variance;
-  }
-  return out;
-}
+bool Stage::solved() const { return is_fitted() && held_out.is_answer(); }
 
 double Stage::bic() const {
-  return deviance(fit) + static_cast<double>(problem.campaign().size()) *
-                             std::log(static_cast<double>(std::max(2L, fit.samples)));
+  return fit.deviance() + static_cast<double>(problem.campaign().size()) *
+                              std::log(static_cast<double>(std::max(2L, fit.samples)));
 }
 
 std::vector<PredictedOutcome> outcomes_of(const Stage& stage, Share share, int threads) {
@@ -101,7 +84,7 @@ bool solve_train(Stage& stage, const DiscoverOptions& options, std::vector<doubl
   train.start = start;
   train.weigh = Weigh::variances;  // as bic() compares
   stage.fit = fit(stage.problem, train);
-  if (!is_answer(stage.fit)) return false;
+  if (!stage.fit.is_answer()) return false;
   if (const auto open = open_shapes(stage.problem, stage.fit); !open.empty()) {
     train.start = stage.fit.values();
     for (const std::size_t k : open) {
@@ -122,7 +105,7 @@ bool solve_held_out(Stage& stage, const DiscoverOptions& options) {
   test.own_spread = stage.fit.own_spread;
   test.rounds = 2;
   stage.held_out = fit(stage.problem, test);
-  return is_answer(stage.held_out);
+  return stage.held_out.is_answer();
 }
 
 void solve(Stage& stage, const DiscoverOptions& options, std::vector<double> start) {
@@ -173,7 +156,7 @@ Stage extended(const Stage& stage, const Candidate& candidate, const Score& scor
   // of that and with an effect of a typical size.
   Stage again{out.problem, {}, {}, out.ids};
   if (solve_train(again, options, std::move(typical)) &&
-      (!out.is_fitted() || deviance(again.fit) < deviance(out.fit)))
+      (!out.is_fitted() || again.fit.deviance() < out.fit.deviance()))
     return again;
   return out;
 }

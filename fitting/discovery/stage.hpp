@@ -27,10 +27,6 @@ struct Stage {
   double bic() const;
 };
 
-/// −2 log of the likelihood in which every channel of every phase has the variance that it shows, at least
-/// the declared one.
-double deviance(const FitResult& fit);
-
 /// Throws as the stage predicts them.
 std::vector<PredictedOutcome> outcomes_of(const Stage& stage, Share share, int threads);
 

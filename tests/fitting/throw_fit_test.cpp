@@ -302,21 +302,24 @@ TEST(ThrowFit, WithoutANormalForceOnlyTheProductOfGripAndFrictionIsKnown) {
   EXPECT_THAT(result.open.front().meaning, HasSubstr("mu"));
 }
 
+// Rigid pads are a law of their own, of which no compliance has no derivative: a fit that is there stays.
+// From the size of soft pads it overshoots to it where the pads give by micrometres only.
 TEST(ThrowFit, AnEffectWithoutADerivativeAtNeutralIsNotStuckThere) {
-  constexpr double kCompliance =
-      5e-6;  // m/N: rigid pads are a law of their own, of which 0 has no derivative
-  auto design = small_design(kLaw);
-  design.effects = {{"contact.pad_compliance.compliance", kCompliance}};
-  CampaignOptions options;
-  options.model = kLaw;
-  options.effects = {"contact.pad_compliance"};
-  options.integrator.tolerances = {1e-5, 1e-8};
-  const auto result = fit(CampaignProblem(experiment::generate_campaign(design, 7), "(in memory)", options));
-  ASSERT_EQ(result.outcome, FitOutcome::converged) << result.message;
-  const auto& compliance = result.campaign.at(2);
-  ASSERT_EQ(compliance.unknown.name, "contact.pad_compliance.compliance");
-  EXPECT_NEAR(compliance.value, kCompliance, 3 * compliance.sigma);
-  EXPECT_LT(compliance.sigma, 0.2 * kCompliance);
+  for (const double compliance : {5e-6, 1e-7}) {  // m/N
+    auto design = small_design(kLaw);
+    design.effects = {{"contact.pad_compliance.compliance", compliance}};
+    CampaignOptions options;
+    options.model = kLaw;
+    options.effects = {"contact.pad_compliance"};
+    options.integrator.tolerances = {1e-5, 1e-8};
+    const auto result =
+        fit(CampaignProblem(experiment::generate_campaign(design, 7), "(in memory)", options));
+    ASSERT_EQ(result.outcome, FitOutcome::converged) << result.message;
+    const auto& fitted = result.campaign.at(2);
+    ASSERT_EQ(fitted.unknown.name, "contact.pad_compliance.compliance");
+    EXPECT_NEAR(fitted.value, compliance, 3 * fitted.sigma);
+    EXPECT_LT(fitted.sigma, 0.2 * compliance);
+  }
 }
 
 TEST(ThrowFit, UnknownsAtTheirBoundsDoNotStopTheOthers) {
