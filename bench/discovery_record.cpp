@@ -12,7 +12,7 @@ namespace unhand {
 using experiment::EffectSettings;
 using nlohmann::json;
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Planted, id, size, right, asked_alone, right_alone, evident)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Planted, id, size, right, asked_again, found_again, evident)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Estimated, name, truth, value, sigma)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StudyRecord, kind, without, seed, answer, made, false_name, unexplained,
                                    effects, estimates, cpu_seconds, seconds)
@@ -55,7 +55,7 @@ std::size_t size_class(double steps) { return steps < 1 ? 0 : steps < 3 ? 1 : st
 void print_table(const std::string& kind, const std::vector<StudyRecord>& records) {
   std::map<std::string, std::array<Tally, kSizes.size()>> by_effect;
   std::array<Tally, kSizes.size()> by_size;
-  Tally all, nothing_false, silent, within_95, within_3_sigma, right_alone, evident;
+  Tally all, nothing_false, silent, within_95, within_3_sigma, found_again, evident;
   int not_made = 0;
   std::vector<double> cpu;
   for (const auto& r : records) {
@@ -71,7 +71,7 @@ void print_table(const std::string& kind, const std::vector<StudyRecord>& record
       by_size[size_class(effect.size)].add(effect.right);
       all.add(effect.right);
       if (kind == "one" && !effect.right) evident.add(effect.evident);
-      if (effect.asked_alone) right_alone.add(effect.right_alone);
+      if (effect.asked_again) found_again.add(effect.found_again);
     }
     for (const auto& e : r.estimates) {
       const double off = std::abs(e.value - e.truth);
@@ -95,8 +95,9 @@ void print_table(const std::string& kind, const std::vector<StudyRecord>& record
   }
   if (evident.campaigns > 0)
     fmt::print("of those that were missed, called evident but too small to matter {}; ", evident.text());
-  if (right_alone.campaigns > 0)
-    fmt::print("of those that were missed, found alone {}; ", right_alone.text());
+  if (found_again.campaigns > 0)
+    fmt::print("of those that were missed, found {} {}; ",
+               kind == "forgotten" ? "where the catalogue has them" : "alone", found_again.text());
   fmt::print("campaigns without a false name {}", nothing_false.text());
   if (kind == "none") fmt::print(", and with nothing called unexplained {}", silent.text());
   if (within_95.campaigns > 0)

@@ -16,10 +16,12 @@ inline std::string id_of(const std::string& setting) { return setting.substr(0, 
 /// An effect that was put into a campaign.
 struct Planted {
   std::string id;
-  double size{};       ///< of its largest parameter, in typical steps from neutral
-  bool right{};        ///< it was named, or the catalogue had to forget it and its phase is unexplained
-  bool asked_alone{};  ///< it was missed beside another, and looked for again without that one
-  bool right_alone{};  ///< and named then
+  double size{};  ///< of its largest parameter, in typical steps from neutral
+  bool right{};   ///< it was named, or the catalogue had to forget it and its phase is unexplained
+  /// It was missed, and looked for again in the same campaign: without the other effect, or by the catalogue
+  /// that does not forget it.
+  bool asked_again{};
+  bool found_again{};  ///< and named then
   bool evident{};      ///< it was missed, but said to be evident and too small to matter
 };
 
