@@ -12,14 +12,18 @@ namespace unhand::fitting {
 struct LackOfFit {
   double repetitions{};  ///< mean square of errors about their condition's mean, unbiased
   double shared{};       ///< mean square of all errors beyond that, at least 0
-  double p_value{1};     ///< F test of the conditions' means against none
+  /// How often chance shows conditions as much in agreement with themselves: the randomisation test that
+  /// turns each error's sign (Fisher 1935). It asks no more than independent errors as often of one sign as
+  /// of the other; conditions differ manyfold in how much they scatter, and the F test takes one that
+  /// scatters more than the others for a difference.
+  double p_value{1};
   /// The errors' mean square over what repetitions scatter by: 1 is the floor.
   double ratio() const { return repetitions > 0 ? 1 + shared / repetitions : 1; }
 };
 
 /// Of errors with up to two components that count alike (positions x and z; a scalar has 0 as its second);
-/// `condition` numbers each. Two components count as one witness in the F test: most of them may be one.
-/// Without at least two repetitions more than conditions nothing is said: p_value 1.
+/// `condition` numbers each. Agreement of a condition: its mean's share n |mean|²/Σ|e|² of its squares, the
+/// mean over conditions. Without at least two repetitions more than conditions nothing is said: p_value 1.
 LackOfFit lack_of_fit(const std::vector<std::array<double, 2>>& error, const std::vector<int>& condition);
 
 }  // namespace unhand::fitting
