@@ -89,98 +89,11 @@ class Search {
     const auto effects = inactive();
     if (effects.empty()) return false;
     const auto f = grouped_footprints(problem_, out_.final, effects, options_.fit);
-    const auto all = scores(f.total);
-    struct Scored {
-      std::size_t candidate;
-      double gain, p;
-      VectorXd step;
-    };
-    std::vector<Scored> scored;
-    for (const auto& s : all) {
-      const Candidate& c = f.total.candidates[s.candidate];
-      if (!s.visible) {  // nothing for it to act through yet: a wind before there is a drag
-        if (Ranked& r = entry_of(out_.ranking, c.id); r.gain < 0) r.gain = 0, r.visible = false;
-        continue;
-      }
-      shown_from_.try_emplace(c.id, out_.effects.size());
-      std::vector<Index> columns;
-      for (std::size_t k = 0; k < f.total.fitted; ++k) columns.push_back(static_cast<Index>(k));
-      std::vector<std::size_t> inside;  // parameters that do not want to where there are none
-      std::vector<int> sides;
-      for (std::size_t j = 0; j < c.columns.size(); ++j)
-        if (c.sides[j] == 0 || s.step[j] != 0) inside.push_back(c.columns[j]), sides.push_back(c.sides[j]);
-      const auto own = indices(inside);
-      columns.insert(columns.end(), own.begin(), own.end());
-      Scored one{s.candidate, s.gain, 1,
-                 Eigen::Map<const VectorXd>(s.step.data(), static_cast<Index>(s.step.size()))};
-      if (!own.empty()) {
-        const LinearStep step = linear_step(f.parts, all_of(f.parts.size()), columns);
-        const auto p = static_cast<Index>(own.size());
-        const VectorXd x = step.value.tail(p);
-        const MatrixXd covariance = step.covariance.bottomRightCorner(p, p);
-        one.p = Wald{x.dot(pseudo_solve(covariance, x)), p}.p_value(out_.final);
-        for (Index j = 0; j < p; ++j)
-          if (sides[static_cast<std::size_t>(j)] * x[j] < 0) one.gain = 0, one.p = 1;
-      }
-      scored.push_back(one);
-      Ranked& r = entry_of(out_.ranking, c.id);
-      if (one.gain <= r.gain) continue;
-      r.gain = one.gain, r.p_value = one.p, r.visible = true;
-      r.step = 1 + static_cast<int>(out_.effects.size());
-    }
+    const auto scored = first_order(f);
     if (scored.empty()) return false;
-    std::sort(scored.begin(), scored.end(), [](const Scored& a, const Scored& b) { return a.gain > b.gain; });
-    for (const auto& s : scored) {
-      const Candidate &best = f.total.candidates[scored.front().candidate],
-                      &c = f.total.candidates[s.candidate];
-      Ranked& r = entry_of(out_.ranking, c.id);
-      if (r.gain == s.gain && scored.front().gain > 0)
-        r.correlation_with_best =
-            between(f.total, best,
-                    {scored.front().step.data(), scored.front().step.data() + scored.front().step.size()}, c);
-    }
-    // Leaders: of candidates with the same footprint, the one that the catalogue lists first.
+    compare_with_best(f.total, scored);
     const double level = options_.false_discovery_rate / static_cast<double>(scored.size());
-    std::vector<Scored> leaders;
-    for (const auto& s : scored) {
-      if (!(s.p < 10 * level) || !(s.gain > 0)) continue;  // the full fit decides; this is to first order
-      const Candidate& c = f.total.candidates[s.candidate];
-      bool known = false;
-      for (auto& leader : leaders) {
-        const Candidate& l = f.total.candidates[leader.candidate];
-        if (l.id == c.id) known = true;
-        if (known ||
-            between(f.total, l, {leader.step.data(), leader.step.data() + leader.step.size()}, c) < kSame)
-          continue;
-        known = true;
-        if (order_of(c.id) < order_of(l.id) && s.gain > 0.9 * leader.gain) leader = s;
-        break;
-      }
-      if (!known && static_cast<int>(leaders.size()) < refits) leaders.push_back(s);
-    }
-    std::vector<EffectTrial> trials;  // the most evident one first
-    for (const auto& s : leaders) {
-      const Candidate& c = f.total.candidates[s.candidate];
-      const auto effect =
-          std::find_if(effects.begin(), effects.end(), [&](const auto& e) { return e.id == c.id; });
-      auto trial = try_effect(problem_, out_.final, out_.final_test, c, s.step, *effect, options_.fit);
-      Ranked& r = entry_of(out_.ranking, c.id);
-      r.refitted = true, r.delta_bic = trial.delta_bic, r.held_out_gain = trial.held.fall();
-      if (!trial.fit.solved || !(trial.p < level) || shape_is_open(trial.fit, c.id)) continue;
-      if (trial.held.share > options_.matters) trials.push_back(std::move(trial));
-    }
-    std::sort(trials.begin(), trials.end(),
-              [](const EffectTrial& a, const EffectTrial& b) { return a.delta_bic < b.delta_bic; });
-    const auto best = std::find_if(trials.begin(), trials.end(),
-                                   [](const EffectTrial& trial) { return trial.held.p < 0.05; });
-    if (best == trials.end()) return false;
-    for (const EffectTrial& trial : trials)
-      if (trial.id != best->id && trial.delta_bic < best->delta_bic + kAlike) {
-        rivals_.push_back(out_);
-        accept(trial, rivals_.back());
-      }
-    accept(*best, out_);
-    return true;
+    return accept_best(convincing(f.total, leaders(f.total, scored, level, refits), effects, level));
   }
 
   /// As far as forward() goes. A step may not have known which of two effects it was: both are as evident,
@@ -258,6 +171,122 @@ class Search {
   }
 
  private:
+  /// A candidate to first order: the χ² that it would take away, at which sizes, and Wald's p-value of them.
+  struct Scored {
+    std::size_t candidate;
+    double gain, p;
+    std::vector<double> step;
+  };
+
+  /// The candidates that some channel shows, largest gain first; takes them into the ranking.
+  std::vector<Scored> first_order(const GroupedFootprints& f) {
+    std::vector<Scored> out;
+    for (auto& s : scores(f.total)) {
+      const Candidate& c = f.total.candidates[s.candidate];
+      if (!s.visible) {  // nothing for it to act through yet: a wind before there is a drag
+        if (Ranked& r = entry_of(out_.ranking, c.id); r.gain < 0) r.gain = 0, r.visible = false;
+        continue;
+      }
+      shown_from_.try_emplace(c.id, out_.effects.size());
+      Scored one{s.candidate, s.gain, 1, std::move(s.step)};
+      judge(f, c, one);
+      Ranked& r = entry_of(out_.ranking, c.id);
+      if (one.gain > r.gain) {
+        r.gain = one.gain, r.p_value = one.p, r.visible = true;
+        r.step = 1 + static_cast<int>(out_.effects.size());
+      }
+      out.push_back(std::move(one));
+    }
+    std::sort(out.begin(), out.end(), [](const Scored& a, const Scored& b) { return a.gain > b.gain; });
+    return out;
+  }
+
+  /// Its p-value, by the scatter between groups; one that wants to where there are no values gains nothing.
+  void judge(const GroupedFootprints& f, const Candidate& c, Scored& one) const {
+    std::vector<std::size_t> inside;  // parameters that do not want to where there are none
+    std::vector<int> sides;
+    for (std::size_t j = 0; j < c.columns.size(); ++j)
+      if (c.sides[j] == 0 || one.step[j] != 0) inside.push_back(c.columns[j]), sides.push_back(c.sides[j]);
+    if (inside.empty()) return;
+    auto columns = indices(all_of(f.total.fitted));
+    const auto own = indices(inside);
+    columns.insert(columns.end(), own.begin(), own.end());
+    const LinearStep step = linear_step(f.parts, all_of(f.parts.size()), columns);
+    const auto p = static_cast<Index>(own.size());
+    const VectorXd x = step.value.tail(p);
+    const MatrixXd covariance = step.covariance.bottomRightCorner(p, p);
+    one.p = Wald{x.dot(pseudo_solve(covariance, x)), p}.p_value(out_.final);
+    for (Index j = 0; j < p; ++j)
+      if (sides[static_cast<std::size_t>(j)] * x[j] < 0) one.gain = 0, one.p = 1;
+  }
+
+  /// Into the ranking: how like the footprint of the best candidate the others' are.
+  void compare_with_best(const Footprints& f, const std::vector<Scored>& scored) {
+    const Scored& best = scored.front();
+    for (const Scored& s : scored) {
+      const Candidate& c = f.candidates[s.candidate];
+      Ranked& r = entry_of(out_.ranking, c.id);
+      if (r.gain == s.gain && best.gain > 0)
+        r.correlation_with_best = between(f, f.candidates[best.candidate], best.step, c);
+    }
+  }
+
+  /// At most `refits` that may be evident at `level`: of candidates with the same footprint, the one that the
+  /// catalogue lists first.
+  std::vector<Scored> leaders(const Footprints& f, const std::vector<Scored>& scored, double level,
+                              int refits) const {
+    std::vector<Scored> out;
+    for (const Scored& s : scored) {
+      if (!(s.p < 10 * level) || !(s.gain > 0)) continue;  // the full fit decides; this is to first order
+      const Candidate& c = f.candidates[s.candidate];
+      const auto same = std::find_if(out.begin(), out.end(), [&](const Scored& leader) {
+        const Candidate& l = f.candidates[leader.candidate];
+        return l.id == c.id || !(between(f, l, leader.step, c) < kSame);
+      });
+      if (same == out.end()) {
+        if (static_cast<int>(out.size()) < refits) out.push_back(s);
+      } else if (order_of(c.id) < order_of(f.candidates[same->candidate].id) && s.gain > 0.9 * same->gain) {
+        *same = s;
+      }
+    }
+    return out;
+  }
+
+  /// Those that a fit in full finds evident and that matter on held-out groups, the most evident one first.
+  std::vector<EffectTrial> convincing(const Footprints& f, const std::vector<Scored>& leaders,
+                                      const std::vector<dynamics::Effect>& effects, double level) {
+    std::vector<EffectTrial> out;
+    for (const Scored& s : leaders) {
+      const Candidate& c = f.candidates[s.candidate];
+      const auto effect =
+          std::find_if(effects.begin(), effects.end(), [&](const auto& e) { return e.id == c.id; });
+      const Eigen::Map<const VectorXd> step(s.step.data(), static_cast<Index>(s.step.size()));
+      auto trial = try_effect(problem_, out_.final, out_.final_test, c, step, *effect, options_.fit);
+      Ranked& r = entry_of(out_.ranking, c.id);
+      r.refitted = true, r.delta_bic = trial.delta_bic, r.held_out_gain = trial.held.fall();
+      if (!trial.fit.solved || !(trial.p < level) || shape_is_open(trial.fit, c.id)) continue;
+      if (trial.held.share > options_.matters) out.push_back(std::move(trial));
+    }
+    std::sort(out.begin(), out.end(),
+              [](const EffectTrial& a, const EffectTrial& b) { return a.delta_bic < b.delta_bic; });
+    return out;
+  }
+
+  /// The most evident one that held-out groups confirm; others as evident are kept as its rivals. False if
+  /// there is none.
+  bool accept_best(const std::vector<EffectTrial>& trials) {
+    const auto best = std::find_if(trials.begin(), trials.end(),
+                                   [](const EffectTrial& trial) { return trial.held.p < 0.05; });
+    if (best == trials.end()) return false;
+    for (const EffectTrial& trial : trials)
+      if (trial.id != best->id && trial.delta_bic < best->delta_bic + kAlike) {
+        rivals_.push_back(out_);
+        accept(trial, rivals_.back());
+      }
+    accept(*best, out_);
+    return true;
+  }
+
   void climb() {
     while (static_cast<int>(out_.effects.size()) < options_.most_effects && forward(options_.refits)) {
     }

@@ -38,13 +38,14 @@ namespace {
 
 constexpr std::size_t kFewest = 3;  // groups that can say how much they scatter
 
-/// Of one group, by what the effect changes in its residual r, g = r_before − r_after: g·r_before
-/// and g·g, times the group's weight.
+/// Of one group: its χ² before and after, and, by what the effect changes in its residual r,
+/// g = r_before − r_after, g·r_before and g·g; all times the group's weight.
 struct Along {
+  double was{}, is{}, samples{};
   double residual{}, change{};
 };
 Along along(const Group& group, const GroupFit& before, const GroupFit& after, double weight) {
-  Along out;
+  Along out{weight * before.chi2, weight * after.chi2, weight * before.n, 0, 0};
   for (Index j = 0; j < before.residual.size(); ++j) {
     if (group.rows[static_cast<std::size_t>(j)].channel == kPriorChannel) continue;
     const double change = before.residual[j] - after.residual[j];
@@ -110,18 +111,14 @@ std::vector<Along> all_along(const GroupedProblem& problem, const GroupedFit& be
 
 HeldOutFall held_out(const GroupedProblem& problem, const GroupedFit& before, const GroupedFit& after,
                      const Slope& train) {
+  const auto groups = all_along(problem, before, after);
   double was = 0, is = 0, samples = 0;
-  for (std::size_t i = 0; i < before.groups.size(); ++i) {
-    const GroupFit &b = before.groups[i], &a = after.groups[i];
-    if (!(b.used && b.solved && a.used && a.solved)) continue;
-    const double w = before.weights.group[i];
-    was += w * b.chi2, is += w * a.chi2, samples += w * b.n;
-  }
+  for (const Along& g : groups) was += g.was, is += g.is, samples += g.samples;
   HeldOutFall out;
   if (!(samples > 0)) return out;
   out.was = was / samples, out.is = is / samples;
   if (!(out.was > out.is)) return out;
-  out.p = p_of_slope(slope_of(all_along(problem, before, after)), train);
+  out.p = p_of_slope(slope_of(groups), train);
   const auto b = misfit(problem, before), a = misfit(problem, after);
   for (std::size_t c = 0; c < b.size(); ++c) {
     const double excess = b[c].chi2_per_sample() - 1, fall = b[c].chi2_per_sample() - a[c].chi2_per_sample();
