@@ -9,25 +9,33 @@
 namespace unhand::dynamics {
 namespace {
 
+struct LuReference {
+  double condition;
+  Eigen::VectorXd solution;
+};
+LuReference lu_reference(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right) {
+  const Eigen::PartialPivLU<Eigen::MatrixXd> lu(matrix);
+  return {matrix.norm() * lu.inverse().norm(), lu.solve(right)};
+}
+
 template <int N>
 void compare(double share_of_zeros) {
   std::mt19937_64 random(N);
   std::uniform_real_distribution<double> uniform(-1, 1), chance(0, 1);
   for (int trial = 0; trial < 500; ++trial) {
     double a[N][N];
-    Eigen::Matrix<double, N, N> matrix;
+    Eigen::MatrixXd matrix(N, N);
     for (int i = 0; i < N; ++i)
       for (int j = 0; j < N; ++j)
         matrix(i, j) = a[i][j] = chance(random) < share_of_zeros ? 0 : uniform(random);
-    const double condition = matrix.norm() * matrix.inverse().norm();
+    typename SmallInverse<N>::Vector x{}, y{};
+    Eigen::VectorXd right(N);
+    for (int i = 0; i < N; ++i) right(i) = x[i] = uniform(random);
+    const auto [condition, expected] = lu_reference(matrix, right);
     if (!(condition < 1e6)) continue;
     SmallInverse<N> inverse;
     inverse.compute(a);
-    typename SmallInverse<N>::Vector x{}, y{};
-    Eigen::Matrix<double, N, 1> right;
-    for (int i = 0; i < N; ++i) right(i) = x[i] = uniform(random);
     inverse.multiply(x, y);
-    const Eigen::Matrix<double, N, 1> expected = matrix.partialPivLu().solve(right);
     // Both err by a few ε times the condition number.
     for (int i = 0; i < N; ++i)
       EXPECT_NEAR(y[i], expected(i), 1e-14 * condition * expected.norm()) << "N " << N << " trial " << trial;
