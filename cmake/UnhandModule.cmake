@@ -10,6 +10,22 @@ function(unhand_batches target size)
   endif()
 endfunction()
 
+# The headers that most sources read, compiled once for all targets of a `kind`. GCC then compiles those targets as it
+# compiled the headers, whatever their own command lines say of optimisation: one kind, one set of options. Further headers: of the kind's first.
+function(unhand_precompiled target kind)
+  if(CMAKE_CXX_COMPILER_LAUNCHER OR NOT CMAKE_CXX_COMPILER_ID STREQUAL GNU)  # a compiler cache does better without
+    return()
+  endif()
+  get_property(owner GLOBAL PROPERTY UNHAND_PRECOMPILED_${kind})
+  if(owner)
+    target_precompile_headers(${target} REUSE_FROM ${owner})
+  else()
+    set_property(GLOBAL PROPERTY UNHAND_PRECOMPILED_${kind} ${target})
+    target_precompile_headers(${target} PRIVATE <algorithm> <array> <cmath> <filesystem> <functional> <map> <memory>
+      <optional> <span> <string> <vector> <Eigen/Dense> <ceres/jet.h> <fmt/format.h> ${ARGN})
+  endif()
+endfunction()
+
 # One folder = one target unhand::<folder> = one namespace unhand::<folder>.
 #
 #   unhand_module(contact
@@ -19,14 +35,18 @@ endfunction()
 #     LINKS   SUNDIALS::cvode_shared  # private third-party libraries
 #     LEVEL   -O2                   # of optimisation in a Release build, where its time goes into other modules
 #     BATCH   5                     # as unhand_batches
-#     ALONE   registry.cpp)
+#     ALONE   registry.cpp
+#     PRECOMPILED)                  # as unhand_precompiled, with the modules of the same LEVEL
 function(unhand_module name)
-  cmake_parse_arguments(ARG "" "BATCH;LEVEL" "SOURCES;HEADERS;USES;LINKS;ALONE" ${ARGN})
+  cmake_parse_arguments(ARG "PRECOMPILED" "BATCH;LEVEL" "SOURCES;HEADERS;USES;LINKS;ALONE" ${ARGN})
   add_library(unhand_${name} ${ARG_SOURCES})
   add_library(unhand::${name} ALIAS unhand_${name})
   set_target_properties(unhand_${name} PROPERTIES EXPORT_NAME ${name})
   if(ARG_BATCH)
     unhand_batches(unhand_${name} ${ARG_BATCH} ALONE ${ARG_ALONE})
+  endif()
+  if(ARG_PRECOMPILED)
+    unhand_precompiled(unhand_${name} modules${ARG_LEVEL})
   endif()
   target_compile_features(unhand_${name} PUBLIC cxx_std_20)
   target_include_directories(unhand_${name} PUBLIC
