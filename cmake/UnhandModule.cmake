@@ -11,7 +11,8 @@ function(unhand_batches target size)
 endfunction()
 
 # The headers that most sources read, compiled once for all targets of a `kind`. GCC then compiles those targets as it
-# compiled the headers, whatever their own command lines say of optimisation: one kind, one set of options. Further headers: of the kind's first.
+# compiled the headers, whatever their own command lines say of optimisation: one kind, one set of options. The first
+# target of a kind must define no macro that the others do not.
 function(unhand_precompiled target kind)
   if(CMAKE_CXX_COMPILER_LAUNCHER OR NOT CMAKE_CXX_COMPILER_ID STREQUAL GNU)  # a compiler cache does better without
     return()
@@ -22,7 +23,7 @@ function(unhand_precompiled target kind)
   else()
     set_property(GLOBAL PROPERTY UNHAND_PRECOMPILED_${kind} ${target})
     target_precompile_headers(${target} PRIVATE <algorithm> <array> <cmath> <filesystem> <functional> <map> <memory>
-      <optional> <span> <string> <vector> <Eigen/Dense> <ceres/jet.h> <fmt/format.h> ${ARGN})
+      <optional> <span> <string> <vector> <Eigen/Dense> <ceres/jet.h> <fmt/format.h>)
   endif()
 endfunction()
 
@@ -78,7 +79,7 @@ endfunction()
 function(unhand_test_options)
   add_library(unhand_test_options INTERFACE)
   target_link_libraries(unhand_test_options INTERFACE unhand_warnings GTest::gmock GTest::gtest_main)
-  target_compile_options(unhand_test_options INTERFACE $<$<CONFIG:Release>:-O1>)  # what takes time at run time is in the library
+  target_compile_options(unhand_test_options INTERFACE $<$<CONFIG:Release>:-Og>)  # less to compile than -O1; what takes time is in the library
   if(NOT CMAKE_CXX_COMPILER_LAUNCHER)  # a compiler cache does better without
     add_executable(test_headers ${PROJECT_SOURCE_DIR}/cmake/empty.cpp)
     target_link_libraries(test_headers PRIVATE unhand_test_options Eigen3::Eigen)
