@@ -34,11 +34,12 @@ struct DiscoverOptions {
 
 Json json_of(const OutcomeErrors& e) {
   Json lacks = Json::array();
-  for (const auto& [outcome, fit] : e.lacks)
+  for (const auto& [outcome, fit, resolution] : e.lacks)
     lacks.push_back({{"outcome", to_string(outcome)},
                      {"unit", unit_of(outcome)},
                      {"rms", number(std::sqrt(fit.repetitions + fit.shared))},
                      {"repetitions_rms", number(std::sqrt(fit.repetitions))},
+                     {"sensor_sigma", number(resolution)},
                      {"p_value", number(fit.p_value)}});
   return {{"n", e.n},
           {"landing_x_mae_m", number(e.landing_x_mae)},
@@ -234,8 +235,7 @@ std::string discovery_text(const Discovery& found, const std::string& log) {
   if (const auto& small = found.small)
     out += fmt::format(
         "\nevident, but {}: {} (BIC {:+.1f}, p {:.2g}; rms predicted before the throw, test: {:.3g} to "
-        "{:.3g} "
-        "mm)\n",
+        "{:.3g} mm)\n",
         small->any_pads ? "no pads are without it" : "too small to matter", small->id, small->delta_bic,
         small->p_value, 1e3 * small->rms_before, 1e3 * small->rms_after);
   if (found.unexplained) out += fmt::format("\nunexplained: {}\n", found.unexplained->description);

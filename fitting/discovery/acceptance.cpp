@@ -96,19 +96,29 @@ bool predicts_better(const Stage& before, const Stage& after, const DiscoverOpti
          holds(&OutcomeErrors::trajectory_rms);
 }
 
-bool is_lacking(const LackOfFit& fit, double level) { return fit.ratio() >= kLacking && fit.p_value < level; }
+bool needs_give(const Stage& rigid, const Stage& give, const DiscoverOptions& options) {
+  const int threads = options.fit.threads;
+  const PredictionGain gain =
+      prediction_gain(outcomes_of(rigid, Share::test, threads), outcomes_of(give, Share::test, threads));
+  return gain.after < gain.before && held_out_confirms(rigid, give);
+}
 
-LackOfFit lack_in(const OutcomeErrors& all, Outcome outcome) {
+bool is_lacking(const OutcomeLack& lack, double level) {
+  return lack.fit.ratio() >= kLacking && lack.fit.p_value < level &&
+         lack.fit.shared > lack.resolution * lack.resolution;
+}
+
+OutcomeLack lack_in(const OutcomeErrors& all, Outcome outcome) {
   for (const OutcomeLack& lack : all.lacks)
-    if (lack.outcome == outcome) return lack.fit;
-  return {};
+    if (lack.outcome == outcome) return lack;
+  return {outcome, {}, 0};
 }
 
 std::vector<OutcomeLack> lacking(const OutcomeErrors& train, const OutcomeErrors& held_out,
                                  const DiscoverOptions& options) {
   std::vector<OutcomeLack> out;
   for (const OutcomeLack& lack : train.lacks)
-    if (is_lacking(lack.fit, options.false_discovery_rate / kOutcomes) &&
+    if (is_lacking(lack, options.false_discovery_rate / kOutcomes) &&
         is_lacking(lack_in(held_out, lack.outcome), kConfirmedAt))
       out.push_back(lack);
   return out;
@@ -166,12 +176,12 @@ bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisf
 
 /// Whether predictions lack so much of what the base model's lacked, in both halves of the throws.
 bool leaves_lacking(const BothErrors& errors, const Discovery& so_far, const DiscoverOptions& options) {
-  const auto share = [](const LackOfFit& now, const LackOfFit& base) {
-    return now.shared > kLeft * base.shared;
+  const auto share = [](const OutcomeLack& now, const OutcomeLack& base) {
+    return now.fit.shared > kLeft * base.fit.shared;
   };
   const auto all = lacking(errors.train, errors.held_out, options);
   return std::any_of(all.begin(), all.end(), [&](const OutcomeLack& lack) {
-    return share(lack.fit, lack_in(so_far.before_train, lack.outcome)) &&
+    return share(lack, lack_in(so_far.before_train, lack.outcome)) &&
            share(lack_in(errors.held_out, lack.outcome), lack_in(so_far.before_test, lack.outcome));
   });
 }

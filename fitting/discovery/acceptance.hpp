@@ -87,19 +87,22 @@ bool predicts_better(const Stage& before, const Stage& after, const DiscoverOpti
 /// How many times what repetitions scatter by the mean square of prediction errors is where a model lacks
 /// something: most of the error then goes with the condition, and a better model would take it away.
 inline constexpr double kLacking = 2;
-/// Outcomes that share the false discovery rate.
-inline constexpr int kOutcomes = 4;
-/// Whether an outcome's errors say so, and a chance of `level` does not.
-bool is_lacking(const LackOfFit& fit, double level);
+/// Whether an outcome's errors say so, a chance of `level` does not, and it is more than one reading of the
+/// outcome's sensor is uncertain by.
+bool is_lacking(const OutcomeLack& lack, double level);
 /// The outcomes that the train throws are predicted so badly in, where the held-out throws confirm it.
 std::vector<OutcomeLack> lacking(const OutcomeErrors& train, const OutcomeErrors& held_out,
                                  const DiscoverOptions& options);
 /// An outcome's errors in `all`; none where it was not predicted.
-LackOfFit lack_in(const OutcomeErrors& all, Outcome outcome);
+OutcomeLack lack_in(const OutcomeErrors& all, Outcome outcome);
 
 /// The give of pads before they slip, under the grip's friction limit, from where on it is an effect like any
 /// other [m].
 inline constexpr double kMostGive = 3e-5;
+
+/// Whether that give is a part of a model beside which nothing is found: held-out throws are predicted the
+/// better for it, and are likelier.
+bool needs_give(const Stage& rigid, const Stage& give, const DiscoverOptions& options);
 
 /// @}
 /// @name What is withdrawn

@@ -92,12 +92,11 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
   for (int step = 0; step < options.most_effects; ++step) {
     auto next = forward(stage, options, out);
     if (!next) {
-      // The give of the pads may hide what else there is: with it, unless it predicts worse, one more look.
+      // The give of the pads may hide what else there is, and predictions may lack it: with it, one more
+      // look.
       const Stage rigid = stage;
-      if (!out.small || !out.small->any_pads || !fit_along(stage, options, out)) break;
-      const PredictionGain gain =
-          prediction_gain(outcomes_of(rigid, Share::test, threads), outcomes_of(stage, Share::test, threads));
-      if (!(gain.after < gain.before) || !held_out_confirms(rigid, stage)) {
+      if (!fit_along(stage, options, out)) break;
+      if (!needs_give(rigid, stage, options)) {
         stage = rigid;
         out.along.clear();
         break;

@@ -66,10 +66,14 @@ const char* to_string(Outcome);
 /// "m" or "rad".
 const char* unit_of(Outcome);
 
+/// Outcomes are few: numbered from 0.
+inline constexpr int kOutcomes = 4;
+
 /// Whether an outcome's errors go with the condition.
 struct OutcomeLack {
   Outcome outcome{};
-  LackOfFit fit;  ///< mean squares in m² or rad²
+  LackOfFit fit;        ///< mean squares in m² or rad²
+  double resolution{};  ///< 1 σ of one reading of the outcome's sensor [m or rad]; of a position, both axes'
 };
 
 /// Errors of the outcome, predicted before the throw (own unknowns from the grasp alone) minus measured.

@@ -23,8 +23,14 @@ void follow_flight(const CampaignProblem& problem, const CampaignThrow& thrown,
   const auto channels = problem.predict(thrown, campaign, predicted.own).channels;
   const double detach = thrown.release_or(predicted.comparison.prediction.detach.time);
   std::array<double, 3> sum{}, n{};
+  double axes[2] = {};  // variances of x and z
+  const auto variance = [&out](Outcome outcome) -> double& {
+    return out.variance[static_cast<std::size_t>(outcome)];
+  };
   for (std::size_t j = 0; j < channels.size(); ++j) {
     const auto& o = thrown.observed.all[j];
+    if (o.channel == Channel::landing_x) variance(Outcome::landing_x) = o.sigma * o.sigma;
+    if (o.channel == Channel::landing_theta) variance(Outcome::landing_theta) = o.sigma * o.sigma;
     if (phase_of(o, thrown.opening, detach) != Phase::flight) continue;
     const std::size_t k = o.channel == Channel::mocap_x       ? 0
                           : o.channel == Channel::mocap_z     ? 1
@@ -34,7 +40,9 @@ void follow_flight(const CampaignProblem& problem, const CampaignThrow& thrown,
     const double error = channels[j] - o.value;
     sum[k] += error, n[k] += 1;
     if (k < 2) out.squares += error * error;
+    (k < 2 ? axes[k] : variance(Outcome::orientation)) = o.sigma * o.sigma;
   }
+  variance(Outcome::position) = axes[0] + axes[1];
   out.samples = n[0];
   if (n[0] > 0 && n[1] > 0 && n[2] > 0) out.flight = {sum[0] / n[0], sum[1] / n[1], sum[2] / n[2]};
 }
@@ -45,13 +53,17 @@ class ByCondition {
   explicit ByCondition(const std::vector<PredictedOutcome>& throws) : throws_(throws) {}
   /// `read` gives a throw's error, or nothing.
   template <class Read>
-  LackOfFit operator()(const Read& read) const {
+  OutcomeLack operator()(Outcome outcome, const Read& read) const {
     std::vector<std::array<double, 2>> error;
     std::vector<int> condition;
+    double variance = 0;
     for (const PredictedOutcome& thrown : throws_)
-      if (const std::optional<std::array<double, 2>> e = read(thrown))
+      if (const std::optional<std::array<double, 2>> e = read(thrown)) {
         error.push_back(*e), condition.push_back(thrown.condition);
-    return lack_of_fit(error, condition);
+        variance += thrown.variance[static_cast<std::size_t>(outcome)];
+      }
+    const double n = std::max(1.0, static_cast<double>(error.size()));
+    return {outcome, lack_of_fit(error, condition), std::sqrt(variance / n)};
   }
 
  private:
@@ -67,14 +79,15 @@ std::vector<OutcomeLack> lacks(const std::vector<PredictedOutcome>& throws) {
       return e ? Error{{*e * unit, 0}} : Error{};
     };
   };
-  return {{Outcome::position, of([](const PredictedOutcome& t) {
-             return t.flight ? Error{{(*t.flight)[0], (*t.flight)[1]}} : Error{};
-           })},
-          {Outcome::orientation, of([](const PredictedOutcome& t) {
-             return t.flight ? Error{{(*t.flight)[2], 0}} : Error{};
-           })},
-          {Outcome::landing_x, of(landing(kLandingX, 1))},
-          {Outcome::landing_theta, of(landing(kLandingTheta, 1 / experiment::kDegrees))}};
+  const auto flight = [](const PredictedOutcome& t) {
+    return t.flight ? Error{{(*t.flight)[0], (*t.flight)[1]}} : Error{};
+  };
+  const auto turned = [](const PredictedOutcome& t) {
+    return t.flight ? Error{{(*t.flight)[2], 0}} : Error{};
+  };
+  return {of(Outcome::position, flight), of(Outcome::orientation, turned),
+          of(Outcome::landing_x, landing(kLandingX, 1)),
+          of(Outcome::landing_theta, landing(kLandingTheta, 1 / experiment::kDegrees))};
 }
 
 }  // namespace

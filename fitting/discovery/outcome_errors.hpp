@@ -18,6 +18,8 @@ struct PredictedOutcome {
   double squares{};  ///< Σ (Δx² + Δz²) over them [m²]
   /// Mean error of the tracked pose in flight [m, m, rad]; none where it was not tracked.
   std::optional<std::array<double, 3>> flight;
+  /// Variance of one reading of each outcome's sensor [m² or rad²]; of a position, both axes' together.
+  std::array<double, kOutcomes> variance{};
 };
 
 /// Of the throws of `share`, in the order of the log.

@@ -23,6 +23,15 @@ void find_other_names(const Footprints& f, const Eigen::VectorXd& contribution, 
   }
 }
 
+/// The give that was fitted along with effects which are gone stays where it is needed without them.
+void drop_give(Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  if (out.along.empty()) return;
+  const Stage& rigid = without(stage, out.along, options);
+  if (!rigid.solved() || needs_give(rigid, stage, options)) return;
+  stage = Stage(rigid);
+  out.along.clear();
+}
+
 /// What was accepted in the company of something that has been withdrawn, another law included, must have its
 /// evidence alone.
 void drop_without_evidence(Stage& stage, const DiscoverOptions& options, Discovery& out) {
@@ -34,11 +43,6 @@ void drop_without_evidence(Stage& stage, const DiscoverOptions& options, Discove
     out.effects.erase(out.effects.begin() + static_cast<std::ptrdiff_t>(i));
     stage = Stage(less);
   }
-  if (!out.effects.empty() || out.along.empty()) return;
-  const Stage& less = without(stage, out.along, options);  // what was fitted along went with them
-  if (!less.solved()) return;
-  stage = Stage(less);
-  out.along.clear();
 }
 
 }  // namespace
@@ -62,7 +66,10 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
 }
 
 FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out) {
-  if (out.effects.empty()) return stage.fit;
+  if (out.effects.empty()) {
+    drop_give(stage, options, out);
+    return stage.fit;
+  }
   FitResult counted = stage.fit;
   count_discrepancy(stage.problem, counted, options.fit.threads);
   const BothErrors errors = errors_of(stage, options.fit.threads);
@@ -79,15 +86,11 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
     if (here) gone.push_back(effect.id);
   }
   if (gone.empty()) return counted;
-  std::vector<std::string> taken = gone;
-  const bool all = gone.size() == out.effects.size();
-  if (all) taken.insert(taken.end(), out.along.begin(), out.along.end());  // it was fitted for their sake
-  const Stage& less = without(stage, taken, options);
+  const Stage& less = without(stage, gone, options);
   if (!less.solved()) return counted;
   std::erase_if(out.effects, [&](const AcceptedEffect& effect) {
     return std::find(gone.begin(), gone.end(), effect.id) != gone.end();
   });
-  if (all) out.along.clear();
   out.imitations.insert(out.imitations.end(), gone.begin(), gone.end());
   stage = Stage(less);
   drop_without_evidence(stage, options, out);

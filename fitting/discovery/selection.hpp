@@ -29,8 +29,9 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out);
 FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
 /// No pads are rigid: a give of some micrometres before they slip bends what the slipping pads say of an
-/// effect on them. contact.pad_compliance is fitted along if the evidence (BIC) is for it and the give stays
-/// below kMostGive; then it is a nuisance of the answer, not a part of it, and in `out.along`. True if it is.
+/// effect on them, and what predictions lack. contact.pad_compliance is fitted along if the evidence (BIC) is
+/// for it and the give stays below kMostGive; then it is a nuisance of the answer, not a part of it, and in
+/// `out.along`. True if it is.
 bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
 /// What speaks for every accepted effect in the end: the answer with it against the answer without it, which

@@ -231,8 +231,8 @@ std::optional<Unexplained> left_in_predictions(const Discovery& so_far, double r
                                                const DiscoverOptions& options) {
   std::optional<OutcomeLack> most;
   for (const OutcomeLack& lack : lacking(so_far.after_train, so_far.after_test, options)) {
-    if (!so_far.effects.empty() && lack.fit.shared < rest * lack_in(so_far.before_train, lack.outcome).shared)
-      continue;
+    const double base = lack_in(so_far.before_train, lack.outcome).fit.shared;
+    if (!so_far.effects.empty() && lack.fit.shared < rest * base) continue;
     const bool tracked = lack.outcome == Outcome::position || lack.outcome == Outcome::orientation;
     if (most && (!tracked || lack.fit.ratio() <= most->fit.ratio())) continue;
     most = lack;

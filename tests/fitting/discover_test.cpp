@@ -7,6 +7,7 @@
 
 #include "experiment/campaign_effects.hpp"
 #include "experiment/synthetic_campaign.hpp"
+#include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/stage.hpp"
 #include "tests/fitting/loop_campaign.hpp"
 
@@ -221,6 +222,32 @@ TEST(Discovery, TheGiveOfAnyPadsIsFittedAlongAndNoPartOfTheAnswer) {
   EXPECT_EQ(found.along, std::vector<std::string>{"contact.pad_compliance"});
   EXPECT_FALSE(found.unexplained.has_value());
   EXPECT_LT(found.after_test.trajectory_rms, found.before_test.trajectory_rms);
+}
+
+// A micrometre, and a robot that repeats itself: to first order no effect explains anything, but predictions
+// are off by condition more than repetitions scatter by. It is the pads' give.
+TEST(Discovery, TheGiveOfAnyPadsIsFittedAlongWhereOnlyPredictionsShowIt) {
+  experiment::CampaignDesign design = experiment::campaign_design("batch180");
+  design.repetitions = 2;
+  design.variation = {1e-4, 6e-4, 1e-3, 0.03, 2e-3, 3e-3, 0, 1e-4, 1e-4, 0};
+  design.effects = {
+      {"contact.pad_compliance.compliance", 1e-6 / (2 * design.patch.mu * design.opening.grip_force)}};
+  const Discovery found = found_in(experiment::generate_campaign(design, 6));
+  const LackOfFit before = lack_in(found.before_train, Outcome::orientation).fit;
+  const LackOfFit after = lack_in(found.after_train, Outcome::orientation).fit;
+  EXPECT_GT(before.ratio(), 2);
+  EXPECT_LT(after.shared, 0.1 * before.shared);
+  EXPECT_EQ(found.verdict, Verdict::no_missing_effect);
+  EXPECT_EQ(found.along, std::vector<std::string>{"contact.pad_compliance"});
+}
+
+// Below what one reading of the sensor tells, an error that repetitions share is nobody's concern.
+TEST(Discovery, PredictionsLackNothingThatTheSensorDoesNotResolve) {
+  constexpr double kResolution = 2e-4;  // m
+  const LackOfFit clear{1e-10, 1.1 * kResolution * kResolution, 1e-4};
+  const LackOfFit slight{1e-10, 0.9 * kResolution * kResolution, 1e-4};
+  EXPECT_TRUE(is_lacking({Outcome::position, clear, kResolution}, 0.01));
+  EXPECT_FALSE(is_lacking({Outcome::position, slight, kResolution}, 0.01));
 }
 
 TEST(Discovery, LogsWithChannelsMissingAreAnswered) {
