@@ -71,7 +71,7 @@ inline constexpr int kOutcomes = 4;
 
 /// Whether an outcome's errors go with the condition.
 struct OutcomeLack {
-  Outcome outcome{};
+  Outcome outcome{};    ///< whose errors these are
   LackOfFit fit;        ///< mean squares in m² or rad²
   double resolution{};  ///< 1 σ of one reading of the outcome's sensor [m or rad]; of a position, both axes'
 };
