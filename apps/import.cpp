@@ -17,9 +17,12 @@ struct ImportOptions {
   std::vector<std::string> inputs;
   LabOptions lab;
   double cube_side{}, cube_mass{}, cube_inertia{};  // [m], [kg], [kg m^2]; 0: not given
+  std::vector<double> block_outline;                // x, y, x, y ... [m]
+  double block_mass{};                              // [kg]; 0: not given
   int threads{0};
 
   bool another_cube() const { return cube_side > 0 || cube_mass > 0 || cube_inertia > 0; }
+  bool another_block() const { return block_mass > 0 || !block_outline.empty(); }
 };
 
 /// Another cube than the published one: homogeneous, unless its inertia is given.
@@ -35,6 +38,26 @@ datasets::CubeTossOptions cube_of(const ImportOptions& options) {
   out.source = fmt::format("measured; mass and side as given, inertia {}",
                            known ? "as given" : "of a homogeneous cube");
   out.licence.clear();
+  return out;
+}
+
+/// Another block than the published one: homogeneous.
+datasets::PlanarPushOptions pushes_of(const ImportOptions& options) {
+  datasets::PlanarPushOptions out;
+  if (!options.another_block()) return out;
+  if (!(options.block_mass > 0 && !options.block_outline.empty()))
+    throw WrongUsage("--block-outline and --block-mass are needed for another block than the published one");
+  const std::vector<double>& numbers = options.block_outline;
+  if (numbers.size() % 2 != 0)
+    throw WrongUsage(fmt::format("--block-outline: {} numbers are not pairs X,Y", numbers.size()));
+  std::vector<std::array<double, 2>> corners;
+  for (std::size_t i = 0; i < numbers.size(); i += 2) corners.push_back({numbers[i], numbers[i + 1]});
+  try {
+    out.block = datasets::homogeneous_block(std::move(corners), options.block_mass);
+  } catch (const std::invalid_argument& error) {
+    throw WrongUsage(fmt::format("--block-{}", error.what()));
+  }
+  out.block.description = "a block; measured; mass and outline as given, centre of a homogeneous one";
   return out;
 }
 
@@ -72,7 +95,7 @@ Imported import_lab_files(const ImportOptions& options, Outputs& outputs) {
 Imported import_pushes(const ImportOptions& options, Outputs& outputs) {
   const std::vector<std::filesystem::path> inputs(options.inputs.begin(), options.inputs.end());
   datasets::PlanarPushReport report;
-  const auto log = datasets::import_planar_pushes(inputs, {}, &report);
+  const auto log = datasets::import_planar_pushes(inputs, pushes_of(options), &report);
   outputs.log(options.out, log);
   Imported out;
   out.text = fmt::format(
@@ -144,6 +167,8 @@ void import(ImportOptions& options) {
     if (format.read != &import_cubes && options.another_cube())
       throw WrongUsage(
           fmt::format("--cube-side, --cube-mass and --cube-inertia are not for {}", options.format));
+    if (format.read != &import_pushes && options.another_block())
+      throw WrongUsage(fmt::format("--block-outline and --block-mass are not for {}", options.format));
     require_writable(options.out);
     require_writable(options.json);
     Outputs outputs;
@@ -181,6 +206,13 @@ Command import_command(Parser& root) {
       .option("--cube-inertia", options->cube_inertia, "[kg m^2] About its middle; else a homogeneous cube's")
       .group(cube)
       .positive();
+  const char* block = "Another block than the published one (planar-pushes)";
+  parser
+      .option("--block-outline", options->block_outline,
+              "[m] X,Y of its corners one after another, in the tracked frame: convex, counter-clockwise")
+      .group(block)
+      .with_commas();
+  parser.option("--block-mass", options->block_mass, "[kg] Its mass").group(block).positive();
   add_lab_options(parser, options->lab);
   parser.footer(examples());
   return {&parser, [options] { import(*options); }};

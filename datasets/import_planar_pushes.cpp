@@ -74,15 +74,41 @@ struct Edge {
   double depth(Vec2 p) const { return dot(normal, p - point); }
 };
 
-std::vector<Edge> edges_of(const PlanarPushOptions& options) {
+std::vector<Edge> edges_of(const PushedBlock& block) {
   std::vector<Edge> out;
-  const std::size_t n = options.outline.size();
+  const std::size_t n = block.outline.size();
   for (std::size_t i = 0; i < n; ++i) {
-    const Vec2 a = options.outline[i], b = options.outline[(i + 1) % n];
+    const Vec2 a = block.outline[i], b = block.outline[(i + 1) % n];
     const Vec2 along = (1 / std::hypot(b[0] - a[0], b[1] - a[1])) * (b - a);
-    out.push_back({a - options.centre, {-along[1], along[0]}});
+    out.push_back({a - block.centre, {-along[1], along[0]}});
   }
   return out;
+}
+
+void check_block(const PushedBlock& block) {
+  constexpr std::size_t kMostCorners = 1000;
+  constexpr double kLeastSide = 1e-4;  // [m]
+  if (!(block.mass > 0 && std::isfinite(block.mass)))
+    throw std::invalid_argument(fmt::format("mass: {} is not > 0", block.mass));
+  const std::size_t n = block.outline.size();
+  if (n < 3 || n > kMostCorners)
+    throw std::invalid_argument(fmt::format("outline: {} corners are not 3 to {}", n, kMostCorners));
+  double turned = 0;  // all the way round: once, or the outline crosses itself
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vec2 here = block.outline[i], next = block.outline[(i + 1) % n];
+    const Vec2 side = next - here, following = block.outline[(i + 2) % n] - next;
+    if (!(std::hypot(side[0], side[1]) >= kLeastSide && std::isfinite(side[0] + side[1])))
+      throw std::invalid_argument(
+          fmt::format("outline: corners {} and {} are closer than {} m, or not finite", i + 1,
+                      (i + 1) % n + 1, kLeastSide));
+    const double turn = std::atan2(cross(side, following), dot(side, following));
+    turned += turn;
+    if (!(turn >= 0))
+      throw std::invalid_argument(
+          fmt::format("outline: not convex and counter-clockwise at corner {} ({}, {})", (i + 1) % n + 1,
+                      next[0], next[1]));
+  }
+  if (!(turned < 3 * std::numbers::pi)) throw std::invalid_argument("outline: it goes round more than once");
 }
 
 Vec2 finger_at(const RawPush& push, double time) {
@@ -124,8 +150,8 @@ struct Reading {
 Reading read_push(const RawPush& push, Vec2 offset, const std::vector<Edge>& edges,
                   const PlanarPushOptions& options) {
   Reading out;
-  const Screw screw(push, options.centre);
-  const double length = options.characteristic_length;
+  const Screw screw(push, options.block.centre);
+  const double length = options.block.characteristic_length;
   const double motion = std::hypot(screw.v[0], screw.v[1], length * screw.omega);
   if (motion < options.least_motion) {
     out.reason =
@@ -228,8 +254,8 @@ void check_options(const PlanarPushOptions& o) {
     if (!(value > 0 && std::isfinite(value)))
       throw std::invalid_argument(fmt::format("{}: {} is not > 0", name, value));
   };
-  positive("mass", o.mass);
-  positive("characteristic_length", o.characteristic_length);
+  check_block(o.block);
+  positive("characteristic_length", o.block.characteristic_length);
   positive("step", o.step);
   positive("rest", o.rest);
   positive("offset_tolerance", o.offset_tolerance);
@@ -242,10 +268,32 @@ void check_options(const PlanarPushOptions& o) {
 
 }  // namespace
 
+PushedBlock homogeneous_block(std::vector<Vec2> outline, double mass) {
+  PushedBlock out;
+  out.mass = mass, out.outline = std::move(outline);
+  out.description.clear(), out.licence.clear();
+  check_block(out);
+  // Triangles from the first corner, which is taken for the origin: areas, centroids, second moments.
+  const Vec2 origin = out.outline.front();
+  double area = 0, moment = 0;
+  Vec2 first{};
+  for (std::size_t i = 1; i + 1 < out.outline.size(); ++i) {
+    const Vec2 a = out.outline[i] - origin, b = out.outline[i + 1] - origin;
+    const double part = cross(a, b) / 2;
+    area += part;
+    first = first + (part / 3) * (a + b);
+    moment += part / 6 * (dot(a, a) + dot(a, b) + dot(b, b));
+  }
+  const Vec2 middle = (1 / area) * first;
+  out.centre = origin + middle;
+  out.characteristic_length = std::sqrt(moment / area - dot(middle, middle));
+  return out;
+}
+
 SlipLog import_planar_pushes(std::span<const fs::path> inputs, const PlanarPushOptions& options,
                              PlanarPushReport* report) {
   check_options(options);
-  const std::vector<Edge> edges = edges_of(options);
+  const std::vector<Edge> edges = edges_of(options.block);
   PlanarPushReport counts;
   SlipLog log;
   for (const auto& [name, file] : logs_of(inputs)) {
@@ -253,14 +301,12 @@ SlipLog import_planar_pushes(std::span<const fs::path> inputs, const PlanarPushO
     std::vector<Vec2> rests;
     for (const RawPush& push : pushes) rests.push_back(rest_force(push, options.rest));
     const Vec2 usual = median_of(rests);
-    Surface surface{
-        options.mass,
-        options.characteristic_length,
-        fmt::format("planar pushes of a triangular block, log {}/{}; measured: robinzhoucmu MLab_EXP "
-                    "(Zhou, Paolini, Bagnell, Mason, ICRA 2016)",
-                    name, file.filename().string()),
-        "Apache-2.0",
-        {}};
+    Surface surface{options.block.mass,
+                    options.block.characteristic_length,
+                    fmt::format("log {}/{}: planar pushes of {}", name, file.filename().string(),
+                                options.block.description),
+                    options.block.licence,
+                    {}};
     for (std::size_t k = 0; k < pushes.size(); ++k) {
       ++counts.pushes;
       const Vec2 apart = rests[k] - usual;

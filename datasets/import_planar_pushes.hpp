@@ -11,11 +11,28 @@
 
 namespace unhand::datasets {
 
-/// A triangular block lies on three feet, or on its whole face, and a finger pushes its edge 16 mm at 2.5
-/// mm/s. A log holds, per push, the block's pose before and after, the finger's pose at 33 Hz and the force
-/// on the finger at 100 Hz. [Zhou2016] What the logs do not say is here: mass, outline and centre of the
-/// block as published with the logs, all in the tracked frame (origin at the right-angled corner, axes along
-/// the legs).
+/// The block that is pushed, in its tracked frame. The logs do not say it; this one is published with them:
+/// a right-angled triangle, origin at the right angle, axes along the legs.
+struct PushedBlock {
+  double mass = 1.518;  ///< [kg]
+  std::vector<std::array<double, 2>> outline{
+      {0, 0}, {0.15, 0}, {0, 0.15}};         ///< convex, counter-clockwise [m]
+  std::array<double, 2> centre{0.05, 0.05};  ///< that torques and the motion are about [m]
+  double characteristic_length = 0.05;       ///< L [m]
+  std::string description =
+      "a triangular block; measured: robinzhoucmu MLab_EXP (Zhou, Paolini, Bagnell, Mason, ICRA 2016)";
+  std::string licence = "Apache-2.0";  ///< of the log; may be empty
+};
+
+/// A homogeneous prism of that outline: its centroid, and for L the distance from there of its area's points,
+/// root mean square. `description` is to be set. Throws std::invalid_argument where the outline has fewer
+/// than three corners or more than 1,000, is not convex or not counter-clockwise, has sides shorter than
+/// 0.1 mm or is not finite, and where the mass [kg] is not > 0.
+PushedBlock homogeneous_block(std::vector<std::array<double, 2>> outline, double mass);
+
+/// A block lies on three feet, or on its whole face, and a finger pushes its edge 16 mm at 2.5 mm/s. A log
+/// holds, per push, the block's pose before and after, the finger's pose at 33 Hz and the force on the finger
+/// at 100 Hz. [Zhou2016]
 ///
 /// **Frames and units.** Poses are in mm, turned into m; every rotation is a yaw about world z, up. The force
 /// sensor turns with the finger: with θ the finger's yaw, the force on the block in the world is
@@ -42,17 +59,14 @@ namespace unhand::datasets {
 /// screw is longer than `least_motion`, the finger ends at an edge, the mean force presses on that edge (a
 /// contact cannot pull), and an interval is left.
 struct PlanarPushOptions {
-  double mass = 1.518;                                                           // [kg]
-  std::array<double, 2> centre{0.05, 0.05};                                      // [m]
-  std::array<std::array<double, 2>, 3> outline{{{0, 0}, {0.15, 0}, {0, 0.15}}};  // counter-clockwise [m]
-  double characteristic_length = 0.05;                                           // L [m]
-  double step = 0.1;                                                             // [s]
-  double rest = 0.2;                                                             // [s]
-  double offset_tolerance = 0.3;                                                 // [N]
-  double contact_tolerance = 0.004;                                              // [m]
-  double least_motion = 0.001;  // [m], √(|v|² + L²ω²) of the whole screw
-  double least_speed = 2e-4;    // [m/s]
-  double least_force = 0.3;     // [N]
+  PushedBlock block;
+  double step = 0.1;                 // [s]
+  double rest = 0.2;                 // [s]
+  double offset_tolerance = 0.3;     // [N]
+  double contact_tolerance = 0.004;  // [m]
+  double least_motion = 0.001;       // [m], √(|v|² + L²ω²) of the whole screw
+  double least_speed = 2e-4;         // [m/s]
+  double least_force = 0.3;          // [N]
   int test_every = 5;  // push numbers n, from 0, with n % test_every == test_every − 1 are held out: 4 to 1
 };
 

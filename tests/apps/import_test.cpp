@@ -111,6 +111,14 @@ TEST_F(Cli, ImportsTossesOfAnotherCube) {
   expect_refusal("import phyphox t.csv --mass 1 --out a.h5 --cube-side 0.06", 2, "are not for phyphox");
 }
 
+TEST_F(Cli, AnotherBlockThatIsPushedIsDeclaredWhole) {
+  const std::string what = "import planar-pushes p.txt --out a.h5 ";
+  expect_refusal(what + "--block-mass 1", 2, "--block-outline and --block-mass");
+  expect_refusal(what + "--block-mass 1 --block-outline 0,0,0.1", 2, "not pairs X,Y");
+  expect_refusal(what + "--block-mass 1 --block-outline 0,0,0,0.1,0.1,0", 2, "counter-clockwise at corner 2");
+  expect_refusal("import cube-tosses t.csv --out a.h5 --block-mass 1", 2, "are not for cube-tosses");
+}
+
 TEST_F(Cli, ImportsPhonesAsFreeFlights) {
   std::ofstream phone(folder / "fall_1.csv");
   phone << "Time (s),Acceleration x (m/s^2),Acceleration y (m/s^2),Acceleration z (m/s^2)\n";

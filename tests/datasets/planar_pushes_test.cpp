@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <cmath>
+#include <limits>
 #include <numbers>
 #include <sstream>
 
@@ -96,6 +98,50 @@ TEST(PlanarPushes, TorqueIsAboutTheCentre) {
   const SlipLog log = import_text(scratch, log_of({push}));
   const Slip& slip = log.surfaces.at("felt").slips[0];
   EXPECT_NEAR(slip.wrench(5, 2), 0.04 * 3, 1e-9);  // 40 mm right of the centre, force up
+}
+
+// Closed forms: a right-angled triangle's radius is √((a² + b²)/18), a rectangle's √((a² + b²)/12), wherever
+// the frame is.
+TEST(PlanarPushes, ABlockIsHomogeneousUnlessItIsPublished) {
+  const PushedBlock published;
+  const PushedBlock triangle = homogeneous_block(published.outline, 2.0);
+  EXPECT_EQ(triangle.mass, 2.0);
+  EXPECT_NEAR(triangle.characteristic_length, std::sqrt(2 * 0.15 * 0.15 / 18), 1e-15);
+  EXPECT_NEAR(triangle.characteristic_length, published.characteristic_length, 1e-15);
+  for (int k = 0; k < 2; ++k) EXPECT_NEAR(triangle.centre[k], published.centre[k], 1e-15);
+  for (const double x : {0.0, -0.3}) {
+    const PushedBlock box = homogeneous_block({{x, 0.1}, {x + 0.08, 0.1}, {x + 0.08, 0.16}, {x, 0.16}}, 1.0);
+    EXPECT_NEAR(box.centre[0], x + 0.04, 1e-15);
+    EXPECT_NEAR(box.centre[1], 0.13, 1e-15);
+    EXPECT_NEAR(box.characteristic_length, std::sqrt((0.08 * 0.08 + 0.06 * 0.06) / 12), 1e-15);
+  }
+}
+
+TEST(PlanarPushes, TorqueIsAboutTheCentreOfAnotherBlock) {
+  const Scratch scratch;
+  Push push;
+  push.along = 70;
+  PlanarPushOptions options;
+  options.block = homogeneous_block({{0, 0}, {0.08, 0}, {0.08, 0.06}, {0, 0.06}}, 0.8);
+  put_bytes(scratch / "a.txt", log_of({push}));
+  const SlipLog log = import_planar_pushes(std::vector<fs::path>{scratch / "a.txt"}, options);
+  const Surface& surface = log.surfaces.begin()->second;
+  EXPECT_EQ(surface.mass, 0.8);
+  EXPECT_NEAR(surface.slips.at(0).wrench(5, 2), 0.03 * 3, 1e-9);
+  EXPECT_EQ(surface.description.find("MLab"), std::string::npos);
+}
+
+TEST(PlanarPushes, OutlinesThatAreNoneAreRefused) {
+  using Outline = std::vector<std::array<double, 2>>;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  Outline star;  // round twice
+  for (int k = 0; k < 5; ++k)
+    star.push_back({std::cos(4 * std::numbers::pi * k / 5), std::sin(4 * std::numbers::pi * k / 5)});
+  for (const Outline& outline : {Outline{{0, 0}, {1, 0}}, Outline{{0, 0}, {0, 1}, {1, 0}}, star,
+                                 Outline{{0, 0}, {1, 0}, {0.2, 0.2}, {0, 1}},
+                                 Outline{{0, 0}, {1, nan}, {0, 1}}, Outline{{0, 0}, {0, 0}, {1, 0}, {0, 1}}})
+    EXPECT_THROW(homogeneous_block(outline, 1), std::invalid_argument);
+  EXPECT_THROW(homogeneous_block({{0, 0}, {1, 0}, {0, 1}}, 0), std::invalid_argument);
 }
 
 TEST(PlanarPushes, FingerThatTouchesFromTheStartBorrowsItsOffset) {
