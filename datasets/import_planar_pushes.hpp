@@ -59,7 +59,7 @@ PushedBlock homogeneous_block(std::vector<std::array<double, 2>> outline, double
 /// screw is longer than `least_motion`, the finger ends at an edge, the mean force presses on that edge (a
 /// contact cannot pull), and an interval is left.
 struct PlanarPushOptions {
-  PushedBlock block;
+  PushedBlock block;                 ///< what is pushed
   double step = 0.1;                 // [s]
   double rest = 0.2;                 // [s]
   double offset_tolerance = 0.3;     // [N]

@@ -57,8 +57,6 @@ struct CardLog {
 struct CardRange {
   double low = 0, high = 0;  ///< in `unit`
   std::string unit;          ///< "-" where it has none
-  /// True in the interval, its ends included.
-  bool contains(double value) const { return low <= value && value <= high; }
   bool operator==(const CardRange&) const = default;
 };
 

@@ -90,10 +90,11 @@ std::vector<std::string> outside_range(const ModelCard& card, const experiment::
   std::vector<std::string> out;
   for (const auto& [name, unit, value] : conditions_of(prepared)) {
     const auto range = card.valid_range.find(name);
-    if (range == card.valid_range.end() || range->second.unit != unit || range->second.contains(value))
-      continue;
-    out.push_back(fmt::format("{} {:.4g} {} is outside [{:.4g}, {:.4g}]", name, value, unit,
-                              range->second.low, range->second.high));
+    if (range == card.valid_range.end() || range->second.unit != unit) continue;
+    const auto& [low, high, same_unit] = range->second;
+    const double margin = kRangeMargin * std::max(std::abs(low), std::abs(high));
+    if (value >= low - margin && value <= high + margin) continue;
+    out.push_back(fmt::format("{} {:.4g} {} is outside [{:.4g}, {:.4g}]", name, value, unit, low, high));
   }
   return out;
 }

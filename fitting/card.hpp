@@ -28,6 +28,9 @@ std::map<std::string, datasets::CardRange> valid_range_of(
     const std::vector<experiment::PreparedThrow>& throws);
 std::map<std::string, datasets::CardRange> valid_range_of(const CampaignProblem& problem);
 
+/// By this share of its ends a throw may lie beyond a valid range: sensors are no better, and a model that
+/// holds inside does not end there.
+inline constexpr double kRangeMargin = 0.01;
 /// Where a throw lies outside a card's valid range, in words; empty: inside. Conditions that the throw does
 /// not tell are passed over.
 std::vector<std::string> outside_range(const datasets::ModelCard& card,
