@@ -75,6 +75,25 @@ function(unhand_module name)
   endforeach()
 endfunction()
 
+# What the command line and the studies are compiled with: text and tables, less to compile than at -O1; what takes time
+# is in the modules. A target that uses it must not set the optimisation itself.
+function(unhand_program target)
+  target_link_libraries(${target} PRIVATE unhand_warnings)
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-Og>)
+  if(CMAKE_CXX_COMPILER_LAUNCHER)  # a compiler cache does better without
+    return()
+  endif()
+  if(NOT TARGET program_headers)
+    add_executable(program_headers ${PROJECT_SOURCE_DIR}/cmake/empty.cpp)
+    target_link_libraries(program_headers PRIVATE unhand_warnings Eigen3::Eigen fmt::fmt nlohmann_json::nlohmann_json)
+    target_compile_features(program_headers PRIVATE cxx_std_20)
+    target_compile_options(program_headers PRIVATE $<$<CONFIG:Release>:-Og>)
+    target_precompile_headers(program_headers PRIVATE <algorithm> <array> <cmath> <filesystem> <fstream> <functional>
+      <map> <memory> <optional> <span> <string> <vector> <Eigen/Dense> <fmt/format.h> <nlohmann/json.hpp>)
+  endif()
+  target_precompile_headers(${target} REUSE_FROM program_headers)
+endfunction()
+
 # What every test is compiled with.
 function(unhand_test_options)
   add_library(unhand_test_options INTERFACE)

@@ -65,6 +65,7 @@ class ForwardStep {
     for (const Score& score : all_)
       if (static_cast<int>(tried_.size()) < options_.refits && score.gain >= kImitation * all_.front().gain)
         consider(score);
+    consider_pads();
     // Laws are alternatives to each other: where one convinces, all are tried. And where nothing convinced,
     // another law may still be the better one.
     if (!best_ || is_law(id_of(*best_->score)))
@@ -97,7 +98,8 @@ class ForwardStep {
 
   std::optional<Trial> try_out(const Score& score) {
     const Candidate& candidate = f_.candidates[score.candidate];
-    Trial trial{&score, extended(stage_, candidate, score, options_), 0, 0, {}};
+    const bool leads = &score == &all_.front() || candidate.id == kPads;
+    Trial trial{&score, extended(stage_, candidate, score, leads, options_), 0, 0, {}};
     if (!trial.next.is_fitted()) return std::nullopt;
     trial.delta_bic = trial.next.bic() - stage_.bic();
     const bool law = is_law(candidate.id);
@@ -125,6 +127,18 @@ class ForwardStep {
     (matters ? convincing_ : evident_).push_back({&score, bic});
     auto& leader = matters ? best_ : small_;
     if (!leader || bic < leader->next.bic()) leader = std::move(trial);
+  }
+
+  /// Rigid pads that fit badly in the grasp are bent so far that their give's footprint may be lost among the
+  /// others.
+  void consider_pads() {
+    const auto& misfit = stage_.fit.misfit;
+    if (std::none_of(misfit.begin(), misfit.end(), [&](const ChannelMisfit& m) {
+          return m.phase == Phase::grasped && is_misfit(m, options_);
+        }))
+      return;
+    for (const Score& score : all_)
+      if (id_of(score) == kPads) consider(score);
   }
 
   /// What matters to no channel may matter to a prediction, where all of a throw's errors add up. Not a give

@@ -129,7 +129,25 @@ CampaignProblem extended_problem(const CampaignProblem& problem, const std::stri
   return problem.with(options.model, effects);
 }
 
-Stage extended(const Stage& stage, const Candidate& candidate, const Score& score,
+namespace {
+
+/// Whether the search of a candidate may have gone astray: it gains nothing where something is missing; or it
+/// has the leading footprint, and still leaves a misfit, or gains far less than noise alone could take away.
+bool is_astray(const Stage& stage, const Stage& next, const Score& score, bool leads,
+               const DiscoverOptions& options) {
+  const auto leaves_misfit = [&](const Stage& s) {
+    return std::any_of(s.fit.misfit.begin(), s.fit.misfit.end(),
+                       [&](const ChannelMisfit& m) { return is_misfit(m, options); });
+  };
+  if (!next.is_fitted()) return leads || leaves_misfit(stage);
+  if (!leaves_misfit(stage))
+    return leads && stage.fit.deviance() - next.fit.deviance() < score.gain / kFirstOrder;
+  return next.bic() - stage.bic() > kDeltaBic || (leads && leaves_misfit(next));
+}
+
+}  // namespace
+
+Stage extended(const Stage& stage, const Candidate& candidate, const Score& score, bool leads,
                const DiscoverOptions& options) {
   Stage out{extended_problem(stage.problem, candidate.id), {}, {}, stage.ids};
   out.ids.push_back(candidate.id);
@@ -147,13 +165,9 @@ Stage extended(const Stage& stage, const Candidate& candidate, const Score& scor
       start[k] = shape->second;
   }
   solve_train(out, options, std::move(start));
-  const bool in_vain = !out.is_fitted() || out.bic() - stage.bic() > kDeltaBic;
-  const bool misfit = std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(),
-                                  [&](const ChannelMisfit& m) { return is_misfit(m, options); });
-  if (is_law(candidate.id) || !stage.ids.empty() || !misfit || !in_vain) return out;
-  // Something is missing, and a leading candidate gains nothing: its search may have gone astray, since the
-  // base had bent what they share to make up for what it lacks. Once more, from what the log itself suggests
-  // of that and with an effect of a typical size.
+  if (is_law(candidate.id) || !stage.ids.empty() || !is_astray(stage, out, score, leads, options)) return out;
+  // The base had bent what they share to make up for what it lacks. Once more, from what the log itself
+  // suggests of that and with an effect of a typical size.
   Stage again{out.problem, {}, {}, out.ids};
   if (solve_train(again, options, std::move(typical)) &&
       (!out.is_fitted() || again.fit.deviance() < out.fit.deviance()))

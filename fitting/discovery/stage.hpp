@@ -67,8 +67,10 @@ void solve(Stage& stage, const DiscoverOptions& options, std::vector<double> sta
 void polish(Stage& stage, const DiscoverOptions& options);
 
 /// The stage with one candidate more, fitted to the train throws from the step that its footprint asks for;
-/// where that gains nothing over a base with a misfit, once more from the problem's own start.
-Stage extended(const Stage& stage, const Candidate& candidate, const Score& score, const DiscoverOptions&);
+/// where that search may have gone astray, once more from the problem's own start. `leads`: the candidate
+/// has the leading footprint, or is the one that a base with rigid pads is bent by most, their give.
+Stage extended(const Stage& stage, const Candidate& candidate, const Score& score, bool leads,
+               const DiscoverOptions&);
 
 /// The stage fitted again without some of its ids: effects, or the law that took the place of the model to
 /// begin with. Every removal is fitted once.

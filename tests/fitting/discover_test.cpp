@@ -241,6 +241,19 @@ TEST(Discovery, TheGiveOfAnyPadsIsFittedAlongWhereOnlyPredictionsShowIt) {
   EXPECT_EQ(found.along, std::vector<std::string>{"contact.pad_compliance"});
 }
 
+// Pads that give by a millimetre bend a base with rigid ones until it slips in the firm grasp, at less than
+// half of its friction: a search that starts there does not find back.
+TEST(Discovery, PadsThatBendTheBaseFarAreFound) {
+  experiment::CampaignDesign design = experiment::random_campaign(144);
+  constexpr double kCompliance = 4.08e-5;  // m/N
+  design.effects = {{"contact.pad_compliance.compliance", kCompliance}};
+  const Discovery found = found_in(experiment::generate_campaign(design, 144));
+  EXPECT_LT(found.base.campaign.front().value, 0.6 * design.patch.mu) << "of the base";
+  const AcceptedEffect* pads = named(found, "contact.pad_compliance");
+  ASSERT_NE(pads, nullptr) << to_string(found.verdict);
+  EXPECT_NEAR(pads->parameters.front().value, kCompliance, 3 * pads->parameters.front().sigma);
+}
+
 // Below what one reading of the sensor tells, an error that repetitions share is nobody's concern.
 TEST(Discovery, PredictionsLackNothingThatTheSensorDoesNotResolve) {
   constexpr double kResolution = 2e-4;  // m
