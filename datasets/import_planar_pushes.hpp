@@ -19,6 +19,7 @@ struct PushedBlock {
       {0, 0}, {0.15, 0}, {0, 0.15}};         ///< convex, counter-clockwise [m]
   std::array<double, 2> centre{0.05, 0.05};  ///< that torques and the motion are about [m]
   double characteristic_length = 0.05;       ///< L [m]
+  /// For the log.
   std::string description =
       "a triangular block; measured: robinzhoucmu MLab_EXP (Zhou, Paolini, Bagnell, Mason, ICRA 2016)";
   std::string licence = "Apache-2.0";  ///< of the log; may be empty
