@@ -53,7 +53,7 @@ double give_per_compliance(const Stage& stage) {
 
 double give_of(const Stage& stage) {
   for (const auto& u : stage.fit.campaign)
-    if (u.unknown.name == std::string(kPads) + ".compliance") return u.value * give_per_compliance(stage);
+    if (u.unknown.name == kCompliance) return u.value * give_per_compliance(stage);
   return 0;
 }
 

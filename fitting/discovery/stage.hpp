@@ -42,6 +42,8 @@ double error_ratio(const OutcomeErrors& before, const OutcomeErrors& after);
 
 /// The give of the pads.
 inline constexpr const char* kPads = "contact.pad_compliance";
+/// Its size.
+inline constexpr const char* kCompliance = "contact.pad_compliance.compliance";
 /// That give per unit of the effect [N]: the friction limit of all pads at the campaign's grip force.
 double give_per_compliance(const Stage& stage);
 /// The give of a fit's pads [m]; 0 where it has none.
