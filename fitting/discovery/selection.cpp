@@ -111,8 +111,7 @@ bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   std::vector<double> start = carried(stage.fit, next.problem);
   constexpr double kGive = 3e-6;  // to start with [m]
   for (std::size_t k = 0; k < start.size(); ++k)
-    if (next.problem.campaign()[k].name == kCompliance)
-      start[k] = kGive / give_per_compliance(stage);
+    if (next.problem.campaign()[k].name == kCompliance) start[k] = kGive / give_per_compliance(stage);
   solve(next, options, std::move(start));
   if (!next.solved() || next.bic() - stage.bic() > kDeltaBic || give_of(next) > kMostGive) return false;
   stage = std::move(next);
