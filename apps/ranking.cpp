@@ -30,7 +30,7 @@ Table ranking_table(std::span<const fitting::Ranked> ranking) {
               {},
               1};
   for (const auto& r : ranking)
-    table.rows.push_back({r.id, r.visible ? fmt::format("{:.4g}", r.gain) : "no footprint",
+    table.rows.push_back({r.id, r.visible ? fmt::format("{:.4g}", std::max(0.0, r.gain)) : "no footprint",
                           std::to_string(r.step), fmt::format("{:.2g}", r.p_value),
                           fmt::format("{:.3f}", r.correlation_with_best),
                           r.refitted ? fmt::format("{:+.1f}", r.delta_bic) : "",
