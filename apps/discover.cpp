@@ -106,10 +106,11 @@ Json misfit_json(const std::vector<fitting::ChannelMisfit>& misfit) {
 
 /// The command line that finds the same again: what it gave, but for outputs and threads.
 std::string command_of(const DiscoverOptions& options, const Parser& parser) {
-  std::string out = fmt::format("unhand discover {} --model {}", options.log, options.model);
+  std::string out = fmt::format("unhand discover {}", options.log);
   const auto add = [&](const char* name, const auto& value) {
     if (parser.given(name)) out += fmt::format(" {} {}", name, value);
   };
+  add("--model", options.model);
   for (const auto& id : options.forget) add("--forget", id);
   add("--matters", options.matters);
   add("--most", options.most.value_or(0));
@@ -126,10 +127,17 @@ void discover(const DiscoverOptions& options, const Parser& parser) {
     require_gnuplot();
   }
   const std::string command = command_of(options, parser);
-  if (const auto kind = measured_kind(options.log))
-    return discover_measured(*kind,
-                             {options.log, options.model, options.report, options.json, options.card, command,
-                              options.forget, options.floor, options.most.value_or(6), options.threads});
+  if (const auto kind = measured_kind(options.log)) {
+    refuse_options(parser, {"--matters", "--rtol"}, "only throws from a hand are judged and integrated so");
+    if (*kind != MeasuredKind::flights)
+      refuse_options(parser, {"--floor"}, "only free flights come to rest on one");
+    if (*kind == MeasuredKind::slips) refuse_options(parser, {"--most"}, "slips have one law");
+    return discover_measured(
+        *kind, {options.log, options.report, options.json, options.card, command,
+                parser.given("--model") ? std::optional(options.model) : std::nullopt, options.forget,
+                options.floor, options.most.value_or(6), options.threads});
+  }
+  refuse_options(parser, {"--floor"}, "only free flights come to rest on one");
   const auto& others = measured_models();
   if (std::find(others.begin(), others.end(), options.model) != others.end())
     throw WrongUsage(fmt::format("--model {}: {} holds planar throws", options.model, options.log));
@@ -244,9 +252,8 @@ std::string discovery_text(const Discovery& found, const std::string& log) {
               {},
               1};
   const auto row = [&](const std::string& name, const OutcomeErrors& e) {
-    table.rows.push_back({name, fmt::format("{:.5f}", e.landing_x_mae),
-                          fmt::format("{:.3f}", e.landing_theta_mae), fmt::format("{:.5f}", e.detach_vx_mae),
-                          fmt::format("{:.3f}", e.detach_omega_mae), fmt::format("{:.6f}", e.trajectory_rms),
+    table.rows.push_back({name, fixed(e.landing_x_mae, 5), fixed(e.landing_theta_mae, 3),
+                          fixed(e.detach_vx_mae, 5), fixed(e.detach_omega_mae, 3), fixed(e.trajectory_rms, 6),
                           fixed(e.chi2_per_dof, 3)});
   };
   row(fmt::format("before, train ({})", found.before_train.n), found.before_train);

@@ -1,6 +1,7 @@
 #include "apps/discover_measured.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -8,7 +9,10 @@
 #include "apps/figure.hpp"
 #include "apps/measured_report.hpp"
 #include "apps/throws.hpp"
+#include "experiment/tracked_flight.hpp"
 #include "fitting/card.hpp"
+#include "fitting/discovery/footprints.hpp"
+#include "fitting/measured/fall_discovery.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -19,6 +23,20 @@ const char* default_model(MeasuredKind kind) {
   return kind == MeasuredKind::flights ? "projectile"
          : kind == MeasuredKind::falls ? "free_fall"
                                        : "ellipsoid";
+}
+
+/// The ids of what may be found in such a log.
+std::vector<std::string> catalogue(MeasuredKind kind) {
+  std::vector<std::string> out;
+  if (kind == MeasuredKind::slips) {
+    for (const auto model : fitting::surface_models)
+      out.push_back(std::string(fitting::kLaw) + fitting::to_string(model));
+    return out;
+  }
+  for (const auto& effect :
+       kind == MeasuredKind::flights ? experiment::known_flight_effects() : fitting::known_fall_effects())
+    out.push_back(effect.id);
+  return out;
 }
 
 /// The parameters that were found, for `unhand compare` to read.
@@ -61,11 +79,14 @@ const std::vector<std::string>& measured_models() {
 }
 
 void discover_measured(MeasuredKind kind, const MeasuredRequest& request) {
-  const bool is_default =
-      std::find(measured_models().begin(), measured_models().end(), request.model) == measured_models().end();
-  if (!is_default && request.model != default_model(kind))
+  if (request.model && *request.model != default_model(kind))
     throw WrongUsage(
-        fmt::format("--model {}: the base model of this log is {}", request.model, default_model(kind)));
+        fmt::format("--model {}: the base model of this log is {}", *request.model, default_model(kind)));
+  const auto known = catalogue(kind);
+  for (const std::string& id : request.forget)
+    if (std::find(known.begin(), known.end(), id) == known.end())
+      throw WrongUsage(
+          fmt::format("--forget {}: the catalogue of this log has {}", id, fmt::join(known, ", ")));
   if (kind == MeasuredKind::slips && !request.card.empty())
     throw WrongUsage("--card: limit surfaces of a slip-log get theirs from `unhand fit LOG --card FILE`");
   MeasuredResult result;

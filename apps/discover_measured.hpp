@@ -10,7 +10,8 @@ namespace unhand::apps {
 /// What such a log is.
 enum class MeasuredKind { flights, falls, slips };
 struct MeasuredRequest {
-  std::string log, model, report, json, card, command;
+  std::string log, report, json, card, command;
+  std::optional<std::string> model;  ///< absent: the kind's own
   std::vector<std::string> forget;
   double floor{0};
   int most{6}, threads{0};

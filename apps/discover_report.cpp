@@ -115,7 +115,8 @@ Table structure_table(const Discovery& found) {
     for (const auto& s : found.structure_after)
       if (s.phase == before.phase && s.channel == before.channel) after = s.structure.in_words();
     table.rows.push_back({std::string(to_string(before.phase)), std::string(to_string(before.channel)),
-                          before.structure.in_words(), found.effects.empty() ? "" : after});
+                          before.structure.in_words(),
+                          found.effects.empty() && found.along.empty() ? "" : after});
   }
   table.left = 4;
   return table;
@@ -127,10 +128,14 @@ Table error_table(const Discovery& found) {
               {},
               1};
   const auto row = [&](const char* name, const OutcomeErrors& e) {
-    table.rows.push_back({name, std::to_string(e.n), fmt::format("{:.2f}", 1e3 * e.landing_x_mae),
-                          fmt::format("{:.3f}", e.landing_theta_mae), fmt::format("{:.5f}", e.detach_vx_mae),
-                          fmt::format("{:.3f}", e.detach_omega_mae),
-                          fmt::format("{:.3f}", 1e3 * e.trajectory_rms), fixed(e.chi2_per_dof, 3)});
+    const auto mm = [](std::optional<double> metres) {
+      if (metres) *metres *= 1e3;
+      return metres;
+    };
+    table.rows.push_back({name, std::to_string(e.n), fixed(mm(e.landing_x_mae), 2),
+                          fixed(e.landing_theta_mae, 3), fixed(e.detach_vx_mae, 5),
+                          fixed(e.detach_omega_mae, 3), fixed(mm(e.trajectory_rms), 3),
+                          fixed(e.chi2_per_dof, 3)});
   };
   row("before, train", found.before_train);
   row("before, test", found.before_test);

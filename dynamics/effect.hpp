@@ -38,6 +38,9 @@ struct Effect {
   bool per_object{false};                   ///< every object has its own values, named "k[jar]"
   /// No two-sided derivative at neutral: its footprint is a difference, at several sizes, over the grid.
   bool one_sided{false};
+  /// In flight: the term of fitting/discovery/missing_force.cpp that is the acceleration this effect seems to
+  /// be. Empty: none is.
+  std::string form{};
   /// "id.name"
   std::string full_name(const EffectParameter& parameter) const { return id + "." + parameter.name; }
 };

@@ -12,7 +12,12 @@ void tilt(const EffectValues<S>& p, Gravity<S>& gravity) {
 
 std::span<const EffectOn<Gravity>> gravity_effects() {
   static const EffectOn<Gravity> table[] = {
-      {{"flight.gravity_tilt", "the base frame is not level", {{"angle", "rad", 0, -0.5, 0.5, 0.01}}},
+      {{"flight.gravity_tilt",
+        "the base frame is not level",
+        {{"angle", "rad", 0, -0.5, 0.5, 0.01}},
+        false,
+        false,
+        "1 along x"},
        &tilt<double>,
        &tilt<Dual>},
   };

@@ -149,6 +149,7 @@ void CampaignProblem::name_unknowns(const std::vector<Effect>& effects) {
       const double disc = contact::ConvexQuartic::kappa_closest_to_disc();
       campaign_.push_back({"kappa", "-", disc, 0.05, 2.95, 0.2, 0.3});
     }
+    for (Unknown& u : campaign_) u.of_law = true;
     own_.push_back({"mu_deviation", "-", 0, -0.5, 0.5, 0.02, 0.03, Unknown::Kind::scatter});
     if (any_force) own_.push_back({"force_deviation", "-", 0, -6, 6, 1, 1, Unknown::Kind::smoothing});
     if (!all_forces) {

@@ -36,6 +36,7 @@ struct Unknown {
   /// 1 σ of what is known of it without this log, about `start`.
   std::optional<double> prior_sigma{};
   Kind kind{Kind::placement};  ///< of a throw's own unknown
+  bool of_law{false};          ///< of a campaign's unknown: a parameter of the contact law
 };
 
 /// Which model, effects and channels a campaign's problem has.

@@ -27,6 +27,16 @@ double chi2_tail(double x, int k) {
   return cdf(complement(ChiSquared(k), std::min(x, kLargest)));
 }
 
+double chi_bar_tail(double x, int free, int bounded) {
+  if (!(x > 0) || free + bounded < 1) return 1;
+  double out = 0, weight = std::ldexp(1.0, -bounded);
+  for (int j = 0; j <= bounded; ++j) {
+    if (free + j > 0) out += weight * chi2_tail(x, free + j);  // with none, all of it is at 0
+    weight *= static_cast<double>(bounded - j) / (j + 1);
+  }
+  return out;
+}
+
 double f_tail(double x, double p, double q) {
   if (!(x > 0) || !(p > 0) || !(q > 0)) return 1;
   return cdf(complement(FisherF(p, q), std::min(x, kLargest)));

@@ -16,6 +16,12 @@ double normal_two_sided(double z);
 /// P(χ²_k > x). 1, no evidence, where k < 1 or x is no positive number.
 double chi2_tail(double x, int k);
 
+/// P(χ̄² > x) of a gain that `bounded` parameters share which may only go one way from where they are none,
+/// and `free` ones that go both ways: Σ_j C(bounded, j) 2^-bounded P(χ²_{free + j} > x), Chernoff's mixture
+/// [SelfLiang1987]. Exact for one bounded parameter beside free ones, and for several that do not correlate,
+/// as sizes of different objects. 1, no evidence, where x is no positive number or there are no parameters.
+double chi_bar_tail(double x, int free, int bounded);
+
 /// P(F_{p,q} > x), Fisher's F. 1, no evidence, where p or q or x is no positive number.
 double f_tail(double x, double p, double q);
 

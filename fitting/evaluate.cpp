@@ -187,7 +187,7 @@ CrossValidation cross_validate(const datasets::ThrowLog& log, const std::string&
     }
     const CampaignProblem problem(part, file, campaign);
     const FitResult result = fit(problem, options);
-    if (result.outcome == FitOutcome::no_start || result.outcome == FitOutcome::not_solved) {
+    if (!result.is_answer()) {
       out.failed.push_back(fmt::format("fold {} of {}: {}", fold + 1, out.folds, result.message));
       continue;
     }

@@ -90,6 +90,7 @@ void describe_throws(const CampaignProblem& problem, const FitRounds& rounds, Fi
     one.chi2 = part.chi2;
     one.own = rounds.own(i);
     one.modes = part.modes;
+    one.detach = part.detach;
     out.samples += static_cast<long>(thrown.observed.all.size());
     total.add(thrown, part.residual, part.detach);
   }
@@ -114,8 +115,11 @@ void describe_throws(const CampaignProblem& problem, const FitRounds& rounds, Fi
     out.chi2 += m.chi2;
     out.misfit.push_back(m);
   }
-  out.degrees_of_freedom = out.samples - static_cast<long>(out.campaign.size()) -
-                           static_cast<long>(rounds.used().size() * problem.own().size());
+  const auto& unknowns = problem.campaign();
+  const auto fitted =
+      std::count_if(unknowns.begin(), unknowns.end(), [&](const Unknown& u) { return !rounds.is_fixed(u); });
+  out.degrees_of_freedom =
+      out.samples - fitted - static_cast<long>(rounds.used().size() * problem.own().size());
 }
 
 /// The sizes of one-sided effects among the campaign's unknowns. At their neutral values they may have no
@@ -148,7 +152,11 @@ FitResult fit_from(std::vector<double> start, const CampaignProblem& problem, co
   FitRounds rounds(problem, options, start);
   if (rounds.used().empty()) {
     out.outcome = FitOutcome::no_start;
-    out.message = "no throw of the fit's share could be simulated with the parameters that it starts from";
+    out.message =
+        rounds.refused()
+            ? fmt::format("throw {} could not be simulated with the parameters that the fit starts from",
+                          out.throws[*rounds.refused()].id)
+            : "no throw of the fit's share could be simulated with the parameters that it starts from";
     return out;
   }
   for (int round = 0; round < options.rounds; ++round) {
@@ -196,7 +204,10 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
     FitResult smaller = fit_from(start(share), problem, options);
     smaller.seconds += out.seconds;
     smaller.jacobian_seconds += out.jacobian_seconds;
-    if (smaller.is_answer() && smaller.deviance() < out.deviance()) out = std::move(smaller);
+    // Deviances of the same throws; a start from which more of them have an answer is the better one.
+    const bool likelier =
+        smaller.samples == out.samples ? smaller.deviance() < out.deviance() : smaller.samples > out.samples;
+    if (smaller.is_answer() && likelier) out = std::move(smaller);
   }
   return out;
 }

@@ -62,6 +62,9 @@ struct FitOptions {
   /// Nothing of the campaign is fitted, only the throws' own unknowns; what the log says of it is not asked.
   bool all_fixed{false};
   std::vector<double> own_spread;  ///< 1 σ of the throws' own unknowns, if it is known; empty: learned
+  /// Per throw of the log, whether it takes part. Empty: all of the share that can be simulated at the start.
+  /// Else exactly these of the share, so that fits can be compared: without one of them there is no answer.
+  std::vector<bool> throws;
   /// Whether unknowns whose cost may not be a parabola are given the interval of their profile.
   bool profile{false};
 };
@@ -70,7 +73,7 @@ struct FitOptions {
 enum class FitOutcome {
   converged,         ///< within `accuracy`
   iterations_spent,  ///< an answer, but short of `accuracy`
-  no_start,          ///< no throw can be simulated at the start
+  no_start,          ///< no throw can be simulated at the start, or one that must be cannot
   not_solved,        ///< the solver failed
 };
 /// The outcome's name, as it is written above.
@@ -118,6 +121,7 @@ struct ThrowFit {
   double chi2{};            ///< of its observations, weighted by group and robust (Huber)
   std::vector<double> own;  ///< its own unknowns
   std::vector<int> modes;   ///< the modes entered, in order
+  double detach{};          ///< as the fit predicts it [s]
 };
 
 /// A fit: values, covariance, what is open, misfit by channel.

@@ -30,18 +30,24 @@ FitRounds::FitRounds(const CampaignProblem& problem, const FitOptions& options,
 void FitRounds::choose_throws(const std::vector<double>& start) {
   const auto& throws = problem_.throws();
   std::vector<Linearisation> starts(throws.size());
+  std::vector<char> asked(throws.size());
   const std::vector<double> own(problem_.own().size(), 0.0);
   experiment::parallel_for(throws.size(), options_.threads, [&](std::size_t i) {
     const bool shared =
         options_.share == Share::all ||
         (options_.share == Share::train) == (throws[i].prepared.split == datasets::Split::train);
-    if (!shared || throws[i].observed.all.empty()) return;
+    if (!shared || throws[i].observed.all.empty() || !(options_.throws.empty() || options_.throws[i])) return;
+    asked[i] = 1;
     try {
       starts[i] = problem_.linearise(throws[i], start, own, DerivativesBy::nothing);
     } catch (const std::invalid_argument&) {
       // a start outside the physics
     }
   });
+  if (!options_.throws.empty())
+    for (std::size_t i = 0; i < throws.size() && !refused_; ++i)
+      if (asked[i] && !starts[i].solved) refused_ = i;
+  if (refused_) return;
   Misfit misfit;
   for (std::size_t i = 0; i < throws.size(); ++i)
     if (starts[i].solved) {

@@ -20,6 +20,8 @@ class FitRounds {
   FitRounds& operator=(const FitRounds&) = delete;
 
   const std::vector<std::size_t>& used() const { return used_; }
+  /// A throw that must take part and cannot be simulated at the start: then none is used.
+  const std::optional<std::size_t>& refused() const { return refused_; }
   bool is_fixed(const Unknown& unknown) const;
 
   /// Least squares with the weights and spreads as they are, and the normal equations at its solution; false
@@ -68,6 +70,7 @@ class FitRounds {
   const FitOptions& options_;
   Shared shared_;
   std::vector<std::size_t> used_;
+  std::optional<std::size_t> refused_;
   SimulatedThrows simulated_{shared_, used_};
   std::vector<double> x_;
   // One array: Ceres orders blocks by their addresses, which must be the throws' order in every run.

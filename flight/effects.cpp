@@ -23,10 +23,20 @@ void wind(const EffectValues<S>& p, Air<S>& air) {
 
 std::span<const dynamics::EffectOn<Air>> air_effects() {
   static const dynamics::EffectOn<Air> table[] = {
-      {{"flight.quadratic_drag", "quadratic drag, a = -k |v| v", {{"k", "1/m", 0, 0, 10, 0.02}}, true},
+      {{"flight.quadratic_drag",
+        "quadratic drag, a = -k |v| v",
+        {{"k", "1/m", 0, 0, 10, 0.02}},
+        true,
+        false,
+        "|v| v"},
        &drag<double>,
        &drag<Dual>},
-      {{"flight.magnus_lift", "Magnus lift, a = k_m omega J v", {{"k_m", "-", 0, -5, 5, 0.01}}},
+      {{"flight.magnus_lift",
+        "Magnus lift, a = k_m omega J v",
+        {{"k_m", "-", 0, -5, 5, 0.01}},
+        false,
+        false,
+        "omega J v"},
        &lift<double>,
        &lift<Dual>},
       {{"flight.wind",

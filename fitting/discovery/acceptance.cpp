@@ -88,8 +88,9 @@ bool predicts_better(const Stage& before, const Stage& after, const DiscoverOpti
   if (!(gain.before > options.prediction_matters * gain.after) || !held_out_confirms(before, after))
     return false;
   const OutcomeErrors was = outcome_errors(outcomes_before), is = outcome_errors(outcomes_after);
-  const auto holds = [&](double OutcomeErrors::*outcome) {
-    return !(is.*outcome > options.prediction_matters * was.*outcome);
+  const auto holds = [&](std::optional<double> OutcomeErrors::*outcome) {
+    if (!(was.*outcome)) return true;
+    return is.*outcome && *(is.*outcome) <= options.prediction_matters * *(was.*outcome);
   };
   return holds(&OutcomeErrors::landing_x_mae) && holds(&OutcomeErrors::landing_theta_mae) &&
          holds(&OutcomeErrors::detach_vx_mae) && holds(&OutcomeErrors::detach_omega_mae) &&
@@ -124,23 +125,47 @@ std::vector<OutcomeLack> lacking(const OutcomeErrors& train, const OutcomeErrors
   return out;
 }
 
-double wald_p_value(const FitResult& fit, const dynamics::Effect& effect) {
+namespace {
+
+/// How far from neutral an effect's sizes are: the square in units of their covariance, and how many of them
+/// may go both ways and one way.
+struct Distance {
+  double square{};
+  int free{}, bounded{};
+};
+
+Distance distance_from_neutral(const FitResult& fit, const dynamics::Effect& effect) {
   std::vector<Eigen::Index> index;
   std::vector<double> away;
+  Distance out;
   const auto& campaign = fit.campaign;
   for (std::size_t k = 0; k < campaign.size(); ++k)
     for (const auto& p : effect.parameters)
       if (!p.is_shape() && without_object(campaign[k].unknown.name) == effect.full_name(p)) {
         index.push_back(static_cast<Eigen::Index>(k));
         away.push_back(campaign[k].value - p.neutral);
+        ++(p.neutral > p.low && p.neutral < p.high ? out.free : out.bounded);
       }
-  if (index.empty()) return 1;
+  if (index.empty()) return out;
   const auto width = static_cast<Eigen::Index>(campaign.size());
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const Eigen::Map<const RowMajor> all(fit.covariance.data(), width, width);
   const Eigen::MatrixXd C = all(index, index);
   const Eigen::Map<const Eigen::VectorXd> d(away.data(), static_cast<Eigen::Index>(away.size()));
-  return chi2_tail(d.dot(pseudo_solve(C, d)), static_cast<int>(away.size()));
+  out.square = d.dot(pseudo_solve(C, d));
+  return out;
+}
+
+}  // namespace
+
+double wald_p_value(const FitResult& fit, const dynamics::Effect& effect) {
+  const Distance from = distance_from_neutral(fit, effect);
+  return chi_bar_tail(from.square, from.free, from.bounded);
+}
+
+bool is_told_from_none(const FitResult& fit, const dynamics::Effect& effect) {
+  const Distance from = distance_from_neutral(fit, effect);
+  return chi2_tail(from.square, from.free + from.bounded) <= kToldFromNone;
 }
 
 bool in_air(Phase phase) { return phase == Phase::flight || phase == Phase::landing; }
@@ -191,7 +216,7 @@ bool leaves_lacking(const BothErrors& errors, const Discovery& so_far, const Dis
 bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const BothErrors& errors,
                   const FitResult& counted, const Discovery& so_far, const DiscoverOptions& options) {
   return (acts(effect, false) && leaves_lacking(errors, so_far, options)) ||
-         (!is_law(effect.id) && wald_p_value(counted, find_effect(effect.id)) > kToldFromNone) ||
+         (!is_law(effect.id) && !is_told_from_none(counted, find_effect(effect.id))) ||
          leaves_too_much(effect, so_far.base.misfit, so_far.base_test, stage.fit.misfit, options) ||
          leaves_too_much(effect, so_far.base_test, so_far.base.misfit, stage.held_out.misfit, options);
 }
@@ -274,7 +299,8 @@ std::vector<std::string> outdone_by_a_form(const Stage& stage, const Discovery& 
                            kOutdone * beyond_noise(flights(stage, stage.held_out), {});
   if (!outdone) return {};
   for (const auto& [object, candidate] : candidates)
-    for (const MissingTerm& term : candidate.terms) std::erase(accepted, term.form_of);
+    for (const MissingTerm& term : candidate.terms)
+      std::erase_if(accepted, [&](const std::string& id) { return find_effect(id).form == term.name; });
   return accepted;
 }
 

@@ -104,6 +104,9 @@ inline constexpr double kMostGive = 3e-5;
 /// better for it, and are likelier.
 bool needs_give(const Stage& rigid, const Stage& give, const DiscoverOptions& options);
 
+/// An estimate of what is missing is used as a correction where it lowers the held-out error to this share.
+inline constexpr double kCorrects = 0.98;
+
 /// @}
 /// @name What is withdrawn
 /// @{
@@ -114,8 +117,11 @@ inline constexpr double kLeft = 0.1;
 /// The level at which an effect's size must be told from none by its own interval.
 inline constexpr double kToldFromNone = 0.05;
 
-/// Wald's test of an effect's size parameters against neutral, with the fit's covariance.
+/// Wald's test of an effect's size parameters against neutral, with the fit's covariance. Sizes that are
+/// neutral at an end of their range count as chi_bar_tail has it.
 double wald_p_value(const FitResult& fit, const dynamics::Effect& effect);
+/// Whether the two-sided confidence region of the sizes, of the level kToldFromNone, leaves neutral out.
+bool is_told_from_none(const FitResult& fit, const dynamics::Effect& effect);
 
 /// In flight or at the landing, not in the hand.
 bool in_air(Phase phase);

@@ -6,6 +6,8 @@
 #include <chrono>
 #include <cmath>
 
+#include "contact/gripper_delay.hpp"
+#include "contact/registry.hpp"
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/held_out_split.hpp"
 #include "fitting/discovery/outcome_errors.hpp"
@@ -28,6 +30,12 @@ const char* to_string(Outcome outcome) {
 
 const char* unit_of(Outcome outcome) {
   return outcome == Outcome::orientation || outcome == Outcome::landing_theta ? "rad" : "m";
+}
+
+std::vector<std::string> all_laws() {
+  auto out = contact::contact_model_names();
+  std::erase(out, contact::kGripperDelay);
+  return out;
 }
 
 void AcceptedEffect::add_other_name(const std::string& other, double correlation) {
@@ -54,9 +62,9 @@ FirstMisfit first_misfit(const FitResult& fit, const DiscoverOptions& options) {
 
 }  // namespace
 
-Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
-                   const DiscoverOptions& options) {
+Discovery discover(const datasets::ThrowLog& logged, const std::string& file, const DiscoverOptions& given) {
   const auto begin = std::chrono::steady_clock::now();
+  DiscoverOptions options = given;
   const int threads = options.fit.threads;
   const datasets::ThrowLog log = with_held_out(logged);
   Discovery out;
@@ -64,7 +72,8 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
         return t.split == datasets::Split::test;
       })) {
     out.verdict = Verdict::not_answered;
-    out.message = "no test throws and one condition only: nothing can be held out to judge an effect by";
+    out.message =
+        "no test throws, and no object with two conditions: nothing can be held out to judge an effect by";
     return out;
   }
   Stage stage{CampaignProblem(log, file, options.campaign), {}, {}, {}};
@@ -80,16 +89,19 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
             : fmt::format("the base model could not be fitted: {}", stage.fit.message);
     return out;
   }
+  options.fit.throws = throws_of(stage);
   out.base_test = stage.held_out.misfit;
   out.before_train = errors_of(stage, Share::train, threads);
   out.before_test = errors_of(stage, Share::test, threads);
   out.first = first_misfit(stage.fit, options);
   const auto residuals_before = residuals_of(stage.problem, stage.fit, threads);
-  out.residual_before = residual_over_time(stage.problem, residuals_before);
-  out.structure_before = structures(stage.problem, residuals_before);
+  out.residual_before = residual_over_time(stage.problem, stage.fit, residuals_before);
+  out.structure_before = structures(stage.problem, stage.fit, residuals_before);
 
   const Stage base = stage;
-  for (int step = 0; step < options.most_effects; ++step) {
+  // One look more than effects are wanted: where none is found, another beside pads that give.
+  for (int look = 0; look <= options.most_effects; ++look) {
+    if (static_cast<int>(out.effects.size()) >= options.most_effects) break;
     auto next = forward(stage, options, out);
     if (!next) {
       // The give of the pads may hide what else there is, and predictions may lack it: with it, one more
@@ -120,8 +132,8 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file,
 
   const bool unchanged = out.effects.empty() && out.along.empty();
   const auto residuals_after = unchanged ? residuals_before : residuals_of(stage.problem, stage.fit, threads);
-  out.residual_after = residual_over_time(stage.problem, residuals_after);
-  out.structure_after = structures(stage.problem, residuals_after);
+  out.residual_after = residual_over_time(stage.problem, stage.fit, residuals_after);
+  out.structure_after = structures(stage.problem, stage.fit, residuals_after);
   out.final = stage.fit;
   out.final_test = stage.held_out.misfit;
   out.model = stage.problem.options().model;

@@ -14,6 +14,9 @@
 
 namespace unhand::fitting {
 
+/// Every contact model that is a law of friction, which gripper_delay is not.
+std::vector<std::string> all_laws();
+
 /// What the loop may try, and what convinces it.
 struct DiscoverOptions {
   CampaignOptions campaign;  ///< model to begin with, and channels
@@ -38,10 +41,8 @@ struct DiscoverOptions {
   int refits{4};
   int most_effects{3};      ///< accepted in all
   double unexplained{1.5};  ///< χ² per sample of a channel in a phase from which on something is missing
-  std::vector<std::string> forget;  ///< effects that are not in the catalogue today
-  std::vector<std::string> laws{"limit_surface", "limit_surface_disc",
-                                "limit_surface_quartic",  ///< contact laws that are tried
-                                "sliding_pivot"};
+  std::vector<std::string> forget;            ///< effects that are not in the catalogue today
+  std::vector<std::string> laws{all_laws()};  ///< contact laws that are tried
 };
 
 /// What the loop says of a log.
@@ -76,14 +77,15 @@ struct OutcomeLack {
   double resolution{};  ///< 1 σ of one reading of the outcome's sensor [m or rad]; of a position, both axes'
 };
 
-/// Errors of the outcome, predicted before the throw (own unknowns from the grasp alone) minus measured.
+/// Errors of the outcome, predicted before the throw (own unknowns from the grasp alone) minus measured; none
+/// of what was not measured, or not predicted.
 struct OutcomeErrors {
-  int n{};                     ///< throws
-  double landing_x_mae{};      ///< [m]
-  double landing_theta_mae{};  ///< [deg]
-  double detach_vx_mae{};      ///< [m/s]
-  double detach_omega_mae{};   ///< [deg/s]
-  double trajectory_rms{};     ///< of the position in flight [m]
+  int n{};                                  ///< throws
+  std::optional<double> landing_x_mae;      ///< [m]
+  std::optional<double> landing_theta_mae;  ///< [deg]
+  std::optional<double> detach_vx_mae;      ///< [m/s]
+  std::optional<double> detach_omega_mae;   ///< [deg/s]
+  std::optional<double> trajectory_rms;     ///< of the position in flight [m]
   std::optional<double>
       chi2_per_dof;  ///< with the throws' own unknowns fitted, where observations outnumber them
   std::vector<OutcomeLack> lacks;  ///< of every outcome
@@ -110,9 +112,10 @@ struct AcceptedEffect {
   std::vector<Parameter> parameters;                       ///< as fitted
   double delta_bic{};             ///< of the model with it against without: negative speaks for it
   std::optional<double> p_value;  ///< of its absence; none for a law, which replaces another
-  double test_error_ratio{};      ///< held-out error with it over without [-]
-  std::string why;                ///< where the held-out misfit fell, in words
-  Phase phase{};                  ///< where it fell most
+  /// Held-out error with it over without [-]; none where one of them is not known.
+  std::optional<double> test_error_ratio;
+  std::string why;  ///< where the held-out misfit fell, in words
+  Phase phase{};    ///< where it fell most
 
   /// Another name that the data cannot tell from this one; of several correlations the largest counts.
   void add_other_name(const std::string& other, double correlation);
@@ -147,7 +150,7 @@ struct Ranked {
 
 /// How a prediction may use what is estimated to be missing.
 enum class Correction {
-  withheld,    ///< none: it does not lower the held-out error
+  withheld,    ///< none: it does not lower the held-out error, or by no share that counts (kCorrects)
   curve,       ///< the curve over time
   candidate,   ///< the physical terms
   not_judged,  ///< none: no held-out motion was tracked, so that nobody knows where it would act

@@ -118,6 +118,15 @@ std::size_t FootprintColumns::add_column(Candidate& candidate, const Unknown& u)
   return width_++;
 }
 
+std::vector<double> FootprintColumns::Difference::own_of(const CampaignProblem& base,
+                                                         const std::vector<double>& own) const {
+  std::vector<double> out(problem.own().size(), 0.0);
+  for (std::size_t k = 0; k < out.size(); ++k)
+    for (std::size_t j = 0; j < own.size(); ++j)
+      if (base.own()[j].name == problem.own()[k].name) out[k] = own[j];
+  return out;
+}
+
 FootprintColumns::Gram FootprintColumns::gram(const CampaignThrow& thrown,
                                               const std::vector<double>& own) const {
   Gram out{Eigen::MatrixXd::Zero(width(), width()), false, false};
@@ -135,7 +144,7 @@ FootprintColumns::Gram FootprintColumns::gram(const CampaignThrow& thrown,
   }
   out.solved = out.complete = true;
   for (const Difference& d : differences_) {
-    const auto l = d.problem.linearise(thrown, d.at, own, DerivativesBy::nothing);
+    const auto l = d.problem.linearise(thrown, d.at, d.own_of(problem_, own), DerivativesBy::nothing);
     out.complete = out.complete && l.solved;
     if (l.solved)
       columns.col(static_cast<Eigen::Index>(d.column)) = (l.residual - columns.col(residual())) / d.step;

@@ -51,6 +51,8 @@ class FootprintColumns {
     std::vector<double> at;
     double step;
     std::size_t column;
+    /// The throw's own unknowns as this problem names them: laws have others than the gripper's delay.
+    std::vector<double> own_of(const CampaignProblem& base, const std::vector<double>& own) const;
   };
 
   void add_alone(const dynamics::Effect& effect, const Shape& shape, double size);

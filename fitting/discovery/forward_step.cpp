@@ -28,7 +28,13 @@ void rank(std::vector<Ranked>& ranking, int step, const Footprints& f, const std
     found->visible = s.visible;
     // What the best candidate leaves sets the scale of what is not noise.
     const double scale = std::max(1.0, (f.gram(last, last) - best->gain) / std::max(1.0, f.samples));
-    found->p_value = chi2_tail(s.gain / scale, static_cast<int>(c.columns.size()));
+    const auto bounded = std::count_if(c.sides.begin(), c.sides.end(), [](int side) { return side != 0; });
+    const auto grid = std::count_if(f.candidates.begin(), f.candidates.end(),
+                                    [&](const Candidate& other) { return other.id == c.id; });
+    found->p_value = std::min(
+        1.0, static_cast<double>(grid) *
+                 chi_bar_tail(s.gain / scale, static_cast<int>(c.sides.size()) - static_cast<int>(bounded),
+                              static_cast<int>(bounded)));
     found->correlation_with_best = between(f, f.candidates[best->candidate], best->step, c);
   }
   std::sort(ranking.begin(), ranking.end(), [](const Ranked& a, const Ranked& b) { return a.gain > b.gain; });
@@ -187,11 +193,13 @@ class ForwardStep {
       if (score != trial.score && !is_law(id_of(*score)) && !is_silent(id_of(*score)) &&
           bic < trial.next.bic() - kDeltaBic)
         accepted.add_other_name(id_of(*score), between_footprints(*trial.score, *score));
+    const bool base_law = accepted.id == std::string(kLaw) + options_.campaign.model;  // no effect
     if (is_law(accepted.id)) {  // it takes the place of a former one
       std::erase_if(out_.effects, [](const AcceptedEffect& e) { return is_law(e.id); });
-      std::erase_if(trial.next.ids, [&](const std::string& id) { return is_law(id) && id != accepted.id; });
+      std::erase_if(trial.next.ids,
+                    [&](const std::string& id) { return is_law(id) && (base_law || id != accepted.id); });
     }
-    out_.effects.push_back(std::move(accepted));
+    if (!base_law) out_.effects.push_back(std::move(accepted));
     return std::move(trial.next);
   }
 

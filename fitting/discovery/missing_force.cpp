@@ -32,14 +32,15 @@ std::vector<double> twice_integrated(const std::vector<double>& time, const std:
 class Rows {
  public:
   Rows(const ResidualTrace& trace, int component, const MissingOptions& options)
-      : trace_(trace), options_(options), scale_(1 / options.sigma[static_cast<std::size_t>(component)]) {
+      : trace_(trace), options_(options), sigma_(trace.sigma[static_cast<std::size_t>(component)]) {
     const auto& r = trace.residual[static_cast<std::size_t>(component)];
     for (std::size_t k = 0; k < r.size(); ++k)
       if (std::isfinite(r[k])) rows_.push_back(k);
     if (options.response == Response::twice_integrated && !rows_.empty()) {
       Eigen::MatrixXd line(static_cast<Eigen::Index>(rows_.size()), 2);
       for (std::size_t k = 0; k < rows_.size(); ++k)
-        line.row(static_cast<Eigen::Index>(k)) << 1, trace.time[rows_[k]] - trace.time[rows_.front()];
+        line.row(static_cast<Eigen::Index>(k)) << 1 / sigma_[rows_[k]],
+            (trace.time[rows_[k]] - trace.time[rows_.front()]) / sigma_[rows_[k]];
       if (rows_.size() >= 3) own_ = orthonormal_basis(line);
     }
     seen_ = whitened(r, false);
@@ -56,13 +57,13 @@ class Rows {
     const std::vector<double> full = integrate ? twice_integrated(trace_.time, series) : series;
     Eigen::VectorXd out(static_cast<Eigen::Index>(rows_.size()));
     for (std::size_t k = 0; k < rows_.size(); ++k)
-      out[static_cast<Eigen::Index>(k)] = scale_ * full[rows_[k]];
+      out[static_cast<Eigen::Index>(k)] = full[rows_[k]] / sigma_[rows_[k]];
     if (own_.size() > 0) out -= own_ * (own_.transpose() * out);
     return out;
   }
   const ResidualTrace& trace_;
   const MissingOptions& options_;
-  double scale_;
+  const std::vector<double>& sigma_;
   std::vector<std::size_t> rows_;
   Eigen::MatrixXd own_;
   Eigen::VectorXd seen_;
@@ -78,7 +79,6 @@ double hat(const std::vector<double>& knots, std::size_t j, double t) {
 struct Term {
   std::string name, unit;
   std::function<Vector3(const State&)> at;
-  std::string form_of{};
 };
 
 std::vector<Term> acceleration_terms() {
@@ -86,8 +86,7 @@ std::vector<Term> acceleration_terms() {
   return {{"|v| v", "1/m",
            [=](const State& s) {
              return Vector3{speed(s) * s.vx, speed(s) * s.vz, 0};
-           },
-           "flight.quadratic_drag"},
+           }},
           {"v", "1/s",
            [](const State& s) {
              return Vector3{s.vx, s.vz, 0};
@@ -95,18 +94,15 @@ std::vector<Term> acceleration_terms() {
           {"omega J v", "-",
            [](const State& s) {
              return Vector3{-s.omega * s.vz, s.omega * s.vx, 0};
-           },
-           "flight.magnus_lift"},
+           }},
           {"1 along x", "m/s^2",
            [](const State&) {
              return Vector3{1, 0, 0};
-           },
-           "flight.gravity_tilt"},
+           }},
           {"1 along z", "m/s^2",
            [](const State&) {
              return Vector3{0, 1, 0};
-           },
-           "sensor.length_scale"},
+           }},
           {"1 along the object's x", "m/s^2",
            [](const State& s) {
              return Vector3{std::cos(s.theta), std::sin(s.theta), 0};
@@ -118,8 +114,7 @@ std::vector<Term> acceleration_terms() {
           {"omega^2 along the object's x", "m",
            [](const State& s) {
              return Vector3{s.omega * s.omega * std::cos(s.theta), s.omega * s.omega * std::sin(s.theta), 0};
-           },
-           "sensor.com_offset"},
+           }},
           {"1 in rotation", "rad/s^2",
            [](const State&) {
              return Vector3{0, 0, 1};
@@ -167,6 +162,12 @@ std::vector<Term> terms_for(Response response) {
 }
 
 }  // namespace
+
+std::vector<std::string> acceleration_names() {
+  std::vector<std::string> out;
+  for (const Term& term : acceleration_terms()) out.push_back(term.name);
+  return out;
+}
 
 std::array<double, 3> MissingCurve::at(double time) const {
   std::array<double, 3> out{};
@@ -306,8 +307,7 @@ MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const M
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(k);
     const Term& term = terms[static_cast<std::size_t>(chosen[k])];
-    out.terms.push_back(
-        {term.name, x[i], std::sqrt(std::max(0.0, covariance(i, i))), term.unit, term.form_of, term.at});
+    out.terms.push_back({term.name, x[i], std::sqrt(std::max(0.0, covariance(i, i))), term.unit, term.at});
   }
   if (squares > samples) out.explained = std::clamp(gain / (squares - samples), 0.0, 1.0);
   return out;

@@ -15,6 +15,7 @@ struct ResidualTrace {
   int group{};               ///< recordings of a group share what is missing: an object, say
   std::vector<double> time;  ///< increasing [s]
   std::array<std::vector<double>, 3> residual;  ///< x, z, θ: m, m, rad, or N, N, N m
+  std::array<std::vector<double>, 3> sigma;     ///< 1 σ of each residual, > 0 where one was seen
   /// The predicted motion at a sample, and the normal force of a pad.
   struct State {
     double vx{}, vz{}, omega{}, theta{};  ///< m/s, m/s, rad/s, rad
@@ -42,10 +43,9 @@ enum class Response {
 
 /// How the estimate is made.
 struct MissingOptions {
-  std::array<double, 3> sigma{1, 1, 1};  ///< noise of the components
-  Response response{Response::direct};   ///< of the residual to what is missing
-  int knots{7};                          ///< per curve
-  int terms{2};                          ///< most that a candidate may have
+  Response response{Response::direct};  ///< of the residual to what is missing
+  int knots{7};                         ///< per curve
+  int terms{2};                         ///< most that a candidate may have
 };
 
 /// Least squares, one curve per group; each recording's own offset and slope are projected out where the
@@ -58,7 +58,6 @@ struct MissingTerm {
   std::string name;               ///< "|v| v", "omega J v", "1 (x)", ...
   double coefficient{}, sigma{};  ///< in `unit`; 1 σ
   std::string unit;               ///< of the coefficient
-  std::string form_of;            ///< id of the effect that has this form; empty where none has
   std::function<std::array<double, 3>(const ResidualTrace::State&)> shape;  ///< of coefficient one
 };
 
@@ -77,6 +76,9 @@ struct MissingCandidate {
 /// along its x (a reference point off the CoM), and for the rotation a constant, ω, |ω| ω, sin θ and cos θ.
 /// Wrenches: a constant, f_N, and f_N² of each component, and |v| and ω for their dependence on the motion.
 MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const MissingOptions& options);
+
+/// The names of the accelerations that missing_terms tries.
+std::vector<std::string> acceleration_names();
 
 /// χ² of the traces around what a candidate says, each recording's own offset and slope projected out where
 /// the response is integrated; and the samples that it is of.

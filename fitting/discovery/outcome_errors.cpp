@@ -131,12 +131,12 @@ OutcomeErrors outcome_errors(const std::vector<PredictedOutcome>& throws) {
       }
     out.n += any ? 1 : 0;
   }
-  const auto mean = [&](int q) { return counts[q] > 0 ? sums[q] / counts[q] : 0.0; };
+  const auto mean = [&](int q) { return counts[q] > 0 ? std::optional(sums[q] / counts[q]) : std::nullopt; };
   out.detach_vx_mae = mean(0);
   out.detach_omega_mae = mean(1);
   out.landing_x_mae = mean(kLandingX);
   out.landing_theta_mae = mean(kLandingTheta);
-  out.trajectory_rms = n > 0 ? std::sqrt(square / n) : 0;
+  if (n > 0) out.trajectory_rms = std::sqrt(square / n);
   out.lacks = lacks(throws);
   return out;
 }

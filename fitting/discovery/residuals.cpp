@@ -33,12 +33,12 @@ std::vector<Eigen::VectorXd> residuals_of(const CampaignProblem& problem, const 
   return out;
 }
 
-std::vector<ResidualBin> residual_over_time(const CampaignProblem& problem,
+std::vector<ResidualBin> residual_over_time(const CampaignProblem& problem, const FitResult& fit,
                                             const std::vector<Eigen::VectorXd>& residuals) {
   std::map<std::pair<int, int>, ResidualBin> bins;
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     const CampaignThrow& thrown = problem.throws()[i];
-    const double release = thrown.release_or(thrown.opening);
+    const double release = thrown.release_or(fit.throws[i].detach);
     for (Eigen::Index j = 0; j < residuals[i].size(); ++j) {
       const auto& o = thrown.observed.all[static_cast<std::size_t>(j)];
       if (phase_of(o, thrown.opening, release) == Phase::landing) continue;
@@ -96,14 +96,14 @@ ResidualTrace::State StateSeries::at(const CampaignThrow& thrown, double t) cons
           mix(state[a].theta, state[b].theta), normal_force(thrown, t)};
 }
 
-std::vector<ChannelStructure> structures(const CampaignProblem& problem,
+std::vector<ChannelStructure> structures(const CampaignProblem& problem, const FitResult& fit,
                                          const std::vector<Eigen::VectorXd>& residuals) {
   std::map<std::pair<Phase, Channel>, ResidualSamples> groups;
   std::map<std::string, int> conditions;
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     if (residuals[i].size() == 0) continue;
     const CampaignThrow& thrown = problem.throws()[i];
-    const double release = thrown.release_or(thrown.opening);
+    const double release = thrown.release_or(fit.throws[i].detach);
     const StateSeries states = states_of(thrown, residuals[i]);
     const int condition =
         conditions.try_emplace(thrown.prepared.experiment(), static_cast<int>(conditions.size()))

@@ -28,8 +28,9 @@ struct ChannelStructure {
 /// Predicted minus observed over σ, one vector per throw; empty for throws that `fit` did not use.
 std::vector<Eigen::VectorXd> residuals_of(const CampaignProblem& problem, const FitResult& fit, int threads);
 
-/// Bins of 5 ms from the log's begin to 50 ms after the release, then of 20 ms.
-std::vector<ResidualBin> residual_over_time(const CampaignProblem& problem,
+/// Bins of 5 ms from the log's begin to 50 ms after the release (measured, or `fit`'s where it was not), then
+/// of 20 ms.
+std::vector<ResidualBin> residual_over_time(const CampaignProblem& problem, const FitResult& fit,
                                             const std::vector<Eigen::VectorXd>& residuals);
 
 /// The predicted motion of the tracked frame where motion capture saw it, by differences of its samples, and
@@ -46,7 +47,7 @@ StateSeries states_of(const CampaignThrow& thrown, const Eigen::VectorXd& residu
 
 /// By channel and phase, against condition, time from the release, and state (speed, spin, and until the
 /// release the normal force). In the order of the phases.
-std::vector<ChannelStructure> structures(const CampaignProblem& problem,
+std::vector<ChannelStructure> structures(const CampaignProblem& problem, const FitResult& fit,
                                          const std::vector<Eigen::VectorXd>& residuals);
 
 }  // namespace unhand::fitting

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "contact/registry.hpp"
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/discrepancy.hpp"
 
@@ -97,13 +98,24 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   return withdraw(stage, options, out);
 }
 
+namespace {
+
+/// Whether a contact model has pads that may give.
+bool can_give(const std::string& model) {
+  contact::ContactParameters<double> giving;
+  giving.patch = {0.5, 0.01};
+  giving.variation.compliance = 1e-6;
+  return contact::make_contact_model(model, giving)->needs_hold();
+}
+
+}  // namespace
+
 bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   const std::string along = kPads;
   const auto& model = stage.problem.options().model;
   auto effects = stage.problem.options().effects;
-  const bool has_pads = model.starts_with("limit_surface");
   const auto known = catalogue(options);
-  if (!has_pads || std::find(effects.begin(), effects.end(), along) != effects.end() ||
+  if (!can_give(model) || std::find(effects.begin(), effects.end(), along) != effects.end() ||
       std::find(known.begin(), known.end(), along) == known.end())
     return false;
   effects.push_back(along);
@@ -140,7 +152,7 @@ void describe(Stage& stage, FitResult counted, const DiscoverOptions& options, D
   for (AcceptedEffect& accepted : out.effects) {
     if (is_law(accepted.id)) {
       for (const auto& u : stage.fit.campaign)
-        if (u.unknown.name == "mu" || u.unknown.name == "length")
+        if (u.unknown.of_law)
           accepted.parameters.push_back({u.unknown.name, u.unknown.unit, u.value, u.sigma});
       continue;
     }

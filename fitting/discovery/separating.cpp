@@ -162,14 +162,14 @@ std::vector<SeparatingExperiment> separating_experiments(const Stage& stage, con
                           {}});
   }
   for (const Sensor& sensor : kSensors) {
-    if (has(throws[used.front()], sensor.first)) continue;
     for (const std::size_t i : used)
-      trials.push_back({fmt::format("add {} to the throws of this log", sensor.name),
-                        with_sensor(throws[i], sensor),
-                        stage.fit.throws[i].own,
-                        1,
-                        count,
-                        {}});
+      if (!has(throws[i], sensor.first))
+        trials.push_back({fmt::format("add {} to the throws of this log", sensor.name),
+                          with_sensor(throws[i], sensor),
+                          stage.fit.throws[i].own,
+                          1,
+                          count,
+                          {}});
     ++count;
   }
   experiment::parallel_for(trials.size(), options.fit.threads, [&](std::size_t k) {

@@ -39,9 +39,12 @@ BothErrors errors_of(const Stage& stage, int threads) {
   return {errors_of(stage, Share::train, threads), errors_of(stage, Share::test, threads)};
 }
 
-double error_ratio(const OutcomeErrors& before, const OutcomeErrors& after) {
-  if (before.trajectory_rms > 0) return after.trajectory_rms / before.trajectory_rms;
-  return before.landing_x_mae > 0 ? after.landing_x_mae / before.landing_x_mae : 1;
+std::optional<double> error_ratio(const OutcomeErrors& before, const OutcomeErrors& after) {
+  const auto ratio = [&](std::optional<double> OutcomeErrors::*error) -> std::optional<double> {
+    if (!(before.*error) || !(after.*error) || !(*(before.*error) > 0)) return std::nullopt;
+    return *(after.*error) / *(before.*error);
+  };
+  return before.trajectory_rms ? ratio(&OutcomeErrors::trajectory_rms) : ratio(&OutcomeErrors::landing_x_mae);
 }
 
 double give_per_compliance(const Stage& stage) {
@@ -115,10 +118,19 @@ void solve(Stage& stage, const DiscoverOptions& options, std::vector<double> sta
 void polish(Stage& stage, const DiscoverOptions& options) {
   for (int again = 0; again < 2; ++again) {
     Stage next{stage.problem, {}, {}, stage.ids};
-    if (!solve_train(next, options, stage.fit.values()) || next.bic() > stage.bic() - 1) return;
+    if (!solve_train(next, options, stage.fit.values())) return;
+    const long more = next.fit.samples - stage.fit.samples;  // of throws that the start could not simulate
+    if (more < 0 || (more == 0 && next.bic() > stage.bic() - 1)) return;
     if (!solve_held_out(next, options)) return;
     stage = std::move(next);
   }
+}
+
+std::vector<bool> throws_of(const Stage& stage) {
+  std::vector<bool> out;
+  for (std::size_t i = 0; i < stage.fit.throws.size(); ++i)
+    out.push_back(stage.fit.throws[i].used || stage.held_out.throws[i].used);
+  return out;
 }
 
 CampaignProblem extended_problem(const CampaignProblem& problem, const std::string& id) {
@@ -164,7 +176,12 @@ Stage extended(const Stage& stage, const Candidate& candidate, const Score& scor
     if (const auto shape = candidate.shape.find(without_object(u.name)); shape != candidate.shape.end())
       start[k] = shape->second;
   }
-  solve_train(out, options, std::move(start));
+  // Where the step is so long that a throw has no answer, half of it.
+  const std::vector<double> from = carried(stage.fit, out.problem);
+  for (int halved = 0; !solve_train(out, options, start) && halved < 4; ++halved) {
+    if (out.fit.outcome != FitOutcome::no_start) break;
+    for (std::size_t k = 0; k < start.size(); ++k) start[k] = 0.5 * (start[k] + from[k]);
+  }
   if (is_law(candidate.id) || !stage.ids.empty() || !is_astray(stage, out, score, leads, options)) return out;
   // The base had bent what they share to make up for what it lacks. Once more, from what the log itself
   // suggests of that and with an effect of a typical size.

@@ -4,6 +4,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,8 +38,9 @@ struct BothErrors {
   OutcomeErrors train, held_out;
 };
 BothErrors errors_of(const Stage& stage, int threads);
-/// Trajectory rms after over before; the landing's where the flight was not seen.
-double error_ratio(const OutcomeErrors& before, const OutcomeErrors& after);
+/// Trajectory rms after over before; the landing's where the flight was not seen; none where either is not
+/// known.
+std::optional<double> error_ratio(const OutcomeErrors& before, const OutcomeErrors& after);
 
 /// The give of the pads.
 inline constexpr const char* kPads = "contact.pad_compliance";
@@ -48,6 +50,10 @@ inline constexpr const char* kCompliance = "contact.pad_compliance.compliance";
 double give_per_compliance(const Stage& stage);
 /// The give of a fit's pads [m]; 0 where it has none.
 double give_of(const Stage& stage);
+
+/// The throws that the stage uses, of both halves: what is compared with it must use them all
+/// (FitOptions::throws).
+std::vector<bool> throws_of(const Stage& stage);
 
 /// The problem with an effect more, or with another contact law.
 CampaignProblem extended_problem(const CampaignProblem& problem, const std::string& id);
@@ -65,7 +71,7 @@ bool solve_held_out(Stage& stage, const DiscoverOptions& options);
 void solve(Stage& stage, const DiscoverOptions& options, std::vector<double> start);
 
 /// Fits again from the solution while that helps: the weights of the channels were learned while the effect
-/// was still missing.
+/// was still missing, and throws may have an answer there that had none at the start.
 void polish(Stage& stage, const DiscoverOptions& options);
 
 /// The stage with one candidate more, fitted to the train throws from the step that its footprint asks for;

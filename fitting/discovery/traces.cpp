@@ -17,12 +17,11 @@ int component_of(const experiment::Observation& o, Channel first) {
 }
 
 /// The residual (observed minus predicted, SI units) of three channels that follow each other, in one phase.
-ResidualTrace trace_of(const CampaignThrow& thrown, const Eigen::VectorXd& residual, Channel first,
-                       Phase phase) {
+ResidualTrace trace_of(const CampaignThrow& thrown, const Eigen::VectorXd& residual, double release,
+                       Channel first, Phase phase) {
   ResidualTrace out;
   const StateSeries states = states_of(thrown, residual);
-  const double release = thrown.release_or(thrown.opening);
-  const auto [origin, scale] = phase_clock(thrown, phase);
+  const auto [origin, scale] = phase_clock(thrown, release, phase);
   for (std::size_t j = 0; j < thrown.observed.all.size(); ++j) {
     const auto& o = thrown.observed.all[j];
     const int component = component_of(o, first);
@@ -32,30 +31,18 @@ ResidualTrace trace_of(const CampaignThrow& thrown, const Eigen::VectorXd& resid
       out.time.push_back(time);
       out.state.push_back(states.at(thrown, o.time));
       for (auto& r : out.residual) r.push_back(NAN);
+      for (auto& s : out.sigma) s.push_back(1);
     }
-    out.residual[static_cast<std::size_t>(component)].back() =
-        -residual[static_cast<Eigen::Index>(j)] * o.sigma;
+    const auto c = static_cast<std::size_t>(component);
+    out.residual[c].back() = -residual[static_cast<Eigen::Index>(j)] * o.sigma;
+    out.sigma[c].back() = o.sigma;
   }
-  return out;
-}
-
-/// 1 σ of each of three channels, where they are there.
-std::array<double, 3> sigmas_of(const CampaignProblem& problem, Channel first) {
-  std::array<double, 3> out{1, 1, 1};
-  for (const auto& thrown : problem.throws())
-    for (const auto& o : thrown.observed.all) {
-      const int component = component_of(o, first);
-      if (component < 0 || component > 2) continue;
-      out[static_cast<std::size_t>(component)] = o.sigma;
-      if (component == 2) return out;
-    }
   return out;
 }
 
 }  // namespace
 
-PhaseClock phase_clock(const CampaignThrow& thrown, Phase phase) {
-  const double release = thrown.release_or(thrown.opening);
+PhaseClock phase_clock(const CampaignThrow& thrown, double release, Phase phase) {
   if (phase == Phase::flight) return {release, 1};
   return {thrown.opening, std::max(1e-6, release - thrown.opening)};
 }
@@ -63,7 +50,6 @@ PhaseClock phase_clock(const CampaignThrow& thrown, Phase phase) {
 PhaseTraces traces_of(const CampaignProblem& problem, const FitResult& fit, Phase phase, int threads) {
   const Channel first = phase == Phase::flight ? Channel::mocap_x : Channel::wrench_fx;
   PhaseTraces out;
-  out.how.sigma = sigmas_of(problem, first);
   out.how.response = phase == Phase::flight ? Response::twice_integrated : Response::direct;
   for (const auto& thrown : problem.throws())
     out.objects.try_emplace(thrown.prepared.object, static_cast<int>(out.objects.size()));
@@ -71,7 +57,8 @@ PhaseTraces traces_of(const CampaignProblem& problem, const FitResult& fit, Phas
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     if (residuals[i].size() == 0) continue;
     const CampaignThrow& thrown = problem.throws()[i];
-    ResidualTrace trace = trace_of(thrown, residuals[i], first, phase);
+    ResidualTrace trace =
+        trace_of(thrown, residuals[i], thrown.release_or(fit.throws[i].detach), first, phase);
     if (trace.time.size() < 4) continue;
     trace.group = out.objects.at(thrown.prepared.object);
     out.all.push_back(std::move(trace));

@@ -15,14 +15,14 @@ namespace unhand::fitting {
 struct PhaseClock {
   double origin{}, scale{1};  ///< s: its zero and its unit
 };
-/// The clock of one throw in the flight or the release.
-PhaseClock phase_clock(const CampaignThrow& thrown, Phase phase);
+/// The clock of one throw, whose object was free from `release` on [s], in the flight or the release.
+PhaseClock phase_clock(const CampaignThrow& thrown, double release, Phase phase);
 
 /// The residuals of a campaign in one phase.
 struct PhaseTraces {
   std::vector<ResidualTrace> all;      ///< of the throws in which enough was seen; grouped by object
   std::map<std::string, int> objects;  ///< group of each object of the campaign
-  MissingOptions how;                  ///< the noise of the channels, and how they respond
+  MissingOptions how;                  ///< how the channels respond
 };
 
 /// In flight the tracked positions (m, m, rad; they respond twice integrated), during the release the wrench

@@ -152,7 +152,7 @@ ErrorFloor error_floor(const datasets::ThrowLog& log, const std::string& file, c
     const auto twin = twin_of(log, problem, fit, seed + static_cast<std::uint64_t>(k));
     const CampaignProblem again(twin, file, problem.options());
     const FitResult refitted = fitting::fit(again, options);
-    if (refitted.outcome == FitOutcome::no_start || refitted.outcome == FitOutcome::not_solved) continue;
+    if (!refitted.is_answer()) continue;
     out.models.push_back(
         comparison_of(again, refitted, predict_throws(again, refitted, {false, options.threads})));
     ++out.twins;

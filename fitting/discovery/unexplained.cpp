@@ -27,9 +27,8 @@ class Displacement {
  public:
   template <class Missing>
   Displacement(const CampaignProblem& problem, const CampaignThrow& thrown, const StateSeries& states,
-               Phase phase, double end, const Missing& missing) {
-    const PhaseClock clock = phase_clock(thrown, phase);
-    const double release = thrown.release_or(thrown.opening);
+               double release, Phase phase, double end, const Missing& missing) {
+    const PhaseClock clock = phase_clock(thrown, release, phase);
     const double inf = std::numeric_limits<double>::infinity();
     const auto& body = thrown.prepared.body;
     Vector3 velocity{}, position{}, last{};
@@ -75,14 +74,15 @@ struct OutcomeSquares {
 
 template <class Missing>
 OutcomeSquares squares_with(const CampaignProblem& problem, const CampaignThrow& thrown,
-                            const Eigen::VectorXd& residual, Phase phase, const Missing& missing) {
+                            const Linearisation& predicted, Phase phase, const Missing& missing) {
   OutcomeSquares out;
+  const Eigen::VectorXd& residual = predicted.residual;
   const StateSeries states = states_of(thrown, residual);
   if (states.time.empty()) return out;  // where it moved, and how fast, is not known
-  double end = thrown.release_or(thrown.opening);
+  const double release = thrown.release_or(predicted.detach), g = -thrown.prepared.gravity.z;
+  double end = release;
   for (const auto& o : thrown.observed.all) end = std::max(end, o.time);
-  const Displacement moved(problem, thrown, states, phase, end, missing);
-  const double release = thrown.release_or(thrown.opening), g = -thrown.prepared.gravity.z;
+  const Displacement moved(problem, thrown, states, release, phase, end, missing);
   for (std::size_t j = 0; j < thrown.observed.all.size(); ++j) {
     const auto& o = thrown.observed.all[j];
     const double error = residual[static_cast<Eigen::Index>(j)] * o.sigma;
@@ -135,13 +135,12 @@ std::optional<MissingEstimate> estimate_missing(const Stage& stage, Phase phase,
     const int group = seen.objects.at(thrown.prepared.object);
     const auto curve = std::find_if(out.curves.begin(), out.curves.end(),
                                     [&](const MissingCurve& c) { return c.group == group; });
-    squares[k][0] =
-        squares_with(problem, thrown, l.residual, phase, [](double, const State&) { return Vector3{}; });
-    squares[k][1] = squares_with(problem, thrown, l.residual, phase, [&](double t, const State&) {
+    squares[k][0] = squares_with(problem, thrown, l, phase, [](double, const State&) { return Vector3{}; });
+    squares[k][1] = squares_with(problem, thrown, l, phase, [&](double t, const State&) {
       return curve == out.curves.end() ? Vector3{} : curve->at(t);
     });
-    squares[k][2] = squares_with(problem, thrown, l.residual, phase,
-                                 [&](double, const State& s) { return out.candidate.at(s); });
+    squares[k][2] =
+        squares_with(problem, thrown, l, phase, [&](double, const State& s) { return out.candidate.at(s); });
   });
   std::array<OutcomeSquares, kTried> sum{};
   for (const auto& of : squares)
@@ -158,12 +157,11 @@ std::optional<MissingEstimate> estimate_missing(const Stage& stage, Phase phase,
   const auto error = [&](std::size_t c) {
     return tracked ? std::sqrt(sum[c].flight / sum[c].samples) : std::sqrt(sum[c].landing / sum[c].landings);
   };
-  constexpr double kLower = 0.98;
   out.error_before = out.error_after = error(0);
   out.error_unit = tracked ? "m" : "sigma";
   for (std::size_t c = 1; c < kTried; ++c) {
     if (c == 2 && out.candidate.terms.empty()) continue;
-    if (!(error(c) < *out.error_after * (out.correction == Correction::withheld ? kLower : 1.0))) continue;
+    if (!(error(c) < *out.error_after * (out.correction == Correction::withheld ? kCorrects : 1.0))) continue;
     out.error_after = error(c);
     out.correction = c == 1 ? Correction::curve : Correction::candidate;
   }
@@ -225,6 +223,11 @@ std::optional<Unexplained> left_in_channels(const Stage& stage, const Discovery&
   return out;
 }
 
+/// Of what was tracked in flight, which says more than the landing does.
+bool is_of_flight(const OutcomeLack& lack) {
+  return lack.outcome == Outcome::position || lack.outcome == Outcome::orientation;
+}
+
 /// Where every channel is noise once a throw's own unknowns follow it, but predictions made before the throw
 /// are off by what repetitions share: something acts before the detach that those unknowns take up.
 std::optional<Unexplained> left_in_predictions(const Discovery& so_far, double rest,
@@ -233,19 +236,19 @@ std::optional<Unexplained> left_in_predictions(const Discovery& so_far, double r
   for (const OutcomeLack& lack : lacking(so_far.after_train, so_far.after_test, options)) {
     const double base = lack_in(so_far.before_train, lack.outcome).fit.shared;
     if (!so_far.effects.empty() && lack.fit.shared < rest * base) continue;
-    const bool tracked = lack.outcome == Outcome::position || lack.outcome == Outcome::orientation;
-    if (most && (!tracked || lack.fit.ratio() <= most->fit.ratio())) continue;
-    most = lack;
+    const bool more =
+        !most || (is_of_flight(lack) == is_of_flight(*most) ? lack.fit.ratio() > most->fit.ratio()
+                                                            : is_of_flight(lack));
+    if (more) most = lack;
   }
   if (!most) return std::nullopt;
   constexpr Channel kShown[] = {Channel::mocap_x, Channel::mocap_theta, Channel::landing_x,
                                 Channel::landing_theta};
   const Channel channel = kShown[static_cast<int>(most->outcome)];
-  const bool tracked = most->outcome == Outcome::position || most->outcome == Outcome::orientation;
   const bool angle = most->outcome == Outcome::orientation || most->outcome == Outcome::landing_theta;
   const double unit = angle ? experiment::kDegrees : 1e3;
   return Unexplained{
-      tracked ? Phase::release : Phase::landing,
+      is_of_flight(*most) ? Phase::release : Phase::landing,
       channel,
       most->fit.ratio(),
       fmt::format("{}, predicted before the throw: {:.3g} times the mean square that repetitions scatter by "
@@ -278,7 +281,9 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
     out->description += fmt::format("; of the forms tried, the missing {} is nearest to {}", quantity,
                                     missing.candidate.in_words());
   if (missing.correction == Correction::withheld)
-    out->description += "; as a correction it does not lower the held-out error and is withheld";
+    out->description +=
+        fmt::format("; as a correction it does not lower the held-out error by {:.0f} % and is withheld",
+                    100 * (1 - kCorrects));
   else if (missing.correction == Correction::not_judged)
     out->description += "; no held-out motion was tracked to judge it by as a correction";
   else

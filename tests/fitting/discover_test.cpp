@@ -46,7 +46,7 @@ TEST(Discovery, DragIsFoundWithItsSize) {
   EXPECT_EQ(found.first.phase, Phase::flight) << "drag acts in flight, and first there";
   for (const auto& p : found.effects.front().parameters)
     EXPECT_NEAR(p.value, kDrag, std::max(4 * p.sigma, 1e-4)) << p.name;
-  EXPECT_LT(found.after_test.trajectory_rms, 0.5 * found.before_test.trajectory_rms);
+  EXPECT_LT(found.after_test.trajectory_rms.value(), 0.5 * found.before_test.trajectory_rms.value());
 }
 
 TEST(Discovery, AClockThatIsLateIsFoundAlreadyInTheGrasp) {
@@ -158,6 +158,17 @@ TEST(Discovery, OfTheWrongLawTheRightOneIsMissing) {
   EXPECT_FALSE(found.unexplained.has_value());
 }
 
+// A delay knows nothing of pads: its throws have other unknowns of their own than those of a law.
+TEST(Discovery, OfThePureDelayALawIsMissing) {
+  DiscoverOptions options;
+  options.campaign.model = "gripper_delay";
+  options.campaign.integrator.tolerances = {1e-5, 1e-8};
+  const Discovery found = discover(support::loop_campaign({}), "synthetic", options);
+  ASSERT_EQ(found.verdict, Verdict::effect_found);
+  EXPECT_EQ(found.effects.front().id, "contact.law:limit_surface_disc");
+  EXPECT_FALSE(found.unexplained.has_value());
+}
+
 // Friction that grows by half with the slip's speed: refitted, it hides below the noise of every channel, and
 // still all of a throw's errors add up in its prediction.
 TEST(Discovery, WhatMattersToThePredictionAloneIsFound) {
@@ -169,7 +180,7 @@ TEST(Discovery, WhatMattersToThePredictionAloneIsFound) {
   const AcceptedEffect* effect = named(found, "contact.viscous");
   ASSERT_NE(effect, nullptr) << to_string(found.verdict);
   EXPECT_NEAR(effect->parameters.front().value, kViscous, 3 * effect->parameters.front().sigma);
-  EXPECT_LT(found.after_test.trajectory_rms, 0.7 * found.before_test.trajectory_rms);
+  EXPECT_LT(found.after_test.trajectory_rms.value(), 0.7 * found.before_test.trajectory_rms.value());
 }
 
 // Not listed, no name can be right; that predictions could be better is told without one: repetitions scatter
@@ -221,7 +232,7 @@ TEST(Discovery, TheGiveOfAnyPadsIsFittedAlongAndNoPartOfTheAnswer) {
   EXPECT_EQ(found.verdict, Verdict::no_missing_effect);
   EXPECT_EQ(found.along, std::vector<std::string>{"contact.pad_compliance"});
   EXPECT_FALSE(found.unexplained.has_value());
-  EXPECT_LT(found.after_test.trajectory_rms, found.before_test.trajectory_rms);
+  EXPECT_LT(found.after_test.trajectory_rms.value(), found.before_test.trajectory_rms.value());
 }
 
 // A micrometre, and a robot that repeats itself: to first order no effect explains anything, but predictions

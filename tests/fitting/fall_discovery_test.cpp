@@ -142,7 +142,7 @@ TEST(SurfaceDiscovery, AQuarticIsFound) {
   const auto found = discover_surfaces({test::simulate(truth, 60, 0.05, 0.03, 22)}, options);
   ASSERT_EQ(found.answer.verdict, Verdict::effect_found);
   EXPECT_EQ(found.answer.effects.front().id, "contact.law:convex_quartic");
-  EXPECT_LT(found.answer.effects.front().test_error_ratio, 0.8);
+  EXPECT_LT(found.answer.effects.front().test_error_ratio.value(), 0.8);
 }
 
 }  // namespace

@@ -4,8 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "experiment/campaign_effects.hpp"
 #include "experiment/random_stream.hpp"
 #include "fitting/discovery/missing_force.hpp"
 
@@ -87,6 +89,7 @@ std::vector<ResidualTrace> flights(const Missing& missing, int first = 0) {
       const auto a = missing(s);
       for (std::size_t c = 0; c < 3; ++c) {
         t.residual[c].push_back(x[c] + random.normal(0, 2e-4));
+        t.sigma[c].push_back(2e-4);
         x[c] += kStep * v[c] + 0.5 * kStep * kStep * a[c];
         v[c] += kStep * a[c];
       }
@@ -97,7 +100,7 @@ std::vector<ResidualTrace> flights(const Missing& missing, int first = 0) {
   }
   return out;
 }
-const MissingOptions kFlight{{2e-4, 2e-4, 2e-4}, Response::twice_integrated, 7, 2};
+const MissingOptions kFlight{Response::twice_integrated, 7, 2};
 
 TEST(MissingForce, DragIsReadFromFlightsWithoutBeingAskedFor) {
   constexpr double k = 0.05;
@@ -162,6 +165,45 @@ TEST(MissingForce, AConstantIsTheCurve) {
     EXPECT_NEAR(curves[0].at(t)[2], 2.0, 0.06) << t;
   }
   EXPECT_LT(curves[0].chi2_after, 0.1 * curves[0].chi2_before);
+}
+
+// Samples count by their own noise: a constant is known to σ/√n of the quiet half, and its interval says so.
+TEST(MissingForce, NoisySamplesCountForWhatTheyKnow) {
+  constexpr double kQuiet = 0.01, kLoud = 1, kMissing = 0.05;
+  constexpr int kThrows = 20, kSamples = 100;
+  std::vector<ResidualTrace> traces;
+  for (int i = 0; i < kThrows; ++i) {
+    RandomStream random(6, static_cast<std::uint64_t>(i), experiment::Purpose::effect);
+    ResidualTrace t;
+    for (int k = 0; k < kSamples; ++k) {
+      const double sigma = k < kSamples / 2 ? kLoud : kQuiet;
+      t.time.push_back(0.01 * k);
+      t.state.push_back({0.1, 0, 0, 0, 10});
+      for (std::size_t c = 0; c < 3; ++c) {
+        t.residual[c].push_back((c == 0 ? kMissing : 0) + random.normal(0, sigma));
+        t.sigma[c].push_back(sigma);
+      }
+    }
+    traces.push_back(std::move(t));
+  }
+  const auto candidate = missing_terms(traces, {Response::direct, 7, 1});
+  ASSERT_EQ(candidate.terms.size(), 1u);
+  const double known_to = kQuiet / std::sqrt(kThrows * kSamples / 2.0);
+  const double size = candidate.terms[0].coefficient * candidate.terms[0].shape({0.1, 0, 0, 0, 10})[0];
+  EXPECT_NEAR(size, kMissing, 4 * known_to);
+}
+
+// What an effect says it seems to be in flight is a term that is tried: else it would be taken for a shadow
+// of that term.
+TEST(MissingForce, TheFormsOfEffectsAreTried) {
+  const auto names = acceleration_names();
+  int forms = 0;
+  for (const auto& effect : experiment::known_effects()) {
+    if (effect.form.empty()) continue;
+    ++forms;
+    EXPECT_NE(std::find(names.begin(), names.end(), effect.form), names.end()) << effect.id;
+  }
+  EXPECT_GE(forms, 5);  // drag, lift, tilt, scale, centre of mass
 }
 
 TEST(MissingForce, NoiseHasNoCandidate) {

@@ -3,13 +3,17 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "experiment/random_stream.hpp"
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/discrepancy.hpp"
 #include "fitting/discovery/footprints.hpp"
+#include "fitting/discovery/residuals.hpp"
 #include "fitting/discovery/selection.hpp"
 #include "fitting/discovery/separating.hpp"
+#include "fitting/distributions.hpp"
 #include "tests/fitting/loop_campaign.hpp"
 
 namespace unhand::fitting {
@@ -42,6 +46,137 @@ TEST(Stage, AShapeThatTheLogLeavesOpenIsHeldAndTheSizeIsKnownForIt) {
     }
   }
   EXPECT_LT(wald_p_value(stage.fit, find_effect("sensor.length_scale")), 1e-3);
+}
+
+// From another law back to the one that the loop began with: that is no effect.
+TEST(Selection, TheBaseLawIsNoEffect) {
+  const auto log = support::loop_campaign({});  // of the disc
+  DiscoverOptions options;
+  options.campaign.model = "limit_surface_disc";
+  options.campaign.integrator.tolerances = {1e-5, 1e-8};
+  options.refits = 1;
+  const std::string other = std::string(kLaw) + "sliding_pivot";
+  auto wrong = options.campaign;
+  wrong.model = "sliding_pivot";
+  Stage stage{CampaignProblem(log, "synthetic", wrong), {}, {}, {other}};
+  solve(stage, options, {});
+  ASSERT_TRUE(stage.solved());
+  Discovery out;
+  out.model = options.campaign.model;
+  out.base = stage.fit, out.base_test = stage.held_out.misfit;
+  out.effects.emplace_back().id = other;
+  options.laws = {"limit_surface_disc"};
+  const auto next = forward(stage, options, out);
+  ASSERT_TRUE(next.has_value());
+  EXPECT_EQ(next->problem.options().model, "limit_surface_disc");
+  EXPECT_TRUE(next->ids.empty());
+  EXPECT_TRUE(out.effects.empty());
+}
+
+// Every sample is in one phase, the same one for the misfit that the loop begins with and for the structure
+// it shows; where no sensor saw the release, the predicted one divides them.
+TEST(Stage, StructureAndMisfitHaveTheSamePhasesWithoutAMeasuredRelease) {
+  experiment::CampaignDesign design = experiment::campaign_design("quick12");
+  design.sensors.ft = false;
+  auto log = experiment::generate_campaign(design, 8);
+  for (auto& thrown : log.throws) thrown.detach_time.reset();
+  CampaignOptions options;
+  options.model = "limit_surface_disc";
+  const CampaignProblem problem(log, "synthetic", options);
+  const FitResult fitted = fit(problem);
+  ASSERT_TRUE(fitted.is_answer());
+  const auto residuals = residuals_of(problem, fitted, 0);
+  int released = 0;
+  const auto all = structures(problem, fitted, residuals);
+  for (const ChannelMisfit& m : fitted.misfit) {
+    const auto same = std::find_if(all.begin(), all.end(), [&](const ChannelStructure& s) {
+      return s.channel == m.channel && s.phase == m.phase;
+    });
+    ASSERT_NE(same, all.end()) << to_string(m.channel) << " in " << to_string(m.phase);
+    EXPECT_EQ(same->structure.n, m.n) << to_string(m.channel) << " in " << to_string(m.phase);
+    released += m.phase == Phase::release ? m.n : 0;
+  }
+  EXPECT_GT(released, 0);
+}
+
+// Fits that are compared must be of the same throws: one that cannot be simulated is named, not left out.
+TEST(Stage, AThrowThatMustTakePartIsNotLeftOut) {
+  auto log = experiment::generate_campaign(experiment::campaign_design("quick12"), 8);
+  CampaignOptions options;
+  options.model = "limit_surface_disc";
+  CampaignProblem problem(log, "synthetic", options);
+  FitOptions some;
+  some.throws.assign(log.throws.size(), true);
+  some.throws[1] = false;
+  const FitResult without_one = fit(problem, some);
+  ASSERT_TRUE(without_one.is_answer());
+  for (std::size_t i = 0; i < log.throws.size(); ++i)
+    EXPECT_EQ(without_one.throws[i].used, i != 1 && log.throws[i].split == datasets::Split::train) << i;
+
+  // The recording of one ends before the gripper opens: in no model is it let go.
+  auto& held = log.throws[0];
+  held.split = datasets::Split::train;
+  held.landing.reset();
+  held.detach_time.reset();
+  const auto cut = [](const datasets::Series& time, std::initializer_list<datasets::Series*> tables) {
+    std::size_t n = 0;
+    while (n < time.rows && time(n) <= 0.02) ++n;
+    for (datasets::Series* table : tables) {
+      table->rows = n;
+      table->data.resize(n * table->cols);
+    }
+  };
+  const datasets::Series ft = held.ft->time, mocap = held.mocap->time;
+  cut(ft, {&held.ft->time, &held.ft->wrench, &held.ft->normal_force});
+  held.mocap->valid.clear();
+  cut(mocap, {&held.mocap->time, &held.mocap->pose});
+  problem = CampaignProblem(log, "synthetic", options);
+  const FitResult left_out = fit(problem);
+  ASSERT_TRUE(left_out.is_answer());
+  EXPECT_FALSE(left_out.throws[0].used);
+  some.throws.assign(log.throws.size(), true);
+  const FitResult asked_for = fit(problem, some);
+  EXPECT_EQ(asked_for.outcome, FitOutcome::no_start);
+  EXPECT_NE(asked_for.message.find(held.id), std::string::npos) << asked_for.message;
+}
+
+// What was not measured has no error; it is not zero.
+TEST(Stage, ErrorsOfWhatWasNotMeasuredAreNone) {
+  PredictedOutcome thrown;
+  thrown.error[2] = -0.02;  // landing x
+  const OutcomeErrors landed = outcome_errors({thrown});
+  EXPECT_EQ(landed.n, 1);
+  EXPECT_DOUBLE_EQ(landed.landing_x_mae.value(), 0.02);
+  EXPECT_FALSE(landed.landing_theta_mae || landed.detach_vx_mae || landed.detach_omega_mae ||
+               landed.trajectory_rms);
+  thrown.error[2] = 0.01;
+  const OutcomeErrors better = outcome_errors({thrown});
+  EXPECT_DOUBLE_EQ(error_ratio(landed, better).value(), 0.5);
+  thrown.error[2].reset();
+  EXPECT_FALSE(error_ratio(landed, outcome_errors({thrown}))) << "after, nothing is predicted to land";
+}
+
+// Of m independent sizes that may only grow, estimates at neutral count for nothing: the sum of the squares
+// of the positive ones of m normal numbers.
+TEST(Stage, SizesAtTheEndOfTheirRangeHaveTheMixedDistribution) {
+  EXPECT_DOUBLE_EQ(chi_bar_tail(3.0, 2, 0), chi2_tail(3.0, 2));
+  EXPECT_DOUBLE_EQ(chi_bar_tail(3.0, 0, 1), 0.5 * chi2_tail(3.0, 1));
+  constexpr int kDraws = 40000;
+  for (const auto& [free, bounded] : {std::pair{0, 3}, std::pair{1, 2}})
+    for (const double x : {1.0, 4.0}) {
+      experiment::RandomStream random(3, 1, experiment::Purpose::effect);
+      int beyond = 0;
+      for (int k = 0; k < kDraws; ++k) {
+        double sum = 0;
+        for (int j = 0; j < free + bounded; ++j) {
+          const double z = random.normal(0, 1);
+          if (j < free || z > 0) sum += z * z;
+        }
+        beyond += sum > x;
+      }
+      const double p = chi_bar_tail(x, free, bounded);
+      EXPECT_NEAR(beyond / double{kDraws}, p, 4 * std::sqrt(p * (1 - p) / kDraws)) << free << " " << bounded;
+    }
 }
 
 // A law that was accepted in the company of a lift which turns out to be none, on throws of another law: once
