@@ -134,8 +134,8 @@ void discover(const DiscoverOptions& options, const Parser& parser) {
     if (*kind == MeasuredKind::slips) refuse_options(parser, {"--most"}, "slips have one law");
     return discover_measured(
         *kind, {options.log, options.report, options.json, options.card, command,
-                parser.given("--model") ? std::optional(options.model) : std::nullopt, options.forget,
-                options.floor, options.most.value_or(6), options.threads});
+                options.model == DiscoverOptions{}.model ? std::nullopt : std::optional(options.model),
+                options.forget, options.floor, options.most.value_or(6), options.threads});
   }
   refuse_options(parser, {"--floor"}, "only free flights come to rest on one");
   const auto& others = measured_models();
@@ -284,7 +284,11 @@ Command discover_command(Parser& root) {
               "A log of planar throws, of free flights, of accelerometers in free fall (dimension 3), or "
               "a slip-log")
       .required();
-  parser.option("--model", options->model, "The base model").one_of(base_models()).with_default();
+  parser
+      .option("--model", options->model,
+              "The base model of throws; other logs have their own (projectile, free_fall, ellipsoid)")
+      .one_of(base_models())
+      .with_default();
   parser.option("--report", options->report, "Directory for the page, its figures and discovery.json");
   parser.option("--json", options->json, "Write the result as JSON");
   parser.option("--card", options->card, "Write the card of the extended model");

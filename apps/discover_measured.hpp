@@ -11,7 +11,7 @@ namespace unhand::apps {
 enum class MeasuredKind { flights, falls, slips };
 struct MeasuredRequest {
   std::string log, report, json, card, command;
-  std::optional<std::string> model;  ///< absent: the kind's own
+  std::optional<std::string> model;  ///< absent, as for the command's default: the kind's own
   std::vector<std::string> forget;
   double floor{0};
   int most{6}, threads{0};

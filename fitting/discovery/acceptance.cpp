@@ -27,8 +27,9 @@ bool is_confirmed(const std::vector<ChannelMisfit>& other_half, const ChannelMis
   });
 }
 
-double unexplained_from(Channel channel, Phase phase, const DiscoverOptions& options) {
-  return is_wrench(channel) && phase != Phase::grasped ? 2 * options.unexplained : options.unexplained;
+double unexplained_from(Channel channel, Phase phase, bool elsewhere, const DiscoverOptions& options) {
+  const bool twice = phase == Phase::grasped ? elsewhere : is_wrench(channel);
+  return (twice ? 2 : 1) * options.unexplained;
 }
 
 double misfit_in(const std::vector<ChannelMisfit>& misfit, Channel channel, Phase phase) {
@@ -185,7 +186,7 @@ namespace {
 
 /// Whether so much is left in a channel that something is missing there.
 bool is_left(const ChannelMisfit& m, const DiscoverOptions& options) {
-  return is_misfit(m, options) && m.chi2_per_sample() >= unexplained_from(m.channel, m.phase, options);
+  return is_misfit(m, options) && m.chi2_per_sample() >= unexplained_from(m.channel, m.phase, false, options);
 }
 
 /// Whether too much is left in the half of the throw where an effect acts, of what the base model's fit left

@@ -28,9 +28,10 @@ bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options);
 /// strike twice.
 bool is_confirmed(const std::vector<ChannelMisfit>& other_half, const ChannelMisfit& misfit);
 
-/// χ² per sample of a channel in a phase from where on something is missing there; of a wrench once the pads
-/// open twice as much, most of whose variance is trust.
-double unexplained_from(experiment::Channel, Phase, const DiscoverOptions& options);
+/// χ² per sample of a channel in a phase from where on something is missing there. Twice as much of a wrench
+/// once the pads open, most of whose variance is trust; and in the firm grasp where something is missing
+/// `elsewhere`, for which the fit bends each throw's own grasp.
+double unexplained_from(experiment::Channel, Phase, bool elsewhere, const DiscoverOptions& options);
 
 /// The misfit of a channel in a phase, 1 where there is none.
 double misfit_in(const std::vector<ChannelMisfit>& misfit, experiment::Channel, Phase);

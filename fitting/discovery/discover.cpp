@@ -60,6 +60,31 @@ FirstMisfit first_misfit(const FitResult& fit, const DiscoverOptions& options) {
   return out;
 }
 
+/// Steps forward, each from the model that the one before has found.
+void search(Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  // One look more than effects are wanted: where none is found, another beside pads that give.
+  for (int look = 0; look <= options.most_effects; ++look) {
+    if (static_cast<int>(out.effects.size()) >= options.most_effects) break;
+    auto next = forward(stage, options, out);
+    if (!next) {
+      // The give of the pads may hide what else there is, and predictions may lack it: with it, one more
+      // look.
+      const Stage rigid = stage;
+      if (!fit_along(stage, options, out)) break;
+      if (!needs_give(rigid, stage, options)) {
+        stage = rigid;
+        out.along.clear();
+        break;
+      }
+      out.small.reset();
+      continue;
+    }
+    stage = std::move(*next);
+    polish(stage, options);
+    if (acts_on_pads(stage)) fit_along(stage, options, out);
+  }
+}
+
 }  // namespace
 
 Discovery discover(const datasets::ThrowLog& logged, const std::string& file, const DiscoverOptions& given) {
@@ -99,27 +124,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
   out.structure_before = structures(stage.problem, stage.fit, residuals_before);
 
   const Stage base = stage;
-  // One look more than effects are wanted: where none is found, another beside pads that give.
-  for (int look = 0; look <= options.most_effects; ++look) {
-    if (static_cast<int>(out.effects.size()) >= options.most_effects) break;
-    auto next = forward(stage, options, out);
-    if (!next) {
-      // The give of the pads may hide what else there is, and predictions may lack it: with it, one more
-      // look.
-      const Stage rigid = stage;
-      if (!fit_along(stage, options, out)) break;
-      if (!needs_give(rigid, stage, options)) {
-        stage = rigid;
-        out.along.clear();
-        break;
-      }
-      out.small.reset();
-      continue;
-    }
-    stage = std::move(*next);
-    polish(stage, options);
-    if (acts_on_pads(stage)) fit_along(stage, options, out);
-  }
+  search(stage, options, out);
   backward(stage, options, out);
   FitResult counted = withdraw(stage, options, out);
   judge(stage, base, options, out);

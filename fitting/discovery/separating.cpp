@@ -112,6 +112,63 @@ CampaignThrow with_sensor(const CampaignThrow& thrown, const Sensor& sensor) {
   return out;
 }
 
+/// A throw of this log, or of an experiment that could be made.
+struct Trial {
+  std::string what;  ///< the experiment, in words
+  CampaignThrow thrown;
+  std::vector<double> own;
+  double weight;
+  int experiment;  ///< trials of one number are one experiment; −1: this log
+  std::optional<Eigen::MatrixXd> gram;
+};
+
+/// The log's throws, and every experiment that is thought of.
+std::vector<Trial> trials_of(const Stage& stage) {
+  const auto& throws = stage.problem.throws();
+  std::vector<Trial> out;
+  std::map<std::string, std::size_t> conditions, objects;
+  std::vector<std::size_t> used;
+  for (std::size_t i = 0; i < throws.size(); ++i) {
+    if (!stage.fit.throws[i].used) continue;
+    used.push_back(i);
+    out.push_back({"", throws[i], stage.fit.throws[i].own, 1, -1, {}});
+    conditions.try_emplace(throws[i].prepared.experiment(), i);
+    objects.try_emplace(throws[i].prepared.object, i);
+  }
+  int count = 0;
+  const std::vector<double> none(stage.problem.own().size(), 0.0);
+  for (const auto& [name, i] : conditions) {
+    for (const double speed : {0.5, 0.8, 1.25})
+      out.push_back(
+          {fmt::format("{:.0f} throws of {} with the hand {:.2f} times as fast", kRepetitions, name, speed),
+           at_speed(throws[i], speed),
+           none,
+           kRepetitions,
+           count++,
+           {}});
+    for (const auto& [object, of] : objects)
+      if (object != throws[i].prepared.object)
+        out.push_back({fmt::format("{:.0f} throws of {} moved as {}", kRepetitions, object, name),
+                       with_object(throws[i], throws[of]),
+                       none,
+                       kRepetitions,
+                       count++,
+                       {}});
+  }
+  for (const Sensor& sensor : kSensors) {
+    for (const std::size_t i : used)
+      if (!has(throws[i], sensor.first))
+        out.push_back({fmt::format("add {} to the throws of this log", sensor.name),
+                       with_sensor(throws[i], sensor),
+                       stage.fit.throws[i].own,
+                       1,
+                       count,
+                       {}});
+    ++count;
+  }
+  return out;
+}
+
 }  // namespace
 
 std::vector<SeparatingExperiment> separating_experiments(const Stage& stage, const AcceptedEffect& accepted,
@@ -121,57 +178,7 @@ std::vector<SeparatingExperiment> separating_experiments(const Stage& stage, con
   if (is_law(accepted.id)) return out;
   const FootprintColumns columns = columns_of(stage, other);
   if (columns.candidates().empty()) return out;
-  const auto& throws = stage.problem.throws();
-  std::vector<std::size_t> used;
-  for (std::size_t i = 0; i < throws.size(); ++i)
-    if (stage.fit.throws[i].used) used.push_back(i);
-
-  struct Trial {
-    std::string what;
-    CampaignThrow thrown;
-    std::vector<double> own;
-    double weight;
-    int experiment;  ///< trials of one number are one experiment
-    std::optional<Eigen::MatrixXd> gram;
-  };
-  std::vector<Trial> trials;
-  for (const std::size_t i : used) trials.push_back({"", throws[i], stage.fit.throws[i].own, 1, -1, {}});
-  int count = 0;
-  std::map<std::string, std::size_t> conditions, objects;
-  for (const std::size_t i : used) {
-    conditions.try_emplace(throws[i].prepared.experiment(), i);
-    objects.try_emplace(throws[i].prepared.object, i);
-  }
-  const std::vector<double> none(stage.problem.own().size(), 0.0);
-  for (const auto& [name, i] : conditions) {
-    for (const double speed : {0.5, 0.8, 1.25})
-      trials.push_back(
-          {fmt::format("{:.0f} throws of {} with the hand {:.2f} times as fast", kRepetitions, name, speed),
-           at_speed(throws[i], speed),
-           none,
-           kRepetitions,
-           count++,
-           {}});
-    for (const auto& [object, of] : objects)
-      if (object != throws[i].prepared.object)
-        trials.push_back({fmt::format("{:.0f} throws of {} moved as {}", kRepetitions, object, name),
-                          with_object(throws[i], throws[of]),
-                          none,
-                          kRepetitions,
-                          count++,
-                          {}});
-  }
-  for (const Sensor& sensor : kSensors) {
-    for (const std::size_t i : used)
-      if (!has(throws[i], sensor.first))
-        trials.push_back({fmt::format("add {} to the throws of this log", sensor.name),
-                          with_sensor(throws[i], sensor),
-                          stage.fit.throws[i].own,
-                          1,
-                          count,
-                          {}});
-    ++count;
-  }
+  std::vector<Trial> trials = trials_of(stage);
   experiment::parallel_for(trials.size(), options.fit.threads, [&](std::size_t k) {
     try {
       auto gram = columns.gram(trials[k].thrown, trials[k].own);

@@ -191,19 +191,14 @@ bool lacks_no_acceleration(const Stage& stage, const DiscoverOptions& options) {
 std::optional<Unexplained> left_in_channels(const Stage& stage, const Discovery& so_far, double rest,
                                             const DiscoverOptions& options) {
   std::optional<Unexplained> out;
-  // In the firm grasp the fit bends each throw's own grasp for what is missing elsewhere: there a channel
-  // speaks for itself where nothing else does.
-  const auto limit_of = [&](const ChannelMisfit& m) {
-    return is_wrench(m.channel) || m.phase == Phase::grasped ? 2 * options.unexplained
-                                                             : unexplained_from(m.channel, m.phase, options);
-  };
   const bool elsewhere = std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(), [&](const auto& m) {
-    return is_misfit(m, options) && m.chi2_per_sample() >= limit_of(m) &&
+    return is_misfit(m, options) &&
+           m.chi2_per_sample() >= unexplained_from(m.channel, m.phase, true, options) &&
            is_confirmed(stage.held_out.misfit, m);
   });
   for (const auto& m : stage.fit.misfit) {
     const double before = misfit_in(so_far.base.misfit, m.channel, m.phase);
-    const double limit = std::max(elsewhere ? limit_of(m) : unexplained_from(m.channel, m.phase, options),
+    const double limit = std::max(unexplained_from(m.channel, m.phase, elsewhere, options),
                                   so_far.effects.empty() ? 0.0 : 1 + rest * (before - 1));
     if (!is_misfit(m, options) || m.chi2_per_sample() < limit) continue;
     if (!is_confirmed(stage.held_out.misfit, m)) continue;
