@@ -1,5 +1,6 @@
 // Every rule by which the loop believes something, with its threshold: what docs/closing-the-loop.md says in
-// words under "Refits". Thresholds that the user may set are in DiscoverOptions. Internal to fitting.
+// words under "Refits". Thresholds that the user may set are in DiscoverOptions; which terms describe what is
+// missing is missing_force.hpp's to say. Internal to fitting.
 #pragma once
 
 #include <string>

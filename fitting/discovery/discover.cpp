@@ -93,15 +93,14 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
   const int threads = options.fit.threads;
   const datasets::ThrowLog log = with_held_out(logged);
   Discovery out;
-  if (!log.throws.empty() && std::none_of(log.throws.begin(), log.throws.end(), [](const datasets::Throw& t) {
-        return t.split == datasets::Split::test;
-      })) {
+  Stage stage{CampaignProblem(log, file, options.campaign), {}, {}, {}};
+  if (std::none_of(log.throws.begin(), log.throws.end(),
+                   [](const datasets::Throw& t) { return t.split == datasets::Split::test; })) {
     out.verdict = Verdict::not_answered;
     out.message =
         "no test throws, and no object with two conditions: nothing can be held out to judge an effect by";
     return out;
   }
-  Stage stage{CampaignProblem(log, file, options.campaign), {}, {}, {}};
   solve(stage, options, {});
   if (stage.solved()) polish(stage, options);
   out.base = stage.fit;
