@@ -161,6 +161,23 @@ TEST(CampaignEffects, TheLandingIsThatOfTheDeclaredCoM) {
     }
 }
 
+// A tracker that reads everything a hundredth too long and also tells the landing finds its height a
+// hundredth too low; one that does not tell it leaves the landing where it is.
+TEST(CampaignEffects, ATrackersScaleMovesTheHeightOfTheLandingThatItTells) {
+  constexpr double kHeight = 0.2, kScale = 0.01;
+  for (const double share : {0.0, 0.5, 1.0})
+    for (const int index : {0, kThrow}) {
+      CampaignDesign design =
+          perfect({{"sensor.length_scale.scale", 1 + kScale}, {"sensor.length_scale.landing_share", share}});
+      design.landing_height = kHeight;
+      const auto [record, truth] = generate_throw(design, kSeed, index);
+      const auto com = flown_to(design, truth, record.landing->time(0));
+      // in closed form, but for the rounding of times of half a second at some 4 m/s
+      EXPECT_NEAR((1 + share * kScale) * com.z, kHeight, 1e-10) << share;
+      EXPECT_NEAR(record.landing->pose(0, 0), (1 + share * kScale) * com.x, 1e-10) << share;
+    }
+}
+
 TEST(CampaignEffects, TheForceComesLaterThanItsSensorSays) {
   const auto plain = generate_throw(perfect(), kSeed, kThrow);
   for (const double delay : {-0.003, 0.004}) {
