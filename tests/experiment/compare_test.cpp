@@ -1,0 +1,111 @@
+// What a comparison says in numbers: its statistics by hand, its scatter of repetitions by the pooled
+// variance, and the parameters that it takes from a log against those that made it.
+#include "experiment/compare.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "experiment/synthetic_campaign.hpp"
+#include "tests/support/perfect_campaign.hpp"
+
+namespace {
+
+using namespace unhand;
+using namespace unhand::experiment;
+using datasets::Split;
+using testing_support::kSeed;
+
+TEST(ErrorStatistics, OfThreeErrorsByHand) {
+  const auto three = statistics_of({1, -2, 3});
+  EXPECT_EQ(three.n, 3);
+  EXPECT_NEAR(three.mae, 2, 1e-15);         // rounding
+  EXPECT_NEAR(three.bias, 2.0 / 3, 1e-15);  // of the errors with their signs
+  EXPECT_NEAR(three.std, 1, 1e-15);         // of 1, 2, 3, with n − 1
+  const auto one = statistics_of({-4});
+  EXPECT_EQ(one.n, 1);
+  EXPECT_EQ(one.mae, 4);
+  EXPECT_EQ(one.bias, -4);
+  EXPECT_EQ(one.std, 0);
+  EXPECT_EQ(statistics_of({}).n, 0);
+}
+
+/// A campaign of perfect sensors with what made its throws.
+struct Known {
+  datasets::ThrowLog log;
+  std::vector<PreparedThrow> prepared;
+  std::vector<ThrowTruth> truth;
+
+  explicit Known(const CampaignDesign& design) : log(campaign_header(design, kSeed)) {
+    for (int i = 0; i < design.throws(); ++i) {
+      auto made = generate_throw(design, kSeed, i);
+      log.throws.push_back(std::move(made.record));
+      truth.push_back(std::move(made.truth));
+    }
+    prepared = prepare_all(log, "(in memory)", 1);
+  }
+  /// The mean of a number of each training throw.
+  template <class Of>
+  double train_mean(Of&& of) const {
+    double sum = 0;
+    int n = 0;
+    for (std::size_t i = 0; i < truth.size(); ++i)
+      if (log.throws[i].split == Split::train) sum += of(i), ++n;
+    return sum / n;
+  }
+};
+
+TEST(RepetitionScatter, PoolsTheVarianceOfTheConditions) {
+  const Known known(testing_support::perfect());
+  const PreparedThrow& any = known.prepared.front();
+  std::vector<PreparedThrow> throws;
+  const auto lands = [&](const char* object, const char* condition, double x, double theta) {
+    throws.push_back(any);
+    throws.back().object = object, throws.back().condition = condition;
+    throws.back().measured.landing_x = x, throws.back().measured.landing_theta = theta;
+  };
+  lands("bar", "slow", 1, 0.1);  // squares about the mean: 2, of one degree of freedom
+  lands("bar", "slow", 3, 0.3);
+  lands("bar", "fast", 1, 0.4);  // 14, of two
+  lands("bar", "fast", 2, 0.5);
+  lands("bar", "fast", 6, 0.9);
+  lands("box", "fast", 100, 9);  // another object's, alone
+  throws.push_back(any);         // not seen to land
+  throws.back().object = "bar", throws.back().condition = "slow";
+  throws.back().measured.landing_x.reset();
+  const auto scatter = compare(known.log, throws, {}).repetitions;
+  EXPECT_EQ(scatter.conditions, 2);
+  EXPECT_NEAR(scatter.landing_x, std::sqrt(16.0 / 3), 1e-14);  // rounding
+  EXPECT_NEAR(scatter.landing_theta, 0.1 * std::sqrt(16.0 / 3) * 180 / M_PI, 1e-13);
+}
+
+TEST(FrictionEstimate, OfTheTrueLawIsTheTrueFriction) {
+  for (const double variation : {0.0, 0.02}) {
+    CampaignDesign design = testing_support::perfect();
+    design.variation.mu = variation;
+    const Known known(design);
+    const auto found = estimate_friction(known.log, known.prepared, "limit_surface_disc").parameters;
+    const double mu = known.train_mean([&](std::size_t i) { return known.truth[i].patch.mu; });
+    // One friction: every slipping wrench lies on its surface, but for the smoothed normal force. Where every
+    // throw has its own, they do not say their mean with equal weights: as far off as they differ, and μ and
+    // L the other way round.
+    EXPECT_NEAR(found.mu / mu, 1, variation > 0 ? 0.03 : 1e-4) << variation;
+    EXPECT_NEAR(found.length / design.patch.length(), 1, variation > 0 ? 0.05 : 1e-4) << variation;
+    EXPECT_EQ(found.pads, design.patch.pads);
+  }
+}
+
+TEST(FrictionEstimate, OfADelayIsTheMeanFromTheCommandToTheDetach) {
+  const CampaignDesign design = testing_support::perfect();
+  const Known known(design);
+  const auto found = estimate_friction(known.log, known.prepared, contact::kGripperDelay).parameters.delay;
+  const auto delay = [&](std::size_t i) { return known.truth[i].detach_time - design.opening.open_command; };
+  const double mean = known.train_mean(delay);
+  const double square = known.train_mean([&](std::size_t i) { return std::pow(delay(i) - mean, 2); });
+  // The ramp of a force without noise ends where its samples say: to a thousandth of their distance.
+  EXPECT_NEAR(found.centre, mean, 1e-6);
+  EXPECT_NEAR(found.spread, std::sqrt(square), 1e-6);
+  EXPECT_GT(square, 1e-8) << "else the mean is any throw's";
+}
+
+}  // namespace
