@@ -1,4 +1,7 @@
 // Every way in which a file can be wrong is refused, with the file, the path inside it and the reason.
+#include <set>
+#include <sstream>
+
 #include "hdf5_tools.hpp"
 #include "log_samples.hpp"
 
@@ -361,6 +364,112 @@ TEST_P(Spatial, IsRefused) { run(GetParam(), spatial_log()); }
 const auto name_of = [](const auto& info) { return std::string(info.param.name); };
 INSTANTIATE_TEST_SUITE_P(Rejection, Planar, testing::ValuesIn(planar_cases), name_of);
 INSTANTIATE_TEST_SUITE_P(Rejection, Spatial, testing::ValuesIn(spatial_cases), name_of);
+
+/// What a log may do without, spelt out here as in the description of the format; all else is required.
+const std::set<std::string> optional_datasets = {"mocap/valid", "imu/angular_rate"};
+const std::vector<std::pair<std::string, std::vector<std::string>>>
+    required_attributes = {{"/",
+                            {"schema", "schema_version", "dimension", "title", "source", "gravity",
+                             "landing_height"}},
+                           {"/objects/bar", {"mass"}},
+                           {"/gripper", {"n_pads"}},
+                           {one, {"object", "condition", "repetition", "split"}}},
+    optional_attributes = {{"/", {"licence"}},
+                           {"/objects/bar", {"inertia", "com_offset", "dims", "surface", "sku", "drag_k"}},
+                           {"/gripper", {"pad_radius", "opening_command_time"}},
+                           {one, {"detach_time", "grasp_angle", "hand_jump_times", "free_flight"}}};
+
+/// A log with everything that its dimension can have, every sample of it good.
+ThrowLog full_log(int dimension) {
+  ThrowLog log = dimension == 3 ? spatial_log() : planar_log();
+  for (Throw& toss : log.throws) {
+    toss.imu = sample_throw("001").imu;
+    toss.mocap->valid = Flags(toss.mocap->time.rows, 1);
+    if (dimension == 2) toss.mocap->pose = wavy(toss.mocap->time.rows, 3, 0.4);
+  }
+  return log;
+}
+
+/// The group of the throw of full_log() that has this dataset.
+std::string throw_with(const LayoutRow& row, int dimension) {
+  if (dimension == 2) return one + "/";
+  return row.path == "mocap/pose" && row.shape == "(N,3)" ? "/throws/points/" : "/throws/full/";
+}
+
+TEST(Rejection, OfEveryDatasetThatIsNotThere) {
+  for (const int dimension : {2, 3})
+    for (const LayoutRow& row : throw_log_layout(dimension)) {
+      const std::string path = throw_with(row, dimension) + row.path;
+      const Spoil remove = [&](const Editor& f) { f.remove(path); };
+      EXPECT_EQ(row.optional, optional_datasets.contains(row.path)) << row.path;
+      if (!optional_datasets.contains(row.path)) {
+        run({"missing", remove, path.c_str(), "required dataset is missing"}, full_log(dimension));
+        continue;
+      }
+      const Scratch scratch;
+      write_throw_log(scratch / "good.h5", full_log(dimension));
+      { remove(Editor(scratch / "good.h5")); }
+      EXPECT_NO_THROW(read_throw_log(scratch / "good.h5")) << path;
+    }
+}
+
+TEST(Rejection, OfEveryColumnThatIsNotFinite) {
+  bool infinite = false;  // by turns
+  for (const int dimension : {2, 3})
+    for (const LayoutRow& row : throw_log_layout(dimension)) {
+      if (row.path == "mocap/valid") continue;  // integers
+      const std::string path = throw_with(row, dimension) + row.path;
+      const std::size_t sample = row.shape[1] == '1' ? 0 : 1;  // the only one, or the second
+      std::vector<std::string> columns;
+      std::istringstream names(row.columns);
+      for (std::string name; std::getline(names, name, ',');) columns.push_back(name);
+      for (std::size_t c = 0; c < columns.size(); ++c) {
+        infinite = !infinite;
+        const std::string reason =
+            "row " + std::to_string(sample) + ", column " + columns[c] + (infinite ? ": Inf" : ": NaN");
+        run({"not finite",
+             [&](const Editor& f) { f.poke(path, sample * columns.size() + c, infinite ? inf : nan); },
+             path.c_str(), reason.c_str()},
+            full_log(dimension));
+      }
+    }
+}
+
+TEST(Rejection, OfEveryTimeThatStandsStill) {
+  for (const int dimension : {2, 3})
+    for (const LayoutRow& row : throw_log_layout(dimension)) {
+      if (row.columns != "t" || row.shape == "(1)") continue;
+      const std::string path = throw_with(row, dimension) + row.path;
+      run({"stands still", [&](const Editor& f) { f.poke(path, 1, 0); }, path.c_str(),
+           "not strictly increasing: 0 s at row 1"},
+          full_log(dimension));
+    }
+}
+
+TEST(Rejection, OfEveryAttributeThatIsNotThere) {
+  for (const auto& [owner, names] : required_attributes)
+    for (const std::string& name : names) {
+      const std::string path = owner + "@" + name;
+      run({"missing", [&](const Editor& f) { f.remove_attribute(owner, name); }, path.c_str(),
+           "required attribute is missing"},
+          planar_log());
+    }
+  for (const LayoutRow& row : throw_log_layout(2)) {
+    const std::string path = one + "/" + row.path;
+    run({"missing", [&](const Editor& f) { f.remove_attribute(path, "units"); }, (path + "@units").c_str(),
+         "required attribute is missing"},
+        planar_log());
+  }
+  const Scratch scratch;
+  const std::string file = scratch / "good.h5";
+  write_throw_log(file, planar_log());
+  {
+    const Editor editor(file);
+    for (const auto& [owner, names] : optional_attributes)
+      for (const std::string& name : names) editor.remove_attribute(owner, name);
+  }
+  EXPECT_NO_THROW(read_throw_log(file));
+}
 
 TEST(Rejection, WhatIsNotALogAtAll) {
   const Scratch scratch;

@@ -43,13 +43,15 @@ struct SpoiledSlip {
 void PrintTo(const SpoiledSlip& c, std::ostream* out) { *out << c.name; }
 class Slips : public testing::TestWithParam<SpoiledSlip> {};
 
-TEST_P(Slips, IsRefused) {
+void expect_refused(const Spoil& spoil, const std::string& path, const std::string& reason) {
   const Scratch scratch;
   const std::string file = scratch / "s.h5";
   write_slip_log(file, sample());
-  GetParam().spoil(Editor(file));
-  expect_error([&] { read_slip_log(file); }, file, GetParam().path, GetParam().reason);
+  { spoil(Editor(file)); }
+  expect_error([&] { read_slip_log(file); }, file, path, reason);
 }
+
+TEST_P(Slips, IsRefused) { expect_refused(GetParam().spoil, GetParam().path, GetParam().reason); }
 
 const std::string first = "/surfaces/feet/slips/1";
 const SpoiledSlip cases[] = {
@@ -79,11 +81,50 @@ const SpoiledSlip cases[] = {
      "strictly increasing"},
     {"unit", [](const Editor& f) { f.text(first + "/wrench", "units", "N"); },
      "/surfaces/feet/slips/1/wrench@units", "column tau is torque"},
+    {"two_columns",
+     [](const Editor& f) {
+       f.doubles(first + "/wrench", {25, 2}, std::vector<double>(50), "N,N");
+     },
+     "/surfaces/feet/slips/1/wrench", "wrong shape (25,2), expected (N,3)"},
+    {"fewer_rows",
+     [](const Editor& f) {
+       f.doubles(first + "/twist", {24, 3}, std::vector<double>(72), "m/s,m/s,rad/s");
+     },
+     "/surfaces/feet/slips/1/twist", "24 rows, but the time beside it has 25"},
     {"split", [](const Editor& f) { f.text(first, "split", "Train"); }, "/surfaces/feet/slips/1@split",
      "'Train'"},
 };
 const auto name_of_spoiled = [](const auto& case_info) { return std::string(case_info.param.name); };
 INSTANTIATE_TEST_SUITE_P(Rejection, Slips, testing::ValuesIn(cases), name_of_spoiled);
+
+TEST(SlipLog, EverythingButTheLicenceIsRequired) {
+  const std::pair<std::string, std::vector<std::string>> attributes[] = {
+      {"/", {"schema", "schema_version"}},
+      {"/surfaces/feet", {"mass", "characteristic_length", "description"}},
+      {first, {"split"}},
+      {first + "/time", {"units"}},
+      {first + "/wrench", {"units"}},
+      {first + "/twist", {"units"}}};
+  for (const auto& [owner, names] : attributes)
+    for (const std::string& name : names)
+      expect_refused([&](const Editor& f) { f.remove_attribute(owner, name); }, owner + "@" + name,
+                     "required attribute is missing");
+  for (const std::string dataset : {"time", "wrench", "twist"})
+    expect_refused([&](const Editor& f) { f.remove(first + "/" + dataset); }, first + "/" + dataset,
+                   "required dataset is missing");
+  ASSERT_FALSE(sample().surfaces.at("feet").licence);
+}
+
+TEST(SlipLog, EveryNumberIsFinite) {
+  const std::pair<std::string, std::vector<std::string>> datasets[] = {
+      {"time", {"t"}}, {"wrench", {"fx", "fy", "tau"}}, {"twist", {"vx", "vy", "omega"}}};
+  for (const auto& [name, columns] : datasets)
+    for (std::size_t c = 0; c < columns.size(); ++c)
+      for (const double value : {std::nan(""), HUGE_VAL})
+        expect_refused([&](const Editor& f) { f.poke(first + "/" + name, 2 * columns.size() + c, value); },
+                       first + "/" + name,
+                       "row 2, column " + columns[c] + (std::isnan(value) ? ": NaN" : ": Inf"));
+}
 
 TEST(SlipLog, WritingRefusesABadLog) {
   const Scratch scratch;
