@@ -176,6 +176,55 @@ TEST(DistributedPatch, AFreeDiscStopsAsFarkasFound) {
   EXPECT_NEAR(points.detach.twist.omega, exact.spin, 1e-4 * kUnit);
 }
 
+/// A thin ring: points of equal load at the radius, half a step off the axes.
+std::vector<PatchPoint> ring_points(int n) {
+  std::vector<PatchPoint> out;
+  for (int i = 0; i < n; ++i) {
+    const double angle = 2 * M_PI * (i + 0.5) / n;
+    out.push_back({{std::cos(angle), std::sin(angle)}, 1.0 / n});
+  }
+  return out;
+}
+
+TEST(DistributedPatch, OfAThinRingResistsSlideAndSpinAlike) {
+  // Where it slides at v = ω R, each point's slip halves the angle between those of slide and spin:
+  // F = T/R = 2/π of the limit. Half a step beside the point that rests the sum is of second order in 1/n.
+  const auto f = sliding_wrench({kMu, kRadius, ring_points(1000)}, kNormal, {3 * kRadius, 0, 3});
+  const double full = 2 * kMu * kNormal;
+  EXPECT_NEAR(-f.fx / full, 2 / M_PI, 1e-6);
+  EXPECT_NEAR(-f.tau / (full * kRadius), 2 / M_PI, 1e-6);
+  EXPECT_NEAR(f.fz / full, 0, 1e-12);  // rounding of a sum
+}
+
+TEST(DistributedPatch, AFreeRingEndsWithSlideAndSpinAlike) {
+  // k = 1: whichever prevails at first is braked more, until v = ω R, and from there on both fall by 2/π of
+  // μ g. Units as for the disc above; a tenth of the unit before the rest, and half of that.
+  constexpr double kUnit = 1e-3;
+  ContactParameters<double> parameters;
+  parameters.patch = {1.0, 1.0, 1.0, 1};
+  const auto model = contact::make_contact_model("limit_surface", parameters);  // is not looked at
+  const support::ConstantForce force(kUnit);
+  PatchOptions options;
+  options.step = 1e-3;
+  for (const auto& [slip, time] : {std::pair{0.5, 1.11}, {2.0, 2.32}}) {
+    const auto twist_at = [&, slip = slip](double t) {
+      const auto hand = support::still_hand(t);
+      const release::ReleaseProblem<double> problem{
+          hand, force, *model, {1.0, 1.0}, {0, 0}, {0, 0}, 0.0, {slip * kUnit, 0}, kUnit};
+      const auto result = simulate_distributed_patch(problem, {1.0, 1.0, ring_points(200), 1}, options);
+      EXPECT_EQ(result.outcome, release::ReleaseOutcome::never_separated);
+      return result.detach.twist;
+    };
+    const auto before = twist_at(time), after = twist_at(time + 0.05);
+    // The ratio closes in faster than the time left: 2e-3 of the start's 0.5 and 2, then 200 points' 1e-4.
+    EXPECT_NEAR(before.vx / before.omega, 1, 4e-3) << slip;
+    EXPECT_NEAR(after.vx / after.omega, 1, 4e-4) << slip;
+    EXPECT_GT(after.vx, 0.02 * kUnit) << "still on its way";
+    for (const double braked : {before.vx - after.vx, before.omega - after.omega})
+      EXPECT_NEAR(braked / (0.05 * kUnit), 2 / M_PI, 4e-3) << slip;  // as far as the ratio is 1
+  }
+}
+
 TEST(DistributedPatch, RefusesWhatIsNoPatch) {
   std::mt19937_64 random(76);
   const Scene scene(random);
