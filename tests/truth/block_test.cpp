@@ -2,6 +2,7 @@
 // a line every law of friction is Coulomb's, and its answer is a parabola.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/support/simple_scenes.hpp"
@@ -144,6 +145,53 @@ TEST_P(Block, AtTheLimitTheThresholdIsSharp) {
   const auto slips = run(support::accelerating_hand({kFriction * (1 + 1e-6), 0, 0}, 0.2), {0, 0});
   EXPECT_TRUE(slips.slips_at_start);
   EXPECT_NEAR(slips.relative.slip.x, -kFriction * 1e-6 * 0.2, 1e-9);
+}
+
+/// A block at rest in a hand that sways with the acceleration −A sin(s), s = w t, where friction is ρ A.
+struct Shaken {
+  static constexpr double kPhaseRate = 20;  ///< w [rad/s]
+
+  static support::SwayingHand hand(double rho, double phases) {
+    std::array<support::SwayingHand::Coordinate, 3> c{};
+    c[0].amplitude = kFriction / rho / (kPhaseRate * kPhaseRate);
+    c[0].frequency = kPhaseRate;
+    return support::SwayingHand(c, phases / kPhaseRate);
+  }
+};
+
+TEST_P(Block, OnAShakenHandSlipsAndStopsWhereTheClosedFormsSay) {
+  for (const double rho : {0.6, 0.7, 0.8, 0.9, 0.99}) {
+    const auto result = run(Shaken::hand(rho, 3.9), {0, 0});
+    EXPECT_FALSE(result.slips_at_start) << rho;
+    ASSERT_GE(words.size(), 2u) << rho;
+    const double begin = words[0].time * Shaken::kPhaseRate;
+    const auto end = std::find_if(words.begin(), words.end(),
+                                  [](const release::ModeEvent& word) { return word.cause == "slip stops"; });
+    ASSERT_NE(end, words.end()) << rho;
+    EXPECT_EQ(end->mode, "stick") << rho;
+    const double stop = end->time * Shaken::kPhaseRate;
+    // 1e-9 s, as an event's time, in phase; the slip's speed is the sum of what drove it
+    EXPECT_NEAR(begin, std::asin(rho), 1e-9 * Shaken::kPhaseRate) << rho;
+    EXPECT_NEAR(std::cos(stop) - std::cos(begin) + rho * (stop - begin), 0, 1e-9 * Shaken::kPhaseRate) << rho;
+  }
+}
+
+TEST_P(Block, OnAShakenHandSticksFromTheThresholdOn) {
+  const double threshold = 1 / std::sqrt(1 + M_PI * M_PI / 4);  // 0.53703
+  // Whether it sticks once the start is forgotten. The threshold itself would be approached for ever; 300
+  // units of phase leave less than 1e-4 of it.
+  const auto sticks = [&](double rho) {
+    const auto result = run(Shaken::hand(rho, 400), {0, 0});
+    EXPECT_GT(words.size(), 100u) << "slips at every turn";
+    return std::any_of(words.begin(), words.end(), [](const release::ModeEvent& word) {
+      return word.mode == "stick" && word.time * Shaken::kPhaseRate > 300;
+    });
+  };
+  EXPECT_FALSE(sticks(threshold - 2e-4));
+  EXPECT_TRUE(sticks(threshold + 2e-4));
+  EXPECT_TRUE(sticks(1 - 1e-3));
+  run(Shaken::hand(1 + 1e-3, 400), {0, 0});
+  EXPECT_TRUE(words.empty()) << "always sticks";
 }
 
 }  // namespace
