@@ -167,5 +167,42 @@ TEST(PivotLimit, APatchOfAnAtomsSizeEndsTyped) {
     }
 }
 
+// What hardly rubs swings as a pendulum about the pads. From rest at `swing` off its lowest point it is there
+// after a quarter of the period, K(sin(swing/2)) √((I + m l²)/(m g l)), and at rest again after each half.
+TEST(PivotLimit, WithoutTorqueABarIsAPendulum) {
+  const double swing = 2.5;  // rad, far from small
+  const double pull = kBar.mass * 9.81 * kLever, inertia = kBar.inertia + kBar.mass * kLever * kLever;
+  const double quarter = std::comp_ellint_1(std::sin(swing / 2)) * std::sqrt(inertia / pull);
+  const double fastest = std::sqrt(2 * pull * (1 - std::cos(swing)) / inertia);
+  for (const char* name : {"sliding_pivot", "limit_surface", "limit_surface_disc", "limit_surface_quartic"}) {
+    ContactParameters<double> p;
+    p.patch = {0.5, 1e-9};
+    const double rubs = p.patch.tau_max(kNormal);  // 1.3e-8 N m, beside gravity's 0.24 N m
+    const auto model = make_contact_model(name, p);
+    const support::SwayingHand hand = support::still_hand(4.5 * quarter);
+    const support::ConstantForce force(kNormal);
+    const release::ReleaseProblem<double> problem{
+        hand, force, *model, kBar, {0, -9.81}, {kLever, swing - M_PI / 2}, 0.0, {}, 0.0};
+    auto o = options();
+    o.ledger = true;
+    const auto result = simulate_release(problem, o);
+    ASSERT_EQ(result.outcome, release::ReleaseOutcome::never_separated) << name;
+    ASSERT_EQ(result.events.size(), 3u) << name << ": the start and two rests";
+    // That little takes 5e-7 rad off each swing, which shortens it by 3e-7 of itself.
+    for (int half = 1; half <= 2; ++half) {
+      EXPECT_NEAR(result.events[static_cast<std::size_t>(half)].t / quarter, 2 * half, 1e-6 * half) << name;
+      const auto low = sample_release(problem, result, (2 * half - 1) * quarter);
+      EXPECT_NEAR(low.pose.theta, -M_PI / 2, 2e-6 * half) << name;
+      EXPECT_NEAR(low.twist.omega, half == 1 ? -fastest : fastest, 1e-6 * fastest) << name;
+    }
+    // All that is lost is what it rubs over 4.5 quarters, and a limit surface's slip under the weight a
+    // little.
+    EXPECT_EQ(result.ledger.hand_work, 0) << name;
+    EXPECT_LT(result.ledger.mechanical_change, 0) << name;
+    EXPECT_GT(result.ledger.mechanical_change, -1.1 * rubs * 4.5 * swing) << name;
+    EXPECT_NEAR(result.ledger.residual, 0, 1e-8 * pull) << name;  // ten times the tolerance
+  }
+}
+
 }  // namespace
 }  // namespace unhand::contact
