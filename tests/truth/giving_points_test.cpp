@@ -29,12 +29,12 @@ contact::FrictionLimits<double> limits(double compliance, double loss_time) {
 
 /// The wrench [N, N, N m] of points that are dragged by `slip` for h [s], whatever they say.
 contact::Vec3<double> dragged(GivingPoints<double>& points, contact::Stretch<double>& stretch,
-                              const contact::Vec3<double>& slip, double h) {
+                              const contact::Vec3<double>& slip, double h, double force = kForce) {
   constexpr double kHeavy = 1e6;
   contact::Stretch<double> to = stretch;
   contact::Vec3<double> at = slip, wrench;
   const GivingPoints<double>::Step step{
-      h, kForce, 2.0 / 3 * kRadius, {{{kHeavy, 0, 0}, {0, kHeavy, 0}, {0, 0, kHeavy}}}, slip};
+      h, force, 2.0 / 3 * kRadius, {{{kHeavy, 0, 0}, {0, kHeavy, 0}, {0, 0, kHeavy}}}, slip};
   EXPECT_TRUE(points.step(step, stretch, to, at, wrench));
   stretch = to;
   return wrench;
@@ -160,20 +160,95 @@ TEST(GivingPoints, ThrowAsManyBristlesDo) {
     }
 }
 
+/// A launch on compliant pads, recorded in steps of 5e-5 s.
+struct Recorded {
+  Launch launch;
+  contact::FrictionLimits<double> pads = limits(3e-4 / kForce, 3e-3);
+  std::unique_ptr<contact::ContactModel> model;
+  release::ReleaseResult<double> result;
+
+  Recorded() {
+    contact::ContactParameters<double> p;
+    p.patch = {kMu, kRadius};
+    p.variation = pads.variation();
+    model = contact::make_contact_model("limit_surface_disc", p);
+    release::ReleaseOptions options;
+    options.integrator = support::tight(1e-7, 1e-10);
+    options.ledger = true;
+    result = simulate_release(launch.problem(*model), options);
+    EXPECT_EQ(result.outcome, release::ReleaseOutcome::detached);
+  }
+  release::ReleaseSample<double> at(double t) const {
+    return sample_release(launch.problem(*model), result, t);
+  }
+};
+
 TEST(GivingPoints, TheLedgerClosesAndPadsNeverFeed) {
-  const Launch launch;
-  contact::ContactParameters<double> p;
-  p.patch = {kMu, kRadius};
-  p.variation.compliance = 3e-4 / kForce;
-  p.variation.loss_time = 3e-3;
-  const auto model = contact::make_contact_model("limit_surface_disc", p);
-  release::ReleaseOptions options;
-  options.integrator = support::tight(1e-7, 1e-10);
-  options.ledger = true;
-  const auto result = simulate_release(launch.problem(*model), options);
-  const auto& l = result.ledger;
+  const Recorded recorded;
+  const auto& l = recorded.result.ledger;
   EXPECT_NEAR(l.residual, 0, 1e-5 * std::abs(l.hand_work)) << l.hand_work;
-  EXPECT_LT(l.linear_friction + l.torsional_friction, 0);
+  const auto start = recorded.at(0);
+  const double stored =
+      0.5 * recorded.pads.variation().compliance *
+      dot(start.wrench.force(), start.wrench.force());  // holds the bar in a hand that turns
+  double given = 0;
+  for (const auto& piece : recorded.result.trajectory.pieces) {
+    const double h = piece.t1 - piece.t0;
+    const auto middle = recorded.at(piece.t0 + 0.5 * h), node = recorded.at(piece.t0);
+    given +=
+        h * (dot(middle.wrench.force(), middle.relative.slip) + middle.wrench.tau * middle.relative.spin);
+    ASSERT_LE(given, stored) << piece.t0 << ": no more than the pads had and got";
+    // No more than the disc can carry: the force alone is limited exactly, up to the order of the steps'
+    // extrapolation; force and torque together as well as the quadrature knows the disc.
+    const double limit = 2 * kMu * node.normal_force;
+    ASSERT_LE(norm(node.wrench.force()), limit * (1 + 1e-6)) << piece.t0;
+    ASSERT_LE(contact::UniformDisc{}.gauge(
+                  contact::Vec3<double>{node.wrench.fx / limit, node.wrench.fz / limit,
+                                        node.wrench.tau / (recorded.pads.length(node.normal_force) * limit)}),
+              1 + 1e-4)
+        << piece.t0;
+  }
+  EXPECT_NEAR(given, l.linear_friction + l.torsional_friction, 1e-3 * std::abs(given));  // a midpoint rule
+}
+
+// The wrench of a sample is what its motion takes. Points that are dragged along the sampled slip, without
+// any body, must come to the same.
+TEST(GivingPoints, TheSampledWrenchIsThatOfPointsThatSlipAsSampled) {
+  const Recorded recorded;
+  constexpr int kSteps = 1000;  // twice as long as the release's
+  const double end = recorded.result.detach.time;
+  const auto in_hand = [](const release::ReleaseSample<double>& s, dynamics::Vec2<double> v, double about) {
+    const auto turned = dynamics::rotate(-s.hand.pose.theta, v);
+    return contact::Vec3<double>{turned.x, turned.z, about};
+  };
+  const auto force_limit = [](const auto& s) { return 2 * kMu * s.normal_force; };
+  const auto follow = [&](int steps) {
+    GivingPoints<double> points(recorded.pads);
+    auto stretch = points.zero();
+    const auto start = recorded.at(0);
+    EXPECT_TRUE(points.hold(in_hand(start, start.wrench.force(), start.wrench.tau), force_limit(start),
+                            recorded.pads.length(start.normal_force), stretch));
+    std::vector<contact::Vec3<double>> out;
+    for (int k = 1; k < steps; ++k) {
+      const auto s = recorded.at(end * k / steps);
+      out.push_back(dragged(points, stretch, in_hand(s, s.relative.slip, s.relative.spin), end / steps,
+                            force_limit(s)));
+    }
+    return out;
+  };
+  const auto coarse = follow(kSteps), fine = follow(2 * kSteps);
+  for (int k = 1; k < kSteps; ++k) {
+    const auto s = recorded.at(end * k / kSteps);
+    const auto sampled = in_hand(s, s.wrench.force(), s.wrench.tau);
+    // Both are of second order in steps of 1e-4 s, during which what slips may change; the torque is also
+    // that of a heavy object, whose momentum is rounded. Of some 1.5 N and 1.5e-3 N m.
+    const double tolerance[] = {3e-4, 3e-4, 5e-6};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double dragged_along =
+          2 * fine[static_cast<std::size_t>(2 * k - 1)][i] - coarse[static_cast<std::size_t>(k - 1)][i];
+      ASSERT_NEAR(sampled[i], dragged_along, tolerance[i]) << i << " at " << end * k / kSteps;
+    }
+  }
 }
 
 }  // namespace
