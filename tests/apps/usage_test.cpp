@@ -4,16 +4,45 @@
 namespace unhand::cli {
 namespace {
 
+/// The commands that a help lists, each behind `before`.
+std::vector<std::string> commands_in(const std::string& help, const std::string& before) {
+  std::vector<std::string> out;
+  std::istringstream lines(help);
+  bool listed = false;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.empty()) listed = false;
+    if (listed && line.starts_with("  ") && line[2] != ' ')
+      out.push_back(before + line.substr(2, line.find(' ', 2) - 2));
+    if (line == "Subcommands:") listed = true;
+  }
+  return out;
+}
+
 TEST_F(Cli, HelpHasAnExampleEverywhere) {
-  EXPECT_EQ(run("--help").code, 0);
   EXPECT_THAT(run("--version").out, HasSubstr("unhand "));
-  for (const std::string command :
-       {"generate", "import", "inspect", "compare", "fit", "predict", "validate-sku"}) {
+  const Answer all = run("--help");
+  EXPECT_EQ(all.code, 0);
+  std::vector<std::string> commands = commands_in(all.out, "");
+  EXPECT_GE(commands.size(), 11u);
+  for (const char* known : {"generate", "import", "inspect", "compare", "fit", "predict", "discover", "plan",
+                            "validate-sku", "figure", "crosscheck"})
+    EXPECT_THAT(commands, testing::Contains(known));
+  for (std::size_t i = 0; i < commands.size(); ++i) {
+    const std::string command = commands[i];
     const Answer answer = run(command + " --help");
     EXPECT_EQ(answer.code, 0) << command;
-    for (const char* word : {"Example", "--json", "--threads"})
-      EXPECT_THAT(answer.out, HasSubstr(word)) << command;
+    const auto inner = commands_in(answer.out, command + " ");
+    commands.insert(commands.end(), inner.begin(), inner.end());
+    if (!inner.empty()) continue;  // the examples are theirs
+    EXPECT_THAT(answer.out, HasSubstr("Example")) << command;
+    if (command != "figure") {  // its numbers are the data that it draws
+      EXPECT_THAT(answer.out, HasSubstr("--json")) << command;
+    }
+    if (!command.starts_with("plan ")) {  // most planners have nothing to share among threads
+      EXPECT_THAT(answer.out, HasSubstr("--threads")) << command;
+    }
   }
+  EXPECT_GE(commands.size(), 16u) << "with the planners";
 }
 
 TEST_F(Cli, WrongUsage) {
