@@ -14,8 +14,8 @@
 #include "apps/figure.hpp"
 #include "apps/progress.hpp"
 #include "apps/throws.hpp"
+#include "dynamics/parallel.hpp"
 #include "experiment/free_flight.hpp"
-#include "experiment/parallel.hpp"
 #include "fitting/slips/slip_surface.hpp"
 
 namespace unhand::apps {
@@ -76,7 +76,7 @@ std::vector<experiment::PreparedThrow> prepare_throws(const datasets::ThrowLog& 
                                                       const CompareRequest& request) {
   std::vector<std::optional<experiment::PreparedThrow>> prepared(log.throws.size());
   Progress progress("prepare", prepared.size());
-  experiment::parallel_for(prepared.size(), request.threads, [&](std::size_t i) {
+  dynamics::parallel_for(prepared.size(), request.threads, [&](std::size_t i) {
     prepared[i] = experiment::prepare(log, log.throws[i], request.log);
     progress.step();
   });

@@ -17,8 +17,8 @@
 #include "contact/gripper_delay.hpp"
 #include "crosscheck/bullet_release.hpp"
 #include "crosscheck/distributed_patch.hpp"
+#include "dynamics/parallel.hpp"
 #include "experiment/friction_estimate.hpp"
-#include "experiment/parallel.hpp"
 #include "flight/fly.hpp"
 
 namespace unhand::apps {
@@ -80,7 +80,7 @@ experiment::ModelParameters parameters_of(const CrosscheckOptions& options, cons
 template <class Predict>
 std::vector<Prediction> all(const Throws& throws, int threads, Progress& progress, Predict&& one) {
   std::vector<Prediction> out(throws.size());
-  experiment::parallel_for(throws.size(), threads, [&](std::size_t i) {
+  dynamics::parallel_for(throws.size(), threads, [&](std::size_t i) {
     out[i] = one(throws[i]);
     progress.step();
   });

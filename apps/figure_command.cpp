@@ -21,7 +21,7 @@ namespace unhand::apps {
 namespace {
 
 struct FigureCommandOptions {
-  std::string name, log, thrown, out{"."};
+  std::string name, log, thrown, json, out{"."};
   std::vector<std::string> models{"limit_surface_disc", "limit_surface", "sliding_pivot"};
   int threads{0};
 };
@@ -77,9 +77,9 @@ experiment::Comparison compared(const Source& source, const FigureCommandOptions
 
 /// Predicted from the twist at detach that the first model says.
 FlightOverlay overlay_of(const Source& source, const FigureCommandOptions& options) {
-  const auto comparison = compared(
-      source,
-      {options.name, options.log, options.thrown, options.out, {options.models.front()}, options.threads});
+  FigureCommandOptions first = options;
+  first.models = {options.models.front()};
+  const auto comparison = compared(source, first);
   const auto& logged = chosen(source, options);
   if (!logged.mocap) throw Unanswered(fmt::format("throw {} has no motion capture", logged.id));
   const auto& throws = comparison.models.front().throws;
@@ -206,6 +206,7 @@ const std::vector<Kind>& kinds() {
 void figure(const FigureCommandOptions& options) {
   require_gnuplot();
   require_writable_directory(options.out);
+  require_writable(options.json);
   for (const auto& model : options.models) {
     try {
       experiment::require_release_model(model);
@@ -231,6 +232,13 @@ void figure(const FigureCommandOptions& options) {
       draw(made, folder);
       drawn.push_back(made.name);
     }
+  if (!options.json.empty()) {
+    Json out = json_head("figure");
+    out["log"] =
+        options.log.empty() ? Json(nullptr) : Json(std::filesystem::path(options.log).filename().string());
+    out["figures"] = drawn;
+    outputs.json(options.json, out);
+  }
   outputs.commit();
   for (const auto& name : drawn)
     fmt::print("{}\n", (std::filesystem::path(options.out) / (name + ".png")).string());
@@ -249,6 +257,7 @@ Command figure_command(Parser& root) {
   parser.option("--models", options->models, "Models, separated by commas").with_commas().with_default();
   parser.option("--out", options->out, "Directory for NAME.png, NAME.pdf, NAME.dat and NAME.gp")
       .with_default();
+  parser.option("--json", options->json, "Write the names of the figures as JSON");
   add_threads(parser, options->threads);
   parser.footer(
       "Friction is estimated from the log as `unhand compare` does. The residual of a model before and after "

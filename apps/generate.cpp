@@ -9,7 +9,7 @@
 #include "apps/output.hpp"
 #include "apps/progress.hpp"
 #include "apps/truth.hpp"
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 #include "experiment/synthetic_campaign.hpp"
 #include "experiment/throw_setup.hpp"
 
@@ -59,7 +59,7 @@ std::vector<experiment::SyntheticThrow> simulate(const experiment::CampaignDesig
                                                  const GenerateOptions& options) {
   std::vector<experiment::SyntheticThrow> throws(static_cast<std::size_t>(design.throws()));
   Progress progress("generate", throws.size());
-  experiment::parallel_for(throws.size(), options.threads, [&](std::size_t i) {
+  dynamics::parallel_for(throws.size(), options.threads, [&](std::size_t i) {
     throws[i] = experiment::generate_throw(design, options.seed, static_cast<int>(i));
     progress.step();
   });

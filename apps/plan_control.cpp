@@ -8,7 +8,7 @@
 #include "apps/output.hpp"
 #include "apps/plan.hpp"
 #include "apps/table.hpp"
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 #include "planners/control/throw_study.hpp"
 
 namespace unhand::apps {
@@ -104,7 +104,7 @@ void run(const PlanControlOptions& o) {
   for (const auto& payload : ct::reported_payloads())
     for (const auto& controller : ct::reported_controllers())
       cells.push_back({payload, controller, std::vector<ct::StudyThrow>(o.seeds), {}});
-  experiment::parallel_for(cells.size() * o.seeds, o.threads, [&](std::size_t i) {
+  dynamics::parallel_for(cells.size() * o.seeds, o.threads, [&](std::size_t i) {
     Cell& cell = cells[i / o.seeds];
     const std::size_t k = i % o.seeds;
     cell.throws[k] = ct::run_throw(cell.controller, cell.payload, study, k + 1);

@@ -21,6 +21,7 @@ namespace el = planners::elastic;
 namespace fs = std::filesystem;
 
 struct PlanElasticOptions {
+  int threads{1};
   std::string arm{"bsa3"}, json, report;
   int starts{10}, intervals{16}, nodes{9}, checks{161};
   double longest{0}, elevation{45}, target_x{0}, target_z{-0.5}, half_table{0.4}, box{0.5};
@@ -282,6 +283,7 @@ Command plan_elastic_command(Parser& plan) {
       .with_default();
   parser.option("--seed", o->seed, "Seed of the random starts").with_default();
   parser.option("--json", o->json, "Write the numbers here");
+  add_one_thread(parser, o->threads);
   parser.option("--report", o->report, "Write tables and figures into this directory");
   return {&parser, [o] { run(*o); }};
 }

@@ -23,6 +23,7 @@ namespace {
 namespace fl = planners::flip;
 
 struct PlanFlipOptions {
+  int threads{1};
   std::string target, learner{"m4"}, robot{"panda-flip"}, sku, card, json, report;
   std::uint64_t seed{1};
   int iterations{5}, throws{3}, repeats{5};
@@ -211,6 +212,7 @@ Command plan_flip_command(Parser& plan) {
       .range(1, 100)
       .with_default();
   parser.option("--json", o->json, "Write the numbers here");
+  add_one_thread(parser, o->threads);
   parser.option("--report", o->report, "Keep every throw here, and write table and figures");
   return {&parser, [o] { run(*o); }};
 }

@@ -26,7 +26,7 @@ using planners::Chain;
 struct PlanThrowOptions {
   std::string arm{"panda"}, target, box{"0.15x0.15"}, card, sku, json, report;
   double window{0.1}, drag{0}, gripper{0.15}, gripper_mass{0.9};
-  int draws{1000}, samples{3000};
+  int draws{1000}, samples{3000}, threads{0};
   std::uint64_t seed{1};
   bool planar{false}, plain{false};
 };
@@ -59,6 +59,7 @@ planners::PlanOptions plan_options(const PlanThrowOptions& options, const Chain&
   out.search.window = options.window;
   out.search.medium.drag_k = options.drag;
   out.search.samples = options.samples;
+  out.search.threads = options.threads;
   out.refine = !options.plain;
   if (planar) make_planar(out.search, arm);
   out.home = planners::middle_of(arm);
@@ -229,6 +230,7 @@ Command plan_throw_command(Parser& plan) {
   parser.option("--draws", o->draws, "Landings drawn").range(1, 1000000).with_default();
   parser.option("--seed", o->seed, "Seed of the draws").with_default();
   parser.option("--json", o->json, "Write the plan as JSON");
+  add_threads(parser, o->threads);
   parser.option("--report", o->report, "Directory for trajectory.csv, landings.csv and figures");
   parser.footer(
       "Without a card, the object leaves at a delay that may be anything in the window. With one, it is let "

@@ -19,6 +19,7 @@ namespace el = planners::elastic;
 namespace fs = std::filesystem;
 
 struct PlanWristOptions {
+  int threads{1};
   std::string arm{"vsa_wrist"}, json, report;
   double softest{0.5}, stiffest{64}, longest{1.0}, elevation{45};
   int stiffnesses{8}, starts{4}, intervals{8};
@@ -189,6 +190,7 @@ Command plan_wrist_command(Parser& plan) {
       .with_default();
   parser.option("--seed", o->seed, "Seed of the random starts").with_default();
   parser.option("--json", o->json, "Write the numbers here");
+  add_one_thread(parser, o->threads);
   parser.option("--report", o->report, "Write table and figure into this directory");
   return {&parser, [o] { run(*o); }};
 }

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "contact/convex_quartic.hpp"
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 #include "experiment/synthetic_campaign.hpp"
 #include "fitting/fit.hpp"
 
@@ -81,8 +81,8 @@ int main(int argc, char** argv) {
     design.train_share = 1;
     const auto begin = std::chrono::steady_clock::now();
     std::vector<Outcome> outcomes(static_cast<std::size_t>(campaigns));
-    experiment::parallel_for(outcomes.size(), threads,
-                             [&](std::size_t i) { outcomes[i] = one_campaign(design, first + i); });
+    dynamics::parallel_for(outcomes.size(), threads,
+                           [&](std::size_t i) { outcomes[i] = one_campaign(design, first + i); });
     std::map<std::string, Tally> tallies;
     int failed = 0;
     for (const auto& outcome : outcomes) {

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 #include "planners/flip/session.hpp"
 
 namespace flip_bench {
@@ -118,7 +118,7 @@ class Contest {
     const Watch watch;
     paths_.assign(robots, {learners_.size(), std::vector<LearningPath>(targets_.size())});
     std::vector<char> begun(robots);
-    unhand::experiment::parallel_for(robots, 0, [&](std::size_t k) {
+    unhand::dynamics::parallel_for(robots, 0, [&](std::size_t k) {
       if (watch.minutes() > minutes) return;
       begun[k] = 1;
       work(k + 1, paths_[k]);

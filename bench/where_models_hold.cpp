@@ -12,7 +12,7 @@
 #include "apps/figure.hpp"
 #include "apps/table.hpp"
 #include "bench/reduced_models.hpp"
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 
 namespace {
 
@@ -161,7 +161,7 @@ int main(int argc, char** argv) {
   for (const double inertia : kInertias)
     for (const double opening : kOpenings)
       for (const double lever : kLevers) cells.push_back({lever, opening, inertia, {}});
-  experiment::parallel_for(cells.size(), 0, [&](std::size_t i) { fill(cells[i], rings); });
+  dynamics::parallel_for(cells.size(), 0, [&](std::size_t i) { fill(cells[i], rings); });
 
   apps::Table table{{"model", "within 1 cm and 5 deg", "median error", "90 %", "worst", "worst at lever/a",
                      "opening [ms]", "I/(m a2)"},

@@ -9,7 +9,7 @@
 
 #include "apps/table.hpp"
 #include "bench/reduced_models.hpp"
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 #include "tests/support/random_throw.hpp"
 
 namespace {
@@ -87,7 +87,7 @@ int main(int argc, char** argv) {
   for (const auto& model : kModels) table.header.push_back(model.title);
   for (const World& world : kWorlds) {
     std::vector<Errors> all(count);
-    experiment::parallel_for(count, 0, [&](std::size_t i) { all[i] = errors_of(drawn[i], world, 8); });
+    dynamics::parallel_for(count, 0, [&](std::size_t i) { all[i] = errors_of(drawn[i], world, 8); });
     std::vector<std::string> row{world.title};
     for (std::size_t m = 0; m < kCount; ++m) {
       double x = 0, theta = 0, n = 0;

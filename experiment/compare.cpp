@@ -5,7 +5,7 @@
 #include <cmath>
 #include <map>
 
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 
 namespace unhand::experiment {
 
@@ -100,8 +100,8 @@ ErrorStatistics ModelComparison::of_condition(int quantity, const std::string& c
 
 std::vector<PreparedThrow> prepare_all(const datasets::ThrowLog& log, const std::string& file, int threads) {
   std::vector<std::optional<PreparedThrow>> prepared(log.throws.size());
-  parallel_for(log.throws.size(), threads,
-               [&](std::size_t i) { prepared[i] = prepare(log, log.throws[i], file); });
+  dynamics::parallel_for(log.throws.size(), threads,
+                         [&](std::size_t i) { prepared[i] = prepare(log, log.throws[i], file); });
   std::vector<PreparedThrow> out;
   out.reserve(prepared.size());
   for (auto& p : prepared) out.push_back(std::move(*p));
@@ -137,7 +137,7 @@ Comparison compare(const datasets::ThrowLog& log, const std::vector<PreparedThro
     result.estimate.parameters.naive = options.naive;
     std::vector<Prediction> predictions(prepared.size());
     std::vector<double> seconds(prepared.size());
-    parallel_for(prepared.size(), options.threads, [&](std::size_t i) {
+    dynamics::parallel_for(prepared.size(), options.threads, [&](std::size_t i) {
       const auto begin = std::chrono::steady_clock::now();
       predictions[i] = predict(prepared[i], model, result.estimate.parameters, options.integrator);
       seconds[i] = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

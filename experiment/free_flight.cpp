@@ -9,9 +9,9 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "dynamics/parallel.hpp"
 #include "experiment/flight_samples.hpp"
 #include "experiment/least_squares.hpp"
-#include "experiment/parallel.hpp"
 #include "flight/point_flight.hpp"
 
 namespace unhand::experiment {
@@ -327,7 +327,7 @@ std::vector<FreeFlightComparison> compare_free_flights(const ThrowLog& log,
     const std::size_t n = log.throws.size();
     comparison.each.resize(n);
     std::vector<double> seconds(n);
-    parallel_for(n, threads, [&](std::size_t i) {
+    dynamics::parallel_for(n, threads, [&](std::size_t i) {
       const auto begin = Clock::now();
       comparison.each[i] = free_flight_errors(model, log, log.throws[i]);
       seconds[i] = std::chrono::duration<double>(Clock::now() - begin).count();

@@ -43,16 +43,23 @@ void measure_flight(const datasets::ThrowLog& log, const datasets::Throw& logged
   std::vector<double> drag_x(t.size()), drag_z(t.size()), xs(t.size()), zs(t.size());
   dynamics::Pose<double> pose;
   dynamics::Twist<double> twist;
-  for (int iteration = 0; iteration < (out.drag_k > 0 ? 4 : 1); ++iteration) {
+  constexpr int kMost = 100;         // each takes off a share of about k |v| times the flight's duration
+  constexpr double kSettled = 1e-9;  // [m/s]
+  double change = HUGE_VAL;
+  for (int iteration = 0; iteration < kMost && change > kSettled; ++iteration) {
     for (std::size_t i = 0; i < t.size(); ++i) {
       xs[i] = x[i] - drag_x[i] - 0.5 * out.gravity.x * t[i] * t[i];
       zs[i] = z[i] - drag_z[i] - 0.5 * out.gravity.z * t[i] * t[i];
     }
     const auto lx = dynamics::fit_line(t, xs), lz = dynamics::fit_line(t, zs),
                lt = dynamics::fit_line(t, theta);
+    change = std::hypot(lx.slope - twist.vx, lz.slope - twist.vz);
     pose = {lx.at(0), lz.at(0), lt.at(0)};
     twist = {lx.slope, lz.slope, lt.slope};
-    if (out.drag_k <= 0) break;
+    if (out.drag_k <= 0) {
+      change = 0;
+      break;
+    }
     const flight::FlightProblem<double> with{pose, twist, out.gravity, out.drag_k, out.landing_height,
                                              {},   30};
     const auto poses = flight::fly_through(with, t);
@@ -62,6 +69,7 @@ void measure_flight(const datasets::ThrowLog& log, const datasets::Throw& logged
       drag_z[i] = poses[i].z - free.z;
     }
   }
+  if (!(change <= kSettled)) return;  // a drag that stops the object before the flight ends
   out.measured.detach_pose = pose;
   out.measured.detach_twist = twist;
 }

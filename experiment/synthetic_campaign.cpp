@@ -217,6 +217,7 @@ SyntheticThrow make_throw(const CampaignDesign& design, const std::vector<bool>&
         flight_from(result.detach, problem.gravity, object.drag_k, design.landing_height, setup);
     auto of_com = flight;
     of_com.tracked = {};
+    of_com.landing_height = design.landing_height;  // the true one, whatever a tracker calls it
     const auto landed = flight::fly(of_com, design.integrator), seen = flight::fly(flight, design.integrator);
     for (const auto* flown : {&landed, &seen})
       if (flown->outcome != flight::FlightOutcome::landed)

@@ -11,8 +11,8 @@
 #include "contact/convex_quartic.hpp"
 #include "contact/gripper_delay.hpp"
 #include "dynamics/median.hpp"
+#include "dynamics/parallel.hpp"
 #include "experiment/compare.hpp"
-#include "experiment/parallel.hpp"
 
 namespace unhand::fitting {
 

@@ -8,9 +8,9 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "dynamics/parallel.hpp"
 #include "dynamics/straight_line.hpp"
 #include "experiment/outcome_slopes.hpp"
-#include "experiment/parallel.hpp"
 #include "fitting/before_release.hpp"
 
 namespace unhand::fitting {
@@ -128,7 +128,7 @@ std::vector<PredictedThrow> predict_some(const CampaignProblem& problem, const F
   for (std::size_t k = known.own_spread.size(); k < problem.own().size(); ++k)
     known.own_spread.push_back(problem.own()[k].prior_sigma.value_or(problem.own()[k].scale));
   std::vector<PredictedThrow> out(which.size());
-  experiment::parallel_for(which.size(), options.threads, [&](std::size_t i) {
+  dynamics::parallel_for(which.size(), options.threads, [&](std::size_t i) {
     out[i] = predict_one(problem, problem.throws()[which[i]], known, options.uncertainty);
   });
   return out;

@@ -5,7 +5,7 @@
 #include <map>
 
 #include "dynamics/median.hpp"
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 #include "fitting/misfit.hpp"
 #include "fitting/throw_cost.hpp"
 
@@ -32,7 +32,7 @@ void FitRounds::choose_throws(const std::vector<double>& start) {
   std::vector<Linearisation> starts(throws.size());
   std::vector<char> asked(throws.size());
   const std::vector<double> own(problem_.own().size(), 0.0);
-  experiment::parallel_for(throws.size(), options_.threads, [&](std::size_t i) {
+  dynamics::parallel_for(throws.size(), options_.threads, [&](std::size_t i) {
     const bool shared =
         options_.share == Share::all ||
         (options_.share == Share::train) == (throws[i].prepared.split == datasets::Split::train);

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 #include "fitting/dense_solve.hpp"
 
 namespace unhand::fitting {
@@ -76,7 +76,7 @@ NormalEquations normal_equations(const CampaignProblem& problem, const std::vect
   const auto width = static_cast<Eigen::Index>(problem.campaign().size());
   out.information.setZero(width, width);
   out.throws.resize(used.size());
-  experiment::parallel_for(used.size(), threads, [&](std::size_t i) {
+  dynamics::parallel_for(used.size(), threads, [&](std::size_t i) {
     const CampaignThrow& thrown = problem.throws()[used[i]];
     const std::vector<double>& values = own[i];
     Linearisation l = linearised[i];

@@ -3,7 +3,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 
 namespace unhand::fitting {
 
@@ -25,7 +25,7 @@ const std::vector<Linearisation>& SimulatedThrows::at(const std::vector<double>&
   const auto asked = !derivatives                ? DerivativesBy::nothing
                      : shared_.options.all_fixed ? DerivativesBy::own
                                                  : DerivativesBy::all;
-  experiment::parallel_for(used_.size(), shared_.options.threads, [&](std::size_t i) {
+  dynamics::parallel_for(used_.size(), shared_.options.threads, [&](std::size_t i) {
     const auto begin = Clock::now();
     try {
       last_.throws[i] = shared_.problem.linearise(shared_.problem.throws()[used_[i]], values,

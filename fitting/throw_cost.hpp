@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 #include "fitting/simulated_throws.hpp"
 
 namespace unhand::fitting {
@@ -31,7 +31,7 @@ class AllThrows final : public ceres::EvaluationCallback {
 
   void PrepareForEvaluation(bool jacobians, bool /*new_point*/) override {
     at_ = simulated_.at(x_, own_, jacobians);
-    experiment::parallel_for(used_.size(), shared_.options.threads, [&](std::size_t i) {
+    dynamics::parallel_for(used_.size(), shared_.options.threads, [&](std::size_t i) {
       const CampaignThrow& thrown = shared_.problem.throws()[used_[i]];
       if (at_[i].solved) weigh(at_[i], thrown.observed, thrown, shared_.weighting);
     });

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 #include "fitting/dense_solve.hpp"
 #include "fitting/distributions.hpp"
 #include "fitting/normal_equations.hpp"
@@ -86,7 +86,7 @@ void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threa
   Weighting weighting;
   std::copy(fit.group_weight.begin(), fit.group_weight.end(), weighting.group.begin());
   std::vector<ThrowShare> shares(fit.throws.size());
-  experiment::parallel_for(fit.throws.size(), threads, [&](std::size_t i) {
+  dynamics::parallel_for(fit.throws.size(), threads, [&](std::size_t i) {
     if (fit.throws[i].used) shares[i] = share_of(problem, i, fit, campaign, weighting);
   });
   Equations all = no_equations(width);

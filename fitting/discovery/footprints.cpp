@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 #include "fitting/dense_solve.hpp"
 #include "fitting/discovery/footprint_columns.hpp"
 
@@ -29,7 +29,7 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
   for (std::size_t i = 0; i < fit.throws.size(); ++i)
     if (fit.throws[i].used) used.push_back(i);
   std::vector<Eigen::MatrixXd> grams(used.size());
-  experiment::parallel_for(used.size(), threads, [&](std::size_t n) {
+  dynamics::parallel_for(used.size(), threads, [&](std::size_t n) {
     grams[n] = columns.gram(problem.throws()[used[n]], fit.throws[used[n]].own).products;
   });
   Footprints out;

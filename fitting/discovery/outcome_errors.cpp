@@ -5,7 +5,7 @@
 #include <map>
 #include <string>
 
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 #include "fitting/evaluate.hpp"
 
 namespace unhand::fitting {
@@ -108,7 +108,7 @@ std::vector<PredictedOutcome> predicted_outcomes(const CampaignProblem& problem,
                            .try_emplace(problem.throws()[which[k]].prepared.experiment(),
                                         static_cast<int>(conditions.size()))
                            .first->second;
-  experiment::parallel_for(which.size(), threads, [&](std::size_t k) {
+  dynamics::parallel_for(which.size(), threads, [&](std::size_t k) {
     std::copy(std::begin(predicted[k].comparison.error), std::end(predicted[k].comparison.error),
               out[k].error.begin());
     follow_flight(problem, problem.throws()[which[k]], campaign, predicted[k], out[k]);

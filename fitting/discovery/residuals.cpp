@@ -6,7 +6,7 @@
 #include <map>
 #include <string>
 
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 
 namespace unhand::fitting {
 
@@ -25,7 +25,7 @@ double normal_force(const CampaignThrow& thrown, double t) {
 std::vector<Eigen::VectorXd> residuals_of(const CampaignProblem& problem, const FitResult& fit, int threads) {
   const auto& throws = problem.throws();
   std::vector<Eigen::VectorXd> out(throws.size());
-  experiment::parallel_for(throws.size(), threads, [&](std::size_t i) {
+  dynamics::parallel_for(throws.size(), threads, [&](std::size_t i) {
     if (!fit.throws[i].used) return;
     auto l = problem.linearise(throws[i], fit.values(), fit.throws[i].own, DerivativesBy::nothing);
     if (l.solved) out[i] = std::move(l.residual);

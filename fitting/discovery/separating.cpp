@@ -9,7 +9,7 @@
 #include <map>
 #include <optional>
 
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 #include "fitting/discovery/footprint_columns.hpp"
 
 namespace unhand::fitting {
@@ -179,7 +179,7 @@ std::vector<SeparatingExperiment> separating_experiments(const Stage& stage, con
   const FootprintColumns columns = columns_of(stage, other);
   if (columns.candidates().empty()) return out;
   std::vector<Trial> trials = trials_of(stage);
-  experiment::parallel_for(trials.size(), options.fit.threads, [&](std::size_t k) {
+  dynamics::parallel_for(trials.size(), options.fit.threads, [&](std::size_t k) {
     try {
       auto gram = columns.gram(trials[k].thrown, trials[k].own);
       if (gram.complete) trials[k].gram = std::move(gram.products);

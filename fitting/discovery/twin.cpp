@@ -7,7 +7,7 @@
 #include <limits>
 #include <optional>
 
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 #include "experiment/random_stream.hpp"
 #include "experiment/sample_window.hpp"
 

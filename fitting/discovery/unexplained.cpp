@@ -7,7 +7,7 @@
 #include <limits>
 #include <map>
 
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/traces.hpp"
 #include "fitting/distributions.hpp"
@@ -128,7 +128,7 @@ std::optional<MissingEstimate> estimate_missing(const Stage& stage, Phase phase,
   const auto predicted = predict_some(problem, stage.fit, held_out, {false, options.fit.threads});
   constexpr int kTried = 3;
   std::vector<std::array<OutcomeSquares, kTried>> squares(held_out.size());
-  experiment::parallel_for(held_out.size(), options.fit.threads, [&](std::size_t k) {
+  dynamics::parallel_for(held_out.size(), options.fit.threads, [&](std::size_t k) {
     const CampaignThrow& thrown = problem.throws()[held_out[k]];
     const auto l = problem.linearise(thrown, stage.fit.values(), predicted[k].own, DerivativesBy::nothing);
     if (!l.solved) return;

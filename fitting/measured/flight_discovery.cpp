@@ -8,8 +8,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "dynamics/parallel.hpp"
 #include "experiment/free_flight.hpp"
-#include "experiment/parallel.hpp"
 #include "experiment/tracked_flight.hpp"
 
 namespace unhand::fitting {
@@ -61,7 +61,7 @@ FlightProblem::FlightProblem(const ThrowLog& log, int threads) : gravity_(log.gr
   covariates_.push_back("order");
   const auto splits = splits_of(log);
   std::vector<experiment::FreeFlightFit> starts(log.throws.size());
-  experiment::parallel_for(starts.size(), threads, [&](std::size_t i) {
+  dynamics::parallel_for(starts.size(), threads, [&](std::size_t i) {
     starts[i] = experiment::fit_free_flight(log, log.throws[i], 1.0);
   });
   // Where no sigma is declared: the scatter from sample to sample, of all flights of an object together.
@@ -204,7 +204,7 @@ FlightErrors flight_errors(const FlightProblem& problem, const GroupedFit& fit, 
     bool solved{}, oriented{};
   };
   std::vector<One> each(used.size());
-  experiment::parallel_for(used.size(), threads, [&](std::size_t k) {
+  dynamics::parallel_for(used.size(), threads, [&](std::size_t k) {
     const std::size_t i = used[k];
     const auto& group = problem.groups()[i];
     One& one = each[k];

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 #include "fitting/dense_solve.hpp"
 
 namespace unhand::fitting {
@@ -69,7 +69,7 @@ GroupedFootprints grouped_footprints(const GroupedProblem& problem, const Groupe
   for (std::size_t i = 0; i < fit.groups.size(); ++i)
     if (fit.groups[i].used && fit.groups[i].solved) used.push_back(i);
   out.parts.assign(used.size(), MatrixXd());
-  experiment::parallel_for(used.size(), options.threads, [&](std::size_t n) {
+  dynamics::parallel_for(used.size(), options.threads, [&](std::size_t n) {
     const std::size_t i = used[n];
     MatrixXd columns = MatrixXd::Zero(static_cast<Index>(problem.groups()[i].rows.size()), w);
     bool solved = true;

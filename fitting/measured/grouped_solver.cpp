@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 #include "fitting/dense_solve.hpp"
 #include "fitting/measured/grouped_weights.hpp"
 
@@ -119,7 +119,7 @@ class Solver {
   void linearise() {
     parts_.assign(used_.size(), {});
     const std::vector<double> values(fit_.values.data(), fit_.values.data() + fit_.values.size());
-    experiment::parallel_for(used_.size(), options_.threads, [&](std::size_t n) {
+    dynamics::parallel_for(used_.size(), options_.threads, [&](std::size_t n) {
       GroupFit& g = fit_.groups[used_[n]];
       const Group& group = problem_.groups()[used_[n]];
       Part& part = parts_[n];
@@ -160,7 +160,7 @@ class Solver {
   double try_step(const std::vector<VectorXd>& own, const VectorXd& shared_change, double factor) {
     std::vector<double> costs(used_.size(), 0.0);
     const std::vector<double> values(fit_.values.data(), fit_.values.data() + fit_.values.size());
-    experiment::parallel_for(used_.size(), options_.threads, [&](std::size_t n) {
+    dynamics::parallel_for(used_.size(), options_.threads, [&](std::size_t n) {
       if (!parts_[n].solved) return;
       GroupFit& g = fit_.groups[used_[n]];
       const Group& group = problem_.groups()[used_[n]];

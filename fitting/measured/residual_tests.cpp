@@ -7,7 +7,7 @@
 #include <limits>
 #include <map>
 
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 
 namespace unhand::fitting {
 
@@ -122,7 +122,7 @@ LeavesNoise leaves_noise(const GroupedProblem& problem, const GroupedFit& fit, d
   for (const double share : kShares) {
     const double until = share * longest;
     std::vector<std::vector<double>> ratios(used.size());  // χ² per degree of freedom by channel, or NaN
-    experiment::parallel_for(used.size(), threads, [&](std::size_t k) {
+    dynamics::parallel_for(used.size(), threads, [&](std::size_t k) {
       const auto& group = problem.groups()[used[k]];
       std::vector<double> n(channels), chi2(channels);
       double rows = 0;

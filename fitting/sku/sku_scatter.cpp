@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 #include "experiment/random_stream.hpp"
 #include "fitting/dense_solve.hpp"
 
@@ -151,7 +151,7 @@ std::pair<double, double> moments(const std::vector<LandingSample>& samples, dou
 void monte_carlo(const SkuMotion& motion, const MatrixXd& J, const SkuRequest& request, SkuValidation& out) {
   const MatrixXd root = root_of(motion.inputs.covariance);
   std::vector<Draw> draws(static_cast<std::size_t>(request.samples));
-  experiment::parallel_for(draws.size(), request.threads, [&](std::size_t i) {
+  dynamics::parallel_for(draws.size(), request.threads, [&](std::size_t i) {
     draws[i] = draw(motion, out.reference(), J, root, request, i);
   });
   const auto n = static_cast<double>(draws.size());

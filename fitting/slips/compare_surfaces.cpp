@@ -10,7 +10,7 @@
 #include <stdexcept>
 
 #include "dynamics/median.hpp"
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 
 namespace unhand::fitting {
 namespace {
@@ -103,14 +103,14 @@ std::vector<std::vector<SurfaceScore>> compare_surfaces(const std::vector<SlipSa
     throw std::invalid_argument(fmt::format("null_draws: {} is not >= 0", options.null_draws));
   const std::size_t draws = static_cast<std::size_t>(options.null_draws), rounds = 1 + draws;
   std::vector<SurfaceFit> nulls(draws > 0 ? surfaces.size() : 0);
-  experiment::parallel_for(nulls.size(), options.threads, [&](std::size_t i) {
+  dynamics::parallel_for(nulls.size(), options.threads, [&](std::size_t i) {
     nulls[i] = fit_surface(surfaces[i], SurfaceModel::ellipsoid);
   });
 
   // One job: a model on a surface's data, measured (round 0) or simulated.
   std::vector<SurfaceFit> fits(surfaces.size() * models.size());
   std::vector<SlipCrossValidation> results(fits.size() * rounds);
-  experiment::parallel_for(results.size(), options.threads, [&](std::size_t job) {
+  dynamics::parallel_for(results.size(), options.threads, [&](std::size_t job) {
     const std::size_t pair = job / rounds, round = job % rounds, i = pair / models.size();
     const SurfaceModel model = models[pair % models.size()];
     if (round == 0) fits[pair] = fit_surface(surfaces[i], model);

@@ -6,6 +6,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "dynamics/parallel.hpp"
 #include "planners/arm/kinematics.hpp"
 
 namespace unhand::planners {
@@ -171,23 +172,27 @@ std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box,
     for (const auto& fixed : options.fixed) q[fixed.joint] = fixed.angle;
     if (options.face_target) q[0] = within(chain.joints[0].limits, azimuth);
   };
-  std::vector<NominalThrow> found;
   const EvenPoints points(n);
-  for (int k = 0; k < options.samples; ++k) {
+  std::vector<std::optional<NominalThrow>> at(static_cast<std::size_t>(options.samples));
+  dynamics::parallel_for(at.size(), options.threads, [&](std::size_t k) {
     JointVector<double> q(n);
     for (int i = 0; i < n; ++i) {
       const JointLimits& l = chain.joints[i].limits;
       const double lower = std::max(l.lower, -std::numbers::pi), upper = std::min(l.upper, std::numbers::pi);
-      q[i] = lower + (0.05 + 0.9 * points.at(k, i)) * (upper - lower);
+      q[i] = lower + (0.05 + 0.9 * points.at(static_cast<int>(k), i)) * (upper - lower);
     }
     hold(q);
-    if (auto one = search.best_at(q)) found.push_back(std::move(*one));
-  }
+    at[k] = search.best_at(q);
+  });
+  std::vector<NominalThrow> found;
+  for (auto& one : at)
+    if (one) found.push_back(std::move(*one));
   const auto better = [](const NominalThrow& a, const NominalThrow& b) { return a.margin > b.margin; };
   const auto kept = std::min(found.size(), static_cast<std::size_t>(std::max(options.candidates, 0)));
   std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(kept), found.end(), better);
   found.resize(kept);
-  for (std::size_t j = 0; j < std::min(found.size(), static_cast<std::size_t>(options.refined)); ++j) {
+  const auto refined = std::min(found.size(), static_cast<std::size_t>(options.refined));
+  dynamics::parallel_for(refined, options.threads, [&](std::size_t j) {
     double size = 0.15;  // rad, halved where it does not help
     for (int k = 0; k < 60; ++k) {
       JointVector<double> q = found[j].state.q;
@@ -200,7 +205,7 @@ std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box,
       else if (k % 6 == 5)
         size *= 0.7;
     }
-  }
+  });
   std::sort(found.begin(), found.end(), better);
   return found;
 }

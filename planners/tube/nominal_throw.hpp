@@ -40,6 +40,7 @@ struct NominalOptions {
   };
   std::vector<Fixed> fixed;  ///< joints that do not move
   bool face_target{false};   ///< whether the first joint turns to the target
+  int threads{0};            ///< 0: one per core; the answer does not depend on it
 };
 
 /// A throw, and what it leaves free: 1 − the largest use of a joint's velocity; the room that the joints have

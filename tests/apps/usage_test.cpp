@@ -35,12 +35,8 @@ TEST_F(Cli, HelpHasAnExampleEverywhere) {
     commands.insert(commands.end(), inner.begin(), inner.end());
     if (!inner.empty()) continue;  // the examples are theirs
     EXPECT_THAT(answer.out, HasSubstr("Example")) << command;
-    if (command != "figure") {  // its numbers are the data that it draws
-      EXPECT_THAT(answer.out, HasSubstr("--json")) << command;
-    }
-    if (!command.starts_with("plan ")) {  // most planners have nothing to share among threads
-      EXPECT_THAT(answer.out, HasSubstr("--threads")) << command;
-    }
+    EXPECT_THAT(answer.out, HasSubstr("--json")) << command;
+    EXPECT_THAT(answer.out, HasSubstr("--threads")) << command;
   }
   EXPECT_GE(commands.size(), 16u) << "with the planners";
 }

@@ -8,7 +8,7 @@
 #include <functional>
 #include <numbers>
 
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 #include "tests/support/perfect_campaign.hpp"
 
 namespace {
@@ -49,8 +49,9 @@ TEST(CampaignEffects, AnyNumberOfThreadsMakesTheSameLog) {
   design.effects = {{"release.hand_tracking_lag.tau", 0.003}, {"flight.quadratic_drag.k", 0.05}};
   const auto make = [&](int threads) {
     std::vector<datasets::Throw> out(12);
-    parallel_for(out.size(), threads,
-                 [&](std::size_t i) { out[i] = generate_throw(design, 5, 4 * static_cast<int>(i)).record; });
+    dynamics::parallel_for(out.size(), threads, [&](std::size_t i) {
+      out[i] = generate_throw(design, 5, 4 * static_cast<int>(i)).record;
+    });
     for (auto& one : out)  // lost samples are NaN, which is unequal to itself
       for (double& x : one.mocap->pose.data)
         if (std::isnan(x)) x = 0;

@@ -56,7 +56,7 @@ struct PerfectThrow {
 };
 
 TEST(PreparedThrow, TheStateAtDetachIsTheTrueOne) {
-  for (const double drag : {0.0, 0.05})
+  for (const double drag : {0.0, 0.05, 0.3})
     for (const int index : {0, 5, testing_support::kThrow}) {
       const PerfectThrow one(index, drag);
       const auto measured = one.prepared().measured;

@@ -1,12 +1,12 @@
 // The loop over independent items: each once, whatever the number of threads, and an exception comes out.
-#include "experiment/parallel.hpp"
+#include "dynamics/parallel.hpp"
 
 #include <gtest/gtest.h>
 
 #include <numeric>
 #include <stdexcept>
 
-namespace unhand::experiment {
+namespace unhand::dynamics {
 namespace {
 
 TEST(ParallelFor, EveryItemOnceForAnyNumberOfThreads) {
@@ -37,4 +37,4 @@ TEST(ParallelFor, TheFirstExceptionComesOutAfterAllThreadsHaveStopped) {
 }
 
 }  // namespace
-}  // namespace unhand::experiment
+}  // namespace unhand::dynamics

@@ -1,13 +1,14 @@
 // A loop over independent items on several threads.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <exception>
 #include <mutex>
 #include <thread>
 #include <vector>
 
-namespace unhand::experiment {
+namespace unhand::dynamics {
 
 /// Calls work(i) for i = 0 … n − 1 on `threads` threads (0: one per core). Each item writes its own result,
 /// so the outcome does not depend on the number of threads. The first exception is rethrown after all threads
@@ -41,4 +42,4 @@ void parallel_for(std::size_t n, int threads, Work&& work) {
   if (first) std::rethrow_exception(first);
 }
 
-}  // namespace unhand::experiment
+}  // namespace unhand::dynamics
