@@ -150,9 +150,13 @@ Table lack_table(const Discovery& found) {
   for (const auto& lack : found.before_train.lacks) table.header.push_back(to_string(lack.outcome));
   const auto row = [&](const char* name, const OutcomeErrors& e) {
     table.rows.push_back({name});
-    for (const auto& [outcome, fit, resolution] : e.lacks)
-      table.rows.back().push_back(
-          fit.repetitions > 0 ? fmt::format("{:.2f} (p {:.1g})", std::sqrt(fit.ratio()), fit.p_value) : "-");
+    for (const auto& column : found.before_train.lacks) {
+      std::string cell = "-";
+      for (const auto& [outcome, fit, resolution] : e.lacks)
+        if (outcome == column.outcome && fit.repetitions > 0)
+          cell = fmt::format("{:.2f} (p {:.1g})", std::sqrt(fit.ratio()), fit.p_value);
+      table.rows.back().push_back(cell);
+    }
   };
   row("before, train", found.before_train);
   row("before, test", found.before_test);

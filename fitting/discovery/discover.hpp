@@ -88,7 +88,7 @@ struct OutcomeErrors {
   std::optional<double> trajectory_rms;     ///< of the position in flight [m]
   std::optional<double>
       chi2_per_dof;  ///< with the throws' own unknowns fitted, where observations outnumber them
-  std::vector<OutcomeLack> lacks;  ///< of every outcome
+  std::vector<OutcomeLack> lacks;  ///< of every outcome that was measured
 };
 
 /// A parameter of an accepted effect.

@@ -51,9 +51,9 @@ void follow_flight(const CampaignProblem& problem, const CampaignThrow& thrown,
 class ByCondition {
  public:
   explicit ByCondition(const std::vector<PredictedOutcome>& throws) : throws_(throws) {}
-  /// `read` gives a throw's error, or nothing.
+  /// `read` gives a throw's error, or nothing. Adds to `out` what at least one throw says.
   template <class Read>
-  OutcomeLack operator()(Outcome outcome, const Read& read) const {
+  void operator()(Outcome outcome, const Read& read, std::vector<OutcomeLack>& out) const {
     std::vector<std::array<double, 2>> error;
     std::vector<int> condition;
     double variance = 0;
@@ -62,8 +62,9 @@ class ByCondition {
         error.push_back(*e), condition.push_back(thrown.condition);
         variance += thrown.variance[static_cast<std::size_t>(outcome)];
       }
-    const double n = std::max(1.0, static_cast<double>(error.size()));
-    return {outcome, lack_of_fit(error, condition), std::sqrt(variance / n)};
+    if (error.empty()) return;
+    const auto n = static_cast<double>(error.size());
+    out.push_back({outcome, lack_of_fit(error, condition), std::sqrt(variance / n)});
   }
 
  private:
@@ -85,9 +86,12 @@ std::vector<OutcomeLack> lacks(const std::vector<PredictedOutcome>& throws) {
   const auto turned = [](const PredictedOutcome& t) {
     return t.flight ? Error{{(*t.flight)[2], 0}} : Error{};
   };
-  return {of(Outcome::position, flight), of(Outcome::orientation, turned),
-          of(Outcome::landing_x, landing(kLandingX, 1)),
-          of(Outcome::landing_theta, landing(kLandingTheta, 1 / experiment::kDegrees))};
+  std::vector<OutcomeLack> out;
+  of(Outcome::position, flight, out);
+  of(Outcome::orientation, turned, out);
+  of(Outcome::landing_x, landing(kLandingX, 1), out);
+  of(Outcome::landing_theta, landing(kLandingTheta, 1 / experiment::kDegrees), out);
+  return out;
 }
 
 }  // namespace
