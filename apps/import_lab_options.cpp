@@ -28,7 +28,7 @@ void add_lab_options(Parser& parser, LabOptions& options) {
       "[s] When the gripper is told to open, on the robot's clock");
   add(fresh, "--condition", options.condition,
       "What these throws repeat; else the file's name without its number");
-  add(fresh, "--test-every", options.test_every, "Hold out every so-manieth throw of each condition; 0: none")
+  add(fresh, "--test-every", options.test_every, "Hold out every Nth throw of each condition; 0: none")
       .with_default();
   add(fresh, "--test-conditions", options.test_conditions, "Hold out these conditions as a whole")
       .with_commas();
