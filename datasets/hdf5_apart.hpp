@@ -8,9 +8,10 @@
 // What is assumed of the moment of the fork: no other thread is inside HDF5 (a Session is held, and a
 // program's own use of HDF5 beside ours is an error already, as Debian's library is not thread-safe). Other
 // threads may run: the child allocates memory, which glibc allows it, and otherwise uses nothing but HDF5,
-// formatting and its own pipe. It ends by _exit, so that nothing of the parent's is flushed or destroyed
-// twice, and its standard output and error lead nowhere (libhdf5 prints its cache's contents to stdout on
-// some damaged files).
+// formatting and its own pipe. AddressSanitizer's allocator, as of GCC 12, does not allow it: a child forked
+// while another thread holds its lock waits until `silence_seconds` are over. The child ends by _exit, so
+// that nothing of the parent's is flushed or destroyed twice, and its standard output and error lead nowhere
+// (libhdf5 prints its cache's contents to stdout on some damaged files).
 #pragma once
 
 #include <cstddef>
