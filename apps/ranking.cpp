@@ -18,22 +18,24 @@ Json ranking_json(std::span<const fitting::Ranked> ranking) {
                    {"chi2_gain", number(r.gain)},
                    {"step", r.step},
                    {"visible", r.visible},
-                   {"refitted", r.refitted},
-                   {"delta_bic", r.refitted ? number(r.delta_bic) : Json(nullptr)},
+                   {"refitted", r.refit_step.has_value()},
+                   {"refit_step", r.refit_step ? Json(*r.refit_step) : Json(nullptr)},
+                   {"delta_bic", r.refit_step ? number(r.delta_bic) : Json(nullptr)},
                    {"held_out_gain", r.held_out_gain ? number(*r.held_out_gain) : Json(nullptr)}});
   return out;
 }
 
 Table ranking_table(std::span<const fitting::Ranked> ranking) {
   Table table{{"candidate", "chi2 gain", "in step", "p", "correlation with the best", "refitted: BIC",
-               "held-out fall"},
+               "in step", "held-out fall"},
               {},
               1};
   for (const auto& r : ranking)
     table.rows.push_back({r.id, r.visible ? fmt::format("{:.4g}", std::max(0.0, r.gain)) : "no footprint",
                           std::to_string(r.step), fmt::format("{:.2g}", r.p_value),
                           fmt::format("{:.3f}", r.correlation_with_best),
-                          r.refitted ? fmt::format("{:+.1f}", r.delta_bic) : "",
+                          r.refit_step ? fmt::format("{:+.1f}", r.delta_bic) : "",
+                          r.refit_step ? std::to_string(*r.refit_step) : "",
                           r.held_out_gain ? fmt::format("{:.3g}", *r.held_out_gain) : ""});
   return table;
 }

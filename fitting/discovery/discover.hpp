@@ -141,8 +141,9 @@ struct Ranked {
   double correlation_with_best{};  ///< of the footprints
   bool visible{true};              ///< something of its footprint is left beside the fitted unknowns
   int step{1};                     ///< of the search, that the gain is of: 1 is beside the base model
-  bool refitted{false};            ///< it was fitted in full
-  double delta_bic{};              ///< negative: for the effect; of the refit
+  std::optional<int>
+      refit_step{};    ///< of the search, in which it was last fitted in full; may be a later one
+  double delta_bic{};  ///< of that refit; negative: for the effect
   /// Largest fall of the held-out χ² per sample in a channel and phase; of refits with evidence on the train
   /// throws.
   std::optional<double> held_out_gain{};

@@ -66,7 +66,7 @@ class ForwardStep {
   std::optional<Stage> run() {
     if (all_.empty()) return std::nullopt;
     if (out_.ranking.empty()) out_.silent = silent_ids(f_);
-    rank(out_.ranking, 1 + static_cast<int>(out_.effects.size()), f_, all_);
+    rank(out_.ranking, this_step(), f_, all_);
     std::sort(all_.begin(), all_.end(), [](const Score& a, const Score& b) { return a.gain > b.gain; });
     for (const Score& score : all_)
       if (static_cast<int>(tried_.size()) < options_.refits && score.gain >= kImitation * all_.front().gain)
@@ -87,6 +87,7 @@ class ForwardStep {
  private:
   using WithCriterion = std::vector<std::pair<const Score*, double>>;  // Bayes' criterion of the refit
 
+  int this_step() const { return 1 + static_cast<int>(out_.effects.size()); }
   const std::string& id_of(const Score& score) const { return f_.candidates[score.candidate].id; }
   double between_footprints(const Score& a, const Score& b) const {
     return between(f_, f_.candidates[a.candidate], a.step, f_.candidates[b.candidate]);
@@ -110,7 +111,7 @@ class ForwardStep {
     trial.delta_bic = trial.next.bic() - stage_.bic();
     const bool law = is_law(candidate.id);
     Ranked& ranked = named(out_.ranking, candidate.id);
-    ranked.refitted = true;
+    ranked.refit_step = this_step();
     ranked.delta_bic = trial.delta_bic;
     ranked.held_out_gain.reset();
     trial.p_value = law ? 0 : wald_p_value(trial.next.fit, find_effect(candidate.id));

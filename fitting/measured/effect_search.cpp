@@ -193,7 +193,7 @@ class Search {
       Ranked& r = entry_of(out_.ranking, c.id);
       if (one.gain > r.gain) {
         r.gain = one.gain, r.p_value = one.p, r.visible = true;
-        r.step = 1 + static_cast<int>(out_.effects.size());
+        r.step = this_step();
       }
       out.push_back(std::move(one));
     }
@@ -263,7 +263,7 @@ class Search {
       const Eigen::Map<const VectorXd> step(s.step.data(), static_cast<Index>(s.step.size()));
       auto trial = try_effect(problem_, out_.final, out_.final_test, c, step, *effect, options_.fit);
       Ranked& r = entry_of(out_.ranking, c.id);
-      r.refitted = true, r.delta_bic = trial.delta_bic, r.held_out_gain = trial.held.fall();
+      r.refit_step = this_step(), r.delta_bic = trial.delta_bic, r.held_out_gain = trial.held.fall();
       if (!trial.fit.solved || !(trial.p < level) || shape_is_open(trial.fit, c.id)) continue;
       if (trial.held.share > options_.matters) out.push_back(std::move(trial));
     }
@@ -291,6 +291,7 @@ class Search {
     while (static_cast<int>(out_.effects.size()) < options_.most_effects && forward(options_.refits)) {
     }
   }
+  int this_step() const { return 1 + static_cast<int>(out_.effects.size()); }
   std::size_t order_of(const std::string& id) const {
     for (std::size_t k = 0; k < catalogue_.size(); ++k)
       if (catalogue_[k].id == id) return k;

@@ -170,7 +170,7 @@ SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
   for (std::size_t k = 1; k < models.size(); ++k) {
     const double gain = base_errors[k] - errors[k];
     Ranked r{id_of(models[k]), std::max(0.0, pooled[k].t() * pooled[k].t())};
-    r.p_value = pooled[k].p(), r.refitted = true, r.held_out_gain = gain;
+    r.p_value = pooled[k].p(), r.refit_step = 1, r.held_out_gain = gain;
     r.delta_bic = std::log(std::max(2.0, pooled[k].n)) - pooled[k].t() * std::abs(pooled[k].t());
     answer.ranking.push_back(r);
     const bool convinces =

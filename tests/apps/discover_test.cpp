@@ -63,7 +63,12 @@ TEST_F(Cli, DiscoverFindsTheDragThatIsThere) {
   ASSERT_NE(named, ranking.end());
   EXPECT_LT((*named)["score_p_value"].get<double>(), 1e-6);
   EXPECT_NEAR((*named)["footprint_correlation_with_best"].get<double>(), 1, 1e-9) << "it is the best";
-  for (const json& one : ranking) EXPECT_TRUE(one.contains("footprint_correlation_with_best")) << one;
+  EXPECT_EQ((*named)["refit_step"], 1);
+  for (const json& one : ranking) {
+    EXPECT_TRUE(one.contains("footprint_correlation_with_best")) << one;
+    EXPECT_EQ(one["refitted"].get<bool>(), one["delta_bic"].is_number()) << one;
+    EXPECT_EQ(one["refitted"].get<bool>(), one["refit_step"].is_number()) << one;
+  }
 }
 
 TEST_F(Cli, DiscoverFindsNothingInACalmLog) {
