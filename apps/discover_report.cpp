@@ -98,7 +98,7 @@ Figure missing_figure(const fitting::MissingEstimate& missing) {
         if (component == 0)
           key.push_back({fmt::format("with linespoints pointtype {} linecolor rgb '{}'", 6 + colour % 4,
                                      kColour[colour % 4]),
-                         plain(object)});
+                         object});
         ++colour;
       }
     script += "\n";
@@ -207,34 +207,26 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
                                                   to_string(found.first.phase),
                                                   to_string(found.first.channel), found.first.chi2_per_sample)
                                             : "No channel leaves the noise in any phase.";
-  write_text(
-      directory / "index.html",
-      fmt::format(
-          "<!DOCTYPE html><html lang=en><meta charset=utf-8><title>What the model lacks: {0}</title>\n"
-          "<style>body{{font:15px/1.45 sans-serif;max-width:60em;margin:2em auto;padding:0 1em}}"
-          "table{{border-collapse:collapse;margin:1em 0;font-size:13px}}td,th{{padding:.15em .7em;"
-          "border-bottom:1px solid "
-          "#ddd;text-align:left}}td.n{{text-align:right;font-variant-numeric:tabular-nums}}"
-          "img{{max-width:100%}}code{{background:#f3f3f3;padding:.1em .3em}}</style>\n"
-          "<h1>What the model lacks: {0}</h1>\n<p>Base model <code>{1}</code>. Verdict: <b>{2}</b>.</p>\n"
-          "<h2>Where it starts</h2><p>{3}</p>\n{4}<h2>The answer</h2>\n{5}<h2>Errors before and after</h2>\n"
-          "<p>Predicted from what is known before the throw, minus measured; chi2/dof with the throws' own "
-          "unknowns fitted. Test throws took no part in any fit. Below, the rms of these errors over what "
-          "repetitions of a condition scatter by about their mean: above 1.4 most of the error goes with the "
-          "condition, and a better model would take it away.</p>{6}"
-          "<h2>Candidates</h2><p>From the footprint of each: the derivative of every predicted sample, with "
-          "the "
-          "model's own unknowns projected out.</p>{7}{8}"
-          "<h2>Misfit by phase and channel</h2><p>chi2 per sample; 1 is the declared noise.</p>{9}"
-          "<h2>Structure of the residual</h2><p>Of the train throws: size, autocorrelation, and what it goes "
-          "with "
-          "(share of its mean square).</p>{12}<h2>Again</h2><p><code>{10}</code><br>log checksum "
-          "<code>{11}</code></p></html>\n",
-          escaped(std::filesystem::path(log).filename().string()),
-          escaped(json.at("base_model").get<std::string>()), to_string(found.verdict), first,
-          picture("residual"), answer, html(error_table(found)) + html(lack_table(found)), picture("ranking"),
-          html(ranking_table(found.ranking)), html(misfit_table(found)), escaped(command),
-          json.value("log_checksum", "unknown"), html(structure_table(found))));
+  const std::string body = fmt::format(
+      "<p>Base model <code>{}</code>. Verdict: <b>{}</b>.</p>\n<h2>Where it starts</h2><p>{}</p>\n{}"
+      "<h2>The answer</h2>\n{}<h2>Errors before and after</h2>\n"
+      "<p>Predicted from what is known before the throw, minus measured; chi2/dof with the throws' own "
+      "unknowns fitted. Test throws took no part in any fit. Below, the rms of these errors over what "
+      "repetitions of a condition scatter by about their mean: above 1.4 most of the error goes with the "
+      "condition, and a better model would take it away.</p>{}{}"
+      "<h2>Candidates</h2><p>From the footprint of each: the derivative of every predicted sample, with the "
+      "model's own unknowns projected out.</p>{}{}"
+      "<h2>Misfit by phase and channel</h2><p>chi2 per sample; 1 is the declared noise.</p>{}"
+      "<h2>Structure of the residual</h2><p>Of the train throws: size, autocorrelation, and what it goes "
+      "with "
+      "(share of its mean square).</p>{}<h2>Again</h2><p><code>{}</code><br>log checksum "
+      "<code>{}</code></p>",
+      escaped(json.at("base_model").get<std::string>()), to_string(found.verdict), first, picture("residual"),
+      answer, html(error_table(found)), html(lack_table(found)), picture("ranking"),
+      html(ranking_table(found.ranking)), html(misfit_table(found)), html(structure_table(found)),
+      escaped(command), json.value("log_checksum", "unknown"));
+  const std::string name = std::filesystem::path(log).filename().string();
+  write_text(directory / "index.html", html_page("What the model lacks: " + name, body));
   write_text(directory / "discovery.json", json_text(json));
 }
 

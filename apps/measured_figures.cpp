@@ -76,18 +76,18 @@ Figure surface_figure(const MeasuredResult& result) {
         fmt::format("with points pointtype {} pointsize 0.8 linecolor rgb '{}'", 4 + 2 * k, colours[k % 4]);
     plots += fmt::format("{}DATA index {} using 1:2 {}, DATA index {} using 3:2 {}", k ? ", " : "", k, filled,
                          k, open);
-    key.push_back({filled, plain(laws[k])});
-    key.push_back({open, plain(laws[k]) + ", null control"});
+    key.push_back({filled, laws[k]});
+    key.push_back({open, laws[k] + ", null control"});
   }
   const double count = static_cast<double>(surfaces.size());
   figure.height += key_height(key.size(), 2);
   figure.script = "set multiplot\nset key off\n" +
-                  place(figure, {6.2, 16.5, 2.2 + key_height(key.size(), 2), figure.height - 0.4}) +
+                  place(figure, {7.4, 16.5, 2.2 + key_height(key.size(), 2), figure.height - 0.4}) +
                   fmt::format(
                       "set xrange [0:{:.4g}]\nset yrange [{:.1f}:-0.5]\nset ytics ({})\nset grid xtics ytics "
                       "linecolor rgb '#e0e0e0'\n"
-                      "set xlabel 'mean angle between predicted and measured sliding [deg], slips not seen "
-                      "by the fit'\nplot {}\n",
+                      "set xlabel 'mean angle between predicted and "
+                      "measured sliding [deg]'\nplot {}\n",
                       1.08 * largest, count - 0.5, tics, plots) +
                   key_strip(figure, key, 2) + "unset multiplot\n";
   return figure;

@@ -65,7 +65,7 @@ Figure ranking_figure(std::span<const fitting::Ranked> ranking,
   figure.height = 2 + 0.55 * std::max(1, position);
   figure.data.push_back(block);
   figure.script = fmt::format(
-      "set key off\nset lmargin 32\nset logscale x\nset format x '10^{{%T}}'\nset xrange [1:{:.4g}]\n"
+      "set key off\nset lmargin 38\nset logscale x\nset format x '10^{{%T}}'\nset xrange [1:{:.4g}]\n"
       "set yrange [{}:-1]\nset ytics ({})\nset xlabel 'chi^2 that the effect would take away, to first "
       "order'\n"
       "set style fill solid 0.9\n"

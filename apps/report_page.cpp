@@ -54,7 +54,7 @@ std::string html_page(const std::string& title, const std::string& body) {
       "<style>body{{font:15px/1.45 sans-serif;max-width:60em;margin:2em auto;padding:0 1em}}"
       "table{{border-collapse:collapse;margin:1em 0;font-size:13px}}td,th{{padding:.15em .7em;"
       "border-bottom:1px solid "
-      "#ddd;text-align:left}}td.n{{text-align:right;font-variant-numeric:tabular-nums}}"
+      "#ddd;text-align:left}}td.n{{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}}"
       "img{{max-width:100%}}code{{background:#f3f3f3;padding:.1em .3em}}</style>\n<h1>{0}</h1>\n{1}</html>\n",
       escaped(title), body);
 }
