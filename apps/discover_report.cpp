@@ -66,6 +66,22 @@ Figure residual_figure(const Discovery& found) {
   return figure;
 }
 
+Figure footprints_of(const Discovery& found) {
+  std::vector<std::string> channels;
+  const auto curves = [&](const std::string& name, const std::vector<fitting::ResidualBin>& bins) {
+    NamedCurves out{name, {}};
+    for (const auto& bin : bins)
+      out.channels[std::string(to_string(bin.channel))].push_back({bin.time, bin.rms, bin.mean, bin.n});
+    return out;
+  };
+  std::vector<NamedCurves> all{curves("residual of the base model", found.residual_before)};
+  for (const auto& bin : found.residual_before)
+    if (const std::string name(to_string(bin.channel)); channels.empty() || channels.back() != name)
+      channels.push_back(name);
+  for (const auto& footprint : found.footprints) all.push_back(curves(footprint.id, footprint.bins));
+  return footprint_figure(channels, all, "time from release [s]");
+}
+
 /// What is missing, component by component; a curve for every object.
 Figure missing_figure(const fitting::MissingEstimate& missing) {
   const bool flight = missing.phase == fitting::Phase::flight;
@@ -188,6 +204,7 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
   const Figure residual = residual_figure(found), ranking = ranking_figure(found.ranking, found.effects);
   draw(residual, directory);
   draw(ranking, directory);
+  draw(footprints_of(found), directory);
   const bool estimated = found.unexplained && found.unexplained->missing;
   if (estimated) draw(missing_figure(*found.unexplained->missing), directory);
   const auto picture = [&](const std::string& name) {
@@ -215,7 +232,7 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
       "repetitions of a condition scatter by about their mean: above 1.4 most of the error goes with the "
       "condition, and a better model would take it away.</p>{}{}"
       "<h2>Candidates</h2><p>From the footprint of each: the derivative of every predicted sample, with the "
-      "model's own unknowns projected out.</p>{}{}"
+      "model's own unknowns projected out.</p>{}{}<p>{}</p>{}"
       "<h2>Misfit by phase and channel</h2><p>chi2 per sample; 1 is the declared noise.</p>{}"
       "<h2>Structure of the residual</h2><p>Of the train throws: size, autocorrelation, and what it goes "
       "with "
@@ -223,8 +240,8 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
       "<code>{}</code></p>",
       escaped(json.at("base_model").get<std::string>()), to_string(found.verdict), first, picture("residual"),
       answer, html(error_table(found)), html(lack_table(found)), picture("ranking"),
-      html(ranking_table(found.ranking)), html(misfit_table(found)), html(structure_table(found)),
-      escaped(command), json.value("log_checksum", "unknown"));
+      html(ranking_table(found.ranking)), kFootprints, picture("footprints"), html(misfit_table(found)),
+      html(structure_table(found)), escaped(command), json.value("log_checksum", "unknown"));
   const std::string name = std::filesystem::path(log).filename().string();
   write_text(directory / "index.html", html_page("What the model lacks: " + name, body));
   write_text(directory / "discovery.json", json_text(json));

@@ -85,6 +85,21 @@ std::string first_text(const MeasuredDiscovery& found) {
   return fmt::format("The residual leaves the noise in {} (phase {}).", found.first.channel, found.phase);
 }
 
+Figure footprints_of(const MeasuredDiscovery& found) {
+  std::vector<std::string> channels;
+  const auto curves = [&](const std::string& name, const std::vector<fitting::ResidualProfile>& profile) {
+    NamedCurves out{name, {}};
+    for (const auto& bin : profile)
+      out.channels[bin.channel].push_back({bin.share, bin.rms, bin.mean, bin.n});
+    return out;
+  };
+  std::vector<NamedCurves> all{curves("residual of the base model", found.profile_before)};
+  for (const auto& bin : found.profile_before)
+    if (channels.empty() || channels.back() != bin.channel) channels.push_back(bin.channel);
+  for (const auto& footprint : found.footprints) all.push_back(curves(footprint.id, footprint.profile));
+  return footprint_figure(channels, all, "share of the duration");
+}
+
 }  // namespace
 
 std::string measured_text(const MeasuredResult& result) {
@@ -142,6 +157,11 @@ void write_measured_report(const MeasuredResult& result, const Json& json,
   body += "<h2>Errors before and after</h2>\n" + html(error_table(found));
   if (slips) body += "<h2>By surface</h2>\n" + html(surface_table(result));
   body += "<h2>Candidates</h2>\n" + picture(ranking) + html(ranking_table(found.ranking));
+  if (!slips) {
+    const Figure footprints = footprints_of(found);
+    draw(footprints, directory);
+    body += fmt::format("<p>{}</p>\n", kFootprints) + picture(footprints);
+  }
   if (!found.stability.empty())
     body +=
         "<h2>Does the answer depend on where one looks?</h2><p>The same parameters from halves of the train "

@@ -1,6 +1,7 @@
 // What every discovery reports, of throws and of measured logs: the candidates, accepted effects, residuals.
 #pragma once
 
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -40,6 +41,24 @@ struct ResidualPoint {
   double x{}, rms{}, mean{};
   int samples{};
 };
+
+/// Points by channel, under one name.
+struct NamedCurves {
+  std::string name;
+  std::map<std::string, std::vector<ResidualPoint>> channels;
+};
+
+/// What candidates would do to the samples (all but the first of `curves`), beside what the base model leaves
+/// of them (the first): rms over `x`, a panel for each channel.
+Figure footprint_figure(const std::vector<std::string>& channels, const std::vector<NamedCurves>& curves,
+                        const std::string& x);
+
+/// What the figure shows.
+inline constexpr const char* kFootprints =
+    "What the leading candidates would do to the samples, each at the size that takes most off chi2 (to "
+    "first "
+    "order) and with all that is fitted anyway making up for what it can; grey: what the base model leaves. "
+    "What is missing should look like that, in every channel.";
 
 /// Marks of a logarithmic axis of residuals from 0.5 to `top` that do not overlap, for gnuplot.
 std::string residual_tics(double top);

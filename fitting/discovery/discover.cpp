@@ -38,6 +38,19 @@ std::vector<std::string> all_laws() {
   return out;
 }
 
+std::vector<std::string> leading_names(std::span<const AcceptedEffect> effects,
+                                       std::span<const Ranked> ranking) {
+  constexpr std::size_t kShown = 4;
+  std::vector<std::string> out;
+  const auto add = [&](const std::string& id) {
+    if (out.size() < kShown && std::find(out.begin(), out.end(), id) == out.end()) out.push_back(id);
+  };
+  for (const AcceptedEffect& effect : effects) add(effect.id);
+  for (const Ranked& ranked : ranking)
+    if (ranked.visible) add(ranked.id);
+  return out;
+}
+
 void AcceptedEffect::add_other_name(const std::string& other, double correlation) {
   for (auto& [name, known] : equivalent)
     if (name == other) {
@@ -134,6 +147,8 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
       effect.separating.insert(effect.separating.end(), experiments.begin(), experiments.end());
     }
 
+  out.footprints =
+      footprint_traces(base.problem, base.fit, leading_names(out.effects, out.ranking), options.fit);
   const bool unchanged = out.effects.empty() && out.along.empty();
   const auto residuals_after = unchanged ? residuals_before : residuals_of(stage.problem, stage.fit, threads);
   out.residual_after = residual_over_time(stage.problem, stage.fit, residuals_after);

@@ -4,9 +4,11 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "fitting/discovery/footprint_traces.hpp"
 #include "fitting/discovery/lack_of_fit.hpp"
 #include "fitting/discovery/missing_force.hpp"
 #include "fitting/discovery/residuals.hpp"
@@ -149,6 +151,10 @@ struct Ranked {
   std::optional<double> held_out_gain{};
 };
 
+/// The effects that were found, then what else would take most away: a few that a figure can show.
+std::vector<std::string> leading_names(std::span<const AcceptedEffect> effects,
+                                       std::span<const Ranked> ranking);
+
 /// How a prediction may use what is estimated to be missing.
 enum class Correction {
   withheld,    ///< none: it does not lower the held-out error, or by no share that counts (kCorrects)
@@ -210,6 +216,7 @@ struct Discovery {
   std::vector<ChannelMisfit> base_test, final_test;          ///< misfit on held-out throws
   std::string model;                                         ///< of the answer (contact.law changes it)
   std::vector<ResidualBin> residual_before, residual_after;  ///< of the train throws
+  std::vector<FootprintTrace> footprints;  ///< beside the base model: the answer's, and others that lead
   std::vector<ChannelStructure> structure_before, structure_after;  ///< of the train throws
   std::shared_ptr<const CampaignProblem> problem;                   ///< of the answer
   double seconds{};                                                 ///< of the whole loop

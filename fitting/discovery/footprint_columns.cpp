@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "fitting/dense_solve.hpp"
 #include "fitting/normal_equations.hpp"
@@ -127,30 +128,63 @@ std::vector<double> FootprintColumns::Difference::own_of(const CampaignProblem& 
   return out;
 }
 
-FootprintColumns::Gram FootprintColumns::gram(const CampaignThrow& thrown,
-                                              const std::vector<double>& own) const {
-  Gram out{Eigen::MatrixXd::Zero(width(), width()), false, false};
-  Eigen::MatrixXd columns, own_columns;
+Eigen::VectorXd FootprintColumns::weights_of(const CampaignThrow& thrown, const Linearisation& l) const {
+  Eigen::VectorXd out = Eigen::VectorXd::Ones(l.residual.size());
+  if (!sample_limit_) return out;
+  for (Eigen::Index j = 0; j < out.size(); ++j) {
+    const auto& o = thrown.observed.all[static_cast<std::size_t>(j)];
+    const double group = fit_.group_weight[group_of(part_of(o, thrown, l.detach), o.channel)],
+                 size = group * std::abs(l.residual[j]);
+    out[j] = group * (size > *sample_limit_ ? std::sqrt(*sample_limit_ / size) : 1);
+  }
+  return out;
+}
+
+FootprintColumns::Columns FootprintColumns::columns_of(const CampaignThrow& thrown,
+                                                       const std::vector<double>& own) const {
+  Columns out;
   for (const Derivatives& d : derivatives_) {
     const auto l = d.problem.linearise(thrown, d.at, own, DerivativesBy::all);
     if (!l.solved) return out;
     if (&d == &derivatives_.front()) {
-      columns.setZero(l.residual.size(), width());
-      columns.col(residual()) = l.residual;
-      own_columns = l.own;
+      out.all.setZero(l.residual.size(), width());
+      out.all.col(residual()) = l.residual;
+      out.own = l.own;
+      out.weight = weights_of(thrown, l);
     }
     for (const auto& [k, column] : d.columns)
-      columns.col(static_cast<Eigen::Index>(column)) = l.campaign.col(static_cast<Eigen::Index>(k));
+      out.all.col(static_cast<Eigen::Index>(column)) = l.campaign.col(static_cast<Eigen::Index>(k));
   }
   out.solved = out.complete = true;
   for (const Difference& d : differences_) {
     const auto l = d.problem.linearise(thrown, d.at, d.own_of(problem_, own), DerivativesBy::nothing);
     out.complete = out.complete && l.solved;
     if (l.solved)
-      columns.col(static_cast<Eigen::Index>(d.column)) = (l.residual - columns.col(residual())) / d.step;
+      out.all.col(static_cast<Eigen::Index>(d.column)) = (l.residual - out.all.col(residual())) / d.step;
   }
-  out.products = eliminated(throw_gram(own_columns, columns, own, fit_.own_spread), own_columns.cols());
+  out.all = out.weight.asDiagonal() * out.all;
+  out.own = out.weight.asDiagonal() * out.own;
   return out;
+}
+
+FootprintColumns::Gram FootprintColumns::gram(const CampaignThrow& thrown,
+                                              const std::vector<double>& own) const {
+  const Columns columns = columns_of(thrown, own);
+  if (!columns.solved) return {Eigen::MatrixXd::Zero(width(), width()), false, false};
+  const auto products = throw_gram(columns.own, columns.all, own, fit_.own_spread);
+  return {eliminated(products, columns.own.cols()), true, columns.complete};
+}
+
+Eigen::MatrixXd FootprintColumns::combined(const CampaignThrow& thrown, const std::vector<double>& own,
+                                           const Eigen::MatrixXd& coefficients) const {
+  const Columns columns = columns_of(thrown, own);
+  if (!columns.solved) return {};
+  Eigen::MatrixXd out = product(columns.all, coefficients), H = inner_products(columns.own, columns.own);
+  for (Eigen::Index k = 0; k < H.rows(); ++k)
+    H(k, k) +=
+        1 / (fit_.own_spread[static_cast<std::size_t>(k)] * fit_.own_spread[static_cast<std::size_t>(k)]);
+  out -= product(columns.own, definite_solve(H, inner_products(columns.own, out)));
+  return columns.weight.cwiseInverse().asDiagonal() * out;
 }
 
 }  // namespace unhand::fitting

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,6 +12,11 @@
 
 namespace unhand::fitting {
 
+class FootprintColumns;
+/// Of the candidates that it has, over the throws of the fit.
+Footprints footprints(const FootprintColumns& columns, const CampaignProblem& problem, const FitResult& fit,
+                      int threads);
+
 /// Columns of whitened observations, each per unit of its parameter: first the derivatives by the model's
 /// unknowns, then those of the candidates, last the residual. Where an effect has no derivative on both sides
 /// of neutral, and for a law, the column is a difference of two simulations.
@@ -18,6 +24,12 @@ class FootprintColumns {
  public:
   /// Both are kept by the caller as long as this is used.
   FootprintColumns(const CampaignProblem& problem, const FitResult& fit);
+
+  /// From now on samples and throws count for as much as they did in the fit, Huber's loss with this limit
+  /// included: what is left of a footprint is then what such a fit would leave of the effect.
+  void weigh_as_fitted(double sample_limit) { sample_limit_ = sample_limit; }
+  /// What a throw of the fit counts for.
+  double weight_of(std::size_t thrown) const { return sample_limit_ ? fit_.throws[thrown].weight : 1; }
 
   /// One candidate for every effect that the problem does not have: at each value of its shape parameters'
   /// grid, and a one-sided one at three sizes. To be called once.
@@ -39,7 +51,19 @@ class FootprintColumns {
   };
   Gram gram(const CampaignThrow& thrown, const std::vector<double>& own) const;
 
+  /// Combinations of the columns (a column of `coefficients` each) sample by sample, with the throw's own
+  /// unknowns projected out; empty where the model cannot simulate it.
+  Eigen::MatrixXd combined(const CampaignThrow& thrown, const std::vector<double>& own,
+                           const Eigen::MatrixXd& coefficients) const;
+
  private:
+  struct Columns {
+    Eigen::MatrixXd all, own;  ///< weighted; zero where a candidate cannot simulate the throw
+    Eigen::VectorXd weight;    ///< factor on each row
+    bool solved{}, complete{};
+  };
+  Eigen::VectorXd weights_of(const CampaignThrow& thrown, const Linearisation& l) const;
+  Columns columns_of(const CampaignThrow& thrown, const std::vector<double>& own) const;
   using Shape = std::map<std::string, double>;  // parameter → value
   struct Derivatives {
     CampaignProblem problem;
@@ -62,7 +86,8 @@ class FootprintColumns {
 
   const CampaignProblem& problem_;
   const FitResult& fit_;
-  std::size_t fitted_, width_;  // without the residual
+  std::optional<double> sample_limit_;  ///< none: all samples count the same
+  std::size_t fitted_, width_;          // without the residual
   std::vector<Candidate> candidates_;
   std::vector<Derivatives> derivatives_;  // the first: of the model and of all effects without shapes
   std::vector<Difference> differences_;

@@ -18,13 +18,8 @@ std::vector<double> carried(const FitResult& from, const CampaignProblem& to) {
   return out;
 }
 
-Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
-                      const std::vector<std::string>& ids, const std::vector<std::string>& laws,
+Footprints footprints(const FootprintColumns& columns, const CampaignProblem& problem, const FitResult& fit,
                       int threads) {
-  FootprintColumns columns(problem, fit);
-  columns.add_effects(ids);
-  for (const auto& law : laws)
-    if (law != problem.options().model) columns.add_law(law);
   std::vector<std::size_t> used;
   for (std::size_t i = 0; i < fit.throws.size(); ++i)
     if (fit.throws[i].used) used.push_back(i);
@@ -36,10 +31,20 @@ Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
   out.candidates = columns.candidates();
   out.fitted = columns.fitted();
   out.gram = Eigen::MatrixXd::Zero(columns.width(), columns.width());
-  for (const auto& gram : grams) out.gram += gram;
+  for (std::size_t n = 0; n < used.size(); ++n) out.gram += columns.weight_of(used[n]) * grams[n];
   for (const std::size_t i : used)
     out.samples += static_cast<double>(problem.throws()[i].observed.all.size());
   return out;
+}
+
+Footprints footprints(const CampaignProblem& problem, const FitResult& fit,
+                      const std::vector<std::string>& ids, const std::vector<std::string>& laws,
+                      int threads) {
+  FootprintColumns columns(problem, fit);
+  columns.add_effects(ids);
+  for (const auto& law : laws)
+    if (law != problem.options().model) columns.add_law(law);
+  return footprints(columns, problem, fit, threads);
 }
 
 std::vector<std::string> silent_ids(const Footprints& f) {
@@ -59,18 +64,22 @@ std::vector<std::string> silent_ids(const Footprints& f) {
 
 namespace {
 
+/// R⁻¹ B in units in which R's diagonal is one; a small prior keeps what R does not determine.
+Eigen::MatrixXd solved_by(Eigen::MatrixXd R, const Eigen::MatrixXd& B) {
+  const Eigen::VectorXd unit = R.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  R = unit.asDiagonal() * R * unit.asDiagonal();
+  R.diagonal().array() += 1e-12;
+  return unit.asDiagonal() * definite_solve(R, unit.asDiagonal() * B);
+}
+
 /// The Gram matrix of `kept` columns after `removed` ones are projected out; a column that keeps less than
 /// 1e-6 of its norm is set to zero.
 Eigen::MatrixXd project(const Eigen::MatrixXd& gram, const std::vector<Eigen::Index>& removed,
                         const std::vector<Eigen::Index>& kept) {
   Eigen::MatrixXd G = gram(kept, kept);
   if (!removed.empty()) {
-    Eigen::MatrixXd R = gram(removed, removed);
-    const Eigen::VectorXd unit = R.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-    R = unit.asDiagonal() * R * unit.asDiagonal();
-    R.diagonal().array() += 1e-12;
-    const Eigen::MatrixXd cross = unit.asDiagonal() * Eigen::MatrixXd(gram(removed, kept));
-    G -= inner_products(cross, definite_solve(R, cross));
+    const Eigen::MatrixXd cross = gram(removed, kept);
+    G -= inner_products(cross, solved_by(gram(removed, removed), cross));
   }
   for (Eigen::Index k = 0; k < G.rows(); ++k)
     if (!(G(k, k) > 1e-6 * gram(kept[static_cast<std::size_t>(k)], kept[static_cast<std::size_t>(k)]))) {
@@ -126,6 +135,16 @@ double cosine(const Eigen::MatrixXd& gram, const std::vector<Eigen::Index>& remo
 }
 
 }  // namespace
+
+Eigen::VectorXd left_of(const Footprints& f, const Score& score) {
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(f.gram.rows());
+  const auto& columns = f.candidates[score.candidate].columns;
+  for (std::size_t k = 0; k < columns.size(); ++k) out[static_cast<Eigen::Index>(columns[k])] = score.step[k];
+  const auto fitted = static_cast<Eigen::Index>(f.fitted);
+  if (fitted > 0)
+    out.head(fitted) = -solved_by(f.gram.topLeftCorner(fitted, fitted), product(f.gram.topRows(fitted), out));
+  return out;
+}
 
 Eigen::VectorXd contribution_of(const FitResult& fit, const dynamics::Effect& effect) {
   Eigen::VectorXd out = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(fit.campaign.size()));

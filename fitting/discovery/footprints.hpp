@@ -66,6 +66,10 @@ struct Score {
 /// One per candidate, in their order.
 std::vector<Score> scores(const Footprints& footprints);
 
+/// Coefficients of the columns (the residual's is zero) that make up what is left of a candidate, at a
+/// score's sizes, when the fitted unknowns have made up for what they can.
+Eigen::VectorXd left_of(const Footprints& footprints, const Score& score);
+
 /// What an effect of the fitted model does: how far its size parameters are from neutral, per unknown of the
 /// campaign; zero for all others.
 Eigen::VectorXd contribution_of(const FitResult& fit, const dynamics::Effect& effect);

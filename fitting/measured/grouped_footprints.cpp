@@ -5,6 +5,7 @@
 
 #include "dynamics/parallel.hpp"
 #include "fitting/dense_solve.hpp"
+#include "fitting/measured/grouped_weights.hpp"
 
 namespace unhand::fitting {
 
@@ -88,6 +89,47 @@ GroupedFootprints grouped_footprints(const GroupedProblem& problem, const Groupe
   f.gram = MatrixXd::Zero(w, w);
   for (const auto& part : out.parts) f.gram += part;
   f.samples = static_cast<double>(fit.samples);
+  return out;
+}
+
+std::vector<FootprintProfile> footprint_profiles(const GroupedProblem& problem, const GroupedFit& fit,
+                                                 const std::vector<dynamics::Effect>& effects,
+                                                 const GroupedFitOptions& options) {
+  const Footprints f = grouped_footprints(problem, fit, effects, options).total;
+  const auto all = scores(f);
+  const auto objects = objects_of(problem);
+  std::vector<FootprintProfile> out;
+  for (const auto& effect : effects) {
+    const Score* best = nullptr;  // of the values of its shape parameter
+    for (const Score& score : all)
+      if (f.candidates[score.candidate].id == effect.id && score.gain > (best ? best->gain : 0))
+        best = &score;
+    if (!best) continue;
+    const Candidate& candidate = f.candidates[best->candidate];
+    const VectorXd left = left_of(f, *best);
+    Call call{fit.names(), {fit.values.data(), fit.values.data() + fit.values.size()}, {}};
+    std::vector<double> change(left.data(), left.data() + f.fitted);
+    std::size_t column = 0;
+    for (const auto& p : shared_parameters(effect, objects)) {
+      call.names.push_back(p.name);
+      call.values.push_back(p.shape ? candidate.shape.at(p.name) : p.neutral);
+      change.push_back(p.shape ? 0 : left[static_cast<Index>(candidate.columns[column++])]);
+    }
+    const Eigen::Map<const VectorXd> by(change.data(), static_cast<Index>(change.size()));
+    GroupedFit shown = fit;
+    dynamics::parallel_for(fit.groups.size(), options.threads, [&](std::size_t i) {
+      GroupFit& group = shown.groups[i];
+      if (!group.used || !group.solved) return;
+      const auto e = problem.equations(i, call.names, call.values, group.own, true);
+      group.solved = e.solved;
+      if (!e.solved) return;
+      auto weighed = e;
+      weigh_rows(weighed, problem.groups()[i], fit.weights, options.sample_limit);
+      const VectorXd own = least_squares(weighed.own, -product(weighed.shared, by));
+      group.residual = product(e.shared, by) + product(e.own, own);
+    });
+    out.push_back({effect.id, residual_profile(problem, shown)});
+  }
   return out;
 }
 

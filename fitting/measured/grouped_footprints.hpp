@@ -3,6 +3,7 @@
 
 #include "fitting/discovery/footprints.hpp"
 #include "fitting/measured/grouped_fit.hpp"
+#include "fitting/measured/residual_tests.hpp"
 
 namespace unhand::fitting {
 
@@ -17,6 +18,12 @@ struct GroupedFootprints {
 GroupedFootprints grouped_footprints(const GroupedProblem& problem, const GroupedFit& fit,
                                      const std::vector<dynamics::Effect>& effects,
                                      const GroupedFitOptions& options);
+
+/// At the solution of `fit`, of those of `effects` that some channel shows: what each does to the rows at the
+/// size that takes most off χ² (to first order), where all that is fitted anyway has made up for what it can.
+std::vector<FootprintProfile> footprint_profiles(const GroupedProblem& problem, const GroupedFit& fit,
+                                                 const std::vector<dynamics::Effect>& effects,
+                                                 const GroupedFitOptions& options);
 
 /// One linear step of `columns` over the groups `which`, in units of the scatter between groups.
 struct LinearStep {

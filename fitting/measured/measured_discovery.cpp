@@ -7,6 +7,7 @@
 
 #include "dynamics/median.hpp"
 #include "fitting/distributions.hpp"
+#include "fitting/measured/grouped_footprints.hpp"
 
 namespace unhand::fitting {
 namespace {
@@ -106,6 +107,11 @@ EffectSearch run_search(const GroupedProblem& problem, const MeasuredOptions& op
   out.autocorrelation_after = autocorrelation(problem, search.final_test);
   out.profile_before = residual_profile(problem, search.base);
   out.profile_after = residual_profile(problem, search.final);
+  std::vector<dynamics::Effect> leading;
+  for (const auto& id : leading_names(out.effects, out.ranking))
+    for (auto& effect : problem.effects())
+      if (effect.id == id) leading.push_back(std::move(effect));
+  out.footprints = footprint_profiles(problem, search.base, leading, options.search.fit);
   look_for_the_unexplained(problem, search.final_test, options, out);
   out.verdict = !out.effects.empty() ? Verdict::effect_found
                 : out.unexplained    ? Verdict::unexplained

@@ -60,8 +60,9 @@ struct MeasuredDiscovery {
   std::vector<MeasuredMisfit> misfit;                                          ///< by channel
   std::vector<Autocorrelation> autocorrelation_before, autocorrelation_after;  ///< held-out groups
   std::vector<ResidualProfile> profile_before, profile_after;                  ///< train groups
-  std::vector<Stability> stability;  ///< of the accepted parameters over halves of the groups
-  std::vector<Evidence> evidence;    ///< what else speaks for or against
+  std::vector<FootprintProfile> footprints;  ///< beside the base model: the answer's, and others that lead
+  std::vector<Stability> stability;          ///< of the accepted parameters over halves of the groups
+  std::vector<Evidence> evidence;            ///< what else speaks for or against
   std::vector<std::pair<std::string, std::string>>
       separating;  ///< effect, what would tell it from its equivalents
   std::vector<std::pair<std::string, std::string>> skipped;  ///< groups, with the reason

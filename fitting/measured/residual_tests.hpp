@@ -27,6 +27,12 @@ struct ResidualProfile {
 std::vector<ResidualProfile> residual_profile(const GroupedProblem& problem, const GroupedFit& fit,
                                               int bins = 20);
 
+/// The same of what an effect would do to the samples.
+struct FootprintProfile {
+  std::string id;                        ///< of the effect
+  std::vector<ResidualProfile> profile;  ///< as residual_profile has it
+};
+
 /// The shortest time from the start of the groups over which the model is told from one that is right: own
 /// unknowns are fitted to the samples up to there, and χ² per degree of freedom of some channel exceeds
 /// `limit` and one by three standard errors (from the scatter between groups).

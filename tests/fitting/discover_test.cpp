@@ -29,6 +29,21 @@ const AcceptedEffect* named(const Discovery& found, const std::string& id) {
   return nullptr;
 }
 
+/// How far a footprint is from the base model's residual: the mean of |log(rms / rms)| over the bins that are
+/// ten times above the noise and more, where noise plays no part.
+double unlike_the_residual(const Discovery& found, const FootprintTrace& footprint) {
+  double sum = 0, n = 0;
+  EXPECT_EQ(footprint.bins.size(), found.residual_before.size());
+  for (std::size_t k = 0; k < footprint.bins.size(); ++k) {
+    const ResidualBin &left = found.residual_before[k], &would = footprint.bins[k];
+    EXPECT_EQ(would.channel, left.channel);
+    EXPECT_EQ(would.time, left.time);
+    if (left.rms > 10) sum += std::abs(std::log(std::max(would.rms, 1e-3) / left.rms)), n += 1;
+  }
+  EXPECT_GT(n, 20);
+  return sum / n;
+}
+
 TEST(Discovery, NothingIsFoundWhereNothingIsMissing) {
   const Discovery found = found_in(support::loop_campaign({}));
   EXPECT_EQ(found.verdict, Verdict::no_missing_effect);
@@ -47,6 +62,17 @@ TEST(Discovery, DragIsFoundWithItsSize) {
   for (const auto& p : found.effects.front().parameters)
     EXPECT_NEAR(p.value, kDrag, std::max(4 * p.sigma, 1e-4)) << p.name;
   EXPECT_LT(found.after_test.trajectory_rms.value(), 0.5 * found.before_test.trajectory_rms.value());
+
+  // What is missing has the residual's shape at every time; what imitates it has not.
+  ASSERT_EQ(found.footprints.size(), 4u);
+  EXPECT_EQ(found.footprints.front().id, "flight.quadratic_drag");
+  for (const FootprintTrace& footprint : found.footprints) {
+    const double off = unlike_the_residual(found, footprint);
+    if (&footprint == &found.footprints.front())
+      EXPECT_LT(off, 0.05);
+    else
+      EXPECT_GT(off, 0.5) << footprint.id;
+  }
 }
 
 TEST(Discovery, AClockThatIsLateIsFoundAlreadyInTheGrasp) {

@@ -71,6 +71,20 @@ TEST_P(EveryFlightEffect, IsFoundWithItsSize) {
   EXPECT_LE(found.effects.size(), GetParam().expected.size()) << "no more than is there";
   EXPECT_FALSE(found.unexplained.has_value()) << found.unexplained->description;
   EXPECT_TRUE(found.first.any);
+  if (found.effects.size() > 1) return;
+  // Alone, an effect's footprint and the noise make up the residual in every channel, all the way.
+  ASSERT_FALSE(found.footprints.empty());
+  EXPECT_EQ(found.footprints.front().id, found.effects.front().id);
+  const auto& would = found.footprints.front().profile;
+  ASSERT_EQ(would.size(), found.profile_before.size());
+  double off = 0, noise_alone = 0;
+  for (std::size_t k = 0; k < would.size(); ++k) {
+    const double left = found.profile_before[k].rms;
+    off += std::abs(std::log(std::hypot(1.0, would[k].rms) / left)) / static_cast<double>(would.size());
+    noise_alone += std::abs(std::log(left)) / static_cast<double>(would.size());
+  }
+  EXPECT_LT(off, 0.1);
+  EXPECT_GT(noise_alone, 2 * off);
 }
 
 std::vector<Case> cases() {
