@@ -197,14 +197,18 @@ Table misfit_table(const Discovery& found) {
   return table;
 }
 
+/// In the place of figures over time.
+constexpr const char* kLandingsAlone = "<p>Landings alone were measured: nothing to draw over time.</p>\n";
+
 }  // namespace
 
 void write_discovery_report(const Discovery& found, const std::string& log, const std::string& command,
                             const Json& json, const std::filesystem::path& directory) {
   const Figure residual = residual_figure(found), ranking = ranking_figure(found.ranking, found.effects);
-  draw(residual, directory);
+  const bool over_time = !found.residual_before.empty();
+  if (over_time) draw(residual, directory);
   draw(ranking, directory);
-  draw(footprints_of(found), directory);
+  if (over_time) draw(footprints_of(found), directory);
   const bool estimated = found.unexplained && found.unexplained->missing;
   if (estimated) draw(missing_figure(*found.unexplained->missing), directory);
   const auto picture = [&](const std::string& name) {
@@ -232,16 +236,17 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
       "repetitions of a condition scatter by about their mean: above 1.4 most of the error goes with the "
       "condition, and a better model would take it away.</p>{}{}"
       "<h2>Candidates</h2><p>From the footprint of each: the derivative of every predicted sample, with the "
-      "model's own unknowns projected out.</p>{}{}<p>{}</p>{}"
+      "model's own unknowns projected out.</p>{}{}{}"
       "<h2>Misfit by phase and channel</h2><p>chi2 per sample; 1 is the declared noise.</p>{}"
       "<h2>Structure of the residual</h2><p>Of the train throws: size, autocorrelation, and what it goes "
-      "with "
-      "(share of its mean square).</p>{}<h2>Again</h2><p><code>{}</code><br>log checksum "
+      "with (share of its mean square).</p>{}<h2>Again</h2><p><code>{}</code><br>log checksum "
       "<code>{}</code></p>",
-      escaped(json.at("base_model").get<std::string>()), to_string(found.verdict), first, picture("residual"),
-      answer, html(error_table(found)), html(lack_table(found)), picture("ranking"),
-      html(ranking_table(found.ranking)), kFootprints, picture("footprints"), html(misfit_table(found)),
-      html(structure_table(found)), escaped(command), json.value("log_checksum", "unknown"));
+      escaped(json.at("base_model").get<std::string>()), to_string(found.verdict), first,
+      over_time ? picture("residual") : kLandingsAlone, answer, html(error_table(found)),
+      html(lack_table(found)), picture("ranking"), html(ranking_table(found.ranking)),
+      over_time ? fmt::format("<p>{}</p>", kFootprints) + picture("footprints") : "",
+      html(misfit_table(found)), html(structure_table(found)), escaped(command),
+      json.value("log_checksum", "unknown"));
   const std::string name = std::filesystem::path(log).filename().string();
   write_text(directory / "index.html", html_page("What the model lacks: " + name, body));
   write_text(directory / "discovery.json", json_text(json));

@@ -18,10 +18,25 @@ void expect_promised_keys(const json& found) {
         EXPECT_TRUE(found["error"][when][split][error].is_number()) << when << split << error;
 }
 
+/// The page of a report holds all that it shows, and says what it is of.
+void expect_whole_page(const fs::path& report, const std::vector<std::string>& figures,
+                       const std::string& checksum) {
+  const std::string page = content(report / "index.html");
+  EXPECT_EQ(page.find("http"), std::string::npos) << "something from elsewhere";
+  std::size_t pictures = 0;
+  for (std::size_t at = 0; (at = page.find("src=", at)) != std::string::npos; ++at, ++pictures)
+    EXPECT_EQ(page.compare(at, 27, "src=\"data:image/png;base64,"), 0) << page.substr(at, 40);
+  EXPECT_EQ(pictures, figures.size());
+  for (const auto& name : figures)
+    for (const char* ending : {".png", ".pdf", ".dat"})
+      EXPECT_GT(fs::file_size(report / (name + ending)), 0u) << name << ending;
+  EXPECT_THAT(page, HasSubstr(checksum));
+}
+
 TEST_F(Cli, DiscoverFindsTheDragThatIsThere) {
   constexpr double kDrag = 0.3;  // 1/m: a tenth of a throw of a metre and a half
   ASSERT_EQ(run("generate quick12 --seed 3 --effect flight.quadratic_drag=0.3 --out windy.h5").code, 0);
-  const Answer answer = run("discover windy.h5 --json d.json");
+  const Answer answer = run("discover windy.h5 --json d.json --report r --card c.json");
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.out, HasSubstr("windy.h5: effect_found"));
   const json found = read_json(folder / "d.json");
@@ -69,12 +84,36 @@ TEST_F(Cli, DiscoverFindsTheDragThatIsThere) {
     EXPECT_EQ(one["refitted"].get<bool>(), one["delta_bic"].is_number()) << one;
     EXPECT_EQ(one["refitted"].get<bool>(), one["refit_step"].is_number()) << one;
   }
+
+  expect_whole_page(folder / "r", {"residual", "ranking", "footprints"}, found["log_checksum"]);
+  EXPECT_EQ(read_json(folder / "r/discovery.json"), found);
+  const std::string page = content(folder / "r/index.html"), traces = content(folder / "r/footprints.dat");
+  EXPECT_THAT(page, HasSubstr("<h3>flight.quadratic_drag</h3>"));
+  EXPECT_THAT(page, HasSubstr("unhand discover windy.h5"));
+  EXPECT_THAT(traces, HasSubstr("mocap.x residual of the base model"));
+  EXPECT_THAT(traces, HasSubstr("mocap.x flight.quadratic_drag"));
+
+  // The card holds the drag: with it, what the other models miss by centimetres is predicted.
+  ASSERT_EQ(
+      run("compare windy.h5 --models limit_surface,limit_surface_disc --card c.json --json e.json").code, 0);
+  const json models = read_json(folder / "e.json")["models"];
+  EXPECT_LT(models["limit_surface_disc"]["test"]["landing_x_m"]["mae"].get<double>(), 0.005);
+  EXPECT_GT(models["limit_surface"]["test"]["landing_x_m"]["mae"].get<double>(), 0.03);
+}
+
+TEST_F(Cli, DiscoverReportsOnFlights) {
+  const Answer answer = run("discover " + flights + " --model projectile --json d.json --report r");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json found = read_json(folder / "d.json");
+  expect_whole_page(folder / "r", {"residual", "ranking", "footprints"}, found["log_checksum"]);
+  EXPECT_EQ(read_json(folder / "r/discovery.json"), found);
 }
 
 TEST_F(Cli, DiscoverFindsNothingInACalmLog) {
-  const Answer answer = run("discover " + quick + " --json d.json");
+  const Answer answer = run("discover " + quick + " --json d.json --report r");
   ASSERT_EQ(answer.code, 0) << answer.err;
   const json found = read_json(folder / "d.json");
+  expect_whole_page(folder / "r", {"residual", "ranking", "footprints"}, found["log_checksum"]);
   expect_promised_keys(found);
   EXPECT_EQ(found["verdict"], "no_missing_effect");
   EXPECT_TRUE(found["effects"].empty());
