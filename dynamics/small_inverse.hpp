@@ -27,60 +27,67 @@ class SmallInverse {
   }
 
   /// An entry of A⁻¹.
-  double operator()(int row, int column) const { return column_[column][row]; }
+  double operator()(int row, int column) const { return column_[column][row / 2][row % 2]; }
 
   /// y = A⁻¹ x
   void multiply(const Vector& x, Vector& y) const {
-    Packed sum = x[0] * column_[0];
-    for (int j = 1; j < N; ++j) sum += x[j] * column_[j];
-    Eigen::Map<Packed>{y} = sum;
+    Pair sum[kPairs];
+    for (int p = 0; p < kPairs; ++p) sum[p] = x[0] * column_[0][p];
+    for (int j = 1; j < N; ++j)
+      for (int p = 0; p < kPairs; ++p) sum[p] += x[j] * column_[j][p];
+    for (int p = 0; p < kPairs; ++p) Eigen::Map<Pair>{y + 2 * p} = sum[p];
   }
 
  private:
-  // Eigen's vectors, since the compiler on its own takes sums of this length apart again.
-  using Packed = Eigen::Matrix<double, kPadded, 1>;
+  // Registers of two, read and written as a whole: the compiler on its own takes sums of this length apart,
+  // and a register that is read after half of it was written waits for the store.
+  using Pair = Eigen::Array2d;
+  static constexpr int kPairs = kPadded / 2;
   enum Pivots { kDiagonal, kByRows };
 
   void fill(const double (&a)[N][N]) {
     for (int j = 0; j < N; ++j)
-      for (int i = 0; i < kPadded; ++i) column_[j][i] = i < N ? a[i][j] : 0;
+      for (int p = 0; p < kPairs; ++p) column_[j][p] = Pair{a[2 * p][j], 2 * p + 1 < N ? a[2 * p + 1][j] : 0};
   }
+  double entry(int i, int k) const { return column_[i][k / 2][k % 2]; }
 
   /// False if a pivot on the diagonal is too small.
   bool eliminate(Pivots pivots) {
     int from[N];
     for (int k = 0; k < N; ++k) {
       int most = k;
-      double largest = std::abs(column_[k][k]);
+      double largest = std::abs(entry(k, k));
       for (int i = k + 1; i < N; ++i)
-        if (std::abs(column_[i][k]) > largest) {
-          largest = std::abs(column_[i][k]);
+        if (std::abs(entry(i, k)) > largest) {
+          largest = std::abs(entry(i, k));
           most = i;
         }
       if (pivots == kDiagonal) {
-        if (!(std::abs(column_[k][k]) >= 0.01 * largest)) return false;
+        if (!(std::abs(entry(k, k)) >= 0.01 * largest)) return false;
       } else {
         from[k] = most;
-        if (most != k) column_[k].swap(column_[most]);
+        if (most != k) std::swap(column_[k], column_[most]);
       }
-      const double pivot = 1 / column_[k][k];
-      column_[k][k] = 1;
-      column_[k] *= pivot;
+      const Pair unit(k % 2 == 0, k % 2 == 1), others = 1 - unit;
+      const double pivot = 1 / entry(k, k);
+      column_[k][k / 2] = column_[k][k / 2] * others + unit;
+      for (int p = 0; p < kPairs; ++p) column_[k][p] *= pivot;
       for (int i = 0; i < N; ++i) {
-        const double factor = column_[i][k];
+        const double factor = entry(i, k);
         if (i == k || factor == 0) continue;  // Jacobians are sparse
-        column_[i][k] = 0;
-        column_[i] -= factor * column_[k];
+        column_[i][k / 2] *= others;
+        for (int p = 0; p < kPairs; ++p) column_[i][p] -= factor * column_[k][p];
       }
     }
     if (pivots == kByRows)  // rows exchanged before are columns exchanged after
       for (int k = N; k-- > 0;)
         if (from[k] != k)
-          for (int i = 0; i < N; ++i) std::swap(column_[i][k], column_[i][from[k]]);
+          for (int i = 0; i < N; ++i)
+            std::swap(column_[i][k / 2][k % 2], column_[i][from[k] / 2][from[k] % 2]);
     return true;
   }
 
-  Packed column_[N];  // of A⁻¹
+  Pair column_[N][kPairs];  // of A⁻¹
 };
 
 }  // namespace unhand::dynamics
