@@ -21,6 +21,11 @@ bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options) {
   return chi2_tail(m.chi2, m.n) < options.false_discovery_rate / kSeries;
 }
 
+bool leaves_misfit(const Stage& stage, const DiscoverOptions& options) {
+  return std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(),
+                     [&](const ChannelMisfit& m) { return is_misfit(m, options); });
+}
+
 bool is_confirmed(const std::vector<ChannelMisfit>& other_half, const ChannelMisfit& misfit) {
   return std::any_of(other_half.begin(), other_half.end(), [&](const ChannelMisfit& m) {
     return m.channel == misfit.channel && m.phase == misfit.phase && chi2_tail(m.chi2, m.n) < kConfirmedAt;
@@ -38,20 +43,49 @@ double misfit_in(const std::vector<ChannelMisfit>& misfit, Channel channel, Phas
   return 1;
 }
 
+namespace {
+
+/// Most of a wrench's variance is trust, not noise: one that is explained falls below 1.
+bool is_explained(double was, double is) { return is < 1 + kRest * (was - 1); }
+
+bool is_among(const std::vector<ChannelMisfit>& all, const ChannelMisfit& m) {
+  return std::any_of(all.begin(), all.end(), [&](const ChannelMisfit& other) {
+    return other.channel == m.channel && other.phase == m.phase;
+  });
+}
+
+}  // namespace
+
+std::vector<ChannelMisfit> settled_wrenches(const FitResult& before, const FitResult& after,
+                                            const DiscoverOptions& options) {
+  std::vector<ChannelMisfit> out;
+  for (const auto& b : before.misfit)
+    if (b.phase == Phase::release && is_wrench(b.channel) && is_misfit(b, options) &&
+        is_explained(b.chi2_per_sample(), misfit_in(after.misfit, b.channel, b.phase)))
+      out.push_back(b);
+  return out;
+}
+
+Improvement improvement(const Stage& before, const Stage& after, const std::vector<ChannelMisfit>& base,
+                        const DiscoverOptions& options) {
+  return improvement(before.held_out, after.held_out, base, options,
+                     settled_wrenches(before.fit, after.fit, options));
+}
+
 Improvement improvement(const FitResult& before, const FitResult& after,
-                        const std::vector<ChannelMisfit>& base, const DiscoverOptions& options) {
+                        const std::vector<ChannelMisfit>& base, const DiscoverOptions& options,
+                        const std::vector<ChannelMisfit>& settled) {
   Improvement out;
   for (const auto& b : before.misfit) {
     if (b.phase == Phase::grasped && !is_wrench(b.channel)) continue;  // no prediction is the better for it
     const double was = b.chi2_per_sample(), is = misfit_in(after.misfit, b.channel, b.phase);
     double needed = std::max({options.matters, kShare * (was - 1), 2 * std::sqrt(2.0 / b.n)});
     if (is_wrench(b.channel)) {
-      // Most of a wrench's variance is trust, not noise: one that is explained falls below 1, and what
-      // matters is by how much.
       const double from = b.phase == Phase::grasped ? 1 + options.matters : options.wrench_misfit;
-      const bool explained = is < 1 + kRest * (was - 1);
-      if (was < from && !explained) continue;
+      const bool settles = is_among(settled, b);
+      if (was < from && !settles && !is_explained(was, is)) continue;
       needed = std::max(options.wrench_matters, kWrenchShare * (was - 1));
+      if (settles) needed = std::min(needed, std::max(kWrenchShare * was, 2 * std::sqrt(2.0 / b.n)));
     }
     needed = std::max(needed, kRest * (misfit_in(base, b.channel, b.phase) - 1));
     if ((was - is) / needed <= out.matters) continue;

@@ -25,6 +25,9 @@ inline constexpr double kConfirmedAt = 0.05;
 /// takes part, only Newton and Euler: there it is a channel like any other.
 bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options);
 
+/// Whether any channel does on the train throws.
+bool leaves_misfit(const Stage& stage, const DiscoverOptions& options);
+
 /// Whether the other half of the throws shows a misfit of the same channel and phase as well: chance does not
 /// strike twice.
 bool is_confirmed(const std::vector<ChannelMisfit>& other_half, const ChannelMisfit& misfit);
@@ -66,8 +69,18 @@ struct Improvement {
   std::string where;
   Phase phase{Phase::release};
 };
+/// A wrench that is `settled` need not have been a misfit on the held-out throws as well, whose conditions
+/// may show less of it: there it matters by a quarter of its χ².
 Improvement improvement(const FitResult& before, const FitResult& after,
-                        const std::vector<ChannelMisfit>& base, const DiscoverOptions& options);
+                        const std::vector<ChannelMisfit>& base, const DiscoverOptions& options,
+                        const std::vector<ChannelMisfit>& settled = {});
+/// That of the held-out throws of two stages, with the wrenches that the train throws settle.
+Improvement improvement(const Stage& before, const Stage& after, const std::vector<ChannelMisfit>& base,
+                        const DiscoverOptions& options);
+
+/// The wrenches of slipping pads whose misfit vanishes altogether: not a hundredth of it is left.
+std::vector<ChannelMisfit> settled_wrenches(const FitResult& before, const FitResult& after,
+                                            const DiscoverOptions& options);
 
 /// Of another law, which has next to no parameters to bend: it matters if the held-out χ² as a whole falls by
 /// half a per cent, channels apart of which not a hundredth of the base's misfit is left.

@@ -60,8 +60,7 @@ class ForwardStep {
         out_(out),
         f_(footprints(stage.problem, stage.fit, catalogue(options), options.laws, options.fit.threads)),
         all_(scores(f_)),
-        noise_(std::none_of(stage.fit.misfit.begin(), stage.fit.misfit.end(),
-                            [&](const ChannelMisfit& m) { return is_misfit(m, options); })) {}
+        noise_(!leaves_misfit(stage, options)) {}
 
   std::optional<Stage> run() {
     if (all_.empty()) return std::nullopt;
@@ -119,7 +118,7 @@ class ForwardStep {
     if (!(trial.delta_bic <= kDeltaBic) || !(trial.p_value <= share)) return std::nullopt;
     if (!solve_held_out(trial.next, options_)) return std::nullopt;
     trial.held_out = law ? law_improvement(stage_.held_out, trial.next.held_out, out_.base_test, options_)
-                         : improvement(stage_.held_out, trial.next.held_out, out_.base_test, options_);
+                         : improvement(stage_, trial.next, out_.base_test, options_);
     ranked.held_out_gain = trial.held_out.fall;
     return trial;
   }
@@ -151,6 +150,7 @@ class ForwardStep {
   /// What matters to no channel may matter to a prediction, where all of a throw's errors add up. Not a give
   /// of the pads that no pads are without, nor what imitates that.
   std::optional<Stage> weigh_small() {
+    if (auto beside = beside_give()) return beside;
     try_give();
     const int threads = options_.fit.threads;
     const PredictionGain gain = prediction_gain(outcomes_of(stage_, Share::test, threads),
@@ -165,6 +165,24 @@ class ForwardStep {
     if (out_.small && out_.small->delta_bic <= small_->delta_bic) return std::nullopt;
     out_.small = {id,  small_->delta_bic, small_->p_value, small_->held_out.fall, gain.before, gain.after,
                   give};
+    return std::nullopt;
+  }
+
+  /// What settles a wrench on the train throws may matter to the held-out ones beside pads that give, which
+  /// their slower slips show more of.
+  std::optional<Stage> beside_give() {
+    if (!acts_on_pads(id_of(*small_->score)) ||
+        settled_wrenches(stage_.fit, small_->next.fit, options_).empty())
+      return std::nullopt;
+    Trial trial = *small_;
+    if (!fit_along(trial.next, options_, out_)) return std::nullopt;
+    const Stage& less = without(trial.next, {id_of(*trial.score)}, options_);
+    if (less.solved()) trial.held_out = improvement(less, trial.next, out_.base_test, options_);
+    if (trial.held_out.matters >= 1) {
+      const std::string why = trial.held_out.where;
+      return accept(std::move(trial), why, evident_);
+    }
+    out_.along.clear();
     return std::nullopt;
   }
 

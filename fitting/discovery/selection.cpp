@@ -56,7 +56,7 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
       const Stage& less = without(stage, {stage.ids[i]}, options);
       if (!less.solved()) continue;
       const bool needed = stage.bic() - less.bic() < kDeltaBic &&
-                          (improvement(less.held_out, stage.held_out, out.base_test, options).matters >= 1 ||
+                          (improvement(less, stage, out.base_test, options).matters >= 1 ||
                            predicts_better(less, stage, options));
       if (needed) continue;
       std::erase_if(out.effects, [&](const AcceptedEffect& e) { return e.id == stage.ids[i]; });

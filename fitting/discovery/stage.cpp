@@ -147,14 +147,10 @@ namespace {
 /// has the leading footprint, and still leaves a misfit, or gains far less than noise alone could take away.
 bool is_astray(const Stage& stage, const Stage& next, const Score& score, bool leads,
                const DiscoverOptions& options) {
-  const auto leaves_misfit = [&](const Stage& s) {
-    return std::any_of(s.fit.misfit.begin(), s.fit.misfit.end(),
-                       [&](const ChannelMisfit& m) { return is_misfit(m, options); });
-  };
-  if (!next.is_fitted()) return leads || leaves_misfit(stage);
-  if (!leaves_misfit(stage))
+  if (!next.is_fitted()) return leads || leaves_misfit(stage, options);
+  if (!leaves_misfit(stage, options))
     return leads && stage.fit.deviance() - next.fit.deviance() < score.gain / kFirstOrder;
-  return next.bic() - stage.bic() > kDeltaBic || (leads && leaves_misfit(next));
+  return next.bic() - stage.bic() > kDeltaBic || (leads && leaves_misfit(next, options));
 }
 
 }  // namespace

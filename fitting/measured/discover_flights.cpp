@@ -27,8 +27,10 @@ double apparent_gravity(const AcceptedEffect& effect) {
 
 /// The answer goes by another of its names, in everything that names its parameter.
 void rename(AcceptedEffect& effect, const char* id, const char* parameter, MeasuredDiscovery& out) {
-  const std::string was = effect.id + "." + effect.parameters.front().name,
-                    is = std::string(id) + "." + parameter;
+  const auto full = [](const std::string& of, const std::string& name) {
+    return fmt::format("{}.{}", of, name);
+  };
+  const std::string was = full(effect.id, effect.parameters.front().name), is = full(id, parameter);
   for (auto& [other, correlation] : effect.equivalent)
     if (other == id) other = effect.id;
   effect.id = id;

@@ -278,6 +278,26 @@ TEST(Discovery, TheGiveOfAnyPadsIsFittedAlongWhereOnlyPredictionsShowIt) {
   EXPECT_EQ(found.along, std::vector<std::string>{"contact.pad_compliance"});
 }
 
+// Friction that falls with the slip, beside pads that give by four micrometres. The held-out conditions slip
+// slowly: their torque is no misfit, and without the give nothing there speaks for Stribeck's friction.
+TEST(Discovery, WhatTheTrainThrowsSettleIsConfirmedBesideTheGiveOfThePads) {
+  experiment::CampaignDesign design = experiment::random_campaign(9205);
+  constexpr double kRatio = 1.5;
+  design.effects = {{"contact.stribeck.mu_s/mu_k", kRatio}, {"contact.pad_compliance.compliance", 1.2e-7}};
+  const Discovery found = found_in(experiment::generate_campaign(design, 9205));
+  const auto torque = [](const std::vector<ChannelMisfit>& misfit) {
+    return misfit_in(misfit, experiment::Channel::wrench_tau, Phase::release);
+  };
+  EXPECT_GT(torque(found.base.misfit), 3);
+  EXPECT_LT(torque(found.base_test), 1.5);
+  ASSERT_EQ(found.effects.size(), 1u) << to_string(found.verdict);
+  EXPECT_EQ(found.effects.front().id, "contact.stribeck");
+  const Parameter& ratio = found.effects.front().parameters.front();
+  EXPECT_NEAR(ratio.value, kRatio, 3 * ratio.sigma);
+  EXPECT_EQ(found.along, std::vector<std::string>{"contact.pad_compliance"});
+  EXPECT_LT(found.after_test.trajectory_rms.value(), 0.75 * found.before_test.trajectory_rms.value());
+}
+
 // Pads that give by a millimetre bend a base with rigid ones until it slips in the firm grasp, at less than
 // half of its friction: a search that starts there does not find back.
 TEST(Discovery, PadsThatBendTheBaseFarAreFound) {

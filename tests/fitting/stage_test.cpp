@@ -228,22 +228,39 @@ TEST(Misfit, IsJudgedByItsChanceAndByTheSeriesThatAreLookedAt) {
 
 // The torque of slipping pads is trusted to 4 % of its size, which is most of its variance: a model that errs
 // by as much as the trust has a misfit of 1, and one that does not, of much less.
-TEST(Improvement, AWrenchThatVanishesMattersByHowMuchItFell) {
+class WrenchImprovement : public testing::Test {
+ protected:
+  static FitResult torque(double per_sample, Phase phase = Phase::release) {
+    FitResult out;
+    auto& m = out.misfit.emplace_back();
+    m.channel = experiment::Channel::wrench_tau, m.phase = phase, m.n = 500, m.chi2 = 500 * per_sample;
+    return out;
+  }
+  bool matters(double was, double is, const std::vector<ChannelMisfit>& settled = {}) const {
+    return improvement(torque(was), torque(is), {}, options, settled).matters >= 1;
+  }
   const DiscoverOptions options;
-  const auto matters = [&](double was, double is) {
-    const auto torque = [](double per_sample) {
-      FitResult out;
-      auto& m = out.misfit.emplace_back();
-      m.channel = experiment::Channel::wrench_tau, m.phase = Phase::release, m.n = 500,
-      m.chi2 = 500 * per_sample;
-      return out;
-    };
-    return improvement(torque(was), torque(is), {}, options).matters >= 1;
-  };
+};
+
+TEST_F(WrenchImprovement, MattersByHowMuchItFellWhereItVanishes) {
   EXPECT_TRUE(matters(1.26, 0.16));
   EXPECT_FALSE(matters(1.26, 0.4)) << "a fall of less than wrench_matters";
   EXPECT_FALSE(matters(2.6, 1.4)) << "slipping pads leave as much under any law";
   EXPECT_TRUE(matters(4.5, 1.4)) << "more than slipping pads leave";
+}
+
+// What the train throws settle the held-out ones need only confirm, whose slips may be too slow to show it.
+TEST_F(WrenchImprovement, MattersByItsShareWhereTheTrainThrowsSettleIt) {
+  const auto settled = [&](double was, double is, Phase phase = Phase::release) {
+    return settled_wrenches(torque(was, phase), torque(is, phase), options);
+  };
+  EXPECT_EQ(settled(4, 0.9).size(), 1u);
+  EXPECT_TRUE(settled(4, 1.2).empty()) << "more than a hundredth is left";
+  EXPECT_TRUE(settled(2.5, 0.5).empty()) << "slipping pads leave as much under any law";
+  EXPECT_TRUE(settled(4, 0.9, Phase::grasped).empty()) << "no friction law takes part";
+  EXPECT_TRUE(matters(1.3, 0.6, settled(4, 0.9)));
+  EXPECT_FALSE(matters(1.3, 1.1, settled(4, 0.9))) << "a fall of less than kWrenchShare";
+  EXPECT_FALSE(matters(3.5, 2.7, settled(4, 0.9))) << "most of it stays";
 }
 
 /// A laboratory's law is not this library's: intervals must know.
