@@ -115,9 +115,10 @@ OutcomeLack lack_in(const OutcomeErrors& all, Outcome outcome);
 /// other [m].
 inline constexpr double kMostGive = 3e-5;
 
-/// Whether that give is a part of a model beside which nothing is found: held-out throws are predicted the
-/// better for it, and are likelier.
-bool needs_give(const Stage& rigid, const Stage& give, const DiscoverOptions& options);
+/// Whether that give is a part of a model beside which nothing is found: on held-out throws it matters to a
+/// channel, or they are predicted the better for it and are likelier.
+bool needs_give(const Stage& rigid, const Stage& give, const std::vector<ChannelMisfit>& base,
+                const DiscoverOptions& options);
 
 /// An estimate of what is missing is used as a correction where it lowers the held-out error to this share.
 inline constexpr double kCorrects = 0.98;

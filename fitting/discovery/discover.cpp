@@ -84,7 +84,7 @@ void search(Stage& stage, const DiscoverOptions& options, Discovery& out) {
       // look.
       const Stage rigid = stage;
       if (!fit_along(stage, options, out)) break;
-      if (!needs_give(rigid, stage, options)) {
+      if (!needs_give(rigid, stage, out.base_test, options)) {
         stage = rigid;
         out.along.clear();
         break;

@@ -76,6 +76,11 @@ class ForwardStep {
     if (!best_ || is_law(id_of(*best_->score)))
       for (const Score& score : all_)
         if (is_law(id_of(score))) consider(score);
+    if (best_ && is_small_give(*best_)) {
+      std::erase(best_->next.ids, kPads);
+      out_.along.push_back(kPads);
+      return std::move(best_->next);
+    }
     if (best_) {
       const std::string why = best_->held_out.where;
       return accept(std::move(*best_), why, convincing_);
@@ -90,6 +95,11 @@ class ForwardStep {
   const std::string& id_of(const Score& score) const { return f_.candidates[score.candidate].id; }
   double between_footprints(const Score& a, const Score& b) const {
     return between(f_, f_.candidates[a.candidate], a.step, f_.candidates[b.candidate]);
+  }
+
+  /// A give that no pads are without: a part of the model, and no answer.
+  bool is_small_give(const Trial& trial) const {
+    return id_of(*trial.score) == kPads && give_of(trial.next) <= kMostGive;
   }
 
   /// Under the base model: it is no other name for anything.
@@ -156,7 +166,7 @@ class ForwardStep {
     const PredictionGain gain = prediction_gain(outcomes_of(stage_, Share::test, threads),
                                                 outcomes_of(small_->next, Share::test, threads));
     const std::string& id = id_of(*small_->score);
-    const bool give = id == kPads && give_of(small_->next) <= kMostGive;
+    const bool give = is_small_give(*small_);
     if (!give && predicts_better(stage_, small_->next, options_))
       return accept(std::move(*small_),
                     fmt::format("predicted before the throw: {:.3g} to {:.3g} mm rms", 1e3 * gain.before,

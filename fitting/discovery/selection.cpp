@@ -28,7 +28,7 @@ void find_other_names(const Footprints& f, const Eigen::VectorXd& contribution, 
 void drop_give(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   if (out.along.empty()) return;
   const Stage& rigid = without(stage, out.along, options);
-  if (!rigid.solved() || needs_give(rigid, stage, options)) return;
+  if (!rigid.solved() || needs_give(rigid, stage, out.base_test, options)) return;
   stage = Stage(rigid);
   out.along.clear();
 }

@@ -261,6 +261,21 @@ TEST(Discovery, TheGiveOfAnyPadsIsFittedAlongAndNoPartOfTheAnswer) {
   EXPECT_LT(found.after_test.trajectory_rms.value(), found.before_test.trajectory_rms.value());
 }
 
+// Four micrometres that explain the torque of the slipping pads so well that they would convince as an
+// effect.
+TEST(Discovery, TheGiveOfAnyPadsIsNoPartOfTheAnswerWhereAChannelShowsIt) {
+  experiment::CampaignDesign design = experiment::random_campaign(9307);
+  design.effects = {{"contact.pad_compliance.compliance", 1.5e-7}};
+  const Discovery found = found_in(experiment::generate_campaign(design, 9307));
+  EXPECT_EQ(found.verdict, Verdict::no_missing_effect);
+  EXPECT_EQ(found.along, std::vector<std::string>{"contact.pad_compliance"});
+  EXPECT_FALSE(found.unexplained.has_value());
+  const auto torque = [](const std::vector<ChannelMisfit>& misfit) {
+    return misfit_in(misfit, experiment::Channel::wrench_tau, Phase::release);
+  };
+  EXPECT_GT(torque(found.base_test) - torque(found.final_test), DiscoverOptions().wrench_matters);
+}
+
 // A micrometre, and a robot that repeats itself: to first order no effect explains anything, but predictions
 // are off by condition more than repetitions scatter by. It is the pads' give.
 TEST(Discovery, TheGiveOfAnyPadsIsFittedAlongWhereOnlyPredictionsShowIt) {
