@@ -158,10 +158,16 @@ ReleaseResult<S> simulate_giving_release(const ReleaseProblem<S>& problem, const
     const S from = t;
     window = {value_of(from), value_of(stop)};
     if (!(window.end > window.begin)) continue;
-    const int steps = std::max(1, static_cast<int>(std::ceil((window.end - window.begin) / longest)));
+    const double needed = std::ceil((window.end - window.begin) / longest);
+    if (!(needed <= static_cast<double>(options.integrator.step_budget - result.statistics.steps))) {
+      ended(Outcome::step_budget_spent);
+      return result;
+    }
+    const long steps = std::max(1L, static_cast<long>(needed));
     State<S, 6> rate = rate_of(at, scene_at(scenes, window, t));
-    for (int k = 1; k <= steps; ++k) {
-      const S next = k == steps ? stop : S(from + (stop - from) * (static_cast<double>(k) / steps));
+    for (long k = 1; k <= steps; ++k) {
+      const S next =
+          k == steps ? stop : S(from + (stop - from) * (static_cast<double>(k) / static_cast<double>(steps)));
       const S h = next - t, middle = t + 0.5 * h;
       const Scene<S> there = scene_at(scenes, window, next);
       if (!stepper.step(h, there, at, coarse) ||

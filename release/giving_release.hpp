@@ -22,7 +22,8 @@ struct GivingStart {
 ///   N (q₁ − q₀ − h b)/h = f(q₁),   q = (v_r, ω_r),   b its rate without friction, N = (G M⁻¹ Gᵀ)⁻¹,
 ///
 /// twice with h/2 and once with h, which are extrapolated: second order, L-stable, whatever the springs. h
-/// follows from the tolerances and the time events alone, so that derivatives are those of the steps. The
+/// follows from the tolerances and the time events alone, so that derivatives are those of the steps. A
+/// stretch between two time events that takes more of them than is left of the step budget is not begun. The
 /// recorded trajectory has the rate at the ends of its pieces that the points' wrench there gives.
 template <class S>
 ReleaseResult<S> simulate_giving_release(const ReleaseProblem<S>& problem, const contact::GivesAtPoints& pads,

@@ -45,7 +45,9 @@ Basins find_basins(const ClutchedArm& arm, const ThrowTask& task, const ThrowPro
 
 ThrowTable make_table(const ClutchedArm& arm, ThrowTask task, const std::vector<double>& distances,
                       const ThrowProgramOptions& options, int starts) {
-  if (distances.size() < 4 || !std::is_sorted(distances.begin(), distances.end()) || !task.target)
+  const auto not_less = [](double a, double b) { return !(a < b); };
+  const bool increasing = std::adjacent_find(distances.begin(), distances.end(), not_less) == distances.end();
+  if (distances.size() < 4 || !increasing || !task.target)
     throw std::invalid_argument(
         "make_table: at least four increasing distances, and a target that gives the height");
   ThrowTable out{task.target->z, distances, {}};

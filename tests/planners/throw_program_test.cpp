@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "planners/elastic/throw_refinement.hpp"
 #include "planners/elastic/throw_table.hpp"
@@ -172,6 +173,12 @@ TEST(ElasticThrow, RefusesATaskWithoutSense) {
   task.margin = 0.7;
   EXPECT_THAT([&] { plan_throw(bsa3(), task); },
               testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("margin = 0.7")));
+  task.margin = 0;
+  task.target = Target{2.2, -0.5};
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  for (const std::vector<double>& x : {std::vector<double>{2.0, 2.1, 2.1, 2.2}, {2.0, kNan, 2.1, 2.2}, {2.0}})
+    EXPECT_THAT([&] { make_table(bsa3(), task, x, {}, 1); },
+                testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("increasing distances")));
 }
 
 }  // namespace

@@ -160,6 +160,28 @@ TEST(GivingPoints, ThrowAsManyBristlesDo) {
     }
 }
 
+TEST(GivingPoints, StopAtTheStepBudget) {
+  const Launch launch;
+  contact::ContactParameters<double> p;
+  p.patch = {kMu, kRadius};
+  p.variation = limits(1e-5, 3e-3).variation();
+  const auto model = contact::make_contact_model("limit_surface_disc", p);
+  release::ReleaseOptions options;
+  options.integrator.tolerances = {1e-5, 1e-8};
+  const auto whole = simulate_release(launch.problem(*model), options);
+  ASSERT_EQ(whole.outcome, release::ReleaseOutcome::detached);
+  options.integrator.step_budget = whole.statistics.steps;
+  const auto just = simulate_release(launch.problem(*model), options);
+  EXPECT_EQ(just.outcome, release::ReleaseOutcome::detached);
+  EXPECT_EQ(just.detach.twist.omega, whole.detach.twist.omega);
+  options.integrator.step_budget = whole.statistics.steps - 1;
+  const auto short_of = simulate_release(launch.problem(*model), options);
+  EXPECT_EQ(short_of.outcome, release::ReleaseOutcome::not_solved);
+  EXPECT_EQ(short_of.integration, dynamics::Outcome::step_budget_spent);
+  EXPECT_LT(short_of.statistics.steps, whole.statistics.steps);
+  EXPECT_TRUE(std::isfinite(short_of.detach.twist.vx));
+}
+
 /// A launch on compliant pads, recorded in steps of 5e-5 s.
 struct Recorded {
   Launch launch;
