@@ -214,13 +214,14 @@ FlightErrors flight_errors(const FlightProblem& problem, const GroupedFit& fit, 
     for (std::size_t j = 0; j < group.rows.size(); ++j)
       if (group.rows[j].channel < positions)
         one.squares += std::pow(size(fit.groups[i].residual, j), 2), one.n += 1.0 / positions;
-    const double half = 0.5 * group.rows.back().time + 1e-9;
+    one.oriented = problem.oriented(i);
+    const std::size_t width = one.oriented ? problem.channels().size() : static_cast<std::size_t>(positions);
+    const std::size_t samples = group.rows.size() / width;
+    const double half = group.rows[(samples - 1) / 2 * width].time;
     const GroupFit part =
         fit_own_part(problem, i, fit, [&](const GroupRow& row) { return row.time <= half; });
     one.solved = part.solved;
     if (!part.solved) return;
-    one.oriented = problem.oriented(i);
-    const std::size_t width = one.oriented ? problem.channels().size() : static_cast<std::size_t>(positions);
     double position = 0, angle = 0;
     for (std::size_t j = group.rows.size() - width; j < group.rows.size(); ++j)
       (group.rows[j].channel < positions ? position : angle) += std::pow(size(part.residual, j), 2);

@@ -45,7 +45,7 @@ class FlightProblem final : public GroupedProblem {
 };
 
 /// Errors of the flights of a split: `fit` holds the shared parameters and the own unknowns of whole flights;
-/// predictions at the end have the start fitted to the first half of the time.
+/// predictions at the end have the start fitted to the first half of the samples.
 struct FlightErrors {
   int n{};                                                 ///< flights
   double trajectory_rms{};                                 ///< [m]

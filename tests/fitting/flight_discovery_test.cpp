@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "datasets/import_cube_tosses.hpp"
+#include "experiment/free_flight.hpp"
 #include "fitting/measured/flight_discovery.hpp"
 #include "fitting/measured/measured_discovery.hpp"
 #include "tests/support/spatial_flights.hpp"
@@ -54,6 +55,36 @@ TEST(FlightDiscovery, NothingIsFoundWhereNothingIsMissing) {
   // The start takes 6 of 120 numbers; 8 flights of 40 samples scatter by √(2/320) = 0.08: four of them.
   for (const auto& m : found.misfit) EXPECT_NEAR(m.before_test, 0.95, 0.32) << m.channel;
   for (const auto& a : found.autocorrelation_before) EXPECT_LT(std::abs(a.z), 4) << a.channel;
+}
+
+TEST(FlightDiscovery, ErrorsBeforeAreThoseOfTheComparison) {
+  // An odd number of samples, at times that are rounded as files round them: the middle one is of the first
+  // half however it was rounded.
+  SpatialDesign design;
+  design.samples = 11;
+  design.rate = 120;
+  SpatialTruth truth;
+  truth.drag = 0.03;
+  auto log = spatial_flights(truth, design, 3);
+  for (auto& one : log.throws)
+    for (double& t : one.mocap->time.data) t = 1e-5 * std::round(1e5 * t);
+  const auto found = found_in(log);
+  const std::vector<std::string> names{"projectile"};
+  const auto expected = experiment::compare_free_flights(log, names, 1)[0];
+  const auto value = [&](const NamedErrors& errors, const char* name) {
+    for (const auto& [key, x] : errors)
+      if (key == name) return x;
+    ADD_FAILURE() << name;
+    return 0.0;
+  };
+  const std::pair<const NamedErrors*, const experiment::FreeFlightStatistics*> halves[] = {
+      {&found.before_train, &expected.train}, {&found.before_test, &expected.test}};
+  for (const auto& [errors, same] : halves) {
+    EXPECT_NEAR(value(*errors, "trajectory_rms_m"), same->trajectory_rms_m, 1e-9);
+    EXPECT_NEAR(value(*errors, "end_position_mae_m"), same->end_position_error_m.mean, 1e-9);
+    EXPECT_NEAR(value(*errors, "end_position_median_m"), same->end_position_error_m.median, 1e-9);
+    EXPECT_NEAR(value(*errors, "end_orientation_mae_deg"), same->end_orientation_error_deg.mean, 1e-6);
+  }
 }
 
 struct Case {
