@@ -13,6 +13,7 @@
 #include "apps/compare_run.hpp"
 #include "apps/figure.hpp"
 #include "apps/progress.hpp"
+#include "apps/tell.hpp"
 #include "apps/throws.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/free_flight.hpp"
@@ -94,7 +95,7 @@ void report_failures(const experiment::Comparison& comparison) {
     for (const auto& one : model.throws)
       if (!one.prediction.landed()) ++reasons[outcome_of(one.prediction)];
     for (const auto& [reason, n] : reasons)
-      fmt::print(stderr, "unhand: {}: {} of {} throws: {}\n", model.model, n, model.throws.size(), reason);
+      tell("unhand: {}: {} of {} throws: {}\n", model.model, n, model.throws.size(), reason);
   }
   if (!any) throw Unanswered("no model brought any throw to a landing");
 }
@@ -117,10 +118,10 @@ void compare_releases(const CompareRequest& request, const datasets::ThrowLog& l
 
   const ReleaseTables tables = release_tables(comparison, log, request.log);
   const Json json = release_json(comparison, request);
-  Outputs outputs;
+  Outputs outputs{request.inputs()};
   if (!request.json.empty()) outputs.json(request.json, json);
   if (!request.report.empty())
-    write_release_report(comparison, tables, json, outputs.directory(request.report));
+    write_release_report(comparison, log, tables, json, outputs.directory(request.report));
   if (!request.write_cards.empty()) {
     const auto directory = outputs.directory(request.write_cards);
     for (const auto& [model, card] : run.cards())

@@ -20,6 +20,12 @@ struct CompareRequest {
   int threads{0};
   release::NaiveOptions naive;
   double rtol{1e-6};  // the printed digits do not change below 1e-5
+
+  std::vector<std::filesystem::path> inputs() const {
+    std::vector<std::filesystem::path> all(cards.begin(), cards.end());
+    all.emplace_back(log);
+    return all;
+  }
 };
 
 /// Free flights: every throw through the flight models.
@@ -40,12 +46,13 @@ ReleaseTables release_tables(const experiment::Comparison& comparison, const dat
                              const std::string& file);
 Json release_json(const experiment::Comparison& comparison, const CompareRequest& request);
 
-/// Every throw with every model: predictions and errors.
-Table throw_table(const experiment::Comparison& comparison);
+/// Every throw with every model: predictions and errors, times on the clock of the log's file.
+Table throw_table(const experiment::Comparison& comparison, const datasets::ThrowLog& log);
 
 /// Figures, tables, per-throw errors and JSON into a directory.
-void write_release_report(const experiment::Comparison& comparison, const ReleaseTables& tables,
-                          const Json& json, const std::filesystem::path& directory);
+void write_release_report(const experiment::Comparison& comparison, const datasets::ThrowLog& log,
+                          const ReleaseTables& tables, const Json& json,
+                          const std::filesystem::path& directory);
 
 /// "landed", or what ended the prediction.
 std::string outcome_of(const experiment::Prediction& prediction);

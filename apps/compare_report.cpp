@@ -6,7 +6,7 @@
 
 namespace unhand::apps {
 
-Table throw_table(const experiment::Comparison& comparison) {
+Table throw_table(const experiment::Comparison& comparison, const datasets::ThrowLog& log) {
   Table out{{"throw", "object", "condition", "split", "model", "outcome", "detach_time_s", "detach_vx_m_s",
              "detach_vz_m_s", "detach_omega_deg_s", "landing_x_m", "landing_theta_deg"},
             {},
@@ -26,7 +26,7 @@ Table throw_table(const experiment::Comparison& comparison) {
                                    one.split == datasets::Split::train ? "train" : "test",
                                    model.model,
                                    outcome_of(p),
-                                   number(detached, p.detach.time),
+                                   number(detached, p.detach.time + log.clock_origin),
                                    number(detached, p.detach.twist.vx),
                                    number(detached, p.detach.twist.vz),
                                    number(detached, p.detach.twist.omega * experiment::kDegrees),
@@ -38,8 +38,9 @@ Table throw_table(const experiment::Comparison& comparison) {
   return out;
 }
 
-void write_release_report(const experiment::Comparison& comparison, const ReleaseTables& tables,
-                          const Json& json, const std::filesystem::path& directory) {
+void write_release_report(const experiment::Comparison& comparison, const datasets::ThrowLog& log,
+                          const ReleaseTables& tables, const Json& json,
+                          const std::filesystem::path& directory) {
   std::string pictures;
   if (const auto figure = landing_figure(comparison)) {
     draw(*figure, directory);
@@ -54,7 +55,7 @@ void write_release_report(const experiment::Comparison& comparison, const Releas
                          "## Parameters\n\n{}",
                          tables.heading, tables.errors.markdown(), tables.floor, pictures,
                          tables.bias.markdown(), tables.parameters.markdown()));
-  write_text(directory / "throws.csv", throw_table(comparison).csv());
+  write_text(directory / "throws.csv", throw_table(comparison, log).csv());
   write_text(directory / "compare.json", json_text(json));
 }
 

@@ -292,6 +292,7 @@ LabImport import_lab(const std::string& format, const std::vector<std::string>& 
     for (std::size_t j = 0; j < reading.throws.size(); ++j) {
       Throw& one = reading.throws[j];
       if (adding) {
+        datasets::move_clock(one, log.clock_origin);
         fill_throw(log, id, std::move(one), options.replace, options.into);
         continue;
       }

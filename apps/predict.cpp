@@ -7,6 +7,7 @@
 #include "apps/cards.hpp"
 #include "apps/command.hpp"
 #include "apps/compare.hpp"
+#include "apps/tell.hpp"
 #include "apps/throws.hpp"
 
 namespace unhand::apps {
@@ -22,7 +23,8 @@ using experiment::kDegrees;
 using Sigmas = std::vector<std::optional<fitting::OutcomeSigma>>;
 
 Json json_of(const experiment::ThrowComparison& one, const experiment::PreparedThrow& prepared,
-             const std::optional<fitting::OutcomeSigma>& sigma, const datasets::ModelCard& card) {
+             const std::optional<fitting::OutcomeSigma>& sigma, const datasets::ModelCard& card,
+             double clock_origin) {
   const auto& p = one.prediction;
   Json out{{"id", one.id},
            {"object", one.object},
@@ -32,7 +34,7 @@ Json json_of(const experiment::ThrowComparison& one, const experiment::PreparedT
            {"detach", nullptr},
            {"landing", nullptr}};
   if (p.release == release::ReleaseOutcome::detached)
-    out["detach"] = {{"time_s", p.detach.time},
+    out["detach"] = {{"time_s", p.detach.time + clock_origin},
                      {"x_m", p.detach.pose.x},
                      {"z_m", p.detach.pose.z},
                      {"theta_deg", p.detach.pose.theta * kDegrees},
@@ -53,7 +55,7 @@ Json json_of(const experiment::ThrowComparison& one, const experiment::PreparedT
   out["outside_valid_range"] = fitting::outside_range(card, prepared);
   Json& measured = out["measured"] = Json::object();
   const auto& m = prepared.measured;
-  if (m.detach_time) measured["detach_time_s"] = *m.detach_time;
+  if (m.detach_time) measured["detach_time_s"] = *m.detach_time + clock_origin;
   if (m.detach_twist) {
     measured["detach_vx_m_s"] = m.detach_twist->vx;
     measured["detach_vz_m_s"] = m.detach_twist->vz;
@@ -96,8 +98,9 @@ Table table_of(const experiment::ModelComparison& model, const Sigmas& sigmas) {
 }
 
 /// The comparison's table with 1 σ beside it.
-Table csv_table(const experiment::Comparison& comparison, const Sigmas& sigmas) {
-  Table out = throw_table(comparison);
+Table csv_table(const experiment::Comparison& comparison, const datasets::ThrowLog& log,
+                const Sigmas& sigmas) {
+  Table out = throw_table(comparison, log);
   for (const char* name : {"detach_time_s", "detach_vx_m_s", "detach_vz_m_s", "detach_omega_deg_s",
                            "landing_x_m", "landing_theta_deg"})
     out.header.push_back(std::string("sigma_") + name);
@@ -116,11 +119,9 @@ void warn_outside(const datasets::ModelCard& card, const std::vector<experiment:
   int outside = 0;
   for (const auto& one : throws)
     if (const auto why = fitting::outside_range(card, one); !why.empty() && ++outside <= kTold)
-      fmt::print(stderr, "unhand: throw {} lies outside the card's valid range: {}\n", one.id,
-                 fmt::join(why, ", "));
+      tell("unhand: throw {} lies outside the card's valid range: {}\n", one.id, fmt::join(why, ", "));
   if (outside > kTold)
-    fmt::print(stderr, "unhand: and {} more of {} throws (--json FILE has them all)\n", outside - kTold,
-               throws.size());
+    tell("unhand: and {} more of {} throws (--json FILE has them all)\n", outside - kTold, throws.size());
 }
 
 /// The predictions of one card, plain or fitted.
@@ -164,7 +165,7 @@ void predict(const PredictOptions& options) {
     throw Unanswered(fmt::format("{} brings no throw to a landing: {}", model,
                                  outcome_of(result.throws.front().prediction)));
 
-  Outputs outputs;
+  Outputs outputs{{options.log, options.card}};
   if (!options.json.empty()) {
     Json json = json_head("predict");
     json["log"] = options.log;
@@ -176,10 +177,11 @@ void predict(const PredictOptions& options) {
     json["failed"] = result.failed;
     json["throws"] = Json::array();
     for (std::size_t i = 0; i < prepared.size(); ++i)
-      json["throws"].push_back(json_of(result.throws[i], prepared[i], sigmas[i], card.card));
+      json["throws"].push_back(
+          json_of(result.throws[i], prepared[i], sigmas[i], card.card, log.clock_origin));
     outputs.json(options.json, json);
   }
-  if (!options.csv.empty()) outputs.text(options.csv, csv_table(comparison, sigmas).csv());
+  if (!options.csv.empty()) outputs.text(options.csv, csv_table(comparison, log, sigmas).csv());
   outputs.commit();
   fmt::print("{}: {} throws with {}{}{} from {} (± 1 sigma; errors: predicted - measured)\n\n{}", options.log,
              prepared.size(), model, card.card.effects.empty() ? "" : " with ",

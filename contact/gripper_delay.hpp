@@ -9,8 +9,8 @@ namespace unhand::contact {
 
 /// Time between the opening command and the release [s]: a number, or a distribution on [0, longest].
 ///
-/// The distribution is given by its quantile function at equally likely midpoints, which is what predictions
-/// need: the mean over `quantiles(n)` is a quadrature of the expectation.
+/// Predictions release after `centre`. `quantiles(n)` are delays to simulate where an outcome's distribution
+/// is wanted: they are equally likely, and the mean over them is a quadrature of the expectation.
 struct DelayDistribution {
   /// A number, or a distribution.
   enum class Kind {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "datasets/channel_rules.hpp"
@@ -64,6 +65,36 @@ void check_throw(const std::string& file, const ThrowLog& log, const Throw& toss
   }
 }
 
+template <class Change>
+void change_times(Throw& toss, Change change) {
+  for (const Channel<Throw>& channel : channels) {
+    if (channel.kind != ChannelKind::time) continue;
+    const Slot slot = channel.slot(toss, false);
+    if (auto* const* time = std::get_if<Series*>(&slot)) std::ranges::for_each((*time)->data, change);
+  }
+  if (toss.detach_time) change(*toss.detach_time);
+  if (toss.free_flight) change(toss.free_flight->first), change(toss.free_flight->second);
+  std::ranges::for_each(toss.hand_jump_times, change);
+}
+
+/// Of all samples [s]; +infinity if there are none.
+double first_time(const ThrowLog& log) {
+  double first = HUGE_VAL;
+  for (const Throw& toss : log.throws)
+    for (const Channel<Throw>& channel : channels)
+      if (channel.kind == ChannelKind::time)
+        if (const Slot slot = channel.slot(const_cast<Throw&>(toss), false);
+            const auto* const* time = std::get_if<Series*>(&slot))
+          if (!(*time)->empty()) first = std::min(first, (*time)->data.front());
+  return first;
+}
+
+void move_clock(ThrowLog& log, double origin) {
+  if (log.gripper && log.gripper->opening_command_time) *log.gripper->opening_command_time -= origin;
+  for (Throw& toss : log.throws) datasets::move_clock(toss, origin);
+  log.clock_origin += origin;
+}
+
 constexpr auto bring_throw_log = [](auto& pipe, ThrowLog& log) {
   const AttributeCarrier<std::remove_reference_t<decltype(pipe)>> visit{pipe};
   log_fields(visit, log);
@@ -80,6 +111,10 @@ constexpr auto bring_throw_log = [](auto& pipe, ThrowLog& log) {
 };
 
 }  // namespace
+
+void move_clock(Throw& toss, double origin) {
+  change_times(toss, [&](double& t) { t -= origin; });
+}
 
 void validate(const ThrowLog& log, const std::string& file) {
   log_fields(AttributeChecker{file, "/"}, log);
@@ -127,11 +162,19 @@ ThrowLog read_throw_log(const std::filesystem::path& file) {
     if (toss.mocap) normalise_quaternions(toss.mocap->pose, toss.mocap->valid);
   }
   std::sort(log.throws.begin(), log.throws.end(), [](const Throw& a, const Throw& b) { return a.id < b.id; });
+  constexpr double kFar = 1e6;  // [s] doubles are 1e-10 s apart there
+  if (const double first = first_time(log); std::isfinite(first) && std::abs(first) > kFar)
+    move_clock(log, std::floor(first));
   return log;
 }
 
 void write_throw_log(const std::filesystem::path& file, const ThrowLog& log) {
   validate(log, file.string());
+  if (log.clock_origin != 0) {
+    ThrowLog as_in_files = log;
+    move_clock(as_in_files, -log.clock_origin);
+    return write_throw_log(file, as_in_files);
+  }
   hdf5::write_atomically(file.string(), [&](const hdf5::Output& root) {
     root.text("schema", "throw-log");
     root.integer("schema_version", throw_log_version);

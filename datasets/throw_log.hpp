@@ -109,18 +109,24 @@ struct ThrowLog {
   std::map<std::string, Object> objects;  ///< by id
   std::optional<Gripper> gripper;         ///< absent where no robot threw
   std::vector<Throw> throws;              // sorted by id when read
+  /// What the file's times are more than those in here [s]: nonzero where its clock is far from zero, as one
+  /// that counts from 1970, since what happens between two of its doubles (2e-7 s) cannot be simulated.
+  double clock_origin = 0;
   bool operator==(const ThrowLog&) const = default;
 };
 
 /// Reads and checks a throw log. The file is opened read-only; names that the schema does not know stay in
 /// the file and are ignored (so they are not in the value, and write_throw_log does not repeat them), unless
-/// they look like a missing name misspelt. Quaternions off unit length by up to 1e-3 are normalised. Throws
-/// LogError.
+/// they look like a missing name misspelt. Quaternions off unit length by up to 1e-3 are normalised. Times
+/// that are all beyond 1e6 s count from the first one's full second (`clock_origin`). Throws LogError.
 ThrowLog read_throw_log(const std::filesystem::path& file);
 
 /// Checks and writes: beside the destination first, then renamed, so that a failure leaves nothing behind and
 /// an older file as it was. Doubles come back bit for bit. Throws LogError.
 void write_throw_log(const std::filesystem::path& file, const ThrowLog& log);
+
+/// Takes `origin` [s] away from every time of the throw.
+void move_clock(Throw& toss, double origin);
 
 /// The rules that reader and writer share (ranges, shapes, order of time, finiteness, references between
 /// parts). Throws LogError with `file` as its file.

@@ -57,7 +57,7 @@ std::unique_ptr<contact::ContactModel> contact_model_for(const PreparedThrow& th
         "throw {}: {} needs the normal force, which was not measured (no ft group)", throw_.id, model));
   return contact::make_contact_model(
       model,
-      contact::ContactParameters<double>{patch_of(p), p.slide_end, {}, throw_.open_command, p.delay.mean()});
+      contact::ContactParameters<double>{patch_of(p), p.slide_end, {}, throw_.open_command, p.delay.centre});
 }
 
 release::ReleaseProblem<double> release_problem(const PreparedThrow& throw_,

@@ -161,7 +161,7 @@ void CampaignProblem::name_unknowns(const std::vector<Effect>& effects) {
       own_.push_back({"dead_time_deviation", "s", 0, -0.05, 0.05, 1e-3, 2e-3, Unknown::Kind::scatter});
     }
   } else {
-    campaign_.push_back({"delay", "s", first_guess_.delay.mean(), 0, 1, 5e-3, {}});
+    campaign_.push_back({"delay", "s", first_guess_.delay.centre, 0, 1, 5e-3, {}});
     own_.push_back({"delay_deviation", "s", 0, -0.1, 0.1, 5e-3, 5e-3, Unknown::Kind::scatter});
   }
   for (const Effect& effect : effects)

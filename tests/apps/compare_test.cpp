@@ -108,6 +108,60 @@ TEST_F(Cli, CardsCarryAnEstimate) {
   }
 }
 
+// A clock that counts from 1970 rounds times to 2.4e-7 s, and nothing else may come of it.
+TEST_F(Cli, AClockFarFromZeroChangesNothing) {
+  constexpr double kEpoch = 1.7e9;
+  auto log = datasets::read_throw_log(quick);
+  for (auto& one : log.throws) datasets::move_clock(one, -kEpoch);
+  if (log.gripper && log.gripper->opening_command_time) *log.gripper->opening_command_time += kEpoch;
+  datasets::write_throw_log(folder / "far.h5", log);
+  const std::string models = " --models limit_surface_disc,sliding_pivot,gripper_delay ";
+  ASSERT_EQ(run("compare " + quick + models + "--write-cards cards --json near.json").code, 0);
+  ASSERT_EQ(run("compare far.h5" + models + "--json far.json --report r").code, 0);
+  const json near = read_json(folder / "near.json"), far = read_json(folder / "far.json");
+  for (const auto& [name, model] : near["models"].items()) {
+    EXPECT_EQ(far["models"][name]["failed"], model["failed"]) << name;
+    for (const auto& [quantity, value] : model["test"].items()) {
+      if (!value.is_object()) continue;
+      const double mae = value["mae"];
+      EXPECT_NEAR(far["models"][name]["test"][quantity]["mae"].get<double>(), mae, 1e-3 * mae + 1e-5)
+          << name << ' ' << quantity;
+    }
+  }
+  const std::string card = " --card cards/limit_surface_disc.json --json p.json";
+  ASSERT_EQ(run("predict " + quick + card).code, 0);
+  const json before = read_json(folder / "p.json");
+  ASSERT_EQ(run("predict far.h5" + card).code, 0);
+  const json after = read_json(folder / "p.json");
+  for (std::size_t k = 0; k < before["throws"].size(); ++k) {
+    const json &a = before["throws"][k], &b = after["throws"][k];
+    EXPECT_NEAR(b["detach"]["time_s"].get<double>() - kEpoch, a["detach"]["time_s"].get<double>(), 1e-6);
+    EXPECT_NEAR(b["measured"]["detach_time_s"].get<double>() - kEpoch,
+                a["measured"]["detach_time_s"].get<double>(), 1e-6);
+    EXPECT_NEAR(b["landing"]["x_m"].get<double>(), a["landing"]["x_m"].get<double>(), 1e-5);
+  }
+}
+
+// The delay that is printed is the one that is predicted with, however the throws' delays are distributed.
+TEST_F(Cli, GripperDelayPredictsWithTheMeanOfTheLog) {
+  auto log = datasets::read_throw_log(quick);
+  log.gripper->opening_command_time = 0.1;
+  for (std::size_t k = 1; k < log.throws.size(); k += 2)
+    for (double& t : log.throws[k].ft->time.data) t += 0.06;
+  datasets::write_throw_log(folder / "late.h5", log);
+  ASSERT_EQ(run("compare late.h5 --models gripper_delay --write-cards cards --json c.json").code, 0);
+  ASSERT_EQ(run("predict late.h5 --card cards/gripper_delay.json --json p.json").code, 0);
+  const double delay = read_json(folder / "c.json")["models"]["gripper_delay"]["parameters"]["delay"];
+  const json predicted = read_json(folder / "p.json");
+  double mean = 0;
+  int train = 0;
+  for (const auto& one : predicted["throws"]) {
+    EXPECT_NEAR(one["detach"]["time_s"].get<double>(), 0.1 + delay, 1e-9);
+    if (one["split"] == "train") mean += one["measured"]["detach_time_s"].get<double>() - 0.1, ++train;
+  }
+  EXPECT_NEAR(delay, mean / train, 1e-9);
+}
+
 TEST_F(Cli, BadCards) {
   ASSERT_EQ(run("compare " + quick + " --models sliding_pivot --write-cards .").code, 0);
   const json good = read_json(folder / "sliding_pivot.json");

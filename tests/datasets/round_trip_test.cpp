@@ -51,6 +51,41 @@ TEST(RoundTrip, OnlyWhatIsRequired) {
   EXPECT_TRUE(back.throws[0].mocap->is_valid(0));
 }
 
+// Seconds since 1970: in memory they count from the first full second, in files they stay what they were.
+TEST(RoundTrip, AClockFarFromZero) {
+  ThrowLog log = planar_log();
+  for (const double epoch : {1.7e9, -3e6}) {
+    ThrowLog far = log;
+    for (Throw& toss : far.throws) move_clock(toss, -epoch);
+    if (far.gripper && far.gripper->opening_command_time) *far.gripper->opening_command_time += epoch;
+    const Scratch scratch;
+    write_throw_log(scratch / "far.h5", far);
+    const ThrowLog back = read_throw_log(scratch / "far.h5");
+    EXPECT_NEAR(back.clock_origin, epoch, 10);
+    EXPECT_EQ(back.clock_origin, std::floor(back.clock_origin));
+    const double shift = back.clock_origin - epoch;
+    for (std::size_t k = 0; k < log.throws.size(); ++k) {
+      const auto near = [&](double now, double before) { EXPECT_NEAR(now + shift, before, 2.4e-7) << k; };
+      const Throw &a = back.throws[k], &b = log.throws[k];
+      ASSERT_EQ(a.id, b.id);
+      if (b.hand)
+        for (std::size_t i = 0; i < b.hand->time.rows; ++i) near(a.hand->time(i), b.hand->time(i));
+      if (b.mocap)
+        for (std::size_t i = 0; i < b.mocap->time.rows; ++i) near(a.mocap->time(i), b.mocap->time(i));
+      if (b.landing) near(a.landing->time(0), b.landing->time(0));
+      if (b.detach_time) near(*a.detach_time, *b.detach_time);
+      if (b.free_flight) near(a.free_flight->first, b.free_flight->first);
+      for (std::size_t i = 0; i < b.hand_jump_times.size(); ++i)
+        near(a.hand_jump_times[i], b.hand_jump_times[i]);
+    }
+    write_throw_log(scratch / "again.h5", back);
+    expect_same(read_throw_log(scratch / "again.h5"), back);
+    ThrowLog as_in_file = back;
+    for (Throw& toss : as_in_file.throws) move_clock(toss, -back.clock_origin);
+    EXPECT_EQ(as_in_file.throws[0].hand->time, far.throws[0].hand->time) << "bit for bit";
+  }
+}
+
 TEST(RoundTrip, ExtremeDoublesKeepTheirBits) {
   ThrowLog log = planar_log();
   using limits = std::numeric_limits<double>;
