@@ -10,6 +10,7 @@
 #include "apps/compare.hpp"
 #include "apps/figure.hpp"
 #include "apps/progress.hpp"
+#include "apps/tell.hpp"
 #include "experiment/free_flight.hpp"
 
 namespace unhand::apps {
@@ -226,7 +227,7 @@ void compare_flights(const CompareRequest& request, const datasets::ThrowLog& lo
   for (const auto& model : models) {
     any = any || model.train.n + model.test.n > 0;
     for (const auto& [reason, n] : skip_reasons(model))
-      fmt::print(stderr, "unhand: {}: {} of {} throws: {}\n", model.model, n, model.each.size(), reason);
+      tell("unhand: {}: {} of {} throws: {}\n", model.model, n, model.each.size(), reason);
   }
   if (!any) throw Unanswered("no throw could be fitted");
 
@@ -237,7 +238,7 @@ void compare_flights(const CompareRequest& request, const datasets::ThrowLog& lo
       request.log, log.title, log.throws.size());
   const Table table = flights_table(models);
   const Json json = flights_json(models, request, log);
-  Outputs outputs;
+  Outputs outputs{request.inputs()};
   if (!request.json.empty()) outputs.json(request.json, json);
   if (!request.report.empty()) {
     const auto directory = outputs.directory(request.report);

@@ -57,8 +57,9 @@ DataBlock near(const fitting::SlipSamples& slips, const Section& section, double
 
 }  // namespace
 
-Figure section_figure(const fitting::SlipSamples& slips, const std::vector<SurfaceScore>& scores) {
-  Figure figure{"section_" + slips.surface, 19, 11, {}, {}};
+Figure section_figure(const fitting::SlipSamples& slips, const std::vector<SurfaceScore>& scores,
+                      const std::string& name) {
+  Figure figure{"section_" + name, 19, 11, {}, {}};
   std::vector<double> sizes;
   for (const auto& s : slips.samples) sizes.push_back(std::hypot(s.wrench[0], s.wrench[1], s.wrench[2]));
   const double largest = sizes.empty() ? 1 : *std::max_element(sizes.begin(), sizes.end());

@@ -9,8 +9,9 @@
 namespace unhand::apps {
 
 /// One surface: sections of the fitted limit surfaces through (f_x, f_y) and (f_x, τ/L), with the wrenches
-/// that lie within 20° of the section and where the object slid under them.
-Figure section_figure(const fitting::SlipSamples& slips, const std::vector<fitting::SurfaceScore>& scores);
+/// that lie within 20° of the section and where the object slid under them. Its files are section_`name`.
+Figure section_figure(const fitting::SlipSamples& slips, const std::vector<fitting::SurfaceScore>& scores,
+                      const std::string& name);
 
 /// Cross-validated errors beside those of the null control, one line per surface.
 Figure surface_error_figure(const std::vector<fitting::SlipSamples>& surfaces,

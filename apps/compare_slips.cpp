@@ -8,6 +8,7 @@
 #include "apps/compare_slip_figures.hpp"
 #include "apps/figure.hpp"
 #include "apps/progress.hpp"
+#include "apps/tell.hpp"
 #include "fitting/slips/compare_surfaces.hpp"
 
 namespace unhand::apps {
@@ -137,7 +138,7 @@ void report_failures(const Scores& scores) {
       if (!score.scored()) reasons.insert(score.reason);
     }
   if (!any && !reasons.empty()) throw Unanswered(*reasons.begin());
-  for (const auto& reason : reasons) fmt::print(stderr, "unhand: {}\n", reason);
+  for (const auto& reason : reasons) tell("unhand: {}\n", reason);
 }
 
 }  // namespace
@@ -169,7 +170,7 @@ void compare_slips(const CompareRequest& request) {
       request.log, options.folds, options.null_draws);
   const Table table = slips_table(surfaces, scores);
   const Json json = slips_json(request, surfaces, scores, options);
-  Outputs outputs;
+  Outputs outputs{request.inputs()};
   if (!request.json.empty()) outputs.json(request.json, json);
   if (!request.report.empty()) {
     const auto directory = outputs.directory(request.report);
@@ -177,9 +178,12 @@ void compare_slips(const CompareRequest& request) {
     draw(errors, directory);
     std::string pictures = fmt::format("![Direction errors by surface]({}.png)\n\n", errors.name);
     for (std::size_t i = 0; i < surfaces.size(); ++i) {
-      const Figure figure = section_figure(surfaces[i], scores[i]);
+      const std::string& surface = surfaces[i].surface;
+      const std::string name = file_stem(surface);
+      const Figure figure =
+          section_figure(surfaces[i], scores[i], name == surface ? name : fmt::format("{}_{}", name, i + 1));
       draw(figure, directory);
-      pictures += fmt::format("![Limit surface of {}]({}.png)\n\n", surfaces[i].surface, figure.name);
+      pictures += fmt::format("![Limit surface of {}]({}.png)\n\n", surface, figure.name);
     }
     write_text(directory / "report.md",
                fmt::format("# Limit surfaces from slips\n\n{}\n{}\n{}", heading, table.markdown(), pictures));

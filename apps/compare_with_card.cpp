@@ -6,6 +6,7 @@
 #include "apps/compare.hpp"
 #include "apps/figure.hpp"
 #include "apps/measured_report.hpp"
+#include "apps/tell.hpp"
 #include "fitting/measured/measured_card.hpp"
 
 namespace unhand::apps {
@@ -44,7 +45,7 @@ void compare_with_card(const CompareRequest& request, const datasets::ThrowLog& 
   }
   if (found.train + found.test == 0)
     throw Unanswered(fmt::format("{}: no throw could be fitted", request.log));
-  for (const auto& [id, reason] : found.skipped) fmt::print(stderr, "unhand: throw {}: {}\n", id, reason);
+  for (const auto& [id, reason] : found.skipped) tell("unhand: throw {}: {}\n", id, reason);
 
   Json json = json_head("compare");
   json["log"] = request.log;
@@ -66,7 +67,7 @@ void compare_with_card(const CompareRequest& request, const datasets::ThrowLog& 
       "{}: {}\n{} {}, {} of them held out; each one's start is fitted, {} from {}\n", request.log, log.title,
       found.train + found.test, found.kind, found.test,
       card.effects.empty() ? "without effects" : fmt::format("{}", fmt::join(card.effects, ", ")), file);
-  Outputs outputs;
+  Outputs outputs{request.inputs()};
   if (!request.json.empty()) outputs.json(request.json, json);
   if (!request.report.empty()) {
     const auto directory = outputs.directory(request.report);

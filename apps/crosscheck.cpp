@@ -306,7 +306,7 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
                         table.text());
   }
   if (!any) throw Unanswered(fmt::format("{}: {} brings no throw to a landing", options.log, options.engine));
-  Outputs outputs;
+  Outputs outputs{{options.log, options.card}};
   if (!options.json.empty()) outputs.json(options.json, json);
   outputs.commit();
   fmt::print("{}: {} throws; mean absolute differences; mu {:.4f}, length {:.3f} mm, {} pads ({})\n{}",

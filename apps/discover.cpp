@@ -159,7 +159,7 @@ void discover(const DiscoverOptions& options, const Parser& parser) {
   const Discovery found = fitting::discover(log, options.log, request);
   if (found.verdict == fitting::Verdict::not_answered) throw Unanswered(found.message);
 
-  Outputs outputs;
+  Outputs outputs{{options.log}};
   const Json json = discovery_json(found, options.log, options.model);
   if (!options.json.empty()) outputs.json(options.json, json);
   if (!options.card.empty()) {

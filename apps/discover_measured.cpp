@@ -115,7 +115,7 @@ void discover_measured(MeasuredKind kind, const MeasuredRequest& request) {
     }
   }
   if (result.answer.verdict == fitting::Verdict::not_answered) throw Unanswered(result.answer.message);
-  Outputs outputs;
+  Outputs outputs{{request.log}};
   const Json json = measured_json(result);
   if (!request.json.empty()) outputs.json(request.json, json);
   if (!request.card.empty())

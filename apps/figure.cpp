@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <cctype>
 #include <cerrno>
 #include <cmath>
 #include <cstdlib>
@@ -84,7 +85,7 @@ std::string data_text(const Figure& figure) {
   for (std::size_t b = 0; b < figure.data.size(); ++b) {
     const DataBlock& block = figure.data[b];
     if (b > 0) out += "\n\n";
-    out += fmt::format("# {}: {}\n#", b, block.title);
+    out += fmt::format("# {}: {}\n#", b, quoted(block.title));
     for (const auto& column : block.columns) out += fmt::format(" {}", quoted(column));
     out += "\n";
     for (std::size_t i = 0; i < block.rows.size(); ++i) {
@@ -138,7 +139,18 @@ std::string script_text(const Figure& figure) {
 
 void require_gnuplot() { gnuplot(); }
 
+std::string file_stem(const std::string& text) {
+  std::string out = text;
+  for (char& c : out)
+    if (const bool ascii = static_cast<unsigned char>(c) < 128;
+        !ascii || (!std::isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '_' && c != '-'))
+      c = '_';
+  return out;
+}
+
 void draw(const Figure& figure, const fs::path& directory) {
+  if (figure.name != file_stem(figure.name))
+    throw std::logic_error("figure: the name " + figure.name + " is none for a file");
   const fs::path program = gnuplot();
   write_text(directory / (figure.name + ".dat"), data_text(figure));
   write_text(directory / (figure.name + ".gp"), script_text(figure));

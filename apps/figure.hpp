@@ -16,11 +16,15 @@ struct DataBlock {
 };
 
 struct Figure {
-  std::string name;              ///< stem of its files
+  std::string name;              ///< stem of its files, as file_stem() gives it
   double width{17}, height{11};  ///< [cm]; text is 9 points at this size
   std::vector<DataBlock> data;
   std::string script;  ///< plot commands; the data file is the variable DATA
 };
+
+/// The text with everything replaced by '_' but letters, digits and "._-" of ASCII: what is safe in the name
+/// of a file, in gnuplot and in a link.
+std::string file_stem(const std::string& text);
 
 /// Writes NAME.png and NAME.pdf, and beside them NAME.gp and NAME.dat from which `gnuplot NAME.gp` draws them
 /// again. Throws Unanswered if there is no gnuplot or it complains.

@@ -13,6 +13,7 @@
 #include "apps/output.hpp"
 #include "apps/release_figures.hpp"
 #include "apps/table.hpp"
+#include "apps/tell.hpp"
 #include "apps/throws.hpp"
 #include "experiment/compare.hpp"
 #include "experiment/synthetic_campaign.hpp"
@@ -34,7 +35,7 @@ struct Source {
 
 Source source_of(const FigureCommandOptions& options) {
   if (!options.log.empty()) return {options.log, read_throws(options.log)};
-  fmt::print(stderr, "unhand: no --log: drawn from the synthetic campaign quick12, seed 1\n");
+  tell("unhand: no --log: drawn from the synthetic campaign quick12, seed 1\n");
   return {"quick12 (synthetic)", experiment::generate_campaign(experiment::campaign_design("quick12"), 1)};
 }
 
@@ -223,7 +224,7 @@ void figure(const FigureCommandOptions& options) {
         fmt::format("no figure is called '{}'; there are {}, and all", options.name, fmt::join(names, ", ")));
   }
   const Source source = source_of(options);
-  Outputs outputs;
+  Outputs outputs{{options.log}};
   const auto folder = outputs.directory(options.out);
   std::vector<std::string> drawn;
   for (const Kind& k : kinds())

@@ -14,6 +14,7 @@
 #include "apps/compare_figures.hpp"
 #include "apps/figure.hpp"
 #include "apps/progress.hpp"
+#include "apps/tell.hpp"
 #include "apps/throws.hpp"
 #include "fitting/slips/slip_surface.hpp"
 
@@ -100,7 +101,7 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
   if (folds > 0 && conditions_of_train(log) < 2) {
     if (request.kfold > 0)
       throw Unanswered(fmt::format("{}: --kfold needs two conditions among the train throws", request.log));
-    fmt::print(stderr, "unhand: no test throws and one condition only: no held-out errors\n");
+    tell("unhand: no test throws and one condition only: no held-out errors\n");
     folds = 0;
   }
   progress.step();
@@ -119,18 +120,17 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
   if (request.floor > 0)
     answer.floor = fitting::error_floor(log, request.log, problem, fit, options, request.floor);
   if (fit.outcome == fitting::FitOutcome::iterations_spent)
-    fmt::print(stderr, "unhand: the fit stopped before it had converged: {}\n", fit.message);
+    tell("unhand: the fit stopped before it had converged: {}\n", fit.message);
 
   for (const auto& m : fit.misfit)
     if (m.chi2_per_sample() > kWildMisfit)
-      fmt::print(
-          stderr,
+      tell(
           "unhand: {} ({}) is off by {:.0f} sigma: it hardly counts in the fit. Another unit, clock or "
           "frame, or not this model?\n",
           to_string(m.channel), to_string(m.phase), std::sqrt(m.chi2_per_sample()));
 
   const Json json = fit_json(answer, request);
-  Outputs outputs;
+  Outputs outputs{{request.log}};
   if (!request.json.empty()) outputs.json(request.json, json);
   if (!request.report.empty()) write_report(answer, request, json, outputs.directory(request.report));
   if (!request.card.empty()) outputs.text(request.card, datasets::to_json(made_card(answer, request, log)));
@@ -143,7 +143,6 @@ void fit(const FitRequest& request, const Parser& parser) {
   require_writable(request.json);
   require_writable(request.card);
   require_writable_directory(request.report);
-  if (!request.report.empty()) require_gnuplot();
   const bool surface = among(surface_names(), request.model);
   if (datasets::read_schema_name(request.log) == "slip-log") {
     if (!surface)
@@ -155,6 +154,7 @@ void fit(const FitRequest& request, const Parser& parser) {
     fit_slips(request);
     return;
   }
+  if (!request.report.empty()) require_gnuplot();
   if (surface)
     throw datasets::LogError(
         request.log, "/throws",

@@ -5,6 +5,7 @@
 
 #include "apps/command.hpp"
 #include "apps/fit.hpp"
+#include "apps/tell.hpp"
 #include "fitting/slips/compare_surfaces.hpp"
 
 namespace unhand::apps {
@@ -89,7 +90,7 @@ void fit_slips(const FitRequest& request) {
   bool any = false;
   for (const auto& score : scores) {
     any = any || score.fit.fitted();
-    if (!score.fit.fitted()) fmt::print(stderr, "unhand: {}\n", score.fit.reason);
+    if (!score.fit.fitted()) tell("unhand: {}\n", score.fit.reason);
   }
   if (!any) throw Unanswered(fmt::format("{}: {} was fitted to no surface", request.log, request.model));
 
@@ -114,7 +115,7 @@ void fit_slips(const FitRequest& request) {
   json["folds"] = options.folds;
   for (std::size_t i = 0; i < surfaces.size(); ++i)
     json["surfaces"][surfaces[i].surface] = surface_json(scores[i]);
-  Outputs outputs;
+  Outputs outputs{{request.log}};
   if (!request.json.empty()) outputs.json(request.json, json);
   if (!request.card.empty())
     outputs.text(request.card, datasets::to_json(slip_card(request, surfaces, scores)));

@@ -171,7 +171,7 @@ void import(ImportOptions& options) {
       throw WrongUsage(fmt::format("--block-outline and --block-mass are not for {}", options.format));
     require_writable(options.out);
     require_writable(options.json);
-    Outputs outputs;
+    Outputs outputs{{options.inputs.begin(), options.inputs.end()}};
     const Imported imported = format.read(options, outputs);
     if (!options.json.empty()) {
       Json report = json_head("import");

@@ -150,7 +150,7 @@ void inspect(const InspectOptions& options) {
     return;
   }
   if (!options.json.empty()) {
-    Outputs outputs;
+    Outputs outputs{{options.log}};
     outputs.text(options.json, seen.json);
     outputs.commit();
   }

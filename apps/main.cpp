@@ -9,6 +9,7 @@
 #include "apps/command.hpp"
 #include "apps/crosscheck.hpp"
 #include "apps/figure_command.hpp"
+#include "apps/tell.hpp"
 #include "apps/validate_sku.hpp"
 #include "datasets/log_error.hpp"
 
@@ -17,7 +18,7 @@ namespace {
 using namespace unhand::apps;
 
 int say(ExitCode code, const std::exception& error) {
-  fmt::print(stderr, "unhand: {}\n", error.what());
+  tell("unhand: {}\n", error.what());
   return code;
 }
 

@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstdlib>
@@ -48,6 +49,12 @@ void require_directory(const fs::path& wanted, const fs::path& directory) {
     refuse(wanted, fmt::format("no permission in {}", directory.string()));
 }
 
+/// Whether a path, both without links and dots, leads through the other one.
+bool is_below(const fs::path& path, const fs::path& other) {
+  return path != other &&
+         std::mismatch(path.begin(), path.end(), other.begin(), other.end()).second == other.end();
+}
+
 void put_in_place(const fs::path& made, const fs::path& destination) {
   std::error_code error;
   fs::rename(made, destination, error);
@@ -80,11 +87,26 @@ fs::path Outputs::part_of(const fs::path& destination) {
   return nearest_existing(parent_of(destination)) / name;
 }
 
-fs::path Outputs::add(const fs::path& destination, bool is_directory) {
+void Outputs::require_other_than_inputs(const fs::path& destination) const {
   std::error_code error;
-  for (const Part& part : parts_)
-    if (fs::weakly_canonical(part.destination, error) == fs::weakly_canonical(destination, error))
-      throw WrongUsage(fmt::format("two outputs are to be {}", destination.string()));
+  for (const fs::path& input : inputs_)
+    if (!input.empty() && fs::equivalent(input, destination, error) && !error)
+      throw WrongUsage(fmt::format("{} is read: it cannot be an output too", destination.string()));
+}
+
+fs::path Outputs::add(const fs::path& wanted, bool is_directory) {
+  std::error_code error;
+  const fs::path destination = fs::is_symlink(wanted, error) ? fs::weakly_canonical(wanted, error) : wanted;
+  if (!is_directory) require_other_than_inputs(destination);
+  for (const Part& part : parts_) {
+    const fs::path one = fs::weakly_canonical(part.destination, error),
+                   other = fs::weakly_canonical(destination, error);
+    if (one == other) throw WrongUsage(fmt::format("two outputs are to be {}", wanted.string()));
+    if ((!part.is_directory && is_below(other, one)) || (!is_directory && is_below(one, other)))
+      throw WrongUsage(fmt::format("{} and {}: one output is to be a file, the other one below it",
+                                   part.destination.string(), wanted.string()));
+  }
+  remove_leftovers(nearest_existing(parent_of(destination)), destination.filename().string());
   parts_.push_back({part_of(destination), destination, is_directory});
   return parts_.back().made;
 }
@@ -123,18 +145,25 @@ fs::path Outputs::directory(const fs::path& destination) {
 }
 
 void Outputs::commit() {
+  std::error_code error;
+  std::vector<std::pair<fs::path, fs::path>> moves;  // from, to
   for (const Part& part : parts_) {
-    std::error_code error;
     if (!part.is_directory) {
-      put_in_place(part.made, part.destination);
+      moves.emplace_back(part.made, part.destination);
       continue;
     }
     fs::create_directories(part.destination, error);
     if (error) refuse(part.destination, error.message());
     for (const auto& entry : fs::directory_iterator(part.made))
-      put_in_place(entry.path(), part.destination / entry.path().filename());
-    fs::remove(part.made, error);
+      moves.emplace_back(entry.path(), part.destination / entry.path().filename());
   }
+  for (const auto& [from, to] : moves) {  // all that is known to fail, before the first one is in place
+    require_other_than_inputs(to);
+    if (!fs::is_directory(from, error)) require_writable(to);
+  }
+  for (const auto& [from, to] : moves) put_in_place(from, to);
+  for (const Part& part : parts_)
+    if (part.is_directory) fs::remove(part.made, error);
   parts_.clear();
 }
 
@@ -142,6 +171,9 @@ void require_writable(const fs::path& file) {
   if (file.empty()) return;
   std::error_code error;
   if (fs::is_directory(file, error)) refuse(file, "it is a directory");
+  if (fs::exists(file, error) && !fs::is_regular_file(file, error)) refuse(file, "it is no regular file");
+  if (fs::is_symlink(file, error) && !fs::exists(file, error))
+    refuse(file, "it is a link that leads nowhere");
   require_directory(file, parent_of(file));
 }
 

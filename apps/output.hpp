@@ -27,11 +27,14 @@ inline std::string json_text(const Json& value) { return value.dump(1) + "\n"; }
 void write_text(const std::filesystem::path& file, const std::string& content);
 
 /// The files and directories that one run leaves. Everything is made beside its destination first; commit()
-/// then renames, replacing files of the same names. Without commit() nothing stays. Throws Unanswered where
-/// something cannot be written.
+/// then renames, replacing files of the same names; behind a symbolic link, the file that it leads to.
+/// Without commit() nothing stays. Throws Unanswered where something cannot be written, and WrongUsage for an
+/// output that is an input, the same as another output, or below one that is a file.
 class Outputs {
  public:
   Outputs() = default;
+  /// `inputs`: what the run reads, which no output may replace; empty paths are ignored.
+  explicit Outputs(std::vector<std::filesystem::path> inputs) : inputs_(std::move(inputs)) {}
   Outputs(const Outputs&) = delete;
   Outputs& operator=(const Outputs&) = delete;
   ~Outputs();
@@ -56,14 +59,16 @@ class Outputs {
   template <class Write>
   void made_by(const std::filesystem::path& file, Write&& write);
   std::filesystem::path part_of(const std::filesystem::path& destination);
-  /// Where to make what goes to `destination`. Throws WrongUsage for one that another output goes to.
+  void require_other_than_inputs(const std::filesystem::path& destination) const;
+  /// Where to make what goes to `destination`.
   std::filesystem::path add(const std::filesystem::path& destination, bool is_directory);
 
+  std::vector<std::filesystem::path> inputs_;
   std::vector<Part> parts_;
 };
 
-/// Finds out before the work begins that a file cannot be written there. An empty path passes. Throws
-/// Unanswered.
+/// Finds out before the work begins that a file cannot be written there: no directory to write it in, or
+/// something that is no regular file in its place. An empty path passes. Throws Unanswered.
 void require_writable(const std::filesystem::path& file);
 /// The same of a directory, which need not exist yet.
 void require_writable_directory(const std::filesystem::path& directory);

@@ -243,7 +243,7 @@ void run(const PlanElasticOptions& o) {
   }
   require_writable(o.json);
   const el::ClutchedArm arm = el::read_clutched_arm(o.arm);
-  Outputs outputs;
+  Outputs outputs{{o.arm}};
   Json json = json_head("plan-elastic");
   json["arm"] = arm.chain.name;
   if (o.target_x > 0)

@@ -12,6 +12,7 @@
 #include "apps/flip_store.hpp"
 #include "apps/numbers.hpp"
 #include "apps/plan.hpp"
+#include "apps/tell.hpp"
 #include "datasets/log_error.hpp"
 #include "datasets/sku.hpp"
 #include "fitting/card.hpp"
@@ -84,8 +85,7 @@ void check_reach(const fl::FlipTarget& target, const fl::HandLibrary& library) {
         x, angle / kDegree, low.x - beyond_x, high.x + beyond_x, (low.angle - beyond_angle) / kDegree,
         (high.angle + beyond_angle) / kDegree, low.x, high.x, low.angle / kDegree, high.angle / kDegree));
   if (error > std::numbers::sqrt2)
-    fmt::print(
-        stderr,
+    tell(
         "unhand: note: out of reach of the robot as declared; nearest to the target it lands this bar at "
         "{:.2f} m, {:.0f} degrees\n",
         nearest.x, nearest.angle / kDegree);
@@ -170,7 +170,7 @@ void run(const PlanFlipOptions& o) {
   fmt::print("{}", text_of(answer));
   if (store && store->recalled() > 0)
     fmt::print("{} throws recalled, {} thrown now\n", store->recalled(), store->thrown());
-  Outputs outputs;
+  Outputs outputs{{o.sku, o.card}};
   if (!o.report.empty()) write_report(answer, outputs.directory(o.report));
   if (!o.json.empty()) outputs.json(o.json, json_of(answer));
   outputs.commit();

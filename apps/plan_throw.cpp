@@ -13,6 +13,7 @@
 #include "apps/figure.hpp"
 #include "apps/numbers.hpp"
 #include "apps/plan.hpp"
+#include "apps/tell.hpp"
 #include "datasets/model_card.hpp"
 #include "datasets/sku.hpp"
 #include "planners/arm/chain_file.hpp"
@@ -139,8 +140,7 @@ void plan_release(ThrowAnswer& a, const Chain& pads, planners::ReleaseThrow rele
     a.predicted.insert(a.predicted.begin(), by_release("insensitive motion", a, release, options));
     return;
   }
-  fmt::print(stderr,
-             "unhand: no motion to the insensitive throw stays within the limits; the tube's is kept\n");
+  tell("unhand: no motion to the insensitive throw stays within the limits; the tube's is kept\n");
 }
 
 void plan_throw(const PlanThrowOptions& options) {
@@ -193,7 +193,7 @@ void plan_throw(const PlanThrowOptions& options) {
         by_delay("no acceleration", answer, planners::JointVector<double>::Zero(pads.size()), options)};
   }
 
-  Outputs outputs;
+  Outputs outputs{{options.arm, options.card, options.sku}};
   if (!options.json.empty()) {
     Json json = json_head("plan-throw");
     json["arm"] = options.arm;

@@ -9,6 +9,7 @@
 #include "apps/output.hpp"
 #include "apps/plan.hpp"
 #include "apps/table.hpp"
+#include "apps/tell.hpp"
 #include "planners/elastic/throw_refinement.hpp"
 #include "planners/elastic/throw_table.hpp"
 
@@ -120,8 +121,7 @@ void run(const PlanWristOptions& o) {
   for (std::size_t k = points.size() - 1; k > 0; --k) follow(arm, o, points[k], points[k - 1]);
   for (std::size_t k = 1; k < points.size(); ++k) follow(arm, o, points[k - 1], points[k]);
   for (const Point& p : points)
-    if (p.speed == 0)
-      fmt::print(stderr, "{:.2f} N m/rad: no throw was found that its run confirms\n", p.stiffness);
+    if (p.speed == 0) tell("{:.2f} N m/rad: no throw was found that its run confirms\n", p.stiffness);
   std::erase_if(points, [](const Point& p) { return p.speed == 0; });
   if (points.empty()) throw Unanswered("no throw with the spring was found that its run confirms");
 
@@ -160,7 +160,7 @@ void run(const PlanWristOptions& o) {
                                          [](const Point& a, const Point& b) { return a.speed < b.speed; });
   fmt::print("{}\nbest stiffness {:.2f} N m/rad: {:.2f} m/s, {:.2f} times the rigid wrist's {:.2f} m/s\n",
              table.text(), best->stiffness, best->speed, best->speed / rigid.speed, rigid.speed);
-  Outputs outputs;
+  Outputs outputs{{o.arm}};
   if (!o.report.empty()) {
     const fs::path folder = outputs.directory(o.report);
     draw_gain(points, rigid, folder);

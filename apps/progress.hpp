@@ -10,6 +10,8 @@
 #include <string>
 #include <utility>
 
+#include "apps/tell.hpp"
+
 namespace unhand::apps {
 
 /// Steps may come from any thread. The bar is wiped when it goes out of scope.
@@ -24,7 +26,7 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
   ~Progress() {
-    if (shown_) fmt::print(stderr, "\r\x1b[K");
+    if (shown_) tell("\r\x1b[K");
   }
 
   void step() {
@@ -40,8 +42,7 @@ class Progress {
     const auto percent = static_cast<int>(100 * std::min(at_, total_) / total_);
     if (!shown_ || percent == last_) return;
     last_ = percent;
-    fmt::print(stderr, "\r\x1b[K{} [{}{}] {}%", label_, std::string(full, '='),
-               std::string(cells - full, ' '), percent);
+    tell("\r\x1b[K{} [{}{}] {}%", label_, std::string(full, '='), std::string(cells - full, ' '), percent);
     std::fflush(stderr);
   }
 

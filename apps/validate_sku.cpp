@@ -68,7 +68,7 @@ void validate(ValidateSkuOptions options) {
   }
   const auto answer = fitting::validate_sku(question.sku, question.card, options.card, request);
   const Json json = sku_json(question, answer);
-  Outputs outputs;
+  Outputs outputs{{options.sku, options.card, options.log}};
   if (!options.json.empty()) outputs.json(options.json, json);
   if (!options.report.empty()) write_report(question, answer, json, outputs.directory(options.report));
   outputs.commit();

@@ -68,6 +68,9 @@ void validate(const FrictionVariation<Dual>& v) {
           "[0, 0.001] m/N");
   require(v.loss_time.a >= 0 && v.loss_time.a <= 0.1, "pad_compliance.loss_time", v.loss_time.a,
           "[0, 0.1] s");
+  require(v.adhesion.a >= 0 && v.adhesion.a <= 50, "adhesion.f_adh", v.adhesion.a, "[0, 50] N");
+  require(v.parting_time.a >= 0 && v.parting_time.a <= 0.1, "adhesion.parting_time", v.parting_time.a,
+          "[0, 0.1] s");
 }
 
 std::span<const dynamics::EffectOn<FrictionVariation>> friction_effects() {

@@ -33,8 +33,8 @@ FrictionVariation<Dual> constant(const FrictionVariation<S>& v) {
 /// Without derivatives.
 FrictionVariation<double> values(const FrictionVariation<Dual>& v);
 
-/// Throws std::invalid_argument, naming parameter, value and accepted range: those of friction_effects(), and
-/// f₀ > 0 where the patch is soft.
+/// Throws std::invalid_argument, naming parameter, value and accepted range: those of friction_effects(), a
+/// parting time of 0 besides, and f₀ > 0 where the patch is soft.
 void validate(const FrictionVariation<Dual>& v);
 
 /// contact.stribeck, contact.viscous, contact.soft_patch_radius, contact.pressure_profile,
@@ -67,7 +67,7 @@ class AdhesiveForce final : public NormalForce {
 /// was seen. b [N] is reported minus true. `base` must outlive it.
 class BiasedForce final : public NormalForce {
  public:
-  /// `bias` b [N], at most 1000 N in size; `opening_start` [s], when the grip begins to open.
+  /// `bias` b [N]; `opening_start` [s], when the grip begins to open.
   BiasedForce(const NormalForce& base, const Dual& bias, double opening_start);
   double at(const Window& window, double t) const override { return at_(window, t); }
   Dual at(const Window& window, const Dual& t) const override { return at_(window, t); }

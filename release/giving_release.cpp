@@ -21,7 +21,7 @@ constexpr double kStep = 5e-4, kStepTolerance = 1e-5, kShortest = 2.5e-5;
 
 double step_for(const dynamics::IntegratorOptions& options) {
   const double step = kStep * std::sqrt(options.tolerances.relative / kStepTolerance);
-  return std::clamp(step, kShortest, std::min(kStep, options.longest_step));
+  return std::min(std::clamp(step, kShortest, kStep), options.longest_step);
 }
 
 template <class S>
@@ -119,11 +119,6 @@ bool is_finite(const Relative<S>& y) {
   return std::all_of(state.begin(), state.end(), [](const S& x) { return std::isfinite(value_of(x)); });
 }
 
-template <class S>
-Scene<S> scene_at(const contact::SceneSource& scenes, const dynamics::Window& window, const S& t) {
-  return scenes.scene(window, t);
-}
-
 }  // namespace
 
 template <class S>
@@ -146,10 +141,10 @@ ReleaseResult<S> simulate_giving_release(const ReleaseProblem<S>& problem, const
   const auto ended = [&](Outcome outcome) {
     result.integration = outcome;
     result.relative = at.relative;
-    const Scene<S> scene = scene_at(scenes, window, t);
+    const Scene<S> scene = scenes.scene(window, t);
     result.detach = {t, object_pose(scene, at.relative), object_twist(scene, at.relative)};
   };
-  if (!stepper.load(scene_at(scenes, window, t), at)) {
+  if (!stepper.load(scenes.scene(window, t), at)) {
     ended(Outcome::step_budget_spent);
     return result;
   }
@@ -164,14 +159,14 @@ ReleaseResult<S> simulate_giving_release(const ReleaseProblem<S>& problem, const
       return result;
     }
     const long steps = std::max(1L, static_cast<long>(needed));
-    State<S, 6> rate = rate_of(at, scene_at(scenes, window, t));
+    State<S, 6> rate = rate_of(at, scenes.scene(window, t));
     for (long k = 1; k <= steps; ++k) {
       const S next =
           k == steps ? stop : S(from + (stop - from) * (static_cast<double>(k) / static_cast<double>(steps)));
       const S h = next - t, middle = t + 0.5 * h;
-      const Scene<S> there = scene_at(scenes, window, next);
+      const Scene<S> there = scenes.scene(window, next);
       if (!stepper.step(h, there, at, coarse) ||
-          !stepper.step(S(0.5 * h), scene_at(scenes, window, middle), at, half) ||
+          !stepper.step(S(0.5 * h), scenes.scene(window, middle), at, half) ||
           !stepper.step(S(0.5 * h), there, half, fine)) {
         ended(is_finite(coarse.relative) && is_finite(fine.relative) ? Outcome::step_budget_spent
                                                                      : Outcome::not_finite);

@@ -110,10 +110,7 @@ ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const Releas
   const double at = value_of(solution.t);
   const auto after = std::lower_bound(times.begin(), times.end(), at - 1e-12);
   const Window last{after == times.begin() ? problem.start : *std::prev(after), at};
-  const Scene<S> scene = problem.start < system.separation() ? [&] {
-    if constexpr (std::is_same_v<S, double>) return system.scene(last, at);
-    else return system.scene(last, solution.t);
-  }() : system.scene(first, solution.t);
+  const Scene<S> scene = system.scene(problem.start < system.separation() ? last : first, solution.t);
   result.relative = Relative<S>::from(solution.y);
   result.detach = {solution.t, object_pose(scene, result.relative), object_twist(scene, result.relative)};
   if constexpr (std::is_same_v<S, double>)

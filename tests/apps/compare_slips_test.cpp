@@ -21,6 +21,29 @@ datasets::Surface logged(const fitting::SlipSamples& slips) {
   return out;
 }
 
+// Names of surfaces are text of whoever made the log.
+TEST_F(Cli, SurfacesMayHaveAnyName) {
+  datasets::SlipLog log;
+  const Eigen::Matrix3d along = Eigen::Vector3d(1 / 16.0, 1 / 9.0, 1 / 25.0).asDiagonal();
+  const auto slips = logged(fitting::test::simulate(fitting::test::ellipsoid(along), 12, 0.1, 0.1, 21));
+  const std::string names[] = {"John's felt", "a'; system('touch called'); b='", "felt",
+                               "Über `touch called`"};
+  for (const auto& name : names) log.surfaces[name] = slips;
+  datasets::write_slip_log(folder / "slips.h5", log);
+  const Answer answer = run("compare slips.h5 --models ellipsoid --fit --report r");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const std::string report = content(folder / "r/report.md");
+  std::set<std::string> sections;
+  for (const auto& file : files()) {
+    EXPECT_NE(fs::path(file).filename(), "called") << "a name ran as a command";
+    if (file.starts_with("r/section_") && file.ends_with(".png")) sections.insert(file.substr(2));
+  }
+  EXPECT_EQ(sections.size(), 4u);
+  EXPECT_TRUE(sections.contains("section_felt.png"));
+  for (const auto& picture : sections) EXPECT_THAT(report, HasSubstr("](" + picture + ")"));
+  for (const auto& name : names) EXPECT_THAT(report, HasSubstr(name));
+}
+
 TEST_F(Cli, CompareSlipsSaysWhatTheSurfacesErrOf) {
   using fitting::SurfaceModel;
   const Eigen::Matrix3d along = Eigen::Vector3d(1 / 16.0, 1 / 9.0, 1 / 25.0).asDiagonal();

@@ -1,4 +1,6 @@
 // Help, refusals and the commands that make and show logs.
+#include <sys/stat.h>
+
 #include "tests/apps/cli.hpp"
 
 namespace unhand::cli {
@@ -33,8 +35,8 @@ TEST_F(Cli, HelpHasAnExampleEverywhere) {
     EXPECT_EQ(answer.code, 0) << command;
     const auto inner = commands_in(answer.out, command + " ");
     commands.insert(commands.end(), inner.begin(), inner.end());
-    if (!inner.empty()) continue;  // the examples are theirs
     EXPECT_THAT(answer.out, HasSubstr("Example")) << command;
+    if (!inner.empty()) continue;
     EXPECT_THAT(answer.out, HasSubstr("--json")) << command;
     EXPECT_THAT(answer.out, HasSubstr("--threads")) << command;
   }
@@ -121,6 +123,65 @@ TEST_F(Cli, UnwritableOutputs) {
   expect_refusal("compare " + quick + models + " --json none/a.json --report r", 1, "cannot be written");
   expect_refusal("compare " + quick + models + " --json a.json --report file/r", 1, "cannot be written");
   expect_refusal("compare " + quick + models + " --json a.json --write-cards file", 1, "cannot be written");
+}
+
+TEST_F(Cli, NoOutputTakesThePlaceOfSomethingElse) {
+  ASSERT_EQ(run("generate quick12 --seed 3 --out log.h5").code, 0);
+  ASSERT_EQ(run("compare log.h5 --models gripper_delay --write-cards cards").code, 0);
+  std::ofstream(folder / "in.csv") << "a log of a robot";
+  fs::create_directories(folder / "taken/report.md");
+  fs::create_symlink("nowhere/at-all", folder / "astray");
+  fs::create_symlink("log.h5", folder / "same.h5");
+  ASSERT_EQ(mkfifo((folder / "pipe").c_str(), 0600), 0);
+  const std::string log = content(folder / "log.h5"), card = content(folder / "cards/gripper_delay.json");
+  const std::string compare = "compare log.h5 --models gripper_delay ";
+  for (const char* file : {"log.h5", "./log.h5", "same.h5", "cards/../log.h5"})
+    expect_refusal(std::string("inspect log.h5 --json ") + file, 2, "is read");
+  expect_refusal("fit log.h5 --model gripper_delay --card log.h5", 2, "is read");
+  expect_refusal("predict log.h5 --card cards/gripper_delay.json --csv cards/gripper_delay.json", 2,
+                 "is read");
+  expect_refusal("inspect log.h5 --json pipe", 1, "no regular file");
+  expect_refusal("inspect log.h5 --json astray", 1, "leads nowhere");
+  expect_refusal(compare + "--json r --report r/sub", 2, "one output is to be a file");
+  expect_refusal(compare + "--json r.json --report taken", 1, "it is a directory");
+  EXPECT_EQ(content(folder / "log.h5"), log);
+  EXPECT_EQ(content(folder / "cards/gripper_delay.json"), card);
+  EXPECT_TRUE(fs::is_fifo(folder / "pipe"));
+
+  // A link to a file stays one: what it leads to is replaced.
+  std::ofstream(folder / "old.json") << "old";
+  fs::create_symlink("old.json", folder / "link.json");
+  ASSERT_EQ(run("inspect log.h5 --json link.json").code, 0);
+  EXPECT_TRUE(fs::is_symlink(folder / "link.json"));
+  EXPECT_EQ(read_json(folder / "old.json")["schema"], "inspect");
+}
+
+TEST_F(Cli, WhatAKilledRunLeftIsClearedByTheNextOfThatName) {
+  const pid_t dead = fork();
+  if (dead == 0) _exit(0);
+  waitpid(dead, nullptr, 0);
+  const auto part = [&](const std::string& name, pid_t process) {
+    return folder / ("." + name + ".part-" + std::to_string(process) + "-0");
+  };
+  for (const auto& left : {part("a.json", dead), part("b.json", dead), part("a.json", getpid())})
+    std::ofstream(left) << "half of it";
+  ASSERT_EQ(run("inspect " + quick + " --json a.json").code, 0);
+  EXPECT_FALSE(fs::exists(part("a.json", dead)));
+  EXPECT_TRUE(fs::exists(part("b.json", dead))) << "of another name";
+  EXPECT_TRUE(fs::exists(part("a.json", getpid()))) << "of a process that lives";
+}
+
+TEST_F(Cli, ExitCodesDoNotDependOnStderr) {
+  for (const char* nowhere : {"2>&-", "2>/dev/full"}) {
+    const auto code = [&](const std::string& arguments) {
+      const int status = std::system(("'" UNHAND_BINARY "' " + arguments + " >/dev/null " + nowhere).c_str());
+      return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    };
+    EXPECT_EQ(code("inspect " + (folder / "none.h5").string()), 3) << nowhere;
+    EXPECT_EQ(code("generate quick12 --out /none/a.h5"), 1) << nowhere;
+    EXPECT_EQ(code("generate nonsense --out a.h5"), 2) << nowhere;
+    EXPECT_EQ(code("inspect '" + quick + "'"), 0) << nowhere;
+  }
 }
 
 TEST_F(Cli, GenerateIsRepeatable) {
