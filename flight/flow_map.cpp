@@ -105,9 +105,9 @@ double tube_level(const PlaneState<double>& release, const LandingSet& set, cons
 std::vector<PlaneState<double>> sample_tube(const LandingSet& set, const Medium& medium,
                                             const TubeSampling& sampling) {
   validate(set);
-  if (sampling.count < 0 || !(sampling.longest > 0) || sampling.boundary_every < 1)
+  if (sampling.count < 0 || !(sampling.longest > 0 && sampling.longest <= 100) || sampling.boundary_every < 1)
     throw std::invalid_argument(
-        "sample_tube: count >= 0, longest > 0 s and boundary_every >= 1 are asked for");
+        "sample_tube: count >= 0, longest in (0, 100] s and boundary_every >= 1 are asked for");
   std::mt19937_64 random(sampling.seed);
   std::uniform_real_distribution<double> unit(0, 1);
   const std::array<std::array<double, 2>, 3> ranges{{{-set.half_length, set.half_length},

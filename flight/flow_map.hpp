@@ -56,11 +56,11 @@ double tube_level(const PlaneState<double>& release, const LandingSet& set, cons
 /// backward from landings drawn from it. Every `boundary_every`-th sample comes from the set's boundary.
 struct TubeSampling {
   int count{1000};        ///< samples, >= 0
-  double longest{1.0};    ///< s
+  double longest{1.0};    ///< in (0, 100] s
   int boundary_every{4};  ///< every how many samples one lies on the boundary
   std::uint64_t seed{1};  ///< the same seed gives the same samples
 };
-/// States of the tube, in the order drawn.
+/// States of the tube, in the order drawn. Throws std::invalid_argument for a sampling out of range.
 std::vector<PlaneState<double>> sample_tube(const LandingSet& set, const Medium& medium,
                                             const TubeSampling& sampling = {});
 

@@ -109,6 +109,8 @@ TEST(ReachableTube, SampledAndImplicitFormsAgree) {
 }
 
 TEST(ReachableTube, RefusesWhatIsNoSet) {
+  for (const double longest : {0.0, 1e7, std::nan("")})
+    EXPECT_THROW(sample_tube({0.1, 0.8, 3.0, -5, -0.5}, {9.81, 0.1}, {10, longest}), std::invalid_argument);
   EXPECT_THROW(tube_level({}, {0.0}, {}), std::invalid_argument);
   EXPECT_THROW(tube_level({}, {0.1, 2, 1}, {}), std::invalid_argument);
   EXPECT_THROW(tube_level({}, {0.1, 0, 1, -1, 1}, {}), std::invalid_argument);
