@@ -119,6 +119,14 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
     answer.cross_validation = fitting::cross_validate(log, request.log, campaign, options, folds);
   if (request.floor > 0)
     answer.floor = fitting::error_floor(log, request.log, problem, fit, options, request.floor);
+  std::vector<std::string> left_out;
+  for (std::size_t i = 0; i < fit.throws.size(); ++i)
+    if (log.throws[i].split == datasets::Split::train && !fit.throws[i].used)
+      left_out.push_back(log.throws[i].id);
+  if (!left_out.empty())
+    tell(
+        "unhand: fitted without {} of the train throws, which {} cannot simulate or which show nothing: {}\n",
+        left_out.size(), request.model, fmt::join(left_out, ", "));
   if (fit.outcome == fitting::FitOutcome::iterations_spent)
     tell("unhand: the fit stopped before it had converged: {}\n", fit.message);
 

@@ -4,6 +4,21 @@
 namespace unhand::cli {
 namespace {
 
+// A hand that is logged no longer than the object is held: the throw cannot be simulated, and that is said.
+TEST_F(Cli, FitSaysWhichThrowsItLeavesOut) {
+  write_changed("short.h5", [](datasets::Throw& one) {
+    if (one.id != "001") return;
+    const std::size_t rows = one.hand->time.rows / 3;
+    for (datasets::Series* s : {&one.hand->time, &one.hand->pose, &one.hand->twist, &one.hand->acceleration})
+      s->rows = rows, s->data.resize(rows * s->cols);
+  });
+  const Answer answer = run("fit short.h5 --model sliding_pivot");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("fitted to 7 of 8 train throws"));
+  EXPECT_THAT(answer.err, HasSubstr("without 1 of the train throws"));
+  EXPECT_THAT(answer.err, HasSubstr(": 001\n"));
+}
+
 TEST_F(Cli, FitThenPredict) {
   const Answer answer =
       run("fit " + quick + " --model limit_surface_disc --card c.json --json f.json --report r");
