@@ -1,8 +1,8 @@
 // The inverse of a small dense matrix, for solving with it many times.
 #pragma once
 
-#include <Eigen/Core>
 #include <cmath>
+#include <cstring>
 #include <utility>
 
 namespace unhand::dynamics {
@@ -35,21 +35,27 @@ class SmallInverse {
     for (int p = 0; p < kPairs; ++p) sum[p] = x[0] * column_[0][p];
     for (int j = 1; j < N; ++j)
       for (int p = 0; p < kPairs; ++p) sum[p] += x[j] * column_[j][p];
-    for (int p = 0; p < kPairs; ++p) Eigen::Map<Pair>{y + 2 * p} = sum[p];
+    std::memcpy(y, sum, sizeof y);
   }
 
  private:
   // Registers of two, read and written as a whole: the compiler on its own takes sums of this length apart,
   // and a register that is read after half of it was written waits for the store.
-  using Pair = Eigen::Array2d;
+  using Pair [[gnu::vector_size(16)]] = double;
   static constexpr int kPairs = kPadded / 2;
   enum Pivots { kDiagonal, kByRows };
 
   void fill(const double (&a)[N][N]) {
     for (int j = 0; j < N; ++j)
-      for (int p = 0; p < kPairs; ++p) column_[j][p] = Pair{a[2 * p][j], 2 * p + 1 < N ? a[2 * p + 1][j] : 0};
+      for (int p = 0; p < kPairs; ++p)
+        column_[j][p] = Pair{a[2 * p][j], 2 * p + 1 < N ? a[2 * p + 1][j] : 0.0};
   }
   double entry(int i, int k) const { return column_[i][k / 2][k % 2]; }
+  void swap_entries(int i, int k, int l) {
+    const double kept = entry(i, k);
+    column_[i][k / 2][k % 2] = entry(i, l);
+    column_[i][l / 2][l % 2] = kept;
+  }
 
   /// False if a pivot on the diagonal is too small.
   bool eliminate(Pivots pivots) {
@@ -68,7 +74,7 @@ class SmallInverse {
         from[k] = most;
         if (most != k) std::swap(column_[k], column_[most]);
       }
-      const Pair unit(k % 2 == 0, k % 2 == 1), others = 1 - unit;
+      const Pair unit{k % 2 == 0 ? 1.0 : 0.0, k % 2 == 1 ? 1.0 : 0.0}, others = 1 - unit;
       const double pivot = 1 / entry(k, k);
       column_[k][k / 2] = column_[k][k / 2] * others + unit;
       for (int p = 0; p < kPairs; ++p) column_[k][p] *= pivot;
@@ -82,8 +88,7 @@ class SmallInverse {
     if (pivots == kByRows)  // rows exchanged before are columns exchanged after
       for (int k = N; k-- > 0;)
         if (from[k] != k)
-          for (int i = 0; i < N; ++i)
-            std::swap(column_[i][k / 2][k % 2], column_[i][from[k] / 2][from[k] % 2]);
+          for (int i = 0; i < N; ++i) swap_entries(i, k, from[k]);
     return true;
   }
 

@@ -13,7 +13,6 @@
 
 namespace unhand::experiment {
 
-using contact::Vec3;
 using dynamics::Dual;
 
 namespace {
@@ -48,7 +47,7 @@ std::vector<Sample> slipping_samples(const datasets::ThrowLog& log,
 /// The sliding pivot's, whose limits of force and torque know nothing of each other.
 struct Decoupled {
   template <class S>
-  S gauge(const Vec3<S>& w) const {
+  S gauge(const contact::Vec3<S>& w) const {
     using std::abs;
     using std::hypot;
     const S force = hypot(w[0], w[1]), torque = abs(w[2]);
@@ -67,7 +66,7 @@ void solve(const Shape& shape, const std::vector<Sample>& samples, double& mu, d
     std::vector<Dual> r(samples.size());
     for (std::size_t i = 0; i < samples.size(); ++i) {
       const Sample& s = samples[i];
-      r[i] = shape.gauge(Vec3<Dual>{s.fx / mu_d, s.fz / mu_d, s.tau / (mu_d * length_d)}) - 1.0;
+      r[i] = shape.gauge(contact::Vec3<Dual>{s.fx / mu_d, s.fz / mu_d, s.tau / (mu_d * length_d)}) - 1.0;
       residuals[i] = std::abs(r[i].a);
     }
     scatter = 1.4826 * dynamics::median(residuals);
