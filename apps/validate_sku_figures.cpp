@@ -99,7 +99,7 @@ Figure sku_budget_figure(const SkuQuestion& question, const SkuValidation& answe
     block.rows.push_back({static_cast<double>(i), 100 * line.x, line.theta * kDegrees, 100 * line.share});
     block.labels.push_back(line.input.name);
     tics += fmt::format("{}'{} ({}, {:.0f} %%)' {}", i > 0 ? ", " : "", plain(line.input.name),
-                        to_string(line.input.source), 100 * line.share, i);
+                        to_string(line.input.source), std::round(100 * line.share) + 0.0, i);  // no "-0"
   }
   figure.data.push_back(std::move(block));
   constexpr double left = 6.6, gap = 0.5;

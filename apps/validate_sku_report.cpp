@@ -21,6 +21,9 @@ Json json_of(const fitting::LandingSpread& s) {
           {"bias_theta_deg", s.bias_theta * kDegrees}};
 }
 
+/// A share of a variance; covariances may make it a little less than nothing, which is no "-0.0 %".
+std::string percent(double share) { return fmt::format("{:.1f} %", std::round(1000 * share) / 10 + 0.0); }
+
 Table budget_table(const SkuValidation& answer) {
   Table out{
       {"input", "known from", "value", "1 sigma", "unit", "landing x [cm]", "theta [deg]", "share", "bend"},
@@ -31,7 +34,7 @@ Table budget_table(const SkuValidation& answer) {
                         fmt::format("{:.4g}", line.input.value), fmt::format("{:.2g}", line.input.sigma),
                         line.input.unit, fmt::format("{:.2f}", 100 * line.x),
                         fmt::format("{:.2f}", line.theta * kDegrees),
-                        fmt::format("{:.1f} %", 100 * line.share), fmt::format("{:.2f}", line.curvature)});
+                        percent(line.share), fmt::format("{:.2f}", line.curvature)});
   return out;
 }
 
@@ -39,7 +42,7 @@ Table gain_table(const SkuValidation& answer) {
   Table out{{"measurement", "of", "takes off the variance"}, {}, 2};
   for (const auto& gain : answer.gains)
     out.rows.push_back({gain.measurement, fmt::format("{}", fmt::join(gain.inputs, ", ")),
-                        fmt::format("{:.1f} %", 100 * gain.share)});
+                        percent(gain.share)});
   return out;
 }
 

@@ -64,7 +64,9 @@ int main() {
   fmt::print(
       "# Validation\n\n```sh\nbuild/release/bench/validation > docs/validation.md\n```\n\n"
       "What the numbers can be held against, computed by the library as it is built: closed forms, other "
-      "codes, other engines. More about\n"
+      "codes, other engines (those that are\n"
+      "installed; on Debian libmujoco-dev and libsiconos-kernel-dev bring two that `./setup` does not). More "
+      "about\n"
       "each, over directions, orders and laws, is in [tests/truth](../tests/truth), "
       "[tests/dynamics](../tests/dynamics) and [tests/contract](../tests/contract).\n");
   Count count;
