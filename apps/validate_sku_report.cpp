@@ -33,16 +33,16 @@ Table budget_table(const SkuValidation& answer) {
     out.rows.push_back({line.input.name, to_string(line.input.source),
                         fmt::format("{:.4g}", line.input.value), fmt::format("{:.2g}", line.input.sigma),
                         line.input.unit, fmt::format("{:.2f}", 100 * line.x),
-                        fmt::format("{:.2f}", line.theta * kDegrees),
-                        percent(line.share), fmt::format("{:.2f}", line.curvature)});
+                        fmt::format("{:.2f}", line.theta * kDegrees), percent(line.share),
+                        fmt::format("{:.2f}", line.curvature)});
   return out;
 }
 
 Table gain_table(const SkuValidation& answer) {
   Table out{{"measurement", "of", "takes off the variance"}, {}, 2};
   for (const auto& gain : answer.gains)
-    out.rows.push_back({gain.measurement, fmt::format("{}", fmt::join(gain.inputs, ", ")),
-                        percent(gain.share)});
+    out.rows.push_back(
+        {gain.measurement, fmt::format("{}", fmt::join(gain.inputs, ", ")), percent(gain.share)});
   return out;
 }
 
