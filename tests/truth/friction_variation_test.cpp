@@ -42,18 +42,23 @@ class FrictionVariationTruth : public testing::TestWithParam<const char*> {
       if (event.kind == dynamics::EventKind::guard) return {event.t, result.detach.time};
     return {std::nan(""), result.detach.time};
   }
-  /// The block's path and speed [m, m/s] after `t`, thrown at `speed` across pads at rest that never open.
-  std::pair<double, double> slide(double speed, const Variation& variation, double t) {
+  /// Relative state after `t`, from the slip `speed` [m/s] and `spin` [rad/s] on pads at rest that never
+  /// open.
+  Relative<double> thrown_across(double speed, double spin, const Variation& variation, double t) {
     const auto hand = support::still_hand(t);
     const support::ConstantForce force(kFullGrip);
     const auto model = law(variation);
     const release::ReleaseProblem<double> problem{
-        hand, force, *model, {kBodyMass, kInertia}, {0, 0}, {0, 0}, 0.0, {speed, 0}, 0.0};
+        hand, force, *model, {kBodyMass, kInertia}, {0, 0}, {0, 0}, 0.0, {speed, 0}, spin};
     release::ReleaseOptions options;
     options.integrator = support::tight(1e-10, 1e-12);
     options.integrator.record = true;
-    const auto result = simulate_release(problem, options);
-    return {lever(Scene<double>{}, result.relative).x, result.relative.slip.x};
+    return simulate_release(problem, options).relative;
+  }
+  /// The block's path and speed [m, m/s] after `t`, thrown at `speed`.
+  std::pair<double, double> slide(double speed, const Variation& variation, double t) {
+    const auto y = thrown_across(speed, 0, variation, t);
+    return {lever(Scene<double>{}, y).x, y.slip.x};
   }
   const ProfileNormalForce opening{OpeningProfile<double>{0, kFullGrip, 0, kT, 1}};
 };
@@ -111,6 +116,21 @@ TEST_P(FrictionVariationTruth, AViscousSlideDecaysExponentially) {
     const auto [path, rest] = slide(V, viscous, 1.5 * stop);
     EXPECT_EQ(rest, 0);
     EXPECT_NEAR(path, v0 / A * (V - v0 * std::log(1 + V / v0)), 1e-9);
+  }
+}
+
+TEST_P(FrictionVariationTruth, AViscousSpinDecaysAsASlideAtTheSpeedLOmega) {
+  // u = L ω: I ω' = −L f (1 + u/v₀), so u' = −A (1 + u/v₀) with A = L² f/I
+  const double L = 0.01 * 2 / 3, A = L * kTorque / kInertia, spin = 45, U = L * spin;
+  for (const double v0 : {0.1, 2.0}) {
+    Variation viscous;
+    viscous.viscous = 1 / v0;
+    const double stop = v0 / A * std::log(1 + U / v0), t = 0.4 * stop;
+    const auto y = thrown_across(0, spin, viscous, t), rest = thrown_across(0, spin, viscous, 1.5 * stop);
+    EXPECT_NEAR(L * y.spin, (U + v0) * std::exp(-A * t / v0) - v0, 1e-9);
+    EXPECT_NEAR(L * y.angle, v0 / A * (U + v0) * (1 - std::exp(-A * t / v0)) - v0 * t, 1e-9);
+    EXPECT_EQ(rest.spin, 0);
+    EXPECT_NEAR(L * rest.angle, v0 / A * (U - v0 * std::log(1 + U / v0)), 1e-9);
   }
 }
 
