@@ -21,6 +21,7 @@ using dynamics::Effect;
 struct Worst {
   std::array<double, kChannelCount> of{};
   int observations{};
+  bool landing_timed{};
 };
 
 /// `told`: the prediction knows the effects.
@@ -57,6 +58,7 @@ Worst consistency(const CampaignDesign& design, int index, bool exact_inputs, bo
   for (std::size_t i = 0; i < observed.all.size(); ++i) {
     double& w = worst.of[static_cast<std::size_t>(observed.all[i].channel)];
     w = std::max(w, std::abs(predicted.channels[i] - observed.all[i].value));
+    worst.landing_timed |= observed.all[i].channel == Channel::landing_time;
   }
   worst.observations = static_cast<int>(observed.all.size());
   return worst;
@@ -67,6 +69,7 @@ CampaignDesign with_everything(const std::string& law, const EffectSettings& eff
   design.contact_model = law;
   for (auto& object : design.objects) object.drag_k = kDrag;
   design.variation.grasp_offset = 0.3e-3;
+  design.sensors.landing_time_sigma = 1e-15;      // declared, or the landing's time is no observation
   design.integrator.tolerances = {1e-11, 1e-13};  // what differs is not what the integrators leave
   return design;
 }
@@ -90,6 +93,7 @@ TEST(GeneratorAndPrediction, AgreeOnEveryChannelForEveryEffect) {
         for (const int index : {2, kThrow}) {
           const Worst worst = consistency(with_everything(law, effects), index, true, true);
           EXPECT_GT(worst.observations, 800) << law << ", " << id;
+          EXPECT_TRUE(worst.landing_timed) << law << ", " << id;
           for (std::size_t c = 0; c < kChannelCount; ++c)
             EXPECT_LE(worst.of[c], tolerance[c])
                 << law << ", " << id << ", throw " << index << ": " << to_string(static_cast<Channel>(c));

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 #include "dynamics/gravity_effects.hpp"
 #include "flight/fly.hpp"
@@ -69,20 +70,31 @@ TEST(AirEffects, DragAtNeutralHasItsOneSidedDerivative) {
 }
 
 TEST(AirEffects, WindIsABoostedFrame) {
-  // In the frame of the air there is no wind; it moves on at w_x while the object flies.
-  const double w = 1.3;
+  // In the frame of the air there is no wind; it moves on at w while the object flies.
+  const dynamics::Vec2<double> w{1.3, -0.7};
   FlightProblem<double> windy{{0.1, 1.2, 0.3}, {2.5, 1.7, -6}, {0, -9.81}};
   windy.drag_k = 0.08;
   windy.lift_km = 0.03;
   auto boosted = windy;
-  windy.wind = {w, 0};
-  boosted.twist.vx -= w;
-  const auto a = fly(windy, kTight), b = fly(boosted, kTight);
-  ASSERT_EQ(a.outcome, FlightOutcome::landed);
-  ASSERT_EQ(b.outcome, FlightOutcome::landed);
-  EXPECT_NEAR(a.landing.flight_time, b.landing.flight_time, 1e-11);
-  EXPECT_NEAR(a.landing.pose.x, b.landing.pose.x + w * b.landing.flight_time, 1e-11);
-  EXPECT_NEAR(a.landing.twist.vx, b.landing.twist.vx + w, 1e-11);
+  windy.wind = w;
+  boosted.twist.vx -= w.x;
+  boosted.twist.vz -= w.z;
+  const std::vector<double> times{0.1, 0.35, 0.8};
+  const auto a = fly_through(windy, times, kTight), b = fly_through(boosted, times, kTight);
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    EXPECT_NEAR(a[i].x, b[i].x + w.x * times[i], 1e-11);
+    EXPECT_NEAR(a[i].z, b[i].z + w.z * times[i], 1e-11);
+    EXPECT_NEAR(a[i].theta, b[i].theta, 1e-12);
+  }
+  // Along the ground the landing is the same event in both frames.
+  windy.wind = {w.x, 0};
+  boosted.twist.vz = windy.twist.vz;
+  const auto landed = fly(windy, kTight), calm = fly(boosted, kTight);
+  ASSERT_EQ(landed.outcome, FlightOutcome::landed);
+  ASSERT_EQ(calm.outcome, FlightOutcome::landed);
+  EXPECT_NEAR(landed.landing.flight_time, calm.landing.flight_time, 1e-11);
+  EXPECT_NEAR(landed.landing.pose.x, calm.landing.pose.x + w.x * calm.landing.flight_time, 1e-11);
+  EXPECT_NEAR(landed.landing.twist.vx, calm.landing.twist.vx + w.x, 1e-11);
 }
 
 TEST(AirEffects, WindWithoutDragOrLiftIsNothing) {

@@ -87,6 +87,14 @@ TEST(ReachableTube, LevelIsNegativeWhereTheFlightLandsInTheSet) {
   }
 }
 
+TEST(ReachableTube, AFlightThatNeverGetsThereIsJudgedByItsApex) {
+  const LandingSet set{0.3, 1, 3.5, -5, -1};
+  const double g = 9.81, apex = -0.21;
+  for (const double climbs : {0.0, 0.8, 2.5})  // later and earlier on the same rise
+    EXPECT_NEAR(tube_level({0.1, apex - climbs * climbs / (2 * g), 2, climbs}, set, {g, 0}), 1 + 0.21 / 0.3,
+                1e-12);
+}
+
 TEST(ReachableTube, SampledAndImplicitFormsAgree) {
   const LandingSet set{0.1, 0.8, 3.0, -5, -0.5};
   for (const double k : {0.0, 0.15}) {
