@@ -95,6 +95,16 @@ TEST(FrictionEstimate, OfTheTrueLawIsTheTrueFriction) {
   }
 }
 
+TEST(FrictionEstimate, OfASlidingPivotKnowsThatItsLimitsAreApart) {
+  CampaignDesign design = testing_support::perfect();
+  design.contact_model = "sliding_pivot";
+  design.variation.mu = 0;
+  const Known known(design);
+  const auto found = estimate_friction(known.log, known.prepared, "sliding_pivot").parameters;
+  EXPECT_NEAR(found.mu / design.patch.mu, 1, 1e-4);
+  EXPECT_NEAR(found.length / design.patch.length(), 1, 1e-4);
+}
+
 TEST(FrictionEstimate, OfADelayIsTheMeanFromTheCommandToTheDetach) {
   const CampaignDesign design = testing_support::perfect();
   const Known known(design);
