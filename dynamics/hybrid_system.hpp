@@ -121,6 +121,9 @@ class HybridSystem {
   virtual double pace(const Phase&, double /*t*/, const State<double, N>&) const { return 1; }
   virtual Dual pace(const Phase&, const Dual& /*t*/, const State<Dual, N>&) const { return Dual(1.0); }
 
+  /// |u| = √Σ (w y)² is the pace: weights w of the part u of the state, zero for the rest.
+  virtual State<double, N> pace_weights() const { return {}; }
+
   /// The error that one step may make in each component of a state that goes from y0 to y1 (SI units):
   /// absolute + relative · size. Flows that are singular at a point may ask for errors relative to their
   /// distance.

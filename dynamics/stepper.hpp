@@ -132,6 +132,17 @@ inline double step_factor(double error, double order) {
   return std::clamp(0.9 * std::pow(error, -1.0 / order), 0.2, 5.0);
 }
 
+/// The square of the error in a component by two estimates of different orders, both over the error's scale:
+/// e q with q = e/√(e² + (coarse/10)²), at least a tenth. Where the flow is smooth, e q is of the method's
+/// own order. Where it is not (a normal force that ends as (t₁ − t)^p, a knot of a spline), the error is of
+/// the order of e, and q is small only because of what else sways: the quotient of two norms, over all
+/// components, would let 1e-2 pass for 1e-4. NaN goes on.
+inline double combined_square(double fine, double coarse) {
+  constexpr double kLeast = 0.1 * 0.1;  // of q²
+  const double square = fine * fine, both = square + 0.01 * coarse * coarse;
+  return both <= 0 ? 0.0 : square * std::max(square / both, kLeast);
+}
+
 /// The error-controlled step of a single-step method. Derived supplies
 ///   double attempt(const S& h)   takes y0_ at t0_ to y1_ and returns the error norm (NaN if not finite),
 ///   kOrder                       the exponent's order,
@@ -214,21 +225,13 @@ class SingleStep : public Stepper<S, N> {
     return scaled_norm<N>(values<S, N>(error), scale);
   }
 
-  /// Norm of the local error by two embedded estimates of different orders: e q with q = e/√(e² +
-  /// (coarse/10)²), at least a tenth, in each component. Where the flow is smooth, e q is of the method's own
-  /// order. Where it is not (a normal force that ends as (t₁ − t)^p, a knot of a spline), the error is of the
-  /// order of e, and q is small only because of what else sways: the quotient of two norms, over all
-  /// components, would let 1e-2 pass for 1e-4.
+  /// Norm of the local error by two embedded estimates of different orders, as combined_square says.
   double error_norm(const State<S, N>& error, const State<S, N>& coarse) const {
-    constexpr double kLeast = 0.1 * 0.1;  // of q²
     State<double, N> scale;
     system_->error_scale(phase_, tolerances_, values<S, N>(this->y0_), values<S, N>(this->y1_), scale);
     double sum = 0;
-    for (int i = 0; i < N; ++i) {
-      const double fine = value_of(error[i]) / scale[i], rough = value_of(coarse[i]) / scale[i];
-      const double square = fine * fine, both = square + 0.01 * rough * rough;
-      if (!(both <= 0)) sum += square * std::max(square / both, kLeast);  // NaN goes on
-    }
+    for (int i = 0; i < N; ++i)
+      sum += combined_square(value_of(error[i]) / scale[i], value_of(coarse[i]) / scale[i]);
     return std::sqrt(sum / N);
   }
 

@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "dynamics/directed_stepper.hpp"
 #include "dynamics/dormand_prince.hpp"
 #include "dynamics/paced_stepper.hpp"
 #include "dynamics/radau.hpp"
@@ -44,8 +45,11 @@ template <int N>
 std::unique_ptr<Stepper<double, N>> make_stepper(Method method, FlowKind kind, const Tolerances& tolerances,
                                                  bool seeded, bool paced) {
   if constexpr (N + 2 <= kDualSize)
-    if (paced)
-      return std::make_unique<PacedStepper<N>>(make_stepper<N + 1>(method, kind, tolerances, seeded));
+    if (paced) {
+      auto in_pace = std::make_unique<PacedStepper<N>>(make_stepper<N + 1>(method, kind, tolerances, seeded));
+      if (method != Method::automatic) return in_pace;
+      return std::make_unique<DirectedStepper<N>>(tolerances, std::move(in_pace));
+    }
   return make_stepper<N>(method, kind, tolerances, seeded);
 }
 

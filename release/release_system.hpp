@@ -62,6 +62,8 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   double pace(const Phase&, double, const State<double, 6>& y) const override { return slip_size(y); }
   Dual pace(const Phase&, const Dual&, const State<Dual, 6>& y) const override { return slip_size(y); }
 
+  State<double, 6> pace_weights() const override { return {0, 0, 0, 1, 1, contact_.spin_length()}; }
+
   void error_scale(const Phase& p, const dynamics::Tolerances& tolerances, const State<double, 6>& y0,
                    const State<double, 6>& y1, State<double, 6>& scale) const override {
     dynamics::HybridSystem<6>::error_scale(p, tolerances, y0, y1, scale);
@@ -112,15 +114,18 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   }
 
  private:
-  /// The last scene is kept: a step, the guards at its end and the phase that follows ask for the same
-  /// instant.
+  /// The last scenes are kept: a step, the guards at its end and the phase that follows ask for the same
+  /// instants, and an implicit step for those of its stages again and again.
   const Scene<double>& scene_(const Window& window, double t) const {
-    if (t != scene_time_ || window.begin != scene_window_.begin || window.end != scene_window_.end) {
-      last_scene_ = scene_at(window, t);
-      scene_time_ = t;
-      scene_window_ = window;
-    }
-    return last_scene_;
+    for (const Kept& kept : kept_)
+      if (t == kept.time && window.begin == kept.window.begin && window.end == kept.window.end)
+        return kept.scene;
+    Kept& kept = kept_[next_kept_];
+    next_kept_ = (next_kept_ + 1) % kept_.size();
+    kept.scene = scene_at(window, t);
+    kept.time = t;
+    kept.window = window;
+    return kept.scene;
   }
   Scene<Dual> scene_(const Window& window, const Dual& t) const { return scene_at(window, t); }
 
@@ -164,9 +169,13 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   contact::Hold<double> hold_;
   contact::Hold<Dual> hold_dual_;
   P separation_{};
-  mutable Scene<double> last_scene_{};
-  mutable double scene_time_{std::numeric_limits<double>::quiet_NaN()};  // none yet
-  mutable Window scene_window_;
+  struct Kept {
+    double time{std::numeric_limits<double>::quiet_NaN()};  // none yet
+    Window window;
+    Scene<double> scene;
+  };
+  mutable std::array<Kept, 8> kept_;
+  mutable std::size_t next_kept_{};
 };
 
 /// The contact model, if its pads give at every point.
