@@ -47,7 +47,7 @@ std::unique_ptr<Stepper<double, N>> make_stepper(Method method, FlowKind kind, c
   if constexpr (N + 2 <= kDualSize)
     if (paced) {
       auto in_pace = std::make_unique<PacedStepper<N>>(make_stepper<N + 1>(method, kind, tolerances, seeded));
-      if (method != Method::automatic) return in_pace;
+      if (method != Method::automatic || kind != FlowKind::stiff) return in_pace;
       return std::make_unique<DirectedStepper<N>>(tolerances, std::move(in_pace));
     }
   return make_stepper<N>(method, kind, tolerances, seeded);
