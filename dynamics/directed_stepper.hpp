@@ -65,7 +65,7 @@ class DirectedStepper final : public Stepper<double, N> {
     this->t0_ = this->t1_;
     this->y0_ = this->y1_;
     const bool due = directed_ ? slaved_ : --wait_ <= 0;
-    if (due && take(limit, longest)) {
+    if (due && (guess_from_ != kNone || is_slaved()) && take(limit, longest)) {
       if (directed_) wait_next_ = kWait;
       directed_ = true;
       count();
@@ -124,7 +124,7 @@ class DirectedStepper final : public Stepper<double, N> {
   static constexpr auto kSlope = Nodes::slopes();
   static constexpr auto kBarycentric = Nodes::barycentric();
 
-  static constexpr double kFirst = 2e-3;      // s: the length first tried
+  static constexpr double kFirst = 4e-3;      // s: the length first tried
   static constexpr double kOrder = 7;         // by which the error estimate falls with the length
   static constexpr double kSafety = 0.1;      // of the estimate, of an order far below the method's
   static constexpr double kMostGrowth = 2.5;  // of a step's length
@@ -295,16 +295,16 @@ class DirectedStepper final : public Stepper<double, N> {
       }
       for (int k = 0; k < 2; ++k) {
         residual[2 * i + k] = dot(node[i].e[k], F[i]) - share * dot(node[i].e[k], slope);
-        if (pass > 1) continue;
+        if (pass > 0) continue;
         for (int j = 0; j < kNodes; ++j)
           for (int l = 0; l < 2; ++l)
             matrix[2 * i + k][2 * j + l] = share * kSlope[i][j + 1] * dot(node[i].e[k], node[j].e[l]);
         for (int l = 0; l < 2; ++l) matrix[2 * i + k][2 * i + l] += node[i].stiffness[k][l];
         matrix[2 * i + k][2 * i + k] += node[i].growth;
       }
-      if (count_ == 2 && pass <= 1) matrix[2 * i + 1][2 * i + 1] = 1;
+      if (count_ == 2 && pass == 0) matrix[2 * i + 1][2 * i + 1] = 1;
     }
-    if (pass <= 1) inverse_.compute(matrix);
+    if (pass == 0) inverse_.compute(matrix);
     inverse_.multiply(residual, tilt);
     double moved = 0;
     for (int i = 0; i < kNodes; ++i) {
@@ -453,9 +453,24 @@ class DirectedStepper final : public Stepper<double, N> {
     return kSafety * std::sqrt(sum / N);
   }
 
-  /// |∂F/∂n| at the end of the step: of the direction that relaxes slowest, and fastest.
-  std::pair<double, double> relaxation() const {
-    const auto& k = solution_.node[kNodes - 1].stiffness;
+  /// Whether a step of the length at hand would be one of a slaved direction, by what the flow says where it
+  /// begins.
+  bool is_slaved() {
+    Node node;
+    node.y = this->y0_;
+    node.n = weighted(this->y0_);
+    node.size = solution_.size0 = std::sqrt(dot(node.n, node.n));
+    if (count_ < 2 || !(node.size > 0)) return false;
+    for (double& x : node.n) x /= node.size;
+    linearise(this->t0_, node, driven(this->t0_, node, node.n, node.rate));
+    return length() * relaxation(node).second > kSlaved * node.size;
+  }
+  /// Of the step to try next.
+  double length() const { return h_next_ > 0 ? h_next_ : kFirst; }
+
+  /// |∂F/∂n| at a node: of the direction that relaxes slowest, and fastest.
+  std::pair<double, double> relaxation(const Node& node) const {
+    const auto& k = node.stiffness;
     if (count_ == 2) return {k[0][0], k[0][0]};
     const double mean = 0.5 * (k[0][0] + k[1][1]), determinant = k[0][0] * k[1][1] - k[0][1] * k[1][0];
     const double spread = std::sqrt(std::max(0.0, mean * mean - determinant));
@@ -475,6 +490,8 @@ class DirectedStepper final : public Stepper<double, N> {
     for (const Node& node : solution_.node) largest = std::max(largest, node.size);
     return largest;
   }
+  /// The same at the end of the step.
+  std::pair<double, double> relaxation() const { return relaxation(solution_.node[kNodes - 1]); }
   /// h |λ| of the fastest.
   double slaving() const { return solution_.h * relaxation().second / solution_.node[kNodes - 1].size; }
 
@@ -482,10 +499,8 @@ class DirectedStepper final : public Stepper<double, N> {
 
   /// Takes the step; false if the other stepper is to take it.
   bool take(double limit, double longest) {
-    const Direction u0 = weighted(this->y0_);
-    if (count_ < 2 || !(dot(u0, u0) > 0)) return false;
     const double left = limit - this->t0_;
-    double h = std::min(h_next_ > 0 ? h_next_ : kFirst, longest);
+    double h = std::min(length(), longest);
     bool stops = false, rejected = false;
     for (int attempt = 0, failures = 0; attempt < 12; ++attempt) {
       const bool last = !stops && h >= left * (1 - 1e-10);
