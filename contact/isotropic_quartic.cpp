@@ -16,10 +16,11 @@ namespace {
 
 constexpr double kTiny = 1e-13;  // what a vanishing curvature of H counts as
 
-// The root of r³ − e κ r² + κ r − e in [0, 1], which rises there: Newton's method inside a bracket, some 4
+// The root of r³ − e κ r² + κ r − e in [0, 1], which rises there: Newton's method inside a bracket, some 3
 // steps.
 double ratio(double e, double kappa) {
-  double low = 0, high = 1, r = e;
+  double low = 0, high = 1;
+  double r = std::min(1.0, e * (1 + kappa * e * e) / std::max(kappa + e * e, kTiny));  // exact at 0, 1, κ = 1
   for (int iteration = 0; iteration < 60; ++iteration) {
     const double value = ((r - e * kappa) * r + kappa) * r - e;
     (value > 0 ? high : low) = r;

@@ -353,9 +353,10 @@ class DirectedStepper final : public Stepper<double, N> {
       if (pass == 0) {
         allowed = scale()[part_[0]] * weight_[0];
       }
-      // What is left after a pass is what it moved times what passes gain.
+      // What is left after a pass is what it moved times what passes gain; s' is known to the rounding of F.
       const double gain = pass > 1 ? std::min(1.0, moved / before[(pass + 1) % 2]) : 1.0;
-      if (pass > 0 && moved * gain <= std::max(kShare * allowed, 1e-14 * largest)) return Solved::yes;
+      const double rounding = std::max(1e-14 * largest, 1e-15 * h * relaxation().second);
+      if (pass > 0 && (moved * gain <= kShare * allowed || moved <= rounding)) return Solved::yes;
       if (pass > 2 && moved > 0.1 * before[pass % 2]) return Solved::no;
       before[pass % 2] = moved;
     }
@@ -487,7 +488,7 @@ class DirectedStepper final : public Stepper<double, N> {
   }
   double largest_size() const {
     double largest = 0;
-    for (const Node& node : solution_.node) largest = std::max(largest, node.size);
+    for (const Node& node : solution_.node) largest = std::max(largest, std::abs(node.size));
     return largest;
   }
   /// The same at the end of the step.
