@@ -133,6 +133,7 @@ class DirectedStepper final : public Stepper<double, N> {
   static constexpr double kSizeShare = 100;
   static constexpr double kSlaved = 20;      // h |λ| of the next step below which the other stepper takes it
   static constexpr double kResolved = 1e10;  // h |λ| above which s' is lost in the rounding of F
+  static constexpr double kTransient = 30;   // h |λ| of a step in which a direction finds its way
   static constexpr double kSmooth = 10;      // least power with which a direction may go into a stop
   static constexpr int kWait = 6, kLongestWait = 10'000;  // steps of the other between two trials
   static constexpr double kBeforeStop = 4e-9;             // s
@@ -399,20 +400,42 @@ class DirectedStepper final : public Stepper<double, N> {
     return point;
   }
 
-  /// The fraction of the step at which the size passes zero; 1 if it does not.
+  /// s' at the fraction θ of the step.
+  double growth_at(double theta) const {
+    double growth = 0, power = 1;
+    for (int d = 0; d < kNodes; ++d, power *= theta)
+      for (int j = 0; j < kNodes; ++j) growth += kPower[d][j] * power * solution_.node[j].growth;
+    return growth;
+  }
+
+  /// The fraction of the step at which the size first passes zero, at a node or between two; 1 if it does
+  /// not.
   double stop() const {
-    const auto& node = solution_.node;
-    int i = 0;
-    while (i < kNodes && node[i].size > 0) ++i;
-    if (i == kNodes) return 1;
-    double low = Nodes::from_start(i), high = Nodes::kNode[i], theta = 0.5 * (low + high);
-    for (int k = 0; k < 60; ++k) {  // Newton's method inside the bracket
+    double low = 0, high = 0, growth = growth_at(0);
+    for (int i = 0; i < kNodes; ++i) {
+      const Node& node = solution_.node[i];
+      high = Nodes::kNode[i];
+      if (!(node.size > 0)) return zero_between(low, high);
+      if (growth < 0 && node.growth > 0) {  // it has turned: was it at zero before?
+        double before = low, after = high;
+        for (int k = 0; k < 30; ++k) {
+          const double middle = 0.5 * (before + after);
+          (growth_at(middle) < 0 ? before : after) = middle;
+        }
+        if (!(at(after).size > 0)) return zero_between(low, after);
+      }
+      growth = node.growth;
+      low = high;
+    }
+    return 1;
+  }
+  /// Newton's method inside the bracket.
+  double zero_between(double low, double high) const {
+    double theta = 0.5 * (low + high);
+    for (int k = 0; k < 60; ++k) {
       const double size = at(theta).size;
       (size > 0 ? low : high) = theta;
-      double growth = 0, power = 1;
-      for (int d = 0; d < kNodes; ++d, power *= theta)
-        for (int j = 0; j < kNodes; ++j) growth += kPower[d][j] * power * node[j].growth;
-      double next = theta - size / (solution_.h * growth);
+      double next = theta - size / (solution_.h * growth_at(theta));
       if (!(next > low && next < high)) next = 0.5 * (low + high);
       const double moved = std::abs(next - theta);
       theta = next;
@@ -503,6 +526,7 @@ class DirectedStepper final : public Stepper<double, N> {
     const double left = limit - this->t0_;
     double h = std::min(length(), longest);
     bool stops = false, rejected = false;
+    double rejected_with = std::numeric_limits<double>::infinity();  // the error of the attempt before
     for (int attempt = 0, failures = 0; attempt < 12; ++attempt) {
       const bool last = !stops && h >= left * (1 - 1e-10);
       if (!last && !stops && h > 0.5 * left) h = 0.5 * left;
@@ -518,7 +542,7 @@ class DirectedStepper final : public Stepper<double, N> {
       if (length * relaxation().second > kResolved * largest_size()) return false;
       if (const double theta = stop(); theta < 1) {
         // Before a stop at t* directions relax as (t* − t) to the power of |∂F/∂n|/|s'|.
-        if (relaxation().first < kSmooth * std::abs(solution_.node[kNodes - 1].growth)) return false;
+        if (relaxation().first < kSmooth * std::abs(growth_at(theta))) return false;
         h = theta * length - kBeforeStop;
         if (!(h > kBeforeStop)) return false;
         stops = true;
@@ -538,9 +562,15 @@ class DirectedStepper final : public Stepper<double, N> {
         return true;
       }
       ++own_rejected_;
-      // An error that falls more slowly than its order says is a direction that still relaxes.
-      if (!std::isfinite(now) || (rejected && slaving() <= kSlaved)) return false;
+      if (!std::isfinite(now)) return false;
       h = length * std::min(step_factor(now, kOrder), 0.7);
+      if (now > 0.5 * rejected_with) {
+        // An error that hardly falls with h: data have kinked, and the direction is still on its way.
+        const double relaxed = length * relaxation().first / solution_.node[kNodes - 1].size;
+        if (relaxed <= kSlaved) return false;
+        h = std::min(h, length * kTransient / relaxed);
+      }
+      rejected_with = now;
       stops = false;
       rejected = true;
     }

@@ -153,6 +153,26 @@ TEST(DirectedStepper, EndsJustBeforeAStop) {
   }
 }
 
+/// s falls below zero for a few thousandths of a step that begins and ends well above, and has a node nowhere
+/// near.
+TEST(DirectedStepper, SeesAStopBetweenTheNodes) {
+  for (const double depth : {1e-3, 1e-5, 1e-7})
+    for (const double bottom : {0.2, 0.25, 0.3, 0.35}) {
+      // s = t² (t − bottom)²/bottom² − depth t²: zero at bottom (1 ∓ √depth)
+      const double k = 1 / (bottom * bottom);
+      const Known known{1e5, 1 - depth, -2 * k * bottom, k, 2};
+      const double end = bottom * (1 - std::sqrt(depth));
+      auto stepper = stepper_of({1e-8, 1e-10});
+      const KnownSlip system(known);
+      stepper.start(system, kOnePhase, 0.02, known.state(0.02));
+      for (int steps = 0; steps < 60 && end - stepper.t1() > 1e-7; ++steps) {
+        ASSERT_EQ(stepper.step(1.0, 1.0), StepStatus::accepted);
+        ASSERT_LT(stepper.t1(), end) << "a step over a stop, depth " << depth << " bottom " << bottom;
+      }
+      EXPECT_LT(end - stepper.t1(), 1e-7) << "depth " << depth << " bottom " << bottom;
+    }
+}
+
 TEST(DirectedStepper, DenseOutputIsAsGoodAsTheStep) {
   const Known known{1e6, 3, -2, 1};
   auto stepper = stepper_of({1e-8, 1e-10});
