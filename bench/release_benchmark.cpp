@@ -4,7 +4,7 @@
 // Two rows a case: the median and the minimum of nine repetitions. Columns:
 //   cvode_us      CVODE's median CPU time [us], at a tenth of the tolerance (its local error makes some ten
 //   times the global) ratio         CVODE's time over ours events        mode changes;  steps: accepted steps
-//   event_err_s   largest error of an event's time [s] against a run at 1e-12;  cvode_err_s: CVODE's
+//   event_err_s   largest error of an event's time [s] against Radau at 1e-12;  cvode_err_s: CVODE's
 //   twist_err     largest error of the twist at detach [m/s, rad/s]
 // Throws: calm and hard have a hand and a force in closed form (hard: shaken, the sliding pivot changes mode
 // nine times or more), log is throw 150 of the campaign batch180 as experiment::prepare smooths it (splines
@@ -136,7 +136,7 @@ void release_case(benchmark::State& state, const Throw& (*thrown)(), const char*
   const Problem problem = thrown().problem(*model);
   const auto ours = options_of(Method::automatic, tolerance),
              cvode = options_of(Method::cvode, 0.1 * tolerance);
-  const Result reference = simulate_release(problem, options_of(Method::automatic, 1e-12));
+  const Result reference = simulate_release(problem, options_of(Method::radau, 1e-12));
 
   std::vector<double> times;  // of CVODE [us]
   Result theirs;
@@ -210,8 +210,8 @@ struct Kind {
   double pivot, surface;  // tolerances
 };
 constexpr Kind kKinds[] = {{"calm", calm, 1e-4, 1e-4},
-                           {"hard", hard, 1e-6, 1e-6},
-                           {"log", log, 1e-6, 1e-5},
+                           {"hard", hard, 1e-6, 1e-5},
+                           {"log", log, 1e-6, 1e-4},
                            {"log_growing", log_growing, 1e-6, 1e-4}};
 constexpr const char* kModels[] = {"sliding_pivot", "limit_surface", "limit_surface_disc",
                                    "limit_surface_quartic"};
