@@ -130,19 +130,18 @@ class DirectedStepper final : public Stepper<double, N> {
   static constexpr double kMostGrowth = 2.5;  // of a step's length
   static constexpr int kPasses = 10;          // of the iteration
   static constexpr double kShare = 1e-3;      // of the error that a step may make, left by the iteration
-  static constexpr double kSizeShare = 100;
+  static constexpr double kSizeShare = 100;   // of the relative tolerance: what a size may err by at most
   static constexpr double kSlaved = 20;      // h |λ| of the next step below which the other stepper takes it
   static constexpr double kResolved = 1e10;  // h |λ| above which s' is lost in the rounding of F
   static constexpr double kTransient = 30;   // h |λ| of a step in which a direction finds its way
   static constexpr double kSmooth = 10;      // least power with which a direction may go into a stop
   static constexpr int kWait = 6, kLongestWait = 10'000;  // steps of the other between two trials
   static constexpr double kBeforeStop = 4e-9;             // s
-  static constexpr double kSmallest =
-      1e-6;  // of the size at the start: at which directions are evaluated at least
+  static constexpr double kSmallest = 1e-6;  // share of the starting size at which directions are evaluated
   static constexpr double kNone = -1;
 
-  using Direction =
-      std::array<double, 3>;  // weighted components of the part; the third is 0 if it has but two
+  /// Weighted components of the part; the third is 0 if it has but two.
+  using Direction = std::array<double, 3>;
 
   struct Node {
     State<double, N> y, rate;  // of y the rest z, of the rate all
@@ -500,8 +499,7 @@ class DirectedStepper final : public Stepper<double, N> {
     const double spread = std::sqrt(std::max(0.0, mean * mean - determinant));
     return {mean - spread, mean + spread};
   }
-  /// The error that the step may make in each component: of a size no more than kSizeShare tolerances,
-  /// however small it is.
+  /// The error that the step may make in each component.
   State<double, N> scale() const {
     State<double, N> scale;
     system_->error_scale(phase_, tolerances_, this->y0_, end_state(), scale);
@@ -514,7 +512,7 @@ class DirectedStepper final : public Stepper<double, N> {
     for (const Node& node : solution_.node) largest = std::max(largest, std::abs(node.size));
     return largest;
   }
-  /// The same at the end of the step.
+  /// |∂F/∂n| at the end of the step.
   std::pair<double, double> relaxation() const { return relaxation(solution_.node[kNodes - 1]); }
   /// h |λ| of the fastest.
   double slaving() const { return solution_.h * relaxation().second / solution_.node[kNodes - 1].size; }
