@@ -13,23 +13,24 @@ using testing_support::small_design;
 
 constexpr const char* kLaw = "limit_surface_disc";
 
-const datasets::ThrowLog& log_of_disc() {
+const datasets::ThrowLog& twinned_log() {
   static const datasets::ThrowLog log = experiment::generate_campaign(small_design(kLaw), 11);
   return log;
 }
-const CampaignProblem& disc() {
-  static const CampaignProblem problem(log_of_disc(), "(in memory)", {});
+const CampaignProblem& twinned() {
+  static const CampaignProblem problem(twinned_log(), "(in memory)", {});
   return problem;
 }
-const FitResult& disc_fit() {
-  static const FitResult result = fit(disc());
+const FitResult& twinned_fit() {
+  static const FitResult result = fit(twinned());
   return result;
 }
 
 TEST(Twin, HasTheSameSamplesAndNewNoise) {
-  const auto& log = log_of_disc();
-  const auto twin = twin_of(log, disc(), disc_fit(), 5), again = twin_of(log, disc(), disc_fit(), 5),
-             other = twin_of(log, disc(), disc_fit(), 6);
+  const auto& log = twinned_log();
+  const auto twin = twin_of(log, twinned(), twinned_fit(), 5),
+             again = twin_of(log, twinned(), twinned_fit(), 5),
+             other = twin_of(log, twinned(), twinned_fit(), 6);
   EXPECT_THAT(twin.title, HasSubstr("synthetic"));
   ASSERT_EQ(twin.throws.size(), log.throws.size());
   EXPECT_NO_THROW(datasets::validate(twin));
@@ -53,9 +54,9 @@ TEST(Twin, HasTheSameSamplesAndNewNoise) {
 }
 
 TEST(Twin, FloorOfATrueModelIsItsError) {
-  const auto throws = predict_throws(disc(), disc_fit(), {false, 0});
-  const auto errors = comparison_of(disc(), disc_fit(), throws);
-  const auto floor = error_floor(log_of_disc(), "(in memory)", disc(), disc_fit(), {}, 4);
+  const auto throws = predict_throws(twinned(), twinned_fit(), {false, 0});
+  const auto errors = comparison_of(twinned(), twinned_fit(), throws);
+  const auto floor = error_floor(twinned_log(), "(in memory)", twinned(), twinned_fit(), {}, 4);
   ASSERT_EQ(floor.twins, 4);
   for (int q = 0; q < experiment::kQuantityCount; ++q) {
     const double mae = errors.statistics(q, Split::test).mae, least = floor.statistics(q, Split::test).mae;
