@@ -45,7 +45,7 @@ Ranked& named(std::vector<Ranked>& ranking, const std::string& id) {
 }
 
 /// A refit of one candidate against the stage that it would extend, with evidence on the train throws.
-struct Trial {
+struct TriedEffect {
   const Score* score{};
   Stage next;
   double delta_bic{}, p_value{};
@@ -98,7 +98,7 @@ class ForwardStep {
   }
 
   /// A give that no pads are without: a part of the model, and no answer.
-  bool is_small_give(const Trial& trial) const {
+  bool is_small_give(const TriedEffect& trial) const {
     return id_of(*trial.score) == kPads && give_of(trial.next) <= kMostGive;
   }
 
@@ -112,10 +112,10 @@ class ForwardStep {
     return !noise_ || kFirstOrder * score.gain >= columns * std::log(f_.samples) - kDeltaBic;
   }
 
-  std::optional<Trial> try_out(const Score& score) {
+  std::optional<TriedEffect> try_out(const Score& score) {
     const Candidate& candidate = f_.candidates[score.candidate];
     const bool leads = &score == &all_.front() || candidate.id == kPads;
-    Trial trial{&score, extended(stage_, candidate, score, leads, options_), 0, 0, {}};
+    TriedEffect trial{&score, extended(stage_, candidate, score, leads, options_), 0, 0, {}};
     if (!trial.next.is_fitted()) return std::nullopt;
     trial.delta_bic = trial.next.bic() - stage_.bic();
     const bool law = is_law(candidate.id);
@@ -184,7 +184,7 @@ class ForwardStep {
     if (!acts_on_pads(id_of(*small_->score)) ||
         settled_wrenches(stage_.fit, small_->next.fit, options_).empty())
       return std::nullopt;
-    Trial trial = *small_;
+    TriedEffect trial = *small_;
     if (!fit_along(trial.next, options_, out_)) return std::nullopt;
     const Stage& less = without(trial.next, {id_of(*trial.score)}, options_);
     if (less.solved()) trial.held_out = improvement(less, trial.next, out_.base_test, options_);
@@ -206,7 +206,7 @@ class ForwardStep {
       small_ = std::move(trial);
   }
 
-  Stage accept(Trial trial, const std::string& why, const WithCriterion& rivals) {
+  Stage accept(TriedEffect trial, const std::string& why, const WithCriterion& rivals) {
     AcceptedEffect accepted;
     accepted.id = id_of(*trial.score);
     accepted.delta_bic = trial.delta_bic;
@@ -239,7 +239,7 @@ class ForwardStep {
   std::vector<Score> all_;
   bool noise_;  // nothing but that is left
   std::set<std::string> tried_;
-  std::optional<Trial> best_, small_;  // of those that matter to a channel, and of those that do not
+  std::optional<TriedEffect> best_, small_;  // of those that matter to a channel, and of those that do not
   WithCriterion convincing_, evident_;
 };
 
