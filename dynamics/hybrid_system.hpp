@@ -114,14 +114,10 @@ class HybridSystem {
     return {from.mode, t, y, Dual(0.0)};
   }
 
-  /// dt/dσ > 0 of the variable σ in which the flow of a mode is regular, if `is_paced`; see
-  /// paced_stepper.hpp.
+  /// Whether the flow of a mode depends on a part u of the state by its direction alone, and so is regular in
+  /// a variable σ with dt/dσ = |u|; see paced_stepper.hpp and directed_stepper.hpp.
   virtual bool is_paced(int /*mode*/) const { return false; }
-  /// dt/dσ at (t, y), > 0: the unit is that of whatever σ the system chose.
-  virtual double pace(const Phase&, double /*t*/, const State<double, N>&) const { return 1; }
-  virtual Dual pace(const Phase&, const Dual& /*t*/, const State<Dual, N>&) const { return Dual(1.0); }
-
-  /// |u| = √Σ (w y)² is the pace: weights w of the part u of the state, zero for the rest.
+  /// |u| = √Σ (w y)²: weights w of the part u of the state, zero for the rest.
   virtual State<double, N> pace_weights() const { return {}; }
 
   /// The error that one step may make in each component of a state that goes from y0 to y1 (SI units):

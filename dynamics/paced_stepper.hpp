@@ -5,7 +5,7 @@
 
 namespace unhand::dynamics {
 
-/// The system in σ, dt/dσ = pace(t, y) (a Sundman transformation): state (y, t), no explicit dependence on σ.
+/// The system in σ, dt/dσ = |u| (a Sundman transformation): state (y, t), no explicit dependence on σ.
 ///
 /// Where y' = F(u/|u|) with u a part of y, the Jacobian grows as 1/|u|; with the pace |u| the right-hand side
 /// becomes |u| F(u/|u|), homogeneous of degree one and regular down to u = 0, which is now reached
@@ -14,8 +14,28 @@ namespace unhand::dynamics {
 template <int N>
 class PacedSystem final : public HybridSystem<N + 1> {
  public:
+  /// The system in time, in one of its phases.
+  void enter(const HybridSystem<N>& entered, const Phase& its_phase) {
+    system = &entered;
+    phase = its_phase;
+    weights = entered.pace_weights();
+  }
   const HybridSystem<N>* system{};  ///< the system in time
   Phase phase;                      ///< its mode and window
+  State<double, N> weights{};       ///< of u, the system's pace_weights
+
+  /// dt/dσ = |u|
+  template <class S>
+  S pace(const State<S, N>& y) const {
+    using std::sqrt;
+    S square(0.0);
+    for (int i = 0; i < N; ++i)
+      if (weights[i] != 0) {
+        const S u = weights[i] * y[i];
+        square += u * u;
+      }
+    return sqrt(square);
+  }
 
   /// As HybridSystem says, of the system in σ: no guards and no events of its own.
   /// @{
@@ -69,7 +89,7 @@ class PacedSystem final : public HybridSystem<N + 1> {
     const State<S, N> at = state(y);
     State<S, N> rate;
     system->flow(phase, y[N], at, rate);
-    const S pace = system->pace(phase, y[N], at);
+    const S pace = this->pace(at);
     for (int i = 0; i < N; ++i) dy[i] = pace * rate[i];
     dy[N] = pace;
   }
@@ -84,8 +104,7 @@ class PacedStepper final : public Stepper<double, N> {
 
   void start(const HybridSystem<N>& system, const Phase& phase, const double& t,
              const State<double, N>& y) override {
-    system_.system = &system;
-    system_.phase = phase;
+    system_.enter(system, phase);
     State<double, N + 1> augmented;
     std::copy_n(y.begin(), N, augmented.begin());
     augmented[N] = t;
@@ -101,14 +120,14 @@ class PacedStepper final : public Stepper<double, N> {
   StepStatus step(const double& limit, double longest) override {
     this->t0_ = this->t1_;
     this->y0_ = this->y1_;
-    const double pace = system_.system->pace(system_.phase, this->t0_, this->y0_);
+    const double pace = system_.pace(this->y0_);
     const StepStatus status = inner_->step(kFar, std::min(longest / pace, length_to(limit, pace)));
     count();
     if (status != StepStatus::accepted) return status;
     if (inner_->y1()[N] < limit) {
       this->t1_ = inner_->y1()[N];
       this->y1_ = PacedSystem<N>::state(inner_->y1());
-      growth_ = (system_.system->pace(system_.phase, this->t1_, this->y1_) - pace) / (this->t1_ - this->t0_);
+      growth_ = (system_.pace(this->y1_) - pace) / (this->t1_ - this->t0_);
       return this->t1_ > this->t0_ ? StepStatus::accepted : StepStatus::too_small;
     }
     land(limit, this->y1_);
@@ -127,7 +146,7 @@ class PacedStepper final : public Stepper<double, N> {
     State<double, N + 1> augmented;
     inner_->interpolate(theta, augmented);
     const State<double, N> y = PacedSystem<N>::state(augmented);
-    return {augmented[N], y, length() * system_.system->pace(system_.phase, augmented[N], y)};
+    return {augmented[N], y, length() * system_.pace(y)};
   }
 
   int parts() const override { return inner_->parts(); }
@@ -151,12 +170,12 @@ class PacedStepper final : public Stepper<double, N> {
     constexpr double kProbe = 1e-6;  // of the time in which the state changes by the pace
     State<double, N> rate, ahead;
     system_.system->flow(system_.phase, t, y, rate);
-    const double pace = system_.system->pace(system_.phase, t, y);
+    const double pace = system_.pace(y);
     double fastest = 0;
     for (int i = 0; i < N; ++i) fastest = std::max(fastest, std::abs(rate[i]));
     const double dt = kProbe * pace / std::max(fastest, 1e-300);
     for (int i = 0; i < N; ++i) ahead[i] = y[i] + dt * rate[i];
-    const double growth = (system_.system->pace(system_.phase, t, ahead) - pace) / dt;
+    const double growth = (system_.pace(ahead) - pace) / dt;
     return std::isfinite(growth) ? growth : 0;
   }
 
@@ -203,7 +222,7 @@ class PacedStepper final : public Stepper<double, N> {
       const double missed = t - augmented[N];
       y = PacedSystem<N>::state(augmented);
       if (std::abs(missed) < kStraight) break;
-      h += missed / system_.system->pace(system_.phase, augmented[N], y);
+      h += missed / system_.pace(y);
     }
     // What is left of t, along the flow.
     State<double, N + 1> rate;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <string_view>
@@ -59,9 +60,6 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   int guard_count(int mode) const override { return contact_.guard_count(mode); }
   dynamics::Guard guard(int mode, int index) const override { return contact_.guard(mode, index); }
   bool is_paced(int mode) const override { return contact_.is_homogeneous(mode); }
-  double pace(const Phase&, double, const State<double, 6>& y) const override { return slip_size(y); }
-  Dual pace(const Phase&, const Dual&, const State<Dual, 6>& y) const override { return slip_size(y); }
-
   State<double, 6> pace_weights() const override { return {0, 0, 0, 1, 1, contact_.spin_length()}; }
 
   void error_scale(const Phase& p, const dynamics::Tolerances& tolerances, const State<double, 6>& y0,
@@ -156,11 +154,9 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   }
 
   /// |(v_r, L ω_r)|
-  template <class S>
-  S slip_size(const State<S, 6>& y) const {
-    using std::sqrt;
-    const S spin = contact_.spin_length() * y[5];
-    return sqrt(y[3] * y[3] + y[4] * y[4] + spin * spin);
+  double slip_size(const State<double, 6>& y) const {
+    const double spin = contact_.spin_length() * y[5];
+    return std::sqrt(y[3] * y[3] + y[4] * y[4] + spin * spin);
   }
 
   const ReleaseProblem<P>& problem_;
