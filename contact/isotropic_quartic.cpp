@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <type_traits>
 
@@ -16,17 +18,18 @@ namespace {
 
 constexpr double kTiny = 1e-13;  // what a vanishing curvature of H counts as
 
-// The root of r³ − e κ r² + κ r − e in [0, 1], which rises there: Newton's method inside a bracket, some 3
-// steps.
-double ratio(double e, double kappa) {
+// The root of r³ − e κ r² + κ r − e in [0, 1], which rises there, from a guess: Halley's method inside a
+// bracket.
+inline double root(double e, double kappa, double r) {
+  constexpr double kCubed = 1e-5;  // what a step leaves is about its cube: rounding
   double low = 0, high = 1;
-  double r = std::min(1.0, e * (1 + kappa * e * e) / std::max(kappa + e * e, kTiny));  // exact at 0, 1, κ = 1
   for (int iteration = 0; iteration < 60; ++iteration) {
-    const double value = ((r - e * kappa) * r + kappa) * r - e;
+    const double value = ((r - e * kappa) * r + kappa) * r - e, slope = (3 * r - 2 * e * kappa) * r + kappa,
+                 bend = 3 * r - e * kappa;
     (value > 0 ? high : low) = r;
-    double next = r - value / ((3 * r - 2 * e * kappa) * r + kappa);
+    double next = r - value * slope / (slope * slope - value * bend);
     if (!(next >= low && next <= high)) next = 0.5 * (low + high);
-    const bool last = std::abs(next - r) <= 1e-8 * next;  // squared: rounding
+    const bool last = std::abs(next - r) <= kCubed * next;
     r = next;
     if (last) break;
   }
@@ -38,6 +41,28 @@ double ratio(double e, double kappa) {
 IsotropicQuartic::IsotropicQuartic(const Dual& kappa) : kappa_(kappa) {
   if (!(kappa.a >= 0 && kappa.a <= 3))
     throw std::invalid_argument(fmt::format("isotropic quartic: kappa = {} is not in [0, 3]", kappa.a));
+  double before = 0, slope_before = 0;
+  for (int k = 0; k <= kPieces; ++k) {
+    constexpr double kWidth = 1.0 / kPieces;
+    const double e = kWidth * k, r = k == 0 ? 0.0 : root(e, kappa.a, std::max(before, 0.5 * e));
+    const double rise = (3 * r - 2 * e * kappa.a) * r + kappa.a;
+    const double slope = rise > kWidth ? kWidth * (1 + kappa.a * r * r) / rise : 1.0;  // any: it is a guess
+    if (k > 0) {
+      const double step = r - before;
+      ratio_[k - 1] = {before, slope_before, 3 * step - 2 * slope_before - slope,
+                       slope_before + slope - 2 * step};
+    }
+    before = r;
+    slope_before = slope;
+  }
+}
+
+double IsotropicQuartic::ratio(double e) const {
+  const double place = kPieces * e;
+  const int piece = place < kPieces ? static_cast<int>(place) : kPieces - 1;
+  const auto& [c0, c1, c2, c3] = ratio_[piece];
+  const double t = place - piece;
+  return root(e, kappa_.a, std::clamp(c0 + t * (c1 + t * (c2 + t * c3)), 0.0, 1.0));
 }
 
 IsotropicQuartic IsotropicQuartic::closest_to_disc() {
@@ -45,19 +70,19 @@ IsotropicQuartic IsotropicQuartic::closest_to_disc() {
 }
 
 // With σ(u) = −resist(u)·u, whose Hessian is λ (q, −p)(q, −p)ᵀ in (p, q) and k = a/p across the slide: the
-// larger of (a, b) is g = H(1, r)^(−1/4) and λ = (1 + κ r²)³ g⁵/D over the cube of the larger of (p, q), D
-// the determinant of ∇²H. By the implicit function theorem ∂r/∂κ = −r (1 − r⁴)/D.
+// larger of (a, b) is g = 1/h = H(1, r)^(−1/4) and λ = (1 + κ r²)³ g⁵/D over the cube of the larger of (p,
+// q), D the determinant of ∇²H. By the implicit function theorem ∂r/∂κ = −r (1 − r⁴)/D.
 Vec3<double> IsotropicQuartic::resist(const Vec3<double>& u, Slopes* slopes) const {
   const double kappa = kappa_.a;
   const double p = std::sqrt(u[0] * u[0] + u[1] * u[1]), q = std::abs(u[2]);
   const bool slides = q <= p;
-  const double most = slides ? p : q, r = ratio(slides ? q / p : p / q, kappa), x = r * r;
-  const double g = 1 / std::sqrt(std::sqrt(1 + x * (2 * kappa + x))), sum = 1 + kappa * x;
-  // e = r (κ + r²)/(1 + κ r²), so a/p stays finite where p vanishes.
-  const double share = sum / std::max(kappa + x, kTiny), k = slides ? g / p : g * share / q;
+  const double most = slides ? p : q, r = ratio(slides ? q / p : p / q), x = r * r;
+  const double h = std::sqrt(std::sqrt(1 + x * (2 * kappa + x))), sum = 1 + kappa * x;
+  // e = r (κ + r²)/(1 + κ r²), so where p is the lesser, a/p = (a/b) b/(e q) stays finite as it vanishes.
+  const double share = slides ? 1.0 : sum / std::max(kappa + x, kTiny), k = share / (h * most);
   if (slopes) {
     const double D = std::max(kappa + x * (3 - kappa * kappa + kappa * x), kTiny), cube = most * most * most;
-    const double g5 = g * g * g * g * g, lambda = sum * sum * sum * g5 / (D * cube);
+    const double g = 1 / h, g5 = g * g * g * g * g, lambda = sum * sum * sum * g5 / (D * cube);
     // (λ q² − k)/p²; where q is the larger, both are near each other and their difference is divided by x.
     const double square = kappa * kappa - 2, bend = square + x * (3 * kappa * square - x * (3 + kappa * x));
     const double cross =
@@ -70,7 +95,7 @@ Vec3<double> IsotropicQuartic::resist(const Vec3<double>& u, Slopes* slopes) con
     const double sign = std::copysign(1.0, u[2]);
     slopes->by_kappa = {-along * u[0], -along * u[1], -sign * (slides ? r * lesser : by_kappa)};
   }
-  return {-k * u[0], -k * u[1], std::copysign(slides ? g * r : g, -u[2])};
+  return {-k * u[0], -k * u[1], std::copysign(slides ? k * p * r : 1 / h, -u[2])};
 }
 
 template <class S>

@@ -1,6 +1,8 @@
 // The convex quartics that are round in the plane of sliding, in closed form but for one root.
 #pragma once
 
+#include <array>
+
 #include "contact/limit_surface_shapes.hpp"
 
 namespace unhand::contact {
@@ -44,7 +46,12 @@ class IsotropicQuartic {
   };
   Vec3<double> resist(const Vec3<double>& u, Slopes* slopes) const;
 
+  /// r(e), e in [0, 1].
+  double ratio(double e) const;
+
+  static constexpr int kPieces = 16;
   dynamics::Dual kappa_;
+  std::array<std::array<double, 4>, kPieces> ratio_;  // cubics in e near r(e), where its iteration begins
 };
 
 }  // namespace unhand::contact
