@@ -44,6 +44,7 @@ class DirectedCollocation {
     double slowest{}, fastest{};  ///< in the unit of u' (u/s)
   };
 
+  /// Of the errors that steps may make.
   explicit DirectedCollocation(const Tolerances& tolerances) : tolerances_(tolerances) {}
 
   /// The flow of the steps that follow.
