@@ -66,7 +66,8 @@ double IsotropicQuartic::ratio(double e) const {
 }
 
 IsotropicQuartic IsotropicQuartic::closest_to_disc() {
-  return IsotropicQuartic(ConvexQuartic::kappa_closest_to_disc());
+  static const IsotropicQuartic quartic(ConvexQuartic::kappa_closest_to_disc());
+  return quartic;
 }
 
 // With σ(u) = −resist(u)·u, whose Hessian is λ (q, −p)(q, −p)ᵀ in (p, q) and k = a/p across the slide: the
