@@ -2,6 +2,8 @@
 // order 7: [HairerNorsettWanner1993] II.5, II.6 and II.10 (DOP853).
 #pragma once
 
+#include <array>
+
 namespace unhand::dynamics::dop853 {
 
 /// The stages' instants. 0 to 11 make a step, 12 is the flow at its end, 13 to 15 serve the dense output.
@@ -76,6 +78,19 @@ inline constexpr double kError3[12] = {-0.18980075407240762,
                                        -0.1521609496625161,
                                        0.20136540080403034,
                                        0.02265179219836082};
+
+/// A ten-thousandth of the sixth divided difference of the flow over the seven stages whose states are of
+/// order three or better: of order six, and far below the other two where the flow is smooth.
+inline constexpr std::array<double, 12> kError6 = [] {
+  constexpr int kStages[7] = {0, 5, 6, 7, 8, 9, 10};
+  std::array<double, 12> weight{};
+  for (const int j : kStages) {
+    weight[j] = 1e-4;
+    for (const int k : kStages)
+      if (k != j) weight[j] /= kNode[j] - kNode[k];
+  }
+  return weight;
+}();
 
 /// The last four terms of the dense output.
 inline constexpr double kBend[4][16] = {

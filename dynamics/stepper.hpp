@@ -226,12 +226,11 @@ class SingleStep : public Stepper<S, N> {
   }
 
   /// Norm of the local error by two embedded estimates of different orders, as combined_square says.
-  double error_norm(const State<S, N>& error, const State<S, N>& coarse) const {
+  double error_norm(const State<double, N>& fine, const State<double, N>& coarse) const {
     State<double, N> scale;
     system_->error_scale(phase_, tolerances_, values<S, N>(this->y0_), values<S, N>(this->y1_), scale);
     double sum = 0;
-    for (int i = 0; i < N; ++i)
-      sum += combined_square(value_of(error[i]) / scale[i], value_of(coarse[i]) / scale[i]);
+    for (int i = 0; i < N; ++i) sum += combined_square(fine[i] / scale[i], coarse[i] / scale[i]);
     return std::sqrt(sum / N);
   }
 
