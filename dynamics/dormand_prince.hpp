@@ -16,8 +16,7 @@ namespace unhand::dynamics {
 template <class S, int N>
 class DormandPrince final : public SingleStep<DormandPrince<S, N>, S, N> {
  public:
-  static constexpr bool kPredictive = false;  ///< the controller looks at one step
-  static constexpr double kOrder = 8;         ///< of the error estimate [-]
+  static constexpr double kOrder = 8;  ///< of the error estimate [-]
   using SingleStep<DormandPrince<S, N>, S, N>::SingleStep;
 
   /// The first stage, which after a step is the last of the one before.

@@ -79,13 +79,13 @@ inline constexpr double kError3[12] = {-0.18980075407240762,
                                        0.20136540080403034,
                                        0.02265179219836082};
 
-/// A ten-thousandth of the sixth divided difference of the flow over the seven stages whose states are of
-/// order three or better: of order six, and far below the other two where the flow is smooth.
+/// Three hundred-thousandths of the sixth divided difference of the flow over the seven stages whose states
+/// are of order three or better: of order six, and far below the other two where the flow is smooth.
 inline constexpr std::array<double, 12> kError6 = [] {
   constexpr int kStages[7] = {0, 5, 6, 7, 8, 9, 10};
   std::array<double, 12> weight{};
   for (const int j : kStages) {
-    weight[j] = 1e-4;
+    weight[j] = 3e-5;
     for (const int k : kStages)
       if (k != j) weight[j] /= kNode[j] - kNode[k];
   }

@@ -19,8 +19,7 @@ namespace unhand::dynamics {
 template <int N>
 class Radau final : public SingleStep<Radau<N>, double, N> {
  public:
-  static constexpr bool kPredictive = true;  ///< the controller looks at two steps
-  static constexpr double kOrder = 4;        ///< of the error estimate, plus one [-]
+  static constexpr double kOrder = 4;  ///< of the error estimate, plus one [-]
   /// `seeded`: the parameters of the system carry derivatives of their own.
   explicit Radau(const Tolerances& tolerances, bool seeded = false)
       : SingleStep<Radau<N>, double, N>(tolerances), seeded_(seeded) {}

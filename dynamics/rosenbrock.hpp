@@ -18,8 +18,7 @@ namespace unhand::dynamics {
 template <int N>
 class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
  public:
-  static constexpr bool kPredictive = true;  ///< the controller looks at two steps
-  static constexpr double kOrder = 5;        ///< of the error estimate [-]
+  static constexpr double kOrder = 5;  ///< of the error estimate [-]
   /// `seeded`: the parameters of the system carry derivatives of their own.
   explicit Rosenbrock(const Tolerances& tolerances, bool seeded = false)
       : SingleStep<Rosenbrock<N>, double, N>(tolerances), seeded_(seeded) {}

@@ -146,7 +146,6 @@ inline double combined_square(double fine, double coarse) {
 /// The error-controlled step of a single-step method. Derived supplies
 ///   double attempt(const S& h)   takes y0_ at t0_ to y1_ and returns the error norm (NaN if not finite),
 ///   kOrder                       the exponent's order,
-///   kPredictive                  whether the controller looks at two steps,
 ///   void prepare(bool retry)     what a new start point needs (once a step).
 template <class Derived, class S, int N>
 class SingleStep : public Stepper<S, N> {
@@ -184,19 +183,16 @@ class SingleStep : public Stepper<S, N> {
         this->t1_ = last ? limit : S(this->t0_ + length);
         const double taken = value_of(length);
         double factor = step_factor(error, Derived::kOrder);
-        if (Derived::kPredictive) {
-          // Gustafsson's predictive controller ([HairerWanner1996] IV.8): what the last step's error grew by,
-          // the next one's will too; without it a flow that quickens steadily has every other step rejected.
-          if (error_before_ > 0)
-            factor = std::min(
-                factor, 0.9 * taken / taken_before_ *
-                            std::pow(error_before_ / std::max(error * error, 1e-20), 1 / Derived::kOrder));
-          factor = std::max(factor, 0.2);
-          // A step cut short by a limit tells no trend.
-          error_before_ =
-              !rejected && taken < 0.99 * std::min(h_next_, longest) ? 0.0 : std::max(error, 1e-3);
-          taken_before_ = taken;
-        }
+        // Gustafsson's predictive controller ([HairerWanner1996] IV.8): what the last step's error grew by,
+        // the next one's will too; without it a flow that quickens steadily has every other step rejected.
+        if (error_before_ > 0)
+          factor = std::min(
+              factor, 0.9 * taken / taken_before_ *
+                          std::pow(error_before_ / std::max(error * error, 1e-20), 1 / Derived::kOrder));
+        factor = std::max(factor, 0.2);
+        // A step cut short by a limit tells no trend.
+        error_before_ = !rejected && taken < 0.99 * std::min(h_next_, longest) ? 0.0 : std::max(error, 1e-3);
+        taken_before_ = taken;
         const double next = taken * (rejected ? std::min(factor, 1.0) : factor);
         // A step cut short by a limit says nothing against the length that was meant.
         h_next_ = !rejected && (last || h >= longest) ? std::max(next, h_next_) : next;
