@@ -160,7 +160,8 @@ class DirectedStepper final : public Stepper<double, N> {
         this->t1_ = last ? limit : this->t0_ + length;
         if (!(this->t1_ > this->t0_)) return false;
         this->y1_ = collocation_.end();
-        const double next = length * growth_of_step(now, length, rejected);
+        const double factor = predicted_factor(now, error_before_, length / length_before_, kOrder);
+        const double next = length * std::min(factor, rejected ? 1.0 : kMostGrowth);
         h_next_ = last || stops ? std::max(next, h_next_) : next;
         error_before_ = last || stops ? 0.0 : std::max(now, 1e-3);
         length_before_ = length;
@@ -182,15 +183,6 @@ class DirectedStepper final : public Stepper<double, N> {
       rejected = true;
     }
     return false;
-  }
-
-  /// What the next step's length is of this one's: as SingleStep's predictive controller says.
-  double growth_of_step(double error, double length, bool rejected) const {
-    double factor = std::min(rejected ? 1.0 : kMostGrowth, step_factor(error, kOrder));
-    if (error_before_ > 0)
-      factor = std::min(factor, 0.9 * length / length_before_ *
-                                    std::pow(error_before_ / std::max(error * error, 1e-20), 1 / kOrder));
-    return std::max(factor, 0.2);
   }
 
   void count() {

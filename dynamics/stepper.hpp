@@ -132,6 +132,18 @@ inline double step_factor(double error, double order) {
   return std::clamp(0.9 * std::pow(error, -1.0 / order), 0.2, 5.0);
 }
 
+/// Gustafsson's predictive controller ([HairerWanner1996] IV.8): no more than step_factor, and no more than
+/// if the error grew to the next step as it did from the last one, whose error was `error_before` (0: no
+/// trend is known), to this one, `lengthened` times as long. Without it a flow that quickens steadily has
+/// every other step rejected.
+inline double predicted_factor(double error, double error_before, double lengthened, double order) {
+  double factor = step_factor(error, order);
+  if (error_before > 0)
+    factor = std::min(factor,
+                      0.9 * lengthened * std::pow(error_before / std::max(error * error, 1e-20), 1 / order));
+  return std::max(factor, 0.2);
+}
+
 /// The square of the error in a component by two estimates of different orders, both over the error's scale:
 /// e q with q = e/√(e² + (coarse/10)²), at least a tenth. Where the flow is smooth, e q is of the method's
 /// own order. Where it is not (a normal force that ends as (t₁ − t)^p, a knot of a spline), the error is of
@@ -182,14 +194,7 @@ class SingleStep : public Stepper<S, N> {
       if (error <= 1.0) {
         this->t1_ = last ? limit : S(this->t0_ + length);
         const double taken = value_of(length);
-        double factor = step_factor(error, Derived::kOrder);
-        // Gustafsson's predictive controller ([HairerWanner1996] IV.8): what the last step's error grew by,
-        // the next one's will too; without it a flow that quickens steadily has every other step rejected.
-        if (error_before_ > 0)
-          factor = std::min(
-              factor, 0.9 * taken / taken_before_ *
-                          std::pow(error_before_ / std::max(error * error, 1e-20), 1 / Derived::kOrder));
-        factor = std::max(factor, 0.2);
+        const double factor = predicted_factor(error, error_before_, taken / taken_before_, Derived::kOrder);
         // A step cut short by a limit tells no trend.
         error_before_ = !rejected && taken < 0.99 * std::min(h_next_, longest) ? 0.0 : std::max(error, 1e-3);
         taken_before_ = taken;
