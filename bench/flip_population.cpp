@@ -1,7 +1,6 @@
 // What commands do: the population of landings, and which targets two bars reach.
-#include <Eigen/QR>
-
 #include "bench/flip_paths.hpp"
+#include "dynamics/dense_solve.hpp"
 #include "planners/flip/forecast.hpp"
 
 namespace flip_bench {
@@ -22,7 +21,7 @@ Curvature curvature(const FlipRobot& robot, const std::vector<FlipDatum>& data) 
     for (Eigen::Index j = 0; j < 6; ++j) y(i, j) = one.detach[static_cast<std::size_t>(j)];
     y(i, 6) = one.landing.x, y(i, 7) = one.landing.angle;
   }
-  const Eigen::MatrixXd fitted = A * A.householderQr().solve(y);
+  const Eigen::MatrixXd fitted = unhand::dynamics::product(A, unhand::dynamics::least_squares(A, y));
   Curvature out;
   for (Eigen::Index i = 0; i < n; ++i) {
     const FlipTarget seen{data[static_cast<std::size_t>(i)].landing};

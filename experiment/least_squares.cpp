@@ -1,8 +1,8 @@
 #include "experiment/least_squares.hpp"
 
-#include <Eigen/QR>
 #include <cmath>
 
+#include "dynamics/dense_solve.hpp"
 #include "dynamics/straight_line.hpp"
 
 namespace unhand::experiment {
@@ -28,9 +28,9 @@ bool gauss_newton(const std::function<void(const VectorXd&, VectorXd&, MatrixXd&
   MatrixXd J, moved_J;
   evaluate(VectorXd::Zero(unknowns), r, J);
   for (int step = 0; step < kSteps; ++step) {
-    const Eigen::ColPivHouseholderQR<MatrixXd> qr(J);
-    if (qr.rank() < J.cols()) return false;
-    const VectorXd d = qr.solve(-r);
+    const MatrixXd inverse = dynamics::inverse_gram(J);
+    if (inverse.cols() < J.cols()) return false;
+    const VectorXd d = dynamics::least_squares(J, -r);
     const double cost = r.squaredNorm(), predicted = (J * d).squaredNorm();
     if (!std::isfinite(predicted)) return false;
     const double floor = static_cast<double>(r.size()) * (kSolved / sigma) * (kSolved / sigma);
@@ -51,11 +51,7 @@ bool gauss_newton(const std::function<void(const VectorXd&, VectorXd&, MatrixXd&
       }
       if (predicted > 1e-8 * cost + 1e2 * floor) return false;  // not a minimum that rounding hides
     }
-    const MatrixXd root = qr.colsPermutation() * MatrixXd(qr.matrixR()
-                                                              .topLeftCorner(J.cols(), J.cols())
-                                                              .triangularView<Eigen::Upper>()
-                                                              .solve(MatrixXd::Identity(J.cols(), J.cols())));
-    covariance = root * root.transpose();  // J P = Q R
+    covariance = inverse;
     return true;
   }
   return false;

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fitting/dense_solve.hpp"
+#include "dynamics/dense_solve.hpp"
 #include "fitting/normal_equations.hpp"
 
 namespace unhand::fitting {
+
+using dynamics::definite_inverse, dynamics::definite_solve;
 
 BeforeRelease before_release(const CampaignProblem& problem, const CampaignThrow& thrown,
                              const FitResult& fit, DerivativesBy derivatives) {

@@ -6,14 +6,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/dense_solve.hpp"
 #include "experiment/campaign_effects.hpp"
-#include "fitting/dense_solve.hpp"
 #include "fitting/fit_rounds.hpp"
 #include "fitting/misfit.hpp"
 #include "fitting/profile.hpp"
 
 namespace unhand::fitting {
 
+using dynamics::Spectrum, dynamics::spectrum_of;
 using experiment::Channel;
 
 namespace {

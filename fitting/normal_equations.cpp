@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
-#include "fitting/dense_solve.hpp"
 
 namespace unhand::fitting {
+
+using dynamics::congruent, dynamics::definite_inverse, dynamics::eliminated, dynamics::gram,
+    dynamics::product, dynamics::Spectrum, dynamics::spectrum_of;
 
 int part_of(const experiment::Observation& o, const CampaignThrow& thrown, double detach) {
   const double release = thrown.release_or(detach);

@@ -7,12 +7,13 @@
 #include <cmath>
 #include <map>
 
-#include "fitting/dense_solve.hpp"
+#include "dynamics/dense_solve.hpp"
 #include "fitting/discovery/traces.hpp"
 #include "fitting/distributions.hpp"
 
 namespace unhand::fitting {
 
+using dynamics::pseudo_solve;
 using experiment::Channel;
 
 bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options) {

@@ -8,13 +8,14 @@
 #include <string>
 #include <vector>
 
+#include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
-#include "fitting/dense_solve.hpp"
 #include "fitting/distributions.hpp"
 #include "fitting/normal_equations.hpp"
 
 namespace unhand::fitting {
 
+using dynamics::eliminated, dynamics::gram, dynamics::pseudo_inverse;
 using experiment::Channel;
 
 namespace {

@@ -4,11 +4,12 @@
 #include <array>
 #include <cmath>
 
-#include "fitting/dense_solve.hpp"
+#include "dynamics/dense_solve.hpp"
 #include "fitting/normal_equations.hpp"
 
 namespace unhand::fitting {
 
+using dynamics::definite_solve, dynamics::eliminated, dynamics::inner_products, dynamics::product;
 using dynamics::Effect;
 using dynamics::EffectParameter;
 

@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
-#include "fitting/dense_solve.hpp"
 #include "fitting/discovery/footprint_columns.hpp"
 
 namespace unhand::fitting {
+
+using dynamics::definite_solve, dynamics::inner_products, dynamics::product, dynamics::pseudo_solve;
 
 std::vector<double> carried(const FitResult& from, const CampaignProblem& to) {
   std::vector<double> out = to.start();

@@ -41,15 +41,15 @@ Features features_of(const datasets::ThrowLog& log, const Throw& one) {
   return out;
 }
 
-struct Condition {
+struct LogCondition {
   std::string object, name;
   Features is{};    ///< the median throw's, of unit variance over the conditions
   double side = 1;  ///< 1: train, −1: held out
 };
 
 /// In the order in which the log first has them.
-std::vector<Condition> conditions_of(const datasets::ThrowLog& log) {
-  std::vector<Condition> out;
+std::vector<LogCondition> conditions_of(const datasets::ThrowLog& log) {
+  std::vector<LogCondition> out;
   std::map<std::pair<std::string, std::string>, std::vector<Features>> seen;
   for (const auto& one : log.throws) {
     auto& all = seen[{one.object, one.condition}];
@@ -75,7 +75,7 @@ std::vector<Condition> conditions_of(const datasets::ThrowLog& log) {
 /// How alike two conditions are, feature by feature; twice that if they are of one object. Over train less
 /// held-out conditions, the double sum of it is how unlike the distributions of each feature are (the maximum
 /// mean discrepancy: Gretton et al., A kernel two-sample test, JMLR 13, 2012).
-double likeness(const Condition& a, const Condition& b) {
+double likeness(const LogCondition& a, const LogCondition& b) {
   constexpr double kWidth = 0.3;  // of the standard deviation: levels of a factor lie farther apart
   double out = 0;
   for (std::size_t k = 0; k < kFeatures; ++k) {
@@ -87,7 +87,7 @@ double likeness(const Condition& a, const Condition& b) {
 
 /// Exchanges a held-out condition with one of train of the same object, the best exchange first, while that
 /// makes the sides more alike.
-void balance(std::vector<Condition>& conditions) {
+void balance(std::vector<LogCondition>& conditions) {
   constexpr std::size_t kMost = 1000;  // of more, every other one will do
   const std::size_t n = conditions.size();
   if (n > kMost) return;
@@ -103,7 +103,7 @@ void balance(std::vector<Condition>& conditions) {
     double most = kGains;
     for (std::size_t i = 0; i < n; ++i)
       for (std::size_t j = i + 1; j < n; ++j) {
-        const Condition &a = conditions[i], &b = conditions[j];
+        const LogCondition &a = conditions[i], &b = conditions[j];
         if (a.object != b.object || a.side == b.side) continue;
         const double gain = a.side * surplus[i] + b.side * surplus[j] -
                             (alike[i * n + i] + alike[j * n + j] - 2 * alike[i * n + j]);
@@ -134,7 +134,7 @@ datasets::ThrowLog with_held_out(datasets::ThrowLog log) {
   balance(conditions);
   std::map<std::string, int> repetition;
   for (auto& t : log.throws) {
-    const auto own = std::find_if(conditions.begin(), conditions.end(), [&](const Condition& c) {
+    const auto own = std::find_if(conditions.begin(), conditions.end(), [&](const LogCondition& c) {
       return c.object == t.object && c.name == t.condition;
     });
     const bool by_repetition = of_object[t.object] == 1 && most > 1;

@@ -7,9 +7,12 @@
 #include <cmath>
 #include <set>
 
-#include "fitting/dense_solve.hpp"
+#include "dynamics/dense_solve.hpp"
 
 namespace unhand::fitting {
+
+using dynamics::definite_inverse, dynamics::definite_solve, dynamics::gram, dynamics::inner_products,
+    dynamics::orthonormal_basis, dynamics::pseudo_inverse, dynamics::pseudo_solve;
 
 namespace {
 

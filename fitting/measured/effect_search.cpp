@@ -7,13 +7,14 @@
 #include <map>
 #include <utility>
 
-#include "fitting/dense_solve.hpp"
+#include "dynamics/dense_solve.hpp"
 #include "fitting/measured/effect_trial.hpp"
 #include "fitting/measured/grouped_footprints.hpp"
 
 namespace unhand::fitting {
 
 using datasets::Split;
+using dynamics::congruent, dynamics::pseudo_inverse, dynamics::pseudo_solve;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;

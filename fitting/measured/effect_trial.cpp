@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fitting/dense_solve.hpp"
+#include "dynamics/dense_solve.hpp"
 #include "fitting/distributions.hpp"
 
 namespace unhand::fitting {
 
 using datasets::Split;
+using dynamics::pseudo_solve;
 using Eigen::Index;
 using Eigen::VectorXd;
 

@@ -1,11 +1,12 @@
 #include "fitting/measured/grouped_fit.hpp"
 
-#include "fitting/dense_solve.hpp"
+#include "dynamics/dense_solve.hpp"
 #include "fitting/measured/grouped_solver.hpp"
 #include "fitting/measured/grouped_weights.hpp"
 
 namespace unhand::fitting {
 
+using dynamics::inner_products, dynamics::least_squares, dynamics::orthonormal_basis, dynamics::product;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;

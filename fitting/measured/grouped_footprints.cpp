@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
-#include "fitting/dense_solve.hpp"
 #include "fitting/measured/grouped_weights.hpp"
 
 namespace unhand::fitting {
 
+using dynamics::congruent, dynamics::gram, dynamics::least_squares, dynamics::product,
+    dynamics::pseudo_inverse;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;

@@ -4,12 +4,14 @@
 #include <cmath>
 #include <limits>
 
+#include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
-#include "fitting/dense_solve.hpp"
 #include "fitting/measured/grouped_weights.hpp"
 
 namespace unhand::fitting {
 
+using dynamics::congruent, dynamics::gram, dynamics::least_squares, dynamics::product,
+    dynamics::pseudo_inverse, dynamics::pseudo_solve;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;

@@ -6,12 +6,13 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "dynamics/dense_solve.hpp"
 #include "experiment/outcome_slopes.hpp"
 #include "experiment/reference_throw.hpp"
-#include "fitting/dense_solve.hpp"
 
 namespace unhand::fitting {
 
+using dynamics::congruent, dynamics::product;
 using Eigen::MatrixXd;
 
 experiment::ThrowPrediction<double> SkuMotion::predict(const std::vector<double>& values) const {

@@ -6,12 +6,14 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/random_stream.hpp"
-#include "fitting/dense_solve.hpp"
 
 namespace unhand::fitting {
 
+using dynamics::congruent, dynamics::definite_solve, dynamics::inner_products, dynamics::product,
+    dynamics::Spectrum, dynamics::spectrum_of;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;

@@ -1,10 +1,13 @@
 // The convex quartic of fit_surface: an augmented Lagrangian keeps it convex, a mixture makes it exactly so.
 #include <Eigen/Core>
 
-#include "fitting/dense_solve.hpp"
+#include "dynamics/dense_solve.hpp"
 #include "fitting/slips/slip_surface_solver.hpp"
 
 namespace unhand::fitting {
+
+using dynamics::congruent, dynamics::Spectrum, dynamics::spectrum_of;
+
 namespace {
 
 using Sym3 = Eigen::Matrix3d;

@@ -7,11 +7,14 @@
 #include <stdexcept>
 
 #include "contact/convex_quartic.hpp"
+#include "dynamics/dense_solve.hpp"
 #include "dynamics/median.hpp"
-#include "fitting/dense_solve.hpp"
 #include "fitting/slips/slip_surface_solver.hpp"
 
 namespace unhand::fitting {
+
+using dynamics::spectrum_of;
+
 namespace {
 
 constexpr double least_spread = 1e-3;  // of the mean square of the directions along any axis

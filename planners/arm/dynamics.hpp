@@ -121,23 +121,28 @@ JointMatrix<S> mass_matrix(const Chain& chain, const JointVector<S>& q) {
   S mass(0.0);
   Vector3<S> first = Vector3<S>::Zero();
   Matrix3<S> second = Matrix3<S>::Zero();
-  const auto parallel = [](const auto& m, const auto& a, const auto& b) {  // m (a·b 1 − ½ (a bᵀ + b aᵀ))
-    using T = decltype(a[0] * b[0]);
-    const Matrix3<T> product = a * b.transpose();
-    return Matrix3<T>(m * (product.trace() * Matrix3<T>::Identity() - 0.5 * (product + product.transpose())));
+  const auto add_parallel = [&](const auto& m, const auto& a, const auto& b) {  // m (a·b 1 − ½ (a bᵀ + b aᵀ))
+    const auto along = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    for (int i = 0; i < 3; ++i) {
+      second(i, i) += m * along;
+      for (int j = 0; j < 3; ++j) second(i, j) -= 0.5 * m * (a[i] * b[j] + a[j] * b[i]);
+    }
   };
   for (int i = 0; i < n; ++i) R[i] = joint_rotation(chain.joints[i].origin.R, q[i]);
   for (int i = n - 1; i >= 0; --i) {
     if (i + 1 < n) {  // the bodies beyond, carried from link i + 1 to link i
-      const Vector3<S> p = chain.joints[i + 1].origin.p.cast<S>(), turned = R[i + 1] * first;
-      second = (R[i + 1] * second * R[i + 1].transpose()).eval() + parallel(2.0, p, turned) +
-               mass * parallel(1.0, p, p);
-      first = turned + mass * p;
+      const Vector3<double>& p = chain.joints[i + 1].origin.p;
+      second = (R[i + 1] * second * R[i + 1].transpose()).eval();
+      first = (R[i + 1] * first).eval();
+      add_parallel(2.0, p, first);
+      add_parallel(mass, p, p);
+      for (int k = 0; k < 3; ++k) first[k] += mass * p[k];
     }
     const Inertia& link = chain.joints[i].link;
     mass += link.mass;
-    first += link.mass * link.com;
-    second += link.about_com + parallel(link.mass, link.com, link.com);
+    first += (link.mass * link.com).cast<S>();
+    second += link.about_com.cast<S>();
+    add_parallel(link.mass, link.com, link.com);
     // The wrench about link i's origin that q̈_i = 1 asks for, then carried down the chain.
     Vector3<S> f(-first[1], first[0], S(0.0)), torque = second.col(2);
     out(i, i) = torque[2];

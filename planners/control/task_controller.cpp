@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -61,10 +60,9 @@ ControlStep AdaptiveController::task_law(const TaskReference& r, const TaskGains
   acceleration << r.acceleration, Eigen::Vector3d::Zero();
   drift << tip.acceleration, tip.alpha;  // J̇ q̇
   // J⁺ = Jᵀ (J Jᵀ)⁻¹ and N = 1 − J⁺ J, applied.
-  const Eigen::Matrix<double, 6, 6> JJt = J * J.transpose();
-  const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> solver(JJt);
+  const JointMatrix<double> JJt = J * J.transpose();
   const auto reach = [&](const Eigen::Matrix<double, 6, 1>& x) {
-    return Joints(J.transpose() * solver.solve(x));
+    return Joints(J.transpose() * solve_positive<double>(JJt, x));
   };
   const auto null = [&](const Joints& x) { return Joints(x - reach(J * x)); };
   const Joints beta = reach(rate) + null(gains.posture * (gains.rest - q));
@@ -90,19 +88,9 @@ void AdaptiveController::adapt(const ControlStep& step, const Joints& applied, c
     const Regressor<double> momentum = momentum_regressor<double>(model_, q, qd, last),
                             input = l * momentum - momentum_rest_regressor(model_, q, qd, kGravity, last);
     // The known links: the same columns times their parameters, without forming them.
-    const JointMatrix<double> M = mass_matrix<double>(model_, q);
-    const Joints own = M * qd;
-    using Along = ceres::Jet<double, 1>;
-    JointVector<Along> moving(model_.size());
-    for (int i = 0; i < model_.size(); ++i) {
-      moving[i] = Along(q[i]);
-      moving[i].v[0] = qd[i];
-    }
-    const JointMatrix<Along> M_along = mass_matrix<Along>(model_, moving);
-    Joints M_rate_qd = Joints::Zero(model_.size());
-    for (int i = 0; i < model_.size(); ++i)
-      for (int j = 0; j < model_.size(); ++j) M_rate_qd[i] += M_along(i, j).v[0] * qd[j];
-    const Joints rest = bias_torque<double>(model_, q, qd) - M_rate_qd;  // h = g − Cᵀ q̇
+    const Joints own = mass_matrix<double>(model_, q) * qd;
+    const Joints rest =  // h = g − Cᵀ q̇
+        gravity_torque<double>(model_, q) - coriolis_matrix<double>(model_, q, qd).transpose() * qd;
     // τ_f − Y_f π of the model: λ/(p + λ) (τ + λ p − h) − λ p
     const Joints input_rest = applied - friction_torque<double>(model_, qd) + l * own - rest;
     if (!started_) {

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -36,9 +35,9 @@ Joints pose_at(const Chain& arm, const Eigen::Vector3d& p, const Eigen::Matrix3d
     error << p - tip.p, turn.angle() * turn.axis();
     if (error.norm() < 1e-12) break;
     const Jacobian<double> J = jacobian<double>(arm, q);
-    const Eigen::Matrix<double, 6, 6> JJt =
-        J * J.transpose() + 1e-8 * Eigen::Matrix<double, 6, 6>::Identity();
-    q += J.transpose() * JJt.ldlt().solve(error);
+    JointMatrix<double> JJt = J * J.transpose();
+    JJt.diagonal().array() += 1e-8;
+    q += J.transpose() * solve_positive<double>(JJt, error);
   }
   return q;
 }

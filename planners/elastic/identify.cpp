@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
-#include <Eigen/SVD>
+#include <Eigen/LU>
 #include <cmath>
 #include <numbers>
 #include <random>
 #include <stdexcept>
+
+#include "dynamics/dense_solve.hpp"
 
 namespace unhand::planners::elastic {
 namespace {
@@ -45,12 +45,17 @@ LinkParameters log_cholesky(const LinkParameters& p, const std::string& joint) {
   J.topRightCorner<3, 1>() = p.segment<3>(1);
   J.bottomLeftCorner<1, 3>() = p.segment<3>(1).transpose();
   J(3, 3) = p[0];
-  const Eigen::Matrix4d reversed = J.reverse();
-  const Eigen::LLT<Eigen::Matrix4d> llt(reversed);
-  if (llt.info() != Eigen::Success)
-    throw std::invalid_argument(fmt::format("identify: no body has the prior inertia of joint '{}'", joint));
-  const Eigen::Matrix4d L = llt.matrixL();
-  const Eigen::Matrix4d U = L.reverse(), T = U / U(3, 3);
+  Eigen::Matrix4d U = Eigen::Matrix4d::Zero();  // J = U Uᵀ, from the last column on
+  for (int j = 3; j >= 0; --j)
+    for (int i = j; i >= 0; --i) {
+      double rest = J(i, j);
+      for (int k = j + 1; k < 4; ++k) rest -= U(i, k) * U(j, k);
+      if (i == j && !(rest > 0))
+        throw std::invalid_argument(
+            fmt::format("identify: no body has the prior inertia of joint '{}'", joint));
+      U(i, j) = i == j ? std::sqrt(rest) : rest / U(j, j);
+    }
+  const Eigen::Matrix4d T = U / U(3, 3);
   LinkParameters out;
   out << std::log(U(3, 3)), std::log(T(0, 0)), std::log(T(1, 1)), std::log(T(2, 2)), T(0, 1), T(1, 2),
       T(0, 2), T(0, 3), T(1, 3), T(2, 3);
@@ -71,24 +76,6 @@ void evaluate(const Eigen::VectorXd& phi, Eigen::VectorXd& pi, Eigen::MatrixXd& 
       derivative.block(first + k, first, 1, kLinkParameters) = out[k].v.transpose();
     }
   }
-}
-
-/// Singular values and right vectors of W, of full size even where its rank is less, and Uᵀ tau; by way of
-/// W = Q R, for W is tall, with tau as its last column.
-struct Decomposition {
-  Eigen::VectorXd values;
-  Eigen::MatrixXd right;
-  Eigen::VectorXd left_times_tau;
-};
-Decomposition decompose(const Eigen::MatrixXd& W, const Eigen::VectorXd& tau) {
-  const Eigen::Index n = W.cols();
-  Eigen::MatrixXd both(W.rows(), n + 1);
-  both << W, tau;
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(both);
-  const Eigen::MatrixXd R = qr.matrixQR().topLeftCorner(n, n).triangularView<Eigen::Upper>();
-  const Eigen::JacobiSVD<Eigen::MatrixXd, Eigen::NoQRPreconditioner> svd(
-      R, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  return {svd.singularValues(), svd.matrixV(), svd.matrixU().transpose() * qr.matrixQR().col(n).head(n)};
 }
 
 double condition_of(const Eigen::VectorXd& s) {
@@ -157,8 +144,9 @@ DesignedExcitation design_excitation(const Chain& chain, const ExcitationOptions
       one.cosine.row(i) *= shrink;
       one.centre[i] = 0.5 * (upper + lower) - 0.5 * shrink * (high[i] + low[i]);
     }
+    const Eigen::MatrixXd W = stacked(chain, one, o.samples);
     const double condition =
-        condition_of(decompose(stacked(chain, one, o.samples), Eigen::VectorXd::Zero(n * o.samples)).values);
+        condition_of(dynamics::singular_vectors(W, Eigen::VectorXd::Zero(W.rows())).values);
     if (trial == 0) out.first_condition = condition;
     if (trial == 0 || condition < out.condition) {
       out.condition = condition;
@@ -181,14 +169,14 @@ IdentifiedInertia identify_inertia(const Chain& prior, const std::vector<MotionS
         control::torque_regressor<double>(prior, log[k].q, log[k].qd, log[k].qdd);
     tau.segment(n * static_cast<int>(k), n) = log[k].torque;
   }
-  const Decomposition svd = decompose(W, tau);
+  const dynamics::SingularVectors svd = dynamics::singular_vectors(W, tau);
   const Eigen::VectorXd& s = svd.values;
   int rank = 0;
   while (rank < s.size() && s[rank] > kRank * s[0]) ++rank;
   IdentifiedInertia out;
   out.condition = condition_of(s);
   out.combinations = svd.right.leftCols(rank);
-  out.estimate = svd.left_times_tau.head(rank).cwiseQuotient(s.head(rank));
+  out.estimate = svd.left_times_b.head(rank).cwiseQuotient(s.head(rank));
   out.torque_noise =
       (tau - W * (out.combinations * out.estimate)).norm() / std::sqrt(static_cast<double>(rows - rank));
   out.sigma = out.torque_noise * s.head(rank).cwiseInverse();
@@ -209,14 +197,14 @@ IdentifiedInertia identify_inertia(const Chain& prior, const std::vector<MotionS
   for (int iteration = 0; iteration < 200; ++iteration) {
     evaluate(phi, pi, D);
     const Eigen::VectorXd r = misfit(pi);
-    const Eigen::MatrixXd J = weight.asDiagonal() * (out.combinations.transpose() * D);
+    const Eigen::MatrixXd J = weight.asDiagonal() * dynamics::inner_products(out.combinations, D);
     const double cost = r.squaredNorm() + hold * hold * (phi - start).squaredNorm();
-    Eigen::MatrixXd H = J.transpose() * J;
+    Eigen::MatrixXd H = dynamics::gram(J);
     H.diagonal().array() += hold * hold;
     const Eigen::VectorXd gradient = J.transpose() * r + hold * hold * (phi - start);
     Eigen::MatrixXd damped = H;
     damped.diagonal() += damping * H.diagonal();
-    const Eigen::VectorXd step = -damped.ldlt().solve(gradient);
+    const Eigen::VectorXd step = -dynamics::definite_solve(damped, gradient);
     Eigen::VectorXd tried;
     evaluate(phi + step, tried, D);
     const double next = misfit(tried).squaredNorm() + hold * hold * (phi + step - start).squaredNorm();

@@ -2,13 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
+#include "dynamics/dense_solve.hpp"
 #include "planners/flip/arm_throw.hpp"
 
 namespace unhand::planners::flip {
@@ -16,7 +15,6 @@ namespace {
 
 constexpr int kFitted = 4;  ///< ln mu, ln length, dead time, opening time
 using Vector4 = Eigen::Matrix<double, kFitted, 1>;
-using Matrix4 = Eigen::Matrix<double, kFitted, kFitted>;
 
 ReleaseCard moved(const ReleaseCard& prior, const Vector4& p, const Vector4& sigma) {
   ReleaseCard out = prior;
@@ -129,7 +127,7 @@ ReleaseFit fit_release(const HandLibrary& library, const ReleaseCard& prior,
   auto r = residuals(p);
   if (!r) return out;
   out.cost_before = out.cost_after = r->squaredNorm();
-  Matrix4 information = Matrix4::Identity();
+  Eigen::MatrixXd information = Eigen::MatrixXd::Identity(kFitted, kFitted);
   double damping = 1e-3;
   for (; out.iterations < 12; ++out.iterations) {
     Eigen::MatrixXd J(rows, kFitted);
@@ -145,11 +143,13 @@ ReleaseFit fit_release(const HandLibrary& library, const ReleaseCard& prior,
       if (solved) J.col(k) = (*a - *b) / (2 * step);
     }
     if (!solved) break;
-    information = J.transpose() * J;
+    information = dynamics::gram(J);
+    const Eigen::VectorXd gradient = dynamics::inner_products(J, *r);
     double cost = out.cost_after;
     for (int attempt = 0; attempt < 6 && !(cost < out.cost_after); ++attempt) {
-      const Matrix4 A = information + damping * Matrix4::Identity();
-      const Vector4 tried = (p - A.ldlt().solve(J.transpose() * *r)).cwiseMax(-4.0).cwiseMin(4.0);
+      Eigen::MatrixXd A = information;
+      A.diagonal().array() += damping;
+      const Vector4 tried = (p - dynamics::definite_solve(A, gradient)).cwiseMax(-4.0).cwiseMin(4.0);
       const auto now = residuals(tried);
       if (now && now->squaredNorm() < cost) {
         p = tried;
@@ -165,7 +165,7 @@ ReleaseFit fit_release(const HandLibrary& library, const ReleaseCard& prior,
     if (enough) break;
   }
   out.card = moved(prior, p, sigma);
-  const Matrix4 covariance = information.inverse();
+  const Eigen::MatrixXd covariance = dynamics::definite_inverse(information);
   out.card.mu.sigma = out.card.mu.value * sigma[0] * std::sqrt(covariance(0, 0));
   out.length_sigma = out.card.length * sigma[1] * std::sqrt(covariance(1, 1));
   out.card.dead_time.sigma = sigma[2] * std::sqrt(covariance(2, 2));

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <numeric>
 
+#include "dynamics/dense_solve.hpp"
+
 namespace unhand::planners::flip {
 namespace {
 
@@ -101,13 +103,13 @@ void LeftOverField::set(std::vector<LeftOver> samples, const DetachVector& throw
       const double sigma = factor * kDiscrepancy[j];
       Eigen::MatrixXd A = sigma * sigma * K;
       A.diagonal() += noise;
-      const Eigen::LLT<Eigen::MatrixXd> llt(A);
-      const Eigen::VectorXd weights = llt.solve(y);
-      const double evidence = -0.5 * y.dot(weights) - llt.matrixLLT().diagonal().array().log().sum();
+      const Eigen::MatrixXd inverse = dynamics::definite_inverse(A);
+      const Eigen::VectorXd weights = inverse * y;
+      const double evidence = -0.5 * (y.dot(weights) + dynamics::log_determinant(A));
       if (!(evidence > best)) continue;
       best = evidence;
       sigma_[j] = sigma;
-      factor_[j] = llt;
+      inverse_[j] = inverse;
       weights_[j] = weights;
     }
   }
@@ -123,8 +125,7 @@ LeftOverField::At LeftOverField::at(const std::array<double, 3>& fractions, cons
     out.variance[j] = s2;
     if (n == 0) continue;
     out.mean[j] = s2 * k.dot(weights_[j]);
-    const Eigen::VectorXd half = factor_[j].matrixL().solve(k);
-    out.variance[j] = std::max(0.0, s2 - s2 * s2 * half.squaredNorm());
+    out.variance[j] = std::max(0.0, s2 - s2 * s2 * k.dot(inverse_[j] * k));
   }
   return out;
 }

@@ -2,7 +2,6 @@
 // command is the one that most probably lands within the tolerances.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <map>
 
@@ -53,7 +52,7 @@ class LeftOverField {
  private:
   std::vector<LeftOver> samples_;
   DetachVector sigma_ = kDiscrepancy;
-  std::array<Eigen::LLT<Eigen::MatrixXd>, 6> factor_;
+  std::array<Eigen::MatrixXd, 6> inverse_;  ///< of the covariance of the samples
   std::array<Eigen::VectorXd, 6> weights_;
 };
 

@@ -2,10 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+
+#include "dynamics/dense_solve.hpp"
 
 namespace unhand::planners {
 
@@ -23,12 +24,12 @@ constexpr int N = PlanarHand::kPoints;
 double point(int k) { return std::cos((k + 0.5) * std::numbers::pi / N); }
 
 /// Coefficients of powers from values at the points.
-const Eigen::Matrix<double, N, N>& from_values() {
-  static const Eigen::Matrix<double, N, N> inverse = [] {
-    Eigen::Matrix<double, N, N> powers;
+const Eigen::MatrixXd& from_values() {
+  static const Eigen::MatrixXd inverse = [] {
+    Eigen::MatrixXd powers(N, N);
     for (int k = 0; k < N; ++k)
       for (int j = 0; j < N; ++j) powers(k, j) = std::pow(point(k), j);
-    return Eigen::Matrix<double, N, N>(powers.inverse());
+    return dynamics::least_squares(powers, Eigen::MatrixXd::Identity(N, N));
   }();
   return inverse;
 }

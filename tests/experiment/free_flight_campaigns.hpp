@@ -1,13 +1,14 @@
 // Free flights whose truth is known, as a tracker would see them, and how far a fit is from it.
 #pragma once
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <array>
 #include <cmath>
 #include <random>
 #include <vector>
 
 #include "datasets/throw_log.hpp"
+#include "dynamics/dense_solve.hpp"
 #include "experiment/free_flight.hpp"
 #include "flight/fly.hpp"
 #include "flight/point_flight.hpp"
@@ -134,7 +135,8 @@ inline double distance(const Eigen::Matrix<double, 6, 6>& C, const std::array<do
     x[a] = e[used[a]];
     for (long b = 0; b < n; ++b) c(a, b) = C(used[a], used[b]);
   }
-  return x.dot(c.ldlt().solve(x));
+  const Eigen::VectorXd solved = dynamics::definite_solve(c, x);
+  return x.dot(solved);
 }
 
 inline double translation_distance(const FreeFlightFit& fit, const Truth& truth) {

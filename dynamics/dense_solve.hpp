@@ -1,11 +1,11 @@
 // Small dense linear algebra, compiled once: inverses of normal equations that may be singular, elimination,
-// spectra, least squares. Empty matrices give empty answers. Internal to fitting.
+// spectra, least squares. Empty matrices give empty answers.
 #pragma once
 
 #include <Eigen/Core>
 #include <vector>
 
-namespace unhand::fitting {
+namespace unhand::dynamics {
 
 /// The Moore-Penrose inverse of a symmetric positive semidefinite A in units in which its diagonal is one,
 /// since parameters differ by orders of magnitude: D (D A D)⁺ D, D = diag(A)^(-1/2). Directions that A does
@@ -24,6 +24,8 @@ Eigen::VectorXd pseudo_solve(const Eigen::MatrixXd& A, const Eigen::VectorXd& b,
 /// callers add a prior to H's diagonal, or ask allFinite().
 Eigen::MatrixXd definite_solve(const Eigen::MatrixXd& H, const Eigen::MatrixXd& B);
 Eigen::MatrixXd definite_inverse(const Eigen::MatrixXd& H);
+/// ln det H of the same; NaN where H is not positive definite.
+double log_determinant(const Eigen::MatrixXd& H);
 
 /// A B, AᵀA, AᵀB and A B Aᵀ.
 Eigen::MatrixXd product(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
@@ -43,11 +45,23 @@ struct Spectrum {
 };
 Spectrum spectrum_of(const Eigen::MatrixXd& A);
 
+/// A = U S Vᵀ of a matrix with no fewer rows than columns.
+struct SingularVectors {
+  Eigen::VectorXd values;        ///< S, in decreasing order, as many as A has columns
+  Eigen::MatrixXd right;         ///< V, square even where the rank of A is less
+  Eigen::VectorXd left_times_b;  ///< Uᵀ b
+};
+/// By way of A P = Q R, for A is tall.
+SingularVectors singular_vectors(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
+
 /// The X that minimises |A X − B| column by column; A's columns are scaled to one first, and what of them
 /// depends on others to 1e-10 gets zero.
 Eigen::MatrixXd least_squares(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
 
+/// (AᵀA)⁻¹ without squaring the condition number; empty where columns depend on others (by the same measure).
+Eigen::MatrixXd inverse_gram(const Eigen::MatrixXd& A);
+
 /// An orthonormal basis of the span of A's columns, of as many columns as A has rank (by the same measure).
 Eigen::MatrixXd orthonormal_basis(const Eigen::MatrixXd& A);
 
-}  // namespace unhand::fitting
+}  // namespace unhand::dynamics

@@ -1,14 +1,14 @@
 // What the small solvers promise: in the units of the unknowns, where something is not determined, and of
 // nothing at all.
-#include "fitting/dense_solve.hpp"
+#include "dynamics/dense_solve.hpp"
 
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
+#include <cmath>
 
 namespace {
 
-using namespace unhand::fitting;
+using namespace unhand::dynamics;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
@@ -64,7 +64,7 @@ TEST(DenseSolve, EliminationLeavesTheBlockOfTheInverse) {
   MatrixXd F(5, 4);
   F << 1, 2, 0, 1, 0, 1, 3, 2, 2, 0, 1, 1, 1, 1, 1, 0, 0, 2, 1, 4;
   const MatrixXd G = gram(F);
-  const MatrixXd rest = eliminated(G, 2), covariance = G.inverse().bottomRightCorner(2, 2);
+  const MatrixXd rest = eliminated(G, 2), covariance = definite_inverse(G).bottomRightCorner(2, 2);
   EXPECT_LT(MatrixXd(rest * covariance - MatrixXd::Identity(2, 2)).norm(), 1e-12);
   EXPECT_EQ(eliminated(G, 0), G);
 }
@@ -81,6 +81,40 @@ TEST(DenseSolve, LeastSquaresLeavesTheResidualNormalToTheColumns) {
   ASSERT_EQ(Q.cols(), 2);
   EXPECT_LT(MatrixXd(gram(Q) - MatrixXd::Identity(2, 2)).norm(), 1e-14);
   EXPECT_LT(VectorXd(Q.transpose() * left).norm(), 1e-12);
+}
+
+TEST(DenseSolve, TheSpectrumRebuildsItsMatrix) {
+  MatrixXd A(4, 4);
+  A << 0, 3, 1, 0, 3, 0, 2, 0, 1, 2, -5, 1e-9, 0, 0, 1e-9, 1e-12;  // of either sign, and of thirteen decades
+  const Spectrum s = spectrum_of(A);
+  EXPECT_LT(MatrixXd(gram(s.vectors) - MatrixXd::Identity(4, 4)).norm(), 1e-14);
+  EXPECT_LT(MatrixXd(congruent(s.vectors, s.values.asDiagonal()) - A).norm(), 1e-14 * A.norm());
+  for (Eigen::Index k = 1; k < 4; ++k) EXPECT_LE(s.values[k - 1], s.values[k]);
+}
+
+TEST(DenseSolve, SingularVectorsRebuildTheNormalEquations) {
+  MatrixXd A(5, 3);
+  A << 1, 2, 3, 0, 1, 1, 2, 0, 2, 1, 1, 2, 0, 2, 2;  // the last column is the sum of the others
+  VectorXd b(5);
+  b << 1, -4, 2, 0, -3;
+  const SingularVectors s = singular_vectors(A, b);
+  const MatrixXd V = s.right, S = s.values.asDiagonal();
+  EXPECT_LT(MatrixXd(gram(V) - MatrixXd::Identity(3, 3)).norm(), 1e-14);
+  EXPECT_LT(MatrixXd(congruent(V, product(S, S)) - gram(A)).norm(), 1e-13 * gram(A).norm());
+  EXPECT_LT(VectorXd(V * s.values.cwiseProduct(s.left_times_b) - A.transpose() * b).norm(),
+            1e-13);  // Aᵀ = V S Uᵀ
+  EXPECT_LT(s.values[2], 1e-15 * s.values[0]);
+}
+
+TEST(DenseSolve, TheInverseOfAGramMatrixAndItsDeterminant) {
+  MatrixXd A(4, 2);
+  A << 1, 1e6, 1, 2e6, 1, 3e6, 1, 5e6;
+  const MatrixXd inverse = inverse_gram(A);
+  EXPECT_LT(MatrixXd(gram(A) * inverse - MatrixXd::Identity(2, 2)).cwiseAbs().maxCoeff(), 1e-8);
+  EXPECT_NEAR(log_determinant(gram(A)), std::log(35e12), 1e-12);  // 4 Σt² − (Σt)²
+  MatrixXd twice(4, 3);
+  twice << A, A.col(0);
+  EXPECT_EQ(inverse_gram(twice).size(), 0);
 }
 
 TEST(DenseSolve, OfNothingComesNothing) {
