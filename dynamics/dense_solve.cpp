@@ -1,13 +1,12 @@
 #include "dynamics/dense_solve.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Jacobi>
+#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 namespace unhand::dynamics {
@@ -138,37 +137,10 @@ MatrixXd eliminated(const MatrixXd& G, Index n) {
   return G.bottomRightCorner(f, f) - inner_products(cross, definite_solve(G.topLeftCorner(n, n), cross));
 }
 
-// Jacobi's rotations, pair by pair.
-Spectrum spectrum_of(const MatrixXd& matrix) {
-  const Index n = matrix.cols();
-  MatrixXd A = matrix, V = MatrixXd::Identity(n, n);
-  constexpr int kMostSweeps = 50;  // of which some eight are needed
-  bool turned = true;
-  for (int sweep = 0; sweep < kMostSweeps && turned; ++sweep) {
-    turned = false;
-    for (Index p = 0; p < n; ++p)
-      for (Index q = p + 1; q < n; ++q) {
-        Eigen::JacobiRotation<double> turn;
-        if (!(std::abs(A(p, q)) > 0.1 * kEpsilon * std::sqrt(std::abs(A(p, p) * A(q, q)))) ||
-            !turn.makeJacobi(A, p, q))
-          continue;
-        A.applyOnTheLeft(p, q, turn.adjoint());
-        A.applyOnTheRight(p, q, turn);
-        V.applyOnTheRight(p, q, turn);
-        A(p, q) = A(q, p) = 0;
-        turned = true;
-      }
-  }
-  std::vector<Index> order(static_cast<std::size_t>(n));
-  std::iota(order.begin(), order.end(), Index{0});
-  std::sort(order.begin(), order.end(), [&](Index a, Index b) { return A(a, a) < A(b, b); });
-  Spectrum out{VectorXd(n), MatrixXd(n, n)};
-  for (Index k = 0; k < n; ++k) {
-    const Index from = order[static_cast<std::size_t>(k)];
-    out.values[k] = A(from, from);
-    out.vectors.col(k) = V.col(from);
-  }
-  return out;
+Spectrum spectrum_of(const MatrixXd& A) {
+  if (A.cols() == 0) return {VectorXd(), A};
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(A);
+  return {solver.eigenvalues(), solver.eigenvectors()};
 }
 
 SingularVectors singular_vectors(const MatrixXd& A, const VectorXd& b) {
