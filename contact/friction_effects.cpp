@@ -140,15 +140,17 @@ void AdhesiveForce::kinks_(std::vector<S>& out) const {
 }
 
 BiasedForce::BiasedForce(const NormalForce& base, const Dual& bias, double opening_start)
-    : base_(base), bias_(bias), opening_start_(opening_start) {}
+    : base_(base), bias_(bias), opening_start_(opening_start) {
+  force_release(base, release_);
+}
 
 template <class S>
 S BiasedForce::at_(const Window& window, const S& t) const {
-  const double release = base_.release_time();
+  const double release = release_.a;
   if (value_of(t) >= release) return S(0);
   S weight(1.0);
   if (value_of(t) > opening_start_ && std::isfinite(release))
-    weight = (release - t) / (release - opening_start_);
+    weight = (convert<S>(release_) - t) / (convert<S>(release_) - opening_start_);
   const S force = base_.at(window, t) - convert<S>(bias_) * weight;
   return value_of(force) > 0 ? force : S(0);
 }

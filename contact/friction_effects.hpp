@@ -15,7 +15,7 @@ struct FrictionVariation {
   S viscous{};               ///< 1/v₀: μ(|u|) = μ (1 + |u|/v₀) [s/m]
   S softness{};              ///< γ: a = a₀ (f_N/f₀)^γ, soft finger [XydasKao1999] [-]
   double reference_force{};  ///< f₀ [N]
-  S pressure_exponent{};     ///< s: pressure ∝ (1 − (r/a)²)^s [-]
+  S pressure_exponent{};     ///< s: pressure ∝ (1 − (r/a)²)^s at the same L = c a [-]
   S compliance{};            ///< tangential, of the pads together [m/N]
   S loss_time{};             ///< of the compliance [s]
   S adhesion{};              ///< f_adh: limits μ (f_N + f_adh) of a pad [N]
@@ -79,7 +79,7 @@ class BiasedForce final : public NormalForce {
   template <class S>
   S at_(const Window& window, const S& t) const;
   const NormalForce& base_;
-  Dual bias_;
+  Dual bias_, release_;
   double opening_start_;
 };
 

@@ -107,6 +107,14 @@ class Stepper {
   long rejected_steps() const { return rejected_; }
 
  protected:
+  /// The length h [s] of a step on the way from t0 to `limit`: where the limit moves with the parameters, the
+  /// step's end does in proportion.
+  S aimed(const S& limit, double h) const {
+    S length(h);
+    if constexpr (!std::is_same_v<S, double>) length.v = h / (limit.a - t0_.a) * (limit.v - t0_.v);
+    return length;
+  }
+
   S t0_{}, t1_{};                    ///< s: ends of the last step
   State<S, N> y0_{}, y1_{};          ///< states there
   mutable long flow_evaluations_{};  // dense output may be worked out when it is first asked for
@@ -189,7 +197,7 @@ class SingleStep : public Stepper<S, N> {
       // Land on the limit rather than leave a sliver before it.
       const bool last = h >= left * (1 - 1e-10);
       if (!last && h > 0.5 * left) h = 0.5 * left;
-      const S length = last ? S(limit - this->t0_) : S(h);
+      const S length = last ? S(limit - this->t0_) : this->aimed(limit, h);
       const double error = self().attempt(length);
       if (error <= 1.0) {
         this->t1_ = last ? limit : S(this->t0_ + length);

@@ -6,11 +6,14 @@
 
 namespace unhand::dynamics {
 
-/// The values are those of `inner` to the last bit, steps and all. Beside them S = ∂y/∂p at fixed t obeys
-/// dS/dt = f_y S + f_p, a linear equation that VariationalSteps of order five solve, in the variable in which
-/// the inner stepper steps (so where that is regular, so is this), with f_y and f_p on the inner dense output
-/// at three nodes: one for a step of order five, several for a longer one of order eight. S therefore has the
-/// order of the values, and their tolerance; it is not the derivative of their rounding and truncation.
+/// The values are those of `inner` to the last bit, steps and all. Beside them go S = dy/dp, taken not at
+/// fixed t but at fixed places between the ends of the phase: where these move by ∂t/∂p, times between them
+/// move in proportion. S then obeys dS/dt = f_y S + f_p + f_t ∂t/∂p + f d(∂t/∂p)/dt. (At fixed t, f_p has a
+/// pole where data end at a time that depends on p as (t₁ − t)^q with q < 1.) The equation is linear;
+/// VariationalSteps of order five solve it in the variable in which the inner stepper steps (so where that is
+/// regular, so is this), with the flow's derivatives on the inner dense output at three nodes: one for a step
+/// of order five, several for a longer one of order eight. S is not the derivative of the values' rounding
+/// and truncation.
 template <int N>
 class TangentStepper final : public Stepper<Dual, N> {
  public:
@@ -23,38 +26,33 @@ class TangentStepper final : public Stepper<Dual, N> {
     phase_ = phase;
     this->t1_ = t;
     this->y1_ = y;
-    const State<double, N> at = values<Dual, N>(y);
-    State<double, N> rate;
-    system.flow(phase, t.a, at, rate);
-    for (int i = 0; i < N; ++i)
-      for (int k = 0; k < kDualSize; ++k) end_[i][k] = y[i].v[k] - rate[i] * t.v[k];
-    inner_->start(system, phase, t.a, at);
+    inner_->start(system, phase, t.a, values<Dual, N>(y));
   }
 
   StepStatus step(const Dual& limit, double longest) override {
     this->t0_ = this->t1_;
     this->y0_ = this->y1_;
-    begin_ = end_;
     const StepStatus status = inner_->step(limit.a, longest);
     count();
     if (status != StepStatus::accepted) return status;
     whole_ = inner_->fraction(inner_->t1() - inner_->t0());
     parts_ = inner_->parts();
-    end_ = begin_;
+    this->t1_ = inner_->t1() < limit.a ? this->t0_ + this->aimed(limit, inner_->t1() - inner_->t0()) : limit;
+    this->t1_.a = inner_->t1();
+    stretch_ = (this->t1_.v - this->t0_.v) / std::max(this->t1_.a - this->t0_.a, shortest_step(this->t0_.a));
+    Sensitivity<N> s = sensitivity(this->y0_);
     for (int k = 0; k < parts_; ++k) {
-      solve(end_, k * whole_ / parts_, (k + 1) * whole_ / parts_, step_[k]);
-      end_ = step_[k].end();
+      solve(s, k * whole_ / parts_, (k + 1) * whole_ / parts_, step_[k]);
+      s = step_[k].end();
     }
-    this->t1_ = inner_->t1() < limit.a ? Dual(inner_->t1()) : limit;
-    join(inner_->y1(), end_, this->t1_, this->y1_);
+    join(inner_->y1(), s, this->y1_);
     return status;
   }
 
   void interpolate(double theta, State<Dual, N>& y) const override {
     const double fraction = inner_->fraction(theta * (inner_->t1() - inner_->t0()));
-    const Dual t = this->t0_ + theta * (this->t1_ - this->t0_);
     const int k = part(fraction);
-    join(inner_->point(fraction).y, step_[k].at(fraction / whole_ * parts_ - k), t, y);
+    join(inner_->point(fraction).y, step_[k].at(fraction / whole_ * parts_ - k), y);
   }
 
   void retake(double h, State<Dual, N>& y) override {
@@ -63,8 +61,12 @@ class TangentStepper final : public Stepper<Dual, N> {
     const double fraction = inner_->fraction(h);
     const int k = part(fraction);
     VariationalStep<N> last;
-    solve(k > 0 ? step_[k - 1].end() : begin_, k * whole_ / parts_, fraction, last);
-    join(at, last.end(), Dual(this->t0_ + h), y);
+    solve(k > 0 ? step_[k - 1].end() : sensitivity(this->y0_), k * whole_ / parts_, fraction, last);
+    join(at, last.end(), y);
+    // h after t0, not at the same place between the ends.
+    State<double, N> rate;
+    system_->flow(phase_, this->t0_.a + h, at, rate);
+    for (int i = 0; i < N; ++i) y[i].v += rate[i] * (this->t0_.v - time(this->t0_.a + h).v);
   }
 
   void interpolate_values(double theta, State<double, N>& y) const override { inner_->interpolate(theta, y); }
@@ -85,29 +87,35 @@ class TangentStepper final : public Stepper<Dual, N> {
     return std::clamp(static_cast<int>(fraction / whole_ * parts_), 0, parts_ - 1);
   }
 
-  /// The derivatives from one fraction of the inner step, where they are `start`, to another.
-  void solve(const Sensitivity<N>& start, double from, double to, VariationalStep<N>& step) {
-    std::array<FlowDerivative<N>, 3> at;
-    std::array<double, 3> speed;
-    for (int k = 0; k < 3; ++k) {
-      const StepPoint<N> point = inner_->point(from + VariationalStep<N>::kNode[k] * (to - from));
-      at[k].evaluate(*system_, phase_, point.t, point.y);
-      speed[k] = point.speed;
-    }
-    dual_evaluations_ += 6;
-    step.solve(start, to - from, at, speed);
-  }
+  /// A time of the step, with its derivatives.
+  Dual time(double t) const { return Dual(t, this->t0_.v + (t - this->t0_.a) * stretch_); }
 
-  /// Values and derivatives at a time that may move with the parameters.
-  void join(const State<double, N>& at, const Sensitivity<N>& s, const Dual& t, State<Dual, N>& y) const {
+  static Sensitivity<N> sensitivity(const State<Dual, N>& y) {
+    Sensitivity<N> s;
+    for (int i = 0; i < N; ++i)
+      for (int k = 0; k < kDualSize; ++k) s[i][k] = y[i].v[k];
+    return s;
+  }
+  static void join(const State<double, N>& at, const Sensitivity<N>& s, State<Dual, N>& y) {
     for (int i = 0; i < N; ++i) {
       y[i].a = at[i];
       for (int k = 0; k < kDualSize; ++k) y[i].v[k] = s[i][k];
     }
-    if (t.v.isZero(0)) return;
-    State<double, N> rate;
-    system_->flow(phase_, t.a, at, rate);
-    for (int i = 0; i < N; ++i) y[i].v += rate[i] * t.v;
+  }
+
+  /// S from one fraction of the inner step, where it is `start`, to another.
+  void solve(const Sensitivity<N>& start, double from, double to, VariationalStep<N>& step) {
+    std::array<double, kDualSize> grows;
+    for (int k = 0; k < kDualSize; ++k) grows[k] = stretch_[k];
+    std::array<FlowDerivative<N>, 3> at;
+    std::array<double, 3> speed;
+    for (int k = 0; k < 3; ++k) {
+      const StepPoint<N> point = inner_->point(from + VariationalStep<N>::kNode[k] * (to - from));
+      at[k].evaluate(*system_, phase_, time(point.t), point.y, grows);
+      speed[k] = point.speed;
+    }
+    dual_evaluations_ += 6;
+    step.solve(start, to - from, at, speed);
   }
 
   void count() {
@@ -118,9 +126,9 @@ class TangentStepper final : public Stepper<Dual, N> {
   std::unique_ptr<Stepper<double, N>> inner_;
   const HybridSystem<N>* system_{};
   Phase phase_;
-  Sensitivity<N> begin_{}, end_{};  // at the ends of the last step, at fixed times
   std::array<VariationalStep<N>, kMostParts> step_;
-  int parts_{1};     // of the last step
+  decltype(Dual::v) stretch_{decltype(Dual::v)::Zero()};  // d(∂t/∂p)/dt along the last step
+  int parts_{1};                                          // of it
   double whole_{1};  // the fraction of the inner step at which the step ends
   long dual_evaluations_{};
 };

@@ -9,29 +9,29 @@
 
 namespace unhand::dynamics {
 
-/// ∂y/∂p of kDualSize parameters at a fixed time: one row a component.
+/// dy/dp of kDualSize parameters: one row a component.
 template <int N>
 using Sensitivity = std::array<std::array<double, kDualSize>, N>;
 
-/// f, f_y and f_p at a point of the solution.
+/// f, f_y and f_p at a point of the solution, where the time of the point may move with the parameters.
 template <int N>
 struct FlowDerivative {
-  State<double, N> f{};                      ///< f(t, y), state units per second
   std::array<std::array<double, N>, N> y{};  ///< ∂f_i/∂y_j, [component][component]
-  Sensitivity<N> p{};                        ///< ∂f_i/∂p_k at fixed y, [component][parameter]
+  Sensitivity<N> p{};  ///< df_i/dp_k at fixed y along the moving time, and f_i d(∂t/∂p_k)/dt
 
-  /// Two Dual evaluations: the derivatives that the system's parameters carry alone, and with those of y.
-  void evaluate(const HybridSystem<N>& system, const Phase& phase, double t, const State<double, N>& at) {
+  /// Two Dual evaluations: the derivatives that the system's parameters and the time carry alone, and with
+  /// those of y. `stretch` is the rate at which the derivatives of the time grow, d(∂t/∂p)/dt.
+  void evaluate(const HybridSystem<N>& system, const Phase& phase, const Dual& t, const State<double, N>& at,
+                const std::array<double, kDualSize>& stretch) {
     static_assert(N <= kDualSize);
     State<Dual, N> yd, own, both;
     for (int i = 0; i < N; ++i) yd[i] = Dual(at[i]);
-    system.flow(phase, Dual(t), yd, own);
+    system.flow(phase, t, yd, own);
     for (int i = 0; i < N; ++i) yd[i].v[i] = 1;
-    system.flow(phase, Dual(t), yd, both);
+    system.flow(phase, t, yd, both);
     for (int i = 0; i < N; ++i) {
-      f[i] = own[i].a;
       for (int j = 0; j < N; ++j) y[i][j] = both[i].v[j] - own[i].v[j];
-      for (int k = 0; k < kDualSize; ++k) p[i][k] = own[i].v[k];
+      for (int k = 0; k < kDualSize; ++k) p[i][k] = own[i].v[k] + own[i].a * stretch[k];
     }
   }
 };

@@ -43,6 +43,8 @@ void validate(const ReleaseProblem<S>& problem) {
   require(std::isfinite(value_of(problem.slip.x)), "slip x", value_of(problem.slip.x), "finite m/s");
   require(std::isfinite(value_of(problem.slip.z)), "slip z", value_of(problem.slip.z), "finite m/s");
   require(std::isfinite(value_of(problem.spin)), "spin", value_of(problem.spin), "finite rad/s");
+  require(std::abs(problem.start) <= 1e6, "start", problem.start,
+          "[-1e6, 1e6] s: a clock must begin near the throw, for its times to be resolved");
   if (!(problem.start >= problem.hand.begin() && problem.start < problem.hand.end()))
     throw std::invalid_argument(
         fmt::format("release: start = {} is not in [{}, {}) s, where the hand's motion is known",

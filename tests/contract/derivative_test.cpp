@@ -30,9 +30,14 @@ class Derivative : public EveryModel {
         t.patch.radius, q.opening_time.a, q.grip_force.a};
   }
 
+  /// One method for both scalars: the double runs then follow the same steps but for the parameter's change.
+  static dynamics::Method one_method() {
+    return surface() ? dynamics::Method::radau : dynamics::Method::automatic;
+  }
+
   template <class S>
   static Answer land(const support::RandomThrow& thrown, const std::array<S, kParameters>& x,
-                     double tolerance) {
+                     double tolerance, dynamics::Method method = one_method()) {
     const auto& q = thrown.force.profile();
     const contact::OpeningProfile<S> opening{q.open_command, x[7], S(q.dead_time.a), x[6], S(q.shape.a)};
     const contact::ProfileNormalForce force(opening);
@@ -45,8 +50,7 @@ class Derivative : public EveryModel {
                                              {x[2], x[3]}, 0.0,   {},     S(0.0)};
     release::ReleaseOptions options;
     options.integrator = support::tight(tolerance, 1e-2 * tolerance);
-    // one method for both scalars: the double runs then follow the same steps but for the parameter's change
-    if (surface()) options.integrator.method = dynamics::Method::radau;
+    options.integrator.method = method;
     const auto result = simulate_release(problem, options);
     EXPECT_EQ(result.outcome, release::ReleaseOutcome::detached) << describe(thrown);
     Answer answer;
@@ -116,6 +120,41 @@ TEST_P(Derivative, OfTheLandingIsTheCentralDifference) {
   if (!carried()) {
     EXPECT_GT(switches, 2 * kThrows);
   }
+}
+
+TEST_P(Derivative, OfTheOpeningIsRightAtTheTolerancesOfFits) {
+  // A force that ends as (t₁ − t)^p: at a fixed time its derivative by t₁ has a pole there if p < 1.
+  constexpr double kTight = 1e-11, kFit = 1e-6, kStep = 1e-4;
+  std::mt19937_64 random(63);
+  int compared = 0;
+  for (const double shape : {0.5, 0.7, 1.2, 2.0})
+    for (int i = 0; i < 4; ++i) {
+      auto thrown = support::random_throw(random, 0);
+      auto profile = thrown.force.profile();
+      profile.shape = Dual(shape);
+      thrown.force = contact::ProfileNormalForce(profile);
+      const auto at = parameters_of(thrown, 0.031);
+      std::array<Dual, kParameters> seeded;
+      for (int k = 0; k < kParameters; ++k) seeded[k] = dynamics::independent(at[k], k);
+      const Answer fit = land<Dual>(thrown, seeded, kFit, dynamics::Method::automatic);
+      for (const int k : {4, 6, 7}) {
+        const double h = kStep * std::abs(at[k]);
+        auto above = at, below = at;
+        above[k] += h;
+        below[k] -= h;
+        const Answer a = land<double>(thrown, above, kTight), b = land<double>(thrown, below, kTight);
+        if (a.modes != fit.modes || b.modes != fit.modes) continue;
+        ++compared;
+        for (int j = 0; j < 4; ++j) {
+          const double difference = (a.landing[j] - b.landing[j]) / (2 * h);
+          const double size =
+              std::max(std::abs(difference), 0.01 * std::max(1.0, std::abs(a.landing[j])) / at[k]);
+          EXPECT_NEAR(fit.slope[j][k], difference, 3e-4 * size)
+              << "answer " << j << " by " << kNames[k] << " shape " << shape << ' ' << describe(thrown);
+        }
+      }
+    }
+  EXPECT_GE(compared, 40);
 }
 
 TEST_P(Derivative, TheValuesAreThoseOfTheDoubleRun) {

@@ -114,7 +114,8 @@ TYPED_TEST(SingleSteps, AKinkInOneComponentIsSeenBesideAnotherThatSways) {
   // derivative at a knot, as hands and normal forces do. Each over places of the end in the rhythm of the
   // steps. The bounds: a knot inside a step errs by at most 3.8 times the finer of DormandPrince's estimates,
   // of which at least a tenth is counted, over √2 (the norm) and of at most 1.3 tolerances: 70. Each estimate
-  // alone has zeros where a knot goes unseen, as close to each other as a thousandth of a step: hence so many.
+  // alone has zeros where a knot goes unseen, as close to each other as a thousandth of a step: hence so
+  // many.
   for (const double tolerance : {1e-7, 1e-9}) {
     for (int k = 0; k < 2000; ++k) {
       const double end = 3.0 + 0.00034 * k, power = 1.1 + 0.0002 * k;
@@ -266,6 +267,31 @@ class WithDual : public testing::Test {};
 using Differentiable = testing::Types<DormandPrince<Dual, 2>, TangentOf<Rosenbrock<2>>, TangentOf<Radau<2>>,
                                       TangentOf<SwitchingStepper<2>>>;
 TYPED_TEST_SUITE(WithDual, Differentiable);
+
+TYPED_TEST(WithDual, DataMayEndWhereAParameterSaysWithAnyPower) {
+  // x' = (1 − t/T)^p, y' = x until T: x = T/(p + 1), y = T²/(p + 2). At fixed t, ∂x'/∂T has a pole at T.
+  const double T = 0.7;
+  for (const double power : {0.3, 0.5, 0.8, 1.5}) {
+    const Dual end = independent(T, 0);
+    const auto problem = free_flow(
+        [&](int, const auto& t, const auto& y, auto& dy) {
+          using S = std::decay_t<decltype(t)>;
+          const S left = 1.0 - t / as<S>(end);
+          const double u = std::max(value_of(left), 0.0);
+          if constexpr (std::is_same_v<S, double>)
+            dy[0] = std::pow(u, power);
+          else
+            dy[0] = S(std::pow(u, power), power * std::pow(std::max(u, 1e-9), power - 1) * left.v);
+          dy[1] = y[0];
+        },
+        FlowKind::stiff);
+    TypeParam stepper(Tolerances{1e-6, 1e-8});
+    stepper.start(problem, kPhase, Dual(0.0), {Dual(0.0), Dual(0.0)});
+    while (stepper.t1().a < T) ASSERT_EQ(stepper.step(end, 10.0), StepStatus::accepted);
+    EXPECT_NEAR(stepper.y1()[0].v[0], 1 / (power + 1), 1e-3) << power;
+    EXPECT_NEAR(stepper.y1()[1].v[0], 2 * T / (power + 2), 1e-3) << power;
+  }
+}
 
 TYPED_TEST(WithDual, IsThatOfTheSolution) {
   // x'' = −k x − c x' + sin t from (t0, x0, v0): derivatives with respect to k, c, x0, v0 and t0.

@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "contact/friction_effects.hpp"
+
 namespace unhand::experiment {
 namespace {
 
@@ -85,6 +87,20 @@ TEST(DoubtfulForce, ExactDerivatives) {
     std::vector<Dual> kinks;
     force.kinks(kinks);
     EXPECT_NEAR(kinks.back().v[4], kSigma, 1e-15);
+  }
+}
+
+TEST(DoubtfulForce, ItsEndMovesTheBiasThatFadesTillThere) {
+  constexpr double kStep = 1e-4;
+  const auto base = ramp(1.5);
+  const Window all{0, 0.2};
+  const auto force = [&](const Dual& deviation, const auto& t) {
+    const DoubtfulForce doubtful(base, summary(1.5), deviation);
+    return contact::BiasedForce(doubtful, Dual(5.0), kStart).at(all, t);
+  };
+  for (const double t : {0.04, 0.06, 0.08}) {
+    const double difference = (force(Dual(kStep), t) - force(Dual(-kStep), t)) / (2 * kStep);
+    EXPECT_NEAR(force(independent(0.0, 0), Dual(t)).v[0], difference, 1e-6 * std::abs(difference)) << t;
   }
 }
 
