@@ -11,6 +11,7 @@
 #include "datasets/slip_log.hpp"
 #include "datasets/summary.hpp"
 #include "experiment/landing_noise.hpp"
+#include "experiment/prepared_throw.hpp"
 #include "experiment/unit_check.hpp"
 
 namespace unhand::apps {
@@ -94,6 +95,12 @@ Inspection inspect_throws(const std::string& file) {
   out.text += "\nno schema errors; times in s, values in SI units and radians as read\n";
   if (const int n = log.dimension == 2 ? experiment::landings_without_sigma(log) : 0; n > 0)
     out.text += fmt::format("note: {}\n", experiment::in_words(experiment::landing_noise(log), n));
+  if (const auto n = std::count_if(log.throws.begin(), log.throws.end(),
+                                   [&](const auto& one) { return !experiment::shows_grasp(log, one); }))
+    out.text += fmt::format(
+        "note: {} of {} throws do not show the grasp (no motion capture before the gripper opens, no "
+        "grasp_angle): a release cannot be predicted from them\n",
+        n, log.throws.size());
   for (const auto& doubt : experiment::unit_doubts(log))
     out.text += fmt::format("doubtful: {}: {}\n", doubt.path, doubt.reason);
   return out;

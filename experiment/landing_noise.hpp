@@ -23,8 +23,7 @@ struct LandingNoise {
 /// - the same about the mean of all throws;
 /// - the landings within the repetitions of a condition: as large as throws differ.
 ///
-/// Declared noise is neither used nor needed. Only the last is more than what the sensor scatters by, or
-/// where both sensors are one, less.
+/// The first two are the sensor's, the last is more.
 LandingNoise landing_noise(const datasets::ThrowLog& log);
 
 /// How many landings of the log declare no noise.
