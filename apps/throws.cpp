@@ -47,8 +47,7 @@ datasets::SlipLog read_slips(const std::string& file) {
 std::string sign_doubt(double dissipation) {
   return fmt::format(
       "friction would drive the object: wrench times twist is negative on the whole ({:+.2f} of its size), "
-      "and "
-      "the wrench is the one that the object applies to the surface: a sign reversed in wrench or twist?",
+      "and the wrench is the one that the object applies to the surface: a sign reversed in wrench or twist?",
       dissipation);
 }
 
