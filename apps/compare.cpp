@@ -8,6 +8,8 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <stdexcept>
+#include <utility>
 
 #include "apps/command.hpp"
 #include "apps/compare_run.hpp"
@@ -105,19 +107,33 @@ void compare_releases(const CompareRequest& request, const datasets::ThrowLog& l
   const auto cards = read_cards(request, models);
   const auto prepared = prepare_throws(log, request);
   ReleaseRun run(request, log, prepared);
+  std::vector<std::pair<std::string, std::string>> unanswered;  // model, reason
   {
     Progress progress(request.fit ? "fit" : "simulate", models.size());
     for (const auto& model : models) {
       const auto card = cards.find(model);
-      run.add(model, card == cards.end() ? nullptr : &card->second);
+      try {
+        run.add(model, card == cards.end() ? nullptr : &card->second);
+      } catch (const std::invalid_argument& error) {
+        unanswered.emplace_back(model, error.what());
+      } catch (const Unanswered& error) {
+        unanswered.emplace_back(model, error.what());
+      }
       progress.step();
     }
   }
   const experiment::Comparison& comparison = run.comparison();
+  if (comparison.models.empty()) {
+    std::string reasons;
+    for (const auto& [model, reason] : unanswered) reasons += (reasons.empty() ? "" : "; ") + reason;
+    throw Unanswered(reasons);
+  }
+  for (const auto& [model, reason] : unanswered) tell("unhand: {}: not compared: {}\n", model, reason);
   report_failures(comparison);
 
   const ReleaseTables tables = release_tables(comparison, log, request.log);
-  const Json json = release_json(comparison, request);
+  Json json = release_json(comparison, request);
+  for (const auto& [model, reason] : unanswered) json["not_compared"][model] = reason;
   Outputs outputs{request.inputs()};
   if (!request.json.empty()) outputs.json(request.json, json);
   if (!request.report.empty())

@@ -9,6 +9,7 @@
 #include "apps/figure.hpp"
 #include "apps/progress.hpp"
 #include "apps/tell.hpp"
+#include "apps/throws.hpp"
 #include "fitting/slips/compare_surfaces.hpp"
 
 namespace unhand::apps {
@@ -146,7 +147,7 @@ void report_failures(const Scores& scores) {
 void compare_slips(const CompareRequest& request) {
   if (!request.cards.empty() || !request.write_cards.empty())
     throw WrongUsage("limit surfaces are fitted to the slips here: neither --card nor --write-cards");
-  const datasets::SlipLog log = datasets::read_slip_log(request.log);
+  const datasets::SlipLog log = read_slips(request.log);
   std::vector<SurfaceModel> models;
   for (const auto& name : request.models) models.push_back(fitting::surface_model(name));
   if (models.empty()) models.assign(std::begin(fitting::surface_models), std::end(fitting::surface_models));

@@ -97,7 +97,7 @@ void discover_measured(MeasuredKind kind, const MeasuredRequest& request) {
     fitting::SurfaceDiscoveryOptions options;
     options.forget = request.forget;
     options.comparison.threads = request.threads;
-    auto found = fitting::discover_surfaces(datasets::read_slip_log(request.log), options);
+    auto found = fitting::discover_surfaces(read_slips(request.log), options);
     result.answer = std::move(found.answer);
     result.surfaces = std::move(found.evidence);
   } else {

@@ -6,6 +6,7 @@
 #include "apps/command.hpp"
 #include "apps/fit.hpp"
 #include "apps/tell.hpp"
+#include "apps/throws.hpp"
 #include "fitting/slips/compare_surfaces.hpp"
 
 namespace unhand::apps {
@@ -77,7 +78,7 @@ Json surface_json(const SurfaceScore& score) {
 }  // namespace
 
 void fit_slips(const FitRequest& request) {
-  const datasets::SlipLog log = datasets::read_slip_log(request.log);
+  const datasets::SlipLog log = read_slips(request.log);
   std::vector<SlipSamples> surfaces;
   for (const auto& [name, surface] : log.surfaces) surfaces.push_back(fitting::slip_samples(name, surface));
   fitting::SurfaceComparisonOptions options;

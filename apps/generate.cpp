@@ -8,6 +8,7 @@
 #include "apps/command.hpp"
 #include "apps/output.hpp"
 #include "apps/progress.hpp"
+#include "apps/tell.hpp"
 #include "apps/truth.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/synthetic_campaign.hpp"
@@ -66,10 +67,40 @@ std::vector<experiment::SyntheticThrow> simulate(const experiment::CampaignDesig
   return throws;
 }
 
+bool same(datasets::Throw a, datasets::Throw b) {
+  for (auto* one : {&a, &b})
+    if (one->mocap)
+      for (double& v : one->mocap->pose.data)
+        if (v != v) v = 0;  // lost samples are NaN, which equals nothing
+  return a == b;
+}
+
+/// Tells of effects without which the log would be the same.
+void tell_idle_effects(const experiment::CampaignDesign& design, const GenerateOptions& options,
+                       const std::vector<experiment::SyntheticThrow>& throws) {
+  for (const auto& effect : experiment::known_effects()) {
+    auto without = design;
+    if (std::erase_if(without.effects,
+                      [&](const auto& one) { return one.first.starts_with(effect.id + "."); }) == 0)
+      continue;
+    bool idle = experiment::campaign_header(without, options.seed) ==
+                experiment::campaign_header(design, options.seed);
+    for (std::size_t i = 0; idle && i < throws.size(); ++i)
+      idle = same(experiment::generate_throw(without, options.seed, static_cast<int>(i)).record,
+                  throws[i].record);
+    if (idle)
+      tell("unhand: {} changes nothing in this campaign{}\n", effect.id,
+           effect.id == "flight.wind" ? ": wind acts through drag, which no object has here "
+                                        "(--effect flight.quadratic_drag=K [1/m])"
+                                      : "");
+  }
+}
+
 void generate(const GenerateOptions& options) {
   const auto design = design_of(options);
   for (const std::string& file : {options.out, options.json, options.truth}) require_writable(file);
   auto throws = simulate(design, options);
+  tell_idle_effects(design, options, throws);
   Outputs outputs;
   if (!options.truth.empty())
     outputs.json(options.truth, truth_json(design, options.seed, options.out, throws));

@@ -7,8 +7,11 @@
 #include "apps/command.hpp"
 #include "apps/output.hpp"
 #include "apps/table.hpp"
+#include "apps/throws.hpp"
 #include "datasets/slip_log.hpp"
 #include "datasets/summary.hpp"
+#include "experiment/landing_noise.hpp"
+#include "experiment/prepared_throw.hpp"
 #include "experiment/unit_check.hpp"
 
 namespace unhand::apps {
@@ -90,6 +93,14 @@ Inspection inspect_throws(const std::string& file) {
                   plural(summary.free_flights, "free flight"));
   out.text += groups_of(summary).text() + "\n" + datasets_of(summary).text();
   out.text += "\nno schema errors; times in s, values in SI units and radians as read\n";
+  if (const int n = log.dimension == 2 ? experiment::landings_without_sigma(log) : 0; n > 0)
+    out.text += fmt::format("note: {}\n", experiment::in_words(experiment::landing_noise(log), n));
+  if (const auto n = std::count_if(log.throws.begin(), log.throws.end(),
+                                   [&](const auto& one) { return !experiment::shows_grasp(log, one); }))
+    out.text += fmt::format(
+        "note: {} of {} throws do not show the grasp (no motion capture before the gripper opens, no "
+        "grasp_angle): a release cannot be predicted from them\n",
+        n, log.throws.size());
   for (const auto& doubt : experiment::unit_doubts(log))
     out.text += fmt::format("doubtful: {}: {}\n", doubt.path, doubt.reason);
   return out;
@@ -103,7 +114,7 @@ Inspection inspect_slips(const std::string& file) {
   Json& surfaces = json["surfaces"] = Json::object();
   Table table{
       {"surface", "mass [kg]", "length [m]", "slips", "train", "test", "samples", "rate [Hz]"}, {}, 1};
-  std::string descriptions;
+  std::string descriptions, doubts;
   for (const auto& [name, surface] : log.surfaces) {
     std::size_t train = 0, samples = 0;
     std::vector<double> steps;
@@ -133,15 +144,19 @@ Inspection inspect_slips(const std::string& file) {
                           fmt::to_string(surface.slips.size()), fmt::to_string(train), fmt::to_string(test),
                           fmt::to_string(samples), fmt::format("{:.4g}", rate)});
     descriptions += fmt::format("  {}: {}\n", name, surface.description);
+    if (const double share = datasets::dissipation(surface); share < 0)
+      doubts += fmt::format("doubtful: /surfaces/{}: {}\n", name, sign_doubt(share));
   }
   out.json = json.dump(1) + "\n";
   out.text =
       fmt::format("{}: slip-log, {}\n{}\n{}\nno schema errors; wrench N, N, N m; twist m/s, m/s, rad/s\n",
-                  file, plural(log.surfaces.size(), "surface"), descriptions, table.text());
+                  file, plural(log.surfaces.size(), "surface"), descriptions, table.text()) +
+      doubts;
   return out;
 }
 
-void inspect(const InspectOptions& options) {
+void inspect(InspectOptions options) {
+  if (options.json == "-") options.json.clear();  // the standard output, as without a name
   require_writable(options.json);
   const Inspection seen = datasets::read_schema_name(options.log) == "slip-log" ? inspect_slips(options.log)
                                                                                 : inspect_throws(options.log);

@@ -169,6 +169,7 @@ void Outputs::commit() {
 
 void require_writable(const fs::path& file) {
   if (file.empty()) return;
+  if (file == "-") throw WrongUsage("'-' names no file, and outputs are files: ./- for one of that name");
   std::error_code error;
   if (fs::is_directory(file, error)) refuse(file, "it is a directory");
   if (fs::exists(file, error) && !fs::is_regular_file(file, error)) refuse(file, "it is no regular file");

@@ -10,6 +10,10 @@
 #include <limits>
 #include <optional>
 #include <type_traits>
+#include <vector>
+
+#include "apps/tell.hpp"
+#include "datasets/csv.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -111,6 +115,21 @@ bool Parser::chosen() const { return app_->parsed(); }
 bool Parser::given(const std::string& option) const { return app_->count(option) > 0; }
 
 Parser::Parsed Parser::parse(int argc, char** argv) {
+  const CLI::App* at = app_;
+  for (int i = 1; i < argc && argv[i][0] != '-'; ++i) {  // CLI11 says only that some command is required
+    const auto below = at->get_subcommands([](const CLI::App*) { return true; });
+    if (below.empty()) break;
+    const auto named = std::find_if(below.begin(), below.end(),
+                                    [&](const CLI::App* one) { return one->get_name() == argv[i]; });
+    if (named == below.end()) {
+      std::vector<std::string> known;
+      for (const CLI::App* one : below) known.push_back(one->get_name());
+      tell("unhand: {}\n",
+           datasets::unknown_name(fmt::format("there is no command '{}'", argv[i]), argv[i], known));
+      return Parsed::wrong_usage;
+    }
+    at = *named;
+  }
   try {
     app_->parse(argc, argv);
     return Parsed::run;

@@ -1,8 +1,14 @@
 #include "apps/throws.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <vector>
 
 #include "apps/command.hpp"
+#include "apps/tell.hpp"
+#include "experiment/prepared_throw.hpp"
 #include "experiment/unit_check.hpp"
 
 namespace unhand::apps {
@@ -13,7 +19,36 @@ datasets::ThrowLog read_throws(const std::string& file) {
   auto log = datasets::read_throw_log(file);
   if (log.throws.empty()) throw Unanswered(fmt::format("{}: holds no throws", file));
   experiment::require_units(log, file);
+  std::vector<std::string> left_out;
+  for (const auto& one : log.throws)
+    if (!experiment::shows_grasp(log, one)) left_out.push_back(one.id);
+  if (left_out.empty() || left_out.size() == log.throws.size()) return log;
+  constexpr std::size_t kNamed = 5;
+  const std::size_t named = std::min(left_out.size(), kNamed);
+  tell(
+      "unhand: left out {} of {} throws, which do not show the grasp (no motion capture before the gripper "
+      "opens, no grasp_angle): {}{}\n",
+      left_out.size(), log.throws.size(), fmt::join(left_out.begin(), left_out.begin() + named, ", "),
+      named < left_out.size() ? ", ..." : "");
+  std::erase_if(log.throws, [&](const auto& one) {
+    return std::binary_search(left_out.begin(), left_out.end(), one.id);  // both are sorted by id
+  });
   return log;
+}
+
+datasets::SlipLog read_slips(const std::string& file) {
+  auto log = datasets::read_slip_log(file);
+  for (const auto& [name, surface] : log.surfaces)
+    if (const double share = datasets::dissipation(surface); share < 0)
+      throw datasets::LogError(file, "/surfaces/" + name, sign_doubt(share));
+  return log;
+}
+
+std::string sign_doubt(double dissipation) {
+  return fmt::format(
+      "friction would drive the object: wrench times twist is negative on the whole ({:+.2f} of its size), "
+      "and the wrench is the one that the object applies to the surface: a sign reversed in wrench or twist?",
+      dissipation);
 }
 
 }  // namespace unhand::apps

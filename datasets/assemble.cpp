@@ -105,37 +105,42 @@ void fill_throw(ThrowLog& log, const std::string& id, Throw channels, bool repla
   if (channels.free_flight) found->free_flight = channels.free_flight;
 }
 
+std::optional<std::size_t> first_below(const MocapLog& mocap, int dimension, double height, double after) {
+  const std::size_t up = dimension == 3 ? 2 : 1;
+  std::optional<std::size_t> highest;
+  for (std::size_t i = 0; i < mocap.time.rows; ++i)
+    if (mocap.time(i) > after && mocap.is_valid(i) &&
+        (!highest || mocap.pose(i, up) > mocap.pose(*highest, up)))
+      highest = i;
+  if (!highest || !(mocap.pose(*highest, up) > height)) return {};
+  for (std::size_t k = *highest + 1; k < mocap.time.rows; ++k)
+    if (mocap.is_valid(k) && mocap.pose(k, up) <= height) return k;
+  return {};
+}
+
 std::optional<LandingLog> landing_of(const MocapLog& mocap, int dimension, double height) {
   const std::size_t up = dimension == 3 ? 2 : 1;
-  std::size_t highest = mocap.pose.rows;
-  for (std::size_t i = 0; i < mocap.pose.rows; ++i)
-    if (mocap.is_valid(i) && (highest == mocap.pose.rows || mocap.pose(i, up) > mocap.pose(highest, up)))
-      highest = i;
-  const double longest = 1.5 * usual_step(mocap.time);
-  std::size_t last = highest;
-  for (std::size_t k = highest + 1; k < mocap.pose.rows; ++k) {
-    if (!mocap.is_valid(k)) continue;
-    const std::size_t i = std::exchange(last, k);
-    const double above = mocap.pose(i, up) - height, below = mocap.pose(k, up) - height;
-    if (!(above > 0 && below <= 0)) continue;
-    if (mocap.time(k) - mocap.time(i) > longest) return {};  // lost where it passes
-    const double s = above / (above - below);
-    const auto at = [&](std::size_t j) { return (1 - s) * mocap.pose(i, j) + s * mocap.pose(k, j); };
-    const auto noise = [&](std::initializer_list<std::size_t> columns) {
-      std::vector<double> sigma;
-      for (const std::size_t j : columns)
-        if (mocap.pose.sigma.size() == mocap.pose.cols) sigma.push_back(mocap.pose.sigma[j]);
-      return sigma;
-    };
-    LandingLog out;
-    out.time = {1, 1, {(1 - s) * mocap.time(i) + s * mocap.time(k)}, {}};
-    if (dimension == 3)
-      out.pose = {1, 3, {at(0), at(1), at(2)}, noise({0, 1, 2})};
-    else
-      out.pose = {1, 2, {at(0), at(2)}, noise({0, 2})};
-    return out;
-  }
-  return {};
+  const auto k = first_below(mocap, dimension, height);
+  if (!k) return {};
+  std::size_t i = *k - 1;  // the highest lies before
+  while (!mocap.is_valid(i)) --i;
+  if (mocap.time(*k) - mocap.time(i) > 1.5 * usual_step(mocap.time)) return {};  // lost where it passes
+  const double above = mocap.pose(i, up) - height, below = mocap.pose(*k, up) - height;
+  const double s = above / (above - below);
+  const auto at = [&](std::size_t j) { return (1 - s) * mocap.pose(i, j) + s * mocap.pose(*k, j); };
+  const auto noise = [&](std::initializer_list<std::size_t> columns) {
+    std::vector<double> sigma;
+    for (const std::size_t j : columns)
+      if (mocap.pose.sigma.size() == mocap.pose.cols) sigma.push_back(mocap.pose.sigma[j]);
+    return sigma;
+  };
+  LandingLog out;
+  out.time = {1, 1, {(1 - s) * mocap.time(i) + s * mocap.time(*k)}, {}};
+  if (dimension == 3)
+    out.pose = {1, 3, {at(0), at(1), at(2)}, noise({0, 1, 2})};
+  else
+    out.pose = {1, 2, {at(0), at(2)}, noise({0, 2})};
+  return out;
 }
 
 }  // namespace unhand::datasets

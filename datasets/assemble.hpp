@@ -1,7 +1,10 @@
 // How what importers read from several files becomes the throws of one log.
 #pragma once
 
+#include <cmath>
+#include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,6 +39,11 @@ void add_throw(ThrowLog& log, Throw one, const std::string& file);
 /// one of them already and `replace` is not set.
 void fill_throw(ThrowLog& log, const std::string& id, Throw channels, bool replace,
                 const std::string& log_file);
+
+/// The first valid sample at or below `height` [m] after the highest valid one of those later than `after`
+/// [s]; nothing where the track does not come from above. `dimension` is the log's.
+std::optional<std::size_t> first_below(const MocapLog& mocap, int dimension, double height,
+                                       double after = -HUGE_VAL);
 
 /// Where the track passes `height` [m] downwards for the first time after its highest point, interpolated
 /// between two samples of `mocap` that follow each other without a loss: time and pose as in a throw log,

@@ -1,6 +1,7 @@
 #include "datasets/slip_log.hpp"
 
 #include <array>
+#include <cmath>
 #include <set>
 
 #include "datasets/channel_rules.hpp"
@@ -64,6 +65,17 @@ void validate(const SlipLog& log, const std::string& file) {
       if (!ids.insert(slip.id).second) fail_at(file, path + "/slips/" + slip.id, "the id is used twice");
     }
   }
+}
+
+double dissipation(const Surface& surface) {
+  double work = 0, size = 0;
+  for (const Slip& slip : surface.slips)
+    for (std::size_t i = 0; i < slip.time.rows; ++i) {
+      double power = 0;
+      for (std::size_t c = 0; c < 3; ++c) power += slip.wrench(i, c) * slip.twist(i, c);
+      work += power, size += std::abs(power);
+    }
+  return size > 0 ? work / size : 0;
 }
 
 SlipLog hdf5::parse_slip_log(const std::string& file, Place* place) {

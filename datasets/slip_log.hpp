@@ -36,6 +36,10 @@ struct SlipLog {
   bool operator==(const SlipLog&) const = default;
 };
 
+/// The work that the object does on the surface over all samples, Σ w·v, over the sum of its sizes, in [-1,
+/// 1]: near 1 where friction takes it, negative where a sign is reversed; 0 without samples.
+double dissipation(const Surface& surface);
+
 /// As for throw logs: the same strictness, the same errors, the same atomic writing.
 SlipLog read_slip_log(const std::filesystem::path& file);
 /// Checks and writes; throws LogError.

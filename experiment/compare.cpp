@@ -133,6 +133,7 @@ Comparison compare(const datasets::ThrowLog& log, const std::vector<PreparedThro
       result.from_card = true;
     } else {
       result.estimate = estimate_friction(log, prepared, model);
+      require_patch(result.estimate, model);
     }
     result.estimate.parameters.naive = options.naive;
     std::vector<Prediction> predictions(prepared.size());

@@ -119,6 +119,20 @@ void estimate_delay(const std::vector<PreparedThrow>& throws, ModelParameters& p
 
 }  // namespace
 
+void require_patch(const FrictionEstimate& estimate, const std::string& model) {
+  if (model == contact::kGripperDelay) return;
+  constexpr double kMu[2] = {1e-3, 20}, kLength[2] = {1e-5, 0.2};  // -, m
+  const auto require = [&](const char* what, double value, const double(&range)[2]) {
+    if (value >= range[0] && value <= range[1]) return;
+    throw std::invalid_argument(
+        fmt::format("the log does not determine the {} for {}: {} F/T samples of slipping pads in its train "
+                    "throws would make it {:.3g}, accepted are {:g} to {:g}; give more throws, or a card",
+                    what, model, estimate.samples, value, range[0], range[1]));
+  };
+  require("friction coefficient", estimate.parameters.mu, kMu);
+  require("length of the pads [m]", estimate.parameters.length, kLength);
+}
+
 FrictionEstimate estimate_friction(const datasets::ThrowLog& log, const std::vector<PreparedThrow>& throws,
                                    const std::string& model) {
   require_release_model(model);

@@ -33,4 +33,8 @@ struct FrictionEstimate {
 FrictionEstimate estimate_friction(const datasets::ThrowLog& log, const std::vector<PreparedThrow>& throws,
                                    const std::string& model);
 
+/// Throws std::invalid_argument, in words, where an estimate's friction is that of no pad: μ outside [0.001,
+/// 20] or a length outside [1e-5, 0.2] m. A few throws whose wrenches point one way determine one of the two.
+void require_patch(const FrictionEstimate& estimate, const std::string& model);
+
 }  // namespace unhand::experiment

@@ -109,10 +109,20 @@ void add_mocap(const datasets::ThrowLog& log, const datasets::Throw& logged, con
   }
 }
 
-void add_landing(const datasets::LandingLog& landing, Observations& out) {
+void add_landing(const datasets::ThrowLog& log, const datasets::LandingLog& landing,
+                 const ObservationOptions& options, Observations& out) {
   const double t = landing.time.empty() ? 0.0 : landing.time(0);
-  out.all.push_back({Channel::landing_x, t, landing.pose(0, 0), sigma_of(landing.pose, 0, 1e-5)});
-  out.all.push_back({Channel::landing_theta, t, landing.pose(0, 1), sigma_of(landing.pose, 1, 1e-4)});
+  constexpr double kLeast[2] = {1e-5, 1e-4};  // m, rad
+  std::optional<double> sigma[2];
+  if (landing.pose.sigma.empty()) {
+    const LandingNoise noise = options.landing_noise ? *options.landing_noise : landing_noise(log);
+    if (noise.x) sigma[0] = std::max(*noise.x, kLeast[0]);
+    if (noise.theta) sigma[1] = std::max(*noise.theta, kLeast[1]);
+  } else {
+    for (std::size_t c = 0; c < 2; ++c) sigma[c] = sigma_of(landing.pose, c, kLeast[c]);
+  }
+  if (sigma[0]) out.all.push_back({Channel::landing_x, t, landing.pose(0, 0), *sigma[0]});
+  if (sigma[1]) out.all.push_back({Channel::landing_theta, t, landing.pose(0, 1), *sigma[1]});
   if (!landing.time.empty() && !landing.time.sigma.empty())
     out.all.push_back({Channel::landing_time, t, t, sigma_of(landing.time, 0, 1e-5)});
 }
@@ -125,7 +135,7 @@ Observations observe(const datasets::ThrowLog& log, const datasets::Throw& logge
   if (logged.ft && options.wrench) add_wrench(*logged.ft, prepared, options, out);
   if (logged.ft && options.normal_force) add_normal_force(*logged.ft, prepared, out);
   if (logged.mocap && options.mocap) add_mocap(log, logged, prepared, out);
-  if (logged.landing && options.landing) add_landing(*logged.landing, out);
+  if (logged.landing && options.landing) add_landing(log, *logged.landing, options, out);
   return out;
 }
 

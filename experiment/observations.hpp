@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "datasets/throw_log.hpp"
+#include "experiment/landing_noise.hpp"
 #include "experiment/prepared_throw.hpp"
 
 namespace unhand::experiment {
@@ -55,11 +56,14 @@ struct ObservationOptions {
   /// F/T sensor and the shape of a friction law are good to a hundredth, and such an error stays for some
   /// twenty samples, which would count as that many witnesses.
   double wrench_trust{0.04};
+  /// Of landings without a declared σ; found from the log if absent.
+  std::optional<LandingNoise> landing_noise{};
 };
 
 /// All that the throw's log holds of the channels asked for. Left out: wrenches that settle, samples outside
 /// the hand's motion, motion capture after the landing, and a wrench channel that is dead. A channel without
-/// a declared σ takes it from its own scatter (third differences).
+/// a declared σ takes it from its own scatter (third differences), a landing from those of the whole log
+/// (experiment::landing_noise): where these are too few, it is left out. So is a landing/time without one.
 Observations observe(const datasets::ThrowLog& log, const datasets::Throw& logged,
                      const PreparedThrow& prepared, const ObservationOptions& options = {});
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "datasets/assemble.hpp"
 #include "dynamics/straight_line.hpp"
 
 namespace unhand::experiment {
@@ -77,10 +78,24 @@ void measure_flight(const datasets::ThrowLog& log, const datasets::Throw& logged
 }  // namespace
 
 double first_below_landing(const datasets::ThrowLog& log, const datasets::MocapLog& mocap, double opening) {
+  const auto i = datasets::first_below(mocap, log.dimension, log.landing_height, opening);
+  return i ? mocap.time(*i) : HUGE_VAL;
+}
+
+bool shows_grasp(const datasets::ThrowLog& log, const datasets::Throw& logged) {
+  if (log.dimension != 2 || !logged.hand) return true;
+  if (logged.grasp_angle && log.objects.at(logged.object).com_offset) return true;
+  if (!logged.mocap) return false;
+  const auto& hand = logged.hand->time;
+  const auto& mocap = *logged.mocap;
+  double opening = hand(hand.rows - 1);
+  if (log.gripper && log.gripper->opening_command_time)
+    opening = std::min(opening, *log.gripper->opening_command_time);
+  else if (logged.detach_time)
+    opening = std::min(opening, *logged.detach_time);
   for (std::size_t i = 0; i < mocap.time.rows; ++i)
-    if (mocap.time(i) > opening && mocap.is_valid(i) && mocap.pose(i, 1) < log.landing_height)
-      return mocap.time(i);
-  return HUGE_VAL;
+    if (mocap.is_valid(i) && mocap.time(i) >= hand(0) && mocap.time(i) < opening) return true;
+  return false;
 }
 
 PreparedThrow prepare(const datasets::ThrowLog& log, const datasets::Throw& logged, const std::string& file) {

@@ -55,8 +55,14 @@ struct PreparedThrow {
 /// hand, the planar inertia, a grasp, an opening time.
 PreparedThrow prepare(const datasets::ThrowLog& log, const datasets::Throw& logged, const std::string& file);
 
-/// When motion capture first sees the object below the landing height after `opening` [s]: from there on it
-/// may have touched the ground. Infinite where it never does. `mocap` is planar.
+/// Whether a throw from a hand shows how the object is held: by motion capture before the gripper opens, or
+/// declared (`grasp_angle` and the object's `com_offset`). Both are optional in a log, and a throw without
+/// either cannot be prepared. True of throws without a hand.
+bool shows_grasp(const datasets::ThrowLog& log, const datasets::Throw& logged);
+
+/// When motion capture first sees the object below the landing height after its highest point since `opening`
+/// [s]: from there on it may have touched what it lands on, which may lie above the hand. Infinite where it
+/// never does. `mocap` is planar.
 double first_below_landing(const datasets::ThrowLog& log, const datasets::MocapLog& mocap, double opening);
 
 }  // namespace unhand::experiment

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "dynamics/median.hpp"
+#include "experiment/turn_check.hpp"
 #include "experiment/unit_evidence.hpp"
 #include "experiment/unit_outliers.hpp"
 #include "experiment/unit_rules.hpp"
@@ -61,6 +62,7 @@ std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log) {
     out.push_back({"/@gravity", "gravity", log.gravity, 1,
                    fmt::format("gravity is {:.6g} m/s², more than {}: mm/s² or cm/s² for m/s²?", log.gravity,
                                kMostGravity)});
+  if (out.empty()) out = jumping_angles(log);
   if (!out.empty()) return out;
   std::vector<SizeRatios> throws;
   std::map<SizedColumn, std::vector<double>> ratios;
@@ -111,6 +113,7 @@ std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log) {
                      mu, friction.size(), kLeastFriction, kMostFriction,
                      mu > 1 ? "kgf, lbf or kN for N" : "mN for N")});
   if (out.empty()) out = outlying_throws(log, throws);
+  if (out.empty()) out = landings_turns_off(log);
   if (const auto height = out.empty() ? doubtful_landing_height(log) : std::nullopt) out.push_back(*height);
   return out;
 }

@@ -8,12 +8,13 @@
 
 namespace unhand::experiment {
 
-/// A column that is as many times too large as another unit would make it.
+/// A column that is as many times too large as another unit would make it, or whole turns off.
 struct UnitDoubt {
   std::string path;    ///< in the log: "/throws/*/mocap/pose", or of one throw: "/throws/017/mocap/pose"
   std::string column;  ///< "theta"
   double ratio{};      ///< its size over what the other channels say, median over throws; of the normal
-                       ///< force: the friction that the wrenches take of it; of grasp_angle: itself
+                       ///< force: the friction that the wrenches take of it; of grasp_angle: itself; of
+                       ///< angles that are whole turns off: 1
   int throws{};        ///< that show it
   std::string reason;  ///< in words, with the unit that would explain it
 };
@@ -45,6 +46,9 @@ inline constexpr double kLeastOutlier = 5;
 ///
 /// - the landing height with where free flights are at landing/time, and with the highest point of all throws
 ///   (to a metre);
+/// - the angles of hand and object with themselves, from sample to sample, and those of the landing with
+/// where
+///   motion capture leads: logs hold them unwrapped, without jumps of whole turns;
 /// - the height of a free flight with what gravity makes of it: the only one of logs without a hand, and of
 ///   dimension 3.
 ///

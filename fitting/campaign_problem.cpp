@@ -80,12 +80,17 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
     first_guess_ = experiment::estimate_friction(log, prepared, options.model).parameters;
   }
   std::size_t observations = 0;
+  if (const int n = experiment::landings_without_sigma(log); n > 0 && options_.observations.landing) {
+    const auto noise = experiment::landing_noise(log);
+    notes_.push_back(experiment::in_words(noise, n));
+    options_.observations.landing_noise = noise;
+  }
   std::map<experiment::Channel, int> dead;
   auto throws = std::make_shared<std::vector<CampaignThrow>>();
   throws->reserve(prepared.size());
   for (std::size_t i = 0; i < prepared.size(); ++i) {
     CampaignThrow t{std::move(prepared[i]), {}, 0, 0};
-    t.observed = experiment::observe(log, log.throws[i], t.prepared, options.observations);
+    t.observed = experiment::observe(log, log.throws[i], t.prepared, options_.observations);
     t.opening = t.prepared.normal_force && std::isfinite(t.prepared.force_fit.opening_start)
                     ? t.prepared.force_fit.opening_start
                     : t.prepared.open_command;

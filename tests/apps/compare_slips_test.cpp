@@ -44,6 +44,21 @@ TEST_F(Cli, SurfacesMayHaveAnyName) {
   for (const auto& name : names) EXPECT_THAT(report, HasSubstr(name));
 }
 
+// The wrench that the surface applies to the object, in place of the one that the object applies.
+TEST_F(Cli, SlipsWithAReversedSignAreRefused) {
+  datasets::SlipLog log;
+  const Eigen::Matrix3d along = Eigen::Vector3d(1 / 16.0, 1 / 9.0, 1 / 25.0).asDiagonal();
+  log.surfaces["felt"] = logged(fitting::test::simulate(fitting::test::ellipsoid(along), 12, 0.1, 0.1, 21));
+  for (auto& slip : log.surfaces["felt"].slips)
+    for (double& v : slip.wrench.data) v = -v;
+  datasets::write_slip_log(folder / "slips.h5", log);
+  const std::string reason = "slips.h5: /surfaces/felt: friction would drive the object";
+  expect_refusal("compare slips.h5 --fit --json c.json", 3, reason);
+  expect_refusal("fit slips.h5 --model ellipsoid --card c.json", 3, reason);
+  expect_refusal("discover slips.h5 --json c.json", 3, reason);
+  EXPECT_THAT(run("inspect slips.h5").out, HasSubstr("doubtful: /surfaces/felt: friction would drive"));
+}
+
 TEST_F(Cli, CompareSlipsSaysWhatTheSurfacesErrOf) {
   using fitting::SurfaceModel;
   const Eigen::Matrix3d along = Eigen::Vector3d(1 / 16.0, 1 / 9.0, 1 / 25.0).asDiagonal();

@@ -29,6 +29,37 @@ TEST_F(Cli, CompareReleases) {
   }
 }
 
+// Motion capture and grasp_angle are optional, by throw.
+TEST_F(Cli, ThrowsWithoutAGraspAreLeftOut) {
+  int k = 0;
+  write_changed("half.h5", [&](datasets::Throw& one) {
+    if (k++ % 2 == 1) one.mocap.reset(), one.grasp_angle.reset();
+  });
+  const Answer answer = run("compare half.h5 --models sliding_pivot,gripper_delay --json a.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.err, HasSubstr("left out 6 of 12 throws, which do not show the grasp"));
+  const json model = read_json(folder / "a.json")["models"]["sliding_pivot"];
+  EXPECT_EQ(model["train"]["n"].get<int>() + model["test"]["n"].get<int>(), 6);
+  write_changed("none.h5", [](datasets::Throw& one) { one.mocap.reset(), one.grasp_angle.reset(); });
+  expect_refusal("compare none.h5 --json b.json", 3, "@grasp_angle: missing");
+  EXPECT_THAT(run("inspect half.h5").out, HasSubstr("note: 6 of 12 throws do not show the grasp"));
+}
+
+// Wrenches without torque do not tell how large the pads are; the delay needs no pads.
+TEST_F(Cli, AModelThatTheLogDoesNotDetermineStopsNoOther) {
+  write_changed("straight.h5", [](datasets::Throw& one) {
+    for (std::size_t i = 0; i < one.ft->wrench.rows; ++i) one.ft->wrench(i, 2) *= 1e-3;
+  });
+  const Answer answer = run("compare straight.h5 --models limit_surface,gripper_delay --json a.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.err, HasSubstr("limit_surface: not compared: the log does not determine"));
+  const json found = read_json(folder / "a.json");
+  EXPECT_EQ(found["models"].size(), 1u);
+  EXPECT_TRUE(found["models"].contains("gripper_delay"));
+  EXPECT_TRUE(found["not_compared"].contains("limit_surface"));
+  expect_refusal("compare straight.h5 --models limit_surface --json b.json", 1, "does not determine");
+}
+
 TEST_F(Cli, NoTestThrowsNoNumbers) {
   write_all_train("train.h5");
   const Answer answer = run("compare train.h5 --models gripper_delay --json a.json --report r");

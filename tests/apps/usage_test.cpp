@@ -45,7 +45,9 @@ TEST_F(Cli, HelpHasAnExampleEverywhere) {
 
 TEST_F(Cli, WrongUsage) {
   EXPECT_EQ(run("").code, 2);
-  EXPECT_EQ(run("juggle").code, 2);
+  expect_refusal("juggle", 2, "there is no command 'juggle'");
+  expect_refusal("discovr log.h5", 2, "there is no command 'discovr'; did you mean 'discover'?");
+  expect_refusal("plan dance", 2, "there is no command 'dance'");
   EXPECT_EQ(run("compare").code, 2);
   EXPECT_EQ(run("inspect " + quick + " --threads -1").code, 2);
   expect_refusal("generate nonsense --out a.h5", 2, "batch180");
@@ -123,6 +125,24 @@ TEST_F(Cli, UnwritableOutputs) {
   expect_refusal("compare " + quick + models + " --json none/a.json --report r", 1, "cannot be written");
   expect_refusal("compare " + quick + models + " --json a.json --report file/r", 1, "cannot be written");
   expect_refusal("compare " + quick + models + " --json a.json --write-cards file", 1, "cannot be written");
+}
+
+TEST_F(Cli, ADashIsNoFile) {
+  expect_refusal("compare " + quick + " --models gripper_delay --json -", 2, "'-' names no file");
+  expect_refusal("generate quick12 --out -", 2, "'-' names no file");
+  const Answer answer = run("inspect " + quick + " --json -");
+  EXPECT_EQ(answer.code, 0) << answer.err;
+  EXPECT_EQ(json::parse(answer.out)["throws"], 12);
+  EXPECT_THAT(files(), IsEmpty());
+}
+
+TEST_F(Cli, AnEffectWithoutConsequenceIsSaid) {
+  const Answer idle = run("generate quick12 --seed 3 --effect flight.wind=3 --out a.h5");
+  ASSERT_EQ(idle.code, 0) << idle.err;
+  EXPECT_THAT(idle.err, HasSubstr("flight.wind changes nothing in this campaign: wind acts through drag"));
+  const Answer blown =
+      run("generate quick12 --seed 3 --effect flight.wind=3 --effect flight.quadratic_drag=0.1 --out a.h5");
+  EXPECT_THAT(blown.err, IsEmpty());
 }
 
 TEST_F(Cli, NoOutputTakesThePlaceOfSomethingElse) {
@@ -226,6 +246,13 @@ TEST_F(Cli, Inspect) {
   EXPECT_EQ(seen["schema"], "inspect");
   EXPECT_EQ(seen["throws"], 12);
   EXPECT_EQ(json::parse(run("inspect " + quick + " --json").out), seen);
+}
+
+TEST_F(Cli, InspectSaysWhatIsTakenForANoiseThatIsNotDeclared) {
+  EXPECT_THAT(run("inspect " + quick).out, Not(HasSubstr("note:")));
+  write_changed("unsure.h5", [](datasets::Throw& one) { one.landing->pose.sigma.clear(); });
+  EXPECT_THAT(run("inspect unsure.h5").out,
+              HasSubstr("note: landing/pose declares no sigma in 12 throws: taken are "));
 }
 
 TEST_F(Cli, FigureDrawsWhatIsAskedFor) {

@@ -35,6 +35,17 @@ TEST(SlipLog, ConvertsUnits) {
   EXPECT_EQ(slip.twist(3, 0), sample().surfaces.at("feet").slips[0].twist(3, 0) / 1000);
 }
 
+TEST(SlipLog, FrictionTakesWorkUnlessASignIsReversed) {
+  Surface patch = sample().surfaces.at("patch");
+  for (Slip& slip : patch.slips) slip.twist = slip.wrench;
+  EXPECT_EQ(dissipation(patch), 1);
+  for (Slip& slip : patch.slips)
+    for (double& v : slip.twist.data) v = -v;
+  EXPECT_EQ(dissipation(patch), -1);
+  patch.slips.clear();
+  EXPECT_EQ(dissipation(patch), 0);
+}
+
 struct SpoiledSlip {
   const char* name;
   Spoil spoil;

@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <stdexcept>
+#include <string>
 
 #include "experiment/synthetic_campaign.hpp"
 #include "tests/support/perfect_campaign.hpp"
@@ -77,6 +79,21 @@ TEST(RepetitionScatter, PoolsTheVarianceOfTheConditions) {
   EXPECT_EQ(scatter.conditions, 2);
   EXPECT_NEAR(scatter.landing_x, std::sqrt(16.0 / 3), 1e-14);  // rounding
   EXPECT_NEAR(scatter.landing_theta, 0.1 * std::sqrt(16.0 / 3) * 180 / M_PI, 1e-13);
+}
+
+TEST(FrictionEstimate, OfOneWrenchDirectionIsNoPatch) {
+  FrictionEstimate estimate;
+  estimate.samples = 24;
+  EXPECT_NO_THROW(require_patch(estimate, "limit_surface"));
+  estimate.parameters.length = 4e10;  // all torque and no force
+  EXPECT_NO_THROW(require_patch(estimate, "gripper_delay")) << "which has no pads";
+  try {
+    require_patch(estimate, "limit_surface");
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("does not determine the length"), std::string::npos)
+        << error.what();
+  }
 }
 
 TEST(FrictionEstimate, OfTheTrueLawIsTheTrueFriction) {

@@ -50,6 +50,34 @@ TEST(PreparedThrow, TheTwistAtDetachKnowsNothingOfTheFloor) {
   }
 }
 
+/// A shelf above the hand: the object is below it when it is let go, and lands on it from above.
+TEST(PreparedThrow, AFlightToAShelfAboveTheHandIsSeen) {
+  CampaignDesign design = campaign_design("quick12");
+  const ThrowTruth on_ground = generate_throw(design, 1, 3).truth;
+  const double rise = on_ground.detach_twist.vz, top = on_ground.detach_pose.z + rise * rise / (2 * 9.81);
+  ASSERT_GT(rise, 0.5);
+  design.landing_height = 0.5 * (on_ground.detach_pose.z + top);
+  const datasets::ThrowLog log = campaign_header(design, 1);
+  const auto [logged, truth] = generate_throw(design, 1, 3);
+  ASSERT_GT(log.landing_height, truth.detach_pose.z);
+  datasets::Throw unlogged = logged;
+  unlogged.landing.reset();
+  for (const datasets::Throw* one : {&logged, const_cast<const datasets::Throw*>(&unlogged)}) {
+    const PreparedThrow prepared = prepare(log, *one, "(in memory)");
+    int flown = 0, lying = 0;
+    for (const auto& o : observe(log, *one, prepared).all) {
+      if (o.channel != Channel::mocap_z) continue;
+      flown += o.time > truth.detach_time && o.time < truth.landing_time;
+      lying += o.time > truth.landing_time + 2 / 240.0;
+    }
+    EXPECT_NEAR(flown, 240 * (truth.landing_time - truth.detach_time), 5);  // but for what is lost
+    EXPECT_EQ(lying, 0);
+    ASSERT_TRUE(prepared.measured.detach_twist);
+    // some 30 samples of 0.2 mm over an eighth of a second: 1 σ of 1 mm/s
+    EXPECT_NEAR(prepared.measured.detach_twist->vx, truth.detach_twist.vx, 5e-3);
+  }
+}
+
 /// One throw of perfect sensors, of objects with this declared drag [1/m].
 struct PerfectThrow {
   datasets::ThrowLog log;

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
@@ -30,6 +31,43 @@ const ThrowLog& campaign() {
 void scale(Series& series, double factor, std::size_t first = 0, std::size_t last = 1) {
   for (std::size_t i = 0; i < series.rows; ++i)
     for (std::size_t c = first; c < last; ++c) series(i, c) *= factor;
+}
+
+TEST(UnitCheck, TellsOfAnglesThatAreWholeTurnsOff) {
+  constexpr double kTurn = 2 * std::numbers::pi;
+  const auto doubt_of = [](const ThrowLog& log) {
+    const auto doubts = unit_doubts(log);
+    return doubts.size() == 1 ? doubts.front() : UnitDoubt{};
+  };
+  auto log = campaign();
+  for (auto& one : log.throws) {  // wrapped half-way
+    auto& pose = one.mocap->pose;
+    const double cut = 0.5 * (pose(0, 2) + pose(pose.rows - 1, 2));
+    for (std::size_t i = 0; i < pose.rows; ++i) pose(i, 2) -= pose(i, 2) > cut ? kTurn : 0;
+  }
+  auto told = doubt_of(log);
+  EXPECT_EQ(told.path, "/throws/" + log.throws[0].id + "/mocap/pose") << told.reason;
+  EXPECT_THAT(told.reason, AllOf(HasSubstr("a jump of 1 turn"), HasSubstr("unwrapped")));
+  EXPECT_EQ(told.throws, 12);
+
+  log = campaign();
+  for (auto& one : log.throws) one.landing->pose(0, 1) -= kTurn;
+  told = doubt_of(log);
+  EXPECT_EQ(told.path, "/throws/" + log.throws[0].id + "/landing/pose") << told.reason;
+  EXPECT_THAT(told.reason, AllOf(HasSubstr("turns from it"), HasSubstr("12 throws")));
+
+  for (const double turns : {-1.0, 1.0, 2.0}) {  // in one throw
+    log = campaign();
+    log.throws[3].landing->pose(0, 1) += turns * kTurn;
+    told = doubt_of(log);
+    EXPECT_EQ(told.path, "/throws/" + log.throws[3].id + "/landing/pose") << told.reason;
+    log = campaign();
+    auto& pose = log.throws[3].hand->pose;
+    for (std::size_t i = pose.rows / 2; i < pose.rows; ++i) pose(i, 2) += turns * kTurn;
+    told = doubt_of(log);
+    EXPECT_EQ(told.path, "/throws/" + log.throws[3].id + "/hand/pose") << told.reason;
+    EXPECT_THAT(told.reason, HasSubstr("a jump of"));
+  }
 }
 
 struct Mistake {

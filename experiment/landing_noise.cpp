@@ -1,0 +1,146 @@
+#include "experiment/landing_noise.hpp"
+
+#include <fmt/core.h>
+
+#include <array>
+#include <cmath>
+#include <map>
+#include <vector>
+
+#include "datasets/assemble.hpp"
+#include "dynamics/straight_line.hpp"
+
+namespace unhand::experiment {
+namespace {
+
+using Pair = std::array<double, 2>;  // x [m], θ [rad]
+
+/// The parabola through samples, by lines through them and through their times squared.
+struct Parabola {
+  dynamics::StraightLine values, squares;
+  double bend{};
+  Parabola(const std::vector<double>& t, const std::vector<double>& y) : values(dynamics::fit_line(t, y)) {
+    std::vector<double> tt;
+    for (const double s : t) tt.push_back(s * s);
+    squares = dynamics::fit_line(t, tt);
+    double cross = 0, spread = 0;
+    for (std::size_t i = 0; i < t.size(); ++i) {
+      const double e = tt[i] - squares.at(t[i]);
+      cross += e * (y[i] - values.at(t[i])), spread += e * e;
+    }
+    bend = cross / spread;
+  }
+  double at(double t) const { return values.at(t) + bend * (t * t - squares.at(t)); }
+  double rate(double t) const { return values.slope + bend * (2 * t - squares.slope); }
+};
+
+/// Where the track passes the landing height.
+std::optional<Pair> tracked_landing(const datasets::ThrowLog& log, const datasets::Throw& one) {
+  constexpr double kLast = 0.1, kBeyond = 0.05;  // [s] that are fitted; that the fit is trusted beyond them
+  constexpr double kClocks = 0.2;                // [s] by which clocks may differ
+  constexpr std::size_t kEnough = 8;
+  if (!one.mocap) return {};
+  const auto& mocap = *one.mocap;
+  const double landed = one.landing->time.empty() ? HUGE_VAL : one.landing->time(0);
+  double end = landed;
+  if (const auto below = datasets::first_below(mocap, log.dimension, log.landing_height))
+    if (mocap.time(*below) < landed + kClocks) end = mocap.time(*below);
+  std::vector<double> t, x, z, theta;
+  for (std::size_t i = 0; i < mocap.time.rows; ++i) {
+    if (!mocap.is_valid(i) || mocap.time(i) >= end || mocap.pose(i, 1) <= log.landing_height) continue;
+    t.push_back(mocap.time(i));
+    x.push_back(mocap.pose(i, 0)), z.push_back(mocap.pose(i, 1)), theta.push_back(mocap.pose(i, 2));
+  }
+  if (t.empty() || !(end - t.back() <= kClocks)) return {};
+  const double last = t.back();
+  std::size_t before = 0;
+  while (t[before] < last - kLast) ++before;
+  for (auto* series : {&t, &x, &z, &theta})
+    series->erase(series->begin(), series->begin() + static_cast<std::ptrdiff_t>(before));
+  if (t.size() < kEnough) return {};
+  for (double& s : t) s -= last;
+  const Parabola height(t, z);
+  double s = 0;
+  for (int k = 0; k < 10; ++k) {
+    if (!(height.rate(s) < 0)) return {};
+    s -= (height.at(s) - log.landing_height) / height.rate(s);
+  }
+  if (!(s <= kBeyond && s >= -kBeyond)) return {};
+  return Pair{Parabola(t, x).at(s), dynamics::fit_line(t, theta).at(s)};
+}
+
+/// Numbers by what they repeat.
+using Groups = std::map<std::string, std::vector<Pair>>;
+
+struct Pooled {
+  Pair sigma{};
+  int freedom{}, groups{};
+};
+
+/// About the mean of each group.
+Pooled pool(const Groups& groups) {
+  Pooled out;
+  Pair squares{};
+  for (const auto& [name, members] : groups) {
+    if (members.size() < 2) continue;
+    ++out.groups, out.freedom += static_cast<int>(members.size()) - 1;
+    for (std::size_t c = 0; c < 2; ++c) {
+      double mean = 0;
+      for (const Pair& m : members) mean += m[c] / static_cast<double>(members.size());
+      for (const Pair& m : members) squares[c] += (m[c] - mean) * (m[c] - mean);
+    }
+  }
+  for (std::size_t c = 0; c < 2 && out.freedom > 0; ++c) out.sigma[c] = std::sqrt(squares[c] / out.freedom);
+  return out;
+}
+
+}  // namespace
+
+LandingNoise landing_noise(const datasets::ThrowLog& log) {
+  constexpr int kLeast = 3;
+  Groups landings, differences, together;
+  int seen = 0;
+  for (const auto& one : log.throws) {
+    if (log.dimension != 2 || !one.landing || one.landing->pose.empty()) continue;
+    const std::string repeats = one.object + ", " + one.condition;
+    const Pair landed{one.landing->pose(0, 0), one.landing->pose(0, 1)};
+    landings[repeats].push_back(landed);
+    ++seen;
+    if (const auto tracked = tracked_landing(log, one)) {
+      const Pair difference{landed[0] - (*tracked)[0], landed[1] - (*tracked)[1]};
+      differences[repeats].push_back(difference);
+      together[""].push_back(difference);
+    }
+  }
+  const auto say = [](const Pooled& of, const char* what) {
+    return LandingNoise{of.sigma[0], of.sigma[1], fmt::format("{}, {} degrees of freedom", what, of.freedom)};
+  };
+  if (const Pooled of = pool(differences); of.freedom >= kLeast)
+    return say(of, "scatter of landing minus motion capture within repetitions of a condition");
+  if (const Pooled of = pool(together); of.freedom >= kLeast)
+    return say(of, "scatter of landing minus motion capture over all throws");
+  if (const Pooled of = pool(landings); of.freedom >= kLeast)
+    return say(of, "scatter of landings within repetitions of a condition, as large as throws differ");
+  return {
+      {},
+      {},
+      fmt::format("{} landings, and neither repetitions nor motion capture at the landing height to judge "
+                  "their noise by",
+                  seen)};
+}
+
+std::string in_words(const LandingNoise& noise, int landings) {
+  if (!noise.x || !noise.theta)
+    return fmt::format("landing/pose declares no sigma in {} throws: its landings are not used ({})",
+                       landings, noise.how);
+  return fmt::format("landing/pose declares no sigma in {} throws: taken are {:.3g} m and {:.3g} rad ({})",
+                     landings, *noise.x, *noise.theta, noise.how);
+}
+
+int landings_without_sigma(const datasets::ThrowLog& log) {
+  int out = 0;
+  for (const auto& one : log.throws) out += one.landing && one.landing->pose.sigma.empty();
+  return out;
+}
+
+}  // namespace unhand::experiment

@@ -1,0 +1,106 @@
+#include "experiment/turn_check.hpp"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "dynamics/straight_line.hpp"
+
+namespace unhand::experiment {
+namespace {
+
+constexpr double kTurn = 2 * std::numbers::pi;
+
+/// The whole turns of an angle, to 1 rad; 0 where it is nothing like that.
+double turns(double angle) {
+  const double n = std::round(angle / kTurn);
+  return std::abs(angle - n * kTurn) < 1 ? n : 0;
+}
+
+/// In words, where the angles of a series first jump.
+std::optional<std::string> jump_of(const datasets::Series& time, const datasets::Series& pose,
+                                   const std::function<bool(std::size_t)>& valid) {
+  constexpr double kApart = 0.1;  // [s]: farther apart, the rate before says little
+  std::optional<std::size_t> last;
+  double rate = 0;
+  for (std::size_t i = 0; i < time.rows; ++i) {
+    if (!valid(i)) continue;
+    if (last) {
+      const double dt = time(i) - time(*last), step = pose(i, 2) - pose(*last, 2);
+      if (const double n = dt < kApart ? turns(step - rate * dt) : 0; n != 0)
+        return fmt::format(
+            "theta goes from {:.4g} to {:.4g} rad within {:.3g} s (to t = {:.6g} s), a jump of {} turn{}",
+            pose(*last, 2), pose(i, 2), dt, time(i), std::abs(n), std::abs(n) == 1 ? "" : "s");
+      rate = step / dt;
+    }
+    last = i;
+  }
+  return {};
+}
+
+/// In words, how far a landing's angle is from where the track leads.
+std::optional<std::string> landing_off(const datasets::Throw& one) {
+  constexpr double kLast = 0.1, kBeyond = 0.3;  // [s]
+  const auto& mocap = *one.mocap;
+  const auto& landing = *one.landing;
+  if (landing.time.empty() || landing.pose.empty()) return {};
+  const double landed = landing.time(0);
+  std::vector<double> t, theta;
+  for (std::size_t i = mocap.time.rows; i-- > 0;) {
+    if (!mocap.is_valid(i) || mocap.time(i) > landed) continue;
+    if (!t.empty() && mocap.time(i) < t.front() - kLast) break;
+    t.push_back(mocap.time(i)), theta.push_back(mocap.pose(i, 2));
+  }
+  if (t.size() < 4 || landed - t.front() > kBeyond) return {};
+  const double expected = dynamics::fit_line(t, theta).at(landed), off = landing.pose(0, 1) - expected;
+  if (!(std::abs(off) > 0.5 * kTurn)) return {};
+  return fmt::format("theta is {:.4g} rad, and the track before leads to {:.4g} rad, {:.2g} turns from it",
+                     landing.pose(0, 1), expected, std::abs(off) / kTurn);
+}
+
+using Found = std::optional<std::string>;
+
+/// One doubt of a dataset, if `off` has words for any throw.
+std::vector<UnitDoubt> first_found(const datasets::ThrowLog& log, const char* where,
+                                   const std::function<Found(const datasets::Throw&)>& off) {
+  UnitDoubt doubt{"", "theta", 1, 0, ""};
+  if (log.dimension != 2) return {};
+  for (const auto& one : log.throws) {
+    const Found found = off(one);
+    if (!found || doubt.throws++ > 0) continue;
+    doubt.path = fmt::format("/throws/{}/{}", one.id, where);
+    doubt.reason = *found;
+  }
+  if (doubt.throws == 0) return {};
+  if (doubt.throws > 1) doubt.reason += fmt::format("; so in {} throws in all", doubt.throws);
+  doubt.reason += ": angles are logged unwrapped, without jumps of whole turns";
+  return {doubt};
+}
+
+}  // namespace
+
+std::vector<UnitDoubt> jumping_angles(const datasets::ThrowLog& log) {
+  auto out = first_found(log, "hand/pose", [](const datasets::Throw& one) {
+    return one.hand ? jump_of(one.hand->time, one.hand->pose, [](std::size_t) { return true; }) : Found{};
+  });
+  for (auto& doubt : first_found(log, "mocap/pose", [](const datasets::Throw& one) {
+         return one.mocap ? jump_of(one.mocap->time, one.mocap->pose,
+                                    [&](std::size_t i) { return one.mocap->is_valid(i); })
+                          : Found{};
+       }))
+    out.push_back(std::move(doubt));
+  return out;
+}
+
+std::vector<UnitDoubt> landings_turns_off(const datasets::ThrowLog& log) {
+  return first_found(log, "landing/pose", [](const datasets::Throw& one) {
+    return one.mocap && one.landing ? landing_off(one) : Found{};
+  });
+}
+
+}  // namespace unhand::experiment
