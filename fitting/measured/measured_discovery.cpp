@@ -94,14 +94,16 @@ bool explains_a_channel(const MeasuredDiscovery& out) {
 }
 
 /// Whether, on train and on held-out groups, more is left of some channel's misfit than they take from any.
+/// A few times the noise is what trackers err by, and no effect has to answer for it.
 bool leave_more_than_they_take(const MeasuredDiscovery& out) {
+  constexpr double kTrackers = 10;
   double left = 0, taken = 0, test_left = 0, test_taken = 0;
   for (const auto& m : out.misfit) {
     left = std::max(left, m.after_train - 1), taken = std::max(taken, m.before_train - m.after_train);
     test_left = std::max(test_left, m.after_test - 1);
     test_taken = std::max(test_taken, m.before_test - m.after_test);
   }
-  return left > taken && test_left > test_taken && left > 1 && test_left > 1;
+  return left > taken && test_left > test_taken && left > kTrackers && test_left > kTrackers;
 }
 
 void take_fits(const GroupedProblem& problem, const EffectSearch& search, MeasuredDiscovery& out) {
