@@ -30,10 +30,10 @@ void inertia(const EffectValues<S>& p, Tracking<S>& tracking) {
 
 std::span<const dynamics::EffectOn<Tracking>> tracking_effects() {
   static const dynamics::EffectOn<Tracking> table[] = {
-      {{"sensor.length_scale", "the tracker's metric scale is off", {{"scale", "-", 1, 0.8, 1.2, 2e-3}}},
+      {{"sensor.length_scale", "the tracker's metric scale is off", {{"scale", "-", 1, 0.1, 10, 2e-3}}},
        &length_scale<double>,
        &length_scale<Dual>},
-      {{"sensor.time_scale", "the tracker's clock runs fast or slow", {{"scale", "-", 1, 0.8, 1.2, 1e-3}}},
+      {{"sensor.time_scale", "the tracker's clock runs fast or slow", {{"scale", "-", 1, 0.3, 3, 1e-3}}},
        &time_scale<double>,
        &time_scale<Dual>},
       {{"sensor.com_offset",

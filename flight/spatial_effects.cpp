@@ -66,7 +66,7 @@ std::span<const dynamics::EffectOn<SpatialAir>> spatial_effects() {
        &wind<Dual>},
       {{"flight.gravity",
         "gravity's magnitude is not the declared one, true/declared",
-        {{"ratio", "-", 1, 0.5, 1.5, 2e-3}}},
+        {{"ratio", "-", 1, 0.1, 10, 2e-3}}},
        &gravity<double>,
        &gravity<Dual>},
       {{"flight.gravity_tilt",

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <map>
+#include <vector>
 
 #include "fitting/measured/fall_discovery.hpp"
 #include "fitting/measured/measured_discovery.hpp"
@@ -12,10 +13,14 @@
 namespace unhand::fitting {
 namespace {
 
-/// How far the mean residual of a fall scatters from fall to fall [m/s²].
-std::array<double, 3> scatter_between_falls(const FallProblem& problem, const GroupedFit& fit) {
-  std::array<double, 3> out{};
-  double falls = 0;
+/// The mean residual of falls, measured − predicted: what they have in common, and how far it scatters about
+/// that from fall to fall [m/s²].
+struct MeanResidual {
+  std::array<double, 3> common{}, scatter{};
+};
+MeanResidual mean_residual(const FallProblem& problem, const GroupedFit& fit) {
+  MeanResidual out;
+  std::vector<std::array<double, 3>> means;
   for (std::size_t i = 0; i < fit.groups.size(); ++i) {
     if (!fit.groups[i].used || !fit.groups[i].solved) continue;
     std::array<double, 3> mean{};
@@ -24,19 +29,25 @@ std::array<double, 3> scatter_between_falls(const FallProblem& problem, const Gr
     for (std::size_t j = 0; j < rows.size(); ++j)
       if (rows[j].channel >= 0) {
         const auto a = static_cast<std::size_t>(rows[j].channel);
-        mean[a] += fit.groups[i].residual[static_cast<Eigen::Index>(j)] * problem.sigma(i)[a];
+        mean[a] -= fit.groups[i].residual[static_cast<Eigen::Index>(j)] * problem.sigma(i)[a];
         n += 1.0 / 3;
       }
-    for (std::size_t a = 0; a < 3; ++a) out[a] += std::pow(mean[a] / n, 2);
-    falls += 1;
+    for (double& x : mean) x /= n;
+    means.push_back(mean);
   }
-  for (double& x : out) x = falls > 0 ? std::sqrt(x / falls) : 0;
+  const auto falls = static_cast<double>(means.size());
+  for (std::size_t a = 0; a < 3; ++a) {
+    for (const auto& mean : means) out.common[a] += mean[a] / falls;
+    double squares = 0;
+    for (const auto& mean : means) squares += std::pow(mean[a] - out.common[a], 2);
+    out.scatter[a] = falls > 1 ? std::sqrt(squares / (falls - 1)) : 0;
+  }
   return out;
 }
 
 void explain(const datasets::ThrowLog& log, const FallProblem& problem, const EffectSearch& search,
              MeasuredDiscovery& out) {
-  const auto scatter = scatter_between_falls(problem, search.final);
+  const auto [common, scatter] = mean_residual(problem, search.final);
   const double largest = std::max({scatter[0], scatter[1], scatter[2]});
   out.evidence.push_back(
       {"sensor.accelerometer_bias",
@@ -45,6 +56,14 @@ void explain(const datasets::ThrowLog& log, const FallProblem& problem, const Ef
            "{:.1f} rad/s about an axis 5 cm from the sensor would do that, and only a gyroscope could say",
            scatter[0], scatter[1], scatter[2], std::sqrt(largest / 0.05)),
        largest > 0.02});
+  const double offset = std::max({std::abs(common[0]), std::abs(common[1]), std::abs(common[2])});
+  if (offset > largest)
+    out.evidence.push_back(
+        {"sensor.accelerometer_bias",
+         fmt::format("What is left has a mean of ({:.3f}, {:.3f}, {:.3f}) m/s² that the falls share: "
+                     "a bias, or what pulls or brakes all falls alike",
+                     common[0], common[1], common[2]),
+         false});
   for (const auto& effect : out.effects) {
     if (effect.id == "flight.quadratic_drag") {
       for (const auto& p : effect.parameters)

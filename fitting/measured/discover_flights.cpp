@@ -40,6 +40,30 @@ void rename(AcceptedEffect& effect, const char* id, const char* parameter, Measu
     if (s.parameter == was) s.parameter = is;
 }
 
+/// Were a scale s gravity, reported lengths would be true ones: what else was found is s times as long.
+void in_reported_lengths(MeasuredDiscovery& out, double s) {
+  const auto factor_of = [&](const std::string& name) {
+    for (const char* id : {"sensor.com_offset.", "flight.wind."})
+      if (name.starts_with(id)) return s;
+    for (const char* id : {"flight.quadratic_drag.", "flight.drag_by_axis.", "flight.cubic_drag."})
+      if (name.starts_with(id)) return 1 / s;
+    return 1.0;
+  };
+  for (auto& effect : out.effects)
+    for (auto& p : effect.parameters) {
+      const double factor = factor_of(effect.id + ".");
+      p.value *= factor, p.sigma *= factor;
+    }
+  for (auto& half : out.stability) {
+    const double factor = factor_of(half.parameter);
+    half.low *= factor, half.low_sigma *= factor, half.high *= factor, half.high_sigma *= factor;
+  }
+  const std::size_t n = out.parameters.size();
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < n; ++j)
+      out.covariance[i * n + j] *= factor_of(out.parameters[i]) * factor_of(out.parameters[j]);
+}
+
 /// Where boxes at rest put the tracker's scale nearer to none than to what the flights need, that is
 /// gravity's (or the clock's).
 void name_scale(const datasets::ThrowLog& log, const MeasuredOptions& options, MeasuredDiscovery& out) {
@@ -52,6 +76,7 @@ void name_scale(const datasets::ThrowLog& log, const MeasuredOptions& options, M
       const auto rest = rest_heights(log, name, options.floor);
       if (!rest || std::abs(rest->scale) > kMostScale || 3 * rest->sigma >= std::abs(apparent)) continue;
       if (std::abs(rest->scale) >= std::abs(rest->scale - apparent)) continue;
+      in_reported_lengths(out, 1 + apparent);
       rename(effect, kGravity, "ratio", out);
       break;
     }

@@ -25,6 +25,8 @@ namespace {
 constexpr double kSame = 0.9999;
 /// Bayes' criteria that are no further apart cannot tell two effects from each other.
 constexpr double kAlike = 10;
+/// The share of the most evident one's evidence from which on held-out groups choose.
+constexpr double kComparable = 0.5;
 /// χ² per sample above which rivals are followed, and the factor by which one has to lower it.
 constexpr double kMisfit = 1.2, kBetter = 0.9;
 
@@ -64,6 +66,19 @@ Ranked& entry_of(std::vector<Ranked>& ranking, const std::string& id) {
   return ranking.back();
 }
 
+/// A parameter that ends at the end of its range, where that is not neutral: it wants to be what it cannot
+/// be.
+bool is_pinned(const GroupedFit& fit) {
+  for (std::size_t k = 0; k < fit.shared.size(); ++k) {
+    const SharedParameter& p = fit.shared[k];
+    const double value = fit.values[static_cast<Index>(k)], near = 1e-6 * (p.high - p.low);
+    if (p.shape) continue;
+    if ((value < p.low + near && p.low != p.neutral) || (value > p.high - near && p.high != p.neutral))
+      return true;
+  }
+  return false;
+}
+
 /// A shape parameter that ends at the border of its range: it would like to be another effect, as a decay
 /// without end is a constant.
 bool shape_is_open(const GroupedFit& fit, const std::string& id) {
@@ -94,6 +109,7 @@ class Search {
     if (scored.empty()) return false;
     compare_with_best(f.total, scored);
     const double level = options_.false_discovery_rate / static_cast<double>(scored.size());
+    kept_at_ = std::max(kept_at_, level);
     return accept_best(convincing(f.total, leaders(f.total, scored, level, refits), effects, level));
   }
 
@@ -120,9 +136,8 @@ class Search {
       removed = false;
       for (std::size_t i = 0; i < out_.effects.size() && !removed; ++i) {
         const std::string id = out_.effects[i].id;
-        if (wald_of(out_.final, id).p_value(out_.final) <
-            options_.false_discovery_rate / static_cast<double>(catalogue_.size()))
-          continue;
+        if (is_needed(id)) continue;
+        if (wald_of(out_.final, id).p_value(out_.final) < kept_at_) continue;
         std::vector<SharedParameter> shared;
         std::vector<double> values;
         for (std::size_t k = 0; k < out_.final.shared.size(); ++k)
@@ -163,6 +178,7 @@ class Search {
       for (const Candidate& candidate : f.total.candidates) {
         const auto shown = shown_from_.find(candidate.id);
         if (shown == shown_from_.end() || shown->second > i) continue;  // it needs what was found later
+        if (!problem_.may_act(candidate.id, accepted_without(accepted.id))) continue;
         const double r = correlation(f.total, contribution, candidate);
         if (r < options_.equivalent || is_spoken_for(f.total, accepted.id, candidate)) continue;
         accepted.add_other_name(candidate.id, r);
@@ -216,7 +232,7 @@ class Search {
     const auto p = static_cast<Index>(own.size());
     const VectorXd x = step.value.tail(p);
     const MatrixXd covariance = step.covariance.bottomRightCorner(p, p);
-    one.p = Wald{x.dot(pseudo_solve(covariance, x)), p}.p_value(out_.final);
+    one.p = wald_of(x, covariance).p_value(out_.final);
     for (Index j = 0; j < p; ++j)
       if (sides[static_cast<std::size_t>(j)] * x[j] < 0) one.gain = 0, one.p = 1;
   }
@@ -266,18 +282,28 @@ class Search {
       Ranked& r = entry_of(out_.ranking, c.id);
       r.refit_step = this_step(), r.delta_bic = trial.delta_bic, r.held_out_gain = trial.held.fall();
       if (!trial.fit.solved || !(trial.p < level) || shape_is_open(trial.fit, c.id)) continue;
-      if (trial.held.share > options_.matters) out.push_back(std::move(trial));
+      if (is_pinned(trial.fit) || !problem_.may_be(trial.fit)) continue;
+      if (trial.held.share > options_.matters && trial.held.stands_out()) out.push_back(std::move(trial));
     }
     std::sort(out.begin(), out.end(),
               [](const EffectTrial& a, const EffectTrial& b) { return a.delta_bic < b.delta_bic; });
     return out;
   }
 
-  /// The most evident one that held-out groups confirm; others as evident are kept as its rivals. False if
-  /// there is none.
+  /// The most evident one that held-out groups confirm, unless another one that they confirm, with at least
+  /// half its evidence, explains them better by a tenth and the train groups no worse; others as evident are
+  /// kept as its rivals. False if there is none.
   bool accept_best(const std::vector<EffectTrial>& trials) {
-    const auto best = std::find_if(trials.begin(), trials.end(),
-                                   [](const EffectTrial& trial) { return trial.held.p < 0.05; });
+    auto best = trials.end();
+    double most = 0;  // evidence
+    for (auto trial = trials.begin(); trial != trials.end(); ++trial) {
+      if (!(trial->held.p < 0.05)) continue;
+      if (best == trials.end())
+        best = trial, most = trial->delta_bic;
+      else if (trial->delta_bic < kComparable * most && trial->held.is < kBetter * best->held.is &&
+               left(trial->fit) <= left(best->fit))
+        best = trial;
+    }
     if (best == trials.end()) return false;
     for (const EffectTrial& trial : trials)
       if (trial.id != best->id && trial.delta_bic < best->delta_bic + kAlike) {
@@ -313,9 +339,22 @@ class Search {
     std::vector<dynamics::Effect> out;
     for (const auto& effect : catalogue_)
       if (std::none_of(out_.effects.begin(), out_.effects.end(),
-                       [&](const auto& e) { return e.id == effect.id; }))
+                       [&](const auto& e) { return e.id == effect.id; }) &&
+          problem_.may_act(effect.id, accepted_without({})))
         out.push_back(effect);
     return out;
+  }
+  std::vector<std::string> accepted_without(const std::string& id) const {
+    std::vector<std::string> out;
+    for (const auto& effect : out_.effects)
+      if (effect.id != id) out.push_back(effect.id);
+    return out;
+  }
+  /// Whether another accepted effect is nothing without this one.
+  bool is_needed(const std::string& id) const {
+    const auto others = accepted_without(id);
+    return std::any_of(others.begin(), others.end(),
+                       [&](const std::string& other) { return !problem_.may_act(other, others); });
   }
   void halves(const GroupedFootprints& f) {
     std::vector<std::size_t> used;
@@ -349,6 +388,7 @@ class Search {
   EffectSearch& out_;
   std::vector<dynamics::Effect> catalogue_;
   std::map<std::string, std::size_t> shown_from_;  ///< after how many effects one first had a footprint
+  double kept_at_{};  ///< the loosest level of any step: what was accepted at it is kept at it
   std::vector<EffectSearch> rivals_;  ///< with another effect, as evident, in the place of the accepted one
 };
 

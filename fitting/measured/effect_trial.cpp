@@ -11,6 +11,7 @@ namespace unhand::fitting {
 using datasets::Split;
 using dynamics::pseudo_solve;
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 double Wald::delta_bic(const GroupedFit& fit) const {
@@ -20,7 +21,16 @@ double Wald::delta_bic(const GroupedFit& fit) const {
 double Wald::p_value(const GroupedFit& fit) const {
   const auto p = static_cast<double>(parameters), n = static_cast<double>(fit.used);
   if (!(n > p + 1)) return 1;
-  return f_tail(statistic * (n - p) / (p * (n - 1)), p, n - p);
+  const double all = f_tail(statistic * (n - p) / (p * (n - 1)), p, n - p);
+  if (parameters < 2) return all;
+  return std::min(1.0, 2 * std::min(all, p * f_tail(largest, 1, n - 1)));
+}
+
+Wald wald_of(const VectorXd& away, const MatrixXd& covariance) {
+  Wald out{away.dot(pseudo_solve(covariance, away)), away.size(), 0};
+  for (Index j = 0; j < away.size(); ++j)
+    if (covariance(j, j) > 0) out.largest = std::max(out.largest, away[j] * away[j] / covariance(j, j));
+  return out;
 }
 
 Wald wald_of(const GroupedFit& fit, const std::string& id) {
@@ -32,11 +42,12 @@ Wald wald_of(const GroupedFit& fit, const std::string& id) {
       away.push_back(fit.values[at.back()] - fit.shared[k].neutral);
     }
   const Eigen::Map<const VectorXd> d(away.data(), static_cast<Index>(away.size()));
-  return {d.dot(pseudo_solve(fit.covariance(at, at), d)), d.size()};
+  return wald_of(d, fit.covariance(at, at));
 }
 
 namespace {
 
+constexpr double kCarries = 0.1;    // of the fall, by a channel that is asked for its share
 constexpr std::size_t kFewest = 3;  // groups that can say how much they scatter
 
 /// Of one group: its χ² before and after, and, by what the effect changes in its residual r,
@@ -110,6 +121,15 @@ std::vector<Along> all_along(const GroupedProblem& problem, const GroupedFit& be
   return out;
 }
 
+/// Standard error of the fall per sample, over groups that differ in length.
+double scatter_of_fall(const std::vector<Along>& groups, double fall, double samples) {
+  if (groups.size() < kFewest) return 0;
+  const auto n = static_cast<double>(groups.size());
+  double squares = 0;
+  for (const Along& g : groups) squares += std::pow(g.was - g.is - fall * g.samples, 2);
+  return std::sqrt(squares * n / (n - 1)) / samples;
+}
+
 HeldOutFall held_out(const GroupedProblem& problem, const GroupedFit& before, const GroupedFit& after,
                      const Slope& train) {
   const auto groups = all_along(problem, before, after);
@@ -119,10 +139,15 @@ HeldOutFall held_out(const GroupedProblem& problem, const GroupedFit& before, co
   if (!(samples > 0)) return out;
   out.was = was / samples, out.is = is / samples;
   if (!(out.was > out.is)) return out;
+  out.scatter = scatter_of_fall(groups, out.fall(), samples);
   out.p = p_of_slope(slope_of(groups), train);
   const auto b = misfit(problem, before), a = misfit(problem, after);
+  double falls = 0;
+  for (std::size_t c = 0; c < b.size(); ++c) falls += std::max(0.0, b[c].chi2 - a[c].chi2);
   for (std::size_t c = 0; c < b.size(); ++c) {
     const double excess = b[c].chi2_per_sample() - 1, fall = b[c].chi2_per_sample() - a[c].chi2_per_sample();
+    // A channel near its noise, where hardly anything falls, has no misfit that it could be a share of.
+    if (b[c].chi2 - a[c].chi2 < kCarries * falls) continue;
     if (b[c].n > 0 && fall > 0) out.share = std::max(out.share, excess > fall ? fall / excess : 1);
   }
   return out;

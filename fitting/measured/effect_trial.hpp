@@ -10,8 +10,11 @@ namespace unhand::fitting {
 struct HeldOutFall {
   double was{}, is{};  ///< χ² per sample
   double p{1};         ///< of a fall by chance: one-sided, jackknife over groups
+  double scatter{};    ///< of the fall, over groups: its standard error; 0 where fewer than three tell
   double share{};      ///< the largest share of a channel's misfit beyond the noise that goes
   double fall() const { return was - is; }
+  /// Whether the fall exceeds its own scatter.
+  bool stands_out() const { return fall() > scatter; }
 };
 
 /// A fit with one effect more, on the train groups and, its shared parameters held, on the test groups.
@@ -30,10 +33,15 @@ EffectTrial try_effect(const GroupedProblem& problem, const GroupedFit& fit, con
 struct Wald {
   double statistic{};
   Eigen::Index parameters{};
+  double largest{};  ///< (θ_j − neutral_j)²/V_jj of the parameter that is told best from neutral
   double delta_bic(const GroupedFit& fit) const;
-  /// Against F, over the groups used.
+  /// Against F, over the groups used; or of the largest alone against Student's t, shared by the parameters:
+  /// few groups cannot say how all of them scatter together, and still that one of them is there. The smaller
+  /// one, twice.
   double p_value(const GroupedFit& fit) const;
 };
 Wald wald_of(const GroupedFit& fit, const std::string& id);
+/// Of parameters that are `away` from neutral.
+Wald wald_of(const Eigen::VectorXd& away, const Eigen::MatrixXd& covariance);
 
 }  // namespace unhand::fitting

@@ -39,7 +39,8 @@ struct GroupedFit {
   Eigen::VectorXd values;               ///< theirs, in their order
   /// A⁻¹ B A⁻¹ n/(n − p): A the information with the groups' own unknowns eliminated, B the scatter of the
   /// groups' scores (the infinitesimal jackknife over groups). It holds when the noise within a group is
-  /// correlated and when the model is not quite right. Not below A⁻¹.
+  /// correlated and when the model is not quite right. Not below A⁻¹; what no group sees is as uncertain as
+  /// its range is wide.
   Eigen::MatrixXd covariance;
   std::vector<GroupFit> groups;          ///< one per group of the problem
   GroupedWeights weights;                ///< as at the answer

@@ -1,11 +1,23 @@
 #include "fitting/measured/grouped_problem.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
+
+#include "fitting/measured/grouped_fit.hpp"
 
 namespace unhand::fitting {
 
 using Eigen::Index;
+
+namespace {
+
+constexpr const char *kDrag = "flight.quadratic_drag", *kDragByAxis = "flight.drag_by_axis";
+
+}  // namespace
 
 std::vector<std::string> objects_of(const GroupedProblem& problem) {
   std::set<std::string> out;
@@ -62,6 +74,40 @@ std::vector<datasets::Split> splits_of(const datasets::ThrowLog& log) {
     for (const std::size_t i : throws)
       if (++seen % 5 == 0) out[i] = datasets::Split::test;
   return out;
+}
+
+bool GroupedProblem::may_act(const std::string& id, const std::vector<std::string>& others) const {
+  if (id != kDragByAxis || std::find(others.begin(), others.end(), kDrag) != others.end()) return true;
+  for (const auto& object : objects_of(*this))
+    if (const auto k = declared_drag_.find(object); k == declared_drag_.end() || !(k->second > 0))
+      return false;
+  return true;
+}
+
+bool GroupedProblem::may_be(const GroupedFit& fit) const {
+  const auto names = fit.names();
+  for (const auto& object : objects_of(*this)) {
+    const auto k = declared_drag_.find(object);
+    const double declared = k == declared_drag_.end() ? 0 : k->second;
+    // The weights of the fitted parameters in the drag along each axis.
+    Eigen::MatrixXd along = Eigen::MatrixXd::Zero(3, fit.values.size());
+    bool by_axis = false;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const auto column = static_cast<Index>(i);
+      if (names[i] == fmt::format("{}.k[{}]", kDrag, object)) along.col(column).setOnes();
+      if (names[i] == fmt::format("{}.a_x[{}]", kDragByAxis, object))
+        along.col(column) = Eigen::Vector3d(1, 0, -1), by_axis = true;
+      if (names[i] == fmt::format("{}.a_y[{}]", kDragByAxis, object))
+        along.col(column) = Eigen::Vector3d(0, 1, -1), by_axis = true;
+    }
+    if (!by_axis) continue;
+    for (Index axis = 0; axis < 3; ++axis) {
+      const double drag = declared + along.row(axis).dot(fit.values),
+                   variance = along.row(axis).dot(fit.covariance * along.row(axis).transpose());
+      if (drag + 2 * std::sqrt(std::max(0.0, variance)) < 0) return false;
+    }
+  }
+  return true;
 }
 
 }  // namespace unhand::fitting

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <limits>
+#include <map>
 #include <span>
 #include <string>
 #include <utility>
@@ -40,6 +41,8 @@ struct GroupEquations {
   Eigen::MatrixXd shared, own;  ///< derivatives: a row each, a column per unknown
 };
 
+struct GroupedFit;
+
 /// Groups of measurements under one model: unknowns that all groups share, and some of each group's own.
 class GroupedProblem {
  public:
@@ -61,9 +64,17 @@ class GroupedProblem {
                                    std::span<const double> values, const Eigen::VectorXd& own,
                                    bool derivatives) const = 0;
 
+  /// Whether an effect says anything beside `others` (ids). flight.drag_by_axis is traceless: it turns and
+  /// shapes a drag, and without one (found, or declared of every object) it would push along some axis.
+  bool may_act(const std::string& id, const std::vector<std::string>& others) const;
+  /// Whether nature has such values: false where the drag along a body axis, k + a_i, is a thrust by more
+  /// than two sigmas.
+  bool may_be(const GroupedFit& fit) const;
+
  protected:
-  std::vector<Group> groups_;                                 ///< filled by the problem's constructor
-  std::vector<std::string> channels_, covariates_;            ///< likewise
+  std::map<std::string, double> declared_drag_;     ///< k by object [1/m]; what is not named has none
+  std::vector<Group> groups_;                       ///< filled by the problem's constructor
+  std::vector<std::string> channels_, covariates_;  ///< likewise
   std::vector<std::pair<std::string, std::string>> skipped_;  ///< id and reason
 };
 

@@ -106,6 +106,15 @@ class Solver {
       if (fit_.covariance(j, j) < inverse(j, j))
         widened[j] = std::sqrt(inverse(j, j) / std::max(1e-300, fit_.covariance(j, j)));
     fit_.covariance = widened.asDiagonal() * fit_.covariance * widened.asDiagonal();
+    // Of a direction that no group sees nothing is known but the range.
+    const MatrixXd unseen = MatrixXd::Identity(p, p) - product(inverse, A);
+    VectorXd range(p);
+    for (Index j = 0; j < p; ++j) {
+      const SharedParameter& s = fit_.shared[static_cast<std::size_t>(j)];
+      range[j] = std::pow(s.high - s.low, 2) / 12;
+    }
+    if (unseen.diagonal().maxCoeff() > 1e-3)
+      fit_.covariance += congruent(unseen, MatrixXd(range.asDiagonal()));
     if (!fit_.covariance.allFinite())
       fit_.solved = false, fit_.message = "the shared parameters are not determined";
   }

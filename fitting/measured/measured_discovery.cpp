@@ -78,6 +78,71 @@ void look_for_the_unexplained(const GroupedProblem& problem, const GroupedFit& h
         100 * largest->share, largest->mean, std::abs(largest->z));
 }
 
+/// Whether the accepted effects explain some channel to within a tenth of its misfit, on train or on held-out
+/// groups. Where they leave more than that of every channel, they are the nearest names of something else.
+bool explains_a_channel(const MeasuredDiscovery& out) {
+  constexpr double kRest = 0.1, kNone = 0.2;  // of the misfit; a misfit of less is none
+  bool any = false;
+  for (const auto& m : out.misfit)
+    for (const auto& [before, after] :
+         {std::pair(m.before_train, m.after_train), std::pair(m.before_test, m.after_test)}) {
+      if (before - 1 < kNone) continue;
+      any = true;
+      if (after - 1 < std::max(kRest * (before - 1), kNone)) return true;
+    }
+  return !any;
+}
+
+/// Whether, on train and on held-out groups, more is left of some channel's misfit than they take from any.
+/// A few times the noise is what trackers err by, and no effect has to answer for it.
+bool leave_more_than_they_take(const MeasuredDiscovery& out) {
+  constexpr double kTrackers = 10;
+  double left = 0, taken = 0, test_left = 0, test_taken = 0;
+  for (const auto& m : out.misfit) {
+    left = std::max(left, m.after_train - 1), taken = std::max(taken, m.before_train - m.after_train);
+    test_left = std::max(test_left, m.after_test - 1);
+    test_taken = std::max(test_taken, m.before_test - m.after_test);
+  }
+  return left > taken && test_left > test_taken && left > kTrackers && test_left > kTrackers;
+}
+
+void take_fits(const GroupedProblem& problem, const EffectSearch& search, MeasuredDiscovery& out) {
+  out.effects = search.effects;
+  out.stability = search.stability;
+  out.parameters = search.final.names();
+  out.covariance.assign(search.final.covariance.data(),
+                        search.final.covariance.data() + search.final.covariance.size());
+  const auto a = misfit(problem, search.base), b = misfit(problem, search.base_test),
+             c = misfit(problem, search.final), d = misfit(problem, search.final_test);
+  out.misfit.clear();
+  for (std::size_t k = 0; k < a.size(); ++k)
+    if (a[k].n + b[k].n > 0)
+      out.misfit.push_back({a[k].channel, a[k].n + b[k].n, a[k].chi2_per_sample(), b[k].chi2_per_sample(),
+                            c[k].chi2_per_sample(), d[k].chi2_per_sample()});
+}
+
+/// Names that explain no channel, or less than they leave, are taken back.
+void withdraw_imitations(const GroupedProblem& problem, EffectSearch& search, MeasuredDiscovery& out) {
+  if (out.effects.empty()) return;
+  const bool none = !explains_a_channel(out);
+  if (!none && !leave_more_than_they_take(out)) return;
+  std::string names;
+  for (const auto& effect : out.effects) names += (names.empty() ? "" : ", ") + effect.id;
+  out.evidence.push_back(
+      {"",
+       fmt::format("Withdrawn: {}. They lower the misfit, but {}: the nearest names of something "
+                   "that is not listed",
+                   names,
+                   none ? "leave more than a tenth of it in every channel"
+                        : "leave more of it in one channel than they take from any"),
+       false});
+  search.effects.clear();
+  search.stability.clear();
+  search.final = search.base;
+  search.final_test = search.base_test;
+  take_fits(problem, search, out);
+}
+
 }  // namespace
 
 EffectSearch run_search(const GroupedProblem& problem, const MeasuredOptions& options,
@@ -89,19 +154,10 @@ EffectSearch run_search(const GroupedProblem& problem, const MeasuredOptions& op
     out.message = search.message;
     return search;
   }
-  out.effects = search.effects;
   out.ranking = search.ranking;
-  out.stability = search.stability;
-  out.parameters = search.final.names();
-  out.covariance.assign(search.final.covariance.data(),
-                        search.final.covariance.data() + search.final.covariance.size());
   out.train = search.base.used, out.test = search.base_test.used;
-  const auto a = misfit(problem, search.base), b = misfit(problem, search.base_test),
-             c = misfit(problem, search.final), d = misfit(problem, search.final_test);
-  for (std::size_t k = 0; k < a.size(); ++k)
-    if (a[k].n + b[k].n > 0)
-      out.misfit.push_back({a[k].channel, a[k].n + b[k].n, a[k].chi2_per_sample(), b[k].chi2_per_sample(),
-                            c[k].chi2_per_sample(), d[k].chi2_per_sample()});
+  take_fits(problem, search, out);
+  withdraw_imitations(problem, search, out);
   out.first = leaves_noise(problem, search.base, 1.2, options.search.fit.threads);
   out.autocorrelation_before = autocorrelation(problem, search.base_test);
   out.autocorrelation_after = autocorrelation(problem, search.final_test);

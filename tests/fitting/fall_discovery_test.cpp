@@ -17,6 +17,7 @@ namespace {
 
 struct Truth {
   double bias_x{}, bias_y{}, bias_z{}, drag{}, drift_z{};
+  double bias_scatter{};  // from fall to fall
 };
 
 /// Drops and (every third) throws upwards: held still for 0.6 s, let go or pushed, flying for 0.6 s.
@@ -43,6 +44,9 @@ datasets::ThrowLog falls(const Truth& truth, int n, unsigned seed) {
     imu.time.cols = 1, imu.specific_force.cols = 3;
     imu.specific_force.sigma = {sigma, sigma, sigma};
     const bool up = k % 3 == 2;
+    double bias[3] = {truth.bias_x, truth.bias_y, truth.bias_z};
+    if (truth.bias_scatter > 0)
+      for (double& b : bias) b += truth.bias_scatter * normal(random);
     const double still = 0.6, free = still + (up ? push : 0), end = free + 0.6;
     double v = up ? thrust * push : 0, begin = 0, last = 0;
     for (int i = 0; i / rate < end + 0.1; ++i) {
@@ -57,10 +61,9 @@ datasets::ThrowLog falls(const Truth& truth, int n, unsigned seed) {
       if (t > end) along = 60;
       imu.time.data.push_back(t);
       const double drift = t >= free && t <= end ? truth.drift_z * (t - begin) : 0;
-      imu.specific_force.data.insert(
-          imu.specific_force.data.end(),
-          {truth.bias_x + sigma * normal(random), truth.bias_y + sigma * normal(random),
-           truth.bias_z + drift + along + sigma * normal(random)});
+      imu.specific_force.data.insert(imu.specific_force.data.end(),
+                                     {bias[0] + sigma * normal(random), bias[1] + sigma * normal(random),
+                                      bias[2] + drift + along + sigma * normal(random)});
     }
     imu.time.rows = imu.time.data.size();
     imu.specific_force.rows = imu.time.rows;
@@ -124,6 +127,57 @@ TEST(FallDiscovery, ADriftIsNotDrag) {
   ASSERT_NE(drift, nullptr) << found.effects.front().id;
   EXPECT_NEAR(value_of(*drift, "z"), 1.0, 0.03);
   EXPECT_EQ(named(found, "flight.quadratic_drag"), nullptr);
+}
+
+// Five falls cannot say how three components of a bias scatter together, and still that one is there.
+TEST(FallDiscovery, SixFallsShowTheBiasThatTheyShare) {
+  for (unsigned seed = 11; seed < 14; ++seed) {
+    const auto found =
+        discover_falls(falls({.bias_x = -0.9, .bias_y = 0.4, .bias_scatter = 0.06}, 6, seed), {});
+    EXPECT_NE(named(found, "sensor.accelerometer_bias"), nullptr) << seed;
+  }
+}
+
+// What is common to all falls is no scatter between them.
+TEST(FallDiscovery, ScatterBetweenFallsIsAboutTheirMean) {
+  MeasuredOptions options;
+  for (const auto& effect : known_fall_effects()) options.search.forget.push_back(effect.id);
+  const auto found = discover_falls(falls({.bias_x = 0.9}, 12, 15), options);
+  const auto says = [&](const std::string& text) {
+    return std::any_of(found.evidence.begin(), found.evidence.end(),
+                       [&](const Evidence& e) { return e.text.find(text) != std::string::npos; });
+  };
+  EXPECT_TRUE(says("scatters by (0.00"));
+  EXPECT_TRUE(says("has a mean of (0.9") || says("has a mean of (0.8"));
+}
+
+// A traceless tensor pushes along some axis: it refines a drag, and is none without.
+TEST(FallDiscovery, DragByAxisIsNoAnswerWithoutADrag) {
+  MeasuredOptions options;
+  options.search.forget = {"flight.quadratic_drag", "flight.linear_drag"};
+  const auto log = falls({-0.9, 0.4, 0.05, 0.045, 0}, 30, 2);
+  EXPECT_EQ(named(discover_falls(log, options), "flight.drag_by_axis"), nullptr);
+  for (const auto& e : discover_falls(log, {}).effects)
+    for (const auto& [other, correlation] : e.equivalent) EXPECT_NE(other, "flight.drag_by_axis") << e.id;
+}
+
+TEST(FallDiscovery, NoDragIsAThrust) {
+  const FallProblem problem(falls({}, 4, 1));
+  GroupedFit fit;
+  for (const auto& effect : known_fall_effects())
+    if (effect.id == "flight.quadratic_drag" || effect.id == "flight.drag_by_axis")
+      for (auto& p : shared_parameters(effect, {"phone"})) fit.shared.push_back(std::move(p));
+  ASSERT_EQ(fit.shared.size(), 3U);
+  fit.values = Eigen::Vector3d(0.04, -0.08, 0.01);  // along x: -0.04
+  fit.covariance = 1e-6 * Eigen::Matrix3d::Identity();
+  EXPECT_FALSE(problem.may_be(fit));
+  fit.covariance *= 1e3;  // two sigmas are 0.09
+  EXPECT_TRUE(problem.may_be(fit));
+  fit.covariance *= 1e-3;
+  fit.values[1] = -0.03;
+  EXPECT_TRUE(problem.may_be(fit));
+  EXPECT_FALSE(problem.may_act("flight.drag_by_axis", {"flight.linear_drag"}));
+  EXPECT_TRUE(problem.may_act("flight.drag_by_axis", {"flight.quadratic_drag"}));
 }
 
 TEST(SurfaceDiscovery, AnEllipsoidMissesNothing) {

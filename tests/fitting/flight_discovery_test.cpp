@@ -155,9 +155,11 @@ std::vector<Case> cases() {
   with(
       "DragByAxis",
       [](SpatialTruth& t) {
-        t.axis_drag = {0.05, -0.02, -0.03};
+        t.drag = 0.06, t.axis_drag = {0.05, -0.02, -0.03};  // along no axis does the air push
       },
-      Expected{{"flight.drag_by_axis", "a_x[body]", 0.05}, {"flight.drag_by_axis", "a_y[body]", -0.02}});
+      Expected{{"flight.quadratic_drag", "k[body]", 0.06},
+               {"flight.drag_by_axis", "a_x[body]", 0.05},
+               {"flight.drag_by_axis", "a_y[body]", -0.02}});
   with(
       "Inertia",
       [](SpatialTruth& t) {
@@ -198,6 +200,27 @@ TEST(FlightDiscovery, AScaleAClockAndGravityAreOneAnswerWithThreeNames) {
       EXPECT_NE(named(found, id), nullptr) << id;
     for (const auto& [id, correlation] : found.effects.front().equivalent) EXPECT_GE(correlation, 0.98) << id;
   }
+}
+
+// Gravity, the scale or the clock may be far off: the declared gravity here is another planet's.
+TEST(FlightDiscovery, AGravityThatIsFarOffIsFoundWithItsSize) {
+  auto log = spatial_flights({.drag = 0.03}, {}, 51);
+  log.gravity = 7.5;
+  const auto found = found_in(log);
+  ASSERT_NE(named(found, "flight.gravity"), nullptr);
+  EXPECT_EQ(named(found, "flight.gravity"), named(found, "sensor.length_scale"));
+  expect_value(found, "sensor.length_scale", "scale", 9.81 / 7.5);
+  EXPECT_NE(named(found, "flight.quadratic_drag"), nullptr);
+  EXPECT_EQ(found.effects.size(), 2U);
+}
+
+// A vertical that leans by more than the catalogue has: no name that comes near is an answer.
+TEST(FlightDiscovery, WhatEndsAtTheEndOfItsRangeIsNotNamed) {
+  const auto found = found_in(spatial_flights({.tilt_x = 0.9}, {}, 52));
+  EXPECT_EQ(named(found, "flight.gravity_tilt"), nullptr);
+  EXPECT_EQ(found.verdict, Verdict::unexplained)
+      << (found.effects.empty() ? "" : found.effects.front().id.c_str());
+  EXPECT_TRUE(found.unexplained.has_value());
 }
 
 TEST(FlightDiscovery, WhatTheCatalogueForgotIsNotCalledByAnotherName) {
