@@ -93,7 +93,7 @@ class Search {
     const auto scored = first_order(f);
     if (scored.empty()) return false;
     compare_with_best(f.total, scored);
-    const double level = options_.false_discovery_rate / static_cast<double>(scored.size());
+    const double level = options_.family_wise_level / static_cast<double>(scored.size());
     return accept_best(convincing(f.total, leaders(f.total, scored, level, refits), effects, level));
   }
 
@@ -121,7 +121,7 @@ class Search {
       for (std::size_t i = 0; i < out_.effects.size() && !removed; ++i) {
         const std::string id = out_.effects[i].id;
         if (wald_of(out_.final, id).p_value(out_.final) <
-            options_.false_discovery_rate / static_cast<double>(catalogue_.size()))
+            options_.family_wise_level / static_cast<double>(catalogue_.size()))
           continue;
         std::vector<SharedParameter> shared;
         std::vector<double> values;
