@@ -134,11 +134,15 @@ TEST(Discovery, ATrackerThatSmoothsIsNotTakenForALateClock) {
   constexpr double kTau = 0.01;  // [s], of a first-order low-pass
   auto log = support::loop_campaign({});
   for (auto& thrown : log.throws) {
+    const datasets::Series& time = thrown.mocap->time;
     datasets::Series& pose = thrown.mocap->pose;
-    for (std::size_t k = 1; k < pose.rows; ++k) {
-      const double a = -std::expm1(-(thrown.mocap->time(k) - thrown.mocap->time(k - 1)) / kTau);
-      for (std::size_t c = 0; c < pose.cols; ++c)
-        pose(k, c) = pose(k - 1, c) + a * (pose(k, c) - pose(k - 1, c));
+    std::size_t last = pose.rows;  // none yet
+    for (std::size_t k = 0; k < pose.rows; ++k) {
+      if (!thrown.mocap->valid.empty() && thrown.mocap->valid[k] == 0) continue;  // lost: NaN
+      for (std::size_t c = 0; last < pose.rows && c < pose.cols; ++c)
+        pose(k, c) =
+            pose(last, c) - std::expm1(-(time(k) - time(last)) / kTau) * (pose(k, c) - pose(last, c));
+      last = k;
     }
   }
   const Discovery found = found_in(log);
