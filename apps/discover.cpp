@@ -239,6 +239,7 @@ std::string discovery_text(const Discovery& found, const std::string& log) {
       out += fmt::format("  to tell it from {}: {} (correlation {:.4f} -> {:.4f})\n", e.from, e.what,
                          e.before, e.after);
   }
+  if (const std::string note = gain_text(found.effects); !note.empty()) out += "\n" + note + "\n";
   for (const auto& id : found.along) out += fmt::format("\nfitted along, since no pads are rigid: {}\n", id);
   if (const auto& small = found.small)
     out += fmt::format(

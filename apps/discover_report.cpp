@@ -216,6 +216,8 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
   };
   std::string answer;
   for (const auto& effect : found.effects) answer += effect_html(effect);
+  if (const std::string note = gain_text(found.effects); !note.empty())
+    answer += fmt::format("<p>{}</p>\n", escaped(note));
   if (found.unexplained)
     answer += fmt::format("<p><b>Unexplained:</b> {}.</p>\n", escaped(found.unexplained->description));
   if (estimated) answer += picture("missing");
@@ -232,7 +234,9 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
       "<p>Base model <code>{}</code>. Verdict: <b>{}</b>.</p>\n<h2>Where it starts</h2><p>{}</p>\n{}"
       "<h2>The answer</h2>\n{}<h2>Errors before and after</h2>\n"
       "<p>Predicted from what is known before the throw, minus measured; chi2/dof with the throws' own "
-      "unknowns fitted. Test throws took no part in any fit. Below, the rms of these errors over what "
+      "unknowns fitted. Test throws took no part in any fit, but they decided what was accepted: after, "
+      "theirs "
+      "is a validation error, slightly optimistic. Below, the rms of these errors over what "
       "repetitions of a condition scatter by about their mean: above 1.4 most of the error goes with the "
       "condition, and a better model would take it away.</p>{}{}"
       "<h2>Candidates</h2><p>From the footprint of each: the derivative of every predicted sample, with the "

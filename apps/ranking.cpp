@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "apps/report_page.hpp"
 #include "fitting/distributions.hpp"
@@ -83,6 +84,23 @@ std::string effect_text(const fitting::AcceptedEffect& effect) {
     out += fmt::format("\n  {} = {:.6g} +- {:.2g} {}", p.name, p.value, p.sigma, p.unit);
   const std::string p = effect.p_value ? fmt::format(", p {:.2g}", *effect.p_value) : "";
   return out + fmt::format("\n  BIC {:+.1f}{}; held out: {}\n", effect.delta_bic, p, effect.why);
+}
+
+std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects) {
+  const auto ratio = [&](const char* id) -> const fitting::Parameter* {
+    for (const auto& effect : effects)
+      if (effect.id == id && !effect.parameters.empty()) return &effect.parameters.front();
+    return nullptr;
+  };
+  const auto *mass = ratio("sensor.mass"), *inertia = ratio("sensor.inertia");
+  if (!mass || !inertia ||
+      !(std::abs(mass->value - inertia->value) <= std::hypot(mass->sigma, inertia->sigma)))
+    return {};
+  return fmt::format(
+      "Mass and inertia are off by the same ratio, within its sigma: to the motion that is nothing, and a "
+      "gain "
+      "of {:.4g} on the whole measured wrench leaves just that.",
+      mass->value);
 }
 
 std::string effect_html(const fitting::AcceptedEffect& effect) {

@@ -29,6 +29,9 @@ Json effect_json(const fitting::AcceptedEffect& effect);
 /// The same in words: its other names, its parameters, and the evidence.
 std::string effect_text(const fitting::AcceptedEffect& effect);
 
+/// Where mass and inertia are off by the same ratio: that it may be a gain of the wrench. Else empty.
+std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects);
+
 /// The same as HTML, with what would separate it from its other names.
 std::string effect_html(const fitting::AcceptedEffect& effect);
 

@@ -27,14 +27,29 @@ double chi2_tail(double x, int k) {
   return cdf(complement(ChiSquared(k), std::min(x, kLargest)));
 }
 
-double chi_bar_tail(double x, int free, int bounded) {
+namespace {
+
+/// Chernoff's mixture of the tails of k parameters.
+template <class Tail>
+double mixed_tail(double x, int free, int bounded, const Tail& tail) {
   if (!(x > 0) || free + bounded < 1) return 1;
   double out = 0, weight = std::ldexp(1.0, -bounded);
   for (int j = 0; j <= bounded; ++j) {
-    if (free + j > 0) out += weight * chi2_tail(x, free + j);  // with none, all of it is at 0
+    if (free + j > 0) out += weight * tail(free + j);  // with none, all of it is at 0
     weight *= static_cast<double>(bounded - j) / (j + 1);
   }
   return out;
+}
+
+}  // namespace
+
+double chi_bar_tail(double x, int free, int bounded) {
+  return mixed_tail(x, free, bounded, [x](int k) { return chi2_tail(x, k); });
+}
+
+double hotelling_bar_tail(double x, int free, int bounded, double n) {
+  return mixed_tail(x, free, bounded,
+                    [x, n](int k) { return f_tail(x * (n - k + 1) / (n * k), k, n - k + 1); });
 }
 
 double f_tail(double x, double p, double q) {

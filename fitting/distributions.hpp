@@ -22,6 +22,10 @@ double chi2_tail(double x, int k);
 /// as sizes of different objects. 1, no evidence, where x is no positive number or there are no parameters.
 double chi_bar_tail(double x, int free, int bounded);
 
+/// The same where the covariance of the gain comes from n degrees of freedom: Hotelling's T² in place of χ²,
+/// P(T²_{k,n} > x) = P(F_{k,n−k+1} > x (n − k + 1)/(n k)); 1, no evidence, where n − k + 1 <= 0.
+double hotelling_bar_tail(double x, int free, int bounded, double n);
+
 /// P(F_{p,q} > x), Fisher's F. 1, no evidence, where p or q or x is no positive number.
 double f_tail(double x, double p, double q);
 

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "dynamics/dense_solve.hpp"
@@ -19,7 +20,7 @@ using experiment::Channel;
 bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options) {
   const bool slips = is_wrench(m.channel) && m.phase != Phase::grasped;
   if (m.chi2_per_sample() <= (slips ? options.wrench_misfit : 1 + options.matters)) return false;
-  return chi2_tail(m.chi2, m.n) < options.false_discovery_rate / kSeries;
+  return chi2_tail(m.chi2, m.n) < options.family_wise_level / kSeries;
 }
 
 bool leaves_misfit(const Stage& stage, const DiscoverOptions& options) {
@@ -157,7 +158,7 @@ std::vector<OutcomeLack> lacking(const OutcomeErrors& train, const OutcomeErrors
                                  const DiscoverOptions& options) {
   std::vector<OutcomeLack> out;
   for (const OutcomeLack& lack : train.lacks)
-    if (is_lacking(lack, options.false_discovery_rate / kOutcomes) &&
+    if (is_lacking(lack, options.family_wise_level / kOutcomes) &&
         is_lacking(lack_in(held_out, lack.outcome), kConfirmedAt))
       out.push_back(lack);
   return out;
@@ -165,45 +166,43 @@ std::vector<OutcomeLack> lacking(const OutcomeErrors& train, const OutcomeErrors
 
 namespace {
 
-/// How far from neutral an effect's sizes are: the square in units of their covariance, and how many of them
-/// may go both ways and one way.
-struct Distance {
-  double square{};
-  int free{}, bounded{};
-};
-
-Distance distance_from_neutral(const FitResult& fit, const dynamics::Effect& effect) {
+/// P-value of Wald's test of an effect's sizes against neutral. `ends`: sizes that are neutral at an end of
+/// their range cannot go beyond it.
+double absence(const FitResult& fit, const dynamics::Effect& effect, bool ends) {
   std::vector<Eigen::Index> index;
   std::vector<double> away;
-  Distance out;
-  const auto& campaign = fit.campaign;
-  for (std::size_t k = 0; k < campaign.size(); ++k)
-    for (const auto& p : effect.parameters)
-      if (!p.is_shape() && without_object(campaign[k].unknown.name) == effect.full_name(p)) {
-        index.push_back(static_cast<Eigen::Index>(k));
-        away.push_back(campaign[k].value - p.neutral);
-        ++(p.neutral > p.low && p.neutral < p.high ? out.free : out.bounded);
-      }
-  if (index.empty()) return out;
-  const auto width = static_cast<Eigen::Index>(campaign.size());
+  const auto width = static_cast<Eigen::Index>(fit.campaign.size());
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const Eigen::Map<const RowMajor> all(fit.covariance.data(), width, width);
+  int free = 0, bounded = 0;
+  double least = std::numeric_limits<double>::infinity(), each = 1;
+  for (Eigen::Index k = 0; k < width; ++k)
+    for (const auto& p : effect.parameters) {
+      const FittedUnknown& u = fit.campaign[static_cast<std::size_t>(k)];
+      if (p.is_shape() || without_object(u.unknown.name) != effect.full_name(p)) continue;
+      const double d = u.value - p.neutral, n = std::max(1.0, u.degrees_of_freedom);
+      const int at_end = ends && !(p.neutral > p.low && p.neutral < p.high) ? 1 : 0;
+      index.push_back(k);
+      away.push_back(d);
+      bounded += at_end, free += 1 - at_end;
+      least = std::min(least, n);
+      if (all(k, k) > 0) each = std::min(each, hotelling_bar_tail(d * d / all(k, k), 1 - at_end, at_end, n));
+    }
+  if (index.size() < 2) return each;
   const Eigen::MatrixXd C = all(index, index);
   const Eigen::Map<const Eigen::VectorXd> d(away.data(), static_cast<Eigen::Index>(away.size()));
-  out.square = d.dot(pseudo_solve(C, d));
-  return out;
+  const double joint = hotelling_bar_tail(d.dot(pseudo_solve(C, d)), free, bounded, least);
+  return std::min(1.0, 2 * std::min(joint, static_cast<double>(index.size()) * each));
 }
 
 }  // namespace
 
 double wald_p_value(const FitResult& fit, const dynamics::Effect& effect) {
-  const Distance from = distance_from_neutral(fit, effect);
-  return chi_bar_tail(from.square, from.free, from.bounded);
+  return absence(fit, effect, true);
 }
 
 bool is_told_from_none(const FitResult& fit, const dynamics::Effect& effect) {
-  const Distance from = distance_from_neutral(fit, effect);
-  return chi2_tail(from.square, from.free + from.bounded) <= kToldFromNone;
+  return absence(fit, effect, false) <= kToldFromNone;
 }
 
 bool in_air(Phase phase) { return phase == Phase::flight || phase == Phase::landing; }
@@ -226,14 +225,17 @@ bool is_left(const ChannelMisfit& m, const DiscoverOptions& options) {
   return is_misfit(m, options) && m.chi2_per_sample() >= unexplained_from(m.channel, m.phase, false, options);
 }
 
-/// Whether too much is left in the half of the throw where an effect acts, of what the base model's fit left
-/// there in the other throws (`other`: train against held-out ones) as well.
+/// Whether too much is left in the half of the throw where an effect acts, or in a channel that it
+/// `explains`, of what the base model's fit left there in the other throws (`other`: train against held-out
+/// ones) as well.
+template <class Explains>
 bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisfit>& base,
                      const std::vector<ChannelMisfit>& other, const std::vector<ChannelMisfit>& now,
-                     const DiscoverOptions& options) {
+                     const DiscoverOptions& options, const Explains& explains) {
   return std::any_of(now.begin(), now.end(), [&](const ChannelMisfit& m) {
-    return is_left(m, options) && acts(effect, in_air(m.phase)) && is_confirmed(other, m) &&
-           m.chi2_per_sample() - 1 > kLeft * (misfit_in(base, m.channel, m.phase) - 1);
+    return is_left(m, options) && is_confirmed(other, m) &&
+           m.chi2_per_sample() - 1 > kLeft * (misfit_in(base, m.channel, m.phase) - 1) &&
+           (acts(effect, in_air(m.phase)) || explains(m));
   });
 }
 
@@ -251,12 +253,26 @@ bool leaves_lacking(const BothErrors& errors, const Discovery& so_far, const Dis
 
 }  // namespace
 
+bool explains_most(const ChannelMisfit& now, const std::vector<ChannelMisfit>& without) {
+  return now.chi2_per_sample() - 1 < kExplains * (misfit_in(without, now.channel, now.phase) - 1);
+}
+
 bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const BothErrors& errors,
                   const FitResult& counted, const Discovery& so_far, const DiscoverOptions& options) {
+  // A sensor that is off is so in the hand and in the air, wherever that was seen most.
+  const auto explains = [&](FitResult Stage::*half) {
+    return [&, half](const ChannelMisfit& m) {
+      if (!effect.id.starts_with("sensor.")) return false;
+      const Stage& less = without(stage, {effect.id}, options);
+      return less.solved() && explains_most(m, (less.*half).misfit);
+    };
+  };
   return (acts(effect, false) && leaves_lacking(errors, so_far, options)) ||
          (!is_law(effect.id) && !is_told_from_none(counted, find_effect(effect.id))) ||
-         leaves_too_much(effect, so_far.base.misfit, so_far.base_test, stage.fit.misfit, options) ||
-         leaves_too_much(effect, so_far.base_test, so_far.base.misfit, stage.held_out.misfit, options);
+         leaves_too_much(effect, so_far.base.misfit, so_far.base_test, stage.fit.misfit, options,
+                         explains(&Stage::fit)) ||
+         leaves_too_much(effect, so_far.base_test, so_far.base.misfit, stage.held_out.misfit, options,
+                         explains(&Stage::held_out));
 }
 
 namespace {

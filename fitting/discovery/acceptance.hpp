@@ -13,14 +13,14 @@ namespace unhand::fitting {
 /// @name What is a misfit
 /// @{
 
-/// Channels and phases of a full log, which share the false discovery rate: wrench and mocap before, during
+/// Channels and phases of a full log, which share the family-wise level: wrench and mocap before, during
 /// and after the release, the sensor's own force, the landing.
 inline constexpr int kSeries = 3 * 3 + 3 * 3 + 1 + 3;
 /// The level at which the other half of the throws confirms a misfit.
 inline constexpr double kConfirmedAt = 0.05;
 
 /// Whether a channel leaves anything to explain in a phase: more than `matters` beyond the noise, and more
-/// than chance leaves (χ², at the false discovery rate shared among all channels and phases of a log). The
+/// than chance leaves (χ², at the family-wise level shared among all channels and phases of a log). The
 /// wrench while the pads still slip or may: more than `wrench_misfit`. In the firm grasp no friction law
 /// takes part, only Newton and Euler: there it is a channel like any other.
 bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options);
@@ -130,11 +130,19 @@ inline constexpr double kCorrects = 0.98;
 /// What is left of the misfit where an effect acts, from which on it is an imitation of another.
 inline constexpr double kLeft = 0.1;
 
+/// Of the misfit without a sensor's effect, the share below which the effect explains a channel in a phase.
+inline constexpr double kExplains = 0.5;
+/// Whether so little of the misfit `without` an effect is left, `now` that it is there.
+bool explains_most(const ChannelMisfit& now, const std::vector<ChannelMisfit>& without);
+
 /// The level at which an effect's size must be told from none by its own interval.
 inline constexpr double kToldFromNone = 0.05;
 
-/// Wald's test of an effect's size parameters against neutral, with the fit's covariance. Sizes that are
-/// neutral at an end of their range count as chi_bar_tail has it.
+/// Wald's test of an effect's size parameters against neutral, with the fit's covariance, which is known to
+/// its degrees of freedom only: each size by Student's t of its own, and several together by Hotelling's T²
+/// of the fewest; the smaller p of the two ways, times two, since few throws know a covariance of several
+/// sizes (forces of three components, drags of two objects) less than the variance of each. Sizes that are
+/// neutral at an end of their range count as hotelling_bar_tail has it.
 double wald_p_value(const FitResult& fit, const dynamics::Effect& effect);
 /// Whether the two-sided confidence region of the sizes, of the level kToldFromNone, leaves neutral out.
 bool is_told_from_none(const FitResult& fit, const dynamics::Effect& effect);
@@ -151,8 +159,10 @@ bool acts(const AcceptedEffect& effect, bool air);
 
 /// An accepted effect that is the shadow of something else. Either conditions and blocks of sensors do not
 /// agree on its size, so that its interval, which counts that (`counted`), has none in it. Or it leaves too
-/// much where it acts: of the throws that it was fitted to, or of those that it has not seen. Or, acting in
-/// the hand, it leaves predictions lacking (`errors` are the stage's) by too much of what the base's lacked.
+/// much where it acts: of the throws that it was fitted to, or of those that it has not seen. A sensor's
+/// effect, which is there in the hand and in the air, answers for every channel that it explains. Or, acting
+/// in the hand, it leaves predictions lacking (`errors` are the stage's) by too much of what the base's
+/// lacked.
 bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const BothErrors& errors,
                   const FitResult& counted, const Discovery& so_far, const DiscoverOptions& options);
 

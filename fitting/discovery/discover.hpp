@@ -34,9 +34,10 @@ struct DiscoverOptions {
   /// Or if the held-out throws are predicted that much better before they are made: rms before over after.
   double prediction_matters{1.15};
   double law_matters{0.005};  ///< another contact law: share of the held-out χ² as a whole
-  /// Shared among the candidates of a step, every shape and size at which a footprint was taken being one;
-  /// and of misfits among the channels and phases of a log.
-  double false_discovery_rate{0.02};
+  /// Chance of any false alarm of a test [-] (Bonferroni): shared among the effects of a step, every shape
+  /// and size at which a footprint was taken being one; and of misfits among the channels and phases of a
+  /// log. Contact laws, which have no size to test, are outside it.
+  double family_wise_level{0.02};
   double equivalent{0.98};  ///< footprints that correlate by this much are one answer
   /// Leading candidates that are fitted in full, in every step. Beyond them all laws, where none but a law
   /// convinced, and the give of the pads, where an effect with evidence matters to no channel.

@@ -124,7 +124,7 @@ class ForwardStep {
     ranked.delta_bic = trial.delta_bic;
     ranked.held_out_gain.reset();
     trial.p_value = law ? 0 : wald_p_value(trial.next.fit, find_effect(candidate.id));
-    const double share = options_.false_discovery_rate / static_cast<double>(f_.candidates.size());
+    const double share = options_.family_wise_level / static_cast<double>(f_.candidates.size());
     if (!(trial.delta_bic <= kDeltaBic) || !(trial.p_value <= share)) return std::nullopt;
     if (!solve_held_out(trial.next, options_)) return std::nullopt;
     trial.held_out = law ? law_improvement(stage_.held_out, trial.next.held_out, out_.base_test, options_)

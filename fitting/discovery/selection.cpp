@@ -146,8 +146,6 @@ void judge(const Stage& stage, const Stage& base, const DiscoverOptions& options
 void describe(Stage& stage, FitResult counted, const DiscoverOptions& options, Discovery& out) {
   if (out.effects.empty()) return;
   const auto f = footprints(stage.problem, stage.fit, catalogue(options), options.laws, options.fit.threads);
-  for (AcceptedEffect& accepted : out.effects)
-    if (!is_law(accepted.id)) accepted.p_value = wald_p_value(stage.fit, find_effect(accepted.id));
   stage.fit = std::move(counted);
   for (AcceptedEffect& accepted : out.effects) {
     if (is_law(accepted.id)) {
@@ -157,6 +155,7 @@ void describe(Stage& stage, FitResult counted, const DiscoverOptions& options, D
       continue;
     }
     const dynamics::Effect effect = find_effect(accepted.id);
+    accepted.p_value = wald_p_value(stage.fit, effect);  // with the covariance of the sigmas beside it
     for (const auto& u : stage.fit.campaign)
       for (const auto& p : effect.parameters)
         if (without_object(u.unknown.name) == effect.full_name(p))

@@ -184,7 +184,7 @@ bool lacks_no_acceleration(const Stage& stage, const DiscoverOptions& options) {
     fall += curve.chi2_before - curve.chi2_after;
     values += 3 * static_cast<int>(curve.knots.size());
   }
-  return values > 0 && chi2_tail(fall, values) > options.false_discovery_rate;
+  return values > 0 && chi2_tail(fall, values) > options.family_wise_level;
 }
 
 /// Where a channel leaves more than noise: the first phase, and in it the channel in which most is left.

@@ -108,7 +108,7 @@ class Search {
     const auto scored = first_order(f);
     if (scored.empty()) return false;
     compare_with_best(f.total, scored);
-    const double level = options_.false_discovery_rate / static_cast<double>(scored.size());
+    const double level = options_.family_wise_level / static_cast<double>(scored.size());
     kept_at_ = std::max(kept_at_, level);
     return accept_best(convincing(f.total, leaders(f.total, scored, level, refits), effects, level));
   }

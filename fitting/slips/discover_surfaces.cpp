@@ -165,7 +165,7 @@ SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
   answer.train = answer.test;
 
   const double rate =
-      options.false_discovery_rate / std::max<double>(1, static_cast<double>(models.size()) - 1);
+      options.family_wise_level / std::max<double>(1, static_cast<double>(models.size()) - 1);
   std::size_t best = 0;
   for (std::size_t k = 1; k < models.size(); ++k) {
     const double gain = base_errors[k] - errors[k];

@@ -10,7 +10,7 @@ namespace unhand::fitting {
 struct SurfaceDiscoveryOptions {
   SurfaceComparisonOptions comparison;         ///< folds and null control
   SurfaceModel base{SurfaceModel::ellipsoid};  ///< the law to begin with
-  double false_discovery_rate{0.02};           ///< shared among the laws that are tried
+  double family_wise_level{0.02};              ///< shared among the laws that are tried
   double matters{0.05};  ///< share of the base's held-out direction error that a law must take away
   /// Neighbouring wrenches of different slips whose residual directions correlate by this much (and by three
   /// standard errors) say that something is left.

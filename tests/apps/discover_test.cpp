@@ -49,7 +49,8 @@ TEST_F(Cli, DiscoverFindsTheDragThatIsThere) {
   EXPECT_EQ(effect["id"], "flight.quadratic_drag");
   EXPECT_TRUE(effect["equivalent"].empty());
   EXPECT_LT(effect["delta_bic"].get<double>(), -100);
-  EXPECT_LT(effect["p_value"].get<double>(), 1e-6);
+  EXPECT_LT(effect["p_value"].get<double>(),
+            1e-4);  // eight throws know their scatter to few degrees of freedom
   EXPECT_LT(effect["test_error_ratio"].get<double>(), 0.5);
   ASSERT_FALSE(effect["parameters"].empty());
   for (const auto& [name, k] : effect["parameters"].items()) {  // each object's own

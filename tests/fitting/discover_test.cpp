@@ -128,6 +128,28 @@ TEST(Discovery, AListedEffectBesideAnUnlistedOneStays) {
   EXPECT_EQ(found.unexplained->phase, Phase::flight);
 }
 
+// A tracker that smooths its poses is late wherever the motion is even, and takes a late clock's place in the
+// air; in the grasp, where the hand's acceleration changes, a fifth of the misfit stays.
+TEST(Discovery, ATrackerThatSmoothsIsNotTakenForALateClock) {
+  constexpr double kTau = 0.01;  // [s], of a first-order low-pass
+  auto log = support::loop_campaign({});
+  for (auto& thrown : log.throws) {
+    const datasets::Series& time = thrown.mocap->time;
+    datasets::Series& pose = thrown.mocap->pose;
+    std::size_t last = pose.rows;  // none yet
+    for (std::size_t k = 0; k < pose.rows; ++k) {
+      if (!thrown.mocap->valid.empty() && thrown.mocap->valid[k] == 0) continue;  // lost: NaN
+      for (std::size_t c = 0; last < pose.rows && c < pose.cols; ++c)
+        pose(k, c) =
+            pose(last, c) - std::expm1(-(time(k) - time(last)) / kTau) * (pose(k, c) - pose(last, c));
+      last = k;
+    }
+  }
+  const Discovery found = found_in(log);
+  EXPECT_EQ(found.verdict, Verdict::unexplained);
+  EXPECT_EQ(named(found, "sensor.mocap_time_offset"), nullptr);
+}
+
 // A bias of the sensor is a force that does not turn with the hand. In one component of the wrench another
 // mass does nearly the same (gravity and the hand's acceleration are much the same in all throws), and lowers
 // its misfit on held-out throws fourfold. But conditions do not agree on that mass, and the rest stays.

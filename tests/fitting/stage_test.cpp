@@ -179,6 +179,55 @@ TEST(Stage, SizesAtTheEndOfTheirRangeHaveTheMixedDistribution) {
     }
 }
 
+// Hotelling's T²: of one size Student's t, of many degrees of freedom χ², of two sizes a power.
+TEST(Wald, TailsOfFewDegreesOfFreedomAreHeavier) {
+  for (const double n : {1.0, 3.1, 12.0}) {
+    EXPECT_NEAR(hotelling_bar_tail(std::pow(student_factor(n), 2), 1, 0, n), 0.05, 1e-9) << n;
+    EXPECT_NEAR(hotelling_bar_tail(std::pow(student_factor(n), 2), 0, 1, n), 0.025, 1e-9) << n;
+    if (n > 1) {
+      EXPECT_NEAR(hotelling_bar_tail(7, 2, 0, n), std::pow(1 + 7 / n, -(n - 1) / 2), 1e-9) << n;
+    }
+  }
+  EXPECT_NEAR(hotelling_bar_tail(4, 1, 2, 1e9), chi_bar_tail(4, 1, 2), 1e-6);
+  EXPECT_EQ(hotelling_bar_tail(1e9, 3, 0, 2), 1) << "two degrees of freedom know no covariance of three";
+}
+
+// A fit to few throws knows its covariance to a few degrees of freedom.
+TEST(Wald, AFewThrowsAreNoCertainty) {
+  const auto fit_of = [](const std::string& id, double sigmas, double n) {
+    FitResult out;
+    for (const auto& p : find_effect(id).parameters) {
+      FittedUnknown u;
+      u.unknown.name = id + "." + p.name;
+      u.sigma = 0.01, u.value = p.neutral + sigmas * u.sigma, u.degrees_of_freedom = n;
+      out.campaign.push_back(u);
+    }
+    const std::size_t width = out.campaign.size();
+    out.covariance.assign(width * width, 0.0);
+    for (std::size_t k = 0; k < width; ++k) out.covariance[k * width + k] = 1e-4;
+    return out;
+  };
+  const dynamics::Effect mass = find_effect("sensor.mass"), bias = find_effect("sensor.ft_bias");
+  const double t = student_factor(3);  // 3.18
+  EXPECT_NEAR(wald_p_value(fit_of(mass.id, t, 3), mass), 0.05, 1e-9);
+  EXPECT_FALSE(is_told_from_none(fit_of(mass.id, 0.99 * t, 3), mass));
+  EXPECT_TRUE(is_told_from_none(fit_of(mass.id, 1.01 * t, 3), mass));
+  EXPECT_NEAR(wald_p_value(fit_of(mass.id, 3, 1e9), mass), normal_two_sided(3), 1e-6);
+  // Three sizes that such a covariance says next to nothing of together are certain each by itself.
+  EXPECT_LT(wald_p_value(fit_of(bias.id, 60, 3), bias), 1e-4);
+  EXPECT_NEAR(wald_p_value(fit_of(bias.id, 3, 1e9), bias), 2 * chi2_tail(27, 3), 1e-6);
+}
+
+// What is left of a misfit tells whether an effect explains it.
+TEST(Misfit, IsExplainedWhereMostOfItGoes) {
+  const auto misfit = [](double per_sample) {
+    return ChannelMisfit{experiment::Channel::mocap_x, Phase::grasped, 100, 100 * per_sample};
+  };
+  EXPECT_TRUE(explains_most(misfit(1116), {misfit(5077)}));
+  EXPECT_FALSE(explains_most(misfit(636), {misfit(693)}));
+  EXPECT_FALSE(explains_most(misfit(3), {})) << "nothing was left there without it";
+}
+
 // A law that was accepted in the company of a lift which turns out to be none, on throws of another law: once
 // the lift is withdrawn, nothing speaks for the law, and it goes, too.
 TEST(Selection, WhatHasNoEvidenceWithoutWhatIsWithdrawnGoesWithIt) {
