@@ -44,6 +44,20 @@ Ranked& named(std::vector<Ranked>& ranking, const std::string& id) {
   return *std::find_if(ranking.begin(), ranking.end(), [&](const Ranked& r) { return r.id == id; });
 }
 
+/// The p-value if the fit's covariance were known.
+double wald_as_known(FitResult fit, const dynamics::Effect& effect) {
+  for (auto& u : fit.campaign) u.degrees_of_freedom = 1e9;
+  return wald_p_value(fit, effect);
+}
+
+/// Whether Wald's test rejects an effect's absence: at the level shared among the candidates if the
+/// covariance were known, and at the level itself as far as it is. Three degrees of freedom reach no shared
+/// level below twenty sigma; there Bayes' criterion and the held-out throws answer for how many are tried.
+bool is_significant(const FitResult& fit, const dynamics::Effect& effect, double p_value, double level,
+                    double candidates) {
+  return p_value <= level && wald_as_known(fit, effect) <= level / candidates;
+}
+
 /// A refit of one candidate against the stage that it would extend, with evidence on the train throws.
 struct TriedEffect {
   const Score* score{};
@@ -123,9 +137,14 @@ class ForwardStep {
     ranked.refit_step = this_step();
     ranked.delta_bic = trial.delta_bic;
     ranked.held_out_gain.reset();
-    trial.p_value = law ? 0 : wald_p_value(trial.next.fit, find_effect(candidate.id));
-    const double share = options_.family_wise_level / static_cast<double>(f_.candidates.size());
-    if (!(trial.delta_bic <= kDeltaBic) || !(trial.p_value <= share)) return std::nullopt;
+    if (!law) {
+      const dynamics::Effect effect = find_effect(candidate.id);
+      trial.p_value = wald_p_value(trial.next.fit, effect);
+      if (!is_significant(trial.next.fit, effect, trial.p_value, options_.family_wise_level,
+                          static_cast<double>(f_.candidates.size())))
+        return std::nullopt;
+    }
+    if (!(trial.delta_bic <= kDeltaBic)) return std::nullopt;
     if (!solve_held_out(trial.next, options_)) return std::nullopt;
     trial.held_out = law ? law_improvement(stage_.held_out, trial.next.held_out, out_.base_test, options_)
                          : improvement(stage_, trial.next, out_.base_test, options_);
