@@ -10,9 +10,9 @@ namespace unhand::fitting {
 
 /// When an effect is believed, and how much is tried.
 struct EffectSearchOptions {
-  GroupedFitOptions fit;              ///< how every fit runs
+  GroupedFitOptions fit;           ///< how every fit runs
   double family_wise_level{0.02};  ///< shared among the candidates of a step
-  double equivalent{0.98};            ///< footprints that correlate by this much are one answer
+  double equivalent{0.98};         ///< footprints that correlate by this much are one answer
   /// An effect matters if, of some channel, it takes away this share of what the held-out χ² per sample
   /// exceeds the noise by.
   double matters{0.1};

@@ -164,8 +164,7 @@ SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
     for (std::size_t k = 0; k < models.size(); ++k) (*sums)[k] /= std::max(1, compared[k]);
   answer.train = answer.test;
 
-  const double rate =
-      options.family_wise_level / std::max<double>(1, static_cast<double>(models.size()) - 1);
+  const double rate = options.family_wise_level / std::max<double>(1, static_cast<double>(models.size()) - 1);
   std::size_t best = 0;
   for (std::size_t k = 1; k < models.size(); ++k) {
     const double gain = base_errors[k] - errors[k];
