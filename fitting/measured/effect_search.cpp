@@ -283,7 +283,7 @@ class Search {
       r.refit_step = this_step(), r.delta_bic = trial.delta_bic, r.held_out_gain = trial.held.fall();
       if (!trial.fit.solved || !(trial.p < level) || shape_is_open(trial.fit, c.id)) continue;
       if (is_pinned(trial.fit) || !problem_.may_be(trial.fit)) continue;
-      if (trial.held.share > options_.matters && trial.held.stands_out()) out.push_back(std::move(trial));
+      if (trial.held.share > options_.matters) out.push_back(std::move(trial));
     }
     std::sort(out.begin(), out.end(),
               [](const EffectTrial& a, const EffectTrial& b) { return a.delta_bic < b.delta_bic; });

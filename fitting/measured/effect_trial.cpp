@@ -121,15 +121,6 @@ std::vector<Along> all_along(const GroupedProblem& problem, const GroupedFit& be
   return out;
 }
 
-/// Standard error of the fall per sample, over groups that differ in length.
-double scatter_of_fall(const std::vector<Along>& groups, double fall, double samples) {
-  if (groups.size() < kFewest) return 0;
-  const auto n = static_cast<double>(groups.size());
-  double squares = 0;
-  for (const Along& g : groups) squares += std::pow(g.was - g.is - fall * g.samples, 2);
-  return std::sqrt(squares * n / (n - 1)) / samples;
-}
-
 HeldOutFall held_out(const GroupedProblem& problem, const GroupedFit& before, const GroupedFit& after,
                      const Slope& train) {
   const auto groups = all_along(problem, before, after);
@@ -139,7 +130,6 @@ HeldOutFall held_out(const GroupedProblem& problem, const GroupedFit& before, co
   if (!(samples > 0)) return out;
   out.was = was / samples, out.is = is / samples;
   if (!(out.was > out.is)) return out;
-  out.scatter = scatter_of_fall(groups, out.fall(), samples);
   out.p = p_of_slope(slope_of(groups), train);
   const auto b = misfit(problem, before), a = misfit(problem, after);
   double falls = 0;

@@ -10,11 +10,8 @@ namespace unhand::fitting {
 struct HeldOutFall {
   double was{}, is{};  ///< χ² per sample
   double p{1};         ///< of a fall by chance: one-sided, jackknife over groups
-  double scatter{};    ///< of the fall, over groups: its standard error; 0 where fewer than three tell
   double share{};      ///< the largest share of a channel's misfit beyond the noise that goes
   double fall() const { return was - is; }
-  /// Whether the fall exceeds its own scatter.
-  bool stands_out() const { return fall() > scatter; }
 };
 
 /// A fit with one effect more, on the train groups and, its shared parameters held, on the test groups.
