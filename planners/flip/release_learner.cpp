@@ -103,13 +103,12 @@ void LeftOverField::set(std::vector<LeftOver> samples, const DetachVector& throw
       const double sigma = factor * kDiscrepancy[j];
       Eigen::MatrixXd A = sigma * sigma * K;
       A.diagonal() += noise;
-      const Eigen::MatrixXd inverse = dynamics::definite_inverse(A);
-      const Eigen::VectorXd weights = inverse * y;
+      const Eigen::VectorXd weights = dynamics::definite_solve(A, y);
       const double evidence = -0.5 * (y.dot(weights) + dynamics::log_determinant(A));
       if (!(evidence > best)) continue;
       best = evidence;
       sigma_[j] = sigma;
-      inverse_[j] = inverse;
+      inverse_[j] = dynamics::definite_inverse(A);
       weights_[j] = weights;
     }
   }
