@@ -77,26 +77,26 @@ Vec3<double> IsotropicQuartic::resist(const Vec3<double>& u, Slopes* slopes) con
   const double kappa = kappa_.a;
   const double p = std::sqrt(u[0] * u[0] + u[1] * u[1]), q = std::abs(u[2]);
   const bool slides = q <= p;
-  const double most = slides ? p : q, r = ratio(slides ? q / p : p / q), x = r * r;
-  const double h = std::sqrt(std::sqrt(1 + x * (2 * kappa + x))), sum = 1 + kappa * x;
+  const double per_most = 1 / (slides ? p : q), r = ratio((slides ? q : p) * per_most), x = r * r;
+  const double g = 1 / std::sqrt(std::sqrt(1 + x * (2 * kappa + x))), sum = 1 + kappa * x;
   // e = r (κ + r²)/(1 + κ r²), so where p is the lesser, a/p = (a/b) b/(e q) stays finite as it vanishes.
-  const double share = slides ? 1.0 : sum / std::max(kappa + x, kTiny), k = share / (h * most);
+  const double share = slides ? 1.0 : sum / std::max(kappa + x, kTiny), k = share * g * per_most;
   if (slopes) {
-    const double D = std::max(kappa + x * (3 - kappa * kappa + kappa * x), kTiny), cube = most * most * most;
-    const double g = 1 / h, g5 = g * g * g * g * g, lambda = sum * sum * sum * g5 / (D * cube);
+    const double per_D = 1 / std::max(kappa + x * (3 - kappa * kappa + kappa * x), kTiny);
+    const double square = per_most * per_most, g5 = g * g * g * g * g, scale = g5 * per_D * square * per_most;
+    const double lambda = sum * sum * sum * scale;
     // (λ q² − k)/p²; where q is the larger, both are near each other and their difference is divided by x.
-    const double square = kappa * kappa - 2, bend = square + x * (3 * kappa * square - x * (3 + kappa * x));
-    const double cross =
-        slides ? (lambda * q * q - k) / (p * p) : share * share * share * g5 * bend / (D * cube);
+    const double below = kappa * kappa - 2, bend = below + x * (3 * kappa * below - x * (3 + kappa * x));
+    const double cross = slides ? (lambda * q * q - k) * square : share * share * share * scale * bend;
     slopes->by_slip = isotropic_hessian(u, -k, -cross, -lambda);
     // Of the larger of (a, b), and of the smaller over r.
-    const double turn = -(1 - x * x) / D, by_kappa = -g5 * x * (0.5 + (kappa + x) * turn),
+    const double turn = -(1 - x * x) * per_D, by_kappa = -g5 * x * (0.5 + (kappa + x) * turn),
                  lesser = by_kappa + g * turn;
-    const double along = slides ? by_kappa / p : lesser * share / q;
+    const double along = (slides ? by_kappa : lesser * share) * per_most;
     const double sign = std::copysign(1.0, u[2]);
     slopes->by_kappa = {-along * u[0], -along * u[1], -sign * (slides ? r * lesser : by_kappa)};
   }
-  return {-k * u[0], -k * u[1], std::copysign(slides ? k * p * r : 1 / h, -u[2])};
+  return {-k * u[0], -k * u[1], std::copysign(slides ? r * g : g, -u[2])};
 }
 
 template <class S>
