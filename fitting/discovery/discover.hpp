@@ -185,8 +185,8 @@ struct MissingEstimate {
 struct Unexplained {
   Phase phase{};                  ///< where it is largest
   experiment::Channel channel{};  ///< of which sensor
-  /// On the train throws: χ² per sample; of predictions, their errors' mean square over what repetitions
-  /// scatter by. 1 is the noise.
+  /// On the train throws (on the held-out ones, if only they are off): χ² per sample; of predictions, their
+  /// errors' mean square over what repetitions scatter by. 1 is the noise.
   double chi2_per_dof{};
   std::string description;                 ///< in words
   std::optional<MissingEstimate> missing;  ///< absent where no force can be read from it

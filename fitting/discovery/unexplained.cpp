@@ -254,6 +254,72 @@ std::optional<Unexplained> left_in_predictions(const Discovery& so_far, double r
       {}};
 }
 
+/// Of which throws a misfit is: the fewest that hold most of it, by name or by the condition they share.
+std::string held_by(const Stage& stage, const FitResult& half, const ChannelMisfit& m, int threads) {
+  constexpr double kMost = 0.9;
+  constexpr std::size_t kNamed = 3;
+  struct Excess {
+    double chi2;
+    const experiment::PreparedThrow* thrown;
+  };
+  std::vector<Excess> all;
+  double sum = 0;
+  const auto residuals = residuals_of(stage.problem, half, threads);
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    if (residuals[i].size() == 0) continue;
+    const CampaignThrow& thrown = stage.problem.throws()[i];
+    const double release = thrown.release_or(half.throws[i].detach);
+    double chi2 = 0;
+    for (std::size_t j = 0; j < thrown.observed.all.size(); ++j) {
+      const auto& o = thrown.observed.all[j];
+      if (o.channel != m.channel || phase_of(o, thrown.opening, release) != m.phase) continue;
+      const double r = residuals[i][static_cast<Eigen::Index>(j)];
+      chi2 += r * r - 1;
+    }
+    all.push_back({chi2, &thrown.prepared});
+    sum += std::max(0.0, chi2);
+  }
+  std::sort(all.begin(), all.end(), [](const Excess& a, const Excess& b) { return a.chi2 > b.chi2; });
+  std::size_t few = 0;
+  for (double held = 0; few < all.size() && held < kMost * sum; ++few) held += std::max(0.0, all[few].chi2);
+  if (few <= kNamed) {
+    std::string names;
+    for (std::size_t i = 0; i < few; ++i) names += (i == 0 ? "" : ", ") + all[i].thrown->id;
+    return names;
+  }
+  const std::string condition = all[0].thrown->experiment();
+  const bool one = std::all_of(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(few),
+                               [&](const Excess& e) { return e.thrown->experiment() == condition; });
+  return one ? condition : fmt::format("{} of its {} throws", few, all.size());
+}
+
+/// Where a channel is far off in one half of the throws and noise in the other: nothing that acts in every
+/// throw, but something is wrong with those.
+std::optional<Unexplained> left_in_one_half(const Stage& stage, const DiscoverOptions& options) {
+  constexpr double kFar = 10;  // parameters from one half leave less in the other
+  std::optional<Unexplained> out;
+  for (const bool train : {true, false}) {
+    const FitResult& half = train ? stage.fit : stage.held_out;
+    const FitResult& other = train ? stage.held_out : stage.fit;
+    for (const ChannelMisfit& m : half.misfit) {
+      if (!is_misfit(m, options) || is_confirmed(other.misfit, m)) continue;
+      if (m.chi2_per_sample() < kFar * unexplained_from(m.channel, m.phase, false, options)) continue;
+      if (out && m.chi2_per_sample() <= out->chi2_per_dof) continue;
+      out = Unexplained{m.phase,
+                        m.channel,
+                        m.chi2_per_sample(),
+                        fmt::format("{} in {}: {:.3g} times the variance of the noise in the {} throws, "
+                                    "noise in the {} ones; nearly "
+                                    "all of it is of {}: nothing that acts in every throw",
+                                    to_string(m.channel), to_string(m.phase), m.chi2_per_sample(),
+                                    train ? "train" : "held-out", train ? "held-out" : "train",
+                                    held_by(stage, half, m, options.fit.threads)),
+                        {}};
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_far,
@@ -261,7 +327,10 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
   // No law of pads is quite right; of flight and of sensors they are.
   const double rest = acts_on_pads(stage) ? kRest : 0;
   std::optional<Unexplained> out = left_in_channels(stage, so_far, rest, options);
-  if (!out) out = left_in_predictions(so_far, rest, options);
+  if (!out) {
+    if (const auto few = left_in_one_half(stage, options)) return few;
+    out = left_in_predictions(so_far, rest, options);
+  }
   if (!out) return out;
   out->description += "; no effect of the catalogue explains it on held-out throws";
   for (const auto& id : so_far.imitations) out->description += fmt::format("; {} imitates it", id);

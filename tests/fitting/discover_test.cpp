@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "experiment/campaign_effects.hpp"
@@ -126,6 +127,43 @@ TEST(Discovery, AListedEffectBesideAnUnlistedOneStays) {
   EXPECT_NE(named(found, "flight.quadratic_drag"), nullptr) << to_string(found.verdict);
   ASSERT_TRUE(found.unexplained.has_value());
   EXPECT_EQ(found.unexplained->phase, Phase::flight);
+}
+
+// What is wrong in some throws only is no effect, and not nothing: the answer names them, in either half.
+TEST(Discovery, WhatIsWrongInOneConditionIsUnexplainedAndNamesIt) {
+  for (const auto half : {datasets::Split::train, datasets::Split::test}) {
+    auto log = support::loop_campaign({});
+    const auto first = std::find_if(log.throws.begin(), log.throws.end(),
+                                    [&](const datasets::ThrowRecord& t) { return t.split == half; });
+    ASSERT_NE(first, log.throws.end());
+    const std::string object = first->object, condition = first->condition;
+    for (datasets::ThrowRecord& t : log.throws)
+      if (t.object == object && t.condition == condition && t.split == half)
+        for (std::size_t k = 0; k < t.mocap->time.rows; ++k) t.mocap->pose(k, 0) += 0.01;
+    const Discovery found = found_in(log);
+    EXPECT_EQ(found.verdict, Verdict::unexplained);
+    ASSERT_TRUE(found.unexplained.has_value());
+    EXPECT_NE(found.unexplained->description.find(first->id), std::string::npos)
+        << found.unexplained->description;
+    EXPECT_NE(found.unexplained->description.find(half == datasets::Split::train ? "train" : "held-out"),
+              std::string::npos)
+        << found.unexplained->description;
+  }
+}
+
+TEST(Discovery, OneLandingThatIsOffIsNamed) {
+  auto log = support::loop_campaign({});
+  const auto bad = std::find_if(log.throws.begin(), log.throws.end(), [](const datasets::ThrowRecord& t) {
+    return t.split == datasets::Split::test;
+  });
+  ASSERT_NE(bad, log.throws.end());
+  bad->landing->pose(0, 0) += 0.5;
+  const Discovery found = found_in(log);
+  EXPECT_EQ(found.verdict, Verdict::unexplained);
+  ASSERT_TRUE(found.unexplained.has_value());
+  EXPECT_EQ(found.unexplained->channel, experiment::Channel::landing_x);
+  EXPECT_NE(found.unexplained->description.find(bad->id), std::string::npos)
+      << found.unexplained->description;
 }
 
 // A tracker that smooths its poses is late wherever the motion is even, and takes a late clock's place in the
