@@ -198,6 +198,21 @@ TEST(FlightDiscovery, FiveHeldOutFlightsOfNoiseDoNotHideWhatTheyShow) {
   EXPECT_GE(found_it, 6);
 }
 
+TEST(FlightDiscovery, ADragThatPushesAlongADiagonalIsSaidToBeNone) {
+  // A harmonic of the drag without a drag to shape: what is listed has that form, air does not.
+  const auto speaks = [](double drag) {
+    SpatialTruth truth;
+    truth.cubic_drag = 0.15;
+    truth.drag = drag;
+    const auto found = found_in(spatial_flights(truth, {}, 5));
+    expect_value(found, "flight.cubic_drag", "kappa[body]", 0.15);
+    return std::any_of(found.evidence.begin(), found.evidence.end(),
+                       [](const Evidence& e) { return e.about == "flight.cubic_drag" && e.against; });
+  };
+  EXPECT_TRUE(speaks(0));
+  EXPECT_FALSE(speaks(0.1));
+}
+
 TEST(FlightDiscovery, FlightsThatShowAnEffectUnequallyDoNotHideIt) {
   SpatialTruth truth;
   truth.inertia = {1, 1.06, 1};
