@@ -45,6 +45,39 @@ MeanResidual mean_residual(const FallProblem& problem, const GroupedFit& fit) {
   return out;
 }
 
+/// A drag slows a fall by what its speed is. Where the fit moves the speeds at the start from what the sensor
+/// gained in the hand, by more than that is known to, a drag, the bias along the vertical and those speeds
+/// trade against each other, and the drag's size is none that the falls determine.
+void weigh_start_speeds(const datasets::ThrowLog& log, const FallProblem& problem, const EffectSearch& search,
+                        MeasuredDiscovery& out) {
+  constexpr double kFar = 2, kOpen = 0.5;  // sigma, in the mean of squares; of the speed in flight
+  double n = 0, mean = 0, squares = 0, speeds = 0;
+  for (std::size_t i = 0; i < search.final.groups.size(); ++i) {
+    const GroupFit& g = search.final.groups[i];
+    if (!g.used || !g.solved) continue;
+    const auto& rows = problem.groups()[i].rows;
+    std::size_t speed = 0;  // the first row of what is known beforehand
+    while (rows[speed].channel != kPriorChannel) ++speed;
+    const double v = problem.groups()[i].start[0], falls = log.gravity * rows[speed - 1].time;
+    n += 1, mean += g.own[0] - v;
+    speeds += v * v - v * falls + falls * falls / 3;  // the mean of its square
+    squares += std::pow(g.residual[static_cast<Eigen::Index>(speed)], 2);
+  }
+  if (!(n > 0) || !(squares > kFar * kFar * n)) return;
+  const double share = std::abs(mean / n) / std::sqrt(std::max(1e-12, speeds / n));
+  for (const auto& effect : out.effects)
+    if (effect.id == "flight.quadratic_drag" || effect.id == "flight.linear_drag")
+      out.evidence.push_back(
+          {effect.id,
+           fmt::format(
+               "The fit starts the falls {:+.2f} m/s faster, in the mean, than the sensor says of the "
+               "time before ({:.1f} sigma, rms), {:.0f} % of the speed in flight. A drag, the bias along "
+               "the vertical and the speeds at the start trade against each other{}",
+               mean / n, std::sqrt(squares / n), 100 * share,
+               share > kOpen ? ": how large the drag and the bias are, these falls do not determine" : ""),
+           true});
+}
+
 void explain(const datasets::ThrowLog& log, const FallProblem& problem, const EffectSearch& search,
              MeasuredDiscovery& out) {
   const auto [common, scatter] = mean_residual(problem, search.final);
@@ -81,6 +114,7 @@ void explain(const datasets::ThrowLog& log, const FallProblem& problem, const Ef
           {effect.id,
            "a bias and a steady turn about an axis off the sensor: a gyroscope in the same recording"});
   }
+  weigh_start_speeds(log, problem, search, out);
   std::map<std::string, int> conditions;
   for (const auto& g : problem.groups()) ++conditions[g.condition];
   std::string text;

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "dynamics/median.hpp"
 #include "fitting/measured/flight_discovery.hpp"
 #include "fitting/measured/measured_discovery.hpp"
 #include "fitting/measured/rest_heights.hpp"
@@ -172,6 +173,39 @@ void weigh_drag(const datasets::ThrowLog& log, MeasuredDiscovery& out) {
   }
 }
 
+/// flight.cubic_drag is traceless: it shapes a drag by how a cube lies in the air, by k + κ (s − 3/5) with s
+/// from 1/3 along a diagonal to 1 along an axis. Where that is negative, the air would push.
+void weigh_thrust(const datasets::ThrowLog& log, const FlightProblem& problem, MeasuredDiscovery& out) {
+  std::vector<double> speeds;
+  for (const auto& g : problem.groups()) speeds.push_back(g.covariates.front());
+  const double speed = std::max(1e-9, dynamics::median(speeds));
+  for (const auto& [name, object] : log.objects) {
+    // The drag: declared, quadratic, and linear at the speed of a launch.
+    double drag = object.drag_k.value_or(0), variance = 0;
+    const Parameter* shape = nullptr;
+    for (const auto& effect : out.effects)
+      for (const auto& p : effect.parameters) {
+        const bool linear = effect.id == "flight.linear_drag" && p.name == "c[" + name + "]";
+        const double per = linear ? speed : 1;
+        if (linear || (effect.id == "flight.quadratic_drag" && p.name == "k[" + name + "]"))
+          drag += p.value / per, variance += std::pow(p.sigma / per, 2);
+        if (p.name == "kappa[" + name + "]") shape = &p;
+      }
+    if (!shape) continue;
+    constexpr double kMean = 0.6;
+    const double along = shape->value < 0 ? 1 - kMean : 1.0 / 3 - kMean, least = drag + along * shape->value,
+                 sigma = std::sqrt(variance + std::pow(along * shape->sigma, 2));
+    if (!(least + 2 * sigma < 0)) continue;
+    out.evidence.push_back(
+        {"flight.cubic_drag",
+         fmt::format(
+             "Along {} of {} the drag adds up to {:.4f} ± {:.4f} 1/m: air would push there, so that "
+             "this is no drag by itself; it has the form of one, and what it is the flights do not say",
+             shape->value < 0 ? "an axis" : "a diagonal", name, least, sigma),
+         true});
+  }
+}
+
 }  // namespace
 
 NamedErrors named_errors(const FlightProblem& problem, const GroupedFit& fit, int threads) {
@@ -202,6 +236,7 @@ MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const Measured
   weigh_stability(out);
   weigh_scales(log, options, out);
   weigh_drag(log, out);
+  weigh_thrust(log, problem, out);
   if (problem.glitches() > 0)
     out.evidence.push_back(
         {"",

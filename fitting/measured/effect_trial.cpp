@@ -92,21 +92,24 @@ Slope slope_of(const std::vector<Along>& groups) {
   return out;
 }
 
-/// That an effect lowers the χ² of groups which no fit has seen. The slope is 1 where they show it as the
-/// train groups do and 0 where there is none, and χ² falls where it exceeds a half. Groups that show an
-/// effect by different amounts are no doubt of it: a paired test of their χ² would take them for that, of the
-/// largest effect as of the smallest. Where fewer than kFewest are held out, the train groups say how much
-/// slopes scatter: of less change, or of fewer groups, by as much more.
-double p_of_slope(const Slope& held_out, const Slope& train) {
-  constexpr double kFalls = 0.5;
+/// That χ² of groups which no fit has seen falls by chance. The slope is 1 where they show an effect as the
+/// train groups do and 0 where there is none, and χ² falls where it exceeds a half. Where only noise is
+/// `left` with the effect, nothing but noise can have made it fall, at a slope of 0. Where a misfit is left,
+/// what causes that lends some of itself to any name, and the slope has to be more than a half. It scatters
+/// by no less than the noise of the samples. Groups that show an effect by different amounts are no doubt of
+/// it: a paired test of their χ² would take them for that, of the largest effect as of the smallest. Where
+/// fewer than kFewest are held out, the train groups say how much slopes scatter: of less change, or of fewer
+/// groups, by as much more.
+double p_of_slope(const Slope& held_out, const Slope& train, double left) {
+  constexpr double kFalls = 0.5, kNoise = 1.2;
   if (!(held_out.change > 0) || !(held_out.value > kFalls)) return 1;
   const bool few = held_out.groups < kFewest;
   const Slope& scatter = few ? train : held_out;
   if (!scatter.known) return 1;
   const double more = few ? std::max(train.change / held_out.change, train.groups / held_out.groups) : 1;
-  const double variance = std::max(more * scatter.variance, 1e-300),
-               t2 = std::pow(held_out.value - kFalls, 2);
-  return 0.5 * f_tail(t2 / variance, 1, scatter.groups - 1);
+  const double variance = std::max(more * scatter.variance, 1 / held_out.change),
+               beyond = held_out.value - (left < kNoise ? 0 : kFalls);
+  return 0.5 * f_tail(beyond * beyond / variance, 1, scatter.groups - 1);
 }
 
 /// Of the groups that both fits could be made of.
@@ -130,7 +133,7 @@ HeldOutFall held_out(const GroupedProblem& problem, const GroupedFit& before, co
   if (!(samples > 0)) return out;
   out.was = was / samples, out.is = is / samples;
   if (!(out.was > out.is)) return out;
-  out.p = p_of_slope(slope_of(groups), train);
+  out.p = p_of_slope(slope_of(groups), train, out.is);
   const auto b = misfit(problem, before), a = misfit(problem, after);
   double falls = 0;
   for (std::size_t c = 0; c < b.size(); ++c) falls += std::max(0.0, b[c].chi2 - a[c].chi2);

@@ -80,16 +80,20 @@ void look_for_the_unexplained(const GroupedProblem& problem, const GroupedFit& h
 
 /// Whether the accepted effects explain some channel to within a tenth of its misfit, on train or on held-out
 /// groups. Where they leave more than that of every channel, they are the nearest names of something else.
+/// What chance makes of so few samples is no misfit.
 bool explains_a_channel(const MeasuredDiscovery& out) {
   constexpr double kRest = 0.1, kNone = 0.2;  // of the misfit; a misfit of less is none
   bool any = false;
+  const auto explained = [&](int n, double before, double after) {
+    const double none = std::max(kNone, 3 * std::sqrt(2.0 / std::max(1, n)));
+    if (before - 1 < none) return false;
+    any = true;
+    return after - 1 < std::max(kRest * (before - 1), none);
+  };
   for (const auto& m : out.misfit)
-    for (const auto& [before, after] :
-         {std::pair(m.before_train, m.after_train), std::pair(m.before_test, m.after_test)}) {
-      if (before - 1 < kNone) continue;
-      any = true;
-      if (after - 1 < std::max(kRest * (before - 1), kNone)) return true;
-    }
+    if (explained(m.n - m.n_test, m.before_train, m.after_train) ||
+        explained(m.n_test, m.before_test, m.after_test))
+      return true;
   return !any;
 }
 
@@ -118,7 +122,7 @@ void take_fits(const GroupedProblem& problem, const EffectSearch& search, Measur
   for (std::size_t k = 0; k < a.size(); ++k)
     if (a[k].n + b[k].n > 0)
       out.misfit.push_back({a[k].channel, a[k].n + b[k].n, a[k].chi2_per_sample(), b[k].chi2_per_sample(),
-                            c[k].chi2_per_sample(), d[k].chi2_per_sample()});
+                            c[k].chi2_per_sample(), d[k].chi2_per_sample(), b[k].n});
 }
 
 /// Names that explain no channel, or less than they leave, are taken back.

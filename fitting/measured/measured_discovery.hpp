@@ -27,6 +27,7 @@ struct MeasuredMisfit {
   std::string channel;                                                ///< which
   int n{};                                                            ///< measurements
   double before_train{}, before_test{}, after_train{}, after_test{};  ///< χ² per sample
+  int n_test{};                                                       ///< of n, held out
 };
 
 /// Something else that the log says about an answer.

@@ -181,6 +181,38 @@ INSTANTIATE_TEST_SUITE_P(Flights, EveryFlightEffect, testing::ValuesIn(cases()),
 
 // Five held-out flights, which spin about different axes: an inertia that is off by 6 % takes most of the
 // misfit of each away, and from one ten times what it takes from another.
+TEST(FlightDiscovery, FiveHeldOutFlightsOfNoiseDoNotHideWhatTheyShow) {
+  // Ten sigma of a spin damping in twenty flights; five of them show it with four or five.
+  SpatialTruth truth;
+  truth.spin_damping = 0.02;
+  SpatialDesign design;
+  design.flights = 25;
+  int found_it = 0;
+  for (unsigned seed = 701; seed < 709; ++seed) {
+    const auto found = found_in(spatial_flights(truth, design, seed));
+    if (found.effects.empty()) continue;
+    EXPECT_EQ(found.effects.size(), 1U);
+    expect_value(found, "flight.spin_damping", "c[body]", 0.02);
+    ++found_it;
+  }
+  EXPECT_GE(found_it, 6);
+}
+
+TEST(FlightDiscovery, ADragThatPushesAlongADiagonalIsSaidToBeNone) {
+  // A harmonic of the drag without a drag to shape: what is listed has that form, air does not.
+  const auto speaks = [](double drag) {
+    SpatialTruth truth;
+    truth.cubic_drag = 0.15;
+    truth.drag = drag;
+    const auto found = found_in(spatial_flights(truth, {}, 5));
+    expect_value(found, "flight.cubic_drag", "kappa[body]", 0.15);
+    return std::any_of(found.evidence.begin(), found.evidence.end(),
+                       [](const Evidence& e) { return e.about == "flight.cubic_drag" && e.against; });
+  };
+  EXPECT_TRUE(speaks(0));
+  EXPECT_FALSE(speaks(0.1));
+}
+
 TEST(FlightDiscovery, FlightsThatShowAnEffectUnequallyDoNotHideIt) {
   SpatialTruth truth;
   truth.inertia = {1, 1.06, 1};
