@@ -6,7 +6,9 @@
 #include <cmath>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
+#include "dynamics/third_difference.hpp"
 #include "flight/quaternion.hpp"
 #include "flight/spatial_effects.hpp"
 
@@ -73,11 +75,11 @@ BeforeFall before_fall(const datasets::ImuLog& imu, std::size_t first, double g)
   return out;
 }
 
-/// Third differences of a smooth series keep 20 σ².
+/// 1 σ of white noise on a smooth series, from its third differences.
 double scatter_of(const std::vector<Vec3<double>>& x, std::size_t axis) {
   double sum = 0;
   for (std::size_t i = 3; i < x.size(); ++i)
-    sum += std::pow(x[i][axis] - 3 * x[i - 1][axis] + 3 * x[i - 2][axis] - x[i - 3][axis], 2) / 20;
+    sum += dynamics::third_difference_variance(x[i - 3][axis], x[i - 2][axis], x[i - 1][axis], x[i][axis]);
   return std::sqrt(sum / static_cast<double>(x.size() - 3));
 }
 
