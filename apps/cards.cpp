@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "contact/gripper_delay.hpp"
+#include "contact/patch.hpp"
 #include "fitting/measured/measured_card.hpp"
 
 namespace unhand::apps {
@@ -100,7 +101,7 @@ UsableCard read_usable_card(const fs::path& file) {
                         : contact::DelayDistribution::number(delay);
   } else {
     p.mu = reader.take("mu", "-", 0, 10);
-    p.length = reader.take("length", "m", 1e-9, 2.0 / 3.0);
+    p.length = reader.take("length", "m", 1e-9, contact::kUniformDisc);
     const double pads = reader.take_or("pads", "-", 1, 1000, 2);
     if (pads != std::floor(pads))
       reader.fail("/parameters/pads/value", fmt::format("{} is not a whole number", pads));

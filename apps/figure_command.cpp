@@ -62,9 +62,9 @@ std::vector<ReleaseTrace> traces_of(const Source& source, const FigureCommandOpt
     const auto result = release::simulate_release(problem, simulate);
     if (result.outcome != release::ReleaseOutcome::detached)
       throw Unanswered(fmt::format("{}, throw {}: {}", model, one.id, to_string(result.outcome)));
-    constexpr double kUniform = 2.0 / 3.0;
     out.push_back(
-        trace_of(problem, result, {parameters.mu, parameters.length / kUniform, kUniform, parameters.pads}));
+        trace_of(problem, result,
+                 contact::Patch<double>::of_length(parameters.mu, parameters.length, parameters.pads)));
   }
   return out;
 }

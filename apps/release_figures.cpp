@@ -160,7 +160,7 @@ Figure wrench_figure(const std::vector<ReleaseTrace>& traces) {
     const double angle = 0.5 * M_PI * i / kSteps;
     ellipse.rows.push_back({std::cos(angle), std::sin(angle)});
     const auto d = contact::disc_friction(std::tan(0.5 * M_PI * (kSteps - i) / kSteps * (1 - 1e-9)));
-    disc.rows.push_back({d.force, d.torque / (2.0 / 3.0)});
+    disc.rows.push_back({d.force, d.torque / contact::kUniformDisc});
   }
   figure.data.push_back(std::move(ellipse));
   figure.data.push_back(std::move(disc));

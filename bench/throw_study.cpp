@@ -109,6 +109,47 @@ Score score(const TubeProblem& problem, const Joints& qdd, double scatter, std::
 
 double distance(const NominalThrow& a, const NominalThrow& b) { return (a.state.q - b.state.q).norm(); }
 
+/// All throws that the search offers for the configurations, not the best alone.
+void all_throws(const Chain& arm) {
+  double zero = 0, tube = 0, refined = 0;
+  int count = 0, infeasible = 0;
+  for (const auto& c : configurations) {
+    if (c.which == 1) continue;
+    const TargetBox box{c.box, 0.15, 0.15};
+    for (const auto& one : find_throws(arm, box, options(c.planar).search)) {
+      const TubeProblem problem{arm, one.state, c.box, 0.1};
+      const auto solved = solve_tube(problem);
+      if (solved.outcome != TubeOutcome::solved) {
+        ++infeasible;
+        continue;
+      }
+      ++count;
+      zero += score(problem, Joints::Zero(7), 0, 1).std;
+      tube += score(problem, solved.qdd, 0, 1).std;
+      refined += score(problem, refine_tube(problem, solved.qdd), 0, 1).std;
+    }
+  }
+  fmt::print(
+      "all {} throws offered ({} more have no tube acceleration): refined {:.2f} cm ({:.0f} % less), "
+      "Tube-CVX {:.2f} cm ({:.0f} % less), none {:.2f} cm\n",
+      count, infeasible, 100 * refined / count, 100 * (1 - refined / zero), 100 * tube / count,
+      100 * (1 - tube / zero), 100 * zero / count);
+}
+
+/// Takes another of the throws: the best one far from it in joint space.
+void take_another(const Chain& arm, const TargetBox& box, const NominalOptions& search, ThrowPlan& plan) {
+  for (const auto& other : find_throws(arm, box, search)) {
+    if (distance(plan.nominal, other) < 1.5) continue;
+    const TubeProblem problem{arm, other.state, box.middle, search.window};
+    const auto tube = solve_tube(problem);
+    if (tube.outcome != TubeOutcome::solved) continue;
+    plan.nominal = other;
+    plan.tube = tube;
+    plan.qdd = refine_tube(problem, tube.qdd);
+    return;
+  }
+}
+
 void boxes() {
   const Chain arm = pads();
   fmt::print(
@@ -126,19 +167,7 @@ void boxes() {
     const TargetBox box{c.box, 0.15, 0.15};
     NominalOptions search = how.search;
     auto result = plan_throw(arm, box, how);
-    if (c.which == 1 && result.plan) {  // another of the throws
-      const NominalThrow first = result.plan->nominal;
-      for (const auto& other : find_throws(arm, box, search)) {
-        if (distance(first, other) < 1.5) continue;
-        const TubeProblem problem{arm, other.state, c.box, search.window};
-        const auto tube = solve_tube(problem);
-        if (tube.outcome != TubeOutcome::solved) continue;
-        result.plan->nominal = other;
-        result.plan->tube = tube;
-        result.plan->qdd = refine_tube(problem, tube.qdd);
-        break;
-      }
-    }
+    if (c.which == 1 && result.plan) take_another(arm, box, search, *result.plan);
     if (!result.plan) {
       fmt::print("| {} | {} |\n", c.name, result.reason);
       continue;
@@ -164,30 +193,7 @@ void boxes() {
       "less), none {:.2f} cm\n",
       100 * sums[0], 100 * (1 - sums[0] / sums[2]), 100 * sums[1], 100 * (1 - sums[1] / sums[2]),
       100 * sums[2]);
-  // All throws that the search offers, not the best alone.
-  double zero = 0, tube = 0, refined = 0;
-  int count = 0, infeasible = 0;
-  for (const auto& c : configurations) {
-    if (c.which == 1) continue;
-    const TargetBox box{c.box, 0.15, 0.15};
-    for (const auto& one : find_throws(arm, box, options(c.planar).search)) {
-      const TubeProblem problem{arm, one.state, c.box, 0.1};
-      const auto solved = solve_tube(problem);
-      if (solved.outcome != TubeOutcome::solved) {
-        ++infeasible;
-        continue;
-      }
-      ++count;
-      zero += score(problem, Joints::Zero(7), 0, 1).std;
-      tube += score(problem, solved.qdd, 0, 1).std;
-      refined += score(problem, refine_tube(problem, solved.qdd), 0, 1).std;
-    }
-  }
-  fmt::print(
-      "all {} throws offered ({} more have no tube acceleration): refined {:.2f} cm ({:.0f} % less), "
-      "Tube-CVX {:.2f} cm ({:.0f} % less), none {:.2f} cm\n",
-      count, infeasible, 100 * refined / count, 100 * (1 - refined / zero), 100 * tube / count,
-      100 * (1 - tube / zero), 100 * zero / count);
+  all_throws(arm);
 }
 
 // ---------------------------------------------------------------- targets

@@ -5,15 +5,24 @@
 
 namespace unhand::contact {
 
+/// Torque factor c of a uniformly pressed disc [-].
+inline constexpr double kUniformDisc = 2.0 / 3.0;
+
 /// Friction limits of n pads, each pressed by f_N [N]:
 ///   f_max = n μ f_N [N],   τ_max = c a n μ f_N [N m].
 /// c is the torque factor of the pressure: 2/3 uniform, 3π/16 Hertz, 1 thin ring. [LiuBillard2025] II-A.
 template <class S>
 struct Patch {
-  S mu{};                      ///< friction coefficient, [0, 10]
-  S radius{};                  ///< a, (0, 1] m
-  S torque_factor{2.0 / 3.0};  ///< c, (0, 1]
-  int pads{2};                 ///< n >= 1
+  S mu{};                         ///< friction coefficient, [0, 10]
+  S radius{};                     ///< a, (0, 1] m
+  S torque_factor{kUniformDisc};  ///< c, (0, 1]
+  int pads{2};                    ///< n >= 1
+
+  /// The uniform disc with L = τ_max/f_max = `length` [m]. Rigid pads show a and c only as L = c a, so fits
+  /// and cards know no more of a patch; where pads give (contact.pad_compliance) a itself enters, as 3/2 L.
+  static Patch of_length(const S& mu, const S& length, int pads) {
+    return {mu, length / kUniformDisc, S(kUniformDisc), pads};
+  }
 
   /// n μ f_N [N] for f_N of one pad [N]
   S f_max(const S& normal_force) const { return static_cast<double>(pads) * mu * normal_force; }

@@ -137,6 +137,89 @@ NormalForceFit without_release(const ForceSeries& s, const NormalForceOptions& o
   return fit;
 }
 
+// What the spline follows on a stretch: the model where it explains the samples, or else the samples.
+struct Followed {
+  std::vector<double> time, value;
+  double sigma;
+  void add(double t, double f) {
+    time.push_back(t);
+    value.push_back(f);
+  }
+};
+constexpr double kModelSigma = 0.02;  // of the model's values, by that of a sample
+
+Followed follow_grip(const ForceSeries& s, const Opening& o) {
+  Followed out{{}, {}, s.sigma};
+  const double begin = s.time.front(), start = o.ramp.start;
+  if (o.straight_grip) {
+    out.sigma *= kModelSigma;
+    for (int k = 0; k < 8; ++k) {
+      const double t = begin + (start - begin) * k / 8.0;
+      out.add(t, o.ramp.grip + o.ramp.slope * (t - start));
+    }
+  } else {
+    for (std::size_t k = 0; k < s.size() && s.time[k] < start; ++k) out.add(s.time[k], s.value[k]);
+  }
+  return out;
+}
+
+// From `start` to `touch`, or with samples to the release. The sensor's bias is faded out over the ramp.
+Followed follow_ramp(const ForceSeries& s, const Opening& o, double start, double touch) {
+  Followed out{{}, {}, s.sigma};
+  const double release = o.ramp.release;
+  const auto unbiased = [&](double t, double f) {
+    return f - o.ramp.tail * std::clamp((t - o.ramp.start) / (release - o.ramp.start), 0.0, 1.0);
+  };
+  if (o.power_law) {
+    out.sigma *= kModelSigma;
+    constexpr int kPoints = 192;
+    for (int k = 0; k <= kPoints; ++k) {  // denser towards the release
+      const double x = static_cast<double>(k) / kPoints, t = start + (touch - start) * x * (2.0 - x);
+      out.add(t,
+              unbiased(t, o.ramp.tail + (o.ramp.grip - o.ramp.tail) * std::pow(o.ramp.u(t), o.ramp.shape)));
+    }
+  } else {
+    for (std::size_t k = 0; k < s.size() && s.time[k] <= release; ++k)
+      if (s.time[k] >= start) out.add(s.time[k], unbiased(s.time[k], s.value[k]));
+  }
+  return out;
+}
+
+Pieces up_to(const Polynomial& spline, double touch) {
+  Pieces out;
+  const auto& breaks = spline.breaks();
+  for (std::size_t i = 0; i + 1 < breaks.size() && breaks[i] < touch; ++i) {
+    out.breaks.push_back(breaks[i]);
+    out.pieces.push_back(spline.pieces()[i]);
+  }
+  out.breaks.push_back(touch);
+  return out;
+}
+
+// Adds the way from the last break, where the force has this value and slope, to zero at the release. Where
+// it is at zero already, the pieces end at their last kink. Returns where the force ends.
+double land(Pieces& p, double value, double first, double release, double shape) {
+  const double touch = p.breaks.back();
+  if (value > 0.0) {
+    const double h = release - touch, y = value, secant = -y / h;
+    const double slope = std::clamp(first, 3.0 * secant, 0.0);
+    if (slope != first) p.kinks.push_back(touch);
+    // the end's slope takes the cubic through u^p half way
+    const double middle = y * std::pow(0.5, shape);
+    const double slope_end = std::clamp(slope + (4.0 * y - 8.0 * middle) / h, 3.0 * secant, 0.0);
+    p.pieces.push_back(landing(h, y, slope, slope_end));
+    p.breaks.push_back(release);
+    return release;
+  }
+  const double end = p.kinks.empty() ? p.breaks.front() : *std::max_element(p.kinks.begin(), p.kinks.end());
+  while (p.breaks.size() > 2 && p.breaks[p.breaks.size() - 2] >= end) {
+    p.breaks.pop_back();
+    p.pieces.pop_back();
+  }
+  p.breaks.back() = end;
+  return end;
+}
+
 NormalForceFit with_release(const ForceSeries& s, Opening o, const NormalForceOptions& options) {
   // A spline needs samples; a stretch with hardly any is left to the model.
   constexpr std::size_t kFewest = 8;
@@ -148,89 +231,29 @@ NormalForceFit with_release(const ForceSeries& s, Opening o, const NormalForceOp
   // A start before the log, or right at its ends, is not a kink of this series.
   const bool starts = o.ramp.start > begin + 2.0 * tick;
   const double start = starts ? o.ramp.start : begin;
-  const auto unbiased = [&](double t, double f) {
-    return f - o.ramp.tail * std::clamp((t - o.ramp.start) / (release - o.ramp.start), 0.0, 1.0);
-  };
   // From `touch` on the force is below the noise and lands on zero by itself.
   const double height = std::max(o.ramp.grip - o.ramp.tail, 10.0 * s.sigma);
   double least = std::pow(std::min(0.3, std::max(0.01, s.sigma / height)), 1.0 / o.ramp.shape);
   least = std::clamp(least, 1e-3, 0.5);
   const double touch = release - least * (release - std::max(start, o.ramp.start));
 
-  // What the pieces follow: the model where it explains the samples, or else the samples.
-  std::vector<double> t_grip, f_grip, t_ramp, f_ramp;
-  const auto grid = [&](double from, double to, auto&& place) {
-    constexpr int kPoints = 192;
-    for (int k = 0; k <= kPoints; ++k)
-      place(from + (to - from) * k / kPoints, static_cast<double>(k) / kPoints);
-  };
-  double sigma_grip = s.sigma, sigma_ramp = s.sigma;
-  if (starts && o.straight_grip) {
-    sigma_grip *= 0.02;
-    for (int k = 0; k < 8; ++k) {
-      t_grip.push_back(begin + (start - begin) * k / 8.0);
-      f_grip.push_back(o.ramp.grip + o.ramp.slope * (t_grip.back() - start));
-    }
-  } else if (starts) {
-    for (std::size_t k = 0; k < s.size() && s.time[k] < start; ++k) {
-      t_grip.push_back(s.time[k]);
-      f_grip.push_back(s.value[k]);
-    }
-  }
-  if (o.power_law) {
-    sigma_ramp *= 0.02;
-    grid(0.0, 1.0, [&](double, double x) {  // denser towards the release
-      const double t = start + (touch - start) * x * (2.0 - x);
-      t_ramp.push_back(t);
-      f_ramp.push_back(
-          unbiased(t, o.ramp.tail + (o.ramp.grip - o.ramp.tail) * std::pow(o.ramp.u(t), o.ramp.shape)));
-    });
-  } else {
-    for (std::size_t k = 0; k < s.size() && s.time[k] <= release; ++k)
-      if (s.time[k] >= start) {
-        t_ramp.push_back(s.time[k]);
-        f_ramp.push_back(unbiased(s.time[k], s.value[k]));
-      }
-  }
+  const Followed grip = starts ? follow_grip(s, o) : Followed{};
+  const Followed ramp = follow_ramp(s, o, start, touch);
   dynamics::SplineProblem<1, 5> problem;
   problem.begin = begin;
   problem.end = o.power_law ? touch : release;
   if (starts) problem.breaks = {{start, 0}};
-  if (starts) problem.observations.push_back({0, t_grip, f_grip, {sigma_grip}});
-  problem.observations.push_back({0, t_ramp, f_ramp, {sigma_ramp}});
+  if (starts) problem.observations.push_back({0, grip.time, grip.value, {grip.sigma}});
+  problem.observations.push_back({0, ramp.time, ramp.value, {ramp.sigma}});
   if (!o.power_law) problem.end_value = {0.0};
   const auto spline = dynamics::fit_spline(problem, spline_options(options));
 
   // Up to `touch` the spline; then the landing, from its value and slope to zero.
-  const Window before{-kInfinity, touch};
-  const auto state = spline.polynomial.at(before, touch);
-  Pieces p;
-  const auto& breaks = spline.polynomial.breaks();
-  for (std::size_t i = 0; i + 1 < breaks.size() && breaks[i] < touch; ++i) {
-    p.breaks.push_back(breaks[i]);
-    p.pieces.push_back(spline.polynomial.pieces()[i]);
-  }
-  p.breaks.push_back(touch);
+  Pieces p = up_to(spline.polynomial, touch);
   p.kinks = sign_changes(spline.polynomial, begin, touch);
   if (starts) p.kinks.push_back(start);
-  double end = release;
-  if (state.value[0] > 0.0) {
-    const double h = release - touch, y = state.value[0], secant = -y / h;
-    const double slope = std::clamp(state.first[0], 3.0 * secant, 0.0);
-    if (slope != state.first[0]) p.kinks.push_back(touch);
-    // the end's slope takes the cubic through u^p half way
-    const double middle = y * std::pow(0.5, o.ramp.shape);
-    const double slope_end = std::clamp(slope + (4.0 * y - 8.0 * middle) / h, 3.0 * secant, 0.0);
-    p.pieces.push_back(landing(h, y, slope, slope_end));
-    p.breaks.push_back(release);
-  } else {  // the samples' spline is at zero already: from its last crossing on
-    end = p.kinks.empty() ? begin : *std::max_element(p.kinks.begin(), p.kinks.end());
-    while (p.breaks.size() > 2 && p.breaks[p.breaks.size() - 2] >= end) {
-      p.breaks.pop_back();
-      p.pieces.pop_back();
-    }
-    p.breaks.back() = end;
-  }
+  const auto state = spline.polynomial.at(Window{-kInfinity, touch}, touch);
+  const double end = land(p, state.value[0], state.first[0], release, o.ramp.shape);
   p.kinks.push_back(end);
   NormalForceFit fit{assemble(s, std::move(p), end), {}};
   fit.summary.power_law = o.power_law;

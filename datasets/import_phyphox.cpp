@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "datasets/csv.hpp"
+#include "dynamics/third_difference.hpp"
 
 namespace unhand::datasets {
 namespace {
@@ -137,7 +138,7 @@ std::string fault_of(const ImuLog& imu, const Stretch& stretch, const PhyphoxOpt
   return {};
 }
 
-/// The independent noise of each axis: third differences of a smooth series keep 20 σ² (1 + 9 + 9 + 1).
+/// The independent noise of each axis, from third differences.
 std::vector<double> estimate_sigma(const Series& values, const std::vector<Stretch>& falls) {
   std::vector<double> out;
   for (std::size_t j = 0; j < values.cols; ++j) {
@@ -145,8 +146,8 @@ std::vector<double> estimate_sigma(const Series& values, const std::vector<Stret
     std::size_t n = 0;
     for (const Stretch& fall : falls)
       for (std::size_t i = fall.first + 3; i <= fall.last; ++i, ++n)
-        sum +=
-            std::pow(values(i, j) - 3 * values(i - 1, j) + 3 * values(i - 2, j) - values(i - 3, j), 2) / 20;
+        sum += dynamics::third_difference_variance(values(i - 3, j), values(i - 2, j), values(i - 1, j),
+                                                   values(i, j));
     if (n < 8) return {};
     out.push_back(std::sqrt(sum / static_cast<double>(n)));
   }

@@ -160,11 +160,13 @@ MatrixXd least_squares(const MatrixXd& A, const MatrixXd& B) {
   return columns.solved(columns.turned_back(B));
 }
 
-MatrixXd inverse_gram(const MatrixXd& A) {
+LeastSquares least_squares_with_covariance(const MatrixXd& A, const MatrixXd& B) {
   const PivotedColumns columns(A, units_of_columns(A));
-  if (columns.qr.rank() < A.cols()) return MatrixXd();
+  LeastSquares out{columns.solved(columns.turned_back(B)), MatrixXd()};
+  if (columns.qr.rank() < A.cols()) return out;
   const MatrixXd root = columns.solved(MatrixXd::Identity(A.cols(), A.cols()));
-  return product(root, root.transpose());
+  out.covariance = product(root, root.transpose());
+  return out;
 }
 
 MatrixXd orthonormal_basis(const MatrixXd& A) {

@@ -58,8 +58,13 @@ SingularVectors singular_vectors(const Eigen::MatrixXd& A, const Eigen::VectorXd
 /// depends on others to 1e-10 gets zero.
 Eigen::MatrixXd least_squares(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
 
-/// (AᵀA)⁻¹ without squaring the condition number; empty where columns depend on others (by the same measure).
-Eigen::MatrixXd inverse_gram(const Eigen::MatrixXd& A);
+/// The same X and, without squaring the condition number, its covariance where B has unit noise.
+struct LeastSquares {
+  Eigen::MatrixXd solution;    ///< X
+  Eigen::MatrixXd covariance;  ///< (AᵀA)⁻¹; empty where columns depend on others (by the same measure)
+};
+/// Both from one decomposition of A, which has columns.
+LeastSquares least_squares_with_covariance(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
 
 /// An orthonormal basis of the span of A's columns, of as many columns as A has rank (by the same measure).
 Eigen::MatrixXd orthonormal_basis(const Eigen::MatrixXd& A);

@@ -5,6 +5,9 @@
 // the effect and how its parameters enter that struct. docs/adding-an-effect.md is the recipe.
 #pragma once
 
+#include <array>
+#include <map>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -30,6 +33,15 @@ struct EffectParameter {
   bool is_shape() const { return !grid.empty(); }
 };
 
+/// Of an effect that is the traceless anisotropy of another one's parameter q ≥ 0: along body axis d that is
+///   q_d = q + Σ_j w_jd p_j,
+/// p_j the effect's own parameters. Nature has no q_d < 0, so there is no such effect where q is zero.
+struct Anisotropy {
+  std::string of;                                        ///< the other effect: "flight.quadratic_drag"
+  std::string parameter;                                 ///< q: "k"
+  std::map<std::string, std::array<double, 3>> weights;  ///< w_j by the name of p_j [-]
+};
+
 /// The descriptor of one effect: what it is called, what it models, and which parameters it has.
 struct Effect {
   std::string id;                           ///< "contact.stribeck"
@@ -41,6 +53,7 @@ struct Effect {
   /// In flight: the term of fitting/discovery/missing_force.cpp that is the acceleration this effect seems to
   /// be. Empty: none is.
   std::string form{};
+  std::optional<Anisotropy> anisotropy{};  ///< none: the effect stands alone
   /// "id.name"
   std::string full_name(const EffectParameter& parameter) const { return id + "." + parameter.name; }
 };

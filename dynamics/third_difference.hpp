@@ -16,4 +16,11 @@ inline std::array<double, 4> third_difference_weights(const std::array<double, 4
   return out;
 }
 
+/// σ² that four evenly spaced samples of a smooth motion show: of noise alone, the square of their third
+/// difference has the mean (1 + 9 + 9 + 1) σ².
+inline double third_difference_variance(double x0, double x1, double x2, double x3) {
+  const double difference = x3 - 3 * x2 + 3 * x1 - x0;
+  return difference * difference / 20;
+}
+
 }  // namespace unhand::dynamics

@@ -92,21 +92,20 @@ FlightSamples read_flight_samples(const datasets::ThrowLog& log, const datasets:
 
 FlightScatter scatter_of(const FlightSamples& s) {
   FlightScatter out;
-  const auto third = [](double a, double b, double c, double d) {
-    return std::pow(d - 3 * c + 3 * b - a, 2) / 20;
-  };
   std::vector<flight::Vec3<double>> turns;  // between neighbours: their second differences are third ones
   for (std::size_t i = 1; i < s.attitude.size(); ++i)
     turns.push_back(flight::rotation_between(s.attitude[i - 1], s.attitude[i]));
   for (std::size_t i = 3; i < s.position.size(); ++i) {
     ++out.n;
     for (std::size_t a = 0; a < 3; ++a) {
-      out.position[a] +=
-          third(s.position[i - 3][a], s.position[i - 2][a], s.position[i - 1][a], s.position[i][a]);
+      out.position[a] += dynamics::third_difference_variance(s.position[i - 3][a], s.position[i - 2][a],
+                                                             s.position[i - 1][a], s.position[i][a]);
       if (i < s.attitude.size())
         out.angle += std::pow(turns[i - 1][a] - 2 * turns[i - 2][a] + turns[i - 3][a], 2) / 60;
     }
-    if (i < s.theta.size()) out.angle += third(s.theta[i - 3], s.theta[i - 2], s.theta[i - 1], s.theta[i]);
+    if (i < s.theta.size())
+      out.angle +=
+          dynamics::third_difference_variance(s.theta[i - 3], s.theta[i - 2], s.theta[i - 1], s.theta[i]);
   }
   if (out.n == 0) return out;
   for (double& x : out.position) x = std::sqrt(x / static_cast<double>(out.n));

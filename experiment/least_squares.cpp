@@ -28,9 +28,9 @@ bool gauss_newton(const std::function<void(const VectorXd&, VectorXd&, MatrixXd&
   MatrixXd J, moved_J;
   evaluate(VectorXd::Zero(unknowns), r, J);
   for (int step = 0; step < kSteps; ++step) {
-    const MatrixXd inverse = dynamics::inverse_gram(J);
-    if (inverse.cols() < J.cols()) return false;
-    const VectorXd d = dynamics::least_squares(J, -r);
+    const dynamics::LeastSquares linear = dynamics::least_squares_with_covariance(J, -r);
+    if (linear.covariance.size() == 0) return false;
+    const VectorXd d = linear.solution;
     const double cost = r.squaredNorm(), predicted = (J * d).squaredNorm();
     if (!std::isfinite(predicted)) return false;
     const double floor = static_cast<double>(r.size()) * (kSolved / sigma) * (kSolved / sigma);
@@ -51,7 +51,7 @@ bool gauss_newton(const std::function<void(const VectorXd&, VectorXd&, MatrixXd&
       }
       if (predicted > 1e-8 * cost + 1e2 * floor) return false;  // not a minimum that rounding hides
     }
-    covariance = inverse;
+    covariance = linear.covariance;
     return true;
   }
   return false;

@@ -25,9 +25,7 @@ class NoForce final : public contact::NormalForce {
 const NoForce kNoForce;
 
 contact::Patch<double> patch_of(const ModelParameters& p) {
-  contact::Patch<double> patch{p.mu, 0, 2.0 / 3.0, p.pads};
-  patch.radius = p.length / patch.torque_factor;
-  return patch;
+  return contact::Patch<double>::of_length(p.mu, p.length, p.pads);
 }
 
 const contact::NormalForce& force_of(const PreparedThrow& throw_) {

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/median.hpp"
+#include "dynamics/third_difference.hpp"
+
 namespace unhand::experiment {
 
 using datasets::Series;
@@ -20,17 +23,15 @@ Channel next(Channel first, std::size_t k) {
   return static_cast<Channel>(static_cast<int>(first) + static_cast<int>(k));
 }
 
-/// 1 σ of white noise on a smooth column, from its third differences (their variance is 20 σ²).
+/// 1 σ of white noise on a smooth column, from the median of its third differences.
 double scatter_of(const Series& series, std::size_t column) {
-  std::vector<double> d;
+  std::vector<double> variances;
   for (std::size_t i = 3; i < series.rows; ++i) {
-    const double x =
-        series(i, column) - 3 * series(i - 1, column) + 3 * series(i - 2, column) - series(i - 3, column);
-    if (std::isfinite(x)) d.push_back(std::abs(x));
+    const double variance = dynamics::third_difference_variance(series(i - 3, column), series(i - 2, column),
+                                                                series(i - 1, column), series(i, column));
+    if (std::isfinite(variance)) variances.push_back(variance);
   }
-  if (d.empty()) return 0;
-  std::nth_element(d.begin(), d.begin() + static_cast<std::ptrdiff_t>(d.size() / 2), d.end());
-  return 1.4826 * d[d.size() / 2] / std::sqrt(20.0);
+  return variances.empty() ? 0 : 1.4826 * std::sqrt(dynamics::median(variances));
 }
 
 double sigma_of(const Series& series, std::size_t column, double least) {

@@ -75,6 +75,111 @@ void measure_flight(const datasets::ThrowLog& log, const datasets::Throw& logged
   out.measured.detach_twist = twist;
 }
 
+/// The log, one of its throws, and how to refuse it.
+struct Source {
+  const datasets::ThrowLog& log;
+  const datasets::Throw& logged;
+  const std::string& file;
+  std::string path() const { return "/throws/" + logged.id; }
+  [[noreturn]] void reject(const std::string& where, const std::string& why) const {
+    throw LogError(file, where, why);
+  }
+};
+
+release::HandFit fitted_hand(const Source& source) {
+  const datasets::HandLog& hand = *source.logged.hand;
+  try {
+    return release::fit_hand_motion({hand.time.data, hand.pose.data, hand.twist.data, hand.acceleration.data,
+                                     sigma_of(hand.pose), sigma_of(hand.twist), sigma_of(hand.acceleration)},
+                                    source.logged.hand_jump_times);
+  } catch (const std::invalid_argument& error) {
+    source.reject(source.path() + "/hand", error.what());
+  }
+}
+
+void smooth_force(const Source& source, PreparedThrow& out) {
+  if (!source.logged.ft) return;
+  const auto& series = source.logged.ft->normal_force;
+  try {
+    auto force = contact::smooth_normal_force(source.logged.ft->time.data, series.data,
+                                              series.sigma.empty() ? 0.0 : series.sigma.front());
+    out.normal_force = std::move(force.force);
+    out.force_fit = force.summary;
+  } catch (const std::invalid_argument& error) {
+    source.reject(source.path() + "/ft/normal_force", error.what());
+  }
+}
+
+/// When the gripper is told to open [s]: declared, seen in the smoothed normal force, or else at detach.
+double opening_command(const Source& source, const PreparedThrow& prepared) {
+  const auto& gripper = source.log.gripper;
+  if (gripper && gripper->opening_command_time) return *gripper->opening_command_time;
+  if (std::isfinite(prepared.force_fit.opening_start) && prepared.normal_force)
+    return prepared.force_fit.opening_start;
+  if (!source.logged.detach_time)
+    source.reject(
+        "/gripper@opening_command_time",
+        "missing, and " + source.path() + " has neither a normal force that opens nor a detach_time");
+  return *source.logged.detach_time;
+}
+
+/// The grasp: as declared, or the mean that motion capture saw while the object was held.
+release::Grasp<double> grasp_of(const Source& source, const PreparedThrow& prepared) {
+  double angle = 0, offset_x = 0;
+  int seen = 0;
+  if (source.logged.mocap) {
+    const datasets::MocapLog& mocap = *source.logged.mocap;
+    const release::HandMotion& hand = prepared.hand;
+    const Window whole{hand.begin(), hand.end()};
+    for (std::size_t i = 0; i < mocap.time.rows; ++i) {
+      const double t = mocap.time(i);
+      if (!mocap.is_valid(i) || t < hand.begin() || t >= prepared.open_command || t > hand.end()) continue;
+      const auto pose = hand.at(whole, t).pose;
+      const dynamics::Vec2<double> r{mocap.pose(i, 0) - pose.x, mocap.pose(i, 1) - pose.z};
+      angle += mocap.pose(i, 2) - pose.theta;
+      offset_x += dynamics::rotate(-mocap.pose(i, 2), r).x;
+      ++seen;
+    }
+  }
+  release::Grasp<double> out;
+  if (seen > 0)
+    out.angle = angle / seen;
+  else if (source.logged.grasp_angle)
+    out.angle = *source.logged.grasp_angle;
+  else
+    source.reject(source.path() + "@grasp_angle", "missing, and no motion capture before the gripper opens");
+  if (const auto& declared = source.log.objects.at(source.logged.object).com_offset)
+    out.com_offset = *declared;
+  else if (seen > 0)
+    out.com_offset = offset_x / seen;
+  else
+    source.reject("/objects/" + source.logged.object + "@com_offset",
+                  "missing, and no motion capture before the gripper opens");
+  return out;
+}
+
+/// Detach, flight and landing as measured.
+void measure_outcome(const Source& source, PreparedThrow& out) {
+  const datasets::Throw& logged = source.logged;
+  double flight_from = 0;
+  if (out.normal_force && std::isfinite(out.normal_force->release_time())) {
+    out.measured.detach_time = out.normal_force->release_time();
+    flight_from = *out.measured.detach_time;
+    const double quiet = 3 * out.force_fit.sigma;
+    const auto& ft = *logged.ft;
+    for (std::size_t i = ft.time.rows; i-- > 0 && ft.normal_force(i) - out.force_fit.tail_mean < quiet;)
+      if (ft.time(i) >= out.open_command) flight_from = std::max(*out.measured.detach_time, ft.time(i));
+  } else if (logged.detach_time) {
+    out.measured.detach_time = flight_from = *logged.detach_time;
+  }
+  if (logged.mocap && out.measured.detach_time)
+    measure_flight(source.log, logged, flight_from, *out.measured.detach_time, out);
+  if (logged.landing) {
+    out.measured.landing_x = logged.landing->pose(0, 0);
+    out.measured.landing_theta = logged.landing->pose(0, 1);
+  }
+}
+
 }  // namespace
 
 double first_below_landing(const datasets::ThrowLog& log, const datasets::MocapLog& mocap, double opening) {
@@ -99,28 +204,13 @@ bool shows_grasp(const datasets::ThrowLog& log, const datasets::Throw& logged) {
 }
 
 PreparedThrow prepare(const datasets::ThrowLog& log, const datasets::Throw& logged, const std::string& file) {
-  const std::string path = "/throws/" + logged.id;
-  const auto reject = [&](const std::string& where, const std::string& why) {
-    throw LogError(file, path + where, why);
-  };
-  if (log.dimension != 2) throw LogError(file, "/@dimension", "a release needs a planar log (dimension 2)");
-  if (!logged.hand) reject("/hand", "missing: a release needs the hand's motion");
+  const Source source{log, logged, file};
+  if (log.dimension != 2) source.reject("/@dimension", "a release needs a planar log (dimension 2)");
+  if (!logged.hand) source.reject(source.path() + "/hand", "missing: a release needs the hand's motion");
   const datasets::Object& object = log.objects.at(logged.object);
   if (!object.inertia)
-    throw LogError(file, "/objects/" + logged.object + "@inertia",
-                   "missing: a release needs the moment of inertia");
-
-  const datasets::HandLog& hand = *logged.hand;
-  release::HandFit fit = [&] {
-    try {
-      return release::fit_hand_motion(
-          {hand.time.data, hand.pose.data, hand.twist.data, hand.acceleration.data, sigma_of(hand.pose),
-           sigma_of(hand.twist), sigma_of(hand.acceleration)},
-          logged.hand_jump_times);
-    } catch (const std::invalid_argument& error) {
-      throw LogError(file, path + "/hand", error.what());
-    }
-  }();
+    source.reject("/objects/" + logged.object + "@inertia", "missing: a release needs the moment of inertia");
+  release::HandFit fit = fitted_hand(source);
   PreparedThrow out{logged.id,
                     logged.object,
                     logged.condition,
@@ -138,77 +228,10 @@ PreparedThrow prepare(const datasets::ThrowLog& log, const datasets::Throw& logg
                     0,
                     {}};
   out.start = out.hand.begin();
-
-  if (logged.ft) {
-    const auto& series = logged.ft->normal_force;
-    try {
-      auto force = contact::smooth_normal_force(logged.ft->time.data, series.data,
-                                                series.sigma.empty() ? 0.0 : series.sigma.front());
-      out.normal_force = std::move(force.force);
-      out.force_fit = force.summary;
-    } catch (const std::invalid_argument& error) {
-      reject("/ft/normal_force", error.what());
-    }
-  }
-
-  if (log.gripper && log.gripper->opening_command_time)
-    out.open_command = *log.gripper->opening_command_time;
-  else if (std::isfinite(out.force_fit.opening_start) && out.normal_force)
-    out.open_command = out.force_fit.opening_start;
-  else if (!logged.detach_time)
-    throw LogError(file, "/gripper@opening_command_time",
-                   "missing, and " + path + " has neither a normal force that opens nor a detach_time");
-  else
-    out.open_command = *logged.detach_time;
-
-  // The grasp: what motion capture saw while the object was held.
-  double angle = 0, offset_x = 0;
-  int seen = 0;
-  if (logged.mocap) {
-    const Window whole{out.hand.begin(), out.hand.end()};
-    for (std::size_t i = 0; i < logged.mocap->time.rows; ++i) {
-      const double t = logged.mocap->time(i);
-      if (!logged.mocap->is_valid(i) || t < out.hand.begin() || t >= out.open_command || t > out.hand.end())
-        continue;
-      const auto pose = out.hand.at(whole, t).pose;
-      const dynamics::Vec2<double> r{logged.mocap->pose(i, 0) - pose.x, logged.mocap->pose(i, 1) - pose.z};
-      angle += logged.mocap->pose(i, 2) - pose.theta;
-      offset_x += dynamics::rotate(-logged.mocap->pose(i, 2), r).x;
-      ++seen;
-    }
-  }
-  if (seen > 0)
-    out.grasp.angle = angle / seen;
-  else if (logged.grasp_angle)
-    out.grasp.angle = *logged.grasp_angle;
-  else
-    reject("@grasp_angle", "missing, and no motion capture before the gripper opens");
-  if (object.com_offset)
-    out.grasp.com_offset = *object.com_offset;
-  else if (seen > 0)
-    out.grasp.com_offset = offset_x / seen;
-  else
-    throw LogError(file, "/objects/" + logged.object + "@com_offset",
-                   "missing, and no motion capture before the gripper opens");
-
-  // The outcome.
-  double flight_from = 0;
-  if (out.normal_force && std::isfinite(out.normal_force->release_time())) {
-    out.measured.detach_time = out.normal_force->release_time();
-    flight_from = *out.measured.detach_time;
-    const double quiet = 3 * out.force_fit.sigma;
-    const auto& ft = *logged.ft;
-    for (std::size_t i = ft.time.rows; i-- > 0 && ft.normal_force(i) - out.force_fit.tail_mean < quiet;)
-      if (ft.time(i) >= out.open_command) flight_from = std::max(*out.measured.detach_time, ft.time(i));
-  } else if (logged.detach_time) {
-    out.measured.detach_time = flight_from = *logged.detach_time;
-  }
-  if (logged.mocap && out.measured.detach_time)
-    measure_flight(log, logged, flight_from, *out.measured.detach_time, out);
-  if (logged.landing) {
-    out.measured.landing_x = logged.landing->pose(0, 0);
-    out.measured.landing_theta = logged.landing->pose(0, 1);
-  }
+  smooth_force(source, out);
+  out.open_command = opening_command(source, out);
+  out.grasp = grasp_of(source, out);
+  measure_outcome(source, out);
   return out;
 }
 

@@ -152,6 +152,21 @@ void validate(const CampaignDesign& design) {
             "campaign {}: {} needs a named contact model, not a contact_factory", design.name, name));
 }
 
+/// Why a throw cannot be made, with what was drawn for it.
+std::runtime_error failure(const CampaignDesign& design, std::uint64_t seed, const SyntheticThrow& made,
+                           const std::string& why) {
+  const auto& [record, truth] = made;
+  const auto& [m, o, p] = std::tie(truth.motion, truth.opening, truth.patch);
+  return std::runtime_error(fmt::format(
+      "campaign {}, seed {}, throw {} ({}, repetition {}): {}; hand at the switch ({:.4g} m, {:.4g} m, "
+      "{:.4g} rad) at ({:.4g} m/s, {:.4g} m/s, {:.4g} rad/s), release acceleration {:.4g} m/s², grasp angle "
+      "{:.4g} rad, mu {:.4g}, pad radius {:.4g} m, grip force {:.4g} N, dead time {:.4g} s, opening time "
+      "{:.4g} s",
+      design.name, seed, record.id, record.condition, record.repetition, why, m.pose.x, m.pose.z,
+      m.pose.theta, m.twist.vx, m.twist.vz, m.twist.omega, m.after, truth.grasp_angle, p.mu, p.radius,
+      o.grip_force, o.dead_time, o.opening_time));
+}
+
 SyntheticThrow make_throw(const CampaignDesign& design, const std::vector<bool>& training, std::uint64_t seed,
                           int index) {
   const Cell cell = cell_of(design, index);
@@ -167,19 +182,7 @@ SyntheticThrow make_throw(const CampaignDesign& design, const std::vector<bool>&
   record.repetition = cell.repetition + 1;
   record.split = training[cell.condition] ? datasets::Split::train : datasets::Split::test;
 
-  const auto fail = [&](const std::string& why) -> std::runtime_error {
-    const auto& [m, o, p] = std::tie(truth.motion, truth.opening, truth.patch);
-    return std::runtime_error(
-        fmt::format("campaign {}, seed {}, throw {} ({}, repetition {}): {}; hand at the switch ({:.4g} m, "
-                    "{:.4g} m, {:.4g} rad) at "
-                    "({:.4g} m/s, {:.4g} m/s, {:.4g} rad/s), release acceleration {:.4g} m/s², grasp angle "
-                    "{:.4g} rad, mu {:.4g}, pad "
-                    "radius {:.4g} m, grip force {:.4g} N, dead time {:.4g} s, opening time {:.4g} s",
-                    design.name, seed, record.id, record.condition, record.repetition, why, m.pose.x,
-                    m.pose.z, m.pose.theta, m.twist.vx, m.twist.vz, m.twist.omega, m.after, truth.grasp_angle,
-                    p.mu, p.radius, o.grip_force, o.dead_time, o.opening_time));
-  };
-
+  const auto fail = [&](const std::string& why) { return failure(design, seed, made, why); };
   const ThrownObject& object = design.objects[cell.object];
   if (!design.sensors.mocap)
     record.grasp_angle = design.postures[cell.posture].grasp_angle.value_or(design.grasp_angle);

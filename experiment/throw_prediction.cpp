@@ -53,9 +53,9 @@ auto with_release(const PreparedThrow& prepared, const ThrowModel& model, const 
   const release::HandMotion& hand = lagged ? static_cast<const release::HandMotion&>(*lagged) : prepared.hand;
 
   contact::ContactParameters<Dual> parameters;
-  constexpr double kTorqueFactor = 2.0 / 3.0;  // of a uniform disc; only L = c a enters
-  parameters.patch = {Dual(values.get("mu", 0.5) * (1.0 + values.get("mu_deviation", 0))),
-                      Dual(values.get("length", 0.007) / kTorqueFactor), Dual(kTorqueFactor), model.pads};
+  parameters.patch =
+      contact::Patch<Dual>::of_length(Dual(values.get("mu", 0.5) * (1.0 + values.get("mu_deviation", 0))),
+                                      Dual(values.get("length", 0.007)), model.pads);
   parameters.open_command = prepared.open_command;
   parameters.delay = Dual(values.get("delay", 0.05) + values.get("delay_deviation", 0));
   parameters.variation = contact::constant(setup.friction);

@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "contact/patch.hpp"
 #include "dynamics/frames.hpp"
 #include "dynamics/median.hpp"
 #include "experiment/unit_rules.hpp"
@@ -212,7 +213,8 @@ void check_landing(const Held& held, SizeRatios& out) {
 /// tells what it counts for, uses up friction, too: of an ellipsoid, and within sqrt(2) of any other law.
 void check_friction(const datasets::ThrowLog& log, const datasets::FtLog& ft, double opening,
                     SizeRatios& out) {
-  const double length = 2.0 / 3.0 * (log.gripper ? log.gripper->pad_radius.value_or(HUGE_VAL) : HUGE_VAL);
+  const double length =
+      contact::kUniformDisc * (log.gripper ? log.gripper->pad_radius.value_or(HUGE_VAL) : HUGE_VAL);
   const auto& force = ft.normal_force;
   if (force.empty()) return;
   const double most = *std::max_element(force.data.begin(), force.data.end()),

@@ -10,6 +10,7 @@
 
 #include "contact/convex_quartic.hpp"
 #include "contact/gripper_delay.hpp"
+#include "contact/patch.hpp"
 #include "dynamics/median.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/compare.hpp"
@@ -21,8 +22,6 @@ using dynamics::Effect;
 using dynamics::Values;
 
 namespace {
-
-constexpr double kUniform = 2.0 / 3.0;  // torque factor of a uniform disc
 
 /// "k[jar]" read as "k" by throws of the jar, and by no other.
 std::optional<std::string> name_for(const std::string& name, const std::string& object) {
@@ -65,7 +64,8 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
       const auto guess = experiment::estimate_friction(log, prepared, options.model).parameters;
       // Declared or not, a pad's size is known to a factor of two.
       const auto radius = log.gripper ? log.gripper->pad_radius : std::nullopt;
-      const double least = radius ? 0.5 * kUniform * *radius : 2e-4, most = radius ? 4 * least : 0.1;
+      const double least = radius ? 0.5 * contact::kUniformDisc * *radius : 2e-4,
+                   most = radius ? 4 * least : 0.1;
       const bool is_patch = guess.mu > 0.02 && guess.mu < 4 && guess.length > least && guess.length < most;
       if (is_patch)
         first_guess_ = guess;
@@ -139,7 +139,7 @@ void CampaignProblem::name_unknowns(const std::vector<Effect>& effects) {
   if (follows_pads) {
     const auto radius = header_.gripper ? header_.gripper->pad_radius : std::nullopt;
     const bool guessed = first_guess_.mu != experiment::ModelParameters{}.mu;
-    const double length = guessed || !radius ? first_guess_.length : kUniform * *radius;
+    const double length = guessed || !radius ? first_guess_.length : contact::kUniformDisc * *radius;
     // Held to a fifth of what the slipping pads or the declared radius say: a fit of a model that lacks an
     // effect would otherwise run away with them.
     constexpr double kHeld = 0.2;

@@ -9,6 +9,7 @@
 #include <fstream>
 
 #include "contact/gripper_delay.hpp"
+#include "contact/patch.hpp"
 #include "experiment/campaign_effects.hpp"
 
 namespace unhand::fitting {
@@ -26,7 +27,7 @@ struct BaseParameter {
   bool of_pads;  ///< of models that follow the pads; otherwise of gripper_delay
 };
 constexpr BaseParameter kBase[] = {{"mu", "-", 0, 10, true},
-                                   {"length", "m", 1e-9, 2.0 / 3.0, true},
+                                   {"length", "m", 1e-9, contact::kUniformDisc, true},
                                    {"kappa", "-", 0, 3, true},
                                    {"pads", "-", 1, 1000, true},
                                    {"reference_force", "N", 1e-9, 1e6, true},

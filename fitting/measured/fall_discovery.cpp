@@ -6,8 +6,11 @@
 #include <cmath>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
+#include "dynamics/third_difference.hpp"
 #include "flight/quaternion.hpp"
+#include "flight/spatial_effects.hpp"
 
 namespace unhand::fitting {
 
@@ -72,11 +75,11 @@ BeforeFall before_fall(const datasets::ImuLog& imu, std::size_t first, double g)
   return out;
 }
 
-/// Third differences of a smooth series keep 20 σ².
+/// 1 σ of white noise on a smooth series, from its third differences.
 double scatter_of(const std::vector<Vec3<double>>& x, std::size_t axis) {
   double sum = 0;
   for (std::size_t i = 3; i < x.size(); ++i)
-    sum += std::pow(x[i][axis] - 3 * x[i - 1][axis] + 3 * x[i - 2][axis] - x[i - 3][axis], 2) / 20;
+    sum += dynamics::third_difference_variance(x[i - 3][axis], x[i - 2][axis], x[i - 1][axis], x[i][axis]);
   return std::sqrt(sum / static_cast<double>(x.size() - 3));
 }
 
@@ -90,20 +93,18 @@ std::vector<dynamics::Effect> known_fall_effects() {
   };
   auto settling = xyz("", "m/s^2", 50, 0.1);
   settling.push_back({"tau", "s", 0.05, 2e-3, 2, 0.02, {0.02, 0.08, 0.3}});
-  return {
-      {"sensor.accelerometer_bias", "constant bias of the accelerometer, body axes",
-       xyz("", "m/s^2", 20, 0.1)},
-      {"flight.quadratic_drag", "quadratic drag, a = -k |v| v", {{"k", "1/m", 0, 0, 10, 0.02}}, true},
-      {"flight.linear_drag", "drag in proportion to speed, a = -c v", {{"c", "1/s", 0, 0, 10, 0.02}}, true},
-      {"flight.drag_by_axis",
-       "drag depends on the body axis along which the air comes, a = -|v| A v, A = diag(a_x, a_y, -a_x - "
-       "a_y)",
-       {{"a_x", "1/m", 0, -10, 10, 0.02}, {"a_y", "1/m", 0, -10, 10, 0.02}},
-       true},
-      {"sensor.accelerometer_drift", "the bias changes during a fall", xyz("", "m/s^3", 50, 0.1)},
-      {"sensor.settling", "the sensor recovers from the time before the fall, s exp(-t/tau)", settling},
-      {"sensor.lever_arm", "the sensor is not at the CoM: w x (w x r) + dw/dt x r", xyz("", "m", 1, 0.01)},
-  };
+  std::vector<dynamics::Effect> out{{"sensor.accelerometer_bias",
+                                     "constant bias of the accelerometer, body axes",
+                                     xyz("", "m/s^2", 20, 0.1)}};
+  for (const auto& entry : flight::spatial_effects())
+    for (const char* id : {"flight.quadratic_drag", "flight.linear_drag", "flight.drag_by_axis"})
+      if (entry.effect.id == id) out.push_back(entry.effect);
+  out.push_back({"sensor.accelerometer_drift", "the bias changes during a fall", xyz("", "m/s^3", 50, 0.1)});
+  out.push_back({"sensor.settling", "the sensor recovers from the time before the fall, s exp(-t/tau)",
+                 std::move(settling)});
+  out.push_back(
+      {"sensor.lever_arm", "the sensor is not at the CoM: w x (w x r) + dw/dt x r", xyz("", "m", 1, 0.01)});
+  return out;
 }
 
 FallProblem::FallProblem(const datasets::ThrowLog& log) : gravity_(log.gravity) {

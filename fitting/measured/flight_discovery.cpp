@@ -94,7 +94,8 @@ FlightProblem::FlightProblem(const ThrowLog& log, int threads) : gravity_(log.gr
     }
     glitches_ += experiment::remove_glitches(s);
     const auto& object = log.objects.at(one.object);
-    flight.drag_k = declared_drag_[one.object] = object.drag_k.value_or(0);
+    flight.drag_k = object.drag_k.value_or(0);
+    declared_["flight.quadratic_drag.k[" + one.object + "]"] = flight.drag_k;
     if (object.inertia && object.inertia->size() == 3)
       std::copy_n(object.inertia->begin(), 3, flight.inertia.begin());
     flight.reference = fit.rotation.attitude;

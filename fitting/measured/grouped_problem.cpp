@@ -15,7 +15,10 @@ using Eigen::Index;
 
 namespace {
 
-constexpr const char *kDrag = "flight.quadratic_drag", *kDragByAxis = "flight.drag_by_axis";
+/// "id.parameter[object]"
+std::string of_object(const std::string& id, const std::string& parameter, const std::string& object) {
+  return fmt::format("{}.{}[{}]", id, parameter, object);
+}
 
 }  // namespace
 
@@ -76,36 +79,50 @@ std::vector<datasets::Split> splits_of(const datasets::ThrowLog& log) {
   return out;
 }
 
+double GroupedProblem::declared(const std::string& name) const {
+  const auto it = declared_.find(name);
+  return it == declared_.end() ? 0 : it->second;
+}
+
 bool GroupedProblem::may_act(const std::string& id, const std::vector<std::string>& others) const {
-  if (id != kDragByAxis || std::find(others.begin(), others.end(), kDrag) != others.end()) return true;
+  const auto all = effects();
+  const auto effect = std::find_if(all.begin(), all.end(), [&](const auto& e) { return e.id == id; });
+  if (effect == all.end() || !effect->anisotropy) return true;
+  const dynamics::Anisotropy& shape = *effect->anisotropy;
+  if (std::find(others.begin(), others.end(), shape.of) != others.end()) return true;
   for (const auto& object : objects_of(*this))
-    if (const auto k = declared_drag_.find(object); k == declared_drag_.end() || !(k->second > 0))
-      return false;
+    if (!(declared(of_object(shape.of, shape.parameter, object)) > 0)) return false;
   return true;
 }
 
 bool GroupedProblem::may_be(const GroupedFit& fit) const {
+  const auto objects = objects_of(*this);
+  for (const auto& effect : effects())
+    if (effect.anisotropy)
+      for (const auto& object : objects)
+        if (!may_be(fit, effect, object)) return false;
+  return true;
+}
+
+bool GroupedProblem::may_be(const GroupedFit& fit, const dynamics::Effect& effect,
+                            const std::string& object) const {
+  const dynamics::Anisotropy& shape = *effect.anisotropy;
+  const std::string whole = of_object(shape.of, shape.parameter, object);
   const auto names = fit.names();
-  for (const auto& object : objects_of(*this)) {
-    const auto k = declared_drag_.find(object);
-    const double declared = k == declared_drag_.end() ? 0 : k->second;
-    // The weights of the fitted parameters in the drag along each axis.
-    Eigen::MatrixXd along = Eigen::MatrixXd::Zero(3, fit.values.size());
-    bool by_axis = false;
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      const auto column = static_cast<Index>(i);
-      if (names[i] == fmt::format("{}.k[{}]", kDrag, object)) along.col(column).setOnes();
-      if (names[i] == fmt::format("{}.a_x[{}]", kDragByAxis, object))
-        along.col(column) = Eigen::Vector3d(1, 0, -1), by_axis = true;
-      if (names[i] == fmt::format("{}.a_y[{}]", kDragByAxis, object))
-        along.col(column) = Eigen::Vector3d(0, 1, -1), by_axis = true;
-    }
-    if (!by_axis) continue;
-    for (Index axis = 0; axis < 3; ++axis) {
-      const double drag = declared + along.row(axis).dot(fit.values),
-                   variance = along.row(axis).dot(fit.covariance * along.row(axis).transpose());
-      if (drag + 2 * std::sqrt(std::max(0.0, variance)) < 0) return false;
-    }
+  // The weights of the fitted parameters along each axis.
+  Eigen::MatrixXd along = Eigen::MatrixXd::Zero(3, fit.values.size());
+  bool is_fitted = false;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const auto column = static_cast<Index>(i);
+    if (names[i] == whole) along.col(column).setOnes();
+    for (const auto& [parameter, weights] : shape.weights)
+      if (names[i] == of_object(effect.id, parameter, object))
+        along.col(column) = Eigen::Vector3d(weights.data()), is_fitted = true;
+  }
+  for (Index axis = 0; is_fitted && axis < 3; ++axis) {
+    const double value = declared(whole) + along.row(axis).dot(fit.values),
+                 variance = along.row(axis).dot(fit.covariance * along.row(axis).transpose());
+    if (value + 2 * std::sqrt(std::max(0.0, variance)) < 0) return false;
   }
   return true;
 }

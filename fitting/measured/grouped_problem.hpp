@@ -64,18 +64,23 @@ class GroupedProblem {
                                    std::span<const double> values, const Eigen::VectorXd& own,
                                    bool derivatives) const = 0;
 
-  /// Whether an effect says anything beside `others` (ids). flight.drag_by_axis is traceless: it turns and
-  /// shapes a drag, and without one (found, or declared of every object) it would push along some axis.
+  /// Whether an effect says anything beside `others` (ids): an anisotropy does where what it shapes is among
+  /// them, or declared of every object.
   bool may_act(const std::string& id, const std::vector<std::string>& others) const;
-  /// Whether nature has such values: false where the drag along a body axis, k + a_i, is a thrust by more
-  /// than two sigmas.
+  /// Whether nature has such values: false where an anisotropy makes what it shapes (declared and found)
+  /// negative along an axis by more than two sigmas.
   bool may_be(const GroupedFit& fit) const;
 
  protected:
-  std::map<std::string, double> declared_drag_;     ///< k by object [1/m]; what is not named has none
+  std::map<std::string, double> declared_;          ///< by "id.parameter[object]"; what is not named is zero
   std::vector<Group> groups_;                       ///< filled by the problem's constructor
   std::vector<std::string> channels_, covariates_;  ///< likewise
   std::vector<std::pair<std::string, std::string>> skipped_;  ///< id and reason
+
+ private:
+  double declared(const std::string& name) const;
+  /// The same of one effect with an anisotropy, and of one object.
+  bool may_be(const GroupedFit& fit, const dynamics::Effect& effect, const std::string& object) const;
 };
 
 /// A parameter that groups share.

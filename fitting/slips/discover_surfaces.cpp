@@ -18,6 +18,7 @@ constexpr double kDegrees = 180 / std::numbers::pi;
 struct Paired {
   double n{}, sum{}, squares{};
   void add(double x) { n += 1, sum += x, squares += x * x; }
+  void add(const Paired& other) { n += other.n, sum += other.sum, squares += other.squares; }
   double mean() const { return n > 0 ? sum / n : 0; }
   double error() const {
     return n > 1 ? std::sqrt(std::max(0.0, squares - n * mean() * mean()) / (n - 1) / n) : 0;
@@ -84,6 +85,145 @@ double level_error(const SlipSamples& slips, const SlipSurface& surface) {
 
 std::string id_of(SurfaceModel model) { return "contact.law:" + to_string(model); }
 
+/// A law beside the base, over the surfaces on which both were scored.
+struct LawScore {
+  SurfaceModel model{};
+  Paired gain;  ///< by slip: how much less the law errs [deg]
+  Paired left;  ///< left_by, over slips
+  int better{}, compared{};
+  // Means over the surfaces: held-out errors, the law's own in sample and in level, what the null control
+  // gains.
+  double error{}, base_error{}, train{}, level{}, null_gain{};
+
+  SurfaceEvidence add(const SlipSamples& slips, const SurfaceScore& base, const SurfaceScore& score) {
+    const auto of_base = by_slip(slips, base.errors_deg);
+    Paired own;
+    for (const auto& [slip, by_law] : by_slip(slips, score.errors_deg)) {
+      own.add(of_base.at(slip) - by_law);
+      gain.add(of_base.at(slip) - by_law);
+    }
+    SurfaceEvidence e;
+    e.surface = slips.surface, e.law = model, e.slips = static_cast<int>(of_base.size());
+    e.base_deg = base.mean_deg, e.law_deg = score.mean_deg;
+    e.null_base_deg = base.null_control_deg, e.null_law_deg = score.null_control_deg;
+    e.gain_deg = own.mean(), e.gain_sigma = own.error();
+    const Paired left_here = left_by(slips, score.fit.surface, e.left);
+    e.left_sigma = left_here.error();
+    left.add(left_here);
+    better += score.mean_deg < base.mean_deg ? 1 : 0, ++compared;
+    error += score.mean_deg, base_error += base.mean_deg;
+    null_gain += base.null_control_deg - score.null_control_deg;
+    train += in_sample(slips, score.fit.surface);
+    level += level_error(slips, score.fit.surface);
+    return e;
+  }
+  /// Sums over surfaces become means.
+  void average() {
+    for (double* sum : {&error, &base_error, &train, &level, &null_gain}) *sum /= std::max(1, compared);
+  }
+  double delta_bic() const { return std::log(std::max(2.0, gain.n)) - gain.t() * std::abs(gain.t()); }
+  NamedErrors errors(double direction) const {
+    return {{"direction_mae_deg", direction}, {"level_mae", level}};
+  }
+};
+
+/// Every law of `models` beside the first one. Writes what was left out, and the evidence by surface.
+std::vector<LawScore> score_laws(const std::vector<SlipSamples>& surfaces,
+                                 const std::vector<SurfaceModel>& models,
+                                 const SurfaceComparisonOptions& options, SurfaceDiscovery& out) {
+  std::vector<LawScore> laws(models.size());
+  for (std::size_t k = 0; k < laws.size(); ++k) laws[k].model = models[k];
+  const auto scores = compare_surfaces(surfaces, models, options);
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    const SurfaceScore& base = scores[i].front();
+    for (const auto& score : scores[i])
+      if (!score.scored())
+        out.answer.skipped.push_back({surfaces[i].surface + ", " + to_string(score.model), score.reason});
+    if (!base.scored()) continue;
+    out.answer.test += static_cast<int>(surfaces[i].slips.size());
+    for (std::size_t k = 0; k < laws.size(); ++k)
+      if (scores[i][k].scored()) out.evidence.push_back(laws[k].add(surfaces[i], base, scores[i][k]));
+  }
+  for (LawScore& law : laws) law.average();
+  return laws;
+}
+
+/// The law that is believed, the base (the first) where none convinces. Writes the ranking.
+const LawScore& believed(const std::vector<LawScore>& laws, const SurfaceDiscoveryOptions& options,
+                         std::vector<Ranked>& ranking) {
+  const double rate = options.family_wise_level / std::max<double>(1, static_cast<double>(laws.size()) - 1);
+  const LawScore* best = &laws.front();
+  for (std::size_t k = 1; k < laws.size(); ++k) {
+    const LawScore& law = laws[k];
+    const double gain = law.base_error - law.error;
+    Ranked r{id_of(law.model), std::max(0.0, law.gain.t() * law.gain.t())};
+    r.p_value = law.gain.p(), r.refit_step = 1, r.held_out_gain = gain, r.delta_bic = law.delta_bic();
+    ranking.push_back(r);
+    const bool convinces =
+        law.gain.p() < rate && gain > options.matters * law.base_error && gain > law.null_gain;
+    // Ellipsoids come first: a richer law has to be better by a twentieth.
+    if (convinces &&
+        (best == &laws.front() || law.error / law.base_error < 0.95 * best->error / best->base_error))
+      best = &law;
+  }
+  std::sort(ranking.begin(), ranking.end(), [](const Ranked& a, const Ranked& b) { return a.gain > b.gain; });
+  for (auto& r : ranking) r.correlation_with_best = r.id == id_of(best->model) ? 1 : 0;
+  return *best;
+}
+
+/// Writes that `law` is accepted, with what speaks for it and against it.
+void accept_law(const LawScore& law, const LawScore& base, SurfaceDiscovery& out) {
+  const std::string id = id_of(law.model);
+  AcceptedEffect effect;
+  effect.id = id;
+  effect.p_value = law.gain.p();
+  effect.delta_bic = law.delta_bic();
+  effect.test_error_ratio = law.error / base.error;
+  effect.parameters.push_back({"gain", "deg", law.gain.mean(), law.gain.error()});
+  effect.why = fmt::format(
+      "mean angle between predicted and measured direction of sliding falls from {:.2f} to {:.2f} degrees, "
+      "on {} of {} surfaces",
+      base.error, law.error, law.better, law.compared);
+  MeasuredDiscovery& answer = out.answer;
+  answer.effects.push_back(std::move(effect));
+  answer.evidence.push_back(
+      {id,
+       fmt::format("Null control: on data simulated from the fitted {} with its own residuals as noise, "
+                   "the same law loses {:.2f} degrees; what it gains on the measurement is not flexibility",
+                   to_string(base.model), -law.null_gain),
+       law.null_gain > 0});
+  answer.separating.push_back(
+      {id,
+       "a shape of the limit surface and a pressure that is not the same everywhere: pushes with the weight "
+       "moved, or wrenches at a fixed normal force over all directions"});
+  for (const auto& e : out.evidence)
+    if (e.law == law.model && e.gain_deg < 2 * e.gain_sigma)
+      answer.evidence.push_back(
+          {id,
+           fmt::format("On {} it gains only {:.2f} ± {:.2f} degrees", e.surface, e.gain_deg, e.gain_sigma),
+           true});
+}
+
+/// Writes what the residuals of neighbouring wrenches have in common, under the base and under `law`.
+void judge_residuals(const LawScore& law, const LawScore& base, double unexplained,
+                     MeasuredDiscovery& answer) {
+  const auto is_common = [&](const Paired& left) { return left.mean() > unexplained && left.t() > 3; };
+  answer.evidence.push_back(
+      {"",
+       fmt::format("Residual directions of neighbouring wrenches of different slips correlate by {:.3f} ± "
+                   "{:.3f} ({:.3f} ± {:.3f} before)",
+                   law.left.mean(), law.left.error(), base.left.mean(), base.left.error()),
+       is_common(law.left)});
+  answer.first = {is_common(base.left), 0, "direction", base.error};
+  if (is_common(law.left))
+    answer.unexplained = MeasuredUnexplained{
+        answer.phase, "direction", law.left.mean(),
+        fmt::format("pushes that know nothing of each other err the same way where their wrenches are alike "
+                    "(correlation {:.2f} ± {:.2f}): the surface has features that the law has not; on three "
+                    "feet a limit surface has flat facets and edges, which no smooth law follows",
+                    law.left.mean(), law.left.error())};
+}
+
 }  // namespace
 
 SurfaceDiscovery discover_surfaces(const datasets::SlipLog& log, const SurfaceDiscoveryOptions& options) {
@@ -105,140 +245,24 @@ SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
     if (model != options.base &&
         std::find(options.forget.begin(), options.forget.end(), id_of(model)) == options.forget.end())
       models.push_back(model);
-  const auto scores = compare_surfaces(surfaces, models, options.comparison);
-
-  // Every law against the base, over slips.
-  std::vector<Paired> pooled(models.size());
-  std::vector<int> better(models.size()), compared(models.size());
-  std::vector<double> errors(models.size()), base_errors(models.size()), train(models.size()),
-      level(models.size()), null_gain(models.size());
-  double used = 0;
-  std::vector<Paired> left_pooled(models.size());
-  for (std::size_t i = 0; i < surfaces.size(); ++i) {
-    const SurfaceScore& base = scores[i].front();
-    for (const auto& score : scores[i])
-      if (!score.scored())
-        answer.skipped.push_back({surfaces[i].surface + ", " + to_string(score.model), score.reason});
-    if (!base.scored()) continue;
-    used += 1;
-    answer.test += static_cast<int>(surfaces[i].slips.size());
-    const auto of_base = by_slip(surfaces[i], base.errors_deg);
-    for (std::size_t k = 0; k < models.size(); ++k) {
-      const SurfaceScore& score = scores[i][k];
-      if (!score.scored()) continue;
-      SurfaceEvidence e{surfaces[i].surface,
-                        models[k],
-                        static_cast<int>(of_base.size()),
-                        base.mean_deg,
-                        score.mean_deg,
-                        base.null_control_deg,
-                        score.null_control_deg,
-                        0,
-                        0,
-                        0,
-                        0};
-      Paired own;
-      for (const auto& [slip, error] : by_slip(surfaces[i], score.errors_deg)) {
-        own.add(of_base.at(slip) - error);
-        pooled[k].add(of_base.at(slip) - error);
-      }
-      e.gain_deg = own.mean(), e.gain_sigma = own.error();
-      const Paired left_here = left_by(surfaces[i], score.fit.surface, e.left);
-      e.left_sigma = left_here.error();
-      left_pooled[k].n += left_here.n, left_pooled[k].sum += left_here.sum,
-          left_pooled[k].squares += left_here.squares;
-      better[k] += score.mean_deg < base.mean_deg ? 1 : 0, ++compared[k];
-      errors[k] += score.mean_deg, base_errors[k] += base.mean_deg;
-      null_gain[k] += base.null_control_deg - score.null_control_deg;
-      train[k] += in_sample(surfaces[i], score.fit.surface);
-      level[k] += level_error(surfaces[i], score.fit.surface);
-      out.evidence.push_back(std::move(e));
-    }
-  }
-  if (used == 0) {
+  const std::vector<LawScore> laws = score_laws(surfaces, models, options.comparison, out);
+  const LawScore& base = laws.front();
+  if (base.compared == 0) {
     answer.verdict = Verdict::not_answered;
     answer.message = answer.skipped.empty() ? "no surface" : answer.skipped.front().second;
     return out;
   }
-  for (auto* sums : {&errors, &base_errors, &train, &level, &null_gain})
-    for (std::size_t k = 0; k < models.size(); ++k) (*sums)[k] /= std::max(1, compared[k]);
   answer.train = answer.test;
-
-  const double rate = options.family_wise_level / std::max<double>(1, static_cast<double>(models.size()) - 1);
-  std::size_t best = 0;
-  for (std::size_t k = 1; k < models.size(); ++k) {
-    const double gain = base_errors[k] - errors[k];
-    Ranked r{id_of(models[k]), std::max(0.0, pooled[k].t() * pooled[k].t())};
-    r.p_value = pooled[k].p(), r.refit_step = 1, r.held_out_gain = gain;
-    r.delta_bic = std::log(std::max(2.0, pooled[k].n)) - pooled[k].t() * std::abs(pooled[k].t());
-    answer.ranking.push_back(r);
-    const bool convinces =
-        pooled[k].p() < rate && gain > options.matters * base_errors[k] && gain > null_gain[k];
-    // Ellipsoids come first: a richer law has to be better by a twentieth.
-    if (convinces && (best == 0 || errors[k] / base_errors[k] < 0.95 * errors[best] / base_errors[best]))
-      best = k;
-  }
-  const auto named = [&](std::size_t k, double error) {
-    return NamedErrors{{"direction_mae_deg", error}, {"level_mae", level[k]}};
-  };
-  answer.before_train = named(0, train[0]), answer.after_train = named(best, train[best]);
-  answer.before_test = {{"direction_mae_deg", errors[0]}},
-  answer.after_test = {{"direction_mae_deg", errors[best]}};
-  std::sort(answer.ranking.begin(), answer.ranking.end(),
-            [](const Ranked& a, const Ranked& b) { return a.gain > b.gain; });
-  for (auto& r : answer.ranking) r.correlation_with_best = r.id == id_of(models[best]) ? 1 : 0;
-
-  if (best > 0) {
-    AcceptedEffect effect;
-    effect.id = id_of(models[best]);
-    effect.p_value = pooled[best].p();
-    effect.delta_bic = std::log(std::max(2.0, pooled[best].n)) - pooled[best].t() * pooled[best].t();
-    effect.test_error_ratio = errors[best] / errors[0];
-    effect.parameters.push_back({"gain", "deg", pooled[best].mean(), pooled[best].error()});
-    effect.why = fmt::format(
-        "mean angle between predicted and measured direction of sliding falls from {:.2f} to {:.2f} degrees, "
-        "on {} of {} "
-        "surfaces",
-        errors[0], errors[best], better[best], compared[best]);
-    answer.effects.push_back(std::move(effect));
-    answer.evidence.push_back(
-        {id_of(models[best]),
-         fmt::format("Null control: on data simulated from the fitted {} with its own residuals as noise, "
-                     "the same law loses "
-                     "{:.2f} degrees; what it gains on the measurement is not flexibility",
-                     to_string(options.base), -null_gain[best]),
-         null_gain[best] > 0});
-    answer.separating.push_back({id_of(models[best]),
-                                 "a shape of the limit surface and a pressure that is not the same "
-                                 "everywhere: pushes with the weight moved, or "
-                                 "wrenches at a fixed normal force over all directions"});
-  }
-  for (const auto& e : out.evidence)
-    if (e.law == models[best] && best > 0 && e.gain_deg < 2 * e.gain_sigma)
-      answer.evidence.push_back(
-          {id_of(models[best]),
-           fmt::format("On {} it gains only {:.2f} ± {:.2f} degrees", e.surface, e.gain_deg, e.gain_sigma),
-           true});
-  const Paired& l = left_pooled[best];
-  answer.evidence.push_back(
-      {"",
-       fmt::format("Residual directions of neighbouring wrenches of different slips correlate by {:.3f} ± "
-                   "{:.3f} ({} before)",
-                   l.mean(), l.error(),
-                   fmt::format("{:.3f} ± {:.3f}", left_pooled[0].mean(), left_pooled[0].error())),
-       l.mean() > options.unexplained && l.t() > 3});
-  answer.first = {left_pooled[0].t() > 3 && left_pooled[0].mean() > options.unexplained, 0, "direction",
-                  errors[0]};
-  if (l.mean() > options.unexplained && l.t() > 3)
-    answer.unexplained = MeasuredUnexplained{
-        answer.phase, "direction", l.mean(),
-        fmt::format("pushes that know nothing of each other err the same way where their wrenches are alike "
-                    "(correlation {:.2f} ± {:.2f}): the surface has features that the law has not; on three "
-                    "feet a limit surface has flat facets and edges, which no smooth law follows",
-                    l.mean(), l.error())};
+  const LawScore& best = believed(laws, options, answer.ranking);
+  const bool found = &best != &base;
+  answer.before_train = base.errors(base.train), answer.after_train = best.errors(best.train);
+  answer.before_test = {{"direction_mae_deg", base.error}};
+  answer.after_test = {{"direction_mae_deg", best.error}};
+  if (found) accept_law(best, base, out);
+  judge_residuals(best, base, options.unexplained, answer);
   answer.misfit.push_back(
-      {"direction", static_cast<int>(pooled[0].n), train[0], errors[0], train[best], errors[best]});
-  answer.verdict = best > 0             ? Verdict::effect_found
+      {"direction", static_cast<int>(base.gain.n), base.train, base.error, best.train, best.error});
+  answer.verdict = found                ? Verdict::effect_found
                    : answer.unexplained ? Verdict::unexplained
                                         : Verdict::no_missing_effect;
   answer.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

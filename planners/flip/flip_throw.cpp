@@ -18,9 +18,8 @@ std::optional<FlipPose> fly_flip(const DetachVector& d) {
 
 std::optional<FlipRelease> release_bar(const release::HandMotion& hand, const HeldBar& held,
                                        std::vector<dynamics::Wrench<double>>* on_bar, double step) {
-  constexpr double kTorqueFactor = 2.0 / 3.0;  // of a uniform disc; only L = c a enters
   contact::ContactParameters<double> pads;
-  pads.patch = {held.pads.mu, held.pads.length / kTorqueFactor, kTorqueFactor, held.pads.count};
+  pads.patch = contact::Patch<double>::of_length(held.pads.mu, held.pads.length, held.pads.count);
   const auto law = contact::make_contact_model(held.pads.law, pads);
   const Gripper& g = held.gripper;
   const contact::ProfileNormalForce force(

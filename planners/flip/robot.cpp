@@ -101,6 +101,75 @@ Pads pads_of(Section keys) {
   return out;
 }
 
+/// The arm with a hand, the tool between its pads.
+Chain with_hand(const Chain& arm, Section keys) {
+  const double mass = keys.number("mass_kg", positive(20, "kg")),
+               length = keys.number("length_m", positive(1, "m")),
+               across = keys.number("inertia_across_kg_m2", positive(1, "kg m^2")),
+               along = keys.number("inertia_along_kg_m2", positive(1, "kg m^2"));
+  keys.done();
+  const Chain loaded =
+      with_payload(arm, {mass, {0, 0, length / 2}, symmetric(across, across, along, 0, 0, 0)});
+  return with_tool(loaded, {Eigen::Matrix3d::Identity(), {0, 0, length}});
+}
+
+Gripper gripper_of(Section keys) {
+  const Gripper out{
+      keys.number("grip_force_n", positive(1000, "N")), keys.number("dead_time_s", not_negative(1, "s")),
+      keys.number("opening_time_s", positive(1, "s")), keys.number("shape", {0.1, 10, false, ""})};
+  keys.done();
+  return out;
+}
+
+Bar bar_of(Section keys) {
+  const Bar out{keys.number("mass_kg", kBarMass), keys.number("inertia_kg_m2", kBarInertia),
+                keys.number("com_offset_m", kComOffset)};
+  keys.done();
+  return out;
+}
+
+constexpr TomlLimits kShare{0, 0.5, false, ""};
+
+RobotSpread robot_spread_of(Section keys) {
+  const RobotSpread out{keys.number("link_mass", kShare),
+                        keys.number("friction", kShare),
+                        keys.number("torque_gain", kShare),
+                        keys.number("mu", kShare),
+                        keys.number("length", kShare),
+                        keys.number("grip_force", kShare),
+                        keys.number("shape", kShare),
+                        keys.number("dead_time_s", not_negative(0.1, "s")),
+                        keys.number("opening_time_s", not_negative(0.1, "s")),
+                        keys.number("com_offset_m", not_negative(0.1, "m"))};
+  keys.done();
+  return out;
+}
+
+ThrowSpread throw_spread_of(Section keys) {
+  const ThrowSpread out{keys.number("mu", kShare),
+                        keys.number("grip_force", kShare),
+                        keys.number("dead_time_s", not_negative(0.1, "s")),
+                        keys.number("opening_time_s", not_negative(0.1, "s")),
+                        keys.number("grasp_offset_m", not_negative(0.1, "m")),
+                        keys.number("grasp_angle_rad", not_negative(1, "rad")),
+                        keys.number("torque_noise", kShare)};
+  keys.done();
+  return out;
+}
+
+FlipSensors sensors_of(Section keys) {
+  const FlipSensors out{keys.number("angle_rad", not_negative(0.1, "rad")),
+                        keys.number("rate_rad_s", not_negative(1, "rad/s")),
+                        keys.number("position_m", not_negative(1, "m")),
+                        keys.number("turn_rad", not_negative(1, "rad")),
+                        keys.number("speed_m_s", not_negative(1, "m/s")),
+                        keys.number("omega_rad_s", not_negative(10, "rad/s")),
+                        keys.number("landing_m", not_negative(1, "m")),
+                        keys.number("landing_turn_rad", not_negative(1, "rad"))};
+  keys.done();
+  return out;
+}
+
 /// Why torques do not tell how the arm moves; empty where they do.
 std::string why_not_simulable(const Chain& chain) {
   for (const Joint& joint : chain.joints)
@@ -159,72 +228,16 @@ FlipRobot read_flip_robot(const std::string& name_or_file) {
   } catch (const std::invalid_argument& error) {
     keys.fail("arm", error.what());
   }
-  {
-    Section hand(keys, "hand");
-    const double mass = hand.number("mass_kg", positive(20, "kg")),
-                 length = hand.number("length_m", positive(1, "m")),
-                 across = hand.number("inertia_across_kg_m2", positive(1, "kg m^2")),
-                 along = hand.number("inertia_along_kg_m2", positive(1, "kg m^2"));
-    hand.done();
-    out.chain =
-        with_payload(out.chain, {mass, {0, 0, length / 2}, symmetric(across, across, along, 0, 0, 0)});
-    out.chain = with_tool(out.chain, {Eigen::Matrix3d::Identity(), {0, 0, length}});
-  }
+  out.chain = with_hand(out.chain, {keys, "hand"});
   if (const std::string why = why_not_simulable(out.chain); !why.empty()) keys.fail("arm", why);
   out.motion = motion_of({keys, "motion"}, out.chain);
   out.control = control_of({keys, "control"}, out.chain.size());
-  {
-    Section k(keys, "gripper");
-    out.gripper = {k.number("grip_force_n", positive(1000, "N")),
-                   k.number("dead_time_s", not_negative(1, "s")),
-                   k.number("opening_time_s", positive(1, "s")), k.number("shape", {0.1, 10, false, ""})};
-    k.done();
-  }
+  out.gripper = gripper_of({keys, "gripper"});
   out.pads = pads_of({keys, "pads"});
-  {
-    Section k(keys, "bar");
-    out.bar = {k.number("mass_kg", kBarMass), k.number("inertia_kg_m2", kBarInertia),
-               k.number("com_offset_m", kComOffset)};
-    k.done();
-  }
-  const TomlLimits share{0, 0.5, false, ""};
-  {
-    Section k(keys, "robots");
-    out.robots = {k.number("link_mass", share),
-                  k.number("friction", share),
-                  k.number("torque_gain", share),
-                  k.number("mu", share),
-                  k.number("length", share),
-                  k.number("grip_force", share),
-                  k.number("shape", share),
-                  k.number("dead_time_s", not_negative(0.1, "s")),
-                  k.number("opening_time_s", not_negative(0.1, "s")),
-                  k.number("com_offset_m", not_negative(0.1, "m"))};
-    k.done();
-  }
-  {
-    Section k(keys, "throws");
-    out.throws = {k.number("mu", share),
-                  k.number("grip_force", share),
-                  k.number("dead_time_s", not_negative(0.1, "s")),
-                  k.number("opening_time_s", not_negative(0.1, "s")),
-                  k.number("grasp_offset_m", not_negative(0.1, "m")),
-                  k.number("grasp_angle_rad", not_negative(1, "rad")),
-                  k.number("torque_noise", share)};
-    k.done();
-  }
-  {
-    Section k(keys, "sensors");
-    out.sensors = {k.number("angle_rad", not_negative(0.1, "rad")),
-                   k.number("rate_rad_s", not_negative(1, "rad/s")),
-                   k.number("position_m", not_negative(1, "m")),
-                   k.number("turn_rad", not_negative(1, "rad")),
-                   k.number("speed_m_s", not_negative(1, "m/s")),
-                   k.number("omega_rad_s", not_negative(10, "rad/s")),
-                   k.number("landing_m", not_negative(1, "m")),
-                   k.number("landing_turn_rad", not_negative(1, "rad"))};
-    k.done();
-  }
+  out.bar = bar_of({keys, "bar"});
+  out.robots = robot_spread_of({keys, "robots"});
+  out.throws = throw_spread_of({keys, "throws"});
+  out.sensors = sensors_of({keys, "sensors"});
   keys.reject_unknown();
   try {
     for (const FlipCommand& u : {out.motion.range.low, out.motion.range.high})

@@ -90,9 +90,8 @@ struct Thrown {
 template <class S>
 std::optional<Thrown<S>> throw_once(const ReleaseThrow& p, const release::HandMotion& hand,
                                     const std::array<S, kUnknowns>& draw) {
-  constexpr double kTorqueFactor = 2.0 / 3.0;  // of a uniform disc; only L = c a enters
   contact::ContactParameters<S> pads;
-  pads.patch = {draw[kMu], S(p.card.length / kTorqueFactor), S(kTorqueFactor), p.card.pads};
+  pads.patch = contact::Patch<S>::of_length(draw[kMu], S(p.card.length), p.card.pads);
   const auto law = contact::make_contact_model(p.card.model, pads);
   const contact::ProfileNormalForce force(contact::OpeningProfile<S>{
       0.0, S(p.card.grip_force), draw[kDeadTime], draw[kOpeningTime], S(p.card.shape)});

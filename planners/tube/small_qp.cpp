@@ -78,14 +78,8 @@ class ActiveSet {
     QpVector r;
   };
   Split split(const QpVector& n) const {
+    Split out = projected(n);
     const int k = static_cast<int>(Q_.cols());
-    Split out{n, QpVector::Zero(k)};
-    for (int pass = 0; pass < 2; ++pass)
-      for (int j = 0; j < k; ++j) {
-        const double part = Q_.col(j).dot(out.free);
-        out.free -= part * Q_.col(j);
-        out.r[j] += part;
-      }
     for (int i = k - 1; i >= 0; --i) {
       for (int j = i + 1; j < k; ++j) out.r[i] -= R_(i, j) * out.r[j];
       out.r[i] /= R_(i, i);
@@ -104,21 +98,28 @@ class ActiveSet {
   }
 
  private:
-  void append(const QpVector& n) {
+  /// What of n the columns of Q leave, and its components along them.
+  Split projected(const QpVector& n) const {
     const int k = static_cast<int>(Q_.cols());
-    QpVector free = n, part = QpVector::Zero(k + 1);
+    Split out{n, QpVector::Zero(k)};
     for (int pass = 0; pass < 2; ++pass)
       for (int j = 0; j < k; ++j) {
-        const double p = Q_.col(j).dot(free);
-        free -= p * Q_.col(j);
-        part[j] += p;
+        const double part = Q_.col(j).dot(out.free);
+        out.free -= part * Q_.col(j);
+        out.r[j] += part;
       }
-    part[k] = free.norm();
+    return out;
+  }
+  void append(const QpVector& n) {
+    const int k = static_cast<int>(Q_.cols());
+    const auto [free, along] = projected(n);
+    const double length = free.norm();
     Q_.conservativeResize(Eigen::NoChange, k + 1);
     R_.conservativeResize(k + 1, k + 1);
-    Q_.col(k) = free / part[k];
+    Q_.col(k) = free / length;
     R_.row(k).setZero();
-    R_.col(k) = part;
+    R_.col(k).head(k) = along;
+    R_(k, k) = length;
   }
   QpMatrix Q_, R_;
 };
@@ -129,6 +130,32 @@ void check(const QuadraticProgram& p) {
   for (const QpConstraint& k : p.constraints)
     fits = fits && k.a.size() == n && k.a.allFinite() && std::isfinite(k.b);
   if (!fits) throw std::invalid_argument("quadratic program: sizes do not match, or a number is not finite");
+}
+
+std::vector<Scaled> scaled_constraints(const QuadraticProgram& program, const QpMatrix& L) {
+  std::vector<Scaled> out;
+  for (const QpConstraint& constraint : program.constraints) {
+    QpVector a = forward(L, constraint.a);
+    const double length = a.norm();
+    if (length > 0) a /= length;
+    out.push_back({a, length > 0 ? constraint.b / length : constraint.b, length});
+  }
+  return out;
+}
+
+/// The constraint to add at y: any equality that is not settled, or the inequality violated most; −1: none.
+int next_constraint(const QuadraticProgram& program, const std::vector<Scaled>& scaled,
+                    const std::vector<bool>& settled, const QpVector& y, double tolerance) {
+  int chosen = -1;
+  double worst = 0;
+  for (std::size_t k = 0; k < scaled.size(); ++k) {
+    if (settled[k]) continue;
+    if (program.constraints[k].equality) return static_cast<int>(k);
+    const double slack = scaled[k].normal.dot(y) - scaled[k].offset;
+    if (slack < -tolerance * (1 + std::abs(scaled[k].offset)) && slack < worst)
+      chosen = static_cast<int>(k), worst = slack;
+  }
+  return chosen;
 }
 
 }  // namespace
@@ -145,14 +172,7 @@ QpSolution solve(const QuadraticProgram& program, const QpOptions& options) {
     return out;
   }
   QpVector y = -forward(L, program.c);
-  std::vector<Scaled> scaled(static_cast<std::size_t>(m));
-  for (int k = 0; k < m; ++k) {
-    const QpConstraint& constraint = program.constraints[k];
-    QpVector a = forward(L, constraint.a);
-    const double length = a.norm();
-    if (length > 0) a /= length;
-    scaled[k] = {a, length > 0 ? constraint.b / length : constraint.b, length};
-  }
+  const std::vector<Scaled> scaled = scaled_constraints(program, L);
   const auto slack = [&](int k) { return scaled[k].normal.dot(y) - scaled[k].offset; };
   ActiveSet active(n);
   std::vector<bool> settled(static_cast<std::size_t>(m), false);  // active, or following from what is
@@ -165,18 +185,7 @@ QpSolution solve(const QuadraticProgram& program, const QpOptions& options) {
   };
 
   for (;;) {
-    // The constraint to add: any equality first, then the most violated.
-    int chosen = -1;
-    double worst = 0;
-    for (int k = 0; k < m; ++k) {
-      if (settled[k]) continue;
-      const double s = slack(k), tolerance = options.tolerance * (1 + std::abs(scaled[k].offset));
-      if (program.constraints[k].equality) {
-        chosen = k;
-        break;
-      }
-      if (s < -tolerance && s < worst) chosen = k, worst = s;
-    }
+    const int chosen = next_constraint(program, scaled, settled, y, options.tolerance);
     if (chosen < 0) return finish(QpOutcome::solved);
     const double sign = program.constraints[chosen].equality && slack(chosen) > 0 ? -1 : 1;
     const QpVector normal = sign * scaled[chosen].normal;

@@ -109,12 +109,16 @@ TEST(DenseSolve, SingularVectorsRebuildTheNormalEquations) {
 TEST(DenseSolve, TheInverseOfAGramMatrixAndItsDeterminant) {
   MatrixXd A(4, 2);
   A << 1, 1e6, 1, 2e6, 1, 3e6, 1, 5e6;
-  const MatrixXd inverse = inverse_gram(A);
+  const VectorXd b = VectorXd::LinSpaced(4, -1, 2);
+  const auto [x, inverse] = least_squares_with_covariance(A, b);
+  EXPECT_EQ(x, least_squares(A, b));
   EXPECT_LT(MatrixXd(gram(A) * inverse - MatrixXd::Identity(2, 2)).cwiseAbs().maxCoeff(), 1e-8);
   EXPECT_NEAR(log_determinant(gram(A)), std::log(35e12), 1e-12);  // 4 Σt² − (Σt)²
   MatrixXd twice(4, 3);
   twice << A, A.col(0);
-  EXPECT_EQ(inverse_gram(twice).size(), 0);
+  const LeastSquares dependent = least_squares_with_covariance(twice, b);
+  EXPECT_EQ(dependent.solution, least_squares(twice, b));
+  EXPECT_EQ(dependent.covariance.size(), 0);
 }
 
 TEST(DenseSolve, OfNothingComesNothing) {
