@@ -1,5 +1,6 @@
 // unhand: the command line.
 #include <fmt/format.h>
+#include <glog/logging.h>
 
 #include <array>
 #include <cstdio>
@@ -40,6 +41,7 @@ int run(const Command& command) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  FLAGS_minloglevel = google::GLOG_FATAL;  // Ceres logs simulations that fail as errors; fits answer for them
   Parser root{"unhand: the physics of letting go. Predicts where released objects land.", "unhand",
               "unhand " UNHAND_VERSION};
   root.require_subcommand();

@@ -16,16 +16,18 @@ bool is_weak(const FittedUnknown& u, double half) {
 
 /// Where the profile is t sigmas away, on the side of `sign`: by secants on the distance in sigmas, which is
 /// a straight line for a parabola; `unit` is the rise of the cost at one sigma. Infinite if that is beyond
-/// the range.
+/// the range, or if simulations fail on this side however near: then nothing was seen to bound it.
 double end_of(FitRounds& rounds, std::size_t k, const FittedUnknown& u, double t, double unit, double sign) {
   const double bound = sign > 0 ? u.unknown.high : u.unknown.low;
   const auto clipped = [&](double v) { return sign > 0 ? std::min(v, bound) : std::max(v, bound); };
   double near = u.value, z_near = 0, far = clipped(u.value + sign * t * u.sigma);
   FitRounds::Point point = rounds.solution_point();  // of the last solution: the next is near it
+  bool seen = false;
   for (int step = 0; step < 8; ++step) {
     if (far == near) return sign * HUGE_VAL;
     const double rise = rounds.cost_with(k, far, point) - rounds.solution().cost;
     const double z = std::sqrt(std::max(0.0, rise) / unit);
+    seen |= std::isfinite(z);
     if (!std::isfinite(z)) point = rounds.solution_point();
     if (std::abs(z - t) < 0.02 * t) return far;
     if (z < t && far == bound) return sign * HUGE_VAL;
@@ -41,7 +43,7 @@ double end_of(FitRounds& rounds, std::size_t k, const FittedUnknown& u, double t
     }
     far = next;
   }
-  return far;
+  return seen ? far : sign * HUGE_VAL;
 }
 
 }  // namespace
