@@ -23,6 +23,7 @@ namespace {
 
 constexpr int kDefaultFolds = 5;
 constexpr double kWildMisfit = 900;  ///< χ² per sample of a channel that is told of: 30 σ
+constexpr double kPoorFit = 2;  ///< χ² per degree of freedom from which parameters are not to be trusted
 
 std::vector<std::string> surface_names() {
   std::vector<std::string> out;
@@ -136,6 +137,12 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
           "unhand: {} ({}) is off by {:.0f} sigma: it hardly counts in the fit. Another unit, clock or "
           "frame, or not this model?\n",
           to_string(m.channel), to_string(m.phase), std::sqrt(m.chi2_per_sample()));
+  if (const auto chi2 = fit.chi2_per_dof(); chi2 && *chi2 > kPoorFit)
+    tell(
+        "unhand: chi2 per degree of freedom is {:.3g}: something is missing in {} or wrong in the log, and "
+        "it bends "
+        "the parameters, which no interval tells; ask unhand discover\n",
+        *chi2, request.model);
 
   const Json json = fit_json(answer, request);
   Outputs outputs{{request.log}};

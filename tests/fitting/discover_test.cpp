@@ -133,11 +133,11 @@ TEST(Discovery, AListedEffectBesideAnUnlistedOneStays) {
 TEST(Discovery, WhatIsWrongInOneConditionIsUnexplainedAndNamesIt) {
   for (const auto half : {datasets::Split::train, datasets::Split::test}) {
     auto log = support::loop_campaign({});
-    const auto first = std::find_if(log.throws.begin(), log.throws.end(),
-                                    [&](const datasets::ThrowRecord& t) { return t.split == half; });
+    const auto first =
+        std::find_if(log.throws.begin(), log.throws.end(), [&](const auto& t) { return t.split == half; });
     ASSERT_NE(first, log.throws.end());
     const std::string object = first->object, condition = first->condition;
-    for (datasets::ThrowRecord& t : log.throws)
+    for (auto& t : log.throws)
       if (t.object == object && t.condition == condition && t.split == half)
         for (std::size_t k = 0; k < t.mocap->time.rows; ++k) t.mocap->pose(k, 0) += 0.01;
     const Discovery found = found_in(log);
@@ -153,9 +153,8 @@ TEST(Discovery, WhatIsWrongInOneConditionIsUnexplainedAndNamesIt) {
 
 TEST(Discovery, OneLandingThatIsOffIsNamed) {
   auto log = support::loop_campaign({});
-  const auto bad = std::find_if(log.throws.begin(), log.throws.end(), [](const datasets::ThrowRecord& t) {
-    return t.split == datasets::Split::test;
-  });
+  const auto bad = std::find_if(log.throws.begin(), log.throws.end(),
+                                [](const auto& t) { return t.split == datasets::Split::test; });
   ASSERT_NE(bad, log.throws.end());
   bad->landing->pose(0, 0) += 0.5;
   const Discovery found = found_in(log);
