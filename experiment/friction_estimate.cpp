@@ -24,6 +24,9 @@ namespace {
 /// What turns a torque into a force where a wrench is judged as a whole: c a of a finger's pad [m].
 constexpr double kFingerLength = 0.007;
 
+/// Above what a clock that counts from 1970 rounds its times to [s]: a sample at an event stays on its side.
+constexpr double kClockRounding = 1e-6;
+
 /// One pad's wrench while it slips, over its normal force: force, force, torque.
 struct SlipSample {
   std::array<double, 3> ratio{}, sigma{};  ///< -, -, m; 1 σ
@@ -52,6 +55,7 @@ std::vector<PadSample> pad_samples(const datasets::ThrowLog& log, const datasets
                                    const PreparedThrow& prepared) {
   ObservationOptions wrenches;
   wrenches.normal_force = wrenches.mocap = wrenches.landing = false;
+  wrenches.settling -= kClockRounding;  // a sample at its very end counts
   std::vector<PadSample> out;
   for (const Observation& o : observe(log, logged, prepared, wrenches).all) {
     if (out.empty() || out.back().time != o.time) out.push_back({o.time});
@@ -89,7 +93,8 @@ std::vector<SlipSample> slipping_samples(const datasets::ThrowLog& log,
     if (!std::isfinite(release)) continue;
     const std::vector<double> jumps = prepared.hand.jumps();
     const auto samples = pad_samples(log, logged, prepared);
-    for (auto s = samples.rbegin(); s != samples.rend() && s->time >= prepared.open_command; ++s) {
+    for (auto s = samples.rbegin(); s != samples.rend() && s->time > prepared.open_command - kClockRounding;
+         ++s) {
       if (s->time >= release) continue;
       const double f = prepared.normal_force->at({prepared.start, release}, s->time);
       if (f < 8 * prepared.force_fit.sigma) continue;
