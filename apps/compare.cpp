@@ -170,6 +170,7 @@ void compare(const CompareRequest& request) {
   const bool flights =
       log.dimension == 3 || std::none_of(log.throws.begin(), log.throws.end(),
                                          [](const auto& one) { return one.hand.has_value(); });
+  if (flights) require_flights(log, request.log);
   for (const auto& model : request.models) {
     if (is_surface_model(model))
       throw datasets::LogError(request.log, "/throws",

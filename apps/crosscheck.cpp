@@ -73,6 +73,7 @@ experiment::ModelParameters parameters_of(const CrosscheckOptions& options, cons
     return out;
   }
   const auto estimate = experiment::estimate_friction(log, prepared, options.models.front());
+  experiment::require_patch(estimate, options.models.front());
   from = fmt::format("estimated for {}", options.models.front());
   return estimate.parameters;
 }

@@ -102,6 +102,7 @@ void discover_measured(MeasuredKind kind, const MeasuredRequest& request) {
     result.surfaces = std::move(found.evidence);
   } else {
     log = read_throws(request.log);
+    if (kind == MeasuredKind::flights) require_flights(*log, request.log);
     fitting::MeasuredOptions options;
     options.search.forget = request.forget;
     options.search.most_effects = request.most;

@@ -53,7 +53,9 @@ std::vector<ReleaseTrace> traces_of(const Source& source, const FigureCommandOpt
   const auto& prepared = *std::find_if(all.begin(), all.end(), [&](const auto& p) { return p.id == one.id; });
   std::vector<ReleaseTrace> out;
   for (const auto& model : options.models) {
-    const auto parameters = experiment::estimate_friction(source.log, all, model).parameters;
+    const auto estimate = experiment::estimate_friction(source.log, all, model);
+    experiment::require_patch(estimate, model);
+    const auto& parameters = estimate.parameters;
     const auto contact = experiment::contact_model_for(prepared, model, parameters);
     if (!contact) throw WrongUsage(fmt::format("--models: {} has no modes to draw", model));
     const auto problem = experiment::release_problem(prepared, *contact);

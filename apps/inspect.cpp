@@ -101,6 +101,12 @@ Inspection inspect_throws(const std::string& file) {
         "note: {} of {} throws do not show the grasp (no motion capture before the gripper opens, no "
         "grasp_angle): a release cannot be predicted from them\n",
         n, log.throws.size());
+  if (const auto n = std::count_if(log.throws.begin(), log.throws.end(),
+                                   [&](const auto& one) { return !datasets::held_by(log, one).empty(); }))
+    out.text += fmt::format(
+        "note: {} of {} throws have no hand and are held at first, and no free_flight says from when on they "
+        "fly: neither a release nor a flight can be predicted from them\n",
+        n, log.throws.size());
   for (const auto& doubt : experiment::unit_doubts(log))
     out.text += fmt::format("doubtful: {}: {}\n", doubt.path, doubt.reason);
   return out;

@@ -8,6 +8,7 @@
 
 #include "apps/command.hpp"
 #include "apps/tell.hpp"
+#include "datasets/summary.hpp"
 #include "experiment/prepared_throw.hpp"
 #include "experiment/unit_check.hpp"
 
@@ -34,6 +35,18 @@ datasets::ThrowLog read_throws(const std::string& file) {
     return std::binary_search(left_out.begin(), left_out.end(), one.id);  // both are sorted by id
   });
   return log;
+}
+
+void require_flights(const datasets::ThrowLog& log, const std::string& file) {
+  for (const auto& one : log.throws)
+    if (datasets::held_by(log, one).empty()) return;
+  const auto& first = log.throws.front();
+  throw datasets::LogError(
+      file, "/throws/" + first.id + "@free_flight",
+      fmt::format("missing: {} shows that the object is held at first, in every throw of this log, and "
+                  "without a hand nothing says from when on it flies; declare free_flight (the seconds from "
+                  "the detach to the landing, on the clock of mocap), or give the hand's motion",
+                  datasets::held_by(log, first)));
 }
 
 datasets::SlipLog read_slips(const std::string& file) {

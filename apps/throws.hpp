@@ -13,6 +13,10 @@ namespace unhand::apps {
 /// or a column is in another unit (experiment::require_units), Unanswered where it holds no throws.
 datasets::ThrowLog read_throws(const std::string& file);
 
+/// Throws datasets::LogError where every throw is held at first and nothing says when it flies
+/// (datasets::held_by); where some are, they are left out as not_free.
+void require_flights(const datasets::ThrowLog& log, const std::string& file);
+
 /// Slips whose friction takes work from the object: throws datasets::LogError for a surface of which the
 /// samples say the opposite (datasets::dissipation < 0), as where a wrench or a twist has the other sign.
 datasets::SlipLog read_slips(const std::string& file);

@@ -83,6 +83,20 @@ void add(NoiseSummary& noise, const Series& series) {
 
 }  // namespace
 
+std::string held_by(const ThrowLog& log, const Throw& toss) {
+  if (toss.hand || toss.free_flight || !toss.mocap) return "";
+  const MocapLog& mocap = *toss.mocap;
+  std::size_t first = 0;
+  while (first < mocap.time.rows && !mocap.is_valid(first)) ++first;
+  if (first == mocap.time.rows) return "";
+  const double seen = mocap.time(first);
+  if (toss.detach_time) return *toss.detach_time > seen ? "a detach_time" : "";
+  if (toss.ft) return "an ft";
+  if (log.gripper && log.gripper->opening_command_time && *log.gripper->opening_command_time >= seen)
+    return "an opening_command_time";
+  return "";
+}
+
 LogSummary summarise(const ThrowLog& log) {
   validate(log);
   LogSummary out;
@@ -98,7 +112,7 @@ LogSummary summarise(const ThrowLog& log) {
   for (Throw& toss : throws) {
     ++(toss.split == Split::train ? out.train : out.test);
     ++out.conditions[toss.condition];
-    out.free_flights += !toss.hand;
+    out.free_flights += !toss.hand && held_by(log, toss).empty();
     out.each.push_back(summarise_throw(toss));
     for (const ChannelSummary& channel : out.each.back().channels) add(out.groups, channel, toss.id);
   }

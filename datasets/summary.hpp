@@ -59,6 +59,12 @@ struct LogSummary {
   std::vector<ThrowSummary> each;                                 ///< in the order of the log
 };
 
+/// What shows that motion capture sees a throw without a hand while a gripper still holds it, or may: an
+/// `ft`, an opening command or a `detach_time` not before its first valid sample; and no `free_flight` says
+/// from when on it flies. In words; empty where it flies free, where it has a hand, or without motion
+/// capture.
+std::string held_by(const ThrowLog& log, const Throw& toss);
+
 /// Counts, rates, gaps and declared noise of a log.
 LogSummary summarise(const ThrowLog& log);
 

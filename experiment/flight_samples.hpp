@@ -8,7 +8,8 @@
 
 namespace unhand::experiment {
 
-/// The valid samples within `free_flight`, or all valid ones. A planar flight lies in the plane y = 0.
+/// The valid samples within `free_flight`, or all valid ones (which a throw that datasets::held_by shows as
+/// held does not all fly). A planar flight lies in the plane y = 0.
 struct FlightSamples {
   std::vector<double> times, elapsed;                // [s]: as logged, and from the first
   std::vector<flight::Vec3<double>> position;        // [m]

@@ -9,6 +9,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "datasets/summary.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/flight_samples.hpp"
 #include "experiment/least_squares.hpp"
@@ -207,6 +208,9 @@ FreeFlightFit fit_projectile(const ThrowLog& log, const Throw& one, double fract
   if (!one.mocap) return stop(FreeFlightOutcome::no_tracking, "no mocap");
   if (one.hand && !one.free_flight)
     return stop(FreeFlightOutcome::not_free, "a hand and no free_flight: it is not known when it flies");
+  if (const std::string held = datasets::held_by(log, one); !held.empty())
+    return stop(FreeFlightOutcome::not_free,
+                held + " and no free_flight: it is held at first, and not known when it flies");
   const FlightSamples s = read_flight_samples(log, one);
   fit.times = s.times;
   if (fit.times.size() < kFewestFlightSamples)

@@ -17,7 +17,7 @@ namespace unhand::experiment {
 enum class FreeFlightOutcome {
   fitted,       ///< the start was found, and the residuals say how good it is
   no_tracking,  ///< the throw has no mocap
-  not_free,     ///< it has a hand and no `free_flight` says when it touches nothing
+  not_free,     ///< held (a hand, or datasets::held_by), and no `free_flight` says when it is not
   too_short,    ///< fewer than kFewestFlightSamples valid samples
   not_solved,   ///< the fit did not converge
 };

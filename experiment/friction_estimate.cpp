@@ -3,13 +3,17 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
+#include "contact/contact_model.hpp"
 #include "contact/convex_quartic.hpp"
 #include "contact/gripper_delay.hpp"
 #include "contact/limit_surface_shapes.hpp"
 #include "dynamics/median.hpp"
+#include "experiment/observations.hpp"
+#include "experiment/sample_window.hpp"
 
 namespace unhand::experiment {
 
@@ -17,28 +21,87 @@ using dynamics::Dual;
 
 namespace {
 
-/// One pad's wrench over its normal force.
-struct Sample {
-  double fx, fz, tau, weight;
+/// What turns a torque into a force where a wrench is judged as a whole: c a of a finger's pad [m].
+constexpr double kFingerLength = 0.007;
+
+/// Above what a clock that counts from 1970 rounds its times to [s]: a sample at an event stays on its side.
+constexpr double kClockRounding = 1e-6;
+
+/// One pad's wrench while it slips, over its normal force: force, force, torque.
+struct SlipSample {
+  std::array<double, 3> ratio{}, sigma{};  ///< -, -, m; 1 σ
 };
 
-std::vector<Sample> slipping_samples(const datasets::ThrowLog& log,
-                                     const std::vector<PreparedThrow>& throws) {
-  std::vector<Sample> out;
+/// What one pad carries at t [s] of an object that does not move in the hand, in the hand frame.
+std::array<double, 3> held_wrench(const PreparedThrow& prepared, const std::vector<double>& jumps, int pads,
+                                  double t) {
+  const auto hand = prepared.hand.at(window_at(prepared.hand.begin(), prepared.hand.end(), jumps, t), t);
+  contact::Scene<double> scene;
+  scene.hand = hand.pose, scene.hand_twist = hand.twist, scene.hand_acceleration = hand.acceleration;
+  scene.body = prepared.body, scene.gravity = prepared.gravity;
+  const auto wrench = contact::sticking_wrench(
+      scene, contact::Relative<double>{{prepared.grasp.com_offset, 0}, prepared.grasp.angle, {}, 0});
+  const auto force = dynamics::rotate(-hand.pose.theta, wrench.force());
+  return {force.x / pads, force.z / pads, wrench.tau / pads};
+}
+
+/// A wrench sample of one pad. A channel that is dead has an infinite σ.
+struct PadSample {
+  double time{};
+  std::array<double, 3> wrench{}, sigma{HUGE_VAL, HUGE_VAL, HUGE_VAL};  ///< N, N, N m
+};
+
+std::vector<PadSample> pad_samples(const datasets::ThrowLog& log, const datasets::Throw& logged,
+                                   const PreparedThrow& prepared) {
+  ObservationOptions wrenches;
+  wrenches.normal_force = wrenches.mocap = wrenches.landing = false;
+  wrenches.settling -= kClockRounding;  // a sample at its very end counts
+  std::vector<PadSample> out;
+  for (const Observation& o : observe(log, logged, prepared, wrenches).all) {
+    if (out.empty() || out.back().time != o.time) out.push_back({o.time});
+    const auto c = static_cast<std::size_t>(o.channel) - static_cast<std::size_t>(Channel::wrench_fx);
+    out.back().wrench[c] = o.value, out.back().sigma[c] = o.sigma;
+  }
+  return out;
+}
+
+/// Whether a pad does not carry what would hold the object still: by 5 σ, and by a fifth of it, which no
+/// error of an inertia or of a clock is.
+bool evidently_slips(const PadSample& sample, const std::array<double, 3>& held) {
+  constexpr double kSigmas = 5, kShare = 0.2;
+  double beyond = 0, missing = 0, whole = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    if (!std::isfinite(sample.sigma[c])) continue;
+    const double off = sample.wrench[c] - held[c], unit = c < 2 ? 1.0 : kFingerLength;
+    beyond += std::pow(off / sample.sigma[c], 2);
+    missing += std::pow(off / unit, 2);
+    whole += std::pow(held[c] / unit, 2);
+  }
+  return beyond > kSigmas * kSigmas && missing > kShare * kShare * whole;
+}
+
+/// The last slip of every train throw: back from the release for as long as the pads evidently slip.
+std::vector<SlipSample> slipping_samples(const datasets::ThrowLog& log,
+                                         const std::vector<PreparedThrow>& throws) {
+  const int pads = log.gripper ? log.gripper->n_pads : 2;
+  std::vector<SlipSample> out;
   for (std::size_t i = 0; i < throws.size(); ++i) {
     const PreparedThrow& prepared = throws[i];
     const datasets::Throw& logged = log.throws[i];
     if (prepared.split != datasets::Split::train || !logged.ft || !prepared.normal_force) continue;
-    const double release = prepared.normal_force->release_time(), grip = prepared.force_fit.grip_force;
+    const double release = prepared.normal_force->release_time();
     if (!std::isfinite(release)) continue;
-    const double low = 8 * prepared.force_fit.sigma, high = 0.2 * grip;
-    for (std::size_t k = 0; k < logged.ft->time.rows; ++k) {
-      const double t = logged.ft->time(k);
-      if (t < prepared.open_command || t >= release) continue;
-      const double f = prepared.normal_force->at({prepared.start, release}, t);
-      if (f < low || f > high) continue;
-      out.push_back(
-          {logged.ft->wrench(k, 0) / f, logged.ft->wrench(k, 1) / f, logged.ft->wrench(k, 2) / f, f / grip});
+    const std::vector<double> jumps = prepared.hand.jumps();
+    const auto samples = pad_samples(log, logged, prepared);
+    for (auto s = samples.rbegin(); s != samples.rend() && s->time > prepared.open_command - kClockRounding;
+         ++s) {
+      if (s->time >= release) continue;
+      const double f = prepared.normal_force->at({prepared.start, release}, s->time);
+      if (f < 8 * prepared.force_fit.sigma) continue;
+      if (!evidently_slips(*s, held_wrench(prepared, jumps, pads, s->time))) break;
+      SlipSample& slip = out.emplace_back();
+      for (std::size_t c = 0; c < 3; ++c)
+        slip.ratio[c] = s->wrench[c] / f, slip.sigma[c] = std::isfinite(s->sigma[c]) ? s->sigma[c] / f : 0;
     }
   }
   return out;
@@ -55,25 +118,38 @@ struct Decoupled {
   }
 };
 
-/// Gauss-Newton on (ln μ, ln L) with weights 1/max(1, |r|/k) and a damped step.
+/// What a fit of the surface to the samples ends with.
+struct SurfaceFit {
+  double mu{}, length{};                              ///< -, m
+  double scatter{};                                   ///< robust 1 σ of gauge − 1 [-]
+  double mu_sigma{HUGE_VAL}, length_sigma{HUGE_VAL};  ///< 1 σ, as shares of the values [-]
+};
+
+/// Gauss-Newton on (ln μ, ln L), every gauge weighted with its own noise and with 1/max(1, |r|/k), the step
+/// damped.
 template <class Shape>
-void solve(const Shape& shape, const std::vector<Sample>& samples, double& mu, double& length,
-           double& scatter) {
-  std::vector<double> residuals(samples.size());
+void solve(const Shape& shape, const std::vector<SlipSample>& samples, SurfaceFit& fit) {
+  std::vector<double> off(samples.size()), whitened(samples.size());
+  std::vector<Dual> r(samples.size());
+  std::vector<double> sigma(samples.size());
   for (int iteration = 0; iteration < 60; ++iteration) {
-    const Dual mu_d(mu, 0), length_d(length, 1);
-    double H[2][2] = {}, b[2] = {};
-    std::vector<Dual> r(samples.size());
+    const Dual mu(fit.mu, 0), length(fit.length, 1);
     for (std::size_t i = 0; i < samples.size(); ++i) {
-      const Sample& s = samples[i];
-      r[i] = shape.gauge(contact::Vec3<Dual>{s.fx / mu_d, s.fz / mu_d, s.tau / (mu_d * length_d)}) - 1.0;
-      residuals[i] = std::abs(r[i].a);
+      const auto& s = samples[i].ratio;
+      const Dual fx(s[0], 2), fz(s[1], 3), tau(s[2], 4);
+      r[i] = shape.gauge(contact::Vec3<Dual>{fx / mu, fz / mu, tau / (mu * length)}) - 1.0;
+      double square = 1e-12;
+      for (int c = 0; c < 3; ++c)
+        square += std::pow(r[i].v[2 + c] * samples[i].sigma[static_cast<std::size_t>(c)], 2);
+      sigma[i] = std::sqrt(square);
+      off[i] = std::abs(r[i].a), whitened[i] = off[i] / sigma[i];
     }
-    scatter = 1.4826 * dynamics::median(residuals);
-    const double k = 1.345 * std::max(scatter, 1e-9);
+    fit.scatter = 1.4826 * dynamics::median(off);
+    const double scale = std::max(1.4826 * dynamics::median(whitened), 1e-9), k = 1.345 * scale;
+    double H[2][2] = {}, b[2] = {};
     for (std::size_t i = 0; i < samples.size(); ++i) {
-      const double w = samples[i].weight * samples[i].weight / std::max(1.0, std::abs(r[i].a) / k);
-      const double J[2] = {mu * r[i].v[0], length * r[i].v[1]};
+      const double w = 1 / (sigma[i] * sigma[i] * std::max(1.0, whitened[i] / k));
+      const double J[2] = {fit.mu * r[i].v[0], fit.length * r[i].v[1]};
       for (int p = 0; p < 2; ++p) {
         b[p] -= w * J[p] * r[i].a;
         for (int q = 0; q < 2; ++q) H[p][q] += w * J[p] * J[q];
@@ -82,21 +158,23 @@ void solve(const Shape& shape, const std::vector<Sample>& samples, double& mu, d
     for (int p = 0; p < 2; ++p) H[p][p] *= 1 + 1e-9;
     const double det = H[0][0] * H[1][1] - H[0][1] * H[1][0];
     if (!(det > 0)) break;
+    fit.mu_sigma = scale * std::sqrt(H[1][1] / det);
+    fit.length_sigma = scale * std::sqrt(H[0][0] / det);
     const double d0 = std::clamp((b[0] * H[1][1] - b[1] * H[0][1]) / det, -0.5, 0.5);
     const double d1 = std::clamp((b[1] * H[0][0] - b[0] * H[1][0]) / det, -0.5, 0.5);
-    mu *= std::exp(d0);
-    length *= std::exp(d1);
+    fit.mu *= std::exp(d0);
+    fit.length *= std::exp(d1);
     if (std::abs(d0) + std::abs(d1) < 1e-10) break;
   }
 }
 
 /// The surface of the two on which the samples lie better: real pads follow no rectangle, and the ellipsoid's
 /// values serve the sliding pivot better there than those of a rectangle through all samples.
-void solve_sliding_pivot(const std::vector<Sample>& samples, double& mu, double& length, double& scatter) {
-  double own_mu = mu, own_length = length, own_scatter = 0;
-  solve(Decoupled{}, samples, own_mu, own_length, own_scatter);
-  solve(contact::Ellipsoid{}, samples, mu, length, scatter);
-  if (own_scatter < scatter) mu = own_mu, length = own_length, scatter = own_scatter;
+void solve_sliding_pivot(const std::vector<SlipSample>& samples, SurfaceFit& fit) {
+  SurfaceFit own = fit;
+  solve(Decoupled{}, samples, own);
+  solve(contact::Ellipsoid{}, samples, fit);
+  if (own.scatter < fit.scatter) fit = own;
 }
 
 void estimate_delay(const std::vector<PreparedThrow>& throws, ModelParameters& parameters) {
@@ -122,15 +200,29 @@ void estimate_delay(const std::vector<PreparedThrow>& throws, ModelParameters& p
 void require_patch(const FrictionEstimate& estimate, const std::string& model) {
   if (model == contact::kGripperDelay) return;
   constexpr double kMu[2] = {1e-3, 20}, kLength[2] = {1e-5, 0.2};  // -, m
-  const auto require = [&](const char* what, double value, const double(&range)[2]) {
-    if (value >= range[0] && value <= range[1]) return;
+  constexpr double kMostScatter = 0.25, kMostSigma = 0.15, kRadiusDoubt = 1.25;
+  const auto refuse = [&](const char* what, const std::string& why) {
     throw std::invalid_argument(
         fmt::format("the log does not determine the {} for {}: {} F/T samples of slipping pads in its train "
-                    "throws would make it {:.3g}, accepted are {:g} to {:g}; give more throws, or a card",
-                    what, model, estimate.samples, value, range[0], range[1]));
+                    "throws {}; fit it to all that the log holds (--fit), give more throws, or a card",
+                    what, model, estimate.samples, why));
   };
-  require("friction coefficient", estimate.parameters.mu, kMu);
-  require("length of the pads [m]", estimate.parameters.length, kLength);
+  const auto require = [&](const char* what, double value, double sigma, const double(&range)[2]) {
+    if (!(value >= range[0] && value <= range[1]))
+      refuse(what, fmt::format("would make it {:.3g}, accepted are {:g} to {:g}", value, range[0], range[1]));
+    if (!(sigma <= kMostSigma))
+      refuse(what, fmt::format("leave it uncertain by {:.0f} %, accepted are {:.0f} %", 100 * sigma,
+                               100 * kMostSigma));
+  };
+  require("friction coefficient", estimate.parameters.mu, estimate.mu_sigma, kMu);
+  require("length of the pads [m]", estimate.parameters.length, estimate.length_sigma, kLength);
+  if (!(estimate.scatter <= kMostScatter))
+    refuse("friction", fmt::format("scatter by {:.0f} % about its limit surface, accepted are {:.0f} %",
+                                   100 * estimate.scatter, 100 * kMostScatter));
+  if (estimate.pad_radius && estimate.parameters.length > kRadiusDoubt * *estimate.pad_radius)
+    refuse("length of the pads [m]",
+           fmt::format("would make it {:.3g}, more than a pad of the declared radius, {:.3g} m, can have",
+                       estimate.parameters.length, *estimate.pad_radius));
 }
 
 FrictionEstimate estimate_friction(const datasets::ThrowLog& log, const std::vector<PreparedThrow>& throws,
@@ -147,31 +239,35 @@ FrictionEstimate estimate_friction(const datasets::ThrowLog& log, const std::vec
   out.samples = static_cast<int>(samples.size());
   if (samples.size() < 10)
     throw std::invalid_argument(
-        fmt::format("the log determines no friction for {}: {} F/T samples with a falling normal "
-                    "force in its train throws, at least 10 are needed; give a card",
+        fmt::format("the log determines no friction for {}: {} F/T samples of evidently slipping pads in "
+                    "its train throws, at least 10 are needed; fit it to all that the log holds (--fit), or "
+                    "give a card",
                     model, samples.size()));
   // Start from the envelope: the largest force and torque ratios that are common.
   std::vector<double> force, torque;
   for (const auto& s : samples) {
-    force.push_back(std::hypot(s.fx, s.fz));
-    torque.push_back(std::abs(s.tau));
+    force.push_back(std::hypot(s.ratio[0], s.ratio[1]));
+    torque.push_back(std::abs(s.ratio[2]));
   }
   std::sort(force.begin(), force.end());
   std::sort(torque.begin(), torque.end());
   const std::size_t top = samples.size() * 9 / 10;
-  double mu = std::clamp(force[top], 0.05, 3.0), length = std::clamp(torque[top] / mu, 1e-4, 0.1);
+  SurfaceFit fit;
+  fit.mu = std::clamp(force[top], 0.05, 3.0), fit.length = std::clamp(torque[top] / fit.mu, 1e-4, 0.1);
   if (model == "limit_surface_disc")
-    solve(contact::UniformDisc{}, samples, mu, length, out.scatter);
+    solve(contact::UniformDisc{}, samples, fit);
   else if (model == "limit_surface_quartic")
-    solve(contact::ConvexQuartic::closest_to_disc(), samples, mu, length, out.scatter);
+    solve(contact::ConvexQuartic::closest_to_disc(), samples, fit);
   else if (model == "sliding_pivot")
-    solve_sliding_pivot(samples, mu, length, out.scatter);
+    solve_sliding_pivot(samples, fit);
   else
-    solve(contact::Ellipsoid{}, samples, mu, length, out.scatter);
-  out.parameters.mu = mu;
-  out.parameters.length = length;
-  out.method =
-      "friction: the pad's wrench on the limit surface while the normal force vanishes, train throws";
+    solve(contact::Ellipsoid{}, samples, fit);
+  out.parameters.mu = fit.mu;
+  out.parameters.length = fit.length;
+  out.scatter = fit.scatter;
+  out.mu_sigma = fit.mu_sigma, out.length_sigma = fit.length_sigma;
+  if (log.gripper) out.pad_radius = log.gripper->pad_radius;
+  out.method = "friction: the pad's wrench on the limit surface where it evidently slips, train throws";
   return out;
 }
 

@@ -1,6 +1,7 @@
 // A first, plain estimate of the friction parameters from a log.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,29 +13,39 @@ namespace unhand::experiment {
 struct FrictionEstimate {
   ModelParameters parameters;  ///< with what was not estimated at its default
   int samples{};               ///< F/T samples used
-  double scatter{};    ///< robust 1 σ of gauge − 1 over them [-]: how well they lie on one limit surface
-  std::string method;  ///< in words, for reports
+  double scatter{};  ///< robust 1 σ of gauge − 1 over them [-]: how well they lie on one limit surface
+  double mu_sigma{}, length_sigma{};  ///< 1 σ of μ and L from the samples' noise, as shares of them [-]
+  std::optional<double> pad_radius;   ///< as the log declares it [m]
+  std::string method;                 ///< in words, for reports
 };
 
 /// Where a model's parameters start when no card gives them. It uses train throws only.
 ///
-/// Friction: near the end of the opening the demand exceeds what the vanishing normal force allows, so the
-/// pad slips and its wrench lies on the limit surface: gauge(f/(μ f_N), τ/(L μ f_N)) = 1 for the model's own
-/// surface, solved for μ and L by least squares with a loss that grows linearly (samples that still stick lie
-/// inside). Samples: smoothed f_N between 8 σ and 20 % of the grip force, on the falling ramp. The naive
-/// limit surface takes the ellipsoid's values, and so does the sliding pivot, unless the samples lie better
-/// on its own surface, max(|f|/(μ f_N), |τ|/(L μ f_N)) = 1: its throws would drive an ellipsoid's μ to
-/// infinity.
+/// Friction: while a pad slips, its wrench lies on the limit surface, gauge(f/(μ f_N), τ/(L μ f_N)) = 1 for
+/// the model's own surface; while it sticks, inside. So samples are those of pads that **evidently slip**:
+/// the wrench differs from what would hold the object still in the moving hand (M a − m g about the pad, from
+/// the smoothed hand and the declared inertia, shared by the pads) by more than 5 σ and more than a fifth of
+/// it, continuously from there to the release. Samples within 30 ms after a jump of the hand's acceleration
+/// (ObservationOptions::settling: pads that give ring there) and those with a smoothed f_N below 8 σ are left
+/// out. μ and L follow by least squares, each gauge weighted with the noise of its wrench (the declared σ,
+/// else the series' own scatter, and ObservationOptions::wrench_trust), with a loss that grows linearly. A
+/// friction that changes with speed or force gives a mean over the slip. The naive limit surface takes the
+/// ellipsoid's values, and so does the sliding pivot, unless the samples lie better on its own surface,
+/// max(|f|/(μ f_N), |τ|/(L μ f_N)) = 1: its throws would drive an ellipsoid's μ to infinity.
 ///
 /// Delay: mean and scatter over the train throws of (detach − opening command).
 ///
-/// Throws std::invalid_argument when the log determines neither (no F/T data in any train throw, or no
-/// detach).
+/// Throws std::invalid_argument when the log determines neither: fewer than ten such samples in its train
+/// throws (objects that stick to the end, no F/T data), or no detach. Whether what was found is a patch,
+/// require_patch says.
 FrictionEstimate estimate_friction(const datasets::ThrowLog& log, const std::vector<PreparedThrow>& throws,
                                    const std::string& model);
 
-/// Throws std::invalid_argument, in words, where an estimate's friction is that of no pad: μ outside [0.001,
-/// 20] or a length outside [1e-5, 0.2] m. A few throws whose wrenches point one way determine one of the two.
+/// Throws std::invalid_argument, in words, where an estimate's friction is not to be relied on: μ outside
+/// [0.001, 20] or L outside [1e-5, 0.2] m; either uncertain by more than 15 % (wrenches that point one way
+/// determine one of the two); samples that scatter by more than 25 % about the surface; or an L above 1.25
+/// times the declared pad radius, as no pad's torque has a longer arm than its rim and a declared radius may
+/// be somewhat wrong.
 void require_patch(const FrictionEstimate& estimate, const std::string& model);
 
 }  // namespace unhand::experiment

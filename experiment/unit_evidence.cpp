@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "contact/patch.hpp"
+#include "datasets/summary.hpp"
 #include "dynamics/frames.hpp"
 #include "dynamics/median.hpp"
 #include "experiment/unit_rules.hpp"
@@ -241,7 +242,7 @@ std::optional<double> opening_of(const datasets::ThrowLog& log, const datasets::
 
 SizeRatios compare_sizes(const datasets::ThrowLog& log, const datasets::Throw& logged) {
   SizeRatios out;
-  if (!logged.hand && logged.mocap) check_fall(log, logged, out);
+  if (!logged.hand && logged.mocap && datasets::held_by(log, logged).empty()) check_fall(log, logged, out);
   if (log.dimension != 2 || !logged.hand || logged.hand->time.rows < 3) return out;
   const auto& hand = *logged.hand;
   check_hand(hand, out);

@@ -60,6 +60,22 @@ TEST_F(Cli, AModelThatTheLogDoesNotDetermineStopsNoOther) {
   expect_refusal("compare straight.h5 --models limit_surface --json b.json", 1, "does not determine");
 }
 
+// What a gripper still holds does not fly, even if nobody logged the hand.
+TEST_F(Cli, ThrowsWithoutAHandAreNoFlightsBeforeTheyAreLetGo) {
+  write_changed("carried.h5", [](datasets::Throw& one) { one.hand.reset(); });
+  expect_refusal("compare carried.h5 --json a.json", 3, "@free_flight: missing");
+  expect_refusal("compare carried.h5 --json a.json", 3, "declare free_flight");
+  const Answer shown = run("inspect carried.h5");
+  EXPECT_THAT(shown.out, HasSubstr("0 free flights"));
+  EXPECT_THAT(shown.out, HasSubstr("note: 12 of 12 throws have no hand and are held at first"));
+  write_changed("free.h5", [](datasets::Throw& one) {
+    one.hand.reset();
+    one.free_flight = {0.2, one.landing->time(0)};
+  });
+  const Answer answer = run("compare free.h5 --json b.json");
+  EXPECT_EQ(answer.code, 0) << answer.err;
+}
+
 TEST_F(Cli, NoTestThrowsNoNumbers) {
   write_all_train("train.h5");
   const Answer answer = run("compare train.h5 --models gripper_delay --json a.json --report r");

@@ -233,6 +233,29 @@ TEST(FreeFlight, WhatCannotBeFittedSaysWhy) {
   EXPECT_THROW(compare_free_flights(c.log, unknown), std::invalid_argument);
 }
 
+// Without a hand, what pressed on the object, opened or let go still tells that it was carried.
+TEST(FreeFlight, WhatIsHeldAtFirstIsNotFree) {
+  const Campaign c = spatial(1, {8e-4, 8e-4, 8e-4}, 0, 1);
+  const auto& free = c.log.throws[0];
+  const double first = free.mocap->time(0), late = first + 0.1;
+  const auto outcome = [](const ThrowLog& log) { return fit_free_flight(log, log.throws[0], 1).outcome; };
+  EXPECT_EQ(outcome(c.log), FreeFlightOutcome::fitted);
+  ThrowLog pressed = c.log, opened = c.log, detached = c.log;
+  pressed.throws[0].ft.emplace();
+  opened.gripper.emplace().opening_command_time = late;
+  detached.throws[0].detach_time = late;
+  for (ThrowLog* log : {&pressed, &opened, &detached}) {
+    EXPECT_EQ(outcome(*log), FreeFlightOutcome::not_free);
+    EXPECT_EQ(compare_free_flights(*log, std::vector<std::string>{"projectile"})[0].skipped, 1u);
+    ThrowLog declared = *log;
+    declared.throws[0].free_flight = {late, free.mocap->time(free.mocap->time.rows - 1)};
+    EXPECT_EQ(outcome(declared), FreeFlightOutcome::fitted);
+    EXPECT_GE(fit_free_flight(declared, declared.throws[0], 1).times.front(), late - 1e-9);
+  }
+  opened.gripper->opening_command_time = first - 0.1;  // before anything was seen
+  EXPECT_EQ(outcome(opened), FreeFlightOutcome::fitted);
+}
+
 TEST(FreeFlight, TheAnswerDoesNotDependOnThreads) {
   const Campaign c = spatial(23, {4e-4, 9e-4, 1.1e-3}, 0.1, 1);
   const std::vector<std::string> names{"projectile"};
