@@ -16,15 +16,29 @@ bool is_weak(const FittedUnknown& u, double half) {
 
 /// Where the profile is t sigmas away, on the side of `sign`: by secants on the distance in sigmas, which is
 /// a straight line for a parabola; `unit` is the rise of the cost at one sigma. Infinite if that is beyond
-/// the range, or if simulations fail on this side however near: then nothing was seen to bound it.
-double end_of(FitRounds& rounds, std::size_t k, const FittedUnknown& u, double t, double unit, double sign) {
+/// the range, or if simulations fail on this side however near: then nothing was seen to bound it. Each fit
+/// starts where the others would go if the cost were its parabola: `along`, their change per change of k.
+double end_of(FitRounds& rounds, const FitResult& fit, std::size_t k, const Eigen::VectorXd& along, double t,
+              double unit, double sign) {
+  const FittedUnknown& u = fit.campaign[k];
   const double bound = sign > 0 ? u.unknown.high : u.unknown.low;
   const auto clipped = [&](double v) { return sign > 0 ? std::min(v, bound) : std::max(v, bound); };
   double near = u.value, z_near = 0, far = clipped(u.value + sign * t * u.sigma);
   FitRounds::Point point = rounds.solution_point();  // of the last solution: the next is near it
+  const std::vector<double>& scale = rounds.shared().scale;
+  const auto follow = [&](FitRounds::Point& from, double value) {
+    const double moved = value - from.campaign[k] * scale[k];
+    for (std::size_t j = 0; j < scale.size(); ++j) {
+      const Unknown& other = fit.campaign[j].unknown;
+      if (j == k || rounds.is_fixed(other)) continue;
+      const double to = from.campaign[j] * scale[j] + along[static_cast<Eigen::Index>(j)] * moved;
+      from.campaign[j] = std::clamp(to, other.low, other.high) / scale[j];
+    }
+  };
   bool seen = false;
   for (int step = 0; step < 8; ++step) {
     if (far == near) return sign * HUGE_VAL;
+    follow(point, far);
     const double rise = rounds.cost_with(k, far, point) - rounds.solution().cost;
     const double z = std::sqrt(std::max(0.0, rise) / unit);
     seen |= std::isfinite(z);
@@ -66,13 +80,16 @@ void profile(FitRounds& rounds, FitResult& fit) {
         H(j, j) += 1 / (*prior * *prior);
     std::vector<double> scale = rounds.shared().scale;
     const auto i = static_cast<Eigen::Index>(k);
-    const double claimed = guarded_inverse(H, scale)(i, i);
-    if (!std::isfinite(claimed) || !(claimed > 0)) {
+    const Eigen::VectorXd column = guarded_inverse(H, scale).col(i);
+    const double claimed = column[i];
+    if (!column.allFinite() || !(claimed > 0)) {
       u.profile = {-HUGE_VAL, HUGE_VAL};
       continue;
     }
     const double unit = 0.5 * u.sigma * u.sigma / claimed;
-    const std::array<double, 2> found{end_of(rounds, k, u, t, unit, -1), end_of(rounds, k, u, t, unit, 1)};
+    const Eigen::VectorXd along = column / claimed;
+    const std::array<double, 2> found{end_of(rounds, fit, k, along, t, unit, -1),
+                                      end_of(rounds, fit, k, along, t, unit, 1)};
     const double half = t * u.sigma;
     if (std::abs(u.value - half - found[0]) > 0.1 * half || std::abs(u.value + half - found[1]) > 0.1 * half)
       u.profile = found;
