@@ -165,42 +165,52 @@ void FitRounds::learn() {
   for (std::size_t k = 0; k < shared_.own_sigma.size(); ++k) {
     const Unknown& u = problem_.own()[k];
     if (u.kind == Unknown::Kind::smoothing) continue;
-    shared_.own_sigma[k] = std::clamp(std::sqrt(spread_of(k)), 1e-3 * *u.prior_sigma, 3 * *u.prior_sigma);
+    shared_.own_sigma[k] = std::clamp(std::sqrt(variance_of(k)), 1e-3 * *u.prior_sigma, 3 * *u.prior_sigma);
   }
 }
 
-double FitRounds::spread_of(std::size_t k) const {
+double FitRounds::variance_of(std::size_t k) const {
   struct Sum {
-    double weight{}, value{}, square{}, uncertain{}, n{};
+    double weight{}, value{}, square{}, share{}, squared_share{}, n{};
   };
+  const double variance = shared_.own_sigma[k] * shared_.own_sigma[k];
   std::map<std::string, Sum> conditions;
   for (std::size_t i = 0; i < used_.size(); ++i) {
     const ThrowEquations& part = equations_.throws[i];
     const double value = own(i)[k];
+    const double share = std::max(0.0, 1 - part.own_variance[static_cast<Eigen::Index>(k)] / variance);
     for (const auto& key : {problem_.throws()[used_[i]].prepared.experiment(), std::string()}) {
       Sum& sum = conditions[key];  // "": all together
       sum.weight += part.weight;
       sum.value += part.weight * value;
       sum.square += part.weight * value * value;
-      sum.uncertain += part.weight * part.own_variance[static_cast<Eigen::Index>(k)];
+      sum.share += part.weight * share;
+      sum.squared_share += part.weight * share * share;
       sum.n += 1;
     }
   }
+  const auto likelier = [&](double square, double share, double squared_share) {
+    if (!(share > 0)) return variance;
+    constexpr double kApart = 4;  // where throws say little, the scores scatter
+    const double fixed_point = square / share;
+    return std::clamp(variance + (square - share * variance) / squared_share, fixed_point / kApart,
+                      fixed_point * kApart);
+  };
   const Sum all = conditions[""];
-  const double about_zero = (all.square + all.uncertain) / std::max(all.weight, 1e-300);
+  const double about_zero = likelier(all.square, all.share, all.squared_share);
   if (problem_.own()[k].kind == Unknown::Kind::placement) return about_zero;
   conditions.erase("");
-  double square = 0, weight = 0, degrees = 0;
+  double square = 0, share = 0, squared_share = 0, degrees = 0;
   for (const auto& [name, sum] : conditions) {
     if (sum.n < 2 || !(sum.weight > 0)) continue;
     const double rest = 1 - 1 / sum.n;
-    square += sum.square - sum.value * sum.value / sum.weight + rest * sum.uncertain;
-    weight += rest * sum.weight;
+    square += sum.square - sum.value * sum.value / sum.weight;
+    share += rest * sum.share;
+    squared_share += rest * sum.squared_share;
     degrees += sum.n - 1;
   }
   constexpr double kEnough = 10;  // a spread is then known to a quarter
-  if (degrees >= kEnough && weight > 0) return square / weight;
-  return about_zero;
+  return degrees >= kEnough ? likelier(square, share, squared_share) : about_zero;
 }
 
 }  // namespace unhand::fitting

@@ -59,9 +59,12 @@ class FitRounds {
  private:
   const double* own_at(std::size_t i) const { return own_.data() + i * shared_.own_scale.size(); }
   double* own_at(std::size_t i) { return own_.data() + i * shared_.own_scale.size(); }
-  /// The variance of own unknown k: what the throws show plus what each is uncertain by; about zero or the
-  /// mean of their condition, as Unknown::Kind says, the latter if there are repetitions enough.
-  double spread_of(std::size_t k) const;
+  /// A likelier variance of own unknown k than it was solved with: a step of Fisher's scoring of the
+  /// likelihood of the variance [Longford1987], not far from the fixed-point iteration of [MacKay1992], which
+  /// has the same solutions. About zero or the mean of their condition, as Unknown::Kind says, the latter if
+  /// there are repetitions enough. Expectation-maximisation would need many rounds where the variance is
+  /// small.
+  double variance_of(std::size_t k) const;
   void choose_throws(const std::vector<double>& start);
   /// Moves x_ and own_ to the least; `held` keeps its value, too.
   Solution minimise(double tolerance, std::optional<std::size_t> held);

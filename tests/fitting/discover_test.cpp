@@ -324,7 +324,7 @@ TEST(Discovery, TheGiveOfAnyPadsIsFittedAlongAndNoPartOfTheAnswer) {
 // effect.
 TEST(Discovery, TheGiveOfAnyPadsIsNoPartOfTheAnswerWhereAChannelShowsIt) {
   experiment::CampaignDesign design = experiment::random_campaign(9307);
-  design.effects = {{"contact.pad_compliance.compliance", 1.5e-7}};
+  design.effects = {{"contact.pad_compliance.compliance", 1.7e-7}};
   const Discovery found = found_in(experiment::generate_campaign(design, 9307));
   EXPECT_EQ(found.verdict, Verdict::no_missing_effect);
   EXPECT_EQ(found.along, std::vector<std::string>{"contact.pad_compliance"});
