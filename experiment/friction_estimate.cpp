@@ -11,6 +11,7 @@
 #include "contact/convex_quartic.hpp"
 #include "contact/gripper_delay.hpp"
 #include "contact/limit_surface_shapes.hpp"
+#include "contact/patch.hpp"
 #include "dynamics/median.hpp"
 #include "experiment/observations.hpp"
 #include "experiment/sample_window.hpp"
@@ -125,10 +126,16 @@ struct SurfaceFit {
   double mu_sigma{HUGE_VAL}, length_sigma{HUGE_VAL};  ///< 1 σ, as shares of the values [-]
 };
 
+/// What is fitted to the samples.
+enum class Fitted {
+  both,  ///< μ and L
+  mu     ///< μ, of pads whose L is known
+};
+
 /// Gauss-Newton on (ln μ, ln L), every gauge weighted with its own noise and with 1/max(1, |r|/k), the step
 /// damped.
 template <class Shape>
-void solve(const Shape& shape, const std::vector<SlipSample>& samples, SurfaceFit& fit) {
+void solve(const Shape& shape, const std::vector<SlipSample>& samples, Fitted what, SurfaceFit& fit) {
   std::vector<double> off(samples.size()), whitened(samples.size());
   std::vector<Dual> r(samples.size());
   std::vector<double> sigma(samples.size());
@@ -149,17 +156,18 @@ void solve(const Shape& shape, const std::vector<SlipSample>& samples, SurfaceFi
     double H[2][2] = {}, b[2] = {};
     for (std::size_t i = 0; i < samples.size(); ++i) {
       const double w = 1 / (sigma[i] * sigma[i] * std::max(1.0, whitened[i] / k));
-      const double J[2] = {fit.mu * r[i].v[0], fit.length * r[i].v[1]};
+      const double J[2] = {fit.mu * r[i].v[0], what == Fitted::mu ? 0 : fit.length * r[i].v[1]};
       for (int p = 0; p < 2; ++p) {
         b[p] -= w * J[p] * r[i].a;
         for (int q = 0; q < 2; ++q) H[p][q] += w * J[p] * J[q];
       }
     }
     for (int p = 0; p < 2; ++p) H[p][p] *= 1 + 1e-9;
+    if (what == Fitted::mu) H[1][1] = H[0][0];  // nothing is asked of L: its step is zero
     const double det = H[0][0] * H[1][1] - H[0][1] * H[1][0];
     if (!(det > 0)) break;
     fit.mu_sigma = scale * std::sqrt(H[1][1] / det);
-    fit.length_sigma = scale * std::sqrt(H[0][0] / det);
+    fit.length_sigma = what == Fitted::mu ? 0 : scale * std::sqrt(H[0][0] / det);
     const double d0 = std::clamp((b[0] * H[1][1] - b[1] * H[0][1]) / det, -0.5, 0.5);
     const double d1 = std::clamp((b[1] * H[0][0] - b[0] * H[1][0]) / det, -0.5, 0.5);
     fit.mu *= std::exp(d0);
@@ -170,11 +178,46 @@ void solve(const Shape& shape, const std::vector<SlipSample>& samples, SurfaceFi
 
 /// The surface of the two on which the samples lie better: real pads follow no rectangle, and the ellipsoid's
 /// values serve the sliding pivot better there than those of a rectangle through all samples.
-void solve_sliding_pivot(const std::vector<SlipSample>& samples, SurfaceFit& fit) {
+void solve_sliding_pivot(const std::vector<SlipSample>& samples, Fitted what, SurfaceFit& fit) {
   SurfaceFit own = fit;
-  solve(Decoupled{}, samples, own);
-  solve(contact::Ellipsoid{}, samples, fit);
+  solve(Decoupled{}, samples, what, own);
+  solve(contact::Ellipsoid{}, samples, what, fit);
   if (own.scatter < fit.scatter) fit = own;
+}
+
+void solve(const std::string& model, const std::vector<SlipSample>& samples, Fitted what, SurfaceFit& fit) {
+  if (model == "limit_surface_disc")
+    solve(contact::UniformDisc{}, samples, what, fit);
+  else if (model == "limit_surface_quartic")
+    solve(contact::ConvexQuartic::closest_to_disc(), samples, what, fit);
+  else if (model == "sliding_pivot")
+    solve_sliding_pivot(samples, what, fit);
+  else
+    solve(contact::Ellipsoid{}, samples, what, fit);
+}
+
+/// From the envelope: the largest force and torque ratios that are common.
+SurfaceFit envelope(const std::vector<SlipSample>& samples) {
+  std::vector<double> force, torque;
+  for (const auto& s : samples) {
+    force.push_back(std::hypot(s.ratio[0], s.ratio[1]));
+    torque.push_back(std::abs(s.ratio[2]));
+  }
+  std::sort(force.begin(), force.end());
+  std::sort(torque.begin(), torque.end());
+  const std::size_t top = samples.size() * 9 / 10;
+  SurfaceFit out;
+  out.mu = std::clamp(force[top], 0.05, 3.0), out.length = std::clamp(torque[top] / out.mu, 1e-4, 0.1);
+  return out;
+}
+
+/// What a friction coefficient and a length can be, and how well they must be known.
+constexpr double kMu[2] = {1e-3, 20}, kLength[2] = {1e-5, 0.2};  // -, m
+constexpr double kMostSigma = 0.15;                              // as a share
+
+bool determines_both(const SurfaceFit& fit) {
+  return fit.mu >= kMu[0] && fit.mu <= kMu[1] && fit.mu_sigma <= kMostSigma && fit.length >= kLength[0] &&
+         fit.length <= kLength[1] && fit.length_sigma <= kMostSigma;
 }
 
 void estimate_delay(const std::vector<PreparedThrow>& throws, ModelParameters& parameters) {
@@ -199,8 +242,7 @@ void estimate_delay(const std::vector<PreparedThrow>& throws, ModelParameters& p
 
 void require_patch(const FrictionEstimate& estimate, const std::string& model) {
   if (model == contact::kGripperDelay) return;
-  constexpr double kMu[2] = {1e-3, 20}, kLength[2] = {1e-5, 0.2};  // -, m
-  constexpr double kMostScatter = 0.25, kMostSigma = 0.15, kRadiusDoubt = 1.25;
+  constexpr double kMostScatter = 0.25, kRadiusDoubt = 1.25;
   const auto refuse = [&](const char* what, const std::string& why) {
     throw std::invalid_argument(
         fmt::format("the log does not determine the {} for {}: {} F/T samples of slipping pads in its train "
@@ -243,31 +285,20 @@ FrictionEstimate estimate_friction(const datasets::ThrowLog& log, const std::vec
                     "its train throws, at least 10 are needed; fit it to all that the log holds (--fit), or "
                     "give a card",
                     model, samples.size()));
-  // Start from the envelope: the largest force and torque ratios that are common.
-  std::vector<double> force, torque;
-  for (const auto& s : samples) {
-    force.push_back(std::hypot(s.ratio[0], s.ratio[1]));
-    torque.push_back(std::abs(s.ratio[2]));
+  out.method = "friction: the pad's wrench on the limit surface where it evidently slips, train throws";
+  if (log.gripper) out.pad_radius = log.gripper->pad_radius;
+  SurfaceFit fit = envelope(samples);
+  solve(model, samples, Fitted::both, fit);
+  if (out.pad_radius && !determines_both(fit)) {
+    fit = envelope(samples);
+    fit.length = contact::kUniformDisc * *out.pad_radius;
+    solve(model, samples, Fitted::mu, fit);
+    out.method += "; the length is that of the declared pad_radius, since those wrenches do not determine it";
   }
-  std::sort(force.begin(), force.end());
-  std::sort(torque.begin(), torque.end());
-  const std::size_t top = samples.size() * 9 / 10;
-  SurfaceFit fit;
-  fit.mu = std::clamp(force[top], 0.05, 3.0), fit.length = std::clamp(torque[top] / fit.mu, 1e-4, 0.1);
-  if (model == "limit_surface_disc")
-    solve(contact::UniformDisc{}, samples, fit);
-  else if (model == "limit_surface_quartic")
-    solve(contact::ConvexQuartic::closest_to_disc(), samples, fit);
-  else if (model == "sliding_pivot")
-    solve_sliding_pivot(samples, fit);
-  else
-    solve(contact::Ellipsoid{}, samples, fit);
   out.parameters.mu = fit.mu;
   out.parameters.length = fit.length;
   out.scatter = fit.scatter;
   out.mu_sigma = fit.mu_sigma, out.length_sigma = fit.length_sigma;
-  if (log.gripper) out.pad_radius = log.gripper->pad_radius;
-  out.method = "friction: the pad's wrench on the limit surface where it evidently slips, train throws";
   return out;
 }
 

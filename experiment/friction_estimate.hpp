@@ -31,7 +31,9 @@ struct FrictionEstimate {
 /// else the series' own scatter, and ObservationOptions::wrench_trust), with a loss that grows linearly. A
 /// friction that changes with speed or force gives a mean over the slip. The naive limit surface takes the
 /// ellipsoid's values, and so does the sliding pivot, unless the samples lie better on its own surface,
-/// max(|f|/(μ f_N), |τ|/(L μ f_N)) = 1: its throws would drive an ellipsoid's μ to infinity.
+/// max(|f|/(μ f_N), |τ|/(L μ f_N)) = 1: its throws would drive an ellipsoid's μ to infinity. Where the
+/// samples do not determine both (objects that only pivot, or only slide, or pads that obey another law), L
+/// is that of the declared pad_radius, 2/3 of it, if there is one.
 ///
 /// Delay: mean and scatter over the train throws of (detach − opening command).
 ///
@@ -42,10 +44,9 @@ FrictionEstimate estimate_friction(const datasets::ThrowLog& log, const std::vec
                                    const std::string& model);
 
 /// Throws std::invalid_argument, in words, where an estimate's friction is not to be relied on: μ outside
-/// [0.001, 20] or L outside [1e-5, 0.2] m; either uncertain by more than 15 % (wrenches that point one way
-/// determine one of the two); samples that scatter by more than 25 % about the surface; or an L above 1.25
-/// times the declared pad radius, as no pad's torque has a longer arm than its rim and a declared radius may
-/// be somewhat wrong.
+/// [0.001, 20] or L outside [1e-5, 0.2] m; either uncertain by more than 15 %; samples that scatter by more
+/// than 25 % about the surface; or an L above 1.25 times the declared pad radius, as no pad's torque has a
+/// longer arm than its rim and a declared radius may be somewhat wrong.
 void require_patch(const FrictionEstimate& estimate, const std::string& model);
 
 }  // namespace unhand::experiment

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "contact/contact_model.hpp"
+#include "contact/patch.hpp"
 #include "experiment/synthetic_campaign.hpp"
 #include "tests/support/perfect_campaign.hpp"
 
@@ -189,6 +190,24 @@ TEST(FrictionEstimate, OfASlidingPivotKnowsThatItsLimitsAreApart) {
   const auto found = estimate_friction(known.log, known.prepared, "sliding_pivot").parameters;
   EXPECT_NEAR(found.mu / design.patch.mu, 1, 1e-4);
   EXPECT_NEAR(found.length / design.patch.length(), 1, 1e-4);
+}
+
+// Pads that obey the sliding pivot turn at their limit of torque under any force below its own limit. A disc
+// can only follow with a μ without end; the declared radius gives it one.
+TEST(FrictionEstimate, OfPadsThatObeyAnotherLawTakesTheDeclaredRadius) {
+  CampaignDesign design = campaign_design("quick12");
+  design.release_accelerations = {3, -4, -9, -14};
+  design.contact_model = "sliding_pivot";
+  Known known(design);
+  const auto found = estimate_friction(known.log, known.prepared, "limit_surface_disc");
+  EXPECT_NO_THROW(require_patch(found, "limit_surface_disc"));
+  EXPECT_NEAR(found.parameters.length, contact::kUniformDisc * *known.log.gripper->pad_radius, 1e-15);
+  EXPECT_NEAR(found.parameters.mu / design.patch.mu, 1, 0.25) << "force and torque share what they had apart";
+  EXPECT_NE(found.method.find("pad_radius"), std::string::npos) << found.method;
+  known.log.gripper->pad_radius.reset();
+  EXPECT_THROW(
+      require_patch(estimate_friction(known.log, known.prepared, "limit_surface_disc"), "limit_surface_disc"),
+      std::invalid_argument);
 }
 
 TEST(FrictionEstimate, OfADelayIsTheMeanFromTheCommandToTheDetach) {
