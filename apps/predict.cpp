@@ -52,7 +52,7 @@ Json json_of(const experiment::ThrowComparison& one, const experiment::PreparedT
         {"detach_vz_m_s", sigma->detach_vz},   {"detach_omega_deg_s", sigma->detach_omega * kDegrees},
         {"landing_x_m", sigma->landing_x},     {"landing_theta_deg", sigma->landing_theta * kDegrees},
         {"flight_time_s", sigma->flight_time}};
-  out["outside_valid_range"] = fitting::outside_range(card, prepared);
+  out["outside_valid_range"] = fitting::reasons_of(fitting::outside_range(card, prepared));
   Json& measured = out["measured"] = Json::object();
   const auto& m = prepared.measured;
   if (m.detach_time) measured["detach_time_s"] = *m.detach_time + clock_origin;
@@ -119,7 +119,8 @@ void warn_outside(const datasets::ModelCard& card, const std::vector<experiment:
   int outside = 0;
   for (const auto& one : throws)
     if (const auto why = fitting::outside_range(card, one); !why.empty() && ++outside <= kTold)
-      tell("unhand: throw {} lies outside the card's valid range: {}\n", one.id, fmt::join(why, ", "));
+      tell("unhand: throw {} lies outside the card's valid range: {}\n", one.id,
+           fmt::join(fitting::reasons_of(why), ", "));
   if (outside > kTold)
     tell("unhand: and {} more of {} throws (--json FILE has them all)\n", outside - kTold, throws.size());
 }

@@ -87,16 +87,35 @@ std::map<std::string, CardRange> valid_range_of(const CampaignProblem& problem) 
   return out;
 }
 
-std::vector<std::string> outside_range(const ModelCard& card, const experiment::PreparedThrow& prepared) {
-  std::vector<std::string> out;
+std::vector<UntriedCondition> outside_range(const ModelCard& card,
+                                            const experiment::PreparedThrow& prepared) {
+  std::vector<UntriedCondition> out;
   for (const auto& [name, unit, value] : conditions_of(prepared)) {
     const auto range = card.valid_range.find(name);
     if (range == card.valid_range.end() || range->second.unit != unit) continue;
     const auto& [low, high, same_unit] = range->second;
     const double margin = kRangeMargin * std::max(std::abs(low), std::abs(high));
     if (value >= low - margin && value <= high + margin) continue;
-    out.push_back(fmt::format("{} {:.4g} {} is outside [{:.4g}, {:.4g}]", name, value, unit, low, high));
+    out.push_back(
+        {name, fmt::format("{} {:.4g} {} is outside [{:.4g}, {:.4g}]", name, value, unit, low, high)});
   }
+  return out;
+}
+
+std::optional<UntriedCondition> untried_surface(const ModelCard& card, const std::string& surface) {
+  const auto& known = card.log.surfaces;
+  if (!card.parameters.contains("mu") || std::find(known.begin(), known.end(), surface) != known.end())
+    return {};
+  return UntriedCondition{
+      "surface",
+      known.empty() ? fmt::format("surface '{}': the card does not name those that it was fitted on", surface)
+                    : fmt::format("surface '{}' is none of those that the card was fitted on: {}", surface,
+                                  fmt::join(known, ", "))};
+}
+
+std::vector<std::string> reasons_of(const std::vector<UntriedCondition>& untried) {
+  std::vector<std::string> out;
+  for (const auto& one : untried) out.push_back(one.reason);
   return out;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,10 +32,23 @@ std::map<std::string, datasets::CardRange> valid_range_of(const CampaignProblem&
 /// By this share of its ends a throw may lie beyond a valid range: sensors are no better, and a model that
 /// holds inside does not end there.
 inline constexpr double kRangeMargin = 0.01;
-/// Where a throw lies outside a card's valid range, in words; empty: inside. Conditions that the throw does
-/// not tell are passed over.
-std::vector<std::string> outside_range(const datasets::ModelCard& card,
-                                       const experiment::PreparedThrow& prepared);
+/// A condition in which a card has not been tried.
+struct UntriedCondition {
+  std::string condition;  ///< "mass"
+  std::string reason;     ///< "mass 0.5 kg is outside [0.24, 0.26]"
+};
+
+/// Where a throw lies outside a card's valid range; empty: inside. Conditions that the throw does not tell
+/// are passed over.
+std::vector<UntriedCondition> outside_range(const datasets::ModelCard& card,
+                                            const experiment::PreparedThrow& prepared);
+
+/// Whether pads on this surface are what the card's friction was estimated on: nothing if its log names the
+/// surface, or if the model has no friction.
+std::optional<UntriedCondition> untried_surface(const datasets::ModelCard& card, const std::string& surface);
+
+/// The reasons alone.
+std::vector<std::string> reasons_of(const std::vector<UntriedCondition>& untried);
 
 /// "fnv1a64:" and 16 hexadecimal digits: the 64-bit FNV-1a hash of the file's bytes (offset basis
 /// cbf29ce484222325, prime 100000001b3). It tells logs apart and is no protection. Nothing if the file cannot

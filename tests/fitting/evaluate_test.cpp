@@ -178,11 +178,11 @@ TEST(Card, KnowsWhereItHasBeenTried) {
     }
   auto far = disc().throws()[0].prepared;
   far.body.mass *= 3;
-  EXPECT_THAT(outside_range(card, far), testing::ElementsAre(HasSubstr("mass")));
+  EXPECT_THAT(reasons_of(outside_range(card, far)), testing::ElementsAre(HasSubstr("mass")));
   far.body.mass = (1 + 0.9 * kRangeMargin) * card.valid_range.at("mass").high;
   EXPECT_THAT(outside_range(card, far), testing::IsEmpty());
   far.body.mass = (1 + 1.1 * kRangeMargin) * card.valid_range.at("mass").high;
-  EXPECT_THAT(outside_range(card, far), testing::ElementsAre(HasSubstr("mass")));
+  EXPECT_THAT(reasons_of(outside_range(card, far)), testing::ElementsAre(HasSubstr("mass")));
 }
 
 TEST(Card, ChecksumIsTheDocumentedOne) {
