@@ -60,6 +60,26 @@ TEST_F(Cli, AModelThatTheLogDoesNotDetermineStopsNoOther) {
   expect_refusal("compare straight.h5 --models limit_surface --json b.json", 1, "does not determine");
 }
 
+// A log without force and torque stops every model: a line per reason with the models, and the advice once.
+TEST_F(Cli, CompareSaysOnceWhyNoModelIsCompared) {
+  write_changed("bare.h5", [](datasets::Throw& one) { one.ft.reset(); });
+  const Answer answer = run("compare bare.h5");
+  EXPECT_EQ(answer.code, 1);
+  std::istringstream lines(answer.err);
+  int told = 0, advised = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++told;
+    advised += line.find("--fit") != std::string::npos;
+    EXPECT_LT(line.size(), 250u) << line;
+  }
+  EXPECT_EQ(told, 5) << answer.err;  // two reasons, what helps against each, the outcome
+  EXPECT_EQ(advised, 1) << answer.err;
+  EXPECT_THAT(answer.err,
+              HasSubstr("limit_surface, limit_surface_disc, limit_surface_quartic: not compared: the log "
+                        "determines no friction"));
+  EXPECT_THAT(answer.err, HasSubstr("gripper_delay: not compared: the log shows no detach"));
+}
+
 // What a gripper still holds does not fly, even if nobody logged the hand.
 TEST_F(Cli, ThrowsWithoutAHandAreNoFlightsBeforeTheyAreLetGo) {
   write_changed("carried.h5", [](datasets::Throw& one) { one.hand.reset(); });
