@@ -268,5 +268,19 @@ TEST_F(Cli, FigureDrawsWhatIsAskedFor) {
   expect_refusal("figure modes --log none.h5 --out g", 3, "none.h5");
 }
 
+TEST_F(Cli, InspectTellsOfWhatIsImpossibleAndTheRestRefusesIt) {
+  EXPECT_EQ(json::parse(run("inspect " + quick + " --json").out)["doubtful"], json::array());
+  auto log = datasets::read_throw_log(quick);
+  log.gripper->pad_radius = 10.6;  // mm
+  datasets::write_throw_log(folder / "mm.h5", log);
+  const Answer answer = run("inspect mm.h5");
+  EXPECT_EQ(answer.code, 0);
+  EXPECT_THAT(answer.out, HasSubstr("doubtful: /gripper@pad_radius: pad_radius is 10.6 m"));
+  const json seen = json::parse(run("inspect mm.h5 --json").out);
+  ASSERT_EQ(seen["doubtful"].size(), 1u);
+  EXPECT_EQ(seen["doubtful"][0]["path"], "/gripper@pad_radius");
+  expect_refusal("compare mm.h5 --json a.json", 3, "mm.h5: /gripper@pad_radius");
+}
+
 }  // namespace
 }  // namespace unhand::cli
