@@ -1,6 +1,7 @@
 // Help, refusals and the commands that make and show logs.
 #include <sys/stat.h>
 
+#include "apps/progress.hpp"
 #include "tests/apps/cli.hpp"
 
 namespace unhand::cli {
@@ -18,6 +19,22 @@ std::vector<std::string> commands_in(const std::string& help, const std::string&
     if (line == "Subcommands:") listed = true;
   }
   return out;
+}
+
+// Where stderr is no terminal, as under a test, a long run tells a line per period, and a short one none.
+TEST(Progress, TellsALineNowAndThenWithoutATerminal) {
+  using std::chrono::milliseconds;
+  testing::internal::CaptureStderr();
+  {
+    apps::Progress progress("fit", 4, milliseconds(30));
+    progress.step();
+    std::this_thread::sleep_for(milliseconds(100));
+  }
+  { const apps::Progress progress("discover", 0, milliseconds(30)); }
+  const std::string told = testing::internal::GetCapturedStderr();
+  EXPECT_TRUE(told.starts_with("unhand: fit: 25 % done, at work for 0 s\n")) << told;
+  EXPECT_THAT(told, Not(HasSubstr("discover")));
+  EXPECT_LE(std::count(told.begin(), told.end(), '\n'), 3);
 }
 
 TEST_F(Cli, HelpHasAnExampleEverywhere) {
