@@ -10,6 +10,7 @@
 #include "datasets/summary.hpp"
 #include "dynamics/frames.hpp"
 #include "dynamics/median.hpp"
+#include "experiment/landing_noise.hpp"
 #include "experiment/unit_rules.hpp"
 
 namespace unhand::experiment {
@@ -191,7 +192,7 @@ void check_landing(const Held& held, SizeRatios& out) {
   keep(out, SizedColumn::landing_x, x.ratio(5 * kShowsShift));
   if (landing.time.empty()) return;
   if (held.end + fall > 0) keep(out, SizedColumn::landing_clock, landing.time(0) / (held.end + fall));
-  if (!held.logged.mocap) return;
+  if (!held.logged.mocap || !tells_angle(landing)) return;
   // On from the last two samples that lie far enough apart for a rate.
   const auto& mocap = *held.logged.mocap;
   constexpr double kApart = 0.02;  // s
