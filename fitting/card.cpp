@@ -186,9 +186,10 @@ ModelCard card_of(const CampaignProblem& problem, const FitResult& fit) {
   card.model = problem.options().model;
   card.effects = problem.options().effects;
   auto& covariance = card.covariance.emplace();
-  for (const auto& u : fit.campaign) {
-    const bool determined = std::isfinite(u.data_sigma);
-    auto& one = card.parameters[u.unknown.name] = {u.value, u.sigma, u.unknown.unit, determined, {}, {}};
+  for (std::size_t k = 0; k < fit.campaign.size(); ++k) {
+    const FittedUnknown& u = fit.campaign[k];
+    auto& one =
+        card.parameters[u.unknown.name] = {u.value, u.sigma, u.unknown.unit, is_determined(fit, k), {}, {}};
     if (u.profile && std::isfinite((*u.profile)[0])) one.low95 = (*u.profile)[0];
     if (u.profile && std::isfinite((*u.profile)[1])) one.high95 = (*u.profile)[1];
     covariance.names.push_back(u.unknown.name);

@@ -86,7 +86,7 @@ TEST_F(Cli, FitThenPredict) {
 // Without a normal force the card tells how the pads open, or prediction says what is missing.
 TEST_F(Cli, PredictSaysHowPadsOpenThatNobodyMeasured) {
   ASSERT_EQ(run("generate quick12 --seed 4 --without ft --out bare.h5").code, 0);
-  ASSERT_EQ(run("fit bare.h5 --model limit_surface_disc --card bare.json").code, 0);
+  ASSERT_EQ(run("fit bare.h5 --model limit_surface_disc --card bare.json --json f.json").code, 0);
   const Answer answer = run("predict bare.h5 --card bare.json");
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.err,
@@ -95,6 +95,18 @@ TEST_F(Cli, PredictSaysHowPadsOpenThatNobodyMeasured) {
   ASSERT_EQ(run("fit " + quick + " --model limit_surface_disc --card c.json").code, 0);
   expect_refusal("predict bare.h5 --card c.json", 3,
                  "c.json: /parameters/grip_force: is missing: throws without a measured normal force");
+
+  // What takes part in an open direction is not called determined, by the fit or by its card.
+  const json fitted = read_json(folder / "f.json"), card = read_json(folder / "bare.json")["parameters"];
+  ASSERT_FALSE(fitted["open_directions"].empty());
+  EXPECT_FALSE(fitted["parameters"]["mu"]["determined"].get<bool>());
+  for (const auto& [name, parameter] : fitted["parameters"].items()) {
+    EXPECT_EQ(card[name].value("determined", true), parameter["determined"].get<bool>()) << name;
+    for (const auto& open : fitted["open_directions"])
+      if (open["meaning"].get<std::string>().find(name + " ") != std::string::npos) {
+        EXPECT_FALSE(parameter["determined"].get<bool>()) << name;
+      }
+  }
 }
 
 TEST_F(Cli, FitAnswersOrSaysWhyNot) {
