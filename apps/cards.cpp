@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "contact/gripper_delay.hpp"
 #include "contact/patch.hpp"
@@ -56,6 +57,16 @@ class Reader {
   const ModelCard& card_;
   std::vector<std::string> asked_;
 };
+
+datasets::CardLog log_of(const fs::path& file, const datasets::ThrowLog& log) {
+  std::set<std::string> surfaces;
+  for (const auto& one : log.throws)
+    if (const auto& object = log.objects.at(one.object);
+        one.split == datasets::Split::train && object.surface && !object.surface->empty())
+      surfaces.insert(*object.surface);
+  return {
+      file.filename().string(), log.title, fitting::checksum_of(file), {surfaces.begin(), surfaces.end()}};
+}
 
 }  // namespace
 
@@ -117,7 +128,7 @@ ModelCard card_of(const experiment::ModelComparison& model, const fs::path& log_
   card.model = model.model;
   for (const auto& [name, unit, value] : named_values(model.model, model.estimate.parameters))
     card.parameters[name] = {value, {}, unit};
-  card.log = {log_file.filename().string(), log.title, fitting::checksum_of(log_file)};
+  card.log = log_of(log_file, log);
   card.split = "train";
   card.valid_range = fitting::valid_range_of(throws);
   card.library_version = UNHAND_VERSION;
@@ -128,7 +139,7 @@ ModelCard card_of(const fitting::CampaignProblem& problem, const fitting::FitRes
                   const experiment::ModelComparison& errors, const fs::path& log_file,
                   const datasets::ThrowLog& log) {
   ModelCard card = fitting::card_of(problem, fit);
-  card.log = {log_file.filename().string(), log.title, fitting::checksum_of(log_file)};
+  card.log = log_of(log_file, log);
   for (const auto& [split, name] :
        {std::pair{datasets::Split::train, "train"}, {datasets::Split::test, "test"}})
     if (auto found = fitting::errors_of(errors, split); !found.empty()) card.errors[name] = std::move(found);

@@ -19,6 +19,7 @@
 #include "apps/throws.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/free_flight.hpp"
+#include "experiment/friction_estimate.hpp"
 #include "fitting/slips/slip_surface.hpp"
 
 namespace unhand::apps {
@@ -102,38 +103,61 @@ void report_failures(const experiment::Comparison& comparison) {
   if (!any) throw Unanswered("no model brought any throw to a landing");
 }
 
+/// A model that has no place in the comparison.
+struct NotCompared {
+  std::string model, reason;
+  std::string advice;  ///< empty: none
+};
+
+/// A line per reason with the models that it stops, then what helps, once.
+void tell_not_compared(const std::vector<NotCompared>& all) {
+  std::vector<std::pair<std::string, std::vector<std::string>>> by_reason;
+  std::set<std::string> advice;
+  for (const auto& one : all) {
+    if (!one.advice.empty()) advice.insert(one.advice);
+    const auto same = std::find_if(by_reason.begin(), by_reason.end(),
+                                   [&](const auto& told) { return told.first == one.reason; });
+    if (same == by_reason.end())
+      by_reason.push_back({one.reason, {one.model}});
+    else
+      same->second.push_back(one.model);
+  }
+  for (const auto& [reason, models] : by_reason)
+    tell("unhand: {}: not compared: {}\n", fmt::join(models, ", "), reason);
+  for (const auto& helps : advice) tell("unhand: {}\n", helps);
+}
+
 void compare_releases(const CompareRequest& request, const datasets::ThrowLog& log) {
   auto models = request.models.empty() ? usual_models() : request.models;
   const auto cards = read_cards(request, models);
   const auto prepared = prepare_throws(log, request);
   ReleaseRun run(request, log, prepared);
-  std::vector<std::pair<std::string, std::string>> unanswered;  // model, reason
+  std::vector<NotCompared> unanswered;
   {
     Progress progress(request.fit ? "fit" : "simulate", models.size());
     for (const auto& model : models) {
       const auto card = cards.find(model);
       try {
         run.add(model, card == cards.end() ? nullptr : &card->second);
+      } catch (const experiment::Undetermined& error) {
+        unanswered.push_back({model, error.reason, error.advice});
       } catch (const std::invalid_argument& error) {
-        unanswered.emplace_back(model, error.what());
+        unanswered.push_back({model, error.what(), {}});
       } catch (const Unanswered& error) {
-        unanswered.emplace_back(model, error.what());
+        unanswered.push_back({model, error.what(), {}});
       }
       progress.step();
     }
   }
   const experiment::Comparison& comparison = run.comparison();
-  if (comparison.models.empty()) {
-    std::string reasons;
-    for (const auto& [model, reason] : unanswered) reasons += (reasons.empty() ? "" : "; ") + reason;
-    throw Unanswered(reasons);
-  }
-  for (const auto& [model, reason] : unanswered) tell("unhand: {}: not compared: {}\n", model, reason);
+  tell_not_compared(unanswered);
+  if (comparison.models.empty()) throw Unanswered("no model is left to compare");
   report_failures(comparison);
 
   const ReleaseTables tables = release_tables(comparison, log, request.log);
   Json json = release_json(comparison, request);
-  for (const auto& [model, reason] : unanswered) json["not_compared"][model] = reason;
+  for (const auto& [model, reason, advice] : unanswered)
+    json["not_compared"][model] = reason + (advice.empty() ? "" : "; " + advice);
   Outputs outputs{request.inputs()};
   if (!request.json.empty()) outputs.json(request.json, json);
   if (!request.report.empty())

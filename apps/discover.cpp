@@ -12,6 +12,7 @@
 #include "apps/command.hpp"
 #include "apps/discover_measured.hpp"
 #include "apps/figure.hpp"
+#include "apps/progress.hpp"
 #include "apps/ranking.hpp"
 #include "apps/table.hpp"
 #include "apps/throws.hpp"
@@ -156,7 +157,10 @@ void discover(const DiscoverOptions& options, const Parser& parser) {
       throw WrongUsage(error.what());
     }
   }
-  const Discovery found = fitting::discover(log, options.log, request);
+  const Discovery found = [&] {
+    const Progress progress("discover", 0);
+    return fitting::discover(log, options.log, request);
+  }();
   if (found.verdict == fitting::Verdict::not_answered) throw Unanswered(found.message);
 
   Outputs outputs{{options.log}};

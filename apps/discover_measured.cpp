@@ -8,6 +8,7 @@
 #include "apps/command.hpp"
 #include "apps/figure.hpp"
 #include "apps/measured_report.hpp"
+#include "apps/progress.hpp"
 #include "apps/throws.hpp"
 #include "experiment/tracked_flight.hpp"
 #include "fitting/card.hpp"
@@ -93,6 +94,7 @@ void discover_measured(MeasuredKind kind, const MeasuredRequest& request) {
   result.log = request.log;
   result.command = request.command;
   std::optional<datasets::ThrowLog> log;
+  std::optional<Progress> progress(std::in_place, "discover", 0);
   if (kind == MeasuredKind::slips) {
     fitting::SurfaceDiscoveryOptions options;
     options.forget = request.forget;
@@ -115,6 +117,7 @@ void discover_measured(MeasuredKind kind, const MeasuredRequest& request) {
       throw Unanswered(fmt::format("{}: {}", request.log, error.what()));
     }
   }
+  progress.reset();
   if (result.answer.verdict == fitting::Verdict::not_answered) throw Unanswered(result.answer.message);
   Outputs outputs{{request.log}};
   const Json json = measured_json(result);

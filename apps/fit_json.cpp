@@ -26,14 +26,15 @@ Json errors_json(int n, Statistics&& statistics) {
 
 Json parameters_json(const fitting::FitResult& fit) {
   Json out = Json::object();
-  for (const auto& u : fit.campaign) {
+  for (std::size_t k = 0; k < fit.campaign.size(); ++k) {
+    const auto& u = fit.campaign[k];
     const auto [low, high] = u.interval95();
     Json& one = out[u.unknown.name] = {{"value", u.value},
                                        {"unit", u.unknown.unit},
                                        {"sigma", number(u.sigma)},
                                        {"interval95", {number(low), number(high)}},
                                        {"data_sigma", number(u.data_sigma)},
-                                       {"determined", std::isfinite(u.data_sigma)},
+                                       {"determined", fitting::is_determined(fit, k)},
                                        {"at_bound", u.at_bound},
                                        {"prior", nullptr}};
     one["profiled"] = u.profile.has_value();

@@ -15,23 +15,25 @@ using experiment::kDegrees;
 
 constexpr int decimals[experiment::kQuantityCount] = {4, 2, 4, 2};
 
-std::string standing_of(const fitting::FittedUnknown& u) {
+std::string standing_of(const fitting::FitResult& fit, std::size_t k) {
+  const auto& u = fit.campaign[k];
   if (u.at_bound) return "at its bound";
-  if (!std::isfinite(u.data_sigma)) return "not by this log";
+  if (!fitting::is_determined(fit, k)) return "not by this log";
   if (u.unknown.prior_sigma && u.data_sigma > *u.unknown.prior_sigma) return "less than the prior";
   return "yes";
 }
 
 Table parameter_table(const fitting::FitResult& fit) {
   Table out{{"parameter", "unit", "value", "1 sigma", "95 % interval", "determined"}, {}, 2};
-  for (const auto& u : fit.campaign) {
+  for (std::size_t k = 0; k < fit.campaign.size(); ++k) {
+    const auto& u = fit.campaign[k];
     const auto [low, high] = u.interval95();
     out.rows.push_back({u.unknown.name, u.unknown.unit, fmt::format("{:.6g}", u.value),
                         fmt::format("{:.2g}", u.sigma),
                         std::isfinite(low) || std::isfinite(high)
                             ? fmt::format("[{:.5g}, {:.5g}]{}", low, high, u.profile ? " of the profile" : "")
                             : "open",
-                        standing_of(u)});
+                        standing_of(fit, k)});
   }
   return out;
 }

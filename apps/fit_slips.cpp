@@ -5,6 +5,7 @@
 
 #include "apps/command.hpp"
 #include "apps/fit.hpp"
+#include "apps/progress.hpp"
 #include "apps/tell.hpp"
 #include "apps/throws.hpp"
 #include "fitting/slips/compare_surfaces.hpp"
@@ -85,9 +86,11 @@ void fit_slips(const FitRequest& request) {
   options.threads = request.threads;
   options.null_draws = 0;
   if (request.kfold > 0) options.folds = request.kfold;
+  std::optional<Progress> progress(std::in_place, "fit", 0);
   std::vector<SurfaceScore> scores;
   for (auto& row : fitting::compare_surfaces(surfaces, {fitting::surface_model(request.model)}, options))
     scores.push_back(std::move(row.front()));
+  progress.reset();
   bool any = false;
   for (const auto& score : scores) {
     any = any || score.fit.fitted();

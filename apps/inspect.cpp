@@ -69,7 +69,6 @@ Inspection inspect_throws(const std::string& file) {
   const auto log = datasets::read_throw_log(file);
   const auto summary = datasets::summarise(log);
   Inspection out;
-  out.json = datasets::to_json(summary);
   out.text = fmt::format("{}: throw-log, dimension {}\n  title    {}\n  source   {}\n", file,
                          summary.dimension, summary.title, summary.source);
   if (!summary.licence.empty()) out.text += fmt::format("  licence  {}\n", summary.licence);
@@ -107,8 +106,13 @@ Inspection inspect_throws(const std::string& file) {
         "note: {} of {} throws have no hand and are held at first, and no free_flight says from when on they "
         "fly: neither a release nor a flight can be predicted from them\n",
         n, log.throws.size());
-  for (const auto& doubt : experiment::unit_doubts(log))
+  Json json = Json::parse(datasets::to_json(summary));
+  json["doubtful"] = Json::array();
+  for (const auto& doubt : experiment::unit_doubts(log)) {
     out.text += fmt::format("doubtful: {}: {}\n", doubt.path, doubt.reason);
+    json["doubtful"].push_back({{"path", doubt.path}, {"reason", doubt.reason}});
+  }
+  out.json = json.dump(1) + "\n";
   return out;
 }
 

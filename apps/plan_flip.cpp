@@ -12,6 +12,7 @@
 #include "apps/flip_store.hpp"
 #include "apps/numbers.hpp"
 #include "apps/plan.hpp"
+#include "apps/progress.hpp"
 #include "apps/tell.hpp"
 #include "datasets/log_error.hpp"
 #include "datasets/sku.hpp"
@@ -160,6 +161,7 @@ void run(const PlanFlipOptions& o) {
     store.emplace(o.report, settings);
     thrower = store->over(std::move(thrower));
   }
+  std::optional<Progress> progress(std::in_place, "plan flip", 0);
   if (!o.report.empty() || o.learner == "m3")
     answer.population =
         fl::gather(thrower, "population", fl::population_grid(robot.motion.range), o.repeats, robot.bar);
@@ -167,6 +169,7 @@ void run(const PlanFlipOptions& o) {
   const auto learner = learner_of(o, robot, library, thrower, answer);
   answer.path = fl::learn(*learner, answer.target, answer.known, answer.bar, thrower,
                           {o.iterations, o.throws, !(answer.known_bar == answer.bar)});
+  progress.reset();
   fmt::print("{}", text_of(answer));
   if (store && store->recalled() > 0)
     fmt::print("{} throws recalled, {} thrown now\n", store->recalled(), store->thrown());

@@ -13,6 +13,7 @@
 #include "apps/figure.hpp"
 #include "apps/numbers.hpp"
 #include "apps/plan.hpp"
+#include "apps/progress.hpp"
 #include "apps/tell.hpp"
 #include "datasets/model_card.hpp"
 #include "datasets/sku.hpp"
@@ -175,6 +176,7 @@ void plan_throw(const PlanThrowOptions& options) {
                                    4 * std::hypot(card->dead_time.sigma, card->opening_time.sigma)
                              : 0;
   how.search.window = answer.window = std::max(options.window, latest);
+  std::optional<Progress> progress(std::in_place, "plan throw", 0);
   auto result = planners::plan_throw(answer.chain, answer.box, how);
   if (!result.plan) throw Unanswered(fmt::format("{}: {}", to_string(result.outcome), result.reason));
   answer.plan = std::move(*result.plan);
@@ -193,6 +195,7 @@ void plan_throw(const PlanThrowOptions& options) {
         by_delay("no acceleration", answer, planners::JointVector<double>::Zero(pads.size()), options)};
   }
 
+  progress.reset();
   Outputs outputs{{options.arm, options.card, options.sku}};
   if (!options.json.empty()) {
     Json json = json_head("plan-throw");

@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <map>
 #include <memory>
 
 #include "apps/cards.hpp"
@@ -52,7 +54,7 @@ Json json_of(const experiment::ThrowComparison& one, const experiment::PreparedT
         {"detach_vz_m_s", sigma->detach_vz},   {"detach_omega_deg_s", sigma->detach_omega * kDegrees},
         {"landing_x_m", sigma->landing_x},     {"landing_theta_deg", sigma->landing_theta * kDegrees},
         {"flight_time_s", sigma->flight_time}};
-  out["outside_valid_range"] = fitting::outside_range(card, prepared);
+  out["outside_valid_range"] = fitting::reasons_of(fitting::outside_range(card, prepared));
   Json& measured = out["measured"] = Json::object();
   const auto& m = prepared.measured;
   if (m.detach_time) measured["detach_time_s"] = *m.detach_time + clock_origin;
@@ -113,15 +115,35 @@ Table csv_table(const experiment::Comparison& comparison, const datasets::ThrowL
   return out;
 }
 
-/// Tells of throws outside the conditions that the card has been tried in: of the first few one by one.
+/// Tells of throws outside the conditions that the card has been tried in: a line per condition.
 void warn_outside(const datasets::ModelCard& card, const std::vector<experiment::PreparedThrow>& throws) {
-  constexpr int kTold = 10;
-  int outside = 0;
+  struct Outside {
+    int throws{};
+    std::string first, reason;
+  };
+  std::map<std::string, Outside> by_condition;
   for (const auto& one : throws)
-    if (const auto why = fitting::outside_range(card, one); !why.empty() && ++outside <= kTold)
-      tell("unhand: throw {} lies outside the card's valid range: {}\n", one.id, fmt::join(why, ", "));
-  if (outside > kTold)
-    tell("unhand: and {} more of {} throws (--json FILE has them all)\n", outside - kTold, throws.size());
+    for (const auto& [condition, reason] : fitting::outside_range(card, one)) {
+      auto& outside = by_condition.try_emplace(condition, Outside{0, one.id, reason}).first->second;
+      ++outside.throws;
+    }
+  for (const auto& [condition, outside] : by_condition)
+    tell("unhand: {} of {} throws are outside of the card's valid range in {}; the first, {}: {}\n",
+         outside.throws, throws.size(), condition, outside.first, outside.reason);
+}
+
+/// Says how the gripper opens in throws whose normal force was not measured.
+void tell_opening(const datasets::ModelCard& card, const std::vector<experiment::PreparedThrow>& throws) {
+  const auto n =
+      std::count_if(throws.begin(), throws.end(), [](const auto& one) { return !one.normal_force; });
+  std::vector<std::string> told;
+  for (const char* name : fitting::kOpeningParameters)
+    if (const auto p = card.parameters.find(name); p != card.parameters.end())
+      told.push_back(fmt::format("{} {:.4g}{}", name, p->second.value,
+                                 p->second.unit == "-" ? "" : " " + p->second.unit));
+  if (n > 0 && !told.empty())
+    tell("unhand: {} of {} throws have no normal force: there the pads open as the card says ({})\n", n,
+         throws.size(), fmt::join(told, ", "));
 }
 
 /// The predictions of one card, plain or fitted.
@@ -160,6 +182,7 @@ void predict(const PredictOptions& options) {
   const auto log = read_throws(options.log);
   const auto [prepared, comparison, sigmas] = predictions_of(card, log, options);
   warn_outside(card.card, prepared);
+  tell_opening(card.card, prepared);
   const auto& result = comparison.models.front();
   if (result.failed == static_cast<int>(result.throws.size()))
     throw Unanswered(fmt::format("{} brings no throw to a landing: {}", model,

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "apps/cards.hpp"
+#include "apps/progress.hpp"
 #include "apps/throws.hpp"
 
 namespace unhand::apps {
@@ -66,7 +67,10 @@ void validate(ValidateSkuOptions options) {
                                    options.condition, fmt::join(known, ", ")));
     request.condition = options.condition;
   }
-  const auto answer = fitting::validate_sku(question.sku, question.card, options.card, request);
+  const auto answer = [&] {
+    const Progress progress("validate-sku", 0);
+    return fitting::validate_sku(question.sku, question.card, options.card, request);
+  }();
   const Json json = sku_json(question, answer);
   Outputs outputs{{options.sku, options.card, options.log}};
   if (!options.json.empty()) outputs.json(options.json, json);

@@ -89,6 +89,15 @@ std::string held_out_text(const datasets::ModelCard& card) {
                      100 * x->second.mae, theta->second.mae);
 }
 
+/// "throwable, if the card holds beyond what it was tried on: mass, surface".
+std::string verdict_text(const SkuValidation& answer) {
+  std::vector<std::string> conditions;
+  for (const auto& one : answer.untried) conditions.push_back(one.condition);
+  return fmt::format("{}{}{}", to_string(answer.verdict),
+                     conditions.empty() ? "" : ", if the card holds beyond what it was tried on: ",
+                     fmt::join(conditions, ", "));
+}
+
 }  // namespace
 
 std::string sku_text(const SkuQuestion& question, const SkuValidation& answer, bool markdown) {
@@ -97,16 +106,18 @@ std::string sku_text(const SkuQuestion& question, const SkuValidation& answer, b
     return markdown ? fmt::format("\n## {}\n\n", text) : fmt::format("\n{}\n\n", text);
   };
   const auto& sku = question.sku;
-  std::string out = markdown ? fmt::format("# {}: {}\n\n", sku.name, to_string(answer.verdict))
-                             : fmt::format("{}: {}\n", sku.name, to_string(answer.verdict));
+  std::string out = markdown ? fmt::format("# {}: {}\n\n", sku.name, verdict_text(answer))
+                             : fmt::format("{}: {}\n", sku.name, verdict_text(answer));
   out += answer.message + ".\n";
+  for (const auto& one : answer.untried) out += fmt::format("Beyond the card: {}.\n", one.reason);
   out += fmt::format("{:.3g} kg, {:.3g} kg m^2, centre of mass {:.3g} m from the pads, {}; {} of {}.\n",
                      sku.mass, *sku.inertia, sku.com_offset, sku.surface, question.card.model,
                      question.card_file);
-  if (question.card.parameters.contains("mu") && question.request.assumed.other_surface == 0)
-    out +=
-        fmt::format("Friction is that of the card's log ({}): --other-surface allows for another surface.\n",
-                    question.card.log.title);
+  if (fitting::untried_surface(question.card, sku.surface))
+    out += fmt::format("Friction is that of the card's log ({}); for another surface {}.\n",
+                       question.card.log.title,
+                       question.request.assumed.other_surface > 0 ? "--other-surface is allowed for"
+                                                                  : "allow with --other-surface (0.2: 20 %)");
   out += held_out_text(question.card);
   if (answer.measured)
     out += measured_text(*answer.measured);
@@ -148,6 +159,7 @@ Json sku_json(const SkuQuestion& question, const SkuValidation& answer) {
                       {"confidence", request.confidence}};
   out["verdict"] = to_string(answer.verdict);
   out["message"] = answer.message;
+  out["outside_valid_range"] = fitting::reasons_of(answer.untried);
   out["notes"] = answer.notes;
   out["needed_grip_force_N"] = answer.needed_grip_force ? Json(*answer.needed_grip_force) : Json(nullptr);
   out["condition"] = answer.reference().condition;

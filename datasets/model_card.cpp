@@ -191,6 +191,7 @@ ModelCard parse_model_card(const std::string& text, const std::string& file) {
   card.log.file = log.required("file", log.text("file"));
   card.log.title = log.text("title").value_or("");
   card.log.checksum = log.text("checksum");
+  card.log.surfaces = log.texts("surfaces");
   root.keep("log", log);
   card.split = root.text("split");
   if (auto errors = root.object("errors")) {
@@ -232,6 +233,7 @@ std::string to_json(const ModelCard& card) {
     out["own_spreads"][name] = {{"sigma", spread.sigma}, {"unit", spread.unit}};
   out["log"] = {{"file", card.log.file}, {"title", card.log.title}};
   if (card.log.checksum) out["log"]["checksum"] = *card.log.checksum;
+  if (!card.log.surfaces.empty()) out["log"]["surfaces"] = card.log.surfaces;
   if (card.split) out["split"] = *card.split;
   for (const auto& [split, quantities] : card.errors) {
     Json& one = out["errors"][split] = Json::object();

@@ -50,6 +50,8 @@ struct CardStatistics {
 struct CardLog {
   std::string file, title;              ///< name of the file, without its folder; the log's title
   std::optional<std::string> checksum;  ///< "fnv1a64:" and 16 digits, as checksum_of makes it
+  /// What the pads touched there, as the log's objects say, sorted; empty: it does not tell.
+  std::vector<std::string> surfaces = {};
   bool operator==(const CardLog&) const = default;
 };
 
@@ -67,7 +69,7 @@ struct CardRange {
 ///                   0.011}, ...},
 ///    "covariance": {"names": ["mu", ...], "matrix": [[1e-4, ...], ...]},
 ///    "own_spreads": {"mu_deviation": {"sigma": 0.02, "unit": "-"}, ...},
-///    "log": {"file": "campaign.h5", "title": "...", "checksum": "fnv1a64:..."},
+///    "log": {"file": "campaign.h5", "title": "...", "checksum": "fnv1a64:...", "surfaces": ["aluminium"]},
 ///    "split": "train",
 ///    "errors": {"test": {"landing_x_m": {"n": 90, "mae": 0.003, "std": 0.002, "bias": 0.0}, ...}, ...},
 ///    "valid_range": {"grip_force": {"low": 45, "high": 55, "unit": "N"}, ...},

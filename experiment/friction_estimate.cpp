@@ -220,15 +220,18 @@ bool determines_both(const SurfaceFit& fit) {
          fit.length <= kLength[1] && fit.length_sigma <= kMostSigma;
 }
 
+constexpr const char* kAdvice = "fit to all that the log holds (--fit), or give a card (--card)";
+
 void estimate_delay(const std::vector<PreparedThrow>& throws, ModelParameters& parameters) {
   std::vector<double> delays;
   for (const auto& t : throws)
     if (t.split == datasets::Split::train && t.measured.detach_time)
       delays.push_back(*t.measured.detach_time - t.open_command);
   if (delays.empty())
-    throw std::invalid_argument(
-        "the log shows no detach in any train throw (neither a normal force that ends nor detach_time): "
-        "the gripper's delay cannot be estimated; give a card");
+    throw Undetermined(contact::kGripperDelay,
+                       "the log shows no detach in any train throw (neither a normal force that ends nor "
+                       "detach_time)",
+                       "give gripper_delay a card (--card), or the throws their detach_time");
   double mean = 0, square = 0;
   for (const double d : delays) mean += d / static_cast<double>(delays.size());
   for (const double d : delays) square += (d - mean) * (d - mean) / static_cast<double>(delays.size());
@@ -244,10 +247,12 @@ void require_patch(const FrictionEstimate& estimate, const std::string& model) {
   if (model == contact::kGripperDelay) return;
   constexpr double kMostScatter = 0.25, kRadiusDoubt = 1.25;
   const auto refuse = [&](const char* what, const std::string& why) {
-    throw std::invalid_argument(
-        fmt::format("the log does not determine the {} for {}: {} F/T samples of slipping pads in its train "
-                    "throws {}; fit it to all that the log holds (--fit), give more throws, or a card",
-                    what, model, estimate.samples, why));
+    throw Undetermined(
+        model,
+        fmt::format("the log does not determine the {}: {} F/T samples of slipping pads in its "
+                    "train throws {}",
+                    what, estimate.samples, why),
+        kAdvice);
   };
   const auto require = [&](const char* what, double value, double sigma, const double(&range)[2]) {
     if (!(value >= range[0] && value <= range[1]))
@@ -280,11 +285,12 @@ FrictionEstimate estimate_friction(const datasets::ThrowLog& log, const std::vec
   const auto samples = slipping_samples(log, throws);
   out.samples = static_cast<int>(samples.size());
   if (samples.size() < 10)
-    throw std::invalid_argument(
-        fmt::format("the log determines no friction for {}: {} F/T samples of evidently slipping pads in "
-                    "its train throws, at least 10 are needed; fit it to all that the log holds (--fit), or "
-                    "give a card",
-                    model, samples.size()));
+    throw Undetermined(
+        model,
+        fmt::format("the log determines no friction: {} F/T samples of evidently slipping pads "
+                    "in its train throws, at least 10 are needed",
+                    samples.size()),
+        kAdvice);
   out.method = "friction: the pad's wrench on the limit surface where it evidently slips, train throws";
   if (log.gripper) out.pad_radius = log.gripper->pad_radius;
   SurfaceFit fit = envelope(samples);

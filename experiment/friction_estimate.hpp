@@ -2,7 +2,9 @@
 #pragma once
 
 #include <optional>
+#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "experiment/model.hpp"
@@ -17,6 +19,18 @@ struct FrictionEstimate {
   double mu_sigma{}, length_sigma{};  ///< 1 σ of μ and L from the samples' noise, as shares of them [-]
   std::optional<double> pad_radius;   ///< as the log declares it [m]
   std::string method;                 ///< in words, for reports
+};
+
+/// A log does not determine a model's parameters. what() is the model, the reason and the advice.
+class Undetermined : public std::invalid_argument {
+ public:
+  /// With the reason and the advice, neither of which names the model.
+  Undetermined(const std::string& model, std::string why, std::string help)
+      : std::invalid_argument(model + ": " + why + "; " + help),
+        reason(std::move(why)),
+        advice(std::move(help)) {}
+  std::string reason;  ///< what the log lacks, alike for all models that lack it
+  std::string advice;  ///< what helps
 };
 
 /// Where a model's parameters start when no card gives them. It uses train throws only.
@@ -37,13 +51,13 @@ struct FrictionEstimate {
 ///
 /// Delay: mean and scatter over the train throws of (detach − opening command).
 ///
-/// Throws std::invalid_argument when the log determines neither: fewer than ten such samples in its train
+/// Throws Undetermined when the log determines neither: fewer than ten such samples in its train
 /// throws (objects that stick to the end, no F/T data), or no detach. Whether what was found is a patch,
 /// require_patch says.
 FrictionEstimate estimate_friction(const datasets::ThrowLog& log, const std::vector<PreparedThrow>& throws,
                                    const std::string& model);
 
-/// Throws std::invalid_argument, in words, where an estimate's friction is not to be relied on: μ outside
+/// Throws Undetermined where an estimate's friction is not to be relied on: μ outside
 /// [0.001, 20] or L outside [1e-5, 0.2] m; either uncertain by more than 15 %; samples that scatter by more
 /// than 25 % about the surface; or an L above 1.25 times the declared pad radius, as no pad's torque has a
 /// longer arm than its rim and a declared radius may be somewhat wrong.

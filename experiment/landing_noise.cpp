@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <vector>
 
 #include "datasets/assemble.hpp"
@@ -135,6 +136,11 @@ std::string in_words(const LandingNoise& noise, int landings) {
                        landings, noise.how);
   return fmt::format("landing/pose declares no sigma in {} throws: taken are {:.3g} m and {:.3g} rad ({})",
                      landings, *noise.x, *noise.theta, noise.how);
+}
+
+bool tells_angle(const datasets::LandingLog& landing) {
+  return !landing.pose.empty() &&
+         (landing.pose.sigma.empty() || landing.pose.sigma.back() < std::numbers::pi);
 }
 
 int landings_without_sigma(const datasets::ThrowLog& log) {

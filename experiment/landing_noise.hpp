@@ -26,6 +26,9 @@ struct LandingNoise {
 /// The first two are the sensor's, the last is more.
 LandingNoise landing_noise(const datasets::ThrowLog& log);
 
+/// Whether a landing tells the angle: one whose sigma is declared as half a turn or more was not measured.
+bool tells_angle(const datasets::LandingLog& landing);
+
 /// How many landings of the log declare no noise.
 int landings_without_sigma(const datasets::ThrowLog& log);
 

@@ -51,8 +51,11 @@ std::unique_ptr<contact::ContactModel> contact_model_for(const PreparedThrow& th
                                                          const std::string& model, const ModelParameters& p) {
   if (model == kNaive) return nullptr;
   if (model != contact::kGripperDelay && !throw_.normal_force)
-    throw std::invalid_argument(fmt::format(
-        "throw {}: {} needs the normal force, which was not measured (no ft group)", throw_.id, model));
+    throw std::invalid_argument(
+        fmt::format("throw {}: {} needs the normal force, which was not measured (no ft group); a card of "
+                    "`unhand fit` on throws "
+                    "without it tells how the pads open",
+                    throw_.id, model));
   return contact::make_contact_model(
       model,
       contact::ContactParameters<double>{patch_of(p), p.slide_end, {}, throw_.open_command, p.delay.centre});
@@ -76,8 +79,11 @@ Prediction predict(const PreparedThrow& throw_, const std::string& model, const 
     out.slips_at_start = result.slips_at_start;
   } else {
     if (!throw_.normal_force)
-      throw std::invalid_argument(fmt::format(
-          "throw {}: {} needs the normal force, which was not measured (no ft group)", throw_.id, model));
+      throw std::invalid_argument(
+          fmt::format("throw {}: {} needs the normal force, which was not measured (no ft group); a card of "
+                      "`unhand fit` on throws "
+                      "without it tells how the pads open",
+                      throw_.id, model));
     const contact::GripperDelay unused(0, dynamics::Dual(0.0));
     const auto result = release::simulate_release_naive(release_problem(throw_, unused), patch_of(parameters),
                                                         parameters.naive);

@@ -5,6 +5,7 @@
 
 #include "dynamics/median.hpp"
 #include "dynamics/third_difference.hpp"
+#include "experiment/landing_noise.hpp"
 
 namespace unhand::experiment {
 
@@ -123,7 +124,8 @@ void add_landing(const datasets::ThrowLog& log, const datasets::LandingLog& land
     for (std::size_t c = 0; c < 2; ++c) sigma[c] = sigma_of(landing.pose, c, kLeast[c]);
   }
   if (sigma[0]) out.all.push_back({Channel::landing_x, t, landing.pose(0, 0), *sigma[0]});
-  if (sigma[1]) out.all.push_back({Channel::landing_theta, t, landing.pose(0, 1), *sigma[1]});
+  if (sigma[1] && tells_angle(landing))
+    out.all.push_back({Channel::landing_theta, t, landing.pose(0, 1), *sigma[1]});
   if (!landing.time.empty() && !landing.time.sigma.empty())
     out.all.push_back({Channel::landing_time, t, t, sigma_of(landing.time, 0, 1e-5)});
 }

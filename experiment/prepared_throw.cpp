@@ -8,6 +8,7 @@
 
 #include "datasets/assemble.hpp"
 #include "dynamics/straight_line.hpp"
+#include "experiment/landing_noise.hpp"
 
 namespace unhand::experiment {
 
@@ -176,7 +177,7 @@ void measure_outcome(const Source& source, PreparedThrow& out) {
     measure_flight(source.log, logged, flight_from, *out.measured.detach_time, out);
   if (logged.landing) {
     out.measured.landing_x = logged.landing->pose(0, 0);
-    out.measured.landing_theta = logged.landing->pose(0, 1);
+    if (tells_angle(*logged.landing)) out.measured.landing_theta = logged.landing->pose(0, 1);
   }
 }
 

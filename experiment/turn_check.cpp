@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "dynamics/straight_line.hpp"
+#include "experiment/landing_noise.hpp"
 
 namespace unhand::experiment {
 namespace {
@@ -48,7 +49,7 @@ std::optional<std::string> landing_off(const datasets::Throw& one) {
   constexpr double kLast = 0.1, kBeyond = 0.3;  // [s]
   const auto& mocap = *one.mocap;
   const auto& landing = *one.landing;
-  if (landing.time.empty() || landing.pose.empty()) return {};
+  if (landing.time.empty() || !tells_angle(landing)) return {};
   const double landed = landing.time(0);
   std::vector<double> t, theta;
   for (std::size_t i = mocap.time.rows; i-- > 0;) {

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "dynamics/median.hpp"
+#include "experiment/declared_check.hpp"
 #include "experiment/turn_check.hpp"
 #include "experiment/unit_evidence.hpp"
 #include "experiment/unit_outliers.hpp"
@@ -62,6 +63,7 @@ std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log) {
     out.push_back({"/@gravity", "gravity", log.gravity, 1,
                    fmt::format("gravity is {:.6g} m/s², more than {}: mm/s² or cm/s² for m/s²?", log.gravity,
                                kMostGravity)});
+  if (out.empty()) out = impossible_declarations(log);
   if (out.empty()) out = jumping_angles(log);
   if (!out.empty()) return out;
   std::vector<SizeRatios> throws;
@@ -113,8 +115,10 @@ std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log) {
                      mu, friction.size(), kLeastFriction, kMostFriction,
                      mu > 1 ? "kgf, lbf or kN for N" : "mN for N")});
   if (out.empty()) out = outlying_throws(log, throws);
+  if (out.empty()) out = turned_levers(log);
   if (out.empty()) out = landings_turns_off(log);
   if (const auto height = out.empty() ? doubtful_landing_height(log) : std::nullopt) out.push_back(*height);
+  if (out.empty()) out = contradicted_landing_height(log);
   return out;
 }
 

@@ -8,14 +8,15 @@
 
 namespace unhand::experiment {
 
-/// A column that is as many times too large as another unit would make it, or whole turns off.
+/// A column that is as many times too large as another unit would make it, or whole turns off, or a declared
+/// number that physics or motion capture contradicts.
 struct UnitDoubt {
   std::string path;    ///< in the log: "/throws/*/mocap/pose", or of one throw: "/throws/017/mocap/pose"
   std::string column;  ///< "theta"
   double ratio{};      ///< its size over what the other channels say, median over throws; of the normal
                        ///< force: the friction that the wrenches take of it; of grasp_angle: itself; of
                        ///< angles that are whole turns off: 1
-  int throws{};        ///< that show it
+  int throws{};        ///< that show it; 0: what is declared is impossible by itself
   std::string reason;  ///< in words, with the unit that would explain it
 };
 
@@ -44,7 +45,11 @@ inline constexpr double kLeastOutlier = 5;
 ///   channel knows the unit of the normal force, of which only the product with friction is determined, but
 ///   in another one friction lies outside [kLeastFriction, kMostFriction].
 ///
-/// - the landing height with where free flights are at landing/time, and with the highest point of all throws
+/// - a declared inertia with what a body of that mass and size can have, and a declared pad_radius with the
+///   objects (declared_check.hpp);
+/// - the direction of com_offset with where motion capture sees the CoM while the object is held;
+/// - the landing height with the height at which motion capture sees the flights end (to 0.1 m), with where
+/// free flights are at landing/time, and with the highest point of all throws
 ///   (to a metre);
 /// - the angles of hand and object with themselves, from sample to sample, and those of the landing with
 /// where

@@ -10,6 +10,7 @@
 #include "datasets/summary.hpp"
 #include "dynamics/frames.hpp"
 #include "dynamics/median.hpp"
+#include "experiment/landing_noise.hpp"
 #include "experiment/unit_rules.hpp"
 
 namespace unhand::experiment {
@@ -191,7 +192,7 @@ void check_landing(const Held& held, SizeRatios& out) {
   keep(out, SizedColumn::landing_x, x.ratio(5 * kShowsShift));
   if (landing.time.empty()) return;
   if (held.end + fall > 0) keep(out, SizedColumn::landing_clock, landing.time(0) / (held.end + fall));
-  if (!held.logged.mocap) return;
+  if (!held.logged.mocap || !tells_angle(landing)) return;
   // On from the last two samples that lie far enough apart for a rate.
   const auto& mocap = *held.logged.mocap;
   constexpr double kApart = 0.02;  // s
@@ -261,6 +262,29 @@ SizeRatios compare_sizes(const datasets::ThrowLog& log, const datasets::Throw& l
   }
   if (logged.landing) check_landing(held, out);
   return out;
+}
+
+std::optional<double> lever_angle(const datasets::ThrowLog& log, const datasets::Throw& logged) {
+  if (log.dimension != 2 || !logged.hand || logged.hand->time.rows < 3 || !logged.mocap) return {};
+  const auto& hand = *logged.hand;
+  const auto& mocap = *logged.mocap;
+  const auto offset = log.objects.at(logged.object).com_offset;
+  const auto opening = opening_of(log, logged);
+  if (!offset || std::abs(*offset) < kShowsLever || !opening) return {};
+  const double begin = hand.time(0), end = std::min(*opening, hand.time(hand.time.rows - 1));
+  Vec2<double> sum{0, 0};
+  double n = 0;
+  for (std::size_t i = 0; i < mocap.time.rows; ++i) {
+    if (!mocap.is_valid(i) || mocap.time(i) < begin || mocap.time(i) > end) continue;
+    const auto pose = at(hand.time, hand.pose, mocap.time(i));
+    const auto d = dynamics::rotate(-mocap.pose(i, 2),
+                                    Vec2<double>{mocap.pose(i, 0) - pose[0], mocap.pose(i, 1) - pose[1]});
+    sum.x += d.x, sum.z += d.z, n += 1;
+  }
+  const double ratio = n > 0 ? std::hypot(sum.x, sum.z) / (n * std::abs(*offset)) : 0;
+  if (!(ratio > 0.5 && ratio < 2)) return {};
+  const double sign = *offset > 0 ? 1 : -1;
+  return std::atan2(sign * sum.z, sign * sum.x);
 }
 
 std::optional<TimedLanding> timed_landing(const datasets::ThrowLog& log, const datasets::Throw& logged) {

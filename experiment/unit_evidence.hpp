@@ -43,6 +43,11 @@ struct TimedLanding {
 /// Nothing if the throw does not tell.
 std::optional<TimedLanding> timed_landing(const datasets::ThrowLog& log, const datasets::Throw& logged);
 
+/// From the declared com_offset to where motion capture sees the CoM from the pads' centre while the object
+/// is held, in the object's frame [rad]; nothing if the throw does not tell, or tells of another distance (by
+/// a factor of two).
+std::optional<double> lever_angle(const datasets::ThrowLog& log, const datasets::Throw& logged);
+
 /// The highest point that a throw is seen at or could reach from the hand's state [m].
 std::optional<double> highest_point(const datasets::ThrowLog& log, const datasets::Throw& logged);
 

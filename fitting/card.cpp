@@ -45,6 +45,50 @@ void check(const std::string& file, const std::string& name, const datasets::Car
     throw CardError(file, path + "/value", fmt::format("{} is not in [{}, {}] {}", p.value, low, high, unit));
 }
 
+/// How far beyond a range a condition may lie for other reasons than a share of its ends.
+struct ConditionScatter {
+  const char *condition, *spread;  ///< the card's own spread that acts like it; null: none
+  bool relative;                   ///< the spread is a share of the condition
+  double least;                    ///< in the condition's unit
+};
+constexpr ConditionScatter kScatter[] = {{"grip_force", "mu_deviation", true, 0},
+                                         {"com_offset", "grasp_offset", false, 1e-3},
+                                         {"opening_time", "dead_time_deviation", false, 0},
+                                         {"release_speed", nullptr, false, 0.02},
+                                         {"detach_speed", nullptr, false, 0.02},
+                                         {"release_omega", nullptr, false, 0.05},
+                                         {"detach_omega", nullptr, false, 0.05}};
+
+std::string why_taken(const std::string& name, const std::string& model) {
+  const auto& opening = kOpeningParameters;
+  if (std::find(opening.begin(), opening.end(), name) == opening.end())
+    return fmt::format("is missing: these throws with {} take it", model);
+  return fmt::format(
+      "is missing: throws without a measured normal force (ft/normal_force) with {} take it. "
+      "Give the card of a fit to such throws (`unhand fit`), or measure the force behind a pad",
+      model);
+}
+
+double margin_of(const ModelCard& card, const std::string& condition, const CardRange& range) {
+  constexpr double kSigmas = 3;
+  const double largest = std::max(std::abs(range.low), std::abs(range.high));
+  double out = kRangeMargin * largest;
+  for (const auto& scatter : kScatter) {
+    if (condition != scatter.condition) continue;
+    out = std::max(out, scatter.least);
+    if (!scatter.spread) continue;
+    if (const auto own = card.own_spreads.find(scatter.spread); own != card.own_spreads.end())
+      out = std::max(out, kSigmas * own->second.sigma * (scatter.relative ? largest : 1));
+  }
+  return out;
+}
+
+std::string in_words(const Condition& is, const CardRange& range) {
+  const auto low = fmt::format("{:.4g}", range.low), high = fmt::format("{:.4g}", range.high);
+  return low == high ? fmt::format("{} {:.4g} {} is not {}", is.name, is.value, is.unit, low)
+                     : fmt::format("{} {:.4g} {} is outside [{}, {}]", is.name, is.value, is.unit, low, high);
+}
+
 void widen(std::map<std::string, CardRange>& range, const experiment::PreparedThrow& prepared) {
   if (prepared.split != datasets::Split::train) return;
   for (const auto& [name, unit, value] : conditions_of(prepared)) {
@@ -87,16 +131,33 @@ std::map<std::string, CardRange> valid_range_of(const CampaignProblem& problem) 
   return out;
 }
 
-std::vector<std::string> outside_range(const ModelCard& card, const experiment::PreparedThrow& prepared) {
-  std::vector<std::string> out;
-  for (const auto& [name, unit, value] : conditions_of(prepared)) {
-    const auto range = card.valid_range.find(name);
-    if (range == card.valid_range.end() || range->second.unit != unit) continue;
-    const auto& [low, high, same_unit] = range->second;
-    const double margin = kRangeMargin * std::max(std::abs(low), std::abs(high));
-    if (value >= low - margin && value <= high + margin) continue;
-    out.push_back(fmt::format("{} {:.4g} {} is outside [{:.4g}, {:.4g}]", name, value, unit, low, high));
+std::vector<UntriedCondition> outside_range(const ModelCard& card,
+                                            const experiment::PreparedThrow& prepared) {
+  std::vector<UntriedCondition> out;
+  for (const Condition& is : conditions_of(prepared)) {
+    const auto range = card.valid_range.find(is.name);
+    if (range == card.valid_range.end() || range->second.unit != is.unit) continue;
+    const double margin = margin_of(card, is.name, range->second);
+    if (is.value >= range->second.low - margin && is.value <= range->second.high + margin) continue;
+    out.push_back({is.name, in_words(is, range->second)});
   }
+  return out;
+}
+
+std::optional<UntriedCondition> untried_surface(const ModelCard& card, const std::string& surface) {
+  const auto& known = card.log.surfaces;
+  if (!card.parameters.contains("mu") || std::find(known.begin(), known.end(), surface) != known.end())
+    return {};
+  return UntriedCondition{
+      "surface",
+      known.empty() ? fmt::format("surface '{}': the card does not name those that it was fitted on", surface)
+                    : fmt::format("surface '{}' is none of those that the card was fitted on: {}", surface,
+                                  fmt::join(known, ", "))};
+}
+
+std::vector<std::string> reasons_of(const std::vector<UntriedCondition>& untried) {
+  std::vector<std::string> out;
+  for (const auto& one : untried) out.push_back(one.reason);
   return out;
 }
 
@@ -125,9 +186,10 @@ ModelCard card_of(const CampaignProblem& problem, const FitResult& fit) {
   card.model = problem.options().model;
   card.effects = problem.options().effects;
   auto& covariance = card.covariance.emplace();
-  for (const auto& u : fit.campaign) {
-    const bool determined = std::isfinite(u.data_sigma);
-    auto& one = card.parameters[u.unknown.name] = {u.value, u.sigma, u.unknown.unit, determined, {}, {}};
+  for (std::size_t k = 0; k < fit.campaign.size(); ++k) {
+    const FittedUnknown& u = fit.campaign[k];
+    auto& one =
+        card.parameters[u.unknown.name] = {u.value, u.sigma, u.unknown.unit, is_determined(fit, k), {}, {}};
     if (u.profile && std::isfinite((*u.profile)[0])) one.low95 = (*u.profile)[0];
     if (u.profile && std::isfinite((*u.profile)[1])) one.high95 = (*u.profile)[1];
     covariance.names.push_back(u.unknown.name);
@@ -201,8 +263,7 @@ FitResult fit_of(const ModelCard& card, const CampaignProblem& problem, const st
   for (const auto& u : problem.campaign()) {
     const auto found = card.parameters.find(u.name);
     if (found == card.parameters.end())
-      throw CardError(file, "/parameters/" + u.name,
-                      fmt::format("is missing: these throws with {} take it", card.model));
+      throw CardError(file, "/parameters/" + u.name, why_taken(u.name, card.model));
     const auto& p = found->second;
     out.campaign.push_back(
         {u, p.value, p.sigma.value_or(0), p.determined ? p.sigma.value_or(0) : HUGE_VAL, false, 0, {}});

@@ -39,7 +39,7 @@ void describe_open_directions(const Eigen::MatrixXd& information, const Campaign
     if (v[largest] < 0) v = -v;
     for (Eigen::Index i = 0; i < n; ++i) {
       open.direction.push_back(v[i]);
-      if (std::abs(v[i]) < 0.2) continue;
+      if (std::abs(v[i]) < kTakesPart) continue;
       const Unknown& u = problem.campaign()[static_cast<std::size_t>(i)];
       open.meaning += fmt::format("{}{} {:+.3g} {}", open.meaning.empty() ? "" : " with ", u.name,
                                   v[i] * u.scale, u.unit);

@@ -95,6 +95,9 @@ struct FittedUnknown {
   std::array<double, 2> interval95() const;
 };
 
+/// Least component of an open direction, which has unit length, for an unknown to take part in it [-].
+inline constexpr double kTakesPart = 0.2;
+
 /// A direction in the space of the campaign's unknowns that the log leaves open.
 struct OpenDirection {
   std::vector<double> direction;  ///< per campaign unknown, in units of its scale, of unit length
@@ -160,6 +163,11 @@ struct FitResult {
   /// Of unknowns i and j, −1 … 1; 0 where either is not determined.
   double correlation(std::size_t i, std::size_t j) const;
 };
+
+/// Whether the log alone, without the prior, tells unknown k: its σ from the data is less than its accepted
+/// range, and it takes part in no direction that the log leaves open (dead_time + opening_time may be known
+/// where neither is).
+bool is_determined(const FitResult& fit, std::size_t k);
 
 /// Least squares by Ceres (Levenberg-Marquardt; the throws' own unknowns eliminated by Schur's complement)
 /// with exact derivatives. Without `options.start` from the problem's own, one-sided effects a typical step

@@ -51,4 +51,11 @@ double FitResult::correlation(std::size_t i, std::size_t j) const {
   return scale > 0 ? covariance[i * n + j] / scale : 0;
 }
 
+bool is_determined(const FitResult& fit, std::size_t k) {
+  const FittedUnknown& u = fit.campaign[k];
+  return u.data_sigma < u.unknown.high - u.unknown.low &&
+         std::none_of(fit.open.begin(), fit.open.end(),
+                      [&](const OpenDirection& open) { return std::abs(open.direction[k]) >= kTakesPart; });
+}
+
 }  // namespace unhand::fitting

@@ -102,8 +102,9 @@ SkuValidation validate_sku(const datasets::Sku& sku, const datasets::ModelCard& 
   out.chosen = best(out.candidates, request.tolerance);
   const SkuMotion& motion = tried[out.chosen];
   out.notes = motion.inputs.notes;
-  for (const auto& why : outside_range(card, motion.prepared))
-    out.notes.push_back("outside the card's valid range: " + why);
+  out.untried = outside_range(card, motion.prepared);
+  if (const auto surface = untried_surface(card, sku.surface); surface && request.assumed.other_surface == 0)
+    out.untried.push_back(*surface);
   out.linear = out.reference().linear;
   if (out.reference().landed && !out.reference().held) out.needed_grip_force = needed_grip(motion);
   if (out.reference().landed && out.reference().held) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "datasets/throw_log.hpp"
+#include "fitting/card.hpp"
 #include "fitting/evaluate.hpp"
 #include "fitting/sku/sku_inputs.hpp"
 
@@ -96,8 +97,11 @@ struct MeasuredVerdict {
 
 /// Whether an object can be thrown, how surely, and why.
 struct SkuValidation {
-  SkuVerdict verdict{};                     ///< the answer
-  std::string message;                      ///< the verdict in words
+  SkuVerdict verdict{};  ///< the answer
+  std::string message;   ///< the verdict in words
+  /// Where the object or the motion is outside of what the card has been tried on; the verdict holds only as
+  /// far as the card holds there. Empty: inside.
+  std::vector<UntriedCondition> untried;
   std::vector<std::string> notes;           ///< what was left out or assumed
   std::vector<ThrowCandidate> candidates;   ///< one per condition of the log, or the reference throw
   std::size_t chosen{};                     ///< among the candidates

@@ -60,6 +60,47 @@ TEST_F(Cli, AModelThatTheLogDoesNotDetermineStopsNoOther) {
   expect_refusal("compare straight.h5 --models limit_surface --json b.json", 1, "does not determine");
 }
 
+// A landing measured with a ruler has no angle: one that is declared as unknown is not judged by.
+TEST_F(Cli, ALandingOfUnknownAngleTellsItsPlaceAlone) {
+  write_changed("ruler.h5", [](datasets::Throw& one) {
+    one.landing->pose(0, 1) = 0;
+    one.landing->pose.sigma = {1e-3, 4};
+  });
+  EXPECT_THAT(run("inspect ruler.h5").out, Not(HasSubstr("doubtful")));
+  ASSERT_EQ(run("fit ruler.h5 --model limit_surface_disc --json f.json --card c.json").code, 0);
+  const json fitted = read_json(folder / "f.json");
+  EXPECT_EQ(fitted["test"]["landing_theta_deg"]["n"], 0);
+  EXPECT_LT(fitted["test"]["landing_x_m"]["mae"].get<double>(), 0.01);
+  EXPECT_NEAR(fitted["parameters"]["mu"]["value"].get<double>(), 0.5, 0.03);  // 3 sigma of eight throws' mu
+  ASSERT_EQ(run("predict ruler.h5 --card c.json --json p.json").code, 0);
+  for (const auto& one : read_json(folder / "p.json")["throws"]) {
+    EXPECT_TRUE(one["error"].contains("landing_x_m"));
+    EXPECT_FALSE(one["error"].contains("landing_theta_deg"));
+  }
+  const Answer compared = run("compare ruler.h5 --models limit_surface_disc");
+  EXPECT_EQ(compared.code, 0) << compared.err;
+}
+
+// A log without force and torque stops every model: a line per reason with the models, and the advice once.
+TEST_F(Cli, CompareSaysOnceWhyNoModelIsCompared) {
+  write_changed("bare.h5", [](datasets::Throw& one) { one.ft.reset(); });
+  const Answer answer = run("compare bare.h5");
+  EXPECT_EQ(answer.code, 1);
+  std::istringstream lines(answer.err);
+  int told = 0, advised = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++told;
+    advised += line.find("--fit") != std::string::npos;
+    EXPECT_LT(line.size(), 250u) << line;
+  }
+  EXPECT_EQ(told, 5) << answer.err;  // two reasons, what helps against each, the outcome
+  EXPECT_EQ(advised, 1) << answer.err;
+  EXPECT_THAT(answer.err,
+              HasSubstr("limit_surface, limit_surface_disc, limit_surface_quartic: not compared: the log "
+                        "determines no friction"));
+  EXPECT_THAT(answer.err, HasSubstr("gripper_delay: not compared: the log shows no detach"));
+}
+
 // What a gripper still holds does not fly, even if nobody logged the hand.
 TEST_F(Cli, ThrowsWithoutAHandAreNoFlightsBeforeTheyAreLetGo) {
   write_changed("carried.h5", [](datasets::Throw& one) { one.hand.reset(); });

@@ -186,6 +186,25 @@ TEST_F(Cli, ValidateSkuAnswersWithABudget) {
   EXPECT_EQ(judged["candidates"].size(), 6u);  // the campaign's conditions, three for each of two objects
   EXPECT_EQ(judged["measured"]["n"], 6);
 
+  // The verdict says where it rests on nothing that the card was tried on.
+  EXPECT_THAT(answer.out, HasSubstr(out["verdict"].get<std::string>() +
+                                    ", if the card holds beyond what it was tried on: surface\n"));
+  EXPECT_THAT(out["outside_valid_range"].dump(), HasSubstr("does not name those that it was fitted on"));
+  json card = read_json(folder / "card.json");
+  const auto outside = [&](const std::string& options) {
+    std::ofstream(folder / "tried.json") << card.dump();
+    EXPECT_EQ(run("validate-sku bar.toml --card tried.json --samples 200 --json t.json" + options).code, 0);
+    return read_json(folder / "t.json")["outside_valid_range"].dump();
+  };
+  card["log"]["surfaces"] = {"glass", "steel"};
+  EXPECT_THAT(outside(""),
+              HasSubstr("surface 'printed' is none of those that the card was fitted on: glass"));
+  EXPECT_EQ(outside(" --other-surface 0.2"), "[]");  // the spread allows for it
+  card["log"]["surfaces"] = {"glass", "printed"};
+  EXPECT_EQ(outside(""), "[]");
+  card["valid_range"]["mass"] = {{"low", 0.1}, {"high", 0.2}, {"unit", "kg"}};
+  EXPECT_THAT(outside(""), HasSubstr("mass 0.246 kg is outside [0.1, 0.2]"));
+
   const std::string asked = "validate-sku bar.toml --card card.json ";
   expect_refusal(asked + "--tolerance 0.05", 2, "METRES,DEGREES");
   expect_refusal(asked + "--tolerance 0.05,-1", 2, "METRES,DEGREES");

@@ -1,6 +1,7 @@
 // Help, refusals and the commands that make and show logs.
 #include <sys/stat.h>
 
+#include "apps/progress.hpp"
 #include "tests/apps/cli.hpp"
 
 namespace unhand::cli {
@@ -18,6 +19,17 @@ std::vector<std::string> commands_in(const std::string& help, const std::string&
     if (line == "Subcommands:") listed = true;
   }
   return out;
+}
+
+TEST(Progress, IsNotShownInAPipe) {  // as stderr is under a test
+  testing::internal::CaptureStderr();
+  {
+    apps::Progress known("fit", 4);
+    const apps::Progress unknown("discover", 0);
+    for (int i = 0; i < 4; ++i) known.step();
+    std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // a second is when time is told
+  }
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
 }
 
 TEST_F(Cli, HelpHasAnExampleEverywhere) {
@@ -266,6 +278,20 @@ TEST_F(Cli, FigureDrawsWhatIsAskedFor) {
   expect_refusal("figure modes --throw 999 --log " + quick + " --out g", 2, "no throw '999'");
   expect_refusal("figure modes --models wishful --log " + quick + " --out g", 2, "wishful");
   expect_refusal("figure modes --log none.h5 --out g", 3, "none.h5");
+}
+
+TEST_F(Cli, InspectTellsOfWhatIsImpossibleAndTheRestRefusesIt) {
+  EXPECT_EQ(json::parse(run("inspect " + quick + " --json").out)["doubtful"], json::array());
+  auto log = datasets::read_throw_log(quick);
+  log.gripper->pad_radius = 10.6;  // mm
+  datasets::write_throw_log(folder / "mm.h5", log);
+  const Answer answer = run("inspect mm.h5");
+  EXPECT_EQ(answer.code, 0);
+  EXPECT_THAT(answer.out, HasSubstr("doubtful: /gripper@pad_radius: pad_radius is 10.6 m"));
+  const json seen = json::parse(run("inspect mm.h5 --json").out);
+  ASSERT_EQ(seen["doubtful"].size(), 1u);
+  EXPECT_EQ(seen["doubtful"][0]["path"], "/gripper@pad_radius");
+  expect_refusal("compare mm.h5 --json a.json", 3, "mm.h5: /gripper@pad_radius");
 }
 
 }  // namespace

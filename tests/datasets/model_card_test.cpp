@@ -23,7 +23,7 @@ ModelCard small_card() {
   card.model = "sliding_pivot";
   card.parameters["mu"] = {0.61, 0.01, "-"};
   card.parameters["length"] = {0.0071, {}, "m"};
-  card.log = {"campaign.h5", "a campaign", "fnv1a64:0123456789abcdef"};
+  card.log = {"campaign.h5", "a campaign", "fnv1a64:0123456789abcdef", {"aluminium", "glass"}};
   card.split = "train";
   card.valid_range["grip_force"] = {45, 55, "N"};
   card.library_version = "0.1.0";
@@ -53,12 +53,14 @@ TEST(ModelCard, ComesBackAsItWas) { EXPECT_EQ(parse_model_card(to_json(small_car
 TEST(ModelCard, LeavesOutWhatIsNotKnown) {
   ModelCard card = small_card();
   card.log.checksum.reset();
+  card.log.surfaces.clear();
   card.split.reset();
   card.valid_range.clear();
   const auto json = nlohmann::json::parse(to_json(card));
   EXPECT_FALSE(json.contains("split"));
   EXPECT_FALSE(json.contains("valid_range"));
   EXPECT_FALSE(json["log"].contains("checksum"));
+  EXPECT_FALSE(json["log"].contains("surfaces"));
   EXPECT_FALSE(json["parameters"]["length"].contains("sigma"));
   EXPECT_EQ(json["schema"], "model-card");
   EXPECT_EQ(json["schema_version"], 1);

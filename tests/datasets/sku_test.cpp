@@ -23,6 +23,14 @@ Sku read_text(const Scratch& scratch, const std::string& text) {
   return read_sku(scratch / "sku.toml");
 }
 
+TEST(Sku, TheExampleIsTheOneOfThePage) {
+  const std::string page = bytes_of(UNHAND_SOURCE_DIR "/docs/validate-sku.md"),
+                    example = bytes_of(UNHAND_SOURCE_DIR "/examples/bar.toml");
+  const Sku sku = read_sku(UNHAND_SOURCE_DIR "/examples/bar.toml");
+  EXPECT_TRUE(sku.inertia.has_value());
+  EXPECT_NE(page.find(example.substr(example.find("name ="))), std::string::npos);
+}
+
 TEST(Sku, ReadsEveryKey) {
   const Scratch scratch;
   const Sku sku = read_text(scratch, good);

@@ -357,5 +357,74 @@ TEST(UnitCheck, ALandingHeightWhereNothingLandsIsRefused) {
   }
 }
 
+/// The only doubt of a log.
+UnitDoubt only_doubt(const ThrowLog& log) {
+  const auto doubts = unit_doubts(log);
+  return doubts.size() == 1 ? doubts.front() : UnitDoubt{"none or many", {}, 0, 0, {}};
+}
+
+TEST(UnitCheck, NoBodyOfItsMassAndSizeHasSuchAnInertia) {
+  for (const double factor : {1e4, 1e-4}) {
+    auto log = campaign();
+    auto& [name, object] = *log.objects.begin();
+    object.inertia->front() *= factor;
+    const auto told = only_doubt(log);
+    EXPECT_EQ(told.path, "/objects/" + name + "@inertia") << told.reason;
+    EXPECT_THAT(told.reason, HasSubstr("radius of gyration"));
+  }
+  // All mass in two opposite corners of the box is the most that there is.
+  auto log = campaign();
+  auto& object = log.objects.begin()->second;
+  object.dims = {0.3, 0.02, 0.04};
+  const double most = object.mass * (0.09 + 4e-4 + 1.6e-3) / 4;
+  object.inertia->front() = 0.99 * most;
+  for (const auto& doubt : unit_doubts(log)) EXPECT_EQ(doubt.path.find("@inertia"), std::string::npos);
+  object.inertia->front() = 1.2 * most;
+  EXPECT_THAT(only_doubt(log).reason, HasSubstr("within its dims"));
+}
+
+TEST(UnitCheck, NoPadIsLargerThanWhatItHolds) {
+  for (const double factor : {1000.0, 100.0, 39.4}) {  // mm, cm, inch
+    auto log = campaign();
+    log.gripper->pad_radius = factor * 0.0106;
+    EXPECT_EQ(only_doubt(log).path, "/gripper@pad_radius") << factor;
+  }
+  auto log = campaign();
+  for (auto& [name, object] : log.objects) object.dims = {0.3, 0.02, 0.04};
+  log.gripper->pad_radius = 0.19;
+  for (const auto& doubt : unit_doubts(log)) EXPECT_NE(doubt.path, "/gripper@pad_radius");
+  for (auto& [name, object] : log.objects) object.dims = {0.16, 0.02, 0.04};
+  EXPECT_EQ(only_doubt(log).path, "/gripper@pad_radius");
+}
+
+TEST(UnitCheck, ALeverAlongAnotherAxisIsSeenByMotionCapture) {
+  const auto turned = [](double by) {
+    auto log = campaign();
+    for (auto& one : log.throws) {
+      for (std::size_t i = 0; i < one.mocap->pose.rows; ++i) one.mocap->pose(i, 2) += by;
+      one.landing->pose(0, 1) += by;
+    }
+    return log;
+  };
+  for (const double by : {90.0, -90.0, 180.0}) {
+    const auto doubts = unit_doubts(turned(by / kDegree));
+    ASSERT_FALSE(doubts.empty()) << by;
+    for (const auto& doubt : doubts) EXPECT_THAT(doubt.path, HasSubstr("@com_offset")) << doubt.reason;
+  }
+  EXPECT_THAT(unit_doubts(turned(10 / kDegree)), IsEmpty());
+}
+
+TEST(UnitCheck, FlightsContradictAWrongLandingHeight) {
+  for (const double height : {0.3, -0.3}) {
+    auto log = campaign();
+    log.landing_height = height;
+    const auto told = only_doubt(log);
+    EXPECT_EQ(told.path, "/@landing_height");
+    EXPECT_THAT(told.reason, AllOf(HasSubstr("motion capture sees"), HasSubstr("accepted are")));
+    for (auto& one : log.throws) one.mocap.reset();  // then nothing does
+    EXPECT_THAT(unit_doubts(log), IsEmpty());
+  }
+}
+
 }  // namespace
 }  // namespace unhand::experiment

@@ -178,11 +178,30 @@ TEST(Card, KnowsWhereItHasBeenTried) {
     }
   auto far = disc().throws()[0].prepared;
   far.body.mass *= 3;
-  EXPECT_THAT(outside_range(card, far), testing::ElementsAre(HasSubstr("mass")));
+  EXPECT_THAT(reasons_of(outside_range(card, far)), testing::ElementsAre(HasSubstr("mass")));
   far.body.mass = (1 + 0.9 * kRangeMargin) * card.valid_range.at("mass").high;
   EXPECT_THAT(outside_range(card, far), testing::IsEmpty());
   far.body.mass = (1 + 1.1 * kRangeMargin) * card.valid_range.at("mass").high;
-  EXPECT_THAT(outside_range(card, far), testing::ElementsAre(HasSubstr("mass")));
+  EXPECT_THAT(reasons_of(outside_range(card, far)), testing::ElementsAre(HasSubstr("mass")));
+}
+
+// All throws of a log alike make a range without width: as wide as the throws themselves scatter.
+TEST(Card, ARangeWithoutWidthIsNoEquality) {
+  auto card = card_of(disc(), disc_fit());
+  auto thrown = disc().throws()[0].prepared;
+  const auto outside = [&](double com_offset) {
+    thrown.grasp.com_offset = com_offset;
+    return !outside_range(card, thrown).empty();
+  };
+  card.valid_range = {{"com_offset", {0, 0, "m"}}};
+  card.own_spreads.erase("grasp_offset");
+  EXPECT_FALSE(outside(0.9e-3));
+  EXPECT_TRUE(outside(1.1e-3));
+  card.own_spreads["grasp_offset"] = {2e-3, "m"};
+  EXPECT_FALSE(outside(5.9e-3));
+  EXPECT_TRUE(outside(-6.1e-3));
+  EXPECT_THAT(reasons_of(outside_range(card, thrown)),
+              testing::ElementsAre(HasSubstr("com_offset -0.0061 m is not 0")));
 }
 
 TEST(Card, ChecksumIsTheDocumentedOne) {
