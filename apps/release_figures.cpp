@@ -165,9 +165,9 @@ Figure wrench_figure(const std::vector<ReleaseTrace>& traces) {
   figure.data.push_back(std::move(ellipse));
   figure.data.push_back(std::move(disc));
   auto key = key_of(traces);
-  const char *ellipse_style = "with lines linecolor rgb '#808080' linewidth 2.6",
-             *disc_style = "with lines linecolor rgb '#c0c0c0' linewidth 2.6 dashtype 2",
-             *box_style = "with lines linecolor rgb '#a0a0a0' linewidth 1 dashtype 3";
+  const char *ellipse_style = "with lines linecolor rgb '#808080' linewidth 1",
+             *disc_style = "with lines linecolor rgb '#d4d4d4' linewidth 5",  // a band to run along
+                 *box_style = "with lines linecolor rgb '#a0a0a0' linewidth 1 dashtype 3";
   key.push_back({ellipse_style, "ellipse"});
   key.push_back({disc_style, "exact disc"});
   key.push_back({box_style, "separate limits"});
@@ -180,7 +180,7 @@ Figure wrench_figure(const std::vector<ReleaseTrace>& traces) {
       "set arrow from 1,0 to 1,1 nohead linecolor rgb '#a0a0a0' linewidth 1 dashtype 3\n";
   s += place(figure, {1.9, figure.width - 0.5, 1.8 + key_height(key.size(), columns), figure.height - 0.4});
   s += fmt::format("plot DATA index {} using 1:2 {}, \\\n     DATA index {} using 1:2 {}, \\\n     {}\n",
-                   traces.size(), ellipse_style, traces.size() + 1, disc_style, plot_all(traces, "1:2"));
+                   traces.size() + 1, disc_style, traces.size(), ellipse_style, plot_all(traces, "1:2"));
   s += key_strip(figure, key, columns) + "unset multiplot\n";
   return figure;
 }
