@@ -4,6 +4,8 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <string>
+#include <vector>
 
 #include "contact/limit_surface.hpp"
 #include "fitting/evaluate.hpp"
@@ -99,6 +101,39 @@ TEST(ThrowFit, ParametersComeBackFromWhateverTheStartIs) {
       EXPECT_NEAR(u.value, truth, 4 * u.sigma) << u.unknown.name << ", seed " << seed;
       EXPECT_LT(u.sigma, 0.05 * truth) << u.unknown.name << ", seed " << seed;
     }
+  }
+}
+
+// The spread of friction is that of the throws' true coefficients about the mean of their condition, and
+// three rounds find it: more of them do not move it.
+TEST(ThrowFit, SpreadsAreThoseOfTheThrows) {
+  for (const double scatter : {0.01, 0.05}) {
+    experiment::CampaignDesign design = experiment::campaign_design("batch180");
+    design.variation.mu = scatter;
+    datasets::ThrowLog log = experiment::campaign_header(design, 5);
+    std::map<std::string, std::vector<double>> mu;  // of the train throws, by condition
+    for (int i = 0; i < design.throws(); ++i) {
+      auto [record, truth] = experiment::generate_throw(design, 5, i);
+      if (record.split == Split::train)
+        mu[record.object + record.condition].push_back(truth.patch.mu / design.patch.mu);
+      log.throws.push_back(std::move(record));
+    }
+    double square = 0, degrees = 0;
+    for (const auto& [condition, all] : mu) {
+      double mean = 0;
+      for (const double x : all) mean += x / static_cast<double>(all.size());
+      for (const double x : all) square += (x - mean) * (x - mean);
+      degrees += static_cast<double>(all.size()) - 1;
+    }
+    const auto problem = problem_of(log);
+    FitOptions options;
+    const FitResult few = fit(problem, options);
+    options.rounds = 10;
+    const FitResult many = fit(problem, options);
+    const std::size_t k = 2;
+    ASSERT_EQ(problem.own()[k].name, "mu_deviation");
+    EXPECT_NEAR(few.own_spread[k] / std::sqrt(square / degrees), 1, 0.05) << scatter;
+    EXPECT_NEAR(few.own_spread[k] / many.own_spread[k], 1, 0.02) << scatter;
   }
 }
 
