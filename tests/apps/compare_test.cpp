@@ -73,7 +73,8 @@ TEST_F(Cli, ALandingOfUnknownAngleTellsItsPlaceAlone) {
   EXPECT_LT(fitted["test"]["landing_x_m"]["mae"].get<double>(), 0.01);
   EXPECT_NEAR(fitted["parameters"]["mu"]["value"].get<double>(), 0.5, 0.03);  // 3 sigma of eight throws' mu
   ASSERT_EQ(run("predict ruler.h5 --card c.json --json p.json").code, 0);
-  for (const auto& one : read_json(folder / "p.json")["throws"]) {
+  const json predicted = read_json(folder / "p.json");
+  for (const auto& one : predicted["throws"]) {
     EXPECT_TRUE(one["error"].contains("landing_x_m"));
     EXPECT_FALSE(one["error"].contains("landing_theta_deg"));
   }
