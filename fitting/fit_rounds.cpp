@@ -189,28 +189,30 @@ double FitRounds::variance_of(std::size_t k) const {
       sum.n += 1;
     }
   }
-  const auto likelier = [&](double square, double share, double squared_share) {
-    if (!(share > 0)) return variance;
-    constexpr double kApart = 4;  // where throws say little, the scores scatter
-    const double fixed_point = square / share;
-    return std::clamp(variance + (square - share * variance) / squared_share, fixed_point / kApart,
-                      fixed_point * kApart);
+  const auto likelier = [&](const Sum& sum) {
+    const double score = sum.square - sum.share * variance;
+    constexpr double kInformed = 2;  // shares' squares below which the scores scatter more than they say
+    if (sum.squared_share < kInformed) return variance + score / sum.weight;
+    constexpr double kApart = 4;
+    const double fixed_point = sum.square / sum.share;
+    return std::clamp(variance + score / sum.squared_share, fixed_point / kApart, fixed_point * kApart);
   };
   const Sum all = conditions[""];
-  const double about_zero = likelier(all.square, all.share, all.squared_share);
+  const double about_zero = likelier(all);
   if (problem_.own()[k].kind == Unknown::Kind::placement) return about_zero;
   conditions.erase("");
-  double square = 0, share = 0, squared_share = 0, degrees = 0;
+  Sum about_means;
   for (const auto& [name, sum] : conditions) {
     if (sum.n < 2 || !(sum.weight > 0)) continue;
     const double rest = 1 - 1 / sum.n;
-    square += sum.square - sum.value * sum.value / sum.weight;
-    share += rest * sum.share;
-    squared_share += rest * sum.squared_share;
-    degrees += sum.n - 1;
+    about_means.weight += rest * sum.weight;
+    about_means.square += sum.square - sum.value * sum.value / sum.weight;
+    about_means.share += rest * sum.share;
+    about_means.squared_share += rest * sum.squared_share;
+    about_means.n += sum.n - 1;
   }
-  constexpr double kEnough = 10;  // a spread is then known to a quarter
-  return degrees >= kEnough ? likelier(square, share, squared_share) : about_zero;
+  constexpr double kEnough = 10;  // degrees of freedom: a spread is then known to a quarter
+  return about_means.n >= kEnough ? likelier(about_means) : about_zero;
 }
 
 }  // namespace unhand::fitting

@@ -61,9 +61,9 @@ class FitRounds {
   double* own_at(std::size_t i) { return own_.data() + i * shared_.own_scale.size(); }
   /// A likelier variance of own unknown k than it was solved with: a step of Fisher's scoring of the
   /// likelihood of the variance [Longford1987], not far from the fixed-point iteration of [MacKay1992], which
-  /// has the same solutions. About zero or the mean of their condition, as Unknown::Kind says, the latter if
-  /// there are repetitions enough. Expectation-maximisation would need many rounds where the variance is
-  /// small.
+  /// has the same solutions; a step of expectation-maximisation, too short where the variance is small but
+  /// always likelier, where the throws say little of it. About zero or the mean of their condition, as
+  /// Unknown::Kind says, the latter if there are repetitions enough.
   double variance_of(std::size_t k) const;
   void choose_throws(const std::vector<double>& start);
   /// Moves x_ and own_ to the least; `held` keeps its value, too.
