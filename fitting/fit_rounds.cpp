@@ -190,6 +190,7 @@ double FitRounds::variance_of(std::size_t k) const {
     }
   }
   const auto likelier = [&](const Sum& sum) {
+    if (!(sum.weight > 0)) return variance;  // no throw was solved
     const double score = sum.square - sum.share * variance;
     constexpr double kInformed = 2;  // shares' squares below which the scores scatter more than they say
     if (sum.squared_share < kInformed) return variance + score / sum.weight;
@@ -206,7 +207,7 @@ double FitRounds::variance_of(std::size_t k) const {
     if (sum.n < 2 || !(sum.weight > 0)) continue;
     const double rest = 1 - 1 / sum.n;
     about_means.weight += rest * sum.weight;
-    about_means.square += sum.square - sum.value * sum.value / sum.weight;
+    about_means.square += std::max(0.0, sum.square - sum.value * sum.value / sum.weight);
     about_means.share += rest * sum.share;
     about_means.squared_share += rest * sum.squared_share;
     about_means.n += sum.n - 1;
