@@ -13,8 +13,11 @@ namespace unhand::dynamics {
 /// spilling; problems with more parameters run in several sweeps.
 inline constexpr int kDualSize = 8;
 
-/// A value with its first derivatives: `.a` the value, `.v` the gradient.
-using Dual = ceres::Jet<double, kDualSize>;
+/// A value with its first derivatives with respect to N parameters: `.a` the value, `.v` the gradient.
+template <int N>
+using DualOf = ceres::Jet<double, N>;
+/// The one that the library's physics is compiled for.
+using Dual = DualOf<kDualSize>;
 
 /// The value without its derivatives: what decides between branches.
 inline double value_of(double x) { return x; }

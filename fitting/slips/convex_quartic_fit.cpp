@@ -20,7 +20,7 @@ Sym3 sym_of(const std::array<double, 6>& s) {
 
 double value_of(double x) { return x; }
 template <int N>
-double value_of(const ceres::Jet<double, N>& x) {
+double value_of(const dynamics::DualOf<N>& x) {
   return x.a;
 }
 

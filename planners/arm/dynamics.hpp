@@ -1,7 +1,7 @@
 // Rigid-body dynamics of a serial chain, M(q) q̈ + C(q, q̇) q̇ + g(q) = τ.
 //
-// All functions are templated on their scalar: double, Dual, or any other ceres::Jet. Those of double and
-// Dual are compiled once, in dynamics.cpp.
+// All functions are templated on their scalar: double, Dual, or any other dynamics::DualOf. Those of double
+// and Dual are compiled once, in dynamics.cpp.
 #pragma once
 
 #include "planners/arm/kinematics.hpp"

@@ -1,7 +1,7 @@
 // Kinematics of a serial chain: where its tip is, and how it moves.
 //
-// All functions are templated on their scalar: double, Dual, or any other ceres::Jet. Those of double and
-// Dual are compiled once, in kinematics.cpp.
+// All functions are templated on their scalar: double, Dual, or any other dynamics::DualOf. Those of double
+// and Dual are compiled once, in kinematics.cpp.
 #pragma once
 
 #include <Eigen/Geometry>

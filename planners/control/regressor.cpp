@@ -36,7 +36,7 @@ Eigen::VectorXd parameters_of(const Chain& chain) {
 Regressor<double> momentum_rest_regressor(const Chain& chain, const JointVector<double>& q,
                                           const JointVector<double>& qd, const Eigen::Vector3d& gravity,
                                           int first) {
-  using Along = ceres::Jet<double, 1>;  // derivative along the motion
+  using Along = dynamics::DualOf<1>;  // derivative along the motion
   const int n = chain.size();
   JointVector<Along> moving(n), fixed(n);
   for (int i = 0; i < n; ++i) {

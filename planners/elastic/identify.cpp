@@ -64,7 +64,7 @@ LinkParameters log_cholesky(const LinkParameters& p, const std::string& joint) {
 
 /// All links' π and ∂π/∂φ.
 void evaluate(const Eigen::VectorXd& phi, Eigen::VectorXd& pi, Eigen::MatrixXd& derivative) {
-  using Dual10 = ceres::Jet<double, kLinkParameters>;
+  using Dual10 = dynamics::DualOf<kLinkParameters>;
   derivative.setZero(phi.size(), phi.size());
   pi.resize(phi.size());
   for (Eigen::Index first = 0; first < phi.size(); first += kLinkParameters) {

@@ -1,12 +1,11 @@
 // Sparse nonlinear programs of small functions of few variables each, solved by an interior point.
 #pragma once
 
-#include <ceres/jet.h>
-
 #include <memory>
 #include <utility>
 #include <vector>
 
+#include "dynamics/scalar.hpp"
 #include "planners/elastic/second_dual.hpp"
 
 namespace unhand::planners::elastic {
@@ -46,7 +45,7 @@ class TermOf final : public Term {
   /// As Term says.
   void value(const double* x, double* f) const override { law_(x, f); }
   void jacobian(const double* x, double* J) const override {
-    using First = ceres::Jet<double, Inputs>;
+    using First = dynamics::DualOf<Inputs>;
     First in[Inputs], out[Outputs];
     for (int i = 0; i < Inputs; ++i) in[i] = First(x[i], i);
     law_(in, out);

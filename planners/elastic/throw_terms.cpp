@@ -67,7 +67,7 @@ class SlotTerm final : public Term {
     for (const Linear& one : linear_) f[one.output] += one.factor * x[one.variable];
   }
   void jacobian(const double* x, double* J) const override {
-    using First = ceres::Jet<double, kSlots>;
+    using First = dynamics::DualOf<kSlots>;
     First in[kSlots], out[Law::kOutputs];
     for (std::size_t i = 0; i < slots_.size(); ++i) in[slots_[i]] = First(x[i], slots_[i]);
     law_(in, out);

@@ -133,10 +133,10 @@ TEST(Chain, JacobianIsTheDerivativeOfThePosition) {
   std::mt19937_64 random(3);
   for (const Chain& arm : arms()) {
     const auto [q, qd, qdd] = state_of(arm.size(), random);
-    JointVector<ceres::Jet<double, 3>> seeded(arm.size());  // another scalar than the two compiled ones
+    JointVector<dynamics::DualOf<3>> seeded(arm.size());  // another scalar than the two compiled ones
     for (int first = 0; first < arm.size(); first += 3) {
       for (int i = 0; i < arm.size(); ++i) {
-        seeded[i] = ceres::Jet<double, 3>(q[i]);
+        seeded[i] = dynamics::DualOf<3>(q[i]);
         if (i >= first && i < first + 3) seeded[i].v[i - first] = 1;
       }
       const auto tip = forward_kinematics(arm, seeded);

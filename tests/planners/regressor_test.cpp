@@ -66,7 +66,7 @@ TEST(Regressor, OfSlotineAndLiHasTheSkewSymmetricC) {
     const Eigen::Vector3d weightless(0, 0, 0);
     // xᵀ (Ṁ − 2 C) x = 0 with C x from the regressor, and Ṁ from dual numbers along the motion.
     const Joints C_x = slotine_li_regressor<double>(arm, q, qd, x, none, weightless) * parameters;
-    using Along = ceres::Jet<double, 1>;
+    using Along = dynamics::DualOf<1>;
     JointVector<Along> moving(7);
     for (int i = 0; i < 7; ++i) {
       moving[i] = Along(q[i]);
@@ -90,7 +90,7 @@ TEST(Regressor, MomentumAndItsRestNeedNoAcceleration) {
     const Joints momentum = momentum_regressor<double>(arm, q, qd) * parameters;
     EXPECT_LE((momentum - mass_matrix<double>(arm, q) * qd).norm(), kRounding * (1 + momentum.norm()));
     // d/dt (M q̇) + h = τ, the rate by dual numbers along (q̇, q̈).
-    using Along = ceres::Jet<double, 1>;
+    using Along = dynamics::DualOf<1>;
     JointVector<Along> at(7), rate(7);
     for (int i = 0; i < 7; ++i) {
       at[i] = Along(q[i]), rate[i] = Along(qd[i]);
