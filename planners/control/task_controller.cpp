@@ -35,19 +35,6 @@ AdaptiveController::AdaptiveController(const Chain& model, const Adaptation& ada
   if (!(adaptation.filter > 0)) refuse("filter", adaptation.filter, "> 0");
 }
 
-ControlStep AdaptiveController::joint_law(const JointReference& r, const JointGains& gains, const Joints& q,
-                                          const Joints& qd) const {
-  const int last = model_.size() - 1;
-  ControlStep out;
-  out.error.setZero();
-  out.velocity_error = r.qd - qd;
-  Y_r_ = torque_regressor<double>(model_, q, qd, r.qdd, kGravity, last);  // q̇_r = q̇
-  out.torque = model_torque(Y_r_, inverse_dynamics<double>(model_, q, qd, r.qdd)) +
-               friction_torque<double>(model_, qd) + gains.damping.cwiseProduct(out.velocity_error) +
-               gains.stiffness.cwiseProduct(r.q - q);
-  return out;
-}
-
 ControlStep AdaptiveController::task_law(const TaskReference& r, const TaskGains& gains, const Joints& q,
                                          const Joints& qd) const {
   const int n = model_.size(), last = n - 1;

@@ -1,7 +1,7 @@
-// Computed torque with and without adaptation, in the joints and in the task, [DarkoD46] Eq. 31, 34, 35, 36.
+// Computed torque in the task with and without adaptation, [DarkoD46] Eq. 34, 35, 36.
 //
 // What is not known is a body in the hand: ten parameters π̃ of the last link beyond the model, estimated as π̂
-// from 0. No law here measures an acceleration or inverts an estimated mass matrix.
+// from 0. The law neither measures an acceleration nor inverts an estimated mass matrix.
 #pragma once
 
 #include <optional>
@@ -22,20 +22,12 @@ struct Adaptation {
   double filter{50};           ///< λ [1/s], > 0
 };
 
-/// Errors in the joints: τ = M̂ q̈_d + Ĉ q̇ + ĝ + k_v ė + k_p e, Eq. 31.
-struct JointReference {
-  JointVector<double> q, qd, qdd;  ///< rad, rad/s, rad/s²
-};
 /// Motion of the tip with its orientation kept.
 struct TaskReference {
   Eigen::Vector3d position, velocity, acceleration;  ///< m, m/s, m/s²
   Eigen::Matrix3d orientation;                       ///< axes of the tip as columns
 };
 
-/// Gains of the law in the joints.
-struct JointGains {
-  JointVector<double> stiffness, damping;  ///< k_p [N m/rad], k_v [N m s/rad]; diagonal, > 0
-};
 /// Gains of the law in the task.
 struct TaskGains {
   double stiffness{};           ///< k_ξ of the position [N/m], > 0
@@ -48,20 +40,17 @@ struct TaskGains {
 /// Quantities of a step that a monitor asks for.
 struct ControlStep {
   JointVector<double> torque;          ///< τ [N m], before limits
-  JointVector<double> velocity_error;  ///< s = β − q̇ or ė [rad/s]
-  Eigen::Matrix<double, 6, 1> error;  ///< e_ξ: position [m] and rotation vector [rad]; zero in the joint law
+  JointVector<double> velocity_error;  ///< s = β − q̇ [rad/s]
+  Eigen::Matrix<double, 6, 1> error;   ///< e_ξ: position [m] and rotation vector [rad]
 };
 
-/// The two laws with one estimate of the unknown body.
+/// The law with its estimate of the unknown body.
 class AdaptiveController {
  public:
   /// `model`: the chain as it is known, without the unknown body; friction is compensated as the model has
   /// it.
   AdaptiveController(const Chain& model, const Adaptation& adaptation);
 
-  /// Torques of Eq. 31.
-  ControlStep joint_law(const JointReference& reference, const JointGains& gains,
-                        const JointVector<double>& q, const JointVector<double>& qd) const;
   /// Torques of Eq. 35: impedance in the task, posture in its null space.
   ControlStep task_law(const TaskReference& reference, const TaskGains& gains, const JointVector<double>& q,
                        const JointVector<double>& qd) const;

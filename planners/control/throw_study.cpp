@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <stdexcept>
 
+#include "flight/projectile.hpp"
 #include "planners/arm/panda.hpp"
 
 namespace unhand::planners::control {
@@ -114,12 +116,10 @@ void check(const ControllerChoice& c, const Payload& payload, const StudyOptions
 }
 
 /// Where it lands from a state of the tip; empty: never.
-bool land(const Eigen::Vector3d& p, const Eigen::Vector3d& v, double height, Eigen::Vector2d& out) {
-  const double g = -kGravity[2], root = v.z() * v.z() + 2 * g * (p.z() - height);
-  if (!(root >= 0)) return false;
-  const double t = (v.z() + std::sqrt(root)) / g;
-  out = p.head<2>() + t * v.head<2>();
-  return t >= 0;
+std::optional<Eigen::Vector2d> land(const Eigen::Vector3d& p, const Eigen::Vector3d& v, double height) {
+  const auto at = flight::project<double>({p.x(), p.z(), 0}, {v.x(), v.z(), 0}, {0, kGravity.z()}, height);
+  if (!at) return {};
+  return Eigen::Vector2d(at->pose.x, p.y() + at->flight_time * v.y());
 }
 
 }  // namespace
@@ -220,10 +220,11 @@ StudyThrow run_throw(const ControllerChoice& choice, const Payload& payload, con
   const TipMotion<double> tip = tip_motion<double>(known, robot.q, robot.qd, Joints::Zero(7));
   out.release_position_error = (tip.frame.p - due.position).norm();
   out.release_velocity_error = (tip.velocity - due.velocity).norm();
-  Eigen::Vector2d target(0, 0), landed(0, 0);
-  land(wanted.position, wanted.velocity, o.landing_height, target);
-  out.lands = land(p, object.velocity, o.landing_height, landed);
-  out.miss = landed - target;
+  const Eigen::Vector2d nowhere(0, 0);
+  const auto target = land(wanted.position, wanted.velocity, o.landing_height);
+  const auto landed = land(p, object.velocity, o.landing_height);
+  out.lands = landed.has_value();
+  out.miss = landed.value_or(nowhere) - target.value_or(nowhere);
   out.hit = out.lands && std::abs(out.miss.x()) <= o.box.x() / 2 && std::abs(out.miss.y()) <= o.box.y() / 2;
   return out;
 }
