@@ -97,8 +97,13 @@ std::optional<ConeStep> cone_search(ForwardModel model, const FlipDatum& base,
 }
 
 ConeLearner::ConeLearner(ForwardModel model, std::vector<FlipDatum> support, const FlipTarget& target,
-                         const CommandRange& range, const ConeSearch& search)
-    : model_(model), data_(std::move(support)), target_(target), range_(range), search_(search) {
+                         const CommandRange& range, const ConeSearch& search, std::vector<FlipCommand> tried)
+    : model_(model),
+      data_(std::move(support)),
+      tried_(std::move(tried)),
+      target_(target),
+      range_(range),
+      search_(search) {
   for (const FlipDatum& one : data_) tried_.push_back(one.command);
 }
 
@@ -125,6 +130,8 @@ std::optional<FlipCommand> ConeLearner::next() {
 
 void ConeLearner::observe(std::span<const FlipTrial> trials) {
   if (const auto mean = mean_of(trials)) data_.push_back(*mean);
+  for (const FlipTrial& one : trials)  // somebody else may have chosen it
+    if (std::find(tried_.begin(), tried_.end(), one.command) == tried_.end()) tried_.push_back(one.command);
 }
 
 DetachVector shifted(const DetachVector& d, double shift) {
@@ -180,7 +187,7 @@ void TransferLearner::observe(std::span<const FlipTrial> trials) {
   if (after_) return after_->observe(trials);
   if (const auto mean = mean_of(trials)) own_.push_back(*mean);
   if (own_.size() == 3)
-    after_ = std::make_unique<ConeLearner>(ForwardModel::detach, own_, target_, range_, search_);
+    after_ = std::make_unique<ConeLearner>(ForwardModel::detach, own_, target_, range_, search_, tried_);
 }
 
 }  // namespace unhand::planners::flip

@@ -78,9 +78,10 @@ std::optional<ConeStep> cone_search(ForwardModel model, const FlipDatum& base,
 /// last throws changed nothing about which those are.
 class ConeLearner final : public FlipLearner {
  public:
-  /// `support`: what is known before, at least three throws of different commands.
+  /// `support`: what is known before, at least three throws of different commands. `tried`: commands that
+  /// were executed, landed or not, and are not to be given again; those of the support are among them anyway.
   ConeLearner(ForwardModel model, std::vector<FlipDatum> support, const FlipTarget& target,
-              const CommandRange& range, const ConeSearch& search = {});
+              const CommandRange& range, const ConeSearch& search = {}, std::vector<FlipCommand> tried = {});
   std::optional<FlipCommand> next() override;
   void observe(std::span<const FlipTrial> trials) override;
   /// All data so far, in the order of arrival.

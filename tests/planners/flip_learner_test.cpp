@@ -178,6 +178,37 @@ TEST(Transfer, GoesOnWhereItsCommandsLieOnALine) {
       EXPECT_FALSE(path.iterations[i].command == path.iterations[k].command) << i << " " << k;
 }
 
+// The nearest command of the past does not let the bar go; three others that do lie so that their mesh comes
+// back to it, whose prediction is the target itself.
+TEST(Transfer, DoesNotRepeatACommandThatNeverLanded) {
+  const LinearPlant plant{false};
+  const auto thrown = [&](double a, double b, double c) {
+    FlipTrial out = plant({"", 0, kRange.at(a, b, c), kBar});
+    out.outcome = FlipOutcome::landed;
+    return out;
+  };
+  const std::vector<FlipCommand> past{kRange.at(0.5, 0.5, 0.5), kRange.at(0.9, 0.1, 0.1),
+                                      kRange.at(0.1, 0.9, 0.9), kRange.at(0.9, 0.9, 0.5)};
+  const auto data = gather(plant, "population", past, 1, kBar).data;
+  TransferLearner learner(data, 0.0, {thrown(0.5, 0.5, 0.5).landing}, kRange);
+  const auto first = learner.next();
+  ASSERT_TRUE(first);
+  ASSERT_TRUE(*first == past[0]);
+  FlipTrial failed;
+  failed.command = *first;
+  failed.outcome = FlipOutcome::not_let_go;
+  learner.observe(std::span(&failed, 1));
+  // past[0] is half way between the first two.
+  for (const FlipTrial& one : {thrown(0.4, 0.5, 0.5), thrown(0.6, 0.5, 0.5), thrown(0.4, 0.7, 0.5)}) {
+    ASSERT_TRUE(learner.next());
+    learner.observe(std::span(&one, 1));
+  }
+  const auto again = learner.next();
+  ASSERT_TRUE(again);
+  const auto f = kRange.fractions(*again);
+  EXPECT_GT(std::hypot(f[0] - 0.5, f[1] - 0.5, f[2] - 0.5), 1e-3);
+}
+
 TEST(Transfer, NeedsFourThrows) {
   const std::vector<FlipDatum> few(3);
   EXPECT_THROW(TransferLearner(few, 0.06, {{1.2, 3}}, kRange), std::invalid_argument);
