@@ -75,7 +75,8 @@ class World {
     const auto& v = object_->getLinearVelocity();
     BulletResult out;
     out.detach = {t, {where.x(), where.y(), theta_}, {v.x(), v.y(), object_->getAngularVelocity().z()}};
-    const auto hand = problem_.hand.at({problem_.start, t}, t);
+    const auto hand =
+        problem_.hand.at({problem_.start, t > problem_.start ? t : problem_.start + options_.step}, t);
     const dynamics::Vec2<double> r{out.detach.pose.x - hand.pose.x, out.detach.pose.z - hand.pose.z};
     const auto patch = dynamics::twist_at_patch(out.detach.twist, r);
     out.relative = {dynamics::rotate(-theta_, r),
@@ -212,9 +213,17 @@ BulletResult simulate_in_bullet(const release::ReleaseProblem<double>& problem,
     throw std::invalid_argument(
         fmt::format("Bullet: iterations = {} is not in [1, 100000]", options.iterations));
   const double release = problem.normal_force.release_time();
+  if (!(problem.start >= problem.hand.begin() && problem.start < problem.hand.end()))
+    throw std::invalid_argument(fmt::format("Bullet: start = {} is not in [{}, {}) s, where the hand moves",
+                                            problem.start, problem.hand.begin(), problem.hand.end()));
   const bool parts = release <= problem.hand.end();
   const double end = parts ? release : problem.hand.end();
   World world(problem, patch, options);
+  if (end <= problem.start) {  // free before it begins, as simulate_release has it
+    BulletResult out = world.result(problem.start);
+    out.outcome = release::ReleaseOutcome::detached;
+    return out;
+  }
   const int steps = std::max(1, static_cast<int>(std::ceil((end - problem.start) / options.step)));
   const double h = (end - problem.start) / steps;
   for (int k = 0; k < steps; ++k)

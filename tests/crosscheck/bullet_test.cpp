@@ -127,6 +127,28 @@ TEST_F(Bullet, ThrowsComeNearTheExactDiscAsTheStepShrinks) {
   EXPECT_LT(fine, 0.06);    // m/s, at 10 cm
 }
 
+// The pads have parted when it begins: it is free then and there, as simulate_release has it.
+TEST_F(Bullet, ReleasesBeforeTheStartAreNoStepBackwards) {
+  const auto hand = support::still_hand(0.2);
+  const contact::ProfileNormalForce opening(contact::OpeningProfile<double>{0.0, 20, 0.02, 0.096, 1});
+  const double release = opening.release_time();
+  for (const double start : {release, 0.12}) {
+    release::ReleaseProblem<double> late{hand,  opening, *disc, {kMass, kInertia}, {0, -9.81}, {0.1, 0.3},
+                                         start, {},      0.0};
+    const auto ours = release::simulate_release(late);
+    const auto theirs = simulate_in_bullet(late, kPatch, with(BulletPads::pins, BulletFriction::along));
+    EXPECT_EQ(ours.outcome, release::ReleaseOutcome::detached);
+    EXPECT_EQ(theirs.outcome, ours.outcome);
+    EXPECT_EQ(theirs.steps, 0);
+    EXPECT_EQ(theirs.detach.time, start);
+    EXPECT_NEAR(theirs.detach.pose.x, ours.detach.pose.x, 1e-15);
+    EXPECT_NEAR(theirs.detach.pose.z, ours.detach.pose.z, 1e-15);
+    EXPECT_NEAR(theirs.detach.pose.theta, ours.detach.pose.theta, 1e-15);
+    EXPECT_NEAR(theirs.detach.twist.vz, ours.detach.twist.vz, 1e-15);
+    EXPECT_NEAR(theirs.relative.arm.x, 0.1, 1e-15);
+  }
+}
+
 TEST_F(Bullet, RefusesOptionsOutOfRange) {
   const auto hand = support::still_hand(0.1);
   const auto still = problem(hand, {0, 0}, 0, {}, 0);
