@@ -174,7 +174,7 @@ void compare_releases(const CompareRequest& request, const datasets::ThrowLog& l
 
 void compare(const CompareRequest& request) {
   require_models(request.models);
-  require_writable(request.json);
+  require_writable(request.json, request.inputs());
   require_writable_directory(request.report);
   require_writable_directory(request.write_cards);
   if (!request.report.empty()) require_gnuplot();

@@ -121,8 +121,8 @@ std::string command_of(const DiscoverOptions& options, const Parser& parser) {
 }
 
 void discover(const DiscoverOptions& options, const Parser& parser) {
-  require_writable(options.json);
-  require_writable(options.card);
+  require_writable(options.json, {options.log});
+  require_writable(options.card, {options.log});
   if (!options.report.empty()) {
     require_writable_directory(options.report);
     require_gnuplot();

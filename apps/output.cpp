@@ -61,6 +61,13 @@ void put_in_place(const fs::path& made, const fs::path& destination) {
   if (error) refuse(destination, error.message());
 }
 
+void require_other_than(const std::vector<fs::path>& inputs, const fs::path& destination) {
+  std::error_code error;
+  for (const fs::path& input : inputs)
+    if (!input.empty() && fs::equivalent(input, destination, error) && !error)
+      throw WrongUsage(fmt::format("{} is read: it cannot be an output too", destination.string()));
+}
+
 }  // namespace
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
@@ -88,10 +95,7 @@ fs::path Outputs::part_of(const fs::path& destination) {
 }
 
 void Outputs::require_other_than_inputs(const fs::path& destination) const {
-  std::error_code error;
-  for (const fs::path& input : inputs_)
-    if (!input.empty() && fs::equivalent(input, destination, error) && !error)
-      throw WrongUsage(fmt::format("{} is read: it cannot be an output too", destination.string()));
+  require_other_than(inputs_, destination);
 }
 
 fs::path Outputs::add(const fs::path& wanted, bool is_directory) {
@@ -167,7 +171,7 @@ void Outputs::commit() {
   parts_.clear();
 }
 
-void require_writable(const fs::path& file) {
+void require_writable(const fs::path& file, const std::vector<fs::path>& inputs) {
   if (file.empty()) return;
   if (file == "-") throw WrongUsage("'-' names no file, and outputs are files: ./- for one of that name");
   std::error_code error;
@@ -176,6 +180,7 @@ void require_writable(const fs::path& file) {
   if (fs::is_symlink(file, error) && !fs::exists(file, error))
     refuse(file, "it is a link that leads nowhere");
   require_directory(file, parent_of(file));
+  require_other_than(inputs, file);
 }
 
 void require_writable_directory(const fs::path& directory) {

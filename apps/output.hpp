@@ -69,8 +69,9 @@ class Outputs {
 
 /// Finds out before the work begins that a file cannot be written there: no directory to write it in, or
 /// something that is no regular file in its place. An empty path passes. Throws Unanswered, and WrongUsage
-/// for "-", which elsewhere stands for the standard output.
-void require_writable(const std::filesystem::path& file);
+/// for "-", which elsewhere stands for the standard output, and for one of `inputs`, which the run reads.
+void require_writable(const std::filesystem::path& file,
+                      const std::vector<std::filesystem::path>& inputs = {});
 /// The same of a directory, which need not exist yet.
 void require_writable_directory(const std::filesystem::path& directory);
 
