@@ -77,7 +77,10 @@ std::vector<NamedValue> named_values(const std::string& model, const experiment:
       out.push_back({"delay_sigma", "s", p.delay.spread});
     return out;
   }
-  return {{"mu", "-", p.mu}, {"length", "m", p.length}, {"pads", "-", static_cast<double>(p.pads)}};
+  std::vector<NamedValue> out{
+      {"mu", "-", p.mu}, {"length", "m", p.length}, {"pads", "-", static_cast<double>(p.pads)}};
+  if (model == "limit_surface_quartic" && p.kappa) out.push_back({"kappa", "-", *p.kappa});
+  return out;
 }
 
 std::vector<NamedValue> named_values(const experiment::ModelComparison& model) {
@@ -117,6 +120,8 @@ UsableCard read_usable_card(const fs::path& file) {
     if (pads != std::floor(pads))
       reader.fail("/parameters/pads/value", fmt::format("{} is not a whole number", pads));
     p.pads = static_cast<int>(pads);
+    if (out.card.model == "limit_surface_quartic" && out.card.parameters.contains("kappa"))
+      p.kappa = reader.take("kappa", "-", 0, 3);
   }
   reader.reject_unknown();
   return out;

@@ -13,6 +13,7 @@
 #include "apps/output.hpp"
 #include "apps/progress.hpp"
 #include "apps/table.hpp"
+#include "apps/tell.hpp"
 #include "apps/throws.hpp"
 #include "contact/gripper_delay.hpp"
 #include "crosscheck/bullet_release.hpp"
@@ -49,14 +50,37 @@ struct Setting {
 
 using Throws = std::vector<experiment::PreparedThrow>;
 
+/// Lets the pads of throws without a measured normal force open as a card says; how many there are.
+int tell_force(const datasets::ModelCard& card, const std::string& file, Throws& throws) {
+  contact::OpeningProfile<double> opening;
+  const auto value = [&](const char* name) {
+    const auto found = card.parameters.find(name);
+    if (found == card.parameters.end())
+      throw datasets::CardError(
+          file, fmt::format("/parameters/{}", name),
+          "is missing: throws without a measured normal force (ft/normal_force) take it. Only the card of a "
+          "fit to such throws (`unhand fit`) tells how the pads open");
+    return found->second.value;
+  };
+  int out = 0;
+  for (auto& one : throws) {
+    if (one.normal_force) continue;
+    if (out++ == 0)
+      opening = {0, value("grip_force"), value("dead_time"), value("opening_time"), value("shape")};
+    opening.open_command = one.open_command;
+    one.told_force.emplace(opening);
+  }
+  return out;
+}
+
 experiment::ModelParameters parameters_of(const CrosscheckOptions& options, const datasets::ThrowLog& log,
-                                          const Throws& prepared, std::string& from) {
+                                          Throws& prepared, std::string& from) {
   if (!options.card.empty()) {
     const UsableCard card = read_usable_card(options.card);
     experiment::ModelParameters out = card.parameters;
     if (!card.card.effects.empty())
       throw datasets::CardError(options.card, "/effects", "other engines have none of them: not accepted");
-    if (!card.fitted && card.card.model == contact::kGripperDelay)
+    if (card.card.model == contact::kGripperDelay)
       throw datasets::CardError(options.card, "/model",
                                 fmt::format("'{}' has no friction", contact::kGripperDelay));
     if (card.fitted) {
@@ -67,8 +91,18 @@ experiment::ModelParameters parameters_of(const CrosscheckOptions& options, cons
         return found->second.value;
       };
       out.mu = value("mu"), out.length = value("length");
-      if (log.gripper) out.pads = log.gripper->n_pads;
+      if (card.card.parameters.contains("pads"))
+        out.pads = static_cast<int>(value("pads"));
+      else if (log.gripper)
+        out.pads = log.gripper->n_pads;
+      if (card.card.parameters.contains("kappa")) out.kappa = value("kappa");
     }
+    const auto& models = options.models;
+    if (out.kappa && std::find(models.begin(), models.end(), "limit_surface_quartic") == models.end())
+      tell("unhand: kappa of {} is of limit_surface_quartic, which is none of --models\n", options.card);
+    if (const int told = tell_force(card.card, options.card, prepared); told > 0)
+      tell("unhand: {} of {} throws have no normal force: there the pads open as the card says\n", told,
+           prepared.size());
     from = options.card;
     return out;
   }
@@ -244,7 +278,7 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
     refuse_options(parser, {"--steps", "--pads", "--friction", "--rings"}, "cvode integrates the models");
   if (options.engine == "patch")
     refuse_options(parser, {"--pads", "--friction"}, "of bullet; patch has points with bristles");
-  require_writable(options.json);
+  require_writable(options.json, {options.log, options.card});
   auto known = contact::contact_model_names();
   std::erase(known, contact::kGripperDelay);  // it has no pads that another engine could be given
   for (const auto& model : options.models)
@@ -253,7 +287,7 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
   if (options.engine == "bullet" && !crosscheck::has_bullet())
     throw Unanswered("built without Bullet (Debian package libbullet-dev)");
   const auto log = read_throws(options.log);
-  const auto throws = experiment::prepare_all(log, options.log, options.threads);
+  auto throws = experiment::prepare_all(log, options.log, options.threads);
   std::string from;
   const auto parameters = parameters_of(options, log, throws, from);
 
@@ -274,6 +308,7 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
   json["engine"] = options.engine;
   json["parameters"] = {
       {"mu", parameters.mu}, {"length_m", parameters.length}, {"pads", parameters.pads}, {"from", from}};
+  if (parameters.kappa) json["parameters"]["kappa"] = *parameters.kappa;
   json["settings"] = Json::array();
   std::string text;
   bool any = false;
@@ -330,8 +365,10 @@ Command crosscheck_command(Parser& root) {
   parser.option("--models", options->models, "Models to hold it against, separated by commas")
       .with_commas()
       .with_default();
-  parser.option("--card", options->card,
-                "Friction from a model card; without it, estimated from the log for the first model");
+  parser.option(
+      "--card", options->card,
+      "Friction from a model card, and how the pads open where the log has no normal force; without it,\n"
+      "friction is estimated from the log for the first model");
   parser.option("--steps", options->steps, "Steps of bullet or patch [s], separated by commas")
       .with_commas()
       .range(1e-6, 1e-3);

@@ -103,6 +103,44 @@ PredictedLandings by_release(const std::string& name, const ThrowAnswer& a,
   return out;
 }
 
+/// The numbers of the release and where each is from.
+std::vector<ThrowAnswer::Number> numbers_of(const planners::ReleaseCard& card,
+                                            const planners::HeldObject& object,
+                                            const std::optional<datasets::Sku>& sku) {
+  using planners::NumberSource;
+  std::vector<ThrowAnswer::Number> out;
+  const auto say = [](const std::string& value, const std::string& sigma, bool uncertain) {
+    return !uncertain || value == sigma ? value : fmt::format("{}; sigma: {}", value, sigma);
+  };
+  const auto origin = [&](const char* name) {
+    const auto found = card.origins.find(name);
+    return found == card.origins.end() ? planners::NumberOrigin{} : found->second;
+  };
+  const auto add = [&](const char* name, const char* unit, double value, double sigma) {
+    const auto [from, of_sigma] = origin(name);
+    out.push_back({name, unit, value, sigma, say(to_string(from), to_string(of_sigma), sigma > 0)});
+  };
+  add("mu", "-", card.mu.value, card.mu.sigma);
+  add("length", "m", card.length, 0);
+  if (card.kappa) add("kappa", "-", *card.kappa, 0);
+  add("pads", "-", card.pads, 0);
+  add("grip_force", "N", card.grip_force, 0);
+  add("dead_time", "s", card.dead_time.value, card.dead_time.sigma);
+  add("opening_time", "s", card.opening_time.value, card.opening_time.sigma);
+  add("shape", "-", card.shape, 0);
+  const std::string told = sku ? "SKU" : "assumed";
+  out.push_back({"mass", "kg", object.mass, 0, told});
+  out.push_back({"inertia", "kg m2", object.inertia, 0, told});
+  const auto& com = object.com_offset;
+  std::string of_sigma = sku && sku->com_offset_sigma ? "SKU" : "assumed";
+  if (card.grasp_offset > 0) of_sigma += " and card";
+  out.push_back(
+      {"com_offset", "m", com.value, std::hypot(com.sigma, card.grasp_offset), say(told, of_sigma, true)});
+  out.push_back({"grasp_angle", "rad", object.angle, card.grasp_angle,
+                 say("assumed", to_string(origin("grasp_angle").sigma), card.grasp_angle > 0)});
+  return out;
+}
+
 /// The plan made insensitive to what the card leaves open, where that is possible within the limits.
 void plan_release(ThrowAnswer& a, const Chain& pads, planners::ReleaseThrow release,
                   const planners::PlanOptions& how, const PlanThrowOptions& options) {
@@ -145,7 +183,7 @@ void plan_release(ThrowAnswer& a, const Chain& pads, planners::ReleaseThrow rele
 }
 
 void plan_throw(const PlanThrowOptions& options) {
-  require_writable(options.json);
+  require_writable(options.json, {options.arm, options.card, options.sku});
   if (!options.report.empty()) {
     require_writable_directory(options.report);
     require_gnuplot();
@@ -163,8 +201,9 @@ void plan_throw(const PlanThrowOptions& options) {
   object.com_offset = {0, 0.004};
   if (!options.card.empty())
     card = planners::release_card(datasets::read_model_card(options.card), options.card);
+  std::optional<datasets::Sku> given;
   if (!options.sku.empty()) {
-    const auto sku = datasets::read_sku(options.sku);
+    const auto& sku = given.emplace(datasets::read_sku(options.sku));
     if (!sku.inertia)
       throw datasets::LogError(options.sku, "inertia_kg_m2", "is not known: give it, or a shape with dims_m");
     object.mass = sku.mass, object.inertia = *sku.inertia;
@@ -187,6 +226,7 @@ void plan_throw(const PlanThrowOptions& options) {
     release.card = *card;
     release.object = object;
     release.medium = answer.medium;
+    answer.numbers = numbers_of(*card, object, given);
     plan_release(answer, pads, release, how, options);
   } else {
     answer.predicted = {

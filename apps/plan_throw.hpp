@@ -25,7 +25,14 @@ struct ThrowAnswer {
   planners::ThrowPlan plan;
   double window{};        ///< for which q̈ is held [s]
   flight::Medium medium;  ///< of the flight
-  bool with_release{};    ///< the release follows a contact model, not a delay
+  /// A number that the release rests on, and who told it and its σ.
+  struct Number {
+    std::string name, unit;  ///< "-" where it has none
+    double value{}, sigma{};
+    std::string from;  ///< "card", "card; sigma assumed", …
+  };
+  std::vector<Number> numbers;  ///< with a contact model
+  bool with_release{};          ///< the release follows a contact model, not a delay
   std::optional<planners::ReleaseLanding> rigid,
       real;  ///< of the tube's motion: carried until the detach, and as the model says
   std::optional<planners::ReleaseSpread> spread_before, spread_after;

@@ -99,6 +99,14 @@ std::string text_of(const ThrowAnswer& a) {
         "\nunder the tube's motion a rigidly carried object would land {:+.3f} m from the middle, the "
         "contact model says {:+.3f} m\n",
         a.rigid->miss, a.real->miss);
+  if (!a.numbers.empty()) {
+    Table numbers{{"the release rests on", "value", "1 sigma", "from"}, {}, 1};
+    for (const auto& one : a.numbers)
+      numbers.rows.push_back({one.unit == "-" ? one.name : fmt::format("{} [{}]", one.name, one.unit),
+                              fmt::format("{:.4g}", one.value),
+                              one.sigma > 0 ? fmt::format("{:.2g}", one.sigma) : "-", one.from});
+    out += "\n" + numbers.text();
+  }
   const auto& limits = plan.limits;
   out += fmt::format(
       "\nlimits used, at most: position {:.1f} %, velocity {:.1f} %, acceleration {:.1f} %, jerk {:.1f} %, "
@@ -131,8 +139,12 @@ Json json_of(const ThrowAnswer& a) {
         {"landed", one.drawn.miss.size()}, {"lost", one.drawn.lost}, {"hits", one.hits},
         {"mean_m", one.drawn.mean},        {"std_m", one.drawn.std}, {"rms_m", rms(one.drawn)}};
   out["release"] = nullptr;
+  Json numbers = Json::object();
+  for (const auto& one : a.numbers)
+    numbers[one.name] = {{"value", one.value}, {"sigma", one.sigma}, {"unit", one.unit}, {"from", one.from}};
   if (a.with_release)
-    out["release"] = {{"carried_rigidly", landing_json(a.rigid)},
+    out["release"] = {{"numbers", numbers},
+                      {"carried_rigidly", landing_json(a.rigid)},
                       {"contact_model", landing_json(a.real)},
                       {"before", spread_json(a.spread_before)},
                       {"after", spread_json(a.spread_after)}};

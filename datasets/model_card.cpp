@@ -216,6 +216,21 @@ ModelCard read_model_card(const fs::path& file) {
   return parse_model_card(text.str(), file.string());
 }
 
+std::optional<CardParameter> middle_of_range(const ModelCard& card, const std::string& file,
+                                             const std::string& condition, const std::string& unit) {
+  const auto found = card.valid_range.find(condition);
+  if (found == card.valid_range.end()) return {};
+  const CardRange& range = found->second;
+  if (range.unit != unit)
+    throw CardError(file, fmt::format("/valid_range/{}/unit", condition),
+                    fmt::format("is '{}', not '{}'", range.unit, unit));
+  CardParameter out;
+  out.value = 0.5 * (range.low + range.high);
+  out.sigma = (range.high - range.low) / std::sqrt(12.0);
+  out.unit = unit;
+  return out;
+}
+
 std::string to_json(const ModelCard& card) {
   Json out{{"schema", schema_name}, {"schema_version", schema_version}, {"model", card.model}};
   if (!card.effects.empty()) out["effects"] = card.effects;

@@ -107,6 +107,12 @@ ModelCard read_model_card(const std::filesystem::path& file);
 /// The same of a text in memory; `file` is its name in errors.
 ModelCard parse_model_card(const std::string& text, const std::string& file = "(in memory)");
 
+/// What the card's valid range says of a condition: its middle, with the sigma of a number drawn evenly from
+/// it. Nothing where the card has no such range. Throws CardError, naming `file`, where it is in another
+/// unit.
+std::optional<CardParameter> middle_of_range(const ModelCard& card, const std::string& file,
+                                             const std::string& condition, const std::string& unit);
+
 /// Indented JSON with a line break at the end. Doubles come back bit for bit. Throws CardError for a card
 /// that could not be read again (no name, a number that is not finite, a range upside down).
 std::string to_json(const ModelCard& card);

@@ -29,7 +29,18 @@ contact::Patch<double> patch_of(const ModelParameters& p) {
 }
 
 const contact::NormalForce& force_of(const PreparedThrow& throw_) {
-  return throw_.normal_force ? static_cast<const contact::NormalForce&>(*throw_.normal_force) : kNoForce;
+  if (throw_.normal_force) return *throw_.normal_force;
+  if (throw_.told_force) return *throw_.told_force;
+  return kNoForce;
+}
+
+void require_force(const PreparedThrow& throw_, const std::string& model) {
+  if (throw_.normal_force || throw_.told_force) return;
+  throw std::invalid_argument(
+      fmt::format("throw {}: {} needs the normal force, which was not measured (no ft group); a card of "
+                  "`unhand fit` on throws "
+                  "without it tells how the pads open",
+                  throw_.id, model));
 }
 
 }  // namespace
@@ -50,15 +61,10 @@ void require_release_model(const std::string& name) {
 std::unique_ptr<contact::ContactModel> contact_model_for(const PreparedThrow& throw_,
                                                          const std::string& model, const ModelParameters& p) {
   if (model == kNaive) return nullptr;
-  if (model != contact::kGripperDelay && !throw_.normal_force)
-    throw std::invalid_argument(
-        fmt::format("throw {}: {} needs the normal force, which was not measured (no ft group); a card of "
-                    "`unhand fit` on throws "
-                    "without it tells how the pads open",
-                    throw_.id, model));
+  if (model != contact::kGripperDelay) require_force(throw_, model);
   return contact::make_contact_model(
-      model,
-      contact::ContactParameters<double>{patch_of(p), p.slide_end, {}, throw_.open_command, p.delay.centre});
+      model, contact::ContactParameters<double>{patch_of(p), p.slide_end, p.kappa, throw_.open_command,
+                                                p.delay.centre});
 }
 
 release::ReleaseProblem<double> release_problem(const PreparedThrow& throw_,
@@ -78,12 +84,7 @@ Prediction predict(const PreparedThrow& throw_, const std::string& model, const 
     out.events = static_cast<int>(result.events.size());
     out.slips_at_start = result.slips_at_start;
   } else {
-    if (!throw_.normal_force)
-      throw std::invalid_argument(
-          fmt::format("throw {}: {} needs the normal force, which was not measured (no ft group); a card of "
-                      "`unhand fit` on throws "
-                      "without it tells how the pads open",
-                      throw_.id, model));
+    require_force(throw_, model);
     const contact::GripperDelay unused(0, dynamics::Dual(0.0));
     const auto result = release::simulate_release_naive(release_problem(throw_, unused), patch_of(parameters),
                                                         parameters.naive);

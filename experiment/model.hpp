@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,9 +16,10 @@ namespace unhand::experiment {
 
 /// Campaign parameters of a model; each model reads what it needs.
 struct ModelParameters {
-  double mu{0.5};                                                              ///< friction coefficient [-]
-  double length{0.007};                                                        ///< L = c a = τ_max/f_max [m]
-  int pads{2};                                                                 ///< n >= 1
+  double mu{0.5};                 ///< friction coefficient [-]
+  double length{0.007};           ///< L = c a = τ_max/f_max [m]
+  int pads{2};                    ///< n >= 1
+  std::optional<double> kappa{};  ///< limit_surface_quartic; the closest to a uniform disc if absent [-]
   contact::SlideEnd slide_end{contact::SlideEnd::latched_brake};               ///< sliding_pivot
   contact::DelayDistribution delay{contact::DelayDistribution::number(0.05)};  ///< gripper_delay
   release::NaiveOptions naive{};                                               ///< limit_surface_naive
@@ -44,7 +46,8 @@ struct Prediction {
 };
 
 /// Simulates the release with the named model and flies to the landing. Throws std::invalid_argument for
-/// parameters out of range, and for a model that needs the normal force when it was not measured.
+/// parameters out of range, and for a model that needs the normal force when it was neither measured nor
+/// told.
 Prediction predict(const PreparedThrow& throw_, const std::string& model, const ModelParameters& parameters,
                    const dynamics::IntegratorOptions& options = {});
 

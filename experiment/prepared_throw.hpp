@@ -42,6 +42,9 @@ struct PreparedThrow {
   double start{};                    ///< [s]
   double open_command{};             ///< when the gripper is told to open [s]
   MeasuredOutcome measured;          ///< what the model is to predict
+  /// Of one pad, where it was not measured and somebody told how the gripper opens; prepare() leaves it
+  /// empty.
+  std::optional<contact::ProfileNormalForce> told_force{};
 };
 
 /// Smooths the hand and the normal force, finds the grasp and the measured outcome.

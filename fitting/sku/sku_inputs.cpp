@@ -98,15 +98,15 @@ void add_spreads(const datasets::ModelCard& card, Collector& collect) {
 
 /// How the gripper opens, where nothing measured it: what the card has seen, else what the synthetic
 /// campaigns take.
-void add_opening(const datasets::ModelCard& card, const AssumedTolerances& assumed, Collector& collect) {
+void add_opening(const datasets::ModelCard& card, const std::string& file, const AssumedTolerances& assumed,
+                 Collector& collect) {
   const auto design = experiment::campaign_design("batch180").opening;
   const auto add = [&](const char* name, const char* range_name, const char* unit, double value,
                        double sigma) {
     if (card.parameters.contains(name)) return;  // fitted, with its own σ
-    if (const auto range = card.valid_range.find(range_name); range != card.valid_range.end()) {
-      value = 0.5 * (range->second.low + range->second.high);
-      // of a number drawn evenly from the range
-      sigma = std::max(sigma, (range->second.high - range->second.low) / std::sqrt(12.0));
+    if (const auto seen = datasets::middle_of_range(card, file, range_name, unit)) {
+      value = seen->value;
+      sigma = std::max(sigma, *seen->sigma);
     }
     const std::size_t k = collect.value(name, value);
     collect.input({name, unit, value, sigma, InputSource::gripper, kForce, {{k, 1}}});
@@ -199,7 +199,7 @@ ThrowInputs throw_inputs(const datasets::Sku& sku, const datasets::ModelCard& ca
   add_card(sku, card, collect, out, of_card);
   add_spreads(card, collect);
   const bool follows_pads = card.model != contact::kGripperDelay;
-  if (follows_pads && !thrown.normal_force) add_opening(card, assumed, collect);
+  if (follows_pads && !thrown.normal_force) add_opening(card, card_file, assumed, collect);
   add_object(sku, assumed, collect);
   if (const auto mu = card.parameters.find("mu"); mu != card.parameters.end())
     collect.input({"surface",

@@ -88,7 +88,7 @@ std::optional<FlipRelease> predicted_release(const release::HandMotion& hand, co
   return release_bar(hand, {bar,
                             0.0,
                             {card.grip_force, card.dead_time.value, card.opening_time.value, card.shape},
-                            {card.model, card.mu.value, card.length, card.pads}});
+                            {card.model, card.mu.value, card.length, card.pads, card.kappa}});
 }
 
 std::vector<std::optional<FlipPose>> declared_landings(const HandLibrary& library) {
@@ -179,6 +179,7 @@ datasets::ModelCard model_card_of(const ReleaseFit& fit, const std::string& sour
   out.model = c.model;
   out.parameters["mu"] = {c.mu.value, c.mu.sigma, "-"};
   out.parameters["length"] = {c.length, fit.length_sigma, "m"};
+  if (c.kappa) out.parameters["kappa"] = {*c.kappa, {}, "-"};
   out.parameters["pads"] = {static_cast<double>(c.pads), {}, "-"};
   out.parameters["grip_force"] = {c.grip_force, {}, "N"};
   out.parameters["dead_time"] = {c.dead_time.value, c.dead_time.sigma, "s"};

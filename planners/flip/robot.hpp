@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -67,10 +68,11 @@ struct Gripper {
 
 /// What holds the bar.
 struct Pads {
-  std::string law;  ///< a contact model's name
-  double mu{};      ///< [-]
-  double length{};  ///< L = τ_max/f_max [m]
-  int count{2};     ///< n >= 1
+  std::string law;                ///< a contact model's name
+  double mu{};                    ///< [-]
+  double length{};                ///< L = τ_max/f_max [m]
+  int count{2};                   ///< n >= 1
+  std::optional<double> kappa{};  ///< limit_surface_quartic; the closest to a uniform disc if absent [-]
 };
 
 /// 1 σ of what differs from robot to robot and stays as it is for one. Shares are of the declared value.

@@ -1,7 +1,9 @@
 #include "planners/tube/release_throw.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <stdexcept>
@@ -26,58 +28,190 @@ const char* name_of(Unknown unknown) {
       return "opening_time";
     case kComOffset:
       return "com_offset";
+    case kGraspAngle:
+      return "grasp_angle";
     case kUnknowns:
       break;
   }
   return "unknown";
 }
 
+const char* to_string(NumberSource source) {
+  switch (source) {
+    case NumberSource::assumed:
+      return "assumed";
+    case NumberSource::parameter:
+      return "card";
+    case NumberSource::range:
+      return "card's range";
+    case NumberSource::widened:
+      return "assumed and card";
+  }
+  return "?";
+}
+
+namespace {
+
+using datasets::CardError;
+
+/// The numbers of a card, each into its place.
+class CardReader {
+ public:
+  CardReader(const datasets::ModelCard& card, const std::string& file, ReleaseCard& out)
+      : card_(card), file_(file), out_(out) {}
+
+  void take(const char* name, const char* unit, double least, bool open, double& value,
+            double* sigma = nullptr) {
+    known_.emplace_back(name);
+    const auto found = card_.parameters.find(name);
+    if (found == card_.parameters.end()) return;
+    const std::string path = fmt::format("/parameters/{}", name);
+    const datasets::CardParameter& told = found->second;
+    if (told.unit != unit)
+      throw CardError(file_, path + "/unit", fmt::format("is '{}', not '{}'", told.unit, unit));
+    require(path + "/value", told.value, least, open);
+    value = told.value;
+    auto& origin = out_.origins[name] = {NumberSource::parameter, NumberSource::assumed};
+    if (sigma == nullptr || !told.sigma) return;
+    *sigma = *told.sigma;
+    origin.sigma = NumberSource::parameter;
+  }
+
+  /// The same, else from the valid range. `least_sigma` of what that tells.
+  void take_or_range(const char* name, const char* unit, double& value, double& sigma, double least_share,
+                     double least_sigma) {
+    take(name, unit, 0, true, value, &sigma);
+    if (card_.parameters.contains(name)) return;
+    const auto seen = datasets::middle_of_range(card_, file_, name, unit);
+    if (!seen) return;
+    require(fmt::format("/valid_range/{}", name), seen->value, 0, true);
+    value = seen->value;
+    sigma = std::max({*seen->sigma, least_share * seen->value, least_sigma});
+    out_.origins[name] = {NumberSource::range, NumberSource::range};
+  }
+
+  /// σ of a spread from throw to throw, which comes on top of `base`; 0 where the card has none.
+  double spread(const char* name, const char* unit, const char* adds_to, double base) {
+    spreads_.emplace_back(name);
+    const auto found = card_.own_spreads.find(name);
+    if (found == card_.own_spreads.end()) return 0;
+    if (found->second.unit != unit)
+      throw CardError(file_, fmt::format("/own_spreads/{}/unit", name),
+                      fmt::format("is '{}', not '{}'", found->second.unit, unit));
+    NumberSource& source = out_.origins[adds_to].sigma;
+    if (source == NumberSource::assumed) source = base > 0 ? NumberSource::widened : NumberSource::parameter;
+    return found->second.sigma;
+  }
+
+  /// Parameters that are right on any card of the model and move nothing here.
+  void pass_over(const char* name) { known_.emplace_back(name); }
+  void pass_over_spread(const char* name) { spreads_.emplace_back(name); }
+
+  void reject_unknown() const {
+    for (const auto& [name, ignored] : card_.parameters)
+      if (std::find(known_.begin(), known_.end(), name) == known_.end())
+        throw CardError(file_, "/parameters/" + name,
+                        fmt::format("is not what plans of throws take of a card of {}: {}", card_.model,
+                                    fmt::join(known_, ", ")));
+    for (const auto& [name, ignored] : card_.own_spreads)
+      if (std::find(spreads_.begin(), spreads_.end(), name) == spreads_.end())
+        throw CardError(
+            file_, "/own_spreads/" + name,
+            fmt::format("is not what plans of throws take of a card: {}", fmt::join(spreads_, ", ")));
+  }
+
+  /// The card's covariance of two parameters; 0 where it does not tell.
+  double covariance(const char* a, const char* b) const {
+    if (!card_.covariance) return 0;
+    const auto& names = card_.covariance->names;
+    const auto i = static_cast<std::size_t>(std::find(names.begin(), names.end(), a) - names.begin()),
+               j = static_cast<std::size_t>(std::find(names.begin(), names.end(), b) - names.begin());
+    return i < names.size() && j < names.size() ? card_.covariance->matrix[i * names.size() + j] : 0;
+  }
+
+ private:
+  void require(const std::string& path, double value, double least, bool open) const {
+    if (!std::isfinite(value) || value < least || (open && value == least))
+      throw CardError(file_, path,
+                      fmt::format("is {}; accepted: finite, {} {}", value, open ? ">" : ">=", least));
+  }
+
+  const datasets::ModelCard& card_;
+  const std::string& file_;
+  ReleaseCard& out_;
+  std::vector<std::string> known_, spreads_;
+};
+
+}  // namespace
+
 ReleaseCard release_card(const datasets::ModelCard& card, const std::string& file,
                          const ReleaseCard& otherwise) {
   if (card.model == contact::kGripperDelay || card.model == "limit_surface_naive" ||
       card.model == "projectile")
-    throw datasets::CardError(file, "/model",
-                              fmt::format("'{}' does not say how the pads let go", card.model));
+    throw CardError(file, "/model", fmt::format("'{}' does not say how the pads let go", card.model));
   if (!card.effects.empty())
-    throw datasets::CardError(file, "/effects", "plans of throws take cards without effects");
+    throw CardError(file, "/effects",
+                    fmt::format("plans of throws take cards without effects; this one has {}",
+                                fmt::join(card.effects, ", ")));
   ReleaseCard out = otherwise;
   out.model = card.model;
-  const auto take = [&](const char* name, const char* unit, bool may_be_zero, double& value, double* sigma) {
-    const auto found = card.parameters.find(name);
-    if (found == card.parameters.end()) return;
-    const std::string path = fmt::format("/parameters/{}", name);
-    if (found->second.unit != unit)
-      throw datasets::CardError(file, path + "/unit",
-                                fmt::format("is '{}', not '{}'", found->second.unit, unit));
-    value = found->second.value;
-    if (!(value > 0 || (may_be_zero && value == 0)) || !std::isfinite(value))
-      throw datasets::CardError(
-          file, path + "/value",
-          fmt::format("is {}; accepted: finite, {} 0", value, may_be_zero ? ">=" : ">"));
-    if (sigma != nullptr && found->second.sigma) *sigma = *found->second.sigma;
-  };
-  take("mu", "-", false, out.mu.value, &out.mu.sigma);
-  if (const auto own = card.own_spreads.find("mu_deviation"); own != card.own_spreads.end())
-    out.mu.sigma = std::hypot(out.mu.sigma, own->second.sigma * out.mu.value);  // a fraction of mu
-  take("length", "m", false, out.length, nullptr);
+  out.kappa.reset();
+  CardReader reader(card, file, out);
+  reader.take("mu", "-", 0, true, out.mu.value, &out.mu.sigma);
+  reader.take("length", "m", 0, true, out.length);
+  if (card.model == "limit_surface_quartic") {
+    double kappa = NAN;
+    reader.take("kappa", "-", 0, false, kappa);
+    constexpr double kMostKappa = 3;  // of a convex surface
+    if (kappa > kMostKappa)
+      throw CardError(file, "/parameters/kappa/value",
+                      fmt::format("is {}; accepted: 0 to {}", kappa, kMostKappa));
+    if (!std::isnan(kappa)) out.kappa = kappa;
+  }
   constexpr int kMostPads = 1000;
   double pads = out.pads;
-  take("pads", "-", false, pads, nullptr);
+  reader.take("pads", "-", 0, true, pads);
   if (pads != std::floor(pads) || pads > kMostPads)
-    throw datasets::CardError(file, "/parameters/pads/value",
-                              fmt::format("is {}; accepted: whole numbers from 1 to {}", pads, kMostPads));
+    throw CardError(file, "/parameters/pads/value",
+                    fmt::format("is {}; accepted: whole numbers from 1 to {}", pads, kMostPads));
   out.pads = static_cast<int>(pads);
-  take("grip_force", "N", false, out.grip_force, nullptr);
-  take("dead_time", "s", true, out.dead_time.value, &out.dead_time.sigma);
-  take("opening_time", "s", false, out.opening_time.value, &out.opening_time.sigma);
-  take("shape", "-", false, out.shape, nullptr);
+  double force_sigma = 0;
+  reader.take_or_range("grip_force", "N", out.grip_force, force_sigma, kLeastForceSigma, 0);
+  reader.take("dead_time", "s", 0, false, out.dead_time.value, &out.dead_time.sigma);
+  reader.take_or_range("opening_time", "s", out.opening_time.value, out.opening_time.sigma, 0,
+                       kLeastOpeningSigma);
+  reader.take("shape", "-", 0, true, out.shape);
+  reader.pass_over("reference_force");  // of contact.soft_patch_radius, an effect
+  reader.pass_over_spread("force_deviation");
+  // Friction's limits know the product of mu and the force alone, of which a card without a measured force
+  // knows more than of either.
+  const double mu = out.mu.value, per_newton = mu / out.grip_force;
+  const double variance = std::pow(out.mu.sigma, 2) + std::pow(per_newton * force_sigma, 2) +
+                          2 * per_newton * reader.covariance("mu", "grip_force");
+  if (NumberSource& source = out.origins["mu"].sigma; force_sigma > 0 && source == NumberSource::assumed)
+    source = NumberSource::widened;
+  out.mu.sigma = std::sqrt(std::max(0.0, variance));
+  out.mu.sigma = std::hypot(out.mu.sigma, mu * reader.spread("mu_deviation", "-", "mu", out.mu.sigma));
+  out.dead_time.sigma = std::hypot(
+      out.dead_time.sigma, reader.spread("dead_time_deviation", "s", "dead_time", out.dead_time.sigma));
+  out.grasp_offset = reader.spread("grasp_offset", "m", "com_offset", 0);
+  out.grasp_angle = reader.spread("grasp_angle", "rad", "grasp_angle", 0);
+  reader.reject_unknown();
   return out;
 }
 
 namespace {
 
+/// The others may not be negative.
+bool has_sign(int unknown) { return unknown == kComOffset || unknown == kGraspAngle; }
+
 std::array<Uncertain, kUnknowns> unknowns_of(const ReleaseThrow& p) {
-  return {p.card.mu, p.card.dead_time, p.card.opening_time, p.object.com_offset};
+  const Uncertain& com = p.object.com_offset;
+  return {p.card.mu,
+          p.card.dead_time,
+          p.card.opening_time,
+          {com.value, std::hypot(com.sigma, p.card.grasp_offset)},
+          {p.object.angle, p.card.grasp_angle}};
 }
 
 template <class S>
@@ -92,6 +226,7 @@ std::optional<Thrown<S>> throw_once(const ReleaseThrow& p, const release::HandMo
                                     const std::array<S, kUnknowns>& draw) {
   contact::ContactParameters<S> pads;
   pads.patch = contact::Patch<S>::of_length(draw[kMu], S(p.card.length), p.card.pads);
+  if (p.card.kappa) pads.kappa = S(*p.card.kappa);
   const auto law = contact::make_contact_model(p.card.model, pads);
   const contact::ProfileNormalForce force(contact::OpeningProfile<S>{
       0.0, S(p.card.grip_force), draw[kDeadTime], draw[kOpeningTime], S(p.card.shape)});
@@ -102,7 +237,7 @@ std::optional<Thrown<S>> throw_once(const ReleaseThrow& p, const release::HandMo
                                                     *law,
                                                     {S(p.object.mass), S(p.object.inertia)},
                                                     gravity,
-                                                    {draw[kComOffset], S(p.object.angle)},
+                                                    {draw[kComOffset], draw[kGraspAngle]},
                                                     hand.begin(),
                                                     {},
                                                     S(0.0)});
@@ -114,7 +249,7 @@ std::optional<Thrown<S>> throw_once(const ReleaseThrow& p, const release::HandMo
   if (flown.outcome != flight::FlightOutcome::landed) return {};
   const auto& twist = let_go.detach.twist;
   return Thrown<S>{flown.landing.pose.x, let_go.detach.time,
-                   dynamics::value_of(let_go.relative.angle) - p.object.angle,
+                   dynamics::value_of(let_go.relative.angle - draw[kGraspAngle]),
                    std::hypot(dynamics::value_of(twist.vx), dynamics::value_of(twist.vz))};
 }
 
@@ -183,12 +318,14 @@ void summarise(Landings& out) {
 
 namespace {
 
-/// A draw of the unknown. One that has no sign is drawn again while it is negative: of a normal distribution
-/// about a value >= 0 at least every second draw is not, so that the last resort, the value, is never needed.
+/// A draw of the unknown. One that may not be negative is drawn again while it is negative: of a normal
+/// distribution about a value >= 0 at least every second draw is not, so that the last resort, the value, is
+/// never needed.
 template <class Normal>
-double drawn(const Uncertain& one, bool has_sign, Normal&& normal) {
+double drawn(const Uncertain& one, bool may_be_negative, Normal&& normal) {
+  if (one.sigma == 0) return one.value;
   for (int attempt = 0; attempt < 1000; ++attempt)
-    if (const double x = one.value + one.sigma * normal(); has_sign || x >= 0) return x;
+    if (const double x = one.value + one.sigma * normal(); may_be_negative || x >= 0) return x;
   return one.value;
 }
 
@@ -203,7 +340,7 @@ Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t see
   for (int i = 0; i < count; ++i) {
     Draw draw{};
     for (int k = 0; k < kUnknowns; ++k)
-      draw[k] = drawn(unknowns[k], k == kComOffset, [&] { return normal(random); });
+      draw[k] = drawn(unknowns[k], has_sign(k), [&] { return normal(random); });
     if (const auto thrown = throw_once<double>(problem, hand, draw))
       out.miss.push_back(thrown->miss);
     else
@@ -228,7 +365,7 @@ class Points {
         if (!(unknowns[k].sigma > 0)) continue;
         Draw draw = nominal_draw(problem);
         draw[k] += side * std::sqrt(p) * unknowns[k].sigma;
-        if (k != kComOffset) draw[k] = std::max(draw[k], 0.05 * unknowns[k].value);
+        if (!has_sign(k)) draw[k] = std::max(draw[k], 0.05 * unknowns[k].value);
         draws_.push_back(draw);
       }
   }

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,6 +18,20 @@ struct Uncertain {
   double value{}, sigma{};  ///< 1 σ
 };
 
+/// Where a number of the release is from.
+enum class NumberSource {
+  assumed,    ///< nothing told it
+  parameter,  ///< the card's parameters and spreads
+  range,      ///< the card's valid range: measured in the throws that the card is of
+  widened,    ///< of a σ: assumed, and a spread of the card's on top
+};
+/// As reports write it.
+const char* to_string(NumberSource);
+/// Of a number and of its σ.
+struct NumberOrigin {
+  NumberSource value{}, sigma{};
+};
+
 /// What is known of the release: a contact model, the friction of its pads, and how the gripper opens.
 struct ReleaseCard {
   std::string model{"limit_surface"};    ///< a name that contact::make_contact_model knows
@@ -27,11 +42,23 @@ struct ReleaseCard {
   Uncertain dead_time{0.020, 0.005};     ///< from the command to the first change of the force [s]
   Uncertain opening_time{0.060, 0.006};  ///< from there until the pads part [s]
   double shape{1.0};                     ///< p of contact::OpeningProfile [-]
+  std::optional<double> kappa{};         ///< limit_surface_quartic; the closest to a uniform disc if absent
+  double grasp_offset{};                 ///< 1 σ of the place of the pads on the object, throw to throw [m]
+  double grasp_angle{};                  ///< 1 σ of the object's angle in the hand, throw to throw [rad]
+  std::map<std::string, NumberOrigin> origins{};  ///< by a number's name on cards; assumed if absent
 };
 
-/// A model card's numbers, and those of `otherwise` where the card has none: mu (with its spread from throw
-/// to throw), length, pads, grip_force, dead_time, opening_time, shape. Throws datasets::CardError for a card
-/// of gripper_delay, or one with effects, which this planner does not take.
+/// The least that a gripper's numbers scatter where a card's valid range tells them, 1 σ.
+inline constexpr double kLeastForceSigma = 0.03,  ///< of the grip force, as its share [-]
+    kLeastOpeningSigma = 1e-3;                    ///< of the opening time [s]
+
+/// A model card's numbers: of its parameters mu, length, kappa (of limit_surface_quartic), pads, grip_force,
+/// dead_time, opening_time and shape; else, for grip_force and opening_time, of its valid range; else those
+/// of `otherwise`. The card's spreads from throw to throw add to σ: mu_deviation, dead_time_deviation,
+/// grasp_offset and grasp_angle; force_deviation is of a log's sensor and passed over. σ of the grip force
+/// counts as friction's, with which it forms one product. Throws datasets::CardError for a card of
+/// gripper_delay, for one with effects, which this planner does not take, and for parameters and spreads that
+/// it does not know.
 ReleaseCard release_card(const datasets::ModelCard& card, const std::string& file,
                          const ReleaseCard& otherwise = {});
 
@@ -48,9 +75,10 @@ enum Unknown {
   kDeadTime,     ///< of the gripper [s]
   kOpeningTime,  ///< of the gripper [s]
   kComOffset,    ///< of the object [m]
+  kGraspAngle,   ///< of the object against the hand [rad]
   kUnknowns      ///< how many there are
 };
-/// A value of every unknown, in its own unit, by kMu … kComOffset.
+/// A value of every unknown, in its own unit, by kMu … kGraspAngle.
 using Draw = std::array<double, kUnknowns>;
 /// The name that a card has for it: "dead_time".
 const char* name_of(Unknown);
@@ -94,6 +122,7 @@ struct ReleaseSpread {
 std::optional<ReleaseSpread> release_spread(const ReleaseThrow& problem);
 
 /// Landings of `count` draws from normal distributions (cut off at zero where the number must be positive).
+/// An unknown without σ takes no draw.
 struct Landings {
   std::vector<double> miss;  ///< of those that land [m]
   int lost{};                ///< not free in time, or never down

@@ -62,6 +62,19 @@ TEST_F(Cli, PlansAThrowWithACard) {
   EXPECT_LT(plan["predicted"]["insensitive motion"]["rms_m"],
             plan["predicted"]["tube acceleration"]["rms_m"]);
   EXPECT_TRUE(plan["release"]["contact_model"]["miss_m"].is_number());
+  // Where each number is from: the card's log measured its gripper, and nothing tells the dead time.
+  const auto& numbers = plan["release"]["numbers"];
+  const auto range = nlohmann::json::parse(content(folder / "cards/sliding_pivot.json"))["valid_range"];
+  for (const char* name : {"grip_force", "opening_time"}) {
+    EXPECT_EQ(numbers[name]["from"], "card's range") << name;
+    EXPECT_DOUBLE_EQ(numbers[name]["value"],
+                     0.5 * (range[name]["low"].get<double>() + range[name]["high"].get<double>()));
+  }
+  EXPECT_EQ(numbers["dead_time"]["from"], "assumed");
+  EXPECT_EQ(numbers["mu"]["from"], "card; sigma: assumed and card");
+  EXPECT_EQ(numbers["mass"]["from"], "SKU");
+  EXPECT_THAT(answer.out, HasSubstr("card's range"));
+  EXPECT_THAT(answer.out, HasSubstr("assumed"));
 }
 
 TEST_F(Cli, LearnsToThrowFlipAndGoesOnAfterAKill) {

@@ -170,6 +170,15 @@ TEST_F(Cli, NoOutputTakesThePlaceOfSomethingElse) {
   for (const char* file : {"log.h5", "./log.h5", "same.h5", "cards/../log.h5"})
     expect_refusal(std::string("inspect log.h5 --json ") + file, 2, "is read");
   expect_refusal("fit log.h5 --model gripper_delay --card log.h5", 2, "is read");
+  // Told before anything is read, let alone worked out: what is no log at all would end in 3.
+  std::ofstream(folder / "notes.txt") << "no log\n";
+  for (const char* what :
+       {"fit notes.txt --model gripper_delay --card notes.txt",
+        "fit notes.txt --model gripper_delay --json notes.txt", "discover notes.txt --card notes.txt",
+        "compare notes.txt --json notes.txt", "predict log.h5 --card notes.txt --json notes.txt",
+        "crosscheck notes.txt --engine cvode --json notes.txt",
+        "plan throw --target 1.3,0,-0.2 --card notes.txt --json notes.txt"})
+    expect_refusal(what, 2, "is read");
   expect_refusal("predict log.h5 --card cards/gripper_delay.json --csv cards/gripper_delay.json", 2,
                  "is read");
   expect_refusal("inspect log.h5 --json pipe", 1, "no regular file");

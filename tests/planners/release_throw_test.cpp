@@ -87,7 +87,7 @@ TEST(ReleaseThrow, DerivativesAreCentralDifferences) {
     const auto spread = release_spread(p);
     ASSERT_TRUE(spread);
     for (int k = 0; k < kUnknowns; ++k) {
-      const double size = nominal_draw(p)[k];
+      const double size = k == kGraspAngle ? 1 : nominal_draw(p)[k];  // rad; its own value is 0
       double best = INFINITY;
       for (double step = 1e-1; step > 1e-6; step *= 0.1) {
         Draw up = nominal_draw(p), down = up;
@@ -156,6 +156,118 @@ TEST(ReleaseThrow, TakesModelCards) {
   EXPECT_THROW(release_card(card, "card.json"), datasets::CardError);
   card.effects.clear();
   card.model = "gripper_delay";
+  EXPECT_THROW(release_card(card, "card.json"), datasets::CardError);
+}
+
+datasets::ModelCard quartic(double kappa) {
+  datasets::ModelCard card;
+  card.model = "limit_surface_quartic";
+  card.parameters = {{"mu", {0.4, 0.01, "-"}}, {"length", {0.01, {}, "m"}}, {"kappa", {kappa, {}, "-"}}};
+  return card;
+}
+
+// Where force and torque act together, κ is how much of both there is: a grip that slides and turns for long.
+TEST(ReleaseThrow, FollowsTheShapeOfItsCard) {
+  const Chain arm = pads();
+  ReleaseThrow p = swing(arm);
+  p.qdd *= 4;  // the swing itself is close to free fall, which asks nothing of the pads
+  const auto lands = [&](double kappa) {
+    p.card = release_card(quartic(kappa), "card.json");
+    p.card.grip_force = 4;
+    const auto at = release_landing(p, nominal_draw(p));
+    EXPECT_TRUE(at) << kappa;
+    return at ? at->miss : NAN;
+  };
+  const double lean = lands(0.3), full = lands(2.7), ellipsoid = lands(1);
+  EXPECT_GT(std::abs(lean - full), 1e-3);
+  p.card.model = "limit_surface";
+  p.card.kappa.reset();
+  const auto exact = release_landing(p, nominal_draw(p));
+  ASSERT_TRUE(exact);
+  EXPECT_NEAR(ellipsoid, exact->miss, 1e-6);  // the quartic of κ = 1 is the ellipsoid; the integrator's 1e-8
+}
+
+TEST(ReleaseCard, RefusesWhatItDoesNotTake) {
+  const auto complaint = [](const datasets::ModelCard& card) -> std::string {
+    try {
+      release_card(card, "card.json");
+    } catch (const datasets::CardError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(complaint(quartic(2.7)), "");
+  EXPECT_THAT(complaint(quartic(3.1)), testing::HasSubstr("/parameters/kappa/value"));
+  datasets::ModelCard card = quartic(1);
+  card.model = "sliding_pivot";
+  EXPECT_THAT(complaint(card), testing::HasSubstr("/parameters/kappa"));
+  card = quartic(1);
+  card.parameters["stiffness"] = {1, {}, "N/m"};
+  EXPECT_THAT(complaint(card), testing::HasSubstr("/parameters/stiffness"));
+  card = quartic(1);
+  card.own_spreads["tilt"] = {0.1, "rad"};
+  EXPECT_THAT(complaint(card), testing::HasSubstr("/own_spreads/tilt"));
+  card = quartic(1);
+  card.own_spreads["dead_time_deviation"] = {0.1, "ms"};
+  EXPECT_THAT(complaint(card), testing::HasSubstr("/own_spreads/dead_time_deviation/unit"));
+  card = quartic(1);
+  card.effects = {"contact.pad_compliance"};
+  EXPECT_THAT(complaint(card), testing::HasSubstr("contact.pad_compliance"));
+  card = quartic(1);
+  card.parameters["reference_force"] = {20, {}, "N"};  // every fit's card has it
+  card.own_spreads["force_deviation"] = {1, "-"};
+  EXPECT_EQ(complaint(card), "");
+}
+
+TEST(ReleaseCard, CountsWhatScattersFromThrowToThrow) {
+  const Chain arm = pads();
+  ReleaseThrow p = swing(arm);
+  datasets::ModelCard card = quartic(1.6);
+  card.parameters["dead_time"] = {0.02, 0.003, "s"};
+  const ReleaseCard still = release_card(card, "card.json");
+  EXPECT_EQ(still.dead_time.sigma, 0.003);
+  p.card = still;
+  const auto before = release_spread(p);
+  card.own_spreads = {
+      {"dead_time_deviation", {0.004, "s"}}, {"grasp_offset", {0.003, "m"}}, {"grasp_angle", {0.02, "rad"}}};
+  p.card = release_card(card, "card.json");
+  EXPECT_DOUBLE_EQ(p.card.dead_time.sigma, 0.005);  // 3, 4, 5
+  EXPECT_EQ(p.card.origins.at("dead_time").sigma, NumberSource::parameter);
+  const auto after = release_spread(p);
+  ASSERT_TRUE(before && after);
+  EXPECT_EQ(after->miss, before->miss);
+  const auto& g = after->gradient;
+  const double added = std::pow(g[kDeadTime] * 0.004, 2) + std::pow(g[kComOffset] * 0.003, 2) +
+                       std::pow(g[kGraspAngle] * 0.02, 2);
+  for (const Unknown k : {kDeadTime, kComOffset, kGraspAngle}) EXPECT_NE(g[k], 0) << name_of(k);
+  EXPECT_NEAR(after->spread * after->spread, before->spread * before->spread + added, 1e-12);
+  card.parameters.erase("dead_time");
+  EXPECT_EQ(release_card(card, "card.json").origins.at("dead_time").sigma, NumberSource::widened);
+}
+
+TEST(ReleaseCard, TakesTheGripperThatItsThrowsHad) {
+  datasets::ModelCard card = quartic(1.6);
+  card.valid_range = {{"grip_force", {48, 52, "N"}}, {"opening_time", {0.03, 0.036, "s"}}};
+  const ReleaseCard seen = release_card(card, "card.json");
+  EXPECT_DOUBLE_EQ(seen.grip_force, 50);
+  EXPECT_DOUBLE_EQ(seen.opening_time.value, 0.033);
+  EXPECT_DOUBLE_EQ(seen.opening_time.sigma, 0.006 / std::sqrt(12.0));
+  // Friction holds mu grip_force: 4 N of an even spread are less than the 3 % that are taken at least.
+  EXPECT_DOUBLE_EQ(seen.mu.sigma, std::hypot(0.01, 0.4 * 0.03));
+  EXPECT_EQ(seen.origins.at("grip_force").value, NumberSource::range);
+  EXPECT_EQ(seen.origins.at("mu").value, NumberSource::parameter);
+  EXPECT_FALSE(seen.origins.contains("dead_time"));  // nothing tells it
+
+  // Fitted numbers go before the range; of mu and the force a fit knows the product better than either.
+  card.parameters["grip_force"] = {30, 6, "N"};
+  card.parameters["mu"] = {0.4, 0.08, "-"};
+  card.covariance = {{"mu", "grip_force"}, {0.08 * 0.08, -0.99 * 0.08 * 6, -0.99 * 0.08 * 6, 36}};
+  const ReleaseCard fitted = release_card(card, "card.json");
+  EXPECT_EQ(fitted.grip_force, 30);
+  EXPECT_EQ(fitted.origins.at("grip_force").value, NumberSource::parameter);
+  EXPECT_NEAR(fitted.mu.sigma, 0.08 * std::sqrt(2 - 2 * 0.99), 1e-15);  // both are known to 20 %
+
+  card.valid_range["opening_time"].unit = "ms";
   EXPECT_THROW(release_card(card, "card.json"), datasets::CardError);
 }
 
