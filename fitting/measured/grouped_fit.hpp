@@ -21,6 +21,9 @@ struct GroupedFitOptions {
 struct GroupedWeights {
   std::vector<double> channel_scale;  ///< robust scatter by channel, at least 1 [σ]
   std::vector<double> group;          ///< factor on every group's part
+  /// Factor on the rows of what is known beforehand: samples that err by more than their noise, alike their
+  /// neighbours, are worth fewer than they are, and must not outvote it by their number.
+  double prior{1};
 };
 
 /// One group at the solution: its own unknowns and its whitened residual.
