@@ -95,7 +95,8 @@ struct GroupedMisfit {
   /// 1 where the model explains the channel to its noise.
   double chi2_per_sample() const { return n > 0 ? chi2 / n : 0; }
 };
-/// By channel.
-std::vector<GroupedMisfit> misfit(const GroupedProblem& problem, const GroupedFit& fit);
+/// By channel. With weights, every group counts as it does in them.
+std::vector<GroupedMisfit> misfit(const GroupedProblem& problem, const GroupedFit& fit,
+                                  const GroupedWeights* weights = nullptr);
 
 }  // namespace unhand::fitting
