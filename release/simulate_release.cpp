@@ -21,12 +21,12 @@ const char* to_string(ReleaseOutcome outcome) {
 
 template <class S>
 ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const ReleaseOptions& options) {
-  validate(problem);
   if (!(std::abs(problem.start) <= 1e6))
     throw std::invalid_argument(
         fmt::format("release: start = {} is not in [-1e6, 1e6] s: a clock must begin near the throw, for its "
                     "times to be resolved",
                     problem.start));
+  validate(problem);
   const ReleaseSystem<S> system(problem);
   const auto& [offset, angle] = problem.grasp;
   const Relative<S> held{{offset, S(0)}, angle, problem.slip, problem.spin};
