@@ -11,8 +11,8 @@
 namespace unhand::dynamics {
 
 /// Calls work(i) for i = 0 … n − 1 on `threads` threads (0: one per core). Each item writes its own result,
-/// so the outcome does not depend on the number of threads. The first exception is rethrown after all threads
-/// have stopped.
+/// so the outcome does not depend on the number of threads. Of the exceptions that of the least i is rethrown
+/// after all threads have stopped: those before it have been tried.
 template <class Work>
 void parallel_for(std::size_t n, int threads, Work&& work) {
   const std::size_t cores =
@@ -24,6 +24,7 @@ void parallel_for(std::size_t n, int threads, Work&& work) {
   }
   std::atomic<std::size_t> next{0};
   std::exception_ptr first;
+  std::size_t first_at = n;
   std::mutex guard;
   std::vector<std::thread> pool;
   for (std::size_t k = 0; k < count; ++k)
@@ -33,7 +34,10 @@ void parallel_for(std::size_t n, int threads, Work&& work) {
           work(i);
         } catch (...) {
           const std::lock_guard lock(guard);
-          if (!first) first = std::current_exception();
+          if (i < first_at) {
+            first_at = i;
+            first = std::current_exception();
+          }
           next = n;
         }
       }

@@ -27,8 +27,7 @@ void judge_detach(const PreparedThrow& prepared, ThrowComparison& comparison) {
   const Prediction& prediction = comparison.prediction;
   const auto& measured = prepared.measured;
   if (prediction.release != release::ReleaseOutcome::detached || !measured.detach_twist) return;
-  const double wait = measured.detach_time ? *measured.detach_time - prediction.detach.time : 0.0;
-  comparison.error[0] = prediction.detach.twist.vx + wait * prepared.gravity.x - measured.detach_twist->vx;
+  comparison.error[0] = prediction.detach.twist.vx - measured.detach_twist->vx;
   comparison.error[1] = (prediction.detach.twist.omega - measured.detach_twist->omega) * kDegrees;
 }
 

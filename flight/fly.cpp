@@ -106,6 +106,8 @@ void validate(const FlightProblem<S>& p) {
   if (!(value_of(p.drag_k) >= 0 && std::isfinite(value_of(p.drag_k))))
     throw std::invalid_argument(
         fmt::format("flight: drag_k = {} is not in [0, inf) 1/m", value_of(p.drag_k)));
+  if (!(p.longest >= 0 && std::isfinite(p.longest)))
+    throw std::invalid_argument(fmt::format("flight: longest = {} is not in [0, inf) s", p.longest));
 }
 
 template <class S>
@@ -162,6 +164,9 @@ template <class S>
 std::vector<Pose<S>> fly_through(const FlightProblem<S>& problem, const std::vector<double>& times,
                                  const dynamics::IntegratorOptions& options) {
   validate(problem);
+  for (const double t : times)
+    if (!(t >= 0 && std::isfinite(t)))
+      throw std::invalid_argument(fmt::format("flight: time {} s is not in [0, inf) s after the state", t));
   std::vector<Pose<S>> out;
   out.reserve(times.size());
   if (is_projectile(problem, false)) {
@@ -170,9 +175,8 @@ std::vector<Pose<S>> fly_through(const FlightProblem<S>& problem, const std::vec
           tracked_point(ballistic(problem.pose, problem.twist, problem.gravity, S(t)), problem.tracked).pose);
     return out;
   }
-  double first = 0, last = 0;
-  for (const double t : times) first = std::min(first, t), last = std::max(last, t);
-  if (first < 0) throw std::invalid_argument(fmt::format("flight: time {} s lies before the state", first));
+  double last = 0;
+  for (const double t : times) last = std::max(last, t);
   if (!(last > 0)) {
     for (std::size_t i = 0; i < times.size(); ++i)
       out.push_back(landing_from(S(0), state_of(problem), problem.tracked).pose);

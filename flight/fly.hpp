@@ -42,8 +42,8 @@ struct FlightResult {
   Landing<S> landing;                ///< pose and twist of the tracked point, if it landed
 };
 
-/// Flies to the landing. Throws std::invalid_argument when an input is not finite or drag_k < 0. Instantiated
-/// for double and Dual.
+/// Flies to the landing. Throws std::invalid_argument when an input is not finite, or drag_k or longest
+/// negative. Instantiated for double and Dual.
 template <class S>
 FlightResult<S> fly(const FlightProblem<S>& problem, const dynamics::IntegratorOptions& options = {});
 
@@ -63,7 +63,8 @@ dynamics::Pose<S> sample_flight(const RecordedFlight<S>& flight, const S& t) {
   return {y[0], y[1], y[2]};
 }
 
-/// Poses of the tracked point at `times` [s] after the problem's state, without landing.
+/// Poses of the tracked point at `times` >= 0 [s] after the problem's state, without landing. Throws
+/// std::invalid_argument for others.
 template <class S>
 std::vector<dynamics::Pose<S>> fly_through(const FlightProblem<S>& problem, const std::vector<double>& times,
                                            const dynamics::IntegratorOptions& options = {});

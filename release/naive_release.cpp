@@ -7,6 +7,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "release/release_system.hpp"
+
 namespace unhand::release {
 
 using dynamics::Acceleration;
@@ -17,6 +19,7 @@ using dynamics::Wrench;
 
 NaiveResult simulate_release_naive(const ReleaseProblem<double>& problem, const contact::Patch<double>& patch,
                                    const NaiveOptions& options) {
+  validate(problem);
   constexpr double kLeast = 1e-7;     // [s]: a release of 0.1 s then takes a million steps
   constexpr double kMostSteps = 1e8;  // some seconds of computing
   constexpr double kSpacings = 8;     // of representable times that a step must be long
@@ -34,7 +37,10 @@ NaiveResult simulate_release_naive(const ReleaseProblem<double>& problem, const 
   const double theta = hand.pose.theta + problem.grasp.angle;
   Vec2<double> r = dynamics::rotate(theta, Vec2<double>{problem.grasp.com_offset, 0});
   Pose<double> pose{hand.pose.x + r.x, hand.pose.z + r.z, theta};
-  Twist<double> twist = dynamics::twist_at_com(hand.twist, r);
+  Twist<double> twist =
+      dynamics::twist_at_com(Twist<double>{hand.twist.vx + problem.slip.x, hand.twist.vz + problem.slip.z,
+                                           hand.twist.omega + problem.spin},
+                             r);
 
   NaiveResult result;
   if (!(release <= problem.hand.end())) {

@@ -1,10 +1,13 @@
 // The release as the integrator sees it, and as a recorded release is read. Internal to release.
 #pragma once
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 #include <string_view>
 #include <vector>
 
@@ -20,6 +23,32 @@ using dynamics::Phase;
 using dynamics::State;
 using dynamics::value_of;
 using dynamics::Wrench;
+
+/// Throws std::invalid_argument, naming parameter, value and range, for a problem that is none.
+template <class S>
+void validate(const ReleaseProblem<S>& problem) {
+  const auto require = [](bool ok, const char* name, double value, const char* range) {
+    if (!ok) throw std::invalid_argument(fmt::format("release: {} = {} is not in {}", name, value, range));
+  };
+  const double m = value_of(problem.body.mass), I = value_of(problem.body.inertia);
+  require(m > 0 && m <= 1e4, "mass", m, "(0, 1e4] kg");
+  require(I > 0 && I <= 1e6, "inertia", I, "(0, 1e6] kg m²");
+  require(std::isfinite(value_of(problem.gravity.x)), "gravity x", value_of(problem.gravity.x),
+          "finite m/s²");
+  require(std::isfinite(value_of(problem.gravity.z)), "gravity z", value_of(problem.gravity.z),
+          "finite m/s²");
+  require(std::abs(value_of(problem.grasp.com_offset)) <= 100, "com_offset",
+          value_of(problem.grasp.com_offset), "[-100, 100] m");
+  require(std::isfinite(value_of(problem.grasp.angle)), "grasp angle", value_of(problem.grasp.angle),
+          "finite rad");
+  require(std::isfinite(value_of(problem.slip.x)), "slip x", value_of(problem.slip.x), "finite m/s");
+  require(std::isfinite(value_of(problem.slip.z)), "slip z", value_of(problem.slip.z), "finite m/s");
+  require(std::isfinite(value_of(problem.spin)), "spin", value_of(problem.spin), "finite rad/s");
+  if (!(problem.start >= problem.hand.begin() && problem.start < problem.hand.end()))
+    throw std::invalid_argument(
+        fmt::format("release: start = {} is not in [{}, {}) s, where the hand's motion is known",
+                    problem.start, problem.hand.begin(), problem.hand.end()));
+}
 
 /// The share of a tiny slip by which one step may be wrong.
 inline constexpr double kSlipShare = 1e-2;

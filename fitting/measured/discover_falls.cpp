@@ -70,10 +70,10 @@ void weigh_start_speeds(const datasets::ThrowLog& log, const FallProblem& proble
       out.evidence.push_back(
           {effect.id,
            fmt::format(
-               "The fit starts the falls {:+.2f} m/s faster, in the mean, than the sensor says of the "
+               "The fit starts the falls {:.2f} m/s more {}, in the mean, than the sensor says of the "
                "time before ({:.1f} sigma, rms), {:.0f} % of the speed in flight. A drag, the bias along "
                "the vertical and the speeds at the start trade against each other{}",
-               mean / n, std::sqrt(squares / n), 100 * share,
+               std::abs(mean / n), mean > 0 ? "upward" : "downward", std::sqrt(squares / n), 100 * share,
                share > kOpen ? ": how large the drag and the bias are, these falls do not determine" : ""),
            true});
 }

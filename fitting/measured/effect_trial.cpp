@@ -134,7 +134,8 @@ HeldOutFall held_out(const GroupedProblem& problem, const GroupedFit& before, co
   out.was = was / samples, out.is = is / samples;
   if (!(out.was > out.is)) return out;
   out.p = p_of_slope(slope_of(groups), train, out.is);
-  const auto b = misfit(problem, before), a = misfit(problem, after);
+  // One wild group must not veto what all others show.
+  const auto b = misfit(problem, before, &before.weights), a = misfit(problem, after, &before.weights);
   double falls = 0;
   for (std::size_t c = 0; c < b.size(); ++c) falls += std::max(0.0, b[c].chi2 - a[c].chi2);
   for (std::size_t c = 0; c < b.size(); ++c) {

@@ -31,7 +31,7 @@ class FallProblem final : public GroupedProblem {
     std::vector<flight::Vec3<double>> force;         // [m/s²]
     std::vector<flight::Vec3<double>> rate, turned;  // gyroscope: ω, and its integral as a rotation vector
     flight::Vec3<double> sigma{}, rest{};            // rest: read before the fall [m/s²]
-    double speed{}, speed_sigma{}, tilt_sigma{};
+    double speed{}, speed_sigma{}, tilt_sigma{};     // upward, when the fall begins [m/s]; of that; [rad]
   };
   std::vector<Fall> falls_;
   double gravity_{};

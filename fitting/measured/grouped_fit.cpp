@@ -130,7 +130,8 @@ ProjectedEquations projected(const GroupedProblem& problem, std::size_t group,
   return out;
 }
 
-std::vector<GroupedMisfit> misfit(const GroupedProblem& problem, const GroupedFit& fit) {
+std::vector<GroupedMisfit> misfit(const GroupedProblem& problem, const GroupedFit& fit,
+                                  const GroupedWeights* weights) {
   std::vector<GroupedMisfit> out;
   for (const auto& name : problem.channels()) out.push_back({name, 0, 0});
   for (std::size_t i = 0; i < fit.groups.size(); ++i) {
@@ -139,7 +140,8 @@ std::vector<GroupedMisfit> misfit(const GroupedProblem& problem, const GroupedFi
     for (Index j = 0; j < g.residual.size(); ++j)
       if (const int c = problem.groups()[i].rows[static_cast<std::size_t>(j)].channel; c >= 0) {
         out[static_cast<std::size_t>(c)].n += 1;
-        out[static_cast<std::size_t>(c)].chi2 += g.residual[j] * g.residual[j];
+        out[static_cast<std::size_t>(c)].chi2 +=
+            (weights ? weights->group[i] : 1.0) * g.residual[j] * g.residual[j];
       }
   }
   return out;

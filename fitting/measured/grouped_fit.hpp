@@ -21,6 +21,9 @@ struct GroupedFitOptions {
 struct GroupedWeights {
   std::vector<double> channel_scale;  ///< robust scatter by channel, at least 1 [σ]
   std::vector<double> group;          ///< factor on every group's part
+  /// Factor on the rows of what is known beforehand: samples that err by more than their noise, alike their
+  /// neighbours, are worth fewer than they are, and must not outvote it by their number.
+  double prior{1};
 };
 
 /// One group at the solution: its own unknowns and its whitened residual.
@@ -92,7 +95,8 @@ struct GroupedMisfit {
   /// 1 where the model explains the channel to its noise.
   double chi2_per_sample() const { return n > 0 ? chi2 / n : 0; }
 };
-/// By channel.
-std::vector<GroupedMisfit> misfit(const GroupedProblem& problem, const GroupedFit& fit);
+/// By channel. With weights, every group counts as it does in them.
+std::vector<GroupedMisfit> misfit(const GroupedProblem& problem, const GroupedFit& fit,
+                                  const GroupedWeights* weights = nullptr);
 
 }  // namespace unhand::fitting

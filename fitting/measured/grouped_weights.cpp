@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "dynamics/median.hpp"
 
@@ -15,13 +16,43 @@ namespace {
 /// Huber: the factor on a residual whose size is `r` in units of `limit`.
 double huber(double r) { return r > 1 ? std::sqrt(1 / r) : 1; }
 
+constexpr double kMostCorrelated = 0.98;  // neighbours of a channel: a hundred samples count as one
+
+/// By how much the variance of a channel's mean exceeds that of independent noise as declared: the scatter
+/// squared, times (1 + ρ)/(1 − ρ) of neighbours that correlate by ρ.
+double inflation(const GroupedProblem& problem, const GroupedFit& fit, int channel, double scale) {
+  double squares = 0, products = 0;
+  for (std::size_t i = 0; i < fit.groups.size(); ++i) {
+    const GroupFit& g = fit.groups[i];
+    if (!g.used || !g.solved) continue;
+    double before = 0;
+    for (Index j = 0; j < g.residual.size(); ++j) {
+      if (problem.groups()[i].rows[static_cast<std::size_t>(j)].channel != channel) continue;
+      squares += g.residual[j] * g.residual[j];
+      products += g.residual[j] * std::exchange(before, g.residual[j]);
+    }
+  }
+  const double rho = squares > 0 ? std::clamp(products / squares, 0.0, kMostCorrelated) : 0;
+  return scale * scale * (1 + rho) / (1 - rho);
+}
+
+/// The factor on a row, as a residual.
+double factor(double residual, int channel, const GroupedWeights& weights, double limit) {
+  if (channel < 0) return weights.prior;
+  return huber(std::abs(residual) / (limit * weights.channel_scale[static_cast<std::size_t>(channel)]));
+}
+
 }  // namespace
 
 double cost_of(const VectorXd& residual, const Group& group, const GroupedWeights& weights, double limit) {
   double out = 0;
   for (Index i = 0; i < residual.size(); ++i) {
     const int c = group.rows[static_cast<std::size_t>(i)].channel;
-    const double scale = c >= 0 ? weights.channel_scale[static_cast<std::size_t>(c)] : 1,
+    if (c < 0) {
+      out += std::pow(weights.prior * residual[i], 2);
+      continue;
+    }
+    const double scale = weights.channel_scale[static_cast<std::size_t>(c)],
                  r = std::abs(residual[i]) / scale;
     out += (r <= limit ? r * r : 2 * limit * r - limit * limit) * scale * scale;
   }
@@ -30,9 +61,7 @@ double cost_of(const VectorXd& residual, const Group& group, const GroupedWeight
 
 void weigh_rows(GroupEquations& e, const Group& group, const GroupedWeights& weights, double limit) {
   for (Index i = 0; i < e.residual.size(); ++i) {
-    const int c = group.rows[static_cast<std::size_t>(i)].channel;
-    const double scale = c >= 0 ? weights.channel_scale[static_cast<std::size_t>(c)] : 1;
-    const double w = huber(std::abs(e.residual[i]) / (limit * scale));
+    const double w = factor(e.residual[i], group.rows[static_cast<std::size_t>(i)].channel, weights, limit);
     if (w == 1) continue;
     e.residual[i] *= w;
     if (e.shared.size() > 0) e.shared.row(i) *= w;
@@ -42,7 +71,7 @@ void weigh_rows(GroupEquations& e, const Group& group, const GroupedWeights& wei
 
 GroupedWeights neutral_weights(const GroupedProblem& problem) {
   return {std::vector<double>(problem.channels().size(), 1e6),
-          std::vector<double>(problem.groups().size(), 1.0)};
+          std::vector<double>(problem.groups().size(), 1.0), 1};
 }
 
 GroupedWeights learned_weights(const GroupedProblem& problem, const GroupedFit& fit,
@@ -60,6 +89,12 @@ GroupedWeights learned_weights(const GroupedProblem& problem, const GroupedFit& 
   }
   for (std::size_t c = 0; c < sizes.size(); ++c)
     out.channel_scale[c] = std::max(1.0, 1.4826 * dynamics::median(sizes[c]));
+  double inflated = 0, measured = 0;
+  for (std::size_t c = 0; c < sizes.size(); ++c) {
+    const auto n = static_cast<double>(sizes[c].size());
+    inflated += n * inflation(problem, fit, static_cast<int>(c), out.channel_scale[c]), measured += n;
+  }
+  if (measured > 0) out.prior = std::sqrt(std::max(1.0, inflated / measured));
   const double limit = options.group_limit * std::max(1.0, dynamics::median(means));
   for (std::size_t i = 0; i < fit.groups.size(); ++i)
     if (const GroupFit& g = fit.groups[i]; g.used && g.n > 0 && g.chi2 / g.n > limit)

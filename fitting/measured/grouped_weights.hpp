@@ -15,8 +15,9 @@ void weigh_rows(GroupEquations& equations, const Group& group, const GroupedWeig
 /// Every group counts fully, every row quadratically.
 GroupedWeights neutral_weights(const GroupedProblem& problem);
 
-/// Scatter of every channel (from the median of |residual|), and less weight for groups whose χ² per sample
-/// is beyond options.group_limit medians.
+/// Scatter of every channel (from the median of |residual|), less weight for groups whose χ² per sample is
+/// beyond options.group_limit medians, and what is known beforehand by the inflation of the samples'
+/// variance: scatter² (1 + ρ)/(1 − ρ), ρ the correlation of neighbours, in the mean over the channels.
 GroupedWeights learned_weights(const GroupedProblem& problem, const GroupedFit& fit,
                                const GroupedFitOptions& options);
 

@@ -127,13 +127,14 @@ struct LawScore {
   }
 };
 
+using Scores = std::vector<std::vector<SurfaceScore>>;  // by surface, then model; the base is the first
+
 /// Every law of `models` beside the first one. Writes what was left out, and the evidence by surface.
 std::vector<LawScore> score_laws(const std::vector<SlipSamples>& surfaces,
-                                 const std::vector<SurfaceModel>& models,
-                                 const SurfaceComparisonOptions& options, SurfaceDiscovery& out) {
+                                 const std::vector<SurfaceModel>& models, const Scores& scores,
+                                 SurfaceDiscovery& out) {
   std::vector<LawScore> laws(models.size());
   for (std::size_t k = 0; k < laws.size(); ++k) laws[k].model = models[k];
-  const auto scores = compare_surfaces(surfaces, models, options);
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     const SurfaceScore& base = scores[i].front();
     for (const auto& score : scores[i])
@@ -146,6 +147,16 @@ std::vector<LawScore> score_laws(const std::vector<SlipSamples>& surfaces,
   }
   for (LawScore& law : laws) law.average();
   return laws;
+}
+
+/// The base over the surfaces on which model `k` was scored, too: what that model is to be held against.
+LawScore base_beside(std::size_t k, const std::vector<SlipSamples>& surfaces, const Scores& scores) {
+  LawScore base;
+  for (std::size_t i = 0; i < surfaces.size(); ++i)
+    if (scores[i].front().scored() && scores[i][k].scored())
+      base.model = scores[i].front().model, base.add(surfaces[i], scores[i].front(), scores[i].front());
+  base.average();
+  return base;
 }
 
 /// The law that is believed, the base (the first) where none convinces. Writes the ranking.
@@ -172,25 +183,25 @@ const LawScore& believed(const std::vector<LawScore>& laws, const SurfaceDiscove
 }
 
 /// Writes that `law` is accepted, with what speaks for it and against it.
-void accept_law(const LawScore& law, const LawScore& base, SurfaceDiscovery& out) {
+void accept_law(const LawScore& law, SurfaceDiscovery& out) {
   const std::string id = id_of(law.model);
   AcceptedEffect effect;
   effect.id = id;
   effect.p_value = law.gain.p();
   effect.delta_bic = law.delta_bic();
-  effect.test_error_ratio = law.error / base.error;
+  effect.test_error_ratio = law.error / law.base_error;
   effect.parameters.push_back({"gain", "deg", law.gain.mean(), law.gain.error()});
   effect.why = fmt::format(
       "mean angle between predicted and measured direction of sliding falls from {:.2f} to {:.2f} degrees, "
       "on {} of {} surfaces",
-      base.error, law.error, law.better, law.compared);
+      law.base_error, law.error, law.better, law.compared);
   MeasuredDiscovery& answer = out.answer;
   answer.effects.push_back(std::move(effect));
   answer.evidence.push_back(
       {id,
        fmt::format("Null control: on data simulated from the fitted {} with its own residuals as noise, "
                    "the same law loses {:.2f} degrees; what it gains on the measurement is not flexibility",
-                   to_string(base.model), -law.null_gain),
+                   to_string(SurfaceModel::ellipsoid), -law.null_gain),
        law.null_gain > 0});
   answer.separating.push_back(
       {id,
@@ -245,20 +256,21 @@ SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
     if (model != options.base &&
         std::find(options.forget.begin(), options.forget.end(), id_of(model)) == options.forget.end())
       models.push_back(model);
-  const std::vector<LawScore> laws = score_laws(surfaces, models, options.comparison, out);
-  const LawScore& base = laws.front();
-  if (base.compared == 0) {
+  const Scores scores = compare_surfaces(surfaces, models, options.comparison);
+  const std::vector<LawScore> laws = score_laws(surfaces, models, scores, out);
+  if (laws.front().compared == 0) {
     answer.verdict = Verdict::not_answered;
     answer.message = answer.skipped.empty() ? "no surface" : answer.skipped.front().second;
     return out;
   }
   answer.train = answer.test;
   const LawScore& best = believed(laws, options, answer.ranking);
-  const bool found = &best != &base;
+  const bool found = &best != &laws.front();
+  const LawScore base = base_beside(static_cast<std::size_t>(&best - laws.data()), surfaces, scores);
   answer.before_train = base.errors(base.train), answer.after_train = best.errors(best.train);
   answer.before_test = {{"direction_mae_deg", base.error}};
   answer.after_test = {{"direction_mae_deg", best.error}};
-  if (found) accept_law(best, base, out);
+  if (found) accept_law(best, out);
   judge_residuals(best, base, options.unexplained, answer);
   answer.misfit.push_back(
       {"direction", static_cast<int>(base.gain.n), base.train, base.error, best.train, best.error});

@@ -24,7 +24,7 @@ struct SurfaceEvidence {
   SurfaceModel law{};                      ///< against the base
   int slips{};                             ///< predicted
   double base_deg{}, law_deg{};            ///< mean held-out direction error
-  double null_base_deg{}, null_law_deg{};  ///< the same on data simulated from the base's fit
+  double null_base_deg{}, null_law_deg{};  ///< the same on data simulated from the fitted ellipsoid
   double gain_deg{}, gain_sigma{};         ///< mean over slips, paired, and its standard error
   double left{}, left_sigma{};             ///< correlation of the residual directions of neighbours
 };

@@ -43,6 +43,31 @@ TEST(Naive, TendsToTheEventDetectedAnswerAndChattersOnTheWay) {
               error[3], reversals[0], reversals[1], reversals[2], reversals[3]);
 }
 
+TEST(Naive, AnObjectThatSlipsFromTheStartAndProblemsThatAreNone) {
+  std::mt19937_64 random(74);
+  const auto thrown = support::random_throw(random, 0);
+  const auto model = contact::make_contact_model("limit_surface", support::parameters_of(thrown));
+  const auto held = support::problem_of(thrown, *model);
+  const release::ReleaseProblem<double> slips{
+      held.hand, held.normal_force, *model, held.body, held.gravity, held.grasp, 0.0, {0.3, -0.2}, 5.0};
+  release::ReleaseOptions options;
+  options.integrator = support::tight(1e-9, 1e-11);
+  const auto exact = simulate_release(slips, options).detach, still = simulate_release(held, options).detach;
+  const auto naive = simulate_release_naive(slips, thrown.patch, {1e-7, 0}).detach;
+  const auto off = [](const auto& a, const auto& b) {
+    return std::hypot(a.pose.x - b.pose.x, a.pose.z - b.pose.z, 0.1 * (a.pose.theta - b.pose.theta));
+  };
+  EXPECT_LT(off(naive, exact), 0.02 * off(still, exact));
+
+  const auto with = [&](double mass, double start) {
+    return release::ReleaseProblem<double>{
+        held.hand, held.normal_force, *model, {mass, 1e-3}, held.gravity, held.grasp, start, {}, 0.0};
+  };
+  EXPECT_THROW(simulate_release_naive(with(-1, 0), thrown.patch), std::invalid_argument);
+  EXPECT_THROW(simulate_release_naive(with(NAN, 0), thrown.patch), std::invalid_argument);
+  EXPECT_THROW(simulate_release_naive(with(0.1, -0.5), thrown.patch), std::invalid_argument);
+}
+
 TEST(Naive, SmoothingHidesTheChatterAndCreeps) {
   // A held object: the smoothed law slips at v_s f/f_max for ever, the event-detected one does not move.
   const auto hand = support::still_hand(1);

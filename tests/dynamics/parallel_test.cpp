@@ -3,8 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <numeric>
 #include <stdexcept>
+#include <string>
+#include <thread>
 
 namespace unhand::dynamics {
 namespace {
@@ -34,6 +37,22 @@ TEST(ParallelFor, TheFirstExceptionComesOutAfterAllThreadsHaveStopped) {
     EXPECT_THROW(parallel_for(1000, threads, work), std::runtime_error) << threads;
     EXPECT_EQ(running, 0);
   }
+}
+
+TEST(ParallelFor, TheExceptionIsThatOfTheLeastItem) {
+  for (const int threads : {1, 2, 8})
+    for (int round = 0; round < 50; ++round) {
+      const auto work = [&](std::size_t i) {
+        if (i == 3) std::this_thread::sleep_for(std::chrono::microseconds(200));  // fails first, throws last
+        if (i >= 3) throw std::runtime_error(std::to_string(i));
+      };
+      try {
+        parallel_for(100, threads, work);
+        FAIL() << "no exception";
+      } catch (const std::runtime_error& error) {
+        EXPECT_STREQ(error.what(), "3") << threads;
+      }
+    }
 }
 
 }  // namespace

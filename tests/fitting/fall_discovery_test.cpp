@@ -216,5 +216,20 @@ TEST(SurfaceDiscovery, AQuarticIsFound) {
   EXPECT_LT(found.answer.effects.front().test_error_ratio.value(), 0.8);
 }
 
+TEST(SurfaceDiscovery, ErrorsBeforeAndAfterAreOfTheSameSurfaces) {
+  const SlipSurface truth = test::quartic(contact::ConvexQuartic::isotropic_blend(2.8), 4.0);
+  SurfaceDiscoveryOptions options;
+  options.comparison.null_draws = 1;
+  const SlipSamples rich = test::simulate(truth, 60, 0.05, 0.03, 22),
+                    poor = test::simulate(truth, 12, 0.4, 0.2,
+                                          23);  // too few for a quartic, not for an ellipsoid
+  const auto alone = discover_surfaces({rich}, options), both = discover_surfaces({rich, poor}, options);
+  ASSERT_FALSE(both.answer.skipped.empty());
+  ASSERT_EQ(both.answer.verdict, Verdict::effect_found);
+  EXPECT_DOUBLE_EQ(both.answer.before_test.front().second, alone.answer.before_test.front().second);
+  EXPECT_DOUBLE_EQ(both.answer.effects.front().test_error_ratio.value(),
+                   alone.answer.effects.front().test_error_ratio.value());
+}
+
 }  // namespace
 }  // namespace unhand::fitting

@@ -291,6 +291,15 @@ TEST(Flights, RefuseWhatIsNoFlight) {
   p.drag_k = 0;
   p.twist.vx = NAN;
   EXPECT_THROW(fly(p), std::invalid_argument);
+  // In closed form as by the integrator.
+  for (const double drag : {0.0, 0.1}) {
+    Problem q = thrown(1, 2);
+    q.drag_k = drag;
+    EXPECT_THROW(fly_through(q, {-0.1}), std::invalid_argument) << drag;
+    EXPECT_THROW(fly_through(q, {NAN}), std::invalid_argument) << drag;
+    q.longest = NAN;
+    EXPECT_THROW(fly(q), std::invalid_argument) << drag;
+  }
   EXPECT_THROW(positions(PointFlight<double>{{}, {}, {0, 0, -g}, -1}, {1.0}), std::invalid_argument);
   EXPECT_THROW(positions(PointFlight<double>{{}, {}, {0, 0, -g}, 0}, {-1.0}), std::invalid_argument);
 }
