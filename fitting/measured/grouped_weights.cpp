@@ -18,23 +18,19 @@ double huber(double r) { return r > 1 ? std::sqrt(1 / r) : 1; }
 
 constexpr double kMostCorrelated = 0.98;  // neighbours of a channel: a hundred samples count as one
 
-/// By how much the variance of a channel's mean exceeds that of independent noise as declared: the scatter
-/// squared, times (1 + ρ)/(1 − ρ) of neighbours that correlate by ρ.
-double inflation(const GroupedProblem& problem, const GroupedFit& fit, int channel, double scale) {
-  double squares = 0, products = 0;
-  for (std::size_t i = 0; i < fit.groups.size(); ++i) {
-    const GroupFit& g = fit.groups[i];
-    if (!g.used || !g.solved) continue;
-    double before = 0;
-    for (Index j = 0; j < g.residual.size(); ++j) {
-      if (problem.groups()[i].rows[static_cast<std::size_t>(j)].channel != channel) continue;
-      squares += g.residual[j] * g.residual[j];
-      products += g.residual[j] * std::exchange(before, g.residual[j]);
-    }
+/// The residuals of a channel in all groups.
+struct Channel {
+  std::vector<double> sizes;
+  double squares{}, products{};  // of neighbours
+  /// Robust, at least 1 [σ].
+  double scale() const { return std::max(1.0, 1.4826 * dynamics::median(sizes)); }
+  /// By how much the variance of the mean exceeds that of independent noise as declared: the scatter squared,
+  /// times (1 + ρ)/(1 − ρ) of neighbours that correlate by ρ.
+  double inflation() const {
+    const double rho = squares > 0 ? std::clamp(products / squares, 0.0, kMostCorrelated) : 0;
+    return scale() * scale() * (1 + rho) / (1 - rho);
   }
-  const double rho = squares > 0 ? std::clamp(products / squares, 0.0, kMostCorrelated) : 0;
-  return scale * scale * (1 + rho) / (1 - rho);
-}
+};
 
 /// The factor on a row, as a residual.
 double factor(double residual, int channel, const GroupedWeights& weights, double limit) {
@@ -77,22 +73,27 @@ GroupedWeights neutral_weights(const GroupedProblem& problem) {
 GroupedWeights learned_weights(const GroupedProblem& problem, const GroupedFit& fit,
                                const GroupedFitOptions& options) {
   GroupedWeights out = neutral_weights(problem);
-  std::vector<std::vector<double>> sizes(problem.channels().size());
+  std::vector<Channel> channels(problem.channels().size());
   std::vector<double> means;
   for (std::size_t i = 0; i < fit.groups.size(); ++i) {
     const GroupFit& g = fit.groups[i];
     if (!g.used || !g.solved) continue;
-    for (Index j = 0; j < g.residual.size(); ++j)
-      if (const int c = problem.groups()[i].rows[static_cast<std::size_t>(j)].channel; c >= 0)
-        sizes[static_cast<std::size_t>(c)].push_back(std::abs(g.residual[j]));
+    std::vector<double> before(channels.size());
+    for (Index j = 0; j < g.residual.size(); ++j) {
+      const int c = problem.groups()[i].rows[static_cast<std::size_t>(j)].channel;
+      if (c < 0) continue;
+      Channel& channel = channels[static_cast<std::size_t>(c)];
+      channel.sizes.push_back(std::abs(g.residual[j]));
+      channel.squares += g.residual[j] * g.residual[j];
+      channel.products += g.residual[j] * std::exchange(before[static_cast<std::size_t>(c)], g.residual[j]);
+    }
     if (g.n > 0) means.push_back(g.chi2 / g.n);
   }
-  for (std::size_t c = 0; c < sizes.size(); ++c)
-    out.channel_scale[c] = std::max(1.0, 1.4826 * dynamics::median(sizes[c]));
   double inflated = 0, measured = 0;
-  for (std::size_t c = 0; c < sizes.size(); ++c) {
-    const auto n = static_cast<double>(sizes[c].size());
-    inflated += n * inflation(problem, fit, static_cast<int>(c), out.channel_scale[c]), measured += n;
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    out.channel_scale[c] = channels[c].scale();
+    const auto n = static_cast<double>(channels[c].sizes.size());
+    if (n > 0) inflated += n * channels[c].inflation(), measured += n;
   }
   if (measured > 0) out.prior = std::sqrt(std::max(1.0, inflated / measured));
   const double limit = options.group_limit * std::max(1.0, dynamics::median(means));

@@ -29,7 +29,7 @@ enum class NumberSource {
 const char* to_string(NumberSource);
 /// Of a number and of its σ.
 struct NumberOrigin {
-  NumberSource value{}, sigma{};
+  NumberSource value{}, sigma{};  ///< of each
 };
 
 /// What is known of the release: a contact model, the friction of its pads, and how the gripper opens.
