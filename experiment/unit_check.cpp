@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "dynamics/median.hpp"
+#include "experiment/axis_check.hpp"
 #include "experiment/declared_check.hpp"
 #include "experiment/turn_check.hpp"
 #include "experiment/unit_evidence.hpp"
@@ -115,7 +116,9 @@ std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log) {
                      mu, friction.size(), kLeastFriction, kMostFriction,
                      mu > 1 ? "kgf, lbf or kN for N" : "mN for N")});
   if (out.empty()) out = outlying_throws(log, throws);
+  if (out.empty()) out = contradicted_axes(log);
   if (out.empty()) out = turned_levers(log);
+  if (out.empty()) out = reversed_wrenches(log);
   if (out.empty()) out = landings_turns_off(log);
   if (const auto height = out.empty() ? doubtful_landing_height(log) : std::nullopt) out.push_back(*height);
   if (out.empty()) out = contradicted_landing_height(log);

@@ -18,6 +18,52 @@ namespace unhand::experiment {
 using datasets::Series;
 using dynamics::Vec2;
 
+std::array<double, 3> hand_at(const Series& time, const Series& values, double t) {
+  const auto after = std::upper_bound(time.data.begin() + 1, time.data.end() - 1, t);
+  const auto b = static_cast<std::size_t>(after - time.data.begin()), a = b - 1;
+  const double s = std::clamp((t - time(a)) / (time(b) - time(a)), 0.0, 1.0);
+  std::array<double, 3> out{};
+  for (std::size_t c = 0; c < 3; ++c) out[c] = values(a, c) + s * (values(b, c) - values(a, c));
+  return out;
+}
+
+std::optional<double> opening_of(const datasets::ThrowLog& log, const datasets::Throw& logged) {
+  if (log.gripper && log.gripper->opening_command_time) return log.gripper->opening_command_time;
+  if (!logged.ft || logged.ft->normal_force.empty()) return logged.detach_time;
+  const auto& force = logged.ft->normal_force.data;
+  const auto most = std::max_element(force.begin(), force.end());
+  const auto half = std::find_if(most, force.end(), [&](double f) { return f < 0.5 * *most; });
+  if (half == force.end()) return logged.detach_time;
+  return logged.ft->time(static_cast<std::size_t>(half - force.begin()));
+}
+
+std::vector<HeldWrench> held_wrenches(const datasets::ThrowLog& log, const datasets::Throw& logged,
+                                      double begin, double end, std::optional<double> grasp_angle) {
+  const auto& object = log.objects.at(logged.object);
+  const auto& ft = *logged.ft;
+  const auto& hand = *logged.hand;
+  const double pads = log.gripper ? log.gripper->n_pads : 2;
+  // d: from the pads' centre to the CoM, in the hand frame.
+  const Vec2<double> d = grasp_angle && object.com_offset
+                             ? dynamics::rotate(*grasp_angle, Vec2<double>{*object.com_offset, 0})
+                             : Vec2<double>{0, 0};
+  const bool turns = grasp_angle && object.com_offset && object.inertia && object.inertia->size() == 1;
+  std::vector<HeldWrench> out;
+  for (std::size_t i = 0; i < ft.time.rows; ++i) {
+    if (ft.time(i) < begin || ft.time(i) > end) continue;
+    const auto pose = hand_at(hand.time, hand.pose, ft.time(i)),
+               twist = hand_at(hand.time, hand.twist, ft.time(i)),
+               a = hand_at(hand.time, hand.acceleration, ft.time(i));
+    const Vec2<double> free = dynamics::rotate(-pose[2], Vec2<double>{a[0], a[1] + log.gravity});
+    const double w2 = twist[2] * twist[2];
+    const Vec2<double> f{object.mass * (free.x - a[2] * d.z - w2 * d.x),
+                         object.mass * (free.z + a[2] * d.x - w2 * d.z)};
+    out.push_back({{pads * ft.wrench(i, 0), pads * ft.wrench(i, 1), pads * ft.wrench(i, 2)},
+                   {f.x, f.z, turns ? object.inertia->front() * a[2] + d.x * f.z - d.z * f.x : NAN}});
+  }
+  return out;
+}
+
 namespace {
 
 /// Numbers of two columns that should be equal.
@@ -69,16 +115,6 @@ void check_hand(const datasets::HandLog& hand, SizeRatios& out) {
   keep(out, SizedColumn::hand_spin, spin);
 }
 
-/// The hand's columns at a time within its own, by straight lines.
-std::array<double, 3> at(const Series& time, const Series& values, double t) {
-  const auto after = std::upper_bound(time.data.begin() + 1, time.data.end() - 1, t);
-  const auto b = static_cast<std::size_t>(after - time.data.begin()), a = b - 1;
-  const double s = std::clamp((t - time(a)) / (time(b) - time(a)), 0.0, 1.0);
-  std::array<double, 3> out{};
-  for (std::size_t c = 0; c < 3; ++c) out[c] = values(a, c) + s * (values(b, c) - values(a, c));
-  return out;
-}
-
 /// A throw while its object is held.
 struct Held {
   const datasets::ThrowLog& log;
@@ -101,7 +137,7 @@ std::optional<double> check_mocap(const Held& held, SizeRatios& out) {
   std::optional<std::pair<std::size_t, std::array<double, 3>>> first;
   for (std::size_t i = 0; i < mocap.time.rows; ++i) {
     if (!mocap.is_valid(i) || !held.covers(mocap.time(i))) continue;
-    const auto pose = at(held.hand.time, held.hand.pose, mocap.time(i));
+    const auto pose = hand_at(held.hand.time, held.hand.pose, mocap.time(i));
     angle += mocap.pose(i, 2) - pose[2], n += 1;
     distance += std::hypot(mocap.pose(i, 0) - pose[0], mocap.pose(i, 1) - pose[1]);
     if (!first) first = {i, pose};
@@ -122,27 +158,11 @@ std::optional<double> check_mocap(const Held& held, SizeRatios& out) {
 
 /// Newton and Euler for the held body, about the pads' centre, in the hand frame.
 void check_wrench(const Held& held, std::optional<double> grasp_angle, SizeRatios& out) {
-  const auto& object = held.object();
-  const auto& ft = *held.logged.ft;
-  const double pads = held.log.gripper ? held.log.gripper->n_pads : 2;
-  // d: from the pads' centre to the CoM, in the hand frame.
-  const Vec2<double> d = grasp_angle && object.com_offset
-                             ? dynamics::rotate(*grasp_angle, Vec2<double>{*object.com_offset, 0})
-                             : Vec2<double>{0, 0};
   Pairs force, torque;
-  for (std::size_t i = 0; i < ft.time.rows; ++i) {
-    if (!held.covers(ft.time(i))) continue;
-    const auto pose = at(held.hand.time, held.hand.pose, ft.time(i)),
-               twist = at(held.hand.time, held.hand.twist, ft.time(i)),
-               a = at(held.hand.time, held.hand.acceleration, ft.time(i));
-    const Vec2<double> free = dynamics::rotate(-pose[2], Vec2<double>{a[0], a[1] + held.log.gravity});
-    const double w2 = twist[2] * twist[2];
-    const Vec2<double> f{object.mass * (free.x - a[2] * d.z - w2 * d.x),
-                         object.mass * (free.z + a[2] * d.x - w2 * d.z)};
-    force.add(pads * ft.wrench(i, 0), f.x);
-    force.add(pads * ft.wrench(i, 1), f.z);
-    if (grasp_angle && object.com_offset && object.inertia && object.inertia->size() == 1)
-      torque.add(pads * ft.wrench(i, 2), object.inertia->front() * a[2] + d.x * f.z - d.z * f.x);
+  for (const auto& [seen, needed] : held_wrenches(held.log, held.logged, held.begin, held.end, grasp_angle)) {
+    force.add(seen[0], needed[0]);
+    force.add(seen[1], needed[1]);
+    if (std::isfinite(needed[2])) torque.add(seen[2], needed[2]);
   }
   keep(out, SizedColumn::force, force.ratio(kShowsNewton));
   keep(out, SizedColumn::torque, torque.ratio(kShowsNewtonMetre));
@@ -181,8 +201,8 @@ void check_fall(const datasets::ThrowLog& log, const datasets::Throw& logged, Si
 /// A free flight of the pads' centre from the end of the grasp.
 void check_landing(const Held& held, SizeRatios& out) {
   const auto& landing = *held.logged.landing;
-  const auto from = at(held.hand.time, held.hand.pose, held.end),
-             with = at(held.hand.time, held.hand.twist, held.end);
+  const auto from = hand_at(held.hand.time, held.hand.pose, held.end),
+             with = hand_at(held.hand.time, held.hand.twist, held.end);
   const double g = held.log.gravity, drop = from[1] - held.log.landing_height,
                under = with[1] * with[1] + 2 * g * drop;
   if (!(under >= 0) || !(g > 0) || landing.pose.empty()) return;
@@ -228,17 +248,6 @@ void check_friction(const datasets::ThrowLog& log, const datasets::FtLog& ft, do
   if (!ratios.empty()) keep(out, SizedColumn::slip_force, dynamics::median(ratios));
 }
 
-/// When the gripper opens: the command, else where the normal force has fallen to half [s].
-std::optional<double> opening_of(const datasets::ThrowLog& log, const datasets::Throw& logged) {
-  if (log.gripper && log.gripper->opening_command_time) return log.gripper->opening_command_time;
-  if (!logged.ft || logged.ft->normal_force.empty()) return logged.detach_time;
-  const auto& force = logged.ft->normal_force.data;
-  const auto most = std::max_element(force.begin(), force.end());
-  const auto half = std::find_if(most, force.end(), [&](double f) { return f < 0.5 * *most; });
-  if (half == force.end()) return logged.detach_time;
-  return logged.ft->time(static_cast<std::size_t>(half - force.begin()));
-}
-
 }  // namespace
 
 SizeRatios compare_sizes(const datasets::ThrowLog& log, const datasets::Throw& logged) {
@@ -276,7 +285,7 @@ std::optional<double> lever_angle(const datasets::ThrowLog& log, const datasets:
   double n = 0;
   for (std::size_t i = 0; i < mocap.time.rows; ++i) {
     if (!mocap.is_valid(i) || mocap.time(i) < begin || mocap.time(i) > end) continue;
-    const auto pose = at(hand.time, hand.pose, mocap.time(i));
+    const auto pose = hand_at(hand.time, hand.pose, mocap.time(i));
     const auto d = dynamics::rotate(-mocap.pose(i, 2),
                                     Vec2<double>{mocap.pose(i, 0) - pose[0], mocap.pose(i, 1) - pose[1]});
     sum.x += d.x, sum.z += d.z, n += 1;
@@ -295,8 +304,8 @@ std::optional<TimedLanding> timed_landing(const datasets::ThrowLog& log, const d
   if (!opening || *opening <= hand.time(0) || *opening > hand.time(hand.time.rows - 1)) return {};
   const double t = logged.landing->time(0) - *opening;
   if (!(t > 0)) return {};
-  const double z = at(hand.time, hand.pose, *opening)[1], vz = at(hand.time, hand.twist, *opening)[1],
-               fall = 0.5 * log.gravity * t * t;
+  const double z = hand_at(hand.time, hand.pose, *opening)[1],
+               vz = hand_at(hand.time, hand.twist, *opening)[1], fall = 0.5 * log.gravity * t * t;
   return TimedLanding{z + vz * t - fall, 1 + 0.5 * fall};
 }
 

@@ -1,8 +1,10 @@
 // What the channels of a throw say of each other's size. Internal to unit_check.
 #pragma once
 
+#include <array>
 #include <map>
 #include <optional>
+#include <vector>
 
 #include "datasets/throw_log.hpp"
 
@@ -34,6 +36,21 @@ using SizeRatios = std::map<SizedColumn, double>;
 
 /// What a throw shows: from a hand if the log is planar, and the height of a free flight in either.
 SizeRatios compare_sizes(const datasets::ThrowLog& log, const datasets::Throw& logged);
+
+/// The hand's columns at a time within its own, by straight lines.
+std::array<double, 3> hand_at(const datasets::Series& time, const datasets::Series& values, double t);
+
+/// When the gripper opens: the command, else where the normal force has fallen to half [s].
+std::optional<double> opening_of(const datasets::ThrowLog& log, const datasets::Throw& logged);
+
+/// One F/T sample of a held object.
+struct HeldWrench {
+  std::array<double, 3> seen;    ///< of all pads, (fx, fz, tau) [N, N, N m]
+  std::array<double, 3> needed;  ///< M a − m g about the pads' centre, in the hand frame; tau NaN: not known
+};
+/// Newton and Euler for the held body from `begin` to `end` [s]; the throw has a hand and F/T samples.
+std::vector<HeldWrench> held_wrenches(const datasets::ThrowLog& log, const datasets::Throw& logged,
+                                      double begin, double end, std::optional<double> grasp_angle);
 
 /// Where a throw lands by its landing/time.
 struct TimedLanding {

@@ -1,0 +1,29 @@
+// Single axes of a planar throw in another unit, or with the other sign. Internal to unit_check.
+#pragma once
+
+#include <vector>
+
+#include "experiment/unit_check.hpp"
+
+namespace unhand::experiment {
+
+/// Single axes (x, z or θ of pose, twist, acceleration, motion capture, landing) that contradict the channels
+/// which tell the same: the hand's pose and the sum of its twist, the twist and the sum of the acceleration,
+/// motion capture and the hand with its lever while the object is held, the height of the flight and gravity,
+/// the landing and where motion capture leads or a free flight from the opening.
+///
+/// Two channels disagree where they are proportional (|cosine| of at least 0.95 over the samples), the larger
+/// is of a size that shows, and the ratio lies near a unit's factor, or its inverse (a file that declares mm
+/// and holds m), or is about −1 (an axis that points the other way). The column told is that with the most
+/// disagreements beyond its agreements. An axis that hardly moves has no say. Of the median over throws
+/// first; where that agrees, of single throws, by factors alone.
+std::vector<UnitDoubt> contradicted_axes(const datasets::ThrowLog& log);
+
+/// Columns of the wrench with the other sign. While the object is held the pads' wrench is M a − m g. A
+/// column is told if it goes against that: in the median over throws a correlation below −0.9 about the means
+/// (a bias of the sensor does not count), a cosine below −0.5, and a size within a factor of five. The torque
+/// has a say where motion capture confirms the lever. Or fx and fz each follow the other's need (correlations
+/// beyond ±0.95, and within ±0.9 with their own): axes swapped.
+std::vector<UnitDoubt> reversed_wrenches(const datasets::ThrowLog& log);
+
+}  // namespace unhand::experiment
