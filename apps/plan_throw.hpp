@@ -25,6 +25,7 @@ struct ThrowAnswer {
   planners::ThrowPlan plan;
   double window{};        ///< for which q̈ is held [s]
   flight::Medium medium;  ///< of the flight
+  double lever{};         ///< of an SKU: from the pads to the centre of mass [m]
   bool with_release{};    ///< the release follows a contact model, not a delay
   std::optional<planners::ReleaseLanding> rigid,
       real;  ///< of the tube's motion: carried until the detach, and as the model says
