@@ -7,6 +7,7 @@
 #include <cmath>
 #include <set>
 
+#include "apps/command.hpp"
 #include "contact/gripper_delay.hpp"
 #include "contact/patch.hpp"
 #include "fitting/measured/measured_card.hpp"
@@ -125,6 +126,36 @@ UsableCard read_usable_card(const fs::path& file) {
   }
   reader.reject_unknown();
   return out;
+}
+
+std::map<std::string, UsableCard> read_usable_cards(const std::vector<std::string>& files,
+                                                    std::vector<std::string>& models, bool named) {
+  std::map<std::string, UsableCard> out;
+  for (const auto& file : files) {
+    const UsableCard card = read_usable_card(file);
+    const std::string& model = card.card.model;
+    if (!out.emplace(model, card).second) throw WrongUsage(fmt::format("two cards for model '{}'", model));
+    if (std::find(models.begin(), models.end(), model) != models.end()) continue;
+    if (named) throw WrongUsage(fmt::format("{}: a card for '{}', which is not among --models", file, model));
+    models.push_back(model);
+  }
+  return out;
+}
+
+experiment::FrictionEstimate estimated(const datasets::ThrowLog& log,
+                                       const std::vector<experiment::PreparedThrow>& throws,
+                                       const std::string& model) {
+  try {
+    auto out = experiment::estimate_friction(log, throws, model);
+    experiment::require_patch(out, model);
+    return out;
+  } catch (const experiment::Undetermined& error) {
+    const std::string advice =
+        model == contact::kGripperDelay
+            ? error.advice
+            : fmt::format("give a card (--card), as `unhand fit LOG --model {} --card FILE` makes it", model);
+    throw Unanswered(fmt::format("{}: {}; {}", model, error.reason, advice));
+  }
 }
 
 ModelCard card_of(const experiment::ModelComparison& model, const fs::path& log_file,

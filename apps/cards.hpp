@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,17 @@ struct UsableCard {
 /// Throws datasets::CardError where the card cannot be read, its model is not one of releases, this library
 /// lacks one of its effects, or a parameter is missing, unknown, in another unit or out of range.
 UsableCard read_usable_card(const std::filesystem::path& file);
+
+/// The cards by model. Adds their models to `models`, unless those were `named`: then a card for another one
+/// is WrongUsage, as are two cards for one model.
+std::map<std::string, UsableCard> read_usable_cards(const std::vector<std::string>& files,
+                                                    std::vector<std::string>& models, bool named);
+
+/// The friction that the log suggests for the model and that can be relied on. Throws Unanswered where it
+/// suggests none, with what helps a command that knows --card but not --fit.
+experiment::FrictionEstimate estimated(const datasets::ThrowLog& log,
+                                       const std::vector<experiment::PreparedThrow>& throws,
+                                       const std::string& model);
 
 /// The card of an estimate. `throws` are those of the log, for the valid range.
 datasets::ModelCard card_of(const experiment::ModelComparison& model, const std::filesystem::path& log_file,

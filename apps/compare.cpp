@@ -17,6 +17,7 @@
 #include "apps/progress.hpp"
 #include "apps/tell.hpp"
 #include "apps/throws.hpp"
+#include "datasets/csv.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/free_flight.hpp"
 #include "experiment/friction_estimate.hpp"
@@ -48,7 +49,8 @@ void require_models(const std::vector<std::string>& models) {
   std::set<std::string> seen;
   for (const auto& model : models) {
     if (std::find(known.begin(), known.end(), model) == known.end())
-      throw WrongUsage(fmt::format("model '{}' is unknown; there are {}", model, fmt::join(known, ", ")));
+      throw WrongUsage(
+          datasets::unknown_name(fmt::format("--models: there is no model '{}'", model), model, known));
     if (!seen.insert(model).second) throw WrongUsage(fmt::format("model '{}' is named twice", model));
   }
 }
@@ -58,22 +60,6 @@ std::vector<std::string> usual_models() {
   auto names = experiment::release_model_names();
   std::erase(names, naive_model);
   return names;
-}
-
-/// The cards by model. Adds their models to `models` if the request names none.
-std::map<std::string, UsableCard> read_cards(const CompareRequest& request,
-                                             std::vector<std::string>& models) {
-  std::map<std::string, UsableCard> out;
-  for (const auto& file : request.cards) {
-    const UsableCard card = read_usable_card(file);
-    const std::string& model = card.card.model;
-    if (!out.emplace(model, card).second) throw WrongUsage(fmt::format("two cards for model '{}'", model));
-    if (std::find(models.begin(), models.end(), model) != models.end()) continue;
-    if (!request.models.empty())
-      throw WrongUsage(fmt::format("{}: a card for '{}', which is not among --models", file, model));
-    models.push_back(model);
-  }
-  return out;
 }
 
 std::vector<experiment::PreparedThrow> prepare_throws(const datasets::ThrowLog& log,
@@ -128,8 +114,9 @@ void tell_not_compared(const std::vector<NotCompared>& all) {
 }
 
 void compare_releases(const CompareRequest& request, const datasets::ThrowLog& log) {
-  auto models = request.models.empty() ? usual_models() : request.models;
-  const auto cards = read_cards(request, models);
+  const bool named = !request.models.empty();
+  auto models = named ? request.models : usual_models();
+  const auto cards = read_usable_cards(request.cards, models, named);
   const auto prepared = prepare_throws(log, request);
   ReleaseRun run(request, log, prepared);
   std::vector<NotCompared> unanswered;

@@ -2,7 +2,6 @@
 #include "apps/crosscheck.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <map>
@@ -18,6 +17,7 @@
 #include "contact/gripper_delay.hpp"
 #include "crosscheck/bullet_release.hpp"
 #include "crosscheck/distributed_patch.hpp"
+#include "datasets/csv.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/friction_estimate.hpp"
 #include "flight/fly.hpp"
@@ -106,8 +106,7 @@ experiment::ModelParameters parameters_of(const CrosscheckOptions& options, cons
     from = options.card;
     return out;
   }
-  const auto estimate = experiment::estimate_friction(log, prepared, options.models.front());
-  experiment::require_patch(estimate, options.models.front());
+  const auto estimate = estimated(log, prepared, options.models.front());
   from = fmt::format("estimated for {}", options.models.front());
   return estimate.parameters;
 }
@@ -283,7 +282,8 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
   std::erase(known, contact::kGripperDelay);  // it has no pads that another engine could be given
   for (const auto& model : options.models)
     if (std::find(known.begin(), known.end(), model) == known.end())
-      throw WrongUsage(fmt::format("model '{}' is unknown; there are {}", model, fmt::join(known, ", ")));
+      throw WrongUsage(
+          datasets::unknown_name(fmt::format("--models: there is no model '{}'", model), model, known));
   if (options.engine == "bullet" && !crosscheck::has_bullet())
     throw Unanswered("built without Bullet (Debian package libbullet-dev)");
   const auto log = read_throws(options.log);

@@ -239,9 +239,7 @@ std::string discovery_text(const Discovery& found, const std::string& log) {
       out += fmt::format("  there: {}\n", s.structure.in_words());
   for (const auto& effect : found.effects) {
     out += effect_text(effect);
-    for (const auto& e : effect.separating)
-      out += fmt::format("  to tell it from {}: {} (correlation {:.4f} -> {:.4f})\n", e.from, e.what,
-                         e.before, e.after);
+    for (const auto& line : separating_lines(effect)) out += fmt::format("  {}\n", line);
   }
   if (const std::string note = gain_text(found.effects); !note.empty()) out += "\n" + note + "\n";
   for (const auto& id : found.along) out += fmt::format("\nfitted along, since no pads are rigid: {}\n", id);

@@ -10,11 +10,11 @@
 #include <cerrno>
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
 #include <sstream>
 #include <stdexcept>
 
 #include "apps/command.hpp"
+#include "apps/interruption.hpp"
 #include "apps/output.hpp"
 
 namespace unhand::apps {
@@ -48,6 +48,7 @@ std::pair<int, std::string> run(const fs::path& program, const std::string& argu
   const pid_t child = fork();
   if (child < 0) throw Unanswered("cannot start gnuplot");
   if (child == 0) {
+    setpgid(0, 0);  // an interruption from the terminal is ours: it kills gnuplot
     const int nowhere = open("/dev/null", O_RDWR);
     dup2(nowhere, STDIN_FILENO);
     dup2(nowhere, STDOUT_FILENO);
@@ -57,6 +58,7 @@ std::pair<int, std::string> run(const fs::path& program, const std::string& argu
       execl(program.c_str(), program.c_str(), argument.c_str(), static_cast<char*>(nullptr));
     _exit(127);
   }
+  end_with_us(child);
   close(ends[1]);
   std::string said;
   std::array<char, 4096> block{};
@@ -65,6 +67,7 @@ std::pair<int, std::string> run(const fs::path& program, const std::string& argu
     if (n < 0 && errno != EINTR) break;
   }
   close(ends[0]);
+  end_with_us(0);
   int status = 0;
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
@@ -149,6 +152,7 @@ std::string file_stem(const std::string& text) {
 }
 
 void draw(const Figure& figure, const fs::path& directory) {
+  const Unbroken here;
   if (figure.name != file_stem(figure.name))
     throw std::logic_error("figure: the name " + figure.name + " is none for a file");
   const fs::path program = gnuplot();
@@ -157,11 +161,9 @@ void draw(const Figure& figure, const fs::path& directory) {
   const auto [status, said] = run(program, figure.name + ".gp", directory);
   if (status != 0)
     throw Unanswered(fmt::format("gnuplot could not draw {} (status {}):\n{}", figure.name, status, said));
-  for (const char* ending : {".png", ".pdf"}) {
-    std::error_code error;
-    if (fs::file_size(directory / (figure.name + ending), error) == 0 || error)
-      throw Unanswered(fmt::format("gnuplot drew no {}{}:\n{}", figure.name, ending, said));
-  }
+  const std::string file = (directory / figure.name).string();
+  require_whole(file + ".png", "IEND", said);
+  require_whole(file + ".pdf", "%%EOF", said);
 }
 
 Style style_of(const std::string& model) {

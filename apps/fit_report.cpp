@@ -28,12 +28,17 @@ Table parameter_table(const fitting::FitResult& fit) {
   for (std::size_t k = 0; k < fit.campaign.size(); ++k) {
     const auto& u = fit.campaign[k];
     const auto [low, high] = u.interval95();
-    out.rows.push_back({u.unknown.name, u.unknown.unit, fmt::format("{:.6g}", u.value),
-                        fmt::format("{:.2g}", u.sigma),
-                        std::isfinite(low) || std::isfinite(high)
-                            ? fmt::format("[{:.5g}, {:.5g}]{}", low, high, u.profile ? " of the profile" : "")
-                            : "open",
-                        standing_of(fit, k)});
+    const Rounded shown = rounded(u.value, u.sigma);
+    const auto end = [&](double x) {
+      return shown.decimals && std::isfinite(x) ? fmt::format("{:.{}f}", x, *shown.decimals)
+                                                : fmt::format("{:.5g}", x);
+    };
+    out.rows.push_back(
+        {u.unknown.name, u.unknown.unit, shown.value, shown.sigma,
+         std::isfinite(low) || std::isfinite(high)
+             ? fmt::format("[{}, {}]{}", end(low), end(high), u.profile ? " of the profile" : "")
+             : "open",
+         standing_of(fit, k)});
   }
   return out;
 }
@@ -142,6 +147,7 @@ std::string fit_text(const FitAnswer& a, const FitRequest& request, bool markdow
         "fitted and predicted alike\n",
         a.floor->twins);
   if (a.errors.failed > 0) out += fmt::format("{} throws are not brought to a landing\n", a.errors.failed);
+  if (!markdown) return out;  // how long it took: in the report and the JSON
   out += fmt::format("\n{:.2f} s on {} threads, Jacobian {:.0f} %\n", fit.seconds, a.threads,
                      100 * a.jacobian_share());
   const auto& g = a.gradients;

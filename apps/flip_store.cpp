@@ -16,7 +16,7 @@ namespace fl = planners::flip;
 
 Json read_json(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
-  if (!in) throw datasets::LogError(file.string(), "file", "cannot be read");
+  if (!in) throw datasets::LogError(file.string(), "", "cannot be read");
   try {
     return Json::parse(in);
   } catch (const Json::exception& error) {

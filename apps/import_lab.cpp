@@ -125,10 +125,12 @@ void require_options(const std::string& format, const LabOptions& options) {
   }
 }
 
+const std::string kUntitled = "imported from ";
+
 ThrowLog new_log(const std::string& format, const LabOptions& options, const std::string& source) {
   ThrowLog log;
   log.dimension = format == "phyphox" ? 3 : format == "motive-csv" ? options.dimension : 2;
-  log.title = options.title.empty() ? fmt::format("imported from {}", format) : options.title;
+  log.title = options.title.empty() ? kUntitled + format : options.title;
   log.source = options.source.empty() ? source : options.source;
   if (!options.licence.empty()) log.licence = options.licence;
   log.gravity = options.gravity;
@@ -319,6 +321,12 @@ LabImport import_lab(const std::string& format, const std::vector<std::string>& 
     if (!adding) split_throws(log, {options.test_every, options.test_conditions});
   } catch (const std::invalid_argument& error) {
     throw WrongUsage(fmt::format("--test-every, --test-conditions: {}", error.what()));
+  }
+  if (adding) {
+    const std::string added = source_of(format, inputs.size());  // --source is for new logs
+    if (log.source.find(added) == std::string::npos) log.source += "; " + added;
+    if (log.title.starts_with(kUntitled) && log.title.find(format) == std::string::npos)
+      log.title += ", " + format;
   }
   datasets::validate(log, out);
   outputs.log(out, log);

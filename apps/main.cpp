@@ -10,6 +10,7 @@
 #include "apps/command.hpp"
 #include "apps/crosscheck.hpp"
 #include "apps/figure_command.hpp"
+#include "apps/interruption.hpp"
 #include "apps/tell.hpp"
 #include "apps/validate_sku.hpp"
 #include "datasets/log_error.hpp"
@@ -19,6 +20,7 @@ namespace {
 using namespace unhand::apps;
 
 int say(ExitCode code, const std::exception& error) {
+  wait_if_interrupted();
   tell("unhand: {}\n", error.what());
   return code;
 }
@@ -26,6 +28,7 @@ int say(ExitCode code, const std::exception& error) {
 int run(const Command& command) {
   try {
     command.run();
+    wait_if_interrupted();
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
       throw Unanswered("the answer cannot be written to the standard output");
     return done;
@@ -41,6 +44,7 @@ int run(const Command& command) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  end_tidily();
   FLAGS_minloglevel = google::GLOG_FATAL;  // Ceres logs simulations that fail as errors; fits answer for them
   Parser root{"unhand: the physics of letting go. Predicts where released objects land.", "unhand",
               "unhand " UNHAND_VERSION};

@@ -12,6 +12,8 @@
 #include <fstream>
 
 #include "apps/command.hpp"
+#include "apps/interruption.hpp"
+#include "datasets/whole_file.hpp"
 
 namespace unhand::apps {
 
@@ -19,11 +21,22 @@ namespace fs = std::filesystem;
 
 namespace {
 
-[[noreturn]] void refuse(const fs::path& file, const std::string& why) {
-  throw Unanswered(fmt::format("{}: cannot be written: {}", file.string(), why));
+constexpr const char* kPart = ".part-";  // .NAME.part-PROCESS-NUMBER, beside NAME
+
+/// The path as it will be called once it is in place.
+fs::path in_place(const fs::path& made) {
+  fs::path out;
+  for (const fs::path& step : made) {
+    const std::string name = step.string();
+    const std::size_t at = name.rfind(kPart);
+    out /= name.front() == '.' && at != std::string::npos && at > 0 ? fs::path(name.substr(1, at - 1)) : step;
+  }
+  return out.lexically_normal();
 }
 
-constexpr const char* kPart = ".part-";  // .NAME.part-PROCESS-NUMBER, beside NAME
+[[noreturn]] void refuse(const fs::path& file, const std::string& why) {
+  throw Unanswered(fmt::format("{}: cannot be written: {}", in_place(file).string(), why));
+}
 
 fs::path parent_of(const fs::path& file) {
   return file.has_parent_path() ? file.parent_path() : fs::path(".");
@@ -77,15 +90,33 @@ std::string fixed(const std::optional<double>& value, int digits) {
 }
 
 void write_text(const fs::path& file, const std::string& content) {
-  std::ofstream out(file, std::ios::binary);
-  out << content;
-  out.close();
-  if (!out) refuse(file, "the disk refuses");
+  const Unbroken here;
+  if (const std::string failed = datasets::write_whole(file, content); !failed.empty()) refuse(file, failed);
+}
+
+void require_whole(const fs::path& file, const std::string& ending, const std::string& said) {
+  std::error_code error;
+  std::ifstream in(file, std::ios::binary);
+  const auto size = static_cast<std::streamoff>(in ? fs::file_size(file, error) : 0);
+  constexpr std::streamoff tail = 64;
+  in.seekg(std::max(std::streamoff{0}, size - tail));
+  if (std::string((std::istreambuf_iterator<char>(in)), {}).find(ending) != std::string::npos) return;
+  constexpr std::size_t much = 1 << 16;
+  const fs::path probe = file.string() + ".probe";
+  std::string why = datasets::write_whole(probe, std::string(much, ' '));
+  fs::remove(probe, error);
+  if (why.empty()) why = "it is not whole, and the disk takes more";
+  refuse(file, said.empty() ? why : why + "\n" + said);
 }
 
 Outputs::~Outputs() {
+  if (parts_.empty()) return;
+  const Unbroken here;
   std::error_code ignored;
-  for (const Part& part : parts_) fs::remove_all(part.made, ignored);
+  for (const Part& part : parts_) {
+    fs::remove_all(part.made, ignored);
+    keep_if_interrupted(part.made);
+  }
 }
 
 fs::path Outputs::part_of(const fs::path& destination) {
@@ -112,6 +143,7 @@ fs::path Outputs::add(const fs::path& wanted, bool is_directory) {
   }
   remove_leftovers(nearest_existing(parent_of(destination)), destination.filename().string());
   parts_.push_back({part_of(destination), destination, is_directory});
+  remove_if_interrupted(parts_.back().made);
   return parts_.back().made;
 }
 
@@ -120,24 +152,19 @@ void Outputs::text(const fs::path& file, const std::string& content) {
   write_text(add(file, false), content);
 }
 
-template <class Write>
-void Outputs::made_by(const fs::path& file, Write&& write) {
+template <class Log>
+void Outputs::hdf5(const fs::path& file, const Log& log) {
   require_writable(file);
-  const fs::path made = add(file, false);
   try {
-    write(made);
+    text(file, datasets::to_hdf5(log, file.string()));
   } catch (const datasets::LogError& error) {
     refuse(file, fmt::format("{}: {}", error.path, error.reason));
   }
 }
 
-void Outputs::log(const fs::path& file, const datasets::ThrowLog& log) {
-  made_by(file, [&](const fs::path& made) { datasets::write_throw_log(made, log); });
-}
+void Outputs::log(const fs::path& file, const datasets::ThrowLog& log) { hdf5(file, log); }
 
-void Outputs::log(const fs::path& file, const datasets::SlipLog& log) {
-  made_by(file, [&](const fs::path& made) { datasets::write_slip_log(made, log); });
-}
+void Outputs::log(const fs::path& file, const datasets::SlipLog& log) { hdf5(file, log); }
 
 fs::path Outputs::directory(const fs::path& destination) {
   require_writable_directory(destination);
@@ -149,6 +176,7 @@ fs::path Outputs::directory(const fs::path& destination) {
 }
 
 void Outputs::commit() {
+  const Unbroken here;  // all or none
   std::error_code error;
   std::vector<std::pair<fs::path, fs::path>> moves;  // from, to
   for (const Part& part : parts_) {
@@ -166,8 +194,10 @@ void Outputs::commit() {
     if (!fs::is_directory(from, error)) require_writable(to);
   }
   for (const auto& [from, to] : moves) put_in_place(from, to);
-  for (const Part& part : parts_)
+  for (const Part& part : parts_) {
     if (part.is_directory) fs::remove(part.made, error);
+    keep_if_interrupted(part.made);
+  }
   parts_.clear();
 }
 

@@ -26,10 +26,15 @@ inline std::string json_text(const Json& value) { return value.dump(1) + "\n"; }
 /// Writes a file in place, for directories that are not in place yet. Throws Unanswered.
 void write_text(const std::filesystem::path& file, const std::string& content);
 
+/// That a file which another program made is there to its end, `ending`. Otherwise throws Unanswered with
+/// what the disk says of another one there, and below it what the program `said`.
+void require_whole(const std::filesystem::path& file, const std::string& ending, const std::string& said);
+
 /// The files and directories that one run leaves. Everything is made beside its destination first; commit()
 /// then renames, replacing files of the same names; behind a symbolic link, the file that it leads to.
-/// Without commit() nothing stays. Throws Unanswered where something cannot be written, and WrongUsage for an
-/// output that is an input, the same as another output, or below one that is a file.
+/// Without commit() nothing stays, nor after an interruption (apps/interruption.hpp). Throws Unanswered where
+/// something cannot be written, and WrongUsage for an output that is an input, the same as another output, or
+/// below one that is a file.
 class Outputs {
  public:
   Outputs() = default;
@@ -56,8 +61,8 @@ class Outputs {
     std::filesystem::path made, destination;
     bool is_directory{};
   };
-  template <class Write>
-  void made_by(const std::filesystem::path& file, Write&& write);
+  template <class Log>
+  void hdf5(const std::filesystem::path& file, const Log& log);
   std::filesystem::path part_of(const std::filesystem::path& destination);
   void require_other_than_inputs(const std::filesystem::path& destination) const;
   /// Where to make what goes to `destination`.

@@ -43,6 +43,20 @@ CLI::Validator whole_number() {
       "");
 }
 
+/// Of a long option that the command does not have, with the nearest that it has; empty if there is none.
+std::string unknown_option(const CLI::App& command, int argc, char** argv) {
+  std::vector<std::string> known;
+  for (const CLI::Option* option : command.get_options())
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  for (int i = 1; i < argc; ++i) {
+    const std::string argument = argv[i], name = argument.substr(0, argument.find('='));
+    if (name == "--") break;
+    if (!name.starts_with("--") || std::find(known.begin(), known.end(), name) != known.end()) continue;
+    return datasets::unknown_name(fmt::format("there is no option '{}'", name), name, known);
+  }
+  return {};
+}
+
 }  // namespace
 
 Option Option::required() { return option_->required(), *this; }
@@ -129,6 +143,10 @@ Parser::Parsed Parser::parse(int argc, char** argv) {
       return Parsed::wrong_usage;
     }
     at = *named;
+  }
+  if (const std::string wrong = unknown_option(*at, argc, argv); !wrong.empty()) {
+    tell("unhand: {}\n", wrong);
+    return Parsed::wrong_usage;
   }
   try {
     app_->parse(argc, argv);

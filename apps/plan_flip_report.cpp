@@ -119,7 +119,7 @@ void draw_path(const FlipAnswer& a, const std::filesystem::path& folder) {
                                   a.path.initial_is_seen ? "known before" : "expected")},
         Series{throws, "using 1:2 with points pt 6 ps 0.6 lc rgb '#56b4e9' title 'throws'"},
         Series{means, "using 1:2 with linespoints pt 7 ps 0.7 lc rgb '#0072b2' title 'means'"},
-        Series{labels, "using 1:2:3 with labels left offset 0.7,0.7 font ',8' notitle"}}) {
+        Series{labels, "using 1:2:3 with labels left offset 0.7,0.7 font ',8' boxed notitle"}}) {
     if (one.block.rows.empty()) continue;
     plots += fmt::format("{}DATA index {} {}", plots.empty() ? "plot " : ", ", figure.data.size(), one.style);
     figure.data.push_back(one.block);
@@ -127,6 +127,7 @@ void draw_path(const FlipAnswer& a, const std::filesystem::path& folder) {
   if (figure.data.empty()) return;
   figure.script =
       "set grid\nset key outside top center horizontal Left reverse samplen 1.5\nset xlabel 'landing x [m]'\n"
+      "set style textbox opaque noborder fillcolor rgb '#ffffff' margins 0.4,0.4\n"
       "set ylabel 'angle from hanging [deg]'\nset offsets graph 0.05, graph 0.08, graph 0.08, graph 0.05\n" +
       target_box(a.target) + plots + "\n";
   draw(figure, folder);

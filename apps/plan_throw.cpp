@@ -206,6 +206,7 @@ void plan_throw(const PlanThrowOptions& options) {
     const auto& sku = given.emplace(datasets::read_sku(options.sku));
     if (!sku.inertia)
       throw datasets::LogError(options.sku, "inertia_kg_m2", "is not known: give it, or a shape with dims_m");
+    answer.lever = sku.com_offset;
     object.mass = sku.mass, object.inertia = *sku.inertia;
     object.com_offset = {sku.com_offset, sku.com_offset_sigma.value_or(0.004)};
   }

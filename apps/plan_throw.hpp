@@ -32,6 +32,7 @@ struct ThrowAnswer {
     std::string from;  ///< "card", "card; sigma assumed", …
   };
   std::vector<Number> numbers;  ///< with a contact model
+  double lever{};               ///< of an SKU: from the pads to the centre of mass [m]
   bool with_release{};          ///< the release follows a contact model, not a delay
   std::optional<planners::ReleaseLanding> rigid,
       real;  ///< of the tube's motion: carried until the detach, and as the model says

@@ -107,6 +107,13 @@ std::string text_of(const ThrowAnswer& a) {
                               one.sigma > 0 ? fmt::format("{:.2g}", one.sigma) : "-", one.from});
     out += "\n" + numbers.text();
   }
+  constexpr double pad = 0.005;  // [m] hung by less, an object hardly turns in the pads
+  if (!a.with_release && std::abs(a.lever) > pad)
+    out += fmt::format(
+        "\nnote: without a card the object is taken as carried rigidly until it leaves; this one hangs "
+        "{:.3g} cm from the pads and turns in them while they open, so that it lands elsewhere: give the "
+        "gripper's card (--card)\n",
+        100 * a.lever);
   const auto& limits = plan.limits;
   out += fmt::format(
       "\nlimits used, at most: position {:.1f} %, velocity {:.1f} %, acceleration {:.1f} %, jerk {:.1f} %, "
@@ -253,8 +260,23 @@ Figure tube_figure(const ThrowAnswer& a) {
                           flight_from(a, t, planned ? a.plan.qdd : JointVector<double>(none)),
                           {}});
     }
+  std::string predicted;
+  if (a.with_release && !a.predicted.front().drawn.miss.empty()) {
+    const auto& drawn = a.predicted.front().drawn;
+    out.data.push_back({"landings that the card predicts",
+                        {"mean forward [m]", "height [m]", "standard deviation [m]"},
+                        {{drawn.mean, 0, drawn.std}},
+                        {}});
+    predicted = fmt::format(
+        ", \\\n     DATA index {} using 1:2:3 with xerrorbars pointtype 7 linewidth 2 linecolor rgb "
+        "'#009e73' "
+        "title 'landings that the card predicts'",
+        out.data.size() - 1);
+  }
   out.script = fmt::format(
       "set xlabel 'forward of the target [m]'; set ylabel 'above the target [m]'\n"
+      "set object 1 rectangle center 0,0 size {4:.6g}, graph 0.018 fillcolor rgb 'black' fillstyle solid "
+      "noborder back\n"
       "set key outside top center horizontal; set grid linecolor rgb '#dddddd'\n"
       "plot for [i=8:12] DATA index i with lines linecolor rgb '{2}' dashtype 2 title (i==8 ? 'flights "
       "without acceleration' : ''), \\\n"
@@ -262,9 +284,11 @@ Figure tube_figure(const ThrowAnswer& a) {
       "\\\n"
       "     DATA index 0 with lines linecolor rgb '#555555' linewidth 1.5 title 'path of the swing', \\\n"
       "     DATA index 1 with lines linecolor rgb '{1}' linewidth 4 title 'where the object may leave', \\\n"
-      "     DATA index 2 with lines linecolor rgb 'black' linewidth 6 title 'box'\n",
+      "     DATA index 2 with lines linecolor rgb 'black' linewidth 0.5 notitle, \\\n"
+      "     keyentry with boxes fillstyle solid noborder fillcolor rgb 'black' title 'box'{5}\n",
       ink, other, quiet,
-      a.with_release ? "flights if carried rigidly until then" : "flights of the planned motion");
+      a.with_release ? "flights if carried rigidly until then" : "flights of the planned motion", 2 * half,
+      predicted);
   return out;
 }
 

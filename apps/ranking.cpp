@@ -81,9 +81,26 @@ std::string effect_text(const fitting::AcceptedEffect& effect) {
   for (const auto& [id, correlation] : effect.equivalent)
     out += fmt::format("\n  or {} (footprints correlate by {:.4f})", id, correlation);
   for (const auto& p : effect.parameters)
-    out += fmt::format("\n  {} = {:.6g} +- {:.2g} {}", p.name, p.value, p.sigma, p.unit);
+    out += fmt::format("\n  {} = {}", p.name, with_sigma(p.value, p.sigma, p.unit));
   const std::string p = effect.p_value ? fmt::format(", p {:.2g}", *effect.p_value) : "";
   return out + fmt::format("\n  BIC {:+.1f}{}; held out: {}\n", effect.delta_bic, p, effect.why);
+}
+
+std::vector<std::string> separating_lines(const fitting::AcceptedEffect& effect) {
+  std::vector<std::string> out;
+  std::string hopeless;  // the name that none of the experiments tells it from: the best of them is told once
+  for (const auto& e : effect.separating) {
+    const auto numbers = fmt::format("correlation {:.4f} -> {:.4f}, simulated", e.before, e.after);
+    if (e.separates)
+      out.push_back(fmt::format("to tell it from {}: {} ({})", e.from, e.what, numbers));
+    else if (hopeless != e.from &&
+             std::none_of(effect.separating.begin(), effect.separating.end(),
+                          [&](const auto& o) { return o.from == e.from && o.separates; }))
+      out.push_back(fmt::format("none of the experiments tried tells it from {}; the best is {} ({})", e.from,
+                                e.what, numbers)),
+          hopeless = e.from;
+  }
+  return out;
 }
 
 std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects) {
@@ -116,9 +133,7 @@ std::string effect_html(const fitting::AcceptedEffect& effect) {
     out +=
         fmt::format("<p>Not distinguishable here from <b>{}</b>: the footprints correlate by {:.4f}.</p>\n",
                     escaped(id), correlation);
-  for (const auto& e : effect.separating)
-    out += fmt::format("<p>Would tell it from {}: {} (correlation {:.4f} to {:.4f}, simulated).</p>\n",
-                       escaped(e.from), escaped(e.what), e.before, e.after);
+  for (const auto& line : separating_lines(effect)) out += fmt::format("<p>{}.</p>\n", escaped(line));
   return out;
 }
 
@@ -138,7 +153,8 @@ Json effect_json(const fitting::AcceptedEffect& effect) {
     out["separating_experiments"].push_back({{"from", e.from},
                                              {"experiment", e.what},
                                              {"correlation_in_this_log", number(e.before)},
-                                             {"correlation_with_it", number(e.after)}});
+                                             {"correlation_with_it", number(e.after)},
+                                             {"separates", e.separates}});
   return out;
 }
 

@@ -29,6 +29,10 @@ Json effect_json(const fitting::AcceptedEffect& effect);
 /// The same in words: its other names, its parameters, and the evidence.
 std::string effect_text(const fitting::AcceptedEffect& effect);
 
+/// A line for each experiment that would tell it from another of its names, and one for each name that none
+/// of those tried tells it from.
+std::vector<std::string> separating_lines(const fitting::AcceptedEffect& effect);
+
 /// Where mass and inertia are off by the same ratio: that it may be a gain of the wrench. Else empty.
 std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects);
 

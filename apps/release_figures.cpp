@@ -59,6 +59,13 @@ std::string plot_all(const std::vector<ReleaseTrace>& traces, const char* column
   return out;
 }
 
+/// Above the whole of a figure: which throw it shows.
+std::string throw_title(const std::string& thrown, const Figure& figure) {
+  if (thrown.empty()) return "";
+  return fmt::format("set label 99 'throw {}' at screen 0.5,{:.4f} center\n", plain(thrown),
+                     1 - 0.4 / figure.height);
+}
+
 double milliseconds(double t) { return kMilliseconds * t; }
 
 }  // namespace
@@ -100,7 +107,7 @@ ReleaseTrace trace_of(const release::ReleaseProblem<double>& problem,
 
 Figure mode_figure(const std::vector<ReleaseTrace>& traces) {
   const auto n = static_cast<double>(traces.size());
-  Figure figure{"modes", 17, 7.2 + 0.9 * n, {}, {}};
+  Figure figure{"modes", 17, 7.6 + 0.9 * n, {}, {}};
   figure.data = blocks({traces.front()}, {"time [ms]", "normal force of a pad [N]"}, [](const TraceRow& r) {
     return std::vector<double>{milliseconds(r.time), r.normal_force};
   });
@@ -135,21 +142,23 @@ Figure mode_figure(const std::vector<ReleaseTrace>& traces) {
   std::string& s = figure.script;
   s = fmt::format("set multiplot\nunset key\nset xrange [{:.6g}:{:.6g}]\n", milliseconds(begin),
                   milliseconds(end));
-  s += place(figure, {left, figure.width - 0.5, ribbon + 0.3, figure.height - 0.5});
+  s += throw_title(traces.front().thrown, figure);
+  s += place(figure, {left, figure.width - 0.5, ribbon + 0.3, figure.height - 0.9});
   s += "set ylabel 'normal force of a pad [N]'\nset yrange [0:*]; set format x ''\n"
        "plot DATA index 0 using 1:2 with lines linecolor rgb '#000000' linewidth 1.6\n";
-  s += place(figure, {left, figure.width - 0.5, low, ribbon});
+  s += "unset label 99\n" + place(figure, {left, figure.width - 0.5, low, ribbon});
   s += fmt::format(
       "set format x; unset ylabel; set xlabel 'time [ms]'\nset yrange [{}:-0.5]\nset ytics ({}) scale 0\n"
       "set style fill solid 1 border rgb '#404040'\nunset grid\nplot {}\n",
       n - 0.5, tics, ribbons);
-  s += key_strip(figure, modes, static_cast<int>(std::max<std::size_t>(1, modes.size()))) +
+  s += "unset label 99\n" +
+       key_strip(figure, modes, static_cast<int>(std::max<std::size_t>(1, modes.size()))) +
        "unset multiplot\n";
   return figure;
 }
 
 Figure wrench_figure(const std::vector<ReleaseTrace>& traces) {
-  Figure figure{"wrench", 13, 12, {}, {}};
+  Figure figure{"wrench", 13, 12.5, {}, {}};
   figure.data = blocks(traces, {"|f|/f_max", "|tau|/tau_max"}, [](const TraceRow& r) {
     return std::vector<double>{r.force, std::abs(r.torque)};
   });
@@ -178,22 +187,23 @@ Figure wrench_figure(const std::vector<ReleaseTrace>& traces) {
       "set ylabel 'torque over its limit, |{/Symbol t}|/{/Symbol t}_{max}'\n"
       "set arrow from 0,1 to 1,1 nohead linecolor rgb '#a0a0a0' linewidth 1 dashtype 3\n"
       "set arrow from 1,0 to 1,1 nohead linecolor rgb '#a0a0a0' linewidth 1 dashtype 3\n";
-  s += place(figure, {1.9, figure.width - 0.5, 1.8 + key_height(key.size(), columns), figure.height - 0.4});
+  s += throw_title(traces.front().thrown, figure);
+  s += place(figure, {1.9, figure.width - 0.5, 1.8 + key_height(key.size(), columns), figure.height - 0.9});
   s += fmt::format("plot DATA index {} using 1:2 {}, \\\n     DATA index {} using 1:2 {}, \\\n     {}\n",
                    traces.size() + 1, disc_style, traces.size(), ellipse_style, plot_all(traces, "1:2"));
-  s += key_strip(figure, key, columns) + "unset multiplot\n";
+  s += "unset label 99\n" + key_strip(figure, key, columns) + "unset multiplot\n";
   return figure;
 }
 
 Figure pivot_figure(const std::vector<ReleaseTrace>& traces) {
-  Figure figure{"pivot", 17, 8.5, {}, {}};
+  Figure figure{"pivot", 17, 9, {}, {}};
   figure.data = blocks(
       traces, {"time [ms]", "angle against the hand [deg]", "relative spin [deg/s]"}, [](const TraceRow& r) {
         return std::vector<double>{milliseconds(r.time), r.pivot * kDegrees, r.spin * kDegrees};
       });
   const auto key = key_of(traces);
   constexpr int columns = 3;
-  const double bottom = 1.8 + key_height(key.size(), columns), top = figure.height - 0.4,
+  const double bottom = 1.8 + key_height(key.size(), columns), top = figure.height - 0.9,
                middle = 0.5 * figure.width;
   const auto& rows = traces.front().rows;
   std::string& s = figure.script;
@@ -202,16 +212,17 @@ Figure pivot_figure(const std::vector<ReleaseTrace>& traces) {
       "set xzeroaxis linetype 1 linecolor rgb '#808080' linewidth 0.6\n"
       "set ylabel 'angle against the hand [deg]'\n",
       milliseconds(rows.front().time), milliseconds(rows.back().time));
+  s += throw_title(traces.front().thrown, figure);
   s += place(figure, {1.9, middle - 0.2, bottom, top}) + "plot " + plot_all(traces, "1:2") + "\n";
-  s += "set ylabel 'spin against the hand [deg/s]'\n";
+  s += "unset label 99\nset ylabel 'spin against the hand [deg/s]'\n";
   s += place(figure, {middle + 2.1, figure.width - 0.5, bottom, top}) + "plot " + plot_all(traces, "1:3") +
        "\n";
-  s += key_strip(figure, key, columns) + "unset multiplot\n";
+  s += "unset label 99\n" + key_strip(figure, key, columns) + "unset multiplot\n";
   return figure;
 }
 
 Figure phase_figure(const std::vector<ReleaseTrace>& traces, double length) {
-  Figure figure{"phase", 13, 10.5, {}, {}};
+  Figure figure{"phase", 13, 11, {}, {}};
   figure.data =
       blocks(traces, {"L omega_r [mm/s]", "slip speed of the patch [mm/s]"}, [&](const TraceRow& r) {
         return std::vector<double>{kMillimetres * length * r.spin, kMillimetres * r.slip};
@@ -226,12 +237,13 @@ Figure phase_figure(const std::vector<ReleaseTrace>& traces, double length) {
   std::string& s = figure.script;
   s = "set multiplot\nunset key\nset yrange [0:*]\n"
       "set xlabel 'relative spin, L {/Symbol w}_r [mm/s]'\nset ylabel 'slip of the patch, |v_r| [mm/s]'\n";
-  s += place(figure, {1.9, figure.width - 0.6, 1.8 + key_height(key.size(), columns), figure.height - 0.4});
+  s += throw_title(traces.front().thrown, figure);
+  s += place(figure, {1.9, figure.width - 0.6, 1.8 + key_height(key.size(), columns), figure.height - 0.9});
   s += fmt::format(
       "plot {}, \\\n     DATA index {} using 1:2 with points pointtype 6 linecolor rgb '#000000' linewidth "
       "1.2\n",
       plot_all(traces, "1:2"), traces.size());
-  s += key_strip(figure, key, columns) + "unset multiplot\n";
+  s += "unset label 99\n" + key_strip(figure, key, columns) + "unset multiplot\n";
   return figure;
 }
 
@@ -259,7 +271,9 @@ Figure flight_figure(const FlightOverlay& overlay) {
   constexpr int columns = 3;
   const double bottom = 1.8 + key_height(key.size(), columns), top = figure.height - 0.9, middle = 8.6;
   std::string& s = figure.script;
-  s = "set multiplot\nunset key\nset title 'path' offset 0,-0.5\nset xlabel 'x [m]'; set ylabel 'z [m]'\n";
+  s = fmt::format(
+      "set multiplot\nunset key\nset title 'path{}' offset 0,-0.5\nset xlabel 'x [m]'; set ylabel 'z [m]'\n",
+      overlay.thrown.empty() ? "" : " of throw " + plain(overlay.thrown));
   s += place(figure, {1.9, middle, bottom, top});
   s += "plot DATA index 0 using 5:6 every 3 with points pointtype 6 linecolor rgb '#000000', \\\n"
        "     DATA index 0 using 2:3 with lines linecolor rgb '#0072b2' linewidth 1.8\n";
@@ -271,7 +285,7 @@ Figure flight_figure(const FlightOverlay& overlay) {
   s += "plot DATA index 0 using 1:8 with points pointtype 7 pointsize 0.45 linecolor rgb '#d55e00', \\\n"
        "     DATA index 0 using 1:9 with points pointtype 4 pointsize 0.45 linecolor rgb '#000000', \\\n"
        "     DATA index 0 using 1:10 with points pointtype 2 pointsize 0.45 linecolor rgb '#0072b2'\n";
-  s += key_strip(figure, key, columns) + "unset multiplot\n";
+  s += "unset label 99\n" + key_strip(figure, key, columns) + "unset multiplot\n";
   return figure;
 }
 

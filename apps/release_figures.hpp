@@ -31,7 +31,7 @@ struct ModeSpan {
 
 /// A release as figures need it.
 struct ReleaseTrace {
-  std::string model;
+  std::string model, thrown;    ///< and the throw's id, for titles
   std::vector<TraceRow> rows;   ///< evenly spaced, from the start to the detach
   std::vector<ModeSpan> modes;  ///< without those shorter than a nanosecond
 };
@@ -58,7 +58,7 @@ Figure phase_figure(const std::vector<ReleaseTrace>& traces, double length);
 
 /// A flight and what a tracker saw of it: paths in the plane, and the residual over time.
 struct FlightOverlay {
-  std::string model;
+  std::string model, thrown;                                ///< and the throw's id
   std::vector<double> time;                                 ///< [s]
   std::vector<dynamics::Pose<double>> predicted, measured;  ///< m, m, rad
 };

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
 
 namespace unhand::apps {
 namespace {
@@ -90,6 +92,29 @@ std::string fixed(bool known, double value, int decimals) {
 
 std::string plus_minus(bool known, double value, double spread, int decimals) {
   return known ? fmt::format("{:.{}f} ± {:.{}f}", value, decimals, spread, decimals) : "-";
+}
+
+Rounded rounded(double value, double sigma) {
+  if (!(sigma > 0) || !std::isfinite(sigma) || !std::isfinite(value))
+    return {fmt::format("{:.6g}", value), fmt::format("{:.2g}", sigma), {}};
+  constexpr int most = 9;  // digits after the point that are still read at a glance
+  const std::string two = fmt::format("{:.1e}", sigma);  // rounded first: 0.0996 is 0.10
+  const int power = std::atoi(two.c_str() + two.find('e') + 1), decimals = 1 - power;
+  if (decimals > most) {
+    const int digits = value == 0 ? 1 : static_cast<int>(std::floor(std::log10(std::abs(value)))) - power + 2;
+    return {fmt::format("{:.{}g}", value, std::clamp(digits, 1, 17)), fmt::format("{:.2g}", sigma), {}};
+  }
+  const double unit = std::pow(10.0, -decimals);  // 123456 ± 2300 is 123500 ± 2300
+  const auto shown = [&](double x) {
+    return fmt::format("{:.{}f}", decimals < 0 ? unit * std::round(x / unit) : x, std::max(0, decimals));
+  };
+  return {shown(value), shown(sigma), std::max(0, decimals)};
+}
+
+std::string with_sigma(double value, double sigma, const std::string& unit) {
+  const Rounded r = rounded(value, sigma);
+  return fmt::format("{} +- {}{}{}", r.value, r.sigma, unit.empty() || unit == "-" ? "" : " ",
+                     unit == "-" ? "" : unit);
 }
 
 }  // namespace unhand::apps

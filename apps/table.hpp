@@ -1,6 +1,7 @@
 // A table of text, for the terminal, for Markdown and for CSV.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,15 @@ struct Table {
 
 /// value ± spread with so many decimals; a dash if there is nothing to show.
 std::string plus_minus(bool known, double value, double spread, int decimals);
+
+/// A value and its sigma as far as the sigma's two leading digits, for people; JSON has all digits.
+struct Rounded {
+  std::string value, sigma;
+  std::optional<int> decimals;  ///< after the point; none where those are too many, or sigma is no size
+};
+Rounded rounded(double value, double sigma);
+/// "19.7 +- 1.1 m/s"; no unit for "-".
+std::string with_sigma(double value, double sigma, const std::string& unit);
 std::string fixed(bool known, double value, int decimals);
 
 }  // namespace unhand::apps

@@ -8,6 +8,7 @@
 
 #include "apps/command.hpp"
 #include "apps/tell.hpp"
+#include "datasets/csv.hpp"
 #include "datasets/summary.hpp"
 #include "experiment/prepared_throw.hpp"
 #include "experiment/unit_check.hpp"
@@ -35,6 +36,15 @@ datasets::ThrowLog read_throws(const std::string& file) {
     return std::binary_search(left_out.begin(), left_out.end(), one.id);  // both are sorted by id
   });
   return log;
+}
+
+std::size_t place_of(const datasets::ThrowLog& log, const std::string& id, const std::string& file) {
+  std::vector<std::string> known;
+  for (std::size_t i = 0; i < log.throws.size(); ++i) {
+    if (log.throws[i].id == id) return i;
+    known.push_back(log.throws[i].id);
+  }
+  throw WrongUsage(datasets::unknown_name(fmt::format("--throw: {} has no throw '{}'", file, id), id, known));
 }
 
 void require_flights(const datasets::ThrowLog& log, const std::string& file) {

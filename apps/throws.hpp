@@ -13,6 +13,9 @@ namespace unhand::apps {
 /// or a column is in another unit (experiment::require_units), Unanswered where it holds no throws.
 datasets::ThrowLog read_throws(const std::string& file);
 
+/// Where the throw of that id is. Throws WrongUsage, naming the nearest id or some of them, if there is none.
+std::size_t place_of(const datasets::ThrowLog& log, const std::string& id, const std::string& file);
+
 /// Throws datasets::LogError where every throw is held at first and nothing says when it flies
 /// (datasets::held_by); where some are, they are left out as not_free.
 void require_flights(const datasets::ThrowLog& log, const std::string& file);

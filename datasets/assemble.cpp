@@ -78,7 +78,7 @@ void split_throws(ThrowLog& log, const SplitRule& rule) {
 void add_throw(ThrowLog& log, Throw one, const std::string& file) {
   for (const Throw& other : log.throws)
     if (other.id == one.id)
-      throw ImportError(file, "line 0",
+      throw ImportError(file, "",
                         fmt::format("there is already a throw '{}': two files of one name?", one.id));
   log.throws.push_back(std::move(one));
 }
@@ -95,7 +95,7 @@ void fill_throw(ThrowLog& log, const std::string& id, Throw channels, bool repla
   const auto move = [&](auto& to, auto& from, const char* name) {
     if (!move_channel(to, from, replace))
       throw LogError(log_file, fmt::format("/throws/{}/{}", id, name),
-                     "is there already, and replace is not set");
+                     "is there already: --replace puts the new one in its place");
   };
   move(found->hand, channels.hand, "hand");
   move(found->ft, channels.ft, "ft");

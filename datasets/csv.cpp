@@ -118,7 +118,7 @@ CsvReader::CsvReader(const std::filesystem::path& file, char separator)
 }
 
 void CsvReader::fail(int line, const std::string& why) const {
-  throw ImportError(file_, fmt::format("line {}", line), why);
+  throw ImportError(file_, line > 0 ? fmt::format("line {}", line) : "", why);
 }
 
 bool CsvReader::next(CsvLine& line) {

@@ -50,13 +50,13 @@ Node::Node(std::shared_ptr<Shared> shared, Handle object, std::string path)
 Node Node::open_file(const std::string& file, Place* place) {
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
-  if (!fs::exists(status)) throw LogError(file, "/", "no such file");
-  if (fs::is_directory(status)) throw LogError(file, "/", "is a directory, not a file");
-  if (!fs::is_regular_file(status)) throw LogError(file, "/", "is not a regular file");
-  if (fs::file_size(file, error) == 0) throw LogError(file, "/", "is empty, not an HDF5 file");
+  if (!fs::exists(status)) throw LogError(file, "", "no such file");
+  if (fs::is_directory(status)) throw LogError(file, "", "is a directory, not a file");
+  if (!fs::is_regular_file(status)) throw LogError(file, "", "is not a regular file");
+  if (fs::file_size(file, error) == 0) throw LogError(file, "", "is empty, not an HDF5 file");
   const htri_t is_hdf5 = H5Fis_hdf5(file.c_str());
   if (is_hdf5 < 0) throw LogError(file, "/", fmt::format("cannot be opened ({})", last_message()));
-  if (is_hdf5 == 0) throw LogError(file, "/", "is not an HDF5 file");
+  if (is_hdf5 == 0) throw LogError(file, "", "is not an HDF5 file");
   Handle access = list_handle(H5Pcreate(H5P_FILE_ACCESS));
 #if H5_VERSION_GE(1, 10, 7)
   H5Pset_file_locking(access.id(), false, true);  // reading must work on a read-only disk

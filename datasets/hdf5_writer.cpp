@@ -1,13 +1,12 @@
 #include "datasets/hdf5_writer.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <filesystem>
 
 #include "datasets/channel_rules.hpp"
+#include "datasets/whole_file.hpp"
 
 namespace unhand::datasets::hdf5 {
 namespace {
@@ -42,22 +41,6 @@ bool put_text(hid_t object, std::string_view name, const std::string& value) {
   const char* content = value.c_str();
   return put_attribute(object, name, type.id(), static_cast<const void*>(&content), 1, true);
 }
-
-/// A name beside the destination that no other process or thread uses.
-std::string part_name(const std::string& file) {
-  static std::atomic<unsigned> counter{0};
-  return fmt::format("{}.part-{}-{}", file, getpid(), counter++);
-}
-
-/// Removes the unfinished file unless it was released.
-struct Unfinished {
-  std::string file;
-  bool released = false;
-  ~Unfinished() {
-    std::error_code ignored;
-    if (!released) fs::remove(file, ignored);
-  }
-};
 
 }  // namespace
 
@@ -123,24 +106,35 @@ void Output::flags(std::string_view name, const Flags& flags) const {
   if (!put_text(dataset.id(), "units", "1")) fail(name);
 }
 
-void write_atomically(const std::string& file, const std::function<void(const Output&)>& fill) {
+std::string image_of(const std::string& file, const std::function<void(const Output&)>& fill) {
   const Session session;
-  std::error_code error;
-  if (fs::is_directory(file, error)) throw LogError(file, "/", "is a directory: a log is one file");
-  Unfinished part{part_name(file)};
+  const auto fail = [&](const char* what) {
+    throw LogError(file, "/", fmt::format("cannot be {} ({})", what, last_message()));
+  };
+  constexpr std::size_t growth = 1 << 20;
+  const Handle access = list_handle(H5Pcreate(H5P_FILE_ACCESS));
   const Handle creation = timeless(H5P_FILE_CREATE);
-  Handle made = file_handle(H5Fcreate(part.file.c_str(), H5F_ACC_EXCL, creation.id(), H5P_DEFAULT));
-  if (!made) throw LogError(file, "/", fmt::format("cannot be created ({})", last_message()));
+  const bool in_memory = H5Pset_fapl_core(access.id(), growth, false) >= 0;
+  Handle made;
+  if (in_memory) made = file_handle(H5Fcreate(file.c_str(), H5F_ACC_TRUNC, creation.id(), access.id()));
+  if (!made) fail("created");
   {
     const Output root(file, group_handle(H5Gopen2(made.id(), "/", H5P_DEFAULT)), "/");
     fill(root);
   }
-  if (H5Fflush(made.id(), H5F_SCOPE_GLOBAL) < 0 || !made.close()) {
-    throw LogError(file, "/", fmt::format("cannot be finished ({})", last_message()));
-  }
-  fs::rename(part.file, file, error);
-  if (error) throw LogError(file, "/", fmt::format("cannot be put in place ({})", error.message()));
-  part.released = true;
+  if (H5Fflush(made.id(), H5F_SCOPE_GLOBAL) < 0) fail("finished");
+  const ssize_t size = H5Fget_file_image(made.id(), nullptr, 0);
+  std::string image(size > 0 ? static_cast<std::size_t>(size) : 0, '\0');
+  if (size <= 0 || H5Fget_file_image(made.id(), image.data(), image.size()) != size || !made.close())
+    fail("finished");
+  return image;
+}
+
+void write_atomically(const std::filesystem::path& file, std::string_view image) {
+  std::error_code error;
+  if (fs::is_directory(file, error)) throw LogError(file.string(), "/", "is a directory: a log is one file");
+  if (const std::string failed = replace_whole(file, image); !failed.empty())
+    throw LogError(file.string(), "/", "cannot be written: " + failed);
 }
 
 }  // namespace unhand::datasets::hdf5

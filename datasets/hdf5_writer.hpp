@@ -1,6 +1,7 @@
 // Writing groups, attributes and tables; a file appears whole or not at all. Private.
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -36,8 +37,13 @@ class Output {
   std::string path_;
 };
 
-/// Calls `fill` with the root of a new file beside `file` and renames it over `file` once it is complete.
-void write_atomically(const std::string& file, const std::function<void(const Output&)>& fill);
+/// The bytes of a file that `fill` writes into, from its root; `file` is for messages only. It is made in
+/// memory: after a write that failed, HDF5 cannot close a file on a disk, and crashes with it when the
+/// process ends.
+std::string image_of(const std::string& file, const std::function<void(const Output&)>& fill);
+
+/// Puts these bytes in the place of `file`, whole or not at all.
+void write_atomically(const std::filesystem::path& file, std::string_view image);
 
 /// Writes a struct's attributes.
 struct AttributeWriter {

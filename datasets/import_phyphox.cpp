@@ -204,8 +204,7 @@ std::vector<std::filesystem::path> phyphox_files(std::span<const std::filesystem
     for (const auto& entry : std::filesystem::recursive_directory_iterator(input))
       if (entry.is_regular_file() && entry.path().extension() == ".csv" && phyphox_names_it(entry.path()))
         found.push_back(entry.path());
-    if (found.empty())
-      throw ImportError(input.string(), "line 0", "a folder without phyphox's 'Raw Data.csv'");
+    if (found.empty()) throw ImportError(input.string(), "", "a folder without phyphox's 'Raw Data.csv'");
     std::sort(found.begin(), found.end());
     out.insert(out.end(), found.begin(), found.end());
   }

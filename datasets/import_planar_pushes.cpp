@@ -229,7 +229,7 @@ std::map<std::string, fs::path> logs_of(std::span<const fs::path> inputs) {
     const std::size_t before = files.size();
     for (const auto& entry : fs::recursive_directory_iterator(input))
       if (entry.is_regular_file() && entry.path().extension() == ".txt") files.push_back(entry.path());
-    if (files.size() == before) throw ImportError(input.string(), "line 0", "a folder without .txt files");
+    if (files.size() == before) throw ImportError(input.string(), "", "a folder without .txt files");
   }
   std::sort(files.begin(), files.end());
   const auto folder = [](const fs::path& file) {
@@ -243,7 +243,7 @@ std::map<std::string, fs::path> logs_of(std::span<const fs::path> inputs) {
     std::string name = home.filename().string();
     if (in_folder[home] > 1 || name.empty()) name += (name.empty() ? "" : "-") + file.stem().string();
     if (const auto [other, fresh] = out.emplace(name, file); !fresh)
-      throw ImportError(file.string(), "line 0",
+      throw ImportError(file.string(), "",
                         fmt::format("surface '{}' comes from {} already", name, other->second.string()));
   }
   return out;

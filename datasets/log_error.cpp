@@ -25,14 +25,15 @@ LogError::LogError(std::string file_name, std::string path_inside, std::string w
       reason(std::move(why)) {}
 
 LogError::LogError(std::string file_name, std::string path_inside, std::string why)
-    : LogError(file_name, path_inside, why, fmt::format("{}: {}: {}", file_name, path_inside, why)) {}
+    : LogError(file_name, path_inside, why,
+               fmt::format("{}: {}{}{}", file_name, path_inside, path_inside.empty() ? "" : ": ", why)) {}
 
 TomlError::TomlError(std::string file_name, int line_number, int column_number, std::string key,
                      std::string why)
     : LogError(file_name, key, why,
                line_number > 0
                    ? fmt::format("{}:{}:{}: {}: {}", file_name, line_number, column_number, key, why)
-                   : fmt::format("{}: {}: {}", file_name, key, why)),
+                   : fmt::format("{}: {}{}{}", file_name, key, key.empty() ? "" : ": ", why)),
       line(line_number),
       column(column_number) {}
 

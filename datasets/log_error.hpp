@@ -7,7 +7,8 @@
 namespace unhand::datasets {
 
 /// A file that cannot be read, or a log that cannot be written. what() is "FILE: WHERE: REASON", always on
-/// one line; WHERE is a path inside an HDF5 file, with attributes after an @ ("/throws/001@split").
+/// one line; WHERE is a path inside an HDF5 file, with attributes after an @ ("/throws/001@split"), and is
+/// left out where it is the whole file that is wrong.
 class LogError : public std::runtime_error {
  public:
   /// The three parts of what().

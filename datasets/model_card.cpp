@@ -1,7 +1,6 @@
 #include "datasets/model_card.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include <string_view>
 
 #include "datasets/json_fields.hpp"
+#include "datasets/whole_file.hpp"
 
 namespace unhand::datasets {
 namespace {
@@ -208,11 +208,11 @@ ModelCard read_model_card(const fs::path& file) {
   std::error_code error;
   if (fs::is_directory(file, error))
     throw CardError(file.string(), "/", "is a directory: a card is one file");
-  if (!fs::exists(file, error)) throw CardError(file.string(), "/", "no such file");
+  if (!fs::exists(file, error)) throw CardError(file.string(), "", "no such file");
   std::ifstream in(file, std::ios::binary);
   std::ostringstream text;
   text << in.rdbuf();
-  if (!in) throw CardError(file.string(), "/", "cannot be read");
+  if (!in) throw CardError(file.string(), "", "cannot be read");
   return parse_model_card(text.str(), file.string());
 }
 
@@ -274,18 +274,11 @@ std::string to_json(const ModelCard& card) {
 
 void write_model_card(const fs::path& file, const ModelCard& card) {
   const std::string text = to_json(card);
-  const fs::path part = fmt::format("{}.part-{}", file.string(), getpid());
   std::error_code error;
   if (fs::is_directory(file, error))
     throw CardError(file.string(), "/", "is a directory: a card is one file");
-  std::ofstream out(part, std::ios::binary | std::ios::trunc);
-  out << text;
-  out.close();
-  if (out) fs::rename(part, file, error);
-  if (!out || error) {
-    fs::remove(part, error);
-    throw CardError(file.string(), "/", "cannot be written");
-  }
+  if (const std::string failed = replace_whole(file, text); !failed.empty())
+    throw CardError(file.string(), "/", "cannot be written: " + failed);
 }
 
 }  // namespace unhand::datasets

@@ -22,9 +22,9 @@ class Lines {
  public:
   explicit Lines(const std::filesystem::path& file) : name_(file.string()) {
     std::error_code error;
-    if (!std::filesystem::is_regular_file(file, error)) fail("no such file");
+    if (!std::filesystem::is_regular_file(file, error)) throw ImportError(name_, "", "no such file");
     in_.open(file, std::ios::binary);
-    if (!in_) fail("cannot be read");
+    if (!in_) throw ImportError(name_, "", "cannot be read");
   }
 
   [[noreturn]] void fail(const std::string& why, std::string_view column = {}) const {

@@ -111,9 +111,9 @@ SlipLog read_slip_log(const std::filesystem::path& file) {
   return log;
 }
 
-void write_slip_log(const std::filesystem::path& file, const SlipLog& log) {
-  validate(log, file.string());
-  hdf5::write_atomically(file.string(), [&](const hdf5::Output& root) {
+std::string to_hdf5(const SlipLog& log, const std::string& file) {
+  validate(log, file);
+  return hdf5::image_of(file, [&](const hdf5::Output& root) {
     root.text("schema", "slip-log");
     root.integer("schema_version", slip_log_version);
     const hdf5::Output surfaces = root.group("surfaces");
@@ -128,6 +128,10 @@ void write_slip_log(const std::filesystem::path& file, const SlipLog& log) {
       }
     }
   });
+}
+
+void write_slip_log(const std::filesystem::path& file, const SlipLog& log) {
+  hdf5::write_atomically(file, to_hdf5(log, file.string()));
 }
 
 }  // namespace unhand::datasets

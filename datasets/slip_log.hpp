@@ -44,6 +44,8 @@ double dissipation(const Surface& surface);
 SlipLog read_slip_log(const std::filesystem::path& file);
 /// Checks and writes; throws LogError.
 void write_slip_log(const std::filesystem::path& file, const SlipLog& log);
+/// The bytes of that file, checked; `file` is for messages. Throws LogError.
+std::string to_hdf5(const SlipLog& log, const std::string& file = "(in memory)");
 /// The rules that reader and writer share. Throws LogError with `file` as its file.
 void validate(const SlipLog& log, const std::string& file = "(in memory)");
 

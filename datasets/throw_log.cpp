@@ -168,14 +168,14 @@ ThrowLog read_throw_log(const std::filesystem::path& file) {
   return log;
 }
 
-void write_throw_log(const std::filesystem::path& file, const ThrowLog& log) {
-  validate(log, file.string());
+std::string to_hdf5(const ThrowLog& log, const std::string& file) {
+  validate(log, file);
   if (log.clock_origin != 0) {
     ThrowLog as_in_files = log;
     move_clock(as_in_files, -log.clock_origin);
-    return write_throw_log(file, as_in_files);
+    return to_hdf5(as_in_files, file);
   }
-  hdf5::write_atomically(file.string(), [&](const hdf5::Output& root) {
+  return hdf5::image_of(file, [&](const hdf5::Output& root) {
     root.text("schema", "throw-log");
     root.integer("schema_version", throw_log_version);
     log_fields(hdf5::AttributeWriter{root}, log);
@@ -195,6 +195,10 @@ void write_throw_log(const std::filesystem::path& file, const ThrowLog& log) {
       hdf5::write_channels<Throw>(out, channels, log.dimension, toss);
     }
   });
+}
+
+void write_throw_log(const std::filesystem::path& file, const ThrowLog& log) {
+  hdf5::write_atomically(file, to_hdf5(log, file.string()));
 }
 
 std::string read_schema_name(const std::filesystem::path& file) {

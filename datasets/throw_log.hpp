@@ -125,6 +125,9 @@ ThrowLog read_throw_log(const std::filesystem::path& file);
 /// an older file as it was. Doubles come back bit for bit. Throws LogError.
 void write_throw_log(const std::filesystem::path& file, const ThrowLog& log);
 
+/// The bytes of that file, checked; `file` is for messages. Throws LogError.
+std::string to_hdf5(const ThrowLog& log, const std::string& file = "(in memory)");
+
 /// Takes `origin` [s] away from every time of the throw.
 void move_clock(Throw& toss, double origin);
 

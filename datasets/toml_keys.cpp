@@ -32,9 +32,9 @@ std::string TomlLimits::text() const {
 
 TomlKeys TomlKeys::parse(const fs::path& file) {
   std::error_code error;
-  if (!fs::is_regular_file(file, error)) throw TomlError(file.string(), 0, 0, "file", "no such file");
+  if (!fs::is_regular_file(file, error)) throw TomlError(file.string(), 0, 0, "", "no such file");
   std::ifstream in(file, std::ios::binary);
-  if (!in) throw TomlError(file.string(), 0, 0, "file", "cannot be opened");
+  if (!in) throw TomlError(file.string(), 0, 0, "", "cannot be opened");
   return parse_text(std::string(std::istreambuf_iterator<char>(in), {}), file.string());
 }
 

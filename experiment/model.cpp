@@ -1,10 +1,11 @@
 #include "experiment/model.hpp"
 
 #include <fmt/core.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <stdexcept>
+
+#include "datasets/csv.hpp"
 
 namespace unhand::experiment {
 namespace {
@@ -55,7 +56,7 @@ void require_release_model(const std::string& name) {
   const auto names = release_model_names();
   if (std::find(names.begin(), names.end(), name) == names.end())
     throw std::invalid_argument(
-        fmt::format("model \"{}\" is unknown; there are {}", name, fmt::join(names, ", ")));
+        datasets::unknown_name(fmt::format("there is no model '{}'", name), name, names));
 }
 
 std::unique_ptr<contact::ContactModel> contact_model_for(const PreparedThrow& throw_,

@@ -158,6 +158,12 @@ bool grip_holds(const PreparedThrow& prepared, const ThrowModel& model, const Va
   return with_release(prepared, model, values, false, read);
 }
 
+void visit_release(const PreparedThrow& prepared, const ThrowModel& model, const Values<double>& values,
+                   const UseOfRelease& use) {
+  const auto hand_over = [&](const auto&, const auto& problem, const auto& result) { use(problem, result); };
+  with_release(prepared, model, values, true, hand_over);
+}
+
 template ThrowPrediction<double> predict_channels(const PreparedThrow&, const Observations&,
                                                   const ThrowModel&, const Values<double>&);
 template ThrowPrediction<Dual> predict_channels(const PreparedThrow&, const Observations&, const ThrowModel&,

@@ -1,6 +1,7 @@
 // Every measured channel of a throw, predicted from the parameters of a model and its effects.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -49,5 +50,11 @@ struct ThrowPrediction {
 template <class S>
 ThrowPrediction<S> predict_channels(const PreparedThrow& prepared, const Observations& observed,
                                     const ThrowModel& model, const dynamics::Values<S>& values);
+
+/// Simulates the release alone, recorded, and hands it to `use`; neither of the two is there afterwards.
+using UseOfRelease =
+    std::function<void(const release::ReleaseProblem<double>&, const release::ReleaseResult<double>&)>;
+void visit_release(const PreparedThrow& prepared, const ThrowModel& model,
+                   const dynamics::Values<double>& values, const UseOfRelease& use);
 
 }  // namespace unhand::experiment

@@ -11,6 +11,7 @@
 #include "contact/convex_quartic.hpp"
 #include "contact/gripper_delay.hpp"
 #include "contact/patch.hpp"
+#include "datasets/near_miss.hpp"
 #include "dynamics/median.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/compare.hpp"
@@ -39,8 +40,11 @@ Effect find_effect(const std::string& id) {
     if (effect.id == id) return effect;
     ids.push_back(effect.id);
   }
-  throw std::invalid_argument(
-      fmt::format("effect \"{}\" is unknown; there are {}", id, fmt::join(ids, ", ")));
+  const std::vector<std::string_view> views(ids.begin(), ids.end());
+  const std::string_view meant = datasets::nearest_name(id, views);
+  throw std::invalid_argument(fmt::format("effect \"{}\" is unknown; {}", id,
+                                          meant.empty() ? fmt::format("there are {}", fmt::join(ids, ", "))
+                                                        : fmt::format("did you mean '{}'?", meant)));
 }
 
 CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::string& file,
@@ -219,6 +223,14 @@ experiment::ThrowPrediction<double> CampaignProblem::predict(const experiment::P
   const Layout& read = layout(prepared);
   const auto values = values_of(read, campaign, own);
   return experiment::predict_channels(prepared, observed, model_, Values<double>(read.names, values));
+}
+
+void CampaignProblem::visit_release(const experiment::PreparedThrow& prepared,
+                                    std::span<const double> campaign, std::span<const double> own,
+                                    const experiment::UseOfRelease& use) const {
+  const Layout& read = layout(prepared);
+  const auto values = values_of(read, campaign, own);
+  experiment::visit_release(prepared, model_, Values<double>(read.names, values), use);
 }
 
 void CampaignProblem::differentiate(const experiment::PreparedThrow& prepared,

@@ -136,6 +136,10 @@ class CampaignProblem {
                                               std::span<const double> campaign,
                                               std::span<const double> own) const;
 
+  /// The recorded release of that prediction (experiment::visit_release).
+  void visit_release(const experiment::PreparedThrow& prepared, std::span<const double> campaign,
+                     std::span<const double> own, const experiment::UseOfRelease& use) const;
+
   /// The prediction in dual numbers, kDualSize unknowns at a time: `use` is given each with the unknowns that
   /// its derivatives are by (campaign first, then own), until it returns false.
   using UseOfDuals =

@@ -105,6 +105,7 @@ struct SeparatingExperiment {
   std::string from;          ///< the other name
   std::string what;          ///< to do, in words
   double before{}, after{};  ///< correlation of the footprints: in this log; with the experiment's throws
+  bool separates{};          ///< they would then be two answers (DiscoverOptions::equivalent)
 };
 
 /// An effect that the data made believable.

@@ -202,9 +202,10 @@ std::vector<SeparatingExperiment> separating_experiments(const Stage& stage, con
   }
   if (now.size() == 0) return out;
   const double before = correlation_in(columns, now, stage, accepted);
-  for (const auto& [number, experiment] : after)
-    out.push_back(
-        {other, experiment.first, before, correlation_in(columns, now + experiment.second, stage, accepted)});
+  for (const auto& [number, experiment] : after) {
+    const double left = correlation_in(columns, now + experiment.second, stage, accepted);
+    out.push_back({other, experiment.first, before, left, left < options.equivalent});
+  }
   std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.after < b.after; });
   constexpr std::size_t kShown = 3;
   if (out.size() > kShown) out.resize(kShown);

@@ -3,12 +3,15 @@
 #include <tinyxml2.h>
 
 #include <Eigen/Geometry>
+#include <cctype>
 #include <cmath>
 #include <map>
 #include <optional>
 #include <set>
 #include <sstream>
 #include <stdexcept>
+#include <string>
+#include <string_view>
 
 #include "datasets/log_error.hpp"
 #include "planners/arm/chain_file.hpp"
@@ -18,13 +21,22 @@ namespace {
 
 using tinyxml2::XMLElement;
 
+/// "not well formed XML (mismatched element)" of XML_ERROR_MISMATCHED_ELEMENT.
+std::string words(std::string name) {
+  constexpr std::string_view prefix = "XML_ERROR_";
+  if (name.starts_with(prefix)) name.erase(0, prefix.size());
+  for (char& c : name) c = c == '_' ? ' ' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return fmt::format("not well formed XML ({})", name);
+}
+
 class Urdf {
  public:
   explicit Urdf(std::string file) : file_(std::move(file)) {
     if (document_.LoadFile(file_.c_str()) != tinyxml2::XML_SUCCESS) {
       const int line = document_.ErrorLineNum();
-      throw datasets::ImportError(file_, line > 0 ? fmt::format("line {}", line) : "file",
-                                  document_.ErrorName());
+      const bool missing = document_.ErrorID() == tinyxml2::XML_ERROR_FILE_NOT_FOUND;
+      throw datasets::ImportError(file_, line > 0 ? fmt::format("line {}", line) : "",
+                                  missing ? "no such file" : words(document_.ErrorName()));
     }
     const XMLElement* robot = document_.FirstChildElement("robot");
     if (robot == nullptr) throw datasets::ImportError(file_, "line 1", "no <robot> element");

@@ -119,6 +119,9 @@ TEST_F(Cli, CrosscheckRefuses) {
   expect_refusal("crosscheck " + quick + " --engine patch --pads point", 2, "--pads: of bullet");
   expect_refusal("crosscheck " + quick + " --engine cvode --steps 1e-3", 2, "--steps: cvode integrates");
   expect_refusal("crosscheck " + quick + " --engine cvode --models gripper_delay", 2, "gripper_delay");
+  ASSERT_EQ(run("generate quick12 --seed 3 --without ft --out blind.h5").code, 0);
+  expect_refusal("crosscheck blind.h5 --engine cvode", 1, "give a card (--card), as `unhand fit LOG");
+  EXPECT_THAT(run("crosscheck blind.h5 --engine cvode").err, Not(HasSubstr("--fit"))) << "which it has not";
   expect_refusal("crosscheck none.h5 --engine cvode", 3, "none.h5");
   expect_refusal("crosscheck " + flights + " --engine cvode", 3, flights);
 }

@@ -55,6 +55,9 @@ TEST_F(Cli, ImportsTheFilesOfALab) {
   EXPECT_EQ(read_json(folder / "full.json")["files"][1]["landing"], true);
   const auto log = datasets::read_throw_log(folder / "full.h5");
   ASSERT_EQ(log.throws.size(), 2u);
+  EXPECT_EQ(log.title, "imported from hand-csv, ft-csv, motive-csv");
+  for (const char* format : {"hand-csv", "ft-csv", "motive-csv"})
+    EXPECT_THAT(log.source, HasSubstr(format)) << "all that was merged";
   const datasets::Throw& one = log.throws[1];
   EXPECT_EQ(one.condition, "slow");
   EXPECT_EQ(one.split, datasets::Split::test);
@@ -66,7 +69,8 @@ TEST_F(Cli, ImportsTheFilesOfALab) {
       datasets::read_throw_log(folder / "log.h5").throws[0].mocap);  // --into alone is left as it was
   EXPECT_EQ(run("compare full.h5 --models gripper_delay").code, 0);
 
-  expect_refusal("import " + ft + "--into full.h5", 3, "full.h5: /throws/slow_01/ft: is there already");
+  expect_refusal("import " + ft + "--into full.h5", 3,
+                 "full.h5: /throws/slow_01/ft: is there already: --replace");
   EXPECT_EQ(run("import " + ft + "--into full.h5 --replace").code, 0);
   expect_refusal("import " + ft + "--into none.h5", 3, "none.h5");
   expect_refusal("import " + ft + "--into full.h5 --throw slow_01", 2, "--throw goes with one input");

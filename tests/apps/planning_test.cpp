@@ -25,7 +25,7 @@ TEST_F(Cli, PlansAThrowIntoABox) {
                  "'kuka' is not panda, a .toml file or a .urdf file");
   expect_refusal("plan throw --target 9,0,0 --samples 200 --json a.json", 1,
                  "no_throw: no configuration reaches the box");
-  expect_refusal("plan throw --target 1.3,0,0 --arm none.toml", 3, "none.toml: file: no such file");
+  expect_refusal("plan throw --target 1.3,0,0 --arm none.toml", 3, "none.toml: no such file");
   expect_refusal("plan throw --target 1.3,0,0 --card none.json", 3, "none.json");
 }
 
@@ -55,9 +55,14 @@ TEST_F(Cli, PlansAThrowWithACard) {
                                         "inertia_kg_m2=0.0024\n";
   const Answer answer =
       run("plan throw --target 1.3,0,-0.2 --samples 600 --draws 40 --card cards/sliding_pivot.json --sku "
-          "bar.toml --json plan.json");
+          "bar.toml --json plan.json --report out");
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.out, HasSubstr("insensitive motion"));
+  EXPECT_THAT(answer.out, Not(HasSubstr("without a card")));
+  EXPECT_THAT(content(folder / "out/tube.gp"), HasSubstr("landings that the card predicts"));
+  const Answer rigid = run("plan throw --target 1.3,0,-0.2 --samples 600 --draws 40 --sku bar.toml");
+  EXPECT_THAT(rigid.out, HasSubstr("note: without a card the object is taken as carried rigidly"));
+  EXPECT_THAT(rigid.out, HasSubstr("14 cm from the pads"));
   const auto plan = nlohmann::json::parse(content(folder / "plan.json"));
   EXPECT_LT(plan["predicted"]["insensitive motion"]["rms_m"],
             plan["predicted"]["tube acceleration"]["rms_m"]);

@@ -1,4 +1,6 @@
 // Help, refusals and the commands that make and show logs.
+#include <signal.h>
+#include <sys/inotify.h>
 #include <sys/stat.h>
 
 #include "apps/progress.hpp"
@@ -60,6 +62,8 @@ TEST_F(Cli, WrongUsage) {
   expect_refusal("juggle", 2, "there is no command 'juggle'");
   expect_refusal("discovr log.h5", 2, "there is no command 'discovr'; did you mean 'discover'?");
   expect_refusal("plan dance", 2, "there is no command 'dance'");
+  expect_refusal("compare a.h5 --modles projectile", 2, "no option '--modles'; did you mean '--models'?");
+  expect_refusal("plan throw --target=1,0,0 --smaples=3", 2, "did you mean '--samples'?");
   EXPECT_EQ(run("compare").code, 2);
   EXPECT_EQ(run("inspect " + quick + " --threads -1").code, 2);
   expect_refusal("generate nonsense --out a.h5", 2, "batch180");
@@ -122,6 +126,9 @@ TEST_F(Cli, BadInput) {
   expect_refusal("compare " + flights + " --models sliding_pivot", 3, "free flights");
   expect_refusal("compare " + quick + " --models projectile", 3, "projectile");
   expect_refusal("import cube-tosses none.csv --out a.h5", 3, "none.csv: ");
+  EXPECT_EQ(run("inspect none.h5").err, "unhand: none.h5: no such file\n");
+  EXPECT_EQ(run("import cube-tosses none.csv --out a.h5").err, "unhand: none.csv: no such file\n");
+  EXPECT_EQ(run("plan throw --target 1.3,0,0 --arm none.urdf").err, "unhand: none.urdf: no such file\n");
   const Answer slip = run("inspect slips.h5 --json slips.json");
   EXPECT_EQ(slip.code, 0) << slip.err;
   EXPECT_EQ(read_json(folder / "slips.json")["surfaces"]["felt"]["slips"], 1);
@@ -137,6 +144,70 @@ TEST_F(Cli, UnwritableOutputs) {
   expect_refusal("compare " + quick + models + " --json none/a.json --report r", 1, "cannot be written");
   expect_refusal("compare " + quick + models + " --json a.json --report file/r", 1, "cannot be written");
   expect_refusal("compare " + quick + models + " --json a.json --write-cards file", 1, "cannot be written");
+}
+
+/// Starts the command in a folder, ends it with a signal once `due`, and says how it ended: waitpid's status.
+template <class Due>
+int interrupted(const fs::path& where, const std::string& arguments, int number, Due&& due) {
+  const pid_t child = fork();
+  if (child == 0) {
+    setpgid(0, 0);
+    signal(number, SIG_DFL);  // a shell ignores it in what runs in the background
+    const std::string command = "cd '" + where.string() + "' && exec '" UNHAND_BINARY "' " + arguments +
+                                " >/dev/null 2>&1 </dev/null";
+    execl("/bin/sh", "sh", "-c", command.c_str(), static_cast<char*>(nullptr));
+    _exit(127);
+  }
+  int status = -1;
+  while (!due())
+    if (waitpid(child, &status, WNOHANG) == child) return status;  // too late
+  kill(child, number);
+  waitpid(child, &status, 0);
+  return status;
+}
+
+TEST_F(Cli, AnInterruptionLeavesNothingUnfinished) {
+  for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
+    std::set<std::string> seen;
+    const int status = interrupted(folder, "figure all --log '" + quick + "' --out f", number, [&] {
+      std::error_code gone;  // files come and go
+      for (fs::recursive_directory_iterator at(folder, gone), end; !gone && at != end; at.increment(gone))
+        seen.insert(at->path().extension().string());
+      return seen.contains(".gp");
+    });
+    EXPECT_TRUE(WIFSIGNALED(status)) << status;
+    EXPECT_EQ(WTERMSIG(status), number);
+    EXPECT_THAT(files(), IsEmpty()) << number;
+  }
+}
+
+TEST_F(Cli, ALogIsMadeBesideItsPlaceUnderOneName) {
+  const int watch = inotify_init1(IN_NONBLOCK);
+  ASSERT_GE(inotify_add_watch(watch, folder.c_str(), IN_CREATE), 0);
+  ASSERT_EQ(run("generate quick12 --out a.h5").code, 0);
+  alignas(inotify_event) char events[4096];
+  const ssize_t n = read(watch, events, sizeof events);
+  close(watch);
+  std::vector<std::string> created;
+  for (ssize_t at = 0; at < n;) {
+    const auto* event = reinterpret_cast<const inotify_event*>(events + at);
+    created.emplace_back(event->name);
+    at += static_cast<ssize_t>(sizeof(inotify_event) + event->len);
+  }
+  EXPECT_THAT(created, testing::ElementsAre(testing::MatchesRegex("\\.a\\.h5\\.part-[0-9]+-[0-9]+")));
+}
+
+// A limit on the size of files stands for a full disk.
+TEST_F(Cli, AFullDiskIsAnErrorLikeAnyOther) {
+  const auto expect = [&](const std::string& arguments, const std::string& file) {
+    const Answer answer = run(arguments, "ulimit -f 40;");
+    EXPECT_EQ(answer.code, 1) << arguments;
+    EXPECT_EQ(answer.err, "unhand: " + file + ": cannot be written: File too large\n");
+    EXPECT_THAT(answer.out, IsEmpty()) << arguments;
+    EXPECT_THAT(files(), IsEmpty()) << arguments;
+  };
+  expect("generate batch180 --out a.h5", "a.h5");
+  expect("figure mae --log '" + quick + "' --models sliding_pivot --out f", "f/mae.png");
 }
 
 TEST_F(Cli, ADashIsNoFile) {
@@ -284,9 +355,39 @@ TEST_F(Cli, FigureDrawsWhatIsAskedFor) {
     for (const char* ending : {".png", ".pdf", ".dat", ".gp"})
       EXPECT_TRUE(fs::exists(folder / "f" / (std::string(name) + ending))) << name << ending;
   expect_refusal("figure portrait --log " + quick + " --out g", 2, "landing-errors");
-  expect_refusal("figure modes --throw 999 --log " + quick + " --out g", 2, "no throw '999'");
+  EXPECT_THAT(content(folder / "f/mae.gp"), HasSubstr("over the 4 held-out throws"));
+  for (const char* name : {"modes", "wrench", "pivot", "phase", "flight"})
+    EXPECT_THAT(content(folder / "f" / (std::string(name) + ".gp")), HasSubstr("throw 001")) << name;
+  expect_refusal("figure modes --throw 999 --log " + quick + " --out g", 2, "no throw '999' (there are: 001");
+  expect_refusal("figure modes --models limit_surfac --log " + quick + " --out g", 2,
+                 "did you mean 'limit_surface'?");
   expect_refusal("figure modes --models wishful --log " + quick + " --out g", 2, "wishful");
   expect_refusal("figure modes --log none.h5 --out g", 3, "none.h5");
+}
+
+TEST_F(Cli, FigureTakesParametersFromCards) {
+  ASSERT_EQ(run("generate quick12 --seed 3 --without ft --out blind.h5").code, 0);
+  ASSERT_EQ(run("fit blind.h5 --model limit_surface --card card.json").code, 0);
+  const Answer refused = run("figure modes --log blind.h5 --out f");
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_THAT(refused.err, HasSubstr("give a card (--card)"));
+  EXPECT_THAT(refused.err, Not(HasSubstr("--fit")));
+  const Answer drawn = run("figure all --log blind.h5 --card card.json --throw 005 --out f");
+  ASSERT_EQ(drawn.code, 0) << drawn.err;
+  EXPECT_THAT(content(folder / "f/modes.dat"), HasSubstr("limit_surface"));
+  EXPECT_THAT(content(folder / "f/modes.dat"), Not(HasSubstr("sliding_pivot"))) << "only the card's model";
+  // The flight is the one that the card predicts: to the noise of the tracker at its start.
+  std::ifstream flight(folder / "f/flight.dat");
+  std::vector<double> row(10);
+  for (std::string line; row[0] == 0 && std::getline(flight, line);)
+    if (!line.empty() && line.front() != '#') {
+      std::istringstream in(line);
+      for (double& x : row) in >> x;
+    }
+  EXPECT_LT(std::abs(row[7]), 20) << "mm";
+  EXPECT_GT(row[0], 0);
+  expect_refusal("figure modes --log blind.h5 --card card.json --models sliding_pivot --out g", 2,
+                 "not among --models");
 }
 
 TEST_F(Cli, InspectTellsOfWhatIsImpossibleAndTheRestRefusesIt) {

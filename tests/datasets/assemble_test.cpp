@@ -59,7 +59,7 @@ TEST(Assemble, NamesAreTakenOnce) {
   ThrowLog log = log_of({"a_1.csv"});
   Throw again;
   again.id = "a_1";
-  expect_error<ImportError>([&] { add_throw(log, again, "other/a_1.csv"); }, "other/a_1.csv", "line 0",
+  expect_error<ImportError>([&] { add_throw(log, again, "other/a_1.csv"); }, "other/a_1.csv", "",
                             "there is already a throw 'a_1'");
 }
 

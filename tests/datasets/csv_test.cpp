@@ -67,7 +67,7 @@ TEST(Csv, SaysWhereAndWhat) {
       "line 1", "UTF-16");
   const std::string long_cell(60, 'x');
   expect(long_cell + ",2\n", "line 1, column t", "xxx...' is not a number");
-  expect_error<ImportError>([&] { lines_of(scratch / "none.csv"); }, scratch / "none.csv", "line 0",
+  expect_error<ImportError>([&] { lines_of(scratch / "none.csv"); }, scratch / "none.csv", "",
                             "no such file");
 }
 

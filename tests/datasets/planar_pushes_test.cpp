@@ -231,11 +231,11 @@ TEST(PlanarPushes, SaysWhichLineAndColumn) {
   expect(robot + "0.1 " + pose + "4\n", "line 10", "'4' after the last push");
   expect(robot + "0.1 " + pose, "line 1", "none of 1 pushes can be used");
   fs::remove(file);
-  expect_error<ImportError>([&] { import_planar_pushes(std::vector<fs::path>{file}); }, file, "line 0",
+  expect_error<ImportError>([&] { import_planar_pushes(std::vector<fs::path>{file}); }, file, "",
                             "no such file");
   fs::create_directories(scratch / "empty");
   expect_error<ImportError>([&] { import_planar_pushes(std::vector<fs::path>{scratch / "empty"}); },
-                            scratch / "empty", "line 0", "without .txt files");
+                            scratch / "empty", "", "without .txt files");
   PlanarPushOptions options;
   options.step = 0;
   EXPECT_THROW(import_planar_pushes(std::vector<fs::path>{file}, options), std::invalid_argument);

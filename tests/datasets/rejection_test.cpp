@@ -474,8 +474,8 @@ TEST(Rejection, OfEveryAttributeThatIsNotThere) {
 TEST(Rejection, WhatIsNotALogAtAll) {
   const Scratch scratch;
   const auto expect = [&](const std::string& file, const std::string& reason) {
-    expect_error([&] { read_throw_log(file); }, file, "/", reason);
-    expect_error([&] { read_schema_name(file); }, file, "/", reason);
+    expect_error([&] { read_throw_log(file); }, file, "", reason);
+    expect_error([&] { read_schema_name(file); }, file, "", reason);
   };
   expect(scratch / "missing.h5", "no such file");
   expect(scratch / ".", "is a directory");

@@ -271,7 +271,8 @@ TEST(Writing, AFailureKeepsTheOlderFile) {
 TEST(Writing, NamesADestinationThatCannotBe) {
   const Scratch scratch;
   const std::string nowhere = scratch / "no/such/folder/a.h5", folder = scratch / ".";
-  expect_error([&] { write_throw_log(nowhere, planar_log()); }, nowhere, "/", "cannot be created");
+  expect_error([&] { write_throw_log(nowhere, planar_log()); }, nowhere, "/",
+               "cannot be written: No such file or directory");
   expect_error([&] { write_throw_log(folder, planar_log()); }, folder, "/", "is a directory");
   EXPECT_EQ(scratch.files(), 0U);
 }

@@ -160,7 +160,7 @@ TEST(Sku, SaysWhereAndWhatIsWrong) {
   expect("name = \n", 1, "syntax", "");
   expect("name = 'a'\nname = 'b'\n", 2, "syntax", "");
   std::filesystem::remove(file);
-  expect_error<TomlError>([&] { read_sku(file); }, file, "file", "no such file");
+  expect_error<TomlError>([&] { read_sku(file); }, file, "", "no such file");
 }
 
 }  // namespace

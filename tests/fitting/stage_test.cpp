@@ -405,6 +405,7 @@ TEST(Separating, ALawIsToldFromAnEffectByExperiments) {
         EXPECT_GE(e.before, 0);
         EXPECT_LE(e.before, 1);
         EXPECT_LE(e.after, 1);
+        EXPECT_EQ(e.separates, e.after < options.equivalent);
       }
     }
   }
