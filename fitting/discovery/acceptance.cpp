@@ -227,14 +227,21 @@ bool is_left(const ChannelMisfit& m, const DiscoverOptions& options) {
 
 /// Whether too much is left in the half of the throw where an effect acts, or in a channel that it
 /// `explains`, of what the base model's fit left there in the other throws (`other`: train against held-out
-/// ones) as well.
+/// ones) as well; and not next to nothing of what the base left in that phase's worst channel.
 template <class Explains>
 bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisfit>& base,
                      const std::vector<ChannelMisfit>& other, const std::vector<ChannelMisfit>& now,
                      const DiscoverOptions& options, const Explains& explains) {
+  const auto worst = [&](Phase phase) {
+    double out = 1;
+    for (const ChannelMisfit& m : base)
+      if (m.phase == phase) out = std::max(out, m.chi2_per_sample());
+    return out;
+  };
   return std::any_of(now.begin(), now.end(), [&](const ChannelMisfit& m) {
     return is_left(m, options) && is_confirmed(other, m) &&
-           m.chi2_per_sample() - 1 > kLeft * (misfit_in(base, m.channel, m.phase) - 1) &&
+           m.chi2_per_sample() - 1 > std::max(kLeft * (misfit_in(base, m.channel, m.phase) - 1),
+                                              kNextToNothing * (worst(m.phase) - 1)) &&
            (acts(effect, in_air(m.phase)) || explains(m));
   });
 }
