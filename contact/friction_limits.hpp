@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "contact/friction_effects.hpp"
+#include "contact/local_friction.hpp"
 #include "contact/patch.hpp"
 #include "dynamics/frames.hpp"
 
@@ -18,16 +19,15 @@ namespace unhand::contact {
 /// to the bit. The soft finger's f_N/f₀ is taken as sqrt((f_N/f₀)² + 10⁻¹⁰), so that L stays positive and
 /// finite as f_N → 0; f_max (1 + |u|/v₀) is taken as 0 where it would be negative. With adhesion f_N is f_N +
 /// f_adh. [XydasKao1999] for γ, [ArmstrongHelouvryDupont1994] for the speeds.
+///
+/// |u| stands for the speed of the patch in the laws that know no points. On the discs every point has its
+/// own: see LocalFriction and GivingPoints.
 template <class S>
 class FrictionLimits {
  public:
   /// Both are copied; validate them first.
   FrictionLimits(const Patch<S>& patch, const FrictionVariation<S>& variation)
-      : patch_(patch),
-        variation_(variation),
-        soft_(is_active(variation.softness)),
-        stribeck_(is_active(variation.static_ratio - 1.0)),
-        viscous_(is_active(variation.viscous)) {}
+      : patch_(patch), variation_(variation), soft_(is_active(variation.softness)), speed_(variation) {}
 
   /// The patch under Coulomb's law.
   const Patch<S>& patch() const { return patch_; }
@@ -42,30 +42,20 @@ class FrictionLimits {
     const S ratio = normal_force / variation_.reference_force;
     return patch_.length() * exp(0.5 * variation_.softness * log(ratio * ratio + 1e-10));
   }
+  /// n μ f_N, under Coulomb's law [N]
+  S coulomb(const S& normal_force) const { return patch_.f_max(normal_force); }
   /// f_max of a held patch [N]
   S held(const S& normal_force) const {
-    const S coulomb = patch_.f_max(normal_force);
-    return stribeck_ ? S(variation_.static_ratio * coulomb) : coulomb;
+    return speed_.stribeck ? S(variation_.static_ratio * coulomb(normal_force)) : coulomb(normal_force);
   }
   /// f_max while slipping at v_r [m/s] and ω_r [rad/s]
   S slipping(const S& normal_force, const dynamics::Vec2<S>& slip, const S& spin) const {
-    const S coulomb = patch_.f_max(normal_force);
-    if (!stribeck_ && !viscous_) return coulomb;
-    using std::exp;
-    using std::sqrt;
+    if (!speed_.any()) return coulomb(normal_force);
     const S spin_speed = length(normal_force) * spin;
-    const S square = dot(slip, slip) + spin_speed * spin_speed;
-    S factor(1.0);
-    if (stribeck_) {
-      const S& v_s = variation_.stribeck_speed;
-      factor += (variation_.static_ratio - 1.0) * exp(-square / (v_s * v_s));
-    }
-    if (viscous_ && dynamics::value_of(square) > 0) {
-      const S growth = 1.0 + variation_.viscous * sqrt(square);
-      factor = dynamics::value_of(growth) > 0 ? S(factor * growth) : S(0);
-    }
-    return factor * coulomb;
+    return speed_.factor(S(dot(slip, slip) + spin_speed * spin_speed)) * coulomb(normal_force);
   }
+  /// How friction depends on the speed of the slip.
+  const SpeedDependence<S>& speed() const { return speed_; }
 
  private:
   static bool is_active(double x) { return x != 0; }
@@ -73,7 +63,8 @@ class FrictionLimits {
 
   Patch<S> patch_;
   FrictionVariation<S> variation_;
-  bool soft_, stribeck_, viscous_;
+  bool soft_;
+  SpeedDependence<S> speed_;
 };
 
 }  // namespace unhand::contact

@@ -76,7 +76,10 @@ template <class S>
 GivingPoints<S>::GivingPoints(const FrictionLimits<S>& limits)
     : points_(disc_quadrature(kRings)),
       stiffness_(1.0 / limits.variation().compliance),
-      loss_time_(limits.variation().loss_time) {
+      loss_time_(limits.variation().loss_time),
+      speed_(limits.speed()),
+      limit_(points_.x.size()),
+      limit_dual_(kVaries<S> ? points_.x.size() : 0) {
   using std::exp;
   const S& exponent = limits.variation().pressure_exponent;
   std::vector<S> load;
@@ -125,13 +128,13 @@ void GivingPoints<S>::extrapolate(const Stretch<S>& coarse, const Stretch<S>& fi
 /// Without a branch, so that the compiler takes several points at once.
 template <class S>
 typename GivingPoints<S>::Sum GivingPoints<S>::sum(const Stretch<S>& from, const Vec3<double>& slip,
-                                                   double gain, double radius, double yield) const {
+                                                   double gain, double radius) const {
   double energy = 0, fx = 0, fz = 0, tau = 0, xx = 0, xz = 0, zz = 0, xt = 0, zt = 0, tt = 0;
   const double gx = gain * slip[0], gz = gain * slip[1], turn = gain * slip[2];
   const std::size_t n = points_.x.size();
   for (std::size_t i = 0; i < n; ++i) {
     const double x = radius * points_.x[i], z = radius * points_.z[i], w = points_.area[i];
-    const double ux = from.x[i] + gx - turn * z, uz = from.z[i] + gz + turn * x, most = yield * load_[i];
+    const double ux = from.x[i] + gx - turn * z, uz = from.z[i] + gz + turn * x, most = limit_[i];
     const double square = ux * ux + uz * uz, size = std::sqrt(square), held = std::min(size, most);
     const double k = w * (size > most ? most / size : 1.0), bent = size > most ? k / square : 0.0;
     energy += w * held * (size - 0.5 * held);
@@ -147,18 +150,18 @@ typename GivingPoints<S>::Sum GivingPoints<S>::sum(const Stretch<S>& from, const
 /// Minimises ½ qᵀ A q − c·q + k/g Σ w ψ over q by Newton's method with a line search; for Dual the implicit
 /// function theorem, with the answer's moment k Σ w Bᵀ e = c − A q.
 template <class S>
-bool GivingPoints<S>::solve(const Step& p, const Stretch<S>& from, const S& gain, const S& radius,
-                            const S& yield, Slip& slip, Vec3<S>& wrench) {
+bool GivingPoints<S>::solve(const Step& p, const Stretch<S>& from, const S& gain, const S& radius, Slip& slip,
+                            Vec3<S>& wrench) {
   const auto& A = p.inertia;
   const auto& c = p.free;
-  const double k = value_of(stiffness_), g = value_of(gain), a = value_of(radius), most = value_of(yield);
+  const double k = value_of(stiffness_), g = value_of(gain), a = value_of(radius);
   Eigen::Matrix3d metric;
   Eigen::Vector3d pull, q;
   for (int i = 0; i < 3; ++i) {
     pull[i] = value_of(c[i]), q[i] = value_of(slip[i]);
     for (int j = 0; j < 3; ++j) metric(i, j) = value_of(A[i][j]);
   }
-  const auto at = [&](const Eigen::Vector3d& x) { return sum(from, {x[0], x[1], x[2]}, g, a, most); };
+  const auto at = [&](const Eigen::Vector3d& x) { return sum(from, {x[0], x[1], x[2]}, g, a); };
   const auto potential = [&](const Eigen::Vector3d& x, const Sum& s) {
     return 0.5 * x.dot(metric * x) - pull.dot(x) + k / g * s.energy;
   };
@@ -207,10 +210,10 @@ bool GivingPoints<S>::solve(const Step& p, const Stretch<S>& from, const S& gain
       double ux = from.x[i] + g * bx, uz = from.z[i] + g * bz;
       Gradient dx = gradient(from.dx[i]) + bx * dg - (g * pz * q[2]) * da;
       Gradient dz = gradient(from.dz[i]) + bz * dg + (g * px * q[2]) * da;
-      const double size = std::sqrt(ux * ux + uz * uz), limit = most * load_[i];
+      const double size = std::sqrt(ux * ux + uz * uz), limit = limit_[i];
       if (size > limit) {
         const double kept = limit / size;
-        limited(ux / size, uz / size, kept, limit_gradient(yield, i), dx, dz);
+        limited(ux / size, uz / size, kept, gradient(limit_dual_[i]), dx, dz);
         ux *= kept, uz *= kept;
       }
       moment[0] += w * dx;
@@ -234,64 +237,76 @@ bool GivingPoints<S>::solve(const Step& p, const Stretch<S>& from, const S& gain
 
 /// The springs follow the slip as far as the limit lets them.
 template <class S>
-void GivingPoints<S>::move(const Stretch<S>& from, const Slip& slip, const S& radius, const S& yield,
-                           const S& h, Stretch<S>& to) const {
-  const double time = value_of(h), a = value_of(radius), most = value_of(yield);
+void GivingPoints<S>::move(const Stretch<S>& from, const Slip& slip, const S& radius, const S& h,
+                           Stretch<S>& to) const {
+  const double time = value_of(h), a = value_of(radius);
   const Vec3<double> q{value_of(slip[0]), value_of(slip[1]), value_of(slip[2])};
   for (std::size_t i = 0; i < points_.x.size(); ++i) {
     const double px = points_.x[i], pz = points_.z[i], x = a * px, z = a * pz;
     const double vx = q[0] - z * q[2], vz = q[1] + x * q[2];
     const double ux = from.x[i] + time * vx, uz = from.z[i] + time * vz;
-    const double size = std::sqrt(ux * ux + uz * uz), limit = most * load_[i];
+    const double size = std::sqrt(ux * ux + uz * uz), limit = limit_[i];
     const double kept = size > limit ? limit / size : 1.0;
     to.x[i] = kept * ux, to.z[i] = kept * uz;
     if constexpr (kVaries<S>) {
       const Gradient turn = time * (a * slip[2].v + q[2] * radius.v);
       Gradient dx = gradient(from.dx[i]) + time * slip[0].v - pz * turn + vx * h.v;
       Gradient dz = gradient(from.dz[i]) + time * slip[1].v + px * turn + vz * h.v;
-      if (size > limit) limited(ux / size, uz / size, kept, limit_gradient(yield, i), dx, dz);
+      if (size > limit) limited(ux / size, uz / size, kept, gradient(limit_dual_[i]), dx, dz);
       gradient(to.dx[i]) = dx, gradient(to.dz[i]) = dz;
     }
   }
 }
 
-/// Of δ λ_i.
+/// δ_i λ_i and its derivatives: friction at every point's own speed where it depends on that.
 template <class S>
-Eigen::Matrix<double, dynamics::kDualSize, 1> GivingPoints<S>::limit_gradient(const Dual& yield,
-                                                                              std::size_t i) const {
-  Gradient out = load_[i] * yield.v;
-  if (!load_dual_.empty()) out += yield.a * gradient(load_dual_[i]);
-  return out;
+void GivingPoints<S>::set_limits(const S& yield, const S& radius, const Slip& before) {
+  S limit = yield;
+  for (std::size_t i = 0; i < points_.x.size(); ++i) {
+    if (speed_.any()) {
+      const S turn = radius * before[2], vx = before[0] - points_.z[i] * turn,
+              vz = before[1] + points_.x[i] * turn;
+      limit = speed_.factor(S(vx * vx + vz * vz)) * yield;
+    }
+    limit_[i] = load_[i] * value_of(limit);
+    if constexpr (kVaries<S>) {
+      gradient(limit_dual_[i]) = load_[i] * limit.v;
+      if (!load_dual_.empty()) gradient(limit_dual_[i]) += limit.a * gradient(load_dual_[i]);
+    }
+  }
 }
 
 template <class S>
 bool GivingPoints<S>::step(const Step& p, const Stretch<S>& from, Stretch<S>& to, Slip& slip,
                            Vec3<S>& wrench) {
-  const S gain = p.h + loss_time_, radius = p.length / torque_factor_, yield = p.force_limit / stiffness_;
+  const S gain = p.h + loss_time_, radius = p.length / torque_factor_, yield = p.force / stiffness_;
   Step scaled = p;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) scaled.inertia[i][j] = p.inertia[i][j] / p.h;
     scaled.free[i] = dot3(scaled.inertia[i], p.free);
   }
-  const bool solved = solve(scaled, from, gain, radius, yield, slip, wrench);
-  move(from, slip, radius, yield, p.h, to);
+  set_limits(yield, radius, p.before);
+  const bool solved = solve(scaled, from, gain, radius, slip, wrench);
+  move(from, slip, radius, p.h, to);
   return solved;
 }
 
 template <class S>
-bool GivingPoints<S>::hold(const Vec3<S>& wrench, const S& force_limit, const S& length, Stretch<S>& to) {
+bool GivingPoints<S>::hold(const Vec3<S>& wrench, const S& force, const S& length, Stretch<S>& to) {
   const Stretch<S> from = zero();
-  const S one(1.0), radius = length / torque_factor_, yield = force_limit / stiffness_;
+  const S one(1.0), radius = length / torque_factor_;
   const S side = kBeside * stiffness_, turn = 0.5 * side * radius * radius;
   const Step p{one,
-               force_limit,
+               force,
                length,
                {{{side, S(0), S(0)}, {S(0), side, S(0)}, {S(0), S(0), turn}}},
-               {-wrench[0], -wrench[1], -wrench[2]}};
+               {-wrench[0], -wrench[1], -wrench[2]},
+               {S(0), S(0), S(0)}};
   Slip moved{S(0), S(0), S(0)};
   Vec3<S> carried;
-  const bool solved = solve(p, from, one, radius, yield, moved, carried);
-  move(from, moved, radius, yield, one, to);
+  set_limits(force / stiffness_, radius, p.before);
+  const bool solved = solve(p, from, one, radius, moved, carried);
+  move(from, moved, radius, one, to);
   return solved;
 }
 

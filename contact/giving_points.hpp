@@ -34,11 +34,11 @@ struct Stretch {
 ///   s_i' = v_i = v_r + ω_r J a p_i while |s_i| < δ λ_i, no further than that otherwise,
 ///   f_i = −k w_i (s_i + T v_i), no more than n μ f_N w_i λ_i;   δ = n μ f_N/k
 ///
-/// k = 1/compliance [N/m], T the loss time [s], a and μ as of FrictionLimits (the patch may shrink, friction
-/// may depend on the slip's speed): the elasto-plastic friction of [DupontHaywardArmstrongAltpeter2002] at
-/// every point, with Coulomb's limit on the whole of a point's force. The outer points slip before the inner
-/// ones; what creeps before the patch slips as a whole is theirs. As k grows, the sum tends to the limit
-/// surface of the disc; its torque limit is that of FrictionLimits exactly.
+/// k = 1/compliance [N/m], T the loss time [s], a and μ as of FrictionLimits (the patch may shrink, and μ may
+/// depend on |v_i|, the point's own speed, taken at the begin of a step): the elasto-plastic friction of
+/// [DupontHaywardArmstrongAltpeter2002] at every point, with Coulomb's limit on the whole of a point's force.
+/// The outer points slip before the inner ones; what creeps before the patch slips as a whole is theirs. As k
+/// grows, the sum tends to the limit surface of the disc; its torque limit is that of FrictionLimits exactly.
 ///
 /// Nothing here is a mode or an event. A step of the implicit Euler method is a convex problem in the slip
 /// q = (v_r, ω_r) at its end, in the hand's frame,
@@ -58,16 +58,18 @@ class GivingPoints {
   /// Nothing stretched: where an unloaded patch starts.
   Stretch<S> zero() const;
   /// Static: the stretches under which the points carry `wrench` [N, N, N m] in the hand's frame, with limits
-  /// n μ f_N [N] and L(f_N) [m]. Where they cannot, they carry what they can. Whether it was found.
-  bool hold(const Vec3<S>& wrench, const S& force_limit, const S& length, Stretch<S>& to);
+  /// n μ f_N [N] under Coulomb's law and L(f_N) [m]. Where they cannot, they carry what they can. Whether it
+  /// was found.
+  bool hold(const Vec3<S>& wrench, const S& force, const S& length, Stretch<S>& to);
 
   /// One implicit step of object and points.
   struct Step {
     S h;              ///< [s]
-    S force_limit;    ///< n μ f_N [N] at the end
+    S force;          ///< n μ f_N [N] at the end, under Coulomb's law
     S length;         ///< L(f_N) [m] at the end
     Inertia inertia;  ///< N
     Slip free;        ///< the slip at the end without the points' wrench
+    Slip before;      ///< the slip at the begin
   };
   /// From `from` to `to` (not the same); `slip` is the first guess and the answer, `wrench` [N, N, N m] what
   /// acts on the object at the end. False if the iteration spends its budget.
@@ -82,18 +84,19 @@ class GivingPoints {
     Vec3<double> moment;            ///< Σ w Bᵀ e
     std::array<double, 6> bending;  ///< Σ w Bᵀ C B: xx, xz, zz, xτ, zτ, ττ
   };
-  Sum sum(const Stretch<S>& from, const Vec3<double>& slip, double gain, double radius, double yield) const;
-  bool solve(const Step& problem, const Stretch<S>& from, const S& gain, const S& radius, const S& yield,
-             Slip& slip, Vec3<S>& wrench);
-  void move(const Stretch<S>& from, const Slip& slip, const S& radius, const S& yield, const S& h,
-            Stretch<S>& to) const;
-  Eigen::Matrix<double, dynamics::kDualSize, 1> limit_gradient(const dynamics::Dual& yield,
-                                                               std::size_t i) const;
+  Sum sum(const Stretch<S>& from, const Vec3<double>& slip, double gain, double radius) const;
+  bool solve(const Step& problem, const Stretch<S>& from, const S& gain, const S& radius, Slip& slip,
+             Vec3<S>& wrench);
+  void move(const Stretch<S>& from, const Slip& slip, const S& radius, const S& h, Stretch<S>& to) const;
+  void set_limits(const S& yield, const S& radius, const Slip& before);
 
   DiscPoints points_;
   std::vector<double> load_;                              ///< λ_i
   std::vector<typename Stretch<S>::Gradient> load_dual_;  ///< empty where it does not vary
   S stiffness_, loss_time_, torque_factor_;
+  SpeedDependence<S> speed_;
+  std::vector<double> limit_;                              ///< how far the springs reach [m], in this step
+  std::vector<typename Stretch<S>::Gradient> limit_dual_;  ///< empty where S is double
 };
 
 extern template class GivingPoints<double>;

@@ -39,6 +39,8 @@ LimitSurface<Shape>::LimitSurface(std::string_view name, const Patch<Dual>& patc
   validate(variation);
   pads_double_ = pad_compliance(limits_double_);
   pads_dual_ = pad_compliance(limits_dual_);
+  if constexpr (kDisc)
+    if (limits_dual_.speed().any()) local_.emplace(shape_.exponent(), shape_.torque_factor());
 }
 
 template <class Shape>
@@ -96,8 +98,11 @@ Wrench<S> LimitSurface<Shape>::wrench_(int mode, const Scene<S>& scene, const Re
     return {k * demand.fx, k * demand.fz, k * demand.tau};
   }
   const Vec3<S> u = normalised_slip(y, length);
-  const S f_max = limits<S>().slipping(scene.normal_force, y.slip, y.spin);
-  return physical(resist(shape_, scene, u), f_max, length);
+  Vec3<S> w = resist(shape_, scene, u);
+  if (!local_) return physical(w, limits<S>().slipping(scene.normal_force, y.slip, y.spin), length);
+  const Vec3<S> more = local_->wrench(limits<S>().speed(), u);
+  for (int i = 0; i < 3; ++i) w[i] += more[i];
+  return physical(w, limits<S>().coulomb(scene.normal_force), length);
 }
 
 template <class Shape>

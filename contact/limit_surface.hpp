@@ -9,6 +9,7 @@
 #include "contact/giving_points.hpp"
 #include "contact/isotropic_quartic.hpp"
 #include "contact/limit_surface_shapes.hpp"
+#include "contact/local_friction.hpp"
 #include "contact/pad_compliance.hpp"
 #include "contact/pressed_disc.hpp"
 
@@ -35,6 +36,9 @@ namespace unhand::contact {
 /// and rigidly after, at any later rest: what it would store then is not followed, a small energy since the
 /// pads are opening. The elastic work is booked with the friction's. Without compliance there is no such
 /// mode.
+///
+/// Friction that depends on the speed of the slip: on the discs at every point by itself (LocalFriction);
+/// other shapes grow and shrink with the norm of (v_r, L ω_r).
 ///
 /// All of this is done in the normalised coordinates of limit_surface_shapes.hpp, so a Shape is all that
 /// differs.
@@ -65,10 +69,7 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>>, public 
   bool is_homogeneous(int mode) const override { return mode == kSlip; }
   bool needs_hold() const override { return pads_double_.has_value(); }
   double spin_length() const override { return limits_double_.patch().length(); }
-  bool gives_at_points() const override {
-    constexpr bool disc = std::is_same_v<Shape, UniformDisc> || std::is_same_v<Shape, PressedDisc>;
-    return disc && pads_double_.has_value();
-  }
+  bool gives_at_points() const override { return kDisc && pads_double_.has_value(); }
   /// The friction limits that the points share.
   const FrictionLimits<double>& point_limits(double) const override { return limits_double_; }
   const FrictionLimits<Dual>& point_limits(const Dual&) const override { return limits_dual_; }
@@ -89,6 +90,8 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>>, public 
 
  private:
   static constexpr int kHeld = 0, kSlip = 1, kStickAgain = 2;
+  /// Whether the shape says where the pressure is.
+  static constexpr bool kDisc = std::is_same_v<Shape, UniformDisc> || std::is_same_v<Shape, PressedDisc>;
   bool is_elastic(int mode) const { return mode == kHeld && pads_dual_; }
   /// The mode of an object that came to rest on the pads.
   int stick() const { return pads_dual_ ? kStickAgain : kHeld; }
@@ -113,6 +116,7 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>>, public 
   Shape shape_;
   FrictionLimits<double> limits_double_;
   FrictionLimits<Dual> limits_dual_;
+  std::optional<LocalFriction> local_;  ///< of a disc, where friction depends on the speed
   std::optional<PadCompliance<double>> pads_double_;
   std::optional<PadCompliance<Dual>> pads_dual_;
 };

@@ -90,6 +90,11 @@ struct UniformDisc {
   static constexpr bool isotropic = true;              ///< round in the plane of sliding: needs no frame
   static constexpr const char* name = "uniform disc";  ///< as messages call it
 
+  /// Of the pressure (1 − (r/a)²)^s [-].
+  dynamics::Dual exponent() const { return dynamics::Dual(0.0); }
+  /// c [-]
+  dynamics::Dual torque_factor() const { return dynamics::Dual(2.0 / 3.0); }
+
   /// The wrench that opposes the slip u.
   template <class S>
   Vec3<S> resist(const Vec3<S>& u) const;

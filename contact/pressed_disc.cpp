@@ -49,7 +49,10 @@ PressedDisc::PressedDisc(const Dual& exponent) : exponent_(exponent) {
   series_ = std::move(series);
 }
 
-double PressedDisc::torque_factor() const { return 1 / series_->kappa; }
+Dual PressedDisc::torque_factor() const {
+  const double kappa = series_->kappa;
+  return dynamics::chain(exponent_, 1 / kappa, -series_->kappa_by_exponent / (kappa * kappa));
+}
 
 /// u of ordinary size. The Jacobian is −∇² of the power, as for UniformDisc with κ = 1/c for 3/2; dm/ds = ∓2
 /// m κ′/κ at fixed u.

@@ -30,8 +30,10 @@ class PressedDisc {
   /// s <= 3.
   explicit PressedDisc(const dynamics::Dual& exponent);
 
-  /// c(s) [-]
-  double torque_factor() const;
+  /// s [-]
+  const dynamics::Dual& exponent() const { return exponent_; }
+  /// c(s) [-], with the exponent's derivatives
+  dynamics::Dual torque_factor() const;
 
   /// As limit_surface_shapes.hpp says. Instantiated for double and Dual, the direction for double alone.
   template <class S>

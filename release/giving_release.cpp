@@ -41,7 +41,7 @@ class Stepper {
   }
   /// Stretches the points as far as they carry the wrench; whether that was found.
   bool load(const Scene<S>& scene, Moving<S>& at) {
-    return points_.hold(at.wrench, limits_.held(scene.normal_force), limits_.length(scene.normal_force),
+    return points_.hold(at.wrench, limits_.coulomb(scene.normal_force), limits_.length(scene.normal_force),
                         at.stretch);
   }
 
@@ -56,14 +56,15 @@ class Stepper {
     const Vec2<S> lever = dynamics::rotate(ahead.angle, ahead.arm);
     const auto& [m, I] = scene.body;
     const S zx = -m * lever.z, zz = m * lever.x;
+    const Vec2<S> before = dynamics::rotate(S(-theta), y.slip);
+    Vec3<S> slip{before.x, before.z, y.spin};
     const typename contact::GivingPoints<S>::Step step{
         h,
-        limits_.slipping(scene.normal_force, y.slip, y.spin),
+        limits_.coulomb(scene.normal_force),
         limits_.length(scene.normal_force),
         {{{m, S(0), zx}, {S(0), m, zz}, {zx, zz, I + m * dot(lever, lever)}}},
-        {free.x, free.z, y.spin + h * rate[5]}};
-    const Vec2<S> guess = dynamics::rotate(S(-theta), y.slip);
-    Vec3<S> slip{guess.x, guess.z, y.spin};
+        {free.x, free.z, y.spin + h * rate[5]},
+        slip};
     const bool solved = points_.step(step, from.stretch, to.stretch, slip, to.wrench);
     to.relative = moved(y, h, scene, dynamics::rotate(theta, Vec2<S>{slip[0], slip[1]}), slip[2]);
     return solved;

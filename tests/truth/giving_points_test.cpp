@@ -34,7 +34,7 @@ contact::Vec3<double> dragged(GivingPoints<double>& points, contact::Stretch<dou
   contact::Stretch<double> to = stretch;
   contact::Vec3<double> at = slip, wrench;
   const GivingPoints<double>::Step step{
-      h, force, 2.0 / 3 * kRadius, {{{kHeavy, 0, 0}, {0, kHeavy, 0}, {0, 0, kHeavy}}}, slip};
+      h, force, 2.0 / 3 * kRadius, {{{kHeavy, 0, 0}, {0, kHeavy, 0}, {0, 0, kHeavy}}}, slip, slip};
   EXPECT_TRUE(points.step(step, stretch, to, at, wrench));
   stretch = to;
   return wrench;
