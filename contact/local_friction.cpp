@@ -1,6 +1,7 @@
 #include "contact/local_friction.hpp"
 
 #include <Eigen/Dense>
+#include <boost/math/quadrature/gauss.hpp>
 #include <cmath>
 #include <numbers>
 
@@ -18,24 +19,15 @@ constexpr int kNodes = 32, kInnerNodes = 20;
 constexpr double kReach = 6.4;  // Stribeck speeds beyond which exp(−v²/v_s²) is rounding
 constexpr double kFar = 1e4;    // d beyond which the disc slides as a whole, to 1e-8
 
-/// Gauss and Legendre's rule on [0, 1].
+/// Gauss and Legendre's rule on [0, 1], N even.
 template <int N>
 struct GaussRule {
   std::array<double, N> x{}, weight{};
   GaussRule() {
-    for (int i = 0; i < N; ++i) {
-      double t = std::cos(std::numbers::pi * (i + 0.75) / (N + 0.5)), slope = 1;
-      for (int k = 0; k < 60; ++k) {
-        double before = 1, at = t;
-        for (int n = 1; n < N; ++n) {
-          const double next = ((2 * n + 1) * t * at - n * before) / (n + 1);
-          before = at, at = next;
-        }
-        slope = N * (t * at - before) / (t * t - 1);
-        t -= at / slope;
-      }
-      x[static_cast<std::size_t>(i)] = 0.5 * (1 - t);
-      weight[static_cast<std::size_t>(i)] = 1 / ((1 - t * t) * slope * slope);
+    using Half = boost::math::quadrature::gauss<double, N>;  // of [−1, 1], the positive points
+    for (std::size_t i = 0; i < N / 2; ++i) {
+      x[2 * i] = 0.5 * (1 - Half::abscissa()[i]), x[2 * i + 1] = 0.5 * (1 + Half::abscissa()[i]);
+      weight[2 * i] = weight[2 * i + 1] = 0.5 * Half::weights()[i];
     }
   }
 };
