@@ -225,7 +225,7 @@ MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const Measured
   out.kind = "free flights";
   out.model = "projectile";
   out.phase = "flight";
-  const FlightProblem problem(log, threads);
+  FlightProblem problem(log, threads);
   const EffectSearch search = run_search(problem, options, out);
   if (out.verdict == Verdict::not_answered) return out;
   out.before_train = named_errors(problem, search.base, threads);

@@ -24,7 +24,7 @@ GroupedFit begin(const GroupedProblem& problem, datasets::Split split) {
   fit.groups.resize(problem.groups().size());
   for (std::size_t i = 0; i < fit.groups.size(); ++i) {
     const Group& g = problem.groups()[i];
-    fit.groups[i].used = g.split == split;
+    fit.groups[i].used = g.split == split && !g.set_aside;
     fit.groups[i].own = Eigen::Map<const VectorXd>(g.start.data(), static_cast<Index>(g.start.size()));
   }
   return fit;

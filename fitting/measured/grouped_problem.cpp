@@ -79,6 +79,11 @@ std::vector<datasets::Split> splits_of(const datasets::ThrowLog& log) {
   return out;
 }
 
+void GroupedProblem::set_aside(const std::vector<std::size_t>& which) {
+  for (Group& group : groups_) group.set_aside = false;
+  for (const std::size_t i : which) groups_[i].set_aside = true;
+}
+
 double GroupedProblem::declared(const std::string& name) const {
   const auto it = declared_.find(name);
   return it == declared_.end() ? 0 : it->second;

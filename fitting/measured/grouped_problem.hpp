@@ -32,6 +32,7 @@ struct Group {
   /// What the group is like, for asking whether an answer depends on it: one value per covariate of the
   /// problem.
   std::vector<double> covariates;
+  bool set_aside{};  ///< it errs as no other does: nothing is fitted to it, and it judges nothing
 };
 
 /// (predicted − measured)/σ of a group, by row, with derivatives where they were asked for.
@@ -53,6 +54,8 @@ class GroupedProblem {
   const std::vector<std::string>& channels() const { return channels_; }
   /// Names of what groups are described by.
   const std::vector<std::string>& covariates() const { return covariates_; }
+  /// These groups (indices), and no others, are set aside.
+  void set_aside(const std::vector<std::size_t>& which);
   /// Groups that were left out, with the reason.
   const std::vector<std::pair<std::string, std::string>>& skipped() const { return skipped_; }
 

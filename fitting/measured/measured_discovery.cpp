@@ -8,8 +8,12 @@
 #include "dynamics/median.hpp"
 #include "fitting/distributions.hpp"
 #include "fitting/measured/grouped_footprints.hpp"
+#include "fitting/measured/wild_groups.hpp"
 
 namespace unhand::fitting {
+
+using datasets::Split;
+
 namespace {
 
 /// χ² per sample of a channel without stray samples: up to a hundredth of them, ten times farther off than
@@ -156,12 +160,60 @@ void withdraw_imitations(const GroupedProblem& problem, EffectSearch& search, Me
   take_fits(problem, search, out);
 }
 
+/// The search without wild groups. One that the answer explains as it does the others is none, and taken
+/// back.
+EffectSearch search_without_wild(GroupedProblem& problem, const EffectSearchOptions& options,
+                                 std::vector<WildGroup>& wild) {
+  const auto set_aside = [&] {
+    std::vector<std::size_t> which;
+    for (const WildGroup& one : wild) which.push_back(one.group);
+    problem.set_aside(which);
+  };
+  wild = wild_groups(problem, problem.effects(), options.fit);
+  for (;;) {
+    set_aside();
+    EffectSearch search = search_effects(problem, options);
+    if (wild.empty()) return search;
+    problem.set_aside({});
+    auto still =
+        search.solved ? still_wild(problem, wild, search.final, options.fit) : std::vector<WildGroup>{};
+    const bool settled = still.size() == wild.size();
+    wild = std::move(still);
+    set_aside();
+    if (settled) return search;
+  }
+}
+
+void tell_of_wild(const GroupedProblem& problem, const std::vector<WildGroup>& wild, MeasuredDiscovery& out) {
+  if (wild.empty()) return;
+  constexpr std::size_t kNamed = 5;
+  std::string names;
+  for (std::size_t k = 0; k < wild.size(); ++k) {
+    const Group& group = problem.groups()[wild[k].group];
+    const std::string how =
+        fmt::format("{:.2g} times the usual misfit, {:.2g} robust sigmas in its logarithm", wild[k].times,
+                    wild[k].sigmas);
+    out.skipped.push_back({group.id, "set aside: " + how});
+    if (k < kNamed)
+      names += fmt::format("{}{} ({}{})", names.empty() ? "" : ", ", group.id,
+                           group.split == Split::test ? "held out; " : "", how);
+    else if (k == kNamed)
+      names += fmt::format(" and {} more", wild.size() - kNamed);
+  }
+  out.evidence.push_back({"",
+                          fmt::format("{} of {} set aside, which neither the answer nor all listed effects "
+                                      "together explain as they do the others: {}",
+                                      wild.size(), problem.groups().size(), names),
+                          false});
+}
+
 }  // namespace
 
-EffectSearch run_search(const GroupedProblem& problem, const MeasuredOptions& options,
-                        MeasuredDiscovery& out) {
-  EffectSearch search = search_effects(problem, options.search);
+EffectSearch run_search(GroupedProblem& problem, const MeasuredOptions& options, MeasuredDiscovery& out) {
+  std::vector<WildGroup> wild;
+  EffectSearch search = search_without_wild(problem, options.search, wild);
   out.skipped = problem.skipped();
+  tell_of_wild(problem, wild, out);
   if (!search.solved) {
     out.verdict = Verdict::not_answered;
     out.message = search.message;
