@@ -47,7 +47,7 @@ void look_for_the_unexplained(const GroupedProblem& problem, const GroupedFit& h
     const auto channel =
         static_cast<std::size_t>(std::find(names.begin(), names.end(), m.channel) - names.begin());
     const double left = without_strays(problem, held_out, channel),
-                 most = std::max(options.unexplained, 1 + 3 * std::sqrt(2.0 / std::max(1, m.n)));
+                 most = std::max(options.unexplained, 1 + 3 * std::sqrt(2.0 / std::max(1, m.n_test)));
     if (left < most) {
       if (m.after_test >= most)
         out.evidence.push_back(
@@ -191,7 +191,7 @@ void tell_of_wild(const GroupedProblem& problem, const std::vector<WildGroup>& w
   for (std::size_t k = 0; k < wild.size(); ++k) {
     const Group& group = problem.groups()[wild[k].group];
     const std::string how =
-        fmt::format("{:.2g} times the usual misfit, {:.2g} robust sigmas in its logarithm", wild[k].times,
+        fmt::format("{:.0f} times the median misfit, {:.1f} robust sigmas in its logarithm", wild[k].times,
                     wild[k].sigmas);
     out.skipped.push_back({group.id, "set aside: " + how});
     if (k < kNamed)

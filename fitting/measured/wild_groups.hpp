@@ -25,8 +25,7 @@ struct WildGroup {
 /// Gross: the logarithm of the misfit lies above the median by more than six times what it scatters upwards
 /// (its 84th percentile minus the median), and the misfit is over ten medians. Upwards, since what is not
 /// listed makes some groups err more than others, by degrees; a wild group is apart from all of them. More
-/// than an eighth of the groups are no strays: then, and of fewer than six groups, none is. Every split keeps
-/// a group.
+/// than an eighth of the groups are no strays: then, and of fewer than six groups, none is.
 std::vector<WildGroup> wild_groups(const GroupedProblem& problem,
                                    const std::vector<dynamics::Effect>& effects,
                                    const GroupedFitOptions& options);
