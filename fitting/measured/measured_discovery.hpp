@@ -85,8 +85,7 @@ MeasuredDiscovery discover_falls(const datasets::ThrowLog& log, const MeasuredOp
 
 /// The part that flights and falls share: the search, residual tests, the verdict. Groups that err as no
 /// other does (wild_groups.hpp) are set aside of the problem, and named among the skipped.
-EffectSearch run_search(GroupedProblem& problem, const MeasuredOptions& options,
-                        MeasuredDiscovery& out);
+EffectSearch run_search(GroupedProblem& problem, const MeasuredOptions& options, MeasuredDiscovery& out);
 /// An answer that depends on where one looks is not the whole truth: evidence from out.stability.
 void weigh_stability(MeasuredDiscovery& out);
 
