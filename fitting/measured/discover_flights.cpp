@@ -90,8 +90,10 @@ void weigh_scales(const datasets::ThrowLog& log, const MeasuredOptions& options,
     const double apparent = apparent_gravity(effect), sigma = effect.parameters.front().sigma;
     out.evidence.push_back(
         {effect.id,
-         fmt::format("Read as gravity, the flights say {:.4f} ± {:.4f} m/s² where {:.4f} is declared",
-                     log.gravity * (1 + apparent), log.gravity * sigma, log.gravity),
+         fmt::format(
+             "Read as gravity, the flights say {:.4f} ± {:.4f} m/s² where {:.4f} is declared; a steady "
+             "pull along the vertical of {:+.3f} m/s² would be the same",
+             log.gravity * (1 + apparent), log.gravity * sigma, log.gravity, -log.gravity * apparent),
          false});
     out.separating.push_back(
         {effect.id,
@@ -236,6 +238,7 @@ MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const Measured
   weigh_stability(out);
   weigh_scales(log, options, out);
   weigh_drag(log, out);
+  weigh_drag_form(problem, search, options, out);
   weigh_thrust(log, problem, out);
   if (problem.glitches() > 0)
     out.evidence.push_back(
