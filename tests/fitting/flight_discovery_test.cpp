@@ -213,6 +213,26 @@ TEST(FlightDiscovery, ADragThatPushesAlongADiagonalIsSaidToBeNone) {
   EXPECT_FALSE(speaks(0.1));
 }
 
+// A drag by v³ goes by the name of one by v², the nearest that is listed: its form is said not to be
+// confirmed.
+TEST(FlightDiscovery, ADragOfAnotherFormIsNotConfirmed) {
+  const auto says = [](const SpatialTruth& truth, unsigned seed, const char* form, const char* name) {
+    const auto found = found_in(spatial_flights(truth, {}, seed));
+    EXPECT_NE(named(found, name), nullptr) << seed;
+    return std::any_of(found.evidence.begin(), found.evidence.end(), [&](const Evidence& e) {
+      return e.against && e.text.starts_with("Its form is not confirmed") &&
+             e.text.find(form) != std::string::npos;
+    });
+  };
+  int wrong = 0;
+  for (unsigned seed = 71; seed < 77; ++seed) {
+    EXPECT_TRUE(says({.third_power = 0.01}, seed, "grows faster than v²", "flight.quadratic_drag")) << seed;
+    wrong += says({.drag = 0.03}, seed, "", "flight.quadratic_drag") +
+             says({.linear_drag = 0.1}, seed, "", "flight.linear_drag");
+  }
+  EXPECT_LE(wrong, 2);  // designed: 2 % of twelve; more than two have a chance of 2e-3
+}
+
 TEST(FlightDiscovery, FlightsThatShowAnEffectUnequallyDoNotHideIt) {
   SpatialTruth truth;
   truth.inertia = {1, 1.06, 1};
