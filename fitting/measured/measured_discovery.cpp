@@ -191,8 +191,8 @@ void tell_of_wild(const GroupedProblem& problem, const std::vector<WildGroup>& w
   for (std::size_t k = 0; k < wild.size(); ++k) {
     const Group& group = problem.groups()[wild[k].group];
     const std::string how =
-        fmt::format("{:.0f} times the median misfit, {:.1f} robust sigmas in its logarithm", wild[k].times,
-                    wild[k].sigmas);
+        fmt::format("{:.0f} times the median misfit that they leave, {:.1f} robust sigmas in its logarithm",
+                    wild[k].times, wild[k].sigmas);
     out.skipped.push_back({group.id, "set aside: " + how});
     if (k < kNamed)
       names += fmt::format("{}{} ({}{})", names.empty() ? "" : ", ", group.id,

@@ -141,16 +141,18 @@ std::vector<WildGroup> still_wild(const GroupedProblem& problem, const std::vect
   std::vector<Footing> parts;
   for (const Split split : {Split::train, Split::test})
     add_parts(problem, fit_own(problem, split, answer, options), {}, options, parts);
+  const auto found = [&](std::size_t group) {
+    return std::find_if(groups.begin(), groups.end(), [&](const WildGroup& g) { return g.group == group; });
+  };
+  const auto misfit = [](const Footing& part) { return part.misfit(VectorXd::Zero(part.gram.rows() - 1)); };
+  double worst = 0;
+  for (const Footing& part : parts)
+    if (found(part.group) == groups.end()) worst = std::max(worst, misfit(part));
   std::vector<WildGroup> out;
-  if (parts.empty()) return out;
-  std::vector<double> misfits;
-  for (const Footing& part : parts) misfits.push_back(part.misfit(VectorXd::Zero(part.gram.rows() - 1)));
-  gross(misfits, out);
-  for (WildGroup& wild : out) wild.group = parts[wild.group].group;
-  std::erase_if(out, [&](const WildGroup& wild) {
-    return std::none_of(groups.begin(), groups.end(),
-                        [&](const WildGroup& other) { return other.group == wild.group; });
-  });
+  for (const Footing& part : parts)
+    if (const auto wild = found(part.group);
+        wild != groups.end() && misfit(part) > options.group_limit * worst)
+      out.push_back(*wild);
   return out;
 }
 

@@ -30,7 +30,8 @@ std::vector<WildGroup> wild_groups(const GroupedProblem& problem,
                                    const std::vector<dynamics::Effect>& effects,
                                    const GroupedFitOptions& options);
 
-/// Of `groups`, those that err grossly beside `answer`, by the same rule.
+/// Of `groups`, those whose misfit beside `answer` exceeds options.group_limit times that of every other
+/// group.
 std::vector<WildGroup> still_wild(const GroupedProblem& problem, const std::vector<WildGroup>& groups,
                                   const GroupedFit& answer, const GroupedFitOptions& options);
 
