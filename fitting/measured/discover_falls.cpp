@@ -138,7 +138,7 @@ MeasuredDiscovery discover_falls(const datasets::ThrowLog& log, const MeasuredOp
   out.kind = "accelerometers in free fall";
   out.model = "free_fall";
   out.phase = "flight";
-  const FallProblem problem(log);
+  FallProblem problem(log);
   const EffectSearch search = run_search(problem, options, out);
   if (out.verdict == Verdict::not_answered) return out;
   out.before_train = named_errors(problem, search.base);
@@ -147,6 +147,7 @@ MeasuredDiscovery discover_falls(const datasets::ThrowLog& log, const MeasuredOp
   out.after_test = named_errors(problem, search.final_test);
   weigh_stability(out);
   explain(log, problem, search, out);
+  weigh_drag_form(problem, search, options, out);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return out;
 }

@@ -90,8 +90,10 @@ void weigh_scales(const datasets::ThrowLog& log, const MeasuredOptions& options,
     const double apparent = apparent_gravity(effect), sigma = effect.parameters.front().sigma;
     out.evidence.push_back(
         {effect.id,
-         fmt::format("Read as gravity, the flights say {:.4f} ± {:.4f} m/s² where {:.4f} is declared",
-                     log.gravity * (1 + apparent), log.gravity * sigma, log.gravity),
+         fmt::format(
+             "Read as gravity, the flights say {:.4f} ± {:.4f} m/s² where {:.4f} is declared; a steady "
+             "pull along the vertical of {:+.3f} m/s² would be the same",
+             log.gravity * (1 + apparent), log.gravity * sigma, log.gravity, -log.gravity * apparent),
          false});
     out.separating.push_back(
         {effect.id,
@@ -225,7 +227,7 @@ MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const Measured
   out.kind = "free flights";
   out.model = "projectile";
   out.phase = "flight";
-  const FlightProblem problem(log, threads);
+  FlightProblem problem(log, threads);
   const EffectSearch search = run_search(problem, options, out);
   if (out.verdict == Verdict::not_answered) return out;
   out.before_train = named_errors(problem, search.base, threads);
@@ -236,6 +238,7 @@ MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const Measured
   weigh_stability(out);
   weigh_scales(log, options, out);
   weigh_drag(log, out);
+  weigh_drag_form(problem, search, options, out);
   weigh_thrust(log, problem, out);
   if (problem.glitches() > 0)
     out.evidence.push_back(

@@ -24,7 +24,7 @@ GroupedFit begin(const GroupedProblem& problem, datasets::Split split) {
   fit.groups.resize(problem.groups().size());
   for (std::size_t i = 0; i < fit.groups.size(); ++i) {
     const Group& g = problem.groups()[i];
-    fit.groups[i].used = g.split == split;
+    fit.groups[i].used = g.split == split && !g.set_aside;
     fit.groups[i].own = Eigen::Map<const VectorXd>(g.start.data(), static_cast<Index>(g.start.size()));
   }
   return fit;
@@ -99,12 +99,16 @@ GroupFit fit_own_part(const GroupedProblem& problem, std::size_t group, const Gr
   std::vector<Index> rows;
   for (std::size_t i = 0; i < g.rows.size(); ++i)
     if (g.rows[i].channel == kPriorChannel || use(g.rows[i])) rows.push_back(static_cast<Index>(i));
+  VectorXd counts = VectorXd::Ones(static_cast<Index>(rows.size()));
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    if (g.rows[static_cast<std::size_t>(rows[k])].channel == kPriorChannel)
+      counts[static_cast<Index>(k)] = fit.weights.prior;
   out.solved = false;
   for (int k = 0; k < 8; ++k) {
     const auto e = problem.equations(group, names, values, out.own, true);
     if (!e.solved) return out;
-    const MatrixXd O = e.own(rows, Eigen::all);
-    const VectorXd r = e.residual(rows), step = least_squares(O, -r);
+    const MatrixXd O = counts.asDiagonal() * e.own(rows, Eigen::all);
+    const VectorXd r = counts.cwiseProduct(e.residual(rows)), step = least_squares(O, -r);
     out.own += step;
     if ((O * step).squaredNorm() < 1e-8) break;
   }

@@ -71,7 +71,8 @@ GroupedFit fit_groups(const GroupedProblem& problem, datasets::Split split,
 GroupedFit fit_own(const GroupedProblem& problem, datasets::Split split, const GroupedFit& fit,
                    const GroupedFitOptions& options = {});
 
-/// The own unknowns of one group fitted to the rows for which `use(row)`: for predicting the others.
+/// The own unknowns of one group fitted to the rows for which `use(row)`: for predicting the others. What is
+/// known beforehand counts as it does in `fit`.
 GroupFit fit_own_part(const GroupedProblem& problem, std::size_t group, const GroupedFit& fit,
                       const std::function<bool(const GroupRow&)>& use);
 

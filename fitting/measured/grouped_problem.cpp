@@ -79,6 +79,31 @@ std::vector<datasets::Split> splits_of(const datasets::ThrowLog& log) {
   return out;
 }
 
+void GroupedProblem::set_aside(const std::vector<std::size_t>& which) {
+  for (Group& group : groups_) group.set_aside = false;
+  for (const std::size_t i : held_out_instead_) groups_[i].split = datasets::Split::train;
+  held_out_instead_.clear();
+  for (const std::size_t i : which) groups_[i].set_aside = true;
+  for (const std::size_t i : which)
+    if (groups_[i].split == datasets::Split::test) hold_out_in_place_of(i);
+}
+
+void GroupedProblem::hold_out_in_place_of(std::size_t group) {
+  const Group& gone = groups_[group];
+  const auto fits = [&](const Group& g, int strictness) {
+    return g.split == datasets::Split::train && !g.set_aside &&
+           (strictness < 2 || g.condition == gone.condition) && (strictness < 1 || g.object == gone.object);
+  };
+  for (int strictness = 2; strictness >= 0; --strictness)
+    for (std::size_t k = 1; k < groups_.size(); ++k) {
+      const std::size_t i = (group + k) % groups_.size();
+      if (!fits(groups_[i], strictness)) continue;
+      groups_[i].split = datasets::Split::test;
+      held_out_instead_.push_back(i);
+      return;
+    }
+}
+
 double GroupedProblem::declared(const std::string& name) const {
   const auto it = declared_.find(name);
   return it == declared_.end() ? 0 : it->second;

@@ -32,6 +32,7 @@ struct Group {
   /// What the group is like, for asking whether an answer depends on it: one value per covariate of the
   /// problem.
   std::vector<double> covariates;
+  bool set_aside{};  ///< it errs as no other does: nothing is fitted to it, and it judges nothing
 };
 
 /// (predicted − measured)/σ of a group, by row, with derivatives where they were asked for.
@@ -53,6 +54,9 @@ class GroupedProblem {
   const std::vector<std::string>& channels() const { return channels_; }
   /// Names of what groups are described by.
   const std::vector<std::string>& covariates() const { return covariates_; }
+  /// These groups (indices), and no others, are set aside. In the place of a held-out one, the next train
+  /// group of its condition in the log (none: of its object, of the log) is held out.
+  void set_aside(const std::vector<std::size_t>& which);
   /// Groups that were left out, with the reason.
   const std::vector<std::pair<std::string, std::string>>& skipped() const { return skipped_; }
 
@@ -78,6 +82,8 @@ class GroupedProblem {
   std::vector<std::pair<std::string, std::string>> skipped_;  ///< id and reason
 
  private:
+  void hold_out_in_place_of(std::size_t group);
+  std::vector<std::size_t> held_out_instead_;
   double declared(const std::string& name) const;
   /// The same of one effect with an anisotropy, and of one object.
   bool may_be(const GroupedFit& fit, const dynamics::Effect& effect, const std::string& object) const;

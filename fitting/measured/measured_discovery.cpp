@@ -8,8 +8,12 @@
 #include "dynamics/median.hpp"
 #include "fitting/distributions.hpp"
 #include "fitting/measured/grouped_footprints.hpp"
+#include "fitting/measured/wild_groups.hpp"
 
 namespace unhand::fitting {
+
+using datasets::Split;
+
 namespace {
 
 /// χ² per sample of a channel without stray samples: up to a hundredth of them, ten times farther off than
@@ -43,7 +47,7 @@ void look_for_the_unexplained(const GroupedProblem& problem, const GroupedFit& h
     const auto channel =
         static_cast<std::size_t>(std::find(names.begin(), names.end(), m.channel) - names.begin());
     const double left = without_strays(problem, held_out, channel),
-                 most = std::max(options.unexplained, 1 + 3 * std::sqrt(2.0 / std::max(1, m.n)));
+                 most = std::max(options.unexplained, 1 + 3 * std::sqrt(2.0 / std::max(1, m.n_test)));
     if (left < most) {
       if (m.after_test >= most)
         out.evidence.push_back(
@@ -156,12 +160,60 @@ void withdraw_imitations(const GroupedProblem& problem, EffectSearch& search, Me
   take_fits(problem, search, out);
 }
 
+/// The search without wild groups. One that the answer explains as it does the others is none, and taken
+/// back.
+EffectSearch search_without_wild(GroupedProblem& problem, const EffectSearchOptions& options,
+                                 std::vector<WildGroup>& wild) {
+  const auto set_aside = [&] {
+    std::vector<std::size_t> which;
+    for (const WildGroup& one : wild) which.push_back(one.group);
+    problem.set_aside(which);
+  };
+  wild = wild_groups(problem, problem.effects(), options.fit);
+  for (;;) {
+    set_aside();
+    EffectSearch search = search_effects(problem, options);
+    if (wild.empty()) return search;
+    problem.set_aside({});
+    auto still =
+        search.solved ? still_wild(problem, wild, search.final, options.fit) : std::vector<WildGroup>{};
+    const bool settled = still.size() == wild.size();
+    wild = std::move(still);
+    set_aside();
+    if (settled) return search;
+  }
+}
+
+void tell_of_wild(const GroupedProblem& problem, const std::vector<WildGroup>& wild, MeasuredDiscovery& out) {
+  if (wild.empty()) return;
+  constexpr std::size_t kNamed = 5;
+  std::string names;
+  for (std::size_t k = 0; k < wild.size(); ++k) {
+    const Group& group = problem.groups()[wild[k].group];
+    const std::string how =
+        fmt::format("{:.0f} times the median misfit that they leave, {:.1f} robust sigmas in its logarithm",
+                    wild[k].times, wild[k].sigmas);
+    out.skipped.push_back({group.id, "set aside: " + how});
+    if (k < kNamed)
+      names += fmt::format("{}{} ({}{})", names.empty() ? "" : ", ", group.id,
+                           group.split == Split::test ? "held out; " : "", how);
+    else if (k == kNamed)
+      names += fmt::format(" and {} more", wild.size() - kNamed);
+  }
+  out.evidence.push_back({"",
+                          fmt::format("{} of {} set aside, which neither the answer nor all listed effects "
+                                      "together explain as they do the others: {}",
+                                      wild.size(), problem.groups().size(), names),
+                          false});
+}
+
 }  // namespace
 
-EffectSearch run_search(const GroupedProblem& problem, const MeasuredOptions& options,
-                        MeasuredDiscovery& out) {
-  EffectSearch search = search_effects(problem, options.search);
+EffectSearch run_search(GroupedProblem& problem, const MeasuredOptions& options, MeasuredDiscovery& out) {
+  std::vector<WildGroup> wild;
+  EffectSearch search = search_without_wild(problem, options.search, wild);
   out.skipped = problem.skipped();
+  tell_of_wild(problem, wild, out);
   if (!search.solved) {
     out.verdict = Verdict::not_answered;
     out.message = search.message;
@@ -186,6 +238,45 @@ EffectSearch run_search(const GroupedProblem& problem, const MeasuredOptions& op
                 : out.unexplained    ? Verdict::unexplained
                                      : Verdict::no_missing_effect;
   return search;
+}
+
+void weigh_drag_form(const GroupedProblem& problem, const EffectSearch& search,
+                     const MeasuredOptions& options, MeasuredDiscovery& out) {
+  const std::string quadratic = "flight.quadratic_drag", linear = "flight.linear_drag";
+  const auto has = [&](const std::string& id) {
+    return std::any_of(out.effects.begin(), out.effects.end(), [&](const auto& e) { return e.id == id; });
+  };
+  if (has(quadratic) == has(linear)) return;
+  const std::string &is = has(quadratic) ? quadratic : linear, &other = has(quadratic) ? linear : quadratic;
+  std::vector<dynamics::Effect> beside;
+  for (auto& effect : problem.effects())
+    if (effect.id == other) beside.push_back(std::move(effect));
+  if (beside.empty()) return;
+  const auto parameters = shared_parameters(beside.front(), objects_of(problem));
+  const auto f = grouped_footprints(problem, search.final, beside, options.search.fit);
+  std::vector<std::size_t> which;
+  std::vector<Eigen::Index> columns;
+  for (std::size_t n = 0; n < f.parts.size(); ++n) which.push_back(n);
+  for (Eigen::Index k = 0; k + 1 < f.total.gram.rows(); ++k) columns.push_back(k);
+  if (which.size() < columns.size() + 2) return;
+  const LinearStep step = linear_step(f.parts, which, columns);
+  const double level = options.search.family_wise_level / static_cast<double>(parameters.size());
+  for (std::size_t j = 0; j < parameters.size(); ++j) {
+    const auto k = static_cast<Eigen::Index>(f.total.fitted + j);
+    const double value = step.value[k], sigma = step.sigma[k];
+    const auto groups = static_cast<double>(which.size());
+    if (!(sigma > 0) || f_tail(value * value / (sigma * sigma), 1, groups - 1) > level) continue;
+    const char* form = is == linear ? (value > 0 ? "grows faster than v" : "grows less than v")
+                                    : (value > 0 ? "grows less than v²" : "grows faster than v²");
+    out.evidence.push_back(
+        {is,
+         fmt::format(
+             "Its form is not confirmed: beside it the fit would take {} = {:.3g} ± {:.2g} {} ({:.1f} "
+             "sigma). What slows them {}, or something else bends them alike: its size is one for "
+             "these speeds",
+             parameters[j].name, value, sigma, parameters[j].unit, std::abs(value) / sigma, form),
+         true});
+  }
 }
 
 void weigh_stability(MeasuredDiscovery& out) {

@@ -83,9 +83,14 @@ MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const Measured
 /// Accelerometers in free fall. Throws std::invalid_argument as FallProblem does.
 MeasuredDiscovery discover_falls(const datasets::ThrowLog& log, const MeasuredOptions& options);
 
-/// The part that flights and falls share: the search, residual tests, the verdict.
-EffectSearch run_search(const GroupedProblem& problem, const MeasuredOptions& options,
-                        MeasuredDiscovery& out);
+/// The part that flights and falls share: the search, residual tests, the verdict. Groups that err as no
+/// other does (wild_groups.hpp) are set aside of the problem, and named among the skipped.
+EffectSearch run_search(GroupedProblem& problem, const MeasuredOptions& options, MeasuredDiscovery& out);
+/// Whether the form of a drag is the one that it is named by: evidence against a quadratic or a linear one
+/// beside which the train groups want some of the other, by the scatter between groups, at the level of the
+/// search. Some less than none of the linear one says that it grows faster than v².
+void weigh_drag_form(const GroupedProblem& problem, const EffectSearch& search,
+                     const MeasuredOptions& options, MeasuredDiscovery& out);
 /// An answer that depends on where one looks is not the whole truth: evidence from out.stability.
 void weigh_stability(MeasuredDiscovery& out);
 

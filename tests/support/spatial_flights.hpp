@@ -18,6 +18,7 @@ struct SpatialTruth {
   Eigen::Vector3d axis_drag{0, 0, 0};                                  // 1/m, traceless
   Eigen::Vector3d inertia{1, 1, 1};                                    // of the body; declared are equal ones
   double side_force{};            ///< m/s², along body x: what no catalogue lists
+  double third_power{};           ///< s/m², drag in proportion to v³: nor this
   Eigen::Vector3d wind{0, 0, 0};  // m/s
 };
 
@@ -59,7 +60,7 @@ inline datasets::ThrowLog spatial_flights(const SpatialTruth& truth, const Spati
     Vector3d a(g * std::sin(truth.tilt_x) * std::cos(truth.tilt_y), g * std::sin(truth.tilt_y),
                -g * std::cos(truth.tilt_x) * std::cos(truth.tilt_y));
     const Vector3d body_v = s.q.conjugate() * u;
-    a -= (truth.drag * speed + truth.linear_drag) * u;
+    a -= (truth.drag * speed + truth.linear_drag + truth.third_power * speed * speed) * u;
     a += truth.lift * (s.q * s.w).cross(u);
     a -= speed * (s.q * truth.axis_drag.cwiseProduct(body_v));
     const double fourth = body_v.array().pow(4).sum() / std::pow(speed, 4);
