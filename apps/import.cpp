@@ -6,6 +6,7 @@
 #include "apps/command.hpp"
 #include "apps/import_lab.hpp"
 #include "apps/output.hpp"
+#include "apps/tell.hpp"
 #include "datasets/import_cube_tosses.hpp"
 #include "datasets/import_planar_pushes.hpp"
 
@@ -65,6 +66,7 @@ datasets::PlanarPushOptions pushes_of(const ImportOptions& options) {
 struct Imported {
   std::string text;
   Json details;
+  std::vector<std::string> notes;
 };
 
 Imported import_cubes(const ImportOptions& options, Outputs& outputs) {
@@ -89,7 +91,7 @@ Imported import_cubes(const ImportOptions& options, Outputs& outputs) {
 
 Imported import_lab_files(const ImportOptions& options, Outputs& outputs) {
   LabImport imported = import_lab(options.format, options.inputs, options.out, options.lab, outputs);
-  return {std::move(imported.text), std::move(imported.details)};
+  return {std::move(imported.text), std::move(imported.details), std::move(imported.notes)};
 }
 
 Imported import_pushes(const ImportOptions& options, Outputs& outputs) {
@@ -178,11 +180,13 @@ void import(ImportOptions& options) {
       report["format"] = options.format;
       report["inputs"] = options.inputs;
       report["log"] = options.out;
+      report["notes"] = imported.notes;
       report.update(imported.details);
       outputs.json(options.json, report);
     }
     outputs.commit();
     fmt::print("{}", imported.text);
+    for (const std::string& note : imported.notes) tell("unhand: {}\n", note);
     return;
   }
   throw WrongUsage(fmt::format("format '{}' is not known; there are:{}", options.format, known_formats()));

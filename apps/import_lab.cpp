@@ -27,6 +27,7 @@ struct Reading {
   std::vector<Throw> throws;
   std::string text;
   Json details;
+  std::vector<std::string> notes;
 };
 
 bool given(const LabOptions& options, const char* name) { return options.parser->given(name); }
@@ -176,6 +177,45 @@ std::array<double, 3> triple(const std::vector<double>& values) {
   return values.empty() ? std::array<double, 3>{} : std::array<double, 3>{values[0], values[1], values[2]};
 }
 
+/// [deg], within ±180.
+double between(double to, double from) { return std::remainder(to - from, 360.0); }
+
+/// A planar log of a throw that goes elsewhere than --heading says is that throw's shadow: refused where
+/// the two are far apart, said where they are somewhat. Throws ImportError.
+void check_heading(const std::string& file, const datasets::MotiveTake& take, double heading,
+                   std::vector<std::string>& notes) {
+  constexpr double kRun = 0.1, kBeside = 0.05;               // m
+  constexpr double kNoted = 3, kRefused = 15, kTurned = 15;  // deg
+  if (take.run >= kRun) {
+    const double seen = take.run_heading * 180 / std::numbers::pi, off = between(seen, heading);
+    const double angle = std::min(std::abs(off), 180 - std::abs(off));  // to the plane, forwards or back
+    const std::string numbers =
+        fmt::format("the body runs {:.2f} m along a heading of {:.1f} deg, {:.1f} deg from --heading {:g}",
+                    take.run, seen, std::abs(off), heading);
+    const std::string advice = fmt::format("--heading {:.1f}", seen);
+    if (angle > kRefused)
+      throw datasets::ImportError(
+          file, fmt::format("rigid body {}, columns Position", take.body),
+          fmt::format("{}: up to {:g} deg are accepted, since a planar log keeps x and z alone: {}?", numbers,
+                      kRefused, advice));
+    if (angle > kNoted)
+      notes.push_back(fmt::format("{}: {}; x is too short by {:.1f} %: {}?", file, numbers,
+                                  100 * (1 - std::cos(angle * std::numbers::pi / 180)), advice));
+    else if (std::abs(off) > 90)
+      notes.push_back(fmt::format("{}: {}: it goes backwards: {}?", file, numbers, advice));
+    if (take.beside_run > kBeside)
+      notes.push_back(
+          fmt::format("{}: the track is up to {:.2f} m beside any vertical plane: not a planar throw?", file,
+                      take.beside_run));
+  }
+  const double angle = take.out_of_plane_angle * 180 / std::numbers::pi;
+  if (angle > kTurned)
+    notes.push_back(fmt::format(
+        "{}: the body's x axis leaves the throwing plane by up to {:.0f} deg, and theta is the angle of "
+        "its shadow: was the body created with its X along the object's x, in that plane?",
+        file, angle));
+}
+
 Reading read_motive(const std::string& file, const ThrowLog& log, const LabOptions& options) {
   datasets::MotiveOptions motive;
   motive.body = options.body;
@@ -207,6 +247,9 @@ Reading read_motive(const std::string& file, const ThrowLog& log, const LabOptio
     out.text += fmt::format(", out of the plane by {:.3g} m and {:.3g} deg", take.out_of_plane, angle);
     out.details["out_of_plane_m"] = take.out_of_plane;
     out.details["out_of_plane_deg"] = angle;
+    out.details["run_m"] = take.run;
+    out.details["run_heading_deg"] = take.run_heading * 180 / std::numbers::pi;
+    check_heading(file, take, options.heading, out.notes);
   }
   if (options.landing) {
     one.landing = datasets::landing_of(take.mocap, log.dimension, log.landing_height);
@@ -263,6 +306,29 @@ std::string source_of(const std::string& format, std::size_t files) {
       format == "phyphox" ? "; sigma estimated by the importer from the scatter in the falls" : "");
 }
 
+/// What to say of a new log whose throws are all of one split.
+std::string one_sided(const std::string& out, const ThrowLog& log, std::ptrdiff_t train,
+                      const LabOptions& options) {
+  if (train == 0)
+    return fmt::format(
+        "{}: all throws are held out: fit and discover need train throws (--test-every, --test-conditions)",
+        out);
+  std::map<std::string, int> conditions;
+  int most = 0;
+  for (const Throw& one : log.throws) most = std::max(most, ++conditions[one.condition]);
+  const std::string why =
+      options.test_every == 0
+          ? std::string()
+          : fmt::format(
+                ": --test-every {} holds out every {}th throw of a condition, and no condition has "
+                "more than {} throw{}",
+                options.test_every, options.test_every, most, most == 1 ? "" : "s");
+  return fmt::format("{}: no throw is held out{}; errors on unseen throws, and discover, need some: {}", out,
+                     why,
+                     log.throws.size() > 1 ? fmt::format("--test-every {}, or more throws", std::max(2, most))
+                                           : std::string("more throws"));
+}
+
 }  // namespace
 
 void refuse_lab_options(const std::string& format, const LabOptions& options) {
@@ -306,6 +372,7 @@ LabImport import_lab(const std::string& format, const std::vector<std::string>& 
     }
     imported.text +=
         fmt::format("  {}: {}{}\n", file, adding ? fmt::format("throw {}, ", id) : "", reading.text);
+    imported.notes.insert(imported.notes.end(), reading.notes.begin(), reading.notes.end());
     reading.details["file"] = file;
     imported.details["files"].push_back(reading.details);
   }
@@ -338,6 +405,7 @@ LabImport import_lab(const std::string& format, const std::vector<std::string>& 
   imported.details["throws"] = log.throws.size();
   imported.details["train"] = train;
   imported.details["test"] = test;
+  if (!adding && (test == 0 || train == 0)) imported.notes.push_back(one_sided(out, log, train, options));
   return imported;
 }
 

@@ -91,6 +91,42 @@ TEST_F(Cli, ImportsTheFilesOfALab) {
   expect_refusal("import " + motive + "--mass 1 --out a.h5 --json a.json", 3, "takes/slow_02.csv: line 246");
 }
 
+// A planar log of a throw that was seen from the side is its shadow.
+TEST_F(Cli, AHeadingThatTheTrackContradictsIsRefused) {
+  write_lab_files(folder);
+  const std::string motive =
+      "import motive-csv takes/slow_01.csv takes/slow_02.csv --dimension 2 --mass 1 --out a.h5 --test-every "
+      "2 ";
+  expect_refusal(
+      motive + "--heading 70", 3,
+      "takes/slow_01.csv: rigid body bar, columns Position: the body runs 1.49 m along a heading of 0.0 "
+      "deg, 70.0 deg from --heading 70: up to 15 deg are accepted");
+  expect_refusal(motive + "--heading 70", 3, "--heading 0.0?");
+  const auto notes = [&](const std::string& heading) {
+    const Answer answer = run(motive + "--json a.json --heading " + heading);
+    EXPECT_EQ(answer.code, 0) << answer.err;
+    EXPECT_EQ(read_json(folder / "a.json")["notes"].empty(), answer.err.empty());
+    return answer.err;
+  };
+  EXPECT_EQ(notes("0"), "");
+  EXPECT_EQ(notes("2"), "");
+  EXPECT_THAT(notes("10"), HasSubstr("10.0 deg from --heading 10; x is too short by 1.5 %: --heading 0.0?"));
+  EXPECT_THAT(notes("180"), HasSubstr("it goes backwards"));
+}
+
+// Fewer throws than are held out of: discover would have nothing to judge by.
+TEST_F(Cli, SaysThatNothingIsHeldOut) {
+  write_lab_files(folder);
+  const std::string motive = "import motive-csv takes/slow_01.csv takes/slow_02.csv --mass 1 --out a.h5 ";
+  EXPECT_THAT(
+      run(motive).err,
+      HasSubstr("no throw is held out: --test-every 5 holds out every 5th throw of a condition, and no "
+                "condition has more than 2 throws"));
+  EXPECT_THAT(run(motive).err, HasSubstr("need some: --test-every 2, or more throws"));
+  EXPECT_THAT(run(motive + "--test-conditions slow").err, HasSubstr("all throws are held out"));
+  EXPECT_EQ(run(motive + "--test-every 2").err, "");
+}
+
 TEST_F(Cli, ImportsTossesOfAnotherCube) {
   std::ofstream tosses(folder / "t.csv");
   tosses << "toss,k,t_s,x_m,y_m,z_m,qw,qx,qy,qz,vx,vy,vz,wx_body,wy_body,wz_body,before_first_contact\n";
@@ -145,6 +181,9 @@ TEST_F(Cli, ImportsPhonesAsFreeFlights) {
                  "still.csv: line 1: holds no free fall");
   expect_refusal("import phyphox fall_1.csv --mass 0.2 --out a.h5 --min-fall 0.8", 3,
                  "lasts 0.600 s, less than 0.8 s");
+  EXPECT_THAT(answer.err, HasSubstr("no throw is held out"));
+  expect_refusal("discover falls.h5 --model free_fall", 1,
+                 "no throw has the split 'test', of 1: effects are found on train");
 }
 
 }  // namespace
