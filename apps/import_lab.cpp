@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "apps/command.hpp"
+#include "apps/throws.hpp"
 #include "datasets/assemble.hpp"
 #include "datasets/import_columns.hpp"
 #include "datasets/import_motive.hpp"
@@ -141,7 +142,7 @@ ThrowLog new_log(const std::string& format, const LabOptions& options, const std
   if (options.sku.empty()) {
     object.mass = options.mass;
   } else {
-    const datasets::Sku sku = datasets::read_sku(options.sku);
+    const datasets::Sku sku = read_possible_sku(options.sku);
     object = datasets::to_object(sku, log.dimension);
     name = sku.name;
   }

@@ -10,6 +10,7 @@
 #include "apps/tell.hpp"
 #include "datasets/csv.hpp"
 #include "datasets/summary.hpp"
+#include "experiment/declared_check.hpp"
 #include "experiment/prepared_throw.hpp"
 #include "experiment/unit_check.hpp"
 
@@ -65,6 +66,13 @@ datasets::SlipLog read_slips(const std::string& file) {
     if (const double share = datasets::dissipation(surface); share < 0)
       throw datasets::LogError(file, "/surfaces/" + name, sign_doubt(share));
   return log;
+}
+
+datasets::Sku read_possible_sku(const std::string& file) {
+  auto sku = datasets::read_sku(file);
+  const std::string why = experiment::impossible_inertia(datasets::to_object(sku));
+  if (!why.empty()) throw datasets::TomlError(file, 0, 0, "inertia_kg_m2", why);
+  return sku;
 }
 
 std::string sign_doubt(double dissipation) {

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "datasets/sku.hpp"
 #include "datasets/slip_log.hpp"
 #include "datasets/throw_log.hpp"
 
@@ -23,6 +24,10 @@ void require_flights(const datasets::ThrowLog& log, const std::string& file);
 /// Slips whose friction takes work from the object: throws datasets::LogError for a surface of which the
 /// samples say the opposite (datasets::dissipation < 0), as where a wrench or a twist has the other sign.
 datasets::SlipLog read_slips(const std::string& file);
+
+/// An object that a body can be: throws datasets::TomlError where none of its mass and dims has its inertia
+/// (experiment::impossible_inertia), and as datasets::read_sku does.
+datasets::Sku read_possible_sku(const std::string& file);
 
 /// In words, what is wrong with a surface of that (negative) datasets::dissipation.
 std::string sign_doubt(double dissipation);
