@@ -9,8 +9,8 @@
 
 namespace unhand::apps {
 
-/// Leaves out, and says so on stderr, throws from a hand that do not show the grasp
-/// (experiment::shows_grasp), as long as others do. Throws datasets::LogError where the file is no throw log
+/// Leaves out, and says so on stderr, throws without a hand, as long as others have one, and throws from a
+/// hand that do not show the grasp (experiment::shows_grasp), as long as others do. Throws datasets::LogError where the file is no throw log
 /// or a column is in another unit (experiment::require_units), Unanswered where it holds no throws.
 datasets::ThrowLog read_throws(const std::string& file);
 
