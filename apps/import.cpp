@@ -140,6 +140,10 @@ constexpr Format formats[] = {
      "unhand import ft-csv ft/*.csv --into log.h5 --columns time=t,fx=-Fx,fz=-Fz,tau=-Ty,normal=Fy\n"
      "      --units time=s,fx=N,fz=N,tau='N mm',normal=N --sigma fx=0.02,fz=0.02,tau=0.2,normal=0.05",
      &import_lab_files},
+    {"mocap-csv", "a tracked object in the throwing plane, any CSV with a map of its columns",
+     "unhand import mocap-csv mocap/*.csv --into log.h5 --landing --columns time=t,x=X,z=Z,theta=pitch\n"
+     "      --units time=s,x=mm,z=mm,theta=deg --sigma x=0.2,z=0.2,theta=0.2",
+     &import_lab_files},
     {"motive-csv", "rigid bodies exported by OptiTrack Motive, one take a throw",
      "unhand import motive-csv takes/*.csv --body bar --heading 90 --landing --into log.h5\n"
      "  unhand import motive-csv ball_01.csv --mass 0.057 --free-flight 1.20,1.85 --out flights.h5",

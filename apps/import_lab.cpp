@@ -87,22 +87,23 @@ struct Rule {
   std::vector<std::string_view> formats;
 };
 const std::vector<Rule>& rules() {
-  static const std::vector<Rule> list = {{"--columns", {"hand-csv", "ft-csv"}},
-                                         {"--units", {"hand-csv", "ft-csv"}},
-                                         {"--sigma", {"hand-csv", "ft-csv", "motive-csv"}},
-                                         {"--time-offset", {"hand-csv", "ft-csv", "motive-csv"}},
-                                         {"--into", {"hand-csv", "ft-csv", "motive-csv"}},
-                                         {"--replace", {"hand-csv", "ft-csv", "motive-csv"}},
-                                         {"--throw", {"hand-csv", "ft-csv", "motive-csv", "phyphox"}},
-                                         {"--body", {"motive-csv"}},
-                                         {"--dimension", {"motive-csv"}},
-                                         {"--heading", {"motive-csv"}},
-                                         {"--origin", {"motive-csv"}},
-                                         {"--com", {"motive-csv"}},
-                                         {"--landing", {"motive-csv"}},
-                                         {"--free-flight", {"motive-csv"}},
-                                         {"--min-fall", {"phyphox"}},
-                                         {"--fall-threshold", {"phyphox"}}};
+  static const std::vector<Rule> list = {
+      {"--columns", {"hand-csv", "ft-csv", "mocap-csv"}},
+      {"--units", {"hand-csv", "ft-csv", "mocap-csv"}},
+      {"--sigma", {"hand-csv", "ft-csv", "mocap-csv", "motive-csv"}},
+      {"--time-offset", {"hand-csv", "ft-csv", "mocap-csv", "motive-csv"}},
+      {"--into", {"hand-csv", "ft-csv", "mocap-csv", "motive-csv"}},
+      {"--replace", {"hand-csv", "ft-csv", "mocap-csv", "motive-csv"}},
+      {"--throw", {"hand-csv", "ft-csv", "mocap-csv", "motive-csv", "phyphox"}},
+      {"--body", {"motive-csv"}},
+      {"--dimension", {"motive-csv"}},
+      {"--heading", {"motive-csv"}},
+      {"--origin", {"motive-csv"}},
+      {"--com", {"motive-csv"}},
+      {"--landing", {"mocap-csv", "motive-csv"}},
+      {"--free-flight", {"mocap-csv", "motive-csv"}},
+      {"--min-fall", {"phyphox"}},
+      {"--fall-threshold", {"phyphox"}}};
   return list;
 }
 
@@ -156,21 +157,44 @@ ThrowLog new_log(const std::string& format, const LabOptions& options, const std
   return log;
 }
 
-Reading read_columns(const std::string& format, const std::string& file, const LabOptions& options) {
+/// What the options ask for beside the track itself: the landing, the free flight.
+void take_from_track(const ThrowLog& log, const LabOptions& options, Throw& one, Reading& out) {
+  if (options.landing) {
+    one.landing = datasets::landing_of(*one.mocap, log.dimension, log.landing_height);
+    out.text += one.landing ? fmt::format(", lands at {:.4f} s", one.landing->time(0))
+                            : fmt::format(", no landing: the track does not pass {} m", log.landing_height);
+    out.details["landing"] = one.landing.has_value();
+  }
+  if (!options.free_flight.empty()) one.free_flight = {options.free_flight[0], options.free_flight[1]};
+}
+
+Reading read_columns(const std::string& format, const std::string& file, const ThrowLog& log,
+                     const LabOptions& options) {
   datasets::ColumnMap map{parse_pairs("--columns", options.columns), parse_pairs("--units", options.units),
                           parse_numbers("--sigma", options.sigma), options.time_offset};
-  const bool hand = format == "hand-csv";
-  const std::string fault = fault_of(map, hand ? datasets::hand_channels() : datasets::ft_channels());
+  const auto channels = format == "hand-csv" ? datasets::hand_channels()
+                        : format == "ft-csv" ? datasets::ft_channels()
+                                             : datasets::mocap_channels();
+  const std::string fault = fault_of(map, channels);
   if (!fault.empty()) throw WrongUsage("--" + fault);
   Reading out;
   Throw& one = out.throws.emplace_back();
-  if (hand)
+  if (format == "hand-csv")
     one.hand = datasets::read_hand_csv(file, map);
-  else
+  else if (format == "ft-csv")
     one.ft = datasets::read_ft_csv(file, map);
-  const datasets::Series& time = hand ? one.hand->time : one.ft->time;
+  else
+    one.mocap = datasets::read_mocap_csv(file, map);
+  const datasets::Series& time = one.hand ? one.hand->time : one.ft ? one.ft->time : one.mocap->time;
   out.text = fmt::format("{} samples, {:.6g} to {:.6g} s", time.rows, time.data.front(), time.data.back());
   out.details = {{"samples", time.rows}};
+  if (!one.mocap) return out;
+  if (log.dimension != 2)
+    throw datasets::LogError(options.into, "/@dimension", "is 3, and mocap-csv is for planar logs (2)");
+  const auto lost = std::count(one.mocap->valid.begin(), one.mocap->valid.end(), 0);
+  out.text += fmt::format(", {} lost", lost);
+  out.details["lost"] = lost;
+  take_from_track(log, options, one, out);
   return out;
 }
 
@@ -252,14 +276,8 @@ Reading read_motive(const std::string& file, const ThrowLog& log, const LabOptio
     out.details["run_heading_deg"] = take.run_heading * 180 / std::numbers::pi;
     check_heading(file, take, options.heading, out.notes);
   }
-  if (options.landing) {
-    one.landing = datasets::landing_of(take.mocap, log.dimension, log.landing_height);
-    out.text += one.landing ? fmt::format(", lands at {:.4f} s", one.landing->time(0))
-                            : fmt::format(", no landing: the track does not pass {} m", log.landing_height);
-    out.details["landing"] = one.landing.has_value();
-  }
   one.mocap = std::move(take.mocap);
-  if (!options.free_flight.empty()) one.free_flight = {options.free_flight[0], options.free_flight[1]};
+  take_from_track(log, options, one, out);
   return out;
 }
 
@@ -298,7 +316,7 @@ Reading read(const std::string& format, const std::string& file, const ThrowLog&
              const LabOptions& options) {
   if (format == "motive-csv") return read_motive(file, log, options);
   if (format == "phyphox") return read_phone(file, options);
-  return read_columns(format, file, options);
+  return read_columns(format, file, log, options);
 }
 
 std::string source_of(const std::string& format, std::size_t files) {
