@@ -51,9 +51,10 @@ template <class S>
 ThrowPrediction<S> predict_channels(const PreparedThrow& prepared, const Observations& observed,
                                     const ThrowModel& model, const dynamics::Values<S>& values);
 
-/// Simulates the release alone, recorded, and hands it to `use`; neither of the two is there afterwards.
+/// What is done with a release that is there only meanwhile.
 using UseOfRelease =
     std::function<void(const release::ReleaseProblem<double>&, const release::ReleaseResult<double>&)>;
+/// Simulates the release alone, recorded, and hands it to `use`; neither of the two is there afterwards.
 void visit_release(const PreparedThrow& prepared, const ThrowModel& model,
                    const dynamics::Values<double>& values, const UseOfRelease& use);
 
