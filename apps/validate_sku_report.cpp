@@ -70,7 +70,8 @@ Table spread_table(const SkuValidation& answer) {
 
 std::string measured_text(const SkuValidation& answer) {
   const auto& m = *answer.measured;
-  const bool contradicted = answer.verdict == fitting::SkuVerdict::contradicted;
+  const bool contradicted =
+      answer.verdict == fitting::SkuVerdict::contradicted || m.rms_z > fitting::kMostSurprise;
   return fmt::format(
       "{}: of {} measured throws of this object {:.1f} % land within the tolerance of their prediction "
       "(error "
