@@ -82,7 +82,7 @@ void report_failures(const experiment::Comparison& comparison) {
     any = any || model.failed < static_cast<int>(model.throws.size());
     std::map<std::string, int> reasons;
     for (const auto& one : model.throws)
-      if (!one.prediction.landed()) ++reasons[outcome_of(one.prediction)];
+      if (!one.prediction.landed()) ++reasons[outcome_in_words(one.prediction)];
     for (const auto& [reason, n] : reasons)
       tell("unhand: {}: {} of {} throws: {}\n", model.model, n, model.throws.size(), reason);
   }
@@ -211,6 +211,11 @@ std::string outcome_of(const experiment::Prediction& prediction) {
   if (prediction.landed()) return "landed";
   return prediction.release == release::ReleaseOutcome::detached ? to_string(prediction.flight)
                                                                  : to_string(prediction.release);
+}
+
+std::string outcome_in_words(const experiment::Prediction& prediction) {
+  return prediction.release == release::ReleaseOutcome::detached ? in_words(prediction.flight)
+                                                                 : in_words(prediction.release);
 }
 
 Command compare_command(Parser& root) {

@@ -56,5 +56,7 @@ void write_release_report(const experiment::Comparison& comparison, const datase
 
 /// "landed", or what ended the prediction.
 std::string outcome_of(const experiment::Prediction& prediction);
+/// The same as a clause, for people.
+std::string outcome_in_words(const experiment::Prediction& prediction);
 
 }  // namespace unhand::apps

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "apps/command.hpp"
+#include "apps/fit.hpp"
 #include "fitting/fit.hpp"
 
 namespace unhand::apps {
@@ -39,7 +40,7 @@ const ReleaseRun::Fitted& ReleaseRun::fitted(const std::string& model) {
   fit_options.threads = request_.threads;
   const auto fit = fitting::fit(problem, fit_options);
   if (fit.outcome == fitting::FitOutcome::no_start || fit.outcome == fitting::FitOutcome::not_solved)
-    throw Unanswered(fmt::format("{}: {}: {}: {}", request_.log, model, to_string(fit.outcome), fit.message));
+    throw Unanswered(fmt::format("{}: {}: {}", request_.log, model, why_unfitted(fit)));
   const auto throws = fitting::predict_throws(problem, fit, {false, request_.threads});
   Fitted out{fitting::comparison_of(problem, fit, throws), {}};
   out.card = card_of(problem, fit, out.comparison, request_.log, log_);

@@ -86,7 +86,7 @@ ReleaseTrace FigureSource::trace(const std::string& model) {
   const auto take = [&](const release::ReleaseProblem<double>& problem,
                         const release::ReleaseResult<double>& result, double mu, double length, int pads) {
     if (result.outcome != release::ReleaseOutcome::detached)
-      throw Unanswered(fmt::format("{}, throw {}: {}", model, prepared.id, to_string(result.outcome)));
+      throw Unanswered(fmt::format("{}, throw {}: {}", model, prepared.id, in_words(result.outcome)));
     out = trace_of(problem, result, contact::Patch<double>::of_length(mu, length, pads));
     out.thrown = prepared.id;
   };

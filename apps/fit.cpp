@@ -108,7 +108,7 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
   progress.step();
   const auto fit = fitting::fit(problem, options);
   if (fit.outcome == fitting::FitOutcome::no_start || fit.outcome == fitting::FitOutcome::not_solved)
-    throw Unanswered(fmt::format("{}: {}: {}", request.log, to_string(fit.outcome), fit.message));
+    throw Unanswered(fmt::format("{}: {}", request.log, why_unfitted(fit)));
   progress.step();
   FitAnswer answer{problem, fit, {}, {}, {}, {}, fitting::gradient_cost(problem, fit), 1};
   answer.threads = request.threads > 0 ? request.threads
@@ -177,7 +177,9 @@ void fit(const FitRequest& request, const Parser& parser) {
   const auto log = read_throws(request.log);
   if (std::none_of(log.throws.begin(), log.throws.end(),
                    [](const auto& one) { return one.split == datasets::Split::train; }))
-    throw Unanswered(fmt::format("{}: holds no train throws to fit to", request.log));
+    throw Unanswered(
+        fmt::format("{}: holds no train throws to fit to: none of its {} throws has the split 'train'",
+                    request.log, log.throws.size()));
   fit_throws(request, log);
 }
 

@@ -41,6 +41,9 @@ struct FitAnswer {
   }
 };
 
+/// Why a fit is no answer, in words.
+std::string why_unfitted(const fitting::FitResult& fit);
+
 /// The answer in words and tables; `markdown` for the report, otherwise aligned with spaces.
 std::string fit_text(const FitAnswer& answer, const FitRequest& request, bool markdown);
 Json fit_json(const FitAnswer& answer, const FitRequest& request);

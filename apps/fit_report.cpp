@@ -97,6 +97,11 @@ Table error_table(const FitAnswer& a) {
 
 }  // namespace
 
+std::string why_unfitted(const fitting::FitResult& fit) {
+  return fit.outcome == fitting::FitOutcome::not_solved ? "the fit found no answer: " + fit.message
+                                                        : fit.message;
+}
+
 std::string fit_text(const FitAnswer& a, const FitRequest& request, bool markdown) {
   const auto table = [&](const Table& t) { return markdown ? t.markdown() : t.text(); };
   const auto& fit = a.fit;
@@ -107,10 +112,11 @@ std::string fit_text(const FitAnswer& a, const FitRequest& request, bool markdow
   }
   std::string effects;
   for (const auto& id : request.effects) effects += (effects.empty() ? " with " : ", ") + id;
-  std::string out =
-      fmt::format("{}{}: {}{} fitted to {} of {} train throws, {} samples: {}, {} iterations\n\n",
-                  markdown ? "# Fit\n\n" : "", request.log, request.model, effects, used, n_train,
-                  fit.samples, to_string(fit.outcome), fit.iterations);
+  std::string out = fmt::format(
+      "{}{}: {}{} fitted to {} of {} train throws, {} samples: {}, {} iterations\n\n",
+      markdown ? "# Fit\n\n" : "", request.log, request.model, effects, used, n_train, fit.samples,
+      fit.outcome == fitting::FitOutcome::converged ? "converged" : "stopped before it converged",
+      fit.iterations);
   out += table(parameter_table(fit)) + "\n";
   for (const auto& open : fit.open)
     out += fmt::format("not determined by this log: {} ({}).\n  It would take {}.\n", open.meaning,

@@ -6,6 +6,7 @@
 #include "apps/command.hpp"
 #include "apps/import_lab.hpp"
 #include "apps/output.hpp"
+#include "apps/tell.hpp"
 #include "datasets/import_cube_tosses.hpp"
 #include "datasets/import_planar_pushes.hpp"
 
@@ -65,6 +66,7 @@ datasets::PlanarPushOptions pushes_of(const ImportOptions& options) {
 struct Imported {
   std::string text;
   Json details;
+  std::vector<std::string> notes;
 };
 
 Imported import_cubes(const ImportOptions& options, Outputs& outputs) {
@@ -89,7 +91,7 @@ Imported import_cubes(const ImportOptions& options, Outputs& outputs) {
 
 Imported import_lab_files(const ImportOptions& options, Outputs& outputs) {
   LabImport imported = import_lab(options.format, options.inputs, options.out, options.lab, outputs);
-  return {std::move(imported.text), std::move(imported.details)};
+  return {std::move(imported.text), std::move(imported.details), std::move(imported.notes)};
 }
 
 Imported import_pushes(const ImportOptions& options, Outputs& outputs) {
@@ -138,6 +140,10 @@ constexpr Format formats[] = {
      "unhand import ft-csv ft/*.csv --into log.h5 --columns time=t,fx=-Fx,fz=-Fz,tau=-Ty,normal=Fy\n"
      "      --units time=s,fx=N,fz=N,tau='N mm',normal=N --sigma fx=0.02,fz=0.02,tau=0.2,normal=0.05",
      &import_lab_files},
+    {"mocap-csv", "a tracked object in the throwing plane, any CSV with a map of its columns",
+     "unhand import mocap-csv mocap/*.csv --into log.h5 --landing --columns time=t,x=X,z=Z,theta=pitch\n"
+     "      --units time=s,x=mm,z=mm,theta=deg --sigma x=0.2,z=0.2,theta=0.2",
+     &import_lab_files},
     {"motive-csv", "rigid bodies exported by OptiTrack Motive, one take a throw",
      "unhand import motive-csv takes/*.csv --body bar --heading 90 --landing --into log.h5\n"
      "  unhand import motive-csv ball_01.csv --mass 0.057 --free-flight 1.20,1.85 --out flights.h5",
@@ -178,11 +184,13 @@ void import(ImportOptions& options) {
       report["format"] = options.format;
       report["inputs"] = options.inputs;
       report["log"] = options.out;
+      report["notes"] = imported.notes;
       report.update(imported.details);
       outputs.json(options.json, report);
     }
     outputs.commit();
     fmt::print("{}", imported.text);
+    for (const std::string& note : imported.notes) tell("unhand: {}\n", note);
     return;
   }
   throw WrongUsage(fmt::format("format '{}' is not known; there are:{}", options.format, known_formats()));

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "apps/command.hpp"
+#include "apps/throws.hpp"
 #include "datasets/assemble.hpp"
 #include "datasets/import_columns.hpp"
 #include "datasets/import_motive.hpp"
@@ -27,6 +28,7 @@ struct Reading {
   std::vector<Throw> throws;
   std::string text;
   Json details;
+  std::vector<std::string> notes;
 };
 
 bool given(const LabOptions& options, const char* name) { return options.parser->given(name); }
@@ -85,22 +87,23 @@ struct Rule {
   std::vector<std::string_view> formats;
 };
 const std::vector<Rule>& rules() {
-  static const std::vector<Rule> list = {{"--columns", {"hand-csv", "ft-csv"}},
-                                         {"--units", {"hand-csv", "ft-csv"}},
-                                         {"--sigma", {"hand-csv", "ft-csv", "motive-csv"}},
-                                         {"--time-offset", {"hand-csv", "ft-csv", "motive-csv"}},
-                                         {"--into", {"hand-csv", "ft-csv", "motive-csv"}},
-                                         {"--replace", {"hand-csv", "ft-csv", "motive-csv"}},
-                                         {"--throw", {"hand-csv", "ft-csv", "motive-csv", "phyphox"}},
-                                         {"--body", {"motive-csv"}},
-                                         {"--dimension", {"motive-csv"}},
-                                         {"--heading", {"motive-csv"}},
-                                         {"--origin", {"motive-csv"}},
-                                         {"--com", {"motive-csv"}},
-                                         {"--landing", {"motive-csv"}},
-                                         {"--free-flight", {"motive-csv"}},
-                                         {"--min-fall", {"phyphox"}},
-                                         {"--fall-threshold", {"phyphox"}}};
+  static const std::vector<Rule> list = {
+      {"--columns", {"hand-csv", "ft-csv", "mocap-csv"}},
+      {"--units", {"hand-csv", "ft-csv", "mocap-csv"}},
+      {"--sigma", {"hand-csv", "ft-csv", "mocap-csv", "motive-csv"}},
+      {"--time-offset", {"hand-csv", "ft-csv", "mocap-csv", "motive-csv"}},
+      {"--into", {"hand-csv", "ft-csv", "mocap-csv", "motive-csv"}},
+      {"--replace", {"hand-csv", "ft-csv", "mocap-csv", "motive-csv"}},
+      {"--throw", {"hand-csv", "ft-csv", "mocap-csv", "motive-csv", "phyphox"}},
+      {"--body", {"motive-csv"}},
+      {"--dimension", {"motive-csv"}},
+      {"--heading", {"motive-csv"}},
+      {"--origin", {"motive-csv"}},
+      {"--com", {"motive-csv"}},
+      {"--landing", {"mocap-csv", "motive-csv"}},
+      {"--free-flight", {"mocap-csv", "motive-csv"}},
+      {"--min-fall", {"phyphox"}},
+      {"--fall-threshold", {"phyphox"}}};
   return list;
 }
 
@@ -140,7 +143,7 @@ ThrowLog new_log(const std::string& format, const LabOptions& options, const std
   if (options.sku.empty()) {
     object.mass = options.mass;
   } else {
-    const datasets::Sku sku = datasets::read_sku(options.sku);
+    const datasets::Sku sku = read_possible_sku(options.sku);
     object = datasets::to_object(sku, log.dimension);
     name = sku.name;
   }
@@ -154,26 +157,88 @@ ThrowLog new_log(const std::string& format, const LabOptions& options, const std
   return log;
 }
 
-Reading read_columns(const std::string& format, const std::string& file, const LabOptions& options) {
+/// What the options ask for beside the track itself: the landing, the free flight.
+void take_from_track(const ThrowLog& log, const LabOptions& options, Throw& one, Reading& out) {
+  if (options.landing) {
+    one.landing = datasets::landing_of(*one.mocap, log.dimension, log.landing_height);
+    out.text += one.landing ? fmt::format(", lands at {:.4f} s", one.landing->time(0))
+                            : fmt::format(", no landing: the track does not pass {} m", log.landing_height);
+    out.details["landing"] = one.landing.has_value();
+  }
+  if (!options.free_flight.empty()) one.free_flight = {options.free_flight[0], options.free_flight[1]};
+}
+
+Reading read_columns(const std::string& format, const std::string& file, const ThrowLog& log,
+                     const LabOptions& options) {
   datasets::ColumnMap map{parse_pairs("--columns", options.columns), parse_pairs("--units", options.units),
                           parse_numbers("--sigma", options.sigma), options.time_offset};
-  const bool hand = format == "hand-csv";
-  const std::string fault = fault_of(map, hand ? datasets::hand_channels() : datasets::ft_channels());
+  const auto channels = format == "hand-csv" ? datasets::hand_channels()
+                        : format == "ft-csv" ? datasets::ft_channels()
+                                             : datasets::mocap_channels();
+  const std::string fault = fault_of(map, channels);
   if (!fault.empty()) throw WrongUsage("--" + fault);
   Reading out;
   Throw& one = out.throws.emplace_back();
-  if (hand)
+  if (format == "hand-csv")
     one.hand = datasets::read_hand_csv(file, map);
-  else
+  else if (format == "ft-csv")
     one.ft = datasets::read_ft_csv(file, map);
-  const datasets::Series& time = hand ? one.hand->time : one.ft->time;
+  else
+    one.mocap = datasets::read_mocap_csv(file, map);
+  const datasets::Series& time = one.hand ? one.hand->time : one.ft ? one.ft->time : one.mocap->time;
   out.text = fmt::format("{} samples, {:.6g} to {:.6g} s", time.rows, time.data.front(), time.data.back());
   out.details = {{"samples", time.rows}};
+  if (!one.mocap) return out;
+  if (log.dimension != 2)
+    throw datasets::LogError(options.into, "/@dimension", "is 3, and mocap-csv is for planar logs (2)");
+  const auto lost = std::count(one.mocap->valid.begin(), one.mocap->valid.end(), 0);
+  out.text += fmt::format(", {} lost", lost);
+  out.details["lost"] = lost;
+  take_from_track(log, options, one, out);
   return out;
 }
 
 std::array<double, 3> triple(const std::vector<double>& values) {
   return values.empty() ? std::array<double, 3>{} : std::array<double, 3>{values[0], values[1], values[2]};
+}
+
+/// [deg], within ±180.
+double between(double to, double from) { return std::remainder(to - from, 360.0); }
+
+/// A planar log of a throw that goes elsewhere than --heading says is that throw's shadow: refused where
+/// the two are far apart, said where they are somewhat. Throws ImportError.
+void check_heading(const std::string& file, const datasets::MotiveTake& take, double heading,
+                   std::vector<std::string>& notes) {
+  constexpr double kRun = 0.1, kBeside = 0.05;               // m
+  constexpr double kNoted = 3, kRefused = 15, kTurned = 15;  // deg
+  if (take.run >= kRun) {
+    const double seen = take.run_heading * 180 / std::numbers::pi, off = between(seen, heading);
+    const double angle = std::min(std::abs(off), 180 - std::abs(off));  // to the plane, forwards or back
+    const std::string numbers =
+        fmt::format("the body runs {:.2f} m along a heading of {:.1f} deg, {:.1f} deg from --heading {:g}",
+                    take.run, seen, std::abs(off), heading);
+    const std::string advice = fmt::format("--heading {:.1f}", seen);
+    if (angle > kRefused)
+      throw datasets::ImportError(
+          file, fmt::format("rigid body {}, columns Position", take.body),
+          fmt::format("{}: up to {:g} deg are accepted, since a planar log keeps x and z alone: {}?", numbers,
+                      kRefused, advice));
+    if (angle > kNoted)
+      notes.push_back(fmt::format("{}: {}; x is too short by {:.1f} %: {}?", file, numbers,
+                                  100 * (1 - std::cos(angle * std::numbers::pi / 180)), advice));
+    else if (std::abs(off) > 90)
+      notes.push_back(fmt::format("{}: {}: it goes backwards: {}?", file, numbers, advice));
+    if (take.beside_run > kBeside)
+      notes.push_back(
+          fmt::format("{}: the track is up to {:.2f} m beside any vertical plane: not a planar throw?", file,
+                      take.beside_run));
+  }
+  const double angle = take.out_of_plane_angle * 180 / std::numbers::pi;
+  if (angle > kTurned)
+    notes.push_back(fmt::format(
+        "{}: the body's x axis leaves the throwing plane by up to {:.0f} deg, and theta is the angle of "
+        "its shadow: was the body created with its X along the object's x, in that plane?",
+        file, angle));
 }
 
 Reading read_motive(const std::string& file, const ThrowLog& log, const LabOptions& options) {
@@ -207,15 +272,12 @@ Reading read_motive(const std::string& file, const ThrowLog& log, const LabOptio
     out.text += fmt::format(", out of the plane by {:.3g} m and {:.3g} deg", take.out_of_plane, angle);
     out.details["out_of_plane_m"] = take.out_of_plane;
     out.details["out_of_plane_deg"] = angle;
-  }
-  if (options.landing) {
-    one.landing = datasets::landing_of(take.mocap, log.dimension, log.landing_height);
-    out.text += one.landing ? fmt::format(", lands at {:.4f} s", one.landing->time(0))
-                            : fmt::format(", no landing: the track does not pass {} m", log.landing_height);
-    out.details["landing"] = one.landing.has_value();
+    out.details["run_m"] = take.run;
+    out.details["run_heading_deg"] = take.run_heading * 180 / std::numbers::pi;
+    check_heading(file, take, options.heading, out.notes);
   }
   one.mocap = std::move(take.mocap);
-  if (!options.free_flight.empty()) one.free_flight = {options.free_flight[0], options.free_flight[1]};
+  take_from_track(log, options, one, out);
   return out;
 }
 
@@ -254,13 +316,36 @@ Reading read(const std::string& format, const std::string& file, const ThrowLog&
              const LabOptions& options) {
   if (format == "motive-csv") return read_motive(file, log, options);
   if (format == "phyphox") return read_phone(file, options);
-  return read_columns(format, file, options);
+  return read_columns(format, file, log, options);
 }
 
 std::string source_of(const std::string& format, std::size_t files) {
   return fmt::format(
       "measured: {} file{} imported by unhand import {}{}", files, files == 1 ? "" : "s", format,
       format == "phyphox" ? "; sigma estimated by the importer from the scatter in the falls" : "");
+}
+
+/// What to say of a new log whose throws are all of one split.
+std::string one_sided(const std::string& out, const ThrowLog& log, std::ptrdiff_t train,
+                      const LabOptions& options) {
+  if (train == 0)
+    return fmt::format(
+        "{}: all throws are held out: fit and discover need train throws (--test-every, --test-conditions)",
+        out);
+  std::map<std::string, int> conditions;
+  int most = 0;
+  for (const Throw& one : log.throws) most = std::max(most, ++conditions[one.condition]);
+  const std::string why =
+      options.test_every == 0
+          ? std::string()
+          : fmt::format(
+                ": --test-every {} holds out every {}th throw of a condition, and no condition has "
+                "more than {} throw{}",
+                options.test_every, options.test_every, most, most == 1 ? "" : "s");
+  return fmt::format("{}: no throw is held out{}; errors on unseen throws, and discover, need some: {}", out,
+                     why,
+                     log.throws.size() > 1 ? fmt::format("--test-every {}, or more throws", std::max(2, most))
+                                           : std::string("more throws"));
 }
 
 }  // namespace
@@ -306,6 +391,7 @@ LabImport import_lab(const std::string& format, const std::vector<std::string>& 
     }
     imported.text +=
         fmt::format("  {}: {}{}\n", file, adding ? fmt::format("throw {}, ", id) : "", reading.text);
+    imported.notes.insert(imported.notes.end(), reading.notes.begin(), reading.notes.end());
     reading.details["file"] = file;
     imported.details["files"].push_back(reading.details);
   }
@@ -338,6 +424,7 @@ LabImport import_lab(const std::string& format, const std::vector<std::string>& 
   imported.details["throws"] = log.throws.size();
   imported.details["train"] = train;
   imported.details["test"] = test;
+  if (!adding && (test == 0 || train == 0)) imported.notes.push_back(one_sided(out, log, train, options));
   return imported;
 }
 

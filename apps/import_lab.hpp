@@ -30,6 +30,7 @@ struct LabOptions {
 struct LabImport {
   std::string text;
   Json details;
+  std::vector<std::string> notes;  // to be said on stderr once the log is written
 };
 
 /// The options that these formats share, in groups of the help.
@@ -38,8 +39,9 @@ void add_lab_options(Parser& parser, LabOptions& options);
 /// Throws WrongUsage if one of these options is given: `format` takes none of them.
 void refuse_lab_options(const std::string& format, const LabOptions& options);
 
-/// Reads the files of one format ("motive-csv", "hand-csv", "ft-csv", "phyphox") into a new log, or into the
-/// throws of the log that --into names, and hands it to `outputs` as `out`. Throws WrongUsage and LogError.
+/// Reads the files of one format ("hand-csv", "ft-csv", "mocap-csv", "motive-csv", "phyphox") into a new log,
+/// or into the throws of the log that --into names, and hands it to `outputs` as `out`. Throws WrongUsage and
+/// LogError.
 LabImport import_lab(const std::string& format, const std::vector<std::string>& inputs,
                      const std::string& out, const LabOptions& options, Outputs& outputs);
 

@@ -9,11 +9,11 @@ void add_lab_options(Parser& parser, LabOptions& options) {
   const auto add = [&](const char* group, const char* name, auto& value, const char* text) {
     return parser.option(name, value, text).group(group);
   };
-  const char* one = "A log to add to (motive-csv, hand-csv, ft-csv)";
+  const char* one = "A log to add to (hand-csv, ft-csv, mocap-csv, motive-csv)";
   add(one, "--into", options.into,
       "Add to the throws of this log that are named like the files; it is --out if that is not given");
   parser.flag("--replace", options.replace, "Where a throw has such data already, replace it").group(one);
-  const char* fresh = "A new log (motive-csv, hand-csv, ft-csv, phyphox)";
+  const char* fresh = "A new log (hand-csv, ft-csv, mocap-csv, motive-csv, phyphox)";
   add(fresh, "--sku", options.sku, "The object as an SKU file (TOML): mass, inertia, offset of the CoM");
   add(fresh, "--mass", options.mass, "[kg] The object's mass, where there is no SKU file").positive();
   add(fresh, "--object", options.object, "The object's name; else the SKU file's");
@@ -32,13 +32,14 @@ void add_lab_options(Parser& parser, LabOptions& options) {
       .with_default();
   add(fresh, "--test-conditions", options.test_conditions, "Hold out these conditions as a whole")
       .with_commas();
-  const char* files = "What is in the files (motive-csv, hand-csv, ft-csv)";
+  const char* files = "What is in the files (hand-csv, ft-csv, mocap-csv, motive-csv)";
   add(files, "--throw", options.throw_id, "The throw's name; else the file's");
   add(files, "--time-offset", options.time_offset,
       "[s] Added to the file's time, to bring it to the robot's clock");
   add(files, "--columns", options.columns,
       "CHANNEL=HEADER,... or CHANNEL=#NUMBER; =-HEADER flips the sign. Channels of hand-csv: "
-      "time,x,z,theta,vx,vz,omega,ax,az,alpha; of ft-csv: time,fx,fz,tau,normal");
+      "time,x,z,theta,vx,vz,omega,ax,az,alpha; of ft-csv: time,fx,fz,tau,normal; of mocap-csv: "
+      "time,x,z,theta");
   add(files, "--units", options.units,
       "CHANNEL=UNIT,... where the header does not say it as 'Fx (N)' or 'Fx [N]'");
   add(files, "--sigma", options.sigma,
@@ -56,13 +57,14 @@ void add_lab_options(Parser& parser, LabOptions& options) {
   add(motive, "--com", options.com, "[m] X,Y,Z of the CoM in the rigid body's frame")
       .with_commas()
       .expected(3, 3);
-  add(motive, "--free-flight", options.free_flight, "[s] T0,T1 between which the object touches nothing")
+  const char* track = "What a track shows (mocap-csv, motive-csv)";
+  add(track, "--free-flight", options.free_flight, "[s] T0,T1 between which the object touches nothing")
       .with_commas()
       .expected(2, 2);
   parser
       .flag("--landing", options.landing,
             "Take the landing from the track, where it passes the landing height")
-      .group(motive);
+      .group(track);
   const char* phone = "Phones (phyphox)";
   add(phone, "--min-fall", options.min_fall, "[s] The shortest free fall").with_default().positive();
   add(phone, "--fall-threshold", options.fall_threshold, "[m/s^2] The specific force in a fall is below it")

@@ -15,6 +15,7 @@
 #include "apps/plan.hpp"
 #include "apps/progress.hpp"
 #include "apps/tell.hpp"
+#include "apps/throws.hpp"
 #include "datasets/model_card.hpp"
 #include "datasets/sku.hpp"
 #include "planners/arm/chain_file.hpp"
@@ -203,7 +204,7 @@ void plan_throw(const PlanThrowOptions& options) {
     card = planners::release_card(datasets::read_model_card(options.card), options.card);
   std::optional<datasets::Sku> given;
   if (!options.sku.empty()) {
-    const auto& sku = given.emplace(datasets::read_sku(options.sku));
+    const auto& sku = given.emplace(read_possible_sku(options.sku));
     if (!sku.inertia)
       throw datasets::LogError(options.sku, "inertia_kg_m2", "is not known: give it, or a shape with dims_m");
     answer.lever = sku.com_offset;

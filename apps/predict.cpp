@@ -186,7 +186,15 @@ void predict(const PredictOptions& options) {
   const auto& result = comparison.models.front();
   if (result.failed == static_cast<int>(result.throws.size()))
     throw Unanswered(fmt::format("{} brings no throw to a landing: {}", model,
-                                 outcome_of(result.throws.front().prediction)));
+                                 outcome_in_words(result.throws.front().prediction)));
+  std::map<std::string, std::pair<std::string, int>> failures;
+  for (const auto& one : result.throws)
+    if (!one.prediction.landed()) {
+      auto& [words, n] = failures[outcome_of(one.prediction)];
+      words = outcome_in_words(one.prediction), ++n;
+    }
+  for (const auto& [name, failure] : failures)
+    tell("unhand: {} of {} throws, {}: {}\n", failure.second, result.throws.size(), name, failure.first);
 
   Outputs outputs{{options.log, options.card}};
   if (!options.json.empty()) {

@@ -10,10 +10,31 @@
 #include "apps/tell.hpp"
 #include "datasets/csv.hpp"
 #include "datasets/summary.hpp"
+#include "experiment/declared_check.hpp"
 #include "experiment/prepared_throw.hpp"
 #include "experiment/unit_check.hpp"
 
 namespace unhand::apps {
+
+namespace {
+
+/// Takes out the throws for which `is_unusable` holds and says which, unless they are all there are.
+template <class Unusable>
+void leave_out(datasets::ThrowLog& log, const char* why, Unusable&& is_unusable) {
+  std::vector<std::string> left_out;
+  for (const auto& one : log.throws)
+    if (is_unusable(one)) left_out.push_back(one.id);
+  if (left_out.empty() || left_out.size() == log.throws.size()) return;
+  constexpr std::size_t kNamed = 5;
+  const std::size_t named = std::min(left_out.size(), kNamed);
+  tell("unhand: left out {} of {} throws, which {}: {}{}\n", left_out.size(), log.throws.size(), why,
+       fmt::join(left_out.begin(), left_out.begin() + named, ", "), named < left_out.size() ? ", ..." : "");
+  std::erase_if(log.throws, [&](const auto& one) {
+    return std::binary_search(left_out.begin(), left_out.end(), one.id);  // both are sorted by id
+  });
+}
+
+}  // namespace
 
 datasets::ThrowLog read_throws(const std::string& file) {
   if (datasets::read_schema_name(file) == "slip-log")
@@ -21,20 +42,11 @@ datasets::ThrowLog read_throws(const std::string& file) {
   auto log = datasets::read_throw_log(file);
   if (log.throws.empty()) throw Unanswered(fmt::format("{}: holds no throws", file));
   experiment::require_units(log, file);
-  std::vector<std::string> left_out;
-  for (const auto& one : log.throws)
-    if (!experiment::shows_grasp(log, one)) left_out.push_back(one.id);
-  if (left_out.empty() || left_out.size() == log.throws.size()) return log;
-  constexpr std::size_t kNamed = 5;
-  const std::size_t named = std::min(left_out.size(), kNamed);
-  tell(
-      "unhand: left out {} of {} throws, which do not show the grasp (no motion capture before the gripper "
-      "opens, no grasp_angle): {}{}\n",
-      left_out.size(), log.throws.size(), fmt::join(left_out.begin(), left_out.begin() + named, ", "),
-      named < left_out.size() ? ", ..." : "");
-  std::erase_if(log.throws, [&](const auto& one) {
-    return std::binary_search(left_out.begin(), left_out.end(), one.id);  // both are sorted by id
-  });
+  if (std::any_of(log.throws.begin(), log.throws.end(), [](const auto& one) { return one.hand.has_value(); }))
+    leave_out(log, "have no hand, which the others have",
+              [](const auto& one) { return !one.hand.has_value(); });
+  leave_out(log, "do not show the grasp (no motion capture before the gripper opens, no grasp_angle)",
+            [&](const auto& one) { return !experiment::shows_grasp(log, one); });
   return log;
 }
 
@@ -65,6 +77,13 @@ datasets::SlipLog read_slips(const std::string& file) {
     if (const double share = datasets::dissipation(surface); share < 0)
       throw datasets::LogError(file, "/surfaces/" + name, sign_doubt(share));
   return log;
+}
+
+datasets::Sku read_possible_sku(const std::string& file) {
+  auto sku = datasets::read_sku(file);
+  const std::string why = experiment::impossible_inertia(datasets::to_object(sku));
+  if (!why.empty()) throw datasets::TomlError(file, 0, 0, "inertia_kg_m2", why);
+  return sku;
 }
 
 std::string sign_doubt(double dissipation) {

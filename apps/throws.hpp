@@ -3,14 +3,16 @@
 
 #include <string>
 
+#include "datasets/sku.hpp"
 #include "datasets/slip_log.hpp"
 #include "datasets/throw_log.hpp"
 
 namespace unhand::apps {
 
-/// Leaves out, and says so on stderr, throws from a hand that do not show the grasp
-/// (experiment::shows_grasp), as long as others do. Throws datasets::LogError where the file is no throw log
-/// or a column is in another unit (experiment::require_units), Unanswered where it holds no throws.
+/// Leaves out, and says so on stderr, throws without a hand, as long as others have one, and throws from a
+/// hand that do not show the grasp (experiment::shows_grasp), as long as others do. Throws datasets::LogError
+/// where the file is no throw log or a column is in another unit (experiment::require_units), Unanswered
+/// where it holds no throws.
 datasets::ThrowLog read_throws(const std::string& file);
 
 /// Where the throw of that id is. Throws WrongUsage, naming the nearest id or some of them, if there is none.
@@ -23,6 +25,10 @@ void require_flights(const datasets::ThrowLog& log, const std::string& file);
 /// Slips whose friction takes work from the object: throws datasets::LogError for a surface of which the
 /// samples say the opposite (datasets::dissipation < 0), as where a wrench or a twist has the other sign.
 datasets::SlipLog read_slips(const std::string& file);
+
+/// An object that a body can be: throws datasets::TomlError where none of its mass and dims has its inertia
+/// (experiment::impossible_inertia), and as datasets::read_sku does.
+datasets::Sku read_possible_sku(const std::string& file);
 
 /// In words, what is wrong with a surface of that (negative) datasets::dissipation.
 std::string sign_doubt(double dissipation);

@@ -22,7 +22,7 @@ struct ValidateSkuOptions {
 };
 
 datasets::Sku read_throwable_sku(const std::string& file) {
-  auto sku = datasets::read_sku(file);
+  auto sku = read_possible_sku(file);
   if (!sku.inertia)
     throw datasets::TomlError(file, 0, 0, "inertia_kg_m2", "missing: it, or shape and dims_m, are needed");
   return sku;

@@ -68,15 +68,21 @@ Table spread_table(const SkuValidation& answer) {
   return out;
 }
 
-std::string measured_text(const fitting::MeasuredVerdict& m) {
+std::string measured_text(const SkuValidation& answer) {
+  const auto& m = *answer.measured;
+  const bool contradicted =
+      answer.verdict == fitting::SkuVerdict::contradicted || m.rms_z > fitting::kMostSurprise;
   return fmt::format(
       "{}: of {} measured throws of this object {:.1f} % land within the tolerance of their prediction "
       "(error "
       "{:.2f} cm, {:.2f} deg in the mean of the absolute; bias {:+.2f} cm, {:+.2f} deg); the errors are "
       "{:.2f} "
       "times what was foretold\n",
-      m.confirmed ? "Confirmed" : "Contradicted", m.throws.size(), 100 * m.within, 100 * m.mae_x,
-      m.mae_theta * kDegrees, 100 * m.bias_x, m.bias_theta * kDegrees, m.rms_z);
+      m.confirmed    ? "Confirmed"
+      : contradicted ? "Contradicted"
+                     : "Not within the tolerance",
+      m.throws.size(), 100 * m.within, 100 * m.mae_x, m.mae_theta * kDegrees, 100 * m.bias_x,
+      m.bias_theta * kDegrees, m.rms_z);
 }
 
 /// The card's own errors on throws that it was not fitted to, which the spread does not hold.
@@ -93,8 +99,12 @@ std::string held_out_text(const datasets::ModelCard& card) {
 std::string verdict_text(const SkuValidation& answer) {
   std::vector<std::string> conditions;
   for (const auto& one : answer.untried) conditions.push_back(one.condition);
+  const bool judged = answer.verdict != fitting::SkuVerdict::contradicted &&
+                      answer.verdict != fitting::SkuVerdict::beyond_the_model;
   return fmt::format("{}{}{}", to_string(answer.verdict),
-                     conditions.empty() ? "" : ", if the card holds beyond what it was tried on: ",
+                     conditions.empty() ? ""
+                     : !judged          ? "; the card was not tried on: "
+                                        : ", if the card holds beyond what it was tried on: ",
                      fmt::join(conditions, ", "));
 }
 
@@ -120,7 +130,7 @@ std::string sku_text(const SkuQuestion& question, const SkuValidation& answer, b
                                                                   : "allow with --other-surface (0.2: 20 %)");
   out += held_out_text(question.card);
   if (answer.measured)
-    out += measured_text(*answer.measured);
+    out += measured_text(answer);
   else if (question.request.log != nullptr)
     out += fmt::format("{} holds no throws of this object with a landing: nothing measured to judge by.\n",
                        question.log_file);

@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <optional>
 #include <span>
 #include <stdexcept>
 
@@ -27,6 +30,7 @@ constexpr Wanted hand_table[] = {{"time", time},          {"x", length},
                                  {"az", acceleration},    {"alpha", angular_acceleration}};
 constexpr Wanted ft_table[] = {
     {"time", time}, {"fx", force}, {"fz", force}, {"tau", torque}, {"normal", force}};
+constexpr Wanted mocap_table[] = {{"time", time}, {"x", length}, {"z", length}, {"theta", angle}};
 
 std::vector<std::string> names_of(std::span<const Wanted> table) {
   std::vector<std::string> names;
@@ -42,6 +46,12 @@ struct Column {
   const Unit* unit = nullptr;
 
   double read(const CsvLine& line) const { return sign * unit->to_si(line.real(index, header)); }
+  /// Nothing stands there, or that it is no number.
+  bool is_lost(const CsvLine& line) const {
+    std::string cell = line.cells[index];
+    std::transform(cell.begin(), cell.end(), cell.begin(), [](unsigned char c) { return std::tolower(c); });
+    return cell.empty() || cell == "nan";
+  }
 };
 
 /// "Fx (N)" or "Fx [N]" as name and unit.
@@ -145,9 +155,11 @@ Series make_series(std::span<const Wanted> table, const std::vector<Column>& col
   return out;
 }
 
-/// Each dataset as wide as the number says, the first of them time.
+/// Each dataset as wide as the number says, the first of them time. With `valid`, rows in which a value
+/// beside the time is lost become NaN.
 std::vector<Series> read_table(const std::filesystem::path& file, const ColumnMap& map,
-                               std::span<const Wanted> table, std::initializer_list<std::size_t> widths) {
+                               std::span<const Wanted> table, std::initializer_list<std::size_t> widths,
+                               Flags* valid = nullptr) {
   const std::string fault = fault_of(map, names_of(table));
   if (!fault.empty()) throw std::invalid_argument(fault);
   CsvReader reader(file, '\0');
@@ -173,9 +185,14 @@ std::vector<Series> read_table(const std::filesystem::path& file, const ColumnMa
   Series& clock = out.front();
   for (bool more = is_row || reader.next(line); more; more = reader.next(line)) {
     line.expect_cells(width);
+    const bool lost = valid != nullptr && std::any_of(columns.begin() + 1, columns.end(),
+                                                      [&](const Column& one) { return one.is_lost(line); });
+    if (valid != nullptr) valid->push_back(lost ? 0 : 1);
     std::size_t next = 0;
     for (Series& series : out) {
-      for (std::size_t j = 0; j < series.cols; ++j) series.data.push_back(columns[next++].read(line));
+      for (std::size_t j = 0; j < series.cols; ++j, ++next)
+        series.data.push_back(lost && next > 0 ? std::numeric_limits<double>::quiet_NaN()
+                                               : columns[next].read(line));
       ++series.rows;
     }
     clock.data.back() += map.time_offset;
@@ -188,10 +205,22 @@ std::vector<Series> read_table(const std::filesystem::path& file, const ColumnMa
   return out;
 }
 
+/// Angles in column 2 never step by more than π from one finite row to the next.
+void unwrap(Series& pose) {
+  constexpr double turn = 2 * std::numbers::pi;
+  std::optional<double> last;
+  for (std::size_t i = 0; i < pose.rows; ++i) {
+    if (std::isnan(pose(i, 2))) continue;
+    if (last) pose(i, 2) -= turn * std::round((pose(i, 2) - *last) / turn);
+    last = pose(i, 2);
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> hand_channels() { return names_of(hand_table); }
 std::vector<std::string> ft_channels() { return names_of(ft_table); }
+std::vector<std::string> mocap_channels() { return names_of(mocap_table); }
 
 std::string fault_of(const ColumnMap& map, const std::vector<std::string>& channels) {
   const auto unknown = [&](const auto& entries, std::string_view what) -> std::string {
@@ -208,9 +237,10 @@ std::string fault_of(const ColumnMap& map, const std::vector<std::string>& chann
       return fmt::format("columns: '{}' is missing (needed: {})", name, fmt::join(channels, ", "));
   for (const auto& [name, value] : map.sigma)
     if (!(std::isfinite(value) && value >= 0)) return fmt::format("sigma: {}={} is not >= 0", name, value);
-  const bool hand = channels.size() == std::size(hand_table);
   const std::vector<std::size_t> widths =
-      hand ? std::vector<std::size_t>{1, 3, 3, 3} : std::vector<std::size_t>{1, 3, 1};
+      channels.size() == std::size(hand_table) ? std::vector<std::size_t>{1, 3, 3, 3}
+      : channels.size() == std::size(ft_table) ? std::vector<std::size_t>{1, 3, 1}
+                                               : std::vector<std::size_t>{1, 3};
   std::size_t first = 0;
   for (const std::size_t width : widths) {
     std::size_t given = 0;
@@ -226,17 +256,23 @@ std::string fault_of(const ColumnMap& map, const std::vector<std::string>& chann
 
 HandLog read_hand_csv(const std::filesystem::path& file, const ColumnMap& map) {
   auto series = read_table(file, map, hand_table, {1, 3, 3, 3});
-  Series& pose = series[1];
-  for (std::size_t i = 1; i < pose.rows; ++i) {
-    constexpr double turn = 2 * std::numbers::pi;
-    pose(i, 2) -= turn * std::round((pose(i, 2) - pose(i - 1, 2)) / turn);
-  }
+  unwrap(series[1]);
   return {std::move(series[0]), std::move(series[1]), std::move(series[2]), std::move(series[3])};
 }
 
 FtLog read_ft_csv(const std::filesystem::path& file, const ColumnMap& map) {
   auto series = read_table(file, map, ft_table, {1, 3, 1});
   return {std::move(series[0]), std::move(series[1]), std::move(series[2])};
+}
+
+MocapLog read_mocap_csv(const std::filesystem::path& file, const ColumnMap& map) {
+  Flags valid;
+  auto series = read_table(file, map, mocap_table, {1, 3}, &valid);
+  if (std::find(valid.begin(), valid.end(), 1) == valid.end())
+    throw ImportError(file.string(), "",
+                      fmt::format("the object is lost in all of its {} rows", valid.size()));
+  unwrap(series[1]);
+  return {std::move(series[0]), std::move(series[1]), std::move(valid)};
 }
 
 }  // namespace unhand::datasets

@@ -1,4 +1,5 @@
-// Importers: a robot's hand and a force/torque sensor from plain CSV files, by a map of columns.
+// Importers: a robot's hand, a force/torque sensor and a tracked object from plain CSV files, by a map of
+// columns.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +13,7 @@
 namespace unhand::datasets {
 
 /// Which column of a file is which channel of the log. Keys are the names of channels (hand_channels(),
-/// ft_channels()).
+/// ft_channels(), mocap_channels()).
 struct ColumnMap {
   /// Channel -> header of its column, or "#3" for the third column (a file whose channels are all given so
   /// needs no header). A '-' in front flips the sign: a sensor that reports what the object does to the pad
@@ -35,6 +36,10 @@ std::vector<std::string> hand_channels();
 /// and the pad's normal force, positive when it presses.
 std::vector<std::string> ft_channels();
 
+/// "time,x,z,theta": the tracked object in the throwing plane (x forward, z up, theta from +x towards +z), at
+/// its centre of mass.
+std::vector<std::string> mocap_channels();
+
 /// Reads a CSV file (separated by tabs, semicolons or commas; with a decimal comma where it is not the
 /// separator) whose first line is a header. All values finite, time strictly increasing. theta is unwrapped:
 /// it never steps by more than π. Throws ImportError naming file, line and column, and std::invalid_argument
@@ -42,6 +47,11 @@ std::vector<std::string> ft_channels();
 HandLog read_hand_csv(const std::filesystem::path& file, const ColumnMap& map);
 /// The same for the sensor behind one pad.
 FtLog read_ft_csv(const std::filesystem::path& file, const ColumnMap& map);
+/// The same for a tracked object. A row in which a cell of x, z or theta is empty or NaN is one in which the
+/// tracker lost the object: valid = 0, pose NaN. theta is unwrapped from valid row to valid row, so that it
+/// is right across a loss only if the object turns by less than half a turn meanwhile. Throws ImportError
+/// where it is lost in all rows, too.
+MocapLog read_mocap_csv(const std::filesystem::path& file, const ColumnMap& map);
 
 /// What is wrong with a map for these channels, or nothing: to say so before any file is read.
 std::string fault_of(const ColumnMap& map, const std::vector<std::string>& channels);

@@ -17,9 +17,9 @@
 namespace unhand::datasets {
 namespace {
 
-constexpr std::string_view header =
-    "toss,k,t_s,x_m,y_m,z_m,qw,qx,qy,qz,vx,vy,vz,wx_body,wy_body,wz_body,before_first_contact";
-constexpr std::size_t n_columns = 17;
+/// The columns that are read, in any order; others are passed over.
+constexpr std::string_view toss_columns = "toss,k,t_s,x_m,y_m,z_m,qw,qx,qy,qz,before_first_contact";
+constexpr std::size_t n_toss_columns = 11;
 
 struct Row {
   int toss = 0, k = 0;
@@ -33,15 +33,41 @@ struct Toss {
   std::size_t flight = 0;  // samples before the first contact
 };
 
-Row parse_row(const CsvLine& line) {
-  line.expect_cells(n_columns);
+/// Where these columns stand.
+struct TossColumns {
+  std::size_t width = 0;
+  std::array<std::size_t, n_toss_columns> index{};
+};
+
+TossColumns toss_columns_of(const CsvLine& line) {
+  if (line.is_number(0))
+    line.fail("", fmt::format("the header is missing, expected one with '{}'", toss_columns));
+  TossColumns out;
+  out.width = line.cells.size();
+  for (std::size_t j = 0; j < n_toss_columns; ++j) {
+    const std::string name(part_of(toss_columns, j));
+    const auto found = std::find(line.cells.begin(), line.cells.end(), name);
+    if (found == line.cells.end())
+      line.fail("", unknown_name(fmt::format("there is no column '{}'", name), name, line.cells));
+    if (std::find(found + 1, line.cells.end(), name) != line.cells.end())
+      line.fail(name, "stands twice in the header");
+    out.index[j] = static_cast<std::size_t>(found - line.cells.begin());
+  }
+  return out;
+}
+
+Row parse_row(const CsvLine& line, const TossColumns& columns) {
+  line.expect_cells(columns.width);
+  const auto integer = [&](std::size_t j) {
+    return line.integer(columns.index[j], part_of(toss_columns, j));
+  };
   Row row;
-  row.toss = line.integer(0, "toss");
-  row.k = line.integer(1, "k");
-  row.t = line.real(2, "t_s");
-  for (std::size_t j = 0; j < 7; ++j) row.pose[j] = line.real(3 + j, part_of(header, 3 + j));
-  for (std::size_t j = 10; j < 16; ++j) line.real(j, part_of(header, j));
-  const int flag = line.integer(16, "before_first_contact");
+  row.toss = integer(0);
+  row.k = integer(1);
+  row.t = line.real(columns.index[2], "t_s");
+  for (std::size_t j = 0; j < 7; ++j)
+    row.pose[j] = line.real(columns.index[3 + j], part_of(toss_columns, 3 + j));
+  const int flag = integer(10);
   if (flag != 0 && flag != 1) line.fail("before_first_contact", fmt::format("{} is not 0 or 1", flag));
   row.before_contact = flag == 1;
   if (row.toss < 0) line.fail("toss", fmt::format("{} is negative", row.toss));
@@ -74,13 +100,13 @@ void append(const CsvLine& line, std::vector<Toss>& tosses, std::set<int>& seen,
 }
 
 std::vector<Toss> read_tosses(const std::filesystem::path& csv, int& rows) {
-  CsvReader reader(csv);
+  CsvReader reader(csv, '\0');
   std::vector<Toss> tosses;
   std::set<int> seen;
   CsvLine line;
-  if (reader.next(line) && line.text != header)
-    line.fail("", fmt::format("the header is missing, expected '{}'", header));
-  for (; reader.next(line); ++rows) append(line, tosses, seen, parse_row(line));
+  TossColumns columns;
+  if (reader.next(line)) columns = toss_columns_of(line);
+  for (; reader.next(line); ++rows) append(line, tosses, seen, parse_row(line, columns));
   if (tosses.empty()) reader.fail(1, "holds no tosses");
   return tosses;
 }

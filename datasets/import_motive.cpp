@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -211,6 +212,32 @@ void check_options(const MotiveOptions& options) {
       throw std::invalid_argument(fmt::format("{}: {} is not >= 0", name, sigma));
 }
 
+/// Where the track runs over the floor, from all of its points: upright, not turned by any heading.
+void find_run(const std::vector<Vector3d>& points, MotiveTake& take) {
+  constexpr double kRises = 0.01;  // m, more than a tracker's noise
+  if (points.empty()) return;
+  const auto highest = std::max_element(points.begin(), points.end(),
+                                        [](const auto& a, const auto& b) { return a.z() < b.z(); });
+  auto end = highest;
+  for (double lowest = highest->z(); end != points.end() && end->z() < lowest + kRises; ++end)
+    lowest = std::min(lowest, end->z());
+  const std::vector<Vector3d> thrown(points.begin(), end);
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const Vector3d& p : thrown) mean += p.head<2>() / static_cast<double>(thrown.size());
+  Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
+  for (const Vector3d& p : thrown) spread += (p.head<2>() - mean) * (p.head<2>() - mean).transpose();
+  Eigen::Vector2d along = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(spread).eigenvectors().col(1);
+  if (along.dot((thrown.back() - thrown.front()).head<2>()) < 0) along *= -1;
+  double least = 0, most = 0;
+  for (const Vector3d& p : thrown) {
+    const Eigen::Vector2d off = p.head<2>() - mean;
+    least = std::min(least, off.dot(along)), most = std::max(most, off.dot(along));
+    take.beside_run = std::max(take.beside_run, std::abs(along.x() * off.y() - along.y() * off.x()));
+  }
+  take.run = most - least;
+  take.run_heading = std::atan2(along.y(), along.x());
+}
+
 /// The log's poses, sample by sample.
 class Track {
  public:
@@ -238,7 +265,8 @@ class Track {
 
   void add(const Vector3d& pivot, const Quaterniond& q_M) {
     const Vector3d p_M = pivot + q_M * vector(options_.com) - vector(options_.origin);
-    const Vector3d p = turned_ * upright(p_M);
+    points_.push_back(upright(p_M));
+    const Vector3d p = turned_ * points_.back();
     const Vector3d axis = upright(q_M.vec());  // C q C⁻¹ turns about the turned axis
     Quaterniond q = turned_ * Quaterniond(q_M.w(), axis.x(), axis.y(), axis.z());
     if (seen_ && q.coeffs().dot(last_.coeffs()) < 0) q.coeffs() *= -1;
@@ -262,6 +290,9 @@ class Track {
     add_flag(1);
   }
 
+  /// Of the frames in which the body was seen: upright, not turned by the heading.
+  const std::vector<Vector3d>& points() const { return points_; }
+
  private:
   void append(std::initializer_list<double> row) {
     take_.mocap.pose.data.insert(take_.mocap.pose.data.end(), row);
@@ -277,6 +308,7 @@ class Track {
   std::size_t cols_;
   double theta_ = 0, first_y_ = 0;
   bool seen_ = false;
+  std::vector<Vector3d> points_;
 };
 
 }  // namespace
@@ -298,7 +330,9 @@ MotiveTake read_motive_csv(const std::filesystem::path& file, const MotiveOption
   if (!columns.rotation.empty() && (options.sigma_position > 0) != (options.sigma_angle > 0))
     throw std::invalid_argument("sigma: give it for positions and angles, or for neither");
 
-  MotiveTake take{facts.take, facts.version, columns.body, columns.bodies, facts.frame_rate, {}, 0, 0, 0};
+  MotiveTake take;
+  take.name = facts.take, take.version = facts.version, take.frame_rate = facts.frame_rate;
+  take.body = columns.body, take.bodies = columns.bodies;
   Track track(take, options, !columns.rotation.empty());
   Series& time = take.mocap.time;
   while (reader.next(line)) {
@@ -319,6 +353,7 @@ MotiveTake read_motive_csv(const std::filesystem::path& file, const MotiveOption
   if (take.lost == time.rows)
     reader.fail(header.number,
                 fmt::format("rigid body '{}' is lost in all of its {} frames", columns.body, time.rows));
+  find_run(track.points(), take);
   return take;
 }
 

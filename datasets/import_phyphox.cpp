@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "datasets/csv.hpp"
+#include "dynamics/median.hpp"
 #include "dynamics/third_difference.hpp"
 
 namespace unhand::datasets {
@@ -103,6 +104,47 @@ ImuLog read_imu(const std::filesystem::path& file) {
 
 double magnitude(const ImuLog& imu, std::size_t i) {
   return std::hypot(imu.specific_force(i, 0), imu.specific_force(i, 1), imu.specific_force(i, 2));
+}
+
+double step_of(const ImuLog& imu) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < imu.time.rows; ++i) steps.push_back(imu.time(i) - imu.time(i - 1));
+  return steps.empty() ? 0 : dynamics::median(steps);
+}
+
+/// Times in another unit than seconds, and accelerations in another than m/s², by what phones do: they sample
+/// 20 to some thousand times a second, and read gravity while they are held.
+void check_units(const std::filesystem::path& file, const ImuLog& imu, double step) {
+  constexpr double kStep[2] = {1e-4, 0.1};    // s
+  constexpr double kHeld[2] = {7, 14};        // m/s²
+  constexpr double kFalling = 5, kInG = 0.1;  // m/s²; as a share of 1
+  constexpr std::size_t kEnough = 20;
+  if (imu.time.rows < kEnough) return;
+  if (!(step >= kStep[0] && step <= kStep[1]))
+    throw ImportError(
+        file.string(), "column Time (s)",
+        fmt::format("samples are {:.3g} s apart (median), accepted are {:g} to {:g} s: is it in {}?", step,
+                    kStep[0], kStep[1], step > kStep[1] ? "ms or another unit" : "another unit"));
+  std::vector<double> all, held;
+  for (std::size_t i = 0; i < imu.time.rows; ++i) {
+    all.push_back(magnitude(imu, i));
+    if (all.back() >= kFalling) held.push_back(all.back());
+  }
+  const auto fail = [&](const std::string& why) {
+    throw ImportError(file.string(), "columns Acceleration (m/s^2)", why);
+  };
+  const double usual = dynamics::median(all);
+  if (held.size() < all.size() / 5 && std::abs(usual - 1) < kInG)
+    fail(
+        fmt::format("{:.3g} m/s^2 is what it reads (median), and a phone that is held reads {:g} to {:g}: "
+                    "is it in g?",
+                    usual, kHeld[0], kHeld[1]));
+  const double rest = held.size() < kEnough ? kHeld[0] : dynamics::median(held);
+  if (!(rest >= kHeld[0] && rest <= kHeld[1]))
+    fail(
+        fmt::format("outside of falls it reads {:.3g} m/s^2 (median), and a phone that is held reads {:g} to "
+                    "{:g}: is it in another unit?",
+                    rest, kHeld[0], kHeld[1]));
 }
 
 /// Samples [first, last] of small specific force.
@@ -216,10 +258,8 @@ PhyphoxRecording read_phyphox(const std::filesystem::path& file, const PhyphoxOp
   ImuLog imu = read_imu(file);
   PhyphoxRecording out;
   out.samples = imu.time.rows;
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < imu.time.rows; ++i) steps.push_back(imu.time(i) - imu.time(i - 1));
-  std::sort(steps.begin(), steps.end());
-  const double step = steps.empty() ? 0 : steps[steps.size() / 2];
+  const double step = step_of(imu);
+  check_units(file, imu, step);
 
   std::vector<Stretch> falls;
   for (const Stretch& stretch : small_force(imu, options.threshold)) {

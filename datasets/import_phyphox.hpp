@@ -41,7 +41,9 @@ struct PhyphoxRecording {
 /// ("Gyroscope x (rad/s)"). Columns are separated by commas, semicolons or tabs, with a header in phyphox's
 /// English words; a file without one holds time, x, y, z and perhaps the absolute value. The noise declared
 /// is estimated from the third differences of each axis over the falls. "Linear acceleration", from which the
-/// phone has taken what it believes gravity to be, is refused. Throws ImportError naming file, line and
+/// phone has taken what it believes gravity to be, is refused, and so are samples further apart than 0.1 s or
+/// closer than 0.1 ms (times in ms), and a phone that reads less than 7 or more than 14 m/s² in the median
+/// outside of falls (g, ft/s²). Throws ImportError naming file, line and
 /// column; a recording without a fall is not an error.
 PhyphoxRecording read_phyphox(const std::filesystem::path& file, const PhyphoxOptions& options = {});
 

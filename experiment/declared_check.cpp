@@ -26,7 +26,13 @@ std::optional<double> diagonal_of(const datasets::Object& object) {
   return std::hypot(d[0], d[1], d[2]);
 }
 
-std::optional<UnitDoubt> doubtful_inertia(const std::string& name, const datasets::Object& object) {
+/// The first of an object's inertias that no body of its mass and size has.
+struct ImpossibleInertia {
+  double ratio{};  ///< I/m over the bound that it passes
+  std::string reason;
+};
+
+std::optional<ImpossibleInertia> first_impossible_inertia(const datasets::Object& object) {
   if (!object.inertia || !(object.mass > 0)) return {};
   const auto diagonal = diagonal_of(object);
   const auto [least, most] = gyration_range(object.mass, diagonal.value_or(kLargestDiagonal));
@@ -34,8 +40,8 @@ std::optional<UnitDoubt> doubtful_inertia(const std::string& name, const dataset
     const double gyration = inertia / object.mass;
     if (gyration >= least / kRounding && gyration <= most * kRounding) continue;
     const bool large = gyration > most;
-    return UnitDoubt{
-        fmt::format("/objects/{}@inertia", name), "inertia", gyration / (large ? most : least), 0,
+    return ImpossibleInertia{
+        gyration / (large ? most : least),
         fmt::format("inertia is {:.3g} kg m^2 for {:.4g} kg, a radius of gyration of {:.3g} m; a "
                     "body {} has {:.3g} to {:.3g} m: {}?",
                     inertia, object.mass, std::sqrt(gyration),
@@ -46,6 +52,12 @@ std::optional<UnitDoubt> doubtful_inertia(const std::string& name, const dataset
                           : "the object's mass in g, or its inertia in another unit than kg m^2")};
   }
   return {};
+}
+
+std::optional<UnitDoubt> doubtful_inertia(const std::string& name, const datasets::Object& object) {
+  const auto found = first_impossible_inertia(object);
+  if (!found) return {};
+  return UnitDoubt{fmt::format("/objects/{}@inertia", name), "inertia", found->ratio, 0, found->reason};
 }
 
 std::optional<UnitDoubt> doubtful_pad(const datasets::ThrowLog& log) {
@@ -119,6 +131,11 @@ LandedHeights landed_heights(const datasets::ThrowLog& log, const datasets::Thro
 
 GyrationRange gyration_range(double mass, double diagonal) {
   return {mass / (2 * std::numbers::pi * kDensest * diagonal), 0.25 * diagonal * diagonal};
+}
+
+std::string impossible_inertia(const datasets::Object& object) {
+  const auto found = first_impossible_inertia(object);
+  return found ? found->reason : std::string();
 }
 
 std::vector<UnitDoubt> impossible_declarations(const datasets::ThrowLog& log) {

@@ -1,7 +1,8 @@
-// What a log declares of its objects, its pads and where they land, held against physics and motion capture.
-// Internal to unit_check.
+// What a log declares of its objects, its pads and where they land, held against physics and motion capture:
+// for unit_check, and for those who read an SKU file.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "experiment/unit_check.hpp"
@@ -18,6 +19,10 @@ struct GyrationRange {
 /// m/(2 π ρ L), is a cylinder about the axis, as long as L and of the densest metal, ρ = 22 600 kg/m³: a
 /// section of area A adds ρ A²/(2 π) per length, and the sum is least where all sections are alike.
 GyrationRange gyration_range(double mass, double diagonal);
+
+/// Why no body of the object's mass and dims (a diagonal of 2 m where it has none) has its inertia, in words;
+/// empty: some body has.
+std::string impossible_inertia(const datasets::Object& object);
 
 /// Inertias outside of that range, with a diagonal of 2 m where no dims are declared (then I/m is at most
 /// 1 m²), and a pad radius above 0.2 m or above the diagonal of every object.

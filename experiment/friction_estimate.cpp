@@ -276,6 +276,13 @@ FrictionEstimate estimate_friction(const datasets::ThrowLog& log, const std::vec
                                    const std::string& model) {
   require_release_model(model);
   FrictionEstimate out;
+  if (std::none_of(throws.begin(), throws.end(),
+                   [](const PreparedThrow& one) { return one.split == datasets::Split::train; }))
+    throw Undetermined(model,
+                       fmt::format("none of the log's {} throws has the split 'train', and parameters are "
+                                   "estimated from no others",
+                                   throws.size()),
+                       "give a card (--card), or some throws the split 'train'");
   if (log.gripper) out.parameters.pads = log.gripper->n_pads;
   if (model == contact::kGripperDelay) {
     estimate_delay(throws, out.parameters);

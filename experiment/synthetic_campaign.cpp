@@ -208,7 +208,8 @@ SyntheticThrow make_throw(const CampaignDesign& design, const std::vector<bool>&
     options.integrator.record = true;
     const auto result = release::simulate_release(problem, options);
     if (result.outcome != release::ReleaseOutcome::detached)
-      throw fail(fmt::format("{} ({})", to_string(result.outcome), to_string(result.integration)));
+      throw fail(fmt::format("{} ({}, {})", in_words(result.outcome), to_string(result.outcome),
+                             to_string(result.integration)));
     if (result.slips_at_start) throw fail("the grip does not hold the object");
     truth.detach_time = result.detach.time;
     truth.detach_pose = result.detach.pose;

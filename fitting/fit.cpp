@@ -153,8 +153,14 @@ FitResult fit_from(std::vector<double> start, const CampaignProblem& problem, co
   FitRounds rounds(problem, options, start);
   if (rounds.used().empty()) {
     out.outcome = FitOutcome::no_start;
+    const bool any_train =
+        std::any_of(problem.throws().begin(), problem.throws().end(),
+                    [](const CampaignThrow& one) { return one.prepared.split == datasets::Split::train; });
     out.message =
-        rounds.refused()
+        !any_train
+            ? fmt::format("none of the log's {} throws has the split 'train', and no others are fitted to",
+                          problem.throws().size())
+        : rounds.refused()
             ? fmt::format("throw {} could not be simulated with the parameters that the fit starts from",
                           out.throws[*rounds.refused()].id)
             : "no throw of the fit's share could be simulated with the parameters that it starts from";

@@ -32,6 +32,18 @@ const char* to_string(FlightOutcome outcome) {
   return "unknown";
 }
 
+const char* in_words(FlightOutcome outcome) {
+  switch (outcome) {
+    case FlightOutcome::landed:
+      return "the object lands";
+    case FlightOutcome::never_reaches:
+      return "the object never comes down through the landing height";
+    case FlightOutcome::not_solved:
+      return "the simulation of the flight stopped before the landing";
+  }
+  return "unknown";
+}
+
 namespace {
 
 constexpr int kBelow = 0, kAbove = 1, kLanded = 2;

@@ -32,6 +32,8 @@ enum class FlightOutcome {
 };
 /// The outcome's name, as it is written above.
 const char* to_string(FlightOutcome);
+/// The same as a clause, for people.
+const char* in_words(FlightOutcome);
 
 /// How a flight ended, and where.
 template <class S>

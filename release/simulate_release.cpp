@@ -19,6 +19,18 @@ const char* to_string(ReleaseOutcome outcome) {
   return "unknown";
 }
 
+const char* in_words(ReleaseOutcome outcome) {
+  switch (outcome) {
+    case ReleaseOutcome::detached:
+      return "the pads let go of the object";
+    case ReleaseOutcome::never_separated:
+      return "the pads still press on the object where the hand's motion ends";
+    case ReleaseOutcome::not_solved:
+      return "the simulation of the release stopped before the pads let go";
+  }
+  return "unknown";
+}
+
 template <class S>
 ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const ReleaseOptions& options) {
   if (!(std::abs(problem.start) <= 1e6))

@@ -34,6 +34,8 @@ enum class ReleaseOutcome {
 };
 /// The outcome's name, as it is written above.
 const char* to_string(ReleaseOutcome);
+/// The same as a clause, for people.
+const char* in_words(ReleaseOutcome);
 
 /// The one value that flight gets.
 template <class S>

@@ -396,7 +396,10 @@ std::string why_not(const GroupedProblem& problem, Split split) {
   const char* name = split == Split::test ? "test" : "train";
   for (const auto& group : problem.groups())
     if (group.split == split) return fmt::format("no throw of split '{}' could be fitted", name);
-  return fmt::format("no throw has the split '{}': effects are found on train, and judged on test", name);
+  return fmt::format(
+      "no throw has the split '{}', of {}: effects are found on train, and judged on test; `unhand import "
+      "--test-every N` holds out every Nth of a condition, 5 if not said",
+      name, problem.groups().size());
 }
 
 }  // namespace

@@ -80,8 +80,7 @@ std::optional<MeasuredVerdict> measured_verdict(const datasets::Sku& sku, const 
                   n;
   }
   out.rms_z = std::sqrt(squares / (2 * n));
-  constexpr double kWild = 2;  // twice what was foretold is more than a tail
-  out.confirmed = out.within >= request.confidence && out.rms_z <= kWild;
+  out.confirmed = out.within >= request.confidence && out.rms_z <= kMostSurprise;
   return out;
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "contact/gripper_delay.hpp"
 #include "experiment/compare.hpp"
 #include "fitting/card.hpp"
 #include "fitting/sku/sku_measured.hpp"
@@ -53,7 +54,8 @@ std::size_t best(const std::vector<ThrowCandidate>& candidates, const LandingTol
   return out;
 }
 
-void decide(const SkuRequest& request, SkuValidation& out) {
+void decide(const datasets::Sku& sku, const datasets::ModelCard& card, const SkuRequest& request,
+            SkuValidation& out) {
   const ThrowCandidate& c = out.reference();
   if (!c.landed) {
     out.verdict = SkuVerdict::does_not_land;
@@ -70,6 +72,21 @@ void decide(const SkuRequest& request, SkuValidation& out) {
         "{:.1f} % of its landings lie within {:.3g} m and {:.3g} deg of the predicted one; "
         "asked for are {:.3g} %",
         100 * out.within, request.tolerance.x, request.tolerance.theta * kDegrees, 100 * request.confidence);
+    const bool lever = card.model == contact::kGripperDelay && std::abs(sku.com_offset) > kLeastLever;
+    if (lever && !(out.measured && out.measured->confirmed)) {
+      out.verdict = SkuVerdict::beyond_the_model;
+      out.message += fmt::format(
+          ", as {} sees it, which carries the object rigidly until it is free; this one hangs {:.3g} m from "
+          "the "
+          "pads and turns in them as they open: a card of limit_surface_disc or sliding_pivot tells of that",
+          card.model, std::abs(sku.com_offset));
+    }
+    if (out.measured && !out.measured->confirmed && (enough || out.measured->rms_z > kMostSurprise)) {
+      out.verdict = SkuVerdict::contradicted;
+      out.message +=
+          fmt::format("; of {} measured throws {:.1f} % do, with errors {:.2g} times what was foretold",
+                      out.measured->throws.size(), 100 * out.measured->within, out.measured->rms_z);
+    }
   }
 }
 
@@ -85,6 +102,10 @@ const char* to_string(SkuVerdict verdict) {
       return "cannot_be_held";
     case SkuVerdict::does_not_land:
       return "does_not_land";
+    case SkuVerdict::beyond_the_model:
+      return "beyond_the_model";
+    case SkuVerdict::contradicted:
+      return "contradicted";
   }
   return "?";
 }
@@ -113,8 +134,8 @@ SkuValidation validate_sku(const datasets::Sku& sku, const datasets::ModelCard& 
     out.gains = gains_of(motion.inputs, J, request.tolerance);
     monte_carlo(motion, J, request, out);
   }
-  decide(request, out);
   if (request.log != nullptr) out.measured = measured_verdict(sku, card, card_file, request);
+  decide(sku, card, request, out);
   return out;
 }
 

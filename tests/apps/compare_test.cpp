@@ -45,6 +45,37 @@ TEST_F(Cli, ThrowsWithoutAGraspAreLeftOut) {
   EXPECT_THAT(run("inspect half.h5").out, HasSubstr("note: 6 of 12 throws do not show the grasp"));
 }
 
+// One throw whose hand was not recorded takes no other with it.
+TEST_F(Cli, ThrowsWithoutAHandAreLeftOutWhereOthersHaveOne) {
+  int k = 0;
+  write_changed("one.h5", [&](datasets::Throw& one) {
+    if (k++ == 2) one.hand.reset();
+  });
+  const Answer answer = run("compare one.h5 --models sliding_pivot --json a.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.err,
+              HasSubstr("left out 1 of 12 throws, which have no hand, which the others have: 003"));
+  const json model = read_json(folder / "a.json")["models"]["sliding_pivot"];
+  EXPECT_EQ(model["train"]["n"].get<int>() + model["test"]["n"].get<int>(), 11);
+  EXPECT_EQ(run("fit one.h5 --model gripper_delay --card c.json").code, 0);
+  EXPECT_THAT(run("inspect one.h5").out,
+              HasSubstr("note: 1 of 12 throws have no hand and are held at first"));
+}
+
+// Parameters come from train throws: without any, that is what is said, not how few samples there are.
+TEST_F(Cli, NoTrainThrowsIsSaid) {
+  write_changed("test.h5", [](datasets::Throw& one) { one.split = datasets::Split::test; });
+  const Answer answer = run("compare test.h5");
+  EXPECT_EQ(answer.code, 1);
+  EXPECT_THAT(answer.err, HasSubstr("gripper_delay: not compared: none of the log's 12 throws has the split "
+                                    "'train', and parameters are estimated from no others"));
+  EXPECT_THAT(answer.err, Not(HasSubstr("samples")));
+  expect_refusal("compare test.h5 --fit --models limit_surface --json a.json", 1,
+                 "limit_surface: none of the log's 12 throws has the split 'train'");
+  expect_refusal("fit test.h5 --model limit_surface --card c.json", 1,
+                 "none of its 12 throws has the split 'train'");
+}
+
 // Wrenches without torque do not tell how large the pads are; the delay needs no pads.
 TEST_F(Cli, AModelThatTheLogDoesNotDetermineStopsNoOther) {
   write_changed("straight.h5", [](datasets::Throw& one) {

@@ -122,5 +122,30 @@ TEST_F(Cli, DiscoverFindsNothingInACalmLog) {
   EXPECT_EQ(found["error"]["before"], found["error"]["after"]) << "nothing was added";
 }
 
+// What the quickstart shows.
+TEST_F(Cli, TheQuickstartsDragMakesEveryHeldOutErrorOfTheLandingSmaller) {
+  ASSERT_EQ(run("generate quick12 --seed 3 --effect flight.quadratic_drag=0.05 --out air.h5").code, 0);
+  ASSERT_EQ(run("discover air.h5 --model limit_surface_disc --json d.json").code, 0);
+  const json found = read_json(folder / "d.json");
+  ASSERT_EQ(found["verdict"], "effect_found");
+  EXPECT_EQ(found["effects"][0]["id"], "flight.quadratic_drag");
+  const json &before = found["error"]["before"]["test"], &after = found["error"]["after"]["test"];
+  for (const char* error : {"landing_x_mae_m", "landing_theta_mae_deg"})
+    EXPECT_LT(after[error].get<double>(), before[error].get<double>()) << error;
+}
+
+// The example that writes a log writes one that the next steps of the documentation work on.
+TEST_F(Cli, TheExamplesLogGoesThroughEveryStep) {
+  ASSERT_EQ(std::system(("cd '" + folder.string() + "' && " UNHAND_WRITE_A_LOG " > written.txt").c_str()), 0);
+  EXPECT_EQ(content(folder / "written.txt"), "throws.h5: 12 throws\n");
+  for (const char* step :
+       {"inspect throws.h5", "compare throws.h5", "fit throws.h5 --model limit_surface_disc --card card.json",
+        "predict throws.h5 --card card.json", "discover throws.h5 --model limit_surface_disc"}) {
+    const Answer answer = run(step);
+    EXPECT_EQ(answer.code, 0) << step << "\n" << answer.err;
+    EXPECT_THAT(answer.out, Not(HasSubstr("doubtful")));
+  }
+}
+
 }  // namespace
 }  // namespace unhand::cli

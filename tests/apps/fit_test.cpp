@@ -88,6 +88,33 @@ TEST_F(Cli, FitThenPredict) {
 }
 
 // Without a normal force the card tells how the pads open, or prediction says what is missing.
+// What ends a throw without a landing is told in words; JSON has its name.
+TEST_F(Cli, ThrowsThatDoNotLandAreToldInWords) {
+  ASSERT_EQ(run("fit " + quick + " --model limit_surface_disc --card c.json").code, 0);
+  auto log = datasets::read_throw_log(quick);
+  std::vector<double> peaks;
+  for (auto& one : log.throws) {
+    one.landing.reset();
+    double& peak = peaks.emplace_back(-1);
+    for (std::size_t i = 0; i < one.mocap->pose.rows; ++i)
+      if (one.mocap->is_valid(i)) peak = std::max(peak, one.mocap->pose(i, 1));
+  }
+  std::sort(peaks.begin(), peaks.end());
+  log.landing_height = peaks[peaks.size() / 2];
+  datasets::write_throw_log(folder / "high.h5", log);
+  const Answer answer = run("predict high.h5 --card c.json --json p.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(
+      answer.err,
+      HasSubstr("of 12 throws, never_reaches: the object never comes down through the landing height"));
+  EXPECT_THAT(read_json(folder / "p.json").dump(), HasSubstr("\"never_reaches\""));
+  log.landing_height = peaks.back() + 0.3;
+  datasets::write_throw_log(folder / "higher.h5", log);
+  const std::string words =
+      "brings no throw to a landing: the object never comes down through the landing height";
+  expect_refusal("predict higher.h5 --card c.json --json q.json", 1, words);
+}
+
 TEST_F(Cli, PredictSaysHowPadsOpenThatNobodyMeasured) {
   ASSERT_EQ(run("generate quick12 --seed 4 --without ft --out bare.h5").code, 0);
   ASSERT_EQ(run("fit bare.h5 --model limit_surface_disc --card bare.json --json f.json").code, 0);

@@ -91,6 +91,94 @@ TEST_F(Cli, ImportsTheFilesOfALab) {
   expect_refusal("import " + motive + "--mass 1 --out a.h5 --json a.json", 3, "takes/slow_02.csv: line 246");
 }
 
+// A campaign of plain CSV files alone is as good as one of Motive's.
+TEST_F(Cli, ImportsATrackFromAnyCsv) {
+  write_lab_files(folder);
+  fs::create_directories(folder / "mocap");
+  for (const std::string name : {"slow_01", "slow_02"}) {
+    std::ofstream track(folder / "mocap" / (name + ".csv"));
+    track << "t (s),X (mm),Z (mm),pitch (deg)\n";
+    for (int k = 0; k < 240; ++k) {
+      const double t = k / 240.0, fall = std::max(0.0, t - 0.15);
+      track << t << ',';
+      if (k == 20)
+        track << ",,\n";
+      else
+        track << 500 + 1500 * t << ',' << 800 + 1500 * t - 500 * 9.81 * fall * fall << ','
+              << (0.26 + 4 * fall) * 180 / std::numbers::pi << '\n';
+    }
+  }
+  const std::string hand =
+      "hand-csv hand/slow_01.csv hand/slow_02.csv --columns "
+      "time=t,x=X,z=Z,theta=pitch,vx=VX,vz=VZ,omega=Q,ax=AX,az=AZ,alpha=DQ --units "
+      "time=ms,x=mm,z=mm,theta=deg,vx=m/s,vz=m/s,omega=deg/s,ax=m/s^2,az=m/s^2,alpha=deg/s^2 ";
+  const std::string mocap =
+      "mocap-csv mocap/slow_01.csv mocap/slow_02.csv --columns time=t,x=X,z=Z,theta=pitch --sigma "
+      "x=0.2,z=0.2,theta=0.2 --landing ";
+  ASSERT_EQ(run("import " + hand + "--sku bar.toml --opening-time 0.1 --test-every 2 --out log.h5").code, 0);
+  ASSERT_EQ(run("import ft-csv ft/slow_01.csv ft/slow_02.csv --columns "
+                "time=t,fx=-Fx,fz=-Fz,tau=-Ty,normal=Fy --into log.h5")
+                .code,
+            0);
+  const Answer answer = run("import " + mocap + "--into log.h5 --json a.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("throw slow_01, 240 samples, 0 to 0.995833 s, 1 lost, lands at"));
+  EXPECT_EQ(read_json(folder / "a.json")["files"][0]["lost"], 1);
+  const auto log = datasets::read_throw_log(folder / "log.h5");
+  const datasets::Throw& one = log.throws[0];
+  EXPECT_FALSE(one.mocap->is_valid(20));
+  EXPECT_NEAR(one.mocap->pose(0, 2), 0.26, 1e-6);
+  EXPECT_NEAR(one.landing->pose(0, 0), 0.5 + 1.5 * one.landing->time(0), 1e-5);
+  EXPECT_EQ(run("compare log.h5 --models gripper_delay").code, 0);
+
+  EXPECT_EQ(run("import " + mocap + "--mass 0.25 --out flights.h5 --test-every 2").code, 0);  // no hand
+  EXPECT_EQ(datasets::read_throw_log(folder / "flights.h5").dimension, 2);
+  expect_refusal("import " + mocap + "--into log.h5 --heading 3", 2, "--heading is not for mocap-csv");
+  expect_refusal("import " + mocap + "--into '" + flights + "' --out a.h5", 3,
+                 "/@dimension: is 3, and mocap-csv is for planar logs");
+  expect_refusal("import mocap-csv mocap/slow_01.csv --mass 1 --out a.h5 --columns time=t,x=X", 2,
+                 "'z' is missing (needed: time, x, z, theta)");
+  expect_refusal(
+      "import mocap-csv mocap/slow_01.csv --mass 1 --out a.h5 --columns time=t,x=X,z=Y,theta=pitch", 3,
+      "mocap/slow_01.csv: line 1: there is no column 'Y' for z");
+}
+
+// A planar log of a throw that was seen from the side is its shadow.
+TEST_F(Cli, AHeadingThatTheTrackContradictsIsRefused) {
+  write_lab_files(folder);
+  const std::string motive =
+      "import motive-csv takes/slow_01.csv takes/slow_02.csv --dimension 2 --mass 1 --out a.h5 --test-every "
+      "2 ";
+  expect_refusal(
+      motive + "--heading 70", 3,
+      "takes/slow_01.csv: rigid body bar, columns Position: the body runs 1.49 m along a heading of 0.0 "
+      "deg, 70.0 deg from --heading 70: up to 15 deg are accepted");
+  expect_refusal(motive + "--heading 70", 3, "--heading 0.0?");
+  const auto notes = [&](const std::string& heading) {
+    const Answer answer = run(motive + "--json a.json --heading " + heading);
+    EXPECT_EQ(answer.code, 0) << answer.err;
+    EXPECT_EQ(read_json(folder / "a.json")["notes"].empty(), answer.err.empty());
+    return answer.err;
+  };
+  EXPECT_EQ(notes("0"), "");
+  EXPECT_EQ(notes("2"), "");
+  EXPECT_THAT(notes("10"), HasSubstr("10.0 deg from --heading 10; x is too short by 1.5 %: --heading 0.0?"));
+  EXPECT_THAT(notes("180"), HasSubstr("it goes backwards"));
+}
+
+// Fewer throws than are held out of: discover would have nothing to judge by.
+TEST_F(Cli, SaysThatNothingIsHeldOut) {
+  write_lab_files(folder);
+  const std::string motive = "import motive-csv takes/slow_01.csv takes/slow_02.csv --mass 1 --out a.h5 ";
+  EXPECT_THAT(
+      run(motive).err,
+      HasSubstr("no throw is held out: --test-every 5 holds out every 5th throw of a condition, and no "
+                "condition has more than 2 throws"));
+  EXPECT_THAT(run(motive).err, HasSubstr("need some: --test-every 2, or more throws"));
+  EXPECT_THAT(run(motive + "--test-conditions slow").err, HasSubstr("all throws are held out"));
+  EXPECT_EQ(run(motive + "--test-every 2").err, "");
+}
+
 TEST_F(Cli, ImportsTossesOfAnotherCube) {
   std::ofstream tosses(folder / "t.csv");
   tosses << "toss,k,t_s,x_m,y_m,z_m,qw,qx,qy,qz,vx,vy,vz,wx_body,wy_body,wz_body,before_first_contact\n";
@@ -145,6 +233,9 @@ TEST_F(Cli, ImportsPhonesAsFreeFlights) {
                  "still.csv: line 1: holds no free fall");
   expect_refusal("import phyphox fall_1.csv --mass 0.2 --out a.h5 --min-fall 0.8", 3,
                  "lasts 0.600 s, less than 0.8 s");
+  EXPECT_THAT(answer.err, HasSubstr("no throw is held out"));
+  expect_refusal("discover falls.h5 --model free_fall", 1,
+                 "no throw has the split 'test', of 1: effects are found on train");
 }
 
 }  // namespace

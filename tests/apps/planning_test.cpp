@@ -232,6 +232,20 @@ TEST_F(Cli, ValidateSkuAnswersWithABudget) {
   expect_refusal("validate-sku bar.toml --card none.json", 3, "none.json");
   std::ofstream(folder / "bare.toml") << "name = 'x'\nmass_kg = 1\nsurface = 'steel'\n";
   expect_refusal("validate-sku bare.toml --card card.json --json c.json", 3, "inertia_kg_m2");
+
+  // An inertia that no body of that mass and size has.
+  const auto inertia = [&](const std::string& value) {
+    std::ofstream(folder / "odd.toml")
+        << "name = 'x'\nmass_kg = 0.246\nsurface = 'steel'\ninertia_kg_m2 = " << value;
+    return "validate-sku odd.toml --card card.json --json c.json";
+  };
+  expect_refusal(inertia("12.1\n"), 3, "odd.toml: inertia_kg_m2: inertia is 12.1 kg m^2 for 0.246 kg");
+  expect_refusal(inertia("1e-9\n"), 3, "or its inertia in another unit than kg m^2?");
+  expect_refusal(inertia("1.21e-3\ndims_m = [0.04, 0.03, 0.02]\n"), 3,
+                 "a body within its dims (a diagonal of 0.0539 m) has 0.0");
+  expect_refusal("plan throw --target 1.3,0,-0.2 --sku odd.toml", 3, "odd.toml: inertia_kg_m2");
+  expect_refusal("import hand-csv x.csv --sku odd.toml --out o.h5 --columns time=t", 3,
+                 "odd.toml: inertia_kg_m2");
 }
 
 }  // namespace

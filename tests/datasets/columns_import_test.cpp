@@ -46,6 +46,43 @@ TEST(ColumnsImport, HandByNumberWithoutHeader) {
   EXPECT_DOUBLE_EQ(hand.acceleration(1, 2), std::numbers::pi);
 }
 
+// Lost rows are marked, never filled in; the angle counts on across them.
+TEST(ColumnsImport, ATrackedObjectWithLosses) {
+  const Scratch scratch;
+  const std::string file = scratch / "mocap.csv";
+  ColumnMap map{{{"time", "t"}, {"x", "X"}, {"z", "Z"}, {"theta", "-pitch"}}, {}, {}, -1};
+  map.sigma = {{"x", 0.2}, {"z", 0.3}, {"theta", 0.9}};
+  put_bytes(file,
+            "\xef\xbb\xbf"
+            "frame,Z (mm),X (mm),pitch (deg),t (s)\r\n1,800,500,-179,1.5\r\n2,,,,1.6\r\n"
+            "3,NaN,510,1,1.7\r\n4,810,520,179,1.8\r\n5,805,530,170,1.9\r\n");
+  const MocapLog mocap = read_mocap_csv(file, map);
+  EXPECT_EQ(mocap.valid, (Flags{1, 0, 0, 1, 1}));
+  ASSERT_EQ(mocap.time.rows, 5U);
+  EXPECT_NEAR(mocap.time(3), 0.8, 1e-12);
+  constexpr double degree = std::numbers::pi / 180;
+  EXPECT_DOUBLE_EQ(mocap.pose(0, 0), 0.5);
+  EXPECT_DOUBLE_EQ(mocap.pose(0, 1), 0.8);
+  EXPECT_NEAR(mocap.pose(0, 2), 179 * degree, 1e-12);
+  EXPECT_NEAR(mocap.pose(3, 2), 181 * degree, 1e-12);
+  EXPECT_NEAR(mocap.pose(4, 2), 190 * degree, 1e-12);
+  for (std::size_t j = 0; j < 3; ++j)
+    EXPECT_TRUE(std::isnan(mocap.pose(1, j)) && std::isnan(mocap.pose(2, j)));
+  const std::vector<double> sigma{2e-4, 3e-4, 0.9 * degree};
+  for (std::size_t j = 0; j < 3; ++j) EXPECT_DOUBLE_EQ(mocap.pose.sigma[j], sigma[j]);
+
+  put_bytes(file, "t (s),X (m),Z (m),pitch (deg)\n0,,,\n1,,,\n");
+  expect_error<ImportError>([&] { read_mocap_csv(file, map); }, file, "", "lost in all of its 2 rows");
+  put_bytes(file, "t (s),X (m),Z (m),pitch (deg)\n0,1,1,x\n");
+  expect_error<ImportError>([&] { read_mocap_csv(file, map); }, file, "line 2, column pitch (deg)",
+                            "'x' is not a number");
+  put_bytes(file, "t (s),X (m),Z (m),pitch (deg)\n,1,1,1\n");
+  expect_error<ImportError>([&] { read_mocap_csv(file, map); }, file, "line 2, column t (s)",
+                            "'' is not a number");
+  map.sigma.erase("z");
+  EXPECT_THAT(fault_of(map, mocap_channels()), HasSubstr("for all of x, z, theta or for none"));
+}
+
 TEST(ColumnsImport, HeadersOfSeveralSpellings) {
   const Scratch scratch;
   put_bytes(scratch / "ft.csv", "\"t\"\tFz_[N]\tFx\t\"Ty (N m)\"\tgrip\n0\t1\t2\t3\t4\n");

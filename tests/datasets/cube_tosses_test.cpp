@@ -96,6 +96,41 @@ TEST(CubeTosses, ResultIsALogThatRoundTrips) {
   EXPECT_EQ(read_throw_log(scratch / "t.h5"), log);
 }
 
+// Columns are found by their names: another order, more of them, fewer that nobody reads, a byte order mark.
+TEST(CubeTosses, ReadsColumnsByName) {
+  const Scratch scratch;
+  put_bytes(scratch / "t.csv", header + toss(0, 9, 2) + toss(4, 12, 0));
+  const ThrowLog expected = import_cube_tosses(scratch / "t.csv");
+  const auto read = [&](const std::string& first, const std::string& separator, auto cells) {
+    std::istringstream rows(toss(0, 9, 2) + toss(4, 12, 0));
+    std::string text = first + "\n", line;
+    while (std::getline(rows, line)) {
+      std::vector<std::string> all;
+      std::istringstream in(line);
+      for (std::string cell; std::getline(in, cell, ',');) all.push_back(cell);
+      const std::vector<std::string> wanted = cells(all);
+      for (std::size_t j = 0; j < wanted.size(); ++j) text += (j > 0 ? separator : "") + wanted[j];
+      text += "\n";
+    }
+    put_bytes(scratch / "u.csv", text);
+    return import_cube_tosses(scratch / "u.csv");
+  };
+  using Cells = std::vector<std::string>;
+  EXPECT_EQ(read("\xef\xbb\xbf" + header.substr(0, header.size() - 1), ",", [](const Cells& c) { return c; }),
+            expected);
+  EXPECT_EQ(read("note,before_first_contact,qz,qy,qx,qw,z_m,y_m,x_m,t_s,k,toss", ",",
+                 [](const Cells& c) {
+                   return Cells{"\"a, b\"", c[16], c[9], c[8], c[7], c[6],
+                                c[5],       c[4],  c[3], c[2], c[1], c[0]};
+                 }),
+            expected);
+  EXPECT_EQ(read("toss;k;t_s;x_m;y_m;z_m;qw;qx;qy;qz;before_first_contact", ";",
+                 [](const Cells& c) {
+                   return Cells{c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9], c[16]};
+                 }),
+            expected);
+}
+
 // Half the space diagonal: with the centre above it, no orientation touches the table.
 TEST(CubeTosses, LandingHeightClearsEveryOrientation) {
   const Scratch scratch;
@@ -128,6 +163,10 @@ TEST(CubeTosses, SaysWhichLineAndColumn) {
   expect("", "line 1", "holds no tosses");
   expect(header, "line 1", "holds no tosses");
   expect(toss(0, 9, 2), "line 1", "header is missing");
+  expect("toss,k,t_s,x_m,y_m,z,qw,qx,qy,qz,before_first_contact\n0,0,0,0,0,0,1,0,0,0,1\n", "line 1",
+         "there is no column 'z_m'");
+  expect("toss,k,t_s,x_m,y_m,z_m,qw,qx,qy,qz,x_m,before_first_contact\n", "line 1, column x_m",
+         "stands twice in the header");
   expect(start + "1,0,0,0.2,0,x.5,0.6,0,0.8,0,1,0,0,0,0,3,1\n", "line 13, column z_m",
          "'x.5' is not a number");
   expect(start + "1,0,0,0.2,0,,0.6,0,0.8,0,1,0,0,0,0,3,1\n", "line 13, column z_m", "'' is not a number");

@@ -142,6 +142,25 @@ TEST(Motive, PlanarThrowAlongAnyHeading) {
   }
 }
 
+// Whatever heading was asked for, and whatever the body does after it has hit the floor.
+TEST(Motive, FindsTheHeadingOfTheThrow) {
+  for (const double heading : {0.0, 0.7, 3.0, -2.0}) {
+    File file;
+    const auto turned = about(Y, heading);
+    for (int k = 0; k < 60; ++k) {
+      const double t = 0.01 * k, rolled = std::max(0.0, t - 0.45);
+      const double up = 1 + t - 5 * std::pow(std::min(t, 0.45), 2) + 2 * rolled;
+      file.rows += row(k, t, upright, turned * Eigen::Vector3d(2 * t, up, 5 * rolled));
+    }
+    MotiveOptions options;
+    options.dimension = 2;
+    const MotiveTake take = read(file, options);
+    EXPECT_NEAR(std::remainder(take.run_heading - heading, 2 * pi), 0, 0.02) << heading;
+    EXPECT_NEAR(take.run, 0.9, 0.03);
+    EXPECT_LT(take.beside_run, 0.03);
+  }
+}
+
 TEST(Motive, OutOfPlaneIsSaid) {
   File file;
   file.rows = row(0, 0, upright, {0, 0, 0}) + row(1, 0.1, about(Y, 0.1), {0, 0, 0.02});

@@ -148,6 +148,27 @@ TEST(Phyphox, ThrowsGoIntoALog) {
   EXPECT_EQ(read_throw_log(scratch / "falls.h5"), log);
 }
 
+// Columns in another unit than the header says would be a log of falls that never were.
+TEST(Phyphox, RefusesOtherUnits) {
+  const Scratch scratch;
+  const std::string file = scratch / "phone.csv";
+  const auto expect = [&](double time, double force, const std::string& place, const std::string& reason) {
+    std::ostringstream out;
+    out << header;
+    for (int k = 0; k < 800; ++k) {
+      const double t = 0.005 * k, up = t < 1 || t > 1.65 ? 9.8 : t > 1.6 ? 150 : 0.2;
+      out << time * t << ",0.1,-0.2," << force * up << '\n';
+    }
+    put_bytes(file, out.str());
+    expect_error<ImportError>([&] { read_phyphox(file); }, file, place, reason);
+  };
+  expect(1000, 1, "column Time (s)",
+         "samples are 5 s apart (median), accepted are 0.0001 to 0.1 s: is it in ms");
+  expect(1e-3, 1, "column Time (s)", "samples are 5e-06 s apart");
+  expect(1, 1 / 9.81, "columns Acceleration (m/s^2)", "a phone that is held reads 7 to 14: is it in g?");
+  expect(1, 3.281, "columns Acceleration (m/s^2)", "outside of falls it reads 32.2 m/s^2");
+}
+
 TEST(Phyphox, SaysWhichLineAndColumn) {
   const Scratch scratch;
   const std::string file = scratch / "phone.csv";

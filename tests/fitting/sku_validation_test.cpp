@@ -153,6 +153,23 @@ TEST(SkuValidation, AnObjectTooHeavyForTheGripIsToldWhatWouldHoldIt) {
   }
 }
 
+// A rigid carriage is sure of an object that turns in the pads, and wrong.
+TEST(SkuValidation, APureDelayCannotVouchForAnObjectOnALever) {
+  datasets::ModelCard delay;
+  delay.model = "gripper_delay";
+  delay.parameters = {{"delay", {0.05, 0.001, "s"}}, {"delay_sigma", {0.002, {}, "s"}}};
+  auto request = quick(200);
+  request.tolerance = {0.5, 3};
+  const auto answer = validate_sku(bar(), delay, "card.json", request);
+  EXPECT_GE(answer.within, request.confidence);
+  EXPECT_EQ(answer.verdict, SkuVerdict::beyond_the_model) << answer.message;
+  EXPECT_THAT(answer.message, HasSubstr("hangs 0.1 m from the pads and turns in them"));
+  auto held_there = bar();
+  held_there.com_offset = 0;
+  const auto central = validate_sku(held_there, delay, "card.json", request);
+  EXPECT_EQ(central.verdict, SkuVerdict::throwable) << central.message;
+}
+
 TEST(SkuValidation, AssumesWhatTheSkuDoesNotTell) {
   auto sku = bar();
   sku.mass_sigma = sku.inertia_sigma = sku.com_offset_sigma = std::nullopt;
@@ -180,6 +197,7 @@ TEST(SkuValidation, MeasuredThrowsConfirmTheRightSkuAndContradictAWrongOne) {
   ASSERT_TRUE(right.measured);
   EXPECT_EQ(right.measured->throws.size(), log.throws.size());
   EXPECT_TRUE(right.measured->confirmed) << right.measured->rms_z << " " << right.measured->within;
+  EXPECT_EQ(right.verdict, SkuVerdict::throwable) << right.message;
   EXPECT_EQ(right.candidates.size(), 3u);  // the design's release accelerations
 
   auto wrong = bar();
@@ -188,6 +206,8 @@ TEST(SkuValidation, MeasuredThrowsConfirmTheRightSkuAndContradictAWrongOne) {
   ASSERT_TRUE(answer.measured);
   EXPECT_FALSE(answer.measured->confirmed);
   EXPECT_GT(answer.measured->rms_z, 2 * right.measured->rms_z);
+  EXPECT_EQ(answer.verdict, SkuVerdict::contradicted) << answer.message;
+  EXPECT_THAT(answer.message, HasSubstr("measured throws"));
 
   request.condition = "no such";
   EXPECT_THROW(validate_sku(bar(), gripper, "card.json", request), std::invalid_argument);
