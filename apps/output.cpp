@@ -29,7 +29,8 @@ fs::path in_place(const fs::path& made) {
   for (const fs::path& step : made) {
     const std::string name = step.string();
     const std::size_t at = name.rfind(kPart);
-    out /= name.front() == '.' && at != std::string::npos && at > 0 ? fs::path(name.substr(1, at - 1)) : step;
+    out /=
+        name.starts_with('.') && at != std::string::npos && at > 0 ? fs::path(name.substr(1, at - 1)) : step;
   }
   return out.lexically_normal();
 }
@@ -169,6 +170,7 @@ void Outputs::log(const fs::path& file, const datasets::SlipLog& log) { hdf5(fil
 fs::path Outputs::directory(const fs::path& destination) {
   require_writable_directory(destination);
   const fs::path wanted = trimmed(destination);
+  const Unbroken here;  // an interruption removes what is there
   const fs::path made = add(wanted, true);
   std::error_code error;
   if (!fs::create_directory(made, error) || error) refuse(destination, error.message());

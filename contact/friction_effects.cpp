@@ -60,7 +60,7 @@ void validate(const FrictionVariation<Dual>& v) {
           "[0.001, 1] m/s");
   require(v.viscous.a >= -1 && v.viscous.a <= 50, "viscous.1/v_0", v.viscous.a, "[-1, 50] s/m");
   require(v.softness.a >= -1 && v.softness.a <= 2, "soft_patch_radius.gamma", v.softness.a, "[-1, 2]");
-  const bool soft = v.softness.a != 0 || !v.softness.v.isZero();
+  const bool soft = !dynamics::is_zero(v.softness);
   require(!soft || v.reference_force > 0, "soft_patch_radius: f_0", v.reference_force, "(0, inf) N");
   require(v.pressure_exponent.a >= -0.4 && v.pressure_exponent.a <= 3, "pressure_profile.s",
           v.pressure_exponent.a, "[-0.4, 3]");

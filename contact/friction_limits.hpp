@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "contact/friction_effects.hpp"
-#include "contact/local_friction.hpp"
 #include "contact/patch.hpp"
+#include "contact/speed_dependence.hpp"
 #include "dynamics/frames.hpp"
 
 namespace unhand::contact {
@@ -27,7 +27,10 @@ class FrictionLimits {
  public:
   /// Both are copied; validate them first.
   FrictionLimits(const Patch<S>& patch, const FrictionVariation<S>& variation)
-      : patch_(patch), variation_(variation), soft_(is_active(variation.softness)), speed_(variation) {}
+      : patch_(patch),
+        variation_(variation),
+        soft_(!dynamics::is_zero(variation.softness)),
+        speed_(variation) {}
 
   /// The patch under Coulomb's law.
   const Patch<S>& patch() const { return patch_; }
@@ -58,9 +61,6 @@ class FrictionLimits {
   const SpeedDependence<S>& speed() const { return speed_; }
 
  private:
-  static bool is_active(double x) { return x != 0; }
-  static bool is_active(const dynamics::Dual& x) { return x.a != 0 || !x.v.isZero(); }
-
   Patch<S> patch_;
   FrictionVariation<S> variation_;
   bool soft_;

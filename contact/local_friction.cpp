@@ -12,9 +12,6 @@ using dynamics::value_of;
 
 namespace {
 
-bool varies(double x) { return x != 0; }
-bool varies(const Dual& x) { return x.a != 0 || !x.v.isZero(); }
-
 constexpr int kNodes = 32, kInnerNodes = 20;
 constexpr double kReach = 6.4;  // Stribeck speeds beyond which exp(−v²/v_s²) is rounding
 constexpr double kFar = 1e4;    // d beyond which the disc slides as a whole, to 1e-8
@@ -160,27 +157,6 @@ DiscExcess even_disc(const Law& law, double V, double W) {
 
 }  // namespace
 
-template <class S>
-SpeedDependence<S>::SpeedDependence(const FrictionVariation<S>& v)
-    : static_excess(v.static_ratio - 1.0),
-      stribeck_speed(v.stribeck_speed),
-      viscous(v.viscous),
-      stribeck(varies(static_excess)),
-      linear(varies(v.viscous)) {}
-
-template <class S>
-S SpeedDependence<S>::factor(const S& square) const {
-  using std::exp;
-  using std::sqrt;
-  S out(1.0);
-  if (stribeck) out += static_excess * exp(-square / (stribeck_speed * stribeck_speed));
-  if (linear && value_of(square) > 0) {
-    const S growth = 1.0 + viscous * sqrt(square);
-    out = value_of(growth) > 0 ? S(out * growth) : S(0);
-  }
-  return out;
-}
-
 /// The weights are those whose sums of R^2k are ∫ R^2k, (k+1)!/((s+2) … (s+k+1)).
 LocalFriction::LocalFriction(const Dual& exponent, const Dual& torque_factor)
     : torque_factor_(torque_factor), square_radius_(1.0 / (exponent + 2.0)) {
@@ -202,7 +178,7 @@ LocalFriction::LocalFriction(const Dual& exponent, const Dual& torque_factor)
   const Eigen::Matrix<double, kDiscs, 1> weight = factor.solve(moments), slope = factor.solve(slopes);
   for (int j = 0; j < kDiscs; ++j)
     weight_[static_cast<std::size_t>(j)] = Dual(weight[j], slope[j] * exponent.v);
-  if (!varies(exponent)) {
+  if (dynamics::is_zero(exponent)) {
     first_ = kDiscs - 1;
     weight_.back() = Dual(1.0);
   }
@@ -244,8 +220,6 @@ Vec3<S> LocalFriction::wrench(const SpeedDependence<S>& speed, const Vec3<S>& u)
   return {-slide * u[0], -slide * u[1], -side / c * torque};
 }
 
-template struct SpeedDependence<double>;
-template struct SpeedDependence<Dual>;
 template Vec3<double> LocalFriction::wrench(const SpeedDependence<double>&, const Vec3<double>&) const;
 template Vec3<Dual> LocalFriction::wrench(const SpeedDependence<Dual>&, const Vec3<Dual>&) const;
 

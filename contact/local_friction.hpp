@@ -1,29 +1,10 @@
 // Friction of a disc whose coefficient depends on every point's own slip speed.
 #pragma once
 
-#include "contact/friction_effects.hpp"
 #include "contact/limit_surface_shapes.hpp"
+#include "contact/speed_dependence.hpp"
 
 namespace unhand::contact {
-
-/// μ(v)/μ of a point that slips at v [m/s], as far as it departs from 1:
-///
-///   μ(v)/μ = (1 + (μ_s/μ_k − 1) exp(−v²/v_s²)) (1 + v/v₀), 0 where that would be negative
-template <class S>
-struct SpeedDependence {
-  S static_excess{};          ///< μ_s/μ_k − 1 [-]
-  S stribeck_speed{0.02};     ///< v_s [m/s]
-  S viscous{};                ///< 1/v₀ [s/m]
-  bool stribeck{}, linear{};  ///< whether the two terms vary, be it by their derivatives alone
-
-  SpeedDependence() = default;
-  /// Of a variation that has been validated.
-  explicit SpeedDependence(const FrictionVariation<S>& variation);
-  /// Whether there is any.
-  bool any() const { return stribeck || linear; }
-  /// μ(v)/μ at v² = `square` [m²/s²]
-  S factor(const S& square) const;
-};
 
 /// What the dependence adds to the force and the torque of a disc of pressure ∝ (1 − (r/a)²)^s, c its torque
 /// factor: with u = (v_r, L ω_r), V = |v_r| and Ω = |ω_r| a = |u_τ|/c,
@@ -37,8 +18,9 @@ struct SpeedDependence {
 ///   F = (2/π) ∫ h ρ sin ψ dρ,   T = (2/π) ∫ h ρ (ρψ − d sin ψ) dρ
 ///
 /// by 32 Gauss points that gather at both ends, where ψ is a square root; error below 1e-8, of derivatives
-/// below 1e-6. A disc that is not pressed evenly is a sum of discs that are, of radii R with the weights
-/// −πR² p′(R) dR: six of them, exact for powers of R² up to the fifth, error below 5e-4.
+/// below 1e-6, but 1e-3 of both where friction is cut off at zero (1/v₀ < 0 and fast). A disc that is not
+/// pressed evenly is a sum of discs that are, of radii R with the weights −πR² p′(R) dR: six of them, exact
+/// for powers of R² up to the fifth, error below 5e-4.
 class LocalFriction {
  public:
   /// The exponent s, and c(s). Derivatives enter those of the answer.

@@ -26,7 +26,7 @@ constexpr std::pair<std::string_view, Maker> kModels[] = {
     {"limit_surface_disc",
      [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
        const Dual& exponent = p.variation.pressure_exponent;
-       if (exponent.a != 0 || !exponent.v.isZero())
+       if (!dynamics::is_zero(exponent))
          return std::make_unique<LimitSurface<PressedDisc>>("limit_surface_disc", p.patch,
                                                             PressedDisc(exponent), p.variation);
        return std::make_unique<LimitSurface<UniformDisc>>("limit_surface_disc", p.patch, UniformDisc{},

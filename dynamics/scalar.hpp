@@ -23,6 +23,10 @@ using Dual = DualOf<kDualSize>;
 inline double value_of(double x) { return x; }
 inline double value_of(const Dual& x) { return x.a; }
 
+/// Whether a number and all of its derivatives are zero: a term that has it as a factor may be left out.
+inline bool is_zero(double x) { return x == 0; }
+inline bool is_zero(const Dual& x) { return x.a == 0 && x.v.isZero(); }
+
 /// x as a T: the value alone when T is double, a constant when x is.
 template <class T, class S>
 T convert(const S& x) {

@@ -68,7 +68,7 @@ std::unique_ptr<contact::ContactModel> make_law(const CampaignDesign& design, co
 class TrueHand {
  public:
   TrueHand(const PlanarArmHand& commanded, const ThrowSetup<double>& setup) : hand_(&commanded) {
-    if (!is_active(setup.late.tracking_lag)) return;
+    if (dynamics::is_zero(setup.late.tracking_lag)) return;
     polynomial_ = std::make_unique<release::PolynomialHand>(polynomial_hand(commanded));
     lagged_ = std::make_unique<release::LaggedHand>(*polynomial_, dynamics::Dual(setup.late.tracking_lag));
     hand_ = lagged_.get();

@@ -48,7 +48,7 @@ auto with_release(const PreparedThrow& prepared, const ThrowModel& model, const 
   const FeltForce<S> force = felt_force(prepared, setup, values);
 
   std::unique_ptr<release::LaggedHand> lagged;
-  if (is_active(setup.late.tracking_lag))
+  if (!dynamics::is_zero(setup.late.tracking_lag))
     lagged = std::make_unique<release::LaggedHand>(prepared.hand, Dual(setup.late.tracking_lag));
   const release::HandMotion& hand = lagged ? static_cast<const release::HandMotion&>(*lagged) : prepared.hand;
 

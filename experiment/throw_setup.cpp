@@ -47,9 +47,6 @@ ThrowSetup<S>::ThrowSetup(const dynamics::Values<S>& values) {
   dynamics::apply_effects(sensor_effects(), values, sensing);
 }
 
-bool is_active(double x) { return x != 0; }
-bool is_active(const Dual& x) { return x.a != 0 || !x.v.isZero(); }
-
 template <class S>
 void FeltForce<S>::wrap(std::unique_ptr<contact::NormalForce> outer) {
   force_ = outer.get();
@@ -57,20 +54,20 @@ void FeltForce<S>::wrap(std::unique_ptr<contact::NormalForce> outer) {
 }
 template <class S>
 void FeltForce<S>::doubt(const contact::NormalForceSummary& ramp, const S& deviation) {
-  if (is_active(deviation) && DoubtfulForce::applies_to(ramp))
+  if (!dynamics::is_zero(deviation) && DoubtfulForce::applies_to(ramp))
     wrap(std::make_unique<DoubtfulForce>(*force_, ramp, Dual(deviation)));
 }
 template <class S>
 void FeltForce<S>::unbias(const ThrowSetup<S>& setup, double opening_start) {
-  if (is_active(setup.sensing.normal_force_bias))
+  if (!dynamics::is_zero(setup.sensing.normal_force_bias))
     wrap(std::make_unique<contact::BiasedForce>(*force_, Dual(setup.sensing.normal_force_bias),
                                                 opening_start));
 }
 template <class S>
 void FeltForce<S>::act(const ThrowSetup<S>& setup) {
-  if (is_active(setup.late.opening_delay))
+  if (!dynamics::is_zero(setup.late.opening_delay))
     wrap(std::make_unique<release::DelayedForce>(*force_, Dual(setup.late.opening_delay)));
-  if (is_active(setup.friction.adhesion))
+  if (!dynamics::is_zero(setup.friction.adhesion))
     wrap(std::make_unique<contact::AdhesiveForce>(*force_, Dual(setup.friction.adhesion),
                                                   Dual(setup.friction.parting_time)));
 }
@@ -98,7 +95,7 @@ ThrowReader<S>::ThrowReader(const release::ReleaseProblem<S>& problem,
 
 template <class S>
 void ThrowReader<S>::fly(double longest, const dynamics::IntegratorOptions& options) {
-  in_air_ = is_active(flight_.drag_k) || is_active(flight_.lift_km);
+  in_air_ = !dynamics::is_zero(flight_.drag_k) || !dynamics::is_zero(flight_.lift_km);
   if (in_air_) flown_ = flight::record_flight(flight_, longest, options);
 }
 

@@ -32,10 +32,6 @@ struct ThrowSetup {
   explicit ThrowSetup(const dynamics::Values<S>& values);
 };
 
-/// True where a value, or one of its derivatives, is not zero.
-bool is_active(double x);
-bool is_active(const dynamics::Dual& x);
-
 /// The normal force that the object feels: a base with the effects on it wrapped around, innermost first.
 template <class S>
 class FeltForce {

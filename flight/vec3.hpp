@@ -8,9 +8,7 @@
 
 namespace unhand::flight {
 
-/// Whether a number and all of its derivatives are zero: a term that has it as a factor may be left out.
-inline bool is_zero(double x) { return x == 0; }
-inline bool is_zero(const dynamics::Dual& x) { return x.a == 0 && x.v.isZero(); }
+using dynamics::is_zero;
 
 /// World: x forward, y to the left, z up.
 template <class S>

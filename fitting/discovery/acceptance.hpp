@@ -129,8 +129,8 @@ inline constexpr double kCorrects = 0.98;
 
 /// What is left of the misfit where an effect acts, from which on it is an imitation of another.
 inline constexpr double kLeft = 0.1;
-/// The same of the misfit in the worst channel of the phase: a channel that showed little beside it cannot
-/// tell an imitation from a true effect whose law is known to a hundredth.
+/// The same of the misfit in the worst channel of the phase, a tenth of its size: a channel that showed
+/// little beside it cannot tell an imitation from a true effect whose law is not quite right.
 inline constexpr double kNextToNothing = 0.01;
 
 /// Of the misfit without a sensor's effect, the share below which the effect explains a channel in a phase.

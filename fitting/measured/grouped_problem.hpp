@@ -60,6 +60,9 @@ class GroupedProblem {
   /// Groups that were left out, with the reason.
   const std::vector<std::pair<std::string, std::string>>& skipped() const { return skipped_; }
 
+  /// Train groups that stand among the held-out ones in the place of such that were set aside.
+  const std::vector<std::size_t>& held_out_instead() const { return held_out_instead_; }
+
   /// The effects that can be asked for; where two are the same in the data, the first one's name is given.
   virtual std::vector<dynamics::Effect> effects() const = 0;
   /// At the values of shared parameters ("id.parameter" or "id.parameter[object]"; what is not named is

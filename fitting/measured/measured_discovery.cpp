@@ -200,11 +200,16 @@ void tell_of_wild(const GroupedProblem& problem, const std::vector<WildGroup>& w
     else if (k == kNamed)
       names += fmt::format(" and {} more", wild.size() - kNamed);
   }
-  out.evidence.push_back({"",
-                          fmt::format("{} of {} set aside, which neither the answer nor all listed effects "
-                                      "together explain as they do the others: {}",
-                                      wild.size(), problem.groups().size(), names),
-                          false});
+  std::string instead;
+  for (const std::size_t i : problem.held_out_instead())
+    instead +=
+        fmt::format("{}{}", instead.empty() ? "; held out in their place: " : ", ", problem.groups()[i].id);
+  out.evidence.push_back(
+      {"",
+       fmt::format("{} of {} throws set aside, which neither the answer nor all listed effects "
+                   "together explain as they do the others: {}{}",
+                   wild.size(), problem.groups().size(), names, instead),
+       false});
 }
 
 }  // namespace

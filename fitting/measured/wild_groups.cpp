@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "dynamics/dense_solve.hpp"
@@ -141,18 +142,22 @@ std::vector<WildGroup> still_wild(const GroupedProblem& problem, const std::vect
   std::vector<Footing> parts;
   for (const Split split : {Split::train, Split::test})
     add_parts(problem, fit_own(problem, split, answer, options), {}, options, parts);
-  const auto found = [&](std::size_t group) {
-    return std::find_if(groups.begin(), groups.end(), [&](const WildGroup& g) { return g.group == group; });
+  const auto is_wild = [&](std::size_t group) {
+    return std::any_of(groups.begin(), groups.end(), [&](const WildGroup& g) { return g.group == group; });
   };
   const auto misfit = [](const Footing& part) { return part.misfit(VectorXd::Zero(part.gram.rows() - 1)); };
   double worst = 0;
   for (const Footing& part : parts)
-    if (found(part.group) == groups.end()) worst = std::max(worst, misfit(part));
+    if (!is_wild(part.group)) worst = std::max(worst, misfit(part));
+  // One that could not be fitted is not explained.
+  const auto is_explained = [&](const WildGroup& wild) {
+    return std::any_of(parts.begin(), parts.end(), [&](const Footing& part) {
+      return part.group == wild.group && misfit(part) <= options.group_limit * worst;
+    });
+  };
   std::vector<WildGroup> out;
-  for (const Footing& part : parts)
-    if (const auto wild = found(part.group);
-        wild != groups.end() && misfit(part) > options.group_limit * worst)
-      out.push_back(*wild);
+  std::copy_if(groups.begin(), groups.end(), std::back_inserter(out),
+               [&](const WildGroup& wild) { return !is_explained(wild); });
   return out;
 }
 

@@ -1,8 +1,6 @@
 // Groups that err as no other does: a track that jumps, a throw that was touched, a phone that hit something.
 #pragma once
 
-#include <string>
-#include <utility>
 #include <vector>
 
 #include "fitting/measured/grouped_fit.hpp"

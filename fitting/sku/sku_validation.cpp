@@ -77,15 +77,15 @@ void decide(const datasets::Sku& sku, const datasets::ModelCard& card, const Sku
       out.verdict = SkuVerdict::beyond_the_model;
       out.message += fmt::format(
           ", as {} sees it, which carries the object rigidly until it is free; this one hangs {:.3g} m from "
-          "the "
-          "pads and turns in them as they open: a card of limit_surface_disc or sliding_pivot tells of that",
+          "the pads and turns in them as they open: a card of limit_surface_disc or sliding_pivot tells of "
+          "that",
           card.model, std::abs(sku.com_offset));
     }
     if (out.measured && !out.measured->confirmed && (enough || out.measured->rms_z > kMostSurprise)) {
       out.verdict = SkuVerdict::contradicted;
-      out.message +=
-          fmt::format("; of {} measured throws {:.1f} % do, with errors {:.2g} times what was foretold",
-                      out.measured->throws.size(), 100 * out.measured->within, out.measured->rms_z);
+      out.message += fmt::format(
+          "; of {} measured throws {:.1f} % lie within, with errors {:.2g} times what was foretold",
+          out.measured->throws.size(), 100 * out.measured->within, out.measured->rms_z);
     }
   }
 }

@@ -67,6 +67,19 @@ TEST(LocalFriction, IsTheIntegralOverAnEvenlyPressedDisc) {
     }
 }
 
+TEST(LocalFriction, InPureSpinItsTorqueIsAnErrorFunction) {
+  // T = 2σ ∫₀¹ exp(−(Ωρ/v_s)²) ρ² dρ = 2σ q³ (√π/4 erf(1/q) − exp(−1/q²)/(2q)), q = v_s/Ω
+  const double c = 2.0 / 3, excess = 0.4, v_s = 0.05;
+  const LocalFriction local(Dual(0.0), Dual(c));
+  for (const double q : {0.003, 0.05, 0.3, 1.0, 8.0}) {
+    const double torque =
+        2 * excess * q * q * q * (std::sqrt(pi) / 4 * std::erf(1 / q) - std::exp(-1 / (q * q)) / (2 * q));
+    const auto w = local.wrench(dependence(1 + excess, v_s, 0), Vec3<double>{0, 0, c * v_s / q});
+    EXPECT_EQ(w[0], 0);
+    EXPECT_NEAR(w[2], -torque / c, 1e-9) << q;
+  }
+}
+
 TEST(LocalFriction, FrictionIsNeverNegative) {
   const auto speed = dependence(1, 0.02, -0.9);  // 0 from 1.11 m/s on
   for (const Vec3<double>& u : {Vec3<double>{1.0, 0.3, 0.4}, {0.2, -0.1, 1.5}, {3, 0, 0.01}}) {
