@@ -38,6 +38,13 @@ std::vector<std::string> names_of(std::span<const Wanted> table) {
   return names;
 }
 
+/// Whether a tracker that lost the body writes this: nothing, or that it is no number.
+bool stands_for_nothing(std::string cell) {
+  std::transform(cell.begin(), cell.end(), cell.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (cell.starts_with('-') || cell.starts_with('+')) cell.erase(0, 1);
+  return cell.empty() || cell == "nan" || cell == "n/a" || cell == "na";
+}
+
 /// A channel's column: where it is, what it is called in errors, and how it becomes SI.
 struct Column {
   std::size_t index = 0;
@@ -46,12 +53,7 @@ struct Column {
   const Unit* unit = nullptr;
 
   double read(const CsvLine& line) const { return sign * unit->to_si(line.real(index, header)); }
-  /// Nothing stands there, or that it is no number.
-  bool is_lost(const CsvLine& line) const {
-    std::string cell = line.cells[index];
-    std::transform(cell.begin(), cell.end(), cell.begin(), [](unsigned char c) { return std::tolower(c); });
-    return cell.empty() || cell == "nan";
-  }
+  bool is_lost(const CsvLine& line) const { return stands_for_nothing(line.cells[index]); }
 };
 
 /// "Fx (N)" or "Fx [N]" as name and unit.
@@ -167,8 +169,13 @@ std::vector<Series> read_table(const std::filesystem::path& file, const ColumnMa
   if (!reader.next(line)) reader.fail(1, "is empty, expected a header and rows of numbers");
   const bool by_number = std::all_of(map.columns.begin(), map.columns.end(),
                                      [](const auto& entry) { return entry.second.find('#') <= 1; });
-  bool is_row = true;
-  for (std::size_t j = 0; j < line.cells.size(); ++j) is_row = is_row && line.is_number(j);
+  bool is_row = true, any = false;  // the first line, where it holds numbers and nothing else but losses
+  for (std::size_t j = 0; j < line.cells.size(); ++j) {
+    const bool number = line.is_number(j);
+    any = any || number;
+    is_row = is_row && (number || (valid != nullptr && stands_for_nothing(line.cells[j])));
+  }
+  is_row = is_row && any;
   if (is_row && !by_number)
     line.fail("", "the header is missing: name the columns by number, " + map.columns.begin()->first + "=#1");
   const ColumnFinder finder(line, map, !is_row);

@@ -212,30 +212,48 @@ void check_options(const MotiveOptions& options) {
       throw std::invalid_argument(fmt::format("{}: {} is not >= 0", name, sigma));
 }
 
-/// Where the track runs over the floor, from all of its points: upright, not turned by any heading.
-void find_run(const std::vector<Vector3d>& points, MotiveTake& take) {
-  constexpr double kRises = 0.01;  // m, more than a tracker's noise
-  if (points.empty()) return;
-  const auto highest = std::max_element(points.begin(), points.end(),
-                                        [](const auto& a, const auto& b) { return a.z() < b.z(); });
-  auto end = highest;
-  for (double lowest = highest->z(); end != points.end() && end->z() < lowest + kRises; ++end)
-    lowest = std::min(lowest, end->z());
-  const std::vector<Vector3d> thrown(points.begin(), end);
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  for (const Vector3d& p : thrown) mean += p.head<2>() / static_cast<double>(thrown.size());
-  Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
-  for (const Vector3d& p : thrown) spread += (p.head<2>() - mean) * (p.head<2>() - mean).transpose();
-  Eigen::Vector2d along = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(spread).eigenvectors().col(1);
-  if (along.dot((thrown.back() - thrown.front()).head<2>()) < 0) along *= -1;
-  double least = 0, most = 0;
-  for (const Vector3d& p : thrown) {
-    const Eigen::Vector2d off = p.head<2>() - mean;
-    least = std::min(least, off.dot(along)), most = std::max(most, off.dot(along));
+/// A frame in which the body was seen: upright, not turned by any heading.
+struct Seen {
+  double t;  // s
+  Vector3d at;
+};
+
+/// Whether frames [first, last] are a free flight: on a parabola that gravity bends, and nothing else.
+bool is_free(const std::vector<Seen>& seen, std::size_t first, std::size_t last) {
+  constexpr double kOther = 2.5;  // m/s², a drag or a tracker's noise
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero(), b = A;
+  for (std::size_t i = first; i <= last; ++i) {
+    const double t = seen[i].t - seen[first].t;
+    const Vector3d powers(1, t, t * t);
+    A += powers * powers.transpose();
+    b += powers * (seen[i].at - seen[first].at).transpose();
+  }
+  const Vector3d bend = 2 * A.ldlt().solve(b).row(2).transpose();
+  return (bend + Vector3d(0, 0, 9.81)).norm() < kOther;
+}
+
+/// Where the body runs over the floor, from its longest free flight: a throw may be carried anywhere before,
+/// and bounce after.
+void find_run(const std::vector<Seen>& seen, MotiveTake& take) {
+  constexpr double kWindow = 0.1, kFrames = 6;  // s; in it
+  std::size_t begin = 0, end = 0, from = 0, until = 0;
+  for (std::size_t i = 0, j = 0; i < seen.size(); ++i) {
+    while (j < seen.size() && seen[j].t - seen[i].t < kWindow) ++j;
+    if (j == seen.size()) break;
+    if (static_cast<double>(j - i) + 1 < kFrames || !is_free(seen, i, j)) continue;
+    if (i > until || until == 0) from = i;
+    until = j;
+    if (seen[until].t - seen[from].t > seen[end].t - seen[begin].t) begin = from, end = until;
+  }
+  if (end == begin) return;
+  const Vector3d way = seen[end].at - seen[begin].at;
+  const Eigen::Vector2d along = way.head<2>().normalized();
+  take.run = way.head<2>().norm();
+  take.run_heading = std::atan2(along.y(), along.x());
+  for (std::size_t i = begin; i <= end; ++i) {
+    const Eigen::Vector2d off = (seen[i].at - seen[begin].at).head<2>();
     take.beside_run = std::max(take.beside_run, std::abs(along.x() * off.y() - along.y() * off.x()));
   }
-  take.run = most - least;
-  take.run_heading = std::atan2(along.y(), along.x());
 }
 
 /// The log's poses, sample by sample.
@@ -263,10 +281,10 @@ class Track {
     ++take_.lost;
   }
 
-  void add(const Vector3d& pivot, const Quaterniond& q_M) {
+  void add(double t, const Vector3d& pivot, const Quaterniond& q_M) {
     const Vector3d p_M = pivot + q_M * vector(options_.com) - vector(options_.origin);
-    points_.push_back(upright(p_M));
-    const Vector3d p = turned_ * points_.back();
+    frames_.push_back({t, upright(p_M)});
+    const Vector3d p = turned_ * frames_.back().at;
     const Vector3d axis = upright(q_M.vec());  // C q C⁻¹ turns about the turned axis
     Quaterniond q = turned_ * Quaterniond(q_M.w(), axis.x(), axis.y(), axis.z());
     if (seen_ && q.coeffs().dot(last_.coeffs()) < 0) q.coeffs() *= -1;
@@ -290,8 +308,7 @@ class Track {
     add_flag(1);
   }
 
-  /// Of the frames in which the body was seen: upright, not turned by the heading.
-  const std::vector<Vector3d>& points() const { return points_; }
+  const std::vector<Seen>& frames() const { return frames_; }
 
  private:
   void append(std::initializer_list<double> row) {
@@ -308,7 +325,7 @@ class Track {
   std::size_t cols_;
   double theta_ = 0, first_y_ = 0;
   bool seen_ = false;
-  std::vector<Vector3d> points_;
+  std::vector<Seen> frames_;
 };
 
 }  // namespace
@@ -346,14 +363,14 @@ MotiveTake read_motive_csv(const std::filesystem::path& file, const MotiveOption
     if (pose.lost(line))
       track.add_lost();
     else
-      track.add(pose.position(line),
+      track.add(t, pose.position(line),
                 columns.rotation.empty() ? Quaterniond::Identity() : pose.rotation(line));
   }
   if (time.rows == 0) reader.fail(header.number, "holds no frames");
   if (take.lost == time.rows)
     reader.fail(header.number,
                 fmt::format("rigid body '{}' is lost in all of its {} frames", columns.body, time.rows));
-  find_run(track.points(), take);
+  find_run(track.frames(), take);
   return take;
 }
 

@@ -115,9 +115,9 @@ double step_of(const ImuLog& imu) {
 /// Times in another unit than seconds, and accelerations in another than m/s², by what phones do: they sample
 /// 20 to some thousand times a second, and read gravity while they are held.
 void check_units(const std::filesystem::path& file, const ImuLog& imu, double step) {
-  constexpr double kStep[2] = {1e-4, 0.1};    // s
-  constexpr double kHeld[2] = {7, 14};        // m/s²
-  constexpr double kFalling = 5, kInG = 0.1;  // m/s²; as a share of 1
+  constexpr double kStep[2] = {1e-4, 0.1};            // s
+  constexpr double kGravity = 9.80665, kFalling = 5;  // m/s²
+  constexpr double kNear = 0.05;                      // as a share
   constexpr std::size_t kEnough = 20;
   if (imu.time.rows < kEnough) return;
   if (!(step >= kStep[0] && step <= kStep[1]))
@@ -133,18 +133,23 @@ void check_units(const std::filesystem::path& file, const ImuLog& imu, double st
   const auto fail = [&](const std::string& why) {
     throw ImportError(file.string(), "columns Acceleration (m/s^2)", why);
   };
-  const double usual = dynamics::median(all);
-  if (held.size() < all.size() / 5 && std::abs(usual - 1) < kInG)
-    fail(
-        fmt::format("{:.3g} m/s^2 is what it reads (median), and a phone that is held reads {:g} to {:g}: "
-                    "is it in g?",
-                    usual, kHeld[0], kHeld[1]));
-  const double rest = held.size() < kEnough ? kHeld[0] : dynamics::median(held);
-  if (!(rest >= kHeld[0] && rest <= kHeld[1]))
-    fail(
-        fmt::format("outside of falls it reads {:.3g} m/s^2 (median), and a phone that is held reads {:g} to "
-                    "{:g}: is it in another unit?",
-                    rest, kHeld[0], kHeld[1]));
+  // Of a unit that is no m/s^2 the median shows gravity in that unit; a phone that is shaken or thrown hard
+  // reads anything else.
+  const double usual = dynamics::median(all),
+               rest = held.size() < kEnough ? kGravity : dynamics::median(held);
+  const auto is_near = [](double seen, double factor) {
+    return std::abs(seen - kGravity * factor) < kNear * kGravity * factor;
+  };
+  constexpr double kPerG = 1 / 9.80665, kPerFoot = 1 / 0.3048;
+  if (held.size() < all.size() / 5 && is_near(usual, kPerG))
+    fail(fmt::format(
+        "{:.3g} m/s^2 is what it reads (median), and a phone that is held reads about 9.8: is it in g?",
+        usual));
+  if (is_near(rest, kPerFoot))
+    fail(fmt::format(
+        "outside of falls it reads {:.3g} m/s^2 (median), and a phone that is held reads about 9.8: "
+        "is it in ft/s^2?",
+        rest));
 }
 
 /// Samples [first, last] of small specific force.

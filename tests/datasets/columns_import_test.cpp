@@ -73,6 +73,11 @@ TEST(ColumnsImport, ATrackedObjectWithLosses) {
 
   put_bytes(file, "t (s),X (m),Z (m),pitch (deg)\n0,,,\n1,,,\n");
   expect_error<ImportError>([&] { read_mocap_csv(file, map); }, file, "", "lost in all of its 2 rows");
+  // Without a header, too, and as C prints what is no number.
+  put_bytes(file, "0,,,\n0.1,-nan,1,0\n0.2,1,1,1\n");
+  ColumnMap numbered{{{"time", "#1"}, {"x", "#2"}, {"z", "#3"}, {"theta", "#4"}}, {}, {}, 0};
+  numbered.units = {{"time", "s"}, {"x", "m"}, {"z", "m"}, {"theta", "rad"}};
+  EXPECT_EQ(read_mocap_csv(file, numbered).valid, (Flags{0, 0, 1}));
   put_bytes(file, "t (s),X (m),Z (m),pitch (deg)\n0,1,1,x\n");
   expect_error<ImportError>([&] { read_mocap_csv(file, map); }, file, "line 2, column pitch (deg)",
                             "'x' is not a number");

@@ -142,11 +142,16 @@ TEST(Motive, PlanarThrowAlongAnyHeading) {
   }
 }
 
-// Whatever heading was asked for, and whatever the body does after it has hit the floor.
+// Whatever heading was asked for, wherever the body was carried before (here high up, and to the side), and
+// whatever it does after it has hit the floor.
 TEST(Motive, FindsTheHeadingOfTheThrow) {
   for (const double heading : {0.0, 0.7, 3.0, -2.0}) {
     File file;
     const auto turned = about(Y, heading);
+    for (int k = -100; k < 0; ++k) {
+      const double t = 0.01 * k;
+      file.rows += row(k, t, upright, turned * Eigen::Vector3d(0, 1 - t, 2 * t));
+    }
     for (int k = 0; k < 60; ++k) {
       const double t = 0.01 * k, rolled = std::max(0.0, t - 0.45);
       const double up = 1 + t - 5 * std::pow(std::min(t, 0.45), 2) + 2 * rolled;

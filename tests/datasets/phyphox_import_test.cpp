@@ -165,8 +165,22 @@ TEST(Phyphox, RefusesOtherUnits) {
   expect(1000, 1, "column Time (s)",
          "samples are 5 s apart (median), accepted are 0.0001 to 0.1 s: is it in ms");
   expect(1e-3, 1, "column Time (s)", "samples are 5e-06 s apart");
-  expect(1, 1 / 9.81, "columns Acceleration (m/s^2)", "a phone that is held reads 7 to 14: is it in g?");
+  expect(1, 1 / 9.81, "columns Acceleration (m/s^2)", "a phone that is held reads about 9.8: is it in g?");
   expect(1, 3.281, "columns Acceleration (m/s^2)", "outside of falls it reads 32.2 m/s^2");
+}
+
+// A phone that is thrown hard reads far from gravity outside of its fall.
+TEST(Phyphox, AHardThrowIsNoOtherUnit) {
+  const Scratch scratch;
+  const std::string file = scratch / "phone.csv";
+  std::ostringstream out;
+  out << header;
+  for (int k = 0; k < 400; ++k) {
+    const double t = 0.005 * k, up = t < 1 ? 20 + 3 * std::sin(9 * t) : t > 1.65 ? 25 : 0.2;
+    out << t << ",0.1,-0.2," << up << '\n';
+  }
+  put_bytes(file, out.str());
+  EXPECT_EQ(read_phyphox(file).falls.size(), 1U);
 }
 
 TEST(Phyphox, SaysWhichLineAndColumn) {
