@@ -1,4 +1,5 @@
 #include "apps/cards.hpp"
+#include "apps/compare_run.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -151,8 +152,9 @@ experiment::FrictionEstimate estimated(const datasets::ThrowLog& log,
     return out;
   } catch (const experiment::Undetermined& error) {
     const std::string advice =
-        model == contact::kGripperDelay
-            ? error.advice
+        model == contact::kGripperDelay ? error.advice
+        : model == naive_model
+            ? std::string("give a card (--card)")
             : fmt::format("give a card (--card), as `unhand fit LOG --model {} --card FILE` makes it", model);
     throw Unanswered(fmt::format("{}: {}; {}", model, error.reason, advice));
   }

@@ -23,7 +23,7 @@ struct FigureCommandOptions {
   FigureRequest request;
 };
 
-/// A round distance between three to seven tics beyond 0, up to `high`.
+/// A round distance, so that there are three to seven tics beyond 0, up to `high`.
 double step(double high) {
   if (!(high > 0)) return 1;
   const double raw = high / 3, decade = std::pow(10, std::floor(std::log10(raw)));

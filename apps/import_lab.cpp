@@ -215,7 +215,7 @@ void check_heading(const std::string& file, const datasets::MotiveTake& take, do
     const double seen = take.run_heading * 180 / std::numbers::pi, off = between(seen, heading);
     const double angle = std::min(std::abs(off), 180 - std::abs(off));  // to the plane, forwards or back
     const std::string numbers =
-        fmt::format("the body runs {:.2f} m along a heading of {:.1f} deg, {:.1f} deg from --heading {:g}",
+        fmt::format("the body flies {:.2f} m along a heading of {:.1f} deg, {:.1f} deg from --heading {:g}",
                     take.run, seen, std::abs(off), heading);
     const std::string advice = fmt::format("--heading {:.1f}", seen);
     if (angle > kRefused)
@@ -335,17 +335,17 @@ std::string one_sided(const std::string& out, const ThrowLog& log, std::ptrdiff_
   std::map<std::string, int> conditions;
   int most = 0;
   for (const Throw& one : log.throws) most = std::max(most, ++conditions[one.condition]);
-  const std::string why =
-      options.test_every == 0
-          ? std::string()
-          : fmt::format(
-                ": --test-every {} holds out every {}th throw of a condition, and no condition has "
-                "more than {} throw{}",
-                options.test_every, options.test_every, most, most == 1 ? "" : "s");
-  return fmt::format("{}: no throw is held out{}; errors on unseen throws, and discover, need some: {}", out,
-                     why,
-                     log.throws.size() > 1 ? fmt::format("--test-every {}, or more throws", std::max(2, most))
-                                           : std::string("more throws"));
+  const std::string why = options.test_every == 0
+                              ? std::string()
+                              : fmt::format(
+                                    ": --test-every {} holds out one in {} throws of a condition, and no "
+                                    "condition has more than {} throw{}",
+                                    options.test_every, options.test_every, most, most == 1 ? "" : "s");
+  return fmt::format(
+      "{}: no throw is held out{}; errors on unseen throws, and discover, need some: {}more throws", out, why,
+      most > 1                ? fmt::format("--test-every {}, or ", most)
+      : conditions.size() > 1 ? "--test-conditions NAME, or "
+                              : "");
 }
 
 }  // namespace

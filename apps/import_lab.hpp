@@ -30,7 +30,7 @@ struct LabOptions {
 struct LabImport {
   std::string text;
   Json details;
-  std::vector<std::string> notes;  // to be said on stderr once the log is written
+  std::vector<std::string> notes;  ///< to be said on stderr once the log is written
 };
 
 /// The options that these formats share, in groups of the help.

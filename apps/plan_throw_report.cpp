@@ -8,6 +8,7 @@
 #include "apps/figure.hpp"
 #include "apps/plan_throw.hpp"
 #include "apps/table.hpp"
+#include "fitting/sku/sku_validation.hpp"
 #include "flight/fly.hpp"
 #include "planners/arm/kinematics.hpp"
 
@@ -107,8 +108,7 @@ std::string text_of(const ThrowAnswer& a) {
                               one.sigma > 0 ? fmt::format("{:.2g}", one.sigma) : "-", one.from});
     out += "\n" + numbers.text();
   }
-  constexpr double pad = 0.005;  // [m] hung by less, an object hardly turns in the pads
-  if (!a.with_release && std::abs(a.lever) > pad)
+  if (!a.with_release && std::abs(a.lever) > fitting::kLeastLever)
     out += fmt::format(
         "\nnote: without a card the object is taken as carried rigidly until it leaves; this one hangs "
         "{:.3g} cm from the pads and turns in them while they open, so that it lands elsewhere: give the "

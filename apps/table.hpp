@@ -23,7 +23,7 @@ std::string plus_minus(bool known, double value, double spread, int decimals);
 
 /// A value and its sigma as far as the sigma's two leading digits, for people; JSON has all digits.
 struct Rounded {
-  std::string value, sigma;
+  std::string value, sigma;     ///< as text, of the same digits
   std::optional<int> decimals;  ///< after the point; none where those are too many, or sigma is no size
 };
 Rounded rounded(double value, double sigma);

@@ -304,8 +304,12 @@ std::vector<UnitDoubt> contradicted_axes(const ThrowLog& log) {
   Links usual;
   for (const auto& [link, ratios] : all) usual[link] = dynamics::median(ratios);
   std::vector<UnitDoubt> out;
-  for (const auto& blame : blamed(usual))
-    out.push_back(doubt_of(blame, "*", static_cast<int>(log.throws.size()), "in the median over throws"));
+  for (const auto& blame : blamed(usual)) {
+    std::size_t throws = 0;
+    for (const auto& [link, ratios] : all)
+      if (link.first == blame.axis || link.second == blame.axis) throws = std::max(throws, ratios.size());
+    out.push_back(doubt_of(blame, "*", static_cast<int>(throws), "in the median over throws"));
+  }
   if (!out.empty()) return out;
   for (std::size_t i = 0; i < each.size(); ++i) {
     // A throw that went wrong lands elsewhere, and its hand may have moved against its log.

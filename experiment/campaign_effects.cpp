@@ -58,9 +58,9 @@ Found find(std::string_view name) {
   if (near.empty())  // the id's last word alone, say
     for (const std::string& id : ids)
       if (id.substr(id.find('.') + 1) == name) near = id;
-  throw std::invalid_argument(fmt::format("effect \"{}\" is unknown{}{}; there are {}", name,
-                                          near.empty() ? "" : ": did you mean " + near + "?", own,
-                                          fmt::join(ids, ", ")));
+  throw std::invalid_argument(fmt::format("effect \"{}\" is unknown{}; {}", name, own,
+                                          near.empty() ? fmt::format("there are {}", fmt::join(ids, ", "))
+                                                       : fmt::format("did you mean '{}'?", near)));
 }
 
 /// "k[jar]" is {"k", "jar"}; without brackets the second is empty.

@@ -87,7 +87,6 @@ TEST_F(Cli, FitThenPredict) {
   expect_refusal("predict " + quick + " --card bad.json", 3, "bad.json: /model");
 }
 
-// Without a normal force the card tells how the pads open, or prediction says what is missing.
 // What ends a throw without a landing is told in words; JSON has its name.
 TEST_F(Cli, ThrowsThatDoNotLandAreToldInWords) {
   ASSERT_EQ(run("fit " + quick + " --model limit_surface_disc --card c.json").code, 0);
@@ -115,6 +114,7 @@ TEST_F(Cli, ThrowsThatDoNotLandAreToldInWords) {
   expect_refusal("predict higher.h5 --card c.json --json q.json", 1, words);
 }
 
+// Without a normal force the card tells how the pads open, or prediction says what is missing.
 TEST_F(Cli, PredictSaysHowPadsOpenThatNobodyMeasured) {
   ASSERT_EQ(run("generate quick12 --seed 4 --without ft --out bare.h5").code, 0);
   ASSERT_EQ(run("fit bare.h5 --model limit_surface_disc --card bare.json --json f.json").code, 0);

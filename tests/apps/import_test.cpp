@@ -151,7 +151,7 @@ TEST_F(Cli, AHeadingThatTheTrackContradictsIsRefused) {
       "2 ";
   expect_refusal(
       motive + "--heading 70", 3,
-      "takes/slow_01.csv: rigid body bar, columns Position: the body runs 1.49 m along a heading of 0.0 "
+      "takes/slow_01.csv: rigid body bar, columns Position: the body flies 1.32 m along a heading of 0.0 "
       "deg, 70.0 deg from --heading 70: up to 15 deg are accepted");
   expect_refusal(motive + "--heading 70", 3, "--heading 0.0?");
   const auto notes = [&](const std::string& heading) {
@@ -172,7 +172,7 @@ TEST_F(Cli, SaysThatNothingIsHeldOut) {
   const std::string motive = "import motive-csv takes/slow_01.csv takes/slow_02.csv --mass 1 --out a.h5 ";
   EXPECT_THAT(
       run(motive).err,
-      HasSubstr("no throw is held out: --test-every 5 holds out every 5th throw of a condition, and no "
+      HasSubstr("no throw is held out: --test-every 5 holds out one in 5 throws of a condition, and no "
                 "condition has more than 2 throws"));
   EXPECT_THAT(run(motive).err, HasSubstr("need some: --test-every 2, or more throws"));
   EXPECT_THAT(run(motive + "--test-conditions slow").err, HasSubstr("all throws are held out"));

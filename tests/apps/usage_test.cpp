@@ -67,7 +67,7 @@ TEST_F(Cli, WrongUsage) {
   EXPECT_EQ(run("compare").code, 2);
   EXPECT_EQ(run("inspect " + quick + " --threads -1").code, 2);
   expect_refusal("generate nonsense --out a.h5", 2, "batch180");
-  expect_refusal("generate quick12 --out a.h5 --effect flight.winds=1", 2, "did you mean flight.wind?");
+  expect_refusal("generate quick12 --out a.h5 --effect flight.winds=1", 2, "did you mean 'flight.wind'?");
   expect_refusal("generate quick12 --out a.h5 --effect breeze=1", 2, "contact.stribeck");
   expect_refusal("generate quick12 --out a.h5 --effect flight.wind=31", 2,
                  "w_x = 31 is not in [-30, 30] m/s");

@@ -32,8 +32,8 @@ TEST(CampaignEffects, AreReadByName) {
     }
     return "no error";
   };
-  EXPECT_THAT(refusal("contact.stribek=1"), HasSubstr("did you mean contact.stribeck?"));
-  EXPECT_THAT(refusal("stribeck=1"), HasSubstr("did you mean contact.stribeck?"));
+  EXPECT_THAT(refusal("contact.stribek=1"), HasSubstr("did you mean 'contact.stribeck'?"));
+  EXPECT_THAT(refusal("stribeck=1"), HasSubstr("did you mean 'contact.stribeck'?"));
   EXPECT_THAT(refusal("flight.quadratic_drag=-1"), HasSubstr("k = -1 is not in [0, 10] 1/m"));
   EXPECT_THAT(refusal("sensor.mass=nan"), HasSubstr("is not in [0.1, 6]"));
   EXPECT_THAT(refusal("sensor.mass=1kg"), HasSubstr("not a number"));
