@@ -25,8 +25,10 @@ struct FigureRequest {
   }
 };
 
-/// Everything is computed when it is first asked for, once. Throws WrongUsage for models and throws that
-/// there are not, Unanswered where the log does not determine a model that has no card.
+/// Everything is computed when it is first asked for. The comparison, the traces and what fitted cards
+/// predict are kept; the parameters of a model without a card are estimated anew for each of them. Throws
+/// WrongUsage for models and throws that there are not, Unanswered where the log does not determine a model
+/// that has no card.
 class FigureSource {
  public:
   explicit FigureSource(const FigureRequest& request);
