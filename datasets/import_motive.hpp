@@ -40,8 +40,8 @@ struct MotiveTake {
   /// the body's x axis and the plane [rad].
   double out_of_plane = 0, out_of_plane_angle = 0;  ///< m; rad
   /// The straight line over the floor along which the longest free flight runs, of 0.1 s at least: how far
-  /// [m], the heading that MotiveOptions calls it [rad], and how far the flight is beside it at most [m]. Zero
-  /// where there is none.
+  /// [m], the heading that MotiveOptions calls it [rad], and how far the flight is beside it at most [m].
+  /// Zero where there is none.
   double run = 0, run_heading = 0, beside_run = 0;  ///< m; rad; m
 };
 
