@@ -235,12 +235,13 @@ bool is_free(const std::vector<Seen>& seen, std::size_t first, std::size_t last)
 /// Where the body runs over the floor, from its longest free flight: a throw may be carried anywhere before,
 /// and bounce after.
 void find_run(const std::vector<Seen>& seen, MotiveTake& take) {
-  constexpr double kWindow = 0.1, kFrames = 6;  // s; in it
+  constexpr double kWindow = 0.1;     // s, at least
+  constexpr std::size_t kFrames = 6;  // in it, at least
   std::size_t begin = 0, end = 0, from = 0, until = 0;
   for (std::size_t i = 0, j = 0; i < seen.size(); ++i) {
-    while (j < seen.size() && seen[j].t - seen[i].t < kWindow) ++j;
+    while (j < seen.size() && (seen[j].t - seen[i].t < kWindow || j + 1 < i + kFrames)) ++j;
     if (j == seen.size()) break;
-    if (static_cast<double>(j - i) + 1 < kFrames || !is_free(seen, i, j)) continue;
+    if (!is_free(seen, i, j)) continue;
     if (i > until || until == 0) from = i;
     until = j;
     if (seen[until].t - seen[from].t > seen[end].t - seen[begin].t) begin = from, end = until;
