@@ -1,5 +1,4 @@
 #include "apps/cards.hpp"
-#include "apps/compare_run.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

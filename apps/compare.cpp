@@ -17,7 +17,7 @@
 #include "apps/progress.hpp"
 #include "apps/tell.hpp"
 #include "apps/throws.hpp"
-#include "datasets/csv.hpp"
+#include "datasets/near_miss.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/free_flight.hpp"
 #include "experiment/friction_estimate.hpp"

@@ -10,9 +10,6 @@
 
 namespace unhand::apps {
 
-/// The limit surface by the sign law at a fixed step, to compare against.
-inline constexpr const char* naive_model = "limit_surface_naive";
-
 /// Collects models over the same throws. Parameters come from a card, from a fit (`--fit`), or from
 /// experiment::estimate_friction. Fits use the train throws; limit_surface_naive, which cannot be fitted,
 /// takes the fitted ellipsoid's values.

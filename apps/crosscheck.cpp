@@ -17,7 +17,7 @@
 #include "contact/gripper_delay.hpp"
 #include "crosscheck/bullet_release.hpp"
 #include "crosscheck/distributed_patch.hpp"
-#include "datasets/csv.hpp"
+#include "datasets/near_miss.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/friction_estimate.hpp"
 #include "flight/fly.hpp"

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "apps/tell.hpp"
-#include "datasets/csv.hpp"
+#include "datasets/near_miss.hpp"
 
 namespace unhand::apps {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "apps/command.hpp"
 #include "apps/tell.hpp"
-#include "datasets/csv.hpp"
+#include "datasets/near_miss.hpp"
 #include "datasets/summary.hpp"
 #include "experiment/declared_check.hpp"
 #include "experiment/prepared_throw.hpp"

@@ -12,12 +12,11 @@ namespace unhand::contact {
 ///   μ(v)/μ = (1 + (μ_s/μ_k − 1) exp(−v²/v_s²)) (1 + v/v₀), 0 where that would be negative
 template <class S>
 struct SpeedDependence {
-  S static_excess{};          ///< μ_s/μ_k − 1 [-]
-  S stribeck_speed{0.02};     ///< v_s [m/s]
-  S viscous{};                ///< 1/v₀ [s/m]
-  bool stribeck{}, linear{};  ///< whether the two terms vary, be it by their derivatives alone
+  S static_excess;        ///< μ_s/μ_k − 1 [-]
+  S stribeck_speed;       ///< v_s [m/s]
+  S viscous;              ///< 1/v₀ [s/m]
+  bool stribeck, linear;  ///< whether the two terms vary, be it by their derivatives alone
 
-  SpeedDependence() = default;
   /// Of a variation that has been validated.
   explicit SpeedDependence(const FrictionVariation<S>& variation)
       : static_excess(variation.static_ratio - 1.0),

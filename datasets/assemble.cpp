@@ -10,8 +10,8 @@
 #include <tuple>
 #include <utility>
 
-#include "datasets/csv.hpp"
 #include "datasets/import_phyphox.hpp"
+#include "datasets/near_miss.hpp"
 
 namespace unhand::datasets {
 namespace {

@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "datasets/attribute_fields.hpp"
-#include "datasets/near_miss.hpp"
 
 namespace unhand::datasets {
 namespace {
@@ -141,19 +140,6 @@ bool CsvReader::next(CsvLine& line) {
   }
   if (in_.bad()) fail(number_, "cannot be read");
   return false;
-}
-
-std::string unknown_name(const std::string& said, std::string_view name,
-                         const std::vector<std::string>& known) {
-  const std::vector<std::string_view> views(known.begin(), known.end());
-  const std::string_view meant = nearest_name(name, views);
-  if (!meant.empty()) return fmt::format("{}; did you mean '{}'?", said, meant);
-  std::vector<std::string_view> some;
-  for (const std::string_view view : views) {
-    if (!view.empty() && some.size() < 12) some.push_back(view);
-  }
-  return fmt::format("{} (there are: {}{})", said, fmt::join(some, ", "),
-                     some.size() == 12 && views.size() > 12 ? ", ..." : "");
 }
 
 }  // namespace unhand::datasets

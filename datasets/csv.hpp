@@ -54,8 +54,4 @@ class CsvReader {
   int number_ = 0;
 };
 
-/// "X; did you mean 'y'?" or "X (there are: a, b)": what to say of a name that is not among those known.
-std::string unknown_name(const std::string& said, std::string_view name,
-                         const std::vector<std::string>& known);
-
 }  // namespace unhand::datasets

@@ -13,6 +13,7 @@
 #include <stdexcept>
 
 #include "datasets/csv.hpp"
+#include "datasets/near_miss.hpp"
 #include "datasets/units.hpp"
 
 namespace unhand::datasets {

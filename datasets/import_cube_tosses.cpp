@@ -12,6 +12,7 @@
 #include "datasets/channel_rules.hpp"
 #include "datasets/channel_table.hpp"
 #include "datasets/csv.hpp"
+#include "datasets/near_miss.hpp"
 #include "datasets/sample_noise.hpp"
 
 namespace unhand::datasets {

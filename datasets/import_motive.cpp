@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -13,6 +13,7 @@
 
 #include "datasets/channel_rules.hpp"
 #include "datasets/csv.hpp"
+#include "datasets/near_miss.hpp"
 #include "datasets/units.hpp"
 
 namespace unhand::datasets {

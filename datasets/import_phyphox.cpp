@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "datasets/csv.hpp"
+#include "datasets/near_miss.hpp"
 #include "dynamics/median.hpp"
 #include "dynamics/third_difference.hpp"
 

@@ -1,5 +1,8 @@
 #include "datasets/near_miss.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <vector>
 
@@ -51,6 +54,19 @@ std::string_view nearest_name(std::string_view name, std::span<const std::string
     }
   }
   return best;
+}
+
+std::string unknown_name(const std::string& said, std::string_view name,
+                         const std::vector<std::string>& known) {
+  const std::vector<std::string_view> views(known.begin(), known.end());
+  const std::string_view meant = nearest_name(name, views);
+  if (!meant.empty()) return fmt::format("{}; did you mean '{}'?", said, meant);
+  std::vector<std::string_view> some;
+  for (const std::string_view view : views) {
+    if (!view.empty() && some.size() < 12) some.push_back(view);
+  }
+  return fmt::format("{} (there are: {}{})", said, fmt::join(some, ", "),
+                     some.size() == 12 && views.size() > 12 ? ", ..." : "");
 }
 
 }  // namespace unhand::datasets

@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace unhand::datasets {
 
@@ -16,5 +17,9 @@ bool is_near_miss(std::string_view name, std::string_view known);
 
 /// The nearest of `known` that `name` misses, or nothing.
 std::string_view nearest_name(std::string_view name, std::span<const std::string_view> known);
+
+/// "X; did you mean 'y'?" or "X (there are: a, b)": what to say of a name that is not among those known.
+std::string unknown_name(const std::string& said, std::string_view name,
+                         const std::vector<std::string>& known);
 
 }  // namespace unhand::datasets

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "datasets/csv.hpp"
+#include "datasets/near_miss.hpp"
 
 namespace unhand::experiment {
 namespace {

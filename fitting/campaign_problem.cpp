@@ -1,7 +1,6 @@
 #include "fitting/campaign_problem.hpp"
 
 #include <fmt/core.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -40,11 +39,7 @@ Effect find_effect(const std::string& id) {
     if (effect.id == id) return effect;
     ids.push_back(effect.id);
   }
-  const std::vector<std::string_view> views(ids.begin(), ids.end());
-  const std::string_view meant = datasets::nearest_name(id, views);
-  throw std::invalid_argument(fmt::format("effect \"{}\" is unknown; {}", id,
-                                          meant.empty() ? fmt::format("there are {}", fmt::join(ids, ", "))
-                                                        : fmt::format("did you mean '{}'?", meant)));
+  throw std::invalid_argument(datasets::unknown_name(fmt::format("effect \"{}\" is unknown", id), id, ids));
 }
 
 CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::string& file,

@@ -1,4 +1,5 @@
 #include "datasets/csv.hpp"
+#include "datasets/near_miss.hpp"
 
 #include "log_samples.hpp"
 
