@@ -138,7 +138,6 @@ SplineFit<Channels, Degree> fit_spline(const SplineProblem<Channels, Degree>& pr
   return fit;
 }
 
-template SplineFit<1, 3> fit_spline(const SplineProblem<1, 3>&, const SplineOptions&);
 template SplineFit<1, 5> fit_spline(const SplineProblem<1, 5>&, const SplineOptions&);
 template SplineFit<3, 5> fit_spline(const SplineProblem<3, 5>&, const SplineOptions&);
 

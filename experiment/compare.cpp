@@ -107,11 +107,6 @@ std::vector<PreparedThrow> prepare_all(const datasets::ThrowLog& log, const std:
   return out;
 }
 
-Comparison compare(const datasets::ThrowLog& log, const std::string& file, const CompareOptions& options) {
-  for (const auto& model : options.models) require_release_model(model);
-  return compare(log, prepare_all(log, file, options.threads), options);
-}
-
 Comparison compare(const datasets::ThrowLog& log, const std::vector<PreparedThrow>& prepared,
                    const CompareOptions& options) {
   Comparison out;

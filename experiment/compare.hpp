@@ -97,12 +97,12 @@ struct CompareOptions {
   release::NaiveOptions naive;  ///< of limit_surface_naive
 };
 
-/// All throws prepared, on several threads. `file` names the log in errors. Throws datasets::LogError.
+/// All throws prepared, on several threads. `file` names the log in errors. Throws datasets::LogError for one
+/// that lacks what a release needs.
 std::vector<PreparedThrow> prepare_all(const datasets::ThrowLog& log, const std::string& file, int threads);
 
-/// Simulates every throw with every model. Throws std::invalid_argument for unknown models and what the log
-/// does not determine, datasets::LogError for throws that lack what a release needs.
-Comparison compare(const datasets::ThrowLog& log, const std::string& file, const CompareOptions& options);
+/// Simulates every prepared throw with every model. Throws std::invalid_argument for unknown models and what
+/// the log does not determine.
 Comparison compare(const datasets::ThrowLog& log, const std::vector<PreparedThrow>& prepared,
                    const CompareOptions& options);
 

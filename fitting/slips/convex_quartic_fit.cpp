@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 
 #include "dynamics/dense_solve.hpp"
+#include "dynamics/scalar.hpp"
 #include "fitting/slips/slip_surface_solver.hpp"
 
 namespace unhand::fitting {

@@ -13,18 +13,6 @@ namespace unhand::planners {
 
 using Eigen::Vector2d, Eigen::Vector3d;
 
-const char* to_string(TubeOutcome outcome) {
-  switch (outcome) {
-    case TubeOutcome::solved:
-      return "solved";
-    case TubeOutcome::infeasible:
-      return "infeasible";
-    case TubeOutcome::never_reaches:
-      return "never_reaches";
-  }
-  return "unknown";
-}
-
 PlaneView plane_view(const Vector3d& tip, const Vector3d& velocity, const Vector3d& target) {
   const Vector3d e = target - tip;
   const double distance = e.head<2>().norm();

@@ -41,8 +41,6 @@ enum class TubeOutcome {
   infeasible,     ///< `reason` names the constraints that cannot hold together
   never_reaches,  ///< with the velocity q̇₀ held, the flight does not come down to the target's height
 };
-/// The outcome's name, as it is written above.
-const char* to_string(TubeOutcome);
 
 /// The tube acceleration, or why there is none.
 struct TubeSolution {

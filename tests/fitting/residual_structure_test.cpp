@@ -9,6 +9,7 @@
 
 #include "experiment/campaign_effects.hpp"
 #include "experiment/random_stream.hpp"
+#include "experiment/throw_setup.hpp"
 #include "fitting/discovery/missing_force.hpp"
 
 namespace unhand::fitting {
