@@ -293,7 +293,17 @@ Reading read_motive(const std::string& file, const ThrowLog& log, const LabOptio
   return out;
 }
 
-Reading read_phone(const std::string& file, const LabOptions& options) {
+/// What to say of a phone that reads no gravity while it is held, or nothing.
+std::string odd_rest(const datasets::PhyphoxRecording& recording, double gravity) {
+  constexpr double kOff = 0.1;  // as a share; a bias and a hand that moves make half of it
+  if (!recording.rest || std::abs(*recording.rest - gravity) <= kOff * gravity) return {};
+  return fmt::format(
+      "outside of falls the phone reads {:.3g} m/s^2 (median), and held still it would read {:.3g}: was it "
+      "shaken, or is its scale off?",
+      *recording.rest, gravity);
+}
+
+Reading read_phone(const std::string& file, const ThrowLog& log, const LabOptions& options) {
   datasets::PhyphoxOptions phone;
   phone.min_duration = options.min_fall;
   phone.threshold = options.fall_threshold;
@@ -313,6 +323,8 @@ Reading read_phone(const std::string& file, const LabOptions& options) {
     out.details["dropped"].push_back(
         {{"begin_s", dropped.begin}, {"end_s", dropped.end}, {"reason", dropped.reason}});
   }
+  if (const std::string odd = odd_rest(recording, log.gravity); !odd.empty())
+    out.notes.push_back(fmt::format("{}: {}", file, odd));
   out.throws = std::move(recording.falls);
   return out;
 }
@@ -327,7 +339,7 @@ std::vector<std::string> phone_files(const std::vector<std::string>& named) {
 Reading read(const std::string& format, const std::string& file, const ThrowLog& log,
              const LabOptions& options) {
   if (format == "motive-csv") return read_motive(file, log, options);
-  if (format == "phyphox") return read_phone(file, options);
+  if (format == "phyphox") return read_phone(file, log, options);
   return read_columns(format, file, log, options);
 }
 

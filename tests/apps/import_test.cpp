@@ -241,6 +241,10 @@ TEST_F(Cli, ImportsPhonesAsFreeFlights) {
   expect_refusal("import phyphox fall_1.csv --mass 0.2 --out a.h5 --min-fall 0.8", 3,
                  "lasts 0.600 s, less than 0.8 s");
   EXPECT_THAT(answer.err, HasSubstr("no throw is held out"));
+  EXPECT_THAT(answer.err, Not(HasSubstr("outside of falls")));
+  const Answer elsewhere = run("import phyphox fall_1.csv --mass 0.2 --out a.h5 --gravity 3.7");
+  EXPECT_THAT(elsewhere.err, HasSubstr("fall_1.csv: outside of falls the phone reads 9.8 m/s^2 (median), and "
+                                       "held still it would read 3.7"));
   expect_refusal("discover falls.h5 --model free_fall", 1,
                  "no throw has the split 'test', of 1: effects are found on train");
 }
