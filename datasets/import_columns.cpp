@@ -42,8 +42,8 @@ std::vector<std::string> names_of(std::span<const Wanted> table) {
 /// Whether a tracker that lost the body writes this: nothing, or that it is no number.
 bool stands_for_nothing(std::string cell) {
   std::transform(cell.begin(), cell.end(), cell.begin(), [](unsigned char c) { return std::tolower(c); });
-  if (cell.starts_with('-') || cell.starts_with('+')) cell.erase(0, 1);
-  return cell.empty() || cell == "nan" || cell == "n/a" || cell == "na";
+  const bool nan = cell == "nan" || cell == "-nan" || cell == "+nan";
+  return cell.empty() || nan || cell == "n/a" || cell == "na";
 }
 
 /// A channel's column: where it is, what it is called in errors, and how it becomes SI.

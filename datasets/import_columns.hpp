@@ -48,9 +48,10 @@ HandLog read_hand_csv(const std::filesystem::path& file, const ColumnMap& map);
 /// The same for the sensor behind one pad.
 FtLog read_ft_csv(const std::filesystem::path& file, const ColumnMap& map);
 /// The same for a tracked object. A row in which a cell of x, z or theta is empty, NaN (of either sign), N/A
-/// or NA, in capitals or not, is one in which the tracker lost the object: valid = 0, pose NaN. theta is
-/// unwrapped from valid row to valid row, so that it is right across a loss only if the object turns by less
-/// than half a turn meanwhile. Throws ImportError where it is lost in all rows, too.
+/// or NA, in capitals or not, is one in which the tracker lost the object: valid = 0, pose NaN. A bare sign
+/// is none of these, and no number. theta is unwrapped from valid row to valid row, so that it is right
+/// across a loss only if the object turns by less than half a turn meanwhile. Throws ImportError where it is
+/// lost in all rows, too.
 MocapLog read_mocap_csv(const std::filesystem::path& file, const ColumnMap& map);
 
 /// What is wrong with a map for these channels, or nothing: to say so before any file is read.

@@ -81,6 +81,12 @@ TEST(ColumnsImport, ATrackedObjectWithLosses) {
   put_bytes(file, "t (s),X (m),Z (m),pitch (deg)\n0,1,1,x\n");
   expect_error<ImportError>([&] { read_mocap_csv(file, map); }, file, "line 2, column pitch (deg)",
                             "'x' is not a number");
+  // Half of a number is none, and no loss that a tracker tells.
+  for (const std::string cell : {"-", "+", "-na", "+n/a"}) {
+    put_bytes(file, "t (s),X (m),Z (m),pitch (deg)\n0,1,1," + cell + "\n");
+    expect_error<ImportError>([&] { read_mocap_csv(file, map); }, file, "line 2, column pitch (deg)",
+                              "'" + cell + "' is not a number");
+  }
   put_bytes(file, "t (s),X (m),Z (m),pitch (deg)\n,1,1,1\n");
   expect_error<ImportError>([&] { read_mocap_csv(file, map); }, file, "line 2, column t (s)",
                             "'' is not a number");
