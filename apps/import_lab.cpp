@@ -173,10 +173,11 @@ Reading read_columns(const std::string& format, const std::string& file, const T
                      const LabOptions& options) {
   datasets::ColumnMap map{parse_pairs("--columns", options.columns), parse_pairs("--units", options.units),
                           parse_numbers("--sigma", options.sigma), options.time_offset};
-  const auto channels = format == "hand-csv" ? datasets::hand_channels()
-                        : format == "ft-csv" ? datasets::ft_channels()
-                                             : datasets::mocap_channels();
-  const std::string fault = fault_of(map, channels);
+  using datasets::TableKind;
+  const TableKind kind = format == "hand-csv" ? TableKind::hand
+                         : format == "ft-csv" ? TableKind::ft
+                                              : TableKind::mocap;
+  const std::string fault = fault_of(map, kind);
   if (!fault.empty()) throw WrongUsage("--" + fault);
   Reading out;
   Throw& one = out.throws.emplace_back();
