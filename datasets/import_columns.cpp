@@ -181,11 +181,13 @@ std::vector<Series> read_table(const std::filesystem::path& file, const ColumnMa
   if (!reader.next(line)) reader.fail(1, "is empty, expected a header and rows of numbers");
   const bool by_number = std::all_of(map.columns.begin(), map.columns.end(),
                                      [](const auto& entry) { return entry.second.find('#') <= 1; });
-  bool is_row = true, any = false;  // the first line, where it holds numbers and nothing else but losses
+  // The first line, where it holds numbers and nothing else but losses; a bare sign is no header.
+  bool is_row = true, any = false;
   for (std::size_t j = 0; j < line.cells.size(); ++j) {
     const bool number = line.is_number(j);
     any = any || number;
-    is_row = is_row && (number || (valid != nullptr && stands_for_nothing(line.cells[j])));
+    const bool sign = line.cells[j] == "-" || line.cells[j] == "+";
+    is_row = is_row && (number || sign || (valid != nullptr && stands_for_nothing(line.cells[j])));
   }
   is_row = is_row && any;
   if (is_row && !by_number)

@@ -78,6 +78,9 @@ TEST(ColumnsImport, ATrackedObjectWithLosses) {
   ColumnMap numbered{{{"time", "#1"}, {"x", "#2"}, {"z", "#3"}, {"theta", "#4"}}, {}, {}, 0};
   numbered.units = {{"time", "s"}, {"x", "m"}, {"z", "m"}, {"theta", "rad"}};
   EXPECT_EQ(read_mocap_csv(file, numbered).valid, (Flags{0, 0, 1}));
+  put_bytes(file, "0,-,1,0\n0.1,1,1,0\n");
+  expect_error<ImportError>([&] { read_mocap_csv(file, numbered); }, file, "line 1, column #2",
+                            "'-' is not a number");
   put_bytes(file, "t (s),X (m),Z (m),pitch (deg)\n0,1,1,x\n");
   expect_error<ImportError>([&] { read_mocap_csv(file, map); }, file, "line 2, column pitch (deg)",
                             "'x' is not a number");
