@@ -12,14 +12,19 @@
 
 namespace unhand::datasets {
 
-/// What a file holds, and with that its channels:
-///  hand   "time,x,z,theta,vx,vz,omega,ax,az,alpha": the hand frame in the throwing plane (x forward, z up,
-///         theta from +x towards +z). All of them are needed: a controller knows its acceleration, a
-///         differentiated log does not.
-///  ft     "time,fx,fz,tau,normal": what this pad applies to the object, in the hand frame, about the pad's
-///         centre, and the pad's normal force, positive when it presses.
-///  mocap  "time,x,z,theta": the tracked object in the throwing plane (as the hand), at its centre of mass.
-enum class TableKind { hand, ft, mocap };
+/// What a file holds, and with that its channels.
+enum class TableKind {
+  /// "time,x,z,theta,vx,vz,omega,ax,az,alpha": the hand frame in the throwing plane (x forward, z up, theta
+  /// from +x towards +z). All of them are needed: a controller knows its acceleration, a differentiated log
+  /// does not.
+  hand,
+  /// "time,fx,fz,tau,normal": what this pad applies to the object, in the hand frame, about the pad's centre,
+  /// and the pad's normal force, positive when it presses.
+  ft,
+  /// "time,x,z,theta": the tracked object in the throwing plane (x forward, z up, theta from +x towards +z),
+  /// at its centre of mass.
+  mocap,
+};
 /// Their names, in this order.
 std::vector<std::string> channels_of(TableKind kind);
 
