@@ -50,12 +50,14 @@ const FigureSource::Fitted& FigureSource::fitted(const std::string& model) {
   return *out;
 }
 
-experiment::ModelParameters FigureSource::parameters_of(const std::string& model) const {
-  const auto card = cards_.find(model);
-  return card != cards_.end() ? card->second.parameters : estimated(log_, prepared_, model).parameters;
+const experiment::ModelParameters& FigureSource::parameters_of(const std::string& model) {
+  if (const auto card = cards_.find(model); card != cards_.end()) return card->second.parameters;
+  const auto known = estimated_.find(model);
+  if (known != estimated_.end()) return known->second;
+  return estimated_.emplace(model, estimated(log_, prepared_, model).parameters).first->second;
 }
 
-double FigureSource::length() const {
+double FigureSource::length() {
   const std::string& model = request_.models.front();
   const auto card = cards_.find(model);
   if (card == cards_.end() || !card->second.fitted) return parameters_of(model).length;
@@ -104,7 +106,7 @@ ReleaseTrace FigureSource::trace(const std::string& model) {
                           });
     return out;
   }
-  const auto parameters = parameters_of(model);
+  const auto& parameters = parameters_of(model);
   const auto contact = experiment::contact_model_for(prepared, model, parameters);
   if (!contact) throw WrongUsage(fmt::format("--models: {} has no modes to draw", model));
   const auto problem = experiment::release_problem(prepared, *contact);

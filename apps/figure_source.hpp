@@ -25,10 +25,8 @@ struct FigureRequest {
   }
 };
 
-/// Everything is computed when it is first asked for. The comparison, the traces and what fitted cards
-/// predict are kept; the parameters of a model without a card are estimated anew for each of them. Throws
-/// WrongUsage for models and throws that there are not, Unanswered where the log does not determine a model
-/// that has no card.
+/// Everything is computed when it is first asked for, and kept. Throws WrongUsage for models and throws that
+/// there are not, Unanswered where the log does not determine a model that has no card.
 class FigureSource {
  public:
   explicit FigureSource(const FigureRequest& request);
@@ -40,14 +38,15 @@ class FigureSource {
   /// The one throw through every model, recorded.
   const std::vector<ReleaseTrace>& traces();
   /// Of the first model: L = c a [m].
-  double length() const;
+  double length();
   /// The flight of the one throw after the release that the first model says.
   FlightOverlay overlay();
 
  private:
   struct Fitted;  // a card of a fit, with its problem on this log
   const Fitted& fitted(const std::string& model);
-  experiment::ModelParameters parameters_of(const std::string& model) const;
+  /// Of its card, or estimated from the log.
+  const experiment::ModelParameters& parameters_of(const std::string& model);
   ReleaseTrace trace(const std::string& model);
 
   FigureRequest request_;
@@ -57,6 +56,7 @@ class FigureSource {
   std::vector<experiment::PreparedThrow> prepared_;
   std::size_t chosen_{};
   std::map<std::string, std::shared_ptr<const Fitted>> fitted_;
+  std::map<std::string, experiment::ModelParameters> estimated_;  // of models without a card
   std::optional<experiment::Comparison> compared_;
   std::vector<ReleaseTrace> traces_;
 };

@@ -16,6 +16,7 @@
 #include "apps/progress.hpp"
 #include "apps/tell.hpp"
 #include "apps/throws.hpp"
+#include "datasets/near_miss.hpp"
 #include "fitting/slips/slip_surface.hpp"
 
 namespace unhand::apps {
@@ -36,10 +37,11 @@ bool among(const std::vector<std::string>& names, const std::string& name) {
 }
 
 void require_names(const FitRequest& request) {
-  const auto models = contact::contact_model_names();
-  if (!among(models, request.model) && !among(surface_names(), request.model))
-    throw WrongUsage(fmt::format("model '{}' cannot be fitted; for throws there are {}; for slip logs {}",
-                                 request.model, fmt::join(models, ", "), fmt::join(surface_names(), ", ")));
+  auto models = contact::contact_model_names();
+  for (auto& name : surface_names()) models.push_back(std::move(name));
+  if (!among(models, request.model))
+    throw WrongUsage(datasets::unknown_name(fmt::format("--model: '{}' cannot be fitted", request.model),
+                                            request.model, models));
   for (const auto& id : request.effects) {
     try {
       fitting::find_effect(id);

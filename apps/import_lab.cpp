@@ -98,6 +98,7 @@ const std::vector<Rule>& rules() {
       {"--body", {"motive-csv"}},
       {"--dimension", {"motive-csv"}},
       {"--heading", {"motive-csv"}},
+      {"--trust-heading", {"motive-csv"}},
       {"--origin", {"motive-csv"}},
       {"--com", {"motive-csv"}},
       {"--landing", {"mocap-csv", "motive-csv"}},
@@ -172,10 +173,11 @@ Reading read_columns(const std::string& format, const std::string& file, const T
                      const LabOptions& options) {
   datasets::ColumnMap map{parse_pairs("--columns", options.columns), parse_pairs("--units", options.units),
                           parse_numbers("--sigma", options.sigma), options.time_offset};
-  const auto channels = format == "hand-csv" ? datasets::hand_channels()
-                        : format == "ft-csv" ? datasets::ft_channels()
-                                             : datasets::mocap_channels();
-  const std::string fault = fault_of(map, channels);
+  using datasets::TableKind;
+  const TableKind kind = format == "hand-csv" ? TableKind::hand
+                         : format == "ft-csv" ? TableKind::ft
+                                              : TableKind::mocap;
+  const std::string fault = fault_of(map, kind);
   if (!fault.empty()) throw WrongUsage("--" + fault);
   Reading out;
   Throw& one = out.throws.emplace_back();
@@ -206,32 +208,39 @@ std::array<double, 3> triple(const std::vector<double>& values) {
 double between(double to, double from) { return std::remainder(to - from, 360.0); }
 
 /// A planar log of a throw that goes elsewhere than --heading says is that throw's shadow: refused where
-/// the two are far apart, said where they are somewhat. Throws ImportError.
-void check_heading(const std::string& file, const datasets::MotiveTake& take, double heading,
+/// the two are far apart (unless --trust-heading), said where they are somewhat. Throws ImportError.
+void check_heading(const std::string& file, const datasets::MotiveTake& take, const LabOptions& options,
                    std::vector<std::string>& notes) {
   constexpr double kRun = 0.1, kBeside = 0.05;               // m
   constexpr double kNoted = 3, kRefused = 15, kTurned = 15;  // deg
-  if (take.run >= kRun) {
-    const double seen = take.run_heading * 180 / std::numbers::pi, off = between(seen, heading);
+  if (!take.run) {
+    notes.push_back(fmt::format(
+        "{}: no free flight is seen {}: --heading is not checked{}", file,
+        options.free_flight.empty() ? "of 0.1 s or longer" : "in --free-flight (fewer than two frames)",
+        options.free_flight.empty() ? "; --free-flight T0,T1 says where it is" : ""));
+  } else if (take.run->length >= kRun) {
+    const double heading = options.heading, seen = take.run->heading * 180 / std::numbers::pi,
+                 off = between(seen, heading);
     const double angle = std::min(std::abs(off), 180 - std::abs(off));  // to the plane, forwards or back
     const std::string numbers =
         fmt::format("the body flies {:.2f} m along a heading of {:.1f} deg, {:.1f} deg from --heading {:g}",
-                    take.run, seen, std::abs(off), heading);
+                    take.run->length, seen, std::abs(off), heading);
     const std::string advice = fmt::format("--heading {:.1f}", seen);
-    if (angle > kRefused)
+    if (angle > kRefused && !options.trust_heading)
       throw datasets::ImportError(
           file, fmt::format("rigid body {}, columns Position", take.body),
-          fmt::format("{}: up to {:g} deg are accepted, since a planar log keeps x and z alone: {}?", numbers,
-                      kRefused, advice));
+          fmt::format("{}: up to {:g} deg are accepted, since a planar log keeps x and z alone: {}? "
+                      "--trust-heading takes it as it is",
+                      numbers, kRefused, advice));
     if (angle > kNoted)
       notes.push_back(fmt::format("{}: {}; x is too short by {:.1f} %: {}?", file, numbers,
                                   100 * (1 - std::cos(angle * std::numbers::pi / 180)), advice));
     else if (std::abs(off) > 90)
       notes.push_back(fmt::format("{}: {}: it goes backwards: {}?", file, numbers, advice));
-    if (take.beside_run > kBeside)
+    if (take.run->beside > kBeside)
       notes.push_back(
           fmt::format("{}: the track is up to {:.2f} m beside any vertical plane: not a planar throw?", file,
-                      take.beside_run));
+                      take.run->beside));
   }
   const double angle = take.out_of_plane_angle * 180 / std::numbers::pi;
   if (angle > kTurned)
@@ -249,6 +258,9 @@ Reading read_motive(const std::string& file, const ThrowLog& log, const LabOptio
   motive.origin = triple(options.origin);
   motive.com = triple(options.com);
   motive.time_offset = options.time_offset;
+  motive.gravity = log.gravity;
+  if (!options.free_flight.empty()) motive.free_flight = {options.free_flight[0], options.free_flight[1]};
+  if (options.landing) motive.landing_height = log.landing_height;
   for (const auto& [name, sigma] : parse_numbers("--sigma", options.sigma)) {
     if (name != "position" && name != "angle")
       throw WrongUsage(fmt::format("--sigma: '{}' is neither position (m) nor angle (rad)", name));
@@ -272,16 +284,27 @@ Reading read_motive(const std::string& file, const ThrowLog& log, const LabOptio
     out.text += fmt::format(", out of the plane by {:.3g} m and {:.3g} deg", take.out_of_plane, angle);
     out.details["out_of_plane_m"] = take.out_of_plane;
     out.details["out_of_plane_deg"] = angle;
-    out.details["run_m"] = take.run;
-    out.details["run_heading_deg"] = take.run_heading * 180 / std::numbers::pi;
-    check_heading(file, take, options.heading, out.notes);
+    out.details["run_m"] = take.run ? Json(take.run->length) : Json(nullptr);
+    out.details["run_heading_deg"] =
+        take.run ? Json(take.run->heading * 180 / std::numbers::pi) : Json(nullptr);
+    check_heading(file, take, options, out.notes);
   }
   one.mocap = std::move(take.mocap);
   take_from_track(log, options, one, out);
   return out;
 }
 
-Reading read_phone(const std::string& file, const LabOptions& options) {
+/// What to say of a phone that reads no gravity while it is held, or nothing.
+std::string odd_rest(const datasets::PhyphoxRecording& recording, double gravity) {
+  constexpr double kOff = 0.1;  // as a share; a bias and a hand that moves make half of it
+  if (!recording.rest || std::abs(*recording.rest - gravity) <= kOff * gravity) return {};
+  return fmt::format(
+      "outside of falls the phone reads {:.3g} m/s^2 (median), and held still it would read {:.3g}: was it "
+      "shaken, or is its scale off?",
+      *recording.rest, gravity);
+}
+
+Reading read_phone(const std::string& file, const ThrowLog& log, const LabOptions& options) {
   datasets::PhyphoxOptions phone;
   phone.min_duration = options.min_fall;
   phone.threshold = options.fall_threshold;
@@ -301,6 +324,8 @@ Reading read_phone(const std::string& file, const LabOptions& options) {
     out.details["dropped"].push_back(
         {{"begin_s", dropped.begin}, {"end_s", dropped.end}, {"reason", dropped.reason}});
   }
+  if (const std::string odd = odd_rest(recording, log.gravity); !odd.empty())
+    out.notes.push_back(fmt::format("{}: {}", file, odd));
   out.throws = std::move(recording.falls);
   return out;
 }
@@ -315,7 +340,7 @@ std::vector<std::string> phone_files(const std::vector<std::string>& named) {
 Reading read(const std::string& format, const std::string& file, const ThrowLog& log,
              const LabOptions& options) {
   if (format == "motive-csv") return read_motive(file, log, options);
-  if (format == "phyphox") return read_phone(file, options);
+  if (format == "phyphox") return read_phone(file, log, options);
   return read_columns(format, file, log, options);
 }
 

@@ -21,6 +21,7 @@ struct LabOptions {
   double time_offset{};
   std::string body;
   double heading{};  // [deg]
+  bool trust_heading{};
   std::vector<double> origin, com, free_flight;
   bool landing{};
   double min_fall{0.4}, fall_threshold{5};  // [s], [m/s^2]

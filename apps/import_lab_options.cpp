@@ -51,6 +51,10 @@ void add_lab_options(Parser& parser, LabOptions& options) {
       .one_of({"2", "3"});
   add(motive, "--heading", options.heading,
       "[deg] Of the throw in Motive's floor, from its X axis, counter-clockwise seen from above");
+  parser
+      .flag("--trust-heading", options.trust_heading,
+            "Take a planar throw that flies elsewhere than --heading all the same")
+      .group(motive);
   add(motive, "--origin", options.origin, "[m] X,Y,Z of the robot's base in Motive's frame")
       .with_commas()
       .expected(3, 3);

@@ -1,6 +1,7 @@
 #include "apps/parser.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -43,6 +44,15 @@ CLI::Validator whole_number() {
       "");
 }
 
+CLI::Validator one_among(const std::vector<std::string>& names) {
+  return CLI::Validator(
+      [names](std::string& text) -> std::string {
+        if (std::find(names.begin(), names.end(), text) != names.end()) return {};
+        return datasets::unknown_name(fmt::format("there is no '{}'", text), text, names);
+      },
+      fmt::format("{{{}}}", fmt::join(names, ",")));
+}
+
 /// Of a long option that the command does not have, with the nearest that it has; empty if there is none.
 std::string unknown_option(const CLI::App& command, int argc, char** argv) {
   std::vector<std::string> known;
@@ -72,8 +82,8 @@ Option Option::positive() {
 Option Option::not_negative() {
   return option_->check(finite_number("a number >= 0", ">= 0", [](double x) { return x >= 0; })), *this;
 }
-Option Option::one_of(std::vector<std::string> values) {
-  return option_->check(CLI::IsMember(std::move(values))), *this;
+Option Option::one_of(const std::vector<std::string>& values) {
+  return option_->check(one_among(values)), *this;
 }
 Option Option::with_commas() { return option_->delimiter(','), *this; }
 Option Option::expected(int least, int most) { return option_->expected(least, most), *this; }
@@ -122,7 +132,7 @@ Option Parser::choice(const std::string& name, const std::vector<std::string>& n
   const auto chosen = [names, choose](const std::string& text) {
     choose(static_cast<std::size_t>(std::find(names.begin(), names.end(), text) - names.begin()));
   };
-  return Option(app_->add_option_function<std::string>(name, chosen, help)->check(CLI::IsMember(names)));
+  return Option(app_->add_option_function<std::string>(name, chosen, help)->check(one_among(names)));
 }
 
 bool Parser::chosen() const { return app_->parsed(); }

@@ -22,7 +22,7 @@ class Option {
   Option range(double low, double high);
   Option positive();  ///< and finite
   Option not_negative();
-  Option one_of(std::vector<std::string> values);
+  Option one_of(const std::vector<std::string>& values);
   /// Several values in one argument, separated by commas.
   Option with_commas();
   /// How many values.

@@ -33,17 +33,28 @@ constexpr Wanted ft_table[] = {
     {"time", time}, {"fx", force}, {"fz", force}, {"tau", torque}, {"normal", force}};
 constexpr Wanted mocap_table[] = {{"time", time}, {"x", length}, {"z", length}, {"theta", angle}};
 
-std::vector<std::string> names_of(std::span<const Wanted> table) {
-  std::vector<std::string> names;
-  for (const Wanted& wanted : table) names.emplace_back(wanted.name);
-  return names;
+/// The channels of a file, and how many of them each dataset of the log takes.
+struct Table {
+  std::span<const Wanted> channels;
+  std::vector<std::size_t> widths;
+};
+Table table_of(TableKind kind) {
+  switch (kind) {
+    case TableKind::hand:
+      return {hand_table, {1, 3, 3, 3}};
+    case TableKind::ft:
+      return {ft_table, {1, 3, 1}};
+    case TableKind::mocap:
+      return {mocap_table, {1, 3}};
+  }
+  return {};
 }
 
 /// Whether a tracker that lost the body writes this: nothing, or that it is no number.
 bool stands_for_nothing(std::string cell) {
   std::transform(cell.begin(), cell.end(), cell.begin(), [](unsigned char c) { return std::tolower(c); });
-  if (cell.starts_with('-') || cell.starts_with('+')) cell.erase(0, 1);
-  return cell.empty() || cell == "nan" || cell == "n/a" || cell == "na";
+  const bool nan = cell == "nan" || cell == "-nan" || cell == "+nan";
+  return cell.empty() || nan || cell == "n/a" || cell == "na";
 }
 
 /// A channel's column: where it is, what it is called in errors, and how it becomes SI.
@@ -158,23 +169,25 @@ Series make_series(std::span<const Wanted> table, const std::vector<Column>& col
   return out;
 }
 
-/// Each dataset as wide as the number says, the first of them time. With `valid`, rows in which a value
-/// beside the time is lost become NaN.
-std::vector<Series> read_table(const std::filesystem::path& file, const ColumnMap& map,
-                               std::span<const Wanted> table, std::initializer_list<std::size_t> widths,
+/// The datasets, the first of them time. With `valid`, rows in which a value beside the time is lost become
+/// NaN.
+std::vector<Series> read_table(const std::filesystem::path& file, const ColumnMap& map, TableKind kind,
                                Flags* valid = nullptr) {
-  const std::string fault = fault_of(map, names_of(table));
+  const std::string fault = fault_of(map, kind);
   if (!fault.empty()) throw std::invalid_argument(fault);
+  const auto [table, widths] = table_of(kind);
   CsvReader reader(file, '\0');
   CsvLine line;
   if (!reader.next(line)) reader.fail(1, "is empty, expected a header and rows of numbers");
   const bool by_number = std::all_of(map.columns.begin(), map.columns.end(),
                                      [](const auto& entry) { return entry.second.find('#') <= 1; });
-  bool is_row = true, any = false;  // the first line, where it holds numbers and nothing else but losses
+  // The first line, where it holds numbers and nothing else but losses; a bare sign is no header.
+  bool is_row = true, any = false;
   for (std::size_t j = 0; j < line.cells.size(); ++j) {
     const bool number = line.is_number(j);
     any = any || number;
-    is_row = is_row && (number || (valid != nullptr && stands_for_nothing(line.cells[j])));
+    const bool sign = line.cells[j] == "-" || line.cells[j] == "+";
+    is_row = is_row && (number || sign || (valid != nullptr && stands_for_nothing(line.cells[j])));
   }
   is_row = is_row && any;
   if (is_row && !by_number)
@@ -226,11 +239,14 @@ void unwrap(Series& pose) {
 
 }  // namespace
 
-std::vector<std::string> hand_channels() { return names_of(hand_table); }
-std::vector<std::string> ft_channels() { return names_of(ft_table); }
-std::vector<std::string> mocap_channels() { return names_of(mocap_table); }
+std::vector<std::string> channels_of(TableKind kind) {
+  std::vector<std::string> names;
+  for (const Wanted& wanted : table_of(kind).channels) names.emplace_back(wanted.name);
+  return names;
+}
 
-std::string fault_of(const ColumnMap& map, const std::vector<std::string>& channels) {
+std::string fault_of(const ColumnMap& map, TableKind kind) {
+  const auto channels = channels_of(kind);
   const auto unknown = [&](const auto& entries, std::string_view what) -> std::string {
     for (const auto& [name, value] : entries)
       if (std::find(channels.begin(), channels.end(), name) == channels.end())
@@ -245,12 +261,8 @@ std::string fault_of(const ColumnMap& map, const std::vector<std::string>& chann
       return fmt::format("columns: '{}' is missing (needed: {})", name, fmt::join(channels, ", "));
   for (const auto& [name, value] : map.sigma)
     if (!(std::isfinite(value) && value >= 0)) return fmt::format("sigma: {}={} is not >= 0", name, value);
-  const std::vector<std::size_t> widths =
-      channels.size() == std::size(hand_table) ? std::vector<std::size_t>{1, 3, 3, 3}
-      : channels.size() == std::size(ft_table) ? std::vector<std::size_t>{1, 3, 1}
-                                               : std::vector<std::size_t>{1, 3};
   std::size_t first = 0;
-  for (const std::size_t width : widths) {
+  for (const std::size_t width : table_of(kind).widths) {
     std::size_t given = 0;
     for (std::size_t j = first; j < first + width; ++j) given += map.sigma.contains(channels[j]);
     if (given != 0 && given != width)
@@ -263,19 +275,19 @@ std::string fault_of(const ColumnMap& map, const std::vector<std::string>& chann
 }
 
 HandLog read_hand_csv(const std::filesystem::path& file, const ColumnMap& map) {
-  auto series = read_table(file, map, hand_table, {1, 3, 3, 3});
+  auto series = read_table(file, map, TableKind::hand);
   unwrap(series[1]);
   return {std::move(series[0]), std::move(series[1]), std::move(series[2]), std::move(series[3])};
 }
 
 FtLog read_ft_csv(const std::filesystem::path& file, const ColumnMap& map) {
-  auto series = read_table(file, map, ft_table, {1, 3, 1});
+  auto series = read_table(file, map, TableKind::ft);
   return {std::move(series[0]), std::move(series[1]), std::move(series[2])};
 }
 
 MocapLog read_mocap_csv(const std::filesystem::path& file, const ColumnMap& map) {
   Flags valid;
-  auto series = read_table(file, map, mocap_table, {1, 3}, &valid);
+  auto series = read_table(file, map, TableKind::mocap, &valid);
   if (std::find(valid.begin(), valid.end(), 1) == valid.end())
     throw ImportError(file.string(), "",
                       fmt::format("the object is lost in all of its {} rows", valid.size()));

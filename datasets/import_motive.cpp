@@ -10,7 +10,9 @@
 #include <numbers>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
+#include "datasets/assemble.hpp"
 #include "datasets/channel_rules.hpp"
 #include "datasets/csv.hpp"
 #include "datasets/near_miss.hpp"
@@ -211,6 +213,8 @@ void check_options(const MotiveOptions& options) {
        {std::pair("sigma_position", options.sigma_position), {"sigma_angle", options.sigma_angle}})
     if (!(std::isfinite(sigma) && sigma >= 0))
       throw std::invalid_argument(fmt::format("{}: {} is not >= 0", name, sigma));
+  if (!(std::isfinite(options.gravity) && options.gravity >= 0))
+    throw std::invalid_argument(fmt::format("gravity: {} is not >= 0", options.gravity));
 }
 
 /// A frame in which the body was seen: upright, not turned by any heading.
@@ -220,8 +224,8 @@ struct Seen {
 };
 
 /// Whether frames [first, last] are a free flight: on a parabola that gravity bends, and nothing else.
-bool is_free(const std::vector<Seen>& seen, std::size_t first, std::size_t last) {
-  constexpr double kOther = 2.5;  // m/s², a drag or a tracker's noise
+bool is_free(const std::vector<Seen>& seen, std::size_t first, std::size_t last, double gravity) {
+  const double other = std::min(2.5, gravity / 3);  // m/s², a drag or a tracker's noise; no rest
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero(), b = A;
   for (std::size_t i = first; i <= last; ++i) {
     const double t = seen[i].t - seen[first].t;
@@ -230,32 +234,47 @@ bool is_free(const std::vector<Seen>& seen, std::size_t first, std::size_t last)
     b += powers * (seen[i].at - seen[first].at).transpose();
   }
   const Vector3d bend = 2 * A.ldlt().solve(b).row(2).transpose();
-  return (bend + Vector3d(0, 0, 9.81)).norm() < kOther;
+  return (bend + Vector3d(0, 0, gravity)).norm() <= other;
 }
 
-/// Where the body runs over the floor, from its longest free flight: a throw may be carried anywhere before,
-/// and bounce after.
-void find_run(const std::vector<Seen>& seen, MotiveTake& take) {
+/// First and last frame of the longest free flight; twice the same where there is none.
+std::pair<std::size_t, std::size_t> longest_flight(const std::vector<Seen>& seen, double gravity) {
   constexpr double kWindow = 0.1;     // s, at least
   constexpr std::size_t kFrames = 6;  // in it, at least
-  std::size_t begin = 0, end = 0, from = 0, until = 0;
+  std::size_t begin = 0, end = 0, from = 0;
+  bool was_free = false;  // where it hits something, some windows are not
   for (std::size_t i = 0, j = 0; i < seen.size(); ++i) {
     while (j < seen.size() && (seen[j].t - seen[i].t < kWindow || j + 1 < i + kFrames)) ++j;
     if (j == seen.size()) break;
-    if (!is_free(seen, i, j)) continue;
-    if (i > until || until == 0) from = i;
-    until = j;
-    if (seen[until].t - seen[from].t > seen[end].t - seen[begin].t) begin = from, end = until;
+    const bool free = is_free(seen, i, j, gravity);
+    if (free && !was_free) from = i;
+    was_free = free;
+    if (free && seen[j].t - seen[from].t > seen[end].t - seen[begin].t) begin = from, end = j;
   }
-  if (end == begin) return;
-  const Vector3d way = seen[end].at - seen[begin].at;
-  const Eigen::Vector2d along = way.head<2>().normalized();
-  take.run = way.head<2>().norm();
-  take.run_heading = std::atan2(along.y(), along.x());
+  return {begin, end};
+}
+
+/// Where the body runs over the floor in its free flight: a throw may be carried anywhere before, and bounce
+/// after.
+std::optional<FlightRun> run_of(std::vector<Seen> seen, const MocapLog& mocap, const MotiveOptions& options) {
+  const auto& known = options.free_flight;
+  if (known) {
+    std::erase_if(seen, [&](const Seen& one) { return one.t < known->first || one.t > known->second; });
+  } else if (options.landing_height) {
+    const auto landing = landing_of(mocap, options.dimension, *options.landing_height);
+    if (landing) std::erase_if(seen, [&](const Seen& one) { return one.t > landing->time(0); });
+  }
+  if (seen.empty()) return {};
+  const auto [begin, end] =
+      known ? std::pair(std::size_t{0}, seen.size() - 1) : longest_flight(seen, options.gravity);
+  if (end == begin) return {};
+  const Eigen::Vector2d way = (seen[end].at - seen[begin].at).head<2>(), along = way.normalized();
+  FlightRun out{way.norm(), std::atan2(along.y(), along.x()), 0};
   for (std::size_t i = begin; i <= end; ++i) {
     const Eigen::Vector2d off = (seen[i].at - seen[begin].at).head<2>();
-    take.beside_run = std::max(take.beside_run, std::abs(along.x() * off.y() - along.y() * off.x()));
+    out.beside = std::max(out.beside, std::abs(along.x() * off.y() - along.y() * off.x()));
   }
+  return out;
 }
 
 /// The log's poses, sample by sample.
@@ -372,7 +391,7 @@ MotiveTake read_motive_csv(const std::filesystem::path& file, const MotiveOption
   if (take.lost == time.rows)
     reader.fail(header.number,
                 fmt::format("rigid body '{}' is lost in all of its {} frames", columns.body, time.rows));
-  find_run(track.frames(), take);
+  take.run = run_of(track.frames(), take.mocap, options);
   return take;
 }
 

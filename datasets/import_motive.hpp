@@ -3,7 +3,9 @@
 
 #include <array>
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "datasets/throw_log.hpp"
@@ -27,6 +29,18 @@ struct MotiveOptions {
   /// Declared noise, 1 σ: of a position [m] and of an angle [rad] (σ/2 of a quaternion's components); both or
   /// neither where the file has rotations. 0: none.
   double sigma_position = 0, sigma_angle = 0;  ///< m; rad
+  double gravity = 9.81;                       ///< [m/s²] by which a free flight is told
+  /// What is known of the free flight: from when to when it is [s, on the robot's clock]; the height [m]
+  /// below which, after its highest point, the body has landed.
+  std::optional<std::pair<double, double>> free_flight;
+  std::optional<double> landing_height;  ///< m
+};
+
+/// The straight line over the floor along which a free flight runs.
+struct FlightRun {
+  double length = 0;   ///< m
+  double heading = 0;  ///< rad, as MotiveOptions has it
+  double beside = 0;   ///< m, how far the flight is beside the line at most
 };
 
 /// One take of a Motive export: times, poses, lost frames.
@@ -39,10 +53,9 @@ struct MotiveTake {
   /// Planar: how far the track leaves the plane through its first sample [m], and the largest angle between
   /// the body's x axis and the plane [rad].
   double out_of_plane = 0, out_of_plane_angle = 0;  ///< m; rad
-  /// The straight line over the floor along which the longest free flight runs, of 0.1 s at least: how far
-  /// [m], the heading that MotiveOptions calls it [rad], and how far the flight is beside it at most [m].
-  /// Zero where there is none.
-  double run = 0, run_heading = 0, beside_run = 0;  ///< m; rad; m
+  /// Of MotiveOptions::free_flight, or else of the longest stretch before the landing, 0.1 s at least, that
+  /// gravity bends and nothing else; nothing where there is none.
+  std::optional<FlightRun> run;
 };
 
 /// Reads the exported rotation and position of one rigid body. Lengths in millimetres, centimetres or metres,

@@ -114,13 +114,13 @@ double step_of(const ImuLog& imu) {
 }
 
 /// Times in another unit than seconds, and accelerations in another than m/s², by what phones do: they sample
-/// 20 to some thousand times a second, and read gravity while they are held.
-void check_units(const std::filesystem::path& file, const ImuLog& imu, double step) {
+/// 20 to some thousand times a second, and read gravity while they are held. Gives what it reads then.
+std::optional<double> check_units(const std::filesystem::path& file, const ImuLog& imu, double step) {
   constexpr double kStep[2] = {1e-4, 0.1};            // s
   constexpr double kGravity = 9.80665, kFalling = 5;  // m/s²
   constexpr double kNear = 0.05;                      // as a share
   constexpr std::size_t kEnough = 20;
-  if (imu.time.rows < kEnough) return;
+  if (imu.time.rows < kEnough) return {};
   if (!(step >= kStep[0] && step <= kStep[1]))
     throw ImportError(
         file.string(), "column Time (s)",
@@ -136,8 +136,7 @@ void check_units(const std::filesystem::path& file, const ImuLog& imu, double st
   };
   // Of a unit that is no m/s^2 the median shows gravity in that unit; a phone that is shaken or thrown hard
   // reads anything else.
-  const double usual = dynamics::median(all),
-               rest = held.size() < kEnough ? kGravity : dynamics::median(held);
+  const double usual = dynamics::median(all);
   const auto is_near = [](double seen, double factor) {
     return std::abs(seen - kGravity * factor) < kNear * kGravity * factor;
   };
@@ -146,11 +145,14 @@ void check_units(const std::filesystem::path& file, const ImuLog& imu, double st
     fail(fmt::format(
         "{:.3g} m/s^2 is what it reads (median), and a phone that is held reads about 9.8: is it in g?",
         usual));
+  if (held.size() < kEnough) return {};
+  const double rest = dynamics::median(held);
   if (is_near(rest, kPerFoot))
     fail(fmt::format(
         "outside of falls it reads {:.3g} m/s^2 (median), and a phone that is held reads about 9.8: "
         "is it in ft/s^2?",
         rest));
+  return rest;
 }
 
 /// Samples [first, last] of small specific force.
@@ -265,7 +267,7 @@ PhyphoxRecording read_phyphox(const std::filesystem::path& file, const PhyphoxOp
   PhyphoxRecording out;
   out.samples = imu.time.rows;
   const double step = step_of(imu);
-  check_units(file, imu, step);
+  out.rest = check_units(file, imu, step);
 
   std::vector<Stretch> falls;
   for (const Stretch& stretch : small_force(imu, options.threshold)) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -35,6 +36,9 @@ struct PhyphoxRecording {
   std::vector<Throw> falls;
   std::vector<DroppedFall> dropped;  ///< what looks like a fall and is none
   std::size_t samples = 0;           ///< in the file
+  /// Median of the specific forces of 5 m/s² and more, where something holds the phone: about gravity, unless
+  /// the phone is shaken or its scale is off [m/s²]; nothing of fewer than 20.
+  std::optional<double> rest;
 };
 
 /// Reads time and specific force [m/s²] in the phone's frame, and its angular rate where the file has it
@@ -42,8 +46,8 @@ struct PhyphoxRecording {
 /// English words; a file without one holds time, x, y, z and perhaps the absolute value. The noise declared
 /// is estimated from the third differences of each axis over the falls. "Linear acceleration", from which the
 /// phone has taken what it believes gravity to be, is refused, and so are samples further apart than 0.1 s or
-/// closer than 0.1 ms (times in ms), and a phone that reads less than 7 or more than 14 m/s² in the median
-/// outside of falls (g, ft/s²). Throws ImportError naming file, line and
+/// closer than 0.1 ms (times in ms), and a median specific force that is, to 5 %, gravity in g (of all
+/// samples) or in ft/s² (PhyphoxRecording::rest). Throws ImportError naming file, line and
 /// column; a recording without a fall is not an error.
 PhyphoxRecording read_phyphox(const std::filesystem::path& file, const PhyphoxOptions& options = {});
 

@@ -252,7 +252,16 @@ std::vector<Blame> blamed(Links links) {
   }
 }
 
-UnitDoubt doubt_of(const Blame& blame, const std::string& throws, int n, const char* of_what) {
+/// Whether a throw by itself shows what an axis is blamed for.
+bool shows(const Links& links, const Blame& blame) {
+  return std::any_of(links.begin(), links.end(), [&](const auto& one) {
+    const auto& [link, ratio] = one;
+    if (link.first != blame.axis && link.second != blame.axis) return false;
+    return !same(ratio) && same((link.first == blame.axis ? ratio : 1 / ratio) / blame.ratio);
+  });
+}
+
+UnitDoubt doubt_of(const Blame& blame, const std::string& throws, int n, const std::string& of_what) {
   const std::string name = name_of(blame.axis);
   return {
       fmt::format("/throws/{}/{}", throws, path_of(blame.axis.source)), name, blame.ratio, n,
@@ -305,10 +314,10 @@ std::vector<UnitDoubt> contradicted_axes(const ThrowLog& log) {
   for (const auto& [link, ratios] : all) usual[link] = dynamics::median(ratios);
   std::vector<UnitDoubt> out;
   for (const auto& blame : blamed(usual)) {
-    std::size_t throws = 0;
-    for (const auto& [link, ratios] : all)
-      if (link.first == blame.axis || link.second == blame.axis) throws = std::max(throws, ratios.size());
-    out.push_back(doubt_of(blame, "*", static_cast<int>(throws), "in the median over throws"));
+    const auto n = std::count_if(each.begin(), each.end(), [&](const Links& l) { return shows(l, blame); });
+    out.push_back(
+        doubt_of(blame, "*", static_cast<int>(n),
+                 fmt::format("in the median over throws ({} of {} show it)", n, log.throws.size())));
   }
   if (!out.empty()) return out;
   for (std::size_t i = 0; i < each.size(); ++i) {
@@ -358,12 +367,15 @@ std::vector<UnitDoubt> reversed_wrenches(const ThrowLog& log) {
     if (about[c].empty()) continue;
     const double against = dynamics::median(about[c]), ratio = dynamics::median(size[c]);
     if (against > kAgainst || dynamics::median(raw[c]) > kRaw || ratio > kSize || ratio < 1 / kSize) continue;
+    const auto n =
+        std::count_if(about[c].begin(), about[c].end(), [&](double each) { return each <= kAgainst; });
     out.push_back(
-        {"/throws/*/ft/wrench", kNames[c], -ratio, static_cast<int>(about[c].size()),
+        {"/throws/*/ft/wrench", kNames[c], -ratio, static_cast<int>(n),
          fmt::format("{} goes against what mass and motion of the held object need (correlation {:.2f}, "
-                     "median of {} throws), and the wrench is the one that the pad applies to the object, in "
+                     "median of {} throws, of which {} show it), and the wrench is the one that the pad "
+                     "applies to the object, in "
                      "the hand frame: is the sign reversed, a reaction logged for the action, or that axis?",
-                     kNames[c], against, about[c].size())});
+                     kNames[c], against, about[c].size(), n)});
   }
   if (!out.empty() || crossed[0].empty()) return out;
   if (dynamics::median(crossed[0]) > kCrossed && dynamics::median(crossed[1]) > kCrossed &&

@@ -16,7 +16,7 @@ struct UnitDoubt {
   double ratio{};      ///< its size over what the other channels say, median over throws; of the normal
                        ///< force: the friction that the wrenches take of it; of grasp_angle: itself; of
                        ///< angles that are whole turns off: 1
-  int throws{};        ///< that show it; 0: what is declared is impossible by itself
+  int throws{};        ///< that show it, or that are in the median; 0: it is impossible by itself
   std::string reason;  ///< in words, with the unit that would explain it
 };
 

@@ -160,26 +160,28 @@ void withdraw_imitations(const GroupedProblem& problem, EffectSearch& search, Me
   take_fits(problem, search, out);
 }
 
-/// The search without wild groups. One that the answer explains as it does the others is none, and taken
-/// back.
+/// The search without wild groups. One that the answer explains as it does the others is none: one that all
+/// effects together bring so near takes part from the start, and the answer decides of each.
 EffectSearch search_without_wild(GroupedProblem& problem, const EffectSearchOptions& options,
                                  std::vector<WildGroup>& wild) {
-  const auto set_aside = [&] {
+  const auto set_aside = [&](const std::vector<WildGroup>& groups) {
     std::vector<std::size_t> which;
-    for (const WildGroup& one : wild) which.push_back(one.group);
+    for (const WildGroup& one : groups) which.push_back(one.group);
     problem.set_aside(which);
   };
   wild = wild_groups(problem, problem.effects(), options.fit);
+  auto aside = wild;
+  std::erase_if(aside, [&](const WildGroup& one) { return one.apart <= options.fit.group_limit; });
   for (;;) {
-    set_aside();
+    set_aside(aside);
     EffectSearch search = search_effects(problem, options);
     if (wild.empty()) return search;
     problem.set_aside({});
     auto still =
         search.solved ? still_wild(problem, wild, search.final, options.fit) : std::vector<WildGroup>{};
-    const bool settled = still.size() == wild.size();
-    wild = std::move(still);
-    set_aside();
+    const bool settled = still == aside;
+    wild = aside = std::move(still);
+    set_aside(aside);
     if (settled) return search;
   }
 }

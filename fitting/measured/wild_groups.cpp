@@ -98,7 +98,7 @@ std::vector<std::size_t> gross(const std::vector<double>& misfits, std::vector<W
   for (std::size_t i = 0; i < logs.size(); ++i)
     if (logs[i] - middle > kGross * scatter) {
       places.push_back(i);
-      out.push_back({i, std::exp(logs[i] - middle), (logs[i] - middle) / scatter});
+      out.push_back({i, std::exp(logs[i] - middle), (logs[i] - middle) / scatter, 0});
     }
   return places;
 }
@@ -123,9 +123,10 @@ std::vector<WildGroup> wild_groups(const GroupedProblem& problem,
   std::vector<WildGroup> out;
   if (parts.size() < kFewestGroups) return out;
   std::vector<bool> kept(parts.size(), true);
+  std::vector<double> misfits;
   for (int round = 0; round < kSearches; ++round) {
     const VectorXd values = fitted(parts, kept, options.group_limit);
-    std::vector<double> misfits;
+    misfits.clear();
     for (const Footing& part : parts) misfits.push_back(part.misfit(values));
     const auto places = gross(misfits, out);
     if (is_too_many(parts, places)) return {};
@@ -133,7 +134,13 @@ std::vector<WildGroup> wild_groups(const GroupedProblem& problem,
     for (const std::size_t i : places) next[i] = false;
     if (std::exchange(kept, next) == next) break;
   }
-  for (WildGroup& wild : out) wild.group = parts[wild.group].group;
+  double worst = 0;
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    if (kept[i]) worst = std::max(worst, misfits[i]);
+  for (WildGroup& wild : out) {
+    wild.apart = misfits[wild.group] / worst;
+    wild.group = parts[wild.group].group;
+  }
   return out;
 }
 

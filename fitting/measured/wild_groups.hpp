@@ -12,6 +12,8 @@ struct WildGroup {
   std::size_t group{};  ///< its place among the problem's
   double times{};       ///< its misfit, in medians of all groups'
   double sigmas{};      ///< the logarithm of that, in robust sigmas
+  double apart{};       ///< its misfit, in those of the worst group that is not gross
+  bool operator==(const WildGroup&) const = default;
 };
 
 /// Groups that err grossly where all `effects` together explain what the groups have in common, to first

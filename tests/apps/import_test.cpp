@@ -153,7 +153,7 @@ TEST_F(Cli, AHeadingThatTheTrackContradictsIsRefused) {
       motive + "--heading 70", 3,
       "takes/slow_01.csv: rigid body bar, columns Position: the body flies 1.32 m along a heading of 0.0 "
       "deg, 70.0 deg from --heading 70: up to 15 deg are accepted");
-  expect_refusal(motive + "--heading 70", 3, "--heading 0.0?");
+  expect_refusal(motive + "--heading 70", 3, "--heading 0.0? --trust-heading takes it as it is");
   const auto notes = [&](const std::string& heading) {
     const Answer answer = run(motive + "--json a.json --heading " + heading);
     EXPECT_EQ(answer.code, 0) << answer.err;
@@ -164,6 +164,13 @@ TEST_F(Cli, AHeadingThatTheTrackContradictsIsRefused) {
   EXPECT_EQ(notes("2"), "");
   EXPECT_THAT(notes("10"), HasSubstr("10.0 deg from --heading 10; x is too short by 1.5 %: --heading 0.0?"));
   EXPECT_THAT(notes("180"), HasSubstr("it goes backwards"));
+  EXPECT_THAT(notes("70 --trust-heading"), HasSubstr("x is too short by 65.8 %: --heading 0.0?"));
+  EXPECT_THAT(notes("70 --gravity 25"), HasSubstr("no free flight is seen of 0.1 s or longer: --heading "
+                                                  "is not checked; --free-flight T0,T1 says where it is"));
+  EXPECT_EQ(read_json(folder / "a.json")["files"][0]["run_m"], nullptr);
+  const std::string one = "import motive-csv takes/slow_01.csv --dimension 2 --mass 1 --out a.h5 ";
+  EXPECT_THAT(run(one + "--free-flight 2,3").err, HasSubstr("in --free-flight (fewer than two frames)"));
+  expect_refusal(one + "--free-flight 0.4,0.8 --heading 70", 3, "the body flies 0.60 m");
 }
 
 // Fewer throws than are held out of: discover would have nothing to judge by.
@@ -234,6 +241,10 @@ TEST_F(Cli, ImportsPhonesAsFreeFlights) {
   expect_refusal("import phyphox fall_1.csv --mass 0.2 --out a.h5 --min-fall 0.8", 3,
                  "lasts 0.600 s, less than 0.8 s");
   EXPECT_THAT(answer.err, HasSubstr("no throw is held out"));
+  EXPECT_THAT(answer.err, Not(HasSubstr("outside of falls")));
+  const Answer elsewhere = run("import phyphox fall_1.csv --mass 0.2 --out a.h5 --gravity 3.7");
+  EXPECT_THAT(elsewhere.err, HasSubstr("fall_1.csv: outside of falls the phone reads 9.8 m/s^2 (median), and "
+                                       "held still it would read 3.7"));
   expect_refusal("discover falls.h5 --model free_fall", 1,
                  "no throw has the split 'test', of 1: effects are found on train");
 }

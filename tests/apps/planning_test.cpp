@@ -158,7 +158,7 @@ TEST_F(Cli, ThrowFlipRefusesWhatItCannotDo) {
   expect_refusal(other + "m2 --target 5,180", 2, "--target: 5 m, 180 degrees; accepted: ");
   expect_refusal(other + "m2 --target -1,180", 2, "--target: -1 m, 180 degrees; accepted: ");
   expect_refusal(other + "m2 --target 1.2,900", 2, "--target: 1.2 m, 900 degrees; accepted: ");
-  expect_refusal(other + "m5 --target 1.2,180", 2, "m5 not in {m1,m2,m3,m4}");
+  expect_refusal(other + "m5 --target 1.2,180", 2, "there is no 'm5' (there are: m1, m2, m3, m4)");
   expect_refusal(aim + "--seed abc", 2, "abc is not a whole number from 0 to");
   expect_refusal(aim + "--seed -1", 2, "-1 is not a whole number from 0 to");
   expect_refusal(aim + "--card card.json", 2, "--card: only --learner m4");

@@ -64,6 +64,12 @@ TEST_F(Cli, WrongUsage) {
   expect_refusal("plan dance", 2, "there is no command 'dance'");
   expect_refusal("compare a.h5 --modles projectile", 2, "no option '--modles'; did you mean '--models'?");
   expect_refusal("plan throw --target=1,0,0 --smaples=3", 2, "did you mean '--samples'?");
+  expect_refusal("fit a.h5 --model limit_surfce", 2, "did you mean 'limit_surface'?");
+  expect_refusal("fit a.h5 --model convex_quatric", 2, "did you mean 'convex_quartic'?");
+  expect_refusal("fit a.h5 --model projectile", 2, "'projectile' cannot be fitted (there are: ");
+  expect_refusal("discover a.h5 --model projectle", 2,
+                 "--model: there is no 'projectle'; did you mean 'projectile'?");
+  expect_refusal("crosscheck a.h5 --engine bulet", 2, "did you mean 'bullet'?");
   EXPECT_EQ(run("compare").code, 2);
   EXPECT_EQ(run("inspect " + quick + " --threads -1").code, 2);
   expect_refusal("generate nonsense --out a.h5", 2, "batch180");

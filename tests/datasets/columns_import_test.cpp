@@ -17,7 +17,7 @@ const std::string ft_header = "t [ms],Fz (N),Fx (N),Ty (Nmm),grip (N)\n";
 ColumnMap hand_map() {
   ColumnMap map;
   int k = 0;
-  for (const std::string& name : hand_channels()) map.columns[name] = "#" + std::to_string(++k);
+  for (const std::string& name : channels_of(TableKind::hand)) map.columns[name] = "#" + std::to_string(++k);
   map.units = {{"time", "s"}, {"x", "mm"},        {"z", "mm"},     {"theta", "deg"}, {"vx", "m/s"},
                {"vz", "m/s"}, {"omega", "deg/s"}, {"ax", "m/s^2"}, {"az", "m/s^2"},  {"alpha", "deg/s^2"}};
   return map;
@@ -78,14 +78,23 @@ TEST(ColumnsImport, ATrackedObjectWithLosses) {
   ColumnMap numbered{{{"time", "#1"}, {"x", "#2"}, {"z", "#3"}, {"theta", "#4"}}, {}, {}, 0};
   numbered.units = {{"time", "s"}, {"x", "m"}, {"z", "m"}, {"theta", "rad"}};
   EXPECT_EQ(read_mocap_csv(file, numbered).valid, (Flags{0, 0, 1}));
+  put_bytes(file, "0,-,1,0\n0.1,1,1,0\n");
+  expect_error<ImportError>([&] { read_mocap_csv(file, numbered); }, file, "line 1, column #2",
+                            "'-' is not a number");
   put_bytes(file, "t (s),X (m),Z (m),pitch (deg)\n0,1,1,x\n");
   expect_error<ImportError>([&] { read_mocap_csv(file, map); }, file, "line 2, column pitch (deg)",
                             "'x' is not a number");
+  // Half of a number is none, and no loss that a tracker tells.
+  for (const std::string cell : {"-", "+", "-na", "+n/a"}) {
+    put_bytes(file, "t (s),X (m),Z (m),pitch (deg)\n0,1,1," + cell + "\n");
+    expect_error<ImportError>([&] { read_mocap_csv(file, map); }, file, "line 2, column pitch (deg)",
+                              "'" + cell + "' is not a number");
+  }
   put_bytes(file, "t (s),X (m),Z (m),pitch (deg)\n,1,1,1\n");
   expect_error<ImportError>([&] { read_mocap_csv(file, map); }, file, "line 2, column t (s)",
                             "'' is not a number");
   map.sigma.erase("z");
-  EXPECT_THAT(fault_of(map, mocap_channels()), HasSubstr("for all of x, z, theta or for none"));
+  EXPECT_THAT(fault_of(map, TableKind::mocap), HasSubstr("for all of x, z, theta or for none"));
 }
 
 TEST(ColumnsImport, HeadersOfSeveralSpellings) {
@@ -133,9 +142,9 @@ TEST(ColumnsImport, MapsAreChecked) {
     ColumnMap map = ft_map;
     change(map);
     EXPECT_THROW(read_ft_csv("none.csv", map), std::invalid_argument);
-    return fault_of(map, ft_channels());
+    return fault_of(map, TableKind::ft);
   };
-  EXPECT_EQ(fault_of(ft_map, ft_channels()), "");
+  EXPECT_EQ(fault_of(ft_map, TableKind::ft), "");
   EXPECT_THAT(fault([](ColumnMap& m) { m.columns.erase("tau"); }), HasSubstr("'tau' is missing"));
   EXPECT_THAT(fault([](ColumnMap& m) { m.columns["nromal"] = "x"; }), HasSubstr("did you mean 'normal'?"));
   EXPECT_THAT(fault([](ColumnMap& m) { m.units["ax"] = "m"; }), HasSubstr("units: there is no channel 'ax'"));

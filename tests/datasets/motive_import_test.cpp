@@ -160,10 +160,68 @@ TEST(Motive, FindsTheHeadingOfTheThrow) {
     MotiveOptions options;
     options.dimension = 2;
     const MotiveTake take = read(file, options);
-    EXPECT_NEAR(std::remainder(take.run_heading - heading, 2 * pi), 0, 0.02) << heading;
-    EXPECT_NEAR(take.run, 0.9, 0.03);
-    EXPECT_LT(take.beside_run, 0.03);
+    ASSERT_TRUE(take.run.has_value());
+    EXPECT_NEAR(std::remainder(take.run->heading - heading, 2 * pi), 0, 0.02) << heading;
+    EXPECT_NEAR(take.run->length, 0.9, 0.03);
+    EXPECT_LT(take.run->beside, 0.03);
   }
+}
+
+/// [rad] A window may reach a frame or two beyond either end of a flight.
+constexpr double kEnds = 0.1;
+
+// A short throw along X, and a long bounce to the side: what is known of the flight decides.
+TEST(Motive, TheFlightIsTheOneThatIsKnown) {
+  File file;
+  for (int k = 0; k < 100; ++k) {
+    const double t = 0.01 * k, u = t - 0.3;  // at 0.3 s it meets the floor
+    file.rows += k < 30 ? row(k, t, upright, {2 * t, 0.4414 - 4.905 * t * t, 0})
+                        : row(k, t, upright, {0.6, 3.4 * u - 4.905 * u * u, 2 * u});
+  }
+  MotiveOptions options;
+  options.dimension = 2;
+  EXPECT_NEAR(read(file, options).run.value().heading, -pi / 2, kEnds);  // the longest one
+  const auto forward = [&](double length) {
+    const auto run = read(file, options).run;
+    ASSERT_TRUE(run.has_value());
+    EXPECT_NEAR(run->heading, 0, kEnds);
+    EXPECT_NEAR(run->length, length, 0.03);
+  };
+  options.free_flight = {0.05, 0.25};
+  forward(0.4);
+  options.gravity = 1.62;  // a known flight is believed
+  forward(0.4);
+  options.time_offset = 5;  // it is on the robot's clock
+  EXPECT_FALSE(read(file, options).run.has_value());
+}
+
+TEST(Motive, NothingAfterTheLandingIsTheFlight) {
+  File file;
+  for (int k = 0; k < 100; ++k) {
+    const double t = 0.01 * k, u = t - 0.2;  // it falls over an edge, and falls on to the side
+    file.rows += k < 20 ? row(k, t, upright, {2 * t, 1 - 4.905 * t * t, 0})
+                        : row(k, t, upright, {0.4, 0.8038 - 4.905 * u * u, 2 * u});
+  }
+  MotiveOptions options;
+  options.dimension = 2;
+  EXPECT_NEAR(read(file, options).run.value().heading, -pi / 2, kEnds);
+  options.landing_height = 0.81;
+  EXPECT_NEAR(read(file, options).run.value().heading, 0, kEnds);
+}
+
+TEST(Motive, AFlightFallsByTheCampaignsGravity) {
+  File file, rest;
+  for (int k = 0; k < 100; ++k) {
+    const double t = 0.01 * k;
+    file.rows += row(k, t, upright, {2 * t, 1 - 0.5 * 1.62 * t * t, 0});
+    rest.rows += row(k, t, upright, {0, 0, 0});
+  }
+  MotiveOptions options;
+  options.dimension = 2;
+  EXPECT_FALSE(read(file, options).run.has_value());
+  options.gravity = 1.62;
+  EXPECT_NEAR(read(file, options).run.value().length, 1.98, 1e-6);
+  EXPECT_FALSE(read(rest, options).run.has_value());
 }
 
 TEST(Motive, OutOfPlaneIsSaid) {

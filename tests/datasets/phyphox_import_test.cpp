@@ -180,7 +180,9 @@ TEST(Phyphox, AHardThrowIsNoOtherUnit) {
     out << t << ",0.1,-0.2," << up << '\n';
   }
   put_bytes(file, out.str());
-  EXPECT_EQ(read_phyphox(file).falls.size(), 1U);
+  const auto recording = read_phyphox(file);
+  EXPECT_EQ(recording.falls.size(), 1U);
+  EXPECT_GT(recording.rest.value(), 18);  // as thrown: told, not refused
 }
 
 TEST(Phyphox, SaysWhichLineAndColumn) {

@@ -84,6 +84,23 @@ TEST(AxisCheck, RadiansDeclaredAsDegreesAreTold) {
   }
 }
 
+// Those that have the channel and are right do not show it.
+TEST(AxisCheck, CountsTheThrowsThatShowIt) {
+  const int all = static_cast<int>(small_log().throws.size()), wrong = all - all / 4;
+  auto log = small_log();
+  for (int i = 0; i < wrong; ++i) scale_column(log.throws[static_cast<std::size_t>(i)].mocap->pose, 1e3, 0);
+  auto doubts = contradicted_axes(log);
+  ASSERT_EQ(doubts.size(), 1U);
+  EXPECT_EQ(doubts[0].throws, wrong);
+  EXPECT_THAT(doubts[0].reason, HasSubstr(std::to_string(wrong) + " of " + std::to_string(all) + " show it"));
+  log = small_log();
+  for (int i = 0; i < wrong; ++i) scale_column(log.throws[static_cast<std::size_t>(i)].ft->wrench, -1, 0);
+  doubts = reversed_wrenches(log);
+  ASSERT_EQ(doubts.size(), 1U);
+  EXPECT_EQ(doubts[0].throws, wrong);
+  EXPECT_THAT(doubts[0].reason, HasSubstr("of which " + std::to_string(wrong) + " show it"));
+}
+
 TEST(AxisCheck, OneThrowWithASmallHandIsToldByItsOwnPath) {
   for (const bool whole : {false, true}) {
     auto log = small_log();

@@ -20,9 +20,11 @@ namespace unhand::fuzz {
 namespace {
 
 using Path = std::filesystem::path;
+using datasets::TableKind;
 
 /// Columns by their own names, in SI units.
-datasets::ColumnMap plain(const std::vector<std::string>& channels) {
+datasets::ColumnMap plain(TableKind kind) {
+  const auto channels = channels_of(kind);
   datasets::ColumnMap map;
   for (const auto& channel : channels) map.columns[channel] = channel;
   const std::map<std::string, std::string> units{
@@ -39,8 +41,8 @@ const std::map<std::string, std::function<void(const Path&)>>& readers() {
       {"slip_log", [](const Path& file) { datasets::read_slip_log(file); }},
       {"model_card", [](const Path& file) { datasets::read_model_card(file); }},
       {"sku", [](const Path& file) { datasets::read_sku(file); }},
-      {"hand_csv", [](const Path& file) { datasets::read_hand_csv(file, plain(datasets::hand_channels())); }},
-      {"ft_csv", [](const Path& file) { datasets::read_ft_csv(file, plain(datasets::ft_channels())); }},
+      {"hand_csv", [](const Path& file) { datasets::read_hand_csv(file, plain(TableKind::hand)); }},
+      {"ft_csv", [](const Path& file) { datasets::read_ft_csv(file, plain(TableKind::ft)); }},
       {"motive_csv", [](const Path& file) { datasets::read_motive_csv(file); }},
       {"phyphox", [](const Path& file) { datasets::read_phyphox(file); }},
       {"cube_tosses", [](const Path& file) { datasets::import_cube_tosses(file); }},
