@@ -54,6 +54,9 @@ struct Effect {
   /// be. Empty: none is.
   std::string form{};
   std::optional<Anisotropy> anisotropy{};  ///< none: the effect stands alone
+  /// Acts through what this other effect adds to, a wind through "flight.quadratic_drag": where nothing is
+  /// declared of that and it is not in the model, this is no answer. Empty: stands alone.
+  std::string acts_through{};
   /// "id.name"
   std::string full_name(const EffectParameter& parameter) const { return id + "." + parameter.name; }
 };

@@ -41,7 +41,12 @@ std::span<const dynamics::EffectOn<Air>> air_effects() {
        &lift<Dual>},
       {{"flight.wind",
         "constant air velocity, acting through the declared drag",
-        {{"w_x", "m/s", 0, -30, 30, 0.3}, {"w_z", "m/s", 0, -30, 30, 0.3}}},
+        {{"w_x", "m/s", 0, -30, 30, 0.3}, {"w_z", "m/s", 0, -30, 30, 0.3}},
+        false,
+        false,
+        {},
+        {},
+        "flight.quadratic_drag"},
        &wind<double>,
        &wind<Dual>},
   };

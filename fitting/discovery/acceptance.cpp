@@ -309,13 +309,6 @@ bool spoils(const AcceptedEffect& effect, const Stage& stage, const Discovery& s
 
 namespace {
 
-/// Whether something is left in the tracked flights of both halves.
-bool leaves_flights(const Stage& stage, const DiscoverOptions& options) {
-  return std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(), [&](const ChannelMisfit& m) {
-    return m.phase == Phase::flight && is_left(m, options) && is_confirmed(stage.held_out.misfit, m);
-  });
-}
-
 /// One candidate for every object, from its own flights.
 std::map<int, MissingCandidate> candidates_of(const PhaseTraces& train) {
   std::map<int, std::vector<ResidualTrace>> of_object;
@@ -326,15 +319,33 @@ std::map<int, MissingCandidate> candidates_of(const PhaseTraces& train) {
 }
 
 /// What candidates leave, a candidate for each object; one that is not there says nothing.
-double beyond_noise(const PhaseTraces& flights, const std::map<int, MissingCandidate>& candidates) {
-  double out = 0;
+Rest left_by(const std::map<int, MissingCandidate>& candidates, const PhaseTraces& flights) {
+  Rest out;
   for (const ResidualTrace& trace : flights.all) {
     const auto candidate = candidates.find(trace.group);
     const Rest rest = rest_around(
         {trace}, candidate == candidates.end() ? MissingCandidate{} : candidate->second, flights.how);
-    out += rest.chi2 - static_cast<double>(rest.samples);
+    out.chi2 += rest.chi2;
+    out.samples += rest.samples;
   }
   return out;
+}
+
+double beyond_noise(const Rest& rest) { return rest.chi2 - static_cast<double>(rest.samples); }
+
+/// How much likelier the form makes the flights of one half, 2 log of the likelihoods' ratio, in units of the
+/// scatter that the effects leave.
+double likelier(const Rest& by_effects, const Rest& by_form) {
+  const double samples = static_cast<double>(std::max(1L, by_effects.samples));
+  return (by_effects.chi2 - by_form.chi2) / std::max(1.0, by_effects.chi2 / samples);
+}
+
+/// The unknowns of some effects in a fit.
+std::size_t unknowns_of(const FitResult& fit, const std::vector<std::string>& ids) {
+  return static_cast<std::size_t>(std::count_if(fit.campaign.begin(), fit.campaign.end(), [&](const auto& u) {
+    return std::any_of(ids.begin(), ids.end(),
+                       [&](const std::string& id) { return u.unknown.name.starts_with(id + "."); });
+  }));
 }
 
 }  // namespace
@@ -344,7 +355,7 @@ std::vector<std::string> outdone_by_a_form(const Stage& stage, const Discovery& 
   std::vector<std::string> accepted;
   for (const AcceptedEffect& effect : so_far.effects)
     if (in_air(effect.phase) && !is_law(effect.id) && !acts_on_pads(effect.id)) accepted.push_back(effect.id);
-  if (accepted.empty() || !leaves_flights(stage, options)) return {};
+  if (accepted.empty()) return {};
   const Stage& less = without(stage, accepted, options);
   if (!less.solved()) return {};
   const int threads = options.fit.threads;
@@ -353,12 +364,18 @@ std::vector<std::string> outdone_by_a_form(const Stage& stage, const Discovery& 
   };
   const PhaseTraces train = flights(less, less.fit);
   const auto candidates = candidates_of(train);
-  const double left = beyond_noise(flights(stage, stage.fit), {});
-  if (!(left < kOutdone * beyond_noise(train, {}))) return {};  // they have no part in the flights
-  const bool outdone = beyond_noise(train, candidates) < kOutdone * left &&
-                       beyond_noise(flights(less, less.held_out), candidates) <
-                           kOutdone * beyond_noise(flights(stage, stage.held_out), {});
-  if (!outdone) return {};
+  const Rest effects = left_by({}, flights(stage, stage.fit)), form = left_by(candidates, train);
+  // They may have no part in the flights.
+  if (!(beyond_noise(effects) < kOutdone * beyond_noise(left_by({}, train)))) return {};
+  const Rest effects_held_out = left_by({}, flights(stage, stage.held_out)),
+             form_held_out = left_by(candidates, flights(less, less.held_out));
+  double terms = 0;
+  for (const auto& [object, candidate] : candidates) terms += static_cast<double>(candidate.terms.size());
+  const double more = terms - static_cast<double>(unknowns_of(stage.fit, accepted));
+  const double bic =
+      more * std::log(static_cast<double>(std::max(2L, form.samples))) - likelier(effects, form);
+  if (!(bic <= kDeltaBic) || !(likelier(effects_held_out, form_held_out) > 2 * std::log(kTimesAsLikely)))
+    return {};
   for (const auto& [object, candidate] : candidates)
     for (const MissingTerm& term : candidate.terms)
       std::erase_if(accepted, [&](const std::string& id) { return find_effect(id).form == term.name; });

@@ -180,14 +180,15 @@ inline constexpr double kNoisier = 0.25;
 bool spoils(const AcceptedEffect& effect, const Stage& stage, const Discovery& so_far,
             const DiscoverOptions& options);
 
-/// What a form that no effect has may leave of what the accepted effects leave of the tracked flights.
+/// What accepted effects may leave of the misfit in tracked flights to count as its explanation.
 inline constexpr double kOutdone = 0.5;
 
 /// The accepted effects of the air that are the shadow of something unlisted. The laws of flight and of
-/// sensors are exact, so that something left in flight means that something else acts: beside them, or in
-/// their place. They are outdone where a few terms (missing_terms, one candidate an object), fitted to the
-/// train throws in their place, leave less than kOutdone of what they leave, beyond noise, in both halves of
-/// the throws. An effect whose own form is among those terms stays.
+/// sensors are exact, so that a form that describes the flights better means that something else acts: beside
+/// them, or in their place. Asked where they explain most of what was off in the flights. They are outdone
+/// where a few terms (missing_terms, one candidate an object), fitted to the train throws in their place, win
+/// by Bayes' criterion there (kDeltaBic), and make the held-out flights kTimesAsLikely as likely. An effect
+/// whose own form is among those terms stays.
 std::vector<std::string> outdone_by_a_form(const Stage& stage, const Discovery& so_far,
                                            const DiscoverOptions& options);
 

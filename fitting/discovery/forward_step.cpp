@@ -121,6 +121,14 @@ class ForwardStep {
     return std::find(out_.silent.begin(), out_.silent.end(), id) != out_.silent.end();
   }
 
+  /// Acts through what is neither declared nor in the model: a wind where no drag is.
+  bool acts_through_nothing(const std::string& id) const {
+    if (is_law(id) || !is_silent(id)) return false;
+    const std::string through = find_effect(id).acts_through;
+    const auto& in_model = stage_.problem.options().effects;
+    return !through.empty() && std::find(in_model.begin(), in_model.end(), through) == in_model.end();
+  }
+
   bool in_reach(const Score& score) const {
     const auto columns = static_cast<double>(f_.candidates[score.candidate].columns.size());
     return !noise_ || kFirstOrder * score.gain >= columns * std::log(f_.samples) - kDeltaBic;
@@ -153,7 +161,9 @@ class ForwardStep {
   }
 
   void consider(const Score& score) {
-    if (!score.visible || !in_reach(score) || !tried_.insert(id_of(score)).second) return;
+    if (!score.visible || acts_through_nothing(id_of(score)) || !in_reach(score) ||
+        !tried_.insert(id_of(score)).second)
+      return;
     auto trial = try_out(score);
     if (!trial) return;
     const double bic = trial->next.bic();

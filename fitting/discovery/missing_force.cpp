@@ -118,6 +118,10 @@ std::vector<Term> acceleration_terms() {
            [](const State& s) {
              return Vector3{s.omega * s.omega * std::cos(s.theta), s.omega * s.omega * std::sin(s.theta), 0};
            }},
+          {"omega^2 along the object's z", "m",
+           [](const State& s) {
+             return Vector3{-s.omega * s.omega * std::sin(s.theta), s.omega * s.omega * std::cos(s.theta), 0};
+           }},
           {"1 in rotation", "rad/s^2",
            [](const State&) {
              return Vector3{0, 0, 1};
