@@ -17,6 +17,7 @@
 #include "apps/progress.hpp"
 #include "apps/tell.hpp"
 #include "apps/throws.hpp"
+#include "apps/weak_grip.hpp"
 #include "datasets/near_miss.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/free_flight.hpp"
@@ -140,6 +141,7 @@ void compare_releases(const CompareRequest& request, const datasets::ThrowLog& l
   tell_not_compared(unanswered);
   if (comparison.models.empty()) throw Unanswered("no model is left to compare");
   report_failures(comparison);
+  for (const auto& model : comparison.models) tell_weak_grip(model);
 
   const ReleaseTables tables = release_tables(comparison, log, request.log);
   Json json = release_json(comparison, request);

@@ -16,6 +16,7 @@
 #include "apps/ranking.hpp"
 #include "apps/table.hpp"
 #include "apps/throws.hpp"
+#include "apps/weak_grip.hpp"
 #include "contact/registry.hpp"
 #include "fitting/card.hpp"
 
@@ -163,15 +164,16 @@ void discover(const DiscoverOptions& options, const Parser& parser) {
   }();
   if (found.verdict == fitting::Verdict::not_answered) throw Unanswered(found.message);
 
+  const auto& problem = *found.problem;
+  const auto errors =
+      comparison_of(problem, found.final, predict_throws(problem, found.final, {false, options.threads}));
+  tell_weak_grip(errors);
+
   Outputs outputs{{options.log}};
   const Json json = discovery_json(found, options.log, options.model);
   if (!options.json.empty()) outputs.json(options.json, json);
-  if (!options.card.empty()) {
-    const auto& problem = *found.problem;
-    const auto errors =
-        comparison_of(problem, found.final, predict_throws(problem, found.final, {false, options.threads}));
+  if (!options.card.empty())
     outputs.text(options.card, datasets::to_json(card_of(problem, found.final, errors, options.log, log)));
-  }
   if (!options.report.empty())
     write_discovery_report(found, options.log, command, json, outputs.directory(options.report));
   outputs.commit();
