@@ -168,14 +168,14 @@ void compare(const CompareRequest& request) {
   require_writable_directory(request.write_cards);
   if (!request.report.empty()) require_gnuplot();
   if (datasets::read_schema_name(request.log) == "slip-log") {
-    if (!request.fit)
-      throw datasets::LogError(request.log, "/@schema",
-                               "is a slip-log, whose surfaces are compared by fitting: add --fit");
     for (const auto& model : request.models)
       if (!is_surface_model(model))
         throw datasets::LogError(request.log, "/surfaces",
                                  fmt::format("slips, which {} does not predict; there are {}", model,
                                              fmt::join(surface_model_names(), ", ")));
+    if (!request.fit)
+      throw WrongUsage(
+          fmt::format("{} is a slip-log, whose surfaces are compared by fitting: add --fit", request.log));
     compare_slips(request);
     return;
   }
