@@ -18,7 +18,9 @@
 #include "apps/throws.hpp"
 #include "apps/weak_grip.hpp"
 #include "contact/registry.hpp"
+#include "datasets/near_miss.hpp"
 #include "fitting/card.hpp"
+#include "fitting/discovery/footprints.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -121,6 +123,21 @@ std::string command_of(const DiscoverOptions& options, const Parser& parser) {
   return out;
 }
 
+/// Takes effects and contact laws out of what is tried. Throws WrongUsage for ids that there are not.
+void forget(const std::vector<std::string>& ids, fitting::DiscoverOptions& request) {
+  std::vector<std::string> known;
+  for (const auto& effect : experiment::known_effects()) known.push_back(effect.id);
+  for (const auto& law : request.laws) known.push_back(std::string(fitting::kLaw) + law);
+  for (const auto& id : ids)
+    if (std::find(known.begin(), known.end(), id) == known.end())
+      throw WrongUsage(
+          datasets::unknown_name(fmt::format("--forget: there is no effect '{}'", id), id, known));
+  request.forget = ids;
+  std::erase_if(request.laws, [&](const std::string& law) {
+    return std::find(ids.begin(), ids.end(), std::string(fitting::kLaw) + law) != ids.end();
+  });
+}
+
 void discover(const DiscoverOptions& options, const Parser& parser) {
   require_writable(options.json, {options.log});
   require_writable(options.card, {options.log});
@@ -150,14 +167,7 @@ void discover(const DiscoverOptions& options, const Parser& parser) {
   request.campaign.integrator.tolerances = {options.tolerance, 1e-3 * options.tolerance};
   request.matters = options.matters;
   request.most_effects = options.most.value_or(3);
-  request.forget = options.forget;
-  for (const auto& id : options.forget) {
-    try {
-      fitting::find_effect(id);
-    } catch (const std::invalid_argument& error) {
-      throw WrongUsage(error.what());
-    }
-  }
+  forget(options.forget, request);
   const Discovery found = [&] {
     const Progress progress("discover", 0);
     return fitting::discover(log, options.log, request);
@@ -297,7 +307,10 @@ Command discover_command(Parser& root) {
   parser.option("--report", options->report, "Directory for the page, its figures and discovery.json");
   parser.option("--json", options->json, "Write the result as JSON");
   parser.option("--card", options->card, "Write the card of the extended model");
-  parser.option("--forget", options->forget, "Effects that the catalogue is told to forget").with_commas();
+  parser
+      .option("--forget", options->forget,
+              "Effects, and laws as contact.law:MODEL, that the catalogue is told to forget")
+      .with_commas();
   parser
       .option("--matters", options->matters,
               "Least fall of chi2 per sample on held-out throws for an effect to count")
