@@ -38,13 +38,17 @@ struct DiscoverOptions {
 
 Json json_of(const OutcomeErrors& e) {
   Json lacks = Json::array();
-  for (const auto& [outcome, fit, resolution] : e.lacks)
+  for (const auto& [outcome, fit, resolution] : e.lacks) {
+    const auto of_repeated = [known = fit.repetitions > 0](double value) {
+      return known ? number(value) : Json(nullptr);
+    };
     lacks.push_back({{"outcome", to_string(outcome)},
                      {"unit", unit_of(outcome)},
-                     {"rms", number(std::sqrt(fit.repetitions + fit.shared))},
-                     {"repetitions_rms", number(std::sqrt(fit.repetitions))},
+                     {"rms", of_repeated(std::sqrt(fit.repetitions + fit.shared))},
+                     {"repetitions_rms", of_repeated(std::sqrt(fit.repetitions))},
                      {"sensor_sigma", number(resolution)},
-                     {"p_value", number(fit.p_value)}});
+                     {"p_value", of_repeated(fit.p_value)}});
+  }
   return {{"n", e.n},
           {"landing_x_mae_m", number(e.landing_x_mae)},
           {"landing_theta_mae_deg", number(e.landing_theta_mae)},

@@ -122,6 +122,20 @@ TEST_F(Cli, DiscoverFindsNothingInACalmLog) {
   EXPECT_EQ(found["error"]["before"], found["error"]["after"]) << "nothing was added";
 }
 
+TEST_F(Cli, WithoutRepetitionsThereIsNoLackOfFit) {
+  auto log = datasets::read_throw_log(quick);
+  std::erase_if(log.throws, [](const auto& one) { return one.repetition != 1; });
+  datasets::write_throw_log(folder / "once.h5", log);
+  ASSERT_EQ(run("discover once.h5 --json d.json").code, 0);
+  const json lacks = read_json(folder / "d.json")["error"]["before"]["train"]["lack_of_fit"];
+  ASSERT_FALSE(lacks.empty());
+  for (const json& lack : lacks) {
+    EXPECT_TRUE(lack["rms"].is_null()) << lack;
+    EXPECT_TRUE(lack["p_value"].is_null()) << lack;
+    EXPECT_TRUE(lack["sensor_sigma"].is_number()) << lack;
+  }
+}
+
 /// With the true law forgotten no law takes its place; ids of laws that there are not are refused.
 TEST_F(Cli, LawsCanBeForgotten) {
   ASSERT_EQ(run("discover " + quick + " --model limit_surface --json with.json").code, 0);

@@ -19,7 +19,8 @@ TEST(Rounded, IsAsFarAsTheSigmaSays) {
   EXPECT_EQ(with_sigma(0.5, 300, "-"), "0 +- 300");
   EXPECT_EQ(with_sigma(1.234567e-12, 4.56e-14, "m"), "1.235e-12 +- 4.6e-14 m");
   EXPECT_EQ(with_sigma(0.25, INFINITY, "-"), "0.25 +- inf");
-  EXPECT_EQ(with_sigma(0.25, 0, "-"), "0.25 +- 0");
+  EXPECT_EQ(with_sigma(0.25, 0, "-"), "0.25 (held)");
+  EXPECT_EQ(with_sigma(1, 1e-16, "m"), "1 m (held)") << "a sigma of rounding errors is none";
 }
 
 TEST(Separating, OnlyWhatSeparatesIsAdvised) {
