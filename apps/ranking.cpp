@@ -103,6 +103,28 @@ std::vector<std::string> separating_lines(const fitting::AcceptedEffect& effect)
   return out;
 }
 
+std::string small_text(const fitting::SmallEffect& small) {
+  const bool predicts = small.rms_before > fitting::DiscoverOptions{}.prediction_matters * small.rms_after;
+  const std::string numbers =
+      fmt::format("{} (BIC {:+.1f}, p {:.2g}; rms predicted before the throw, test: {:.3g} to {:.3g} mm",
+                  small.id, small.delta_bic, small.p_value, 1e3 * small.rms_before, 1e3 * small.rms_after);
+  if (small.any_pads) return fmt::format("evident, but no pads are without it: {})", numbers);
+  if (!predicts) return fmt::format("evident, but too small to matter: {})", numbers);
+  return fmt::format(
+      "evident on the train throws, but the test throws do not confirm it: {}, yet no channel's chi2 falls "
+      "by "
+      "what matters, and their likelihood does not rise enough or another of their errors grows)",
+      numbers);
+}
+
+std::string unexplained_text(const fitting::Unexplained& left) {
+  const auto seen = fmt::format("{} in ", to_string(left.channel));
+  if (!left.description.starts_with(seen) ||
+      left.description.starts_with(fmt::format("{}{}", seen, to_string(left.phase))))
+    return left.description;
+  return fmt::format("in {}, seen in {}", to_string(left.phase), left.description);
+}
+
 std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects) {
   const auto ratio = [&](const char* id) -> const fitting::Parameter* {
     for (const auto& effect : effects)

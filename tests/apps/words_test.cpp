@@ -23,6 +23,24 @@ TEST(Rounded, IsAsFarAsTheSigmaSays) {
   EXPECT_EQ(with_sigma(1, 1e-16, "m"), "1 m (held)") << "a sigma of rounding errors is none";
 }
 
+TEST(SmallEffect, IsNotCalledSmallWhereHeldOutErrorsFall) {
+  fitting::SmallEffect small{"contact.viscous", -369, 8e-4, 0.1, 1.23e-3, 0.911e-3, false};
+  EXPECT_THAT(small_text(small),
+              testing::StartsWith("evident on the train throws, but the test throws do not"));
+  small.rms_after = 1.2e-3;
+  EXPECT_THAT(small_text(small), testing::StartsWith("evident, but too small to matter: contact.viscous"));
+  small.any_pads = true;
+  EXPECT_THAT(small_text(small), testing::StartsWith("evident, but no pads are without it: "));
+}
+
+TEST(Unexplained, NamesThePhaseOfTheCauseAndWhereItWasSeen) {
+  fitting::Unexplained left{
+      fitting::Phase::release, experiment::Channel::mocap_z, 42, "mocap.z in flight: 42 times", {}};
+  EXPECT_EQ(unexplained_text(left), "in release, seen in mocap.z in flight: 42 times");
+  left.phase = fitting::Phase::flight;
+  EXPECT_EQ(unexplained_text(left), "mocap.z in flight: 42 times");
+}
+
 TEST(Separating, OnlyWhatSeparatesIsAdvised) {
   fitting::AcceptedEffect effect;
   effect.separating = {{"flight.wind", "throw faster", 0.999, 0.5, true},
