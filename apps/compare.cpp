@@ -17,6 +17,7 @@
 #include "apps/progress.hpp"
 #include "apps/tell.hpp"
 #include "apps/throws.hpp"
+#include "apps/weak_grip.hpp"
 #include "datasets/near_miss.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/free_flight.hpp"
@@ -140,6 +141,7 @@ void compare_releases(const CompareRequest& request, const datasets::ThrowLog& l
   tell_not_compared(unanswered);
   if (comparison.models.empty()) throw Unanswered("no model is left to compare");
   report_failures(comparison);
+  for (const auto& model : comparison.models) tell_weak_grip(model);
 
   const ReleaseTables tables = release_tables(comparison, log, request.log);
   Json json = release_json(comparison, request);
@@ -166,14 +168,14 @@ void compare(const CompareRequest& request) {
   require_writable_directory(request.write_cards);
   if (!request.report.empty()) require_gnuplot();
   if (datasets::read_schema_name(request.log) == "slip-log") {
-    if (!request.fit)
-      throw datasets::LogError(request.log, "/@schema",
-                               "is a slip-log, whose surfaces are compared by fitting: add --fit");
     for (const auto& model : request.models)
       if (!is_surface_model(model))
         throw datasets::LogError(request.log, "/surfaces",
                                  fmt::format("slips, which {} does not predict; there are {}", model,
                                              fmt::join(surface_model_names(), ", ")));
+    if (!request.fit)
+      throw WrongUsage(
+          fmt::format("{} is a slip-log, whose surfaces are compared by fitting: add --fit", request.log));
     compare_slips(request);
     return;
   }

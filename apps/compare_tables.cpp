@@ -6,6 +6,7 @@
 
 #include "apps/cards.hpp"
 #include "apps/compare.hpp"
+#include "apps/weak_grip.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -131,6 +132,7 @@ Json release_json(const experiment::Comparison& comparison, const CompareRequest
                        {"samples", model.estimate.samples},
                        {"scatter", model.estimate.scatter}};
     one["failed"] = model.failed;
+    one["slips_at_start"] = slips_at_start(model);
     for (const auto& [split, name] : kThrowSplits) one[name] = split_json(model, split);
     one["microseconds_per_throw"] = model.microseconds_per_throw;
   }

@@ -16,8 +16,11 @@
 #include "apps/ranking.hpp"
 #include "apps/table.hpp"
 #include "apps/throws.hpp"
+#include "apps/weak_grip.hpp"
 #include "contact/registry.hpp"
+#include "datasets/near_miss.hpp"
 #include "fitting/card.hpp"
+#include "fitting/discovery/footprints.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -35,13 +38,17 @@ struct DiscoverOptions {
 
 Json json_of(const OutcomeErrors& e) {
   Json lacks = Json::array();
-  for (const auto& [outcome, fit, resolution] : e.lacks)
+  for (const auto& [outcome, fit, resolution] : e.lacks) {
+    const auto of_repeated = [known = fit.repetitions > 0](double value) {
+      return known ? number(value) : Json(nullptr);
+    };
     lacks.push_back({{"outcome", to_string(outcome)},
                      {"unit", unit_of(outcome)},
-                     {"rms", number(std::sqrt(fit.repetitions + fit.shared))},
-                     {"repetitions_rms", number(std::sqrt(fit.repetitions))},
+                     {"rms", of_repeated(std::sqrt(fit.repetitions + fit.shared))},
+                     {"repetitions_rms", of_repeated(std::sqrt(fit.repetitions))},
                      {"sensor_sigma", number(resolution)},
-                     {"p_value", number(fit.p_value)}});
+                     {"p_value", of_repeated(fit.p_value)}});
+  }
   return {{"n", e.n},
           {"landing_x_mae_m", number(e.landing_x_mae)},
           {"landing_theta_mae_deg", number(e.landing_theta_mae)},
@@ -120,6 +127,21 @@ std::string command_of(const DiscoverOptions& options, const Parser& parser) {
   return out;
 }
 
+/// Takes effects and contact laws out of what is tried. Throws WrongUsage for ids that there are not.
+void forget(const std::vector<std::string>& ids, fitting::DiscoverOptions& request) {
+  std::vector<std::string> known;
+  for (const auto& effect : experiment::known_effects()) known.push_back(effect.id);
+  for (const auto& law : request.laws) known.push_back(std::string(fitting::kLaw) + law);
+  for (const auto& id : ids)
+    if (std::find(known.begin(), known.end(), id) == known.end())
+      throw WrongUsage(
+          datasets::unknown_name(fmt::format("--forget: there is no effect '{}'", id), id, known));
+  request.forget = ids;
+  std::erase_if(request.laws, [&](const std::string& law) {
+    return std::find(ids.begin(), ids.end(), std::string(fitting::kLaw) + law) != ids.end();
+  });
+}
+
 void discover(const DiscoverOptions& options, const Parser& parser) {
   require_writable(options.json, {options.log});
   require_writable(options.card, {options.log});
@@ -149,29 +171,23 @@ void discover(const DiscoverOptions& options, const Parser& parser) {
   request.campaign.integrator.tolerances = {options.tolerance, 1e-3 * options.tolerance};
   request.matters = options.matters;
   request.most_effects = options.most.value_or(3);
-  request.forget = options.forget;
-  for (const auto& id : options.forget) {
-    try {
-      fitting::find_effect(id);
-    } catch (const std::invalid_argument& error) {
-      throw WrongUsage(error.what());
-    }
-  }
+  forget(options.forget, request);
   const Discovery found = [&] {
     const Progress progress("discover", 0);
     return fitting::discover(log, options.log, request);
   }();
   if (found.verdict == fitting::Verdict::not_answered) throw Unanswered(found.message);
 
+  const auto& problem = *found.problem;
+  const auto errors =
+      comparison_of(problem, found.final, predict_throws(problem, found.final, {false, options.threads}));
+  tell_weak_grip(errors);
+
   Outputs outputs{{options.log}};
   const Json json = discovery_json(found, options.log, options.model);
   if (!options.json.empty()) outputs.json(options.json, json);
-  if (!options.card.empty()) {
-    const auto& problem = *found.problem;
-    const auto errors =
-        comparison_of(problem, found.final, predict_throws(problem, found.final, {false, options.threads}));
+  if (!options.card.empty())
     outputs.text(options.card, datasets::to_json(card_of(problem, found.final, errors, options.log, log)));
-  }
   if (!options.report.empty())
     write_discovery_report(found, options.log, command, json, outputs.directory(options.report));
   outputs.commit();
@@ -202,7 +218,7 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
     out["unexplained"] = {{"phase", to_string(found.unexplained->phase)},
                           {"channel", to_string(found.unexplained->channel)},
                           {"chi2_per_dof", number(found.unexplained->chi2_per_dof)},
-                          {"description", found.unexplained->description}};
+                          {"description", unexplained_text(*found.unexplained)}};
     if (found.unexplained->missing) out["unexplained"]["missing"] = json_of(*found.unexplained->missing);
   }
   out["error"] = {{"before", {{"train", json_of(found.before_train)}, {"test", json_of(found.before_test)}}},
@@ -243,13 +259,8 @@ std::string discovery_text(const Discovery& found, const std::string& log) {
   }
   if (const std::string note = gain_text(found.effects); !note.empty()) out += "\n" + note + "\n";
   for (const auto& id : found.along) out += fmt::format("\nfitted along, since no pads are rigid: {}\n", id);
-  if (const auto& small = found.small)
-    out += fmt::format(
-        "\nevident, but {}: {} (BIC {:+.1f}, p {:.2g}; rms predicted before the throw, test: {:.3g} to "
-        "{:.3g} mm)\n",
-        small->any_pads ? "no pads are without it" : "too small to matter", small->id, small->delta_bic,
-        small->p_value, 1e3 * small->rms_before, 1e3 * small->rms_after);
-  if (found.unexplained) out += fmt::format("\nunexplained: {}\n", found.unexplained->description);
+  if (found.small) out += fmt::format("\n{}\n", small_text(*found.small));
+  if (found.unexplained) out += fmt::format("\nunexplained: {}\n", unexplained_text(*found.unexplained));
   Table table{{"predicted before the throw", "landing x MAE [m]", "theta MAE [deg]", "detach vx MAE [m/s]",
                "omega MAE [deg/s]", "trajectory RMS [m]", "chi2/dof"},
               {},
@@ -295,7 +306,10 @@ Command discover_command(Parser& root) {
   parser.option("--report", options->report, "Directory for the page, its figures and discovery.json");
   parser.option("--json", options->json, "Write the result as JSON");
   parser.option("--card", options->card, "Write the card of the extended model");
-  parser.option("--forget", options->forget, "Effects that the catalogue is told to forget").with_commas();
+  parser
+      .option("--forget", options->forget,
+              "Effects, and laws as contact.law:MODEL, that the catalogue is told to forget")
+      .with_commas();
   parser
       .option("--matters", options->matters,
               "Least fall of chi2 per sample on held-out throws for an effect to count")

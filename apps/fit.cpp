@@ -16,6 +16,7 @@
 #include "apps/progress.hpp"
 #include "apps/tell.hpp"
 #include "apps/throws.hpp"
+#include "apps/weak_grip.hpp"
 #include "datasets/near_miss.hpp"
 #include "fitting/slips/slip_surface.hpp"
 
@@ -145,6 +146,7 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
         "it bends "
         "the parameters, which no interval tells; ask unhand discover\n",
         *chi2, request.model);
+  tell_weak_grip(answer.errors);
 
   const Json json = fit_json(answer, request);
   Outputs outputs{{request.log}};

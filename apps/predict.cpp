@@ -11,6 +11,7 @@
 #include "apps/compare.hpp"
 #include "apps/tell.hpp"
 #include "apps/throws.hpp"
+#include "apps/weak_grip.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -33,6 +34,7 @@ Json json_of(const experiment::ThrowComparison& one, const experiment::PreparedT
            {"condition", one.condition},
            {"split", one.split == datasets::Split::train ? "train" : "test"},
            {"outcome", outcome_of(p)},
+           {"slips_at_start", p.slips_at_start},
            {"detach", nullptr},
            {"landing", nullptr}};
   if (p.release == release::ReleaseOutcome::detached)
@@ -184,6 +186,7 @@ void predict(const PredictOptions& options) {
   warn_outside(card.card, prepared);
   tell_opening(card.card, prepared);
   const auto& result = comparison.models.front();
+  tell_weak_grip(result);
   if (result.failed == static_cast<int>(result.throws.size()))
     throw Unanswered(fmt::format("{} brings no throw to a landing: {}", model,
                                  outcome_in_words(result.throws.front().prediction)));
@@ -206,6 +209,7 @@ void predict(const PredictOptions& options) {
     json["parameters"] = Json::object();
     for (const auto& [name, unit, value] : named_values(result)) json["parameters"][name] = value;
     json["failed"] = result.failed;
+    json["slips_at_start"] = slips_at_start(result);
     json["throws"] = Json::array();
     for (std::size_t i = 0; i < prepared.size(); ++i)
       json["throws"].push_back(

@@ -103,6 +103,28 @@ std::vector<std::string> separating_lines(const fitting::AcceptedEffect& effect)
   return out;
 }
 
+std::string small_text(const fitting::SmallEffect& small) {
+  const bool predicts = small.rms_before > fitting::DiscoverOptions{}.prediction_matters * small.rms_after;
+  const std::string numbers =
+      fmt::format("{} (BIC {:+.1f}, p {:.2g}; rms predicted before the throw, test: {:.3g} to {:.3g} mm",
+                  small.id, small.delta_bic, small.p_value, 1e3 * small.rms_before, 1e3 * small.rms_after);
+  if (small.any_pads) return fmt::format("evident, but no pads are without it: {})", numbers);
+  if (!predicts) return fmt::format("evident, but too small to matter: {})", numbers);
+  return fmt::format(
+      "evident on the train throws, but the test throws do not confirm it: {}, yet no channel's chi2 falls "
+      "by "
+      "what matters, and their likelihood does not rise enough or another of their errors grows)",
+      numbers);
+}
+
+std::string unexplained_text(const fitting::Unexplained& left) {
+  const auto seen = fmt::format("{} in ", to_string(left.channel));
+  if (!left.description.starts_with(seen) ||
+      left.description.starts_with(fmt::format("{}{}", seen, to_string(left.phase))))
+    return left.description;
+  return fmt::format("in {}, seen in {}", to_string(left.phase), left.description);
+}
+
 std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects) {
   const auto ratio = [&](const char* id) -> const fitting::Parameter* {
     for (const auto& effect : effects)
@@ -123,9 +145,11 @@ std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects) {
 std::string effect_html(const fitting::AcceptedEffect& effect) {
   std::string out = fmt::format("<h3>{}</h3><p>", escaped(effect.id));
   for (const auto& p : effect.parameters)
-    out += fmt::format("{} = {:.6g} &plusmn; {:.2g} {} (95 %: {:.6g} to {:.6g})<br>", escaped(p.name),
-                       p.value, p.sigma, escaped(p.unit), p.value - fitting::kNormal95 * p.sigma,
-                       p.value + fitting::kNormal95 * p.sigma);
+    out += is_held(p.value, p.sigma)
+               ? fmt::format("{} = {}<br>", escaped(p.name), escaped(with_sigma(p.value, p.sigma, p.unit)))
+               : fmt::format("{} = {:.6g} &plusmn; {:.2g} {} (95 %: {:.6g} to {:.6g})<br>", escaped(p.name),
+                             p.value, p.sigma, escaped(p.unit), p.value - fitting::kNormal95 * p.sigma,
+                             p.value + fitting::kNormal95 * p.sigma);
   const std::string p_value = effect.p_value ? fmt::format(", p = {:.2g}", *effect.p_value) : "";
   out += fmt::format("BIC {:+.1f}{}. On held-out data: {}.</p>\n", effect.delta_bic, p_value,
                      escaped(effect.why));

@@ -94,6 +94,8 @@ std::string plus_minus(bool known, double value, double spread, int decimals) {
   return known ? fmt::format("{:.{}f} ± {:.{}f}", value, decimals, spread, decimals) : "-";
 }
 
+bool is_held(double value, double sigma) { return sigma <= 1e-12 * std::abs(value); }
+
 Rounded rounded(double value, double sigma) {
   if (!(sigma > 0) || !std::isfinite(sigma) || !std::isfinite(value))
     return {fmt::format("{:.6g}", value), fmt::format("{:.2g}", sigma), {}};
@@ -113,8 +115,9 @@ Rounded rounded(double value, double sigma) {
 
 std::string with_sigma(double value, double sigma, const std::string& unit) {
   const Rounded r = rounded(value, sigma);
-  return fmt::format("{} +- {}{}{}", r.value, r.sigma, unit.empty() || unit == "-" ? "" : " ",
-                     unit == "-" ? "" : unit);
+  const std::string with_unit = unit.empty() || unit == "-" ? "" : " " + unit;
+  if (is_held(value, sigma)) return fmt::format("{}{} (held)", r.value, with_unit);
+  return fmt::format("{} +- {}{}", r.value, r.sigma, with_unit);
 }
 
 }  // namespace unhand::apps

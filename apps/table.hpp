@@ -27,7 +27,9 @@ struct Rounded {
   std::optional<int> decimals;  ///< after the point; none where those are too many, or sigma is no size
 };
 Rounded rounded(double value, double sigma);
-/// "19.7 +- 1.1 m/s"; no unit for "-".
+/// Whether the sigma is but rounding errors: the value was held, at an end of its range for instance.
+bool is_held(double value, double sigma);
+/// "19.7 +- 1.1 m/s", "1 (held)"; no unit for "-".
 std::string with_sigma(double value, double sigma, const std::string& unit);
 std::string fixed(bool known, double value, int decimals);
 

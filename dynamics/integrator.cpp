@@ -48,6 +48,7 @@ class Run {
   Solution<S, N> operator()(const Entry<S, N>& start, const S& t_end) {
     solution_.events.reserve(32);
     begin_windows(start, t_end);
+    record_lead(start, {value_of(start.t) - value_of(start.lead), window_.end});
     Entry<S, N> entry = start;
     phase_.mode = kNoMode;
     for (;;) {
@@ -88,7 +89,7 @@ class Run {
     ++next_time_;
     window_ = {value_of(t), value_of(window_end())};
     Departure departure{system_.on_time(mode, window_, t, y), {}};
-    record_lead(departure.at);
+    record_lead(departure.at, window_);
     log(EventKind::time, index, mode, departure.at);
     return departure;
   }
@@ -150,7 +151,7 @@ class Run {
   Departure transition(int guard, const S& t, const State<S, N>& y) {
     Departure departure{system_.on_guard(phase_, guard, t, y), {}};
     record_straight(phase_, t, y, departure.at.t - departure.at.lead, departure.at.event_state());
-    record_lead(departure.at);
+    record_lead(departure.at, window_);
     watch_.fired = guard;
     log(EventKind::guard, guard, phase_.mode, departure.at);
     if (static_cast<int>(solution_.events.size()) >= options_.event_budget)
@@ -222,8 +223,8 @@ class Run {
         piece.nodes[k][i] = y0[i] + static_cast<double>(k) / (piece.kNodes - 1) * (y1[i] - y0[i]);
     solution_.trajectory.pieces.push_back(piece);
   }
-  void record_lead(const Entry<S, N>& entry) {
-    record_straight({entry.mode, window_}, entry.t - entry.lead, entry.event_state(), entry.t, entry.y);
+  void record_lead(const Entry<S, N>& entry, const Window& window) {
+    record_straight({entry.mode, window}, entry.t - entry.lead, entry.event_state(), entry.t, entry.y);
   }
 
   static bool finite(const Entry<S, N>& entry) {

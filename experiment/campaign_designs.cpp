@@ -110,10 +110,37 @@ int CampaignDesign::conditions() const {
 }
 int CampaignDesign::throws() const { return conditions() * repetitions; }
 
-std::vector<std::string> campaign_names() { return {"batch180", "quick12", "random"}; }
+/// Pitch, speed and how hard the hand brakes, each at three levels, as in the task of
+/// [LiuDaCostaBillard2025]: the pads become a hinge and the bar flips on. Bar, pads and gripper are those of
+/// planners/flip/robot.toml.
+CampaignDesign throw_flip_campaign() {
+  CampaignDesign design;
+  design.name = "throw-flip";
+  design.objects = {{"bar", {0.242, 1.6e-3}, 0.12, {0.32, 0.03, 0.02}}};
+  design.patch = {0.6, 0.0105};
+  design.opening = {0.050, 33, 0.015, 0.050, 1.0};
+  design.begin = -0.02;
+  design.switch_time = 0.050;  // the brake begins with the command to open
+  design.release_accelerations = {-4, -12, -20};
+  design.repetitions = 3;
+  for (const int pitch : {-45, -25, -5})
+    for (const double speed : {2.0, 2.4, 2.8}) {
+      Posture posture{fmt::format("pitch{:+}/speed{:.1f}", pitch, speed),
+                      {0.45, 0.55, pitch * kDegree},
+                      speed,
+                      (pitch + 67) * kDegree,
+                      2.2 * speed};
+      posture.grasp_angle = hold_in(design, posture, false).grasp_angle;
+      design.postures.push_back(posture);
+    }
+  return design;
+}
+
+std::vector<std::string> campaign_names() { return {"batch180", "throw-flip", "quick12", "random"}; }
 
 CampaignDesign campaign_design(std::string_view name, std::uint64_t seed) {
   if (name == "random") return random_campaign(seed);
+  if (name == "throw-flip") return throw_flip_campaign();
   CampaignDesign design;
   design.name = name;
   design.objects = {loaded_bar("bar-com100", 0.10), loaded_bar("bar-com160", 0.16)};

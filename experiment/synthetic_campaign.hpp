@@ -123,9 +123,9 @@ struct CampaignDesign {
   double reference_force() const { return opening.grip_force; }
 };
 
-/// The designs by name: "batch180" (2 × 3 × 6 × 5, after D4.6 2.2.3), "quick12" (2 × 1 × 3 × 2) and
-/// "random", random_campaign(seed); the others do not depend on the seed. Throws std::invalid_argument,
-/// listing the names, for any other.
+/// The designs by name: "batch180" (2 × 3 × 6 × 5, after D4.6 2.2.3), "throw-flip" (1 × 9 × 3 × 3),
+/// "quick12" (2 × 1 × 3 × 2) and "random", random_campaign(seed); the others do not depend on the seed.
+/// Throws std::invalid_argument, listing the names, for any other.
 CampaignDesign campaign_design(std::string_view name, std::uint64_t seed = 1);
 /// The names that campaign_design knows.
 std::vector<std::string> campaign_names();

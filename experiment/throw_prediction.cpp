@@ -92,6 +92,7 @@ ThrowPrediction<S> predict_channels(const PreparedThrow& prepared, const Observa
     out.release = result.outcome;
     out.detach = result.detach;
     for (const auto& event : result.events) out.modes.push_back(event.mode_after);
+    out.slips_at_start = result.slips_at_start;
     if (out.release != release::ReleaseOutcome::detached) return out;
 
     const auto flight =

@@ -38,6 +38,7 @@ struct ThrowPrediction {
   flight::Landing<S> landing;                                       ///< of the tracked point
   std::vector<S> channels;  ///< one per observation, in its order and units
   std::vector<int> modes;   ///< the modes entered, in order
+  bool slips_at_start{};    ///< the grip cannot hold the object even before it opens
   /// Whether release and flight have an answer.
   bool landed() const {
     return release == release::ReleaseOutcome::detached && flight == flight::FlightOutcome::landed;

@@ -34,10 +34,11 @@ std::optional<UnitDoubt> doubtful_landing_height(const datasets::ThrowLog& log) 
       seen.push_back(timed->height), tolerances.push_back(timed->tolerance);
   }
   const auto doubt = [&](double accepted, std::size_t throws, const std::string& reason) {
-    return UnitDoubt{"/@landing_height", "landing_height", log.landing_height / accepted,
-                     static_cast<int>(throws),
-                     fmt::format("landing_height is {:.6g} m, and {}: another unit than m, or another frame?",
-                                 log.landing_height, reason)};
+    return UnitDoubt{
+        "/@landing_height", "landing_height", log.landing_height / accepted, static_cast<int>(throws),
+        fmt::format("landing_height is {:.6g} m, and {}: another unit than m, another frame, or another "
+                    "gravity than the declared {:.6g} m/s^2?",
+                    log.landing_height, reason, log.gravity)};
   };
   if (!seen.empty()) {
     const double height = dynamics::median(seen), most = dynamics::median(tolerances);

@@ -111,6 +111,7 @@ PredictedThrow predict_one(const CampaignProblem& problem, const CampaignThrow& 
   prediction.detach = bare.detach;
   prediction.landing = bare.landing;
   prediction.events = static_cast<int>(bare.modes.size());
+  prediction.slips_at_start = bare.slips_at_start;
   const double from = std::max(thrown.release_or(bare.detach.time), bare.detach.time);
   const auto observed = bare.landed() ? outcome_channels(thrown, from) : experiment::Observations{};
   judge(prepared, observed,

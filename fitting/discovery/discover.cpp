@@ -111,7 +111,9 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
                    [](const datasets::Throw& t) { return t.split == datasets::Split::test; })) {
     out.verdict = Verdict::not_answered;
     out.message =
-        "no test throws, and no object with two conditions: nothing can be held out to judge an effect by";
+        "nothing can be held out to judge an effect by: needed are train and test throws, or an object that "
+        "was "
+        "thrown under two conditions";
     return out;
   }
   solve(stage, options, {});

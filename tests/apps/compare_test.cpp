@@ -282,6 +282,25 @@ TEST_F(Cli, GripperDelayPredictsWithTheMeanOfTheLog) {
   EXPECT_NEAR(delay, mean / train, 1e-9);
 }
 
+/// Of pads whose friction cannot carry the bar the commands say so, and go on.
+TEST_F(Cli, AGripThatCannotHoldIsSaid) {
+  const std::string says = "unhand: limit_surface: in 12 of 12 throws the grip cannot hold the object";
+  ASSERT_EQ(run("compare " + quick + " --models limit_surface --write-cards . --json firm.json").code, 0);
+  json card = read_json(folder / "limit_surface.json");
+  EXPECT_EQ(read_json(folder / "firm.json")["models"]["limit_surface"]["slips_at_start"], 0);
+  card["parameters"]["mu"]["value"] = 0.05;
+  std::ofstream(folder / "weak.json") << card.dump();
+  const Answer predicted = run("predict " + quick + " --card weak.json --json p.json");
+  EXPECT_THAT(predicted.err, HasSubstr(says));
+  EXPECT_THAT(predicted.err, HasSubstr("and 1 more"));  // of six conditions
+  EXPECT_EQ(read_json(folder / "p.json")["slips_at_start"], 12);
+  EXPECT_TRUE(read_json(folder / "p.json")["throws"][0]["slips_at_start"]);
+  const Answer compared = run("compare " + quick + " --models limit_surface --card weak.json --json c.json");
+  EXPECT_THAT(compared.err, HasSubstr(says));
+  EXPECT_EQ(read_json(folder / "c.json")["models"]["limit_surface"]["slips_at_start"], 12);
+  EXPECT_EQ(run("figure modes --log " + quick + " --models limit_surface --card weak.json --out f").code, 0);
+}
+
 TEST_F(Cli, BadCards) {
   ASSERT_EQ(run("compare " + quick + " --models sliding_pivot --write-cards .").code, 0);
   const json good = read_json(folder / "sliding_pivot.json");

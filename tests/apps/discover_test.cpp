@@ -122,6 +122,40 @@ TEST_F(Cli, DiscoverFindsNothingInACalmLog) {
   EXPECT_EQ(found["error"]["before"], found["error"]["after"]) << "nothing was added";
 }
 
+TEST_F(Cli, WithoutRepetitionsThereIsNoLackOfFit) {
+  auto log = datasets::read_throw_log(quick);
+  std::erase_if(log.throws, [](const auto& one) { return one.repetition != 1; });
+  datasets::write_throw_log(folder / "once.h5", log);
+  ASSERT_EQ(run("discover once.h5 --json d.json").code, 0);
+  const json lacks = read_json(folder / "d.json")["error"]["before"]["train"]["lack_of_fit"];
+  ASSERT_FALSE(lacks.empty());
+  for (const json& lack : lacks) {
+    EXPECT_TRUE(lack["rms"].is_null()) << lack;
+    EXPECT_TRUE(lack["p_value"].is_null()) << lack;
+    EXPECT_TRUE(lack["sensor_sigma"].is_number()) << lack;
+  }
+}
+
+/// With the true law forgotten no law takes its place; ids of laws that there are not are refused.
+TEST_F(Cli, LawsCanBeForgotten) {
+  ASSERT_EQ(run("discover " + quick + " --model limit_surface --json with.json").code, 0);
+  const std::string laws =
+      "contact.law:limit_surface_disc,contact.law:limit_surface_quartic,contact.law:sliding_pivot";
+  const Answer answer =
+      run("discover " + quick + " --model limit_surface --forget " + laws + " --json d.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const auto tries_laws = [&](const char* file) {
+    const json found = read_json(folder / file);
+    return std::any_of(found["ranking"].begin(), found["ranking"].end(), [](const json& one) {
+      return one["id"].get<std::string>().starts_with("contact.law:");
+    });
+  };
+  EXPECT_TRUE(tries_laws("with.json"));
+  EXPECT_FALSE(tries_laws("d.json"));
+  expect_refusal("discover " + quick + " --forget contact.law:limit_surfac", 2,
+                 "did you mean 'contact.law:limit_surface'?");
+}
+
 // What the quickstart shows.
 TEST_F(Cli, TheQuickstartsDragMakesEveryHeldOutErrorOfTheLandingSmaller) {
   ASSERT_EQ(run("generate quick12 --seed 3 --effect flight.quadratic_drag=0.05 --out air.h5").code, 0);

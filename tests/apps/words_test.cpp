@@ -19,7 +19,26 @@ TEST(Rounded, IsAsFarAsTheSigmaSays) {
   EXPECT_EQ(with_sigma(0.5, 300, "-"), "0 +- 300");
   EXPECT_EQ(with_sigma(1.234567e-12, 4.56e-14, "m"), "1.235e-12 +- 4.6e-14 m");
   EXPECT_EQ(with_sigma(0.25, INFINITY, "-"), "0.25 +- inf");
-  EXPECT_EQ(with_sigma(0.25, 0, "-"), "0.25 +- 0");
+  EXPECT_EQ(with_sigma(0.25, 0, "-"), "0.25 (held)");
+  EXPECT_EQ(with_sigma(1, 1e-16, "m"), "1 m (held)") << "a sigma of rounding errors is none";
+}
+
+TEST(SmallEffect, IsNotCalledSmallWhereHeldOutErrorsFall) {
+  fitting::SmallEffect small{"contact.viscous", -369, 8e-4, 0.1, 1.23e-3, 0.911e-3, false};
+  EXPECT_THAT(small_text(small),
+              testing::StartsWith("evident on the train throws, but the test throws do not"));
+  small.rms_after = 1.2e-3;
+  EXPECT_THAT(small_text(small), testing::StartsWith("evident, but too small to matter: contact.viscous"));
+  small.any_pads = true;
+  EXPECT_THAT(small_text(small), testing::StartsWith("evident, but no pads are without it: "));
+}
+
+TEST(Unexplained, NamesThePhaseOfTheCauseAndWhereItWasSeen) {
+  fitting::Unexplained left{
+      fitting::Phase::release, experiment::Channel::mocap_z, 42, "mocap.z in flight: 42 times", {}};
+  EXPECT_EQ(unexplained_text(left), "in release, seen in mocap.z in flight: 42 times");
+  left.phase = fitting::Phase::flight;
+  EXPECT_EQ(unexplained_text(left), "mocap.z in flight: 42 times");
 }
 
 TEST(Separating, OnlyWhatSeparatesIsAdvised) {

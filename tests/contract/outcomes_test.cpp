@@ -30,6 +30,7 @@ TEST_P(WithoutFriction, TheObjectIsFreeAtOnce) {
     const auto problem = support::problem_of(thrown, *model);
     release::ReleaseOptions options;
     options.integrator = support::tight(1e-10, 1e-12);
+    options.integrator.record = true;
     const auto result = simulate_release(problem, options);
     ASSERT_EQ(result.outcome, release::ReleaseOutcome::detached) << describe(thrown);
     EXPECT_TRUE(result.slips_at_start);
@@ -37,6 +38,7 @@ TEST_P(WithoutFriction, TheObjectIsFreeAtOnce) {
     const double theta = hand.pose.theta + thrown.grasp.angle, t = result.detach.time;
     const auto r = dynamics::rotate(theta, dynamics::Vec2<double>{thrown.grasp.com_offset, 0});
     const auto v = dynamics::twist_at_com(hand.twist, r);
+    EXPECT_NEAR(sample_release(problem, result, problem.start).pose.x, hand.pose.x + r.x, 1e-15);
     EXPECT_DOUBLE_EQ(t, thrown.force.release_time());
     // free flight from the first instant; 1e-9: the tolerance over a tenth of a second and lengths of a metre
     EXPECT_NEAR(result.detach.twist.vx, v.vx, 1e-9) << describe(thrown);

@@ -174,6 +174,20 @@ TEST_P(Events, AnEmptySpanReturnsItsStart) {
   EXPECT_THROW(run(swing, {NAN, 0.5}, 3.0, options(), 2.0), std::invalid_argument);
 }
 
+/// A start whose first instants are known in closed form: the record begins where it does, not after them.
+TEST_P(Events, TheRecordBeginsAtTheStartItself) {
+  const auto swing = Toy({{FlowKind::smooth, {}}}, oscillator(), no_guards(), enter(0));
+  constexpr double kLead = 1e-6, kStart = 0.5;
+  IntegratorOptions recorded = options();
+  recorded.record = true;
+  const Entry<double, 2> start{0, kStart + kLead, {1.0, -kLead}, kLead, {1.0, 0.0}};
+  const auto end = integrate<double, 2>(swing, start, 1.0, recorded);
+  ASSERT_EQ(end.outcome, Outcome::horizon);
+  EXPECT_EQ(end.trajectory.at(kStart)[1], 0.0);
+  EXPECT_NEAR(end.trajectory.at(kStart + kLead)[1], -kLead, 1e-12);
+  EXPECT_NEAR(end.trajectory.at(0.8)[0], std::cos(0.3), 1e-8);
+}
+
 // ------------------------------------------------------------------ Coulomb friction with a true stick mode
 
 /// A block on an incline: y = (position up the slope, velocity). Modes: slides up (0), stuck (1), slides down

@@ -47,6 +47,19 @@ TEST(SyntheticCampaign, SameSeedSameLogDifferentSeedAnother) {
   }
 }
 
+/// Angles of landing are counted from the bar hanging straight down, not wrapped.
+TEST(SyntheticCampaign, ThrowFlipsLandBetweenHalfAFlipAndAFullOne) {
+  const ThrowLog log = generate_campaign(campaign_design("throw-flip"), kSeed);
+  ASSERT_EQ(log.throws.size(), 81u);
+  double least = INFINITY, most = -INFINITY;
+  for (const auto& one : log.throws) {
+    const double turned = one.landing->pose(0, 1) + M_PI / 2;
+    least = std::min(least, turned), most = std::max(most, turned);
+  }
+  EXPECT_LT(least, M_PI);
+  EXPECT_GT(most, 2 * M_PI);
+}
+
 TEST(SyntheticCampaign, ThrowsDoNotDependOnTheirOrder) {
   const CampaignDesign design = campaign_design("quick12");
   const ThrowLog log = generate_campaign(design, kSeed);

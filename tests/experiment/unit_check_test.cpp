@@ -357,6 +357,13 @@ TEST(UnitCheck, ALandingHeightWhereNothingLandsIsRefused) {
   }
 }
 
+TEST(UnitCheck, AnotherGravityIsSuspectedBesideTheLandingHeight) {
+  auto log = campaign();
+  log.gravity = 1.62;
+  ASSERT_EQ(unit_doubts(log).size(), 1u);
+  EXPECT_THAT(unit_doubts(log).front().reason, HasSubstr("another gravity than the declared 1.62 m/s^2?"));
+}
+
 /// The only doubt of a log.
 UnitDoubt only_doubt(const ThrowLog& log) {
   const auto doubts = unit_doubts(log);

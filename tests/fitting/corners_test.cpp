@@ -83,10 +83,21 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         Corner{"NoThrow", [] { return first_throws(0); }, "refused: (in memory): nothing to fit to",
                "refused: (in memory): nothing to fit to"},
-        Corner{"OneThrow", [] { return first_throws(1); }, "converged",
-               "not_answered: no test throws, and no object with two conditions"},
-        Corner{"TwoThrows", [] { return first_throws(2); }, "converged",
-               "not_answered: no test throws, and no object with two conditions"},
+        Corner{
+            "OneThrow", [] { return first_throws(1); }, "converged",
+            "not_answered: nothing can be held out to judge an effect by: needed are train and test throws"},
+        Corner{
+            "TwoThrows", [] { return first_throws(2); }, "converged",
+            "not_answered: nothing can be held out to judge an effect by: needed are train and test throws"},
+        Corner{
+            "OneTestThrow",
+            [] {
+              auto log = first_throws(1);
+              for (Throw& one : log.throws) one.split = Split::test;
+              return log;
+            },
+            "no_start",
+            "not_answered: nothing can be held out to judge an effect by: needed are train and test throws"},
         // its noise is the same every time, so it is no noise: something is left that no effect explains
         Corner{"OneThrowAgainAndAgain", one_throw_again, "converged", "unexplained"},
         Corner{"HeldToTheVeryEnd", [] { return campaign(5); }, "converged", "no_missing_effect"},
