@@ -174,8 +174,8 @@ void compare(const CompareRequest& request) {
                                  fmt::format("slips, which {} does not predict; there are {}", model,
                                              fmt::join(surface_model_names(), ", ")));
     if (!request.fit)
-      throw WrongUsage(
-          fmt::format("{} is a slip-log, whose surfaces are compared by fitting: add --fit", request.log));
+      throw datasets::LogError(request.log, "/@schema",
+                               "is a slip-log, whose surfaces are compared by fitting: add --fit");
     compare_slips(request);
     return;
   }

@@ -309,6 +309,13 @@ bool spoils(const AcceptedEffect& effect, const Stage& stage, const Discovery& s
 
 namespace {
 
+/// Whether something is left in the tracked flights of both halves.
+bool leaves_flights(const Stage& stage, const DiscoverOptions& options) {
+  return std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(), [&](const ChannelMisfit& m) {
+    return m.phase == Phase::flight && is_left(m, options) && is_confirmed(stage.held_out.misfit, m);
+  });
+}
+
 /// One candidate for every object, from its own flights.
 std::map<int, MissingCandidate> candidates_of(const PhaseTraces& train) {
   std::map<int, std::vector<ResidualTrace>> of_object;
@@ -375,6 +382,12 @@ std::vector<std::string> outdone_by_a_form(const Stage& stage, const Discovery& 
   const double bic =
       more * std::log(static_cast<double>(std::max(2L, form.samples))) - likelier(effects, form);
   if (!(bic <= kDeltaBic) || !(likelier(effects_held_out, form_held_out) > 2 * std::log(kTimesAsLikely)))
+    return {};
+  // Beside a misfit that a form lowers by little, the effects may be true, and something acts beside them.
+  const auto halves = [](const Rest& by_form, const Rest& by_effects) {
+    return beyond_noise(by_form) < kOutdone * beyond_noise(by_effects);
+  };
+  if (leaves_flights(stage, options) && !(halves(form, effects) && halves(form_held_out, effects_held_out)))
     return {};
   for (const auto& [object, candidate] : candidates)
     for (const MissingTerm& term : candidate.terms)

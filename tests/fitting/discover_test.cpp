@@ -129,6 +129,21 @@ TEST(Discovery, AListedEffectBesideAnUnlistedOneStays) {
   EXPECT_EQ(found.unexplained->phase, Phase::flight);
 }
 
+// Gravity that is declared wrong by little bends flights as no effect does. A lift imitates it down to the
+// noise of every channel, and through the lift a wind, though no object has a drag.
+TEST(Discovery, GravityDeclaredWrongIsNoLiftAndNoWind) {
+  datasets::ThrowLog log = experiment::generate_campaign(experiment::random_campaign(2), 2);
+  log.gravity -= 0.03;
+  const Discovery found = found_in(log);
+  EXPECT_EQ(found.verdict, Verdict::unexplained);
+  EXPECT_TRUE(found.effects.empty());
+  ASSERT_TRUE(found.unexplained && found.unexplained->missing);
+  const MissingCandidate& form = found.unexplained->missing->candidate;
+  ASSERT_EQ(form.terms.size(), 1u);
+  EXPECT_EQ(form.terms[0].name, "1 along z");
+  EXPECT_NEAR(form.terms[0].coefficient, -0.03, 0.003);
+}
+
 // What is wrong in some throws only is no effect, and not nothing: the answer names them, in either half.
 TEST(Discovery, WhatIsWrongInOneConditionIsUnexplainedAndNamesIt) {
   for (const auto half : {datasets::Split::train, datasets::Split::test}) {
