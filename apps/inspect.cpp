@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <sstream>
 
 #include "apps/command.hpp"
 #include "apps/output.hpp"
@@ -45,24 +46,64 @@ Table groups_of(const datasets::LogSummary& summary) {
   return table;
 }
 
-/// Columns, units and declared noise of every dataset that the log holds.
+auto row_of(const std::vector<datasets::LayoutRow>& layout, const std::string& dataset) {
+  return std::ranges::find_if(
+      layout, [&](const auto& r) { return r.path == dataset || r.path.ends_with("/" + dataset); });
+}
+
+/// Columns, units, declared noise and scatter of every dataset that the log holds.
 Table datasets_of(const datasets::LogSummary& summary) {
-  Table table{{"dataset", "columns", "units", "throws", "declared sigma"}, {}, 5};
+  Table table{{"dataset", "columns", "units", "throws", "declared sigma", "scatter"}, {}, 6};
   const auto layout = datasets::throw_log_layout(summary.dimension);
   for (const auto& noise : summary.noise) {
-    const auto row = std::find_if(layout.begin(), layout.end(), [&](const auto& r) {
-      return r.path == noise.dataset || r.path.ends_with("/" + noise.dataset);
-    });
+    const auto row = row_of(layout, noise.dataset);
     std::string sigma;
     for (std::size_t j = 0; j < noise.lowest.size(); ++j)
       sigma += (j > 0 ? ", " : "") + range(noise.lowest[j], noise.highest[j]);
     if (noise.declared > 0 && noise.declared < noise.throws)
       sigma += fmt::format(" (in {} throws)", noise.declared);
+    std::string scatter;
+    for (std::size_t j = 0; j < noise.scatter.size(); ++j)
+      scatter += fmt::format("{}{:.3g}", j > 0 ? ", " : "", noise.scatter[j]);
     table.rows.push_back({noise.dataset, row == layout.end() ? "" : row->columns,
                           row == layout.end() ? "" : row->units, fmt::to_string(noise.throws),
-                          sigma.empty() ? "-" : sigma});
+                          sigma.empty() ? "-" : sigma, scatter.empty() ? "-" : scatter});
   }
   return table;
+}
+
+/// The names of the columns "x,z,theta"; empty where they are not as many.
+std::vector<std::string> names_of(const std::string& columns, std::size_t count) {
+  std::vector<std::string> out;
+  std::istringstream list(columns);
+  for (std::string name; std::getline(list, name, ',');) out.push_back(name);
+  return out.size() == count ? out : std::vector<std::string>{};
+}
+
+/// What the samples say against the declared noise, a line each.
+std::string noise_doubts(const datasets::LogSummary& summary) {
+  std::string out;
+  const auto layout = datasets::throw_log_layout(summary.dimension);
+  for (const auto& noise : summary.noise) {
+    const auto row = row_of(layout, noise.dataset);
+    const auto names = names_of(row == layout.end() ? "" : row->columns, noise.ratio.size());
+    std::string columns;
+    for (std::size_t j = 0; j < noise.too_small.size(); ++j)
+      if (noise.too_small[j])
+        columns += fmt::format("{}{} {:.2g} times", columns.empty() ? "" : ", ",
+                               names.empty() ? fmt::format("column {}", j) : names[j], noise.ratio[j]);
+    if (!columns.empty())
+      out += fmt::format(
+          "declared too small: {}: its samples scatter from one to the next by more than the declared "
+          "sigma ({})\n",
+          noise.dataset, columns);
+    if (noise.zero > 0)
+      out += fmt::format(
+          "note: {} declares a sigma of 0 in {}: {}\n", noise.dataset, plural(noise.zero, "throw"),
+          noise.scatter.empty() ? "it is believed, as far as 0.01 mm, 0.1 mrad and 0.01 ms"
+                                : "treated as undeclared, the noise is taken from the scatter");
+  }
+  return out;
 }
 
 Inspection inspect_throws(const std::string& file) {
@@ -92,6 +133,7 @@ Inspection inspect_throws(const std::string& file) {
                   plural(summary.free_flights, "free flight"));
   out.text += groups_of(summary).text() + "\n" + datasets_of(summary).text();
   out.text += "\nno schema errors; times in s, values in SI units and radians as read\n";
+  out.text += noise_doubts(summary);
   if (const int n = log.dimension == 2 ? experiment::landings_without_sigma(log) : 0; n > 0)
     out.text += fmt::format("note: {}\n", experiment::in_words(experiment::landing_noise(log), n));
   if (const auto n = std::count_if(log.throws.begin(), log.throws.end(),

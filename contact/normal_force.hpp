@@ -121,19 +121,20 @@ struct NormalForceOptions {
 
 /// What the smoothing found.
 struct NormalForceSummary {
-  double sigma{};         ///< noise used [N]
+  double sigma{};         ///< noise used: the declared one, or that of the scatter if it is larger [N]
   double chi2_per_dof{};  ///< of the smoothed force, and of the tail's level, against the whole series
   double max_whitened_residual{};  ///< largest |residual|/σ
   int knots{};                     ///< breaks strictly between the first sample and the release
   bool power_law{};  ///< the ramp is (1 − s)^p to within the noise; otherwise a spline follows the samples
   double grip_force{};  ///< at the start of the opening [N]
   double opening_start{
-      std::numeric_limits<double>::quiet_NaN()};  ///< first change of the force [s]; NaN: none
+      std::numeric_limits<double>::quiet_NaN()};                ///< first change of the force [s]; NaN: none
+  double ramp_start{std::numeric_limits<double>::quiet_NaN()};  ///< the same, or the first sample where the
+                                                                ///< force falls from there on [s]
   double shape{
       std::numeric_limits<double>::quiet_NaN()};  ///< exponent p (of the ramp's end) [-]; NaN: no ramp
-  double release_time{std::numeric_limits<double>::infinity()};  ///< [s]
-  double release_sigma{
-      std::numeric_limits<double>::quiet_NaN()};  ///< 1 σ of it, from the noise [s]; NaN: no release
+  double release_time{std::numeric_limits<double>::infinity()};    ///< [s]
+  double release_sigma{std::numeric_limits<double>::quiet_NaN()};  ///< 1 σ of it, > 0 [s]; NaN: no release
   double tail_mean{};  ///< mean of the series after the release [N]: the sensor's bias, if it has one
   double tail_mean_sigma{
       std::numeric_limits<double>::infinity()};  ///< 1 σ of it [N]; infinite without samples there
@@ -145,15 +146,18 @@ struct NormalForceFit {
   NormalForceSummary summary;  ///< release, level, and how well the curve explains the series
 };
 
-/// Smooths a measured normal force [N] at `time` [s]; `sigma` is its declared noise [N] (0 or NaN: estimated
-/// from the series' own scatter).
+/// Smooths a measured normal force [N] at `time` [s]; `sigma` is its declared noise [N] (0 or NaN: none). The
+/// noise used is the larger of it and of the scatter of the series' fourth differences (what is slower does
+/// not show there, so that a larger declaration is kept).
 ///
 /// The last opening of the series is taken as a straight grip, a ramp A (1 − s)^p that starts with a kink,
 /// and a level tail. Start, end, p and levels are found together by least squares, so the release is known to
 /// well below a sample. Where the residual is noise, that curve is the smoothed force (in pieces of degree
 /// five); otherwise start and end are found again from their neighbourhoods, and a smoothing spline with a
-/// kink at the start follows the samples. The last bit before the release (below the noise, or 1 % of the
-/// grip) falls monotonically to zero.
+/// kink at the start follows the samples. Then the release is uncertain by what the width of its
+/// neighbourhood makes of it, too, and always by where it is between two samples. Outliers that stand alone,
+/// or in pairs, count as little as they go beyond 3.5 σ. The last bit before the release (below the noise, or
+/// 1 % of the grip) falls monotonically to zero.
 ///
 /// **A sensor bias** shows as a tail that is not zero. The release is where the ramp meets the tail's
 /// plateau, whatever its level; `tail_mean` reports that level. The grip is not shifted by it; over the ramp

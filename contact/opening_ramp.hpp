@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "contact/normal_force.hpp"
 
@@ -29,13 +30,20 @@ struct Ramp {
   }
 };
 
-/// Σ ((ramp − sample)/σ)² of the samples [from, to).
-double chi2(const ForceSeries&, const Ramp&, std::size_t from, std::size_t to);
+/// Weights of the samples [from, to), by sample [-], for their residuals e [σ]: (3.5/e)² of isolated
+/// outliers, beyond ±3.5 with at most one neighbour that is so on the same side; else 1. A ramp of another
+/// form leaves long stretches on one side, and they keep their weight.
+std::vector<double> outlier_weights(const std::vector<double>& e, std::size_t from, std::size_t to);
+
+/// Σ w ((ramp − sample)/σ)² of the samples [from, to).
+double chi2(const ForceSeries&, const Ramp&, std::size_t from, std::size_t to,
+            const std::vector<double>& weight);
 
 /// The first sample at or after t [s].
 std::size_t index_of(const ForceSeries&, double t);
 
 /// The last descent of the series from a plateau to the tail: a first guess, and where its plateau begins.
+/// Sought in running medians of five samples, which spikes do not move.
 struct Descent {
   Ramp ramp;
   std::size_t plateau{};
@@ -44,10 +52,12 @@ struct Descent {
 std::optional<Descent> last_descent(const ForceSeries&, double noise, double tail, double peak);
 
 /// The opening as measured: start, release and shape of its ramp, and which of its parts are what the model
-/// says.
+/// says. The release's variance [s²] is that of least squares with outliers weighted; where the ramp is no
+/// power law, times the χ² per sample of the fit to its end, with the square of what a narrower
+/// neighbourhood moves it by, and never below that of an unknown place between two samples.
 struct Opening {
   Ramp ramp;
-  double release_variance{};
+  double release_variance{};  ///< > 0 [s²]
   bool straight_grip{}, power_law{};
 };
 Opening find_opening(const ForceSeries&, const Descent& guess, const NormalForceOptions& options);

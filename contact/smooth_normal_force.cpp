@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "contact/opening_ramp.hpp"
+#include "dynamics/median.hpp"
 #include "dynamics/spline_fit.hpp"
 #include "dynamics/straight_line.hpp"
 #include "dynamics/white_noise.hpp"
@@ -259,8 +260,9 @@ NormalForceFit with_release(const ForceSeries& s, Opening o, const NormalForceOp
   fit.summary.power_law = o.power_law;
   fit.summary.grip_force = o.ramp.grip;
   if (starts) fit.summary.opening_start = start;
+  fit.summary.ramp_start = start;
   fit.summary.shape = o.ramp.shape;
-  fit.summary.release_sigma = std::sqrt(o.release_variance);
+  fit.summary.release_sigma = std::hypot(std::sqrt(o.release_variance), release - end);
   finish(s, fit, (o.straight_grip && o.power_law) ? 6.0 : spline.summary.knots + 8.0);
   return fit;
 }
@@ -281,19 +283,17 @@ NormalForceFit smooth_normal_force(std::span<const double> time, std::span<const
   std::vector<double> sorted(value.begin(), value.end());
   std::sort(sorted.begin(), sorted.end());
   const double peak = sorted[sorted.size() * 9 / 10];
-  const double natural = dynamics::white_noise(value);
-  const ForceSeries s{
-      time, value,
-      std::isfinite(sigma) && sigma > 0.0 ? sigma : std::max(natural, 1e-6 * std::max(1.0, std::abs(peak)))};
-  const double noise = std::max(s.sigma, natural);  // a declaration may be too optimistic
+  const double natural = dynamics::trimmed_white_noise(value);  // a declaration may be too optimistic
+  const double declared = std::isfinite(sigma) && sigma > 0.0 ? sigma : 1e-6 * std::max(1.0, std::abs(peak));
+  const ForceSeries s{time, value, std::max(declared, natural)};
 
   const std::size_t n = s.size();
-  const double tail = (value[n - 1] + value[n - 2] + value[n - 3]) / 3.0;
+  const double tail = dynamics::median(value.last(3));
   const auto is_zero = [&](double level, double height) {
-    return std::abs(level) <= std::max(options.max_tail_bias * height, 5.0 * noise);
+    return std::abs(level) <= std::max(options.max_tail_bias * height, 5.0 * s.sigma);
   };
   if (!is_zero(tail, sorted.back())) return without_release(s, options);
-  const std::optional<Descent> descent = last_descent(s, noise, tail, std::max(peak, 0.5 * sorted.back()));
+  const std::optional<Descent> descent = last_descent(s, s.sigma, tail, std::max(peak, 0.5 * sorted.back()));
   if (!descent) {  // nothing but zero: released from the beginning
     NormalForceFit fit{
         {Polynomial({time.front(), time.back()}, {constant(0.0)}), {time.front()}, time.front()}, {}};

@@ -1,7 +1,9 @@
-// The independent noise of samples of a smooth motion, from the samples themselves. Private to importers.
+// The independent noise of samples of a smooth motion, from the samples themselves. For importers and
+// summaries.
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <vector>
 
 namespace unhand::datasets {
@@ -14,6 +16,8 @@ class SampleNoise {
   /// σ, in the unit of the values; 0 of nothing. Differences beyond five of their typical size are glitches
   /// of a tracker and left out.
   double sigma() const;
+  /// How many were added.
+  std::size_t size() const { return squares_.size(); }
 
  private:
   std::vector<double> squares_;

@@ -1,8 +1,10 @@
 #include "datasets/summary.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "datasets/sample_noise.hpp"
 #include "datasets/throw_log_table.hpp"
 
 namespace unhand::datasets {
@@ -73,11 +75,74 @@ void add(NoiseSummary& noise, const Series& series) {
   noise.throws += 1;
   if (series.sigma.empty()) return;
   noise.declared += 1;
+  noise.zero += std::ranges::count(series.sigma, 0.0) > 0;
   if (noise.lowest.empty()) noise.lowest = noise.highest = series.sigma;
   const std::size_t n = std::min(noise.lowest.size(), series.sigma.size());
   for (std::size_t j = 0; j < n; ++j) {
     noise.lowest[j] = std::min(noise.lowest[j], series.sigma[j]);
     noise.highest[j] = std::max(noise.highest[j], series.sigma[j]);
+  }
+}
+
+/// The scatter of one column, over steps and over doubled steps.
+class Scatter {
+ public:
+  void add(const Series& time, const Series& values, std::size_t column, const std::vector<std::size_t>& rows,
+           double unit) {
+    for (const std::size_t stride : {1, 2})
+      for (std::size_t k = 0; k + 3 * stride < rows.size(); ++k) {
+        std::array<double, 4> t{}, x{};
+        for (std::size_t i = 0; i < 4; ++i) {
+          const std::size_t row = rows[k + i * stride];
+          t[i] = time(row), x[i] = values(row, column) / unit;
+        }
+        (stride == 1 ? single_ : doubled_).add(t, x);
+      }
+  }
+  double sigma() const {
+    const double once = std::pow(single_.sigma(), 2), twice = std::pow(doubled_.sigma(), 2);
+    return std::sqrt(std::max(0.0, doubled_.size() > 0 ? (64 * once - twice) / 63 : once));
+  }
+  /// Whether the noise is most of it also over doubled steps, where a motion shows 64 times as much.
+  bool seen() const { return std::pow(doubled_.sigma(), 2) <= 4 * std::pow(single_.sigma(), 2); }
+  /// Of sigma, relative, for white noise.
+  double standard_error() const { return 1.07 / std::sqrt(static_cast<double>(single_.size())); }
+
+ private:
+  SampleNoise single_, doubled_;
+};
+
+const Series& time_of(Throw& toss, std::string_view group) {
+  const auto time = std::ranges::find_if(
+      throw_channels, [&](const auto& c) { return c.group == group && c.kind == ChannelKind::time; });
+  return *std::get<Series*>(time->slot(toss, false));
+}
+
+void add_scatter(NoiseSummary& noise, const Channel<Throw>& channel, std::vector<Throw>& throws) {
+  std::vector<Scatter> all, whitened;
+  for (Throw& toss : throws) {
+    const Slot slot = channel.slot(toss, false);
+    const Series* const* series = std::get_if<Series*>(&slot);
+    if (series == nullptr || (*series)->empty()) continue;
+    const Series& values = **series;
+    std::vector<std::size_t> rows;
+    for (std::size_t i = 0; i < values.rows; ++i)
+      if (channel.group != "mocap" || toss.mocap->is_valid(i)) rows.push_back(i);
+    all.resize(std::max(all.size(), values.cols));
+    whitened.resize(all.size());
+    for (std::size_t j = 0; j < values.cols; ++j) {
+      all[j].add(time_of(toss, channel.group), values, j, rows, 1);
+      const double sigma = values.sigma.empty() ? 0 : values.sigma[values.sigma.size() == 1 ? 0 : j];
+      if (sigma > 0) whitened[j].add(time_of(toss, channel.group), values, j, rows, sigma);
+    }
+  }
+  constexpr double kTooSmall = 1.2, kSure = 3;
+  for (std::size_t j = 0; j < all.size(); ++j) {
+    const double ratio = whitened[j].sigma();
+    noise.scatter.push_back(all[j].sigma());
+    noise.ratio.push_back(ratio);
+    noise.too_small.push_back(whitened[j].seen() && ratio > kTooSmall &&
+                              ratio > 1 + kSure * whitened[j].standard_error());
   }
 }
 
@@ -125,6 +190,7 @@ LogSummary summarise(const ThrowLog& log) {
       const Series* const* series = std::get_if<Series*>(&slot);
       if (series != nullptr && !(*series)->empty()) add(noise, **series);
     }
+    if (channel.kind != ChannelKind::time && !channel.single) add_scatter(noise, channel, throws);
     if (noise.throws > 0) out.noise.push_back(std::move(noise));
   }
   return out;
@@ -158,8 +224,14 @@ std::string to_json(const LogSummary& summary) {
   }
   ordered_json& noise = out["noise"] = ordered_json::object();
   for (const NoiseSummary& n : summary.noise) {
-    noise[n.dataset] = {
-        {"throws", n.throws}, {"declared", n.declared}, {"lowest", n.lowest}, {"highest", n.highest}};
+    noise[n.dataset] = {{"throws", n.throws},
+                        {"declared", n.declared},
+                        {"lowest", n.lowest},
+                        {"highest", n.highest},
+                        {"declared_zero", n.zero},
+                        {"scatter", n.scatter},
+                        {"scatter_over_declared", n.ratio},
+                        {"declared_too_small", n.too_small}};
   }
   ordered_json& each = out["each"] = ordered_json::array();
   for (const ThrowSummary& toss : summary.each) {

@@ -39,11 +39,18 @@ struct GroupSummary {
 };
 
 /// The declared noise of one dataset: [lowest, highest] per column over all throws; empty where none declares
-/// any.
+/// any. Beside it the high-frequency scatter of the samples themselves, from third differences over all
+/// throws, without what a smooth motion adds (its third differences over doubled steps are eight times as
+/// large, those of white noise are not). Noise that is slower than the samples does not show in it.
 struct NoiseSummary {
   std::string dataset;                   // "mocap/pose"
   std::size_t throws = 0, declared = 0;  ///< that carry the dataset; that declare its noise
-  std::vector<double> lowest, highest;   ///< 1 σ by column, SI units
+  std::size_t zero = 0;  ///< throws that declare 0 for a column; in series that counts as undeclared
+  std::vector<double> lowest, highest;  ///< 1 σ by column, SI units
+  std::vector<double> scatter;          ///< 1 σ by column, SI units; empty for single rows and times
+  std::vector<double> ratio;            ///< of the scatter to the declared noise; 0 where there is no either
+  std::vector<bool> too_small;          ///< a ratio above 1.2, above 1 by three of its standard errors, where
+                                        ///< noise, not motion, is most of the doubled differences
 };
 
 /// What `unhand inspect` says of a log.

@@ -13,17 +13,23 @@ using dynamics::Dual;
 using dynamics::value_of;
 using dynamics::Window;
 
+namespace {
+constexpr double kWide = 20;   // σ of the release that the ramp is long: below, deviations saturate
+constexpr double kMost = 0.2;  // of the ramp's length, in saturation
+}  // namespace
+
 bool DoubtfulForce::applies_to(const contact::NormalForceSummary& ramp) {
-  return std::isfinite(ramp.opening_start) && std::isfinite(ramp.release_time) &&
+  return std::isfinite(ramp.ramp_start) && std::isfinite(ramp.release_time) &&
          std::isfinite(ramp.release_sigma) && std::isfinite(ramp.shape) &&
-         ramp.release_time - ramp.opening_start > 20 * ramp.release_sigma;
+         ramp.release_time > ramp.ramp_start;
 }
 
 DoubtfulForce::DoubtfulForce(const contact::NormalForce& base, const contact::NormalForceSummary& ramp,
                              const Dual& deviation)
-    : base_(base), start_(ramp.opening_start), release_(ramp.release_time) {
-  const Dual by = deviation * ramp.release_sigma;
-  const double length = release_ - start_;
+    : base_(base), start_(ramp.ramp_start), release_(ramp.release_time) {
+  const double length = release_ - start_, most = kMost * length;
+  Dual by = deviation * ramp.release_sigma;
+  if (kWide * ramp.release_sigma > length) by = most * tanh(by / most);
   if (!(std::abs(by.a) < 0.5 * length))
     throw std::invalid_argument(
         fmt::format("force_deviation = {}: moves the release by {} s, must be below half the ramp, {} s",

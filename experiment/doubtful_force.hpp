@@ -13,6 +13,9 @@ namespace unhand::experiment {
 ///
 /// (the grip is known from the plateau before). The error left is that of the last bit of the ramp, where f
 /// is small and a share of it large: slipping pads' wrenches are proportional to f, so that it matters there.
+///
+/// A release that is uncertain by more than a twentieth of the ramp saturates: δ = d tanh(z σ_r/d) with d a
+/// fifth of the ramp, so that it stays a ramp at every z, and has the slope σ_r at z = 0.
 class DoubtfulForce final : public contact::NormalForce {
  public:
   /// `base`, with a ramp, must outlive it. Throws std::invalid_argument unless the ramp stays one: |δ| below

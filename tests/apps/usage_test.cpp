@@ -353,6 +353,26 @@ TEST_F(Cli, InspectSaysWhatIsTakenForANoiseThatIsNotDeclared) {
               HasSubstr("note: landing/pose declares no sigma in 12 throws: taken are "));
 }
 
+TEST_F(Cli, InspectHoldsTheDeclaredNoiseAgainstTheScatter) {
+  EXPECT_THAT(run("inspect " + quick).out, Not(HasSubstr("declared too small")));
+  write_changed("bold.h5", [](datasets::Throw& one) {
+    for (double& sigma : one.ft->normal_force.sigma) sigma *= 0.5;
+    one.mocap->pose.sigma.assign(3, 0.0);
+  });
+  const Answer answer = run("inspect bold.h5 --json bold.json");
+  EXPECT_THAT(answer.out, HasSubstr("declared too small: ft/normal_force: "));
+  EXPECT_THAT(answer.out, HasSubstr("(f_N "));
+  EXPECT_THAT(answer.out,
+              HasSubstr("note: mocap/pose declares a sigma of 0 in 12 throws: treated as undeclared"));
+  const json noise = read_json(folder / "bold.json")["noise"];
+  EXPECT_EQ(noise["ft/normal_force"]["declared_too_small"], json::array({true}));
+  // of 4200 samples: to 1.7 %
+  EXPECT_NEAR(noise["ft/normal_force"]["scatter"][0], 0.05, 0.0025);
+  EXPECT_NEAR(noise["ft/normal_force"]["scatter_over_declared"][0], 2, 0.1);
+  EXPECT_EQ(noise["ft/wrench"]["declared_too_small"], json::array({false, false, false}));
+  EXPECT_EQ(noise["mocap/pose"]["declared_zero"], 12);
+}
+
 TEST_F(Cli, FigureDrawsWhatIsAskedFor) {
   const Answer answer = run("figure all --log " + quick + " --models sliding_pivot,limit_surface --out f");
   ASSERT_EQ(answer.code, 0) << answer.err;

@@ -271,6 +271,7 @@ TEST(SmoothNormalForce, OtherRampsAreFollowedByASpline) {
     const double e = (fit.summary.release_time - 0.1125) / 1e-3;
     sum += e;
     square += e * e;
+    EXPECT_LT(std::abs(e), 4 * fit.summary.release_sigma / 1e-3);  // which form the end has is not known
   }
   EXPECT_LT(std::sqrt(square / 50), 0.5);
   EXPECT_LT(std::abs(sum / 50), 0.3);  // the power that stands in for the ramp's end is not its form
@@ -302,12 +303,16 @@ TEST(SmoothNormalForce, LaterGripsAndOddSeriesAreSurvived) {
   fit = smooth_normal_force(log.time, log.value, 0.05);
   expect_sound(fit, log);
   EXPECT_NEAR(fit.summary.release_time, 0.1, 1.5e-3);
+  EXPECT_GE(fit.summary.release_sigma, 1e-3 / std::sqrt(12.0));  // between two samples nothing is seen
 
   log = record([](double t) { return ramp(t, 20.0, -0.05, 0.1, 1.0); }, 0.05,
                random);  // opening before the log
   fit = smooth_normal_force(log.time, log.value, 0.05);
   expect_sound(fit, log);
   EXPECT_NEAR(fit.summary.release_time, 0.05, 0.5e-3);
+  EXPECT_TRUE(std::isnan(fit.summary.opening_start));
+  EXPECT_EQ(fit.summary.ramp_start, log.time.front());
+  EXPECT_NEAR(fit.summary.release_time, 0.05, 4 * fit.summary.release_sigma);
 
   for (int n = 4; n < 14; ++n) {  // hardly any samples
     log = record([](double t) { return ramp(t, 20.0, 0.002, 0.003, 1.0); }, 0.05, random, 0.0, n);
@@ -333,6 +338,62 @@ TEST(SmoothNormalForce, UndeclaredNoiseIsEstimated) {
   const NormalForceFit fit = smooth_normal_force(log.time, log.value, 0.0);
   EXPECT_NEAR(fit.summary.sigma, 0.05, 0.015);
   EXPECT_NEAR(fit.summary.release_time, 0.1125, 0.3e-3);
+}
+
+// Of many releases, in ms: the scatter of the release about the truth, the mean claim, the worst error.
+struct Releases {
+  double scatter{}, claimed{}, worst{};
+};
+
+template <class Spoil>
+Releases releases(double declared, std::mt19937_64& random, const Spoil& spoil) {
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  constexpr int kRuns = 200;
+  Releases out;
+  for (int run = 0; run < kRuns; ++run) {
+    const double start = 0.057 + 1e-3 * uniform(random), length = 0.05 + 0.01 * uniform(random);
+    Log log = record([&](double t) { return ramp(t, 25.0, start, length, 1.25); }, 0.0, random);
+    for (double& f : log.value) f += spoil();
+    const NormalForceFit fit = smooth_normal_force(log.time, log.value, declared);
+    const double e = (fit.summary.release_time - start - length) / 1e-3;
+    EXPECT_GT(fit.summary.release_sigma, 0.0);
+    out.scatter += e * e / kRuns;
+    out.claimed += fit.summary.release_sigma / 1e-3 / kRuns;
+    out.worst = std::max(out.worst, std::abs(e));
+  }
+  out.scatter = std::sqrt(out.scatter);
+  return out;
+}
+
+TEST(SmoothNormalForce, ANoiseDeclaredTooSmallIsSeenInTheScatter) {
+  std::mt19937_64 random(28);
+  std::normal_distribution<double> normal;
+  for (double factor : {0.0, 0.1, 0.5, 0.67, 0.8, 0.9, 1.0}) {
+    const auto found = releases(0.05 * factor, random, [&] { return 0.05 * normal(random); });
+    EXPECT_LT(found.scatter, 0.12) << factor;  // that of the right declaration
+    EXPECT_LT(found.worst, 0.5) << factor;     // four of it
+    EXPECT_NEAR(found.scatter, found.claimed, 0.2 * found.scatter) << factor;
+  }
+  // One that is too large is kept: the noise may be slow.
+  const auto found = releases(0.15, random, [&] { return 0.05 * normal(random); });
+  EXPECT_NEAR(found.claimed, 3 * found.scatter, 0.2 * found.claimed);
+}
+
+TEST(SmoothNormalForce, SpikesAndHeavyTailsDoNotMoveTheRelease) {
+  std::mt19937_64 random(29);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  for (double height : {0.5, 5.0, 50.0}) {
+    const auto found = releases(0.05, random, [&] {
+      return 0.05 * normal(random) + (uniform(random) < 0.01 ? height * normal(random) : 0.0);
+    });
+    EXPECT_LT(found.worst, 0.5) << height;
+    EXPECT_NEAR(found.scatter, found.claimed, 0.2 * found.scatter) << height;
+  }
+  std::student_t_distribution<double> heavy(3);  // of variance 3
+  const auto found = releases(0.05, random, [&] { return 0.05 / std::sqrt(3.0) * heavy(random); });
+  EXPECT_LT(found.worst, 0.5);
+  EXPECT_LT(found.scatter, 1.1 * found.claimed);  // its core is narrower than its variance
 }
 
 TEST(SmoothNormalForce, RejectsBrokenSeries) {

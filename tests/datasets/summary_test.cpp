@@ -1,5 +1,8 @@
 #include "datasets/summary.hpp"
 
+#include <cmath>
+#include <random>
+
 #include "log_samples.hpp"
 
 namespace unhand::datasets::test {
@@ -46,6 +49,42 @@ TEST(Summary, CountsRatesGapsAndNoise) {
   EXPECT_EQ(noise->declared, 2U);
   EXPECT_EQ(noise->lowest[0], 2e-4);
   EXPECT_EQ(noise->highest[0], 5e-4);
+}
+
+// A force sensor with white noise of 1 σ = `noise` on a motion of 10 rad/s; its log declares 0.05 N.
+NoiseSummary force_noise(double noise, double rate, double declared = 0.05) {
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  ThrowLog log = planar_log();
+  for (Throw& toss : log.throws) {
+    FtLog& felt = *toss.ft;
+    constexpr std::size_t kRows = 300;
+    felt.time = clock_of(kRows, rate);
+    felt.wrench = {kRows, 3, std::vector<double>(3 * kRows), {0.02, 0.02, 2e-4}};
+    felt.normal_force = {kRows, 1, {}, {declared}};
+    for (std::size_t i = 0; i < kRows; ++i)
+      felt.normal_force.data.push_back(20 + 5 * std::sin(10 * felt.time(i)) + noise * normal(random));
+  }
+  const LogSummary s = summarise(log);
+  return *std::ranges::find_if(s.noise, [](const auto& n) { return n.dataset == "ft/normal_force"; });
+}
+
+TEST(Summary, ScatterTellsADeclaredNoiseThatIsTooSmall) {
+  constexpr double kSure = 3 * 1.07 / 24.4;  // of 600 samples
+  for (double ratio : {0.5, 1.0, 1.4, 2.0}) {
+    const NoiseSummary n = force_noise(0.05 * ratio, 1000);
+    EXPECT_NEAR(n.scatter.at(0), 0.05 * ratio, kSure * 0.05 * ratio);
+    EXPECT_NEAR(n.ratio.at(0), ratio, kSure * ratio);
+    EXPECT_EQ(n.too_small.at(0), ratio > 1.2) << ratio;
+  }
+  // A motion that is fast for the sensor is no noise: ω Δt = 0.5, 5 (ω Δt)³/√20 = 0.14 N in third
+  // differences.
+  EXPECT_FALSE(force_noise(0.05, 20).too_small.at(0));
+  EXPECT_FALSE(force_noise(0, 20).too_small.at(0));
+  const NoiseSummary zero = force_noise(0.05, 1000, 0);
+  EXPECT_EQ(zero.zero, 2U);
+  EXPECT_EQ(zero.ratio.at(0), 0);
+  EXPECT_FALSE(zero.too_small.at(0));
 }
 
 TEST(Summary, OneSampleHasNoRate) {

@@ -42,4 +42,23 @@ TEST(WhiteNoise, IsToldFromASmoothMotionWithAJump) {
   EXPECT_EQ(white_noise(std::vector<double>{1, 2, 3, 4}), 0);
 }
 
+TEST(WhiteNoise, TrimmedIsSurerAndForgivesSpikes) {
+  constexpr double kSigma = 0.01;
+  constexpr int kCount = 400, kRuns = 400;
+  std::mt19937 random(8);
+  std::normal_distribution<double> noise(0, kSigma);
+  double trimmed = 0, middle = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    std::vector<double> y;
+    for (int i = 0; i < kCount; ++i) y.push_back((i > 200 ? 1 : 0) + noise(random));
+    trimmed += std::pow(trimmed_white_noise(y) / kSigma - 1, 2) / kRuns;
+    middle += std::pow(white_noise(y) / kSigma - 1, 2) / kRuns;
+    for (int i = 10; i < kCount; i += 100) y[i] += 1;  // 1 % of the samples, 5 % of the differences
+    EXPECT_NEAR(trimmed_white_noise(y), kSigma, 5 * 1.15 / std::sqrt(kCount) * kSigma);
+  }
+  EXPECT_NEAR(std::sqrt(trimmed), 1.15 / std::sqrt(kCount), 0.15 * 1.15 / std::sqrt(kCount));
+  EXPECT_LT(trimmed, 0.6 * middle);
+  EXPECT_EQ(trimmed_white_noise(std::vector<double>{1, 2, 3, 4}), 0);
+}
+
 }  // namespace

@@ -21,7 +21,7 @@ contact::ProfileNormalForce ramp(double shape) {
 }
 contact::NormalForceSummary summary(double shape) {
   contact::NormalForceSummary out;
-  out.opening_start = kStart;
+  out.opening_start = out.ramp_start = kStart;
   out.release_time = kStart + kLength;
   out.release_sigma = kSigma;
   out.shape = shape;
@@ -87,6 +87,32 @@ TEST(DoubtfulForce, ExactDerivatives) {
     std::vector<Dual> kinks;
     force.kinks(kinks);
     EXPECT_NEAR(kinks.back().v[4], kSigma, 1e-15);
+  }
+}
+
+TEST(DoubtfulForce, AWideReleaseMovesAsFarAsARampCan) {
+  for (const double shape : {0.5, 1.0, 2.0}) {
+    const auto base = ramp(shape);
+    auto wide = summary(shape);
+    for (const double sigma : {kLength / 15, kLength / 5, kLength, 100 * kLength}) {
+      wide.release_sigma = sigma;
+      ASSERT_TRUE(DoubtfulForce::applies_to(wide));
+      std::vector<Dual> kinks;
+      DoubtfulForce(base, wide, independent(0.0, 4)).kinks(kinks);
+      EXPECT_NEAR(kinks.back().v[4], sigma, 1e-12 * sigma);  // what a prediction's sigma is made of
+      double before = 0;
+      for (const double z : {-6.0, -1.0, 1.0, 6.0}) {
+        const DoubtfulForce moved(base, wide, Dual(z));
+        const double end = moved.release_time(), start = moved.kinks().front();
+        EXPECT_GE(end, before);
+        before = end;
+        EXPECT_LE(std::abs(end - kStart - kLength), 0.2 * kLength * (1 + 1e-12));
+        for (double u = 0.01; u < 1; u += 0.01) {
+          const double f = moved.at(Window{start, end}, end - (end - start) * u);
+          EXPECT_TRUE(f > 0 && f < 1.0001 * kGrip) << f << " N at " << u << ", z " << z;
+        }
+      }
+    }
   }
 }
 
