@@ -85,7 +85,15 @@ Option Option::not_negative() {
 Option Option::one_of(const std::vector<std::string>& values) {
   return option_->check(one_among(values)), *this;
 }
-Option Option::with_commas() { return option_->delimiter(','), *this; }
+Option Option::with_commas() {
+  option_->delimiter(',')->transform(CLI::Validator(
+      [](std::string& word) {
+        CLI::detail::trim(word);
+        return std::string();
+      },
+      ""));
+  return *this;
+}
 Option Option::expected(int least, int most) { return option_->expected(least, most), *this; }
 Option Option::one_value_each() { return option_->allow_extra_args(false), *this; }
 Option Option::with_default() { return option_->capture_default_str(), *this; }

@@ -63,6 +63,17 @@ TEST_F(Cli, ThrowsWithoutAHandAreLeftOutWhereOthersHaveOne) {
 }
 
 // Parameters come from train throws: without any, that is what is said, not how few samples there are.
+TEST_F(Cli, BlanksAroundNamesMeanNothing) {
+  auto log = datasets::read_throw_log(quick);
+  const std::string first = log.throws.front().condition;
+  std::erase_if(log.throws, [&](const auto& one) { return one.condition != first; });
+  datasets::write_throw_log(folder / "one.h5", log);
+  const Answer answer = run("compare one.h5 --models ' gripper_delay, limit_surface' --json a.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_EQ(read_json(folder / "a.json")["models"].size(), 2u);
+  EXPECT_THAT(answer.out, HasSubstr(" 1 condition; "));
+}
+
 TEST_F(Cli, NoTrainThrowsIsSaid) {
   write_changed("test.h5", [](datasets::Throw& one) { one.split = datasets::Split::test; });
   const Answer answer = run("compare test.h5");
