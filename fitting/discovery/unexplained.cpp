@@ -187,6 +187,31 @@ bool lacks_no_acceleration(const Stage& stage, const DiscoverOptions& options) {
   return values > 0 && chi2_tail(fall, values) > options.family_wise_level;
 }
 
+/// √χ² of what a channel leaves where it is white and alike in all phases, as a declared σ that is too small
+/// leaves it: the number that it is too small by.
+std::optional<double> too_small_by(const Discovery& so_far, Channel channel) {
+  constexpr int kFewest = 50;                     // samples of a phase
+  constexpr double kWhite = 0.15, kAlike = 1.15;  // autocorrelation; √χ² of a phase against all
+  constexpr double kLeast = 1.2;                  // less is no matter of a declaration
+  const StructureOptions named;
+  double sum = 0, n = 0;
+  std::vector<double> each;
+  for (const auto& s : so_far.structure_after) {
+    if (s.channel != channel || s.structure.n < kFewest) continue;
+    if (std::abs(s.structure.autocorrelation) > kWhite) return {};
+    for (const Dependence& d : s.structure.depends)
+      if (d.share > named.share && d.p_value < named.level) return {};
+    sum += s.structure.n * s.structure.chi2_per_sample, n += s.structure.n;
+    each.push_back(std::sqrt(s.structure.chi2_per_sample));
+  }
+  if (each.size() < 2) return {};
+  const double mean = std::sqrt(sum / n);
+  for (const double one : each)
+    if (one > kAlike * mean || mean > kAlike * one) return {};
+  if (mean < kLeast) return {};
+  return mean;
+}
+
 /// Where a channel leaves more than noise: the first phase, and in it the channel in which most is left.
 std::optional<Unexplained> left_in_channels(const Stage& stage, const Discovery& so_far, double rest,
                                             const DiscoverOptions& options) {
@@ -211,7 +236,10 @@ std::optional<Unexplained> left_in_channels(const Stage& stage, const Discovery&
   for (const auto& s : so_far.structure_after)
     if (s.channel == out->channel && s.phase == out->phase) words = s.structure.in_words();
   out->description += words;
-  if (out->phase == Phase::flight && is_tracked(out->channel) && lacks_no_acceleration(stage, options)) {
+  if (const auto factor = too_small_by(so_far, out->channel))
+    out->description +=
+        fmt::format("; white and alike in all phases: a sigma too small by {:.2g} would do", *factor);
+  else if (out->phase == Phase::flight && is_tracked(out->channel) && lacks_no_acceleration(stage, options)) {
     out->phase = Phase::release;
     out->description += ", from how flights begin: they lack no acceleration";
   }
@@ -335,7 +363,7 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
   out->description += "; no effect of the catalogue explains it on held-out throws";
   for (const auto& id : so_far.imitations) out->description += fmt::format("; {} imitates it", id);
   if (so_far.effects.empty() && so_far.imitations.empty() && !so_far.ranking.empty() &&
-      so_far.ranking.front().gain > 1)
+      so_far.ranking.front().gain > 1 && !too_small_by(so_far, out->channel))
     out->description += fmt::format("; the nearest footprint is that of {}", so_far.ranking.front().id);
   out->missing = estimate_missing(stage, out->phase, options);
   if (!out->missing) return out;

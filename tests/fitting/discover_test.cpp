@@ -144,6 +144,22 @@ TEST(Discovery, GravityDeclaredWrongIsNoLiftAndNoWind) {
   EXPECT_NEAR(form.terms[0].coefficient, -0.03, 0.003);
 }
 
+// Noise that is declared too small leaves the noise in every phase, by the same factor.
+TEST(Discovery, ASigmaThatIsTooSmallIsSaidToDo) {
+  constexpr double kFactor = 1.6;
+  auto log = support::loop_campaign({});
+  for (auto& t : log.throws)
+    for (double& sigma : t.mocap->pose.sigma) sigma /= kFactor;
+  const Discovery found = found_in(log);
+  ASSERT_TRUE(found.unexplained.has_value()) << to_string(found.verdict);
+  const std::string& words = found.unexplained->description;
+  EXPECT_TRUE(words.find("white and alike in all phases: a sigma too small by 1.6 would do") !=
+                  std::string::npos ||
+              words.find("too small by 1.5 would do") != std::string::npos)
+      << words;  // what is fitted takes up some of it
+  EXPECT_EQ(words.find("nearest footprint"), std::string::npos) << words;
+}
+
 // What is wrong in some throws only is no effect, and not nothing: the answer names them, in either half.
 TEST(Discovery, WhatIsWrongInOneConditionIsUnexplainedAndNamesIt) {
   for (const auto half : {datasets::Split::train, datasets::Split::test}) {
