@@ -52,10 +52,8 @@ ReleaseTables release_tables(const experiment::Comparison& comparison, const dat
   std::array<int, 2> n{};
   for (const auto& one : log.throws) ++n[one.split == Split::test];
   out.heading = fmt::format(
-      "{}: {}\n{} throws ({} train, {} test), {} condition{}; mean absolute error ± its standard "
-      "deviation\n",
-      file, log.title, log.throws.size(), n[0], n[1], comparison.conditions.size(),
-      comparison.conditions.size() == 1 ? "" : "s");
+      "{}: {}\n{} throws ({} train, {} test), {}; mean absolute error ± its standard deviation\n", file,
+      log.title, log.throws.size(), n[0], n[1], plural(comparison.conditions.size(), "condition"));
   out.errors.left = out.bias.left = 2;
   out.errors.header = out.bias.header = {"model", "throws", "n", "failed"};
   for (const auto& quantity : experiment::kQuantities) {
@@ -83,9 +81,10 @@ ReleaseTables release_tables(const experiment::Comparison& comparison, const dat
   out.floor =
       floor.conditions > 0
           ? fmt::format(
-                "scatter of repetitions: landing x {:.4f} m, landing theta {:.2f} deg (pooled 1 sigma, {} "
-                "condition{}): the floor of a model that knows of a throw only its condition\n",
-                floor.landing_x, floor.landing_theta, floor.conditions, floor.conditions == 1 ? "" : "s")
+                "scatter of repetitions: landing x {:.4f} m, landing theta {:.2f} deg (pooled 1 sigma, "
+                "{}): the floor of a model that knows of a throw only its condition\n",
+                floor.landing_x, floor.landing_theta,
+                plural(static_cast<std::size_t>(floor.conditions), "condition"))
           : "scatter of repetitions: no condition was repeated with its landing measured\n";
   out.parameters = {{"model", "parameters", "how", "samples", "scatter"}, {}, 3};
   for (const auto& model : comparison.models) {

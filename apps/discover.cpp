@@ -218,7 +218,7 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
     out["unexplained"] = {{"phase", to_string(found.unexplained->phase)},
                           {"channel", to_string(found.unexplained->channel)},
                           {"chi2_per_dof", number(found.unexplained->chi2_per_dof)},
-                          {"description", unexplained_text(*found.unexplained)}};
+                          {"description", found.unexplained->description}};
     if (found.unexplained->missing) out["unexplained"]["missing"] = json_of(*found.unexplained->missing);
   }
   out["error"] = {{"before", {{"train", json_of(found.before_train)}, {"test", json_of(found.before_test)}}},
@@ -260,7 +260,7 @@ std::string discovery_text(const Discovery& found, const std::string& log) {
   if (const std::string note = gain_text(found.effects); !note.empty()) out += "\n" + note + "\n";
   for (const auto& id : found.along) out += fmt::format("\nfitted along, since no pads are rigid: {}\n", id);
   if (found.small) out += fmt::format("\n{}\n", small_text(*found.small));
-  if (found.unexplained) out += fmt::format("\nunexplained: {}\n", unexplained_text(*found.unexplained));
+  if (found.unexplained) out += fmt::format("\nunexplained: {}\n", found.unexplained->description);
   Table table{{"predicted before the throw", "landing x MAE [m]", "theta MAE [deg]", "detach vx MAE [m/s]",
                "omega MAE [deg/s]", "trajectory RMS [m]", "chi2/dof"},
               {},

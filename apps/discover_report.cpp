@@ -219,7 +219,7 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
   if (const std::string note = gain_text(found.effects); !note.empty())
     answer += fmt::format("<p>{}</p>\n", escaped(note));
   if (found.unexplained)
-    answer += fmt::format("<p><b>Unexplained:</b> {}.</p>\n", escaped(unexplained_text(*found.unexplained)));
+    answer += fmt::format("<p><b>Unexplained:</b> {}.</p>\n", escaped(found.unexplained->description));
   if (estimated) answer += picture("missing");
   if (found.effects.empty() && !found.unexplained)
     answer += "<p>Nothing that the data show is missing in the model.</p>\n";

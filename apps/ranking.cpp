@@ -112,17 +112,8 @@ std::string small_text(const fitting::SmallEffect& small) {
   if (!predicts) return fmt::format("evident, but too small to matter: {})", numbers);
   return fmt::format(
       "evident on the train throws, but the test throws do not confirm it: {}, yet no channel's chi2 falls "
-      "by "
-      "what matters, and their likelihood does not rise enough or another of their errors grows)",
+      "by what matters, and their likelihood does not rise enough or another of their errors grows)",
       numbers);
-}
-
-std::string unexplained_text(const fitting::Unexplained& left) {
-  const auto seen = fmt::format("{} in ", to_string(left.channel));
-  if (!left.description.starts_with(seen) ||
-      left.description.starts_with(fmt::format("{}{}", seen, to_string(left.phase))))
-    return left.description;
-  return fmt::format("in {}, seen in {}", to_string(left.phase), left.description);
 }
 
 std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects) {

@@ -36,9 +36,6 @@ std::vector<std::string> separating_lines(const fitting::AcceptedEffect& effect)
 /// Evident, and yet no part of the answer: too small, or not confirmed by the held-out throws.
 std::string small_text(const fitting::SmallEffect& small);
 
-/// What is left, with the phase of its cause before the one in which it was seen.
-std::string unexplained_text(const fitting::Unexplained& left);
-
 /// Where mass and inertia are off by the same ratio: that it may be a gain of the wrench. Else empty.
 std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects);
 

@@ -94,6 +94,10 @@ std::string plus_minus(bool known, double value, double spread, int decimals) {
   return known ? fmt::format("{:.{}f} ± {:.{}f}", value, decimals, spread, decimals) : "-";
 }
 
+std::string plural(std::size_t n, const char* what) {
+  return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s");
+}
+
 bool is_held(double value, double sigma) { return sigma <= 1e-12 * std::abs(value); }
 
 Rounded rounded(double value, double sigma) {

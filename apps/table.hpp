@@ -32,5 +32,7 @@ bool is_held(double value, double sigma);
 /// "19.7 +- 1.1 m/s", "1 (held)"; no unit for "-".
 std::string with_sigma(double value, double sigma, const std::string& unit);
 std::string fixed(bool known, double value, int decimals);
+/// "1 throw", "2 throws".
+std::string plural(std::size_t n, const char* what);
 
 }  // namespace unhand::apps

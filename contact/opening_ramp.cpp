@@ -173,22 +173,22 @@ double chi2(const ForceSeries& s, const Ramp& ramp, std::size_t from, std::size_
   return sum;
 }
 
-std::optional<Descent> last_descent(const ForceSeries& measured, double noise, double tail, double peak) {
+std::optional<Descent> last_descent(const ForceSeries& measured, double tail, double peak) {
   const std::vector<double> calm = calmed(measured.value);
   const ForceSeries s{measured.time, calm, measured.sigma};
   const auto n = static_cast<std::ptrdiff_t>(s.size());
   std::ptrdiff_t last = n - 1;
-  while (last >= 0 && s.value[last] - tail <= std::max(6.0 * noise, 0.02 * (peak - tail))) --last;
+  while (last >= 0 && s.value[last] - tail <= std::max(6.0 * s.sigma, 0.02 * (peak - tail))) --last;
   if (last < 0) return std::nullopt;
   double top = -kInfinity;
   std::ptrdiff_t first = last;
   for (std::ptrdiff_t k = last; k >= 0;
        --k) {  // back over the plateau, up to where an earlier grip began to close
     top = std::max(top, s.value[k]);
-    if (s.value[k] < top - std::max(8.0 * noise, 0.15 * (top - tail))) break;
+    if (s.value[k] < top - std::max(8.0 * s.sigma, 0.15 * (top - tail))) break;
     first = k;
   }
-  while (first < last && s.value[first] < top - std::max(6.0 * noise, 0.03 * (top - tail))) ++first;
+  while (first < last && s.value[first] < top - std::max(6.0 * s.sigma, 0.03 * (top - tail))) ++first;
   const auto crossing = [&](double level) {
     std::ptrdiff_t k = last;
     while (k > first && s.value[k] <= level) --k;

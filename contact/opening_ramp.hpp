@@ -49,7 +49,7 @@ struct Descent {
   std::size_t plateau{};
   double height{};
 };
-std::optional<Descent> last_descent(const ForceSeries&, double noise, double tail, double peak);
+std::optional<Descent> last_descent(const ForceSeries&, double tail, double peak);
 
 /// The opening as measured: start, release and shape of its ramp, and which of its parts are what the model
 /// says. The release's variance [s²] is that of least squares with outliers weighted; where the ramp is no

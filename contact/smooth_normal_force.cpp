@@ -293,7 +293,7 @@ NormalForceFit smooth_normal_force(std::span<const double> time, std::span<const
     return std::abs(level) <= std::max(options.max_tail_bias * height, 5.0 * s.sigma);
   };
   if (!is_zero(tail, sorted.back())) return without_release(s, options);
-  const std::optional<Descent> descent = last_descent(s, s.sigma, tail, std::max(peak, 0.5 * sorted.back()));
+  const std::optional<Descent> descent = last_descent(s, tail, std::max(peak, 0.5 * sorted.back()));
   if (!descent) {  // nothing but zero: released from the beginning
     NormalForceFit fit{
         {Polynomial({time.front(), time.back()}, {constant(0.0)}), {time.front()}, time.front()}, {}};

@@ -1,9 +1,7 @@
 #include "datasets/sample_noise.hpp"
 
-#include <cmath>
-
-#include "dynamics/median.hpp"
 #include "dynamics/third_difference.hpp"
+#include "dynamics/white_noise.hpp"
 
 namespace unhand::datasets {
 
@@ -14,13 +12,6 @@ void SampleNoise::add(const std::array<double, 4>& times, const std::array<doubl
   squares_.push_back(sum * sum / weights);
 }
 
-double SampleNoise::sigma() const {
-  if (squares_.empty()) return 0;
-  const double most = 25 * dynamics::median(squares_);
-  double sum = 0, n = 0;
-  for (const double square : squares_)
-    if (square <= most) sum += square, n += 1;
-  return std::sqrt(sum / n);
-}
+double SampleNoise::sigma() const { return dynamics::trimmed_rms(squares_); }
 
 }  // namespace unhand::datasets

@@ -112,8 +112,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
     out.verdict = Verdict::not_answered;
     out.message =
         "nothing can be held out to judge an effect by: needed are train and test throws, or an object that "
-        "was "
-        "thrown under two conditions";
+        "was thrown under two conditions";
     return out;
   }
   solve(stage, options, {});

@@ -241,6 +241,7 @@ std::optional<Unexplained> left_in_channels(const Stage& stage, const Discovery&
         fmt::format("; white and alike in all phases: a sigma too small by {:.2g} would do", *factor);
   else if (out->phase == Phase::flight && is_tracked(out->channel) && lacks_no_acceleration(stage, options)) {
     out->phase = Phase::release;
+    out->description = "in release, seen in " + out->description;
     out->description += ", from how flights begin: they lack no acceleration";
   }
   return out;

@@ -33,14 +33,6 @@ TEST(SmallEffect, IsNotCalledSmallWhereHeldOutErrorsFall) {
   EXPECT_THAT(small_text(small), testing::StartsWith("evident, but no pads are without it: "));
 }
 
-TEST(Unexplained, NamesThePhaseOfTheCauseAndWhereItWasSeen) {
-  fitting::Unexplained left{
-      fitting::Phase::release, experiment::Channel::mocap_z, 42, "mocap.z in flight: 42 times", {}};
-  EXPECT_EQ(unexplained_text(left), "in release, seen in mocap.z in flight: 42 times");
-  left.phase = fitting::Phase::flight;
-  EXPECT_EQ(unexplained_text(left), "mocap.z in flight: 42 times");
-}
-
 TEST(Separating, OnlyWhatSeparatesIsAdvised) {
   fitting::AcceptedEffect effect;
   effect.separating = {{"flight.wind", "throw faster", 0.999, 0.5, true},

@@ -138,6 +138,7 @@ TEST(Discovery, GravityDeclaredWrongIsNoLiftAndNoWind) {
   EXPECT_EQ(found.verdict, Verdict::unexplained);
   EXPECT_TRUE(found.effects.empty());
   ASSERT_TRUE(found.unexplained && found.unexplained->missing);
+  EXPECT_TRUE(found.unexplained->description.starts_with("mocap.z in flight: "));
   const MissingCandidate& form = found.unexplained->missing->candidate;
   ASSERT_EQ(form.terms.size(), 1u);
   EXPECT_EQ(form.terms[0].name, "1 along z");
@@ -322,6 +323,9 @@ TEST(Discovery, WhatLeavesPredictionsOffByConditionIsWithdrawn) {
   EXPECT_EQ(found.imitations, std::vector<std::string>{"release.opening_delay"});
   ASSERT_TRUE(found.unexplained.has_value());
   EXPECT_EQ(found.unexplained->phase, Phase::release) << "flights lack no acceleration";
+  EXPECT_TRUE(found.unexplained->description.starts_with("in release, seen in mocap."))
+      << found.unexplained->description;
+  EXPECT_NE(found.unexplained->description.find(" in flight: "), std::string::npos);
 }
 
 // The same friction beside a tilt: once that is found, no channel shows it.
