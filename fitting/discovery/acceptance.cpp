@@ -309,6 +309,13 @@ bool spoils(const AcceptedEffect& effect, const Stage& stage, const Discovery& s
 
 namespace {
 
+/// Whether an accepted effect bends what is seen of flights, wherever it was seen most: a gravity that is
+/// tilted acts in the hand as well.
+bool bends_flights(const AcceptedEffect& effect) {
+  if (effect.id.starts_with("flight.")) return true;
+  return in_air(effect.phase) && !is_law(effect.id) && !acts_on_pads(effect.id);
+}
+
 /// Whether something is left in the tracked flights of both halves.
 bool leaves_flights(const Stage& stage, const DiscoverOptions& options) {
   return std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(), [&](const ChannelMisfit& m) {
@@ -357,11 +364,11 @@ std::size_t unknowns_of(const FitResult& fit, const std::vector<std::string>& id
 
 }  // namespace
 
-std::vector<std::string> outdone_by_a_form(const Stage& stage, const Discovery& so_far,
-                                           const DiscoverOptions& options) {
+std::optional<AskedForm> form_asked_for(const Stage& stage, const Discovery& so_far,
+                                        const DiscoverOptions& options) {
   std::vector<std::string> accepted;
   for (const AcceptedEffect& effect : so_far.effects)
-    if (in_air(effect.phase) && !is_law(effect.id) && !acts_on_pads(effect.id)) accepted.push_back(effect.id);
+    if (bends_flights(effect)) accepted.push_back(effect.id);
   if (accepted.empty()) return {};
   const Stage& less = without(stage, accepted, options);
   if (!less.solved()) return {};
@@ -389,10 +396,19 @@ std::vector<std::string> outdone_by_a_form(const Stage& stage, const Discovery& 
   };
   if (leaves_flights(stage, options) && !(halves(form, effects) && halves(form_held_out, effects_held_out)))
     return {};
-  for (const auto& [object, candidate] : candidates)
-    for (const MissingTerm& term : candidate.terms)
-      std::erase_if(accepted, [&](const std::string& id) { return find_effect(id).form == term.name; });
-  return accepted;
+  AskedForm out{accepted, {}, false};
+  for (const auto& [name, object] : train.objects) {
+    const auto candidate = candidates.find(object);
+    if (candidate == candidates.end() || candidate->second.terms.empty()) continue;
+    out.words += (out.words.empty() ? "" : ", ") + candidate->second.in_words();
+    if (train.objects.size() > 1) out.words += fmt::format(" for {}", name);
+    for (const MissingTerm& term : candidate->second.terms) {
+      const auto is_its_own = [&](const std::string& id) { return find_effect(id).form == term.name; };
+      out.unlisted |= std::none_of(accepted.begin(), accepted.end(), is_its_own);
+      std::erase_if(out.outdone, is_its_own);
+    }
+  }
+  return out;
 }
 
 }  // namespace unhand::fitting

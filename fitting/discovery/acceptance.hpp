@@ -3,6 +3,7 @@
 // missing is missing_force.hpp's to say. Internal to fitting.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -184,15 +185,15 @@ bool spoils(const AcceptedEffect& effect, const Stage& stage, const Discovery& s
 /// of what they leave.
 inline constexpr double kOutdone = 0.5;
 
-/// The accepted effects of the air that are the shadow of something unlisted. The laws of flight and of
-/// sensors are exact, so that a form that describes the flights better means that something else acts: beside
-/// them, or in their place. Asked where they explain most of what was off in the flights. They are outdone
-/// where a few terms (missing_terms, one candidate an object), fitted to the train throws in their place, win
-/// by Bayes' criterion there (kDeltaBic), and make the held-out flights kTimesAsLikely as likely; where the
-/// effects leave a misfit, if less than kOutdone of it is left in both halves, too. An effect whose own form
-/// is among those terms stays.
-std::vector<std::string> outdone_by_a_form(const Stage& stage, const Discovery& so_far,
-                                           const DiscoverOptions& options);
+/// What tracked flights ask for that accepted effects of the air do not give them. The laws of flight and of
+/// sensors are exact, so that a form that describes the flights better means that something unlisted acts:
+/// beside them, or in their place. Asked where they explain most of what was off in the flights. They are
+/// outdone where a few terms (missing_terms, one candidate an object), fitted to the train throws in their
+/// place, win by Bayes' criterion there (kDeltaBic), and make the held-out flights kTimesAsLikely as likely;
+/// where the effects leave a misfit, if less than kOutdone of it is left in both halves, too. An effect whose
+/// own form is among those terms is not outdone.
+std::optional<AskedForm> form_asked_for(const Stage& stage, const Discovery& so_far,
+                                        const DiscoverOptions& options);
 
 /// @}
 

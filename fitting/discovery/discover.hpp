@@ -193,6 +193,13 @@ struct Unexplained {
   std::optional<MissingEstimate> missing;  ///< absent where no force can be read from it
 };
 
+/// Terms that describe tracked flights better than accepted effects of the air do.
+struct AskedForm {
+  std::vector<std::string> outdone;  ///< effects none of whose own forms is among the terms
+  std::string words;                 ///< the terms with their sizes, of each object
+  bool unlisted{};                   ///< a term is no accepted effect's own form
+};
+
 /// Where the residual first leaves the noise.
 struct FirstMisfit {
   bool any{false};                ///< false: it stays in the noise
@@ -207,6 +214,7 @@ struct Discovery {
   std::string message;                  ///< the answer in words
   std::vector<AcceptedEffect> effects;  ///< in order of acceptance
   std::vector<std::string> imitations;  ///< accepted at first, and withdrawn (acceptance.hpp)
+  std::optional<AskedForm> asked;       ///< what the flights asked for when effects were questioned
   std::vector<std::string> along;       ///< effects that are fitted along as nuisances, too small to matter
   std::optional<SmallEffect> small;     ///< the most evident of what was too small to matter
   std::optional<Unexplained> unexplained;                            ///< what is left, if anything

@@ -94,6 +94,11 @@ std::vector<Term> acceleration_terms() {
            [](const State& s) {
              return Vector3{s.vx, s.vz, 0};
            }},
+          {"|v|^2 v", "s/m^2",
+           [=](const State& s) {
+             const double square = s.vx * s.vx + s.vz * s.vz;
+             return Vector3{square * s.vx, square * s.vz, 0};
+           }},
           {"omega J v", "-",
            [](const State& s) {
              return Vector3{-s.omega * s.vz, s.omega * s.vx, 0};

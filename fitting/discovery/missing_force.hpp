@@ -72,8 +72,8 @@ struct MissingCandidate {
 };
 
 /// Sparse regression by forward selection: a term enters while it lowers χ² by more than 2 log n and by a
-/// fifth. Accelerations: |v| v, v, ω J v, a constant along x or z, one and ω² along each of the object's axes
-/// (a reference point off the CoM), and for the rotation a constant, ω, |ω| ω, sin θ and cos θ.
+/// fifth. Accelerations: v, |v| v, |v|² v, ω J v, a constant along x or z, one and ω² along each of the
+/// object's axes (a reference point off the CoM), and for the rotation a constant, ω, |ω| ω, sin θ and cos θ.
 /// Wrenches: a constant, f_N, and f_N² of each component, and |v| and ω for their dependence on the motion.
 MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const MissingOptions& options);
 

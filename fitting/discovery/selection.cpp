@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "contact/registry.hpp"
 #include "fitting/discovery/acceptance.hpp"
@@ -75,14 +76,16 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   count_discrepancy(stage.problem, counted, options.fit.threads);
   const BothErrors errors = errors_of(stage, options.fit.threads);
   std::vector<std::string> gone;
-  const std::vector<std::string> outdone = outdone_by_a_form(stage, out, options);
+  const std::optional<AskedForm> asked = form_asked_for(stage, out, options);
+  if (asked) out.asked = asked;
   std::array<bool, 2> misled{};  // in the hand, in the air
   for (const AcceptedEffect& effect : out.effects) {
     const bool in_company = (misled[0] && acts(effect, false)) || (misled[1] && acts(effect, true));
     const bool last = effect.id == out.effects.back().id;
-    const bool here = in_company || is_imitation(effect, stage, errors, counted, out, options) ||
-                      (last && spoils(effect, stage, out, options)) ||
-                      std::find(outdone.begin(), outdone.end(), effect.id) != outdone.end();
+    const bool here =
+        in_company || is_imitation(effect, stage, errors, counted, out, options) ||
+        (last && spoils(effect, stage, out, options)) ||
+        (asked && std::find(asked->outdone.begin(), asked->outdone.end(), effect.id) != asked->outdone.end());
     for (const bool air : {false, true}) misled[air ? 1 : 0] |= here && acts(effect, air);
     if (here) gone.push_back(effect.id);
   }

@@ -212,6 +212,14 @@ std::optional<double> too_small_by(const Discovery& so_far, Channel channel) {
   return mean;
 }
 
+/// What the answer leaves of a channel in a phase.
+std::string in_words(const Discovery& so_far, const Unexplained& left) {
+  std::string words = fmt::format("{:.3g} times the variance of the noise", left.chi2_per_dof);
+  for (const auto& s : so_far.structure_after)
+    if (s.channel == left.channel && s.phase == left.phase) words = s.structure.in_words();
+  return fmt::format("{} in {}: {}", to_string(left.channel), to_string(left.phase), words);
+}
+
 /// Where a channel leaves more than noise: the first phase, and in it the channel in which most is left.
 std::optional<Unexplained> left_in_channels(const Stage& stage, const Discovery& so_far, double rest,
                                             const DiscoverOptions& options) {
@@ -231,11 +239,7 @@ std::optional<Unexplained> left_in_channels(const Stage& stage, const Discovery&
     out = Unexplained{m.phase, m.channel, m.chi2_per_sample(), {}, {}};
   }
   if (!out) return out;
-  out->description = fmt::format("{} in {}: ", to_string(out->channel), to_string(out->phase));
-  std::string words = fmt::format("{:.3g} times the variance of the noise", out->chi2_per_dof);
-  for (const auto& s : so_far.structure_after)
-    if (s.channel == out->channel && s.phase == out->phase) words = s.structure.in_words();
-  out->description += words;
+  out->description = in_words(so_far, *out);
   if (const auto factor = too_small_by(so_far, out->channel))
     out->description +=
         fmt::format("; white and alike in all phases: a sigma too small by {:.2g} would do", *factor);
@@ -244,6 +248,22 @@ std::optional<Unexplained> left_in_channels(const Stage& stage, const Discovery&
     out->description = "in release, seen in " + out->description;
     out->description += ", from how flights begin: they lack no acceleration";
   }
+  return out;
+}
+
+/// Where flights asked for what no effect has the form of, though no channel need show it any more: in the
+/// tracked channel that is off most.
+std::optional<Unexplained> asked_for_in_flight(const Stage& stage, const Discovery& so_far) {
+  if (!so_far.asked || !so_far.asked->unlisted) return {};
+  const ChannelMisfit* worst = nullptr;
+  for (const ChannelMisfit& m : stage.fit.misfit)
+    if (m.phase == Phase::flight && is_tracked(m.channel) &&
+        (!worst || m.chi2_per_sample() > worst->chi2_per_sample()))
+      worst = &m;
+  if (!worst) return {};
+  Unexplained out{worst->phase, worst->channel, worst->chi2_per_sample(), {}, {}};
+  out.description =
+      fmt::format("{}; flights ask for an acceleration of {}", in_words(so_far, out), so_far.asked->words);
   return out;
 }
 
@@ -355,7 +375,8 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
                                        const DiscoverOptions& options) {
   // No law of pads is quite right; of flight and of sensors they are.
   const double rest = acts_on_pads(stage) ? kRest : 0;
-  std::optional<Unexplained> out = left_in_channels(stage, so_far, rest, options);
+  std::optional<Unexplained> out = asked_for_in_flight(stage, so_far);
+  if (!out) out = left_in_channels(stage, so_far, rest, options);
   if (!out) {
     if (const auto few = left_in_one_half(stage, options)) return few;
     out = left_in_predictions(so_far, rest, options);
@@ -367,10 +388,15 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
       so_far.ranking.front().gain > 1 && !too_small_by(so_far, out->channel))
     out->description += fmt::format("; the nearest footprint is that of {}", so_far.ranking.front().id);
   out->missing = estimate_missing(stage, out->phase, options);
+  if (out->phase == Phase::grasped && is_tracked(out->channel)) {  // what acts there may act in flight, too
+    auto in_flight = estimate_missing(stage, Phase::flight, options);
+    if (in_flight && !in_flight->candidate.terms.empty()) out->missing = std::move(in_flight);
+  }
   if (!out->missing) return out;
   const MissingEstimate& missing = *out->missing;
-  const char* quantity = missing.phase == Phase::flight ? "acceleration" : "wrench of a pad";
-  if (!missing.candidate.terms.empty())
+  const char* quantity = missing.phase == Phase::flight ? "acceleration in flight" : "wrench of a pad";
+  const bool asked = so_far.asked && so_far.asked->unlisted;  // its terms have been said
+  if (!missing.candidate.terms.empty() && !asked)
     out->description += fmt::format("; of the forms tried, the missing {} is nearest to {}", quantity,
                                     missing.candidate.in_words());
   if (missing.correction == Correction::withheld)

@@ -26,22 +26,40 @@ inline datasets::ThrowLog loop_campaign(const experiment::EffectSettings& effect
   return experiment::generate_campaign(design, seed);
 }
 
-/// The same under a drag that no effect has, a = −c v, c [1/s]: from its true detach on, each flight is moved
-/// by what the exact solution differs from the parabola. The noise stays.
-inline datasets::ThrowLog loop_campaign_in_linear_drag(double c, std::uint64_t seed = 3) {
+/// The same under a drag that no effect has, a = −rate(|v|) v, rate [1/s] of a speed [m/s]: from its true
+/// detach on, each flight is moved by what the classical Runge-Kutta formula says that it differs from the
+/// parabola by. The noise stays.
+template <class Rate>
+datasets::ThrowLog loop_campaign_in_drag(const Rate& rate, std::uint64_t seed = 3) {
   const experiment::CampaignDesign design = loop_design();
   datasets::ThrowLog log = experiment::campaign_header(design, seed);
   for (int i = 0; i < design.throws(); ++i) {
     auto [record, truth] = experiment::generate_throw(design, seed, i);
     const double g = design.gravity, vx = truth.detach_twist.vx, vz = truth.detach_twist.vz;
-    const auto moved = [&](double t) {  // after t [s] of flight: by (x, z) [m]
-      const double lag = -std::expm1(-c * t) / c;
-      return std::array<double, 2>{vx * (lag - t), (vz + g / c) * lag - g * t / c - vz * t + 0.5 * g * t * t};
+    using Flight = std::array<double, 4>;  // what (x, z, vx, vz) differ by
+    const auto slope = [&](double t, const Flight& d) {
+      const double u = vx + d[2], w = vz - g * t + d[3], r = rate(std::hypot(u, w));
+      return Flight{d[2], d[3], -r * u, -r * w};
+    };
+    const auto moved = [&](double t) {  // after t [s] of flight
+      constexpr int kSteps = 50;
+      const double h = t / kSteps;
+      const auto ahead = [](const Flight& d, double step, const Flight& k) {
+        return Flight{d[0] + step * k[0], d[1] + step * k[1], d[2] + step * k[2], d[3] + step * k[3]};
+      };
+      Flight d{};
+      for (int step = 0; step < kSteps; ++step) {
+        const double at = step * h;
+        const Flight a = slope(at, d), b = slope(at + h / 2, ahead(d, h / 2, a)),
+                     c = slope(at + h / 2, ahead(d, h / 2, b)), e = slope(at + h, ahead(d, h, c));
+        for (std::size_t j = 0; j < 4; ++j) d[j] += h / 6 * (a[j] + 2 * b[j] + 2 * c[j] + e[j]);
+      }
+      return d;
     };
     for (std::size_t k = 0; k < record.mocap->time.rows; ++k) {
       const double t = record.mocap->time(k) - truth.detach_time;
       if (t <= 0) continue;
-      const auto by = moved(t);
+      const Flight by = moved(t);
       record.mocap->pose(k, 0) += by[0];
       record.mocap->pose(k, 1) += by[1];
     }
