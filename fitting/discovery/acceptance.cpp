@@ -340,18 +340,18 @@ Rest left_by(const std::map<int, MissingCandidate>& candidates, const PhaseTrace
     const Rest rest = rest_around(
         {trace}, candidate == candidates.end() ? MissingCandidate{} : candidate->second, flights.how);
     out.chi2 += rest.chi2;
-    out.samples += rest.samples;
+    out.degrees_of_freedom += rest.degrees_of_freedom;
   }
   return out;
 }
 
-double beyond_noise(const Rest& rest) { return rest.chi2 - static_cast<double>(rest.samples); }
+double beyond_noise(const Rest& rest) { return rest.chi2 - static_cast<double>(rest.degrees_of_freedom); }
 
 /// How much likelier the form makes the flights of one half, 2 log of the likelihoods' ratio, in units of the
 /// scatter that the effects leave.
 double likelier(const Rest& by_effects, const Rest& by_form) {
-  const double samples = static_cast<double>(std::max(1L, by_effects.samples));
-  return (by_effects.chi2 - by_form.chi2) / std::max(1.0, by_effects.chi2 / samples);
+  const double n = static_cast<double>(std::max(1L, by_effects.degrees_of_freedom));
+  return (by_effects.chi2 - by_form.chi2) / std::max(1.0, by_effects.chi2 / n);
 }
 
 /// The unknowns of some effects in a fit.
@@ -379,15 +379,16 @@ std::optional<AskedForm> form_asked_for(const Stage& stage, const Discovery& so_
   const PhaseTraces train = flights(less, less.fit);
   const auto candidates = candidates_of(train);
   const Rest effects = left_by({}, flights(stage, stage.fit)), form = left_by(candidates, train);
-  // They may have no part in the flights.
-  if (!(beyond_noise(effects) < kOutdone * beyond_noise(left_by({}, train)))) return {};
+  // They may have no part in the flights, or these may lack no acceleration.
+  const double lacked = beyond_noise(left_by({}, train));
+  if (!(lacked > 0 && std::max(beyond_noise(effects), beyond_noise(form)) < kOutdone * lacked)) return {};
   const Rest effects_held_out = left_by({}, flights(stage, stage.held_out)),
              form_held_out = left_by(candidates, flights(less, less.held_out));
   double terms = 0;
   for (const auto& [object, candidate] : candidates) terms += static_cast<double>(candidate.terms.size());
   const double more = terms - static_cast<double>(unknowns_of(stage.fit, accepted));
   const double bic =
-      more * std::log(static_cast<double>(std::max(2L, form.samples))) - likelier(effects, form);
+      more * std::log(static_cast<double>(std::max(2L, form.degrees_of_freedom))) - likelier(effects, form);
   if (!(bic <= kDeltaBic) || !(likelier(effects_held_out, form_held_out) > 2 * std::log(kTimesAsLikely)))
     return {};
   // Beside a misfit that a form lowers by little, the effects may be true, and something acts beside them.

@@ -187,11 +187,11 @@ inline constexpr double kOutdone = 0.5;
 
 /// What tracked flights ask for that accepted effects of the air do not give them. The laws of flight and of
 /// sensors are exact, so that a form that describes the flights better means that something unlisted acts:
-/// beside them, or in their place. Asked where they explain most of what was off in the flights. They are
-/// outdone where a few terms (missing_terms, one candidate an object), fitted to the train throws in their
-/// place, win by Bayes' criterion there (kDeltaBic), and make the held-out flights kTimesAsLikely as likely;
-/// where the effects leave a misfit, if less than kOutdone of it is left in both halves, too. An effect whose
-/// own form is among those terms is not outdone.
+/// beside them, or in their place. Asked where the effects explain most of the acceleration that flights lack
+/// without them, and the terms do. They are outdone where a few terms (missing_terms, one candidate an
+/// object), fitted to the train throws in their place, win by Bayes' criterion there (kDeltaBic), and make
+/// the held-out flights kTimesAsLikely as likely; where the effects leave a misfit, if less than kOutdone of
+/// it is left in both halves, too. An effect whose own form is among those terms is not outdone.
 std::optional<AskedForm> form_asked_for(const Stage& stage, const Discovery& so_far,
                                         const DiscoverOptions& options);
 

@@ -50,6 +50,8 @@ class Rows {
   }
   bool enough() const { return rows_.size() >= 3; }
   const Eigen::VectorXd& seen() const { return seen_; }
+  /// Of what was seen, less what was projected out.
+  long degrees_of_freedom() const { return static_cast<long>(seen_.size() - own_.cols()); }
   /// What a missing quantity, given at every time of the trace, would do to the residual.
   Eigen::VectorXd response(const std::vector<double>& missing) const {
     return whitened(missing, options_.response == Response::twice_integrated);
@@ -336,7 +338,7 @@ Rest rest_around(const std::vector<ResidualTrace>& traces, const MissingCandidat
       for (const State& s : trace.state)
         missing.push_back(candidate.at(s)[static_cast<std::size_t>(component)]);
       out.chi2 += (rows.seen() - rows.response(missing)).squaredNorm();
-      out.samples += rows.seen().size();
+      out.degrees_of_freedom += rows.degrees_of_freedom();
     }
   return out;
 }

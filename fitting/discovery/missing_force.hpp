@@ -81,10 +81,10 @@ MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const M
 std::vector<std::string> acceleration_names();
 
 /// χ² of the traces around what a candidate says, each recording's own offset and slope projected out where
-/// the response is integrated; and the samples that it is of.
+/// the response is integrated.
 struct Rest {
-  double chi2{};   ///< sum over all components
-  long samples{};  ///< that were seen
+  double chi2{};              ///< sum over all components
+  long degrees_of_freedom{};  ///< samples that were seen, less the offsets and slopes
 };
 /// What the candidate leaves; of one without terms, what there is.
 Rest rest_around(const std::vector<ResidualTrace>& traces, const MissingCandidate& candidate,

@@ -139,12 +139,13 @@ TEST(MissingForce, TheRightFormLeavesNoiseAndANearOneDoesNot) {
   EXPECT_EQ(candidate.terms.front().name, "v");
   const auto per_sample = [&](const std::vector<ResidualTrace>& traces, const MissingCandidate& around) {
     const Rest rest = rest_around(traces, around, kFlight);
-    return rest.chi2 / static_cast<double>(rest.samples);
+    return rest.chi2 / static_cast<double>(rest.degrees_of_freedom);
   };
   EXPECT_GT(per_sample(seen, {}), 50);
-  // Offset and slope of each of 36 series of 100 samples are projected out.
-  EXPECT_NEAR(per_sample(seen, candidate), 0.98, 0.1);
-  EXPECT_NEAR(per_sample(unseen, candidate), 0.98, 0.1);
+  // Of offset and slope of each of 36 series of 100 samples nothing is left: they are no degrees of freedom.
+  EXPECT_EQ(rest_around(seen, candidate, kFlight).degrees_of_freedom, 36 * (100 - 2));
+  EXPECT_NEAR(per_sample(seen, candidate), 1, 0.1);
+  EXPECT_NEAR(per_sample(unseen, candidate), 1, 0.1);
   MissingCandidate near = candidate;
   near.terms.resize(1);
   near.terms[0].shape = [](const ResidualTrace::State& s) {
