@@ -50,9 +50,11 @@ void drop_without_evidence(Stage& stage, const DiscoverOptions& options, Discove
 }  // namespace
 
 void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
-  for (bool removed = true; removed && stage.ids.size() > 1;) {
+  for (bool removed = true; removed && !stage.ids.empty();) {
     removed = false;
-    for (std::size_t i = 0; i + 1 < stage.ids.size() && !removed; ++i) {
+    // The last one has just been judged, unless pads that give were fitted along after it.
+    const std::size_t judged = stage.ids.size() - (out.along.empty() ? 1 : 0);
+    for (std::size_t i = 0; i < judged && !removed; ++i) {
       if (is_law(stage.ids[i])) continue;
       const Stage& less = without(stage, {stage.ids[i]}, options);
       if (!less.solved()) continue;

@@ -16,7 +16,7 @@ namespace unhand::fitting {
 /// that matters to neither is left in `out.small`. Empty if none convinces.
 std::optional<Stage> forward(const Stage& stage, const DiscoverOptions& options, Discovery& out);
 
-/// Effects that a later one has made superfluous are taken back.
+/// Effects that a later one, or the pads' give that was fitted along, has made superfluous are taken back.
 void backward(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
 /// Withdraws imitations of something that is not in the catalogue, and names them in `out.imitations`: an
