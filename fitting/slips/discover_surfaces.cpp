@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 
@@ -225,14 +226,16 @@ void judge_residuals(const LawScore& law, const LawScore& base, double unexplain
                    "{:.3f} ({:.3f} ± {:.3f} before)",
                    law.left.mean(), law.left.error(), base.left.mean(), base.left.error()),
        is_common(law.left)});
-  answer.first = {is_common(base.left), 0, "direction", base.error};
+  constexpr double kNoNoise = std::numeric_limits<double>::quiet_NaN();  // is declared, to compare with
+  answer.first = {is_common(base.left), 0, "direction", kNoNoise};
   if (is_common(law.left))
     answer.unexplained = MeasuredUnexplained{
-        answer.phase, "direction", law.left.mean(),
+        answer.phase, "direction", kNoNoise,
         fmt::format("pushes that know nothing of each other err the same way where their wrenches are alike "
                     "(correlation {:.2f} ± {:.2f}): the surface has features that the law has not; on three "
                     "feet a limit surface has flat facets and edges, which no smooth law follows",
-                    law.left.mean(), law.left.error())};
+                    law.left.mean(), law.left.error()),
+        law.left.mean()};
 }
 
 }  // namespace
