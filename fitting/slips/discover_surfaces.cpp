@@ -183,8 +183,20 @@ const LawScore& believed(const std::vector<LawScore>& laws, const SurfaceDiscove
   return *best;
 }
 
+/// What a law does on data that the fitted ellipsoid made.
+Evidence null_control(const LawScore& law) {
+  const bool gains = law.null_gain > 0;
+  return {id_of(law.model),
+          fmt::format("Null control: on data simulated from the fitted {} with its own residuals as noise, "
+                      "the same law {} {:.2f} degrees; {}",
+                      to_string(SurfaceModel::ellipsoid), gains ? "gains" : "loses", std::abs(law.null_gain),
+                      gains ? "that much of what it gains on the measurement may be due to noise alone"
+                            : "what it gains on the measurement is not flexibility"),
+          gains};
+}
+
 /// Writes that `law` is accepted, with what speaks for it and against it.
-void accept_law(const LawScore& law, SurfaceDiscovery& out) {
+void accept_law(const LawScore& law, bool controlled, SurfaceDiscovery& out) {
   const std::string id = id_of(law.model);
   AcceptedEffect effect;
   effect.id = id;
@@ -198,12 +210,7 @@ void accept_law(const LawScore& law, SurfaceDiscovery& out) {
       law.base_error, law.error, law.better, law.compared);
   MeasuredDiscovery& answer = out.answer;
   answer.effects.push_back(std::move(effect));
-  answer.evidence.push_back(
-      {id,
-       fmt::format("Null control: on data simulated from the fitted {} with its own residuals as noise, "
-                   "the same law loses {:.2f} degrees; what it gains on the measurement is not flexibility",
-                   to_string(SurfaceModel::ellipsoid), -law.null_gain),
-       law.null_gain > 0});
+  if (controlled) answer.evidence.push_back(null_control(law));
   answer.separating.push_back(
       {id,
        "a shape of the limit surface and a pressure that is not the same everywhere: pushes with the weight "
@@ -273,7 +280,7 @@ SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
   answer.before_train = base.errors(base.train), answer.after_train = best.errors(best.train);
   answer.before_test = {{"direction_mae_deg", base.error}};
   answer.after_test = {{"direction_mae_deg", best.error}};
-  if (found) accept_law(best, out);
+  if (found) accept_law(best, options.comparison.null_draws > 0, out);
   judge_residuals(best, base, options.unexplained, answer);
   answer.misfit.push_back(
       {"direction", static_cast<int>(base.gain.n), base.train, base.error, best.train, best.error});
