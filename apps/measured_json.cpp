@@ -51,6 +51,8 @@ Json measured_json(const MeasuredResult& result) {
                           {"channel", found.unexplained->channel},
                           {"chi2_per_dof", number(found.unexplained->chi2_per_dof)},
                           {"description", found.unexplained->description}};
+  if (found.unexplained && found.unexplained->correlation)
+    out["unexplained"]["correlation"] = number(*found.unexplained->correlation);
   out["error"] = {{"before",
                    {{"train", json_of(found.before_train, found.train)},
                     {"test", json_of(found.before_test, found.test)}}},
@@ -71,7 +73,8 @@ Json measured_json(const MeasuredResult& result) {
                              {"before_train", number(m.before_train)},
                              {"before_test", number(m.before_test)},
                              {"after_train", number(m.after_train)},
-                             {"after_test", number(m.after_test)}});
+                             {"after_test", number(m.after_test)},
+                             {"unit", result.surfaces.empty() ? "chi2 per sample" : "deg"}});
   out["autocorrelation"] = {{"before", json_of(found.autocorrelation_before)},
                             {"after", json_of(found.autocorrelation_after)}};
   out["evidence"] = Json::array();

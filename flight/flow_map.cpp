@@ -63,8 +63,16 @@ void validate(const LandingSet& set) {
                     set.r_rate_low, set.r_rate_high, set.z_rate_low, set.z_rate_high));
 }
 
-/// `longest` seconds backward in time: by the closed form, or by Runge-Kutta steps of at most 1 ms, whose
-/// error at throwing speeds is below 1e-11 m.
+/// With drag, the fastest that a flight is followed back to [m/s]: backward in time, drag has the speed grow
+/// without bound within a finite time, before which there is no flight.
+constexpr double kFastest = 100;
+/// How slowly a sampled flight may come down, without drag and with it [m/s]: it has just risen above the
+/// height, by 5e-14 m and by 1e-6 m, and rounding or the integrator must not lose that.
+constexpr double kSlowest[2] = {1e-6, 5e-3};
+
+/// `longest` seconds backward in time, or to where it had kFastest: by the closed form, or by Runge-Kutta
+/// steps of at most 1 ms and a hundredth of the time in which drag takes the speed away, whose error at
+/// throwing speeds is below 1e-11 m.
 PlaneState<double> before(PlaneState<double> s, double longest, const Medium& medium) {
   const double g = medium.gravity, k = medium.drag_k;
   if (k == 0)
@@ -78,12 +86,14 @@ PlaneState<double> before(PlaneState<double> s, double longest, const Medium& me
                        const PlaneState<double>& b) -> PlaneState<double> {
     return {a.r + h * b.r, a.z + h * b.z, a.r_rate + h * b.r_rate, a.z_rate + h * b.z_rate};
   };
-  const int steps = std::max(1, static_cast<int>(std::ceil(longest / 1e-3)));
-  const double h = -longest / steps;
-  for (int i = 0; i < steps; ++i) {
+  for (double left = longest; left > 0;) {
+    const double speed = std::hypot(s.r_rate, s.z_rate);
+    if (speed > kFastest) break;
+    const double step = std::min({left, 1e-3, 1e-2 / (k * std::max(speed, 1e-3))}), h = -step;
     const auto k1 = rate(s), k2 = rate(plus(s, h / 2, k1)), k3 = rate(plus(s, h / 2, k2)),
                k4 = rate(plus(s, h, k3));
     s = plus(plus(plus(plus(s, h / 6, k1), h / 3, k2), h / 3, k3), h / 6, k4);
+    left -= step;
   }
   return s;
 }
@@ -108,6 +118,9 @@ std::vector<PlaneState<double>> sample_tube(const LandingSet& set, const Medium&
   if (sampling.count < 0 || !(sampling.longest > 0 && sampling.longest <= 100) || sampling.boundary_every < 1)
     throw std::invalid_argument(
         "sample_tube: count >= 0, longest in (0, 100] s and boundary_every >= 1 are asked for");
+  if (!(medium.gravity > 0 && medium.drag_k >= 0 && std::isfinite(medium.gravity + medium.drag_k)))
+    throw std::invalid_argument(fmt::format(
+        "sample_tube: gravity {} m/s² is not > 0, or drag_k {} 1/m not >= 0", medium.gravity, medium.drag_k));
   std::mt19937_64 random(sampling.seed);
   std::uniform_real_distribution<double> unit(0, 1);
   const std::array<std::array<double, 2>, 3> ranges{{{-set.half_length, set.half_length},
@@ -123,7 +136,8 @@ std::vector<PlaneState<double>> sample_tube(const LandingSet& set, const Medium&
       x[face % 3] = ranges[face % 3][face / 3];
     }
     // A flight that comes down at ż = 0 has just touched the height: the tube ends there.
-    out.push_back(before({x[0], 0, x[1], std::min(x[2], -1e-6)}, unit(random) * sampling.longest, medium));
+    const double down = std::min(x[2], -kSlowest[medium.drag_k > 0 ? 1 : 0]);
+    out.push_back(before({x[0], 0, x[1], down}, unit(random) * sampling.longest, medium));
   }
   return out;
 }

@@ -20,10 +20,15 @@ constexpr double kMostScale = 0.2;  // beyond it, it is the floor that is elsewh
 
 bool is_one_of_the_scales(const std::string& id) { return id == kScale || id == kClock || id == kGravity; }
 
-/// What reported g t²/2 would be if nothing but this effect were there, relative to the declared one.
-double apparent_gravity(const AcceptedEffect& effect) {
-  const double x = effect.parameters.front().value - 1;
-  return effect.id == kClock ? 1 / ((1 + x) * (1 + x)) - 1 : x;
+/// By how much reported g t²/2 would exceed the declared one if nothing but this effect were there, as a
+/// share of it, and 1 σ.
+struct ApparentGravity {
+  double excess{}, sigma{};
+};
+ApparentGravity apparent_gravity(const AcceptedEffect& effect) {
+  const auto& [name, unit, s, sigma] = effect.parameters.front();
+  if (effect.id == kClock) return {1 / (s * s) - 1, 2 * sigma / (s * s * s)};
+  return {s - 1, sigma};
 }
 
 /// The answer goes by another of its names, in everything that names its parameter.
@@ -72,7 +77,7 @@ void name_scale(const datasets::ThrowLog& log, const MeasuredOptions& options, M
     const auto other_name = [&](const auto& other) { return other.first == kGravity; };
     if (effect.id != kScale || std::none_of(effect.equivalent.begin(), effect.equivalent.end(), other_name))
       continue;
-    const double apparent = apparent_gravity(effect);
+    const double apparent = apparent_gravity(effect).excess;
     for (const auto& [name, object] : log.objects) {
       const auto rest = rest_heights(log, name, options.floor);
       if (!rest || std::abs(rest->scale) > kMostScale || 3 * rest->sigma >= std::abs(apparent)) continue;
@@ -87,7 +92,7 @@ void name_scale(const datasets::ThrowLog& log, const MeasuredOptions& options, M
 void weigh_scales(const datasets::ThrowLog& log, const MeasuredOptions& options, MeasuredDiscovery& out) {
   for (auto& effect : out.effects) {
     if (!is_one_of_the_scales(effect.id)) continue;
-    const double apparent = apparent_gravity(effect), sigma = effect.parameters.front().sigma;
+    const auto [apparent, sigma] = apparent_gravity(effect);
     out.evidence.push_back(
         {effect.id,
          fmt::format(

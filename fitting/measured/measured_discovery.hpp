@@ -22,11 +22,12 @@ class FallProblem;
 NamedErrors named_errors(const FlightProblem& problem, const GroupedFit& fit, int threads);
 NamedErrors named_errors(const FallProblem& problem, const GroupedFit& fit);
 
-/// Misfit of a channel before and after the accepted effects, on train and held-out groups.
+/// Misfit of a channel before and after the accepted effects, on train and held-out groups: χ² per sample or,
+/// of slips, the mean angle between predicted and measured directions [deg].
 struct MeasuredMisfit {
   std::string channel;                                                ///< which
   int n{};                                                            ///< measurements
-  double before_train{}, before_test{}, after_train{}, after_test{};  ///< χ² per sample
+  double before_train{}, before_test{}, after_train{}, after_test{};  ///< see above
   int n_test{};                                                       ///< of n, held out
 };
 
@@ -40,8 +41,10 @@ struct Evidence {
 /// Where structure remains that no effect accounts for.
 struct MeasuredUnexplained {
   std::string phase, channel;  ///< where it is largest
-  double chi2_per_dof{};       ///< on held-out groups; 1 is the noise
+  double chi2_per_dof{};       ///< on held-out groups; 1 is the noise; NaN of slips, which declare none
   std::string description;     ///< in words
+  /// Of slips: what residual directions of neighbouring wrenches of different slips correlate by.
+  std::optional<double> correlation{};
 };
 
 /// The answer of the loop on a log without a hand: what is missing, the errors before and after, and what is

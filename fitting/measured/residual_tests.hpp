@@ -40,7 +40,7 @@ struct LeavesNoise {
   bool any{};             ///< false: it stays in the noise
   double time{};          ///< [s]
   std::string channel;    ///< which channel does
-  double chi2_per_dof{};  ///< there
+  double chi2_per_dof{};  ///< there; NaN of slips
 };
 /// See LeavesNoise.
 LeavesNoise leaves_noise(const GroupedProblem& problem, const GroupedFit& fit, double limit, int threads);

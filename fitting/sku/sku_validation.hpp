@@ -119,11 +119,12 @@ struct SkuValidation {
   std::size_t chosen{};                     ///< among the candidates
   std::optional<double> needed_grip_force;  ///< where the grip of a profile slips: the least that holds [N]
 
-  LandingSpread linear, monte_carlo;        ///< of the landing, by derivatives and by simulation
-  double within_linear{}, within{};         ///< shares within the tolerance of the nominal landing
-  double lost{};                            ///< share of draws that the grip does not hold or that never land
-  bool agree{};                             ///< Monte Carlo and the derivatives, to a tenth of σ
-  std::string disagreement;                 ///< which input bends the answer; empty: they agree
+  LandingSpread linear, monte_carlo;  ///< of the landing, by derivatives and by simulation
+  double within_linear{}, within{};   ///< shares within the tolerance of the nominal landing
+  double lost{};                      ///< share of draws that the grip does not hold or that never land
+  bool agree{};                       ///< Monte Carlo and the derivatives, to a tenth of σ
+  /// Which input bends the answer, or that it is draws that are lost; empty: they agree.
+  std::string disagreement;
   std::vector<BudgetLine> budget;           ///< the largest share first
   std::vector<MeasurementGain> gains;       ///< the largest first
   std::vector<LandingSample> samples;       ///< of the draws that land

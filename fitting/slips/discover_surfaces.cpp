@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 
@@ -182,8 +183,20 @@ const LawScore& believed(const std::vector<LawScore>& laws, const SurfaceDiscove
   return *best;
 }
 
+/// What a law does on data that the fitted ellipsoid made.
+Evidence null_control(const LawScore& law) {
+  const bool gains = law.null_gain > 0;
+  return {id_of(law.model),
+          fmt::format("Null control: on data simulated from the fitted {} with its own residuals as noise, "
+                      "the same law {} {:.2f} degrees; {}",
+                      to_string(SurfaceModel::ellipsoid), gains ? "gains" : "loses", std::abs(law.null_gain),
+                      gains ? "that much of what it gains on the measurement may be due to noise alone"
+                            : "what it gains on the measurement is not flexibility"),
+          gains};
+}
+
 /// Writes that `law` is accepted, with what speaks for it and against it.
-void accept_law(const LawScore& law, SurfaceDiscovery& out) {
+void accept_law(const LawScore& law, bool controlled, SurfaceDiscovery& out) {
   const std::string id = id_of(law.model);
   AcceptedEffect effect;
   effect.id = id;
@@ -197,12 +210,7 @@ void accept_law(const LawScore& law, SurfaceDiscovery& out) {
       law.base_error, law.error, law.better, law.compared);
   MeasuredDiscovery& answer = out.answer;
   answer.effects.push_back(std::move(effect));
-  answer.evidence.push_back(
-      {id,
-       fmt::format("Null control: on data simulated from the fitted {} with its own residuals as noise, "
-                   "the same law loses {:.2f} degrees; what it gains on the measurement is not flexibility",
-                   to_string(SurfaceModel::ellipsoid), -law.null_gain),
-       law.null_gain > 0});
+  if (controlled) answer.evidence.push_back(null_control(law));
   answer.separating.push_back(
       {id,
        "a shape of the limit surface and a pressure that is not the same everywhere: pushes with the weight "
@@ -225,14 +233,16 @@ void judge_residuals(const LawScore& law, const LawScore& base, double unexplain
                    "{:.3f} ({:.3f} ± {:.3f} before)",
                    law.left.mean(), law.left.error(), base.left.mean(), base.left.error()),
        is_common(law.left)});
-  answer.first = {is_common(base.left), 0, "direction", base.error};
+  constexpr double kNoNoise = std::numeric_limits<double>::quiet_NaN();  // is declared, to compare with
+  answer.first = {is_common(base.left), 0, "direction", kNoNoise};
   if (is_common(law.left))
     answer.unexplained = MeasuredUnexplained{
-        answer.phase, "direction", law.left.mean(),
+        answer.phase, "direction", kNoNoise,
         fmt::format("pushes that know nothing of each other err the same way where their wrenches are alike "
                     "(correlation {:.2f} ± {:.2f}): the surface has features that the law has not; on three "
                     "feet a limit surface has flat facets and edges, which no smooth law follows",
-                    law.left.mean(), law.left.error())};
+                    law.left.mean(), law.left.error()),
+        law.left.mean()};
 }
 
 }  // namespace
@@ -270,7 +280,7 @@ SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
   answer.before_train = base.errors(base.train), answer.after_train = best.errors(best.train);
   answer.before_test = {{"direction_mae_deg", base.error}};
   answer.after_test = {{"direction_mae_deg", best.error}};
-  if (found) accept_law(best, out);
+  if (found) accept_law(best, options.comparison.null_draws > 0, out);
   judge_residuals(best, base, options.unexplained, answer);
   answer.misfit.push_back(
       {"direction", static_cast<int>(base.gain.n), base.train, base.error, best.train, best.error});

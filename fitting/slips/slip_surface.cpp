@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Core>
+#include <numbers>
 #include <set>
 #include <stdexcept>
 
@@ -205,7 +206,7 @@ SlipSurface::Extremes SlipSurface::extremes() const {
   Extremes out{1e300, 0, characteristic_length / gauge({0, 0, 1})};
   constexpr int directions = 720;
   for (int k = 0; k < directions; ++k) {
-    const double phi = 3.141592653589793 * k / directions;
+    const double phi = std::numbers::pi * k / directions;
     const double force = 1 / gauge({std::cos(phi), std::sin(phi), 0});
     out.least_force = std::min(out.least_force, force);
     out.largest_force = std::max(out.largest_force, force);

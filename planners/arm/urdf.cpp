@@ -187,6 +187,10 @@ Chain read_urdf_chain(const std::filesystem::path& file, const std::string& base
                       link = urdf.attribute(urdf.child_of(*element, "child"), "link");
     here = here * urdf.origin_of(*element);
     if (type == "revolute" || type == "continuous") {
+      if (const auto* mimic = element->FirstChildElement("mimic"))
+        urdf.fail(*mimic, fmt::format("joint '{}' mimics '{}', and does not move by itself: coupled joints "
+                                      "are not known",
+                                      urdf.attribute(*element, "name"), urdf.attribute(*mimic, "joint")));
       Eigen::Vector3d axis = urdf.triple(element->FirstChildElement("axis"), "xyz", Eigen::Vector3d::UnitX());
       if (!(axis.norm() > 1e-9)) urdf.fail(*element, "its axis has no direction");
       const Transform<double> turned{onto(axis.normalized()), Eigen::Vector3d::Zero()};

@@ -12,6 +12,8 @@ namespace {
 
 using dynamics::State;
 
+constexpr double kTogether = 1e-12;  ///< instants that are no further apart are one [s]
+
 template <class S>
 void split(const State<S, kStates>& y, Coordinates<S>& at, Coordinates<S>& rate) {
   for (int i = 0; i < kCoordinates; ++i) at[i] = y[i], rate[i] = y[kCoordinates + i];
@@ -30,6 +32,11 @@ ClutchedArmSystem::ClutchedArmSystem(const ClutchedArm& arm, std::vector<Schedul
     : arm_(arm), phases_(std::move(phases)), torques_(std::move(torques)) {
   if (phases_.empty() || torques_.empty())
     throw std::invalid_argument("clutched arm: a run needs at least one phase and one interval of torques");
+  for (const ScheduledPhase& one : phases_) begins_.push_back(one.begin);
+  for (const TorqueInterval& one : torques_) begins_.push_back(one.begin);
+  std::sort(begins_.begin(), begins_.end());
+  const auto together = [](double a, double b) { return b - a <= kTogether; };
+  begins_.erase(std::unique(begins_.begin(), begins_.end(), together), begins_.end());
 }
 
 dynamics::FlowKind ClutchedArmSystem::kind(int mode) const {
@@ -42,7 +49,7 @@ std::string_view ClutchedArmSystem::mode_name(int mode) const {
 
 template <class S>
 MotorTorques<S> ClutchedArmSystem::torque_at(double begin, const S& t) const {
-  auto next = std::upper_bound(torques_.begin(), torques_.end(), begin + 1e-12,
+  auto next = std::upper_bound(torques_.begin(), torques_.end(), begin + kTogether,
                                [](double at, const TorqueInterval& one) { return at < one.begin; });
   const TorqueInterval& here = next == torques_.begin() ? *next : *std::prev(next);
   const S u = (t - here.begin) / (here.end - here.begin);
@@ -64,7 +71,7 @@ template <class S>
 dynamics::Entry<S, kStates> ClutchedArmSystem::on_time_(int mode, const dynamics::Window& window, const S& t,
                                                         const Full<S>& y) const {
   int now = mode;
-  while (now + 1 < spring_stop() && phases_[now + 1].begin <= window.begin + 1e-12) ++now;
+  while (now + 1 < spring_stop() && phases_[now + 1].begin <= window.begin + kTogether) ++now;
   if (now == mode) return {mode, t, y, S(0.0)};
   Coordinates<S> at, rate;
   split<S>(y, at, rate);

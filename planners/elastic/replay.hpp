@@ -44,11 +44,11 @@ class ClutchedArmSystem final : public dynamics::HybridSystemFrom<ClutchedArmSys
     return {"spring at its stop", dynamics::Crossing::falling, false};
   }
 
-  /// The begins of phases and intervals [s].
+  /// The begins of phases and intervals [s], increasing.
   template <class S>
   void time_events_(std::vector<S>& out) const {
     out.clear();
-    for (const TorqueInterval& one : torques_) out.push_back(S(one.begin));
+    for (const double begin : begins_) out.push_back(S(begin));
   }
   /// d/dt (ξ, ξ̇) in the phase's mode.
   template <class S>
@@ -79,6 +79,7 @@ class ClutchedArmSystem final : public dynamics::HybridSystemFrom<ClutchedArmSys
   ClutchedArm arm_;
   std::vector<ScheduledPhase> phases_;
   std::vector<TorqueInterval> torques_;
+  std::vector<double> begins_;  ///< of both, those of one instant once
 };
 
 /// One instant of a run.

@@ -350,11 +350,16 @@ void check(const ClutchedArm& arm, const ThrowTask& task, const ThrowProgramOpti
   if (options.intervals < 2 || options.intervals > 500) refuse("intervals", options.intervals, "2 to 500");
   if (task.target && !(std::isfinite(task.target->x) && std::isfinite(task.target->z)))
     refuse("target", task.target->x, "finite");
-  const std::size_t points = 2u * options.intervals * (task.drive == Drive::clutched ? 1 : 2) + 1;
-  if (options.near)
-    for (const ThrowPhase& phase : options.near->phases)
-      if (phase.points.size() != points)
-        throw std::invalid_argument("plan_throw: the neighbouring solution has other intervals");
+  if (!options.near) return;
+  const std::size_t phases = task.drive == Drive::clutched ? 2 : 1,
+                    points = 2u * options.intervals * (task.drive == Drive::clutched ? 1 : 2) + 1;
+  if (options.near->phases.size() != phases)
+    throw std::invalid_argument(
+        fmt::format("plan_throw: the neighbouring solution has {} phases; accepted: {}",
+                    options.near->phases.size(), phases));
+  for (const ThrowPhase& phase : options.near->phases)
+    if (phase.points.size() != points)
+      throw std::invalid_argument("plan_throw: the neighbouring solution has other intervals");
 }
 
 }  // namespace

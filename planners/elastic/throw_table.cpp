@@ -91,6 +91,12 @@ ElasticThrow interpolate(const ThrowTable& table, double distance) {
   ElasticThrow out = table.throws[first];
   out.program = {};
   out.program.outcome = ProgramOutcome::solved;
+  out.release = {};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const TipState<double>& tip = table.throws[first + i].release;
+    out.release.x += weight[i] * tip.x, out.release.z += weight[i] * tip.z;
+    out.release.vx += weight[i] * tip.vx, out.release.vz += weight[i] * tip.vz;
+  }
   for (std::size_t p = 0; p < out.phases.size(); ++p)
     for (std::size_t k = 0; k < out.phases[p].points.size(); ++k) {
       ThrowPoint sum{0, Coordinates<double>::Zero(), Coordinates<double>::Zero(), Coordinates<double>::Zero(),

@@ -37,8 +37,8 @@ struct ThrowTable {
 ThrowTable make_table(const ClutchedArm& arm, ThrowTask task, const std::vector<double>& distances,
                       const ThrowProgramOptions& options, int starts = 6);
 
-/// The throw to a target between nodes: durations, motor torques and states through the four nearest nodes by
-/// Lagrange's cubic. Throws std::invalid_argument outside the table.
+/// The throw to a target between nodes: durations, motor torques, states and the release through the four
+/// nearest nodes by Lagrange's cubic. Throws std::invalid_argument outside the table.
 ElasticThrow interpolate(const ThrowTable& table, double distance);
 
 /// One target of a dense check: the interpolated throw run by the integrator.

@@ -250,11 +250,15 @@ FlipRobot read_flip_robot(const std::string& name_or_file) {
 }
 
 std::string complaint_of(const Bar& bar) {
-  const auto outside = [](const char* what, double value, const TomlLimits& limits) {
-    return limits.accept(value) ? "" : fmt::format("{}: {} is outside {}", what, value, limits.text());
+  std::string out;
+  const auto ask = [&](const char* what, double value, const TomlLimits& limits) {
+    if (limits.accept(value)) return;
+    out += fmt::format("{}{}: {} is outside {}", out.empty() ? "" : "; ", what, value, limits.text());
   };
-  return outside("mass_kg", bar.mass, kBarMass) + outside("inertia_kg_m2", bar.inertia, kBarInertia) +
-         outside("com_offset_m", bar.com_offset, kComOffset);
+  ask("mass_kg", bar.mass, kBarMass);
+  ask("inertia_kg_m2", bar.inertia, kBarInertia);
+  ask("com_offset_m", bar.com_offset, kComOffset);
+  return out;
 }
 
 }  // namespace unhand::planners::flip

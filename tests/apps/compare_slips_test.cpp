@@ -1,4 +1,5 @@
 // compare on a log of slips: what it writes is what the library says of these slips.
+#include "contact/convex_quartic.hpp"
 #include "fitting/slips/compare_surfaces.hpp"
 #include "tests/apps/cli.hpp"
 #include "tests/fitting/slip_simulator.hpp"
@@ -53,6 +54,24 @@ TEST_F(Cli, SlipsAreComparedByFitting) {
   expect_refusal("compare slips.h5 --models ellipsoid", 3, "add --fit");
   expect_refusal("compare slips.h5 --models sliding_pivot", 3,
                  "which sliding_pivot does not predict; there are ellipsoid, ");
+}
+
+// Slips declare no noise: what is left of them is an angle and a correlation, and no chi2.
+TEST_F(Cli, WhatIsLeftOfSlipsHasItsOwnUnits) {
+  datasets::SlipLog log;
+  const auto truth = fitting::test::quartic(contact::ConvexQuartic::isotropic_blend(2.8), 4.0);
+  log.surfaces["felt"] = logged(fitting::test::simulate(truth, 60, 0.05, 0.03, 22));
+  datasets::write_slip_log(folder / "slips.h5", log);
+  const Answer answer =
+      run("discover slips.h5 --model ellipsoid --forget contact.law:convex_quartic --forget "
+          "contact.law:ellipsoid_full --json d.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json found = read_json(folder / "d.json");
+  ASSERT_EQ(found["verdict"], "unexplained");
+  EXPECT_TRUE(found["unexplained"]["chi2_per_dof"].is_null());
+  EXPECT_GT(found["unexplained"]["correlation"], 0.15);
+  EXPECT_TRUE(found["first_misfit"]["chi2_per_sample"].is_null());
+  EXPECT_EQ(found["misfit"][0]["unit"], "deg");
 }
 
 // The wrench that the surface applies to the object, in place of the one that the object applies.

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <random>
 
 #include "fitting/measured/measured_discovery.hpp"
@@ -303,6 +304,32 @@ TEST(SurfaceDiscovery, AQuarticIsFound) {
   ASSERT_EQ(found.answer.verdict, Verdict::effect_found);
   EXPECT_EQ(found.answer.effects.front().id, "contact.law:convex_quartic");
   EXPECT_LT(found.answer.effects.front().test_error_ratio.value(), 0.8);
+}
+
+// A control that was not made is no evidence, and one in which the law gains does not speak for it.
+TEST(SurfaceDiscovery, TheNullControlSaysWhatItFound) {
+  const auto control = [](const SlipSamples& slips, SurfaceModel base, int draws) {
+    SurfaceDiscoveryOptions options;
+    options.base = base;
+    options.comparison.null_draws = draws;
+    std::optional<Evidence> out;
+    for (const Evidence& e : discover_surfaces({slips}, options).answer.evidence)
+      if (e.text.starts_with("Null control")) out = e;
+    return out;
+  };
+  const SlipSamples quartic =
+      test::simulate(test::quartic(contact::ConvexQuartic::isotropic_blend(2.8), 4.0), 60, 0.05, 0.03, 22);
+  EXPECT_FALSE(control(quartic, SurfaceModel::ellipsoid, 0));
+  const auto loses = control(quartic, SurfaceModel::ellipsoid, 1);
+  ASSERT_TRUE(loses);
+  EXPECT_FALSE(loses->against);
+  EXPECT_NE(loses->text.find("the same law loses 0."), std::string::npos) << loses->text;
+  const Eigen::Matrix3d diagonal = Eigen::Vector3d(1 / 16.0, 1 / 9.0, 1 / 25.0).asDiagonal();
+  const auto gains =
+      control(test::simulate(test::ellipsoid(diagonal), 30, 0.1, 0.1, 2), SurfaceModel::convex_quartic, 1);
+  ASSERT_TRUE(gains);
+  EXPECT_TRUE(gains->against);
+  EXPECT_NE(gains->text.find("the same law gains "), std::string::npos) << gains->text;
 }
 
 TEST(SurfaceDiscovery, ErrorsBeforeAndAfterAreOfTheSameSurfaces) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <utility>
@@ -254,6 +255,25 @@ TEST(FlightDiscovery, AScaleAClockAndGravityAreOneAnswerWithThreeNames) {
       EXPECT_NE(named(found, id), nullptr) << id;
     for (const auto& [id, correlation] : found.effects.front().equivalent) EXPECT_GE(correlation, 0.98) << id;
   }
+}
+
+// The clock enters squared: read as gravity, its error counts twice.
+TEST(FlightDiscovery, TheGravityThatAClockStandsForIsAsUncertainAsByItsOtherNames) {
+  const auto log = spatial_flights({.time_scale = -0.0075}, {}, 6);
+  const auto read_as_gravity = [&](const std::string& id, std::vector<std::string> forget) {
+    const auto found = found_in(log, std::move(forget));
+    double value = 0, sigma = 0;
+    for (const auto& e : found.evidence)
+      if (e.about == id)
+        std::sscanf(e.text.c_str(), "Read as gravity, the flights say %lf ± %lf", &value, &sigma);
+    EXPECT_GT(sigma, 0) << id;
+    return std::pair(value, sigma);
+  };
+  const auto scale = read_as_gravity("sensor.length_scale", {}),
+             clock = read_as_gravity("sensor.time_scale", {"sensor.length_scale", "flight.gravity"});
+  EXPECT_NEAR(scale.first, 9.81 * std::pow(1 - 0.0075, -2), 4 * scale.second);
+  EXPECT_NEAR(clock.first, scale.first, 0.3 * scale.second);
+  EXPECT_NEAR(clock.second, scale.second, 0.1 * scale.second);  // printed to 1e-4 m/s²
 }
 
 // Gravity, the scale or the clock may be far off: the declared gravity here is another planet's.

@@ -153,6 +153,22 @@ TEST(SkuValidation, AnObjectTooHeavyForTheGripIsToldWhatWouldHoldIt) {
   }
 }
 
+// A grip that holds most draws: nothing bends the landing, and the answer does not say so.
+TEST(SkuValidation, DrawsThatTheGripLosesAreNoCurvature) {
+  auto sku = bar();
+  sku.mass *= 4;
+  *sku.inertia *= 4;
+  sku.com_offset_sigma = 1e-4;
+  auto gripper = card();
+  const double needed = validate_sku(sku, gripper, "card.json", quick()).needed_grip_force.value();
+  gripper.valid_range["grip_force"] = {1.03 * needed, 1.03 * needed, "N"};  // its sigma is some 2 %
+  const auto answer = validate_sku(sku, gripper, "card.json", quick());
+  EXPECT_GT(answer.lost, 0);
+  EXPECT_FALSE(answer.agree);
+  EXPECT_THAT(answer.disagreement, HasSubstr("slip out of the grip"));
+  EXPECT_THAT(answer.disagreement, testing::Not(HasSubstr("not linear")));
+}
+
 // A rigid carriage is sure of an object that turns in the pads, and wrong.
 TEST(SkuValidation, APureDelayCannotVouchForAnObjectOnALever) {
   datasets::ModelCard delay;

@@ -116,9 +116,27 @@ TEST(ReachableTube, SampledAndImplicitFormsAgree) {
   }
 }
 
+// Backward in time drag has no bound: 2 s before it lands at 10 m/s, no object with k = 0.15 1/m was in
+// flight.
+TEST(ReachableTube, SamplesWithDragAreStatesThatLandInTheSet) {
+  LandingSet set;  // comes down at 0 to 10 m/s: grazing flights, too
+  set.half_length = 0.1;
+  for (const double k : {0.05, 0.15, 1.0})
+    for (const double longest : {0.5, 2.0, 20.0})
+      for (const auto& state : sample_tube(set, {9.81, k}, {200, longest, 4, 5})) {
+        ASSERT_TRUE(std::isfinite(state.r) && std::isfinite(state.z) && std::isfinite(state.r_rate) &&
+                    std::isfinite(state.z_rate))
+            << k << ' ' << longest;
+        EXPECT_LT(std::hypot(state.r_rate, state.z_rate), 102) << k << ' ' << longest;
+        EXPECT_LE(tube_level(state, set, {9.81, k}), 1e-6) << k << ' ' << longest;  // the integrator's
+      }
+}
+
 TEST(ReachableTube, RefusesWhatIsNoSet) {
   for (const double longest : {0.0, 1e7, std::nan("")})
     EXPECT_THROW(sample_tube({0.1, 0.8, 3.0, -5, -0.5}, {9.81, 0.1}, {10, longest}), std::invalid_argument);
+  for (const Medium& medium : {Medium{9.81, -0.1}, Medium{0.0, 0.1}, Medium{9.81, std::nan("")}})
+    EXPECT_THROW(sample_tube({0.1, 0.8, 3.0, -5, -0.5}, medium), std::invalid_argument);
   EXPECT_THROW(tube_level({}, {0.0}, {}), std::invalid_argument);
   EXPECT_THROW(tube_level({}, {0.1, 2, 1}, {}), std::invalid_argument);
   EXPECT_THROW(tube_level({}, {0.1, 0, 1, -1, 1}, {}), std::invalid_argument);

@@ -160,6 +160,9 @@ TEST_F(ChainFile, UrdfMistakesAreToldWhereTheyAre) {
   };
   refused("continuous", "prismatic", "line 16: type 'prismatic' is not revolute, continuous or fixed");
   refused("xyz=\"0 -2 0\"", "xyz=\"0 0 0\"", "line 11: its axis has no direction");
+  refused("<axis xyz=\"0 -1 0\"/>",
+          "<axis xyz=\"0 -1 0\"/>\n    <mimic joint=\"shoulder\" multiplier=\"-1\"/>",
+          "line 18: joint 'elbow' mimics 'shoulder', and does not move by itself");
   refused("xyz=\"0 0 0.4\"", "xyz=\"0 0\"", "xyz=\"0 0\" is not three numbers");
   refused("link=\"hand\"/>", "link=\"paw\"/>", "there is no link 'paw'");
   refused("mass value=\"1.5\"", "mass value=\"-1.5\"", "a mass of -1.5 kg");

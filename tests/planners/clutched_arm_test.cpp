@@ -126,6 +126,21 @@ TEST(ClutchedArm, TheLedgerOfARunCloses) {
   EXPECT_NEAR(run.unexplained(), 0, 1e-6 * run.motor_work);
 }
 
+TEST(ClutchedArm, APhaseBeginsWhereItSaysAlsoWithinAnIntervalOfTorques) {
+  const ClutchedArm arm = bsa3();
+  const MotorTorques<double> none(0, 0, 0);
+  const ClutchedArmSystem system(arm, {{ClutchMode::free, 0.0}, {ClutchMode::sea, 0.037}},
+                                 {{0.0, 0.1, none, none, none}});
+  dynamics::State<double, kStates> y{};
+  y[2] = 0.3, y[kCoordinates + 4] = 1;  // the last link turns, the spring's end does not
+  dynamics::IntegratorOptions options;
+  options.record = true;
+  const auto run = dynamics::integrate<double, kStates>(system, {0, 0.0, y, 0.0}, 0.1, options);
+  ASSERT_EQ(run.outcome, dynamics::Outcome::horizon);
+  EXPECT_EQ(run.mode, 1);
+  for (const auto& piece : run.trajectory.pieces) EXPECT_EQ(piece.phase.mode, piece.t0 < 0.037 ? 0 : 1);
+}
+
 TEST(ClutchedArm, ASpringAtItsStopEndsTheRun) {
   ClutchedArm arm = bsa3();
   arm.last.deflection = 0.02;

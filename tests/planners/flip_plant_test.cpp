@@ -268,6 +268,7 @@ TEST(FlipBar, ComplaintNamesTheNumber) {
   EXPECT_EQ(complaint_of(robot().bar), "");
   EXPECT_NE(complaint_of({0.2, 1e-9, 0.1}).find("inertia_kg_m2"), std::string::npos);
   EXPECT_NE(complaint_of({-1, 1e-3, 0.1}).find("mass_kg"), std::string::npos);
+  EXPECT_NE(complaint_of({-1, 1e-9, 0.1}).find("kg; inertia_kg_m2: 1e-09 is"), std::string::npos);
 }
 
 TEST(FlipRobotFile, TellsWhatIsWrong) {

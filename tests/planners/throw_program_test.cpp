@@ -165,7 +165,26 @@ TEST(ElasticThrow, BetweenTheNodesOfATableNoLimitIsExceeded) {
     EXPECT_LT(std::abs(check.miss), 0.01)
         << check.distance;  // collocation's error, and cubic between nodes of 10 cm
   }
+  // The release is the target's own, cubic between nodes of 10 cm as the states that it is made of.
+  const ElasticThrow between = interpolate(table, 2.26);
+  const ThrowPoint& end = between.phases.back().points.back();
+  const auto tip = tip_of<double>(bsa3(), end.at.tail<3>(), end.rate.tail<3>());
+  EXPECT_NEAR(between.release.x, tip.x, 1e-3);
+  EXPECT_NEAR(between.release.z, tip.z, 1e-3);
+  EXPECT_NEAR(between.speed(), std::hypot(tip.vx, tip.vz), 1e-3);
   EXPECT_THROW(interpolate(table, 1.9), std::invalid_argument);
+}
+
+TEST(ElasticThrow, StartsFromNoSolutionOfOtherPhases) {
+  ElasticThrow near = planned(Drive::series, 6);  // one phase of 12 intervals: as many points as below
+  ThrowTask task;
+  ThrowProgramOptions options;
+  options.intervals = 12;
+  options.near = &near;
+  EXPECT_THAT([&] { plan_throw(bsa3(), task, options); },
+              testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("1 phases; accepted: 2")));
+  near.phases.clear();
+  EXPECT_THROW(plan_throw(bsa3(), task, options), std::invalid_argument);
 }
 
 TEST(ElasticThrow, RefusesATaskWithoutSense) {
