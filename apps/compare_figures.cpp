@@ -12,6 +12,7 @@ namespace {
 using datasets::Split;
 using experiment::Comparison;
 using experiment::ModelComparison;
+using experiment::ThrownCondition;
 
 constexpr int landing_x = 2, landing_theta = 3;
 
@@ -115,19 +116,19 @@ std::string value_axis(const std::vector<double>& values) {
 }
 
 /// The conditions, that with the largest landing error of `model` first.
-std::vector<std::string> sorted_conditions(const Comparison& comparison, const ModelComparison& model) {
-  std::vector<std::pair<double, std::string>> order;
+std::vector<ThrownCondition> sorted_conditions(const Comparison& comparison, const ModelComparison& model) {
+  std::vector<std::pair<double, ThrownCondition>> order;
   for (const auto& condition : comparison.conditions)
     order.emplace_back(model.of_condition(landing_x, condition).mae, condition);
   std::stable_sort(order.begin(), order.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
-  std::vector<std::string> out;
+  std::vector<ThrownCondition> out;
   for (const auto& entry : order) out.push_back(entry.second);
   return out;
 }
 
 /// Rows: the line in the figure, MAE of landing x [cm] and theta [deg].
-DataBlock condition_block(const ModelComparison& model, const std::vector<std::string>& conditions,
+DataBlock condition_block(const ModelComparison& model, const std::vector<ThrownCondition>& conditions,
                           double dodge) {
   DataBlock out{model.model, {"line", "MAE landing x [cm]", "MAE landing theta [deg]", "condition"}, {}, {}};
   for (std::size_t i = 0; i < conditions.size(); ++i) {
@@ -135,7 +136,7 @@ DataBlock condition_block(const ModelComparison& model, const std::vector<std::s
     const auto theta = model.of_condition(landing_theta, conditions[i]);
     if (x.n == 0 || theta.n == 0) continue;
     out.rows.push_back({static_cast<double>(i) + dodge, 100 * x.mae, theta.mae});
-    out.labels.push_back(conditions[i]);
+    out.labels.push_back(conditions[i].label);
   }
   return out;
 }
@@ -216,6 +217,8 @@ std::optional<Figure> landing_figure(const Comparison& comparison) {
 std::optional<Figure> condition_figure(const Comparison& comparison) {
   const ModelComparison& first = comparison.models.front();
   const auto conditions = sorted_conditions(comparison, first);
+  std::vector<std::string> labels;
+  for (const auto& condition : conditions) labels.push_back(condition.label);
   Figure figure{"conditions", 19, 0, {}, {}};
   std::vector<KeyEntry> key;
   const double models = static_cast<double>(comparison.models.size());
@@ -235,7 +238,7 @@ std::optional<Figure> condition_figure(const Comparison& comparison) {
   }
   constexpr int columns = 3;
   std::size_t longest = 0;
-  for (const auto& condition : conditions) longest = std::max(longest, condition.size());
+  for (const auto& label : labels) longest = std::max(longest, label.size());
   const double n = static_cast<double>(conditions.size());
   const double left = std::clamp(0.18 * static_cast<double>(longest) + 0.4, 1.5, 7.0);
   const double bottom = 1.7 + key_height(key.size(), columns);
@@ -247,10 +250,10 @@ std::optional<Figure> condition_figure(const Comparison& comparison) {
       "set label 1 'mean absolute error of each condition, sorted by landing x of {}' at screen 0.5,{:.4f} "
       "center\n"
       "set yrange [{}:-0.7]\nset ytics ({}) scale 0\n",
-      plain(first.model), 1 - 0.5 / figure.height, n - 0.3, line_tics(conditions, true));
+      plain(first.model), 1 - 0.5 / figure.height, n - 0.3, line_tics(labels, true));
   s += place(figure, {left, middle - 0.25, bottom, top}) +
        condition_panel(figure, 2, floor_x, "landing x [cm]");
-  s += fmt::format("unset label 1\nset ytics ({})\n", line_tics(conditions, false));
+  s += fmt::format("unset label 1\nset ytics ({})\n", line_tics(labels, false));
   s += place(figure, {middle + 0.25, figure.width - 0.5, bottom, top}) +
        condition_panel(figure, 3, floor_theta, "landing theta [deg]");
   s += key_strip(figure, key, columns) + "unset multiplot\n";

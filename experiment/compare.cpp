@@ -88,13 +88,30 @@ RepetitionScatter scatter_of(const std::vector<PreparedThrow>& throws) {
   return out;
 }
 
+std::vector<ThrownCondition> conditions_of(const std::vector<PreparedThrow>& throws) {
+  std::vector<ThrownCondition> out;
+  for (const auto& t : throws)
+    if (std::none_of(out.begin(), out.end(), [&](const ThrownCondition& known) {
+          return known.object == t.object && known.condition == t.condition;
+        }))
+      out.push_back({t.object, t.condition, {}});
+  for (ThrownCondition& one : out) {
+    const auto sharing = std::count_if(
+        out.begin(), out.end(), [&](const ThrownCondition& c) { return c.condition == one.condition; });
+    one.label = sharing > 1 ? one.object + ", " + one.condition : one.condition;
+  }
+  return out;
+}
+
 }  // namespace
 
 ErrorStatistics ModelComparison::statistics(int quantity, datasets::Split split) const {
   return collect(throws, quantity, [&](const ThrowComparison& t) { return t.split == split; });
 }
-ErrorStatistics ModelComparison::of_condition(int quantity, const std::string& condition) const {
-  return collect(throws, quantity, [&](const ThrowComparison& t) { return t.condition == condition; });
+ErrorStatistics ModelComparison::of_condition(int quantity, const ThrownCondition& of) const {
+  return collect(throws, quantity, [&](const ThrowComparison& t) {
+    return t.object == of.object && t.condition == of.condition;
+  });
 }
 
 std::vector<PreparedThrow> prepare_all(const datasets::ThrowLog& log, const std::string& file, int threads) {
@@ -111,11 +128,10 @@ Comparison compare(const datasets::ThrowLog& log, const std::vector<PreparedThro
                    const CompareOptions& options) {
   Comparison out;
   for (const auto& t : prepared) {
-    if (std::find(out.conditions.begin(), out.conditions.end(), t.condition) == out.conditions.end())
-      out.conditions.push_back(t.condition);
     out.worst_hand_chi2 = std::max(out.worst_hand_chi2, t.hand_fit.chi2_per_dof);
     out.mean_force_chi2 += t.force_fit.chi2_per_dof / static_cast<double>(prepared.size());
   }
+  out.conditions = conditions_of(prepared);
   out.repetitions = scatter_of(prepared);
 
   for (const auto& model : options.models) {

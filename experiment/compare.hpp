@@ -55,6 +55,12 @@ struct NamedParameter {
   double value{}, sigma{};  ///< in `unit`; 1 σ
 };
 
+/// One object under one condition: what is repeated.
+struct ThrownCondition {
+  std::string object, condition;  ///< as in the log
+  std::string label;              ///< the condition, after its object where several share its name
+};
+
 /// One model's predictions and errors, throw by throw.
 struct ModelComparison {
   std::string model;                    ///< its name
@@ -67,8 +73,8 @@ struct ModelComparison {
 
   /// Over the throws of one split; `quantity` is a place in kQuantities.
   ErrorStatistics statistics(int quantity, datasets::Split split) const;
-  /// The same over all throws of one condition.
-  ErrorStatistics of_condition(int quantity, const std::string& condition) const;
+  /// The same over all throws of one object under one condition.
+  ErrorStatistics of_condition(int quantity, const ThrownCondition& condition) const;
 };
 
 /// How far repetitions of a condition scatter about their mean: the floor of any model that does not know
@@ -81,7 +87,7 @@ struct RepetitionScatter {
 
 /// Models against the measured outcomes of a campaign.
 struct Comparison {
-  std::vector<std::string> conditions;          ///< in order of appearance
+  std::vector<ThrownCondition> conditions;      ///< in order of appearance
   std::vector<ModelComparison> models;          ///< in the order asked for
   RepetitionScatter repetitions;                ///< the floor under all of them
   double worst_hand_chi2{}, mean_force_chi2{};  ///< how well the smoothed inputs explain the logged ones

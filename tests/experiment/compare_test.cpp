@@ -85,6 +85,35 @@ TEST(RepetitionScatter, PoolsTheVarianceOfTheConditions) {
   EXPECT_NEAR(scatter.landing_theta, 0.1 * std::sqrt(16.0 / 3) * 180 / M_PI, 1e-13);
 }
 
+// Two objects may be thrown under conditions of one name; each has its own errors.
+TEST(Conditions, OfTwoObjectsAreNotPooled) {
+  const Known known(testing_support::perfect());
+  std::vector<PreparedThrow> throws;
+  const auto misses = [&](const char* object, const char* condition, double by) {
+    throws.push_back(known.prepared.front());
+    throws.back().object = object, throws.back().condition = condition;
+    throws.back().measured.landing_x = *throws.back().measured.landing_x + by;
+  };
+  misses("bar", "slow", 0);
+  misses("bar", "fast", 0);
+  misses("box", "fast", 0.5);
+  CompareOptions options;
+  options.models = {"gripper_delay"};
+  options.parameters["gripper_delay"] = {};
+  const Comparison out = compare(known.log, throws, options);
+  ASSERT_EQ(out.conditions.size(), 3u);
+  EXPECT_EQ(out.conditions[0].label, "slow");
+  EXPECT_EQ(out.conditions[1].label, "bar, fast");
+  EXPECT_EQ(out.conditions[2].label, "box, fast");
+  constexpr int kLandingX = 2;  // of kQuantities
+  const auto& model = out.models.front();
+  const auto bar = model.of_condition(kLandingX, out.conditions[1]),
+             box = model.of_condition(kLandingX, out.conditions[2]);
+  EXPECT_EQ(bar.n, 1);
+  EXPECT_EQ(box.n, 1);
+  EXPECT_NEAR(box.bias - bar.bias, -0.5, 1e-12);  // predicted less measured
+}
+
 TEST(FrictionEstimate, OfOneWrenchDirectionIsNoPatch) {
   FrictionEstimate estimate;
   estimate.samples = 24;
