@@ -258,6 +258,34 @@ TEST(Selection, WhatHasNoEvidenceWithoutWhatIsWithdrawnGoesWithIt) {
   EXPECT_NEAR(stage.bic(), base.bic(), 1);
 }
 
+// A soft patch was accepted over rigid pads; the give that was then fitted along takes its part.
+TEST(Selection, TheLastEffectIsJudgedAgainBesideTheGiveThatWasFittedAlong) {
+  const auto log = support::loop_campaign({{"contact.pad_compliance.compliance", 4e-7}});  // some 20 um
+  const std::string soft = "contact.soft_patch_radius";
+  DiscoverOptions options;
+  options.campaign.model = "limit_surface_disc";
+  options.campaign.integrator.tolerances = {1e-5, 1e-8};
+  Stage base{CampaignProblem(log, "synthetic", options.campaign), {}, {}, {}};
+  solve(base, options, {});
+  Stage stage{base.problem.with(options.campaign.model, {soft}), {}, {}, {soft}};
+  solve(stage, options, {});
+  ASSERT_TRUE(base.solved() && stage.solved());
+  Discovery out;
+  out.model = options.campaign.model;
+  out.base = base.fit, out.base_test = base.held_out.misfit;
+  AcceptedEffect effect;
+  effect.id = soft;
+  effect.phase = Phase::release;
+  out.effects = {effect};
+  backward(stage, options, out);
+  EXPECT_EQ(out.effects.size(), 1u) << "it has just been judged";
+  ASSERT_TRUE(fit_along(stage, options, out));
+  backward(stage, options, out);
+  EXPECT_TRUE(out.effects.empty());
+  EXPECT_TRUE(stage.ids.empty());
+  EXPECT_EQ(stage.problem.options().effects, std::vector<std::string>{kPads});
+}
+
 // Thirty landings whose chi-square is 1.78 per sample: one in two hundred by chance, and a log has 22 such
 // series to look at.
 TEST(Misfit, IsJudgedByItsChanceAndByTheSeriesThatAreLookedAt) {
