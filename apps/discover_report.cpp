@@ -61,7 +61,9 @@ Figure residual_figure(const Discovery& found) {
     index += 2;
     ++at;
   }
-  script += key_strip(figure, {{kBefore, "before"}, {kAfter, "after"}}, 2);
+  const bool same = found.effects.empty() && found.along.empty();
+  script += same ? key_strip(figure, {{kAfter, "base model, to which nothing was added"}}, 1)
+                 : key_strip(figure, {{kBefore, "before"}, {kAfter, "after"}}, 2);
   figure.script = script + "unset multiplot\n";
   return figure;
 }
@@ -85,7 +87,10 @@ Figure footprints_of(const Discovery& found) {
 /// What is missing, component by component; a curve for every object.
 Figure missing_figure(const fitting::MissingEstimate& missing) {
   const bool flight = missing.phase == fitting::Phase::flight;
-  Figure figure{"missing", 17, 7.2, {}, {}};
+  Figure figure{"missing", 17, 6.3, {}, {}};
+  double last = 0;
+  for (const auto& curve : missing.curves)
+    if (!curve.knots.empty()) last = std::max(last, curve.knots.back());
   const std::array<const char*, 3> unit =
       flight ? std::array{"a_x [m/s^2]", "a_z [m/s^2]", "{/Symbol a} [rad/s^2]"}
              : std::array{"f_x [N]", "f_z [N]", "{/Symbol t} [N m]"};
@@ -96,9 +101,11 @@ Figure missing_figure(const fitting::MissingEstimate& missing) {
     const double left = 2.0 + 5.2 * static_cast<double>(component);
     script += place(figure, {left, left + 3.4, 1.9, 5.4});
     script += fmt::format(
-        "set title '{}' offset 0,-0.5\nset xlabel '{}' offset 0,0.5\nset xtics auto\nplot 0 "
-        "with lines linecolor rgb '#808080'",
-        unit[component], flight ? "since the detach [s]" : "share of the opening");
+        "set title '{}' offset 0,-0.5\nset xlabel '{}' offset 0,0.5\nset xrange [0:{:.6g}]; set xtics "
+        "{:.6g}\n"
+        "plot 0 with lines linecolor rgb '#808080'",
+        unit[component], flight ? "since the detach [s]" : "share of the opening", 1.04 * last,
+        tic_step(last));
     int colour = 0;
     for (const auto& [object, group] : missing.groups)
       for (const auto& curve : missing.curves) {

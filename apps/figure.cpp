@@ -209,6 +209,12 @@ std::string key_strip(const Figure& figure, const std::vector<KeyEntry>& entries
   return out + "\n";
 }
 
+double tic_step(double high) {
+  if (!(high > 0)) return 1;
+  const double raw = high / 3, decade = std::pow(10, std::floor(std::log10(raw)));
+  return decade * (raw >= 5 * decade ? 5 : raw >= 2 * decade ? 2 : 1);
+}
+
 std::string plain(const std::string& text) {
   std::string out;
   for (const char c : text) {

@@ -58,6 +58,9 @@ inline double key_height(std::size_t entries, int columns) {
   return key_row * static_cast<double>((static_cast<int>(entries) + columns - 1) / columns);
 }
 
+/// A round distance, so that there are three to seven tics beyond 0, up to `high`.
+double tic_step(double high);
+
 /// Text as gnuplot takes it between single quotes, without its own markup.
 std::string plain(const std::string& text);
 

@@ -5,7 +5,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 #include <memory>
 
@@ -22,13 +21,6 @@ struct FigureCommandOptions {
   std::string name, out{"."}, json;
   FigureRequest request;
 };
-
-/// A round distance, so that there are three to seven tics beyond 0, up to `high`.
-double step(double high) {
-  if (!(high > 0)) return 1;
-  const double raw = high / 3, decade = std::pow(10, std::floor(std::log10(raw)));
-  return decade * (raw >= 5 * decade ? 5 : raw >= 2 * decade ? 2 : 1);
-}
 
 /// MAE with the standard deviation of the absolute error as whiskers, held-out throws where there are any.
 Figure mae_figure(const experiment::Comparison& comparison) {
@@ -73,7 +65,7 @@ Figure mae_figure(const experiment::Comparison& comparison) {
         "plot DATA index {} using (0.5*$2):1:(0.5*$2):(0.28) with boxxyerror linecolor rgb '#56b4e9', \\\n"
         "     DATA index {} using 2:1:($2-$3 > 0 ? $2-$3 : 0):($2+$3) with xerrorbars pointtype 7 linecolor "
         "rgb '#000000' linewidth 1.2\nunset label 1\n",
-        plain(experiment::kQuantities[q].title), high > 0 ? 1.06 * high : 1, step(high), q, q);
+        plain(experiment::kQuantities[q].title), high > 0 ? 1.06 * high : 1, tic_step(high), q, q);
   }
   figure.script = fmt::format(
       "set multiplot\nunset key\nset label 1 'mean absolute errors over the {} {} throws, whiskers: their "
