@@ -61,9 +61,8 @@ Figure residual_figure(const Discovery& found) {
     index += 2;
     ++at;
   }
-  const bool same = found.effects.empty() && found.along.empty();
-  script += same ? key_strip(figure, {{kAfter, "base model, to which nothing was added"}}, 1)
-                 : key_strip(figure, {{kBefore, "before"}, {kAfter, "after"}}, 2);
+  script += found.adds_nothing() ? key_strip(figure, {{kAfter, "base model, to which nothing was added"}}, 1)
+                                 : key_strip(figure, {{kBefore, "before"}, {kAfter, "after"}}, 2);
   figure.script = script + "unset multiplot\n";
   return figure;
 }
@@ -138,8 +137,7 @@ Table structure_table(const Discovery& found) {
     for (const auto& s : found.structure_after)
       if (s.phase == before.phase && s.channel == before.channel) after = s.structure.in_words();
     table.rows.push_back({std::string(to_string(before.phase)), std::string(to_string(before.channel)),
-                          before.structure.in_words(),
-                          found.effects.empty() && found.along.empty() ? "" : after});
+                          before.structure.in_words(), found.adds_nothing() ? "" : after});
   }
   table.left = 4;
   return table;

@@ -150,7 +150,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
 
   out.footprints =
       footprint_traces(base.problem, base.fit, leading_names(out.effects, out.ranking), options.fit);
-  const bool unchanged = out.effects.empty() && out.along.empty();
+  const bool unchanged = out.adds_nothing();
   const auto residuals_after = unchanged ? residuals_before : residuals_of(stage.problem, stage.fit, threads);
   out.residual_after = residual_over_time(stage.problem, stage.fit, residuals_after);
   out.structure_after = structures(stage.problem, stage.fit, residuals_after);

@@ -230,6 +230,9 @@ struct Discovery {
   std::vector<ChannelStructure> structure_before, structure_after;  ///< of the train throws
   std::shared_ptr<const CampaignProblem> problem;                   ///< of the answer
   double seconds{};                                                 ///< of the whole loop
+
+  /// Whether the answer is the base model as it was.
+  bool adds_nothing() const { return effects.empty() && along.empty(); }
 };
 
 /// Runs the loop. A log without a test split is split as with_held_out does.

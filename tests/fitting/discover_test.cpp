@@ -131,8 +131,8 @@ TEST(Discovery, ADragThatNoEffectHasIsNotTakenForTheNearestOne) {
            -cubic, 0.1 * cubic);
 }
 
-// A tracked frame that is off its CoM across the pads, along which no effect moves it, turns about the CoM. A
-// tilt of gravity and a lift take that down to the noise of every channel.
+// A tracked frame that is off its CoM across the pads, along which no effect moves it, turns about the CoM.
+// Listed effects, a tilt of gravity and a lift say, may take that down to the noise of every channel.
 TEST(Discovery, AFrameThatIsOffAcrossThePadsIsNoTiltAndNoLift) {
   constexpr double kOff = 0.001;  // m
   datasets::ThrowLog log = support::loop_campaign({});
