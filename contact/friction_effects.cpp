@@ -87,7 +87,8 @@ std::span<const dynamics::EffectOn<FrictionVariation>> friction_effects() {
        &viscous<Dual>},
       {{"contact.soft_patch_radius",
         "the patch shrinks with the normal force, a = a_0 (f_N/f_0)^gamma",
-        {{"gamma", "-", 0, -1, 2, 0.1}}},
+        // Below 0 the law has solutions, but no patch widens as it is let go.
+        {{"gamma", "-", 0, 0, 2, 0.1}}},
        &soft_patch<double>,
        &soft_patch<Dual>},
       {{"contact.pressure_profile",

@@ -274,6 +274,23 @@ TEST(Discovery, AnEffectOnThePadsAnswersForTheHandWhereverItWasSeen) {
   EXPECT_TRUE(found.unexplained->phase == Phase::release || found.unexplained->phase == Phase::grasped);
 }
 
+// The friction coefficient falls as the pads press harder: f_N is logged as the 1.15th power of what friction
+// goes with. A patch that widened as it is let go would describe that well; there is none.
+TEST(Discovery, FrictionThatIsNotProportionalToTheForceIsNoSoftPatch) {
+  datasets::ThrowLog log = experiment::generate_campaign(experiment::campaign_design("quick12"), 4);
+  for (datasets::Throw& thrown : log.throws) {
+    std::vector<double>& force = thrown.ft->normal_force.data;
+    const double grip = force.front();
+    for (double& f : force)
+      if (f > 0) f = grip * std::pow(f / grip, 1.15);
+  }
+  const Discovery found = found_in(log);
+  EXPECT_EQ(found.verdict, Verdict::unexplained);
+  EXPECT_TRUE(found.effects.empty()) << found.effects.front().id;
+  ASSERT_TRUE(found.unexplained.has_value());
+  EXPECT_EQ(found.unexplained->phase, Phase::release) << "in the grasp the pads do not slip";
+}
+
 // The landing times of this campaign's held-out throws scatter by 2.2 times their variance. No effect has to
 // do with that: the train throws do not show it.
 TEST(Discovery, AChanceMisfitElsewhereDoesNotWithdrawAnEffect) {
