@@ -258,23 +258,23 @@ TEST(Selection, WhatHasNoEvidenceWithoutWhatIsWithdrawnGoesWithIt) {
   EXPECT_NEAR(stage.bic(), base.bic(), 1);
 }
 
-// A soft patch was accepted over rigid pads; the give that was then fitted along takes its part.
+// A delay was accepted over rigid pads; the give that was then fitted along takes its part.
 TEST(Selection, TheLastEffectIsJudgedAgainBesideTheGiveThatWasFittedAlong) {
   const auto log = support::loop_campaign({{"contact.pad_compliance.compliance", 4e-7}});  // some 20 um
-  const std::string soft = "contact.soft_patch_radius";
+  const std::string delay = "release.opening_delay";
   DiscoverOptions options;
   options.campaign.model = "limit_surface_disc";
   options.campaign.integrator.tolerances = {1e-5, 1e-8};
   Stage base{CampaignProblem(log, "synthetic", options.campaign), {}, {}, {}};
   solve(base, options, {});
-  Stage stage{base.problem.with(options.campaign.model, {soft}), {}, {}, {soft}};
+  Stage stage{base.problem.with(options.campaign.model, {delay}), {}, {}, {delay}};
   solve(stage, options, {});
   ASSERT_TRUE(base.solved() && stage.solved());
   Discovery out;
   out.model = options.campaign.model;
   out.base = base.fit, out.base_test = base.held_out.misfit;
   AcceptedEffect effect;
-  effect.id = soft;
+  effect.id = delay;
   effect.phase = Phase::release;
   out.effects = {effect};
   backward(stage, options, out);
