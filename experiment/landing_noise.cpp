@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -101,8 +102,11 @@ LandingNoise landing_noise(const datasets::ThrowLog& log) {
   constexpr int kLeast = 3;
   Groups landings, differences, together;
   int seen = 0;
+  const auto is_train = [](const datasets::Throw& one) { return one.split == datasets::Split::train; };
+  const bool fitted = std::any_of(log.throws.begin(), log.throws.end(), is_train);
   for (const auto& one : log.throws) {
-    if (log.dimension != 2 || !one.landing || one.landing->pose.empty()) continue;
+    if (log.dimension != 2 || !one.landing || one.landing->pose.empty() || (fitted && !is_train(one)))
+      continue;
     const std::string repeats = one.object + ", " + one.condition;
     const Pair landed{one.landing->pose(0, 0), one.landing->pose(0, 1)};
     landings[repeats].push_back(landed);
@@ -125,9 +129,9 @@ LandingNoise landing_noise(const datasets::ThrowLog& log) {
   return {
       {},
       {},
-      fmt::format("{} landings, and neither repetitions nor motion capture at the landing height to judge "
+      fmt::format("{} landings{}, and neither repetitions nor motion capture at the landing height to judge "
                   "their noise by",
-                  seen)};
+                  seen, fitted ? " of train throws" : "")};
 }
 
 std::string in_words(const LandingNoise& noise, int landings) {

@@ -23,7 +23,8 @@ struct LandingNoise {
 /// - the same about the mean of all throws;
 /// - the landings within the repetitions of a condition: as large as throws differ.
 ///
-/// The first two are the sensor's, the last is more.
+/// The first two are the sensor's, the last is more. Of the train throws alone, where there are any: a fit
+/// must not know what its judges say.
 LandingNoise landing_noise(const datasets::ThrowLog& log);
 
 /// Whether a landing tells the angle: one whose sigma is declared as half a turn or more was not measured.

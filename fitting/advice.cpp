@@ -63,7 +63,7 @@ std::string remedy(const CampaignProblem& problem, const OpenDirection& open) {
   std::vector<std::string> said;
   std::string out;
   for (std::size_t k = 0; k < open.direction.size() && k < problem.campaign().size(); ++k) {
-    if (std::abs(open.direction[k]) < kTakesPart) continue;
+    if (!open.moves(k)) continue;
     auto one = remedy_for(problem, problem.campaign()[k].name);
     if (std::find(said.begin(), said.end(), one) != said.end()) continue;
     out += (out.empty() ? "" : "; or ") + one;

@@ -5,6 +5,8 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <string>
 
 #include "dynamics/dense_solve.hpp"
 #include "experiment/campaign_effects.hpp"
@@ -27,7 +29,6 @@ void describe_open_directions(const Eigen::MatrixXd& information, const Campaign
     for (Eigen::Index j = 0; j < n; ++j)
       scaled(i, j) *= scale[static_cast<std::size_t>(i)] * scale[static_cast<std::size_t>(j)];
   const Spectrum spectrum = spectrum_of(scaled);
-  constexpr double kOpen = 3;  // a direction known to no better than three changes that matter
   for (Eigen::Index k = 0; k < n; ++k) {
     const double sigma = spectrum.values[k] > 0 ? 1 / std::sqrt(spectrum.values[k]) : HUGE_VAL;
     if (sigma < kOpen) continue;
@@ -37,12 +38,12 @@ void describe_open_directions(const Eigen::MatrixXd& information, const Campaign
     Eigen::Index largest = 0;
     v.cwiseAbs().maxCoeff(&largest);
     if (v[largest] < 0) v = -v;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      open.direction.push_back(v[i]);
-      if (std::abs(v[i]) < kTakesPart) continue;
-      const Unknown& u = problem.campaign()[static_cast<std::size_t>(i)];
+    open.direction.assign(v.begin(), v.end());
+    for (std::size_t i = 0; i < scale.size(); ++i) {
+      if (!open.moves(i)) continue;
+      const Unknown& u = problem.campaign()[i];
       open.meaning += fmt::format("{}{} {:+.3g} {}", open.meaning.empty() ? "" : " with ", u.name,
-                                  v[i] * u.scale, u.unit);
+                                  open.direction[i] * u.scale, u.unit);
     }
     out.open.push_back(std::move(open));
   }
@@ -50,7 +51,6 @@ void describe_open_directions(const Eigen::MatrixXd& information, const Campaign
 
 /// Values, covariance and what the log leaves open.
 void describe_campaign(const CampaignProblem& problem, const FitRounds& rounds, FitResult& out) {
-  const auto& equations = rounds.equations();
   const auto& scale = rounds.shared().scale;
   const auto width = static_cast<Eigen::Index>(out.campaign.size());
   Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(width, width);
@@ -59,22 +59,21 @@ void describe_campaign(const CampaignProblem& problem, const FitRounds& rounds, 
     if (u.prior_sigma) prior(k, k) = 1 / (*u.prior_sigma * *u.prior_sigma);
     if (rounds.is_fixed(u)) prior(k, k) = 1e30 / (u.scale * u.scale);
   }
-  const auto [covariance, degrees_of_freedom] = scatter_covariance(equations, prior);
-  const Eigen::MatrixXd data = guarded_inverse(equations.information, scale);
+  const auto [covariance, degrees_of_freedom] = scatter_covariance(rounds.equations(), prior);
+  const Eigen::MatrixXd information = rounds.information(), data = guarded_inverse(information, scale);
   const auto values = rounds.campaign();
   for (Eigen::Index k = 0; k < width; ++k) {
     auto& fitted = out.campaign[static_cast<std::size_t>(k)];
     const auto& u = fitted.unknown;
     fitted.value = values[static_cast<std::size_t>(k)];
     fitted.sigma = std::sqrt(covariance(k, k));
-    fitted.data_sigma = std::sqrt(data(k, k));
+    fitted.data_sigma = rounds.is_fixed(u) ? HUGE_VAL : std::sqrt(data(k, k));
     fitted.degrees_of_freedom = degrees_of_freedom[k];
     const double margin = 1e-6 * (u.high - u.low);
     fitted.at_bound = fitted.value < u.low + margin || fitted.value > u.high - margin;
     for (Eigen::Index j = 0; j < width; ++j) out.covariance.push_back(covariance(k, j));
   }
-  if (!rounds.shared().options.all_fixed)
-    describe_open_directions(equations.information, problem, scale, out);
+  if (!rounds.shared().options.all_fixed) describe_open_directions(information, problem, scale, out);
 }
 
 /// Every throw's part, and the misfit by channel and phase.
@@ -138,13 +137,41 @@ std::vector<std::size_t> one_sided_sizes(const CampaignProblem& problem) {
   return out;
 }
 
+void validate(const FitOptions& options, const CampaignProblem& problem) {
+  const auto require = [](bool ok, const std::string& what) {
+    if (!ok) throw std::invalid_argument("fit: " + what);
+  };
+  const auto sized = [&](const char* name, std::size_t size, std::size_t wanted, const char* what) {
+    require(size == 0 || size == wanted,
+            fmt::format("{} has {} values, not 0 or {}, one for each of the {}", name, size, wanted, what));
+  };
+  require(options.rounds >= 1, fmt::format("rounds = {} is not in [1, inf)", options.rounds));
+  require(options.iterations >= 1, fmt::format("iterations = {} is not in [1, inf)", options.iterations));
+  require(options.sample_limit > 0,
+          fmt::format("sample_limit = {} is not in (0, inf]", options.sample_limit));
+  require(options.throw_limit > 0, fmt::format("throw_limit = {} is not in (0, inf]", options.throw_limit));
+  require(options.accuracy > 0 && options.accuracy < 1,
+          fmt::format("accuracy = {} is not in (0, 1)", options.accuracy));
+  sized("start", options.start.size(), problem.campaign().size(), "campaign's unknowns");
+  sized("own_spread", options.own_spread.size(), problem.own().size(), "throws' own unknowns");
+  sized("throws", options.throws.size(), problem.throws().size(), "log's throws");
+  for (const double x : options.start)
+    require(std::isfinite(x), fmt::format("start: {} is not a finite number", x));
+  for (const double x : options.own_spread)
+    require(x > 0 && std::isfinite(x), fmt::format("own_spread: {} is not in (0, inf)", x));
+  for (const auto& name : options.fixed)
+    require(std::any_of(problem.campaign().begin(), problem.campaign().end(),
+                        [&](const Unknown& u) { return u.name == name; }),
+            fmt::format("fixed: the campaign has no unknown '{}'", name));
+}
+
 FitResult fit_from(std::vector<double> start, const CampaignProblem& problem, const FitOptions& options) {
   const auto begin = Clock::now();
   FitResult out;
   const auto& unknowns = problem.campaign();
   for (std::size_t k = 0; k < start.size(); ++k)
     start[k] = std::clamp(start[k], unknowns[k].low, unknowns[k].high);
-  for (const auto& u : unknowns) out.campaign.push_back({u, u.start, 0, 0, false, 0, {}});
+  for (const auto& u : unknowns) out.campaign.push_back({u, u.start, HUGE_VAL, HUGE_VAL, false, 1, {}});
   for (const auto& thrown : problem.throws()) {
     auto& one = out.throws.emplace_back();
     one.id = thrown.prepared.id;
@@ -153,13 +180,14 @@ FitResult fit_from(std::vector<double> start, const CampaignProblem& problem, co
   FitRounds rounds(problem, options, start);
   if (rounds.used().empty()) {
     out.outcome = FitOutcome::no_start;
-    const bool any_train =
-        std::any_of(problem.throws().begin(), problem.throws().end(),
-                    [](const CampaignThrow& one) { return one.prepared.split == datasets::Split::train; });
+    const bool train = options.share == Share::train;
+    const bool any =
+        std::any_of(problem.throws().begin(), problem.throws().end(), [&](const CampaignThrow& one) {
+          return options.share == Share::all || train == (one.prepared.split == datasets::Split::train);
+        });
     out.message =
-        !any_train
-            ? fmt::format("none of the log's {} throws has the split 'train', and no others are fitted to",
-                          problem.throws().size())
+        !any ? fmt::format("none of the log's {} throws has the split '{}', and no others are fitted to",
+                           problem.throws().size(), train ? "train" : "test")
         : rounds.refused()
             ? fmt::format("throw {} could not be simulated with the parameters that the fit starts from",
                           out.throws[*rounds.refused()].id)
@@ -191,6 +219,7 @@ FitResult fit_from(std::vector<double> start, const CampaignProblem& problem, co
 }  // namespace
 
 FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
+  validate(options, problem);
   if (!options.start.empty()) return fit_from(options.start, problem, options);
   const std::vector<std::size_t> sizes = one_sided_sizes(problem);
   const auto start = [&](double share) {  // of a typical step

@@ -81,11 +81,12 @@ const char* to_string(FitOutcome);
 
 /// An unknown's value and how sure it is.
 struct FittedUnknown {
-  Unknown unknown;              ///< name, unit, range
-  double value{};               ///< in the unknown's unit
-  double sigma{};               ///< 1 σ, from the scatter between throws (see covariance)
-  double data_sigma{};          ///< 1 σ without the prior; infinite where the log does not determine it
-  bool at_bound{};              ///< the value is at an end of its range: sigma says little
+  Unknown unknown;  ///< name, unit, range
+  double value{};   ///< in the unknown's unit
+  double sigma{};   ///< 1 σ, from the scatter between throws (see covariance); infinite without an answer
+  double data_sigma{};  ///< 1 σ without the prior; infinite where the log does not determine it, or was
+                        ///< not asked, since the unknown was fixed
+  bool at_bound{};      ///< the value is at an end of its range: sigma says little
   double degrees_of_freedom{};  ///< of sigma: it comes from the scatter between throws
   /// The 95 % interval of the profile, where it departs from value ± t sigma: there, with everything else
   /// fitted again, the cost has risen by as much as it would at ± t sigma if it were a parabola. An end
@@ -95,15 +96,17 @@ struct FittedUnknown {
   std::array<double, 2> interval95() const;
 };
 
-/// Least component of an open direction, which has unit length, for an unknown to take part in it [-].
-inline constexpr double kTakesPart = 0.2;
-
 /// A direction in the space of the campaign's unknowns that the log leaves open.
 struct OpenDirection {
   std::vector<double> direction;  ///< per campaign unknown, in units of its scale, of unit length
   double sigma{};                 ///< along it, from the data alone, in scales; infinite: nothing
   std::string meaning;            ///< in words
+  /// Whether unknown k takes part: its component is a fifth at least, or moves it by kOpen at sigma.
+  bool moves(std::size_t k) const;
 };
+
+/// A direction is open where the log knows it to no better than so many changes that matter (scales) [-].
+inline constexpr double kOpen = 3;
 
 /// χ² of one channel in one phase.
 struct ChannelMisfit {
@@ -171,7 +174,8 @@ bool is_determined(const FitResult& fit, std::size_t k);
 
 /// Least squares by Ceres (Levenberg-Marquardt; the throws' own unknowns eliminated by Schur's complement)
 /// with exact derivatives. Without `options.start` from the problem's own, one-sided effects a typical step
-/// from neutral, and from smaller ones where they end at neutral: of those the likeliest.
+/// from neutral, and from smaller ones where they end at neutral: of those the likeliest. Throws
+/// std::invalid_argument for options outside their ranges, lists of the wrong length, and unknown names.
 FitResult fit(const CampaignProblem& problem, const FitOptions& options = {});
 
 }  // namespace unhand::fitting

@@ -51,11 +51,17 @@ double FitResult::correlation(std::size_t i, std::size_t j) const {
   return scale > 0 ? covariance[i * n + j] / scale : 0;
 }
 
+bool OpenDirection::moves(std::size_t k) const {
+  constexpr double kTakesPart = 0.2, kRounding = 1e-3;
+  const double part = std::abs(direction[k]);
+  return part >= kTakesPart || (part > kRounding && part * sigma >= kOpen);
+}
+
 bool is_determined(const FitResult& fit, std::size_t k) {
   const FittedUnknown& u = fit.campaign[k];
   return u.data_sigma < u.unknown.high - u.unknown.low &&
          std::none_of(fit.open.begin(), fit.open.end(),
-                      [&](const OpenDirection& open) { return std::abs(open.direction[k]) >= kTakesPart; });
+                      [&](const OpenDirection& open) { return open.moves(k); });
 }
 
 }  // namespace unhand::fitting

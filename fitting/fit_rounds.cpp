@@ -66,6 +66,18 @@ bool FitRounds::is_fixed(const Unknown& unknown) const {
          std::find(options_.fixed.begin(), options_.fixed.end(), unknown.name) != options_.fixed.end();
 }
 
+Eigen::MatrixXd FitRounds::information() const {
+  Eigen::MatrixXd out = equations_.information;
+  for (std::size_t i = 0; i < x_.size(); ++i) {
+    if (!is_fixed(problem_.campaign()[i])) continue;
+    const auto k = static_cast<Eigen::Index>(i);
+    out.row(k).setZero();
+    out.col(k).setZero();
+    out(k, k) = 1 / (shared_.scale[i] * shared_.scale[i]);
+  }
+  return out;
+}
+
 FitRounds::Solution FitRounds::minimise(double tolerance, std::optional<std::size_t> held) {
   AllThrows all(shared_, simulated_, used_, x_, own_);
   ceres::Problem::Options problem_options;

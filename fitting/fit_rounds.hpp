@@ -43,6 +43,9 @@ class FitRounds {
   std::vector<double> own(std::size_t i) const { return shared_.own_unscaled(own_at(i)); }
   const Shared& shared() const { return shared_; }
   const NormalEquations& equations() const { return equations_; }
+  /// What the log says of the campaign's unknowns, those that are fixed taking part in nothing: rows and
+  /// columns of them are those of an unknown apart, known to its scale.
+  Eigen::MatrixXd information() const;
 
   /// How the last round ended.
   struct Solution {

@@ -125,7 +125,8 @@ ScatterCovariance scatter_covariance(const NormalEquations& equations, const Eig
       unit.asDiagonal() * spectrum.vectors * root.asDiagonal();
 
   std::vector<Eigen::MatrixXd> share, adjust;
-  Eigen::MatrixXd G = Eigen::MatrixXd::Zero(width, width);
+  const Eigen::MatrixXd known = congruent(whiten.transpose(), prior);  // a measurement whose noise is certain
+  Eigen::MatrixXd G = known;
   for (const auto& part : equations.throws) {
     if (!(part.weight > 0)) continue;
     share.push_back(congruent(whiten.transpose(), part.information));
@@ -142,16 +143,15 @@ ScatterCovariance scatter_covariance(const NormalEquations& equations, const Eig
   for (Eigen::Index k = 0; k < width; ++k) {
     const Eigen::VectorXd c = whiten.row(k);
     Eigen::MatrixXd toward(width, n), shared(width, n);  // A_i c and H_i A_i c
-    double trace = 0;
     for (Eigen::Index i = 0; i < n; ++i) {
       toward.col(i) = adjust[static_cast<std::size_t>(i)] * c;
       shared.col(i) = share[static_cast<std::size_t>(i)] * toward.col(i);
     }
     Eigen::MatrixXd B = -gram(shared);
     for (Eigen::Index i = 0; i < n; ++i) B(i, i) += toward.col(i).dot(shared.col(i));
-    trace = B.trace();
-    if (const double square = B.squaredNorm(); square > 0)
-      out.degrees_of_freedom[k] = std::max(1.0, trace * trace / square);
+    const double trace = B.trace() + c.dot(known * c);
+    if (const double square = B.squaredNorm(); trace > 0)
+      out.degrees_of_freedom[k] = std::clamp(trace * trace / std::max(square, 1e-300), 1.0, kCertain);
   }
   Spectrum scatter = spectrum_of(G);
   const double seen = width > 0 ? out.degrees_of_freedom.minCoeff() : 0;

@@ -63,7 +63,7 @@ double end_of(FitRounds& rounds, const FitResult& fit, std::size_t k, const Eige
 }  // namespace
 
 void profile(FitRounds& rounds, FitResult& fit) {
-  const Eigen::Index width = rounds.equations().information.rows();
+  const auto width = static_cast<Eigen::Index>(fit.campaign.size());
   for (std::size_t k = 0; k < fit.campaign.size(); ++k) {
     FittedUnknown& u = fit.campaign[k];
     const double t = student_factor(u.degrees_of_freedom);
@@ -74,7 +74,7 @@ void profile(FitRounds& rounds, FitResult& fit) {
       continue;
     }
     // The cost's own curvature claims a smaller sigma where throws scatter beyond the noise.
-    Eigen::MatrixXd H = rounds.equations().information;
+    Eigen::MatrixXd H = rounds.information();
     for (Eigen::Index j = 0; j < width; ++j)
       if (const auto& prior = fit.campaign[static_cast<std::size_t>(j)].unknown.prior_sigma)
         H(j, j) += 1 / (*prior * *prior);

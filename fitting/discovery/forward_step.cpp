@@ -8,6 +8,7 @@
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/selection.hpp"
 #include "fitting/distributions.hpp"
+#include "fitting/normal_equations.hpp"
 
 namespace unhand::fitting {
 
@@ -46,7 +47,7 @@ Ranked& named(std::vector<Ranked>& ranking, const std::string& id) {
 
 /// The p-value if the fit's covariance were known.
 double wald_as_known(FitResult fit, const dynamics::Effect& effect) {
-  for (auto& u : fit.campaign) u.degrees_of_freedom = 1e9;
+  for (auto& u : fit.campaign) u.degrees_of_freedom = kCertain;
   return wald_p_value(fit, effect);
 }
 

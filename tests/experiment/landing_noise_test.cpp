@@ -46,6 +46,19 @@ TEST(LandingNoise, IsWhatThrowsDifferByWhereNothingElseTells) {
   EXPECT_THAT(noise.how, HasSubstr("as large as throws differ"));
 }
 
+TEST(LandingNoise, HeldOutLandingsHaveNoSayInWhatAFitTrusts) {
+  for (const bool mocap : {true, false}) {
+    auto log = unsure(mocap);
+    const auto before = landing_noise(log);
+    double sign = 1;
+    for (auto& one : log.throws)
+      if (one.split == datasets::Split::test) one.landing->pose(0, 0) += 0.2 * (sign = -sign);
+    EXPECT_EQ(landing_noise(log).x, before.x);
+    for (auto& one : log.throws) one.split = datasets::Split::test;  // where nothing is fitted, all tell
+    EXPECT_GT(landing_noise(log).x.value(), 10 * kSensors.landing_sigma[0]);
+  }
+}
+
 TEST(LandingNoise, WeighsTheLandingsOfALogThatDeclaresNone) {
   const auto sigma_in = [](const datasets::ThrowLog& log, Channel channel) {
     const auto& one = log.throws.front();

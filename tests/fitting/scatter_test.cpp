@@ -1,8 +1,10 @@
 // What the scatter between throws says: closed forms for a mean of n numbers, and for residuals that stay.
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
 #include <cmath>
 #include <numeric>
+#include <random>
 
 #include "fitting/misfit.hpp"
 
@@ -59,6 +61,50 @@ TEST(ScatterCovariance, ThrowsThatAgreeTooWellAreNotQuiteBelieved) {
     const double expected = own < 1 ? (1 + (n - 1) * own) / n : own;
     const auto found = scatter_covariance(equations, Eigen::MatrixXd::Zero(1, 1));
     EXPECT_NEAR(found.covariance(0, 0), expected / n, 1e-12) << s;
+  }
+}
+
+// Two unknowns in each of twelve throws: the first is seen well, the second hardly or not at all. Where the
+// truth is drawn from the prior, the claimed variance is the one that estimates have.
+TEST(ScatterCovariance, APriorIsAMeasurementOfKnownNoise) {
+  constexpr int kThrows = 12, kDraws = 2000;
+  constexpr double kPrior = 0.2;
+  Eigen::Matrix2d prior = Eigen::Matrix2d::Zero();
+  prior(1, 1) = 1 / (kPrior * kPrior);
+  for (const double seen : {0.0, 0.1, 1.0, 25.0}) {  // of the second, by all throws together
+    const Eigen::Matrix2d each = Eigen::Vector2d(1, seen / kThrows).asDiagonal();
+    std::mt19937_64 random(1);
+    std::normal_distribution<double> normal;
+    double claimed = 0, squares = 0, degrees = 0;
+    for (int draw = 0; draw < kDraws; ++draw) {
+      const Eigen::Vector2d truth(0, kPrior * normal(random));
+      std::vector<Eigen::Vector2d> said(kThrows);
+      Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+      for (auto& one : said) {
+        one = each * truth + Eigen::Vector2d(normal(random), std::sqrt(seen / kThrows) * normal(random));
+        sum += one;
+      }
+      NormalEquations equations;
+      equations.information = kThrows * each;
+      const Eigen::Vector2d found = (equations.information + prior).ldlt().solve(sum);
+      for (const auto& one : said) {
+        ThrowEquations part;
+        part.information = each;
+        part.gradient = each * found - one;
+        equations.throws.push_back(part);
+      }
+      const auto scatter = scatter_covariance(equations, prior);
+      claimed += scatter.covariance(1, 1) / kDraws;
+      degrees += scatter.degrees_of_freedom[1] / kDraws;
+      squares += std::pow(found[1] - truth[1], 2) / kDraws;
+    }
+    // A mean of 2000 squares is known to 3 %.
+    EXPECT_NEAR(claimed, squares, 0.1 * squares) << seen;
+    if (seen == 0) {
+      EXPECT_EQ(degrees, kCertain) << "nothing of it is estimated";
+    } else if (seen == 25) {
+      EXPECT_NEAR(degrees, 4 * (kThrows - 1), 4) << "half of the variance is";
+    }
   }
 }
 

@@ -335,6 +335,54 @@ TEST(ThrowFit, WithoutANormalForceOnlyTheProductOfGripAndFrictionIsKnown) {
   EXPECT_NEAR(product, 1, 4 * std::sqrt((0.03 * 0.03 + 0.02 * 0.02) / 8));
   ASSERT_EQ(result.open.size(), 1u);
   EXPECT_THAT(result.open.front().meaning, HasSubstr("mu"));
+  EXPECT_THAT(result.open.front().meaning, HasSubstr("grip_force"));
+}
+
+// Of a product one factor is known once the other is.
+TEST(ThrowFit, WhatIsFixedLeavesNothingOpen) {
+  auto log = disc_log();
+  for (auto& one : log.throws) one.ft.reset();
+  const auto problem = problem_of(log);
+  FitOptions options;
+  options.start = problem.start();
+  const auto index = [&](const std::string& name) {
+    return static_cast<std::size_t>(std::find_if(problem.campaign().begin(), problem.campaign().end(),
+                                                 [&](const Unknown& u) { return u.name == name; }) -
+                                    problem.campaign().begin());
+  };
+  const std::size_t mu = index("mu"), grip = index("grip_force");
+  options.start[grip] = small_design(kLaw).opening.grip_force;
+  options.fixed = {"grip_force"};
+  const auto result = fit(problem, options);
+  ASSERT_TRUE(result.is_answer()) << result.message;
+  EXPECT_TRUE(result.open.empty()) << result.open.front().meaning;
+  EXPECT_TRUE(is_determined(result, mu));
+  EXPECT_FALSE(is_determined(result, grip)) << "it was not asked for";
+  EXPECT_NEAR(result.campaign[mu].value, truth_of(small_design(kLaw), "mu"), 3 * result.campaign[mu].sigma);
+  EXPECT_LT(result.campaign[mu].data_sigma, 0.1 * result.campaign[mu].value);
+  EXPECT_LT(result.campaign[grip].sigma, 1e-9);
+}
+
+TEST(ThrowFit, RefusesOptionsThatMeanNothing) {
+  const auto problem = problem_of(disc_log());
+  const auto message = [&](auto&& change) {
+    FitOptions options;
+    change(options);
+    try {
+      fit(problem, options);
+    } catch (const std::invalid_argument& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  EXPECT_THAT(message([](auto& o) { o.rounds = 0; }), HasSubstr("rounds = 0"));
+  EXPECT_THAT(message([](auto& o) { o.iterations = -1; }), HasSubstr("iterations = -1"));
+  EXPECT_THAT(message([](auto& o) { o.accuracy = NAN; }), HasSubstr("accuracy = nan"));
+  EXPECT_THAT(message([](auto& o) { o.start = {0.5}; }), HasSubstr("start has 1 values, not 0 or 2"));
+  EXPECT_THAT(message([](auto& o) { o.start = {0.5, NAN}; }), HasSubstr("start: nan"));
+  EXPECT_THAT(message([](auto& o) { o.own_spread = {0.01}; }), HasSubstr("own_spread has 1 values"));
+  EXPECT_THAT(message([](auto& o) { o.throws = {true}; }), HasSubstr("throws has 1 values"));
+  EXPECT_THAT(message([](auto& o) { o.fixed = {"nu"}; }), HasSubstr("no unknown 'nu'"));
 }
 
 // Rigid pads are a law of their own, of which no compliance has no derivative: a fit that is there stays.
@@ -400,7 +448,12 @@ TEST(ThrowFit, SaysWhyThereIsNothingToFit) {
   }
   auto test_only = disc_log();
   for (auto& one : test_only.throws) one.split = Split::test;
-  EXPECT_EQ(fit_of_log(test_only).outcome, FitOutcome::no_start);
+  const auto nothing = fit_of_log(test_only);
+  EXPECT_EQ(nothing.outcome, FitOutcome::no_start);
+  for (std::size_t k = 0; k < nothing.campaign.size(); ++k) {
+    EXPECT_TRUE(std::isinf(nothing.campaign[k].sigma));
+    EXPECT_FALSE(is_determined(nothing, k));
+  }
 }
 
 }  // namespace
