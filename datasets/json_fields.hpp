@@ -69,6 +69,14 @@ class JsonFields {
     return real;
   }
 
+  bool has(const std::string& key) const { return object_.contains(key); }
+
+  /// The same of a key that may be null.
+  std::optional<double> number_or_null(const std::string& key) {
+    if (has(key) && object_[key].is_null()) object_.erase(key);
+    return number(key);
+  }
+
   std::optional<std::string> text(const std::string& key) {
     const auto value = take(key);
     if (!value) return {};

@@ -71,12 +71,16 @@ CardParameter read_parameter(Fields& from) {
   if (out.sigma && *out.sigma < 0) from.fail("sigma", fmt::format("{} is below 0", *out.sigma));
   out.unit = from.required("unit", from.text("unit"));
   out.determined = from.boolean("determined").value_or(true);
-  out.low95 = from.number("low95");
-  out.high95 = from.number("high95");
-  if (out.low95 && *out.low95 > out.value)
-    from.fail("low95", fmt::format("{} lies above the value", *out.low95));
-  if (out.high95 && *out.high95 < out.value)
-    from.fail("high95", fmt::format("{} lies below the value", *out.high95));
+  out.degrees_of_freedom = from.number("degrees_of_freedom");
+  if (out.degrees_of_freedom && !(*out.degrees_of_freedom >= 1))
+    from.fail("degrees_of_freedom", fmt::format("{} is below 1", *out.degrees_of_freedom));
+  if (from.has("low95") || from.has("high95")) {
+    const double low = from.number_or_null("low95").value_or(-HUGE_VAL);
+    const double high = from.number_or_null("high95").value_or(HUGE_VAL);
+    if (low > out.value) from.fail("low95", fmt::format("{} lies above the value", low));
+    if (high < out.value) from.fail("high95", fmt::format("{} lies below the value", high));
+    out.interval95 = {low, high};
+  }
   return out;
 }
 
@@ -240,8 +244,12 @@ std::string to_json(const ModelCard& card) {
     if (p.sigma) one["sigma"] = *p.sigma;
     one["unit"] = p.unit;
     if (!p.determined) one["determined"] = false;
-    if (p.low95) one["low95"] = *p.low95;
-    if (p.high95) one["high95"] = *p.high95;
+    if (p.degrees_of_freedom) one["degrees_of_freedom"] = *p.degrees_of_freedom;
+    if (p.interval95) {
+      const auto end = [](double x) { return std::isinf(x) ? Json() : Json(x); };
+      one["low95"] = end((*p.interval95)[0]);
+      one["high95"] = end((*p.interval95)[1]);
+    }
   }
   if (card.covariance) write_covariance(*card.covariance, out);
   for (const auto& [name, spread] : card.own_spreads)

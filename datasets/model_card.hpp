@@ -1,6 +1,7 @@
 // A model card: a model's name, the numbers it takes, and where they come from, as one JSON file.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -17,9 +18,10 @@ struct CardParameter {
   std::optional<double> sigma;  // 1 σ, in the same unit
   std::string unit;             // "-" where it has none
   bool determined = true;       // false: the log alone says nothing of it, sigma is what was known before
-  // The ends of the 95 % interval where it is not even about the value; an end that is missing beside the
-  // other is open.
-  std::optional<double> low95 = {}, high95 = {};  ///< in `unit`
+  /// Of sigma, which comes from the scatter between throws; absent: sigma is known.
+  std::optional<double> degrees_of_freedom = {};
+  /// The 95 % interval in `unit`, where it is not value ± t sigma; an end that is infinite is open.
+  std::optional<std::array<double, 2>> interval95 = {};
   bool operator==(const CardParameter&) const = default;
 };
 
@@ -64,9 +66,9 @@ struct CardRange {
 
 ///   {"schema": "model-card", "schema_version": 1, "model": "sliding_pivot",
 ///    "effects": ["contact.viscous"],
-///    "parameters": {"mu": {"value": 0.61, "sigma": 0.01, "unit": "-"},
-///                   "length": {"value": 0.007, "sigma": 0.001, "unit": "m", "low95": 0.0062, "high95":
-///                   0.011}, ...},
+///    "parameters": {"mu": {"value": 0.61, "sigma": 0.01, "unit": "-", "degrees_of_freedom": 40},
+///                   "length": {"value": 0.007, "sigma": 0.001, "unit": "m", "degrees_of_freedom": 12,
+///                              "low95": 0.0062, "high95": null}, ...},     (null: open)
 ///    "covariance": {"names": ["mu", ...], "matrix": [[1e-4, ...], ...]},
 ///    "own_spreads": {"mu_deviation": {"sigma": 0.02, "unit": "-"}, ...},
 ///    "log": {"file": "campaign.h5", "title": "...", "checksum": "fnv1a64:...", "surfaces": ["aluminium"]},

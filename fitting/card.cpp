@@ -11,6 +11,7 @@
 #include "contact/gripper_delay.hpp"
 #include "contact/patch.hpp"
 #include "experiment/campaign_effects.hpp"
+#include "fitting/normal_equations.hpp"
 
 namespace unhand::fitting {
 
@@ -188,10 +189,8 @@ ModelCard card_of(const CampaignProblem& problem, const FitResult& fit) {
   auto& covariance = card.covariance.emplace();
   for (std::size_t k = 0; k < fit.campaign.size(); ++k) {
     const FittedUnknown& u = fit.campaign[k];
-    auto& one =
-        card.parameters[u.unknown.name] = {u.value, u.sigma, u.unknown.unit, is_determined(fit, k), {}, {}};
-    if (u.profile && std::isfinite((*u.profile)[0])) one.low95 = (*u.profile)[0];
-    if (u.profile && std::isfinite((*u.profile)[1])) one.high95 = (*u.profile)[1];
+    card.parameters[u.unknown.name] = {
+        u.value, u.sigma, u.unknown.unit, is_determined(fit, k), u.degrees_of_freedom, u.profile};
     covariance.names.push_back(u.unknown.name);
   }
   covariance.matrix = fit.covariance;
@@ -265,8 +264,9 @@ FitResult fit_of(const ModelCard& card, const CampaignProblem& problem, const st
     if (found == card.parameters.end())
       throw CardError(file, "/parameters/" + u.name, why_taken(u.name, card.model));
     const auto& p = found->second;
-    out.campaign.push_back(
-        {u, p.value, p.sigma.value_or(0), p.determined ? p.sigma.value_or(0) : HUGE_VAL, false, 0, {}});
+    const double sigma = p.sigma.value_or(0);
+    out.campaign.push_back({u, p.value, sigma, p.determined ? sigma : HUGE_VAL, false,
+                            p.degrees_of_freedom.value_or(kCertain), p.interval95});
     std::size_t k = none;
     if (card.covariance)
       k = static_cast<std::size_t>(

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <filesystem>
@@ -49,6 +50,22 @@ std::string refusal_after(Change&& change) {
 }
 
 TEST(ModelCard, ComesBackAsItWas) { EXPECT_EQ(parse_model_card(to_json(small_card())), small_card()); }
+
+TEST(ModelCard, AnEndOfAnIntervalMayBeOpen) {
+  const double open = std::numeric_limits<double>::infinity();
+  for (const auto& interval : {std::array{0.6, 0.63}, std::array{0.6, open}, std::array{-open, open}}) {
+    ModelCard card = small_card();
+    card.parameters["mu"].degrees_of_freedom = 12.5;
+    card.parameters["mu"].interval95 = interval;
+    EXPECT_EQ(parse_model_card(to_json(card)), card);
+  }
+  const auto json = nlohmann::json::parse(to_json(small_card()));
+  EXPECT_FALSE(json["parameters"]["mu"].contains("low95"));
+  EXPECT_THAT(refusal_after([](auto& j) { j["parameters"]["mu"]["low95"] = 0.7; }),
+              HasSubstr("/parameters/mu/low95: 0.7 lies above the value"));
+  EXPECT_THAT(refusal_after([](auto& j) { j["parameters"]["mu"]["degrees_of_freedom"] = 0; }),
+              HasSubstr("/parameters/mu/degrees_of_freedom: 0 is below 1"));
+}
 
 TEST(ModelCard, LeavesOutWhatIsNotKnown) {
   ModelCard card = small_card();

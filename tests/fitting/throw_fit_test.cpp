@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "contact/limit_surface.hpp"
+#include "fitting/card.hpp"
 #include "fitting/evaluate.hpp"
 #include "fitting/fit_rounds.hpp"
 #include "tests/support/small_campaign.hpp"
@@ -330,6 +331,18 @@ TEST(ThrowFit, WithoutANormalForceOnlyTheProductOfGripAndFrictionIsKnown) {
     const bool scales = u.unknown.name == "mu" || u.unknown.name == "grip_force";
     EXPECT_EQ(scales, std::isinf(low) && std::isinf(high)) << u.unknown.name;
     if (scales) product *= u.value / truth.at(u.unknown.name);
+  }
+  // The card tells the same, also where an interval is open.
+  datasets::ModelCard card = card_of(problem_of(log), result);
+  card.log.file = "a log";
+  card.library_version = "a version";
+  card = datasets::parse_model_card(datasets::to_json(card));
+  const auto again = fit_of(card, problem_of(log), "a card");
+  ASSERT_EQ(again.campaign.size(), result.campaign.size());
+  for (std::size_t k = 0; k < again.campaign.size(); ++k) {
+    EXPECT_EQ(again.campaign[k].interval95(), result.campaign[k].interval95())
+        << result.campaign[k].unknown.name;
+    EXPECT_EQ(is_determined(again, k), is_determined(result, k));
   }
   // Eight throws whose grip and friction scatter by 3 and 2 % each.
   EXPECT_NEAR(product, 1, 4 * std::sqrt((0.03 * 0.03 + 0.02 * 0.02) / 8));
