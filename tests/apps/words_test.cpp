@@ -23,6 +23,18 @@ TEST(Rounded, IsAsFarAsTheSigmaSays) {
   EXPECT_EQ(with_sigma(1, 1e-16, "m"), "1 m (held)") << "a sigma of rounding errors is none";
 }
 
+TEST(Fixed, HasNoMinusZero) {
+  EXPECT_EQ(fixed(true, -1e-9, 3), "0.000");
+  EXPECT_EQ(fixed(true, -0.0, 0), "0");
+  EXPECT_EQ(fixed(true, -0.0006, 3), "-0.001");
+  EXPECT_EQ(fixed(true, -20, 0), "-20");
+  EXPECT_EQ(fixed(true, -INFINITY, 1), "-inf");
+  EXPECT_EQ(fixed(false, 1, 1), "-");
+  EXPECT_EQ(with_sign(-1e-9, 4), "+0.0000");
+  EXPECT_EQ(with_sign(-0.25, 2), "-0.25");
+  EXPECT_EQ(with_sign(1, 1), "+1.0");
+}
+
 TEST(SmallEffect, IsNotCalledSmallWhereHeldOutErrorsFall) {
   fitting::SmallEffect small{"contact.viscous", -369, 8e-4, 0.1, 1.23e-3, 0.911e-3, false};
   EXPECT_THAT(small_text(small),
