@@ -1,8 +1,12 @@
 // What the command says of numbers and of effects, without running it.
 #include <gmock/gmock.h>
 
+#include <tuple>
+#include <vector>
+
 #include "apps/ranking.hpp"
 #include "apps/table.hpp"
+#include "apps/weak_grip.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -33,6 +37,25 @@ TEST(Fixed, HasNoMinusZero) {
   EXPECT_EQ(with_sign(-1e-9, 4), "+0.0000");
   EXPECT_EQ(with_sign(-0.25, 2), "-0.25");
   EXPECT_EQ(with_sign(1, 1), "+1.0");
+}
+
+TEST(WeakGrip, NamesConditionsOfEveryObject) {
+  experiment::ModelComparison model;
+  model.model = "sliding_pivot";
+  const std::vector<std::tuple<const char*, const char*, bool>> thrown{
+      {"bar", "fast", true}, {"box", "fast", true}, {"box", "slow", true}, {"can", "fast", false}};
+  for (const auto& [object, condition, slips] : thrown)
+    for (int repetition = 0; repetition < 2; ++repetition) {
+      auto& one = model.throws.emplace_back();
+      one.object = object, one.condition = condition;
+      one.prediction.slips_at_start = slips;
+    }
+  testing::internal::CaptureStderr();
+  tell_weak_grip(model);
+  EXPECT_THAT(
+      testing::internal::GetCapturedStderr(),
+      testing::EndsWith("in 6 of 8 throws the grip cannot hold the object, which slips from the start; "
+                        "conditions bar, fast; box, fast; slow\n"));
 }
 
 TEST(SmallEffect, IsNotCalledSmallWhereHeldOutErrorsFall) {
