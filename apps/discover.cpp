@@ -212,7 +212,8 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
                                 {"p_value", number(small->p_value)},
                                 {"held_out_gain", number(small->held_out_fall)},
                                 {"test_rms_before_m", number(small->rms_before)},
-                                {"test_rms_after_m", number(small->rms_after)}};
+                                {"test_rms_after_m", number(small->rms_after)},
+                                {"test_likelier", small->likelier}};
   out["unexplained"] = nullptr;
   if (found.unexplained) {
     out["unexplained"] = {{"phase", to_string(found.unexplained->phase)},

@@ -11,6 +11,7 @@
 #include "apps/throws.hpp"
 #include "datasets/slip_log.hpp"
 #include "datasets/summary.hpp"
+#include "dynamics/median.hpp"
 #include "experiment/landing_noise.hpp"
 #include "experiment/prepared_throw.hpp"
 #include "experiment/unit_check.hpp"
@@ -171,12 +172,7 @@ Inspection inspect_slips(const std::string& file) {
       samples += slip.time.rows;
       for (std::size_t i = 1; i < slip.time.rows; ++i) steps.push_back(slip.time(i) - slip.time(i - 1));
     }
-    double rate = 0;
-    if (!steps.empty()) {
-      const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-      std::nth_element(steps.begin(), middle, steps.end());
-      rate = 1 / *middle;
-    }
+    const double rate = steps.empty() ? 0 : 1 / dynamics::median(steps);
     const std::size_t test = surface.slips.size() - train;
     surfaces[name] = {{"mass_kg", surface.mass},
                       {"characteristic_length_m", surface.characteristic_length},

@@ -170,7 +170,12 @@ Parser::Parsed Parser::parse(int argc, char** argv) {
     app_->parse(argc, argv);
     return Parsed::run;
   } catch (const CLI::ParseError& error) {
-    return app_->exit(error) == 0 ? Parsed::helped : Parsed::wrong_usage;
+    if (error.get_exit_code() != 0) {
+      tell("unhand: {}\nRun with --help for more information.\n", error.what());
+      return Parsed::wrong_usage;
+    }
+    app_->exit(error);  // prints the help or the version
+    return Parsed::helped;
   }
 }
 

@@ -202,8 +202,7 @@ void to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs&
     const double miss = el::landing_x(run.release, o.target_z).value_or(NAN) - distances[k];
     text.rows.push_back({fmt::format("{:.2f}", distances[k]), fmt::format("{:.3f}", one.speed()),
                          fmt::format("{:.3f}", one.duration()), fmt::format("{:.2f}", one.program.seconds),
-                         fmt::format("{:+.2f}", 1e3 * miss),
-                         fmt::format("{:.1f} %", 100 * run.use.largest())});
+                         with_sign(1e3 * miss, 2), fmt::format("{:.1f} %", 100 * run.use.largest())});
     json["nodes"].push_back({{"target_m", distances[k]},
                              {"speed_m_s", one.speed()},
                              {"duration_s", one.duration()},

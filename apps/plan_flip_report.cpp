@@ -23,10 +23,10 @@ Table table_of(const FlipAnswer& a) {
   Table out{{"iteration", "pitch [deg]", "speed", "damping", "x [m]", "angle [deg]", "error", "hits"}, {}, 1};
   for (std::size_t i = 0; i < a.path.iterations.size(); ++i) {
     const auto& one = a.path.iterations[i];
-    out.rows.push_back({std::to_string(i + 1), fmt::format("{:.2f}", one.command.pitch / kDegree),
+    out.rows.push_back({std::to_string(i + 1), fixed(true, one.command.pitch / kDegree, 2),
                         fmt::format("{:.4f}", one.command.speed), fmt::format("{:.2f}", one.command.damping),
                         one.mean ? fmt::format("{:.3f}", one.mean->x) : "-",
-                        one.mean ? fmt::format("{:.0f}", one.mean->angle / kDegree) : "-",
+                        one.mean ? fixed(true, one.mean->angle / kDegree, 0) : "-",
                         one.mean ? fmt::format("{:.2f}", one.error) : "-",
                         fmt::format("{}/{}", one.hits, a.throws)});
   }

@@ -83,23 +83,21 @@ std::string text_of(const ThrowAnswer& a) {
       std::atan2(tip.velocity.z(), tip.velocity.head<2>().norm()) * 180 / std::numbers::pi);
   Table joints{{"joint", "q0 [rad]", "qd0 [rad/s]", "qdd [rad/s2]"}, {}, 1};
   for (int i = 0; i < a.chain.size(); ++i)
-    joints.rows.push_back({a.chain.joints[i].name, fmt::format("{:.4f}", plan.nominal.state.q[i]),
-                           fmt::format("{:.4f}", plan.nominal.state.qd[i]),
-                           fmt::format("{:.3f}", plan.qdd[i])});
+    joints.rows.push_back({a.chain.joints[i].name, fixed(true, plan.nominal.state.q[i], 4),
+                           fixed(true, plan.nominal.state.qd[i], 4), fixed(true, plan.qdd[i], 3)});
   out += joints.text() + "\n";
   Table landings{{"motion", "landings", "in the box", "mean miss [m]", "std [m]", "lost"}, {}, 1};
   for (const auto& one : a.predicted)
     landings.rows.push_back(
         {one.name, fmt::to_string(one.drawn.miss.size()),
          percent(one.hits, one.drawn.miss.size() + static_cast<std::size_t>(one.drawn.lost)),
-         fmt::format("{:+.4f}", one.drawn.mean), fmt::format("{:.4f}", one.drawn.std),
-         fmt::to_string(one.drawn.lost)});
+         with_sign(one.drawn.mean, 4), fmt::format("{:.4f}", one.drawn.std), fmt::to_string(one.drawn.lost)});
   out += landings.text();
   if (a.real && a.rigid)
     out += fmt::format(
-        "\nunder the tube's motion a rigidly carried object would land {:+.3f} m from the middle, the "
-        "contact model says {:+.3f} m\n",
-        a.rigid->miss, a.real->miss);
+        "\nunder the tube's motion a rigidly carried object would land {} m from the middle, the contact "
+        "model says {} m\n",
+        with_sign(a.rigid->miss, 3), with_sign(a.real->miss, 3));
   if (!a.numbers.empty()) {
     Table numbers{{"the release rests on", "value", "1 sigma", "from"}, {}, 1};
     for (const auto& one : a.numbers)

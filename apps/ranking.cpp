@@ -112,8 +112,8 @@ std::string small_text(const fitting::SmallEffect& small) {
   if (!predicts) return fmt::format("evident, but too small to matter: {})", numbers);
   return fmt::format(
       "evident on the train throws, but the test throws do not confirm it: {}, yet no channel's chi2 falls "
-      "by what matters, and their likelihood does not rise enough or another of their errors grows)",
-      numbers);
+      "by what matters, and {})",
+      numbers, small.likelier ? "another of their errors grows" : "their likelihood does not rise enough");
 }
 
 std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects) {

@@ -87,7 +87,15 @@ std::string Table::csv() const {
 }
 
 std::string fixed(bool known, double value, int decimals) {
-  return known ? fmt::format("{:.{}f}", value, decimals) : "-";
+  if (!known) return "-";
+  std::string out = fmt::format("{:.{}f}", value, decimals);
+  if (out.find_first_not_of("-0.") == std::string::npos) out.erase(0, out.find('0'));
+  return out;
+}
+
+std::string with_sign(double value, int decimals) {
+  const std::string out = fixed(true, value, decimals);
+  return out.starts_with('-') ? out : "+" + out;
 }
 
 std::string plus_minus(bool known, double value, double spread, int decimals) {

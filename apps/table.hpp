@@ -31,7 +31,10 @@ Rounded rounded(double value, double sigma);
 bool is_held(double value, double sigma);
 /// "19.7 +- 1.1 m/s", "1 (held)"; no unit for "-".
 std::string with_sigma(double value, double sigma, const std::string& unit);
+/// With so many decimals, and never -0; a dash if it is not known.
 std::string fixed(bool known, double value, int decimals);
+/// The same with its sign, + for 0.
+std::string with_sign(double value, int decimals);
 /// "1 throw", "2 throws".
 std::string plural(std::size_t n, const char* what);
 

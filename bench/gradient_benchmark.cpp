@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "contact/registry.hpp"
+#include "dynamics/median.hpp"
 #include "experiment/model.hpp"
 #include "experiment/synthetic_campaign.hpp"
 #include "release/simulate_release.hpp"
@@ -120,8 +121,7 @@ double median_microseconds(Function&& function) {
     benchmark::DoNotOptimize(function());
     times.push_back(1e6 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
   }
-  std::nth_element(times.begin(), times.begin() + 25, times.end());
-  return times[25];
+  return dynamics::median(times);
 }
 
 void gradient_case(benchmark::State& state, const char* model, double tolerance) {

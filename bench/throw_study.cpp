@@ -15,6 +15,7 @@
 #include <string_view>
 #include <vector>
 
+#include "dynamics/median.hpp"
 #include "planners/arm/kinematics.hpp"
 #include "planners/arm/panda.hpp"
 #include "planners/tube/plan_throw.hpp"
@@ -201,10 +202,7 @@ void boxes() {
 /// Numbers of which median and worst are told.
 struct Times {
   std::vector<double> values;
-  double median() {
-    std::sort(values.begin(), values.end());
-    return values.empty() ? 0 : values[values.size() / 2];
-  }
+  double median() const { return values.empty() ? 0 : unhand::dynamics::median(values); }
   double worst() const { return values.empty() ? 0 : *std::max_element(values.begin(), values.end()); }
 };
 

@@ -12,6 +12,7 @@
 
 #include "datasets/import_phyphox.hpp"
 #include "datasets/near_miss.hpp"
+#include "dynamics/median.hpp"
 
 namespace unhand::datasets {
 namespace {
@@ -31,10 +32,7 @@ bool move_channel(std::optional<Part>& to, std::optional<Part>& from, bool repla
 double usual_step(const Series& time) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < time.rows; ++i) steps.push_back(time(i) - time(i - 1));
-  if (steps.empty()) return 0;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return steps.empty() ? 0 : dynamics::median(steps);
 }
 
 }  // namespace

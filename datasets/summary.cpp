@@ -6,6 +6,7 @@
 
 #include "datasets/sample_noise.hpp"
 #include "datasets/throw_log_table.hpp"
+#include "dynamics/median.hpp"
 
 namespace unhand::datasets {
 namespace {
@@ -26,9 +27,7 @@ ChannelSummary summarise_channel(std::string_view group, const Series& time, con
     }
   }
   if (!steps.empty()) {
-    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-    std::nth_element(steps.begin(), middle, steps.end());
-    out.median_step = *middle;
+    out.median_step = dynamics::median(steps);
     out.rate = 1 / out.median_step;
   }
   std::size_t run = 0;

@@ -88,7 +88,8 @@ RepetitionScatter scatter_of(const std::vector<PreparedThrow>& throws) {
   return out;
 }
 
-std::vector<ThrownCondition> conditions_of(const std::vector<PreparedThrow>& throws) {
+template <class Throw>
+std::vector<ThrownCondition> labelled_conditions(const std::vector<Throw>& throws) {
   std::vector<ThrownCondition> out;
   for (const auto& t : throws)
     if (std::none_of(out.begin(), out.end(), [&](const ThrownCondition& known) {
@@ -104,6 +105,10 @@ std::vector<ThrownCondition> conditions_of(const std::vector<PreparedThrow>& thr
 }
 
 }  // namespace
+
+std::vector<ThrownCondition> conditions_of(const std::vector<ThrowComparison>& throws) {
+  return labelled_conditions(throws);
+}
 
 ErrorStatistics ModelComparison::statistics(int quantity, datasets::Split split) const {
   return collect(throws, quantity, [&](const ThrowComparison& t) { return t.split == split; });
@@ -131,7 +136,7 @@ Comparison compare(const datasets::ThrowLog& log, const std::vector<PreparedThro
     out.worst_hand_chi2 = std::max(out.worst_hand_chi2, t.hand_fit.chi2_per_dof);
     out.mean_force_chi2 += t.force_fit.chi2_per_dof / static_cast<double>(prepared.size());
   }
-  out.conditions = conditions_of(prepared);
+  out.conditions = labelled_conditions(prepared);
   out.repetitions = scatter_of(prepared);
 
   for (const auto& model : options.models) {

@@ -77,6 +77,9 @@ struct ModelComparison {
   ErrorStatistics of_condition(int quantity, const ThrownCondition& condition) const;
 };
 
+/// The conditions of predicted throws, in order of appearance.
+std::vector<ThrownCondition> conditions_of(const std::vector<ThrowComparison>& throws);
+
 /// How far repetitions of a condition scatter about their mean: the floor of any model that does not know
 /// what differs between them.
 struct RepetitionScatter {

@@ -56,7 +56,7 @@ struct ObservationOptions {
   /// F/T sensor and the shape of a friction law are good to a hundredth, and such an error stays for some
   /// twenty samples, which would count as that many witnesses.
   double wrench_trust{0.04};
-  /// Of landings without a declared σ; found from the log if absent.
+  /// Of landings without a declared σ; found from the log if absent, for every throw anew.
   std::optional<LandingNoise> landing_noise{};
 };
 

@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "dynamics/quintic.hpp"
+
 namespace unhand::experiment {
 
 using dynamics::Vec2;
@@ -91,31 +93,22 @@ release::PolynomialHand polynomial_hand(const release::HandMotion& hand, double 
   std::vector<double> ends = hand.jumps(), breaks{hand.begin()};
   ends.push_back(hand.end());
   std::vector<release::PolynomialHand::Polynomial::Coefficients> pieces;
-  const auto state = [&](const Window& window, double t) {
+  const auto state = [&](const Window& window, double t) {  // of each coordinate
     const auto s = hand.at(window, t);
-    return std::array<std::array<double, 3>, 3>{
-        {{s.pose.x, s.pose.z, s.pose.theta},
-         {s.twist.vx, s.twist.vz, s.twist.omega},
-         {s.acceleration.ax, s.acceleration.az, s.acceleration.alpha}}};
+    return std::array<std::array<double, 3>, 3>{{{s.pose.x, s.twist.vx, s.acceleration.ax},
+                                                 {s.pose.z, s.twist.vz, s.acceleration.az},
+                                                 {s.pose.theta, s.twist.omega, s.acceleration.alpha}}};
   };
   for (const double end : ends) {
     const Window stretch{breaks.back(), end};
     const int n = std::max(1, static_cast<int>(std::ceil((end - stretch.begin) / longest)));
     for (int i = 1; i <= n; ++i) {
       const double t0 = breaks.back(), t1 = i == n ? end : stretch.begin + (end - stretch.begin) * i / n;
-      const double h = t1 - t0;
-      const auto [p0, v0, a0] = state(stretch, t0);
-      const auto [p1, v1, a1] = state(stretch, t1);
+      const auto first = state(stretch, t0), last = state(stretch, t1);
       auto& c = pieces.emplace_back();
-      for (int k = 0; k < 3; ++k) {
-        const double p = p1[k] - p0[k] - h * (v0[k] + 0.5 * h * a0[k]), v = h * (v1[k] - v0[k] - h * a0[k]),
-                     a = h * h * (a1[k] - a0[k]);
-        c[0][k] = p0[k];
-        c[1][k] = v0[k];
-        c[2][k] = 0.5 * a0[k];
-        c[3][k] = (10 * p - 4 * v + 0.5 * a) / (h * h * h);
-        c[4][k] = (-15 * p + 7 * v - a) / (h * h * h * h);
-        c[5][k] = (6 * p - 3 * v + 0.5 * a) / (h * h * h * h * h);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const auto quintic = dynamics::quintic_between(first[k], last[k], t1 - t0);
+        for (std::size_t power = 0; power < 6; ++power) c[power][k] = quintic[power];
       }
       breaks.push_back(t1);
     }

@@ -4,7 +4,6 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <stdexcept>
 
@@ -12,6 +11,7 @@
 #include "dynamics/straight_line.hpp"
 #include "experiment/outcome_slopes.hpp"
 #include "fitting/before_release.hpp"
+#include "fitting/clock.hpp"
 
 namespace unhand::fitting {
 
@@ -94,7 +94,6 @@ void judge(const experiment::PreparedThrow& prepared, const experiment::Observat
 
 PredictedThrow predict_one(const CampaignProblem& problem, const CampaignThrow& thrown, const FitResult& fit,
                            bool uncertainty) {
-  using Clock = std::chrono::steady_clock;
   PredictedThrow out;
   const auto& prepared = thrown.prepared;
   out.comparison = {prepared.id, prepared.object, prepared.condition, prepared.split, {}, {}};
@@ -104,7 +103,7 @@ PredictedThrow predict_one(const CampaignProblem& problem, const CampaignThrow& 
   const auto campaign = fit.values();
   const auto begin = Clock::now();
   const auto bare = problem.predict(prepared, {}, campaign, out.own);
-  out.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+  out.seconds = seconds_since(begin);
   auto& prediction = out.comparison.prediction;
   prediction.release = bare.release;
   prediction.flight = bare.flight;

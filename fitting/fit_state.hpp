@@ -2,17 +2,12 @@
 #pragma once
 
 #include <atomic>
-#include <chrono>
 #include <vector>
 
+#include "fitting/clock.hpp"
 #include "fitting/normal_equations.hpp"
 
 namespace unhand::fitting {
-
-using Clock = std::chrono::steady_clock;
-inline double seconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
 
 /// What all costs share: unknowns in units of their scales.
 struct Shared {

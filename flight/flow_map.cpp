@@ -68,7 +68,7 @@ void validate(const LandingSet& set) {
 constexpr double kFastest = 100;
 /// How slowly a sampled flight may come down, without drag and with it [m/s]: it has just risen above the
 /// height, by 5e-14 m and by 1e-6 m, and rounding or the integrator must not lose that.
-constexpr double kSlowest[2] = {1e-6, 5e-3};
+constexpr double kSlowest = 1e-6, kSlowestWithDrag = 5e-3;
 
 /// `longest` seconds backward in time, or to where it had kFastest: by the closed form, or by Runge-Kutta
 /// steps of at most 1 ms and a hundredth of the time in which drag takes the speed away, whose error at
@@ -136,7 +136,7 @@ std::vector<PlaneState<double>> sample_tube(const LandingSet& set, const Medium&
       x[face % 3] = ranges[face % 3][face / 3];
     }
     // A flight that comes down at ż = 0 has just touched the height: the tube ends there.
-    const double down = std::min(x[2], -kSlowest[medium.drag_k > 0 ? 1 : 0]);
+    const double down = std::min(x[2], medium.drag_k > 0 ? -kSlowestWithDrag : -kSlowest);
     out.push_back(before({x[0], 0, x[1], down}, unit(random) * sampling.longest, medium));
   }
   return out;

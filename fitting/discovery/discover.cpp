@@ -3,11 +3,11 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "contact/gripper_delay.hpp"
 #include "contact/registry.hpp"
+#include "fitting/clock.hpp"
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/held_out_split.hpp"
 #include "fitting/discovery/outcome_errors.hpp"
@@ -101,7 +101,7 @@ void search(Stage& stage, const DiscoverOptions& options, Discovery& out) {
 }  // namespace
 
 Discovery discover(const datasets::ThrowLog& logged, const std::string& file, const DiscoverOptions& given) {
-  const auto begin = std::chrono::steady_clock::now();
+  const auto begin = Clock::now();
   DiscoverOptions options = given;
   const int threads = options.fit.threads;
   const datasets::ThrowLog log = with_held_out(logged);
@@ -113,6 +113,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
     out.message =
         "nothing can be held out to judge an effect by: needed are train and test throws, or an object that "
         "was thrown under two conditions";
+    out.seconds = seconds_since(begin);
     return out;
   }
   solve(stage, options, {});
@@ -125,6 +126,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
         stage.is_fitted()
             ? fmt::format("there are no held-out throws to judge the fit by: {}", stage.held_out.message)
             : fmt::format("the base model could not be fitted: {}", stage.fit.message);
+    out.seconds = seconds_since(begin);
     return out;
   }
   options.fit.throws = throws_of(stage);
@@ -165,7 +167,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
                 : out.unexplained    ? Verdict::unexplained
                                      : Verdict::no_missing_effect;
   out.problem = std::make_shared<const CampaignProblem>(std::move(stage.problem));
-  out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  out.seconds = seconds_since(begin);
   return out;
 }
 

@@ -134,6 +134,7 @@ struct SmallEffect {
   double rms_before{};     ///< of held-out predictions without it, as PredictionGain has it [m]
   double rms_after{};      ///< and with it [m]
   bool any_pads{};         ///< it is a give of the pads that no pads are without
+  bool likelier{};         ///< the held-out throws' likelihood rises enough with it
 };
 
 /// One candidate: gain, p-value, correlation and visibility of the step in which its gain was largest, the

@@ -203,8 +203,14 @@ class ForwardStep {
                                 1e3 * gain.after),
                     evident_);
     if (out_.small && out_.small->delta_bic <= small_->delta_bic) return std::nullopt;
-    out_.small = {id,  small_->delta_bic, small_->p_value, small_->held_out.fall, gain.before, gain.after,
-                  give};
+    out_.small = {id,
+                  small_->delta_bic,
+                  small_->p_value,
+                  small_->held_out.fall,
+                  gain.before,
+                  gain.after,
+                  give,
+                  held_out_confirms(stage_, small_->next)};
     return std::nullopt;
   }
 

@@ -89,7 +89,8 @@ double* place_of(const experiment::Observation& o, datasets::Throw& record) {
 
 std::optional<datasets::Throw> twin_throw(const datasets::ThrowLog& log, const datasets::Throw& logged,
                                           const CampaignThrow& thrown, const CampaignProblem& problem,
-                                          const FitResult& fit, std::uint64_t seed, std::uint64_t index) {
+                                          const FitResult& fit, const experiment::ObservationOptions& every,
+                                          std::uint64_t seed, std::uint64_t index) {
   const auto stream = [&](Purpose purpose) { return RandomStream(seed, index, purpose); };
   auto random = stream(Purpose::variation);
   std::vector<double> own;
@@ -100,8 +101,6 @@ std::optional<datasets::Throw> twin_throw(const datasets::ThrowLog& log, const d
                       ? 0.0
                       : std::clamp(random.normal(0, fit.own_spread[k]), u.low, u.high));
   }
-  experiment::ObservationOptions every;
-  every.settling = every.wrench_trust = 0;
   const auto observed = experiment::observe(log, logged, thrown.prepared, every);
   const auto predicted = problem.predict(thrown.prepared, observed, fit.values(), own);
   if (!predicted.landed()) return {};
@@ -126,8 +125,11 @@ datasets::ThrowLog twin_of(const datasets::ThrowLog& log, const CampaignProblem&
   out.title = fmt::format("synthetic twin of: {}", log.title);
   out.source =
       fmt::format("synthetic: simulated by unhand with {} as fitted, seed {}", problem.options().model, seed);
+  experiment::ObservationOptions every;
+  every.settling = every.wrench_trust = 0;
+  every.landing_noise = experiment::landing_noise(log);  // once, of all landings
   for (std::size_t i = 0; i < log.throws.size(); ++i)
-    if (auto one = twin_throw(log, log.throws[i], problem.throws()[i], problem, fit, seed, i))
+    if (auto one = twin_throw(log, log.throws[i], problem.throws()[i], problem, fit, every, seed, i))
       out.throws.push_back(std::move(*one));
   return out;
 }

@@ -2,11 +2,11 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <map>
 #include <vector>
 
+#include "fitting/clock.hpp"
 #include "fitting/measured/fall_discovery.hpp"
 #include "fitting/measured/measured_discovery.hpp"
 
@@ -133,14 +133,17 @@ NamedErrors named_errors(const FallProblem& problem, const GroupedFit& fit) {
 }
 
 MeasuredDiscovery discover_falls(const datasets::ThrowLog& log, const MeasuredOptions& options) {
-  const auto begin = std::chrono::steady_clock::now();
+  const auto begin = Clock::now();
   MeasuredDiscovery out;
   out.kind = "accelerometers in free fall";
   out.model = "free_fall";
   out.phase = "flight";
   FallProblem problem(log);
   const EffectSearch search = run_search(problem, options, out);
-  if (out.verdict == Verdict::not_answered) return out;
+  if (out.verdict == Verdict::not_answered) {
+    out.seconds = seconds_since(begin);
+    return out;
+  }
   out.before_train = named_errors(problem, search.base);
   out.before_test = named_errors(problem, search.base_test);
   out.after_train = named_errors(problem, search.final);
@@ -148,7 +151,7 @@ MeasuredDiscovery discover_falls(const datasets::ThrowLog& log, const MeasuredOp
   weigh_stability(out);
   explain(log, problem, search, out);
   weigh_drag_form(problem, search, options, out);
-  out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  out.seconds = seconds_since(begin);
   return out;
 }
 

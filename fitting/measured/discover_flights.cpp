@@ -2,10 +2,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "dynamics/median.hpp"
+#include "fitting/clock.hpp"
 #include "fitting/measured/flight_discovery.hpp"
 #include "fitting/measured/measured_discovery.hpp"
 #include "fitting/measured/rest_heights.hpp"
@@ -226,7 +226,7 @@ NamedErrors named_errors(const FlightProblem& problem, const GroupedFit& fit, in
 }
 
 MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const MeasuredOptions& options) {
-  const auto begin = std::chrono::steady_clock::now();
+  const auto begin = Clock::now();
   const int threads = options.search.fit.threads;
   MeasuredDiscovery out;
   out.kind = "free flights";
@@ -234,7 +234,10 @@ MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const Measured
   out.phase = "flight";
   FlightProblem problem(log, threads);
   const EffectSearch search = run_search(problem, options, out);
-  if (out.verdict == Verdict::not_answered) return out;
+  if (out.verdict == Verdict::not_answered) {
+    out.seconds = seconds_since(begin);
+    return out;
+  }
   out.before_train = named_errors(problem, search.base, threads);
   out.before_test = named_errors(problem, search.base_test, threads);
   out.after_train = named_errors(problem, search.final, threads);
@@ -251,7 +254,7 @@ MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const Measured
          fmt::format("{} frames in which the tracker was elsewhere for once were taken out",
                      problem.glitches()),
          false});
-  out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  out.seconds = seconds_since(begin);
   return out;
 }
 

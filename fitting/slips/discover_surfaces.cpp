@@ -2,12 +2,12 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <numbers>
 
+#include "fitting/clock.hpp"
 #include "fitting/distributions.hpp"
 #include "fitting/slips/surface_discovery.hpp"
 
@@ -255,7 +255,7 @@ SurfaceDiscovery discover_surfaces(const datasets::SlipLog& log, const SurfaceDi
 
 SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
                                    const SurfaceDiscoveryOptions& options) {
-  const auto begin = std::chrono::steady_clock::now();
+  const auto begin = Clock::now();
   SurfaceDiscovery out;
   MeasuredDiscovery& answer = out.answer;
   answer.kind = "slips";
@@ -271,6 +271,7 @@ SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
   if (laws.front().compared == 0) {
     answer.verdict = Verdict::not_answered;
     answer.message = answer.skipped.empty() ? "no surface" : answer.skipped.front().second;
+    answer.seconds = seconds_since(begin);
     return out;
   }
   answer.train = answer.test;
@@ -287,7 +288,7 @@ SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
   answer.verdict = found                ? Verdict::effect_found
                    : answer.unexplained ? Verdict::unexplained
                                         : Verdict::no_missing_effect;
-  answer.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  answer.seconds = seconds_since(begin);
   return out;
 }
 

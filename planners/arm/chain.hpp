@@ -95,9 +95,10 @@ struct Joint {
 
 /// A serial chain of revolute joints, from its base to its tip.
 struct Chain {
-  std::string name;           ///< for messages
-  std::vector<Joint> joints;  ///< from the base outwards
-  Transform<double> tip;      ///< in the last link's frame: the flange, or the tool on it
+  std::string name;                  ///< for messages
+  std::vector<Joint> joints;         ///< from the base outwards
+  Transform<double> tip;             ///< in the last link's frame: the flange, or the tool on it
+  std::vector<std::string> notes{};  ///< what a file says that the chain leaves out
 
   /// How many joints there are.
   int size() const { return static_cast<int>(joints.size()); }

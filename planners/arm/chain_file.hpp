@@ -37,8 +37,8 @@ Chain toml_chain(std::string_view text, const std::string& name);
 /// The chain from link `base` to link `tip` of a URDF file; empty names: the only root, the only leaf. Joints
 /// may be revolute or continuous, about any axis (frames are turned so that it is z), and fixed: a link fixed
 /// to a moving one belongs to it. Links beside the chain on joints that move (fingers) do not count, nor does
-/// their mass; a joint of the chain that mimics another is refused. A URDF tells no limits of acceleration
-/// and jerk. Throws datasets::ImportError with the line.
+/// their mass, as the chain's notes say; a joint of the chain that mimics another is refused. A URDF tells no
+/// limits of acceleration and jerk. Throws datasets::ImportError with the line.
 Chain read_urdf_chain(const std::filesystem::path& file, const std::string& base = "",
                       const std::string& tip = "");
 

@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "datasets/log_error.hpp"
 #include "planners/arm/chain_file.hpp"
@@ -123,6 +124,26 @@ class Urdf {
         out = together(out, seen_from(origin_of(*joint), solid(child, path)));
     return out;
   }
+  /// The mass of the link and of all links after it [kg].
+  double mass_from(const std::string& link) const {
+    double out = inertia_of(link).mass;
+    for (const auto& [child, joint] : joint_above)
+      if (parent_of(*joint) == link) out += mass_from(child);
+    return out;
+  }
+  /// What moves on the link's solid beside `path`, where it has a mass.
+  void note_beside(const std::string& link, const std::set<std::string>& path,
+                   std::vector<std::string>& notes) const {
+    for (const auto& [child, joint] : joint_above) {
+      if (parent_of(*joint) != link || path.contains(child)) continue;
+      if (attribute(*joint, "type") == "fixed")
+        note_beside(child, path, notes);
+      else if (const double mass = mass_from(child); mass > 0)
+        notes.push_back(
+            fmt::format("joint '{}' is beside the chain: what it moves, {:.3g} kg, does not count",
+                        attribute(*joint, "name"), mass));
+    }
+  }
 
   std::string name;
   std::map<std::string, const XMLElement*> links, joint_above;
@@ -210,6 +231,7 @@ Chain read_urdf_chain(const std::filesystem::path& file, const std::string& base
     if (!out.joints.empty()) {  // what hangs on the base does not move
       Inertia& moving = out.joints.back().link;
       moving = together(moving, seen_from(here, urdf.solid(link, on_path)));
+      urdf.note_beside(link, on_path, out.notes);
     }
   }
   out.tip = here;

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "dynamics/quintic.hpp"
+
 namespace unhand::planners::control {
 namespace {
 
@@ -108,14 +110,14 @@ double lyapunov(const Chain& truth, const TaskGains& gains, const Adaptation& ad
 
 TaskReference MinimumJerk::at(double t, const Eigen::Matrix3d& orientation) const {
   const double T = duration, s = std::clamp(t / T, 0.0, 1.0);
-  const Eigen::Vector3d way = to - from, a = from_velocity * T, b = to_velocity * T;
-  // x(s) = from + a s + c3 s³ + c4 s⁴ + c5 s⁵ with accelerations zero at both ends
-  const Eigen::Vector3d c3 = 10 * way - 6 * a - 4 * b, c4 = -15 * way + 8 * a + 7 * b,
-                        c5 = 6 * way - 3 * a - 3 * b;
+  // In s = t/T, with accelerations zero at both ends.
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  const auto c = dynamics::quintic_between<Eigen::Vector3d>({from, from_velocity * T, zero},
+                                                            {to, to_velocity * T, zero}, 1);
   TaskReference out;
-  out.position = from + s * (a + s * s * (c3 + s * (c4 + s * c5)));
-  out.velocity = (a + s * s * (3 * c3 + s * (4 * c4 + s * 5 * c5))) / T;
-  out.acceleration = s * (6 * c3 + s * (12 * c4 + s * 20 * c5)) / (T * T);
+  out.position = c[0] + s * (c[1] + s * s * (c[3] + s * (c[4] + s * c[5])));
+  out.velocity = (c[1] + s * s * (3 * c[3] + s * (4 * c[4] + s * 5 * c[5]))) / T;
+  out.acceleration = s * (6 * c[3] + s * (12 * c[4] + s * 20 * c[5])) / (T * T);
   out.orientation = orientation;
   return out;
 }

@@ -74,8 +74,8 @@ struct ElasticThrow {
   bool solved() const { return program.outcome == ProgramOutcome::solved; }
   /// Of the tip at the release [m/s].
   double speed() const { return std::hypot(release.vx, release.vz); }
-  /// From rest to the release [s].
-  double duration() const { return phases.back().points.back().t; }
+  /// From rest to the release [s]; 0 without phases.
+  double duration() const { return phases.empty() ? 0 : phases.back().points.back().t; }
 };
 
 /// Throws std::invalid_argument naming the option if the task makes no sense.

@@ -7,6 +7,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "dynamics/quintic.hpp"
+
 namespace unhand::planners::flip {
 namespace {
 
@@ -20,14 +22,9 @@ struct HandKnot {
 release::PolynomialHand::Polynomial::Coefficients between(const HandKnot& a, const HandKnot& b, double h) {
   release::PolynomialHand::Polynomial::Coefficients c{};
   for (std::size_t i = 0; i < 3; ++i) {
-    const double p = b.p[i] - a.p[i] - h * a.v[i] - 0.5 * h * h * a.a[i], v = b.v[i] - a.v[i] - h * a.a[i],
-                 w = b.a[i] - a.a[i];
-    c[0][i] = a.p[i];
-    c[1][i] = a.v[i];
-    c[2][i] = 0.5 * a.a[i];
-    c[3][i] = (10 * p - 4 * h * v + 0.5 * h * h * w) / (h * h * h);
-    c[4][i] = (-15 * p + 7 * h * v - h * h * w) / (h * h * h * h);
-    c[5][i] = (6 * p - 3 * h * v + 0.5 * h * h * w) / (h * h * h * h * h);
+    const auto quintic =
+        dynamics::quintic_between<double>({a.p[i], a.v[i], a.a[i]}, {b.p[i], b.v[i], b.a[i]}, h);
+    for (std::size_t power = 0; power < 6; ++power) c[power][i] = quintic[power];
   }
   return c;
 }

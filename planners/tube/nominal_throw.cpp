@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "dynamics/parallel.hpp"
+#include "flight/fly.hpp"
 #include "planners/arm/kinematics.hpp"
 
 namespace unhand::planners {
@@ -91,7 +92,8 @@ class Search {
       const double level = flight::tube_level({-distance, -e.z(), *speed * std::cos(elevation), v.z()},
                                               landing, options_.medium);
       const double margin = std::min({speed_margin, position_margin, -level});
-      if (margin > 0 && (!best || margin > best->margin))
+      if (!(margin > 0) || (best && best->margin >= margin)) continue;
+      if (!options_.clear_column || !through_column(frames, along, v))
         best = NominalThrow{{q, qd}, margin, speed_margin, position_margin, -level, *speed, elevation};
     }
     return best;
@@ -101,6 +103,31 @@ class Search {
   double weight(int i) const {
     const double most = chain_.joints[i].limits.velocity;
     return most * most;
+  }
+
+  /// Whether a throw from these frames flies through the arm's column.
+  bool through_column(const ChainFrames<double>& frames, const Vector2d& along, const Vector3d& v) const {
+    const Vector3d& p = frames.tip.p;
+    const double distance = along.dot(box_.middle.head<2>() - p.head<2>()),
+                 nearest = std::clamp(-along.dot(p.head<2>()), 0.0, distance);
+    const auto inside = [&](const Vector2d& at) { return at.norm() < options_.nearest_tip; };
+    if (!inside(p.head<2>() + nearest * along)) return false;
+    double top = -std::numeric_limits<double>::infinity();
+    for (int i = 0; i < chain_.size(); ++i)
+      if (inside(frames.links[i].p.head<2>())) top = std::max(top, frames.links[i].p.z());
+    flight::FlightProblem<double> flight;
+    flight.pose = {0, p.z(), 0};
+    flight.twist = {v.head<2>().norm(), v.z(), 0};
+    flight.gravity = {0, -options_.medium.gravity};
+    flight.drag_k = options_.medium.drag_k;
+    flight.landing_height = box_.middle.z();
+    const double duration = flight::fly(flight).landing.flight_time;
+    std::vector<double> times;
+    for (int k = 0; k <= 60; ++k) times.push_back(duration * k / 60);
+    const auto path = flight::fly_through(flight, times);
+    return std::any_of(path.begin(), path.end(), [&](const dynamics::Pose<double>& at) {
+      return at.z < top && inside(p.head<2>() + at.x * along);
+    });
   }
 
   /// The speed that lands `distance` ahead and `height` below.

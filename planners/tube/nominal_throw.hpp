@@ -33,6 +33,9 @@ struct NominalOptions {
   double lowest_tip{0.15}, nearest_tip{0.25};    ///< height, and level distance from the base's z axis [m]
   double shortest_throw{0.3};                    ///< level distance from the tip to the target [m]
   double speed_reserve{0.02};                    ///< of the joints' velocity limits, kept free
+  /// No flight through the arm's column: as near to the base's z axis as no tip is, and lower than the
+  /// highest joint that is as near.
+  bool clear_column{true};
   /// The arm as a planar one: joints named here stay at the given angle, and the first turns to the target.
   struct Fixed {
     int joint;     ///< index

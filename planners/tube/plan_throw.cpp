@@ -154,6 +154,15 @@ PlanResult plan_throw(const Chain& chain, const TargetBox& box, const PlanOption
   out.throws = static_cast<int>(throws.size());
   out.outcome = PlanOutcome::no_throw;
   out.reason = "no configuration reaches the box within the joints' limits";
+  if (throws.empty() && options.search.clear_column) {
+    NominalOptions any = options.search;
+    any.clear_column = false;
+    if (!find_throws(chain, box, any).empty())
+      out.reason = fmt::format(
+          "every throw to the box flies through the arm's own column, within {:g} m of the base's axis and "
+          "below its joints there",
+          any.nearest_tip);
+  }
   for (const NominalThrow& nominal : throws) {
     ++out.tried;
     const TubeProblem problem{chain, nominal.state, box.middle, options.search.window, options.search.medium};

@@ -24,6 +24,7 @@ using nlohmann::json;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
+using testing::StartsWith;
 namespace fs = std::filesystem;
 
 struct Answer {
@@ -101,6 +102,7 @@ class Cli : public testing::Test {
     const Answer answer = run(arguments);
     EXPECT_EQ(answer.code, code) << arguments << "\n" << answer.err;
     EXPECT_THAT(answer.err, HasSubstr(reason)) << arguments;
+    EXPECT_THAT(answer.err, StartsWith("unhand: ")) << arguments;
     EXPECT_THAT(answer.out, IsEmpty()) << arguments;
     EXPECT_EQ(files(), before) << arguments;
     if (code == 3) {

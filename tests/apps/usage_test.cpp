@@ -58,7 +58,7 @@ TEST_F(Cli, HelpHasAnExampleEverywhere) {
 }
 
 TEST_F(Cli, WrongUsage) {
-  EXPECT_EQ(run("").code, 2);
+  expect_refusal("", 2, "unhand: A subcommand is required\n");
   expect_refusal("juggle", 2, "there is no command 'juggle'");
   expect_refusal("discovr log.h5", 2, "there is no command 'discovr'; did you mean 'discover'?");
   expect_refusal("plan dance", 2, "there is no command 'dance'");
@@ -70,8 +70,9 @@ TEST_F(Cli, WrongUsage) {
   expect_refusal("discover a.h5 --model projectle", 2,
                  "--model: there is no 'projectle'; did you mean 'projectile'?");
   expect_refusal("crosscheck a.h5 --engine bulet", 2, "did you mean 'bullet'?");
-  EXPECT_EQ(run("compare").code, 2);
-  EXPECT_EQ(run("inspect " + quick + " --threads -1").code, 2);
+  expect_refusal("compare", 2, "unhand: LOG is required\n");
+  expect_refusal("inspect " + quick + " -z", 2, "unhand: The following argument was not expected: -z\n");
+  expect_refusal("inspect " + quick + " --threads -1", 2, "unhand: --threads: ");
   expect_refusal("generate nonsense --out a.h5", 2, "batch180");
   expect_refusal("generate quick12 --out a.h5 --effect flight.winds=1", 2, "did you mean 'flight.wind'?");
   expect_refusal("generate quick12 --out a.h5 --effect breeze=1", 2, "contact.stribeck");

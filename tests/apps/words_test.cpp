@@ -1,8 +1,12 @@
 // What the command says of numbers and of effects, without running it.
 #include <gmock/gmock.h>
 
+#include <tuple>
+#include <vector>
+
 #include "apps/ranking.hpp"
 #include "apps/table.hpp"
+#include "apps/weak_grip.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -23,10 +27,44 @@ TEST(Rounded, IsAsFarAsTheSigmaSays) {
   EXPECT_EQ(with_sigma(1, 1e-16, "m"), "1 m (held)") << "a sigma of rounding errors is none";
 }
 
+TEST(Fixed, HasNoMinusZero) {
+  EXPECT_EQ(fixed(true, -1e-9, 3), "0.000");
+  EXPECT_EQ(fixed(true, -0.0, 0), "0");
+  EXPECT_EQ(fixed(true, -0.0006, 3), "-0.001");
+  EXPECT_EQ(fixed(true, -20, 0), "-20");
+  EXPECT_EQ(fixed(true, -INFINITY, 1), "-inf");
+  EXPECT_EQ(fixed(false, 1, 1), "-");
+  EXPECT_EQ(with_sign(-1e-9, 4), "+0.0000");
+  EXPECT_EQ(with_sign(-0.25, 2), "-0.25");
+  EXPECT_EQ(with_sign(1, 1), "+1.0");
+}
+
+TEST(WeakGrip, NamesConditionsOfEveryObject) {
+  experiment::ModelComparison model;
+  model.model = "sliding_pivot";
+  const std::vector<std::tuple<const char*, const char*, bool>> thrown{
+      {"bar", "fast", true}, {"box", "fast", true}, {"box", "slow", true}, {"can", "fast", false}};
+  for (const auto& [object, condition, slips] : thrown)
+    for (int repetition = 0; repetition < 2; ++repetition) {
+      auto& one = model.throws.emplace_back();
+      one.object = object, one.condition = condition;
+      one.prediction.slips_at_start = slips;
+    }
+  testing::internal::CaptureStderr();
+  tell_weak_grip(model);
+  EXPECT_THAT(
+      testing::internal::GetCapturedStderr(),
+      testing::EndsWith("in 6 of 8 throws the grip cannot hold the object, which slips from the start; "
+                        "conditions bar, fast; box, fast; slow\n"));
+}
+
 TEST(SmallEffect, IsNotCalledSmallWhereHeldOutErrorsFall) {
   fitting::SmallEffect small{"contact.viscous", -369, 8e-4, 0.1, 1.23e-3, 0.911e-3, false};
   EXPECT_THAT(small_text(small),
-              testing::StartsWith("evident on the train throws, but the test throws do not"));
+              testing::AllOf(testing::StartsWith("evident on the train throws, but the test throws do not"),
+                             testing::EndsWith("and their likelihood does not rise enough)")));
+  small.likelier = true;
+  EXPECT_THAT(small_text(small), testing::EndsWith("and another of their errors grows)"));
   small.rms_after = 1.2e-3;
   EXPECT_THAT(small_text(small), testing::StartsWith("evident, but too small to matter: contact.viscous"));
   small.any_pads = true;

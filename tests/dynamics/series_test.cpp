@@ -1,10 +1,11 @@
-// Small tools on series: the straight line, and the noise on a smooth quantity.
+// Small tools on series: the straight line, the quintic, and the noise on a smooth quantity.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 #include <vector>
 
+#include "dynamics/quintic.hpp"
 #include "dynamics/straight_line.hpp"
 #include "dynamics/white_noise.hpp"
 
@@ -23,6 +24,25 @@ TEST(StraightLine, MinimisesTheSquares) {
   EXPECT_NEAR(sum, 0, 1e-14);
   EXPECT_NEAR(moment, 0, 1e-14);
   EXPECT_NEAR(line.at(1) - line.at(0), line.slope, 1e-14);
+}
+
+TEST(Quintic, MeetsBothStates) {
+  const std::array<double, 3> first{0.3, -2, 7}, last{1.1, 0.5, -40};
+  const double h = 0.25;
+  const auto c = quintic_between(first, last, h);
+  std::array<double, 3> begin{}, end{};  // each derivative of the sum, term by term
+  for (int k = 0; k < 6; ++k) {
+    double factor = c[k];
+    for (int d = 0; d < 3 && d <= k; ++d) {
+      begin[d] += k == d ? factor : 0;
+      end[d] += factor * std::pow(h, k - d);
+      factor *= k - d;
+    }
+  }
+  for (int d = 0; d < 3; ++d) {
+    EXPECT_DOUBLE_EQ(begin[d], first[d]);
+    EXPECT_NEAR(end[d], last[d], 1e-12);  // terms of some 1e3 cancel
+  }
 }
 
 TEST(WhiteNoise, IsToldFromASmoothMotionWithAJump) {

@@ -147,6 +147,7 @@ TEST_P(Corners, DiscoverAnswers) {
     options.campaign.integrator.tolerances = {1e-5, 1e-8};
     options.refits = 1;
     const Discovery found = discover(GetParam().log(), "(in memory)", options);
+    EXPECT_GT(found.seconds, 0);
     outcome_of(found.base);
     return std::string(to_string(found.verdict)) + ": " + found.message;
   });

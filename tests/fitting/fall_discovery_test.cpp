@@ -296,6 +296,18 @@ TEST(SurfaceDiscovery, AnEllipsoidMissesNothing) {
   EXPECT_EQ(found.answer.verdict, Verdict::no_missing_effect);
 }
 
+TEST(SurfaceDiscovery, NoAnswerTakesItsTimeToo) {
+  const auto none = discover_surfaces(std::vector<SlipSamples>{}, {}).answer;
+  EXPECT_EQ(none.verdict, Verdict::not_answered);
+  EXPECT_GT(none.seconds, 0);
+}
+
+TEST(FallDiscovery, NoAnswerTakesItsTimeToo) {
+  const auto none = discover_falls(falls({}, 1, 1), {});
+  EXPECT_EQ(none.verdict, Verdict::not_answered);
+  EXPECT_GT(none.seconds, 0);
+}
+
 TEST(SurfaceDiscovery, AQuarticIsFound) {
   const SlipSurface truth = test::quartic(contact::ConvexQuartic::isotropic_blend(2.8), 4.0);
   SurfaceDiscoveryOptions options;

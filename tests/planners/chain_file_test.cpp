@@ -147,6 +147,33 @@ TEST_F(ChainFile, Urdf) {
             forward_kinematics<double>(arm, Joints::Zero(2)).p);
 }
 
+TEST_F(ChainFile, UrdfSaysWhichMassesDoNotCount) {
+  std::string text = urdf;
+  const auto mass = [](const std::string& kg) {
+    return "<inertial><mass value=\"" + kg +
+           "\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>";
+  };
+  const auto joined = [](const std::string& joint, const std::string& type, const std::string& parent,
+                         const std::string& child) {
+    return "<joint name=\"" + joint + "\" type=\"" + type + "\"><parent link=\"" + parent +
+           "\"/><child link=\"" + child + "\"/></joint>\n";
+  };
+  text.replace(text.find("</robot>"), 8,
+               "<link name=\"finger\">" + mass("0.03") + "</link><link name=\"nail\">" + mass("0.005") +
+                   "</link><link name=\"camera\"/><link name=\"lens\"/><link name=\"cart\">" + mass("9") +
+                   "</link>\n" + joined("grip", "prismatic", "hand", "finger") +
+                   joined("glue", "fixed", "finger", "nail") +
+                   joined("pan", "revolute", "upper_mass", "camera") +
+                   joined("focus", "fixed", "camera", "lens") + joined("rail", "prismatic", "base", "cart") +
+                   "</robot>");
+  const Chain arm = read_urdf_chain(put("fingers.urdf", text), "world", "hand");
+  expect_two_links(arm);
+  // What has no mass is not missed, and the base bears what hangs on it.
+  EXPECT_THAT(arm.notes, testing::ElementsAre(
+                             "joint 'grip' is beside the chain: what it moves, 0.035 kg, does not count"));
+  EXPECT_THAT(read_urdf_chain(put("arm.urdf", urdf), "world", "hand").notes, testing::IsEmpty());
+}
+
 TEST_F(ChainFile, UrdfMistakesAreToldWhereTheyAre) {
   const auto refused = [&](std::string from, const std::string& to, const std::string& why) {
     std::string text = urdf;

@@ -69,6 +69,11 @@ ElasticThrow planned(Drive drive, int intervals, std::optional<Target> target = 
   return plan_throw(bsa3(), task, options);
 }
 
+TEST(ElasticThrow, WithoutAPlanIsNothing) {
+  EXPECT_FALSE(ElasticThrow{}.solved());
+  EXPECT_EQ(ElasticThrow{}.duration(), 0);
+}
+
 TEST(ElasticThrow, TheIntegratorAgreesAndNoLimitIsExceeded) {
   for (const Drive drive : {Drive::clutched, Drive::series, Drive::rigid}) {
     const ElasticThrow plan = planned(drive, 12);

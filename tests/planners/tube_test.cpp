@@ -67,6 +67,32 @@ TEST(NominalThrow, LandsInTheMiddleWithinTheLimits) {
     }
 }
 
+TEST(NominalThrow, FliesClearOfTheArmsColumn) {
+  const Chain arm = thrower();
+  const auto through = [&](const NominalThrow& one, const TargetBox& box) {
+    const auto frames = frames_of(arm, one.state.q);
+    const Eigen::Vector3d p = frames.tip.p, v = jacobian(arm, one.state.q).topRows<3>() * one.state.qd;
+    double top = 0;
+    for (int i = 0; i < arm.size(); ++i)
+      if (frames.links[i].p.head<2>().norm() < 0.25) top = std::max(top, frames.links[i].p.z());
+    for (double t = 0;; t += 1e-3) {
+      const Eigen::Vector3d at = p + t * v - Eigen::Vector3d{0, 0, 0.5 * 9.81 * t * t};
+      if (v.z() < 9.81 * t && at.z() < box.middle.z()) return false;
+      // 1 cm: the search looks at sixty points of the path only.
+      if (at.head<2>().norm() < 0.24 && at.z() < top) return true;
+    }
+  };
+  for (const TargetBox& box : {box_at(-0.5, 0, 0), box_at(0.4, 0.2, -0.2), box_at(0, -0.3, 0.3)}) {
+    NominalOptions options = few();
+    const auto clear = find_throws(arm, box, options);
+    options.clear_column = false;
+    const auto any = find_throws(arm, box, options);
+    EXPECT_FALSE(clear.empty());
+    for (const auto& one : clear) EXPECT_FALSE(through(one, box)) << box.middle.transpose();
+    EXPECT_TRUE(std::any_of(any.begin(), any.end(), [&](const auto& one) { return through(one, box); }));
+  }
+}
+
 TEST(NominalThrow, IsTheSameEveryTime) {
   NominalOptions threaded = few();
   threaded.threads = 3;
@@ -234,6 +260,11 @@ TEST(PlanThrow, SaysWhyThereIsNone) {
   PlanOptions options;
   options.search = few();
   EXPECT_EQ(plan_throw(thrower(), box_at(6, 0, 0), options).outcome, PlanOutcome::no_throw);
+  for (const TargetBox& inside : {box_at(0, 0, -0.2), box_at(0.1, 0, 0.1)}) {
+    const auto own = plan_throw(thrower(), inside, options);
+    EXPECT_EQ(own.outcome, PlanOutcome::no_throw);
+    EXPECT_THAT(own.reason, testing::HasSubstr("flies through the arm's own column"));
+  }
   options.search = planar();
   Chain arm = thrower();
   for (Joint& joint : arm.joints) joint.limits.torque = 1;  // it cannot even hold itself
