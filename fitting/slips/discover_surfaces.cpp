@@ -42,7 +42,8 @@ std::map<int, double> by_slip(const SlipSamples& slips, const std::vector<double
 }
 
 /// Do pushes that know nothing of each other err the same way where their wrenches are alike? Every sample
-/// against the one of another slip whose direction of wrench is nearest; slips are the observations.
+/// against the one of another slip whose direction of wrench is nearest. Pairs of slips are the observations:
+/// of errors that know nothing of each other, the products in different pairs do not correlate.
 Paired left_by(const SlipSamples& slips, const SlipSurface& surface, double& correlation) {
   const std::size_t n = slips.samples.size();
   std::vector<Eigen::Vector3d> residual(n), at(n);
@@ -55,7 +56,8 @@ Paired left_by(const SlipSamples& slips, const SlipSurface& surface, double& cor
     at[i] = Eigen::Vector3d(s.wrench[0], s.wrench[1], s.wrench[2]).normalized();
     squares += residual[i].squaredNorm() / static_cast<double>(n);
   }
-  std::map<int, std::pair<double, double>> sums;
+  std::map<std::pair<int, int>, double> sums;
+  double count = 0;
   for (std::size_t i = 0; i < n; ++i) {
     double nearest = -2;
     std::size_t other = i;
@@ -63,11 +65,12 @@ Paired left_by(const SlipSamples& slips, const SlipSurface& surface, double& cor
       if (slips.samples[j].slip != slips.samples[i].slip && at[i].dot(at[j]) > nearest)
         nearest = at[i].dot(at[j]), other = j;
     if (other == i) continue;
-    auto& [sum, count] = sums[slips.samples[i].slip];
-    sum += residual[i].dot(residual[other]) / squares, count += 1;
+    sums[std::minmax({slips.samples[i].slip, slips.samples[other].slip})] +=
+        residual[i].dot(residual[other]) / squares;
+    count += 1;
   }
-  Paired out;
-  for (const auto& [slip, s] : sums) out.add(s.first / s.second);
+  Paired out;  // whose mean is the mean over samples
+  for (const auto& [pair, sum] : sums) out.add(sum * static_cast<double>(sums.size()) / count);
   correlation = out.mean();
   return out;
 }
@@ -90,7 +93,7 @@ std::string id_of(SurfaceModel model) { return "contact.law:" + to_string(model)
 struct LawScore {
   SurfaceModel model{};
   Paired gain;  ///< by slip: how much less the law errs [deg]
-  Paired left;  ///< left_by, over slips
+  Paired left;  ///< left_by, over pairs of slips
   int better{}, compared{};
   // Means over the surfaces: held-out errors, the law's own in sample and in level, what the null control
   // gains.

@@ -318,6 +318,24 @@ TEST(SurfaceDiscovery, AQuarticIsFound) {
   EXPECT_LT(found.answer.effects.front().test_error_ratio.value(), 0.8);
 }
 
+// Two samples that are each other's nearest are one observation: of noise alone, the correlation of
+// neighbours is as uncertain as it is said to be.
+TEST(SurfaceDiscovery, NeighboursOfNoiseCorrelateAsTheirSigmaSays) {
+  const Eigen::Matrix3d diagonal = Eigen::Vector3d(1 / 16.0, 1 / 9.0, 1 / 25.0).asDiagonal();
+  SurfaceDiscoveryOptions options;
+  options.comparison.null_draws = 0;
+  options.forget = {"contact.law:ellipsoid_full", "contact.law:convex_quartic"};
+  constexpr unsigned kSets = 200;
+  double squares = 0;
+  for (unsigned set = 0; set < kSets; ++set) {
+    const auto found =
+        discover_surfaces({test::simulate(test::ellipsoid(diagonal), 60, 0.08, 0.03, 100 + set)}, options);
+    const auto& left = found.evidence.front();
+    squares += std::pow(left.left / left.left_sigma, 2) / kSets;
+  }
+  EXPECT_NEAR(std::sqrt(squares), 1, 0.2);  // known to 5 %, and some scatter is fitted away
+}
+
 // A control that was not made is no evidence, and one in which the law gains does not speak for it.
 TEST(SurfaceDiscovery, TheNullControlSaysWhatItFound) {
   const auto control = [](const SlipSamples& slips, SurfaceModel base, int draws) {
