@@ -22,6 +22,13 @@ struct Series {
   bool operator==(const Series&) const = default;
 };
 
+/// Whether all samples of a column are the same, as those of a dead sensor are.
+inline bool is_constant(const Series& series, std::size_t column = 0) {
+  for (std::size_t i = 1; i < series.rows; ++i)
+    if (series(i, column) != series(0, column)) return false;
+  return true;
+}
+
 /// One flag per sample, 0 or 1.
 using Flags = std::vector<std::uint8_t>;
 

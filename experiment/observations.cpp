@@ -42,12 +42,6 @@ double sigma_of(const Series& series, std::size_t column, double least) {
   return std::max(sigma, least);
 }
 
-bool is_dead(const Series& series, std::size_t column) {
-  for (std::size_t i = 1; i < series.rows; ++i)
-    if (series(i, column) != series(0, column)) return false;
-  return true;
-}
-
 /// What turns a force into a torque where a wrench is judged as a whole: c a of a finger's pad [m].
 constexpr double kPadLength = 0.007;
 
@@ -67,7 +61,7 @@ void add_wrench(const datasets::FtLog& ft, const PreparedThrow& prepared, const 
   double sigma[3];
   for (std::size_t c = 0; c < 3; ++c) {
     sigma[c] = sigma_of(ft.wrench, c, least[c]);
-    if (is_dead(ft.wrench, c)) {
+    if (datasets::is_constant(ft.wrench, c)) {
       sigma[c] = 0;
       out.dead.push_back(next(Channel::wrench_fx, c));
     }
@@ -87,6 +81,7 @@ void add_wrench(const datasets::FtLog& ft, const PreparedThrow& prepared, const 
 
 /// After the release the true normal force is zero, so what is read there is the sensor's own.
 void add_normal_force(const datasets::FtLog& ft, const PreparedThrow& prepared, Observations& out) {
+  if (datasets::is_constant(ft.normal_force)) out.dead.push_back(Channel::normal_force);
   if (!prepared.normal_force || !std::isfinite(prepared.normal_force->release_time())) return;
   const double from = prepared.normal_force->release_time() + 0.005,
                sigma = sigma_of(ft.normal_force, 0, kLeastForce);

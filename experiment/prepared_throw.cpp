@@ -98,12 +98,34 @@ release::HandFit fitted_hand(const Source& source) {
   }
 }
 
+/// Whether the log shows that the pads let go: a landing, a free flight, or an object that motion capture
+/// last sees elsewhere in the hand than first.
+bool lets_go(const Source& source, const release::HandMotion& hand) {
+  if (source.logged.landing || source.logged.free_flight) return true;
+  if (!source.logged.mocap) return false;
+  constexpr double kGone = 0.05;  // [m]
+  const datasets::MocapLog& mocap = *source.logged.mocap;
+  const Window whole{hand.begin(), hand.end()};
+  std::optional<double> first;
+  double last = 0;
+  for (std::size_t i = 0; i < mocap.time.rows; ++i) {
+    const double t = mocap.time(i);
+    if (!mocap.is_valid(i) || t < hand.begin() || t > hand.end()) continue;
+    const auto pose = hand.at(whole, t).pose;
+    last = std::hypot(mocap.pose(i, 0) - pose.x, mocap.pose(i, 1) - pose.z);
+    if (!first) first = last;
+  }
+  return first && std::abs(last - *first) > kGone;
+}
+
 void smooth_force(const Source& source, PreparedThrow& out) {
-  if (!source.logged.ft) return;
+  if (!source.logged.ft || datasets::is_constant(source.logged.ft->normal_force)) return;
   const auto& series = source.logged.ft->normal_force;
+  contact::NormalForceOptions options;
+  if (lets_go(source, out.hand)) options.max_tail_bias = 0.5;  // what is left then is the sensor's
   try {
     auto force = contact::smooth_normal_force(source.logged.ft->time.data, series.data,
-                                              series.sigma.empty() ? 0.0 : series.sigma.front());
+                                              series.sigma.empty() ? 0.0 : series.sigma.front(), options);
     out.normal_force = std::move(force.force);
     out.force_fit = force.summary;
   } catch (const std::invalid_argument& error) {

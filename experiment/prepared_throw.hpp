@@ -31,7 +31,8 @@ struct PreparedThrow {
   datasets::Split split{};                                  ///< whether it may be fitted to
   release::PolynomialHand hand;                             ///< smoothed
   release::HandFitSummary hand_fit;                         ///< how well it explains the logged hand
-  std::optional<contact::SampledNormalForce> normal_force;  ///< of one pad; absent if it was not measured
+  std::optional<contact::SampledNormalForce> normal_force;  ///< of one pad; absent if it was not measured,
+                                                            ///< or is dead
   contact::NormalForceSummary
       force_fit;                     ///< how well it explains the logged force; without a force, its defaults
   dynamics::RigidBody<double> body;  ///< declared; kg, kg m²
@@ -53,6 +54,9 @@ struct PreparedThrow {
 /// by its declared σ). The grasp angle is the mean of θ_O − θ_H over the motion capture before the gripper is
 /// told to open; the log's `grasp_angle` is used where there is none. The CoM lies at the declared
 /// `com_offset` on the object's x axis; if it is not declared, where motion capture saw it.
+///
+/// Where the log shows that the pads let go, a normal force may end at up to half its grip (an untared
+/// sensor); else a level above NormalForceOptions::max_tail_bias means that they still press.
 ///
 /// Throws datasets::LogError, naming the path inside `file`, when the throw lacks what a release needs: the
 /// hand, the planar inertia, a grasp, an opening time.

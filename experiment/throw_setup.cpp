@@ -139,12 +139,14 @@ double ThrowReader<S>::first() const {
 template <class S>
 Pose<S> ThrowReader<S>::com(const S& t) const {
   if (value_of(t) >= value_of(result_.detach.time)) return flying(t - result_.detach.time);
-  if (value_of(t) >= first()) return sample_release(problem_, result_, t).pose;
+  const bool held = !result_.trajectory.empty();  // not free from the start
+  if (held && value_of(t) >= first()) return sample_release(problem_, result_, t).pose;
   // Before the simulation starts: held, in the hand's motion continued backwards.
-  const auto& piece = result_.trajectory.pieces.front();
   contact::Scene<S> scene;
-  scene.hand = problem_.hand.at(piece.phase.window, t).pose;
-  return contact::object_pose(scene, contact::Relative<S>::from(piece.nodes[0]));
+  scene.hand = problem_.hand.at({problem_.start, problem_.hand.end()}, t).pose;
+  return contact::object_pose(
+      scene,
+      held ? contact::Relative<S>::from(result_.trajectory.pieces.front().nodes[0]) : result_.relative);
 }
 
 /// `since` [s] after the detach; flights in air were integrated once, over the whole series.

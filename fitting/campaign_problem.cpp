@@ -260,6 +260,9 @@ Linearisation CampaignProblem::linearise(const experiment::PreparedThrow& prepar
     out.modes = predicted.modes;
     out.detach = dynamics::value_of(predicted.detach.time);
     out.solved = predicted.channels.size() == all.size() && predicted.landed();
+    if (!out.solved)
+      out.why_not = predicted.release != release::ReleaseOutcome::detached ? in_words(predicted.release)
+                                                                           : in_words(predicted.flight);
     for (std::size_t i = 0; out.solved && i < all.size(); ++i)
       out.residual[static_cast<Eigen::Index>(i)] =
           (dynamics::value_of(predicted.channels[i]) - all[i].value) / all[i].sigma;

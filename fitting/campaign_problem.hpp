@@ -80,6 +80,7 @@ enum class DerivativesBy {
 /// own.
 struct Linearisation {
   bool solved{};                  ///< false: release or flight has no answer, and what follows is empty
+  std::string why_not;            ///< then: why, in words
   Eigen::VectorXd residual;       ///< one per observation [σ]
   Eigen::MatrixXd campaign, own;  ///< its derivatives, a column per unknown; 0 by what was not asked for
   std::vector<int> modes;         ///< the modes entered, in order

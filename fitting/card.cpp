@@ -99,6 +99,9 @@ void widen(std::map<std::string, CardRange>& range, const experiment::PreparedTh
   }
 }
 
+/// For predictions: what leaves no trace in a log adds nothing to them.
+double variance_of(const FittedUnknown& u) { return std::isfinite(u.sigma) ? u.sigma * u.sigma : 0; }
+
 }  // namespace
 
 std::vector<Condition> conditions_of(const experiment::PreparedThrow& one) {
@@ -187,13 +190,19 @@ ModelCard card_of(const CampaignProblem& problem, const FitResult& fit) {
   card.model = problem.options().model;
   card.effects = problem.options().effects;
   auto& covariance = card.covariance.emplace();
-  for (std::size_t k = 0; k < fit.campaign.size(); ++k) {
+  const std::size_t n = fit.campaign.size();
+  std::vector<std::size_t> known;  // what leaves no trace in the log has no sigma
+  for (std::size_t k = 0; k < n; ++k) {
     const FittedUnknown& u = fit.campaign[k];
-    card.parameters[u.unknown.name] = {
-        u.value, u.sigma, u.unknown.unit, is_determined(fit, k), u.degrees_of_freedom, u.profile};
+    auto& one = card.parameters[u.unknown.name] = {
+        u.value, {}, u.unknown.unit, is_determined(fit, k), u.degrees_of_freedom, u.profile};
+    if (!std::isfinite(fit.covariance[k * n + k])) continue;
+    one.sigma = u.sigma;
+    known.push_back(k);
     covariance.names.push_back(u.unknown.name);
   }
-  covariance.matrix = fit.covariance;
+  for (const std::size_t k : known)
+    for (const std::size_t j : known) covariance.matrix.push_back(fit.covariance[k * n + j]);
   if (card.model != contact::kGripperDelay) {
     card.parameters["pads"] = {static_cast<double>(problem.model().pads), {}, "-"};
     card.parameters["reference_force"] = {problem.model().reference_force, {}, "N"};
@@ -264,7 +273,7 @@ FitResult fit_of(const ModelCard& card, const CampaignProblem& problem, const st
     if (found == card.parameters.end())
       throw CardError(file, "/parameters/" + u.name, why_taken(u.name, card.model));
     const auto& p = found->second;
-    const double sigma = p.sigma.value_or(0);
+    const double sigma = p.sigma.value_or(p.determined ? 0 : HUGE_VAL);
     out.campaign.push_back({u, p.value, sigma, p.determined ? sigma : HUGE_VAL, false,
                             p.degrees_of_freedom.value_or(kCertain), p.interval95});
     std::size_t k = none;
@@ -280,7 +289,7 @@ FitResult fit_of(const ModelCard& card, const CampaignProblem& problem, const st
       if (place[i] < none && place[j] < none)
         out.covariance.push_back(card.covariance->matrix[place[i] * none + place[j]]);
       else
-        out.covariance.push_back(i == j ? out.campaign[i].sigma * out.campaign[i].sigma : 0.0);
+        out.covariance.push_back(i == j ? variance_of(out.campaign[i]) : 0.0);
     }
   for (const auto& u : problem.own()) {
     const auto spread = card.own_spreads.find(u.name);

@@ -189,9 +189,12 @@ FitResult fit_from(std::vector<double> start, const CampaignProblem& problem, co
         !any ? fmt::format("none of the log's {} throws has the split '{}', and no others are fitted to",
                            problem.throws().size(), train ? "train" : "test")
         : rounds.refused()
-            ? fmt::format("throw {} could not be simulated with the parameters that the fit starts from",
-                          out.throws[*rounds.refused()].id)
-            : "no throw of the fit's share could be simulated with the parameters that it starts from";
+            ? fmt::format("throw {} could not be simulated with the parameters that the fit starts from: {}",
+                          out.throws[*rounds.refused()].id, rounds.why_not())
+            : fmt::format(
+                  "no throw of the fit's share could be simulated with the parameters that it starts "
+                  "from: {}",
+                  rounds.why_not());
     return out;
   }
   for (int round = 0; round < options.rounds; ++round) {

@@ -1,5 +1,7 @@
 #include "fitting/fit_rounds.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -40,10 +42,12 @@ void FitRounds::choose_throws(const std::vector<double>& start) {
     asked[i] = 1;
     try {
       starts[i] = problem_.linearise(throws[i], start, own, DerivativesBy::nothing);
-    } catch (const std::invalid_argument&) {
-      // a start outside the physics
+    } catch (const std::invalid_argument& error) {  // a start outside the physics
+      starts[i].why_not = error.what();
     }
   });
+  for (std::size_t i = 0; i < throws.size(); ++i)
+    if (asked[i] && !starts[i].solved) ++why_not_[starts[i].why_not];
   if (!options_.throws.empty())
     for (std::size_t i = 0; i < throws.size() && !refused_; ++i)
       if (asked[i] && !starts[i].solved) refused_ = i;
@@ -59,6 +63,12 @@ void FitRounds::choose_throws(const std::vector<double>& start) {
     weigh(starts[i], throws[i].observed, throws[i], shared_.weighting);
     chi2_.push_back(starts[i].residual.squaredNorm());
   }
+}
+
+std::string FitRounds::why_not() const {
+  const auto most = std::max_element(why_not_.begin(), why_not_.end(),
+                                     [](const auto& a, const auto& b) { return a.second < b.second; });
+  return most == why_not_.end() ? "" : fmt::format("{} ({} throws)", most->first, most->second);
 }
 
 bool FitRounds::is_fixed(const Unknown& unknown) const {
