@@ -208,6 +208,22 @@ TEST(FlipPlant, RefusesCommandsOutOfRange) {
   EXPECT_THROW(plant.throw_bar(u, robot().bar, 1), std::invalid_argument);
 }
 
+TEST(FlipPlant, RefusesOptionsOutOfRange) {
+  const auto refusal = [](int substeps, double noise, int passes) -> std::string {
+    try {
+      FlipPlant(robot(), 1).throw_bar(middle(), robot().bar, 1, {{substeps, noise}, passes});
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(refusal(1, 1, -1), "flip plant: reaction_passes = -1; accepted: 0 to 64");
+  EXPECT_NE(refusal(1, 1, 65), "");
+  EXPECT_NE(refusal(0, 1, 1).find("substeps = 0"), std::string::npos);
+  EXPECT_NE(refusal(1, -0.1, 1).find("noise = -0.1"), std::string::npos);
+  EXPECT_NE(refusal(1, NAN, 1).find("noise = nan"), std::string::npos);
+}
+
 // The paper's trends, over the declared robot's 27 commands.
 TEST(FlipPopulation, Trends) {
   const FlipPlant plant(exact_robot(), 1);
