@@ -36,7 +36,7 @@ DesignedExcitation design_excitation(const Chain& chain, const ExcitationOptions
 
 /// One line of a log.
 struct MotionSample {
-  JointVector<double> q, qd, qdd, torque;  ///< rad, rad/s, rad/s², N m; friction taken away
+  JointVector<double> q, qd, qdd, torque;  ///< rad, rad/s, rad/s², N m, less friction and rotors' inertia
 };
 
 /// What a log determines: combinations βᵀ = πᵀ V of the parameters, orthonormal columns V.
