@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "datasets/import_phyphox.hpp"
+#include "datasets/median_step.hpp"
 #include "datasets/near_miss.hpp"
-#include "dynamics/median.hpp"
 
 namespace unhand::datasets {
 namespace {
@@ -26,13 +26,6 @@ bool move_channel(std::optional<Part>& to, std::optional<Part>& from, bool repla
   if (to && !replace) return false;
   to = std::move(from);
   return true;
-}
-
-/// The median of the steps between samples.
-double usual_step(const Series& time) {
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < time.rows; ++i) steps.push_back(time(i) - time(i - 1));
-  return steps.empty() ? 0 : dynamics::median(steps);
 }
 
 }  // namespace
@@ -122,7 +115,7 @@ std::optional<LandingLog> landing_of(const MocapLog& mocap, int dimension, doubl
   if (!k) return {};
   std::size_t i = *k - 1;  // the highest lies before
   while (!mocap.is_valid(i)) --i;
-  if (mocap.time(*k) - mocap.time(i) > 1.5 * usual_step(mocap.time)) return {};  // lost where it passes
+  if (mocap.time(*k) - mocap.time(i) > 1.5 * median_step(mocap.time)) return {};  // lost where it passes
   const double above = mocap.pose(i, up) - height, below = mocap.pose(*k, up) - height;
   const double s = above / (above - below);
   const auto at = [&](std::size_t j) { return (1 - s) * mocap.pose(i, j) + s * mocap.pose(*k, j); };

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "datasets/csv.hpp"
+#include "datasets/median_step.hpp"
 #include "datasets/near_miss.hpp"
 #include "dynamics/median.hpp"
 #include "dynamics/third_difference.hpp"
@@ -105,12 +106,6 @@ ImuLog read_imu(const std::filesystem::path& file) {
 
 double magnitude(const ImuLog& imu, std::size_t i) {
   return std::hypot(imu.specific_force(i, 0), imu.specific_force(i, 1), imu.specific_force(i, 2));
-}
-
-double step_of(const ImuLog& imu) {
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < imu.time.rows; ++i) steps.push_back(imu.time(i) - imu.time(i - 1));
-  return steps.empty() ? 0 : dynamics::median(steps);
 }
 
 /// Times in another unit than seconds, and accelerations in another than m/s², by what phones do: they sample
@@ -266,7 +261,7 @@ PhyphoxRecording read_phyphox(const std::filesystem::path& file, const PhyphoxOp
   ImuLog imu = read_imu(file);
   PhyphoxRecording out;
   out.samples = imu.time.rows;
-  const double step = step_of(imu);
+  const double step = median_step(imu.time);
   out.rest = check_units(file, imu, step);
 
   std::vector<Stretch> falls;

@@ -34,7 +34,7 @@ struct CardCovariance {
 
 /// 1 σ from throw to throw of a number that every throw has for itself ("grasp_angle").
 struct CardSpread {
-  double sigma = 0;  ///< in `unit`, > 0
+  double sigma = 0;  ///< in `unit`, >= 0; 0: it is the same in all throws. Fits write more than 0
   std::string unit;  ///< "-" where it has none
   bool operator==(const CardSpread&) const = default;
 };

@@ -17,14 +17,24 @@ using dynamics::value_of;
 
 namespace {
 
+/// ω̇ in the body, of the ratios (I₂ − I₃)/I₁ and so on in turn, with the damping c.
+template <class S>
+Vec3<S> spin_rate(const Vec3<S>& ratios, const S& damping, const Vec3<S>& w) {
+  return {ratios[0] * w[1] * w[2] - damping * w[0], ratios[1] * w[2] * w[0] - damping * w[1],
+          ratios[2] * w[0] * w[1] - damping * w[2]};
+}
+
+template <class S>
+Vec3<S> inertia_ratios(const Vec3<S>& inertia) {
+  return {S((inertia[1] - inertia[2]) / inertia[0]), S((inertia[2] - inertia[0]) / inertia[1]),
+          S((inertia[0] - inertia[1]) / inertia[2])};
+}
+
 /// State: the attitude against the start's (w, x, y, z) and ω in the body.
 template <class P>
 class Turning final : public dynamics::HybridSystemFrom<Turning<P>, 7> {
  public:
-  Turning(const Vec3<P>& inertia, const P& damping)
-      : damping_(damping),
-        ratios_{P((inertia[1] - inertia[2]) / inertia[0]), P((inertia[2] - inertia[0]) / inertia[1]),
-                P((inertia[0] - inertia[1]) / inertia[2])} {}
+  Turning(const Vec3<P>& ratios, const P& damping) : damping_(damping), ratios_(ratios) {}
   dynamics::FlowKind kind(int) const override { return dynamics::FlowKind::smooth; }
   std::string_view mode_name(int) const override { return "turning"; }
   int guard_count(int) const override { return 0; }
@@ -33,13 +43,10 @@ class Turning final : public dynamics::HybridSystemFrom<Turning<P>, 7> {
   template <class S>
   void flow_(const Phase&, const S&, const State<S, 7>& y, State<S, 7>& dy) const {
     const Quaternion<S> rate = Quaternion<S>{y[0], y[1], y[2], y[3]} * Quaternion<S>{S(0), y[4], y[5], y[6]};
-    dy = {0.5 * rate.w,
-          0.5 * rate.x,
-          0.5 * rate.y,
-          0.5 * rate.z,
-          convert<S>(ratios_[0]) * y[5] * y[6] - convert<S>(damping_) * y[4],
-          convert<S>(ratios_[1]) * y[6] * y[4] - convert<S>(damping_) * y[5],
-          convert<S>(ratios_[2]) * y[4] * y[5] - convert<S>(damping_) * y[6]};
+    const Vec3<S> spin =
+        spin_rate<S>({convert<S>(ratios_[0]), convert<S>(ratios_[1]), convert<S>(ratios_[2])},
+                     convert<S>(damping_), {y[4], y[5], y[6]});
+    dy = {0.5 * rate.w, 0.5 * rate.x, 0.5 * rate.y, 0.5 * rate.z, spin[0], spin[1], spin[2]};
   }
   template <class S>
   void guards_(const Phase&, const S&, const State<S, 7>&, S*) const {}
@@ -80,6 +87,8 @@ Rotation<S>::Rotation(const Vec3<S>& inertia, const RotationState<S>& start, con
     throw std::invalid_argument("free rotation: the damping is not finite");
   attitude_ = normalised(start.attitude);
   omega_ = start.omega;
+  const Vec3<S> ratios = inertia_ratios(inertia);
+  spin_rate_ = spin_rate(ratios, damping, omega_);
   // A difference of zero may still carry a derivative; then the closed form would lose it.
   closed_form_ =
       (is_zero(S(inertia[0] - inertia[1])) && is_zero(S(inertia[1] - inertia[2])) && is_zero(damping)) ||
@@ -90,7 +99,7 @@ Rotation<S>::Rotation(const Vec3<S>& inertia, const RotationState<S>& start, con
   recorded.longest_step =
       std::max(options.longest_step, last);  // no guards: the error alone chooses the step
   const State<S, 7> y{S(1), S(0), S(0), S(0), omega_[0], omega_[1], omega_[2]};
-  auto solution = dynamics::integrate<S, 7>(Turning<S>(inertia, damping), Entry<S, 7>{0, S(0), y, S(0)},
+  auto solution = dynamics::integrate<S, 7>(Turning<S>(ratios, damping), Entry<S, 7>{0, S(0), y, S(0)},
                                             S(last), recorded);
   if (solution.outcome != dynamics::Outcome::horizon)
     throw std::runtime_error(fmt::format("free rotation: not solved ({})", to_string(solution.outcome)));
@@ -99,8 +108,8 @@ Rotation<S>::Rotation(const Vec3<S>& inertia, const RotationState<S>& start, con
 
 template <class S>
 RotationState<S> Rotation<S>::at(const S& t) const {
-  if (closed_form_) return {attitude_ * exp(scaled(t, omega_)), omega_};
-  if (!(value_of(t) > 0)) return {attitude_, omega_};
+  if (closed_form_ || !(value_of(t) > 0))  // at the start the first order carries all derivatives
+    return {attitude_ * exp(scaled(t, omega_)), sum(omega_, scaled(t, spin_rate_))};
   const State<S, 7> y = trajectory_.at(t);
   return {attitude_ * normalised(Quaternion<S>{y[0], y[1], y[2], y[3]}), {y[4], y[5], y[6]}};
 }

@@ -39,12 +39,13 @@ class Rotation {
   /// From 0 to `last` [s]. Throws as rotate_freely does, and when c is not finite.
   Rotation(const Vec3<S>& inertia, const RotationState<S>& start, const S& damping, double last,
            const dynamics::IntegratorOptions& options = {});
-  /// `t` [s] after the start, in [0, last].
+  /// `t` [s] after the start, in [0, last]; derivatives of `t` are carried, at the start too.
   RotationState<S> at(const S& t) const;
 
  private:
   Quaternion<S> attitude_;
   Vec3<S> omega_;
+  Vec3<S> spin_rate_;  ///< ω̇ at the start
   bool closed_form_{};
   dynamics::Trajectory<S, 7> trajectory_;
 };

@@ -177,12 +177,6 @@ std::vector<Term> terms_for(Response response) {
 
 }  // namespace
 
-std::vector<std::string> acceleration_names() {
-  std::vector<std::string> out;
-  for (const Term& term : acceleration_terms()) out.push_back(term.name);
-  return out;
-}
-
 std::array<double, 3> MissingCurve::at(double time) const {
   std::array<double, 3> out{};
   for (std::size_t c = 0; c < 3; ++c)

@@ -77,9 +77,6 @@ struct MissingCandidate {
 /// Wrenches: a constant, f_N, and f_N² of each component, and |v| and ω for their dependence on the motion.
 MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const MissingOptions& options);
 
-/// The names of the accelerations that missing_terms tries.
-std::vector<std::string> acceleration_names();
-
 /// χ² of the traces around what a candidate says, each recording's own offset and slope projected out where
 /// the response is integrated.
 struct Rest {

@@ -81,7 +81,7 @@ VectorXd fitted(const std::vector<Footing>& parts, const std::vector<bool>& kept
   return values;
 }
 
-/// The groups whose misfit is gross, by place among `misfits`; the worst first.
+/// The groups whose misfit is gross, by place among `misfits` and in that order.
 std::vector<std::size_t> gross(const std::vector<double>& misfits, std::vector<WildGroup>& out) {
   std::vector<std::size_t> places;
   out.clear();

@@ -78,8 +78,10 @@ class AdaptiveController {
   bool started_{};
 };
 
-/// ½ sᵀ M s + ½ k |e_p|² + ½ k_r |e_r|² + ½ π̃ᵀ R_p⁻¹ π̃ over the adapted parameters, M of the true chain: it
-/// falls as −sᵀ k_v s − γ |Y_f π̃|²_R_t under the task law without noise, limits and friction left over.
+/// ½ sᵀ M s + ½ k |e_p|² + ½ k_r |e_r|² + ½ π̃ᵀ R_p⁻¹ π̃ over the adapted parameters, M of the true chain. If α
+/// were dβ/dt it would fall as −sᵀ k_v s − γ |Y_f π̃|²_R_t under the task law without noise, limits and
+/// friction left over. α as printed is not where the null space turns: even then V rises at times within a
+/// motion, and is lower only after the repetitions than before them (docs/adaptive-control.md).
 double lyapunov(const Chain& truth, const TaskGains& gains, const Adaptation& adaptation,
                 const ControlStep& step, const JointVector<double>& q, const LinkParameters& error);
 

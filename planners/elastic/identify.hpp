@@ -36,7 +36,7 @@ DesignedExcitation design_excitation(const Chain& chain, const ExcitationOptions
 
 /// One line of a log.
 struct MotionSample {
-  JointVector<double> q, qd, qdd, torque;  ///< rad, rad/s, rad/s², N m; friction taken away
+  JointVector<double> q, qd, qdd, torque;  ///< rad, rad/s, rad/s², N m, less friction and rotors' inertia
 };
 
 /// What a log determines: combinations βᵀ = πᵀ V of the parameters, orthonormal columns V.
@@ -52,7 +52,8 @@ struct IdentifiedInertia {
 /// Least squares for the identifiable combinations, then bodies for them: each link's pseudo-inertia is J = U
 /// Uᵀ with an upper triangular U of positive diagonal (log-Cholesky, [RuckerWensing2022]), so that no
 /// estimate is unphysical; what the log does not determine stays near `prior`. Throws std::invalid_argument
-/// for fewer samples than parameters, or a prior with no mass.
+/// for fewer equations (one per sample and joint) than twice the parameters, that is fewer than 20 samples,
+/// or a prior with no mass.
 IdentifiedInertia identify_inertia(const Chain& prior, const std::vector<MotionSample>& log);
 
 /// One line of a log in a coupled mode, the link held: deflection θ − ψ, θ̇, θ̈ and the motor's torque.

@@ -1,7 +1,10 @@
 #include "planners/elastic/replay.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
 
 #include "dynamics/rigid_body.hpp"
@@ -116,11 +119,42 @@ void use_limits(const ClutchedArm& arm, const ReplaySample& s, LimitUse& use) {
   }
 }
 
+/// The samples with the shares of the limits, and what the clutches take where the mode changes.
+void record(const ClutchedArm& arm, const ClutchedArmSystem& system,
+            const dynamics::Trajectory<double, kStates>& trajectory, int samples_per_interval, Replay& out) {
+  const auto& pieces = trajectory.pieces;
+  for (auto first = pieces.begin(); first != pieces.end();) {
+    const dynamics::Phase& phase = first->phase;
+    if (phase.mode >= system.spring_stop()) break;
+    const auto next = std::find_if(first, pieces.end(), [&](const auto& piece) {
+      return piece.phase.mode != phase.mode || piece.phase.window.begin != phase.window.begin;
+    });
+    const auto& last = *std::prev(next);
+    for (int k = 0; k < samples_per_interval; ++k) {
+      const bool ends = k == samples_per_interval - 1;
+      ReplaySample s;
+      s.t = ends ? last.t1 : first->t0 + (last.t1 - first->t0) * k / (samples_per_interval - 1);
+      s.mode = system.clutches(phase.mode);
+      split<double>(ends ? last.nodes.back() : trajectory.at(s.t), s.at, s.rate);
+      s.torque = system.torque_at<double>(phase.window.begin, s.t);
+      use_limits(arm, s, out.use);
+      if (!out.samples.empty() && out.samples.back().mode != s.mode) {
+        const Coordinates<double> lost = out.samples.back().rate - s.rate;
+        out.impacts += 0.5 * lost.dot(inertia_of<double>(arm, s.at.tail<3>()) * lost);  // Carnot
+      }
+      out.samples.push_back(s);
+    }
+    first = next;
+  }
+}
+
 }  // namespace
 
 Replay replay(const ClutchedArm& arm, const ElasticThrow& plan, int samples_per_interval) {
   if (plan.phases.empty()) throw std::invalid_argument("replay: the plan has no phases");
-  if (samples_per_interval < 1) throw std::invalid_argument("replay: samples_per_interval < 1");
+  if (samples_per_interval < 2)
+    throw std::invalid_argument(
+        fmt::format("replay: samples_per_interval = {}; accepted: 2 and more", samples_per_interval));
   std::vector<ScheduledPhase> phases;
   std::vector<TorqueInterval> torques;
   for (const ThrowPhase& phase : plan.phases) {
@@ -152,8 +186,7 @@ Replay replay(const ClutchedArm& arm, const ElasticThrow& plan, int samples_per_
       weight[kNodes]{0.11846344252809454, 0.23931433524968324, 0.28444444444444444, 0.23931433524968324,
                      0.11846344252809454};
   for (const auto& piece : solution.trajectory.pieces) {
-    const int mode = piece.phase.mode;
-    if (mode >= system.spring_stop()) break;
+    if (piece.phase.mode >= system.spring_stop()) break;
     const double length = piece.t1 - piece.t0;
     for (int k = 0; k < kNodes; ++k) {
       split<double>(piece.at_fraction(node[k]), at, rate);
@@ -165,23 +198,8 @@ Replay replay(const ClutchedArm& arm, const ElasticThrow& plan, int samples_per_
       out.damping += weight[k] * length * arm.last.damping * slip * slip;
       out.friction += weight[k] * length * friction_torque<double>(arm.chain, qd).dot(qd);
     }
-    const int n = std::max(1, samples_per_interval / 4);
-    for (int k = 0; k <= n; ++k) {
-      ReplaySample s;
-      s.t = piece.t0 + length * k / n;
-      s.mode = system.clutches(mode);
-      split<double>(piece.at_fraction(static_cast<double>(k) / n), s.at, s.rate);
-      s.torque = system.torque_at<double>(piece.phase.window.begin, s.t);
-      use_limits(arm, s, out.use);
-      if (!out.samples.empty() && out.samples.back().mode != s.mode) {
-        const double lost =
-            0.5 * (out.samples.back().rate - s.rate)
-                      .dot(inertia_of<double>(arm, s.at.tail<3>()) * (out.samples.back().rate - s.rate));
-        out.impacts += lost;  // Carnot
-      }
-      out.samples.push_back(s);
-    }
   }
+  record(arm, system, solution.trajectory, samples_per_interval, out);
   return out;
 }
 

@@ -101,7 +101,7 @@ struct LimitUse {
 struct Replay {
   dynamics::Outcome outcome{};        ///< how the integrator ended
   bool spring_stop{};                 ///< the spring came to its largest deflection
-  std::vector<ReplaySample> samples;  ///< dense
+  std::vector<ReplaySample> samples;  ///< in order of time; two at an instant where two intervals meet
   TipState<double> release;           ///< the tip at the end
   LimitUse use;                       ///< over the run
   // Energy from start to end [J]: work of the motors − damping − friction − clutch impacts = gain, but for
@@ -111,8 +111,11 @@ struct Replay {
   double unexplained() const { return motor_work - damping - friction - impacts - gain; }
 };
 
-/// Runs the torques of a plan from its first state; `samples_per_interval` >= 1 of the record.
-Replay replay(const ClutchedArm& arm, const ElasticThrow& plan, int samples_per_interval = 20);
+/// Runs the torques of a plan from its first state. The record has `samples_per_interval` >= 2 samples of
+/// each of the plan's intervals (node to node), evenly from one end to the other, both included; the shares
+/// of the limits are the largest of these samples. Where the spring stops the run, the last interval ends
+/// there.
+Replay replay(const ClutchedArm& arm, const ElasticThrow& plan, int samples_per_interval = 21);
 
 /// Where the object comes down at the height z, released at the end; empty: it never gets there.
 std::optional<double> landing_x(const TipState<double>& release, double z, double gravity = 9.81);

@@ -84,6 +84,9 @@ ThrowingArm::ThrowingArm(const FlipRobot& robot, const ArmBody& body, const Flip
   if (options.substeps < 1 || options.substeps > 64)
     throw std::invalid_argument(
         fmt::format("throwing arm: substeps = {}; accepted: 1 to 64", options.substeps));
+  if (!(options.noise >= 0 && std::isfinite(options.noise)))
+    throw std::invalid_argument(
+        fmt::format("throwing arm: noise = {}; accepted: 0 to any finite factor", options.noise));
   const int n = robot.chain.size();
   const FlipReference start = reference_at(robot.motion, u, 0);
   State s{start.q, start.qd, Joints::Zero(n), {}, std::mt19937_64(noise_seed), {}, {}};

@@ -40,8 +40,8 @@ void check_reference(const FlipRobot& robot, const FlipCommand& u);
 
 /// How finely the arm is integrated.
 struct ArmOptions {
-  int substeps{1};  ///< integration steps in a control step
-  double noise{0};  ///< factor on the sensors' and torques' noise
+  int substeps{1};  ///< integration steps in a control step, 1 to 64
+  double noise{0};  ///< factor on the sensors' and torques' noise, >= 0
 };
 
 /// Largest shares of limits that were used, and how often commands were cut.
@@ -64,7 +64,8 @@ struct ArmThrow {
 /// are held over a control step. Commands are cut to the torque limits and to `torque_rate`.
 class ThrowingArm {
  public:
-  /// Simulates the acceleration. Equal seeds give equal noise.
+  /// Simulates the acceleration. Equal seeds give equal noise. Throws std::invalid_argument for options out
+  /// of range.
   ThrowingArm(const FlipRobot& robot, const ArmBody& body, const FlipCommand& u, std::uint64_t noise_seed,
               const ArmOptions& options = {});
 

@@ -76,6 +76,7 @@ ReleaseCard prior_card(const FlipRobot& robot, const std::string& law) {
   out.mu = {robot.pads.mu, robot.pads.mu * std::hypot(s.mu, s.grip_force)};
   out.length = robot.pads.length;
   out.pads = robot.pads.count;
+  if (law == robot.pads.law) out.kappa = robot.pads.kappa;
   out.grip_force = g.grip_force;
   out.dead_time = {g.dead_time, s.dead_time};
   out.opening_time = {g.opening_time, s.opening_time};

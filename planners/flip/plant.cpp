@@ -74,6 +74,9 @@ FlipTrial FlipPlant::throw_bar(const FlipCommand& u, const Bar& declared, std::u
   if (!robot_.motion.range.holds(u))
     throw std::invalid_argument(fmt::format(
         "flip command ({:.4f}, {:.4f}, {:.4f}) is outside the robot's range", u.pitch, u.speed, u.damping));
+  if (options.reaction_passes < 0 || options.reaction_passes > 64)
+    throw std::invalid_argument(
+        fmt::format("flip plant: reaction_passes = {}; accepted: 0 to 64", options.reaction_passes));
   const ThrowSpread& spread = robot_.throws;
   Draws draws(seed_of({trial_seed, 2}));
   HeldBar held{declared, draws.plain(spread.grasp_angle), gripper_, pads_};
@@ -93,7 +96,7 @@ FlipTrial FlipPlant::throw_bar(const FlipCommand& u, const Bar& declared, std::u
   ArmThrow moved = arm.brake();
   std::optional<FlipRelease> release;
   for (int pass = 0;; ++pass) {
-    const bool last = pass == options.reaction_passes;
+    const bool last = pass >= options.reaction_passes;
     release = release_bar(moved.hand, held, last ? nullptr : &on_bar);
     if (last || !release) break;
     moved = arm.brake(on_bar);

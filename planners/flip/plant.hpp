@@ -30,7 +30,7 @@ struct FlipTrial {
 /// How the plant is simulated.
 struct PlantOptions {
   ArmOptions arm{1, 1.0};  ///< integration steps and noise
-  int reaction_passes{1};  ///< the hand's motion is found again under the wrench that the bar exerts on it
+  int reaction_passes{1};  ///< the hand's motion is found again under the wrench of the bar; 0 to 64
 };
 
 /// One robot: the declared one with masses, friction, motors, gripper, pads and bar off by [robots], drawn by
@@ -44,8 +44,8 @@ class FlipPlant {
   /// Keeps a reference to `robot`.
   FlipPlant(const FlipRobot& robot, std::uint64_t seed);
 
-  /// Throws the bar once. Equal seeds give equal throws. Throws std::invalid_argument for a command out of
-  /// range.
+  /// Throws the bar once. Equal seeds give equal throws. Throws std::invalid_argument for a command or
+  /// options out of range.
   FlipTrial throw_bar(const FlipCommand& u, const Bar& declared, std::uint64_t trial_seed,
                       const PlantOptions& options = {}) const;
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 
 #include "contact/gripper_delay.hpp"
@@ -28,7 +29,7 @@ constexpr TomlLimits around_zero(double most, const char* unit) { return {-most,
 constexpr TomlLimits kBarMass{1e-3, 10, false, "kg"}, kBarInertia{1e-6, 1, false, "kg m^2"},
     kComOffset{0, 1, false, "m"};
 
-/// One table of the file, every key of it required.
+/// One table of the file, its keys required but where they are asked for by `if_there`.
 class Section {
  public:
   Section(TomlKeys& file, const char* name) : keys_(file.required(name, file.table(name))) {
@@ -37,6 +38,9 @@ class Section {
   }
   double number(const char* key, const TomlLimits& limits) {
     return keys_.required(key, keys_.number(key, limits));
+  }
+  std::optional<double> if_there(const char* key, const TomlLimits& limits) {
+    return keys_.number(key, limits);
   }
   std::string text(const char* key) { return keys_.required(key, keys_.text(key)); }
   std::array<double, 2> range(const char* key, const TomlLimits& limits) {
@@ -97,6 +101,9 @@ Pads pads_of(Section keys) {
   const double pads = keys.number("pads", {1, 8, false, ""});
   if (pads != std::floor(pads)) keys.fail("pads", fmt::format("{} is not a whole number", pads));
   out.count = static_cast<int>(pads);
+  out.kappa = keys.if_there("kappa", {0, 3, false, ""});  // of a convex surface
+  if (out.kappa && out.law != "limit_surface_quartic")
+    keys.fail("kappa", fmt::format("is of limit_surface_quartic, and the law is '{}'", out.law));
   keys.done();
   return out;
 }

@@ -152,9 +152,11 @@ struct InsensitiveResult {
 ///
 ///   E[x²] ≈ 1/(2 p) Σ_k (x(θ ± √p σ_k e_k; q̇₀, q̈))²,   k = 1 … p
 ///
-/// (exact for a landing that is cubic in its p unknowns) by Levenberg-Marquardt; the derivatives by q̇₀ and q̈
-/// pass exactly through hand, release with its events, and flight, and each step is a quadratic program
-/// within the limits of q̇₀, q̇₀ + hold q̈ and q̈. Throws std::invalid_argument unless 1 to 4 joints are named.
+/// by Levenberg-Marquardt. The rule is exact where x² is a cubic of the p unknowns, so for a landing that is
+/// linear in them; of curvature it knows only roughly: of x = (θ_k/σ_k)² it makes p where 3 is true, of x =
+/// θ_i θ_j nothing. The derivatives by q̇₀ and q̈ pass exactly through hand, release with its events, and
+/// flight, and each step is a quadratic program within the limits of q̇₀, q̇₀ + hold q̈ and q̈. Throws
+/// std::invalid_argument unless 1 to 4 joints are named.
 InsensitiveResult make_insensitive(const ReleaseThrow& problem, const InsensitiveOptions& options);
 
 }  // namespace unhand::planners

@@ -4,8 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
+#include <functional>
+#include <map>
 
 #include "experiment/campaign_effects.hpp"
 #include "experiment/random_stream.hpp"
@@ -195,15 +196,41 @@ TEST(MissingForce, NoisySamplesCountForWhatTheyKnow) {
   EXPECT_NEAR(size, kMissing, 4 * known_to);
 }
 
-// What an effect says it seems to be in flight is a term that is tried: else it would be taken for a shadow
+// What an effect says it seems to be in flight is found under that name: else it would be taken for a shadow
 // of that term.
-TEST(MissingForce, TheFormsOfEffectsAreTried) {
-  const auto names = acceleration_names();
+TEST(MissingForce, TheFormsOfEffectsAreFound) {
+  using State = ResidualTrace::State;
+  using Missing = std::array<double, 3>;
+  const auto drag = [](const State& s) { return 0.05 * std::hypot(s.vx, s.vz); };
+  const auto spin = [](const State& s) { return 0.01 * s.omega * s.omega; };
+  const std::map<std::string, std::function<Missing(const State&)>> missing{
+      {"|v| v",
+       [&](const State& s) {
+         return Missing{drag(s) * s.vx, drag(s) * s.vz, 0};
+       }},
+      {"omega J v",
+       [](const State& s) {
+         return Missing{-0.02 * s.omega * s.vz, 0.02 * s.omega * s.vx, 0};
+       }},
+      {"1 along x",
+       [](const State&) {
+         return Missing{0.3, 0, 0};
+       }},
+      {"1 along z",
+       [](const State&) {
+         return Missing{0, 0.3, 0};
+       }},
+      {"omega^2 along the object's x", [&](const State& s) {
+         return Missing{spin(s) * std::cos(s.theta), spin(s) * std::sin(s.theta), 0};
+       }}};
   int forms = 0;
   for (const auto& effect : experiment::known_effects()) {
     if (effect.form.empty()) continue;
     ++forms;
-    EXPECT_NE(std::find(names.begin(), names.end(), effect.form), names.end()) << effect.id;
+    ASSERT_TRUE(missing.contains(effect.form)) << effect.id;
+    const auto candidate = missing_terms(flights(missing.at(effect.form)), kFlight);
+    ASSERT_FALSE(candidate.terms.empty()) << effect.id;
+    EXPECT_EQ(candidate.terms.front().name, effect.form) << effect.id;
   }
   EXPECT_GE(forms, 5);  // drag, lift, tilt, scale, centre of mass
 }

@@ -213,6 +213,27 @@ TEST(FreeRotation, DerivativesByOmegaAndInertia) {
   }
 }
 
+TEST(FreeRotation, TheStartCarriesTheDerivativeByTime) {
+  const RotationState<Dual> start{exp(Vec3<Dual>{Dual(0.3), Dual(-0.2), Dual(0.9)}),
+                                  {Dual(3), Dual(5), Dual(-2)}};
+  const Quaternion<Dual>& q = start.attitude;
+  const Quaternion<Dual> rate = q * Quaternion<Dual>{Dual(0), Dual(3), Dual(5), Dual(-2)};
+  const double c = 0.4;  // 1/s
+  for (const Vec3<double>& I : {Vec3<double>{1, 1.3, 2}, Vec3<double>{1, 1, 1}})
+    for (const double last : {0.6, 0.0}) {
+      const Rotation<Dual> rotation({Dual(I[0]), Dual(I[1]), Dual(I[2])}, start, Dual(c), last, sharp());
+      const auto at = rotation.at(independent(0.0, 0));
+      // q' = q (0, omega)/2, and Euler's equations.
+      EXPECT_NEAR(at.attitude.w.v[0], 0.5 * rate.w.a, 1e-14) << last;
+      EXPECT_NEAR(at.attitude.x.v[0], 0.5 * rate.x.a, 1e-14) << last;
+      EXPECT_NEAR(at.attitude.y.v[0], 0.5 * rate.y.a, 1e-14) << last;
+      EXPECT_NEAR(at.attitude.z.v[0], 0.5 * rate.z.a, 1e-14) << last;
+      EXPECT_NEAR(at.omega[0].v[0], (I[1] - I[2]) / I[0] * 5 * -2 - c * 3, 1e-14) << last;
+      EXPECT_NEAR(at.omega[1].v[0], (I[2] - I[0]) / I[1] * -2 * 3 - c * 5, 1e-14) << last;
+      EXPECT_NEAR(at.omega[2].v[0], (I[0] - I[1]) / I[2] * 3 * 5 + c * 2, 1e-14) << last;
+    }
+}
+
 TEST(FreeRotation, RefusesWhatIsNoRotation) {
   const RotationState<double> start{{}, {1, 2, 3}};
   EXPECT_THROW(rotate_freely<double>({1, 0, 1}, start, {1.0}), std::invalid_argument);

@@ -95,7 +95,7 @@ TEST(ClutchedArm, ClutchesHoldWhatTheySay) {
 }
 
 /// A motion that goes through several modes, two of them entered with an impact.
-Replay tour(const ClutchedArm& arm, int intervals) {
+Replay tour(const ClutchedArm& arm, int intervals, int samples = 21) {
   ElasticThrow plan;
   const double length = 0.05;
   double t = 0;
@@ -112,7 +112,7 @@ Replay tour(const ClutchedArm& arm, int intervals) {
     }
     t += length;
   }
-  return replay(arm, plan);
+  return replay(arm, plan, samples);
 }
 
 TEST(ClutchedArm, TheLedgerOfARunCloses) {
@@ -124,6 +124,25 @@ TEST(ClutchedArm, TheLedgerOfARunCloses) {
   // The integrator's tolerance is 1e-10; Gauss's rule on its pieces of quartics is of order 6, pieces are
   // below 5 ms.
   EXPECT_NEAR(run.unexplained(), 0, 1e-6 * run.motor_work);
+}
+
+TEST(ClutchedArm, ARunIsRecordedAsOftenAsItIsAsked) {
+  constexpr int kPhases = 5, kIntervals = 2;
+  constexpr double kLength = 0.05 / kIntervals;
+  for (const int n : {2, 3, 7, 21}) {
+    const Replay run = tour(bsa3(), kIntervals, n);
+    ASSERT_EQ(run.samples.size(), static_cast<std::size_t>(kPhases * kIntervals * n)) << n;
+    for (int i = 0; i < kPhases * kIntervals; ++i)
+      for (int k = 0; k < n; ++k) {
+        const ReplaySample& s = run.samples[static_cast<std::size_t>(i * n + k)];
+        EXPECT_NEAR(s.t, kLength * (i + static_cast<double>(k) / (n - 1)), 1e-14) << n;
+        if (k == 0 && i > 0) {  // nothing but rates jumps where two intervals meet
+          EXPECT_EQ(s.at, run.samples[static_cast<std::size_t>(i * n - 1)].at) << n;
+        }
+      }
+    EXPECT_NEAR(run.unexplained(), 0, 1e-6 * run.motor_work) << n;
+  }
+  EXPECT_THROW(tour(bsa3(), kIntervals, 1), std::invalid_argument);
 }
 
 TEST(ClutchedArm, APhaseBeginsWhereItSaysAlsoWithinAnIntervalOfTorques) {

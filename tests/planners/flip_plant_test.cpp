@@ -208,6 +208,22 @@ TEST(FlipPlant, RefusesCommandsOutOfRange) {
   EXPECT_THROW(plant.throw_bar(u, robot().bar, 1), std::invalid_argument);
 }
 
+TEST(FlipPlant, RefusesOptionsOutOfRange) {
+  const auto refusal = [](int substeps, double noise, int passes) -> std::string {
+    try {
+      FlipPlant(robot(), 1).throw_bar(middle(), robot().bar, 1, {{substeps, noise}, passes});
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(refusal(1, 1, -1), "flip plant: reaction_passes = -1; accepted: 0 to 64");
+  EXPECT_NE(refusal(1, 1, 65), "");
+  EXPECT_NE(refusal(0, 1, 1).find("substeps = 0"), std::string::npos);
+  EXPECT_NE(refusal(1, -0.1, 1).find("noise = -0.1"), std::string::npos);
+  EXPECT_NE(refusal(1, NAN, 1).find("noise = nan"), std::string::npos);
+}
+
 // The paper's trends, over the declared robot's 27 commands.
 TEST(FlipPopulation, Trends) {
   const FlipPlant plant(exact_robot(), 1);
@@ -295,6 +311,8 @@ TEST(FlipRobotFile, TellsWhatIsWrong) {
             std::string::npos);
   EXPECT_NE(refusal("speed = [0.62, 0.97]", "speed = [0.62, 1.9]").find("panda_joint"), std::string::npos);
   EXPECT_EQ(refusal("arm = \"panda\"", "arm = \"panda\""), "");
+  EXPECT_NE(refusal("pads = 2", "pads = 2\nkappa = 1").find("is of limit_surface_quartic"),
+            std::string::npos);
   // Arms of seven joints that move, but not by torques.
   const auto arm = path.parent_path() / "flip_arm_test.toml";
   for (const auto& [joint, why] :
@@ -307,6 +325,33 @@ TEST(FlipRobotFile, TellsWhatIsWrong) {
         << refusal("arm = \"panda\"", "arm = \"flip_arm_test.toml\"");
   }
   std::filesystem::remove(arm);
+  std::filesystem::remove(path);
+}
+
+TEST(FlipRobotFile, SaysTheShapeOfTheQuartic) {
+  const auto path = std::filesystem::temp_directory_path() / "flip_robot_quartic_test.toml";
+  const auto with = [&](const std::string& kappa) {
+    std::string text(built_in_robot());
+    const std::string disc = "law = \"limit_surface_disc\"";
+    text.replace(text.find(disc), disc.size(), "law = \"limit_surface_quartic\"\n" + kappa);
+    std::ofstream(path) << text;
+    return read_flip_robot(path.string());
+  };
+  EXPECT_FALSE(with("").pads.kappa);
+  std::vector<double> lands;
+  for (const double kappa : {0.0, 3.0}) {
+    const FlipRobot one = with(fmt::format("kappa = {}", kappa));
+    EXPECT_EQ(one.pads.kappa, kappa);
+    EXPECT_EQ(prior_card(one, one.pads.law).kappa, kappa);
+    EXPECT_FALSE(prior_card(one).kappa);  // a pivot has none
+    const auto release = release_bar(ThrowingArm(one, declared_body(one, one.bar), middle(), 1).brake().hand,
+                                     {one.bar, 0.0, one.gripper, one.pads});
+    ASSERT_TRUE(release) << kappa;
+    lands.push_back(fly_flip(release->detach).value().angle);
+  }
+  EXPECT_GT(std::abs(lands[0] - lands[1]), 1e-3);  // rad: the shape counts
+  EXPECT_THROW(with("kappa = 3.1"), datasets::TomlError);
+  EXPECT_THROW(with("kappa = -0.1"), datasets::TomlError);
   std::filesystem::remove(path);
 }
 

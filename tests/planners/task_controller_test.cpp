@@ -1,4 +1,5 @@
-// Computed torque in the task, adaptive and plain: perfect models track, adaptation learns the load, V falls.
+// Computed torque in the task, adaptive and plain: perfect models track, adaptation learns the load, V ends
+// below its start.
 #include "planners/control/task_controller.hpp"
 
 #include <gtest/gtest.h>
