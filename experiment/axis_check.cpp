@@ -387,4 +387,33 @@ std::vector<UnitDoubt> reversed_wrenches(const ThrowLog& log) {
   return out;
 }
 
+std::vector<UnitDoubt> reversed_forces(const ThrowLog& log) {
+  constexpr double kMost = 0.95;
+  constexpr std::size_t kEnough = 10;
+  std::vector<double> levels;  // of throws that show it
+  std::vector<std::string> ids;
+  std::size_t seen = 0;
+  for (const auto& one : log.throws) {
+    const auto opening = one.ft ? opening_of(log, one) : std::nullopt;
+    if (!opening) continue;
+    std::vector<double> held;
+    for (std::size_t i = 0; i < one.ft->normal_force.rows && one.ft->time(i) < *opening; ++i)
+      held.push_back(one.ft->normal_force(i));
+    if (held.size() < kEnough) continue;
+    ++seen;
+    const auto below = std::count_if(held.begin(), held.end(), [](double f) { return f < 0; });
+    if (static_cast<double>(below) < kMost * static_cast<double>(held.size())) continue;
+    levels.push_back(dynamics::median(held));
+    ids.push_back(one.id);
+  }
+  if (levels.empty()) return {};
+  const bool most = 2 * levels.size() > seen;
+  const double level = dynamics::median(levels);
+  return {{fmt::format("/throws/{}/ft/normal_force", most ? "*" : ids.front()), "f_N", -1,
+           static_cast<int>(levels.size()),
+           fmt::format("f_N is {:.3g} N before the gripper opens (median of {} throws that show it, of {}), "
+                       "and pads that hold an object press with more than 0 N: is the sign reversed?",
+                       level, levels.size(), seen)}};
+}
+
 }  // namespace unhand::experiment

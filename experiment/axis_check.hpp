@@ -1,4 +1,5 @@
-// Single axes of a planar throw in another unit, or with the other sign. Internal to unit_check.
+// Single axes of a planar throw in another unit, or with the other sign; so the normal force. Internal to
+// unit_check.
 #pragma once
 
 #include <vector>
@@ -25,5 +26,9 @@ std::vector<UnitDoubt> contradicted_axes(const datasets::ThrowLog& log);
 /// has a say where motion capture confirms the lever. Or fx and fz each follow the other's need (correlations
 /// beyond ±0.95, and within ±0.9 with their own): axes swapped.
 std::vector<UnitDoubt> reversed_wrenches(const datasets::ThrowLog& log);
+
+/// A normal force that is below zero in 95 % of the samples before the gripper opens, while the pads hold the
+/// object: of all throws, or of those that show it where most do not.
+std::vector<UnitDoubt> reversed_forces(const datasets::ThrowLog& log);
 
 }  // namespace unhand::experiment

@@ -67,6 +67,7 @@ std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log) {
                                kMostGravity)});
   if (out.empty()) out = impossible_declarations(log);
   if (out.empty()) out = jumping_angles(log);
+  if (out.empty()) out = reversed_forces(log);
   if (!out.empty()) return out;
   std::vector<SizeRatios> throws;
   std::map<SizedColumn, std::vector<double>> ratios;

@@ -101,6 +101,24 @@ TEST(AxisCheck, CountsTheThrowsThatShowIt) {
   EXPECT_THAT(doubts[0].reason, HasSubstr("of which " + std::to_string(wrong) + " show it"));
 }
 
+TEST(AxisCheck, PadsDoNotPull) {
+  EXPECT_THAT(reversed_forces(small_log()), IsEmpty());
+  auto log = small_log();
+  scale_column(log.throws[1].ft->normal_force, -1, 0);
+  auto doubts = reversed_forces(log);
+  ASSERT_EQ(doubts.size(), 1U);
+  EXPECT_EQ(doubts[0].path, "/throws/" + log.throws[1].id + "/ft/normal_force");
+  for (std::size_t i = 0; i < log.throws.size(); ++i)
+    if (i != 1) scale_column(log.throws[i].ft->normal_force, -1, 0);
+  doubts = unit_doubts(log);
+  ASSERT_EQ(doubts.size(), 1U);
+  EXPECT_EQ(doubts[0].path, "/throws/*/ft/normal_force");
+  EXPECT_EQ(doubts[0].throws, static_cast<int>(log.throws.size()));
+  // A dead sensor says nothing.
+  for (auto& one : log.throws) scale_column(one.ft->normal_force, 0, 0);
+  EXPECT_THAT(reversed_forces(log), IsEmpty());
+}
+
 TEST(AxisCheck, OneThrowWithASmallHandIsToldByItsOwnPath) {
   for (const bool whole : {false, true}) {
     auto log = small_log();

@@ -7,6 +7,7 @@
 #include "experiment/observations.hpp"
 #include "experiment/prepared_throw.hpp"
 #include "experiment/synthetic_campaign.hpp"
+#include "experiment/throw_prediction.hpp"
 #include "tests/support/perfect_campaign.hpp"
 
 namespace {
@@ -128,6 +129,49 @@ TEST(PreparedThrow, TheGraspIsWhatMotionCaptureSaw) {
     record.mocap.reset();
     EXPECT_EQ(one.prepared().grasp.angle, 1) << "there is nothing else";
   }
+}
+
+/// A sensor that was not tared reads an eighth of the grip after the pads have parted. That they have, only
+/// the rest of the log can tell.
+TEST(PreparedThrow, TheReleaseInAnUntaredForceIsSeenWhereTheObjectFlew) {
+  const CampaignDesign design = campaign_design("quick12");
+  datasets::ThrowLog log = campaign_header(design, 1);
+  auto [record, truth] = generate_throw(design, 1, 3);
+  const double release = truth.opening.open_command + truth.opening.dead_time + truth.opening.opening_time;
+  for (double& f : record.ft->normal_force.data) f += truth.opening.grip_force / 8;
+  log.throws = {record};
+  datasets::Throw tracked = record, silent = record;
+  tracked.landing.reset();
+  silent.landing.reset(), silent.mocap.reset(), silent.grasp_angle = 0.0;
+  for (const datasets::Throw* one : {&record, &tracked})
+    EXPECT_NEAR(prepare(log, *one, "(in memory)").normal_force->release_time(), release, 5e-4);
+  EXPECT_TRUE(std::isinf(prepare(log, silent, "(in memory)").normal_force->release_time()));
+}
+
+/// The object is free from the start, and the tracker's clock asks for poses before it: held in the hand.
+TEST(PreparedThrow, APadThatNeverPressesIsNoReasonToFail) {
+  const CampaignDesign design = campaign_design("quick12");
+  datasets::ThrowLog log = campaign_header(design, 1);
+  auto [record, truth] = generate_throw(design, 1, 3);
+  for (double& f : record.ft->normal_force.data) f = 0;
+  log.throws = {record};
+  PreparedThrow prepared = prepare(log, record, "(in memory)");
+  EXPECT_FALSE(prepared.normal_force) << "a dead sensor";
+  prepared.told_force.emplace(contact::OpeningProfile<double>{prepared.start - 1, 1.0, 0.0, 0.1, 1.0});
+  const Observations observed = observe(log, record, prepared);
+  EXPECT_EQ(std::count(observed.dead.begin(), observed.dead.end(), Channel::normal_force), 1);
+  const std::vector<std::string> names{"sensor.mocap_time_offset.offset"};
+  const std::vector<double> late{0.01};
+  const auto predicted = predict_channels(prepared, observed, {design.contact_model, 2, 20, {}},
+                                          dynamics::Values<double>(names, late));
+  ASSERT_EQ(predicted.channels.size(), observed.all.size());
+  for (const double x : predicted.channels) ASSERT_TRUE(std::isfinite(x));
+  const auto first =
+      static_cast<std::size_t>(std::find_if(observed.all.begin(), observed.all.end(),
+                                            [](const auto& o) { return o.channel == Channel::mocap_theta; }) -
+                               observed.all.begin());
+  ASSERT_LT(observed.all[first].time - late[0], prepared.start);
+  EXPECT_NEAR(predicted.channels[first], observed.all[first].value, 0.05);
 }
 
 }  // namespace

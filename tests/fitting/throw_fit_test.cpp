@@ -214,6 +214,24 @@ TEST(ThrowFit, DeadForceChannelIsDropped) {
   expect_unmoved(fit(problem), 3, "dead channel");  // less data: another estimate, of the same thing
 }
 
+// A wind in which nothing drags.
+TEST(ThrowFit, ACardTellsOfWhatLeavesNoTrace) {
+  CampaignOptions options;
+  options.model = kLaw;
+  options.effects = {"flight.wind"};
+  const CampaignProblem problem(disc_log(), "(in memory)", options);
+  datasets::ModelCard card = card_of(problem, fit(problem));
+  card.log.file = "a log";
+  card.library_version = "a version";
+  const auto again = datasets::parse_model_card(datasets::to_json(card));
+  EXPECT_EQ(again, card);
+  const auto& wind = again.parameters.at("flight.wind.w_x");
+  EXPECT_FALSE(wind.determined);
+  EXPECT_FALSE(wind.sigma);
+  EXPECT_TRUE(again.parameters.at("mu").determined);
+  for (const double x : fit_of(again, problem, "a card").covariance) EXPECT_TRUE(std::isfinite(x));
+}
+
 TEST(ThrowFit, MocapDropouts) {
   auto gaps = disc_log();
   for (auto& one : gaps.throws) {
@@ -459,6 +477,10 @@ TEST(ThrowFit, SaysWhyThereIsNothingToFit) {
   } catch (const std::invalid_argument& error) {
     EXPECT_THAT(error.what(), HasSubstr("nothing to fit to"));
   }
+  auto pressing = disc_log();
+  for (auto& one : pressing.throws)
+    for (double& f : one.ft->normal_force.data) f += 50;
+  EXPECT_THAT(fit_of_log(pressing).message, HasSubstr("the pads still press"));
   auto test_only = disc_log();
   for (auto& one : test_only.throws) one.split = Split::test;
   const auto nothing = fit_of_log(test_only);
