@@ -134,7 +134,8 @@ struct NormalForceSummary {
   double shape{
       std::numeric_limits<double>::quiet_NaN()};  ///< exponent p (of the ramp's end) [-]; NaN: no ramp
   double release_time{std::numeric_limits<double>::infinity()};    ///< [s]
-  double release_sigma{std::numeric_limits<double>::quiet_NaN()};  ///< 1 σ of it, > 0 [s]; NaN: no release
+  double release_sigma{std::numeric_limits<double>::quiet_NaN()};  ///< 1 σ of it, > 0 and at most half the
+                                                                   ///< ramp [s]; NaN: no release
   double tail_mean{};  ///< mean of the series after the release [N]: the sensor's bias, if it has one
   double tail_mean_sigma{
       std::numeric_limits<double>::infinity()};  ///< 1 σ of it [N]; infinite without samples there
@@ -155,7 +156,8 @@ struct NormalForceFit {
 /// well below a sample. Where the residual is noise, that curve is the smoothed force (in pieces of degree
 /// five); otherwise start and end are found again from their neighbourhoods, and a smoothing spline with a
 /// kink at the start follows the samples. Then the release is uncertain by what the width of its
-/// neighbourhood makes of it, too, and always by where it is between two samples. Outliers that stand alone,
+/// neighbourhood makes of it, too, and always by where it is between two samples; by one whole step where the
+/// ramp has fewer than four. Outliers that stand alone,
 /// or in pairs, count as little as they go beyond 3.5 σ. The last bit before the release (below the noise, or
 /// 1 % of the grip) falls monotonically to zero.
 ///

@@ -262,7 +262,12 @@ NormalForceFit with_release(const ForceSeries& s, Opening o, const NormalForceOp
   if (starts) fit.summary.opening_start = start;
   fit.summary.ramp_start = start;
   fit.summary.shape = o.ramp.shape;
-  fit.summary.release_sigma = std::hypot(std::sqrt(o.release_variance), release - end);
+  const double length = release - o.ramp.start;
+  double release_sigma = std::hypot(std::sqrt(o.release_variance), release - end);
+  // Start, end and shape need three samples, and a fourth to be told how well they are known.
+  if (index_of(s, release) < index_of(s, std::max(o.ramp.start, begin)) + 4)
+    release_sigma = std::hypot(release_sigma, tick);
+  fit.summary.release_sigma = std::min(release_sigma, 0.5 * length);
   finish(s, fit, (o.straight_grip && o.power_law) ? 6.0 : spline.summary.knots + 8.0);
   return fit;
 }

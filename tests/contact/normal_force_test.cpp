@@ -241,6 +241,32 @@ TEST(SmoothNormalForce, BiasIsReportedAndDoesNotMoveTheRelease) {
   EXPECT_NEAR(fit.force.at(kAlways, 9.0), 5.0, 0.2);
 }
 
+// Two or three samples of a ramp do not tell its shape, and with it not where it ends: σ says so, and no more
+// than that the force was seen to fall.
+TEST(SmoothNormalForce, OfAHandfulOfSamplesTheReleaseIsAsUncertainAsItIs) {
+  std::mt19937_64 random(25);
+  std::normal_distribution<double> noise(0.0, 0.05);
+  double squares = 0;
+  int runs = 0;
+  for (const double shape : {1.0, 2.0})
+    for (const double step : {0.02, 0.025})
+      for (double begin = 0; begin < step; begin += step / 7) {
+        Log log;
+        for (double t = begin; t < 0.3; t += step) {
+          log.time.push_back(t);
+          log.value.push_back(ramp(t, 25.0, 0.057, 0.055, shape) + noise(random));
+        }
+        const auto summary = smooth_normal_force(log.time, log.value, 0.05).summary;
+        ASSERT_TRUE(std::isfinite(summary.release_time)) << shape << ' ' << step << ' ' << begin;
+        EXPECT_LE(summary.release_sigma, 0.5 * (summary.release_time - summary.ramp_start));
+        EXPECT_LT(summary.release_sigma, 2 * step);
+        squares += std::pow((summary.release_time - 0.112) / summary.release_sigma, 2);
+        ++runs;
+      }
+  EXPECT_LT(std::sqrt(squares / runs), 1.2);
+  EXPECT_GT(std::sqrt(squares / runs), 0.1);
+}
+
 TEST(SmoothNormalForce, NoReleaseWhereTheSeriesEndsFirst) {
   std::mt19937_64 random(24);
   for (int n :
