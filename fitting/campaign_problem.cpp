@@ -268,9 +268,11 @@ Linearisation CampaignProblem::linearise(const experiment::PreparedThrow& prepar
           (dynamics::value_of(predicted.channels[i]) - all[i].value) / all[i].sigma;
     return out.solved;
   };
-  if (derivatives == DerivativesBy::nothing) {
-    take(predict(prepared, observed, campaign, own));
-  } else {
+  const auto run = [&] {
+    if (derivatives == DerivativesBy::nothing) {
+      take(predict(prepared, observed, campaign, own));
+      return;
+    }
     const auto width = static_cast<int>(campaign.size());
     out.campaign.setZero(rows, width);
     out.own.setZero(rows, static_cast<Eigen::Index>(own.size()));
@@ -285,6 +287,13 @@ Linearisation CampaignProblem::linearise(const experiment::PreparedThrow& prepar
       return true;
     };
     differentiate(prepared, observed, campaign, own, derivatives, read);
+  };
+  try {
+    run();
+  } catch (const std::invalid_argument& error) {  // a point outside the physics
+    out = {};
+    out.why_not = error.what();
+    return out;
   }
   out.solved = out.solved && out.residual.allFinite() && out.campaign.allFinite() && out.own.allFinite();
   return out;

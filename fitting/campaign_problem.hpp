@@ -118,7 +118,8 @@ class CampaignProblem {
     return layouts_.at(prepared.object);
   }
 
-  /// The residual of one throw, of all its observations or of some; its derivatives through dual numbers.
+  /// The residual of one throw, of all its observations or of some; its derivatives through dual numbers. Not
+  /// solved where the unknowns are outside the physics (a gripper that opens before it is told to).
   Linearisation linearise(const CampaignThrow& thrown, std::span<const double> campaign,
                           std::span<const double> own, DerivativesBy derivatives) const {
     return linearise(thrown.prepared, thrown.observed, campaign, own, derivatives);

@@ -40,11 +40,7 @@ void FitRounds::choose_throws(const std::vector<double>& start) {
         (options_.share == Share::train) == (throws[i].prepared.split == datasets::Split::train);
     if (!shared || throws[i].observed.all.empty() || !(options_.throws.empty() || options_.throws[i])) return;
     asked[i] = 1;
-    try {
-      starts[i] = problem_.linearise(throws[i], start, own, DerivativesBy::nothing);
-    } catch (const std::invalid_argument& error) {  // a start outside the physics
-      starts[i].why_not = error.what();
-    }
+    starts[i] = problem_.linearise(throws[i], start, own, DerivativesBy::nothing);
   });
   for (std::size_t i = 0; i < throws.size(); ++i)
     if (asked[i] && !starts[i].solved) ++why_not_[starts[i].why_not];

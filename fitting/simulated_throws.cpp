@@ -27,12 +27,8 @@ const std::vector<Linearisation>& SimulatedThrows::at(const std::vector<double>&
                                                  : DerivativesBy::all;
   dynamics::parallel_for(used_.size(), shared_.options.threads, [&](std::size_t i) {
     const auto begin = Clock::now();
-    try {
-      last_.throws[i] = shared_.problem.linearise(shared_.problem.throws()[used_[i]], values,
-                                                  shared_.own_unscaled(own.data() + i * width), asked);
-    } catch (const std::invalid_argument&) {
-      last_.throws[i] = {};  // a trial step outside the physics
-    }
+    last_.throws[i] = shared_.problem.linearise(shared_.problem.throws()[used_[i]], values,
+                                                shared_.own_unscaled(own.data() + i * width), asked);
     if (derivatives) shared_.jacobian_nanoseconds += static_cast<long>(1e9 * seconds_since(begin));
   });
   return last_.throws;

@@ -160,12 +160,16 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   Scene<S> scene_at(const Window& window, const S& t) const {
     const HandState<S> hand = problem_.hand.at(window, t);
     const auto& [m, I] = problem_.body;
+    const S force = problem_.normal_force.at(window, t);
+    if (value_of(force) < 0)
+      throw std::invalid_argument(fmt::format("release: normal force = {} N at {} s is not in [0, inf) N",
+                                              value_of(force), value_of(t)));
     return {{convert<S>(m), convert<S>(I)},
             {convert<S>(problem_.gravity.x), convert<S>(problem_.gravity.z)},
             hand.pose,
             hand.twist,
             hand.acceleration,
-            problem_.normal_force.at(window, t),
+            force,
             &hold<S>()};
   }
 

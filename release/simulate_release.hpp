@@ -85,7 +85,8 @@ struct ReleaseResult {
 };
 
 /// Simulates from `problem.start` to detach. Throws std::invalid_argument when an input is not finite or out
-/// of range (mass, inertia, start against the hand's log). Instantiated for double and Dual.
+/// of range (mass, inertia, start against the hand's log, a normal force below zero). Instantiated for double
+/// and Dual.
 template <class S>
 ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const ReleaseOptions& options = {});
 

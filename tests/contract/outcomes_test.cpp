@@ -148,6 +148,13 @@ TEST_P(Outcomes, WrongProblemsAreRefused) {
     expect_refused({"com_offset", "[-100, 100] m"}, with([=](auto& p) { p.grasp.com_offset = x; }));
   for (const double x : {-0.1, 10.0})
     expect_refused({"start", "where the hand's motion is known"}, with([=](auto& p) { p.start = x; }));
+  // Pads that pull.
+  const support::ConstantForce pull(-60);
+  const auto given = support::problem_of(thrown, *model);
+  expect_refused({"normal force = -60 N at", "[0, inf) N"}, [&] {
+    simulate_release(release::ReleaseProblem<double>{given.hand, pull, *model, given.body, given.gravity,
+                                                     given.grasp, given.start, given.slip, given.spin});
+  });
   // seconds since 1970: a step of 1 µs would be of four ulps
   for (const double x : {1.7e9, kNaN})
     expect_refused({"start", "[-1e6, 1e6] s"}, with([=](auto& p) { p.start = x; }));

@@ -394,6 +394,21 @@ TEST(ThrowFit, WhatIsFixedLeavesNothingOpen) {
   EXPECT_LT(result.campaign[grip].sigma, 1e-9);
 }
 
+TEST(ThrowFit, AGripperThatOpensBeforeItIsToldToIsNoAnswerAndNoError) {
+  auto log = disc_log();
+  for (auto& one : log.throws) one.ft.reset();
+  const auto problem = problem_of(log);
+  auto values = problem.start();
+  for (std::size_t k = 0; k < values.size(); ++k)
+    if (problem.campaign()[k].name == "dead_time") values[k] = -1e-6;
+  const std::vector<double> own(problem.own().size(), 0.0);
+  for (const auto by : {DerivativesBy::nothing, DerivativesBy::all}) {
+    const auto l = problem.linearise(problem.throws().front(), values, own, by);
+    EXPECT_FALSE(l.solved);
+    EXPECT_THAT(l.why_not, HasSubstr("dead_time"));
+  }
+}
+
 TEST(ThrowFit, RefusesOptionsThatMeanNothing) {
   const auto problem = problem_of(disc_log());
   const auto message = [&](auto&& change) {
