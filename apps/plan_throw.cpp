@@ -18,6 +18,7 @@
 #include "apps/throws.hpp"
 #include "datasets/model_card.hpp"
 #include "datasets/sku.hpp"
+#include "fitting/sku/sku_inputs.hpp"
 #include "planners/arm/chain_file.hpp"
 #include "planners/tube/planar_hand.hpp"
 
@@ -199,7 +200,8 @@ void plan_throw(const PlanThrowOptions& options) {
 
   std::optional<planners::ReleaseCard> card;
   planners::HeldObject object;
-  object.com_offset = {0, 0.004};
+  const double com_sigma = fitting::AssumedTolerances{}.com_offset;  // as validate-sku assumes
+  object.com_offset = {0, com_sigma};
   if (!options.card.empty())
     card = planners::release_card(datasets::read_model_card(options.card), options.card);
   std::optional<datasets::Sku> given;
@@ -209,7 +211,7 @@ void plan_throw(const PlanThrowOptions& options) {
       throw datasets::LogError(options.sku, "inertia_kg_m2", "is not known: give it, or a shape with dims_m");
     answer.lever = sku.com_offset;
     object.mass = sku.mass, object.inertia = *sku.inertia;
-    object.com_offset = {sku.com_offset, sku.com_offset_sigma.value_or(0.004)};
+    object.com_offset = {sku.com_offset, sku.com_offset_sigma.value_or(com_sigma)};
   }
   answer.chain = planners::with_tool(pads, {Eigen::Matrix3d::Identity(), {0, 0, object.com_offset.value}});
   auto how = plan_options(options, pads, options.planar || card.has_value());

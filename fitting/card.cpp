@@ -55,6 +55,8 @@ struct ConditionScatter {
 constexpr ConditionScatter kScatter[] = {{"grip_force", "mu_deviation", true, 0},
                                          {"com_offset", "grasp_offset", false, 1e-3},
                                          {"opening_time", "dead_time_deviation", false, 0},
+                                         {"dead_time", "dead_time_deviation", false, 1e-3},
+                                         {"shape", nullptr, false, 0.1},
                                          {"release_speed", nullptr, false, 0.02},
                                          {"detach_speed", nullptr, false, 0.02},
                                          {"release_omega", nullptr, false, 0.05},
@@ -114,7 +116,12 @@ std::vector<Condition> conditions_of(const experiment::PreparedThrow& one) {
   if (one.normal_force) {
     out.push_back({"grip_force", "N", one.force_fit.grip_force});
     const double opening = one.force_fit.release_time - one.force_fit.opening_start;
-    if (std::isfinite(opening)) out.push_back({"opening_time", "s", opening});
+    if (std::isfinite(opening)) {
+      out.push_back({"opening_time", "s", opening});
+      out.push_back({"shape", "-", one.force_fit.shape});
+      if (const double dead = one.force_fit.opening_start - one.open_command; dead > 0)  // a command is known
+        out.push_back({"dead_time", "s", dead});
+    }
   }
   if (const auto& twist = one.measured.detach_twist) {
     out.push_back({"detach_speed", "m/s", std::hypot(twist->vx, twist->vz)});

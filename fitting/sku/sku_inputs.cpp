@@ -101,20 +101,21 @@ void add_spreads(const datasets::ModelCard& card, Collector& collect) {
 void add_opening(const datasets::ModelCard& card, const std::string& file, const AssumedTolerances& assumed,
                  Collector& collect) {
   const auto design = experiment::campaign_design("batch180").opening;
-  const auto add = [&](const char* name, const char* range_name, const char* unit, double value,
-                       double sigma) {
+  const auto add = [&](const char* name, const char* unit, double value, double sigma) {
     if (card.parameters.contains(name)) return;  // fitted, with its own σ
-    if (const auto seen = datasets::middle_of_range(card, file, range_name, unit)) {
+    const auto seen = datasets::middle_of_range(card, file, name, unit);
+    if (seen) {
       value = seen->value;
       sigma = std::max(sigma, *seen->sigma);
     }
     const std::size_t k = collect.value(name, value);
-    collect.input({name, unit, value, sigma, InputSource::gripper, kForce, {{k, 1}}});
+    collect.input(
+        {name, unit, value, sigma, seen ? InputSource::gripper : InputSource::assumed, kForce, {{k, 1}}});
   };
-  add("grip_force", "grip_force", "N", design.grip_force, assumed.grip_force * design.grip_force);
-  add("opening_time", "opening_time", "s", design.opening_time, assumed.opening_time);
-  add("dead_time", "", "s", design.dead_time, assumed.dead_time);
-  add("shape", "", "-", design.shape, 0);
+  add("grip_force", "N", design.grip_force, assumed.grip_force * design.grip_force);
+  add("opening_time", "s", design.opening_time, assumed.opening_time);
+  add("dead_time", "s", design.dead_time, assumed.dead_time);
+  add("shape", "-", design.shape, 0);
 }
 
 void add_object(const datasets::Sku& sku, const AssumedTolerances& assumed, Collector& collect) {

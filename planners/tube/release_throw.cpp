@@ -78,13 +78,13 @@ class CardReader {
   }
 
   /// The same, else from the valid range. `least_sigma` of what that tells.
-  void take_or_range(const char* name, const char* unit, double& value, double& sigma, double least_share,
-                     double least_sigma) {
-    take(name, unit, 0, true, value, &sigma);
+  void take_or_range(const char* name, const char* unit, bool positive, double& value, double& sigma,
+                     double least_share, double least_sigma) {
+    take(name, unit, 0, positive, value, &sigma);
     if (card_.parameters.contains(name)) return;
     const auto seen = datasets::middle_of_range(card_, file_, name, unit);
     if (!seen) return;
-    require(fmt::format("/valid_range/{}", name), seen->value, 0, true);
+    require(fmt::format("/valid_range/{}", name), seen->value, 0, positive);
     value = seen->value;
     sigma = std::max({*seen->sigma, least_share * seen->value, least_sigma});
     out_.origins[name] = {NumberSource::range, NumberSource::range};
@@ -175,12 +175,13 @@ ReleaseCard release_card(const datasets::ModelCard& card, const std::string& fil
     throw CardError(file, "/parameters/pads/value",
                     fmt::format("is {}; accepted: whole numbers from 1 to {}", pads, kMostPads));
   out.pads = static_cast<int>(pads);
-  double force_sigma = 0;
-  reader.take_or_range("grip_force", "N", out.grip_force, force_sigma, kLeastForceSigma, 0);
-  reader.take("dead_time", "s", 0, false, out.dead_time.value, &out.dead_time.sigma);
-  reader.take_or_range("opening_time", "s", out.opening_time.value, out.opening_time.sigma, 0,
+  double force_sigma = 0, of_shape = 0;
+  reader.take_or_range("grip_force", "N", true, out.grip_force, force_sigma, kLeastForceSigma, 0);
+  reader.take_or_range("dead_time", "s", false, out.dead_time.value, out.dead_time.sigma, 0,
                        kLeastOpeningSigma);
-  reader.take("shape", "-", 0, true, out.shape);
+  reader.take_or_range("opening_time", "s", true, out.opening_time.value, out.opening_time.sigma, 0,
+                       kLeastOpeningSigma);
+  reader.take_or_range("shape", "-", true, out.shape, of_shape, 0, 0);  // how it scatters moves little
   reader.pass_over("reference_force");  // of contact.soft_patch_radius, an effect
   reader.pass_over_spread("force_deviation");
   // Friction's limits know the product of mu and the force alone, of which a card without a measured force

@@ -50,11 +50,11 @@ struct ReleaseCard {
 
 /// The least that a gripper's numbers scatter where a card's valid range tells them, 1 σ.
 inline constexpr double kLeastForceSigma = 0.03,  ///< of the grip force, as its share [-]
-    kLeastOpeningSigma = 1e-3;                    ///< of the opening time [s]
+    kLeastOpeningSigma = 1e-3;                    ///< of the dead time and of the opening time [s]
 
 /// A model card's numbers: of its parameters mu, length, kappa (of limit_surface_quartic), pads, grip_force,
-/// dead_time, opening_time and shape; else, for grip_force and opening_time, of its valid range; else those
-/// of `otherwise`. The card's spreads from throw to throw add to σ: mu_deviation, dead_time_deviation,
+/// dead_time, opening_time and shape; else, for these four of the gripper, of its valid range; else those of
+/// `otherwise`. The card's spreads from throw to throw add to σ: mu_deviation, dead_time_deviation,
 /// grasp_offset and grasp_angle; force_deviation is of a log's sensor and passed over. σ of the grip force
 /// counts as friction's, with which it forms one product. Throws datasets::CardError for a card of
 /// gripper_delay, for one with effects, which this planner does not take, and for parameters and spreads that

@@ -214,6 +214,20 @@ TEST(ThrowFit, DeadForceChannelIsDropped) {
   expect_unmoved(fit(problem), 3, "dead channel");  // less data: another estimate, of the same thing
 }
 
+TEST(ThrowFit, ACardTellsHowTheGripperOpened) {
+  const auto card = card_of(problem_of(disc_log()), disc_fit());
+  const auto& opening = small_design(kLaw).opening;
+  const auto expect_around = [&](const char* name, double truth, double within) {
+    const auto& range = card.valid_range.at(name);
+    EXPECT_LT(range.low, truth + within) << name;
+    EXPECT_GT(range.high, truth - within) << name;
+    EXPECT_LT(range.high - range.low, 10 * within) << name;
+  };
+  expect_around("dead_time", opening.dead_time, 5e-4);
+  expect_around("opening_time", opening.opening_time, 5e-4);
+  expect_around("shape", opening.shape, 0.05);
+}
+
 // A wind in which nothing drags.
 TEST(ThrowFit, ACardTellsOfWhatLeavesNoTrace) {
   CampaignOptions options;

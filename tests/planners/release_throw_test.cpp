@@ -257,6 +257,13 @@ TEST(ReleaseCard, TakesTheGripperThatItsThrowsHad) {
   EXPECT_EQ(seen.origins.at("grip_force").value, NumberSource::range);
   EXPECT_EQ(seen.origins.at("mu").value, NumberSource::parameter);
   EXPECT_FALSE(seen.origins.contains("dead_time"));  // nothing tells it
+  card.valid_range["dead_time"] = {0.006, 0.008, "s"};
+  card.valid_range["shape"] = {1.9, 2.1, "-"};
+  const ReleaseCard whole = release_card(card, "card.json");
+  EXPECT_DOUBLE_EQ(whole.dead_time.value, 0.007);
+  EXPECT_DOUBLE_EQ(whole.dead_time.sigma, kLeastOpeningSigma) << "an even spread of 2 ms is less";
+  EXPECT_DOUBLE_EQ(whole.shape, 2);
+  EXPECT_EQ(whole.origins.at("dead_time").value, NumberSource::range);
 
   // Fitted numbers go before the range; of mu and the force a fit knows the product better than either.
   card.parameters["grip_force"] = {30, 6, "N"};
