@@ -23,7 +23,10 @@ std::vector<UnitDoubt> contradicted_axes(const datasets::ThrowLog& log);
 /// column is told if it goes against that: in the median over throws a correlation below −0.9 about the means
 /// (a bias of the sensor does not count), a cosine below −0.5, and a size within a factor of five. The torque
 /// has a say where motion capture confirms the lever. Or fx and fz each follow the other's need (correlations
-/// beyond ±0.95, and within ±0.9 with their own): axes swapped.
+/// beyond ±0.95, and within ±0.9 with their own), or over all samples of all throws both fit crossed (rms of
+/// the difference below 0.6 of the need and half of that as they stand) and do so about the means (below
+/// 0.8): axes swapped. The second sees what noise hides within a throw: what objects and conditions differ
+/// by.
 std::vector<UnitDoubt> reversed_wrenches(const datasets::ThrowLog& log);
 
 }  // namespace unhand::experiment
