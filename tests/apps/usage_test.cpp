@@ -431,5 +431,21 @@ TEST_F(Cli, InspectTellsOfWhatIsImpossibleAndTheRestRefusesIt) {
   expect_refusal("compare mm.h5 --json a.json", 3, "mm.h5: /gripper@pad_radius");
 }
 
+TEST_F(Cli, ImpossibleTimesAreTold) {
+  auto log = datasets::read_throw_log(quick);
+  log.gripper->opening_command_time = 10;
+  datasets::write_throw_log(folder / "late.h5", log);
+  const char* said = "/gripper@opening_command_time: is 10 s, and throw ";
+  EXPECT_THAT(run("inspect late.h5").out, HasSubstr(said));
+  EXPECT_THAT(run("fit late.h5 --model gripper_delay").err, HasSubstr(said));
+  write_changed("landed.h5", [](datasets::Throw& one) { one.landing->time.data = {0}; });
+  EXPECT_THAT(run("compare landed.h5 --models gripper_delay").err,
+              HasSubstr("/landing/time: is 0 s, not after the gripper's opening at "));
+  write_changed("clocks.h5", [](datasets::Throw& one) {
+    for (double& t : one.mocap->time.data) t += 10;
+  });
+  expect_refusal("compare clocks.h5", 3, "they do not overlap");
+}
+
 }  // namespace
 }  // namespace unhand::cli
