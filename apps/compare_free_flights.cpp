@@ -76,8 +76,8 @@ Table flights_table(const std::vector<FreeFlightComparison>& models) {
       const FreeFlightStatistics& s = model.*member;
       const auto &p = s.end_position_error_m, &a = s.end_orientation_error_deg;
       out.rows.push_back({model.model, name, fmt::to_string(s.n), fixed(s.n > 0, 1e3 * s.trajectory_rms_m, 3),
-                          plus_minus(p.n > 0, 1e3 * p.mean, 1e3 * p.std, 2),
-                          fixed(p.n > 0, 1e3 * p.median, 2), plus_minus(a.n > 0, a.mean, a.std, 2),
+                          mean_and_spread(p.n, 1e3 * p.mean, 1e3 * p.std, 2),
+                          fixed(p.n > 0, 1e3 * p.median, 2), mean_and_spread(a.n, a.mean, a.std, 2),
                           fixed(a.n > 0, a.median, 2), fmt::format("{:.0f}", model.microseconds_per_throw)});
     }
   return out;

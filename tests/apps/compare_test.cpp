@@ -363,6 +363,7 @@ TEST_F(Cli, FreeFlights) {
   const json& model = one["models"]["projectile"];
   EXPECT_EQ(model["train"]["n"], 4);
   EXPECT_EQ(model["test"]["n"], 1);
+  EXPECT_THAT(answer.out, HasSubstr("0.00 ± - ")) << "a single error has no spread";
   EXPECT_LT(model["test"]["trajectory_rms_m"], 1e-6);  // the motion is the model's, rounded
   EXPECT_GT(fs::file_size(folder / "r/residuals_projectile.png"), 0u);
 }
