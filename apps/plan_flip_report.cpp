@@ -35,7 +35,7 @@ Table table_of(const FlipAnswer& a) {
 
 std::string reached(const fl::LearningPath& path, int hits) {
   const int i = path.reached(hits);
-  return i == 0 ? "not" : fmt::format("in iteration {}", i);
+  return i == 0 ? "in no iteration" : fmt::format("first in iteration {}", i);
 }
 
 std::string target_box(const fl::FlipTarget& t) {
@@ -224,12 +224,13 @@ std::string summary(const FlipAnswer& a) {
              : fmt::format(", known from {} throws of another one ({:.1f} cm{})", a.known_throws, known,
                            a.paper_shift ? "; the paper's shift, as no --com-offset was given" : "");
   const int most = (2 * a.throws + 2) / 3;
+  const std::string some =
+      most == a.throws ? "" : fmt::format("at least {} of {} {}, ", most, a.throws, reached(a.path, most));
   return out + fmt::format(
-                   "\nError {:.2f} before{}, {:.2f} after one iteration, {:.2f} at least; {} of {} throws "
-                   "within the tolerances {}, all {} {}{}\n",
+                   "\nError {:.2f} before{}, {:.2f} after one iteration, {:.2f} at least; throws within the "
+                   "tolerances: {}all {} {}{}\n",
                    a.path.initial, a.path.initial_is_seen ? "" : " (expected, not seen)", a.path.first(),
-                   a.path.minimum(), most, a.throws, reached(a.path, most), a.throws,
-                   reached(a.path, a.throws),
+                   a.path.minimum(), some, a.throws, reached(a.path, a.throws),
                    a.path.gave_up ? "; the learner had no command left to try" : "");
 }
 
