@@ -295,18 +295,20 @@ class Crossing {
   void add(const HeldWrench& sample) {
     for (std::size_t c = 0; c < 2; ++c) {
       own_[c].push_back(sample.seen[c] - sample.needed[c]);
+      reversed_[c].push_back(sample.seen[c] + sample.needed[c]);
       crossed_[c].push_back(sample.seen[1 - c] - sample.needed[c]);
       needed_[c].push_back(sample.needed[c]);
     }
   }
-  /// Crossed they fit, as they stand they do not; and not by a bias alone, which the means take out.
+  /// Crossed they fit, and neither as they stand nor reversed; and not by a bias alone, which the means take
+  /// out.
   bool fits_crossed() const {
     constexpr double kCloser = 0.5, kWithin = 0.6, kCloserAboutMeans = 0.8;
     if (needed_[0].empty()) return false;
     const auto both = [](double (*size)(const std::vector<double>&), const auto& of) {
       return std::hypot(size(of[0]), size(of[1]));
     };
-    return both(rms, crossed_) < kCloser * both(rms, own_) &&
+    return both(rms, crossed_) < kCloser * std::min(both(rms, own_), both(rms, reversed_)) &&
            both(rms, crossed_) < kWithin * both(rms, needed_) &&
            both(spread, crossed_) < kCloserAboutMeans * both(spread, own_);
   }
@@ -317,7 +319,7 @@ class Crossing {
     for (const double x : a) sum += x * x;
     return std::sqrt(sum / static_cast<double>(a.size()));
   }
-  std::array<std::vector<double>, 2> own_, crossed_, needed_;
+  std::array<std::vector<double>, 2> own_, reversed_, crossed_, needed_;
 };
 
 std::optional<double> seen_grasp(const Throw& one, double opening) {
@@ -399,6 +401,15 @@ std::vector<UnitDoubt> reversed_wrenches(const ThrowLog& log) {
         crossed[c].push_back(std::abs(correlation(seen[c], needed[1 - c], true)));
   }
   std::vector<UnitDoubt> out;
+  const auto tell_swapped = [&] {
+    out.push_back({"/throws/*/ft/wrench", "fx", 1, compared,
+                   fmt::format("fx goes with the fz, and fz with the fx, that mass and motion of the held "
+                               "object need ({} throws): axes swapped?",
+                               compared)});
+    return out;
+  };
+  // Where what they need goes opposite ways, a swap looks like a reversed sign, too.
+  if (crossing.fits_crossed()) return tell_swapped();
   for (std::size_t c = 0; c < 3; ++c) {
     if (about[c].empty()) continue;
     const double against = dynamics::median(about[c]), ratio = dynamics::median(size[c]);
@@ -413,16 +424,10 @@ std::vector<UnitDoubt> reversed_wrenches(const ThrowLog& log) {
                      "the hand frame: is the sign reversed, a reaction logged for the action, or that axis?",
                      kNames[c], against, about[c].size(), n)});
   }
-  if (!out.empty()) return out;
-  const bool follow = !crossed[0].empty() && dynamics::median(crossed[0]) > kCrossed &&
-                      dynamics::median(crossed[1]) > kCrossed &&
-                      std::abs(dynamics::median(about[0])) < kOwn &&
-                      std::abs(dynamics::median(about[1])) < kOwn;
-  if (follow || crossing.fits_crossed())
-    out.push_back({"/throws/*/ft/wrench", "fx", 1, compared,
-                   fmt::format("fx goes with the fz, and fz with the fx, that mass and motion of the held "
-                               "object need ({} throws): axes swapped?",
-                               compared)});
+  if (!out.empty() || crossed[0].empty()) return out;
+  if (dynamics::median(crossed[0]) > kCrossed && dynamics::median(crossed[1]) > kCrossed &&
+      std::abs(dynamics::median(about[0])) < kOwn && std::abs(dynamics::median(about[1])) < kOwn)
+    return tell_swapped();
   return out;
 }
 

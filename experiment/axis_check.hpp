@@ -22,11 +22,13 @@ std::vector<UnitDoubt> contradicted_axes(const datasets::ThrowLog& log);
 /// Columns of the wrench with the other sign. While the object is held the pads' wrench is M a − m g. A
 /// column is told if it goes against that: in the median over throws a correlation below −0.9 about the means
 /// (a bias of the sensor does not count), a cosine below −0.5, and a size within a factor of five. The torque
-/// has a say where motion capture confirms the lever. Or fx and fz each follow the other's need (correlations
-/// beyond ±0.95, and within ±0.9 with their own), or over all samples of all throws both fit crossed (rms of
-/// the difference below 0.6 of the need and half of that as they stand) and do so about the means (below
-/// 0.8): axes swapped. The second sees what noise hides within a throw: what objects and conditions differ
-/// by.
+/// has a say where motion capture confirms the lever.
+///
+/// Axes are told as swapped instead if fx and fz fit each other's need over all samples of all throws: the
+/// rms of the difference below 0.6 of the need and half of that as they stand or reversed, about the means
+/// (which a bias leaves alone) below 0.8 of it. That sees what noise hides within a throw, by what objects
+/// and conditions differ. Or, where no sign is told, if each follows the other's need in the median over
+/// throws (correlations beyond ±0.95, and within ±0.9 with their own).
 std::vector<UnitDoubt> reversed_wrenches(const datasets::ThrowLog& log);
 
 }  // namespace unhand::experiment
