@@ -103,7 +103,7 @@ std::string scatter(const std::vector<Cloud>& clouds, std::size_t first, const E
 std::string value_axis(const std::vector<double>& values) {
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
   if (!(*low > 0 && *high / *low > 20))
-    return fmt::format("unset logscale x; set xtics autofreq\nset xrange [0:{:.6g}]\n",
+    return fmt::format("unset logscale x; set xtics {:.6g}\nset xrange [0:{:.6g}]\n", tic_step(*high),
                        *high > 0 ? 1.08 * *high : 1);
   const double left = *low / 1.4, right = *high * 1.4;
   std::string out = fmt::format("set logscale x\nset xrange [{:.6g}:{:.6g}]\n", left, right);

@@ -76,8 +76,8 @@ Table flights_table(const std::vector<FreeFlightComparison>& models) {
       const FreeFlightStatistics& s = model.*member;
       const auto &p = s.end_position_error_m, &a = s.end_orientation_error_deg;
       out.rows.push_back({model.model, name, fmt::to_string(s.n), fixed(s.n > 0, 1e3 * s.trajectory_rms_m, 3),
-                          plus_minus(p.n > 0, 1e3 * p.mean, 1e3 * p.std, 2),
-                          fixed(p.n > 0, 1e3 * p.median, 2), plus_minus(a.n > 0, a.mean, a.std, 2),
+                          mean_and_spread(p.n, 1e3 * p.mean, 1e3 * p.std, 2),
+                          fixed(p.n > 0, 1e3 * p.median, 2), mean_and_spread(a.n, a.mean, a.std, 2),
                           fixed(a.n > 0, a.median, 2), fmt::format("{:.0f}", model.microseconds_per_throw)});
     }
   return out;
@@ -113,7 +113,7 @@ double quantile(const std::vector<double>& values, double p) {
 
 using Residuals = std::vector<flight::Vec3<double>> experiment::FreeFlightFit::*;
 
-/// Median and 10-90 % of one axis in bins of normalised time.
+/// Median and 10-90 % of fitted − measured, one axis in bins of normalised time.
 DataBlock band(const FreeFlightComparison& model, bool test_only, Residuals residuals, int axis, double scale,
                const std::string& title) {
   constexpr std::size_t bins = 20;
@@ -123,7 +123,7 @@ DataBlock band(const FreeFlightComparison& model, bool test_only, Residuals resi
     const auto& r = one.whole.*residuals;
     for (std::size_t i = 0; i < r.size(); ++i) {
       const auto bin = static_cast<std::size_t>(one.normalised_time[i] * bins);
-      values[std::min(bin, bins - 1)].push_back(scale * r[i][static_cast<std::size_t>(axis)]);
+      values[std::min(bin, bins - 1)].push_back(-scale * r[i][static_cast<std::size_t>(axis)]);
     }
   }
   DataBlock out{title, {"normalised time", "10 %", "median", "90 %"}, {}, {}};
@@ -176,7 +176,7 @@ Figure residual_figure(const FreeFlightComparison& model, bool planar) {
   s = fmt::format(
       "set multiplot\nunset key\nset style fill transparent solid 0.3 noborder\nset xrange [0:1]\n"
       "set xtics 0,0.25,1 format '%g'\nset xzeroaxis linetype 1 linecolor rgb '#808080' linewidth 0.6\n"
-      "set label 1 'what {} leaves: measured - fitted, {} flights' at screen 0.5,{:.4f} center\n",
+      "set label 1 'what {} leaves: fitted - measured, {} flights' at screen 0.5,{:.4f} center\n",
       plain(model.model), test_only ? "test" : "all", 1 - 0.5 / figure.height);
   double y = top - height;
   for (const PanelRow& row : rows) {

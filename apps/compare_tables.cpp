@@ -69,7 +69,7 @@ ReleaseTables release_tables(const experiment::Comparison& comparison, const dat
       auto bias = row;
       for (int q = 0; q < experiment::kQuantityCount; ++q) {
         const auto s = model.statistics(q, split);
-        row.push_back(plus_minus(s.n > 0, s.mae, s.std, decimals[q]));
+        row.push_back(mean_and_spread(s.n, s.mae, s.std, decimals[q]));
         bias.push_back(s.n > 0 ? fmt::format("{:+.{}f}", s.bias, decimals[q]) : "-");
       }
       row.push_back(fmt::format("{:.0f}", model.microseconds_per_throw));

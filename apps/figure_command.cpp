@@ -13,6 +13,7 @@
 #include "apps/output.hpp"
 #include "apps/release_figures.hpp"
 #include "apps/table.hpp"
+#include "apps/tell.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -23,7 +24,7 @@ struct FigureCommandOptions {
 };
 
 /// MAE with the standard deviation of the absolute error as whiskers, held-out throws where there are any.
-Figure mae_figure(const experiment::Comparison& comparison) {
+std::optional<Figure> mae_figure(const experiment::Comparison& comparison) {
   Figure figure{"mae", 17, 0, {}, {}};
   const auto split =
       std::any_of(comparison.models.front().throws.begin(), comparison.models.front().throws.end(),
@@ -31,6 +32,7 @@ Figure mae_figure(const experiment::Comparison& comparison) {
           ? datasets::Split::test
           : datasets::Split::train;
   std::string tics, body;
+  bool any = false;
   const auto thrown =
       std::count_if(comparison.models.front().throws.begin(), comparison.models.front().throws.end(),
                     [&](const auto& t) { return t.split == split; });
@@ -51,6 +53,7 @@ Figure mae_figure(const experiment::Comparison& comparison) {
       block.labels.push_back(comparison.models[i].model);
       high = std::max(high, s.mae + s.std);
     }
+    any = any || !block.rows.empty();
     figure.data.push_back(std::move(block));
     const double x = left + (q % 2) * (width + gap), y = 1.3 + (1 - q / 2) * (panel + 1.3);
     body += place(figure, {x, x + width, y, y + panel - 0.7});
@@ -63,10 +66,11 @@ Figure mae_figure(const experiment::Comparison& comparison) {
     body += fmt::format(
         "set title '{}' offset 0,-0.7\nset xrange [0:{:.6g}]; set xtics {:.6g} font ',7.5'\n"
         "plot DATA index {} using (0.5*$2):1:(0.5*$2):(0.28) with boxxyerror linecolor rgb '#56b4e9', \\\n"
-        "     DATA index {} using 2:1:($2-$3 > 0 ? $2-$3 : 0):($2+$3) with xerrorbars pointtype 7 linecolor "
+        "     DATA index {} using 2:1:($2-$3):($2+$3) with xerrorbars pointtype 7 linecolor "
         "rgb '#000000' linewidth 1.2\nunset label 1\n",
         plain(experiment::kQuantities[q].title), high > 0 ? 1.06 * high : 1, tic_step(high), q, q);
   }
+  if (!any) return {};
   figure.script = fmt::format(
       "set multiplot\nunset key\nset label 1 'mean absolute errors over the {} {} throws, whiskers: their "
       "standard deviation' at screen 0.5,{:.4f} center\nset style fill solid 1 noborder\nset yrange "
@@ -76,8 +80,9 @@ Figure mae_figure(const experiment::Comparison& comparison) {
   return figure;
 }
 
-Figure required(std::optional<Figure> figure, const FigureSource& source) {
-  if (!figure) throw Unanswered(source.file() + ": no landing was measured");
+Figure required(std::optional<Figure> figure, const FigureSource& source,
+                const char* missing = "no landing was measured") {
+  if (!figure) throw Unanswered(fmt::format("{}: {}", source.file(), missing));
   return *std::move(figure);
 }
 
@@ -93,7 +98,9 @@ const std::vector<Kind>& kinds() {
       {"conditions", "mean landing errors of each condition",
        [](FigureSource& s) { return required(condition_figure(s.compared()), s); }},
       {"mae", "mean absolute errors of each model, with their standard deviation",
-       [](FigureSource& s) { return mae_figure(s.compared()); }},
+       [](FigureSource& s) {
+         return required(mae_figure(s.compared()), s, "neither a detach nor a landing was measured");
+       }},
       {"modes", "normal force and modes of one throw over time",
        [](FigureSource& s) { return mode_figure(s.traces()); }},
       {"wrench", "the wrench of one throw on the limit surface",
@@ -124,17 +131,32 @@ void figure(const FigureCommandOptions& options) {
   Outputs outputs{options.request.inputs()};
   const auto folder = outputs.directory(options.out);
   std::vector<std::string> drawn;
-  for (const Kind& k : kinds())
-    if (options.name == "all" || options.name == k.name) {
-      const Figure made = k.make(source);
-      draw(made, folder);
-      drawn.push_back(made.name);
+  std::vector<std::pair<std::string, std::string>> left_out;  // with the reason
+  for (const Kind& k : kinds()) {
+    if (options.name != "all" && options.name != k.name) continue;
+    std::optional<Figure> made;
+    try {
+      made = k.make(source);
+    } catch (const Unanswered& error) {
+      if (options.name != "all") throw;
+      left_out.emplace_back(k.name, error.what());
+    } catch (const WrongUsage& error) {  // a model that has no modes
+      if (options.name != "all") throw;
+      left_out.emplace_back(k.name, error.what());
     }
+    if (!made) continue;
+    draw(*made, folder);
+    drawn.push_back(made->name);
+  }
+  if (drawn.empty()) throw Unanswered(fmt::format("no figure can be drawn: {}", left_out.front().second));
+  for (const auto& [name, reason] : left_out) tell("unhand: left out {}: {}\n", name, reason);
   if (!options.json.empty()) {
     Json out = json_head("figure");
     const std::filesystem::path log = options.request.log;
     out["log"] = log.empty() ? Json(nullptr) : Json(log.filename().string());
     out["figures"] = drawn;
+    out["left_out"] = Json::object();
+    for (const auto& [name, reason] : left_out) out["left_out"][name] = reason;
     outputs.json(options.json, out);
   }
   outputs.commit();
@@ -149,7 +171,7 @@ Command figure_command(Parser& root) {
   Parser& parser = root.subcommand("figure", "Draw one figure, or all, of a log");
   std::string listed = "Which:";
   for (const Kind& kind : kinds()) listed += fmt::format("\n{}: {}", kind.name, kind.what);
-  parser.option("NAME", options->name, listed + "\nall: every one").required();
+  parser.option("NAME", options->name, listed + "\nall: every one that the log has data for").required();
   parser.option("--log", options->request.log, "A throw log; without one, the synthetic campaign quick12");
   parser.option("--throw", options->request.thrown,
                 "Id of the throw for figures of one; the first if not given");

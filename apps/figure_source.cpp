@@ -118,9 +118,10 @@ ReleaseTrace FigureSource::trace(const std::string& model) {
 }
 
 const std::vector<ReleaseTrace>& FigureSource::traces() {
-  if (traces_.empty())
-    for (const auto& model : request_.models) traces_.push_back(trace(model));
-  return traces_;
+  if (!traces_.empty()) return traces_;
+  std::vector<ReleaseTrace> all;
+  for (const auto& model : request_.models) all.push_back(trace(model));
+  return traces_ = std::move(all);
 }
 
 FlightOverlay FigureSource::overlay() {

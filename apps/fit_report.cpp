@@ -68,7 +68,7 @@ Table error_table(const FitAnswer& a) {
     std::vector<std::string> row{name, fmt::to_string(n)};
     for (int q = 0; q < experiment::kQuantityCount; ++q) {
       const ErrorStatistics s = statistics(q);
-      row.push_back(s.n > 0 ? fmt::format("{} ({:+.{}f})", plus_minus(true, s.mae, s.std, decimals[q]),
+      row.push_back(s.n > 0 ? fmt::format("{} ({:+.{}f})", mean_and_spread(s.n, s.mae, s.std, decimals[q]),
                                           s.bias, decimals[q])
                             : "-");
     }

@@ -14,6 +14,7 @@
 #include "dynamics/median.hpp"
 #include "experiment/landing_noise.hpp"
 #include "experiment/prepared_throw.hpp"
+#include "experiment/time_check.hpp"
 #include "experiment/unit_check.hpp"
 
 namespace unhand::apps {
@@ -146,6 +147,11 @@ Inspection inspect_throws(const std::string& file) {
         "fly: neither a release nor a flight can be predicted from them\n",
         n, log.throws.size());
   Json json = Json::parse(datasets::to_json(summary));
+  json["impossible_times"] = Json::array();
+  for (const auto& note : experiment::impossible_times(log)) {
+    out.text += fmt::format("note: {}\n", note.in_words(log.throws.size()));
+    json["impossible_times"].push_back({{"path", note.path}, {"reason", note.said}, {"throws", note.throws}});
+  }
   json["doubtful"] = Json::array();
   for (const auto& doubt : experiment::unit_doubts(log)) {
     out.text += fmt::format("doubtful: {}: {}\n", doubt.path, doubt.reason);

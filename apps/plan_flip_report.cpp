@@ -2,7 +2,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <climits>
 #include <cmath>
+#include <iterator>
 #include <set>
 
 #include "apps/figure.hpp"
@@ -35,7 +37,7 @@ Table table_of(const FlipAnswer& a) {
 
 std::string reached(const fl::LearningPath& path, int hits) {
   const int i = path.reached(hits);
-  return i == 0 ? "not" : fmt::format("in iteration {}", i);
+  return i == 0 ? "in no iteration" : fmt::format("first in iteration {}", i);
 }
 
 std::string target_box(const fl::FlipTarget& t) {
@@ -61,7 +63,7 @@ std::string listed(const std::vector<int>& numbers) {
   return out;
 }
 
-/// One label for each cluster of means, where numbers would lie on each other.
+/// One label for each cluster of means, where numbers would lie on each other: at its first mean.
 DataBlock labels_of(const std::vector<std::vector<double>>& means, double reach_x, double reach_angle) {
   DataBlock out{"iterations", {"x [m]", "angle [deg]", "numbers"}, {}, {}};
   std::vector<std::vector<int>> numbers;
@@ -77,6 +79,47 @@ DataBlock labels_of(const std::vector<std::vector<double>>& means, double reach_
     numbers[at].push_back(static_cast<int>(one[2]));
   }
   for (const auto& cluster : numbers) out.labels.push_back(listed(cluster));
+  return out;
+}
+
+/// Where a label stands from its point, with its style.
+struct Corner {
+  int right, up;  ///< 1, or -1: left, down
+  const char* style;
+};
+constexpr Corner kCorners[]{{1, 1, "left offset 0.7,0.7"},
+                            {-1, 1, "right offset -0.7,0.7"},
+                            {1, -1, "left offset 0.7,-0.7"},
+                            {-1, -1, "right offset -0.7,-0.7"}};
+
+/// The labels of each corner: where they cover least of the path through the means.
+std::vector<DataBlock> placed_labels(const DataBlock& labels, const std::vector<std::vector<double>>& means,
+                                     double width, double height) {
+  constexpr double kLetter = 0.018, kText = 0.06, kAside = 0.015, kAbove = 0.02;  // of width and height
+  constexpr int kAlong = 20;
+  std::vector<DataBlock> out(std::size(kCorners), {labels.title, labels.columns, {}, {}});
+  for (std::size_t i = 0; i < labels.rows.size(); ++i) {
+    const double wide = kLetter * static_cast<double>(labels.labels[i].size());
+    const auto covers = [&](const Corner& corner, double x, double angle) {
+      const double right = corner.right * (x - labels.rows[i][0]) / width,
+                   up = corner.up * (angle - labels.rows[i][1]) / height;
+      return right > kAside && right < kAside + wide && up > kAbove && up < kAbove + kText;
+    };
+    std::size_t best = 0;
+    int least = INT_MAX;
+    for (std::size_t c = 0; c < out.size(); ++c) {
+      int covered = 0;
+      for (std::size_t k = 1; k < means.size(); ++k)
+        for (int j = 0; j <= kAlong; ++j) {
+          const double share = static_cast<double>(j) / kAlong;
+          covered += covers(kCorners[c], means[k - 1][0] + share * (means[k][0] - means[k - 1][0]),
+                            means[k - 1][1] + share * (means[k][1] - means[k - 1][1]));
+        }
+      if (covered < least) least = covered, best = c;
+    }
+    out[best].rows.push_back(labels.rows[i]);
+    out[best].labels.push_back(labels.labels[i]);
+  }
   return out;
 }
 
@@ -108,18 +151,23 @@ void draw_path(const FlipAnswer& a, const std::filesystem::path& folder) {
     for (const auto& row : block->rows)
       for (std::size_t k = 0; k < 2; ++k)
         low[k] = std::min(low[k], row[k]), high[k] = std::max(high[k], row[k]);
-  const DataBlock labels = labels_of(means.rows, 0.11 * (high[0] - low[0]), 0.06 * (high[1] - low[1]));
+  const double width = high[0] - low[0], height = high[1] - low[1];
+  const auto labels =
+      placed_labels(labels_of(means.rows, 0.11 * width, 0.06 * height), means.rows, width, height);
   struct Series {
     const DataBlock& block;
     std::string style;
   };
+  std::vector<Series> all;
+  for (std::size_t c = 0; c < labels.size(); ++c)  // first: they hide nothing but the grid
+    all.push_back(
+        {labels[c], fmt::format("using 1:2:3 with labels {} font ',8' boxed notitle", kCorners[c].style)});
+  all.push_back({known, fmt::format("using 1:2 with points pt 2 ps 0.8 lc rgb '#888888' title '{}'",
+                                    a.path.initial_is_seen ? "known before" : "expected")});
+  all.push_back({throws, "using 1:2 with points pt 6 ps 0.6 lc rgb '#56b4e9' title 'throws'"});
+  all.push_back({means, "using 1:2 with linespoints pt 7 ps 0.7 lc rgb '#0072b2' title 'means'"});
   std::string plots;
-  for (const Series& one :
-       {Series{known, fmt::format("using 1:2 with points pt 2 ps 0.8 lc rgb '#888888' title '{}'",
-                                  a.path.initial_is_seen ? "known before" : "expected")},
-        Series{throws, "using 1:2 with points pt 6 ps 0.6 lc rgb '#56b4e9' title 'throws'"},
-        Series{means, "using 1:2 with linespoints pt 7 ps 0.7 lc rgb '#0072b2' title 'means'"},
-        Series{labels, "using 1:2:3 with labels left offset 0.7,0.7 font ',8' boxed notitle"}}) {
+  for (const Series& one : all) {
     if (one.block.rows.empty()) continue;
     plots += fmt::format("{}DATA index {} {}", plots.empty() ? "plot " : ", ", figure.data.size(), one.style);
     figure.data.push_back(one.block);
@@ -224,12 +272,13 @@ std::string summary(const FlipAnswer& a) {
              : fmt::format(", known from {} throws of another one ({:.1f} cm{})", a.known_throws, known,
                            a.paper_shift ? "; the paper's shift, as no --com-offset was given" : "");
   const int most = (2 * a.throws + 2) / 3;
+  const std::string some =
+      most == a.throws ? "" : fmt::format("at least {} of {} {}, ", most, a.throws, reached(a.path, most));
   return out + fmt::format(
-                   "\nError {:.2f} before{}, {:.2f} after one iteration, {:.2f} at least; {} of {} throws "
-                   "within the tolerances {}, all {} {}{}\n",
+                   "\nError {:.2f} before{}, {:.2f} after one iteration, {:.2f} at least; throws within the "
+                   "tolerances: {}all {} {}{}\n",
                    a.path.initial, a.path.initial_is_seen ? "" : " (expected, not seen)", a.path.first(),
-                   a.path.minimum(), most, a.throws, reached(a.path, most), a.throws,
-                   reached(a.path, a.throws),
+                   a.path.minimum(), some, a.throws, reached(a.path, a.throws),
                    a.path.gave_up ? "; the learner had no command left to try" : "");
 }
 

@@ -252,16 +252,20 @@ Figure flight_figure(const FlightOverlay& overlay) {
   DataBlock block{
       overlay.model,
       {"time [s]", "x predicted [m]", "z predicted [m]", "theta predicted [deg]", "x measured [m]",
-       "z measured [m]", "theta measured [deg]", "measured - predicted x [mm]", "z [mm]", "theta [deg]"},
+       "z measured [m]", "theta measured [deg]", "predicted - measured x [mm]", "z [mm]", "theta [deg]"},
       {},
       {}};
   for (std::size_t i = 0; i < overlay.time.size(); ++i) {
     const auto &p = overlay.predicted[i], &m = overlay.measured[i];
     block.rows.push_back({overlay.time[i], p.x, p.z, p.theta * kDegrees, m.x, m.z, m.theta * kDegrees,
-                          kMillimetres * (m.x - p.x), kMillimetres * (m.z - p.z),
-                          kDegrees * (m.theta - p.theta)});
+                          kMillimetres * (p.x - m.x), kMillimetres * (p.z - m.z),
+                          kDegrees * (p.theta - m.theta)});
   }
   figure.data.push_back(std::move(block));
+  double left = HUGE_VAL, right = -HUGE_VAL;
+  for (std::size_t i = 0; i < overlay.time.size(); ++i)
+    for (const double x : {overlay.predicted[i].x, overlay.measured[i].x})
+      left = std::min(left, x), right = std::max(right, x);
   const std::vector<KeyEntry> key{
       {"with lines linecolor rgb '#0072b2' linewidth 1.8", overlay.model},
       {"with points pointtype 6 linecolor rgb '#000000'", "motion capture"},
@@ -272,12 +276,14 @@ Figure flight_figure(const FlightOverlay& overlay) {
   const double bottom = 1.8 + key_height(key.size(), columns), top = figure.height - 0.9, middle = 8.6;
   std::string& s = figure.script;
   s = fmt::format(
-      "set multiplot\nunset key\nset title 'path{}' offset 0,-0.5\nset xlabel 'x [m]'; set ylabel 'z [m]'\n",
-      overlay.thrown.empty() ? "" : " of throw " + plain(overlay.thrown));
+      "set multiplot\nunset key\nset title 'path{}' offset 0,-0.5\nset xlabel 'x [m]'; set ylabel 'z [m]'\n"
+      "set xtics {:.6g}\n",
+      overlay.thrown.empty() ? "" : " of throw " + plain(overlay.thrown), tic_step(1.5 * (right - left)));
   s += place(figure, {1.9, middle, bottom, top});
   s += "plot DATA index 0 using 5:6 every 3 with points pointtype 6 linecolor rgb '#000000', \\\n"
        "     DATA index 0 using 2:3 with lines linecolor rgb '#0072b2' linewidth 1.8\n";
-  s += "set title 'measured - predicted' offset 0,-0.5\nset xtics 0.1; set xlabel 'time [s]'; set ylabel "
+  s += fmt::format("set xtics {:.6g}\n", tic_step(overlay.time.back() - overlay.time.front()));
+  s += "set title 'predicted - measured' offset 0,-0.5\nset xlabel 'time [s]'; set ylabel "
        "'mm, deg' offset "
        "1,0\n"
        "set xzeroaxis linetype 1 linecolor rgb '#808080' linewidth 0.6\n";

@@ -102,6 +102,10 @@ std::string plus_minus(bool known, double value, double spread, int decimals) {
   return known ? fmt::format("{:.{}f} ± {:.{}f}", value, decimals, spread, decimals) : "-";
 }
 
+std::string mean_and_spread(std::size_t n, double mean, double spread, int decimals) {
+  return n == 1 ? fmt::format("{:.{}f} ± -", mean, decimals) : plus_minus(n > 0, mean, spread, decimals);
+}
+
 std::string plural(std::size_t n, const char* what) {
   return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s");
 }

@@ -20,6 +20,8 @@ struct Table {
 
 /// value ± spread with so many decimals; a dash if there is nothing to show.
 std::string plus_minus(bool known, double value, double spread, int decimals);
+/// The same of n numbers: a single one has no spread, for which a dash stands.
+std::string mean_and_spread(std::size_t n, double mean, double spread, int decimals);
 
 /// A value and its sigma as far as the sigma's two leading digits, for people; JSON has all digits.
 struct Rounded {

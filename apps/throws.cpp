@@ -12,6 +12,7 @@
 #include "datasets/summary.hpp"
 #include "experiment/declared_check.hpp"
 #include "experiment/prepared_throw.hpp"
+#include "experiment/time_check.hpp"
 #include "experiment/unit_check.hpp"
 
 namespace unhand::apps {
@@ -34,6 +35,17 @@ void leave_out(datasets::ThrowLog& log, const char* why, Unusable&& is_unusable)
   });
 }
 
+/// Where no throw shows how it is held since motion capture keeps another time: Throws datasets::LogError.
+void require_common_clock(const datasets::ThrowLog& log, const std::string& file) {
+  if (std::any_of(log.throws.begin(), log.throws.end(),
+                  [&](const auto& one) { return experiment::shows_grasp(log, one); }))
+    return;
+  for (const auto& one : log.throws)
+    if (const auto apart = experiment::clocks_apart(log, one); !apart.empty())
+      throw datasets::LogError(file, "/throws/" + one.id + "/mocap/time",
+                               apart + ", so that nothing shows how the object is held");
+}
+
 }  // namespace
 
 datasets::ThrowLog read_throws(const std::string& file) {
@@ -42,6 +54,9 @@ datasets::ThrowLog read_throws(const std::string& file) {
   auto log = datasets::read_throw_log(file);
   if (log.throws.empty()) throw Unanswered(fmt::format("{}: holds no throws", file));
   experiment::require_units(log, file);
+  require_common_clock(log, file);
+  for (const auto& note : experiment::impossible_times(log))
+    tell("unhand: {}: {}\n", file, note.in_words(log.throws.size()));
   if (std::any_of(log.throws.begin(), log.throws.end(), [](const auto& one) { return one.hand.has_value(); }))
     leave_out(log, "have no hand, which the others have",
               [](const auto& one) { return !one.hand.has_value(); });

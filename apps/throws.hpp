@@ -10,9 +10,10 @@
 namespace unhand::apps {
 
 /// Leaves out, and says so on stderr, throws without a hand, as long as others have one, and throws from a
-/// hand that do not show the grasp (experiment::shows_grasp), as long as others do. Throws datasets::LogError
-/// where the file is no throw log or a column is in another unit (experiment::require_units), Unanswered
-/// where it holds no throws.
+/// hand that do not show the grasp (experiment::shows_grasp), as long as others do. Tells of times that
+/// cannot be (experiment::impossible_times). Throws datasets::LogError where the file is no throw log, a
+/// column is in another unit (experiment::require_units), or no throw shows the grasp since the clocks do not
+/// overlap; Unanswered where it holds no throws.
 datasets::ThrowLog read_throws(const std::string& file);
 
 /// Where the throw of that id is. Throws WrongUsage, naming the nearest id or some of them, if there is none.

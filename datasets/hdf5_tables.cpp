@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <utility>
 
 #include "datasets/hdf5_reader.hpp"
 #include "datasets/units.hpp"
@@ -11,6 +13,19 @@ namespace {
 
 constexpr std::string_view dataset_attributes[] = {"units", "sigma"};
 constexpr std::size_t widest_number = 16;  // bytes
+
+/// Whether a type is what h5py and others write for booleans: an enumeration of FALSE = 0 and TRUE = 1.
+bool is_boolean(const Handle& type) {
+  if (H5Tget_class(type.id()) != H5T_ENUM || H5Tget_nmembers(type.id()) != 2) return false;
+  const Handle base = type_handle(H5Tget_super(type.id()));
+  for (const auto& [name, expected] : {std::pair{"FALSE", 0LL}, {"TRUE", 1LL}}) {
+    std::array<long long, 2> value{};  // of at most widest_number bytes, converted in place
+    if (H5Tenum_valueof(type.id(), name, value.data()) < 0) return false;
+    if (H5Tconvert(base.id(), H5T_NATIVE_LLONG, 1, value.data(), nullptr, H5P_DEFAULT) < 0) return false;
+    if (value[0] != expected) return false;
+  }
+  return true;
+}
 
 /// The unit of each column, for which the log names one for all or one per column.
 std::vector<const Unit*> column_units(const Node& dataset, const ColumnLayout& layout, std::size_t columns) {
@@ -133,11 +148,14 @@ Series Node::series(std::string_view name, std::span<const ColumnLayout> layouts
 
 Flags Node::flags(std::string_view name) const {
   const Table table = open_table(name);
-  if (table.kind != H5T_INTEGER)
-    fail(name, fmt::format("wrong type: {}, expected integers", class_name(table.kind)));
+  const Node& self = table.node;
+  if (table.kind != H5T_INTEGER && !is_boolean(type_handle(H5Dget_type(self.object_.id()))))
+    fail(name,
+         fmt::format("wrong type: {}, expected integers or HDF5's booleans (an enumeration of FALSE = 0 and "
+                     "TRUE = 1)",
+                     class_name(table.kind)));
   if (table.rank != 1)
     fail(name, fmt::format("wrong shape {}, expected (N)", shape_text(table.rows, table.cols, table.rank)));
-  const Node& self = table.node;
   const std::string units = self.text("units");
   if (units != "1")
     self.fail_attribute("units", fmt::format("unknown unit '{}' for a flag (known: 1)", units));

@@ -172,11 +172,11 @@ void check_fall(const ThrowLog& log, const Throw& one, double opening, Links& ou
 }
 
 /// The landing beside where motion capture leads within its last tenth of a second.
-void check_landing(const Throw& one, Links& out) {
+void check_landing(const Throw& one, double opening, Links& out) {
   constexpr double kLast = 0.1, kBeyond = 0.15;  // s
   const auto& landing = *one.landing;
   const auto& mocap = *one.mocap;
-  if (landing.time.empty() || landing.pose.empty()) return;
+  if (landing.time.empty() || landing.pose.empty() || landing.time(0) <= opening) return;
   std::vector<double> t, x, theta;
   for (std::size_t i = mocap.time.rows; i-- > 0;) {
     if (!mocap.is_valid(i) || mocap.time(i) > landing.time(0)) continue;
@@ -202,7 +202,7 @@ Links links_of(const ThrowLog& log, const Throw& one) {
   const auto opening = opening_of(log, one);
   if (!opening || *opening <= hand.time(0) || *opening > hand.time(hand.time.rows - 1)) return out;
   if (one.mocap) check_held(log, one, *opening, out), check_fall(log, one, *opening, out);
-  if (one.mocap && one.landing) check_landing(one, out);
+  if (one.mocap && one.landing) check_landing(one, *opening, out);
   if (!one.landing || one.landing->pose.empty() || one.landing->time.empty()) return out;
   const double flown = one.landing->time(0) - *opening;
   Beside flight;
@@ -289,6 +289,39 @@ double spread(const std::vector<double>& a) {
   return std::sqrt(sum / static_cast<double>(a.size()));
 }
 
+/// fx and fz of all throws beside what the held objects need, as they stand and crossed.
+class Crossing {
+ public:
+  void add(const HeldWrench& sample) {
+    for (std::size_t c = 0; c < 2; ++c) {
+      own_[c].push_back(sample.seen[c] - sample.needed[c]);
+      reversed_[c].push_back(sample.seen[c] + sample.needed[c]);
+      crossed_[c].push_back(sample.seen[1 - c] - sample.needed[c]);
+      needed_[c].push_back(sample.needed[c]);
+    }
+  }
+  /// Crossed they fit, and neither as they stand nor reversed; and not by a bias alone, which the means take
+  /// out.
+  bool fits_crossed() const {
+    constexpr double kCloser = 0.5, kWithin = 0.6, kCloserAboutMeans = 0.8;
+    if (needed_[0].empty()) return false;
+    const auto both = [](double (*size)(const std::vector<double>&), const auto& of) {
+      return std::hypot(size(of[0]), size(of[1]));
+    };
+    return both(rms, crossed_) < kCloser * std::min(both(rms, own_), both(rms, reversed_)) &&
+           both(rms, crossed_) < kWithin * both(rms, needed_) &&
+           both(spread, crossed_) < kCloserAboutMeans * both(spread, own_);
+  }
+
+ private:
+  static double rms(const std::vector<double>& a) {
+    double sum = 0;
+    for (const double x : a) sum += x * x;
+    return std::sqrt(sum / static_cast<double>(a.size()));
+  }
+  std::array<std::vector<double>, 2> own_, reversed_, crossed_, needed_;
+};
+
 std::optional<double> seen_grasp(const Throw& one, double opening) {
   if (!one.mocap) return one.grasp_angle;
   double sum = 0, n = 0;
@@ -338,6 +371,8 @@ std::vector<UnitDoubt> reversed_wrenches(const ThrowLog& log) {
   if (log.dimension != 2) return {};
   std::array<std::vector<double>, 3> about, raw, size;
   std::array<std::vector<double>, 2> crossed;
+  Crossing crossing;
+  int compared = 0;
   for (const auto& one : log.throws) {
     if (!one.hand || one.hand->time.rows < 3 || !one.ft) continue;
     const auto opening = opening_of(log, one);
@@ -347,9 +382,12 @@ std::vector<UnitDoubt> reversed_wrenches(const ThrowLog& log) {
     if (held.size() < kEnough) continue;
     const bool lever = lever_angle(log, one).has_value();
     std::array<std::vector<double>, 3> seen, needed;
-    for (const auto& sample : held)
+    for (const auto& sample : held) {
+      crossing.add(sample);
       for (std::size_t c = 0; c < 3; ++c)
         seen[c].push_back(sample.seen[c]), needed[c].push_back(sample.needed[c]);
+    }
+    ++compared;
     std::array<bool, 3> moves{};
     for (std::size_t c = 0; c < 3; ++c) {
       moves[c] = spread(needed[c]) > (c == 2 ? kShowsNewtonMetre : kShowsNewton);  // not if it is NaN
@@ -363,6 +401,15 @@ std::vector<UnitDoubt> reversed_wrenches(const ThrowLog& log) {
         crossed[c].push_back(std::abs(correlation(seen[c], needed[1 - c], true)));
   }
   std::vector<UnitDoubt> out;
+  const auto tell_swapped = [&] {
+    out.push_back({"/throws/*/ft/wrench", "fx", 1, compared,
+                   fmt::format("fx goes with the fz, and fz with the fx, that mass and motion of the held "
+                               "object need ({} throws): axes swapped?",
+                               compared)});
+    return out;
+  };
+  // Where what they need goes opposite ways, a swap looks like a reversed sign, too.
+  if (crossing.fits_crossed()) return tell_swapped();
   for (std::size_t c = 0; c < 3; ++c) {
     if (about[c].empty()) continue;
     const double against = dynamics::median(about[c]), ratio = dynamics::median(size[c]);
@@ -380,10 +427,7 @@ std::vector<UnitDoubt> reversed_wrenches(const ThrowLog& log) {
   if (!out.empty() || crossed[0].empty()) return out;
   if (dynamics::median(crossed[0]) > kCrossed && dynamics::median(crossed[1]) > kCrossed &&
       std::abs(dynamics::median(about[0])) < kOwn && std::abs(dynamics::median(about[1])) < kOwn)
-    out.push_back({"/throws/*/ft/wrench", "fx", 1, static_cast<int>(crossed[0].size()),
-                   fmt::format("fx goes with the fz, and fz with the fx, that mass and motion of the held "
-                               "object need (median of {} throws): axes swapped?",
-                               crossed[0].size())});
+    return tell_swapped();
   return out;
 }
 

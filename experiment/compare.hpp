@@ -69,7 +69,7 @@ struct ModelComparison {
   bool from_card{};                     ///< the parameters are a card's
   std::vector<ThrowComparison> throws;  ///< in the order of the log
   int failed{};  ///< throws without a predicted landing: at most their detach is in a statistic
-  double microseconds_per_throw{};  ///< release and flight, one thread's time
+  double microseconds_per_throw{};  ///< release and flight, one thread's time, warmed up
 
   /// Over the throws of one split; `quantity` is a place in kQuantities.
   ErrorStatistics statistics(int quantity, datasets::Split split) const;

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "dynamics/median.hpp"
+#include "experiment/time_check.hpp"
 #include "experiment/unit_evidence.hpp"
 
 namespace unhand::experiment {
@@ -102,6 +103,7 @@ LandedHeights landed_heights(const datasets::ThrowLog& log, const datasets::Thro
   constexpr std::size_t kEnough = 5;
   LandedHeights out;
   if (!logged.mocap || !logged.landing || logged.landing->pose.empty()) return out;
+  if (!landed_before(log, logged).empty()) return out;
   const auto& mocap = *logged.mocap;
   const auto& landing = *logged.landing;
   std::vector<std::array<double, 2>> x, z;

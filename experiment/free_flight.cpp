@@ -331,6 +331,7 @@ std::vector<FreeFlightComparison> compare_free_flights(const ThrowLog& log,
     const std::size_t n = log.throws.size();
     comparison.each.resize(n);
     std::vector<double> seconds(n);
+    if (n > 0) free_flight_errors(model, log, log.throws[0]);  // warms up, untimed
     dynamics::parallel_for(n, threads, [&](std::size_t i) {
       const auto begin = Clock::now();
       comparison.each[i] = free_flight_errors(model, log, log.throws[i]);

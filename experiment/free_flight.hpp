@@ -106,7 +106,7 @@ struct FreeFlightComparison {
   std::string model;                   ///< its name
   FreeFlightStatistics train, test;    ///< over the fitted throws of each split
   std::size_t skipped{};               ///< throws that were not fitted: their `each` says why
-  double microseconds_per_throw{};     ///< both fits, one thread's time
+  double microseconds_per_throw{};     ///< both fits, one thread's time, warmed up
   std::vector<FreeFlightErrors> each;  ///< in the order of the log
 };
 

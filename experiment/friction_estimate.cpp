@@ -15,6 +15,7 @@
 #include "dynamics/median.hpp"
 #include "experiment/observations.hpp"
 #include "experiment/sample_window.hpp"
+#include "experiment/seen_delay.hpp"
 
 namespace unhand::experiment {
 
@@ -222,21 +223,30 @@ bool determines_both(const SurfaceFit& fit) {
 
 constexpr const char* kAdvice = "fit to all that the log holds (--fit), or give a card (--card)";
 
-void estimate_delay(const std::vector<PreparedThrow>& throws, ModelParameters& parameters) {
+void estimate_delay(const datasets::ThrowLog& log, const std::vector<PreparedThrow>& throws,
+                    FrictionEstimate& out) {
   std::vector<double> delays;
   for (const auto& t : throws)
     if (t.split == datasets::Split::train && t.measured.detach_time)
       delays.push_back(*t.measured.detach_time - t.open_command);
+  out.method = "delay: mean of detach minus opening command over the train throws";
+  if (delays.empty()) {
+    for (std::size_t i = 0; i < throws.size(); ++i)
+      if (throws[i].split == datasets::Split::train)
+        if (const auto seen = seen_delay(log, log.throws[i], throws[i])) delays.push_back(*seen);
+    out.method =
+        "delay: that after which carried objects fly as motion capture sees them, mean of the train throws";
+  }
   if (delays.empty())
     throw Undetermined(contact::kGripperDelay,
-                       "the log shows no detach in any train throw (neither a normal force that ends nor "
-                       "detach_time)",
+                       "the log shows no detach in any train throw (neither a normal force that ends, nor "
+                       "detach_time, nor motion capture from the opening to the landing)",
                        "give gripper_delay a card (--card), or the throws their detach_time");
   double mean = 0, square = 0;
   for (const double d : delays) mean += d / static_cast<double>(delays.size());
   for (const double d : delays) square += (d - mean) * (d - mean) / static_cast<double>(delays.size());
   mean = std::max(mean, 0.0);
-  parameters.delay =
+  out.parameters.delay =
       square > 0 ? contact::DelayDistribution::normal(mean, std::sqrt(square), std::max(0.1, 2 * mean))
                  : contact::DelayDistribution::number(mean);
 }
@@ -285,8 +295,7 @@ FrictionEstimate estimate_friction(const datasets::ThrowLog& log, const std::vec
                        "give a card (--card), or some throws the split 'train'");
   if (log.gripper) out.parameters.pads = log.gripper->n_pads;
   if (model == contact::kGripperDelay) {
-    estimate_delay(throws, out.parameters);
-    out.method = "delay: mean of detach minus opening command over the train throws";
+    estimate_delay(log, throws, out);
     return out;
   }
   const auto samples = slipping_samples(log, throws);

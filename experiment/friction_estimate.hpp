@@ -49,7 +49,8 @@ class Undetermined : public std::invalid_argument {
 /// samples do not determine both (objects that only pivot, or only slide, or pads that obey another law), L
 /// is that of the declared pad_radius, 2/3 of it, if there is one.
 ///
-/// Delay: mean and scatter over the train throws of (detach − opening command).
+/// Delay: mean and scatter over the train throws of (detach − opening command); where no train throw shows a
+/// detach (no normal force, no detach_time), of the delay that motion capture shows (seen_delay.hpp).
 ///
 /// Throws Undetermined when the log determines neither: fewer than ten such samples in its train
 /// throws (objects that stick to the end, no F/T data), or no detach. Whether what was found is a patch,

@@ -11,6 +11,7 @@
 
 #include "dynamics/straight_line.hpp"
 #include "experiment/landing_noise.hpp"
+#include "experiment/time_check.hpp"
 
 namespace unhand::experiment {
 namespace {
@@ -99,8 +100,8 @@ std::vector<UnitDoubt> jumping_angles(const datasets::ThrowLog& log) {
 }
 
 std::vector<UnitDoubt> landings_turns_off(const datasets::ThrowLog& log) {
-  return first_found(log, "landing/pose", [](const datasets::Throw& one) {
-    return one.mocap && one.landing ? landing_off(one) : Found{};
+  return first_found(log, "landing/pose", [&](const datasets::Throw& one) {
+    return one.mocap && one.landing && landed_before(log, one).empty() ? landing_off(one) : Found{};
   });
 }
 

@@ -124,9 +124,22 @@ TEST_F(Cli, ALandingOfUnknownAngleTellsItsPlaceAlone) {
   EXPECT_EQ(compared.code, 0) << compared.err;
 }
 
-// A log without force and torque stops every model: a line per reason with the models, and the advice once.
+// Without a force sensor motion capture tells the delay, to compare and to fit it.
+TEST_F(Cli, ADelayNeedsNoForceSensor) {
+  write_changed("tracked.h5", [](datasets::Throw& one) { one.ft.reset(); });
+  const Answer compared = run("compare tracked.h5 --models gripper_delay");
+  EXPECT_EQ(compared.code, 0) << compared.err;
+  EXPECT_THAT(compared.out, HasSubstr("as motion capture sees them"));
+  const Answer fitted = run("fit tracked.h5 --model gripper_delay");
+  EXPECT_EQ(fitted.code, 0) << fitted.err;
+}
+
+// A log of hands and landings stops every model: a line per reason with the models, and the advice once.
 TEST_F(Cli, CompareSaysOnceWhyNoModelIsCompared) {
-  write_changed("bare.h5", [](datasets::Throw& one) { one.ft.reset(); });
+  write_changed("bare.h5", [](datasets::Throw& one) {
+    one.grasp_angle = 0;
+    one.ft.reset(), one.mocap.reset();
+  });
   const Answer answer = run("compare bare.h5");
   EXPECT_EQ(answer.code, 1);
   std::istringstream lines(answer.err);
@@ -350,6 +363,7 @@ TEST_F(Cli, FreeFlights) {
   const json& model = one["models"]["projectile"];
   EXPECT_EQ(model["train"]["n"], 4);
   EXPECT_EQ(model["test"]["n"], 1);
+  EXPECT_THAT(answer.out, HasSubstr("0.00 ± - ")) << "a single error has no spread";
   EXPECT_LT(model["test"]["trajectory_rms_m"], 1e-6);  // the motion is the model's, rounded
   EXPECT_GT(fs::file_size(folder / "r/residuals_projectile.png"), 0u);
 }

@@ -88,6 +88,11 @@ TEST_F(Cli, LearnsToThrowFlipAndGoesOnAfterAKill) {
   const Answer answer = run(what + "--learner m2 --json flip.json");
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.out, HasSubstr("m2: target 1.20 m, 180 degrees"));
+  EXPECT_THAT(answer.out, testing::ContainsRegex(
+                              "throws within the tolerances: at least 2 of 3 (first in iteration [12]|in no "
+                              "iteration), all 3 (first in iteration [12]|in no iteration)"));
+  const std::string path = content(folder / "out/path.gp");
+  EXPECT_LT(path.rfind("with labels"), path.find("with linespoints")) << "labels hide no mean";
   const auto flip = nlohmann::json::parse(content(folder / "flip.json"));
   EXPECT_EQ(flip["schema"], "plan-flip");
   EXPECT_EQ(flip["iterations"].size(), 2u);

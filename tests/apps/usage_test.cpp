@@ -392,6 +392,20 @@ TEST_F(Cli, FigureDrawsWhatIsAskedFor) {
   expect_refusal("figure modes --log none.h5 --out g", 3, "none.h5");
 }
 
+TEST_F(Cli, FigureAllDrawsWhatTheLogHasDataFor) {
+  write_changed("aloft.h5", [](datasets::Throw& one) { one.landing.reset(); });
+  const Answer answer = run("figure all --log aloft.h5 --models sliding_pivot --out f --json f.json");
+  EXPECT_EQ(answer.code, 0) << answer.err;
+  for (const char* name : {"mae", "modes", "wrench", "pivot", "phase", "flight"})
+    EXPECT_TRUE(fs::exists(folder / "f" / (std::string(name) + ".png"))) << name;
+  for (const char* name : {"landing-errors", "conditions"})
+    EXPECT_THAT(answer.err,
+                HasSubstr(std::string("unhand: left out ") + name + ": aloft.h5: no landing was measured\n"));
+  EXPECT_EQ(read_json(folder / "f.json")["left_out"].size(), 2u);
+  write_changed("blind.h5", [](datasets::Throw& one) { one.ft.reset(); });
+  expect_refusal("figure all --log blind.h5 --models sliding_pivot --out g", 1, "no figure can be drawn");
+}
+
 TEST_F(Cli, FigureTakesParametersFromCards) {
   ASSERT_EQ(run("generate quick12 --seed 3 --without ft --out blind.h5").code, 0);
   ASSERT_EQ(run("fit blind.h5 --model limit_surface --card card.json").code, 0);
@@ -412,6 +426,7 @@ TEST_F(Cli, FigureTakesParametersFromCards) {
       for (double& x : row) in >> x;
     }
   EXPECT_LT(std::abs(row[7]), 20) << "mm";
+  EXPECT_NEAR(row[7], 1e3 * (row[1] - row[4]), 1e-6) << "predicted - measured, as everywhere";
   EXPECT_GT(row[0], 0);
   expect_refusal("figure modes --log blind.h5 --card card.json --models sliding_pivot --out g", 2,
                  "not among --models");
@@ -429,6 +444,22 @@ TEST_F(Cli, InspectTellsOfWhatIsImpossibleAndTheRestRefusesIt) {
   ASSERT_EQ(seen["doubtful"].size(), 1u);
   EXPECT_EQ(seen["doubtful"][0]["path"], "/gripper@pad_radius");
   expect_refusal("compare mm.h5 --json a.json", 3, "mm.h5: /gripper@pad_radius");
+}
+
+TEST_F(Cli, ImpossibleTimesAreTold) {
+  auto log = datasets::read_throw_log(quick);
+  log.gripper->opening_command_time = 10;
+  datasets::write_throw_log(folder / "late.h5", log);
+  const char* said = "/gripper@opening_command_time: is 10 s, and throw ";
+  EXPECT_THAT(run("inspect late.h5").out, HasSubstr(said));
+  EXPECT_THAT(run("fit late.h5 --model gripper_delay").err, HasSubstr(said));
+  write_changed("landed.h5", [](datasets::Throw& one) { one.landing->time.data = {0}; });
+  EXPECT_THAT(run("compare landed.h5 --models gripper_delay").err,
+              HasSubstr("/landing/time: is 0 s, not after the gripper's opening at "));
+  write_changed("clocks.h5", [](datasets::Throw& one) {
+    for (double& t : one.mocap->time.data) t += 10;
+  });
+  expect_refusal("compare clocks.h5", 3, "they do not overlap");
 }
 
 }  // namespace

@@ -39,6 +39,12 @@ TEST(Fixed, HasNoMinusZero) {
   EXPECT_EQ(with_sign(1, 1), "+1.0");
 }
 
+TEST(MeanAndSpread, OfASingleNumberHasNoSpread) {
+  EXPECT_EQ(mean_and_spread(0, 0, 0, 2), "-");
+  EXPECT_EQ(mean_and_spread(1, 0.125, 0, 3), "0.125 ± -");
+  EXPECT_EQ(mean_and_spread(2, 0.125, 0.25, 3), "0.125 ± 0.250");
+}
+
 TEST(WeakGrip, NamesConditionsOfEveryObject) {
   experiment::ModelComparison model;
   model.model = "sliding_pivot";

@@ -194,6 +194,41 @@ TEST(Reading, AcceptsOtherWidthsAndStringKinds) {
   EXPECT_EQ(log.gravity, 10);
 }
 
+/// An enumeration of single bytes; what h5py writes for numpy's bool is FALSE = 0 and TRUE = 1.
+struct Enumeration {
+  hid_t type = H5Tenum_create(H5T_NATIVE_SCHAR);
+  Enumeration(const char* zero, const char* unity) {
+    const signed char values[] = {0, 1};
+    H5Tenum_insert(type, zero, &values[0]);
+    H5Tenum_insert(type, unity, &values[1]);
+  }
+  ~Enumeration() { H5Tclose(type); }
+  Enumeration(const Enumeration&) = delete;
+  Enumeration& operator=(const Enumeration&) = delete;
+};
+
+TEST(Reading, AcceptsBooleansAsFlags) {
+  const Scratch scratch;
+  const std::string file = scratch / "a.h5";
+  write_throw_log(file, planar_log());
+  const std::string path = "/throws/002/mocap/valid";
+  std::vector<signed char> valid(30, 1);
+  valid[7] = 0;
+  const auto with = [&](const Enumeration& of) {
+    const Editor f(file);
+    f.dataset(path, of.type, {30}, valid.data(), "1");
+  };
+  with({"FALSE", "TRUE"});
+  Flags expected(30, 1);
+  expected[7] = 0;
+  EXPECT_EQ(read_throw_log(file).throws[1].mocap->valid, expected);
+  for (const auto& [zero, unity] : {std::pair{"LOST", "SEEN"}, {"TRUE", "FALSE"}}) {
+    with({zero, unity});
+    EXPECT_THAT([&] { read_throw_log(file); },
+                testing::ThrowsMessage<LogError>(testing::HasSubstr("an enumeration, expected integers")));
+  }
+}
+
 TEST(Reading, IgnoresWhatItDoesNotKnow) {
   const Scratch scratch;
   const std::string file = scratch / "a.h5";

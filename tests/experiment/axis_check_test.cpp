@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "experiment/random_stream.hpp"
 #include "tests/support/small_campaign.hpp"
 
 namespace unhand::experiment {
@@ -173,14 +174,65 @@ TEST(AxisCheck, AWrenchWithTheOtherSignIsToldByItsColumns) {
   }
 }
 
-TEST(AxisCheck, SwappedForcesAreTold) {
-  auto log = small_log();
+void swap_forces(ThrowLog& log) {
   for (auto& one : log.throws)
     for (std::size_t i = 0; i < one.ft->wrench.rows; ++i)
       std::swap(one.ft->wrench(i, 0), one.ft->wrench(i, 1));
+}
+
+TEST(AxisCheck, SwappedForcesAreTold) {
+  auto log = small_log();
+  swap_forces(log);
   const auto doubts = unit_doubts(log);
   ASSERT_EQ(doubts.size(), 1U);
   EXPECT_THAT(doubts[0].reason, HasSubstr("axes swapped"));
+}
+
+// Noise that is as large as a force's change within a throw leaves no correlation there; what throws differ
+// by tells.
+TEST(AxisCheck, SwappedForcesAreToldThroughNoise) {
+  constexpr double kNoise = 0.2;  // N
+  auto log = small_log();
+  for (std::size_t k = 0; k < log.throws.size(); ++k) {
+    RandomStream noise(1, k, Purpose::force_torque);
+    auto& wrench = log.throws[k].ft->wrench;
+    for (std::size_t i = 0; i < wrench.rows; ++i)
+      for (std::size_t c = 0; c < 2; ++c) wrench(i, c) += noise.normal(0, kNoise);
+  }
+  EXPECT_THAT(unit_doubts(log), IsEmpty());
+  swap_forces(log);
+  const auto doubts = unit_doubts(log);
+  ASSERT_EQ(doubts.size(), 1U);
+  EXPECT_THAT(doubts[0].reason, HasSubstr("axes swapped"));
+}
+
+// Where what objects need along x and z goes opposite ways, swapped forces look reversed, too; and reversed
+// ones swapped.
+TEST(AxisCheck, SwappedAndReversedForcesAreToldApart) {
+  const auto healthy = generate_campaign(campaign_design("random", 2), 2);
+  EXPECT_THAT(unit_doubts(healthy), IsEmpty());
+  auto log = healthy;
+  swap_forces(log);
+  auto doubts = unit_doubts(log);
+  ASSERT_EQ(doubts.size(), 1U);
+  EXPECT_THAT(doubts[0].reason, HasSubstr("axes swapped"));
+  log = healthy;
+  for (auto& one : log.throws)
+    for (std::size_t c = 0; c < 3; ++c) scale_column(one.ft->wrench, -1, c);
+  doubts = unit_doubts(log);
+  ASSERT_FALSE(doubts.empty());
+  for (const auto& doubt : doubts) EXPECT_THAT(doubt.reason, HasSubstr("is the sign reversed"));
+}
+
+// Among these biases is one that makes the means of fx and fz each other's.
+TEST(AxisCheck, ABiasIsNoSwap) {
+  for (double bias = -6; bias <= 6; bias += 0.25) {  // N
+    auto log = small_log();
+    for (auto& one : log.throws)
+      for (std::size_t i = 0; i < one.ft->wrench.rows; ++i)
+        wrench(one)(i, 0) += bias, wrench(one)(i, 1) -= bias;
+    EXPECT_THAT(reversed_wrenches(log), IsEmpty()) << bias;
+  }
 }
 
 // A bias takes no sign away; where the lever is not seen, a torque may be another lever's.
