@@ -2,12 +2,12 @@
 
 #include <gmock/gmock.h>
 
-#include <set>
-#include <string>
-
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <numeric>
+#include <set>
+#include <string>
 
 #include "experiment/outcome_slopes.hpp"
 #include "experiment/reference_throw.hpp"
@@ -213,10 +213,12 @@ TEST(SkuValidation, AssumesWhatTheSkuDoesNotTell) {
                       {"shape", {1.5, 1.5, "-"}}};
   const auto told = throw_inputs(bar(), seen, "card.json", thrown);
   EXPECT_TRUE(assumed(told).empty());
-  for (std::size_t k = 0; k < told.names.size(); ++k) {
-    if (told.names[k] == "dead_time") EXPECT_EQ(told.values[k], 0.004);
-    if (told.names[k] == "shape") EXPECT_EQ(told.values[k], 1.5);
-  }
+  const auto value_of = [&](const std::string& name) {
+    return told.values[static_cast<std::size_t>(std::find(told.names.begin(), told.names.end(), name) -
+                                                told.names.begin())];
+  };
+  EXPECT_EQ(value_of("dead_time"), 0.004);
+  EXPECT_EQ(value_of("shape"), 1.5);
 }
 
 TEST(SkuValidation, MeasuredThrowsConfirmTheRightSkuAndContradictAWrongOne) {
