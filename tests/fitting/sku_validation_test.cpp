@@ -201,7 +201,8 @@ TEST(SkuValidation, AssumesWhatTheSkuDoesNotTell) {
     return out;
   };
   // The card's parameters say nothing of the gripper.
-  const std::set<std::string> gripper{"grip_force", "opening_time", "dead_time", "shape"};
+  const std::set<std::string> gripper{"grip_force", "opening_time",
+                                      "dead_time"};  // nor of its shape: no sigma
   std::set<std::string> all = gripper;
   all.insert({"mass", "inertia", "com_offset"});
   EXPECT_EQ(assumed(inputs), all);
