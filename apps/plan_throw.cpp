@@ -9,6 +9,7 @@
 #include <memory>
 #include <numbers>
 #include <random>
+#include <tuple>
 
 #include "apps/figure.hpp"
 #include "apps/numbers.hpp"
@@ -28,21 +29,40 @@ namespace {
 using planners::Chain;
 
 struct PlanThrowOptions {
-  std::string arm{"panda"}, target, box{"0.15x0.15"}, card, sku, json, report;
+  std::string arm{"panda"}, tip, target, box{"0.15x0.15"}, card, sku, json, report;
+  double acceleration{0}, jerk{0};  // 0: the file gives them
   double window{0.1}, drag{0}, gripper{0.15}, gripper_mass{0.9};
   int draws{1000}, samples{3000}, threads{0};
   std::uint64_t seed{1};
   bool planar{false}, plain{false};
 };
 
+/// Gives joints the limits that the arm's file does not tell.
+void fill_limits(Chain& arm, const PlanThrowOptions& options) {
+  for (auto& joint : arm.joints)
+    for (const auto& [limit, given, name] :
+         {std::tuple<double&, double, const char*>{joint.limits.acceleration, options.acceleration,
+                                                   "acceleration"},
+          std::tuple<double&, double, const char*>{joint.limits.jerk, options.jerk, "jerk"}}) {
+      if (std::isfinite(limit)) continue;
+      if (!(given > 0))
+        throw WrongUsage(fmt::format(
+            "--{0}: joint '{1}' of {2} has no limit of {0}: give one for all joints that have none", name,
+            joint.name, options.arm));
+      limit = given;
+    }
+}
+
 /// The arm with its gripper: a tool of `length` along the flange's z, whose mass sits halfway.
 Chain armed(const PlanThrowOptions& options) {
   Chain arm;
   try {
-    arm = planners::read_chain(options.arm);
+    arm = planners::read_chain(options.arm, options.tip);
   } catch (const std::invalid_argument& error) {
     throw WrongUsage(fmt::format("--{}", error.what()));
   }
+  for (const auto& note : arm.notes) tell("note: {}: {}\n", options.arm, note);
+  fill_limits(arm, options);
   if (options.gripper_mass > 0) {
     const double m = options.gripper_mass, l = options.gripper,
                  across = m * (l * l + 0.1 * 0.1) / 12;  // a block 0.1 m wide
@@ -55,7 +75,8 @@ Chain armed(const PlanThrowOptions& options) {
 /// The joints of the Panda that stay where they are in a planar throw.
 void make_planar(planners::NominalOptions& search, const Chain& arm) {
   if (arm.size() == 7) search.fixed = {{2, 0.0}, {4, 0.0}, {6, std::numbers::pi / 4}};
-  search.face_target = true;
+  // The first joint turns the plane to the target, if its axis is upright: else the arm's own plane is it.
+  search.face_target = std::abs(arm.joints.front().origin.R(2, 2)) > 0.999;
 }
 
 planners::PlanOptions plan_options(const PlanThrowOptions& options, const Chain& arm, bool planar) {
@@ -261,6 +282,10 @@ Command plan_throw_command(Parser& plan) {
   parser.option("--target", o->target, "Middle of the box in the base's frame, X,Y,Z [m]").required();
   parser.option("--box", o->box, "Opening of the box along x and y, AxB [m]").with_default();
   parser.option("--arm", o->arm, "panda, a TOML chain or a URDF file").with_default();
+  parser.option("--tip", o->tip, "Of a URDF file: the link that carries the gripper, if several links end");
+  parser.option("--acceleration", o->acceleration, "Limit of joints that the arm's file gives none [rad/s2]")
+      .range(1e-3, 1e6);
+  parser.option("--jerk", o->jerk, "The same of the jerk [rad/s3]").range(1e-3, 1e9);
   parser.option("--gripper", o->gripper, "From the flange to the middle of the pads [m]")
       .range(0.0, 1.0)
       .with_default();

@@ -42,7 +42,8 @@ Chain toml_chain(std::string_view text, const std::string& name);
 Chain read_urdf_chain(const std::filesystem::path& file, const std::string& base = "",
                       const std::string& tip = "");
 
-/// By name or file: "panda", FILE.toml or FILE.urdf. Throws std::invalid_argument for another name.
-Chain read_chain(const std::string& name_or_file);
+/// By name or file: "panda", FILE.toml or FILE.urdf, of the last up to link `tip`. Throws
+/// std::invalid_argument for another name, and for a tip of what is no URDF file.
+Chain read_chain(const std::string& name_or_file, const std::string& tip = "");
 
 }  // namespace unhand::planners

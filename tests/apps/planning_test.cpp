@@ -30,6 +30,41 @@ TEST_F(Cli, PlansAThrowIntoABox) {
   expect_refusal("plan throw --target 1.3,0,0 --card none.json", 3, "none.json");
 }
 
+/// Three joints in a vertical plane, and a camera beside the hand.
+constexpr const char* kPlanarArm = R"(<robot name="three joints">
+  <link name="base"/><link name="hand"/><link name="camera"/>
+  <link name="upper"><inertial><origin xyz="0 0 0.2"/><mass value="3"/>
+    <inertia ixx="0.05" iyy="0.05" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="lower"><inertial><origin xyz="0 0 0.2"/><mass value="2"/>
+    <inertia ixx="0.03" iyy="0.03" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="palm"><inertial><origin xyz="0 0 0.05"/><mass value="1"/>
+    <inertia ixx="0.004" iyy="0.004" izz="0.002" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.4"/>
+    <axis xyz="0 1 0"/><limit lower="-2.5" upper="2.5" velocity="3" effort="200"/></joint>
+  <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0 0 0.4"/>
+    <axis xyz="0 1 0"/><limit lower="-2.5" upper="2.5" velocity="3.5" effort="150"/></joint>
+  <joint name="wrist" type="revolute"><parent link="lower"/><child link="palm"/><origin xyz="0 0 0.4"/>
+    <axis xyz="0 1 0"/><limit lower="-2.5" upper="2.5" velocity="5" effort="50"/></joint>
+  <joint name="flange" type="fixed"><parent link="palm"/><child link="hand"/><origin xyz="0 0 0.1"/></joint>
+  <joint name="mount" type="fixed"><parent link="palm"/><child link="camera"/><origin xyz="0.1 0 0.1"/></joint>
+</robot>)";
+
+// A URDF file tells neither which end throws nor how fast joints may speed up.
+TEST_F(Cli, PlansAThrowOfAnArmFromUrdf) {
+  std::ofstream(folder / "arm.urdf") << kPlanarArm;
+  const std::string plan = "plan throw --target 1.3,0,-0.2 --samples 600 --draws 50 --arm arm.urdf";
+  expect_refusal(plan, 3, "the tip is 'camera' or 'hand'");
+  expect_refusal(plan + " --tip hand", 2, "--acceleration: joint 'shoulder' of arm.urdf has no limit");
+  expect_refusal(plan + " --tip hand --acceleration 15", 2, "--jerk: joint 'shoulder'");
+  expect_refusal("plan throw --target 1.3,0,-0.2 --tip hand", 2, "--tip: 'panda' is no .urdf file");
+  const Answer answer = run(plan + " --tip hand --acceleration 15 --jerk 5000 --planar --json plan.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const auto told = nlohmann::json::parse(content(folder / "plan.json"));
+  EXPECT_EQ(told["predicted"]["planned"]["landed"], 50);
+  EXPECT_NE(told["q0_rad"][0], 0.0) << "the shoulder is no turntable: it is searched like the others";
+  EXPECT_LE(told["limits"]["acceleration"]["fraction"], 1 + 1e-9);
+}
+
 /// The last row of a block of a figure's data.
 std::string last_row(const std::string& data, const std::string& title) {
   std::istringstream lines(data.substr(data.find(title)));
@@ -68,15 +103,14 @@ TEST_F(Cli, PlansAThrowWithACard) {
   EXPECT_LT(plan["predicted"]["insensitive motion"]["rms_m"],
             plan["predicted"]["tube acceleration"]["rms_m"]);
   EXPECT_TRUE(plan["release"]["contact_model"]["miss_m"].is_number());
-  // Where each number is from: the card's log measured its gripper, and nothing tells the dead time.
+  // Where each number is from: the card's log measured its gripper.
   const auto& numbers = plan["release"]["numbers"];
   const auto range = nlohmann::json::parse(content(folder / "cards/sliding_pivot.json"))["valid_range"];
-  for (const char* name : {"grip_force", "opening_time"}) {
+  for (const char* name : {"grip_force", "dead_time", "opening_time", "shape"}) {
     EXPECT_EQ(numbers[name]["from"], "card's range") << name;
     EXPECT_DOUBLE_EQ(numbers[name]["value"],
                      0.5 * (range[name]["low"].get<double>() + range[name]["high"].get<double>()));
   }
-  EXPECT_EQ(numbers["dead_time"]["from"], "assumed");
   EXPECT_EQ(numbers["mu"]["from"], "card; sigma: assumed and card");
   EXPECT_EQ(numbers["mass"]["from"], "SKU");
   EXPECT_THAT(answer.out, HasSubstr("card's range"));
