@@ -147,6 +147,22 @@ double refine_robustly(const ForceSeries& s, Ramp& ramp, std::size_t from, std::
   return variance;
 }
 
+// As how many samples one of [from, to) counts, whose noise neighbours share: 1 + 2 Σ ρ_k over the
+// autocorrelations of the residuals, as long as they stand out of what white noise shows; 1 for white noise.
+double samples_per_witness(const ForceSeries& s, const Ramp& ramp, std::size_t from, std::size_t to) {
+  const std::vector<double> e = whitened(s, ramp);
+  const auto n = static_cast<double>(to - from);
+  double squares = 0, sum = 0;
+  for (std::size_t k = from; k < to; ++k) squares += e[k] * e[k];
+  for (std::size_t lag = 1; lag < (to - from) / 4 && squares > 0; ++lag) {
+    double product = 0;
+    for (std::size_t k = from + lag; k < to; ++k) product += e[k] * e[k - lag];
+    if (product / squares < 2 / std::sqrt(n)) break;
+    sum += product / squares;
+  }
+  return 1 + 2 * sum;
+}
+
 double noise_limit(double target, double n) { return target * n + 4.0 * std::sqrt(2.0 * n); }
 
 }  // namespace
@@ -240,14 +256,18 @@ Opening find_opening(const ForceSeries& s, const Descent& guess, const NormalFor
   };
   o.release_variance = refine_robustly(s, o.ramp, guess.plateau, n, spikes);
   judge(guess.plateau);
-  if (o.straight_grip && o.power_law) return o;
+  const auto counted = [&](std::size_t from, std::size_t to) {
+    o.release_variance *= samples_per_witness(s, o.ramp, from, to);
+    return o;
+  };
+  if (o.straight_grip && o.power_law) return counted(guess.plateau, n);
   // A grip that is not straight: only what lies near the opening says where it starts.
   const double length = o.ramp.release - o.ramp.start;
   const std::size_t near = std::max(guess.plateau, index_of(s, o.ramp.start - 0.4 * length));
   const std::size_t after = std::min(n, index_of(s, o.ramp.release + 2.0 * length));
   o.release_variance = refine_robustly(s, o.ramp, near, after, spikes);
   judge(guess.plateau);
-  if (o.power_law) return o;
+  if (o.power_law) return counted(near, after);
   // A ramp of another form: each of its ends from its own neighbourhood, as wide as a power still explains.
   const auto explained = [&](const Ramp& r, std::size_t from, std::size_t to) {
     const auto count = static_cast<double>(to - from);
@@ -267,7 +287,8 @@ Opening find_opening(const ForceSeries& s, const Descent& guess, const NormalFor
     if (found) break;  // one narrower than needed: what the neighbourhood's width makes of the release
     end = nearer;
     const auto count = static_cast<double>(after - upper);
-    o.release_variance = variance * std::max(1.0, chi2(s, end, upper, after, spikes) / count);
+    o.release_variance = variance * std::max(1.0, chi2(s, end, upper, after, spikes) / count) *
+                         samples_per_witness(s, end, upper, after);
     found = explained(end, upper, after);
   }
   if (ends.size() > 1) o.release_variance += std::pow(ends.back() - ends[ends.size() - 2], 2);

@@ -52,9 +52,10 @@ struct Descent {
 std::optional<Descent> last_descent(const ForceSeries&, double tail, double peak);
 
 /// The opening as measured: start, release and shape of its ramp, and which of its parts are what the model
-/// says. The release's variance [s²] is that of least squares with outliers weighted; where the ramp is no
-/// power law, times the χ² per sample of the fit to its end, with the square of what a narrower
-/// neighbourhood moves it by, and never below that of an unknown place between two samples.
+/// says. The release's variance [s²] is that of least squares with outliers weighted, times the number of
+/// samples over which their noise stays (1 + 2 Σ ρ_k of the residuals); where the ramp is no power law, times
+/// the χ² per sample of the fit to its end, with the square of what a narrower neighbourhood moves it by, and
+/// never below that of an unknown place between two samples.
 struct Opening {
   Ramp ramp;
   double release_variance{};  ///< > 0 [s²]

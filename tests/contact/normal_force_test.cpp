@@ -241,6 +241,32 @@ TEST(SmoothNormalForce, BiasIsReportedAndDoesNotMoveTheRelease) {
   EXPECT_NEAR(fit.force.at(kAlways, 9.0), 5.0, 0.2);
 }
 
+// A filter before the sampling, or a cable: noise that stays for ten samples makes them one witness.
+TEST(SmoothNormalForce, NoiseThatStaysIsCounted) {
+  std::mt19937_64 random(26);
+  for (const double stays : {0.0, 0.7, 0.9}) {
+    std::normal_distribution<double> normal(0.0, 0.05 * std::sqrt(1 - stays * stays));
+    double squares = 0, claimed = 0;
+    constexpr int kRuns = 200;
+    for (int run = 0; run < kRuns; ++run) {
+      double noise = 0;
+      const Log log = record(
+          [&](double t) {
+            noise = stays * noise + normal(random);
+            return ramp(t, 25.0, 0.057, 0.055, 1.25) + noise;
+          },
+          0.0, random);
+      const auto summary = smooth_normal_force(log.time, log.value, 0.05).summary;
+      squares += std::pow(summary.release_time - 0.112, 2) / kRuns;
+      claimed += std::pow(summary.release_sigma, 2) / kRuns;
+    }
+    // Of some ten witnesses the correlation itself is known to a factor.
+    const double ratio = std::sqrt(claimed / squares);
+    EXPECT_GT(ratio, stays > 0 ? 0.7 : 0.8) << stays;
+    EXPECT_LT(ratio, stays > 0 ? 2.0 : 1.2) << stays;
+  }
+}
+
 // Two or three samples of a ramp do not tell its shape, and with it not where it ends: σ says so, and no more
 // than that the force was seen to fall.
 TEST(SmoothNormalForce, OfAHandfulOfSamplesTheReleaseIsAsUncertainAsItIs) {
