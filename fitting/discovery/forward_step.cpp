@@ -91,6 +91,7 @@ class ForwardStep {
     if (!best_ || is_law(id_of(*best_->score)))
       for (const Score& score : all_)
         if (is_law(id_of(score))) consider(score);
+    consider_laws_that_give();
     if (best_ && is_small_give(*best_)) {
       std::erase(best_->next.ids, kPads);
       out_.along.push_back(kPads);
@@ -178,13 +179,38 @@ class ForwardStep {
   /// Rigid pads that fit badly in the grasp are bent so far that their give's footprint may be lost among the
   /// others.
   void consider_pads() {
-    const auto& misfit = stage_.fit.misfit;
-    if (std::none_of(misfit.begin(), misfit.end(), [&](const ChannelMisfit& m) {
-          return m.phase == Phase::grasped && is_misfit(m, options_);
-        }))
-      return;
+    if (!grasp_is_off()) return;
     for (const Score& score : all_)
       if (id_of(score) == kPads) consider(score);
+  }
+
+  bool grasp_is_off() const {
+    const auto& misfit = stage_.fit.misfit;
+    return std::any_of(misfit.begin(), misfit.end(), [&](const ChannelMisfit& m) {
+      return m.phase == Phase::grasped && is_misfit(m, options_);
+    });
+  }
+
+  /// The likeliest law whose pads can give, if the present one's cannot, the grasp is off, and their give
+  /// convinces beside it, more than what convinced so far.
+  void consider_laws_that_give() {
+    if (can_give(stage_.problem.options().model) || !grasp_is_off()) return;
+    std::optional<TriedEffect> law;
+    for (const Score& score : all_) {
+      const Candidate& candidate = f_.candidates[score.candidate];
+      if (!is_law(candidate.id) || !can_give(candidate.id.substr(std::string_view(kLaw).size()))) continue;
+      TriedEffect trial{&score, extended(stage_, candidate, score, true, options_), 0, 0, {}};
+      if (trial.next.is_fitted() && (!law || trial.next.bic() < law->next.bic())) law = std::move(trial);
+    }
+    if (!law || !solve_held_out(law->next, options_)) return;
+    Discovery aside = out_;  // whose ranking is not this step's
+    ForwardStep beside(law->next, options_, aside);
+    beside.consider_pads();
+    if (!beside.best_) return;
+    law->delta_bic = beside.best_->next.bic() - stage_.bic();
+    law->held_out = improvement(stage_, beside.best_->next, out_.base_test, options_);
+    const double bic = beside.best_->next.bic(), least = best_ ? best_->next.bic() : stage_.bic();
+    if (bic - least <= kDeltaBic && law->held_out.matters >= 1) best_ = std::move(law);
   }
 
   /// What matters to no channel may matter to a prediction, where all of a throw's errors add up. Not a give

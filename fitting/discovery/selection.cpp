@@ -103,17 +103,12 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   return withdraw(stage, options, out);
 }
 
-namespace {
-
-/// Whether a contact model has pads that may give.
 bool can_give(const std::string& model) {
   contact::ContactParameters<double> giving;
   giving.patch = {0.5, 0.01};
   giving.variation.compliance = 1e-6;
   return contact::make_contact_model(model, giving)->needs_hold();
 }
-
-}  // namespace
 
 bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   const std::string along = kPads;

@@ -13,7 +13,9 @@ namespace unhand::fitting {
 /// evidence is not less by what an effect needs to be accepted (ten of the criterion). Convincing is evidence
 /// on the train throws, and on held-out ones an improvement that matters: to a channel (Improvement), or,
 /// where no candidate's does, to the predictions made before the throw (PredictionGain). The most evident one
-/// that matters to neither is left in `out.small`. Empty if none convinces.
+/// that matters to neither is left in `out.small`. A law whose pads cannot give (the sliding pivot) hides
+/// what they do in the grasp: where that is a misfit and nothing else convinces, the likeliest law whose pads
+/// can takes its place if their give convinces beside it. Empty if none convinces.
 std::optional<Stage> forward(const Stage& stage, const DiscoverOptions& options, Discovery& out);
 
 /// Effects that a later one, or the pads' give that was fitted along, has made superfluous are taken back.
@@ -27,6 +29,9 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out);
 /// it in that half goes with it: it was judged in its company. Returns the stage's fit
 /// with intervals that count its misfit.
 FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out);
+
+/// Whether a contact model has pads that may give before they slip.
+bool can_give(const std::string& model);
 
 /// No pads are rigid: a give of some micrometres before they slip bends what the slipping pads say of an
 /// effect on them, and what predictions lack. contact.pad_compliance is fitted along if the evidence (BIC) is

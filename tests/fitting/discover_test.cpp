@@ -310,6 +310,23 @@ TEST(Discovery, TwoEffectsAtOnceAreBothFound) {
   EXPECT_EQ(found.effects.size(), 2u);
 }
 
+// Pads of the sliding pivot cannot give: of ones that do, it lacks another law, and in that their give.
+TEST(Discovery, AGiveIsFoundBehindALawWhosePadsCannot) {
+  constexpr double kGive = 2e-5;  // m/N
+  DiscoverOptions options;
+  options.campaign.model = "sliding_pivot";
+  options.campaign.integrator.tolerances = {1e-5, 1e-8};
+  const Discovery found =
+      discover(support::loop_campaign({{"contact.pad_compliance.compliance", kGive}}), "synthetic", options);
+  ASSERT_EQ(found.verdict, Verdict::effect_found);
+  EXPECT_EQ(found.effects.front().id, "contact.law:limit_surface_disc");
+  const AcceptedEffect* give = named(found, "contact.pad_compliance");
+  ASSERT_NE(give, nullptr);
+  EXPECT_NEAR(give->parameters[0].value, kGive, 4 * give->parameters[0].sigma);
+  EXPECT_EQ(found.effects.size(), 2u);
+  EXPECT_FALSE(found.unexplained.has_value());
+}
+
 TEST(Discovery, OfTheWrongLawTheRightOneIsMissing) {
   DiscoverOptions options;
   options.campaign.model = "sliding_pivot";
