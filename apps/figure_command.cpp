@@ -135,14 +135,16 @@ void figure(const FigureCommandOptions& options) {
   for (const Kind& k : kinds()) {
     if (options.name != "all" && options.name != k.name) continue;
     std::optional<Figure> made;
+    const auto leave_out = [&](const std::exception& error) {
+      if (options.name != "all") throw;
+      left_out.emplace_back(k.name, error.what());
+    };
     try {
       made = k.make(source);
     } catch (const Unanswered& error) {
-      if (options.name != "all") throw;
-      left_out.emplace_back(k.name, error.what());
+      leave_out(error);
     } catch (const WrongUsage& error) {  // a model that has no modes
-      if (options.name != "all") throw;
-      left_out.emplace_back(k.name, error.what());
+      leave_out(error);
     }
     if (!made) continue;
     draw(*made, folder);

@@ -152,9 +152,10 @@ double refine_robustly(const ForceSeries& s, Ramp& ramp, std::size_t from, std::
 double samples_per_witness(const ForceSeries& s, const Ramp& ramp, std::size_t from, std::size_t to) {
   const std::vector<double> e = whitened(s, ramp);
   const auto n = static_cast<double>(to - from);
+  const std::size_t most = std::min<std::size_t>((to - from) / 4, 1000);  // lags
   double squares = 0, sum = 0;
   for (std::size_t k = from; k < to; ++k) squares += e[k] * e[k];
-  for (std::size_t lag = 1; lag < (to - from) / 4 && squares > 0; ++lag) {
+  for (std::size_t lag = 1; lag < most && squares > 0; ++lag) {
     double product = 0;
     for (std::size_t k = from + lag; k < to; ++k) product += e[k] * e[k - lag];
     if (product / squares < 2 / std::sqrt(n)) break;

@@ -62,7 +62,7 @@ struct ObservationOptions {
 
 /// All that the throw's log holds of the channels asked for. Left out: wrenches that settle, samples outside
 /// the hand's motion, motion capture after the landing, and an F/T channel that is dead. A channel without
-/// a declared σ takes it from its own scatter (third differences), a landing from those of the whole log
+/// a declared σ takes it from its own scatter (third differences), a landing from those of the log
 /// (experiment::landing_noise): where these are too few, it is left out. So is a landing/time without one.
 Observations observe(const datasets::ThrowLog& log, const datasets::Throw& logged,
                      const PreparedThrow& prepared, const ObservationOptions& options = {});

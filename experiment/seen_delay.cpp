@@ -3,6 +3,7 @@
 #include <cmath>
 #include <vector>
 
+#include "contact/contact_model.hpp"
 #include "flight/fly.hpp"
 
 namespace unhand::experiment {
@@ -20,11 +21,11 @@ struct Carried {
 
 Carried carried_at(const PreparedThrow& prepared, double t) {
   const auto hand = prepared.hand.at({prepared.hand.begin(), prepared.hand.end()}, t);
-  const double theta = hand.pose.theta + prepared.grasp.angle;
-  const auto d = dynamics::rotate(theta, dynamics::Vec2<double>{prepared.grasp.com_offset, 0});
-  const double w = hand.twist.omega;
-  return {{hand.pose.x + d.x, hand.pose.z + d.z, theta},
-          {hand.twist.vx - w * d.z, hand.twist.vz + w * d.x, w}};
+  contact::Scene<double> scene;
+  scene.hand = hand.pose;
+  scene.hand_twist = hand.twist;
+  const contact::Relative<double> held{{prepared.grasp.com_offset, 0}, prepared.grasp.angle, {}, 0};
+  return {object_pose(scene, held), object_twist(scene, held)};
 }
 
 /// Sum of the squared distances between the samples and a path that is carried until `release` [m²].

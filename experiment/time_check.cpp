@@ -75,15 +75,17 @@ std::string clocks_apart(const ThrowLog& log, const Throw& one) {
 
 std::vector<TimeNote> impossible_times(const ThrowLog& log) {
   struct Rule {
-    const char* where;  ///< from a throw on; of the log if it starts with a slash
+    const char* where;  ///< in a throw
     std::function<std::string(const Throw&)> said;
+    bool of_log{false};  ///< where is in the log
   };
   const Rule rules[] = {
       {"/gripper@opening_command_time",
        [&](const Throw& one) {
          const bool given = log.gripper && log.gripper->opening_command_time;
          return given ? outside_of_hand(log, one, *log.gripper->opening_command_time) : std::string{};
-       }},
+       },
+       true},
       {"@detach_time",
        [&](const Throw& one) {
          return one.detach_time ? outside_of_hand(log, one, *one.detach_time) : std::string{};
@@ -99,8 +101,7 @@ std::vector<TimeNote> impossible_times(const ThrowLog& log) {
       const auto said = rule.said(one);
       if (said.empty()) continue;
       if (note.throws++ == 0) {
-        const std::string where = rule.where;
-        note.path = where.starts_with("/gripper") ? where : "/throws/" + one.id + where;
+        note.path = (rule.of_log ? "" : "/throws/" + one.id) + rule.where;
         note.said = said;
       }
     }

@@ -198,7 +198,7 @@ class ForwardStep {
     std::optional<TriedEffect> law;
     for (const Score& score : all_) {
       const Candidate& candidate = f_.candidates[score.candidate];
-      if (!is_law(candidate.id) || !can_give(candidate.id.substr(std::string_view(kLaw).size()))) continue;
+      if (!is_law(candidate.id) || !can_give(candidate.id.substr(kLaw.size()))) continue;
       TriedEffect trial{&score, extended(stage_, candidate, score, true, options_), 0, 0, {}};
       if (trial.next.is_fitted() && (!law || trial.next.bic() < law->next.bic())) law = std::move(trial);
     }

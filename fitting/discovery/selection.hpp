@@ -14,8 +14,8 @@ namespace unhand::fitting {
 /// on the train throws, and on held-out ones an improvement that matters: to a channel (Improvement), or,
 /// where no candidate's does, to the predictions made before the throw (PredictionGain). The most evident one
 /// that matters to neither is left in `out.small`. A law whose pads cannot give (the sliding pivot) hides
-/// what they do in the grasp: where that is a misfit and nothing else convinces, the likeliest law whose pads
-/// can takes its place if their give convinces beside it. Empty if none convinces.
+/// what they do in the grasp: where that is a misfit, the likeliest law whose pads can takes its place if
+/// their give beside it convinces more than anything else. Empty if none convinces.
 std::optional<Stage> forward(const Stage& stage, const DiscoverOptions& options, Discovery& out);
 
 /// Effects that a later one, or the pads' give that was fitted along, has made superfluous are taken back.

@@ -52,7 +52,7 @@ TEST(LandingNoise, HeldOutLandingsHaveNoSayInWhatAFitTrusts) {
     const auto before = landing_noise(log);
     double sign = 1;
     for (auto& one : log.throws)
-      if (one.split == datasets::Split::test) one.landing->pose(0, 0) += 0.2 * (sign = -sign);
+      if (one.split == datasets::Split::test) one.landing->pose(0, 0) += 0.2 * sign, sign = -sign;
     EXPECT_EQ(landing_noise(log).x, before.x);
     for (auto& one : log.throws) one.split = datasets::Split::test;  // where nothing is fitted, all tell
     EXPECT_GT(landing_noise(log).x.value(), 10 * kSensors.landing_sigma[0]);
