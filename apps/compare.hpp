@@ -37,6 +37,10 @@ void compare_with_card(const CompareRequest& request, const datasets::ThrowLog& 
 /// Slip logs: limit surfaces identified from measured slips, cross-validated.
 void compare_slips(const CompareRequest& request);
 
+/// Statistics of errors, null where so few errors have none: below one a mean, below two a standard
+/// deviation.
+Json statistics_json(const experiment::ErrorStatistics&);
+
 /// The tables of a comparison of releases, in words and numbers.
 struct ReleaseTables {
   Table errors, bias, parameters;

@@ -32,7 +32,7 @@ constexpr SplitOf kFlightSplits[] = {{Split::train, "train", &FreeFlightComparis
 
 Json json_of(const experiment::Spread& s) {
   if (s.n == 0) return {{"n", 0}, {"mean", nullptr}, {"median", nullptr}, {"std", nullptr}};
-  return {{"n", s.n}, {"mean", s.mean}, {"median", s.median}, {"std", s.std}};
+  return {{"n", s.n}, {"mean", s.mean}, {"median", s.median}, {"std", s.n > 1 ? Json(s.std) : Json(nullptr)}};
 }
 
 std::map<std::string, int> skip_reasons(const FreeFlightComparison& model) {

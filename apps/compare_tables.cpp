@@ -12,7 +12,6 @@ namespace unhand::apps {
 namespace {
 
 using datasets::Split;
-using experiment::ErrorStatistics;
 using experiment::ModelComparison;
 
 constexpr int decimals[experiment::kQuantityCount] = {4, 2, 4, 2};
@@ -31,20 +30,22 @@ Count count(const ModelComparison& model, Split split) {
   return out;
 }
 
-Json json_of(const ErrorStatistics& s) {
-  if (s.n == 0) return {{"n", 0}, {"mae", nullptr}, {"std", nullptr}, {"bias", nullptr}};
-  return {{"n", s.n}, {"mae", s.mae}, {"std", s.std}, {"bias", s.bias}};
-}
-
 Json split_json(const ModelComparison& model, Split split) {
   const Count counted = count(model, split);
   Json out{{"n", counted.throws}, {"failed", counted.failed}};
   for (int q = 0; q < experiment::kQuantityCount; ++q)
-    out[experiment::kQuantities[q].key] = json_of(model.statistics(q, split));
+    out[experiment::kQuantities[q].key] = statistics_json(model.statistics(q, split));
   return out;
 }
 
 }  // namespace
+
+Json statistics_json(const experiment::ErrorStatistics& s) {
+  Json out{{"n", s.n}, {"mae", nullptr}, {"std", nullptr}, {"bias", nullptr}};
+  if (s.n > 0) out["mae"] = s.mae, out["bias"] = s.bias;
+  if (s.n > 1) out["std"] = s.std;
+  return out;
+}
 
 ReleaseTables release_tables(const experiment::Comparison& comparison, const datasets::ThrowLog& log,
                              const std::string& file) {

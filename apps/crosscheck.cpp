@@ -9,6 +9,7 @@
 
 #include "apps/cards.hpp"
 #include "apps/command.hpp"
+#include "apps/compare.hpp"
 #include "apps/output.hpp"
 #include "apps/progress.hpp"
 #include "apps/table.hpp"
@@ -235,11 +236,8 @@ Json json_of(const Differences& differences) {
   Json out = Json::object();
   for (int q = 0; q < experiment::kQuantityCount; ++q) {
     const auto s = experiment::statistics_of(differences.of[q]);
-    out[experiment::kQuantities[q].key] = {
-        {"n", s.n}, {"mae", nullptr}, {"std", nullptr}, {"bias", nullptr}, {"max", nullptr}};
-    if (s.n > 0)
-      out[experiment::kQuantities[q].key] = {
-          {"n", s.n}, {"mae", s.mae}, {"std", s.std}, {"bias", s.bias}, {"max", differences.worst(q)}};
+    Json& one = out[experiment::kQuantities[q].key] = statistics_json(s);
+    one["max"] = s.n > 0 ? Json(differences.worst(q)) : Json(nullptr);
   }
   return out;
 }

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/compare.hpp"
 #include "apps/fit.hpp"
 #include "fitting/advice.hpp"
 
@@ -9,12 +10,6 @@ namespace unhand::apps {
 namespace {
 
 using datasets::Split;
-using experiment::ErrorStatistics;
-
-Json statistics_json(const ErrorStatistics& s) {
-  if (s.n == 0) return {{"n", 0}, {"mae", nullptr}, {"std", nullptr}, {"bias", nullptr}};
-  return {{"n", s.n}, {"mae", s.mae}, {"std", s.std}, {"bias", s.bias}};
-}
 
 template <class Statistics>
 Json errors_json(int n, Statistics&& statistics) {

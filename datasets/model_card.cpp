@@ -98,7 +98,8 @@ CardStatistics read_statistics(Fields& from) {
   if (!(n >= 0 && n < 1e9 && n == std::floor(n))) from.fail("n", fmt::format("{} is no count", n));
   out.n = static_cast<int>(n);
   out.mae = from.required("mae", from.number("mae"));
-  out.std = from.required("std", from.number("std"));
+  const auto std = from.number_or_null("std");
+  if (out.n > 1) out.std = from.required("std", std);
   out.bias = from.required("bias", from.number("bias"));
   return out;
 }
@@ -261,7 +262,8 @@ std::string to_json(const ModelCard& card) {
   for (const auto& [split, quantities] : card.errors) {
     Json& one = out["errors"][split] = Json::object();
     for (const auto& [name, e] : quantities)
-      one[name] = {{"n", e.n}, {"mae", e.mae}, {"std", e.std}, {"bias", e.bias}};
+      one[name] = {
+          {"n", e.n}, {"mae", e.mae}, {"std", e.n > 1 ? Json(e.std) : Json(nullptr)}, {"bias", e.bias}};
   }
   if (!card.valid_range.empty()) {
     Json& ranges = out["valid_range"] = Json::object();

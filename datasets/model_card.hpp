@@ -43,7 +43,7 @@ struct CardSpread {
 struct CardStatistics {
   int n = 0;        ///< throws
   double mae = 0;   // mean of the absolute error
-  double std = 0;   // standard deviation of the absolute error
+  double std = 0;   // standard deviation of the absolute error; null in the file below two throws, 0 here
   double bias = 0;  // mean of the error
   bool operator==(const CardStatistics&) const = default;
 };

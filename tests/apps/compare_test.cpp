@@ -29,6 +29,18 @@ TEST_F(Cli, CompareReleases) {
   }
 }
 
+TEST_F(Cli, TheErrorOfOneThrowHasNoStandardDeviation) {
+  int k = 0;
+  write_changed("one.h5", [&](datasets::Throw& one) {
+    one.split = k++ == 0 ? datasets::Split::test : datasets::Split::train;
+  });
+  ASSERT_EQ(run("compare one.h5 --models limit_surface_disc --json one.json").code, 0);
+  const auto model = read_json(folder / "one.json")["models"]["limit_surface_disc"];
+  EXPECT_TRUE(model["test"]["landing_x_m"]["std"].is_null());
+  EXPECT_TRUE(model["test"]["landing_x_m"]["mae"].is_number());
+  EXPECT_TRUE(model["train"]["landing_x_m"]["std"].is_number());
+}
+
 // Motion capture and grasp_angle are optional, by throw.
 TEST_F(Cli, ThrowsWithoutAGraspAreLeftOut) {
   int k = 0;

@@ -67,6 +67,18 @@ TEST(ModelCard, AnEndOfAnIntervalMayBeOpen) {
               HasSubstr("/parameters/mu/degrees_of_freedom: 0 is below 1"));
 }
 
+TEST(ModelCard, OneErrorHasNoStandardDeviation) {
+  ModelCard card = small_card();
+  card.errors["test"] = {{"landing_x_m", {1, 0.012, 0, -0.012}}, {"landing_theta_deg", {2, 1.5, 0.5, 0.5}}};
+  const auto json = nlohmann::json::parse(to_json(card));
+  EXPECT_TRUE(json["errors"]["test"]["landing_x_m"]["std"].is_null());
+  EXPECT_EQ(json["errors"]["test"]["landing_theta_deg"]["std"], 0.5);
+  EXPECT_EQ(parse_model_card(json.dump()), card);
+  auto without = json;
+  without["errors"]["test"]["landing_theta_deg"]["std"] = nullptr;
+  EXPECT_THAT(refusal(without.dump()), HasSubstr("/errors/test/landing_theta_deg/std: is missing"));
+}
+
 TEST(ModelCard, LeavesOutWhatIsNotKnown) {
   ModelCard card = small_card();
   card.log.checksum.reset();
