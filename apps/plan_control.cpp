@@ -119,6 +119,7 @@ void run(const PlanControlOptions& o) {
   for (Cell& cell : cells) {
     cell.landed = ct::dispersion_of(cell.throws);
     const auto& d = cell.landed;
+    const int landed = d.throws - d.lost;
     double position = 0, velocity = 0;
     for (const auto& one : cell.throws)
       position += one.release_position_error / o.seeds, velocity += one.release_velocity_error / o.seeds;
@@ -134,9 +135,9 @@ void run(const PlanControlOptions& o) {
                              {"throws", d.throws},
                              {"hits", d.hits},
                              {"lost", d.lost},
-                             {"mean_m", {d.mean.x(), d.mean.y()}},
-                             {"std_m", {d.std.x(), d.std.y()}},
-                             {"rms_m", d.rms},
+                             {"mean_m", landed > 0 ? Json{d.mean.x(), d.mean.y()} : Json(nullptr)},
+                             {"std_m", landed > 1 ? Json{d.std.x(), d.std.y()} : Json(nullptr)},
+                             {"rms_m", landed > 0 ? Json(d.rms) : Json(nullptr)},
                              {"release_position_error_m", position},
                              {"release_velocity_error_m_s", velocity},
                              {"torque_use", d.largest_torque_use}});

@@ -246,7 +246,9 @@ Dispersion dispersion_of(const std::vector<StudyThrow>& throws) {
   if (landed == 0) return out;
   out.mean /= landed;
   squares /= landed;
-  out.std = (squares - out.mean.cwiseProduct(out.mean)).cwiseMax(0).cwiseSqrt();
+  const double n = landed;
+  const Eigen::Vector2d variance = n / std::max(1.0, n - 1) * (squares - out.mean.cwiseProduct(out.mean));
+  out.std = variance.cwiseMax(0).cwiseSqrt();
   out.rms = std::sqrt(squares.sum());
   return out;
 }

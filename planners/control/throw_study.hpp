@@ -80,10 +80,11 @@ StudyThrow run_throw(const ControllerChoice& controller, const Payload& payload,
 
 /// Landings of many seeds.
 struct Dispersion {
-  int throws{}, hits{}, lost{};           ///< runs; landed in the box; never landed
-  Eigen::Vector2d mean{0, 0}, std{0, 0};  ///< of the miss [m]
-  double rms{};                           ///< √(mean |miss|²): bias and scatter [m]
-  double largest_torque_use{};            ///< share of a joint's limit
+  int throws{}, hits{}, lost{};  ///< runs; landed in the box; never landed
+  Eigen::Vector2d mean{0, 0};    ///< of the miss, along and across [m]
+  Eigen::Vector2d std{0, 0};     ///< of the miss, of a sample (n - 1) [m]
+  double rms{};                  ///< √(mean |miss|²): bias and scatter [m]
+  double largest_torque_use{};   ///< share of a joint's limit
 };
 /// Over runs with different seeds.
 Dispersion dispersion_of(const std::vector<StudyThrow>& throws);

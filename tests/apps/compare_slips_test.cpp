@@ -1,5 +1,6 @@
-// compare on a log of slips: what it writes is what the library says of these slips.
+// compare and fit on a log of slips: what they write is what the library says of these slips.
 #include "contact/convex_quartic.hpp"
+#include "datasets/model_card.hpp"
 #include "fitting/slips/compare_surfaces.hpp"
 #include "tests/apps/cli.hpp"
 #include "tests/fitting/slip_simulator.hpp"
@@ -87,6 +88,38 @@ TEST_F(Cli, SlipsWithAReversedSignAreRefused) {
   expect_refusal("fit slips.h5 --model ellipsoid --card c.json", 3, reason);
   expect_refusal("discover slips.h5 --json c.json", 3, reason);
   EXPECT_THAT(run("inspect slips.h5").out, HasSubstr("doubtful: /surfaces/felt: friction would drive"));
+}
+
+// An ellipsoid of 4 N, 3 N and 5 N times its length, from noisy slips.
+TEST_F(Cli, FitsTheSurfaceThatSlipsWereDrawnFrom) {
+  datasets::SlipLog log;
+  const Eigen::Matrix3d along = Eigen::Vector3d(1 / 16.0, 1 / 9.0, 1 / 25.0).asDiagonal();
+  const auto slips = fitting::test::simulate(fitting::test::ellipsoid(along), 60, 0.03, 0.03, 23);
+  log.surfaces["felt"] = logged(slips);
+  datasets::write_slip_log(folder / "slips.h5", log);
+  const Answer answer =
+      run("fit slips.h5 --model ellipsoid_full --json f.json --card card.json --report out");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json surface = read_json(folder / "f.json")["surfaces"]["felt"];
+  EXPECT_EQ(surface["n"], 60);
+  // Levels that scatter by 3 % leave a radius of 60 slips some 1 %.
+  EXPECT_NEAR(surface["least_force_N"].get<double>(), 3, 0.1);
+  EXPECT_NEAR(surface["largest_force_N"].get<double>(), 4, 0.13);
+  EXPECT_NEAR(surface["torque_N_m"].get<double>(), 5 * slips.characteristic_length,
+              0.2 * slips.characteristic_length);
+  EXPECT_NEAR(surface["sigma_direction_rad"].get<double>(), 0.03, 4 * 0.03 / std::sqrt(2 * 120.0));
+  EXPECT_NEAR(surface["sigma_level"].get<double>(), 0.03, 4 * 0.03 / std::sqrt(2 * 60.0));
+
+  const auto card = datasets::parse_model_card(content(folder / "card.json"));
+  EXPECT_EQ(card.model, "ellipsoid_full");
+  EXPECT_EQ(card.parameters.at("A_xx[felt]").value, surface["coefficients"][0]);
+  EXPECT_EQ(card.parameters.at("A_xx[felt]").unit, "1/N^2");
+  const auto& error = card.errors.at("cross_validation").at("direction_error_deg[felt]");
+  EXPECT_EQ(error.n, 60);
+  EXPECT_EQ(error.mae, surface["cv_direction_error_deg"]);
+  // Two components of 0.03 rad: √(π/2) 0.03 = 2.15 deg in the mean, of 60 slips to 7 %, and what a fit adds.
+  EXPECT_NEAR(error.mae, 2.15, 0.6);
+  EXPECT_THAT(content(folder / "out/report.md"), HasSubstr("| felt"));
 }
 
 TEST_F(Cli, CompareSlipsSaysWhatTheSurfacesErrOf) {

@@ -117,6 +117,97 @@ TEST_F(Cli, PlansAThrowWithACard) {
   EXPECT_THAT(answer.out, HasSubstr("assumed"));
 }
 
+// A load that the controller does not know pulls a soft arm off its path; adaptation learns it beforehand.
+TEST_F(Cli, AdaptationThrowsUnknownObjectsWhereItShould) {
+  const Answer answer = run("plan control --seeds 3 --repetitions 2 --json c.json --report out");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  std::map<std::string, std::map<std::string, json>> cells;
+  const json found = read_json(folder / "c.json");
+  for (const auto& cell : found["cells"]) cells[cell["object"]][cell["controller"]] = cell;
+  ASSERT_EQ(cells.size(), 3u);
+  for (const auto& [object, by] : cells) {
+    const json &adaptive = by.at("adaptive, 30 N/m"), &soft = by.at("plain, 30 N/m"),
+               &stiff = by.at("plain, 300 N/m");
+    for (const json& cell : {adaptive, soft, stiff}) {
+      EXPECT_EQ(cell["throws"], 3);
+      EXPECT_LT(cell["torque_use"], 1);
+      // rms² is the square of the mean and the spread about it, on both axes.
+      double square = 0;
+      for (int axis = 0; axis < 2; ++axis)
+        square += std::pow(cell["mean_m"][axis].get<double>(), 2) +
+                  2.0 / 3.0 * std::pow(cell["std_m"][axis].get<double>(), 2);
+      EXPECT_NEAR(cell["rms_m"].get<double>(), std::sqrt(square), 1e-9) << object;
+    }
+    EXPECT_EQ(adaptive["hits"], 3) << object;
+    EXPECT_LT(soft["mean_m"][0], -0.01) << object << " is heavy: the arm lags, and the throw falls short";
+    const auto error = [](const json& cell) { return cell["release_position_error_m"].get<double>(); };
+    EXPECT_LT(10 * error(adaptive), error(soft)) << object;
+    EXPECT_LT(5 * error(stiff), error(soft)) << object << ": ten times the stiffness, a tenth of the lag";
+  }
+  const auto lag = [&](const char* object) {
+    return cells.at(object).at("plain, 30 N/m")["release_position_error_m"].get<double>();
+  };
+  EXPECT_LT(lag("box"), lag("ball"));  // 221 g, 427 g
+  EXPECT_THAT(content(folder / "out/landings.md"), HasSubstr("ball, 427 g"));
+}
+
+// What the motors put in and no loss takes is in the arm: the spring lends it, and throws with it are faster.
+TEST_F(Cli, AClutchedSpringThrowsFaster) {
+  const Answer answer = run("plan elastic --starts 1 --intervals 8 --longest 0.4 --json e.json --report out");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json drives = read_json(folder / "e.json")["drives"];
+  for (const auto& [name, drive] : drives.items()) {
+    ASSERT_FALSE(drive["basins"].empty()) << name;
+    for (const auto& basin : drive["basins"]) {
+      const json& energy = basin["energy_J"];
+      const auto joules = [&](const char* what) { return energy[what].get<double>(); };
+      EXPECT_NEAR(joules("gain"),
+                  joules("motors") - joules("damping") - joules("friction") - joules("impacts"), 1e-9)
+          << name;
+      EXPECT_GE(joules("damping"), 0) << name;
+      EXPECT_GE(joules("friction"), 0) << name;
+      for (const auto& [limit, use] : basin["limits"].items()) EXPECT_LE(use, 1) << name << ' ' << limit;
+      EXPECT_NEAR(basin["resimulated_speed_m_s"].get<double>(), basin["speed_m_s"].get<double>(),
+                  0.01 * basin["speed_m_s"].get<double>())
+          << name;
+      EXPECT_LE(basin["duration_s"], 0.4 + 1e-6) << name;
+    }
+  }
+  const auto fastest = [&](const char* drive) {
+    return drives[drive]["basins"][0]["speed_m_s"].get<double>();
+  };
+  EXPECT_GT(fastest("SEA"), 1.2 * fastest("rigid"));
+  EXPECT_THAT(content(folder / "out/speeds.md"), HasSubstr("SEA"));
+
+  expect_refusal("plan elastic --arm none.toml", 3, "none.toml: no such file");
+}
+
+TEST_F(Cli, ElasticThrowsReachTheirTargets) {
+  const Answer answer =
+      run("plan elastic --target 2.2 --starts 2 --intervals 8 --nodes 4 --checks 9 --json e.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("9 land in the box of 0.5 m"));
+}
+
+TEST_F(Cli, AnElasticWristThrowsFaster) {
+  const Answer answer =
+      run("plan wrist --stiffnesses 2 --softest 4 --stiffest 16 --starts 1 --intervals 4 --json w.json "
+          "--report out");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json wrist = read_json(folder / "w.json");
+  ASSERT_EQ(wrist["spring"].size(), 2u);
+  for (const auto& spring : wrist["spring"]) {
+    const auto speed = spring["speed_m_s"].get<double>();
+    EXPECT_NEAR(spring["gain"].get<double>(), speed / wrist["rigid_m_s"].get<double>(), 1e-9);
+    EXPECT_GT(spring["gain"], 1.2);
+    EXPECT_LE(spring["largest_limit_use"], 1);
+    EXPECT_NEAR(spring["unexplained_J"].get<double>(), 0, 1e-6);
+    EXPECT_GT(spring["stored_J"], 0);
+    EXPECT_NEAR(speed, spring["planned_m_s"].get<double>(), 0.01 * speed);
+  }
+  EXPECT_TRUE(fs::exists(folder / "out/gain.png"));
+}
+
 TEST_F(Cli, LearnsToThrowFlipAndGoesOnAfterAKill) {
   const std::string what = "plan flip --target 1.2,180 --seed 3 --iterations 2 --repeats 1 --report out ";
   const Answer answer = run(what + "--learner m2 --json flip.json");
