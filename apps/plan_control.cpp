@@ -125,9 +125,9 @@ void run(const PlanControlOptions& o) {
       position += one.release_position_error / o.seeds, velocity += one.release_velocity_error / o.seeds;
     table.rows.push_back(
         {fmt::format("{}, {:.0f} g", cell.payload.name, 1e3 * cell.payload.mass), cell.controller.name,
-         fmt::format("{}/{}", d.hits, d.throws), with_sign(1e3 * d.mean.x(), 1),
-         fmt::format("{:.1f}, {:.1f}", 1e3 * d.std.x(), 1e3 * d.std.y()), fmt::format("{:.1f}", 1e3 * d.rms),
-         fmt::format("{:.1f}, {:.1f}", 1e3 * position, 1e3 * velocity),
+         fmt::format("{}/{}", d.hits, d.throws), landed > 0 ? with_sign(1e3 * d.mean.x(), 1) : "-",
+         fmt::format("{}, {}", fixed(landed > 1, 1e3 * d.std.x(), 1), fixed(landed > 1, 1e3 * d.std.y(), 1)),
+         fixed(landed > 0, 1e3 * d.rms, 1), fmt::format("{:.1f}, {:.1f}", 1e3 * position, 1e3 * velocity),
          fmt::format("{:.0f} %", 100 * d.largest_torque_use)});
     json["cells"].push_back({{"object", cell.payload.name},
                              {"mass_kg", cell.payload.mass},
