@@ -108,9 +108,11 @@ function(unhand_test_options)
 endfunction()
 
 # unhand_test(dynamics SOURCES integrator_test.cpp ... USES release BATCH 4)
-# makes the executable test_<name> from tests/<name>/*.cpp and registers each test case.
+# makes the executable test_<name> from tests/<name>/*.cpp and registers each test case. Those that LONG names (patterns
+# of --gtest_filter) have the label `long` as well: runs of many seconds through the code of shorter tests beside them,
+# which slow builds (sanitizers, counters) leave out.
 function(unhand_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT;BATCH" "SOURCES;USES;ALONE" ${ARGN})
+  cmake_parse_arguments(ARG "" "TIMEOUT;BATCH" "SOURCES;USES;ALONE;LONG" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 1500)  # the sanitizers are an order of magnitude slower
   endif()
@@ -126,6 +128,13 @@ function(unhand_test name)
   if(TARGET test_headers)
     target_precompile_headers(test_${name} REUSE_FROM test_headers)
   endif()
-  gtest_discover_tests(test_${name} TEST_PREFIX ${name}. NO_PRETTY_VALUES DISCOVERY_TIMEOUT 60
-    PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS ${name})
+  set(discovery TEST_PREFIX ${name}. NO_PRETTY_VALUES DISCOVERY_TIMEOUT 60)
+  set(properties PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+  if(ARG_LONG)
+    list(JOIN ARG_LONG ":" long)
+    gtest_discover_tests(test_${name} ${discovery} TEST_FILTER ${long} TEST_LIST ${name}_long ${properties} LABELS "${name}\\;long")
+    gtest_discover_tests(test_${name} ${discovery} TEST_FILTER "-${long}" ${properties} LABELS ${name})
+  else()
+    gtest_discover_tests(test_${name} ${discovery} ${properties} LABELS ${name})
+  endif()
 endfunction()
