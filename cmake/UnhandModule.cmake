@@ -109,8 +109,8 @@ endfunction()
 
 # unhand_test(dynamics SOURCES integrator_test.cpp ... USES release BATCH 4)
 # makes the executable test_<name> from tests/<name>/*.cpp and registers each test case. Those that LONG names (patterns
-# of --gtest_filter) have the label `long` as well: runs of many seconds through the code of shorter tests beside them,
-# which slow builds (sanitizers, counters) leave out.
+# of --gtest_filter) have the label <name>.long instead of <name>: runs of many seconds through the code of shorter tests
+# beside them, which slow builds (sanitizers, counters) leave out.
 function(unhand_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT;BATCH" "SOURCES;USES;ALONE;LONG" ${ARGN})
   if(NOT ARG_TIMEOUT)
@@ -132,7 +132,7 @@ function(unhand_test name)
   set(properties PROPERTIES TIMEOUT ${ARG_TIMEOUT})
   if(ARG_LONG)
     list(JOIN ARG_LONG ":" long)
-    gtest_discover_tests(test_${name} ${discovery} TEST_FILTER ${long} TEST_LIST ${name}_long ${properties} LABELS "${name}\\;long")
+    gtest_discover_tests(test_${name} ${discovery} TEST_FILTER ${long} TEST_LIST ${name}_long ${properties} LABELS ${name}.long)
     gtest_discover_tests(test_${name} ${discovery} TEST_FILTER "-${long}" ${properties} LABELS ${name})
   else()
     gtest_discover_tests(test_${name} ${discovery} ${properties} LABELS ${name})
