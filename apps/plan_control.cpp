@@ -3,10 +3,12 @@
 
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "apps/figure.hpp"
 #include "apps/output.hpp"
 #include "apps/plan.hpp"
+#include "apps/progress.hpp"
 #include "apps/table.hpp"
 #include "dynamics/parallel.hpp"
 #include "planners/control/throw_study.hpp"
@@ -104,11 +106,14 @@ void run(const PlanControlOptions& o) {
   for (const auto& payload : ct::reported_payloads())
     for (const auto& controller : ct::reported_controllers())
       cells.push_back({payload, controller, std::vector<ct::StudyThrow>(o.seeds), {}});
+  std::optional<Progress> progress(std::in_place, "plan control", cells.size() * o.seeds);
   dynamics::parallel_for(cells.size() * o.seeds, o.threads, [&](std::size_t i) {
     Cell& cell = cells[i / o.seeds];
     const std::size_t k = i % o.seeds;
     cell.throws[k] = ct::run_throw(cell.controller, cell.payload, study, k + 1);
+    progress->step();
   });
+  progress.reset();
   Table table{{"object", "controller", "in the box", "mean miss [mm]", "std along, across [mm]",
                "rms miss [mm]", "error at the release [mm, mm/s]", "torque used"},
               {},
