@@ -212,9 +212,11 @@ void SlidingPivot::rate_(int mode, const Scene<S>& scene, const Relative<S>& y, 
   }
 }
 
-/// Which branches a transition has just left, and so must not choose again.
+/// Which branches a transition has just left, and so must not choose again. `torque_suffices`: a guard has
+/// found that the torque of the locked slide just suffices, which the demand at its root says only to
+/// rounding.
 struct SlidingPivot::Excluded {
-  bool locked{}, stuck{}, slide{}, brake{}, between{};
+  bool locked{}, stuck{}, slide{}, brake{}, between{}, torque_suffices{};
 };
 
 /// A time and the state at it.
@@ -248,7 +250,9 @@ int SlidingPivot::consistent_mode(const Scene<double>& scene, const Relative<dou
   }
   const int locked = mode_of(translation_with(kLocked), kLocked);
   const double demand = law(locked, limits, scene, y, r).wrench.tau;
-  if (!excluded.locked && std::abs(demand) <= torque_limit) return locked;
+  const bool suffices =
+      std::abs(demand) <= torque_limit || (excluded.torque_suffices && translation_of(locked) == kSlide);
+  if (!excluded.locked && suffices) return locked;
   const Rotation first = lagging(demand), second = first == kNegative ? kPositive : kNegative;
   const int modes[2] = {mode_of(translation_with(first), first), mode_of(translation_with(second), second)};
   double drive[2];  // how the spin of that sign would grow
@@ -276,6 +280,7 @@ Entry<S, 6> SlidingPivot::on_guard_(const Phase& from, int guard, const SceneSou
   Excluded excluded;
   if (from.mode == kSlideBetween && guard != kTranslationGuard) {
     excluded.locked = excluded.between = guard == kRotationGuard;
+    excluded.torque_suffices = guard == kTorqueSuffices;
   } else if (guard == kRotationGuard) {
     if (rotation_of(from.mode) == kLocked)
       excluded.locked = true;
