@@ -95,11 +95,10 @@ void add_mocap(const datasets::ThrowLog& log, const datasets::Throw& logged, con
   const double least[3] = {kLeastLength, kLeastLength, kLeastAngle};
   double sigma[3];
   for (std::size_t c = 0; c < 3; ++c) sigma[c] = sigma_of(mocap.pose, c, least[c]);
-  const double landed = logged.landing && !logged.landing->time.empty() ? logged.landing->time(0) : HUGE_VAL,
-               below = first_below_landing(log, mocap, prepared.open_command);
+  const double until = flight_end(log, logged, prepared.measured.detach_time.value_or(prepared.open_command));
   for (std::size_t i = 0; i < mocap.time.rows; ++i) {
     const double t = mocap.time(i);
-    if (t > landed || t >= below) break;
+    if (t >= until) break;
     if (!mocap.is_valid(i) || t < prepared.hand.begin()) continue;
     for (std::size_t c = 0; c < 3; ++c)
       out.all.push_back({next(Channel::mocap_x, c), t, mocap.pose(i, c), sigma[c]});

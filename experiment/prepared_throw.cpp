@@ -31,9 +31,7 @@ void measure_flight(const datasets::ThrowLog& log, const datasets::Throw& logged
                     PreparedThrow& out) {
   std::vector<double> t, x, z, theta;
   const auto& mocap = *logged.mocap;
-  const double until = logged.landing && !logged.landing->time.empty()
-                           ? logged.landing->time(0) + 1e-9
-                           : first_below_landing(log, mocap, out.open_command);
+  const double until = flight_end(log, logged, detach);
   for (std::size_t i = 0; i < mocap.time.rows; ++i) {
     if (!mocap.is_valid(i) || mocap.time(i) < from || mocap.time(i) >= until) continue;
     t.push_back(mocap.time(i) - detach);
@@ -181,17 +179,26 @@ release::Grasp<double> grasp_of(const Source& source, const PreparedThrow& prepa
   return out;
 }
 
+/// From when on the normal force is below 3 σ [s], `release` or later: the first of three samples in a row,
+/// as one alone may be noise.
+double quiet_from(const datasets::FtLog& ft, const contact::NormalForceSummary& fit, double release) {
+  constexpr std::size_t kInARow = 3;
+  std::size_t quiet = 0;
+  for (std::size_t i = 0; i < ft.time.rows; ++i) {
+    if (ft.time(i) < release) continue;
+    quiet = ft.normal_force(i) - fit.tail_mean < 3 * fit.sigma ? quiet + 1 : 0;
+    if (quiet == kInARow) return std::max(release, ft.time(i + 1 - kInARow));
+  }
+  return release;
+}
+
 /// Detach, flight and landing as measured.
 void measure_outcome(const Source& source, PreparedThrow& out) {
   const datasets::Throw& logged = source.logged;
   double flight_from = 0;
   if (out.normal_force && std::isfinite(out.normal_force->release_time())) {
     out.measured.detach_time = out.normal_force->release_time();
-    flight_from = *out.measured.detach_time;
-    const double quiet = 3 * out.force_fit.sigma;
-    const auto& ft = *logged.ft;
-    for (std::size_t i = ft.time.rows; i-- > 0 && ft.normal_force(i) - out.force_fit.tail_mean < quiet;)
-      if (ft.time(i) >= out.open_command) flight_from = std::max(*out.measured.detach_time, ft.time(i));
+    flight_from = quiet_from(*logged.ft, out.force_fit, *out.measured.detach_time);
   } else if (logged.detach_time) {
     out.measured.detach_time = flight_from = *logged.detach_time;
   }
@@ -205,9 +212,36 @@ void measure_outcome(const Source& source, PreparedThrow& out) {
 
 }  // namespace
 
-double first_below_landing(const datasets::ThrowLog& log, const datasets::MocapLog& mocap, double opening) {
-  const auto i = datasets::first_below(mocap, log.dimension, log.landing_height, opening);
-  return i ? mocap.time(*i) : HUGE_VAL;
+namespace {
+
+/// When motion capture first sees the object back down at the landing height [s]; infinite where it never
+/// does.
+double first_landing(const datasets::MocapLog& mocap, double height, double since) {
+  constexpr double kAbove = 0.01;  // [m]: noise at the height itself is no flight
+  bool risen = false;
+  for (std::size_t i = 0; i < mocap.time.rows; ++i) {
+    if (!mocap.is_valid(i) || mocap.time(i) < since) continue;
+    if (mocap.pose(i, 1) > height + kAbove) risen = true;
+    if (risen && mocap.pose(i, 1) <= height) return mocap.time(i);
+  }
+  return HUGE_VAL;
+}
+
+}  // namespace
+
+double flight_end(const datasets::ThrowLog& log, const datasets::Throw& logged, double since) {
+  constexpr double kRounding = 1e-9;  // [s]: a sample at the end still flies
+  const auto& mocap = *logged.mocap;
+  double end = HUGE_VAL;
+  if (logged.landing && !logged.landing->time.empty()) {
+    const auto& time = logged.landing->time;
+    const double blur = time.sigma.empty() ? 0 : 3 * time.sigma[0];
+    const bool goes_on = mocap.time(mocap.time.rows - 1) > time(0) + std::max(blur, kRounding);
+    end = time(0) + (goes_on ? -blur : kRounding);
+  }
+  end = std::min(end, first_landing(mocap, log.landing_height, since));
+  if (logged.free_flight) end = std::min(end, logged.free_flight->second + kRounding);
+  return end;
 }
 
 bool shows_grasp(const datasets::ThrowLog& log, const datasets::Throw& logged) {

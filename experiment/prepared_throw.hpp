@@ -14,8 +14,8 @@
 namespace unhand::experiment {
 
 /// What the log says about the outcome. The twist at detach is that of the flight model fitted to the motion
-/// capture after the normal force has fallen below 3 σ and up to the landing (where none was logged, up to
-/// first_below_landing), evaluated at detach.
+/// capture after the normal force has fallen below 3 σ (at the release of its smoothed series or later: the
+/// first of three samples in a row below) and before flight_end, evaluated at detach.
 struct MeasuredOutcome {
   std::optional<double> detach_time;                    ///< [s]
   std::optional<dynamics::Pose<double>> detach_pose;    ///< of the CoM; m, m, rad
@@ -67,9 +67,14 @@ PreparedThrow prepare(const datasets::ThrowLog& log, const datasets::Throw& logg
 /// either cannot be prepared. True of throws without a hand.
 bool shows_grasp(const datasets::ThrowLog& log, const datasets::Throw& logged);
 
-/// When motion capture first sees the object below the landing height after its highest point since `opening`
-/// [s]: from there on it may have touched what it lands on, which may lie above the hand. Infinite where it
-/// never does. `mocap` is planar.
-double first_below_landing(const datasets::ThrowLog& log, const datasets::MocapLog& mocap, double opening);
+/// Up to when a planar throw flies [s, motion capture's clock]: samples from there on may have touched
+/// something. The earliest of
+/// - the logged landing: where motion capture goes on after it, 3 σ of its time before it, else itself;
+/// - the first sample at or below the landing height once the object has been above it by a centimetre since
+///   `since` [s], its release or, where that is not known, the opening: what it lands on may lie above the
+///   hand;
+/// - the end of a declared `free_flight`.
+/// Infinite where none of them is known.
+double flight_end(const datasets::ThrowLog& log, const datasets::Throw& logged, double since);
 
 }  // namespace unhand::experiment

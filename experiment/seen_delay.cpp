@@ -58,9 +58,7 @@ std::optional<double> seen_delay(const datasets::ThrowLog& log, const datasets::
   const double open = prepared.open_command, longest = prepared.hand.end() - open;
   if (!logged.mocap || open < prepared.hand.begin() || !(longest > 0)) return {};
   const auto& mocap = *logged.mocap;
-  const double until = logged.landing && !logged.landing->time.empty()
-                           ? logged.landing->time(0)
-                           : first_below_landing(log, mocap, open);
+  const double until = flight_end(log, logged, open);
   std::vector<Sample> samples;
   for (std::size_t i = 0; i < mocap.time.rows; ++i)
     if (mocap.is_valid(i) && mocap.time(i) > open && mocap.time(i) < until)

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <random>
+#include <utility>
 
 #include "experiment/observations.hpp"
 #include "experiment/prepared_throw.hpp"
@@ -49,6 +51,60 @@ TEST(PreparedThrow, TheTwistAtDetachKnowsNothingOfTheFloor) {
     EXPECT_NEAR(twist->vz, clean->vz, 1e-3);
     EXPECT_NEAR(twist->omega, clean->omega, 0.02);
   }
+}
+
+/// A force sensor goes on for three seconds: of its noise one sample in 740 is above 3 σ, which is no grip.
+TEST(PreparedThrow, ALongTailOfTheForceHidesNoFlight) {
+  const CampaignDesign design = campaign_design("quick12");
+  datasets::ThrowLog log = campaign_header(design, 1);
+  for (int index = 0; index < 4; ++index) {
+    const auto [record, truth] = generate_throw(design, 1, index);
+    datasets::Throw longer = record;
+    datasets::FtLog& ft = *longer.ft;
+    const double step = ft.time(1) - ft.time(0), last = ft.time(ft.time.rows - 1);
+    std::mt19937_64 random(7 + index);
+    std::normal_distribution<double> noise;
+    for (int k = 0; k < 3 / step; ++k) {
+      ft.time.data.push_back(last + (k + 1) * step);
+      for (std::size_t c = 0; c < 3; ++c) ft.wrench.data.push_back(ft.wrench.sigma[c] * noise(random));
+      ft.normal_force.data.push_back(ft.normal_force.sigma[0] * noise(random));
+      ++ft.time.rows, ++ft.wrench.rows, ++ft.normal_force.rows;
+    }
+    log.throws = {record};
+    for (const datasets::Throw* one : {&std::as_const(record), &std::as_const(longer)}) {
+      const auto measured = prepare(log, *one, "(in memory)").measured;
+      ASSERT_TRUE(measured.detach_twist);
+      EXPECT_NEAR(measured.detach_twist->vx, truth.detach_twist.vx, 2e-3) << index;
+      EXPECT_NEAR(measured.detach_twist->omega, truth.detach_twist.omega, 0.02) << index;
+    }
+  }
+}
+
+/// A declared free flight ends where it says, also of a throw from a hand: what it bounces off is no flight.
+TEST(PreparedThrow, AFlightEndsWhereItIsDeclaredTo) {
+  const CampaignDesign design = campaign_design("quick12");
+  datasets::ThrowLog log = campaign_header(design, 1);
+  const auto [record, truth] = generate_throw(design, 1, 3);
+  log.throws = {record};
+  datasets::Throw bounced = record;
+  bounced.landing.reset();
+  bounced.free_flight = {truth.detach_time, truth.landing_time - 0.01};
+  datasets::MocapLog& mocap = *bounced.mocap;
+  for (int k = 0; k < 120; ++k) {  // back up at once, turning the other way
+    const double since = k / 240.0;
+    mocap.time.data.push_back(truth.landing_time + 1e-3 + since);
+    mocap.pose.data.insert(mocap.pose.data.end(), {truth.landing_pose.x - since,
+                                                   log.landing_height + 2 * since - 4.905 * since * since,
+                                                   truth.landing_pose.theta - 5 * since});
+    mocap.valid.push_back(1);
+    ++mocap.time.rows, ++mocap.pose.rows;
+  }
+  const auto twist = prepare(log, bounced, "(in memory)").measured.detach_twist;
+  ASSERT_TRUE(twist);
+  EXPECT_NEAR(twist->vx, truth.detach_twist.vx, 2e-3);
+  EXPECT_NEAR(twist->omega, truth.detach_twist.omega, 0.02);
+  for (const auto& seen : observe(log, bounced, prepare(log, bounced, "(in memory)")).all)
+    EXPECT_LT(seen.time, truth.landing_time);
 }
 
 /// A shelf above the hand: the object is below it when it is let go, and lands on it from above.
