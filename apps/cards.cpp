@@ -80,7 +80,9 @@ std::vector<NamedValue> named_values(const std::string& model, const experiment:
   }
   std::vector<NamedValue> out{
       {"mu", "-", p.mu}, {"length", "m", p.length}, {"pads", "-", static_cast<double>(p.pads)}};
-  if (model == "limit_surface_quartic" && p.kappa) out.push_back({"kappa", "-", *p.kappa});
+  for (const auto& own : contact::law_parameters(model))
+    if (const auto value = p.law_values.find(own.name); value != p.law_values.end())
+      out.push_back({own.name, own.unit, value->second});
   return out;
 }
 
@@ -121,8 +123,9 @@ UsableCard read_usable_card(const fs::path& file) {
     if (pads != std::floor(pads))
       reader.fail("/parameters/pads/value", fmt::format("{} is not a whole number", pads));
     p.pads = static_cast<int>(pads);
-    if (out.card.model == "limit_surface_quartic" && out.card.parameters.contains("kappa"))
-      p.kappa = reader.take("kappa", "-", 0, 3);
+    for (const auto& own : contact::law_parameters(out.card.model))
+      if (out.card.parameters.contains(own.name))
+        p.law_values[own.name] = reader.take(own.name, own.unit, own.low, own.high);
   }
   reader.reject_unknown();
   return out;

@@ -21,8 +21,8 @@ struct NamedValue {
   double value{};
 };
 
-/// What `model` reads of the parameters: mu [-], length [m], pads [-] and kappa [-], or delay [s] and
-/// delay_sigma [s].
+/// What `model` reads of the parameters: mu [-], length [m], pads [-] and what the law takes of its own, or
+/// delay [s] and delay_sigma [s].
 std::vector<NamedValue> named_values(const std::string& model, const experiment::ModelParameters& parameters);
 /// Those of a fitted model where it is one.
 std::vector<NamedValue> named_values(const experiment::ModelComparison& model);

@@ -96,11 +96,14 @@ experiment::ModelParameters parameters_of(const CrosscheckOptions& options, cons
         out.pads = static_cast<int>(value("pads"));
       else if (log.gripper)
         out.pads = log.gripper->n_pads;
-      if (card.card.parameters.contains("kappa")) out.kappa = value("kappa");
+      for (const auto& own : contact::law_parameters(card.card.model))
+        if (card.card.parameters.contains(own.name)) out.law_values[own.name] = value(own.name.c_str());
     }
     const auto& models = options.models;
-    if (out.kappa && std::find(models.begin(), models.end(), "limit_surface_quartic") == models.end())
-      tell("unhand: kappa of {} is of limit_surface_quartic, which is none of --models\n", options.card);
+    const std::string& law = card.card.model;
+    if (!out.law_values.empty() && std::find(models.begin(), models.end(), law) == models.end())
+      for (const auto& [name, unused] : out.law_values)
+        tell("unhand: {} of {} is of {}, which is none of --models\n", name, options.card, law);
     if (const int told = tell_force(card.card, options.card, prepared); told > 0)
       tell("unhand: {} of {} throws have no normal force: there the pads open as the card says\n", told,
            prepared.size());
@@ -306,7 +309,7 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
   json["engine"] = options.engine;
   json["parameters"] = {
       {"mu", parameters.mu}, {"length_m", parameters.length}, {"pads", parameters.pads}, {"from", from}};
-  if (parameters.kappa) json["parameters"]["kappa"] = *parameters.kappa;
+  for (const auto& [name, value] : parameters.law_values) json["parameters"][name] = value;
   json["settings"] = Json::array();
   std::string text;
   bool any = false;

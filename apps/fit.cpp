@@ -113,7 +113,8 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
   if (fit.outcome == fitting::FitOutcome::no_start || fit.outcome == fitting::FitOutcome::not_solved)
     throw Unanswered(fmt::format("{}: {}", request.log, why_unfitted(fit)));
   progress.step();
-  FitAnswer answer{problem, fit, {}, {}, {}, {}, fitting::gradient_cost(problem, fit), 1};
+  const auto cost = fitting::gradient_cost(problem, fit);
+  FitAnswer answer{problem, fit, {}, {}, {}, {}, cost, 1};
   answer.threads = request.threads > 0 ? request.threads
                                        : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   answer.throws = fitting::predict_throws(problem, fit, {true, request.threads});

@@ -145,7 +145,9 @@ std::vector<ThrowAnswer::Number> numbers_of(const planners::ReleaseCard& card,
   };
   add("mu", "-", card.mu.value, card.mu.sigma);
   add("length", "m", card.length, 0);
-  if (card.kappa) add("kappa", "-", *card.kappa, 0);
+  for (const auto& own : contact::law_parameters(card.model))
+    if (const auto value = card.law_values.find(own.name); value != card.law_values.end())
+      add(own.name.c_str(), own.unit.c_str(), value->second, 0);
   add("pads", "-", card.pads, 0);
   add("grip_force", "N", card.grip_force, 0);
   add("dead_time", "s", card.dead_time.value, card.dead_time.sigma);

@@ -3,6 +3,9 @@
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <cmath>
+#include <deque>
 #include <stdexcept>
 
 #include "contact/gripper_delay.hpp"
@@ -11,51 +14,119 @@
 namespace unhand::contact {
 namespace {
 
-using Maker = std::unique_ptr<ContactModel> (*)(const ContactParameters<Dual>&);
+using Parameters = ContactParameters<Dual>;
+using Model = std::unique_ptr<ContactModel>;
 
-/// A contact model is one line here.
-constexpr std::pair<std::string_view, Maker> kModels[] = {
-    {"sliding_pivot",
-     [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
-       return std::make_unique<SlidingPivot>(p.patch, p.slide_end, p.variation);
-     }},
-    {"limit_surface",
-     [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
-       return std::make_unique<LimitSurface<Ellipsoid>>("limit_surface", p.patch, Ellipsoid{}, p.variation);
-     }},
-    {"limit_surface_disc",
-     [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
-       const Dual& exponent = p.variation.pressure_exponent;
-       if (!dynamics::is_zero(exponent))
-         return std::make_unique<LimitSurface<PressedDisc>>("limit_surface_disc", p.patch,
-                                                            PressedDisc(exponent), p.variation);
-       return std::make_unique<LimitSurface<UniformDisc>>("limit_surface_disc", p.patch, UniformDisc{},
-                                                          p.variation);
-     }},
-    {"limit_surface_quartic",
-     [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
-       const auto shape = p.kappa ? IsotropicQuartic(*p.kappa) : IsotropicQuartic::closest_to_disc();
-       return std::make_unique<LimitSurface<IsotropicQuartic>>("limit_surface_quartic", p.patch, shape,
-                                                               p.variation);
-     }},
-    {kGripperDelay,
-     [](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
-       return std::make_unique<GripperDelay>(p.open_command, p.delay);
-     }},
-};
+/// A contact model is one entry here. Addresses stay as more are registered.
+std::deque<ContactModelEntry>& models() {
+  static std::deque<ContactModelEntry> known{
+      {"sliding_pivot",
+       [](const Parameters& p) -> Model {
+         return std::make_unique<SlidingPivot>(p.patch, p.slide_end, p.variation);
+       }},
+      {"limit_surface",
+       [](const Parameters& p) -> Model {
+         return std::make_unique<LimitSurface<Ellipsoid>>("limit_surface", p.patch, Ellipsoid{}, p.variation);
+       }},
+      {"limit_surface_disc",
+       [](const Parameters& p) -> Model {
+         const Dual& exponent = p.variation.pressure_exponent;
+         if (!dynamics::is_zero(exponent))
+           return std::make_unique<LimitSurface<PressedDisc>>("limit_surface_disc", p.patch,
+                                                              PressedDisc(exponent), p.variation);
+         return std::make_unique<LimitSurface<UniformDisc>>("limit_surface_disc", p.patch, UniformDisc{},
+                                                            p.variation);
+       }},
+      {"limit_surface_quartic",
+       [](const Parameters& p) -> Model {
+         const auto kappa = p.law_values.find("kappa");
+         const auto shape = kappa != p.law_values.end() ? IsotropicQuartic(kappa->second)
+                                                        : IsotropicQuartic::closest_to_disc();
+         return std::make_unique<LimitSurface<IsotropicQuartic>>("limit_surface_quartic", p.patch, shape,
+                                                                 p.variation);
+       },
+       // Of the shape (IsotropicQuartic). The disc's, and about as far from it as the ellipsoid's 1 is
+       // likely; convex from 0 to 3, singular at both.
+       {{"kappa", "-", ConvexQuartic::kappa_closest_to_disc(), 0, 3, 0.05, 2.95, 0.2, 0.3,
+         "throws whose pads slide and turn at once, with force and torque measured behind a pad"}}},
+      {kGripperDelay,
+       [](const Parameters& p) -> Model { return std::make_unique<GripperDelay>(p.open_command, p.delay); }},
+  };
+  return known;
+}
+
+const ContactModelEntry* find(std::string_view name) {
+  const auto& all = models();
+  const auto at = std::find_if(all.begin(), all.end(), [&](const auto& entry) { return entry.name == name; });
+  return at == all.end() ? nullptr : &*at;
+}
+
+/// The names that fits and cards have for what every law takes, and for what a throw has of its own.
+constexpr std::string_view kTaken[] = {"mu",
+                                       "length",
+                                       "pads",
+                                       "reference_force",
+                                       "grip_force",
+                                       "dead_time",
+                                       "opening_time",
+                                       "shape",
+                                       "delay",
+                                       "delay_sigma",
+                                       "grasp_angle",
+                                       "grasp_offset",
+                                       "mu_deviation",
+                                       "force_deviation",
+                                       "delay_deviation",
+                                       "dead_time_deviation"};
+
+void validate(const ContactModelEntry& entry) {
+  const auto fail = [&](const std::string& why) {
+    throw std::invalid_argument(fmt::format("register_contact_model: \"{}\" {}", entry.name, why));
+  };
+  if (entry.name.empty()) fail("is no name");
+  if (find(entry.name)) fail("is taken");
+  if (!entry.make) fail("has no maker");
+  for (const LawParameter& p : entry.own) {
+    if (p.name.empty() || p.name.find_first_of(".[]") != std::string::npos ||
+        std::find(std::begin(kTaken), std::end(kTaken), p.name) != std::end(kTaken))
+      fail(fmt::format("has a parameter named \"{}\", which is empty, taken or has one of . [ ]", p.name));
+    if (std::count_if(entry.own.begin(), entry.own.end(), [&](const auto& q) { return q.name == p.name; }) >
+        1)
+      fail(fmt::format("has two parameters named \"{}\"", p.name));
+    if (!(p.low <= p.search_low && p.search_low <= p.start && p.start <= p.search_high &&
+          p.search_high <= p.high && p.search_low < p.search_high && std::isfinite(p.high - p.low)))
+      fail(
+          fmt::format("has \"{}\" = {}, to be searched in [{}, {}] and accepted in [{}, {}]: each must hold "
+                      "the one before it, and be finite",
+                      p.name, p.start, p.search_low, p.search_high, p.low, p.high));
+    if (!(p.typical > 0 && std::isfinite(p.typical) && p.prior_sigma.value_or(1) > 0))
+      fail(fmt::format("has \"{}\" with a step of {} and a prior sigma of {}: both must be > 0", p.name,
+                       p.typical, p.prior_sigma.value_or(HUGE_VAL)));
+  }
+}
 
 }  // namespace
 
+void register_contact_model(ContactModelEntry entry) {
+  validate(entry);
+  models().push_back(std::move(entry));
+}
+
 std::vector<std::string> contact_model_names() {
   std::vector<std::string> names;
-  for (const auto& [name, maker] : kModels) names.emplace_back(name);
+  for (const auto& entry : models()) names.push_back(entry.name);
   return names;
+}
+
+const std::vector<LawParameter>& law_parameters(std::string_view name) {
+  static const std::vector<LawParameter> kNone;
+  const auto* entry = find(name);
+  return entry ? entry->own : kNone;
 }
 
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name,
                                                  const ContactParameters<Dual>& parameters) {
-  for (const auto& [known, maker] : kModels)
-    if (known == name) return maker(parameters);
+  if (const auto* entry = find(name)) return entry->make(parameters);
   throw std::invalid_argument(fmt::format("contact model \"{}\" is unknown; there are {}", name,
                                           fmt::join(contact_model_names(), ", ")));
 }
@@ -63,7 +134,7 @@ std::unique_ptr<ContactModel> make_contact_model(std::string_view name,
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name, const ContactParameters<double>& p) {
   return make_contact_model(
       name, ContactParameters<Dual>{constant(p.patch), p.slide_end,
-                                    p.kappa ? std::optional<Dual>(*p.kappa) : std::nullopt, p.open_command,
+                                    LawValues<Dual>(p.law_values.begin(), p.law_values.end()), p.open_command,
                                     Dual(p.delay), constant(p.variation)});
 }
 

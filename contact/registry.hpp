@@ -1,14 +1,15 @@
 // The contact models by name.
 #pragma once
 
+#include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "contact/contact_model.hpp"
 #include "contact/friction_effects.hpp"
+#include "contact/law_parameter.hpp"
 #include "contact/patch.hpp"
 #include "contact/sliding_pivot.hpp"
 
@@ -19,17 +20,33 @@ template <class S>
 struct ContactParameters {
   Patch<S> patch;                               ///< the limits, for all but gripper_delay
   SlideEnd slide_end{SlideEnd::latched_brake};  ///< sliding_pivot
-  std::optional<S> kappa;            ///< limit_surface_quartic; the closest to a uniform disc if absent [-]
-  double open_command{};             ///< gripper_delay: when the gripper is told to open [s]
-  S delay{};                         ///< gripper_delay: from the command to the release [s]
-  FrictionVariation<S> variation{};  ///< departures of the friction limits; neutral by default
+  LawValues<S> law_values{};                    ///< of the law's own parameters (ContactModelEntry::own)
+  double open_command{};                        ///< gripper_delay: when the gripper is told to open [s]
+  S delay{};                                    ///< gripper_delay: from the command to the release [s]
+  FrictionVariation<S> variation{};             ///< departures of the friction limits; neutral by default
 };
 
-/// The names that make_contact_model knows.
+/// A contact model that can be chosen by name.
+struct ContactModelEntry {
+  std::string name;
+  std::function<std::unique_ptr<ContactModel>(const ContactParameters<Dual>&)> make;
+  std::vector<LawParameter> own{};  ///< what it takes beside ContactParameters' other members
+};
+
+/// Makes a law known by name to everything in this program that takes names: make_contact_model, comparisons,
+/// fits, discovery, planners. For a program's begin: not while another thread uses the registry. Throws
+/// std::invalid_argument for a name that is empty or taken, a missing maker, and an own parameter that does
+/// not keep what LawParameter says.
+void register_contact_model(ContactModelEntry entry);
+
+/// The names that make_contact_model knows, the library's own first.
 std::vector<std::string> contact_model_names();
 
+/// What a law takes of its own; empty for a name that is not known.
+const std::vector<LawParameter>& law_parameters(std::string_view name);
+
 /// The model of that name. Throws std::invalid_argument, listing the names, if there is none, and as the
-/// model's constructor does.
+/// model's constructor does. Of `law_values` it reads those of its own parameters.
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name, const ContactParameters<double>&);
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name, const ContactParameters<Dual>&);
 

@@ -64,7 +64,7 @@ std::unique_ptr<contact::ContactModel> contact_model_for(const PreparedThrow& th
   if (model == kNaive) return nullptr;
   if (model != contact::kGripperDelay) require_force(throw_, model);
   return contact::make_contact_model(
-      model, contact::ContactParameters<double>{patch_of(p), p.slide_end, p.kappa, throw_.open_command,
+      model, contact::ContactParameters<double>{patch_of(p), p.slide_end, p.law_values, throw_.open_command,
                                                 p.delay.centre});
 }
 

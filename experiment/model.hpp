@@ -16,11 +16,11 @@ namespace unhand::experiment {
 
 /// Campaign parameters of a model; each model reads what it needs.
 struct ModelParameters {
-  double mu{0.5};                 ///< friction coefficient [-]
-  double length{0.007};           ///< L = c a = τ_max/f_max [m]
-  int pads{2};                    ///< n >= 1
-  std::optional<double> kappa{};  ///< limit_surface_quartic; the closest to a uniform disc if absent [-]
-  contact::SlideEnd slide_end{contact::SlideEnd::latched_brake};               ///< sliding_pivot
+  double mu{0.5};                                                 ///< friction coefficient [-]
+  double length{0.007};                                           ///< L = c a = τ_max/f_max [m]
+  int pads{2};                                                    ///< n >= 1
+  contact::LawValues<double> law_values{};                        ///< of the law's own parameters
+  contact::SlideEnd slide_end{contact::SlideEnd::latched_brake};  ///< sliding_pivot
   contact::DelayDistribution delay{contact::DelayDistribution::number(0.05)};  ///< gripper_delay
   release::NaiveOptions naive{};                                               ///< limit_surface_naive
 };

@@ -59,8 +59,8 @@ auto with_release(const PreparedThrow& prepared, const ThrowModel& model, const 
   parameters.open_command = prepared.open_command;
   parameters.delay = Dual(values.get("delay", 0.05) + values.get("delay_deviation", 0));
   parameters.variation = contact::constant(setup.friction);
-  if (model.contact_model == "limit_surface_quartic")
-    parameters.kappa = Dual(values.get("kappa", contact::ConvexQuartic::kappa_closest_to_disc()));
+  for (const auto& p : contact::law_parameters(model.contact_model))
+    parameters.law_values.emplace(p.name, Dual(values.get(p.name, p.start)));
   const auto contact = contact::make_contact_model(model.contact_model, parameters);
 
   const Vec2<S> gravity = setup.gravity.at(-prepared.gravity.z);

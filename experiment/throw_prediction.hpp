@@ -14,7 +14,7 @@ namespace unhand::experiment {
 /// The named values that a prediction reads, beside those of the effects ("contact.viscous.1/v_0"):
 ///   mu             friction coefficient [-]
 ///   length         L = c a = τ_max/f_max [m]
-///   kappa          limit_surface_quartic: of its shape (contact::IsotropicQuartic) [-]
+///   the law's own (contact::law_parameters), as kappa of limit_surface_quartic
 ///   grip_force, dead_time, opening_time, shape   contact::OpeningProfile where no normal force was measured
 ///   delay          gripper_delay: from the opening command to the release [s]
 ///   grasp_angle    of this throw, beyond the prepared one [rad]

@@ -36,8 +36,8 @@ std::string remedy_for(const CampaignProblem& problem, const std::string& name) 
     if (!torque) return "the torque behind a pad while the gripper opens";
     return "throws in which the object pivots in the grip: a CoM further from the pads";
   }
-  if (name == "kappa")
-    return "throws whose pads slide and turn at once, with force and torque measured behind a pad";
+  for (const auto& p : contact::law_parameters(problem.options().model))
+    if (name == p.name && !p.remedy.empty()) return p.remedy;
   if (name == "dead_time" || name == "opening_time" || name == "shape")
     return "the pads' normal force while they open";
   if (name == "delay")

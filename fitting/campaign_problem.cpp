@@ -136,7 +136,8 @@ void CampaignProblem::name_unknowns(const std::vector<Effect>& effects) {
     objects.insert(t.prepared.object);
   }
   if (follows_pads) {
-    const auto radius = header_.gripper ? header_.gripper->pad_radius : std::nullopt;
+    const auto& gripper = header_.gripper;
+    const double* radius = gripper && gripper->pad_radius ? &*gripper->pad_radius : nullptr;
     const bool guessed = first_guess_.mu != experiment::ModelParameters{}.mu;
     const double length = guessed || !radius ? first_guess_.length : contact::kUniformDisc * *radius;
     // Held to a fifth of what the slipping pads or the declared radius say: a fit of a model that lacks an
@@ -147,12 +148,8 @@ void CampaignProblem::name_unknowns(const std::vector<Effect>& effects) {
     if (guessed || radius) length_prior = kHeld * length;
     campaign_.push_back({"mu", "-", first_guess_.mu, 0.01, 5, 0.05, mu_prior});
     campaign_.push_back({"length", "m", length, 1e-4, 0.2, 0.1 * length, length_prior});
-    if (options_.model == "limit_surface_quartic") {
-      // The disc's, and about as far from it as the ellipsoid's 1 is likely. Convex for 0 to 3, singular at
-      // both.
-      const double disc = contact::ConvexQuartic::kappa_closest_to_disc();
-      campaign_.push_back({"kappa", "-", disc, 0.05, 2.95, 0.2, 0.3});
-    }
+    for (const auto& p : contact::law_parameters(options_.model))
+      campaign_.push_back({p.name, p.unit, p.start, p.search_low, p.search_high, p.typical, p.prior_sigma});
     for (Unknown& u : campaign_) u.of_law = true;
     own_.push_back({"mu_deviation", "-", 0, -0.5, 0.5, 0.02, 0.03, Unknown::Kind::scatter});
     if (any_force) own_.push_back({"force_deviation", "-", 0, -6, 6, 1, 1, Unknown::Kind::smoothing});

@@ -29,7 +29,6 @@ struct BaseParameter {
 };
 constexpr BaseParameter kBase[] = {{"mu", "-", 0, 10, true},
                                    {"length", "m", 1e-9, contact::kUniformDisc, true},
-                                   {"kappa", "-", 0, 3, true},
                                    {"pads", "-", 1, 1000, true},
                                    {"reference_force", "N", 1e-9, 1e6, true},
                                    {"grip_force", "N", 1e-9, 1e6, true},
@@ -250,6 +249,11 @@ CampaignOptions options_of(const ModelCard& card, const std::string& file) {
         [&, &key = name](const BaseParameter& b) { return b.of_pads == follows_pads && key == b.name; });
     bool known = base != std::end(kBase);
     if (known) check(file, name, parameter, base->unit, base->low, base->high);
+    for (const auto& p : contact::law_parameters(card.model))
+      if (name == p.name) {
+        check(file, name, parameter, p.unit, p.low, p.high);
+        known = true;
+      }
     for (const auto& effect : effects)
       for (const auto& p : effect.parameters)
         if (experiment::without_object(name) == effect.full_name(p)) {

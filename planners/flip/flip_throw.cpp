@@ -20,7 +20,7 @@ std::optional<FlipRelease> release_bar(const release::HandMotion& hand, const He
                                        std::vector<dynamics::Wrench<double>>* on_bar, double step) {
   contact::ContactParameters<double> pads;
   pads.patch = contact::Patch<double>::of_length(held.pads.mu, held.pads.length, held.pads.count);
-  pads.kappa = held.pads.kappa;
+  pads.law_values = held.pads.law_values;
   const auto law = contact::make_contact_model(held.pads.law, pads);
   const Gripper& g = held.gripper;
   const contact::ProfileNormalForce force(

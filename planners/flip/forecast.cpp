@@ -76,7 +76,7 @@ ReleaseCard prior_card(const FlipRobot& robot, const std::string& law) {
   out.mu = {robot.pads.mu, robot.pads.mu * std::hypot(s.mu, s.grip_force)};
   out.length = robot.pads.length;
   out.pads = robot.pads.count;
-  if (law == robot.pads.law) out.kappa = robot.pads.kappa;
+  if (law == robot.pads.law) out.law_values = robot.pads.law_values;
   out.grip_force = g.grip_force;
   out.dead_time = {g.dead_time, s.dead_time};
   out.opening_time = {g.opening_time, s.opening_time};
@@ -89,7 +89,7 @@ std::optional<FlipRelease> predicted_release(const release::HandMotion& hand, co
   return release_bar(hand, {bar,
                             0.0,
                             {card.grip_force, card.dead_time.value, card.opening_time.value, card.shape},
-                            {card.model, card.mu.value, card.length, card.pads, card.kappa}});
+                            {card.model, card.mu.value, card.length, card.pads, card.law_values}});
 }
 
 std::vector<std::optional<FlipPose>> declared_landings(const HandLibrary& library) {
@@ -180,7 +180,9 @@ datasets::ModelCard model_card_of(const ReleaseFit& fit, const std::string& sour
   out.model = c.model;
   out.parameters["mu"] = {c.mu.value, c.mu.sigma, "-"};
   out.parameters["length"] = {c.length, fit.length_sigma, "m"};
-  if (c.kappa) out.parameters["kappa"] = {*c.kappa, {}, "-"};
+  for (const auto& own : contact::law_parameters(c.model))
+    if (const auto value = c.law_values.find(own.name); value != c.law_values.end())
+      out.parameters[own.name] = {value->second, {}, own.unit};
   out.parameters["pads"] = {static_cast<double>(c.pads), {}, "-"};
   out.parameters["grip_force"] = {c.grip_force, {}, "N"};
   out.parameters["dead_time"] = {c.dead_time.value, c.dead_time.sigma, "s"};

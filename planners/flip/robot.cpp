@@ -101,9 +101,15 @@ Pads pads_of(Section keys) {
   const double pads = keys.number("pads", {1, 8, false, ""});
   if (pads != std::floor(pads)) keys.fail("pads", fmt::format("{} is not a whole number", pads));
   out.count = static_cast<int>(pads);
-  out.kappa = keys.if_there("kappa", {0, 3, false, ""});  // of a convex surface
-  if (out.kappa && out.law != "limit_surface_quartic")
-    keys.fail("kappa", fmt::format("is of limit_surface_quartic, and the law is '{}'", out.law));
+  for (const auto& own : contact::law_parameters(out.law)) {
+    const TomlLimits accepted{own.low, own.high, false, own.unit == "-" ? "" : own.unit.c_str()};
+    if (const auto value = keys.if_there(own.name.c_str(), accepted)) out.law_values[own.name] = *value;
+  }
+  for (const auto& name : known)
+    for (const auto& other : contact::law_parameters(name))
+      if (!out.law_values.contains(other.name) &&
+          keys.if_there(other.name.c_str(), {-HUGE_VAL, HUGE_VAL, false, ""}))
+        keys.fail(other.name.c_str(), fmt::format("is of {}, and the law is '{}'", name, out.law));
   keys.done();
   return out;
 }

@@ -2,10 +2,10 @@
 #pragma once
 
 #include <array>
-#include <optional>
 #include <string>
 #include <string_view>
 
+#include "contact/law_parameter.hpp"
 #include "planners/arm/chain.hpp"
 
 namespace unhand::planners::flip {
@@ -68,12 +68,11 @@ struct Gripper {
 
 /// What holds the bar.
 struct Pads {
-  std::string law;  ///< a contact model's name
-  double mu{};      ///< [-]
-  double length{};  ///< L = τ_max/f_max [m]
-  int count{2};     ///< n >= 1
-  /// Of limit_surface_quartic, 0 to 3 [-]; the closest to a uniform disc if absent.
-  std::optional<double> kappa{};
+  std::string law;                          ///< a contact model's name
+  double mu{};                              ///< [-]
+  double length{};                          ///< L = τ_max/f_max [m]
+  int count{2};                             ///< n >= 1
+  contact::LawValues<double> law_values{};  ///< of the law's own parameters
 };
 
 /// 1 σ of what differs from robot to robot and stays as it is for one. Shares are of the declared value.
@@ -121,9 +120,9 @@ std::string_view built_in_robot();
 /// Which of a bar's numbers no robot here could throw, and what is accepted; empty: all may be thrown.
 std::string complaint_of(const Bar& bar);
 
-/// "panda-flip", or a TOML file with the same keys; all but `source`, `notes` and the pads' `kappa` are
-/// required. `arm` is as for read_chain, a file's name relative to the TOML file. Throws datasets::TomlError,
-/// also where the reference of a command would leave the joints' limits.
+/// "panda-flip", or a TOML file with the same keys; all but `source`, `notes` and what the pads' law takes of
+/// its own are required. `arm` is as for read_chain, a file's name relative to the TOML file. Throws
+/// datasets::TomlError, also where the reference of a command would leave the joints' limits.
 FlipRobot read_flip_robot(const std::string& name_or_file);
 
 /// The chain with the bar held rigidly along the tip's z axis: a thin rod's inertia across it.

@@ -155,18 +155,18 @@ ReleaseCard release_card(const datasets::ModelCard& card, const std::string& fil
                                 fmt::join(card.effects, ", ")));
   ReleaseCard out = otherwise;
   out.model = card.model;
-  out.kappa.reset();
+  out.law_values.clear();
   CardReader reader(card, file, out);
   reader.take("mu", "-", 0, true, out.mu.value, &out.mu.sigma);
   reader.take("length", "m", 0, true, out.length);
-  if (card.model == "limit_surface_quartic") {
-    double kappa = NAN;
-    reader.take("kappa", "-", 0, false, kappa);
-    constexpr double kMostKappa = 3;  // of a convex surface
-    if (kappa > kMostKappa)
-      throw CardError(file, "/parameters/kappa/value",
-                      fmt::format("is {}; accepted: 0 to {}", kappa, kMostKappa));
-    if (!std::isnan(kappa)) out.kappa = kappa;
+  for (const auto& own : contact::law_parameters(card.model)) {
+    if (!card.parameters.contains(own.name)) continue;
+    double value = own.start;
+    reader.take(own.name.c_str(), own.unit.c_str(), own.low, false, value);
+    if (value > own.high)
+      throw CardError(file, fmt::format("/parameters/{}/value", own.name),
+                      fmt::format("is {}; accepted: {} to {}", value, own.low, own.high));
+    out.law_values[own.name] = value;
   }
   constexpr int kMostPads = 1000;
   double pads = out.pads;
@@ -227,7 +227,7 @@ std::optional<Thrown<S>> throw_once(const ReleaseThrow& p, const release::HandMo
                                     const std::array<S, kUnknowns>& draw) {
   contact::ContactParameters<S> pads;
   pads.patch = contact::Patch<S>::of_length(draw[kMu], S(p.card.length), p.card.pads);
-  if (p.card.kappa) pads.kappa = S(*p.card.kappa);
+  for (const auto& [name, value] : p.card.law_values) pads.law_values.emplace(name, S(value));
   const auto law = contact::make_contact_model(p.card.model, pads);
   const contact::ProfileNormalForce force(contact::OpeningProfile<S>{
       0.0, S(p.card.grip_force), draw[kDeadTime], draw[kOpeningTime], S(p.card.shape)});

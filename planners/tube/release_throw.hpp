@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "contact/law_parameter.hpp"
 #include "datasets/model_card.hpp"
 #include "planners/tube/tube_cvx.hpp"
 
@@ -34,17 +35,17 @@ struct NumberOrigin {
 
 /// What is known of the release: a contact model, the friction of its pads, and how the gripper opens.
 struct ReleaseCard {
-  std::string model{"limit_surface"};    ///< a name that contact::make_contact_model knows
-  Uncertain mu{0.5, 0.05};               ///< friction coefficient [-]
-  double length{0.007};                  ///< L = τ_max/f_max [m]
-  int pads{2};                           ///< n >= 1
-  double grip_force{40};                 ///< of one pad [N]
-  Uncertain dead_time{0.020, 0.005};     ///< from the command to the first change of the force [s]
-  Uncertain opening_time{0.060, 0.006};  ///< from there until the pads part [s]
-  double shape{1.0};                     ///< p of contact::OpeningProfile [-]
-  std::optional<double> kappa{};         ///< limit_surface_quartic; the closest to a uniform disc if absent
-  double grasp_offset{};                 ///< 1 σ of the place of the pads on the object, throw to throw [m]
-  double grasp_angle{};                  ///< 1 σ of the object's angle in the hand, throw to throw [rad]
+  std::string model{"limit_surface"};       ///< a name that contact::make_contact_model knows
+  Uncertain mu{0.5, 0.05};                  ///< friction coefficient [-]
+  double length{0.007};                     ///< L = τ_max/f_max [m]
+  int pads{2};                              ///< n >= 1
+  double grip_force{40};                    ///< of one pad [N]
+  Uncertain dead_time{0.020, 0.005};        ///< from the command to the first change of the force [s]
+  Uncertain opening_time{0.060, 0.006};     ///< from there until the pads part [s]
+  double shape{1.0};                        ///< p of contact::OpeningProfile [-]
+  contact::LawValues<double> law_values{};  ///< of the law's own parameters
+  double grasp_offset{};  ///< 1 σ of the place of the pads on the object, throw to throw [m]
+  double grasp_angle{};   ///< 1 σ of the object's angle in the hand, throw to throw [rad]
   std::map<std::string, NumberOrigin> origins{};  ///< by a number's name on cards; assumed if absent
 };
 
@@ -52,7 +53,7 @@ struct ReleaseCard {
 inline constexpr double kLeastForceSigma = 0.03,  ///< of the grip force, as its share [-]
     kLeastOpeningSigma = 1e-3;                    ///< of the dead time and of the opening time [s]
 
-/// A model card's numbers: of its parameters mu, length, kappa (of limit_surface_quartic), pads, grip_force,
+/// A model card's numbers: of its parameters mu, length, those of the law's own, pads, grip_force,
 /// dead_time, opening_time and shape; else, for these four of the gripper, of its valid range; else those of
 /// `otherwise`. The card's spreads from throw to throw add to σ: mu_deviation, dead_time_deviation,
 /// grasp_offset and grasp_angle; force_deviation is of a log's sensor and passed over. σ of the grip force

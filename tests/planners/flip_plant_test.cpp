@@ -337,13 +337,13 @@ TEST(FlipRobotFile, SaysTheShapeOfTheQuartic) {
     std::ofstream(path) << text;
     return read_flip_robot(path.string());
   };
-  EXPECT_FALSE(with("").pads.kappa);
+  EXPECT_TRUE(with("").pads.law_values.empty());
   std::vector<double> lands;
   for (const double kappa : {0.0, 3.0}) {
     const FlipRobot one = with(fmt::format("kappa = {}", kappa));
-    EXPECT_EQ(one.pads.kappa, kappa);
-    EXPECT_EQ(prior_card(one, one.pads.law).kappa, kappa);
-    EXPECT_FALSE(prior_card(one).kappa);  // a pivot has none
+    EXPECT_EQ(one.pads.law_values.at("kappa"), kappa);
+    EXPECT_EQ(prior_card(one, one.pads.law).law_values.at("kappa"), kappa);
+    EXPECT_TRUE(prior_card(one).law_values.empty());  // a pivot has none
     const auto release = release_bar(ThrowingArm(one, declared_body(one, one.bar), middle(), 1).brake().hand,
                                      {one.bar, 0.0, one.gripper, one.pads});
     ASSERT_TRUE(release) << kappa;

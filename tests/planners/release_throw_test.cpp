@@ -181,7 +181,7 @@ TEST(ReleaseThrow, FollowsTheShapeOfItsCard) {
   const double lean = lands(0.3), full = lands(2.7), ellipsoid = lands(1);
   EXPECT_GT(std::abs(lean - full), 1e-3);
   p.card.model = "limit_surface";
-  p.card.kappa.reset();
+  p.card.law_values.clear();
   const auto exact = release_landing(p, nominal_draw(p));
   ASSERT_TRUE(exact);
   EXPECT_NEAR(ellipsoid, exact->miss, 1e-6);  // the quartic of κ = 1 is the ellipsoid; the integrator's 1e-8

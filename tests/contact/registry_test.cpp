@@ -1,0 +1,77 @@
+// The contact models by name, and one that a program registers.
+#include "contact/registry.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "contact/gripper_delay.hpp"
+
+namespace unhand::contact {
+namespace {
+
+using dynamics::Dual;
+using testing::Contains;
+using testing::HasSubstr;
+
+/// A law by another name, which notes the values of its own parameter.
+ContactModelEntry named(std::string name, std::vector<LawParameter> own,
+                        std::vector<double>* seen = nullptr) {
+  return {std::move(name),
+          [seen](const ContactParameters<Dual>& p) -> std::unique_ptr<ContactModel> {
+            for (const auto& [key, value] : p.law_values)
+              if (seen) seen->push_back(value.a);
+            return std::make_unique<SlidingPivot>(p.patch);
+          },
+          std::move(own)};
+}
+
+LawParameter glue() { return {"glue", "N", 1, 0, 10, 0.1, 9, 0.5, 2.0, ""}; }
+
+TEST(Registry, TakesALawOfOnesOwn) {
+  std::vector<double> seen;
+  register_contact_model(named("glued", {glue()}, &seen));
+  EXPECT_THAT(contact_model_names(), Contains("glued"));
+  EXPECT_EQ(contact_model_names().front(), "sliding_pivot");
+  ASSERT_EQ(law_parameters("glued").size(), 1u);
+  EXPECT_EQ(law_parameters("glued")[0].unit, "N");
+  ContactParameters<double> p;
+  p.patch = {0.5, 0.01};
+  p.law_values["glue"] = 2.5;
+  EXPECT_EQ(make_contact_model("glued", p)->mode_count(), 10);
+  EXPECT_THAT(seen, testing::ElementsAre(2.5));
+  EXPECT_TRUE(law_parameters("sliding_pivot").empty());
+  EXPECT_TRUE(law_parameters("nobody").empty());
+}
+
+TEST(Registry, RefusesWhatIsNoLaw) {
+  const auto refusal = [](const ContactModelEntry& entry) -> std::string {
+    try {
+      register_contact_model(entry);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(refusal(named("", {})), HasSubstr("no name"));
+  EXPECT_THAT(refusal(named(kGripperDelay, {})), HasSubstr("is taken"));
+  EXPECT_THAT(refusal({"unmade", {}, {}}), HasSubstr("no maker"));
+  const auto with = [&](auto change) {
+    LawParameter p = glue();
+    change(p);
+    return refusal(named("refused", {p}));
+  };
+  EXPECT_THAT(with([](auto& p) { p.name = "mu"; }), HasSubstr("\"mu\""));
+  EXPECT_THAT(with([](auto& p) { p.name = "contact.viscous"; }), HasSubstr("contact.viscous"));
+  EXPECT_THAT(with([](auto& p) { p.start = 20; }), HasSubstr("\"glue\" = 20"));
+  EXPECT_THAT(with([](auto& p) { p.start = NAN; }), HasSubstr("\"glue\" = nan"));
+  EXPECT_THAT(with([](auto& p) { p.high = INFINITY; }), HasSubstr("inf"));
+  EXPECT_THAT(with([](auto& p) { p.typical = 0; }), HasSubstr("a step of 0"));
+  EXPECT_THAT(with([](auto& p) { p.prior_sigma = -1; }), HasSubstr("sigma of -1"));
+  EXPECT_THAT(refusal(named("refused", {glue(), glue()})), HasSubstr("two parameters"));
+  EXPECT_THAT(contact_model_names(), testing::Not(Contains("refused")));
+}
+
+}  // namespace
+}  // namespace unhand::contact
