@@ -95,7 +95,7 @@ ThrowReader<S>::ThrowReader(const release::ReleaseProblem<S>& problem,
 
 template <class S>
 void ThrowReader<S>::fly(double longest, const dynamics::IntegratorOptions& options) {
-  in_air_ = !dynamics::is_zero(flight_.drag_k) || !dynamics::is_zero(flight_.lift_km);
+  in_air_ = !flight::is_ballistic(flight_);
   if (in_air_) flown_ = flight::record_flight(flight_, longest, options);
 }
 

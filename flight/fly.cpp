@@ -132,26 +132,18 @@ Landing<S> landing_from(const S& t, const State<S, 6>& y, const Vec2<S>& tracked
   return tracked_point(Landing<S>{t, {y[0], y[1], y[2]}, {y[3], y[4], y[5]}}, tracked);
 }
 
-bool has_derivative(double) { return false; }
-bool has_derivative(const Dual& x) { return !x.v.isZero(); }
-
-/// True if the closed form answers: neither drag nor lift, nor derivatives with respect to them, and the CoM
-/// itself is tracked.
-template <class S>
-bool is_projectile(const FlightProblem<S>& p, bool lands) {
-  const bool centred = value_of(p.tracked.x) == 0 && value_of(p.tracked.z) == 0 &&
-                       !has_derivative(p.tracked.x) && !has_derivative(p.tracked.z);
-  const bool airless = value_of(p.drag_k) == 0 && !has_derivative(p.drag_k) && value_of(p.lift_km) == 0 &&
-                       !has_derivative(p.lift_km);
-  return airless && (centred || !lands);
-}
-
 }  // namespace
+
+template <class S>
+bool is_ballistic(const FlightProblem<S>& p) {
+  return dynamics::is_zero(p.drag_k) && dynamics::is_zero(p.lift_km);
+}
 
 template <class S>
 FlightResult<S> fly(const FlightProblem<S>& problem, const dynamics::IntegratorOptions& options) {
   validate(problem);
-  if (is_projectile(problem, true)) {
+  const bool centred = dynamics::is_zero(problem.tracked.x) && dynamics::is_zero(problem.tracked.z);
+  if (centred && is_ballistic(problem)) {
     const auto landing = project(problem.pose, problem.twist, problem.gravity, problem.landing_height);
     if (!landing || value_of(landing->flight_time) > problem.longest)
       return {FlightOutcome::never_reaches, {}, {}};
@@ -182,7 +174,7 @@ std::vector<Pose<S>> fly_through(const FlightProblem<S>& problem, const std::vec
       throw std::invalid_argument(fmt::format("flight: time {} s is not in [0, inf) s after the state", t));
   std::vector<Pose<S>> out;
   out.reserve(times.size());
-  if (is_projectile(problem, false)) {
+  if (is_ballistic(problem)) {
     for (const double t : times)
       out.push_back(
           tracked_point(ballistic(problem.pose, problem.twist, problem.gravity, S(t)), problem.tracked).pose);
@@ -214,11 +206,13 @@ RecordedFlight<S> record_flight(const FlightProblem<S>& problem, double longest,
   return {std::move(solution.trajectory)};
 }
 
+template bool is_ballistic(const FlightProblem<double>&);
 template FlightResult<double> fly(const FlightProblem<double>&, const dynamics::IntegratorOptions&);
 template RecordedFlight<double> record_flight(const FlightProblem<double>&, double,
                                               const dynamics::IntegratorOptions&);
 template RecordedFlight<Dual> record_flight(const FlightProblem<Dual>&, double,
                                             const dynamics::IntegratorOptions&);
+template bool is_ballistic(const FlightProblem<Dual>&);
 template FlightResult<Dual> fly(const FlightProblem<Dual>&, const dynamics::IntegratorOptions&);
 template std::vector<Pose<double>> fly_through(const FlightProblem<double>&, const std::vector<double>&,
                                                const dynamics::IntegratorOptions&);

@@ -24,6 +24,11 @@ struct FlightProblem {
   dynamics::Vec2<S> wind{};  ///< velocity of the air [m/s]; drag and lift see v − wind
 };
 
+/// Whether gravity alone acts, without derivatives by what else might: the CoM then moves as ballistic()
+/// says. What a new effect of the air adds to FlightProblem is asked for here.
+template <class S>
+bool is_ballistic(const FlightProblem<S>& problem);
+
 /// How a flight ended.
 enum class FlightOutcome {
   landed,         ///< passed the landing height on its way down
