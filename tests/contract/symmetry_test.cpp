@@ -55,7 +55,9 @@ TEST_P(Symmetry, NeitherIsLeftNorRight) {
   std::mt19937_64 random(22);
   for (int i = 0; i < kThrows; ++i) {
     const auto thrown = support::random_throw(random, i % 2);
-    const auto model = make(support::parameters_of(thrown));
+    auto pads = support::parameters_of(thrown);
+    if (i % 3 == 2) pads.variation.compliance = 1e-5;  // m/N: they give
+    const auto model = make(pads);
     const auto problem = support::problem_of(thrown, *model);
     const TransformedHand mirrored(thrown.hand, true, 0, {});
     const release::ReleaseProblem<double> other{mirrored,
