@@ -257,9 +257,28 @@ class Run {
 
 }  // namespace
 
+void validate(const IntegratorOptions& o) {
+  const auto require = [](bool right, const char* name, double value, const char* accepted) {
+    if (!right)
+      throw std::invalid_argument(
+          fmt::format("integrator options: {} = {} is not {}", name, value, accepted));
+  };
+  const auto& [relative, absolute] = o.tolerances;
+  require(relative >= 0 && std::isfinite(relative), "relative tolerance", relative, "in [0, inf)");
+  require(absolute >= 0 && std::isfinite(absolute), "absolute tolerance", absolute, "in [0, inf)");
+  require(relative + absolute > 0, "relative + absolute tolerance", relative + absolute, "> 0");
+  require(o.guard_interval > 0, "guard_interval", o.guard_interval, "> 0 s");
+  require(o.longest_step > 0, "longest_step", o.longest_step, "> 0 s");
+  require(o.zeno_tolerance >= 0, "zeno_tolerance", o.zeno_tolerance, ">= 0");
+  require(o.step_budget >= 0, "step_budget", static_cast<double>(o.step_budget), ">= 0");
+  require(o.event_budget >= 0, "event_budget", o.event_budget, ">= 0");
+  require(o.events_per_instant >= 0, "events_per_instant", o.events_per_instant, ">= 0");
+}
+
 template <class S, int N>
 Solution<S, N> integrate(const HybridSystem<N>& system, const Entry<S, N>& start, const S& t_end,
                          const IntegratorOptions& options) {
+  validate(options);
   if (!std::isfinite(value_of(start.t)) || !std::isfinite(value_of(t_end)) ||
       value_of(t_end) < value_of(start.t))
     throw std::invalid_argument(

@@ -27,6 +27,10 @@ struct IntegratorOptions {
   bool record{false};  ///< keep the trajectory
 };
 
+/// Throws std::invalid_argument, naming the option, its value and the accepted range: tolerances finite and
+/// not negative, not both zero; intervals > 0; budgets not negative.
+void validate(const IntegratorOptions& options);
+
 /// How an integration ended. Only the first two are answers; the rest say why there is none.
 enum class Outcome {
   finished,            ///< a mode of kind `finished` was entered
@@ -83,8 +87,8 @@ struct Solution {
 /// true steps. Guards that fire together are handled in the order of their indices, each transition deciding
 /// anew. A guard that is at zero when a phase begins is armed once it has been seen on its safe side. Time
 /// events are stepped to exactly. Instantiated for N = 2, 6, 7 with double and Dual. Throws
-/// std::invalid_argument when `start` is not finite, t_end lies before it, or derivatives are asked of a
-/// method that has none. N = 10 is there with double and smooth flows only.
+/// std::invalid_argument when `start` is not finite, t_end lies before it, an option is none, or derivatives
+/// are asked of a method that has none. N = 10 is there with double and smooth flows only.
 template <class S, int N>
 Solution<S, N> integrate(const HybridSystem<N>& system, const Entry<S, N>& start, const S& t_end,
                          const IntegratorOptions& options = {});

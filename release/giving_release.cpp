@@ -126,6 +126,7 @@ template <class S>
 ReleaseResult<S> simulate_giving_release(const ReleaseProblem<S>& problem, const contact::GivesAtPoints& pads,
                                          const contact::SceneSource& scenes, const GivingStart<S>& start,
                                          const ReleaseOptions& options) {
+  dynamics::validate(options.integrator);
   const double end = std::min(start.separation, problem.hand.end());
   std::vector<S> stops;
   for (const S& t : start.time_events)

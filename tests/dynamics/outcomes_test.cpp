@@ -1,4 +1,6 @@
 // Everything awkward ends in a typed outcome.
+#include <gmock/gmock.h>
+
 #include <random>
 
 #include "tests/dynamics/every_method.hpp"
@@ -91,6 +93,30 @@ TEST_P(Outcomes, InconsistentModesAreACycle) {
       EXPECT_LE(end.events.size(), 24u);  // events_per_instant
     }
   }
+}
+
+TEST(IntegratorOptions, AreChecked) {
+  const auto complaint = [](auto change) -> std::string {
+    IntegratorOptions options;
+    change(options);
+    try {
+      const auto swing = Toy({{FlowKind::smooth, {}}}, oscillator(), no_guards(), enter(0));
+      run(swing, {1.0, 0.0}, 1.0, options);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(complaint([](auto&) {}), "");
+  EXPECT_EQ(complaint([](auto& o) { o.tolerances.relative = 0; }), "");  // absolute alone
+  using testing::HasSubstr;
+  EXPECT_THAT(complaint([](auto& o) { o.tolerances.relative = -1; }), HasSubstr("relative tolerance = -1"));
+  EXPECT_THAT(complaint([](auto& o) { o.tolerances.absolute = NAN; }), HasSubstr("absolute tolerance = nan"));
+  EXPECT_THAT(complaint([](auto& o) { o.tolerances = {0, 0}; }), HasSubstr("absolute tolerance = 0"));
+  EXPECT_THAT(complaint([](auto& o) { o.guard_interval = 0; }), HasSubstr("guard_interval = 0"));
+  EXPECT_THAT(complaint([](auto& o) { o.longest_step = NAN; }), HasSubstr("longest_step = nan"));
+  EXPECT_THAT(complaint([](auto& o) { o.zeno_tolerance = -1; }), HasSubstr("zeno_tolerance = -1"));
+  EXPECT_THAT(complaint([](auto& o) { o.step_budget = -1; }), HasSubstr("step_budget = -1"));
 }
 
 TEST_P(Outcomes, BudgetsAreKept) {
