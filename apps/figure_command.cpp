@@ -117,8 +117,7 @@ const std::vector<Kind>& kinds() {
 
 void figure(const FigureCommandOptions& options) {
   require_gnuplot();
-  require_writable_directory(options.out);
-  require_writable(options.json);
+  require_outputs({{options.out, Wanted::directory}, {options.json}}, options.request.inputs());
   const auto kind =
       std::find_if(kinds().begin(), kinds().end(), [&](const Kind& k) { return options.name == k.name; });
   if (kind == kinds().end() && options.name != "all") {

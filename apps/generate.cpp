@@ -98,7 +98,7 @@ void tell_idle_effects(const experiment::CampaignDesign& design, const GenerateO
 
 void generate(const GenerateOptions& options) {
   const auto design = design_of(options);
-  for (const std::string& file : {options.out, options.json, options.truth}) require_writable(file);
+  require_outputs({{options.out, Wanted::log}, {options.json}, {options.truth}});
   auto throws = simulate(design, options);
   tell_idle_effects(design, options, throws);
   Outputs outputs;

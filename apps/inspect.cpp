@@ -207,7 +207,7 @@ Inspection inspect_slips(const std::string& file) {
 
 void inspect(InspectOptions options) {
   if (options.json == "-") options.json.clear();  // the standard output, as without a name
-  require_writable(options.json);
+  require_outputs({{options.json}}, {options.log});
   const Inspection seen = datasets::read_schema_name(options.log) == "slip-log" ? inspect_slips(options.log)
                                                                                 : inspect_throws(options.log);
   if (options.json_wanted && options.json.empty()) {
@@ -229,9 +229,10 @@ Command inspect_command(Parser& root) {
   Parser& parser =
       root.subcommand("inspect", "Show what is in a log: units, rates, gaps, noise, schema errors");
   parser.option("LOG", options->log, "A throw log or slip log").required();
-  const Option json =
-      parser.option("--json", options->json, "Write it as JSON; without a file name, JSON on stdout")
-          .expected(0, 1);
+  const Option json = parser
+                          .option("--json", options->json,
+                                  "Write it as JSON; without a file name, JSON on stdout (then after LOG)")
+                          .expected(0, 1);
   add_threads(parser, options->threads);
   parser.footer("Examples:\n  unhand inspect campaign.h5\n  unhand inspect campaign.h5 --json campaign.json");
   return {&parser, [options, json] {

@@ -88,7 +88,6 @@ TEST_F(Cli, WrongUsage) {
   expect_refusal("compare " + quick + " --models sliding_pivot,sliding_pivot", 2, "twice");
   expect_refusal("compare " + quick + " --rtol 7", 2, "rtol");
   expect_refusal("compare " + quick + " --rtol nan", 2, "finite");
-  expect_refusal("fit " + quick + " --model sliding_pivot --card a.json --json a.json", 2, "two outputs");
 }
 
 // A block without rows keeps its place: gnuplot's index would draw the next one in it.
@@ -273,6 +272,34 @@ TEST_F(Cli, NoOutputTakesThePlaceOfSomethingElse) {
   ASSERT_EQ(run("inspect log.h5 --json link.json").code, 0);
   EXPECT_TRUE(fs::is_symlink(folder / "link.json"));
   EXPECT_EQ(read_json(folder / "old.json")["schema"], "inspect");
+}
+
+// Before anything is read: what is no log at all would end in 3.
+TEST_F(Cli, NoOutputReplacesAMeasurementOrAnotherOutput) {
+  ASSERT_EQ(run("generate quick12 --seed 3 --out kept.h5").code, 0);
+  const std::string kept = content(folder / "kept.h5");
+  std::ofstream(folder / "text.h5") << "no log\n";
+  std::ofstream(folder / "userblock.mat", std::ios::binary) << std::string(512, ' ') << kept;
+  for (const char* file : {"kept.h5", "userblock.mat"})
+    for (const std::string one :
+         {"inspect text.h5 --json ", "compare text.h5 --json ", "fit text.h5 --model sliding_pivot --card ",
+          "predict text.h5 --card text.h5 --csv ", "discover text.h5 --card ",
+          "generate quick12 --out new.h5 --truth ", "import cube-tosses text.h5 --out new.h5 --json ",
+          "plan throw --target 1.3,0,-0.2 --json ", "validate-sku text.h5 --card text.h5 --json ",
+          "crosscheck text.h5 --engine cvode --json ", "figure mae --log text.h5 --out f --json "})
+      expect_refusal(one + file, 2, std::string(file) + " is an HDF5 file, which only a log may replace");
+  expect_refusal("inspect --json kept.h5 '" + quick + "'", 2, "write --json=FILE, or kept.h5 before it");
+  EXPECT_EQ(content(folder / "kept.h5"), kept);
+
+  fs::create_directory(folder / "sub");
+  fs::create_directory_symlink("sub", folder / "link");
+  for (const std::string one :
+       {"fit text.h5 --model sliding_pivot --card a --json ./a", "discover text.h5 --json ./a --card a",
+        "discover text.h5 --json a --card sub/../a", "predict text.h5 --card c --json sub/a --csv link/a",
+        "generate quick12 --out a --json ./a", "generate quick12 --out a --truth ./a",
+        "import cube-tosses text.h5 --out a --json ./a", "compare text.h5 --report sub --write-cards link/",
+        "validate-sku text.h5 --card text.h5 --json sub --report link/"})
+    expect_refusal(one, 2, "two outputs are to be ");
 }
 
 TEST_F(Cli, WhatAKilledRunLeftIsClearedByTheNextOfThatName) {
