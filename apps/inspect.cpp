@@ -44,17 +44,10 @@ Table groups_of(const datasets::LogSummary& summary) {
   return table;
 }
 
-auto row_of(const std::vector<datasets::LayoutRow>& layout, const std::string& dataset) {
-  return std::ranges::find_if(
-      layout, [&](const auto& r) { return r.path == dataset || r.path.ends_with("/" + dataset); });
-}
-
 /// Columns, units, declared noise and scatter of every dataset that the log holds.
 Table datasets_of(const datasets::LogSummary& summary) {
   Table table{{"dataset", "columns", "units", "throws", "declared sigma", "scatter"}, {}, 6};
-  const auto layout = datasets::throw_log_layout(summary.dimension);
   for (const auto& noise : summary.noise) {
-    const auto row = row_of(layout, noise.dataset);
     std::string sigma;
     for (std::size_t j = 0; j < noise.lowest.size(); ++j)
       sigma += (j > 0 ? ", " : "") + range(noise.lowest[j], noise.highest[j]);
@@ -63,8 +56,7 @@ Table datasets_of(const datasets::LogSummary& summary) {
     std::string scatter;
     for (std::size_t j = 0; j < noise.scatter.size(); ++j)
       scatter += fmt::format("{}{:.3g}", j > 0 ? ", " : "", noise.scatter[j]);
-    table.rows.push_back({noise.dataset, row == layout.end() ? "" : row->columns,
-                          row == layout.end() ? "" : row->units, fmt::to_string(noise.throws),
+    table.rows.push_back({noise.dataset, noise.columns, noise.units, fmt::to_string(noise.throws),
                           sigma.empty() ? "-" : sigma, scatter.empty() ? "-" : scatter});
   }
   return table;
@@ -81,10 +73,8 @@ std::vector<std::string> names_of(const std::string& columns, std::size_t count)
 /// What the samples say against the declared noise, a line each.
 std::string noise_doubts(const datasets::LogSummary& summary) {
   std::string out;
-  const auto layout = datasets::throw_log_layout(summary.dimension);
   for (const auto& noise : summary.noise) {
-    const auto row = row_of(layout, noise.dataset);
-    const auto names = names_of(row == layout.end() ? "" : row->columns, noise.ratio.size());
+    const auto names = names_of(noise.columns, noise.ratio.size());
     std::string columns;
     for (std::size_t j = 0; j < noise.too_small.size(); ++j)
       if (noise.too_small[j])

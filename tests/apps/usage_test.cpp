@@ -473,6 +473,13 @@ TEST_F(Cli, InspectTellsOfWhatIsImpossibleAndTheRestRefusesIt) {
   expect_refusal("compare mm.h5 --json a.json", 3, "mm.h5: /gripper@pad_radius");
 }
 
+TEST_F(Cli, InspectShowsTheColumnsThatTheFileHas) {
+  write_unoriented_flights("ff.h5");
+  EXPECT_THAT(run("inspect ff.h5").out, testing::ContainsRegex("mocap/pose +x,y,z +m,m,m +5 "));
+  EXPECT_THAT(run("inspect '" + flights + "'").out,
+              testing::ContainsRegex("mocap/pose +x,y,z,qw,qx,qy,qz +m,m,m,1,1,1,1 +5 "));
+}
+
 TEST_F(Cli, ImpossibleTimesAreTold) {
   auto log = datasets::read_throw_log(quick);
   log.gripper->opening_command_time = 10;
