@@ -473,6 +473,34 @@ TEST_F(Cli, InspectTellsOfWhatIsImpossibleAndTheRestRefusesIt) {
   expect_refusal("compare mm.h5 --json a.json", 3, "mm.h5: /gripper@pad_radius");
 }
 
+TEST_F(Cli, InspectTellsUnitsAndWhatIsDeclaredInJson) {
+  auto log = datasets::read_throw_log(quick);
+  log.objects.begin()->second.com_offset.reset();
+  datasets::write_throw_log(folder / "log.h5", log);
+  ASSERT_EQ(run("inspect log.h5 --json i.json").code, 0);
+  const json seen = read_json(folder / "i.json");
+  EXPECT_EQ(seen["software"]["name"], "unhand");
+  EXPECT_EQ(seen["log"], "log.h5");
+  EXPECT_EQ(seen["log_schema"], "throw-log");
+  for (const auto& [dataset, noise] : seen["noise"].items()) {
+    const json& one = seen["datasets"][dataset];
+    EXPECT_EQ(one["units"].size(), one["columns"].size()) << dataset;
+    EXPECT_EQ(one["throws"], noise["throws"]) << dataset;
+    EXPECT_FALSE(one["units"].empty()) << dataset;
+  }
+  EXPECT_EQ(seen["datasets"]["ft/wrench"]["columns"], json({"fx", "fz", "tau"}));
+  EXPECT_EQ(seen["datasets"]["ft/wrench"]["units"], json({"N", "N", "N m"}));
+  for (const auto& [name, object] : log.objects) {
+    const json& one = seen["declared_objects"][name];
+    EXPECT_EQ(one["mass_kg"], object.mass);
+    EXPECT_EQ(one["inertia_kg_m2"], *object.inertia);
+    EXPECT_EQ(one["com_offset_m"], object.com_offset ? json(*object.com_offset) : json(nullptr));
+  }
+  EXPECT_EQ(seen["gripper"]["n_pads"], log.gripper->n_pads);
+  EXPECT_EQ(seen["gripper"]["pad_radius_m"], *log.gripper->pad_radius);
+  EXPECT_THAT(run("inspect '" + flights + "' --json").out, HasSubstr("\"gripper\": null"));
+}
+
 TEST_F(Cli, InspectShowsTheColumnsThatTheFileHas) {
   write_unoriented_flights("ff.h5");
   EXPECT_THAT(run("inspect ff.h5").out, testing::ContainsRegex("mocap/pose +x,y,z +m,m,m +5 "));
