@@ -13,6 +13,7 @@
 
 #include "apps/command.hpp"
 #include "apps/interruption.hpp"
+#include "datasets/extended_log.hpp"
 #include "datasets/whole_file.hpp"
 
 namespace unhand::apps {
@@ -198,19 +199,33 @@ fs::path Outputs::add(const Wanted& wanted) {
 
 void Outputs::text(const fs::path& file, const std::string& content) { write_text(add({file}), content); }
 
-template <class Log>
-void Outputs::hdf5(const fs::path& file, const Log& log) {
+void Outputs::hdf5(const fs::path& file, const std::function<std::string()>& image) {
   const fs::path made = add({file, Wanted::log});
   try {
-    write_text(made, datasets::to_hdf5(log, file.string()));
+    write_text(made, image());
   } catch (const datasets::LogError& error) {
     refuse(file, fmt::format("{}: {}", error.path, error.reason));
   }
 }
 
-void Outputs::log(const fs::path& file, const datasets::ThrowLog& log) { hdf5(file, log); }
+void Outputs::log(const fs::path& file, const datasets::ThrowLog& log) {
+  hdf5(file, [&] { return datasets::to_hdf5(log, file.string()); });
+}
 
-void Outputs::log(const fs::path& file, const datasets::SlipLog& log) { hdf5(file, log); }
+std::vector<std::string> Outputs::log(const fs::path& file, const datasets::ThrowLog& log,
+                                      const fs::path& old) {
+  std::vector<std::string> left_out;
+  hdf5(file, [&] {
+    auto extended = datasets::to_hdf5_with_extras(log, old, file.string());
+    left_out = std::move(extended.left_out);
+    return std::move(extended.image);
+  });
+  return left_out;
+}
+
+void Outputs::log(const fs::path& file, const datasets::SlipLog& log) {
+  hdf5(file, [&] { return datasets::to_hdf5(log, file.string()); });
+}
 
 fs::path Outputs::directory(const fs::path& destination) {
   const Unbroken here;  // an interruption removes what is there

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -61,6 +62,9 @@ class Outputs {
   void json(const std::filesystem::path& file, const Json& value) { text(file, json_text(value)); }
 
   void log(const std::filesystem::path& file, const datasets::ThrowLog& log);
+  /// With what else the log `old` holds, see datasets/extended_log.hpp; returns what is left out.
+  std::vector<std::string> log(const std::filesystem::path& file, const datasets::ThrowLog& log,
+                               const std::filesystem::path& old);
   void log(const std::filesystem::path& file, const datasets::SlipLog& log);
 
   /// A directory to fill; commit() moves what it holds to `destination`, which may exist and keeps its other
@@ -74,8 +78,8 @@ class Outputs {
     std::filesystem::path made;
     Wanted destination;
   };
-  template <class Log>
-  void hdf5(const std::filesystem::path& file, const Log& log);
+  /// `image`: the bytes.
+  void hdf5(const std::filesystem::path& file, const std::function<std::string()>& image);
   std::filesystem::path part_of(const std::filesystem::path& destination);
   /// Where to make it.
   std::filesystem::path add(const Wanted& wanted);
