@@ -185,7 +185,10 @@ Command figure_command(Parser& root) {
       .option("--card", options->request.cards,
               "A model card: its parameters are used for its model; may be repeated")
       .one_value_each();
-  parser.option("--out", options->out, "Directory for NAME.png, NAME.pdf, NAME.dat and NAME.gp")
+  parser
+      .option("--out", options->out,
+              "Directory for NAME.png, NAME.pdf, NAME.dat and NAME.gp, with _ in the place of - in NAME")
+      .not_empty()
       .with_default();
   parser.option("--json", options->json, "Write the names of the figures as JSON");
   add_threads(parser, options->request.threads);

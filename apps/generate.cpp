@@ -156,7 +156,9 @@ Command generate_command(Parser& root) {
       .option("CAMPAIGN", options->campaign,
               fmt::format("Which campaign: {}", fmt::join(experiment::campaign_names(), ", ")))
       .required();
-  parser.option("--out", options->out, "The throw log to write (replaced if it exists)").required();
+  parser.option("--out", options->out, "The throw log to write (replaced if it exists)")
+      .required()
+      .not_empty();
   parser.option("--seed", options->seed, "Seed of everything random; the same seed gives the same log")
       .with_default();
   parser

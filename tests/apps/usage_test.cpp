@@ -87,6 +87,8 @@ TEST_F(Cli, WrongUsage) {
   expect_refusal("compare " + quick + " --models sliding_pivot,wishful", 2, "wishful");
   expect_refusal("compare " + quick + " --models sliding_pivot,sliding_pivot", 2, "twice");
   expect_refusal("compare " + quick + " --rtol 7", 2, "rtol");
+  expect_refusal("generate quick12 --out ''", 2, "--out: '' names no file");
+  expect_refusal("figure mae --out ''", 2, "--out: '' names no file");
   expect_refusal("compare " + quick + " --rtol nan", 2, "finite");
 }
 
@@ -408,6 +410,7 @@ TEST_F(Cli, FigureDrawsWhatIsAskedFor) {
        {"landing_errors", "conditions", "mae", "modes", "wrench", "pivot", "phase", "flight"})
     for (const char* ending : {".png", ".pdf", ".dat", ".gp"})
       EXPECT_TRUE(fs::exists(folder / "f" / (std::string(name) + ending))) << name << ending;
+  EXPECT_THAT(run("figure --help").out, HasSubstr("with _ in the place of - in NAME"));
   expect_refusal("figure portrait --log " + quick + " --out g", 2, "landing-errors");
   EXPECT_THAT(content(folder / "f/mae.gp"), HasSubstr("over the 4 held-out throws"));
   for (const char* name : {"modes", "wrench", "pivot", "phase", "flight"})
