@@ -214,13 +214,9 @@ void Outputs::log(const fs::path& file, const datasets::ThrowLog& log) {
 
 std::vector<std::string> Outputs::log(const fs::path& file, const datasets::ThrowLog& log,
                                       const fs::path& old) {
-  std::vector<std::string> left_out;
-  hdf5(file, [&] {
-    auto extended = datasets::to_hdf5_with_extras(log, old, file.string());
-    left_out = std::move(extended.left_out);
-    return std::move(extended.image);
-  });
-  return left_out;
+  auto extended = datasets::to_hdf5_with_extras(log, old, file.string());  // LogErrors are the old file's
+  hdf5(file, [&] { return std::move(extended.image); });
+  return std::move(extended.left_out);
 }
 
 void Outputs::log(const fs::path& file, const datasets::SlipLog& log) {
