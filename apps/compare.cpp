@@ -163,9 +163,9 @@ void compare_releases(const CompareRequest& request, const datasets::ThrowLog& l
 
 void compare(const CompareRequest& request) {
   require_models(request.models);
-  require_writable(request.json, request.inputs());
-  require_writable_directory(request.report);
-  require_writable_directory(request.write_cards);
+  require_outputs(
+      {{request.json}, {request.report, Wanted::directory}, {request.write_cards, Wanted::directory}},
+      request.inputs());
   if (!request.report.empty()) require_gnuplot();
   if (datasets::read_schema_name(request.log) == "slip-log") {
     for (const auto& model : request.models)

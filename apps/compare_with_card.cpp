@@ -22,7 +22,7 @@ Json json_of(const NamedErrors& errors) {
 }
 
 std::string value_of(const NamedErrors& errors, std::size_t k) {
-  return k < errors.size() ? fmt::format("{:.4g}", errors[k].second) : "";
+  return k < errors.size() ? error_text(errors[k].second) : "";
 }
 
 }  // namespace

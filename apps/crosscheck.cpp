@@ -278,7 +278,7 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
     refuse_options(parser, {"--steps", "--pads", "--friction", "--rings"}, "cvode integrates the models");
   if (options.engine == "patch")
     refuse_options(parser, {"--pads", "--friction"}, "of bullet; patch has points with bristles");
-  require_writable(options.json, {options.log, options.card});
+  require_outputs({{options.json}}, {options.log, options.card});
   auto known = contact::contact_model_names();
   std::erase(known, contact::kGripperDelay);  // it has no pads that another engine could be given
   for (const auto& model : options.models)

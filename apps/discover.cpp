@@ -143,12 +143,8 @@ void forget(const std::vector<std::string>& ids, fitting::DiscoverOptions& reque
 }
 
 void discover(const DiscoverOptions& options, const Parser& parser) {
-  require_writable(options.json, {options.log});
-  require_writable(options.card, {options.log});
-  if (!options.report.empty()) {
-    require_writable_directory(options.report);
-    require_gnuplot();
-  }
+  require_outputs({{options.json}, {options.card}, {options.report, Wanted::directory}}, {options.log});
+  if (!options.report.empty()) require_gnuplot();
   const std::string command = command_of(options, parser);
   if (const auto kind = measured_kind(options.log)) {
     refuse_options(parser, {"--matters", "--rtol"}, "only throws from a hand are judged and integrated so");

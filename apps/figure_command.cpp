@@ -117,8 +117,7 @@ const std::vector<Kind>& kinds() {
 
 void figure(const FigureCommandOptions& options) {
   require_gnuplot();
-  require_writable_directory(options.out);
-  require_writable(options.json);
+  require_outputs({{options.out, Wanted::directory}, {options.json}}, options.request.inputs());
   const auto kind =
       std::find_if(kinds().begin(), kinds().end(), [&](const Kind& k) { return options.name == k.name; });
   if (kind == kinds().end() && options.name != "all") {
@@ -186,7 +185,10 @@ Command figure_command(Parser& root) {
       .option("--card", options->request.cards,
               "A model card: its parameters are used for its model; may be repeated")
       .one_value_each();
-  parser.option("--out", options->out, "Directory for NAME.png, NAME.pdf, NAME.dat and NAME.gp")
+  parser
+      .option("--out", options->out,
+              "Directory for NAME.png, NAME.pdf, NAME.dat and NAME.gp, with _ in the place of - in NAME")
+      .not_empty()
       .with_default();
   parser.option("--json", options->json, "Write the names of the figures as JSON");
   add_threads(parser, options->request.threads);

@@ -160,9 +160,7 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
 
 void fit(const FitRequest& request, const Parser& parser) {
   require_names(request);
-  require_writable(request.json, {request.log});
-  require_writable(request.card, {request.log});
-  require_writable_directory(request.report);
+  require_outputs({{request.json}, {request.card}, {request.report, Wanted::directory}}, {request.log});
   const bool surface = among(surface_names(), request.model);
   if (datasets::read_schema_name(request.log) == "slip-log") {
     if (!surface)

@@ -98,7 +98,7 @@ void tell_idle_effects(const experiment::CampaignDesign& design, const GenerateO
 
 void generate(const GenerateOptions& options) {
   const auto design = design_of(options);
-  for (const std::string& file : {options.out, options.json, options.truth}) require_writable(file);
+  require_outputs({{options.out, Wanted::log}, {options.json}, {options.truth}});
   auto throws = simulate(design, options);
   tell_idle_effects(design, options, throws);
   Outputs outputs;
@@ -156,7 +156,9 @@ Command generate_command(Parser& root) {
       .option("CAMPAIGN", options->campaign,
               fmt::format("Which campaign: {}", fmt::join(experiment::campaign_names(), ", ")))
       .required();
-  parser.option("--out", options->out, "The throw log to write (replaced if it exists)").required();
+  parser.option("--out", options->out, "The throw log to write (replaced if it exists)")
+      .required()
+      .not_empty();
   parser.option("--seed", options->seed, "Seed of everything random; the same seed gives the same log")
       .with_default();
   parser

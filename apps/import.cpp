@@ -175,9 +175,9 @@ void import(ImportOptions& options) {
           fmt::format("--cube-side, --cube-mass and --cube-inertia are not for {}", options.format));
     if (format.read != &import_pushes && options.another_block())
       throw WrongUsage(fmt::format("--block-outline and --block-mass are not for {}", options.format));
-    require_writable(options.out);
-    require_writable(options.json);
-    Outputs outputs{{options.inputs.begin(), options.inputs.end()}};
+    const std::vector<std::filesystem::path> inputs(options.inputs.begin(), options.inputs.end());
+    require_outputs({{options.out, Wanted::log}, {options.json}}, inputs);
+    Outputs outputs{inputs};
     const Imported imported = format.read(options, outputs);
     if (!options.json.empty()) {
       Json report = json_head("import");

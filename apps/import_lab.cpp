@@ -440,7 +440,13 @@ LabImport import_lab(const std::string& format, const std::vector<std::string>& 
       log.title += ", " + format;
   }
   datasets::validate(log, out);
-  outputs.log(out, log);
+  if (adding) {
+    for (const std::string& path : outputs.log(out, log, options.into))
+      imported.notes.push_back(
+          fmt::format("{}: {}: not in {}: it refers to other objects of its file", options.into, path, out));
+  } else {
+    outputs.log(out, log);
+  }
   const auto train = std::count_if(log.throws.begin(), log.throws.end(),
                                    [](const Throw& one) { return one.split == datasets::Split::train; });
   const auto test = static_cast<std::ptrdiff_t>(log.throws.size()) - train;

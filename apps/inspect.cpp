@@ -44,17 +44,10 @@ Table groups_of(const datasets::LogSummary& summary) {
   return table;
 }
 
-auto row_of(const std::vector<datasets::LayoutRow>& layout, const std::string& dataset) {
-  return std::ranges::find_if(
-      layout, [&](const auto& r) { return r.path == dataset || r.path.ends_with("/" + dataset); });
-}
-
 /// Columns, units, declared noise and scatter of every dataset that the log holds.
 Table datasets_of(const datasets::LogSummary& summary) {
   Table table{{"dataset", "columns", "units", "throws", "declared sigma", "scatter"}, {}, 6};
-  const auto layout = datasets::throw_log_layout(summary.dimension);
   for (const auto& noise : summary.noise) {
-    const auto row = row_of(layout, noise.dataset);
     std::string sigma;
     for (std::size_t j = 0; j < noise.lowest.size(); ++j)
       sigma += (j > 0 ? ", " : "") + range(noise.lowest[j], noise.highest[j]);
@@ -63,8 +56,7 @@ Table datasets_of(const datasets::LogSummary& summary) {
     std::string scatter;
     for (std::size_t j = 0; j < noise.scatter.size(); ++j)
       scatter += fmt::format("{}{:.3g}", j > 0 ? ", " : "", noise.scatter[j]);
-    table.rows.push_back({noise.dataset, row == layout.end() ? "" : row->columns,
-                          row == layout.end() ? "" : row->units, fmt::to_string(noise.throws),
+    table.rows.push_back({noise.dataset, noise.columns, noise.units, fmt::to_string(noise.throws),
                           sigma.empty() ? "-" : sigma, scatter.empty() ? "-" : scatter});
   }
   return table;
@@ -81,10 +73,8 @@ std::vector<std::string> names_of(const std::string& columns, std::size_t count)
 /// What the samples say against the declared noise, a line each.
 std::string noise_doubts(const datasets::LogSummary& summary) {
   std::string out;
-  const auto layout = datasets::throw_log_layout(summary.dimension);
   for (const auto& noise : summary.noise) {
-    const auto row = row_of(layout, noise.dataset);
-    const auto names = names_of(row == layout.end() ? "" : row->columns, noise.ratio.size());
+    const auto names = names_of(noise.columns, noise.ratio.size());
     std::string columns;
     for (std::size_t j = 0; j < noise.too_small.size(); ++j)
       if (noise.too_small[j])
@@ -104,6 +94,33 @@ std::string noise_doubts(const datasets::LogSummary& summary) {
   return out;
 }
 
+/// What the log says of objects and gripper; null where it says nothing.
+void add_declared(Json& json, const datasets::ThrowLog& log) {
+  const auto json_of = [](const auto& value) { return value ? Json(*value) : Json(nullptr); };
+  Json& objects = json["declared_objects"] = Json::object();
+  for (const auto& [name, object] : log.objects)
+    objects[name] = {{"mass_kg", object.mass},
+                     {"inertia_kg_m2", json_of(object.inertia)},
+                     {"com_offset_m", json_of(object.com_offset)},
+                     {"dims_m", json_of(object.dims)},
+                     {"surface", json_of(object.surface)},
+                     {"sku", json_of(object.sku)},
+                     {"drag_k_1_m", json_of(object.drag_k)}};
+  json["gripper"] = nullptr;
+  if (log.gripper)
+    json["gripper"] = {{"n_pads", log.gripper->n_pads},
+                       {"pad_radius_m", json_of(log.gripper->pad_radius)},
+                       {"opening_command_time_s", json_of(log.gripper->opening_command_time)}};
+}
+
+/// What the JSON of both kinds of logs begins with.
+Json head_of(const std::string& file, const std::string& log_schema) {
+  Json json = json_head("inspect");
+  json["log"] = std::filesystem::path(file).filename().string();
+  json["log_schema"] = log_schema;
+  return json;
+}
+
 Inspection inspect_throws(const std::string& file) {
   const auto log = datasets::read_throw_log(file);
   const auto summary = datasets::summarise(log);
@@ -121,6 +138,13 @@ Inspection inspect_throws(const std::string& file) {
                                 j + 1 == object.inertia->size() ? " kg m^2" : "");
     if (object.com_offset) out.text += fmt::format(", CoM offset {} m", *object.com_offset);
     if (object.drag_k) out.text += fmt::format(", drag {} 1/m", *object.drag_k);
+    out.text += "\n";
+  }
+  if (log.gripper) {
+    out.text += fmt::format("  gripper: {}", plural(static_cast<std::size_t>(log.gripper->n_pads), "pad"));
+    if (log.gripper->pad_radius) out.text += fmt::format(", radius {} m", *log.gripper->pad_radius);
+    if (log.gripper->opening_command_time)
+      out.text += fmt::format(", told to open at {} s", *log.gripper->opening_command_time);
     out.text += "\n";
   }
   const std::size_t landed = static_cast<std::size_t>(
@@ -146,7 +170,9 @@ Inspection inspect_throws(const std::string& file) {
         "note: {} of {} throws have no hand and are held at first, and no free_flight says from when on they "
         "fly: neither a release nor a flight can be predicted from them\n",
         n, log.throws.size());
-  Json json = Json::parse(datasets::to_json(summary));
+  Json json = head_of(file, "throw-log");
+  json.update(Json::parse(datasets::to_json(summary)));
+  add_declared(json, log);
   json["impossible_times"] = Json::array();
   for (const auto& note : experiment::impossible_times(log)) {
     out.text += fmt::format("note: {}\n", note.in_words(log.throws.size()));
@@ -164,8 +190,7 @@ Inspection inspect_throws(const std::string& file) {
 Inspection inspect_slips(const std::string& file) {
   const auto log = datasets::read_slip_log(file);
   Inspection out;
-  Json json = json_head("inspect");
-  json["log_schema"] = "slip-log";
+  Json json = head_of(file, "slip-log");
   Json& surfaces = json["surfaces"] = Json::object();
   Table table{
       {"surface", "mass [kg]", "length [m]", "slips", "train", "test", "samples", "rate [Hz]"}, {}, 1};
@@ -207,7 +232,7 @@ Inspection inspect_slips(const std::string& file) {
 
 void inspect(InspectOptions options) {
   if (options.json == "-") options.json.clear();  // the standard output, as without a name
-  require_writable(options.json);
+  require_outputs({{options.json}}, {options.log});
   const Inspection seen = datasets::read_schema_name(options.log) == "slip-log" ? inspect_slips(options.log)
                                                                                 : inspect_throws(options.log);
   if (options.json_wanted && options.json.empty()) {
@@ -229,9 +254,10 @@ Command inspect_command(Parser& root) {
   Parser& parser =
       root.subcommand("inspect", "Show what is in a log: units, rates, gaps, noise, schema errors");
   parser.option("LOG", options->log, "A throw log or slip log").required();
-  const Option json =
-      parser.option("--json", options->json, "Write it as JSON; without a file name, JSON on stdout")
-          .expected(0, 1);
+  const Option json = parser
+                          .option("--json", options->json,
+                                  "Write it as JSON; without a file name, JSON on stdout (then after LOG)")
+                          .expected(0, 1);
   add_threads(parser, options->threads);
   parser.footer("Examples:\n  unhand inspect campaign.h5\n  unhand inspect campaign.h5 --json campaign.json");
   return {&parser, [options, json] {

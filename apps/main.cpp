@@ -50,7 +50,9 @@ int main(int argc, char** argv) {
               "unhand " UNHAND_VERSION};
   root.require_subcommand();
   root.footer(
-      "Exit codes: 0 done, 1 the computation could not answer, 2 wrong usage, 3 bad input.\n"
+      "Exit codes: 0 done, 1 the computation could not answer or its output cannot be written, 2 wrong "
+      "usage,\n"
+      "3 bad input.\n"
       "Existing outputs are replaced, each at once, and only if everything succeeded.");
   const std::array commands{generate_command(root), import_command(root),    inspect_command(root),
                             compare_command(root),  fit_command(root),       predict_command(root),

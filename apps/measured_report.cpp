@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "apps/figure.hpp"
 #include "apps/ranking.hpp"
@@ -16,7 +17,7 @@ using fitting::NamedErrors;
 
 std::string value_of(const NamedErrors& errors, const std::string& name) {
   for (const auto& [key, value] : errors)
-    if (key == name) return fmt::format("{:.4g}", value);
+    if (key == name) return error_text(value);
   return "";
 }
 
@@ -101,6 +102,8 @@ Figure footprints_of(const MeasuredDiscovery& found) {
 }
 
 }  // namespace
+
+std::string error_text(double value) { return std::isfinite(value) ? fmt::format("{:.4g}", value) : "-"; }
 
 std::string measured_text(const MeasuredResult& result) {
   const MeasuredDiscovery& found = result.answer;

@@ -20,6 +20,8 @@ struct MeasuredResult {
 
 /// discovery.json, schema "discovery" version 1.
 Json measured_json(const MeasuredResult& result);
+/// One of NamedErrors; "-" where it was not measured.
+std::string error_text(double value);
 std::string measured_text(const MeasuredResult& result);
 /// Residuals over the share of the duration, a panel for each channel: of the base model and of an answer,
 /// with what the key calls them.

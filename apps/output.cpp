@@ -13,6 +13,7 @@
 
 #include "apps/command.hpp"
 #include "apps/interruption.hpp"
+#include "datasets/extended_log.hpp"
 #include "datasets/whole_file.hpp"
 
 namespace unhand::apps {
@@ -82,7 +83,65 @@ void require_other_than(const std::vector<fs::path>& inputs, const fs::path& des
       throw WrongUsage(fmt::format("{} is read: it cannot be an output too", destination.string()));
 }
 
+/// Its signature is at 0, 512, 1024, 2048, ...
+bool is_hdf5(const fs::path& file) {
+  constexpr std::string_view signature = "\x89HDF\r\n\x1a\n";
+  std::ifstream in(file, std::ios::binary);
+  std::string there(signature.size(), '\0');
+  for (std::streamoff at = 0; in.seekg(at) && in.read(there.data(), std::ssize(there));
+       at = at == 0 ? 512 : 2 * at)
+    if (there == signature) return true;
+  return false;
+}
+
+void require_file(const Wanted& wanted, const std::vector<fs::path>& inputs) {
+  const fs::path& file = wanted.path;
+  if (file == "-") throw WrongUsage("'-' names no file, and outputs are files: ./- for one of that name");
+  std::error_code error;
+  if (fs::is_directory(file, error)) refuse(file, "it is a directory");
+  if (fs::exists(file, error) && !fs::is_regular_file(file, error)) refuse(file, "it is no regular file");
+  if (fs::is_symlink(file, error) && !fs::exists(file, error))
+    refuse(file, "it is a link that leads nowhere");
+  require_directory(file, parent_of(file));
+  require_other_than(inputs, file);
+  if (wanted.what != Wanted::log && is_hdf5(file))
+    throw WrongUsage(
+        fmt::format("{} is an HDF5 file, which only a log may replace; if it is to be read: --json takes the "
+                    "next word as its file, so write --json=FILE, or {} before it",
+                    file.string(), file.string()));
+}
+
+void require_one(const Wanted& wanted, const std::vector<fs::path>& inputs) {
+  if (wanted.path.empty()) return;
+  if (wanted.what == Wanted::directory)
+    require_directory(wanted.path, nearest_existing(trimmed(wanted.path)));
+  else
+    require_file(wanted, inputs);
+}
+
+/// However it is spelt.
+fs::path one_spelling(const fs::path& path) {
+  std::error_code error;
+  return fs::weakly_canonical(fs::absolute(trimmed(path), error), error);  // alone, it leaves "a" as it is
+}
+
+void require_apart(const Wanted& first, const Wanted& second) {
+  if (first.path.empty() || second.path.empty()) return;
+  const fs::path one = one_spelling(first.path), other = one_spelling(second.path);
+  if (one == other) throw WrongUsage(fmt::format("two outputs are to be {}", second.path.string()));
+  if ((first.what != Wanted::directory && is_below(other, one)) ||
+      (second.what != Wanted::directory && is_below(one, other)))
+    throw WrongUsage(fmt::format("{} and {}: one output is to be a file, the other one below it",
+                                 first.path.string(), second.path.string()));
+}
+
 }  // namespace
+
+void require_outputs(const std::vector<Wanted>& outputs, const std::vector<fs::path>& inputs) {
+  for (std::size_t i = 0; i < outputs.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) require_apart(outputs[j], outputs[i]);
+  for (const Wanted& one : outputs) require_one(one, inputs);
+}
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 Json number(const std::optional<double>& value) { return value ? number(*value) : Json(nullptr); }
@@ -126,52 +185,47 @@ fs::path Outputs::part_of(const fs::path& destination) {
   return nearest_existing(parent_of(destination)) / name;
 }
 
-void Outputs::require_other_than_inputs(const fs::path& destination) const {
-  require_other_than(inputs_, destination);
-}
-
-fs::path Outputs::add(const fs::path& wanted, bool is_directory) {
+fs::path Outputs::add(const Wanted& wanted) {
+  require_one(wanted, inputs_);
+  for (const Part& part : parts_) require_apart(part.destination, wanted);
   std::error_code error;
-  const fs::path destination = fs::is_symlink(wanted, error) ? fs::weakly_canonical(wanted, error) : wanted;
-  if (!is_directory) require_other_than_inputs(destination);
-  for (const Part& part : parts_) {
-    const fs::path one = fs::weakly_canonical(part.destination, error),
-                   other = fs::weakly_canonical(destination, error);
-    if (one == other) throw WrongUsage(fmt::format("two outputs are to be {}", wanted.string()));
-    if ((!part.is_directory && is_below(other, one)) || (!is_directory && is_below(one, other)))
-      throw WrongUsage(fmt::format("{} and {}: one output is to be a file, the other one below it",
-                                   part.destination.string(), wanted.string()));
-  }
+  const fs::path destination =
+      fs::is_symlink(wanted.path, error) ? fs::weakly_canonical(wanted.path, error) : wanted.path;
   remove_leftovers(nearest_existing(parent_of(destination)), destination.filename().string());
-  parts_.push_back({part_of(destination), destination, is_directory});
+  parts_.push_back({part_of(destination), {destination, wanted.what}});
   remove_if_interrupted(parts_.back().made);
   return parts_.back().made;
 }
 
-void Outputs::text(const fs::path& file, const std::string& content) {
-  require_writable(file);
-  write_text(add(file, false), content);
-}
+void Outputs::text(const fs::path& file, const std::string& content) { write_text(add({file}), content); }
 
-template <class Log>
-void Outputs::hdf5(const fs::path& file, const Log& log) {
-  require_writable(file);
+void Outputs::hdf5(const fs::path& file, const std::function<std::string()>& image) {
+  const fs::path made = add({file, Wanted::log});
   try {
-    text(file, datasets::to_hdf5(log, file.string()));
+    write_text(made, image());
   } catch (const datasets::LogError& error) {
     refuse(file, fmt::format("{}: {}", error.path, error.reason));
   }
 }
 
-void Outputs::log(const fs::path& file, const datasets::ThrowLog& log) { hdf5(file, log); }
+void Outputs::log(const fs::path& file, const datasets::ThrowLog& log) {
+  hdf5(file, [&] { return datasets::to_hdf5(log, file.string()); });
+}
 
-void Outputs::log(const fs::path& file, const datasets::SlipLog& log) { hdf5(file, log); }
+std::vector<std::string> Outputs::log(const fs::path& file, const datasets::ThrowLog& log,
+                                      const fs::path& old) {
+  auto extended = datasets::to_hdf5_with_extras(log, old, file.string());  // LogErrors are the old file's
+  hdf5(file, [&] { return std::move(extended.image); });
+  return std::move(extended.left_out);
+}
+
+void Outputs::log(const fs::path& file, const datasets::SlipLog& log) {
+  hdf5(file, [&] { return datasets::to_hdf5(log, file.string()); });
+}
 
 fs::path Outputs::directory(const fs::path& destination) {
-  require_writable_directory(destination);
-  const fs::path wanted = trimmed(destination);
   const Unbroken here;  // an interruption removes what is there
-  const fs::path made = add(wanted, true);
+  const fs::path made = add({trimmed(destination), Wanted::directory});
   std::error_code error;
   if (!fs::create_directory(made, error) || error) refuse(destination, error.message());
   return made;
@@ -180,44 +234,30 @@ fs::path Outputs::directory(const fs::path& destination) {
 void Outputs::commit() {
   const Unbroken here;  // all or none
   std::error_code error;
-  std::vector<std::pair<fs::path, fs::path>> moves;  // from, to
+  std::vector<Part> moves;
   for (const Part& part : parts_) {
-    if (!part.is_directory) {
-      moves.emplace_back(part.made, part.destination);
+    const fs::path& destination = part.destination.path;
+    if (part.destination.what != Wanted::directory) {
+      moves.push_back(part);
       continue;
     }
-    fs::create_directories(part.destination, error);
-    if (error) refuse(part.destination, error.message());
+    fs::create_directories(destination, error);
+    if (error) refuse(destination, error.message());
     for (const auto& entry : fs::directory_iterator(part.made))
-      moves.emplace_back(entry.path(), part.destination / entry.path().filename());
+      moves.push_back({entry.path(), {destination / entry.path().filename()}});
   }
   for (const auto& [from, to] : moves) {  // all that is known to fail, before the first one is in place
-    require_other_than_inputs(to);
-    if (!fs::is_directory(from, error)) require_writable(to);
+    if (fs::is_directory(from, error))
+      require_other_than(inputs_, to.path);
+    else
+      require_file(to, inputs_);
   }
-  for (const auto& [from, to] : moves) put_in_place(from, to);
+  for (const auto& [from, to] : moves) put_in_place(from, to.path);
   for (const Part& part : parts_) {
-    if (part.is_directory) fs::remove(part.made, error);
+    if (part.destination.what == Wanted::directory) fs::remove(part.made, error);
     keep_if_interrupted(part.made);
   }
   parts_.clear();
-}
-
-void require_writable(const fs::path& file, const std::vector<fs::path>& inputs) {
-  if (file.empty()) return;
-  if (file == "-") throw WrongUsage("'-' names no file, and outputs are files: ./- for one of that name");
-  std::error_code error;
-  if (fs::is_directory(file, error)) refuse(file, "it is a directory");
-  if (fs::exists(file, error) && !fs::is_regular_file(file, error)) refuse(file, "it is no regular file");
-  if (fs::is_symlink(file, error) && !fs::exists(file, error))
-    refuse(file, "it is a link that leads nowhere");
-  require_directory(file, parent_of(file));
-  require_other_than(inputs, file);
-}
-
-void require_writable_directory(const fs::path& directory) {
-  if (directory.empty()) return;
-  require_directory(directory, nearest_existing(trimmed(directory)));
 }
 
 void remove_leftovers(const fs::path& directory, const std::string& file_name) {

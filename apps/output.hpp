@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -30,11 +31,24 @@ void write_text(const std::filesystem::path& file, const std::string& content);
 /// what the disk says of another one there, and below it what the program `said`.
 void require_whole(const std::filesystem::path& file, const std::string& ending, const std::string& said);
 
+/// What a run is to leave.
+struct Wanted {
+  enum What { file, log, directory };
+  std::filesystem::path path;  // empty where nothing is wanted
+  What what = file;
+};
+
+/// Finds out before the work begins what cannot be written: no directory to write it in, or something that is
+/// no regular file in its place; a directory need not exist yet. Throws Unanswered, and WrongUsage for "-",
+/// which elsewhere stands for the standard output, for one of `inputs`, which the run reads, for an HDF5 file
+/// that something else than a log would replace, and for two that are one file, or one below the other.
+void require_outputs(const std::vector<Wanted>& outputs,
+                     const std::vector<std::filesystem::path>& inputs = {});
+
 /// The files and directories that one run leaves. Everything is made beside its destination first; commit()
 /// then renames, replacing files of the same names; behind a symbolic link, the file that it leads to.
-/// Without commit() nothing stays, nor after an interruption (apps/interruption.hpp). Throws Unanswered where
-/// something cannot be written, and WrongUsage for an output that is an input, the same as another output, or
-/// below one that is a file.
+/// Without commit() nothing stays, nor after an interruption (apps/interruption.hpp). Throws as
+/// require_outputs does.
 class Outputs {
  public:
   Outputs() = default;
@@ -48,6 +62,9 @@ class Outputs {
   void json(const std::filesystem::path& file, const Json& value) { text(file, json_text(value)); }
 
   void log(const std::filesystem::path& file, const datasets::ThrowLog& log);
+  /// With what else the log `old` holds, see datasets/extended_log.hpp; returns what is left out.
+  std::vector<std::string> log(const std::filesystem::path& file, const datasets::ThrowLog& log,
+                               const std::filesystem::path& old);
   void log(const std::filesystem::path& file, const datasets::SlipLog& log);
 
   /// A directory to fill; commit() moves what it holds to `destination`, which may exist and keeps its other
@@ -58,27 +75,18 @@ class Outputs {
 
  private:
   struct Part {
-    std::filesystem::path made, destination;
-    bool is_directory{};
+    std::filesystem::path made;
+    Wanted destination;
   };
-  template <class Log>
-  void hdf5(const std::filesystem::path& file, const Log& log);
+  /// `image`: the bytes.
+  void hdf5(const std::filesystem::path& file, const std::function<std::string()>& image);
   std::filesystem::path part_of(const std::filesystem::path& destination);
-  void require_other_than_inputs(const std::filesystem::path& destination) const;
-  /// Where to make what goes to `destination`.
-  std::filesystem::path add(const std::filesystem::path& destination, bool is_directory);
+  /// Where to make it.
+  std::filesystem::path add(const Wanted& wanted);
 
   std::vector<std::filesystem::path> inputs_;
   std::vector<Part> parts_;
 };
-
-/// Finds out before the work begins that a file cannot be written there: no directory to write it in, or
-/// something that is no regular file in its place. An empty path passes. Throws Unanswered, and WrongUsage
-/// for "-", which elsewhere stands for the standard output, and for one of `inputs`, which the run reads.
-void require_writable(const std::filesystem::path& file,
-                      const std::vector<std::filesystem::path>& inputs = {});
-/// The same of a directory, which need not exist yet.
-void require_writable_directory(const std::filesystem::path& directory);
 
 /// Removes from a directory what runs that were killed left of outputs with that file name, or of any: parts
 /// of processes that no longer live.

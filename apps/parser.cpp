@@ -82,6 +82,11 @@ Option Option::positive() {
 Option Option::not_negative() {
   return option_->check(finite_number("a number >= 0", ">= 0", [](double x) { return x >= 0; })), *this;
 }
+Option Option::not_empty() {
+  return option_->check(CLI::Validator(
+             [](std::string& text) -> std::string { return text.empty() ? "'' names no file" : ""; }, "")),
+         *this;
+}
 Option Option::one_of(const std::vector<std::string>& values) {
   return option_->check(one_among(values)), *this;
 }

@@ -22,6 +22,7 @@ class Option {
   Option range(double low, double high);
   Option positive();  ///< and finite
   Option not_negative();
+  Option not_empty();
   Option one_of(const std::vector<std::string>& values);
   /// Several values in one argument, separated by commas.
   Option with_commas();

@@ -94,11 +94,8 @@ void draw_errors(const std::vector<ct::StudyThrow>& recorded,
 }
 
 void run(const PlanControlOptions& o) {
-  if (!o.report.empty()) {
-    require_gnuplot();
-    require_writable_directory(o.report);
-  }
-  require_writable(o.json);
+  if (!o.report.empty()) require_gnuplot();
+  require_outputs({{o.report, Wanted::directory}, {o.json}});
   ct::StudyOptions study;
   study.repetitions = o.repetitions;
   study.box = {o.box, o.box};

@@ -236,11 +236,8 @@ void to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs&
 }
 
 void run(const PlanElasticOptions& o) {
-  if (!o.report.empty()) {
-    require_gnuplot();
-    require_writable_directory(o.report);
-  }
-  require_writable(o.json);
+  if (!o.report.empty()) require_gnuplot();
+  require_outputs({{o.report, Wanted::directory}, {o.json}}, {o.arm});
   const el::ClutchedArm arm = el::read_clutched_arm(o.arm);
   Outputs outputs{{o.arm}};
   Json json = json_head("plan-elastic");

@@ -132,11 +132,8 @@ std::unique_ptr<fl::FlipLearner> learner_of(const PlanFlipOptions& o, const fl::
 
 void run(const PlanFlipOptions& o) {
   if (!o.card.empty() && o.learner != "m4") throw WrongUsage("--card: only --learner m4 begins from a card");
-  if (!o.report.empty()) {
-    require_gnuplot();
-    require_writable_directory(o.report);
-  }
-  require_writable(o.json);
+  if (!o.report.empty()) require_gnuplot();
+  require_outputs({{o.report, Wanted::directory}, {o.json}}, {o.sku, o.card});
   FlipAnswer answer;
   answer.learner = o.learner;
   answer.throws = o.throws;

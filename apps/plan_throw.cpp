@@ -208,11 +208,9 @@ void plan_release(ThrowAnswer& a, const Chain& pads, planners::ReleaseThrow rele
 }
 
 void plan_throw(const PlanThrowOptions& options) {
-  require_writable(options.json, {options.arm, options.card, options.sku});
-  if (!options.report.empty()) {
-    require_writable_directory(options.report);
-    require_gnuplot();
-  }
+  require_outputs({{options.json}, {options.report, Wanted::directory}},
+                  {options.arm, options.card, options.sku});
+  if (!options.report.empty()) require_gnuplot();
   const auto target = numbers<3>("--target", options.target, ',');
   const auto box = numbers<2>("--box", options.box, 'x');
   if (!(box[0] > 0 && box[1] > 0)) throw WrongUsage(fmt::format("--box: '{}' has no area", options.box));

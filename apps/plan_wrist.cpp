@@ -103,11 +103,8 @@ void draw_gain(const std::vector<Point>& points, const Point& rigid, const fs::p
 }
 
 void run(const PlanWristOptions& o) {
-  if (!o.report.empty()) {
-    require_gnuplot();
-    require_writable_directory(o.report);
-  }
-  require_writable(o.json);
+  if (!o.report.empty()) require_gnuplot();
+  require_outputs({{o.report, Wanted::directory}, {o.json}}, {o.arm});
   if (!(o.softest < o.stiffest)) throw WrongUsage("--softest must be below --stiffest");
   el::ClutchedArm arm = el::read_clutched_arm(o.arm);
   const Point rigid = solve(arm, o, el::Drive::locked);

@@ -177,8 +177,7 @@ Predictions predictions_of(const UsableCard& card, const datasets::ThrowLog& log
 }
 
 void predict(const PredictOptions& options) {
-  require_writable(options.json, {options.log, options.card});
-  require_writable(options.csv, {options.log, options.card});
+  require_outputs({{options.json}, {options.csv}}, {options.log, options.card});
   const UsableCard card = read_usable_card(options.card);
   const std::string& model = card.card.model;
   const auto log = read_throws(options.log);

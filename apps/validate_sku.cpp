@@ -44,8 +44,8 @@ void write_report(const SkuQuestion& question, const fitting::SkuValidation& ans
 void validate(ValidateSkuOptions options) {
   if (options.tolerance.size() != 2 || !(options.tolerance[0] > 0) || !(options.tolerance[1] > 0))
     throw WrongUsage("--tolerance takes two positive numbers, METRES,DEGREES: 0.05,45");
-  require_writable(options.json);
-  require_writable_directory(options.report);
+  require_outputs({{options.json}, {options.report, Wanted::directory}},
+                  {options.sku, options.card, options.log});
   if (!options.report.empty()) require_gnuplot();
   SkuQuestion question{options.sku, options.card, options.log, read_throwable_sku(options.sku), {}, {}};
   question.card = read_usable_card(options.card).card;

@@ -142,10 +142,15 @@ void Node::check_link(std::string_view name) const {
 Node Node::group(std::string_view name) const {
   note(join(path_, name));
   if (!has(name)) fail(name, "required group is missing");
+  Node out = child(name);
+  if (H5Iget_type(out.id()) != H5I_GROUP) fail(name, "is not a group");
+  return out;
+}
+
+Node Node::child(std::string_view name) const {
   check_link(name);
   Handle object = object_handle(H5Oopen(object_.id(), std::string(name).c_str(), H5P_DEFAULT));
   if (!object) fail(name, fmt::format("cannot be opened ({})", last_message()));
-  if (H5Iget_type(object.id()) != H5I_GROUP) fail(name, "is not a group");
   return {shared_, std::move(object), join(path_, name)};
 }
 

@@ -27,6 +27,7 @@ class Node {
 
   const std::string& path() const { return path_; }
   const std::string& file() const { return shared_->file; }
+  hid_t id() const { return object_.id(); }
   [[noreturn]] void fail(std::string_view name, const std::string& reason) const;
   [[noreturn]] void fail_attribute(std::string_view name, const std::string& reason) const;
 
@@ -39,6 +40,8 @@ class Node {
                        std::span<const std::string_view> attributes) const;
 
   Node group(std::string_view name) const;
+  /// A group or a dataset.
+  Node child(std::string_view name) const;
   std::string text(std::string_view attribute) const;
   long long integer(std::string_view attribute) const;
   /// A scalar or a list; integers are taken as the numbers they are. n = 0: any length.

@@ -107,7 +107,6 @@ void Output::flags(std::string_view name, const Flags& flags) const {
 }
 
 std::string image_of(const std::string& file, const std::function<void(const Output&)>& fill) {
-  const Session session;
   const auto fail = [&](const char* what) {
     throw LogError(file, "/", fmt::format("cannot be {} ({})", what, last_message()));
   };

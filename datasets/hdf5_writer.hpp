@@ -18,6 +18,7 @@ class Output {
   Output(std::string file, Handle group, std::string path)
       : file_(std::move(file)), group_(std::move(group)), path_(std::move(path)) {}
 
+  hid_t id() const { return group_.id(); }
   Output group(std::string_view name) const;
   void text(std::string_view attribute, const std::string& value) const;
   void integer(std::string_view attribute, long long value) const;
@@ -39,7 +40,7 @@ class Output {
 
 /// The bytes of a file that `fill` writes into, from its root; `file` is for messages only. It is made in
 /// memory: after a write that failed, HDF5 cannot close a file on a disk, and crashes with it when the
-/// process ends.
+/// process ends. Needs the Session of its caller.
 std::string image_of(const std::string& file, const std::function<void(const Output&)>& fill);
 
 /// Puts these bytes in the place of `file`, whole or not at all.

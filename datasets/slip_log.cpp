@@ -113,6 +113,7 @@ SlipLog read_slip_log(const std::filesystem::path& file) {
 
 std::string to_hdf5(const SlipLog& log, const std::string& file) {
   validate(log, file);
+  const hdf5::Session session;
   return hdf5::image_of(file, [&](const hdf5::Output& root) {
     root.text("schema", "slip-log");
     root.integer("schema_version", slip_log_version);

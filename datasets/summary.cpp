@@ -145,6 +145,12 @@ void add_scatter(NoiseSummary& noise, const Channel<Throw>& channel, std::vector
   }
 }
 
+std::vector<std::string> parts_of(std::string_view list) {
+  std::vector<std::string> out;
+  while (!list.empty()) out.emplace_back(next_part(list));
+  return out;
+}
+
 }  // namespace
 
 std::string held_by(const ThrowLog& log, const Throw& toss) {
@@ -184,11 +190,16 @@ LogSummary summarise(const ThrowLog& log) {
     if (channel.kind == ChannelKind::flag) continue;
     NoiseSummary noise;
     noise.dataset = std::string(channel.group) + "/" + std::string(channel.name);
+    std::size_t widest = 0;
     for (Throw& toss : throws) {
       const Slot slot = channel.slot(toss, false);
       const Series* const* series = std::get_if<Series*>(&slot);
-      if (series != nullptr && !(*series)->empty()) add(noise, **series);
+      if (series == nullptr || (*series)->empty()) continue;
+      add(noise, **series);
+      widest = std::max(widest, (*series)->cols);
     }
+    if (const ColumnLayout* layout = layout_of_width(channel.layouts(log.dimension), widest))
+      noise.columns = layout->columns, noise.units = layout->units;
     if (channel.kind != ChannelKind::time && !channel.single) add_scatter(noise, channel, throws);
     if (noise.throws > 0) out.noise.push_back(std::move(noise));
   }
@@ -221,6 +232,10 @@ std::string to_json(const LogSummary& summary) {
                        {"worst_gap_over_median_step", g.worst_gap_ratio},
                        {"worst_gap_throw", g.worst_gap_throw}};
   }
+  ordered_json& datasets = out["datasets"] = ordered_json::object();
+  for (const NoiseSummary& n : summary.noise)
+    datasets[n.dataset] = {
+        {"columns", parts_of(n.columns)}, {"units", parts_of(n.units)}, {"throws", n.throws}};
   ordered_json& noise = out["noise"] = ordered_json::object();
   for (const NoiseSummary& n : summary.noise) {
     noise[n.dataset] = {{"throws", n.throws},

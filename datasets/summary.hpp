@@ -44,6 +44,7 @@ struct GroupSummary {
 /// large, those of white noise are not). Noise that is slower than the samples does not show in it.
 struct NoiseSummary {
   std::string dataset;                   // "mocap/pose"
+  std::string columns, units;            ///< "x,z,theta" and "m,m,rad"; of the widest, where throws differ
   std::size_t throws = 0, declared = 0;  ///< that carry the dataset; that declare its noise
   std::size_t zero = 0;  ///< throws that declare 0 for a column; in series that counts as undeclared
   std::vector<double> lowest, highest;  ///< 1 σ by column, SI units

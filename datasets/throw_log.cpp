@@ -7,7 +7,9 @@
 #include <set>
 
 #include "datasets/channel_rules.hpp"
+#include "datasets/extended_log.hpp"
 #include "datasets/hdf5_apart.hpp"
+#include "datasets/hdf5_extras.hpp"
 #include "datasets/hdf5_reader.hpp"
 #include "datasets/hdf5_writer.hpp"
 #include "datasets/parse_log.hpp"
@@ -110,6 +112,56 @@ constexpr auto bring_throw_log = [](auto& pipe, ThrowLog& log) {
   });
 };
 
+/// The log with the times of its file, checked; in `moved` where they are others.
+const ThrowLog& as_in_file(const ThrowLog& log, const std::string& file, std::optional<ThrowLog>& moved) {
+  validate(log, file);
+  if (log.clock_origin == 0) return log;
+  move_clock(moved.emplace(log), -log.clock_origin);
+  validate(*moved, file);
+  return *moved;
+}
+
+void write(const hdf5::Output& root, const ThrowLog& log) {
+  root.text("schema", "throw-log");
+  root.integer("schema_version", throw_log_version);
+  log_fields(hdf5::AttributeWriter{root}, log);
+  const hdf5::Output objects = root.group("objects");
+  for (const auto& [name, object] : log.objects) {
+    const hdf5::Output out = objects.group(name);
+    object_fields(hdf5::AttributeWriter{out}, object, log.dimension);
+  }
+  if (log.gripper) {
+    const hdf5::Output out = root.group("gripper");
+    gripper_fields(hdf5::AttributeWriter{out}, *log.gripper);
+  }
+  const hdf5::Output throws = root.group("throws");
+  for (const Throw& toss : log.throws) {
+    const hdf5::Output out = throws.group(toss.id);
+    throw_fields(hdf5::AttributeWriter{out}, toss);
+    hdf5::write_channels<Throw>(out, channels, log.dimension, toss);
+  }
+}
+
+/// Of the whole layout.
+hdf5::KnownNames known_names() {
+  const ThrowLog log;
+  const Object object_values;
+  const Gripper gripper_values;
+  const Throw throw_values;
+  hdf5::KnownNames object{"", names_of([&](auto& names) { object_fields(names, object_values, 3); }), {}};
+  hdf5::KnownNames toss{"", names_of([&](auto& names) { throw_fields(names, throw_values); }), {}};
+  for (const Channel<Throw>& channel : channels) {
+    if (toss.children.empty() || toss.children.back().name != channel.group)
+      toss.children.push_back({std::string(channel.group), {}, {}});
+    toss.children.back().children.push_back({std::string(channel.name), {"units", "sigma"}, {}});
+  }
+  return {"",
+          names_of([&](auto& names) { log_fields(names, log); }, {"schema", "schema_version"}),
+          {{"objects", {}, {std::move(object)}},
+           {"gripper", names_of([&](auto& names) { gripper_fields(names, gripper_values); }), {}},
+           {"throws", {}, {std::move(toss)}}}};
+}
+
 }  // namespace
 
 void move_clock(Throw& toss, double origin) {
@@ -169,31 +221,28 @@ ThrowLog read_throw_log(const std::filesystem::path& file) {
 }
 
 std::string to_hdf5(const ThrowLog& log, const std::string& file) {
-  validate(log, file);
-  if (log.clock_origin != 0) {
-    ThrowLog as_in_files = log;
-    move_clock(as_in_files, -log.clock_origin);
-    return to_hdf5(as_in_files, file);
-  }
-  return hdf5::image_of(file, [&](const hdf5::Output& root) {
-    root.text("schema", "throw-log");
-    root.integer("schema_version", throw_log_version);
-    log_fields(hdf5::AttributeWriter{root}, log);
-    const hdf5::Output objects = root.group("objects");
-    for (const auto& [name, object] : log.objects) {
-      const hdf5::Output out = objects.group(name);
-      object_fields(hdf5::AttributeWriter{out}, object, log.dimension);
-    }
-    if (log.gripper) {
-      const hdf5::Output out = root.group("gripper");
-      gripper_fields(hdf5::AttributeWriter{out}, *log.gripper);
-    }
-    const hdf5::Output throws = root.group("throws");
-    for (const Throw& toss : log.throws) {
-      const hdf5::Output out = throws.group(toss.id);
-      throw_fields(hdf5::AttributeWriter{out}, toss);
-      hdf5::write_channels<Throw>(out, channels, log.dimension, toss);
-    }
+  std::optional<ThrowLog> moved;
+  const ThrowLog& there = as_in_file(log, file, moved);
+  const hdf5::Session session;
+  return hdf5::image_of(file, [&](const hdf5::Output& root) { write(root, there); });
+}
+
+ExtendedLog to_hdf5_with_extras(const ThrowLog& log, const std::filesystem::path& old,
+                                const std::string& file) {
+  std::optional<ThrowLog> moved;
+  const ThrowLog& known = as_in_file(log, file, moved);
+  const auto extend = [&](const std::string& name, hdf5::Place* place) {
+    const hdf5::Node extended = hdf5::Node::open_file(name, place);
+    ExtendedLog out;
+    out.image = hdf5::image_of(file, [&](const hdf5::Output& root) {
+      write(root, known);
+      out.left_out = hdf5::take_extras(extended, root, known_names());
+    });
+    return out;
+  };
+  return hdf5::value_apart<ExtendedLog>(old.string(), extend, [](auto& pipe, ExtendedLog& out) {
+    carry(pipe, out.image);
+    carry_list(pipe, out.left_out, [&](std::string& path) { carry(pipe, path); });
   });
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <stdexcept>
@@ -195,6 +196,7 @@ GroupEquations FlightProblem::equations(std::size_t group, std::span<const std::
 
 FlightErrors flight_errors(const FlightProblem& problem, const GroupedFit& fit, int threads) {
   constexpr double kDegrees = 180 / std::numbers::pi;
+  constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
   const int positions = problem.position_channels();
   FlightErrors out;
   std::vector<std::size_t> used;
@@ -238,13 +240,15 @@ FlightErrors flight_errors(const FlightProblem& problem, const GroupedFit& fit, 
     if (one.oriented) angle.push_back(one.angle);
   }
   const auto mean_median = [](std::vector<double> x, double& mean, double& median) {
+    mean = median = kNotMeasured;
     if (x.empty()) return;
     std::sort(x.begin(), x.end());
+    mean = 0;
     median = 0.5 * (x[(x.size() - 1) / 2] + x[x.size() / 2]);
     for (const double v : x) mean += v / static_cast<double>(x.size());
   };
   out.n = static_cast<int>(used.size());
-  out.trajectory_rms = n > 0 ? std::sqrt(squares / n) : 0;
+  out.trajectory_rms = n > 0 ? std::sqrt(squares / n) : kNotMeasured;
   mean_median(std::move(position), out.end_position_mae, out.end_position_median);
   mean_median(std::move(angle), out.end_orientation_mae, out.end_orientation_median);
   out.chi2_per_dof = fit.chi2_per_dof();

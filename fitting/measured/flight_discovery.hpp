@@ -45,12 +45,12 @@ class FlightProblem final : public GroupedProblem {
 };
 
 /// Errors of the flights of a split: `fit` holds the shared parameters and the own unknowns of whole flights;
-/// predictions at the end have the start fitted to the first half of the samples.
+/// predictions at the end have the start fitted to the first half of the samples. NaN: not measured.
 struct FlightErrors {
   int n{};                                                 ///< flights
   double trajectory_rms{};                                 ///< [m]
   double end_position_mae{}, end_position_median{};        ///< [m]
-  double end_orientation_mae{}, end_orientation_median{};  ///< [deg]; 0 where orientation was not tracked
+  double end_orientation_mae{}, end_orientation_median{};  ///< [deg]
   double chi2_per_dof{};                                   ///< 1 is the noise
 };
 /// The errors over the flights that `fit` used.

@@ -13,7 +13,7 @@
 
 namespace unhand::fitting {
 
-/// An error of a model, with its unit in the name ("trajectory_rms_m").
+/// An error of a model, with its unit in the name ("trajectory_rms_m"); NaN where it was not measured.
 using NamedErrors = std::vector<std::pair<std::string, double>>;
 
 class FlightProblem;

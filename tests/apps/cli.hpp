@@ -140,6 +140,19 @@ class Cli : public testing::Test {
     datasets::write_throw_log(file, log);
   }
 
+  /// The same without orientations.
+  void write_unoriented_flights(const std::string& name) const {
+    auto log = datasets::read_throw_log(flights);
+    for (auto& one : log.throws) {
+      datasets::Series& pose = one.mocap->pose;
+      datasets::Series positions{pose.rows, 3, {}, {1e-4, 2e-4, 3e-4}};
+      for (std::size_t i = 0; i < pose.rows; ++i)
+        for (std::size_t j = 0; j < 3; ++j) positions.data.push_back(pose(i, j));
+      pose = std::move(positions);
+    }
+    datasets::write_throw_log(folder / name, log);
+  }
+
   static inline fs::path shared;
   fs::path folder;
   std::string quick, flights;

@@ -380,6 +380,27 @@ TEST_F(Cli, FreeFlights) {
   EXPECT_GT(fs::file_size(folder / "r/residuals_projectile.png"), 0u);
 }
 
+// What was not tracked has no error, in the loop as in the comparison.
+TEST_F(Cli, FlightsWithoutOrientationHaveNoErrorOfIt) {
+  write_unoriented_flights("ff.h5");
+  const Answer found = run("discover ff.h5 --json d.json --card c.json");
+  ASSERT_EQ(found.code, 0) << found.err;
+  const Answer compared = run("compare ff.h5 --card c.json --json x.json");
+  ASSERT_EQ(compared.code, 0) << compared.err;
+  const json d = read_json(folder / "d.json")["error"], x = read_json(folder / "x.json");
+  for (const json* split : {&d["before"], &d["after"], &x["base"], &x["with_card"]})
+    for (const char* half : {"train", "test"}) {
+      const json& errors = (*split)[half];
+      EXPECT_TRUE(errors["end_orientation_mae_deg"].is_null()) << errors;
+      EXPECT_TRUE(errors["end_orientation_median_deg"].is_null()) << errors;
+      EXPECT_TRUE(errors["end_position_mae_m"].is_number()) << errors;
+    }
+  for (const Answer* one : {&found, &compared})
+    for (const char* name : {"mae", "median"})
+      EXPECT_THAT(one->out,
+                  testing::ContainsRegex(std::string("end_orientation_") + name + "_deg +- +- +- +-"));
+}
+
 TEST_F(Cli, ACardOfFlightsIsShownInAFigure) {
   std::ofstream(folder / "card.json")
       << R"({"schema": "model-card", "schema_version": 1, "model": "projectile",

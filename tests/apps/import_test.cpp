@@ -1,5 +1,6 @@
 // import: a lab's own files and phones.
 #include "tests/apps/cli.hpp"
+#include "tests/datasets/hdf5_tools.hpp"
 
 namespace unhand::cli {
 namespace {
@@ -69,9 +70,19 @@ TEST_F(Cli, ImportsTheFilesOfALab) {
       datasets::read_throw_log(folder / "log.h5").throws[0].mocap);  // --into alone is left as it was
   EXPECT_EQ(run("compare full.h5 --models gripper_delay").code, 0);
 
+  {  // what the layout does not know stays
+    const datasets::test::Editor f((folder / "full.h5").string());
+    f.text("/", "operator", "somebody");
+    f.doubles("/throws/slow_01/ft/temperature", {1}, {20}, "K");
+  }
   expect_refusal("import " + ft + "--into full.h5", 3,
                  "full.h5: /throws/slow_01/ft: is there already: --replace");
   EXPECT_EQ(run("import " + ft + "--into full.h5 --replace").code, 0);
+  {
+    const datasets::test::Editor f((folder / "full.h5").string());
+    EXPECT_GT(H5Aexists(f.file, "operator"), 0);
+    EXPECT_GT(H5Lexists(f.file, "/throws/slow_01/ft/temperature", H5P_DEFAULT), 0);
+  }
   expect_refusal("import " + ft + "--into none.h5", 3, "none.h5");
   expect_refusal("import " + ft + "--into full.h5 --throw slow_01", 2, "--throw goes with one input");
   expect_refusal("import " + ft + "--into full.h5 --sku bar.toml", 2, "--sku is for a new log");

@@ -87,8 +87,9 @@ TEST_F(Cli, WrongUsage) {
   expect_refusal("compare " + quick + " --models sliding_pivot,wishful", 2, "wishful");
   expect_refusal("compare " + quick + " --models sliding_pivot,sliding_pivot", 2, "twice");
   expect_refusal("compare " + quick + " --rtol 7", 2, "rtol");
+  expect_refusal("generate quick12 --out ''", 2, "--out: '' names no file");
+  expect_refusal("figure mae --out ''", 2, "--out: '' names no file");
   expect_refusal("compare " + quick + " --rtol nan", 2, "finite");
-  expect_refusal("fit " + quick + " --model sliding_pivot --card a.json --json a.json", 2, "two outputs");
 }
 
 // A block without rows keeps its place: gnuplot's index would draw the next one in it.
@@ -275,6 +276,34 @@ TEST_F(Cli, NoOutputTakesThePlaceOfSomethingElse) {
   EXPECT_EQ(read_json(folder / "old.json")["schema"], "inspect");
 }
 
+// Before anything is read: what is no log at all would end in 3.
+TEST_F(Cli, NoOutputReplacesAMeasurementOrAnotherOutput) {
+  ASSERT_EQ(run("generate quick12 --seed 3 --out kept.h5").code, 0);
+  const std::string kept = content(folder / "kept.h5");
+  std::ofstream(folder / "text.h5") << "no log\n";
+  std::ofstream(folder / "userblock.mat", std::ios::binary) << std::string(512, ' ') << kept;
+  for (const char* file : {"kept.h5", "userblock.mat"})
+    for (const std::string one :
+         {"inspect text.h5 --json ", "compare text.h5 --json ", "fit text.h5 --model sliding_pivot --card ",
+          "predict text.h5 --card text.h5 --csv ", "discover text.h5 --card ",
+          "generate quick12 --out new.h5 --truth ", "import cube-tosses text.h5 --out new.h5 --json ",
+          "plan throw --target 1.3,0,-0.2 --json ", "validate-sku text.h5 --card text.h5 --json ",
+          "crosscheck text.h5 --engine cvode --json ", "figure mae --log text.h5 --out f --json "})
+      expect_refusal(one + file, 2, std::string(file) + " is an HDF5 file, which only a log may replace");
+  expect_refusal("inspect --json kept.h5 '" + quick + "'", 2, "write --json=FILE, or kept.h5 before it");
+  EXPECT_EQ(content(folder / "kept.h5"), kept);
+
+  fs::create_directory(folder / "sub");
+  fs::create_directory_symlink("sub", folder / "link");
+  for (const std::string one :
+       {"fit text.h5 --model sliding_pivot --card a --json ./a", "discover text.h5 --json ./a --card a",
+        "discover text.h5 --json a --card sub/../a", "predict text.h5 --card c --json sub/a --csv link/a",
+        "generate quick12 --out a --json ./a", "generate quick12 --out a --truth ./a",
+        "import cube-tosses text.h5 --out a --json ./a", "compare text.h5 --report sub --write-cards link/",
+        "validate-sku text.h5 --card text.h5 --json sub --report link/"})
+    expect_refusal(one, 2, "two outputs are to be ");
+}
+
 TEST_F(Cli, WhatAKilledRunLeftIsClearedByTheNextOfThatName) {
   const pid_t dead = fork();
   if (dead == 0) _exit(0);
@@ -381,6 +410,7 @@ TEST_F(Cli, FigureDrawsWhatIsAskedFor) {
        {"landing_errors", "conditions", "mae", "modes", "wrench", "pivot", "phase", "flight"})
     for (const char* ending : {".png", ".pdf", ".dat", ".gp"})
       EXPECT_TRUE(fs::exists(folder / "f" / (std::string(name) + ending))) << name << ending;
+  EXPECT_THAT(run("figure --help").out, HasSubstr("with _ in the place of - in NAME"));
   expect_refusal("figure portrait --log " + quick + " --out g", 2, "landing-errors");
   EXPECT_THAT(content(folder / "f/mae.gp"), HasSubstr("over the 4 held-out throws"));
   for (const char* name : {"modes", "wrench", "pivot", "phase", "flight"})
@@ -444,6 +474,41 @@ TEST_F(Cli, InspectTellsOfWhatIsImpossibleAndTheRestRefusesIt) {
   ASSERT_EQ(seen["doubtful"].size(), 1u);
   EXPECT_EQ(seen["doubtful"][0]["path"], "/gripper@pad_radius");
   expect_refusal("compare mm.h5 --json a.json", 3, "mm.h5: /gripper@pad_radius");
+}
+
+TEST_F(Cli, InspectTellsUnitsAndWhatIsDeclaredInJson) {
+  auto log = datasets::read_throw_log(quick);
+  log.objects.begin()->second.com_offset.reset();
+  datasets::write_throw_log(folder / "log.h5", log);
+  ASSERT_EQ(run("inspect log.h5 --json i.json").code, 0);
+  const json seen = read_json(folder / "i.json");
+  EXPECT_EQ(seen["software"]["name"], "unhand");
+  EXPECT_EQ(seen["log"], "log.h5");
+  EXPECT_EQ(seen["log_schema"], "throw-log");
+  for (const auto& [dataset, noise] : seen["noise"].items()) {
+    const json& one = seen["datasets"][dataset];
+    EXPECT_EQ(one["units"].size(), one["columns"].size()) << dataset;
+    EXPECT_EQ(one["throws"], noise["throws"]) << dataset;
+    EXPECT_FALSE(one["units"].empty()) << dataset;
+  }
+  EXPECT_EQ(seen["datasets"]["ft/wrench"]["columns"], json({"fx", "fz", "tau"}));
+  EXPECT_EQ(seen["datasets"]["ft/wrench"]["units"], json({"N", "N", "N m"}));
+  for (const auto& [name, object] : log.objects) {
+    const json& one = seen["declared_objects"][name];
+    EXPECT_EQ(one["mass_kg"], object.mass);
+    EXPECT_EQ(one["inertia_kg_m2"], *object.inertia);
+    EXPECT_EQ(one["com_offset_m"], object.com_offset ? json(*object.com_offset) : json(nullptr));
+  }
+  EXPECT_EQ(seen["gripper"]["n_pads"], log.gripper->n_pads);
+  EXPECT_EQ(seen["gripper"]["pad_radius_m"], *log.gripper->pad_radius);
+  EXPECT_THAT(run("inspect '" + flights + "' --json").out, HasSubstr("\"gripper\": null"));
+}
+
+TEST_F(Cli, InspectShowsTheColumnsThatTheFileHas) {
+  write_unoriented_flights("ff.h5");
+  EXPECT_THAT(run("inspect ff.h5").out, testing::ContainsRegex("mocap/pose +x,y,z +m,m,m +5 "));
+  EXPECT_THAT(run("inspect '" + flights + "'").out,
+              testing::ContainsRegex("mocap/pose +x,y,z,qw,qx,qy,qz +m,m,m,1,1,1,1 +5 "));
 }
 
 TEST_F(Cli, ImpossibleTimesAreTold) {

@@ -1,6 +1,7 @@
 // What is written comes back bit for bit; other units, types and strings come back as the same SI values.
 #include <numbers>
 
+#include "datasets/extended_log.hpp"
 #include "hdf5_tools.hpp"
 #include "log_samples.hpp"
 
@@ -287,6 +288,93 @@ TEST(Writing, RefusesWhatReadingWouldRefuseAndLeavesNothing) {
   expect([](ThrowLog& l) { l.throws[0].mocap->valid.pop_back(); }, "/throws/001/mocap/valid", "29 rows");
   expect([](ThrowLog& l) { l.throws[0].hand->time = {}; }, "/throws/001/hand/time", "is empty");
   expect([](ThrowLog& l) { l.dimension = 3; }, "/objects/bar@inertia", "1 values, expected 3");
+}
+
+/// The text of an attribute; "" where there is none.
+std::string text_in(const Editor& f, const std::string& path, const std::string& name) {
+  if (H5Aexists_by_name(f.file, path.c_str(), name.c_str(), H5P_DEFAULT) <= 0) return "";
+  const hid_t attribute = H5Aopen_by_name(f.file, path.c_str(), name.c_str(), 0, 0);
+  const hid_t type = H5Aget_type(attribute);
+  std::string out(H5Tget_size(type), '\0');
+  must(H5Tis_variable_str(type) == 0 && H5Aread(attribute, type, out.data()) >= 0);
+  H5Tclose(type);
+  H5Aclose(attribute);
+  return out.c_str();
+}
+
+TEST(Writing, TakesAlongWhatTheLayoutDoesNotKnow) {
+  const Scratch scratch;
+  const std::string old = scratch / "old.h5", made = scratch / "made.h5";
+  ThrowLog log = planar_log();
+  write_throw_log(old, log);
+  const std::string throw1 = "/throws/001";
+  {
+    const Editor f(old);
+    f.text("/", "operator", "somebody");
+    f.text("/throws", "room", "E2");
+    f.real("/objects/bar", "colour", 3);
+    f.text("/gripper", "maker", "ours");
+    f.group("/lab_notes");
+    f.text("/lab_notes", "monday", "rain");
+    f.group(throw1 + "/camera");
+    f.doubles(throw1 + "/camera/frames", {2}, {1, 2}, "furlong");
+    f.doubles(throw1 + "/hand/joints", {2}, {3, 4}, "");
+    f.doubles(throw1 + "/mocap/quality", {2}, {5, 6}, "");
+    f.text(throw1 + "/mocap/pose", "calibration", "today");
+    f.attribute(throw1 + "/ft", "empty", H5T_NATIVE_DOUBLE, "", {0});
+    const char* words[] = {"one", "two"};
+    const hid_t strings = H5Tcopy(H5T_C_S1);
+    H5Tset_size(strings, H5T_VARIABLE);
+    f.attribute(throw1, "words", strings, words, {2});
+    H5Tclose(strings);
+    hobj_ref_t reference{};
+    must(H5Rcreate(&reference, f.file, "/lab_notes", H5R_OBJECT, -1) >= 0);
+    f.attribute(throw1 + "/mocap/pose", "scale", H5T_STD_REF_OBJ, &reference, {1});
+    must(H5Lcreate_soft("/nowhere", f.file, "/soft", 0, 0) >= 0);
+    must(H5Lcreate_external("other.h5", "/there", f.file, "/outside", 0, 0) >= 0);
+  }
+  const std::string before = bytes_of(old);
+  log = read_throw_log(old);
+  log.throws[0].mocap->valid.clear();  // replaced by a track that lost nothing
+  for (double& x : log.throws[0].mocap->pose.data) x = 0.5;
+  const ExtendedLog extended = to_hdf5_with_extras(log, old);
+  put_bytes(made, extended.image);
+  EXPECT_EQ(bytes_of(old), before);
+  EXPECT_THAT(extended.left_out, testing::ElementsAre(throw1 + "/mocap/pose@scale"));
+  expect_same(read_throw_log(made), log);
+
+  const Editor f(made);
+  EXPECT_EQ(text_in(f, "/", "operator"), "somebody");
+  EXPECT_EQ(text_in(f, "/throws", "room"), "E2");
+  EXPECT_EQ(text_in(f, "/gripper", "maker"), "ours");
+  EXPECT_EQ(text_in(f, "/lab_notes", "monday"), "rain");
+  EXPECT_EQ(text_in(f, throw1 + "/mocap/pose", "calibration"), "today");
+  EXPECT_EQ(text_in(f, throw1 + "/camera/frames", "units"), "furlong");
+  const auto has_attribute = [&](const std::string& path, const char* name) {
+    return H5Aexists_by_name(f.file, path.c_str(), name, H5P_DEFAULT) > 0;
+  };
+  const auto has = [&](const std::string& path) { return H5Lexists(f.file, path.c_str(), H5P_DEFAULT) > 0; };
+  EXPECT_TRUE(has_attribute("/objects/bar", "colour"));
+  EXPECT_TRUE(has_attribute(throw1 + "/ft", "empty"));
+  EXPECT_FALSE(has_attribute(throw1 + "/mocap/pose", "scale"));
+  for (const char* name : {"/hand/joints", "/mocap/quality", "/camera/frames"})
+    EXPECT_TRUE(has(throw1 + name));
+  EXPECT_FALSE(has(throw1 + "/mocap/valid")) << "known, and no longer there";
+  EXPECT_TRUE(has("/soft"));
+  EXPECT_TRUE(has("/outside"));
+  std::vector<double> joints(2);
+  const hid_t set = H5Dopen2(f.file, (throw1 + "/hand/joints").c_str(), 0);
+  must(H5Dread(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, 0, joints.data()) >= 0);
+  H5Dclose(set);
+  EXPECT_THAT(joints, testing::ElementsAre(3, 4));
+  const hid_t words = H5Aopen_by_name(f.file, throw1.c_str(), "words", 0, 0), type = H5Aget_type(words);
+  char* both[2] = {};
+  must(H5Aread(words, type, both) >= 0);
+  EXPECT_STREQ(both[0], "one");
+  EXPECT_STREQ(both[1], "two");
+  for (char* word : both) H5free_memory(word);
+  H5Tclose(type);
+  H5Aclose(words);
 }
 
 TEST(Writing, AFailureKeepsTheOlderFile) {

@@ -46,6 +46,8 @@ TEST(Summary, CountsRatesGapsAndNoise) {
   const auto noise =
       std::find_if(s.noise.begin(), s.noise.end(), [](const auto& n) { return n.dataset == "mocap/pose"; });
   ASSERT_NE(noise, s.noise.end());
+  EXPECT_EQ(noise->columns, "x,z,theta");
+  EXPECT_EQ(noise->units, "m,m,rad");
   EXPECT_EQ(noise->declared, 2U);
   EXPECT_EQ(noise->lowest[0], 2e-4);
   EXPECT_EQ(noise->highest[0], 5e-4);
