@@ -24,7 +24,8 @@ constexpr OtherUnit kTorques[] = {{1e3, "N mm for N m"},
                                   {100, "N cm for N m"},
                                   {100 / kStandardGravity, "kgf cm for N m"},
                                   {1 / kStandardGravity, "kgf m for N m"}};
-constexpr OtherUnit kTimes[] = {{1e3, "ms for s"}, {1e6, "us for s"}, {1e9, "ns for s"}};
+constexpr OtherUnit kTimes[] = {
+    {1e3, "ms for s"}, {1e6, "us for s"}, {1e9, "ns for s"}, {1e-3, "s for ms"}, {1e-6, "s for us"}};
 
 constexpr ColumnSide kDeclared{"what is declared", "", {}};
 
