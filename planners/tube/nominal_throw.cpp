@@ -187,6 +187,12 @@ void check(const Chain& chain, const TargetBox& box, const NominalOptions& optio
 
 }  // namespace
 
+void make_planar(NominalOptions& options, const Chain& chain) {
+  validate(chain);
+  if (chain.size() == 7) options.fixed = {{2, 0.0}, {4, 0.0}, {6, std::numbers::pi / 4}};
+  options.face_target = std::abs(chain.joints.front().origin.R(2, 2)) > 0.999;
+}
+
 std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box,
                                       const NominalOptions& options) {
   check(chain, box, options);

@@ -46,6 +46,12 @@ struct NominalOptions {
   int threads{0};            ///< 0: one per core; the answer does not depend on it
 };
 
+/// Asks for throws in the vertical plane of the target, for arms built like the Panda: of seven joints the
+/// third and fifth stay at 0 and the last at 45°, so that the others move in a plane; of any arm whose first
+/// joint stands upright, that turns the plane to the target. An arm that is planar by itself is left as it
+/// is.
+void make_planar(NominalOptions& options, const Chain& chain);
+
 /// Throws std::invalid_argument, naming value and accepted range: numbers finite and in range, joints of the
 /// chain, each fixed once.
 void validate(const NominalOptions& options, const Chain& chain);

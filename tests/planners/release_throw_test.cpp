@@ -10,6 +10,7 @@
 #include "planners/arm/panda.hpp"
 #include "planners/tube/plan_throw.hpp"
 #include "planners/tube/planar_hand.hpp"
+#include "planners/tube/robust_throw.hpp"
 
 namespace unhand::planners {
 namespace {
@@ -136,6 +137,38 @@ TEST(ReleaseThrow, InsensitiveMotionsMissLess) {
   EXPECT_LT(rms(after), 0.6 * rms(before));
   EXPECT_NEAR(rms(after), result.after, 0.3 * result.after);
   EXPECT_THROW(make_insensitive(p, {{}}), std::invalid_argument);
+}
+
+// With a gripper, from ready pose to rest; the spread of its landing against the tube's.
+TEST(RobustThrow, IsPlannedForAPandaWithAGripper) {
+  const Chain arm = with_gripper(panda(), 0.15, 0.9);
+  const TargetBox box{{1.3, 0, -0.2}};
+  ReleaseCard card;
+  EXPECT_NEAR(window_for(card), 0.080 + 4 * std::hypot(0.005, 0.006), 1e-12);
+  PlanOptions options;
+  make_planar(options.search, arm);
+  options.home = panda_ready();
+  options.search.window = window_for(card);
+  const HeldObject object;
+  const auto tube = plan_throw(with_tool(arm, {Eigen::Matrix3d::Identity(), {0, 0, object.com_offset.value}}),
+                               box, options);
+  ASSERT_TRUE(tube.plan) << tube.reason;
+  ReleaseThrow p{arm, tube.plan->nominal.state, tube.plan->qdd, box.middle};
+  p.hold = options.search.window + 1e-6;
+  p.card = card;
+  const auto before = draw_landings(p, 100, 1);
+  const auto robust = plan_robust_throw(p, options);
+  ASSERT_TRUE(robust);
+  p.start = robust->choice.start;
+  p.qdd = robust->choice.qdd;
+  const auto after = draw_landings(p, 100, 1);
+  EXPECT_LT(after.std, before.std);
+  EXPECT_LT(std::abs(after.mean), box.length_x / 2);
+  EXPECT_TRUE(check_limits(arm, robust->motion, 5e-4).within());
+  const auto at = robust->motion.at(0), end = robust->motion.at(robust->motion.end());
+  EXPECT_LT((at.q - p.start.q).norm() + (at.qd - p.start.qd).norm(), 1e-9);
+  EXPECT_LT(end.qd.norm(), 1e-9);
+  EXPECT_LT((robust->motion.at(robust->motion.begin).q - panda_ready()).norm(), 1e-9);
 }
 
 TEST(ReleaseThrow, TakesModelCards) {
