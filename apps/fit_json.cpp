@@ -61,6 +61,7 @@ Json throws_json(const FitAnswer& a) {
     out.push_back({{"id", t.id},
                    {"split", a.throws[i].comparison.split == Split::train ? "train" : "test"},
                    {"used", t.used},
+                   {"why_not", t.why_not.empty() ? Json(nullptr) : Json(t.why_not)},
                    {"weight", t.weight},
                    {"chi2", number(t.chi2)},
                    {"own", own}});

@@ -136,9 +136,11 @@ std::string fit_text(const FitAnswer& a, const FitRequest& request, bool markdow
     if (t.used && t.weight < 1)
       outliers += fmt::format("{}{} ({:.2f})", outliers.empty() ? "" : ", ", t.id, t.weight);
   out += outliers.empty() ? "no outlier throws\n" : fmt::format("outlier throws (weight): {}\n", outliers);
-  if (used < n_train)
-    out += fmt::format("{} train throws could not be simulated from the start and took no part\n",
-                       n_train - used);
+  if (fit.not_simulated > 0)
+    out += fmt::format("{} train throws could not be simulated from the start and took no part: {}\n",
+                       fit.not_simulated, fit.why_not());
+  if (const auto without = n_train - used - static_cast<std::size_t>(fit.not_simulated); without > 0)
+    out += fmt::format("{} train throws have no observation among the channels asked for\n", without);
   for (const auto& note : a.problem.notes()) out += fmt::format("note: {}\n", note);
   out += fmt::format("\npredictions: mean absolute error ± its standard deviation (bias)\n{}{}",
                      markdown ? "\n" : "", table(error_table(a)));

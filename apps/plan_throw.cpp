@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <numbers>
 #include <random>
 #include <tuple>
 
@@ -21,7 +20,9 @@
 #include "datasets/sku.hpp"
 #include "fitting/sku/sku_inputs.hpp"
 #include "planners/arm/chain_file.hpp"
+#include "planners/arm/panda.hpp"
 #include "planners/tube/planar_hand.hpp"
+#include "planners/tube/robust_throw.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -53,7 +54,7 @@ void fill_limits(Chain& arm, const PlanThrowOptions& options) {
     }
 }
 
-/// The arm with its gripper: a tool of `length` along the flange's z, whose mass sits halfway.
+/// The arm with its gripper.
 Chain armed(const PlanThrowOptions& options) {
   Chain arm;
   try {
@@ -63,20 +64,7 @@ Chain armed(const PlanThrowOptions& options) {
   }
   for (const auto& note : arm.notes) tell("note: {}: {}\n", options.arm, note);
   fill_limits(arm, options);
-  if (options.gripper_mass > 0) {
-    const double m = options.gripper_mass, l = options.gripper,
-                 across = m * (l * l + 0.1 * 0.1) / 12;  // a block 0.1 m wide
-    arm = planners::with_payload(
-        arm, {m, {0, 0, l / 2}, planners::symmetric(across, across, m * 0.02 / 12, 0, 0, 0)});
-  }
-  return planners::with_tool(arm, {Eigen::Matrix3d::Identity(), {0, 0, options.gripper}});
-}
-
-/// The joints of the Panda that stay where they are in a planar throw.
-void make_planar(planners::NominalOptions& search, const Chain& arm) {
-  if (arm.size() == 7) search.fixed = {{2, 0.0}, {4, 0.0}, {6, std::numbers::pi / 4}};
-  // The first joint turns the plane to the target, if its axis is upright: else the arm's own plane is it.
-  search.face_target = std::abs(arm.joints.front().origin.R(2, 2)) > 0.999;
+  return planners::with_gripper(arm, options.gripper, options.gripper_mass);
 }
 
 planners::PlanOptions plan_options(const PlanThrowOptions& options, const Chain& arm, bool planar) {
@@ -87,11 +75,7 @@ planners::PlanOptions plan_options(const PlanThrowOptions& options, const Chain&
   out.search.threads = options.threads;
   out.refine = !options.plain;
   if (planar) make_planar(out.search, arm);
-  out.home = planners::middle_of(arm);
-  if (options.arm == "panda") {  // its usual ready pose
-    constexpr double pi = std::numbers::pi;
-    out.home = planners::JointVector<double>{{0, -pi / 4, 0, -3 * pi / 4, 0, pi / 2, pi / 4}};
-  }
+  out.home = options.arm == "panda" ? planners::panda_ready() : planners::middle_of(arm);
   return out;
 }
 
@@ -167,8 +151,8 @@ std::vector<ThrowAnswer::Number> numbers_of(const planners::ReleaseCard& card,
 }
 
 /// The plan made insensitive to what the card leaves open, where that is possible within the limits.
-void plan_release(ThrowAnswer& a, const Chain& pads, planners::ReleaseThrow release,
-                  const planners::PlanOptions& how, const PlanThrowOptions& options) {
+void plan_release(ThrowAnswer& a, planners::ReleaseThrow release, const planners::PlanOptions& how,
+                  const PlanThrowOptions& options) {
   a.with_release = true;
   a.real = planners::release_landing(release, planners::nominal_draw(release));
   if (!a.real)
@@ -177,34 +161,24 @@ void plan_release(ThrowAnswer& a, const Chain& pads, planners::ReleaseThrow rele
   a.rigid = planners::rigid_landing(release, release.object.com_offset.value, a.real->detach_time);
   a.spread_before = planners::release_spread(release);
   a.predicted.push_back(by_release("tube acceleration", a, release, options));
-  planners::InsensitiveOptions insensitive;
-  for (int i = 0; i < pads.size(); ++i)
-    if (std::abs(a.plan.nominal.state.qd[i]) > 1e-9) insensitive.joints.push_back(i);
-  const auto better = planners::make_insensitive(release, insensitive);
-  planners::MotionOptions motion = how.motion;
-  motion.window = release.hold;
-  for (const double share : {0.9, 0.65, 0.45, 0.3}) {
-    motion.acceleration_share = share;
-    auto moved = planners::throw_motion(pads, how.home, better.start, better.qdd, motion);
-    if (!moved) continue;
-    const auto limits = planners::check_limits(pads, *moved, how.check_step);
-    if (!limits.within()) continue;
-    a.plan.motion = std::move(*moved);
-    a.plan.limits = limits;
-    a.plan.nominal.state = release.start = better.start;
-    a.plan.qdd = release.qdd = better.qdd;
-    const planners::TubeProblem rigid{a.chain, better.start, a.box.middle, a.window, a.medium};
-    const auto landings = [&](const planners::JointVector<double>& qdd) {
-      return planners::landings_over_window(rigid, qdd, how.landing_samples);
-    };
-    a.plan.landings = landings(better.qdd);
-    a.plan.tube_landings.clear();  // of another throw
-    a.plan.at_rest = landings(planners::JointVector<double>::Zero(pads.size()));
-    a.spread_after = planners::release_spread(release);
-    a.predicted.insert(a.predicted.begin(), by_release("insensitive motion", a, release, options));
+  auto robust = planners::plan_robust_throw(release, how);
+  if (!robust) {
+    tell("unhand: no motion to the insensitive throw stays within the limits; the tube's is kept\n");
     return;
   }
-  tell("unhand: no motion to the insensitive throw stays within the limits; the tube's is kept\n");
+  a.plan.motion = std::move(robust->motion);
+  a.plan.limits = robust->limits;
+  a.plan.nominal.state = release.start = robust->choice.start;
+  a.plan.qdd = release.qdd = robust->choice.qdd;
+  const planners::TubeProblem rigid{a.chain, release.start, a.box.middle, a.window, a.medium};
+  const auto landings = [&](const planners::JointVector<double>& qdd) {
+    return planners::landings_over_window(rigid, qdd, how.landing_samples);
+  };
+  a.plan.landings = landings(release.qdd);
+  a.plan.tube_landings.clear();  // of another throw
+  a.plan.at_rest = landings(planners::JointVector<double>::Zero(release.chain.size()));
+  a.spread_after = planners::release_spread(release);
+  a.predicted.insert(a.predicted.begin(), by_release("insensitive motion", a, release, options));
 }
 
 void plan_throw(const PlanThrowOptions& options) {
@@ -236,10 +210,7 @@ void plan_throw(const PlanThrowOptions& options) {
   }
   answer.chain = planners::with_tool(pads, {Eigen::Matrix3d::Identity(), {0, 0, object.com_offset.value}});
   auto how = plan_options(options, pads, options.planar || card.has_value());
-  const double latest = card ? card->dead_time.value + card->opening_time.value +
-                                   4 * std::hypot(card->dead_time.sigma, card->opening_time.sigma)
-                             : 0;
-  how.search.window = answer.window = std::max(options.window, latest);
+  how.search.window = answer.window = std::max(options.window, card ? planners::window_for(*card) : 0.0);
   std::optional<Progress> progress(std::in_place, "plan throw", 0);
   auto result = planners::plan_throw(answer.chain, answer.box, how);
   if (!result.plan) throw Unanswered(fmt::format("{}: {}", to_string(result.outcome), result.reason));
@@ -252,7 +223,7 @@ void plan_throw(const PlanThrowOptions& options) {
     release.object = object;
     release.medium = answer.medium;
     answer.numbers = numbers_of(*card, object, given);
-    plan_release(answer, pads, release, how, options);
+    plan_release(answer, release, how, options);
   } else {
     answer.predicted = {
         by_delay("planned", answer, answer.plan.qdd, options),

@@ -2,6 +2,7 @@
 // and what happens there.
 #pragma once
 
+#include <cmath>
 #include <string_view>
 #include <vector>
 
@@ -222,7 +223,8 @@ class ContactModel {
   virtual bool may_feed_energy(int /*mode*/) const { return false; }
 };
 
-/// The release of the force that the pads follow.
+/// The release of the force that the pads follow [s]: the last kink within kSameInstant of its
+/// release_time(), whose derivatives it has; else that time alone.
 template <class S>
 void force_release(const NormalForce& force, S& t) {
   std::vector<S> kinks;
@@ -230,7 +232,7 @@ void force_release(const NormalForce& force, S& t) {
   const double release = force.release_time();
   t = S(release);
   for (const S& kink : kinks)
-    if (dynamics::value_of(kink) == release) t = kink;
+    if (std::abs(dynamics::value_of(kink) - release) <= kSameInstant) t = kink;
 }
 
 /// Writes both overloads from the templates wrench_, rate_, guards_, on_guard_, membership_ of Derived. The

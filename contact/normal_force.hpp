@@ -18,6 +18,10 @@ namespace unhand::contact {
 using dynamics::Dual;
 using dynamics::Window;
 
+/// How far the last kink of a force may be from its release [s]: two sums of the same times differ by
+/// rounding.
+inline constexpr double kSameInstant = 1e-9;
+
 /// f_N(t) of one pad [N], >= 0, and the instants at which it kinks.
 class NormalForce {
  public:
@@ -26,7 +30,8 @@ class NormalForce {
   virtual double at(const Window&, double t) const = 0;
   virtual Dual at(const Window&, const Dual& t) const = 0;
   /// Appends the instants [s], increasing, at which f_N or its slope jumps; the last is the release, if there
-  /// is one. As Dual they carry the derivatives with respect to the parameters of the force.
+  /// is one. As Dual they carry the derivatives with respect to the parameters of the force; those of the
+  /// release are those of the detach.
   virtual void kinks(std::vector<double>& out) const = 0;
   virtual void kinks(std::vector<Dual>& out) const = 0;
   /// The instants alone [s].
@@ -35,7 +40,8 @@ class NormalForce {
     kinks(out);
     return out;
   }
-  /// Start of the final interval with f_N = 0 [s]; +infinity when the pads never part.
+  /// Start of the final interval with f_N = 0 [s]; +infinity when the pads never part. The last kink must be
+  /// within kSameInstant of it, or the detach has no derivatives.
   virtual double release_time() const = 0;
 };
 

@@ -120,6 +120,7 @@ ErrorStatistics ModelComparison::of_condition(int quantity, const ThrownConditio
 }
 
 std::vector<PreparedThrow> prepare_all(const datasets::ThrowLog& log, const std::string& file, int threads) {
+  datasets::validate(log, file);
   std::vector<std::optional<PreparedThrow>> prepared(log.throws.size());
   dynamics::parallel_for(log.throws.size(), threads,
                          [&](std::size_t i) { prepared[i] = prepare(log, log.throws[i], file); });

@@ -106,8 +106,9 @@ struct CompareOptions {
   release::NaiveOptions naive;  ///< of limit_surface_naive
 };
 
-/// All throws prepared, on several threads. `file` names the log in errors. Throws datasets::LogError for one
-/// that lacks what a release needs.
+/// All throws prepared, on several threads. `file` names the log in errors. Throws datasets::LogError for a
+/// log that breaks the rules of its kind (datasets::validate) and for throws that lack what a release
+/// needs.
 std::vector<PreparedThrow> prepare_all(const datasets::ThrowLog& log, const std::string& file, int threads);
 
 /// Simulates every prepared throw with every model. Throws std::invalid_argument for unknown models and what

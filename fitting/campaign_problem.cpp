@@ -10,6 +10,7 @@
 #include "contact/convex_quartic.hpp"
 #include "contact/gripper_delay.hpp"
 #include "contact/patch.hpp"
+#include "contact/registry.hpp"
 #include "datasets/near_miss.hpp"
 #include "dynamics/median.hpp"
 #include "dynamics/parallel.hpp"
@@ -31,6 +32,35 @@ std::optional<std::string> name_for(const std::string& name, const std::string& 
   return name.substr(0, bracket);
 }
 
+/// Throws std::invalid_argument for a name that contact::make_contact_model does not know.
+void require_contact_model(const std::string& name) {
+  const auto names = contact::contact_model_names();
+  if (std::find(names.begin(), names.end(), name) == names.end())
+    throw std::invalid_argument(datasets::unknown_name(
+        fmt::format("there is no contact model '{}' that can be fitted", name), name, names));
+}
+
+/// The effects of those ids. Throws std::invalid_argument for one that is unknown, or named twice.
+std::vector<Effect> find_effects(const std::vector<std::string>& ids) {
+  std::vector<Effect> out;
+  std::set<std::string> seen;
+  for (const auto& id : ids) {
+    out.push_back(find_effect(id));
+    if (!seen.insert(id).second)
+      throw std::invalid_argument(fmt::format("effects: \"{}\" is named twice", id));
+  }
+  return out;
+}
+
+void validate(const CampaignOptions& options) {
+  require_contact_model(options.model);
+  if (options.pads && *options.pads < 1)
+    throw std::invalid_argument(fmt::format("pads = {} is not in [1, inf)", *options.pads));
+  const double force = options.reference_force.value_or(1);
+  if (!(force > 0 && std::isfinite(force)))
+    throw std::invalid_argument(fmt::format("reference_force = {} is not in (0, inf) N", force));
+}
+
 }  // namespace
 
 Effect find_effect(const std::string& id) {
@@ -45,7 +75,8 @@ Effect find_effect(const std::string& id) {
 CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::string& file,
                                  const CampaignOptions& options)
     : options_(options) {
-  experiment::require_release_model(options.model);
+  validate(options);
+  const std::vector<Effect> effects = find_effects(options.effects);
   header_ = log;
   header_.throws.clear();
   auto prepared = experiment::prepare_all(log, file, options.threads);
@@ -107,20 +138,16 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
         fmt::format("{}: nothing to fit to: no throw has F/T data, motion capture or a landing among the "
                     "channels asked for",
                     file));
-  std::vector<Effect> effects;
-  for (const auto& id : options.effects) effects.push_back(find_effect(id));
   name_unknowns(effects);
 }
 
 CampaignProblem CampaignProblem::with(const std::string& model,
                                       const std::vector<std::string>& effects) const {
-  experiment::require_release_model(model);
+  require_contact_model(model);
   CampaignProblem out(*this);
   out.options_.model = out.model_.contact_model = model;
   out.options_.effects = effects;
-  std::vector<Effect> found;
-  for (const auto& id : effects) found.push_back(find_effect(id));
-  out.name_unknowns(found);
+  out.name_unknowns(find_effects(effects));
   return out;
 }
 
@@ -292,7 +319,9 @@ Linearisation CampaignProblem::linearise(const experiment::PreparedThrow& prepar
     out.why_not = error.what();
     return out;
   }
-  out.solved = out.solved && out.residual.allFinite() && out.campaign.allFinite() && out.own.allFinite();
+  const bool finite = out.residual.allFinite() && out.campaign.allFinite() && out.own.allFinite();
+  if (out.solved && !finite) out.why_not = "a prediction, or a derivative of one, is not finite";
+  out.solved = out.solved && finite;
   return out;
 }
 

@@ -42,7 +42,7 @@ struct Unknown {
 /// Which model, effects and channels a campaign's problem has.
 struct CampaignOptions {
   std::string model{"limit_surface_disc"};      ///< a name that contact::make_contact_model knows
-  std::vector<std::string> effects;             ///< ids whose parameters are unknowns, too
+  std::vector<std::string> effects;             ///< ids whose parameters are unknowns, too; each once
   experiment::ObservationOptions observations;  ///< which channels, how far trusted
   dynamics::IntegratorOptions integrator{.tolerances = {1e-6, 1e-9}};  ///< of release and flight
   int threads{0};  ///< 0: one per core; the answer does not depend on it
@@ -50,7 +50,7 @@ struct CampaignOptions {
   /// for, and the campaign's own numbers (ThrowModel) are these if given.
   bool predict_only{false};
   std::optional<int> pads{};                ///< n >= 1
-  std::optional<double> reference_force{};  ///< [N]
+  std::optional<double> reference_force{};  ///< f₀ of contact.soft_patch_radius, > 0 [N]
 };
 
 /// One throw and its observations.
@@ -90,8 +90,10 @@ struct Linearisation {
 /// A campaign with a model: unknowns, residuals and their derivatives.
 class CampaignProblem {
  public:
-  /// Prepares every throw, on several threads. Throws datasets::LogError for throws that lack what a release
-  /// needs, std::invalid_argument for an unknown model or effect, or a log without any observation.
+  /// Prepares every throw, on several threads. Throws datasets::LogError for a log that breaks the rules of
+  /// its kind and for throws that lack what a release needs, std::invalid_argument for an unknown model or
+  /// effect, an effect named twice, pads or a reference force out of range, or a log without any
+  /// observation.
   CampaignProblem(const datasets::ThrowLog& log, const std::string& file, const CampaignOptions& options);
 
   /// In the order of the log.
@@ -107,7 +109,8 @@ class CampaignProblem {
   /// What was left out of the log, and why.
   const std::vector<std::string>& notes() const { return notes_; }
 
-  /// The same throws (shared, not copied) with other effects, or another contact model.
+  /// The same throws (shared, not copied) with other effects, or another contact model. Throws
+  /// std::invalid_argument as the constructor does.
   CampaignProblem with(const std::string& model, const std::vector<std::string>& effects) const;
 
   /// Where a fit starts: the campaign's unknowns, in their order.

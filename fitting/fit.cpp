@@ -178,6 +178,10 @@ FitResult fit_from(std::vector<double> start, const CampaignProblem& problem, co
     one.own.assign(problem.own().size(), 0.0);
   }
   FitRounds rounds(problem, options, start);
+  for (std::size_t i = 0; i < out.throws.size(); ++i) {
+    out.throws[i].why_not = rounds.why_not()[i];
+    out.not_simulated += !out.throws[i].why_not.empty();
+  }
   if (rounds.used().empty()) {
     out.outcome = FitOutcome::no_start;
     const bool train = options.share == Share::train;
@@ -190,11 +194,11 @@ FitResult fit_from(std::vector<double> start, const CampaignProblem& problem, co
                            problem.throws().size(), train ? "train" : "test")
         : rounds.refused()
             ? fmt::format("throw {} could not be simulated with the parameters that the fit starts from: {}",
-                          out.throws[*rounds.refused()].id, rounds.why_not())
+                          out.throws[*rounds.refused()].id, out.why_not())
             : fmt::format(
                   "no throw of the fit's share could be simulated with the parameters that it starts "
                   "from: {}",
-                  rounds.why_not());
+                  out.why_not());
     return out;
   }
   for (int round = 0; round < options.rounds; ++round) {

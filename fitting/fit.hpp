@@ -122,7 +122,8 @@ struct ChannelMisfit {
 /// One throw's part in a fit.
 struct ThrowFit {
   std::string id;           ///< as in the log
-  bool used{};              ///< of the share that is fitted to, with observations
+  bool used{};              ///< of the share that is fitted to, with observations, and simulated
+  std::string why_not;      ///< of the share with observations, but not simulated at the start: why, in words
   double weight{1};         ///< below 1: an outlier that counts less
   double chi2{};            ///< of its observations, weighted by group and robust (Huber)
   std::vector<double> own;  ///< its own unknowns
@@ -143,6 +144,7 @@ struct FitResult {
   std::vector<double> own_spread;        ///< learned 1 σ of the throws' own unknowns
   std::vector<OpenDirection> open;       ///< directions without an answer
   std::vector<ThrowFit> throws;          ///< in the order of the log
+  int not_simulated{};                   ///< throws of the share that took no part: their `why_not` says why
   std::vector<ChannelMisfit> misfit;     ///< of the throws used
   std::vector<double> group_weight;      ///< factor on the residuals of every group_of(part, channel)
   double chi2{};                         ///< of the throws used, not weighted
@@ -158,6 +160,8 @@ struct FitResult {
   }
   /// Whether the values mean anything: converged, or short of it by the iterations allowed.
   bool is_answer() const;
+  /// Of the throws that took no part: the most frequent reason, and of how many; empty without one.
+  std::string why_not() const;
   /// −2 log of the likelihood in which every channel of every phase has the variance that it shows, at least
   /// the declared one.
   double deviance() const;

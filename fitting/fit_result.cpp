@@ -1,6 +1,9 @@
 // Names, and what a fit's result answers by itself.
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "fitting/fit.hpp"
 
@@ -28,6 +31,15 @@ Phase phase_of(const experiment::Observation& o, double opening, double release)
 
 bool FitResult::is_answer() const {
   return outcome == FitOutcome::converged || outcome == FitOutcome::iterations_spent;
+}
+
+std::string FitResult::why_not() const {
+  std::map<std::string, int> reasons;
+  for (const ThrowFit& one : throws)
+    if (!one.why_not.empty()) ++reasons[one.why_not];
+  const auto most = std::max_element(reasons.begin(), reasons.end(),
+                                     [](const auto& a, const auto& b) { return a.second < b.second; });
+  return most == reasons.end() ? "" : fmt::format("{} ({} throws)", most->first, most->second);
 }
 
 double FitResult::deviance() const {

@@ -1,7 +1,5 @@
 #include "fitting/fit_rounds.hpp"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -32,21 +30,18 @@ FitRounds::FitRounds(const CampaignProblem& problem, const FitOptions& options,
 void FitRounds::choose_throws(const std::vector<double>& start) {
   const auto& throws = problem_.throws();
   std::vector<Linearisation> starts(throws.size());
-  std::vector<char> asked(throws.size());
   const std::vector<double> own(problem_.own().size(), 0.0);
   dynamics::parallel_for(throws.size(), options_.threads, [&](std::size_t i) {
     const bool shared =
         options_.share == Share::all ||
         (options_.share == Share::train) == (throws[i].prepared.split == datasets::Split::train);
     if (!shared || throws[i].observed.all.empty() || !(options_.throws.empty() || options_.throws[i])) return;
-    asked[i] = 1;
     starts[i] = problem_.linearise(throws[i], start, own, DerivativesBy::nothing);
   });
-  for (std::size_t i = 0; i < throws.size(); ++i)
-    if (asked[i] && !starts[i].solved) ++why_not_[starts[i].why_not];
+  for (const Linearisation& one : starts) why_not_.push_back(one.why_not);
   if (!options_.throws.empty())
     for (std::size_t i = 0; i < throws.size() && !refused_; ++i)
-      if (asked[i] && !starts[i].solved) refused_ = i;
+      if (!why_not_[i].empty()) refused_ = i;
   if (refused_) return;
   Misfit misfit;
   for (std::size_t i = 0; i < throws.size(); ++i)
@@ -59,12 +54,6 @@ void FitRounds::choose_throws(const std::vector<double>& start) {
     weigh(starts[i], throws[i].observed, throws[i], shared_.weighting);
     chi2_.push_back(starts[i].residual.squaredNorm());
   }
-}
-
-std::string FitRounds::why_not() const {
-  const auto most = std::max_element(why_not_.begin(), why_not_.end(),
-                                     [](const auto& a, const auto& b) { return a.second < b.second; });
-  return most == why_not_.end() ? "" : fmt::format("{} ({} throws)", most->first, most->second);
 }
 
 bool FitRounds::is_fixed(const Unknown& unknown) const {

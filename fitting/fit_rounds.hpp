@@ -1,7 +1,6 @@
 // The rounds of a fit: least squares, then what the solution teaches of weights and spreads. Internal.
 #pragma once
 
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,8 +22,9 @@ class FitRounds {
   const std::vector<std::size_t>& used() const { return used_; }
   /// A throw that must take part and cannot be simulated at the start: then none is used.
   const std::optional<std::size_t>& refused() const { return refused_; }
-  /// Why throws of the share could not be simulated at the start: of the reasons the most frequent, in words.
-  std::string why_not() const;
+  /// By throw of the log: why it could not be simulated at the start, in words; empty where it could, or was
+  /// not asked to.
+  const std::vector<std::string>& why_not() const { return why_not_; }
   bool is_fixed(const Unknown& unknown) const;
 
   /// Least squares with the weights and spreads as they are, and the normal equations at its solution; false
@@ -80,7 +80,7 @@ class FitRounds {
   Shared shared_;
   std::vector<std::size_t> used_;
   std::optional<std::size_t> refused_;
-  std::map<std::string, int> why_not_;  // throws by reason
+  std::vector<std::string> why_not_;
   SimulatedThrows simulated_{shared_, used_};
   std::vector<double> x_;
   // One array: Ceres orders blocks by their addresses, which must be the throws' order in every run.

@@ -68,8 +68,8 @@ NaiveResult simulate_release_naive(const ReleaseProblem<double>& problem, const 
     t += dt;
     ++result.steps;
   }
-  result.outcome = ReleaseOutcome::detached;
   result.detach = {t, pose, twist};
+  result.outcome = is_finite(result.detach) ? ReleaseOutcome::detached : ReleaseOutcome::not_solved;
   return result;
 }
 

@@ -15,7 +15,7 @@ struct NaiveOptions {
 
 /// How a naive release ended.
 struct NaiveResult {
-  ReleaseOutcome outcome{};    ///< `detached` or `never_separated`
+  ReleaseOutcome outcome{};    ///< `detached`, `never_separated`; `not_solved`: the detach is not finite
   DetachState<double> detach;  ///< the answer, if detached
   int steps{};                 ///< Euler steps taken
   int reversals{};             ///< steps after which the slip points against the one before: the chatter
@@ -24,8 +24,8 @@ struct NaiveResult {
 /// The ellipsoidal limit surface as [LiuBillard2025] describes it in use, for comparison only: without a
 /// stick mode the wrench of a held object flips from side to side at every step, and the energy that this
 /// costs is the error. The contact model of `problem` is not used; `patch` gives the limits. Throws
-/// std::invalid_argument for a step outside [1e-7, 0.1] s, one below eight spacings of representable times,
-/// and one of which the release takes more than 1e8.
+/// std::invalid_argument for what simulate_release refuses, a step outside [1e-7, 0.1] s, one below eight
+/// spacings of representable times, and one of which the release takes more than 1e8.
 NaiveResult simulate_release_naive(const ReleaseProblem<double>& problem, const contact::Patch<double>& patch,
                                    const NaiveOptions& options = {});
 

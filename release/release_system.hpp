@@ -44,10 +44,29 @@ void validate(const ReleaseProblem<S>& problem) {
   require(std::isfinite(value_of(problem.slip.x)), "slip x", value_of(problem.slip.x), "finite m/s");
   require(std::isfinite(value_of(problem.slip.z)), "slip z", value_of(problem.slip.z), "finite m/s");
   require(std::isfinite(value_of(problem.spin)), "spin", value_of(problem.spin), "finite rad/s");
-  if (!(problem.start >= problem.hand.begin() && problem.start < problem.hand.end()))
+  const double begin = problem.hand.begin(), end = problem.hand.end();
+  require(std::isfinite(begin), "begin of the hand's motion", begin, "finite s");
+  require(std::isfinite(end), "end of the hand's motion", end, "finite s");
+  for (const double t : problem.hand.jumps())
+    require(std::isfinite(t), "jump of the hand's motion", t, "finite s");
+  for (const double t : problem.normal_force.kinks())
+    require(std::isfinite(t), "kink of the normal force", t, "finite s");
+  const double release = problem.normal_force.release_time();
+  require(release > -std::numeric_limits<double>::infinity(), "release time of the normal force", release,
+          "(-inf, inf] s");
+  if (!(problem.start >= begin && problem.start < end))
     throw std::invalid_argument(
         fmt::format("release: start = {} is not in [{}, {}) s, where the hand's motion is known",
-                    problem.start, problem.hand.begin(), problem.hand.end()));
+                    problem.start, begin, end));
+}
+
+/// True if time, pose and twist are.
+template <class S>
+bool is_finite(const DetachState<S>& detach) {
+  const auto& [t, pose, twist] = detach;
+  for (const S& x : {t, pose.x, pose.z, pose.theta, twist.vx, twist.vz, twist.omega})
+    if (!std::isfinite(value_of(x))) return false;
+  return true;
 }
 
 /// The share of a tiny slip by which one step may be wrong.

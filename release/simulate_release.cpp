@@ -31,6 +31,19 @@ const char* in_words(ReleaseOutcome outcome) {
   return "unknown";
 }
 
+namespace {
+
+/// A detach that is not finite is none: poses do not pass through the integrator, which looks at what it
+/// integrates.
+template <class S>
+void require_finite_detach(ReleaseResult<S>& result) {
+  if (result.outcome != ReleaseOutcome::detached || is_finite(result.detach)) return;
+  result.outcome = ReleaseOutcome::not_solved;
+  result.integration = dynamics::Outcome::not_finite;
+}
+
+}  // namespace
+
 template <class S>
 ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const ReleaseOptions& options) {
   if (!(std::abs(problem.start) <= 1e6))
@@ -64,6 +77,7 @@ ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const Releas
     const bool slips = result.slips_at_start;
     result = simulate_giving_release(problem, *pads, system, start, {integrator, options.ledger});
     result.slips_at_start = slips;
+    require_finite_detach(result);
     if constexpr (std::is_same_v<S, double>)
       if (options.ledger && !result.trajectory.empty()) result.ledger = energy_ledger(problem, result);
     return result;
@@ -98,6 +112,7 @@ ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const Releas
   const Scene<S> scene = system.scene(problem.start < system.separation() ? last : first, solution.t);
   result.relative = Relative<S>::from(solution.y);
   result.detach = {solution.t, object_pose(scene, result.relative), object_twist(scene, result.relative)};
+  require_finite_detach(result);
   if constexpr (std::is_same_v<S, double>)
     if (options.ledger && !result.trajectory.empty()) result.ledger = energy_ledger(problem, result);
   return result;

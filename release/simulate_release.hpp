@@ -84,9 +84,10 @@ struct ReleaseResult {
   EnergyLedger ledger;                        ///< zero unless options.ledger
 };
 
-/// Simulates from `problem.start` to detach. Throws std::invalid_argument when an input is not finite or out
-/// of range (mass, inertia, start against the hand's log, a normal force below zero). Instantiated for double
-/// and Dual.
+/// Simulates from `problem.start` to detach. Throws std::invalid_argument when an input is not finite (an
+/// instant of the hand or of the normal force, too; a release at +infinity is none) or out of range (mass,
+/// inertia, start against the hand's log, a normal force below zero). A hand that is not finite where it is
+/// followed, or at detach, leaves it `not_solved`, `not_finite`. Instantiated for double and Dual.
 template <class S>
 ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const ReleaseOptions& options = {});
 

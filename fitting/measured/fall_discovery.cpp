@@ -108,6 +108,7 @@ std::vector<dynamics::Effect> known_fall_effects() {
 }
 
 FallProblem::FallProblem(const datasets::ThrowLog& log) : gravity_(log.gravity) {
+  datasets::validate(log);
   channels_ = {"force_x", "force_y", "force_z"};
   covariates_ = {"speed at the start [m/s]", "duration [s]", "vertical along body z [-]", "order"};
   const auto splits = splits_of(log);

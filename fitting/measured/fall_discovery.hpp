@@ -17,7 +17,8 @@ namespace unhand::fitting {
 /// the last term is taken as zero.
 class FallProblem final : public GroupedProblem {
  public:
-  /// Throws std::invalid_argument when no throw can be used.
+  /// Throws datasets::LogError for a log that breaks the rules of its kind, std::invalid_argument when no
+  /// throw can be used.
   explicit FallProblem(const datasets::ThrowLog& log);
   std::vector<dynamics::Effect> effects() const override;
   GroupEquations equations(std::size_t group, std::span<const std::string> names,

@@ -49,6 +49,7 @@ void restrict_to_plane(std::vector<dynamics::Effect>& effects) {
 }  // namespace
 
 FlightProblem::FlightProblem(const ThrowLog& log, int threads) : gravity_(log.gravity) {
+  datasets::validate(log);
   const bool planar = log.dimension == 2;
   if (planar) {
     axes_ = {0, 2}, turns_ = {1}, turn_sign_ = -1;

@@ -14,7 +14,8 @@ namespace unhand::fitting {
 /// without a test split holds every fifth throw out (splits_of).
 class FlightProblem final : public GroupedProblem {
  public:
-  /// Throws std::invalid_argument when no throw is a free flight.
+  /// Throws datasets::LogError for a log that breaks the rules of its kind, std::invalid_argument when no
+  /// throw is a free flight.
   FlightProblem(const datasets::ThrowLog& log, int threads);
   std::vector<dynamics::Effect> effects() const override;
   GroupEquations equations(std::size_t group, std::span<const std::string> names,

@@ -97,6 +97,18 @@ Chain with_payload(Chain chain, const Inertia& body) {
   return chain;
 }
 
+Chain with_gripper(const Chain& chain, double length, double mass) {
+  for (const auto& [name, value] : {std::pair{"length", length}, {"mass", mass}})
+    if (!(value >= 0 && std::isfinite(value)))
+      throw std::invalid_argument(fmt::format("gripper: {} = {} is not in [0, inf)", name, value));
+  constexpr double kWidth = 0.1;  // m
+  const double across = mass * (length * length + kWidth * kWidth) / 12;
+  const Transform<double> pads{Eigen::Matrix3d::Identity(), {0, 0, length}};
+  if (mass == 0) return with_tool(chain, pads);
+  const Inertia block{mass, {0, 0, length / 2}, symmetric(across, across, mass * 0.02 / 12, 0, 0, 0)};
+  return with_tool(with_payload(chain, block), pads);
+}
+
 JointVector<double> limits_of(const Chain& chain, double JointLimits::*which) {
   JointVector<double> out(chain.size());
   for (int i = 0; i < chain.size(); ++i) out[i] = chain.joints[i].limits.*which;

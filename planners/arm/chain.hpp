@@ -112,6 +112,9 @@ void validate(const Chain& chain);
 Chain with_tool(Chain chain, const Transform<double>& tool);
 /// The chain carrying a body, seen from its tip.
 Chain with_payload(Chain chain, const Inertia& body);
+/// The chain with a gripper on its flange: its tip is the middle of the pads, `length` [m] along the flange's
+/// z. The mass [kg] (0: none; an object may count) is a block 0.1 m wide and as long as the gripper.
+Chain with_gripper(const Chain& chain, double length, double mass);
 
 /// One limit of every joint, as a vector.
 JointVector<double> limits_of(const Chain& chain, double JointLimits::*which);

@@ -126,4 +126,9 @@ Chain panda() {
   return out;
 }
 
+JointVector<double> panda_ready() {
+  constexpr double pi = std::numbers::pi;
+  return JointVector<double>{{0, -pi / 4, 0, -3 * pi / 4, 0, pi / 2, pi / 4}};
+}
+
 }  // namespace unhand::planners

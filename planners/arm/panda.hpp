@@ -11,4 +11,7 @@ namespace unhand::planners {
 /// torques do not determine (the inertia of link 1 about x, say) are what the identification left there.
 Chain panda();
 
+/// Its usual ready pose [rad].
+JointVector<double> panda_ready();
+
 }  // namespace unhand::planners

@@ -182,12 +182,16 @@ void check(const Chain& chain, const TargetBox& box, const NominalOptions& optio
         !std::isfinite(joint.limits.jerk))
       throw std::invalid_argument("chain '" + chain.name + "': joint '" + joint.name +
                                   "' needs limits of velocity, acceleration and jerk to plan a throw");
-  for (const auto& fixed : options.fixed)
-    if (fixed.joint < 0 || fixed.joint >= chain.size())
-      throw std::invalid_argument("fixed joint " + std::to_string(fixed.joint) + " is not one of the chain");
+  validate(options, chain);
 }
 
 }  // namespace
+
+void make_planar(NominalOptions& options, const Chain& chain) {
+  validate(chain);
+  if (chain.size() == 7) options.fixed = {{2, 0.0}, {4, 0.0}, {6, std::numbers::pi / 4}};
+  options.face_target = std::abs(chain.joints.front().origin.R(2, 2)) > 0.999;
+}
 
 std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box,
                                       const NominalOptions& options) {
@@ -215,7 +219,7 @@ std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box,
   for (auto& one : at)
     if (one) found.push_back(std::move(*one));
   const auto better = [](const NominalThrow& a, const NominalThrow& b) { return a.margin > b.margin; };
-  const auto kept = std::min(found.size(), static_cast<std::size_t>(std::max(options.candidates, 0)));
+  const auto kept = std::min(found.size(), static_cast<std::size_t>(options.candidates));
   std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(kept), found.end(), better);
   found.resize(kept);
   const auto refined = std::min(found.size(), static_cast<std::size_t>(options.refined));

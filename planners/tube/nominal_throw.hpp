@@ -27,9 +27,9 @@ struct NominalOptions {
   double window{0.1};                            ///< the arm must be able to go on for so long [s]
   flight::Medium medium{};                       ///< of the flight
   flight::LandingSet landing{.half_length = 1};  ///< velocities at the landing; its length is the box's
-  int samples{3000};                             ///< configurations looked at
-  int refined{10};                               ///< best ones improved by small steps
-  int candidates{40};                            ///< most that come back
+  int samples{3000};                             ///< configurations looked at, >= 1
+  int refined{10};                               ///< best ones improved by small steps, >= 0
+  int candidates{40};                            ///< most that come back, >= 1
   double lowest_tip{0.15}, nearest_tip{0.25};    ///< height, and level distance from the base's z axis [m]
   double shortest_throw{0.3};                    ///< level distance from the tip to the target [m]
   double speed_reserve{0.02};                    ///< of the joints' velocity limits, kept free
@@ -46,6 +46,16 @@ struct NominalOptions {
   int threads{0};            ///< 0: one per core; the answer does not depend on it
 };
 
+/// Asks for throws in the vertical plane of the target, for arms built like the Panda: of seven joints the
+/// third and fifth stay at 0 and the last at 45°, so that the others move in a plane; of any arm whose first
+/// joint stands upright, that turns the plane to the target. An arm that is planar by itself is left as it
+/// is.
+void make_planar(NominalOptions& options, const Chain& chain);
+
+/// Throws std::invalid_argument, naming value and accepted range: numbers finite and in range, joints of the
+/// chain, each fixed once.
+void validate(const NominalOptions& options, const Chain& chain);
+
 /// A throw, and what it leaves free: 1 − the largest use of a joint's velocity; the room that the joints have
 /// before and after for speeding up and braking, over half their range; and −f of the tube. The margin is the
 /// smallest of them.
@@ -58,7 +68,8 @@ struct NominalThrow {
 /// Configurations from a low-discrepancy sequence; at each, elevations whose parabola (with drag: whose
 /// flight) ends in the box's middle, and of all joint velocities with that tip velocity the one that is
 /// smallest against the limits, q̇ = W Jᵀ (J W Jᵀ)⁻¹ v with W = diag(q̇_max²). Sorted, best first; only margins
-/// > 0. The same options give the same throws.
+/// > 0. The same options give the same throws. Throws std::invalid_argument for a box without area, a chain
+/// that is none or lacks limits, and as validate() does.
 std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box,
                                       const NominalOptions& options = {});
 

@@ -4,9 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
+#include <utility>
 
 #include "planners/arm/kinematics.hpp"
+#include "planners/tube/require.hpp"
 
 namespace unhand::planners {
 
@@ -59,8 +60,17 @@ std::optional<std::vector<std::vector<JerkPiece>>> ramps(const Chain& chain, con
 std::optional<JointTrajectory> throw_motion(const Chain& chain, const JointVector<double>& home,
                                             const ThrowState& state, const JointVector<double>& qdd,
                                             const MotionOptions& options) {
-  const int n = chain.size();
+  constexpr const char* kOf = "throw motion";
+  require_joints(chain, kOf, "home", home);
+  require_joints(chain, kOf, "q", state.q);
+  require_joints(chain, kOf, "qd", state.qd);
+  require_joints(chain, kOf, "qdd", qdd);
   const double T = options.window;
+  require(T >= 0 && std::isfinite(T), kOf, "window", T, "[0, inf) s");
+  for (const auto& [name, share] : {std::pair{"velocity_share", options.velocity_share},
+                                    {"acceleration_share", options.acceleration_share}})
+    require(share > 0 && share <= 1, kOf, name, share, "(0, 1]");
+  const int n = chain.size();
   const JointVector<double> last = state.qd + T * qdd;
   const auto swing = ramps(chain, state.qd, qdd, options);
   // Braking is speeding up seen backwards: there the acceleration at the joint is −q̈.
@@ -147,9 +157,10 @@ PlanResult plan_throw(const Chain& chain, const TargetBox& box, const PlanOption
   PlanResult out;
   JointVector<double> home = options.home;
   if (home.size() == 0) home = middle_of(chain);
-  if (home.size() != chain.size())
-    throw std::invalid_argument(
-        fmt::format("plan: home has {} angles for {} joints", home.size(), chain.size()));
+  require_joints(chain, "plan", "home", home);
+  require(options.landing_samples >= 2, "plan", "landing_samples", options.landing_samples, "[2, inf)");
+  require(options.check_step > 0 && std::isfinite(options.check_step), "plan", "check_step",
+          options.check_step, "(0, inf) s");
   const auto throws = find_throws(chain, box, options.search);
   out.throws = static_cast<int>(throws.size());
   out.outcome = PlanOutcome::no_throw;

@@ -12,14 +12,15 @@ namespace unhand::planners {
 
 /// How the arm moves before and after the window.
 struct MotionOptions {
-  double window{0.1};              ///< T [s], from the instant at which the gripper is told to open
-  double velocity_share{0.95};     ///< of the joints' limits that speeding up and braking use
+  double window{0.1};              ///< T >= 0 [s], from the instant at which the gripper is told to open
+  double velocity_share{0.95};     ///< of the joints' limits that speeding up and braking use, in (0, 1]
   double acceleration_share{0.9};  ///< the same of acceleration and jerk; a torque limit may ask for less
 };
 
 /// The arm's motion, t = 0 where the gripper is told to open: from rest at `home` along a straight line in
 /// joint space to where the swing begins; from rest to (q₀, q̇₀, q̈), all joints at once; q̈ held for the
-/// window; to rest, all joints at once. Acceleration is continuous. Empty where |q̈| exceeds a limit.
+/// window; to rest, all joints at once. Acceleration is continuous. Empty where |q̈| exceeds a limit. Throws
+/// std::invalid_argument unless there is one finite number per joint, and the options are in their ranges.
 std::optional<JointTrajectory> throw_motion(const Chain& chain, const JointVector<double>& home,
                                             const ThrowState& state, const JointVector<double>& qdd,
                                             const MotionOptions& options = {});
@@ -31,8 +32,8 @@ struct PlanOptions {
   JointVector<double> home;  ///< where the arm rests before; empty: middle_of
   bool tube{true};           ///< false: no acceleration in the window, for comparison
   bool refine{true};         ///< go on from Tube-CVX to refine_tube
-  int landing_samples{21};   ///< instants of the window at which landings are reported
-  double check_step{1e-3};   ///< of the dense check of limits [s]
+  int landing_samples{21};   ///< instants of the window at which landings are reported, >= 2
+  double check_step{1e-3};   ///< of the dense check of limits, > 0 [s]
 };
 
 /// How planning ended.
@@ -73,6 +74,7 @@ struct PlanResult {
 };
 
 /// Tries the throws of find_throws in order of their margin. The same options give the same plan.
+/// Throws std::invalid_argument as find_throws does, and for options out of range.
 PlanResult plan_throw(const Chain& chain, const TargetBox& box, const PlanOptions& options = {});
 
 }  // namespace unhand::planners

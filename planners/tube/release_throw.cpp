@@ -12,6 +12,7 @@
 #include "contact/registry.hpp"
 #include "flight/fly.hpp"
 #include "planners/tube/planar_hand.hpp"
+#include "planners/tube/require.hpp"
 #include "release/simulate_release.hpp"
 
 namespace unhand::planners {
@@ -265,6 +266,7 @@ PlanarHand hand_of(const ReleaseThrow& p) { return hand_of(p, constant(p.start.q
 }  // namespace
 
 Draw nominal_draw(const ReleaseThrow& problem) {
+  validate(problem);
   Draw out{};
   const auto unknowns = unknowns_of(problem);
   for (int k = 0; k < kUnknowns; ++k) out[k] = unknowns[k].value;
@@ -272,12 +274,14 @@ Draw nominal_draw(const ReleaseThrow& problem) {
 }
 
 std::optional<ReleaseLanding> release_landing(const ReleaseThrow& problem, const Draw& draw) {
+  validate(problem);
   const auto thrown = throw_once<double>(problem, hand_of(problem), draw);
   if (!thrown) return {};
   return ReleaseLanding{thrown->miss, thrown->detach_time, thrown->angle, thrown->speed};
 }
 
 std::optional<ReleaseLanding> rigid_landing(const ReleaseThrow& problem, double com_offset, double delay) {
+  validate(problem);
   if (!(delay >= 0 && delay <= problem.hold))
     throw std::invalid_argument(fmt::format("delay {} is not in [0, {}] s", delay, problem.hold));
   const PlanarHand motion = hand_of(problem);
@@ -295,6 +299,7 @@ std::optional<ReleaseLanding> rigid_landing(const ReleaseThrow& problem, double 
 }
 
 std::optional<ReleaseSpread> release_spread(const ReleaseThrow& problem) {
+  validate(problem);
   const auto unknowns = unknowns_of(problem);
   std::array<Dual, kUnknowns> draw;
   for (int k = 0; k < kUnknowns; ++k) draw[k] = independent(unknowns[k].value, k);
@@ -333,6 +338,8 @@ double drawn(const Uncertain& one, bool may_be_negative, Normal&& normal) {
 }  // namespace
 
 Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t seed) {
+  validate(problem);
+  require(count >= 1, "draw_landings", "count", count, "[1, inf)");
   const auto unknowns = unknowns_of(problem);
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
@@ -423,13 +430,9 @@ double square_sum(const std::vector<double>& r) {
 }  // namespace
 
 InsensitiveResult make_insensitive(const ReleaseThrow& problem, const InsensitiveOptions& options) {
+  validate(problem);
+  validate(options, problem.chain);
   const int m = static_cast<int>(options.joints.size()), n = 2 * m;
-  if (m < 1 || n > dynamics::kDualSize)
-    throw std::invalid_argument(
-        fmt::format("make_insensitive: {} joints named; accepted: 1 to {}", m, dynamics::kDualSize / 2));
-  for (const int joint : options.joints)
-    if (joint < 0 || joint >= problem.chain.size())
-      throw std::invalid_argument(fmt::format("make_insensitive: there is no joint {}", joint));
   const Points points(problem);
   const auto moved = [&](const ThrowState& start, const JointVector<double>& qdd) {
     ReleaseThrow out = problem;

@@ -97,6 +97,11 @@ struct ReleaseThrow {
   flight::Medium medium{};  ///< of the flight
 };
 
+/// Throws std::invalid_argument, naming value and accepted range: one finite number per joint, hold > 0,
+/// sigma
+/// >= 0, what is thrown and what holds it > 0. All functions below that take a throw check it.
+void validate(const ReleaseThrow& problem);
+
 /// One landing, and the release before it.
 struct ReleaseLanding {
   double miss{};         ///< of the centre of mass, forward of the target [m]
@@ -131,16 +136,19 @@ struct Landings {
 };
 /// Mean and standard deviation of what landed.
 void summarise(Landings& landings);
-/// Equal seeds give equal draws.
+/// Equal seeds give equal draws; count >= 1.
 Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t seed);
 
 /// How the search for an insensitive throw runs.
 struct InsensitiveOptions {
-  std::vector<int> joints;  ///< that move in the plane, at most 4
+  std::vector<int> joints;  ///< that move in the plane, 1 to 4, each once
   int iterations{15};       ///< at most
-  double reserve{0.02};     ///< of the limits of velocity and acceleration, kept free
-  double tolerance{1e-3};   ///< relative decrease of the cost at which it is enough
+  double reserve{0.02};     ///< of the limits of velocity and acceleration, kept free; in [0, 1)
+  double tolerance{1e-3};   ///< relative decrease of the cost at which it is enough; in [0, 1)
 };
+/// Throws std::invalid_argument, naming value and accepted range.
+void validate(const InsensitiveOptions& options, const Chain& chain);
+
 /// A throw that depends little on what is not known.
 struct InsensitiveResult {
   ThrowState start;          ///< q̇₀ as chosen
@@ -157,7 +165,7 @@ struct InsensitiveResult {
 /// linear in them; of curvature it knows only roughly: of x = (θ_k/σ_k)² it makes p where 3 is true, of x =
 /// θ_i θ_j nothing. The derivatives by q̇₀ and q̈ pass exactly through hand, release with its events, and
 /// flight, and each step is a quadratic program within the limits of q̇₀, q̇₀ + hold q̈ and q̈. Throws
-/// std::invalid_argument unless 1 to 4 joints are named.
+/// std::invalid_argument as both validate() do.
 InsensitiveResult make_insensitive(const ReleaseThrow& problem, const InsensitiveOptions& options);
 
 }  // namespace unhand::planners

@@ -5,9 +5,9 @@
 
 #include <cmath>
 #include <optional>
-#include <stdexcept>
 
 #include "planners/arm/kinematics.hpp"
+#include "planners/tube/require.hpp"
 
 namespace unhand::planners {
 
@@ -24,14 +24,10 @@ PlaneView plane_view(const Vector3d& tip, const Vector3d& velocity, const Vector
 namespace {
 
 void check(const TubeProblem& p) {
-  const int n = p.chain.size();
-  if (p.start.q.size() != n || p.start.qd.size() != n)
-    throw std::invalid_argument(fmt::format("tube: {} positions and {} velocities for {} joints",
-                                            p.start.q.size(), p.start.qd.size(), n));
-  if (!(p.window > 0 && p.window <= 1))
-    throw std::invalid_argument(fmt::format("tube: window {} is not in (0, 1] s", p.window));
-  if (!p.start.q.allFinite() || !p.start.qd.allFinite() || !p.target.allFinite())
-    throw std::invalid_argument("tube: a number of the throw is not finite");
+  require_joints(p.chain, "tube", "q", p.start.q);
+  require_joints(p.chain, "tube", "qd", p.start.qd);
+  require(p.window > 0 && p.window <= 1, "tube", "window", p.window, "(0, 1] s");
+  for (const double x : p.target) require(std::isfinite(x), "tube", "target", x, "(-inf, inf) m");
 }
 
 /// What is known at the window's end before q̈ is: kinematics, and the flow map without acceleration.
@@ -196,6 +192,8 @@ Vector2d forward_of(const TubeProblem& p) {
 std::vector<LandingAt> landings_over_window(const TubeProblem& problem, const JointVector<double>& qdd,
                                             int samples) {
   check(problem);
+  require_joints(problem.chain, "tube", "qdd", qdd);
+  require(samples >= 1, "tube", "samples", samples, "[1, inf)");
   const Vector2d along = forward_of(problem);
   std::vector<LandingAt> out;
   for (int k = 0; k < samples; ++k) {
@@ -258,6 +256,7 @@ double refine_cost(const TubeProblem& p, const Vector2d& along, const JointVecto
 JointVector<double> refine_tube(const TubeProblem& problem, const JointVector<double>& start,
                                 const RefineOptions& options) {
   check(problem);
+  require_joints(problem.chain, "tube", "qdd", start);
   const Vector2d along = forward_of(problem);
   JointVector<double> at = start;
   double cost = refine_cost(problem, along, at, options.times, nullptr);

@@ -78,7 +78,8 @@ struct LandingAt {
   double x{}, y{};             ///< of the target, in the base's axes [m]
   bool lands{};                ///< the flight comes down to the target's height
 };
-/// At `samples` >= 2 instants from 0 to T.
+/// At `samples` >= 1 instants from 0 to T. Throws std::invalid_argument for sizes and ranges, as solve_tube
+/// does.
 std::vector<LandingAt> landings_over_window(const TubeProblem& problem, const JointVector<double>& qdd,
                                             int samples);
 
@@ -92,7 +93,7 @@ std::vector<LandingAt> landings_over_window(const TubeProblem& problem, const Jo
 struct RefineOptions {
   int times{4}, iterations{6};  ///< instants of the window; Gauss-Newton steps
 };
-/// See RefineOptions.
+/// See RefineOptions. Throws as landings_over_window does.
 JointVector<double> refine_tube(const TubeProblem& problem, const JointVector<double>& start,
                                 const RefineOptions& options = {});
 

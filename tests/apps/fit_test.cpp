@@ -12,11 +12,21 @@ TEST_F(Cli, FitSaysWhichThrowsItLeavesOut) {
     for (datasets::Series* s : {&one.hand->time, &one.hand->pose, &one.hand->twist, &one.hand->acceleration})
       s->rows = rows, s->data.resize(rows * s->cols);
   });
-  const Answer answer = run("fit short.h5 --model sliding_pivot");
+  const Answer answer = run("fit short.h5 --model sliding_pivot --json f.json");
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.out, HasSubstr("fitted to 7 of 8 train throws"));
   EXPECT_THAT(answer.err, HasSubstr("without 1 of the train throws"));
   EXPECT_THAT(answer.err, HasSubstr(": 001\n"));
+  const std::string why = "the pads still press on the object where the hand's motion ends";
+  EXPECT_THAT(answer.out,
+              HasSubstr("1 train throws could not be simulated from the start and took no part: " + why +
+                        " (1 throws)"));
+  for (const auto& one : read_json(folder / "f.json")["throws"]) {
+    if (one["id"] == "001")
+      EXPECT_EQ(one["why_not"], why);
+    else
+      EXPECT_TRUE(one["why_not"].is_null()) << one["id"];
+  }
 }
 
 TEST_F(Cli, FitThenPredict) {

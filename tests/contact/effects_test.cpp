@@ -259,6 +259,32 @@ TEST(AdhesiveForce, AddsToTheForceAndDiesWithinThePartingTime) {
   EXPECT_THROW(contact::AdhesiveForce(base, Dual(1), Dual(0)), std::invalid_argument);
 }
 
+/// A force whose last kink is told by another sum than its release, `off` [s] apart.
+class RoundedForce final : public contact::NormalForce {
+ public:
+  RoundedForce(const Dual& dead_time, double off)
+      : base_(contact::OpeningProfile<Dual>{0.02, Dual(20.0), dead_time, Dual(0.04), Dual(1.3)}), off_(off) {}
+  double at(const contact::Window& w, double t) const override { return base_.at(w, t); }
+  Dual at(const contact::Window& w, const Dual& t) const override { return base_.at(w, t); }
+  void kinks(std::vector<double>& out) const override { base_.kinks(out), out.back() += off_; }
+  void kinks(std::vector<Dual>& out) const override { base_.kinks(out), out.back().a += off_; }
+  double release_time() const override { return base_.release_time(); }
+
+ private:
+  contact::ProfileNormalForce base_;
+  double off_;
+};
+
+TEST(ForceRelease, IsTheLastKinkWhateverRoundingSays) {
+  for (const double off : {0.0, 1e-17, -1e-17, 9e-10, -9e-10, 2e-9}) {
+    const RoundedForce force(dynamics::independent(0.005, 0), off);
+    Dual t;
+    contact::force_release(force, t);
+    EXPECT_NEAR(t.a, force.release_time(), contact::kSameInstant);
+    EXPECT_EQ(t.v[0], std::abs(off) <= contact::kSameInstant ? 1 : 0) << off;
+  }
+}
+
 TEST(ContactEffectParameters, OutOfRangeAreNamed) {
   contact::ContactParameters<double> p;
   p.patch = {0.5, 0.01};

@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 
+#include "release/naive_release.hpp"
 #include "tests/contract/every_model.hpp"
 
 namespace unhand {
@@ -158,6 +159,106 @@ TEST_P(Outcomes, WrongProblemsAreRefused) {
   // seconds since 1970: a step of 1 µs would be of four ulps
   for (const double x : {1.7e9, kNaN})
     expect_refused({"start", "[-1e6, 1e6] s"}, with([=](auto& p) { p.start = x; }));
+}
+
+/// A hand with one more jump, other ends, or a pose that is NaN from an instant on.
+class SpoiltHand final : public release::HandMotion {
+ public:
+  explicit SpoiltHand(const release::HandMotion& hand)
+      : first(hand.begin()), last(hand.end()), jump(hand.jumps()), hand_(hand) {}
+  double first, last;
+  std::vector<double> jump;
+  double lost_after = kInfinity;  // s
+
+  release::HandState<double> at(const release::Window& w, double t) const override { return at_(w, t); }
+  release::HandState<dynamics::Dual> at(const release::Window& w, const dynamics::Dual& t) const override {
+    return at_(w, t);
+  }
+  std::vector<double> jumps() const override { return jump; }
+  double begin() const override { return first; }
+  double end() const override { return last; }
+
+ private:
+  template <class S>
+  release::HandState<S> at_(const release::Window& w, const S& t) const {
+    auto h = hand_.at(w, t);
+    if (dynamics::value_of(t) > lost_after) h.pose.x = S(kNaN);
+    return h;
+  }
+  const release::HandMotion& hand_;
+};
+
+/// A force with one more kink, or another release.
+class SpoiltForce final : public contact::NormalForce {
+ public:
+  explicit SpoiltForce(const contact::NormalForce& force) : release(force.release_time()), force_(force) {}
+  double release;
+  std::vector<double> more;
+
+  double at(const contact::Window& w, double t) const override { return force_.at(w, t); }
+  dynamics::Dual at(const contact::Window& w, const dynamics::Dual& t) const override {
+    return force_.at(w, t);
+  }
+  void kinks(std::vector<double>& out) const override { kinks_(out); }
+  void kinks(std::vector<dynamics::Dual>& out) const override { kinks_(out); }
+  double release_time() const override { return release; }
+
+ private:
+  template <class S>
+  void kinks_(std::vector<S>& out) const {
+    for (const double t : more) out.push_back(S(t));
+    force_.kinks(out);
+  }
+  const contact::NormalForce& force_;
+};
+
+class Spoilt : public EveryModel {
+ protected:
+  release::ReleaseProblem<double> problem() const {
+    const auto given = support::problem_of(thrown, *model);
+    return {hand, force, *model, given.body, given.gravity, given.grasp, given.start, given.slip, given.spin};
+  }
+  void expect_both_refuse(const std::vector<std::string>& words) const {
+    expect_refused(words, [&] { simulate_release(problem()); });
+    expect_refused(words, [&] { simulate_release_naive(problem(), thrown.patch); });
+  }
+
+  std::mt19937_64 random{55};
+  const support::RandomThrow thrown = support::random_throw(random, 0);
+  const std::unique_ptr<contact::ContactModel> model = make(support::parameters_of(thrown));
+  SpoiltHand hand{thrown.hand};
+  SpoiltForce force{thrown.force};
+};
+UNHAND_EVERY_MODEL(Spoilt);
+
+TEST_P(Spoilt, InstantsThatAreNoneAreRefused) {
+  ASSERT_EQ(simulate_release(problem()).outcome, release::ReleaseOutcome::detached);
+  for (const double t : {kNaN, -kInfinity}) {
+    force.release = t;
+    expect_both_refuse({"release time of the normal force", std::to_string(t), "(-inf, inf] s"});
+  }
+  force.release = thrown.force.release_time();
+  for (const double t : {kNaN, kInfinity}) {
+    force.more = {t};
+    expect_both_refuse({"kink of the normal force", std::to_string(t), "finite s"});
+    force.more = {};
+    hand.jump = {t};
+    expect_both_refuse({"jump of the hand's motion", std::to_string(t), "finite s"});
+    hand.jump = {};
+    hand.last = t;
+    expect_both_refuse({"end of the hand's motion", std::to_string(t), "finite s"});
+    hand.last = thrown.hand.end();
+    hand.first = -t;
+    expect_both_refuse({"begin of the hand's motion", std::to_string(-t), "finite s"});
+    hand.first = thrown.hand.begin();
+  }
+}
+
+TEST_P(Spoilt, ADetachThatIsNotFiniteIsNone) {
+  hand.lost_after = 0.5 * support::parameters_of(thrown).open_command;
+  const auto result = simulate_release(problem());
+  EXPECT_EQ(result.outcome, release::ReleaseOutcome::not_solved);
+  EXPECT_EQ(result.integration, dynamics::Outcome::not_finite);
 }
 
 TEST(UnknownModel, IsRefusedWithTheNamesThereAre) {

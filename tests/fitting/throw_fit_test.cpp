@@ -1,5 +1,7 @@
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -518,6 +520,77 @@ TEST(ThrowFit, SaysWhyThereIsNothingToFit) {
     EXPECT_TRUE(std::isinf(nothing.campaign[k].sigma));
     EXPECT_FALSE(is_determined(nothing, k));
   }
+}
+
+TEST(CampaignInput, LogsInMemoryObeyTheRulesOfFiles) {
+  const auto expect_refused = [](const char* what, auto&& change) {
+    auto log = disc_log();
+    change(log);
+    try {
+      problem_of(log);
+      FAIL() << "accepted: " << what;
+    } catch (const datasets::LogError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(what));
+    }
+  };
+  expect_refused("mass", [](auto& log) { log.objects.begin()->second.mass = -1; });
+  expect_refused("mass", [](auto& log) { log.objects.begin()->second.mass = NAN; });
+  expect_refused("gravity", [](auto& log) { log.gravity = NAN; });
+  expect_refused("there is no object", [](auto& log) { log.throws.front().object = "another"; });
+}
+
+TEST(CampaignInput, RefusesOptionsOutOfRange) {
+  const auto message = [](auto&& change) {
+    CampaignOptions options;
+    change(options);
+    try {
+      const CampaignProblem problem(disc_log(), "(in memory)", options);
+    } catch (const std::invalid_argument& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  EXPECT_EQ(message([](auto& o) { o.pads = 1, o.reference_force = 5; }), "accepted");
+  for (const int pads : {0, -2})
+    EXPECT_EQ(message([=](auto& o) { o.pads = pads; }), fmt::format("pads = {} is not in [1, inf)", pads));
+  for (const double force : {0.0, -1.0, HUGE_VAL})
+    EXPECT_EQ(message([=](auto& o) { o.reference_force = force; }),
+              fmt::format("reference_force = {} is not in (0, inf) N", force));
+  EXPECT_THAT(message([](auto& o) {
+                o.effects = {"contact.viscous", "flight.wind", "contact.viscous"};
+              }),
+              HasSubstr("\"contact.viscous\" is named twice"));
+  // It has no derivatives.
+  EXPECT_THAT(message([](auto& o) { o.model = "limit_surface_naive"; }), HasSubstr("that can be fitted"));
+  const auto problem = problem_of(disc_log());
+  EXPECT_THROW(problem.with("limit_surface_naive", {}), std::invalid_argument);
+  EXPECT_THROW(problem.with(kLaw, {"flight.wind", "flight.wind"}), std::invalid_argument);
+}
+
+TEST(CampaignInput, ThrowsThatCannotBeSimulatedAreCountedAndSayWhy) {
+  auto log = disc_log();
+  std::vector<std::string> pressing;  // two throws whose pads stay on the object
+  for (auto& one : log.throws) {
+    if (one.split != Split::train || pressing.size() == 2) continue;
+    pressing.push_back(one.id);
+    auto& force = one.ft->normal_force.data;
+    const double most = *std::max_element(force.begin(), force.end());
+    for (double& f : force) f = std::max(f, 0.7 * most);
+  }
+  FitOptions options;
+  options.rounds = options.iterations = 1;
+  const auto result = fit(problem_of(log), options);
+  ASSERT_TRUE(result.is_answer()) << result.message;
+  EXPECT_EQ(result.not_simulated, 2);
+  EXPECT_THAT(result.why_not(), HasSubstr("the pads still press"));
+  EXPECT_THAT(result.why_not(), HasSubstr("(2 throws)"));
+  for (const auto& one : result.throws)
+    if (std::count(pressing.begin(), pressing.end(), one.id)) {
+      EXPECT_FALSE(one.used);
+      EXPECT_THAT(one.why_not, HasSubstr("the pads still press"));
+    } else {
+      EXPECT_EQ(one.why_not, "");
+    }
 }
 
 }  // namespace

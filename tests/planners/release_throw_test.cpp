@@ -10,6 +10,7 @@
 #include "planners/arm/panda.hpp"
 #include "planners/tube/plan_throw.hpp"
 #include "planners/tube/planar_hand.hpp"
+#include "planners/tube/robust_throw.hpp"
 
 namespace unhand::planners {
 namespace {
@@ -136,6 +137,38 @@ TEST(ReleaseThrow, InsensitiveMotionsMissLess) {
   EXPECT_LT(rms(after), 0.6 * rms(before));
   EXPECT_NEAR(rms(after), result.after, 0.3 * result.after);
   EXPECT_THROW(make_insensitive(p, {{}}), std::invalid_argument);
+}
+
+// With a gripper, from ready pose to rest; the spread of its landing against the tube's.
+TEST(RobustThrow, IsPlannedForAPandaWithAGripper) {
+  const Chain arm = with_gripper(panda(), 0.15, 0.9);
+  const TargetBox box{{1.3, 0, -0.2}};
+  ReleaseCard card;
+  EXPECT_NEAR(window_for(card), 0.080 + 4 * std::hypot(0.005, 0.006), 1e-12);
+  PlanOptions options;
+  make_planar(options.search, arm);
+  options.home = panda_ready();
+  options.search.window = window_for(card);
+  const HeldObject object;
+  const auto tube = plan_throw(with_tool(arm, {Eigen::Matrix3d::Identity(), {0, 0, object.com_offset.value}}),
+                               box, options);
+  ASSERT_TRUE(tube.plan) << tube.reason;
+  ReleaseThrow p{arm, tube.plan->nominal.state, tube.plan->qdd, box.middle};
+  p.hold = options.search.window + 1e-6;
+  p.card = card;
+  const auto before = draw_landings(p, 100, 1);
+  const auto robust = plan_robust_throw(p, options);
+  ASSERT_TRUE(robust);
+  p.start = robust->choice.start;
+  p.qdd = robust->choice.qdd;
+  const auto after = draw_landings(p, 100, 1);
+  EXPECT_LT(after.std, before.std);
+  EXPECT_LT(std::abs(after.mean), box.length_x / 2);
+  EXPECT_TRUE(check_limits(arm, robust->motion, 5e-4).within());
+  const auto at = robust->motion.at(0), end = robust->motion.at(robust->motion.end());
+  EXPECT_LT((at.q - p.start.q).norm() + (at.qd - p.start.qd).norm(), 1e-9);
+  EXPECT_LT(end.qd.norm(), 1e-9);
+  EXPECT_LT((robust->motion.at(robust->motion.begin).q - panda_ready()).norm(), 1e-9);
 }
 
 TEST(ReleaseThrow, TakesModelCards) {
@@ -315,6 +348,97 @@ TEST(ReleaseThrow, OfAGripperWithoutDeadTimeIsDrawn) {
   for (const double miss : same.miss) EXPECT_EQ(miss, nominal->miss);
   p.card.dead_time.sigma = 0.005;  // half of the normal distribution has no meaning
   EXPECT_EQ(draw_landings(p, 20, 1).miss.size(), 20u);
+}
+
+/// The message of the std::invalid_argument that `action` throws.
+template <class Action>
+std::string refusal(Action&& action) {
+  try {
+    action();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(ReleaseThrow, RefusesWhatIsNoThrow) {
+  using testing::HasSubstr;
+  const Chain arm = pads();
+  const auto expect_refused = [&](const char* what, auto&& change) {
+    ReleaseThrow p = swing(arm);
+    const Draw draw = nominal_draw(p);
+    change(p);
+    EXPECT_THAT(refusal([&] { release_landing(p, draw); }), HasSubstr(what));
+    EXPECT_THAT(refusal([&] { nominal_draw(p); }), HasSubstr(what));
+    EXPECT_THAT(refusal([&] { rigid_landing(p, 0.14, 0.05); }), HasSubstr(what));
+    EXPECT_THAT(refusal([&] { release_spread(p); }), HasSubstr(what));
+    EXPECT_THAT(refusal([&] { draw_landings(p, 1, 1); }), HasSubstr(what));
+    EXPECT_THAT(refusal([&] { make_insensitive(p, {{1, 3, 5}}); }), HasSubstr(what));
+  };
+  expect_refused("q has 3 values for 7 joints", [](auto& p) { p.start.q = p.start.q.head(3).eval(); });
+  expect_refused("qd has 3 values for 7 joints", [](auto& p) { p.start.qd = p.start.qd.head(3).eval(); });
+  expect_refused("qdd has 3 values for 7 joints", [](auto& p) { p.qdd = p.qdd.head(3).eval(); });
+  expect_refused("qdd = nan", [](auto& p) { p.qdd[4] = NAN; });
+  expect_refused("target = inf", [](auto& p) { p.target.z() = INFINITY; });
+  for (const double hold : {static_cast<double>(NAN), -1.0, 0.0, HUGE_VAL})
+    expect_refused("hold = ", [=](auto& p) { p.hold = hold; });
+  expect_refused("sigma of mu = nan is not in [0, inf)", [](auto& p) { p.card.mu.sigma = NAN; });
+  expect_refused("sigma of dead_time = -0.1", [](auto& p) { p.card.dead_time.sigma = -0.1; });
+  expect_refused("sigma of com_offset = -1", [](auto& p) { p.object.com_offset.sigma = -1; });
+  expect_refused("grasp_angle = inf", [](auto& p) { p.card.grasp_angle = INFINITY; });
+  expect_refused("grip_force = nan", [](auto& p) { p.card.grip_force = NAN; });
+  expect_refused("pads = 0", [](auto& p) { p.card.pads = 0; });
+  expect_refused("mass = -1 is not in (0, inf) kg", [](auto& p) { p.object.mass = -1; });
+  for (const double gravity : {0.0, -9.81, static_cast<double>(NAN)})
+    expect_refused("gravity = ", [=](auto& p) { p.medium.gravity = gravity; });
+  const ReleaseThrow p = swing(arm);
+  EXPECT_THAT(refusal([&] { draw_landings(p, -5, 1); }), HasSubstr("count = -5"));
+  const auto insensitive = [&](const InsensitiveOptions& o) {
+    return refusal([&] { make_insensitive(p, o); });
+  };
+  EXPECT_THAT(insensitive({{1, 1}}), HasSubstr("joint 1 is named twice"));
+  EXPECT_THAT(insensitive({{1, 7}}), HasSubstr("joint 7 is not in [0, 6]"));
+  EXPECT_THAT(insensitive({{0, 1, 2, 3, 4}}), HasSubstr("accepted: 1 to 4"));
+  EXPECT_THAT(insensitive({{1}, 15, 1.0}), HasSubstr("reserve = 1 is not in [0, 1)"));
+  EXPECT_THAT(insensitive({{1}, -1}), HasSubstr("iterations = -1"));
+}
+
+TEST(NominalThrow, RefusesASearchWithoutSense) {
+  using testing::HasSubstr;
+  const Chain arm = pads();
+  const auto expect_refused = [&](const char* what, auto&& change) {
+    PlanOptions o;
+    change(o.search);
+    const TargetBox box{{1.3, 0, -0.2}};
+    EXPECT_THAT(refusal([&] { find_throws(arm, box, o.search); }), HasSubstr(what));
+    EXPECT_THAT(refusal([&] { plan_throw(arm, box, o); }), HasSubstr(what));
+  };
+  expect_refused("samples = 0 is not in [1, inf)", [](auto& o) { o.samples = 0; });
+  expect_refused("samples = -1 is not in [1, inf)", [](auto& o) { o.samples = -1; });
+  expect_refused("candidates = 0 is not in [1, inf)", [](auto& o) { o.candidates = 0; });
+  expect_refused("refined = -1", [](auto& o) { o.refined = -1; });
+  for (const double gravity : {0.0, -9.0, static_cast<double>(NAN)})
+    expect_refused("gravity = ", [=](auto& o) { o.medium.gravity = gravity; });
+  expect_refused("drag_k = -1", [](auto& o) { o.medium.drag_k = -1; });
+  expect_refused("window = 0 is not in (0, 1] s", [](auto& o) { o.window = 0; });
+  expect_refused("speed_reserve = nan", [](auto& o) { o.speed_reserve = NAN; });
+  expect_refused("joint 99 is not in [0, 6]", [](auto& o) { o.fixed = {{99, 0}}; });
+  expect_refused("joint 2 is named twice", [](auto& o) { o.fixed = {{2, 0}, {2, 0.1}}; });
+}
+
+TEST(ThrowMotion, RefusesAnotherNumberOfJoints) {
+  using testing::HasSubstr;
+  const Chain arm = pads();
+  const ReleaseThrow p = swing(arm);
+  const Joints three = p.qdd.head(3).eval();
+  EXPECT_THAT(refusal([&] { throw_motion(arm, three, p.start, p.qdd); }), HasSubstr("home has 3 values"));
+  EXPECT_THAT(refusal([&] { throw_motion(arm, middle_of(arm), p.start, three); }), HasSubstr("qdd has 3"));
+  EXPECT_THAT(refusal([&] { throw_motion(arm, middle_of(arm), p.start, p.qdd, {.velocity_share = 0}); }),
+              HasSubstr("velocity_share = 0"));
+  const TubeProblem tube{arm, p.start, p.target};
+  EXPECT_THAT(refusal([&] { landings_over_window(tube, three, 5); }), HasSubstr("qdd has 3"));
+  EXPECT_THAT(refusal([&] { landings_over_window(tube, p.qdd, 0); }), HasSubstr("samples = 0"));
+  EXPECT_THAT(refusal([&] { refine_tube(tube, three); }), HasSubstr("qdd has 3"));
 }
 
 }  // namespace

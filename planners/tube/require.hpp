@@ -1,0 +1,27 @@
+// Checks of what a throw is asked for. Internal to planners/tube.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "planners/arm/chain.hpp"
+
+namespace unhand::planners {
+
+/// Throws std::invalid_argument, naming what and the accepted range, unless `ok`.
+inline void require(bool ok, const char* of, const char* name, double value, const char* range) {
+  if (!ok) throw std::invalid_argument(fmt::format("{}: {} = {} is not in {}", of, name, value, range));
+}
+
+/// Throws std::invalid_argument unless there is one finite number for each joint.
+inline void require_joints(const Chain& chain, const char* of, const char* name,
+                           const JointVector<double>& x) {
+  if (x.size() != chain.size())
+    throw std::invalid_argument(
+        fmt::format("{}: {} has {} values for {} joints", of, name, x.size(), chain.size()));
+  for (const double one : x) require(std::isfinite(one), of, name, one, "(-inf, inf)");
+}
+
+}  // namespace unhand::planners

@@ -1,0 +1,30 @@
+// A throw whose landing depends least on what is not known of its release, and the motion to it.
+#pragma once
+
+#include <optional>
+
+#include "planners/tube/plan_throw.hpp"
+#include "planners/tube/release_throw.hpp"
+
+namespace unhand::planners {
+
+/// How long q̈ must be held for the object to be free [s]: dead time and opening time of the card, and 4 σ of
+/// their sum.
+double window_for(const ReleaseCard& card);
+
+/// What make_insensitive chose, and a motion to it.
+struct RobustThrow {
+  InsensitiveResult choice;     ///< q̇₀ and q̈, for the q₀ that was given
+  JointTrajectory motion;       ///< from rest to rest; its window is the throw's `hold`
+  LimitCheck limits;            ///< of the motion, looked at densely
+  double acceleration_share{};  ///< share of the limits that speeding up and braking use [-]
+};
+
+/// The throw made insensitive by the joints that move in it, and the fastest of a few motions to it that stay
+/// within the limits; nothing where none does. `home`, shares and the step of the check are those of
+/// `options`, its search is not used. The way to a throw to begin with: plan_throw with a chain up to the
+/// object's centre of mass, in the vertical plane of the target (make_planar). Throws std::invalid_argument
+/// as make_insensitive and throw_motion do.
+std::optional<RobustThrow> plan_robust_throw(const ReleaseThrow& problem, const PlanOptions& options = {});
+
+}  // namespace unhand::planners

@@ -1,0 +1,97 @@
+// What throws may be asked for: sizes, ranges, finiteness.
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "planners/tube/nominal_throw.hpp"
+#include "planners/tube/release_throw.hpp"
+#include "planners/tube/require.hpp"
+
+namespace unhand::planners {
+namespace {
+
+bool is_positive(double x) { return x > 0 && std::isfinite(x); }
+bool is_not_negative(double x) { return x >= 0 && std::isfinite(x); }
+
+void require_medium(const char* of, const flight::Medium& medium) {
+  require(is_positive(medium.gravity), of, "gravity", medium.gravity, "(0, inf) m/s²");
+  require(is_not_negative(medium.drag_k), of, "drag_k", medium.drag_k, "[0, inf) 1/m");
+}
+
+/// Throws std::invalid_argument for a joint that the chain does not have, or one named before.
+void require_joint(const Chain& chain, const char* of, int joint, std::set<int>& seen) {
+  if (joint < 0 || joint >= chain.size())
+    throw std::invalid_argument(fmt::format("{}: joint {} is not in [0, {}]", of, joint, chain.size() - 1));
+  if (!seen.insert(joint).second)
+    throw std::invalid_argument(fmt::format("{}: joint {} is named twice", of, joint));
+}
+
+}  // namespace
+
+void validate(const ReleaseThrow& p) {
+  constexpr const char* kOf = "release throw";
+  validate(p.chain);
+  require_joints(p.chain, kOf, "q", p.start.q);
+  require_joints(p.chain, kOf, "qd", p.start.qd);
+  require_joints(p.chain, kOf, "qdd", p.qdd);
+  for (const double x : p.target) require(std::isfinite(x), kOf, "target", x, "(-inf, inf) m");
+  require(is_positive(p.hold), kOf, "hold", p.hold, "(0, inf) s");
+  const ReleaseCard& c = p.card;
+  require(is_not_negative(c.mu.value), kOf, "mu", c.mu.value, "[0, inf)");
+  require(is_positive(c.length), kOf, "length", c.length, "(0, inf) m");
+  require(c.pads >= 1, kOf, "pads", c.pads, "[1, inf)");
+  require(is_positive(c.grip_force), kOf, "grip_force", c.grip_force, "(0, inf) N");
+  require(is_not_negative(c.dead_time.value), kOf, "dead_time", c.dead_time.value, "[0, inf) s");
+  require(is_positive(c.opening_time.value), kOf, "opening_time", c.opening_time.value, "(0, inf) s");
+  require(is_positive(c.shape), kOf, "shape", c.shape, "(0, inf)");
+  const HeldObject& o = p.object;
+  require(is_positive(o.mass), kOf, "mass", o.mass, "(0, inf) kg");
+  require(is_positive(o.inertia), kOf, "inertia", o.inertia, "(0, inf) kg m²");
+  require(std::isfinite(o.com_offset.value), kOf, "com_offset", o.com_offset.value, "(-inf, inf) m");
+  require(std::isfinite(o.angle), kOf, "angle of the object", o.angle, "(-inf, inf) rad");
+  for (const auto& [name, sigma] : {std::pair{"sigma of mu", c.mu.sigma},
+                                    {"sigma of dead_time", c.dead_time.sigma},
+                                    {"sigma of opening_time", c.opening_time.sigma},
+                                    {"sigma of com_offset", o.com_offset.sigma},
+                                    {"grasp_offset", c.grasp_offset},
+                                    {"grasp_angle", c.grasp_angle}})
+    require(is_not_negative(sigma), kOf, name, sigma, "[0, inf)");
+  require_medium(kOf, p.medium);
+}
+
+void validate(const InsensitiveOptions& options, const Chain& chain) {
+  constexpr const char* kOf = "make_insensitive";
+  constexpr std::size_t kMost = dynamics::kDualSize / 2;
+  if (options.joints.empty() || options.joints.size() > kMost)
+    throw std::invalid_argument(
+        fmt::format("{}: {} joints named; accepted: 1 to {}", kOf, options.joints.size(), kMost));
+  std::set<int> seen;
+  for (const int joint : options.joints) require_joint(chain, kOf, joint, seen);
+  require(options.iterations >= 0, kOf, "iterations", options.iterations, "[0, inf)");
+  require(options.reserve >= 0 && options.reserve < 1, kOf, "reserve", options.reserve, "[0, 1)");
+  require(options.tolerance >= 0 && options.tolerance < 1, kOf, "tolerance", options.tolerance, "[0, 1)");
+}
+
+void validate(const NominalOptions& options, const Chain& chain) {
+  constexpr const char* kOf = "throw search";
+  require(options.window > 0 && options.window <= 1, kOf, "window", options.window, "(0, 1] s");
+  require_medium(kOf, options.medium);
+  for (const auto& [name, count, least] : {std::tuple{"samples", options.samples, 1},
+                                           {"refined", options.refined, 0},
+                                           {"candidates", options.candidates, 1},
+                                           {"threads", options.threads, 0}})
+    require(count >= least, kOf, name, count, least == 1 ? "[1, inf)" : "[0, inf)");
+  require(std::isfinite(options.lowest_tip), kOf, "lowest_tip", options.lowest_tip, "(-inf, inf) m");
+  require(is_not_negative(options.nearest_tip), kOf, "nearest_tip", options.nearest_tip, "[0, inf) m");
+  require(is_not_negative(options.shortest_throw), kOf, "shortest_throw", options.shortest_throw,
+          "[0, inf) m");
+  require(options.speed_reserve >= 0 && options.speed_reserve < 1, kOf, "speed_reserve",
+          options.speed_reserve, "[0, 1)");
+  std::set<int> seen;
+  for (const auto& fixed : options.fixed) {
+    require_joint(chain, "throw search, fixed", fixed.joint, seen);
+    require(std::isfinite(fixed.angle), kOf, "angle of a fixed joint", fixed.angle, "(-inf, inf) rad");
+  }
+}
+
+}  // namespace unhand::planners
