@@ -231,6 +231,7 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
       {"after", {{"train", misfit_json(found.final.misfit)}, {"test", misfit_json(found.final_test)}}}};
   out["structure"] = {{"before", structure_json(found.structure_before)},
                       {"after", structure_json(found.structure_after)}};
+  if (!found.held_out.empty()) out["held_out"] = found.held_out;
   out["model"] = found.model;
   out["parameters"] = Json::object();
   for (const auto& u : found.final.campaign)
@@ -271,6 +272,7 @@ std::string discovery_text(const Discovery& found, const std::string& log) {
   row(fmt::format("before, test ({})", found.before_test.n), found.before_test);
   row(fmt::format("after, train ({})", found.after_train.n), found.after_train);
   row(fmt::format("after, test ({})", found.after_test.n), found.after_test);
+  if (const std::string note = held_out_text(found); !note.empty()) out += "\n" + note + "\n";
   return out + "\n" + table.text() + fmt::format("\n{:.1f} s\n", found.seconds);
 }
 

@@ -242,7 +242,7 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
       "unknowns fitted. Test throws took no part in any fit, but they decided what was accepted: after, "
       "theirs is a validation error, slightly optimistic. Below, the rms of these errors over what "
       "repetitions of a condition scatter by about their mean: above 1.4 most of the error goes with the "
-      "condition, and a better model would take it away.</p>{}{}"
+      "condition, and a better model would take it away.</p>{}{}{}"
       "<h2>Candidates</h2><p>From the footprint of each: the derivative of every predicted sample, with the "
       "model's own unknowns projected out.</p>{}{}{}"
       "<h2>Misfit by phase and channel</h2><p>chi2 per sample; 1 is the declared noise.</p>{}"
@@ -250,8 +250,10 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
       "with (share of its mean square).</p>{}<h2>Again</h2><p><code>{}</code><br>log checksum "
       "<code>{}</code></p>",
       escaped(json.at("base_model").get<std::string>()), to_string(found.verdict), first,
-      over_time ? picture("residual") : kLandingsAlone, answer, html(error_table(found)),
-      html(lack_table(found)), picture("ranking"), html(ranking_table(found.ranking)),
+      over_time ? picture("residual") : kLandingsAlone, answer,
+      found.held_out.empty() ? "" : fmt::format("<p>{}</p>\n", escaped(held_out_text(found))),
+      html(error_table(found)), html(lack_table(found)), picture("ranking"),
+      html(ranking_table(found.ranking)),
       over_time ? fmt::format("<p>{}</p>", kFootprints) + picture("footprints") : "",
       html(misfit_table(found)), html(structure_table(found)), escaped(command),
       json.value("log_checksum", "unknown"));

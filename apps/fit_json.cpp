@@ -63,7 +63,7 @@ Json throws_json(const FitAnswer& a) {
                    {"used", t.used},
                    {"why_not", t.why_not.empty() ? Json(nullptr) : Json(t.why_not)},
                    {"weight", t.weight},
-                   {"chi2", number(t.chi2)},
+                   {"weighted_chi2", number(t.chi2)},
                    {"own", own}});
   }
   return out;

@@ -34,7 +34,7 @@ Table parameter_table(const fitting::FitResult& fit) {
                                                 : fmt::format("{:.5g}", x);
     };
     out.rows.push_back(
-        {u.unknown.name, u.unknown.unit, shown.value, shown.sigma,
+        {u.unknown.name, u.unknown.unit, shown.value, std::isfinite(u.sigma) ? shown.sigma : "-",
          std::isfinite(low) || std::isfinite(high)
              ? fmt::format("[{}, {}]{}", end(low), end(high), u.profile ? " of the profile" : "")
              : "open",
@@ -170,7 +170,7 @@ std::string fit_text(const FitAnswer& a, const FitRequest& request, bool markdow
 }
 
 Table fit_throw_table(const FitAnswer& a) {
-  Table out{{"throw", "object", "condition", "split", "used", "weight", "chi2"}, {}, 4};
+  Table out{{"throw", "object", "condition", "split", "used", "weight", "weighted chi2"}, {}, 4};
   for (const auto& u : a.problem.own())
     out.header.push_back("fitted_" + u.name + (u.unit == "-" ? "" : "_" + u.unit));
   for (const char* name : {"detach_vx_m_s", "sigma", "detach_omega_deg_s", "sigma", "landing_x_m", "sigma",

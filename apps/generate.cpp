@@ -46,7 +46,8 @@ experiment::CampaignDesign design_of(const GenerateOptions& options) {
         design.effects.merge(experiment::random_effect(design, options.seed));
       } else {
         const auto [name, value] = experiment::parse_effect(text);
-        design.effects.insert_or_assign(name, value);
+        if (!design.effects.emplace(name, value).second)
+          throw WrongUsage(fmt::format("--effect: {} is given twice", name));
       }
     }
     experiment::validate_effects(design.effects, objects);
@@ -164,10 +165,15 @@ Command generate_command(Parser& root) {
   parser
       .option("--effect", options->effects,
               "ID=value, ID.parameter=value or ID[object]=value: what the world or the sensors do and the "
-              "log does not say; 'random': one drawn with the seed. May be repeated")
+              "log does not say; 'random': one drawn with the seed. Several with blanks or commas between, "
+              "or repeated")
+      .with_commas()
       .one_value_each();
-  parser.option("--without", options->without, "Leave a sensor out: ft, wrench, mocap or landing")
+  parser
+      .option("--without", options->without,
+              "Leave sensors out: ft, wrench, mocap or landing; several with commas between, or repeated")
       .one_of({"ft", "wrench", "mocap", "landing"})
+      .with_commas()
       .one_value_each();
   parser.option("--truth", options->truth,
                 "Write the truth (parameters, effects, every throw) as JSON; the log never tells it");

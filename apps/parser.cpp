@@ -67,6 +67,21 @@ std::string unknown_option(const CLI::App& command, int argc, char** argv) {
   return {};
 }
 
+/// The words, with `--effect A=1 B=2` as `--effect A=1 --effect B=2`: a word with '=' that follows such a
+/// value is another one, and one without is what comes next on the command line.
+std::vector<std::string> repeated(int argc, char** argv) {
+  std::vector<std::string> out;
+  bool values = false;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const bool option = word.starts_with('-'), value = !option && word.find('=') != std::string::npos;
+    if (values && value && out.back() != "--effect") out.emplace_back("--effect");
+    values = word == "--effect" || (values && (value || out.back() == "--effect"));
+    out.push_back(word);
+  }
+  return out;
+}
+
 }  // namespace
 
 Option Option::required() { return option_->required(), *this; }
@@ -172,7 +187,9 @@ Parser::Parsed Parser::parse(int argc, char** argv) {
     return Parsed::wrong_usage;
   }
   try {
-    app_->parse(argc, argv);
+    auto words = repeated(argc, argv);
+    std::reverse(words.begin(), words.end());  // as CLI11 takes them
+    app_->parse(std::move(words));
     return Parsed::run;
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() != 0) {

@@ -1,6 +1,7 @@
 #include "apps/ranking.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -114,6 +115,12 @@ std::string small_text(const fitting::SmallEffect& small) {
       "evident on the train throws, but the test throws do not confirm it: {}, yet no channel's chi2 falls "
       "by what matters, and {})",
       numbers, small.likelier ? "another of their errors grows" : "their likelihood does not rise enough");
+}
+
+std::string held_out_text(const fitting::Discovery& found) {
+  if (found.held_out.empty()) return {};
+  return fmt::format("The log's throws all have one split: held out here were {} of them, by condition: {}.",
+                     found.held_out.size(), fmt::join(found.held_out, ", "));
 }
 
 std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects) {

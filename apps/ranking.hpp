@@ -36,6 +36,9 @@ std::vector<std::string> separating_lines(const fitting::AcceptedEffect& effect)
 /// Evident, and yet no part of the answer: too small, or not confirmed by the held-out throws.
 std::string small_text(const fitting::SmallEffect& small);
 
+/// Which throws were held out where the log does not say; empty where it does.
+std::string held_out_text(const fitting::Discovery& found);
+
 /// Where mass and inertia are off by the same ratio: that it may be a gain of the wrench. Else empty.
 std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects);
 

@@ -28,8 +28,9 @@ struct ContactParameters {
 
 /// A contact model that can be chosen by name.
 struct ContactModelEntry {
-  std::string name;
-  std::function<std::unique_ptr<ContactModel>(const ContactParameters<Dual>&)> make;
+  std::string name;  ///< as in commands, cards and messages
+  std::function<std::unique_ptr<ContactModel>(const ContactParameters<Dual>&)>
+      make;                         ///< throws as its constructor
   std::vector<LawParameter> own{};  ///< what it takes beside ContactParameters' other members
 };
 

@@ -24,7 +24,8 @@ constexpr OtherUnit kTorques[] = {{1e3, "N mm for N m"},
                                   {100, "N cm for N m"},
                                   {100 / kStandardGravity, "kgf cm for N m"},
                                   {1 / kStandardGravity, "kgf m for N m"}};
-constexpr OtherUnit kTimes[] = {
+constexpr OtherUnit kTimes[] = {{1e3, "ms for s"}, {1e6, "us for s"}, {1e9, "ns for s"}};
+constexpr OtherUnit kSpans[] = {
     {1e3, "ms for s"}, {1e6, "us for s"}, {1e9, "ns for s"}, {1e-3, "s for ms"}, {1e-6, "s for us"}};
 
 constexpr ColumnSide kDeclared{"what is declared", "", {}};
@@ -32,8 +33,8 @@ constexpr ColumnSide kDeclared{"what is declared", "", {}};
 const std::map<SizedColumn, UnitRule> kRules{
     {SizedColumn::hand_clock,
      {{"hand/time", "time", kTimes}, kDeclared, "its twist and acceleration allow", 1.5}},
-    {SizedColumn::ft_clock, {{"ft/time", "time", kTimes}, kDeclared, "the hand's clock runs", 4}},
-    {SizedColumn::mocap_clock, {{"mocap/time", "time", kTimes}, kDeclared, "the hand's clock runs", 4}},
+    {SizedColumn::ft_clock, {{"ft/time", "time", kSpans}, kDeclared, "the hand's clock runs", 4}},
+    {SizedColumn::mocap_clock, {{"mocap/time", "time", kSpans}, kDeclared, "the hand's clock runs", 4}},
     {SizedColumn::landing_clock,
      {{"landing/time", "time", kTimes}, kDeclared, "a free fall from the opening takes", 3}},
     {SizedColumn::hand_shift,

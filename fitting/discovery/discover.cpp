@@ -106,6 +106,9 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
   const int threads = options.fit.threads;
   const datasets::ThrowLog log = with_held_out(logged);
   Discovery out;
+  if (!has_both_splits(logged))
+    for (const auto& one : log.throws)
+      if (one.split == datasets::Split::test) out.held_out.push_back(one.id);
   Stage stage{CampaignProblem(log, file, options.campaign), {}, {}, {}};
   if (std::none_of(log.throws.begin(), log.throws.end(),
                    [](const datasets::Throw& t) { return t.split == datasets::Split::test; })) {

@@ -212,6 +212,7 @@ struct FirstMisfit {
 /// The loop's answer.
 struct Discovery {
   Verdict verdict{};                    ///< found, nothing missing, unexplained, or no answer
+  std::vector<std::string> held_out;    ///< throws that with_held_out chose; empty where the log says which
   std::string message;                  ///< the answer in words
   std::vector<AcceptedEffect> effects;  ///< in order of acceptance
   std::vector<std::string> imitations;  ///< accepted at first, and withdrawn (acceptance.hpp)

@@ -119,10 +119,14 @@ void balance(std::vector<LogCondition>& conditions) {
 
 }  // namespace
 
-datasets::ThrowLog with_held_out(datasets::ThrowLog log) {
+bool has_both_splits(const datasets::ThrowLog& log) {
   bool train = false, test = false;
   for (const auto& t : log.throws) (t.split == Split::train ? train : test) = true;
-  if (train && test) return log;
+  return train && test;
+}
+
+datasets::ThrowLog with_held_out(datasets::ThrowLog log) {
+  if (has_both_splits(log)) return log;
   auto conditions = conditions_of(log);
   std::map<std::string, int> of_object;
   int most = 0;

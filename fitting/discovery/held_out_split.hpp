@@ -5,6 +5,9 @@
 
 namespace unhand::fitting {
 
+/// Whether the log itself says what is held out.
+bool has_both_splits(const datasets::ThrowLog& log);
+
 /// The log as it is if it has throws of both splits. Else half of the conditions of each object are held out,
 /// one less if they are odd: such that train and held-out throws are distributed most alike in the grip's
 /// force and in what the hand does when the gripper opens (velocity, spin, attitude, accelerations), each by

@@ -110,6 +110,18 @@ TEST_F(Cli, DiscoverReportsOnFlights) {
   EXPECT_EQ(read_json(folder / "r/discovery.json"), found);
 }
 
+TEST_F(Cli, WhatDiscoverHoldsOutByItselfIsSaid) {
+  auto log = datasets::read_throw_log(quick);
+  for (auto& one : log.throws) one.split = datasets::Split::test;
+  datasets::write_throw_log((folder / "one.h5").string(), log);
+  const Answer answer = run("discover one.h5 --json d.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("held out here were 4 of them"));
+  EXPECT_EQ(read_json(folder / "d.json")["held_out"].size(), 4u);
+  ASSERT_EQ(run("discover " + quick + " --json declared.json").code, 0);
+  EXPECT_FALSE(read_json(folder / "declared.json").contains("held_out"));
+}
+
 TEST_F(Cli, DiscoverFindsNothingInACalmLog) {
   const Answer answer = run("discover " + quick + " --json d.json --report r");
   ASSERT_EQ(answer.code, 0) << answer.err;

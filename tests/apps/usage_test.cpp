@@ -87,9 +87,25 @@ TEST_F(Cli, WrongUsage) {
   expect_refusal("compare " + quick + " --models sliding_pivot,wishful", 2, "wishful");
   expect_refusal("compare " + quick + " --models sliding_pivot,sliding_pivot", 2, "twice");
   expect_refusal("compare " + quick + " --rtol 7", 2, "rtol");
+  expect_refusal("generate quick12 --out a.h5 --effect flight.wind=1 --effect flight.wind=2", 2,
+                 "given twice");
   expect_refusal("generate quick12 --out ''", 2, "--out: '' names no file");
   expect_refusal("figure mae --out ''", 2, "--out: '' names no file");
   expect_refusal("compare " + quick + " --rtol nan", 2, "finite");
+}
+
+TEST_F(Cli, SeveralEffectsAndSensorsMayBeSaidAtOnce) {
+  const std::string one = "contact.viscous=1", two = "flight.wind=0.5";
+  ASSERT_EQ(run("generate quick12 --effect " + one + " --effect " + two +
+                " --without mocap --without landing --out a.h5")
+                .code,
+            0);
+  ASSERT_EQ(run("generate --effect " + one + " " + two + " quick12 --without mocap,landing --out b.h5").code,
+            0);
+  ASSERT_EQ(run("generate quick12 --effect " + one + "," + two + " --without mocap,landing --out c.h5").code,
+            0);
+  EXPECT_EQ(content(folder / "a.h5"), content(folder / "b.h5"));
+  EXPECT_EQ(content(folder / "a.h5"), content(folder / "c.h5"));
 }
 
 // A block without rows keeps its place: gnuplot's index would draw the next one in it.

@@ -117,6 +117,8 @@ const Mistake kMistakes[] = {
      "/throws/*/hand/time", "time", "ms for s"},
     {"the F/T clock in ms", [](Throw& t) { scale(t.ft->time, 1e3); }, "/throws/*/ft/time", "time",
      "ms for s"},
+    {"the F/T clock said to be in ms", [](Throw& t) { scale(t.ft->time, 1e-3); }, "/throws/*/ft/time", "time",
+     "s for ms"},
     {"wrenches in kgf and kgf m", [](Throw& t) { scale(t.ft->wrench, 1 / kGravity, 0, 3); },
      "/throws/*/ft/wrench", "force", "kgf for N"},
     {"forces in mN", [](Throw& t) { scale(t.ft->wrench, 1e3, 0, 2); }, "/throws/*/ft/wrench", "force",
