@@ -10,6 +10,7 @@
 #include "apps/command.hpp"
 #include "contact/gripper_delay.hpp"
 #include "contact/patch.hpp"
+#include "contact/registry.hpp"
 #include "fitting/measured/measured_card.hpp"
 
 namespace unhand::apps {

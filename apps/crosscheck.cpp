@@ -16,6 +16,7 @@
 #include "apps/tell.hpp"
 #include "apps/throws.hpp"
 #include "contact/gripper_delay.hpp"
+#include "contact/registry.hpp"
 #include "crosscheck/bullet_release.hpp"
 #include "crosscheck/distributed_patch.hpp"
 #include "datasets/near_miss.hpp"

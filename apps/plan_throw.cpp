@@ -16,6 +16,7 @@
 #include "apps/progress.hpp"
 #include "apps/tell.hpp"
 #include "apps/throws.hpp"
+#include "contact/registry.hpp"
 #include "datasets/model_card.hpp"
 #include "datasets/sku.hpp"
 #include "fitting/sku/sku_inputs.hpp"

@@ -61,7 +61,8 @@ GripperDelay::GripperDelay(double open_command, const Dual& delay)
   if (!std::isfinite(open_command))
     throw std::invalid_argument(
         fmt::format("gripper delay: open_command = {} s is not finite", open_command));
-  validate(DelayDistribution::number(delay.a));
+  if (!(delay.a >= 0 && delay.a <= 10))
+    throw std::invalid_argument(fmt::format("gripper delay: delay = {} is not in [0, 10] s", delay.a));
 }
 
 template class ContactModelFrom<GripperDelay>;

@@ -1,5 +1,7 @@
 #include "experiment/compare.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -35,6 +37,8 @@ namespace {
 
 template <class Keep>
 ErrorStatistics collect(const std::vector<ThrowComparison>& throws, int quantity, Keep&& keep) {
+  if (quantity < 0 || quantity >= kQuantityCount)
+    throw std::invalid_argument(fmt::format("quantity {} is not in [0, {})", quantity, kQuantityCount));
   std::vector<double> errors;
   for (const auto& t : throws)
     if (keep(t) && t.error[quantity]) errors.push_back(*t.error[quantity]);

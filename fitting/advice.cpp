@@ -1,4 +1,6 @@
 #include "fitting/advice.hpp"
+
+#include "contact/registry.hpp"
 #include "fitting/distributions.hpp"
 
 #include <algorithm>

@@ -10,6 +10,7 @@
 
 #include "contact/gripper_delay.hpp"
 #include "contact/patch.hpp"
+#include "contact/registry.hpp"
 #include "experiment/campaign_effects.hpp"
 #include "fitting/normal_equations.hpp"
 

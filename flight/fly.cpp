@@ -196,6 +196,9 @@ std::vector<Pose<S>> fly_through(const FlightProblem<S>& problem, const std::vec
 template <class S>
 RecordedFlight<S> record_flight(const FlightProblem<S>& problem, double longest,
                                 const dynamics::IntegratorOptions& options) {
+  validate(problem);
+  if (!(longest > 0 && std::isfinite(longest)))
+    throw std::invalid_argument(fmt::format("flight: longest = {} is not in (0, inf) s", longest));
   dynamics::IntegratorOptions recorded = options;
   recorded.record = true;
   recorded.longest_step = std::max(options.longest_step, 0.05);

@@ -59,7 +59,8 @@ template <class S>
 struct RecordedFlight {
   dynamics::Trajectory<S, 6> trajectory;  ///< pose and twist of the CoM
 };
-/// Flies for `longest` > 0 [s], without landing. Throws std::runtime_error if the flight is not solved.
+/// Flies for `longest` > 0 [s], without landing. Throws std::invalid_argument as fly() does, and
+/// std::runtime_error if the flight is not solved.
 template <class S>
 RecordedFlight<S> record_flight(const FlightProblem<S>& problem, double longest,
                                 const dynamics::IntegratorOptions& options = {});

@@ -235,6 +235,12 @@ PolynomialHand PolynomialHand::segments(double t_start, const dynamics::Pose<dou
                                   std::to_string(breaks.back()) + " s");
     const Columns a = {stretch.acceleration.ax, stretch.acceleration.az, stretch.acceleration.alpha};
     const Columns j = {stretch.jerk.ax, stretch.jerk.az, stretch.jerk.alpha};
+    for (int n = 0; n < 3; ++n)
+      if (!std::isfinite(a[n]) || !std::isfinite(j[n]) || !std::isfinite(x[n]) || !std::isfinite(v[n]))
+        throw std::invalid_argument(
+            "PolynomialHand::segments: pose, twist, accelerations and jerks must be finite; "
+            "those of the stretch to " +
+            std::to_string(stretch.t_end) + " s are not");
     Polynomial::Coefficients c{};
     for (int n = 0; n < 3; ++n) {
       c[0][n] = x[n];

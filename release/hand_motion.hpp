@@ -59,7 +59,8 @@ class PolynomialHand final : public HandMotion {
   explicit PolynomialHand(Polynomial path, std::vector<double> jumps = {});
 
   /// Joins stretches of linear acceleration, starting at t_start [s] from the given pose and twist. Every
-  /// inner end of a stretch counts as a jump. Throws std::invalid_argument unless the ends increase.
+  /// inner end of a stretch counts as a jump. Throws std::invalid_argument unless the ends increase and all
+  /// is finite.
   static PolynomialHand segments(double t_start, const dynamics::Pose<double>& pose,
                                  const dynamics::Twist<double>& twist,
                                  const std::vector<HandSegment>& stretches);

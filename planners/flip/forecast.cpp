@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "contact/registry.hpp"
 #include "dynamics/dense_solve.hpp"
 #include "planners/flip/arm_throw.hpp"
 

@@ -118,7 +118,7 @@ TEST_P(Outcomes, WrongPatchesAreRefused) {
     for (const double t : {kNaN, kInfinity})
       expect_refused({"open_command"}, with([=](auto& p) { p.open_command = t; }));
     for (const double t : {-0.1, 10.1, kNaN})
-      expect_refused({"gripper delay"}, with([=](auto& p) { p.delay = t; }));
+      expect_refused({"gripper delay: delay"}, with([=](auto& p) { p.delay = t; }));
   }
 }
 

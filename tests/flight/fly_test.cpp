@@ -297,6 +297,8 @@ TEST(Flights, RefuseWhatIsNoFlight) {
     q.drag_k = drag;
     EXPECT_THROW(fly_through(q, {-0.1}), std::invalid_argument) << drag;
     EXPECT_THROW(fly_through(q, {NAN}), std::invalid_argument) << drag;
+    for (const double longest : {0.0, -1.0, double(NAN)})
+      EXPECT_THROW(record_flight(q, longest), std::invalid_argument) << drag << ' ' << longest;
     q.longest = NAN;
     EXPECT_THROW(fly(q), std::invalid_argument) << drag;
   }

@@ -85,6 +85,8 @@ TEST(PolynomialHand, SegmentsJoinWithContinuousTwist) {
   EXPECT_EQ(left.acceleration.alpha, -4.0);
   EXPECT_EQ(right.acceleration.alpha, 8.0);
   EXPECT_THROW(PolynomialHand::segments(1.0, {}, {}, {{0.5, {}, {}}}), std::invalid_argument);
+  EXPECT_THROW(PolynomialHand::segments(1.0, {}, {}, {{1.5, {NAN, 0, 0}, {}}}), std::invalid_argument);
+  EXPECT_THROW(PolynomialHand::segments(1.0, {NAN, 0, 0}, {}, {{1.5, {}, {}}}), std::invalid_argument);
   EXPECT_THROW(PolynomialHand(hand.path(), {1.25}), std::invalid_argument);
 }
 
