@@ -5,7 +5,6 @@
 #include <memory>
 #include <stdexcept>
 
-#include "contact/convex_quartic.hpp"
 #include "contact/registry.hpp"
 #include "experiment/outcome_slopes.hpp"
 

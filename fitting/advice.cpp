@@ -1,10 +1,10 @@
 #include "fitting/advice.hpp"
 
-#include "contact/registry.hpp"
-#include "fitting/distributions.hpp"
-
 #include <algorithm>
 #include <cmath>
+
+#include "contact/registry.hpp"
+#include "fitting/distributions.hpp"
 
 namespace unhand::fitting {
 

@@ -7,7 +7,6 @@
 #include <set>
 #include <stdexcept>
 
-#include "contact/convex_quartic.hpp"
 #include "contact/gripper_delay.hpp"
 #include "contact/patch.hpp"
 #include "contact/registry.hpp"
