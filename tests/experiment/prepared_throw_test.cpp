@@ -17,21 +17,26 @@ namespace {
 using namespace unhand;
 using namespace unhand::experiment;
 
-/// A tracker goes on after the object has come down: what lies on the floor is no flight, whether the landing
-/// was logged or not.
+/// One more sample of a planar track.
+void track(datasets::MocapLog& mocap, double t, const dynamics::Pose<double>& pose) {
+  mocap.time.data.push_back(t);
+  mocap.pose.data.insert(mocap.pose.data.end(), {pose.x, pose.z, pose.theta});
+  mocap.valid.push_back(1);
+  ++mocap.time.rows, ++mocap.pose.rows;
+}
+
+/// A tracker goes on after the object has come down: what lies on the floor is no flight, nor what somebody
+/// picks up again and lifts above all that was thrown, whether the landing was logged or not.
 TEST(PreparedThrow, TheTwistAtDetachKnowsNothingOfTheFloor) {
   const CampaignDesign design = campaign_design("quick12");
   datasets::ThrowLog log = campaign_header(design, 1);
   const auto [record, truth] = generate_throw(design, 1, 3);
   log.throws = {record};
   datasets::Throw lying = record;
-  datasets::MocapLog& mocap = *lying.mocap;
-  for (int k = 0; k < 120; ++k) {  // half a second, rolled on by a centimetre, a millimetre below
-    mocap.time.data.push_back(truth.landing_time + (k + 1) / 240.0);
-    mocap.pose.data.insert(mocap.pose.data.end(), {truth.landing_pose.x + 0.01, log.landing_height - 1e-3,
-                                                   truth.landing_pose.theta});
-    mocap.valid.push_back(1);
-    ++mocap.time.rows, ++mocap.pose.rows;
+  for (int k = 0; k < 120; ++k) {  // a quarter of a second, rolled on by a centimetre, a millimetre below
+    const double lifted = k < 60 ? -1e-3 : 0.05 * (k - 60);
+    track(*lying.mocap, truth.landing_time + (k + 1) / 240.0,
+          {truth.landing_pose.x + 0.01, log.landing_height + lifted, truth.landing_pose.theta});
   }
   datasets::Throw unlogged = lying;
   unlogged.landing.reset();
@@ -89,15 +94,11 @@ TEST(PreparedThrow, AFlightEndsWhereItIsDeclaredTo) {
   datasets::Throw bounced = record;
   bounced.landing.reset();
   bounced.free_flight = {truth.detach_time, truth.landing_time - 0.01};
-  datasets::MocapLog& mocap = *bounced.mocap;
   for (int k = 0; k < 120; ++k) {  // back up at once, turning the other way
     const double since = k / 240.0;
-    mocap.time.data.push_back(truth.landing_time + 1e-3 + since);
-    mocap.pose.data.insert(mocap.pose.data.end(), {truth.landing_pose.x - since,
-                                                   log.landing_height + 2 * since - 4.905 * since * since,
-                                                   truth.landing_pose.theta - 5 * since});
-    mocap.valid.push_back(1);
-    ++mocap.time.rows, ++mocap.pose.rows;
+    track(*bounced.mocap, truth.landing_time + 1e-3 + since,
+          {truth.landing_pose.x - since, log.landing_height + 2 * since - 4.905 * since * since,
+           truth.landing_pose.theta - 5 * since});
   }
   const auto twist = prepare(log, bounced, "(in memory)").measured.detach_twist;
   ASSERT_TRUE(twist);
