@@ -21,7 +21,8 @@ TEST_F(Cli, FitSaysWhichThrowsItLeavesOut) {
   EXPECT_THAT(answer.out,
               HasSubstr("1 train throws could not be simulated from the start and took no part: " + why +
                         " (1 throws)"));
-  for (const auto& one : read_json(folder / "f.json")["throws"]) {
+  const json fitted = read_json(folder / "f.json");
+  for (const auto& one : fitted["throws"]) {
     if (one["id"] == "001")
       EXPECT_EQ(one["why_not"], why);
     else
