@@ -81,9 +81,8 @@ std::vector<NamedValue> named_values(const std::string& model, const experiment:
   }
   std::vector<NamedValue> out{
       {"mu", "-", p.mu}, {"length", "m", p.length}, {"pads", "-", static_cast<double>(p.pads)}};
-  for (const auto& own : contact::law_parameters(model))
-    if (const auto value = p.law_values.find(own.name); value != p.law_values.end())
-      out.push_back({own.name, own.unit, value->second});
+  for (const auto& [own, value] : contact::given_law_parameters(model, p.law_values))
+    out.push_back({own.name, own.unit, value});
   return out;
 }
 

@@ -168,7 +168,7 @@ Command generate_command(Parser& root) {
               "log does not say; 'random': one drawn with the seed. Several with blanks or commas between, "
               "or repeated")
       .with_commas()
-      .one_value_each();
+      .assignments();
   parser
       .option("--without", options->without,
               "Leave sensors out: ft, wrench, mocap or landing; several with commas between, or repeated")

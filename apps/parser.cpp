@@ -67,16 +67,24 @@ std::string unknown_option(const CLI::App& command, int argc, char** argv) {
   return {};
 }
 
-/// The words, with `--effect A=1 B=2` as `--effect A=1 --effect B=2`: a word with '=' that follows such a
-/// value is another one, and one without is what comes next on the command line.
-std::vector<std::string> repeated(int argc, char** argv) {
+/// How the help shows the values of an option that takes assignments; such options are known by it.
+const char* const kAssignment = "NAME=VALUE";
+
+/// The words, with `--effect A=1 B=2` as `--effect A=1 --effect B=2` where the option takes assignments.
+std::vector<std::string> repeated(const CLI::App& command, int argc, char** argv) {
   std::vector<std::string> out;
-  bool values = false;
+  std::string name;  // of the option whose values may go on
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
-    const bool option = word.starts_with('-'), value = !option && word.find('=') != std::string::npos;
-    if (values && value && out.back() != "--effect") out.emplace_back("--effect");
-    values = word == "--effect" || (values && (value || out.back() == "--effect"));
+    const bool first = !name.empty() && out.back() == name;
+    if (word.starts_with('-')) {
+      const CLI::Option* option = command.get_option_no_throw(word);
+      name = option && option->get_type_name().starts_with(kAssignment) ? word : "";
+    } else if (!first && word.find('=') == std::string::npos) {
+      name.clear();
+    } else if (!first && !name.empty()) {
+      out.push_back(name);
+    }
     out.push_back(word);
   }
   return out;
@@ -116,6 +124,7 @@ Option Option::with_commas() {
 }
 Option Option::expected(int least, int most) { return option_->expected(least, most), *this; }
 Option Option::one_value_each() { return option_->allow_extra_args(false), *this; }
+Option Option::assignments() { return option_->type_name(kAssignment)->allow_extra_args(false), *this; }
 Option Option::with_default() { return option_->capture_default_str(), *this; }
 Option Option::group(const std::string& name) { return option_->group(name), *this; }
 bool Option::given() const { return option_->count() > 0; }
@@ -187,7 +196,7 @@ Parser::Parsed Parser::parse(int argc, char** argv) {
     return Parsed::wrong_usage;
   }
   try {
-    auto words = repeated(argc, argv);
+    auto words = repeated(*at, argc, argv);
     std::reverse(words.begin(), words.end());  // as CLI11 takes them
     app_->parse(std::move(words));
     return Parsed::run;

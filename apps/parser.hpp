@@ -30,6 +30,8 @@ class Option {
   Option expected(int least, int most);
   /// One value each time it is given; it may be given again.
   Option one_value_each();
+  /// Values as NAME=VALUE: one, and the words with '=' that follow it; it may be given again.
+  Option assignments();
   /// The help shows the value that holds if it is not given.
   Option with_default();
   /// Under this heading in the help.

@@ -130,9 +130,8 @@ std::vector<ThrowAnswer::Number> numbers_of(const planners::ReleaseCard& card,
   };
   add("mu", "-", card.mu.value, card.mu.sigma);
   add("length", "m", card.length, 0);
-  for (const auto& own : contact::law_parameters(card.model))
-    if (const auto value = card.law_values.find(own.name); value != card.law_values.end())
-      add(own.name.c_str(), own.unit.c_str(), value->second, 0);
+  for (const auto& [own, value] : contact::given_law_parameters(card.model, card.law_values))
+    add(own.name.c_str(), own.unit.c_str(), value, 0);
   add("pads", "-", card.pads, 0);
   add("grip_force", "N", card.grip_force, 0);
   add("dead_time", "s", card.dead_time.value, card.dead_time.sigma);

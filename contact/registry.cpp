@@ -124,6 +124,13 @@ const std::vector<LawParameter>& law_parameters(std::string_view name) {
   return entry ? entry->own : kNone;
 }
 
+std::vector<GivenLawParameter> given_law_parameters(std::string_view name, const LawValues<double>& values) {
+  std::vector<GivenLawParameter> out;
+  for (const auto& own : law_parameters(name))
+    if (const auto value = values.find(own.name); value != values.end()) out.push_back({own, value->second});
+  return out;
+}
+
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name,
                                                  const ContactParameters<Dual>& parameters) {
   if (const auto* entry = find(name)) return entry->make(parameters);

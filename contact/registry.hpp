@@ -46,6 +46,15 @@ std::vector<std::string> contact_model_names();
 /// What a law takes of its own; empty for a name that is not known.
 const std::vector<LawParameter>& law_parameters(std::string_view name);
 
+/// One of a law's own parameters that has a value [LawParameter::unit].
+struct GivenLawParameter {
+  const LawParameter& parameter;
+  double value;
+};
+
+/// Those of the law's own parameters that `values` knows, in the law's order.
+std::vector<GivenLawParameter> given_law_parameters(std::string_view name, const LawValues<double>& values);
+
 /// The model of that name. Throws std::invalid_argument, listing the names, if there is none, and as the
 /// model's constructor does. Of `law_values` it reads those of its own parameters.
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name, const ContactParameters<double>&);

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "datasets/hdf5_driver.hpp"
+#include "datasets/hdf5_lzf.hpp"
 #include "datasets/near_miss.hpp"
 
 namespace unhand::datasets::hdf5 {
@@ -63,6 +64,7 @@ Node Node::open_file(const std::string& file, Place* place) {
 #endif
   if (read_plainly(access.id()) < 0)
     throw LogError(file, "/", fmt::format("cannot be opened ({})", last_message()));
+  read_lzf();
   Handle opened = file_handle(H5Fopen(file.c_str(), H5F_ACC_RDONLY, access.id()));
   if (!opened) throw LogError(file, "/", fmt::format("is truncated or damaged ({})", last_message()));
   Handle root = group_handle(H5Gopen2(opened.id(), "/", H5P_DEFAULT));

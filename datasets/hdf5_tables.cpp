@@ -65,6 +65,21 @@ std::vector<double> column_sigma(const Node& dataset, const std::vector<const Un
   return sigma;
 }
 
+/// The first filter of a dataset that nothing here can undo, by name and number; empty if there is none.
+std::string missing_filter(hid_t creation) {
+  const int filters = H5Pget_nfilters(creation);
+  for (int i = 0; i < filters; ++i) {
+    unsigned flags = 0, configuration = 0;
+    std::size_t values = 0;
+    char name[64] = {};
+    const H5Z_filter_t filter = H5Pget_filter2(creation, static_cast<unsigned>(i), &flags, &values, nullptr,
+                                               sizeof name - 1, name, &configuration);
+    if (filter < 0 || H5Zfilter_avail(filter) > 0) continue;
+    return fmt::format("the filter {}{}", filter, *name ? fmt::format(" ({})", name) : "");
+  }
+  return {};
+}
+
 std::string shape_text(std::size_t rows, std::size_t cols, int rank) {
   return rank == 1 ? fmt::format("({})", rows) : fmt::format("({},{})", rows, cols);
 }
@@ -93,6 +108,9 @@ Node::Table Node::open_table(std::string_view name) const {
   if (H5Pget_external_count(creation.id()) > 0 || H5Pget_layout(creation.id()) == H5D_VIRTUAL) {
     fail(name, "keeps its values in another file");
   }
+  if (const std::string filter = missing_filter(creation.id()); !filter.empty())
+    fail(name,
+         fmt::format("is compressed with {}, which this HDF5 cannot read (gzip and lzf are read)", filter));
   if (H5Tget_size(type.id()) > widest_number)
     fail(name, fmt::format("wrong type: numbers of {} bytes", H5Tget_size(type.id())));
   hsize_t sizes[H5S_MAX_RANK] = {};

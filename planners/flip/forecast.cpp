@@ -181,9 +181,8 @@ datasets::ModelCard model_card_of(const ReleaseFit& fit, const std::string& sour
   out.model = c.model;
   out.parameters["mu"] = {c.mu.value, c.mu.sigma, "-"};
   out.parameters["length"] = {c.length, fit.length_sigma, "m"};
-  for (const auto& own : contact::law_parameters(c.model))
-    if (const auto value = c.law_values.find(own.name); value != c.law_values.end())
-      out.parameters[own.name] = {value->second, {}, own.unit};
+  for (const auto& [own, value] : contact::given_law_parameters(c.model, c.law_values))
+    out.parameters[own.name] = {value, {}, own.unit};
   out.parameters["pads"] = {static_cast<double>(c.pads), {}, "-"};
   out.parameters["grip_force"] = {c.grip_force, {}, "N"};
   out.parameters["dead_time"] = {c.dead_time.value, c.dead_time.sigma, "s"};

@@ -90,6 +90,23 @@ struct Editor {
     H5Sclose(space);
     if (!units.empty()) text(path, "units", units);
   }
+  /// Replaces a dataset by one of a single chunk, whose bytes are as a filter of this number left them.
+  void filtered(const std::string& path, std::vector<hsize_t> sizes, H5Z_filter_t filter,
+                const std::vector<unsigned>& filter_values, const std::vector<char>& bytes,
+                const std::string& units) const {
+    if (H5Lexists(file, path.c_str(), H5P_DEFAULT) > 0) remove(path);
+    const hid_t space = H5Screate_simple(int(sizes.size()), sizes.data(), nullptr);
+    const hid_t creation = H5Pcreate(H5P_DATASET_CREATE);
+    must(H5Pset_chunk(creation, int(sizes.size()), sizes.data()) >= 0);
+    must(H5Pset_filter(creation, filter, H5Z_FLAG_OPTIONAL, filter_values.size(), filter_values.data()) >= 0);
+    const hid_t made = H5Dcreate2(file, path.c_str(), H5T_NATIVE_DOUBLE, space, 0, creation, 0);
+    const std::vector<hsize_t> first(sizes.size(), 0);
+    must(made >= 0 && H5Dwrite_chunk(made, 0, 0, first.data(), bytes.size(), bytes.data()) >= 0);
+    H5Dclose(made);
+    H5Pclose(creation);
+    H5Sclose(space);
+    text(path, "units", units);
+  }
   void doubles(const std::string& path, std::vector<hsize_t> sizes, std::vector<double> values,
                const std::string& units) const {
     dataset(path, H5T_NATIVE_DOUBLE, std::move(sizes), values.data(), units);

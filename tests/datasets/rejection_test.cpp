@@ -104,6 +104,11 @@ const Case planar_cases[] = {
        must(H5Lcreate_external("other.h5", "/hand", f.file, hand.c_str(), 0, 0) >= 0);
      },
      "/throws/001/hand", "link out of the file"},
+    {"unknown_compression",
+     [](const Editor& f) {
+       f.filtered(hand + "/pose", {2, 3}, 65000, {}, std::vector<char>(48), "m,m,rad");
+     },
+     "/throws/001/hand/pose", "the filter 65000"},
     {"dangling_link",
      [](const Editor& f) {
        f.remove(hand + "/pose");

@@ -1,4 +1,6 @@
 // What is written comes back bit for bit; other units, types and strings come back as the same SI values.
+#include <lzf.h>
+
 #include <numbers>
 
 #include "datasets/extended_log.hpp"
@@ -119,6 +121,39 @@ TEST(RoundTrip, TheSameLogGivesTheSameBytes) {
   write_throw_log(scratch / "a.h5", planar_log());
   write_throw_log(scratch / "b.h5", planar_log());
   EXPECT_EQ(bytes_of(scratch / "a.h5"), bytes_of(scratch / "b.h5"));
+}
+
+/// What h5py's compression="lzf" leaves: the values and a pattern that LZF makes smaller.
+TEST(RoundTrip, ReadsWhatIsCompressedWithLzf) {
+  const Scratch scratch;
+  ThrowLog log = planar_log();
+  Series& pose = log.throws[0].mocap->pose;
+  for (std::size_t k = 0; k < pose.data.size(); ++k) pose.data[k] = 0.25 * static_cast<double>(k % 6);
+  write_throw_log(scratch / "a.h5", log);
+  const std::size_t size = pose.data.size() * sizeof(double);
+  std::vector<char> packed(size);
+  packed.resize(lzf_compress(pose.data.data(), static_cast<unsigned>(size), packed.data(),
+                             static_cast<unsigned>(size - 1)));
+  ASSERT_GT(packed.size(), 0u);
+  const auto pack = [&](unsigned chunk, const std::vector<char>& bytes) {
+    Editor(scratch / "a.h5")
+        .filtered("/throws/001/mocap/pose", {pose.rows, pose.cols}, 32000, {4, LZF_VERSION, chunk}, bytes,
+                  "m,m,rad");
+    const std::vector<double> sigma = pose.sigma;
+    if (!sigma.empty()) Editor(scratch / "a.h5").reals("/throws/001/mocap/pose", "sigma", sigma);
+  };
+  pack(static_cast<unsigned>(size), packed);
+  const ThrowLog read = read_throw_log(scratch / "a.h5");
+  EXPECT_EQ(read.throws[0].mocap->pose.data, pose.data);
+
+  for (const unsigned wrong : {0u, 8u}) {
+    SCOPED_TRACE(wrong);
+    pack(wrong, packed);
+    EXPECT_THROW(read_throw_log(scratch / "a.h5"), LogError);
+  }
+  packed.resize(packed.size() / 2);
+  pack(static_cast<unsigned>(size), packed);
+  EXPECT_THROW(read_throw_log(scratch / "a.h5"), LogError);
 }
 
 TEST(RoundTrip, WritesWithChunksGzipShuffleAndChecksum) {
