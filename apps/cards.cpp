@@ -73,7 +73,7 @@ datasets::CardLog log_of(const fs::path& file, const datasets::ThrowLog& log) {
 }  // namespace
 
 std::vector<NamedValue> named_values(const std::string& model, const experiment::ModelParameters& p) {
-  if (model == contact::kGripperDelay) {
+  if (!contact::follows_pads(model)) {
     std::vector<NamedValue> out{{"delay", "s", p.delay.centre}};
     if (p.delay.kind == contact::DelayDistribution::Kind::truncated_normal)
       out.push_back({"delay_sigma", "s", p.delay.spread});
@@ -111,7 +111,7 @@ UsableCard read_usable_card(const fs::path& file) {
     reader.fail("/model", fmt::format("'{}' is no model of releases; there are {}", out.card.model,
                                       fmt::join(models, ", ")));
   auto& p = out.parameters;
-  if (out.card.model == contact::kGripperDelay) {
+  if (!contact::follows_pads(out.card.model)) {
     const double delay = reader.take("delay", "s", 0, 10),
                  sigma = reader.take_or("delay_sigma", "s", 0, 10, 0);
     p.delay = sigma > 0 ? contact::DelayDistribution::normal(delay, sigma, std::max(0.1, 2 * delay))
@@ -154,7 +154,7 @@ experiment::FrictionEstimate estimated(const datasets::ThrowLog& log,
     return out;
   } catch (const experiment::Undetermined& error) {
     const std::string advice =
-        model == contact::kGripperDelay ? error.advice
+        !contact::follows_pads(model) ? error.advice
         : model == naive_model
             ? std::string("give a card (--card)")
             : fmt::format("give a card (--card), as `unhand fit LOG --model {} --card FILE` makes it", model);

@@ -82,9 +82,8 @@ experiment::ModelParameters parameters_of(const CrosscheckOptions& options, cons
     experiment::ModelParameters out = card.parameters;
     if (!card.card.effects.empty())
       throw datasets::CardError(options.card, "/effects", "other engines have none of them: not accepted");
-    if (card.card.model == contact::kGripperDelay)
-      throw datasets::CardError(options.card, "/model",
-                                fmt::format("'{}' has no friction", contact::kGripperDelay));
+    if (!contact::follows_pads(card.card.model))
+      throw datasets::CardError(options.card, "/model", fmt::format("'{}' has no friction", card.card.model));
     if (card.fitted) {
       const auto value = [&](const char* name) {
         const auto found = card.card.parameters.find(name);
@@ -281,7 +280,7 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
     refuse_options(parser, {"--pads", "--friction"}, "of bullet; patch has points with bristles");
   require_outputs({{options.json}}, {options.log, options.card});
   auto known = contact::contact_model_names();
-  std::erase(known, contact::kGripperDelay);  // it has no pads that another engine could be given
+  std::erase_if(known, [](const auto& law) { return !contact::follows_pads(law); });
   for (const auto& model : options.models)
     if (std::find(known.begin(), known.end(), model) == known.end())
       throw WrongUsage(

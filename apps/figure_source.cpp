@@ -93,7 +93,7 @@ ReleaseTrace FigureSource::trace(const std::string& model) {
     out.thrown = prepared.id;
   };
   const auto card = cards_.find(model);
-  if (model == contact::kGripperDelay || model == naive_model)
+  if (!contact::follows_pads(model) || model == naive_model)
     throw WrongUsage(fmt::format("--models: {} has no modes to draw", model));
   if (card != cards_.end() && card->second.fitted) {
     const Fitted& known = fitted(model);

@@ -50,7 +50,9 @@ std::deque<ContactModelEntry>& models() {
        {{"kappa", "-", ConvexQuartic::kappa_closest_to_disc(), 0, 3, 0.05, 2.95, 0.2, 0.3,
          "throws whose pads slide and turn at once, with force and torque measured behind a pad"}}},
       {kGripperDelay,
-       [](const Parameters& p) -> Model { return std::make_unique<GripperDelay>(p.open_command, p.delay); }},
+       [](const Parameters& p) -> Model { return std::make_unique<GripperDelay>(p.open_command, p.delay); },
+       {},
+       false},
   };
   return known;
 }
@@ -116,6 +118,11 @@ std::vector<std::string> contact_model_names() {
   std::vector<std::string> names;
   for (const auto& entry : models()) names.push_back(entry.name);
   return names;
+}
+
+bool follows_pads(std::string_view name) {
+  const auto* entry = find(name);
+  return !entry || entry->follows_pads;
 }
 
 const std::vector<LawParameter>& law_parameters(std::string_view name) {

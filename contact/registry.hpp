@@ -18,11 +18,11 @@ namespace unhand::contact {
 /// Everything that some contact model takes. Each model reads what it needs.
 template <class S>
 struct ContactParameters {
-  Patch<S> patch;                               ///< the limits, for all but gripper_delay
+  Patch<S> patch;                               ///< the limits, for laws that follow the pads
   SlideEnd slide_end{SlideEnd::latched_brake};  ///< sliding_pivot
   LawValues<S> law_values{};                    ///< of the law's own parameters (ContactModelEntry::own)
-  double open_command{};                        ///< gripper_delay: when the gripper is told to open [s]
-  S delay{};                                    ///< gripper_delay: from the command to the release [s]
+  double open_command{};                        ///< for other laws: when the gripper is told to open [s]
+  S delay{};                                    ///< for other laws: from the command to the release [s]
   FrictionVariation<S> variation{};             ///< departures of the friction limits; neutral by default
 };
 
@@ -32,6 +32,9 @@ struct ContactModelEntry {
   std::function<std::unique_ptr<ContactModel>(const ContactParameters<Dual>&)>
       make;                         ///< throws as its constructor
   std::vector<LawParameter> own{};  ///< what it takes beside ContactParameters' other members
+  /// Whether it says how the pads' friction lets go of the object, and so needs the patch and a normal force.
+  /// A law that does not, as gripper_delay, takes the delay.
+  bool follows_pads{true};
 };
 
 /// Makes a law known by name to everything in this program that takes names: make_contact_model, comparisons,
@@ -42,6 +45,9 @@ void register_contact_model(ContactModelEntry entry);
 
 /// The names that make_contact_model knows, the library's own first.
 std::vector<std::string> contact_model_names();
+
+/// ContactModelEntry::follows_pads; true for a name that is not known.
+bool follows_pads(std::string_view name);
 
 /// What a law takes of its own; empty for a name that is not known.
 const std::vector<LawParameter>& law_parameters(std::string_view name);

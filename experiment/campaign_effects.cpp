@@ -8,7 +8,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "contact/gripper_delay.hpp"
+#include "contact/registry.hpp"
 #include "datasets/near_miss.hpp"
 #include "experiment/random_stream.hpp"
 #include "experiment/synthetic_campaign.hpp"
@@ -97,7 +97,7 @@ bool is_visible(const Effect& effect, const CampaignDesign& design) {
     return std::any_of(design.objects.begin(), design.objects.end(),
                        [](const auto& o) { return o.drag_k > 0; });
   if (effect.id == "contact.pad_compliance")
-    return design.contact_model != "sliding_pivot" && design.contact_model != contact::kGripperDelay;
+    return design.contact_model != "sliding_pivot" && contact::follows_pads(design.contact_model);
   if (effect.id == "contact.pressure_profile") return design.contact_model == "limit_surface_disc";
   if (effect.id == "sensor.ft_bias") return s.ft && s.wrench;
   if (effect.id == "sensor.normal_force_bias" || effect.id == "release.opening_delay") return s.ft;

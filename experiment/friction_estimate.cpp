@@ -12,6 +12,7 @@
 #include "contact/gripper_delay.hpp"
 #include "contact/limit_surface_shapes.hpp"
 #include "contact/patch.hpp"
+#include "contact/registry.hpp"
 #include "dynamics/median.hpp"
 #include "experiment/observations.hpp"
 #include "experiment/sample_window.hpp"
@@ -224,7 +225,7 @@ bool determines_both(const SurfaceFit& fit) {
 constexpr const char* kAdvice = "fit to all that the log holds (--fit), or give a card (--card)";
 
 void estimate_delay(const datasets::ThrowLog& log, const std::vector<PreparedThrow>& throws,
-                    FrictionEstimate& out) {
+                    const std::string& model, FrictionEstimate& out) {
   std::vector<double> delays;
   for (const auto& t : throws)
     if (t.split == datasets::Split::train && t.measured.detach_time)
@@ -238,10 +239,10 @@ void estimate_delay(const datasets::ThrowLog& log, const std::vector<PreparedThr
         "delay: that after which carried objects fly as motion capture sees them, mean of the train throws";
   }
   if (delays.empty())
-    throw Undetermined(contact::kGripperDelay,
+    throw Undetermined(model,
                        "the log shows no detach in any train throw (neither a normal force that ends, nor "
                        "detach_time, nor motion capture from the opening to the landing)",
-                       "give gripper_delay a card (--card), or the throws their detach_time");
+                       "give a card (--card), or the throws their detach_time");
   double mean = 0, square = 0;
   for (const double d : delays) mean += d / static_cast<double>(delays.size());
   for (const double d : delays) square += (d - mean) * (d - mean) / static_cast<double>(delays.size());
@@ -254,7 +255,7 @@ void estimate_delay(const datasets::ThrowLog& log, const std::vector<PreparedThr
 }  // namespace
 
 void require_patch(const FrictionEstimate& estimate, const std::string& model) {
-  if (model == contact::kGripperDelay) return;
+  if (!contact::follows_pads(model)) return;
   constexpr double kMostScatter = 0.25, kRadiusDoubt = 1.25;
   const auto refuse = [&](const char* what, const std::string& why) {
     throw Undetermined(
@@ -294,8 +295,8 @@ FrictionEstimate estimate_friction(const datasets::ThrowLog& log, const std::vec
                                    throws.size()),
                        "give a card (--card), or some throws the split 'train'");
   if (log.gripper) out.parameters.pads = log.gripper->n_pads;
-  if (model == contact::kGripperDelay) {
-    estimate_delay(log, throws, out);
+  if (!contact::follows_pads(model)) {
+    estimate_delay(log, throws, model, out);
     return out;
   }
   const auto samples = slipping_samples(log, throws);

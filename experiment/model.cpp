@@ -62,7 +62,7 @@ void require_release_model(const std::string& name) {
 std::unique_ptr<contact::ContactModel> contact_model_for(const PreparedThrow& throw_,
                                                          const std::string& model, const ModelParameters& p) {
   if (model == kNaive) return nullptr;
-  if (model != contact::kGripperDelay) require_force(throw_, model);
+  if (contact::follows_pads(model)) require_force(throw_, model);
   return contact::make_contact_model(
       model, contact::ContactParameters<double>{patch_of(p), p.slide_end, p.law_values, throw_.open_command,
                                                 p.delay.centre});

@@ -7,7 +7,6 @@
 #include <set>
 #include <stdexcept>
 
-#include "contact/gripper_delay.hpp"
 #include "contact/patch.hpp"
 #include "contact/registry.hpp"
 #include "datasets/near_miss.hpp"
@@ -88,7 +87,7 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
             options.integrator};
   if (options.predict_only) {
     // nothing to start from
-  } else if (!grips.empty() && options.model != contact::kGripperDelay) {
+  } else if (!grips.empty() && contact::follows_pads(options.model)) {
     try {
       const auto guess = experiment::estimate_friction(log, prepared, options.model).parameters;
       // Declared or not, a pad's size is known to a factor of two.
@@ -105,7 +104,7 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
             guess.mu, guess.length, radius ? fmt::format(" of the declared radius, {:.3g} m", *radius) : ""));
     } catch (const std::invalid_argument&) {  // too few samples: the default start has to do
     }
-  } else if (options.model == contact::kGripperDelay) {
+  } else if (!contact::follows_pads(options.model)) {
     first_guess_ = experiment::estimate_friction(log, prepared, options.model).parameters;
   }
   std::size_t observations = 0;
@@ -153,7 +152,7 @@ CampaignProblem CampaignProblem::with(const std::string& model,
 void CampaignProblem::name_unknowns(const std::vector<Effect>& effects) {
   campaign_.clear();
   own_ = {{"grasp_angle", "rad", 0, -1, 1, 0.01, 0.05}, {"grasp_offset", "m", 0, -0.02, 0.02, 1e-3, 1e-3}};
-  const bool follows_pads = options_.model != contact::kGripperDelay;
+  const bool follows_pads = contact::follows_pads(options_.model);
   bool all_forces = true, any_force = false;
   std::set<std::string> objects;
   for (const auto& t : *throws_) {

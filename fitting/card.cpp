@@ -8,7 +8,6 @@
 #include <cmath>
 #include <fstream>
 
-#include "contact/gripper_delay.hpp"
 #include "contact/patch.hpp"
 #include "contact/registry.hpp"
 #include "experiment/campaign_effects.hpp"
@@ -210,7 +209,7 @@ ModelCard card_of(const CampaignProblem& problem, const FitResult& fit) {
   }
   for (const std::size_t k : known)
     for (const std::size_t j : known) covariance.matrix.push_back(fit.covariance[k * n + j]);
-  if (card.model != contact::kGripperDelay) {
+  if (contact::follows_pads(card.model)) {
     card.parameters["pads"] = {static_cast<double>(problem.model().pads), {}, "-"};
     card.parameters["reference_force"] = {problem.model().reference_force, {}, "N"};
   }
@@ -239,7 +238,7 @@ CampaignOptions options_of(const ModelCard& card, const std::string& file) {
       throw CardError(file, fmt::format("/effects/{}", i), error.what());
     }
   }
-  const bool follows_pads = card.model != contact::kGripperDelay;
+  const bool follows_pads = contact::follows_pads(card.model);
   CampaignOptions out;
   out.model = card.model;
   out.effects = card.effects;

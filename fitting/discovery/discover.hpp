@@ -16,7 +16,7 @@
 
 namespace unhand::fitting {
 
-/// Every contact model that is a law of friction, which gripper_delay is not.
+/// Every contact model that follows the pads (contact::follows_pads).
 std::vector<std::string> all_laws();
 
 /// What the loop may try, and what convinces it.

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "contact/gripper_delay.hpp"
+#include "contact/registry.hpp"
 #include "experiment/synthetic_campaign.hpp"
 #include "fitting/card.hpp"
 
@@ -199,7 +199,7 @@ ThrowInputs throw_inputs(const datasets::Sku& sku, const datasets::ModelCard& ca
   Eigen::MatrixXd of_card;
   add_card(sku, card, collect, out, of_card);
   add_spreads(card, collect);
-  const bool follows_pads = card.model != contact::kGripperDelay;
+  const bool follows_pads = contact::follows_pads(card.model);
   if (follows_pads && !thrown.normal_force) add_opening(card, card_file, assumed, collect);
   add_object(sku, assumed, collect);
   if (const auto mu = card.parameters.find("mu"); mu != card.parameters.end())

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "contact/gripper_delay.hpp"
+#include "contact/registry.hpp"
 #include "experiment/compare.hpp"
 #include "fitting/card.hpp"
 #include "fitting/sku/sku_measured.hpp"
@@ -72,7 +72,7 @@ void decide(const datasets::Sku& sku, const datasets::ModelCard& card, const Sku
         "{:.1f} % of its landings lie within {:.3g} m and {:.3g} deg of the predicted one; "
         "asked for are {:.3g} %",
         100 * out.within, request.tolerance.x, request.tolerance.theta * kDegrees, 100 * request.confidence);
-    const bool lever = card.model == contact::kGripperDelay && std::abs(sku.com_offset) > kLeastLever;
+    const bool lever = !contact::follows_pads(card.model) && std::abs(sku.com_offset) > kLeastLever;
     if (lever && !(out.measured && out.measured->confirmed)) {
       out.verdict = SkuVerdict::beyond_the_model;
       out.message += fmt::format(

@@ -9,7 +9,6 @@
 #include <optional>
 #include <stdexcept>
 
-#include "contact/gripper_delay.hpp"
 #include "contact/registry.hpp"
 #include "datasets/toml_keys.hpp"
 #include "planners/arm/chain_file.hpp"
@@ -94,7 +93,7 @@ Pads pads_of(Section keys) {
   Pads out;
   out.law = keys.text("law");
   const auto known = contact::contact_model_names();
-  if (out.law == contact::kGripperDelay || std::find(known.begin(), known.end(), out.law) == known.end())
+  if (!contact::follows_pads(out.law) || std::find(known.begin(), known.end(), out.law) == known.end())
     keys.fail("law", fmt::format("'{}' is no contact model that says how the pads let go", out.law));
   out.mu = keys.number("mu", {0, 10, true, ""});
   out.length = keys.number("length_m", {0, 0.5, true, "m"});

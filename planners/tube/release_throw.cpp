@@ -8,7 +8,6 @@
 #include <random>
 #include <stdexcept>
 
-#include "contact/gripper_delay.hpp"
 #include "contact/registry.hpp"
 #include "flight/fly.hpp"
 #include "planners/tube/planar_hand.hpp"
@@ -147,7 +146,7 @@ class CardReader {
 
 ReleaseCard release_card(const datasets::ModelCard& card, const std::string& file,
                          const ReleaseCard& otherwise) {
-  if (card.model == contact::kGripperDelay || card.model == "limit_surface_naive" ||
+  if (!contact::follows_pads(card.model) || card.model == "limit_surface_naive" ||
       card.model == "projectile")
     throw CardError(file, "/model", fmt::format("'{}' does not say how the pads let go", card.model));
   if (!card.effects.empty())

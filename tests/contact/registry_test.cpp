@@ -45,6 +45,25 @@ TEST(Registry, TakesALawOfOnesOwn) {
   EXPECT_TRUE(law_parameters("nobody").empty());
 }
 
+TEST(Registry, SaysWhichLawsFollowThePads) {
+  EXPECT_FALSE(follows_pads(kGripperDelay));
+  for (const char* law : {"sliding_pivot", "limit_surface", "limit_surface_disc", "limit_surface_quartic"})
+    EXPECT_TRUE(follows_pads(law)) << law;
+  auto rigid = named("rigid", {});
+  rigid.follows_pads = false;
+  register_contact_model(std::move(rigid));
+  EXPECT_FALSE(follows_pads("rigid"));
+}
+
+TEST(Registry, GivenParametersAreTheLawsOwn) {
+  register_contact_model(named("pasted", {glue()}));
+  const auto given = given_law_parameters("pasted", {{"glue", 3.0}, {"kappa", 1.0}});
+  ASSERT_EQ(given.size(), 1u);
+  EXPECT_EQ(given[0].parameter.name, "glue");
+  EXPECT_EQ(given[0].value, 3.0);
+  EXPECT_TRUE(given_law_parameters("pasted", {}).empty());
+}
+
 TEST(Registry, RefusesWhatIsNoLaw) {
   const auto refusal = [](const ContactModelEntry& entry) -> std::string {
     try {

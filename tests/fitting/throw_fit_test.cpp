@@ -6,10 +6,13 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "contact/gripper_delay.hpp"
 #include "contact/limit_surface.hpp"
+#include "contact/registry.hpp"
 #include "fitting/card.hpp"
 #include "fitting/evaluate.hpp"
 #include "fitting/fit_rounds.hpp"
@@ -93,6 +96,24 @@ TEST_P(EveryLaw, StartsNearTheTruth) {
 INSTANTIATE_TEST_SUITE_P(Throws, EveryLaw,
                          testing::Values("limit_surface_disc", "limit_surface", "sliding_pivot",
                                          "gripper_delay"));
+
+// A law of a program's own that carries until a delay is over is fitted as the library's is.
+TEST(ThrowFit, ALawThatDoesNotFollowThePadsIsFittedByItsDelay) {
+  contact::register_contact_model({"carried_until",
+                                   [](const contact::ContactParameters<dynamics::Dual>& p) {
+                                     return std::make_unique<contact::GripperDelay>(p.open_command, p.delay);
+                                   },
+                                   {},
+                                   false});
+  const auto log = campaign("gripper_delay");
+  const FitResult own = fit(problem_of(log, "carried_until")), known = fit(problem_of(log, "gripper_delay"));
+  ASSERT_EQ(own.campaign.size(), known.campaign.size());
+  for (std::size_t k = 0; k < own.campaign.size(); ++k) {
+    EXPECT_EQ(own.campaign[k].unknown.name, known.campaign[k].unknown.name);
+    EXPECT_EQ(own.campaign[k].value, known.campaign[k].value);
+    EXPECT_EQ(own.campaign[k].sigma, known.campaign[k].sigma);
+  }
+}
 
 TEST(ThrowFit, ParametersComeBackFromWhateverTheStartIs) {
   // The plain estimate puts the sliding pivot's start far off in some campaigns. Seven of them, two unknowns:
