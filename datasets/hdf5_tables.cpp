@@ -105,9 +105,8 @@ Node::Table Node::open_table(std::string_view name) const {
   const Handle space = space_handle(H5Dget_space(object.id()));
   const Handle creation = list_handle(H5Dget_create_plist(object.id()));
   if (!type || !space || !creation) fail(name, fmt::format("cannot be opened ({})", last_message()));
-  if (H5Pget_external_count(creation.id()) > 0 || H5Pget_layout(creation.id()) == H5D_VIRTUAL) {
-    fail(name, "keeps its values in another file");
-  }
+  if (H5Pget_external_count(creation.id()) > 0) fail(name, "keeps its values in another file");
+  if (H5Pget_layout(creation.id()) == H5D_VIRTUAL) fail(name, "is virtual: its values are another dataset's");
   if (const std::string filter = missing_filter(creation.id()); !filter.empty())
     fail(name,
          fmt::format("is compressed with {}, which this HDF5 cannot read (gzip and lzf are read)", filter));

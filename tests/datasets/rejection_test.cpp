@@ -22,6 +22,20 @@ const std::string one = "/throws/001";
 const std::string mocap = one + "/mocap", hand = one + "/hand", ft = one + "/ft";
 const std::vector<double> zeros(1000, 0.0);
 
+/// Replaces a dataset by one of (2,3) that keeps its values where `keep` says.
+void remake(const Editor& f, const std::string& path, const std::function<herr_t(hid_t, hid_t)>& keep) {
+  f.remove(path);
+  const hsize_t sizes[] = {2, 3};
+  const hid_t space = H5Screate_simple(2, sizes, nullptr), creation = H5Pcreate(H5P_DATASET_CREATE);
+  must(keep(creation, space) >= 0);
+  const hid_t made = H5Dcreate2(f.file, path.c_str(), H5T_NATIVE_DOUBLE, space, 0, creation, 0);
+  must(made >= 0);
+  H5Dclose(made);
+  H5Pclose(creation);
+  H5Sclose(space);
+  f.text(path, "units", "m,m,rad");
+}
+
 const Case planar_cases[] = {
     // the head
     {"no_schema", [](const Editor& f) { f.remove_attribute("/", "schema"); }, "/@schema", "missing"},
@@ -109,6 +123,19 @@ const Case planar_cases[] = {
        f.filtered(hand + "/pose", {2, 3}, 65000, {}, std::vector<char>(48), "m,m,rad");
      },
      "/throws/001/hand/pose", "the filter 65000"},
+    {"values_in_another_file",
+     [](const Editor& f) {
+       remake(f, hand + "/pose",
+              [](hid_t creation, hid_t) { return H5Pset_external(creation, "other.bin", 0, H5F_UNLIMITED); });
+     },
+     "/throws/001/hand/pose", "in another file"},
+    {"virtual_values",
+     [](const Editor& f) {
+       remake(f, hand + "/pose", [](hid_t creation, hid_t space) {
+         return H5Pset_virtual(creation, space, ".", "/throws/001/hand/twist", space);
+       });
+     },
+     "/throws/001/hand/pose", "is virtual"},
     {"dangling_link",
      [](const Editor& f) {
        f.remove(hand + "/pose");
