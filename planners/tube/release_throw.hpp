@@ -97,9 +97,8 @@ struct ReleaseThrow {
   flight::Medium medium{};  ///< of the flight
 };
 
-/// Throws std::invalid_argument, naming value and accepted range: one finite number per joint, hold > 0,
-/// sigma
-/// >= 0, what is thrown and what holds it > 0. All functions below that take a throw check it.
+/// Throws std::invalid_argument, naming value and accepted range: one finite number per joint, hold > 0, every
+/// sigma >= 0, what is thrown and what holds it > 0. All functions below that take a throw check it.
 void validate(const ReleaseThrow& problem);
 
 /// One landing, and the release before it.
