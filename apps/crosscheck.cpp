@@ -299,7 +299,11 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
     Progress progress("models", throws.size() * options.models.size());
     for (const auto& model : options.models)
       models[model] = all(throws, options.threads, progress, [&](const auto& one) {
-        return experiment::predict(one, model, parameters, tight);
+        experiment::ModelParameters of_law = parameters;
+        of_law.law_values.clear();
+        for (const auto& [own, value] : contact::given_law_parameters(model, parameters.law_values))
+          of_law.law_values[own.name] = value;
+        return experiment::predict(one, model, of_law, tight);
       });
   }
   const auto settings = run_engine(options, throws, parameters);

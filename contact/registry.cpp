@@ -17,42 +17,55 @@ namespace {
 using Parameters = ContactParameters<Dual>;
 using Model = std::unique_ptr<ContactModel>;
 
+template <class Shape>
+WrenchGauge gauge_of(const Shape& shape) {
+  return [shape](const Vec3<Dual>& w) { return shape.gauge(w); };
+}
+
+/// Of a sliding pivot, whose limits of force and torque know nothing of each other.
+Dual decoupled_gauge(const Vec3<Dual>& w) {
+  const Dual force = hypot(w[0], w[1]), torque = abs(w[2]);
+  return force < torque ? torque : force;
+}
+
 /// A contact model is one entry here. Addresses stay as more are registered.
 std::deque<ContactModelEntry>& models() {
   static std::deque<ContactModelEntry> known{
-      {"sliding_pivot",
-       [](const Parameters& p) -> Model {
+      {.name = "sliding_pivot",
+       .make = [](const Parameters& p) -> Model {
          return std::make_unique<SlidingPivot>(p.patch, p.slide_end, p.variation);
-       }},
-      {"limit_surface",
-       [](const Parameters& p) -> Model {
+       },
+       // Real pads follow no rectangle, and the ellipsoid's values serve the pivot better there.
+       .gauges = {gauge_of(Ellipsoid{}), decoupled_gauge}},
+      {.name = "limit_surface",
+       .make = [](const Parameters& p) -> Model {
          return std::make_unique<LimitSurface<Ellipsoid>>("limit_surface", p.patch, Ellipsoid{}, p.variation);
        }},
-      {"limit_surface_disc",
-       [](const Parameters& p) -> Model {
+      {.name = "limit_surface_disc",
+       .make = [](const Parameters& p) -> Model {
          const Dual& exponent = p.variation.pressure_exponent;
          if (!dynamics::is_zero(exponent))
            return std::make_unique<LimitSurface<PressedDisc>>("limit_surface_disc", p.patch,
                                                               PressedDisc(exponent), p.variation);
          return std::make_unique<LimitSurface<UniformDisc>>("limit_surface_disc", p.patch, UniformDisc{},
                                                             p.variation);
-       }},
-      {"limit_surface_quartic",
-       [](const Parameters& p) -> Model {
-         const auto kappa = p.law_values.find("kappa");
-         const auto shape = kappa != p.law_values.end() ? IsotropicQuartic(kappa->second)
-                                                        : IsotropicQuartic::closest_to_disc();
-         return std::make_unique<LimitSurface<IsotropicQuartic>>("limit_surface_quartic", p.patch, shape,
-                                                                 p.variation);
+       },
+       .gauges = {gauge_of(UniformDisc{})}},
+      {.name = "limit_surface_quartic",
+       .make = [](const Parameters& p) -> Model {
+         return std::make_unique<LimitSurface<IsotropicQuartic>>(
+             "limit_surface_quartic", p.patch, IsotropicQuartic(p.law_values.at("kappa")), p.variation);
        },
        // Of the shape (IsotropicQuartic). The disc's, and about as far from it as the ellipsoid's 1 is
        // likely; convex from 0 to 3, singular at both.
-       {{"kappa", "-", ConvexQuartic::kappa_closest_to_disc(), 0, 3, 0.05, 2.95, 0.2, 0.3,
-         "throws whose pads slide and turn at once, with force and torque measured behind a pad"}}},
-      {kGripperDelay,
-       [](const Parameters& p) -> Model { return std::make_unique<GripperDelay>(p.open_command, p.delay); },
-       {},
-       false},
+       .own = {{"kappa", "-", ConvexQuartic::kappa_closest_to_disc(), 0, 3, 0.05, 2.95, 0.2, 0.3,
+                "throws whose pads slide and turn at once, with force and torque measured behind a pad"}},
+       .gauges = {gauge_of(IsotropicQuartic::closest_to_disc())}},
+      {.name = kGripperDelay,
+       .make = [](const Parameters& p) -> Model {
+         return std::make_unique<GripperDelay>(p.open_command, p.delay);
+       },
+       .follows_pads = false},
   };
   return known;
 }
@@ -107,6 +120,21 @@ void validate(const ContactModelEntry& entry) {
   }
 }
 
+/// Values of all the law's own parameters: those given, else their start.
+LawValues<Dual> complete(const ContactModelEntry& entry, LawValues<Dual> values) {
+  for (const auto& [name, value] : values)
+    if (std::none_of(entry.own.begin(), entry.own.end(), [&](const auto& own) { return own.name == name; }))
+      throw std::invalid_argument(
+          fmt::format("contact model \"{}\" has no parameter \"{}\"", entry.name, name));
+  for (const LawParameter& own : entry.own) {
+    const double value = values.try_emplace(own.name, Dual(own.start)).first->second.a;
+    if (!(value >= own.low && value <= own.high))
+      throw std::invalid_argument(fmt::format("contact model \"{}\": {} = {} is not in [{}, {}] {}",
+                                              entry.name, own.name, value, own.low, own.high, own.unit));
+  }
+  return values;
+}
+
 }  // namespace
 
 void register_contact_model(ContactModelEntry entry) {
@@ -125,6 +153,12 @@ bool follows_pads(std::string_view name) {
   return !entry || entry->follows_pads;
 }
 
+std::vector<WrenchGauge> wrench_gauges(std::string_view name) {
+  const auto* entry = find(name);
+  if (!entry || entry->gauges.empty()) return {gauge_of(Ellipsoid{})};
+  return entry->gauges;
+}
+
 const std::vector<LawParameter>& law_parameters(std::string_view name) {
   static const std::vector<LawParameter> kNone;
   const auto* entry = find(name);
@@ -139,10 +173,15 @@ std::vector<GivenLawParameter> given_law_parameters(std::string_view name, const
 }
 
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name,
-                                                 const ContactParameters<Dual>& parameters) {
-  if (const auto* entry = find(name)) return entry->make(parameters);
-  throw std::invalid_argument(fmt::format("contact model \"{}\" is unknown; there are {}", name,
-                                          fmt::join(contact_model_names(), ", ")));
+                                                 const ContactParameters<Dual>& given) {
+  const auto* entry = find(name);
+  if (!entry)
+    throw std::invalid_argument(fmt::format("contact model \"{}\" is unknown; there are {}", name,
+                                            fmt::join(contact_model_names(), ", ")));
+  if (entry->own.empty() && given.law_values.empty()) return entry->make(given);
+  ContactParameters<Dual> parameters = given;
+  parameters.law_values = complete(*entry, given.law_values);
+  return entry->make(parameters);
 }
 
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name, const ContactParameters<double>& p) {

@@ -10,6 +10,7 @@
 #include "contact/contact_model.hpp"
 #include "contact/friction_effects.hpp"
 #include "contact/law_parameter.hpp"
+#include "contact/limit_surface_shapes.hpp"
 #include "contact/patch.hpp"
 #include "contact/sliding_pivot.hpp"
 
@@ -26,6 +27,9 @@ struct ContactParameters {
   FrictionVariation<S> variation{};             ///< departures of the friction limits; neutral by default
 };
 
+/// 1 on a surface of limits, for w = (f_x, f_z, τ/L)/f_max; homogeneous of degree one.
+using WrenchGauge = std::function<Dual(const Vec3<Dual>& w)>;
+
 /// A contact model that can be chosen by name.
 struct ContactModelEntry {
   std::string name;  ///< as in commands, cards and messages
@@ -35,6 +39,10 @@ struct ContactModelEntry {
   /// Whether it says how the pads' friction lets go of the object, and so needs the patch and a normal force.
   /// A law that does not, as gripper_delay, takes the delay.
   bool follows_pads{true};
+  /// On which surface the wrench of pads that slip lies, for the friction that is read off such wrenches: the
+  /// ellipsoid where there is none, the one that the wrenches fit best where there are several. Own
+  /// parameters have their start.
+  std::vector<WrenchGauge> gauges{};
 };
 
 /// Makes a law known by name to everything in this program that takes names: make_contact_model, comparisons,
@@ -49,6 +57,9 @@ std::vector<std::string> contact_model_names();
 /// ContactModelEntry::follows_pads; true for a name that is not known.
 bool follows_pads(std::string_view name);
 
+/// ContactModelEntry::gauges, or the ellipsoid's.
+std::vector<WrenchGauge> wrench_gauges(std::string_view name);
+
 /// What a law takes of its own; empty for a name that is not known.
 const std::vector<LawParameter>& law_parameters(std::string_view name);
 
@@ -62,7 +73,9 @@ struct GivenLawParameter {
 std::vector<GivenLawParameter> given_law_parameters(std::string_view name, const LawValues<double>& values);
 
 /// The model of that name. Throws std::invalid_argument, listing the names, if there is none, and as the
-/// model's constructor does. Of `law_values` it reads those of its own parameters.
+/// model's constructor does. Of the law's own parameters `law_values` may leave out any, which then have
+/// their start; throws std::invalid_argument for one that the law does not have, and for one out of its
+/// range.
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name, const ContactParameters<double>&);
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name, const ContactParameters<Dual>&);
 

@@ -23,6 +23,8 @@ const char* to_string(Outcome outcome) {
       return "event_budget_spent";
     case Outcome::step_budget_spent:
       return "step_budget_spent";
+    case Outcome::not_converged:
+      return "not_converged";
     case Outcome::mode_cycle:
       return "mode_cycle";
     case Outcome::step_too_small:
@@ -272,7 +274,7 @@ void validate(const IntegratorOptions& o) {
   require(o.zeno_tolerance >= 0, "zeno_tolerance", o.zeno_tolerance, ">= 0");
   require(o.step_budget >= 0, "step_budget", static_cast<double>(o.step_budget), ">= 0");
   require(o.event_budget >= 0, "event_budget", o.event_budget, ">= 0");
-  require(o.events_per_instant >= 0, "events_per_instant", o.events_per_instant, ">= 0");
+  require(o.events_per_instant >= 2, "events_per_instant", o.events_per_instant, ">= 2");
 }
 
 template <class S, int N>

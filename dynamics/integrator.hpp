@@ -20,15 +20,15 @@ struct IntegratorOptions {
   double guard_interval{5e-3};
   double longest_step{0.05};   ///< [s]; steps with guards are no longer than sixteen guard intervals
   long step_budget{200'000};   ///< steps in all, before the answer is `step_budget_spent`
-  int event_budget{10'000};    ///< events in all, before the answer is `event_budget_spent`
-  int events_per_instant{24};  ///< mode changes without time passing, before the answer is `mode_cycle`
+  int event_budget{10'000};    ///< events in all, with which the answer is `event_budget_spent`
+  int events_per_instant{24};  ///< mode changes without time passing, >= 2, with which it is `mode_cycle`
   /// Events accumulate at t∞: jump there when what is left of the state's change is below this (SI units).
   double zeno_tolerance{1e-7};
   bool record{false};  ///< keep the trajectory
 };
 
 /// Throws std::invalid_argument, naming the option, its value and the accepted range: tolerances finite and
-/// not negative, not both zero; intervals > 0; budgets not negative.
+/// not negative, not both zero; intervals > 0; budgets not negative; events_per_instant >= 2.
 void validate(const IntegratorOptions& options);
 
 /// How an integration ended. Only the first two are answers; the rest say why there is none.
@@ -36,9 +36,10 @@ enum class Outcome {
   finished,            ///< a mode of kind `finished` was entered
   horizon,             ///< t_end was reached
   zeno,                ///< events accumulate at the returned time and the system knows no state there
-  event_budget_spent,  ///< more events than the options allow
+  event_budget_spent,  ///< as many events as the options allow
   step_budget_spent,   ///< more steps than the options allow
   mode_cycle,          ///< no mode is consistent at the returned instant
+  not_converged,       ///< the equations of a step were not solved
   step_too_small,      ///< the tolerances cannot be met above the spacing of representable times
   not_finite,          ///< a flow or a guard returned NaN or infinity
 };

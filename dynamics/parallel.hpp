@@ -5,14 +5,16 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
 namespace unhand::dynamics {
 
-/// Calls work(i) for i = 0 … n − 1 on `threads` threads (0: one per core). Each item writes its own result,
-/// so the outcome does not depend on the number of threads. Of the exceptions that of the least i is rethrown
-/// after all threads have stopped: those before it have been tried.
+/// Calls work(i) for i = 0 … n − 1 on `threads` threads (0: one per core), of which the caller's is one, or
+/// on as many as the system allows. Each item writes its own result, so the outcome does not depend on the
+/// number of threads. Of the exceptions that of the least i is rethrown after all threads have stopped: those
+/// before it have been tried.
 template <class Work>
 void parallel_for(std::size_t n, int threads, Work&& work) {
   const std::size_t cores =
@@ -26,23 +28,27 @@ void parallel_for(std::size_t n, int threads, Work&& work) {
   std::exception_ptr first;
   std::size_t first_at = n;
   std::mutex guard;
-  std::vector<std::thread> pool;
-  for (std::size_t k = 0; k < count; ++k)
-    pool.emplace_back([&] {
-      for (std::size_t i = next++; i < n; i = next++) {
-        try {
-          work(i);
-        } catch (...) {
-          const std::lock_guard lock(guard);
-          if (i < first_at) {
-            first_at = i;
-            first = std::current_exception();
-          }
-          next = n;
+  const auto run = [&] {
+    for (std::size_t i = next++; i < n; i = next++) {
+      try {
+        work(i);
+      } catch (...) {
+        const std::lock_guard lock(guard);
+        if (i < first_at) {
+          first_at = i;
+          first = std::current_exception();
         }
+        next = n;
       }
-    });
-  for (auto& thread : pool) thread.join();
+    }
+  };
+  std::vector<std::jthread> pool;
+  try {
+    while (pool.size() + 1 < count) pool.emplace_back(run);
+  } catch (const std::system_error&) {  // no more threads are to be had
+  }
+  run();
+  pool.clear();  // joins
   if (first) std::rethrow_exception(first);
 }
 

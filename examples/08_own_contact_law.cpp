@@ -95,9 +95,8 @@ int main() {
   contact::register_contact_model(
       {kName,
        [](const contact::ContactParameters<Dual>& p) -> std::unique_ptr<contact::ContactModel> {
-         const auto exponent = p.law_values.find("exponent");
-         const SuperEllipsoid shape(exponent != p.law_values.end() ? exponent->second : Dual(1.95));
-         return std::make_unique<contact::LimitSurface<SuperEllipsoid>>(kName, p.patch, shape, p.variation);
+         return std::make_unique<contact::LimitSurface<SuperEllipsoid>>(
+             kName, p.patch, SuperEllipsoid(p.law_values.at("exponent")), p.variation);
        },
        {{"exponent", "-", 1.95, 1.1, 2, 1.2, 2, 0.05, {}, "throws whose pads slide and turn at once"}}});
 

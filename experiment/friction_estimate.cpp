@@ -110,17 +110,6 @@ std::vector<SlipSample> slipping_samples(const datasets::ThrowLog& log,
   return out;
 }
 
-/// The sliding pivot's, whose limits of force and torque know nothing of each other.
-struct Decoupled {
-  template <class S>
-  S gauge(const contact::Vec3<S>& w) const {
-    using std::abs;
-    using std::hypot;
-    const S force = hypot(w[0], w[1]), torque = abs(w[2]);
-    return force < torque ? torque : force;
-  }
-};
-
 /// What a fit of the surface to the samples ends with.
 struct SurfaceFit {
   double mu{}, length{};                              ///< -, m
@@ -136,8 +125,8 @@ enum class Fitted {
 
 /// Gauss-Newton on (ln μ, ln L), every gauge weighted with its own noise and with 1/max(1, |r|/k), the step
 /// damped.
-template <class Shape>
-void solve(const Shape& shape, const std::vector<SlipSample>& samples, Fitted what, SurfaceFit& fit) {
+void solve(const contact::WrenchGauge& gauge, const std::vector<SlipSample>& samples, Fitted what,
+           SurfaceFit& fit) {
   std::vector<double> off(samples.size()), whitened(samples.size());
   std::vector<Dual> r(samples.size());
   std::vector<double> sigma(samples.size());
@@ -146,7 +135,7 @@ void solve(const Shape& shape, const std::vector<SlipSample>& samples, Fitted wh
     for (std::size_t i = 0; i < samples.size(); ++i) {
       const auto& s = samples[i].ratio;
       const Dual fx(s[0], 2), fz(s[1], 3), tau(s[2], 4);
-      r[i] = shape.gauge(contact::Vec3<Dual>{fx / mu, fz / mu, tau / (mu * length)}) - 1.0;
+      r[i] = gauge(contact::Vec3<Dual>{fx / mu, fz / mu, tau / (mu * length)}) - 1.0;
       double square = 1e-12;
       for (int c = 0; c < 3; ++c)
         square += std::pow(r[i].v[2 + c] * samples[i].sigma[static_cast<std::size_t>(c)], 2);
@@ -178,24 +167,15 @@ void solve(const Shape& shape, const std::vector<SlipSample>& samples, Fitted wh
   }
 }
 
-/// The surface of the two on which the samples lie better: real pads follow no rectangle, and the ellipsoid's
-/// values serve the sliding pivot better there than those of a rectangle through all samples.
-void solve_sliding_pivot(const std::vector<SlipSample>& samples, Fitted what, SurfaceFit& fit) {
-  SurfaceFit own = fit;
-  solve(Decoupled{}, samples, what, own);
-  solve(contact::Ellipsoid{}, samples, what, fit);
-  if (own.scatter < fit.scatter) fit = own;
-}
-
+/// On the surface of the law's on which the samples lie best.
 void solve(const std::string& model, const std::vector<SlipSample>& samples, Fitted what, SurfaceFit& fit) {
-  if (model == "limit_surface_disc")
-    solve(contact::UniformDisc{}, samples, what, fit);
-  else if (model == "limit_surface_quartic")
-    solve(contact::ConvexQuartic::closest_to_disc(), samples, what, fit);
-  else if (model == "sliding_pivot")
-    solve_sliding_pivot(samples, what, fit);
-  else
-    solve(contact::Ellipsoid{}, samples, what, fit);
+  const SurfaceFit start = fit;
+  fit.scatter = HUGE_VAL;
+  for (const auto& gauge : contact::wrench_gauges(model)) {
+    SurfaceFit own = start;
+    solve(gauge, samples, what, own);
+    if (own.scatter < fit.scatter) fit = own;
+  }
 }
 
 /// From the envelope: the largest force and torque ratios that are common.

@@ -63,6 +63,12 @@ void validate(const LandingSet& set) {
                     set.r_rate_low, set.r_rate_high, set.z_rate_low, set.z_rate_high));
 }
 
+void validate(const Medium& medium) {
+  if (!(medium.gravity > 0 && medium.drag_k >= 0 && std::isfinite(medium.gravity + medium.drag_k)))
+    throw std::invalid_argument(fmt::format("medium: gravity {} m/s² is not > 0, or drag_k {} 1/m not >= 0",
+                                            medium.gravity, medium.drag_k));
+}
+
 /// With drag, the fastest that a flight is followed back to [m/s]: backward in time, drag has the speed grow
 /// without bound within a finite time, before which there is no flight.
 constexpr double kFastest = 100;
@@ -102,6 +108,10 @@ PlaneState<double> before(PlaneState<double> s, double longest, const Medium& me
 
 double tube_level(const PlaneState<double>& release, const LandingSet& set, const Medium& medium) {
   validate(set);
+  for (const double x : {release.r, release.z, release.r_rate, release.z_rate})
+    if (!std::isfinite(x))
+      throw std::invalid_argument(fmt::format("tube_level: a state with {} is not finite", x));
+  validate(medium);
   const auto landing = landing_of(release, medium);
   if (!landing) {
     const double rise = release.z_rate > 0 ? release.z_rate * release.z_rate / (2 * medium.gravity) : 0;
@@ -118,9 +128,7 @@ std::vector<PlaneState<double>> sample_tube(const LandingSet& set, const Medium&
   if (sampling.count < 0 || !(sampling.longest > 0 && sampling.longest <= 100) || sampling.boundary_every < 1)
     throw std::invalid_argument(
         "sample_tube: count >= 0, longest in (0, 100] s and boundary_every >= 1 are asked for");
-  if (!(medium.gravity > 0 && medium.drag_k >= 0 && std::isfinite(medium.gravity + medium.drag_k)))
-    throw std::invalid_argument(fmt::format(
-        "sample_tube: gravity {} m/s² is not > 0, or drag_k {} 1/m not >= 0", medium.gravity, medium.drag_k));
+  validate(medium);
   std::mt19937_64 random(sampling.seed);
   std::uniform_real_distribution<double> unit(0, 1);
   const std::array<std::array<double, 2>, 3> ranges{{{-set.half_length, set.half_length},

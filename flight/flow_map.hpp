@@ -49,7 +49,8 @@ struct LandingSet {
 /// The backward reachable tube of a landing set in implicit form: f(ξ) < 0 inside, 0 on its boundary, > 0
 /// outside. f is the largest of |x − c|/h − 1 over the coordinates x of the landing state, c and h the middle
 /// and the half width of their ranges; where a flight never gets to z = 0, it is 1 plus what its apex
-/// (without drag) lacks over half_length. [-]
+/// (without drag) lacks over half_length. [-] Throws std::invalid_argument for a state that is not finite,
+/// and for a set or a medium out of range.
 double tube_level(const PlaneState<double>& release, const LandingSet& set, const Medium& medium);
 
 /// The same tube by samples: states from which flights of up to `longest` [s] end in the set, found by flying

@@ -100,7 +100,7 @@ HandState<S> LaggedHand::at_(const Window& window, const S& t) const {
   const Piece& piece = pieces_[i];
   const S h = t - logged_.path().breaks()[i];
   std::array<S, 3> value, first, second;
-  const bool settling = lag_.a > 0;
+  const bool settling = lag_.a > 0 && i > 0;  // before the log it has settled, and exp(-h/τ) overflows
   const S rate = settling ? S(1.0 / convert<S>(lag_)) : S(0), decay = settling ? S(exp(-h * rate)) : S(0);
   for (int n = 0; n < 3; ++n) {
     S p = convert<S>(piece.settled[5][n]), d(0), half(0);

@@ -147,7 +147,7 @@ ReleaseResult<S> simulate_giving_release(const ReleaseProblem<S>& problem, const
     result.detach = {t, object_pose(scene, at.relative), object_twist(scene, at.relative)};
   };
   if (!stepper.load(scenes.scene(window, t), at)) {
-    ended(Outcome::step_budget_spent);
+    ended(Outcome::not_converged);
     return result;
   }
   Moving<S> coarse = at, half = at, fine = at;
@@ -170,7 +170,7 @@ ReleaseResult<S> simulate_giving_release(const ReleaseProblem<S>& problem, const
       if (!stepper.step(h, there, at, coarse) ||
           !stepper.step(S(0.5 * h), scenes.scene(window, middle), at, half) ||
           !stepper.step(S(0.5 * h), there, half, fine)) {
-        ended(is_finite(coarse.relative) && is_finite(fine.relative) ? Outcome::step_budget_spent
+        ended(is_finite(coarse.relative) && is_finite(fine.relative) ? Outcome::not_converged
                                                                      : Outcome::not_finite);
         return result;
       }

@@ -31,6 +31,9 @@ NaiveResult simulate_release_naive(const ReleaseProblem<double>& problem, const 
   if (!(options.step >= least && options.step <= 0.1))
     throw std::invalid_argument(
         fmt::format("naive release: step = {} is not in [{}, 0.1] s", options.step, least));
+  if (!(options.smoothing >= 0 && std::isfinite(options.smoothing)))
+    throw std::invalid_argument(
+        fmt::format("naive release: smoothing = {} is not in [0, inf) m/s", options.smoothing));
   validate(patch);
   double t = problem.start;
   HandState<double> hand = problem.hand.at({t, t + options.step}, t);

@@ -10,7 +10,7 @@ namespace unhand::release {
 /// Euler method.
 struct NaiveOptions {
   double step{1e-3};      ///< s
-  double smoothing{0.0};  ///< v_s, viscous smoothing of the sign law [m/s]; 0 is the sign law itself
+  double smoothing{0.0};  ///< v_s >= 0, viscous smoothing of the sign law [m/s]; 0 is the sign law itself
 };
 
 /// How a naive release ended.
@@ -25,7 +25,8 @@ struct NaiveResult {
 /// stick mode the wrench of a held object flips from side to side at every step, and the energy that this
 /// costs is the error. The contact model of `problem` is not used; `patch` gives the limits. Throws
 /// std::invalid_argument for what simulate_release refuses, a step outside [1e-7, 0.1] s, one below eight
-/// spacings of representable times, and one of which the release takes more than 1e8.
+/// spacings of representable times, one of which the release takes more than 1e8, and a smoothing that is
+/// negative or not finite.
 NaiveResult simulate_release_naive(const ReleaseProblem<double>& problem, const contact::Patch<double>& patch,
                                    const NaiveOptions& options = {});
 

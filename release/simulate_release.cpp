@@ -83,10 +83,9 @@ ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const Releas
     return result;
   }
   // A release at the very end of the log still counts: the horizon lies one instant after.
-  const double horizon = std::max(
-      problem.hand.end(), std::isfinite(system.separation()) && system.separation() <= problem.hand.end()
-                              ? std::nextafter(system.separation(), 1e300) + 1e-9
-                              : 0.0);
+  double horizon = problem.hand.end();
+  if (system.separation() <= horizon)
+    horizon = std::max(horizon, std::nextafter(system.separation(), HUGE_VAL) + 1e-9);
   dynamics::Solution<S, 6> solution = dynamics::integrate<S, 6>(system, entry, S(horizon), integrator);
 
   result.integration = solution.outcome;

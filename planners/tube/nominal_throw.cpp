@@ -121,7 +121,9 @@ class Search {
     flight.gravity = {0, -options_.medium.gravity};
     flight.drag_k = options_.medium.drag_k;
     flight.landing_height = box_.middle.z();
-    const double duration = flight::fly(flight).landing.flight_time;
+    const auto flown = flight::fly(flight);
+    if (flown.outcome != flight::FlightOutcome::landed) return true;  // nothing says that it is clear
+    const double duration = flown.landing.flight_time;
     std::vector<double> times;
     for (int k = 0; k <= 60; ++k) times.push_back(duration * k / 60);
     const auto path = flight::fly_through(flight, times);

@@ -41,6 +41,9 @@ TEST(Registry, TakesALawOfOnesOwn) {
   p.law_values["glue"] = 2.5;
   EXPECT_EQ(make_contact_model("glued", p)->mode_count(), 10);
   EXPECT_THAT(seen, testing::ElementsAre(2.5));
+  p.law_values.clear();
+  make_contact_model("glued", p);
+  EXPECT_THAT(seen, testing::ElementsAre(2.5, 1)) << "its start, where nobody says";
   EXPECT_TRUE(law_parameters("sliding_pivot").empty());
   EXPECT_TRUE(law_parameters("nobody").empty());
 }
@@ -62,6 +65,40 @@ TEST(Registry, GivenParametersAreTheLawsOwn) {
   EXPECT_EQ(given[0].parameter.name, "glue");
   EXPECT_EQ(given[0].value, 3.0);
   EXPECT_TRUE(given_law_parameters("pasted", {}).empty());
+}
+
+TEST(Registry, RefusesParametersThatALawDoesNotHave) {
+  register_contact_model(named("taped", {glue()}));
+  const auto refusal = [](const char* law, LawValues<double> values) -> std::string {
+    ContactParameters<double> p;
+    p.patch = {0.5, 0.01};
+    p.law_values = std::move(values);
+    try {
+      make_contact_model(law, p);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(refusal("limit_surface_quartic", {{"kapa", 1}}), HasSubstr("no parameter \"kapa\""));
+  EXPECT_THAT(refusal("limit_surface", {{"kappa", 1}}), HasSubstr("no parameter \"kappa\""));
+  for (const double value : {-1.0, 11.0, std::nan("")})
+    EXPECT_THAT(refusal("taped", {{"glue", value}}), HasSubstr("is not in [0, 10] N"));
+  EXPECT_EQ(refusal("taped", {{"glue", 10}}), "");
+}
+
+TEST(Registry, GaugesAreOneOnTheSurface) {
+  const auto gauge = [](const char* law, std::size_t k, Vec3<double> w) {
+    return wrench_gauges(law).at(k)({Dual(w[0]), Dual(w[1]), Dual(w[2])}).a;
+  };
+  for (const char* law : {"limit_surface", "limit_surface_disc", "limit_surface_quartic", "gripper_delay",
+                          "nobody", "sliding_pivot"})
+    for (std::size_t k = 0; k < wrench_gauges(law).size(); ++k) {
+      EXPECT_NEAR(gauge(law, k, {0.6, -0.8, 0}), 1, 1e-12) << law;  // pure slide
+      EXPECT_NEAR(gauge(law, k, {0, 0, 2}), 2, 1e-12) << law;       // twice a pure spin
+    }
+  EXPECT_NEAR(gauge("limit_surface", 0, {0.6, 0, 0.8}), 1, 1e-12);
+  EXPECT_NEAR(gauge("sliding_pivot", 1, {0.6, 0, 0.8}), 0.8, 1e-12);
 }
 
 TEST(Registry, RefusesWhatIsNoLaw) {

@@ -71,6 +71,25 @@ TEST_P(Outcomes, PadsThatNeverPart) {
   }
 }
 
+/// Whatever the clock: pads that part after the hand's motion ends, on clocks before 0 and after.
+TEST_P(Outcomes, PadsThatPartTooLateHaveNotParted) {
+  for (const double begin : {-10.0, -0.1, 0.0, 100.0}) {
+    const auto hand =
+        release::PolynomialHand::segments(begin, {0, 1, 0}, {1, 0, 2}, {{begin + 0.2, {3, 1, 5}, {}}});
+    const contact::ProfileNormalForce force(
+        contact::OpeningProfile<double>{begin + 0.15, 20, 0.0, 0.08, 1.0});
+    contact::ContactParameters<double> p;
+    p.patch = {0.5, 0.01, 2.0 / 3, 2};
+    p.open_command = begin + 0.15;
+    p.delay = 0.08;
+    const auto model = make(p);
+    const auto result = simulate_release(release::ReleaseProblem<double>{
+        hand, force, *model, {0.1, 1e-3}, {0, -9.81}, {0.02, 0}, begin, {}, 0.0});
+    EXPECT_EQ(result.outcome, release::ReleaseOutcome::never_separated) << begin;
+    EXPECT_DOUBLE_EQ(result.detach.time, begin + 0.2);
+  }
+}
+
 TEST_P(Outcomes, SlippingAtTheStartIsReported) {
   std::mt19937_64 random(52);
   for (int i = 0; i < 20; ++i) {
@@ -329,6 +348,17 @@ TEST_P(Outcomes, ExtremeThrowsHaveAnswers) {
   }
   EXPECT_EQ(unsolved, 0);
   RecordProperty("most_steps", std::to_string(most_steps));
+}
+
+TEST(NaiveRelease, SmoothingIsNoSpeedBelowZero) {
+  std::mt19937_64 random(56);
+  const auto thrown = support::random_throw(random, 0);
+  const auto model = contact::make_contact_model("limit_surface", support::parameters_of(thrown));
+  const auto problem = support::problem_of(thrown, *model);
+  for (const double speed : {kNaN, kInfinity, -1e-3})
+    expect_refused({"smoothing", "[0, inf) m/s"}, [&] {
+      simulate_release_naive(problem, thrown.patch, {1e-3, speed});
+    });
 }
 
 }  // namespace

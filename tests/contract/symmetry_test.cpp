@@ -161,7 +161,7 @@ TEST_P(Symmetry, NoInstantIsSpecial) {
     const auto a = thrown.simulate(*make(pads), 0, options);
     ASSERT_EQ(a.outcome, release::ReleaseOutcome::detached) << i;
     for (const auto& event : a.events) slid_both_ways += event.mode_before == 9 && event.mode_after != 9;
-    for (const double later : {1.0, 10.0}) {
+    for (const double later : {-1.0, 10.0}) {
       pads.open_command = thrown.opening.open_command + later;
       const auto b = thrown.simulate(*make(pads), later, options);
       ASSERT_EQ(b.outcome, a.outcome) << i;

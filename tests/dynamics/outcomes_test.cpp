@@ -117,6 +117,8 @@ TEST(IntegratorOptions, AreChecked) {
   EXPECT_THAT(complaint([](auto& o) { o.longest_step = NAN; }), HasSubstr("longest_step = nan"));
   EXPECT_THAT(complaint([](auto& o) { o.zeno_tolerance = -1; }), HasSubstr("zeno_tolerance = -1"));
   EXPECT_THAT(complaint([](auto& o) { o.step_budget = -1; }), HasSubstr("step_budget = -1"));
+  for (const int n : {0, 1})  // two events are what shows that no time passes
+    EXPECT_THAT(complaint([&](auto& o) { o.events_per_instant = n; }), HasSubstr("events_per_instant"));
 }
 
 TEST_P(Outcomes, BudgetsAreKept) {

@@ -2,6 +2,7 @@
 #include "dynamics/parallel.hpp"
 
 #include <gtest/gtest.h>
+#include <pthread.h>
 
 #include <chrono>
 #include <numeric>
@@ -21,6 +22,18 @@ TEST(ParallelFor, EveryItemOnceForAnyNumberOfThreads) {
       EXPECT_EQ(std::accumulate(times.begin(), times.end(), 0), static_cast<int>(n)) << threads;
       for (const int count : times) EXPECT_EQ(count, 1);
     }
+}
+
+TEST(ParallelFor, WorksWithAsManyThreadsAsThereAre) {
+  pthread_attr_t usual, huge;
+  ASSERT_EQ(pthread_getattr_default_np(&usual), 0);
+  ASSERT_EQ(pthread_attr_init(&huge), 0);
+  ASSERT_EQ(pthread_attr_setstacksize(&huge, std::size_t{1} << 60), 0);  // no thread can have such a stack
+  ASSERT_EQ(pthread_setattr_default_np(&huge), 0);
+  std::vector<int> times(100);
+  parallel_for(times.size(), 8, [&](std::size_t i) { ++times[i]; });
+  ASSERT_EQ(pthread_setattr_default_np(&usual), 0);
+  for (const int count : times) EXPECT_EQ(count, 1);
 }
 
 TEST(ParallelFor, TheFirstExceptionComesOutAfterAllThreadsHaveStopped) {

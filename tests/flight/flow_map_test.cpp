@@ -137,6 +137,12 @@ TEST(ReachableTube, RefusesWhatIsNoSet) {
     EXPECT_THROW(sample_tube({0.1, 0.8, 3.0, -5, -0.5}, {9.81, 0.1}, {10, longest}), std::invalid_argument);
   for (const Medium& medium : {Medium{9.81, -0.1}, Medium{0.0, 0.1}, Medium{9.81, std::nan("")}})
     EXPECT_THROW(sample_tube({0.1, 0.8, 3.0, -5, -0.5}, medium), std::invalid_argument);
+  for (int n = 0; n < 4; ++n) {
+    double x[4] = {-1, -0.3, 2, 1};
+    x[n] = std::nan("");
+    EXPECT_THROW(tube_level({x[0], x[1], x[2], x[3]}, {0.1}, {}), std::invalid_argument);
+  }
+  EXPECT_THROW(tube_level({-1, -0.3, 2, 1}, {0.1}, {0.0, 0.1}), std::invalid_argument);
   EXPECT_THROW(tube_level({}, {0.0}, {}), std::invalid_argument);
   EXPECT_THROW(tube_level({}, {0.1, 2, 1}, {}), std::invalid_argument);
   EXPECT_THROW(tube_level({}, {0.1, 0, 1, -1, 1}, {}), std::invalid_argument);

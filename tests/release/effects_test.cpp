@@ -80,6 +80,15 @@ TEST(LaggedHand, HasSettledAtTheStartAndIsSmoothAtTheJumps) {
   }
 }
 
+TEST(LaggedHand, IsSettledBeforeTheLogHoweverShortTheLag) {
+  const auto log = logged();
+  for (const double lag : {0.01, 1e-5, 1e-9}) {
+    const auto a = LaggedHand(log, Dual(lag)).at(kAlways, -0.02), b = log.at(kAlways, -0.02);
+    for (int n = 0; n < 3; ++n)  // y(t) = u(t) − τ u̇(t) + …, of which the first term bounds the rest here
+      EXPECT_NEAR(pose(a)[n], pose(b)[n], 5 * lag * (1 + std::abs(twist(b)[n]))) << lag;
+  }
+}
+
 TEST(LaggedHand, WithoutLagIsTheLog) {
   const auto log = logged();
   const LaggedHand hand(log, Dual(0));
