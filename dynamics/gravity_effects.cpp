@@ -12,12 +12,11 @@ void tilt(const EffectValues<S>& p, Gravity<S>& gravity) {
 
 std::span<const EffectOn<Gravity>> gravity_effects() {
   static const EffectOn<Gravity> table[] = {
-      {{"flight.gravity_tilt",
-        "the base frame is not level",
-        {{"angle", "rad", 0, -0.5, 0.5, 0.01}},
-        false,
-        false,
-        "1 along x"},
+      {{.id = "flight.gravity_tilt",
+        .mechanism = "the base frame is not level",
+        .parameters = {{"angle", "rad", 0, -0.5, 0.5, 0.01}},
+        .form = "1 along x",
+        .acts_everywhere = true},
        &tilt<double>,
        &tilt<Dual>},
   };

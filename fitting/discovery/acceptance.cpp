@@ -209,13 +209,16 @@ bool in_air(Phase phase) { return phase == Phase::flight || phase == Phase::land
 
 bool acts_on_pads(const std::string& id) { return id.starts_with("contact.") || id.starts_with("release."); }
 
+bool is_of_sensor(const std::string& id) { return id.starts_with("sensor."); }
+
 bool acts_on_pads(const Stage& stage) {
   return std::any_of(stage.ids.begin(), stage.ids.end(),
                      [](const std::string& id) { return acts_on_pads(id); });
 }
 
 bool acts(const AcceptedEffect& effect, bool air) {
-  return in_air(effect.phase) == air || (!air && acts_on_pads(effect.id));
+  return in_air(effect.phase) == air || (!air && acts_on_pads(effect.id)) ||
+         (!is_law(effect.id) && find_effect(effect.id).acts_everywhere);
 }
 
 namespace {
@@ -225,13 +228,38 @@ bool is_left(const ChannelMisfit& m, const DiscoverOptions& options) {
   return is_misfit(m, options) && m.chi2_per_sample() >= unexplained_from(m.channel, m.phase, false, options);
 }
 
+/// Whether a channel in a phase is read by a sensor behind the pads while nothing touches them: what it shows
+/// is the sensor's own.
+bool is_unloaded(Channel channel, Phase phase) {
+  return in_air(phase) && (is_wrench(channel) || channel == Channel::normal_force);
+}
+
+/// Whether an unloaded sensor has shown that an effect is its own: of what the base left in this channel in
+/// the air, no more than kLeft is there now.
+bool is_shown_unloaded(Channel channel, const std::vector<ChannelMisfit>& base,
+                       const std::vector<ChannelMisfit>& now, const DiscoverOptions& options) {
+  return std::any_of(base.begin(), base.end(), [&](const ChannelMisfit& b) {
+    return b.channel == channel && is_unloaded(channel, b.phase) && is_left(b, options) &&
+           misfit_in(now, channel, b.phase) - 1 <= kLeft * (b.chi2_per_sample() - 1);
+  });
+}
+
 /// Whether too much is left in the half of the throw where an effect acts, or in a channel that it
 /// `explains`, of what the base model's fit left there in the other throws (`other`: train against held-out
-/// ones) as well; and not next to nothing of what the base left in that phase's worst channel.
+/// ones) as well; and not next to nothing of what the base left in that phase's worst channel. Readings of an
+/// unloaded sensor are of sensors alone, and where they have shown a sensor's effect, what is left of the
+/// same channel under load is something else's.
 template <class Explains>
 bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisfit>& base,
                      const std::vector<ChannelMisfit>& other, const std::vector<ChannelMisfit>& now,
                      const DiscoverOptions& options, const Explains& explains) {
+  const bool sensor = is_of_sensor(effect.id);
+  const auto answers_for = [&](const ChannelMisfit& m) {
+    if (is_unloaded(m.channel, m.phase) ? !sensor
+                                        : sensor && is_shown_unloaded(m.channel, base, now, options))
+      return false;
+    return acts(effect, in_air(m.phase)) || explains(m);
+  };
   const auto worst = [&](Phase phase) {
     double out = 1;
     for (const ChannelMisfit& m : base)
@@ -242,7 +270,7 @@ bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisf
     return is_left(m, options) && is_confirmed(other, m) &&
            m.chi2_per_sample() - 1 > std::max(kLeft * (misfit_in(base, m.channel, m.phase) - 1),
                                               kNextToNothing * (worst(m.phase) - 1)) &&
-           (acts(effect, in_air(m.phase)) || explains(m));
+           answers_for(m);
   });
 }
 
@@ -258,6 +286,19 @@ bool leaves_lacking(const BothErrors& errors, const Discovery& so_far, const Dis
   });
 }
 
+/// Whether what predictions lack is another with an effect than without it, by so much of what the base's
+/// lacked.
+bool bears_on_lacking(const AcceptedEffect& effect, const Stage& stage, const BothErrors& errors,
+                      const Discovery& so_far, const DiscoverOptions& options) {
+  const Stage& less = without(stage, {effect.id}, options);
+  if (!less.solved()) return true;
+  const OutcomeErrors before = errors_of(less, Share::train, options.fit.threads);
+  return std::any_of(errors.train.lacks.begin(), errors.train.lacks.end(), [&](const OutcomeLack& now) {
+    return std::abs(now.fit.shared - lack_in(before, now.outcome).fit.shared) >
+           kLeft * lack_in(so_far.before_train, now.outcome).fit.shared;
+  });
+}
+
 }  // namespace
 
 bool explains_most(const ChannelMisfit& now, const std::vector<ChannelMisfit>& without) {
@@ -269,13 +310,14 @@ bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const BothEr
   // A sensor that is off is so in the hand and in the air, wherever that was seen most.
   const auto explains = [&](FitResult Stage::*half) {
     return [&, half](const ChannelMisfit& m) {
-      if (!effect.id.starts_with("sensor.")) return false;
+      if (!is_of_sensor(effect.id)) return false;
       const Stage& less = without(stage, {effect.id}, options);
       return less.solved() && explains_most(m, (less.*half).misfit);
     };
   };
-  return (acts(effect, false) && leaves_lacking(errors, so_far, options)) ||
-         (!is_law(effect.id) && !is_told_from_none(counted, find_effect(effect.id))) ||
+  const bool lacks = acts(effect, false) && leaves_lacking(errors, so_far, options) &&
+                     (!is_of_sensor(effect.id) || bears_on_lacking(effect, stage, errors, so_far, options));
+  return lacks || (!is_law(effect.id) && !is_told_from_none(counted, find_effect(effect.id))) ||
          leaves_too_much(effect, so_far.base.misfit, so_far.base_test, stage.fit.misfit, options,
                          explains(&Stage::fit)) ||
          leaves_too_much(effect, so_far.base_test, so_far.base.misfit, stage.held_out.misfit, options,

@@ -155,10 +155,12 @@ bool is_told_from_none(const FitResult& fit, const dynamics::Effect& effect);
 bool in_air(Phase phase);
 /// Whether an effect is one on the contact or the release.
 bool acts_on_pads(const std::string& id);
-/// Whether such an effect was added.
+/// Whether an effect is one of sensing, or of what the log declares.
+bool is_of_sensor(const std::string& id);
+/// Whether an effect on the pads was added.
 bool acts_on_pads(const Stage& stage);
-/// Whether an effect acts in the air, or in the hand: where the misfit fell most, and an effect on the pads
-/// in the hand wherever that was.
+/// Whether an effect acts in the air, or in the hand: where the misfit fell most, an effect on the pads in
+/// the hand wherever that was, and one that acts everywhere (Effect::acts_everywhere) in both.
 bool acts(const AcceptedEffect& effect, bool air);
 
 /// An accepted effect that is the shadow of something else. Either conditions and blocks of sensors do not
@@ -166,7 +168,8 @@ bool acts(const AcceptedEffect& effect, bool air);
 /// much where it acts: of the throws that it was fitted to, or of those that it has not seen. A sensor's
 /// effect, which is there in the hand and in the air, answers for every channel that it explains. Or, acting
 /// in the hand, it leaves predictions lacking (`errors` are the stage's) by too much of what the base's
-/// lacked.
+/// lacked; a sensor's effect only where they lack another amount without it, as most sensors take no part in
+/// what happens.
 bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const BothErrors& errors,
                   const FitResult& counted, const Discovery& so_far, const DiscoverOptions& options);
 

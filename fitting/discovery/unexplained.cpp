@@ -224,6 +224,7 @@ std::string in_words(const Discovery& so_far, const Unexplained& left) {
 std::optional<Unexplained> left_in_channels(const Stage& stage, const Discovery& so_far, double rest,
                                             const DiscoverOptions& options) {
   std::optional<Unexplained> out;
+  const ChannelMisfit* worst = nullptr;
   const bool elsewhere = std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(), [&](const auto& m) {
     return is_misfit(m, options) &&
            m.chi2_per_sample() >= unexplained_from(m.channel, m.phase, true, options) &&
@@ -235,11 +236,16 @@ std::optional<Unexplained> left_in_channels(const Stage& stage, const Discovery&
                                   so_far.effects.empty() ? 0.0 : 1 + rest * (before - 1));
     if (!is_misfit(m, options) || m.chi2_per_sample() < limit) continue;
     if (!is_confirmed(stage.held_out.misfit, m)) continue;
+    if (!worst || m.chi2_per_sample() > worst->chi2_per_sample()) worst = &m;
     if (out && (m.phase != out->phase || m.chi2_per_sample() <= out->chi2_per_dof)) continue;
     out = Unexplained{m.phase, m.channel, m.chi2_per_sample(), {}, {}};
   }
   if (!out) return out;
   out->description = in_words(so_far, *out);
+  constexpr double kFarMore = 3;
+  if (worst->phase != out->phase && worst->chi2_per_sample() > kFarMore * out->chi2_per_dof)
+    out->description += fmt::format("; most is left in {} in {}, {:.3g} times", to_string(worst->channel),
+                                    to_string(worst->phase), worst->chi2_per_sample());
   if (const auto factor = too_small_by(so_far, out->channel))
     out->description +=
         fmt::format("; white and alike in all phases: a sigma too small by {:.2g} would do", *factor);
