@@ -148,6 +148,29 @@ TEST(Discovery, AFrameThatIsOffAcrossThePadsIsNoTiltAndNoLift) {
   asks_for(found_in(log), "omega^2 along the object's z", -kOff, 0.15 * kOff);  // towards the CoM
 }
 
+// A push along x that only flights feel, a draught say, is in flight just what a tilted gravity is: that one,
+// though, acts in the hand as well, and the wrench before the detach knows nothing of it.
+TEST(Discovery, APushThatTheHandDoesNotFeelIsNoTiltedGravity) {
+  constexpr double kPush = -0.2;  // [m/s^2]
+  const experiment::CampaignDesign design = support::loop_design();
+  datasets::ThrowLog log = experiment::campaign_header(design, 3);
+  for (int i = 0; i < design.throws(); ++i) {
+    auto [record, truth] = experiment::generate_throw(design, 3, i);
+    const auto moved = [&, from = truth.detach_time](double t) {
+      return t > from ? 0.5 * kPush * (t - from) * (t - from) : 0.0;
+    };
+    for (std::size_t k = 0; k < record.mocap->time.rows; ++k)
+      record.mocap->pose(k, 0) += moved(record.mocap->time(k));
+    record.landing->pose(0, 0) += moved(truth.landing_time);
+    log.throws.push_back(std::move(record));
+  }
+  const Discovery found = found_in(log);
+  EXPECT_EQ(found.verdict, Verdict::unexplained);
+  EXPECT_EQ(named(found, "flight.gravity_tilt"), nullptr);
+  ASSERT_TRUE(found.unexplained.has_value());
+  EXPECT_EQ(found.unexplained->phase, Phase::flight);
+}
+
 // A drag of the catalogue beside a push that is not in it: the rest is unexplained, and the drag stays.
 TEST(Discovery, AListedEffectBesideAnUnlistedOneStays) {
   const Discovery found =
