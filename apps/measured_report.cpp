@@ -33,21 +33,28 @@ Table error_table(const MeasuredDiscovery& found) {
   return table;
 }
 
-Table misfit_table(const MeasuredDiscovery& found) {
-  Table table{{"channel", "samples", "before, train", "before, test", "after, train", "after, test",
-               "neighbours, before", "neighbours, after"},
+/// By channel; residuals of slips are angles, and without neighbours in time.
+Table misfit_table(const MeasuredResult& result) {
+  const MeasuredDiscovery& found = result.answer;
+  const bool slips = !result.surfaces.empty();
+  Table table{{slips ? "mean angle [deg]" : "chi2 per sample", slips ? "slips" : "samples", "before, train",
+               "before, test", "after, train", "after, test"},
               {},
               1};
+  if (!slips) table.header.insert(table.header.end(), {"neighbours, before", "neighbours, after"});
   const auto lag = [](const std::vector<fitting::Autocorrelation>& all, const std::string& channel) {
     for (const auto& a : all)
       if (a.channel == channel) return fmt::format("{:+.2f} ({:+.0f} sigma)", a.lag1, a.z);
     return std::string();
   };
-  for (const auto& m : found.misfit)
+  for (const auto& m : found.misfit) {
     table.rows.push_back({m.channel, std::to_string(m.n), fmt::format("{:.3f}", m.before_train),
                           fmt::format("{:.3f}", m.before_test), fmt::format("{:.3f}", m.after_train),
-                          fmt::format("{:.3f}", m.after_test), lag(found.autocorrelation_before, m.channel),
-                          lag(found.autocorrelation_after, m.channel)});
+                          fmt::format("{:.3f}", m.after_test)});
+    if (!slips)
+      table.rows.back().insert(table.rows.back().end(), {lag(found.autocorrelation_before, m.channel),
+                                                         lag(found.autocorrelation_after, m.channel)});
+  }
   return table;
 }
 
@@ -115,7 +122,7 @@ std::string measured_text(const MeasuredResult& result) {
   for (const auto& e : found.evidence)
     out += fmt::format("\n{} {}{}{}\n", e.against ? "against:" : "note:", e.about,
                        e.about.empty() ? "" : ": ", e.text);
-  return out + "\n" + error_table(found).text() + "\n" + misfit_table(found).text() +
+  return out + "\n" + error_table(found).text() + "\n" + misfit_table(result).text() +
          fmt::format("\n{:.1f} s\n", found.seconds);
 }
 
@@ -170,10 +177,12 @@ void write_measured_report(const MeasuredResult& result, const Json& json,
         "<h2>Does the answer depend on where one looks?</h2><p>The same parameters from halves of the train "
         "data.</p>\n" +
         html(stability_table(found));
-  body +=
-      "<h2>Misfit by channel</h2><p>chi2 per sample; 1 is the noise. Neighbours: correlation of neighbouring "
-      "residuals on held-out data.</p>\n" +
-      html(misfit_table(found));
+  body += fmt::format(
+              "<h2>Misfit by channel</h2><p>{}</p>\n",
+              slips ? "Mean angle between predicted and measured direction of sliding, in degrees."
+                    : "chi2 per sample; 1 is the noise. Neighbours: correlation of neighbouring residuals "
+                      "on held-out data.") +
+          html(misfit_table(result));
   if (!found.skipped.empty())
     body += fmt::format("<p>{} left out; the first: {} ({}).</p>\n", found.skipped.size(),
                         escaped(found.skipped.front().first), escaped(found.skipped.front().second));
