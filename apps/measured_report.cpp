@@ -86,10 +86,14 @@ std::string first_text(const MeasuredDiscovery& found) {
   if (!found.first.any) return "No channel leaves the noise.";
   if (found.first.time > 0)
     return fmt::format(
-        "The residual first leaves the noise after {:.3f} s: a start fitted to the samples up to there "
-        "leaves {:.2f} times the variance "
-        "of the noise, most of it in {}.",
-        found.first.time, found.first.chi2_per_dof, found.first.channel);
+        "The residual {}: a start fitted to the samples up to there leaves {:.3g} times the variance of the "
+        "noise, most of it in {}.",
+        found.first.at_once
+            ? fmt::format("leaves the noise from the start on, already in the first {:.3f} s, the shortest "
+                          "time looked at",
+                          found.first.time)
+            : fmt::format("first leaves the noise after {:.3f} s", found.first.time),
+        found.first.chi2_per_dof, found.first.channel);
   return fmt::format("The residual leaves the noise in {} (phase {}).", found.first.channel, found.phase);
 }
 
