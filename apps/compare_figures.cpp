@@ -87,13 +87,12 @@ std::size_t first_narrow(const std::vector<Cloud>& clouds) {
   return first;
 }
 
-std::string scatter(const std::vector<Cloud>& clouds, std::size_t first, const Extent& e,
-                    const std::string& title) {
+std::string scatter(const std::vector<Cloud>& clouds, const Extent& e, const std::string& title) {
   std::string out =
       fmt::format("set xrange [{:.6g}:{:.6g}]; set yrange [{:.6g}:{:.6g}]\n", -e.x, e.x, -e.theta, e.theta);
   out += fmt::format("set title '{}' offset 0,-0.5\nplot ", title);
-  for (std::size_t i = first; i < clouds.size(); ++i)
-    out += fmt::format("{}DATA index {} using 1:2 {}", i > first ? ", \\\n     " : "", i,
+  for (std::size_t i = 0; i < clouds.size(); ++i)
+    out += fmt::format("{}DATA index {} using 1:2 {}", i > 0 ? ", \\\n     " : "", i,
                        point_style(clouds[i].model));
   return out + "\n";
 }
@@ -206,10 +205,10 @@ std::optional<Figure> landing_figure(const Comparison& comparison) {
         "'#303030' "
         "linewidth 1 dashtype 2\n",
         -zoom.x, -zoom.theta, zoom.x, zoom.theta);
-  s += scatter(clouds, 0, all, (two ? "every model, " : "landing errors, ") + which);
+  s += scatter(clouds, all, (two ? "every model, " : "landing errors, ") + which);
   if (two)
     s += "unset object 1\nset ylabel ''\n" + place(figure, {10.8, figure.width - 0.5, bottom, top}) +
-         scatter(clouds, narrow, zoom, "the same, magnified about zero");
+         scatter(clouds, zoom, "the same, magnified about zero");
   s += key_strip(figure, key, columns) + "unset multiplot\n";
   return figure;
 }
