@@ -142,12 +142,15 @@ std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects) {
 
 std::string effect_html(const fitting::AcceptedEffect& effect) {
   std::string out = fmt::format("<h3>{}</h3><p>", escaped(effect.id));
-  for (const auto& p : effect.parameters)
-    out += is_held(p.value, p.sigma)
-               ? fmt::format("{} = {}<br>", escaped(p.name), escaped(with_sigma(p.value, p.sigma, p.unit)))
-               : fmt::format("{} = {:.6g} &plusmn; {:.2g} {} (95 %: {:.6g} to {:.6g})<br>", escaped(p.name),
-                             p.value, p.sigma, escaped(p.unit), p.value - fitting::kNormal95 * p.sigma,
-                             p.value + fitting::kNormal95 * p.sigma);
+  for (const auto& p : effect.parameters) {
+    const auto end = [&](double sign) {
+      return rounded(p.value + sign * fitting::kNormal95 * p.sigma, p.sigma).value;
+    };
+    const std::string interval =
+        is_held(p.value, p.sigma) ? "" : fmt::format(" (95 %: {} to {})", end(-1), end(1));
+    out += fmt::format("{} = {}{}<br>", escaped(p.name), escaped(with_sigma(p.value, p.sigma, p.unit)),
+                       interval);
+  }
   const std::string p_value = effect.p_value ? fmt::format(", p = {:.2g}", *effect.p_value) : "";
   out += fmt::format("BIC {:+.1f}{}. On held-out data: {}.</p>\n", effect.delta_bic, p_value,
                      escaped(effect.why));
