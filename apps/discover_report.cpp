@@ -56,7 +56,9 @@ Figure residual_figure(const Discovery& found) {
         "set arrow 2 from {:.3f},1 to {:.3f},1 nohead linecolor rgb '#b0b0b0'\n"
         "plot DATA index {} using 1:2 {}, DATA index {} using 1:2 {}\n",
         plain(std::string(to_string(channel))), low, high, 1.5 * top, residual_tics(top),
-        at / columns == rows - 1 ? "set xlabel 'time from release [s]' offset 0,0.6\n" : "unset xlabel\n",
+        at + columns >= static_cast<int>(channels.size())
+            ? "set xlabel 'time from release [s]' offset 0,0.3\n"
+            : "unset xlabel\n",
         1.5 * top, low, high, index, kBefore, index + 1, kAfter);
     index += 2;
     ++at;
@@ -100,7 +102,7 @@ Figure missing_figure(const fitting::MissingEstimate& missing) {
     const double left = 2.0 + 5.2 * static_cast<double>(component);
     script += place(figure, {left, left + 3.4, 1.9, 5.4});
     script += fmt::format(
-        "set title '{}' offset 0,-0.5\nset xlabel '{}' offset 0,0.5\nset xrange [0:{:.6g}]; set xtics "
+        "set title '{}' offset 0,-0.5\nset xlabel '{}' offset 0,0.3\nset xrange [0:{:.6g}]; set xtics "
         "{:.6g}\n"
         "plot 0 with lines linecolor rgb '#808080'",
         unit[component], flight ? "since the detach [s]" : "share of the opening", 1.04 * last,

@@ -130,6 +130,7 @@ std::string script_text(const Figure& figure) {
       "  set output '{0}.'.format\n"
       "  set border 3 linecolor rgb '#404040' linewidth 0.7\n"
       "  set tics nomirror out scale 0.5 textcolor rgb '#202020'\n"
+      "  set format '%h'\n"
       "  set grid linetype 1 linecolor rgb '#e2e2e2' linewidth 0.5\n"
       "{5}"
       "  set output\n"

@@ -48,7 +48,7 @@ Figure footprint_figure(const std::vector<std::string>& channels, const std::vec
     script += place(figure, {left, left + 4.2, bottom, bottom + 2.4});
     script += fmt::format(
         "set title '{}' offset 0,-0.6\nset yrange [{:.2g}:{:.4g}]\nset format y '%g'\nset ytics {}\n"
-        "set ylabel '{}' offset 0.5\nset xlabel '{}' offset 0,0.6\n"
+        "set ylabel '{}' offset 0.5\nset xlabel '{}' offset 0,0.3\n"
         "set arrow 2 from {:.4g},1 to {:.4g},1 nohead linecolor rgb '#b0b0b0'\nplot {}\n",
         plain(channel), kFloor, 1.5 * top,
         top > 60 ? "(0.1, 1, 10, 100, 1000, '10^4' 1e4, '10^5' 1e5)" : "auto",

@@ -33,10 +33,11 @@ Figure measured_residual_figure(const std::vector<fitting::ResidualProfile>& bas
     script += fmt::format(
         "set title '{}' offset 0,-0.6\nset logscale y\nset yrange [0.5:{:.4g}]\nset format y '%g'\n"
         "{}set ylabel '{}' offset 0.5\n"
-        "set arrow 2 from 0,1 to 1,1 nohead linecolor rgb '#b0b0b0'\nset xlabel '{}' offset 0,0.6\n"
+        "set arrow 2 from 0,1 to 1,1 nohead linecolor rgb '#b0b0b0'\nset xlabel '{}' offset 0,0.3\n"
         "plot DATA index {} using 1:2 {}, DATA index {} using 1:2 {}\n",
         plain(channel), 1.5 * top, residual_tics(top), at % columns == 0 ? "rms [{/Symbol s}]" : "",
-        at / columns == rows - 1 ? "share of the duration" : "", index, kBefore, index + 1, kAfter);
+        at + columns >= static_cast<int>(channels.size()) ? "share of the duration" : "", index, kBefore,
+        index + 1, kAfter);
     index += 2;
     ++at;
   }

@@ -148,7 +148,8 @@ Figure mode_figure(const std::vector<ReleaseTrace>& traces) {
        "plot DATA index 0 using 1:2 with lines linecolor rgb '#000000' linewidth 1.6\n";
   s += "unset label 99\n" + place(figure, {left, figure.width - 0.5, low, ribbon});
   s += fmt::format(
-      "set format x; unset ylabel; set xlabel 'time [ms]'\nset yrange [{}:-0.5]\nset ytics ({}) scale 0\n"
+      "set format x '%h'; unset ylabel; set xlabel 'time [ms]'\nset yrange [{}:-0.5]\nset ytics ({}) scale "
+      "0\n"
       "set style fill solid 1 border rgb '#404040'\nunset grid\nplot {}\n",
       n - 0.5, tics, ribbons);
   s += "unset label 99\n" +
