@@ -35,9 +35,9 @@ class FigureSource {
 
   /// All throws with every model.
   const experiment::Comparison& compared();
-  /// The one throw through every model, recorded.
+  /// The one throw through every model that has modes, recorded.
   const std::vector<ReleaseTrace>& traces();
-  /// Of the first model: L = c a [m].
+  /// Of the first of the traces: L = c a [m].
   double length();
   /// The flight of the one throw after the release that the first model says.
   FlightOverlay overlay();
@@ -47,7 +47,8 @@ class FigureSource {
   const Fitted& fitted(const std::string& model);
   /// Of its card, or estimated from the log.
   const experiment::ModelParameters& parameters_of(const std::string& model);
-  ReleaseTrace trace(const std::string& model);
+  /// Nothing of a model without modes.
+  std::optional<ReleaseTrace> trace(const std::string& model);
 
   FigureRequest request_;
   std::string file_;
