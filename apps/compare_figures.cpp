@@ -97,23 +97,6 @@ std::string scatter(const std::vector<Cloud>& clouds, const Extent& e, const std
   return out + "\n";
 }
 
-/// An axis of positive values from its commands: logarithmic where they span more than a factor of 20, then
-/// with tics at 1, 2 and 5 where decades alone would be few.
-std::string value_axis(const std::vector<double>& values) {
-  const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  if (!(*low > 0 && *high / *low > 20))
-    return fmt::format("unset logscale x; set xtics {:.6g}\nset xrange [0:{:.6g}]\n", tic_step(*high),
-                       *high > 0 ? 1.08 * *high : 1);
-  const double left = *low / 1.4, right = *high * 1.4;
-  std::string out = fmt::format("set logscale x\nset xrange [{:.6g}:{:.6g}]\n", left, right);
-  if (right / left > 300) return out + "set xtics autofreq\n";
-  std::string tics;
-  for (double decade = std::pow(10, std::floor(std::log10(left))); decade < right; decade *= 10)
-    for (const int digit : {1, 2, 5})
-      tics += fmt::format("{}{:.6g}", tics.empty() ? "" : ", ", digit * decade);
-  return out + fmt::format("set xtics ({})\n", tics);
-}
-
 /// The conditions, that with the largest landing error of `model` first.
 std::vector<ThrownCondition> sorted_conditions(const Comparison& comparison, const ModelComparison& model) {
   std::vector<std::pair<double, ThrownCondition>> order;

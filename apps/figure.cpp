@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <cerrno>
@@ -214,6 +215,21 @@ double tic_step(double high) {
   if (!(high > 0)) return 1;
   const double raw = high / 3, decade = std::pow(10, std::floor(std::log10(raw)));
   return decade * (raw >= 5 * decade ? 5 : raw >= 2 * decade ? 2 : 1);
+}
+
+std::string value_axis(const std::vector<double>& values) {
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  if (!(*low > 0 && *high / *low > 20))
+    return fmt::format("unset logscale x; set xtics {:.6g}\nset xrange [0:{:.6g}]\n", tic_step(*high),
+                       *high > 0 ? 1.08 * *high : 1);
+  const double left = *low / 1.4, right = *high * 1.4;
+  std::string out = fmt::format("set logscale x\nset xrange [{:.6g}:{:.6g}]\n", left, right);
+  if (right / left > 300) return out + "set xtics autofreq\n";
+  std::string tics;
+  for (double decade = std::pow(10, std::floor(std::log10(left))); decade < right; decade *= 10)
+    for (const int digit : {1, 2, 5})
+      tics += fmt::format("{}{:.6g}", tics.empty() ? "" : ", ", digit * decade);
+  return out + fmt::format("set xtics ({})\n", tics);
 }
 
 std::string plain(const std::string& text) {
