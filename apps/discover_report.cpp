@@ -49,20 +49,21 @@ Figure residual_figure(const Discovery& found) {
     const double left = 1.9 + (at % columns) * 8.2, bottom = 1.9 + (rows - 1 - at / columns) * 3.9;
     script += place(figure, {left, left + 6.3, bottom, bottom + 2.5});
     script += fmt::format(
-        "set title '{}' offset 0,-0.6\nset logscale y\nset xrange [{:.3f}:{:.3f}]\nset yrange [0.3:{:.4g}]\n"
-        "set format y '%g'\n{}{}set ylabel 'rms "
+        "set title '{}' offset 0,-0.6\nset logscale y\nset xrange [{:.3f}:{:.3f}]\nset yrange [{}:{:.4g}]\n"
+        "{}{}set ylabel 'rms "
         "[{{/Symbol s}}]' offset 0.5\n"
-        "set arrow 1 from 0,0.3 to 0,{:.4g} nohead dashtype 3 linecolor rgb '#808080'\n"
+        "set arrow 1 from 0,graph 0 to 0,graph 1 nohead dashtype 3 linecolor rgb '#808080'\n"
         "set arrow 2 from {:.3f},1 to {:.3f},1 nohead linecolor rgb '#b0b0b0'\n"
         "plot DATA index {} using 1:2 {}, DATA index {} using 1:2 {}\n",
-        plain(std::string(to_string(channel))), low, high, 1.5 * top, residual_tics(top),
+        plain(std::string(to_string(channel))), low, high, kResidualFloor, 1.5 * top, residual_tics(top),
         at + columns >= static_cast<int>(channels.size())
             ? "set xlabel 'time from release [s]' offset 0,0.3\n"
             : "unset xlabel\n",
-        1.5 * top, low, high, index, kBefore, index + 1, kAfter);
+        low, high, index, kBefore, index + 1, kAfter);
     index += 2;
     ++at;
   }
+  script += floor_note(figure);
   script += found.adds_nothing() ? key_strip(figure, {{kAfter, "base model, to which nothing was added"}}, 1)
                                  : key_strip(figure, {{kBefore, "before"}, {kAfter, "after"}}, 2);
   figure.script = script + "unset multiplot\n";

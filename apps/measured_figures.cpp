@@ -31,17 +31,18 @@ Figure measured_residual_figure(const std::vector<fitting::ResidualProfile>& bas
     const double left = 1.8 + (at % columns) * 5.2, bottom = 2.3 + (rows - 1 - at / columns) * 3.9;
     script += place(figure, {left, left + 4.2, bottom, bottom + 2.5});
     script += fmt::format(
-        "set title '{}' offset 0,-0.6\nset logscale y\nset yrange [0.5:{:.4g}]\nset format y '%g'\n"
+        "set title '{}' offset 0,-0.6\nset logscale y\nset yrange [{}:{:.4g}]\n"
         "{}set ylabel '{}' offset 0.5\n"
         "set arrow 2 from 0,1 to 1,1 nohead linecolor rgb '#b0b0b0'\nset xlabel '{}' offset 0,0.3\n"
         "plot DATA index {} using 1:2 {}, DATA index {} using 1:2 {}\n",
-        plain(channel), 1.5 * top, residual_tics(top), at % columns == 0 ? "rms [{/Symbol s}]" : "",
+        plain(channel), kResidualFloor, 1.5 * top, residual_tics(top),
+        at % columns == 0 ? "rms [{/Symbol s}]" : "",
         at + columns >= static_cast<int>(channels.size()) ? "share of the duration" : "", index, kBefore,
         index + 1, kAfter);
     index += 2;
     ++at;
   }
-  script += key_strip(figure, {{kBefore, base_name}, {kAfter, answer_name}}, 2);
+  script += floor_note(figure) + key_strip(figure, {{kBefore, base_name}, {kAfter, answer_name}}, 2);
   figure.script = script + "unset multiplot\n";
   return figure;
 }

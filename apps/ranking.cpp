@@ -184,8 +184,14 @@ Json effect_json(const fitting::AcceptedEffect& effect) {
 }
 
 std::string residual_tics(double top) {
-  return top > 60 ? "set ytics (1, 10, 100, 1000, '10^4' 1e4, '10^5' 1e5, '10^6' 1e6)\n"
-                  : "set ytics (0.5, 1, 2, 5, 10, 20, 50)\n";
+  return top > 6 ? "set ytics (0.1, 1, 10, 100, 1000, '10^4' 1e4, '10^5' 1e5, '10^6' 1e6)\n"
+                 : "set ytics (0.1, 0.2, 0.5, 1, 2, 5)\n";
+}
+
+std::string floor_note(const Figure& figure) {
+  return fmt::format(
+      "set label 98 'below {} {{/Symbol s}}: not shown' at screen {:.4f},{:.4f} right font ',7'\n",
+      kResidualFloor, 1 - 0.3 / figure.width, 1 - 0.3 / figure.height);
 }
 
 double add_residuals(Figure& figure, const std::string& channel, const std::string& x,
@@ -197,7 +203,7 @@ double add_residuals(Figure& figure, const std::string& channel, const std::stri
                     {},
                     {}};
     for (const auto& p : *points) {
-      block.rows.push_back({p.x, std::max(p.rms, 0.05), p.mean, static_cast<double>(p.samples)});
+      block.rows.push_back({p.x, p.rms, p.mean, static_cast<double>(p.samples)});
       top = std::max(top, p.rms);
     }
     figure.data.push_back(std::move(block));

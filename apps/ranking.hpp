@@ -73,7 +73,11 @@ inline constexpr const char* kFootprints =
     "order) and with all that is fitted anyway making up for what it can; grey: what the base model leaves. "
     "What is missing should look like that, in every channel.";
 
-/// Marks of a logarithmic axis of residuals from 0.5 to `top` that do not overlap, for gnuplot.
+/// Where the axes of residuals begin [sigma], and a note in the upper right corner that says so.
+inline constexpr double kResidualFloor = 0.1;
+std::string floor_note(const Figure& figure);
+
+/// Marks of a logarithmic axis of residuals from there to `top` that do not overlap, for gnuplot.
 std::string residual_tics(double top);
 
 /// Adds a channel's residuals before and after as data of the figure. Returns the largest rms, at least 2.
