@@ -50,30 +50,30 @@ Figure ranking_figure(std::span<const fitting::Ranked> ranking,
   std::stable_sort(by_step.begin(), by_step.end(),
                    [](const auto& a, const auto& b) { return a.step < b.step; });
   std::string tics;
-  int position = 0;
+  int lines = 0, step = 0;  // a headline and a gap for every step
   double largest = 10;
+  const auto line = [&](const std::string& text) {
+    tics += fmt::format("{}'{}' {}", lines > 0 ? ", " : "", text, lines);
+    return static_cast<double>(lines++);
+  };
   for (const auto& r : by_step) {
     if (!(r.gain > 1)) continue;
+    if (r.step != step) line(fmt::format("{{/:Bold step {}}}", step = r.step));
     const bool taken =
         std::any_of(accepted.begin(), accepted.end(), [&](const auto& e) { return e.id == r.id; });
-    block.rows.push_back(
-        {r.gain, static_cast<double>(position), taken ? 1.0 : 0.0, static_cast<double>(r.step)});
-    const std::string step = r.step > 1 ? fmt::format(" (step {})", r.step) : "";
-    tics += fmt::format("{}'{}{}' {}", position ? ", " : "", plain(r.id), step, position);
+    block.rows.push_back({r.gain, line(plain(r.id)), taken ? 1.0 : 0.0, static_cast<double>(r.step)});
     largest = std::max(largest, r.gain);
-    ++position;
   }
-  if (position == 0) block.rows.push_back({1, 0, 0, 1}), tics = "'none' 0";
-  figure.height = 2 + 0.55 * std::max(1, position);
+  if (block.rows.empty()) line("none");
+  figure.height = 2 + 0.55 * lines;
   figure.data.push_back(block);
   figure.script = fmt::format(
-      "set key off\nset lmargin 38\nset logscale x\nset format x '10^{{%T}}'\nset xrange [1:{:.4g}]\n"
-      "set yrange [{}:-1]\nset ytics ({})\nset xlabel 'chi^2 that the effect would take away, to first "
-      "order'\n"
-      "set style fill solid 0.9\n"
-      "plot DATA index 0 using (sqrt($1)):2:(0):1:($2-0.35):($2+0.35):($3 > 0 ? 0x0072b2 : 0xb0b0b0) "
-      "with boxxyerror linecolor rgb variable\n",
-      2 * largest, std::max(1, position), tics);
+      "set key off\nset lmargin 38\nset logscale x\nset format x '10^{{%T}}'\nset xrange [0.7:{:.4g}]\n"
+      "set yrange [{}:-0.6]\nset ytics ({}) scale 0\n"
+      "set xlabel '{{/Symbol c}}^2 that the effect would take away, to first order'\n"
+      "plot DATA index 0 using ($3 > 0 ? NaN : $1):2 with points pointtype 6 linecolor rgb '#707070', \\\n"
+      "     DATA index 0 using ($3 > 0 ? $1 : NaN):2 with points pointtype 7 linecolor rgb '#0072b2'\n",
+      2 * largest, lines - 0.4, tics);
   return figure;
 }
 

@@ -18,8 +18,8 @@ Json ranking_json(std::span<const fitting::Ranked> ranking);
 /// The candidates, best first: what each would take away, and what a refit showed.
 Table ranking_table(std::span<const fitting::Ranked> ranking);
 
-/// Bars of the fall of chi-square to first order, by the step of the search that they are of; those of the
-/// accepted effects are blue.
+/// The fall of chi-square to first order as points, by the step of the search that they are of; those of the
+/// accepted effects are filled.
 Figure ranking_figure(std::span<const fitting::Ranked> ranking,
                       std::span<const fitting::AcceptedEffect> accepted);
 
