@@ -210,15 +210,17 @@ constexpr const char* kLandingsAlone = "<p>Landings alone were measured: nothing
 
 }  // namespace
 
-void write_discovery_report(const Discovery& found, const std::string& log, const std::string& command,
-                            const Json& json, const std::filesystem::path& directory) {
+void write_discovery_report(const Discovery& found, const std::string& log, const std::string& origin,
+                            const std::string& command, const Json& json,
+                            const std::filesystem::path& directory) {
   const Figure residual = residual_figure(found), ranking = ranking_figure(found.ranking, found.effects);
+  const std::string about = log + ": " + origin;
   const bool over_time = !found.residual_before.empty();
-  if (over_time) draw(residual, directory);
-  draw(ranking, directory);
-  if (over_time) draw(footprints_of(found), directory);
+  if (over_time) draw(residual, directory, about);
+  draw(ranking, directory, about);
+  if (over_time) draw(footprints_of(found), directory, about);
   const bool estimated = found.unexplained && found.unexplained->missing;
-  if (estimated) draw(missing_figure(*found.unexplained->missing), directory);
+  if (estimated) draw(missing_figure(*found.unexplained->missing), directory, about);
   const auto picture = [&](const std::string& name) {
     return html_picture(directory / (name + ".png"), name);
   };
@@ -239,7 +241,7 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
                                                   to_string(found.first.channel), found.first.chi2_per_sample)
                                             : "No channel leaves the noise in any phase.";
   const std::string body = fmt::format(
-      "<p>Base model <code>{}</code>. Verdict: <b>{}</b>.</p>\n<h2>Where it starts</h2><p>{}</p>\n{}"
+      "<p>{}: base model <code>{}</code>. Verdict: <b>{}</b>.</p>\n<h2>Where it starts</h2><p>{}</p>\n{}"
       "<h2>The answer</h2>\n{}<h2>Errors before and after</h2>\n"
       "<p>Predicted from what is known before the throw, minus measured; chi2/dof with the throws' own "
       "unknowns fitted. Test throws took no part in any fit, but they decided what was accepted: after, "
@@ -252,7 +254,7 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
       "<h2>Structure of the residual</h2><p>Of the train throws: size, autocorrelation, and what it goes "
       "with (share of its mean square).</p>{}<h2>Again</h2><p><code>{}</code><br>log checksum "
       "<code>{}</code></p>",
-      escaped(json.at("base_model").get<std::string>()), to_string(found.verdict), first,
+      escaped(origin), escaped(json.at("base_model").get<std::string>()), to_string(found.verdict), first,
       over_time ? picture("residual") : kLandingsAlone, answer,
       found.held_out.empty() ? "" : fmt::format("<p>{}</p>\n", escaped(held_out_text(found))),
       html(error_table(found)), html(lack_table(found)), picture("ranking"),

@@ -153,13 +153,14 @@ std::string file_stem(const std::string& text) {
   return out;
 }
 
-void draw(const Figure& figure, const fs::path& directory) {
+void draw(const Figure& figure, const fs::path& directory, const std::string& about) {
   const Unbroken here;
   if (figure.name != file_stem(figure.name))
     throw std::logic_error("figure: the name " + figure.name + " is none for a file");
   const fs::path program = gnuplot();
-  write_text(directory / (figure.name + ".dat"), data_text(figure));
-  write_text(directory / (figure.name + ".gp"), script_text(figure));
+  const std::string comment = about.empty() ? "" : "# " + quoted(about) + "\n";
+  write_text(directory / (figure.name + ".dat"), comment + data_text(figure));
+  write_text(directory / (figure.name + ".gp"), comment + script_text(figure));
   const auto [status, said] = run(program, figure.name + ".gp", directory);
   if (status != 0)
     throw Unanswered(fmt::format("gnuplot could not draw {} (status {}):\n{}", figure.name, status, said));

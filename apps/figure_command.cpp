@@ -72,7 +72,7 @@ std::optional<Figure> mae_figure(const experiment::Comparison& comparison) {
                     {"line", "MAE", "lower quartile of the absolute error", "upper quartile", "n", "model"},
                     {},
                     {}};
-    std::vector<double> shown;
+    std::vector<double> means, shown;
     std::string points;
     for (std::size_t i = 0; i < n; ++i) {
       const auto errors = absolute_errors(comparison.models[i], q, split, position ? 100 : 1);
@@ -88,9 +88,12 @@ std::optional<Figure> mae_figure(const experiment::Comparison& comparison) {
           style.colour);
       block.rows.push_back({static_cast<double>(i), mae, low, high, static_cast<double>(errors.size())});
       block.labels.push_back(comparison.models[i].model);
+      means.push_back(mae);
       shown.insert(shown.end(), {mae, low, high});
     }
-    if (shown.empty()) shown = {1}, points = "plot NaN";
+    if (shown.empty()) means = shown = {1}, points = "plot NaN";
+    const auto [least, most] = std::minmax_element(means.begin(), means.end());
+    if (*most < 5 * *least) shown.push_back(0);  // models that are alike, on an axis from 0
     any = any || !block.rows.empty();
     figure.data.push_back(std::move(block));
     const double x = left + (q % 2) * (width + gap), y = 1.3 + (1 - q / 2) * (panel + 1.3);
@@ -180,7 +183,7 @@ void figure(const FigureCommandOptions& options) {
       leave_out(error);
     }
     if (!made) continue;
-    draw(*made, folder);
+    draw(*made, folder, source.about());
     drawn.push_back(made->name);
   }
   if (drawn.empty()) throw Unanswered(fmt::format("no figure can be drawn: {}", left_out.front().second));

@@ -4,11 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 
 #include "apps/command.hpp"
 #include "apps/tell.hpp"
-#include "apps/throws.hpp"
 #include "experiment/synthetic_campaign.hpp"
 
 namespace unhand::apps {
@@ -92,6 +92,10 @@ std::optional<ReleaseTrace> FigureSource::trace(const std::string& model) {
       throw Unanswered(fmt::format("{}, throw {}: {}", model, prepared.id, in_words(result.outcome)));
     out = trace_of(problem, result, contact::Patch<double>::of_length(mu, length, pads));
     out.thrown = prepared.id;
+    out.open_command = prepared.open_command;
+    if (const auto& ft = log_.throws[chosen_].ft)
+      for (std::size_t i = 0; i < ft->normal_force.rows; ++i)
+        if (std::isfinite(ft->normal_force(i))) out.pressed.emplace_back(ft->time(i), ft->normal_force(i));
   };
   const auto card = cards_.find(model);
   if (!contact::follows_pads(model) || model == naive_model) return {};

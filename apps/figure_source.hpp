@@ -10,6 +10,7 @@
 
 #include "apps/cards.hpp"
 #include "apps/release_figures.hpp"
+#include "apps/throws.hpp"
 
 namespace unhand::apps {
 
@@ -32,6 +33,8 @@ class FigureSource {
   explicit FigureSource(const FigureRequest& request);
 
   const std::string& file() const { return file_; }
+  /// The file, and what it declares of itself.
+  std::string about() const { return file_ + ": " + origin_text(log_); }
 
   /// All throws with every model.
   const experiment::Comparison& compared();

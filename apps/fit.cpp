@@ -114,7 +114,8 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
     throw Unanswered(fmt::format("{}: {}", request.log, why_unfitted(fit)));
   progress.step();
   const auto cost = fitting::gradient_cost(problem, fit);
-  FitAnswer answer{problem, fit, {}, {}, {}, {}, cost, 1};
+  FitAnswer answer{problem, fit, {}, {}, {}, {}, cost, 1, {}};
+  answer.origin = origin_text(log);
   answer.threads = request.threads > 0 ? request.threads
                                        : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   answer.throws = fitting::predict_throws(problem, fit, {true, request.threads});

@@ -82,6 +82,14 @@ Table surface_table(const MeasuredResult& result) {
   return table;
 }
 
+/// What was fitted to, and what judges.
+std::string split_text(const MeasuredResult& result) {
+  const MeasuredDiscovery& found = result.answer;
+  return result.surfaces.empty() ? fmt::format("{} train and {} held out", found.train, found.test)
+                                 : fmt::format("{}, each held out once in the cross-validation",
+                                               plural(static_cast<std::size_t>(found.test), "slip"));
+}
+
 std::string first_text(const MeasuredDiscovery& found) {
   if (!found.first.any) return "No channel leaves the noise.";
   if (found.first.time > 0)
@@ -118,9 +126,9 @@ std::string error_text(double value) { return std::isfinite(value) ? fmt::format
 
 std::string measured_text(const MeasuredResult& result) {
   const MeasuredDiscovery& found = result.answer;
-  std::string out = fmt::format("{}: {}\n{}, base model {}, {} train and {} held out\n{}\n", result.log,
-                                to_string(found.verdict), found.kind, found.model, found.train, found.test,
-                                first_text(found));
+  std::string out =
+      fmt::format("{}: {}\n{}\n{}, base model {}, {}\n{}\n", result.log, to_string(found.verdict),
+                  result.origin, found.kind, found.model, split_text(result), first_text(found));
   for (const auto& effect : found.effects) out += effect_text(effect);
   if (found.unexplained) out += fmt::format("\nunexplained: {}\n", found.unexplained->description);
   for (const auto& e : found.evidence)
@@ -138,8 +146,9 @@ void write_measured_report(const MeasuredResult& result, const Json& json,
                                 : measured_residual_figure(found.profile_before, found.profile_after,
                                                            "before", "after"),
                ranking = ranking_figure(found.ranking, found.effects);
-  draw(residual, directory);
-  draw(ranking, directory);
+  const std::string about = result.log + ": " + result.origin;
+  draw(residual, directory, about);
+  draw(ranking, directory, about);
   const auto picture = [&](const Figure& figure) {
     return html_picture(directory / (figure.name + ".png"), figure.name);
   };
@@ -162,10 +171,10 @@ void write_measured_report(const MeasuredResult& result, const Json& json,
     if (!list.empty()) notes += fmt::format("<h3>{}</h3><ul>{}</ul>\n", against ? "Against" : "Beside", list);
   }
   std::string body = fmt::format(
-      "<p>{}, base model <code>{}</code>, {} train and {} held out. Verdict: <b>{}</b>.</p>\n<h2>Where it "
+      "<p>{}: {}, base model <code>{}</code>, {}. Verdict: <b>{}</b>.</p>\n<h2>Where it "
       "starts</h2><p>{}</p>\n{}",
-      escaped(found.kind), escaped(found.model), found.train, found.test, to_string(found.verdict),
-      escaped(first_text(found)), picture(residual));
+      escaped(result.origin), escaped(found.kind), escaped(found.model), split_text(result),
+      to_string(found.verdict), escaped(first_text(found)), picture(residual));
   body += "<h2>The answer</h2>\n" + answer;
   if (!notes.empty()) body += "<h2>What else the log says</h2>\n" + notes;
   body += "<h2>Errors before and after</h2>\n" + html(error_table(found));
@@ -173,7 +182,7 @@ void write_measured_report(const MeasuredResult& result, const Json& json,
   body += "<h2>Candidates</h2>\n" + picture(ranking) + html(ranking_table(found.ranking));
   if (!slips) {
     const Figure footprints = footprints_of(found);
-    draw(footprints, directory);
+    draw(footprints, directory, about);
     body += fmt::format("<p>{}</p>\n", kFootprints) + picture(footprints);
   }
   if (!found.stability.empty())
