@@ -61,7 +61,6 @@ Figure surface_figure(const MeasuredResult& result) {
   for (std::size_t i = 0; i < surfaces.size(); ++i)
     tics += fmt::format("{}'{}' {}", i ? ", " : "", plain(surfaces[i]), i);
   std::vector<KeyEntry> key;
-  const char* colours[] = {"#d55e00", "#009e73", "#0072b2", "#cc79a7"};
   double largest = 1;
   for (std::size_t k = 0; k < laws.size(); ++k) {
     DataBlock block{laws[k], {"held-out error [deg]", "surface", "null control [deg]"}, {}, {}};
@@ -72,10 +71,13 @@ Figure surface_figure(const MeasuredResult& result) {
         largest = std::max({largest, e.law_deg, e.null_law_deg});
       }
     figure.data.push_back(std::move(block));
-    const std::string filled =
-        fmt::format("with points pointtype {} pointsize 1.1 linecolor rgb '{}'", 5 + 2 * k, colours[k % 4]);
-    const std::string open =
-        fmt::format("with points pointtype {} pointsize 0.8 linecolor rgb '{}'", 4 + 2 * k, colours[k % 4]);
+    const Style style = style_of(laws[k]);
+    const auto points = [&](int marker, double size) {
+      return fmt::format("with points pointtype {} pointsize {} linecolor rgb '{}'", marker, size,
+                         style.colour);
+    };
+    const int ring = style.marker - style.marker % 2;  // gnuplot's even markers are open, the next is filled
+    const std::string filled = points(ring + 1, 1.1), open = points(ring, 0.8);
     plots += fmt::format("{}DATA index {} using 1:2 {}, DATA index {} using 3:2 {}", k ? ", " : "", k, filled,
                          k, open);
     key.push_back({filled, laws[k]});

@@ -28,7 +28,7 @@ Json ranking_json(std::span<const fitting::Ranked> ranking) {
 }
 
 Table ranking_table(std::span<const fitting::Ranked> ranking) {
-  Table table{{"candidate", "chi2 gain", "in step", "p", "correlation with the best", "refitted: BIC",
+  Table table{{"candidate", "chi2 gain", "in step", "p", "correlation with its step's best", "refitted: BIC",
                "in step", "held-out fall"},
               {},
               1};
@@ -70,7 +70,7 @@ Figure ranking_figure(std::span<const fitting::Ranked> ranking,
   figure.script = fmt::format(
       "set key off\nset lmargin 38\nset logscale x\nset format x '10^{{%T}}'\nset xrange [0.7:{:.4g}]\n"
       "set yrange [{}:-0.6]\nset ytics ({}) scale 0\n"
-      "set xlabel '{{/Symbol c}}^2 that the effect would take away, to first order'\n"
+      "set xlabel '{{/Symbol c}}^2 that the effect would take away, to first order (filled: accepted)'\n"
       "plot DATA index 0 using ($3 > 0 ? NaN : $1):2 with points pointtype 6 linecolor rgb '#707070', \\\n"
       "     DATA index 0 using ($3 > 0 ? $1 : NaN):2 with points pointtype 7 linecolor rgb '#0072b2'\n",
       2 * largest, lines - 0.4, tics);
