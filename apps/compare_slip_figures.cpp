@@ -66,14 +66,14 @@ Figure section_figure(const fitting::SlipSamples& slips, const std::vector<Surfa
   for (const auto& s : slips.samples) sizes.push_back(std::hypot(s.wrench[0], s.wrench[1], s.wrench[2]));
   const double largest = sizes.empty() ? 1 : *std::max_element(sizes.begin(), sizes.end());
   const double extent = 1.3 * largest, arrow = 0.16 * largest;
-  std::vector<KeyEntry> key{{"with points pointtype 7 pointsize 0.4 linecolor rgb '#808080'",
-                             "wrench and sliding, measured within 20 deg of the section"}};
+  std::vector<KeyEntry> key{{"with points pointtype 7 pointsize 0.4 linecolor rgb '#808080'", "measured"}};
   for (const SurfaceScore& score : scores)
     if (score.fit.fitted()) key.push_back({line_style(to_string(score.model)), to_string(score.model)});
   const double bottom = 1.8 + key_height(key.size(), 2), top = figure.height - 1.2;
   std::string& s = figure.script;
   s = fmt::format(
-      "set multiplot\nunset key\nset label 1 '{}: limit surface and directions of sliding' at screen "
+      "set multiplot\nunset key\nset label 1 '{}: limit surface, and wrenches within 20 deg of the section "
+      "with their sliding' at screen "
       "0.5,{:.4f} center\nset xrange [{:.6g}:{:.6g}]\nset yrange [{:.6g}:{:.6g}]\nset size ratio -1\n",
       plain(slips.surface), 1 - 0.5 / figure.height, -extent, extent, -extent, extent);
   double left = 1.7;

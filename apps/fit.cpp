@@ -209,8 +209,9 @@ Command fit_command(Parser& root) {
       .with_commas();
   parser.option("--card", request->card, "Write the model card");
   parser.option("--json", request->json, "Write the fit as JSON");
-  parser.option("--report", request->report,
-                "A directory for the tables (Markdown), a figure, all throws (CSV) and the JSON");
+  parser.option(
+      "--report", request->report,
+      "A directory for the tables (Markdown) and the JSON; of throws also a figure and all throws (CSV)");
   parser
       .option("--kfold", request->kfold,
               "Cross-validate over so many groups of conditions of the train throws; 0: with 5, and only "

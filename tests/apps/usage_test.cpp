@@ -3,6 +3,8 @@
 #include <sys/inotify.h>
 #include <sys/stat.h>
 
+#include <regex>
+
 #include "apps/progress.hpp"
 #include "tests/apps/cli.hpp"
 
@@ -426,7 +428,8 @@ TEST_F(Cli, FigureDrawsWhatIsAskedFor) {
        {"landing_errors", "conditions", "mae", "modes", "wrench", "pivot", "phase", "flight"})
     for (const char* ending : {".png", ".pdf", ".dat", ".gp"})
       EXPECT_TRUE(fs::exists(folder / "f" / (std::string(name) + ending))) << name << ending;
-  EXPECT_THAT(run("figure --help").out, HasSubstr("with _ in the place of - in NAME"));
+  const std::string help = std::regex_replace(run("figure --help").out, std::regex("\\s+"), " ");
+  EXPECT_THAT(help, HasSubstr("with _ in the place of - in NAME"));
   expect_refusal("figure portrait --log " + quick + " --out g", 2, "landing-errors");
   EXPECT_THAT(content(folder / "f/mae.gp"), HasSubstr("over the 4 held-out throws"));
   for (const char* name : {"modes", "wrench", "pivot", "phase", "flight"})
