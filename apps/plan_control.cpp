@@ -55,26 +55,27 @@ void draw_landings(const std::vector<Cell>& cells, double box, const fs::path& f
   constexpr double left = 1.9, width = 14.6, bottom = 2.0, gap = 0.9;
   const double height = std::clamp(2 * side * width / (front - back), 1.5, 6.0);
   figure.height = bottom + static_cast<double>(panels) * (height + gap);
-  std::string script =
-      fmt::format(
-          "set multiplot\nset key off\nset ylabel 'across [cm]'\nset xrange [{:.6g}:{:.6g}]\n"
-          "set yrange [{:.6g}:{:.6g}]\nset ytics {:.6g}\nset format x ''\n",
-          back, front, -side, side, tic_step(side)) +
-      fmt::format("set object 1 rectangle from {0},{0} to {1},{1} fs empty border lc rgb '#000000' lw 1\n",
-                  -50 * box, 50 * box);
+  std::string script = fmt::format(
+      "set multiplot\nset key off\nset clip two\nset ylabel 'across [cm]'\nset xrange [{:.6g}:{:.6g}]\n"
+      "set yrange [{:.6g}:{:.6g}]\nset ytics {:.6g}\nset format x ''\n",
+      back, front, -side, side, tic_step(2 * side));
+  const double edge = 50 * box;
+  figure.data.push_back({"box",
+                         {"forward [cm]", "across [cm]"},
+                         {{-edge, -edge}, {edge, -edge}, {edge, edge}, {-edge, edge}, {-edge, -edge}},
+                         {}});
   std::vector<KeyEntry> key;
   for (std::size_t i = 0; i < controllers; ++i)
     key.push_back({fmt::format("with points {}", kLook[i]), cells[i].controller.name});
   for (std::size_t p = 0; p < panels; ++p) {
-    std::string points;
+    std::string points = "plot DATA index 0 using 1:2 with lines lc rgb '#000000' lw 1";
     for (std::size_t c = controllers; c-- > 0;) {
       const Cell& cell = cells[p * controllers + c];
       DataBlock block{
           cell.payload.name + ", " + cell.controller.name, {"forward [cm]", "across [cm]"}, {}, {}};
       for (const auto& one : cell.throws)
         if (one.lands) block.rows.push_back({100 * one.miss.x(), 100 * one.miss.y()});
-      points += fmt::format("{}DATA index {} using 1:2 with points {}", points.empty() ? "plot " : ", ",
-                            figure.data.size(), kLook[c]);
+      points += fmt::format(", DATA index {} using 1:2 with points {}", figure.data.size(), kLook[c]);
       figure.data.push_back(std::move(block));
     }
     const double low = bottom + static_cast<double>(panels - 1 - p) * (height + gap);
