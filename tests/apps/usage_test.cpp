@@ -434,6 +434,10 @@ TEST_F(Cli, FigureDrawsWhatIsAskedFor) {
   EXPECT_THAT(content(folder / "f/mae.gp"), HasSubstr("over the 4 held-out throws"));
   for (const char* name : {"modes", "wrench", "pivot", "phase", "flight"})
     EXPECT_THAT(content(folder / "f" / (std::string(name) + ".gp")), HasSubstr("throw 001")) << name;
+  const Answer mixed = run("figure modes --log " + quick + " --models gripper_delay,limit_surface --out m");
+  EXPECT_EQ(mixed.code, 0) << mixed.err;
+  EXPECT_THAT(mixed.err, HasSubstr("without modes, left out of the figures of one release: gripper_delay\n"));
+  expect_refusal("figure modes --models gripper_delay --log " + quick + " --out g", 2, "no modes to draw");
   expect_refusal("figure modes --throw 999 --log " + quick + " --out g", 2, "no throw '999' (there are: 001");
   expect_refusal("figure modes --models limit_surfac --log " + quick + " --out g", 2,
                  "did you mean 'limit_surface'?");
