@@ -87,32 +87,14 @@ std::size_t first_narrow(const std::vector<Cloud>& clouds) {
   return first;
 }
 
-std::string scatter(const std::vector<Cloud>& clouds, std::size_t first, const Extent& e,
-                    const std::string& title) {
+std::string scatter(const std::vector<Cloud>& clouds, const Extent& e, const std::string& title) {
   std::string out =
       fmt::format("set xrange [{:.6g}:{:.6g}]; set yrange [{:.6g}:{:.6g}]\n", -e.x, e.x, -e.theta, e.theta);
   out += fmt::format("set title '{}' offset 0,-0.5\nplot ", title);
-  for (std::size_t i = first; i < clouds.size(); ++i)
-    out += fmt::format("{}DATA index {} using 1:2 {}", i > first ? ", \\\n     " : "", i,
+  for (std::size_t i = 0; i < clouds.size(); ++i)
+    out += fmt::format("{}DATA index {} using 1:2 {}", i > 0 ? ", \\\n     " : "", i,
                        point_style(clouds[i].model));
   return out + "\n";
-}
-
-/// An axis of positive values from its commands: logarithmic where they span more than a factor of 20, then
-/// with tics at 1, 2 and 5 where decades alone would be few.
-std::string value_axis(const std::vector<double>& values) {
-  const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  if (!(*low > 0 && *high / *low > 20))
-    return fmt::format("unset logscale x; set xtics {:.6g}\nset xrange [0:{:.6g}]\n", tic_step(*high),
-                       *high > 0 ? 1.08 * *high : 1);
-  const double left = *low / 1.4, right = *high * 1.4;
-  std::string out = fmt::format("set logscale x\nset xrange [{:.6g}:{:.6g}]\n", left, right);
-  if (right / left > 300) return out + "set xtics autofreq\n";
-  std::string tics;
-  for (double decade = std::pow(10, std::floor(std::log10(left))); decade < right; decade *= 10)
-    for (const int digit : {1, 2, 5})
-      tics += fmt::format("{}{:.6g}", tics.empty() ? "" : ", ", digit * decade);
-  return out + fmt::format("set xtics ({})\n", tics);
 }
 
 /// The conditions, that with the largest landing error of `model` first.
@@ -206,10 +188,10 @@ std::optional<Figure> landing_figure(const Comparison& comparison) {
         "'#303030' "
         "linewidth 1 dashtype 2\n",
         -zoom.x, -zoom.theta, zoom.x, zoom.theta);
-  s += scatter(clouds, 0, all, (two ? "every model, " : "landing errors, ") + which);
+  s += scatter(clouds, all, (two ? "every model, " : "landing errors, ") + which);
   if (two)
     s += "unset object 1\nset ylabel ''\n" + place(figure, {10.8, figure.width - 0.5, bottom, top}) +
-         scatter(clouds, narrow, zoom, "the same, magnified about zero");
+         scatter(clouds, zoom, "the same, magnified about zero");
   s += key_strip(figure, key, columns) + "unset multiplot\n";
   return figure;
 }

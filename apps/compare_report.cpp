@@ -3,6 +3,7 @@
 
 #include "apps/compare.hpp"
 #include "apps/compare_figures.hpp"
+#include "apps/throws.hpp"
 
 namespace unhand::apps {
 
@@ -43,11 +44,11 @@ void write_release_report(const experiment::Comparison& comparison, const datase
                           const std::filesystem::path& directory) {
   std::string pictures;
   if (const auto figure = landing_figure(comparison)) {
-    draw(*figure, directory);
+    draw(*figure, directory, origin_text(log));
     pictures += fmt::format("![Landing errors]({}.png)\n\n", figure->name);
   }
   if (const auto figure = condition_figure(comparison)) {
-    draw(*figure, directory);
+    draw(*figure, directory, origin_text(log));
     pictures += fmt::format("![Errors of each condition]({}.png)\n\n", figure->name);
   }
   write_text(directory / "report.md",

@@ -23,9 +23,11 @@ std::string point_style(const std::string& model) {
 /// A section through the origin: two of the three components.
 struct Section {
   std::size_t across, up, off;
-  const char *across_name, *up_name;
+  const char *across_name, *up_name;    ///< of columns
+  const char *across_label, *up_label;  ///< of axes
 };
-constexpr Section sections[] = {{0, 1, 2, "f_x [N]", "f_y [N]"}, {0, 2, 1, "f_x [N]", "tau/L [N]"}};
+constexpr Section sections[] = {{0, 1, 2, "f_x [N]", "f_y [N]", "f_x [N]", "f_y [N]"},
+                                {0, 2, 1, "f_x [N]", "tau/L [N]", "f_x [N]", "{/Symbol t}/L [N]"}};
 
 DataBlock curve(const fitting::SlipSurface& surface, const Section& section) {
   DataBlock out{to_string(surface.model), {section.across_name, section.up_name}, {}, {}};
@@ -64,14 +66,14 @@ Figure section_figure(const fitting::SlipSamples& slips, const std::vector<Surfa
   for (const auto& s : slips.samples) sizes.push_back(std::hypot(s.wrench[0], s.wrench[1], s.wrench[2]));
   const double largest = sizes.empty() ? 1 : *std::max_element(sizes.begin(), sizes.end());
   const double extent = 1.3 * largest, arrow = 0.16 * largest;
-  std::vector<KeyEntry> key{
-      {"with points pointtype 7 pointsize 0.4 linecolor rgb '#808080'", "measured, within 20 deg"}};
+  std::vector<KeyEntry> key{{"with points pointtype 7 pointsize 0.4 linecolor rgb '#808080'", "measured"}};
   for (const SurfaceScore& score : scores)
     if (score.fit.fitted()) key.push_back({line_style(to_string(score.model)), to_string(score.model)});
   const double bottom = 1.8 + key_height(key.size(), 2), top = figure.height - 1.2;
   std::string& s = figure.script;
   s = fmt::format(
-      "set multiplot\nunset key\nset label 1 '{}: limit surface and directions of sliding' at screen "
+      "set multiplot\nunset key\nset label 1 '{}: limit surface, and wrenches within 20 deg of the section "
+      "with their sliding' at screen "
       "0.5,{:.4f} center\nset xrange [{:.6g}:{:.6g}]\nset yrange [{:.6g}:{:.6g}]\nset size ratio -1\n",
       plain(slips.surface), 1 - 0.5 / figure.height, -extent, extent, -extent, extent);
   double left = 1.7;
@@ -81,8 +83,7 @@ Figure section_figure(const fitting::SlipSamples& slips, const std::vector<Surfa
     for (const SurfaceScore& score : scores)
       if (score.fit.fitted()) figure.data.push_back(curve(score.fit.surface, section));
     s += place(figure, {left, left + 7.6, bottom, top});
-    s +=
-        fmt::format("set xlabel '{}'\nset ylabel '{}'\n", plain(section.across_name), plain(section.up_name));
+    s += fmt::format("set xlabel '{}'\nset ylabel '{}'\n", section.across_label, section.up_label);
     s += fmt::format("plot ");
     if (!figure.data[data].rows.empty())
       s += fmt::format(

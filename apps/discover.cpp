@@ -185,9 +185,10 @@ void discover(const DiscoverOptions& options, const Parser& parser) {
   if (!options.card.empty())
     outputs.text(options.card, datasets::to_json(card_of(problem, found.final, errors, options.log, log)));
   if (!options.report.empty())
-    write_discovery_report(found, options.log, command, json, outputs.directory(options.report));
+    write_discovery_report(found, options.log, origin_text(log), command, json,
+                           outputs.directory(options.report));
   outputs.commit();
-  fmt::print("{}", discovery_text(found, options.log));
+  fmt::print("{}", discovery_text(found, options.log, origin_text(log)));
 }
 
 }  // namespace
@@ -240,8 +241,8 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
   return out;
 }
 
-std::string discovery_text(const Discovery& found, const std::string& log) {
-  std::string out = fmt::format("{}: {}\n", log, to_string(found.verdict));
+std::string discovery_text(const Discovery& found, const std::string& log, const std::string& origin) {
+  std::string out = fmt::format("{}: {}\n{}\n", log, to_string(found.verdict), origin);
   if (found.first.any)
     out += fmt::format(
         "the residual first leaves the noise in the phase {}, channel {} ({:.3g} times its variance)\n",

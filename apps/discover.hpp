@@ -12,12 +12,13 @@ namespace unhand::apps {
 /// discovery.json, schema "discovery" version 1.
 Json discovery_json(const fitting::Discovery& discovery, const std::string& log, const std::string& model);
 
-/// The answer in a few lines.
-std::string discovery_text(const fitting::Discovery& discovery, const std::string& log);
+/// The answer in a few lines; `origin` is what the log declares of itself.
+std::string discovery_text(const fitting::Discovery& discovery, const std::string& log,
+                           const std::string& origin);
 
 /// A self-contained page (index.html), the figures with their data and scripts, and discovery.json.
 void write_discovery_report(const fitting::Discovery& discovery, const std::string& log,
-                            const std::string& command, const Json& json,
+                            const std::string& origin, const std::string& command, const Json& json,
                             const std::filesystem::path& directory);
 
 }  // namespace unhand::apps

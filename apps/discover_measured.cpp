@@ -99,11 +99,14 @@ void discover_measured(MeasuredKind kind, const MeasuredRequest& request) {
     fitting::SurfaceDiscoveryOptions options;
     options.forget = request.forget;
     options.comparison.threads = request.threads;
-    auto found = fitting::discover_surfaces(read_slips(request.log), options);
+    const auto slips = read_slips(request.log);
+    result.origin = origin_text(slips);
+    auto found = fitting::discover_surfaces(slips, options);
     result.answer = std::move(found.answer);
     result.surfaces = std::move(found.evidence);
   } else {
     log = read_throws(request.log);
+    result.origin = origin_text(*log);
     if (kind == MeasuredKind::flights) require_flights(*log, request.log);
     fitting::MeasuredOptions options;
     options.search.forget = request.forget;

@@ -49,18 +49,21 @@ Figure residual_figure(const Discovery& found) {
     const double left = 1.9 + (at % columns) * 8.2, bottom = 1.9 + (rows - 1 - at / columns) * 3.9;
     script += place(figure, {left, left + 6.3, bottom, bottom + 2.5});
     script += fmt::format(
-        "set title '{}' offset 0,-0.6\nset logscale y\nset xrange [{:.3f}:{:.3f}]\nset yrange [0.3:{:.4g}]\n"
-        "set format y '%g'\n{}{}set ylabel 'rms "
+        "set title '{}' offset 0,-0.6\nset logscale y\nset xrange [{:.3f}:{:.3f}]\nset yrange [{}:{:.4g}]\n"
+        "{}{}set ylabel 'rms "
         "[{{/Symbol s}}]' offset 0.5\n"
-        "set arrow 1 from 0,0.3 to 0,{:.4g} nohead dashtype 3 linecolor rgb '#808080'\n"
+        "set arrow 1 from 0,graph 0 to 0,graph 1 nohead dashtype 3 linecolor rgb '#808080'\n"
         "set arrow 2 from {:.3f},1 to {:.3f},1 nohead linecolor rgb '#b0b0b0'\n"
         "plot DATA index {} using 1:2 {}, DATA index {} using 1:2 {}\n",
-        plain(std::string(to_string(channel))), low, high, 1.5 * top, residual_tics(top),
-        at / columns == rows - 1 ? "set xlabel 'time from release [s]' offset 0,0.6\n" : "unset xlabel\n",
-        1.5 * top, low, high, index, kBefore, index + 1, kAfter);
+        plain(std::string(to_string(channel))), low, high, kResidualFloor, 1.5 * top, residual_tics(top),
+        at + columns >= static_cast<int>(channels.size())
+            ? "set xlabel 'time from release [s]' offset 0,0.3\n"
+            : "unset xlabel\n",
+        low, high, index, kBefore, index + 1, kAfter);
     index += 2;
     ++at;
   }
+  script += floor_note(figure);
   script += found.adds_nothing() ? key_strip(figure, {{kAfter, "base model, to which nothing was added"}}, 1)
                                  : key_strip(figure, {{kBefore, "before"}, {kAfter, "after"}}, 2);
   figure.script = script + "unset multiplot\n";
@@ -100,7 +103,7 @@ Figure missing_figure(const fitting::MissingEstimate& missing) {
     const double left = 2.0 + 5.2 * static_cast<double>(component);
     script += place(figure, {left, left + 3.4, 1.9, 5.4});
     script += fmt::format(
-        "set title '{}' offset 0,-0.5\nset xlabel '{}' offset 0,0.5\nset xrange [0:{:.6g}]; set xtics "
+        "set title '{}' offset 0,-0.5\nset xlabel '{}' offset 0,0.3\nset xrange [0:{:.6g}]; set xtics "
         "{:.6g}\n"
         "plot 0 with lines linecolor rgb '#808080'",
         unit[component], flight ? "since the detach [s]" : "share of the opening", 1.04 * last,
@@ -207,15 +210,17 @@ constexpr const char* kLandingsAlone = "<p>Landings alone were measured: nothing
 
 }  // namespace
 
-void write_discovery_report(const Discovery& found, const std::string& log, const std::string& command,
-                            const Json& json, const std::filesystem::path& directory) {
+void write_discovery_report(const Discovery& found, const std::string& log, const std::string& origin,
+                            const std::string& command, const Json& json,
+                            const std::filesystem::path& directory) {
   const Figure residual = residual_figure(found), ranking = ranking_figure(found.ranking, found.effects);
+  const std::string about = log + ": " + origin;
   const bool over_time = !found.residual_before.empty();
-  if (over_time) draw(residual, directory);
-  draw(ranking, directory);
-  if (over_time) draw(footprints_of(found), directory);
+  if (over_time) draw(residual, directory, about);
+  draw(ranking, directory, about);
+  if (over_time) draw(footprints_of(found), directory, about);
   const bool estimated = found.unexplained && found.unexplained->missing;
-  if (estimated) draw(missing_figure(*found.unexplained->missing), directory);
+  if (estimated) draw(missing_figure(*found.unexplained->missing), directory, about);
   const auto picture = [&](const std::string& name) {
     return html_picture(directory / (name + ".png"), name);
   };
@@ -236,7 +241,7 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
                                                   to_string(found.first.channel), found.first.chi2_per_sample)
                                             : "No channel leaves the noise in any phase.";
   const std::string body = fmt::format(
-      "<p>Base model <code>{}</code>. Verdict: <b>{}</b>.</p>\n<h2>Where it starts</h2><p>{}</p>\n{}"
+      "<p>{}: base model <code>{}</code>. Verdict: <b>{}</b>.</p>\n<h2>Where it starts</h2><p>{}</p>\n{}"
       "<h2>The answer</h2>\n{}<h2>Errors before and after</h2>\n"
       "<p>Predicted from what is known before the throw, minus measured; chi2/dof with the throws' own "
       "unknowns fitted. Test throws took no part in any fit, but they decided what was accepted: after, "
@@ -249,7 +254,7 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
       "<h2>Structure of the residual</h2><p>Of the train throws: size, autocorrelation, and what it goes "
       "with (share of its mean square).</p>{}<h2>Again</h2><p><code>{}</code><br>log checksum "
       "<code>{}</code></p>",
-      escaped(json.at("base_model").get<std::string>()), to_string(found.verdict), first,
+      escaped(origin), escaped(json.at("base_model").get<std::string>()), to_string(found.verdict), first,
       over_time ? picture("residual") : kLandingsAlone, answer,
       found.held_out.empty() ? "" : fmt::format("<p>{}</p>\n", escaped(held_out_text(found))),
       html(error_table(found)), html(lack_table(found)), picture("ranking"),

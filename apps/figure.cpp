@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <cerrno>
@@ -130,6 +131,7 @@ std::string script_text(const Figure& figure) {
       "  set output '{0}.'.format\n"
       "  set border 3 linecolor rgb '#404040' linewidth 0.7\n"
       "  set tics nomirror out scale 0.5 textcolor rgb '#202020'\n"
+      "  set format '%h'\n"
       "  set grid linetype 1 linecolor rgb '#e2e2e2' linewidth 0.5\n"
       "{5}"
       "  set output\n"
@@ -151,13 +153,14 @@ std::string file_stem(const std::string& text) {
   return out;
 }
 
-void draw(const Figure& figure, const fs::path& directory) {
+void draw(const Figure& figure, const fs::path& directory, const std::string& about) {
   const Unbroken here;
   if (figure.name != file_stem(figure.name))
     throw std::logic_error("figure: the name " + figure.name + " is none for a file");
   const fs::path program = gnuplot();
-  write_text(directory / (figure.name + ".dat"), data_text(figure));
-  write_text(directory / (figure.name + ".gp"), script_text(figure));
+  const std::string comment = about.empty() ? "" : "# " + quoted(about) + "\n";
+  write_text(directory / (figure.name + ".dat"), comment + data_text(figure));
+  write_text(directory / (figure.name + ".gp"), comment + script_text(figure));
   const auto [status, said] = run(program, figure.name + ".gp", directory);
   if (status != 0)
     throw Unanswered(fmt::format("gnuplot could not draw {} (status {}):\n{}", figure.name, status, said));
@@ -213,6 +216,21 @@ double tic_step(double high) {
   if (!(high > 0)) return 1;
   const double raw = high / 3, decade = std::pow(10, std::floor(std::log10(raw)));
   return decade * (raw >= 5 * decade ? 5 : raw >= 2 * decade ? 2 : 1);
+}
+
+std::string value_axis(const std::vector<double>& values) {
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  if (!(*low > 0 && *high / *low > 20))
+    return fmt::format("unset logscale x; set xtics {:.6g}\nset xrange [0:{:.6g}]\n", tic_step(*high),
+                       *high > 0 ? 1.08 * *high : 1);
+  const double left = *low / 1.4, right = *high * 1.4;
+  std::string out = fmt::format("set logscale x\nset xrange [{:.6g}:{:.6g}]\n", left, right);
+  if (right / left > 300) return out + "set xtics autofreq\n";
+  std::string tics;
+  for (double decade = std::pow(10, std::floor(std::log10(left))); decade < right; decade *= 10)
+    for (const int digit : {1, 2, 5})
+      tics += fmt::format("{}{:.6g}", tics.empty() ? "" : ", ", digit * decade);
+  return out + fmt::format("set xtics ({})\n", tics);
 }
 
 std::string plain(const std::string& text) {

@@ -27,8 +27,9 @@ struct Figure {
 std::string file_stem(const std::string& text);
 
 /// Writes NAME.png and NAME.pdf, and beside them NAME.gp and NAME.dat from which `gnuplot NAME.gp` draws them
-/// again. Throws Unanswered if there is no gnuplot or it complains.
-void draw(const Figure& figure, const std::filesystem::path& directory);
+/// again; `about`, of what data, is a comment in these. Throws Unanswered if there is no gnuplot or it
+/// complains.
+void draw(const Figure& figure, const std::filesystem::path& directory, const std::string& about = {});
 
 /// Throws Unanswered, naming the package, where gnuplot is missing.
 void require_gnuplot();
@@ -60,6 +61,10 @@ inline double key_height(std::size_t entries, int columns) {
 
 /// A round distance, so that there are three to seven tics beyond 0, up to `high`.
 double tic_step(double high);
+
+/// An axis x of values that are not negative, at least one: logarithmic where they are positive and span more
+/// than a factor of 20, then with tics at 1, 2 and 5 where decades alone would be few.
+std::string value_axis(const std::vector<double>& values);
 
 /// Text as gnuplot takes it between single quotes, without its own markup.
 std::string plain(const std::string& text);

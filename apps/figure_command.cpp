@@ -5,8 +5,10 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <memory>
+#include <numeric>
 
 #include "apps/compare_figures.hpp"
 #include "apps/figure_source.hpp"
@@ -23,7 +25,28 @@ struct FigureCommandOptions {
   FigureRequest request;
 };
 
-/// MAE with the standard deviation of the absolute error as whiskers, held-out throws where there are any.
+constexpr int kLandingX = 2;  // of experiment::kQuantities
+
+/// A quantile of sorted values, between neighbours.
+double quantile(const std::vector<double>& sorted, double share) {
+  const double at = share * static_cast<double>(sorted.size() - 1);
+  const auto below = static_cast<std::size_t>(at);
+  const double above = sorted[std::min(below + 1, sorted.size() - 1)];
+  return sorted[below] + (at - static_cast<double>(below)) * (above - sorted[below]);
+}
+
+/// The absolute errors of one quantity over the throws of a split, sorted.
+std::vector<double> absolute_errors(const experiment::ModelComparison& model, int quantity,
+                                    datasets::Split split, double scale) {
+  std::vector<double> out;
+  for (const auto& one : model.throws)
+    if (const auto& error = one.error[quantity]; one.split == split && error)
+      out.push_back(scale * std::abs(*error));
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+/// MAE with the quartiles of the absolute error as whiskers, held-out throws where there are any.
 std::optional<Figure> mae_figure(const experiment::Comparison& comparison) {
   Figure figure{"mae", 17, 0, {}, {}};
   const auto split =
@@ -43,16 +66,34 @@ std::optional<Figure> mae_figure(const experiment::Comparison& comparison) {
   const double left = 4.4, gap = 1.1, width = (figure.width - left - gap - 0.5) / 2,
                panel = (figure.height - 3.3) / 2;
   for (int q = 0; q < experiment::kQuantityCount; ++q) {
-    DataBlock block{
-        experiment::kQuantities[q].title, {"line", "MAE", "STD of the absolute error", "n", "model"}, {}, {}};
-    double high = 0;
+    const bool position = q == kLandingX;
+    const std::string title = position ? "landing x [cm]" : experiment::kQuantities[q].title;
+    DataBlock block{title,
+                    {"line", "MAE", "lower quartile of the absolute error", "upper quartile", "n", "model"},
+                    {},
+                    {}};
+    std::vector<double> means, shown;
+    std::string points;
     for (std::size_t i = 0; i < n; ++i) {
-      const auto s = comparison.models[i].statistics(q, split);
-      if (s.n == 0) continue;
-      block.rows.push_back({static_cast<double>(i), s.mae, s.std, static_cast<double>(s.n)});
+      const auto errors = absolute_errors(comparison.models[i], q, split, position ? 100 : 1);
+      if (errors.empty()) continue;
+      const double mae =
+          std::accumulate(errors.begin(), errors.end(), 0.0) / static_cast<double>(errors.size());
+      const double low = quantile(errors, 0.25), high = quantile(errors, 0.75);
+      const Style style = style_of(comparison.models[i].model);
+      points += fmt::format(
+          "{}DATA index {} every ::{}::{} using 2:1:3:4 with xerrorbars pointtype {} linecolor rgb '{}' "
+          "linewidth 1.2",
+          points.empty() ? "plot " : ", \\\n     ", q, block.rows.size(), block.rows.size(), style.marker,
+          style.colour);
+      block.rows.push_back({static_cast<double>(i), mae, low, high, static_cast<double>(errors.size())});
       block.labels.push_back(comparison.models[i].model);
-      high = std::max(high, s.mae + s.std);
+      means.push_back(mae);
+      shown.insert(shown.end(), {mae, low, high});
     }
+    if (shown.empty()) means = shown = {1}, points = "plot NaN";
+    const auto [least, most] = std::minmax_element(means.begin(), means.end());
+    if (*most < 5 * *least) shown.push_back(0);  // models that are alike, on an axis from 0
     any = any || !block.rows.empty();
     figure.data.push_back(std::move(block));
     const double x = left + (q % 2) * (width + gap), y = 1.3 + (1 - q / 2) * (panel + 1.3);
@@ -63,17 +104,13 @@ std::optional<Figure> mae_figure(const experiment::Comparison& comparison) {
           for (std::size_t i = 0; i < n; ++i) blank += fmt::format("{}'' {}", i > 0 ? ", " : "", i);
           return blank;
         }());
-    body += fmt::format(
-        "set title '{}' offset 0,-0.7\nset xrange [0:{:.6g}]; set xtics {:.6g} font ',7.5'\n"
-        "plot DATA index {} using (0.5*$2):1:(0.5*$2):(0.28) with boxxyerror linecolor rgb '#56b4e9', \\\n"
-        "     DATA index {} using 2:1:($2-$3):($2+$3) with xerrorbars pointtype 7 linecolor "
-        "rgb '#000000' linewidth 1.2\nunset label 1\n",
-        plain(experiment::kQuantities[q].title), high > 0 ? 1.06 * high : 1, tic_step(high), q, q);
+    body += fmt::format("set title '{}' offset 0,-0.7\nset xtics font ',7.5'\n{}{}\nunset label 1\n",
+                        plain(title), value_axis(shown), points);
   }
   if (!any) return {};
   figure.script = fmt::format(
-      "set multiplot\nunset key\nset label 1 'mean absolute errors over the {} {} throws, whiskers: their "
-      "standard deviation' at screen 0.5,{:.4f} center\nset style fill solid 1 noborder\nset yrange "
+      "set multiplot\nunset key\nset label 1 'mean absolute errors over the {} {} throws, whiskers: the "
+      "middle half' at screen 0.5,{:.4f} center\nset yrange "
       "[{}:-0.6]\n{}unset multiplot\n",
       thrown, split == datasets::Split::test ? "held-out" : "train", 1 - 0.4 / figure.height,
       static_cast<double>(n) - 0.4, body);
@@ -97,7 +134,7 @@ const std::vector<Kind>& kinds() {
        [](FigureSource& s) { return required(landing_figure(s.compared()), s); }},
       {"conditions", "mean landing errors of each condition",
        [](FigureSource& s) { return required(condition_figure(s.compared()), s); }},
-      {"mae", "mean absolute errors of each model, with their standard deviation",
+      {"mae", "mean absolute errors of each model, and where half of them lie",
        [](FigureSource& s) {
          return required(mae_figure(s.compared()), s, "neither a detach nor a landing was measured");
        }},
@@ -142,11 +179,11 @@ void figure(const FigureCommandOptions& options) {
       made = k.make(source);
     } catch (const Unanswered& error) {
       leave_out(error);
-    } catch (const WrongUsage& error) {  // a model that has no modes
+    } catch (const WrongUsage& error) {  // of models without modes alone
       leave_out(error);
     }
     if (!made) continue;
-    draw(*made, folder);
+    draw(*made, folder, source.about());
     drawn.push_back(made->name);
   }
   if (drawn.empty()) throw Unanswered(fmt::format("no figure can be drawn: {}", left_out.front().second));

@@ -1,13 +1,14 @@
 #include "apps/figure_source.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 
 #include "apps/command.hpp"
 #include "apps/tell.hpp"
-#include "apps/throws.hpp"
 #include "experiment/synthetic_campaign.hpp"
 
 namespace unhand::apps {
@@ -58,7 +59,7 @@ const experiment::ModelParameters& FigureSource::parameters_of(const std::string
 }
 
 double FigureSource::length() {
-  const std::string& model = request_.models.front();
+  const std::string& model = traces().front().model;
   const auto card = cards_.find(model);
   if (card == cards_.end() || !card->second.fitted) return parameters_of(model).length;
   return card->second.card.parameters.at("length").value;
@@ -82,7 +83,7 @@ const experiment::Comparison& FigureSource::compared() {
   return compared_.emplace(std::move(out));
 }
 
-ReleaseTrace FigureSource::trace(const std::string& model) {
+std::optional<ReleaseTrace> FigureSource::trace(const std::string& model) {
   const auto& prepared = prepared_[chosen_];
   ReleaseTrace out;
   const auto take = [&](const release::ReleaseProblem<double>& problem,
@@ -91,10 +92,13 @@ ReleaseTrace FigureSource::trace(const std::string& model) {
       throw Unanswered(fmt::format("{}, throw {}: {}", model, prepared.id, in_words(result.outcome)));
     out = trace_of(problem, result, contact::Patch<double>::of_length(mu, length, pads));
     out.thrown = prepared.id;
+    out.open_command = prepared.open_command;
+    if (const auto& ft = log_.throws[chosen_].ft)
+      for (std::size_t i = 0; i < ft->normal_force.rows; ++i)
+        if (std::isfinite(ft->normal_force(i))) out.pressed.emplace_back(ft->time(i), ft->normal_force(i));
   };
   const auto card = cards_.find(model);
-  if (!contact::follows_pads(model) || model == naive_model)
-    throw WrongUsage(fmt::format("--models: {} has no modes to draw", model));
+  if (!contact::follows_pads(model) || model == naive_model) return {};
   if (card != cards_.end() && card->second.fitted) {
     const Fitted& known = fitted(model);
     const auto& problem = known.predicted.problem;
@@ -108,7 +112,7 @@ ReleaseTrace FigureSource::trace(const std::string& model) {
   }
   const auto& parameters = parameters_of(model);
   const auto contact = experiment::contact_model_for(prepared, model, parameters);
-  if (!contact) throw WrongUsage(fmt::format("--models: {} has no modes to draw", model));
+  if (!contact) return {};
   const auto problem = experiment::release_problem(prepared, *contact);
   release::ReleaseOptions simulate;
   simulate.integrator.record = true;
@@ -120,7 +124,15 @@ ReleaseTrace FigureSource::trace(const std::string& model) {
 const std::vector<ReleaseTrace>& FigureSource::traces() {
   if (!traces_.empty()) return traces_;
   std::vector<ReleaseTrace> all;
-  for (const auto& model : request_.models) all.push_back(trace(model));
+  std::vector<std::string> without;
+  for (const auto& model : request_.models)
+    if (auto one = trace(model))
+      all.push_back(*std::move(one));
+    else
+      without.push_back(model);
+  if (all.empty()) throw WrongUsage(fmt::format("--models: {} has no modes to draw", without.front()));
+  if (!without.empty())
+    tell("unhand: without modes, left out of the figures of one release: {}\n", fmt::join(without, ", "));
   return traces_ = std::move(all);
 }
 

@@ -10,6 +10,7 @@
 
 #include "apps/cards.hpp"
 #include "apps/release_figures.hpp"
+#include "apps/throws.hpp"
 
 namespace unhand::apps {
 
@@ -32,12 +33,14 @@ class FigureSource {
   explicit FigureSource(const FigureRequest& request);
 
   const std::string& file() const { return file_; }
+  /// The file, and what it declares of itself.
+  std::string about() const { return file_ + ": " + origin_text(log_); }
 
   /// All throws with every model.
   const experiment::Comparison& compared();
-  /// The one throw through every model, recorded.
+  /// The one throw through every model that has modes, recorded.
   const std::vector<ReleaseTrace>& traces();
-  /// Of the first model: L = c a [m].
+  /// Of the first of the traces: L = c a [m].
   double length();
   /// The flight of the one throw after the release that the first model says.
   FlightOverlay overlay();
@@ -47,7 +50,8 @@ class FigureSource {
   const Fitted& fitted(const std::string& model);
   /// Of its card, or estimated from the log.
   const experiment::ModelParameters& parameters_of(const std::string& model);
-  ReleaseTrace trace(const std::string& model);
+  /// Nothing of a model without modes.
+  std::optional<ReleaseTrace> trace(const std::string& model);
 
   FigureRequest request_;
   std::string file_;

@@ -114,7 +114,8 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
     throw Unanswered(fmt::format("{}: {}", request.log, why_unfitted(fit)));
   progress.step();
   const auto cost = fitting::gradient_cost(problem, fit);
-  FitAnswer answer{problem, fit, {}, {}, {}, {}, cost, 1};
+  FitAnswer answer{problem, fit, {}, {}, {}, {}, cost, 1, {}};
+  answer.origin = origin_text(log);
   answer.threads = request.threads > 0 ? request.threads
                                        : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   answer.throws = fitting::predict_throws(problem, fit, {true, request.threads});
@@ -208,8 +209,9 @@ Command fit_command(Parser& root) {
       .with_commas();
   parser.option("--card", request->card, "Write the model card");
   parser.option("--json", request->json, "Write the fit as JSON");
-  parser.option("--report", request->report,
-                "A directory for the tables (Markdown), a figure, all throws (CSV) and the JSON");
+  parser.option(
+      "--report", request->report,
+      "A directory for the tables (Markdown) and the JSON; of throws also a figure and all throws (CSV)");
   parser
       .option("--kfold", request->kfold,
               "Cross-validate over so many groups of conditions of the train throws; 0: with 5, and only "

@@ -32,7 +32,8 @@ struct FitAnswer {
   std::optional<fitting::CrossValidation> cross_validation;
   std::optional<fitting::ErrorFloor> floor;
   fitting::GradientCost gradients;
-  int threads{1};  ///< used
+  int threads{1};      ///< used
+  std::string origin;  ///< of the log, as it declares it
 
   bool has_test() const;
   /// Of the fit's time, over all threads.

@@ -112,11 +112,12 @@ std::string fit_text(const FitAnswer& a, const FitRequest& request, bool markdow
   }
   std::string effects;
   for (const auto& id : request.effects) effects += (effects.empty() ? " with " : ", ") + id;
-  std::string out = fmt::format(
-      "{}{}: {}{} fitted to {} of {} train throws, {} samples: {}, {} iterations\n\n",
-      markdown ? "# Fit\n\n" : "", request.log, request.model, effects, used, n_train, fit.samples,
-      fit.outcome == fitting::FitOutcome::converged ? "converged" : "stopped before it converged",
-      fit.iterations);
+  std::string out =
+      fmt::format("{}{}: {}\n{}{}{} fitted to {} of {} train throws, {} samples: {}, {} iterations\n\n",
+                  markdown ? "# Fit\n\n" : "", request.log, a.origin, markdown ? "\n" : "", request.model,
+                  effects, used, n_train, fit.samples,
+                  fit.outcome == fitting::FitOutcome::converged ? "converged" : "stopped before it converged",
+                  fit.iterations);
   out += table(parameter_table(fit)) + "\n";
   for (const auto& open : fit.open)
     out += fmt::format("not determined by this log: {} ({}).\n  It would take {}.\n", open.meaning,

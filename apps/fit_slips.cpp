@@ -125,12 +125,12 @@ void fit_slips(const FitRequest& request) {
     outputs.text(request.card, datasets::to_json(slip_card(request, surfaces, scores)));
   if (!request.report.empty()) {
     const auto directory = outputs.directory(request.report);
-    write_text(directory / "report.md",
-               fmt::format("# Fit\n\n{}: {}\n\n{}", request.log, request.model, table.markdown()));
+    write_text(directory / "report.md", fmt::format("# Fit\n\n{}: {}\n\n{} by surface\n\n{}", request.log,
+                                                    origin_text(log), request.model, table.markdown()));
     write_text(directory / "fit.json", json_text(json));
   }
   outputs.commit();
-  fmt::print("{}: {} by surface\n\n{}", request.log, request.model, table.text());
+  fmt::print("{}: {}\n{} by surface\n\n{}", request.log, origin_text(log), request.model, table.text());
 }
 
 }  // namespace unhand::apps

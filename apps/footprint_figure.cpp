@@ -9,7 +9,6 @@ namespace unhand::apps {
 
 Figure footprint_figure(const std::vector<std::string>& channels, const std::vector<NamedCurves>& curves,
                         const std::string& x) {
-  constexpr double kFloor = 0.1;  // σ: below, nothing is to be seen of it
   constexpr const char* kLines[] = {"#0072b2' dashtype 1", "#d55e00' dashtype 2", "#009e73' dashtype 4",
                                     "#cc79a7' dashtype 5"};
   const auto style_of_curve = [&](std::size_t k) {
@@ -37,7 +36,7 @@ Figure footprint_figure(const std::vector<std::string>& channels, const std::vec
       if (found == curves[k].channels.end()) continue;
       DataBlock block{channel + " " + curves[k].name, {x, "rms [sigma]", "mean [sigma]", "samples"}, {}, {}};
       for (const auto& p : found->second) {
-        block.rows.push_back({p.x, std::max(p.rms, kFloor), p.mean, static_cast<double>(p.samples)});
+        block.rows.push_back({p.x, p.rms, p.mean, static_cast<double>(p.samples)});
         top = std::max(top, p.rms);
       }
       figure.data.push_back(std::move(block));
@@ -47,18 +46,17 @@ Figure footprint_figure(const std::vector<std::string>& channels, const std::vec
     const double left = 1.8 + (at % kColumns) * 5.2, bottom = 1.7 + below + (rows - 1 - at / kColumns) * 3.9;
     script += place(figure, {left, left + 4.2, bottom, bottom + 2.4});
     script += fmt::format(
-        "set title '{}' offset 0,-0.6\nset yrange [{:.2g}:{:.4g}]\nset format y '%g'\nset ytics {}\n"
-        "set ylabel '{}' offset 0.5\nset xlabel '{}' offset 0,0.6\n"
+        "set title '{}' offset 0,-0.6\nset yrange [{:.2g}:{:.4g}]\n{}"
+        "set ylabel '{}' offset 0.5\nset xlabel '{}' offset 0,0.3\n"
         "set arrow 2 from {:.4g},1 to {:.4g},1 nohead linecolor rgb '#b0b0b0'\nplot {}\n",
-        plain(channel), kFloor, 1.5 * top,
-        top > 60 ? "(0.1, 1, 10, 100, 1000, '10^4' 1e4, '10^5' 1e5)" : "auto",
+        plain(channel), kResidualFloor, 1.5 * top, residual_tics(top),
         at % kColumns == 0 ? "rms [{/Symbol s}]" : "",
         at + kColumns >= static_cast<int>(channels.size()) ? x : "", low - margin, high + margin, plots);
     ++at;
   }
   std::vector<KeyEntry> key;
   for (std::size_t k = 0; k < curves.size(); ++k) key.push_back({style_of_curve(k), curves[k].name});
-  figure.script = script + key_strip(figure, key, 2) + "unset multiplot\n";
+  figure.script = script + floor_note(figure) + key_strip(figure, key, 2) + "unset multiplot\n";
   return figure;
 }
 

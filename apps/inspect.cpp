@@ -128,7 +128,7 @@ Inspection inspect_throws(const std::string& file) {
   out.text = fmt::format("{}: throw-log, dimension {}\n  title    {}\n  source   {}\n", file,
                          summary.dimension, summary.title, summary.source);
   if (!summary.licence.empty()) out.text += fmt::format("  licence  {}\n", summary.licence);
-  out.text += fmt::format("  gravity {} m/s^2 (declared), landing height {} m\n", summary.gravity,
+  out.text += fmt::format("  gravity {:.6g} m/s^2 (declared), landing height {:.6g} m\n", summary.gravity,
                           summary.landing_height);
   for (const auto& [name, object] : log.objects) {
     out.text += fmt::format("  object {}: mass {} kg", name, object.mass);

@@ -31,16 +31,18 @@ Figure measured_residual_figure(const std::vector<fitting::ResidualProfile>& bas
     const double left = 1.8 + (at % columns) * 5.2, bottom = 2.3 + (rows - 1 - at / columns) * 3.9;
     script += place(figure, {left, left + 4.2, bottom, bottom + 2.5});
     script += fmt::format(
-        "set title '{}' offset 0,-0.6\nset logscale y\nset yrange [0.5:{:.4g}]\nset format y '%g'\n"
+        "set title '{}' offset 0,-0.6\nset logscale y\nset yrange [{}:{:.4g}]\n"
         "{}set ylabel '{}' offset 0.5\n"
-        "set arrow 2 from 0,1 to 1,1 nohead linecolor rgb '#b0b0b0'\nset xlabel '{}' offset 0,0.6\n"
+        "set arrow 2 from 0,1 to 1,1 nohead linecolor rgb '#b0b0b0'\nset xlabel '{}' offset 0,0.3\n"
         "plot DATA index {} using 1:2 {}, DATA index {} using 1:2 {}\n",
-        plain(channel), 1.5 * top, residual_tics(top), at % columns == 0 ? "rms [{/Symbol s}]" : "",
-        at / columns == rows - 1 ? "share of the duration" : "", index, kBefore, index + 1, kAfter);
+        plain(channel), kResidualFloor, 1.5 * top, residual_tics(top),
+        at % columns == 0 ? "rms [{/Symbol s}]" : "",
+        at + columns >= static_cast<int>(channels.size()) ? "share of the duration" : "", index, kBefore,
+        index + 1, kAfter);
     index += 2;
     ++at;
   }
-  script += key_strip(figure, {{kBefore, base_name}, {kAfter, answer_name}}, 2);
+  script += floor_note(figure) + key_strip(figure, {{kBefore, base_name}, {kAfter, answer_name}}, 2);
   figure.script = script + "unset multiplot\n";
   return figure;
 }
@@ -59,7 +61,6 @@ Figure surface_figure(const MeasuredResult& result) {
   for (std::size_t i = 0; i < surfaces.size(); ++i)
     tics += fmt::format("{}'{}' {}", i ? ", " : "", plain(surfaces[i]), i);
   std::vector<KeyEntry> key;
-  const char* colours[] = {"#d55e00", "#009e73", "#0072b2", "#cc79a7"};
   double largest = 1;
   for (std::size_t k = 0; k < laws.size(); ++k) {
     DataBlock block{laws[k], {"held-out error [deg]", "surface", "null control [deg]"}, {}, {}};
@@ -70,10 +71,13 @@ Figure surface_figure(const MeasuredResult& result) {
         largest = std::max({largest, e.law_deg, e.null_law_deg});
       }
     figure.data.push_back(std::move(block));
-    const std::string filled =
-        fmt::format("with points pointtype {} pointsize 1.1 linecolor rgb '{}'", 5 + 2 * k, colours[k % 4]);
-    const std::string open =
-        fmt::format("with points pointtype {} pointsize 0.8 linecolor rgb '{}'", 4 + 2 * k, colours[k % 4]);
+    const Style style = style_of(laws[k]);
+    const auto points = [&](int marker, double size) {
+      return fmt::format("with points pointtype {} pointsize {} linecolor rgb '{}'", marker, size,
+                         style.colour);
+    };
+    const int ring = style.marker - style.marker % 2;  // gnuplot's even markers are open, the next is filled
+    const std::string filled = points(ring + 1, 1.1), open = points(ring, 0.8);
     plots += fmt::format("{}DATA index {} using 1:2 {}, DATA index {} using 3:2 {}", k ? ", " : "", k, filled,
                          k, open);
     key.push_back({filled, laws[k]});

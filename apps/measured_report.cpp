@@ -33,21 +33,28 @@ Table error_table(const MeasuredDiscovery& found) {
   return table;
 }
 
-Table misfit_table(const MeasuredDiscovery& found) {
-  Table table{{"channel", "samples", "before, train", "before, test", "after, train", "after, test",
-               "neighbours, before", "neighbours, after"},
+/// By channel; residuals of slips are angles, and without neighbours in time.
+Table misfit_table(const MeasuredResult& result) {
+  const MeasuredDiscovery& found = result.answer;
+  const bool slips = !result.surfaces.empty();
+  Table table{{slips ? "mean angle [deg]" : "chi2 per sample", slips ? "slips" : "samples", "before, train",
+               "before, test", "after, train", "after, test"},
               {},
               1};
+  if (!slips) table.header.insert(table.header.end(), {"neighbours, before", "neighbours, after"});
   const auto lag = [](const std::vector<fitting::Autocorrelation>& all, const std::string& channel) {
     for (const auto& a : all)
       if (a.channel == channel) return fmt::format("{:+.2f} ({:+.0f} sigma)", a.lag1, a.z);
     return std::string();
   };
-  for (const auto& m : found.misfit)
+  for (const auto& m : found.misfit) {
     table.rows.push_back({m.channel, std::to_string(m.n), fmt::format("{:.3f}", m.before_train),
                           fmt::format("{:.3f}", m.before_test), fmt::format("{:.3f}", m.after_train),
-                          fmt::format("{:.3f}", m.after_test), lag(found.autocorrelation_before, m.channel),
-                          lag(found.autocorrelation_after, m.channel)});
+                          fmt::format("{:.3f}", m.after_test)});
+    if (!slips)
+      table.rows.back().insert(table.rows.back().end(), {lag(found.autocorrelation_before, m.channel),
+                                                         lag(found.autocorrelation_after, m.channel)});
+  }
   return table;
 }
 
@@ -75,14 +82,26 @@ Table surface_table(const MeasuredResult& result) {
   return table;
 }
 
+/// What was fitted to, and what judges.
+std::string split_text(const MeasuredResult& result) {
+  const MeasuredDiscovery& found = result.answer;
+  return result.surfaces.empty() ? fmt::format("{} train and {} held out", found.train, found.test)
+                                 : fmt::format("{}, each held out once in the cross-validation",
+                                               plural(static_cast<std::size_t>(found.test), "slip"));
+}
+
 std::string first_text(const MeasuredDiscovery& found) {
   if (!found.first.any) return "No channel leaves the noise.";
   if (found.first.time > 0)
     return fmt::format(
-        "The residual first leaves the noise after {:.3f} s: a start fitted to the samples up to there "
-        "leaves {:.2f} times the variance "
-        "of the noise, most of it in {}.",
-        found.first.time, found.first.chi2_per_dof, found.first.channel);
+        "The residual {}: a start fitted to the samples up to there leaves {:.3g} times the variance of the "
+        "noise, most of it in {}.",
+        found.first.at_once
+            ? fmt::format("leaves the noise from the start on, already in the first {:.3f} s, the shortest "
+                          "time looked at",
+                          found.first.time)
+            : fmt::format("first leaves the noise after {:.3f} s", found.first.time),
+        found.first.chi2_per_dof, found.first.channel);
   return fmt::format("The residual leaves the noise in {} (phase {}).", found.first.channel, found.phase);
 }
 
@@ -107,15 +126,15 @@ std::string error_text(double value) { return std::isfinite(value) ? fmt::format
 
 std::string measured_text(const MeasuredResult& result) {
   const MeasuredDiscovery& found = result.answer;
-  std::string out = fmt::format("{}: {}\n{}, base model {}, {} train and {} held out\n{}\n", result.log,
-                                to_string(found.verdict), found.kind, found.model, found.train, found.test,
-                                first_text(found));
+  std::string out =
+      fmt::format("{}: {}\n{}\n{}, base model {}, {}\n{}\n", result.log, to_string(found.verdict),
+                  result.origin, found.kind, found.model, split_text(result), first_text(found));
   for (const auto& effect : found.effects) out += effect_text(effect);
   if (found.unexplained) out += fmt::format("\nunexplained: {}\n", found.unexplained->description);
   for (const auto& e : found.evidence)
     out += fmt::format("\n{} {}{}{}\n", e.against ? "against:" : "note:", e.about,
                        e.about.empty() ? "" : ": ", e.text);
-  return out + "\n" + error_table(found).text() + "\n" + misfit_table(found).text() +
+  return out + "\n" + error_table(found).text() + "\n" + misfit_table(result).text() +
          fmt::format("\n{:.1f} s\n", found.seconds);
 }
 
@@ -127,8 +146,9 @@ void write_measured_report(const MeasuredResult& result, const Json& json,
                                 : measured_residual_figure(found.profile_before, found.profile_after,
                                                            "before", "after"),
                ranking = ranking_figure(found.ranking, found.effects);
-  draw(residual, directory);
-  draw(ranking, directory);
+  const std::string about = result.log + ": " + result.origin;
+  draw(residual, directory, about);
+  draw(ranking, directory, about);
   const auto picture = [&](const Figure& figure) {
     return html_picture(directory / (figure.name + ".png"), figure.name);
   };
@@ -151,10 +171,10 @@ void write_measured_report(const MeasuredResult& result, const Json& json,
     if (!list.empty()) notes += fmt::format("<h3>{}</h3><ul>{}</ul>\n", against ? "Against" : "Beside", list);
   }
   std::string body = fmt::format(
-      "<p>{}, base model <code>{}</code>, {} train and {} held out. Verdict: <b>{}</b>.</p>\n<h2>Where it "
+      "<p>{}: {}, base model <code>{}</code>, {}. Verdict: <b>{}</b>.</p>\n<h2>Where it "
       "starts</h2><p>{}</p>\n{}",
-      escaped(found.kind), escaped(found.model), found.train, found.test, to_string(found.verdict),
-      escaped(first_text(found)), picture(residual));
+      escaped(result.origin), escaped(found.kind), escaped(found.model), split_text(result),
+      to_string(found.verdict), escaped(first_text(found)), picture(residual));
   body += "<h2>The answer</h2>\n" + answer;
   if (!notes.empty()) body += "<h2>What else the log says</h2>\n" + notes;
   body += "<h2>Errors before and after</h2>\n" + html(error_table(found));
@@ -162,7 +182,7 @@ void write_measured_report(const MeasuredResult& result, const Json& json,
   body += "<h2>Candidates</h2>\n" + picture(ranking) + html(ranking_table(found.ranking));
   if (!slips) {
     const Figure footprints = footprints_of(found);
-    draw(footprints, directory);
+    draw(footprints, directory, about);
     body += fmt::format("<p>{}</p>\n", kFootprints) + picture(footprints);
   }
   if (!found.stability.empty())
@@ -170,10 +190,12 @@ void write_measured_report(const MeasuredResult& result, const Json& json,
         "<h2>Does the answer depend on where one looks?</h2><p>The same parameters from halves of the train "
         "data.</p>\n" +
         html(stability_table(found));
-  body +=
-      "<h2>Misfit by channel</h2><p>chi2 per sample; 1 is the noise. Neighbours: correlation of neighbouring "
-      "residuals on held-out data.</p>\n" +
-      html(misfit_table(found));
+  body += fmt::format(
+              "<h2>Misfit by channel</h2><p>{}</p>\n",
+              slips ? "Mean angle between predicted and measured direction of sliding, in degrees."
+                    : "chi2 per sample; 1 is the noise. Neighbours: correlation of neighbouring residuals "
+                      "on held-out data.") +
+          html(misfit_table(result));
   if (!found.skipped.empty())
     body += fmt::format("<p>{} left out; the first: {} ({}).</p>\n", found.skipped.size(),
                         escaped(found.skipped.front().first), escaped(found.skipped.front().second));

@@ -16,6 +16,7 @@ struct MeasuredResult {
   fitting::MeasuredDiscovery answer;
   std::vector<fitting::SurfaceEvidence> surfaces;  ///< slips only
   std::string log, command;
+  std::string origin;  ///< as the log declares it
 };
 
 /// discovery.json, schema "discovery" version 1.

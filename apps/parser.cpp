@@ -9,7 +9,9 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
+#include <sstream>
 #include <type_traits>
 #include <vector>
 
@@ -66,6 +68,39 @@ std::string unknown_option(const CLI::App& command, int argc, char** argv) {
   }
   return {};
 }
+
+/// CLI11's help with its second column broken at blanks, to a hundred columns in all.
+class WrappedHelp final : public CLI::Formatter {
+ public:
+  std::string make_option_desc(const CLI::Option* option) const override {
+    return wrapped(CLI::Formatter::make_option_desc(option));
+  }
+  std::string make_subcommand(const CLI::App* sub) const override {
+    std::stringstream out;
+    CLI::detail::format_help(out, sub->get_display_name(true), wrapped(sub->get_description()),
+                             get_column_width());
+    return out.str();
+  }
+
+ private:
+  std::string wrapped(const std::string& text) const {
+    const std::size_t width = 100 - get_column_width();
+    std::string out;
+    std::size_t column = 0;
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line); column = 0) {
+      if (!out.empty()) out += '\n';
+      std::istringstream words(line);
+      for (std::string word; words >> word;) {
+        const bool fits = column == 0 || column + 1 + word.size() <= width;
+        if (column > 0) out += fits ? ' ' : '\n';
+        column = (fits && column > 0 ? column + 1 : 0) + word.size();
+        out += word;
+      }
+    }
+    return out;
+  }
+};
 
 /// How the help shows the values of an option that takes assignments; such options are known by it.
 const char* const kAssignment = "NAME=VALUE";
@@ -131,6 +166,7 @@ bool Option::given() const { return option_->count() > 0; }
 
 Parser::Parser(const std::string& description, const std::string& name, const std::string& version)
     : root_(std::make_unique<CLI::App>(description, name)), app_(root_.get()) {
+  root_->formatter(std::make_shared<WrappedHelp>());  // of the subcommands, too
   root_->set_version_flag("--version", version);
 }
 Parser::Parser(CLI::App* subcommand) : app_(subcommand) {}

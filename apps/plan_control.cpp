@@ -1,6 +1,7 @@
 // unhand plan control: throws of unknown objects under adaptive and plain computed torque, in simulation.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -32,36 +33,59 @@ struct Cell {
   ct::Dispersion landed;
 };
 
-const char* kLook[]{"pt 7 ps 0.5 lc rgb '#0072b2'", "pt 6 ps 0.6 lc rgb '#d55e00'",
+const char* kLook[]{"pt 6 ps 0.6 lc rgb '#0072b2'", "pt 8 ps 0.6 lc rgb '#d55e00'",
                     "pt 2 ps 0.6 lc rgb '#555555'"};
 const char* kLine[]{"lw 2 dt 1 lc rgb '#0072b2'", "lw 2 dt 2 lc rgb '#d55e00'", "lw 2 dt 4 lc rgb '#555555'"};
 
+/// A panel for every object, all to one scale about their landings; the last controllers first, so that the
+/// adaptive one lies on top.
 void draw_landings(const std::vector<Cell>& cells, double box, const fs::path& folder) {
-  Figure figure{"landings", 17, 8, {}, ""};
-  std::string script =
-      "set multiplot layout 1,3\nset grid\nset size square\nset xlabel 'forward [cm]'\nset ylabel 'across "
-      "[cm]'\nset key off\n";
+  const std::size_t controllers = ct::reported_controllers().size(), panels = cells.size() / controllers;
+  double back = -1, front = 1, side = 1;  // [cm]
+  for (const Cell& cell : cells)
+    for (const auto& one : cell.throws) {
+      if (!one.lands) continue;
+      back = std::min(back, 100 * one.miss.x());
+      front = std::max(front, 100 * one.miss.x());
+      side = std::max(side, 100 * std::abs(one.miss.y()));
+    }
+  const double margin = 0.04 * (front - back);
+  back -= margin, front += margin, side += margin;
+  Figure figure{"landings", 17, 0, {}, ""};
+  constexpr double left = 1.9, width = 14.6, bottom = 2.0, gap = 0.9;
+  const double height = std::clamp(2 * side * width / (front - back), 1.5, 6.0);
+  figure.height = bottom + static_cast<double>(panels) * (height + gap);
+  std::string script = fmt::format(
+      "set multiplot\nset key off\nset clip two\nset ylabel 'across [cm]'\nset xrange [{:.6g}:{:.6g}]\n"
+      "set yrange [{:.6g}:{:.6g}]\nset ytics {:.6g}\nset format x ''\n",
+      back, front, -side, side, tic_step(2 * side));
+  const double edge = 50 * box;
+  figure.data.push_back({"box",
+                         {"forward [cm]", "across [cm]"},
+                         {{-edge, -edge}, {edge, -edge}, {edge, edge}, {-edge, edge}, {-edge, -edge}},
+                         {}});
   std::vector<KeyEntry> key;
-  script +=
-      fmt::format("set object 1 rectangle from {0},{0} to {1},{1} fs empty border lc rgb '#000000' lw 1\n",
-                  -50 * box, 50 * box);
-  script += fmt::format("set yrange [{}:{}]\nset xrange [{}:{}]\n", -60 * box, 60 * box, -60 * box, 60 * box);
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    DataBlock block{
-        cells[i].payload.name + ", " + cells[i].controller.name, {"forward [cm]", "across [cm]"}, {}, {}};
-    for (const auto& one : cells[i].throws)
-      if (one.lands) block.rows.push_back({100 * one.miss.x(), 100 * one.miss.y()});
-    figure.data.push_back(block);
-    const std::size_t c = i % 3;
-    if (c == 0)
-      script += fmt::format("set title '{}, {:.0f} g'\n", plain(cells[i].payload.name),
-                            1e3 * cells[i].payload.mass);
-    script += fmt::format("{}DATA index {} using 1:2 with points {} title '{}'", c == 0 ? "plot " : ", ", i,
-                          kLook[c], plain(cells[i].controller.name));
-    if (c == 2) script += "\n";
-    if (i < 3) key.push_back({fmt::format("with points {}", kLook[c]), cells[i].controller.name});
+  for (std::size_t i = 0; i < controllers; ++i)
+    key.push_back({fmt::format("with points {}", kLook[i]), cells[i].controller.name});
+  for (std::size_t p = 0; p < panels; ++p) {
+    std::string points = "plot DATA index 0 using 1:2 with lines lc rgb '#000000' lw 1";
+    for (std::size_t c = controllers; c-- > 0;) {
+      const Cell& cell = cells[p * controllers + c];
+      DataBlock block{
+          cell.payload.name + ", " + cell.controller.name, {"forward [cm]", "across [cm]"}, {}, {}};
+      for (const auto& one : cell.throws)
+        if (one.lands) block.rows.push_back({100 * one.miss.x(), 100 * one.miss.y()});
+      points += fmt::format(", DATA index {} using 1:2 with points {}", figure.data.size(), kLook[c]);
+      figure.data.push_back(std::move(block));
+    }
+    const double low = bottom + static_cast<double>(panels - 1 - p) * (height + gap);
+    if (p + 1 == panels) script += "set format x '%h'\nset xlabel 'forward [cm]'\n";
+    script += place(figure, {left, left + width, low, low + height}) +
+              fmt::format("set title '{}, {:.0f} g' offset 0,-0.6\n{}\n",
+                          plain(cells[p * controllers].payload.name),
+                          1e3 * cells[p * controllers].payload.mass, points);
   }
-  figure.script = script + "set size nosquare\n" + key_strip(figure, key, 3) + "unset multiplot\n";
+  figure.script = script + key_strip(figure, key, static_cast<int>(controllers)) + "unset multiplot\n";
   draw(figure, folder);
 }
 
@@ -69,14 +93,17 @@ void draw_errors(const std::vector<ct::StudyThrow>& recorded,
                  const std::vector<ct::ControllerChoice>& controllers, const fs::path& folder) {
   Figure figure{"errors", 17, 16, {}, ""};
   std::string position, velocity, falls;
+  double last = 0;
   for (std::size_t i = 0; i < recorded.size(); ++i) {
     DataBlock block{
         controllers[i].name,
         {"time [s]", "position error [cm]", "velocity error [m/s]", "V [J]", "mass estimate [kg]"},
         {},
         {}};
-    for (const auto& s : recorded[i].history)
+    for (const auto& s : recorded[i].history) {
+      last = std::max(last, s.t);
       block.rows.push_back({s.t, 100 * s.position_error, s.velocity_error, s.lyapunov, s.mass_estimate});
+    }
     figure.data.push_back(block);
     position += fmt::format("{}DATA index {} using 1:2 with lines {} title '{}'", i ? ", " : "plot ", i,
                             kLine[i], plain(controllers[i].name));
@@ -85,7 +112,8 @@ void draw_errors(const std::vector<ct::StudyThrow>& recorded,
   }
   falls = fmt::format("plot DATA index 0 using 1:4 with lines {} notitle", kLine[0]);
   figure.script =
-      "set multiplot layout 3,1\nset grid\nset key outside top center horizontal samplen 4\nset xlabel 'time "
+      fmt::format("set multiplot layout 3,1\nset lmargin 10\nset rmargin 3\nset xrange [0:{:.6g}]\n", last) +
+      "set key outside top center horizontal samplen 4\nset xlabel 'time "
       "[s]'\nset ylabel 'position "
       "error [cm]'\n" +
       position + "\nset ylabel 'velocity error [m/s]'\n" + velocity +

@@ -79,7 +79,8 @@ void draw_speeds(const el::ClutchedArm& arm, const std::vector<Fastest>& all, co
   }
   if (figure.data.empty()) return;
   figure.script =
-      "set multiplot layout 2,1\nset grid\nset key left top\nset xlabel 'time [s]'\nset ylabel 'tip speed "
+      "set multiplot layout 2,1\nset lmargin 10\nset rmargin 3\nset key left top\nset xlabel 'time [s]'\nset "
+      "ylabel 'tip speed "
       "[m/s]'\n" +
       speed + "\nset ylabel 'spring deflection [rad]'\n" + deflection + "\nunset multiplot\n";
   draw(figure, folder);
@@ -95,7 +96,8 @@ void draw_table(const std::vector<el::TableCheck>& checks, const fs::path& folde
     if (c.lands) figure.data[0].rows.push_back({c.distance, 1e3 * c.miss, c.limit_use});
   if (figure.data[0].rows.empty()) return;
   figure.script =
-      "set multiplot layout 2,1\nset grid\nunset key\nset xlabel 'distance of the target [m]'\nset ylabel "
+      "set multiplot layout 2,1\nset lmargin 10\nset rmargin 3\nunset key\nset xlabel 'distance of the "
+      "target [m]'\nset ylabel "
       "'miss [mm]'\n"
       "plot DATA using 1:2 with lines lw 2 lc rgb '#0072b2'\nset ylabel 'largest share of a limit'\nset "
       "yrange [0.8:1.02]\n"

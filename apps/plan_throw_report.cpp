@@ -318,7 +318,8 @@ Figure motion_figure(const ThrowAnswer& a) {
         "behind\n"
         "set ylabel '{3} over limit'; {4}\nunset key\nplot ",
         motion.begin, motion.end(), a.window, upper ? "velocity" : "acceleration",
-        upper ? "set format x ''; unset xlabel" : "set format x; set xlabel 'after the command to open [s]'");
+        upper ? "set format x ''; unset xlabel"
+              : "set format x '%h'; set xlabel 'after the command to open [s]'");
     for (int i = 0; i < n; ++i)
       out.script +=
           fmt::format("{}DATA index 0 using 1:{} with lines linecolor rgb '{}' dashtype {} linewidth 1.3",

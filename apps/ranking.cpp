@@ -28,7 +28,7 @@ Json ranking_json(std::span<const fitting::Ranked> ranking) {
 }
 
 Table ranking_table(std::span<const fitting::Ranked> ranking) {
-  Table table{{"candidate", "chi2 gain", "in step", "p", "correlation with the best", "refitted: BIC",
+  Table table{{"candidate", "chi2 gain", "in step", "p", "correlation with its step's best", "refitted: BIC",
                "in step", "held-out fall"},
               {},
               1};
@@ -50,30 +50,30 @@ Figure ranking_figure(std::span<const fitting::Ranked> ranking,
   std::stable_sort(by_step.begin(), by_step.end(),
                    [](const auto& a, const auto& b) { return a.step < b.step; });
   std::string tics;
-  int position = 0;
+  int lines = 0, step = 0;  // a headline and a gap for every step
   double largest = 10;
+  const auto line = [&](const std::string& text) {
+    tics += fmt::format("{}'{}' {}", lines > 0 ? ", " : "", text, lines);
+    return static_cast<double>(lines++);
+  };
   for (const auto& r : by_step) {
     if (!(r.gain > 1)) continue;
+    if (r.step != step) line(fmt::format("{{/:Bold step {}}}", step = r.step));
     const bool taken =
         std::any_of(accepted.begin(), accepted.end(), [&](const auto& e) { return e.id == r.id; });
-    block.rows.push_back(
-        {r.gain, static_cast<double>(position), taken ? 1.0 : 0.0, static_cast<double>(r.step)});
-    const std::string step = r.step > 1 ? fmt::format(" (step {})", r.step) : "";
-    tics += fmt::format("{}'{}{}' {}", position ? ", " : "", plain(r.id), step, position);
+    block.rows.push_back({r.gain, line(plain(r.id)), taken ? 1.0 : 0.0, static_cast<double>(r.step)});
     largest = std::max(largest, r.gain);
-    ++position;
   }
-  if (position == 0) block.rows.push_back({1, 0, 0, 1}), tics = "'none' 0";
-  figure.height = 2 + 0.55 * std::max(1, position);
+  if (block.rows.empty()) line("none");
+  figure.height = 2 + 0.55 * lines;
   figure.data.push_back(block);
   figure.script = fmt::format(
-      "set key off\nset lmargin 38\nset logscale x\nset format x '10^{{%T}}'\nset xrange [1:{:.4g}]\n"
-      "set yrange [{}:-1]\nset ytics ({})\nset xlabel 'chi^2 that the effect would take away, to first "
-      "order'\n"
-      "set style fill solid 0.9\n"
-      "plot DATA index 0 using (sqrt($1)):2:(0):1:($2-0.35):($2+0.35):($3 > 0 ? 0x0072b2 : 0xb0b0b0) "
-      "with boxxyerror linecolor rgb variable\n",
-      2 * largest, std::max(1, position), tics);
+      "set key off\nset lmargin 38\nset logscale x\nset format x '10^{{%T}}'\nset xrange [0.7:{:.4g}]\n"
+      "set yrange [{}:-0.6]\nset ytics ({}) scale 0\n"
+      "set xlabel '{{/Symbol c}}^2 that the effect would take away, to first order (filled: accepted)'\n"
+      "plot DATA index 0 using ($3 > 0 ? NaN : $1):2 with points pointtype 6 linecolor rgb '#707070', \\\n"
+      "     DATA index 0 using ($3 > 0 ? $1 : NaN):2 with points pointtype 7 linecolor rgb '#0072b2'\n",
+      2 * largest, lines - 0.4, tics);
   return figure;
 }
 
@@ -142,12 +142,15 @@ std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects) {
 
 std::string effect_html(const fitting::AcceptedEffect& effect) {
   std::string out = fmt::format("<h3>{}</h3><p>", escaped(effect.id));
-  for (const auto& p : effect.parameters)
-    out += is_held(p.value, p.sigma)
-               ? fmt::format("{} = {}<br>", escaped(p.name), escaped(with_sigma(p.value, p.sigma, p.unit)))
-               : fmt::format("{} = {:.6g} &plusmn; {:.2g} {} (95 %: {:.6g} to {:.6g})<br>", escaped(p.name),
-                             p.value, p.sigma, escaped(p.unit), p.value - fitting::kNormal95 * p.sigma,
-                             p.value + fitting::kNormal95 * p.sigma);
+  for (const auto& p : effect.parameters) {
+    const auto end = [&](double sign) {
+      return rounded(p.value + sign * fitting::kNormal95 * p.sigma, p.sigma).value;
+    };
+    const std::string interval =
+        is_held(p.value, p.sigma) ? "" : fmt::format(" (95 %: {} to {})", end(-1), end(1));
+    out += fmt::format("{} = {}{}<br>", escaped(p.name), escaped(with_sigma(p.value, p.sigma, p.unit)),
+                       interval);
+  }
   const std::string p_value = effect.p_value ? fmt::format(", p = {:.2g}", *effect.p_value) : "";
   out += fmt::format("BIC {:+.1f}{}. On held-out data: {}.</p>\n", effect.delta_bic, p_value,
                      escaped(effect.why));
@@ -181,8 +184,14 @@ Json effect_json(const fitting::AcceptedEffect& effect) {
 }
 
 std::string residual_tics(double top) {
-  return top > 60 ? "set ytics (1, 10, 100, 1000, '10^4' 1e4, '10^5' 1e5, '10^6' 1e6)\n"
-                  : "set ytics (0.5, 1, 2, 5, 10, 20, 50)\n";
+  return top > 6 ? "set ytics (0.1, 1, 10, 100, 1000, '10^4' 1e4, '10^5' 1e5, '10^6' 1e6)\n"
+                 : "set ytics (0.1, 0.2, 0.5, 1, 2, 5)\n";
+}
+
+std::string floor_note(const Figure& figure) {
+  return fmt::format(
+      "set label 98 'below {} {{/Symbol s}}: not shown' at screen {:.4f},{:.4f} right font ',7'\n",
+      kResidualFloor, 1 - 0.3 / figure.width, 1 - 0.3 / figure.height);
 }
 
 double add_residuals(Figure& figure, const std::string& channel, const std::string& x,
@@ -194,7 +203,7 @@ double add_residuals(Figure& figure, const std::string& channel, const std::stri
                     {},
                     {}};
     for (const auto& p : *points) {
-      block.rows.push_back({p.x, std::max(p.rms, 0.05), p.mean, static_cast<double>(p.samples)});
+      block.rows.push_back({p.x, p.rms, p.mean, static_cast<double>(p.samples)});
       top = std::max(top, p.rms);
     }
     figure.data.push_back(std::move(block));

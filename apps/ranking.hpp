@@ -18,8 +18,8 @@ Json ranking_json(std::span<const fitting::Ranked> ranking);
 /// The candidates, best first: what each would take away, and what a refit showed.
 Table ranking_table(std::span<const fitting::Ranked> ranking);
 
-/// Bars of the fall of chi-square to first order, by the step of the search that they are of; those of the
-/// accepted effects are blue.
+/// The fall of chi-square to first order as points, by the step of the search that they are of; those of the
+/// accepted effects are filled.
 Figure ranking_figure(std::span<const fitting::Ranked> ranking,
                       std::span<const fitting::AcceptedEffect> accepted);
 
@@ -73,7 +73,11 @@ inline constexpr const char* kFootprints =
     "order) and with all that is fitted anyway making up for what it can; grey: what the base model leaves. "
     "What is missing should look like that, in every channel.";
 
-/// Marks of a logarithmic axis of residuals from 0.5 to `top` that do not overlap, for gnuplot.
+/// Where the axes of residuals begin [sigma], and a note in the upper right corner that says so.
+inline constexpr double kResidualFloor = 0.1;
+std::string floor_note(const Figure& figure);
+
+/// Marks of a logarithmic axis of residuals from there to `top` that do not overlap, for gnuplot.
 std::string residual_tics(double top);
 
 /// Adds a channel's residuals before and after as data of the figure. Returns the largest rms, at least 2.

@@ -45,7 +45,7 @@ std::vector<DataBlock> blocks(const std::vector<ReleaseTrace>& traces,
   std::vector<DataBlock> out;
   for (const auto& trace : traces) {
     out.push_back({trace.model, columns, {}, {}});
-    for (const auto& r : trace.rows) out.back().rows.push_back(row(r));
+    for (const auto& r : trace.rows) out.back().rows.push_back(row(trace, r));
   }
   return out;
 }
@@ -66,7 +66,21 @@ std::string throw_title(const std::string& thrown, const Figure& figure) {
                      1 - 0.4 / figure.height);
 }
 
-double milliseconds(double t) { return kMilliseconds * t; }
+/// On the figures' clock [ms].
+double milliseconds(const ReleaseTrace& trace, double t) {
+  return kMilliseconds * (t - trace.open_command.value_or(0));
+}
+
+std::string time_label(const ReleaseTrace& trace) {
+  return trace.open_command ? "time from the command to open [ms]" : "time [ms]";
+}
+
+/// A line at the command to open.
+std::string command_mark(const ReleaseTrace& trace) {
+  return trace.open_command
+             ? "set arrow 97 from 0, graph 0 to 0, graph 1 nohead back linecolor rgb '#808080' dashtype 3\n"
+             : "";
+}
 
 }  // namespace
 
@@ -107,22 +121,27 @@ ReleaseTrace trace_of(const release::ReleaseProblem<double>& problem,
 
 Figure mode_figure(const std::vector<ReleaseTrace>& traces) {
   const auto n = static_cast<double>(traces.size());
-  Figure figure{"modes", 17, 7.6 + 0.9 * n, {}, {}};
-  figure.data = blocks({traces.front()}, {"time [ms]", "normal force of a pad [N]"}, [](const TraceRow& r) {
-    return std::vector<double>{milliseconds(r.time), r.normal_force};
-  });
+  Figure figure{"modes", 17, 0, {}, {}};
+  figure.data = blocks({traces.front()}, {time_label(traces.front()), "normal force of a pad [N]"},
+                       [](const ReleaseTrace& trace, const TraceRow& r) {
+                         return std::vector<double>{milliseconds(trace, r.time), r.normal_force};
+                       });
   double begin = traces.front().rows.front().time, end = begin;
   std::vector<std::string> seen;
   for (std::size_t i = 0; i < traces.size(); ++i) {
     DataBlock block{traces[i].model + ", modes", {"from [ms]", "to [ms]", "line", "mode"}, {}, {}};
     for (const auto& span : traces[i].modes) {
-      block.rows.push_back({milliseconds(span.begin), milliseconds(span.end), static_cast<double>(i)});
+      block.rows.push_back(
+          {milliseconds(traces[i], span.begin), milliseconds(traces[i], span.end), static_cast<double>(i)});
       block.labels.push_back(span.mode);
       end = std::max(end, span.end);
       if (std::find(seen.begin(), seen.end(), span.mode) == seen.end()) seen.push_back(span.mode);
     }
     figure.data.push_back(std::move(block));
   }
+  DataBlock pressed{"measured", figure.data.front().columns, {}, {}};
+  for (const auto& [t, force] : traces.front().pressed)
+    if (t >= begin && t <= end) pressed.rows.push_back({milliseconds(traces.front(), t), force});
   std::string tics, ribbons;
   for (std::size_t i = 0; i < traces.size(); ++i) {
     tics += fmt::format("{}'{}' {}", i > 0 ? ", " : "", plain(traces[i].model), i);
@@ -133,33 +152,42 @@ Figure mode_figure(const std::vector<ReleaseTrace>& traces) {
           "fillcolor rgb '{}' linecolor rgb '#404040' linewidth 0.6",
           ribbons.empty() ? "" : ", \\\n     ", i + 1, mode, colour_of(mode));
   }
-  const double left = 4.2, key = 0.9, low = 1.7 + key, ribbon = low + 0.9 * n;
-  std::vector<KeyEntry> modes;
+  std::vector<KeyEntry> key;
+  const char *measured_style = "with points pointtype 7 pointsize 0.4 linecolor rgb '#a8a8a8'",
+             *force_style = "with lines linecolor rgb '#000000' linewidth 1.1";
+  std::string force = fmt::format("DATA index 0 using 1:2 {}\n", force_style);
+  if (!pressed.rows.empty()) {
+    key = {{measured_style, "measured"}, {force_style, "smoothed"}};
+    force = fmt::format("DATA index {} using 1:2 {}, ", figure.data.size(), measured_style) + force;
+    figure.data.push_back(std::move(pressed));
+  }
   for (const auto& mode : seen)
-    modes.push_back(
+    key.push_back(
         {fmt::format("with boxes fillstyle solid 1 border rgb '#404040' fillcolor rgb '{}'", colour_of(mode)),
          mode});
+  constexpr int columns = 3;
+  const double left = 4.2, low = 2.0 + key_height(key.size(), columns), ribbon = low + 0.9 * n;
+  figure.height = ribbon + 5.2;
   std::string& s = figure.script;
-  s = fmt::format("set multiplot\nunset key\nset xrange [{:.6g}:{:.6g}]\n", milliseconds(begin),
-                  milliseconds(end));
+  s = fmt::format("set multiplot\nunset key\nset xrange [{:.6g}:{:.6g}]\n",
+                  milliseconds(traces.front(), begin), milliseconds(traces.front(), end));
   s += throw_title(traces.front().thrown, figure);
   s += place(figure, {left, figure.width - 0.5, ribbon + 0.3, figure.height - 0.9});
-  s += "set ylabel 'normal force of a pad [N]'\nset yrange [0:*]; set format x ''\n"
-       "plot DATA index 0 using 1:2 with lines linecolor rgb '#000000' linewidth 1.6\n";
+  s += command_mark(traces.front()) +
+       "set ylabel 'normal force of a pad [N]'\nset yrange [0:*]; set format x ''\nplot " + force;
   s += "unset label 99\n" + place(figure, {left, figure.width - 0.5, low, ribbon});
   s += fmt::format(
-      "set format x; unset ylabel; set xlabel 'time [ms]'\nset yrange [{}:-0.5]\nset ytics ({}) scale 0\n"
+      "set format x '%h'; unset ylabel; set xlabel '{}'\nset yrange [{}:-0.5]\nset ytics ({}) scale "
+      "0\n"
       "set style fill solid 1 border rgb '#404040'\nunset grid\nplot {}\n",
-      n - 0.5, tics, ribbons);
-  s += "unset label 99\n" +
-       key_strip(figure, modes, static_cast<int>(std::max<std::size_t>(1, modes.size()))) +
-       "unset multiplot\n";
+      time_label(traces.front()), n - 0.5, tics, ribbons);
+  s += "unset label 99\n" + key_strip(figure, key, columns) + "unset multiplot\n";
   return figure;
 }
 
 Figure wrench_figure(const std::vector<ReleaseTrace>& traces) {
   Figure figure{"wrench", 13, 12.5, {}, {}};
-  figure.data = blocks(traces, {"|f|/f_max", "|tau|/tau_max"}, [](const TraceRow& r) {
+  figure.data = blocks(traces, {"|f|/f_max", "|tau|/tau_max"}, [](const ReleaseTrace&, const TraceRow& r) {
     return std::vector<double>{r.force, std::abs(r.torque)};
   });
   DataBlock ellipse{"ellipse", {"|f|/f_max", "|tau|/tau_max"}, {}, {}}, disc = ellipse;
@@ -173,34 +201,44 @@ Figure wrench_figure(const std::vector<ReleaseTrace>& traces) {
   }
   figure.data.push_back(std::move(ellipse));
   figure.data.push_back(std::move(disc));
+  DataBlock starts{"at the start", {"|f|/f_max", "|tau|/tau_max"}, {}, {}};
+  for (const auto& trace : traces)
+    starts.rows.push_back({trace.rows.front().force, std::abs(trace.rows.front().torque)});
+  figure.data.push_back(std::move(starts));
   auto key = key_of(traces);
   const char *ellipse_style = "with lines linecolor rgb '#808080' linewidth 1",
              *disc_style = "with lines linecolor rgb '#d4d4d4' linewidth 5",  // a band to run along
-                 *box_style = "with lines linecolor rgb '#a0a0a0' linewidth 1 dashtype 3";
+                 *box_style = "with lines linecolor rgb '#a0a0a0' linewidth 1 dashtype 5",
+             *start_style = "with points pointtype 6 linecolor rgb '#000000' linewidth 1.2";
   key.push_back({ellipse_style, "ellipse"});
   key.push_back({disc_style, "exact disc"});
   key.push_back({box_style, "separate limits"});
+  key.push_back({start_style, "at the start"});
   constexpr int columns = 2;
   std::string& s = figure.script;
   s = "set multiplot\nunset key\nset xrange [0:1.12]; set yrange [0:1.12]\n"
       "set xlabel 'force on the pads over its limit, |f|/f_{max}'\n"
       "set ylabel 'torque over its limit, |{/Symbol t}|/{/Symbol t}_{max}'\n"
-      "set arrow from 0,1 to 1,1 nohead linecolor rgb '#a0a0a0' linewidth 1 dashtype 3\n"
-      "set arrow from 1,0 to 1,1 nohead linecolor rgb '#a0a0a0' linewidth 1 dashtype 3\n";
+      "set arrow from 0,1 to 1,1 nohead linecolor rgb '#a0a0a0' linewidth 1 dashtype 5\n"
+      "set arrow from 1,0 to 1,1 nohead linecolor rgb '#a0a0a0' linewidth 1 dashtype 5\n";
   s += throw_title(traces.front().thrown, figure);
   s += place(figure, {1.9, figure.width - 0.5, 1.8 + key_height(key.size(), columns), figure.height - 0.9});
-  s += fmt::format("plot DATA index {} using 1:2 {}, \\\n     DATA index {} using 1:2 {}, \\\n     {}\n",
-                   traces.size() + 1, disc_style, traces.size(), ellipse_style, plot_all(traces, "1:2"));
+  s += fmt::format(
+      "plot DATA index {} using 1:2 {}, \\\n     DATA index {} using 1:2 {}, \\\n     {}, \\\n     "
+      "DATA index {} using 1:2 {}\n",
+      traces.size() + 1, disc_style, traces.size(), ellipse_style, plot_all(traces, "1:2"), traces.size() + 2,
+      start_style);
   s += "unset label 99\n" + key_strip(figure, key, columns) + "unset multiplot\n";
   return figure;
 }
 
 Figure pivot_figure(const std::vector<ReleaseTrace>& traces) {
   Figure figure{"pivot", 17, 9, {}, {}};
-  figure.data = blocks(
-      traces, {"time [ms]", "angle against the hand [deg]", "relative spin [deg/s]"}, [](const TraceRow& r) {
-        return std::vector<double>{milliseconds(r.time), r.pivot * kDegrees, r.spin * kDegrees};
-      });
+  figure.data =
+      blocks(traces, {time_label(traces.front()), "angle against the hand [deg]", "relative spin [deg/s]"},
+             [](const ReleaseTrace& trace, const TraceRow& r) {
+               return std::vector<double>{milliseconds(trace, r.time), r.pivot * kDegrees, r.spin * kDegrees};
+             });
   const auto key = key_of(traces);
   constexpr int columns = 3;
   const double bottom = 1.8 + key_height(key.size(), columns), top = figure.height - 0.9,
@@ -208,10 +246,12 @@ Figure pivot_figure(const std::vector<ReleaseTrace>& traces) {
   const auto& rows = traces.front().rows;
   std::string& s = figure.script;
   s = fmt::format(
-      "set multiplot\nunset key\nset xlabel 'time [ms]'\nset xrange [{:.6g}:{:.6g}]\n"
+      "set multiplot\nunset key\nset xlabel '{}'\nset xrange [{:.6g}:{:.6g}]\n"
       "set xzeroaxis linetype 1 linecolor rgb '#808080' linewidth 0.6\n"
       "set ylabel 'angle against the hand [deg]'\n",
-      milliseconds(rows.front().time), milliseconds(rows.back().time));
+      time_label(traces.front()), milliseconds(traces.front(), rows.front().time),
+      milliseconds(traces.front(), rows.back().time));
+  s += command_mark(traces.front());
   s += throw_title(traces.front().thrown, figure);
   s += place(figure, {1.9, middle - 0.2, bottom, top}) + "plot " + plot_all(traces, "1:2") + "\n";
   s += "unset label 99\nset ylabel 'spin against the hand [deg/s]'\n";
@@ -223,26 +263,26 @@ Figure pivot_figure(const std::vector<ReleaseTrace>& traces) {
 
 Figure phase_figure(const std::vector<ReleaseTrace>& traces, double length) {
   Figure figure{"phase", 13, 11, {}, {}};
-  figure.data =
-      blocks(traces, {"L omega_r [mm/s]", "slip speed of the patch [mm/s]"}, [&](const TraceRow& r) {
-        return std::vector<double>{kMillimetres * length * r.spin, kMillimetres * r.slip};
-      });
+  figure.data = blocks(traces, {"L omega_r [mm/s]", "slip speed of the patch [mm/s]"},
+                       [&](const ReleaseTrace&, const TraceRow& r) {
+                         return std::vector<double>{kMillimetres * length * r.spin, kMillimetres * r.slip};
+                       });
   DataBlock ends{"where they part", {"L omega_r [mm/s]", "slip speed [mm/s]"}, {}, {}};
   for (const auto& trace : traces)
     ends.rows.push_back(
         {kMillimetres * length * trace.rows.back().spin, kMillimetres * trace.rows.back().slip});
   figure.data.push_back(std::move(ends));
-  const auto key = key_of(traces);
+  auto key = key_of(traces);
+  const char* ends_style = "with points pointtype 6 linecolor rgb '#000000' linewidth 1.2";
+  key.push_back({ends_style, "where they part"});
   constexpr int columns = 2;
   std::string& s = figure.script;
   s = "set multiplot\nunset key\nset yrange [0:*]\n"
       "set xlabel 'relative spin, L {/Symbol w}_r [mm/s]'\nset ylabel 'slip of the patch, |v_r| [mm/s]'\n";
   s += throw_title(traces.front().thrown, figure);
   s += place(figure, {1.9, figure.width - 0.6, 1.8 + key_height(key.size(), columns), figure.height - 0.9});
-  s += fmt::format(
-      "plot {}, \\\n     DATA index {} using 1:2 with points pointtype 6 linecolor rgb '#000000' linewidth "
-      "1.2\n",
-      plot_all(traces, "1:2"), traces.size());
+  s += fmt::format("plot {}, \\\n     DATA index {} using 1:2 {}\n", plot_all(traces, "1:2"), traces.size(),
+                   ends_style);
   s += "unset label 99\n" + key_strip(figure, key, columns) + "unset multiplot\n";
   return figure;
 }
@@ -266,12 +306,14 @@ Figure flight_figure(const FlightOverlay& overlay) {
   for (std::size_t i = 0; i < overlay.time.size(); ++i)
     for (const double x : {overlay.predicted[i].x, overlay.measured[i].x})
       left = std::min(left, x), right = std::max(right, x);
+  const std::string path =
+      fmt::format("with lines linecolor rgb '{}' linewidth 1.8", style_of(overlay.model).colour);
   const std::vector<KeyEntry> key{
-      {"with lines linecolor rgb '#0072b2' linewidth 1.8", overlay.model},
-      {"with points pointtype 6 linecolor rgb '#000000'", "motion capture"},
-      {"with points pointtype 7 linecolor rgb '#d55e00'", "residual x [mm]"},
-      {"with points pointtype 4 linecolor rgb '#000000'", "residual z [mm]"},
-      {"with points pointtype 2 linecolor rgb '#0072b2'", "residual theta [deg]"}};
+      {path, overlay.model},
+      {"with points pointtype 6 linecolor rgb '#808080'", "motion capture"},
+      {"with points pointtype 7 linecolor rgb '#009e73'", "residual x [mm]"},
+      {"with points pointtype 4 linecolor rgb '#606060'", "residual z [mm]"},
+      {"with points pointtype 2 linecolor rgb '#cc79a7'", "residual theta [deg]"}};
   constexpr int columns = 3;
   const double bottom = 1.8 + key_height(key.size(), columns), top = figure.height - 0.9, middle = 8.6;
   std::string& s = figure.script;
@@ -280,17 +322,18 @@ Figure flight_figure(const FlightOverlay& overlay) {
       "set xtics {:.6g}\n",
       overlay.thrown.empty() ? "" : " of throw " + plain(overlay.thrown), tic_step(1.5 * (right - left)));
   s += place(figure, {1.9, middle, bottom, top});
-  s += "plot DATA index 0 using 5:6 every 3 with points pointtype 6 linecolor rgb '#000000', \\\n"
-       "     DATA index 0 using 2:3 with lines linecolor rgb '#0072b2' linewidth 1.8\n";
+  s += "plot DATA index 0 using 5:6 every 3 with points pointtype 6 linecolor rgb '#808080', \\\n"
+       "     DATA index 0 using 2:3 " +
+       path + "\n";
   s += fmt::format("set xtics {:.6g}\n", tic_step(overlay.time.back() - overlay.time.front()));
   s += "set title 'predicted - measured' offset 0,-0.5\nset xlabel 'time [s]'; set ylabel "
        "'mm, deg' offset "
        "1,0\n"
        "set xzeroaxis linetype 1 linecolor rgb '#808080' linewidth 0.6\n";
   s += place(figure, {middle + 1.9, figure.width - 0.5, bottom, top});
-  s += "plot DATA index 0 using 1:8 with points pointtype 7 pointsize 0.45 linecolor rgb '#d55e00', \\\n"
-       "     DATA index 0 using 1:9 with points pointtype 4 pointsize 0.45 linecolor rgb '#000000', \\\n"
-       "     DATA index 0 using 1:10 with points pointtype 2 pointsize 0.45 linecolor rgb '#0072b2'\n";
+  s += "plot DATA index 0 using 1:8 with points pointtype 7 pointsize 0.45 linecolor rgb '#009e73', \\\n"
+       "     DATA index 0 using 1:9 with points pointtype 4 pointsize 0.45 linecolor rgb '#606060', \\\n"
+       "     DATA index 0 using 1:10 with points pointtype 2 pointsize 0.45 linecolor rgb '#cc79a7'\n";
   s += "unset label 99\n" + key_strip(figure, key, columns) + "unset multiplot\n";
   return figure;
 }

@@ -1,6 +1,7 @@
 // Figures of one release: what the pads do while they open, and where the object goes.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,9 +32,11 @@ struct ModeSpan {
 
 /// A release as figures need it.
 struct ReleaseTrace {
-  std::string model, thrown;    ///< and the throw's id, for titles
-  std::vector<TraceRow> rows;   ///< evenly spaced, from the start to the detach
-  std::vector<ModeSpan> modes;  ///< without those shorter than a nanosecond
+  std::string model, thrown;           ///< and the throw's id, for titles
+  std::vector<TraceRow> rows;          ///< evenly spaced, from the start to the detach
+  std::vector<ModeSpan> modes;         ///< without those shorter than a nanosecond
+  std::optional<double> open_command;  ///< when the gripper is told to open: zero of the figures' time [s]
+  std::vector<std::pair<double, double>> pressed;  ///< the normal force of a pad as measured: s, N
 };
 
 /// Of a result that was recorded (IntegratorOptions::record) and detached. `patch` gives the limits f_max and
@@ -42,7 +45,7 @@ ReleaseTrace trace_of(const release::ReleaseProblem<double>& problem,
                       const release::ReleaseResult<double>& result, const contact::Patch<double>& patch,
                       int samples = 800);
 
-/// Normal force of the first trace, and the modes of each as a ribbon below it.
+/// Normal force of the first trace with what was measured of it, and the modes of each as a ribbon below it.
 Figure mode_figure(const std::vector<ReleaseTrace>& traces);
 
 /// The wrench in the plane of |f|/f_max and |τ|/τ_max, with the ellipse, the exact disc and the separate

@@ -133,7 +133,7 @@ std::string with_sigma(double value, double sigma, const std::string& unit) {
   const Rounded r = rounded(value, sigma);
   const std::string with_unit = unit.empty() || unit == "-" ? "" : " " + unit;
   if (is_held(value, sigma)) return fmt::format("{}{} (held)", r.value, with_unit);
-  return fmt::format("{} +- {}{}", r.value, r.sigma, with_unit);
+  return fmt::format("{} ± {}{}", r.value, r.sigma, with_unit);
 }
 
 }  // namespace unhand::apps

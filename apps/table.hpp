@@ -31,7 +31,7 @@ struct Rounded {
 Rounded rounded(double value, double sigma);
 /// Whether the sigma is but rounding errors: the value was held, at an end of its range for instance.
 bool is_held(double value, double sigma);
-/// "19.7 +- 1.1 m/s", "1 (held)"; no unit for "-".
+/// "19.7 ± 1.1 m/s", "1 (held)"; no unit for "-".
 std::string with_sigma(double value, double sigma, const std::string& unit);
 /// With so many decimals, and never -0; a dash if it is not known.
 std::string fixed(bool known, double value, int decimals);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "apps/command.hpp"
+#include "apps/table.hpp"
 #include "apps/tell.hpp"
 #include "datasets/near_miss.hpp"
 #include "datasets/summary.hpp"
@@ -63,6 +64,16 @@ datasets::ThrowLog read_throws(const std::string& file) {
   leave_out(log, "do not show the grasp (no motion capture before the gripper opens, no grasp_angle)",
             [&](const auto& one) { return !experiment::shows_grasp(log, one); });
   return log;
+}
+
+std::string origin_text(const datasets::ThrowLog& log) {
+  return log.title + (log.title.empty() || log.source.empty() ? "" : "; ") + log.source;
+}
+
+std::string origin_text(const datasets::SlipLog& log) {
+  const std::string count = plural(log.surfaces.size(), "surface");
+  const std::string first = log.surfaces.empty() ? "" : log.surfaces.begin()->second.description;
+  return first.empty() ? count : fmt::format("{}, the first: {}", count, first);
 }
 
 std::size_t place_of(const datasets::ThrowLog& log, const std::string& id, const std::string& file) {

@@ -16,6 +16,11 @@ namespace unhand::apps {
 /// overlap; Unanswered where it holds no throws.
 datasets::ThrowLog read_throws(const std::string& file);
 
+/// Title and source as the log declares them: "synthetic throws: ...; synthetic: simulated by ...".
+std::string origin_text(const datasets::ThrowLog& log);
+/// Of a slip-log: how many surfaces, and what is said of the first.
+std::string origin_text(const datasets::SlipLog& log);
+
 /// Where the throw of that id is. Throws WrongUsage, naming the nearest id or some of them, if there is none.
 std::size_t place_of(const datasets::ThrowLog& log, const std::string& id, const std::string& file);
 

@@ -108,7 +108,8 @@ Figure sku_budget_figure(const SkuQuestion& question, const SkuValidation& answe
   std::string& s = figure.script;
   s = fmt::format(
       "set multiplot\nunset key\nset style fill solid 0.75 noborder\nset boxwidth 0.6\n"
-      "set label 1 '{}: landing of 1 sigma of each input (share of the variance)' at screen 0.5,{:.4f} "
+      "set label 1 '{}: what 1 sigma of each input does to the landing (share of the variance)' at screen "
+      "0.5,{:.4f} "
       "center\n"
       "set yrange [{}:-0.7]\nset ytics ({}) scale 0\n",
       plain(question.sku.name), 1 - 0.5 / figure.height, static_cast<double>(n) - 0.3, tics);

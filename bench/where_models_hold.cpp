@@ -108,7 +108,7 @@ apps::Figure figure(const std::vector<Cell>& cells) {
   s += "set multiplot\nunset key\nunset grid\nunset colorbox\nset cbrange [-2:2]\n";
   s += "set border 15 linewidth 0.7\nset tics out scale 0.4\n";
   // light where the model holds, dark where it does not, with the step at 1 (log 0): readable in grey
-  s += "set palette defined (-2 '#f7fbff', -1 '#c6dbef', -0.001 '#85bcdb', 0.001 '#d55e00', 1 '#8c2d04', 2 "
+  s += "set palette defined (-2 '#f7fbff', -1 '#c6dbef', 0 '#85bcdb', 0 '#d55e00', 1 '#8c2d04', 2 "
        "'#2b0a00')\n";
   std::string xtics, ytics;
   for (std::size_t i = 0; i < kLevers.size(); ++i)

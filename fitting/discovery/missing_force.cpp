@@ -256,7 +256,7 @@ std::array<double, 3> MissingCandidate::at(const State& state) const {
 std::string MissingCandidate::in_words() const {
   std::string out;
   for (const auto& t : terms)
-    out += fmt::format("{}({:.4g} +- {:.2g}) {} [{}]", out.empty() ? "" : " + ", t.coefficient, t.sigma,
+    out += fmt::format("{}({:.4g} ± {:.2g}) {} [{}]", out.empty() ? "" : " + ", t.coefficient, t.sigma,
                        t.name, t.unit);
   return out;
 }

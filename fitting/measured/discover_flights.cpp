@@ -123,8 +123,8 @@ void weigh_scales(const datasets::ThrowLog& log, const MeasuredOptions& options,
             {effect.id,
              fmt::format("{} throws of {} end at rest on a face: if the floor is at {:.4g} m, its known size "
                          "makes the metric scale "
-                         "{:+.4f} ± {:.4f} (the flights would need {:+.4f} ± {:.4f}; {:.1f} sigma apart). {}",
-                         rest->n, name, options.floor, rest->scale, rest->sigma, apparent, sigma,
+                         "{:.4f} ± {:.4f} (the flights would need {:.4f} ± {:.4f}; {:.1f} sigma apart). {}",
+                         rest->n, name, options.floor, 1 + rest->scale, rest->sigma, 1 + apparent, sigma,
                          std::abs(apart),
                          scaled && enough ? "That is a metric scale, not gravity and not the clock"
                          : scaled         ? "The scale is off, but not by what the flights need"

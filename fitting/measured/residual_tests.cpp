@@ -148,7 +148,7 @@ LeavesNoise leaves_noise(const GroupedProblem& problem, const GroupedFit& fit, d
       if (n < 5) continue;
       const double mean = sum / n, error = std::sqrt(std::max(0.0, squares / n - mean * mean) / (n - 1));
       if (mean < limit || mean < 1 + 3 * error || mean <= out.chi2_per_dof) continue;
-      out = {true, until, problem.channels()[c], mean};
+      out = {true, until, problem.channels()[c], mean, share == kShares.front()};
     }
     if (out.any) break;
   }

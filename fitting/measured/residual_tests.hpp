@@ -41,6 +41,7 @@ struct LeavesNoise {
   double time{};          ///< [s]
   std::string channel;    ///< which channel does
   double chi2_per_dof{};  ///< there; NaN of slips
+  bool at_once{};         ///< in the shortest time that is looked at: earlier cannot be told
 };
 /// See LeavesNoise.
 LeavesNoise leaves_noise(const GroupedProblem& problem, const GroupedFit& fit, double limit, int threads);

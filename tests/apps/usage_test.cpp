@@ -3,6 +3,8 @@
 #include <sys/inotify.h>
 #include <sys/stat.h>
 
+#include <regex>
+
 #include "apps/progress.hpp"
 #include "tests/apps/cli.hpp"
 
@@ -426,11 +428,16 @@ TEST_F(Cli, FigureDrawsWhatIsAskedFor) {
        {"landing_errors", "conditions", "mae", "modes", "wrench", "pivot", "phase", "flight"})
     for (const char* ending : {".png", ".pdf", ".dat", ".gp"})
       EXPECT_TRUE(fs::exists(folder / "f" / (std::string(name) + ending))) << name << ending;
-  EXPECT_THAT(run("figure --help").out, HasSubstr("with _ in the place of - in NAME"));
+  const std::string help = std::regex_replace(run("figure --help").out, std::regex("\\s+"), " ");
+  EXPECT_THAT(help, HasSubstr("with _ in the place of - in NAME"));
   expect_refusal("figure portrait --log " + quick + " --out g", 2, "landing-errors");
   EXPECT_THAT(content(folder / "f/mae.gp"), HasSubstr("over the 4 held-out throws"));
   for (const char* name : {"modes", "wrench", "pivot", "phase", "flight"})
     EXPECT_THAT(content(folder / "f" / (std::string(name) + ".gp")), HasSubstr("throw 001")) << name;
+  const Answer mixed = run("figure modes --log " + quick + " --models gripper_delay,limit_surface --out m");
+  EXPECT_EQ(mixed.code, 0) << mixed.err;
+  EXPECT_THAT(mixed.err, HasSubstr("without modes, left out of the figures of one release: gripper_delay\n"));
+  expect_refusal("figure modes --models gripper_delay --log " + quick + " --out g", 2, "no modes to draw");
   expect_refusal("figure modes --throw 999 --log " + quick + " --out g", 2, "no throw '999' (there are: 001");
   expect_refusal("figure modes --models limit_surfac --log " + quick + " --out g", 2,
                  "did you mean 'limit_surface'?");

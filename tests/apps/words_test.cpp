@@ -15,14 +15,14 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 TEST(Rounded, IsAsFarAsTheSigmaSays) {
-  EXPECT_EQ(with_sigma(0.0500087, 7.2e-5, "m"), "0.050009 +- 0.000072 m");
-  EXPECT_EQ(with_sigma(19.7109, 1.1, "1/m"), "19.7 +- 1.1 1/m");
-  EXPECT_EQ(with_sigma(0.982122, 2e-4, "-"), "0.98212 +- 0.00020");
-  EXPECT_EQ(with_sigma(-1.2345, 0.0996, ""), "-1.23 +- 0.10") << "the sigma is rounded first";
-  EXPECT_EQ(with_sigma(123456, 2345, "N"), "123500 +- 2300 N");
-  EXPECT_EQ(with_sigma(0.5, 300, "-"), "0 +- 300");
-  EXPECT_EQ(with_sigma(1.234567e-12, 4.56e-14, "m"), "1.235e-12 +- 4.6e-14 m");
-  EXPECT_EQ(with_sigma(0.25, INFINITY, "-"), "0.25 +- inf");
+  EXPECT_EQ(with_sigma(0.0500087, 7.2e-5, "m"), "0.050009 ± 0.000072 m");
+  EXPECT_EQ(with_sigma(19.7109, 1.1, "1/m"), "19.7 ± 1.1 1/m");
+  EXPECT_EQ(with_sigma(0.982122, 2e-4, "-"), "0.98212 ± 0.00020");
+  EXPECT_EQ(with_sigma(-1.2345, 0.0996, ""), "-1.23 ± 0.10") << "the sigma is rounded first";
+  EXPECT_EQ(with_sigma(123456, 2345, "N"), "123500 ± 2300 N");
+  EXPECT_EQ(with_sigma(0.5, 300, "-"), "0 ± 300");
+  EXPECT_EQ(with_sigma(1.234567e-12, 4.56e-14, "m"), "1.235e-12 ± 4.6e-14 m");
+  EXPECT_EQ(with_sigma(0.25, INFINITY, "-"), "0.25 ± inf");
   EXPECT_EQ(with_sigma(0.25, 0, "-"), "0.25 (held)");
   EXPECT_EQ(with_sigma(1, 1e-16, "m"), "1 m (held)") << "a sigma of rounding errors is none";
 }
