@@ -103,7 +103,8 @@ PredictedLandings by_delay(const std::string& name, const ThrowAnswer& a,
 
 PredictedLandings by_release(const std::string& name, const ThrowAnswer& a,
                              const planners::ReleaseThrow& release, const PlanThrowOptions& options) {
-  PredictedLandings out{name, planners::draw_landings(release, options.draws, options.seed), 0};
+  const planners::HeldMotion before(release, a.plan.motion);
+  PredictedLandings out{name, planners::draw_landings(release, options.draws, options.seed, &before), 0};
   const planners::ThrowPlane plane(planners::forward_kinematics(release.chain, release.start.q).p,
                                    release.target);
   for (const double miss : out.drawn.miss)
@@ -161,9 +162,14 @@ void plan_release(ThrowAnswer& a, planners::ReleaseThrow release, const planners
   a.rigid = planners::rigid_landing(release, release.object.com_offset.value, a.real->detach_time);
   a.spread_before = planners::release_spread(release);
   a.predicted.push_back(by_release("tube acceleration", a, release, options));
-  auto robust = planners::plan_robust_throw(release, how);
+  const auto tell_needed = [&] {
+    a.needed_force = planners::HeldMotion(release, a.plan.motion).needed_force();
+  };
+  std::string reason;
+  auto robust = planners::plan_robust_throw(release, how, &reason);
   if (!robust) {
-    tell("unhand: no motion to the insensitive throw stays within the limits; the tube's is kept\n");
+    tell("unhand: of the motions to the insensitive throw none will do ({}); the tube's is kept\n", reason);
+    tell_needed();
     return;
   }
   a.plan.motion = std::move(robust->motion);
@@ -179,7 +185,34 @@ void plan_release(ThrowAnswer& a, planners::ReleaseThrow release, const planners
   a.plan.at_rest = landings(planners::JointVector<double>::Zero(release.chain.size()));
   a.spread_after = planners::release_spread(release);
   a.predicted.insert(a.predicted.begin(), by_release("insensitive motion", a, release, options));
+  tell_needed();
 }
+
+/// Motions over which the grip does not hold its object.
+struct DroppingMotions {
+  int count{};
+  std::optional<double> least_force;  ///< of one pad, that would hold over the gentlest of them [N]
+
+  /// As planners::PlanOptions::refuse.
+  std::string look(const planners::ReleaseThrow& release, const planners::JointTrajectory& motion) {
+    const planners::HeldMotion held(release, motion);
+    if (held.holds(planners::nominal_draw(release))) return "";
+    ++count;
+    if (const auto needed = held.needed_force())
+      least_force = std::min(*needed, least_force.value_or(*needed));
+    return "the grip does not hold the object";
+  }
+  std::string in_words(const planners::ReleaseCard& card) const {
+    std::string out = fmt::format(
+        "a grip of {:.4g} N per pad lets the object slip before the gripper opens in {} of the motions "
+        "within "
+        "the limits",
+        card.grip_force, count);
+    if (least_force)
+      out += fmt::format("; the gentlest of them needs at least {:.3g} N per pad", *least_force);
+    return out;
+  }
+};
 
 void plan_throw(const PlanThrowOptions& options) {
   require_outputs({{options.json}, {options.report, Wanted::directory}},
@@ -211,19 +244,30 @@ void plan_throw(const PlanThrowOptions& options) {
   answer.chain = planners::with_tool(pads, {Eigen::Matrix3d::Identity(), {0, 0, object.com_offset.value}});
   auto how = plan_options(options, pads, options.planar || card.has_value());
   how.search.window = answer.window = std::max(options.window, card ? planners::window_for(*card) : 0.0);
-  std::optional<Progress> progress(std::in_place, "plan throw", 0);
-  auto result = planners::plan_throw(answer.chain, answer.box, how);
-  if (!result.plan) throw Unanswered(fmt::format("{}: {}", to_string(result.outcome), result.reason));
-  answer.plan = std::move(*result.plan);
-  answer.medium = how.search.medium;
-  if (card) {
-    planners::ReleaseThrow release{pads, answer.plan.nominal.state, answer.plan.qdd, answer.box.middle};
+  const auto release_of = [&](const planners::ThrowPlan& plan) {
+    planners::ReleaseThrow release{pads, plan.nominal.state, plan.qdd, answer.box.middle};
     release.hold = answer.window + 1e-6;
     release.card = *card;
     release.object = object;
-    release.medium = answer.medium;
+    release.medium = how.search.medium;
+    return release;
+  };
+  DroppingMotions dropping;
+  if (card)
+    how.refuse = [&](const planners::ThrowPlan& plan) {
+      return dropping.look(release_of(plan), plan.motion);
+    };
+  std::optional<Progress> progress(std::in_place, "plan throw", 0);
+  auto result = planners::plan_throw(answer.chain, answer.box, how);
+  if (!result.plan)
+    throw Unanswered(fmt::format("{}: {}", to_string(result.outcome),
+                                 dropping.count > 0 ? dropping.in_words(*card) : result.reason));
+  if (dropping.count > 0) tell("note: passed over for another: {}\n", dropping.in_words(*card));
+  answer.plan = std::move(*result.plan);
+  answer.medium = how.search.medium;
+  if (card) {
     answer.numbers = numbers_of(*card, object, given);
-    plan_release(answer, release, how, options);
+    plan_release(answer, release_of(answer.plan), how, options);
   } else {
     answer.predicted = {
         by_delay("planned", answer, answer.plan.qdd, options),

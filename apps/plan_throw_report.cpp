@@ -106,6 +106,9 @@ std::string text_of(const ThrowAnswer& a) {
                               one.sigma > 0 ? fmt::format("{:.2g}", one.sigma) : "-", one.from});
     out += "\n" + numbers.text();
   }
+  if (a.needed_force)
+    out += fmt::format("\nuntil the command to open the grip needs at least {:.3g} N per pad\n",
+                       *a.needed_force);
   if (!a.with_release && std::abs(a.lever) > fitting::kLeastLever)
     out += fmt::format(
         "\nnote: without a card the object is taken as carried rigidly until it leaves; this one hangs "
@@ -149,6 +152,7 @@ Json json_of(const ThrowAnswer& a) {
     numbers[one.name] = {{"value", one.value}, {"sigma", one.sigma}, {"unit", one.unit}, {"from", one.from}};
   if (a.with_release)
     out["release"] = {{"numbers", numbers},
+                      {"needed_grip_force_N", a.needed_force ? Json(*a.needed_force) : Json(nullptr)},
                       {"carried_rigidly", landing_json(a.rigid)},
                       {"contact_model", landing_json(a.real)},
                       {"before", spread_json(a.spread_before)},

@@ -10,6 +10,7 @@
 
 #include "contact/registry.hpp"
 #include "flight/fly.hpp"
+#include "planners/tube/held_motion.hpp"
 #include "planners/tube/planar_hand.hpp"
 #include "planners/tube/require.hpp"
 #include "release/simulate_release.hpp"
@@ -146,8 +147,7 @@ class CardReader {
 
 ReleaseCard release_card(const datasets::ModelCard& card, const std::string& file,
                          const ReleaseCard& otherwise) {
-  if (!contact::follows_pads(card.model) || card.model == "limit_surface_naive" ||
-      card.model == "projectile")
+  if (!contact::follows_pads(card.model) || card.model == "limit_surface_naive" || card.model == "projectile")
     throw CardError(file, "/model", fmt::format("'{}' does not say how the pads let go", card.model));
   if (!card.effects.empty())
     throw CardError(file, "/effects",
@@ -219,6 +219,7 @@ template <class S>
 struct Thrown {
   S miss{}, detach_time{};
   double angle{}, speed{};
+  bool slips_at_start{};
 };
 
 /// Which quantity carries derivatives is the caller's: hand, draw, or none.
@@ -249,9 +250,9 @@ std::optional<Thrown<S>> throw_once(const ReleaseThrow& p, const release::HandMo
   const auto flown = flight::fly(flight);
   if (flown.outcome != flight::FlightOutcome::landed) return {};
   const auto& twist = let_go.detach.twist;
-  return Thrown<S>{flown.landing.pose.x, let_go.detach.time,
-                   dynamics::value_of(let_go.relative.angle - draw[kGraspAngle]),
-                   std::hypot(dynamics::value_of(twist.vx), dynamics::value_of(twist.vz))};
+  return Thrown<S>{
+      flown.landing.pose.x, let_go.detach.time, dynamics::value_of(let_go.relative.angle - draw[kGraspAngle]),
+      std::hypot(dynamics::value_of(twist.vx), dynamics::value_of(twist.vz)), let_go.slips_at_start};
 }
 
 JointVector<Dual> constant(const JointVector<double>& x) { return x.cast<Dual>(); }
@@ -336,7 +337,7 @@ double drawn(const Uncertain& one, bool may_be_negative, Normal&& normal) {
 
 }  // namespace
 
-Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t seed) {
+Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t seed, const HeldMotion* before) {
   validate(problem);
   require(count >= 1, "draw_landings", "count", count, "[1, inf)");
   const auto unknowns = unknowns_of(problem);
@@ -348,7 +349,9 @@ Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t see
     Draw draw{};
     for (int k = 0; k < kUnknowns; ++k)
       draw[k] = drawn(unknowns[k], has_sign(k), [&] { return normal(random); });
-    if (const auto thrown = throw_once<double>(problem, hand, draw))
+    const bool held = before == nullptr || before->holds(draw);
+    const auto thrown = held ? throw_once<double>(problem, hand, draw) : std::nullopt;
+    if (thrown && !thrown->slips_at_start)
       out.miss.push_back(thrown->miss);
     else
       ++out.lost;

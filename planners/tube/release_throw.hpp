@@ -97,8 +97,8 @@ struct ReleaseThrow {
   flight::Medium medium{};  ///< of the flight
 };
 
-/// Throws std::invalid_argument, naming value and accepted range: one finite number per joint, hold > 0, every
-/// sigma >= 0, what is thrown and what holds it > 0. All functions below that take a throw check it.
+/// Throws std::invalid_argument, naming value and accepted range: one finite number per joint, hold > 0,
+/// every sigma >= 0, what is thrown and what holds it > 0. All functions below that take a throw check it.
 void validate(const ReleaseThrow& problem);
 
 /// One landing, and the release before it.
@@ -126,17 +126,21 @@ struct ReleaseSpread {
 /// Nothing where the nominal throw does not land.
 std::optional<ReleaseSpread> release_spread(const ReleaseThrow& problem);
 
+class HeldMotion;
+
 /// Landings of `count` draws from normal distributions (cut off at zero where the number must be positive).
 /// An unknown without σ takes no draw.
 struct Landings {
   std::vector<double> miss;  ///< of those that land [m]
-  int lost{};                ///< not free in time, or never down
+  int lost{};                ///< slipping before the gripper opens, not free in time, or never down
   double mean{}, std{};      ///< of those that land [m]
 };
 /// Mean and standard deviation of what landed.
 void summarise(Landings& landings);
-/// Equal seeds give equal draws; count >= 1.
-Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t seed);
+/// Equal seeds give equal draws; count >= 1. Draws that slip at t = 0 are lost and, where `before` tells the
+/// motion up to there, those that slip on the way.
+Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t seed,
+                       const HeldMotion* before = nullptr);
 
 /// How the search for an insensitive throw runs.
 struct InsensitiveOptions {
