@@ -33,7 +33,8 @@ using planners::Chain;
 struct PlanThrowOptions {
   std::string arm{"panda"}, tip, target, box{"0.15x0.15"}, card, sku, json, report;
   double acceleration{0}, jerk{0};  // 0: the file gives them
-  double window{0.1}, drag{0}, gripper{0.15}, gripper_mass{0.9};
+  std::optional<double> drag;       // nothing: the SKU tells it, else 0
+  double window{0.1}, gripper{0.15}, gripper_mass{0.9};
   int draws{1000}, samples{3000}, threads{0};
   std::uint64_t seed{1};
   bool planar{false}, plain{false};
@@ -55,8 +56,8 @@ void fill_limits(Chain& arm, const PlanThrowOptions& options) {
     }
 }
 
-/// The arm with its gripper.
-Chain armed(const PlanThrowOptions& options) {
+/// The arm with its gripper and, where an SKU tells of it, the object in it.
+Chain armed(const PlanThrowOptions& options, const std::optional<datasets::Sku>& sku) {
   Chain arm;
   try {
     arm = planners::read_chain(options.arm, options.tip);
@@ -65,13 +66,18 @@ Chain armed(const PlanThrowOptions& options) {
   }
   for (const auto& note : arm.notes) tell("note: {}: {}\n", options.arm, note);
   fill_limits(arm, options);
-  return planners::with_gripper(arm, options.gripper, options.gripper_mass);
+  arm = planners::with_gripper(arm, options.gripper, options.gripper_mass);
+  if (!sku) return arm;
+  const double about_its_axis = 0.1 * *sku->inertia;  // which the arm does not turn in planar throws
+  return planners::with_payload(arm,
+                                {sku->mass,
+                                 {0, 0, sku->com_offset},
+                                 planners::symmetric(*sku->inertia, *sku->inertia, about_its_axis, 0, 0, 0)});
 }
 
 planners::PlanOptions plan_options(const PlanThrowOptions& options, const Chain& arm, bool planar) {
   planners::PlanOptions out;
   out.search.window = options.window;
-  out.search.medium.drag_k = options.drag;
   out.search.samples = options.samples;
   out.search.threads = options.threads;
   out.refine = !options.plain;
@@ -188,6 +194,15 @@ void plan_release(ThrowAnswer& a, planners::ReleaseThrow release, const planners
   tell_needed();
 }
 
+/// --drag, else the SKU's [1/m].
+double drag_of(ThrowAnswer& a, const PlanThrowOptions& options, const std::optional<datasets::Sku>& sku) {
+  const std::optional<double> told = sku ? sku->drag_k : std::nullopt;
+  a.drag_from = options.drag ? "--drag" : "SKU";
+  if (options.drag && told && *options.drag != *told)
+    tell("note: --drag {:g} is taken, not drag_k_per_m = {:g} of {}\n", *options.drag, *told, options.sku);
+  return options.drag ? *options.drag : told.value_or(0);
+}
+
 /// Motions over which the grip does not hold its object.
 struct DroppingMotions {
   int count{};
@@ -224,7 +239,6 @@ void plan_throw(const PlanThrowOptions& options) {
   ThrowAnswer answer;
   answer.box = {{target[0], target[1], target[2]}, box[0], box[1]};
   answer.window = options.window;
-  const Chain pads = armed(options);
 
   std::optional<planners::ReleaseCard> card;
   planners::HeldObject object;
@@ -241,8 +255,10 @@ void plan_throw(const PlanThrowOptions& options) {
     object.mass = sku.mass, object.inertia = *sku.inertia;
     object.com_offset = {sku.com_offset, sku.com_offset_sigma.value_or(com_sigma)};
   }
+  const Chain pads = armed(options, given);
   answer.chain = planners::with_tool(pads, {Eigen::Matrix3d::Identity(), {0, 0, object.com_offset.value}});
   auto how = plan_options(options, pads, options.planar || card.has_value());
+  how.search.medium.drag_k = drag_of(answer, options, given);
   how.search.window = answer.window = std::max(options.window, card ? planners::window_for(*card) : 0.0);
   const auto release_of = [&](const planners::ThrowPlan& plan) {
     planners::ReleaseThrow release{pads, plan.nominal.state, plan.qdd, answer.box.middle};
@@ -304,13 +320,19 @@ Command plan_throw_command(Parser& plan) {
   parser.option("--gripper", o->gripper, "From the flange to the middle of the pads [m]")
       .range(0.0, 1.0)
       .with_default();
-  parser.option("--gripper-mass", o->gripper_mass, "Gripper and object [kg]").range(0.0, 10.0).with_default();
+  parser.option("--gripper-mass", o->gripper_mass, "Gripper [kg]; without --sku, gripper and object")
+      .range(0.0, 10.0)
+      .with_default();
   parser.option("--window", o->window, "The object may leave at any time up to this after the command [s]")
       .range(0.01, 0.5)
       .with_default();
-  parser.option("--drag", o->drag, "Quadratic drag of the flight, k in a = -k |v| v [1/m]").range(0.0, 10.0);
+  parser
+      .option("--drag", o->drag,
+              "Quadratic drag of the flight, k in a = -k |v| v [1/m]; else that of the SKU")
+      .range(0.0, 10.0);
   parser.option("--card", o->card, "A model card: the release follows its contact model (planar throws)");
-  parser.option("--sku", o->sku, "The object: mass, inertia, offset of its centre of mass from the pads");
+  parser.option("--sku", o->sku,
+                "The object: mass, inertia, drag, offset of its centre of mass from the pads");
   parser.flag("--planar", o->planar, "Throw in the vertical plane of the target");
   parser.flag("--tube-cvx", o->plain, "Stop at the convex problem, without refinement");
   parser.option("--samples", o->samples, "Configurations searched").range(1, 1000000).with_default();

@@ -25,6 +25,7 @@ struct ThrowAnswer {
   planners::ThrowPlan plan;
   double window{};        ///< for which q̈ is held [s]
   flight::Medium medium;  ///< of the flight
+  std::string drag_from;  ///< who told its drag
   /// A number that the release rests on, and who told it and its σ.
   struct Number {
     std::string name, unit;  ///< "-" where it has none

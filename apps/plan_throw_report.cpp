@@ -106,6 +106,8 @@ std::string text_of(const ThrowAnswer& a) {
                               one.sigma > 0 ? fmt::format("{:.2g}", one.sigma) : "-", one.from});
     out += "\n" + numbers.text();
   }
+  if (a.medium.drag_k > 0)
+    out += fmt::format("\nthe flight has a drag of {:g} 1/m ({})\n", a.medium.drag_k, a.drag_from);
   if (a.needed_force)
     out += fmt::format("\nuntil the command to open the grip needs at least {:.3g} N per pad\n",
                        *a.needed_force);
@@ -130,6 +132,7 @@ Json json_of(const ThrowAnswer& a) {
   out["target_m"] = {a.box.middle.x(), a.box.middle.y(), a.box.middle.z()};
   out["box_m"] = {a.box.length_x, a.box.length_y};
   out["window_s"] = a.window;
+  out["drag_k_per_m"] = a.medium.drag_k;
   out["margin"] = {{"least", plan.nominal.margin},
                    {"speed", plan.nominal.speed_margin},
                    {"position", plan.nominal.position_margin},

@@ -85,6 +85,35 @@ TEST_F(Cli, DrawsTheFlightsOfAThrowWithTheirDrag) {
   EXPECT_NEAR(std::stod(last_row(data, "flight from 0.100 s, no")), landings.back().get<double>(), 1e-6);
 }
 
+// The object weighs on the arm and flies through the air.
+TEST_F(Cli, PlansAThrowWithTheMassAndTheDragOfItsSku) {
+  const auto bar = [&](const std::string& file, const std::string& mass, const std::string& more) {
+    std::ofstream(folder / file) << "name='bar'\nsurface='paper'\ncom_offset_m=0.1\ninertia_kg_m2=0.0012\n"
+                                 << "mass_kg=" << mass << "\n"
+                                 << more;
+  };
+  bar("bar.toml", "0.246", "");
+  bar("heavy.toml", "8", "");
+  bar("blunt.toml", "0.246", "drag_k_per_m=0.3\n");
+  const std::string plan = "plan throw --target 1.3,0,-0.2 --samples 200 --draws 20 --planar --json p.json ";
+  const auto planned = [&](const std::string& options) {
+    const Answer answer = run(plan + options);
+    EXPECT_EQ(answer.code, 0) << answer.err;
+    return std::pair{nlohmann::json::parse(content(folder / "p.json")), answer};
+  };
+  const auto bare = planned("").first, light = planned("--sku bar.toml").first;
+  EXPECT_GT(light["limits"]["torque"]["fraction"], bare["limits"]["torque"]["fraction"]);
+  expect_refusal(plan + "--sku heavy.toml", 1, "torque of panda_joint");
+  const auto [blunt, told] = planned("--sku blunt.toml");
+  EXPECT_EQ(blunt["drag_k_per_m"], 0.3);
+  EXPECT_THAT(told.out, HasSubstr("a drag of 0.3 1/m (SKU)"));
+  EXPECT_EQ(blunt["qd0_rad_s"], planned("--sku bar.toml --drag 0.3").first["qd0_rad_s"]);
+  EXPECT_NE(blunt["qd0_rad_s"], light["qd0_rad_s"]);
+  const auto [other, noted] = planned("--sku blunt.toml --drag 0.1");
+  EXPECT_EQ(other["drag_k_per_m"], 0.1);
+  EXPECT_THAT(noted.err, HasSubstr("--drag 0.1 is taken, not drag_k_per_m = 0.3 of blunt.toml"));
+}
+
 TEST_F(Cli, PlansAThrowWithACard) {
   ASSERT_EQ(run("compare " + quick + " --models sliding_pivot --write-cards cards").code, 0);
   std::ofstream(folder / "bar.toml") << "name='bar'\nsurface='paper'\nmass_kg=0.246\ncom_offset_m=0.14\n"
