@@ -136,8 +136,8 @@ struct SkuValidation {
 
 /// The landing of the nominal throw and how it scatters, to first order by exact derivatives,
 ///   Σ_y = J A Σ_p Aᵀ Jᵀ,  J = ∂(landing)/∂(values), A = ∂(values)/∂(inputs),
-/// and by Monte Carlo of normal inputs p; the same draws go through both. Draws at which a value leaves its
-/// range are drawn again.
+/// and by Monte Carlo of normal inputs p (log-normal ones where UncertainInput says so); the same draws go
+/// through both. Draws at which a value leaves its range are drawn again.
 ///
 /// The motion is a logged one with this object in the hand or, without a log, experiment::reference_throw.
 /// How well a robot repeats its motion is not in it, nor what the model lacks: the card's errors on held-out
