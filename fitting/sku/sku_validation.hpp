@@ -99,12 +99,15 @@ inline constexpr double kMostSurprise = 2;
 
 /// Throws of this object, set against what the SKU and the card say of them.
 struct MeasuredVerdict {
-  std::vector<MeasuredLanding> throws;  ///< one per throw with a landing
-  double within{};                      ///< share that lands within the tolerance of its prediction
-  double mae_x{}, mae_theta{};          ///< [m, rad]
-  double bias_x{}, bias_theta{};        ///< mean of predicted − measured [m, rad]
-  double rms_z{};    ///< errors in their own σ; 1 where the prediction knows how sure it is
-  bool confirmed{};  ///< within >= confidence, and rms_z <= kMostSurprise
+  std::vector<MeasuredLanding> throws;  ///< one per throw with a landing and a prediction of it
+  int never_lands{};  ///< further ones of which the card says that they never land: not within
+  /// The log is the card's own: the throws are those that it was not fitted to.
+  bool held_out{};
+  double within{};                ///< share that lands within the tolerance of its prediction
+  double mae_x{}, mae_theta{};    ///< [m, rad]
+  double bias_x{}, bias_theta{};  ///< mean of predicted − measured [m, rad]
+  double rms_z{};                 ///< errors in their own σ; 1 where the prediction knows how sure it is
+  bool confirmed{};               ///< within >= confidence, and rms_z <= kMostSurprise
 };
 
 /// Whether an object can be thrown, how surely, and why.

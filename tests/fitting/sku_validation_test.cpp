@@ -193,7 +193,7 @@ TEST(SkuValidation, FrictionAndForceScatterAsTheirProductDoes) {
       {force * force, 0, rho * mu * force, 0, length * length, 0, rho * mu * force, 0, mu * mu}};
   const auto a = validate_sku(bar(), known, "card.json", quick(1000)),
              b = validate_sku(bar(), ridge, "card.json", quick(1000));
-  EXPECT_NEAR(b.linear.theta / a.linear.theta, 1, 1e-3);
+  EXPECT_NEAR(b.linear.theta / a.linear.theta, 1, 0.02);
   EXPECT_EQ(a.lost, b.lost);
   // Two samples of 1000: a sigma is known to 2.2 %; four of √2 of these.
   EXPECT_NEAR(b.monte_carlo.x / a.monte_carlo.x, 1, 0.13);
@@ -277,8 +277,44 @@ TEST(SkuValidation, MeasuredThrowsConfirmTheRightSkuAndContradictAWrongOne) {
   EXPECT_EQ(answer.verdict, SkuVerdict::contradicted) << answer.message;
   EXPECT_THAT(answer.message, HasSubstr("measured throws"));
 
+  // So far beyond the pads that the card lets go of it before the throw: measured landings that are foretold
+  // not to be count against it.
+  auto far = bar();
+  far.com_offset = 1.9;
+  const auto never = validate_sku(far, gripper, "card.json", request);
+  ASSERT_TRUE(never.measured);
+  EXPECT_EQ(never.measured->throws.size() + static_cast<std::size_t>(never.measured->never_lands),
+            log.throws.size());
+  EXPECT_FALSE(never.measured->confirmed);
+
   request.condition = "no such";
   EXPECT_THROW(validate_sku(bar(), gripper, "card.json", request), std::invalid_argument);
+}
+
+// Throws that a card was fitted to say nothing of how well it foretells.
+TEST(SkuValidation, ItsOwnLogConfirmsACardByTheHeldOutThrowsAlone) {
+  auto design = testing_support::small_design("limit_surface_disc");
+  design.objects = {experiment::loaded_bar("bar-com100", 0.10)};
+  const auto log = experiment::generate_campaign(design, 5);
+  const auto file = std::filesystem::temp_directory_path() / "unhand_sku_own_log.h5";
+  datasets::write_throw_log(file, log);
+  auto gripper = card();
+  auto request = quick(100);
+  request.log = &log;
+  request.log_file = file.string();
+  const auto test =
+      static_cast<std::size_t>(std::count_if(log.throws.begin(), log.throws.end(), [](const auto& one) {
+        return one.split == datasets::Split::test;
+      }));
+  const auto other = validate_sku(bar(), gripper, "card.json", request);
+  gripper.log.checksum = checksum_of(file);
+  const auto own = validate_sku(bar(), gripper, "card.json", request);
+  std::filesystem::remove(file);
+  ASSERT_TRUE(other.measured);
+  EXPECT_EQ(other.measured->throws.size(), log.throws.size());
+  EXPECT_FALSE(other.measured->held_out);
+  EXPECT_THAT(own.notes, Contains(HasSubstr("the log is the card's own")));
+  EXPECT_EQ(own.measured ? own.measured->throws.size() : 0, test);
 }
 
 TEST(SkuValidation, EveryObjectOfTheCatalogueIsAnswered) {
