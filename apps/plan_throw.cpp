@@ -19,6 +19,7 @@
 #include "contact/registry.hpp"
 #include "datasets/model_card.hpp"
 #include "datasets/sku.hpp"
+#include "fitting/card.hpp"
 #include "fitting/sku/sku_inputs.hpp"
 #include "planners/arm/chain_file.hpp"
 #include "planners/arm/panda.hpp"
@@ -29,6 +30,7 @@ namespace unhand::apps {
 namespace {
 
 using planners::Chain;
+using planners::JointVector;
 
 struct PlanThrowOptions {
   std::string arm{"panda"}, tip, target, box{"0.15x0.15"}, card, sku, json, report;
@@ -194,6 +196,23 @@ void plan_release(ThrowAnswer& a, planners::ReleaseThrow release, const planners
   tell_needed();
 }
 
+/// Where the plan is beyond what its card was tried on.
+std::vector<std::string> beyond(const datasets::ModelCard& card, const ThrowAnswer& a,
+                                const planners::Chain& pads, const planners::HeldObject& object,
+                                const std::optional<datasets::Sku>& sku) {
+  const auto tip = planners::tip_motion<double>(pads, a.plan.nominal.state.q, a.plan.nominal.state.qd,
+                                                JointVector<double>::Zero(pads.size()));
+  const planners::ThrowPlane plane(tip.frame.p, a.box.middle);
+  const double omega = tip.omega.dot(Eigen::Vector3d(plane.along.y(), -plane.along.x(), 0));
+  auto out = fitting::outside_range(card, {{"mass", "kg", object.mass},
+                                           {"com_offset", "m", object.com_offset.value},
+                                           {"release_speed", "m/s", tip.velocity.norm()},
+                                           {"release_omega", "rad/s", omega}});
+  if (sku)
+    if (const auto surface = fitting::untried_surface(card, sku->surface)) out.push_back(*surface);
+  return fitting::reasons_of(out);
+}
+
 /// --drag, else the SKU's [1/m].
 double drag_of(ThrowAnswer& a, const PlanThrowOptions& options, const std::optional<datasets::Sku>& sku) {
   const std::optional<double> told = sku ? sku->drag_k : std::nullopt;
@@ -234,6 +253,10 @@ void plan_throw(const PlanThrowOptions& options) {
                   {options.arm, options.card, options.sku});
   if (!options.report.empty()) require_gnuplot();
   const auto target = numbers<3>("--target", options.target, ',');
+  constexpr double kFarthest = 1000;  // m
+  for (const double one : target)
+    if (!(std::abs(one) <= kFarthest))
+      throw WrongUsage(fmt::format("--target: {:g} m is not in [{:g}, {:g}] m", one, -kFarthest, kFarthest));
   const auto box = numbers<2>("--box", options.box, 'x');
   if (!(box[0] > 0 && box[1] > 0)) throw WrongUsage(fmt::format("--box: '{}' has no area", options.box));
   ThrowAnswer answer;
@@ -244,8 +267,11 @@ void plan_throw(const PlanThrowOptions& options) {
   planners::HeldObject object;
   const double com_sigma = fitting::AssumedTolerances{}.com_offset;  // as validate-sku assumes
   object.com_offset = {0, com_sigma};
-  if (!options.card.empty())
-    card = planners::release_card(datasets::read_model_card(options.card), options.card);
+  datasets::ModelCard read;
+  if (!options.card.empty()) {
+    read = datasets::read_model_card(options.card);
+    card = planners::release_card(read, options.card);
+  }
   std::optional<datasets::Sku> given;
   if (!options.sku.empty()) {
     const auto& sku = given.emplace(read_possible_sku(options.sku));
@@ -283,7 +309,11 @@ void plan_throw(const PlanThrowOptions& options) {
   answer.medium = how.search.medium;
   if (card) {
     answer.numbers = numbers_of(*card, object, given);
+    answer.passed_over = card->passed_over;
+    if (given && given->mass_sigma.value_or(0) > 0) answer.passed_over.emplace_back("mass");
+    if (given && given->inertia_sigma.value_or(0) > 0) answer.passed_over.emplace_back("inertia");
     plan_release(answer, release_of(answer.plan), how, options);
+    answer.beyond_card = beyond(read, answer, pads, object, given);
   } else {
     answer.predicted = {
         by_delay("planned", answer, answer.plan.qdd, options),

@@ -47,6 +47,7 @@ struct ReleaseCard {
   double grasp_offset{};  ///< 1 σ of the place of the pads on the object, throw to throw [m]
   double grasp_angle{};   ///< 1 σ of the object's angle in the hand, throw to throw [rad]
   std::map<std::string, NumberOrigin> origins{};  ///< by a number's name on cards; assumed if absent
+  std::vector<std::string> passed_over{};         ///< names of numbers whose σ no unknown of the throw has
 };
 
 /// The least that a gripper's numbers scatter where a card's valid range tells them, 1 σ.
@@ -158,6 +159,8 @@ struct InsensitiveResult {
   JointVector<double> qdd;   ///< q̈ as chosen [rad/s²]
   double before{}, after{};  ///< root mean square miss over the unknowns' spread [m]
   int iterations{};          ///< taken
+  /// The unknown of which a draw within its spread does not land; then nothing was minimised. Empty: none.
+  std::string lost{};
 };
 
 /// Chooses q̇₀ and q̈ so that landings miss least over the card's and the grasp's uncertainty: minimises

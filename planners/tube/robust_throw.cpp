@@ -21,6 +21,13 @@ std::optional<RobustThrow> plan_robust_throw(const ReleaseThrow& problem, const 
     if (std::abs(problem.start.qd[i]) > 1e-9) insensitive.joints.push_back(i);
   RobustThrow out;
   out.choice = make_insensitive(problem, insensitive);
+  if (!out.choice.lost.empty()) {
+    if (reason != nullptr)
+      *reason =
+          fmt::format("a draw of {} within its spread does not land, so that no spread can be minimised",
+                      out.choice.lost);
+    return {};
+  }
   const JointVector<double> home = options.home.size() == 0 ? middle_of(problem.chain) : options.home;
   MotionOptions motion = options.motion;
   motion.window = problem.hold;

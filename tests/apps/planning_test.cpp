@@ -20,6 +20,7 @@ TEST_F(Cli, PlansAThrowIntoABox) {
     EXPECT_TRUE(fs::exists(folder / "out" / file)) << file;
 
   expect_refusal("plan throw --target 1.3,0", 2, "--target: '1.3,0' is not 3 numbers with ',' between");
+  expect_refusal("plan throw --target 1e300,0,0", 2, "--target: 1e+300 m is not in [-1000, 1000] m");
   expect_refusal("plan throw --target 1.3,0,0 --box 0x1", 2, "--box: '0x1' has no area");
   expect_refusal("plan throw --target 1.3,0,0 --arm kuka", 2,
                  "'kuka' is not panda, a .toml file or a .urdf file");
@@ -95,7 +96,7 @@ TEST_F(Cli, PlansAThrowWithTheMassAndTheDragOfItsSku) {
   bar("bar.toml", "0.246", "");
   bar("heavy.toml", "8", "");
   bar("blunt.toml", "0.246", "drag_k_per_m=0.3\n");
-  const std::string plan = "plan throw --target 1.3,0,-0.2 --samples 200 --draws 20 --planar --json p.json ";
+  const std::string plan = "plan throw --target 1.3,0,-0.2 --samples 80 --draws 20 --planar --json p.json ";
   const auto planned = [&](const std::string& options) {
     const Answer answer = run(plan + options);
     EXPECT_EQ(answer.code, 0) << answer.err;
@@ -143,6 +144,8 @@ TEST_F(Cli, PlansAThrowWithACard) {
   EXPECT_EQ(numbers["mu"]["from"], "card; sigma: assumed and card");
   EXPECT_EQ(numbers["mass"]["from"], "SKU");
   EXPECT_THAT(answer.out, HasSubstr("card's range"));
+  EXPECT_THAT(answer.out, HasSubstr("Beyond the card: surface 'paper'"));
+  EXPECT_THAT(plan["release"]["outside_valid_range"].dump(), HasSubstr("com_offset 0.14 m"));
   EXPECT_THAT(answer.out, HasSubstr("assumed"));
 }
 

@@ -276,6 +276,33 @@ TEST(RobustThrow, StaysAboveItsBase) {
   EXPECT_NEAR(robust->limits.lowest, lowest, 0.1);
 }
 
+TEST(RobustThrow, SaysWhyThereIsNothingToMinimise) {
+  BarThrow bar;
+  const auto tube = bar.plan();
+  ASSERT_TRUE(tube.plan) << tube.reason;
+  ReleaseThrow p = bar.release(*tube.plan);
+  p.card.dead_time.sigma = 0.2;  // longer than the motion goes on
+  std::string reason;
+  EXPECT_FALSE(plan_robust_throw(p, bar.options, &reason));
+  EXPECT_THAT(reason, testing::HasSubstr("a draw of dead_time within its spread does not land"));
+}
+
+// Friction known to no better than its own size and more: draws stay within what pads may have.
+TEST(ReleaseThrow, DrawsFrictionThatPadsMayHave) {
+  const Chain arm = pads();
+  ReleaseThrow p = swing(arm);
+  p.card.mu.sigma = 20;
+  EXPECT_NO_THROW(draw_landings(p, 50, 1));
+  EXPECT_NO_THROW(make_insensitive(p, {{1, 3, 5}, 1}));
+}
+
+TEST(ReleaseCard, NamesTheSigmasThatItPassesOver) {
+  datasets::ModelCard card;
+  card.model = "sliding_pivot";
+  card.parameters = {{"mu", {0.6, 0.03, "-"}}, {"length", {0.008, 1e-3, "m"}}, {"shape", {2, 0.1, "-"}}};
+  EXPECT_THAT(release_card(card, "card.json").passed_over, testing::ElementsAre("length", "shape"));
+}
+
 // What the search offers first strains the grip; a plan over which it holds comes after, or none does.
 TEST(PlanThrow, PassesOverMotionsThatAreRefused) {
   BarThrow bar;
