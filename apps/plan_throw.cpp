@@ -32,11 +32,15 @@ namespace {
 using planners::Chain;
 using planners::JointVector;
 
+/// Of a gripper alone, and of one with an object that no SKU tells of [kg].
+constexpr double kGripperMass = 0.65, kLoadedGripperMass = 0.9;
+
 struct PlanThrowOptions {
   std::string arm{"panda"}, tip, target, box{"0.15x0.15"}, card, sku, json, report;
-  double acceleration{0}, jerk{0};  // 0: the file gives them
-  std::optional<double> drag;       // nothing: the SKU tells it, else 0
-  double window{0.1}, gripper{0.15}, gripper_mass{0.9};
+  double acceleration{0}, jerk{0};     // 0: the file gives them
+  std::optional<double> gripper_mass;  // nothing: kGripperMass or kLoadedGripperMass
+  std::optional<double> drag;          // nothing: the SKU tells it, else 0
+  double window{0.1}, gripper{0.15};
   int draws{1000}, samples{3000}, threads{0};
   std::uint64_t seed{1};
   bool planar{false}, plain{false};
@@ -68,7 +72,8 @@ Chain armed(const PlanThrowOptions& options, const std::optional<datasets::Sku>&
   }
   for (const auto& note : arm.notes) tell("note: {}: {}\n", options.arm, note);
   fill_limits(arm, options);
-  arm = planners::with_gripper(arm, options.gripper, options.gripper_mass);
+  arm = planners::with_gripper(arm, options.gripper,
+                               options.gripper_mass.value_or(sku ? kGripperMass : kLoadedGripperMass));
   if (!sku) return arm;
   const double about_its_axis = 0.1 * *sku->inertia;  // which the arm does not turn in planar throws
   return planners::with_payload(arm,
@@ -350,9 +355,9 @@ Command plan_throw_command(Parser& plan) {
   parser.option("--gripper", o->gripper, "From the flange to the middle of the pads [m]")
       .range(0.0, 1.0)
       .with_default();
-  parser.option("--gripper-mass", o->gripper_mass, "Gripper [kg]; without --sku, gripper and object")
-      .range(0.0, 10.0)
-      .with_default();
+  parser
+      .option("--gripper-mass", o->gripper_mass, "Gripper [kg], 0.65; without --sku, gripper and object, 0.9")
+      .range(0.0, 10.0);
   parser.option("--window", o->window, "The object may leave at any time up to this after the command [s]")
       .range(0.01, 0.5)
       .with_default();
