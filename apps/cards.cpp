@@ -51,7 +51,8 @@ class Reader {
     for (const auto& [name, ignored] : card_.parameters)
       if (std::find(asked_.begin(), asked_.end(), name) == asked_.end())
         fail("/parameters/" + name,
-             fmt::format("is no parameter of {}, which takes {}", card_.model, fmt::join(asked_, ", ")));
+             fmt::format("is not what is taken of a card of {} without covariance and spreads: {}",
+                         card_.model, fmt::join(asked_, ", ")));
   }
 
  private:

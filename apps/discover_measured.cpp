@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "apps/command.hpp"
 #include "apps/figure.hpp"
@@ -50,8 +51,19 @@ datasets::ModelCard card_of(const MeasuredDiscovery& found, const datasets::Thro
     for (const auto& p : effect.parameters)
       card.parameters[effect.id + "." + p.name] = {p.value, p.sigma, p.unit, true};
   }
-  if (!found.parameters.empty())
-    card.covariance = datasets::CardCovariance{found.parameters, found.covariance};
+  if (!found.parameters.empty()) {
+    // A sigma may be wider than the fit's: the other names of an effect are allowed for. It keeps its
+    // correlations.
+    auto& [names, matrix] =
+        card.covariance.emplace(datasets::CardCovariance{found.parameters, found.covariance});
+    const std::size_t n = names.size();
+    for (std::size_t i = 0; i < n; ++i) {
+      const double variance = matrix[i * n + i], sigma = card.parameters.at(names[i]).sigma.value_or(0);
+      const double wider = variance > 0 ? sigma / std::sqrt(variance) : 0;
+      for (std::size_t j = 0; j < n; ++j) matrix[i * n + j] *= wider, matrix[j * n + i] *= wider;
+      matrix[i * n + i] = sigma * sigma;
+    }
+  }
   card.log = {std::filesystem::path(file).filename().string(), log.title, fitting::checksum_of(file)};
   card.split = "train";
   card.library_version = UNHAND_VERSION;

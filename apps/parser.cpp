@@ -183,7 +183,8 @@ template <class T>
 Option Parser::option(const std::string& name, T& value, const std::string& help) {
   CLI::Option* const out = app_->add_option(name, value, help);
   if constexpr (std::is_same_v<T, std::uint64_t>) out->check(whole_number());  // CLI11 lets -1 wrap around
-  if constexpr (std::is_same_v<T, double> || std::is_same_v<T, std::vector<double>>)
+  if constexpr (std::is_same_v<T, double> || std::is_same_v<T, std::optional<double>> ||
+                std::is_same_v<T, std::vector<double>>)
     out->check(finite_number("a finite number", "", [](double) { return true; }));
   return Option(out);
 }
@@ -193,6 +194,7 @@ template Option Parser::option(const std::string&, int&, const std::string&);
 template Option Parser::option(const std::string&, unsigned&, const std::string&);
 template Option Parser::option(const std::string&, std::uint64_t&, const std::string&);
 template Option Parser::option(const std::string&, std::optional<int>&, const std::string&);
+template Option Parser::option(const std::string&, std::optional<double>&, const std::string&);
 template Option Parser::option(const std::string&, std::vector<std::string>&, const std::string&);
 template Option Parser::option(const std::string&, std::vector<double>&, const std::string&);
 

@@ -59,7 +59,7 @@ class Parser {
   void footer(const std::string& text);
 
   /// For text, numbers and lists of them: std::string, double, int, unsigned, std::uint64_t,
-  /// std::optional<int>, std::vector of std::string or double.
+  /// std::optional<int> or <double>, std::vector of std::string or double.
   template <class T>
   Option option(const std::string& name, T& value, const std::string& help);
   Option flag(const std::string& name, bool& value, const std::string& help);

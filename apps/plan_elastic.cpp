@@ -238,6 +238,8 @@ void to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs&
 }
 
 void run(const PlanElasticOptions& o) {
+  if (o.longest > 0 && o.longest < 0.1)
+    throw WrongUsage(fmt::format("--longest: {:g} s; accepted: 0, or 0.1 to 10 s", o.longest));
   if (!o.report.empty()) require_gnuplot();
   require_outputs({{o.report, Wanted::directory}, {o.json}}, {o.arm});
   const el::ClutchedArm arm = el::read_clutched_arm(o.arm);

@@ -49,6 +49,9 @@ fl::Bar bar_of(const PlanFlipOptions& o, const fl::FlipRobot& robot) {
     const datasets::Sku sku = datasets::read_sku(o.sku);
     if (!sku.inertia)
       throw datasets::LogError(o.sku, "inertia_kg_m2", "is not known: give it, or a shape with dims_m");
+    if (sku.drag_k.value_or(0) > 0)
+      tell("note: drag_k_per_m = {:g} of {} is passed over: throw-flip flies without drag\n", *sku.drag_k,
+           o.sku);
     out = {sku.mass, *sku.inertia, sku.com_offset};
     if (const std::string why = fl::complaint_of(out); !why.empty())
       throw datasets::LogError(o.sku, "object", why);

@@ -19,6 +19,7 @@
 #include "contact/registry.hpp"
 #include "datasets/model_card.hpp"
 #include "datasets/sku.hpp"
+#include "fitting/card.hpp"
 #include "fitting/sku/sku_inputs.hpp"
 #include "planners/arm/chain_file.hpp"
 #include "planners/arm/panda.hpp"
@@ -29,11 +30,17 @@ namespace unhand::apps {
 namespace {
 
 using planners::Chain;
+using planners::JointVector;
+
+/// Of a gripper alone, and of one with an object that no SKU tells of [kg].
+constexpr double kGripperMass = 0.65, kLoadedGripperMass = 0.9;
 
 struct PlanThrowOptions {
   std::string arm{"panda"}, tip, target, box{"0.15x0.15"}, card, sku, json, report;
-  double acceleration{0}, jerk{0};  // 0: the file gives them
-  double window{0.1}, drag{0}, gripper{0.15}, gripper_mass{0.9};
+  double acceleration{0}, jerk{0};     // 0: the file gives them
+  std::optional<double> gripper_mass;  // nothing: kGripperMass or kLoadedGripperMass
+  std::optional<double> drag;          // nothing: the SKU tells it, else 0
+  double window{0.1}, gripper{0.15};
   int draws{1000}, samples{3000}, threads{0};
   std::uint64_t seed{1};
   bool planar{false}, plain{false};
@@ -55,8 +62,8 @@ void fill_limits(Chain& arm, const PlanThrowOptions& options) {
     }
 }
 
-/// The arm with its gripper.
-Chain armed(const PlanThrowOptions& options) {
+/// The arm with its gripper and, where an SKU tells of it, the object in it.
+Chain armed(const PlanThrowOptions& options, const std::optional<datasets::Sku>& sku) {
   Chain arm;
   try {
     arm = planners::read_chain(options.arm, options.tip);
@@ -65,13 +72,19 @@ Chain armed(const PlanThrowOptions& options) {
   }
   for (const auto& note : arm.notes) tell("note: {}: {}\n", options.arm, note);
   fill_limits(arm, options);
-  return planners::with_gripper(arm, options.gripper, options.gripper_mass);
+  arm = planners::with_gripper(arm, options.gripper,
+                               options.gripper_mass.value_or(sku ? kGripperMass : kLoadedGripperMass));
+  if (!sku) return arm;
+  const double about_its_axis = 0.1 * *sku->inertia;  // which the arm does not turn in planar throws
+  return planners::with_payload(arm,
+                                {sku->mass,
+                                 {0, 0, sku->com_offset},
+                                 planners::symmetric(*sku->inertia, *sku->inertia, about_its_axis, 0, 0, 0)});
 }
 
 planners::PlanOptions plan_options(const PlanThrowOptions& options, const Chain& arm, bool planar) {
   planners::PlanOptions out;
   out.search.window = options.window;
-  out.search.medium.drag_k = options.drag;
   out.search.samples = options.samples;
   out.search.threads = options.threads;
   out.refine = !options.plain;
@@ -103,7 +116,8 @@ PredictedLandings by_delay(const std::string& name, const ThrowAnswer& a,
 
 PredictedLandings by_release(const std::string& name, const ThrowAnswer& a,
                              const planners::ReleaseThrow& release, const PlanThrowOptions& options) {
-  PredictedLandings out{name, planners::draw_landings(release, options.draws, options.seed), 0};
+  const planners::HeldMotion before(release, a.plan.motion);
+  PredictedLandings out{name, planners::draw_landings(release, options.draws, options.seed, &before), 0};
   const planners::ThrowPlane plane(planners::forward_kinematics(release.chain, release.start.q).p,
                                    release.target);
   for (const double miss : out.drawn.miss)
@@ -161,9 +175,14 @@ void plan_release(ThrowAnswer& a, planners::ReleaseThrow release, const planners
   a.rigid = planners::rigid_landing(release, release.object.com_offset.value, a.real->detach_time);
   a.spread_before = planners::release_spread(release);
   a.predicted.push_back(by_release("tube acceleration", a, release, options));
-  auto robust = planners::plan_robust_throw(release, how);
+  const auto tell_needed = [&] {
+    a.needed_force = planners::HeldMotion(release, a.plan.motion).needed_force();
+  };
+  std::string reason;
+  auto robust = planners::plan_robust_throw(release, how, &reason);
   if (!robust) {
-    tell("unhand: no motion to the insensitive throw stays within the limits; the tube's is kept\n");
+    tell("unhand: of the motions to the insensitive throw none will do ({}); the tube's is kept\n", reason);
+    tell_needed();
     return;
   }
   a.plan.motion = std::move(robust->motion);
@@ -179,26 +198,85 @@ void plan_release(ThrowAnswer& a, planners::ReleaseThrow release, const planners
   a.plan.at_rest = landings(planners::JointVector<double>::Zero(release.chain.size()));
   a.spread_after = planners::release_spread(release);
   a.predicted.insert(a.predicted.begin(), by_release("insensitive motion", a, release, options));
+  tell_needed();
 }
+
+/// Where the plan is beyond what its card was tried on.
+std::vector<std::string> beyond(const datasets::ModelCard& card, const ThrowAnswer& a,
+                                const planners::Chain& pads, const planners::HeldObject& object,
+                                const std::optional<datasets::Sku>& sku) {
+  const auto tip = planners::tip_motion<double>(pads, a.plan.nominal.state.q, a.plan.nominal.state.qd,
+                                                JointVector<double>::Zero(pads.size()));
+  const planners::ThrowPlane plane(tip.frame.p, a.box.middle);
+  const double omega = tip.omega.dot(Eigen::Vector3d(plane.along.y(), -plane.along.x(), 0));
+  auto out = fitting::outside_range(card, {{"mass", "kg", object.mass},
+                                           {"com_offset", "m", object.com_offset.value},
+                                           {"release_speed", "m/s", tip.velocity.norm()},
+                                           {"release_omega", "rad/s", omega}});
+  if (sku)
+    if (const auto surface = fitting::untried_surface(card, sku->surface)) out.push_back(*surface);
+  return fitting::reasons_of(out);
+}
+
+/// --drag, else the SKU's [1/m].
+double drag_of(ThrowAnswer& a, const PlanThrowOptions& options, const std::optional<datasets::Sku>& sku) {
+  const std::optional<double> told = sku ? sku->drag_k : std::nullopt;
+  a.drag_from = options.drag ? "--drag" : "SKU";
+  if (options.drag && told && *options.drag != *told)
+    tell("note: --drag {:g} is taken, not drag_k_per_m = {:g} of {}\n", *options.drag, *told, options.sku);
+  return options.drag ? *options.drag : told.value_or(0);
+}
+
+/// Motions over which the grip does not hold its object.
+struct DroppingMotions {
+  int count{};
+  std::optional<double> least_force;  ///< of one pad, that would hold over the gentlest of them [N]
+
+  /// As planners::PlanOptions::refuse.
+  std::string look(const planners::ReleaseThrow& release, const planners::JointTrajectory& motion) {
+    const planners::HeldMotion held(release, motion);
+    if (held.holds(planners::nominal_draw(release))) return "";
+    ++count;
+    if (const auto needed = held.needed_force())
+      least_force = std::min(*needed, least_force.value_or(*needed));
+    return "the grip does not hold the object";
+  }
+  std::string in_words(const planners::ReleaseCard& card) const {
+    std::string out = fmt::format(
+        "a grip of {:.4g} N per pad lets the object slip before the gripper opens in {} of the motions "
+        "within "
+        "the limits",
+        card.grip_force, count);
+    if (least_force)
+      out += fmt::format("; the gentlest of them needs at least {:.3g} N per pad", *least_force);
+    return out;
+  }
+};
 
 void plan_throw(const PlanThrowOptions& options) {
   require_outputs({{options.json}, {options.report, Wanted::directory}},
                   {options.arm, options.card, options.sku});
   if (!options.report.empty()) require_gnuplot();
   const auto target = numbers<3>("--target", options.target, ',');
+  constexpr double kFarthest = 1000;  // m
+  for (const double one : target)
+    if (!(std::abs(one) <= kFarthest))
+      throw WrongUsage(fmt::format("--target: {:g} m is not in [{:g}, {:g}] m", one, -kFarthest, kFarthest));
   const auto box = numbers<2>("--box", options.box, 'x');
   if (!(box[0] > 0 && box[1] > 0)) throw WrongUsage(fmt::format("--box: '{}' has no area", options.box));
   ThrowAnswer answer;
   answer.box = {{target[0], target[1], target[2]}, box[0], box[1]};
   answer.window = options.window;
-  const Chain pads = armed(options);
 
   std::optional<planners::ReleaseCard> card;
   planners::HeldObject object;
   const double com_sigma = fitting::AssumedTolerances{}.com_offset;  // as validate-sku assumes
   object.com_offset = {0, com_sigma};
-  if (!options.card.empty())
-    card = planners::release_card(datasets::read_model_card(options.card), options.card);
+  datasets::ModelCard read;
+  if (!options.card.empty()) {
+    read = datasets::read_model_card(options.card);
+    card = planners::release_card(read, options.card);
+  }
   std::optional<datasets::Sku> given;
   if (!options.sku.empty()) {
     const auto& sku = given.emplace(read_possible_sku(options.sku));
@@ -208,22 +286,39 @@ void plan_throw(const PlanThrowOptions& options) {
     object.mass = sku.mass, object.inertia = *sku.inertia;
     object.com_offset = {sku.com_offset, sku.com_offset_sigma.value_or(com_sigma)};
   }
+  const Chain pads = armed(options, given);
   answer.chain = planners::with_tool(pads, {Eigen::Matrix3d::Identity(), {0, 0, object.com_offset.value}});
   auto how = plan_options(options, pads, options.planar || card.has_value());
+  how.search.medium.drag_k = drag_of(answer, options, given);
   how.search.window = answer.window = std::max(options.window, card ? planners::window_for(*card) : 0.0);
-  std::optional<Progress> progress(std::in_place, "plan throw", 0);
-  auto result = planners::plan_throw(answer.chain, answer.box, how);
-  if (!result.plan) throw Unanswered(fmt::format("{}: {}", to_string(result.outcome), result.reason));
-  answer.plan = std::move(*result.plan);
-  answer.medium = how.search.medium;
-  if (card) {
-    planners::ReleaseThrow release{pads, answer.plan.nominal.state, answer.plan.qdd, answer.box.middle};
+  const auto release_of = [&](const planners::ThrowPlan& plan) {
+    planners::ReleaseThrow release{pads, plan.nominal.state, plan.qdd, answer.box.middle};
     release.hold = answer.window + 1e-6;
     release.card = *card;
     release.object = object;
-    release.medium = answer.medium;
+    release.medium = how.search.medium;
+    return release;
+  };
+  DroppingMotions dropping;
+  if (card)
+    how.refuse = [&](const planners::ThrowPlan& plan) {
+      return dropping.look(release_of(plan), plan.motion);
+    };
+  std::optional<Progress> progress(std::in_place, "plan throw", 0);
+  auto result = planners::plan_throw(answer.chain, answer.box, how);
+  if (!result.plan)
+    throw Unanswered(fmt::format("{}: {}", to_string(result.outcome),
+                                 dropping.count > 0 ? dropping.in_words(*card) : result.reason));
+  if (dropping.count > 0) tell("note: passed over for another: {}\n", dropping.in_words(*card));
+  answer.plan = std::move(*result.plan);
+  answer.medium = how.search.medium;
+  if (card) {
     answer.numbers = numbers_of(*card, object, given);
-    plan_release(answer, release, how, options);
+    answer.passed_over = card->passed_over;
+    if (given && given->mass_sigma.value_or(0) > 0) answer.passed_over.emplace_back("mass");
+    if (given && given->inertia_sigma.value_or(0) > 0) answer.passed_over.emplace_back("inertia");
+    plan_release(answer, release_of(answer.plan), how, options);
+    answer.beyond_card = beyond(read, answer, pads, object, given);
   } else {
     answer.predicted = {
         by_delay("planned", answer, answer.plan.qdd, options),
@@ -260,13 +355,19 @@ Command plan_throw_command(Parser& plan) {
   parser.option("--gripper", o->gripper, "From the flange to the middle of the pads [m]")
       .range(0.0, 1.0)
       .with_default();
-  parser.option("--gripper-mass", o->gripper_mass, "Gripper and object [kg]").range(0.0, 10.0).with_default();
+  parser
+      .option("--gripper-mass", o->gripper_mass, "Gripper [kg], 0.65; without --sku, gripper and object, 0.9")
+      .range(0.0, 10.0);
   parser.option("--window", o->window, "The object may leave at any time up to this after the command [s]")
       .range(0.01, 0.5)
       .with_default();
-  parser.option("--drag", o->drag, "Quadratic drag of the flight, k in a = -k |v| v [1/m]").range(0.0, 10.0);
+  parser
+      .option("--drag", o->drag,
+              "Quadratic drag of the flight, k in a = -k |v| v [1/m]; else that of the SKU")
+      .range(0.0, 10.0);
   parser.option("--card", o->card, "A model card: the release follows its contact model (planar throws)");
-  parser.option("--sku", o->sku, "The object: mass, inertia, offset of its centre of mass from the pads");
+  parser.option("--sku", o->sku,
+                "The object: mass, inertia, drag, offset of its centre of mass from the pads");
   parser.flag("--planar", o->planar, "Throw in the vertical plane of the target");
   parser.flag("--tube-cvx", o->plain, "Stop at the convex problem, without refinement");
   parser.option("--samples", o->samples, "Configurations searched").range(1, 1000000).with_default();

@@ -25,15 +25,19 @@ struct ThrowAnswer {
   planners::ThrowPlan plan;
   double window{};        ///< for which q̈ is held [s]
   flight::Medium medium;  ///< of the flight
+  std::string drag_from;  ///< who told its drag
   /// A number that the release rests on, and who told it and its σ.
   struct Number {
     std::string name, unit;  ///< "-" where it has none
     double value{}, sigma{};
     std::string from;  ///< "card", "card; sigma assumed", …
   };
-  std::vector<Number> numbers;  ///< with a contact model
-  double lever{};               ///< of an SKU: from the pads to the centre of mass [m]
-  bool with_release{};          ///< the release follows a contact model, not a delay
+  std::vector<Number> numbers;           ///< with a contact model
+  std::vector<std::string> beyond_card;  ///< where the plan is beyond what its card was tried on
+  std::vector<std::string> passed_over;  ///< sigmas that are told and that the plan does not count
+  double lever{};                        ///< of an SKU: from the pads to the centre of mass [m]
+  bool with_release{};                   ///< the release follows a contact model, not a delay
+  std::optional<double> needed_force;    ///< of one pad, so that the grip holds until the command to open [N]
   std::optional<planners::ReleaseLanding> rigid,
       real;  ///< of the tube's motion: carried until the detach, and as the model says
   std::optional<planners::ReleaseSpread> spread_before, spread_after;

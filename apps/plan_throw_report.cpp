@@ -1,5 +1,6 @@
 // The answer of `unhand plan throw` as text, JSON, tables and figures.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -106,6 +107,14 @@ std::string text_of(const ThrowAnswer& a) {
                               one.sigma > 0 ? fmt::format("{:.2g}", one.sigma) : "-", one.from});
     out += "\n" + numbers.text();
   }
+  for (const auto& one : a.beyond_card) out += fmt::format("\nBeyond the card: {}.\n", one);
+  if (!a.passed_over.empty())
+    out += fmt::format("\npassed over in the spread: sigma of {}\n", fmt::join(a.passed_over, ", "));
+  if (a.medium.drag_k > 0)
+    out += fmt::format("\nthe flight has a drag of {:g} 1/m ({})\n", a.medium.drag_k, a.drag_from);
+  if (a.needed_force)
+    out += fmt::format("\nuntil the command to open the grip needs at least {:.3g} N per pad\n",
+                       *a.needed_force);
   if (!a.with_release && std::abs(a.lever) > fitting::kLeastLever)
     out += fmt::format(
         "\nnote: without a card the object is taken as carried rigidly until it leaves; this one hangs "
@@ -127,6 +136,7 @@ Json json_of(const ThrowAnswer& a) {
   out["target_m"] = {a.box.middle.x(), a.box.middle.y(), a.box.middle.z()};
   out["box_m"] = {a.box.length_x, a.box.length_y};
   out["window_s"] = a.window;
+  out["drag_k_per_m"] = a.medium.drag_k;
   out["margin"] = {{"least", plan.nominal.margin},
                    {"speed", plan.nominal.speed_margin},
                    {"position", plan.nominal.position_margin},
@@ -149,6 +159,9 @@ Json json_of(const ThrowAnswer& a) {
     numbers[one.name] = {{"value", one.value}, {"sigma", one.sigma}, {"unit", one.unit}, {"from", one.from}};
   if (a.with_release)
     out["release"] = {{"numbers", numbers},
+                      {"outside_valid_range", a.beyond_card},
+                      {"sigmas_passed_over", a.passed_over},
+                      {"needed_grip_force_N", a.needed_force ? Json(*a.needed_force) : Json(nullptr)},
                       {"carried_rigidly", landing_json(a.rigid)},
                       {"contact_model", landing_json(a.real)},
                       {"before", spread_json(a.spread_before)},

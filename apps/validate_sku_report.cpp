@@ -72,17 +72,19 @@ std::string measured_text(const SkuValidation& answer) {
   const auto& m = *answer.measured;
   const bool contradicted =
       answer.verdict == fitting::SkuVerdict::contradicted || m.rms_z > fitting::kMostSurprise;
+  const std::string never =
+      m.never_lands == 0 ? "" : fmt::format("; {} of them never land, says the card", m.never_lands);
   return fmt::format(
       "{}: of {} measured throws of this object {:.1f} % land within the tolerance of their prediction "
       "(error "
       "{:.2f} cm, {:.2f} deg in the mean of the absolute; bias {:+.2f} cm, {:+.2f} deg); the errors are "
       "{:.2f} "
-      "times what was foretold\n",
+      "times what was foretold{}\n",
       m.confirmed    ? "Confirmed"
       : contradicted ? "Contradicted"
                      : "Not within the tolerance",
-      m.throws.size(), 100 * m.within, 100 * m.mae_x, m.mae_theta * kDegrees, 100 * m.bias_x,
-      m.bias_theta * kDegrees, m.rms_z);
+      m.throws.size() + static_cast<std::size_t>(m.never_lands), 100 * m.within, 100 * m.mae_x,
+      m.mae_theta * kDegrees, 100 * m.bias_x, m.bias_theta * kDegrees, m.rms_z, never);
 }
 
 /// The card's own errors on throws that it was not fitted to, which the spread does not hold.
@@ -209,12 +211,14 @@ Json sku_json(const SkuQuestion& question, const SkuValidation& answer) {
   if (const auto& m = answer.measured) {
     out["measured"] = {{"confirmed", m->confirmed},
                        {"n", m->throws.size()},
+                       {"never_lands", m->never_lands},
+                       {"held_out", m->held_out},
                        {"within", m->within},
                        {"landing_x_mae_m", m->mae_x},
                        {"landing_theta_mae_deg", m->mae_theta * kDegrees},
                        {"bias_x_m", m->bias_x},
                        {"bias_theta_deg", m->bias_theta * kDegrees},
-                       {"rms_z", m->rms_z},
+                       {"rms_z", number(m->rms_z)},
                        {"throws", Json::array()}};
     for (const auto& one : m->throws)
       out["measured"]["throws"].push_back({{"id", one.id},

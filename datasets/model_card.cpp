@@ -11,6 +11,7 @@
 
 #include "datasets/json_fields.hpp"
 #include "datasets/whole_file.hpp"
+#include "dynamics/dense_solve.hpp"
 
 namespace unhand::datasets {
 namespace {
@@ -104,6 +105,38 @@ CardStatistics read_statistics(Fields& from) {
   return out;
 }
 
+/// Refuses what no covariance of these parameters is, beyond the rounding of numbers written by hand.
+void require_covariance(const CardCovariance& covariance,
+                        const std::map<std::string, CardParameter>& parameters, Fields& from) {
+  constexpr double kRounding = 1e-6;
+  const auto& [names, matrix] = covariance;
+  const std::size_t n = names.size();
+  Eigen::MatrixXd correlation =
+      Eigen::MatrixXd::Identity(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(n));
+  for (std::size_t i = 0; i < n; ++i) {
+    const double variance = matrix[i * n + i];
+    if (const auto& sigma = parameters.at(names[i]).sigma;
+        sigma && !(std::abs(variance - *sigma * *sigma) <= kRounding * *sigma * *sigma))
+      from.fail("matrix",
+                fmt::format("has the variance {} of {}, whose sigma is {}: accepted is its square, {}",
+                            variance, names[i], *sigma, *sigma * *sigma));
+    for (std::size_t j = 0; j < n; ++j) {
+      const double covaries = matrix[i * n + j], scale = std::sqrt(variance * matrix[j * n + j]);
+      if (i == j) continue;
+      if (!(std::abs(covaries) <= (1 + kRounding) * scale))
+        from.fail("matrix",
+                  fmt::format("has the covariance {} of {} and {}; accepted with their variances: -{} to {}",
+                              covaries, names[i], names[j], scale, scale));
+      if (scale > 0)
+        correlation(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = covaries / scale;
+    }
+  }
+  if (n > 0 && !(dynamics::spectrum_of(correlation).values[0] >= -kRounding))
+    from.fail("matrix",
+              fmt::format("is no covariance: the least eigenvalue of its correlations is {}; accepted: >= 0",
+                          dynamics::spectrum_of(correlation).values[0]));
+}
+
 CardCovariance read_covariance(Fields& from, const std::map<std::string, CardParameter>& parameters) {
   CardCovariance out;
   out.names = from.texts("names");
@@ -130,6 +163,7 @@ CardCovariance read_covariance(Fields& from, const std::map<std::string, CardPar
           out.matrix[i * n + i] < 0)
         from.fail("matrix", "is no covariance: not symmetric, or negative on its diagonal");
     }
+  require_covariance(out, parameters, from);
   return out;
 }
 

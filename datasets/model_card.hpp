@@ -26,6 +26,7 @@ struct CardParameter {
 };
 
 /// Of the estimated parameters: names.size() squared numbers, row by row, in the product of their units.
+/// Symmetric, positive semidefinite, and sigma² on the diagonal where a parameter has one, to 1e-6.
 struct CardCovariance {
   std::vector<std::string> names;  ///< of the estimated parameters, a row and column each
   std::vector<double> matrix;      ///< row by row

@@ -143,8 +143,12 @@ std::map<std::string, CardRange> valid_range_of(const CampaignProblem& problem) 
 
 std::vector<UntriedCondition> outside_range(const ModelCard& card,
                                             const experiment::PreparedThrow& prepared) {
+  return outside_range(card, conditions_of(prepared));
+}
+
+std::vector<UntriedCondition> outside_range(const ModelCard& card, const std::vector<Condition>& conditions) {
   std::vector<UntriedCondition> out;
-  for (const Condition& is : conditions_of(prepared)) {
+  for (const Condition& is : conditions) {
     const auto range = card.valid_range.find(is.name);
     if (range == card.valid_range.end() || range->second.unit != is.unit) continue;
     const double margin = margin_of(card, is.name, range->second);

@@ -47,6 +47,10 @@ struct UntriedCondition {
 std::vector<UntriedCondition> outside_range(const datasets::ModelCard& card,
                                             const experiment::PreparedThrow& prepared);
 
+/// The same of conditions at hand, as of a throw that is planned.
+std::vector<UntriedCondition> outside_range(const datasets::ModelCard& card,
+                                            const std::vector<Condition>& conditions);
+
 /// Whether pads on this surface are what the card's friction was estimated on: nothing if its log names the
 /// surface, or if the model has no friction.
 std::optional<UntriedCondition> untried_surface(const datasets::ModelCard& card, const std::string& surface);

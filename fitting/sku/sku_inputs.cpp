@@ -64,8 +64,14 @@ void add_card(const datasets::Sku& sku, const datasets::ModelCard& card, Collect
     const std::size_t k = collect.value(name.substr(0, bracket), parameter.value);
     const double sigma = parameter.sigma.value_or(0);
     if (!(sigma > 0)) continue;
-    collect.input(
-        {name, parameter.unit, parameter.value, sigma, InputSource::card, measurement_for(name), {{k, 1}}});
+    collect.input({name,
+                   parameter.unit,
+                   parameter.value,
+                   sigma,
+                   InputSource::card,
+                   measurement_for(name),
+                   {{k, 1}},
+                   parameter.determined});
     std::size_t at = width;
     if (card.covariance)
       at = static_cast<std::size_t>(
@@ -83,6 +89,21 @@ void add_card(const datasets::Sku& sku, const datasets::ModelCard& card, Collect
                          : i == j               ? sigma * sigma
                                                 : 0.0;
     }
+}
+
+/// Friction and grip force that a card knows to a tenth or less are drawn by their logarithms: the pads'
+/// limits know the product alone, which of (1 + e)(1 − e) would be off by e².
+void draw_product(std::vector<UncertainInput>& inputs) {
+  constexpr double kRough = 0.1;
+  const auto named = [&](const char* name) {
+    return std::find_if(inputs.begin(), inputs.end(), [&](const UncertainInput& one) {
+      return one.source == InputSource::card && one.name == name && one.value > 0;
+    });
+  };
+  const auto mu = named("mu"), force = named("grip_force");
+  if (mu == inputs.end() || force == inputs.end()) return;
+  if (std::max(mu->sigma / mu->value, force->sigma / force->value) > kRough)
+    mu->logarithmic = force->logarithmic = true;
 }
 
 void add_spreads(const datasets::ModelCard& card, Collector& collect) {
@@ -177,6 +198,16 @@ std::vector<double> ThrowInputs::moved(const Eigen::VectorXd& by) const {
   return out;
 }
 
+std::vector<double> ThrowInputs::drawn(const Eigen::VectorXd& by) const {
+  Eigen::VectorXd by_value = by;
+  for (std::size_t k = 0; k < inputs.size(); ++k)
+    if (inputs[k].logarithmic) {
+      double& step = by_value[static_cast<Eigen::Index>(k)];
+      step = inputs[k].value * std::expm1(step / inputs[k].value);
+    }
+  return moved(by_value);
+}
+
 Eigen::MatrixXd ThrowInputs::mixing() const {
   Eigen::MatrixXd out = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(values.size()),
                                               static_cast<Eigen::Index>(inputs.size()));
@@ -198,6 +229,7 @@ ThrowInputs throw_inputs(const datasets::Sku& sku, const datasets::ModelCard& ca
   Collector collect(out);
   Eigen::MatrixXd of_card;
   add_card(sku, card, collect, out, of_card);
+  draw_product(out.inputs);
   add_spreads(card, collect);
   const bool follows_pads = contact::follows_pads(card.model);
   if (follows_pads && !thrown.normal_force) add_opening(card, card_file, assumed, collect);

@@ -31,6 +31,10 @@ struct UncertainInput {
   std::string measurement;  ///< what would make it better known; empty: nothing does before the throw
   /// The values that it moves, by their place, and how far per unit of it.
   std::vector<std::pair<std::size_t, double>> moves;
+  bool determined{true};  ///< false: the card's log alone says nothing of it
+  /// Drawn as value · exp(δ/value) for a normal δ, so that products keep their spread: of friction and grip
+  /// force, where a fit knows their product far better than either.
+  bool logarithmic{false};
 };
 
 /// Where the SKU file gives no tolerance, 1 σ is taken to be
@@ -56,6 +60,9 @@ struct ThrowInputs {
 
   /// The values with the inputs moved by so much.
   std::vector<double> moved(const Eigen::VectorXd& by) const;
+  /// The same for a normal draw of the inputs: those that are logarithmic are moved by value (exp(by/value) −
+  /// 1), which is `by` to first order.
+  std::vector<double> drawn(const Eigen::VectorXd& by) const;
   /// ∂(value)/∂(input).
   Eigen::MatrixXd mixing() const;
 };

@@ -44,6 +44,10 @@ std::optional<MeasuredVerdict> measured_verdict(const datasets::Sku& sku, const 
   std::erase_if(log.throws, [&](const datasets::Throw& one) {
     return (one.object != sku.name && log.objects.at(one.object).sku != sku.name) || !one.landing;
   });
+  MeasuredVerdict out;
+  out.held_out = card.log.checksum && checksum_of(request.log_file) == card.log.checksum;
+  if (out.held_out)
+    std::erase_if(log.throws, [](const datasets::Throw& one) { return one.split == datasets::Split::train; });
   if (log.throws.empty()) return {};
   for (const auto& one : log.throws) log.objects[one.object] = datasets::to_object(sku);
 
@@ -51,9 +55,12 @@ std::optional<MeasuredVerdict> measured_verdict(const datasets::Sku& sku, const 
   campaign.threads = request.threads;
   const CampaignProblem problem(log, request.log_file, campaign);
   const auto predicted = predict_throws(problem, fit_of(card, problem, card_file), {true, request.threads});
-  MeasuredVerdict out;
   for (std::size_t i = 0; i < predicted.size(); ++i) {
     const auto& error = predicted[i].comparison.error;
+    if (!predicted[i].comparison.prediction.landed()) {
+      ++out.never_lands;
+      continue;
+    }
     if (!error[2] || !error[3] || !predicted[i].sigma) continue;
     const CampaignThrow& thrown = problem.throws()[i];
     auto inputs = throw_inputs(sku, card, card_file, thrown.prepared, request.assumed);
@@ -66,7 +73,7 @@ std::optional<MeasuredVerdict> measured_verdict(const datasets::Sku& sku, const 
          total(predicted[i].sigma->landing_x, variance[0], experiment::Channel::landing_x),
          total(predicted[i].sigma->landing_theta, variance[1], experiment::Channel::landing_theta)});
   }
-  if (out.throws.empty()) return {};
+  if (out.throws.empty() && out.never_lands == 0) return {};
   const auto n = static_cast<double>(out.throws.size());
   double squares = 0;
   for (const auto& one : out.throws) {
@@ -77,9 +84,9 @@ std::optional<MeasuredVerdict> measured_verdict(const datasets::Sku& sku, const 
     squares += std::pow(one.error_x / one.sigma_x, 2) + std::pow(one.error_theta / one.sigma_theta, 2);
     out.within += (std::abs(one.error_x) <= request.tolerance.x &&
                    std::abs(one.error_theta) <= request.tolerance.theta) /
-                  n;
+                  (n + out.never_lands);
   }
-  out.rms_z = std::sqrt(squares / (2 * n));
+  out.rms_z = n > 0 ? std::sqrt(squares / (2 * n)) : HUGE_VAL;
   out.confirmed = out.within >= request.confidence && out.rms_z <= kMostSurprise;
   return out;
 }

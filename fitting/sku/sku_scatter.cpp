@@ -124,7 +124,7 @@ Draw draw(const SkuMotion& motion, const ThrowCandidate& nominal, const MatrixXd
     out.sample.linear_theta = linear[1];
     out.linear_within = std::abs(linear[0]) <= t.x && std::abs(linear[1]) <= t.theta;
     try {
-      const auto values = motion.inputs.moved(by);
+      const auto values = motion.inputs.drawn(by);
       const auto p = motion.predict(values);
       out.landed = p.landed() && motion.held(values);
       if (out.landed) {
@@ -177,18 +177,29 @@ void monte_carlo(const SkuMotion& motion, const MatrixXd& J, const SkuRequest& r
   const bool linear = same(x, sx, lx, slx) && same(theta, stheta, ltheta, sltheta);
   out.agree = linear && out.lost == 0;
   if (out.agree) return;
+  const auto whom = [](const UncertainInput* open) -> std::string {
+    return open == nullptr ? "believe the Monte Carlo"
+                           : fmt::format(
+                                 "the card's log does not determine {}, so that neither is sure: make the "
+                                 "card from a log that does",
+                                 open->name);
+  };
   if (linear) {
+    const auto open = std::find_if(out.budget.begin(), out.budget.end(),
+                                   [](const BudgetLine& line) { return !line.input.determined; });
     out.disagreement =
         "Monte Carlo and derivatives agree where the object lands, but derivatives know nothing of "
-        "draws that slip out of the grip or do not land; believe the Monte Carlo";
+        "draws that slip out of the grip or do not land; " +
+        whom(open == out.budget.end() ? nullptr : &open->input);
     return;
   }
   const auto worst = std::max_element(out.budget.begin(), out.budget.end(),
                                       [](const auto& a, const auto& b) { return a.curvature < b.curvature; });
   out.disagreement = fmt::format(
       "Monte Carlo and derivatives differ by more than {:.0f} % of sigma: the landing is not linear in {} "
-      "over its spread; believe the Monte Carlo",
-      100 * kAgree, worst == out.budget.end() ? "its inputs" : worst->input.name);
+      "over its spread; {}",
+      100 * kAgree, worst == out.budget.end() ? "its inputs" : worst->input.name,
+      whom(worst == out.budget.end() || worst->input.determined ? nullptr : &worst->input));
 }
 
 }  // namespace unhand::fitting

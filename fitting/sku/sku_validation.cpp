@@ -85,7 +85,8 @@ void decide(const datasets::Sku& sku, const datasets::ModelCard& card, const Sku
       out.verdict = SkuVerdict::contradicted;
       out.message += fmt::format(
           "; of {} measured throws {:.1f} % lie within, with errors {:.2g} times what was foretold",
-          out.measured->throws.size(), 100 * out.measured->within, out.measured->rms_z);
+          out.measured->throws.size() + static_cast<std::size_t>(out.measured->never_lands),
+          100 * out.measured->within, out.measured->rms_z);
     }
   }
 }
@@ -134,6 +135,9 @@ SkuValidation validate_sku(const datasets::Sku& sku, const datasets::ModelCard& 
     out.gains = gains_of(motion.inputs, J, request.tolerance);
     monte_carlo(motion, J, request, out);
   }
+  if (request.log != nullptr && card.log.checksum && checksum_of(request.log_file) == card.log.checksum)
+    out.notes.push_back(
+        "the log is the card's own: its train throws, which the card was fitted to, do not count");
   if (request.log != nullptr) out.measured = measured_verdict(sku, card, card_file, request);
   decide(sku, card, request, out);
   return out;

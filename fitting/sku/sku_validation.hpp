@@ -99,12 +99,15 @@ inline constexpr double kMostSurprise = 2;
 
 /// Throws of this object, set against what the SKU and the card say of them.
 struct MeasuredVerdict {
-  std::vector<MeasuredLanding> throws;  ///< one per throw with a landing
-  double within{};                      ///< share that lands within the tolerance of its prediction
-  double mae_x{}, mae_theta{};          ///< [m, rad]
-  double bias_x{}, bias_theta{};        ///< mean of predicted − measured [m, rad]
-  double rms_z{};    ///< errors in their own σ; 1 where the prediction knows how sure it is
-  bool confirmed{};  ///< within >= confidence, and rms_z <= kMostSurprise
+  std::vector<MeasuredLanding> throws;  ///< one per throw with a landing and a prediction of it
+  int never_lands{};  ///< further ones of which the card says that they never land: not within
+  /// The log is the card's own: the throws are those that it was not fitted to.
+  bool held_out{};
+  double within{};                ///< share that lands within the tolerance of its prediction
+  double mae_x{}, mae_theta{};    ///< [m, rad]
+  double bias_x{}, bias_theta{};  ///< mean of predicted − measured [m, rad]
+  double rms_z{};                 ///< errors in their own σ; 1 where the prediction knows how sure it is
+  bool confirmed{};               ///< within >= confidence, and rms_z <= kMostSurprise
 };
 
 /// Whether an object can be thrown, how surely, and why.
@@ -136,8 +139,8 @@ struct SkuValidation {
 
 /// The landing of the nominal throw and how it scatters, to first order by exact derivatives,
 ///   Σ_y = J A Σ_p Aᵀ Jᵀ,  J = ∂(landing)/∂(values), A = ∂(values)/∂(inputs),
-/// and by Monte Carlo of normal inputs p; the same draws go through both. Draws at which a value leaves its
-/// range are drawn again.
+/// and by Monte Carlo of normal inputs p (log-normal ones where UncertainInput says so); the same draws go
+/// through both. Draws at which a value leaves its range are drawn again.
 ///
 /// The motion is a logged one with this object in the hand or, without a log, experiment::reference_throw.
 /// How well a robot repeats its motion is not in it, nor what the model lacks: the card's errors on held-out

@@ -143,9 +143,11 @@ bool add_motion(const Chain& chain, const JointVector<double>& home, const PlanO
     if (plan.limits.within()) plan.limits = check_limits(chain, *moved, options.check_step);
     plan.motion = std::move(*moved);
     plan.acceleration_share = motion.acceleration_share;
-    if (plan.limits.within() && plan.limits.lowest > 0) return true;
-    reason = plan.limits.within() ? fmt::format("the arm would come down to {:.2f} m", plan.limits.lowest)
-                                  : plan.limits.worst(chain);
+    const bool possible = plan.limits.within() && plan.limits.lowest > 0;
+    reason = possible               ? (options.refuse ? options.refuse(plan) : "")
+             : plan.limits.within() ? fmt::format("the arm would come down to {:.2f} m", plan.limits.lowest)
+                                    : plan.limits.worst(chain);
+    if (reason.empty()) return true;
     if (plan.limits.position.fraction > 1) return false;  // slower goes no less far
   }
   return false;

@@ -1,6 +1,7 @@
 // A whole throw: from rest to the nominal state, along the tube while the gripper opens, and to rest again.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,6 +26,8 @@ std::optional<JointTrajectory> throw_motion(const Chain& chain, const JointVecto
                                             const ThrowState& state, const JointVector<double>& qdd,
                                             const MotionOptions& options = {});
 
+struct ThrowPlan;
+
 /// What a whole throw may be.
 struct PlanOptions {
   NominalOptions search;     ///< window and medium are those of all parts
@@ -34,6 +37,9 @@ struct PlanOptions {
   bool refine{true};         ///< go on from Tube-CVX to refine_tube
   int landing_samples{21};   ///< instants of the window at which landings are reported, >= 2
   double check_step{1e-3};   ///< of the dense check of limits, > 0 [s]
+  /// Why a plan within the limits is not taken, as that the grip does not hold its object (why_not_held);
+  /// empty: it is taken. Without one all are.
+  std::function<std::string(const ThrowPlan&)> refuse{};
 };
 
 /// How planning ended.
@@ -41,7 +47,7 @@ enum class PlanOutcome {
   planned,    ///< a plan was found
   no_throw,   ///< no configuration reaches the box within the limits
   no_tube,    ///< none of the throws has a tube acceleration that lands in the box from the whole window
-  no_motion,  ///< no motion to any of them stays within the limits
+  no_motion,  ///< no motion to any of them stays within the limits, or they are refused
 };
 /// The outcome's name, as it is written above.
 const char* to_string(PlanOutcome);

@@ -10,6 +10,7 @@
 
 #include "contact/registry.hpp"
 #include "flight/fly.hpp"
+#include "planners/tube/held_motion.hpp"
 #include "planners/tube/planar_hand.hpp"
 #include "planners/tube/require.hpp"
 #include "release/simulate_release.hpp"
@@ -72,6 +73,7 @@ class CardReader {
     require(path + "/value", told.value, least, open);
     value = told.value;
     auto& origin = out_.origins[name] = {NumberSource::parameter, NumberSource::assumed};
+    if (sigma == nullptr && told.sigma.value_or(0) > 0) out_.passed_over.emplace_back(name);
     if (sigma == nullptr || !told.sigma) return;
     *sigma = *told.sigma;
     origin.sigma = NumberSource::parameter;
@@ -146,8 +148,7 @@ class CardReader {
 
 ReleaseCard release_card(const datasets::ModelCard& card, const std::string& file,
                          const ReleaseCard& otherwise) {
-  if (!contact::follows_pads(card.model) || card.model == "limit_surface_naive" ||
-      card.model == "projectile")
+  if (!contact::follows_pads(card.model) || card.model == "limit_surface_naive" || card.model == "projectile")
     throw CardError(file, "/model", fmt::format("'{}' does not say how the pads let go", card.model));
   if (!card.effects.empty())
     throw CardError(file, "/effects",
@@ -156,6 +157,7 @@ ReleaseCard release_card(const datasets::ModelCard& card, const std::string& fil
   ReleaseCard out = otherwise;
   out.model = card.model;
   out.law_values.clear();
+  out.passed_over.clear();
   CardReader reader(card, file, out);
   reader.take("mu", "-", 0, true, out.mu.value, &out.mu.sigma);
   reader.take("length", "m", 0, true, out.length);
@@ -181,7 +183,8 @@ ReleaseCard release_card(const datasets::ModelCard& card, const std::string& fil
                        kLeastOpeningSigma);
   reader.take_or_range("opening_time", "s", true, out.opening_time.value, out.opening_time.sigma, 0,
                        kLeastOpeningSigma);
-  reader.take_or_range("shape", "-", true, out.shape, of_shape, 0, 0);  // how it scatters moves little
+  reader.take_or_range("shape", "-", true, out.shape, of_shape, 0, 0);
+  if (of_shape > 0) out.passed_over.emplace_back("shape");
   reader.pass_over("reference_force");  // of contact.soft_patch_radius, an effect
   reader.pass_over_spread("force_deviation");
   // Friction's limits know the product of mu and the force alone, of which a card without a measured force
@@ -203,6 +206,9 @@ ReleaseCard release_card(const datasets::ModelCard& card, const std::string& fil
 
 namespace {
 
+constexpr double kMostMu = 10;  // contact::Patch
+/// The most that a draw may be.
+double most_of(int unknown) { return unknown == kMu ? kMostMu : HUGE_VAL; }
 /// The others may not be negative.
 bool has_sign(int unknown) { return unknown == kComOffset || unknown == kGraspAngle; }
 
@@ -219,6 +225,7 @@ template <class S>
 struct Thrown {
   S miss{}, detach_time{};
   double angle{}, speed{};
+  bool slips_at_start{};
 };
 
 /// Which quantity carries derivatives is the caller's: hand, draw, or none.
@@ -249,9 +256,9 @@ std::optional<Thrown<S>> throw_once(const ReleaseThrow& p, const release::HandMo
   const auto flown = flight::fly(flight);
   if (flown.outcome != flight::FlightOutcome::landed) return {};
   const auto& twist = let_go.detach.twist;
-  return Thrown<S>{flown.landing.pose.x, let_go.detach.time,
-                   dynamics::value_of(let_go.relative.angle - draw[kGraspAngle]),
-                   std::hypot(dynamics::value_of(twist.vx), dynamics::value_of(twist.vz))};
+  return Thrown<S>{
+      flown.landing.pose.x, let_go.detach.time, dynamics::value_of(let_go.relative.angle - draw[kGraspAngle]),
+      std::hypot(dynamics::value_of(twist.vx), dynamics::value_of(twist.vz)), let_go.slips_at_start};
 }
 
 JointVector<Dual> constant(const JointVector<double>& x) { return x.cast<Dual>(); }
@@ -323,20 +330,19 @@ void summarise(Landings& out) {
 
 namespace {
 
-/// A draw of the unknown. One that may not be negative is drawn again while it is negative: of a normal
-/// distribution about a value >= 0 at least every second draw is not, so that the last resort, the value, is
-/// never needed.
+/// A draw of the unknown. One that may not be negative, or not above `most`, is drawn again while it is: the
+/// last resort is the value.
 template <class Normal>
-double drawn(const Uncertain& one, bool may_be_negative, Normal&& normal) {
+double drawn(const Uncertain& one, bool may_be_negative, double most, Normal&& normal) {
   if (one.sigma == 0) return one.value;
   for (int attempt = 0; attempt < 1000; ++attempt)
-    if (const double x = one.value + one.sigma * normal(); may_be_negative || x >= 0) return x;
+    if (const double x = one.value + one.sigma * normal(); (may_be_negative || x >= 0) && x <= most) return x;
   return one.value;
 }
 
 }  // namespace
 
-Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t seed) {
+Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t seed, const HeldMotion* before) {
   validate(problem);
   require(count >= 1, "draw_landings", "count", count, "[1, inf)");
   const auto unknowns = unknowns_of(problem);
@@ -347,8 +353,10 @@ Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t see
   for (int i = 0; i < count; ++i) {
     Draw draw{};
     for (int k = 0; k < kUnknowns; ++k)
-      draw[k] = drawn(unknowns[k], has_sign(k), [&] { return normal(random); });
-    if (const auto thrown = throw_once<double>(problem, hand, draw))
+      draw[k] = drawn(unknowns[k], has_sign(k), most_of(k), [&] { return normal(random); });
+    const bool held = before == nullptr || before->holds(draw);
+    const auto thrown = held ? throw_once<double>(problem, hand, draw) : std::nullopt;
+    if (thrown && !thrown->slips_at_start)
       out.miss.push_back(thrown->miss);
     else
       ++out.lost;
@@ -366,15 +374,22 @@ class Points {
     const auto unknowns = unknowns_of(problem);
     int p = 0;
     for (const Uncertain& one : unknowns) p += one.sigma > 0;
-    if (p == 0) draws_.push_back(nominal_draw(problem));
+    if (p == 0) draws_.push_back(nominal_draw(problem)), moved_.emplace_back("their nominal values");
     for (int k = 0; k < kUnknowns; ++k)
       for (const double side : {-1.0, 1.0}) {
         if (!(unknowns[k].sigma > 0)) continue;
         Draw draw = nominal_draw(problem);
         draw[k] += side * std::sqrt(p) * unknowns[k].sigma;
-        if (!has_sign(k)) draw[k] = std::max(draw[k], 0.05 * unknowns[k].value);
+        if (!has_sign(k)) draw[k] = std::clamp(draw[k], 0.05 * unknowns[k].value, most_of(k));
         draws_.push_back(draw);
+        moved_.emplace_back(name_of(static_cast<Unknown>(k)));
       }
+  }
+  /// The first unknown of which a draw does not land; empty: all do.
+  std::string lost(const ReleaseThrow& problem, const PlanarHand& hand) const {
+    for (std::size_t i = 0; i < draws_.size(); ++i)
+      if (!throw_once<double>(problem, hand, draws_[i])) return moved_[i];
+    return "";
   }
   int size() const { return static_cast<int>(draws_.size()); }
   double weight() const { return 1 / std::sqrt(static_cast<double>(draws_.size())); }
@@ -394,6 +409,7 @@ class Points {
 
  private:
   std::vector<Draw> draws_;
+  std::vector<std::string> moved_;  ///< the unknown that is moved in a draw
 };
 
 /// Limits of what a step may change: rows of a quadratic program in (δq̇₀, δq̈).
@@ -447,6 +463,7 @@ InsensitiveResult make_insensitive(const ReleaseThrow& problem, const Insensitiv
   InsensitiveResult out{problem.start, problem.qdd, 0, 0, 0};
   double cost = cost_of(out.start, out.qdd), damping = 1e-3;
   out.before = out.after = std::sqrt(cost);
+  if (!std::isfinite(cost)) out.lost = points.lost(problem, hand_of(problem));
   for (; std::isfinite(cost) && out.iterations < options.iterations; ++out.iterations) {
     const ReleaseThrow at = moved(out.start, out.qdd);
     JointVector<Dual> qd = constant(at.start.qd), qdd = constant(at.qdd);

@@ -47,6 +47,7 @@ struct ReleaseCard {
   double grasp_offset{};  ///< 1 σ of the place of the pads on the object, throw to throw [m]
   double grasp_angle{};   ///< 1 σ of the object's angle in the hand, throw to throw [rad]
   std::map<std::string, NumberOrigin> origins{};  ///< by a number's name on cards; assumed if absent
+  std::vector<std::string> passed_over{};         ///< names of numbers whose σ no unknown of the throw has
 };
 
 /// The least that a gripper's numbers scatter where a card's valid range tells them, 1 σ.
@@ -97,8 +98,8 @@ struct ReleaseThrow {
   flight::Medium medium{};  ///< of the flight
 };
 
-/// Throws std::invalid_argument, naming value and accepted range: one finite number per joint, hold > 0, every
-/// sigma >= 0, what is thrown and what holds it > 0. All functions below that take a throw check it.
+/// Throws std::invalid_argument, naming value and accepted range: one finite number per joint, hold > 0,
+/// every sigma >= 0, what is thrown and what holds it > 0. All functions below that take a throw check it.
 void validate(const ReleaseThrow& problem);
 
 /// One landing, and the release before it.
@@ -126,17 +127,21 @@ struct ReleaseSpread {
 /// Nothing where the nominal throw does not land.
 std::optional<ReleaseSpread> release_spread(const ReleaseThrow& problem);
 
+class HeldMotion;
+
 /// Landings of `count` draws from normal distributions (cut off at zero where the number must be positive).
 /// An unknown without σ takes no draw.
 struct Landings {
   std::vector<double> miss;  ///< of those that land [m]
-  int lost{};                ///< not free in time, or never down
+  int lost{};                ///< slipping before the gripper opens, not free in time, or never down
   double mean{}, std{};      ///< of those that land [m]
 };
 /// Mean and standard deviation of what landed.
 void summarise(Landings& landings);
-/// Equal seeds give equal draws; count >= 1.
-Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t seed);
+/// Equal seeds give equal draws; count >= 1. Draws that slip at t = 0 are lost and, where `before` tells the
+/// motion up to there, those that slip on the way.
+Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t seed,
+                       const HeldMotion* before = nullptr);
 
 /// How the search for an insensitive throw runs.
 struct InsensitiveOptions {
@@ -154,6 +159,8 @@ struct InsensitiveResult {
   JointVector<double> qdd;   ///< q̈ as chosen [rad/s²]
   double before{}, after{};  ///< root mean square miss over the unknowns' spread [m]
   int iterations{};          ///< taken
+  /// The unknown of which a draw within its spread does not land; then nothing was minimised. Empty: none.
+  std::string lost{};
 };
 
 /// Chooses q̇₀ and q̈ so that landings miss least over the card's and the grasp's uncertainty: minimises

@@ -1,5 +1,7 @@
 #include "planners/tube/robust_throw.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -11,25 +13,48 @@ double window_for(const ReleaseCard& card) {
          4 * std::hypot(card.dead_time.sigma, card.opening_time.sigma);
 }
 
-std::optional<RobustThrow> plan_robust_throw(const ReleaseThrow& problem, const PlanOptions& options) {
+std::optional<RobustThrow> plan_robust_throw(const ReleaseThrow& problem, const PlanOptions& options,
+                                             std::string* reason) {
   validate(problem);
   InsensitiveOptions insensitive;
   for (int i = 0; i < problem.chain.size(); ++i)
     if (std::abs(problem.start.qd[i]) > 1e-9) insensitive.joints.push_back(i);
   RobustThrow out;
   out.choice = make_insensitive(problem, insensitive);
+  if (!out.choice.lost.empty()) {
+    if (reason != nullptr)
+      *reason =
+          fmt::format("a draw of {} within its spread does not land, so that no spread can be minimised",
+                      out.choice.lost);
+    return {};
+  }
   const JointVector<double> home = options.home.size() == 0 ? middle_of(problem.chain) : options.home;
   MotionOptions motion = options.motion;
   motion.window = problem.hold;
+  ReleaseThrow chosen = problem;
+  chosen.start = out.choice.start;
+  chosen.qdd = out.choice.qdd;
+  const Chain to_object =
+      with_tool(problem.chain, {Eigen::Matrix3d::Identity(), {0, 0, problem.object.com_offset.value}});
+  std::string why = "no ramp leads to its acceleration within the limits";
   for (const double share : {0.9, 0.65, 0.45, 0.3}) {
     motion.acceleration_share = out.acceleration_share = std::min(share, options.motion.acceleration_share);
     auto moved = throw_motion(problem.chain, home, out.choice.start, out.choice.qdd, motion);
     if (!moved) continue;
     out.limits = check_limits(problem.chain, *moved, options.check_step);
-    if (!out.limits.within()) continue;
+    out.limits.lowest =
+        std::min(out.limits.lowest, check_limits(to_object, *moved, options.check_step).lowest);
+    if (!out.limits.within())
+      why = out.limits.worst(problem.chain);
+    else if (!(out.limits.lowest > 0))
+      why = fmt::format("it would come down to {:.2f} m", out.limits.lowest);
+    else
+      why = why_not_held(chosen, *moved);
+    if (!why.empty()) continue;
     out.motion = std::move(*moved);
     return out;
   }
+  if (reason != nullptr) *reason = why;
   return {};
 }
 

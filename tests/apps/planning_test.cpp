@@ -20,6 +20,7 @@ TEST_F(Cli, PlansAThrowIntoABox) {
     EXPECT_TRUE(fs::exists(folder / "out" / file)) << file;
 
   expect_refusal("plan throw --target 1.3,0", 2, "--target: '1.3,0' is not 3 numbers with ',' between");
+  expect_refusal("plan throw --target 1e300,0,0", 2, "--target: 1e+300 m is not in [-1000, 1000] m");
   expect_refusal("plan throw --target 1.3,0,0 --box 0x1", 2, "--box: '0x1' has no area");
   expect_refusal("plan throw --target 1.3,0,0 --arm kuka", 2,
                  "'kuka' is not panda, a .toml file or a .urdf file");
@@ -85,6 +86,34 @@ TEST_F(Cli, DrawsTheFlightsOfAThrowWithTheirDrag) {
   EXPECT_NEAR(std::stod(last_row(data, "flight from 0.100 s, no")), landings.back().get<double>(), 1e-6);
 }
 
+// The object weighs on the arm and flies through the air.
+TEST_F(Cli, PlansAThrowWithTheMassAndTheDragOfItsSku) {
+  const auto bar = [&](const std::string& file, const std::string& mass, const std::string& more) {
+    std::ofstream(folder / file) << "name='bar'\nsurface='paper'\ncom_offset_m=0.1\ninertia_kg_m2=0.0012\n"
+                                 << "mass_kg=" << mass << "\n"
+                                 << more;
+  };
+  bar("bar.toml", "0.246", "");
+  bar("heavy.toml", "8", "");
+  bar("blunt.toml", "0.246", "drag_k_per_m=0.3\n");
+  const std::string plan = "plan throw --target 1.3,0,-0.2 --samples 80 --draws 20 --planar --json p.json ";
+  const auto planned = [&](const std::string& options) {
+    const Answer answer = run(plan + options);
+    EXPECT_EQ(answer.code, 0) << answer.err;
+    return std::pair{nlohmann::json::parse(content(folder / "p.json")), answer};
+  };
+  const auto light = planned("--sku bar.toml").first;
+  expect_refusal(plan + "--sku heavy.toml", 1, "torque of panda_joint");
+  const auto [blunt, told] = planned("--sku blunt.toml");
+  EXPECT_EQ(blunt["drag_k_per_m"], 0.3);
+  EXPECT_THAT(told.out, HasSubstr("a drag of 0.3 1/m (SKU)"));
+  EXPECT_EQ(blunt["qd0_rad_s"], planned("--sku bar.toml --drag 0.3").first["qd0_rad_s"]);
+  EXPECT_NE(blunt["qd0_rad_s"], light["qd0_rad_s"]);
+  const auto [other, noted] = planned("--sku blunt.toml --drag 0.1");
+  EXPECT_EQ(other["drag_k_per_m"], 0.1);
+  EXPECT_THAT(noted.err, HasSubstr("--drag 0.1 is taken, not drag_k_per_m = 0.3 of blunt.toml"));
+}
+
 TEST_F(Cli, PlansAThrowWithACard) {
   ASSERT_EQ(run("compare " + quick + " --models sliding_pivot --write-cards cards").code, 0);
   std::ofstream(folder / "bar.toml") << "name='bar'\nsurface='paper'\nmass_kg=0.246\ncom_offset_m=0.14\n"
@@ -114,6 +143,8 @@ TEST_F(Cli, PlansAThrowWithACard) {
   EXPECT_EQ(numbers["mu"]["from"], "card; sigma: assumed and card");
   EXPECT_EQ(numbers["mass"]["from"], "SKU");
   EXPECT_THAT(answer.out, HasSubstr("card's range"));
+  EXPECT_THAT(answer.out, HasSubstr("Beyond the card: surface 'paper'"));
+  EXPECT_THAT(plan["release"]["outside_valid_range"].dump(), HasSubstr("com_offset 0.14 m"));
   EXPECT_THAT(answer.out, HasSubstr("assumed"));
 }
 

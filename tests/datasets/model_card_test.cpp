@@ -178,6 +178,28 @@ TEST(ModelCard, NamesThePlaceOfAMistake) {
   EXPECT_THAT(refusal("[1]"), HasSubstr("is array, not an object"));
 }
 
+TEST(ModelCard, RefusesCovariancesThatAreNone) {
+  using Json = nlohmann::json;
+  const auto with = [](const Json& matrix) {
+    return refusal_after([&](Json& j) {
+      j["parameters"]["length"]["sigma"] = 1e-3;
+      j["parameters"]["opening_time"] = {{"value", 0.05}, {"sigma", 0.002}, {"unit", "s"}};
+      j["covariance"] = {{"names", {"mu", "length", "opening_time"}}, {"matrix", matrix}};
+    });
+  };
+  const double m = 1e-4, l = 1e-6, t = 4e-6, ml = 1e-5, mt = 2e-5,
+               lt = 2e-6;  // variances; products of sigmas
+  EXPECT_EQ(with({{m, 0.9 * ml, 0}, {0.9 * ml, l, 0}, {0, 0, t}}), "accepted");
+  EXPECT_EQ(with({{m, -ml, 0}, {-ml, l, 0}, {0, 0, t * (1 + 1e-9)}}), "accepted") << "one is the other's";
+  EXPECT_THAT(with({{m, 5 * ml, 0}, {5 * ml, l, 0}, {0, 0, t}}),
+              HasSubstr("c.json: /covariance/matrix: has the covariance 5e-05 of mu and length; accepted"));
+  EXPECT_THAT(with({{m, 0, 0}, {0, 1.1 * l, 0}, {0, 0, t}}),
+              HasSubstr("of length, whose sigma is 0.001: accepted is its square, 1e-06"));
+  // Each pair may be, all three may not: two that go along with the first, but not with each other.
+  EXPECT_THAT(with({{m, 0.9 * ml, 0.9 * mt}, {0.9 * ml, l, -0.9 * lt}, {0.9 * mt, -0.9 * lt, t}}),
+              HasSubstr("is no covariance: the least eigenvalue of its correlations is -0.8"));
+}
+
 TEST(ModelCard, CountsLinesAndColumnsOfBrokenJson) {
   EXPECT_THAT(refusal("{\n  \"schema\": ,\n}"), HasSubstr("c.json: line 2, column 13: syntax error"));
   EXPECT_THAT(refusal(""), HasSubstr("line 1, column 1"));

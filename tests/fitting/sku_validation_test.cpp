@@ -20,6 +20,7 @@ namespace {
 using testing::Contains;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 
 /// The bar of the synthetic campaigns, as its SKU file would tell it.
 datasets::Sku bar(double com_offset = 0.10) {
@@ -173,6 +174,33 @@ TEST(SkuValidation, DrawsThatTheGripLosesAreNoCurvature) {
 }
 
 // A rigid carriage is sure of an object that turns in the pads, and wrong.
+// A log without a normal force knows the product of friction and grip force, and neither of them: the landing
+// scatters as with a card that knows the force and has the product's spread on its friction.
+TEST(SkuValidation, FrictionAndForceScatterAsTheirProductDoes) {
+  constexpr double kProduct = 0.01, kEach = 0.4;  // relative sigmas
+  auto known = card();
+  known.covariance.reset();
+  known.parameters["grip_force"] = {50, {}, "N"};
+  known.parameters["mu"].sigma = kProduct * 0.5;
+  auto ridge = known;
+  const double mu = kEach * 0.5, force = kEach * 50, length = *known.parameters["length"].sigma;
+  ridge.parameters["mu"] = {0.5, mu, "-", false};
+  ridge.parameters["grip_force"] = {50, force, "N", false};
+  // var(ln mu + ln F) = 2 kEach² (1 + rho)
+  const double rho = kProduct * kProduct / (2 * kEach * kEach) - 1;
+  ridge.covariance = {
+      {"grip_force", "length", "mu"},
+      {force * force, 0, rho * mu * force, 0, length * length, 0, rho * mu * force, 0, mu * mu}};
+  const auto a = validate_sku(bar(), known, "card.json", quick(1000)),
+             b = validate_sku(bar(), ridge, "card.json", quick(1000));
+  EXPECT_NEAR(b.linear.theta / a.linear.theta, 1, 0.02);
+  EXPECT_EQ(a.lost, b.lost);
+  // Two samples of 1000: a sigma is known to 2.2 %; four of √2 of these.
+  EXPECT_NEAR(b.monte_carlo.x / a.monte_carlo.x, 1, 0.13);
+  EXPECT_NEAR(b.monte_carlo.theta / a.monte_carlo.theta, 1, 0.13);
+  EXPECT_THAT(b.disagreement, Not(HasSubstr("believe the Monte Carlo")));
+}
+
 TEST(SkuValidation, APureDelayCannotVouchForAnObjectOnALever) {
   datasets::ModelCard delay;
   delay.model = "gripper_delay";
@@ -249,8 +277,44 @@ TEST(SkuValidation, MeasuredThrowsConfirmTheRightSkuAndContradictAWrongOne) {
   EXPECT_EQ(answer.verdict, SkuVerdict::contradicted) << answer.message;
   EXPECT_THAT(answer.message, HasSubstr("measured throws"));
 
+  // So far beyond the pads that the card lets go of it before the throw: measured landings that are foretold
+  // not to be count against it.
+  auto far = bar();
+  far.com_offset = 1.9;
+  const auto never = validate_sku(far, gripper, "card.json", request);
+  ASSERT_TRUE(never.measured);
+  EXPECT_EQ(never.measured->throws.size() + static_cast<std::size_t>(never.measured->never_lands),
+            log.throws.size());
+  EXPECT_FALSE(never.measured->confirmed);
+
   request.condition = "no such";
   EXPECT_THROW(validate_sku(bar(), gripper, "card.json", request), std::invalid_argument);
+}
+
+// Throws that a card was fitted to say nothing of how well it foretells.
+TEST(SkuValidation, ItsOwnLogConfirmsACardByTheHeldOutThrowsAlone) {
+  auto design = testing_support::small_design("limit_surface_disc");
+  design.objects = {experiment::loaded_bar("bar-com100", 0.10)};
+  const auto log = experiment::generate_campaign(design, 5);
+  const auto file = std::filesystem::temp_directory_path() / "unhand_sku_own_log.h5";
+  datasets::write_throw_log(file, log);
+  auto gripper = card();
+  auto request = quick(100);
+  request.log = &log;
+  request.log_file = file.string();
+  const auto test =
+      static_cast<std::size_t>(std::count_if(log.throws.begin(), log.throws.end(), [](const auto& one) {
+        return one.split == datasets::Split::test;
+      }));
+  const auto other = validate_sku(bar(), gripper, "card.json", request);
+  gripper.log.checksum = checksum_of(file);
+  const auto own = validate_sku(bar(), gripper, "card.json", request);
+  std::filesystem::remove(file);
+  ASSERT_TRUE(other.measured);
+  EXPECT_EQ(other.measured->throws.size(), log.throws.size());
+  EXPECT_FALSE(other.measured->held_out);
+  EXPECT_THAT(own.notes, Contains(HasSubstr("the log is the card's own")));
+  EXPECT_EQ(own.measured ? own.measured->throws.size() : 0, test);
 }
 
 TEST(SkuValidation, EveryObjectOfTheCatalogueIsAnswered) {

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "planners/arm/panda.hpp"
+#include "planners/tube/held_motion.hpp"
 #include "planners/tube/plan_throw.hpp"
 #include "planners/tube/planar_hand.hpp"
 #include "planners/tube/robust_throw.hpp"
@@ -169,6 +170,151 @@ TEST(RobustThrow, IsPlannedForAPandaWithAGripper) {
   EXPECT_LT((at.q - p.start.q).norm() + (at.qd - p.start.qd).norm(), 1e-9);
   EXPECT_LT(end.qd.norm(), 1e-9);
   EXPECT_LT((robust->motion.at(robust->motion.begin).q - panda_ready()).norm(), 1e-9);
+}
+
+/// A tube throw of a bar held 0.14 m beside its centre of mass.
+struct BarThrow {
+  Chain arm = with_gripper(panda(), 0.15, 0.9);
+  TargetBox box{{1.3, 0, -0.2}};
+  ReleaseCard card;
+  HeldObject object;
+  PlanOptions options;
+
+  BarThrow() {
+    make_planar(options.search, arm);
+    options.home = panda_ready();
+    options.search.window = window_for(card);
+  }
+  ReleaseThrow release(const ThrowPlan& plan) const {
+    ReleaseThrow p{arm, plan.nominal.state, plan.qdd, box.middle};
+    p.hold = options.search.window + 1e-6;
+    p.card = card;
+    p.object = object;
+    return p;
+  }
+  PlanResult plan() const {
+    return plan_throw(with_tool(arm, {Eigen::Matrix3d::Identity(), {0, 0, object.com_offset.value}}), box,
+                      options);
+  }
+};
+
+// At its needed force the torque of the pads' ellipsoid is used up where the load is largest: the wrench from
+// the arm's own kinematics.
+TEST(HeldMotion, NeedsTheForceThatTheLargestLoadTakes) {
+  BarThrow bar;
+  const auto tube = bar.plan();
+  ASSERT_TRUE(tube.plan) << tube.reason;
+  const ReleaseThrow p = bar.release(*tube.plan);
+  const auto needed = HeldMotion(p, tube.plan->motion, 1e-3).needed_force();
+  ASSERT_TRUE(needed);
+  double most = 0;
+  for (double t = tube.plan->motion.begin; t <= 0; t += 1e-3) {
+    const auto s = tube.plan->motion.at(t);
+    const auto tip = tip_motion<double>(bar.arm, s.q, s.qd, s.qdd);
+    const Eigen::Vector3d r = 0.14 * tip.frame.R.col(2),
+                          a = tip.acceleration + tip.alpha.cross(r) + tip.omega.cross(tip.omega.cross(r)),
+                          f = p.object.mass * (a + Eigen::Vector3d(0, 0, p.medium.gravity)),
+                          torque = p.object.inertia * tip.alpha + r.cross(f);
+    // f² + (τ/L)² = (n μ N)²
+    most = std::max(most, std::hypot(f.norm(), torque.y() / p.card.length));
+  }
+  EXPECT_NEAR(*needed, most / (p.card.pads * p.card.mu.value), 5e-3 * *needed);
+  ReleaseThrow weaker = p;
+  weaker.card.grip_force = 0.99 * *needed;
+  EXPECT_FALSE(HeldMotion(weaker, tube.plan->motion).holds(nominal_draw(p)));
+  EXPECT_THAT(why_not_held(weaker, tube.plan->motion), testing::HasSubstr("needs at least"));
+  weaker.card.grip_force = 1.01 * *needed;
+  EXPECT_TRUE(HeldMotion(weaker, tube.plan->motion).holds(nominal_draw(p)));
+}
+
+// A draw that slips while the arm swings has no landing, wherever a release from rest in the hand would go.
+TEST(HeldMotion, DrawsThatSlipBeforeTheGripperOpensAreLost) {
+  BarThrow bar;
+  const auto tube = bar.plan();
+  ASSERT_TRUE(tube.plan) << tube.reason;
+  ReleaseThrow p = bar.release(*tube.plan);
+  p.card.grip_force = *HeldMotion(p, tube.plan->motion).needed_force();
+  const HeldMotion before(p, tube.plan->motion);
+  const Landings drawn = draw_landings(p, 200, 1, &before);
+  EXPECT_GT(drawn.lost, 60);  // half of the draws have less friction, or a longer lever
+  EXPECT_LT(drawn.lost, 140);
+  p.card.grip_force = 1;
+  EXPECT_EQ(draw_landings(p, 50, 1).lost, 50) << "slips at t = 0";
+}
+
+TEST(RobustThrow, IsNotPlannedWhereTheGripDoesNotHold) {
+  BarThrow bar;
+  const auto tube = bar.plan();
+  ASSERT_TRUE(tube.plan) << tube.reason;
+  ReleaseThrow p = bar.release(*tube.plan);
+  p.card.grip_force = 1;
+  std::string reason;
+  EXPECT_FALSE(plan_robust_throw(p, bar.options, &reason));
+  EXPECT_THAT(reason, testing::HasSubstr("a grip of 1 N per pad lets the object slip before"));
+}
+
+// A bar whose centre of mass is behind the pads: the tube's motion stays above the base, the fastest one to
+// the insensitive throw would dip the pads below it.
+TEST(RobustThrow, StaysAboveItsBase) {
+  BarThrow bar;
+  bar.box = {{1.0, 0, -0.1}};
+  bar.card = {"limit_surface_disc", {0.5004, 0.022},  0.007066, 2, 59.81,
+              {0.01002, 0.0015},    {0.0704, 0.0014}, 2.0};
+  bar.card.grasp_angle = 8.6e-4;
+  bar.object = {0.246, 1.21e-3, {-0.1, 0.002}};
+  bar.options.search.window = 0.1;
+  const auto tube = bar.plan();
+  ASSERT_TRUE(tube.plan) << tube.reason;
+  const auto robust = plan_robust_throw(bar.release(*tube.plan), bar.options);
+  if (!robust) return;  // none stays above it
+  double lowest = INFINITY;
+  for (double t = robust->motion.begin; t <= robust->motion.end(); t += 1e-3) {
+    const auto tip = forward_kinematics(bar.arm, robust->motion.at(t).q);
+    lowest = std::min({lowest, tip.p.z(), tip.p.z() - 0.1 * tip.R(2, 2)});
+  }
+  EXPECT_GT(lowest, 0);
+  EXPECT_NEAR(robust->limits.lowest, lowest, 0.1);
+}
+
+TEST(RobustThrow, SaysWhyThereIsNothingToMinimise) {
+  BarThrow bar;
+  const auto tube = bar.plan();
+  ASSERT_TRUE(tube.plan) << tube.reason;
+  ReleaseThrow p = bar.release(*tube.plan);
+  p.card.dead_time.sigma = 0.2;  // longer than the motion goes on
+  std::string reason;
+  EXPECT_FALSE(plan_robust_throw(p, bar.options, &reason));
+  EXPECT_THAT(reason, testing::HasSubstr("a draw of dead_time within its spread does not land"));
+}
+
+// Friction known to no better than its own size and more: draws stay within what pads may have.
+TEST(ReleaseThrow, DrawsFrictionThatPadsMayHave) {
+  const Chain arm = pads();
+  ReleaseThrow p = swing(arm);
+  p.card.mu.sigma = 20;
+  EXPECT_NO_THROW(draw_landings(p, 50, 1));
+  EXPECT_NO_THROW(make_insensitive(p, {{1, 3, 5}, 1}));
+}
+
+TEST(ReleaseCard, NamesTheSigmasThatItPassesOver) {
+  datasets::ModelCard card;
+  card.model = "sliding_pivot";
+  card.parameters = {{"mu", {0.6, 0.03, "-"}}, {"length", {0.008, 1e-3, "m"}}, {"shape", {2, 0.1, "-"}}};
+  EXPECT_THAT(release_card(card, "card.json").passed_over, testing::ElementsAre("length", "shape"));
+}
+
+// What the search offers first strains the grip; a plan over which it holds comes after, or none does.
+TEST(PlanThrow, PassesOverMotionsThatAreRefused) {
+  BarThrow bar;
+  int refused = 0;
+  bar.options.refuse = [&](const ThrowPlan&) { return refused++ < 5 ? "not this one" : ""; };
+  const auto plan = bar.plan();
+  ASSERT_TRUE(plan.plan);
+  EXPECT_GT(plan.tried, 1);
+  bar.options.refuse = [](const ThrowPlan&) { return "none"; };
+  const auto none = bar.plan();
+  EXPECT_EQ(none.outcome, PlanOutcome::no_motion);
+  EXPECT_EQ(none.reason, "none");
 }
 
 TEST(ReleaseThrow, TakesModelCards) {
