@@ -227,6 +227,57 @@ TEST(FallDiscovery, AWildFallIsSetAsideAndNamed) {
   }
 }
 
+// A sensor that rounds to steps of five times its noise: the samples of a fall stand still, and what they are
+// off by is half a step at most.
+TEST(FallDiscovery, ASensorThatRoundsHasTheNoiseOfItsSteps) {
+  constexpr double step = 0.15;
+  auto log = falls({-0.9, 0.4, 0.05, 0.045, 0}, 30, 2);
+  for (auto& one : log.throws) {
+    one.imu->specific_force.sigma = {};
+    for (double& f : one.imu->specific_force.data) f = step * std::round(f / step);
+  }
+  const FallProblem problem(log);
+  for (std::size_t a = 0; a < 3; ++a) EXPECT_GE(problem.sigma(0)[a], 0.999 * step / std::sqrt(12.0));
+  const auto found = discover_falls(log, {});
+  const auto *bias = named(found, "sensor.accelerometer_bias"), *drag = named(found, "flight.quadratic_drag");
+  ASSERT_NE(bias, nullptr);
+  ASSERT_NE(drag, nullptr);
+  EXPECT_EQ(named(found, "sensor.accelerometer_drift"), nullptr);
+  EXPECT_NEAR(value_of(*drag, "k[phone]"), 0.045, 0.004);
+  EXPECT_NEAR(value_of(*bias, "x"), -0.9, step / 2);
+  EXPECT_NEAR(value_of(*bias, "y"), 0.4, step / 2);
+  EXPECT_TRUE(std::any_of(found.evidence.begin(), found.evidence.end(), [](const Evidence& e) {
+    return e.text.starts_with("force_y of phone reads in steps of 0.15");
+  }));
+}
+
+// What an axis reads at the end of its range, or all the time, says nothing of the falls.
+TEST(FallDiscovery, AnAxisThatIsCutOffOrDeadIsLeftOut) {
+  const auto whole = falls({-0.9, 0.4, 0.05, 0.045, 0}, 30, 2);
+  for (const double highest : {-0.9, 9.0}) {  // above half of the noise; a dead axis
+    auto log = whole;
+    for (auto& one : log.throws)
+      for (std::size_t i = 0; i < one.imu->specific_force.data.size(); i += 3) {
+        double& f = one.imu->specific_force.data[i];
+        f = highest > 0 ? 1.5 : std::min(f, highest);
+      }
+    const auto found = discover_falls(log, {});
+    const auto *bias = named(found, "sensor.accelerometer_bias"),
+               *drag = named(found, "flight.quadratic_drag");
+    ASSERT_NE(bias, nullptr);
+    ASSERT_NE(drag, nullptr);
+    EXPECT_EQ(bias->parameters.size(), 2U);  // y and z
+    EXPECT_NEAR(value_of(*bias, "y"), 0.4, 0.02);
+    EXPECT_NEAR(value_of(*drag, "k[phone]"), 0.045, 0.003);
+    EXPECT_TRUE(std::none_of(found.misfit.begin(), found.misfit.end(),
+                             [](const MeasuredMisfit& m) { return m.channel == "force_x"; }));
+    EXPECT_TRUE(std::any_of(found.evidence.begin(), found.evidence.end(), [](const Evidence& e) {
+      return e.text.starts_with("force_x of phone") && e.text.ends_with("left out of 30 falls");
+    }));
+    for (const auto& m : found.misfit) EXPECT_LT(m.after_test, 1.5) << m.channel;
+  }
+}
+
 TEST(FallDiscovery, ADriftIsNotDrag) {
   const auto found = discover_falls(falls({0, 0, 0, 0, 1.0}, 30, 3), {});
   ASSERT_EQ(found.verdict, Verdict::effect_found);
