@@ -87,26 +87,16 @@ double scatter_of(const std::vector<Vec3<double>>& x, std::size_t axis) {
   return std::sqrt(sum / static_cast<double>(x.size() - 3));
 }
 
+/// Whether a throw that has a free flight is in it at this time [s].
+bool falls_at(const datasets::Throw& one, double time) {
+  return time >= one.free_flight->first - 1e-9 && time <= one.free_flight->second + 1e-9;
+}
+
 /// An axis of an object over all its recordings: between which values it reads, and on which grid.
 struct Axis {
   double low{}, high{}, step{};  // step: 0 on none [m/s²]
+  std::string fault;             // why it says nothing of most falls, or nothing
 };
-
-/// By object and axis, of throws that have falls.
-std::map<std::string, std::array<Axis, 3>> axes_of(const datasets::ThrowLog& log) {
-  std::map<std::string, std::array<std::vector<double>, 3>> readings;
-  for (const auto& one : log.throws)
-    if (one.imu && one.free_flight)
-      for (std::size_t i = 0; i < one.imu->time.rows; ++i)
-        for (std::size_t a = 0; a < 3; ++a) readings[one.object][a].push_back(one.imu->specific_force(i, a));
-  std::map<std::string, std::array<Axis, 3>> out;
-  for (const auto& [object, of] : readings)
-    for (std::size_t a = 0; a < 3; ++a) {
-      const auto [low, high] = std::minmax_element(of[a].begin(), of[a].end());
-      out[object][a] = {*low, *high, dynamics::quantisation_step(of[a])};
-    }
-  return out;
-}
 
 /// Why an axis says nothing of a fall, or nothing. One of a single value does not, unless that is all that
 /// its grid can tell; nor does one that is cut off: most often it reads a value that none of the recordings
@@ -124,6 +114,42 @@ std::string fault_in(const std::vector<Vec3<double>>& force, std::size_t axis, c
       times >= kLeast && static_cast<double>(times) >= kPile * static_cast<double>(force.size());
   if (values.size() >= kValues && at_the_end && piles) return fmt::format("is cut off at {:.4g} m/s²", value);
   return {};
+}
+
+/// By object and axis, of throws that have falls. What says nothing of most falls is not asked in the others:
+/// they are the exception.
+std::map<std::string, std::array<Axis, 3>> axes_of(const datasets::ThrowLog& log) {
+  struct Readings {
+    std::array<std::vector<double>, 3> all;
+    std::vector<std::vector<Vec3<double>>> falls;
+  };
+  std::map<std::string, Readings> readings;
+  for (const auto& one : log.throws) {
+    if (!one.imu || !one.free_flight) continue;
+    Readings& of = readings[one.object];
+    auto& fall = of.falls.emplace_back();
+    for (std::size_t i = 0; i < one.imu->time.rows; ++i) {
+      const Vec3<double> f{one.imu->specific_force(i, 0), one.imu->specific_force(i, 1),
+                           one.imu->specific_force(i, 2)};
+      for (std::size_t a = 0; a < 3; ++a) of.all[a].push_back(f[a]);
+      if (falls_at(one, one.imu->time(i))) fall.push_back(f);
+    }
+    if (fall.empty()) of.falls.pop_back();
+  }
+  std::map<std::string, std::array<Axis, 3>> out;
+  for (const auto& [object, of] : readings)
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto [low, high] = std::minmax_element(of.all[a].begin(), of.all[a].end());
+      if (low == of.all[a].end()) continue;
+      Axis& axis = out[object][a];
+      axis = {*low, *high, dynamics::quantisation_step(of.all[a]), {}};
+      std::string fault;
+      std::size_t faulty = 0;
+      for (const auto& fall : of.falls)
+        if (auto why = fault_in(fall, a, axis); !why.empty()) fault = std::move(why), ++faulty;
+      if (2 * faulty > of.falls.size()) axis.fault = fault;
+    }
+  return out;
 }
 
 }  // namespace
@@ -169,8 +195,7 @@ FallProblem::FallProblem(const datasets::ThrowLog& log) : gravity_(log.gravity) 
     Fall fall;
     std::optional<std::size_t> first;
     for (std::size_t i = 0; i < imu.time.rows; ++i) {
-      if (imu.time(i) < one.free_flight->first - 1e-9 || imu.time(i) > one.free_flight->second + 1e-9)
-        continue;
+      if (!falls_at(one, imu.time(i))) continue;
       if (!first) first = i;
       fall.time.push_back(imu.time(i) - imu.time(*first));
       fall.force.push_back({imu.specific_force(i, 0), imu.specific_force(i, 1), imu.specific_force(i, 2)});
@@ -194,7 +219,8 @@ FallProblem::FallProblem(const datasets::ThrowLog& log) : gravity_(log.gravity) 
       const double scatter = declared && imu.specific_force.sigma[a] > 0 ? imu.specific_force.sigma[a]
                                                                          : scatter_of(fall.force, a);
       fall.sigma[a] = std::max(scatter, dynamics::rounding_sigma(known[a].step));
-      if (const auto fault = fault_in(fall.force, a, known[a]); !fault.empty()) {
+      if (const auto fault = known[a].fault.empty() ? fault_in(fall.force, a, known[a]) : known[a].fault;
+          !fault.empty()) {
         faults += fmt::format("{}{} {}", faults.empty() ? "" : ", ", channels_[a], fault);
         ++left_out[fmt::format("{} of {} {}", channels_[a], one.object, fault)];
         continue;
@@ -225,8 +251,8 @@ FallProblem::FallProblem(const datasets::ThrowLog& log) : gravity_(log.gravity) 
     for (std::size_t a = 0; a < 3; ++a)
       if (of[a] > 0)
         notes_.push_back(fmt::format(
-            "{} of {} reads in steps of {:.3g} m/s², and its noise reaches over less than one in {} "
-            "falls: there, a constant is known to half a step, whatever its interval",
+            "{} of {} reads in steps of {:.3g} m/s², and in {} falls its noise is less than half of one: "
+            "what is constant is known to half a step there, whatever its interval",
             channels_[a], object, axes.at(object)[a].step, of[a]));
   if (groups_.empty())
     throw std::invalid_argument("falls: no throw is one" +
