@@ -312,7 +312,7 @@ Command discover_command(Parser& root) {
       .with_commas();
   parser
       .option("--matters", options->matters,
-              "Least fall of chi2 per sample on held-out throws for an effect to count")
+              "Throws from a hand: least fall of chi2 per sample on held-out ones for an effect to count")
       .range(1e-3, 1e3)
       .with_default();
   parser.option("--most", options->most, "Most effects to add (3 for planar throws, 6 for other logs)")
@@ -320,7 +320,7 @@ Command discover_command(Parser& root) {
   parser.option("--floor", options->floor, "Free flights: height of the floor that boxes come to rest on [m]")
       .range(-1e3, 1e3)
       .with_default();
-  parser.option("--rtol", options->tolerance, "Relative tolerance of the integration")
+  parser.option("--rtol", options->tolerance, "Throws from a hand: relative tolerance of the integration")
       .range(1e-10, 1e-3)
       .with_default();
   add_threads(parser, options->threads);

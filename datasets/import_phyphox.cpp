@@ -7,11 +7,13 @@
 #include <filesystem>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "datasets/csv.hpp"
 #include "datasets/median_step.hpp"
 #include "datasets/near_miss.hpp"
 #include "dynamics/median.hpp"
+#include "dynamics/quantisation.hpp"
 #include "dynamics/third_difference.hpp"
 
 namespace unhand::datasets {
@@ -183,7 +185,8 @@ std::string fault_of(const ImuLog& imu, const Stretch& stretch, const PhyphoxOpt
   return {};
 }
 
-/// The independent noise of each axis, from third differences.
+/// The independent noise of each axis, from third differences; not below what rounding to the grid of the
+/// recording's readings adds.
 std::vector<double> estimate_sigma(const Series& values, const std::vector<Stretch>& falls) {
   std::vector<double> out;
   for (std::size_t j = 0; j < values.cols; ++j) {
@@ -194,7 +197,10 @@ std::vector<double> estimate_sigma(const Series& values, const std::vector<Stret
         sum += dynamics::third_difference_variance(values(i - 3, j), values(i - 2, j), values(i - 1, j),
                                                    values(i, j));
     if (n < 8) return {};
-    out.push_back(std::sqrt(sum / static_cast<double>(n)));
+    std::vector<double> readings;
+    for (std::size_t i = 0; i < values.rows; ++i) readings.push_back(values(i, j));
+    out.push_back(std::max(std::sqrt(sum / static_cast<double>(n)),
+                           dynamics::rounding_sigma(dynamics::quantisation_step(std::move(readings)))));
   }
   return out;
 }

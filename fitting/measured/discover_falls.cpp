@@ -30,7 +30,7 @@ MeanResidual mean_residual(const FallProblem& problem, const GroupedFit& fit) {
       if (rows[j].channel >= 0) {
         const auto a = static_cast<std::size_t>(rows[j].channel);
         mean[a] -= fit.groups[i].residual[static_cast<Eigen::Index>(j)] * problem.sigma(i)[a];
-        n += 1.0 / 3;
+        n += 1.0 / static_cast<double>(problem.axes(i).size());
       }
     for (double& x : mean) x /= n;
     means.push_back(mean);
@@ -80,6 +80,7 @@ void weigh_start_speeds(const datasets::ThrowLog& log, const FallProblem& proble
 
 void explain(const datasets::ThrowLog& log, const FallProblem& problem, const EffectSearch& search,
              MeasuredDiscovery& out) {
+  for (const std::string& note : problem.notes()) out.evidence.push_back({"", note, false});
   const auto [common, scatter] = mean_residual(problem, search.final);
   const double largest = std::max({scatter[0], scatter[1], scatter[2]});
   out.evidence.push_back(

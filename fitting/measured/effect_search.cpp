@@ -14,7 +14,7 @@
 namespace unhand::fitting {
 
 using datasets::Split;
-using dynamics::congruent, dynamics::pseudo_inverse, dynamics::pseudo_solve;
+using dynamics::congruent, dynamics::pseudo_inverse;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -100,9 +100,12 @@ class Search {
         catalogue_.push_back(std::move(effect));
   }
 
-  /// One step: false if nothing convinces. `refits`: candidates fitted in full.
-  bool forward(int refits) {
-    const auto effects = inactive();
+  /// One step: false if nothing convinces. `refits`: candidates fitted in full; `only`: of these ids, if any.
+  bool forward(int refits, const std::vector<std::string>& only = {}) {
+    auto effects = inactive();
+    if (!only.empty())
+      std::erase_if(effects,
+                    [&](const auto& e) { return std::find(only.begin(), only.end(), e.id) == only.end(); });
     if (effects.empty()) return false;
     const auto f = grouped_footprints(problem_, out_.final, effects, options_.fit);
     const auto scored = first_order(f);
@@ -110,7 +113,8 @@ class Search {
     compare_with_best(f.total, scored);
     const double level = options_.family_wise_level / static_cast<double>(scored.size());
     kept_at_ = std::max(kept_at_, level);
-    return accept_best(convincing(f.total, leaders(f.total, scored, level, refits), effects, level));
+    return accept_best(evident(f.total, leaders(f.total, scored, level, refits), effects, level),
+                       silent(f.total, effects));
   }
 
   /// As far as forward() goes. A step may not have known which of two effects it was: both are as evident,
@@ -120,15 +124,27 @@ class Search {
   void follow() {
     climb();
     const auto rivals = std::move(rivals_);
-    for (const EffectSearch& rival : rivals) {
+    for (const Rival& rival : rivals) {
       if (!(left(out_.final_test) > kMisfit)) return;
-      if (static_cast<int>(rival.effects.size()) >= options_.most_effects) continue;
-      EffectSearch first = std::exchange(out_, rival);
-      if (forward(1)) climb();  // by what it makes room for
-      const bool better = left(out_.final_test) < kBetter * left(first.final_test) &&
+      if (static_cast<int>(rival.answer.effects.size()) >= options_.most_effects) continue;
+      EffectSearch first = std::exchange(out_, rival.answer);
+      auto shown_from = std::exchange(shown_from_, rival.shown_from);
+      const bool stands = rival.opens.empty() ? (climb_from_one(), true) : opened(rival);
+      const bool better = stands && left(out_.final_test) < kBetter * left(first.final_test) &&
                           left(out_.final) < kBetter * left(first.final);
-      if (!better) out_ = std::move(first);
+      if (better) continue;
+      out_ = std::move(first);
+      shown_from_ = std::move(shown_from);
     }
+  }
+
+  /// What groups show most alike is evident, and need not be what explains most: three numbers of a drift
+  /// stand in for a drag and a bias until the bias is found. Where a misfit is left, every accepted effect
+  /// that no other one needs is exchanged for the candidate that takes most in its place, if all groups are
+  /// explained the better for it.
+  void exchange() {
+    for (std::size_t i = 0; i < out_.effects.size(); ++i)
+      if (left(out_.final_test) > kMisfit && !is_needed(out_.effects[i].id) && exchanged(i)) climb();
   }
 
   void backward() {
@@ -138,15 +154,7 @@ class Search {
         const std::string id = out_.effects[i].id;
         if (is_needed(id)) continue;
         if (wald_of(out_.final, id).p_value(out_.final) < kept_at_) continue;
-        std::vector<SharedParameter> shared;
-        std::vector<double> values;
-        for (std::size_t k = 0; k < out_.final.shared.size(); ++k)
-          if (out_.final.shared[k].effect != id)
-            shared.push_back(out_.final.shared[k]),
-                values.push_back(out_.final.values[static_cast<Index>(k)]);
-        auto without = fit_groups(
-            problem_, Split::train, shared,
-            Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size())), options_.fit);
+        auto without = fit_without(problem_, out_.final, id, options_.fit);
         if (!without.solved) continue;
         auto held_out = fit_own(problem_, Split::test, without, options_.fit);
         if (!held_out.solved) continue;
@@ -179,8 +187,10 @@ class Search {
         const auto shown = shown_from_.find(candidate.id);
         if (shown == shown_from_.end() || shown->second > i) continue;  // it needs what was found later
         if (!problem_.may_act(candidate.id, accepted_without(accepted.id))) continue;
-        const double r = correlation(f.total, contribution, candidate);
-        if (r < options_.equivalent || is_spoken_for(f.total, accepted.id, candidate)) continue;
+        const Candidate own = unspoken(f.total, accepted.id, candidate);
+        if (own.columns.empty()) continue;
+        const double r = correlation(f.total, contribution, own);
+        if (r < options_.equivalent) continue;
         accepted.add_other_name(candidate.id, r);
       }
     }
@@ -269,9 +279,19 @@ class Search {
     return out;
   }
 
-  /// Those that a fit in full finds evident and that matter on held-out groups, the most evident one first.
-  std::vector<EffectTrial> convincing(const Footprints& f, const std::vector<Scored>& leaders,
-                                      const std::vector<dynamics::Effect>& effects, double level) {
+  /// Of `effects`, those that no channel shows yet.
+  std::vector<dynamics::Effect> silent(const Footprints& f,
+                                       const std::vector<dynamics::Effect>& effects) const {
+    const auto ids = silent_ids(f);
+    std::vector<dynamics::Effect> out;
+    for (const auto& effect : effects)
+      if (std::find(ids.begin(), ids.end(), effect.id) != ids.end()) out.push_back(effect);
+    return out;
+  }
+
+  /// Those that a fit in full finds evident on train groups, the most evident one first.
+  std::vector<EffectTrial> evident(const Footprints& f, const std::vector<Scored>& leaders,
+                                   const std::vector<dynamics::Effect>& effects, double level) {
     std::vector<EffectTrial> out;
     for (const Scored& s : leaders) {
       const Candidate& c = f.candidates[s.candidate];
@@ -283,37 +303,119 @@ class Search {
       r.refit_step = this_step(), r.delta_bic = trial.delta_bic, r.held_out_gain = trial.held.fall();
       if (!trial.fit.solved || !(trial.p < level) || shape_is_open(trial.fit, c.id)) continue;
       if (is_pinned(trial.fit) || !problem_.may_be(trial.fit)) continue;
-      if (trial.held.share > options_.matters) out.push_back(std::move(trial));
+      out.push_back(std::move(trial));
     }
     std::sort(out.begin(), out.end(),
               [](const EffectTrial& a, const EffectTrial& b) { return a.delta_bic < b.delta_bic; });
     return out;
   }
 
+  bool matters(const HeldOutFall& held) const { return held.share > options_.matters; }
+  bool is_confirmed(const HeldOutFall& held) const { return matters(held) && held.p < 0.05; }
+
   /// The most evident one that held-out groups confirm, unless another one that they confirm, with at least
-  /// half its evidence, explains them better by a tenth and the train groups no worse; others as evident are
-  /// kept as its rivals. False if there is none.
-  bool accept_best(const std::vector<EffectTrial>& trials) {
+  /// half its evidence, explains them better by a tenth and the train groups no worse. Kept as its rivals are
+  /// others as evident, and those through which others act that no channel shows yet. False if there is none.
+  bool accept_best(const std::vector<EffectTrial>& trials, const std::vector<dynamics::Effect>& silent) {
     auto best = trials.end();
     double most = 0;  // evidence
     for (auto trial = trials.begin(); trial != trials.end(); ++trial) {
-      if (!(trial->held.p < 0.05)) continue;
+      if (!is_confirmed(trial->held)) continue;
       if (best == trials.end())
         best = trial, most = trial->delta_bic;
       else if (trial->delta_bic < kComparable * most && trial->held.is < kBetter * best->held.is &&
                left(trial->fit) <= left(best->fit))
         best = trial;
     }
+    for (auto trial = trials.begin(); trial != trials.end(); ++trial) {
+      if (trial == best) continue;
+      const bool alike =
+          best != trials.end() && matters(trial->held) && trial->delta_bic < best->delta_bic + kAlike;
+      const auto opens =
+          left(trial->test) > kMisfit ? shown_beside(*trial, silent) : std::vector<std::string>{};
+      if (alike) rivals_.push_back(rival_with(*trial, {}));
+      if (!opens.empty()) rivals_.push_back(rival_with(*trial, opens));
+    }
     if (best == trials.end()) return false;
-    for (const EffectTrial& trial : trials)
-      if (trial.id != best->id && trial.delta_bic < best->delta_bic + kAlike) {
-        rivals_.push_back(out_);
-        accept(trial, rivals_.back());
-      }
     accept(*best, out_);
     return true;
   }
 
+  /// Whether accepted effect i was exchanged for another one; the new one is the last.
+  bool exchanged(std::size_t i) {
+    const std::string id = out_.effects[i].id;
+    auto without = out_;
+    without.effects.erase(without.effects.begin() + static_cast<std::ptrdiff_t>(i));
+    without.final = fit_without(problem_, out_.final, id, options_.fit);
+    if (!without.final.solved) return false;
+    without.final_test = fit_own(problem_, Split::test, without.final, options_.fit);
+    if (!without.final_test.solved) return false;
+    EffectSearch first = std::exchange(out_, std::move(without));
+    auto shown_from = shown_from_;
+    auto effects = inactive();
+    std::erase_if(effects, [&](const auto& e) { return e.id == id; });
+    const auto f = grouped_footprints(problem_, out_.final, effects, options_.fit);
+    const auto scored = first_order(f);
+    if (!scored.empty() && scored.front().gain > 0) {
+      const auto trials = evident(f.total, {scored.front()}, effects,
+                                  options_.family_wise_level / static_cast<double>(scored.size()));
+      if (!trials.empty() && is_confirmed(trials.front().held) &&
+          left(trials.front().test) < kBetter * left(first.final_test) &&
+          left(trials.front().fit) < kBetter * left(first.final)) {
+        accept(trials.front(), out_);
+        return true;
+      }
+    }
+    out_ = std::move(first);
+    shown_from_ = std::move(shown_from);
+    return false;
+  }
+
+  /// An answer with another effect in the place of the accepted one. `opens`: ids of effects that act through
+  /// it, of which one has to be found beside it; the held-out groups need not have shown it alone.
+  struct Rival {
+    EffectSearch answer;
+    std::map<std::string, std::size_t> shown_from;
+    std::vector<std::string> opens;
+    GroupedFit before, before_test;  ///< without it
+  };
+  Rival rival_with(const EffectTrial& trial, const std::vector<std::string>& opens) const {
+    Rival out{out_, shown_from_, opens, out_.final, out_.final_test};
+    accept(trial, out.answer);
+    return out;
+  }
+
+  /// The ids of those of `silent` that a channel shows once the trial's effect is there.
+  std::vector<std::string> shown_beside(const EffectTrial& trial,
+                                        const std::vector<dynamics::Effect>& silent) const {
+    std::vector<std::string> out;
+    if (silent.empty()) return out;
+    const auto f = grouped_footprints(problem_, trial.fit, silent, options_.fit);
+    const auto still = silent_ids(f.total);
+    for (const auto& effect : silent)
+      if (std::find(still.begin(), still.end(), effect.id) == still.end()) out.push_back(effect.id);
+    return out;
+  }
+
+  /// From the answer of a rival on: one that acts through its last effect, whether held-out groups confirm
+  /// the two together, and what else there is.
+  bool opened(const Rival& rival) {
+    const std::string id = out_.effects.back().id;
+    if (!forward(options_.refits, rival.opens)) return false;
+    const HeldOutFall both =
+        held_out_fall(problem_, rival.before, rival.before_test, out_.final, out_.final_test);
+    if (!is_confirmed(both) || !(wald_of(out_.final, id).p_value(out_.final) < kept_at_)) return false;
+    AcceptedEffect& first = out_.effects[out_.effects.size() - 2];
+    first.test_error_ratio = std::sqrt(both.is / both.was);
+    first.why = fmt::format("with {} chi2 per sample falls from {:.4g} to {:.4g} (p {:.1g})",
+                            out_.effects.back().id, both.was, both.is, both.p);
+    climb();
+    return true;
+  }
+
+  void climb_from_one() {
+    if (forward(1)) climb();  // by what it makes room for
+  }
   void climb() {
     while (static_cast<int>(out_.effects.size()) < options_.most_effects && forward(options_.refits)) {
     }
@@ -324,16 +426,29 @@ class Search {
       if (catalogue_[k].id == id) return k;
     return catalogue_.size();
   }
-  /// What the other accepted effects do already leaves (almost) nothing of the candidate's footprint.
-  bool is_spoken_for(const Footprints& f, const std::string& accepted, const Candidate& candidate) const {
+  /// A candidate without the parameters of which what the other accepted effects do leaves (almost) nothing:
+  /// a wind along the vertical beside a scale. What is left of those is rounding, which is like anything.
+  /// Without any, where that holds of all of them together.
+  Candidate unspoken(const Footprints& f, const std::string& accepted, const Candidate& candidate) const {
+    constexpr double kNothing = 1e-2;
     std::vector<Index> others;
     for (std::size_t k = 0; k < f.fitted; ++k)
       if (out_.final.shared[k].effect != accepted) others.push_back(static_cast<Index>(k));
-    if (others.empty()) return false;
+    if (others.empty()) return candidate;
     const auto own = indices(candidate.columns);
-    const MatrixXd cross = f.gram(others, own), whole = f.gram(own, own);
-    const MatrixXd taken = congruent(cross.transpose(), pseudo_inverse(f.gram(others, others)));
-    return whole.trace() - taken.trace() < 1e-2 * whole.trace();
+    const VectorXd whole = f.gram(own, own).diagonal(),
+                   rest = whole -
+                          congruent(MatrixXd(f.gram(own, others)), pseudo_inverse(f.gram(others, others)))
+                              .diagonal();
+    Candidate out{candidate.id, {}, {}, candidate.shape, {}};
+    if (rest.sum() < kNothing * whole.sum()) return out;
+    for (std::size_t j = 0; j < candidate.columns.size(); ++j) {
+      if (const auto k = static_cast<Index>(j); !(rest[k] > kNothing * whole[k])) continue;
+      out.parameters.push_back(candidate.parameters[j]);
+      out.columns.push_back(candidate.columns[j]);
+      out.sides.push_back(candidate.sides[j]);
+    }
+    return out;
   }
   std::vector<dynamics::Effect> inactive() const {
     std::vector<dynamics::Effect> out;
@@ -388,8 +503,8 @@ class Search {
   EffectSearch& out_;
   std::vector<dynamics::Effect> catalogue_;
   std::map<std::string, std::size_t> shown_from_;  ///< after how many effects one first had a footprint
-  double kept_at_{};  ///< the loosest level of any step: what was accepted at it is kept at it
-  std::vector<EffectSearch> rivals_;  ///< with another effect, as evident, in the place of the accepted one
+  double kept_at_{};           ///< the loosest level of any step: what was accepted at it is kept at it
+  std::vector<Rival> rivals_;  ///< of what was accepted
 };
 
 std::string why_not(const GroupedProblem& problem, Split split) {
@@ -397,8 +512,9 @@ std::string why_not(const GroupedProblem& problem, Split split) {
   for (const auto& group : problem.groups())
     if (group.split == split) return fmt::format("no throw of split '{}' could be fitted", name);
   return fmt::format(
-      "no throw has the split '{}', of {}: effects are found on train, and judged on test; `unhand import "
-      "--test-every N` holds out every Nth of a condition, 5 if not said",
+      "no throw has the split '{}', of {}: effects are found on train, and judged on test. Where a log "
+      "declares none, every fifth is held out, condition by condition: record five or more, or declare the "
+      "split in the log",
       name, problem.groups().size());
 }
 
@@ -417,6 +533,7 @@ EffectSearch search_effects(const GroupedProblem& problem, const EffectSearchOpt
   out.final_test = out.base_test;
   Search search(problem, options, out);
   search.follow();
+  search.exchange();
   search.backward();
   search.describe();
   std::sort(out.ranking.begin(), out.ranking.end(),

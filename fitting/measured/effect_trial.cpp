@@ -149,6 +149,23 @@ HeldOutFall held_out(const GroupedProblem& problem, const GroupedFit& before, co
 
 }  // namespace
 
+GroupedFit fit_without(const GroupedProblem& problem, const GroupedFit& fit, const std::string& id,
+                       const GroupedFitOptions& options) {
+  std::vector<SharedParameter> shared;
+  std::vector<double> values;
+  for (std::size_t k = 0; k < fit.shared.size(); ++k)
+    if (fit.shared[k].effect != id)
+      shared.push_back(fit.shared[k]), values.push_back(fit.values[static_cast<Index>(k)]);
+  return fit_groups(problem, Split::train, shared,
+                    Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size())), options);
+}
+
+HeldOutFall held_out_fall(const GroupedProblem& problem, const GroupedFit& before,
+                          const GroupedFit& before_test, const GroupedFit& after,
+                          const GroupedFit& after_test) {
+  return held_out(problem, before_test, after_test, slope_of(all_along(problem, before, after)));
+}
+
 EffectTrial try_effect(const GroupedProblem& problem, const GroupedFit& fit, const GroupedFit& test,
                        const Candidate& candidate, const VectorXd& step, const dynamics::Effect& effect,
                        const GroupedFitOptions& options) {
@@ -170,8 +187,7 @@ EffectTrial try_effect(const GroupedProblem& problem, const GroupedFit& fit, con
   const Wald wald = wald_of(out.fit, effect.id);
   out.p = wald.p_value(out.fit);
   out.delta_bic = wald.delta_bic(out.fit);
-  if (out.test.solved)
-    out.held = held_out(problem, test, out.test, slope_of(all_along(problem, fit, out.fit)));
+  if (out.test.solved) out.held = held_out_fall(problem, fit, test, out.fit, out.test);
   return out;
 }
 

@@ -21,6 +21,13 @@ struct EffectTrial {
   double p{1}, delta_bic{};
   HeldOutFall held;
 };
+/// The fit of the train groups without one of its effects, the others fitted again.
+GroupedFit fit_without(const GroupedProblem& problem, const GroupedFit& fit, const std::string& id,
+                       const GroupedFitOptions& options);
+/// On the held-out groups, by the shared parameters of two fits of the train groups: `before` and `after`.
+HeldOutFall held_out_fall(const GroupedProblem& problem, const GroupedFit& before,
+                          const GroupedFit& before_test, const GroupedFit& after,
+                          const GroupedFit& after_test);
 /// Starts at `step` from neutral, the shape parameters at the candidate's.
 EffectTrial try_effect(const GroupedProblem& problem, const GroupedFit& fit, const GroupedFit& test,
                        const Candidate& candidate, const Eigen::VectorXd& step,

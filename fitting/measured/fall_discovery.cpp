@@ -3,11 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
+#include "dynamics/quantisation.hpp"
 #include "dynamics/third_difference.hpp"
 #include "flight/quaternion.hpp"
 #include "flight/spatial_effects.hpp"
@@ -83,6 +87,71 @@ double scatter_of(const std::vector<Vec3<double>>& x, std::size_t axis) {
   return std::sqrt(sum / static_cast<double>(x.size() - 3));
 }
 
+/// Whether a throw that has a free flight is in it at this time [s].
+bool falls_at(const datasets::Throw& one, double time) {
+  return time >= one.free_flight->first - 1e-9 && time <= one.free_flight->second + 1e-9;
+}
+
+/// An axis of an object over all its recordings: between which values it reads, and on which grid.
+struct Axis {
+  double low{}, high{}, step{};  // step: 0 on none [m/s²]
+  std::string fault;             // why it says nothing of most falls, or nothing
+};
+
+/// Why an axis says nothing of a fall, or nothing. One of a single value does not, unless that is all that
+/// its grid can tell; nor does one that is cut off: most often it reads a value that none of the recordings
+/// goes beyond.
+std::string fault_in(const std::vector<Vec3<double>>& force, std::size_t axis, const Axis& of) {
+  constexpr double kPile = 0.02;  // of the readings in a fall
+  constexpr std::size_t kLeast = 3, kValues = 4;
+  std::map<double, std::size_t> values;
+  for (const auto& f : force) ++values[f[axis]];
+  const auto [value, times] = *std::max_element(
+      values.begin(), values.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  const bool at_the_end = value == of.low || value == of.high;
+  if (values.size() == 1 && (at_the_end || of.step == 0)) return "reads one value all the time";
+  const bool piles =
+      times >= kLeast && static_cast<double>(times) >= kPile * static_cast<double>(force.size());
+  if (values.size() >= kValues && at_the_end && piles) return fmt::format("is cut off at {:.4g} m/s²", value);
+  return {};
+}
+
+/// By object and axis, of throws that have falls. What says nothing of most falls is not asked in the others:
+/// they are the exception.
+std::map<std::string, std::array<Axis, 3>> axes_of(const datasets::ThrowLog& log) {
+  struct Readings {
+    std::array<std::vector<double>, 3> all;
+    std::vector<std::vector<Vec3<double>>> falls;
+  };
+  std::map<std::string, Readings> readings;
+  for (const auto& one : log.throws) {
+    if (!one.imu || !one.free_flight) continue;
+    Readings& of = readings[one.object];
+    auto& fall = of.falls.emplace_back();
+    for (std::size_t i = 0; i < one.imu->time.rows; ++i) {
+      const Vec3<double> f{one.imu->specific_force(i, 0), one.imu->specific_force(i, 1),
+                           one.imu->specific_force(i, 2)};
+      for (std::size_t a = 0; a < 3; ++a) of.all[a].push_back(f[a]);
+      if (falls_at(one, one.imu->time(i))) fall.push_back(f);
+    }
+    if (fall.empty()) of.falls.pop_back();
+  }
+  std::map<std::string, std::array<Axis, 3>> out;
+  for (const auto& [object, of] : readings)
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto [low, high] = std::minmax_element(of.all[a].begin(), of.all[a].end());
+      if (low == of.all[a].end()) continue;
+      Axis& axis = out[object][a];
+      axis = {*low, *high, dynamics::quantisation_step(of.all[a]), {}};
+      std::string fault;
+      std::size_t faulty = 0;
+      for (const auto& fall : of.falls)
+        if (auto why = fault_in(fall, a, axis); !why.empty()) fault = std::move(why), ++faulty;
+      if (2 * faulty > of.falls.size()) axis.fault = fault;
+    }
+  return out;
+}
+
 }  // namespace
 
 std::vector<dynamics::Effect> known_fall_effects() {
@@ -112,6 +181,10 @@ FallProblem::FallProblem(const datasets::ThrowLog& log) : gravity_(log.gravity) 
   channels_ = {"force_x", "force_y", "force_z"};
   covariates_ = {"speed at the start [m/s]", "duration [s]", "vertical along body z [-]", "order"};
   const auto splits = splits_of(log);
+  const auto axes = axes_of(log);
+  std::map<std::string, int> left_out;  // what of which axis, and in how many falls
+  std::map<std::string, std::array<std::size_t, 3>>
+      coarse;  // falls whose readings scatter by less than a step
   for (std::size_t n = 0; n < log.throws.size(); ++n) {
     const auto& one = log.throws[n];
     if (!one.imu || !one.free_flight) {
@@ -122,8 +195,7 @@ FallProblem::FallProblem(const datasets::ThrowLog& log) : gravity_(log.gravity) 
     Fall fall;
     std::optional<std::size_t> first;
     for (std::size_t i = 0; i < imu.time.rows; ++i) {
-      if (imu.time(i) < one.free_flight->first - 1e-9 || imu.time(i) > one.free_flight->second + 1e-9)
-        continue;
+      if (!falls_at(one, imu.time(i))) continue;
       if (!first) first = i;
       fall.time.push_back(imu.time(i) - imu.time(*first));
       fall.force.push_back({imu.specific_force(i, 0), imu.specific_force(i, 1), imu.specific_force(i, 2)});
@@ -141,28 +213,64 @@ FallProblem::FallProblem(const datasets::ThrowLog& log) : gravity_(log.gravity) 
       continue;
     }
     const bool declared = imu.specific_force.sigma.size() == 3;
-    for (std::size_t a = 0; a < 3; ++a)
-      fall.sigma[a] = std::max(1e-6, declared && imu.specific_force.sigma[a] > 0 ? imu.specific_force.sigma[a]
-                                                                                 : scatter_of(fall.force, a));
+    const auto& known = axes.at(one.object);
+    std::string faults;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double scatter = declared && imu.specific_force.sigma[a] > 0 ? imu.specific_force.sigma[a]
+                                                                         : scatter_of(fall.force, a);
+      fall.sigma[a] = std::max(scatter, dynamics::rounding_sigma(known[a].step));
+      if (const auto fault = known[a].fault.empty() ? fault_in(fall.force, a, known[a]) : known[a].fault;
+          !fault.empty()) {
+        faults += fmt::format("{}{} {}", faults.empty() ? "" : ", ", channels_[a], fault);
+        ++left_out[fmt::format("{} of {} {}", channels_[a], one.object, fault)];
+        continue;
+      }
+      fall.axes.push_back(a);
+      if (fall.sigma[a] > scatter || scatter_of(fall.force, a) < 0.5 * known[a].step) ++coarse[one.object][a];
+    }
+    if (fall.axes.empty()) {
+      skipped_.push_back({one.id, faults});
+      continue;
+    }
     const BeforeFall before = before_fall(imu, *first, gravity_);
     fall.rest = before.rest, fall.speed = before.speed;
     fall.speed_sigma = before.speed_sigma, fall.tilt_sigma = before.tilt_sigma;
     Group group{one.id, one.object, one.condition, splits[n], {}, {}, {}};
     group.start = {fall.speed, 0, 0, 0, 0, 0, 0};
     for (const double t : fall.time)
-      for (int c = 0; c < 3; ++c) group.rows.push_back({c, t});
+      for (const std::size_t a : fall.axes) group.rows.push_back({static_cast<int>(a), t});
     for (int k = 0; k < 7; ++k) group.rows.push_back({kPriorChannel, 0});
     group.covariates = {fall.speed, fall.time.back(), fall.rest[2] / flight::norm(fall.rest),
                         static_cast<double>(groups_.size())};
     groups_.push_back(std::move(group));
     falls_.push_back(std::move(fall));
   }
+  for (const auto& [what, times] : left_out)
+    notes_.push_back(fmt::format("{}: left out of {} falls", what, times));
+  for (const auto& [object, of] : coarse)
+    for (std::size_t a = 0; a < 3; ++a)
+      if (of[a] > 0)
+        notes_.push_back(fmt::format(
+            "{} of {} reads in steps of {:.3g} m/s², and in {} falls its noise is less than half of one: "
+            "what is constant is known to half a step there, whatever its interval",
+            channels_[a], object, axes.at(object)[a].step, of[a]));
   if (groups_.empty())
     throw std::invalid_argument("falls: no throw is one" +
                                 (skipped_.empty() ? "" : ": " + skipped_.front().second));
 }
 
-std::vector<dynamics::Effect> FallProblem::effects() const { return known_fall_effects(); }
+std::vector<dynamics::Effect> FallProblem::effects() const {
+  std::set<std::size_t> seen;
+  for (const Fall& fall : falls_) seen.insert(fall.axes.begin(), fall.axes.end());
+  auto out = known_fall_effects();
+  for (auto& effect : out)
+    if (effect.id == "sensor.accelerometer_bias" || effect.id == "sensor.accelerometer_drift" ||
+        effect.id == "sensor.settling")
+      std::erase_if(effect.parameters, [&](const dynamics::EffectParameter& p) {
+        return p.name.size() == 1 && !seen.contains(static_cast<std::size_t>(p.name[0] - 'x'));
+      });
+  return out;
+}
 
 GroupEquations FallProblem::equations(std::size_t group, std::span<const std::string> names,
                                       std::span<const double> values, const Eigen::VectorXd& own,
@@ -222,7 +330,7 @@ GroupEquations FallProblem::equations(std::size_t group, std::span<const std::st
         }
         f = flight::sum(f, flight::sum(flight::cross(w, flight::cross(w, lever)), flight::cross(dw, lever)));
       }
-      for (std::size_t a = 0; a < 3; ++a) out.push_back((f[a] - fall.force[i][a]) / fall.sigma[a]);
+      for (const std::size_t a : fall.axes) out.push_back((f[a] - fall.force[i][a]) / fall.sigma[a]);
     }
     out.push_back((x[0] - fall.speed) / fall.speed_sigma);
     for (std::size_t a = 1; a < 4; ++a) out.push_back(x[a] / fall.tilt_sigma);
@@ -243,11 +351,13 @@ FallErrors fall_errors(const FallProblem& problem, const GroupedFit& fit) {
     const auto& rows = problem.groups()[i].rows;
     Vec3<double> speed{}, position{}, last{};
     double before = 0;
-    for (std::size_t j = 0; j + 2 < rows.size() && rows[j].channel >= 0; j += 3) {
+    const auto& axes = problem.axes(i);
+    for (std::size_t j = 0; j < rows.size() && rows[j].channel >= 0; j += axes.size()) {
       const double dt = rows[j].time - before;
       before = rows[j].time;
-      for (std::size_t a = 0; a < 3; ++a) {
-        const double r = g.residual[static_cast<Eigen::Index>(j + a)] * problem.sigma(i)[a];
+      for (std::size_t k = 0; k < axes.size(); ++k) {
+        const std::size_t a = axes[k];
+        const double r = g.residual[static_cast<Eigen::Index>(j + k)] * problem.sigma(i)[a];
         squares += r * r;
         position[a] += dt * (speed[a] + 0.25 * dt * (r + last[a]));
         speed[a] += 0.5 * dt * (r + last[a]);

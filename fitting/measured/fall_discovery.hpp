@@ -15,6 +15,10 @@ namespace unhand::fitting {
 /// turning rate; each known beforehand to what the recording before the fall says of it. (The vertical is
 /// what the sensor reads at rest without its bias.) A gyroscope, where there is one, gives ω; without, ω of
 /// the last term is taken as zero.
+///
+/// The noise of an axis is the declared one or that of its third differences, and not below what rounding to
+/// the grid of its readings adds. An axis that says nothing of a fall, as it stands still or is cut off, is
+/// left out of it.
 class FallProblem final : public GroupedProblem {
  public:
   /// Throws datasets::LogError for a log that breaks the rules of its kind, std::invalid_argument when no
@@ -25,16 +29,22 @@ class FallProblem final : public GroupedProblem {
                            std::span<const double> values, const Eigen::VectorXd& own,
                            bool derivatives) const override;
   const flight::Vec3<double>& sigma(std::size_t group) const { return falls_[group].sigma; }  ///< [m/s²]
+  /// The axes that a fall's rows are of, in their order at every sample.
+  const std::vector<std::size_t>& axes(std::size_t group) const { return falls_[group].axes; }
+  /// What the readings are like: axes that were left out, and coarse ones.
+  const std::vector<std::string>& notes() const { return notes_; }
 
  private:
   struct Fall {
     std::vector<double> time;                        // from the first sample [s]
     std::vector<flight::Vec3<double>> force;         // [m/s²]
     std::vector<flight::Vec3<double>> rate, turned;  // gyroscope: ω, and its integral as a rotation vector
+    std::vector<std::size_t> axes;                   // that are used
     flight::Vec3<double> sigma{}, rest{};            // rest: read before the fall [m/s²]
     double speed{}, speed_sigma{}, tilt_sigma{};     // upward, when the fall begins [m/s]; of that; [rad]
   };
   std::vector<Fall> falls_;
+  std::vector<std::string> notes_;
   double gravity_{};
 };
 

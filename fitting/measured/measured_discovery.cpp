@@ -7,6 +7,7 @@
 
 #include "dynamics/median.hpp"
 #include "fitting/distributions.hpp"
+#include "fitting/measured/effect_trial.hpp"
 #include "fitting/measured/grouped_footprints.hpp"
 #include "fitting/measured/wild_groups.hpp"
 
@@ -82,22 +83,27 @@ void look_for_the_unexplained(const GroupedProblem& problem, const GroupedFit& h
         100 * largest->share, largest->mean, std::abs(largest->z));
 }
 
+/// A misfit that is less than chance makes of so few samples is none.
+double least_misfit(int n) { return std::max(0.2, 3 * std::sqrt(2.0 / std::max(1, n))); }
+
+/// Of a misfit: what may be left of it where it is explained. A few times the noise is what trackers err by,
+/// and no effect has to answer for it.
+constexpr double kRest = 0.1, kTrackers = 10;
+
 /// Whether the accepted effects explain some channel to within a tenth of its misfit, on train or on held-out
 /// groups, or leave one in its noise that carries a tenth of what they take: a channel that they do not touch
 /// says nothing of them. Where they leave more than that of every channel, they are the nearest names of
 /// something else. What chance makes of so few samples is no misfit.
 bool explains_a_channel(const MeasuredDiscovery& out) {
-  constexpr double kRest = 0.1, kNone = 0.2;  // of the misfit; a misfit of less is none
-  constexpr double kTenth = 0.1;              // of the fall of all channels
+  constexpr double kTenth = 0.1;  // of the fall of all channels
   double falls = 0;
   const auto fall = [](const MeasuredMisfit& m) {
     return std::max(0.0, m.before_train - m.after_train) * (m.n - m.n_test);
   };
   for (const auto& m : out.misfit) falls += fall(m);
   bool any = false;
-  const auto least = [&](int n) { return std::max(kNone, 3 * std::sqrt(2.0 / std::max(1, n))); };
   const auto explained = [&](int n, double before, double after) {
-    const double none = least(n);
+    const double none = least_misfit(n);
     if (before - 1 < none) return false;
     any = true;
     return after - 1 < std::max(kRest * (before - 1), none);
@@ -105,15 +111,32 @@ bool explains_a_channel(const MeasuredDiscovery& out) {
   for (const auto& m : out.misfit)
     if (explained(m.n - m.n_test, m.before_train, m.after_train) ||
         explained(m.n_test, m.before_test, m.after_test) ||
-        (fall(m) >= kTenth * falls && m.after_train - 1 < least(m.n - m.n_test)))
+        (fall(m) >= kTenth * falls && m.after_train - 1 < least_misfit(m.n - m.n_test)))
       return true;
   return !any;
 }
 
+/// Whether the answer explains the channel that an effect acts in, on train or on held-out groups, to within
+/// a tenth of its misfit or what trackers err by. It is the one that it takes most from: `without` is what is
+/// left by channel, on train groups, if that effect alone is taken away. What explains another channel beside
+/// it says nothing of it.
+bool explains_its_channel(const std::vector<GroupedMisfit>& without, const MeasuredDiscovery& out) {
+  const MeasuredMisfit* its = nullptr;
+  double most = 0;
+  for (const auto& m : out.misfit)
+    for (const auto& w : without)
+      if (const double falls = (w.chi2_per_sample() - m.after_train) * w.n;
+          w.channel == m.channel && falls > most)
+        its = &m, most = falls;
+  if (!its) return true;
+  const auto explained = [](double before, double after) {
+    return after - 1 < std::max(kRest * (before - 1), kTrackers);
+  };
+  return explained(its->before_train, its->after_train) || explained(its->before_test, its->after_test);
+}
+
 /// Whether, on train and on held-out groups, more is left of some channel's misfit than they take from any.
-/// A few times the noise is what trackers err by, and no effect has to answer for it.
 bool leave_more_than_they_take(const MeasuredDiscovery& out) {
-  constexpr double kTrackers = 10;
   double left = 0, taken = 0, test_left = 0, test_taken = 0;
   for (const auto& m : out.misfit) {
     left = std::max(left, m.after_train - 1), taken = std::max(taken, m.before_train - m.after_train);
@@ -138,21 +161,32 @@ void take_fits(const GroupedProblem& problem, const EffectSearch& search, Measur
                             c[k].chi2_per_sample(), d[k].chi2_per_sample(), b[k].n});
 }
 
-/// Names that explain no channel, or less than they leave, are taken back.
-void withdraw_imitations(const GroupedProblem& problem, EffectSearch& search, MeasuredDiscovery& out) {
+/// What lies in the way of believing the accepted effects, in words; empty if nothing does.
+std::string fault_of(const GroupedProblem& problem, const EffectSearchOptions& options,
+                     const EffectSearch& search, const MeasuredDiscovery& out) {
+  if (!explains_a_channel(out)) return "leave more than a tenth of it in every channel";
+  for (const auto& effect : out.effects) {
+    const GroupedFit without = fit_without(problem, search.final, effect.id, options.fit);
+    if (without.solved && !explains_its_channel(misfit(problem, without), out))
+      return fmt::format("more than a tenth of it is left in the channel that {} acts in most", effect.id);
+  }
+  return leave_more_than_they_take(out) ? "leave more of it in one channel than they take from any" : "";
+}
+
+/// Names that explain no channel, or not the one they act in, or less than they leave, are taken back; all of
+/// them, as each was found beside the others.
+void withdraw_imitations(const GroupedProblem& problem, const EffectSearchOptions& options,
+                         EffectSearch& search, MeasuredDiscovery& out) {
   if (out.effects.empty()) return;
-  const bool none = !explains_a_channel(out);
-  if (!none && !leave_more_than_they_take(out)) return;
+  const std::string fault = fault_of(problem, options, search, out);
+  if (fault.empty()) return;
   std::string names;
   for (const auto& effect : out.effects) names += (names.empty() ? "" : ", ") + effect.id;
-  out.evidence.push_back(
-      {"",
-       fmt::format("Withdrawn: {}. They lower the misfit, but {}: the nearest names of something "
-                   "that is not listed",
-                   names,
-                   none ? "leave more than a tenth of it in every channel"
-                        : "leave more of it in one channel than they take from any"),
-       false});
+  out.evidence.push_back({"",
+                          fmt::format("Withdrawn: {}. They lower the misfit, but {}: the nearest names of "
+                                      "something that is not listed",
+                                      names, fault),
+                          false});
   search.effects.clear();
   search.stability.clear();
   search.final = search.base;
@@ -229,7 +263,7 @@ EffectSearch run_search(GroupedProblem& problem, const MeasuredOptions& options,
   out.ranking = search.ranking;
   out.train = search.base.used, out.test = search.base_test.used;
   take_fits(problem, search, out);
-  withdraw_imitations(problem, search, out);
+  withdraw_imitations(problem, options.search, search, out);
   out.first = leaves_noise(problem, search.base, 1.2, options.search.fit.threads);
   out.autocorrelation_before = autocorrelation(problem, search.base_test);
   out.autocorrelation_after = autocorrelation(problem, search.final_test);

@@ -169,6 +169,27 @@ TEST(Phyphox, RefusesOtherUnits) {
   expect(1, 3.281, "columns Acceleration (m/s^2)", "outside of falls it reads 32.2 m/s^2");
 }
 
+// Readings that stand still on their grid have its rounding as their noise: no noise at all would outvote all
+// others.
+TEST(Phyphox, TheNoiseIsNotBelowThatOfRounding) {
+  const Scratch scratch;
+  const std::string file = scratch / "phone.csv";
+  std::ostringstream out;
+  out << header;
+  for (int k = 0; k < 400; ++k) {
+    const double t = 0.005 * k, up = t < 1 || t > 1.65 ? 9.75 + 0.15 * (k % 3) : 0.3;
+    out << t << ",0.45," << 0.15 * (k % 2) << ',' << up << '\n';
+  }
+  put_bytes(file, out.str());
+  const auto recording = read_phyphox(file);
+  ASSERT_EQ(recording.falls.size(), 1U);
+  const auto& sigma = recording.falls[0].imu->specific_force.sigma;
+  ASSERT_EQ(sigma.size(), 3U);
+  EXPECT_LT(sigma[0], 1e-12);  // one value all the time: no grid is known
+  EXPECT_GE(sigma[1], 0.0433);
+  EXPECT_NEAR(sigma[2], 0.15 / std::sqrt(12.0), 1e-6);
+}
+
 // A phone that is thrown hard reads far from gravity outside of its fall.
 TEST(Phyphox, AHardThrowIsNoOtherUnit) {
   const Scratch scratch;

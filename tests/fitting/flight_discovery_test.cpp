@@ -550,6 +550,36 @@ TEST(FlightDiscovery, AWindIsFoundThroughADragThatWasFound) {
   EXPECT_FALSE(found.unexplained.has_value()) << found.unexplained->description;
 }
 
+// Of slow bodies the air's own speed is most of what the drag sees: the drag alone explains so little that no
+// held-out flight shows it, a vertical that leans explains more, and both of them together all.
+TEST(FlightDiscovery, ADragIsFoundTogetherWithItsWind) {
+  SpatialDesign slow;
+  slow.speed = 1;
+  SpatialTruth truth;
+  truth.drag = 0.1, truth.wind = {2, 0, 0};
+  for (const unsigned seed : {47U, 48U}) {
+    const auto found = found_in(spatial_flights(truth, slow, seed));
+    expect_value(found, "flight.quadratic_drag", "k[body]", 0.1);
+    expect_value(found, "flight.wind", "w_x", 2);
+    EXPECT_EQ(found.effects.size(), 2U);
+    EXPECT_FALSE(found.unexplained.has_value()) << found.unexplained->description;
+  }
+}
+
+// A centre of mass off the tracked point turns with the body, and no wind does.
+TEST(FlightDiscovery, AWindIsNoOtherNameOfWhatTurnsWithTheBody) {
+  SpatialTruth truth;
+  truth.linear_drag = 0.2, truth.length_scale = 0.01, truth.com = {0.001, 0, 0.002};
+  const auto found = found_in(spatial_flights(truth, {}, 49));
+  bool com = false;
+  for (const auto& effect : found.effects) {
+    if (effect.id != "sensor.com_offset") continue;
+    com = true;
+    for (const auto& [other, r] : effect.equivalent) EXPECT_NE(other, "flight.wind") << r;
+  }
+  EXPECT_TRUE(com);
+}
+
 // Two held-out flights cannot say how much they scatter; those that were fitted can.
 TEST(FlightDiscovery, TwoHeldOutFlightsAreEnoughForALargeEffect) {
   SpatialDesign few;
