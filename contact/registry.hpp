@@ -65,8 +65,8 @@ const std::vector<LawParameter>& law_parameters(std::string_view name);
 
 /// One of a law's own parameters that has a value [LawParameter::unit].
 struct GivenLawParameter {
-  const LawParameter& parameter;
-  double value;
+  const LawParameter& parameter;  ///< of the registered law
+  double value;                   ///< [LawParameter::unit]
 };
 
 /// Those of the law's own parameters that `values` knows, in the law's order.

@@ -57,8 +57,8 @@ struct Effect {
   /// Acts through what this other effect adds to, a wind through "flight.quadratic_drag": where nothing is
   /// declared of that and it is not in the model, this is no answer. Empty: stands alone.
   std::string acts_through{};
-  /// Acts in the hand and in flight alike, as a tilted gravity does: wherever it was seen most, the rest of the
-  /// throw must bear it out.
+  /// Acts in the hand and in flight alike, as a tilted gravity does: wherever it was seen most, the rest of
+  /// the throw must bear it out.
   bool acts_everywhere{false};
   /// "id.name"
   std::string full_name(const EffectParameter& parameter) const { return id + "." + parameter.name; }
