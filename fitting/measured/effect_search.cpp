@@ -29,6 +29,11 @@ constexpr double kAlike = 10;
 constexpr double kComparable = 0.5;
 /// χ² per sample above which rivals are followed, and the factor by which one has to lower it.
 constexpr double kMisfit = 1.2, kBetter = 0.9;
+/// χ² per sample, twice the noise in size, above which accepted effects are exchanged for others: that takes
+/// as many fits as all steps before.
+constexpr double kFarOff = 4;
+/// A fit gains what the footprint promises, within this factor.
+constexpr double kPromised = 3;
 
 double left(const GroupedFit& fit) {
   return fit.samples > 0 ? fit.chi2 / static_cast<double>(fit.samples) : 0;
@@ -139,12 +144,12 @@ class Search {
   }
 
   /// What groups show most alike is evident, and need not be what explains most: three numbers of a drift
-  /// stand in for a drag and a bias until the bias is found. Where a misfit is left, every accepted effect
-  /// that no other one needs is exchanged for the candidate that takes most in its place, if all groups are
-  /// explained the better for it.
+  /// stand in for a drag and a bias until the bias is found. Where a large misfit is left, every accepted
+  /// effect that no other one needs is exchanged for the candidate that takes most in its place, if all
+  /// groups are explained the better for it.
   void exchange() {
     for (std::size_t i = 0; i < out_.effects.size(); ++i)
-      if (left(out_.final_test) > kMisfit && !is_needed(out_.effects[i].id) && exchanged(i)) climb();
+      if (left(out_.final_test) > kFarOff && !is_needed(out_.effects[i].id) && exchanged(i)) climb();
   }
 
   void backward() {
@@ -356,7 +361,10 @@ class Search {
     std::erase_if(effects, [&](const auto& e) { return e.id == id; });
     const auto f = grouped_footprints(problem_, out_.final, effects, options_.fit);
     const auto scored = first_order(f);
-    if (!scored.empty() && scored.front().gain > 0) {
+    // To first order; where less than a third of what goes with the old one comes back, no fit will tell
+    // more.
+    const double lost = out_.final.chi2 - first.final.chi2;
+    if (!scored.empty() && scored.front().gain > 0 && kPromised * scored.front().gain > lost) {
       const auto trials = evident(f.total, {scored.front()}, effects,
                                   options_.family_wise_level / static_cast<double>(scored.size()));
       if (!trials.empty() && is_confirmed(trials.front().held) &&
