@@ -116,10 +116,18 @@ bool explains_a_channel(const MeasuredDiscovery& out) {
   return !any;
 }
 
-/// Whether the answer explains the channel that an effect acts in, on train or on held-out groups, to within
-/// a tenth of its misfit or what trackers err by. It is the one that it takes most from: `without` is what is
-/// left by channel, on train groups, if that effect alone is taken away. What explains another channel beside
-/// it says nothing of it.
+/// Whether the answer explains a channel, on train or on held-out groups, to within a tenth of its misfit or
+/// what trackers err by.
+bool is_explained(const MeasuredMisfit& m) {
+  const auto explained = [](double before, double after) {
+    return after - 1 < std::max(kRest * (before - 1), kTrackers);
+  };
+  return explained(m.before_train, m.after_train) || explained(m.before_test, m.after_test);
+}
+
+/// Whether the answer explains the channel that an effect acts in. It is the one that it takes most from:
+/// `without` is what is left by channel, on train groups, if that effect alone is taken away. What explains
+/// another channel beside it says nothing of it.
 bool explains_its_channel(const std::vector<GroupedMisfit>& without, const MeasuredDiscovery& out) {
   const MeasuredMisfit* its = nullptr;
   double most = 0;
@@ -128,11 +136,7 @@ bool explains_its_channel(const std::vector<GroupedMisfit>& without, const Measu
       if (const double falls = (w.chi2_per_sample() - m.after_train) * w.n;
           w.channel == m.channel && falls > most)
         its = &m, most = falls;
-  if (!its) return true;
-  const auto explained = [](double before, double after) {
-    return after - 1 < std::max(kRest * (before - 1), kTrackers);
-  };
-  return explained(its->before_train, its->after_train) || explained(its->before_test, its->after_test);
+  return !its || is_explained(*its);
 }
 
 /// Whether, on train and on held-out groups, more is left of some channel's misfit than they take from any.
@@ -165,7 +169,9 @@ void take_fits(const GroupedProblem& problem, const EffectSearch& search, Measur
 std::string fault_of(const GroupedProblem& problem, const EffectSearchOptions& options,
                      const EffectSearch& search, const MeasuredDiscovery& out) {
   if (!explains_a_channel(out)) return "leave more than a tenth of it in every channel";
+  const bool all_explained = std::all_of(out.misfit.begin(), out.misfit.end(), is_explained);
   for (const auto& effect : out.effects) {
+    if (all_explained) break;
     const GroupedFit without = fit_without(problem, search.final, effect.id, options.fit);
     if (without.solved && !explains_its_channel(misfit(problem, without), out))
       return fmt::format("more than a tenth of it is left in the channel that {} acts in most", effect.id);
