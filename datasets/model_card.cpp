@@ -131,10 +131,11 @@ void require_covariance(const CardCovariance& covariance,
         correlation(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = covaries / scale;
     }
   }
-  if (n > 0 && !(dynamics::spectrum_of(correlation).values[0] >= -kRounding))
+  if (n == 0) return;
+  if (const double least = dynamics::spectrum_of(correlation).values[0]; !(least >= -kRounding))
     from.fail("matrix",
               fmt::format("is no covariance: the least eigenvalue of its correlations is {}; accepted: >= 0",
-                          dynamics::spectrum_of(correlation).values[0]));
+                          least));
 }
 
 CardCovariance read_covariance(Fields& from, const std::map<std::string, CardParameter>& parameters) {

@@ -134,7 +134,7 @@ class Search {
       if (static_cast<int>(rival.answer.effects.size()) >= options_.most_effects) continue;
       EffectSearch first = std::exchange(out_, rival.answer);
       auto shown_from = std::exchange(shown_from_, rival.shown_from);
-      const bool stands = rival.opens.empty() ? (climb_from_one(), true) : opened(rival);
+      const bool stands = rival.opens.empty() ? climbed_from_one() : opened(rival);
       const bool better = stands && left(out_.final_test) < kBetter * left(first.final_test) &&
                           left(out_.final) < kBetter * left(first.final);
       if (better) continue;
@@ -421,8 +421,10 @@ class Search {
     return true;
   }
 
-  void climb_from_one() {
-    if (forward(1)) climb();  // by what it makes room for
+  /// From the answer of a rival on, by what it makes room for; it stands without.
+  bool climbed_from_one() {
+    if (forward(1)) climb();
+    return true;
   }
   void climb() {
     while (static_cast<int>(out_.effects.size()) < options_.most_effects && forward(options_.refits)) {
