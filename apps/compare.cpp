@@ -157,8 +157,9 @@ void compare_releases(const CompareRequest& request, const datasets::ThrowLog& l
       datasets::write_model_card(directory / (model + ".json"), card);
   }
   outputs.commit();
-  fmt::print("{}\n{}\n{}\nbias (predicted - measured)\n{}\nparameters\n{}", tables.heading,
-             tables.errors.text(), tables.floor, tables.bias.text(), tables.parameters.text());
+  fmt::print("{}\n{}\n{}\nbias (predicted - measured)\n{}\nparameters\n{}{}\n", tables.heading,
+             tables.errors.text(), tables.floor, tables.bias.text(), tables.parameters.text(),
+             fmt::join(tables.methods, "\n"));
 }
 
 void compare(const CompareRequest& request) {

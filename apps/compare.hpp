@@ -45,6 +45,8 @@ Json statistics_json(const experiment::ErrorStatistics&);
 struct ReleaseTables {
   Table errors, bias, parameters;
   std::string heading, floor;
+  std::vector<std::string>
+      methods;  ///< "[1] ...": how parameters were found, as the table's "how" counts them
 };
 ReleaseTables release_tables(const experiment::Comparison& comparison, const datasets::ThrowLog& log,
                              const std::string& file);

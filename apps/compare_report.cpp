@@ -1,5 +1,6 @@
 // The report of `unhand compare` on releases: figures, tables, per-throw errors.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "apps/compare.hpp"
 #include "apps/compare_figures.hpp"
@@ -51,11 +52,12 @@ void write_release_report(const experiment::Comparison& comparison, const datase
     draw(*figure, directory, origin_text(log));
     pictures += fmt::format("![Errors of each condition]({}.png)\n\n", figure->name);
   }
-  write_text(directory / "report.md",
-             fmt::format("# Models against a log\n\n{}\n{}\n{}\n{}## Bias (predicted - measured)\n\n{}\n"
-                         "## Parameters\n\n{}",
-                         tables.heading, tables.errors.markdown(), tables.floor, pictures,
-                         tables.bias.markdown(), tables.parameters.markdown()));
+  write_text(
+      directory / "report.md",
+      fmt::format("# Models against a log\n\n{}\n{}\n{}\n{}## Bias (predicted - measured)\n\n{}\n"
+                  "## Parameters\n\n{}\n{}\n",
+                  tables.heading, tables.errors.markdown(), tables.floor, pictures, tables.bias.markdown(),
+                  tables.parameters.markdown(), fmt::join(tables.methods, "\n\n")));
   write_text(directory / "throws.csv", throw_table(comparison, log).csv());
   write_text(directory / "compare.json", json_text(json));
 }

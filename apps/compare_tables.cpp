@@ -1,6 +1,7 @@
 // The answer of `unhand compare` on releases, as tables and as JSON.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -88,13 +89,20 @@ ReleaseTables release_tables(const experiment::Comparison& comparison, const dat
                 plural(static_cast<std::size_t>(floor.conditions), "condition"))
           : "scatter of repetitions: no condition was repeated with its landing measured\n";
   out.parameters = {{"model", "parameters", "how", "samples", "scatter"}, {}, 3};
+  std::vector<std::string> known;
   for (const auto& model : comparison.models) {
     std::string values;
     for (const auto& [name, unit, value] : named_values(model))
       values += fmt::format("{}{} = {:.5g}{}", values.empty() ? "" : ", ", name, value,
                             unit == "-" ? "" : " " + unit);
     const bool sampled = model.estimate.samples > 0;
-    out.parameters.rows.push_back({model.model, values, model.estimate.method,
+    const auto method = std::find(known.begin(), known.end(), model.estimate.method) - known.begin();
+    const std::string number = fmt::format("[{}]", method + 1);
+    if (method == std::ssize(known)) {
+      known.push_back(model.estimate.method);
+      out.methods.push_back(number + " " + model.estimate.method);
+    }
+    out.parameters.rows.push_back({model.model, values, number,
                                    sampled ? fmt::to_string(model.estimate.samples) : "-",
                                    fixed(sampled, model.estimate.scatter, 3)});
   }

@@ -22,7 +22,7 @@ Json json_of(const NamedErrors& errors) {
 }
 
 std::string value_of(const NamedErrors& errors, std::size_t k) {
-  return k < errors.size() ? error_text(errors[k].second) : "";
+  return k < errors.size() ? error_text(errors[k].first, errors[k].second) : "";
 }
 
 }  // namespace
@@ -61,8 +61,9 @@ void compare_with_card(const CompareRequest& request, const datasets::ThrowLog& 
   Table table{{"error", card.model + ", train", "test", "card, train", "test"}, {}, 1};
   const NamedErrors& names = found.train > 0 ? found.base_train : found.base_test;
   for (std::size_t k = 0; k < names.size(); ++k)
-    table.rows.push_back({names[k].first, value_of(found.base_train, k), value_of(found.base_test, k),
-                          value_of(found.card_train, k), value_of(found.card_test, k)});
+    table.rows.push_back({error_title(names[k].first), value_of(found.base_train, k),
+                          value_of(found.base_test, k), value_of(found.card_train, k),
+                          value_of(found.card_test, k)});
   const std::string heading = fmt::format(
       "{}: {}\n{} {}, {} of them held out; each one's start is fitted, {} from {}\n", request.log, log.title,
       found.train + found.test, found.kind, found.test,

@@ -257,24 +257,11 @@ std::string discovery_text(const Discovery& found, const std::string& log, const
     for (const auto& line : separating_lines(effect)) out += fmt::format("  {}\n", line);
   }
   if (const std::string note = gain_text(found.effects); !note.empty()) out += "\n" + note + "\n";
-  for (const auto& id : found.along) out += fmt::format("\nfitted along, since no pads are rigid: {}\n", id);
+  for (const auto& id : found.along) out += fmt::format("\n{}\n", along_text(id));
   if (found.small) out += fmt::format("\n{}\n", small_text(*found.small));
   if (found.unexplained) out += fmt::format("\nunexplained: {}\n", found.unexplained->description);
-  Table table{{"predicted before the throw", "landing x MAE [m]", "theta MAE [deg]", "detach vx MAE [m/s]",
-               "omega MAE [deg/s]", "trajectory RMS [m]", "chi2/dof"},
-              {},
-              1};
-  const auto row = [&](const std::string& name, const OutcomeErrors& e) {
-    table.rows.push_back({name, fixed(e.landing_x_mae, 5), fixed(e.landing_theta_mae, 3),
-                          fixed(e.detach_vx_mae, 5), fixed(e.detach_omega_mae, 3), fixed(e.trajectory_rms, 6),
-                          fixed(e.chi2_per_dof, 3)});
-  };
-  row(fmt::format("before, train ({})", found.before_train.n), found.before_train);
-  row(fmt::format("before, test ({})", found.before_test.n), found.before_test);
-  row(fmt::format("after, train ({})", found.after_train.n), found.after_train);
-  row(fmt::format("after, test ({})", found.after_test.n), found.after_test);
   if (const std::string note = held_out_text(found); !note.empty()) out += "\n" + note + "\n";
-  return out + "\n" + table.text() + fmt::format("\n{:.1f} s\n", found.seconds);
+  return out + "\n" + prediction_errors(found).text() + fmt::format("\n{:.1f} s\n", found.seconds);
 }
 
 namespace {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "apps/output.hpp"
+#include "apps/table.hpp"
 #include "fitting/discovery/discover.hpp"
 
 namespace unhand::apps {
@@ -15,6 +16,11 @@ Json discovery_json(const fitting::Discovery& discovery, const std::string& log,
 /// The answer in a few lines; `origin` is what the log declares of itself.
 std::string discovery_text(const fitting::Discovery& discovery, const std::string& log,
                            const std::string& origin);
+
+/// Errors of what is predicted before the throw, of train and test throws, before and after.
+Table prediction_errors(const fitting::Discovery& discovery);
+/// What was fitted along without being an answer, by the effect's id.
+std::string along_text(const std::string& id);
 
 /// A self-contained page (index.html), the figures with their data and scripts, and discovery.json.
 void write_discovery_report(const fitting::Discovery& discovery, const std::string& log,

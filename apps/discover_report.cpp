@@ -146,28 +146,6 @@ Table structure_table(const Discovery& found) {
   return table;
 }
 
-Table error_table(const Discovery& found) {
-  Table table{{"predicted before the throw", "n", "landing x MAE [mm]", "theta MAE [deg]",
-               "detach vx MAE [m/s]", "detach omega MAE [deg/s]", "trajectory RMS [mm]", "chi2/dof"},
-              {},
-              1};
-  const auto row = [&](const char* name, const OutcomeErrors& e) {
-    const auto mm = [](std::optional<double> metres) {
-      if (metres) *metres *= 1e3;
-      return metres;
-    };
-    table.rows.push_back({name, std::to_string(e.n), fixed(mm(e.landing_x_mae), 2),
-                          fixed(e.landing_theta_mae, 3), fixed(e.detach_vx_mae, 5),
-                          fixed(e.detach_omega_mae, 3), fixed(mm(e.trajectory_rms), 3),
-                          fixed(e.chi2_per_dof, 3)});
-  };
-  row("before, train", found.before_train);
-  row("before, test", found.before_test);
-  row("after, train", found.after_train);
-  row("after, test", found.after_test);
-  return table;
-}
-
 /// Whether the errors go with the condition: rms over what repetitions scatter by, outcome by outcome.
 Table lack_table(const Discovery& found) {
   Table table{{"prediction errors over repetitions' scatter"}, {}, 1};
@@ -210,6 +188,30 @@ constexpr const char* kLandingsAlone = "<p>Landings alone were measured: nothing
 
 }  // namespace
 
+Table prediction_errors(const Discovery& found) {
+  Table table{{"predicted before the throw", "n", "landing x MAE [mm]", "theta MAE [deg]",
+               "detach vx MAE [m/s]", "omega MAE [deg/s]", "trajectory RMS [mm]", "chi2/dof"},
+              {},
+              1};
+  const auto row = [&](const char* name, const OutcomeErrors& e) {
+    const auto mm = [](std::optional<double> metres) {
+      if (metres) *metres *= 1e3;
+      return metres;
+    };
+    table.rows.push_back({name, std::to_string(e.n), fixed(mm(e.landing_x_mae), 2),
+                          fixed(e.landing_theta_mae, 3), fixed(e.detach_vx_mae, 5),
+                          fixed(e.detach_omega_mae, 3), fixed(mm(e.trajectory_rms), 3),
+                          fixed(e.chi2_per_dof, 3)});
+  };
+  row("before, train", found.before_train);
+  row("before, test", found.before_test);
+  row("after, train", found.after_train);
+  row("after, test", found.after_test);
+  return table;
+}
+
+std::string along_text(const std::string& id) { return "fitted along, since no pads are rigid: " + id; }
+
 void write_discovery_report(const Discovery& found, const std::string& log, const std::string& origin,
                             const std::string& command, const Json& json,
                             const std::filesystem::path& directory) {
@@ -228,6 +230,8 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
   for (const auto& effect : found.effects) answer += effect_html(effect);
   if (const std::string note = gain_text(found.effects); !note.empty())
     answer += fmt::format("<p>{}</p>\n", escaped(note));
+  for (const auto& id : found.along) answer += fmt::format("<p>{}.</p>\n", escaped(along_text(id)));
+  if (found.small) answer += fmt::format("<p>{}.</p>\n", escaped(small_text(*found.small)));
   if (found.unexplained)
     answer += fmt::format("<p><b>Unexplained:</b> {}.</p>\n", escaped(found.unexplained->description));
   if (estimated) answer += picture("missing");
@@ -257,7 +261,7 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
       escaped(origin), escaped(json.at("base_model").get<std::string>()), to_string(found.verdict), first,
       over_time ? picture("residual") : kLandingsAlone, answer,
       found.held_out.empty() ? "" : fmt::format("<p>{}</p>\n", escaped(held_out_text(found))),
-      html(error_table(found)), html(lack_table(found)), picture("ranking"),
+      html(prediction_errors(found)), html(lack_table(found)), picture("ranking"),
       html(ranking_table(found.ranking)),
       over_time ? fmt::format("<p>{}</p>", kFootprints) + picture("footprints") : "",
       html(misfit_table(found)), html(structure_table(found)), escaped(command),

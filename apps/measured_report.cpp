@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
+#include <utility>
 
 #include "apps/figure.hpp"
 #include "apps/ranking.hpp"
@@ -15,9 +17,29 @@ namespace {
 using fitting::MeasuredDiscovery;
 using fitting::NamedErrors;
 
+/// A key of NamedErrors without its unit, and the unit that people read with the factor into it.
+struct KeyUnit {
+  std::string_view stem;
+  const char* unit;
+  double scale;
+};
+
+KeyUnit unit_of(std::string_view key) {
+  struct Suffix {
+    std::string_view text;
+    const char* unit;
+    double scale;
+  };
+  for (const Suffix& suffix :
+       {Suffix{"_m_s2", "m/s^2", 1}, {"_m_s", "m/s", 1}, {"_deg", "deg", 1}, {"_m", "mm", 1e3}})
+    if (key.size() > suffix.text.size() && key.ends_with(suffix.text))
+      return {key.substr(0, key.size() - suffix.text.size()), suffix.unit, suffix.scale};
+  return {key, "", 1};
+}
+
 std::string value_of(const NamedErrors& errors, const std::string& name) {
   for (const auto& [key, value] : errors)
-    if (key == name) return error_text(value);
+    if (key == name) return error_text(key, value);
   return "";
 }
 
@@ -28,8 +50,9 @@ Table error_table(const MeasuredDiscovery& found) {
     for (const auto& [name, value] : *errors)
       if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
   for (const auto& name : names)
-    table.rows.push_back({name, value_of(found.before_train, name), value_of(found.before_test, name),
-                          value_of(found.after_train, name), value_of(found.after_test, name)});
+    table.rows.push_back({error_title(name), value_of(found.before_train, name),
+                          value_of(found.before_test, name), value_of(found.after_train, name),
+                          value_of(found.after_test, name)});
   return table;
 }
 
@@ -122,7 +145,19 @@ Figure footprints_of(const MeasuredDiscovery& found) {
 
 }  // namespace
 
-std::string error_text(double value) { return std::isfinite(value) ? fmt::format("{:.4g}", value) : "-"; }
+std::string error_title(const std::string& key) {
+  const auto [stem, unit, scale] = unit_of(key);
+  std::string title;
+  for (const char c : stem) title += c == '_' ? ' ' : c;
+  for (const auto& [word, capitals] : {std::pair{"mae", "MAE"}, {"rms", "RMS"}, {"chi2 per dof", "chi2/dof"}})
+    if (const auto at = title.find(word); at != std::string::npos)
+      title.replace(at, std::string_view(word).size(), capitals);
+  return *unit == '\0' ? title : fmt::format("{} [{}]", title, unit);
+}
+
+std::string error_text(const std::string& key, double value) {
+  return std::isfinite(value) ? fmt::format("{:.4g}", unit_of(key).scale * value) : "-";
+}
 
 std::string measured_text(const MeasuredResult& result) {
   const MeasuredDiscovery& found = result.answer;

@@ -21,8 +21,11 @@ struct MeasuredResult {
 
 /// discovery.json, schema "discovery" version 1.
 Json measured_json(const MeasuredResult& result);
-/// One of NamedErrors; "-" where it was not measured.
-std::string error_text(double value);
+/// NamedErrors for people: a key of the JSON ends with its unit, as _m or _deg; lengths are shown in mm.
+/// "trajectory rms [mm]" of trajectory_rms_m.
+std::string error_title(const std::string& key);
+/// The value to go with that title; "-" where it was not measured.
+std::string error_text(const std::string& key, double value);
 std::string measured_text(const MeasuredResult& result);
 /// Residuals over the share of the duration, a panel for each channel: of the base model and of an answer,
 /// with what the key calls them.

@@ -395,10 +395,13 @@ TEST_F(Cli, FlightsWithoutOrientationHaveNoErrorOfIt) {
       EXPECT_TRUE(errors["end_orientation_median_deg"].is_null()) << errors;
       EXPECT_TRUE(errors["end_position_mae_m"].is_number()) << errors;
     }
+  const double millimetres = 1e3 * x["base"]["test"]["end_position_median_m"].get<double>();
+  EXPECT_THAT(compared.out, testing::ContainsRegex("end position median .mm. +[0-9.e-]+ +" +
+                                                   fmt::format("{:.4g}", millimetres)));
   for (const Answer* one : {&found, &compared})
-    for (const char* name : {"mae", "median"})
+    for (const char* name : {"MAE", "median"})
       EXPECT_THAT(one->out,
-                  testing::ContainsRegex(std::string("end_orientation_") + name + "_deg +- +- +- +-"));
+                  testing::ContainsRegex(std::string("end orientation ") + name + " .deg. +- +- +- +-"));
 }
 
 TEST_F(Cli, ACardOfFlightsIsShownInAFigure) {
