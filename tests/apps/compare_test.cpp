@@ -1,4 +1,6 @@
 // compare, its report and its cards; predict with them.
+#include <fmt/format.h>
+
 #include "tests/apps/cli.hpp"
 
 namespace unhand::cli {
