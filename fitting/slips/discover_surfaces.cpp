@@ -251,6 +251,7 @@ void judge_residuals(const LawScore& law, const LawScore& base, double unexplain
 }  // namespace
 
 SurfaceDiscovery discover_surfaces(const datasets::SlipLog& log, const SurfaceDiscoveryOptions& options) {
+  datasets::validate(log);
   std::vector<SlipSamples> surfaces;
   for (const auto& [name, surface] : log.surfaces) surfaces.push_back(slip_samples(name, surface));
   return discover_surfaces(surfaces, options);

@@ -41,6 +41,7 @@ struct SurfaceDiscovery {
 /// the one with the fewest coefficients.
 SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
                                    const SurfaceDiscoveryOptions& options);
+/// Throws datasets::LogError for a log that datasets::validate does not take.
 SurfaceDiscovery discover_surfaces(const datasets::SlipLog& log, const SurfaceDiscoveryOptions& options);
 
 }  // namespace unhand::fitting

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <random>
@@ -363,6 +364,21 @@ TEST(SurfaceDiscovery, AnEllipsoidMissesNothing) {
   const auto found =
       discover_surfaces({test::simulate(test::ellipsoid(diagonal), 50, 0.15, 0.1, 21)}, options);
   EXPECT_EQ(found.answer.verdict, Verdict::no_missing_effect);
+}
+
+// As from a program of one's own, which no reader has looked through.
+TEST(SurfaceDiscovery, SlipsThatAreNoNumbersAreRefused) {
+  datasets::SlipLog log;
+  datasets::Surface& patch = log.surfaces["patch"];
+  patch.mass = 1, patch.characteristic_length = 0.05;
+  patch.slips = {{"1",
+                  datasets::Split::train,
+                  {2, 1, {0, 0.01}, {}},
+                  {2, 3, {1, 0, 0, 1, 0, 0}, {}},
+                  {2, 3, {0.1, 0, 0, 0.1, 0, 0}, {}}}};
+  EXPECT_NO_THROW(discover_surfaces(log, {}));
+  patch.slips[0].wrench.data[3] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(discover_surfaces(log, {}), datasets::LogError);
 }
 
 TEST(SurfaceDiscovery, NoAnswerTakesItsTimeToo) {
