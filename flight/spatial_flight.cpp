@@ -24,10 +24,15 @@ Vec3<S> convert3(const Vec3<P>& a) {
   return {convert<S>(a[0]), convert<S>(a[1]), convert<S>(a[2])};
 }
 
+/// Whether drag depends on where in the body the air comes from.
+template <class S>
+bool has_shape(const SpatialAir<S>& a) {
+  return !(is_zero(a.axis_drag_x) && is_zero(a.axis_drag_y) && is_zero(a.cubic_drag));
+}
+
 template <class S>
 bool is_still(const SpatialAir<S>& a) {
-  return is_zero(a.drag_k) && is_zero(a.linear_drag) && is_zero(a.lift) && is_zero(a.axis_drag_x) &&
-         is_zero(a.axis_drag_y) && is_zero(a.cubic_drag);
+  return is_zero(a.drag_k) && is_zero(a.linear_drag) && is_zero(a.lift) && !has_shape(a);
 }
 
 /// κ (Σ n_i⁴ − 3/5) |u| u and |u| A u in body axes.
@@ -50,8 +55,7 @@ class SpatialPath final : public dynamics::HybridSystemFrom<SpatialPath<P>, 6> {
   /// The rotation is known up to `last` [s]; a trial step may look past it.
   SpatialPath(const SpatialAir<P>& air, const Rotation<P>& rotation, double last)
       : air_(air), rotation_(rotation), last_(last) {
-    turns_ = !(is_zero(air.lift) && is_zero(air.axis_drag_x) && is_zero(air.axis_drag_y) &&
-               is_zero(air.cubic_drag));
+    turns_ = !is_zero(air.lift) || has_shape(air);
   }
   dynamics::FlowKind kind(int) const override { return dynamics::FlowKind::smooth; }
   std::string_view mode_name(int) const override { return "flying"; }
@@ -107,6 +111,17 @@ void validate(const SpatialStart<S>& start, const SpatialAir<S>& air, const std:
 }
 
 }  // namespace
+
+template <class S>
+Vec3<S> body_drag(const SpatialAir<S>& air, const Vec3<S>& u) {
+  Vec3<S> a{S(0), S(0), S(0)};
+  if (!is_zero(air.drag_k)) a = quadratic_drag(air.drag_k, u);
+  if (!is_zero(air.linear_drag)) a = difference(a, scaled(air.linear_drag, u));
+  if (has_shape(air)) a = difference(a, shape_drag(air.axis_drag_x, air.axis_drag_y, air.cubic_drag, u));
+  return a;
+}
+template Vec3<double> body_drag(const SpatialAir<double>&, const Vec3<double>&);
+template Vec3<Dual> body_drag(const SpatialAir<Dual>&, const Vec3<Dual>&);
 
 template <class S>
 std::vector<SpatialState<S>> fly_in_space(const SpatialStart<S>& start, const SpatialAir<S>& air,

@@ -27,6 +27,11 @@ struct SpatialAir {
   Vec3<S> wind{};                        ///< velocity of the air [m/s]
 };
 
+/// What the air does to a body by where it comes from [m/s²], u [m/s] its velocity against the air, both in
+/// body axes: −k |u| u − c u − |u| A u − κ (Σ n_i⁴ − 3/5) |u| u. Instantiated for double and Dual.
+template <class S>
+Vec3<S> body_drag(const SpatialAir<S>& air, const Vec3<S>& u);
+
 /// A rigid body as it is let go, in space.
 template <class S>
 struct SpatialStart {
