@@ -99,7 +99,7 @@ std::vector<TrackedPose<S>> tracked_poses(const TrackedFlight<S>& declared, cons
   std::vector<S> true_times;
   for (const double t : times) true_times.push_back(t / (1.0 + tracking.time_scale));
   std::vector<TrackedPose<S>> out;
-  for (const auto& state : flight::fly_in_space(start, air, true_times, options)) {
+  for (const auto& state : flight::fly_in_space(start, air, true_times, options).states) {
     const Vec3<S> point =
         flight::difference(state.position, rotate(state.rotation.attitude, tracking.com_offset));
     out.push_back({flight::scaled(S(1.0 + tracking.length_scale), point), state.rotation.attitude});

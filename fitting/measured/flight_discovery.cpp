@@ -21,11 +21,11 @@ using flight::Vec3;
 
 namespace {
 
-const dynamics::IntegratorOptions kFine = [] {
-  dynamics::IntegratorOptions options;
-  options.tolerances = {1e-8, 1e-10};  // m, rad: far below any tracker
-  return options;
-}();
+const dynamics::IntegratorOptions kFine =
+    dynamics::error_controlled({1e-8, 1e-10});  // m, rad: far below any tracker
+
+/// Of a flight that could not be integrated: its equations are not finite, and so not solved.
+constexpr double kNotSolved = std::numeric_limits<double>::quiet_NaN();
 
 template <class S>
 Quaternion<S> converted(const Quaternion<double>& q) {
@@ -161,6 +161,7 @@ GroupEquations FlightProblem::equations(std::size_t group, std::span<const std::
     const auto poses =
         experiment::tracked_poses(declared, dynamics::Values<S>(mine.names, effects), s.elapsed, kFine);
     std::vector<S> out;
+    if (poses.size() != s.elapsed.size()) out.assign(groups_[group].rows.size(), S(kNotSolved));
     out.reserve(poses.size() * channels_.size());
     for (std::size_t i = 0; i < poses.size(); ++i) {
       for (const std::size_t a : axes_) out.push_back((poses[i].position[a] - s.position[i][a]) / s.sigma[a]);
@@ -173,8 +174,6 @@ GroupEquations FlightProblem::equations(std::size_t group, std::span<const std::
   GroupEquations out;
   try {
     out = swept(shared, own, derivatives, residual);
-  } catch (const std::runtime_error&) {
-    return {};  // the flight could not be integrated
   } catch (const std::invalid_argument&) {
     return {};  // a step led where no flight is
   }
