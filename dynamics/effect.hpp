@@ -48,7 +48,7 @@ int length_power(std::string_view unit);
 /// are tried for something unlisted, and that some effects have. Coefficients have the unit of an
 /// acceleration over that of the form. θ, ω: of the object; J turns by +90°.
 enum class AccelerationForm {
-  none,
+  none,               ///< it seems to be none
   quadratic,          ///< |v| v
   linear,             ///< v
   cubic,              ///< |v|² v

@@ -36,7 +36,7 @@ Vec3<S> body_drag(const SpatialAir<S>& air, const Vec3<S>& u);
 template <class S>
 struct SpatialStart {
   Vec3<S> position{}, velocity{};     ///< of the CoM [m, m/s]
-  RotationState<S> rotation;          ///< at the start
+  RotationState<S> rotation{};        ///< at the start
   Vec3<S> inertia{S(1), S(1), S(1)};  ///< about the principal axes, which are the body's; any unit
 };
 
