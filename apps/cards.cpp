@@ -156,7 +156,7 @@ experiment::FrictionEstimate estimated(const datasets::ThrowLog& log,
   } catch (const experiment::Undetermined& error) {
     const std::string advice =
         !contact::follows_pads(model) ? error.advice
-        : model == naive_model
+        : model == release::kNaiveModel
             ? std::string("give a card (--card)")
             : fmt::format("give a card (--card), as `unhand fit LOG --model {} --card FILE` makes it", model);
     throw Unanswered(fmt::format("{}: {}; {}", model, error.reason, advice));

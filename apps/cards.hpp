@@ -12,9 +12,6 @@
 
 namespace unhand::apps {
 
-/// The limit surface by the sign law at a fixed step, to compare against.
-inline constexpr const char* naive_model = "limit_surface_naive";
-
 /// A parameter by its name on cards.
 struct NamedValue {
   std::string name, unit;

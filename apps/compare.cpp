@@ -59,7 +59,7 @@ void require_models(const std::vector<std::string>& models) {
 /// All release models but the naive one, which is there to be asked for.
 std::vector<std::string> usual_models() {
   auto names = experiment::release_model_names();
-  std::erase(names, naive_model);
+  std::erase(names, release::kNaiveModel);
   return names;
 }
 
@@ -230,7 +230,7 @@ Command compare_command(Parser& root) {
               fmt::format(
                   "Which models, separated by commas: {}. Without it, all release models but {}; for free "
                   "flights, projectile; for slip logs, all surfaces",
-                  fmt::join(known_models(), ", "), naive_model))
+                  fmt::join(known_models(), ", "), release::kNaiveModel))
       .with_commas();
   parser.flag("--fit", request->fit,
               "Fit the models to the log's train throws (see `unhand fit`), or to its slips");

@@ -71,7 +71,7 @@ void ReleaseRun::add(const std::string& model, const UsableCard* card) {
     comparison_.models.push_back(std::move(predicted.comparison));
   } else if (card) {
     add_plain(model, &card->parameters, "");
-  } else if (request_.fit && model == naive_model) {
+  } else if (request_.fit && model == release::kNaiveModel) {
     const auto& law = fitted(naive_law).comparison;
     experiment::ModelParameters parameters;
     parameters.mu = value_of(law, "mu");

@@ -36,7 +36,7 @@ std::vector<std::string> catalogue(MeasuredKind kind) {
     return out;
   }
   for (const auto& effect :
-       kind == MeasuredKind::flights ? experiment::known_flight_effects() : fitting::known_fall_effects())
+       kind == MeasuredKind::flights ? experiment::known_flight_effects() : experiment::known_fall_effects())
     out.push_back(effect.id);
   return out;
 }

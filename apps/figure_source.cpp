@@ -98,7 +98,7 @@ std::optional<ReleaseTrace> FigureSource::trace(const std::string& model) {
         if (std::isfinite(ft->normal_force(i))) out.pressed.emplace_back(ft->time(i), ft->normal_force(i));
   };
   const auto card = cards_.find(model);
-  if (!contact::follows_pads(model) || model == naive_model) return {};
+  if (!contact::follows_pads(model) || model == release::kNaiveModel) return {};
   if (card != cards_.end() && card->second.fitted) {
     const Fitted& known = fitted(model);
     const auto& problem = known.predicted.problem;

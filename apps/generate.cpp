@@ -76,6 +76,18 @@ bool same(datasets::Throw a, datasets::Throw b) {
   return a == b;
 }
 
+/// What an effect acts through and no object has here, if it may be that.
+std::string missing_carrier(const dynamics::Effect& effect) {
+  if (effect.acts_through.empty()) return {};
+  for (const auto& carrier : experiment::known_effects())
+    if (carrier.id == effect.acts_through) {
+      const auto& size = carrier.parameters.front();
+      return fmt::format(": it acts through {0}, which no object has here (--effect {0}={1} [{2}])",
+                         carrier.id, size.name, size.unit);
+    }
+  return {};
+}
+
 /// Tells of effects without which the log would be the same.
 void tell_idle_effects(const experiment::CampaignDesign& design, const GenerateOptions& options,
                        const std::vector<experiment::SyntheticThrow>& throws) {
@@ -89,11 +101,7 @@ void tell_idle_effects(const experiment::CampaignDesign& design, const GenerateO
     for (std::size_t i = 0; idle && i < throws.size(); ++i)
       idle = same(experiment::generate_throw(without, options.seed, static_cast<int>(i)).record,
                   throws[i].record);
-    if (idle)
-      tell("unhand: {} changes nothing in this campaign{}\n", effect.id,
-           effect.id == "flight.wind" ? ": wind acts through drag, which no object has here "
-                                        "(--effect flight.quadratic_drag=K [1/m])"
-                                      : "");
+    if (idle) tell("unhand: {} changes nothing in this campaign{}\n", effect.id, missing_carrier(effect));
   }
 }
 

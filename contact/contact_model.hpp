@@ -155,7 +155,7 @@ Wrench<S> sticking_wrench(const Scene<S>& scene, const Relative<S>& y) {
   return dynamics::required_wrench(scene.body, com, r, scene.gravity);
 }
 
-/// An abstract contact model; see architecture in docs/adding-a-contact-model.md for the recipe.
+/// An abstract contact model; docs/adding-a-contact-model.md is the recipe.
 /// Mode 0 is where a held object starts when its grip holds.
 class ContactModel {
  public:

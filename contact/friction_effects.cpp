@@ -46,69 +46,77 @@ void adhesion(const EffectValues<S>& p, FrictionVariation<S>& friction) {
 }  // namespace
 
 FrictionVariation<double> values(const FrictionVariation<Dual>& v) {
-  return {v.static_ratio.a,      v.stribeck_speed.a, v.viscous.a,   v.softness.a, v.reference_force,
-          v.pressure_exponent.a, v.compliance.a,     v.loss_time.a, v.adhesion.a, v.parting_time.a};
+  FrictionVariation<double> out;
+  const auto from = effect_values(v);
+  const auto to = effect_values(out);
+  for (std::size_t i = 0; i < to.size(); ++i) *to[i] = from[i]->a;
+  out.reference_force = v.reference_force;
+  return out;
 }
 
 void validate(const FrictionVariation<Dual>& v) {
-  const auto require = [](bool ok, const char* name, double value, const char* range) {
-    if (!ok) throw std::invalid_argument(fmt::format("contact.{} = {} is not in {}", name, value, range));
-  };
-  require(v.static_ratio.a >= 0.2 && v.static_ratio.a <= 5, "stribeck.mu_s/mu_k", v.static_ratio.a,
-          "[0.2, 5]");
-  require(v.stribeck_speed.a >= 1e-3 && v.stribeck_speed.a <= 1, "stribeck.v_s", v.stribeck_speed.a,
-          "[0.001, 1] m/s");
-  require(v.viscous.a >= -1 && v.viscous.a <= 50, "viscous.1/v_0", v.viscous.a, "[-1, 50] s/m");
-  require(v.softness.a >= -1 && v.softness.a <= 2, "soft_patch_radius.gamma", v.softness.a, "[-1, 2]");
-  const bool soft = !dynamics::is_zero(v.softness);
-  require(!soft || v.reference_force > 0, "soft_patch_radius: f_0", v.reference_force, "(0, inf) N");
-  require(v.pressure_exponent.a >= -0.4 && v.pressure_exponent.a <= 3, "pressure_profile.s",
-          v.pressure_exponent.a, "[-0.4, 3]");
-  require(v.compliance.a >= 0 && v.compliance.a <= 1e-3, "pad_compliance.compliance", v.compliance.a,
-          "[0, 0.001] m/N");
-  require(v.loss_time.a >= 0 && v.loss_time.a <= 0.1, "pad_compliance.loss_time", v.loss_time.a,
-          "[0, 0.1] s");
-  require(v.adhesion.a >= 0 && v.adhesion.a <= 50, "adhesion.f_adh", v.adhesion.a, "[0, 50] N");
-  require(v.parting_time.a >= 0 && v.parting_time.a <= 0.1, "adhesion.parting_time", v.parting_time.a,
-          "[0, 0.1] s");
+  const auto values = effect_values(v);
+  auto value = values.begin();
+  for (const auto& [effect, apply, apply_dual] : friction_effects())
+    for (const dynamics::EffectParameter& p : effect.parameters)
+      dynamics::require_in_range(effect, p, (*value++)->a);
+  if (!dynamics::is_zero(v.softness) && !(v.reference_force > 0))
+    throw std::invalid_argument(
+        fmt::format("contact.soft_patch_radius: f_0 = {} is not in (0, inf) N", v.reference_force));
 }
 
 std::span<const dynamics::EffectOn<FrictionVariation>> friction_effects() {
   static const dynamics::EffectOn<FrictionVariation> table[] = {
-      {{"contact.stribeck",
-        "friction falls with slip speed from a static to a kinetic coefficient",
-        {{"mu_s/mu_k", "-", 1, 0.2, 5, 0.1}, {"v_s", "m/s", 0.02, 1e-3, 1, 0.01, {0.003, 0.01, 0.03, 0.1}}}},
+      {{.id = "contact.stribeck",
+        .mechanism = "friction falls with slip speed from a static to a kinetic coefficient",
+        // Pads that hold less than they slip with would not hold what a campaign's grip holds.
+        .parameters = {{.name = "mu_s/mu_k",
+                        .unit = "-",
+                        .neutral = 1,
+                        .low = 0.2,
+                        .high = 5,
+                        .typical = 0.1,
+                        .above_neutral = true},
+                       {"v_s", "m/s", 0.02, 1e-3, 1, 0.01, {0.003, 0.01, 0.03, 0.1}}}},
        &stribeck<double>,
        &stribeck<Dual>},
-      {{"contact.viscous",
-        "friction grows with slip speed, mu (1 + v/v_0)",
-        {{"1/v_0", "s/m", 0, -1, 50, 1}}},
+      {{.id = "contact.viscous",
+        .mechanism = "friction grows with slip speed, mu (1 + v/v_0)",
+        .parameters = {{"1/v_0", "s/m", 0, -1, 50, 1}}},
        &viscous<double>,
        &viscous<Dual>},
-      {{"contact.soft_patch_radius",
-        "the patch shrinks with the normal force, a = a_0 (f_N/f_0)^gamma",
+      {{.id = "contact.soft_patch_radius",
+        .mechanism = "the patch shrinks with the normal force, a = a_0 (f_N/f_0)^gamma",
         // Below 0 the law has solutions, but no patch widens as it is let go.
-        {{"gamma", "-", 0, 0, 2, 0.1}}},
+        .parameters = {{.name = "gamma", .unit = "-", .high = 2, .typical = 0.1, .least = -1}}},
        &soft_patch<double>,
        &soft_patch<Dual>},
-      {{"contact.pressure_profile",
-        "pressure (1 - (r/a)^2)^s instead of a uniform one",
-        {{"s", "-", 0, -0.4, 3, 0.2}}},
+      {{.id = "contact.pressure_profile",
+        .mechanism = "pressure (1 - (r/a)^2)^s instead of a uniform one",
+        .parameters = {{"s", "-", 0, -0.4, 3, 0.2}},
+        .needs = {.pressure = true}},
        &pressure_profile<double>,
        &pressure_profile<Dual>},
-      {{"contact.pad_compliance",
-        "the pads give tangentially before they slip",
-        {{"compliance", "m/N", 0, 0, 1e-3, 5e-6},
-         {"loss_time", "s", 0.005, 0, 0.1, 0.005, {0.002, 0.005, 0.02}}},
-        false,
-        true},
+      {{.id = "contact.pad_compliance",
+        .mechanism = "the pads give tangentially before they slip",
+        .parameters = {{"compliance", "m/N", 0, 0, 1e-3, 5e-6},
+                       {"loss_time", "s", 0.005, 0, 0.1, 0.005, {0.002, 0.005, 0.02}}},
+        .one_sided = true,
+        .needs = {.giving_pads = true}},
        &compliance<double>,
        &compliance<Dual>},
-      {{"contact.adhesion",
-        "the pads stick to the object beyond their normal force",
-        {{"f_adh", "N", 0, 0, 50, 0.2}, {"parting_time", "s", 0.005, 1e-4, 0.1, 0.005, {0.001, 0.003, 0.01}}},
-        false,
-        true},
+      {{.id = "contact.adhesion",
+        .mechanism = "the pads stick to the object beyond their normal force",
+        .parameters = {{"f_adh", "N", 0, 0, 50, 0.2},
+                       {.name = "parting_time",
+                        .unit = "s",
+                        .neutral = 0.005,
+                        .low = 1e-4,
+                        .high = 0.1,
+                        .typical = 0.005,
+                        .grid = {0.001, 0.003, 0.01},
+                        .least = 0}},
+        .one_sided = true},
        &adhesion<double>,
        &adhesion<Dual>},
   };
@@ -117,12 +125,10 @@ std::span<const dynamics::EffectOn<FrictionVariation>> friction_effects() {
 
 AdhesiveForce::AdhesiveForce(const NormalForce& base, const Dual& adhesion, const Dual& parting_time)
     : base_(base), adhesion_(adhesion), parting_time_(parting_time) {
-  if (!(adhesion.a >= 0 && adhesion.a <= 1000))
-    throw std::invalid_argument(
-        fmt::format("contact.adhesion: f_adh = {} is not in [0, 1000] N", adhesion.a));
-  if (!(parting_time.a > 0 && parting_time.a <= 1))
-    throw std::invalid_argument(
-        fmt::format("contact.adhesion: parting_time = {} is not in (0, 1] s", parting_time.a));
+  dynamics::require_in_range(friction_effects(), "contact.adhesion.f_adh", adhesion.a);
+  dynamics::require_in_range(friction_effects(), "contact.adhesion.parting_time", parting_time.a);
+  if (parting_time.a == 0)
+    throw std::invalid_argument("contact.adhesion.parting_time = 0 s is no time to part");
   force_release(base, parting_);
 }
 

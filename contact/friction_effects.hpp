@@ -1,6 +1,9 @@
 // How friction and the normal force may depart from a rigid patch under Coulomb's law.
 #pragma once
 
+#include <array>
+#include <span>
+
 #include "contact/normal_force.hpp"
 #include "dynamics/effect.hpp"
 
@@ -22,19 +25,30 @@ struct FrictionVariation {
   S parting_time{};          ///< from f_N = 0 until the adhesion has died [s]
 };
 
+/// The members that effects set, in the order of friction_effects() and of their parameters: of a variation
+/// (const or not), pointers to its members.
+template <class Variation>
+auto effect_values(Variation& v) {
+  return std::array{&v.static_ratio, &v.stribeck_speed, &v.viscous,  &v.softness,    &v.pressure_exponent,
+                    &v.compliance,   &v.loss_time,      &v.adhesion, &v.parting_time};
+}
+
 /// With derivatives, for models that store both.
 template <class S>
 FrictionVariation<Dual> constant(const FrictionVariation<S>& v) {
-  return {Dual(v.static_ratio), Dual(v.stribeck_speed),    Dual(v.viscous),    Dual(v.softness),
-          v.reference_force,    Dual(v.pressure_exponent), Dual(v.compliance), Dual(v.loss_time),
-          Dual(v.adhesion),     Dual(v.parting_time)};
+  FrictionVariation<Dual> out;
+  const auto from = effect_values(v);
+  const auto to = effect_values(out);
+  for (std::size_t i = 0; i < to.size(); ++i) *to[i] = Dual(*from[i]);
+  out.reference_force = v.reference_force;
+  return out;
 }
 
 /// Without derivatives.
 FrictionVariation<double> values(const FrictionVariation<Dual>& v);
 
-/// Throws std::invalid_argument, naming parameter, value and accepted range: those of friction_effects(), a
-/// parting time of 0 besides, and f₀ > 0 where the patch is soft.
+/// Throws std::invalid_argument, naming parameter, value and range, outside of those of friction_effects()
+/// (EffectParameter::least where there is one), and unless f₀ > 0 where the patch is soft.
 void validate(const FrictionVariation<Dual>& v);
 
 /// contact.stribeck, contact.viscous, contact.soft_patch_radius, contact.pressure_profile,
@@ -45,7 +59,8 @@ std::span<const dynamics::EffectOn<FrictionVariation>> friction_effects();
 /// object is free. `base` must outlive it.
 class AdhesiveForce final : public NormalForce {
  public:
-  /// Throws std::invalid_argument unless 0 <= adhesion <= 1000 N and 0 < parting_time <= 1 s.
+  /// `adhesion` f_adh [N], `parting_time` [s] > 0. Throws std::invalid_argument outside of the effect's
+  /// ranges.
   AdhesiveForce(const NormalForce& base, const Dual& adhesion, const Dual& parting_time);
   double at(const Window& window, double t) const override { return at_(window, t); }
   Dual at(const Window& window, const Dual& t) const override { return at_(window, t); }

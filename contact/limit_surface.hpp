@@ -2,6 +2,7 @@
 #pragma once
 
 #include <concepts>
+#include <string>
 #include <utility>
 
 #include "contact/contact_model.hpp"
@@ -14,6 +15,14 @@
 #include "contact/pressed_disc.hpp"
 
 namespace unhand::contact {
+
+/// A shape that says where in a disc the pressure is: s of p ∝ (1 − (r/a)²)^s, and c of L = c a [-]. Its
+/// points may give (GivingPoints) and slip at their own speeds (LocalFriction).
+template <class T>
+concept PressedShape = requires(const T& shape) {
+  { shape.exponent() } -> std::convertible_to<Dual>;
+  { shape.torque_factor() } -> std::convertible_to<Dual>;
+};
 
 /// The set-valued law: slipping, the friction wrench is the one in the limit set that dissipates most,
 ///   f = argmin over the set of f · v_r   (for the ellipsoid f = −D v_r / sqrt(v_rᵀ D v_r), D = diag(f_max²,
@@ -41,7 +50,7 @@ namespace unhand::contact {
 /// other shapes grow and shrink with the norm of (v_r, L ω_r).
 ///
 /// All of this is done in the normalised coordinates of limit_surface_shapes.hpp, so a Shape is all that
-/// differs.
+/// differs; "disc" above is any PressedShape.
 template <class Shape>
 class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>>, public GivesAtPoints {
  public:
@@ -91,7 +100,7 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>>, public 
  private:
   static constexpr int kHeld = 0, kSlip = 1, kStickAgain = 2;
   /// Whether the shape says where the pressure is.
-  static constexpr bool kDisc = std::is_same_v<Shape, UniformDisc> || std::is_same_v<Shape, PressedDisc>;
+  static constexpr bool kDisc = PressedShape<Shape>;
   bool is_elastic(int mode) const { return mode == kHeld && pads_dual_; }
   /// The mode of an object that came to rest on the pads.
   int stick() const { return pads_dual_ ? kStickAgain : kHeld; }
@@ -112,7 +121,7 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>>, public 
   Entry<S, 6> onset(const Window&, const SceneSource&, const S& t, const Relative<S>&,
                     bool at_the_surface) const;
 
-  std::string_view name_;
+  std::string name_;
   Shape shape_;
   FrictionLimits<double> limits_double_;
   FrictionLimits<Dual> limits_dual_;

@@ -40,8 +40,9 @@ class NormalForce {
     kinks(out);
     return out;
   }
-  /// Start of the final interval with f_N = 0 [s]; +infinity when the pads never part. The last kink must be
-  /// within kSameInstant of it, or the detach has no derivatives.
+  /// The instant at which the pads count as parted [s]; +infinity when they never part. f_N is zero from
+  /// there on, and may be before. The last kink must be within kSameInstant of it, or the detach has no
+  /// derivatives.
   virtual double release_time() const = 0;
 };
 
@@ -139,9 +140,10 @@ struct NormalForceSummary {
                                                                 ///< force falls from there on [s]
   double shape{
       std::numeric_limits<double>::quiet_NaN()};  ///< exponent p (of the ramp's end) [-]; NaN: no ramp
-  double release_time{std::numeric_limits<double>::infinity()};    ///< [s]
-  double release_sigma{std::numeric_limits<double>::quiet_NaN()};  ///< 1 σ of it, > 0 and at most half the
-                                                                   ///< ramp [s]; NaN: no release
+  double release_time{std::numeric_limits<double>::infinity()};  ///< [s]
+  /// 1 σ of it, > 0 and at most half the ramp [s]; NaN: no release, or none that was seen (a series that is
+  /// zero from its first sample)
+  double release_sigma{std::numeric_limits<double>::quiet_NaN()};
   double tail_mean{};  ///< mean of the series after the release [N]: the sensor's bias, if it has one
   double tail_mean_sigma{
       std::numeric_limits<double>::infinity()};  ///< 1 σ of it [N]; infinite without samples there

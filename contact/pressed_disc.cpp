@@ -1,10 +1,7 @@
 #include "contact/pressed_disc.hpp"
 
-#include <fmt/core.h>
-
-#include <stdexcept>
-
 #include "contact/disc_friction.hpp"
+#include "contact/friction_effects.hpp"
 #include "contact/pressed_disc_table.hpp"
 
 namespace unhand::contact {
@@ -38,8 +35,7 @@ struct PressedDisc::Ray {
 
 PressedDisc::PressedDisc(const Dual& exponent) : exponent_(exponent) {
   const double s = exponent.a;
-  if (!(s >= -0.4 && s <= 3))
-    throw std::invalid_argument(fmt::format("contact.pressure_profile: s = {} is not in [-0.4, 3]", s));
+  dynamics::require_in_range(friction_effects(), "contact.pressure_profile.s", s);
   auto series = std::make_shared<Series>();
   series->uniform = s == 0;
   series->at = pressed_series(s);

@@ -50,7 +50,8 @@ std::deque<ContactModelEntry>& models() {
          return std::make_unique<LimitSurface<UniformDisc>>("limit_surface_disc", p.patch, UniformDisc{},
                                                             p.variation);
        },
-       .gauges = {gauge_of(UniformDisc{})}},
+       .gauges = {gauge_of(UniformDisc{})},
+       .feels_pressure = true},
       {.name = "limit_surface_quartic",
        .make = [](const Parameters& p) -> Model {
          return std::make_unique<LimitSurface<IsotropicQuartic>>(
@@ -151,6 +152,18 @@ std::vector<std::string> contact_model_names() {
 bool follows_pads(std::string_view name) {
   const auto* entry = find(name);
   return !entry || entry->follows_pads;
+}
+
+bool feels_pressure(std::string_view name) {
+  const auto* entry = find(name);
+  return entry && entry->feels_pressure;
+}
+
+bool can_give(std::string_view name) {
+  ContactParameters<double> giving;
+  giving.patch = {0.5, 0.01};
+  giving.variation.compliance = 1e-6;
+  return make_contact_model(name, giving)->needs_hold();
 }
 
 std::vector<WrenchGauge> wrench_gauges(std::string_view name) {

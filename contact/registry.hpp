@@ -43,6 +43,8 @@ struct ContactModelEntry {
   /// ellipsoid where there is none, the one that the wrenches fit best where there are several. Own
   /// parameters have their start.
   std::vector<WrenchGauge> gauges{};
+  /// Whether where the pads press shapes its limits (contact.pressure_profile); else their length alone does.
+  bool feels_pressure{false};
 };
 
 /// Makes a law known by name to everything in this program that takes names: make_contact_model, comparisons,
@@ -56,6 +58,13 @@ std::vector<std::string> contact_model_names();
 
 /// ContactModelEntry::follows_pads; true for a name that is not known.
 bool follows_pads(std::string_view name);
+
+/// ContactModelEntry::feels_pressure; false for a name that is not known.
+bool feels_pressure(std::string_view name);
+
+/// Whether the law has pads that may give before they slip (contact.pad_compliance): what it says of itself
+/// with some. Throws as make_contact_model does.
+bool can_give(std::string_view name);
 
 /// ContactModelEntry::gauges, or the ellipsoid's.
 std::vector<WrenchGauge> wrench_gauges(std::string_view name);

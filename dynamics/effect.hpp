@@ -29,8 +29,51 @@ struct EffectParameter {
   /// Values to try for a parameter that has no influence while the effect is absent (a Stribeck speed, say).
   /// Empty: the parameter measures the effect's size.
   std::vector<double> grid{};
+  /// The equations hold down to here, though no fit looks and no campaign goes below `low` [unit].
+  std::optional<double> least{};
+  bool above_neutral{false};             ///< random campaigns draw it above neutral alone
+  bool in_space_only{false};             ///< no motion in the plane x-z tells it
+  std::optional<std::size_t> on_axis{};  ///< of the body, 0 to 2: it adds to what a sensor reads there alone
+  std::string remedy{};  ///< what to measure where a log does not tell it; empty: Effect::remedy
   /// True if the parameter only shapes an effect that another parameter switches on.
   bool is_shape() const { return !grid.empty(); }
+};
+
+/// The power of the metre in a unit as descriptors write it: 1 of "m/s", −1 of "1/m", 0 of "rad". Lengths
+/// that are s times as long make a value s to that power as large. Units that hide a metre, as N does, are
+/// taken as they are.
+int length_power(std::string_view unit);
+
+/// An acceleration of the free object in the plane x-z or, from `turning` on, of its rotation: the forms that
+/// are tried for something unlisted, and that some effects have. Coefficients have the unit of an
+/// acceleration over that of the form. θ, ω: of the object; J turns by +90°.
+enum class AccelerationForm {
+  none,               ///< it seems to be none
+  quadratic,          ///< |v| v
+  linear,             ///< v
+  cubic,              ///< |v|² v
+  lift,               ///< ω J v
+  along_x,            ///< 1 along x
+  along_z,            ///< 1 along z
+  along_body_x,       ///< 1 along the object's x
+  along_body_z,       ///< 1 along the object's z
+  centripetal_x,      ///< ω² along the object's x
+  centripetal_z,      ///< ω² along the object's z
+  turning,            ///< 1 in rotation
+  turning_linear,     ///< ω in rotation
+  turning_quadratic,  ///< |ω| ω in rotation
+  turning_sine,       ///< sin θ in rotation
+  turning_cosine      ///< cos θ in rotation
+};
+
+/// What must be there for an effect to leave a trace in a log of throws or flights.
+struct EffectNeeds {
+  bool wrench{false};        ///< the wrench behind a pad is measured
+  bool normal_force{false};  ///< the pads' normal force is measured
+  bool mocap{false};         ///< the object is tracked
+  bool attitude{false};      ///< how a free body lies is tracked
+  bool giving_pads{false};   ///< the contact law has pads that may give before they slip
+  bool pressure{false};      ///< where the pads press shapes the contact law's limits
 };
 
 /// Of an effect that is the traceless anisotropy of another one's parameter q ≥ 0: along body axis d that is
@@ -50,9 +93,8 @@ struct Effect {
   bool per_object{false};                   ///< every object has its own values, named "k[jar]"
   /// No two-sided derivative at neutral: its footprint is a difference, at several sizes, over the grid.
   bool one_sided{false};
-  /// In flight: the term of fitting/discovery/missing_force.cpp that is the acceleration this effect seems to
-  /// be. Empty: none is.
-  std::string form{};
+  /// In flight: the acceleration that this effect seems to be.
+  AccelerationForm form{AccelerationForm::none};
   std::optional<Anisotropy> anisotropy{};  ///< none: the effect stands alone
   /// Acts through what this other effect adds to, a wind through "flight.quadratic_drag": where nothing is
   /// declared of that and it is not in the model, this is no answer. Empty: stands alone.
@@ -60,9 +102,18 @@ struct Effect {
   /// Acts in the hand and in flight alike, as a tilted gravity does: wherever it was seen most, the rest of
   /// the throw must bear it out.
   bool acts_everywhere{false};
+  EffectNeeds needs{};             ///< without these the log is the base model's
+  bool about_declaration{false};   ///< of what the log declares of an object: another object has its own
+  bool felt_in_fall{false};        ///< an accelerometer that falls feels it, along the vertical too
+  std::string remedy{};            ///< what to measure where a log does not tell it; empty: other throws
+  std::string untracked_remedy{};  ///< the same where no motion capture tracks the object; empty: as `remedy`
   /// "id.name"
   std::string full_name(const EffectParameter& parameter) const { return id + "." + parameter.name; }
 };
+
+/// Throws std::invalid_argument, naming parameter, value and range, for a value [unit] outside of what the
+/// equations hold for: [low, high], or from `least` on.
+void require_in_range(const Effect& effect, const EffectParameter& parameter, double value);
 
 /// Named numbers; what is not named has the value the reader expects.
 template <class S>
@@ -132,6 +183,16 @@ void apply_effects(std::span<const EffectOn<Setup>> table, const Values<S>& valu
     else
       entry.apply_dual(own, setup);
   }
+}
+
+/// As above, for the parameter of one of the table's effects ("id.name"). Throws std::logic_error if there is
+/// none such.
+template <template <class> class Setup>
+void require_in_range(std::span<const EffectOn<Setup>> table, std::string_view full_name, double value) {
+  for (const EffectOn<Setup>& entry : table)
+    for (const EffectParameter& p : entry.effect.parameters)
+      if (entry.effect.full_name(p) == full_name) return require_in_range(entry.effect, p, value);
+  throw std::logic_error("no effect has the parameter " + std::string(full_name));
 }
 
 }  // namespace unhand::dynamics

@@ -15,8 +15,9 @@ std::span<const EffectOn<Gravity>> gravity_effects() {
       {{.id = "flight.gravity_tilt",
         .mechanism = "the base frame is not level",
         .parameters = {{"angle", "rad", 0, -0.5, 0.5, 0.01}},
-        .form = "1 along x",
-        .acts_everywhere = true},
+        .form = AccelerationForm::along_x,
+        .acts_everywhere = true,
+        .remedy = "motion capture of longer and faster flights"},
        &tilt<double>,
        &tilt<Dual>},
   };

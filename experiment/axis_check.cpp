@@ -15,6 +15,7 @@
 #include "dynamics/frames.hpp"
 #include "dynamics/median.hpp"
 #include "dynamics/straight_line.hpp"
+#include "experiment/column_pair.hpp"
 #include "experiment/landing_noise.hpp"
 #include "experiment/unit_evidence.hpp"
 #include "experiment/unit_rules.hpp"
@@ -81,22 +82,6 @@ std::string mistake_of(const Axis& axis, double ratio, double within) {
   return out;
 }
 
-/// Numbers of two columns that should be equal.
-class Beside {
- public:
-  void add(double a, double b) { aa_ += a * a, ab_ += a * b, bb_ += b * b, n_ += 1; }
-  double cosine() const { return aa_ > 0 && bb_ > 0 ? ab_ / std::sqrt(aa_ * bb_) : 0; }
-  /// The first over the second, where they are proportional and the larger is of a size that shows.
-  std::optional<double> ratio(double shows) const {
-    constexpr double kTogether = 0.95;
-    if (n_ == 0 || std::max(aa_, bb_) < n_ * shows * shows || !(std::abs(cosine()) > kTogether)) return {};
-    return std::copysign(std::sqrt(aa_ / bb_), ab_);
-  }
-
- private:
-  double aa_{}, ab_{}, bb_{}, n_{};
-};
-
 void keep(Links& out, const Axis& a, const Axis& b, std::optional<double> ratio) {
   if (ratio && std::isfinite(*ratio) && *ratio != 0) out[{a, b}] = *ratio;
 }
@@ -105,13 +90,13 @@ void keep(Links& out, const Axis& a, const Axis& b, std::optional<double> ratio)
 void check_sums(const Series& time, const Series& value, const Series& rate, Source of, Source from,
                 double shows, double shows_turn, Links& out) {
   for (std::size_t c = 0; c < 3; ++c) {
-    Beside pairs;
+    ColumnPair pairs;
     double sum = 0;
     for (std::size_t i = 1; i < time.rows; ++i) {
       sum += 0.5 * (rate(i, c) + rate(i - 1, c)) * (time(i) - time(i - 1));
       pairs.add(value(i, c) - value(0, c), sum);
     }
-    keep(out, {of, c}, {from, c}, pairs.ratio(c == 2 ? shows_turn : shows));
+    keep(out, {of, c}, {from, c}, pairs.size_ratio(c == 2 ? shows_turn : shows));
   }
 }
 
@@ -140,7 +125,7 @@ void check_held(const ThrowLog& log, const Throw& one, double opening, Links& ou
   for (std::size_t c = 0; c < 3; ++c) {
     if (c < 2 && !lever) continue;
     // The lever is in the right unit, and stands on the side of the one that is, too.
-    Beside with_hand, with_object;
+    ColumnPair with_hand, with_object;
     for (const auto& s : samples) {
       const double seen = mocap.pose(s.i, c) - mocap.pose(samples[0].i, c),
                    moved = s.pose[c] - samples[0].pose[c], swung = arm(s)[c] - arm(samples[0])[c];
@@ -148,7 +133,7 @@ void check_held(const ThrowLog& log, const Throw& one, double opening, Links& ou
     }
     const bool object = std::abs(with_object.cosine()) > std::abs(with_hand.cosine());
     keep(out, {Source::mocap, c}, {Source::pose, c},
-         (object ? with_object : with_hand).ratio(c == 2 ? kShowsTurn : kShowsShift));
+         (object ? with_object : with_hand).size_ratio(c == 2 ? kShowsTurn : kShowsShift));
   }
 }
 
@@ -166,9 +151,9 @@ void check_fall(const ThrowLog& log, const Throw& one, double opening, Links& ou
   }
   if (t.size() < kEnough) return;
   const auto straight = dynamics::fit_line(t, z), falls = dynamics::fit_line(t, fall);
-  Beside bend;
+  ColumnPair bend;
   for (std::size_t i = 0; i < t.size(); ++i) bend.add(z[i] - straight.at(t[i]), fall[i] - falls.at(t[i]));
-  keep(out, {Source::mocap, 1}, {Source::physics, 1}, bend.ratio(kShowsBend));
+  keep(out, {Source::mocap, 1}, {Source::physics, 1}, bend.size_ratio(kShowsBend));
 }
 
 /// The landing beside where motion capture leads within its last tenth of a second.
@@ -184,12 +169,12 @@ void check_landing(const Throw& one, double opening, Links& out) {
     t.push_back(mocap.time(i)), x.push_back(mocap.pose(i, 0)), theta.push_back(mocap.pose(i, 2));
   }
   if (t.size() < 4 || landing.time(0) - t.front() > kBeyond) return;
-  Beside there, turned;
+  ColumnPair there, turned;
   there.add(landing.pose(0, 0), dynamics::fit_line(t, x).at(landing.time(0)));
-  keep(out, {Source::landing, 0}, {Source::mocap, 0}, there.ratio(10 * kShowsShift));
+  keep(out, {Source::landing, 0}, {Source::mocap, 0}, there.size_ratio(10 * kShowsShift));
   if (!tells_angle(landing)) return;
   turned.add(landing.pose(0, 1), dynamics::fit_line(t, theta).at(landing.time(0)));
-  keep(out, {Source::landing, 2}, {Source::mocap, 2}, turned.ratio(10 * kShowsTurn));
+  keep(out, {Source::landing, 2}, {Source::mocap, 2}, turned.size_ratio(10 * kShowsTurn));
 }
 
 Links links_of(const ThrowLog& log, const Throw& one) {
@@ -205,10 +190,10 @@ Links links_of(const ThrowLog& log, const Throw& one) {
   if (one.mocap && one.landing) check_landing(one, *opening, out);
   if (!one.landing || one.landing->pose.empty() || one.landing->time.empty()) return out;
   const double flown = one.landing->time(0) - *opening;
-  Beside flight;
+  ColumnPair flight;
   flight.add(one.landing->pose(0, 0) - hand_at(hand.time, hand.pose, *opening)[0],
              hand_at(hand.time, hand.twist, *opening)[0] * flown);
-  if (flown > 0) keep(out, {Source::landing, 0}, {Source::twist, 0}, flight.ratio(10 * kShowsShift));
+  if (flown > 0) keep(out, {Source::landing, 0}, {Source::twist, 0}, flight.size_ratio(10 * kShowsShift));
   return out;
 }
 

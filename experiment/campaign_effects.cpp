@@ -93,16 +93,14 @@ std::string checked(std::string_view name, double value) {
 /// True where the campaign's law and sensors could show it.
 bool is_visible(const Effect& effect, const CampaignDesign& design) {
   const SensorSuite& s = design.sensors;
-  if (effect.id == "flight.wind")
-    return std::any_of(design.objects.begin(), design.objects.end(),
-                       [](const auto& o) { return o.drag_k > 0; });
-  if (effect.id == "contact.pad_compliance")
-    return design.contact_model != "sliding_pivot" && contact::follows_pads(design.contact_model);
-  if (effect.id == "contact.pressure_profile") return design.contact_model == "limit_surface_disc";
-  if (effect.id == "sensor.ft_bias") return s.ft && s.wrench;
-  if (effect.id == "sensor.normal_force_bias" || effect.id == "release.opening_delay") return s.ft;
-  if (effect.id == "sensor.mocap_time_offset" || effect.id == "sensor.length_scale") return s.mocap;
-  return true;
+  const dynamics::EffectNeeds& needs = effect.needs;
+  const auto is_dragged = [](const ThrownObject& o) { return o.drag_k > 0; };
+  if (!effect.acts_through.empty() &&  // drag is all that objects declare of what effects act through
+      std::none_of(design.objects.begin(), design.objects.end(), is_dragged))
+    return false;
+  return !(needs.wrench && !(s.ft && s.wrench)) && !(needs.normal_force && !s.ft) &&
+         !(needs.mocap && !s.mocap) && !(needs.giving_pads && !contact::can_give(design.contact_model)) &&
+         !(needs.pressure && !contact::feels_pressure(design.contact_model));
 }
 
 /// What a random campaign can just detect, in typical steps.
@@ -111,8 +109,7 @@ constexpr double kLeastSteps = 0.5;
 double random_size(const Effect& effect, const EffectParameter& p, RandomStream& random) {
   constexpr double kLargeOverLeast = 20;
   const double size = p.typical * kLeastSteps * std::pow(kLargeOverLeast, random.uniform());
-  // A static friction below the kinetic one would not hold what the campaign's grip holds.
-  const bool two_sided = !effect.one_sided && effect.id != "contact.stribeck";
+  const bool two_sided = !effect.one_sided && !p.above_neutral;
   const bool negative = random.uniform() < 0.5 && two_sided && p.neutral - size >= p.low;
   return std::min(p.high, p.neutral + (negative ? -size : size));
 }
@@ -122,6 +119,8 @@ double random_size(const Effect& effect, const EffectParameter& p, RandomStream&
 std::string without_object(std::string_view name) { return std::string(name.substr(0, name.find('['))); }
 
 const EffectParameter* find_parameter(std::string_view name) { return find(name).parameter; }
+
+const Effect* effect_of(std::string_view name) { return find(name).effect; }
 
 std::pair<std::string, double> parse_effect(std::string_view text) {
   const std::size_t equals = text.find('=');

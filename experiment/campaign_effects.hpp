@@ -50,6 +50,9 @@ std::string without_object(std::string_view name);
 /// The parameter that a name means ("id.parameter", no brackets); null if there is none.
 const dynamics::EffectParameter* find_parameter(std::string_view name);
 
+/// The effect that a parameter's name belongs to ("id.parameter", no brackets); null if there is none.
+const dynamics::Effect* effect_of(std::string_view name);
+
 /// An effect for benchmarks of detection: one of the catalogue that the design's sensors can see, each of its
 /// sizes log-uniform from half the `typical` one (viscous friction: 2.5 times; about what a campaign can
 /// detect) to twenty times that (large), with either sign where the range allows it (but μ_s > μ_k);

@@ -3,11 +3,13 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <map>
 
 #include "dynamics/parallel.hpp"
+#include "dynamics/pooled_scatter.hpp"
 
 namespace unhand::experiment {
 
@@ -58,37 +60,15 @@ ThrowComparison judge(const PreparedThrow& prepared, const Prediction& predictio
 }
 
 RepetitionScatter scatter_of(const std::vector<PreparedThrow>& throws) {
-  RepetitionScatter out;
-  struct Landings {
-    std::vector<double> x, theta;
-  };
-  std::map<std::string, Landings> repetitions;
+  std::map<std::string, std::vector<std::array<double, 2>>> repetitions;
   for (const auto& t : throws)
-    if (t.measured.landing_x && t.measured.landing_theta) {
-      Landings& of = repetitions[t.experiment()];
-      of.x.push_back(*t.measured.landing_x);
-      of.theta.push_back(*t.measured.landing_theta * kDegrees);
-    }
-  double x_square = 0, theta_square = 0;
-  int freedom = 0;
-  for (const auto& [experiment, landings] : repetitions) {
-    const auto& [x, theta] = landings;
-    if (x.size() < 2) continue;
-    ++out.conditions;
-    freedom += static_cast<int>(x.size()) - 1;
-    const auto square = [](const std::vector<double>& v) {
-      double mean = 0, sum = 0;
-      for (const double e : v) mean += e / static_cast<double>(v.size());
-      for (const double e : v) sum += (e - mean) * (e - mean);
-      return sum;
-    };
-    x_square += square(x);
-    theta_square += square(theta);
-  }
-  if (freedom > 0) {
-    out.landing_x = std::sqrt(x_square / freedom);
-    out.landing_theta = std::sqrt(theta_square / freedom);
-  }
+    if (t.measured.landing_x && t.measured.landing_theta)
+      repetitions[t.experiment()].push_back({*t.measured.landing_x, *t.measured.landing_theta * kDegrees});
+  dynamics::PooledScatter<2> pooled;
+  for (const auto& [experiment, landings] : repetitions) pooled.add(landings);
+  RepetitionScatter out;
+  out.conditions = pooled.groups();
+  if (pooled.freedom() > 0) out.landing_x = pooled.sigma(0), out.landing_theta = pooled.sigma(1);
   return out;
 }
 

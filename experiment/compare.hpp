@@ -45,8 +45,8 @@ struct ThrowComparison {
 };
 
 /// The errors at the detach from the prediction there, if both are known. A model may let go earlier or later
-/// than the pads did: the twists are compared at the measured detach, to which gravity carries the predicted
-/// one (ω does not change in flight).
+/// than the pads did: v_x and ω are subtracted as they are, each at its own detach, for gravity alone changes
+/// neither.
 void judge_detach(const PreparedThrow& prepared, ThrowComparison& comparison);
 
 /// A parameter's value in words' terms; sigma is NaN where it is not known.

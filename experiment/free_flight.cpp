@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 
@@ -13,7 +14,7 @@
 #include "dynamics/parallel.hpp"
 #include "experiment/flight_samples.hpp"
 #include "experiment/least_squares.hpp"
-#include "flight/point_flight.hpp"
+#include "flight/spatial_flight.hpp"
 
 namespace unhand::experiment {
 
@@ -52,11 +53,25 @@ void place(const MatrixXd& covariance, const std::vector<int>& axes, Eigen::Matr
       out(axes[a % n] + 3 * (a / n), axes[b % n] + 3 * (b / n)) = covariance(a, b);
 }
 
-const dynamics::IntegratorOptions kFine = [] {
-  dynamics::IntegratorOptions options;
-  options.tolerances = {1e-10, 1e-12};  // far below any tracker
-  return options;
-}();
+const dynamics::IntegratorOptions kFine =
+    dynamics::error_controlled({1e-10, 1e-12});  // far below any tracker
+
+/// Residuals of a flight that the integrator did not solve.
+constexpr double kNotSolved = std::numeric_limits<double>::quiet_NaN();
+
+/// Where the CoM is at `times`; empty if the flight was not solved.
+template <class S>
+std::vector<Vec3<S>> places(const flight::SpatialStart<S>& start, const Vec3<double>& gravity, double drag_k,
+                            const std::vector<double>& times) {
+  flight::SpatialAir<S> air;
+  for (std::size_t a = 0; a < 3; ++a) air.gravity[a] = S(gravity[a]);
+  air.drag_k = S(drag_k);
+  std::vector<Vec3<S>> out;
+  for (const auto& state :
+       flight::fly_in_space<S>(start, air, std::vector<S>(times.begin(), times.end()), kFine).states)
+    out.push_back(state.position);
+  return out;
+}
 
 /// The flight of the CoM. With drag the closed form without it is where Gauss-Newton begins.
 bool fit_translation(const FlightSamples& s, const Vec3<double>& gravity, double drag_k, std::size_t n,
@@ -84,20 +99,18 @@ bool fit_translation(const FlightSamples& s, const Vec3<double>& gravity, double
     };
     const auto evaluate = [&](const VectorXd& d, VectorXd& r, MatrixXd& J) {
       const Start at = moved(d);
-      flight::PointFlight<Dual> flight;
-      for (int a = 0; a < 3; ++a)
-        flight.position[a] = Dual(at.p[a]), flight.velocity[a] = Dual(at.v[a]),
-        flight.gravity[a] = Dual(gravity[a]);
-      flight.drag_k = Dual(drag_k);
+      flight::SpatialStart<Dual> start;
+      for (int a = 0; a < 3; ++a) start.position[a] = Dual(at.p[a]), start.velocity[a] = Dual(at.v[a]);
       for (int j = 0; j < axes; ++j) {
         const int a = s.axes[j];
-        flight.position[a] = dynamics::independent(at.p[a], j);
-        flight.velocity[a] = dynamics::independent(at.v[a], axes + j);
+        start.position[a] = dynamics::independent(at.p[a], j);
+        start.velocity[a] = dynamics::independent(at.v[a], axes + j);
       }
-      const auto predicted = flight::positions(flight, fitted, kFine);
+      const auto predicted = places(start, gravity, drag_k, fitted);
       r.resize(static_cast<long>(n) * axes);
       J.resize(r.size(), 2 * axes);
-      for (std::size_t i = 0; i < n; ++i)
+      if (predicted.empty()) r.setConstant(kNotSolved), J.setZero();
+      for (std::size_t i = 0; i < predicted.size(); ++i)
         for (int j = 0; j < axes; ++j) {
           const int a = s.axes[j];
           const long row = static_cast<long>(i) * axes + j;
@@ -114,11 +127,11 @@ bool fit_translation(const FlightSamples& s, const Vec3<double>& gravity, double
     fit.velocity = x.v;
     place(covariance, s.axes, fit.translation_covariance);
   }
-  const auto predicted = flight::positions(
-      flight::PointFlight<double>{fit.position, fit.velocity, gravity, drag_k}, s.elapsed, kFine);
-  for (std::size_t i = 0; i < s.elapsed.size(); ++i)
+  const auto predicted =
+      places<double>({.position = fit.position, .velocity = fit.velocity}, gravity, drag_k, s.elapsed);
+  for (std::size_t i = 0; i < predicted.size(); ++i)
     fit.position_residuals.push_back(flight::difference(s.position[i], predicted[i]));
-  return true;
+  return !predicted.empty();
 }
 
 /// Torque-free rotation in space. The window grows from the first few samples: however many turns the flight
@@ -143,10 +156,11 @@ bool fit_rotation(const FlightSamples& s, const Vec3<double>& inertia, std::size
                            dynamics::independent(state.omega[2], 5)};
     const RotationState<Dual> start{
         Quaternion<Dual>{Dual(q.w), Dual(q.x), Dual(q.y), Dual(q.z)} * flight::exp(turn), omega};
-    const auto predicted = flight::rotate_freely(inertia_dual, start, window, kFine);
+    const auto predicted = flight::rotate_freely(inertia_dual, start, window, kFine).states;
     r.resize(3 * static_cast<long>(window.size()));
     J.resize(r.size(), 6);
-    for (std::size_t i = 0; i < window.size(); ++i) {
+    if (predicted.empty()) r.setConstant(kNotSolved), J.setZero();
+    for (std::size_t i = 0; i < predicted.size(); ++i) {
       const Quaternion<double>& m = s.attitude[i];
       const Vec3<Dual> error = flight::rotation_between(
           Quaternion<Dual>{Dual(m.w), Dual(m.x), Dual(m.y), Dual(m.z)}, predicted[i].attitude);
@@ -167,10 +181,10 @@ bool fit_rotation(const FlightSamples& s, const Vec3<double>& inertia, std::size
   }
   fit.rotation = x;
   fit.rotation_covariance = covariance;
-  const auto predicted = flight::rotate_freely(inertia, x, s.elapsed, kFine);
-  for (std::size_t i = 0; i < s.elapsed.size(); ++i)
+  const auto predicted = flight::rotate_freely(inertia, x, s.elapsed, kFine).states;
+  for (std::size_t i = 0; i < predicted.size(); ++i)
     fit.orientation_residuals.push_back(flight::rotation_between(predicted[i].attitude, s.attitude[i]));
-  return true;
+  return !predicted.empty();
 }
 
 void fit_angle(const FlightSamples& s, std::size_t n, FreeFlightFit& fit) {

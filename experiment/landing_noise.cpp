@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "datasets/assemble.hpp"
+#include "dynamics/pooled_scatter.hpp"
 #include "dynamics/straight_line.hpp"
 
 namespace unhand::experiment {
@@ -74,25 +75,12 @@ std::optional<Pair> tracked_landing(const datasets::ThrowLog& log, const dataset
 /// Numbers by what they repeat.
 using Groups = std::map<std::string, std::vector<Pair>>;
 
-struct Pooled {
-  Pair sigma{};
-  int freedom{}, groups{};
-};
+using Pooled = dynamics::PooledScatter<2>;
 
 /// About the mean of each group.
 Pooled pool(const Groups& groups) {
   Pooled out;
-  Pair squares{};
-  for (const auto& [name, members] : groups) {
-    if (members.size() < 2) continue;
-    ++out.groups, out.freedom += static_cast<int>(members.size()) - 1;
-    for (std::size_t c = 0; c < 2; ++c) {
-      double mean = 0;
-      for (const Pair& m : members) mean += m[c] / static_cast<double>(members.size());
-      for (const Pair& m : members) squares[c] += (m[c] - mean) * (m[c] - mean);
-    }
-  }
-  for (std::size_t c = 0; c < 2 && out.freedom > 0; ++c) out.sigma[c] = std::sqrt(squares[c] / out.freedom);
+  for (const auto& [name, members] : groups) out.add(members);
   return out;
 }
 
@@ -118,13 +106,14 @@ LandingNoise landing_noise(const datasets::ThrowLog& log) {
     }
   }
   const auto say = [](const Pooled& of, const char* what) {
-    return LandingNoise{of.sigma[0], of.sigma[1], fmt::format("{}, {} degrees of freedom", what, of.freedom)};
+    return LandingNoise{of.sigma(0), of.sigma(1),
+                        fmt::format("{}, {} degrees of freedom", what, of.freedom())};
   };
-  if (const Pooled of = pool(differences); of.freedom >= kLeast)
+  if (const Pooled of = pool(differences); of.freedom() >= kLeast)
     return say(of, "scatter of landing minus motion capture within repetitions of a condition");
-  if (const Pooled of = pool(together); of.freedom >= kLeast)
+  if (const Pooled of = pool(together); of.freedom() >= kLeast)
     return say(of, "scatter of landing minus motion capture over all throws");
-  if (const Pooled of = pool(landings); of.freedom >= kLeast)
+  if (const Pooled of = pool(landings); of.freedom() >= kLeast)
     return say(of, "scatter of landings within repetitions of a condition, as large as throws differ");
   return {
       {},

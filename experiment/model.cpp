@@ -10,8 +10,6 @@
 namespace unhand::experiment {
 namespace {
 
-constexpr const char* kNaive = "limit_surface_naive";
-
 /// For models that do not follow the pads.
 class NoForce final : public contact::NormalForce {
  public:
@@ -48,7 +46,7 @@ void require_force(const PreparedThrow& throw_, const std::string& model) {
 
 std::vector<std::string> release_model_names() {
   auto names = contact::contact_model_names();
-  names.emplace_back(kNaive);
+  names.emplace_back(release::kNaiveModel);
   return names;
 }
 
@@ -61,7 +59,7 @@ void require_release_model(const std::string& name) {
 
 std::unique_ptr<contact::ContactModel> contact_model_for(const PreparedThrow& throw_,
                                                          const std::string& model, const ModelParameters& p) {
-  if (model == kNaive) return nullptr;
+  if (model == release::kNaiveModel) return nullptr;
   if (contact::follows_pads(model)) require_force(throw_, model);
   return contact::make_contact_model(
       model, contact::ContactParameters<double>{patch_of(p), p.slide_end, p.law_values, throw_.open_command,

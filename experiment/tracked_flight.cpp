@@ -30,22 +30,46 @@ void inertia(const EffectValues<S>& p, Tracking<S>& tracking) {
 
 std::span<const dynamics::EffectOn<Tracking>> tracking_effects() {
   static const dynamics::EffectOn<Tracking> table[] = {
-      {{"sensor.length_scale", "the tracker's metric scale is off", {{"scale", "-", 1, 0.1, 10, 2e-3}}},
+      {{.id = "sensor.length_scale",
+        .mechanism = "the tracker's metric scale is off",
+        .parameters = {{"scale", "-", 1, 0.1, 10, 2e-3}}},
        &length_scale<double>,
        &length_scale<Dual>},
-      {{"sensor.time_scale", "the tracker's clock runs fast or slow", {{"scale", "-", 1, 0.3, 3, 1e-3}}},
+      {{.id = "sensor.time_scale",
+        .mechanism = "the tracker's clock runs fast or slow",
+        .parameters = {{"scale", "-", 1, 0.3, 3, 1e-3}}},
        &time_scale<double>,
        &time_scale<Dual>},
-      {{"sensor.com_offset",
-        "the tracked point is not the CoM: true - declared CoM in body axes",
-        {{"x", "m", 0, -0.1, 0.1, 1e-3}, {"y", "m", 0, -0.1, 0.1, 1e-3}, {"z", "m", 0, -0.1, 0.1, 1e-3}},
-        true},
+      {{.id = "sensor.com_offset",
+        .mechanism = "the tracked point is not the CoM: true - declared CoM in body axes",
+        .parameters =
+            {{"x", "m", 0, -0.1, 0.1, 1e-3},
+             {.name = "y", .unit = "m", .low = -0.1, .high = 0.1, .typical = 1e-3, .in_space_only = true},
+             {"z", "m", 0, -0.1, 0.1, 1e-3}},
+        .per_object = true,
+        .needs = {.attitude = true},
+        .about_declaration = true},
        &com_offset<double>,
        &com_offset<Dual>},
-      {{"sensor.inertia",
-        "the declared ratios of the moments of inertia are off",
-        {{"ratio_y", "-", 1, 0.2, 5, 0.02}, {"ratio_z", "-", 1, 0.2, 5, 0.02}},
-        true},
+      {{.id = "sensor.inertia",
+        .mechanism = "the declared ratios of the moments of inertia are off",
+        .parameters = {{.name = "ratio_y",
+                        .unit = "-",
+                        .neutral = 1,
+                        .low = 0.2,
+                        .high = 5,
+                        .typical = 0.02,
+                        .in_space_only = true},
+                       {.name = "ratio_z",
+                        .unit = "-",
+                        .neutral = 1,
+                        .low = 0.2,
+                        .high = 5,
+                        .typical = 0.02,
+                        .in_space_only = true}},
+        .per_object = true,
+        .needs = {.attitude = true},
+        .about_declaration = true},
        &inertia<double>,
        &inertia<Dual>},
   };
@@ -75,7 +99,7 @@ std::vector<TrackedPose<S>> tracked_poses(const TrackedFlight<S>& declared, cons
   std::vector<S> true_times;
   for (const double t : times) true_times.push_back(t / (1.0 + tracking.time_scale));
   std::vector<TrackedPose<S>> out;
-  for (const auto& state : flight::fly_in_space(start, air, true_times, options)) {
+  for (const auto& state : flight::fly_in_space(start, air, true_times, options).states) {
     const Vec3<S> point =
         flight::difference(state.position, rotate(state.rotation.attitude, tracking.com_offset));
     out.push_back({flight::scaled(S(1.0 + tracking.length_scale), point), state.rotation.attitude});

@@ -39,11 +39,11 @@ struct TrackedPose {
   flight::Quaternion<S> attitude;  ///< body to world, as reported
 };
 
-/// The tracked poses at reported `times` [s] from the start, with the effects that `values` names. Throws as
-/// fly_in_space does. Instantiated for double and Dual.
+/// The tracked poses at reported `times` [s] from the start, with the effects that `values` names; none if
+/// the flight is not solved. Throws as fly_in_space does. Instantiated for double and Dual.
 template <class S>
-std::vector<TrackedPose<S>> tracked_poses(const TrackedFlight<S>& declared, const dynamics::Values<S>& values,
-                                          const std::vector<double>& times,
-                                          const dynamics::IntegratorOptions& options = {});
+std::vector<TrackedPose<S>> tracked_poses(
+    const TrackedFlight<S>& declared, const dynamics::Values<S>& values, const std::vector<double>& times,
+    const dynamics::IntegratorOptions& options = dynamics::error_controlled());
 
 }  // namespace unhand::experiment

@@ -10,6 +10,7 @@
 #include "datasets/summary.hpp"
 #include "dynamics/frames.hpp"
 #include "dynamics/median.hpp"
+#include "experiment/column_pair.hpp"
 #include "experiment/landing_noise.hpp"
 #include "experiment/unit_rules.hpp"
 
@@ -66,36 +67,17 @@ std::vector<HeldWrench> held_wrenches(const datasets::ThrowLog& log, const datas
 
 namespace {
 
-/// Numbers of two columns that should be equal.
-class Pairs {
- public:
-  void add(double seen, double expected) {
-    ss_ += seen * seen, se_ += seen * expected, ee_ += expected * expected;
-    n_ += 1;
-  }
-  /// Seen over expected by least squares, where both go together and either is of a size that shows.
-  std::optional<double> ratio(double shows) const {
-    constexpr double kTogether = 0.9;
-    if (n_ == 0 || ss_ < n_ * shows * shows || ee_ < n_ * shows * shows) return {};
-    if (!(se_ > kTogether * std::sqrt(ss_ * ee_))) return {};
-    return se_ / ee_;
-  }
-
- private:
-  double ss_{}, se_{}, ee_{}, n_{};
-};
-
 /// Every sample of `value` minus the first, beside its derivative added up (trapezoids).
 std::optional<double> ratio_to_integral(const Series& time, const Series& value, const Series& rate,
                                         std::size_t first, std::size_t last, double shows) {
-  Pairs pairs;
+  ColumnPair pairs;
   std::vector<double> sum(last - first, 0.0);
   for (std::size_t i = 1; i < time.rows; ++i)
     for (std::size_t c = first; c < last; ++c) {
       sum[c - first] += 0.5 * (rate(i, c) + rate(i - 1, c)) * (time(i) - time(i - 1));
       pairs.add(value(i, c) - value(0, c), sum[c - first]);
     }
-  return pairs.ratio(shows);
+  return pairs.fitted_ratio(shows);
 }
 
 void keep(SizeRatios& out, SizedColumn column, std::optional<double> ratio) {
@@ -132,7 +114,7 @@ struct Held {
 std::optional<double> check_mocap(const Held& held, SizeRatios& out) {
   if (!held.logged.mocap) return held.logged.grasp_angle;
   const auto& mocap = *held.logged.mocap;
-  Pairs shift, turn;
+  ColumnPair shift, turn;
   double farthest = 0, widest = 0, angle = 0, distance = 0, n = 0;
   std::optional<std::pair<std::size_t, std::array<double, 3>>> first;
   for (std::size_t i = 0; i < mocap.time.rows; ++i) {
@@ -149,8 +131,8 @@ std::optional<double> check_mocap(const Held& held, SizeRatios& out) {
   }
   // Where the hand hardly moves but turns, the object moves by its lever.
   if (farthest > held.lever() * std::min(widest, 2.0))
-    keep(out, SizedColumn::held_shift, shift.ratio(kShowsShift));
-  keep(out, SizedColumn::held_turn, turn.ratio(kShowsTurn));
+    keep(out, SizedColumn::held_shift, shift.fitted_ratio(kShowsShift));
+  keep(out, SizedColumn::held_turn, turn.fitted_ratio(kShowsTurn));
   if (const auto offset = held.object().com_offset; offset && n > 0 && distance > n * kShowsLever)
     keep(out, SizedColumn::lever, std::abs(*offset) * n / distance);
   return n > 0 ? std::optional(angle / n) : held.logged.grasp_angle;
@@ -158,14 +140,14 @@ std::optional<double> check_mocap(const Held& held, SizeRatios& out) {
 
 /// Newton and Euler for the held body, about the pads' centre, in the hand frame.
 void check_wrench(const Held& held, std::optional<double> grasp_angle, SizeRatios& out) {
-  Pairs force, torque;
+  ColumnPair force, torque;
   for (const auto& [seen, needed] : held_wrenches(held.log, held.logged, held.begin, held.end, grasp_angle)) {
     force.add(seen[0], needed[0]);
     force.add(seen[1], needed[1]);
     if (std::isfinite(needed[2])) torque.add(seen[2], needed[2]);
   }
-  keep(out, SizedColumn::force, force.ratio(kShowsNewton));
-  keep(out, SizedColumn::torque, torque.ratio(kShowsNewtonMetre));
+  keep(out, SizedColumn::force, force.fitted_ratio(kShowsNewton));
+  keep(out, SizedColumn::torque, torque.fitted_ratio(kShowsNewtonMetre));
 }
 
 /// The bend of the height over time, beside gravity's; what is straight of both is taken out.
@@ -190,12 +172,12 @@ void check_fall(const datasets::ThrowLog& log, const datasets::Throw& logged, Si
     const double t = s[0] - mean[0];
     tt += t * t, th += t * (s[1] - mean[1]), tf += t * (s[2] - mean[2]);
   }
-  Pairs bend;
+  ColumnPair bend;
   for (const auto& s : samples) {
     const double t = s[0] - mean[0];
     bend.add(s[1] - mean[1] - th / tt * t, s[2] - mean[2] - tf / tt * t);
   }
-  keep(out, SizedColumn::fall, bend.ratio(kShowsBend));
+  keep(out, SizedColumn::fall, bend.fitted_ratio(kShowsBend));
 }
 
 /// A free flight of the pads' centre from the end of the grasp.
@@ -207,9 +189,9 @@ void check_landing(const Held& held, SizeRatios& out) {
                under = with[1] * with[1] + 2 * g * drop;
   if (!(under >= 0) || !(g > 0) || landing.pose.empty()) return;
   const double fall = (with[1] + std::sqrt(under)) / g;
-  Pairs x;
+  ColumnPair x;
   x.add(landing.pose(0, 0), from[0] + with[0] * fall);
-  keep(out, SizedColumn::landing_x, x.ratio(5 * kShowsShift));
+  keep(out, SizedColumn::landing_x, x.fitted_ratio(5 * kShowsShift));
   if (landing.time.empty()) return;
   if (held.end + fall > 0) keep(out, SizedColumn::landing_clock, landing.time(0) / (held.end + fall));
   if (!held.logged.mocap || !tells_angle(landing)) return;
@@ -224,9 +206,9 @@ void check_landing(const Held& held, SizeRatios& out) {
     if (apart < kApart) continue;
     if (left > 5 * kApart) return;
     const double rate = (mocap.pose(*last, 2) - mocap.pose(i, 2)) / apart;
-    Pairs turn;
+    ColumnPair turn;
     turn.add(landing.pose(0, 1), mocap.pose(*last, 2) + rate * left);
-    keep(out, SizedColumn::landing_turn, turn.ratio(10 * kShowsTurn));
+    keep(out, SizedColumn::landing_turn, turn.fitted_ratio(10 * kShowsTurn));
     return;
   }
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "contact/registry.hpp"
+#include "experiment/campaign_effects.hpp"
 #include "fitting/distributions.hpp"
 
 namespace unhand::fitting {
@@ -44,17 +45,11 @@ std::string remedy_for(const CampaignProblem& problem, const std::string& name) 
     return "the pads' normal force while they open";
   if (name == "delay")
     return mocap ? "throws with the landing measured, or with a faster hand" : "motion capture of the flight";
-  if (name.starts_with("sensor.ft") || name.starts_with("sensor.normal_force"))
-    return "F/T samples after the release, or with empty pads";
-  if (name.starts_with("sensor.inertia"))
-    return "the torque behind a pad while the held object turns, or a weighed inertia";
-  if (name.starts_with("sensor.mass"))
-    return "the force behind a pad while the object is held, or a weighing";
-  if (name.starts_with("sensor.com_offset"))
-    return mocap ? "grasps at other places on the object" : "motion capture of the turning flight";
-  if (name.ends_with(".landing_share")) return "landings measured by another instrument than the tracker";
-  if (name.starts_with("sensor.")) return "motion capture while the object is held by a moving hand";
-  if (name.starts_with("flight.")) return "motion capture of longer and faster flights";
+  const std::string bare = experiment::without_object(name);
+  if (const auto* parameter = experiment::find_parameter(bare); parameter && !parameter->remedy.empty())
+    return parameter->remedy;
+  if (const auto* effect = experiment::effect_of(bare); effect && !effect->remedy.empty())
+    return mocap || effect->untracked_remedy.empty() ? effect->remedy : effect->untracked_remedy;
   return "throws in which the pads slip for longer and at other speeds and forces: other accelerations, a "
          "slower opening";
 }

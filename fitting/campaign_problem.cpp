@@ -316,6 +316,10 @@ Linearisation CampaignProblem::linearise(const experiment::PreparedThrow& prepar
     out = {};
     out.why_not = error.what();
     return out;
+  } catch (const std::runtime_error& error) {  // a flight that is not solved
+    out = {};
+    out.why_not = error.what();
+    return out;
   }
   const bool finite = out.residual.allFinite() && out.campaign.allFinite() && out.own.allFinite();
   if (out.solved && !finite) out.why_not = "a prediction, or a derivative of one, is not finite";

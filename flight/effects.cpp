@@ -3,6 +3,7 @@
 namespace unhand::flight {
 namespace {
 
+using dynamics::AccelerationForm;
 using dynamics::Dual;
 using dynamics::EffectValues;
 
@@ -22,31 +23,28 @@ void wind(const EffectValues<S>& p, Air<S>& air) {
 }  // namespace
 
 std::span<const dynamics::EffectOn<Air>> air_effects() {
+  static const char* const kLonger = "motion capture of longer and faster flights";
   static const dynamics::EffectOn<Air> table[] = {
-      {{"flight.quadratic_drag",
-        "quadratic drag, a = -k |v| v",
-        {{"k", "1/m", 0, 0, 10, 0.02}},
-        true,
-        false,
-        "|v| v"},
+      {{.id = "flight.quadratic_drag",
+        .mechanism = "quadratic drag, a = -k |v| v",
+        .parameters = {{"k", "1/m", 0, 0, 10, 0.02}},
+        .per_object = true,
+        .form = AccelerationForm::quadratic,
+        .remedy = kLonger},
        &drag<double>,
        &drag<Dual>},
-      {{"flight.magnus_lift",
-        "Magnus lift, a = k_m omega J v",
-        {{"k_m", "-", 0, -5, 5, 0.01}},
-        false,
-        false,
-        "omega J v"},
+      {{.id = "flight.magnus_lift",
+        .mechanism = "Magnus lift, a = k_m omega J v",
+        .parameters = {{"k_m", "-", 0, -5, 5, 0.01}},
+        .form = AccelerationForm::lift,
+        .remedy = kLonger},
        &lift<double>,
        &lift<Dual>},
-      {{"flight.wind",
-        "constant air velocity, acting through the declared drag",
-        {{"w_x", "m/s", 0, -30, 30, 0.3}, {"w_z", "m/s", 0, -30, 30, 0.3}},
-        false,
-        false,
-        {},
-        {},
-        "flight.quadratic_drag"},
+      {{.id = "flight.wind",
+        .mechanism = "constant air velocity, acting through the declared drag",
+        .parameters = {{"w_x", "m/s", 0, -30, 30, 0.3}, {"w_z", "m/s", 0, -30, 30, 0.3}},
+        .acts_through = "flight.quadratic_drag",
+        .remedy = kLonger},
        &wind<double>,
        &wind<Dual>},
   };

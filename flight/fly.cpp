@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "dynamics/smooth_flow.hpp"
 #include "flight/aerodynamics.hpp"
 
 namespace unhand::flight {
@@ -199,14 +200,11 @@ RecordedFlight<S> record_flight(const FlightProblem<S>& problem, double longest,
   validate(problem);
   if (!(longest > 0 && std::isfinite(longest)))
     throw std::invalid_argument(fmt::format("flight: longest = {} is not in (0, inf) s", longest));
-  dynamics::IntegratorOptions recorded = options;
-  recorded.record = true;
-  recorded.longest_step = std::max(options.longest_step, 0.05);
-  auto solution = dynamics::integrate<S, 6>(
-      Flying<S>(problem, false), Entry<S, 6>{kAbove, S(0), state_of(problem), S(0)}, S(longest), recorded);
-  if (solution.outcome != dynamics::Outcome::horizon)
-    throw std::runtime_error(fmt::format("flight: not solved ({})", to_string(solution.outcome)));
-  return {std::move(solution.trajectory)};
+  auto flow =
+      dynamics::integrate_flow<S, 6>(Flying<S>(problem, false), state_of(problem), longest, options, kAbove);
+  if (flow.outcome != dynamics::Outcome::horizon)
+    throw std::runtime_error(fmt::format("flight: not solved ({})", to_string(flow.outcome)));
+  return {std::move(flow.trajectory)};
 }
 
 template bool is_ballistic(const FlightProblem<double>&);

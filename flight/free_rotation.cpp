@@ -10,7 +10,6 @@ namespace unhand::flight {
 
 using dynamics::convert;
 using dynamics::Dual;
-using dynamics::Entry;
 using dynamics::Phase;
 using dynamics::State;
 using dynamics::value_of;
@@ -32,13 +31,9 @@ Vec3<S> inertia_ratios(const Vec3<S>& inertia) {
 
 /// State: the attitude against the start's (w, x, y, z) and ω in the body.
 template <class P>
-class Turning final : public dynamics::HybridSystemFrom<Turning<P>, 7> {
+class Turning final : public dynamics::SmoothSystem<Turning<P>, 7> {
  public:
   Turning(const Vec3<P>& ratios, const P& damping) : damping_(damping), ratios_(ratios) {}
-  dynamics::FlowKind kind(int) const override { return dynamics::FlowKind::smooth; }
-  std::string_view mode_name(int) const override { return "turning"; }
-  int guard_count(int) const override { return 0; }
-  dynamics::Guard guard(int, int) const override { return {}; }
 
   template <class S>
   void flow_(const Phase&, const S&, const State<S, 7>& y, State<S, 7>& dy) const {
@@ -47,12 +42,6 @@ class Turning final : public dynamics::HybridSystemFrom<Turning<P>, 7> {
         spin_rate<S>({convert<S>(ratios_[0]), convert<S>(ratios_[1]), convert<S>(ratios_[2])},
                      convert<S>(damping_), {y[4], y[5], y[6]});
     dy = {0.5 * rate.w, 0.5 * rate.x, 0.5 * rate.y, 0.5 * rate.z, spin[0], spin[1], spin[2]};
-  }
-  template <class S>
-  void guards_(const Phase&, const S&, const State<S, 7>&, S*) const {}
-  template <class S>
-  Entry<S, 7> on_guard_(const Phase& from, int, const S& t, const State<S, 7>& y) const {
-    return {from.mode, t, y, S(0)};
   }
 
  private:
@@ -94,46 +83,36 @@ Rotation<S>::Rotation(const Vec3<S>& inertia, const RotationState<S>& start, con
       (is_zero(S(inertia[0] - inertia[1])) && is_zero(S(inertia[1] - inertia[2])) && is_zero(damping)) ||
       !(last > 0);
   if (closed_form_) return;
-  dynamics::IntegratorOptions recorded = options;
-  recorded.record = true;
-  recorded.longest_step =
-      std::max(options.longest_step, last);  // no guards: the error alone chooses the step
-  const State<S, 7> y{S(1), S(0), S(0), S(0), omega_[0], omega_[1], omega_[2]};
-  auto solution = dynamics::integrate<S, 7>(Turning<S>(ratios, damping), Entry<S, 7>{0, S(0), y, S(0)},
-                                            S(last), recorded);
-  if (solution.outcome != dynamics::Outcome::horizon)
-    throw std::runtime_error(fmt::format("free rotation: not solved ({})", to_string(solution.outcome)));
-  trajectory_ = std::move(solution.trajectory);
+  flow_ = dynamics::integrate_flow<S, 7>(
+      Turning<S>(ratios, damping), {S(1), S(0), S(0), S(0), omega_[0], omega_[1], omega_[2]}, last, options);
 }
 
 template <class S>
 RotationState<S> Rotation<S>::at(const S& t) const {
   if (closed_form_ || !(value_of(t) > 0))  // at the start the first order carries all derivatives
     return {attitude_ * exp(scaled(t, omega_)), sum(omega_, scaled(t, spin_rate_))};
-  const State<S, 7> y = trajectory_.at(t);
+  const State<S, 7> y = flow_.trajectory.at(t);
   return {attitude_ * normalised(Quaternion<S>{y[0], y[1], y[2], y[3]}), {y[4], y[5], y[6]}};
 }
 
 template <class S>
-std::vector<RotationState<S>> rotate_freely(const Vec3<S>& inertia, const RotationState<S>& start,
-                                            const std::vector<double>& times,
-                                            const dynamics::IntegratorOptions& options) {
+FreeRotation<S> rotate_freely(const Vec3<S>& inertia, const RotationState<S>& start,
+                              const std::vector<double>& times, const dynamics::IntegratorOptions& options) {
   validate(inertia, start, times);
   const double last = times.empty() ? 0 : *std::max_element(times.begin(), times.end());
   const Rotation<S> rotation(inertia, start, S(0), last, options);
-  std::vector<RotationState<S>> out;
-  out.reserve(times.size());
-  for (const double t : times) out.push_back(rotation.at(S(t)));
+  FreeRotation<S> out{rotation.outcome(), {}};
+  if (out.outcome != dynamics::Outcome::horizon) return out;
+  out.states.reserve(times.size());
+  for (const double t : times) out.states.push_back(rotation.at(S(t)));
   return out;
 }
 
 template class Rotation<double>;
 template class Rotation<Dual>;
-template std::vector<RotationState<double>> rotate_freely(const Vec3<double>&, const RotationState<double>&,
-                                                          const std::vector<double>&,
-                                                          const dynamics::IntegratorOptions&);
-template std::vector<RotationState<Dual>> rotate_freely(const Vec3<Dual>&, const RotationState<Dual>&,
-                                                        const std::vector<double>&,
-                                                        const dynamics::IntegratorOptions&);
+template FreeRotation<double> rotate_freely(const Vec3<double>&, const RotationState<double>&,
+                                            const std::vector<double>&, const dynamics::IntegratorOptions&);
+template FreeRotation<Dual> rotate_freely(const Vec3<Dual>&, const RotationState<Dual>&,
+                                          const std::vector<double>&, const dynamics::IntegratorOptions&);
 
 }  // namespace unhand::flight

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "dynamics/integrator.hpp"
+#include "dynamics/smooth_flow.hpp"
 #include "flight/quaternion.hpp"
 
 namespace unhand::flight {
@@ -15,6 +15,13 @@ struct RotationState {
   Vec3<S> omega{};         ///< body axes [rad/s]
 };
 
+/// A rotation at some instants, or why there is none.
+template <class S>
+struct FreeRotation {
+  dynamics::Outcome outcome{dynamics::Outcome::horizon};  ///< only `horizon` has states
+  std::vector<RotationState<S>> states;                   ///< in the order of the times asked for
+};
+
 /// Torque-free rotation in the principal axes of the body,
 ///
 ///   I₁ ω̇₁ = (I₂ − I₃) ω₂ ω₃ and so on in turn,   q̇ = ½ q ⊗ (0, ω),
@@ -24,12 +31,12 @@ struct RotationState {
 /// length.
 ///
 /// `times` [s] count from `start` and are >= 0 (in any order). Throws std::invalid_argument when an input is
-/// not finite, a time is negative, the attitude is zero or a moment of inertia is not > 0, and
-/// std::runtime_error when the integrator stops. Instantiated for double and Dual.
+/// not finite, a time is negative, the attitude is zero or a moment of inertia is not > 0. Instantiated for
+/// double and Dual.
 template <class S>
-std::vector<RotationState<S>> rotate_freely(const Vec3<S>& inertia, const RotationState<S>& start,
-                                            const std::vector<double>& times,
-                                            const dynamics::IntegratorOptions& options = {});
+FreeRotation<S> rotate_freely(const Vec3<S>& inertia, const RotationState<S>& start,
+                              const std::vector<double>& times,
+                              const dynamics::IntegratorOptions& options = dynamics::error_controlled());
 
 /// The same rotation, to be read at any instant, and with air that brakes it: I ω̇ = … − c I ω, so that the
 /// spin of a body with equal moments dies as exp(−c t); c [1/s].
@@ -38,8 +45,11 @@ class Rotation {
  public:
   /// From 0 to `last` [s]. Throws as rotate_freely does, and when c is not finite.
   Rotation(const Vec3<S>& inertia, const RotationState<S>& start, const S& damping, double last,
-           const dynamics::IntegratorOptions& options = {});
-  /// `t` [s] after the start, in [0, last]; derivatives of `t` are carried, at the start too.
+           const dynamics::IntegratorOptions& options = dynamics::error_controlled());
+  /// `horizon`, or why there is nothing to read.
+  dynamics::Outcome outcome() const { return flow_.outcome; }
+  /// `t` [s] after the start, in [0, last], of a rotation that was solved; derivatives of `t` are carried, at
+  /// the start too.
   RotationState<S> at(const S& t) const;
 
  private:
@@ -47,21 +57,7 @@ class Rotation {
   Vec3<S> omega_;
   Vec3<S> spin_rate_;  ///< ω̇ at the start
   bool closed_form_{};
-  dynamics::Trajectory<S, 7> trajectory_;
+  dynamics::Flow<S, 7> flow_{dynamics::Outcome::horizon, {}};
 };
-
-/// Kinetic energy ½ ω·Iω [J if I is in kg m²].
-template <class S>
-S rotational_energy(const Vec3<S>& inertia, const Vec3<S>& omega) {
-  return 0.5 * (inertia[0] * omega[0] * omega[0] + inertia[1] * omega[1] * omega[1] +
-                inertia[2] * omega[2] * omega[2]);
-}
-
-/// Angular momentum R(q) I ω in the world [kg m²/s].
-template <class S>
-Vec3<S> angular_momentum(const Vec3<S>& inertia, const RotationState<S>& state) {
-  return rotate(state.attitude, Vec3<S>{inertia[0] * state.omega[0], inertia[1] * state.omega[1],
-                                        inertia[2] * state.omega[2]});
-}
 
 }  // namespace unhand::flight

@@ -12,7 +12,6 @@ namespace unhand::flight {
 
 using dynamics::convert;
 using dynamics::Dual;
-using dynamics::Entry;
 using dynamics::Phase;
 using dynamics::State;
 using dynamics::value_of;
@@ -24,10 +23,15 @@ Vec3<S> convert3(const Vec3<P>& a) {
   return {convert<S>(a[0]), convert<S>(a[1]), convert<S>(a[2])};
 }
 
+/// Whether drag depends on where in the body the air comes from.
+template <class S>
+bool has_shape(const SpatialAir<S>& a) {
+  return !(is_zero(a.axis_drag_x) && is_zero(a.axis_drag_y) && is_zero(a.cubic_drag));
+}
+
 template <class S>
 bool is_still(const SpatialAir<S>& a) {
-  return is_zero(a.drag_k) && is_zero(a.linear_drag) && is_zero(a.lift) && is_zero(a.axis_drag_x) &&
-         is_zero(a.axis_drag_y) && is_zero(a.cubic_drag);
+  return is_zero(a.drag_k) && is_zero(a.linear_drag) && is_zero(a.lift) && !has_shape(a);
 }
 
 /// κ (Σ n_i⁴ − 3/5) |u| u and |u| A u in body axes.
@@ -45,18 +49,13 @@ Vec3<S> shape_drag(const S& x, const S& y, const S& cubic, const Vec3<S>& u) {
 
 /// State: position and velocity of the CoM; the rotation is known.
 template <class P>
-class SpatialPath final : public dynamics::HybridSystemFrom<SpatialPath<P>, 6> {
+class SpatialPath final : public dynamics::SmoothSystem<SpatialPath<P>, 6> {
  public:
   /// The rotation is known up to `last` [s]; a trial step may look past it.
   SpatialPath(const SpatialAir<P>& air, const Rotation<P>& rotation, double last)
       : air_(air), rotation_(rotation), last_(last) {
-    turns_ = !(is_zero(air.lift) && is_zero(air.axis_drag_x) && is_zero(air.axis_drag_y) &&
-               is_zero(air.cubic_drag));
+    turns_ = !is_zero(air.lift) || has_shape(air);
   }
-  dynamics::FlowKind kind(int) const override { return dynamics::FlowKind::smooth; }
-  std::string_view mode_name(int) const override { return "flying"; }
-  int guard_count(int) const override { return 0; }
-  dynamics::Guard guard(int, int) const override { return {}; }
 
   template <class S>
   void flow_(const Phase&, const S& t, const State<S, 6>& y, State<S, 6>& dy) const {
@@ -76,12 +75,6 @@ class SpatialPath final : public dynamics::HybridSystemFrom<SpatialPath<P>, 6> {
       dy[i] = y[3 + i];
       dy[3 + i] = a[static_cast<std::size_t>(i)];
     }
-  }
-  template <class S>
-  void guards_(const Phase&, const S&, const State<S, 6>&, S*) const {}
-  template <class S>
-  Entry<S, 6> on_guard_(const Phase& from, int, const S& t, const State<S, 6>& y) const {
-    return {from.mode, t, y, S(0)};
   }
 
  private:
@@ -109,46 +102,50 @@ void validate(const SpatialStart<S>& start, const SpatialAir<S>& air, const std:
 }  // namespace
 
 template <class S>
-std::vector<SpatialState<S>> fly_in_space(const SpatialStart<S>& start, const SpatialAir<S>& air,
-                                          const std::vector<S>& times,
-                                          const dynamics::IntegratorOptions& options) {
+Vec3<S> body_drag(const SpatialAir<S>& air, const Vec3<S>& u) {
+  Vec3<S> a{S(0), S(0), S(0)};
+  if (!is_zero(air.drag_k)) a = quadratic_drag(air.drag_k, u);
+  if (!is_zero(air.linear_drag)) a = difference(a, scaled(air.linear_drag, u));
+  if (has_shape(air)) a = difference(a, shape_drag(air.axis_drag_x, air.axis_drag_y, air.cubic_drag, u));
+  return a;
+}
+template Vec3<double> body_drag(const SpatialAir<double>&, const Vec3<double>&);
+template Vec3<Dual> body_drag(const SpatialAir<Dual>&, const Vec3<Dual>&);
+
+template <class S>
+SpatialFlight<S> fly_in_space(const SpatialStart<S>& start, const SpatialAir<S>& air,
+                              const std::vector<S>& times, const dynamics::IntegratorOptions& options) {
   validate(start, air, times);
   double last = 0;
   for (const S& t : times) last = std::max(last, value_of(t));
   const Rotation<S> rotation(start.inertia, start.rotation, air.spin_damping, last, options);
+  SpatialFlight<S> out{rotation.outcome(), {}};
+  if (out.outcome != dynamics::Outcome::horizon) return out;
   const Vec3<S>&p = start.position, &v = start.velocity;
-  std::vector<SpatialState<S>> out;
-  out.reserve(times.size());
+  out.states.reserve(times.size());
   if (is_still(air) || !(last > 0)) {
     for (const S& t : times)
-      out.push_back({sum(p, scaled(t, sum(v, scaled(S(0.5 * t), air.gravity)))), rotation.at(t)});
+      out.states.push_back({sum(p, scaled(t, sum(v, scaled(S(0.5 * t), air.gravity)))), rotation.at(t)});
     return out;
   }
-  dynamics::IntegratorOptions recorded = options;
-  recorded.record = true;
-  recorded.longest_step =
-      std::max(options.longest_step, last);  // no guards: the error alone chooses the step
-  const auto solution = dynamics::integrate<S, 6>(
-      SpatialPath<S>(air, rotation, last), Entry<S, 6>{0, S(0), {p[0], p[1], p[2], v[0], v[1], v[2]}, S(0)},
-      S(last), recorded);
-  if (solution.outcome != dynamics::Outcome::horizon)
-    throw std::runtime_error(fmt::format("spatial flight: not solved ({})", to_string(solution.outcome)));
+  const auto flow = dynamics::integrate_flow<S, 6>(SpatialPath<S>(air, rotation, last),
+                                                   {p[0], p[1], p[2], v[0], v[1], v[2]}, last, options);
+  out.outcome = flow.outcome;
+  if (out.outcome != dynamics::Outcome::horizon) return out;
   for (const S& t : times) {
     if (!(value_of(t) > 0)) {
-      out.push_back({sum(p, scaled(t, v)), rotation.at(t)});
+      out.states.push_back({sum(p, scaled(t, v)), rotation.at(t)});
       continue;
     }
-    const State<S, 6> at = solution.trajectory.at(t);
-    out.push_back({{at[0], at[1], at[2]}, rotation.at(t)});
+    const State<S, 6> at = flow.trajectory.at(t);
+    out.states.push_back({{at[0], at[1], at[2]}, rotation.at(t)});
   }
   return out;
 }
 
-template std::vector<SpatialState<double>> fly_in_space(const SpatialStart<double>&,
-                                                        const SpatialAir<double>&, const std::vector<double>&,
-                                                        const dynamics::IntegratorOptions&);
-template std::vector<SpatialState<Dual>> fly_in_space(const SpatialStart<Dual>&, const SpatialAir<Dual>&,
-                                                      const std::vector<Dual>&,
-                                                      const dynamics::IntegratorOptions&);
+template SpatialFlight<double> fly_in_space(const SpatialStart<double>&, const SpatialAir<double>&,
+                                            const std::vector<double>&, const dynamics::IntegratorOptions&);
+template SpatialFlight<Dual> fly_in_space(const SpatialStart<Dual>&, const SpatialAir<Dual>&,
+                                          const std::vector<Dual>&, const dynamics::IntegratorOptions&);
 
 }  // namespace unhand::flight

@@ -27,11 +27,16 @@ struct SpatialAir {
   Vec3<S> wind{};                        ///< velocity of the air [m/s]
 };
 
+/// What the air does to a body by where it comes from [m/s²], u [m/s] its velocity against the air, both in
+/// body axes: −k |u| u − c u − |u| A u − κ (Σ n_i⁴ − 3/5) |u| u. Instantiated for double and Dual.
+template <class S>
+Vec3<S> body_drag(const SpatialAir<S>& air, const Vec3<S>& u);
+
 /// A rigid body as it is let go, in space.
 template <class S>
 struct SpatialStart {
   Vec3<S> position{}, velocity{};     ///< of the CoM [m, m/s]
-  RotationState<S> rotation;          ///< at the start
+  RotationState<S> rotation{};        ///< at the start
   Vec3<S> inertia{S(1), S(1), S(1)};  ///< about the principal axes, which are the body's; any unit
 };
 
@@ -42,13 +47,19 @@ struct SpatialState {
   RotationState<S> rotation;  ///< orientation and spin
 };
 
-/// States at `times` [s] after the start, each >= 0 (in any order; they may carry derivatives). Without air:
-/// closed form for the CoM and rotate_freely; otherwise by the integrator. Throws std::invalid_argument when
-/// an input is not finite or a time is negative, std::runtime_error when the integrator stops. Instantiated
-/// for double and Dual.
+/// A flight at some instants, or why there is none.
 template <class S>
-std::vector<SpatialState<S>> fly_in_space(const SpatialStart<S>& start, const SpatialAir<S>& air,
-                                          const std::vector<S>& times,
-                                          const dynamics::IntegratorOptions& options = {});
+struct SpatialFlight {
+  dynamics::Outcome outcome{dynamics::Outcome::horizon};  ///< only `horizon` has states
+  std::vector<SpatialState<S>> states;                    ///< in the order of the times asked for
+};
+
+/// States at `times` [s] after the start, each >= 0 (in any order; they may carry derivatives). Without air:
+/// closed form for the CoM and Rotation; otherwise by the integrator. Throws std::invalid_argument when an
+/// input is not finite or a time is negative. Instantiated for double and Dual.
+template <class S>
+SpatialFlight<S> fly_in_space(const SpatialStart<S>& start, const SpatialAir<S>& air,
+                              const std::vector<S>& times,
+                              const dynamics::IntegratorOptions& options = dynamics::error_controlled());
 
 }  // namespace unhand::flight

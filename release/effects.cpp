@@ -1,9 +1,5 @@
 #include "release/effects.hpp"
 
-#include <fmt/core.h>
-
-#include <stdexcept>
-
 namespace unhand::release {
 
 using dynamics::convert;
@@ -26,16 +22,17 @@ Window shifted(const Window& window, double by) { return {window.begin - by, win
 
 std::span<const dynamics::EffectOn<Lateness>> lateness_effects() {
   static const dynamics::EffectOn<Lateness> table[] = {
-      {{"release.opening_delay",
-        "the normal force acts later than its log says",
-        {{"delay", "s", 0, -0.05, 0.05, 5e-4}}},
+      {{.id = "release.opening_delay",
+        .mechanism = "the normal force acts later than its log says",
+        .parameters = {{"delay", "s", 0, -0.05, 0.05, 5e-4}},
+        .needs = {.normal_force = true}},
        &delay<double>,
        &delay<Dual>},
-      {{"release.hand_tracking_lag",
-        "the logged hand motion is the commanded one, which the true one follows with a first-order lag",
-        {{"tau", "s", 0, 0, 0.1, 1e-3}},
-        false,
-        true},
+      {{.id = "release.hand_tracking_lag",
+        .mechanism =
+            "the logged hand motion is the commanded one, which the true one follows with a first-order lag",
+        .parameters = {{"tau", "s", 0, 0, 0.1, 1e-3}},
+        .one_sided = true},
        &lag<double>,
        &lag<Dual>},
   };
@@ -43,9 +40,7 @@ std::span<const dynamics::EffectOn<Lateness>> lateness_effects() {
 }
 
 DelayedForce::DelayedForce(const contact::NormalForce& base, const Dual& delay) : base_(base), delay_(delay) {
-  if (!(std::abs(delay.a) <= 1))
-    throw std::invalid_argument(
-        fmt::format("release.opening_delay: delay = {} is not in [-1, 1] s", delay.a));
+  dynamics::require_in_range(lateness_effects(), "release.opening_delay.delay", delay.a);
 }
 double DelayedForce::at(const Window& window, double t) const {
   return base_.at(shifted(window, delay_.a), t - delay_.a);
@@ -65,8 +60,7 @@ void DelayedForce::kinks(std::vector<Dual>& out) const {
 }
 
 LaggedHand::LaggedHand(const PolynomialHand& logged, const Dual& lag) : logged_(logged), lag_(lag) {
-  if (!(lag.a >= 0 && lag.a <= 1))
-    throw std::invalid_argument(fmt::format("release.hand_tracking_lag: tau = {} is not in [0, 1] s", lag.a));
+  dynamics::require_in_range(lateness_effects(), "release.hand_tracking_lag.tau", lag.a);
   const auto& path = logged.path();
   const auto& breaks = path.breaks();
   for (std::size_t i = 0; i < path.pieces().size(); ++i) {

@@ -20,10 +20,11 @@ struct Lateness {
 /// release.opening_delay, release.hand_tracking_lag
 std::span<const dynamics::EffectOn<Lateness>> lateness_effects();
 
-/// f_N(t − delay), |delay| <= 1 s. `base` must outlive it.
+/// f_N(t − delay). `base` must outlive it.
 class DelayedForce final : public contact::NormalForce {
  public:
-  /// `delay` [s], positive where the force acts later than logged. Throws std::invalid_argument.
+  /// `delay` [s], positive where the force acts later than logged. Throws std::invalid_argument outside of
+  /// the effect's range.
   DelayedForce(const contact::NormalForce& base, const dynamics::Dual& delay);
   double at(const Window& window, double t) const override;
   Dual at(const Window& window, const Dual& t) const override;
@@ -41,7 +42,7 @@ class DelayedForce final : public contact::NormalForce {
 /// continuous; before the log begins the lag has settled (C = 0). `logged` must outlive it.
 class LaggedHand final : public HandMotion {
  public:
-  /// Throws std::invalid_argument unless 0 <= τ <= 1 s.
+  /// `lag` τ [s]. Throws std::invalid_argument outside of the effect's range.
   LaggedHand(const PolynomialHand& logged, const dynamics::Dual& lag);
   HandState<double> at(const Window& window, double t) const override { return at_(window, t); }
   HandState<Dual> at(const Window& window, const Dual& t) const override { return at_(window, t); }

@@ -6,6 +6,9 @@
 
 namespace unhand::release {
 
+/// What commands, cards and comparisons call it; no contact model of the registry.
+inline constexpr const char* kNaiveModel = "limit_surface_naive";
+
 /// The sign law at a fixed step: f = −D v_r/sqrt(v_rᵀ D v_r + f_max² v_s²) at every v_r, by the explicit
 /// Euler method.
 struct NaiveOptions {

@@ -446,7 +446,9 @@ std::optional<AskedForm> form_asked_for(const Stage& stage, const Discovery& so_
     out.words += (out.words.empty() ? "" : ", ") + candidate->second.in_words();
     if (train.objects.size() > 1) out.words += fmt::format(" for {}", name);
     for (const MissingTerm& term : candidate->second.terms) {
-      const auto is_its_own = [&](const std::string& id) { return find_effect(id).form == term.name; };
+      const auto is_its_own = [&](const std::string& id) {
+        return term.form != dynamics::AccelerationForm::none && find_effect(id).form == term.form;
+      };
       out.unlisted |= std::none_of(accepted.begin(), accepted.end(), is_its_own);
       std::erase_if(out.outdone, is_its_own);
     }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include "contact/registry.hpp"
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/selection.hpp"
 #include "fitting/distributions.hpp"
@@ -194,11 +195,11 @@ class ForwardStep {
   /// The likeliest law whose pads can give, if the present one's cannot, the grasp is off, and their give
   /// convinces beside it, more than what convinced so far.
   void consider_laws_that_give() {
-    if (can_give(stage_.problem.options().model) || !grasp_is_off()) return;
+    if (contact::can_give(stage_.problem.options().model) || !grasp_is_off()) return;
     std::optional<TriedEffect> law;
     for (const Score& score : all_) {
       const Candidate& candidate = f_.candidates[score.candidate];
-      if (!is_law(candidate.id) || !can_give(candidate.id.substr(kLaw.size()))) continue;
+      if (!is_law(candidate.id) || !contact::can_give(candidate.id.substr(kLaw.size()))) continue;
       TriedEffect trial{&score, extended(stage_, candidate, score, true, options_), 0, 0, {}};
       if (trial.next.is_fitted() && (!law || trial.next.bic() < law->next.bic())) law = std::move(trial);
     }

@@ -82,70 +82,72 @@ double hat(const std::vector<double>& knots, std::size_t j, double t) {
 }
 
 struct Term {
+  dynamics::AccelerationForm form;
   std::string name, unit;
   std::function<Vector3(const State&)> at;
 };
 
 std::vector<Term> acceleration_terms() {
+  using Form = dynamics::AccelerationForm;
   const auto speed = [](const State& s) { return std::hypot(s.vx, s.vz); };
-  return {{"|v| v", "1/m",
+  return {{Form::quadratic, "|v| v", "1/m",
            [=](const State& s) {
              return Vector3{speed(s) * s.vx, speed(s) * s.vz, 0};
            }},
-          {"v", "1/s",
+          {Form::linear, "v", "1/s",
            [](const State& s) {
              return Vector3{s.vx, s.vz, 0};
            }},
-          {"|v|^2 v", "s/m^2",
+          {Form::cubic, "|v|^2 v", "s/m^2",
            [=](const State& s) {
              const double square = s.vx * s.vx + s.vz * s.vz;
              return Vector3{square * s.vx, square * s.vz, 0};
            }},
-          {"omega J v", "-",
+          {Form::lift, "omega J v", "-",
            [](const State& s) {
              return Vector3{-s.omega * s.vz, s.omega * s.vx, 0};
            }},
-          {"1 along x", "m/s^2",
+          {Form::along_x, "1 along x", "m/s^2",
            [](const State&) {
              return Vector3{1, 0, 0};
            }},
-          {"1 along z", "m/s^2",
+          {Form::along_z, "1 along z", "m/s^2",
            [](const State&) {
              return Vector3{0, 1, 0};
            }},
-          {"1 along the object's x", "m/s^2",
+          {Form::along_body_x, "1 along the object's x", "m/s^2",
            [](const State& s) {
              return Vector3{std::cos(s.theta), std::sin(s.theta), 0};
            }},
-          {"1 along the object's z", "m/s^2",
+          {Form::along_body_z, "1 along the object's z", "m/s^2",
            [](const State& s) {
              return Vector3{-std::sin(s.theta), std::cos(s.theta), 0};
            }},
-          {"omega^2 along the object's x", "m",
+          {Form::centripetal_x, "omega^2 along the object's x", "m",
            [](const State& s) {
              return Vector3{s.omega * s.omega * std::cos(s.theta), s.omega * s.omega * std::sin(s.theta), 0};
            }},
-          {"omega^2 along the object's z", "m",
+          {Form::centripetal_z, "omega^2 along the object's z", "m",
            [](const State& s) {
              return Vector3{-s.omega * s.omega * std::sin(s.theta), s.omega * s.omega * std::cos(s.theta), 0};
            }},
-          {"1 in rotation", "rad/s^2",
+          {Form::turning, "1 in rotation", "rad/s^2",
            [](const State&) {
              return Vector3{0, 0, 1};
            }},
-          {"omega in rotation", "1/s",
+          {Form::turning_linear, "omega in rotation", "1/s",
            [](const State& s) {
              return Vector3{0, 0, s.omega};
            }},
-          {"|omega| omega in rotation", "1/rad",
+          {Form::turning_quadratic, "|omega| omega in rotation", "1/rad",
            [](const State& s) {
              return Vector3{0, 0, std::abs(s.omega) * s.omega};
            }},
-          {"sin theta in rotation", "rad/s^2",
+          {Form::turning_sine, "sin theta in rotation", "rad/s^2",
            [](const State& s) {
              return Vector3{0, 0, std::sin(s.theta)};
            }},
-          {"cos theta in rotation", "rad/s^2", [](const State& s) {
+          {Form::turning_cosine, "cos theta in rotation", "rad/s^2", [](const State& s) {
              return Vector3{0, 0, std::cos(s.theta)};
            }}};
 }
@@ -156,7 +158,8 @@ std::vector<Term> wrench_terms() {
   constexpr const char* kUnit[] = {"N", "N", "N m"};
   for (std::size_t c = 0; c < 3; ++c) {
     const auto add = [&](const std::string& what, const std::string& per, auto size) {
-      out.push_back({fmt::format("{} in {}", what, kOf[c]), kUnit[c] + per, [=](const State& s) {
+      out.push_back({dynamics::AccelerationForm::none, fmt::format("{} in {}", what, kOf[c]), kUnit[c] + per,
+                     [=](const State& s) {
                        Vector3 v{};
                        v[c] = size(s);
                        return v;
@@ -315,7 +318,8 @@ MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const M
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(k);
     const Term& term = terms[static_cast<std::size_t>(chosen[k])];
-    out.terms.push_back({term.name, x[i], std::sqrt(std::max(0.0, covariance(i, i))), term.unit, term.at});
+    out.terms.push_back(
+        {term.name, x[i], std::sqrt(std::max(0.0, covariance(i, i))), term.unit, term.at, term.form});
   }
   if (squares > samples) out.explained = std::clamp(gain / (squares - samples), 0.0, 1.0);
   return out;

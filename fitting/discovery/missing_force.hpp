@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "dynamics/effect.hpp"
+
 namespace unhand::fitting {
 
 /// One recording: what was seen minus what was predicted, and the predicted state beside it. Three components
@@ -59,6 +61,7 @@ struct MissingTerm {
   double coefficient{}, sigma{};  ///< in `unit`; 1 σ
   std::string unit;               ///< of the coefficient
   std::function<std::array<double, 3>(const ResidualTrace::State&)> shape;  ///< of coefficient one
+  dynamics::AccelerationForm form{dynamics::AccelerationForm::none};        ///< of an acceleration
 };
 
 /// The few terms that explain most.

@@ -103,19 +103,12 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   return withdraw(stage, options, out);
 }
 
-bool can_give(const std::string& model) {
-  contact::ContactParameters<double> giving;
-  giving.patch = {0.5, 0.01};
-  giving.variation.compliance = 1e-6;
-  return contact::make_contact_model(model, giving)->needs_hold();
-}
-
 bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   const std::string along = kPads;
   const auto& model = stage.problem.options().model;
   auto effects = stage.problem.options().effects;
   const auto known = catalogue(options);
-  if (!can_give(model) || std::find(effects.begin(), effects.end(), along) != effects.end() ||
+  if (!contact::can_give(model) || std::find(effects.begin(), effects.end(), along) != effects.end() ||
       std::find(known.begin(), known.end(), along) == known.end())
     return false;
   effects.push_back(along);

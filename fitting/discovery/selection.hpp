@@ -30,9 +30,6 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out);
 /// with intervals that count its misfit.
 FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
-/// Whether a contact model has pads that may give before they slip.
-bool can_give(const std::string& model);
-
 /// No pads are rigid: a give of some micrometres before they slip bends what the slipping pads say of an
 /// effect on them, and what predictions lack. contact.pad_compliance is fitted along if the evidence (BIC) is
 /// for it and the give stays below kMostGive; then it is a nuisance of the answer, not a part of it, and in

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "dynamics/median.hpp"
 #include "fitting/clock.hpp"
@@ -48,18 +49,17 @@ void rename(AcceptedEffect& effect, const char* id, const char* parameter, Measu
 
 /// Were a scale s gravity, reported lengths would be true ones: what else was found is s times as long.
 void in_reported_lengths(MeasuredDiscovery& out, double s) {
-  const auto factor_of = [&](const std::string& name) {
-    for (const char* id : {"sensor.com_offset.", "flight.wind."})
-      if (name.starts_with(id)) return s;
-    for (const char* id : {"flight.quadratic_drag.", "flight.drag_by_axis.", "flight.cubic_drag."})
-      if (name.starts_with(id)) return 1 / s;
-    return 1.0;
-  };
+  std::map<std::string, double> factors;  // by full name
   for (auto& effect : out.effects)
     for (auto& p : effect.parameters) {
-      const double factor = factor_of(effect.id + ".");
+      const double factor = std::pow(s, dynamics::length_power(p.unit));
+      factors[effect.id + "." + p.name] = factor;
       p.value *= factor, p.sigma *= factor;
     }
+  const auto factor_of = [&](const std::string& name) {
+    const auto at = factors.find(name);
+    return at == factors.end() ? 1.0 : at->second;
+  };
   for (auto& half : out.stability) {
     const double factor = factor_of(half.parameter);
     half.low *= factor, half.low_sigma *= factor, half.high *= factor, half.high_sigma *= factor;

@@ -14,7 +14,6 @@
 #include "dynamics/quantisation.hpp"
 #include "dynamics/third_difference.hpp"
 #include "flight/quaternion.hpp"
-#include "flight/spatial_effects.hpp"
 
 namespace unhand::fitting {
 
@@ -154,28 +153,6 @@ std::map<std::string, std::array<Axis, 3>> axes_of(const datasets::ThrowLog& log
 
 }  // namespace
 
-std::vector<dynamics::Effect> known_fall_effects() {
-  const auto xyz = [](const std::string& stem, const std::string& unit, double limit, double typical) {
-    std::vector<dynamics::EffectParameter> out;
-    for (const char axis : {'x', 'y', 'z'}) out.push_back({stem + axis, unit, 0, -limit, limit, typical});
-    return out;
-  };
-  auto settling = xyz("", "m/s^2", 50, 0.1);
-  settling.push_back({"tau", "s", 0.05, 2e-3, 2, 0.02, {0.02, 0.08, 0.3}});
-  std::vector<dynamics::Effect> out{{"sensor.accelerometer_bias",
-                                     "constant bias of the accelerometer, body axes",
-                                     xyz("", "m/s^2", 20, 0.1)}};
-  for (const auto& entry : flight::spatial_effects())
-    for (const char* id : {"flight.quadratic_drag", "flight.linear_drag", "flight.drag_by_axis"})
-      if (entry.effect.id == id) out.push_back(entry.effect);
-  out.push_back({"sensor.accelerometer_drift", "the bias changes during a fall", xyz("", "m/s^3", 50, 0.1)});
-  out.push_back({"sensor.settling", "the sensor recovers from the time before the fall, s exp(-t/tau)",
-                 std::move(settling)});
-  out.push_back(
-      {"sensor.lever_arm", "the sensor is not at the CoM: w x (w x r) + dw/dt x r", xyz("", "m", 1, 0.01)});
-  return out;
-}
-
 FallProblem::FallProblem(const datasets::ThrowLog& log) : gravity_(log.gravity) {
   datasets::validate(log);
   channels_ = {"force_x", "force_y", "force_z"};
@@ -197,19 +174,21 @@ FallProblem::FallProblem(const datasets::ThrowLog& log) : gravity_(log.gravity) 
     for (std::size_t i = 0; i < imu.time.rows; ++i) {
       if (!falls_at(one, imu.time(i))) continue;
       if (!first) first = i;
-      fall.time.push_back(imu.time(i) - imu.time(*first));
+      auto& [time, omega, turned] = fall.samples;
+      time.push_back(imu.time(i) - imu.time(*first));
       fall.force.push_back({imu.specific_force(i, 0), imu.specific_force(i, 1), imu.specific_force(i, 2)});
       if (imu.angular_rate.empty()) continue;
-      fall.rate.push_back({imu.angular_rate(i, 0), imu.angular_rate(i, 1), imu.angular_rate(i, 2)});
-      Vec3<double> turned{};
-      if (fall.turned.size() > 0)
+      omega.push_back({imu.angular_rate(i, 0), imu.angular_rate(i, 1), imu.angular_rate(i, 2)});
+      Vec3<double> angle{};
+      if (!turned.empty())
         for (std::size_t a = 0; a < 3; ++a)
-          turned[a] = fall.turned.back()[a] + 0.5 * (fall.time.back() - fall.time[fall.time.size() - 2]) *
-                                                  (fall.rate.back()[a] + fall.rate[fall.rate.size() - 2][a]);
-      fall.turned.push_back(turned);
+          angle[a] = turned.back()[a] + 0.5 * (time.back() - time[time.size() - 2]) *
+                                            (omega.back()[a] + omega[omega.size() - 2][a]);
+      turned.push_back(angle);
     }
-    if (fall.time.size() < 12) {
-      skipped_.push_back({one.id, fmt::format("{} samples in free fall, fewer than 12", fall.time.size())});
+    const auto& time = fall.samples.time;
+    if (time.size() < 12) {
+      skipped_.push_back({one.id, fmt::format("{} samples in free fall, fewer than 12", time.size())});
       continue;
     }
     const bool declared = imu.specific_force.sigma.size() == 3;
@@ -237,10 +216,10 @@ FallProblem::FallProblem(const datasets::ThrowLog& log) : gravity_(log.gravity) 
     fall.speed_sigma = before.speed_sigma, fall.tilt_sigma = before.tilt_sigma;
     Group group{one.id, one.object, one.condition, splits[n], {}, {}, {}};
     group.start = {fall.speed, 0, 0, 0, 0, 0, 0};
-    for (const double t : fall.time)
+    for (const double t : time)
       for (const std::size_t a : fall.axes) group.rows.push_back({static_cast<int>(a), t});
     for (int k = 0; k < 7; ++k) group.rows.push_back({kPriorChannel, 0});
-    group.covariates = {fall.speed, fall.time.back(), fall.rest[2] / flight::norm(fall.rest),
+    group.covariates = {fall.speed, time.back(), fall.rest[2] / flight::norm(fall.rest),
                         static_cast<double>(groups_.size())};
     groups_.push_back(std::move(group));
     falls_.push_back(std::move(fall));
@@ -262,13 +241,11 @@ FallProblem::FallProblem(const datasets::ThrowLog& log) : gravity_(log.gravity) 
 std::vector<dynamics::Effect> FallProblem::effects() const {
   std::set<std::size_t> seen;
   for (const Fall& fall : falls_) seen.insert(fall.axes.begin(), fall.axes.end());
-  auto out = known_fall_effects();
+  auto out = experiment::known_fall_effects();
   for (auto& effect : out)
-    if (effect.id == "sensor.accelerometer_bias" || effect.id == "sensor.accelerometer_drift" ||
-        effect.id == "sensor.settling")
-      std::erase_if(effect.parameters, [&](const dynamics::EffectParameter& p) {
-        return p.name.size() == 1 && !seen.contains(static_cast<std::size_t>(p.name[0] - 'x'));
-      });
+    std::erase_if(effect.parameters, [&](const dynamics::EffectParameter& p) {
+      return p.on_axis && !seen.contains(*p.on_axis);
+    });
   return out;
 }
 
@@ -279,62 +256,22 @@ GroupEquations FallProblem::equations(std::size_t group, std::span<const std::st
   const OwnNames mine(names, groups_[group].object);
   const auto residual = [&]<class S>(const std::vector<S>& effects, const std::vector<S>& x) {
     const dynamics::Values<S> given(mine.names, effects);
-    const auto value = [&](const char* name, double neutral = 0) { return given.get(name, neutral); };
-    const auto vector = [&](const std::string& id) {
-      return Vec3<S>{given.get(id + ".x", 0), given.get(id + ".y", 0), given.get(id + ".z", 0)};
-    };
-    const S k = value("flight.quadratic_drag.k"), c = value("flight.linear_drag.c"),
-            a_x = value("flight.drag_by_axis.a_x"), a_y = value("flight.drag_by_axis.a_y"),
-            tau = value("sensor.settling.tau", 0.05);
-    const Vec3<S> along{k + a_x, k + a_y, k - a_x - a_y},
-        bias = vector("sensor.accelerometer_bias"), drift = vector("sensor.accelerometer_drift"),
-        settling = vector("sensor.settling"), lever = vector("sensor.lever_arm");
+    experiment::Accelerometer<S> sensor;
+    dynamics::apply_effects(experiment::accelerometer_effects(), given, sensor);
     Vec3<S> rest;
-    for (std::size_t a = 0; a < 3; ++a) rest[a] = fall.rest[a] - bias[a];
-    const Vec3<S> up0 = flight::rotate(flight::exp(Vec3<S>{x[1], x[2], x[3]}),
-                                       flight::scaled(S(1.0 / flight::norm(rest)), rest));
-    const Vec3<S> spin{x[4], x[5], x[6]};
-    const auto up_at = [&](std::size_t i) {  // the vertical turns against the body
-      Vec3<S> turned = flight::scaled(S(-fall.time[i]), spin);
-      if (!fall.turned.empty())
-        for (std::size_t a = 0; a < 3; ++a) turned[a] -= fall.turned[i][a];
-      return flight::rotate(flight::exp(turned), up0);
-    };
-    const auto deceleration = [&](const S& v, const Vec3<S>& up) {
-      const S size = dynamics::value_of(v) < 0 ? S(-v) : v;
-      return size * v * (along[0] * up[0] * up[0] + along[1] * up[1] * up[1] + along[2] * up[2] * up[2]) +
-             c * v;
-    };
+    for (std::size_t a = 0; a < 3; ++a) rest[a] = fall.rest[a] - sensor.bias[a];
+    const Vec3<S> up = flight::rotate(flight::exp(Vec3<S>{x[1], x[2], x[3]}),
+                                      flight::scaled(S(1.0 / flight::norm(rest)), rest));
+    const auto force =
+        experiment::falling_readings<S>({x[0], up, {x[4], x[5], x[6]}}, fall.samples, gravity_, given);
     std::vector<S> out;
     out.reserve(groups_[group].rows.size());
-    S v = x[0];
-    for (std::size_t i = 0; i < fall.time.size(); ++i) {
-      const Vec3<S> up = up_at(i);
-      if (i > 0) {  // Heun: drag changes by a hundredth of itself from sample to sample
-        const double dt = fall.time[i] - fall.time[i - 1];
-        const S slope = -gravity_ - deceleration(v, up), ahead = v + dt * slope;
-        v += 0.5 * dt * (slope - gravity_ - deceleration(ahead, up));
-      }
-      const S size = dynamics::value_of(v) < 0 ? S(-v) : v;
-      using std::exp;
-      const S decay = exp(-fall.time[i] / tau);
-      Vec3<S> f;
-      for (std::size_t a = 0; a < 3; ++a)
-        f[a] = -(along[a] * size + c) * v * up[a] + bias[a] + drift[a] * fall.time[i] + settling[a] * decay;
-      if (!fall.rate.empty()) {
-        const std::size_t before = i > 0 ? i - 1 : 0, after = std::min(i + 1, fall.time.size() - 1);
-        Vec3<S> w, dw;
-        for (std::size_t a = 0; a < 3; ++a) {
-          w[a] = S(fall.rate[i][a]);
-          dw[a] = S((fall.rate[after][a] - fall.rate[before][a]) / (fall.time[after] - fall.time[before]));
-        }
-        f = flight::sum(f, flight::sum(flight::cross(w, flight::cross(w, lever)), flight::cross(dw, lever)));
-      }
-      for (const std::size_t a : fall.axes) out.push_back((f[a] - fall.force[i][a]) / fall.sigma[a]);
-    }
+    for (std::size_t i = 0; i < force.size(); ++i)
+      for (const std::size_t a : fall.axes) out.push_back((force[i][a] - fall.force[i][a]) / fall.sigma[a]);
     out.push_back((x[0] - fall.speed) / fall.speed_sigma);
     for (std::size_t a = 1; a < 4; ++a) out.push_back(x[a] / fall.tilt_sigma);
-    for (std::size_t a = 4; a < 7; ++a) out.push_back(x[a] / (fall.rate.empty() ? kTurningRate : 0.02));
+    for (std::size_t a = 4; a < 7; ++a)
+      out.push_back(x[a] / (fall.samples.omega.empty() ? kTurningRate : 0.02));
     return out;
   };
   GroupEquations out = swept(mine.values(values), own, derivatives, residual);

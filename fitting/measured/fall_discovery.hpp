@@ -1,20 +1,17 @@
 // Accelerometers in free fall as groups: the speed at the start of each fall is its own, effects are shared.
 #pragma once
 
+#include "experiment/falling_sensor.hpp"
 #include "fitting/measured/grouped_fit.hpp"
-#include "flight/vec3.hpp"
 
 namespace unhand::fitting {
 
-/// Throws with `imu` and `free_flight`, dimension 3. In free fall a perfect accelerometer reads zero; what it
-/// reads of an object that moves along the vertical u (in body axes) with v [m/s, up], v̇ = −g − (drag), is
+/// Throws with `imu` and `free_flight`, dimension 3, under experiment::falling_readings.
 ///
-///   f = −(k + A) |v| v u − c v u + b + d t + s exp(−t/τ) + ω × (ω × r) + ω̇ × r.
-///
-/// Own unknowns of a fall: v at its first sample, a turn of u against where it stood at rest before, and its
-/// turning rate; each known beforehand to what the recording before the fall says of it. (The vertical is
-/// what the sensor reads at rest without its bias.) A gyroscope, where there is one, gives ω; without, ω of
-/// the last term is taken as zero.
+/// Own unknowns of a fall: the speed at its first sample, a turn of the vertical (in body axes) against where
+/// it stood at rest before, and its turning rate; each known beforehand to what the recording before the fall
+/// says of it. (The vertical is what the sensor reads at rest without its bias.) A gyroscope, where there is
+/// one, gives ω; without, ω of the last term is taken as zero.
 ///
 /// The noise of an axis is the declared one or that of its third differences, and not below what rounding to
 /// the grid of its readings adds. An axis that says nothing of a fall, as it stands still or is cut off, is
@@ -36,20 +33,16 @@ class FallProblem final : public GroupedProblem {
 
  private:
   struct Fall {
-    std::vector<double> time;                        // from the first sample [s]
-    std::vector<flight::Vec3<double>> force;         // [m/s²]
-    std::vector<flight::Vec3<double>> rate, turned;  // gyroscope: ω, and its integral as a rotation vector
-    std::vector<std::size_t> axes;                   // that are used
-    flight::Vec3<double> sigma{}, rest{};            // rest: read before the fall [m/s²]
-    double speed{}, speed_sigma{}, tilt_sigma{};     // upward, when the fall begins [m/s]; of that; [rad]
+    experiment::FallSamples samples;
+    std::vector<flight::Vec3<double>> force;      // [m/s²]
+    std::vector<std::size_t> axes;                // that are used
+    flight::Vec3<double> sigma{}, rest{};         // rest: read before the fall [m/s²]
+    double speed{}, speed_sigma{}, tilt_sigma{};  // upward, when the fall begins [m/s]; of that; [rad]
   };
   std::vector<Fall> falls_;
   std::vector<std::string> notes_;
   double gravity_{};
 };
-
-/// The effects on an accelerometer in free fall.
-std::vector<dynamics::Effect> known_fall_effects();
 
 /// Errors over the falls of a split: what is left of the reading, and where one is after integrating it.
 struct FallErrors {

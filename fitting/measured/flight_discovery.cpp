@@ -21,29 +21,22 @@ using flight::Vec3;
 
 namespace {
 
-const dynamics::IntegratorOptions kFine = [] {
-  dynamics::IntegratorOptions options;
-  options.tolerances = {1e-8, 1e-10};  // m, rad: far below any tracker
-  return options;
-}();
+const dynamics::IntegratorOptions kFine =
+    dynamics::error_controlled({1e-8, 1e-10});  // m, rad: far below any tracker
+
+/// Of a flight that could not be integrated: its equations are not finite, and so not solved.
+constexpr double kNotSolved = std::numeric_limits<double>::quiet_NaN();
 
 template <class S>
 Quaternion<S> converted(const Quaternion<double>& q) {
   return {S(q.w), S(q.x), S(q.y), S(q.z)};
 }
 
-/// What a flight in the plane x, z cannot tell goes: the ratios of a torque-free rotation about one axis, a
-/// cube's harmonic (drag by axis says what its section does), and all along y. Drag by axis keeps a_x = −a_z.
+/// What a flight in the plane x, z cannot tell goes.
 void restrict_to_plane(std::vector<dynamics::Effect>& effects) {
-  std::erase_if(effects, [](const dynamics::Effect& e) {
-    return e.id == "sensor.inertia" || e.id == "flight.cubic_drag";
-  });
   for (auto& e : effects)
-    std::erase_if(e.parameters, [](const dynamics::EffectParameter& p) {
-      for (const char* across : {"y", "w_y", "toward_y", "a_y"})
-        if (p.name == across) return true;
-      return false;
-    });
+    std::erase_if(e.parameters, [](const dynamics::EffectParameter& p) { return p.in_space_only; });
+  std::erase_if(effects, [](const dynamics::Effect& e) { return e.parameters.empty(); });
 }
 
 }  // namespace
@@ -127,15 +120,9 @@ FlightProblem::FlightProblem(const ThrowLog& log, int threads) : gravity_(log.gr
 
 std::vector<dynamics::Effect> FlightProblem::effects() const {
   auto out = experiment::known_flight_effects();
-  // What needs to know how the body lies or turns.
   if (std::all_of(flights_.begin(), flights_.end(),
                   [](const Flight& f) { return f.samples.attitude.empty(); }))
-    std::erase_if(out, [](const dynamics::Effect& e) {
-      for (const char* id : {"sensor.com_offset", "sensor.inertia", "flight.magnus_lift",
-                             "flight.drag_by_axis", "flight.cubic_drag", "flight.spin_damping"})
-        if (e.id == id) return true;
-      return false;
-    });
+    std::erase_if(out, [](const dynamics::Effect& e) { return e.needs.attitude; });
   if (axes_.size() == 2) restrict_to_plane(out);
   return out;
 }
@@ -174,6 +161,7 @@ GroupEquations FlightProblem::equations(std::size_t group, std::span<const std::
     const auto poses =
         experiment::tracked_poses(declared, dynamics::Values<S>(mine.names, effects), s.elapsed, kFine);
     std::vector<S> out;
+    if (poses.size() != s.elapsed.size()) out.assign(groups_[group].rows.size(), S(kNotSolved));
     out.reserve(poses.size() * channels_.size());
     for (std::size_t i = 0; i < poses.size(); ++i) {
       for (const std::size_t a : axes_) out.push_back((poses[i].position[a] - s.position[i][a]) / s.sigma[a]);
@@ -186,8 +174,6 @@ GroupEquations FlightProblem::equations(std::size_t group, std::span<const std::
   GroupEquations out;
   try {
     out = swept(shared, own, derivatives, residual);
-  } catch (const std::runtime_error&) {
-    return {};  // the flight could not be integrated
   } catch (const std::invalid_argument&) {
     return {};  // a step led where no flight is
   }

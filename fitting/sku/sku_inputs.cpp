@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "contact/registry.hpp"
+#include "experiment/campaign_effects.hpp"
 #include "experiment/synthetic_campaign.hpp"
 #include "fitting/card.hpp"
 
@@ -56,8 +57,8 @@ void add_card(const datasets::Sku& sku, const datasets::ModelCard& card, Collect
       out.notes.push_back(name + " is of another object: left out");
       continue;
     }
-    if (name.starts_with("sensor.mass.") || name.starts_with("sensor.inertia.") ||
-        name.starts_with("sensor.com_offset.")) {
+    if (const auto* effect = experiment::effect_of(name.substr(0, bracket));
+        effect && effect->about_declaration) {
       out.notes.push_back(name + " is about what the card's log declared: left out");
       continue;
     }

@@ -13,6 +13,7 @@
 #include "planners/tube/held_motion.hpp"
 #include "planners/tube/planar_hand.hpp"
 #include "planners/tube/require.hpp"
+#include "release/naive_release.hpp"
 #include "release/simulate_release.hpp"
 
 namespace unhand::planners {
@@ -148,7 +149,7 @@ class CardReader {
 
 ReleaseCard release_card(const datasets::ModelCard& card, const std::string& file,
                          const ReleaseCard& otherwise) {
-  if (!contact::follows_pads(card.model) || card.model == "limit_surface_naive" || card.model == "projectile")
+  if (!contact::follows_pads(card.model) || card.model == release::kNaiveModel || card.model == "projectile")
     throw CardError(file, "/model", fmt::format("'{}' does not say how the pads let go", card.model));
   if (!card.effects.empty())
     throw CardError(file, "/effects",

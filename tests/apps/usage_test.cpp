@@ -248,7 +248,9 @@ TEST_F(Cli, ADashIsNoFile) {
 TEST_F(Cli, AnEffectWithoutConsequenceIsSaid) {
   const Answer idle = run("generate quick12 --seed 3 --effect flight.wind=3 --out a.h5");
   ASSERT_EQ(idle.code, 0) << idle.err;
-  EXPECT_THAT(idle.err, HasSubstr("flight.wind changes nothing in this campaign: wind acts through drag"));
+  EXPECT_THAT(
+      idle.err,
+      HasSubstr("flight.wind changes nothing in this campaign: it acts through flight.quadratic_drag"));
   const Answer blown =
       run("generate quick12 --seed 3 --effect flight.wind=3 --effect flight.quadratic_drag=0.1 --out a.h5");
   EXPECT_THAT(blown.err, IsEmpty());

@@ -1,5 +1,6 @@
 // Departures of the friction limits, contact effect by contact effect: neutral is the base law to the bit,
 // derivatives are central differences through whole releases, and closed forms where there are any.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -305,6 +306,40 @@ TEST(ContactEffectParameters, OutOfRangeAreNamed) {
   EXPECT_NE(message([](auto& v) { v.softness = 3; }).find("gamma"), std::string::npos);
   EXPECT_NE(message([](auto& v) { v.softness = 0.3; }).find("f_0 = 0"), std::string::npos);
   EXPECT_NE(message([](auto& v) { v.compliance = -1; }).find("compliance"), std::string::npos);
+}
+
+/// What validate() accepts is what the table says, parameter by parameter.
+TEST(ContactEffectParameters, HaveTheRangesOfTheTable) {
+  std::size_t i = 0;
+  for (const auto& [effect, apply, apply_dual] : contact::friction_effects())
+    for (const auto& p : effect.parameters) {
+      const auto accepts = [&](double value) {
+        FrictionVariation<Dual> v;
+        v.reference_force = 20;
+        *contact::effect_values(v)[i] = Dual(value);
+        EXPECT_EQ(*contact::effect_values(v)[i], Dual(value));
+        try {
+          contact::validate(v);
+        } catch (const std::invalid_argument& e) {
+          EXPECT_THAT(e.what(), testing::StartsWith(effect.full_name(p) + " = "));
+          return false;
+        }
+        return true;
+      };
+      const double low = p.least.value_or(p.low), beyond = 0.01 * (p.high - low);
+      EXPECT_TRUE(accepts(low) && accepts(p.neutral) && accepts(p.high)) << effect.full_name(p);
+      EXPECT_FALSE(accepts(low - beyond) || accepts(p.high + beyond)) << effect.full_name(p);
+      // the same parameter as the effect sets
+      FrictionVariation<double> set;
+      const std::vector<std::string> name{effect.full_name(p)};
+      const std::vector<double> value{p.high};
+      const dynamics::Values<double> values(name, value);
+      apply({effect, values}, set);
+      EXPECT_EQ(*contact::effect_values(set)[i], p.high) << effect.full_name(p);
+      ++i;
+    }
+  FrictionVariation<double> v;
+  EXPECT_EQ(i, contact::effect_values(v).size());
 }
 
 }  // namespace

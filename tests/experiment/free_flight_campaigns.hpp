@@ -11,7 +11,7 @@
 #include "dynamics/dense_solve.hpp"
 #include "experiment/free_flight.hpp"
 #include "flight/fly.hpp"
-#include "flight/point_flight.hpp"
+#include "flight/spatial_flight.hpp"
 
 namespace unhand::experiment {
 
@@ -62,23 +62,22 @@ inline Campaign spatial(int throws, const Vec3<double>& inertia, double drag_k, 
     const std::size_t n = 40 + k % 20;
     std::vector<double> times;
     for (std::size_t i = 0; i < n; ++i) times.push_back(static_cast<double>(i) / kRate);
-    const auto p = flight::positions(
-        flight::PointFlight<double>{truth.position, truth.velocity, {0, 0, -out.log.gravity}, drag_k}, times,
-        {.tolerances = {1e-12, 1e-13}});
-    const auto q = flight::rotate_freely(inertia, truth.rotation, times, {.tolerances = {1e-12, 1e-13}});
+    const flight::SpatialAir<double> air{.gravity = {0, 0, -out.log.gravity}, .drag_k = drag_k};
+    const auto flown = flight::fly_in_space<double>({truth.position, truth.velocity, truth.rotation, inertia},
+                                                    air, times, {.tolerances = {1e-12, 1e-13}});
     auto& mocap = one.mocap.emplace();
     mocap.time = {n, 1, times, {}};
     mocap.pose = {n, 7, {}, {kSigmaP, kSigmaP, 2 * kSigmaP, kSigmaQ, kSigmaQ, kSigmaQ, kSigmaQ}};
     for (double& t : mocap.time.data) t += 17.5;
     for (std::size_t i = 0; i < n; ++i) {
       const double s = noise * kSigmaP, r = noise * kSigmaQ;
-      Quaternion<double> a = q[i].attitude;
+      const auto& p = flown.states[i].position;
+      Quaternion<double> a = flown.states[i].rotation.attitude;
       a = normalised(Quaternion<double>{a.w + r * normal(random), a.x + r * normal(random),
                                         a.y + r * normal(random), a.z + r * normal(random)});
       const double sign = i % 3 == 1 ? -1 : 1;  // either sign is the same orientation
-      for (const double x :
-           {p[i][0] + s * normal(random), p[i][1] + s * normal(random), p[i][2] + 2 * s * normal(random),
-            sign * a.w, sign * a.x, sign * a.y, sign * a.z})
+      for (const double x : {p[0] + s * normal(random), p[1] + s * normal(random),
+                             p[2] + 2 * s * normal(random), sign * a.w, sign * a.x, sign * a.y, sign * a.z})
         mocap.pose.data.push_back(x);
     }
     out.log.throws.push_back(one);

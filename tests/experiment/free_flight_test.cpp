@@ -13,7 +13,7 @@
 
 #include "datasets/import_cube_tosses.hpp"
 #include "flight/fly.hpp"
-#include "flight/point_flight.hpp"
+#include "flight/spatial_flight.hpp"
 #include "free_flight_campaigns.hpp"
 
 namespace unhand::experiment {

@@ -149,7 +149,7 @@ datasets::ThrowLog throws_upwards(const Truth& truth, int n, unsigned seed) {
 /// The fit of a bias and a drag to the train groups.
 GroupedFit bias_and_drag(const FallProblem& problem) {
   std::vector<SharedParameter> shared;
-  for (const auto& effect : known_fall_effects())
+  for (const auto& effect : experiment::known_fall_effects())
     if (effect.id == "sensor.accelerometer_bias" || effect.id == "flight.quadratic_drag")
       for (auto& p : shared_parameters(effect, {"phone"})) shared.push_back(std::move(p));
   return fit_groups(problem, datasets::Split::train, shared, Eigen::VectorXd::Zero(4));
@@ -318,7 +318,7 @@ TEST(FallDiscovery, SixFallsShowTheBiasThatTheyShare) {
 // What is common to all falls is no scatter between them.
 TEST(FallDiscovery, ScatterBetweenFallsIsAboutTheirMean) {
   MeasuredOptions options;
-  for (const auto& effect : known_fall_effects()) options.search.forget.push_back(effect.id);
+  for (const auto& effect : experiment::known_fall_effects()) options.search.forget.push_back(effect.id);
   const auto found = discover_falls(falls({.bias_x = 0.9}, 12, 15), options);
   const auto says = [&](const std::string& text) {
     return std::any_of(found.evidence.begin(), found.evidence.end(),
@@ -341,7 +341,7 @@ TEST(FallDiscovery, DragByAxisIsNoAnswerWithoutADrag) {
 TEST(FallDiscovery, NoDragIsAThrust) {
   const FallProblem problem(falls({}, 4, 1));
   GroupedFit fit;
-  for (const auto& effect : known_fall_effects())
+  for (const auto& effect : experiment::known_fall_effects())
     if (effect.id == "flight.quadratic_drag" || effect.id == "flight.drag_by_axis")
       for (auto& p : shared_parameters(effect, {"phone"})) fit.shared.push_back(std::move(p));
   ASSERT_EQ(fit.shared.size(), 3U);

@@ -203,34 +203,35 @@ TEST(MissingForce, TheFormsOfEffectsAreFound) {
   using Missing = std::array<double, 3>;
   const auto drag = [](const State& s) { return 0.05 * std::hypot(s.vx, s.vz); };
   const auto spin = [](const State& s) { return 0.01 * s.omega * s.omega; };
-  const std::map<std::string, std::function<Missing(const State&)>> missing{
-      {"|v| v",
+  using Form = dynamics::AccelerationForm;
+  const std::map<Form, std::function<Missing(const State&)>> missing{
+      {Form::quadratic,
        [&](const State& s) {
          return Missing{drag(s) * s.vx, drag(s) * s.vz, 0};
        }},
-      {"omega J v",
+      {Form::lift,
        [](const State& s) {
          return Missing{-0.02 * s.omega * s.vz, 0.02 * s.omega * s.vx, 0};
        }},
-      {"1 along x",
+      {Form::along_x,
        [](const State&) {
          return Missing{0.3, 0, 0};
        }},
-      {"1 along z",
+      {Form::along_z,
        [](const State&) {
          return Missing{0, 0.3, 0};
        }},
-      {"omega^2 along the object's x", [&](const State& s) {
+      {Form::centripetal_x, [&](const State& s) {
          return Missing{spin(s) * std::cos(s.theta), spin(s) * std::sin(s.theta), 0};
        }}};
   int forms = 0;
   for (const auto& effect : experiment::known_effects()) {
-    if (effect.form.empty()) continue;
+    if (effect.form == Form::none) continue;
     ++forms;
     ASSERT_TRUE(missing.contains(effect.form)) << effect.id;
     const auto candidate = missing_terms(flights(missing.at(effect.form)), kFlight);
     ASSERT_FALSE(candidate.terms.empty()) << effect.id;
-    EXPECT_EQ(candidate.terms.front().name, effect.form) << effect.id;
+    EXPECT_EQ(candidate.terms.front().form, effect.form) << effect.id;
   }
   EXPECT_GE(forms, 5);  // drag, lift, tilt, scale, centre of mass
 }

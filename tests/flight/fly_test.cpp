@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "flight/point_flight.hpp"
+#include "flight/spatial_flight.hpp"
 #include "tests/flight/tight.hpp"
 
 namespace unhand::flight {
@@ -257,30 +257,46 @@ TEST(TrackedPoint, IsWhatFlyThroughReports) {
 
 // ---------------------------------------------------------------- in space
 
-TEST(PointFlight, IsThePlanarFlightInItsPlane) {
+TEST(DragInSpace, IsThePlanarFlightInItsPlane) {
   Problem p = thrown(1, 2);
   p.drag_k = 0.3;
   const std::vector<double> times{0.5, 0.0, 0.2};
   const auto planar = fly_through(p, times, kTight);
   const double turn = 0.7, c = std::cos(turn), s = std::sin(turn);  // the plane, about the vertical
-  const PointFlight<double> flight{{0.2 * c, 0.2 * s, 1}, {1.5 * c, 1.5 * s, 2}, {0, 0, -g}, 0.3};
-  const auto spatial = positions(flight, times, kTight);
+  const SpatialStart<double> start{.position = {0.2 * c, 0.2 * s, 1}, .velocity = {1.5 * c, 1.5 * s, 2}};
+  const SpatialAir<double> air{.gravity = {0, 0, -g}, .drag_k = 0.3};
+  const auto spatial = fly_in_space(start, air, times, kTight).states;
   for (std::size_t i = 0; i < times.size(); ++i) {
-    EXPECT_NEAR(spatial[i][0], planar[i].x * c, 1e-11);
-    EXPECT_NEAR(spatial[i][1], planar[i].x * s, 1e-11);
-    EXPECT_NEAR(spatial[i][2], planar[i].z, 1e-11);
+    EXPECT_NEAR(spatial[i].position[0], planar[i].x * c, 1e-11);
+    EXPECT_NEAR(spatial[i].position[1], planar[i].x * s, 1e-11);
+    EXPECT_NEAR(spatial[i].position[2], planar[i].z, 1e-11);
   }
 }
 
-TEST(PointFlight, DragAtNoDragIsTheParabolaWithADerivative) {
-  PointFlight<Dual> flight{
-      {Dual(0), Dual(0), Dual(1)}, {Dual(1), Dual(2), Dual(3)}, {Dual(0), Dual(0), Dual(-g)}, Dual(0)};
-  const auto parabola = positions(flight, {0.4});
-  flight.drag_k = independent(0, 0);
-  const auto with = positions(flight, {0.4}, kTight);
+TEST(DragInSpace, AtNoDragIsTheParabolaWithADerivative) {
+  const SpatialStart<Dual> start{.position = {Dual(0), Dual(0), Dual(1)},
+                                 .velocity = {Dual(1), Dual(2), Dual(3)}};
+  SpatialAir<Dual> air{.gravity = {Dual(0), Dual(0), Dual(-g)}};
+  const std::vector<Dual> when{Dual(0.4)};
+  const auto parabola = fly_in_space(start, air, when).states[0].position;
+  air.drag_k = independent(0, 0);
+  const auto with = fly_in_space(start, air, when, kTight).states[0].position;
   for (int i = 0; i < 3; ++i) {
-    EXPECT_NEAR(with[0][i].a, parabola[0][i].a, 1e-12);
-    EXPECT_LT(with[0][i].v[0], 0);  // all three velocities are positive most of the way
+    EXPECT_NEAR(with[i].a, parabola[i].a, 1e-12);
+    EXPECT_LT(with[i].v[0], 0);  // all three velocities are positive most of the way
+  }
+}
+
+TEST(RecordedFlight, StepsAreNoLongerThanAsked) {
+  Problem p = thrown(1, 2);
+  p.drag_k = 0.3;
+  dynamics::IntegratorOptions options;
+  for (const double longest : {1e-3, 1e-2}) {
+    options.longest_step = longest;
+    options.step_budget = static_cast<long>(0.5 / longest) - 1;
+    EXPECT_THROW(record_flight(p, 0.5, options), std::runtime_error) << longest << ": too few such steps";
+    EXPECT_EQ(fly_in_space<double>({.velocity = {1, 2, 3}}, {.drag_k = 0.3}, {0.5}, options).outcome,
+              dynamics::Outcome::step_budget_spent);
   }
 }
 
@@ -302,8 +318,6 @@ TEST(Flights, RefuseWhatIsNoFlight) {
     q.longest = NAN;
     EXPECT_THROW(fly(q), std::invalid_argument) << drag;
   }
-  EXPECT_THROW(positions(PointFlight<double>{{}, {}, {0, 0, -g}, -1}, {1.0}), std::invalid_argument);
-  EXPECT_THROW(positions(PointFlight<double>{{}, {}, {0, 0, -g}, 0}, {-1.0}), std::invalid_argument);
 }
 
 }  // namespace

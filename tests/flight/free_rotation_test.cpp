@@ -18,6 +18,20 @@ using dynamics::Dual;
 using dynamics::independent;
 constexpr double kPi = std::numbers::pi;
 
+/// Kinetic energy ½ ω·Iω [J if I is in kg m²].
+template <class S>
+S rotational_energy(const Vec3<S>& inertia, const Vec3<S>& omega) {
+  return 0.5 * (inertia[0] * omega[0] * omega[0] + inertia[1] * omega[1] * omega[1] +
+                inertia[2] * omega[2] * omega[2]);
+}
+
+/// Angular momentum R(q) I ω in the world [kg m²/s].
+template <class S>
+Vec3<S> angular_momentum(const Vec3<S>& inertia, const RotationState<S>& state) {
+  return rotate(state.attitude, Vec3<S>{inertia[0] * state.omega[0], inertia[1] * state.omega[1],
+                                        inertia[2] * state.omega[2]});
+}
+
 dynamics::IntegratorOptions sharp() {
   dynamics::IntegratorOptions options;
   options.tolerances = {1e-13, 1e-14};
@@ -34,7 +48,7 @@ Vec3<double> random_vector(std::mt19937_64& random, double size) {
 }
 
 RotationState<double> after(const Vec3<double>& inertia, const RotationState<double>& start, double t) {
-  return rotate_freely(inertia, start, {t}, sharp())[0];
+  return rotate_freely(inertia, start, {t}, sharp()).states[0];
 }
 
 // ---------------------------------------------------------------- quaternions
@@ -97,7 +111,7 @@ TEST(Quaternions, RotateLikeRodrigues) {
 
 TEST(FreeRotation, ASphereTurnsSteadily) {
   const RotationState<double> start{exp(Vec3<double>{0.2, 0.5, -1.0}), {3, -4, 12}};
-  const auto states = rotate_freely<double>({2, 2, 2}, start, {1.0, 0.0, 0.25});
+  const auto states = rotate_freely<double>({2, 2, 2}, start, {1.0, 0.0, 0.25}).states;
   EXPECT_LT(angle_between(states[1].attitude, start.attitude), 1e-15);
   // 13 rad/s about a fixed axis.
   const Quaternion<double> expected = start.attitude * exp(Vec3<double>{3, -4, 12});
@@ -117,7 +131,7 @@ TEST(FreeRotation, ASymmetricTopPrecesses) {
     const Vec3<double> L = angular_momentum(inertia, start);
     const double rate = (I3 - 1) * start.omega[2];
     const std::vector<double> times{0.01, 0.37, 1.0, 4.0};
-    const auto states = rotate_freely(inertia, start, times, sharp());
+    const auto states = rotate_freely(inertia, start, times, sharp()).states;
     for (std::size_t i = 0; i < times.size(); ++i) {
       const double t = times[i], c = std::cos(rate * t), s = std::sin(rate * t);
       EXPECT_NEAR(states[i].omega[0], c * 1.5 + s * 0.5, 1e-10);  // tolerance 1e-13 a step, some 200 steps
@@ -140,7 +154,8 @@ TEST(FreeRotation, EnergyAndAngularMomentumAreKept) {
     const RotationState<double> start{exp(random_vector(random, 1)), random_vector(random, 8)};
     const Vec3<double> L = angular_momentum(inertia, start);
     const double E = rotational_energy(inertia, start.omega);
-    for (const auto& state : rotate_freely(inertia, start, {0.1, 0.5, 3.0}, sharp())) {
+    const auto turned = rotate_freely(inertia, start, {0.1, 0.5, 3.0}, sharp());
+    for (const auto& state : turned.states) {
       EXPECT_NEAR(rotational_energy(inertia, state.omega) / E, 1, 1e-9) << n;
       EXPECT_LT(norm(difference(angular_momentum(inertia, state), L)) / norm(L), 1e-9) << n;
       const Quaternion<double>& q = state.attitude;
@@ -193,7 +208,7 @@ TEST(FreeRotation, DerivativesByOmegaAndInertia) {
     const Quaternion<double> q0 = exp(Vec3<double>{0.3, -0.2, 0.9});
     const auto end = [&](const std::array<Dual, 6>& x) {
       const RotationState<Dual> start{{Dual(q0.w), Dual(q0.x), Dual(q0.y), Dual(q0.z)}, {x[0], x[1], x[2]}};
-      const auto state = rotate_freely<Dual>({x[3], x[4], x[5]}, start, {0.6}, sharp())[0];
+      const auto state = rotate_freely<Dual>({x[3], x[4], x[5]}, start, {0.6}, sharp()).states[0];
       return std::array<Dual, 7>{state.attitude.w, state.attitude.x, state.attitude.y, state.attitude.z,
                                  state.omega[0],   state.omega[1],   state.omega[2]};
     };
@@ -241,7 +256,13 @@ TEST(FreeRotation, RefusesWhatIsNoRotation) {
   EXPECT_THROW(rotate_freely<double>({1, 1, 2}, start, {-1.0}), std::invalid_argument);
   EXPECT_THROW(rotate_freely<double>({1, 1, 2}, {{0, 0, 0, 0}, {1, 2, 3}}, {1.0}), std::invalid_argument);
   EXPECT_THROW(rotate_freely<double>({1, 1, 2}, {{}, {1, INFINITY, 3}}, {1.0}), std::invalid_argument);
-  EXPECT_TRUE(rotate_freely<double>({1, 1, 2}, start, {}).empty());
+  EXPECT_TRUE(rotate_freely<double>({1, 1, 2}, start, {}).states.empty());
+  // Two steps are too few for a second of it.
+  auto few = sharp();
+  few.step_budget = 2;
+  const auto spent = rotate_freely<double>({1, 2, 3}, start, {1.0}, few);
+  EXPECT_EQ(spent.outcome, dynamics::Outcome::step_budget_spent);
+  EXPECT_TRUE(spent.states.empty());
 }
 
 }  // namespace

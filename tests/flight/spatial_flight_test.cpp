@@ -24,7 +24,7 @@ using Flown = SpatialState<double>;
 constexpr double kSame = 1e-11;  // [m], [m/s], [rad]: both are integrated to 1e-12
 
 Flown at(const LetGo& start, const OpenAir& air, double t) {
-  return fly_in_space<double>(start, air, {t}, kTight)[0];
+  return fly_in_space<double>(start, air, {t}, kTight).states[0];
 }
 
 void expect_near(const Vec3<double>& a, const Vec3<double>& b, double tolerance, const std::string& what) {
@@ -59,7 +59,7 @@ TEST(SpatialFlight, InItsPlaneIsThePlanarFlight) {
   planar.drag_k = 0.08;
   planar.lift_km = 0.03;
   planar.wind = {1.3, -0.4};
-  const auto expected = fly_through(planar, {t}, kTight)[0];
+  const auto expected = fly_through(planar, {t}, kTight).states[0];
   OpenAir air{{0.4, 0, -9.81}};
   air.drag_k = planar.drag_k;
   air.lift = planar.lift_km;
@@ -183,7 +183,7 @@ TEST(SpatialFlight, DerivativesAreCentralDifferences) {
     air.drag_k = p[0], air.linear_drag = p[1], air.lift = p[2], air.axis_drag_x = p[3];
     air.axis_drag_y = S(-0.03), air.cubic_drag = p[4], air.spin_damping = p[5];
     air.wind = {p[6], S(-0.6), S(0.3)};
-    return fly_in_space<S>(start, air, {S(t)}, kTight)[0].position;
+    return fly_in_space<S>(start, air, {S(t)}, kTight).states[0].position;
   };
   const std::array<double, kInputs> p{0.05, 0.11, 0.02, 0.07, 0.15, 0.4, 1.1, -9.7};
   std::array<Dual, kInputs> seeded;
