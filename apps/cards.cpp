@@ -172,7 +172,7 @@ ModelCard card_of(const experiment::ModelComparison& model, const fs::path& log_
   card.log = log_of(log_file, log);
   card.split = "train";
   card.valid_range = fitting::valid_range_of(throws);
-  card.library_version = UNHAND_VERSION;
+  card.library_version = datasets::library_version();
   return card;
 }
 
@@ -184,7 +184,6 @@ ModelCard card_of(const fitting::CampaignProblem& problem, const fitting::FitRes
   for (const auto& [split, name] :
        {std::pair{datasets::Split::train, "train"}, {datasets::Split::test, "test"}})
     if (auto found = fitting::errors_of(errors, split); !found.empty()) card.errors[name] = std::move(found);
-  card.library_version = UNHAND_VERSION;
   return card;
 }
 

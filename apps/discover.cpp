@@ -18,7 +18,6 @@
 #include "apps/throws.hpp"
 #include "apps/weak_grip.hpp"
 #include "contact/registry.hpp"
-#include "datasets/near_miss.hpp"
 #include "fitting/card.hpp"
 #include "fitting/discovery/footprints.hpp"
 
@@ -127,21 +126,6 @@ std::string command_of(const DiscoverOptions& options, const Parser& parser) {
   return out;
 }
 
-/// Takes effects and contact laws out of what is tried. Throws WrongUsage for ids that there are not.
-void forget(const std::vector<std::string>& ids, fitting::DiscoverOptions& request) {
-  std::vector<std::string> known;
-  for (const auto& effect : experiment::known_effects()) known.push_back(effect.id);
-  for (const auto& law : request.laws) known.push_back(std::string(fitting::kLaw) + law);
-  for (const auto& id : ids)
-    if (std::find(known.begin(), known.end(), id) == known.end())
-      throw WrongUsage(
-          datasets::unknown_name(fmt::format("--forget: there is no effect '{}'", id), id, known));
-  request.forget = ids;
-  std::erase_if(request.laws, [&](const std::string& law) {
-    return std::find(ids.begin(), ids.end(), std::string(fitting::kLaw) + law) != ids.end();
-  });
-}
-
 void discover(const DiscoverOptions& options, const Parser& parser) {
   require_outputs({{options.json}, {options.card}, {options.report, Wanted::directory}}, {options.log});
   if (!options.report.empty()) require_gnuplot();
@@ -167,7 +151,12 @@ void discover(const DiscoverOptions& options, const Parser& parser) {
   request.campaign.integrator.tolerances = {options.tolerance, 1e-3 * options.tolerance};
   request.matters = options.matters;
   request.most_effects = options.most.value_or(3);
-  forget(options.forget, request);
+  request.forget = options.forget;
+  try {
+    fitting::validate(request);
+  } catch (const std::invalid_argument& error) {
+    throw WrongUsage(fmt::format("--{}", error.what()));
+  }
   const Discovery found = [&] {
     const Progress progress("discover", 0);
     return fitting::discover(log, options.log, request);

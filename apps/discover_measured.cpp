@@ -66,7 +66,7 @@ datasets::ModelCard card_of(const MeasuredDiscovery& found, const datasets::Thro
   }
   card.log = {std::filesystem::path(file).filename().string(), log.title, fitting::checksum_of(file)};
   card.split = "train";
-  card.library_version = UNHAND_VERSION;
+  card.library_version = datasets::library_version();
   return card;
 }
 

@@ -52,7 +52,7 @@ datasets::ModelCard slip_card(const FitRequest& request, const std::vector<SlipS
   }
   card.log = {std::filesystem::path(request.log).filename().string(), "", fitting::checksum_of(request.log)};
   card.split = "all";
-  card.library_version = UNHAND_VERSION;
+  card.library_version = datasets::library_version();
   return card;
 }
 

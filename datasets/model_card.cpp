@@ -244,6 +244,8 @@ ModelCard parse_model_card(const std::string& text, const std::string& file) {
   return card;
 }
 
+std::string library_version() { return UNHAND_VERSION; }
+
 ModelCard read_model_card(const fs::path& file) {
   std::error_code error;
   if (fs::is_directory(file, error))

@@ -86,7 +86,7 @@ struct ModelCard {
   std::optional<CardCovariance> covariance;         ///< of those that were estimated
   std::map<std::string, CardSpread> own_spreads;    ///< by the name of a throw's own unknown
   CardLog log;                                      ///< what it was estimated from
-  std::optional<std::string> split;                 // the throws that were used: "train"
+  std::optional<std::string> split;                 // the throws that were used: "train", "test" or "all"
   /// By split ("train", "test", "cross_validation"), then by quantity.
   std::map<std::string, std::map<std::string, CardStatistics>> errors;
   std::map<std::string, CardRange> valid_range;  ///< by condition: "grip_force", ...
@@ -103,6 +103,9 @@ class CardError : public LogError {
  public:
   using LogError::LogError;  ///< with the three parts
 };
+
+/// This library's, "0.1.0": what cards that it writes say of themselves.
+std::string library_version();
 
 /// Throws CardError.
 ModelCard read_model_card(const std::filesystem::path& file);

@@ -43,12 +43,12 @@ bool GuardWatch<S, N>::evaluate(double t, const State<double, N>& y, double* G) 
 
 template <class S, int N>
 int GuardWatch<S, N>::arm(const Entry<S, N>& entry, bool same_mode) {
+  short_until_ = short_step_ = std::numeric_limits<double>::infinity();
   if (count == 0) return kNone;
   double G[kMaxGuards];
   if (!evaluate(value_of(entry.t), values<S, N>(entry.y), G)) return kNotFinite;
   std::optional<std::array<double, kMaxGuards>> slope;
   int immediate = kNone;
-  short_until_ = short_step_ = std::numeric_limits<double>::infinity();
   for (int i = 0; i < count; ++i) {
     const bool spent = same_mode && (i == fired || !armed[i]);
     start[i] = G[i];

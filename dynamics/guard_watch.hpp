@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 
 #include "dynamics/hybrid_system.hpp"
 #include "dynamics/stepper.hpp"
@@ -51,7 +52,9 @@ class GuardWatch {
 
   const HybridSystem<N>& system_;
   Method method_;
-  double short_step_{}, short_until_{};
+  // None by default: no step is too long at any time.
+  double short_step_{std::numeric_limits<double>::infinity()},
+      short_until_{std::numeric_limits<double>::infinity()};
 };
 
 extern template class GuardWatch<double, 2>;

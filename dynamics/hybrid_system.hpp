@@ -20,7 +20,7 @@ using State = std::array<S, N>;
 /// Local error per step: see HybridSystem::error_scale; the norm is the root mean square over the components.
 struct Tolerances {
   double relative{1e-8};   ///< of the size of each component [-]
-  double absolute{1e-10};  ///< in the unit of each component (m, rad, m/s, rad/s)
+  double absolute{1e-10};  ///< in the unit of each component (m, rad, m/s, rad/s); >= 1e-18
 };
 
 /// What the flow of a mode asks of a stepper.

@@ -257,6 +257,9 @@ class Run {
   Phase phase_;
 };
 
+/// With none, a component that is zero has no scale: 0/0.
+constexpr double kLeastAbsolute = 1e-18;
+
 }  // namespace
 
 void validate(const IntegratorOptions& o) {
@@ -267,8 +270,8 @@ void validate(const IntegratorOptions& o) {
   };
   const auto& [relative, absolute] = o.tolerances;
   require(relative >= 0 && std::isfinite(relative), "relative tolerance", relative, "in [0, inf)");
-  require(absolute >= 0 && std::isfinite(absolute), "absolute tolerance", absolute, "in [0, inf)");
-  require(relative + absolute > 0, "relative + absolute tolerance", relative + absolute, "> 0");
+  require(absolute >= kLeastAbsolute && std::isfinite(absolute), "absolute tolerance", absolute,
+          "in [1e-18, inf)");
   require(o.guard_interval > 0, "guard_interval", o.guard_interval, "> 0 s");
   require(o.longest_step > 0, "longest_step", o.longest_step, "> 0 s");
   require(o.zeno_tolerance >= 0, "zeno_tolerance", o.zeno_tolerance, ">= 0");

@@ -27,8 +27,9 @@ struct IntegratorOptions {
   bool record{false};  ///< keep the trajectory
 };
 
-/// Throws std::invalid_argument, naming the option, its value and the accepted range: tolerances finite and
-/// not negative, not both zero; intervals > 0; budgets not negative; events_per_instant >= 2.
+/// Throws std::invalid_argument, naming the option, its value and the accepted range: tolerances finite, the
+/// relative one not negative, the absolute one >= 1e-18; intervals > 0; budgets not negative;
+/// events_per_instant >= 2.
 void validate(const IntegratorOptions& options);
 
 /// How an integration ended. Only the first two are answers; the rest say why there is none.

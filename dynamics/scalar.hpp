@@ -19,6 +19,11 @@ using DualOf = ceres::Jet<double, N>;
 /// The one that the library's physics is compiled for.
 using Dual = DualOf<kDualSize>;
 
+static_assert(alignof(Dual) == 16,
+              "unhand::dynamics is compiled with EIGEN_MAX_ALIGN_BYTES=16, which its CMake target tells: a "
+              "program that "
+              "uses the headers must be, too");
+
 /// The value without its derivatives: what decides between branches.
 inline double value_of(double x) { return x; }
 inline double value_of(const Dual& x) { return x.a; }

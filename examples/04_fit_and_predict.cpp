@@ -18,7 +18,9 @@ int main() {
   if (fit.outcome != fitting::FitOutcome::converged) return 1;
   for (const auto& u : fit.campaign)
     std::printf("%-8s %.5f +- %.5f %s\n", u.unknown.name.c_str(), u.value, u.sigma, u.unknown.unit.c_str());
-  datasets::write_model_card("card.json", fitting::card_of(problem, fit));
+  datasets::ModelCard card = fitting::card_of(problem, fit);
+  card.log = {.file = "mine.h5", .title = log.title};
+  datasets::write_model_card("card.json", card);
 
   for (const auto& one : fitting::predict_throws(problem, fit))
     if (one.sigma && one.comparison.split == datasets::Split::test)

@@ -10,6 +10,7 @@
 
 #include "dynamics/parallel.hpp"
 #include "dynamics/pooled_scatter.hpp"
+#include "experiment/unit_check.hpp"
 
 namespace unhand::experiment {
 
@@ -103,8 +104,10 @@ ErrorStatistics ModelComparison::of_condition(int quantity, const ThrownConditio
   });
 }
 
-std::vector<PreparedThrow> prepare_all(const datasets::ThrowLog& log, const std::string& file, int threads) {
+std::vector<PreparedThrow> prepare_all(const datasets::ThrowLog& log, const std::string& file, int threads,
+                                       bool check_units) {
   datasets::validate(log, file);
+  if (check_units) require_units(log, file);
   std::vector<std::optional<PreparedThrow>> prepared(log.throws.size());
   dynamics::parallel_for(log.throws.size(), threads,
                          [&](std::size_t i) { prepared[i] = prepare(log, log.throws[i], file); });

@@ -107,9 +107,10 @@ struct CompareOptions {
 };
 
 /// All throws prepared, on several threads. `file` names the log in errors. Throws datasets::LogError for a
-/// log that breaks the rules of its kind (datasets::validate) and for throws that lack what a release
-/// needs.
-std::vector<PreparedThrow> prepare_all(const datasets::ThrowLog& log, const std::string& file, int threads);
+/// log that breaks the rules of its kind (datasets::validate), for one with a column in another unit than it
+/// says (require_units; not asked without `check_units`), and for throws that lack what a release needs.
+std::vector<PreparedThrow> prepare_all(const datasets::ThrowLog& log, const std::string& file, int threads,
+                                       bool check_units = true);
 
 /// Simulates every prepared throw with every model. Throws std::invalid_argument for unknown models and what
 /// the log does not determine.

@@ -52,8 +52,8 @@ std::vector<Effect> find_effects(const std::vector<std::string>& ids) {
 
 void validate(const CampaignOptions& options) {
   require_contact_model(options.model);
-  if (options.pads && *options.pads < 1)
-    throw std::invalid_argument(fmt::format("pads = {} is not in [1, inf)", *options.pads));
+  if (options.pads && !(*options.pads >= 1 && *options.pads <= 1000))
+    throw std::invalid_argument(fmt::format("pads = {} is not in [1, 1000]", *options.pads));
   const double force = options.reference_force.value_or(1);
   if (!(force > 0 && std::isfinite(force)))
     throw std::invalid_argument(fmt::format("reference_force = {} is not in (0, inf) N", force));
@@ -77,7 +77,7 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
   const std::vector<Effect> effects = find_effects(options.effects);
   header_ = log;
   header_.throws.clear();
-  auto prepared = experiment::prepare_all(log, file, options.threads);
+  auto prepared = experiment::prepare_all(log, file, options.threads, options.check_units);
   std::vector<double> grips;
   for (const auto& p : prepared)
     if (p.split == datasets::Split::train && p.normal_force && p.force_fit.grip_force > 0)
@@ -225,6 +225,10 @@ std::vector<double> CampaignProblem::start() const {
 
 std::vector<double> CampaignProblem::values_of(const Layout& layout, std::span<const double> campaign,
                                                std::span<const double> own) const {
+  if (campaign.size() != campaign_.size() || own.size() != own_.size())
+    throw std::invalid_argument(
+        fmt::format("a throw is predicted with {} unknowns of the campaign and {} of its own, not {} and {}",
+                    campaign_.size(), own_.size(), campaign.size(), own.size()));
   std::vector<double> out;
   for (const int column : layout.columns) {
     const auto c = static_cast<std::size_t>(column);

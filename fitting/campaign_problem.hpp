@@ -45,11 +45,12 @@ struct CampaignOptions {
   std::vector<std::string> effects;             ///< ids whose parameters are unknowns, too; each once
   experiment::ObservationOptions observations;  ///< which channels, how far trusted
   dynamics::IntegratorOptions integrator{.tolerances = {1e-6, 1e-9}};  ///< of release and flight
-  int threads{0};  ///< 0: one per core; the answer does not depend on it
+  int threads{0};          ///< 0: one per core; the answer does not depend on it
+  bool check_units{true};  ///< refuse a log with a column in another unit (experiment::require_units)
   /// For predictions with parameters from elsewhere: the log need hold no observations, starts are not looked
   /// for, and the campaign's own numbers (ThrowModel) are these if given.
   bool predict_only{false};
-  std::optional<int> pads{};                ///< n >= 1
+  std::optional<int> pads{};                ///< 1 … 1000, as in logs
   std::optional<double> reference_force{};  ///< f₀ of contact.soft_patch_radius, > 0 [N]
 };
 

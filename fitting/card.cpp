@@ -91,8 +91,8 @@ std::string in_words(const Condition& is, const CardRange& range) {
                      : fmt::format("{} {:.4g} {} is outside [{}, {}]", is.name, is.value, is.unit, low, high);
 }
 
-void widen(std::map<std::string, CardRange>& range, const experiment::PreparedThrow& prepared) {
-  if (prepared.split != datasets::Split::train) return;
+void widen(std::map<std::string, CardRange>& range, const experiment::PreparedThrow& prepared, Share share) {
+  if (share != Share::all && (prepared.split == datasets::Split::train) != (share == Share::train)) return;
   for (const auto& [name, unit, value] : conditions_of(prepared)) {
     auto& r = range.try_emplace(name, CardRange{value, value, unit}).first->second;
     r.low = std::min(r.low, value);
@@ -131,13 +131,13 @@ std::vector<Condition> conditions_of(const experiment::PreparedThrow& one) {
 
 std::map<std::string, CardRange> valid_range_of(const std::vector<experiment::PreparedThrow>& throws) {
   std::map<std::string, CardRange> out;
-  for (const auto& one : throws) widen(out, one);
+  for (const auto& one : throws) widen(out, one, Share::train);
   return out;
 }
 
-std::map<std::string, CardRange> valid_range_of(const CampaignProblem& problem) {
+std::map<std::string, CardRange> valid_range_of(const CampaignProblem& problem, Share share) {
   std::map<std::string, CardRange> out;
-  for (const auto& one : problem.throws()) widen(out, one.prepared);
+  for (const auto& one : problem.throws()) widen(out, one.prepared, share);
   return out;
 }
 
@@ -196,7 +196,9 @@ std::map<std::string, datasets::CardStatistics> errors_of(const experiment::Mode
 }
 
 ModelCard card_of(const CampaignProblem& problem, const FitResult& fit) {
+  require_fit_of(problem, fit);
   ModelCard card;
+  card.library_version = datasets::library_version();
   card.model = problem.options().model;
   card.effects = problem.options().effects;
   auto& covariance = card.covariance.emplace();
@@ -208,6 +210,7 @@ ModelCard card_of(const CampaignProblem& problem, const FitResult& fit) {
         u.value, {}, u.unknown.unit, is_determined(fit, k), u.degrees_of_freedom, u.profile};
     if (!std::isfinite(fit.covariance[k * n + k])) continue;
     one.sigma = u.sigma;
+    if (fit.covariance[k * n + k] == 0) continue;  // fixed
     known.push_back(k);
     covariance.names.push_back(u.unknown.name);
   }
@@ -219,8 +222,8 @@ ModelCard card_of(const CampaignProblem& problem, const FitResult& fit) {
   }
   for (std::size_t k = 0; k < fit.own_spread.size(); ++k)
     card.own_spreads[problem.own()[k].name] = {fit.own_spread[k], problem.own()[k].unit};
-  card.split = "train";
-  card.valid_range = valid_range_of(problem);
+  card.split = fit.share == Share::train ? "train" : fit.share == Share::test ? "test" : "all";
+  card.valid_range = valid_range_of(problem, fit.share);
   return card;
 }
 

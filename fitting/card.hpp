@@ -28,7 +28,8 @@ std::vector<Condition> conditions_of(const experiment::PreparedThrow& prepared);
 /// Smallest and largest condition of the train throws among `throws`.
 std::map<std::string, datasets::CardRange> valid_range_of(
     const std::vector<experiment::PreparedThrow>& throws);
-std::map<std::string, datasets::CardRange> valid_range_of(const CampaignProblem& problem);
+/// The same of the problem's throws of a share.
+std::map<std::string, datasets::CardRange> valid_range_of(const CampaignProblem& problem, Share share);
 
 /// By this share of its ends a throw may lie beyond a valid range: sensors are no better, and a model that
 /// holds inside does not end there. It may also do so by three sigma of what the card's own throws scattered
@@ -71,7 +72,8 @@ std::map<std::string, datasets::CardStatistics> errors_of(const experiment::Mode
                                                           datasets::Split split);
 
 /// The card of a fit. Beside the unknowns it holds what the model takes from the campaign: `pads`, and
-/// `reference_force`, f₀ of contact.soft_patch_radius. Errors, log and version are the caller's to add.
+/// `reference_force`, f₀ of contact.soft_patch_radius. Errors and log are the caller's to add, the log's file
+/// at least. Throws std::invalid_argument as require_fit_of does.
 datasets::ModelCard card_of(const CampaignProblem& problem, const FitResult& fit);
 
 /// Whether the card comes from a fit (it holds effects, spreads or a covariance), rather than from a plain

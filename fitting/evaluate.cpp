@@ -124,6 +124,11 @@ PredictedThrow predict_one(const CampaignProblem& problem, const CampaignThrow& 
 std::vector<PredictedThrow> predict_some(const CampaignProblem& problem, const FitResult& fit,
                                          const std::vector<std::size_t>& which,
                                          const EvaluateOptions& options) {
+  require_fit_of(problem, fit);
+  for (const std::size_t i : which)
+    if (i >= problem.throws().size())
+      throw std::invalid_argument(
+          fmt::format("predict_some: place {} is not in [0, {})", i, problem.throws().size()));
   FitResult known = fit;
   for (std::size_t k = known.own_spread.size(); k < problem.own().size(); ++k)
     known.own_spread.push_back(problem.own()[k].prior_sigma.value_or(problem.own()[k].scale));

@@ -29,7 +29,8 @@ struct EvaluateOptions {
   int threads{0};          ///< 0: one per core; the answer does not depend on it
 };
 
-/// Predicts throws of `problem` with a fit of the same unknowns; all, or those listed.
+/// Predicts throws of `problem` with a fit of the same unknowns; all, or those listed. Throws
+/// std::invalid_argument as require_fit_of does, and for a place that is none in problem.throws().
 ///
 /// The throw's own unknowns o are what its samples before the opening and the learned spread say,
 /// for train throws, too: a prediction does not know the outcome.

@@ -66,12 +66,16 @@ void describe_campaign(const CampaignProblem& problem, const FitRounds& rounds, 
     auto& fitted = out.campaign[static_cast<std::size_t>(k)];
     const auto& u = fitted.unknown;
     fitted.value = values[static_cast<std::size_t>(k)];
-    fitted.sigma = std::sqrt(covariance(k, k));
+    fitted.sigma = rounds.is_fixed(u) ? 0 : std::sqrt(covariance(k, k));
     fitted.data_sigma = rounds.is_fixed(u) ? HUGE_VAL : std::sqrt(data(k, k));
     fitted.degrees_of_freedom = degrees_of_freedom[k];
     const double margin = 1e-6 * (u.high - u.low);
     fitted.at_bound = fitted.value < u.low + margin || fitted.value > u.high - margin;
-    for (Eigen::Index j = 0; j < width; ++j) out.covariance.push_back(covariance(k, j));
+    for (Eigen::Index j = 0; j < width; ++j) {
+      const bool held =
+          rounds.is_fixed(u) || rounds.is_fixed(problem.campaign()[static_cast<std::size_t>(j)]);
+      out.covariance.push_back(held ? 0 : covariance(k, j));
+    }
   }
   if (!rounds.shared().options.all_fixed) describe_open_directions(information, problem, scale, out);
 }
@@ -155,8 +159,13 @@ void validate(const FitOptions& options, const CampaignProblem& problem) {
   sized("start", options.start.size(), problem.campaign().size(), "campaign's unknowns");
   sized("own_spread", options.own_spread.size(), problem.own().size(), "throws' own unknowns");
   sized("throws", options.throws.size(), problem.throws().size(), "log's throws");
-  for (const double x : options.start)
-    require(std::isfinite(x), fmt::format("start: {} is not a finite number", x));
+  for (std::size_t k = 0; k < options.start.size(); ++k) {
+    const Unknown& u = problem.campaign()[k];
+    const double x = options.start[k];
+    const double rounding = 1e-9 * (u.high - u.low);
+    require(x >= u.low - rounding && x <= u.high + rounding,
+            fmt::format("start: {} = {} is not in [{}, {}] {}", u.name, x, u.low, u.high, u.unit));
+  }
   for (const double x : options.own_spread)
     require(x > 0 && std::isfinite(x), fmt::format("own_spread: {} is not in (0, inf)", x));
   for (const auto& name : options.fixed)
@@ -168,6 +177,7 @@ void validate(const FitOptions& options, const CampaignProblem& problem) {
 FitResult fit_from(std::vector<double> start, const CampaignProblem& problem, const FitOptions& options) {
   const auto begin = Clock::now();
   FitResult out;
+  out.share = options.share;
   const auto& unknowns = problem.campaign();
   for (std::size_t k = 0; k < start.size(); ++k)
     start[k] = std::clamp(start[k], unknowns[k].low, unknowns[k].high);

@@ -56,7 +56,7 @@ struct FitOptions {
   double throw_limit{3};          ///< a throw whose χ² exceeds this many medians counts less [-]
   double accuracy{1e-6};          ///< relative change of the cost at which a round ends
   int threads{0};                 ///< 0: one per core; the answer does not depend on it
-  std::vector<double> start;      ///< of the campaign's unknowns; empty: the problem's
+  std::vector<double> start;      ///< of the campaign's unknowns, within their ranges; empty: the problem's
   /// Campaign unknowns that keep their start, by name; `all_fixed` for every one.
   std::vector<std::string> fixed;
   /// Nothing of the campaign is fitted, only the throws' own unknowns; what the log says of it is not asked.
@@ -83,7 +83,8 @@ const char* to_string(FitOutcome);
 struct FittedUnknown {
   Unknown unknown;  ///< name, unit, range
   double value{};   ///< in the unknown's unit
-  double sigma{};   ///< 1 σ, from the scatter between throws (see covariance); infinite without an answer
+  /// 1 σ, from the scatter between throws (see covariance); infinite without an answer, 0 of what was fixed.
+  double sigma{};
   double data_sigma{};  ///< 1 σ without the prior; infinite where the log does not determine it, or was
                         ///< not asked, since the unknown was fixed
   bool at_bound{};      ///< the value is at an end of its range: sigma says little
@@ -131,10 +132,12 @@ struct ThrowFit {
   double detach{};          ///< as the fit predicts it [s]
 };
 
-/// A fit: values, covariance, what is open, misfit by channel.
+/// A fit: values, covariance, what is open, misfit by channel. Without an answer the values are the start's,
+/// the sigmas infinite, and `covariance`, `own_spread`, `open`, `misfit` and `group_weight` empty.
 struct FitResult {
   FitOutcome outcome{};                 ///< only `converged` and `iterations_spent` are answers
   std::string message;                  ///< in words
+  Share share{Share::train};            ///< of the log that was fitted to
   std::vector<FittedUnknown> campaign;  ///< in the problem's order
   /// Covariance of the campaign's unknowns, row by row. H⁻¹ G H⁻¹ with H the Gauss-Newton matrix after the
   /// throws' own unknowns are eliminated and G the scatter of the throws' gradients, each enlarged by what
@@ -167,9 +170,13 @@ struct FitResult {
   double deviance() const;
   /// Of the campaign's unknowns, in their order and units.
   std::vector<double> values() const;
-  /// Of unknowns i and j, −1 … 1; 0 where either is not determined.
+  /// Of unknowns i and j, −1 … 1; 0 where either is not determined, and without an answer. Throws
+  /// std::out_of_range unless both are places in `campaign`.
   double correlation(std::size_t i, std::size_t j) const;
 };
+
+/// Throws std::invalid_argument unless the fit is an answer to the problem's own unknowns, by their names.
+void require_fit_of(const CampaignProblem& problem, const FitResult& fit);
 
 /// Whether the log alone, without the prior, tells unknown k: its σ from the data is less than its accepted
 /// range, and it takes part in no direction that the log leaves open (dead_time + opening_time may be known
@@ -178,8 +185,11 @@ bool is_determined(const FitResult& fit, std::size_t k);
 
 /// Least squares by Ceres (Levenberg-Marquardt; the throws' own unknowns eliminated by Schur's complement)
 /// with exact derivatives. Without `options.start` from the problem's own, one-sided effects a typical step
-/// from neutral, and from smaller ones where they end at neutral: of those the likeliest. Throws
-/// std::invalid_argument for options outside their ranges, lists of the wrong length, and unknown names.
+/// from neutral, and from smaller ones where they end at neutral: of those the likeliest. With one, the
+/// answer is the minimum that it leads to: what a channel and a throw count for is learned on the way, and
+/// where the law cannot follow the log, a start far off may end some sigma from the problem's own. Throws
+/// std::invalid_argument for options outside their ranges, a start outside an unknown's, lists of the wrong
+/// length, and unknown names.
 FitResult fit(const CampaignProblem& problem, const FitOptions& options = {});
 
 }  // namespace unhand::fitting

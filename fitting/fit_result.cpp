@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <stdexcept>
 
 #include "fitting/fit.hpp"
 
@@ -59,8 +60,31 @@ std::vector<double> FitResult::values() const {
 
 double FitResult::correlation(std::size_t i, std::size_t j) const {
   const std::size_t n = campaign.size();
+  if (i >= n || j >= n)
+    throw std::out_of_range(fmt::format("correlation: {} of {} unknowns", std::max(i, j), n));
+  if (covariance.empty()) return 0;
   const double scale = std::sqrt(covariance[i * n + i] * covariance[j * n + j]);
   return scale > 0 ? covariance[i * n + j] / scale : 0;
+}
+
+void require_fit_of(const CampaignProblem& problem, const FitResult& fit) {
+  const auto& unknowns = problem.campaign();
+  const bool same =
+      std::equal(unknowns.begin(), unknowns.end(), fit.campaign.begin(), fit.campaign.end(),
+                 [](const Unknown& a, const FittedUnknown& b) { return a.name == b.unknown.name; });
+  const auto names = [](const auto& list, const auto& name_of) {
+    std::string out;
+    for (const auto& one : list) out += (out.empty() ? "" : ", ") + name_of(one);
+    return out.empty() ? std::string("none") : out;
+  };
+  if (!same || fit.own_spread.size() > problem.own().size())
+    throw std::invalid_argument(
+        fmt::format("the fit is of another problem: its unknowns are {}, and the problem's {}",
+                    names(fit.campaign, [](const FittedUnknown& u) { return u.unknown.name; }),
+                    names(unknowns, [](const Unknown& u) { return u.name; })));
+  if (!fit.is_answer())
+    throw std::invalid_argument(
+        fmt::format("the fit is no answer ({}): {}", to_string(fit.outcome), fit.message));
 }
 
 bool OpenDirection::moves(std::size_t k) const {

@@ -4,9 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <utility>
 
 #include "contact/gripper_delay.hpp"
 #include "contact/registry.hpp"
+#include "datasets/near_miss.hpp"
+#include "experiment/throw_setup.hpp"
 #include "fitting/clock.hpp"
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/held_out_split.hpp"
@@ -36,6 +40,36 @@ std::vector<std::string> all_laws() {
   auto out = contact::contact_model_names();
   std::erase_if(out, [](const auto& law) { return !contact::follows_pads(law); });
   return out;
+}
+
+void validate(const DiscoverOptions& options) {
+  const auto require = [](bool ok, const char* name, double value, const char* range) {
+    if (!ok) throw std::invalid_argument(fmt::format("{} = {} is not in {}", name, value, range));
+  };
+  for (const auto& [name, value] : {std::pair{"matters", options.matters},
+                                    {"wrench_matters", options.wrench_matters},
+                                    {"wrench_misfit", options.wrench_misfit},
+                                    {"law_matters", options.law_matters}})
+    require(value > 0 && std::isfinite(value), name, value, "(0, inf)");
+  for (const auto& [name, value] :
+       {std::pair{"prediction_matters", options.prediction_matters}, {"unexplained", options.unexplained}})
+    require(value >= 1 && std::isfinite(value), name, value, "[1, inf)");
+  require(options.family_wise_level > 0 && options.family_wise_level < 1, "family_wise_level",
+          options.family_wise_level, "(0, 1)");
+  require(options.equivalent > 0 && options.equivalent <= 1, "equivalent", options.equivalent, "(0, 1]");
+  require(options.refits >= 1, "refits", options.refits, "[1, inf)");
+  require(options.most_effects >= 0, "most_effects", options.most_effects, "[0, inf)");
+  std::vector<std::string> known;
+  for (const auto& effect : experiment::known_effects()) known.push_back(effect.id);
+  for (const auto& law : all_laws()) known.push_back(std::string(kLaw) + law);
+  for (const auto& id : options.forget)
+    if (std::find(known.begin(), known.end(), id) == known.end())
+      throw std::invalid_argument(
+          datasets::unknown_name(fmt::format("forget: there is no effect '{}'", id), id, known));
+  for (const auto& law : options.laws)
+    if (std::find(known.begin(), known.end(), std::string(kLaw) + law) == known.end())
+      throw std::invalid_argument(
+          fmt::format("laws: {} is no contact law whose pads press on the object", law));
 }
 
 std::vector<std::string> leading_names(std::span<const AcceptedEffect> effects,
@@ -102,7 +136,11 @@ void search(Stage& stage, const DiscoverOptions& options, Discovery& out) {
 
 Discovery discover(const datasets::ThrowLog& logged, const std::string& file, const DiscoverOptions& given) {
   const auto begin = Clock::now();
+  validate(given);
   DiscoverOptions options = given;
+  std::erase_if(options.laws, [&](const std::string& law) {
+    return std::find(given.forget.begin(), given.forget.end(), std::string(kLaw) + law) != given.forget.end();
+  });
   const int threads = options.fit.threads;
   const datasets::ThrowLog log = with_held_out(logged);
   Discovery out;

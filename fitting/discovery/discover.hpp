@@ -44,9 +44,14 @@ struct DiscoverOptions {
   int refits{4};
   int most_effects{3};      ///< accepted in all
   double unexplained{1.5};  ///< χ² per sample of a channel in a phase from which on something is missing
-  std::vector<std::string> forget;            ///< effects that are not in the catalogue today
+  /// Effects, and laws as contact.law:MODEL, that are not in the catalogue today.
+  std::vector<std::string> forget;
   std::vector<std::string> laws{all_laws()};  ///< contact laws that are tried
 };
+
+/// Throws std::invalid_argument, naming option, value and accepted range; for a name in `forget` that is no
+/// effect and no law (contact.law:MODEL), with the nearest one.
+void validate(const DiscoverOptions& options);
 
 /// What the loop says of a log.
 enum class Verdict {
@@ -213,7 +218,7 @@ struct FirstMisfit {
 struct Discovery {
   Verdict verdict{};                    ///< found, nothing missing, unexplained, or no answer
   std::vector<std::string> held_out;    ///< throws that with_held_out chose; empty where the log says which
-  std::string message;                  ///< the answer in words
+  std::string message;                  ///< why there is no answer (not_answered); else empty
   std::vector<AcceptedEffect> effects;  ///< in order of acceptance
   std::vector<std::string> imitations;  ///< accepted at first, and withdrawn (acceptance.hpp)
   std::optional<AskedForm> asked;       ///< what the flights asked for when effects were questioned
@@ -238,7 +243,7 @@ struct Discovery {
 };
 
 /// Runs the loop. A log without a test split is split as with_held_out does.
-/// Throws as CampaignProblem does.
+/// Throws as validate and CampaignProblem do.
 Discovery discover(const datasets::ThrowLog& log, const std::string& file, const DiscoverOptions& options);
 
 }  // namespace unhand::fitting

@@ -75,6 +75,16 @@ TEST_P(Outcomes, AFlowThatExplodesEndsTyped) {
   EXPECT_NEAR(end.t, 1.0, 1e-6);
 }
 
+// No instant is special: clocks may be below zero, and a mode may have nothing to watch.
+TEST_P(Outcomes, AModeWithoutGuardsFlowsAtAnyTime) {
+  const auto swing = Toy({{FlowKind::smooth, {}}}, oscillator(), no_guards(), enter(0));
+  for (const double start : {-0.05, -1e-9, 0.0}) {
+    const auto end = integrate<double, 2>(swing, {0, start, {1.0, 0.0}, 0.0}, start + 1, options());
+    EXPECT_EQ(end.outcome, Outcome::horizon) << start;
+    EXPECT_NEAR(end.y[0], std::cos(1.0), 1e-7) << start;
+  }
+}
+
 TEST_P(Outcomes, InconsistentModesAreACycle) {
   // Each mode sends to the next at once; both the short cycles and a long one.
   for (const int length : {1, 2, 3, 4, 5, 7}) {
@@ -112,7 +122,11 @@ TEST(IntegratorOptions, AreChecked) {
   using testing::HasSubstr;
   EXPECT_THAT(complaint([](auto& o) { o.tolerances.relative = -1; }), HasSubstr("relative tolerance = -1"));
   EXPECT_THAT(complaint([](auto& o) { o.tolerances.absolute = NAN; }), HasSubstr("absolute tolerance = nan"));
-  EXPECT_THAT(complaint([](auto& o) { o.tolerances = {0, 0}; }), HasSubstr("absolute tolerance = 0"));
+  for (const double relative : {0.0, 1e-6})  // a component that is zero would have no scale
+    EXPECT_THAT(complaint([&](auto& o) {
+                  o.tolerances = {relative, 0};
+                }),
+                HasSubstr("absolute tolerance = 0"));
   EXPECT_THAT(complaint([](auto& o) { o.guard_interval = 0; }), HasSubstr("guard_interval = 0"));
   EXPECT_THAT(complaint([](auto& o) { o.longest_step = NAN; }), HasSubstr("longest_step = nan"));
   EXPECT_THAT(complaint([](auto& o) { o.zeno_tolerance = -1; }), HasSubstr("zeno_tolerance = -1"));

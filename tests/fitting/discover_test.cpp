@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
 
 #include "experiment/campaign_effects.hpp"
 #include "experiment/synthetic_campaign.hpp"
@@ -43,6 +46,30 @@ double unlike_the_residual(const Discovery& found, const FootprintTrace& footpri
   }
   EXPECT_GT(n, 20);
   return sum / n;
+}
+
+TEST(DiscoverOptions, ThatMeanNothingAreRefused) {
+  const auto complaint = [](auto change) -> std::string {
+    DiscoverOptions options;
+    change(options);
+    try {
+      validate(options);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(complaint([](auto&) {}), "");
+  EXPECT_EQ(complaint([](auto& o) { o.forget = {"flight.wind", "contact.law:limit_surface"}; }), "");
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(complaint([&](auto& o) { o.family_wise_level = nan; }),
+            "family_wise_level = nan is not in (0, 1)");
+  EXPECT_EQ(complaint([](auto& o) { o.family_wise_level = -1; }), "family_wise_level = -1 is not in (0, 1)");
+  EXPECT_EQ(complaint([&](auto& o) { o.matters = nan; }), "matters = nan is not in (0, inf)");
+  EXPECT_EQ(complaint([](auto& o) { o.refits = -1; }), "refits = -1 is not in [1, inf)");
+  EXPECT_NE(complaint([](auto& o) { o.forget = {"flight.quadratic_drga"}; }).find("flight.quadratic_drag"),
+            std::string::npos);
+  EXPECT_NE(complaint([](auto& o) { o.laws = {"gripper_delay"}; }).find("gripper_delay"), std::string::npos);
 }
 
 TEST(Discovery, NothingIsFoundWhereNothingIsMissing) {

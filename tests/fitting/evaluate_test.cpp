@@ -70,6 +70,24 @@ TEST(Evaluate, SigmaIsTheSlopeTimesSigma) {
   }
 }
 
+TEST(Evaluate, AFitOfAnotherProblemAndNoAnswerAreRefused) {
+  const CampaignProblem quartic = disc().with("limit_surface_quartic", {});
+  FitResult none = disc_fit();
+  none.outcome = FitOutcome::no_start;
+  none.covariance.clear();
+  const auto refused = [](const CampaignProblem& problem, const FitResult& fit) {
+    EXPECT_THROW(predict_throws(problem, fit), std::invalid_argument);
+    EXPECT_THROW(card_of(problem, fit), std::invalid_argument);
+  };
+  refused(quartic, disc_fit());
+  refused(disc(), {});
+  refused(disc(), none);
+  EXPECT_THROW(predict_some(disc(), disc_fit(), {disc().throws().size()}), std::invalid_argument);
+  EXPECT_THROW(disc().predict(disc().throws().front(), {}, {}), std::invalid_argument);
+  EXPECT_EQ(none.correlation(0, 1), 0);
+  EXPECT_THROW(disc_fit().correlation(0, 2), std::out_of_range);
+}
+
 TEST(Evaluate, OwnSpreadAddsUncertainty) {
   const FitResult sure = sure_but_for(0, 1e-6);
   FitResult scattered = sure;
@@ -125,6 +143,16 @@ TEST(Card, RoundTripIsExact) {
   EXPECT_EQ(predicted[0].comparison.prediction.landing.pose.x,
             throws[3].comparison.prediction.landing.pose.x);
   EXPECT_EQ(predicted[0].sigma->landing_x, throws[3].sigma->landing_x);
+}
+
+TEST(Card, SaysWhichThrowsItIsOf) {
+  FitOptions options;
+  options.share = Share::test;
+  const auto test = card_of(disc(), fit(disc(), options)), train = card_of(disc(), disc_fit());
+  EXPECT_EQ(train.split, "train");
+  EXPECT_EQ(test.split, "test");
+  EXPECT_EQ(test.library_version, datasets::library_version());
+  EXPECT_NE(train.valid_range.at("detach_omega").low, test.valid_range.at("detach_omega").low);
 }
 
 TEST(Card, HoldsEffectsAndRefusesUnknownOnes) {

@@ -301,7 +301,10 @@ TEST(ThrowFit, ChannelInAnotherUnitDoesNotMoveIt) {
       auto& series = series_of(one);
       for (std::size_t i = 0; i < series.rows; ++i) series(i, column) *= factor;
     }
-    const auto result = fit_of_log(wrong);
+    CampaignOptions as_written;
+    as_written.model = kLaw;
+    as_written.check_units = false;
+    const auto result = fit(CampaignProblem(wrong, "(in memory)", as_written));
     bool seen = false;
     for (const auto& m : result.misfit)
       if (m.channel == channel && (m.phase == Phase::release || m.phase == Phase::landing)) {
@@ -462,7 +465,9 @@ TEST(ThrowFit, RefusesOptionsThatMeanNothing) {
   EXPECT_THAT(message([](auto& o) { o.iterations = -1; }), HasSubstr("iterations = -1"));
   EXPECT_THAT(message([](auto& o) { o.accuracy = NAN; }), HasSubstr("accuracy = nan"));
   EXPECT_THAT(message([](auto& o) { o.start = {0.5}; }), HasSubstr("start has 1 values, not 0 or 2"));
-  EXPECT_THAT(message([](auto& o) { o.start = {0.5, NAN}; }), HasSubstr("start: nan"));
+  EXPECT_THAT(message([](auto& o) { o.start = {0.5, NAN}; }), HasSubstr("start: length = nan is not in ["));
+  for (const double mu : {-1.0, 50.0})
+    EXPECT_THAT(message([=](auto& o) { o.start = {mu, 0.007}; }), HasSubstr("is not in [0, 10]"));
   EXPECT_THAT(message([](auto& o) { o.own_spread = {0.01}; }), HasSubstr("own_spread has 1 values"));
   EXPECT_THAT(message([](auto& o) { o.throws = {true}; }), HasSubstr("throws has 1 values"));
   EXPECT_THAT(message([](auto& o) { o.fixed = {"nu"}; }), HasSubstr("no unknown 'nu'"));
@@ -560,6 +565,24 @@ TEST(CampaignInput, LogsInMemoryObeyTheRulesOfFiles) {
   expect_refused("there is no object", [](auto& log) { log.throws.front().object = "another"; });
 }
 
+// Another unit is no model error that weights could take up: the fit would converge, to other parameters.
+TEST(CampaignInput, ColumnsInAnotherUnitAreRefusedUnlessTheyAreWanted) {
+  auto log = disc_log();
+  for (auto& one : log.throws)
+    for (std::size_t i = 0; i < one.mocap->pose.rows; ++i)
+      for (const std::size_t j : {0, 1}) one.mocap->pose(i, j) *= 1e3;  // mm for m
+  try {
+    const CampaignProblem problem(log, "log.h5", {});
+    FAIL() << "accepted";
+  } catch (const datasets::LogError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("log.h5"));
+    EXPECT_THAT(error.what(), HasSubstr("mm"));
+  }
+  CampaignOptions as_written;
+  as_written.check_units = false;
+  EXPECT_NO_THROW(CampaignProblem(log, "log.h5", as_written));
+}
+
 TEST(CampaignInput, RefusesOptionsOutOfRange) {
   const auto message = [](auto&& change) {
     CampaignOptions options;
@@ -572,8 +595,8 @@ TEST(CampaignInput, RefusesOptionsOutOfRange) {
     return std::string("accepted");
   };
   EXPECT_EQ(message([](auto& o) { o.pads = 1, o.reference_force = 5; }), "accepted");
-  for (const int pads : {0, -2})
-    EXPECT_EQ(message([=](auto& o) { o.pads = pads; }), fmt::format("pads = {} is not in [1, inf)", pads));
+  for (const int pads : {0, -2, 1001})
+    EXPECT_EQ(message([=](auto& o) { o.pads = pads; }), fmt::format("pads = {} is not in [1, 1000]", pads));
   for (const double force : {0.0, -1.0, HUGE_VAL})
     EXPECT_EQ(message([=](auto& o) { o.reference_force = force; }),
               fmt::format("reference_force = {} is not in (0, inf) N", force));
