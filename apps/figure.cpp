@@ -180,7 +180,7 @@ Style style_of(const std::string& model) {
                                 {"limit_surface_disc", {4, "#000000", 3}},      // open square
                                 {"limit_surface_quartic", {12, "#cc79a7", 4}},  // open diamond
                                 {"gripper_delay", {2, "#56b4e9", 5}},           // cross
-                                {release::kNaiveModel, {1, "#e69f00", 4}},      // plus
+                                {"limit_surface_naive", {1, "#e69f00", 4}},     // plus
                                 {"ellipsoid", {7, "#0072b2", 2}},
                                 {"ellipsoid_full", {9, "#d55e00", 4}},
                                 {"convex_quartic", {4, "#000000", 1}},

@@ -59,7 +59,7 @@ TEST(SpatialFlight, InItsPlaneIsThePlanarFlight) {
   planar.drag_k = 0.08;
   planar.lift_km = 0.03;
   planar.wind = {1.3, -0.4};
-  const auto expected = fly_through(planar, {t}, kTight).states[0];
+  const auto expected = fly_through(planar, {t}, kTight)[0];
   OpenAir air{{0.4, 0, -9.81}};
   air.drag_k = planar.drag_k;
   air.lift = planar.lift_km;
