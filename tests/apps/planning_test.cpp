@@ -316,9 +316,11 @@ TEST_F(Cli, ThrowFlipTransfersToAnotherBar) {
   EXPECT_EQ(learned["bar"]["mass_kg"], 0.3);
   // What was learned of the gripper and its pads answers for another object.
   std::ofstream(folder / "card.json") << learned["card"];
-  const Answer object = run("validate-sku sku.toml --card card.json --json sku.json");
+  std::ofstream(folder / "light.toml") << "name = 'c'\nmass_kg = 0.2\ninertia_kg_m2 = 1e-3\n"
+                                          "com_offset_m = 0.08\nsurface = 'printed'\n";
+  const Answer object = run("validate-sku light.toml --card card.json --json sku.json");
   ASSERT_EQ(object.code, 0) << object.err;
-  EXPECT_THAT(object.out, HasSubstr("Beyond the card: mass 0.3 kg is not 0.242"));
+  EXPECT_THAT(object.out, HasSubstr("Beyond the card: mass 0.2 kg is not 0.242"));
   const auto budget = nlohmann::json::parse(content(folder / "sku.json"))["budget"].dump();
   for (const char* of : {"\"mu\"", "\"length\"", "\"dead_time\"", "\"mu_deviation\"", "\"grasp_angle\""})
     EXPECT_THAT(budget, HasSubstr(of));
