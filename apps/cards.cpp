@@ -118,7 +118,7 @@ UsableCard read_usable_card(const fs::path& file) {
     p.delay = sigma > 0 ? contact::DelayDistribution::normal(delay, sigma, std::max(0.1, 2 * delay))
                         : contact::DelayDistribution::number(delay);
   } else {
-    p.mu = reader.take("mu", "-", 0, 10);
+    p.mu = reader.take("mu", "-", 0, contact::kMostMu);
     p.length = reader.take("length", "m", 1e-9, contact::kUniformDisc);
     const double pads = reader.take_or("pads", "-", 1, 1000, 2);
     if (pads != std::floor(pads))

@@ -126,7 +126,9 @@ std::unique_ptr<fl::FlipLearner> learner_of(const PlanFlipOptions& o, const fl::
           ? fl::prior_card(robot)
           : planners::release_card(datasets::read_model_card(o.card), o.card, fl::prior_card(robot));
   const fl::ReleaseFit fit = fl::fit_release(old, prior, support.data);
-  answer.card = datasets::to_json(fl::model_card_of(fit, o.robot));
+  auto learned = fl::model_card_of(fit, old, support.data, o.robot);
+  learned.library_version = UNHAND_VERSION;
+  answer.card = datasets::to_json(learned);
   library.emplace(robot, answer.bar);
   return std::make_unique<fl::ReleaseLearner>(*library, fit.card, fl::left_over(old, fit.card, support.data),
                                               fl::scatter_of(support.trials, robot.bar.com_offset),

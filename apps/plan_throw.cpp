@@ -143,19 +143,24 @@ std::vector<ThrowAnswer::Number> numbers_of(const planners::ReleaseCard& card,
     out.push_back({name, unit, value, sigma, say(to_string(from), to_string(of_sigma), sigma > 0)});
   };
   add("mu", "-", card.mu.value, card.mu.sigma);
-  add("length", "m", card.length, 0);
+  add("length", "m", card.length, card.length_sigma);
   for (const auto& [own, value] : contact::given_law_parameters(card.model, card.law_values))
     add(own.name.c_str(), own.unit.c_str(), value, 0);
   add("pads", "-", card.pads, 0);
   add("grip_force", "N", card.grip_force, 0);
   add("dead_time", "s", card.dead_time.value, card.dead_time.sigma);
   add("opening_time", "s", card.opening_time.value, card.opening_time.sigma);
-  add("shape", "-", card.shape, 0);
+  add("shape", "-", card.shape, card.shape_sigma);
   const std::string told = sku ? "SKU" : "assumed";
-  out.push_back({"mass", "kg", object.mass, 0, told});
-  out.push_back({"inertia", "kg m2", object.inertia, 0, told});
+  const auto teller = [&](std::optional<double> datasets::Sku::*sigma) -> std::string {
+    return sku && (*sku).*sigma ? "SKU" : "assumed";
+  };
+  out.push_back(
+      {"mass", "kg", object.mass, object.mass_sigma, say(told, teller(&datasets::Sku::mass_sigma), true)});
+  out.push_back({"inertia", "kg m2", object.inertia, object.inertia_sigma,
+                 say(told, teller(&datasets::Sku::inertia_sigma), true)});
   const auto& com = object.com_offset;
-  std::string of_sigma = sku && sku->com_offset_sigma ? "SKU" : "assumed";
+  std::string of_sigma = teller(&datasets::Sku::com_offset_sigma);
   if (card.grasp_offset > 0) of_sigma += " and card";
   out.push_back(
       {"com_offset", "m", com.value, std::hypot(com.sigma, card.grasp_offset), say(told, of_sigma, true)});
@@ -270,8 +275,9 @@ void plan_throw(const PlanThrowOptions& options) {
 
   std::optional<planners::ReleaseCard> card;
   planners::HeldObject object;
-  const double com_sigma = fitting::AssumedTolerances{}.com_offset;  // as validate-sku assumes
-  object.com_offset = {0, com_sigma};
+  const fitting::AssumedTolerances assumed;  // as validate-sku assumes
+  object.com_offset = {0, assumed.com_offset};
+  object.mass_sigma = assumed.mass * object.mass, object.inertia_sigma = assumed.inertia * object.inertia;
   datasets::ModelCard read;
   if (!options.card.empty()) {
     read = datasets::read_model_card(options.card);
@@ -284,7 +290,8 @@ void plan_throw(const PlanThrowOptions& options) {
       throw datasets::LogError(options.sku, "inertia_kg_m2", "is not known: give it, or a shape with dims_m");
     answer.lever = sku.com_offset;
     object.mass = sku.mass, object.inertia = *sku.inertia;
-    object.com_offset = {sku.com_offset, sku.com_offset_sigma.value_or(com_sigma)};
+    object.mass_sigma = fitting::mass_sigma_of(sku), object.inertia_sigma = fitting::inertia_sigma_of(sku);
+    object.com_offset = {sku.com_offset, sku.com_offset_sigma.value_or(assumed.com_offset)};
   }
   const Chain pads = armed(options, given);
   answer.chain = planners::with_tool(pads, {Eigen::Matrix3d::Identity(), {0, 0, object.com_offset.value}});
@@ -315,8 +322,6 @@ void plan_throw(const PlanThrowOptions& options) {
   if (card) {
     answer.numbers = numbers_of(*card, object, given);
     answer.passed_over = card->passed_over;
-    if (given && given->mass_sigma.value_or(0) > 0) answer.passed_over.emplace_back("mass");
-    if (given && given->inertia_sigma.value_or(0) > 0) answer.passed_over.emplace_back("inertia");
     plan_release(answer, release_of(answer.plan), how, options);
     answer.beyond_card = beyond(read, answer, pads, object, given);
   } else {

@@ -7,13 +7,15 @@ namespace unhand::contact {
 
 /// Torque factor c of a uniformly pressed disc [-].
 inline constexpr double kUniformDisc = 2.0 / 3.0;
+/// The largest friction coefficient that anything here accepts [-].
+inline constexpr double kMostMu = 10;
 
 /// Friction limits of n pads, each pressed by f_N [N]:
 ///   f_max = n μ f_N [N],   τ_max = c a n μ f_N [N m].
 /// c is the torque factor of the pressure: 2/3 uniform, 3π/16 Hertz, 1 thin ring. [LiuBillard2025] II-A.
 template <class S>
 struct Patch {
-  S mu{};                         ///< friction coefficient, [0, 10]
+  S mu{};                         ///< friction coefficient, [0, kMostMu]
   S radius{};                     ///< a, (0, 1] m
   S torque_factor{kUniformDisc};  ///< c, (0, 1]
   int pads{2};                    ///< n >= 1

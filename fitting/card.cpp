@@ -27,7 +27,7 @@ struct BaseParameter {
   double low, high;
   bool of_pads;  ///< of models that follow the pads; otherwise of gripper_delay
 };
-constexpr BaseParameter kBase[] = {{"mu", "-", 0, 10, true},
+constexpr BaseParameter kBase[] = {{"mu", "-", 0, contact::kMostMu, true},
                                    {"length", "m", 1e-9, contact::kUniformDisc, true},
                                    {"pads", "-", 1, 1000, true},
                                    {"reference_force", "N", 1e-9, 1e6, true},

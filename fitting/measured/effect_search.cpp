@@ -34,6 +34,19 @@ constexpr double kMisfit = 1.2, kBetter = 0.9;
 constexpr double kFarOff = 4;
 /// A fit gains what the footprint promises, within this factor.
 constexpr double kPromised = 3;
+/// Groups of each object that are asked whether one effect makes room for another: one would show it, the
+/// others are for one that lies still.
+constexpr int kAsked = 3;
+
+/// The fit with no more groups used than tell what acts at all.
+GroupedFit asked_of_few(const GroupedProblem& problem, GroupedFit fit) {
+  std::map<std::string, int> asked;  // by object
+  for (std::size_t i = 0; i < fit.groups.size(); ++i) {
+    GroupFit& group = fit.groups[i];
+    group.used = group.used && group.solved && ++asked[problem.groups()[i].object] <= kAsked;
+  }
+  return fit;
+}
 
 double left(const GroupedFit& fit) {
   return fit.samples > 0 ? fit.chi2 / static_cast<double>(fit.samples) : 0;
@@ -132,6 +145,7 @@ class Search {
     for (const Rival& rival : rivals) {
       if (!(left(out_.final_test) > kMisfit)) return;
       if (static_cast<int>(rival.answer.effects.size()) >= options_.most_effects) continue;
+      if (!rival.opens.empty() && is_accepted(rival.answer.effects.back().id)) continue;  // asked since then
       EffectSearch first = std::exchange(out_, rival.answer);
       auto shown_from = std::exchange(shown_from_, rival.shown_from);
       const bool stands = rival.opens.empty() ? climbed_from_one() : opened(rival);
@@ -393,16 +407,21 @@ class Search {
     return out;
   }
 
-  /// The ids of those of `silent` that a channel shows once the trial's effect is there.
+  /// The ids of those of `silent` that a channel shows once the trial's effect is there. Few groups tell:
+  /// nothing acts through most effects, and the derivatives by what is silent are then zero in all groups.
   std::vector<std::string> shown_beside(const EffectTrial& trial,
                                         const std::vector<dynamics::Effect>& silent) const {
     std::vector<std::string> out;
     if (silent.empty()) return out;
-    const auto f = grouped_footprints(problem_, trial.fit, silent, options_.fit);
+    const auto f = grouped_footprints(problem_, asked_of_few(problem_, trial.fit), silent, options_.fit);
     const auto still = silent_ids(f.total);
     for (const auto& effect : silent)
       if (std::find(still.begin(), still.end(), effect.id) == still.end()) out.push_back(effect.id);
     return out;
+  }
+
+  bool is_accepted(const std::string& id) const {
+    return std::any_of(out_.effects.begin(), out_.effects.end(), [&](const auto& e) { return e.id == id; });
   }
 
   /// From the answer of a rival on: one that acts through its last effect, whether held-out groups confirm

@@ -140,9 +140,13 @@ void add_opening(const datasets::ModelCard& card, const std::string& file, const
   add("shape", "-", design.shape, 0);
 }
 
+/// Whether the inertia is that of a uniform shape.
+bool is_shaped(const datasets::Sku& sku) {
+  return sku.shape && sku.dims && sku.inertia &&
+         *sku.inertia == datasets::shape_inertia(*sku.shape, sku.mass, *sku.dims);
+}
+
 void add_object(const datasets::Sku& sku, const AssumedTolerances& assumed, Collector& collect) {
-  const bool shaped = sku.shape && sku.dims && sku.inertia &&
-                      *sku.inertia == datasets::shape_inertia(*sku.shape, sku.mass, *sku.dims);
   const auto source = [](bool told) { return told ? InputSource::sku : InputSource::assumed; };
   const std::size_t mass = collect.value("sensor.mass.ratio", 1),
                     inertia = collect.value("sensor.inertia.ratio", 1),
@@ -150,17 +154,17 @@ void add_object(const datasets::Sku& sku, const AssumedTolerances& assumed, Coll
   UncertainInput weight{"mass",
                         "kg",
                         sku.mass,
-                        sku.mass_sigma.value_or(assumed.mass * sku.mass),
+                        mass_sigma_of(sku, assumed),
                         source(sku.mass_sigma.has_value()),
                         "weigh the object",
                         {{mass, 1 / sku.mass}}};
-  if (shaped) weight.moves.push_back({inertia, 1 / sku.mass});  // I = m k²
+  if (is_shaped(sku)) weight.moves.push_back({inertia, 1 / sku.mass});  // I = m k²
   collect.input(std::move(weight));
   const double I = sku.inertia.value_or(0);
   collect.input({"inertia",
                  "kg m^2",
                  I,
-                 sku.inertia_sigma.value_or((shaped ? assumed.shape : assumed.inertia) * I),
+                 inertia_sigma_of(sku, assumed),
                  source(sku.inertia_sigma.has_value()),
                  "time the object's swing as a pendulum: its inertia",
                  {{inertia, 1 / I}}});
@@ -174,6 +178,15 @@ void add_object(const datasets::Sku& sku, const AssumedTolerances& assumed, Coll
 }
 
 }  // namespace
+
+double mass_sigma_of(const datasets::Sku& sku, const AssumedTolerances& assumed) {
+  return sku.mass_sigma.value_or(assumed.mass * sku.mass);
+}
+
+double inertia_sigma_of(const datasets::Sku& sku, const AssumedTolerances& assumed) {
+  return sku.inertia_sigma.value_or((is_shaped(sku) ? assumed.shape : assumed.inertia) *
+                                    sku.inertia.value_or(0));
+}
 
 const char* to_string(InputSource source) {
   switch (source) {

@@ -39,13 +39,14 @@ double sensor_sigma(const CampaignThrow& thrown, experiment::Channel channel) {
 }  // namespace
 
 std::optional<MeasuredVerdict> measured_verdict(const datasets::Sku& sku, const datasets::ModelCard& card,
-                                                const std::string& card_file, const SkuRequest& request) {
+                                                const std::string& card_file, const SkuRequest& request,
+                                                bool held_out) {
   datasets::ThrowLog log = *request.log;
   std::erase_if(log.throws, [&](const datasets::Throw& one) {
     return (one.object != sku.name && log.objects.at(one.object).sku != sku.name) || !one.landing;
   });
   MeasuredVerdict out;
-  out.held_out = card.log.checksum && checksum_of(request.log_file) == card.log.checksum;
+  out.held_out = held_out;
   if (out.held_out)
     std::erase_if(log.throws, [](const datasets::Throw& one) { return one.split == datasets::Split::train; });
   if (log.throws.empty()) return {};

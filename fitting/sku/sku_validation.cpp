@@ -135,10 +135,13 @@ SkuValidation validate_sku(const datasets::Sku& sku, const datasets::ModelCard& 
     out.gains = gains_of(motion.inputs, J, request.tolerance);
     monte_carlo(motion, J, request, out);
   }
-  if (request.log != nullptr && card.log.checksum && checksum_of(request.log_file) == card.log.checksum)
-    out.notes.push_back(
-        "the log is the card's own: its train throws, which the card was fitted to, do not count");
-  if (request.log != nullptr) out.measured = measured_verdict(sku, card, card_file, request);
+  if (request.log != nullptr) {
+    const bool own = card.log.checksum && checksum_of(request.log_file) == card.log.checksum;
+    if (own)
+      out.notes.push_back(
+          "the log is the card's own: its train throws, which the card was fitted to, do not count");
+    out.measured = measured_verdict(sku, card, card_file, request, own);
+  }
   decide(sku, card, request, out);
   return out;
 }

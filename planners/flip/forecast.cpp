@@ -103,6 +103,57 @@ std::vector<std::optional<FlipPose>> declared_landings(const HandLibrary& librar
   return out;
 }
 
+double likeness(const std::array<double, 3>& a, const std::array<double, 3>& b) {
+  constexpr double reach = 0.6;
+  double d = 0;
+  for (std::size_t i = 0; i < 3; ++i) d += (a[i] - b[i]) * (a[i] - b[i]);
+  return 0.5 + 0.5 * std::exp(-0.5 * d / (reach * reach));
+}
+
+namespace {
+
+/// The correlation of all components' discrepancies, six rows per datum.
+Eigen::MatrixXd correlations(const CommandRange& range, std::span<const FlipDatum> data) {
+  const auto n = static_cast<Eigen::Index>(data.size());
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(6 * n, 6 * n);
+  for (Eigen::Index a = 0; a < n; ++a)
+    for (Eigen::Index b = 0; b < n; ++b)
+      out.block<6, 6>(6 * a, 6 * b)
+          .diagonal()
+          .setConstant(likeness(range.fractions(data[static_cast<std::size_t>(a)].command),
+                                range.fractions(data[static_cast<std::size_t>(b)].command)));
+  return out;
+}
+
+/// Covariance, degrees of freedom and discrepancy from the Jacobian and the residuals, both with the prior's
+/// rows last; parameters in the prior's σ.
+void judge(const Eigen::MatrixXd& J, const Eigen::VectorXd& residual, const Eigen::MatrixXd& K,
+           ReleaseFit& out) {
+  using dynamics::congruent, dynamics::gram, dynamics::product;
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  const Eigen::Index n = K.rows();
+  const Eigen::MatrixXd D = J.topRows(n), inverse = dynamics::definite_inverse(gram(J)),
+                        from_prior = product(inverse, inverse);
+  out.covariance = from_prior;
+  out.degrees_of_freedom.fill(kInfinite);
+  if (n == 0) return;
+  const Eigen::MatrixXd rest = Eigen::MatrixXd::Identity(n, n) - congruent(D, inverse),
+                        MK = product(gram(rest), K);
+  const double trace = MK.trace();
+  if (!(trace > 0)) return;
+  const double square = product(MK, MK).trace(), freedom = trace * trace / square,
+               s2 = residual.head(n).squaredNorm() / trace;
+  out.discrepancy = std::sqrt(s2);
+  const Eigen::MatrixXd from_data = s2 * congruent(product(inverse, D.transpose()), K);
+  out.covariance += from_data;
+  for (int k = 0; k < kFitted; ++k)
+    if (from_data(k, k) > 0)
+      out.degrees_of_freedom[static_cast<std::size_t>(k)] =
+          std::max(1.0, freedom * std::pow(out.covariance(k, k) / from_data(k, k), 2));
+}
+
+}  // namespace
+
 ReleaseFit fit_release(const HandLibrary& library, const ReleaseCard& prior,
                        std::span<const FlipDatum> data) {
   const Vector4 sigma{std::max(0.02, prior.mu.sigma / prior.mu.value), 0.15,
@@ -125,28 +176,29 @@ ReleaseFit fit_release(const HandLibrary& library, const ReleaseCard& prior,
     return out;
   };
   Vector4 p = Vector4::Zero();
-  ReleaseFit out{prior, 0.15 * prior.length, 0, 0, 0};
-  auto r = residuals(p);
-  if (!r) return out;
-  out.cost_before = out.cost_after = r->squaredNorm();
-  Eigen::MatrixXd information = Eigen::MatrixXd::Identity(kFitted, kFitted);
-  double damping = 1e-3;
-  for (; out.iterations < 12; ++out.iterations) {
+  const auto slopes = [&](const Vector4& at) -> std::optional<Eigen::MatrixXd> {
     Eigen::MatrixXd J(rows, kFitted);
     constexpr double step =
         0.05;  // of a σ: the release's events move smoothly, its integration errors do not
-    bool solved = true;
-    for (int k = 0; k < kFitted && solved; ++k) {
-      Vector4 up = p, down = p;
+    for (int k = 0; k < kFitted; ++k) {
+      Vector4 up = at, down = at;
       up[k] += step;
       down[k] -= step;
       const auto a = residuals(up), b = residuals(down);
-      solved = a && b;
-      if (solved) J.col(k) = (*a - *b) / (2 * step);
+      if (!a || !b) return {};
+      J.col(k) = (*a - *b) / (2 * step);
     }
-    if (!solved) break;
-    information = dynamics::gram(J);
-    const Eigen::VectorXd gradient = dynamics::inner_products(J, *r);
+    return J;
+  };
+  ReleaseFit out;
+  auto r = residuals(p);
+  out.cost_before = out.cost_after = r ? r->squaredNorm() : 0;
+  double damping = 1e-3;
+  for (; r && out.iterations < 12; ++out.iterations) {
+    const auto J = slopes(p);
+    if (!J) break;
+    const Eigen::MatrixXd information = dynamics::gram(*J);
+    const Eigen::VectorXd gradient = dynamics::inner_products(*J, *r);
     double cost = out.cost_after;
     for (int attempt = 0; attempt < 6 && !(cost < out.cost_after); ++attempt) {
       Eigen::MatrixXd A = information;
@@ -166,28 +218,60 @@ ReleaseFit fit_release(const HandLibrary& library, const ReleaseCard& prior,
     out.cost_after = cost;
     if (enough) break;
   }
+  // Where the release has no slopes at the answer, nothing was learned that could be told.
+  const auto J = r ? slopes(p) : std::nullopt;
+  if (J)
+    judge(*J, *r, correlations(library.robot().motion.range, data), out);
+  else
+    judge(Eigen::MatrixXd::Identity(kFitted, kFitted), p, Eigen::MatrixXd(0, 0), out);
   out.card = moved(prior, p, sigma);
-  const Eigen::MatrixXd covariance = dynamics::definite_inverse(information);
-  out.card.mu.sigma = out.card.mu.value * sigma[0] * std::sqrt(covariance(0, 0));
-  out.length_sigma = out.card.length * sigma[1] * std::sqrt(covariance(1, 1));
-  out.card.dead_time.sigma = sigma[2] * std::sqrt(covariance(2, 2));
-  out.card.opening_time.sigma = sigma[3] * std::sqrt(covariance(3, 3));
+  const Vector4 unit{out.card.mu.value * sigma[0], out.card.length * sigma[1], sigma[2], sigma[3]};
+  out.covariance = (unit.asDiagonal() * out.covariance * unit.asDiagonal()).eval();
+  for (int k = 0; k < kFitted; ++k)
+    *std::array{&out.card.mu.sigma, &out.card.length_sigma, &out.card.dead_time.sigma,
+                &out.card.opening_time.sigma}[static_cast<std::size_t>(k)] = std::sqrt(out.covariance(k, k));
   return out;
 }
 
-datasets::ModelCard model_card_of(const ReleaseFit& fit, const std::string& source) {
+datasets::ModelCard model_card_of(const ReleaseFit& fit, const HandLibrary& library,
+                                  std::span<const FlipDatum> data, const std::string& source) {
   const ReleaseCard& c = fit.card;
   datasets::ModelCard out;
   out.model = c.model;
-  out.parameters["mu"] = {c.mu.value, c.mu.sigma, "-"};
-  out.parameters["length"] = {c.length, fit.length_sigma, "m"};
+  auto& covariance = out.covariance.emplace();
+  const auto learned = [&](const char* name, double value, double sigma, const char* unit) {
+    auto& one = out.parameters[name] = {value, sigma, unit};
+    if (const double freedom = fit.degrees_of_freedom[covariance.names.size()]; std::isfinite(freedom))
+      one.degrees_of_freedom = freedom;
+    covariance.names.emplace_back(name);
+  };
+  learned("mu", c.mu.value, c.mu.sigma, "-");
+  learned("length", c.length, c.length_sigma, "m");
+  learned("dead_time", c.dead_time.value, c.dead_time.sigma, "s");
+  learned("opening_time", c.opening_time.value, c.opening_time.sigma, "s");
+  for (int i = 0; i < kFitted; ++i)
+    for (int j = 0; j < kFitted; ++j) covariance.matrix.push_back(fit.covariance(i, j));
   for (const auto& [own, value] : contact::given_law_parameters(c.model, c.law_values))
     out.parameters[own.name] = {value, {}, own.unit};
   out.parameters["pads"] = {static_cast<double>(c.pads), {}, "-"};
   out.parameters["grip_force"] = {c.grip_force, {}, "N"};
-  out.parameters["dead_time"] = {c.dead_time.value, c.dead_time.sigma, "s"};
-  out.parameters["opening_time"] = {c.opening_time.value, c.opening_time.sigma, "s"};
   out.parameters["shape"] = {c.shape, {}, "-"};
+  const ThrowSpread& spread = library.robot().throws;
+  out.own_spreads = {{"mu_deviation", {std::hypot(spread.mu, spread.grip_force), "-"}},
+                     {"dead_time_deviation", {std::hypot(spread.dead_time, spread.opening_time), "s"}},
+                     {"grasp_offset", {spread.grasp_offset, "m"}},
+                     {"grasp_angle", {spread.grasp_angle, "rad"}}};
+  const auto tried = [&](const char* name, double value, const char* unit) {
+    auto& range = out.valid_range.try_emplace(name, datasets::CardRange{value, value, unit}).first->second;
+    range.low = std::min(range.low, value);
+    range.high = std::max(range.high, value);
+  };
+  tried("mass", library.bar().mass, "kg");
+  tried("com_offset", library.bar().com_offset, "m");
+  for (const FlipDatum& one : data) {
+    tried("detach_speed", std::hypot(one.detach[3], one.detach[4]), "m/s");
+    tried("detach_omega", one.detach[5], "rad/s");
+  }
   out.log.file = source;
   out.log.title = "support throws of a simulated robot";
   return out;

@@ -2,6 +2,7 @@
 // pads. The physics of model 4.
 #pragma once
 
+#include <Eigen/Core>
 #include <map>
 #include <memory>
 #include <vector>
@@ -59,19 +60,35 @@ std::vector<std::optional<FlipPose>> declared_landings(const HandLibrary& librar
 /// have, 1 σ of x, z [m], θ [rad] and their rates [m/s, m/s, rad/s].
 inline constexpr DetachVector kDiscrepancy{0.01, 0.01, 0.15, 0.05, 0.05, 0.6};
 
+/// How alike such differences are at two commands u, in fractions of their range, as a correlation:
+/// ½ + ½ exp(−|u − u'|²/(2 ℓ²)), ℓ = 0.6.
+double likeness(const std::array<double, 3>& a, const std::array<double, 3>& b);
+
 /// The card that explains throws best.
 struct ReleaseFit {
-  ReleaseCard card;                    ///< σ: posterior, of the parameters that are Uncertain
-  double length_sigma{};               ///< of card.length [m]
+  ReleaseCard card;                    ///< σ: posterior, of mu, length, dead time and opening time
   int iterations{};                    ///< of Gauss-Newton
   double cost_before{}, cost_after{};  ///< sum of squares in σ, prior included
+  /// Of these four, in their order and units.
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+  /// Of their σ, as far as it comes from the residuals; infinite where all of it is the prior's.
+  std::array<double, 4> degrees_of_freedom{};
+  double discrepancy{};  ///< s: what differs for reasons that the card does not have, in kDiscrepancy [-]
 };
 /// The card that explains throws of the library's bar best: mu, length, dead time and opening time by
 /// Gauss-Newton with step control on the mean detach states, weighted with kDiscrepancy, and the prior.
 /// Length's prior: 15 %. (grip_force enters only as mu grip_force and is kept.)
+///
+/// The covariance is that of this estimate if residuals are correlated from command to command as likeness()
+/// says, C = s² K, and not independent as the weights take them:
+///   V = A⁻¹ (Jᵀ C J + P) A⁻¹,   A = Jᵀ J + P, P the prior's information,   s² = rᵀr / tr(M K),
+/// M = (1 − H)ᵀ(1 − H), H = J A⁻¹ Jᵀ. The degrees of freedom of s² are tr(M K)²/tr(M K M K).
 ReleaseFit fit_release(const HandLibrary& library, const ReleaseCard& prior, std::span<const FlipDatum> data);
 
-/// The fit as a model card, for `unhand plan throw --card` and as the prior of another session.
-datasets::ModelCard model_card_of(const ReleaseFit& fit, const std::string& source);
+/// The fit as a model card, for `unhand plan throw --card`, `unhand validate-sku --card` and as the prior of
+/// another session. What scatters from throw to throw is the robot's declaration; the valid range is that of
+/// the data.
+datasets::ModelCard model_card_of(const ReleaseFit& fit, const HandLibrary& library,
+                                  std::span<const FlipDatum> data, const std::string& source);
 
 }  // namespace unhand::planners::flip

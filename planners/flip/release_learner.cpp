@@ -17,11 +17,8 @@ constexpr DetachVector kScatterDetach{0.003, 0.003, 0.05, 0.04, 0.04, 0.5};
 constexpr int kScatterFreedom = 4;
 
 double kernel(const LeftOver& a, const std::array<double, 3>& at, const Bar& bar) {
-  constexpr double reach = 0.6, other_bar = 0.8;
-  double d = 0;
-  for (std::size_t i = 0; i < 3; ++i) d += (a.at[i] - at[i]) * (a.at[i] - at[i]);
-  const double same = a.bar == bar ? 1.0 : other_bar;
-  return same * (0.5 + 0.5 * std::exp(-0.5 * d / (reach * reach)));
+  constexpr double other_bar = 0.8;
+  return (a.bar == bar ? 1.0 : other_bar) * likeness(a.at, at);
 }
 
 /// Probability that a normal variable lies within ± half of `middle`.

@@ -33,8 +33,8 @@ struct ThrowScatter {
 ThrowScatter scatter_of(std::span<const FlipTrial> trials, double com_offset);
 
 /// A Gaussian process for each component of what is left over:
-///   cov = σ_j² (½ + ½ exp(−|u − u'|²/(2 ℓ²))) ρ^[other bar]
-/// u in fractions of the range, ℓ = 0.6, ρ = 0.8; σ_j is the multiple of kDiscrepancy, from 1/8 to 4 by
+///   cov = σ_j² likeness(u, u') ρ^[other bar]
+/// u in fractions of the range, ρ = 0.8; σ_j is the multiple of kDiscrepancy, from 1/8 to 4 by
 /// factors of two, with the largest evidence.
 class LeftOverField {
  public:

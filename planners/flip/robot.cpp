@@ -9,6 +9,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "contact/patch.hpp"
 #include "contact/registry.hpp"
 #include "datasets/toml_keys.hpp"
 #include "planners/arm/chain_file.hpp"
@@ -95,7 +96,7 @@ Pads pads_of(Section keys) {
   const auto known = contact::contact_model_names();
   if (!contact::follows_pads(out.law) || std::find(known.begin(), known.end(), out.law) == known.end())
     keys.fail("law", fmt::format("'{}' is no contact model that says how the pads let go", out.law));
-  out.mu = keys.number("mu", {0, 10, true, ""});
+  out.mu = keys.number("mu", {0, contact::kMostMu, true, ""});
   out.length = keys.number("length_m", {0, 0.5, true, "m"});
   const double pads = keys.number("pads", {1, 8, false, ""});
   if (pads != std::floor(pads)) keys.fail("pads", fmt::format("{} is not a whole number", pads));

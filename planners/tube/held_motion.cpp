@@ -38,14 +38,15 @@ class StandingScene final : public contact::SceneSource {
   const Scene<double>& scene_;
 };
 
-std::unique_ptr<contact::ContactModel> law_of(const ReleaseCard& card, double mu) {
+std::unique_ptr<contact::ContactModel> law_of(const ReleaseCard& card, const Draw& draw) {
   contact::ContactParameters<double> pads;
-  pads.patch = contact::Patch<double>::of_length(mu, card.length, card.pads);
+  pads.patch = contact::Patch<double>::of_length(draw[kMu], draw[kLength], card.pads);
   pads.law_values = card.law_values;
   return contact::make_contact_model(card.model, pads);
 }
 
-bool sticks(const contact::ContactModel& law, const Scene<double>& scene, const Draw& draw) {
+bool sticks(const contact::ContactModel& law, Scene<double> scene, const Draw& draw) {
+  scene.body = {draw[kMass], draw[kInertia]};
   const contact::Relative<double> held{{draw[kComOffset], 0}, draw[kGraspAngle], {}, 0};
   return law.membership(-1, {0, 1}, StandingScene(scene), 0.0, held).mode == 0;
 }
@@ -78,14 +79,14 @@ HeldMotion::HeldMotion(const ReleaseThrow& problem, const JointTrajectory& motio
 }
 
 bool HeldMotion::holds(const Draw& draw) const {
-  const auto law = law_of(problem_.card, draw[kMu]);
+  const auto law = law_of(problem_.card, draw);
   return std::all_of(scenes_.rbegin(), scenes_.rend(),
                      [&](const Scene<double>& scene) { return sticks(*law, scene, draw); });
 }
 
 std::optional<double> HeldMotion::needed_force() const {
   const Draw nominal = nominal_draw(problem_);
-  const auto law = law_of(problem_.card, nominal[kMu]);
+  const auto law = law_of(problem_.card, nominal);
   double needed = 0;
   for (Scene<double> scene : scenes_) {
     const auto enough = [&](double force) {

@@ -20,9 +20,9 @@ class HeldMotion {
   /// validate() does.
   HeldMotion(const ReleaseThrow& problem, const JointTrajectory& motion, double step = 2e-3);
 
-  /// Whether the grip of the card holds the object all the way, with the draw's friction and grasp.
+  /// Whether the grip of the card holds the object all the way, with the draw's pads, object and grasp.
   bool holds(const Draw& draw) const;
-  /// The least force of one pad that holds it with the nominal friction and grasp, to 0.1 % [N]; nothing if
+  /// The least force of one pad that holds it with the nominal draw, to 0.1 % [N]; nothing if
   /// 10 kN do not.
   std::optional<double> needed_force() const;
 

@@ -1,6 +1,7 @@
 #include "planners/tube/nominal_throw.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -51,55 +52,82 @@ class Search {
     if (options.face_target) held_[0] = true;
   }
 
-  /// The best throw from a configuration, if there is one.
-  std::optional<NominalThrow> best_at(const JointVector<double>& q) const {
+  /// The best throw from a configuration, if there is one; sets `barred` where one flies through the column.
+  std::optional<NominalThrow> best_at(const JointVector<double>& q, bool& barred) const {
     const auto frames = frames_of(chain_, q);
     const Vector3d p = frames.tip.p, e = box_.middle - p;
     const double distance = e.head<2>().norm();
     if (p.z() < options_.lowest_tip || p.head<2>().norm() < options_.nearest_tip ||
         distance < options_.shortest_throw)
       return {};
-    const Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, kMaxJoints> J =
-        jacobian(chain_, frames).topRows<3>();
+    const TipJacobian J = jacobian(chain_, frames).topRows<3>();
     Eigen::Matrix3d A = Eigen::Matrix3d::Zero();  // J W Jᵀ
     for (int i = 0; i < chain_.size(); ++i)
       if (!held_[i]) A += weight(i) * J.col(i) * J.col(i).transpose();
     A += 1e-9 * A.trace() * Eigen::Matrix3d::Identity();  // a planar arm moves in its plane only
     const Eigen::Matrix3d inverse = A.inverse();
     const Vector2d along = e.head<2>() / distance;
+    const double height = p.z() - box_.middle.z();
     std::optional<NominalThrow> best;
     for (double degrees = 5; degrees < 70; degrees += 7.5) {
-      const double elevation = degrees * std::numbers::pi / 180;
-      const auto speed = speed_for(distance, p.z() - box_.middle.z(), elevation);
+      const double elevation = degrees * std::numbers::pi / 180, beaten = best ? best->margin : 0;
+      auto speed = least_speed(distance, height, elevation);
       if (!speed) continue;
-      Vector3d v;
-      v << *speed * std::cos(elevation) * along, *speed * std::sin(elevation);
-      const Vector3d scaled = inverse * v;
-      JointVector<double> qd = JointVector<double>::Zero(chain_.size());
-      double use = 0;
-      for (int i = 0; i < chain_.size(); ++i)
-        if (!held_[i]) {
-          qd[i] = weight(i) * J.col(i).dot(scaled);
-          use = std::max(use, std::abs(qd[i]) / chain_.joints[i].limits.velocity);
-        }
-      const double speed_margin = 1 - options_.speed_reserve - use;
-      if (!(speed_margin > 0) || (best && best->margin >= speed_margin)) continue;
-      const double position_margin = room(q, qd);
-      if (!(position_margin > 0) || (best && best->margin >= position_margin)) continue;
-      if ((J * qd - v).norm() > 1e-6) continue;
+      const auto swing_at = [&](double fast) {
+        Vector3d v;
+        v << fast * std::cos(elevation) * along, fast * std::sin(elevation);
+        return swing(q, J, inverse, v, beaten);
+      };
+      auto swung = swing_at(*speed);
+      if (!swung) continue;  // the faster, the less room
+      if (options_.medium.drag_k > 0) {
+        const double most = *speed * (1 - options_.speed_reserve - beaten) /
+                            (1 - options_.speed_reserve - swung->speed_margin);
+        speed = speed_with_drag(distance, height, elevation, *speed, most);
+        if (!speed || !(swung = swing_at(*speed))) continue;
+      }
       flight::LandingSet landing = options_.landing;
       landing.half_length = box_.half_length(along);
-      const double level = flight::tube_level({-distance, -e.z(), *speed * std::cos(elevation), v.z()},
+      const double level = flight::tube_level({-distance, -e.z(), *speed * std::cos(elevation), swung->v.z()},
                                               landing, options_.medium);
-      const double margin = std::min({speed_margin, position_margin, -level});
-      if (!(margin > 0) || (best && best->margin >= margin)) continue;
-      if (!options_.clear_column || !through_column(frames, along, v))
-        best = NominalThrow{{q, qd}, margin, speed_margin, position_margin, -level, *speed, elevation};
+      const double margin = std::min({swung->speed_margin, swung->position_margin, -level});
+      if (!(margin > beaten)) continue;
+      if (options_.clear_column && through_column(frames, along, swung->v))
+        barred = true;
+      else
+        best = NominalThrow{{q, swung->qd}, margin,   swung->speed_margin, swung->position_margin, -level,
+                            *speed,         elevation};
     }
     return best;
   }
 
  private:
+  using TipJacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, kMaxJoints>;
+
+  /// What a velocity of the tip asks of the joints.
+  struct Swing {
+    Vector3d v;
+    JointVector<double> qd;
+    double speed_margin, position_margin;
+  };
+  /// Nothing where the joints cannot, or with no more margin than what is `beaten` by then.
+  std::optional<Swing> swing(const JointVector<double>& q, const TipJacobian& J,
+                             const Eigen::Matrix3d& inverse, const Vector3d& v, double beaten) const {
+    const Vector3d scaled = inverse * v;
+    Swing out{v, JointVector<double>::Zero(chain_.size()), 0, 0};
+    double use = 0;
+    for (int i = 0; i < chain_.size(); ++i)
+      if (!held_[i]) {
+        out.qd[i] = weight(i) * J.col(i).dot(scaled);
+        use = std::max(use, std::abs(out.qd[i]) / chain_.joints[i].limits.velocity);
+      }
+    out.speed_margin = 1 - options_.speed_reserve - use;
+    if (!(out.speed_margin > beaten)) return {};
+    out.position_margin = room(q, out.qd);
+    if (!(out.position_margin > beaten) || (J * out.qd - v).norm() > 1e-6) return {};
+    return out;
+  }
+
   double weight(int i) const {
     const double most = chain_.joints[i].limits.velocity;
     return most * most;
@@ -132,19 +160,39 @@ class Search {
     });
   }
 
-  /// The speed that lands `distance` ahead and `height` below.
-  std::optional<double> speed_for(double distance, double height, double elevation) const {
+  /// The speed that lands `distance` ahead and `height` below; with drag, one that lands shorter. There, of
+  /// the level speed u = v cos ε e^(−k s) no more is left than at the path's length s = x, which makes the
+  /// fall
+  ///   x tan ε + h = g ∫₀ˣ (x − ξ)/u(ξ)² dξ  >=  g/(v cos ε)² (e^(2 k x) − 1 − 2 k x)/(4 k²).
+  std::optional<double> least_speed(double distance, double height, double elevation) const {
     const double c = std::cos(elevation), s = std::sin(elevation), fall = distance * s / c + height;
     if (!(fall > 0)) return {};
-    double speed = distance / c * std::sqrt(options_.medium.gravity / (2 * fall));
-    if (options_.medium.drag_k == 0) return speed;
-    for (int i = 0; i < 20; ++i) {  // Newton
-      const auto flow = flight::flow_map({-distance, height, speed * c, speed * s}, options_.medium);
-      if (!flow) return {};
-      const double step = flow->landing / (flow->gradient[2] * c + flow->gradient[3] * s);
-      speed -= step;
-      if (!(speed > 0)) return {};
-      if (std::abs(step) < 1e-10 * speed) return speed;
+    const double speed = distance / c * std::sqrt(options_.medium.gravity / (2 * fall)),
+                 x = 2 * options_.medium.drag_k * distance;
+    if (x < 1e-3) return speed;  // the rest is rounding
+    return speed * std::sqrt(2 * (std::expm1(x) - x)) / x;
+  }
+
+  /// The speed in [least, most] with drag: Newton's steps, halvings of what is left where they leave it.
+  std::optional<double> speed_with_drag(double distance, double height, double elevation, double least,
+                                        double most) const {
+    const double c = std::cos(elevation), s = std::sin(elevation);
+    const auto landing = [&](double speed) {
+      return flight::landing_of<double>({-distance, height, speed * c, speed * s}, options_.medium);
+    };
+    if (!std::isfinite(most)) return {};
+    if (const auto fastest = landing(most); !fastest || fastest->r < 0) return {};
+    double speed = least;
+    for (int i = 0; i < 40; ++i) {
+      double next = 0;
+      if (const auto flow = flight::flow_map({-distance, height, speed * c, speed * s}, options_.medium)) {
+        (flow->landing < 0 ? least : most) = speed;
+        next = speed - flow->landing / (flow->gradient[2] * c + flow->gradient[3] * s);
+        if (std::abs(next - speed) < 1e-10 * speed) return next;
+      } else {
+        least = speed;  // it does not rise to the box
+      }
+      speed = next > least && next < most ? next : 0.5 * (least + most);
     }
     return {};
   }
@@ -195,8 +243,8 @@ void make_planar(NominalOptions& options, const Chain& chain) {
   options.face_target = std::abs(chain.joints.front().origin.R(2, 2)) > 0.999;
 }
 
-std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box,
-                                      const NominalOptions& options) {
+std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box, const NominalOptions& options,
+                                      bool* through_column) {
   check(chain, box, options);
   const int n = chain.size();
   const Search search(chain, box, options);
@@ -207,6 +255,7 @@ std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box,
   };
   const EvenPoints points(n);
   std::vector<std::optional<NominalThrow>> at(static_cast<std::size_t>(options.samples));
+  std::atomic<bool> any_barred = false;
   dynamics::parallel_for(at.size(), options.threads, [&](std::size_t k) {
     JointVector<double> q(n);
     for (int i = 0; i < n; ++i) {
@@ -215,11 +264,14 @@ std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box,
       q[i] = lower + (0.05 + 0.9 * points.at(static_cast<int>(k), i)) * (upper - lower);
     }
     hold(q);
-    at[k] = search.best_at(q);
+    bool barred = false;
+    at[k] = search.best_at(q, barred);
+    if (barred) any_barred = true;
   });
   std::vector<NominalThrow> found;
   for (auto& one : at)
     if (one) found.push_back(std::move(*one));
+  if (through_column != nullptr) *through_column = found.empty() && any_barred;
   const auto better = [](const NominalThrow& a, const NominalThrow& b) { return a.margin > b.margin; };
   const auto kept = std::min(found.size(), static_cast<std::size_t>(options.candidates));
   std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(kept), found.end(), better);
@@ -232,7 +284,8 @@ std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box,
       for (int i = 0; i < n; ++i)
         q[i] = within(chain.joints[i].limits, q[i] + size * (2 * points.at(k + 7, i) - 1));
       hold(q);
-      const auto one = search.best_at(q);
+      bool ignored = false;
+      const auto one = search.best_at(q, ignored);
       if (one && one->margin > found[j].margin)
         found[j] = *one;
       else if (k % 6 == 5)

@@ -69,8 +69,9 @@ struct NominalThrow {
 /// flight) ends in the box's middle, and of all joint velocities with that tip velocity the one that is
 /// smallest against the limits, q̇ = W Jᵀ (J W Jᵀ)⁻¹ v with W = diag(q̇_max²). Sorted, best first; only margins
 /// > 0. The same options give the same throws. Throws std::invalid_argument for a box without area, a chain
-/// that is none or lacks limits, and as validate() does.
+/// that is none or lacks limits, and as validate() does. Where nothing comes back, `through_column` says
+/// whether clear_column alone left it out.
 std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box,
-                                      const NominalOptions& options = {});
+                                      const NominalOptions& options = {}, bool* through_column = nullptr);
 
 }  // namespace unhand::planners

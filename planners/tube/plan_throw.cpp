@@ -38,10 +38,12 @@ JointLimits share_of(JointLimits limits, const MotionOptions& options) {
 std::optional<std::vector<std::vector<JerkPiece>>> ramps(const Chain& chain, const JointVector<double>& v,
                                                          const JointVector<double>& a,
                                                          const MotionOptions& options) {
-  // What the window asks for may use the whole limit.
+  // What the window asks for may use the whole limit, to the rounding of who made use of it.
+  constexpr double kWhole = 1 + 1e-12;
   const auto limits = [&](int i) {
     JointLimits l = share_of(chain.joints[i].limits, options);
-    l.acceleration = std::max(l.acceleration, std::min(std::abs(a[i]), chain.joints[i].limits.acceleration));
+    l.acceleration =
+        std::max(l.acceleration, std::min(std::abs(a[i]), kWhole * chain.joints[i].limits.acceleration));
     return l;
   };
   double longest = 0;
@@ -163,19 +165,16 @@ PlanResult plan_throw(const Chain& chain, const TargetBox& box, const PlanOption
   require(options.landing_samples >= 2, "plan", "landing_samples", options.landing_samples, "[2, inf)");
   require(options.check_step > 0 && std::isfinite(options.check_step), "plan", "check_step",
           options.check_step, "(0, inf) s");
-  const auto throws = find_throws(chain, box, options.search);
+  bool through_column = false;
+  const auto throws = find_throws(chain, box, options.search, &through_column);
   out.throws = static_cast<int>(throws.size());
   out.outcome = PlanOutcome::no_throw;
   out.reason = "no configuration reaches the box within the joints' limits";
-  if (throws.empty() && options.search.clear_column) {
-    NominalOptions any = options.search;
-    any.clear_column = false;
-    if (!find_throws(chain, box, any).empty())
-      out.reason = fmt::format(
-          "every throw to the box flies through the arm's own column, within {:g} m of the base's axis and "
-          "below its joints there",
-          any.nearest_tip);
-  }
+  if (through_column)
+    out.reason = fmt::format(
+        "every throw to the box flies through the arm's own column, within {:g} m of the base's axis and "
+        "below its joints there",
+        options.search.nearest_tip);
   for (const NominalThrow& nominal : throws) {
     ++out.tried;
     const TubeProblem problem{chain, nominal.state, box.middle, options.search.window, options.search.medium};

@@ -8,6 +8,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "contact/patch.hpp"
 #include "contact/registry.hpp"
 #include "flight/fly.hpp"
 #include "planners/tube/held_motion.hpp"
@@ -32,6 +33,14 @@ const char* name_of(Unknown unknown) {
       return "com_offset";
     case kGraspAngle:
       return "grasp_angle";
+    case kLength:
+      return "length";
+    case kShape:
+      return "shape";
+    case kMass:
+      return "mass";
+    case kInertia:
+      return "inertia";
     case kUnknowns:
       break;
   }
@@ -62,7 +71,7 @@ class CardReader {
   CardReader(const datasets::ModelCard& card, const std::string& file, ReleaseCard& out)
       : card_(card), file_(file), out_(out) {}
 
-  void take(const char* name, const char* unit, double least, bool open, double& value,
+  void take(const char* name, const char* unit, double least, bool open, double most, double& value,
             double* sigma = nullptr) {
     known_.emplace_back(name);
     const auto found = card_.parameters.find(name);
@@ -71,7 +80,7 @@ class CardReader {
     const datasets::CardParameter& told = found->second;
     if (told.unit != unit)
       throw CardError(file_, path + "/unit", fmt::format("is '{}', not '{}'", told.unit, unit));
-    require(path + "/value", told.value, least, open);
+    require(path + "/value", told.value, least, open, most);
     value = told.value;
     auto& origin = out_.origins[name] = {NumberSource::parameter, NumberSource::assumed};
     if (sigma == nullptr && told.sigma.value_or(0) > 0) out_.passed_over.emplace_back(name);
@@ -83,11 +92,11 @@ class CardReader {
   /// The same, else from the valid range. `least_sigma` of what that tells.
   void take_or_range(const char* name, const char* unit, bool positive, double& value, double& sigma,
                      double least_share, double least_sigma) {
-    take(name, unit, 0, positive, value, &sigma);
+    take(name, unit, 0, positive, HUGE_VAL, value, &sigma);
     if (card_.parameters.contains(name)) return;
     const auto seen = datasets::middle_of_range(card_, file_, name, unit);
     if (!seen) return;
-    require(fmt::format("/valid_range/{}", name), seen->value, 0, positive);
+    require(fmt::format("/valid_range/{}", name), seen->value, 0, positive, HUGE_VAL);
     value = seen->value;
     sigma = std::max({*seen->sigma, least_share * seen->value, least_sigma});
     out_.origins[name] = {NumberSource::range, NumberSource::range};
@@ -133,10 +142,11 @@ class CardReader {
   }
 
  private:
-  void require(const std::string& path, double value, double least, bool open) const {
-    if (!std::isfinite(value) || value < least || (open && value == least))
+  void require(const std::string& path, double value, double least, bool open, double most) const {
+    if (!std::isfinite(value) || value < least || (open && value == least) || value > most)
       throw CardError(file_, path,
-                      fmt::format("is {}; accepted: finite, {} {}", value, open ? ">" : ">=", least));
+                      fmt::format("is {}; accepted: {}{}, {}{}", value, open ? '(' : '[', least, most,
+                                  std::isfinite(most) ? ']' : ')'));
   }
 
   const datasets::ModelCard& card_;
@@ -160,32 +170,28 @@ ReleaseCard release_card(const datasets::ModelCard& card, const std::string& fil
   out.law_values.clear();
   out.passed_over.clear();
   CardReader reader(card, file, out);
-  reader.take("mu", "-", 0, true, out.mu.value, &out.mu.sigma);
-  reader.take("length", "m", 0, true, out.length);
+  reader.take("mu", "-", 0, true, contact::kMostMu, out.mu.value, &out.mu.sigma);
+  reader.take("length", "m", 0, true, contact::kUniformDisc, out.length, &out.length_sigma);
   for (const auto& own : contact::law_parameters(card.model)) {
     if (!card.parameters.contains(own.name)) continue;
     double value = own.start;
-    reader.take(own.name.c_str(), own.unit.c_str(), own.low, false, value);
-    if (value > own.high)
-      throw CardError(file, fmt::format("/parameters/{}/value", own.name),
-                      fmt::format("is {}; accepted: {} to {}", value, own.low, own.high));
+    reader.take(own.name.c_str(), own.unit.c_str(), own.low, false, own.high, value);
     out.law_values[own.name] = value;
   }
   constexpr int kMostPads = 1000;
   double pads = out.pads;
-  reader.take("pads", "-", 0, true, pads);
+  reader.take("pads", "-", 0, true, HUGE_VAL, pads);
   if (pads != std::floor(pads) || pads > kMostPads)
     throw CardError(file, "/parameters/pads/value",
                     fmt::format("is {}; accepted: whole numbers from 1 to {}", pads, kMostPads));
   out.pads = static_cast<int>(pads);
-  double force_sigma = 0, of_shape = 0;
+  double force_sigma = 0;
   reader.take_or_range("grip_force", "N", true, out.grip_force, force_sigma, kLeastForceSigma, 0);
   reader.take_or_range("dead_time", "s", false, out.dead_time.value, out.dead_time.sigma, 0,
                        kLeastOpeningSigma);
   reader.take_or_range("opening_time", "s", true, out.opening_time.value, out.opening_time.sigma, 0,
                        kLeastOpeningSigma);
-  reader.take_or_range("shape", "-", true, out.shape, of_shape, 0, 0);
-  if (of_shape > 0) out.passed_over.emplace_back("shape");
+  reader.take_or_range("shape", "-", true, out.shape, out.shape_sigma, 0, 0);
   reader.pass_over("reference_force");  // of contact.soft_patch_radius, an effect
   reader.pass_over_spread("force_deviation");
   // Friction's limits know the product of mu and the force alone, of which a card without a measured force
@@ -207,9 +213,10 @@ ReleaseCard release_card(const datasets::ModelCard& card, const std::string& fil
 
 namespace {
 
-constexpr double kMostMu = 10;  // contact::Patch
 /// The most that a draw may be.
-double most_of(int unknown) { return unknown == kMu ? kMostMu : HUGE_VAL; }
+double most_of(int unknown) {
+  return unknown == kMu ? contact::kMostMu : unknown == kLength ? contact::kUniformDisc : HUGE_VAL;
+}
 /// The others may not be negative.
 bool has_sign(int unknown) { return unknown == kComOffset || unknown == kGraspAngle; }
 
@@ -219,7 +226,11 @@ std::array<Uncertain, kUnknowns> unknowns_of(const ReleaseThrow& p) {
           p.card.dead_time,
           p.card.opening_time,
           {com.value, std::hypot(com.sigma, p.card.grasp_offset)},
-          {p.object.angle, p.card.grasp_angle}};
+          {p.object.angle, p.card.grasp_angle},
+          {p.card.length, p.card.length_sigma},
+          {p.card.shape, p.card.shape_sigma},
+          {p.object.mass, p.object.mass_sigma},
+          {p.object.inertia, p.object.inertia_sigma}};
 }
 
 template <class S>
@@ -234,17 +245,17 @@ template <class S>
 std::optional<Thrown<S>> throw_once(const ReleaseThrow& p, const release::HandMotion& hand,
                                     const std::array<S, kUnknowns>& draw) {
   contact::ContactParameters<S> pads;
-  pads.patch = contact::Patch<S>::of_length(draw[kMu], S(p.card.length), p.card.pads);
+  pads.patch = contact::Patch<S>::of_length(draw[kMu], draw[kLength], p.card.pads);
   for (const auto& [name, value] : p.card.law_values) pads.law_values.emplace(name, S(value));
   const auto law = contact::make_contact_model(p.card.model, pads);
   const contact::ProfileNormalForce force(contact::OpeningProfile<S>{
-      0.0, S(p.card.grip_force), draw[kDeadTime], draw[kOpeningTime], S(p.card.shape)});
+      0.0, S(p.card.grip_force), draw[kDeadTime], draw[kOpeningTime], draw[kShape]});
   const dynamics::Vec2<S> gravity{S(0.0), S(-p.medium.gravity)};
   if (!(force.release_time() < hand.end())) return {};
   const auto let_go = release::simulate_release<S>({hand,
                                                     force,
                                                     *law,
-                                                    {S(p.object.mass), S(p.object.inertia)},
+                                                    {draw[kMass], draw[kInertia]},
                                                     gravity,
                                                     {draw[kComOffset], draw[kGraspAngle]},
                                                     hand.begin(),
@@ -308,15 +319,20 @@ std::optional<ReleaseLanding> rigid_landing(const ReleaseThrow& problem, double 
 std::optional<ReleaseSpread> release_spread(const ReleaseThrow& problem) {
   validate(problem);
   const auto unknowns = unknowns_of(problem);
-  std::array<Dual, kUnknowns> draw;
-  for (int k = 0; k < kUnknowns; ++k) draw[k] = independent(unknowns[k].value, k);
-  const auto thrown = throw_once<Dual>(problem, hand_of(problem), draw);
-  if (!thrown) return {};
+  const PlanarHand hand = hand_of(problem);
   ReleaseSpread out;
-  out.miss = thrown->miss.a;
-  for (int k = 0; k < kUnknowns; ++k) {
-    out.gradient[k] = thrown->miss.v[k];
-    out.spread = std::hypot(out.spread, out.gradient[k] * unknowns[k].sigma);
+  for (int first = 0; first < kUnknowns; first += dynamics::kDualSize) {
+    const int end = std::min<int>(kUnknowns, first + dynamics::kDualSize);
+    std::array<Dual, kUnknowns> draw;
+    for (int k = 0; k < kUnknowns; ++k)
+      draw[k] = k >= first && k < end ? independent(unknowns[k].value, k - first) : Dual(unknowns[k].value);
+    const auto thrown = throw_once<Dual>(problem, hand, draw);
+    if (!thrown) return {};
+    out.miss = thrown->miss.a;
+    for (int k = first; k < end; ++k) {
+      out.gradient[k] = thrown->miss.v[k - first];
+      out.spread = std::hypot(out.spread, out.gradient[k] * unknowns[k].sigma);
+    }
   }
   return out;
 }

@@ -48,6 +48,7 @@ struct ReleaseCard {
   double grasp_angle{};   ///< 1 σ of the object's angle in the hand, throw to throw [rad]
   std::map<std::string, NumberOrigin> origins{};  ///< by a number's name on cards; assumed if absent
   std::vector<std::string> passed_over{};         ///< names of numbers whose σ no unknown of the throw has
+  double length_sigma{}, shape_sigma{};           ///< 1 σ of `length` [m] and of `shape` [-]
 };
 
 /// The least that a gripper's numbers scatter where a card's valid range tells them, 1 σ.
@@ -69,6 +70,7 @@ struct HeldObject {
   double mass{0.246}, inertia{2.4e-3};  ///< [kg], about the centre of mass [kg m²]
   Uncertain com_offset{0.14, 0.004};    ///< pads to centre of mass [m]
   double angle{};  ///< of the object's x axis against the tip's z axis, in the plane [rad]
+  double mass_sigma{}, inertia_sigma{};  ///< 1 σ [kg, kg m²]
 };
 
 /// The uncertain numbers of one throw.
@@ -78,9 +80,13 @@ enum Unknown {
   kOpeningTime,  ///< of the gripper [s]
   kComOffset,    ///< of the object [m]
   kGraspAngle,   ///< of the object against the hand [rad]
+  kLength,       ///< L = τ_max/f_max of the pads [m]
+  kShape,        ///< p of the gripper's opening [-]
+  kMass,         ///< of the object [kg]
+  kInertia,      ///< of the object, about its centre of mass [kg m²]
   kUnknowns      ///< how many there are
 };
-/// A value of every unknown, in its own unit, by kMu … kGraspAngle.
+/// A value of every unknown, in its own unit, by kMu … kInertia.
 using Draw = std::array<double, kUnknowns>;
 /// The name that a card has for it: "dead_time".
 const char* name_of(Unknown);
@@ -129,8 +135,8 @@ std::optional<ReleaseSpread> release_spread(const ReleaseThrow& problem);
 
 class HeldMotion;
 
-/// Landings of `count` draws from normal distributions (cut off at zero where the number must be positive).
-/// An unknown without σ takes no draw.
+/// Landings of `count` draws from normal distributions (cut off at zero where the number must be positive),
+/// each unknown by itself. An unknown without σ takes no draw.
 struct Landings {
   std::vector<double> miss;  ///< of those that land [m]
   int lost{};                ///< slipping before the gripper opens, not free in time, or never down

@@ -3,6 +3,7 @@
 #include <tuple>
 #include <utility>
 
+#include "contact/patch.hpp"
 #include "planners/tube/nominal_throw.hpp"
 #include "planners/tube/release_throw.hpp"
 #include "planners/tube/require.hpp"
@@ -37,7 +38,8 @@ void validate(const ReleaseThrow& p) {
   for (const double x : p.target) require(std::isfinite(x), kOf, "target", x, "(-inf, inf) m");
   require(is_positive(p.hold), kOf, "hold", p.hold, "(0, inf) s");
   const ReleaseCard& c = p.card;
-  require(is_not_negative(c.mu.value), kOf, "mu", c.mu.value, "[0, inf)");
+  require(c.mu.value >= 0 && c.mu.value <= contact::kMostMu, kOf, "mu", c.mu.value,
+          fmt::format("[0, {}]", contact::kMostMu).c_str());
   require(is_positive(c.length), kOf, "length", c.length, "(0, inf) m");
   require(c.pads >= 1, kOf, "pads", c.pads, "[1, inf)");
   require(is_positive(c.grip_force), kOf, "grip_force", c.grip_force, "(0, inf) N");
@@ -53,6 +55,10 @@ void validate(const ReleaseThrow& p) {
                                     {"sigma of dead_time", c.dead_time.sigma},
                                     {"sigma of opening_time", c.opening_time.sigma},
                                     {"sigma of com_offset", o.com_offset.sigma},
+                                    {"sigma of length", c.length_sigma},
+                                    {"sigma of shape", c.shape_sigma},
+                                    {"sigma of mass", o.mass_sigma},
+                                    {"sigma of inertia", o.inertia_sigma},
                                     {"grasp_offset", c.grasp_offset},
                                     {"grasp_angle", c.grasp_angle}})
     require(is_not_negative(sigma), kOf, name, sigma, "[0, inf)");

@@ -141,7 +141,8 @@ TEST_F(Cli, PlansAThrowWithACard) {
                      0.5 * (range[name]["low"].get<double>() + range[name]["high"].get<double>()));
   }
   EXPECT_EQ(numbers["mu"]["from"], "card; sigma: assumed and card");
-  EXPECT_EQ(numbers["mass"]["from"], "SKU");
+  EXPECT_EQ(numbers["mass"]["from"], "SKU; sigma: assumed");
+  EXPECT_DOUBLE_EQ(numbers["mass"]["sigma"], 0.01 * 0.246);
   EXPECT_THAT(answer.out, HasSubstr("card's range"));
   EXPECT_THAT(answer.out, HasSubstr("Beyond the card: surface 'paper'"));
   EXPECT_THAT(plan["release"]["outside_valid_range"].dump(), HasSubstr("release_speed"));
@@ -311,7 +312,18 @@ TEST_F(Cli, ThrowFlipTransfersToAnotherBar) {
   const Answer sku = run(what + "--learner m4 --sku sku.toml");
   ASSERT_EQ(sku.code, 0) << sku.err;
   EXPECT_THAT(sku.out, HasSubstr("15.0 cm from the pads, known from 12 throws of another one (12.0 cm)"));
-  EXPECT_EQ(nlohmann::json::parse(content(folder / "flip.json"))["bar"]["mass_kg"], 0.3);
+  const auto learned = nlohmann::json::parse(content(folder / "flip.json"));
+  EXPECT_EQ(learned["bar"]["mass_kg"], 0.3);
+  // What was learned of the gripper and its pads answers for another object.
+  std::ofstream(folder / "card.json") << learned["card"];
+  std::ofstream(folder / "light.toml") << "name = 'c'\nmass_kg = 0.2\ninertia_kg_m2 = 1e-3\n"
+                                          "com_offset_m = 0.08\nsurface = 'printed'\n";
+  const Answer object = run("validate-sku light.toml --card card.json --json sku.json");
+  ASSERT_EQ(object.code, 0) << object.err;
+  EXPECT_THAT(object.out, HasSubstr("Beyond the card: mass 0.2 kg is not 0.242"));
+  const auto budget = nlohmann::json::parse(content(folder / "sku.json"))["budget"].dump();
+  for (const char* of : {"\"mu\"", "\"length\"", "\"dead_time\"", "\"mu_deviation\"", "\"grasp_angle\""})
+    EXPECT_THAT(budget, HasSubstr(of));
 }
 
 TEST_F(Cli, ThrowFlipRefusesWhatItCannotDo) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -11,6 +12,7 @@
 
 #include "datasets/import_cube_tosses.hpp"
 #include "experiment/free_flight.hpp"
+#include "fitting/measured/effect_search.hpp"
 #include "fitting/measured/flight_discovery.hpp"
 #include "fitting/measured/measured_discovery.hpp"
 #include "fitting/measured/wild_groups.hpp"
@@ -564,6 +566,41 @@ TEST(FlightDiscovery, ADragIsFoundTogetherWithItsWind) {
     EXPECT_EQ(found.effects.size(), 2U);
     EXPECT_FALSE(found.unexplained.has_value()) << found.unexplained->description;
   }
+}
+
+/// Counts the flights of which footprints are asked of a wind and of no other candidate.
+class AskedOfWind final : public GroupedProblem {
+ public:
+  explicit AskedOfWind(const FlightProblem& of) : asked(of.groups().size()), of_(of) {
+    groups_ = of.groups(), channels_ = of.channels(), covariates_ = of.covariates();
+  }
+  std::vector<dynamics::Effect> effects() const override { return of_.effects(); }
+  GroupEquations equations(std::size_t group, std::span<const std::string> names,
+                           std::span<const double> values, const Eigen::VectorXd& own,
+                           bool derivatives) const override {
+    bool wind = false, spin = false;  // a step asks of the spin's damping, too
+    for (const auto& name : names)
+      wind |= name.starts_with("flight.wind."), spin |= name.starts_with("flight.spin_damping.");
+    if (wind && !spin && derivatives) asked[group] = true;
+    return of_.equations(group, names, values, own, derivatives);
+  }
+  mutable std::vector<std::atomic<bool>> asked;
+
+ private:
+  const FlightProblem& of_;
+};
+
+// Whether a candidate makes room for a wind is told by few flights: most candidates do not, and nobody wants
+// to wait until all flights have said so.
+TEST(FlightDiscovery, FewFlightsAreAskedWhatACandidateMakesRoomFor) {
+  SpatialTruth truth;
+  truth.length_scale = 0.01, truth.com = {0.003, 0, 0}, truth.inertia = {1, 1.1, 1}, truth.side_force = 0.1;
+  const FlightProblem flights(spatial_flights(truth, {}, 50), 1);
+  const AskedOfWind problem(flights);
+  ASSERT_TRUE(search_effects(problem, {}).solved);
+  const auto asked = std::count(problem.asked.begin(), problem.asked.end(), true);
+  EXPECT_GT(asked, 0);
+  EXPECT_LT(asked, static_cast<long>(flights.groups().size()) / 2);
 }
 
 // A centre of mass off the tracked point turns with the body, and no wind does.

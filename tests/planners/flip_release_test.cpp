@@ -1,8 +1,10 @@
 // Model 4: what the physics explains it need not learn, and what it does not explain it learns.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include "planners/flip/release_learner.hpp"
 #include "planners/flip/session.hpp"
@@ -71,15 +73,76 @@ TEST(ReleaseFit, ExplainsThrowsThatItHasNotSeen) {
   EXPECT_LT(fit.card.dead_time.sigma, prior.dead_time.sigma);
 }
 
+// Robots that differ from the declared one as much as is said, in pads and gripper and in what the card has
+// not: the errors of the fits are as large as their covariances say, and where nothing else differs, so do
+// they.
+TEST(ReleaseFit, ItsCovarianceIsThatOfItsErrors) {
+  const ReleaseCard prior = prior_card(robot());
+  const auto commands = support_simplex(robot().motion.range);
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  constexpr int kRobots = 16;
+  double squares = 0, exact = 0;
+  for (int i = 0; i < 2 * kRobots; ++i) {
+    const bool differs = i < kRobots;
+    CardPlant plant{prior};
+    plant.card.mu.value *= std::exp(prior.mu.sigma / prior.mu.value * normal(random));
+    plant.card.length *= std::exp(0.15 * normal(random));
+    plant.card.dead_time.value =
+        std::max(0.0, prior.dead_time.value + prior.dead_time.sigma * normal(random));
+    plant.card.opening_time.value += prior.opening_time.sigma * normal(random);
+    DetachVector common{};
+    for (std::size_t j = 0; j < 6; ++j) common[j] = kDiscrepancy[j] * normal(random);
+    std::vector<FlipDatum> data;
+    for (const FlipCommand& u : commands) {
+      const auto one = mean_of(std::vector{plant({"", 0, u, robot().bar})});
+      if (!one) continue;
+      data.push_back(*one);
+      for (std::size_t j = 0; differs && j < 6; ++j)  // likeness of these commands is 0.75
+        data.back().detach[j] +=
+            std::sqrt(0.75) * common[j] + std::sqrt(0.25) * kDiscrepancy[j] * normal(random);
+    }
+    const ReleaseFit fit = fit_release(library(), prior, data);
+    const ReleaseCard &is = fit.card, &was = plant.card;
+    const Eigen::Vector4d error{is.mu.value - was.mu.value, is.length - was.length,
+                                is.dead_time.value - was.dead_time.value,
+                                is.opening_time.value - was.opening_time.value};
+    (differs ? squares : exact) += error.dot(fit.covariance.inverse() * error) / 4 / kRobots;
+    EXPECT_NEAR(std::sqrt(fit.covariance(2, 2)), is.dead_time.sigma, 1e-12);
+    if (differs) {
+      EXPECT_GT(fit.discrepancy, 0.3);
+      EXPECT_LT(fit.discrepancy, 2.0);
+      for (const double freedom : fit.degrees_of_freedom) EXPECT_GE(freedom, 1);
+    } else {
+      EXPECT_LT(fit.discrepancy, 0.3);
+    }
+  }
+  // χ² of 16 x 4 scatters by √(2/64) = 0.18 about 1, and the degrees of freedom of s² are few.
+  EXPECT_GT(squares, 0.5);
+  EXPECT_LT(squares, 1.8);
+  EXPECT_LT(exact, 1.8);
+}
+
 TEST(ReleaseFit, CardComesBackAsItWasWritten) {
-  const ReleaseFit fit{other_card(), 3e-4, 0, 0, 0};
-  const std::string text = datasets::to_json(model_card_of(fit, "robot.toml"));
-  const ReleaseCard back = release_card(datasets::parse_model_card(text), "card.json");
+  ReleaseFit fit{other_card(), 0, 0, 0};
+  fit.card.length_sigma = 3e-4;
+  fit.covariance.diagonal() << std::pow(fit.card.mu.sigma, 2), 9e-8, std::pow(fit.card.dead_time.sigma, 2),
+      std::pow(fit.card.opening_time.sigma, 2);
+  fit.degrees_of_freedom = {5, 6, 7, HUGE_VAL};
+  const std::string text = datasets::to_json(model_card_of(fit, library(), {}, "robot.toml"));
+  const datasets::ModelCard card = datasets::parse_model_card(text);
+  EXPECT_EQ(card.covariance->names, (std::vector<std::string>{"mu", "length", "dead_time", "opening_time"}));
+  EXPECT_EQ(card.parameters.at("length").degrees_of_freedom, 6);
+  EXPECT_FALSE(card.parameters.at("opening_time").degrees_of_freedom) << "the prior's";
+  EXPECT_EQ(card.valid_range.at("mass").low, robot().bar.mass);
+  EXPECT_EQ(card.own_spreads.at("grasp_angle").sigma, robot().throws.grasp_angle);
+  const ReleaseCard back = release_card(card, "card.json");
   EXPECT_EQ(back.model, fit.card.model);
   EXPECT_EQ(back.mu.value, fit.card.mu.value);
   EXPECT_EQ(back.length, fit.card.length);
   EXPECT_EQ(back.dead_time.value, fit.card.dead_time.value);
   EXPECT_EQ(back.opening_time.sigma, fit.card.opening_time.sigma);
+  EXPECT_EQ(back.length_sigma, fit.card.length_sigma);
 }
 
 TEST(LeftOverField, KnowsWhatItSawAndDoubtsTheRest) {

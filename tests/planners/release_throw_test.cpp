@@ -118,6 +118,41 @@ TEST(ReleaseThrow, LinearSpreadIsThatOfDraws) {
   EXPECT_NEAR(drawn.mean, spread->miss, 0.25 * spread->spread);
 }
 
+/// A grip that slides and turns for long, so that pads and object matter.
+ReleaseThrow weak_swing(const Chain& arm) {
+  ReleaseThrow out = swing(arm);
+  out.qdd *= 4;
+  out.card.mu.sigma = out.card.dead_time.sigma = out.card.opening_time.sigma = 0;
+  out.card.grip_force = 30;
+  out.object.com_offset.sigma = 0;
+  return out;
+}
+
+// What is not known of the pads and of the object widens the landings by what a finite difference says.
+TEST(ReleaseThrow, SigmasOfPadsAndObjectCount) {
+  const Chain arm = pads();
+  for (const Unknown k : {kLength, kShape, kMass, kInertia}) {
+    ReleaseThrow p = weak_swing(arm);
+    const double value = nominal_draw(p)[k], sigma = 0.05 * value;
+    EXPECT_EQ(release_spread(p)->spread, 0);
+    (k == kLength  ? p.card.length_sigma
+     : k == kShape ? p.card.shape_sigma
+     : k == kMass  ? p.object.mass_sigma
+                   : p.object.inertia_sigma) = sigma;
+    Draw up = nominal_draw(p), down = up;
+    up[k] += 0.2 * sigma, down[k] -= 0.2 * sigma;
+    const auto a = release_landing(p, up), b = release_landing(p, down);
+    ASSERT_TRUE(a && b) << name_of(k);
+    const double expected = std::abs(a->miss - b->miss) / 0.4;
+    EXPECT_GT(expected, k == kInertia ? 1e-6 : 2e-5) << name_of(k) << ": it matters to the landing";
+    EXPECT_NEAR(release_spread(p)->spread, expected, 0.02 * expected) << name_of(k);
+    // The standard deviation of 200 draws scatters by 5 %: four of those, and some curvature.
+    const Landings drawn = draw_landings(p, 200, 1);
+    EXPECT_EQ(drawn.lost, 0) << name_of(k);
+    EXPECT_NEAR(drawn.std, expected, 0.3 * expected) << name_of(k);
+  }
+}
+
 TEST(ReleaseThrow, InsensitiveMotionsMissLess) {
   const Chain arm = pads();
   ReleaseThrow p = swing(arm);
@@ -242,6 +277,23 @@ TEST(HeldMotion, DrawsThatSlipBeforeTheGripperOpensAreLost) {
   EXPECT_EQ(draw_landings(p, 50, 1).lost, 50) << "slips at t = 0";
 }
 
+// A heavier draw may slip out of a grip that holds the nominal object.
+TEST(HeldMotion, DrawsTheObjectsMass) {
+  BarThrow bar;
+  const auto tube = bar.plan();
+  ASSERT_TRUE(tube.plan) << tube.reason;
+  ReleaseThrow p = bar.release(*tube.plan);
+  p.card.grip_force = 1.02 * *HeldMotion(p, tube.plan->motion).needed_force();
+  const HeldMotion held(p, tube.plan->motion);
+  Draw draw = nominal_draw(p);
+  EXPECT_TRUE(held.holds(draw));
+  draw[kMass] *= 1.2;
+  EXPECT_FALSE(held.holds(draw));
+  draw = nominal_draw(p);
+  draw[kLength] *= 0.8;
+  EXPECT_FALSE(held.holds(draw));
+}
+
 TEST(RobustThrow, IsNotPlannedWhereTheGripDoesNotHold) {
   BarThrow bar;
   const auto tube = bar.plan();
@@ -293,9 +345,15 @@ TEST(ReleaseThrow, DrawsFrictionThatPadsMayHave) {
 
 TEST(ReleaseCard, NamesTheSigmasThatItPassesOver) {
   datasets::ModelCard card;
-  card.model = "sliding_pivot";
-  card.parameters = {{"mu", {0.6, 0.03, "-"}}, {"length", {0.008, 1e-3, "m"}}, {"shape", {2, 0.1, "-"}}};
-  EXPECT_THAT(release_card(card, "card.json").passed_over, testing::ElementsAre("length", "shape"));
+  card.model = "limit_surface_quartic";
+  card.parameters = {{"mu", {0.6, 0.03, "-"}},
+                     {"length", {0.008, 1e-3, "m"}},
+                     {"shape", {2, 0.1, "-"}},
+                     {"kappa", {1.5, 0.2, "-"}}};
+  const ReleaseCard taken = release_card(card, "card.json");
+  EXPECT_THAT(taken.passed_over, testing::ElementsAre("kappa"));
+  EXPECT_EQ(taken.length_sigma, 1e-3);
+  EXPECT_EQ(taken.shape_sigma, 0.1);
 }
 
 // What the search offers first strains the grip; a plan over which it holds comes after, or none does.
@@ -373,6 +431,15 @@ TEST(ReleaseCard, RefusesWhatItDoesNotTake) {
   EXPECT_EQ(complaint(quartic(2.7)), "");
   EXPECT_THAT(complaint(quartic(3.1)), testing::HasSubstr("/parameters/kappa/value"));
   datasets::ModelCard card = quartic(1);
+  card.parameters["mu"].value = 11;  // contact::Patch takes no more than contact::kMostMu
+  EXPECT_THAT(complaint(card), testing::HasSubstr("card.json"));
+  EXPECT_THAT(complaint(card), testing::HasSubstr("/parameters/mu/value"));
+  EXPECT_THAT(complaint(card), testing::HasSubstr("is 11; accepted: (0, 10]"));
+  card.parameters["mu"].value = 10;
+  EXPECT_EQ(complaint(card), "");
+  card.parameters["length"].value = 0.7;
+  EXPECT_THAT(complaint(card), testing::HasSubstr("/parameters/length/value"));
+  card = quartic(1);
   card.model = "sliding_pivot";
   EXPECT_THAT(complaint(card), testing::HasSubstr("/parameters/kappa"));
   card = quartic(1);
@@ -526,6 +593,9 @@ TEST(ReleaseThrow, RefusesWhatIsNoThrow) {
   expect_refused("sigma of mu = nan is not in [0, inf)", [](auto& p) { p.card.mu.sigma = NAN; });
   expect_refused("sigma of dead_time = -0.1", [](auto& p) { p.card.dead_time.sigma = -0.1; });
   expect_refused("sigma of com_offset = -1", [](auto& p) { p.object.com_offset.sigma = -1; });
+  expect_refused("sigma of length = -1", [](auto& p) { p.card.length_sigma = -1; });
+  expect_refused("sigma of mass = nan", [](auto& p) { p.object.mass_sigma = NAN; });
+  expect_refused("mu = 10.5 is not in [0, 10]", [](auto& p) { p.card.mu.value = 10.5; });
   expect_refused("grasp_angle = inf", [](auto& p) { p.card.grasp_angle = INFINITY; });
   expect_refused("grip_force = nan", [](auto& p) { p.card.grip_force = NAN; });
   expect_refused("pads = 0", [](auto& p) { p.card.pads = 0; });
