@@ -189,7 +189,13 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
   out["base_model"] = model;
   out["verdict"] = to_string(found.verdict);
   out["effects"] = Json::array();
-  for (const auto& effect : found.effects) out["effects"].push_back(effect_json(effect));
+  const std::string gain = gain_text(found.effects);
+  for (const auto& effect : found.effects) {
+    Json one = effect_json(effect);
+    if (!gain.empty() && (effect.id == "sensor.mass" || effect.id == "sensor.inertia"))
+      one["reads_the_same"] = gain;
+    out["effects"].push_back(std::move(one));
+  }
   out["fitted_along"] = found.along;
   out["evident_but_small"] = nullptr;
   if (const auto& small = found.small)

@@ -131,12 +131,13 @@ std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects) {
   };
   const auto *mass = ratio("sensor.mass"), *inertia = ratio("sensor.inertia");
   if (!mass || !inertia ||
-      !(std::abs(mass->value - inertia->value) <= std::hypot(mass->sigma, inertia->sigma)))
+      !(std::abs(mass->value - inertia->value) <=
+        fitting::kNormal95 * std::hypot(mass->sigma, inertia->sigma)))
     return {};
   return fmt::format(
-      "Mass and inertia are off by the same ratio, within its sigma: to the motion that is nothing, and a "
-      "gain "
-      "of {:.4g} on the whole measured wrench leaves just that.",
+      "Mass and inertia are off by the same ratio, as far as their intervals tell: to the motion that is "
+      "nothing, and a gain of {:.4g} on the whole measured wrench leaves just that. A weighing of the object "
+      "tells which, or a known weight on the sensor.",
       mass->value);
 }
 

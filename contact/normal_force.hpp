@@ -132,8 +132,8 @@ struct NormalForceSummary {
   double chi2_per_dof{};  ///< of the smoothed force, and of the tail's level, against the whole series
   double max_whitened_residual{};  ///< largest |residual|/σ
   int knots{};                     ///< breaks strictly between the first sample and the release
-  bool power_law{};  ///< the ramp is (1 − s)^p to within the noise; otherwise a spline follows the samples
-  double grip_force{};  ///< at the start of the opening [N]
+  bool power_law{};                ///< the ramp is (1 − s)^p to within the noise
+  double grip_force{};             ///< at the start of the opening [N]
   double opening_start{
       std::numeric_limits<double>::quiet_NaN()};                ///< first change of the force [s]; NaN: none
   double ramp_start{std::numeric_limits<double>::quiet_NaN()};  ///< the same, or the first sample where the
@@ -161,13 +161,23 @@ struct NormalForceFit {
 ///
 /// The last opening of the series is taken as a straight grip, a ramp A (1 − s)^p that starts with a kink,
 /// and a level tail. Start, end, p and levels are found together by least squares, so the release is known to
-/// well below a sample. Where the residual is noise, that curve is the smoothed force (in pieces of degree
-/// five); otherwise start and end are found again from their neighbourhoods, and a smoothing spline with a
-/// kink at the start follows the samples. Then the release is uncertain by what the width of its
-/// neighbourhood makes of it, too, and always by where it is between two samples; by one whole step where the
-/// ramp has fewer than four. Outliers that stand alone,
-/// or in pairs, count as little as they go beyond 3.5 σ. The last bit before the release (below the noise, or
-/// 1 % of the grip) falls monotonically to zero.
+/// well below a sample. A ramp that is no power (a cosine's half, say, whose end is flatter than the power
+/// that fits the whole of it) would put the release early or late. So powers with bends are asked, too,
+///
+///   A (1 − s)^p exp(b₁ s + b₂ s² + ...),
+///
+/// which end as a power, whatever they are before; the samples say how many bends there are (the first must
+/// convince by BIC), and forms with more of them count for σ of the release by what evidence leaves them.
+/// Where the residual is noise, that curve is the smoothed force (in pieces of degree five); otherwise start
+/// and end are found again from their neighbourhoods, and a smoothing spline with a kink at the start follows
+/// the samples. Then the release is uncertain by what the width of its neighbourhood makes of it, too, and
+/// always by where it is between two samples; by one whole step where the ramp has fewer than four. Outliers
+/// that stand alone, or in pairs, count as little as they go beyond 3.5 σ. The last bit before the release
+/// (below the noise, or 1 % of the grip) falls monotonically to zero. What the few samples of a slow or noisy
+/// sensor cannot tell from a power is taken for one, and σ does not know of it.
+///
+/// A curve that leaves the samples by a fifth of the largest (through spikes, or rubbish) is replaced by
+/// straight lines between them.
 ///
 /// **A sensor bias** shows as a tail that is not zero. The release is where the ramp meets the tail's
 /// plateau, whatever its level; `tail_mean` reports that level. The grip is not shifted by it; over the ramp

@@ -14,36 +14,73 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kOutlier = 3.5;  // residual/σ
-constexpr int kParameters = 6;
+constexpr int kBends = Ramp::kBends, kPlain = 6, kParameters = kPlain + kBends;
+constexpr double kFlattest = 0.4, kSteepest = 6.0;  // shapes [-]
+constexpr double kFirst = 7.0;                      // χ² that the first bend must be worth beside BIC, and
+constexpr double kFurther = 3.0;                    // each further one: what is no power may be anything
+constexpr double kChosen = 1.5;     // of the variance, where the samples have chosen the form as well
+constexpr double kBendSigma = 4.0;  // 1 σ of a bend before the samples are seen [-]
 using Vector = Eigen::Matrix<double, kParameters, 1>;
 using Matrix = Eigen::Matrix<double, kParameters, kParameters>;
-using Free = std::array<bool, kParameters>;  // grip, slope, tail, start, release, log shape
+using Free = std::array<bool, kPlain>;  // grip, slope, tail, start, release, log shape
+
+constexpr Free kAll = {true, true, true, true, true, true};
+
+// The derivative of the ramp at t: slope per unit, times in units of `tick`.
+Vector derivative(const Ramp& r, double t, double tick) {
+  Vector g = Vector::Zero();
+  const double length = r.release - r.start, height = r.grip - r.tail;
+  if (t <= r.start) {
+    g.head<kPlain>() << 1.0, (t - r.start) / tick, 0.0, -r.slope * tick, 0.0, 0.0;
+  } else if (t < r.release) {
+    const double u = (r.release - t) / length, s = 1.0 - u;
+    const double power = std::pow(u, r.shape) * std::exp(r.bent(s));
+    double bending = 0.0, s_j = 1.0;  // d/ds Σ bend_j s^j
+    for (int j = 0; j < kBends; ++j) {
+      bending += (j + 1) * r.bend[j] * s_j;
+      s_j *= s;
+      g[kPlain + j] = height * power * s_j;
+    }
+    const double per_u = height * power * (r.shape / u - bending) / length * tick;
+    g.head<kPlain>() << power, 0.0, 1.0 - power, per_u * u, per_u * s, height * power * std::log(u) * r.shape;
+  } else {
+    g[2] = 1.0;
+  }
+  return g;
+}
 
 // Gauss-Newton system of samples [from, to): slope per unit, times in units of `tick`.
 void linearise(const ForceSeries& s, const Ramp& r, std::size_t from, std::size_t to,
                const std::vector<double>& weight, double tick, Matrix& a, Vector& b) {
   a.setZero();
   b.setZero();
-  const double length = r.release - r.start, height = r.grip - r.tail;
   for (std::size_t k = from; k < to; ++k) {
-    const double t = s.time[k];
-    Vector g = Vector::Zero();
-    double model = r.tail;
-    if (t <= r.start) {
-      model = r.grip + r.slope * (t - r.start);
-      g << 1.0, (t - r.start) / tick, 0.0, -r.slope * tick, 0.0, 0.0;
-    } else if (t < r.release) {
-      const double u = (r.release - t) / length, power = std::pow(u, r.shape);
-      model += height * power;
-      g << power, 0.0, 1.0 - power, height * r.shape * power / length * tick,
-          height * r.shape * power / u * (1.0 - u) / length * tick, height * power * std::log(u) * r.shape;
-    } else {
-      g[2] = 1.0;
-    }
+    const Vector g = derivative(r, s.time[k], tick);
     const double w = weight[k] / (s.sigma * s.sigma);
     a.noalias() += w * g * g.transpose();
-    b.noalias() += w * (s.value[k] - model) * g;
+    b.noalias() += w * (s.value[k] - r.at(s.time[k])) * g;
   }
+  for (int j = 0; j < kBends; ++j) {
+    a(kPlain + j, kPlain + j) += 1.0 / (kBendSigma * kBendSigma);
+    b[kPlain + j] -= r.bend[j] / (kBendSigma * kBendSigma);
+  }
+}
+
+// Leaves what is not free, and the bends beyond the first `bends`, out of the system.
+void fix(Matrix& a, Vector& b, const Free& free, int bends) {
+  for (int i = 0; i < kParameters; ++i) {
+    if (i < kPlain ? free[i] : i < kPlain + bends) continue;
+    a.row(i).setZero();
+    a.col(i).setZero();
+    a(i, i) = 1.0;
+    b[i] = 0.0;
+  }
+}
+
+double bend_cost(const Ramp& r) {
+  double sum = 0.0;
+  for (const double b : r.bend) sum += b * b / (kBendSigma * kBendSigma);
+  return sum;
 }
 
 double tick_of(const ForceSeries& s) {
@@ -53,26 +90,18 @@ double tick_of(const ForceSeries& s) {
 // Of a time that is anywhere between two samples [s²].
 double between_samples(const ForceSeries& s) { return tick_of(s) * tick_of(s) / 12.0; }
 
-// Levenberg-Marquardt on samples [from, to) over the free parameters; returns the variance of the release
-// [s²].
+// Levenberg-Marquardt on samples [from, to) over the free parameters and so many bends; returns the variance
+// of the release [s²].
 double refine(const ForceSeries& s, Ramp& ramp, std::size_t from, std::size_t to,
-              const std::vector<double>& weight, const Free& free) {
+              const std::vector<double>& weight, const Free& free, int bends) {
   const double tick = tick_of(s);
-  const auto fix = [&](Matrix& a, Vector& b) {
-    for (int i = 0; i < kParameters; ++i) {
-      if (free[i]) continue;
-      a.row(i).setZero();
-      a.col(i).setZero();
-      a(i, i) = 1.0;
-      b[i] = 0.0;
-    }
-  };
   Matrix a;
   Vector b;
-  double best = chi2(s, ramp, from, to, weight), damping = 1e-3;
+  const auto cost = [&](const Ramp& r) { return chi2(s, r, from, to, weight) + bend_cost(r); };
+  double best = cost(ramp), damping = 1e-3;
   for (int iteration = 0; iteration < 60; ++iteration) {
     linearise(s, ramp, from, to, weight, tick, a, b);
-    fix(a, b);
+    fix(a, b, free, bends);
     bool moved = false;
     double gain = 0.0;
     for (; damping < 1e8 && !moved; damping *= moved ? 0.1 : 8.0) {
@@ -85,9 +114,10 @@ double refine(const ForceSeries& s, Ramp& ramp, std::size_t from, std::size_t to
       next.tail += d[2];
       next.start += std::clamp(d[3], -10.0, 10.0) * tick;
       next.release += std::clamp(d[4], -10.0, 10.0) * tick;
-      next.shape = std::clamp(ramp.shape * std::exp(std::clamp(d[5], -0.5, 0.5)), 0.4, 6.0);
+      next.shape = std::clamp(ramp.shape * std::exp(std::clamp(d[5], -0.5, 0.5)), kFlattest, kSteepest);
+      for (int j = 0; j < bends; ++j) next.bend[j] += std::clamp(d[kPlain + j], -2.0, 2.0);
       if (!(next.release - next.start > 0.5 * tick)) continue;
-      const double trial = chi2(s, next, from, to, weight);
+      const double trial = cost(next);
       if (trial <= best) {
         gain = best - trial;
         best = trial;
@@ -98,7 +128,7 @@ double refine(const ForceSeries& s, Ramp& ramp, std::size_t from, std::size_t to
     if (!moved || gain < 1e-6) break;
   }
   linearise(s, ramp, from, to, weight, tick, a, b);
-  fix(a, b);
+  fix(a, b, free, bends);
   for (int i = 0; i < kParameters; ++i) a(i, i) += 1e-12;
   const double variance = a.ldlt().solve(Vector::Unit(4))[4] * tick * tick;
   return variance > 0.0 ? variance : between_samples(s);
@@ -112,6 +142,15 @@ std::vector<double> whitened(const ForceSeries& s, const Ramp& ramp) {
 
 double misfit(const ForceSeries& s, const Ramp& ramp, std::size_t from, std::size_t to) {
   return chi2(s, ramp, from, to, outlier_weights(whitened(s, ramp), from, to));
+}
+
+// Weights of what stands out of the ramp and out of its neighbours: a ramp of another form leaves a sample or
+// two on one side where the rate is low, and they keep their weight.
+std::vector<double> weights(const ForceSeries& s, const Ramp& ramp, const std::vector<double>& spikes,
+                            std::size_t from, std::size_t to) {
+  std::vector<double> out = outlier_weights(whitened(s, ramp), from, to);
+  for (std::size_t k = from; k < to; ++k) out[k] = std::max(out[k], spikes[k]);
+  return out;
 }
 
 // Running medians of five, at the ends of three.
@@ -132,25 +171,10 @@ std::vector<double> spike_weights(const ForceSeries& s) {
   return outlier_weights(e, 0, s.size());
 }
 
-// Spikes weighted, and then, a few times over, what stands out of the ramp found before.
-double refine_robustly(const ForceSeries& s, Ramp& ramp, std::size_t from, std::size_t to,
-                       std::vector<double> weight) {
-  constexpr Free kAll = {true, true, true, true, true, true};
-  double variance = refine(s, ramp, from, to, weight, kAll);
-  constexpr int kTimes = 4;
-  for (int k = 0; k < kTimes; ++k) {
-    std::vector<double> next = outlier_weights(whitened(s, ramp), from, to);
-    if (next == weight) break;
-    weight = std::move(next);
-    variance = refine(s, ramp, from, to, weight, kAll);
-  }
-  return variance;
-}
-
 // As how many samples one of [from, to) counts, whose noise neighbours share: 1 + 2 Σ ρ_k over the
-// autocorrelations of the residuals, as long as they stand out of what white noise shows; 1 for white noise.
-double samples_per_witness(const ForceSeries& s, const Ramp& ramp, std::size_t from, std::size_t to) {
-  const std::vector<double> e = whitened(s, ramp);
+// autocorrelations of the residuals e, as long as they stand out of what white noise shows; 1 for white
+// noise.
+double samples_per_witness(const std::vector<double>& e, std::size_t from, std::size_t to) {
   const auto n = static_cast<double>(to - from);
   const std::size_t most = std::min<std::size_t>((to - from) / 4, 1000);  // lags
   double squares = 0, sum = 0;
@@ -162,6 +186,89 @@ double samples_per_witness(const ForceSeries& s, const Ramp& ramp, std::size_t f
     sum += product / squares;
   }
   return 1 + 2 * sum;
+}
+
+// Spikes weighted, and then, a few times over, what stands out of the ramp found before.
+double refine_robustly(const ForceSeries& s, Ramp& ramp, std::size_t from, std::size_t to,
+                       const std::vector<double>& spikes, std::vector<double>& weight, const Free& free,
+                       int bends) {
+  double variance = refine(s, ramp, from, to, weight, free, bends);
+  constexpr int kTimes = 4;
+  for (int k = 0; k < kTimes; ++k) {
+    std::vector<double> next = weights(s, ramp, spikes, from, to);
+    if (next == weight) break;
+    weight = std::move(next);
+    variance = refine(s, ramp, from, to, weight, free, bends);
+  }
+  return variance;
+}
+
+// What so many bends promise to first order: the χ² that they take away, how far the release moves [s], its
+// variance [s²], and ln of the number of witnesses.
+struct Promise {
+  double gain{}, shift{}, variance{}, log_witnesses{}, per_chi2{};  // of χ², one witness with its noise
+};
+Promise promise(const ForceSeries& s, const Ramp& ramp, std::size_t from, std::size_t to,
+                const std::vector<double>& weight, const Free& free, int bends) {
+  const double tick = tick_of(s);
+  Matrix a;
+  Vector b;
+  linearise(s, ramp, from, to, weight, tick, a, b);
+  fix(a, b, free, bends);
+  for (int i = 0; i < kParameters; ++i) a(i, i) += 1e-12;
+  const Eigen::LDLT<Matrix> factor(a);
+  const Vector step = factor.solve(b);
+  std::vector<double> e = whitened(s, ramp);  // after the step: what is left is noise, as far as it tells
+  double left = 0.0;
+  for (std::size_t k = from; k < to; ++k) {
+    e[k] -= derivative(ramp, s.time[k], tick).dot(step) / s.sigma;
+    left += weight[k] * e[k] * e[k];
+  }
+  const double noise = std::max(1.0, left / static_cast<double>(to - from));
+  const double samples = samples_per_witness(e, from, to);
+  const double variance = factor.solve(Vector::Unit(4))[4] * tick * tick, n = static_cast<double>(to - from);
+  return {b.dot(step) / (samples * noise), step[4] * tick, samples * variance, std::log(n / samples),
+          1.0 / (samples * noise)};
+}
+
+// The ramp in [from, to) with as many bends as have evidence; returns the variance of the release [s²]. The
+// first one must convince (BIC). Forms with more bends than were taken count by what their evidence leaves
+// open.
+double refine_form(const ForceSeries& s, Ramp& ramp, std::size_t from, std::size_t to,
+                   const std::vector<double>& spikes, const Free& free) {
+  std::vector<double> weight = spikes;
+  double variance = refine_robustly(s, ramp, from, to, spikes, weight, free, 0);
+  const std::size_t begin = std::max(from, index_of(s, ramp.start));
+  const auto inside = static_cast<int>(std::max(begin, index_of(s, ramp.release)) - begin);
+  const int most = std::clamp((inside - 6) / 3, 0, kBends);
+  int bends = 0;
+  for (;;) {
+    int best = bends;
+    double evidence = 0.0, needed = 0.0, per_chi2 = 1.0, all = 1.0;
+    double sum = variance * samples_per_witness(whitened(s, ramp), from, to) * (bends > 0 ? kChosen : 1.0);
+    for (int then = bends + 1; then <= most; ++then) {
+      const Promise p = promise(s, ramp, from, to, weight, free, then);
+      const double first = bends > 0 ? kFurther : p.log_witnesses + kFirst;
+      const double price = first + (then - bends - 1) * kFurther;
+      if (p.gain - price > evidence) {
+        evidence = p.gain - price;
+        best = then, needed = price, per_chi2 = p.per_chi2;
+      }
+      const double share = std::exp(std::min(0.0, 0.5 * (p.gain - (then - bends) * first)));
+      all += share;
+      sum += share * (p.variance + p.shift * p.shift);
+    }
+    // A shape at its bound: the end falls at once, somewhere between two samples.
+    if (ramp.shape < kFlattest + 1e-3) sum = std::max(sum, all * between_samples(s));
+    if (best == bends) return sum / all;
+    Ramp next = ramp;
+    std::vector<double> next_weight = weight;
+    const double next_variance = refine_robustly(s, next, from, to, spikes, next_weight, free, best);
+    // The promise was to first order.
+    const double gain = chi2(s, ramp, from, to, weight) - chi2(s, next, from, to, weight);
+    if (!(gain * per_chi2 > needed)) return sum / all;
+    ramp = next, weight = next_weight, variance = next_variance, bends = best;
+  }
 }
 
 double noise_limit(double target, double n) { return target * n + 4.0 * std::sqrt(2.0 * n); }
@@ -246,36 +353,35 @@ Opening find_opening(const ForceSeries& s, const Descent& guess, const NormalFor
   const std::size_t n = s.size();
   const std::vector<double> spikes = spike_weights(s);
   Opening o{guess.ramp, 0.0, false, false};
+  const auto left = [&](std::size_t from, std::size_t to) {
+    return chi2(s, o.ramp, from, to, weights(s, o.ramp, spikes, from, to));
+  };
   const auto judge = [&](std::size_t from) {
     const std::size_t start = index_of(s, o.ramp.start);
     const std::size_t grip = start > from ? start - from : 0;
-    o.straight_grip =
-        from == 0 && misfit(s, o.ramp, from, start) <=
-                         noise_limit(options.chi2_target, std::max(1.0, static_cast<double>(grip)));
-    o.power_law =
-        misfit(s, o.ramp, start, n) <= noise_limit(options.chi2_target, static_cast<double>(n - start));
+    o.straight_grip = from == 0 && left(from, start) <= noise_limit(options.chi2_target,
+                                                                    std::max(1.0, static_cast<double>(grip)));
+    o.modelled = left(start, n) <= noise_limit(options.chi2_target, static_cast<double>(n - start));
   };
-  o.release_variance = refine_robustly(s, o.ramp, guess.plateau, n, spikes);
+  o.release_variance = refine_form(s, o.ramp, guess.plateau, n, spikes, kAll);
   judge(guess.plateau);
-  const auto counted = [&](std::size_t from, std::size_t to) {
-    o.release_variance *= samples_per_witness(s, o.ramp, from, to);
-    return o;
-  };
-  if (o.straight_grip && o.power_law) return counted(guess.plateau, n);
+  if (o.straight_grip && o.modelled) return o;
   // A grip that is not straight: only what lies near the opening says where it starts.
   const double length = o.ramp.release - o.ramp.start;
   const std::size_t near = std::max(guess.plateau, index_of(s, o.ramp.start - 0.4 * length));
   const std::size_t after = std::min(n, index_of(s, o.ramp.release + 2.0 * length));
-  o.release_variance = refine_robustly(s, o.ramp, near, after, spikes);
+  o.ramp.bend = {};
+  o.release_variance = refine_form(s, o.ramp, near, after, spikes, kAll);
   judge(guess.plateau);
-  if (o.power_law) return counted(near, after);
+  if (o.modelled) return o;
   // A ramp of another form: each of its ends from its own neighbourhood, as wide as a power still explains.
   const auto explained = [&](const Ramp& r, std::size_t from, std::size_t to) {
     const auto count = static_cast<double>(to - from);
     return chi2(s, r, from, to, spikes) <= options.chi2_target * count + 2.0 * std::sqrt(2.0 * count);
   };
   constexpr std::size_t kFewest = 6;
-  const Ramp whole = o.ramp;
+  Ramp whole = o.ramp;
+  whole.bend = {};
   Ramp end = whole, start = whole;
   std::vector<double> ends = {whole.release};  // from the whole ramp and from ever narrower neighbourhoods
   bool found = false;
@@ -283,13 +389,13 @@ Opening find_opening(const ForceSeries& s, const Descent& guess, const NormalFor
     const std::size_t upper = index_of(s, whole.release - part * length);
     if (index_of(s, whole.release) < upper + kFewest) break;
     Ramp nearer = whole;
-    const double variance = refine(s, nearer, upper, after, spikes, {true, false, true, false, true, true});
+    const double variance =
+        refine_form(s, nearer, upper, after, spikes, {true, false, true, false, true, true});
     ends.push_back(nearer.release);
     if (found) break;  // one narrower than needed: what the neighbourhood's width makes of the release
     end = nearer;
     const auto count = static_cast<double>(after - upper);
-    o.release_variance = variance * std::max(1.0, chi2(s, end, upper, after, spikes) / count) *
-                         samples_per_witness(s, end, upper, after);
+    o.release_variance = variance * std::max(1.0, chi2(s, end, upper, after, spikes) / count);
     found = explained(end, upper, after);
   }
   if (ends.size() > 1) o.release_variance += std::pow(ends.back() - ends[ends.size() - 2], 2);
@@ -298,13 +404,13 @@ Opening find_opening(const ForceSeries& s, const Descent& guess, const NormalFor
     const std::size_t lower = index_of(s, whole.start + part * length);
     if (lower < index_of(s, whole.start) + kFewest) break;
     start = whole;
-    refine(s, start, near, lower, spikes, {true, true, false, true, false, true});
+    refine(s, start, near, lower, spikes, {true, true, false, true, false, true}, 0);
     if (explained(start, near, lower)) break;
   }
   if (start.start < end.release)
-    o.ramp = {start.grip, start.slope, end.tail, start.start, end.release, end.shape};
+    o.ramp = {start.grip, start.slope, end.tail, start.start, end.release, end.shape, {}};
   judge(guess.plateau);
-  o.power_law = false;
+  o.modelled = false;
   return o;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <optional>
@@ -19,14 +20,25 @@ struct ForceSeries {
   std::size_t size() const { return time.size(); }
 };
 
-/// grip + slope (t − start) until start, then tail + (grip − tail) u^shape with u from 1 to 0, then tail; N,
-/// N/s, s.
+/// grip + slope (t − start) until start, then tail + (grip − tail) u^shape exp(Σ_j bend_j (1 − u)^j), j = 1,
+/// 2,
+/// ..., with u from 1 to 0, then tail; N, N/s, s. Without bends a power; with them whatever ends as a power.
 struct Ramp {
+  static constexpr int kBends = 6;
   double grip{}, slope{}, tail{}, start{}, release{}, shape{1.0};
+  std::array<double, kBends> bend{};
 
   double u(double t) const { return std::clamp((release - t) / (release - start), 0.0, 1.0); }
+  /// Σ bend_j s^j [-].
+  double bent(double s) const {
+    double sum = 0.0;
+    for (int j = kBends; j-- > 0;) sum = (sum + bend[j]) * s;
+    return sum;
+  }
   double at(double t) const {
-    return t <= start ? grip + slope * (t - start) : tail + (grip - tail) * std::pow(u(t), shape);
+    if (t <= start) return grip + slope * (t - start);
+    const double v = u(t);
+    return tail + (grip - tail) * std::pow(v, shape) * std::exp(bent(1.0 - v));
   }
 };
 
@@ -53,13 +65,14 @@ std::optional<Descent> last_descent(const ForceSeries&, double tail, double peak
 
 /// The opening as measured: start, release and shape of its ramp, and which of its parts are what the model
 /// says. The release's variance [s²] is that of least squares with outliers weighted, times the number of
-/// samples over which their noise stays (1 + 2 Σ ρ_k of the residuals); where the ramp is no power law, times
-/// the χ² per sample of the fit to its end, with the square of what a narrower neighbourhood moves it by, and
-/// never below that of an unknown place between two samples.
+/// samples over which their noise stays (1 + 2 Σ ρ_k of the residuals), half as much again where the samples
+/// say how many bends the ramp has, and the mean over the forms with more bends, each by its evidence. Where
+/// the ramp is none of these, times the χ² per sample of the fit to its end, with the square of what a
+/// narrower neighbourhood moves it by, and never below that of an unknown place between two samples.
 struct Opening {
   Ramp ramp;
-  double release_variance{};  ///< > 0 [s²]
-  bool straight_grip{}, power_law{};
+  double release_variance{};         ///< > 0 [s²]
+  bool straight_grip{}, modelled{};  ///< to within the noise
 };
 Opening find_opening(const ForceSeries&, const Descent& guess, const NormalForceOptions& options);
 

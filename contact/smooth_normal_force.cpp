@@ -171,13 +171,12 @@ Followed follow_ramp(const ForceSeries& s, const Opening& o, double start, doubl
   const auto unbiased = [&](double t, double f) {
     return f - o.ramp.tail * std::clamp((t - o.ramp.start) / (release - o.ramp.start), 0.0, 1.0);
   };
-  if (o.power_law) {
+  if (o.modelled) {
     out.sigma *= kModelSigma;
     constexpr int kPoints = 192;
     for (int k = 0; k <= kPoints; ++k) {  // denser towards the release
       const double x = static_cast<double>(k) / kPoints, t = start + (touch - start) * x * (2.0 - x);
-      out.add(t,
-              unbiased(t, o.ramp.tail + (o.ramp.grip - o.ramp.tail) * std::pow(o.ramp.u(t), o.ramp.shape)));
+      out.add(t, unbiased(t, o.ramp.at(t)));
     }
   } else {
     for (std::size_t k = 0; k < s.size() && s.time[k] <= release; ++k)
@@ -221,12 +220,55 @@ double land(Pieces& p, double value, double first, double release, double shape)
   return end;
 }
 
+// Whether the force stays within what was measured, and a fifth: a spline through rubbish may not.
+bool is_within(const ForceSeries& s, const SampledNormalForce& force) {
+  double most = 5.0 * s.sigma;
+  for (const double f : s.value) most = std::max(most, std::abs(f));
+  const Window all{-kInfinity, kInfinity};
+  constexpr int kParts = 4;
+  for (std::size_t k = 0; k + 1 < s.size(); ++k)
+    for (int part = 0; part < kParts; ++part)
+      if (!(force.at(all, s.time[k] + (s.time[k + 1] - s.time[k]) * part / kParts) <= 1.2 * most))
+        return false;
+  return true;
+}
+
+// The samples joined by straight lines, and to zero at the release.
+SampledNormalForce broken_line(const ForceSeries& s, double release) {
+  Pieces p;
+  const auto add = [&](double t, double f) {
+    if (!p.breaks.empty()) {
+      const double from = p.pieces.back()[0][0];
+      p.pieces.back()[1][0] = (f - from) / (t - p.breaks.back());
+    }
+    p.breaks.push_back(t);
+    p.pieces.push_back(constant(f));
+  };
+  for (std::size_t k = 0; k < s.size() && s.time[k] < release; ++k) add(s.time[k], std::max(0.0, s.value[k]));
+  if (std::isfinite(release)) add(release, 0.0);
+  p.pieces.pop_back();
+  p.kinks = {p.breaks.begin() + 1, p.breaks.end()};
+  if (!std::isfinite(release)) p.kinks.pop_back();
+  return assemble(s, std::move(p), release);
+}
+
+// The fit, its force within what was measured.
+NormalForceFit within(const ForceSeries& s, NormalForceFit fit) {
+  if (is_within(s, fit.force)) return fit;
+  fit.force = broken_line(s, fit.force.release_time());
+  fit.summary.power_law = false;
+  fit.summary.knots = 0;
+  finish(s, fit, 0.0);
+  return fit;
+}
+
 NormalForceFit with_release(const ForceSeries& s, Opening o, const NormalForceOptions& options) {
+  const bool judged = o.modelled && o.ramp.bend == decltype(o.ramp.bend){};
   // A spline needs samples; a stretch with hardly any is left to the model.
   constexpr std::size_t kFewest = 8;
   if (index_of(s, o.ramp.start) < kFewest) o.straight_grip = true;
   if (index_of(s, o.ramp.release) < index_of(s, std::max(o.ramp.start, s.time.front())) + kFewest)
-    o.power_law = true;
+    o.modelled = true;
   const double begin = s.time.front(), release = o.ramp.release;
   const double tick = (s.time.back() - begin) / static_cast<double>(s.size() - 1);
   // A start before the log, or right at its ends, is not a kink of this series.
@@ -242,11 +284,11 @@ NormalForceFit with_release(const ForceSeries& s, Opening o, const NormalForceOp
   const Followed ramp = follow_ramp(s, o, start, touch);
   dynamics::SplineProblem<1, 5> problem;
   problem.begin = begin;
-  problem.end = o.power_law ? touch : release;
+  problem.end = o.modelled ? touch : release;
   if (starts) problem.breaks = {{start, 0}};
   if (starts) problem.observations.push_back({0, grip.time, grip.value, {grip.sigma}});
   problem.observations.push_back({0, ramp.time, ramp.value, {ramp.sigma}});
-  if (!o.power_law) problem.end_value = {0.0};
+  if (!o.modelled) problem.end_value = {0.0};
   const auto spline = dynamics::fit_spline(problem, spline_options(options));
 
   // Up to `touch` the spline; then the landing, from its value and slope to zero.
@@ -257,7 +299,7 @@ NormalForceFit with_release(const ForceSeries& s, Opening o, const NormalForceOp
   const double end = land(p, state.value[0], state.first[0], release, o.ramp.shape);
   p.kinks.push_back(end);
   NormalForceFit fit{assemble(s, std::move(p), end), {}};
-  fit.summary.power_law = o.power_law;
+  fit.summary.power_law = judged;
   fit.summary.grip_force = o.ramp.grip;
   if (starts) fit.summary.opening_start = start;
   fit.summary.ramp_start = start;
@@ -268,7 +310,7 @@ NormalForceFit with_release(const ForceSeries& s, Opening o, const NormalForceOp
   if (index_of(s, release) < index_of(s, std::max(o.ramp.start, begin)) + 4)
     release_sigma = std::hypot(release_sigma, tick);
   fit.summary.release_sigma = std::min(release_sigma, 0.5 * length);
-  finish(s, fit, (o.straight_grip && o.power_law) ? 6.0 : spline.summary.knots + 8.0);
+  finish(s, fit, (o.straight_grip && o.modelled) ? 6.0 : spline.summary.knots + 8.0);
   return fit;
 }
 
@@ -297,7 +339,7 @@ NormalForceFit smooth_normal_force(std::span<const double> time, std::span<const
   const auto is_zero = [&](double level, double height) {
     return std::abs(level) <= std::max(options.max_tail_bias * height, 5.0 * s.sigma);
   };
-  if (!is_zero(tail, sorted.back())) return without_release(s, options);
+  if (!is_zero(tail, sorted.back())) return within(s, without_release(s, options));
   const std::optional<Descent> descent = last_descent(s, tail, std::max(peak, 0.5 * sorted.back()));
   if (!descent) {  // nothing but zero: released from the beginning
     NormalForceFit fit{
@@ -310,8 +352,8 @@ NormalForceFit smooth_normal_force(std::span<const double> time, std::span<const
   const bool sound = std::isfinite(opening.ramp.release) && index_of(s, opening.ramp.release) + 3 <= n &&
                      opening.ramp.release > time.front() + 3.0 * tick &&
                      is_zero(opening.ramp.tail, descent->height);
-  if (!sound) return without_release(s, options);
-  return with_release(s, opening, options);
+  if (!sound) return within(s, without_release(s, options));
+  return within(s, with_release(s, opening, options));
 }
 
 }  // namespace unhand::contact

@@ -102,6 +102,29 @@ TEST_F(Cli, DiscoverFindsTheDragThatIsThere) {
   EXPECT_GT(models["limit_surface"]["test"]["landing_x_m"]["mae"].get<double>(), 0.03);
 }
 
+// M a − m g has one factor for both: a gain of the wrench cannot be told from a mass and an inertia that are
+// off by it, and whoever reads the answer must know.
+TEST_F(Cli, AMassAndAnInertiaThatAreOffAlikeMayBeAGain) {
+  const auto said = [&](const std::string& mass, const std::string& inertia) {
+    EXPECT_EQ(run("generate quick12 --seed 3 --effect sensor.mass=" + mass +
+                  " --effect sensor.inertia=" + inertia + " --out g.h5")
+                  .code,
+              0);
+    const Answer answer = run("discover g.h5 --json g.json");
+    EXPECT_EQ(answer.code, 0) << answer.err;
+    int notes = 0;
+    for (const auto& effect : read_json(folder / "g.json")["effects"]) {
+      if (!effect.contains("reads_the_same")) continue;
+      ++notes;
+      EXPECT_THAT(effect["reads_the_same"].get<std::string>(), HasSubstr("a gain of 1."));
+      EXPECT_THAT(answer.out, HasSubstr(effect["reads_the_same"].get<std::string>()));
+    }
+    return notes;
+  };
+  EXPECT_EQ(said("1.5", "1.5"), 2);
+  EXPECT_EQ(said("1.5", "0.7"), 0);
+}
+
 TEST_F(Cli, DiscoverReportsOnFlights) {
   const Answer answer = run("discover " + flights + " --model projectile --json d.json --report r");
   ASSERT_EQ(answer.code, 0) << answer.err;

@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <random>
+#include <utility>
+#include <vector>
 
 namespace {
 
@@ -329,6 +332,79 @@ TEST(SmoothNormalForce, OtherRampsAreFollowedByASpline) {
   EXPECT_LT(std::abs(sum / 50), 0.3);  // the power that stands in for the ramp's end is not its form
 }
 
+// Ramps that end more flatly, or more steeply, than the power that fits the whole of them: taken for one,
+// they end a millisecond early or late, with a σ that does not know.
+TEST(SmoothNormalForce, TheReleaseOfARampThatIsNoPowerIsAsUncertainAsItIs) {
+  std::mt19937_64 random(31);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  const auto cosine = [](double s) { return 0.5 * (1.0 + std::cos(3.14159265358979 * s)); };
+  const auto quarter = [](double s) { return std::cos(0.5 * 3.14159265358979 * s); };
+  const auto parabola = [](double s) { return 1.0 - s * s; };
+  const auto exponential = [](double s) {
+    return (std::exp(-2.0 * s) - std::exp(-2.0)) / (1.0 - std::exp(-2.0));
+  };
+  // Bounds on the mean error [ms]: a third of what the power that fits misses by.
+  const std::vector<std::pair<std::function<double(double)>, double>> shapes = {
+      {cosine, 0.35}, {quarter, 0.06}, {parabola, 0.06}, {exponential, 0.6}};
+  for (std::size_t shape = 0; shape < shapes.size(); ++shape) {
+    double sum = 0.0, squares = 0.0;
+    constexpr int kRuns = 100;
+    for (int run = 0; run < kRuns; ++run) {
+      const double start = 0.057 + 1e-3 * uniform(random), length = 0.05 + 0.01 * uniform(random);
+      const auto truth = [&](double t) {
+        return 40.0 * shapes[shape].first(std::clamp((t - start) / length, 0.0, 1.0));
+      };
+      const Log log = record(truth, 0.05, random);
+      const NormalForceFit fit = smooth_normal_force(log.time, log.value, 0.05);
+      expect_sound(fit, log);
+      EXPECT_FALSE(fit.summary.power_law);
+      const double e = fit.summary.release_time - start - length;
+      sum += 1e3 * e / kRuns;
+      squares += std::pow(e / fit.summary.release_sigma, 2) / kRuns;
+    }
+    EXPECT_LT(std::abs(sum), shapes[shape].second) << shape;
+    EXPECT_LT(std::sqrt(squares), 1.3) << shape;
+    EXPECT_GT(std::sqrt(squares), 0.5) << shape;
+  }
+}
+
+// No sensor measured what a spline through spikes swings to.
+TEST(SmoothNormalForce, StaysWithinWhatWasMeasured) {
+  std::mt19937_64 random(32);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  std::normal_distribution<double> normal;
+  for (int run = 0; run < 1000; ++run) {
+    const int n = 20 + static_cast<int>(100 * uniform(random));
+    const double start = 0.3 * n * uniform(random), length = n * (0.02 + 0.5 * uniform(random));
+    Log log;
+    double most = 0.0;
+    for (int k = 0; k < n; ++k) {
+      log.time.push_back(1e-3 * k);
+      double f = ramp(k, 25.0, start, length, 0.4 + 2.0 * (run % 10) / 10) + 0.05 * normal(random);
+      if (run % 2 == 0 && uniform(random) < 0.05) f += 30.0 * normal(random);
+      if (run % 4 == 1) f = k < n - 5 ? (k % 2 ? 20.0 : -20.0) * uniform(random) : 0.0;
+      log.value.push_back(f);
+      most = std::max(most, std::abs(f));
+    }
+    const NormalForceFit fit = smooth_normal_force(log.time, log.value, 0.05);
+    expect_sound(fit, log);
+    for (double t = log.time.front(); t < log.time.back(); t += 1.3e-4)
+      ASSERT_LT(fit.force.at(kAlways, t), 1.5 * most) << run << ' ' << t;
+  }
+}
+
+// Too few samples of a ramp to judge its form: the model is followed, and nothing is said to be to within
+// noise.
+TEST(SmoothNormalForce, AFormThatMissesIsNotCalledAPower) {
+  std::mt19937_64 random(33);
+  const auto truth = [](double t) { return t < 0.1 ? 25.0 : t < 0.1025 ? 5.0 : t < 0.1045 ? 8.0 : 0.0; };
+  const Log log = record(truth, 0.05, random);
+  const NormalForceFit fit = smooth_normal_force(log.time, log.value, 0.05);
+  expect_sound(fit, log);
+  EXPECT_GT(fit.summary.chi2_per_dof, 1.5);
+  EXPECT_FALSE(fit.summary.power_law);
+}
+
 TEST(SmoothNormalForce, LaterGripsAndOddSeriesAreSurvived) {
   std::mt19937_64 random(26);
   const auto again = [](double t) {  // opens, closes once more, opens for good
@@ -392,9 +468,10 @@ TEST(SmoothNormalForce, UndeclaredNoiseIsEstimated) {
   EXPECT_NEAR(fit.summary.release_time, 0.1125, 0.3e-3);
 }
 
-// Of many releases, in ms: the scatter of the release about the truth, the mean claim, the worst error.
+// Of many releases, in ms: the scatter of the release about the truth, the mean claim, the worst error; and
+// that in its own σ.
 struct Releases {
-  double scatter{}, claimed{}, worst{};
+  double scatter{}, claimed{}, worst{}, worst_in_sigmas{};
 };
 
 template <class Spoil>
@@ -412,6 +489,7 @@ Releases releases(double declared, std::mt19937_64& random, const Spoil& spoil) 
     out.scatter += e * e / kRuns;
     out.claimed += fit.summary.release_sigma / 1e-3 / kRuns;
     out.worst = std::max(out.worst, std::abs(e));
+    out.worst_in_sigmas = std::max(out.worst_in_sigmas, std::abs(e) / fit.summary.release_sigma * 1e-3);
   }
   out.scatter = std::sqrt(out.scatter);
   return out;
@@ -423,7 +501,8 @@ TEST(SmoothNormalForce, ANoiseDeclaredTooSmallIsSeenInTheScatter) {
   for (double factor : {0.0, 0.1, 0.5, 0.67, 0.8, 0.9, 1.0}) {
     const auto found = releases(0.05 * factor, random, [&] { return 0.05 * normal(random); });
     EXPECT_LT(found.scatter, 0.12) << factor;  // that of the right declaration
-    EXPECT_LT(found.worst, 0.5) << factor;     // four of it
+    // In one of some hundreds noise passes for a bend of the ramp, and σ says what that leaves open.
+    EXPECT_LT(found.worst_in_sigmas, 5) << factor;
     EXPECT_NEAR(found.scatter, found.claimed, 0.2 * found.scatter) << factor;
   }
   // One that is too large is kept: the noise may be slow.
