@@ -164,7 +164,8 @@ void validate(const FitOptions& options, const CampaignProblem& problem) {
     const double x = options.start[k];
     const double rounding = 1e-9 * (u.high - u.low);
     require(x >= u.low - rounding && x <= u.high + rounding,
-            fmt::format("start: {} = {} is not in [{}, {}] {}", u.name, x, u.low, u.high, u.unit));
+            fmt::format("start: {} = {} is not in [{}, {}]{}", u.name, x, u.low, u.high,
+                        u.unit == "-" ? "" : " " + u.unit));
   }
   for (const double x : options.own_spread)
     require(x > 0 && std::isfinite(x), fmt::format("own_spread: {} is not in (0, inf)", x));

@@ -467,7 +467,7 @@ TEST(ThrowFit, RefusesOptionsThatMeanNothing) {
   EXPECT_THAT(message([](auto& o) { o.start = {0.5}; }), HasSubstr("start has 1 values, not 0 or 2"));
   EXPECT_THAT(message([](auto& o) { o.start = {0.5, NAN}; }), HasSubstr("start: length = nan is not in ["));
   for (const double mu : {-1.0, 50.0})
-    EXPECT_THAT(message([=](auto& o) { o.start = {mu, 0.007}; }), HasSubstr("is not in [0, 10]"));
+    EXPECT_THAT(message([=](auto& o) { o.start = {mu, 0.007}; }), HasSubstr("is not in [0.01, 5]"));
   EXPECT_THAT(message([](auto& o) { o.own_spread = {0.01}; }), HasSubstr("own_spread has 1 values"));
   EXPECT_THAT(message([](auto& o) { o.throws = {true}; }), HasSubstr("throws has 1 values"));
   EXPECT_THAT(message([](auto& o) { o.fixed = {"nu"}; }), HasSubstr("no unknown 'nu'"));
