@@ -107,6 +107,22 @@ FirstMisfit first_misfit(const FitResult& fit, const DiscoverOptions& options) {
   return out;
 }
 
+/// A give that was fitted along and has grown beyond what all pads do, beside what was accepted after it, is
+/// an effect like any other.
+void promote_give(Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  if (out.along.empty() || give_of(stage) <= kMostGive) return;
+  AcceptedEffect give;
+  give.id = kPads;
+  if (const Stage& rigid = without(stage, out.along, options); rigid.solved()) {
+    const Improvement gain = improvement(rigid, stage, out.base_test, options);
+    give.why = gain.where;
+    give.phase = gain.phase;
+  }
+  stage.ids.push_back(kPads);
+  out.effects.push_back(std::move(give));
+  out.along.clear();
+}
+
 /// Steps forward, each from the model that the one before has found.
 void search(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   // One look more than effects are wanted: where none is found, another beside pads that give.
@@ -181,6 +197,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
 
   const Stage base = stage;
   search(stage, options, out);
+  promote_give(stage, options, out);
   backward(stage, options, out);
   FitResult counted = withdraw(stage, options, out);
   judge(stage, base, options, out);
