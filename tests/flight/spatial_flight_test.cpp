@@ -59,7 +59,7 @@ TEST(SpatialFlight, InItsPlaneIsThePlanarFlight) {
   planar.drag_k = 0.08;
   planar.lift_km = 0.03;
   planar.wind = {1.3, -0.4};
-  const auto expected = fly_through(planar, {t}, kTight).states[0];
+  const auto expected = fly_through(planar, {t}, kTight)[0];
   OpenAir air{{0.4, 0, -9.81}};
   air.drag_k = planar.drag_k;
   air.lift = planar.lift_km;
@@ -226,6 +226,13 @@ TEST(SpatialEffects, EachIsTheAirsTermAndDragAddsToTheDeclaredOne) {
   EXPECT_DOUBLE_EQ(air.drag_k, 0.05);
   OpenAir expected{{0, 0, -9.8}, 0.05, 0.11, 0.02, 0.07, -0.03, 0.15, 0.4, {0, -0.6, 0}};
   expect_near(at(kStart, air, 0.8), at(kStart, expected, 0.8), "effects");
+}
+
+TEST(SpatialFlight, RefusesADragThatDrives) {
+  for (const double k : {-1.0, static_cast<double>(NAN)}) {
+    OpenAir air{{0, 0, -9.8}, k};
+    EXPECT_THROW(fly_in_space<double>(kStart, air, {0.5}), std::invalid_argument) << k;
+  }
 }
 
 }  // namespace
