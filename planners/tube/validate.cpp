@@ -3,6 +3,7 @@
 #include <tuple>
 #include <utility>
 
+#include "contact/registry.hpp"
 #include "planners/tube/nominal_throw.hpp"
 #include "planners/tube/release_throw.hpp"
 #include "planners/tube/require.hpp"
@@ -37,6 +38,9 @@ void validate(const ReleaseThrow& p) {
   for (const double x : p.target) require(std::isfinite(x), kOf, "target", x, "(-inf, inf) m");
   require(is_positive(p.hold), kOf, "hold", p.hold, "(0, inf) s");
   const ReleaseCard& c = p.card;
+  if (!contact::follows_pads(c.model))
+    throw std::invalid_argument(
+        fmt::format("{}: model = {} does not follow the pads, whose opening plans are of", kOf, c.model));
   require(is_not_negative(c.mu.value), kOf, "mu", c.mu.value, "[0, inf)");
   require(is_positive(c.length), kOf, "length", c.length, "(0, inf) m");
   require(c.pads >= 1, kOf, "pads", c.pads, "[1, inf)");
