@@ -156,20 +156,25 @@ Wrench<S> sticking_wrench(const Scene<S>& scene, const Relative<S>& y) {
 }
 
 /// An abstract contact model; docs/adding-a-contact-model.md is the recipe.
-/// Mode 0 is where a held object starts when its grip holds.
+/// Mode 0 is where a held object starts when its grip holds. Its functions are const and may be called by
+/// several threads at once: a law keeps nothing between two calls, or keeps it behind a lock of its own.
 class ContactModel {
  public:
   virtual ~ContactModel() = default;
 
-  /// The name by which cards and the command line choose it.
+  /// The name by which cards and the command line choose it; valid as long as the law is, which owns it.
   virtual std::string_view name() const = 0;
 
   // Which modes?
-  /// Modes, numbered from 0.
+  /// Modes, numbered from 0; at least one. The object is free when separation() says so, which is no mode of
+  /// the law: a release throws std::logic_error, naming law and mode, where on_guard() or membership() lead
+  /// to a mode that is not in [0, mode_count()).
   virtual int mode_count() const = 0;
-  /// What event logs call a mode.
+  /// What event logs call a mode; valid as long as the law is.
   virtual std::string_view mode_name(int mode) const = 0;
-  /// What the mode's flow asks of a stepper.
+  /// What the mode's flow asks of a stepper: `frozen` where the relative state does not change, `stiff` where
+  /// the wrench turns with the direction of a tiny slip, `smooth` where it changes as slowly as the slip
+  /// itself; `mixed`, where that is open, finds out. Never `finished`.
   virtual dynamics::FlowKind kind(int mode) const = 0;
 
   // Which wrench on the object, about the patch, in the world [N, N, N m]?
@@ -181,7 +186,8 @@ class ContactModel {
   virtual void rate(int mode, const Scene<Dual>&, const Relative<Dual>&, State<Dual, 6>&) const = 0;
 
   // Which guards leave a mode?
-  /// Guards that leave a mode.
+  /// Guards that leave a mode, at most dynamics::kMaxGuards = 8: more are a std::logic_error that names law,
+  /// mode and number.
   virtual int guard_count(int mode) const = 0;
   /// A guard's name and direction; 0 <= index < guard_count(mode).
   virtual dynamics::Guard guard(int mode, int index) const = 0;

@@ -149,6 +149,11 @@ void AdhesiveForce::kinks_(std::vector<S>& out) const {
 BiasedForce::BiasedForce(const NormalForce& base, const Dual& bias, double opening_start)
     : base_(base), bias_(bias), opening_start_(opening_start) {
   force_release(base, release_);
+  if (!std::isfinite(bias.a))
+    throw std::invalid_argument(fmt::format("biased force: bias = {} N is not finite", bias.a));
+  if (!std::isfinite(opening_start) && std::isfinite(release_.a))
+    throw std::invalid_argument(
+        fmt::format("biased force: opening_start = {} s is not finite", opening_start));
 }
 
 template <class S>

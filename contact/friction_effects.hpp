@@ -9,8 +9,9 @@
 
 namespace unhand::contact {
 
-/// Departures of the friction limits, all neutral by default; contact laws read them, and the normal force is
-/// wrapped for adhesion. u = (v_r, L ω_r) is the slip, |u| its speed [m/s].
+/// Departures of the friction limits, all neutral by default. Contact laws read them, each those that it has
+/// (ContactParameters::variation); adhesion is of the normal force, which whoever simulates wraps in an
+/// AdhesiveForce. u = (v_r, L ω_r) is the slip, |u| its speed [m/s].
 template <class S>
 struct FrictionVariation {
   S static_ratio{1.0};       ///< μ_s/μ_k: μ(|u|) = μ (1 + (μ_s/μ_k − 1) exp(−(|u|/v_s)²)) [-]
@@ -18,11 +19,11 @@ struct FrictionVariation {
   S viscous{};               ///< 1/v₀: μ(|u|) = μ (1 + |u|/v₀) [s/m]
   S softness{};              ///< γ: a = a₀ (f_N/f₀)^γ, soft finger [XydasKao1999] [-]
   double reference_force{};  ///< f₀ [N]
-  S pressure_exponent{};     ///< s: pressure ∝ (1 − (r/a)²)^s at the same L = c a [-]
-  S compliance{};            ///< tangential, of the pads together [m/N]
-  S loss_time{};             ///< of the compliance [s]
-  S adhesion{};              ///< f_adh: limits μ (f_N + f_adh) of a pad [N]
-  S parting_time{};          ///< from f_N = 0 until the adhesion has died [s]
+  S pressure_exponent{};     ///< s: pressure ∝ (1 − (r/a)²)^s at the same L = c a [-]; of the disc alone
+  S compliance{};            ///< tangential, of the pads together [m/N]; of limit surfaces alone
+  S loss_time{};             ///< of the compliance [s]; likewise
+  S adhesion{};      ///< f_adh: limits μ (f_N + f_adh) of a pad [N]; AdhesiveForce's, no law reads it
+  S parting_time{};  ///< from f_N = 0 until the adhesion has died [s]; likewise
 };
 
 /// The members that effects set, in the order of friction_effects() and of their parameters: of a variation
@@ -82,7 +83,8 @@ class AdhesiveForce final : public NormalForce {
 /// was seen. b [N] is reported minus true. `base` must outlive it.
 class BiasedForce final : public NormalForce {
  public:
-  /// `bias` b [N]; `opening_start` [s], when the grip begins to open.
+  /// `bias` b [N]; `opening_start` [s], when the grip begins to open (after the release: all of b acts until
+  /// then; not read where `base` has none). Throws std::invalid_argument where either is not finite.
   BiasedForce(const NormalForce& base, const Dual& bias, double opening_start);
   double at(const Window& window, double t) const override { return at_(window, t); }
   Dual at(const Window& window, const Dual& t) const override { return at_(window, t); }

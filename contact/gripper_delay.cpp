@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -18,6 +19,7 @@ double normal_probability(double x) { return 0.5 * std::erfc(-x * M_SQRT1_2); }
 double truncated_normal_quantile(const DelayDistribution& d, double p) {
   const double low = normal_probability((0 - d.centre) / d.spread);
   const double high = normal_probability((d.longest - d.centre) / d.spread);
+  if (!(high > low)) return p * d.longest;  // so short a part of the normal is even
   double a = 0, b = d.longest;
   for (int k = 0; k < 60; ++k) {
     const double middle = 0.5 * (a + b);
@@ -40,7 +42,9 @@ void validate(const DelayDistribution& d) {
 }
 
 std::vector<double> DelayDistribution::quantiles(int n) const {
-  if (kind == Kind::number || n < 1) return {centre};
+  validate(*this);
+  if (n < 1) throw std::invalid_argument(fmt::format("gripper delay: {} quantiles are not in [1, inf)", n));
+  if (kind == Kind::number) return {centre};
   std::vector<double> out;
   for (int k = 0; k < n; ++k) {
     const double p = (k + 0.5) / n;
@@ -50,10 +54,13 @@ std::vector<double> DelayDistribution::quantiles(int n) const {
 }
 
 double DelayDistribution::mean() const {
+  validate(*this);
   if (kind != Kind::truncated_normal) return centre;
   const double a = (0 - centre) / spread, b = (longest - centre) / spread;
   const auto density = [](double x) { return std::exp(-0.5 * x * x) / std::sqrt(2 * M_PI); };
-  return centre + spread * (density(a) - density(b)) / (normal_probability(b) - normal_probability(a));
+  const double mass = normal_probability(b) - normal_probability(a);
+  if (!(mass > 0)) return 0.5 * longest;  // so short a part of the normal is even
+  return std::clamp(centre + spread * (density(a) - density(b)) / mass, 0.0, longest);
 }
 
 GripperDelay::GripperDelay(double open_command, const Dual& delay)

@@ -32,9 +32,10 @@ struct DelayDistribution {
     return {Kind::truncated_normal, mean, deviation, longest};
   }
 
-  /// Mean after truncation [s].
+  /// Mean after truncation [s]. Throws as validate() does.
   double mean() const;
-  /// The delays at probabilities (k + ½)/n, k = 0 … n − 1 [s], increasing. A number gives itself once.
+  /// The delays at probabilities (k + ½)/n, k = 0 … n − 1 [s], increasing; n >= 1. A number gives itself
+  /// once. Throws std::invalid_argument for another n, and as validate() does.
   std::vector<double> quantiles(int n) const;
 };
 

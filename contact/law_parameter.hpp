@@ -12,7 +12,7 @@ namespace unhand::contact {
 /// is said here.
 struct LawParameter {
   std::string name;  ///< as on cards: none of the names of patch, gripper and throw (mu, length, delay, ...)
-  std::string unit;  ///< "-" where it has none
+  std::string unit;  ///< not empty: "-" where it has none
   double start{};    ///< where fits begin, and what holds where nobody says [unit]
   double low{}, high{};                 ///< accepted, ends included [unit]
   double search_low{}, search_high{};   ///< where fits look, within [low, high] [unit]

@@ -54,7 +54,8 @@ concept PressedShape = requires(const T& shape) {
 template <class Shape>
 class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>>, public GivesAtPoints {
  public:
-  /// Throws std::invalid_argument as the validations of Patch and FrictionVariation do.
+  /// Keeps a copy of the name. Throws std::invalid_argument as the validations of Patch and FrictionVariation
+  /// do.
   LimitSurface(std::string_view name, const Patch<Dual>& patch, Shape shape,
                const FrictionVariation<Dual>& variation = {});
   LimitSurface(std::string_view name, const Patch<double>& patch, Shape shape)

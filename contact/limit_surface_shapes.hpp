@@ -1,6 +1,7 @@
 // Limit surfaces in normalised coordinates: the shapes that a slipping patch's wrench can lie on.
 //
-// L = τ_max/f_max [m]. Slip u = (v_x, v_z, L ω_r) [m/s], wrench w = (f_x, f_z, τ/L)/f_max [-]: pure slide is
+// L = τ_max/f_max [m]. Slip u = (v_x, v_z, L ω_r) [m/s], wrench w = (f_x, f_z, τ/L)/f_max [-], x and z being
+// the hand's axes (round shapes need not know which): pure slide is
 // |w_xz| = 1 and pure spin |w_τ| = 1 for every isotropic shape. Each shape is a convex, centrally symmetric
 // set:
 //   resist(u)          the wrench that opposes the slip u ≠ 0: argmin over the set of w · u (maximal

@@ -1,7 +1,8 @@
 #include "contact/normal_force.hpp"
 
+#include <fmt/core.h>
+
 #include <stdexcept>
-#include <string>
 #include <utility>
 
 namespace unhand::contact {
@@ -17,14 +18,13 @@ OpeningProfile<Dual> with_derivatives(const OpeningProfile<double>& q) {
 void check(const OpeningProfile<double>& q) {
   const auto require = [](bool ok, const char* name, double value, const char* range) {
     if (!ok || !std::isfinite(value))
-      throw std::invalid_argument(std::string("OpeningProfile: ") + name + " = " + std::to_string(value) +
-                                  ", must be " + range);
+      throw std::invalid_argument(fmt::format("OpeningProfile: {} = {} is not in {}", name, value, range));
   };
-  require(true, "open_command", q.open_command, "finite [s]");
-  require(q.grip_force > 0.0, "grip_force", q.grip_force, "> 0 [N]");
-  require(q.dead_time >= 0.0, "dead_time", q.dead_time, ">= 0 [s]");
-  require(q.opening_time > 0.0, "opening_time", q.opening_time, "> 0 [s]");
-  require(q.shape > 0.0, "shape", q.shape, "> 0");
+  require(true, "open_command", q.open_command, "(-inf, inf) s");
+  require(q.grip_force > 0.0, "grip_force", q.grip_force, "(0, inf) N");
+  require(q.dead_time >= 0.0, "dead_time", q.dead_time, "[0, inf) s");
+  require(q.opening_time > 0.0, "opening_time", q.opening_time, "(0, inf) s");
+  require(q.shape > 0.0, "shape", q.shape, "(0, inf)");
 }
 
 /// f_N of the profile at t, as ProfileNormalForce says.
@@ -86,8 +86,8 @@ SampledNormalForce::SampledNormalForce(Polynomial force, std::vector<double> kin
   for (std::size_t i = 1; i < kinks_.size(); ++i)
     if (!(kinks_[i] > kinks_[i - 1])) throw std::invalid_argument("SampledNormalForce: kinks must increase");
   if (std::isfinite(release_) && (kinks_.empty() || kinks_.back() != release_))
-    throw std::invalid_argument("SampledNormalForce: the last kink must be the release, " +
-                                std::to_string(release_) + " s");
+    throw std::invalid_argument(
+        fmt::format("SampledNormalForce: the last kink must be the release, {} s", release_));
 }
 
 void SampledNormalForce::kinks(std::vector<double>& out) const {

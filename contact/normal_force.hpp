@@ -22,7 +22,8 @@ using dynamics::Window;
 /// rounding.
 inline constexpr double kSameInstant = 1e-9;
 
-/// f_N(t) of one pad [N], >= 0, and the instants at which it kinks.
+/// f_N(t) of one pad [N], >= 0, and the instants at which it kinks. Its functions are const and may be called
+/// by several threads at once.
 class NormalForce {
  public:
   virtual ~NormalForce() = default;
@@ -41,8 +42,8 @@ class NormalForce {
     return out;
   }
   /// The instant at which the pads count as parted [s]; +infinity when they never part. f_N is zero from
-  /// there on, and may be before. The last kink must be within kSameInstant of it, or the detach has no
-  /// derivatives.
+  /// there on, which simulations check, and may be before. The last kink must be within kSameInstant of it,
+  /// or the detach has no derivatives.
   virtual double release_time() const = 0;
 };
 

@@ -77,6 +77,17 @@ const ContactModelEntry* find(std::string_view name) {
   return at == all.end() ? nullptr : &*at;
 }
 
+/// Models of comparisons, flights, falls and slips that are no contact law of a release.
+constexpr std::string_view kReserved[] = {"limit_surface_naive", "projectile",     "free_fall",
+                                          "ellipsoid",           "ellipsoid_full", "convex_quartic"};
+
+bool is_name(std::string_view name) {
+  return !name.empty() && std::all_of(name.begin(), name.end(), [](unsigned char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '-' || c == '.';
+  });
+}
+
 /// The names that fits and cards have for what every law takes, and for what a throw has of its own.
 constexpr std::string_view kTaken[] = {"mu",
                                        "length",
@@ -99,13 +110,16 @@ void validate(const ContactModelEntry& entry) {
   const auto fail = [&](const std::string& why) {
     throw std::invalid_argument(fmt::format("register_contact_model: \"{}\" {}", entry.name, why));
   };
-  if (entry.name.empty()) fail("is no name");
+  if (!is_name(entry.name)) fail("is no name: one of A-Z, a-z, 0-9, '_', '-' and '.' is");
+  if (std::find(std::begin(kReserved), std::end(kReserved), entry.name) != std::end(kReserved))
+    fail("is the name of a model that is no contact law");
   if (find(entry.name)) fail("is taken");
   if (!entry.make) fail("has no maker");
   for (const LawParameter& p : entry.own) {
     if (p.name.empty() || p.name.find_first_of(".[]") != std::string::npos ||
         std::find(std::begin(kTaken), std::end(kTaken), p.name) != std::end(kTaken))
       fail(fmt::format("has a parameter named \"{}\", which is empty, taken or has one of . [ ]", p.name));
+    if (p.unit.empty()) fail(fmt::format("has \"{}\" without a unit; \"-\" where it has none", p.name));
     if (std::count_if(entry.own.begin(), entry.own.end(), [&](const auto& q) { return q.name == p.name; }) >
         1)
       fail(fmt::format("has two parameters named \"{}\"", p.name));
@@ -119,6 +133,12 @@ void validate(const ContactModelEntry& entry) {
       fail(fmt::format("has \"{}\" with a step of {} and a prior sigma of {}: both must be > 0", p.name,
                        p.typical, p.prior_sigma.value_or(HUGE_VAL)));
   }
+}
+
+Model made(const ContactModelEntry& entry, const Parameters& parameters) {
+  Model law = entry.make(parameters);
+  if (!law) throw std::logic_error(fmt::format("contact model \"{}\": its maker gave null", entry.name));
+  return law;
 }
 
 /// Values of all the law's own parameters: those given, else their start.
@@ -191,10 +211,10 @@ std::unique_ptr<ContactModel> make_contact_model(std::string_view name,
   if (!entry)
     throw std::invalid_argument(fmt::format("contact model \"{}\" is unknown; there are {}", name,
                                             fmt::join(contact_model_names(), ", ")));
-  if (entry->own.empty() && given.law_values.empty()) return entry->make(given);
+  if (entry->own.empty() && given.law_values.empty()) return made(*entry, given);
   ContactParameters<Dual> parameters = given;
   parameters.law_values = complete(*entry, given.law_values);
-  return entry->make(parameters);
+  return made(*entry, parameters);
 }
 
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name, const ContactParameters<double>& p) {

@@ -1,6 +1,8 @@
 // A table of samples in SI base units, one row per sample.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -16,10 +18,17 @@ struct Series {
 
   /// True if it was not recorded.
   bool empty() const { return rows == 0; }
-  /// Row i, column j.
+  /// Row i < rows, column j < cols; others are not checked.
   double operator()(std::size_t i, std::size_t j = 0) const { return data[i * cols + j]; }
   double& operator()(std::size_t i, std::size_t j = 0) { return data[i * cols + j]; }
-  bool operator==(const Series&) const = default;
+  /// Equal where all numbers are; a NaN, as lost samples may be, is equal to a NaN.
+  bool operator==(const Series& other) const {
+    const auto same = [](const std::vector<double>& a, const std::vector<double>& b) {
+      return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                        [](double x, double y) { return x == y || (std::isnan(x) && std::isnan(y)); });
+    };
+    return rows == other.rows && cols == other.cols && same(data, other.data) && same(sigma, other.sigma);
+  }
 };
 
 /// Whether all samples of a column are the same, as those of a dead sensor are.

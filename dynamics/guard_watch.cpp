@@ -1,5 +1,7 @@
 #include "dynamics/guard_watch.hpp"
 
+#include <fmt/core.h>
+
 #include <optional>
 #include <stdexcept>
 
@@ -16,7 +18,9 @@ template <class S, int N>
 void GuardWatch<S, N>::enter(const Phase& entered) {
   phase = entered;
   count = system_.guard_count(phase.mode);
-  if (count > kMaxGuards) throw std::logic_error("integrate: a mode has too many guards");
+  if (count > kMaxGuards)
+    throw std::logic_error(fmt::format("integrate: mode \"{}\" has {} guards, more than {}",
+                                       system_.mode_name(phase.mode), count, kMaxGuards));
   monotone = true;
   for (int i = 0; i < count; ++i) {
     const Guard guard = system_.guard(phase.mode, i);

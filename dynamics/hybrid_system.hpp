@@ -32,6 +32,9 @@ enum class FlowKind {
   finished,  ///< nothing is left to simulate: entering the mode ends the integration
 };
 
+/// Most guards that a mode may have.
+inline constexpr int kMaxGuards = 8;
+
 /// A guard g(t, y) fires where it passes zero in this direction, once, on (t0, t1].
 enum class Crossing {
   rising,   ///< from below zero to above

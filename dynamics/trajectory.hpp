@@ -48,16 +48,17 @@ class Trajectory {
   /// True if nothing was recorded.
   bool empty() const { return pieces.empty(); }
 
-  /// The piece that holds t; at an event the later one. t outside the trajectory throws std::out_of_range.
+  /// The piece that holds t; at an event the later one. t outside the trajectory, or none, throws
+  /// std::out_of_range.
   const TrajectoryPiece<S, N>& piece_at(double t) const {
-    if (pieces.empty() || t < value_of(pieces.front().t0) || t > value_of(pieces.back().t1))
+    if (pieces.empty() || !(t >= value_of(pieces.front().t0) && t <= value_of(pieces.back().t1)))
       throw std::out_of_range("trajectory: the time asked for lies outside it");
     auto next = std::upper_bound(pieces.begin(), pieces.end(), t,
                                  [](double x, const TrajectoryPiece<S, N>& p) { return x < value_of(p.t0); });
     return *std::prev(next);
   }
 
-  /// State at t [s].
+  /// State at t [s]. Throws as piece_at does.
   State<S, N> at(const S& t) const {
     const TrajectoryPiece<S, N>& piece = piece_at(value_of(t));
     const S length = piece.t1 - piece.t0;

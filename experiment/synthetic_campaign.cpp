@@ -55,7 +55,11 @@ std::vector<bool> training_conditions(const CampaignDesign& design, std::uint64_
 
 std::unique_ptr<contact::ContactModel> make_law(const CampaignDesign& design, const ThrowTruth& truth,
                                                 const ThrowSetup<double>& setup) {
-  if (design.contact_factory) return design.contact_factory(truth.patch, truth.opening);
+  if (design.contact_factory) {
+    auto law = design.contact_factory(truth.patch, truth.opening);
+    if (!law) throw std::logic_error(fmt::format("campaign {}: contact_factory gave null", design.name));
+    return law;
+  }
   contact::ContactParameters<double> parameters;
   parameters.patch = truth.patch;
   parameters.open_command = truth.opening.open_command;

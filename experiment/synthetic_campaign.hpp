@@ -105,7 +105,7 @@ struct CampaignDesign {
   contact::OpeningProfile<double> opening{0.025, 60.0, 0.010, 0.070, 2.0};
   double grasp_angle{-0.7};                         ///< θ_O − θ_H [rad]
   std::string contact_model{"limit_surface_disc"};  ///< a name that contact::make_contact_model knows
-  ContactFactory contact_factory;                   ///< takes the place of `contact_model` if set
+  ContactFactory contact_factory;  ///< takes the place of `contact_model` if set; never gives null
 
   double gravity{9.81};        ///< [m/s²]
   double landing_height{0.0};  ///< [m]

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "flight/fly.hpp"
 
@@ -13,8 +14,30 @@ namespace unhand::flight {
 using dynamics::Dual;
 using dynamics::value_of;
 
+namespace {
+
+void validate(const Medium& medium) {
+  if (!(medium.gravity > 0 && medium.drag_k >= 0 && std::isfinite(medium.gravity + medium.drag_k)))
+    throw std::invalid_argument(fmt::format("medium: gravity {} m/s² is not > 0, or drag_k {} 1/m not >= 0",
+                                            medium.gravity, medium.drag_k));
+}
+
+template <class S>
+void validate(const PlaneState<S>& state) {
+  for (const auto& [name, x] : {std::pair{"r", value_of(state.r)},
+                                {"z", value_of(state.z)},
+                                {"r_rate", value_of(state.r_rate)},
+                                {"z_rate", value_of(state.z_rate)}})
+    if (!std::isfinite(x))
+      throw std::invalid_argument(fmt::format("flight in the plane: {} = {} is not finite", name, x));
+}
+
+}  // namespace
+
 template <class S>
 std::optional<PlaneState<S>> landing_of(const PlaneState<S>& release, const Medium& medium) {
+  validate(release);
+  validate(medium);
   if (medium.drag_k == 0) {  // the closed form without fly()'s checks: planners ask a hundred thousand times
     const auto landing = project<S>({release.r, release.z, S(0.0)}, {release.r_rate, release.z_rate, S(0.0)},
                                     {S(0.0), S(-medium.gravity)}, S(0.0));
@@ -62,20 +85,10 @@ void validate(const LandingSet& set) {
                     set.r_rate_low, set.r_rate_high, set.z_rate_low, set.z_rate_high));
 }
 
-void validate(const Medium& medium) {
-  if (!(medium.gravity > 0 && medium.drag_k >= 0 && std::isfinite(medium.gravity + medium.drag_k)))
-    throw std::invalid_argument(fmt::format("medium: gravity {} m/s² is not > 0, or drag_k {} 1/m not >= 0",
-                                            medium.gravity, medium.drag_k));
-}
-
 }  // namespace
 
 double tube_level(const PlaneState<double>& release, const LandingSet& set, const Medium& medium) {
   validate(set);
-  for (const double x : {release.r, release.z, release.r_rate, release.z_rate})
-    if (!std::isfinite(x))
-      throw std::invalid_argument(fmt::format("tube_level: a state with {} is not finite", x));
-  validate(medium);
   const auto landing = landing_of(release, medium);
   if (!landing) {
     const double rise = release.z_rate > 0 ? release.z_rate * release.z_rate / (2 * medium.gravity) : 0;

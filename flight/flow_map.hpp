@@ -24,7 +24,8 @@ struct Medium {
 };
 
 /// The state on the way down through z = 0; empty if the flight never gets there. Projectiles in closed form,
-/// drag by the integrator; derivatives pass through the landing. Instantiated for double and Dual.
+/// drag by the integrator; derivatives pass through the landing. Throws std::invalid_argument for a state
+/// that is not finite and a medium out of range. Instantiated for double and Dual.
 template <class S>
 std::optional<PlaneState<S>> landing_of(const PlaneState<S>& release, const Medium& medium);
 
@@ -33,7 +34,7 @@ struct FlowMap {
   double landing{};                  ///< r_land [m]
   std::array<double, 4> gradient{};  ///< by r, z, ṙ, ż
 };
-/// The flow map at a state; empty if the flight never gets down to z = 0.
+/// The flow map at a state; empty if the flight never gets down to z = 0. Throws as landing_of does.
 std::optional<FlowMap> flow_map(const PlaneState<double>& release, const Medium& medium);
 
 /// Where and how fast a throw may come down: |r| <= half_length at z = 0, and both velocities in their

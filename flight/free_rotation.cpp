@@ -49,11 +49,17 @@ class Turning final : public dynamics::SmoothSystem<Turning<P>, 7> {
   Vec3<P> ratios_;
 };
 
+constexpr double kMostTurn = 1e15;  ///< [rad], or per second, or of moments of inertia their ratio
+
 template <class S>
 void validate(const Vec3<S>& inertia, const RotationState<S>& start, const std::vector<double>& times) {
   for (const S& x : inertia)
     if (!(value_of(x) > 0 && std::isfinite(value_of(x))))
       throw std::invalid_argument(fmt::format("free rotation: inertia {} is not in (0, inf)", value_of(x)));
+  const auto [least, most] = std::minmax({value_of(inertia[0]), value_of(inertia[1]), value_of(inertia[2])});
+  if (!(most / least <= kMostTurn))
+    throw std::invalid_argument(fmt::format(
+        "free rotation: inertia {} is not in (0, {:g}] times another, which is {}", most, kMostTurn, least));
   for (const S* x : {&start.attitude.w, &start.attitude.x, &start.attitude.y, &start.attitude.z,
                      &start.omega[0], &start.omega[1], &start.omega[2]})
     if (!std::isfinite(value_of(*x)))
@@ -64,6 +70,13 @@ void validate(const Vec3<S>& inertia, const RotationState<S>& start, const std::
   for (const double t : times)
     if (!(t >= 0 && std::isfinite(t)))
       throw std::invalid_argument(fmt::format("free rotation: time {} s is not in [0, inf)", t));
+  double last = 1;
+  for (const double t : times) last = std::max(last, t);
+  for (const S& w : start.omega)
+    if (!(std::abs(value_of(w)) * last <= kMostTurn))
+      throw std::invalid_argument(
+          fmt::format("free rotation: omega {} rad/s is not in [-{:g}, {:g}] rad/s over {} s", value_of(w),
+                      kMostTurn / last, kMostTurn / last, last));
 }
 
 }  // namespace
@@ -76,6 +89,7 @@ Rotation<S>::Rotation(const Vec3<S>& inertia, const RotationState<S>& start, con
     throw std::invalid_argument("free rotation: the damping is not finite");
   attitude_ = normalised(start.attitude);
   omega_ = start.omega;
+  last_ = last;
   const Vec3<S> ratios = inertia_ratios(inertia);
   spin_rate_ = spin_rate(ratios, damping, omega_);
   // A difference of zero may still carry a derivative; then the closed form would lose it.
@@ -89,6 +103,8 @@ Rotation<S>::Rotation(const Vec3<S>& inertia, const RotationState<S>& start, con
 
 template <class S>
 RotationState<S> Rotation<S>::at(const S& t) const {
+  if (!(value_of(t) >= 0 && value_of(t) <= last_))
+    throw std::out_of_range(fmt::format("free rotation: time {} s is not in [0, {}] s", value_of(t), last_));
   if (closed_form_ || !(value_of(t) > 0))  // at the start the first order carries all derivatives
     return {attitude_ * exp(scaled(t, omega_)), sum(omega_, scaled(t, spin_rate_))};
   const State<S, 7> y = flow_.trajectory.at(t);

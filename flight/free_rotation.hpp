@@ -30,9 +30,10 @@ struct FreeRotation {
 /// I₃ the closed form q(t) = q₀ exp(ω t) answers, otherwise the integrator; the quaternion returned has unit
 /// length.
 ///
-/// `times` [s] count from `start` and are >= 0 (in any order). Throws std::invalid_argument when an input is
-/// not finite, a time is negative, the attitude is zero or a moment of inertia is not > 0. Instantiated for
-/// double and Dual.
+/// `times` [s] count from `start` and are >= 0 (in any order). The start's attitude may have any length but
+/// zero. Throws std::invalid_argument when an input is not finite, a time is negative, the attitude is zero,
+/// a moment of inertia is not > 0 or 1e15 times another, or the body turns by more than 1e15 rad, which no
+/// double resolves: |ω| and |ω t| of each axis are accepted up to that. Instantiated for double and Dual.
 template <class S>
 FreeRotation<S> rotate_freely(const Vec3<S>& inertia, const RotationState<S>& start,
                               const std::vector<double>& times,
@@ -49,7 +50,7 @@ class Rotation {
   /// `horizon`, or why there is nothing to read.
   dynamics::Outcome outcome() const { return flow_.outcome; }
   /// `t` [s] after the start, in [0, last], of a rotation that was solved; derivatives of `t` are carried, at
-  /// the start too.
+  /// the start too. Throws std::out_of_range for another.
   RotationState<S> at(const S& t) const;
 
  private:
@@ -57,6 +58,7 @@ class Rotation {
   Vec3<S> omega_;
   Vec3<S> spin_rate_;  ///< ω̇ at the start
   bool closed_form_{};
+  double last_{};  ///< s
   dynamics::Flow<S, 7> flow_{dynamics::Outcome::horizon, {}};
 };
 

@@ -1,6 +1,7 @@
 // Unit quaternions as orientations.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "flight/vec3.hpp"
@@ -24,10 +25,15 @@ template <class S>
 Quaternion<S> conjugate(const Quaternion<S>& q) {
   return {q.w, -q.x, -q.y, -q.z};
 }
-/// q/|q|; q = 0 gives NaN.
+/// q/|q|, whose size may lie anywhere in the range of double; q = 0 gives NaN.
 template <class S>
 Quaternion<S> normalised(const Quaternion<S>& q) {
+  using dynamics::value_of;
   using std::sqrt;
+  const double size = std::max(
+      {std::abs(value_of(q.w)), std::abs(value_of(q.x)), std::abs(value_of(q.y)), std::abs(value_of(q.z))});
+  if (size > 0 && std::isfinite(size) && !(size > 1e-100 && size < 1e100))  // its square may be no number
+    return normalised(Quaternion<S>{q.w / size, q.x / size, q.y / size, q.z / size});
   const S k = 1.0 / sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
   return {k * q.w, k * q.x, k * q.y, k * q.z};
 }

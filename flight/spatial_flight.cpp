@@ -94,6 +94,9 @@ void validate(const SpatialStart<S>& start, const SpatialAir<S>& air, const std:
        {&air.drag_k, &air.linear_drag, &air.lift, &air.axis_drag_x, &air.axis_drag_y, &air.cubic_drag})
     if (!std::isfinite(value_of(*x)))
       throw std::invalid_argument("spatial flight: a coefficient of the air is not finite");
+  if (!(value_of(air.drag_k) >= 0))
+    throw std::invalid_argument(
+        fmt::format("spatial flight: drag_k = {} is not in [0, inf) 1/m", value_of(air.drag_k)));
   for (const S& t : times)
     if (!(value_of(t) >= 0 && std::isfinite(value_of(t))))
       throw std::invalid_argument(fmt::format("spatial flight: time {} s is not in [0, inf)", value_of(t)));

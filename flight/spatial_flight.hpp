@@ -18,7 +18,7 @@ namespace unhand::flight {
 template <class S>
 struct SpatialAir {
   Vec3<S> gravity{};                     ///< g [m/s²]
-  S drag_k{0.0};                         ///< k [1/m]
+  S drag_k{0.0};                         ///< k [1/m], >= 0
   S linear_drag{0.0};                    ///< c [1/s]
   S lift{0.0};                           ///< k_m [-]: Magnus
   S axis_drag_x{0.0}, axis_drag_y{0.0};  ///< a_x, a_y [1/m]
@@ -56,7 +56,8 @@ struct SpatialFlight {
 
 /// States at `times` [s] after the start, each >= 0 (in any order; they may carry derivatives). Without air:
 /// closed form for the CoM and Rotation; otherwise by the integrator. Throws std::invalid_argument when an
-/// input is not finite or a time is negative. Instantiated for double and Dual.
+/// input is not finite, a time or drag_k is negative, or the rotation is none that Rotation takes.
+/// Instantiated for double and Dual.
 template <class S>
 SpatialFlight<S> fly_in_space(const SpatialStart<S>& start, const SpatialAir<S>& air,
                               const std::vector<S>& times,

@@ -1,5 +1,7 @@
 #include "release/hand_motion.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -210,37 +212,80 @@ void check(const HandSeries& s) {
 
 }  // namespace
 
+namespace {
+
+/// How far pose and twist may be apart at a break: absolutely [m, rad, per s], and as a share of the terms
+/// that sum up to them, of which each is rounded.
+constexpr double kRounding = 1e-9, kRoundingShare = 1e-7;
+
+void require_continuous(const PolynomialHand::Polynomial& path) {
+  constexpr const char* kName[] = {"x", "z", "theta"};
+  const auto& breaks = path.breaks();
+  const auto& pieces = path.pieces();
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    const double h = breaks[i + 1] - breaks[i];
+    for (std::size_t n = 0; n < 3; ++n) {
+      std::array<double, 3> at{}, terms{};  // pose, twist and acceleration at the end
+      double power = 1;
+      for (std::size_t k = 0; k < pieces[i].size(); ++k, power *= h) {
+        const double c = pieces[i][k][n], m = static_cast<double>(k);
+        const std::array<double, 3> term = {c * power, k < 1 ? 0 : m * c * power / h,
+                                            k < 2 ? 0 : m * (m - 1) * c * power / (h * h)};
+        for (std::size_t d = 0; d < 3; ++d) at[d] += term[d], terms[d] += std::abs(term[d]);
+      }
+      if (!std::isfinite(terms[0] + terms[1] + terms[2]))
+        throw std::invalid_argument(fmt::format("PolynomialHand: {} is not finite between {} and {} s",
+                                                kName[n], breaks[i], breaks[i + 1]));
+      if (i + 1 == pieces.size()) continue;
+      for (std::size_t d = 0; d < 2; ++d) {
+        const double next = pieces[i + 1][d][n], step = next - at[d];
+        if (!(std::abs(step) <= kRounding + kRoundingShare * (terms[d] + std::abs(next))))
+          throw std::invalid_argument(fmt::format("PolynomialHand: {}{} jumps by {} at {} s",
+                                                  d == 0 ? "" : "the rate of ", kName[n], step,
+                                                  breaks[i + 1]));
+      }
+    }
+  }
+}
+
+}  // namespace
+
 PolynomialHand::PolynomialHand(Polynomial path, std::vector<double> jumps)
     : path_(std::move(path)), jumps_(std::move(jumps)) {
+  require_continuous(path_);
   const auto& breaks = path_.breaks();
   for (std::size_t i = 0; i < jumps_.size(); ++i)
     if ((i > 0 && !(jumps_[i] > jumps_[i - 1])) ||
         !std::binary_search(breaks.begin() + 1, breaks.end() - 1, jumps_[i]))
-      throw std::invalid_argument(
-          "PolynomialHand: jumps must increase and be interior breaks of the path, got " +
-          std::to_string(jumps_[i]) + " s");
+      throw std::invalid_argument(fmt::format(
+          "PolynomialHand: jumps must increase and be interior breaks of the path, got {} s", jumps_[i]));
 }
 
 PolynomialHand PolynomialHand::segments(double t_start, const dynamics::Pose<double>& pose,
                                         const dynamics::Twist<double>& twist,
                                         const std::vector<HandSegment>& stretches) {
+  if (stretches.empty())
+    throw std::invalid_argument("PolynomialHand::segments: stretches is empty; at least one is needed");
+  if (!std::isfinite(t_start))
+    throw std::invalid_argument(
+        fmt::format("PolynomialHand::segments: t_start = {} s is not finite", t_start));
   std::vector<double> breaks = {t_start};
   std::vector<Polynomial::Coefficients> pieces;
   Columns x = {pose.x, pose.z, pose.theta}, v = {twist.vx, twist.vz, twist.omega};
   for (const HandSegment& stretch : stretches) {
     const double h = stretch.t_end - breaks.back();
     if (!(h > 0.0) || !std::isfinite(h))
-      throw std::invalid_argument("PolynomialHand::segments: t_end must increase, got " +
-                                  std::to_string(stretch.t_end) + " s after " +
-                                  std::to_string(breaks.back()) + " s");
+      throw std::invalid_argument(
+          fmt::format("PolynomialHand::segments: t_end = {} s is not in ({}, inf) s, after the end before it",
+                      stretch.t_end, breaks.back()));
     const Columns a = {stretch.acceleration.ax, stretch.acceleration.az, stretch.acceleration.alpha};
     const Columns j = {stretch.jerk.ax, stretch.jerk.az, stretch.jerk.alpha};
     for (int n = 0; n < 3; ++n)
       if (!std::isfinite(a[n]) || !std::isfinite(j[n]) || !std::isfinite(x[n]) || !std::isfinite(v[n]))
-        throw std::invalid_argument(
-            "PolynomialHand::segments: pose, twist, accelerations and jerks must be finite; "
-            "those of the stretch to " +
-            std::to_string(stretch.t_end) + " s are not");
+        throw std::invalid_argument(fmt::format(
+            "PolynomialHand::segments: pose, twist, accelerations and jerks must be finite; those "
+            "of the stretch to {} s are not",
+            stretch.t_end));
     Polynomial::Coefficients c{};
     for (int n = 0; n < 3; ++n) {
       c[0][n] = x[n];
@@ -250,6 +295,10 @@ PolynomialHand PolynomialHand::segments(double t_start, const dynamics::Pose<dou
       x[n] += h * (v[n] + h * (a[n] / 2.0 + h * j[n] / 6.0));
       v[n] += h * (a[n] + h * j[n] / 2.0);
     }
+    for (int n = 0; n < 3; ++n)
+      if (!std::isfinite(x[n]) || !std::isfinite(v[n]))
+        throw std::invalid_argument(
+            fmt::format("PolynomialHand::segments: pose and twist at {} s are not finite", stretch.t_end));
     pieces.push_back(c);
     breaks.push_back(stretch.t_end);
   }

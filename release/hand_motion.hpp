@@ -24,7 +24,8 @@ struct HandState {
   dynamics::Acceleration<S> acceleration;  ///< m/s², m/s², rad/s²
 };
 
-/// Pose, twist and acceleration of the hand over time.
+/// Pose, twist and acceleration of the hand over time. Its functions are const and may be called by several
+/// threads at once.
 class HandMotion {
  public:
   virtual ~HandMotion() = default;
@@ -48,19 +49,20 @@ struct HandSegment {
 };
 
 /// A hand that follows piecewise polynomials of degree five (channels x, z, θ in the world): twist and
-/// acceleration are their exact derivatives, pose and twist are continuous, and the acceleration jumps at
-/// `jumps()` only.
+/// acceleration are their exact derivatives, pose and twist are continuous to rounding, and the acceleration
+/// jumps at `jumps()` only.
 class PolynomialHand final : public HandMotion {
  public:
   using Polynomial = dynamics::PiecewisePolynomial<3, 5>;  ///< m, m, rad over s
 
   /// `jumps` [s]: the breaks at which the acceleration is not continuous. Each must be an interior break of
-  /// `path`; otherwise std::invalid_argument.
+  /// `path`; otherwise std::invalid_argument, as for a path that is not finite or whose pose or twist jumps
+  /// at a break (by more than 1e-9 m, rad or per s, and 1e-7 of the terms that make it).
   explicit PolynomialHand(Polynomial path, std::vector<double> jumps = {});
 
   /// Joins stretches of linear acceleration, starting at t_start [s] from the given pose and twist. Every
-  /// inner end of a stretch counts as a jump. Throws std::invalid_argument unless the ends increase and all
-  /// is finite.
+  /// inner end of a stretch counts as a jump. Throws std::invalid_argument unless there is a stretch, the
+  /// ends increase and all is finite, the motion that they make too.
   static PolynomialHand segments(double t_start, const dynamics::Pose<double>& pose,
                                  const dynamics::Twist<double>& twist,
                                  const std::vector<HandSegment>& stretches);

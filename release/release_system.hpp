@@ -33,24 +33,23 @@ void validate(const ReleaseProblem<S>& problem) {
   const double m = value_of(problem.body.mass), I = value_of(problem.body.inertia);
   require(m > 0 && m <= 1e4, "mass", m, "(0, 1e4] kg");
   require(I > 0 && I <= 1e6, "inertia", I, "(0, 1e6] kg m²");
-  require(std::isfinite(value_of(problem.gravity.x)), "gravity x", value_of(problem.gravity.x),
-          "finite m/s²");
-  require(std::isfinite(value_of(problem.gravity.z)), "gravity z", value_of(problem.gravity.z),
-          "finite m/s²");
+  const auto finite = [](const char* name, double value, const char* unit) {
+    if (!std::isfinite(value))
+      throw std::invalid_argument(fmt::format("release: {} = {} {} is not finite", name, value, unit));
+  };
+  finite("gravity x", value_of(problem.gravity.x), "m/s²");
+  finite("gravity z", value_of(problem.gravity.z), "m/s²");
   require(std::abs(value_of(problem.grasp.com_offset)) <= 100, "com_offset",
           value_of(problem.grasp.com_offset), "[-100, 100] m");
-  require(std::isfinite(value_of(problem.grasp.angle)), "grasp angle", value_of(problem.grasp.angle),
-          "finite rad");
-  require(std::isfinite(value_of(problem.slip.x)), "slip x", value_of(problem.slip.x), "finite m/s");
-  require(std::isfinite(value_of(problem.slip.z)), "slip z", value_of(problem.slip.z), "finite m/s");
-  require(std::isfinite(value_of(problem.spin)), "spin", value_of(problem.spin), "finite rad/s");
+  finite("grasp angle", value_of(problem.grasp.angle), "rad");
+  finite("slip x", value_of(problem.slip.x), "m/s");
+  finite("slip z", value_of(problem.slip.z), "m/s");
+  finite("spin", value_of(problem.spin), "rad/s");
   const double begin = problem.hand.begin(), end = problem.hand.end();
-  require(std::isfinite(begin), "begin of the hand's motion", begin, "finite s");
-  require(std::isfinite(end), "end of the hand's motion", end, "finite s");
-  for (const double t : problem.hand.jumps())
-    require(std::isfinite(t), "jump of the hand's motion", t, "finite s");
-  for (const double t : problem.normal_force.kinks())
-    require(std::isfinite(t), "kink of the normal force", t, "finite s");
+  finite("begin of the hand's motion", begin, "s");
+  finite("end of the hand's motion", end, "s");
+  for (const double t : problem.hand.jumps()) finite("jump of the hand's motion", t, "s");
+  for (const double t : problem.normal_force.kinks()) finite("kink of the normal force", t, "s");
   const double release = problem.normal_force.release_time();
   require(release > -std::numeric_limits<double>::infinity(), "release time of the normal force", release,
           "(-inf, inf] s");
@@ -58,6 +57,19 @@ void validate(const ReleaseProblem<S>& problem) {
     throw std::invalid_argument(
         fmt::format("release: start = {} is not in [{}, {}) s, where the hand's motion is known",
                     problem.start, begin, end));
+}
+
+/// Throws std::invalid_argument for a normal force that still presses after its own release, where the hand's
+/// motion goes on after it.
+inline void require_released(const contact::NormalForce& force, double end) {
+  const double release = force.release_time(), first = release + contact::kSameInstant;
+  if (!(first <= end)) return;
+  const Window after{release, end};
+  for (const double t : {first, 0.5 * (first + end), end})
+    if (const double f = force.at(after, t); f != 0)
+      throw std::invalid_argument(
+          fmt::format("release: normal force = {} N at {} s is not 0 N, though its release_time() is {} s", f,
+                      t, release));
 }
 
 /// True if time, pose and twist are.
@@ -77,8 +89,12 @@ template <class P>
 class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 6>,
                             public contact::SceneSource {
  public:
+  /// Throws std::logic_error for a law without modes.
   explicit ReleaseSystem(const ReleaseProblem<P>& problem)
       : problem_(problem), contact_(problem.contact), free_(contact_.mode_count()) {
+    if (free_ < 1)
+      throw std::logic_error(
+          fmt::format("contact model \"{}\": {} modes are not in [1, inf)", contact_.name(), free_));
     contact_.separation(problem.normal_force, separation_);
     if (!contact_.needs_hold()) return;
     hold_at_start(hold_dual_);
@@ -105,7 +121,14 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   std::string_view mode_name(int mode) const override {
     return mode == free_ ? "free" : contact_.mode_name(mode);
   }
-  int guard_count(int mode) const override { return contact_.guard_count(mode); }
+  int guard_count(int mode) const override {
+    const int count = mode == free_ ? 0 : contact_.guard_count(mode);
+    if (count < 0 || count > dynamics::kMaxGuards)
+      throw std::logic_error(fmt::format("contact model \"{}\": {} guards of mode \"{}\" are not in [0, {}]",
+                                         contact_.name(), count, contact_.mode_name(mode),
+                                         dynamics::kMaxGuards));
+    return count;
+  }
   dynamics::Guard guard(int mode, int index) const override { return contact_.guard(mode, index); }
   bool is_paced(int mode) const override { return contact_.is_homogeneous(mode); }
   State<double, 6> pace_weights() const override { return {0, 0, 0, 1, 1, contact_.spin_length()}; }
@@ -151,15 +174,29 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   }
   template <class S>
   Entry<S, 6> on_guard_(const Phase& p, int guard, const S& t, const State<S, 6>& y) const {
-    return contact_.on_guard(p, guard, *this, t, Relative<S>::from(y));
+    return of_the_law(contact_.on_guard(p, guard, *this, t, Relative<S>::from(y)));
   }
   template <class S>
   Entry<S, 6> on_time_(int mode, const Window& window, const S& t, const State<S, 6>& y) const {
     if (value_of(t) >= separation() - 1e-12) return {free_, t, y, S(0)};
-    return contact_.membership(mode, window, *this, t, Relative<S>::from(y));
+    return of_the_law(contact_.membership(mode, window, *this, t, Relative<S>::from(y)));
+  }
+  /// The mode in which the start is.
+  Entry<P, 6> begin(const Window& window, const Relative<P>& y) const {
+    return of_the_law(contact_.membership(-1, window, *this, P(problem_.start), y));
   }
 
  private:
+  /// A law's answer, which has to be a mode of its own: when the object is free its separation says.
+  template <class S>
+  Entry<S, 6> of_the_law(const Entry<S, 6>& entry) const {
+    if (entry.mode < 0 || entry.mode >= free_)
+      throw std::logic_error(
+          fmt::format("contact model \"{}\": mode {} is not in [0, {}], the modes that it says to have",
+                      contact_.name(), entry.mode, free_ - 1));
+    return entry;
+  }
+
   /// The last scenes are kept: a step, the guards at its end and the phase that follows ask for the same
   /// instants, and an implicit step for those of its stages again and again.
   const Scene<double>& scene_(const Window& window, double t) const {

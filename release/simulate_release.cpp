@@ -52,7 +52,12 @@ ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const Releas
                     "times to be resolved",
                     problem.start));
   validate(problem);
+  if (std::is_same_v<S, Dual> && options.ledger)
+    throw std::invalid_argument(
+        "release: ledger = true is not for problems with derivatives: simulate the values for it");
   const ReleaseSystem<S> system(problem);
+  if (std::abs(system.separation() - problem.normal_force.release_time()) <= contact::kSameInstant)
+    require_released(problem.normal_force, problem.hand.end());
   const auto& [offset, angle] = problem.grasp;
   const Relative<S> held{{offset, S(0)}, angle, problem.slip, problem.spin};
   std::vector<double> times;
@@ -63,8 +68,7 @@ ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const Releas
 
   ReleaseResult<S> result;
   Entry<S, 6> entry{system.free_mode(), S(problem.start), held.state(), S(0)};
-  if (problem.start < system.separation())
-    entry = problem.contact.membership(-1, first, system, S(problem.start), held);
+  if (problem.start < system.separation()) entry = system.begin(first, held);
   result.slips_at_start = entry.mode != 0 && entry.mode != system.free_mode();
 
   dynamics::IntegratorOptions integrator = options.integrator;

@@ -11,8 +11,11 @@
 
 namespace unhand::release {
 
-/// Everything that determines a release. The references must outlive the simulation. A held object starts in
-/// the mode that its grip allows; one that slips already starts slipping.
+/// Everything that determines a release. The references must outlive the simulation, and the readings of its
+/// result (mode_events, sample_release). A held object starts in the mode that its grip allows; one that
+/// slips already starts slipping. Accepted: mass (0, 1e4] kg, inertia (0, 1e6] kg m², com_offset [-100, 100]
+/// m, start [-1e6, 1e6] s and within the hand's motion but not at its end, everything else finite. Units
+/// cannot be seen here: metres and radians are taken as they are given.
 template <class S>
 struct ReleaseProblem {
   const HandMotion& hand;                    ///< in the world
@@ -23,7 +26,8 @@ struct ReleaseProblem {
   Grasp<S> grasp;                            ///< where the pads hold the object
   double start{};                            ///< [s]
   dynamics::Vec2<S> slip{};                  ///< of the patch at the start [m/s]; zero: held
-  S spin{};                                  ///< ω_O − ω_H at the start [rad/s]
+  /// ω_O − ω_H at the start [rad/s]. A law that knows no slip (gripper_delay) starts without slip and spin.
+  S spin{};
 };
 
 /// How a release ended.
@@ -45,7 +49,10 @@ struct DetachState {
   dynamics::Twist<S> twist;  ///< of the CoM, in the world [m/s, m/s, rad/s]
 };
 
-/// What happened, in order: the mode entered at `time`, and why.
+/// What happened, in order: the mode entered at `time`, and why. The first mode of an object that is held at
+/// the start is no event; where it slips at once, or moves against the hand there, that mode is one of cause
+/// "start". A mode entered again at a kink or a jump ("time") is told again; pads that give at every point
+/// have no modes but "free".
 struct ModeEvent {
   double time{};      ///< s
   std::string cause;  ///< the guard's name, "start", "time" or "limit"
@@ -67,7 +74,7 @@ struct EnergyLedger {
 /// How the release is integrated, and what is kept.
 struct ReleaseOptions {
   dynamics::IntegratorOptions integrator{};  ///< tolerances, budgets, method
-  bool ledger{false};                        ///< book the energy (records the trajectory)
+  bool ledger{false};  ///< book the energy (records the trajectory); of problems of double alone
 };
 
 /// How a release ended: state at detach, events, energy.
@@ -85,9 +92,14 @@ struct ReleaseResult {
 };
 
 /// Simulates from `problem.start` to detach. Throws std::invalid_argument when an input is not finite (an
-/// instant of the hand or of the normal force, too; a release at +infinity is none) or out of range (mass,
-/// inertia, start against the hand's log, a normal force below zero). A hand that is not finite where it is
-/// followed, or at detach, leaves it `not_solved`, `not_finite`. Instantiated for double and Dual.
+/// instant of the hand or of the normal force, too; a release at +infinity is none) or out of range
+/// (ReleaseProblem), where a ledger is asked for with derivatives, where the normal force is not zero after
+/// its own release_time() (looked at right after it, at the end of the hand's motion and midway), and where
+/// it is below zero at an instant that the integration looks at: a dip between two of them is not seen. A
+/// release before the start is none of these: the object is free from the start on, detached there without an
+/// event. A hand that is not finite where it is followed, or at detach, leaves it `not_solved`, `not_finite`.
+/// Throws std::logic_error for a law that breaks what ContactModel says of modes and guards. Instantiated for
+/// double and Dual.
 template <class S>
 ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const ReleaseOptions& options = {});
 
@@ -98,7 +110,7 @@ std::vector<ModeEvent> mode_events(const ReleaseProblem<S>& problem, const Relea
 /// A recorded release at t: pose, twist, and the wrench about the patch, all of the object in the world.
 template <class S>
 struct ReleaseSample {
-  std::string_view mode;          ///< the mode in force
+  std::string_view mode;          ///< the mode in force; of the law, as long as that lives
   dynamics::Pose<S> pose;         ///< of the CoM [m, m, rad]
   dynamics::Twist<S> twist;       ///< of the CoM [m/s, m/s, rad/s]
   dynamics::Wrench<S> wrench;     ///< by the pads, about the patch [N, N, N m]
@@ -106,7 +118,8 @@ struct ReleaseSample {
   S normal_force{};               ///< of one pad [N]
   contact::Relative<S> relative;  ///< the object against the hand
 };
-/// The release at t [s], start <= t <= detach; needs a recorded trajectory, throws std::out_of_range without.
+/// The release at t [s], start <= t <= detach; throws std::out_of_range for another t, and without a recorded
+/// trajectory.
 template <class S>
 ReleaseSample<S> sample_release(const ReleaseProblem<S>& problem, const ReleaseResult<S>& result, const S& t);
 

@@ -1,7 +1,7 @@
 // Rigid-body dynamics of a serial chain, M(q) q̈ + C(q, q̇) q̇ + g(q) = τ.
 //
 // All functions are templated on their scalar: double, Dual, or any other dynamics::DualOf. Those of double
-// and Dual are compiled once, in dynamics.cpp.
+// and Dual are compiled once, in dynamics.cpp. They check sizes as those of kinematics.hpp do.
 #pragma once
 
 #include "planners/arm/kinematics.hpp"
@@ -58,6 +58,7 @@ JointVector<S> forward_dynamics(const Chain& chain, const JointVector<S>& q, con
 template <class S>
 JointVector<S> friction_torque(const Chain& chain, const JointVector<S>& qd) {
   using std::exp;
+  require_sizes(chain, "friction of the joints", qd);
   JointVector<S> out(chain.size());
   for (int i = 0; i < chain.size(); ++i) {
     const JointFriction& f = chain.joints[i].friction;
@@ -81,6 +82,7 @@ ChainEnergy<S> energy_of(const Chain& chain, const JointVector<S>& q, const Join
 template <class S>
 JointVector<S> inverse_dynamics(const Chain& chain, const JointVector<S>& q, const JointVector<S>& qd,
                                 const JointVector<S>& qdd, const Eigen::Vector3d& gravity) {
+  require_sizes(chain, "inverse dynamics", q, qd, qdd);
   const int n = chain.size();
   std::array<Matrix3<S>, kMaxJoints> R;
   std::array<Vector3<S>, kMaxJoints> force, torque;  // of each link's own motion, about its origin
@@ -114,6 +116,7 @@ JointVector<S> inverse_dynamics(const Chain& chain, const JointVector<S>& q, con
 
 template <class S>
 JointMatrix<S> mass_matrix(const Chain& chain, const JointVector<S>& q) {
+  require_sizes(chain, "mass matrix", q);
   const int n = chain.size();
   JointMatrix<S> out(n, n);
   std::array<Matrix3<S>, kMaxJoints> R;
@@ -158,7 +161,7 @@ JointMatrix<S> mass_matrix(const Chain& chain, const JointVector<S>& q) {
 template <class S>
 JointMatrix<S> coriolis_matrix(const Chain& chain, const JointVector<S>& q, const JointVector<S>& qd) {
   const int n = chain.size();
-  const JointVector<S> at = coriolis_torque(chain, q, qd);
+  const JointVector<S> at = coriolis_torque(chain, q, qd);  // checks the sizes
   JointMatrix<S> out(n, n);
   for (int j = 0; j < n; ++j) {
     JointVector<S> unit = JointVector<S>::Zero(n);
@@ -192,6 +195,7 @@ JointVector<S> solve_positive(JointMatrix<S> A, JointVector<S> b) {
 template <class S>
 ChainEnergy<S> energy_of(const Chain& chain, const JointVector<S>& q, const JointVector<S>& qd,
                          const Eigen::Vector3d& gravity) {
+  require_sizes(chain, "energy of a chain", q, qd);
   const ChainFrames<S> frames = frames_of(chain, q);
   ChainEnergy<S> out;
   Vector3<S> v = Vector3<S>::Zero(), w = Vector3<S>::Zero(), at = Vector3<S>::Zero();

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <tuple>
 
 #include "planners/arm/dynamics.hpp"
 
@@ -11,6 +13,10 @@ namespace unhand::planners {
 
 void JerkProfile::append(const std::vector<JerkPiece>& pieces) {
   for (const auto& [h, jerk] : pieces) {
+    if (!(h >= 0 && std::isfinite(h)))
+      throw std::invalid_argument(fmt::format("jerk profile: duration = {} is not in [0, inf) s", h));
+    if (!std::isfinite(jerk))
+      throw std::invalid_argument(fmt::format("jerk profile: jerk = {} rad/s³ is not finite", jerk));
     JointSample& from = knots_.back();
     from.jerk = jerk;
     knots_.push_back({from.q + h * (from.qd + h * (from.qdd / 2 + h * jerk / 6)),
@@ -20,6 +26,7 @@ void JerkProfile::append(const std::vector<JerkPiece>& pieces) {
 }
 
 JointSample JerkProfile::at(double t) const {
+  if (std::isnan(t)) throw std::invalid_argument("jerk profile: t = nan s is no instant");
   if (t < 0) return {knots_[0].q + t * knots_[0].qd, knots_[0].qd, 0, 0};
   if (t >= times_.back()) {
     const JointSample& last = knots_.back();
@@ -56,10 +63,22 @@ std::pair<double, double> peaks(double a, double duration, const JointLimits& l)
 
 constexpr int kHalvings = 60;  ///< of an interval: to rounding
 
+void require_ramp(double v, double a, const JointLimits& limits) {
+  if (!std::isfinite(v) || !std::isfinite(a))
+    throw std::invalid_argument(fmt::format("velocity ramp: to {} rad/s with {} rad/s² is not finite", v, a));
+  if (!(limits.acceleration > 0) || !(limits.jerk > 0))
+    throw std::invalid_argument(
+        fmt::format("velocity ramp: limits of {} rad/s² and {} rad/s³ are not in (0, inf]",
+                    limits.acceleration, limits.jerk));
+}
+
 }  // namespace
 
 std::optional<std::vector<JerkPiece>> velocity_ramp(double v, double a, double duration,
                                                     const JointLimits& limits) {
+  require_ramp(v, a, limits);
+  if (!(duration >= 0 && std::isfinite(duration)))
+    throw std::invalid_argument(fmt::format("velocity ramp: duration = {} is not in [0, inf) s", duration));
   const double j = limits.jerk;
   if (std::abs(a) > limits.acceleration || duration * j < std::abs(a) * (1 - 1e-12)) return {};
   auto [low, high] = peaks(a, duration, limits);
@@ -77,6 +96,7 @@ std::optional<std::vector<JerkPiece>> velocity_ramp(double v, double a, double d
 }
 
 double shortest_ramp(double v, double a, const JointLimits& limits) {
+  require_ramp(v, a, limits);
   if (std::abs(a) > limits.acceleration) return std::numeric_limits<double>::infinity();
   const auto possible = [&](double duration) {
     const auto [low, high] = peaks(a, duration, limits);
@@ -94,6 +114,12 @@ double shortest_ramp(double v, double a, const JointLimits& limits) {
 }
 
 std::vector<JerkPiece> rest_to_rest(double velocity, double acceleration, double jerk) {
+  for (const auto& [name, value, unit] : {std::tuple{"velocity", velocity, "1/s"},
+                                          {"acceleration", acceleration, "1/s²"},
+                                          {"jerk", jerk, "1/s³"}})
+    if (!(value > 0 && std::isfinite(value)))
+      throw std::invalid_argument(
+          fmt::format("motion from rest to rest: {} = {} is not in (0, inf) {}", name, value, unit));
   double v = velocity;
   const auto ramp = [&] {  // duration of one jerk piece, and of speeding up
     const double piece = v * jerk >= acceleration * acceleration ? acceleration / jerk : std::sqrt(v / jerk);
@@ -134,11 +160,20 @@ std::string LimitCheck::worst(const Chain& chain) const {
   const auto most = *std::max_element(std::begin(all), std::end(all), [](const auto& a, const auto& b) {
     return a.first->fraction < b.first->fraction;
   });
+  if (most.first->joint < 0 || most.first->joint >= chain.size())
+    throw std::invalid_argument(
+        fmt::format("limit check: joint {} is not in [0, {}]", most.first->joint, chain.size() - 1));
   return fmt::format("{} of {} at {:.1f} % of its limit at {:.4f} s", most.second,
                      chain.joints[most.first->joint].name, 100 * most.first->fraction, most.first->time);
 }
 
 LimitCheck check_limits(const Chain& chain, const JointTrajectory& trajectory, double step) {
+  if (!(step >= kLeastCheckStep && std::isfinite(step)))
+    throw std::invalid_argument(
+        fmt::format("limit check: step = {} is not in [{}, inf) s", step, kLeastCheckStep));
+  if (static_cast<int>(trajectory.joints.size()) != chain.size())
+    throw std::invalid_argument(fmt::format("limit check: the motion of {} joints is not one of {}",
+                                            trajectory.joints.size(), chain.size()));
   LimitCheck out;
   out.lowest = std::numeric_limits<double>::infinity();
   const auto note = [](LimitUse& use, double fraction, int joint, double t) {

@@ -23,9 +23,11 @@ class JerkProfile {
  public:
   /// From (q, q̇, q̈) at t = 0.
   explicit JerkProfile(const JointSample& start) : knots_{start}, times_{0.0} {}
-  /// Adds stretches after the last one; durations >= 0 [s].
+  /// Adds stretches after the last one. Throws std::invalid_argument unless durations are >= 0 [s] and all is
+  /// finite.
   void append(const std::vector<JerkPiece>& pieces);
-  /// Beyond its ends the motion stays at the end's state, with the end's velocity and no acceleration.
+  /// Beyond its ends the motion goes on uniformly, with the end's velocity; no `t` [s], no sample: NaN throws
+  /// std::invalid_argument.
   JointSample at(double t) const;
   /// Appends the instants at which acceleration or velocity may be largest: the pieces' ends, and where the
   /// acceleration passes through zero.
@@ -41,14 +43,15 @@ class JerkProfile {
 };
 
 /// From rest to velocity `v` with acceleration `a` at the end, in three pieces (jerk, none, jerk): the peak
-/// acceleration follows from the duration. Empty where `duration` is too short for the limits.
+/// acceleration follows from the duration. Empty where `duration` is too short for the limits. Throws
+/// std::invalid_argument for a number that is not finite, and for limits that are not > 0.
 std::optional<std::vector<JerkPiece>> velocity_ramp(double v, double a, double duration,
                                                     const JointLimits& limits);
-/// The shortest duration for which there is one. Infinite if |a| exceeds the limit.
+/// The shortest duration for which there is one. Infinite if |a| exceeds the limit. Throws as velocity_ramp.
 double shortest_ramp(double v, double a, const JointLimits& limits);
 
 /// From rest to rest over the distance 1 with limits of velocity, acceleration and jerk [1/s, 1/s², 1/s³]:
-/// the time-optimal seven pieces.
+/// the time-optimal seven pieces. Throws std::invalid_argument unless each is > 0 and finite.
 std::vector<JerkPiece> rest_to_rest(double velocity, double acceleration, double jerk);
 
 /// All joints of a chain together, from `begin` [s] on.
@@ -79,11 +82,15 @@ struct LimitCheck {
   double lowest{};  ///< height of the lowest joint origin beyond the second, or the tip [m]
   /// Whether every fraction is at most 1 + tolerance.
   bool within(double tolerance = 1e-9) const;
-  /// The limit that is used most, in words.
+  /// The limit that is used most, in words. Throws std::invalid_argument for a joint that the chain does not
+  /// have.
   std::string worst(const Chain& chain) const;
 };
+/// The least step of check_limits, by which a long look stays one of seconds [s].
+inline constexpr double kLeastCheckStep = 1e-5;
 /// Looks every `step` [s], at the end, and where a velocity or an acceleration is largest. Torques are those
-/// of inverse dynamics, with friction.
+/// of inverse dynamics, with friction. Throws std::invalid_argument for a step out of [kLeastCheckStep, inf)
+/// and a trajectory of another number of joints than the chain's.
 LimitCheck check_limits(const Chain& chain, const JointTrajectory& trajectory, double step = 1e-3);
 
 }  // namespace unhand::planners

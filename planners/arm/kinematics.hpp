@@ -1,16 +1,30 @@
 // Kinematics of a serial chain: where its tip is, and how it moves.
 //
 // All functions are templated on their scalar: double, Dual, or any other dynamics::DualOf. Those of double
-// and Dual are compiled once, in kinematics.cpp.
+// and Dual are compiled once, in kinematics.cpp. They throw std::invalid_argument for vectors that have not
+// one number for each joint of the chain; what the numbers are, and whether the chain is one (validate), is
+// the caller's to check.
 #pragma once
+
+#include <fmt/core.h>
 
 #include <Eigen/Geometry>
 #include <array>
 #include <cmath>
+#include <stdexcept>
 
 #include "planners/arm/chain.hpp"
 
 namespace unhand::planners {
+
+/// Throws std::invalid_argument unless each of `x` has one number for each joint.
+template <class... Vectors>
+void require_sizes(const Chain& chain, const char* of, const Vectors&... x) {
+  for (const Eigen::Index size : {static_cast<Eigen::Index>(x.size())...})
+    if (size != chain.size())
+      throw std::invalid_argument(fmt::format("{}: a vector of {} is not one of {} joints, as the chain has",
+                                              of, size, chain.size()));
+}
 
 /// a × b; of mixed scalars.
 template <class A, class B>
@@ -75,6 +89,7 @@ TipMotion<S> tip_motion(const Chain& chain, const JointVector<S>& q, const Joint
 
 template <class S>
 ChainFrames<S> frames_of(const Chain& chain, const JointVector<S>& q) {
+  require_sizes(chain, "frames of a chain", q);
   ChainFrames<S> out;
   Transform<S> at;
   for (int i = 0; i < chain.size(); ++i) {
@@ -105,6 +120,7 @@ Jacobian<S> jacobian(const Chain& chain, const JointVector<S>& q) {
 
 template <class S>
 Jacobian<S> jacobian_rate(const Chain& chain, const JointVector<S>& q, const JointVector<S>& qd) {
+  require_sizes(chain, "rate of a Jacobian", q, qd);
   const ChainFrames<S> frames = frames_of(chain, q);
   std::array<Vector3<S>, kMaxJoints> velocity, omega;  // of the links' origins, and of the links
   Vector3<S> v = Vector3<S>::Zero(), w = Vector3<S>::Zero(), at = Vector3<S>::Zero();
@@ -129,6 +145,7 @@ Jacobian<S> jacobian_rate(const Chain& chain, const JointVector<S>& q, const Joi
 template <class S>
 TipMotion<S> tip_motion(const Chain& chain, const JointVector<S>& q, const JointVector<S>& qd,
                         const JointVector<S>& qdd) {
+  require_sizes(chain, "motion of the tip", q, qd, qdd);
   const ChainFrames<S> frames = frames_of(chain, q);
   const Vector3<S> zero = Vector3<S>::Zero();
   TipMotion<S> m{frames.tip, zero, zero, zero, zero};

@@ -66,6 +66,7 @@ Regressor<double> momentum_rest_regressor(const Chain& chain, const JointVector<
 template <class S>
 Regressor<S> torque_regressor(const Chain& chain, const JointVector<S>& q, const JointVector<S>& qd,
                               const JointVector<S>& qdd, const Eigen::Vector3d& gravity, int first) {
+  require_sizes(chain, "torque regressor", q, qd, qdd);
   const int n = chain.size();
   Regressor<S> out = Regressor<S>::Zero(n, kLinkParameters * (n - first));
   std::array<Matrix3<S>, kMaxJoints> R;

@@ -39,6 +39,7 @@ AdaptiveController::AdaptiveController(const Chain& model, const Adaptation& ada
 
 ControlStep AdaptiveController::task_law(const TaskReference& r, const TaskGains& gains, const Joints& q,
                                          const Joints& qd) const {
+  require_sizes(model_, "task law", q, qd, gains.damping, gains.rest);
   const int n = model_.size(), last = n - 1;
   const TipMotion<double> tip = tip_motion<double>(model_, q, qd, Joints::Zero(n));
   const Jacobian<double> J = jacobian<double>(model_, q);
@@ -69,6 +70,9 @@ ControlStep AdaptiveController::task_law(const TaskReference& r, const TaskGains
 
 void AdaptiveController::adapt(const ControlStep& step, const Joints& applied, const Joints& q,
                                const Joints& qd, double dt) {
+  require_sizes(model_, "adaptation", step.velocity_error, applied, q, qd);
+  if (!(dt >= 0 && std::isfinite(dt)))
+    throw std::invalid_argument(fmt::format("adaptation: dt = {} is not in [0, inf) s", dt));
   if (adaptation_.gain.maxCoeff() == 0) return;
   const int last = model_.size() - 1;
   LinkParameters rate = Y_r_.transpose() * step.velocity_error;
@@ -109,6 +113,8 @@ double lyapunov(const Chain& truth, const TaskGains& gains, const Adaptation& ad
 }
 
 TaskReference MinimumJerk::at(double t, const Eigen::Matrix3d& orientation) const {
+  if (!(duration > 0 && std::isfinite(duration)))
+    throw std::invalid_argument(fmt::format("minimum jerk: duration = {} is not in (0, inf) s", duration));
   const double T = duration, s = std::clamp(t / T, 0.0, 1.0);
   // In s = t/T, with accelerations zero at both ends.
   const Eigen::Vector3d zero = Eigen::Vector3d::Zero();

@@ -44,7 +44,8 @@ struct ControlStep {
   Eigen::Matrix<double, 6, 1> error;   ///< e_ξ: position [m] and rotation vector [rad]
 };
 
-/// The law with its estimate of the unknown body.
+/// The law with its estimate of the unknown body. For one thread: `task_law` keeps its regressor for `adapt`.
+/// Both throw std::invalid_argument for vectors that have not one number for each joint.
 class AdaptiveController {
  public:
   /// `model`: the chain as it is known, without the unknown body; friction is compensated as the model has
@@ -90,7 +91,7 @@ double lyapunov(const Chain& truth, const TaskGains& gains, const Adaptation& ad
 struct MinimumJerk {
   Eigen::Vector3d from, from_velocity, to, to_velocity;  ///< m, m/s
   double duration{};                                     ///< s, > 0
-  /// The motion at t [s], with the orientation given.
+  /// The motion at t [s], with the orientation given. Throws std::invalid_argument for another duration.
   TaskReference at(double t, const Eigen::Matrix3d& orientation) const;
 };
 

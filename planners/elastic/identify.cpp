@@ -113,9 +113,10 @@ void Excitation::at(double t, Joints& q, Joints& qd, Joints& qdd) const {
 
 DesignedExcitation design_excitation(const Chain& chain, const ExcitationOptions& o) {
   validate(chain);
-  if (!(o.period > 0) || o.harmonics < 1 || o.samples < 10 || o.trials < 1)
+  if (!(o.period > 0 && std::isfinite(o.period)) || o.harmonics < 1 || o.samples < 10 || o.trials < 1)
     throw std::invalid_argument(
-        "design_excitation: period > 0, harmonics >= 1, samples >= 10 and trials >= 1 are accepted");
+        "design_excitation: period in (0, inf) s, harmonics >= 1, samples >= 10 and trials >= 1 are "
+        "accepted");
   const int n = chain.size();
   std::mt19937_64 random(o.seed);
   std::normal_distribution<double> normal;
@@ -165,6 +166,10 @@ IdentifiedInertia identify_inertia(const Chain& prior, const std::vector<MotionS
   Eigen::MatrixXd W(rows, parameters);
   Eigen::VectorXd tau(rows);
   for (std::size_t k = 0; k < log.size(); ++k) {
+    const MotionSample& one = log[k];
+    require_sizes(prior, "identify", one.q, one.qd, one.qdd, one.torque);
+    if (!std::isfinite(one.q.sum() + one.qd.sum() + one.qdd.sum() + one.torque.sum()))
+      throw std::invalid_argument(fmt::format("identify: sample {} is not finite", k));
     W.middleRows(n * static_cast<int>(k), n) =
         control::torque_regressor<double>(prior, log[k].q, log[k].qd, log[k].qdd);
     tau.segment(n * static_cast<int>(k), n) = log[k].torque;

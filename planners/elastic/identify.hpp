@@ -19,10 +19,10 @@ struct Excitation {
 
 /// What motion is looked for, and how long.
 struct ExcitationOptions {
-  double period{4};  ///< s, > 0
+  double period{4};  ///< s, in (0, inf)
   int harmonics{3};  ///< >= 1
-  int samples{60};   ///< instants per period that the condition number looks at
-  int trials{300};   ///< of a random search that narrows around the best
+  int samples{60};   ///< instants per period that the condition number looks at, >= 10
+  int trials{300};   ///< of a random search that narrows around the best, >= 1
   unsigned seed{1};  ///< of the random search
 };
 /// A motion, and how well it shows the parameters.
@@ -53,7 +53,7 @@ struct IdentifiedInertia {
 /// Uᵀ with an upper triangular U of positive diagonal (log-Cholesky, [RuckerWensing2022]), so that no
 /// estimate is unphysical; what the log does not determine stays near `prior`. Throws std::invalid_argument
 /// for fewer equations (one per sample and joint) than twice the parameters, that is fewer than 20 samples,
-/// or a prior with no mass.
+/// for samples that have not one finite number for each joint, or a prior with no mass.
 IdentifiedInertia identify_inertia(const Chain& prior, const std::vector<MotionSample>& log);
 
 /// One line of a log in a coupled mode, the link held: deflection θ − ψ, θ̇, θ̈ and the motor's torque.

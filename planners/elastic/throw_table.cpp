@@ -79,6 +79,9 @@ ElasticThrow interpolate(const ThrowTable& table, double distance) {
   if (x.size() < 4 || !(distance >= x.front() && distance <= x.back()))
     throw std::invalid_argument(fmt::format("interpolate: distance = {} m; accepted: [{}, {}] of the table",
                                             distance, x.empty() ? 0 : x.front(), x.empty() ? 0 : x.back()));
+  if (table.throws.size() != x.size())
+    throw std::invalid_argument(fmt::format("interpolate: {} throws are not one for each of {} distances",
+                                            table.throws.size(), x.size()));
   const std::size_t above =
       static_cast<std::size_t>(std::upper_bound(x.begin(), x.end(), distance) - x.begin());
   const std::size_t first = std::min(above > 2 ? above - 2 : 0, x.size() - 4);

@@ -38,7 +38,8 @@ ThrowTable make_table(const ClutchedArm& arm, ThrowTask task, const std::vector<
                       const ThrowProgramOptions& options, int starts = 6);
 
 /// The throw to a target between nodes: durations, motor torques, states and the release through the four
-/// nearest nodes by Lagrange's cubic. Throws std::invalid_argument outside the table.
+/// nearest nodes by Lagrange's cubic. Throws std::invalid_argument outside the table, and for one that has
+/// not a throw for each distance.
 ElasticThrow interpolate(const ThrowTable& table, double distance);
 
 /// One target of a dense check: the interpolated throw run by the integrator.

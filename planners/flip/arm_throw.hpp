@@ -64,8 +64,8 @@ struct ArmThrow {
 /// are held over a control step. Commands are cut to the torque limits and to `torque_rate`.
 class ThrowingArm {
  public:
-  /// Simulates the acceleration. Equal seeds give equal noise. Throws std::invalid_argument for options out
-  /// of range.
+  /// Simulates the acceleration. Equal seeds give equal noise. `robot` and `body` are kept by reference.
+  /// Throws std::invalid_argument for options out of range.
   ThrowingArm(const FlipRobot& robot, const ArmBody& body, const FlipCommand& u, std::uint64_t noise_seed,
               const ArmOptions& options = {});
 

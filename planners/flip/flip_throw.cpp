@@ -1,6 +1,9 @@
 #include "planners/flip/flip_throw.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
+#include <stdexcept>
 
 #include "contact/registry.hpp"
 #include "flight/projectile.hpp"
@@ -10,6 +13,9 @@
 namespace unhand::planners::flip {
 
 std::optional<FlipPose> fly_flip(const DetachVector& d) {
+  for (const double x : d)
+    if (!std::isfinite(x))
+      throw std::invalid_argument(fmt::format("flight of a bar: a state with {} is not finite", x));
   const auto landing =
       flight::project<double>({d[0], d[1], d[2]}, {d[3], d[4], d[5]}, {0.0, kGravity.z()}, 0.0);
   if (!landing) return {};
@@ -18,6 +24,11 @@ std::optional<FlipPose> fly_flip(const DetachVector& d) {
 
 std::optional<FlipRelease> release_bar(const release::HandMotion& hand, const HeldBar& held,
                                        std::vector<dynamics::Wrench<double>>* on_bar, double step) {
+  if (!contact::follows_pads(held.pads.law))
+    throw std::invalid_argument(
+        fmt::format("release of a bar: the law {} does not follow the pads", held.pads.law));
+  if (!(step > 0 && std::isfinite(step)))
+    throw std::invalid_argument(fmt::format("release of a bar: step = {} is not in (0, inf) s", step));
   contact::ContactParameters<double> pads;
   pads.patch = contact::Patch<double>::of_length(held.pads.mu, held.pads.length, held.pads.count);
   pads.law_values = held.pads.law_values;

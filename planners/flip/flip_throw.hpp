@@ -23,7 +23,8 @@ struct FlipPose {
 };
 inline constexpr double kFromHanging = 1.5707963267948966;  ///< [rad]
 
-/// The flow map g of the flight to height 0. Empty where it never comes down to it.
+/// The flow map g of the flight to height 0. Empty where it never comes down to it. Throws
+/// std::invalid_argument for a state that is not finite.
 std::optional<FlipPose> fly_flip(const DetachVector& detach);
 
 /// How one bar is held and let go.
@@ -42,7 +43,9 @@ struct FlipRelease {
   double turned{};               ///< of the bar against the hand until then [rad]
 };
 
-/// Empty where the bar is not free before the hand's motion ends, or the release is not solved. With
+/// Throws std::invalid_argument for pads whose law does not follow them (contact::follows_pads) and for a
+/// step that is not > 0 [s]. Empty where the bar is not free before the hand's motion ends, or the release is
+/// not solved. With
 /// `on_bar`, the wrench of the pads about their middle is written there for instants k `step`, k = 0 …, zero
 /// once the bar is free.
 std::optional<FlipRelease> release_bar(const release::HandMotion& hand, const HeldBar& held,

@@ -42,9 +42,14 @@ HandLibrary::HandLibrary(const FlipRobot& robot, const Bar& bar, int per_side)
 
 std::optional<DetachVector> HandLibrary::between(const std::vector<std::optional<DetachVector>>& values,
                                                  const std::array<double, 3>& fractions) const {
+  if (values.size() != commands_.size())
+    throw std::invalid_argument(fmt::format("hand library: {} values are not one for each of {} commands",
+                                            values.size(), commands_.size()));
   std::array<int, 3> cell{};
   std::array<double, 3> part{};
   for (std::size_t k = 0; k < 3; ++k) {
+    if (std::isnan(fractions[k]))
+      throw std::invalid_argument("hand library: a fraction of the command's range is not finite");
     const double at = std::clamp(fractions[k], 0.0, 1.0) / spacing_;
     cell[k] = std::min(static_cast<int>(at), per_side_ - 2);
     part[k] = at - cell[k];

@@ -16,7 +16,7 @@ namespace unhand::planners::flip {
 /// that is learned, so all learners may share them. Building it takes some 3 ms for each mesh point.
 class HandLibrary {
  public:
-  /// Simulates `per_side`³ commands; the robot is kept by reference.
+  /// Simulates `per_side`³ commands, 2 to 64; the robot is kept by reference.
   HandLibrary(const FlipRobot& robot, const Bar& bar, int per_side = 7);
 
   /// The declared robot.
@@ -25,11 +25,12 @@ class HandLibrary {
   const Bar& bar() const { return bar_; }
   /// The mesh.
   const std::vector<FlipCommand>& commands() const { return commands_; }
-  /// The motion of the hand for command i of the mesh.
-  const release::PolynomialHand& hand(std::size_t i) const { return hands_[i]; }
+  /// The motion of the hand for command i of the mesh; std::out_of_range for another i.
+  const release::PolynomialHand& hand(std::size_t i) const { return hands_.at(i); }
   double spacing() const { return spacing_; }  ///< of the mesh, as a fraction of the range
-  /// Between the values at the mesh points around a command (fractions of its range), linear in each of its
-  /// parameters. Empty where one of them is.
+  /// Between the values at the mesh points around a command (fractions of its range, the nearest of it where
+  /// they lie outside), linear in each of its parameters. Empty where one of them is. Throws
+  /// std::invalid_argument unless there is one value for each of the mesh, and for a fraction that is none.
   std::optional<DetachVector> between(const std::vector<std::optional<DetachVector>>& values,
                                       const std::array<double, 3>& fractions) const;
   /// Of any command; simulated now.

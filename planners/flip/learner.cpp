@@ -1,9 +1,12 @@
 #include "planners/flip/learner.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
+#include <tuple>
 
 namespace unhand::planners::flip {
 namespace {
@@ -20,7 +23,50 @@ void sort_by_error(std::vector<FlipDatum>& data, const FlipTarget& target) {
   });
 }
 
+/// How many of the commands differ.
+std::size_t different(std::span<const FlipDatum> data) {
+  std::size_t out = 0;
+  for (std::size_t i = 0; i < data.size(); ++i)
+    out += std::none_of(data.begin(), data.begin() + static_cast<std::ptrdiff_t>(i),
+                        [&](const FlipDatum& before) { return before.command == data[i].command; });
+  return out;
+}
+
+void require_finite(std::span<const FlipDatum> data) {
+  for (const FlipDatum& one : data) {
+    double sum = one.landing.x + one.landing.angle;
+    for (const double x : one.detach) sum += x;
+    if (!std::isfinite(sum))
+      throw std::invalid_argument(
+          fmt::format("flip learner: the detach or landing of command ({}, {}, {}) is "
+                      "not finite",
+                      one.command.pitch, one.command.speed, one.command.damping));
+  }
+}
+
+constexpr std::size_t kSimplex = 3;  ///< throws of different commands that model 2 begins with
+
 }  // namespace
+
+void validate(const FlipTarget& target) {
+  if (!std::isfinite(target.pose.x) || !std::isfinite(target.pose.angle))
+    throw std::invalid_argument(
+        fmt::format("flip target: x = {} m, angle = {} rad is not finite", target.pose.x, target.pose.angle));
+  for (const auto& [name, value, unit] : {std::tuple{"tolerance_x", target.tolerance_x, "m"},
+                                          {"tolerance_angle", target.tolerance_angle, "rad"}})
+    if (!(value > 0 && std::isfinite(value)))
+      throw std::invalid_argument(
+          fmt::format("flip target: {} = {} is not in (0, inf) {}", name, value, unit));
+}
+
+void validate(const ConeSearch& search) {
+  constexpr double kFinest = 500;
+  if (!(search.reach > 0 && search.reach <= 100))
+    throw std::invalid_argument(fmt::format("cone search: reach = {} is not in (0, 100]", search.reach));
+  if (!(search.mesh >= search.reach / kFinest && search.mesh <= search.reach))
+    throw std::invalid_argument(fmt::format("cone search: mesh = {} is not in [{}, {}], reach/500 to reach",
+                                            search.mesh, search.reach / kFinest, search.reach));
+}
 
 double normalized_error(const FlipPose& landing, const FlipTarget& target) {
   return std::hypot((landing.x - target.pose.x) / target.tolerance_x,
@@ -53,6 +99,8 @@ std::optional<ConeStep> cone_search(ForwardModel model, const FlipDatum& base,
                                     std::span<const FlipDatum, 3> simplex, const FlipTarget& target,
                                     const CommandRange& range, const ConeSearch& search,
                                     std::span<const FlipCommand> tried) {
+  validate(target);
+  validate(search);
   const auto u0 = range.fractions(simplex[0].command), u1 = range.fractions(simplex[1].command),
              u2 = range.fractions(simplex[2].command), from = range.fractions(base.command);
   std::array<double, 3> d1{}, d2{};
@@ -104,6 +152,12 @@ ConeLearner::ConeLearner(ForwardModel model, std::vector<FlipDatum> support, con
       target_(target),
       range_(range),
       search_(search) {
+  validate(target_);
+  validate(search_);
+  require_finite(data_);
+  if (const std::size_t n = different(data_); n < kSimplex)
+    throw std::invalid_argument(fmt::format(
+        "flip learner: the support has {} different commands; accepted: at least {}", n, kSimplex));
   for (const FlipDatum& one : data_) tried_.push_back(one.command);
 }
 
@@ -129,7 +183,10 @@ std::optional<FlipCommand> ConeLearner::next() {
 }
 
 void ConeLearner::observe(std::span<const FlipTrial> trials) {
-  if (const auto mean = mean_of(trials)) data_.push_back(*mean);
+  if (const auto mean = mean_of(trials)) {
+    require_finite({&*mean, 1});
+    data_.push_back(*mean);
+  }
   for (const FlipTrial& one : trials)  // somebody else may have chosen it
     if (std::find(tried_.begin(), tried_.end(), one.command) == tried_.end()) tried_.push_back(one.command);
 }
@@ -155,6 +212,8 @@ std::vector<FlipDatum> transferred(std::span<const FlipDatum> data, double shift
 TransferLearner::TransferLearner(std::span<const FlipDatum> past, double shift, const FlipTarget& target,
                                  const CommandRange& range, const ConeSearch& search)
     : past_(transferred(past, shift)), target_(target), range_(range), search_(search) {
+  validate(target_);
+  validate(search_);
   if (past_.size() < 4)
     throw std::invalid_argument("transfer: fewer than four throws of the old bar can be transferred");
   sort_by_error(past_, target_);
@@ -185,8 +244,11 @@ std::optional<FlipCommand> TransferLearner::next() {
 
 void TransferLearner::observe(std::span<const FlipTrial> trials) {
   if (after_) return after_->observe(trials);
-  if (const auto mean = mean_of(trials)) own_.push_back(*mean);
-  if (own_.size() == 3)
+  if (const auto mean = mean_of(trials)) {
+    require_finite({&*mean, 1});
+    own_.push_back(*mean);
+  }
+  if (different(own_) == kSimplex)
     after_ = std::make_unique<ConeLearner>(ForwardModel::detach, own_, target_, range_, search_, tried_);
 }
 

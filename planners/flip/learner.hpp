@@ -18,9 +18,11 @@ namespace unhand::planners::flip {
 /// Where a bar is to land, and how exactly.
 struct FlipTarget {
   FlipPose pose;                                ///< x* [m], θ* [rad]
-  double tolerance_x{0.05};                     ///< ε_x [m]
-  double tolerance_angle{0.78539816339744831};  ///< ε_θ [rad]
+  double tolerance_x{0.05};                     ///< ε_x [m], > 0
+  double tolerance_angle{0.78539816339744831};  ///< ε_θ [rad], > 0
 };
+/// Throws std::invalid_argument, naming value and accepted range. Learners check their target.
+void validate(const FlipTarget& target);
 
 /// e = |((x − x*)/ε_x, (θ − θ*)/ε_θ)| [-]
 double normalized_error(const FlipPose& landing, const FlipTarget& target);
@@ -55,9 +57,12 @@ enum class ForwardModel {
 
 /// The plane of commands through u_1 that (α_1, α_2) span: u = u_1 + Σ α_i (u_{i+1} − u_1).
 struct ConeSearch {
-  double reach{2.5};  ///< |α_i| at most
-  double mesh{0.05};  ///< between mesh points
+  double reach{2.5};  ///< |α_i| at most, in (0, 100]
+  double mesh{
+      0.05};  ///< between mesh points, from reach/500 to reach: of a finer one the search would be long
 };
+/// Throws std::invalid_argument, naming value and accepted range. Whoever takes a search checks it.
+void validate(const ConeSearch& search);
 
 /// What Σ α_i (y_{i+1} − y_1) is added to, and its prediction, at the best mesh point.
 struct ConeStep {
@@ -80,6 +85,7 @@ class ConeLearner final : public FlipLearner {
  public:
   /// `support`: what is known before, at least three throws of different commands. `tried`: commands that
   /// were executed, landed or not, and are not to be given again; those of the support are among them anyway.
+  /// Throws std::invalid_argument for a smaller support, one that is not finite, and as both validate() do.
   ConeLearner(ForwardModel model, std::vector<FlipDatum> support, const FlipTarget& target,
               const CommandRange& range, const ConeSearch& search = {}, std::vector<FlipCommand> tried = {});
   std::optional<FlipCommand> next() override;
@@ -109,7 +115,7 @@ std::vector<FlipDatum> transferred(std::span<const FlipDatum> data, double shift
 class TransferLearner final : public FlipLearner {
  public:
   /// `past` are throws of the old bar. Throws std::invalid_argument for fewer than four that can be
-  /// transferred.
+  /// transferred, and as both validate() do.
   TransferLearner(std::span<const FlipDatum> past, double shift, const FlipTarget& target,
                   const CommandRange& range, const ConeSearch& search = {});
   std::optional<FlipCommand> next() override;

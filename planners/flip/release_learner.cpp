@@ -1,10 +1,13 @@
 #include "planners/flip/release_learner.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <numeric>
+#include <stdexcept>
 
 #include "dynamics/dense_solve.hpp"
 
@@ -135,6 +138,9 @@ ReleaseLearner::ReleaseLearner(const HandLibrary& library, const ReleaseCard& ca
       scatter_(scatter),
       target_(target),
       throws_(throws) {
+  validate(target_);
+  if (throws_ < 1)
+    throw std::invalid_argument(fmt::format("release learner: throws = {} is not in [1, inf)", throws_));
   for (std::size_t i = 0; i < library_.commands().size(); ++i) {
     const auto release = predicted_release(library_.hand(i), card_, library_.bar());
     mesh_.push_back(release ? std::optional(release->detach) : std::nullopt);
@@ -143,6 +149,7 @@ ReleaseLearner::ReleaseLearner(const HandLibrary& library, const ReleaseCard& ca
 }
 
 ReleaseLearner ReleaseLearner::aimed_at(const FlipTarget& target) const {
+  validate(target);
   ReleaseLearner out = *this;
   out.target_ = target;
   return out;

@@ -67,7 +67,8 @@ struct FlipForecast {
 class ReleaseLearner final : public FlipLearner {
  public:
   /// `known`: what was left over of earlier throws, of this bar or another one. `throws`: of each command.
-  /// Keeps a reference to `library`.
+  /// Keeps a reference to `library`. Throws std::invalid_argument as validate(target) does, and for fewer
+  /// than one throw.
   ReleaseLearner(const HandLibrary& library, const ReleaseCard& card, std::vector<LeftOver> known,
                  const ThrowScatter& scatter, const FlipTarget& target, int throws);
   /// With the same knowledge at another target.

@@ -16,8 +16,8 @@ namespace unhand::planners {
 /// acts across that plane, and so presses on the pads, is left out.
 class HeldMotion {
  public:
-  /// Looks every `step` [s] > 0 from the motion's begin on, and at t = 0. Throws std::invalid_argument as
-  /// validate() does.
+  /// Looks every `step` [s] > 0 from the motion's begin on, and at t = 0. The throw is copied; its chain must
+  /// outlive this. Throws std::invalid_argument as validate() does.
   HeldMotion(const ReleaseThrow& problem, const JointTrajectory& motion, double step = 2e-3);
 
   /// Whether the grip of the card holds the object all the way, with the draw's pads, object and grasp.

@@ -163,8 +163,8 @@ PlanResult plan_throw(const Chain& chain, const TargetBox& box, const PlanOption
   if (home.size() == 0) home = middle_of(chain);
   require_joints(chain, "plan", "home", home);
   require(options.landing_samples >= 2, "plan", "landing_samples", options.landing_samples, "[2, inf)");
-  require(options.check_step > 0 && std::isfinite(options.check_step), "plan", "check_step",
-          options.check_step, "(0, inf) s");
+  require(options.check_step >= kLeastCheckStep && std::isfinite(options.check_step), "plan", "check_step",
+          options.check_step, "[1e-5, inf) s");
   bool through_column = false;
   const auto throws = find_throws(chain, box, options.search, &through_column);
   out.throws = static_cast<int>(throws.size());

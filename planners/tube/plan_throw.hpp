@@ -36,7 +36,7 @@ struct PlanOptions {
   bool tube{true};           ///< false: no acceleration in the window, for comparison
   bool refine{true};         ///< go on from Tube-CVX to refine_tube
   int landing_samples{21};   ///< instants of the window at which landings are reported, >= 2
-  double check_step{1e-3};   ///< of the dense check of limits, > 0 [s]
+  double check_step{1e-3};   ///< of the dense check of limits, in [kLeastCheckStep, inf) [s]
   /// Why a plan within the limits is not taken, as that the grip does not hold its object (why_not_held);
   /// empty: it is taken. Without one all are.
   std::function<std::string(const ThrowPlan&)> refuse{};

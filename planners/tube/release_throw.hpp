@@ -35,7 +35,8 @@ struct NumberOrigin {
 
 /// What is known of the release: a contact model, the friction of its pads, and how the gripper opens.
 struct ReleaseCard {
-  std::string model{"limit_surface"};       ///< a name that contact::make_contact_model knows
+  /// A name that contact::make_contact_model knows, of a law that follows the pads (contact::follows_pads).
+  std::string model{"limit_surface"};
   Uncertain mu{0.5, 0.05};                  ///< friction coefficient [-]
   double length{0.007};                     ///< L = τ_max/f_max [m]
   int pads{2};                              ///< n >= 1
@@ -105,7 +106,8 @@ struct ReleaseThrow {
 };
 
 /// Throws std::invalid_argument, naming value and accepted range: one finite number per joint, hold > 0,
-/// every sigma >= 0, what is thrown and what holds it > 0. All functions below that take a throw check it.
+/// every sigma >= 0, what is thrown and what holds it > 0, a card whose law follows the pads: plans have no
+/// delay of a gripper. All functions below that take a throw check it.
 void validate(const ReleaseThrow& problem);
 
 /// One landing, and the release before it.

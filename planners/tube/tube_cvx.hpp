@@ -18,7 +18,7 @@ struct ThrowState {
 
 /// What the tube acceleration is asked for.
 struct TubeProblem {
-  const Chain& chain;       ///< its tip carries the object's centre of mass
+  const Chain& chain;       ///< its tip carries the object's centre of mass; kept by reference
   ThrowState start;         ///< when the gripper is told to open
   Eigen::Vector3d target;   ///< B, in the base [m]
   double window{0.1};       ///< T [s]

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "contact/patch.hpp"
+#include "contact/registry.hpp"
 #include "planners/tube/nominal_throw.hpp"
 #include "planners/tube/release_throw.hpp"
 #include "planners/tube/require.hpp"
@@ -38,6 +39,9 @@ void validate(const ReleaseThrow& p) {
   for (const double x : p.target) require(std::isfinite(x), kOf, "target", x, "(-inf, inf) m");
   require(is_positive(p.hold), kOf, "hold", p.hold, "(0, inf) s");
   const ReleaseCard& c = p.card;
+  if (!contact::follows_pads(c.model))
+    throw std::invalid_argument(
+        fmt::format("{}: model = {} does not follow the pads, whose opening plans are of", kOf, c.model));
   require(c.mu.value >= 0 && c.mu.value <= contact::kMostMu, kOf, "mu", c.mu.value,
           fmt::format("[0, {}]", contact::kMostMu).c_str());
   require(is_positive(c.length), kOf, "length", c.length, "(0, inf) m");

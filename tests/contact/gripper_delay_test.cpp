@@ -130,5 +130,19 @@ TEST(GripperDelay, IsCarriedAtRestInTheHand) {
               1e-15);  // the CoM lies ahead of the pads: they hold it up against a torque of −0.4 N m
 }
 
+TEST(DelayDistribution, HasAMeanAndQuantilesOrIsRefused) {
+  for (const auto& d : {DelayDistribution::normal(5, 0.01, 0.1), DelayDistribution::normal(0.03, kNaN, 0.1),
+                        DelayDistribution::uniform(kNaN)}) {
+    EXPECT_THROW(static_cast<void>(d.mean()), std::invalid_argument);
+    EXPECT_THROW(static_cast<void>(d.quantiles(3)), std::invalid_argument);
+  }
+  EXPECT_THROW(static_cast<void>(DelayDistribution::uniform(0.1).quantiles(0)), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(DelayDistribution::number(0.1).quantiles(-1)), std::invalid_argument);
+  // an interval that the normal does not resolve is evenly full
+  const auto narrow = DelayDistribution::normal(0, 10, 1e-300);
+  EXPECT_EQ(narrow.mean(), 5e-301);
+  EXPECT_EQ(narrow.quantiles(1)[0], 5e-301);
+}
+
 }  // namespace
 }  // namespace unhand::contact

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "contact/friction_effects.hpp"
+
 namespace {
 
 using namespace unhand;
@@ -537,6 +539,23 @@ TEST(SmoothNormalForce, RejectsBrokenSeries) {
   f[2] = 1;
   t[2] = 0.5;
   EXPECT_THROW(smooth_normal_force(t, f, 0.1), std::invalid_argument);
+}
+
+TEST(BiasedForce, RefusesWhatIsNoNumber) {
+  const ProfileNormalForce opens(OpeningProfile<double>{0.0, 40, 0.01, 0.05, 1});
+  EXPECT_THROW(BiasedForce(opens, dynamics::Dual(NAN), 0.01), std::invalid_argument);
+  EXPECT_THROW(BiasedForce(opens, dynamics::Dual(1.0), NAN), std::invalid_argument);
+  // an opening after the release: all of the bias until then
+  EXPECT_EQ(BiasedForce(opens, dynamics::Dual(1.0), 1.0).at({0.0, 0.01}, 0.0), 39);
+}
+
+TEST(OpeningProfile, TellsSmallValuesAsTheyAre) {
+  try {
+    ProfileNormalForce(OpeningProfile<double>{0.0, -1e-9, 0.01, 0.05, 1});
+    ADD_FAILURE() << "a grip that pulls was taken";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "OpeningProfile: grip_force = -1e-09 is not in (0, inf) N");
+  }
 }
 
 }  // namespace

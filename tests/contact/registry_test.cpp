@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "contact/gripper_delay.hpp"
+#include "contact/limit_surface.hpp"
 
 namespace unhand::contact {
 namespace {
@@ -110,7 +111,11 @@ TEST(Registry, RefusesWhatIsNoLaw) {
     }
     return "";
   };
-  EXPECT_THAT(refusal(named("", {})), HasSubstr("no name"));
+  for (const char* name : {"", "two words", "line\nbreak", "quote\"", "comma,", "ümlaut"})
+    EXPECT_THAT(refusal(named(name, {})), HasSubstr("no name")) << name;
+  for (const char* name :
+       {"limit_surface_naive", "projectile", "free_fall", "ellipsoid", "ellipsoid_full", "convex_quartic"})
+    EXPECT_THAT(refusal(named(name, {})), HasSubstr("no contact law")) << name;
   EXPECT_THAT(refusal(named(kGripperDelay, {})), HasSubstr("is taken"));
   EXPECT_THAT(refusal({"unmade", {}, {}}), HasSubstr("no maker"));
   const auto with = [&](auto change) {
@@ -120,6 +125,7 @@ TEST(Registry, RefusesWhatIsNoLaw) {
   };
   EXPECT_THAT(with([](auto& p) { p.name = "mu"; }), HasSubstr("\"mu\""));
   EXPECT_THAT(with([](auto& p) { p.name = "contact.viscous"; }), HasSubstr("contact.viscous"));
+  EXPECT_THAT(with([](auto& p) { p.unit = ""; }), HasSubstr("\"glue\" without a unit"));
   EXPECT_THAT(with([](auto& p) { p.start = 20; }), HasSubstr("\"glue\" = 20"));
   EXPECT_THAT(with([](auto& p) { p.start = NAN; }), HasSubstr("\"glue\" = nan"));
   EXPECT_THAT(with([](auto& p) { p.high = INFINITY; }), HasSubstr("inf"));
@@ -127,6 +133,26 @@ TEST(Registry, RefusesWhatIsNoLaw) {
   EXPECT_THAT(with([](auto& p) { p.prior_sigma = -1; }), HasSubstr("sigma of -1"));
   EXPECT_THAT(refusal(named("refused", {glue(), glue()})), HasSubstr("two parameters"));
   EXPECT_THAT(contact_model_names(), testing::Not(Contains("refused")));
+}
+
+TEST(Registry, AMakerThatGivesNothingIsNamed) {
+  register_contact_model({"hollow", [](const ContactParameters<Dual>&) { return nullptr; }, {}});
+  ContactParameters<double> p;
+  p.patch = {0.5, 0.01};
+  try {
+    make_contact_model("hollow", p);
+    ADD_FAILURE() << "a null law was handed on";
+  } catch (const std::logic_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("\"hollow\""));
+  }
+}
+
+TEST(Registry, ALimitSurfaceKeepsItsName) {
+  auto name = std::make_unique<std::string>("a name longer than any small string holds in itself");
+  const LimitSurface<Ellipsoid> law(*name, Patch<double>{0.5, 0.01});
+  *name = std::string(name->size(), 'Z');
+  name.reset();
+  EXPECT_EQ(law.name(), "a name longer than any small string holds in itself");
 }
 
 }  // namespace

@@ -259,16 +259,16 @@ TEST_P(Spoilt, InstantsThatAreNoneAreRefused) {
   force.release = thrown.force.release_time();
   for (const double t : {kNaN, kInfinity}) {
     force.more = {t};
-    expect_both_refuse({"kink of the normal force", std::to_string(t), "finite s"});
+    expect_both_refuse({"kink of the normal force", std::to_string(t), "s is not finite"});
     force.more = {};
     hand.jump = {t};
-    expect_both_refuse({"jump of the hand's motion", std::to_string(t), "finite s"});
+    expect_both_refuse({"jump of the hand's motion", std::to_string(t), "s is not finite"});
     hand.jump = {};
     hand.last = t;
-    expect_both_refuse({"end of the hand's motion", std::to_string(t), "finite s"});
+    expect_both_refuse({"end of the hand's motion", std::to_string(t), "s is not finite"});
     hand.last = thrown.hand.end();
     hand.first = -t;
-    expect_both_refuse({"begin of the hand's motion", std::to_string(-t), "finite s"});
+    expect_both_refuse({"begin of the hand's motion", std::to_string(-t), "s is not finite"});
     hand.first = thrown.hand.begin();
   }
 }

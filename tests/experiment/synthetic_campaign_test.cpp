@@ -123,6 +123,8 @@ TEST(SyntheticCampaign, TheLawCanBeChosen) {
   };
   const auto made = generate_throw(design, kSeed, 11);
   EXPECT_EQ(named.truth.landing_pose.x, made.truth.landing_pose.x);
+  design.contact_factory = [](const auto&, const auto&) { return nullptr; };
+  EXPECT_THROW(generate_throw(design, kSeed, 11), std::logic_error);
   design.contact_factory = {};
   design.contact_model = "gripper_delay";
   const auto carried = generate_throw(design, kSeed, 11);

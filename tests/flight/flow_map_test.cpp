@@ -218,5 +218,15 @@ TEST(ReachableTube, RefusesWhatIsNoSet) {
   EXPECT_THROW(tube_level({}, {0.1, 0, 1, -1, 1}, {}), std::invalid_argument);
 }
 
+TEST(FlowMap, RefusesWhatIsNoFlight) {
+  for (int n = 0; n < 4; ++n) {
+    double x[4] = {-1, -0.3, 2, 5};
+    x[n] = n % 2 ? std::nan("") : INFINITY;
+    EXPECT_THROW(flow_map({x[0], x[1], x[2], x[3]}, {}), std::invalid_argument) << n;
+  }
+  for (const Medium& medium : {Medium{9.81, -0.1}, Medium{0.0, 0.0}, Medium{std::nan(""), 0.0}})
+    EXPECT_THROW(flow_map({-1, -0.3, 2, 5}, medium), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace unhand::flight

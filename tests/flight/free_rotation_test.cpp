@@ -256,6 +256,9 @@ TEST(FreeRotation, RefusesWhatIsNoRotation) {
   EXPECT_THROW(rotate_freely<double>({1, 1, 2}, start, {-1.0}), std::invalid_argument);
   EXPECT_THROW(rotate_freely<double>({1, 1, 2}, {{0, 0, 0, 0}, {1, 2, 3}}, {1.0}), std::invalid_argument);
   EXPECT_THROW(rotate_freely<double>({1, 1, 2}, {{}, {1, INFINITY, 3}}, {1.0}), std::invalid_argument);
+  EXPECT_THROW(rotate_freely<double>({1, 1, 2}, {{}, {1, 1e200, 3}}, {1.0}), std::invalid_argument);
+  EXPECT_THROW(rotate_freely<double>({1, 1, 1}, start, {1e300}), std::invalid_argument);
+  EXPECT_THROW(rotate_freely<double>({1e-300, 1, 1e300}, start, {1.0}), std::invalid_argument);
   EXPECT_TRUE(rotate_freely<double>({1, 1, 2}, start, {}).states.empty());
   // Two steps are too few for a second of it.
   auto few = sharp();
@@ -263,6 +266,27 @@ TEST(FreeRotation, RefusesWhatIsNoRotation) {
   const auto spent = rotate_freely<double>({1, 2, 3}, start, {1.0}, few);
   EXPECT_EQ(spent.outcome, dynamics::Outcome::step_budget_spent);
   EXPECT_TRUE(spent.states.empty());
+}
+
+TEST(FreeRotation, StartsOfAnyLengthAreOrientations) {
+  const Vec3<double> omega{0.3, -0.5, 0.2};
+  for (const Vec3<double>& I : {Vec3<double>{1, 1, 1}, Vec3<double>{1, 2, 3}})
+    for (const double size : {5e-324, 1e-200, 1e-120, 1.0, 1e120, 1e200, 1e308}) {
+      const auto one = after(I, {{size, 0, 0, 0}, omega}, 1.0), unit = after(I, {{}, omega}, 1.0);
+      const auto& q = one.attitude;
+      EXPECT_NEAR(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z, 1, 1e-14) << size;
+      EXPECT_LT(angle_between(q, unit.attitude), 1e-14) << size;
+    }
+}
+
+TEST(FreeRotation, IsReadWithinItsTimesOnly) {
+  for (const Vec3<double>& I : {Vec3<double>{1, 1, 1}, Vec3<double>{1, 2, 3}}) {
+    const Rotation<double> rotation(I, {{}, {1, 2, 3}}, 0.0, 1.0);
+    EXPECT_NO_THROW(rotation.at(0.0));
+    EXPECT_NO_THROW(rotation.at(1.0));
+    for (const double t : {-3.0, 2.0, static_cast<double>(NAN)})
+      EXPECT_THROW(rotation.at(t), std::out_of_range) << t;
+  }
 }
 
 }  // namespace

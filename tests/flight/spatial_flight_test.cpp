@@ -228,5 +228,12 @@ TEST(SpatialEffects, EachIsTheAirsTermAndDragAddsToTheDeclaredOne) {
   expect_near(at(kStart, air, 0.8), at(kStart, expected, 0.8), "effects");
 }
 
+TEST(SpatialFlight, RefusesADragThatDrives) {
+  for (const double k : {-1.0, static_cast<double>(NAN)}) {
+    OpenAir air{{0, 0, -9.8}, k};
+    EXPECT_THROW(fly_in_space<double>(kStart, air, {0.5}), std::invalid_argument) << k;
+  }
+}
+
 }  // namespace
 }  // namespace unhand::flight

@@ -260,5 +260,19 @@ TEST(Chain, RefusesWhatIsNoArm) {
   EXPECT_THROW(with_payload(panda(), {}), std::invalid_argument);
 }
 
+TEST(Chain, RefusesVectorsOfAnotherSize) {
+  const Chain arm = panda();
+  const Joints all = Joints::Zero(7), three = Joints::Zero(3), none(0);
+  EXPECT_THROW(forward_kinematics(arm, three), std::invalid_argument);
+  EXPECT_THROW(jacobian(arm, none), std::invalid_argument);
+  EXPECT_THROW(jacobian_rate(arm, all, three), std::invalid_argument);
+  EXPECT_THROW(tip_motion(arm, all, all, three), std::invalid_argument);
+  EXPECT_THROW(mass_matrix(arm, none), std::invalid_argument);
+  EXPECT_THROW(inverse_dynamics(arm, all, three, all), std::invalid_argument);
+  EXPECT_THROW(forward_dynamics(arm, all, three, all), std::invalid_argument);
+  EXPECT_THROW(friction_torque(arm, three), std::invalid_argument);
+  EXPECT_THROW(energy_of(arm, all, three), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace unhand::planners

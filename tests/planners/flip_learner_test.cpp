@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 #include "planners/flip/session.hpp"
 
@@ -124,12 +125,42 @@ TEST(ConeLearner, ReSelectionTakesOtherNeighbours) {
   EXPECT_GT(std::abs(kRange.fractions(*u)[2] - 0.5), 0.05);  // off the line
 }
 
+/// Three commands on a line: they span no plane.
+std::vector<FlipDatum> on_a_line() {
+  std::vector<FlipCommand> line;
+  for (const double s : {0.3, 0.5, 0.7}) line.push_back(kRange.at(0.5, s, 0.5));
+  return gather(LinearPlant{}, "support", line, 1, kBar).data;
+}
+
 TEST(ConeLearner, GivesUpWithoutNeighbours) {
-  ConeLearner learner(ForwardModel::detach, {}, {{1.2, 3}}, kRange);
+  ConeLearner learner(ForwardModel::detach, on_a_line(), {{1.2, 3}}, kRange);
   EXPECT_FALSE(learner.next());
   const LearningPath path = learn(learner, {{1.2, 3}}, {}, kBar, LinearPlant{}, {3, 1});
   EXPECT_TRUE(path.gave_up);
   EXPECT_TRUE(std::isinf(path.minimum()));
+}
+
+TEST(ConeLearner, RefusesWhatItCannotSearch) {
+  const auto support = gather(LinearPlant{}, "support", support_simplex(kRange), 1, kBar).data;
+  const auto made = [&](std::vector<FlipDatum> data, const FlipTarget& target, const ConeSearch& search) {
+    ConeLearner(ForwardModel::detach, std::move(data), target, kRange, search);
+  };
+  EXPECT_NO_THROW(made(support, {{1.2, 3}}, {}));
+  EXPECT_THROW(made({}, {{1.2, 3}}, {}), std::invalid_argument);
+  EXPECT_THROW(made({support[0], support[1], support[0]}, {{1.2, 3}}, {}), std::invalid_argument);
+  auto odd = support;
+  odd[1].landing.x = NAN;
+  EXPECT_THROW(made(odd, {{1.2, 3}}, {}), std::invalid_argument);
+  for (const FlipTarget& target :
+       {FlipTarget{{NAN, 3}}, {{1.2, INFINITY}}, {{1.2, 3}, 0}, {{1.2, 3}, 1, NAN}})
+    EXPECT_THROW(made(support, target, {}), std::invalid_argument);
+  for (const ConeSearch& search : {ConeSearch{2.5, 0}, {2.5, -0.05}, {2.5, NAN}, {2.5, 1e-6}, {0, 0}, {2, 3}})
+    EXPECT_THROW(made(support, {{1.2, 3}}, search), std::invalid_argument) << search.mesh;
+}
+
+TEST(FlipFlight, RefusesWhatIsNoState) {
+  EXPECT_THROW(fly_flip({NAN, 0.5, 0, 1, 1, 6}), std::invalid_argument);
+  EXPECT_THROW(fly_flip({0.7, 0.5, 0, 1, INFINITY, 6}), std::invalid_argument);
 }
 
 TEST(Transfer, ShiftIsARigidBodys) {

@@ -240,5 +240,18 @@ TEST(ReleaseLearner, ForecastsAreAboutAsSureAsTheyMayBe) {
   EXPECT_LT(squares / n, 3.0);  // χ² of 12 exceeds 2.7 per degree once in a thousand
 }
 
+TEST(HandLibrary, AnswersForItsOwnMeshOnly) {
+  const HandLibrary small(robot(), robot().bar, 2);
+  EXPECT_THROW(static_cast<void>(small.between({}, {0.5, 0.5, 0.5})), std::invalid_argument);
+  const std::vector<std::optional<DetachVector>> ones(small.commands().size(),
+                                                      DetachVector{1, 1, 1, 1, 1, 1});
+  EXPECT_NEAR((*small.between(ones, {0.2, 0.5, 2}))[5], 1, 1e-14);
+  EXPECT_THROW(static_cast<void>(small.between(ones, {0.5, NAN, 0.5})), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(small.hand(99)), std::out_of_range);
+  HeldBar held{robot().bar, 0, robot().gripper, robot().pads};
+  held.pads.law = "gripper_delay";
+  EXPECT_THROW(release_bar(small.hand(0), held), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace unhand::planners::flip

@@ -63,6 +63,20 @@ TEST(Identify, InertiaComesBackWithinItsIntervals) {
   EXPECT_NEAR(static_cast<double>(inside) / all, 0.95, 3 * std::sqrt(0.95 * 0.05 / all));
 }
 
+TEST(Identify, RefusesSamplesOfAnotherArm) {
+  const Chain prior = arm();
+  const JointVector<double> all = JointVector<double>::Zero(3), two = JointVector<double>::Zero(2);
+  std::vector<MotionSample> log(20, MotionSample{all, all, all, all});
+  log[3].torque = two;
+  EXPECT_THROW(identify_inertia(prior, log), std::invalid_argument);
+  log[3] = {all, two, all, all};
+  EXPECT_THROW(identify_inertia(prior, log), std::invalid_argument);
+  log[3] = {all, all, all, JointVector<double>::Constant(3, NAN)};
+  EXPECT_THROW(identify_inertia(prior, log), std::invalid_argument);
+  for (const double period : {0.0, static_cast<double>(NAN), static_cast<double>(INFINITY)})
+    EXPECT_THROW(design_excitation(prior, {.period = period}), std::invalid_argument) << period;
+}
+
 TEST(Identify, SpringComesBackWithinItsIntervals) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;

@@ -109,5 +109,38 @@ TEST(LimitCheck, FindsWhatIsExceeded) {
   EXPECT_EQ(found.worst(arm).substr(0, 24), "velocity of panda_joint4");
 }
 
+TEST(JerkProfile, GoesOnUniformlyBeyondItsEnds) {
+  JerkProfile profile({0, 1, 0, 0});
+  profile.append({{1, 0}});
+  for (const double t : {-2.0, 0.5, 3.0}) EXPECT_EQ(profile.at(t).q, t);
+}
+
+TEST(JerkProfile, RefusesWhatIsNoMotion) {
+  JerkProfile profile({0, 1, 0, 0});
+  for (const double h : {-1.0, static_cast<double>(NAN), static_cast<double>(INFINITY)})
+    EXPECT_THROW(profile.append({{h, 0}}), std::invalid_argument) << h;
+  EXPECT_THROW(profile.append({{1, NAN}}), std::invalid_argument);
+  EXPECT_EQ(profile.duration(), 0);
+  EXPECT_THROW(profile.at(NAN), std::invalid_argument);
+  EXPECT_THROW(velocity_ramp(NAN, 0, 1, limits(10, 1000)), std::invalid_argument);
+  EXPECT_THROW(velocity_ramp(1, 0, NAN, limits(10, 1000)), std::invalid_argument);
+  EXPECT_THROW(shortest_ramp(1, NAN, limits(10, 1000)), std::invalid_argument);
+  EXPECT_THROW(shortest_ramp(1, 0, limits(10, 0)), std::invalid_argument);
+  EXPECT_THROW(rest_to_rest(1, 1, NAN), std::invalid_argument);
+}
+
+TEST(LimitCheck, RefusesOtherArmsAndStepsWithoutEnd) {
+  const Chain arm = panda();
+  JointTrajectory motion;
+  for (int i = 0; i < 7; ++i) motion.joints.emplace_back(JointSample{});
+  for (const double step : {0.0, -1e-3, 1e-9, static_cast<double>(NAN)})
+    EXPECT_THROW(check_limits(arm, motion, step), std::invalid_argument) << step;
+  motion.joints.pop_back();
+  EXPECT_THROW(check_limits(arm, motion), std::invalid_argument);
+  LimitCheck elsewhere;
+  elsewhere.torque = {2.0, 9, 0.0};
+  EXPECT_THROW(static_cast<void>(elsewhere.worst(arm)), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace unhand::planners

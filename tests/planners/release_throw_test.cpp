@@ -614,6 +614,14 @@ TEST(ReleaseThrow, RefusesWhatIsNoThrow) {
   EXPECT_THAT(insensitive({{1}, -1}), HasSubstr("iterations = -1"));
 }
 
+TEST(ReleaseThrow, IsNotOfALawWithoutPads) {
+  const Chain arm = pads();
+  ReleaseThrow p = swing(arm);
+  p.card.model = "gripper_delay";
+  EXPECT_THAT(refusal([&] { release_landing(p, nominal_draw(p)); }),
+              testing::HasSubstr("gripper_delay does not follow the pads"));
+}
+
 TEST(NominalThrow, RefusesASearchWithoutSense) {
   using testing::HasSubstr;
   const Chain arm = pads();
@@ -633,6 +641,12 @@ TEST(NominalThrow, RefusesASearchWithoutSense) {
   expect_refused("drag_k = -1", [](auto& o) { o.medium.drag_k = -1; });
   expect_refused("window = 0 is not in (0, 1] s", [](auto& o) { o.window = 0; });
   expect_refused("speed_reserve = nan", [](auto& o) { o.speed_reserve = NAN; });
+  PlanOptions fine;
+  fine.check_step = 1e-9;
+  EXPECT_THAT(refusal([&] {
+                plan_throw(arm, {{1.3, 0, -0.2}}, fine);
+              }),
+              HasSubstr("check_step = 1e-09 is not in [1e-5, inf) s"));
   expect_refused("joint 99 is not in [0, 6]", [](auto& o) { o.fixed = {{99, 0}}; });
   expect_refused("joint 2 is named twice", [](auto& o) { o.fixed = {{2, 0}, {2, 0.1}}; });
 }

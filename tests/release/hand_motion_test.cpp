@@ -248,4 +248,44 @@ TEST(FitHandMotion, TakesShortLogsAndRejectsBrokenOnes) {
   EXPECT_THROW(fit_hand_motion(log.series()), std::invalid_argument);
 }
 
+/// What the constructor says of x(t) in two pieces that meet at 1 s.
+std::string refusal_of(const std::vector<double>& first, const std::vector<double>& second) {
+  std::vector<PolynomialHand::Polynomial::Coefficients> pieces(2);
+  for (std::size_t k = 0; k < first.size(); ++k) pieces[0][k][0] = first[k];
+  for (std::size_t k = 0; k < second.size(); ++k) pieces[1][k][0] = second[k];
+  try {
+    PolynomialHand({{0.0, 1.0, 2.0}, pieces});
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(PolynomialHand, RefusesPathsThatJumpOrAreNoNumbers) {
+  EXPECT_EQ(refusal_of({0.05, 0.1, 0.2}, {0.35, 0.5}), "");
+  EXPECT_EQ(refusal_of({0.05, 0.1, 0.2}, {0.35 + 1e-10, 0.5}), "") << "rounding";
+  EXPECT_EQ(refusal_of({0.05, 0, 0}, {100, 0}), "PolynomialHand: x jumps by 99.95 at 1 s");
+  EXPECT_EQ(refusal_of({0, 1, 0}, {1, 1.5}), "PolynomialHand: the rate of x jumps by 0.5 at 1 s");
+  EXPECT_EQ(refusal_of({0, 0}, {0, 0, NAN}), "PolynomialHand: x is not finite between 1 and 2 s");
+}
+
+TEST(PolynomialHand, SegmentsNameTheirOwnArguments) {
+  const auto refusal = [](double begin, const std::vector<HandSegment>& stretches) -> std::string {
+    try {
+      PolynomialHand::segments(begin, {}, {}, stretches);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(refusal(0, {}), "PolynomialHand::segments: stretches is empty; at least one is needed");
+  EXPECT_EQ(refusal(NAN, {{1, {}, {}}}), "PolynomialHand::segments: t_start = nan s is not finite");
+  EXPECT_EQ(refusal(0, {{INFINITY, {}, {}}}),
+            "PolynomialHand::segments: t_end = inf s is not in (0, inf) s, after the end before it");
+  EXPECT_EQ(refusal(0, {{1e-9, {}, {}}, {1e-10, {}, {}}}),
+            "PolynomialHand::segments: t_end = 1e-10 s is not in (1e-09, inf) s, after the end before it");
+  EXPECT_EQ(refusal(0, {{1e200, {1e200, 0, 0}, {}}}),
+            "PolynomialHand::segments: pose and twist at 1e+200 s are not finite");
+}
+
 }  // namespace
