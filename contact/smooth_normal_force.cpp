@@ -1,4 +1,7 @@
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -341,6 +344,10 @@ NormalForceFit smooth_normal_force(std::span<const double> time, std::span<const
   };
   if (!is_zero(tail, sorted.back())) return within(s, without_release(s, options));
   const std::optional<Descent> descent = last_descent(s, tail, std::max(peak, 0.5 * sorted.back()));
+  // Pads that press lightly and never part are told by the mean, which knows the level better than a sample.
+  const double mean = std::accumulate(value.begin(), value.end(), 0.0) / static_cast<double>(n);
+  if (!descent && mean > s.sigma * std::max(2.0, 5.0 / std::sqrt(static_cast<double>(n))))
+    return within(s, without_release(s, options));
   if (!descent) {  // nothing but zero: released from the beginning
     NormalForceFit fit{
         {Polynomial({time.front(), time.back()}, {constant(0.0)}), {time.front()}, time.front()}, {}};

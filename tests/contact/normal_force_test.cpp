@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <random>
 #include <utility>
 #include <vector>
@@ -307,6 +308,26 @@ TEST(SmoothNormalForce, NoReleaseWhereTheSeriesEndsFirst) {
     const NormalForceFit fit = smooth_normal_force(log.time, log.value, 0.05);
     expect_sound(fit, log);
     EXPECT_EQ(fit.summary.release_time, kInfinity) << n;
+  }
+}
+
+// A level of four sigma of a sample is seventy of the mean of three hundred.
+TEST(SmoothNormalForce, ALightGripIsNoRelease) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> noise;
+  for (const auto& [level, sigma] : {std::pair{4.0, 1.0}, {2.0, 0.5}, {6.0, 1.0}, {0.0, 1.0}}) {
+    std::vector<double> time, value;
+    for (int k = 0; k < 300; ++k) {
+      time.push_back(1e-3 * k);
+      value.push_back(level + sigma * noise(random));
+    }
+    const auto fit = smooth_normal_force(time, value, sigma);
+    if (level == 0) {
+      EXPECT_EQ(fit.force.release_time(), time.front());
+      continue;
+    }
+    EXPECT_EQ(fit.force.release_time(), std::numeric_limits<double>::infinity()) << level;
+    EXPECT_NEAR(fit.force.at({0.0, 0.3}, 0.15), level, sigma) << level;
   }
 }
 
