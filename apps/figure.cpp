@@ -17,6 +17,7 @@
 #include "apps/command.hpp"
 #include "apps/interruption.hpp"
 #include "apps/output.hpp"
+#include "release/naive_release.hpp"
 
 namespace unhand::apps {
 namespace {

@@ -9,6 +9,8 @@
 //
 // A third argument, MINUTES: no further robot is begun after them.
 #include <cstdlib>
+#include <memory>
+#include <optional>
 #include <string_view>
 
 #include "bench/flip_paths.hpp"
@@ -29,6 +31,20 @@ ReleaseLearner learned(const HandLibrary& library, const HandLibrary& old, const
           3};
 }
 
+/// Has no command: where fewer than three of the known ones landed.
+class Nothing final : public FlipLearner {
+ public:
+  std::optional<FlipCommand> next() override { return {}; }
+  void observe(std::span<const FlipTrial>) override {}
+};
+
+/// Model 1 or 2.
+std::unique_ptr<FlipLearner> cone(ForwardModel model, const Gathered& known, const FlipTarget& target,
+                                  const CommandRange& range) {
+  if (known.data.size() < 3) return std::make_unique<Nothing>();
+  return std::make_unique<ConeLearner>(model, known.data, target, range);
+}
+
 void targets(const FlipRobot& robot, std::size_t robots, double minutes) {
   const Watch watch;
   const CommandRange& range = robot.motion.range;
@@ -44,8 +60,8 @@ void targets(const FlipRobot& robot, std::size_t robots, double minutes) {
       const auto path = [&](FlipLearner&& learner) {
         return learn(learner, target, support.data, robot.bar, thrower, {5, 3});
       };
-      paths[0][t] = path(ConeLearner(ForwardModel::landing, support.data, target, range));
-      paths[1][t] = path(ConeLearner(ForwardModel::detach, support.data, target, range));
+      paths[0][t] = path(std::move(*cone(ForwardModel::landing, support, target, range)));
+      paths[1][t] = path(std::move(*cone(ForwardModel::detach, support, target, range)));
       paths[2][t] = path(m4.aimed_at(target));
     }
   });
@@ -67,9 +83,9 @@ void support(const FlipRobot& robot, std::size_t robots, double minutes) {
       for (std::size_t t = 0; t < contest.targets().size(); ++t)
         for (std::size_t m = 0; m < 2; ++m) {
           const FlipTarget& target = contest.targets()[t].target;
-          ConeLearner learner(m == 0 ? ForwardModel::landing : ForwardModel::detach, known.data, target,
-                              range);
-          paths[m][t] = learn(learner, target, known.data, robot.bar, thrower, {5, 3});
+          const auto learner =
+              cone(m == 0 ? ForwardModel::landing : ForwardModel::detach, known, target, range);
+          paths[m][t] = learn(*learner, target, known.data, robot.bar, thrower, {5, 3});
         }
     });
     rows += contest.rows(fmt::format("{:.2f}", inset));
@@ -123,8 +139,8 @@ void shift(const FlipRobot& robot, std::size_t robots, double minutes) {
       const auto path = [&](FlipLearner&& learner, const std::vector<FlipDatum>& transferred_data) {
         return learn(learner, target, transferred_data, bar, thrower, {9, 3, true});
       };
-      ConeLearner m2(ForwardModel::detach, anew.data, target, range);
-      paths[0][t] = learn(m2, target, anew.data, bar, thrower, {9, 3});
+      const auto m2 = cone(ForwardModel::detach, anew, target, range);
+      paths[0][t] = learn(*m2, target, anew.data, bar, thrower, {9, 3});
       paths[1][t] = path(TransferLearner(past.data, moved, target, range), known);
       paths[2][t] = path(much.aimed_at(target), known);
       paths[3][t] = path(little.aimed_at(target), known_few);
