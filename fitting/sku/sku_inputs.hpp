@@ -49,8 +49,9 @@ struct AssumedTolerances {
   double opening_time{1e-3};  ///< likewise [s]
 };
 
-/// 1 σ of an object's mass [kg] and of its inertia [kg m²], as the SKU file tells it or else assumed.
+/// 1 σ of an object's mass [kg], as the SKU file tells it or else assumed.
 double mass_sigma_of(const datasets::Sku& sku, const AssumedTolerances& assumed = {});
+/// The same of its inertia [kg m²].
 double inertia_sigma_of(const datasets::Sku& sku, const AssumedTolerances& assumed = {});
 
 /// The values of a throw as experiment::predict_channels reads them, and what is uncertain about them.
