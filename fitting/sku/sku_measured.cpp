@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "experiment/outcome_slopes.hpp"
+#include "experiment/unit_check.hpp"
 #include "fitting/card.hpp"
 
 namespace unhand::fitting {
@@ -42,6 +43,7 @@ std::optional<MeasuredVerdict> measured_verdict(const datasets::Sku& sku, const 
                                                 const std::string& card_file, const SkuRequest& request,
                                                 bool held_out) {
   datasets::ThrowLog log = *request.log;
+  experiment::require_units(log, request.log_file);
   std::erase_if(log.throws, [&](const datasets::Throw& one) {
     return (one.object != sku.name && log.objects.at(one.object).sku != sku.name) || !one.landing;
   });
@@ -54,6 +56,7 @@ std::optional<MeasuredVerdict> measured_verdict(const datasets::Sku& sku, const 
 
   auto campaign = options_of(card, card_file);
   campaign.threads = request.threads;
+  campaign.check_units = false;  // from here on the object is the SKU's: a wrong one is no wrong unit
   const CampaignProblem problem(log, request.log_file, campaign);
   const auto predicted = predict_throws(problem, fit_of(card, problem, card_file), {true, request.threads});
   for (std::size_t i = 0; i < predicted.size(); ++i) {

@@ -113,7 +113,8 @@ TEST_F(Cli, AMassAndAnInertiaThatAreOffAlikeMayBeAGain) {
     const Answer answer = run("discover g.h5 --json g.json");
     EXPECT_EQ(answer.code, 0) << answer.err;
     int notes = 0;
-    for (const auto& effect : read_json(folder / "g.json")["effects"]) {
+    const json found = read_json(folder / "g.json");
+    for (const auto& effect : found["effects"]) {
       if (!effect.contains("reads_the_same")) continue;
       ++notes;
       EXPECT_THAT(effect["reads_the_same"].get<std::string>(), HasSubstr("a gain of 1."));
