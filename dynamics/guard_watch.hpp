@@ -9,8 +9,6 @@
 
 namespace unhand::dynamics {
 
-/// The most guards that a mode may have.
-
 /// What is known of the guards of the phase at hand. Values are signed so that every guard fires upwards:
 /// below zero is the safe side. Instantiated as `integrate` is.
 template <class S, int N>
