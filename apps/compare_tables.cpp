@@ -8,6 +8,7 @@
 #include "apps/cards.hpp"
 #include "apps/compare.hpp"
 #include "apps/weak_grip.hpp"
+#include "dynamics/effect.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -94,7 +95,7 @@ ReleaseTables release_tables(const experiment::Comparison& comparison, const dat
     std::string values;
     for (const auto& [name, unit, value] : named_values(model))
       values += fmt::format("{}{} = {:.5g}{}", values.empty() ? "" : ", ", name, value,
-                            unit == "-" ? "" : " " + unit);
+                            dynamics::after_number(unit));
     const bool sampled = model.estimate.samples > 0;
     const auto method = std::find(known.begin(), known.end(), model.estimate.method) - known.begin();
     const std::string number = fmt::format("[{}]", method + 1);

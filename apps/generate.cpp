@@ -10,6 +10,7 @@
 #include "apps/progress.hpp"
 #include "apps/tell.hpp"
 #include "apps/truth.hpp"
+#include "dynamics/effect.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/synthetic_campaign.hpp"
 #include "experiment/throw_setup.hpp"
@@ -148,9 +149,8 @@ std::string footer() {
   for (const auto& effect : experiment::known_effects()) {
     std::vector<std::string> parameters;
     for (const auto& p : effect.parameters)
-      parameters.push_back(fmt::format("{}{} ({}, {} .. {}{}{})", p.name, effect.per_object ? "[OBJECT]" : "",
-                                       p.neutral, p.low, p.high, p.unit == "-" ? "" : " ",
-                                       p.unit == "-" ? "" : p.unit));
+      parameters.push_back(fmt::format("{}{} ({}, {} .. {}{})", p.name, effect.per_object ? "[OBJECT]" : "",
+                                       p.neutral, p.low, p.high, dynamics::after_number(p.unit)));
     out += fmt::format("  {}: {}\n      {}\n", effect.id, effect.mechanism, fmt::join(parameters, ", "));
   }
   return out;

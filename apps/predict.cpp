@@ -12,6 +12,7 @@
 #include "apps/tell.hpp"
 #include "apps/throws.hpp"
 #include "apps/weak_grip.hpp"
+#include "dynamics/effect.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -141,8 +142,8 @@ void tell_opening(const datasets::ModelCard& card, const std::vector<experiment:
   std::vector<std::string> told;
   for (const char* name : fitting::kOpeningParameters)
     if (const auto p = card.parameters.find(name); p != card.parameters.end())
-      told.push_back(fmt::format("{} {:.4g}{}", name, p->second.value,
-                                 p->second.unit == "-" ? "" : " " + p->second.unit));
+      told.push_back(
+          fmt::format("{} {:.4g}{}", name, p->second.value, dynamics::after_number(p->second.unit)));
   if (n > 0 && !told.empty())
     tell("unhand: {} of {} throws have no normal force: there the pads open as the card says ({})\n", n,
          throws.size(), fmt::join(told, ", "));

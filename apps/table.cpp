@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "dynamics/effect.hpp"
+
 namespace unhand::apps {
 namespace {
 
@@ -131,7 +133,7 @@ Rounded rounded(double value, double sigma) {
 
 std::string with_sigma(double value, double sigma, const std::string& unit) {
   const Rounded r = rounded(value, sigma);
-  const std::string with_unit = unit.empty() || unit == "-" ? "" : " " + unit;
+  const std::string with_unit = dynamics::after_number(unit);
   if (is_held(value, sigma)) return fmt::format("{}{} (held)", r.value, with_unit);
   return fmt::format("{} ± {}{}", r.value, r.sigma, with_unit);
 }

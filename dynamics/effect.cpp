@@ -9,9 +9,12 @@ namespace unhand::dynamics {
 void require_in_range(const Effect& effect, const EffectParameter& parameter, double value) {
   const double low = std::min(parameter.low, parameter.least.value_or(parameter.low));
   if (value >= low && value <= parameter.high) return;
-  throw std::invalid_argument(fmt::format("{} = {} is not in [{}, {}]{}{}", effect.full_name(parameter),
-                                          value, low, parameter.high, parameter.unit == "-" ? "" : " ",
-                                          parameter.unit == "-" ? "" : parameter.unit));
+  throw std::invalid_argument(fmt::format("{} = {} is not in [{}, {}]{}", effect.full_name(parameter), value,
+                                          low, parameter.high, after_number(parameter.unit)));
+}
+
+std::string after_number(std::string_view unit) {
+  return unit.empty() || unit == "-" ? "" : fmt::format(" {}", unit);
 }
 
 int length_power(std::string_view unit) {

@@ -44,6 +44,9 @@ struct EffectParameter {
 /// taken as they are.
 int length_power(std::string_view unit);
 
+/// A unit as it stands after its number: with a space before it; nothing for "-".
+std::string after_number(std::string_view unit);
+
 /// An acceleration of the free object in the plane x-z or, from `turning` on, of its rotation: the forms that
 /// are tried for something unlisted, and that some effects have. Coefficients have the unit of an
 /// acceleration over that of the form. θ, ω: of the object; J turns by +90°.

@@ -19,11 +19,12 @@ using DualOf = ceres::Jet<double, N>;
 /// The one that the library's physics is compiled for.
 using Dual = DualOf<kDualSize>;
 
-// Eigen's layout, its memory and the insides of its functions depend on the widest vectors of the compiler's target.
-// Debian's Ceres is compiled for those of every processor, and what is linked with it must be, too.
-static_assert(EIGEN_DEFAULT_ALIGN_BYTES == 16,
-              "unhand and Ceres are compiled without AVX: compile what uses their headers without -march=native, "
-              "-mavx and their like (docs/quickstart.md)");
+// Eigen's layout, its memory and the insides of its functions depend on the widest vectors of the compiler's
+// target. Debian's Ceres is compiled for those of every processor, and what is linked with it must be, too.
+static_assert(
+    EIGEN_DEFAULT_ALIGN_BYTES == 16,
+    "unhand and Ceres are compiled without AVX: compile what uses their headers without -march=native, "
+    "-mavx and their like (docs/quickstart.md)");
 
 /// The value without its derivatives: what decides between branches.
 inline double value_of(double x) { return x; }

@@ -10,6 +10,7 @@
 
 #include "contact/registry.hpp"
 #include "datasets/near_miss.hpp"
+#include "dynamics/effect.hpp"
 #include "experiment/random_stream.hpp"
 #include "experiment/synthetic_campaign.hpp"
 #include "experiment/throw_setup.hpp"
@@ -83,9 +84,8 @@ std::string checked(std::string_view name, double value) {
         fmt::format("effect {}: all objects share it, so it takes no [{}]", found.effect->id, object));
   const EffectParameter& p = *found.parameter;
   if (!(value >= p.low && value <= p.high))
-    throw std::invalid_argument(fmt::format("effect {}: {} = {} is not in [{}, {}]{}{}", found.effect->id,
-                                            p.name, value, p.low, p.high, p.unit == "-" ? "" : " ",
-                                            p.unit == "-" ? "" : p.unit));
+    throw std::invalid_argument(fmt::format("effect {}: {} = {} is not in [{}, {}]{}", found.effect->id,
+                                            p.name, value, p.low, p.high, dynamics::after_number(p.unit)));
   const std::string full = found.effect->full_name(p);
   return object.empty() ? full : fmt::format("{}[{}]", full, object);
 }

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "dynamics/dense_solve.hpp"
+#include "dynamics/effect.hpp"
 #include "experiment/campaign_effects.hpp"
 #include "fitting/fit_rounds.hpp"
 #include "fitting/misfit.hpp"
@@ -165,7 +166,7 @@ void validate(const FitOptions& options, const CampaignProblem& problem) {
     const double rounding = 1e-9 * (u.high - u.low);
     require(x >= u.low - rounding && x <= u.high + rounding,
             fmt::format("start: {} = {} is not in [{}, {}]{}", u.name, x, u.low, u.high,
-                        u.unit == "-" ? "" : " " + u.unit));
+                        dynamics::after_number(u.unit)));
   }
   for (const double x : options.own_spread)
     require(x > 0 && std::isfinite(x), fmt::format("own_spread: {} is not in (0, inf)", x));
