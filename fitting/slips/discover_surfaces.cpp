@@ -10,6 +10,7 @@
 #include "fitting/clock.hpp"
 #include "fitting/distributions.hpp"
 #include "fitting/slips/surface_discovery.hpp"
+#include "fitting/slips/wrench_bias.hpp"
 
 namespace unhand::fitting {
 namespace {
@@ -163,11 +164,11 @@ LawScore base_beside(std::size_t k, const std::vector<SlipSamples>& surfaces, co
   return base;
 }
 
-/// The law that is believed, the base (the first) where none convinces. Writes the ranking.
-const LawScore& believed(const std::vector<LawScore>& laws, const SurfaceDiscoveryOptions& options,
-                         std::vector<Ranked>& ranking) {
+/// Which law is believed, the base (0) where none convinces. Writes the ranking.
+std::size_t believed(const std::vector<LawScore>& laws, const SurfaceDiscoveryOptions& options,
+                     std::vector<Ranked>& ranking) {
   const double rate = options.family_wise_level / std::max<double>(1, static_cast<double>(laws.size()) - 1);
-  const LawScore* best = &laws.front();
+  std::size_t best = 0;
   for (std::size_t k = 1; k < laws.size(); ++k) {
     const LawScore& law = laws[k];
     const double gain = law.base_error - law.error;
@@ -178,12 +179,12 @@ const LawScore& believed(const std::vector<LawScore>& laws, const SurfaceDiscove
         law.gain.p() < rate && gain > options.matters * law.base_error && gain > law.null_gain;
     // Ellipsoids come first: a richer law has to be better by a twentieth.
     if (convinces &&
-        (best == &laws.front() || law.error / law.base_error < 0.95 * best->error / best->base_error))
-      best = &law;
+        (best == 0 || law.error / law.base_error < 0.95 * laws[best].error / laws[best].base_error))
+      best = k;
   }
   std::sort(ranking.begin(), ranking.end(), [](const Ranked& a, const Ranked& b) { return a.gain > b.gain; });
-  for (auto& r : ranking) r.correlation_with_best = r.id == id_of(best->model) ? 1 : 0;
-  return *best;
+  for (auto& r : ranking) r.correlation_with_best = r.id == id_of(laws[best].model) ? 1 : 0;
+  return best;
 }
 
 /// What a law does on data that the fitted ellipsoid made.
@@ -196,6 +197,44 @@ Evidence null_control(const LawScore& law) {
                       gains ? "that much of what it gains on the measurement may be due to noise alone"
                             : "what it gains on the measurement is not flexibility"),
           gains};
+}
+
+/// A wrench that is off by a constant, under one law, and what the same law does without it.
+struct BiasTrial {
+  WrenchBias whole;
+  LawScore with, without;
+  Ranked ranked{kWrenchBias};
+  bool convinces{};
+};
+
+BiasTrial try_bias(const std::vector<SlipSamples>& surfaces, std::size_t k, const Scores& scores,
+                   const SurfaceDiscoveryOptions& options) {
+  BiasTrial out;
+  std::vector<SlipSamples> scored;
+  std::vector<const SurfaceScore*> plain;
+  for (std::size_t i = 0; i < surfaces.size(); ++i)
+    if (scores[i].front().scored() && scores[i][k].scored())
+      scored.push_back(surfaces[i]), plain.push_back(&scores[i][k]);
+  const SurfaceModel model = scores.front()[k].model;
+  out.with.model = out.without.model = model;
+  out.whole = fit_wrench_bias(scored, model);
+  if (!out.whole.solved) return out;
+  out.ranked.p_value = out.whole.p_value;
+  if (!(out.whole.p_value < options.family_wise_level)) return out;
+  const auto biased = score_with_bias(scored, model, out.whole, options.comparison);
+  if (biased.empty()) return out;
+  for (std::size_t i = 0; i < scored.size(); ++i) {
+    out.with.add(without_bias(scored[i], out.whole.value), *plain[i], biased[i]);
+    out.without.add(scored[i], *plain[i], *plain[i]);
+  }
+  out.with.average(), out.without.average();
+  const double gain = out.with.base_error - out.with.error;
+  out.ranked.gain = std::max(0.0, out.with.gain.t() * out.with.gain.t());
+  out.ranked.p_value = out.with.gain.p();
+  out.ranked.held_out_gain = gain, out.ranked.delta_bic = out.with.delta_bic();
+  out.convinces =
+      out.with.gain.p() < options.family_wise_level && gain > options.matters * out.with.base_error;
+  return out;
 }
 
 /// Writes that `law` is accepted, with what speaks for it and against it.
@@ -224,6 +263,71 @@ void accept_law(const LawScore& law, bool controlled, SurfaceDiscovery& out) {
           {id,
            fmt::format("On {} it gains only {:.2f} ± {:.2f} degrees", e.surface, e.gain_deg, e.gain_sigma),
            true});
+}
+
+bool is_forgotten(const std::string& id, const SurfaceDiscoveryOptions& options) {
+  return std::find(options.forget.begin(), options.forget.end(), id) != options.forget.end();
+}
+
+/// All laws on one set of wrenches, and which of them is believed.
+struct Choice {
+  Scores scores;
+  std::vector<LawScore> laws;
+  std::size_t best{};  ///< of laws; 0 is the base
+};
+
+/// Writes the evidence, what was left out and the ranking.
+Choice choose_law(const std::vector<SlipSamples>& surfaces, const SurfaceDiscoveryOptions& options,
+                  SurfaceDiscovery& out) {
+  std::vector<SurfaceModel> models{options.base};
+  for (const SurfaceModel model : surface_models)
+    if (model != options.base && !is_forgotten(id_of(model), options)) models.push_back(model);
+  Choice choice;
+  choice.scores = compare_surfaces(surfaces, models, options.comparison);
+  choice.laws = score_laws(surfaces, models, choice.scores, out);
+  choice.best = believed(choice.laws, options, out.answer.ranking);
+  return choice;
+}
+
+/// Which law it is shows when the bias is gone: where that is another one, the bias beside it takes the place
+/// of the one before if less is left.
+void choose_again(const std::vector<SlipSamples>& surfaces, const Scores& measured,
+                  const SurfaceDiscoveryOptions& options, BiasTrial& bias, Choice& choice,
+                  SurfaceDiscovery& out) {
+  SurfaceDiscovery other;
+  other.answer.kind = out.answer.kind, other.answer.model = out.answer.model;
+  other.answer.phase = out.answer.phase;
+  Choice unbiased = choose_law(without_bias(surfaces, bias.whole.value), options, other);
+  if (unbiased.best != choice.best) {
+    BiasTrial again = try_bias(surfaces, unbiased.best, measured, options);
+    if (!again.convinces || !(again.with.error < bias.with.error))
+      unbiased.best = choice.best;
+    else
+      bias = std::move(again);
+  }
+  choice = std::move(unbiased);
+  out = std::move(other);
+}
+
+/// Writes that the wrenches are off by a constant.
+void accept_bias(const BiasTrial& bias, MeasuredDiscovery& answer) {
+  AcceptedEffect effect;
+  effect.id = kWrenchBias;
+  effect.p_value = bias.with.gain.p();
+  effect.delta_bic = bias.with.delta_bic();
+  effect.test_error_ratio = bias.with.error / bias.without.error;
+  const char* names[] = {"fx", "fy", "tau"};
+  for (Eigen::Index j = 0; j < 3; ++j)
+    effect.parameters.push_back({names[j], j < 2 ? "N" : "N m", bias.whole.value[j],
+                                 std::sqrt(std::max(0.0, bias.whole.covariance(j, j)))});
+  effect.why = fmt::format(
+      "no limit surface is other where things slide the other way, and wrenches less this one are more so: "
+      "mean angle between predicted and measured direction of sliding falls from {:.2f} to {:.2f} degrees, "
+      "on "
+      "{} of {} surfaces",
+      bias.without.error, bias.with.error, bias.with.better, bias.with.compared);
+  answer.effects.push_back(std::move(effect));
+  answer.separating.push_back({kWrenchBias, "what the sensor reads before and after it touches anything"});
 }
 
 /// Writes what the residuals of neighbouring wrenches have in common, under the base and under `law`.
@@ -265,33 +369,35 @@ SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
   answer.kind = "slips";
   answer.model = to_string(options.base);
   answer.phase = "release";
-  std::vector<SurfaceModel> models{options.base};
-  for (const SurfaceModel model : surface_models)
-    if (model != options.base &&
-        std::find(options.forget.begin(), options.forget.end(), id_of(model)) == options.forget.end())
-      models.push_back(model);
-  const Scores scores = compare_surfaces(surfaces, models, options.comparison);
-  const std::vector<LawScore> laws = score_laws(surfaces, models, scores, out);
-  if (laws.front().compared == 0) {
+  Choice choice = choose_law(surfaces, options, out);
+  if (choice.laws.front().compared == 0) {
     answer.verdict = Verdict::not_answered;
     answer.message = answer.skipped.empty() ? "no surface" : answer.skipped.front().second;
     answer.seconds = seconds_since(begin);
     return out;
   }
+  const Scores measured = choice.scores;
+  BiasTrial bias;
+  if (!is_forgotten(kWrenchBias, options)) {
+    bias = try_bias(surfaces, choice.best, measured, options);
+    if (bias.convinces) choose_again(surfaces, measured, options, bias, choice, out);
+    answer.ranking.push_back(bias.ranked);
+  }
   answer.train = answer.test;
-  const LawScore& best = believed(laws, options, answer.ranking);
-  const bool found = &best != &laws.front();
-  const LawScore base = base_beside(static_cast<std::size_t>(&best - laws.data()), surfaces, scores);
-  answer.before_train = base.errors(base.train), answer.after_train = best.errors(best.train);
+  const LawScore& law = choice.laws[choice.best];
+  const LawScore& final = bias.convinces ? bias.with : law;
+  const LawScore base = base_beside(choice.best, surfaces, measured);
+  answer.before_train = base.errors(base.train), answer.after_train = final.errors(final.train);
   answer.before_test = {{"direction_mae_deg", base.error}};
-  answer.after_test = {{"direction_mae_deg", best.error}};
-  if (found) accept_law(best, options.comparison.null_draws > 0, out);
-  judge_residuals(best, base, options.unexplained, answer);
+  answer.after_test = {{"direction_mae_deg", final.error}};
+  if (bias.convinces) accept_bias(bias, answer);
+  if (choice.best > 0) accept_law(law, options.comparison.null_draws > 0, out);
+  judge_residuals(final, base, options.unexplained, answer);
   answer.misfit.push_back(
-      {"direction", static_cast<int>(base.gain.n), base.train, base.error, best.train, best.error});
-  answer.verdict = found                ? Verdict::effect_found
-                   : answer.unexplained ? Verdict::unexplained
-                                        : Verdict::no_missing_effect;
+      {"direction", static_cast<int>(base.gain.n), base.train, base.error, final.train, final.error});
+  answer.verdict = !answer.effects.empty() ? Verdict::effect_found
+                   : answer.unexplained    ? Verdict::unexplained
+                                           : Verdict::no_missing_effect;
   answer.seconds = seconds_since(begin);
   return out;
 }

@@ -6,12 +6,15 @@
 
 namespace unhand::fitting {
 
-/// When another limit surface is believed.
+/// What slips can show beside another law: wrenches that are off by a constant, in the frame of the object.
+inline constexpr const char* kWrenchBias = "sensor.ft_bias";
+
+/// When another limit surface, or a bias, is believed.
 struct SurfaceDiscoveryOptions {
   SurfaceComparisonOptions comparison;         ///< folds and null control
   SurfaceModel base{SurfaceModel::ellipsoid};  ///< the law to begin with
-  double family_wise_level{0.02};              ///< shared among the laws that are tried
-  double matters{0.05};  ///< share of the base's held-out direction error that a law must take away
+  double family_wise_level{0.02};              ///< shared among the laws that are tried; of the bias
+  double matters{0.05};  ///< share of the held-out direction error that a law, or the bias, must take away
   /// Neighbouring wrenches of different slips whose residual directions correlate by this much (and by three
   /// standard errors) say that something is left.
   double unexplained{0.15};
@@ -29,7 +32,8 @@ struct SurfaceEvidence {
   double left{}, left_sigma{};             ///< correlation of the residual directions of neighbours
 };
 
-/// The answer of the loop on measured slips, with each law's evidence on each surface.
+/// The answer of the loop on measured slips, with each law's evidence on each surface (of the wrenches
+/// without the bias, where there is one).
 struct SurfaceDiscovery {
   MeasuredDiscovery answer;               ///< as for the other logs
   std::vector<SurfaceEvidence> evidence;  ///< by surface, then law; the base's own row holds what it leaves
@@ -39,6 +43,11 @@ struct SurfaceDiscovery {
 /// that left it out) it lowers the direction error by a one-sided paired t-test, by at least `matters`, and
 /// by more than on the null control; the law with the least error wins, and of those within a twentieth of it
 /// the one with the fewest coefficients.
+///
+/// A bias of the wrenches, one of all surfaces, is asked for beside the law that is believed, with each
+/// fold's bias from the other folds: it is accepted if its three numbers differ from zero (Hotelling's T² by
+/// the scatter between slips) and the direction error falls by the same t-test and share. The laws are then
+/// asked again of the wrenches without it.
 SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
                                    const SurfaceDiscoveryOptions& options);
 /// Throws datasets::LogError for a log that datasets::validate does not take.
