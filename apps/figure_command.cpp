@@ -230,11 +230,9 @@ Command figure_command(Parser& root) {
   parser.option("--json", options->json, "Write the names of the figures as JSON");
   add_threads(parser, options->request.threads);
   parser.footer(
-      "Friction that no card gives is estimated from the log as `unhand compare` does. The residual of a "
-      "model before and after "
-      "an "
-      "effect\nis drawn by `unhand discover --report`, the limit surface of measured slips by `unhand "
-      "compare` on a slip log.\n"
+      "Friction that no card gives is estimated from the log as `unhand compare` does. The residual of a\n"
+      "model before and after an effect is drawn by `unhand discover --report`, the limit surface of\n"
+      "measured slips by `unhand compare` on a slip log.\n"
       "Examples:\n  unhand figure modes --log campaign.h5 --throw 017 --out figures\n"
       "  unhand figure all --log campaign.h5 --models sliding_pivot,limit_surface --out figures\n"
       "  unhand figure all --log tracked.h5 --card card.json --out figures");

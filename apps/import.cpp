@@ -132,16 +132,16 @@ constexpr Format formats[] = {
     {"planar-pushes", "measured pushes of a block, text logs or folders of them: a slip log",
      "unhand import planar-pushes planar_pushes --out pushes.h5", &import_pushes},
     {"hand-csv", "a robot's hand in the throwing plane, any CSV with a map of its columns",
-     "unhand import hand-csv hand/*.csv --sku bar.toml --opening-time 0.1 --out log.h5\n"
-     "      --columns time=t,x=X,z=Z,theta=pitch,vx=VX,vz=VZ,omega=q,ax=AX,az=AZ,alpha=qd\n"
+     "unhand import hand-csv hand/*.csv --sku bar.toml --opening-time 0.1 --out log.h5 \\\n"
+     "      --columns time=t,x=X,z=Z,theta=pitch,vx=VX,vz=VZ,omega=q,ax=AX,az=AZ,alpha=qd \\\n"
      "      --units time=ms,x=mm,z=mm,theta=deg,vx=m/s,vz=m/s,omega=deg/s,ax=m/s^2,az=m/s^2,alpha=deg/s^2",
      &import_lab_files},
     {"ft-csv", "the sensor behind one pad, any CSV with a map of its columns",
-     "unhand import ft-csv ft/*.csv --into log.h5 --columns time=t,fx=-Fx,fz=-Fz,tau=-Ty,normal=Fy\n"
+     "unhand import ft-csv ft/*.csv --into log.h5 --columns time=t,fx=-Fx,fz=-Fz,tau=-Ty,normal=Fy \\\n"
      "      --units time=s,fx=N,fz=N,tau='N mm',normal=N --sigma fx=0.02,fz=0.02,tau=0.2,normal=0.05",
      &import_lab_files},
     {"mocap-csv", "a tracked object in the throwing plane, any CSV with a map of its columns",
-     "unhand import mocap-csv mocap/*.csv --into log.h5 --landing --columns time=t,x=X,z=Z,theta=pitch\n"
+     "unhand import mocap-csv mocap/*.csv --into log.h5 --landing --columns time=t,x=X,z=Z,theta=pitch \\\n"
      "      --units time=s,x=mm,z=mm,theta=deg --sigma x=0.2,z=0.2,theta=0.2",
      &import_lab_files},
     {"motive-csv", "rigid bodies exported by OptiTrack Motive, one take a throw",

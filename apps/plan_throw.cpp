@@ -382,10 +382,9 @@ Command plan_throw_command(Parser& plan) {
   add_threads(parser, o->threads);
   parser.option("--report", o->report, "Directory for trajectory.csv, landings.csv and figures");
   parser.footer(
-      "Without a card, the object leaves at a delay that may be anything in the window. With one, it is let "
-      "go as the\n"
-      "card's contact model says, and the motion is the one whose landings depend least on friction, delay "
-      "and grasp.\n"
+      "Without a card, the object leaves at a delay that may be anything in the window. With one, it is\n"
+      "let go as the card's contact model says, and the motion is the one whose landings depend least on\n"
+      "friction, delay and grasp.\n"
       "Exit code 1 says why there is no plan. Example:\n"
       "  unhand plan throw --target 1.3,0,-0.2 --box 0.15x0.15 --report out/throw");
   return {&parser, [o] { plan_throw(*o); }};

@@ -235,9 +235,8 @@ Command predict_command(Parser& root) {
   parser.option("--csv", options->csv, "Write the predictions as CSV");
   add_threads(parser, options->threads);
   parser.footer(
-      "Cards come from `unhand fit LOG --card FILE` (with uncertainties) and from `unhand compare LOG "
-      "--write-cards\n"
-      "DIR`. Existing files are replaced.\n"
+      "Cards come from `unhand fit LOG --card FILE` (with uncertainties) and from\n"
+      "`unhand compare LOG --write-cards DIR`. Existing files are replaced.\n"
       "Example:\n  unhand predict campaign.h5 --card cards/sliding_pivot.json --csv predictions.csv");
   return {&parser, [options] { predict(*options); }};
 }

@@ -115,8 +115,8 @@ Command validate_sku_command(Parser& root) {
   parser.option("--report", options->report, "A directory for the tables (Markdown), figures and JSON");
   add_threads(parser, options->request.threads);
   parser.footer(
-      "Without --log, the motion is the middle flip of the synthetic campaign batch180 and the gripper opens "
-      "as\nthe card's valid range says. Existing files are replaced.\n"
+      "Without --log, the motion is the middle flip of the synthetic campaign batch180 and the gripper\n"
+      "opens as the card's valid range says. Existing files are replaced.\n"
       "Examples:\n  unhand validate-sku jar.toml --card card.json --report out\n"
       "  unhand validate-sku bar.toml --card card.json --log campaign.h5 --tolerance 0.05,45");
   return {&parser, [options] { validate(*options); }};
