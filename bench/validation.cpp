@@ -103,8 +103,8 @@ int main() {
       "the child that reads HDF5\n"
       "  under the thread sanitizer without a report (`cmake --preset tsan`; `test_fitting "
       "--gtest_filter='*Thread*:Twin.*:Corner*'`,\n"
-      "  `test_experiment --gtest_filter='Parallel*:*ampaign*:FreeFlight*'`, `test_planners`, `test_flip`, "
-      "`test_datasets`).\n"
+      "  `test_dynamics --gtest_filter='ParallelFor.*'`, `test_experiment "
+      "--gtest_filter='*ampaign*:FreeFlight*'`, `test_planners`, `test_flip`, `test_datasets`).\n"
       "- Lines that the tests run, by folder: [coverage.md](coverage.md).\n");
   return count.holds == count.all ? 0 : 1;
 }
