@@ -125,7 +125,7 @@ Json release_json(const experiment::Comparison& comparison, const CompareRequest
     out["repetition_scatter"]["landing_theta_deg"] = floor.landing_theta;
   }
   out["inputs"] = {{"worst_hand_chi2_per_dof", comparison.worst_hand_chi2},
-                   {"mean_normal_force_chi2_per_dof", comparison.mean_force_chi2}};
+                   {"mean_normal_force_chi2_per_dof", number(comparison.mean_force_chi2)}};
   Json& models = out["models"] = Json::object();
   for (const auto& model : comparison.models) {
     Json& one = models[model.model];

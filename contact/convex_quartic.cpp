@@ -263,34 +263,19 @@ Vec3<S> ConvexQuartic::resist(const Vec3<S>& u) const {
   }
 }
 
-template <class S>
-Vec3<S> ConvexQuartic::slip_direction(const Vec3<S>& w) const {
+Vec3<double> ConvexQuartic::slip_direction(const Vec3<double>& w) const {
   const double scale = scale_of(w);
-  if (scale == 0.0) return {S(0.0), S(0.0), S(0.0)};
-  const Vec3<double> v{value_of(w[0]) / scale, value_of(w[1]) / scale, value_of(w[2]) / scale};
-  const Mat3 h = hessian(v);
-  Vec3<double> n = times(h, v);  // 3 ∇H
+  if (scale == 0.0) return {0.0, 0.0, 0.0};
+  const Vec3<double> v{w[0] / scale, w[1] / scale, w[2] / scale};
+  Vec3<double> n = times(hessian(v), v);  // 3 ∇H
   const double inverse = 1.0 / std::sqrt(dot3(n, n));
   for (double& entry : n) entry *= -inverse;
-  if constexpr (std::is_same_v<S, double>) {
-    return n;
-  } else {
-    // d(∇H) = ∇²H dw, and −∇H/|∇H| turns by the part of it across itself.
-    Mat3 jacobian;
-    const Vec3<double> nh = times(h, n);
-    const double k = 3.0 * inverse / scale;
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) jacobian[i][j] = -k * (h[i][j] - n[i] * nh[j]);
-    }
-    return chain3(w, n, jacobian);
-  }
+  return n;
 }
 
 template Vec3<double> ConvexQuartic::resist(const Vec3<double>&) const;
 template Vec3<Dual> ConvexQuartic::resist(const Vec3<Dual>&) const;
 template double ConvexQuartic::gauge(const Vec3<double>&) const;
 template Dual ConvexQuartic::gauge(const Vec3<Dual>&) const;
-template Vec3<double> ConvexQuartic::slip_direction(const Vec3<double>&) const;
-template Vec3<Dual> ConvexQuartic::slip_direction(const Vec3<Dual>&) const;
 
 }  // namespace unhand::contact

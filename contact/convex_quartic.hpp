@@ -45,8 +45,7 @@ class ConvexQuartic {
   template <class S>
   S gauge(const Vec3<S>& w) const;
   /// −∇H/|∇H| at w: the unit slip that a wrench there opposes.
-  template <class S>
-  Vec3<S> slip_direction(const Vec3<S>& w) const;
+  Vec3<double> slip_direction(const Vec3<double>& w) const;
 
   /// c_k in the order of the monomials above [-].
   const std::array<double, kCoefficients>& coefficients() const { return coefficients_; }

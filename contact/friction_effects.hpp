@@ -9,7 +9,7 @@
 
 namespace unhand::contact {
 
-/// Departures of the friction limits, all neutral by default. Contact laws read them, each those that it has
+/// Departures of the friction limits, all neutral by default. Each contact law reads those that it models
 /// (ContactParameters::variation); adhesion is of the normal force, which whoever simulates wraps in an
 /// AdhesiveForce. u = (v_r, L ω_r) is the slip, |u| its speed [m/s].
 template <class S>

@@ -19,7 +19,7 @@ double normal_probability(double x) { return 0.5 * std::erfc(-x * M_SQRT1_2); }
 double truncated_normal_quantile(const DelayDistribution& d, double p) {
   const double low = normal_probability((0 - d.centre) / d.spread);
   const double high = normal_probability((d.longest - d.centre) / d.spread);
-  if (!(high > low)) return p * d.longest;  // so short a part of the normal is even
+  if (!(high > low)) return p * d.longest;  // over so short an interval the normal is flat
   double a = 0, b = d.longest;
   for (int k = 0; k < 60; ++k) {
     const double middle = 0.5 * (a + b);
@@ -59,7 +59,7 @@ double DelayDistribution::mean() const {
   const double a = (0 - centre) / spread, b = (longest - centre) / spread;
   const auto density = [](double x) { return std::exp(-0.5 * x * x) / std::sqrt(2 * M_PI); };
   const double mass = normal_probability(b) - normal_probability(a);
-  if (!(mass > 0)) return 0.5 * longest;  // so short a part of the normal is even
+  if (!(mass > 0)) return 0.5 * longest;  // over so short an interval the normal is flat
   return std::clamp(centre + spread * (density(a) - density(b)) / mass, 0.0, longest);
 }
 

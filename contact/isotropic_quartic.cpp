@@ -131,16 +131,14 @@ S IsotropicQuartic::gauge(const Vec3<S>& w) const {
 }
 
 // −∇H/|∇H|
-template <class S>
-Vec3<S> IsotropicQuartic::slip_direction(const Vec3<S>& w) const {
-  using std::sqrt;
+Vec3<double> IsotropicQuartic::slip_direction(const Vec3<double>& w) const {
   const double scale = scale_of(w);
-  if (scale == 0.0) return {S(0.0), S(0.0), S(0.0)};
-  const Vec3<S> v{w[0] / scale, w[1] / scale, w[2] / scale};
-  const S A = v[0] * v[0] + v[1] * v[1], B = v[2] * v[2], kappa = dynamics::convert<S>(kappa_);
-  const S flat = A + kappa * B, high = kappa * A + B;
-  const Vec3<S> n{v[0] * flat, v[1] * flat, v[2] * high};
-  const S k = -1.0 / sqrt(dot3(n, n));
+  if (scale == 0.0) return {0.0, 0.0, 0.0};
+  const Vec3<double> v{w[0] / scale, w[1] / scale, w[2] / scale};
+  const double A = v[0] * v[0] + v[1] * v[1], B = v[2] * v[2], kappa = kappa_.a;
+  const double flat = A + kappa * B, high = kappa * A + B;
+  const Vec3<double> n{v[0] * flat, v[1] * flat, v[2] * high};
+  const double k = -1.0 / std::sqrt(dot3(n, n));
   return {k * n[0], k * n[1], k * n[2]};
 }
 
@@ -148,7 +146,5 @@ template Vec3<double> IsotropicQuartic::resist(const Vec3<double>&) const;
 template Vec3<Dual> IsotropicQuartic::resist(const Vec3<Dual>&) const;
 template double IsotropicQuartic::gauge(const Vec3<double>&) const;
 template Dual IsotropicQuartic::gauge(const Vec3<Dual>&) const;
-template Vec3<double> IsotropicQuartic::slip_direction(const Vec3<double>&) const;
-template Vec3<Dual> IsotropicQuartic::slip_direction(const Vec3<Dual>&) const;
 
 }  // namespace unhand::contact

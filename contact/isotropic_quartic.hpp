@@ -22,7 +22,7 @@ class IsotropicQuartic {
   static constexpr const char* name = "isotropic quartic";  ///< as messages call it
 
   /// Throws std::invalid_argument unless 0 ≤ κ ≤ 3, where H is convex. Derivatives of κ go into those of
-  /// resist, gauge and slip_direction in Dual.
+  /// resist and gauge in Dual.
   explicit IsotropicQuartic(const dynamics::Dual& kappa);
   explicit IsotropicQuartic(double kappa) : IsotropicQuartic(dynamics::Dual(kappa)) {}
   /// κ = ConvexQuartic::kappa_closest_to_disc().
@@ -35,8 +35,7 @@ class IsotropicQuartic {
   template <class S>
   S gauge(const Vec3<S>& w) const;
   /// −∇H/|∇H| at w: the unit slip that a wrench there opposes.
-  template <class S>
-  Vec3<S> slip_direction(const Vec3<S>& w) const;
+  Vec3<double> slip_direction(const Vec3<double>& w) const;
 
  private:
   /// Its derivatives by u and by κ, unless null.

@@ -25,13 +25,13 @@ concept PressedShape = requires(const T& shape) {
 };
 
 /// The set-valued law: slipping, the friction wrench is the one in the limit set that dissipates most,
-///   f = argmin over the set of f · v_r   (for the ellipsoid f = −D v_r / sqrt(v_rᵀ D v_r), D = diag(f_max²,
-///   f_max², τ_max²));
+///   f = argmin over the set of f · v_r
+/// (for the ellipsoid f = −D v_r / sqrt(v_rᵀ D v_r) with D = diag(f_max², f_max², τ_max²));
 /// sticking, any f in the set. The slip acceleration is W f + b, W = G M⁻¹ Gᵀ. [LiuBillard2025] section II-B,
 /// [GoyalRuinaPapadopoulos1991] for the surface.
 ///
-/// For a convex law and f_N(t) > 0 the forward solution is unique, so chatter is an artefact of integration:
-/// here
+/// For a convex law and f_N(t) > 0 the forward solution is unique, so chatter is an artefact of integration.
+/// Here are two modes:
 ///   stick  y' = 0, left when the sticking wrench f_p reaches the surface;
 ///   slip   stiff (the wrench turns with the direction of a tiny slip), left when the slip comes to rest.
 /// At onset the slip leaves along a = W (f* − f_p), f* the projection of f_p onto the limit set in the metric

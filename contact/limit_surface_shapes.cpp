@@ -40,7 +40,6 @@ struct RayPoint {
   double t;       // ε if inner, else δ = 1/ε
   double gauge;   // p/F = q/T̂
   double slide;   // Φ
-  double dslide;  // Φ′
   double dforce;  // dF/dt: F′(ε) if inner
   double torque;  // T̂
   double power;   // t-scaled dissipation: 1.5 ε F + T̂ if inner, else 1.5 F + δ T̂
@@ -90,7 +89,6 @@ RayPoint disc_ray(double p, double q, double accuracy) {
     if (std::abs(step) <= accuracy || iteration == 49) {
       r.gauge = (gain - 0.75 * h * step / r.power) / r.power;
       r.slide = at.slide + at.dslide * (next * next - t * t);
-      r.dslide = at.dslide;
       if (r.inner) {
         r.torque -= 1.5 * t * r.dforce * step;
         r.power += 1.5 * force * step;
@@ -105,21 +103,10 @@ RayPoint disc_ray(double p, double q, double accuracy) {
   return r;
 }
 
-// ∇gauge at w, and ∇² unless null.
-Vec3<double> disc_gradient(const RayPoint& r, const Vec3<double>& w, Mat3* hessian) {
-  const double g = r.gauge, along = r.inner ? 1.0 / (g * r.slide) : 1.0 / std::hypot(w[0], w[1]);  // ε/p, 1/p
+// ∇gauge at w.
+Vec3<double> disc_gradient(const RayPoint& r, const Vec3<double>& w) {
+  const double along = r.inner ? 1.0 / (r.gauge * r.slide) : 1.0 / std::hypot(w[0], w[1]);  // ε/p, 1/p
   const double k = 1.5 * along / r.power;
-  if (hessian) {
-    const double gp = g * r.power, cube = gp * gp * gp;
-    if (r.inner) {
-      const double f = r.slide, m = r.t * r.t, lambda = 1.5 / (cube * r.dforce);
-      const double bend = 2.0 * r.dslide * r.power * r.power + f * f * (3.0 * r.torque + 2.25 * m * f);
-      *hessian = isotropic_hessian(w, k, -lambda * bend / (f * f * f), lambda);
-    } else {
-      const double lambda = -0.75 / (cube * r.dslide);
-      *hessian = isotropic_hessian(w, k, (lambda * w[2] * w[2] - k) * along * along, lambda);
-    }
-  }
   return {k * w[0], k * w[1], std::copysign((r.inner ? 1.0 : r.t) / r.power, w[2])};
 }
 
@@ -173,39 +160,26 @@ S UniformDisc::gauge(const Vec3<S>& w) const {
     return scale * disc_ray(slide, std::abs(unit[2]), kForValue).gauge;
   } else {
     const RayPoint r = disc_ray(slide, std::abs(unit[2]), kForGradient);
-    const Vec3<double> gradient = disc_gradient(r, unit, nullptr);
+    const Vec3<double> gradient = disc_gradient(r, unit);
     return S(scale * r.gauge, gradient[0] * w[0].v + gradient[1] * w[1].v + gradient[2] * w[2].v);
   }
 }
 
-template <class S>
-Vec3<S> UniformDisc::slip_direction(const Vec3<S>& w) const {
+Vec3<double> UniformDisc::slip_direction(const Vec3<double>& w) const {
   Vec3<double> unit;
   double scale;
-  if (!to_unit(w, unit, scale)) return {S(scale), S(scale), S(scale)};
+  if (!to_unit(w, unit, scale)) return {scale, scale, scale};
   const double slide = std::sqrt(unit[0] * unit[0] + unit[1] * unit[1]);
   const RayPoint r = disc_ray(slide, std::abs(unit[2]), kForGradient);
-  Mat3 h;
-  Vec3<double> n = disc_gradient(r, unit, std::is_same_v<S, double> ? nullptr : &h);
+  Vec3<double> n = disc_gradient(r, unit);
   const double inverse = 1.0 / std::sqrt(dot3(n, n));
   for (double& entry : n) entry *= -inverse;
-  if constexpr (std::is_same_v<S, double>) {
-    return n;
-  } else {
-    Mat3 jacobian;  // −(1 − n nᵀ) ∇²gauge/|∇gauge|
-    const Vec3<double> nh{dot3(n, h[0]), dot3(n, h[1]), dot3(n, h[2])};
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) jacobian[i][j] = -(h[i][j] - n[i] * nh[j]) * inverse / scale;
-    }
-    return chain3(w, n, jacobian);
-  }
+  return n;
 }
 
 template Vec3<double> UniformDisc::resist(const Vec3<double>&) const;
 template Vec3<Dual> UniformDisc::resist(const Vec3<Dual>&) const;
 template double UniformDisc::gauge(const Vec3<double>&) const;
 template Dual UniformDisc::gauge(const Vec3<Dual>&) const;
-template Vec3<double> UniformDisc::slip_direction(const Vec3<double>&) const;
-template Vec3<Dual> UniformDisc::slip_direction(const Vec3<Dual>&) const;
 
 }  // namespace unhand::contact

@@ -4,12 +4,12 @@
 // the hand's axes (round shapes need not know which): pure slide is
 // |w_xz| = 1 and pure spin |w_τ| = 1 for every isotropic shape. Each shape is a convex, centrally symmetric
 // set:
-//   resist(u)          the wrench that opposes the slip u ≠ 0: argmin over the set of w · u (maximal
-//   dissipation); gauge(w)           positively homogeneous, 1 on the surface, below 1 inside, 0 at w = 0;
-//   slip_direction(w)  the unit u with resist(u) = w/gauge(w), that is −∇gauge/|∇gauge|, minus the outward
-//   normal.
-// With Dual all three carry exact first derivatives. At u = 0 or w = 0 the answer is open: zero is returned,
-// without derivatives. NaN in, NaN out; magnitudes may lie anywhere in the range of double.
+// - resist(u): the wrench that opposes the slip u ≠ 0, argmin over the set of w · u (maximal dissipation);
+// - gauge(w): positively homogeneous, 1 on the surface, below 1 inside, 0 at w = 0;
+// - slip_direction(w): the unit u with resist(u) = w/gauge(w), −∇gauge/|∇gauge|: minus the outward normal.
+// With Dual the first two carry exact first derivatives; directions are asked for in double. At u = 0 or w =
+// 0 the answer is open: zero is returned, without derivatives. NaN in, NaN out; magnitudes may lie anywhere
+// in the range of double.
 #pragma once
 
 #include <algorithm>
@@ -72,16 +72,12 @@ struct Ellipsoid {
     return sqrt(dot3(w, w));
   }
   /// −w/|w|
-  template <class S>
-  Vec3<S> slip_direction(const Vec3<S>& w) const {
-    return resist(w);
-  }
+  Vec3<double> slip_direction(const Vec3<double>& w) const { return resist(w); }
 };
 
-/// The exact surface of a uniformly pressed disc of radius R [m], L = 2R/3 [m]: with ε = v/(|ω|R) =
-/// |u_xz|/(1.5 |u_τ|)
-/// [-], w_xz = −F(ε) u_xz/|u_xz| and w_τ = −sgn(u_τ) T(ε)/(2/3), F and T as in disc_friction.hpp.
-/// [Farkas2003]
+/// The exact surface of a uniformly pressed disc of radius R [m], L = 2R/3 [m] [Farkas2003]:
+///   w_xz = −F(ε) u_xz/|u_xz|,  w_τ = −sgn(u_τ) T(ε)/(2/3),  ε = v/(|ω|R) = |u_xz|/(1.5 |u_τ|),
+/// F and T as in disc_friction.hpp.
 ///
 /// Everything is written so that nothing is divided by a part of u or w that may vanish. Second derivatives
 /// are closed: the power σ(u) = −resist(u)·u and the gauge depend on (|x_xz|, |x_τ|) and are homogeneous of
@@ -103,8 +99,7 @@ struct UniformDisc {
   template <class S>
   S gauge(const Vec3<S>& w) const;
   /// Unit slip that a wrench w on the surface opposes.
-  template <class S>
-  Vec3<S> slip_direction(const Vec3<S>& w) const;
+  Vec3<double> slip_direction(const Vec3<double>& w) const;
 };
 
 /// ∇² at x of a function of (a, b) = (|x_xz|, |x_τ|), homogeneous of degree 1: in (a, b) it is λ (b, −a)(b,

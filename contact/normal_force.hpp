@@ -131,10 +131,9 @@ struct NormalForceOptions {
 struct NormalForceSummary {
   double sigma{};         ///< noise used: the declared one, or that of the scatter if it is larger [N]
   double chi2_per_dof{};  ///< of the smoothed force, and of the tail's level, against the whole series
-  double max_whitened_residual{};  ///< largest |residual|/σ
-  int knots{};                     ///< breaks strictly between the first sample and the release
-  bool power_law{};                ///< the ramp is (1 − s)^p to within the noise
-  double grip_force{};             ///< at the start of the opening [N]
+  int knots{};            ///< breaks strictly between the first sample and the release
+  bool power_law{};       ///< the ramp is (1 − s)^p to within the noise
+  double grip_force{};    ///< at the start of the opening [N]
   double opening_start{
       std::numeric_limits<double>::quiet_NaN()};                ///< first change of the force [s]; NaN: none
   double ramp_start{std::numeric_limits<double>::quiet_NaN()};  ///< the same, or the first sample where the

@@ -20,9 +20,9 @@ struct ForceSeries {
   std::size_t size() const { return time.size(); }
 };
 
-/// grip + slope (t − start) until start, then tail + (grip − tail) u^shape exp(Σ_j bend_j (1 − u)^j), j = 1,
-/// 2,
-/// ..., with u from 1 to 0, then tail; N, N/s, s. Without bends a power; with them whatever ends as a power.
+/// The force of an opening gripper [N], by time [s]: until `start` it is grip + slope (t − start), then
+///   tail + (grip − tail) u^shape exp(Σ_j bend_j (1 − u)^j),  j = 1, 2, ...,
+/// with u from 1 to 0, and after the release `tail`. Without bends a power; with them whatever ends as one.
 struct Ramp {
   static constexpr int kBends = 6;
   double grip{}, slope{}, tail{}, start{}, release{}, shape{1.0};

@@ -110,7 +110,7 @@ void validate(const ContactModelEntry& entry) {
   const auto fail = [&](const std::string& why) {
     throw std::invalid_argument(fmt::format("register_contact_model: \"{}\" {}", entry.name, why));
   };
-  if (!is_name(entry.name)) fail("is no name: one of A-Z, a-z, 0-9, '_', '-' and '.' is");
+  if (!is_name(entry.name)) fail("is not a valid name: use A-Z, a-z, 0-9, '_', '-' and '.'");
   if (std::find(std::begin(kReserved), std::end(kReserved), entry.name) != std::end(kReserved))
     fail("is the name of a model that is no contact law");
   if (find(entry.name)) fail("is taken");

@@ -85,6 +85,13 @@ dynamics::SplineOptions spline_options(const NormalForceOptions& o) {
   return out;
 }
 
+// The share of the sensor's bias that acts at t: it is faded out over the ramp.
+double bias_share(const NormalForceSummary& u, double t) {
+  const double length = u.release_time - u.opening_start;
+  if (!std::isfinite(length)) return t >= u.release_time ? 1.0 : 0.0;
+  return std::clamp((t - u.opening_start) / length, 0.0, 1.0);
+}
+
 void finish(const ForceSeries& s, NormalForceFit& fit, double parameters) {
   NormalForceSummary& u = fit.summary;
   u.sigma = s.sigma;
@@ -101,16 +108,13 @@ void finish(const ForceSeries& s, NormalForceFit& fit, double parameters) {
     u.tail_mean = tail / count;
     u.tail_mean_sigma = s.sigma / std::sqrt(static_cast<double>(count));
   }
-  // The bias is faded out over the ramp: against the samples it is put back.
-  for (std::size_t k = 0; k < s.size(); ++k) {
-    const double t = s.time[k], length = u.release_time - u.opening_start;
-    const double fade = std::isfinite(length) ? std::clamp((t - u.opening_start) / length, 0.0, 1.0)
-                                              : (t >= u.release_time ? 1.0 : 0.0);
-    const double e = (fit.force.at(all, t) + fade * u.tail_mean - s.value[k]) / s.sigma;
+  for (std::size_t k = 0; k < s.size(); ++k) {  // against the samples the bias is put back
+    const double t = s.time[k];
+    const double e = (fit.force.at(all, t) + bias_share(u, t) * u.tail_mean - s.value[k]) / s.sigma;
     sum += e * e;
-    u.max_whitened_residual = std::max(u.max_whitened_residual, std::abs(e));
   }
   u.chi2_per_dof = sum / std::max(1.0, static_cast<double>(s.size()) - parameters);
+  u.knots = 0;
   for (double t : fit.force.force().breaks())
     if (t > s.time.front() && t < std::min(u.release_time, s.time.back())) ++u.knots;
 }
@@ -128,6 +132,7 @@ NormalForceFit without_release(const ForceSeries& s, const NormalForceOptions& o
     Pieces p{{problem.begin, problem.end}, {line}, {}};
     p.kinks = sign_changes(Polynomial(p.breaks, p.pieces), problem.begin, problem.end);
     NormalForceFit fit{assemble(s, std::move(p), kInfinity), {}};
+    fit.summary.grip_force = std::max(0.0, fitted.at(problem.begin));
     finish(s, fit, 2.0);
     return fit;
   }
@@ -236,8 +241,9 @@ bool is_within(const ForceSeries& s, const SampledNormalForce& force) {
   return true;
 }
 
-// The samples joined by straight lines, and to zero at the release.
-SampledNormalForce broken_line(const ForceSeries& s, double release) {
+// The samples without the sensor's bias, joined by straight lines, and to zero at the release.
+SampledNormalForce broken_line(const ForceSeries& s, const NormalForceSummary& u) {
+  const double release = u.release_time;
   Pieces p;
   const auto add = [&](double t, double f) {
     if (!p.breaks.empty()) {
@@ -247,7 +253,8 @@ SampledNormalForce broken_line(const ForceSeries& s, double release) {
     p.breaks.push_back(t);
     p.pieces.push_back(constant(f));
   };
-  for (std::size_t k = 0; k < s.size() && s.time[k] < release; ++k) add(s.time[k], std::max(0.0, s.value[k]));
+  for (std::size_t k = 0; k < s.size() && s.time[k] < release; ++k)
+    add(s.time[k], std::max(0.0, s.value[k] - bias_share(u, s.time[k]) * u.tail_mean));
   if (std::isfinite(release)) add(release, 0.0);
   p.pieces.pop_back();
   p.kinks = {p.breaks.begin() + 1, p.breaks.end()};
@@ -258,9 +265,8 @@ SampledNormalForce broken_line(const ForceSeries& s, double release) {
 // The fit, its force within what was measured.
 NormalForceFit within(const ForceSeries& s, NormalForceFit fit) {
   if (is_within(s, fit.force)) return fit;
-  fit.force = broken_line(s, fit.force.release_time());
+  fit.force = broken_line(s, fit.summary);
   fit.summary.power_law = false;
-  fit.summary.knots = 0;
   finish(s, fit, 0.0);
   return fit;
 }

@@ -29,11 +29,12 @@ struct Grid {
   }
 };
 
+/// Values of the functions that are not zero in an interval: [derivative][function].
+template <int Degree>
+using Basis = std::array<std::array<double, Degree + 1>, Degree + 1>;
+
 /// The B-splines of interval i and their derivatives up to `order` at x: the Cox-de Boor triangle,
 /// differentiated through the coefficients of divided differences (Piegl and Tiller, The NURBS Book, 2.3).
-template <int Degree>
-using Basis = std::array<std::array<double, Degree + 1>, Degree + 1>;  // [derivative][function]
-
 template <int Degree>
 void basis(const Grid& grid, int i, double x, int order, Basis<Degree>& out) {
   const double* const knot = grid.knots.data() + grid.column[i] + Degree;

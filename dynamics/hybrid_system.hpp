@@ -107,9 +107,10 @@ class HybridSystem {
   virtual Entry<double, N> on_time(int mode, const Window&, double t, const State<double, N>& y) const = 0;
   virtual Entry<Dual, N> on_time(int mode, const Window&, const Dual& t, const State<Dual, N>& y) const = 0;
 
-  /// The state at an accumulation point of events at t. Only asked for when `has_limit` says so.
+  /// Whether events of this guard may accumulate in the mode, and at_limit() knows what comes then.
   virtual bool has_limit(int /*mode*/, int /*guard*/) const { return false; }
-  /// The state at an accumulation point t [s] of events, whose last phase is `from`.
+  /// The state at an accumulation point t [s] of events, whose last phase is `from`. Only asked for where
+  /// has_limit() says so.
   virtual Entry<double, N> at_limit(const Phase& from, double t, const State<double, N>& y) const {
     return {from.mode, t, y, 0.0};
   }

@@ -76,7 +76,7 @@ struct SplineFit {
 /// Householder QR in time relative to `begin`, so that σ of very different size do not square the condition
 /// number.
 ///
-/// Instantiated for <1,3>, <1,5> and <3,5>. Throws std::invalid_argument for a malformed problem, or for
+/// Instantiated for <1,5> and <3,5>. Throws std::invalid_argument for a malformed problem, or for
 /// observations that do not determine the spline.
 template <int Channels, int Degree>
 SplineFit<Channels, Degree> fit_spline(const SplineProblem<Channels, Degree>& problem,

@@ -1,5 +1,5 @@
-// Single axes of a planar throw in another unit, or with the other sign; so the normal force. Internal to
-// unit_check.
+// Single axes of a planar throw in another unit, or with the other sign, and a normal force with it. Internal
+// to unit_check.
 #pragma once
 
 #include <vector>

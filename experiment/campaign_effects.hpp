@@ -54,8 +54,8 @@ const dynamics::EffectParameter* find_parameter(std::string_view name);
 const dynamics::Effect* effect_of(std::string_view name);
 
 /// An effect for benchmarks of detection: one of the catalogue that the design's sensors can see, each of its
-/// sizes log-uniform from half the `typical` one (viscous friction: 2.5 times; about what a campaign can
-/// detect) to twenty times that (large), with either sign where the range allows it (but μ_s > μ_k);
+/// sizes log-uniform from half the `typical` one (about what a campaign can detect) to twenty times that
+/// (large), with either sign where the range allows it (but μ_s > μ_k);
 /// parameters of shape from their grid.
 EffectSettings random_effect(const CampaignDesign& design, std::uint64_t seed);
 

@@ -120,10 +120,12 @@ std::vector<PreparedThrow> prepare_all(const datasets::ThrowLog& log, const std:
 Comparison compare(const datasets::ThrowLog& log, const std::vector<PreparedThrow>& prepared,
                    const CompareOptions& options) {
   Comparison out;
+  double force_chi2 = 0, forces = 0;
   for (const auto& t : prepared) {
     out.worst_hand_chi2 = std::max(out.worst_hand_chi2, t.hand_fit.chi2_per_dof);
-    out.mean_force_chi2 += t.force_fit.chi2_per_dof / static_cast<double>(prepared.size());
+    if (t.normal_force) force_chi2 += t.force_fit.chi2_per_dof, forces += 1;
   }
+  if (forces > 0) out.mean_force_chi2 = force_chi2 / forces;
   out.conditions = labelled_conditions(prepared);
   out.repetitions = scatter_of(prepared);
 

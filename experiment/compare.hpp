@@ -49,7 +49,7 @@ struct ThrowComparison {
 /// neither.
 void judge_detach(const PreparedThrow& prepared, ThrowComparison& comparison);
 
-/// A parameter's value in words' terms; sigma is NaN where it is not known.
+/// A fitted parameter as tables show it; sigma is NaN where it is not known.
 struct NamedParameter {
   std::string name, unit;   ///< as a card has them
   double value{}, sigma{};  ///< in `unit`; 1 σ
@@ -90,10 +90,11 @@ struct RepetitionScatter {
 
 /// Models against the measured outcomes of a campaign.
 struct Comparison {
-  std::vector<ThrownCondition> conditions;      ///< in order of appearance
-  std::vector<ModelComparison> models;          ///< in the order asked for
-  RepetitionScatter repetitions;                ///< the floor under all of them
-  double worst_hand_chi2{}, mean_force_chi2{};  ///< how well the smoothed inputs explain the logged ones
+  std::vector<ThrownCondition> conditions;  ///< in order of appearance
+  std::vector<ModelComparison> models;      ///< in the order asked for
+  RepetitionScatter repetitions;            ///< the floor under all of them
+  double worst_hand_chi2{};                 ///< how well the smoothed hands explain the logged ones
+  std::optional<double> mean_force_chi2;    ///< and the normal forces, over the throws that have one
 };
 
 /// Which models are compared, and with which parameters.

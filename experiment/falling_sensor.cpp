@@ -1,7 +1,11 @@
 #include "experiment/falling_sensor.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <utility>
 
 namespace unhand::experiment {
 
@@ -115,6 +119,11 @@ std::vector<Vec3<S>> falling_readings(const FallStart<S>& start, const FallSampl
   dynamics::apply_effects(accelerometer_effects(), values, sensor);
   dynamics::apply_effects(flight::spatial_effects(), values, air);
   const auto& time = samples.time;
+  for (const auto& [name, size] :
+       {std::pair{"omega", samples.omega.size()}, {"turned", samples.turned.size()}})
+    if (size != 0 && size != time.size())
+      throw std::invalid_argument(
+          fmt::format("falling_readings: {} has {} rows, and time {}", name, size, time.size()));
   std::vector<Vec3<S>> out;
   out.reserve(time.size());
   FallingBody<S> body{0, start.velocity, start.up, {}, {}};
@@ -133,9 +142,9 @@ std::vector<Vec3<S>> falling_readings(const FallStart<S>& start, const FallSampl
       const S slope = slope_at(v), ahead = v + dt * slope;
       body.velocity += 0.5 * dt * (slope + slope_at(ahead));
     }
-    if (!samples.omega.empty()) {
+    if (!samples.omega.empty()) body.omega = samples.omega[i];
+    if (!samples.omega.empty() && time.size() > 1) {
       const std::size_t before = i > 0 ? i - 1 : 0, after = std::min(i + 1, time.size() - 1);
-      body.omega = samples.omega[i];
       for (std::size_t a = 0; a < 3; ++a)
         body.omega_rate[a] =
             (samples.omega[after][a] - samples.omega[before][a]) / (time[after] - time[before]);

@@ -60,7 +60,8 @@ struct FallStart {
 
 /// The readings at the samples [m/s²], body axes, with the effects that `values` names: the vertical turns
 /// against the body, and v̇ = −g + a(v u)·u by Heun's method from sample to sample. `gravity` g [m/s²].
-/// Instantiated for double and Dual.
+/// Instantiated for double and Dual. Throws std::invalid_argument where `omega` or `turned` is of another
+/// size than `time`, and not empty.
 template <class S>
 std::vector<flight::Vec3<S>> falling_readings(const FallStart<S>& start, const FallSamples& samples,
                                               double gravity, const dynamics::Values<S>& values);

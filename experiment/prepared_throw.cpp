@@ -210,10 +210,6 @@ void measure_outcome(const Source& source, PreparedThrow& out) {
   }
 }
 
-}  // namespace
-
-namespace {
-
 /// When motion capture first sees the object back down at the landing height [s]; infinite where it never
 /// does.
 double first_landing(const datasets::MocapLog& mocap, double height, double since) {

@@ -71,8 +71,7 @@ bool shows_grasp(const datasets::ThrowLog& log, const datasets::Throw& logged);
 /// something. The earliest of
 /// - the logged landing: where motion capture goes on after it, 3 σ of its time before it, else itself;
 /// - the first sample at or below the landing height once the object has been above it by a centimetre since
-///   `since` [s], its release or, where that is not known, the opening: what it lands on may lie above the
-///   hand;
+///   `since` [s], its release or, where that is not known, the opening: it may land above the hand;
 /// - the end of a declared `free_flight`.
 /// Infinite where none of them is known.
 double flight_end(const datasets::ThrowLog& log, const datasets::Throw& logged, double since);

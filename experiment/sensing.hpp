@@ -13,7 +13,7 @@ struct Sensing {
   S landing_share{};      ///< 1 where the landing was read from the tracker, so that its scale is off too [-]
   S com_offset{};         ///< CoM beyond its declared place, along the object's x [m]
   S inertia{};            ///< true/declared − 1 [-]
-  S mass{};               ///< true/declared − 1, the inertia's value as declared [-]
+  S mass{};               ///< true/declared − 1 [-]; the inertia stays as declared
   S bias_fx{}, bias_fz{};  ///< of the F/T sensor, hand frame [N]
   S bias_tau{};            ///< [N m]
   S normal_force_bias{};   ///< reported − true, of the pad [N]

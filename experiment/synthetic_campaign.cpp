@@ -121,9 +121,9 @@ void validate(const CampaignDesign& design) {
       throw std::invalid_argument(
           fmt::format("campaign {}: {} = {} is not in {}", design.name, name, value, range));
   };
-  require(!design.objects.empty(), "number of objects", 0, "[1, 10000]");
-  require(!design.postures.empty(), "number of postures", 0, "[1, 10000]");
-  require(!design.release_accelerations.empty(), "number of release accelerations", 0, "[1, 10000]");
+  require(!design.objects.empty(), "number of objects", 0, "[1, inf)");
+  require(!design.postures.empty(), "number of postures", 0, "[1, inf)");
+  require(!design.release_accelerations.empty(), "number of release accelerations", 0, "[1, inf)");
   require(design.repetitions >= 1 && design.repetitions <= 10'000, "repetitions", design.repetitions,
           "[1, 10000]");
   require(design.train_share >= 0 && design.train_share <= 1, "train_share", design.train_share, "[0, 1]");

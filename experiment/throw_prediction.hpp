@@ -21,6 +21,7 @@ namespace unhand::experiment {
 ///   grasp_offset   of this throw: the pads hold a point that much nearer to the tip [m]
 ///   mu_deviation   of this throw: its μ is mu (1 + mu_deviation) [-]
 ///   force_deviation  of this throw: of its measured normal force, in σ of the smoothing (DoubtfulForce) [-]
+///   dead_time_deviation  of this throw, beyond `dead_time` [s]
 ///   delay_deviation  of this throw, beyond `delay` [s]
 struct ThrowModel {
   std::string contact_model;   ///< a name that contact::make_contact_model knows

@@ -35,26 +35,22 @@ inline constexpr double kLeastOutlier = 5;
 /// unit in use (mm, cm, inch; degrees; kgf, lbf, mN, kN; N mm, N cm, kgf cm; ms; g). Compared are
 ///
 /// - the hand's pose with the sum of its twist, the twist with the sum of the acceleration;
-/// - the object's motion with the hand's while it is held, and its declared com_offset with its distance
-/// then;
+/// - the object's motion with the hand's while it is held, and then its distance with its com_offset;
 /// - the wrench of all pads with what the held body's mass, inertia and lever need (Newton and Euler);
 /// - the landing with the hand's state at the opening (as a free flight from there: to a factor of three)
 ///   and with the attitude that motion capture saw last;
 /// - the clocks of the groups with each other; a declared grasp_angle with a whole turn;
 /// - the wrench with the normal force while that falls through its last fifth and the pads slip: no
 ///   channel knows the unit of the normal force, of which only the product with friction is determined, but
-///   in another one friction lies outside [kLeastFriction, kMostFriction].
-///
+///   in another one friction lies outside [kLeastFriction, kMostFriction];
 /// - a declared inertia with what a body of that mass and size can have, and a declared pad_radius with the
 ///   objects (declared_check.hpp);
 /// - each axis by itself, and the signs of the wrench and the normal force (axis_check.hpp);
 /// - the direction of com_offset with where motion capture sees the CoM while the object is held;
 /// - the landing height with the height at which motion capture sees the flights end (to 0.1 m), with where
-/// free flights are at landing/time, and with the highest point of all throws
-///   (to a metre);
+///   free flights are at landing/time, and with the highest point of all throws (to a metre);
 /// - the angles of hand and object with themselves, from sample to sample, and those of the landing with
-/// where
-///   motion capture leads: logs hold them unwrapped, without jumps of whole turns;
+///   what motion capture leads to: logs hold them unwrapped, without jumps of whole turns;
 /// - the height of a free flight with what gravity makes of it: the only one of logs without a hand, and of
 ///   dimension 3.
 ///

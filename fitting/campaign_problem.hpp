@@ -21,9 +21,8 @@ namespace unhand::fitting {
 struct Unknown {
   /// Of a throw's own unknown: what its spread is learned from.
   enum class Kind {
-    /// Where the object was held; about zero. Its zero is what the log's sensors say: a clock or a hand's
-    /// pose
-    /// that is off moves it for whole conditions, and the throw must be free to take that back.
+    /// Where the object was held; about zero. Its zero is what the log's sensors say: a clock or a pose of
+    /// the hand that is off moves it for whole conditions, and the throw must be free to take that back.
     placement,
     /// What differs between repetitions by itself; about the mean of their condition. What all of them share
     /// is where the law fails, and must not be hidden from the campaign's unknowns.

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "dynamics/require_finite.hpp"
 #include "flight/fly.hpp"
 
 namespace unhand::flight {
@@ -24,12 +25,10 @@ void validate(const Medium& medium) {
 
 template <class S>
 void validate(const PlaneState<S>& state) {
-  for (const auto& [name, x] : {std::pair{"r", value_of(state.r)},
-                                {"z", value_of(state.z)},
-                                {"r_rate", value_of(state.r_rate)},
-                                {"z_rate", value_of(state.z_rate)}})
-    if (!std::isfinite(x))
-      throw std::invalid_argument(fmt::format("flight in the plane: {} = {} is not finite", name, x));
+  dynamics::require_finite("flight in the plane", {{"r", value_of(state.r), "m"},
+                                                   {"z", value_of(state.z), "m"},
+                                                   {"r_rate", value_of(state.r_rate), "m/s"},
+                                                   {"z_rate", value_of(state.z_rate), "m/s"}});
 }
 
 }  // namespace

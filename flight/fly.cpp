@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "dynamics/require_finite.hpp"
 #include "dynamics/smooth_flow.hpp"
 #include "flight/aerodynamics.hpp"
 
@@ -112,11 +113,20 @@ class Flying final : public dynamics::HybridSystemFrom<Flying<P>, 6> {
 
 template <class S>
 void validate(const FlightProblem<S>& p) {
-  for (const S* x :
-       {&p.pose.x, &p.pose.z, &p.pose.theta, &p.twist.vx, &p.twist.vz, &p.twist.omega, &p.gravity.x,
-        &p.gravity.z, &p.landing_height, &p.tracked.x, &p.tracked.z, &p.lift_km, &p.wind.x, &p.wind.z})
-    if (!std::isfinite(value_of(*x)))
-      throw std::invalid_argument("flight: a component of the problem is not finite");
+  dynamics::require_finite("flight", {{"pose x", value_of(p.pose.x), "m"},
+                                      {"pose z", value_of(p.pose.z), "m"},
+                                      {"pose theta", value_of(p.pose.theta), "rad"},
+                                      {"twist vx", value_of(p.twist.vx), "m/s"},
+                                      {"twist vz", value_of(p.twist.vz), "m/s"},
+                                      {"twist omega", value_of(p.twist.omega), "rad/s"},
+                                      {"gravity x", value_of(p.gravity.x), "m/s²"},
+                                      {"gravity z", value_of(p.gravity.z), "m/s²"},
+                                      {"landing_height", value_of(p.landing_height), "m"},
+                                      {"tracked x", value_of(p.tracked.x), "m"},
+                                      {"tracked z", value_of(p.tracked.z), "m"},
+                                      {"lift_km", value_of(p.lift_km), ""},
+                                      {"wind x", value_of(p.wind.x), "m/s"},
+                                      {"wind z", value_of(p.wind.z), "m/s"}});
   if (!(value_of(p.drag_k) >= 0 && std::isfinite(value_of(p.drag_k))))
     throw std::invalid_argument(
         fmt::format("flight: drag_k = {} is not in [0, inf) 1/m", value_of(p.drag_k)));

@@ -8,8 +8,8 @@
 
 namespace unhand::flight {
 
-/// A planar flight. In still thin air (no drag, no lift) the closed form is used, otherwise the integrator
-/// with the landing as an event.
+/// A planar flight. Where gravity alone acts (is_ballistic) and the CoM is tracked, the closed form is used,
+/// otherwise the integrator with the landing as an event.
 template <class S>
 struct FlightProblem {
   dynamics::Pose<S> pose;     ///< of the CoM

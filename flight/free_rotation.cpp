@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "dynamics/require_finite.hpp"
+
 namespace unhand::flight {
 
 using dynamics::convert;
@@ -60,10 +62,13 @@ void validate(const Vec3<S>& inertia, const RotationState<S>& start, const std::
   if (!(most / least <= kMostTurn))
     throw std::invalid_argument(fmt::format(
         "free rotation: inertia {} is not in (0, {:g}] times another, which is {}", most, kMostTurn, least));
-  for (const S* x : {&start.attitude.w, &start.attitude.x, &start.attitude.y, &start.attitude.z,
-                     &start.omega[0], &start.omega[1], &start.omega[2]})
-    if (!std::isfinite(value_of(*x)))
-      throw std::invalid_argument("free rotation: a component of the start is not finite");
+  dynamics::require_finite("free rotation", {{"attitude w", value_of(start.attitude.w), ""},
+                                             {"attitude x", value_of(start.attitude.x), ""},
+                                             {"attitude y", value_of(start.attitude.y), ""},
+                                             {"attitude z", value_of(start.attitude.z), ""},
+                                             {"omega x", value_of(start.omega[0]), "rad/s"},
+                                             {"omega y", value_of(start.omega[1]), "rad/s"},
+                                             {"omega z", value_of(start.omega[2]), "rad/s"}});
   if (value_of(start.attitude.w) == 0 && value_of(start.attitude.x) == 0 && value_of(start.attitude.y) == 0 &&
       value_of(start.attitude.z) == 0)
     throw std::invalid_argument("free rotation: the attitude is the zero quaternion");
@@ -85,8 +90,7 @@ template <class S>
 Rotation<S>::Rotation(const Vec3<S>& inertia, const RotationState<S>& start, const S& damping, double last,
                       const dynamics::IntegratorOptions& options) {
   validate(inertia, start, {last});
-  if (!std::isfinite(value_of(damping)))
-    throw std::invalid_argument("free rotation: the damping is not finite");
+  dynamics::require_finite("free rotation", {{"damping", value_of(damping), "1/s"}});
   attitude_ = normalised(start.attitude);
   omega_ = start.omega;
   last_ = last;

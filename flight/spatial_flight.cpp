@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "dynamics/require_finite.hpp"
 #include "flight/aerodynamics.hpp"
 
 namespace unhand::flight {
@@ -86,14 +87,17 @@ class SpatialPath final : public dynamics::SmoothSystem<SpatialPath<P>, 6> {
 
 template <class S>
 void validate(const SpatialStart<S>& start, const SpatialAir<S>& air, const std::vector<S>& times) {
-  for (const Vec3<S>* v : {&start.position, &start.velocity, &air.gravity, &air.wind})
-    for (const S& x : *v)
-      if (!std::isfinite(value_of(x)))
-        throw std::invalid_argument("spatial flight: a component is not finite");
-  for (const S* x :
-       {&air.drag_k, &air.linear_drag, &air.lift, &air.axis_drag_x, &air.axis_drag_y, &air.cubic_drag})
-    if (!std::isfinite(value_of(*x)))
-      throw std::invalid_argument("spatial flight: a coefficient of the air is not finite");
+  for (std::size_t i = 0; i < 3; ++i)
+    dynamics::require_finite("spatial flight", {{"position", value_of(start.position[i]), "m"},
+                                                {"velocity", value_of(start.velocity[i]), "m/s"},
+                                                {"gravity", value_of(air.gravity[i]), "m/s²"},
+                                                {"wind", value_of(air.wind[i]), "m/s"}});
+  dynamics::require_finite("spatial flight", {{"drag_k", value_of(air.drag_k), "1/m"},
+                                              {"linear_drag", value_of(air.linear_drag), "1/s"},
+                                              {"lift", value_of(air.lift), ""},
+                                              {"axis_drag_x", value_of(air.axis_drag_x), "1/m"},
+                                              {"axis_drag_y", value_of(air.axis_drag_y), "1/m"},
+                                              {"cubic_drag", value_of(air.cubic_drag), "1/m"}});
   if (!(value_of(air.drag_k) >= 0))
     throw std::invalid_argument(
         fmt::format("spatial flight: drag_k = {} is not in [0, inf) 1/m", value_of(air.drag_k)));

@@ -210,10 +210,6 @@ void check(const HandSeries& s) {
             "time must be finite and increase");
 }
 
-}  // namespace
-
-namespace {
-
 /// How far pose and twist may be apart at a break: absolutely [m, rad, per s], and as a share of the terms
 /// that sum up to them, of which each is rounded.
 constexpr double kRounding = 1e-9, kRoundingShare = 1e-7;

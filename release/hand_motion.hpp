@@ -34,9 +34,9 @@ class HandMotion {
   virtual HandState<Dual> at(const Window&, const Dual& t) const = 0;
   /// Instants [s], increasing, strictly inside (begin, end), at which the acceleration jumps.
   virtual std::vector<double> jumps() const = 0;
-  /// First and last instant [s] at which the motion is known.
+  /// First instant [s] at which the motion is known.
   virtual double begin() const = 0;
-  /// Last instant at which the motion is known [s].
+  /// Last instant [s] at which the motion is known.
   virtual double end() const = 0;
 };
 

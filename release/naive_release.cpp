@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "release/release_system.hpp"
@@ -22,12 +21,9 @@ NaiveResult simulate_release_naive(const ReleaseProblem<double>& problem, const 
   validate(problem);
   constexpr double kLeast = 1e-7;     // [s]: a release of 0.1 s then takes a million steps
   constexpr double kMostSteps = 1e8;  // some seconds of computing
-  constexpr double kSpacings = 8;     // of representable times that a step must be long
   const double release = problem.normal_force.release_time(), L = patch.length();
   const double last_time = std::min(release, problem.hand.end());
-  const double spacing =
-      std::numeric_limits<double>::epsilon() * std::max(std::abs(problem.start), std::abs(last_time));
-  const double least = std::max({kLeast, kSpacings * spacing, (last_time - problem.start) / kMostSteps});
+  const double least = std::max(kLeast, (last_time - problem.start) / kMostSteps);
   if (!(options.step >= least && options.step <= 0.1))
     throw std::invalid_argument(
         fmt::format("naive release: step = {} is not in [{}, 0.1] s", options.step, least));
@@ -35,6 +31,7 @@ NaiveResult simulate_release_naive(const ReleaseProblem<double>& problem, const 
     throw std::invalid_argument(
         fmt::format("naive release: smoothing = {} is not in [0, inf) m/s", options.smoothing));
   validate(patch);
+  require_released(problem.normal_force, problem.hand.end());
   double t = problem.start;
   HandState<double> hand = problem.hand.at({t, t + options.step}, t);
   const double theta = hand.pose.theta + problem.grasp.angle;
@@ -61,7 +58,11 @@ NaiveResult simulate_release_naive(const ReleaseProblem<double>& problem, const 
                                      L * (patch_twist.omega - hand.twist.omega)};
     const double size = std::sqrt(slip[0] * slip[0] + slip[1] * slip[1] + slip[2] * slip[2] +
                                   options.smoothing * options.smoothing);
-    const double k = size > 0 ? patch.f_max(problem.normal_force.at(window, t)) / size : 0.0;
+    const double pressed = problem.normal_force.at(window, t);
+    if (!(pressed >= 0))
+      throw std::invalid_argument(
+          fmt::format("naive release: normal force = {} N at {} s is not in [0, inf) N", pressed, t));
+    const double k = size > 0 ? patch.f_max(pressed) / size : 0.0;
     const Acceleration<double> a = dynamics::acceleration_under(
         problem.body, Wrench<double>{-k * slip[0], -k * slip[1], -k * L * slip[2]}, r, problem.gravity);
     if (last[0] * slip[0] + last[1] * slip[1] + last[2] * slip[2] < 0) ++result.reversals;

@@ -27,9 +27,8 @@ struct NaiveResult {
 /// The ellipsoidal limit surface as [LiuBillard2025] describes it in use, for comparison only: without a
 /// stick mode the wrench of a held object flips from side to side at every step, and the energy that this
 /// costs is the error. The contact model of `problem` is not used; `patch` gives the limits. Throws
-/// std::invalid_argument for what simulate_release refuses, a step outside [1e-7, 0.1] s, one below eight
-/// spacings of representable times, one of which the release takes more than 1e8, and a smoothing that is
-/// negative or not finite.
+/// std::invalid_argument for what simulate_release refuses, a step outside [1e-7, 0.1] s, one of which the
+/// release takes more than 1e8, and a smoothing that is negative or not finite.
 NaiveResult simulate_release_naive(const ReleaseProblem<double>& problem, const contact::Patch<double>& patch,
                                    const NaiveOptions& options = {});
 

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "dynamics/require_finite.hpp"
 #include "release/giving_release.hpp"
 
 namespace unhand::release {
@@ -27,6 +28,11 @@ using dynamics::Wrench;
 /// Throws std::invalid_argument, naming parameter, value and range, for a problem that is none.
 template <class S>
 void validate(const ReleaseProblem<S>& problem) {
+  if (!(std::abs(problem.start) <= 1e6))
+    throw std::invalid_argument(
+        fmt::format("release: start = {} is not in [-1e6, 1e6] s: a clock must begin near the throw, for its "
+                    "times to be resolved",
+                    problem.start));
   const auto require = [](bool ok, const char* name, double value, const char* range) {
     if (!ok) throw std::invalid_argument(fmt::format("release: {} = {} is not in {}", name, value, range));
   };
@@ -34,8 +40,7 @@ void validate(const ReleaseProblem<S>& problem) {
   require(m > 0 && m <= 1e4, "mass", m, "(0, 1e4] kg");
   require(I > 0 && I <= 1e6, "inertia", I, "(0, 1e6] kg m²");
   const auto finite = [](const char* name, double value, const char* unit) {
-    if (!std::isfinite(value))
-      throw std::invalid_argument(fmt::format("release: {} = {} {} is not finite", name, value, unit));
+    dynamics::require_finite("release", {{name, value, unit}});
   };
   finite("gravity x", value_of(problem.gravity.x), "m/s²");
   finite("gravity z", value_of(problem.gravity.z), "m/s²");
@@ -151,18 +156,21 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
     out.clear();
     problem_.normal_force.kinks(out);
     for (const double t : problem_.hand.jumps()) out.push_back(S(t));
-    if (std::isfinite(separation())) out.push_back(convert<S>(separation_));
-    std::stable_sort(out.begin(), out.end(),
-                     [](const S& a, const S& b) { return value_of(a) < value_of(b); });
-    // Of events at one instant the one sorted last stays. The separation, which may be a kink: its
-    // derivatives are the detach's. A jump of the hand rather than a kink: no parameter moves what jumps, and
-    // where the force only kinks the flow is continuous, so that the kink's own derivatives do not count.
+    const auto earlier = [](const S& a, const S& b) { return value_of(a) < value_of(b); };
+    std::stable_sort(out.begin(), out.end(), earlier);
+    // Of events at one instant one stays. A jump of the hand rather than a kink, since no parameter moves
+    // what jumps, and where the force only kinks the flow is continuous, so that the kink's own derivatives
+    // do not count. The separation rather than either: its derivatives are the detach's.
+    constexpr double kOneInstant = 1e-12;
     for (std::size_t i = 1; i < out.size();) {
-      if (value_of(out[i]) - value_of(out[i - 1]) < 1e-12)
+      if (value_of(out[i]) - value_of(out[i - 1]) < kOneInstant)
         out.erase(out.begin() + static_cast<std::ptrdiff_t>(i) - 1);
       else
         ++i;
     }
+    if (!std::isfinite(separation())) return;
+    std::erase_if(out, [&](const S& t) { return std::abs(value_of(t) - separation()) < kOneInstant; });
+    out.insert(std::upper_bound(out.begin(), out.end(), S(separation()), earlier), convert<S>(separation_));
   }
   template <class S>
   void flow_(const Phase& p, const S& t, const State<S, 6>& y, State<S, 6>& dy) const {

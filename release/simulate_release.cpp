@@ -46,11 +46,6 @@ void require_finite_detach(ReleaseResult<S>& result) {
 
 template <class S>
 ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const ReleaseOptions& options) {
-  if (!(std::abs(problem.start) <= 1e6))
-    throw std::invalid_argument(
-        fmt::format("release: start = {} is not in [-1e6, 1e6] s: a clock must begin near the throw, for its "
-                    "times to be resolved",
-                    problem.start));
   validate(problem);
   if (std::is_same_v<S, Dual> && options.ledger)
     throw std::invalid_argument(

@@ -45,9 +45,8 @@ struct EffectSearch {
 /// ones in full and accepts the best if
 ///  - Wald's test with the scatter between groups (F distribution) rejects its absence at the rate divided by
 ///    the number of candidates,
-///  - on held-out groups χ² falls, at 5 %, one-sided, by the jackknife over groups of how much of the
-///  predicted
-///    change they show, and
+///  - on held-out groups χ² falls, at 5 %, one-sided, by the jackknife over groups of how much they show of
+///    the change that is predicted, and
 ///  - it matters there.
 /// Candidates whose footprints are the same are fitted once, under the name that problem.effects() lists
 /// first; those that correlate by `equivalent` with what was accepted are listed as its other names. At the

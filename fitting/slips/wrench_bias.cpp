@@ -20,6 +20,8 @@ namespace {
 constexpr int kSteps = 20;
 /// Of a sigma: steps below it change nothing that matters.
 constexpr double kAtRest = 0.1;
+/// Of the mean force: the longest step.
+constexpr double kFarthest = 0.3;
 
 /// (f_x, f_y, τ) as samples have it.
 Vector3d in_samples(const Vector3d& bias, double characteristic_length) {
@@ -108,6 +110,14 @@ Step next_step(const std::vector<SlipSamples>& rest, const std::vector<SurfaceFi
   return {-inverse * gradient, inverse * scatter * inverse * (slips / std::max(1.0, slips - 3)), slips};
 }
 
+/// Of all samples [N].
+double mean_force(const std::vector<SlipSamples>& surfaces) {
+  double sum = 0, n = 0;
+  for (const SlipSamples& slips : surfaces)
+    for (const SlipSample& s : slips.samples) sum += std::hypot(s.wrench[0], s.wrench[1]), n += 1;
+  return n > 0 ? sum / n : 0;
+}
+
 std::vector<SlipSamples> without_fold(std::vector<SlipSamples> surfaces, int fold, int folds) {
   for (SlipSamples& slips : surfaces)
     std::erase_if(slips.samples, [&](const SlipSample& s) { return s.slip % folds == fold; });
@@ -128,8 +138,11 @@ std::vector<SlipSamples> without_bias(std::vector<SlipSamples> surfaces, const V
   return surfaces;
 }
 
-WrenchBias fit_wrench_bias(const std::vector<SlipSamples>& surfaces, SurfaceModel model) {
+WrenchBias fit_wrench_bias(const std::vector<SlipSamples>& surfaces, SurfaceModel model,
+                           const Vector3d& start) {
   WrenchBias out;
+  out.value = start;
+  const double force = mean_force(surfaces);
   Vector3d asked = Vector3d::Zero(), taken = Vector3d::Zero();  // of the last step
   for (int i = 0; i < kSteps; ++i) {
     const auto rest = without_bias(surfaces, out.value);
@@ -149,7 +162,10 @@ WrenchBias fit_wrench_bias(const std::vector<SlipSamples>& surfaces, SurfaceMode
     }
     // One that goes back has gone too far: to where the line through the two is zero.
     const bool back = step.value.dot(information * taken) < 0;
-    const double share = back ? std::min(1.0, length(taken) / (length(asked) + length(step.value))) : 1.0;
+    double share = back ? std::min(1.0, length(taken) / (length(asked) + length(step.value))) : 1.0;
+    // And none by more than a part of the wrenches.
+    if (const double size = step.value.head<2>().norm(); share * size > kFarthest * force)
+      share = kFarthest * force / size;
     asked = step.value, taken = share * step.value;
     out.value += taken;
   }
@@ -158,7 +174,7 @@ WrenchBias fit_wrench_bias(const std::vector<SlipSamples>& surfaces, SurfaceMode
 
 std::vector<SurfaceScore> score_with_bias(const std::vector<SlipSamples>& surfaces, SurfaceModel model,
                                           const WrenchBias& whole, const SurfaceComparisonOptions& options) {
-  constexpr double kDegrees = 180 / std::numbers::pi;
+  constexpr double to_deg = 180 / std::numbers::pi;
   std::vector<SurfaceScore> out(surfaces.size());
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     out[i].model = model, out[i].outcome = SurfaceOutcome::fitted, out[i].fit = whole.fits[i];
@@ -166,7 +182,8 @@ std::vector<SurfaceScore> score_with_bias(const std::vector<SlipSamples>& surfac
   }
   std::vector<WrenchBias> folds(static_cast<std::size_t>(options.folds));
   dynamics::parallel_for(folds.size(), options.threads, [&](std::size_t k) {
-    folds[k] = fit_wrench_bias(without_fold(surfaces, static_cast<int>(k), options.folds), model);
+    folds[k] =
+        fit_wrench_bias(without_fold(surfaces, static_cast<int>(k), options.folds), model, whole.value);
   });
   for (std::size_t k = 0; k < folds.size(); ++k) {
     if (!folds[k].solved) return {};
@@ -174,7 +191,7 @@ std::vector<SurfaceScore> score_with_bias(const std::vector<SlipSamples>& surfac
       const SlipSamples rest = without_bias(surfaces[i], folds[k].value);
       for (std::size_t s = 0; s < rest.samples.size(); ++s)
         if (static_cast<std::size_t>(rest.samples[s].slip) % folds.size() == k)
-          out[i].errors_deg[s] = kDegrees * direction_error(folds[k].fits[i].surface, rest.samples[s]);
+          out[i].errors_deg[s] = to_deg * direction_error(folds[k].fits[i].surface, rest.samples[s]);
     }
   }
   for (SurfaceScore& score : out) {

@@ -27,7 +27,8 @@ std::vector<SlipSamples> without_bias(std::vector<SlipSamples> surfaces, const E
 
 /// Bias and surfaces together: steps of Newton for the one, the others eliminated, and fits of the
 /// others (fit_surface, whose weights the steps have, too) in turn.
-WrenchBias fit_wrench_bias(const std::vector<SlipSamples>& surfaces, SurfaceModel model);
+WrenchBias fit_wrench_bias(const std::vector<SlipSamples>& surfaces, SurfaceModel model,
+                           const Eigen::Vector3d& start = Eigen::Vector3d::Zero());
 
 /// As compare_surfaces scores `model`, by the same folds, with the bias that the slips of all surfaces but of
 /// the left-out fold show: errors, and fits to all slips without the bias `whole`. No null control. Empty

@@ -45,9 +45,8 @@ struct FlipRelease {
 
 /// Throws std::invalid_argument for pads whose law does not follow them (contact::follows_pads) and for a
 /// step that is not > 0 [s]. Empty where the bar is not free before the hand's motion ends, or the release is
-/// not solved. With
-/// `on_bar`, the wrench of the pads about their middle is written there for instants k `step`, k = 0 …, zero
-/// once the bar is free.
+/// not solved. With `on_bar`, the wrench of the pads about their middle is written there for instants
+/// k `step`, k = 0 …, zero once the bar is free.
 std::optional<FlipRelease> release_bar(const release::HandMotion& hand, const HeldBar& held,
                                        std::vector<dynamics::Wrench<double>>* on_bar = nullptr,
                                        double step = 1e-3);

@@ -161,8 +161,7 @@ class Search {
   }
 
   /// The speed that lands `distance` ahead and `height` below; with drag, one that lands shorter. There, of
-  /// the level speed u = v cos ε e^(−k s) no more is left than at the path's length s = x, which makes the
-  /// fall
+  /// the level speed u = v cos ε e^(−k s) no more is left than at the path's length s = x. So it falls
   ///   x tan ε + h = g ∫₀ˣ (x − ξ)/u(ξ)² dξ  >=  g/(v cos ε)² (e^(2 k x) − 1 − 2 k x)/(4 k²).
   std::optional<double> least_speed(double distance, double height, double elevation) const {
     const double c = std::cos(elevation), s = std::sin(elevation), fall = distance * s / c + height;

@@ -112,7 +112,7 @@ TEST(Registry, RefusesWhatIsNoLaw) {
     return "";
   };
   for (const char* name : {"", "two words", "line\nbreak", "quote\"", "comma,", "ümlaut"})
-    EXPECT_THAT(refusal(named(name, {})), HasSubstr("no name")) << name;
+    EXPECT_THAT(refusal(named(name, {})), HasSubstr("not a valid name")) << name;
   for (const char* name :
        {"limit_surface_naive", "projectile", "free_fall", "ellipsoid", "ellipsoid_full", "convex_quartic"})
     EXPECT_THAT(refusal(named(name, {})), HasSubstr("no contact law")) << name;

@@ -273,6 +273,13 @@ TEST_P(Spoilt, InstantsThatAreNoneAreRefused) {
   }
 }
 
+TEST_P(Spoilt, ClocksThatBeginFarAwayAreRefused) {
+  auto far = problem();
+  far.start = 1e7;
+  expect_refused({"start = 10000000", "[-1e6, 1e6] s"}, [&] { simulate_release(far); });
+  expect_refused({"start = 10000000", "[-1e6, 1e6] s"}, [&] { simulate_release_naive(far, thrown.patch); });
+}
+
 TEST_P(Spoilt, ADetachThatIsNotFiniteIsNone) {
   hand.lost_after = 0.5 * support::parameters_of(thrown).open_command;
   const auto result = simulate_release(problem());

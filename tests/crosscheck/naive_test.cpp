@@ -87,21 +87,6 @@ TEST(Naive, SmoothingHidesTheChatterAndCreeps) {
   EXPECT_LT(naive.detach.pose.z, exact.detach.pose.z - 8e-4);
 }
 
-// On a clock of seconds since 1970 a step of 1e-7 s does not move the time.
-TEST(Naive, RefusesAStepThatTheClockCannotResolve) {
-  constexpr double kEpoch = 1.7e9;
-  const auto hand = support::still_hand(kEpoch + 1);
-  const contact::ProfileNormalForce force(contact::OpeningProfile<double>{kEpoch + 0.01, 20, 0, 0.05, 1});
-  const contact::Patch<double> patch{0.5, 0.01, 2.0 / 3, 2};
-  contact::ContactParameters<double> p;
-  p.patch = patch;
-  const auto model = contact::make_contact_model("limit_surface", p);
-  const release::ReleaseProblem<double> problem{hand,   force,  *model, {0.2, 1e-3}, {0, -9.81},
-                                                {0, 0}, kEpoch, {},     0.0};
-  EXPECT_THROW(simulate_release_naive(problem, patch, {1e-7, 0}), std::invalid_argument);
-  EXPECT_EQ(simulate_release_naive(problem, patch, {1e-3, 0}).outcome, release::ReleaseOutcome::detached);
-}
-
 TEST(Naive, RefusesAStepThatIsNone) {
   std::mt19937_64 random(74);
   const auto thrown = support::random_throw(random, 0);

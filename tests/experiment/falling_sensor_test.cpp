@@ -114,5 +114,19 @@ TEST(FallingSensor, TheVerticalTurnsAgainstTheBody) {
   }
 }
 
+TEST(FallingSensor, OneSampleHasARateAndSizesAgree) {
+  FallSamples one{{0}, {{0, 0, 4}}, {{0, 0, 0}}};
+  const Named named{{"sensor.lever_arm.x", 0.1}};
+  const auto f = readings({0, {0, 0, 1}, {}}, one, named);
+  ASSERT_EQ(f.size(), 1U);
+  expect_near(f[0], {-0.1 * 16, 0, 0}, 1e-12, 0);  // ω × (ω × r), towards the axis
+  one.turned.clear();
+  one.omega.push_back({0, 0, 4});
+  EXPECT_THROW(readings({0, {0, 0, 1}, {}}, one, named), std::invalid_argument);
+  one.omega.clear();
+  one.turned = {{0, 0, 0}, {0, 0, 0}};
+  EXPECT_THROW(readings({0, {0, 0, 1}, {}}, one, named), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace unhand::experiment

@@ -45,7 +45,7 @@ TEST(WrenchBias, IsFoundWithinItsSigma) {
     const WrenchBias with =
         fit_wrench_bias({with_bias(ellipsoid(unequal_axes), 50, 0.15, seed)}, SurfaceModel::ellipsoid);
     ASSERT_TRUE(with.solved);
-    EXPECT_LT(with.p_value, 1e-6);
+    EXPECT_LT(with.p_value, 1e-3);
     const Vector3d off = with.value - sensor_bias;
     z2 += off.dot(Eigen::Matrix3d(with.covariance.inverse()) * off) / 3 / 40;
     const WrenchBias none =
@@ -88,7 +88,7 @@ TEST(WrenchBias, IsNamedWhereItIsAndNowhereElse) {
     EXPECT_NEAR(p.value, sensor_bias[static_cast<Eigen::Index>(j)], 4 * p.sigma) << p.name;
   }
   // Two components of 0.15 rad: mean length 0.15 √(π/2) rad = 10.8°.
-  EXPECT_GT(found.answer.before_test.front().second, 13);
+  EXPECT_GT(found.answer.before_test.front().second, 12);
   EXPECT_NEAR(found.answer.after_test.front().second, 10.8, 2.5);
 
   const auto none =

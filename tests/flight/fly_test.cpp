@@ -255,6 +255,17 @@ TEST(TrackedPoint, IsWhatFlyThroughReports) {
   }
 }
 
+TEST(Flight, ErrorsNameWhatIsNotFinite) {
+  Problem p = thrown(1, 2);
+  p.twist.vz = NAN;
+  try {
+    fly(p);
+    ADD_FAILURE();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "flight: twist vz = nan m/s is not finite");
+  }
+}
+
 // ---------------------------------------------------------------- in space
 
 TEST(DragInSpace, IsThePlanarFlightInItsPlane) {

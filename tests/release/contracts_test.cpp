@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "contact/contact_model_from.hpp"
+#include "contact/gripper_delay.hpp"
+#include "release/naive_release.hpp"
 #include "tests/support/simple_scenes.hpp"
 
 namespace unhand {
@@ -119,6 +122,17 @@ TEST(Contracts, OfTheReleaseOfTheForce) {
   EXPECT_EQ(message<std::exception>(Claimed(0.5, 0.4), law), "") << "after the hand's motion nobody looks";
 }
 
+TEST(Contracts, ANaiveReleaseAsksForTheSame) {
+  const auto hand = support::still_hand(0.2);
+  const Odd law;
+  const auto thrown_with = [&](const contact::NormalForce& force) {
+    release::simulate_release_naive(problem<double>(hand, force, law), contact::Patch<double>{0.5, 0.01});
+  };
+  EXPECT_NO_THROW(thrown_with(Claimed(0.1, 0.1)));
+  EXPECT_THROW(thrown_with(Claimed(0.1, 0.05)), std::invalid_argument);
+  EXPECT_THROW(thrown_with(Claimed(0.05, 0.1, -10)), std::invalid_argument) << "negative before the release";
+}
+
 TEST(Contracts, AReleaseBeforeTheStartIsAtTheStart) {
   const auto hand = support::still_hand(0.2);
   const Claimed force(-5, -5);
@@ -127,6 +141,21 @@ TEST(Contracts, AReleaseBeforeTheStartIsAtTheStart) {
   EXPECT_EQ(result.outcome, release::ReleaseOutcome::detached);
   EXPECT_EQ(result.detach.time, 0);
   EXPECT_TRUE(result.events.empty());
+}
+
+TEST(Contracts, AJumpAtTheInstantOfTheSeparationLeavesItsDerivative) {
+  // 0.1 + 0.7 is one rounding below 0.8, where the hand's acceleration jumps.
+  ASSERT_LT(0.1 + 0.7, 0.8);
+  for (const double jump : {0.8, std::nextafter(0.1 + 0.7, 0), 0.1 + 0.7}) {
+    const auto hand = release::PolynomialHand::segments(0, {0, 0, 0}, {0, 0, 0},
+                                                        {{jump, {2, 1, 3}, {}}, {1, {-5, 0, 0}, {}}});
+    const support::ConstantForce force(10);
+    const contact::GripperDelay law(0.1, Dual(0.7, 0));
+    const auto result = release::simulate_release(problem<Dual>(hand, force, law));
+    ASSERT_EQ(result.outcome, release::ReleaseOutcome::detached);
+    EXPECT_NEAR(result.detach.time.a, 0.8, 1e-12);
+    EXPECT_EQ(result.detach.time.v[0], 1) << jump;
+  }
 }
 
 TEST(Contracts, LedgersAreOfValues) {
