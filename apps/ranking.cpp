@@ -70,7 +70,7 @@ Figure ranking_figure(std::span<const fitting::Ranked> ranking,
   figure.script = fmt::format(
       "set key off\nset lmargin 38\nset logscale x\nset format x '10^{{%T}}'\nset xrange [0.7:{:.4g}]\n"
       "set yrange [{}:-0.6]\nset ytics ({}) scale 0\n"
-      "set xlabel '{{/Symbol c}}^2 that the effect would take away, to first order (filled: accepted)'\n"
+      "set xlabel '{{/Symbol c}}^2 taken away, to first order (filled: accepted)'\n"
       "plot DATA index 0 using ($3 > 0 ? NaN : $1):2 with points pointtype 6 linecolor rgb '#707070', \\\n"
       "     DATA index 0 using ($3 > 0 ? $1 : NaN):2 with points pointtype 7 linecolor rgb '#0072b2'\n",
       2 * largest, lines - 0.4, tics);

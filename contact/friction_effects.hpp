@@ -80,7 +80,9 @@ class AdhesiveForce final : public NormalForce {
 
 /// f_N(t) − b w(t) >= 0, where w is 1 in the grip and falls linearly to 0 over the opening: the smoothing has
 /// already taken the level after the release for the sensor's zero there, so that the release stays where it
-/// was seen. b [N] is reported minus true. `base` must outlive it.
+/// was seen. b [N] is reported minus true. Where the difference is cut off at zero, near the release, its
+/// slope jumps: kinks() does not list that instant, which depends on b, and the integrator's error control
+/// finds it. `base` must outlive it.
 class BiasedForce final : public NormalForce {
  public:
   /// `bias` b [N]; `opening_start` [s], when the grip begins to open (after the release: all of b acts until

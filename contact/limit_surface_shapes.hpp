@@ -16,7 +16,7 @@
 #include <array>
 #include <cmath>
 
-#include "dynamics/scalar.hpp"
+#include "contact/patch.hpp"
 
 namespace unhand::contact {
 
@@ -90,7 +90,7 @@ struct UniformDisc {
   /// Of the pressure (1 − (r/a)²)^s [-].
   dynamics::Dual exponent() const { return dynamics::Dual(0.0); }
   /// c [-]
-  dynamics::Dual torque_factor() const { return dynamics::Dual(2.0 / 3.0); }
+  dynamics::Dual torque_factor() const { return dynamics::Dual(kUniformDisc); }
 
   /// The wrench that opposes the slip u.
   template <class S>

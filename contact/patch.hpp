@@ -9,6 +9,9 @@ namespace unhand::contact {
 inline constexpr double kUniformDisc = 2.0 / 3.0;
 /// The largest friction coefficient that anything here accepts [-].
 inline constexpr double kMostMu = 10;
+/// L = c a of a finger's pad of about 1 cm radius [m]: where a length is to be assumed, and where force and
+/// torque of a wrench are judged together.
+inline constexpr double kFingerLength = 0.007;
 
 /// Friction limits of n pads, each pressed by f_N [N]:
 ///   f_max = n μ f_N [N],   τ_max = c a n μ f_N [N m].

@@ -3,13 +3,14 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <optional>
+#include <vector>
 
 #include "dynamics/median.hpp"
+#include "dynamics/straight_line.hpp"
 #include "experiment/time_check.hpp"
 #include "experiment/unit_evidence.hpp"
 
@@ -77,20 +78,6 @@ std::optional<UnitDoubt> doubtful_pad(const datasets::ThrowLog& log) {
           radius, most)};
 }
 
-/// A straight line beside time, by least squares.
-struct Line {
-  double value{}, slope{};  ///< at time 0, and per second
-};
-
-Line line_through(const std::vector<std::array<double, 2>>& points) {
-  const auto n = static_cast<double>(points.size());
-  double t = 0, y = 0, tt = 0, ty = 0;
-  for (const auto& p : points) t += p[0] / n, y += p[1] / n;
-  for (const auto& p : points) tt += (p[0] - t) * (p[0] - t), ty += (p[0] - t) * (p[1] - y);
-  const double slope = tt > 0 ? ty / tt : 0;
-  return {y - slope * t, slope};
-}
-
 /// Heights of the tracked frame where it lands [m].
 struct LandedHeights {
   std::optional<double> at_x, at_time;  ///< where it passes the landing x; at landing/time
@@ -106,7 +93,7 @@ LandedHeights landed_heights(const datasets::ThrowLog& log, const datasets::Thro
   if (!landed_before(log, logged).empty()) return out;
   const auto& mocap = *logged.mocap;
   const auto& landing = *logged.landing;
-  std::vector<std::array<double, 2>> x, z;
+  std::vector<double> time, x, z;
   std::optional<double> last;
   for (std::size_t i = mocap.time.rows; i-- > 0;) {
     const double t = mocap.time(i);
@@ -114,16 +101,17 @@ LandedHeights landed_heights(const datasets::ThrowLog& log, const datasets::Thro
     if (!last) last = t;
     const double before = t - *last;
     if (before < -kStretch) break;
-    x.push_back({before, mocap.pose(i, 0)});
-    z.push_back({before, mocap.pose(i, 1) + 0.5 * log.gravity * before * before});
+    time.push_back(before);
+    x.push_back(mocap.pose(i, 0));
+    z.push_back(mocap.pose(i, 1) + 0.5 * log.gravity * before * before);
   }
   if (x.size() < kEnough) return out;
-  const Line across = line_through(x), up = line_through(z);
-  const auto height = [&](double t) { return up.value + up.slope * t - 0.5 * log.gravity * t * t; };
+  const auto across = dynamics::fit_line(time, x), up = dynamics::fit_line(time, z);
+  const auto height = [&](double t) { return up.at(t) - 0.5 * log.gravity * t * t; };
   if (!landing.time.empty() && landing.time(0) - *last <= kContinued)
     out.at_time = height(landing.time(0) - *last);
   if (std::abs(across.slope) > kForward) {
-    const double t = (landing.pose(0, 0) - across.value) / across.slope;
+    const double t = (landing.pose(0, 0) - across.at(0)) / across.slope;
     if (t >= -kStretch && t <= kContinued) out.at_x = height(t);
   }
   return out;

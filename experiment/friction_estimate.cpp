@@ -24,9 +24,6 @@ using dynamics::Dual;
 
 namespace {
 
-/// What turns a torque into a force where a wrench is judged as a whole: c a of a finger's pad [m].
-constexpr double kFingerLength = 0.007;
-
 /// Above what a clock that counts from 1970 rounds its times to [s]: a sample at an event stays on its side.
 constexpr double kClockRounding = 1e-6;
 
@@ -75,7 +72,7 @@ bool evidently_slips(const PadSample& sample, const std::array<double, 3>& held)
   double beyond = 0, missing = 0, whole = 0;
   for (std::size_t c = 0; c < 3; ++c) {
     if (!std::isfinite(sample.sigma[c])) continue;
-    const double off = sample.wrench[c] - held[c], unit = c < 2 ? 1.0 : kFingerLength;
+    const double off = sample.wrench[c] - held[c], unit = c < 2 ? 1.0 : contact::kFingerLength;
     beyond += std::pow(off / sample.sigma[c], 2);
     missing += std::pow(off / unit, 2);
     whole += std::pow(held[c] / unit, 2);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "contact/gripper_delay.hpp"
+#include "contact/patch.hpp"
 #include "contact/registry.hpp"
 #include "experiment/prepared_throw.hpp"
 #include "release/naive_release.hpp"
@@ -17,7 +18,7 @@ namespace unhand::experiment {
 /// Campaign parameters of a model; each model reads what it needs.
 struct ModelParameters {
   double mu{0.5};                                                 ///< friction coefficient [-]
-  double length{0.007};                                           ///< L = c a = τ_max/f_max [m]
+  double length{contact::kFingerLength};                          ///< L = c a = τ_max/f_max [m]
   int pads{2};                                                    ///< n >= 1
   contact::LawValues<double> law_values{};                        ///< of the law's own parameters
   contact::SlideEnd slide_end{contact::SlideEnd::latched_brake};  ///< sliding_pivot

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/patch.hpp"
 #include "dynamics/median.hpp"
 #include "dynamics/third_difference.hpp"
 #include "experiment/landing_noise.hpp"
@@ -42,9 +43,6 @@ double sigma_of(const Series& series, std::size_t column, double least) {
   return std::max(sigma, least);
 }
 
-/// What turns a force into a torque where a wrench is judged as a whole: c a of a finger's pad [m].
-constexpr double kPadLength = 0.007;
-
 /// The least σ that a channel is trusted to [SI]: the integration and the smoothed inputs are no better.
 constexpr double kLeastForce = 1e-4, kLeastTorque = 1e-6, kLeastLength = 1e-6, kLeastAngle = 1e-5;
 
@@ -71,7 +69,7 @@ void add_wrench(const datasets::FtLog& ft, const PreparedThrow& prepared, const 
     if (t < prepared.hand.begin() || t > prepared.hand.end() || is_settling(jumps, t, options.settling))
       continue;
     const double force = std::hypot(ft.wrench(i, 0), ft.wrench(i, 1));
-    const double size[3] = {force, force, std::hypot(ft.wrench(i, 2), kPadLength * force)};
+    const double size[3] = {force, force, std::hypot(ft.wrench(i, 2), contact::kFingerLength * force)};
     for (std::size_t c = 0; c < 3; ++c)
       if (sigma[c] > 0)
         out.all.push_back({next(Channel::wrench_fx, c), t, ft.wrench(i, c),

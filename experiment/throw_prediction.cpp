@@ -5,6 +5,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "contact/patch.hpp"
 #include "contact/registry.hpp"
 #include "experiment/outcome_slopes.hpp"
 
@@ -54,7 +55,7 @@ auto with_release(const PreparedThrow& prepared, const ThrowModel& model, const 
   contact::ContactParameters<Dual> parameters;
   parameters.patch =
       contact::Patch<Dual>::of_length(Dual(values.get("mu", 0.5) * (1.0 + values.get("mu_deviation", 0))),
-                                      Dual(values.get("length", 0.007)), model.pads);
+                                      Dual(values.get("length", contact::kFingerLength)), model.pads);
   parameters.open_command = prepared.open_command;
   parameters.delay = Dual(values.get("delay", 0.05) + values.get("delay_deviation", 0));
   parameters.variation = contact::constant(setup.friction);

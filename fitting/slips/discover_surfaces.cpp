@@ -164,6 +164,8 @@ LawScore base_beside(std::size_t k, const std::vector<SlipSamples>& surfaces, co
   return base;
 }
 
+bool larger_gain(const Ranked& a, const Ranked& b) { return a.gain > b.gain; }
+
 /// Which law is believed, the base (0) where none convinces. Writes the ranking.
 std::size_t believed(const std::vector<LawScore>& laws, const SurfaceDiscoveryOptions& options,
                      std::vector<Ranked>& ranking) {
@@ -182,7 +184,7 @@ std::size_t believed(const std::vector<LawScore>& laws, const SurfaceDiscoveryOp
         (best == 0 || law.error / law.base_error < 0.95 * laws[best].error / laws[best].base_error))
       best = k;
   }
-  std::sort(ranking.begin(), ranking.end(), [](const Ranked& a, const Ranked& b) { return a.gain > b.gain; });
+  std::sort(ranking.begin(), ranking.end(), larger_gain);
   for (auto& r : ranking) r.correlation_with_best = r.id == id_of(laws[best].model) ? 1 : 0;
   return best;
 }
@@ -321,10 +323,8 @@ void accept_bias(const BiasTrial& bias, MeasuredDiscovery& answer) {
     effect.parameters.push_back({names[j], j < 2 ? "N" : "N m", bias.whole.value[j],
                                  std::sqrt(std::max(0.0, bias.whole.covariance(j, j)))});
   effect.why = fmt::format(
-      "no limit surface is other where things slide the other way, and wrenches less this one are more so: "
-      "mean angle between predicted and measured direction of sliding falls from {:.2f} to {:.2f} degrees, "
-      "on "
-      "{} of {} surfaces",
+      "a limit surface is symmetric, and without this constant the wrenches are, too: mean angle between "
+      "predicted and measured direction of sliding falls from {:.2f} to {:.2f} degrees, on {} of {} surfaces",
       bias.without.error, bias.with.error, bias.with.better, bias.with.compared);
   answer.effects.push_back(std::move(effect));
   answer.separating.push_back({kWrenchBias, "what the sensor reads before and after it touches anything"});
@@ -382,6 +382,7 @@ SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
     bias = try_bias(surfaces, choice.best, measured, options);
     if (bias.convinces) choose_again(surfaces, measured, options, bias, choice, out);
     answer.ranking.push_back(bias.ranked);
+    std::stable_sort(answer.ranking.begin(), answer.ranking.end(), larger_gain);
   }
   answer.train = answer.test;
   const LawScore& law = choice.laws[choice.best];

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "contact/law_parameter.hpp"
+#include "contact/patch.hpp"
 #include "datasets/model_card.hpp"
 #include "planners/tube/tube_cvx.hpp"
 
@@ -38,7 +39,7 @@ struct ReleaseCard {
   /// A name that contact::make_contact_model knows, of a law that follows the pads (contact::follows_pads).
   std::string model{"limit_surface"};
   Uncertain mu{0.5, 0.05};                  ///< friction coefficient [-]
-  double length{0.007};                     ///< L = τ_max/f_max [m]
+  double length{contact::kFingerLength};    ///< L = τ_max/f_max [m]
   int pads{2};                              ///< n >= 1
   double grip_force{40};                    ///< of one pad [N]
   Uncertain dead_time{0.020, 0.005};        ///< from the command to the first change of the force [s]
