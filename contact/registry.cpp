@@ -77,7 +77,9 @@ const ContactModelEntry* find(std::string_view name) {
   return at == all.end() ? nullptr : &*at;
 }
 
-/// Models of comparisons, flights, falls and slips that are no contact law of a release.
+/// Models of comparisons, flights, falls and slips that are no contact law of a release
+/// (release::kNaiveModel, fitting::surface_models, and what discover calls its base models). This folder must
+/// not know them.
 constexpr std::string_view kReserved[] = {"limit_surface_naive", "projectile",     "free_fall",
                                           "ellipsoid",           "ellipsoid_full", "convex_quartic"};
 

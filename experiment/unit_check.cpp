@@ -7,6 +7,8 @@
 #include <map>
 #include <numbers>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "dynamics/median.hpp"
 #include "experiment/axis_check.hpp"
@@ -25,7 +27,7 @@ std::string path_of(const ColumnSide& side) {
 }
 
 /// A height that throws do not come by, or do not land at.
-std::optional<UnitDoubt> doubtful_landing_height(const datasets::ThrowLog& log) {
+std::vector<UnitDoubt> doubtful_landing_height(const datasets::ThrowLog& log) {
   std::vector<double> seen, tolerances;
   std::optional<double> highest;
   for (const auto& one : log.throws) {
@@ -34,11 +36,11 @@ std::optional<UnitDoubt> doubtful_landing_height(const datasets::ThrowLog& log) 
       seen.push_back(timed->height), tolerances.push_back(timed->tolerance);
   }
   const auto doubt = [&](double accepted, std::size_t throws, const std::string& reason) {
-    return UnitDoubt{
+    return std::vector{UnitDoubt{
         "/@landing_height", "landing_height", log.landing_height / accepted, static_cast<int>(throws),
         fmt::format("landing_height is {:.6g} m, and {}: another unit than m, another frame, or another "
                     "gravity than the declared {:.6g} m/s^2?",
-                    log.landing_height, reason, log.gravity)};
+                    log.landing_height, reason, log.gravity)}};
   };
   if (!seen.empty()) {
     const double height = dynamics::median(seen), most = dynamics::median(tolerances);
@@ -56,25 +58,19 @@ std::optional<UnitDoubt> doubtful_landing_height(const datasets::ThrowLog& log) 
   return {};
 }
 
-}  // namespace
-
-std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log) {
-  std::vector<UnitDoubt> out;
+std::vector<UnitDoubt> doubtful_gravity(const datasets::ThrowLog& log) {
   constexpr double kMostGravity = 100;  // [m/s²]
-  if (log.gravity > kMostGravity)
-    out.push_back({"/@gravity", "gravity", log.gravity, 1,
-                   fmt::format("gravity is {:.6g} m/s², more than {}: mm/s² or cm/s² for m/s²?", log.gravity,
-                               kMostGravity)});
-  if (out.empty()) out = impossible_declarations(log);
-  if (out.empty()) out = jumping_angles(log);
-  if (out.empty()) out = reversed_forces(log);
-  if (!out.empty()) return out;
-  std::vector<SizeRatios> throws;
-  std::map<SizedColumn, std::vector<double>> ratios;
-  for (const auto& one : log.throws) {
-    throws.push_back(compare_sizes(log, one));
-    for (const auto& [column, ratio] : throws.back()) ratios[column].push_back(ratio);
-  }
+  if (!(log.gravity > kMostGravity)) return {};
+  return {{"/@gravity", "gravity", log.gravity, 1,
+           fmt::format("gravity is {:.6g} m/s², more than {}: mm/s² or cm/s² for m/s²?", log.gravity,
+                       kMostGravity)}};
+}
+
+using RatiosByColumn = std::map<SizedColumn, std::vector<double>>;
+
+/// Columns whose size is by the factor of a unit another one than what others make of it.
+std::vector<UnitDoubt> disproportionate_columns(const RatiosByColumn& ratios) {
+  std::vector<UnitDoubt> out;
   for (const auto& [column, all] : ratios) {
     const auto found = unit_rules().find(column);
     if (found == unit_rules().end()) continue;
@@ -98,33 +94,57 @@ std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log) {
     doubt(rule.expected, rule.seen, 1 / ratio);
     if (column == SizedColumn::hand_clock && !out.empty()) return out;  // it is behind all that follows
   }
+  return out;
+}
+
+std::vector<UnitDoubt> turned_grasps(const datasets::ThrowLog& log) {
   std::vector<double> angles;
   for (const auto& one : log.throws)
     if (one.grasp_angle) angles.push_back(std::abs(*one.grasp_angle));
-  if (const double turn = angles.size() < 2 ? 0 : dynamics::median(angles); turn > 2 * std::numbers::pi)
-    out.push_back(
-        {"/throws/*@grasp_angle", "grasp_angle", turn, static_cast<int>(angles.size()),
-         fmt::format("grasp_angle is {:.3g} rad (median of {} throws), more than a whole turn: degrees "
-                     "for rad?",
-                     turn, angles.size())});
-  const auto& friction = ratios[SizedColumn::slip_force];
-  const double mu = friction.empty() ? kMostFriction : dynamics::median(friction);
+  const double turn = angles.size() < 2 ? 0 : dynamics::median(angles);
+  if (!(turn > 2 * std::numbers::pi)) return {};
+  return {{"/throws/*@grasp_angle", "grasp_angle", turn, static_cast<int>(angles.size()),
+           fmt::format("grasp_angle is {:.3g} rad (median of {} throws), more than a whole turn: degrees "
+                       "for rad?",
+                       turn, angles.size())}};
+}
+
+std::vector<UnitDoubt> doubtful_friction(const RatiosByColumn& ratios) {
+  const auto found = ratios.find(SizedColumn::slip_force);
+  if (found == ratios.end()) return {};
+  const auto& friction = found->second;
+  const double mu = dynamics::median(friction);
   const bool dead = mu == 0;  // a wrench that says nothing is no unit
-  if (out.empty() && !dead && (mu < kLeastFriction || mu > kMostFriction))
-    out.push_back(
-        {"/throws/*/ft/normal_force", "f_N", mu, static_cast<int>(friction.size()),
-         fmt::format("where the pads slip their wrench takes a friction of {:.3g} of it (median of {} "
-                     "throws), and there are pads of {} to {}: {}?",
-                     mu, friction.size(), kLeastFriction, kMostFriction,
-                     mu > 1 ? "kgf, lbf or kN for N" : "mN for N")});
+  if (dead || (mu >= kLeastFriction && mu <= kMostFriction)) return {};
+  return {{"/throws/*/ft/normal_force", "f_N", mu, static_cast<int>(friction.size()),
+           fmt::format("where the pads slip their wrench takes a friction of {:.3g} of it (median of {} "
+                       "throws), and there are pads of {} to {}: {}?",
+                       mu, friction.size(), kLeastFriction, kMostFriction,
+                       mu > 1 ? "kgf, lbf or kN for N" : "mN for N")}};
+}
+
+}  // namespace
+
+std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log) {
+  // What one check finds makes the later ones compare with what is wrong: the first that finds something is
+  // the last.
+  for (const auto check : {doubtful_gravity, impossible_declarations, jumping_angles, reversed_forces})
+    if (auto out = check(log); !out.empty()) return out;
+  std::vector<SizeRatios> throws;
+  RatiosByColumn ratios;
+  for (const auto& one : log.throws) {
+    throws.push_back(compare_sizes(log, one));
+    for (const auto& [column, ratio] : throws.back()) ratios[column].push_back(ratio);
+  }
+  auto out = disproportionate_columns(ratios);
+  for (auto& doubt : turned_grasps(log)) out.push_back(std::move(doubt));
+  if (out.empty()) out = doubtful_friction(ratios);
   if (out.empty()) out = outlying_throws(log, throws);
-  if (out.empty()) out = contradicted_axes(log);
-  if (out.empty()) out = turned_levers(log);
-  if (out.empty()) out = reversed_wrenches(log);
-  if (out.empty()) out = landings_turns_off(log);
-  if (const auto height = out.empty() ? doubtful_landing_height(log) : std::nullopt) out.push_back(*height);
-  if (out.empty()) out = contradicted_landing_height(log);
-  return out;
+  if (!out.empty()) return out;
+  for (const auto check : {contradicted_axes, turned_levers, reversed_wrenches, landings_turns_off,
+                           doubtful_landing_height, contradicted_landing_height})
+    if (auto found = check(log); !found.empty()) return found;
+  return {};
 }
 
 void require_units(const datasets::ThrowLog& log, const std::string& file) {

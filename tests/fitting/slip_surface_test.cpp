@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "contact/registry.hpp"
 #include "slip_simulator.hpp"
 
 namespace unhand::fitting::test {
@@ -160,6 +161,15 @@ TEST(SlipSurface, SlipsOfNoSurfaceAreNoError) {
   SurfaceFit fit;
   ASSERT_NO_THROW(fit = fit_surface(slips, SurfaceModel::convex_quartic));
   EXPECT_EQ(fit.outcome, SurfaceOutcome::not_converged);
+}
+
+TEST(SlipSurface, NoContactLawTakesTheNameOfAModel) {
+  for (const SurfaceModel model : surface_models) try {
+      contact::register_contact_model({to_string(model), [](const auto&) { return nullptr; }, {}});
+      ADD_FAILURE() << to_string(model);
+    } catch (const std::invalid_argument& error) {
+      EXPECT_THAT(error.what(), testing::HasSubstr("no contact law")) << to_string(model);
+    }
 }
 
 }  // namespace
