@@ -67,7 +67,7 @@ TEST_F(Cli, WhatIsLeftOfSlipsHasItsOwnUnits) {
       run("discover slips.h5 --model ellipsoid --forget contact.law:convex_quartic --forget "
           "contact.law:ellipsoid_full --json d.json");
   ASSERT_EQ(answer.code, 0) << answer.err;
-  const json found = read_json(folder / "d.json");
+  json found = read_json(folder / "d.json");
   ASSERT_EQ(found["verdict"], "unexplained");
   EXPECT_TRUE(found["unexplained"]["chi2_per_dof"].is_null());
   EXPECT_GT(found["unexplained"]["correlation"], 0.15);
@@ -100,7 +100,7 @@ TEST_F(Cli, FitsTheSurfaceThatSlipsWereDrawnFrom) {
   const Answer answer =
       run("fit slips.h5 --model ellipsoid_full --json f.json --card card.json --report out");
   ASSERT_EQ(answer.code, 0) << answer.err;
-  const json surface = read_json(folder / "f.json")["surfaces"]["felt"];
+  json surface = read_json(folder / "f.json")["surfaces"]["felt"];
   EXPECT_EQ(surface["n"], 60);
   // Levels that scatter by 3 % leave a radius of 60 slips some 1 %.
   EXPECT_NEAR(surface["least_force_N"].get<double>(), 3, 0.1);
@@ -134,7 +134,7 @@ TEST_F(Cli, CompareSlipsSaysWhatTheSurfacesErrOf) {
   datasets::write_slip_log(folder / "slips.h5", log);
   const Answer answer = run("compare slips.h5 --models ellipsoid,ellipsoid_full --fit --json c.json");
   ASSERT_EQ(answer.code, 0) << answer.err;
-  const json compared = read_json(folder / "c.json");
+  json compared = read_json(folder / "c.json");
   EXPECT_EQ(compared["schema"], "compare");
   EXPECT_EQ(compared["schema_version"], 1);
   EXPECT_EQ(compared["log"], "slips.h5");
@@ -145,11 +145,11 @@ TEST_F(Cli, CompareSlipsSaysWhatTheSurfacesErrOf) {
   const std::vector<SurfaceModel> models{SurfaceModel::ellipsoid, SurfaceModel::ellipsoid_full};
   const auto scores = fitting::compare_surfaces(surfaces, models);
   for (std::size_t k = 0; k < models.size(); ++k) {
-    const json& model = compared["models"][to_string(models[k])];
+    json& model = compared["models"][to_string(models[k])];
     ASSERT_EQ(model["surfaces"].size(), surfaces.size());
     double error = 0, null = 0;
     for (std::size_t i = 0; i < surfaces.size(); ++i) {
-      const json& surface = model["surfaces"][surfaces[i].surface];
+      json& surface = model["surfaces"][surfaces[i].surface];
       EXPECT_EQ(surface["cv_direction_error_deg"].get<double>(), scores[i][k].mean_deg);
       EXPECT_EQ(surface["null_control_deg"].get<double>(), scores[i][k].null_control_deg);
       error += surface["cv_direction_error_deg"].get<double>() / 2;

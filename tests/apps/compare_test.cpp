@@ -13,7 +13,7 @@ TEST_F(Cli, CompareReleases) {
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.out, HasSubstr("landing theta [deg]"));
   EXPECT_THAT(answer.err, IsEmpty());
-  const json one = read_json(folder / "one.json");
+  json one = read_json(folder / "one.json");
   EXPECT_EQ(timeless(one), timeless(read_json(folder / "two.json")));
   EXPECT_EQ(one["schema"], "compare");
   EXPECT_EQ(one["schema_version"], 1);
@@ -37,7 +37,7 @@ TEST_F(Cli, TheErrorOfOneThrowHasNoStandardDeviation) {
     one.split = k++ == 0 ? datasets::Split::test : datasets::Split::train;
   });
   ASSERT_EQ(run("compare one.h5 --models limit_surface_disc --json one.json").code, 0);
-  const auto model = read_json(folder / "one.json")["models"]["limit_surface_disc"];
+  auto model = read_json(folder / "one.json")["models"]["limit_surface_disc"];
   EXPECT_TRUE(model["test"]["landing_x_m"]["std"].is_null());
   EXPECT_TRUE(model["test"]["landing_x_m"]["mae"].is_number());
   EXPECT_TRUE(model["train"]["landing_x_m"]["std"].is_number());
@@ -52,7 +52,7 @@ TEST_F(Cli, ThrowsWithoutAGraspAreLeftOut) {
   const Answer answer = run("compare half.h5 --models sliding_pivot,gripper_delay --json a.json");
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.err, HasSubstr("left out 6 of 12 throws, which do not show the grasp"));
-  const json model = read_json(folder / "a.json")["models"]["sliding_pivot"];
+  json model = read_json(folder / "a.json")["models"]["sliding_pivot"];
   EXPECT_EQ(model["train"]["n"].get<int>() + model["test"]["n"].get<int>(), 6);
   write_changed("none.h5", [](datasets::Throw& one) { one.mocap.reset(), one.grasp_angle.reset(); });
   expect_refusal("compare none.h5 --json b.json", 3, "@grasp_angle: missing");
@@ -69,14 +69,13 @@ TEST_F(Cli, ThrowsWithoutAHandAreLeftOutWhereOthersHaveOne) {
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.err,
               HasSubstr("left out 1 of 12 throws, which have no hand, which the others have: 003"));
-  const json model = read_json(folder / "a.json")["models"]["sliding_pivot"];
+  json model = read_json(folder / "a.json")["models"]["sliding_pivot"];
   EXPECT_EQ(model["train"]["n"].get<int>() + model["test"]["n"].get<int>(), 11);
   EXPECT_EQ(run("fit one.h5 --model gripper_delay --card c.json").code, 0);
   EXPECT_THAT(run("inspect one.h5").out,
               HasSubstr("note: 1 of 12 throws have no hand and are held at first"));
 }
 
-// Parameters come from train throws: without any, that is what is said, not how few samples there are.
 TEST_F(Cli, BlanksAroundNamesMeanNothing) {
   auto log = datasets::read_throw_log(quick);
   const std::string first = log.throws.front().condition;
@@ -88,6 +87,7 @@ TEST_F(Cli, BlanksAroundNamesMeanNothing) {
   EXPECT_THAT(answer.out, HasSubstr(" 1 condition; "));
 }
 
+// Parameters come from train throws: without any, that is what is said, not how few samples there are.
 TEST_F(Cli, NoTrainThrowsIsSaid) {
   write_changed("test.h5", [](datasets::Throw& one) { one.split = datasets::Split::test; });
   const Answer answer = run("compare test.h5");
@@ -109,7 +109,7 @@ TEST_F(Cli, AModelThatTheLogDoesNotDetermineStopsNoOther) {
   const Answer answer = run("compare straight.h5 --models limit_surface,gripper_delay --json a.json");
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.err, HasSubstr("limit_surface: not compared: the log does not determine"));
-  const json found = read_json(folder / "a.json");
+  json found = read_json(folder / "a.json");
   EXPECT_EQ(found["models"].size(), 1u);
   EXPECT_TRUE(found["models"].contains("gripper_delay"));
   EXPECT_TRUE(found["not_compared"].contains("limit_surface"));
@@ -124,12 +124,12 @@ TEST_F(Cli, ALandingOfUnknownAngleTellsItsPlaceAlone) {
   });
   EXPECT_THAT(run("inspect ruler.h5").out, Not(HasSubstr("doubtful")));
   ASSERT_EQ(run("fit ruler.h5 --model limit_surface_disc --json f.json --card c.json").code, 0);
-  const json fitted = read_json(folder / "f.json");
+  json fitted = read_json(folder / "f.json");
   EXPECT_EQ(fitted["test"]["landing_theta_deg"]["n"], 0);
   EXPECT_LT(fitted["test"]["landing_x_m"]["mae"].get<double>(), 0.01);
   EXPECT_NEAR(fitted["parameters"]["mu"]["value"].get<double>(), 0.5, 0.03);  // 3 sigma of eight throws' mu
   ASSERT_EQ(run("predict ruler.h5 --card c.json --json p.json").code, 0);
-  const json predicted = read_json(folder / "p.json");
+  json predicted = read_json(folder / "p.json");
   for (const auto& one : predicted["throws"]) {
     EXPECT_TRUE(one["error"].contains("landing_x_m"));
     EXPECT_FALSE(one["error"].contains("landing_theta_deg"));
@@ -191,7 +191,7 @@ TEST_F(Cli, NoTestThrowsNoNumbers) {
   write_all_train("train.h5");
   const Answer answer = run("compare train.h5 --models gripper_delay --json a.json --report r");
   ASSERT_EQ(answer.code, 0) << answer.err;
-  const json test = read_json(folder / "a.json")["models"]["gripper_delay"]["test"];
+  json test = read_json(folder / "a.json")["models"]["gripper_delay"]["test"];
   EXPECT_EQ(test["n"], 0);
   EXPECT_TRUE(test["landing_x_m"]["mae"].is_null());
   for (const auto& text : {answer.out, content(folder / "a.json"), content(folder / "r/report.md"),
@@ -250,7 +250,7 @@ TEST_F(Cli, CardsCarryAnEstimate) {
     const Answer answer =
         run("predict " + quick + " --card cards/" + model + ".json --json p.json --csv p.csv --threads 2");
     ASSERT_EQ(answer.code, 0) << answer.err;
-    const json predicted = read_json(folder / "p.json");
+    json predicted = read_json(folder / "p.json");
     EXPECT_EQ(predicted["schema"], "predict");
     EXPECT_EQ(predicted["throws"].size(), 12u);
     EXPECT_TRUE(predicted["throws"][0]["landing"]["x_m"].is_number());
@@ -258,8 +258,8 @@ TEST_F(Cli, CardsCarryAnEstimate) {
         run("compare " + quick + " --models " + model + " --card cards/" + model + ".json --json b.json")
             .code,
         0);
-    const json again = timeless(read_json(folder / "b.json"))["models"][model];
-    const json first = timeless(read_json(folder / "a.json"))["models"][model];
+    json again = timeless(read_json(folder / "b.json"))["models"][model];
+    json first = timeless(read_json(folder / "a.json"))["models"][model];
     EXPECT_EQ(again["test"], first["test"]);
     EXPECT_EQ(again["train"], first["train"]);
     EXPECT_TRUE(again["estimate"]["from_card"]);
@@ -276,7 +276,7 @@ TEST_F(Cli, AClockFarFromZeroChangesNothing) {
   const std::string models = " --models limit_surface_disc,sliding_pivot,gripper_delay ";
   ASSERT_EQ(run("compare " + quick + models + "--write-cards cards --json near.json").code, 0);
   ASSERT_EQ(run("compare far.h5" + models + "--json far.json --report r").code, 0);
-  const json near = read_json(folder / "near.json"), far = read_json(folder / "far.json");
+  json near = read_json(folder / "near.json"), far = read_json(folder / "far.json");
   for (const auto& [name, model] : near["models"].items()) {
     EXPECT_EQ(far["models"][name]["failed"], model["failed"]) << name;
     for (const auto& [quantity, value] : model["test"].items()) {
@@ -288,11 +288,11 @@ TEST_F(Cli, AClockFarFromZeroChangesNothing) {
   }
   const std::string card = " --card cards/limit_surface_disc.json --json p.json";
   ASSERT_EQ(run("predict " + quick + card).code, 0);
-  const json before = read_json(folder / "p.json");
+  json before = read_json(folder / "p.json");
   ASSERT_EQ(run("predict far.h5" + card).code, 0);
-  const json after = read_json(folder / "p.json");
+  json after = read_json(folder / "p.json");
   for (std::size_t k = 0; k < before["throws"].size(); ++k) {
-    const json &a = before["throws"][k], &b = after["throws"][k];
+    json &a = before["throws"][k], &b = after["throws"][k];
     EXPECT_NEAR(b["detach"]["time_s"].get<double>() - kEpoch, a["detach"]["time_s"].get<double>(), 1e-6);
     EXPECT_NEAR(b["measured"]["detach_time_s"].get<double>() - kEpoch,
                 a["measured"]["detach_time_s"].get<double>(), 1e-6);
@@ -310,7 +310,7 @@ TEST_F(Cli, GripperDelayPredictsWithTheMeanOfTheLog) {
   ASSERT_EQ(run("compare late.h5 --models gripper_delay --write-cards cards --json c.json").code, 0);
   ASSERT_EQ(run("predict late.h5 --card cards/gripper_delay.json --json p.json").code, 0);
   const double delay = read_json(folder / "c.json")["models"]["gripper_delay"]["parameters"]["delay"];
-  const json predicted = read_json(folder / "p.json");
+  json predicted = read_json(folder / "p.json");
   double mean = 0;
   int train = 0;
   for (const auto& one : predicted["throws"]) {
@@ -341,7 +341,7 @@ TEST_F(Cli, AGripThatCannotHoldIsSaid) {
 
 TEST_F(Cli, BadCards) {
   ASSERT_EQ(run("compare " + quick + " --models sliding_pivot --write-cards .").code, 0);
-  const json good = read_json(folder / "sliding_pivot.json");
+  json good = read_json(folder / "sliding_pivot.json");
   const auto expect = [&](const json& card, const std::string& reason) {
     std::ofstream(folder / "bad.json") << card.dump();
     expect_refusal("predict " + quick + " --card bad.json --json p.json", 3, "bad.json: " + reason);
@@ -372,9 +372,9 @@ TEST_F(Cli, FreeFlights) {
   const Answer answer = run("compare " + flights + " --json a.json --report r --threads 1");
   ASSERT_EQ(answer.code, 0) << answer.err;
   ASSERT_EQ(run("compare " + flights + " --models projectile --json b.json --threads 2").code, 0);
-  const json one = read_json(folder / "a.json");
+  json one = read_json(folder / "a.json");
   EXPECT_EQ(timeless(one), timeless(read_json(folder / "b.json")));
-  const json& model = one["models"]["projectile"];
+  json& model = one["models"]["projectile"];
   EXPECT_EQ(model["train"]["n"], 4);
   EXPECT_EQ(model["test"]["n"], 1);
   EXPECT_THAT(answer.out, HasSubstr("0.00 ± - ")) << "a single error has no spread";
@@ -389,10 +389,10 @@ TEST_F(Cli, FlightsWithoutOrientationHaveNoErrorOfIt) {
   ASSERT_EQ(found.code, 0) << found.err;
   const Answer compared = run("compare ff.h5 --card c.json --json x.json");
   ASSERT_EQ(compared.code, 0) << compared.err;
-  const json d = read_json(folder / "d.json")["error"], x = read_json(folder / "x.json");
-  for (const json* split : {&d["before"], &d["after"], &x["base"], &x["with_card"]})
+  json d = read_json(folder / "d.json")["error"], x = read_json(folder / "x.json");
+  for (json* split : {&d["before"], &d["after"], &x["base"], &x["with_card"]})
     for (const char* half : {"train", "test"}) {
-      const json& errors = (*split)[half];
+      json& errors = (*split)[half];
       EXPECT_TRUE(errors["end_orientation_mae_deg"].is_null()) << errors;
       EXPECT_TRUE(errors["end_orientation_median_deg"].is_null()) << errors;
       EXPECT_TRUE(errors["end_position_mae_m"].is_number()) << errors;
@@ -414,7 +414,7 @@ TEST_F(Cli, ACardOfFlightsIsShownInAFigure) {
     "effects": ["sensor.length_scale"], "errors": {}, "split": "train", "library_version": "0"})";
   const Answer answer = run("compare " + flights + " --card card.json --json a.json --report r");
   ASSERT_EQ(answer.code, 0) << answer.err;
-  const json errors = read_json(folder / "a.json");  // the motion has no such scale
+  json errors = read_json(folder / "a.json");  // the motion has no such scale
   EXPECT_GT(errors["with_card"]["test"]["trajectory_rms_m"], errors["base"]["test"]["trajectory_rms_m"]);
   EXPECT_GT(fs::file_size(folder / "r/residual.png"), 0u);
   std::ifstream report(folder / "r/report.md");

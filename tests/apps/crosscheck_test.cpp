@@ -9,17 +9,17 @@ TEST_F(Cli, CrosscheckWithCvodeFindsTheSameLandings) {
   const Answer answer = run("crosscheck " + quick + " --engine cvode --models " + models + " --json c.json");
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.out, HasSubstr("CVODE"));
-  const json checked = read_json(folder / "c.json");
+  json checked = read_json(folder / "c.json");
   EXPECT_EQ(checked["schema"], "crosscheck");
   EXPECT_EQ(checked["engine"], "cvode");
   ASSERT_EQ(checked["settings"].size(), 2u);  // one a model
-  for (const json& setting : checked["settings"]) {
+  for (json& setting : checked["settings"]) {
     ASSERT_EQ(setting["models"].size(), 1u);
     EXPECT_EQ(setting["throws"].size(), 12u);
-    const json& model = setting["models"].front();
+    json& model = setting["models"].front();
     EXPECT_EQ(model["other_number_of_events"], 0);
     // Two integrators of the same equations, at 1e-9 and 1e-10: landings within a micrometre of each other.
-    const json& landing = model["landing_x_m"];
+    json& landing = model["landing_x_m"];
     ASSERT_TRUE(landing["mae"].is_number()) << model.dump();
     EXPECT_LT(landing["mae"].get<double>(), 1e-6);
   }
@@ -29,9 +29,9 @@ TEST_F(Cli, CrosscheckWithPointsComesNearTheExactDisc) {
   const Answer answer =
       run("crosscheck " + quick + " --engine patch --rings 4 --models limit_surface_disc --json p.json");
   ASSERT_EQ(answer.code, 0) << answer.err;
-  const json checked = read_json(folder / "p.json");
+  json checked = read_json(folder / "p.json");
   ASSERT_EQ(checked["settings"].size(), 1u);
-  const json& landing = checked["settings"][0]["models"]["limit_surface_disc"]["landing_x_m"];
+  json& landing = checked["settings"][0]["models"]["limit_surface_disc"]["landing_x_m"];
   // 48 points with bristles know no limit surface; the map of tests/truth says millimetres.
   EXPECT_LT(landing["mae"].get<double>(), 5e-3);
   EXPECT_GT(landing["mae"].get<double>(), 0);
@@ -50,9 +50,9 @@ void write_fitted_card(const fs::path& file, const std::string& model, const std
 }
 
 /// Landings of a crosscheck's only engine, or of a prediction.
-std::vector<double> landings_of(const json& throws) {
+std::vector<double> landings_of(json throws) {
   std::vector<double> out;
-  for (const json& one : throws)
+  for (json& one : throws)
     if (one.contains("landing_x_m"))
       out.push_back(one["landing_x_m"]);
     else if (one["landing"].is_object())
@@ -70,7 +70,7 @@ TEST_F(Cli, CrosscheckFollowsTheShapeOfACard) {
             " --engine cvode --models limit_surface_quartic --card card.json --json c.json");
     ASSERT_EQ(answer.code, 0) << answer.err;
     ASSERT_EQ(run("predict " + quick + " --card card.json --json p.json").code, 0);
-    const json checked = read_json(folder / "c.json");
+    json checked = read_json(folder / "c.json");
     EXPECT_EQ(checked["parameters"]["kappa"].get<double>(), std::stod(kappa));
     const auto engine = landings_of(checked["settings"][0]["throws"]),
                predicted = landings_of(read_json(folder / "p.json")["throws"]);

@@ -5,7 +5,7 @@ namespace unhand::cli {
 namespace {
 
 /// The parts of discovery.json that its description promises.
-void expect_promised_keys(const json& found) {
+void expect_promised_keys(json& found) {
   for (const char* key :
        {"log", "base_model", "verdict", "effects", "unexplained", "error", "ranking", "parameters", "misfit"})
     EXPECT_TRUE(found.contains(key)) << key;
@@ -39,13 +39,13 @@ TEST_F(Cli, DiscoverFindsTheDragThatIsThere) {
   const Answer answer = run("discover windy.h5 --json d.json --report r --card c.json");
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.out, HasSubstr("windy.h5: effect_found"));
-  const json found = read_json(folder / "d.json");
+  json found = read_json(folder / "d.json");
   expect_promised_keys(found);
   EXPECT_EQ(found["log"], "windy.h5");
   EXPECT_EQ(found["base_model"], "limit_surface_disc");
   EXPECT_EQ(found["verdict"], "effect_found");
   ASSERT_EQ(found["effects"].size(), 1u);
-  const json& effect = found["effects"][0];
+  json& effect = found["effects"][0];
   EXPECT_EQ(effect["id"], "flight.quadratic_drag");
   EXPECT_TRUE(effect["equivalent"].empty());
   EXPECT_LT(effect["delta_bic"].get<double>(), -100);
@@ -60,7 +60,7 @@ TEST_F(Cli, DiscoverFindsTheDragThatIsThere) {
     EXPECT_EQ(k["unit"], "1/m") << name;
   }
   // Without the drag the landings are predicted centimetres too far; with it, as well as throws repeat: 2 mm.
-  const json &before = found["error"]["before"], &after = found["error"]["after"];
+  json &before = found["error"]["before"], &after = found["error"]["after"];
   for (const auto& [split, n] : {std::pair{"train", 8}, {"test", 4}}) {
     EXPECT_EQ(before[split]["n"], n);
     EXPECT_EQ(after[split]["n"], n);
@@ -73,14 +73,14 @@ TEST_F(Cli, DiscoverFindsTheDragThatIsThere) {
     EXPECT_GT(before[split]["chi2_per_dof"].get<double>(), 100) << split;
     EXPECT_NEAR(after[split]["chi2_per_dof"].get<double>(), 1, 0.5) << split;
   }
-  const json& ranking = found["ranking"];
+  json& ranking = found["ranking"];
   const auto named = std::find_if(ranking.begin(), ranking.end(),
-                                  [](const json& one) { return one["id"] == "flight.quadratic_drag"; });
+                                  [](json one) { return one["id"] == "flight.quadratic_drag"; });
   ASSERT_NE(named, ranking.end());
   EXPECT_LT((*named)["score_p_value"].get<double>(), 1e-6);
   EXPECT_NEAR((*named)["footprint_correlation_with_best"].get<double>(), 1, 1e-9) << "it is the best";
   EXPECT_EQ((*named)["refit_step"], 1);
-  for (const json& one : ranking) {
+  for (json& one : ranking) {
     EXPECT_TRUE(one.contains("footprint_correlation_with_best")) << one;
     EXPECT_EQ(one["refitted"].get<bool>(), one["delta_bic"].is_number()) << one;
     EXPECT_EQ(one["refitted"].get<bool>(), one["refit_step"].is_number()) << one;
@@ -97,7 +97,7 @@ TEST_F(Cli, DiscoverFindsTheDragThatIsThere) {
   // The card holds the drag: with it, what the other models miss by centimetres is predicted.
   ASSERT_EQ(
       run("compare windy.h5 --models limit_surface,limit_surface_disc --card c.json --json e.json").code, 0);
-  const json models = read_json(folder / "e.json")["models"];
+  json models = read_json(folder / "e.json")["models"];
   EXPECT_LT(models["limit_surface_disc"]["test"]["landing_x_m"]["mae"].get<double>(), 0.005);
   EXPECT_GT(models["limit_surface"]["test"]["landing_x_m"]["mae"].get<double>(), 0.03);
 }
@@ -113,7 +113,7 @@ TEST_F(Cli, AMassAndAnInertiaThatAreOffAlikeMayBeAGain) {
     const Answer answer = run("discover g.h5 --json g.json");
     EXPECT_EQ(answer.code, 0) << answer.err;
     int notes = 0;
-    const json found = read_json(folder / "g.json");
+    json found = read_json(folder / "g.json");
     for (const auto& effect : found["effects"]) {
       if (!effect.contains("reads_the_same")) continue;
       ++notes;
@@ -129,7 +129,7 @@ TEST_F(Cli, AMassAndAnInertiaThatAreOffAlikeMayBeAGain) {
 TEST_F(Cli, DiscoverReportsOnFlights) {
   const Answer answer = run("discover " + flights + " --model projectile --json d.json --report r");
   ASSERT_EQ(answer.code, 0) << answer.err;
-  const json found = read_json(folder / "d.json");
+  json found = read_json(folder / "d.json");
   expect_whole_page(folder / "r", {"residual", "ranking", "footprints"}, found["log_checksum"]);
   EXPECT_EQ(read_json(folder / "r/discovery.json"), found);
 }
@@ -149,7 +149,7 @@ TEST_F(Cli, WhatDiscoverHoldsOutByItselfIsSaid) {
 TEST_F(Cli, DiscoverFindsNothingInACalmLog) {
   const Answer answer = run("discover " + quick + " --json d.json --report r");
   ASSERT_EQ(answer.code, 0) << answer.err;
-  const json found = read_json(folder / "d.json");
+  json found = read_json(folder / "d.json");
   expect_whole_page(folder / "r", {"residual", "ranking", "footprints"}, found["log_checksum"]);
   expect_promised_keys(found);
   EXPECT_EQ(found["verdict"], "no_missing_effect");
@@ -163,9 +163,9 @@ TEST_F(Cli, WithoutRepetitionsThereIsNoLackOfFit) {
   std::erase_if(log.throws, [](const auto& one) { return one.repetition != 1; });
   datasets::write_throw_log(folder / "once.h5", log);
   ASSERT_EQ(run("discover once.h5 --json d.json").code, 0);
-  const json lacks = read_json(folder / "d.json")["error"]["before"]["train"]["lack_of_fit"];
+  json lacks = read_json(folder / "d.json")["error"]["before"]["train"]["lack_of_fit"];
   ASSERT_FALSE(lacks.empty());
-  for (const json& lack : lacks) {
+  for (json& lack : lacks) {
     EXPECT_TRUE(lack["rms"].is_null()) << lack;
     EXPECT_TRUE(lack["p_value"].is_null()) << lack;
     EXPECT_TRUE(lack["sensor_sigma"].is_number()) << lack;
@@ -181,10 +181,9 @@ TEST_F(Cli, LawsCanBeForgotten) {
       run("discover " + quick + " --model limit_surface --forget " + laws + " --json d.json");
   ASSERT_EQ(answer.code, 0) << answer.err;
   const auto tries_laws = [&](const char* file) {
-    const json found = read_json(folder / file);
-    return std::any_of(found["ranking"].begin(), found["ranking"].end(), [](const json& one) {
-      return one["id"].get<std::string>().starts_with("contact.law:");
-    });
+    json found = read_json(folder / file);
+    return std::any_of(found["ranking"].begin(), found["ranking"].end(),
+                       [](json one) { return one["id"].get<std::string>().starts_with("contact.law:"); });
   };
   EXPECT_TRUE(tries_laws("with.json"));
   EXPECT_FALSE(tries_laws("d.json"));
@@ -196,10 +195,10 @@ TEST_F(Cli, LawsCanBeForgotten) {
 TEST_F(Cli, TheQuickstartsDragMakesEveryHeldOutErrorOfTheLandingSmaller) {
   ASSERT_EQ(run("generate quick12 --seed 3 --effect flight.quadratic_drag=0.05 --out air.h5").code, 0);
   ASSERT_EQ(run("discover air.h5 --model limit_surface_disc --json d.json").code, 0);
-  const json found = read_json(folder / "d.json");
+  json found = read_json(folder / "d.json");
   ASSERT_EQ(found["verdict"], "effect_found");
   EXPECT_EQ(found["effects"][0]["id"], "flight.quadratic_drag");
-  const json &before = found["error"]["before"]["test"], &after = found["error"]["after"]["test"];
+  json &before = found["error"]["before"]["test"], &after = found["error"]["after"]["test"];
   for (const char* error : {"landing_x_mae_m", "landing_theta_mae_deg"})
     EXPECT_LT(after[error].get<double>(), before[error].get<double>()) << error;
 }

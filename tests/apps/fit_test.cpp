@@ -21,7 +21,7 @@ TEST_F(Cli, FitSaysWhichThrowsItLeavesOut) {
   EXPECT_THAT(answer.out,
               HasSubstr("1 train throws could not be simulated from the start and took no part: " + why +
                         " (1 throws)"));
-  const json fitted = read_json(folder / "f.json");
+  json fitted = read_json(folder / "f.json");
   for (const auto& one : fitted["throws"]) {
     if (one["id"] == "001")
       EXPECT_EQ(one["why_not"], why);
@@ -43,7 +43,7 @@ TEST_F(Cli, FitThenPredict) {
   }
   EXPECT_THAT(files(),
               testing::IsSupersetOf({"c.json", "f.json", "r/fit.json", "r/report.md", "r/throws.csv"}));
-  const json fitted = read_json(folder / "f.json"), card = read_json(folder / "c.json");
+  json fitted = read_json(folder / "f.json"), card = read_json(folder / "c.json");
   EXPECT_EQ(fitted["schema"], "fit");
   EXPECT_EQ(fitted["schema_version"], 1);
   EXPECT_EQ(fitted["outcome"], "converged");
@@ -60,7 +60,7 @@ TEST_F(Cli, FitThenPredict) {
   ASSERT_EQ(predicted.code, 0) << predicted.err;
   EXPECT_THAT(predicted.out, HasSubstr("±"));
   EXPECT_THAT(content(folder / "p.csv"), HasSubstr("sigma_landing_x_m"));
-  const json throws = read_json(folder / "p.json")["throws"];
+  json throws = read_json(folder / "p.json")["throws"];
   ASSERT_EQ(throws.size(), 12u);
   double mae = 0;
   int n = 0;
@@ -84,7 +84,7 @@ TEST_F(Cli, FitThenPredict) {
     EXPECT_THAT(predicted.err,
                 HasSubstr("of 12 throws are outside of the card's valid range in " + condition));
   ASSERT_EQ(run("compare " + quick + " --models limit_surface_disc --card c.json --json k.json").code, 0);
-  const json compared = read_json(folder / "k.json")["models"]["limit_surface_disc"];
+  json compared = read_json(folder / "k.json")["models"]["limit_surface_disc"];
   EXPECT_TRUE(compared["estimate"]["from_card"]);
   EXPECT_NEAR(compared["test"]["landing_x_m"]["mae"].get<double>(), mae / n, 1e-5);  // another rtol
 
@@ -139,7 +139,7 @@ TEST_F(Cli, PredictSaysHowPadsOpenThatNobodyMeasured) {
                  "c.json: /parameters/grip_force: is missing: throws without a measured normal force");
 
   // What takes part in an open direction is not called determined, by the fit or by its card.
-  const json fitted = read_json(folder / "f.json"), card = read_json(folder / "bare.json")["parameters"];
+  json fitted = read_json(folder / "f.json"), card = read_json(folder / "bare.json")["parameters"];
   ASSERT_FALSE(fitted["open_directions"].empty());
   EXPECT_FALSE(fitted["parameters"]["mu"]["determined"].get<bool>());
   for (const auto& [name, parameter] : fitted["parameters"].items()) {
@@ -222,7 +222,7 @@ TEST_F(Cli, FitCrossValidatesWithoutTestThrows) {
   const Answer answer = run("fit train.h5 --model gripper_delay --json f.json --card c.json");
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.out, HasSubstr("cross-validated"));
-  const json fitted = read_json(folder / "f.json");
+  json fitted = read_json(folder / "f.json");
   EXPECT_EQ(fitted["cross_validation"]["folds"], 5);
   EXPECT_EQ(fitted["cross_validation"]["n"], 12);
   EXPECT_TRUE(read_json(folder / "c.json")["errors"].contains("cross_validation"));
@@ -233,7 +233,7 @@ TEST_F(Cli, CompareFitsTheModels) {
       run("compare " + quick +
           " --models limit_surface,limit_surface_naive,gripper_delay --fit --json a.json --write-cards c");
   ASSERT_EQ(answer.code, 0) << answer.err;
-  const json models = read_json(folder / "a.json")["models"];
+  json models = read_json(folder / "a.json")["models"];
   ASSERT_EQ(models.size(), 3u);
   for (const auto& [name, model] : models.items()) {
     EXPECT_THAT(model["estimate"]["method"].get<std::string>(), HasSubstr("fitted")) << name;

@@ -9,7 +9,7 @@ TEST_F(Cli, PlansAThrowIntoABox) {
       run("plan throw --target 1.3,0,-0.2 --samples 600 --draws 50 --json plan.json --report out");
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.out, HasSubstr("no acceleration"));
-  const auto plan = nlohmann::json::parse(content(folder / "plan.json"));
+  auto plan = nlohmann::json::parse(content(folder / "plan.json"));
   EXPECT_EQ(plan["schema"], "plan-throw");
   EXPECT_EQ(plan["qdd_rad_s2"].size(), 7u);
   EXPECT_EQ(plan["predicted"]["planned"]["landed"], 50);
@@ -60,7 +60,7 @@ TEST_F(Cli, PlansAThrowOfAnArmFromUrdf) {
   expect_refusal("plan throw --target 1.3,0,-0.2 --tip hand", 2, "--tip: 'panda' is no .urdf file");
   const Answer answer = run(plan + " --tip hand --acceleration 15 --jerk 5000 --planar --json plan.json");
   ASSERT_EQ(answer.code, 0) << answer.err;
-  const auto told = nlohmann::json::parse(content(folder / "plan.json"));
+  auto told = nlohmann::json::parse(content(folder / "plan.json"));
   EXPECT_EQ(told["predicted"]["planned"]["landed"], 50);
   EXPECT_NE(told["q0_rad"][0], 0.0) << "the shoulder is no turntable: it is searched like the others";
   EXPECT_LE(told["limits"]["acceleration"]["fraction"], 1 + 1e-9);
@@ -128,13 +128,13 @@ TEST_F(Cli, PlansAThrowWithACard) {
   const Answer rigid = run("plan throw --target 1.3,0,-0.2 --samples 600 --draws 40 --sku bar.toml");
   EXPECT_THAT(rigid.out, HasSubstr("note: without a card the object is taken as carried rigidly"));
   EXPECT_THAT(rigid.out, HasSubstr("14 cm from the pads"));
-  const auto plan = nlohmann::json::parse(content(folder / "plan.json"));
+  auto plan = nlohmann::json::parse(content(folder / "plan.json"));
   EXPECT_LT(plan["predicted"]["insensitive motion"]["rms_m"],
             plan["predicted"]["tube acceleration"]["rms_m"]);
   EXPECT_TRUE(plan["release"]["contact_model"]["miss_m"].is_number());
   // Where each number is from: the card's log measured its gripper.
   const auto& numbers = plan["release"]["numbers"];
-  const auto range = nlohmann::json::parse(content(folder / "cards/sliding_pivot.json"))["valid_range"];
+  auto range = nlohmann::json::parse(content(folder / "cards/sliding_pivot.json"))["valid_range"];
   for (const char* name : {"grip_force", "dead_time", "opening_time", "shape"}) {
     EXPECT_EQ(numbers[name]["from"], "card's range") << name;
     EXPECT_DOUBLE_EQ(numbers[name]["value"],
@@ -154,13 +154,13 @@ TEST_F(Cli, AdaptationThrowsUnknownObjectsWhereItShould) {
   const Answer answer = run("plan control --seeds 3 --repetitions 2 --json c.json --report out");
   ASSERT_EQ(answer.code, 0) << answer.err;
   std::map<std::string, std::map<std::string, json>> cells;
-  const json found = read_json(folder / "c.json");
+  json found = read_json(folder / "c.json");
   for (const auto& cell : found["cells"]) cells[cell["object"]][cell["controller"]] = cell;
   ASSERT_EQ(cells.size(), 3u);
-  for (const auto& [object, by] : cells) {
-    const json &adaptive = by.at("adaptive, 30 N/m"), &soft = by.at("plain, 30 N/m"),
-               &stiff = by.at("plain, 300 N/m");
-    for (const json& cell : {adaptive, soft, stiff}) {
+  for (auto& [object, by] : cells) {
+    json &adaptive = by.at("adaptive, 30 N/m"), &soft = by.at("plain, 30 N/m"),
+         &stiff = by.at("plain, 300 N/m");
+    for (json cell : {adaptive, soft, stiff}) {
       EXPECT_EQ(cell["throws"], 3);
       EXPECT_LT(cell["torque_use"], 1);
       // rms² is the square of the mean and the spread about it, on both axes.
@@ -172,7 +172,7 @@ TEST_F(Cli, AdaptationThrowsUnknownObjectsWhereItShould) {
     }
     EXPECT_EQ(adaptive["hits"], 3) << object;
     EXPECT_LT(soft["mean_m"][0], -0.01) << object << " is heavy: the arm lags, and the throw falls short";
-    const auto error = [](const json& cell) { return cell["release_position_error_m"].get<double>(); };
+    const auto error = [](json cell) { return cell["release_position_error_m"].get<double>(); };
     EXPECT_LT(10 * error(adaptive), error(soft)) << object;
     EXPECT_LT(5 * error(stiff), error(soft)) << object << ": ten times the stiffness, a tenth of the lag";
   }
@@ -187,11 +187,11 @@ TEST_F(Cli, AdaptationThrowsUnknownObjectsWhereItShould) {
 TEST_F(Cli, AClutchedSpringThrowsFaster) {
   const Answer answer = run("plan elastic --starts 1 --intervals 8 --longest 0.4 --json e.json --report out");
   ASSERT_EQ(answer.code, 0) << answer.err;
-  const json drives = read_json(folder / "e.json")["drives"];
-  for (const auto& [name, drive] : drives.items()) {
+  json drives = read_json(folder / "e.json")["drives"];
+  for (auto& [name, drive] : drives.items()) {
     ASSERT_FALSE(drive["basins"].empty()) << name;
-    for (const auto& basin : drive["basins"]) {
-      const json& energy = basin["energy_J"];
+    for (auto& basin : drive["basins"]) {
+      json& energy = basin["energy_J"];
       const auto joules = [&](const char* what) { return energy[what].get<double>(); };
       EXPECT_NEAR(joules("gain"),
                   joules("motors") - joules("damping") - joules("friction") - joules("impacts"), 1e-9)
@@ -226,7 +226,7 @@ TEST_F(Cli, AnElasticWristThrowsFaster) {
       run("plan wrist --stiffnesses 2 --softest 4 --stiffest 16 --starts 1 --intervals 4 --json w.json "
           "--report out");
   ASSERT_EQ(answer.code, 0) << answer.err;
-  const json wrist = read_json(folder / "w.json");
+  json wrist = read_json(folder / "w.json");
   ASSERT_EQ(wrist["spring"].size(), 2u);
   for (const auto& spring : wrist["spring"]) {
     const auto speed = spring["speed_m_s"].get<double>();
@@ -250,7 +250,7 @@ TEST_F(Cli, LearnsToThrowFlipAndGoesOnAfterAKill) {
                               "iteration), all 3 (first in iteration [12]|in no iteration)"));
   const std::string path = content(folder / "out/path.gp");
   EXPECT_LT(path.rfind("with labels"), path.find("with linespoints")) << "labels hide no mean";
-  const auto flip = nlohmann::json::parse(content(folder / "flip.json"));
+  auto flip = nlohmann::json::parse(content(folder / "flip.json"));
   EXPECT_EQ(flip["schema"], "plan-flip");
   EXPECT_EQ(flip["iterations"].size(), 2u);
   EXPECT_EQ(flip["iterations"][0]["trials"].size(), 3u);
@@ -302,7 +302,7 @@ TEST_F(Cli, ThrowFlipTransfersToAnotherBar) {
               HasSubstr("18.0 cm from the pads, known from 27 throws of another one (12.0 cm; the "
                         "paper's shift, as no --com-offset was given)"));
   EXPECT_THAT(shifted.out, HasSubstr("(expected, not seen)"));
-  const auto flip = nlohmann::json::parse(content(folder / "flip.json"));
+  auto flip = nlohmann::json::parse(content(folder / "flip.json"));
   EXPECT_EQ(flip["bar"]["com_offset_m"], 0.18);
   EXPECT_EQ(flip["known_bar"]["com_offset_m"], 0.12);
   EXPECT_EQ(flip["initial_error_is_seen"], false);
@@ -312,7 +312,7 @@ TEST_F(Cli, ThrowFlipTransfersToAnotherBar) {
   const Answer sku = run(what + "--learner m4 --sku sku.toml");
   ASSERT_EQ(sku.code, 0) << sku.err;
   EXPECT_THAT(sku.out, HasSubstr("15.0 cm from the pads, known from 12 throws of another one (12.0 cm)"));
-  const auto learned = nlohmann::json::parse(content(folder / "flip.json"));
+  auto learned = nlohmann::json::parse(content(folder / "flip.json"));
   EXPECT_EQ(learned["bar"]["mass_kg"], 0.3);
   // What was learned of the gripper and its pads answers for another object.
   std::ofstream(folder / "card.json") << learned["card"];
@@ -321,7 +321,7 @@ TEST_F(Cli, ThrowFlipTransfersToAnotherBar) {
   const Answer object = run("validate-sku light.toml --card card.json --json sku.json");
   ASSERT_EQ(object.code, 0) << object.err;
   EXPECT_THAT(object.out, HasSubstr("Beyond the card: mass 0.2 kg is not 0.242"));
-  const auto budget = nlohmann::json::parse(content(folder / "sku.json"))["budget"].dump();
+  auto budget = nlohmann::json::parse(content(folder / "sku.json"))["budget"].dump();
   for (const char* of : {"\"mu\"", "\"length\"", "\"dead_time\"", "\"mu_deviation\"", "\"grasp_angle\""})
     EXPECT_THAT(budget, HasSubstr(of));
 }
@@ -359,7 +359,7 @@ TEST_F(Cli, ValidateSkuAnswersWithABudget) {
   const Answer answer = run(
       "validate-sku bar.toml --card card.json --samples 200 --json a.json --report out --tolerance 0.1,60");
   ASSERT_EQ(answer.code, 0) << answer.err;
-  const json out = read_json(folder / "a.json");
+  json out = read_json(folder / "a.json");
   EXPECT_EQ(out["schema"], "validate-sku");
   EXPECT_NEAR(out["tolerance"]["landing_theta_deg"].get<double>(), 60, 1e-12);
   double share = 0;
@@ -374,7 +374,7 @@ TEST_F(Cli, ValidateSkuAnswersWithABudget) {
   const Answer with_log =
       run("validate-sku bar.toml --card card.json --samples 200 --log " + quick + " --json b.json");
   ASSERT_EQ(with_log.code, 0) << with_log.err;
-  const json judged = read_json(folder / "b.json");
+  json judged = read_json(folder / "b.json");
   EXPECT_EQ(judged["candidates"].size(), 6u);  // the campaign's conditions, three for each of two objects
   EXPECT_EQ(judged["measured"]["n"], 6);
 

@@ -369,7 +369,7 @@ TEST_F(Cli, GenerateTellsTheTruthOnlyWhenAsked) {
                 .code,
             0);
   EXPECT_EQ(content(folder / "a.h5").find("quadratic_drag"), std::string::npos);
-  const json truth = read_json(folder / "a.json");
+  json truth = read_json(folder / "a.json");
   EXPECT_EQ(truth["schema"], "truth");
   EXPECT_EQ(truth["effects"]["flight.quadratic_drag.k"]["value"], 0.1);
   EXPECT_EQ(truth["effects"]["flight.quadratic_drag.k[bar-com160]"]["value"], 0.2);
@@ -390,7 +390,7 @@ TEST_F(Cli, Inspect) {
   EXPECT_THAT(answer.out, HasSubstr("12 throws"));
   EXPECT_THAT(answer.out, HasSubstr("mocap"));
   EXPECT_THAT(answer.err, IsEmpty());  // no progress bar in a pipe
-  const json seen = read_json(folder / "a.json");
+  json seen = read_json(folder / "a.json");
   EXPECT_EQ(seen["schema"], "inspect");
   EXPECT_EQ(seen["throws"], 12);
   EXPECT_EQ(json::parse(run("inspect " + quick + " --json").out), seen);
@@ -414,7 +414,7 @@ TEST_F(Cli, InspectHoldsTheDeclaredNoiseAgainstTheScatter) {
   EXPECT_THAT(answer.out, HasSubstr("(f_N "));
   EXPECT_THAT(answer.out,
               HasSubstr("note: mocap/pose declares a sigma of 0 in 12 throws: treated as undeclared"));
-  const json noise = read_json(folder / "bold.json")["noise"];
+  json noise = read_json(folder / "bold.json")["noise"];
   EXPECT_EQ(noise["ft/normal_force"]["declared_too_small"], json::array({true}));
   // of 4200 samples: to 1.7 %
   EXPECT_NEAR(noise["ft/normal_force"]["scatter"][0], 0.05, 0.0025);
@@ -495,7 +495,7 @@ TEST_F(Cli, InspectTellsOfWhatIsImpossibleAndTheRestRefusesIt) {
   const Answer answer = run("inspect mm.h5");
   EXPECT_EQ(answer.code, 0);
   EXPECT_THAT(answer.out, HasSubstr("doubtful: /gripper@pad_radius: pad_radius is 10.6 m"));
-  const json seen = json::parse(run("inspect mm.h5 --json").out);
+  json seen = json::parse(run("inspect mm.h5 --json").out);
   ASSERT_EQ(seen["doubtful"].size(), 1u);
   EXPECT_EQ(seen["doubtful"][0]["path"], "/gripper@pad_radius");
   expect_refusal("compare mm.h5 --json a.json", 3, "mm.h5: /gripper@pad_radius");
@@ -506,12 +506,12 @@ TEST_F(Cli, InspectTellsUnitsAndWhatIsDeclaredInJson) {
   log.objects.begin()->second.com_offset.reset();
   datasets::write_throw_log(folder / "log.h5", log);
   ASSERT_EQ(run("inspect log.h5 --json i.json").code, 0);
-  const json seen = read_json(folder / "i.json");
+  json seen = read_json(folder / "i.json");
   EXPECT_EQ(seen["software"]["name"], "unhand");
   EXPECT_EQ(seen["log"], "log.h5");
   EXPECT_EQ(seen["log_schema"], "throw-log");
   for (const auto& [dataset, noise] : seen["noise"].items()) {
-    const json& one = seen["datasets"][dataset];
+    json& one = seen["datasets"][dataset];
     EXPECT_EQ(one["units"].size(), one["columns"].size()) << dataset;
     EXPECT_EQ(one["throws"], noise["throws"]) << dataset;
     EXPECT_FALSE(one["units"].empty()) << dataset;
@@ -519,7 +519,7 @@ TEST_F(Cli, InspectTellsUnitsAndWhatIsDeclaredInJson) {
   EXPECT_EQ(seen["datasets"]["ft/wrench"]["columns"], json({"fx", "fz", "tau"}));
   EXPECT_EQ(seen["datasets"]["ft/wrench"]["units"], json({"N", "N", "N m"}));
   for (const auto& [name, object] : log.objects) {
-    const json& one = seen["declared_objects"][name];
+    json& one = seen["declared_objects"][name];
     EXPECT_EQ(one["mass_kg"], object.mass);
     EXPECT_EQ(one["inertia_kg_m2"], *object.inertia);
     EXPECT_EQ(one["com_offset_m"], object.com_offset ? json(*object.com_offset) : json(nullptr));

@@ -5,6 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
+#include <string>
+#include <utility>
 
 #include "contact/gripper_delay.hpp"
 #include "contact/limit_surface.hpp"
@@ -28,11 +31,18 @@ ContactModelEntry named(std::string name, std::vector<LawParameter> own,
           std::move(own)};
 }
 
+/// Registers a law once: its name is taken for good, and a test may run again.
+void register_once(ContactModelEntry entry) {
+  static std::set<std::string> done;
+  if (done.insert(entry.name).second) register_contact_model(std::move(entry));
+}
+
 LawParameter glue() { return {"glue", "N", 1, 0, 10, 0.1, 9, 0.5, 2.0, ""}; }
 
 TEST(Registry, TakesALawOfOnesOwn) {
-  std::vector<double> seen;
-  register_contact_model(named("glued", {glue()}, &seen));
+  static std::vector<double> seen;  // by the law, which outlives the test
+  seen.clear();
+  register_once(named("glued", {glue()}, &seen));
   EXPECT_THAT(contact_model_names(), Contains("glued"));
   EXPECT_EQ(contact_model_names().front(), "sliding_pivot");
   ASSERT_EQ(law_parameters("glued").size(), 1u);
@@ -55,12 +65,12 @@ TEST(Registry, SaysWhichLawsFollowThePads) {
     EXPECT_TRUE(follows_pads(law)) << law;
   auto rigid = named("rigid", {});
   rigid.follows_pads = false;
-  register_contact_model(std::move(rigid));
+  register_once(std::move(rigid));
   EXPECT_FALSE(follows_pads("rigid"));
 }
 
 TEST(Registry, GivenParametersAreTheLawsOwn) {
-  register_contact_model(named("pasted", {glue()}));
+  register_once(named("pasted", {glue()}));
   const auto given = given_law_parameters("pasted", {{"glue", 3.0}, {"kappa", 1.0}});
   ASSERT_EQ(given.size(), 1u);
   EXPECT_EQ(given[0].parameter.name, "glue");
@@ -69,7 +79,7 @@ TEST(Registry, GivenParametersAreTheLawsOwn) {
 }
 
 TEST(Registry, RefusesParametersThatALawDoesNotHave) {
-  register_contact_model(named("taped", {glue()}));
+  register_once(named("taped", {glue()}));
   const auto refusal = [](const char* law, LawValues<double> values) -> std::string {
     ContactParameters<double> p;
     p.patch = {0.5, 0.01};
@@ -136,7 +146,7 @@ TEST(Registry, RefusesWhatIsNoLaw) {
 }
 
 TEST(Registry, AMakerThatGivesNothingIsNamed) {
-  register_contact_model({"hollow", [](const ContactParameters<Dual>&) { return nullptr; }, {}});
+  register_once({"hollow", [](const ContactParameters<Dual>&) { return nullptr; }, {}});
   ContactParameters<double> p;
   p.patch = {0.5, 0.01};
   try {

@@ -90,7 +90,7 @@ TEST_P(Derivative, OfTheLandingIsTheCentralDifference) {
       const double scale = std::max(std::abs(at[k]), 1e-2);
       std::array<double, 4> best;
       best.fill(std::numeric_limits<double>::infinity());
-      for (const double relative : {1e-3, 1e-4, 1e-5, 1e-6}) {
+      for (const double relative : {1e-4, 1e-5}) {
         const double h = relative * scale;
         auto above = at, below = at;
         above[k] += h;

@@ -42,7 +42,7 @@ TEST_F(Bullet, SlidesAsCoulombSaysAlongItsOwnRow) {
     for (const auto pads : {BulletPads::pins, BulletPads::point}) {
       const auto r =
           simulate_in_bullet(problem(hand, {0, 0}, 0, slip, 0), kPatch, with(pads, BulletFriction::along));
-      // uniform deceleration is exact for Euler steps; 1e-6: the contacts' own first-order effects
+      // uniform deceleration is exact for Euler steps; 1e-5: the contacts' own first-order effects
       EXPECT_NEAR(norm(r.relative.slip), 1 - 8 * 0.1, 1e-5) << to_string(pads) << " " << direction;
     }
   }

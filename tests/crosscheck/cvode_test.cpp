@@ -75,8 +75,6 @@ TEST_P(Cvode, AgreesOnTheDetachTwist) {
   EXPECT_GT(switches, 3 * GetParam().throws);
   RecordProperty("worst", std::to_string(worst));
   RecordProperty("other_sequence", other_sequence);
-  std::printf("%s: %d throws, %d events, largest difference %.2e, %d grazing\n", GetParam().model,
-              GetParam().throws, switches, worst, other_sequence);
 }
 
 }  // namespace

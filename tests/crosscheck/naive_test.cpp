@@ -39,8 +39,6 @@ TEST(Naive, TendsToTheEventDetectedAnswerAndChattersOnTheWay) {
   EXPECT_GT(error[0], 0.05) << "a millisecond is far from the answer [m/s]";
   EXPECT_LT(error[3], 0.02 * error[0]) << "it does tend to the same answer";
   EXPECT_GT(error[3], 1e-7) << "where the event-detected one has long arrived";
-  std::printf("error %.2e %.2e %.2e %.2e m/s, reversals %.0f %.0f %.0f %.0f\n", error[0], error[1], error[2],
-              error[3], reversals[0], reversals[1], reversals[2], reversals[3]);
 }
 
 TEST(Naive, AnObjectThatSlipsFromTheStartAndProblemsThatAreNone) {

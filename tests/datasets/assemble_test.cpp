@@ -1,3 +1,4 @@
+// Throws put together from the files of their channels.
 #include "datasets/assemble.hpp"
 
 #include <stdexcept>

@@ -1,3 +1,4 @@
+// A lab's own CSV columns, by name and by number.
 #include "datasets/import_columns.hpp"
 
 #include <numbers>

@@ -1,3 +1,4 @@
+// Tables of text as spreadsheets and recorders write them.
 #include "datasets/csv.hpp"
 #include "datasets/near_miss.hpp"
 

@@ -1,3 +1,4 @@
+// The import of measured cube tosses: which are kept, and how their noise is told.
 #include "datasets/import_cube_tosses.hpp"
 
 #include <cmath>

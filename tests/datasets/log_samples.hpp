@@ -1,9 +1,8 @@
-// Small logs and a scratch folder for the tests of datasets.
+// Small logs for the tests of datasets.
 #pragma once
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <cstring>
@@ -14,30 +13,11 @@
 #include <string>
 
 #include "datasets/throw_log.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace unhand::datasets::test {
 
-/// A folder that goes away with the test.
-class Scratch {
- public:
-  Scratch() {
-    static int counter = 0;
-    folder_ = std::filesystem::temp_directory_path() /
-              ("unhand-datasets-" + std::to_string(getpid()) + "-" + std::to_string(counter++));
-    std::filesystem::create_directories(folder_);
-  }
-  ~Scratch() { std::filesystem::remove_all(folder_); }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-
-  std::string operator/(const std::string& name) const { return (folder_ / name).string(); }
-  std::size_t files() const {
-    return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(folder_), {}));
-  }
-
- private:
-  std::filesystem::path folder_;
-};
+using support::Scratch;
 
 inline std::string bytes_of(const std::string& file) {
   std::ifstream in(file, std::ios::binary);

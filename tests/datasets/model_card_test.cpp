@@ -1,7 +1,7 @@
+// Model cards: round trip, what is refused, and how files are replaced.
 #include "datasets/model_card.hpp"
 
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include <array>
 #include <bit>
@@ -12,6 +12,8 @@
 #include <nlohmann/json.hpp>
 #include <random>
 #include <sstream>
+
+#include "tests/support/scratch.hpp"
 
 namespace unhand::datasets {
 namespace {
@@ -59,7 +61,7 @@ TEST(ModelCard, AnEndOfAnIntervalMayBeOpen) {
     card.parameters["mu"].interval95 = interval;
     EXPECT_EQ(parse_model_card(to_json(card)), card);
   }
-  const auto json = nlohmann::json::parse(to_json(small_card()));
+  auto json = nlohmann::json::parse(to_json(small_card()));
   EXPECT_FALSE(json["parameters"]["mu"].contains("low95"));
   EXPECT_THAT(refusal_after([](auto& j) { j["parameters"]["mu"]["low95"] = 0.7; }),
               HasSubstr("/parameters/mu/low95: 0.7 lies above the value"));
@@ -70,7 +72,7 @@ TEST(ModelCard, AnEndOfAnIntervalMayBeOpen) {
 TEST(ModelCard, OneErrorHasNoStandardDeviation) {
   ModelCard card = small_card();
   card.errors["test"] = {{"landing_x_m", {1, 0.012, 0, -0.012}}, {"landing_theta_deg", {2, 1.5, 0.5, 0.5}}};
-  const auto json = nlohmann::json::parse(to_json(card));
+  auto json = nlohmann::json::parse(to_json(card));
   EXPECT_TRUE(json["errors"]["test"]["landing_x_m"]["std"].is_null());
   EXPECT_EQ(json["errors"]["test"]["landing_theta_deg"]["std"], 0.5);
   EXPECT_EQ(parse_model_card(json.dump()), card);
@@ -85,7 +87,7 @@ TEST(ModelCard, LeavesOutWhatIsNotKnown) {
   card.log.surfaces.clear();
   card.split.reset();
   card.valid_range.clear();
-  const auto json = nlohmann::json::parse(to_json(card));
+  auto json = nlohmann::json::parse(to_json(card));
   EXPECT_FALSE(json.contains("split"));
   EXPECT_FALSE(json.contains("valid_range"));
   EXPECT_FALSE(json["log"].contains("checksum"));
@@ -220,8 +222,8 @@ TEST(ModelCard, RefusesToWriteWhatCannotBeReadAgain) {
 }
 
 TEST(ModelCard, FilesAreReplacedAtOnce) {
-  const fs::path folder = fs::temp_directory_path() / ("unhand_cards_" + std::to_string(getpid()));
-  fs::create_directory(folder);
+  const support::Scratch scratch;
+  const fs::path folder = scratch.path();
   const fs::path file = folder / "card.json";
   write_model_card(file, small_card());
   ModelCard other = small_card();
@@ -234,7 +236,6 @@ TEST(ModelCard, FilesAreReplacedAtOnce) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder), {}), 1);
   EXPECT_THROW(read_model_card(folder), CardError);
   EXPECT_THROW(read_model_card(folder / "none.json"), CardError);
-  fs::remove_all(folder);
 }
 
 }  // namespace

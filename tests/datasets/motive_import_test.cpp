@@ -1,3 +1,4 @@
+// Takes of a motion capture: units, heading, centre of mass, losses, and the flight in them.
 #include "datasets/import_motive.hpp"
 
 #include <Eigen/Geometry>

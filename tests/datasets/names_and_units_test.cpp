@@ -1,3 +1,4 @@
+// Misspelled names, units, and the list of all datasets.
 #include "datasets/near_miss.hpp"
 #include "datasets/reference.hpp"
 #include "datasets/units.hpp"

@@ -1,3 +1,4 @@
+// Falls from a telephone's recordings.
 #include "datasets/import_phyphox.hpp"
 
 #include <sstream>

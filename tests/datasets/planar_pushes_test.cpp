@@ -1,3 +1,4 @@
+// The import of measured planar pushes: frames, torques about the centre, and what is refused.
 #include <fmt/format.h>
 
 #include <cmath>

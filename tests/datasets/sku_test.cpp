@@ -1,3 +1,4 @@
+// Files that describe an object: keys, units, and the inertia of a shape.
 #include "datasets/sku.hpp"
 
 #include <stdexcept>

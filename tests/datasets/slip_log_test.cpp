@@ -1,3 +1,4 @@
+// Logs of slips: round trip, units, and what is refused.
 #include "datasets/slip_log.hpp"
 
 #include "hdf5_tools.hpp"

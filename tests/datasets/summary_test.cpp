@@ -1,3 +1,4 @@
+// What a log is said to hold: rates, gaps, noise and scatter.
 #include "datasets/summary.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// Axes of a log that point the other way are told from the motion.
 #include "experiment/axis_check.hpp"
 
 #include <gmock/gmock.h>

@@ -52,9 +52,6 @@ TEST(CampaignEffects, AnyNumberOfThreadsMakesTheSameLog) {
     dynamics::parallel_for(out.size(), threads, [&](std::size_t i) {
       out[i] = generate_throw(design, 5, 4 * static_cast<int>(i)).record;
     });
-    for (auto& one : out)  // lost samples are NaN, which is unequal to itself
-      for (double& x : one.mocap->pose.data)
-        if (std::isnan(x)) x = 0;
     return out;
   };
   EXPECT_TRUE(make(1) == make(3));
@@ -291,9 +288,10 @@ TEST(CampaignEffects, AirMovesTheLandingAsPerturbationTheorySays) {
 TEST(CampaignEffects, FrictionMattersOnlyOnceThePadsOpen) {
   const auto plain = generate_throw(perfect(), kSeed, kThrow);
   for (const Effect& effect : known_effects()) {
-    if (!effect.id.starts_with("contact.") || is_optional(effect.id)) continue;
+    if (!effect.id.starts_with("contact.")) continue;
     const auto made = generate_throw(perfect(typical(effect)), kSeed, kThrow);
-    for (std::size_t k = 0; plain.record.ft->time(k) < plain.truth.motion.switch_time; ++k)
+    const bool gives = effect.id == "contact.pad_compliance";  // under the load of the firm grasp, too
+    for (std::size_t k = 0; !gives && plain.record.ft->time(k) < plain.truth.motion.switch_time; ++k)
       EXPECT_NEAR(made.record.ft->wrench(k, 2), plain.record.ft->wrench(k, 2), 1e-12) << effect.id;
     EXPECT_NE(made.truth.landing_pose.x, plain.truth.landing_pose.x) << effect.id;
   }

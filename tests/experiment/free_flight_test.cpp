@@ -257,7 +257,7 @@ TEST(FreeFlight, WhatIsHeldAtFirstIsNotFree) {
 }
 
 TEST(FreeFlight, TheAnswerDoesNotDependOnThreads) {
-  const Campaign c = spatial(23, {4e-4, 9e-4, 1.1e-3}, 0.1, 1);
+  const Campaign c = spatial(7, {4e-4, 9e-4, 1.1e-3}, 0.1, 1);  // no number of threads divides them
   const std::vector<std::string> names{"projectile"};
   const auto one = compare_free_flights(c.log, names, 1)[0];
   for (const int threads : {0, 2, 3, 64}) {

@@ -126,7 +126,7 @@ TEST(GeneratorAndPrediction, AgreeThroughTheSmoothedLogOnlyIfTheEffectIsKnown) {
     const Worst told = consistency(design, kThrow, false, true);
     EXPECT_GT(told.observations, 800) << id;
     EXPECT_LE(largest(told), 2e-3) << id;
-    if (!is_optional(id) && id != "none") {
+    if (id != "none") {
       EXPECT_GE(largest(consistency(design, kThrow, false, false)), 0.05) << id;
     }
   }

@@ -44,7 +44,7 @@ TEST(CampaignEffects, AreReadByName) {
   const OwnEffects box({{"flight.quadratic_drag.k", 0.1}, {"flight.quadratic_drag.k[jar]", 0.2}}, "box");
   EXPECT_EQ(box.values().get("flight.quadratic_drag.k", 0), 0.1);
 }
-TEST(CampaignEffects, RandomOnesAreFromTheCatalogueAndVisible) {
+TEST(CampaignEffects, RandomOnesAreFromTheCatalogueAndOfTypicalSize) {
   std::set<std::string> ids, without_ft;
   for (std::uint64_t seed = 1; seed <= 400; ++seed) {
     CampaignDesign design = perfect();

@@ -1,3 +1,4 @@
+// The delay between command and detach, as the tracker saw it.
 #include "experiment/seen_delay.hpp"
 
 #include <gtest/gtest.h>

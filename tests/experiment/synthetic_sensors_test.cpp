@@ -139,7 +139,6 @@ TEST(SyntheticSensors, ForcesOfBothPadsAndGravityAreNewtons) {
     }
     EXPECT_GT(checked, 500) << i;
   }
-  std::printf("Newton: worst force %.2g N, worst torque %.2g N m\n", worst_force, worst_torque);
   // Second differences over 0.25 ms: h²/12 of the jerk's slope, and the dense output's 1e-9 over h²; the
   // forces are some newtons, the torques some tenths of a newton metre.
   EXPECT_LT(worst_force, 0.02);

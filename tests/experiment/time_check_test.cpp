@@ -1,3 +1,4 @@
+// Times of a log that cannot be are told.
 #include "experiment/time_check.hpp"
 
 #include <fmt/core.h>

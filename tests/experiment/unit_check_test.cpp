@@ -1,3 +1,4 @@
+// Columns of a log in another unit are told.
 #include "experiment/unit_check.hpp"
 
 #include <gmock/gmock.h>

@@ -1,3 +1,4 @@
+// Which limit surface slips speak for, held-out ones judging.
 #include "fitting/slips/compare_surfaces.hpp"
 
 #include <gmock/gmock.h>

@@ -13,6 +13,7 @@
 #include "experiment/synthetic_campaign.hpp"
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/stage.hpp"
+#include "tests/fitting/found_size.hpp"
 #include "tests/fitting/loop_campaign.hpp"
 
 namespace unhand::fitting {
@@ -87,8 +88,7 @@ TEST(Discovery, DragIsFoundWithItsSize) {
   EXPECT_TRUE(found.effects.front().equivalent.empty()) << "a wind needs a drag to act through";
   EXPECT_EQ(found.silent, std::vector<std::string>{"flight.wind"}) << "none was declared";
   EXPECT_EQ(found.first.phase, Phase::flight) << "drag acts in flight, and first there";
-  for (const auto& p : found.effects.front().parameters)
-    EXPECT_NEAR(p.value, kDrag, std::max(4 * p.sigma, 1e-4)) << p.name;
+  support::expect_size(found, "flight.quadratic_drag", kDrag);
   EXPECT_LT(found.after_test.trajectory_rms.value(), 0.5 * found.before_test.trajectory_rms.value());
 
   // What is missing has the residual's shape at every time; what imitates it has not.
@@ -108,10 +108,7 @@ TEST(Discovery, AClockThatIsLateIsFoundAlreadyInTheGrasp) {
   const Discovery found = found_in(support::loop_campaign({{"sensor.mocap_time_offset.offset", kOffset}}));
   ASSERT_EQ(found.verdict, Verdict::effect_found);
   EXPECT_EQ(found.first.phase, Phase::grasped);
-  const AcceptedEffect* effect = named(found, "sensor.mocap_time_offset");
-  ASSERT_NE(effect, nullptr) << found.effects.front().id;
-  EXPECT_NEAR(effect->parameters.front().value, kOffset,
-              std::max(4 * effect->parameters.front().sigma, 2e-5));
+  support::expect_size(found, "sensor.mocap_time_offset", kOffset);
 }
 
 TEST(Discovery, AnEffectThatTheCatalogueForgetsIsUnexplainedWithAReadableCandidate) {
@@ -203,7 +200,10 @@ TEST(Discovery, AListedEffectBesideAnUnlistedOneStays) {
   const Discovery found =
       found_in(support::loop_campaign({{"flight.quadratic_drag.k", 0.05}, {"flight.magnus_lift.k_m", 0.02}}),
                {"flight.magnus_lift"});
-  EXPECT_NE(named(found, "flight.quadratic_drag"), nullptr) << to_string(found.verdict);
+  const AcceptedEffect* drag = named(found, "flight.quadratic_drag");
+  ASSERT_NE(drag, nullptr) << to_string(found.verdict);
+  // Of what size cannot be known beside what is not listed; that it brakes can.
+  for (const auto& p : drag->parameters) EXPECT_GT(p.value, 4 * p.sigma) << p.name;
   ASSERT_TRUE(found.unexplained.has_value());
   EXPECT_EQ(found.unexplained->phase, Phase::flight);
 }
@@ -347,16 +347,16 @@ TEST(Discovery, AChanceMisfitElsewhereDoesNotWithdrawAnEffect) {
   experiment::CampaignDesign design = experiment::random_campaign(2018);
   design.effects = {{"contact.pressure_profile.s", 0.5136}, {"sensor.normal_force_bias.bias", 0.7581}};
   const Discovery found = found_in(experiment::generate_campaign(design, 2018));
-  const AcceptedEffect* effect = named(found, "sensor.normal_force_bias");
-  ASSERT_NE(effect, nullptr);
-  EXPECT_NEAR(effect->parameters[0].value, 0.7581, 3 * effect->parameters[0].sigma);
+  EXPECT_GT(misfit_in(found.base_test, experiment::Channel::landing_time, Phase::landing), 1.7);
+  EXPECT_LT(misfit_in(found.base.misfit, experiment::Channel::landing_time, Phase::landing), 1.5);
+  support::expect_size(found, "sensor.normal_force_bias", 0.7581);
 }
 
 TEST(Discovery, TwoEffectsAtOnceAreBothFound) {
   const Discovery found = found_in(support::loop_campaign(
       {{"flight.gravity_tilt.angle", 0.02}, {"sensor.mocap_time_offset.offset", 0.005}}));
-  EXPECT_NE(named(found, "flight.gravity_tilt"), nullptr);
-  EXPECT_NE(named(found, "sensor.mocap_time_offset"), nullptr);
+  support::expect_size(found, "flight.gravity_tilt", 0.02);
+  support::expect_size(found, "sensor.mocap_time_offset", 0.005);
   EXPECT_EQ(found.effects.size(), 2u);
 }
 
@@ -370,9 +370,7 @@ TEST(Discovery, AGiveIsFoundBehindALawWhosePadsCannot) {
       discover(support::loop_campaign({{"contact.pad_compliance.compliance", kGive}}), "synthetic", options);
   ASSERT_EQ(found.verdict, Verdict::effect_found);
   EXPECT_EQ(found.effects.front().id, "contact.law:limit_surface_disc");
-  const AcceptedEffect* give = named(found, "contact.pad_compliance");
-  ASSERT_NE(give, nullptr);
-  EXPECT_NEAR(give->parameters[0].value, kGive, 4 * give->parameters[0].sigma);
+  support::expect_size(found, "contact.pad_compliance", kGive);
   EXPECT_EQ(found.effects.size(), 2u);
   EXPECT_FALSE(found.unexplained.has_value());
 }
@@ -407,9 +405,7 @@ TEST(Discovery, WhatMattersToThePredictionAloneIsFound) {
   design.effects = {{"contact.viscous.1/v_0", kViscous}};
   const Discovery found = found_in(experiment::generate_campaign(design, 4));
   EXPECT_FALSE(found.first.any) << "no channel alone would show it";
-  const AcceptedEffect* effect = named(found, "contact.viscous");
-  ASSERT_NE(effect, nullptr) << to_string(found.verdict);
-  EXPECT_NEAR(effect->parameters.front().value, kViscous, 3 * effect->parameters.front().sigma);
+  support::expect_size(found, "contact.viscous", kViscous);
   EXPECT_LT(found.after_test.trajectory_rms.value(), 0.7 * found.before_test.trajectory_rms.value());
 }
 
@@ -448,16 +444,14 @@ TEST(Discovery, ASecondEffectIsLookedForWhereNoChannelShowsIt) {
   const Discovery found = found_in(experiment::generate_campaign(design, 4));
   ASSERT_EQ(found.effects.size(), 2u) << to_string(found.verdict);
   EXPECT_EQ(found.effects.front().id, "flight.gravity_tilt");
-  const AcceptedEffect* viscous = named(found, "contact.viscous");
-  ASSERT_NE(viscous, nullptr) << found.effects.back().id;
-  EXPECT_NEAR(viscous->parameters.front().value, 5, 3 * viscous->parameters.front().sigma);
+  support::expect_size(found, "contact.viscous", 5);
+  support::expect_size(found, "flight.gravity_tilt", 0.02);
 }
 
 // Pads that give by three micrometres, which no pads are without, are no missing effect and no unexplained
 // one either: the answer's model has them, and predicts the better for it.
 TEST(Discovery, TheGiveOfAnyPadsIsFittedAlongAndNoPartOfTheAnswer) {
-  experiment::CampaignDesign design = experiment::campaign_design("batch180");
-  design.repetitions = 2;
+  experiment::CampaignDesign design = support::loop_design();
   constexpr double kGive = 3e-6;  // m, at the friction limit of two pads
   design.effects = {
       {"contact.pad_compliance.compliance", kGive / (2 * design.patch.mu * design.opening.grip_force)}};
@@ -514,8 +508,7 @@ TEST(Discovery, WhatTheTrainThrowsSettleIsConfirmedBesideTheGiveOfThePads) {
   EXPECT_LT(torque(found.base_test), 1.5);
   ASSERT_EQ(found.effects.size(), 1u) << to_string(found.verdict);
   EXPECT_EQ(found.effects.front().id, "contact.stribeck");
-  const Parameter& ratio = found.effects.front().parameters.front();
-  EXPECT_NEAR(ratio.value, kRatio, 3 * ratio.sigma);
+  support::expect_size(found, "contact.stribeck", kRatio, 1);
   EXPECT_EQ(found.along, std::vector<std::string>{"contact.pad_compliance"});
   EXPECT_LT(found.after_test.trajectory_rms.value(), 0.75 * found.before_test.trajectory_rms.value());
 }
@@ -528,9 +521,7 @@ TEST(Discovery, PadsThatBendTheBaseFarAreFound) {
   design.effects = {{"contact.pad_compliance.compliance", kCompliance}};
   const Discovery found = found_in(experiment::generate_campaign(design, 144));
   EXPECT_LT(found.base.campaign.front().value, 0.6 * design.patch.mu) << "of the base";
-  const AcceptedEffect* pads = named(found, "contact.pad_compliance");
-  ASSERT_NE(pads, nullptr) << to_string(found.verdict);
-  EXPECT_NEAR(pads->parameters.front().value, kCompliance, 3 * pads->parameters.front().sigma);
+  support::expect_size(found, "contact.pad_compliance", kCompliance);
 }
 
 // Below what one reading of the sensor tells, an error that repetitions share is nobody's concern.

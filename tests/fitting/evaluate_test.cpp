@@ -1,22 +1,21 @@
+// Predictions with their uncertainty, cards and what they vouch for, advice.
 #include "fitting/evaluate.hpp"
 
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 
 #include "fitting/advice.hpp"
 #include "fitting/card.hpp"
 #include "fitting/distributions.hpp"
+#include "tests/support/scratch.hpp"
 #include "tests/support/small_campaign.hpp"
 
 namespace unhand::fitting {
 namespace {
 
 using testing::HasSubstr;
-namespace fs = std::filesystem;
 
 const datasets::ThrowLog& log_of_disc() {
   static const auto log =
@@ -88,12 +87,33 @@ TEST(Evaluate, AFitOfAnotherProblemAndNoAnswerAreRefused) {
   EXPECT_THROW(disc_fit().correlation(0, 2), std::out_of_range);
 }
 
+// The friction of each throw is the campaign's times 1 + its own deviation, which the next throw's is drawn
+// from: what that is worth where it lands is added to the variance.
 TEST(Evaluate, OwnSpreadAddsUncertainty) {
+  constexpr double kSpread = 0.02, kStep = 1e-3;
   const FitResult sure = sure_but_for(0, 1e-6);
-  FitResult scattered = sure;
-  scattered.own_spread[2] = 0.02;  // mu_deviation
-  const auto a = predict_some(disc(), sure, {4}), b = predict_some(disc(), scattered, {4});
-  EXPECT_GT(b[0].sigma->landing_x, 10 * a[0].sigma->landing_x);
+  ASSERT_EQ(disc().own()[2].name, "mu_deviation");
+  ASSERT_EQ(sure.campaign[0].unknown.name, "mu");
+  FitResult scattered = sure, above = sure, below = sure;
+  scattered.own_spread[2] = kSpread;
+  above.campaign[0].value *= 1 + kStep;
+  below.campaign[0].value *= 1 - kStep;
+  for (const std::size_t i : {0, 4, 7}) {
+    const auto a = predict_some(disc(), sure, {i}), b = predict_some(disc(), scattered, {i});
+    const auto up = predict_some(disc(), above, {i}), down = predict_some(disc(), below, {i});
+    ASSERT_TRUE(a[0].sigma && b[0].sigma);
+    const auto expect = [&](double difference, double without, double with, double least) {
+      const double worth = kSpread * std::abs(difference) / (2 * kStep);
+      EXPECT_NEAR(with, std::hypot(without, worth), 0.02 * with + least) << "throw " << i;
+      EXPECT_GT(with, 10 * without) << "throw " << i;
+    };
+    const auto &p = up[0].comparison.prediction, &m = down[0].comparison.prediction;
+    expect(p.landing.pose.x - m.landing.pose.x, a[0].sigma->landing_x, b[0].sigma->landing_x, 1e-6);
+    expect(p.landing.pose.theta - m.landing.pose.theta, a[0].sigma->landing_theta, b[0].sigma->landing_theta,
+           1e-5);
+    expect(p.detach.twist.omega - m.detach.twist.omega, a[0].sigma->detach_omega, b[0].sigma->detach_omega,
+           1e-5);
+  }
 }
 
 TEST(Evaluate, TwistErrorsOfTheBaseModelAreThoseOfCompare) {
@@ -233,11 +253,11 @@ TEST(Card, ARangeWithoutWidthIsNoEquality) {
 }
 
 TEST(Card, ChecksumIsTheDocumentedOne) {
-  const fs::path file = fs::temp_directory_path() / ("unhand_checksum_" + std::to_string(getpid()));
+  const unhand::support::Scratch scratch;
+  const std::string file = scratch / "foobar";
   std::ofstream(file) << "foobar";
   EXPECT_EQ(checksum_of(file), "fnv1a64:85944171f73967e8");  // the test vector of FNV's authors
-  fs::remove(file);
-  EXPECT_FALSE(checksum_of(file));
+  EXPECT_FALSE(checksum_of(scratch / "none"));
 }
 
 TEST(Advice, NamesWhatWouldFixIt) {

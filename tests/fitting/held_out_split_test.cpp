@@ -1,3 +1,4 @@
+// Which throws are held out where a log does not say.
 #include "fitting/discovery/held_out_split.hpp"
 
 #include <gtest/gtest.h>

@@ -31,7 +31,10 @@ TEST(ScatterCovariance, OfAMeanIsTheTextbooks) {
 }
 
 TEST(ScatterCovariance, UnequalSharesLeaveFewerDegrees) {
-  // One throw that holds as much as all others: its residual is half followed, and it speaks for few.
+  // One throw that holds as much as all others: its residual is half followed, and it speaks for few. As
+  // Satterthwaite counts: of a sum of squares of normal numbers with covariance B, (tr B)² / tr B². The
+  // residual of a weighted mean from a throw of the share h has the variance (1 − h) of that throw's noise,
+  // by which its square is enlarged, and residuals of two throws covary.
   NormalEquations equations;
   equations.information = Eigen::MatrixXd::Constant(1, 1, 20);
   for (int i = 0; i < 11; ++i) {
@@ -41,8 +44,14 @@ TEST(ScatterCovariance, UnequalSharesLeaveFewerDegrees) {
     part.information = Eigen::MatrixXd::Constant(1, 1, share);
     equations.throws.push_back(part);
   }
+  Eigen::VectorXd share = Eigen::VectorXd::Constant(11, 1 / 20.0);
+  share[0] = 10 / 20.0;
+  Eigen::MatrixXd B(11, 11);
+  for (int i = 0; i < 11; ++i)
+    for (int j = 0; j < 11; ++j)
+      B(i, j) = share[i] * ((i == j) - share[j]) / std::sqrt((1 - share[i]) * (1 - share[j]));
   const auto found = scatter_covariance(equations, Eigen::MatrixXd::Zero(1, 1));
-  EXPECT_LT(found.degrees_of_freedom[0], 5);
+  EXPECT_NEAR(found.degrees_of_freedom[0], std::pow(B.trace(), 2) / (B * B).trace(), 1e-9);
 }
 
 TEST(ScatterCovariance, ThrowsThatAgreeTooWellAreNotQuiteBelieved) {

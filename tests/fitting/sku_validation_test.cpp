@@ -1,3 +1,4 @@
+// Whether an object that nobody has thrown can be: derivatives, Monte Carlo, and what is assumed.
 #include "fitting/sku/sku_validation.hpp"
 
 #include <gmock/gmock.h>
@@ -12,6 +13,7 @@
 #include "experiment/outcome_slopes.hpp"
 #include "experiment/reference_throw.hpp"
 #include "fitting/card.hpp"
+#include "tests/support/scratch.hpp"
 #include "tests/support/small_campaign.hpp"
 
 namespace unhand::fitting {
@@ -173,7 +175,6 @@ TEST(SkuValidation, DrawsThatTheGripLosesAreNoCurvature) {
   EXPECT_THAT(answer.disagreement, testing::Not(HasSubstr("not linear")));
 }
 
-// A rigid carriage is sure of an object that turns in the pads, and wrong.
 // A log without a normal force knows the product of friction and grip force, and neither of them: the landing
 // scatters as with a card that knows the force and has the product's spread on its friction.
 TEST(SkuValidation, FrictionAndForceScatterAsTheirProductDoes) {
@@ -201,6 +202,7 @@ TEST(SkuValidation, FrictionAndForceScatterAsTheirProductDoes) {
   EXPECT_THAT(b.disagreement, Not(HasSubstr("believe the Monte Carlo")));
 }
 
+// A rigid carriage is sure of an object that turns in the pads, and wrong.
 TEST(SkuValidation, APureDelayCannotVouchForAnObjectOnALever) {
   datasets::ModelCard delay;
   delay.model = "gripper_delay";
@@ -296,12 +298,13 @@ TEST(SkuValidation, ItsOwnLogConfirmsACardByTheHeldOutThrowsAlone) {
   auto design = testing_support::small_design("limit_surface_disc");
   design.objects = {experiment::loaded_bar("bar-com100", 0.10)};
   const auto log = experiment::generate_campaign(design, 5);
-  const auto file = std::filesystem::temp_directory_path() / "unhand_sku_own_log.h5";
+  const unhand::support::Scratch scratch;
+  const std::string file = scratch / "own.h5";
   datasets::write_throw_log(file, log);
   auto gripper = card();
   auto request = quick(100);
   request.log = &log;
-  request.log_file = file.string();
+  request.log_file = file;
   const auto test =
       static_cast<std::size_t>(std::count_if(log.throws.begin(), log.throws.end(), [](const auto& one) {
         return one.split == datasets::Split::test;
@@ -309,7 +312,6 @@ TEST(SkuValidation, ItsOwnLogConfirmsACardByTheHeldOutThrowsAlone) {
   const auto other = validate_sku(bar(), gripper, "card.json", request);
   gripper.log.checksum = checksum_of(file);
   const auto own = validate_sku(bar(), gripper, "card.json", request);
-  std::filesystem::remove(file);
   ASSERT_TRUE(other.measured);
   EXPECT_EQ(other.measured->throws.size(), log.throws.size());
   EXPECT_FALSE(other.measured->held_out);

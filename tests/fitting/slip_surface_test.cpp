@@ -1,3 +1,4 @@
+// Limit surfaces fitted to slips.
 #include "fitting/slips/slip_surface.hpp"
 
 #include <gmock/gmock.h>

@@ -429,14 +429,57 @@ TEST(Separating, ALawIsToldFromAnEffectByExperiments) {
       if (other == std::string(kLaw) + law) continue;
       const auto experiments = separating_experiments(stage, accepted, other, options);
       ASSERT_FALSE(experiments.empty()) << law << " against " << other;
+      if (experiments.front().before > 0) {
+        EXPECT_LT(experiments.front().after, experiments.front().before) << law << " against " << other;
+      }
+      double last = 0;  // the most telling first
       for (const auto& e : experiments) {
+        EXPECT_EQ(e.before, experiments.front().before) << "of one log";
         EXPECT_GE(e.before, 0);
         EXPECT_LE(e.before, 1);
+        EXPECT_GE(e.after, last) << e.what;
         EXPECT_LE(e.after, 1);
         EXPECT_EQ(e.separates, e.after < options.equivalent);
+        last = e.after;
       }
     }
   }
+}
+
+// What an experiment would bring is what the log says once it has been made: ten more throws of one object,
+// moved as the other was, which the design's campaigns have.
+TEST(Separating, AnExperimentBringsWhatItPromised) {
+  experiment::CampaignDesign design = support::loop_design();
+  design.effects = {{"sensor.mocap_time_offset.offset", 0.004}};
+  DiscoverOptions options;
+  options.campaign.model = "limit_surface_disc";
+  options.campaign.effects = {"sensor.mocap_time_offset"};
+  options.campaign.integrator.tolerances = {1e-5, 1e-8};
+  AcceptedEffect accepted;
+  accepted.id = "sensor.mocap_time_offset";
+  const auto asked = [&](const datasets::ThrowLog& log) {
+    Stage stage{CampaignProblem(log, "synthetic", options.campaign), {}, {}, options.campaign.effects};
+    EXPECT_TRUE(solve_train(stage, options, {}));
+    return separating_experiments(stage, accepted, "sensor.length_scale", options);
+  };
+  datasets::ThrowLog log = experiment::generate_campaign(design, 3);
+  const auto experiments = asked(log);
+  const std::string words = "10 throws of bar-com100 moved as bar-com160, condition bar-com160/";
+  const auto promise = std::find_if(experiments.begin(), experiments.end(),
+                                    [&](const auto& e) { return e.what.starts_with(words); });
+  ASSERT_NE(promise, experiments.end());
+  ASSERT_LT(promise->after, 0.7 * promise->before);
+  const std::string condition = "bar-com100/" + promise->what.substr(words.size());
+  std::erase_if(log.throws, [&](const auto& one) { return one.condition == condition; });
+  design.repetitions = 10;
+  for (datasets::Throw& one : experiment::generate_campaign(design, 4).throws)
+    if (one.condition == condition) {
+      one.id = "more-" + one.id, one.split = datasets::Split::train;
+      log.throws.push_back(std::move(one));
+    }
+  const auto then = asked(log);
+  ASSERT_FALSE(then.empty());
+  EXPECT_NEAR(then.front().before, promise->after, 0.2 * (promise->before - promise->after));
 }
 
 // A drag and a wind that together pass for a third law of the air bend the motion in the hand; a mass that

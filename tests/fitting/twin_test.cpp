@@ -1,3 +1,4 @@
+// A campaign made again from a fit, and the error that a true model leaves.
 #include "fitting/discovery/twin.hpp"
 
 #include <gmock/gmock.h>

@@ -12,7 +12,7 @@
 namespace unhand::flight {
 namespace {
 
-using support::best_difference;
+using support::best_differences;
 
 using dynamics::Dual;
 using dynamics::independent;
@@ -215,16 +215,21 @@ TEST(FreeRotation, DerivativesByOmegaAndInertia) {
     std::array<Dual, 6> seeded;
     for (int k = 0; k < 6; ++k) seeded[k] = independent(p[k], k);
     const auto y = end(seeded);
-    for (int k = 0; k < 6; ++k)
-      for (int i = 0; i < 7; ++i) {
-        const auto f = [&](double value) {
-          std::array<Dual, 6> x;
-          for (int j = 0; j < 6; ++j) x[j] = Dual(j == k ? value : p[j]);
-          return end(x)[i].a;
-        };
-        // The bottom of the V: truncation of order 10 step², noise of the steps' choice 1e-12 over the step.
-        EXPECT_LT(best_difference(f, p[k], y[i].v[k]), 5e-7) << "parameter " << k << " component " << i;
-      }
+    for (int k = 0; k < 6; ++k) {
+      const auto f = [&](double value) {
+        std::array<Dual, 6> x;
+        for (int j = 0; j < 6; ++j) x[j] = Dual(j == k ? value : p[j]);
+        const auto turned = end(x);
+        std::array<double, 7> out;
+        for (std::size_t i = 0; i < 7; ++i) out[i] = turned[i].a;
+        return out;
+      };
+      std::array<double, 7> derivative;
+      for (std::size_t i = 0; i < 7; ++i) derivative[i] = y[i].v[k];
+      // The bottom of the V: truncation of order 10 step², noise of the steps' choice 1e-12 over the step.
+      const auto off = best_differences<7>(f, p[k], derivative);
+      for (std::size_t i = 0; i < 7; ++i) EXPECT_LT(off[i], 5e-7) << "parameter " << k << " component " << i;
+    }
   }
 }
 

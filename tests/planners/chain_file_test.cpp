@@ -3,7 +3,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <numbers>
@@ -11,6 +10,7 @@
 
 #include "datasets/log_error.hpp"
 #include "planners/arm/dynamics.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace unhand::planners {
 namespace {
@@ -20,14 +20,12 @@ using Joints = JointVector<double>;
 
 class ChainFile : public testing::Test {
  protected:
-  ChainFile() { std::filesystem::create_directories(folder); }
-  ~ChainFile() override { std::filesystem::remove_all(folder); }
   std::string put(const std::string& name, const std::string& text) const {
     std::ofstream(folder / name) << text;
     return (folder / name).string();
   }
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / ("unhand_chain_" + std::to_string(getpid()));
+  const support::Scratch scratch;
+  const std::filesystem::path folder = scratch.path();
 };
 
 /// Two links of 0.5 and 0.4 m in the x-z plane, each with its mass halfway. With the axes −y the angles are

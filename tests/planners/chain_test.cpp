@@ -27,12 +27,16 @@ Inertia odd_payload() { return {0.9, {0.03, -0.02, 0.09}, symmetric(2e-3, 3e-3, 
 std::vector<Chain> arms() {
   std::vector<Chain> out{panda(), with_payload(panda(), odd_payload())};
   std::mt19937_64 random(11);
-  std::uniform_real_distribution<double> length(-0.5, 0.5), angle(-3, 3), mass(0.1, 5), width(0.02, 0.2);
+  std::uniform_real_distribution<double> length(-0.5, 0.5), mass(0.1, 5), width(0.02, 0.2);
+  std::normal_distribution<double> normal;
   for (const int n : {1, 3, 8}) {
     Chain arm{"random", {}, {}};
     const auto frame = [&] {
-      return Transform<double>{Eigen::Quaterniond::UnitRandom().toRotationMatrix(),
-                               {length(random), length(random), length(random)}};
+      Eigen::Quaterniond turned;
+      for (int k = 0; k < 4; ++k) turned.coeffs()[k] = normal(random);
+      Transform<double> there{turned.normalized().toRotationMatrix(), {}};
+      for (int k = 0; k < 3; ++k) there.p[k] = length(random);
+      return there;
     };
     for (int i = 0; i < n; ++i) {
       const double a = width(random), b = width(random), c = width(random), m = mass(random);

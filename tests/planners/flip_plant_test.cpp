@@ -12,6 +12,7 @@
 #include "planners/flip/forecast.hpp"
 #include "planners/flip/session.hpp"
 #include "tests/planners/flip_robot.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace unhand::planners::flip {
 namespace {
@@ -288,7 +289,8 @@ TEST(FlipBar, ComplaintNamesTheNumber) {
 }
 
 TEST(FlipRobotFile, TellsWhatIsWrong) {
-  const auto path = std::filesystem::temp_directory_path() / "flip_robot_test.toml";
+  const support::Scratch scratch;
+  const auto path = scratch.path() / "robot.toml";
   const auto refusal = [&](const std::string& from, const std::string& to) -> std::string {
     std::string text(built_in_robot());
     const auto at = text.find(from);
@@ -314,22 +316,21 @@ TEST(FlipRobotFile, TellsWhatIsWrong) {
   EXPECT_NE(refusal("pads = 2", "pads = 2\nkappa = 1").find("is of limit_surface_quartic"),
             std::string::npos);
   // Arms of seven joints that move, but not by torques.
-  const auto arm = path.parent_path() / "flip_arm_test.toml";
+  const auto arm = scratch.path() / "seven.toml";
   for (const auto& [joint, why] :
        {std::pair{"mass_kg = 1", "no limit of its torque"}, {"torque_n_m = 50", "too light for joint"}}) {
     std::string text = "name = \"seven\"\n";
     for (int i = 0; i < 7; ++i)
       text += fmt::format("[[joint]]\nname = \"j{}\"\na_m = 0.1\nalpha_deg = 90\n{}\n", i, joint);
     std::ofstream(arm) << text;
-    EXPECT_NE(refusal("arm = \"panda\"", "arm = \"flip_arm_test.toml\"").find(why), std::string::npos)
-        << refusal("arm = \"panda\"", "arm = \"flip_arm_test.toml\"");
+    EXPECT_NE(refusal("arm = \"panda\"", "arm = \"seven.toml\"").find(why), std::string::npos)
+        << refusal("arm = \"panda\"", "arm = \"seven.toml\"");
   }
-  std::filesystem::remove(arm);
-  std::filesystem::remove(path);
 }
 
 TEST(FlipRobotFile, SaysTheShapeOfTheQuartic) {
-  const auto path = std::filesystem::temp_directory_path() / "flip_robot_quartic_test.toml";
+  const support::Scratch scratch;
+  const auto path = scratch.path() / "robot.toml";
   const auto with = [&](const std::string& kappa) {
     std::string text(built_in_robot());
     const std::string disc = "law = \"limit_surface_disc\"";
@@ -352,7 +353,6 @@ TEST(FlipRobotFile, SaysTheShapeOfTheQuartic) {
   EXPECT_GT(std::abs(lands[0] - lands[1]), 1e-3);  // rad: the shape counts
   EXPECT_THROW(with("kappa = 3.1"), datasets::TomlError);
   EXPECT_THROW(with("kappa = -0.1"), datasets::TomlError);
-  std::filesystem::remove(path);
 }
 
 }  // namespace

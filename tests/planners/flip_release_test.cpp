@@ -129,7 +129,8 @@ TEST(ReleaseFit, CardComesBackAsItWasWritten) {
   fit.covariance.diagonal() << std::pow(fit.card.mu.sigma, 2), 9e-8, std::pow(fit.card.dead_time.sigma, 2),
       std::pow(fit.card.opening_time.sigma, 2);
   fit.degrees_of_freedom = {5, 6, 7, HUGE_VAL};
-  const std::string text = datasets::to_json(model_card_of(fit, library(), {}, "robot.toml"));
+  const HandLibrary small(robot(), robot().bar, 2);  // the bar is all that is asked of it
+  const std::string text = datasets::to_json(model_card_of(fit, small, {}, "robot.toml"));
   const datasets::ModelCard card = datasets::parse_model_card(text);
   EXPECT_EQ(card.covariance->names, (std::vector<std::string>{"mu", "length", "dead_time", "opening_time"}));
   EXPECT_EQ(card.parameters.at("length").degrees_of_freedom, 6);
@@ -236,8 +237,8 @@ TEST(ReleaseLearner, ForecastsAreAboutAsSureAsTheyMayBe) {
                std::pow((seen[0].landing.angle - said->mean.angle) / sa, 2);
     n += 2;
   }
-  EXPECT_GT(squares / n, 0.05);
-  EXPECT_LT(squares / n, 3.0);  // χ² of 12 exceeds 2.7 per degree once in a thousand
+  EXPECT_GT(squares / n, 0.18);  // χ² of 12 is below this, and above the next, once in a thousand
+  EXPECT_LT(squares / n, 2.75);
 }
 
 TEST(HandLibrary, AnswersForItsOwnMeshOnly) {

@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "planners/elastic/throw_refinement.hpp"
 #include "planners/elastic/throw_table.hpp"
@@ -75,6 +76,7 @@ TEST(ElasticThrow, WithoutAPlanIsNothing) {
 }
 
 TEST(ElasticThrow, TheIntegratorAgreesAndNoLimitIsExceeded) {
+  std::map<Drive, double> speed;
   for (const Drive drive : {Drive::clutched, Drive::series, Drive::rigid}) {
     const ElasticThrow plan = planned(drive, 12);
     ASSERT_TRUE(plan.solved()) << to_string(drive);
@@ -87,11 +89,9 @@ TEST(ElasticThrow, TheIntegratorAgreesAndNoLimitIsExceeded) {
     EXPECT_LE(run.use.largest(), 1) << to_string(drive);
     EXPECT_NEAR(run.unexplained(), 0, 1e-6 * std::abs(run.motor_work)) << to_string(drive);
     EXPECT_NEAR(plan.release.vz / plan.release.vx, 1, 1e-6);  // thrown at 45 degrees
+    speed[drive] = plan.speed();
   }
-}
-
-TEST(ElasticThrow, TheSpringLetGoIsFasterThanTheRigidJoint) {
-  EXPECT_GT(planned(Drive::clutched, 10).speed(), 1.05 * planned(Drive::rigid, 10).speed());
+  EXPECT_GT(speed[Drive::clutched], 1.05 * speed[Drive::rigid]) << "the spring that is let go is faster";
 }
 
 TEST(ElasticThrow, ASpringInTheWristIsFasterThanNone) {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 
 #include "experiment/campaign_effects.hpp"
 #include "experiment/synthetic_campaign.hpp"
@@ -27,11 +26,6 @@ inline experiment::EffectSettings typical(const dynamics::Effect& effect, double
   for (const auto& p : effect.parameters)
     out[effect.full_name(p)] = p.is_shape() ? p.grid.back() : p.neutral + size * p.typical;
   return out;
-}
-
-/// Effects that this law may not know yet: then the throw is as without them.
-inline bool is_optional(const std::string& id) {
-  return id == "contact.pressure_profile" || id == "contact.pad_compliance";
 }
 
 }  // namespace unhand::testing_support

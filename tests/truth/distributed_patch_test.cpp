@@ -116,7 +116,6 @@ TEST(DistributedPatch, ThrowsOfTheExactDiscAreTheLimitOfManyPoints) {
   EXPECT_GT(coarse / medium, 3);
   EXPECT_GT(medium / fine, 3);
   EXPECT_LT(fine, 6e-5);  // m/s, on throws of some 2 m/s
-  std::printf("27 points %.2e, 108 points %.2e, 432 points %.2e m/s\n", coarse, medium, fine);
 }
 
 TEST(DistributedPatch, StepsAndBristlesDoNotMatter) {
