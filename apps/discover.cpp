@@ -254,7 +254,9 @@ std::string discovery_text(const Discovery& found, const std::string& log, const
   if (const std::string note = gain_text(found.effects); !note.empty()) out += "\n" + note + "\n";
   for (const auto& id : found.along) out += fmt::format("\n{}\n", along_text(id));
   if (found.small) out += fmt::format("\n{}\n", small_text(*found.small));
-  if (found.unexplained) out += fmt::format("\nunexplained: {}\n", found.unexplained->description);
+  if (found.unexplained)
+    out +=
+        fmt::format("\nunexplained: {}\n", unexplained_text(found.effects, found.unexplained->description));
   if (const std::string note = held_out_text(found); !note.empty()) out += "\n" + note + "\n";
   return out + "\n" + prediction_errors(found).text() + fmt::format("\n{:.1f} s\n", found.seconds);
 }

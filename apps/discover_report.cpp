@@ -233,7 +233,8 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
   for (const auto& id : found.along) answer += fmt::format("<p>{}.</p>\n", escaped(along_text(id)));
   if (found.small) answer += fmt::format("<p>{}.</p>\n", escaped(small_text(*found.small)));
   if (found.unexplained)
-    answer += fmt::format("<p><b>Unexplained:</b> {}.</p>\n", escaped(found.unexplained->description));
+    answer += fmt::format("<p><b>Unexplained:</b> {}.</p>\n",
+                          escaped(unexplained_text(found.effects, found.unexplained->description)));
   if (estimated) answer += picture("missing");
   if (found.effects.empty() && !found.unexplained)
     answer += "<p>Nothing that the data show is missing in the model.</p>\n";

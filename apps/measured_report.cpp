@@ -165,7 +165,9 @@ std::string measured_text(const MeasuredResult& result) {
       fmt::format("{}: {}\n{}\n{}, base model {}, {}\n{}\n", result.log, to_string(found.verdict),
                   result.origin, found.kind, found.model, split_text(result), first_text(found));
   for (const auto& effect : found.effects) out += effect_text(effect);
-  if (found.unexplained) out += fmt::format("\nunexplained: {}\n", found.unexplained->description);
+  if (found.unexplained)
+    out +=
+        fmt::format("\nunexplained: {}\n", unexplained_text(found.effects, found.unexplained->description));
   for (const auto& e : found.evidence)
     out += fmt::format("\n{} {}{}{}\n", e.against ? "against:" : "note:", e.about,
                        e.about.empty() ? "" : ": ", e.text);
@@ -194,7 +196,8 @@ void write_measured_report(const MeasuredResult& result, const Json& json,
       if (id == effect.id) answer += fmt::format("<p>What would separate them: {}.</p>\n", escaped(text));
   }
   if (found.unexplained)
-    answer += fmt::format("<p><b>Unexplained:</b> {}.</p>\n", escaped(found.unexplained->description));
+    answer += fmt::format("<p><b>Unexplained:</b> {}.</p>\n",
+                          escaped(unexplained_text(found.effects, found.unexplained->description)));
   if (found.effects.empty() && !found.unexplained)
     answer += "<p>Nothing that the data show is missing in the model.</p>\n";
   for (const bool against : {true, false}) {

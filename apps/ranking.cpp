@@ -141,6 +141,13 @@ std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects) {
       mass->value);
 }
 
+std::string unexplained_text(std::span<const fitting::AcceptedEffect> effects,
+                             const std::string& description) {
+  if (effects.empty()) return description;
+  return description +
+         ". The intervals of what was found allow for noise, not for this: it may bend the sizes by more";
+}
+
 std::string effect_html(const fitting::AcceptedEffect& effect) {
   std::string out = fmt::format("<h3>{}</h3><p>", escaped(effect.id));
   for (const auto& p : effect.parameters) {

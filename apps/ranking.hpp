@@ -42,7 +42,11 @@ std::string held_out_text(const fitting::Discovery& found);
 /// Where mass and inertia are off by the same ratio: that it may be a gain of the wrench. Else empty.
 std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects);
 
-/// The same as HTML, with what would separate it from its other names.
+/// What is unexplained, with what that means for the sizes of what was found.
+std::string unexplained_text(std::span<const fitting::AcceptedEffect> effects,
+                             const std::string& description);
+
+/// An accepted effect as HTML, with what would separate it from its other names.
 std::string effect_html(const fitting::AcceptedEffect& effect);
 
 /// Styles of the base model's residuals and of the answer's.
