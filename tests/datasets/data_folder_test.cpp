@@ -1,6 +1,5 @@
 // The data folder (UNHAND_DATA), when there is one: its logs are read, and come back the same.
-#include <cstdlib>
-
+#include "tests/support/data_folder.hpp"
 #include "datasets/assemble.hpp"
 #include "datasets/import_cube_tosses.hpp"
 #include "datasets/import_phyphox.hpp"
@@ -11,18 +10,6 @@ namespace unhand::datasets::test {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// The path of something in the data folder, or nothing, with `missing` saying what to set or add.
-std::string in_data_folder(const std::string& name, std::string& missing) {
-  const char* folder = std::getenv("UNHAND_DATA");
-  if (folder == nullptr || *folder == '\0') {
-    missing = "UNHAND_DATA is not set: no data folder to take " + name + " from";
-    return {};
-  }
-  const fs::path path = fs::path(folder) / name;
-  if (!fs::exists(path)) missing = "the data folder has no " + name;
-  return path.string();
-}
 
 void expect_round_trip(const std::string& file) {
   const Scratch scratch;
@@ -40,8 +27,7 @@ void expect_round_trip(const std::string& file) {
 }
 
 TEST(DataFolder, Batch180) {
-  std::string missing;
-  const std::string file = in_data_folder("batch180.h5", missing);
+  const auto [file, missing] = support::from_data_folder("batch180.h5");
   if (!missing.empty()) GTEST_SKIP() << missing;
   expect_round_trip(file);
   const LogSummary s = summarise(read_throw_log(file));
@@ -51,8 +37,7 @@ TEST(DataFolder, Batch180) {
 }
 
 TEST(DataFolder, PracticeLogs) {
-  std::string missing;
-  const std::string folder = in_data_folder("practice", missing);
+  const auto [folder, missing] = support::from_data_folder("practice");
   if (!missing.empty()) GTEST_SKIP() << missing;
   int logs = 0;
   for (const auto& entry : fs::directory_iterator(folder)) {
@@ -64,8 +49,7 @@ TEST(DataFolder, PracticeLogs) {
 }
 
 TEST(DataFolder, CubeTosses) {
-  std::string missing;
-  const std::string file = in_data_folder("measured/cube_tosses/cube_tosses.csv", missing);
+  const auto [file, missing] = support::from_data_folder("measured/cube_tosses/cube_tosses.csv");
   if (!missing.empty()) GTEST_SKIP() << missing;
   ImportReport report;
   const ThrowLog log = import_cube_tosses(file, {}, &report);
@@ -83,8 +67,7 @@ TEST(DataFolder, CubeTosses) {
 // part, of variance 20 σ² (1 + 9 + 9 + 1). Within a factor of two, since slow errors are in the one and not
 // in the other.
 TEST(DataFolder, CubeTossNoiseIsAsDeclared) {
-  std::string missing;
-  const std::string file = in_data_folder("measured/cube_tosses/cube_tosses.csv", missing);
+  const auto [file, missing] = support::from_data_folder("measured/cube_tosses/cube_tosses.csv");
   if (!missing.empty()) GTEST_SKIP() << missing;
   double sum = 0;
   std::size_t n = 0;
@@ -104,8 +87,7 @@ TEST(DataFolder, CubeTossNoiseIsAsDeclared) {
 // 22 drops, 15 throws upwards and 3 drops on edge: one free fall in each recording, and none in the phone at
 // rest.
 TEST(DataFolder, FallingSmartphone) {
-  std::string missing;
-  const fs::path folder = in_data_folder("measured/falling_smartphone", missing);
+  const auto [folder, missing] = support::from_data_folder("measured/falling_smartphone");
   if (!missing.empty()) GTEST_SKIP() << missing;
   int recordings = 0;
   const auto expect_one_fall = [&](const fs::path& file, double shortest, double longest) {

@@ -6,8 +6,6 @@
 
 #include <Eigen/Dense>
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
 #include <numbers>
 #include <random>
 
@@ -15,6 +13,7 @@
 #include "flight/fly.hpp"
 #include "flight/spatial_flight.hpp"
 #include "free_flight_campaigns.hpp"
+#include "tests/support/data_folder.hpp"
 
 namespace unhand::experiment {
 namespace {
@@ -278,11 +277,8 @@ TEST(FreeFlight, TheAnswerDoesNotDependOnThreads) {
 /// Tosses of a cube, measured. The bounds are what a tracker and still air leave: not numbers that were
 /// fitted.
 TEST(FreeFlightMeasured, CubeTosses) {
-  const char* folder = std::getenv("UNHAND_DATA");
-  if (folder == nullptr) GTEST_SKIP() << "UNHAND_DATA does not name the data folder";
-  const std::filesystem::path csv = std::filesystem::path(folder) / "measured/cube_tosses/cube_tosses.csv";
-  if (!std::filesystem::exists(csv))
-    GTEST_SKIP() << "the data folder (UNHAND_DATA) has no measured/cube_tosses/cube_tosses.csv";
+  const auto [csv, missing] = unhand::support::from_data_folder("measured/cube_tosses/cube_tosses.csv");
+  if (!missing.empty()) GTEST_SKIP() << missing;
   datasets::ImportReport report;
   const ThrowLog log = datasets::import_cube_tosses(csv, {}, &report);
   const std::vector<std::string> names{"projectile"};

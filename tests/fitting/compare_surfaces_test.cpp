@@ -4,11 +4,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 
 #include "datasets/import_planar_pushes.hpp"
 #include "slip_simulator.hpp"
+#include "tests/support/data_folder.hpp"
 
 namespace unhand::fitting::test {
 namespace {
@@ -65,12 +65,9 @@ TEST(CompareSurfaces, SaysWhichSurfaceHasTooLittle) {
 }
 
 TEST(CompareSurfaces, MeasuredPlanarPushes) {
-  const char* folder = std::getenv("UNHAND_DATA");
-  if (folder == nullptr || *folder == '\0')
-    GTEST_SKIP() << "UNHAND_DATA is not set: no data folder to take measured/planar_pushes from";
-  const std::filesystem::path pushes = std::filesystem::path(folder) / "measured" / "planar_pushes";
-  if (!std::filesystem::exists(pushes)) GTEST_SKIP() << "the data folder has no measured/planar_pushes";
-  const auto log = datasets::import_planar_pushes(std::vector{pushes});
+  const auto [pushes, missing] = unhand::support::from_data_folder("measured/planar_pushes");
+  if (!missing.empty()) GTEST_SKIP() << missing;
+  const auto log = datasets::import_planar_pushes(std::vector<std::filesystem::path>{pushes});
   ASSERT_EQ(log.surfaces.size(), 10U);
   std::vector<SlipSamples> slips;
   for (const auto& [name, surface] : log.surfaces) slips.push_back(slip_samples(name, surface));

@@ -6,8 +6,6 @@
 #include <atomic>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <filesystem>
 #include <utility>
 
 #include "datasets/import_cube_tosses.hpp"
@@ -16,6 +14,7 @@
 #include "fitting/measured/flight_discovery.hpp"
 #include "fitting/measured/measured_discovery.hpp"
 #include "fitting/measured/wild_groups.hpp"
+#include "tests/support/data_folder.hpp"
 #include "tests/support/spatial_flights.hpp"
 
 namespace unhand::fitting {
@@ -658,12 +657,8 @@ TEST(FlightDiscovery, SingleGlitchedFramesAreNoMisfit) {
 }
 
 TEST(FlightDiscovery, MeasuredCubeTosses) {
-  const char* folder = std::getenv("UNHAND_DATA");
-  if (folder == nullptr || *folder == '\0')
-    GTEST_SKIP() << "UNHAND_DATA is not set: no data folder to take measured/cube_tosses from";
-  const auto csv = std::filesystem::path(folder) / "measured" / "cube_tosses" / "cube_tosses.csv";
-  if (!std::filesystem::exists(csv))
-    GTEST_SKIP() << "the data folder has no measured/cube_tosses/cube_tosses.csv";
+  const auto [csv, missing] = unhand::support::from_data_folder("measured/cube_tosses/cube_tosses.csv");
+  if (!missing.empty()) GTEST_SKIP() << missing;
   auto log = datasets::import_cube_tosses(csv);
   // A third of the tosses says the same in a third of the time.
   std::vector<datasets::Throw> some;

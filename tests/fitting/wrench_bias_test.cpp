@@ -5,12 +5,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 
 #include "datasets/import_planar_pushes.hpp"
 #include "fitting/slips/surface_discovery.hpp"
 #include "slip_simulator.hpp"
+#include "tests/support/data_folder.hpp"
 
 namespace unhand::fitting::test {
 namespace {
@@ -110,12 +110,9 @@ TEST(WrenchBias, StandsBesideAnotherLaw) {
 }
 
 TEST(WrenchBias, MeasuredPushesHaveNoneButAnAddedOne) {
-  const char* folder = std::getenv("UNHAND_DATA");
-  if (folder == nullptr || *folder == '\0')
-    GTEST_SKIP() << "UNHAND_DATA is not set: no data folder to take measured/planar_pushes from";
-  const std::filesystem::path pushes = std::filesystem::path(folder) / "measured" / "planar_pushes";
-  if (!std::filesystem::exists(pushes)) GTEST_SKIP() << "the data folder has no measured/planar_pushes";
-  const auto log = datasets::import_planar_pushes(std::vector{pushes});
+  const auto [pushes, missing] = unhand::support::from_data_folder("measured/planar_pushes");
+  if (!missing.empty()) GTEST_SKIP() << missing;
+  const auto log = datasets::import_planar_pushes(std::vector<std::filesystem::path>{pushes});
   std::vector<SlipSamples> measured;
   for (const char* name : {"patch", "wood_patch"})
     measured.push_back(slip_samples(name, log.surfaces.at(name)));
