@@ -1,5 +1,6 @@
 #include "fitting/slips/wrench_bias.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>

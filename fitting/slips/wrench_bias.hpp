@@ -26,7 +26,9 @@ SlipSamples without_bias(SlipSamples slips, const Eigen::Vector3d& bias);
 std::vector<SlipSamples> without_bias(std::vector<SlipSamples> surfaces, const Eigen::Vector3d& bias);
 
 /// Bias and surfaces together: steps of Newton for the one, the others eliminated, and fits of the
-/// others (fit_surface, whose weights the steps have, too) in turn.
+/// others (fit_surface, whose weights the steps have, too) in turn, from `start` (as `value`) on. A step that
+/// goes back is cut to where the line through it and the one before is zero, and none is longer than a third
+/// of the mean force.
 WrenchBias fit_wrench_bias(const std::vector<SlipSamples>& surfaces, SurfaceModel model,
                            const Eigen::Vector3d& start = Eigen::Vector3d::Zero());
 
