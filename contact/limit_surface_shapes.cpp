@@ -36,13 +36,11 @@ Vec3<double> disc_resist(const Vec3<double>& u, Mat3* jacobian) {
 
 // The point of the disc's surface on a ray: (F, T̂) ∝ (p, q), T̂ = T/(2/3).
 struct RayPoint {
-  bool inner;     // ε ≤ 1
-  double t;       // ε if inner, else δ = 1/ε
-  double gauge;   // p/F = q/T̂
-  double slide;   // Φ
-  double dforce;  // dF/dt: F′(ε) if inner
-  double torque;  // T̂
-  double power;   // t-scaled dissipation: 1.5 ε F + T̂ if inner, else 1.5 F + δ T̂
+  bool inner;    // ε ≤ 1
+  double t;      // ε if inner, else δ = 1/ε
+  double gauge;  // p/F = q/T̂
+  double slide;  // Φ
+  double power;  // t-scaled dissipation: 1.5 ε F + T̂ if inner, else 1.5 F + δ T̂
 };
 
 // Solves h(t) = 0, h = F q − T̂ p if inner and T̂ p − F q if not, by Newton's method kept inside a bracket (h
@@ -63,21 +61,19 @@ RayPoint disc_ray(double p, double q, double accuracy) {
   double low = 0.0, high = 1.0;
   for (int iteration = 0; iteration < 50; ++iteration) {
     const DiscProfile at = disc_profile(t * t);
-    double force, h, dh, gain;
+    double force, torque, h, dh, gain;  // F, T̂; the equation and its slope; numerator of the gauge
     if (r.inner) {
       force = t * at.slide;
-      r.torque = 1.5 * at.spin;
-      r.dforce = at.slide + 2.0 * t * t * at.dslide;
-      r.power = 1.5 * t * force + r.torque;
-      h = force * q - r.torque * p;
-      dh = r.dforce * (q + 1.5 * t * p);
+      torque = 1.5 * at.spin;
+      r.power = 1.5 * t * force + torque;
+      h = force * q - torque * p;
+      dh = (at.slide + 2.0 * t * t * at.dslide) * (q + 1.5 * t * p);
       gain = 1.5 * t * p + q;
     } else {
       force = at.slide;
-      r.torque = 1.5 * t * at.arm;
-      r.dforce = 2.0 * t * at.dslide;
-      r.power = 1.5 * force + t * r.torque;
-      h = r.torque * p - force * q;
+      torque = 1.5 * t * at.arm;
+      r.power = 1.5 * force + t * torque;
+      h = torque * p - force * q;
       dh = -at.dslide * (3.0 * p + 2.0 * t * q);
       gain = 1.5 * p + t * q;
     }
@@ -89,13 +85,7 @@ RayPoint disc_ray(double p, double q, double accuracy) {
     if (std::abs(step) <= accuracy || iteration == 49) {
       r.gauge = (gain - 0.75 * h * step / r.power) / r.power;
       r.slide = at.slide + at.dslide * (next * next - t * t);
-      if (r.inner) {
-        r.torque -= 1.5 * t * r.dforce * step;
-        r.power += 1.5 * force * step;
-      } else {
-        r.torque -= 3.0 * at.dslide * step;
-        r.power += r.torque * step;
-      }
+      r.power += (r.inner ? 1.5 * force : torque - 3.0 * at.dslide * step) * step;
       break;
     }
     t = next;

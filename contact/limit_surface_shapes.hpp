@@ -79,10 +79,10 @@ struct Ellipsoid {
 ///   w_xz = −F(ε) u_xz/|u_xz|,  w_τ = −sgn(u_τ) T(ε)/(2/3),  ε = v/(|ω|R) = |u_xz|/(1.5 |u_τ|),
 /// F and T as in disc_friction.hpp.
 ///
-/// Everything is written so that nothing is divided by a part of u or w that may vanish. Second derivatives
-/// are closed: the power σ(u) = −resist(u)·u and the gauge depend on (|x_xz|, |x_τ|) and are homogeneous of
-/// degree 1, which leaves one curvature λ and the slope over |x_xz|; ∇resist = −∇²σ. Error of resist and
-/// gauge below 1e-14. Instantiated for double and Dual.
+/// Everything is written so that nothing is divided by a part of u or w that may vanish. Derivatives of
+/// resist are closed: ∇resist = −∇²σ, and the power σ(u) = −resist(u)·u depends on (|u_xz|, |u_τ|) and is
+/// homogeneous of degree 1, which leaves one curvature λ and the slope over |u_xz|. Error of resist and gauge
+/// below 1e-14. Instantiated for double and Dual.
 struct UniformDisc {
   static constexpr bool isotropic = true;              ///< round in the plane of sliding: needs no frame
   static constexpr const char* name = "uniform disc";  ///< as messages call it

@@ -38,8 +38,7 @@ struct Prediction {
   flight::FlightOutcome flight{flight::FlightOutcome::not_solved};  ///< how the flight ended
   release::DetachState<double> detach;                              ///< the CoM where the pads part
   flight::Landing<double> landing;                                  ///< of the CoM
-  int events{};  ///< events of the release, changes of mode or not; for limit_surface_naive, reversals of the
-                 ///< slip
+  int events{};           ///< of the release; for limit_surface_naive, reversals of the slip
   bool slips_at_start{};  ///< the grip cannot hold the object even before it opens
   /// Whether release and flight have an answer.
   bool landed() const {

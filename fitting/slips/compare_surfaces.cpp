@@ -8,14 +8,13 @@
 #include <numeric>
 #include <random>
 #include <stdexcept>
+#include <utility>
 
 #include "dynamics/median.hpp"
 #include "dynamics/parallel.hpp"
 
 namespace unhand::fitting {
 namespace {
-
-constexpr double degrees = 180 / std::numbers::pi;
 
 struct SlipCrossValidation {
   SurfaceOutcome outcome{SurfaceOutcome::fitted};
@@ -37,7 +36,7 @@ SlipCrossValidation cross_validate(const SlipSamples& slips, SurfaceModel model,
     }
     for (std::size_t i = 0; i < slips.samples.size(); ++i)
       if (slips.samples[i].slip % folds == fold)
-        out.errors_deg[i] = degrees * direction_error(fit.surface, slips.samples[i]);
+        out.errors_deg[i] = kDegreesPerRadian * direction_error(fit.surface, slips.samples[i]);
   }
   return out;
 }
@@ -62,6 +61,12 @@ const T& any_of(const std::vector<T>& values, std::mt19937_64& random) {
 }
 
 }  // namespace
+
+void SurfaceScore::set_errors(std::vector<double> deg) {
+  errors_deg = std::move(deg);
+  mean_deg = mean_of(errors_deg);
+  median_deg = dynamics::median(errors_deg);
+}
 
 SlipSamples simulate_slips(const SlipSamples& slips, const SurfaceFit& fit, std::uint64_t seed) {
   std::vector<double> angles, levels;
@@ -137,9 +142,7 @@ std::vector<std::vector<SurfaceScore>> compare_surfaces(const std::vector<SlipSa
       if (round > 0) {
         score.null_control_deg += mean_of(one.errors_deg) / static_cast<double>(draws);
       } else {
-        score.errors_deg = one.errors_deg;
-        score.mean_deg = mean_of(one.errors_deg);
-        score.median_deg = dynamics::median(one.errors_deg);
+        score.set_errors(one.errors_deg);
       }
     }
     out[pair / models.size()].push_back(std::move(score));

@@ -3,11 +3,15 @@
 
 #include <cstdint>
 #include <functional>
+#include <numbers>
 #include <vector>
 
 #include "fitting/slips/slip_surface.hpp"
 
 namespace unhand::fitting {
+
+/// For angles that are reported [°/rad].
+inline constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 
 /// How identified surfaces are cross-validated.
 struct SurfaceComparisonOptions {
@@ -32,6 +36,8 @@ struct SurfaceScore {
   double null_control_deg{};
   /// Whether there are errors to speak of.
   bool scored() const { return outcome == SurfaceOutcome::fitted; }
+  /// Takes the errors, with their mean and median.
+  void set_errors(std::vector<double> deg);
 };
 
 /// Every model on every surface, in that order. An error is the angle [deg] between predicted and measured

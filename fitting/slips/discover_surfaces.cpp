@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numbers>
 
 #include "fitting/clock.hpp"
 #include "fitting/distributions.hpp"
@@ -14,8 +13,6 @@
 
 namespace unhand::fitting {
 namespace {
-
-constexpr double kDegrees = 180 / std::numbers::pi;
 
 struct Paired {
   double n{}, sum{}, squares{};
@@ -78,7 +75,7 @@ Paired left_by(const SlipSamples& slips, const SlipSurface& surface, double& cor
 
 double in_sample(const SlipSamples& slips, const SlipSurface& surface) {
   double out = 0;
-  for (const auto& s : slips.samples) out += kDegrees * direction_error(surface, s);
+  for (const auto& s : slips.samples) out += kDegreesPerRadian * direction_error(surface, s);
   return slips.samples.empty() ? 0 : out / static_cast<double>(slips.samples.size());
 }
 
@@ -134,19 +131,29 @@ struct LawScore {
 
 using Scores = std::vector<std::vector<SurfaceScore>>;  // by surface, then model; the base is the first
 
+/// All laws on one set of wrenches, which of them is believed, and what there is to tell of that.
+struct Choice {
+  Scores scores;
+  std::vector<LawScore> laws;
+  std::size_t best{};  ///< of laws; 0 is the base
+  std::vector<SurfaceEvidence> evidence;
+  std::vector<Ranked> ranking;
+  std::vector<std::pair<std::string, std::string>> skipped;
+  int slips{};  ///< predicted
+};
+
 /// Every law of `models` beside the first one. Writes what was left out, and the evidence by surface.
 std::vector<LawScore> score_laws(const std::vector<SlipSamples>& surfaces,
-                                 const std::vector<SurfaceModel>& models, const Scores& scores,
-                                 SurfaceDiscovery& out) {
+                                 const std::vector<SurfaceModel>& models, const Scores& scores, Choice& out) {
   std::vector<LawScore> laws(models.size());
   for (std::size_t k = 0; k < laws.size(); ++k) laws[k].model = models[k];
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     const SurfaceScore& base = scores[i].front();
     for (const auto& score : scores[i])
       if (!score.scored())
-        out.answer.skipped.push_back({surfaces[i].surface + ", " + to_string(score.model), score.reason});
+        out.skipped.push_back({surfaces[i].surface + ", " + to_string(score.model), score.reason});
     if (!base.scored()) continue;
-    out.answer.test += static_cast<int>(surfaces[i].slips.size());
+    out.slips += static_cast<int>(surfaces[i].slips.size());
     for (std::size_t k = 0; k < laws.size(); ++k)
       if (scores[i][k].scored()) out.evidence.push_back(laws[k].add(surfaces[i], base, scores[i][k]));
   }
@@ -271,44 +278,29 @@ bool is_forgotten(const std::string& id, const SurfaceDiscoveryOptions& options)
   return std::find(options.forget.begin(), options.forget.end(), id) != options.forget.end();
 }
 
-/// All laws on one set of wrenches, and which of them is believed.
-struct Choice {
-  Scores scores;
-  std::vector<LawScore> laws;
-  std::size_t best{};  ///< of laws; 0 is the base
-};
-
-/// Writes the evidence, what was left out and the ranking.
-Choice choose_law(const std::vector<SlipSamples>& surfaces, const SurfaceDiscoveryOptions& options,
-                  SurfaceDiscovery& out) {
+Choice choose_law(const std::vector<SlipSamples>& surfaces, const SurfaceDiscoveryOptions& options) {
   std::vector<SurfaceModel> models{options.base};
   for (const SurfaceModel model : surface_models)
     if (model != options.base && !is_forgotten(id_of(model), options)) models.push_back(model);
   Choice choice;
   choice.scores = compare_surfaces(surfaces, models, options.comparison);
-  choice.laws = score_laws(surfaces, models, choice.scores, out);
-  choice.best = believed(choice.laws, options, out.answer.ranking);
+  choice.laws = score_laws(surfaces, models, choice.scores, choice);
+  choice.best = believed(choice.laws, options, choice.ranking);
   return choice;
 }
 
 /// Which law it is shows when the bias is gone: where that is another one, the bias beside it takes the place
 /// of the one before if less is left.
-void choose_again(const std::vector<SlipSamples>& surfaces, const Scores& measured,
-                  const SurfaceDiscoveryOptions& options, BiasTrial& bias, Choice& choice,
-                  SurfaceDiscovery& out) {
-  SurfaceDiscovery other;
-  other.answer.kind = out.answer.kind, other.answer.model = out.answer.model;
-  other.answer.phase = out.answer.phase;
-  Choice unbiased = choose_law(without_bias(surfaces, bias.whole.value), options, other);
-  if (unbiased.best != choice.best) {
-    BiasTrial again = try_bias(surfaces, unbiased.best, measured, options);
-    if (!again.convinces || !(again.with.error < bias.with.error))
-      unbiased.best = choice.best;
-    else
-      bias = std::move(again);
-  }
-  choice = std::move(unbiased);
-  out = std::move(other);
+Choice choose_again(const std::vector<SlipSamples>& surfaces, const Choice& measured,
+                    const SurfaceDiscoveryOptions& options, BiasTrial& bias) {
+  Choice unbiased = choose_law(without_bias(surfaces, bias.whole.value), options);
+  if (unbiased.best == measured.best) return unbiased;
+  BiasTrial again = try_bias(surfaces, unbiased.best, measured.scores, options);
+  if (again.convinces && again.with.error < bias.with.error)
+    bias = std::move(again);
+  else
+    unbiased.best = measured.best;
+  return unbiased;
 }
 
 /// Writes that the wrenches are off by a constant.
@@ -369,25 +361,27 @@ SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
   answer.kind = "slips";
   answer.model = to_string(options.base);
   answer.phase = "release";
-  Choice choice = choose_law(surfaces, options, out);
-  if (choice.laws.front().compared == 0) {
+  const Choice measured = choose_law(surfaces, options);
+  answer.skipped = measured.skipped, answer.ranking = measured.ranking;
+  if (measured.laws.front().compared == 0) {
     answer.verdict = Verdict::not_answered;
     answer.message = answer.skipped.empty() ? "no surface" : answer.skipped.front().second;
     answer.seconds = seconds_since(begin);
     return out;
   }
-  const Scores measured = choice.scores;
   BiasTrial bias;
+  if (!is_forgotten(kWrenchBias, options)) bias = try_bias(surfaces, measured.best, measured.scores, options);
+  Choice choice = bias.convinces ? choose_again(surfaces, measured, options, bias) : measured;
+  answer.ranking = std::move(choice.ranking);
+  out.evidence = std::move(choice.evidence);
+  answer.train = answer.test = choice.slips;
   if (!is_forgotten(kWrenchBias, options)) {
-    bias = try_bias(surfaces, choice.best, measured, options);
-    if (bias.convinces) choose_again(surfaces, measured, options, bias, choice, out);
     answer.ranking.push_back(bias.ranked);
     std::stable_sort(answer.ranking.begin(), answer.ranking.end(), larger_gain);
   }
-  answer.train = answer.test;
   const LawScore& law = choice.laws[choice.best];
   const LawScore& final = bias.convinces ? bias.with : law;
-  const LawScore base = base_beside(choice.best, surfaces, measured);
+  const LawScore base = base_beside(choice.best, surfaces, measured.scores);
   answer.before_train = base.errors(base.train), answer.after_train = final.errors(final.train);
   answer.before_test = {{"direction_mae_deg", base.error}};
   answer.after_test = {{"direction_mae_deg", final.error}};

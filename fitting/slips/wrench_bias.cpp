@@ -3,12 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
-#include <numeric>
 #include <utility>
 
 #include "dynamics/dense_solve.hpp"
-#include "dynamics/median.hpp"
 #include "dynamics/parallel.hpp"
 #include "fitting/distributions.hpp"
 
@@ -47,25 +44,26 @@ struct Profiled {
 
 Profiled profiled(const SlipSamples& slips, const SurfaceFit& fit) {
   const SlipSurface& surface = fit.surface;
-  std::vector<std::size_t> free;
-  for (std::size_t k = 0; k < surface.coefficients.size(); ++k)
-    if (surface.coefficients[k] != 0 || surface.model != SurfaceModel::ellipsoid) free.push_back(k);
   double largest = 0;
   for (const double c : surface.coefficients) largest = std::max(largest, std::abs(c));
-  const auto n = static_cast<Index>(free.size());
+  std::vector<SlipSurface> up, down;  // in one coefficient each
+  for (std::size_t k = 0; k < surface.coefficients.size(); ++k) {
+    if (surface.model == SurfaceModel::ellipsoid && surface.coefficients[k] == 0) continue;
+    up.push_back(surface), down.push_back(surface);
+    up.back().coefficients[k] += 1e-5 * largest;
+    down.back().coefficients[k] -= 1e-5 * largest;
+  }
+  const auto n = static_cast<Index>(up.size());
   MatrixXd curvature = MatrixXd::Zero(n + 3, n + 3);
   std::map<int, VectorXd> gradients;
   for (const SlipSample& s : slips.samples) {
     const double h = 1e-5 * std::hypot(s.wrench[0], s.wrench[1], s.wrench[2]);
     if (!(h > 0)) continue;
     Eigen::Matrix<double, 4, Eigen::Dynamic> J(4, n + 3);
-    for (Index k = 0; k < n; ++k) {
-      SlipSurface up = surface, down = surface;
-      up.coefficients[free[static_cast<std::size_t>(k)]] += 1e-5 * largest;
-      down.coefficients[free[static_cast<std::size_t>(k)]] -= 1e-5 * largest;
-      J.col(k) = (residual(up, fit, s, Vector3d::Zero()) - residual(down, fit, s, Vector3d::Zero())) /
-                 (2e-5 * largest);
-    }
+    for (std::size_t k = 0; k < up.size(); ++k)
+      J.col(static_cast<Index>(k)) =
+          (residual(up[k], fit, s, Vector3d::Zero()) - residual(down[k], fit, s, Vector3d::Zero())) /
+          (2e-5 * largest);
     for (Index k = 0; k < 3; ++k) {
       const Vector3d along = h * Vector3d::Unit(k);
       J.col(n + k) = (residual(surface, fit, s, along) - residual(surface, fit, s, -along)) / (2 * h);
@@ -175,12 +173,12 @@ WrenchBias fit_wrench_bias(const std::vector<SlipSamples>& surfaces, SurfaceMode
 
 std::vector<SurfaceScore> score_with_bias(const std::vector<SlipSamples>& surfaces, SurfaceModel model,
                                           const WrenchBias& whole, const SurfaceComparisonOptions& options) {
-  constexpr double to_deg = 180 / std::numbers::pi;
   std::vector<SurfaceScore> out(surfaces.size());
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     out[i].model = model, out[i].outcome = SurfaceOutcome::fitted, out[i].fit = whole.fits[i];
-    out[i].errors_deg.resize(surfaces[i].samples.size());
   }
+  std::vector<std::vector<double>> errors(surfaces.size());
+  for (std::size_t i = 0; i < surfaces.size(); ++i) errors[i].resize(surfaces[i].samples.size());
   std::vector<WrenchBias> folds(static_cast<std::size_t>(options.folds));
   dynamics::parallel_for(folds.size(), options.threads, [&](std::size_t k) {
     folds[k] =
@@ -192,14 +190,10 @@ std::vector<SurfaceScore> score_with_bias(const std::vector<SlipSamples>& surfac
       const SlipSamples rest = without_bias(surfaces[i], folds[k].value);
       for (std::size_t s = 0; s < rest.samples.size(); ++s)
         if (static_cast<std::size_t>(rest.samples[s].slip) % folds.size() == k)
-          out[i].errors_deg[s] = to_deg * direction_error(folds[k].fits[i].surface, rest.samples[s]);
+          errors[i][s] = kDegreesPerRadian * direction_error(folds[k].fits[i].surface, rest.samples[s]);
     }
   }
-  for (SurfaceScore& score : out) {
-    score.mean_deg = std::accumulate(score.errors_deg.begin(), score.errors_deg.end(), 0.0) /
-                     static_cast<double>(score.errors_deg.size());
-    score.median_deg = dynamics::median(score.errors_deg);
-  }
+  for (std::size_t i = 0; i < surfaces.size(); ++i) out[i].set_errors(std::move(errors[i]));
   return out;
 }
 
