@@ -175,7 +175,7 @@ class Search {
         if (wald_of(out_.final, id).p_value(out_.final) < kept_at_) continue;
         auto without = fit_without(problem_, out_.final, id, options_.fit);
         if (!without.solved) continue;
-        auto held_out = fit_own(problem_, Split::test, without, options_.fit);
+        auto held_out = fit_own(problem_, Split::test, without, options_.fit, &out_.final_test);
         if (!held_out.solved) continue;
         out_.final = std::move(without);
         out_.final_test = std::move(held_out);
@@ -367,7 +367,7 @@ class Search {
     without.effects.erase(without.effects.begin() + static_cast<std::ptrdiff_t>(i));
     without.final = fit_without(problem_, out_.final, id, options_.fit);
     if (!without.final.solved) return false;
-    without.final_test = fit_own(problem_, Split::test, without.final, options_.fit);
+    without.final_test = fit_own(problem_, Split::test, without.final, options_.fit, &out_.final_test);
     if (!without.final_test.solved) return false;
     EffectSearch first = std::exchange(out_, std::move(without));
     auto shown_from = shown_from_;

@@ -157,7 +157,8 @@ GroupedFit fit_without(const GroupedProblem& problem, const GroupedFit& fit, con
     if (fit.shared[k].effect != id)
       shared.push_back(fit.shared[k]), values.push_back(fit.values[static_cast<Index>(k)]);
   return fit_groups(problem, Split::train, shared,
-                    Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size())), options);
+                    Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size())), options,
+                    &fit);
 }
 
 HeldOutFall held_out_fall(const GroupedProblem& problem, const GroupedFit& before,
@@ -180,10 +181,11 @@ EffectTrial try_effect(const GroupedProblem& problem, const GroupedFit& fit, con
     shared.push_back(std::move(p));
   }
   EffectTrial out{effect.id, {}, {}, 1, 0, {}};
-  out.fit = fit_groups(problem, Split::train, shared,
-                       Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size())), options);
+  out.fit =
+      fit_groups(problem, Split::train, shared,
+                 Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size())), options, &fit);
   if (!out.fit.solved) return out;
-  out.test = fit_own(problem, Split::test, out.fit, options);
+  out.test = fit_own(problem, Split::test, out.fit, options, &test);
   const Wald wald = wald_of(out.fit, effect.id);
   out.p = wald.p_value(out.fit);
   out.delta_bic = wald.delta_bic(out.fit);

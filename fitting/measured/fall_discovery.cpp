@@ -251,7 +251,7 @@ std::vector<dynamics::Effect> FallProblem::effects() const {
 
 GroupEquations FallProblem::equations(std::size_t group, std::span<const std::string> names,
                                       std::span<const double> values, const Eigen::VectorXd& own,
-                                      bool derivatives) const {
+                                      Derivatives derivatives) const {
   const Fall& fall = falls_[group];
   const OwnNames mine(names, groups_[group].object);
   const auto residual = [&]<class S>(const std::vector<S>& effects, const std::vector<S>& x) {
@@ -275,7 +275,7 @@ GroupEquations FallProblem::equations(std::size_t group, std::span<const std::st
     return out;
   };
   GroupEquations out = swept(mine.values(values), own, derivatives, residual);
-  if (derivatives) mine.spread(out, names.size());
+  if (derivatives == Derivatives::all) mine.spread(out, names.size());
   return out;
 }
 

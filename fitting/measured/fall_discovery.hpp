@@ -24,7 +24,7 @@ class FallProblem final : public GroupedProblem {
   std::vector<dynamics::Effect> effects() const override;
   GroupEquations equations(std::size_t group, std::span<const std::string> names,
                            std::span<const double> values, const Eigen::VectorXd& own,
-                           bool derivatives) const override;
+                           Derivatives derivatives) const override;
   const flight::Vec3<double>& sigma(std::size_t group) const { return falls_[group].sigma; }  ///< [m/s²]
   /// The axes that a fall's rows are of, in their order at every sample.
   const std::vector<std::size_t>& axes(std::size_t group) const { return falls_[group].axes; }

@@ -134,7 +134,7 @@ double FlightProblem::sigma(std::size_t group, int channel) const {
 
 GroupEquations FlightProblem::equations(std::size_t group, std::span<const std::string> names,
                                         std::span<const double> values, const Eigen::VectorXd& own,
-                                        bool derivatives) const {
+                                        Derivatives derivatives) const {
   const Flight& flight = flights_[group];
   const OwnNames mine(names, groups_[group].object);
   const std::vector<double> shared = mine.values(values);
@@ -177,7 +177,7 @@ GroupEquations FlightProblem::equations(std::size_t group, std::span<const std::
   } catch (const std::invalid_argument&) {
     return {};  // a step led where no flight is
   }
-  if (derivatives) mine.spread(out, names.size());
+  if (derivatives == Derivatives::all) mine.spread(out, names.size());
   return out;
 }
 

@@ -20,7 +20,7 @@ class FlightProblem final : public GroupedProblem {
   std::vector<dynamics::Effect> effects() const override;
   GroupEquations equations(std::size_t group, std::span<const std::string> names,
                            std::span<const double> values, const Eigen::VectorXd& own,
-                           bool derivatives) const override;
+                           Derivatives derivatives) const override;
 
   /// 1 σ of a row's channel, in m or rad.
   double sigma(std::size_t group, int channel) const;

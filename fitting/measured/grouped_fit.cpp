@@ -19,35 +19,30 @@ std::vector<std::string> GroupedFit::names() const {
 
 namespace {
 
-GroupedFit begin(const GroupedProblem& problem, datasets::Split split) {
+/// Every group of the split, from its start or from where it was in `near`.
+GroupedFit begin(const GroupedProblem& problem, datasets::Split split, const GroupedFit* near) {
   GroupedFit fit;
   fit.groups.resize(problem.groups().size());
   for (std::size_t i = 0; i < fit.groups.size(); ++i) {
     const Group& g = problem.groups()[i];
     fit.groups[i].used = g.split == split && !g.set_aside;
-    fit.groups[i].own = Eigen::Map<const VectorXd>(g.start.data(), static_cast<Index>(g.start.size()));
+    fit.groups[i].own =
+        near && near->groups[i].used && near->groups[i].solved
+            ? near->groups[i].own
+            : VectorXd(Eigen::Map<const VectorXd>(g.start.data(), static_cast<Index>(g.start.size())));
   }
   return fit;
-}
-
-void solve(const GroupedProblem& problem, GroupedFit& fit, const GroupedFitOptions& options) {
-  if (fit.weights.group.empty()) fit.weights = neutral_weights(problem);
-  for (int round = 0; round < (options.robust ? 2 : 1); ++round) {
-    solve_shared(problem, fit, options);
-    if (!fit.solved) return;
-    if (round == 0 && options.robust) fit.weights = learned_weights(problem, fit, options);
-  }
 }
 
 }  // namespace
 
 GroupedFit fit_groups(const GroupedProblem& problem, datasets::Split split,
                       const std::vector<SharedParameter>& shared, const VectorXd& values,
-                      const GroupedFitOptions& options) {
-  GroupedFit fit = begin(problem, split);
+                      const GroupedFitOptions& options, const GroupedFit* near) {
+  GroupedFit fit = begin(problem, split, near);
   fit.shared = shared;
   fit.values = values;
-  solve(problem, fit, options);
+  solve_groups(problem, fit, options);
   return fit;
 }
 
@@ -63,8 +58,9 @@ class Held final : public GroupedProblem {
   }
   std::vector<dynamics::Effect> effects() const override { return {}; }
   GroupEquations equations(std::size_t group, std::span<const std::string>, std::span<const double>,
-                           const VectorXd& own, bool derivatives) const override {
-    auto out = problem_.equations(group, names_, values_, own, derivatives);
+                           const VectorXd& own, Derivatives derivatives) const override {
+    auto out = problem_.equations(group, names_, values_, own,
+                                  derivatives == Derivatives::all ? Derivatives::own : derivatives);
     out.shared = MatrixXd::Zero(out.residual.size(), 0);
     return out;
   }
@@ -78,10 +74,10 @@ class Held final : public GroupedProblem {
 }  // namespace
 
 GroupedFit fit_own(const GroupedProblem& problem, datasets::Split split, const GroupedFit& fit,
-                   const GroupedFitOptions& options) {
+                   const GroupedFitOptions& options, const GroupedFit* near) {
   const Held held(problem, fit);
-  GroupedFit out = begin(problem, split);
-  solve(held, out, options);
+  GroupedFit out = begin(problem, split, near);
+  solve_groups(held, out, options);
   out.shared = fit.shared;
   out.values = fit.values;
   out.covariance = fit.covariance;
@@ -105,14 +101,14 @@ GroupFit fit_own_part(const GroupedProblem& problem, std::size_t group, const Gr
       counts[static_cast<Index>(k)] = fit.weights.prior;
   out.solved = false;
   for (int k = 0; k < 8; ++k) {
-    const auto e = problem.equations(group, names, values, out.own, true);
+    const auto e = problem.equations(group, names, values, out.own, Derivatives::own);
     if (!e.solved) return out;
     const MatrixXd O = counts.asDiagonal() * e.own(rows, Eigen::all);
     const VectorXd r = counts.cwiseProduct(e.residual(rows)), step = least_squares(O, -r);
     out.own += step;
     if ((O * step).squaredNorm() < 1e-8) break;
   }
-  const auto e = problem.equations(group, names, values, out.own, false);
+  const auto e = problem.equations(group, names, values, out.own, Derivatives::none);
   out.residual = e.residual;
   out.solved = e.solved;
   return out;
@@ -122,7 +118,7 @@ ProjectedEquations projected(const GroupedProblem& problem, std::size_t group,
                              std::span<const std::string> names, std::span<const double> values,
                              const VectorXd& own, const GroupedWeights& weights, double sample_limit) {
   ProjectedEquations out;
-  auto e = problem.equations(group, names, values, own, true);
+  auto e = problem.equations(group, names, values, own, Derivatives::all);
   if (!e.solved) return out;
   weigh_rows(e, problem.groups()[group], weights, sample_limit);
   MatrixXd columns(e.residual.size(), e.shared.cols() + 1);

@@ -122,7 +122,7 @@ std::vector<FootprintProfile> footprint_profiles(const GroupedProblem& problem, 
     dynamics::parallel_for(fit.groups.size(), options.threads, [&](std::size_t i) {
       GroupFit& group = shown.groups[i];
       if (!group.used || !group.solved) return;
-      const auto e = problem.equations(i, call.names, call.values, group.own, true);
+      const auto e = problem.equations(i, call.names, call.values, group.own, Derivatives::all);
       group.solved = e.solved;
       if (!e.solved) return;
       auto weighed = e;

@@ -42,6 +42,9 @@ struct GroupEquations {
   Eigen::MatrixXd shared, own;  ///< derivatives: a row each, a column per unknown
 };
 
+/// By which unknowns equations are asked to be differentiated.
+enum class Derivatives { none, own, all };
+
 struct GroupedFit;
 
 /// Groups of measurements under one model: unknowns that all groups share, and some of each group's own.
@@ -66,10 +69,10 @@ class GroupedProblem {
   /// The effects that can be asked for; where two are the same in the data, the first one's name is given.
   virtual std::vector<dynamics::Effect> effects() const = 0;
   /// At the values of shared parameters ("id.parameter" or "id.parameter[object]"; what is not named is
-  /// neutral) and of the group's own unknowns.
+  /// neutral) and of the group's own unknowns. Derivatives that were not asked for may be missing or zero.
   virtual GroupEquations equations(std::size_t group, std::span<const std::string> names,
                                    std::span<const double> values, const Eigen::VectorXd& own,
-                                   bool derivatives) const = 0;
+                                   Derivatives derivatives) const = 0;
 
   /// Whether an effect says anything beside `others` (ids): an anisotropy does where what it shapes is among
   /// them, or declared of every object.
@@ -124,18 +127,19 @@ struct OwnNames {
 /// Derivatives of f(shared, own) in sweeps of dynamics::kDualSize parameters: f takes two vectors of a scalar
 /// and returns the residual in it. `shared` are the values that the group reads.
 template <class F>
-GroupEquations swept(const std::vector<double>& shared, const Eigen::VectorXd& own, bool derivatives,
+GroupEquations swept(const std::vector<double>& shared, const Eigen::VectorXd& own, Derivatives derivatives,
                      const F& f) {
   using dynamics::Dual;
   GroupEquations out;
   const auto n_shared = shared.size(), n_own = static_cast<std::size_t>(own.size()), n = n_shared + n_own;
-  if (!derivatives) {
+  if (derivatives == Derivatives::none) {
     const std::vector<double> r = f(shared, std::vector<double>(own.data(), own.data() + own.size()));
     out.residual = Eigen::Map<const Eigen::VectorXd>(r.data(), static_cast<Eigen::Index>(r.size()));
     out.solved = out.residual.allFinite();
     return out;
   }
-  for (std::size_t first = 0; first < n || first == 0; first += dynamics::kDualSize) {
+  const std::size_t begin = derivatives == Derivatives::own ? n_shared : 0;
+  for (std::size_t first = begin; first < n || first == begin; first += dynamics::kDualSize) {
     std::vector<Dual> s, o;
     const auto seed = [&](double value, std::size_t k) {
       return k >= first && k < first + dynamics::kDualSize
@@ -147,9 +151,9 @@ GroupEquations swept(const std::vector<double>& shared, const Eigen::VectorXd& o
       o.push_back(seed(own[static_cast<Eigen::Index>(k)], n_shared + k));
     const std::vector<Dual> r = f(s, o);
     const auto rows = static_cast<Eigen::Index>(r.size());
-    if (first == 0) {
+    if (first == begin) {
       out.residual.resize(rows);
-      out.shared.resize(rows, static_cast<Eigen::Index>(n_shared));
+      out.shared.setZero(rows, static_cast<Eigen::Index>(n_shared));
       out.own.resize(rows, static_cast<Eigen::Index>(n_own));
     }
     for (Eigen::Index i = 0; i < rows; ++i) {

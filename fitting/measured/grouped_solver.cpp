@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <utility>
 
 #include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
@@ -18,9 +20,12 @@ using Eigen::VectorXd;
 
 namespace {
 
+/// Steps on one linear model: samples that count linearly (Huber's) make it converge by a factor a step.
+constexpr int kModelSteps = 100;
+
 /// One group's equations, its own unknowns projected out.
 struct Part {
-  bool solved{};
+  bool solved{}, quadratic{};  // quadratic: every row counts fully
   double cost{};
   MatrixXd information;  // shared
   VectorXd score;
@@ -28,44 +33,53 @@ struct Part {
   VectorXd own_step;
 };
 
-/// Gauss-Newton over the groups.
+/// A step of a group's own unknowns.
+struct OwnStep {
+  VectorXd from, change;
+  double cost{};  // of the group, before it
+};
+
+/// Gauss-Newton over the groups. Equations are dear and weights are not: each linear model is followed to its
+/// own minimum, with its rows weighed again and again, before the equations are asked for there.
 class Solver {
  public:
   Solver(const GroupedProblem& problem, GroupedFit& fit, const GroupedFitOptions& options)
       : problem_(problem), fit_(fit), options_(options), names_(fit.names()) {
     for (std::size_t i = 0; i < fit.groups.size(); ++i)
       if (fit.groups[i].used) used_.push_back(i);
+    linearise();
   }
 
-  void run() {
-    linearise();
+  /// To a minimum at the fit's weights.
+  void descend() {
+    project();
     double cost = total();
     for (int k = 0; k < options_.iterations; ++k) {
       ++fit_.iterations;
-      const VectorXd step = shared_step();
-      // Groups that do not solve drop out of the sum; a step is halved until the sum falls.
-      std::vector<VectorXd> own;
-      for (const std::size_t i : used_) own.push_back(fit_.groups[i].own);
+      std::vector<OwnStep> own;
+      for (std::size_t n = 0; n < used_.size(); ++n)
+        own.push_back({fit_.groups[used_[n]].own, {}, parts_[n].cost});
       const VectorXd values = fit_.values;
+      const double little = 1e-9 * cost + 1e-9, promised = cost - follow_model(cost, little);
+      if (std::abs(promised) <= little) break;  // so near, the model is the truth
+      const VectorXd step = fit_.values - values;
+      for (std::size_t n = 0; n < used_.size(); ++n) own[n].change = fit_.groups[used_[n]].own - own[n].from;
+      // Groups that do not solve drop out of the sum; a step is halved until the sum falls.
       double factor = 1, moved = cost;
       bool better = false;
-      for (int halving = 0; halving < 10 && !better; ++halving, factor *= 0.5) {
+      for (int halving = 0; halving < 10 && promised > 0 && !better; ++halving, factor *= 0.5) {
         fit_.values = values + factor * step;
-        for (Index j = 0; j < step.size(); ++j)
-          fit_.values[j] = std::clamp(fit_.values[j], fit_.shared[static_cast<std::size_t>(j)].low,
-                                      fit_.shared[static_cast<std::size_t>(j)].high);
-        moved = try_step(own, fit_.values - values, factor);
+        moved = try_step(own, factor);
         better = moved <= cost * (1 + 1e-12);
       }
       if (!better) {
         fit_.values = values;
-        for (std::size_t n = 0; n < used_.size(); ++n) fit_.groups[used_[n]].own = own[n];
-        break;
+        for (std::size_t n = 0; n < used_.size(); ++n) fit_.groups[used_[n]].own = own[n].from;
       }
-      const bool done = cost - moved <= 1e-9 * cost + 1e-9;
       linearise();
+      project();
+      if (!better || cost - moved <= little) break;
       cost = total();
-      if (done) break;
     }
   }
 
@@ -80,6 +94,7 @@ class Solver {
       const Group& group = problem_.groups()[used_[n]];
       g.solved = parts_[n].solved;
       if (!g.solved) continue;
+      g.residual = residual_[n];
       g.chi2 = 0, g.n = 0;
       for (Index i = 0; i < g.residual.size(); ++i)
         if (group.rows[static_cast<std::size_t>(i)].channel >= 0)
@@ -127,48 +142,110 @@ class Solver {
     return out;
   }
 
+  /// The equations at the fit's values and own unknowns.
   void linearise() {
-    parts_.assign(used_.size(), {});
+    equations_.resize(used_.size());
+    residual_.resize(used_.size());
     const std::vector<double> values(fit_.values.data(), fit_.values.data() + fit_.values.size());
     dynamics::parallel_for(used_.size(), options_.threads, [&](std::size_t n) {
-      GroupFit& g = fit_.groups[used_[n]];
-      const Group& group = problem_.groups()[used_[n]];
-      Part& part = parts_[n];
-      auto e = problem_.equations(used_[n], names_, values, g.own, true);
-      if (!e.solved) return;
-      g.residual = e.residual;
-      part.cost = cost_of(e.residual, group, fit_.weights, options_.sample_limit);
-      weigh_rows(e, group, fit_.weights, options_.sample_limit);
-      const Index p = e.shared.cols();
-      MatrixXd columns(e.residual.size(), p + 1);
-      columns << e.shared, e.residual;
-      const MatrixXd own = least_squares(e.own, -columns);
-      columns += product(e.own, own);  // own unknowns projected out
-      const MatrixXd products = gram(columns);
-      part.own_per_shared = own.leftCols(p);
-      part.own_step = own.col(p);
-      part.information = products.topLeftCorner(p, p);
-      part.score = products.col(p).head(p);
-      part.solved = own.allFinite();
+      equations_[n] = problem_.equations(used_[n], names_, values, fit_.groups[used_[n]].own,
+                                         fit_.values.size() > 0 ? Derivatives::all : Derivatives::own);
+      residual_[n] = equations_[n].residual;
     });
   }
 
+  /// Weighs the model's rows, and takes out of them what the groups' own unknowns can do.
+  void project() {
+    parts_.assign(used_.size(), {});
+    dynamics::parallel_for(used_.size(), options_.threads, [&](std::size_t n) { project(n); });
+  }
+  void project(std::size_t n) {
+    Part& part = parts_[n];
+    part.solved = false;
+    if (!equations_[n].solved) return;
+    const Group& group = problem_.groups()[used_[n]];
+    GroupEquations e = equations_[n];
+    e.residual = residual_[n];
+    part.cost = cost_of(e.residual, group, fit_.weights, options_.sample_limit);
+    part.quadratic = is_quadratic(e.residual, group, fit_.weights, options_.sample_limit);
+    weigh_rows(e, group, fit_.weights, options_.sample_limit);
+    const Index p = e.shared.cols();
+    MatrixXd columns(e.residual.size(), p + 1);
+    columns << e.shared, e.residual;
+    const MatrixXd own = least_squares(e.own, -columns);
+    columns += product(e.own, own);
+    const MatrixXd products = gram(columns);
+    part.own_per_shared = own.leftCols(p);
+    part.own_step = own.col(p);
+    part.information = products.topLeftCorner(p, p);
+    part.score = products.col(p).head(p);
+    part.solved = own.allFinite();
+  }
+
+  /// Moves the fit to the minimum of the linear model, which has this cost, and returns the cost there.
+  double follow_model(double cost, double little) {
+    for (int k = 0; k < kModelSteps; ++k) {
+      const VectorXd change = shared_step();
+      fit_.values += change;
+      dynamics::parallel_for(used_.size(), options_.threads, [&](std::size_t n) { move_group(n, change); });
+      const double before = std::exchange(cost, total());
+      if (before - cost <= little) break;
+    }
+    return cost;
+  }
+  void move_group(std::size_t n, const VectorXd& shared_change) {
+    Part& part = parts_[n];
+    if (!part.solved) return;
+    VectorXd own = part.own_step;
+    if (shared_change.size() > 0) {
+      own += part.own_per_shared * shared_change;
+      residual_[n] += product(equations_[n].shared, shared_change);
+    }
+    residual_[n] += product(equations_[n].own, own);
+    fit_.groups[used_[n]].own += own;
+    const Group& group = problem_.groups()[used_[n]];
+    if (!part.quadratic || !is_quadratic(residual_[n], group, fit_.weights, options_.sample_limit))
+      return project(n);
+    // Its rows count as before: nothing is left for its own unknowns to do.
+    part.cost = cost_of(residual_[n], group, fit_.weights, options_.sample_limit);
+    if (shared_change.size() > 0) part.score += part.information * shared_change;
+    part.own_step.setZero();
+  }
+
+  /// To the minimum of the model in the shared parameters; those that want beyond their range go to its end.
   VectorXd shared_step() const {
     const Index p = fit_.values.size();
-    if (p == 0) return {};
     MatrixXd A = MatrixXd::Zero(p, p);
-    VectorXd b = VectorXd::Zero(p);
+    VectorXd b = VectorXd::Zero(p), step = b;
     for (std::size_t n = 0; n < used_.size(); ++n) {
       if (!parts_[n].solved) continue;
       const double w = fit_.weights.group[used_[n]];
       A += w * parts_[n].information;
       b += w * parts_[n].score;
     }
-    return pseudo_solve(A, -b);
+    std::vector<Index> free(static_cast<std::size_t>(p));
+    std::iota(free.begin(), free.end(), Index{0});
+    while (!free.empty()) {
+      const VectorXd wanted = pseudo_solve(MatrixXd(A(free, free)), VectorXd(-(b + A * step)(free)));
+      std::vector<Index> inside;
+      VectorXd limited = step;
+      for (std::size_t k = 0; k < free.size(); ++k) {
+        const Index j = free[k];
+        const SharedParameter& s = fit_.shared[static_cast<std::size_t>(j)];
+        const double value = fit_.values[j] + wanted[static_cast<Index>(k)];
+        limited[j] = std::clamp(value, s.low, s.high) - fit_.values[j];
+        if (value >= s.low && value <= s.high) inside.push_back(j);
+      }
+      if (inside.size() == free.size()) return limited;
+      for (const Index j : inside) limited[j] = 0;  // asked again beside those at their ends
+      step = limited;
+      free = inside;
+    }
+    return step;
   }
 
-  /// The cost after a step of the shared parameters and of every group's own.
-  double try_step(const std::vector<VectorXd>& own, const VectorXd& shared_change, double factor) {
+  /// The cost at the fit's values after a part of every group's own step.
+  double try_step(const std::vector<OwnStep>& own, double factor) {
     std::vector<double> costs(used_.size(), 0.0);
     const std::vector<double> values(fit_.values.data(), fit_.values.data() + fit_.values.size());
     dynamics::parallel_for(used_.size(), options_.threads, [&](std::size_t n) {
@@ -176,16 +253,15 @@ class Solver {
       GroupFit& g = fit_.groups[used_[n]];
       const Group& group = problem_.groups()[used_[n]];
       const double w = fit_.weights.group[used_[n]];
-      VectorXd change = factor * parts_[n].own_step;
-      if (shared_change.size() > 0) change += parts_[n].own_per_shared * shared_change;
+      VectorXd change = factor * own[n].change;
       // A group alone may overshoot: it goes as far as it gains.
       for (int halving = 0; halving < 6; ++halving, change *= 0.5) {
-        g.own = own[n] + change;
-        const auto e = problem_.equations(used_[n], names_, values, g.own, false);
+        g.own = own[n].from + change;
+        const auto e = problem_.equations(used_[n], names_, values, g.own, Derivatives::none);
         costs[n] = e.solved ? w * cost_of(e.residual, group, fit_.weights, options_.sample_limit)
                             : std::numeric_limits<double>::infinity();
-        if (shared_change.size() > 0 ? e.solved : costs[n] <= w * parts_[n].cost) break;
-        if (halving == 5) g.own = own[n], costs[n] = w * parts_[n].cost;
+        if (!values.empty() ? e.solved : costs[n] <= w * own[n].cost) break;
+        if (halving == 5) g.own = own[n].from, costs[n] = w * own[n].cost;
       }
     });
     double out = 0;
@@ -198,15 +274,22 @@ class Solver {
   const GroupedFitOptions& options_;
   std::vector<std::string> names_;
   std::vector<std::size_t> used_;
+  std::vector<GroupEquations> equations_;  // of the groups used, before weighing
+  std::vector<VectorXd> residual_;         // theirs, on the linear model
   std::vector<Part> parts_;
 };
 
 }  // namespace
 
-void solve_shared(const GroupedProblem& problem, GroupedFit& fit, const GroupedFitOptions& options) {
+void solve_groups(const GroupedProblem& problem, GroupedFit& fit, const GroupedFitOptions& options) {
+  if (fit.weights.group.empty()) fit.weights = neutral_weights(problem);
   Solver solver(problem, fit, options);
-  solver.run();
-  solver.finish();
+  for (int round = 0; round < (options.robust ? 2 : 1); ++round) {
+    solver.descend();
+    solver.finish();
+    if (!fit.solved) return;
+    if (round == 0 && options.robust) fit.weights = learned_weights(problem, fit, options);
+  }
 }
 
 }  // namespace unhand::fitting

@@ -55,6 +55,14 @@ double cost_of(const VectorXd& residual, const Group& group, const GroupedWeight
   return out;
 }
 
+bool is_quadratic(const VectorXd& residual, const Group& group, const GroupedWeights& weights, double limit) {
+  for (Index i = 0; i < residual.size(); ++i)
+    if (const int c = group.rows[static_cast<std::size_t>(i)].channel; c >= 0)
+      if (!(std::abs(residual[i]) <= limit * weights.channel_scale[static_cast<std::size_t>(c)]))
+        return false;
+  return true;
+}
+
 void weigh_rows(GroupEquations& e, const Group& group, const GroupedWeights& weights, double limit) {
   for (Index i = 0; i < e.residual.size(); ++i) {
     const double w = factor(e.residual[i], group.rows[static_cast<std::size_t>(i)].channel, weights, limit);

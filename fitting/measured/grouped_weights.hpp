@@ -9,6 +9,10 @@ namespace unhand::fitting {
 double cost_of(const Eigen::VectorXd& residual, const Group& group, const GroupedWeights& weights,
                double limit);
 
+/// Whether every row lies where the loss is quadratic.
+bool is_quadratic(const Eigen::VectorXd& residual, const Group& group, const GroupedWeights& weights,
+                  double limit);
+
 /// Huber's factors on rows, on their residuals and their derivatives.
 void weigh_rows(GroupEquations& equations, const Group& group, const GroupedWeights& weights, double limit);
 

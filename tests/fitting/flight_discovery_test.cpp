@@ -415,7 +415,7 @@ class CountedFlights final : public GroupedProblem {
   std::vector<dynamics::Effect> effects() const override { return flights_.effects(); }
   GroupEquations equations(std::size_t group, std::span<const std::string> names,
                            std::span<const double> values, const Eigen::VectorXd& own,
-                           bool derivatives) const override {
+                           Derivatives derivatives) const override {
     ++asked;
     return flights_.equations(group, names, values, own, derivatives);
   }
@@ -507,15 +507,15 @@ TEST(FlightProblem, DerivativesAreThoseOfTheResidual) {
   const auto& start = problem.groups()[0].start;
   const Eigen::VectorXd own =
       Eigen::Map<const Eigen::VectorXd>(start.data(), static_cast<Eigen::Index>(start.size()));
-  const auto e = problem.equations(0, names, values, own, true);
+  const auto e = problem.equations(0, names, values, own, Derivatives::all);
   ASSERT_TRUE(e.solved);
   for (std::size_t k = 0; k < names.size(); ++k) {
     double best = 1;
     for (const double h : {1e-3, 1e-4, 1e-5}) {
       auto low = values, high = values;
       low[k] -= h, high[k] += h;
-      const Eigen::VectorXd difference = (problem.equations(0, names, high, own, false).residual -
-                                          problem.equations(0, names, low, own, false).residual) /
+      const Eigen::VectorXd difference = (problem.equations(0, names, high, own, Derivatives::none).residual -
+                                          problem.equations(0, names, low, own, Derivatives::none).residual) /
                                          (2 * h);
       const auto column = e.shared.col(static_cast<Eigen::Index>(k));
       best = std::min(best, (difference - column).norm() / std::max(1.0, column.norm()));
@@ -592,11 +592,11 @@ class AskedOfWind final : public GroupedProblem {
   std::vector<dynamics::Effect> effects() const override { return of_.effects(); }
   GroupEquations equations(std::size_t group, std::span<const std::string> names,
                            std::span<const double> values, const Eigen::VectorXd& own,
-                           bool derivatives) const override {
+                           Derivatives derivatives) const override {
     bool wind = false, spin = false;  // a step asks of the spin's damping, too
     for (const auto& name : names)
       wind |= name.starts_with("flight.wind."), spin |= name.starts_with("flight.spin_damping.");
-    if (wind && !spin && derivatives) asked[group] = true;
+    if (wind && !spin && derivatives == Derivatives::all) asked[group] = true;
     return of_.equations(group, names, values, own, derivatives);
   }
   mutable std::vector<std::atomic<bool>> asked;
