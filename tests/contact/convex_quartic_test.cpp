@@ -10,6 +10,8 @@
 #include <stdexcept>
 
 #include "contact/isotropic_quartic.hpp"
+#include "tests/support/best_difference.hpp"
+#include "tests/support/refusal.hpp"
 
 namespace {
 
@@ -174,13 +176,8 @@ TEST(ConvexQuartic, BlendIsConvexExactlyUpToThree) {
 }
 
 TEST(ConvexQuartic, RefusesAndSaysWhy) {
-  const auto message = [](const Coefficients& c) -> std::string {
-    try {
-      const ConvexQuartic quartic(c);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "accepted";
+  const auto message = [](const Coefficients& c) {
+    return unhand::support::refusal([&] { ConvexQuartic{c}; });
   };
   using testing::HasSubstr;
   Coefficients c = sum_of_fourths();
