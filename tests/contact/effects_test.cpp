@@ -156,9 +156,8 @@ contact::Relative<double> on_compliant_pads(const dynamics::Acceleration<double>
   const support::ConstantForce force(1e4);
   const release::ReleaseProblem<double> problem{moving, force, *model, {0.2, 5e-4}, {0, 0}, {com_offset, 0.3},
                                                 0,      {},    0};
-  release::ReleaseOptions options{support::tight(1e-10, 1e-12), false};
-  options.integrator.record = true;
-  const auto result = simulate_release(problem, options);
+  const auto result =
+      simulate_release(problem, {.integrator = {.tolerances = {1e-10, 1e-12}, .record = true}});
   EXPECT_FALSE(result.slips_at_start);
   for (const auto& event : result.events)
     EXPECT_EQ(event.mode_after, event.mode_before) << "holds throughout";
@@ -195,9 +194,8 @@ TEST(PadComplianceTruth, AnObjectThatHasBeenHeldForLongStaysWhereItIs) {
   const support::ConstantForce force(1e4);
   const release::ReleaseProblem<double> problem{hand, force, *model, {0.2, 5e-4}, {0, -9.81}, {0.1, 0.3},
                                                 0,    {},    0};
-  release::ReleaseOptions options{support::tight(1e-10, 1e-12), false};
-  options.integrator.record = true;
-  const auto result = simulate_release(problem, options);
+  const auto result =
+      simulate_release(problem, {.integrator = {.tolerances = {1e-10, 1e-12}, .record = true}});
   const auto y = contact::Relative<double>::from(result.trajectory.at(0.15));
   EXPECT_NEAR(y.angle, 0.3, 1e-12) << "in steady acceleration nothing moves: the pads carry the load already";
   EXPECT_NEAR(y.arm.x, 0.1, 1e-12);

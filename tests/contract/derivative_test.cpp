@@ -50,7 +50,7 @@ class Derivative : public EveryModel {
     const release::ReleaseProblem<S> problem{thrown.hand,  force, *model, {x[0], x[1]}, {S(0.0), S(-9.81)},
                                              {x[2], x[3]}, 0.0,   {},     S(0.0)};
     release::ReleaseOptions options;
-    options.integrator = support::tight(tolerance, 1e-2 * tolerance);
+    options.integrator.tolerances = {tolerance, 1e-2 * tolerance};
     options.integrator.method = method;
     const auto result = simulate_release(problem, options);
     EXPECT_EQ(result.outcome, release::ReleaseOutcome::detached) << describe(thrown);

@@ -30,10 +30,8 @@ TEST_P(WithoutFriction, TheObjectIsFreeAtOnce) {
     p.patch.mu = 0;
     const auto model = make(p);
     const auto problem = support::problem_of(thrown, *model);
-    release::ReleaseOptions options;
-    options.integrator = support::tight(1e-10, 1e-12);
-    options.integrator.record = true;
-    const auto result = simulate_release(problem, options);
+    const auto result =
+        simulate_release(problem, {.integrator = {.tolerances = {1e-10, 1e-12}, .record = true}});
     ASSERT_EQ(result.outcome, release::ReleaseOutcome::detached) << describe(thrown);
     EXPECT_TRUE(result.slips_at_start);
     const auto hand = thrown.hand.at({}, 0);
