@@ -93,8 +93,7 @@ TEST(CubeTosses, ResultIsALogThatRoundTrips) {
   const Scratch scratch;
   put_bytes(scratch / "t.csv", header + toss(0, 9, 2) + toss(4, 12, 0));
   const ThrowLog log = import_cube_tosses(scratch / "t.csv");
-  write_throw_log(scratch / "t.h5", log);
-  EXPECT_EQ(read_throw_log(scratch / "t.h5"), log);
+  EXPECT_EQ(reread(log), log);
 }
 
 // Columns are found by their names: another order, more of them, fewer that nobody reads, a byte order mark.
