@@ -105,9 +105,8 @@ TEST(FitHandMotion, FollowsAnExactLogToItsDeclaredPrecision) {
   const Swing swing;
   const Log log = record(swing, -0.01, 311, {1e-6, 1e-6, 1e-6}, nullptr);
   const HandFit fit = fit_hand_motion(log.series());
-  ASSERT_EQ(fit.jumps.size(), 1u);
-  EXPECT_EQ(fit.jumps[0], log.time[60]);
-  EXPECT_EQ(fit.motion.jumps(), fit.jumps);
+  ASSERT_EQ(fit.motion.jumps().size(), 1u);
+  EXPECT_EQ(fit.motion.jumps()[0], log.time[60]);
   EXPECT_TRUE(fit.summary.noise_reached);
   EXPECT_LT(fit.summary.chi2_per_dof, 1.1);
   // Also between the samples, and on both sides of the jump: the spline's error is the declared 1e-6 times a
@@ -117,7 +116,7 @@ TEST(FitHandMotion, FollowsAnExactLogToItsDeclaredPrecision) {
     for (int c = 0; c < 9; ++c)
       EXPECT_NEAR(got[c], truth[c], c < 6 ? 1e-7 : 2e-5) << "t " << t << " column " << c;
   }
-  const double jump = fit.jumps[0];
+  const double jump = fit.motion.jumps()[0];
   EXPECT_NEAR(fit.motion.at(Window{-0.01, jump}, jump).acceleration.alpha, 2.0, 1e-5);
   EXPECT_NEAR(fit.motion.at(Window{jump, 0.3}, jump).acceleration.alpha, -25.0, 1e-5);
 }
@@ -126,8 +125,8 @@ TEST(FitHandMotion, PlacesAJumpBetweenSamplesWhereTheTwistsMeet) {
   Swing swing;
   swing.t_jump = 0.0503;
   const HandFit fit = fit_hand_motion(record(swing, -0.01, 311, {1e-6, 1e-6, 1e-6}, nullptr).series());
-  ASSERT_EQ(fit.jumps.size(), 1u);
-  EXPECT_NEAR(fit.jumps[0], 0.0503, 2e-7);  // a twist of 1e-6 rad/s against a jump of 27 rad/s²
+  ASSERT_EQ(fit.motion.jumps().size(), 1u);
+  EXPECT_NEAR(fit.motion.jumps()[0], 0.0503, 2e-7);  // a twist of 1e-6 rad/s against a jump of 27 rad/s²
   EXPECT_TRUE(fit.summary.noise_reached);
 }
 
@@ -135,8 +134,8 @@ TEST(FitHandMotion, FindsWeakJumps) {
   Swing swing;
   swing.after = swing.before + 0.05;  // 0.05 rad/s² in 2
   const HandFit fit = fit_hand_motion(record(swing, -0.01, 311, {1e-6, 1e-6, 1e-6}, nullptr).series());
-  ASSERT_EQ(fit.jumps.size(), 1u);
-  EXPECT_NEAR(fit.jumps[0], 0.05, 1e-12);
+  ASSERT_EQ(fit.motion.jumps().size(), 1u);
+  EXPECT_NEAR(fit.motion.jumps()[0], 0.05, 1e-12);
 }
 
 TEST(FitHandMotion, FindsJumpsThatOnlyTheLongestStretchesShow) {
@@ -148,7 +147,7 @@ TEST(FitHandMotion, FindsJumpsThatOnlyTheLongestStretchesShow) {
     swing.t_jump = 0.15;
     swing.after = swing.before + 12.0 * 0.05;  // 8 σ of the difference of two cubics through 14 samples each
     const HandFit fit = fit_hand_motion(record(swing, -0.01, 311, {1e-4, 2e-3, 0.05}, &random).series());
-    found += fit.jumps.size() == 1 && std::abs(fit.jumps[0] - 0.15) < 0.01;
+    found += fit.motion.jumps().size() == 1 && std::abs(fit.motion.jumps()[0] - 0.15) < 0.01;
   }
   EXPECT_GE(found, kRuns - 2);
 }
@@ -168,15 +167,15 @@ TEST(FitHandMotion, FindsJumpsInNoiseWithoutInventingAny) {
     const std::array<double, 3> sigma = {1e-4, 2e-3, noise};
     const Log smooth = record(swing, -0.01, 311, sigma, &random);
     const HandFit none = fit_hand_motion(smooth.series());
-    invented += static_cast<int>(none.jumps.size());
+    invented += static_cast<int>(none.motion.jumps().size());
     total += none.summary.chi2_per_dof;
     for (std::size_t k = 0; k < smooth.time.size(); ++k)
       error += std::pow(
           (none.motion.at(kAlways, smooth.time[k]).acceleration.ax - swing(smooth.time[k])[6]) / noise, 2);
     swing.after = swing.before + 20.0 * noise + 10.0 * noise;
     const HandFit one = fit_hand_motion(record(swing, -0.01, 311, sigma, &random).series());
-    found += one.jumps.size() == 1;
-    misplaced += one.jumps.size() == 1 && std::abs(one.jumps[0] - 0.05) > 1e-9;
+    found += one.motion.jumps().size() == 1;
+    misplaced += one.motion.jumps().size() == 1 && std::abs(one.motion.jumps()[0] - 0.05) > 1e-9;
   }
   EXPECT_EQ(invented, 0);
   EXPECT_EQ(found, kRuns);  // a jump of 30 σ of one sample
@@ -194,7 +193,7 @@ TEST(FitHandMotion, OptimisticNoiseInventsNoJumps) {
     Log log = record(swing, -0.01, 311, {1e-4, 2e-3, 0.3}, &random);
     log.sigma = {1e-4, 2e-3, 0.03};
     const HandFit fit = fit_hand_motion(log.series());
-    EXPECT_TRUE(fit.jumps.empty());
+    EXPECT_TRUE(fit.motion.jumps().empty());
     EXPECT_GT(fit.summary.acceleration_chi2[0], 20.0);
   }
 }
@@ -204,7 +203,7 @@ TEST(FitHandMotion, DeclaredJumpsAreTaken) {
   const std::array<double, 3> declared = {-5.0, 0.05,
                                           0.12};  // the first is outside, at the last nothing happens
   const HandFit fit = fit_hand_motion(log.series(), declared);
-  EXPECT_EQ(fit.jumps, (std::vector<double>{0.05, 0.12}));
+  EXPECT_EQ(fit.motion.jumps(), (std::vector<double>{0.05, 0.12}));
   EXPECT_TRUE(fit.summary.noise_reached);
 }
 
@@ -230,8 +229,8 @@ TEST(FitHandMotion, EstimatesNoiseThatIsNotDeclared) {
   const HandFit fit = fit_hand_motion(log.series());
   EXPECT_NEAR(fit.summary.twist_sigma[0], 2e-3, 0.6e-3);  // a median of 300 correlated differences
   EXPECT_NEAR(fit.summary.acceleration_sigma[2], 0.1, 0.03);
-  ASSERT_EQ(fit.jumps.size(), 1u);
-  EXPECT_NEAR(fit.jumps[0], 0.05, 1e-9);
+  ASSERT_EQ(fit.motion.jumps().size(), 1u);
+  EXPECT_NEAR(fit.motion.jumps()[0], 0.05, 1e-9);
 }
 
 TEST(FitHandMotion, TakesShortLogsAndRejectsBrokenOnes) {
