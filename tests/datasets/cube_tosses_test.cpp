@@ -139,19 +139,6 @@ TEST(CubeTosses, LandingHeightClearsEveryOrientation) {
               1e-15);
 }
 
-TEST(CubeTosses, OptionsChooseTheSplitAndTheMinimum) {
-  const Scratch scratch;
-  put_bytes(scratch / "t.csv", header + toss(0, 9, 2) + toss(1, 4, 2));
-  CubeTossOptions options;
-  options.min_samples = 3;
-  options.test_every = 2;
-  const ThrowLog log = import_cube_tosses(scratch / "t.csv", options);
-  ASSERT_EQ(log.throws.size(), 2U);
-  EXPECT_EQ(log.throws[1].split, Split::test);
-  options.min_samples = 1;
-  EXPECT_THROW(import_cube_tosses(scratch / "t.csv", options), std::invalid_argument);
-}
-
 TEST(CubeTosses, SaysWhichLineAndColumn) {
   const Scratch scratch;
   const std::string file = scratch / "t.csv", start = header + toss(0, 9, 2);
