@@ -189,19 +189,8 @@ double inertia_sigma_of(const datasets::Sku& sku, const AssumedTolerances& assum
 }
 
 const char* to_string(InputSource source) {
-  switch (source) {
-    case InputSource::card:
-      return "card";
-    case InputSource::throw_to_throw:
-      return "throw to throw";
-    case InputSource::gripper:
-      return "gripper";
-    case InputSource::sku:
-      return "SKU";
-    case InputSource::assumed:
-      return "assumed";
-  }
-  return "?";
+  constexpr const char* kNames[] = {"card", "throw to throw", "gripper", "SKU", "assumed"};
+  return kNames[static_cast<int>(source)];
 }
 
 std::vector<double> ThrowInputs::moved(const Eigen::VectorXd& by) const {
