@@ -127,10 +127,9 @@ class Run {
     if (watch_.count > 0 && !watch_.monotone)
       longest = std::min(longest, (options_.method == Method::cvode ? 1 : 16) * options_.guard_interval);
     if (system_.kind(phase_.mode) == FlowKind::frozen || system_.is_paced(phase_.mode)) return longest;
-    State<double, N> y;
-    for (int i = 0; i < N; ++i) y[i] = value_of(stepper.y1()[i]);
-    const double bound = system_.max_step(phase_, value_of(stepper.t1()), y);
-    return std::min({longest, bound, watch_.longest_step(value_of(stepper.t1()))});
+    const double t = value_of(stepper.t1());
+    return std::min(
+        {longest, system_.max_step(phase_, t, values<S, N>(stepper.y1())), watch_.longest_step(t)});
   }
 
   Departure transition(int guard, const S& t, const State<S, N>& y) {
