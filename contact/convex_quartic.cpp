@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/Core>
 #include <limits>
 #include <numbers>
 #include <stdexcept>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "contact/disc_friction.hpp"
+#include "dynamics/dense_solve.hpp"
 
 namespace unhand::contact {
 
@@ -43,44 +45,6 @@ struct Factored {
     const double y1 = b[1] - l10 * b[0], y2 = b[2] - l20 * b[0] - l21 * y1;
     const double x2 = y2 / d2, x1 = y1 / d1 - l21 * x2;
     return {b[0] / d0 - l10 * x1 - l20 * x2, x1, x2};
-  }
-};
-
-// Eigenvalues of a symmetric matrix, by Jacobi rotations, with the eigenvector of the least.
-struct Spectrum {
-  double least, largest;
-  Vec3<double> vector;
-
-  explicit Spectrum(Mat3 a) {
-    Mat3 v{Vec3<double>{1, 0, 0}, Vec3<double>{0, 1, 0}, Vec3<double>{0, 0, 1}};
-    for (int sweep = 0; sweep < 12; ++sweep) {
-      for (const auto& [i, j] : {std::pair{0, 1}, std::pair{0, 2}, std::pair{1, 2}}) {
-        if (a[i][j] == 0.0) continue;
-        const double theta = 0.5 * (a[j][j] - a[i][i]) / a[i][j];
-        const double t = std::copysign(1.0, theta) / (std::abs(theta) + std::hypot(1.0, theta));
-        const double c = 1.0 / std::sqrt(1.0 + t * t), s = t * c;
-        for (int k = 0; k < 3; ++k) {
-          const double x = a[k][i], y = a[k][j];
-          a[k][i] = c * x - s * y;
-          a[k][j] = s * x + c * y;
-        }
-        for (int k = 0; k < 3; ++k) {
-          const double x = a[i][k], y = a[j][k];
-          a[i][k] = c * x - s * y;
-          a[j][k] = s * x + c * y;
-          const double p = v[k][i], q = v[k][j];
-          v[k][i] = c * p - s * q;
-          v[k][j] = s * p + c * q;
-        }
-      }
-    }
-    int low = 0;
-    for (int i = 1; i < 3; ++i) {
-      if (a[i][i] < a[low][low]) low = i;
-    }
-    least = a[low][low];
-    largest = std::max({a[0][0], a[1][1], a[2][2]});
-    vector = {v[0][low], v[1][low], v[2][low]};
   }
 };
 
@@ -119,14 +83,18 @@ ConvexQuartic::ConvexQuartic(const std::array<double, kCoefficients>& coefficien
                       kPower[k][0], kPower[k][1], kPower[k][2], coefficients[k]));
     }
   }
+  const auto spectrum = [this](const Vec3<double>& x) {
+    const Mat3 h = hessian(x);
+    return dynamics::spectrum_of(Eigen::Map<const Eigen::Matrix3d>(h[0].data()));
+  };
   constexpr int kDirections = 600, kLowest = 24, kTurns = 60;
   std::vector<std::pair<double, Vec3<double>>> found;
   double largest = 0.0;
   for (int k = 0; k < kDirections; ++k) {
     const Vec3<double> x = spread(k, kDirections);
-    const Spectrum s(hessian(x));
-    largest = std::max(largest, s.largest);
-    found.emplace_back(s.least, x);
+    const Eigen::VectorXd values = spectrum(x).values;
+    largest = std::max(largest, values[2]);
+    found.emplace_back(values[0], x);
   }
   if (!(largest > 0.0)) refuse("the largest eigenvalue of the Hessian", largest, found[0].second);
   std::partial_sort(found.begin(), found.begin() + kLowest, found.end(),
@@ -134,9 +102,9 @@ ConvexQuartic::ConvexQuartic(const std::array<double, kCoefficients>& coefficien
   for (int k = 0; k < kLowest; ++k) {
     Vec3<double> x = found[k].second;
     for (int turn = 0; turn < kTurns; ++turn) {
-      const Spectrum s(hessian(x));
-      if (s.least < -1e-10 * largest) refuse("the least eigenvalue of the Hessian", s.least, x);
-      x = s.vector;
+      const auto [values, vectors] = spectrum(x);
+      if (values[0] < -1e-10 * largest) refuse("the least eigenvalue of the Hessian", values[0], x);
+      x = {vectors(0, 0), vectors(1, 0), vectors(2, 0)};
       // A convex H vanishes only along a line on which its Hessian vanishes too: the least eigenvector of any
       // place.
       const double value = dot3(x, times(hessian(x), x)) / 12.0;

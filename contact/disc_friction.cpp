@@ -160,21 +160,4 @@ DiscFriction disc_friction(double epsilon) {
   return {std::copysign(p.slide, epsilon), delta * p.arm, -2.0 * delta * m * p.dslide};
 }
 
-double disc_force_exact(double epsilon) {
-  const double e = epsilon, e2 = e * e;
-  if (e == 1.0) return 2.0 * kThird;
-  if (e < 1.0) return kThird * ((1.0 + e2) * std::comp_ellint_2(e) - (1.0 - e2) * std::comp_ellint_1(e)) / e;
-  return kThird * ((e2 + 1.0) * std::comp_ellint_2(1.0 / e) - (e2 - 1.0) * std::comp_ellint_1(1.0 / e));
-}
-
-double disc_torque_exact(double epsilon) {
-  const double e = epsilon, e2 = e * e;
-  if (e == 1.0) return 2.0 * kNinth;
-  if (e < 1.0)
-    return kNinth * ((4.0 - 2.0 * e2) * std::comp_ellint_2(e) - (1.0 - e2) * std::comp_ellint_1(e));
-  return kNinth * e *
-         ((4.0 - 2.0 * e2) * std::comp_ellint_2(1.0 / e) +
-          (2.0 * e2 - 5.0 + 3.0 / e2) * std::comp_ellint_1(1.0 / e));
-}
-
 }  // namespace unhand::contact

@@ -43,11 +43,4 @@ struct DiscProfile {
 /// which are polynomials in m up to m = 1/2 and polynomials plus polynomials × ln(1−m) above.
 DiscProfile disc_profile(double m);
 
-/// The same two formulas through std::comp_ellint_1 and _2: slow, and losing digits by cancellation as ε → 0
-/// and ∞. Kept as an oracle for tests and for reading.
-/// F/(μN) [-], ε > 0
-double disc_force_exact(double epsilon);
-/// T/(μNR) [-], likewise
-double disc_torque_exact(double epsilon);
-
 }  // namespace unhand::contact

@@ -10,40 +10,7 @@
 namespace unhand::contact {
 
 using dynamics::convert;
-using dynamics::EffectValues;
 using dynamics::value_of;
-
-namespace {
-
-template <class S>
-void stribeck(const EffectValues<S>& p, FrictionVariation<S>& friction) {
-  friction.static_ratio = p["mu_s/mu_k"];
-  friction.stribeck_speed = p["v_s"];
-}
-template <class S>
-void viscous(const EffectValues<S>& p, FrictionVariation<S>& friction) {
-  friction.viscous = p["1/v_0"];
-}
-template <class S>
-void soft_patch(const EffectValues<S>& p, FrictionVariation<S>& friction) {
-  friction.softness = p["gamma"];
-}
-template <class S>
-void pressure_profile(const EffectValues<S>& p, FrictionVariation<S>& friction) {
-  friction.pressure_exponent = p["s"];
-}
-template <class S>
-void compliance(const EffectValues<S>& p, FrictionVariation<S>& friction) {
-  friction.compliance = p["compliance"];
-  friction.loss_time = p["loss_time"];
-}
-template <class S>
-void adhesion(const EffectValues<S>& p, FrictionVariation<S>& friction) {
-  friction.adhesion = p["f_adh"];
-  friction.parting_time = p["parting_time"];
-}
-
-}  // namespace
 
 FrictionVariation<double> values(const FrictionVariation<Dual>& v) {
   FrictionVariation<double> out;
@@ -78,33 +45,34 @@ std::span<const dynamics::EffectOn<FrictionVariation>> friction_effects() {
                         .typical = 0.1,
                         .above_neutral = true},
                        {"v_s", "m/s", 0.02, 1e-3, 1, 0.01, {0.003, 0.01, 0.03, 0.1}}}},
-       &stribeck<double>,
-       &stribeck<Dual>},
+       [](const auto& p, auto& friction) {
+         friction.static_ratio = p["mu_s/mu_k"];
+         friction.stribeck_speed = p["v_s"];
+       }},
       {{.id = "contact.viscous",
         .mechanism = "friction grows with slip speed, mu (1 + v/v_0)",
         .parameters = {{"1/v_0", "s/m", 0, -1, 50, 1}}},
-       &viscous<double>,
-       &viscous<Dual>},
+       [](const auto& p, auto& friction) { friction.viscous = p["1/v_0"]; }},
       {{.id = "contact.soft_patch_radius",
         .mechanism = "the patch shrinks with the normal force, a = a_0 (f_N/f_0)^gamma",
         // Below 0 the law has solutions, but no patch widens as it is let go.
         .parameters = {{.name = "gamma", .unit = "-", .high = 2, .typical = 0.1, .least = -1}}},
-       &soft_patch<double>,
-       &soft_patch<Dual>},
+       [](const auto& p, auto& friction) { friction.softness = p["gamma"]; }},
       {{.id = "contact.pressure_profile",
         .mechanism = "pressure (1 - (r/a)^2)^s instead of a uniform one",
         .parameters = {{"s", "-", 0, -0.4, 3, 0.2}},
         .needs = {.pressure = true}},
-       &pressure_profile<double>,
-       &pressure_profile<Dual>},
+       [](const auto& p, auto& friction) { friction.pressure_exponent = p["s"]; }},
       {{.id = "contact.pad_compliance",
         .mechanism = "the pads give tangentially before they slip",
         .parameters = {{"compliance", "m/N", 0, 0, 1e-3, 5e-6},
                        {"loss_time", "s", 0.005, 0, 0.1, 0.005, {0.002, 0.005, 0.02}}},
         .one_sided = true,
         .needs = {.giving_pads = true}},
-       &compliance<double>,
-       &compliance<Dual>},
+       [](const auto& p, auto& friction) {
+         friction.compliance = p["compliance"];
+         friction.loss_time = p["loss_time"];
+       }},
       {{.id = "contact.adhesion",
         .mechanism = "the pads stick to the object beyond their normal force",
         .parameters = {{"f_adh", "N", 0, 0, 50, 0.2},
@@ -117,8 +85,10 @@ std::span<const dynamics::EffectOn<FrictionVariation>> friction_effects() {
                         .grid = {0.001, 0.003, 0.01},
                         .least = 0}},
         .one_sided = true},
-       &adhesion<double>,
-       &adhesion<Dual>},
+       [](const auto& p, auto& friction) {
+         friction.adhesion = p["f_adh"];
+         friction.parting_time = p["parting_time"];
+       }},
   };
   return table;
 }

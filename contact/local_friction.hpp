@@ -1,4 +1,9 @@
-// Friction of a disc whose coefficient depends on every point's own slip speed.
+// Friction of a disc whose coefficient depends on every point's own slip speed,
+//
+//   h(v) = μ(v)/μ − 1 = (1 + (μ_s/μ_k − 1) exp(−(v/v_s)²)) (1 + v/v₀) − 1
+//   F = ∫ p (v̂·V̂) h(|v|) dA,   T = ∫ p (r × v̂)/a h(|v|) dA,   ∫ p dA = 1
+//
+// h after [ArmstrongHelouvryDupont1994]; the integrals over the disc are those of [Farkas2003], where h = 1.
 #pragma once
 
 #include "contact/limit_surface_shapes.hpp"
@@ -6,14 +11,11 @@
 
 namespace unhand::contact {
 
-/// What the dependence adds to the force and the torque of a disc of pressure ∝ (1 − (r/a)²)^s, c its torque
-/// factor: with u = (v_r, L ω_r), V = |v_r| and Ω = |ω_r| a = |u_τ|/c,
-///
-///   F = ∫ p (v̂·V̂) h(|v|) dA,   T = ∫ p (r × v̂)/a h(|v|) dA,   h = μ(v)/μ − 1,   ∫ p dA = 1
-///
-/// The viscous part alone is linear: F = V/v₀, T = Ω/((s+2) v₀). The rest is integrated around the centre of
-/// rotation, d = V/Ω radii off the middle, where every circle ρ has one speed Ωρ; of each the disc covers
-/// |φ| < ψ, cos ψ = (d² + ρ² − 1)/(2dρ):
+/// What the dependence adds to the force and the torque of a disc of pressure p ∝ (1 − (r/a)²)^s, c its
+/// torque factor: with u = (v_r, L ω_r), V = |v_r| and Ω = |ω_r| a = |u_τ|/c. The viscous part alone is
+/// linear: F = V/v₀, T = Ω/((s+2) v₀). The rest is integrated around the centre of rotation, d = V/Ω radii
+/// off the middle, where every circle ρ has one speed Ωρ; of each the disc covers |φ| < ψ, cos ψ = (d² + ρ² −
+/// 1)/(2dρ):
 ///
 ///   F = (2/π) ∫ h ρ sin ψ dρ,   T = (2/π) ∫ h ρ (ρψ − d sin ψ) dρ
 ///

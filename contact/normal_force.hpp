@@ -106,8 +106,6 @@ class SampledNormalForce final : public NormalForce {
   void kinks(std::vector<double>& out) const override;
   void kinks(std::vector<Dual>& out) const override;
   double release_time() const override { return release_; }
-  /// The pieces, before values below zero are cut off.
-  const Polynomial& force() const { return force_; }
 
  private:
   Polynomial force_;
@@ -115,12 +113,8 @@ class SampledNormalForce final : public NormalForce {
   double release_;
 };
 
-/// How closely a measured force is followed.
+/// What a measured force may be.
 struct NormalForceOptions {
-  /// χ² per degree of freedom up to which the residual counts as noise, beside its own statistical scatter.
-  double chi2_target = 1.1;
-  /// Fewest samples in a knot interval, where the series is followed by a spline.
-  int min_samples_per_interval = 3;
   /// The largest plateau after the opening that still counts as the sensor's zero, as a fraction of the grip
   /// force (or five σ, if that is more). A larger one means that the pad still presses, and there is no
   /// release.
@@ -131,7 +125,6 @@ struct NormalForceOptions {
 struct NormalForceSummary {
   double sigma{};         ///< noise used: the declared one, or that of the scatter if it is larger [N]
   double chi2_per_dof{};  ///< of the smoothed force, and of the tail's level, against the whole series
-  int knots{};            ///< breaks strictly between the first sample and the release
   bool power_law{};       ///< the ramp is (1 − s)^p to within the noise
   double grip_force{};    ///< at the start of the opening [N]
   double opening_start{

@@ -271,7 +271,9 @@ double refine_form(const ForceSeries& s, Ramp& ramp, std::size_t from, std::size
   }
 }
 
-double noise_limit(double target, double n) { return target * n + 4.0 * std::sqrt(2.0 * n); }
+constexpr double kNoise = 1.1;  // χ² per sample, beside its own statistical scatter
+// The most χ² of n samples that is noise, at `z` standard deviations.
+double noise_limit(double n, double z) { return kNoise * n + z * std::sqrt(2.0 * n); }
 
 }  // namespace
 
@@ -349,7 +351,7 @@ std::size_t index_of(const ForceSeries& s, double t) {
   return static_cast<std::size_t>(std::lower_bound(s.time.begin(), s.time.end(), t) - s.time.begin());
 }
 
-Opening find_opening(const ForceSeries& s, const Descent& guess, const NormalForceOptions& options) {
+Opening find_opening(const ForceSeries& s, const Descent& guess) {
   const std::size_t n = s.size();
   const std::vector<double> spikes = spike_weights(s);
   Opening o{guess.ramp, 0.0, false, false};
@@ -359,9 +361,9 @@ Opening find_opening(const ForceSeries& s, const Descent& guess, const NormalFor
   const auto judge = [&](std::size_t from) {
     const std::size_t start = index_of(s, o.ramp.start);
     const std::size_t grip = start > from ? start - from : 0;
-    o.straight_grip = from == 0 && left(from, start) <= noise_limit(options.chi2_target,
-                                                                    std::max(1.0, static_cast<double>(grip)));
-    o.modelled = left(start, n) <= noise_limit(options.chi2_target, static_cast<double>(n - start));
+    o.straight_grip =
+        from == 0 && left(from, start) <= noise_limit(std::max(1.0, static_cast<double>(grip)), 4.0);
+    o.modelled = left(start, n) <= noise_limit(static_cast<double>(n - start), 4.0);
   };
   o.release_variance = refine_form(s, o.ramp, guess.plateau, n, spikes, kAll);
   judge(guess.plateau);
@@ -376,8 +378,7 @@ Opening find_opening(const ForceSeries& s, const Descent& guess, const NormalFor
   if (o.modelled) return o;
   // A ramp of another form: each of its ends from its own neighbourhood, as wide as a power still explains.
   const auto explained = [&](const Ramp& r, std::size_t from, std::size_t to) {
-    const auto count = static_cast<double>(to - from);
-    return chi2(s, r, from, to, spikes) <= options.chi2_target * count + 2.0 * std::sqrt(2.0 * count);
+    return chi2(s, r, from, to, spikes) <= noise_limit(static_cast<double>(to - from), 2.0);
   };
   constexpr std::size_t kFewest = 6;
   Ramp whole = o.ramp;

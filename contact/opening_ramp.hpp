@@ -1,4 +1,15 @@
-// The opening of a gripper in a measured series of its normal force: a ramp found by least squares.
+// The opening of a gripper in a measured series of its normal force, f_k [N] at t_k [s]: a ramp found by
+// least squares.
+//
+//   f(t) = grip + slope (t − start)                              until the start
+//   f(t) = tail + (grip − tail) u^shape exp(Σ_j bend_j (1 − u)^j),  u = (release − t)/(release − start)
+//   f(t) = tail                                                  from the release on
+//
+//   least Σ_k w_k ((f(t_k) − f_k)/σ)² + Σ_j (bend_j/4)²          by Levenberg and Marquardt's method
+//
+// Without bends it is the profile of ProfileNormalForce. As many bends are taken as the series tells: the
+// first if its fall of χ² exceeds ln n + 7 (n samples of independent noise), each further one for 3. The form
+// is this library's own: no gripper is known to open by it.
 #pragma once
 
 #include <algorithm>
@@ -20,9 +31,8 @@ struct ForceSeries {
   std::size_t size() const { return time.size(); }
 };
 
-/// The force of an opening gripper [N], by time [s]: until `start` it is grip + slope (t − start), then
-///   tail + (grip − tail) u^shape exp(Σ_j bend_j (1 − u)^j),  j = 1, 2, ...,
-/// with u from 1 to 0, and after the release `tail`. Without bends a power; with them whatever ends as one.
+/// The force of an opening gripper [N] by time [s], f above; j = 1, 2, ... Without bends a power; with them
+/// whatever ends as one.
 struct Ramp {
   static constexpr int kBends = 6;
   double grip{}, slope{}, tail{}, start{}, release{}, shape{1.0};
@@ -74,6 +84,6 @@ struct Opening {
   double release_variance{};         ///< > 0 [s²]
   bool straight_grip{}, modelled{};  ///< to within the noise
 };
-Opening find_opening(const ForceSeries&, const Descent& guess, const NormalForceOptions& options);
+Opening find_opening(const ForceSeries&, const Descent& guess);
 
 }  // namespace unhand::contact

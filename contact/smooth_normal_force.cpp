@@ -78,13 +78,6 @@ SampledNormalForce assemble(const ForceSeries& s, Pieces p, double release) {
   return {Polynomial(std::move(p.breaks), std::move(p.pieces)), std::move(p.kinks), release};
 }
 
-dynamics::SplineOptions spline_options(const NormalForceOptions& o) {
-  dynamics::SplineOptions out;
-  out.chi2_target = o.chi2_target;
-  out.min_samples_per_interval = o.min_samples_per_interval;
-  return out;
-}
-
 // The share of the sensor's bias that acts at t: it is faded out over the ramp.
 double bias_share(const NormalForceSummary& u, double t) {
   const double length = u.release_time - u.opening_start;
@@ -114,13 +107,10 @@ void finish(const ForceSeries& s, NormalForceFit& fit, double parameters) {
     sum += e * e;
   }
   u.chi2_per_dof = sum / std::max(1.0, static_cast<double>(s.size()) - parameters);
-  u.knots = 0;
-  for (double t : fit.force.force().breaks())
-    if (t > s.time.front() && t < std::min(u.release_time, s.time.back())) ++u.knots;
 }
 
 // A spline through all samples, without an opening.
-NormalForceFit without_release(const ForceSeries& s, const NormalForceOptions& options) {
+NormalForceFit without_release(const ForceSeries& s) {
   dynamics::SplineProblem<1, 5> problem;
   problem.begin = s.time.front();
   problem.end = s.time.back();
@@ -137,7 +127,7 @@ NormalForceFit without_release(const ForceSeries& s, const NormalForceOptions& o
     return fit;
   }
   problem.observations = {{0, s.time, s.value, sigma}};
-  const auto spline = dynamics::fit_spline(problem, spline_options(options));
+  const auto spline = dynamics::fit_spline(problem);
   Pieces p{spline.polynomial.breaks(), spline.polynomial.pieces(), {}};
   p.kinks = sign_changes(spline.polynomial, problem.begin, problem.end);
   NormalForceFit fit{assemble(s, std::move(p), kInfinity), {}};
@@ -271,7 +261,7 @@ NormalForceFit within(const ForceSeries& s, NormalForceFit fit) {
   return fit;
 }
 
-NormalForceFit with_release(const ForceSeries& s, Opening o, const NormalForceOptions& options) {
+NormalForceFit with_release(const ForceSeries& s, Opening o) {
   const bool judged = o.modelled && o.ramp.bend == decltype(o.ramp.bend){};
   // A spline needs samples; a stretch with hardly any is left to the model.
   constexpr std::size_t kFewest = 8;
@@ -298,7 +288,7 @@ NormalForceFit with_release(const ForceSeries& s, Opening o, const NormalForceOp
   if (starts) problem.observations.push_back({0, grip.time, grip.value, {grip.sigma}});
   problem.observations.push_back({0, ramp.time, ramp.value, {ramp.sigma}});
   if (!o.modelled) problem.end_value = {0.0};
-  const auto spline = dynamics::fit_spline(problem, spline_options(options));
+  const auto spline = dynamics::fit_spline(problem);
 
   // Up to `touch` the spline; then the landing, from its value and slope to zero.
   Pieces p = up_to(spline.polynomial, touch);
@@ -348,25 +338,25 @@ NormalForceFit smooth_normal_force(std::span<const double> time, std::span<const
   const auto is_zero = [&](double level, double height) {
     return std::abs(level) <= std::max(options.max_tail_bias * height, 5.0 * s.sigma);
   };
-  if (!is_zero(tail, sorted.back())) return within(s, without_release(s, options));
+  if (!is_zero(tail, sorted.back())) return within(s, without_release(s));
   const std::optional<Descent> descent = last_descent(s, tail, std::max(peak, 0.5 * sorted.back()));
   // Pads that press lightly and never part are told by the mean, which knows the level better than a sample.
   const double mean = std::accumulate(value.begin(), value.end(), 0.0) / static_cast<double>(n);
   if (!descent && mean > s.sigma * std::max(2.0, 5.0 / std::sqrt(static_cast<double>(n))))
-    return within(s, without_release(s, options));
+    return within(s, without_release(s));
   if (!descent) {  // nothing but zero: released from the beginning
     NormalForceFit fit{
         {Polynomial({time.front(), time.back()}, {constant(0.0)}), {time.front()}, time.front()}, {}};
     finish(s, fit, 1.0);
     return fit;
   }
-  const Opening opening = find_opening(s, *descent, options);
+  const Opening opening = find_opening(s, *descent);
   const double tick = (time.back() - time.front()) / static_cast<double>(n - 1);
   const bool sound = std::isfinite(opening.ramp.release) && index_of(s, opening.ramp.release) + 3 <= n &&
                      opening.ramp.release > time.front() + 3.0 * tick &&
                      is_zero(opening.ramp.tail, descent->height);
-  if (!sound) return within(s, without_release(s, options));
-  return within(s, with_release(s, opening, options));
+  if (!sound) return within(s, without_release(s));
+  return within(s, with_release(s, opening));
 }
 
 }  // namespace unhand::contact

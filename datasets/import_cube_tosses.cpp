@@ -18,6 +18,10 @@
 namespace unhand::datasets {
 namespace {
 
+constexpr double kTossSigmaPosition = 3e-5, kTossSigmaQuaternion = 2e-4;  // [m], [1]: at least
+constexpr std::size_t kTossMinSamples = 8;                                // before the first contact
+constexpr int kTossTestEvery = 5;                                         // one in five is held out
+
 /// The columns that are read, in any order; others are passed over.
 constexpr std::string_view toss_columns = "toss,k,t_s,x_m,y_m,z_m,qw,qx,qy,qz,before_first_contact";
 constexpr std::size_t n_toss_columns = 11;
@@ -127,7 +131,7 @@ std::array<double, 3> half_turn(const Row& from, const Row& to) {
 
 /// x, y, z and every part of the quaternion: what was found of the published tosses, or more where the
 /// samples in the air scatter by more.
-std::vector<double> sigma_of(const std::vector<Toss>& tosses, const CubeTossOptions& options) {
+std::vector<double> sigma_of(const std::vector<Toss>& tosses) {
   std::array<SampleNoise, 3> position;
   SampleNoise attitude;
   for (const Toss& toss : tosses)
@@ -142,19 +146,19 @@ std::vector<double> sigma_of(const std::vector<Toss>& tosses, const CubeTossOpti
       }
     }
   std::vector<double> out;
-  for (const SampleNoise& axis : position) out.push_back(std::max(options.sigma_position, axis.sigma()));
-  out.resize(7, std::max(options.sigma_quaternion, attitude.sigma()));
+  for (const SampleNoise& axis : position) out.push_back(std::max(kTossSigmaPosition, axis.sigma()));
+  out.resize(7, std::max(kTossSigmaQuaternion, attitude.sigma()));
   return out;
 }
 
-Throw make_throw(const Toss& toss, const CubeTossOptions& options, const std::vector<double>& sigma) {
+Throw make_throw(const Toss& toss, const std::vector<double>& sigma) {
   const std::size_t n = toss.rows.size();
   Throw out;
   out.repetition = toss.rows.front().toss;
   out.id = fmt::format("toss-{:04}", out.repetition);
   out.object = "cube";
   out.condition = "toss";
-  out.split = out.repetition % options.test_every == options.test_every - 1 ? Split::test : Split::train;
+  out.split = out.repetition % kTossTestEvery == kTossTestEvery - 1 ? Split::test : Split::train;
   MocapLog& mocap = out.mocap.emplace();
   mocap.time = {n, 1, {}, {}};
   mocap.pose = {n, 7, {}, sigma};
@@ -174,11 +178,6 @@ void check_options(const CubeTossOptions& options) {
        {std::pair{"mass", options.mass}, {"side", options.side}, {"inertia", std::min({ix, iy, iz})}})
     if (!(value > 0 && std::isfinite(value)))
       throw std::invalid_argument(fmt::format("{}: {} is not > 0", name, value));
-  if (options.min_samples < 2) {
-    throw std::invalid_argument(fmt::format("min_samples: {} is not >= 2", options.min_samples));
-  }
-  if (options.test_every < 2)
-    throw std::invalid_argument(fmt::format("test_every: {} is not >= 2", options.test_every));
 }
 
 }  // namespace
@@ -205,23 +204,23 @@ ThrowLog import_cube_tosses(const std::filesystem::path& csv, const CubeTossOpti
   cube.dims = {options.side, options.side, options.side};
   log.objects.emplace("cube", cube);
 
-  const std::vector<double> sigma = sigma_of(tosses, options);
+  const std::vector<double> sigma = sigma_of(tosses);
   for (const Toss& toss : tosses) {
     const int number = toss.rows.front().toss;
-    if (toss.flight < static_cast<std::size_t>(options.min_samples)) {
+    if (toss.flight < kTossMinSamples) {
       counts.dropped.push_back(
           {number, static_cast<int>(toss.flight),
-           fmt::format("{} samples before contact, fewer than {}", toss.flight, options.min_samples)});
+           fmt::format("{} samples before contact, fewer than {}", toss.flight, kTossMinSamples)});
       continue;
     }
-    log.throws.push_back(make_throw(toss, options, sigma));
+    log.throws.push_back(make_throw(toss, sigma));
     ++(log.throws.back().split == Split::train ? counts.train : counts.test);
   }
   counts.kept = static_cast<int>(log.throws.size());
   if (log.throws.empty()) {
     throw ImportError(
         csv.string(), "line 1",
-        fmt::format("none of {} tosses has {} samples before contact", counts.tosses, options.min_samples));
+        fmt::format("none of {} tosses has {} samples before contact", counts.tosses, kTossMinSamples));
   }
   std::sort(log.throws.begin(), log.throws.end(), [](const Throw& a, const Throw& b) { return a.id < b.id; });
   validate(log, csv.string());

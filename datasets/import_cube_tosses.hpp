@@ -30,11 +30,7 @@ struct CubeTossOptions {
       "measured: DAIRLab contact-nets (Pfrommer, Halm, Posa, CoRL 2020); mass, side and inertia as published";
   std::string licence = "BSD-3-Clause";
   /// @}
-  double gravity = 9.81;           // [m/s²]
-  double sigma_position = 3e-5;    // [m], at least
-  double sigma_quaternion = 2e-4;  // [1], at least
-  int min_samples = 8;             // before the first contact; fewer do not pin down a flight
-  int test_every = 5;  // toss numbers n with n % test_every == test_every − 1 are held out: 4 to 1
+  double gravity = 9.81;  // [m/s²]
 };
 
 /// A toss that was not kept, and why.
@@ -51,8 +47,10 @@ struct ImportReport {
 
 /// A spatial log with one object, "cube", and one throw per kept toss: id "toss-0042", condition "toss",
 /// repetition = the toss number, the whole series as mocap pose (K,7), and `free_flight` from the first
-/// sample to the last one before contact. Quaternions are normalised. The velocities in the file are derived
-/// from the poses and are not kept. Throws ImportError naming file, line and column.
+/// sample to the last one before contact. Tosses with fewer than eight samples before contact do not pin down
+/// a flight and are dropped; every fifth toss number (4, 9, ...) is held out. Quaternions are normalised. The
+/// velocities in the file are derived from the poses and are not kept. Throws ImportError naming file, line
+/// and column.
 ThrowLog import_cube_tosses(const std::filesystem::path& csv, const CubeTossOptions& options = {},
                             ImportReport* report = nullptr);
 

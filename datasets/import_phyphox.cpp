@@ -20,6 +20,8 @@ namespace unhand::datasets {
 namespace {
 
 constexpr double absolute_tolerance = 1e-3;  // relative, of the absolute value that a file carries
+constexpr double kImpact = 60;               // [m/s²] a specific force that no hand gives
+constexpr double kBounceWithin = 0.25;       // [s] what starts that soon after an impact is a bounce
 
 struct ExportColumns {
   std::size_t width = 0;
@@ -174,8 +176,8 @@ std::string fault_of(const ImuLog& imu, const Stretch& stretch, const PhyphoxOpt
   const double begin = imu.time(stretch.first), end = imu.time(stretch.last);
   if (stretch.first == 0) return "the recording starts in it";
   if (stretch.last + 1 == imu.time.rows) return "the recording ends in it";
-  for (std::size_t i = stretch.first; i-- > 0 && imu.time(i) >= begin - options.bounce_within;)
-    if (magnitude(imu, i) > options.impact)
+  for (std::size_t i = stretch.first; i-- > 0 && imu.time(i) >= begin - kBounceWithin;)
+    if (magnitude(imu, i) > kImpact)
       return fmt::format("a bounce: {:.0f} m/s^2 at {:.3f} s", magnitude(imu, i), imu.time(i));
   if (end - begin < options.min_duration)
     return fmt::format("lasts {:.3f} s, less than {} s", end - begin, options.min_duration);
@@ -228,12 +230,9 @@ void check_options(const PhyphoxOptions& options) {
   };
   positive("threshold", options.threshold);
   positive("min_duration", options.min_duration);
-  positive("impact", options.impact);
   if (!(options.guard >= 0 && 2 * options.guard < options.min_duration))
     throw std::invalid_argument(
         fmt::format("guard: {} is not >= 0 and below half of min_duration", options.guard));
-  if (!(options.bounce_within >= 0))
-    throw std::invalid_argument(fmt::format("bounce_within: {} is not >= 0", options.bounce_within));
 }
 
 }  // namespace

@@ -12,15 +12,14 @@
 namespace unhand::datasets {
 
 /// What counts as a free fall: the specific force stays below `threshold` for at least `min_duration`, and no
-/// impact came just before (that would be a bounce). Bias and drag of a phone reach some 2.5 m/s² at 6 m/s, a
-/// hand that holds it stays above 8 m/s², so the threshold lies between; `guard` is cut from both ends, where
-/// the hand lets go and where the ground, or the air before it, begins to push.
+/// impact of 60 m/s², which no hand gives, came in the 0.25 s before (that would be a bounce). Bias and drag
+/// of a phone reach some 2.5 m/s² at 6 m/s, a hand that holds it stays above 8 m/s², so the threshold lies
+/// between; `guard` is cut from both ends, where the hand lets go and where the ground, or the air before it,
+/// begins to push.
 struct PhyphoxOptions {
-  double threshold = 5.0;       ///< [m/s²]
-  double min_duration = 0.4;    ///< [s] a fall from 0.8 m
-  double guard = 0.03;          ///< [s]
-  double impact = 60;           ///< [m/s²] a specific force that no hand gives
-  double bounce_within = 0.25;  ///< [s] what starts that soon after an impact is a bounce
+  double threshold = 5.0;     ///< [m/s²]
+  double min_duration = 0.4;  ///< [s] a fall from 0.8 m
+  double guard = 0.03;        ///< [s]
 };
 
 /// A stretch of small specific force that is no free fall, and why.

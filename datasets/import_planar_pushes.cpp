@@ -19,6 +19,15 @@ namespace {
 namespace fs = std::filesystem;
 using Vec2 = std::array<double, 2>;
 
+// What the header says of offset, contact and samples.
+constexpr double kPushStep = 0.1, kPushRest = 0.2;  // [s]
+constexpr double kPushOffsetTolerance = 0.3;        // [N]
+constexpr double kPushContactTolerance = 0.004;     // [m]
+constexpr double kPushLeastMotion = 0.001;          // [m]
+constexpr double kPushLeastSpeed = 2e-4;            // [m/s]
+constexpr double kPushLeastForce = 0.3;             // [N]
+constexpr std::size_t kPushTestEvery = 5;
+
 Vec2 operator+(Vec2 a, Vec2 b) { return {a[0] + b[0], a[1] + b[1]}; }
 Vec2 operator-(Vec2 a, Vec2 b) { return {a[0] - b[0], a[1] - b[1]}; }
 Vec2 operator*(double k, Vec2 a) { return {k * a[0], k * a[1]}; }
@@ -88,8 +97,10 @@ std::vector<Edge> edges_of(const PushedBlock& block) {
 void check_block(const PushedBlock& block) {
   constexpr std::size_t kMostCorners = 1000;
   constexpr double kLeastSide = 1e-4;  // [m]
-  if (!(block.mass > 0 && std::isfinite(block.mass)))
-    throw std::invalid_argument(fmt::format("mass: {} is not > 0", block.mass));
+  for (const auto& [name, value] :
+       {std::pair{"mass", block.mass}, {"characteristic_length", block.characteristic_length}})
+    if (!(value > 0 && std::isfinite(value)))
+      throw std::invalid_argument(fmt::format("{}: {} is not > 0", name, value));
   const std::size_t n = block.outline.size();
   if (n < 3 || n > kMostCorners)
     throw std::invalid_argument(fmt::format("outline: {} corners are not 3 to {}", n, kMostCorners));
@@ -121,10 +132,10 @@ Vec2 finger_at(const RawPush& push, double time) {
   return position(before->pose) + share * (position(after->pose) - position(before->pose));
 }
 
-Vec2 rest_force(const RawPush& push, double rest) {
+Vec2 rest_force(const RawPush& push) {
   std::vector<Vec2> values;
   for (const TimedForce& f : push.forces)
-    if (f.time <= push.forces.front().time + rest) values.push_back(f.force);
+    if (f.time <= push.forces.front().time + kPushRest) values.push_back(f.force);
   return median_of(values);
 }
 
@@ -148,14 +159,13 @@ struct Reading {
 };
 
 Reading read_push(const RawPush& push, Vec2 offset, const std::vector<Edge>& edges,
-                  const PlanarPushOptions& options) {
+                  const PushedBlock& block) {
   Reading out;
-  const Screw screw(push, options.block.centre);
-  const double length = options.block.characteristic_length;
+  const Screw screw(push, block.centre);
+  const double length = block.characteristic_length;
   const double motion = std::hypot(screw.v[0], screw.v[1], length * screw.omega);
-  if (motion < options.least_motion) {
-    out.reason =
-        fmt::format("moves by {:.2g} mm, less than {:.2g} mm", 1e3 * motion, 1e3 * options.least_motion);
+  if (motion < kPushLeastMotion) {
+    out.reason = fmt::format("moves by {:.2g} mm, less than {:.2g} mm", 1e3 * motion, 1e3 * kPushLeastMotion);
     return out;
   }
   const double begin = push.forces.front().time, end = push.forces.back().time;
@@ -164,7 +174,7 @@ Reading read_push(const RawPush& push, Vec2 offset, const std::vector<Edge>& edg
     return std::abs(a.depth(last)) < std::abs(b.depth(last));
   });
   const double gap = edge.depth(last);
-  if (std::abs(gap) > options.contact_tolerance) {
+  if (std::abs(gap) > kPushContactTolerance) {
     out.reason = fmt::format("the finger ends {:.1f} mm from the nearest edge", 1e3 * std::abs(gap));
     return out;
   }
@@ -176,21 +186,21 @@ Reading read_push(const RawPush& push, Vec2 offset, const std::vector<Edge>& edg
   double s = reached(screw, edge, gap, finger_at(push, begin)), pressed = 0;
   auto next = push.forces.begin();
   constexpr double kMostIntervals = 1e6;
-  if (!((end - begin) / options.step <= kMostIntervals)) {
+  if (!((end - begin) / kPushStep <= kMostIntervals)) {
     out.reason = fmt::format("lasts {:.3g} s, more than {:.0f} intervals of {:.3g} s", end - begin,
-                             kMostIntervals, options.step);
+                             kMostIntervals, kPushStep);
     return out;
   }
-  const auto intervals = static_cast<int>(std::floor((end - begin) / options.step));
+  const auto intervals = static_cast<int>(std::floor((end - begin) / kPushStep));
   for (int k = 0; k < intervals; ++k) {
-    const double from = begin + k * options.step, to = from + options.step;
+    const double from = begin + k * kPushStep, to = from + kPushStep;
     const double before = s;
     s = std::max(s, reached(screw, edge, gap, finger_at(push, to)));
     Vec2 sum{};
     int n = 0;
     for (; next != push.forces.end() && next->time < to; ++next, ++n) sum = sum + next->force;
-    const double rate = (s - before) / options.step;
-    if (n == 0 || rate * speed < options.least_speed) {
+    const double rate = (s - before) / kPushStep;
+    if (n == 0 || rate * speed < kPushLeastSpeed) {
       ++out.dropped;
       continue;
     }
@@ -198,7 +208,7 @@ Reading read_push(const RawPush& push, Vec2 offset, const std::vector<Edge>& edg
     const Vec2 mounted = (-1 / std::numbers::sqrt2) * Vec2{raw[0] + raw[1], raw[0] - raw[1]};
     const double at = (before + s) / 2;
     const Vec2 f = turn(tool - screw.angle - at * screw.omega, mounted);
-    if (std::hypot(f[0], f[1]) < options.least_force) {
+    if (std::hypot(f[0], f[1]) < kPushLeastForce) {
       ++out.dropped;
       continue;
     }
@@ -249,23 +259,6 @@ std::map<std::string, fs::path> logs_of(std::span<const fs::path> inputs) {
   return out;
 }
 
-void check_options(const PlanarPushOptions& o) {
-  const auto positive = [](const char* name, double value) {
-    if (!(value > 0 && std::isfinite(value)))
-      throw std::invalid_argument(fmt::format("{}: {} is not > 0", name, value));
-  };
-  check_block(o.block);
-  positive("characteristic_length", o.block.characteristic_length);
-  positive("step", o.step);
-  positive("rest", o.rest);
-  positive("offset_tolerance", o.offset_tolerance);
-  positive("contact_tolerance", o.contact_tolerance);
-  positive("least_motion", o.least_motion);
-  positive("least_speed", o.least_speed);
-  positive("least_force", o.least_force);
-  if (o.test_every < 2) throw std::invalid_argument(fmt::format("test_every: {} is not >= 2", o.test_every));
-}
-
 }  // namespace
 
 PushedBlock homogeneous_block(std::vector<Vec2> outline, double mass) {
@@ -292,34 +285,34 @@ PushedBlock homogeneous_block(std::vector<Vec2> outline, double mass) {
 
 SlipLog import_planar_pushes(std::span<const fs::path> inputs, const PlanarPushOptions& options,
                              PlanarPushReport* report) {
-  check_options(options);
-  const std::vector<Edge> edges = edges_of(options.block);
+  const PushedBlock& block = options.block;
+  check_block(block);
+  const std::vector<Edge> edges = edges_of(block);
   PlanarPushReport counts;
   SlipLog log;
   for (const auto& [name, file] : logs_of(inputs)) {
     const std::vector<RawPush> pushes = read_push_file(file);
     std::vector<Vec2> rests;
-    for (const RawPush& push : pushes) rests.push_back(rest_force(push, options.rest));
+    for (const RawPush& push : pushes) rests.push_back(rest_force(push));
     const Vec2 usual = median_of(rests);
-    Surface surface{options.block.mass,
-                    options.block.characteristic_length,
-                    fmt::format("log {}/{}: planar pushes of {}", name, file.filename().string(),
-                                options.block.description),
-                    options.block.licence,
-                    {}};
+    Surface surface{
+        block.mass,
+        block.characteristic_length,
+        fmt::format("log {}/{}: planar pushes of {}", name, file.filename().string(), block.description),
+        block.licence,
+        {}};
     for (std::size_t k = 0; k < pushes.size(); ++k) {
       ++counts.pushes;
       const Vec2 apart = rests[k] - usual;
-      const bool touching = std::hypot(apart[0], apart[1]) > options.offset_tolerance;
-      Reading reading = read_push(pushes[k], touching ? usual : rests[k], edges, options);
+      const bool touching = std::hypot(apart[0], apart[1]) > kPushOffsetTolerance;
+      Reading reading = read_push(pushes[k], touching ? usual : rests[k], edges, block);
       if (!reading.reason.empty()) {
         counts.dropped.push_back({name, static_cast<int>(k), reading.reason});
         continue;
       }
       Slip& slip = reading.slip;
       slip.id = fmt::format("push-{:02}", k);
-      const int every = options.test_every;
-      slip.split = static_cast<int>(k) % every == every - 1 ? Split::test : Split::train;
+      slip.split = k % kPushTestEvery == kPushTestEvery - 1 ? Split::test : Split::train;
       ++(slip.split == Split::train ? counts.train : counts.test);
       ++counts.kept;
       counts.borrowed_offsets += touching;

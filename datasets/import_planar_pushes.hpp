@@ -42,9 +42,9 @@ PushedBlock homogeneous_block(std::vector<std::array<double, 2>> outline, double
 /// which the block applies to the surface: at 2.5 mm/s inertia is nothing beside friction (quasi-static).
 /// The torque is r × f about the block's centre, r from the centre to the finger.
 ///
-/// **Offset b.** The median of the first `rest` seconds, when the finger is still on its way. Where that is
-/// further than `offset_tolerance` from the median of the log's pushes the finger was touching already, and
-/// the median of the log's pushes is taken.
+/// **Offset b.** The median of the first 0.2 s, when the finger is still on its way. Where that is further
+/// than 0.3 N from the median of the log's pushes the finger was touching already, and the median of the
+/// log's pushes is taken.
 ///
 /// **Clocks.** Both series bear stamps of one computer; the finger's pose is interpolated linearly at the
 /// times of the grid and stays at its ends beyond them (0.03 s at most in these logs).
@@ -52,23 +52,15 @@ PushedBlock homogeneous_block(std::vector<std::array<double, 2>> outline, double
 /// **Motion.** The block's pose is known before and after only. In between it moves along the screw that
 /// leads from one to the other, so its twist has one direction, and where it is along the screw follows from
 /// the finger, which stays on the edge: s(t) in [0, 1], never falling. The edge is the one that the finger is
-/// at when the push ends; what it lacks to the edge then (calibration, up to `contact_tolerance`) is taken as
-/// constant. The finger sits on the block at its own position: its radius does not show in the logs.
+/// at when the push ends; what it lacks to the edge then (calibration, up to 4 mm) is taken as constant. The
+/// finger sits on the block at its own position: its radius does not show in the logs.
 ///
-/// **Samples.** Intervals of `step` seconds: mean force, twist = screw · Δs/step. An interval stays if the
-/// block moves faster than `least_speed` (|v| + L|ω|) under more than `least_force`. A push stays if its
-/// screw is longer than `least_motion`, the finger ends at an edge, the mean force presses on that edge (a
-/// contact cannot pull), and an interval is left.
+/// **Samples.** Intervals of 0.1 s: mean force, twist = screw · Δs/0.1 s. An interval stays if the block
+/// moves faster than 0.2 mm/s (|v| + L|ω|) under more than 0.3 N. A push stays if its screw, √(|v|² + L²ω²),
+/// is longer than 1 mm, the finger ends at an edge, the mean force presses on that edge (a contact cannot
+/// pull), and an interval is left. Every fifth push is held out: numbers 4, 9, ..., from 0.
 struct PlanarPushOptions {
-  PushedBlock block;                 ///< what is pushed
-  double step = 0.1;                 // [s]
-  double rest = 0.2;                 // [s]
-  double offset_tolerance = 0.3;     // [N]
-  double contact_tolerance = 0.004;  // [m]
-  double least_motion = 0.001;       // [m], √(|v|² + L²ω²) of the whole screw
-  double least_speed = 2e-4;         // [m/s]
-  double least_force = 0.3;          // [N]
-  int test_every = 5;  // push numbers n, from 0, with n % test_every == test_every − 1 are held out: 4 to 1
+  PushedBlock block;  ///< what is pushed
 };
 
 /// A push that was not kept, and why.

@@ -246,6 +246,13 @@ ModelCard parse_model_card(const std::string& text, const std::string& file) {
 
 std::string library_version() { return UNHAND_VERSION; }
 
+std::optional<double> CardCovariance::of(const std::string& a, const std::string& b) const {
+  const auto i = static_cast<std::size_t>(std::find(names.begin(), names.end(), a) - names.begin()),
+             j = static_cast<std::size_t>(std::find(names.begin(), names.end(), b) - names.begin());
+  if (i == names.size() || j == names.size()) return {};
+  return matrix[i * names.size() + j];
+}
+
 ModelCard read_model_card(const fs::path& file) {
   std::error_code error;
   if (fs::is_directory(file, error))

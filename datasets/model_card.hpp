@@ -30,6 +30,8 @@ struct CardParameter {
 struct CardCovariance {
   std::vector<std::string> names;  ///< of the estimated parameters, a row and column each
   std::vector<double> matrix;      ///< row by row
+  /// The entry of two of them; none where a name is not among `names`.
+  std::optional<double> of(const std::string& a, const std::string& b) const;
   bool operator==(const CardCovariance&) const = default;
 };
 

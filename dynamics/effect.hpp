@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "dynamics/scalar.hpp"
@@ -169,10 +170,19 @@ class EffectValues {
 /// An effect and how it enters what it changes.
 template <template <class> class Setup>
 struct EffectOn {
-  Effect effect;  ///< the descriptor
-  void (*apply)(const EffectValues<double>&,
-                Setup<double>&);  ///< writes the parameters into the setup, SI units
-  void (*apply_dual)(const EffectValues<Dual>&, Setup<Dual>&);  ///< the same with derivatives
+  /// How the parameters enter a setup, SI units.
+  template <class S>
+  using Apply = void (*)(const EffectValues<S>&, Setup<S>&);
+  /// `enter` serves either scalar: [](const auto& p, auto& setup) { setup.drag = p["k"]; }
+  template <class Enter>
+  EffectOn(Effect what, Enter enter) : EffectOn(std::move(what), enter, enter) {}
+  /// One function for each.
+  EffectOn(Effect what, Apply<double> enter, Apply<Dual> enter_dual)
+      : effect(std::move(what)), apply(enter), apply_dual(enter_dual) {}
+
+  Effect effect;           ///< the descriptor
+  Apply<double> apply;     ///< writes the parameters into the setup
+  Apply<Dual> apply_dual;  ///< the same with derivatives
 };
 
 /// Writes the parameters of all effects of `table` that `values` names into `setup`.

@@ -1,14 +1,6 @@
 #include "dynamics/gravity_effects.hpp"
 
 namespace unhand::dynamics {
-namespace {
-
-template <class S>
-void tilt(const EffectValues<S>& p, Gravity<S>& gravity) {
-  gravity.tilt = p["angle"];
-}
-
-}  // namespace
 
 std::span<const EffectOn<Gravity>> gravity_effects() {
   static const EffectOn<Gravity> table[] = {
@@ -18,8 +10,7 @@ std::span<const EffectOn<Gravity>> gravity_effects() {
         .form = AccelerationForm::along_x,
         .acts_everywhere = true,
         .remedy = "motion capture of longer and faster flights"},
-       &tilt<double>,
-       &tilt<Dual>},
+       [](const auto& p, auto& gravity) { gravity.tilt = p["angle"]; }},
   };
   return table;
 }

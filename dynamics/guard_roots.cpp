@@ -340,10 +340,9 @@ void GuardRoots<S, N>::add_root_derivative(int guard, Entry<S, N>& root) const {
   if (rate == 0) return;  // grazing: the event time has no derivative
   S shift = -g[guard] / rate;
   if constexpr (!std::is_same_v<S, double>) shift.a = 0;  // the value is at the root already
-  State<double, N> y, dy{};
-  for (int i = 0; i < N; ++i) y[i] = value_of(root.y[i]);
+  State<double, N> dy{};
   if (system_.kind(watch_.phase.mode) != FlowKind::frozen)
-    system_.flow(watch_.phase, value_of(root.t), y, dy);
+    system_.flow(watch_.phase, value_of(root.t), values<S, N>(root.y), dy);
   root.t += shift;
   for (int i = 0; i < N; ++i) root.y[i] += dy[i] * shift;
 }

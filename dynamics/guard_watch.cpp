@@ -79,8 +79,8 @@ int GuardWatch<S, N>::arm(const Entry<S, N>& entry, bool same_mode) {
 template <class S, int N>
 void GuardWatch<S, N>::resolve_return(const Entry<S, N>& entry, int guard, double rate) {
   constexpr double kAhead = 1e-7;  // s
-  State<double, N> y, dy{};
-  for (int i = 0; i < N; ++i) y[i] = value_of(entry.y[i]);
+  const State<double, N> y = values<S, N>(entry.y);
+  State<double, N> dy{};
   const double t = value_of(entry.t);
   if (system_.kind(phase.mode) == FlowKind::frozen) return;
   system_.flow(phase, t, y, dy);
@@ -95,8 +95,8 @@ void GuardWatch<S, N>::resolve_return(const Entry<S, N>& entry, int guard, doubl
 
 template <class S, int N>
 std::array<double, kMaxGuards> GuardWatch<S, N>::slopes(const Entry<S, N>& entry) const {
-  State<double, N> y, dy{};
-  for (int i = 0; i < N; ++i) y[i] = value_of(entry.y[i]);
+  const State<double, N> y = values<S, N>(entry.y);
+  State<double, N> dy{};
   const double t = value_of(entry.t);
   if (system_.kind(phase.mode) != FlowKind::frozen) system_.flow(phase, t, y, dy);
   State<Dual, N> yd;

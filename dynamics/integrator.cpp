@@ -12,27 +12,10 @@
 namespace unhand::dynamics {
 
 const char* to_string(Outcome outcome) {
-  switch (outcome) {
-    case Outcome::finished:
-      return "finished";
-    case Outcome::horizon:
-      return "horizon";
-    case Outcome::zeno:
-      return "zeno";
-    case Outcome::event_budget_spent:
-      return "event_budget_spent";
-    case Outcome::step_budget_spent:
-      return "step_budget_spent";
-    case Outcome::not_converged:
-      return "not_converged";
-    case Outcome::mode_cycle:
-      return "mode_cycle";
-    case Outcome::step_too_small:
-      return "step_too_small";
-    case Outcome::not_finite:
-      return "not_finite";
-  }
-  return "unknown";
+  constexpr const char* kNames[] = {"finished",           "horizon",           "zeno",
+                                    "event_budget_spent", "step_budget_spent", "mode_cycle",
+                                    "not_converged",      "step_too_small",    "not_finite"};
+  return kNames[static_cast<int>(outcome)];
 }
 
 namespace {
@@ -144,10 +127,9 @@ class Run {
     if (watch_.count > 0 && !watch_.monotone)
       longest = std::min(longest, (options_.method == Method::cvode ? 1 : 16) * options_.guard_interval);
     if (system_.kind(phase_.mode) == FlowKind::frozen || system_.is_paced(phase_.mode)) return longest;
-    State<double, N> y;
-    for (int i = 0; i < N; ++i) y[i] = value_of(stepper.y1()[i]);
-    const double bound = system_.max_step(phase_, value_of(stepper.t1()), y);
-    return std::min({longest, bound, watch_.longest_step(value_of(stepper.t1()))});
+    const double t = value_of(stepper.t1());
+    return std::min(
+        {longest, system_.max_step(phase_, t, values<S, N>(stepper.y1())), watch_.longest_step(t)});
   }
 
   Departure transition(int guard, const S& t, const State<S, N>& y) {

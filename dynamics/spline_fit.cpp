@@ -32,15 +32,18 @@ void check(const SplineProblem<Channels, Degree>& p) {
   }
 }
 
+constexpr double kNoise = 1.1;  // χ² per degree of freedom, beside its own statistical scatter
+constexpr int kFewest = 3;      // samples in an interval
+constexpr double kSignificant = 3.0, kCertain = 4.5;  // standard deviations
+
 // Halves the marked intervals that have samples enough; false if there was none.
-bool halve(Grid& grid, const std::vector<bool>& marked, const std::vector<int>& instants, int least,
-           int degree) {
+bool halve(Grid& grid, const std::vector<bool>& marked, const std::vector<int>& instants, int degree) {
   Grid finer;
   bool any = false;
   for (std::size_t i = 0; i + 1 < grid.edges.size(); ++i) {
     finer.edges.push_back(grid.edges[i]);
     finer.continuity.push_back(grid.continuity[i]);
-    if (marked[i] && instants[i] >= 2 * least) {
+    if (marked[i] && instants[i] >= 2 * kFewest) {
       finer.edges.push_back(0.5 * (grid.edges[i] + grid.edges[i + 1]));
       finer.continuity.push_back(degree - 1);
       any = true;
@@ -58,19 +61,15 @@ bool halve(Grid& grid, const std::vector<bool>& marked, const std::vector<int>& 
 }  // namespace
 
 template <int Channels, int Degree>
-SplineFit<Channels, Degree> fit_spline(const SplineProblem<Channels, Degree>& problem,
-                                       const SplineOptions& options) {
+SplineFit<Channels, Degree> fit_spline(const SplineProblem<Channels, Degree>& problem) {
   check(problem);
   Grid grid;
   double from = 0.0;
   int continuity = 0;
   for (std::size_t i = 0; i <= problem.breaks.size(); ++i) {
     const double to = (i < problem.breaks.size() ? problem.breaks[i].time : problem.end) - problem.begin;
-    const int parts = std::max(1, options.initial_intervals);
-    for (int k = 0; k < parts; ++k) {
-      grid.edges.push_back(from + (to - from) * k / parts);
-      grid.continuity.push_back(k == 0 ? continuity : Degree - 1);
-    }
+    grid.edges.push_back(from);
+    grid.continuity.push_back(continuity);
     if (i < problem.breaks.size()) continuity = problem.breaks[i].continuity;
     from = to;
   }
@@ -81,8 +80,7 @@ SplineFit<Channels, Degree> fit_spline(const SplineProblem<Channels, Degree>& pr
   SplineSolver<Channels, Degree> solver(problem);
   solver.solve(grid);
   const auto dof = [&] { return static_cast<double>(solver.values()) - grid.functions * Channels; };
-  const auto limit = [&](double n, double z) { return options.chi2_target * n + z * std::sqrt(2.0 * n); };
-  constexpr double kSignificant = 3.0, kCertain = 4.5;
+  const auto limit = [&](double n, double z) { return kNoise * n + z * std::sqrt(2.0 * n); };
   const std::size_t series = problem.observations.size();
   double bad_total = 0.0;                // the chi2 that halving is meant to lower
   const auto find_bad = [&](double z) {  // intervals whose residual is not noise, at z standard deviations
@@ -104,41 +102,36 @@ SplineFit<Channels, Degree> fit_spline(const SplineProblem<Channels, Degree>& pr
   };
   std::vector<bool> bad = find_bad(kSignificant);
   const auto is_noise = [&] { return std::find(bad.begin(), bad.end(), true) == bad.end(); };
-  if (options.refine) {
-    Grid best = grid;
-    double best_total = solver.total();
-    for (int idle = 0; !is_noise() && idle < 2;) {
-      const double misfit = bad_total;
-      if (!halve(grid, bad, solver.interval_instants(), std::max(1, options.min_samples_per_interval),
-                 Degree))
-        break;
-      solver.solve(grid);
-      const double added = (grid.functions - best.functions) * Channels;
-      if (best_total - solver.total() > std::max(4.0 * added, 0.02 * misfit)) {
-        best = grid;
-        best_total = solver.total();
-        idle = 0;
-      } else {
-        ++idle;  // a symmetric misfit may need two halvings to give way
-      }
-      bad = find_bad(kSignificant);
+  Grid best = grid;
+  double best_total = solver.total();
+  for (int idle = 0; !is_noise() && idle < 2;) {
+    const double misfit = bad_total;
+    if (!halve(grid, bad, solver.interval_instants(), Degree)) break;
+    solver.solve(grid);
+    const double added = (grid.functions - best.functions) * Channels;
+    if (best_total - solver.total() > std::max(4.0 * added, 0.02 * misfit)) {
+      best = grid;
+      best_total = solver.total();
+      idle = 0;
+    } else {
+      ++idle;  // a symmetric misfit may need two halvings to give way
     }
-    if (best.functions != grid.functions) {
-      grid = best;
-      solver.solve(grid);
-    }
+    bad = find_bad(kSignificant);
+  }
+  if (best.functions != grid.functions) {
+    grid = best;
+    solver.solve(grid);
   }
   bad = find_bad(kCertain);  // an interval that only looked bad, and did not improve, is no misfit
   SplineFit<Channels, Degree> fit{solver.polynomial(grid), {}};
   fit.summary.chi2 = solver.series_chi2();
   fit.summary.chi2_per_dof = dof() > 0.0 ? solver.total() / dof() : 0.0;
-  fit.summary.max_whitened_residual = solver.largest();
   fit.summary.knots = static_cast<int>(grid.column.size()) - 1;
   fit.summary.noise_reached = is_noise();
   return fit;
 }
 
-template SplineFit<1, 5> fit_spline(const SplineProblem<1, 5>&, const SplineOptions&);
-template SplineFit<3, 5> fit_spline(const SplineProblem<3, 5>&, const SplineOptions&);
+template SplineFit<1, 5> fit_spline(const SplineProblem<1, 5>&);
+template SplineFit<3, 5> fit_spline(const SplineProblem<3, 5>&);
 
 }  // namespace unhand::dynamics

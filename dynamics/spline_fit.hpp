@@ -39,27 +39,14 @@ struct SplineProblem {
   std::optional<std::array<double, Channels>> end_value{};  ///< value prescribed at `end`, if any
 };
 
-/// How closely a spline follows its samples.
-struct SplineOptions {
-  /// Intervals in each stretch between breaks to begin with.
-  int initial_intervals = 1;
-  /// Whether to halve intervals until the residual is noise; otherwise the initial ones stay.
-  bool refine = true;
-  /// χ² per degree of freedom up to which the residual counts as noise, beside its own statistical scatter.
-  double chi2_target = 1.1;
-  /// Fewest samples in an interval.
-  int min_samples_per_interval = 3;
-};
-
 /// How a spline was found, and how well it follows its samples.
 template <int Channels>
 struct SplineSummary {
   /// Mean square of residual/σ per observed series (in the order given) and channel.
   std::vector<std::array<double, Channels>> chi2;
-  double chi2_per_dof{};           ///< of everything together; 0 where nothing is left over
-  double max_whitened_residual{};  ///< largest |residual|/σ
-  int knots{};                     ///< breaks strictly inside (begin, end)
-  bool noise_reached{};            ///< no interval has a certain misfit (4.5 standard deviations)
+  double chi2_per_dof{};  ///< of everything together; 0 where nothing is left over
+  int knots{};            ///< breaks strictly inside (begin, end)
+  bool noise_reached{};   ///< no interval has a certain misfit (4.5 standard deviations)
 };
 
 /// A smoothing spline and its summary.
@@ -70,16 +57,15 @@ struct SplineFit {
 };
 
 /// Minimises Σ ((f^(k)(t_n) − y_n)/σ)² over the splines of the problem. Knots: each stretch between breaks
-/// begins with few equal intervals; those are halved in which the residual of some series is not noise (its
-/// χ² exceeds the target by more than three standard deviations, or its neighbours are correlated by more
-/// than three), until none is left, halving no longer pays, or the samples run out. Solved by banded
-/// Householder QR in time relative to `begin`, so that σ of very different size do not square the condition
-/// number.
+/// begins as one interval; those are halved in which the residual of some series is not noise (its χ² exceeds
+/// 1.1 per degree of freedom by more than three standard deviations, or its neighbours are correlated by more
+/// than three), until none is left, halving no longer pays, or fewer than three samples would be in one.
+/// Solved by banded Householder QR in time relative to `begin`, so that σ of very different size do not
+/// square the condition number.
 ///
 /// Instantiated for <1,5> and <3,5>. Throws std::invalid_argument for a malformed problem, or for
 /// observations that do not determine the spline.
 template <int Channels, int Degree>
-SplineFit<Channels, Degree> fit_spline(const SplineProblem<Channels, Degree>& problem,
-                                       const SplineOptions& options = {});
+SplineFit<Channels, Degree> fit_spline(const SplineProblem<Channels, Degree>& problem);
 
 }  // namespace unhand::dynamics

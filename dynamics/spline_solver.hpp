@@ -57,7 +57,6 @@ class SplineSolver {
   }
 
   double total() const { return total_; }
-  double largest() const { return largest_; }
   // Per interval, and within it per series.
   const std::vector<double>& interval_chi2() const { return interval_chi2_; }
   const std::vector<double>& interval_lag() const { return interval_lag_; }  // sum of products of neighbours
@@ -213,7 +212,7 @@ class SplineSolver {
     interval_lag_.assign(grid.column.size() * series, 0.0);
     interval_rows_.assign(grid.column.size() * series, 0);
     std::vector<std::array<double, Channels>> last(series);
-    total_ = largest_ = 0.0;
+    total_ = 0.0;
     for (const auto& row : rows_) {
       const auto& sigma = problem_.observations[row.series].sigma;
       const double* c0 = &coefficients_[static_cast<std::size_t>(grid.column[row.interval]) * Channels];
@@ -227,7 +226,6 @@ class SplineSolver {
           interval_lag_[row.interval * series + row.series] += e * last[row.series][c];
         last[row.series][c] = e;
         total_ += e * e;
-        largest_ = std::max(largest_, std::abs(e));
       }
       ++series_rows_[row.series];
       interval_rows_[row.interval * series + row.series] += Channels;
@@ -242,7 +240,7 @@ class SplineSolver {
   std::vector<std::array<double, Channels>> series_chi2_;
   std::vector<double> interval_chi2_, interval_lag_;
   std::vector<int> series_rows_, interval_rows_, interval_instants_;
-  double total_{}, largest_{};
+  double total_{};
 };
 
 }  // namespace unhand::dynamics

@@ -85,34 +85,48 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
   model_ = {options.model, options.pads.value_or(log.gripper ? log.gripper->n_pads : 2),
             options.reference_force.value_or(grips.empty() ? 20.0 : dynamics::median(grips)),
             options.integrator};
-  if (options.predict_only) {
-    // nothing to start from
-  } else if (!grips.empty() && contact::follows_pads(options.model)) {
-    try {
-      const auto guess = experiment::estimate_friction(log, prepared, options.model).parameters;
-      // Declared or not, a pad's size is known to a factor of two.
-      const auto radius = log.gripper ? log.gripper->pad_radius : std::nullopt;
-      const double least = radius ? 0.5 * contact::kUniformDisc * *radius : 2e-4,
-                   most = radius ? 4 * least : 0.1;
-      const bool is_patch = guess.mu > 0.02 && guess.mu < 4 && guess.length > least && guess.length < most;
-      if (is_patch)
-        first_guess_ = guess;
-      else
-        notes_.push_back(fmt::format(
-            "the pads' wrenches while the force vanishes say mu = {:.3g}, length = {:.3g} m, which is no "
-            "patch{}: not used as a start",
-            guess.mu, guess.length, radius ? fmt::format(" of the declared radius, {:.3g} m", *radius) : ""));
-    } catch (const std::invalid_argument&) {  // too few samples: the default start has to do
-    }
-  } else if (!contact::follows_pads(options.model)) {
-    first_guess_ = experiment::estimate_friction(log, prepared, options.model).parameters;
+  if (!options.predict_only) guess_start(log, prepared, !grips.empty());
+  if (observe(log, std::move(prepared)) == 0 && !options.predict_only)
+    throw std::invalid_argument(
+        fmt::format("{}: nothing to fit to: no throw has F/T data, motion capture or a landing among the "
+                    "channels asked for",
+                    file));
+  name_unknowns(effects);
+}
+
+void CampaignProblem::guess_start(const datasets::ThrowLog& log,
+                                  const std::vector<experiment::PreparedThrow>& prepared, bool pressed) {
+  if (!contact::follows_pads(options_.model)) {
+    first_guess_ = experiment::estimate_friction(log, prepared, options_.model).parameters;
+    return;
   }
-  std::size_t observations = 0;
+  if (!pressed) return;
+  try {
+    const auto guess = experiment::estimate_friction(log, prepared, options_.model).parameters;
+    // Declared or not, a pad's size is known to a factor of two.
+    const auto radius = log.gripper ? log.gripper->pad_radius : std::nullopt;
+    const double least = radius ? 0.5 * contact::kUniformDisc * *radius : 2e-4,
+                 most = radius ? 4 * least : 0.1;
+    const bool is_patch = guess.mu > 0.02 && guess.mu < 4 && guess.length > least && guess.length < most;
+    if (is_patch)
+      first_guess_ = guess;
+    else
+      notes_.push_back(fmt::format(
+          "the pads' wrenches while the force vanishes say mu = {:.3g}, length = {:.3g} m, which is no "
+          "patch{}: not used as a start",
+          guess.mu, guess.length, radius ? fmt::format(" of the declared radius, {:.3g} m", *radius) : ""));
+  } catch (const std::invalid_argument&) {  // too few samples: the default start has to do
+  }
+}
+
+std::size_t CampaignProblem::observe(const datasets::ThrowLog& log,
+                                     std::vector<experiment::PreparedThrow> prepared) {
   if (const int n = experiment::landings_without_sigma(log); n > 0 && options_.observations.landing) {
     const auto noise = experiment::landing_noise(log);
     notes_.push_back(experiment::in_words(noise, n));
     options_.observations.landing_noise = noise;
   }
+  std::size_t observations = 0;
   std::map<experiment::Channel, int> dead;
   auto throws = std::make_shared<std::vector<CampaignThrow>>();
   throws->reserve(prepared.size());
@@ -131,12 +145,7 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::strin
     notes_.push_back(fmt::format("{} is dead (always the same) in {} of {} throws: not used there",
                                  to_string(channel), n, throws->size()));
   throws_ = std::move(throws);
-  if (observations == 0 && !options.predict_only)
-    throw std::invalid_argument(
-        fmt::format("{}: nothing to fit to: no throw has F/T data, motion capture or a landing among the "
-                    "channels asked for",
-                    file));
-  name_unknowns(effects);
+  return observations;
 }
 
 CampaignProblem CampaignProblem::with(const std::string& model,

@@ -156,7 +156,11 @@ class CampaignProblem {
                      const UseOfDuals& use) const;
 
  private:
-  CampaignProblem() = default;
+  /// Where the pads' wrenches, or the releases that motion capture shows, let fits start.
+  void guess_start(const datasets::ThrowLog& log, const std::vector<experiment::PreparedThrow>& prepared,
+                   bool pressed);
+  /// Makes the throws, with what was measured of them; how many observations there are.
+  std::size_t observe(const datasets::ThrowLog& log, std::vector<experiment::PreparedThrow> prepared);
   void name_unknowns(const std::vector<dynamics::Effect>& effects);
   std::vector<double> values_of(const Layout&, std::span<const double> campaign,
                                 std::span<const double> own) const;

@@ -284,8 +284,6 @@ CampaignOptions options_of(const ModelCard& card, const std::string& file) {
 
 FitResult fit_of(const ModelCard& card, const CampaignProblem& problem, const std::string& file) {
   FitResult out;
-  std::vector<std::size_t> place;  // of the problem's unknowns in the card's covariance
-  const std::size_t none = card.covariance ? card.covariance->names.size() : 0;
   for (const auto& u : problem.campaign()) {
     const auto found = card.parameters.find(u.name);
     if (found == card.parameters.end())
@@ -294,21 +292,12 @@ FitResult fit_of(const ModelCard& card, const CampaignProblem& problem, const st
     const double sigma = p.sigma.value_or(p.determined ? 0 : HUGE_VAL);
     out.campaign.push_back({u, p.value, sigma, p.determined ? sigma : HUGE_VAL, false,
                             p.degrees_of_freedom.value_or(kCertain), p.interval95});
-    std::size_t k = none;
-    if (card.covariance)
-      k = static_cast<std::size_t>(
-          std::find(card.covariance->names.begin(), card.covariance->names.end(), u.name) -
-          card.covariance->names.begin());
-    place.push_back(k);
   }
-  const std::size_t width = out.campaign.size();
-  for (std::size_t i = 0; i < width; ++i)
-    for (std::size_t j = 0; j < width; ++j) {
-      if (place[i] < none && place[j] < none)
-        out.covariance.push_back(card.covariance->matrix[place[i] * none + place[j]]);
-      else
-        out.covariance.push_back(i == j ? variance_of(out.campaign[i]) : 0.0);
-    }
+  const datasets::CardCovariance told = card.covariance.value_or(datasets::CardCovariance{});
+  for (const FittedUnknown& a : out.campaign)
+    for (const FittedUnknown& b : out.campaign)
+      out.covariance.push_back(
+          told.of(a.unknown.name, b.unknown.name).value_or(&a == &b ? variance_of(a) : 0));
   for (const auto& u : problem.own()) {
     const auto spread = card.own_spreads.find(u.name);
     const double sigma =

@@ -1,26 +1,8 @@
 #include "flight/effects.hpp"
 
 namespace unhand::flight {
-namespace {
 
 using dynamics::AccelerationForm;
-using dynamics::Dual;
-using dynamics::EffectValues;
-
-template <class S>
-void drag(const EffectValues<S>& p, Air<S>& air) {
-  air.extra_drag = p["k"];
-}
-template <class S>
-void lift(const EffectValues<S>& p, Air<S>& air) {
-  air.lift = p["k_m"];
-}
-template <class S>
-void wind(const EffectValues<S>& p, Air<S>& air) {
-  air.wind = {p["w_x"], p["w_z"]};
-}
-
-}  // namespace
 
 std::span<const dynamics::EffectOn<Air>> air_effects() {
   static const char* const kLonger = "motion capture of longer and faster flights";
@@ -31,22 +13,21 @@ std::span<const dynamics::EffectOn<Air>> air_effects() {
         .per_object = true,
         .form = AccelerationForm::quadratic,
         .remedy = kLonger},
-       &drag<double>,
-       &drag<Dual>},
+       [](const auto& p, auto& air) { air.extra_drag = p["k"]; }},
       {{.id = "flight.magnus_lift",
         .mechanism = "Magnus lift, a = k_m omega J v",
         .parameters = {{"k_m", "-", 0, -5, 5, 0.01}},
         .form = AccelerationForm::lift,
         .remedy = kLonger},
-       &lift<double>,
-       &lift<Dual>},
+       [](const auto& p, auto& air) { air.lift = p["k_m"]; }},
       {{.id = "flight.wind",
         .mechanism = "constant air velocity, acting through the declared drag",
         .parameters = {{"w_x", "m/s", 0, -30, 30, 0.3}, {"w_z", "m/s", 0, -30, 30, 0.3}},
         .acts_through = "flight.quadratic_drag",
         .remedy = kLonger},
-       &wind<double>,
-       &wind<Dual>},
+       [](const auto& p, auto& air) {
+         air.wind = {p["w_x"], p["w_z"]};
+       }},
   };
   return table;
 }

@@ -24,27 +24,15 @@ using dynamics::value_of;
 using dynamics::Vec2;
 
 const char* to_string(FlightOutcome outcome) {
-  switch (outcome) {
-    case FlightOutcome::landed:
-      return "landed";
-    case FlightOutcome::never_reaches:
-      return "never_reaches";
-    case FlightOutcome::not_solved:
-      return "not_solved";
-  }
-  return "unknown";
+  constexpr const char* kNames[] = {"landed", "never_reaches", "not_solved"};
+  return kNames[static_cast<int>(outcome)];
 }
 
 const char* in_words(FlightOutcome outcome) {
-  switch (outcome) {
-    case FlightOutcome::landed:
-      return "the object lands";
-    case FlightOutcome::never_reaches:
-      return "the object never comes down through the landing height";
-    case FlightOutcome::not_solved:
-      return "the simulation of the flight stopped before the landing";
-  }
-  return "unknown";
+  constexpr const char* kWords[] = {"the object lands",
+                                    "the object never comes down through the landing height",
+                                    "the simulation of the flight stopped before the landing"};
+  return kWords[static_cast<int>(outcome)];
 }
 
 namespace {

@@ -3,18 +3,8 @@
 namespace unhand::release {
 
 using dynamics::convert;
-using dynamics::EffectValues;
 
 namespace {
-
-template <class S>
-void delay(const EffectValues<S>& p, Lateness<S>& late) {
-  late.opening_delay = p["delay"];
-}
-template <class S>
-void lag(const EffectValues<S>& p, Lateness<S>& late) {
-  late.tracking_lag = p["tau"];
-}
 
 Window shifted(const Window& window, double by) { return {window.begin - by, window.end - by}; }
 
@@ -26,15 +16,13 @@ std::span<const dynamics::EffectOn<Lateness>> lateness_effects() {
         .mechanism = "the normal force acts later than its log says",
         .parameters = {{"delay", "s", 0, -0.05, 0.05, 5e-4}},
         .needs = {.normal_force = true}},
-       &delay<double>,
-       &delay<Dual>},
+       [](const auto& p, auto& late) { late.opening_delay = p["delay"]; }},
       {{.id = "release.hand_tracking_lag",
         .mechanism =
             "the logged hand motion is the commanded one, which the true one follows with a first-order lag",
         .parameters = {{"tau", "s", 0, 0, 0.1, 1e-3}},
         .one_sided = true},
-       &lag<double>,
-       &lag<Dual>},
+       [](const auto& p, auto& late) { late.tracking_lag = p["tau"]; }},
   };
   return table;
 }

@@ -28,6 +28,8 @@ Columns sigma_to_use(std::span<const double> rows, const Columns& declared) {
 
 // Samples on each side of a jump: of strong ones, and of weak but noisy ones.
 constexpr std::array<std::size_t, 3> kReaches = {6, 14, 32};
+constexpr double kSignificant = 8.0;  // a jump, in σ of its own estimate
+constexpr std::size_t kMostJumps = 8;
 
 // Polynomials of degree < kTerms fitted to samples [first, last) of the three columns, in an orthonormal
 // basis of those samples, and extrapolated to one instant.
@@ -117,7 +119,7 @@ struct Found {
   std::size_t gap, reach;
 };
 
-std::vector<Found> find_jumps(const HandSeries& s, const Columns& sigma, const HandFitOptions& options) {
+std::vector<Found> find_jumps(const HandSeries& s, const Columns& sigma) {
   const std::size_t n = s.time.size();
   std::vector<Found> found;
   const auto bounds = [&](std::size_t k, std::size_t reach) {
@@ -135,7 +137,7 @@ std::vector<Found> find_jumps(const HandSeries& s, const Columns& sigma, const H
   };
   for (std::size_t reach : kReaches) {
     if (n < 2 * kReaches[0]) break;
-    while (static_cast<int>(found.size()) < options.max_jumps) {
+    while (found.size() < kMostJumps) {
       // Where one cubic over both sides fits worse than two, by most.
       double most = 0.0;
       std::size_t near = 0;
@@ -148,7 +150,7 @@ std::vector<Found> find_jumps(const HandSeries& s, const Columns& sigma, const H
           near = k;
         }
       }
-      if (most <= options.jump_significance) break;
+      if (most <= kSignificant) break;
       // A jump also spoils the fits of the gaps beside it: its place is where two cubics over one fixed
       // stretch fit best.
       const auto [from, to] = bounds(near, 2 * reach);
@@ -164,7 +166,7 @@ std::vector<Found> find_jumps(const HandSeries& s, const Columns& sigma, const H
       }
       const auto [a, b] = bounds(best, reach);
       const Step step = step_at(s, s.acceleration, sigma, a, best, b, s.time[best]);
-      if (significance(step) <= options.jump_significance) break;
+      if (significance(step) <= kSignificant) break;
       found.push_back({best, reach});
     }
   }
@@ -182,7 +184,7 @@ double instant_of(const HandSeries& s, const Found& jump, std::size_t from, std:
   const Step da = step_at(s, s.acceleration, sigma_acceleration, from, jump.gap, to, t);
   double information = 0.0, sum = 0.0;
   for (int c = 0; c < 3; ++c) {
-    if (da.excess[c] < 8.0 * da.sigma[c]) continue;
+    if (da.excess[c] < kSignificant * da.sigma[c]) continue;
     const double weight = 1.0 / (dv.sigma[c] * dv.sigma[c]);
     information += da.size[c] * da.size[c] * weight;
     sum += da.size[c] * dv.size[c] * weight;
@@ -303,8 +305,7 @@ PolynomialHand PolynomialHand::segments(double t_start, const dynamics::Pose<dou
   return PolynomialHand(Polynomial(std::move(breaks), std::move(pieces)), std::move(jumps));
 }
 
-HandFit fit_hand_motion(const HandSeries& s, std::span<const double> declared,
-                        const HandFitOptions& options) {
+HandFit fit_hand_motion(const HandSeries& s, std::span<const double> declared) {
   check(s);
   const Columns sigma_x = sigma_to_use(s.pose, s.pose_sigma);
   const Columns sigma_v = sigma_to_use(s.twist, s.twist_sigma);
@@ -316,12 +317,12 @@ HandFit fit_hand_motion(const HandSeries& s, std::span<const double> declared,
     for (double t : declared)
       if (t > s.time.front() && t < s.time.back()) jumps.push_back(t);
     std::sort(jumps.begin(), jumps.end());
-  } else if (options.detect_jumps) {
+  } else {
     // A declaration may be too optimistic; a false jump would be worse than a missed one.
     Columns cautious = sigma_a;
     for (int c = 0; c < 3; ++c)
       cautious[c] = std::max(cautious[c], dynamics::white_noise(s.acceleration, c, 3));
-    const std::vector<Found> found = find_jumps(s, cautious, options);
+    const std::vector<Found> found = find_jumps(s, cautious);
     for (std::size_t i = 0; i < found.size(); ++i) {
       const std::size_t least = i > 0 ? found[i - 1].gap : 0,
                         most = i + 1 < found.size() ? found[i + 1].gap : n;
@@ -348,10 +349,7 @@ HandFit fit_hand_motion(const HandSeries& s, std::span<const double> declared,
   for (double t : jumps) problem.breaks.push_back({t, 1});
   problem.observations = {
       {0, s.time, s.pose, sigma_x}, {1, s.time, s.twist, sigma_v}, {2, s.time, s.acceleration, sigma_a}};
-  dynamics::SplineOptions spline;
-  spline.chi2_target = options.chi2_target;
-  spline.min_samples_per_interval = options.min_samples_per_interval;
-  auto fit = dynamics::fit_spline(problem, spline);
+  auto fit = dynamics::fit_spline(problem);
 
   HandFitSummary summary;
   summary.pose_chi2 = fit.summary.chi2[0];
@@ -361,10 +359,8 @@ HandFit fit_hand_motion(const HandSeries& s, std::span<const double> declared,
   summary.twist_sigma = sigma_v;
   summary.acceleration_sigma = sigma_a;
   summary.chi2_per_dof = fit.summary.chi2_per_dof;
-  summary.max_whitened_residual = fit.summary.max_whitened_residual;
-  summary.knots = fit.summary.knots;
   summary.noise_reached = fit.summary.noise_reached;
-  return {PolynomialHand(std::move(fit.polynomial), jumps), summary, jumps};
+  return {PolynomialHand(std::move(fit.polynomial), std::move(jumps)), summary};
 }
 
 }  // namespace unhand::release

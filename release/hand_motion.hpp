@@ -98,20 +98,6 @@ struct HandSeries {
   std::array<double, 3> pose_sigma{}, twist_sigma{}, acceleration_sigma{};  ///< m, m, rad; per s; per s²
 };
 
-/// How closely a logged hand is followed.
-struct HandFitOptions {
-  /// χ² per degree of freedom up to which the residual counts as noise, beside its own statistical scatter.
-  double chi2_target = 1.1;
-  /// Fewest samples in a knot interval.
-  int min_samples_per_interval = 3;
-  /// Where no jump times are given: look for jumps of the logged acceleration.
-  bool detect_jumps = true;
-  /// A jump must exceed this many σ of its own estimate.
-  double jump_significance = 8.0;
-  /// Most jumps looked for.
-  int max_jumps = 8;
-};
-
 /// How well the smoothed motion explains each logged series, in units of the σ used for it.
 struct HandFitSummary {
   /// Mean square of the whitened residual, per column: 1 is noise as declared, less is a pessimistic σ, more
@@ -120,16 +106,13 @@ struct HandFitSummary {
   std::array<double, 3> pose_chi2{}, twist_chi2{}, acceleration_chi2{};     ///< columns x, z, θ [-]
   std::array<double, 3> pose_sigma{}, twist_sigma{}, acceleration_sigma{};  ///< the σ used
   double chi2_per_dof{};                                                    ///< of everything together
-  double max_whitened_residual{};                                           ///< largest |residual|/σ
-  int knots{};           ///< breaks strictly inside (begin, end), jumps included
   bool noise_reached{};  ///< no stretch has a misfit beyond doubt (4.5 standard deviations)
 };
 
 /// A smooth hand motion and how it was found.
 struct HandFit {
-  PolynomialHand motion;      ///< begins and ends with the log
-  HandFitSummary summary;     ///< how well it explains each series
-  std::vector<double> jumps;  ///< instants [s] at which the acceleration may jump; = motion.jumps()
+  PolynomialHand motion;   ///< begins and ends with the log; its acceleration may jump at jumps()
+  HandFitSummary summary;  ///< how well it explains each series
 };
 
 /// The smooth motion that explains a log: a spline of degree five, four times continuously differentiable
@@ -143,14 +126,13 @@ struct HandFit {
 /// none (an analytic log), it is 1e-6 m, m/s, m/s² (or rad).
 ///
 /// `jumps` [s]: where the acceleration is known to jump (a declaration; values outside the log are ignored).
-/// If it is empty, they are detected: between two samples, the one-sided extrapolations of the acceleration
-/// from left and right must differ by more than `jump_significance` σ of that difference and by more than
+/// If it is empty, they are detected, at most eight: between two samples, the one-sided extrapolations of the
+/// acceleration from left and right must differ by more than 8 σ of that difference and by more than
 /// curvature explains. A jump between samples k − 1 and k is put at t_k, as the log holds the later value
 /// there, unless the twists tell that it was earlier: a jump by Δa at t_k − s leaves them ahead by Δa s.
 ///
 /// Throws std::invalid_argument for fewer than four samples, shapes that do not match, times that do not
 /// increase, or a value that is not finite.
-HandFit fit_hand_motion(const HandSeries& series, std::span<const double> jumps = {},
-                        const HandFitOptions& options = {});
+HandFit fit_hand_motion(const HandSeries& series, std::span<const double> jumps = {});
 
 }  // namespace unhand::release

@@ -8,27 +8,15 @@
 namespace unhand::release {
 
 const char* to_string(ReleaseOutcome outcome) {
-  switch (outcome) {
-    case ReleaseOutcome::detached:
-      return "detached";
-    case ReleaseOutcome::never_separated:
-      return "never_separated";
-    case ReleaseOutcome::not_solved:
-      return "not_solved";
-  }
-  return "unknown";
+  constexpr const char* kNames[] = {"detached", "never_separated", "not_solved"};
+  return kNames[static_cast<int>(outcome)];
 }
 
 const char* in_words(ReleaseOutcome outcome) {
-  switch (outcome) {
-    case ReleaseOutcome::detached:
-      return "the pads let go of the object";
-    case ReleaseOutcome::never_separated:
-      return "the pads still press on the object where the hand's motion ends";
-    case ReleaseOutcome::not_solved:
-      return "the simulation of the release stopped before the pads let go";
-  }
-  return "unknown";
+  constexpr const char* kWords[] = {"the pads let go of the object",
+                                    "the pads still press on the object where the hand's motion ends",
+                                    "the simulation of the release stopped before the pads let go"};
+  return kWords[static_cast<int>(outcome)];
 }
 
 namespace {

@@ -87,69 +87,44 @@ struct Term {
   std::function<Vector3(const State&)> at;
 };
 
+Vector3 moving(double x, double z) { return {x, z, 0}; }
+Vector3 turning(double about) { return {0, 0, about}; }
+
 std::vector<Term> acceleration_terms() {
   using Form = dynamics::AccelerationForm;
   const auto speed = [](const State& s) { return std::hypot(s.vx, s.vz); };
-  return {{Form::quadratic, "|v| v", "1/m",
-           [=](const State& s) {
-             return Vector3{speed(s) * s.vx, speed(s) * s.vz, 0};
-           }},
-          {Form::linear, "v", "1/s",
-           [](const State& s) {
-             return Vector3{s.vx, s.vz, 0};
-           }},
-          {Form::cubic, "|v|^2 v", "s/m^2",
-           [=](const State& s) {
-             const double square = s.vx * s.vx + s.vz * s.vz;
-             return Vector3{square * s.vx, square * s.vz, 0};
-           }},
-          {Form::lift, "omega J v", "-",
-           [](const State& s) {
-             return Vector3{-s.omega * s.vz, s.omega * s.vx, 0};
-           }},
-          {Form::along_x, "1 along x", "m/s^2",
-           [](const State&) {
-             return Vector3{1, 0, 0};
-           }},
-          {Form::along_z, "1 along z", "m/s^2",
-           [](const State&) {
-             return Vector3{0, 1, 0};
-           }},
-          {Form::along_body_x, "1 along the object's x", "m/s^2",
-           [](const State& s) {
-             return Vector3{std::cos(s.theta), std::sin(s.theta), 0};
-           }},
-          {Form::along_body_z, "1 along the object's z", "m/s^2",
-           [](const State& s) {
-             return Vector3{-std::sin(s.theta), std::cos(s.theta), 0};
-           }},
-          {Form::centripetal_x, "omega^2 along the object's x", "m",
-           [](const State& s) {
-             return Vector3{s.omega * s.omega * std::cos(s.theta), s.omega * s.omega * std::sin(s.theta), 0};
-           }},
-          {Form::centripetal_z, "omega^2 along the object's z", "m",
-           [](const State& s) {
-             return Vector3{-s.omega * s.omega * std::sin(s.theta), s.omega * s.omega * std::cos(s.theta), 0};
-           }},
-          {Form::turning, "1 in rotation", "rad/s^2",
-           [](const State&) {
-             return Vector3{0, 0, 1};
-           }},
-          {Form::turning_linear, "omega in rotation", "1/s",
-           [](const State& s) {
-             return Vector3{0, 0, s.omega};
-           }},
-          {Form::turning_quadratic, "|omega| omega in rotation", "1/rad",
-           [](const State& s) {
-             return Vector3{0, 0, std::abs(s.omega) * s.omega};
-           }},
-          {Form::turning_sine, "sin theta in rotation", "rad/s^2",
-           [](const State& s) {
-             return Vector3{0, 0, std::sin(s.theta)};
-           }},
-          {Form::turning_cosine, "cos theta in rotation", "rad/s^2", [](const State& s) {
-             return Vector3{0, 0, std::cos(s.theta)};
-           }}};
+  return {
+      {Form::quadratic, "|v| v", "1/m",
+       [=](const State& s) { return moving(speed(s) * s.vx, speed(s) * s.vz); }},
+      {Form::linear, "v", "1/s", [](const State& s) { return moving(s.vx, s.vz); }},
+      {Form::cubic, "|v|^2 v", "s/m^2",
+       [=](const State& s) {
+         const double square = s.vx * s.vx + s.vz * s.vz;
+         return moving(square * s.vx, square * s.vz);
+       }},
+      {Form::lift, "omega J v", "-", [](const State& s) { return moving(-s.omega * s.vz, s.omega * s.vx); }},
+      {Form::along_x, "1 along x", "m/s^2", [](const State&) { return moving(1, 0); }},
+      {Form::along_z, "1 along z", "m/s^2", [](const State&) { return moving(0, 1); }},
+      {Form::along_body_x, "1 along the object's x", "m/s^2",
+       [](const State& s) { return moving(std::cos(s.theta), std::sin(s.theta)); }},
+      {Form::along_body_z, "1 along the object's z", "m/s^2",
+       [](const State& s) { return moving(-std::sin(s.theta), std::cos(s.theta)); }},
+      {Form::centripetal_x, "omega^2 along the object's x", "m",
+       [](const State& s) {
+         return moving(s.omega * s.omega * std::cos(s.theta), s.omega * s.omega * std::sin(s.theta));
+       }},
+      {Form::centripetal_z, "omega^2 along the object's z", "m",
+       [](const State& s) {
+         return moving(-s.omega * s.omega * std::sin(s.theta), s.omega * s.omega * std::cos(s.theta));
+       }},
+      {Form::turning, "1 in rotation", "rad/s^2", [](const State&) { return turning(1); }},
+      {Form::turning_linear, "omega in rotation", "1/s", [](const State& s) { return turning(s.omega); }},
+      {Form::turning_quadratic, "|omega| omega in rotation", "1/rad",
+       [](const State& s) { return turning(std::abs(s.omega) * s.omega); }},
+      {Form::turning_sine, "sin theta in rotation", "rad/s^2",
+       [](const State& s) { return turning(std::sin(s.theta)); }},
+      {Form::turning_cosine, "cos theta in rotation", "rad/s^2",
+       [](const State& s) { return turning(std::cos(s.theta)); }}};
 }
 
 std::vector<Term> wrench_terms() {

@@ -46,10 +46,8 @@ std::string measurement_for(const std::string& name) {
 }
 
 /// The card's parameters that this throw reads, with their covariance.
-void add_card(const datasets::Sku& sku, const datasets::ModelCard& card, Collector& collect, ThrowInputs& out,
-              Eigen::MatrixXd& covariance) {
-  std::vector<std::size_t> place;  // of the inputs in the card's covariance
-  const std::size_t width = card.covariance ? card.covariance->names.size() : 0;
+void add_card(const datasets::Sku& sku, const datasets::ModelCard& card, Collector& collect,
+              ThrowInputs& out) {
   for (const auto& [name, parameter] : card.parameters) {
     if (name == "pads" || name == "reference_force") continue;
     const std::size_t bracket = name.find('[');
@@ -73,23 +71,19 @@ void add_card(const datasets::Sku& sku, const datasets::ModelCard& card, Collect
                    measurement_for(name),
                    {{k, 1}},
                    parameter.determined});
-    std::size_t at = width;
-    if (card.covariance)
-      at = static_cast<std::size_t>(
-          std::find(card.covariance->names.begin(), card.covariance->names.end(), name) -
-          card.covariance->names.begin());
-    place.push_back(at);
   }
-  const auto n = static_cast<Eigen::Index>(place.size());
-  covariance = Eigen::MatrixXd::Zero(n, n);
-  for (Eigen::Index i = 0; i < n; ++i)
-    for (Eigen::Index j = 0; j < n; ++j) {
-      const std::size_t a = place[static_cast<std::size_t>(i)], b = place[static_cast<std::size_t>(j)];
-      const double sigma = out.inputs[static_cast<std::size_t>(i)].sigma;
-      covariance(i, j) = a < width && b < width ? card.covariance->matrix[a * width + b]
-                         : i == j               ? sigma * sigma
-                                                : 0.0;
-    }
+}
+
+/// Of the inputs: the card's where it tells one, σ² on the diagonal otherwise.
+Eigen::MatrixXd covariance_of(const std::vector<UncertainInput>& inputs, const datasets::ModelCard& card) {
+  const datasets::CardCovariance told = card.covariance.value_or(datasets::CardCovariance{});
+  const auto n = static_cast<Eigen::Index>(inputs.size());
+  return Eigen::MatrixXd::NullaryExpr(n, n, [&](Eigen::Index i, Eigen::Index j) {
+    const UncertainInput &a = inputs[static_cast<std::size_t>(i)], &b = inputs[static_cast<std::size_t>(j)];
+    const double own = i == j ? a.sigma * a.sigma : 0;
+    if (a.source != InputSource::card || b.source != InputSource::card) return own;
+    return told.of(a.name, b.name).value_or(own);
+  });
 }
 
 /// Friction and grip force that a card knows to a tenth or less are drawn by their logarithms: the pads'
@@ -189,19 +183,8 @@ double inertia_sigma_of(const datasets::Sku& sku, const AssumedTolerances& assum
 }
 
 const char* to_string(InputSource source) {
-  switch (source) {
-    case InputSource::card:
-      return "card";
-    case InputSource::throw_to_throw:
-      return "throw to throw";
-    case InputSource::gripper:
-      return "gripper";
-    case InputSource::sku:
-      return "SKU";
-    case InputSource::assumed:
-      return "assumed";
-  }
-  return "?";
+  constexpr const char* kNames[] = {"card", "throw to throw", "gripper", "SKU", "assumed"};
+  return kNames[static_cast<int>(source)];
 }
 
 std::vector<double> ThrowInputs::moved(const Eigen::VectorXd& by) const {
@@ -241,8 +224,8 @@ ThrowInputs throw_inputs(const datasets::Sku& sku, const datasets::ModelCard& ca
   out.model.reference_force = options.reference_force.value_or(20);
   out.model.integrator = options.integrator;
   Collector collect(out);
-  Eigen::MatrixXd of_card;
-  add_card(sku, card, collect, out, of_card);
+  add_card(sku, card, collect, out);
+  const bool card_tells = !out.inputs.empty();
   draw_product(out.inputs);
   add_spreads(card, collect);
   const bool follows_pads = contact::follows_pads(card.model);
@@ -256,15 +239,8 @@ ThrowInputs throw_inputs(const datasets::Sku& sku, const datasets::ModelCard& ca
                    InputSource::assumed,
                    "throws of an object with this surface for the card",
                    {{collect.value("mu", mu->second.value), 1}}});
-  const auto n = static_cast<Eigen::Index>(out.inputs.size());
-  out.covariance = Eigen::MatrixXd::Zero(n, n);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const double sigma = out.inputs[static_cast<std::size_t>(k)].sigma;
-    out.covariance(k, k) = sigma * sigma;
-  }
-  out.covariance.topLeftCorner(of_card.rows(), of_card.cols()) = of_card;
-  if (out.inputs.empty() || of_card.size() == 0)
-    out.notes.push_back("the card tells no uncertainty of its parameters (`unhand fit` does)");
+  out.covariance = covariance_of(out.inputs, card);
+  if (!card_tells) out.notes.push_back("the card tells no uncertainty of its parameters (`unhand fit` does)");
   return out;
 }
 

@@ -94,21 +94,9 @@ void decide(const datasets::Sku& sku, const datasets::ModelCard& card, const Sku
 }  // namespace
 
 const char* to_string(SkuVerdict verdict) {
-  switch (verdict) {
-    case SkuVerdict::throwable:
-      return "throwable";
-    case SkuVerdict::too_uncertain:
-      return "too_uncertain";
-    case SkuVerdict::cannot_be_held:
-      return "cannot_be_held";
-    case SkuVerdict::does_not_land:
-      return "does_not_land";
-    case SkuVerdict::beyond_the_model:
-      return "beyond_the_model";
-    case SkuVerdict::contradicted:
-      return "contradicted";
-  }
-  return "?";
+  constexpr const char* kNames[] = {"throwable",     "too_uncertain",    "cannot_be_held",
+                                    "does_not_land", "beyond_the_model", "contradicted"};
+  return kNames[static_cast<int>(verdict)];
 }
 
 SkuValidation validate_sku(const datasets::Sku& sku, const datasets::ModelCard& given,

@@ -96,15 +96,8 @@ bool is_quartic(const std::vector<double>& coefficients) {
 }  // namespace
 
 std::string to_string(SurfaceModel model) {
-  switch (model) {
-    case SurfaceModel::ellipsoid:
-      return "ellipsoid";
-    case SurfaceModel::ellipsoid_full:
-      return "ellipsoid_full";
-    case SurfaceModel::convex_quartic:
-      break;
-  }
-  return "convex_quartic";
+  constexpr const char* kNames[] = {"ellipsoid", "ellipsoid_full", "convex_quartic"};
+  return kNames[static_cast<int>(model)];
 }
 
 SurfaceModel surface_model(const std::string& name) {
@@ -115,17 +108,8 @@ SurfaceModel surface_model(const std::string& name) {
 }
 
 std::string to_string(SurfaceOutcome outcome) {
-  switch (outcome) {
-    case SurfaceOutcome::fitted:
-      return "fitted";
-    case SurfaceOutcome::too_few_slips:
-      return "too few slips";
-    case SurfaceOutcome::directions_do_not_span:
-      return "directions do not span";
-    case SurfaceOutcome::not_converged:
-      break;
-  }
-  return "not converged";
+  constexpr const char* kNames[] = {"fitted", "too few slips", "directions do not span", "not converged"};
+  return kNames[static_cast<int>(outcome)];
 }
 
 int least_slips(SurfaceModel model) {

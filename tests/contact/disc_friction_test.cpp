@@ -94,13 +94,6 @@ TEST(DiscFriction, AccurateOverSixteenDecades) {
     EXPECT_NEAR(f.torque, torque, 2e-14) << epsilon;
     EXPECT_NEAR(f.force / force, 1.0, 1e-13) << epsilon;  // small values keep their digits
     EXPECT_NEAR(f.torque / torque, 1.0, 1e-13) << epsilon;
-    if (epsilon > 1e-2 &&
-        epsilon < 1e2) {  // where the oracle's cancellation, 1e-16/ε and 1e-16 ε³, allows its 1e-12
-      EXPECT_NEAR(f.force, disc_force_exact(epsilon), 2e-12) << epsilon;
-      if (epsilon < 10.0) {
-        EXPECT_NEAR(f.torque, disc_torque_exact(epsilon), 1e-9) << epsilon;
-      }
-    }
   }
 }
 
@@ -111,8 +104,6 @@ TEST(DiscFriction, AccurateAtTheLogarithm) {
       const DiscFriction f = disc_friction(epsilon);
       EXPECT_NEAR(f.force, by_mean(epsilon).force, 2e-14) << epsilon - 1.0;
       EXPECT_NEAR(f.torque, by_mean(epsilon).torque, 2e-14) << epsilon - 1.0;
-      EXPECT_NEAR(f.force, disc_force_exact(epsilon), 2e-12) << epsilon - 1.0;  // of the standard library
-      EXPECT_NEAR(f.torque, disc_torque_exact(epsilon), 2e-12) << epsilon - 1.0;
     }
   }
 }

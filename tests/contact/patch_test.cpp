@@ -7,6 +7,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "tests/support/refusal.hpp"
+
 namespace {
 
 using namespace unhand::contact;
@@ -26,14 +28,7 @@ TEST(Patch, LimitsAndTheirDerivatives) {
 
 TEST(Patch, ValidationNamesParameterValueAndRange) {
   using testing::AllOf, testing::HasSubstr;
-  const auto message = [](const Patch<double>& p) -> std::string {
-    try {
-      validate(p);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "accepted";
-  };
+  const auto message = [](const Patch<double>& p) { return unhand::support::refusal([&] { validate(p); }); };
   EXPECT_EQ(message({0.0, 1.0, 1.0, 1}), "accepted");
   EXPECT_EQ(message({10.0, 1e-6, 1e-3, 4}), "accepted");
   EXPECT_THAT(message({-0.1, 0.01, 0.6, 2}), AllOf(HasSubstr("mu"), HasSubstr("-0.1"), HasSubstr("[0, 10]")));

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "contact/slip_stop.hpp"
+#include "tests/support/best_difference.hpp"
 
 namespace unhand::contact {
 namespace {
@@ -365,28 +366,15 @@ TEST_F(Pivot, DerivativesOfTheLaw) {
   for (int mode = 1; mode < model.mode_count(); ++mode) {
     const double spin = mode % 3 == 0 ? 0 : mode % 3 == 1 ? 2 : -2;
     const Relative<double> y{{0.1, 0.01}, 0.2, {mode < kSlide ? 0 : 0.3, mode < kSlide ? 0 : -0.2}, spin};
-    const State<double, 6> at_y = y.state();
-    Relative<Dual> yd;
-    State<Dual, 6> seeded;
-    for (int i = 0; i < 6; ++i) seeded[i] = dynamics::independent(at_y[i], i);
     State<Dual, 6> exact;
-    model.rate(mode, world.scene({}, Dual(0.0)), Relative<Dual>::from(seeded), exact);
+    model.rate(mode, world.scene({}, Dual(0.0)), Relative<Dual>::from(support::seeded(y.state())), exact);
+    const auto at = [&](const State<double, 6>& x) { return rate(mode, Relative<double>::from(x)); };
     for (int k = 0; k < 6; ++k) {
       if ((k == 3 || k == 4) && mode < kSlide) continue;  // stuck: the slip is zero and stays so
-      for (int i = 0; i < 6; ++i) {
-        double best = 1e300;
-        for (const double h : {1e-3, 1e-4, 1e-5, 1e-6}) {
-          auto up = at_y, down = at_y;
-          up[k] += h;
-          down[k] -= h;
-          const double slope =
-              (rate(mode, Relative<double>::from(up))[i] - rate(mode, Relative<double>::from(down))[i]) /
-              (2 * h);
-          best = std::min(best, std::abs(slope - exact[i].v[k]));
-        }
-        EXPECT_LT(best, 1e-7 * (1 + std::abs(exact[i].v[k])))
+      const auto off = support::best_differences_by(k, at, y.state(), exact, 1e-3);
+      for (int i = 0; i < 6; ++i)
+        EXPECT_LT(off[i], 1e-7 * (1 + std::abs(exact[i].v[k])))
             << model.mode_name(mode) << " d rate " << i << " / d y " << k;
-      }
     }
   }
 }

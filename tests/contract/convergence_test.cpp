@@ -13,9 +13,8 @@ class Convergence : public EveryModel {
  protected:
   static dynamics::Twist<double> twist(const support::RandomThrow& thrown, double tolerance) {
     const auto model = make(support::parameters_of(thrown));
-    release::ReleaseOptions options;
-    options.integrator = support::tight(tolerance, 1e-2 * tolerance);
-    const auto result = simulate_release(support::problem_of(thrown, *model), options);
+    const auto result = simulate_release(support::problem_of(thrown, *model),
+                                         {.integrator = {.tolerances = {tolerance, 1e-2 * tolerance}}});
     EXPECT_EQ(result.outcome, release::ReleaseOutcome::detached) << describe(thrown);
     return result.detach.twist;
   }

@@ -5,6 +5,7 @@
 
 #include "flight/projectile.hpp"
 #include "tests/contract/every_model.hpp"
+#include "tests/support/best_difference.hpp"
 
 namespace unhand {
 namespace {
@@ -49,7 +50,7 @@ class Derivative : public EveryModel {
     const release::ReleaseProblem<S> problem{thrown.hand,  force, *model, {x[0], x[1]}, {S(0.0), S(-9.81)},
                                              {x[2], x[3]}, 0.0,   {},     S(0.0)};
     release::ReleaseOptions options;
-    options.integrator = support::tight(tolerance, 1e-2 * tolerance);
+    options.integrator.tolerances = {tolerance, 1e-2 * tolerance};
     options.integrator.method = method;
     const auto result = simulate_release(problem, options);
     EXPECT_EQ(result.outcome, release::ReleaseOutcome::detached) << describe(thrown);
@@ -82,9 +83,7 @@ TEST_P(Derivative, OfTheLandingIsTheCentralDifference) {
   for (int i = 0; i < kThrows; ++i) {
     const auto thrown = support::random_throw(random, 0.5 * (i % 3));
     const auto at = parameters_of(thrown, 0.031);
-    std::array<Dual, kParameters> seeded;
-    for (int k = 0; k < kParameters; ++k) seeded[k] = dynamics::independent(at[k], k);
-    const Answer exact = land<Dual>(thrown, seeded, kTolerance);
+    const Answer exact = land<Dual>(thrown, support::seeded(at), kTolerance);
     switches += static_cast<int>(exact.modes.size());
     for (int k = 0; k < kParameters; ++k) {
       const double scale = std::max(std::abs(at[k]), 1e-2);
@@ -134,9 +133,7 @@ TEST_P(Derivative, OfTheOpeningIsRightAtTheTolerancesOfFits) {
       profile.shape = Dual(shape);
       thrown.force = contact::ProfileNormalForce(profile);
       const auto at = parameters_of(thrown, 0.031);
-      std::array<Dual, kParameters> seeded;
-      for (int k = 0; k < kParameters; ++k) seeded[k] = dynamics::independent(at[k], k);
-      const Answer fit = land<Dual>(thrown, seeded, kFit, dynamics::Method::automatic);
+      const Answer fit = land<Dual>(thrown, support::seeded(at), kFit, dynamics::Method::automatic);
       for (const int k : {4, 6, 7}) {
         const double h = kStep * std::abs(at[k]);
         auto above = at, below = at;
@@ -162,9 +159,7 @@ TEST_P(Derivative, TheValuesAreThoseOfTheDoubleRun) {
   for (int i = 0; i < 10; ++i) {
     const auto thrown = support::random_throw(random, i % 2);
     const auto at = parameters_of(thrown, 0.031);
-    std::array<Dual, kParameters> seeded;
-    for (int k = 0; k < kParameters; ++k) seeded[k] = dynamics::independent(at[k], k);
-    const Answer a = land<Dual>(thrown, seeded, 1e-9), b = land<double>(thrown, at, 1e-9);
+    const Answer a = land<Dual>(thrown, support::seeded(at), 1e-9), b = land<double>(thrown, at, 1e-9);
     EXPECT_EQ(a.modes, b.modes) << describe(thrown);
     for (int j = 0; j < 4; ++j)
       EXPECT_NEAR(a.landing[j], b.landing[j], 1e-7 * std::max(1.0, std::abs(b.landing[j])))

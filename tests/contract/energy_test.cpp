@@ -11,10 +11,7 @@ namespace {
 class Energy : public EveryModel {
  protected:
   static release::ReleaseOptions options() {
-    release::ReleaseOptions o;
-    o.integrator = support::tight(1e-9, 1e-11);
-    o.ledger = true;
-    return o;
+    return {.integrator = {.tolerances = {1e-9, 1e-11}}, .ledger = true};
   }
 
   /// Calls `visit(sample, limits)` at several instants of every recorded step of random throws.

@@ -15,9 +15,7 @@ class Symmetry : public EveryModel {
   static release::ReleaseOptions options() {
     // The steps depend on the frame (errors are judged by component), so results agree to the integrator's
     // error: 1e-9 is asked for, 1e-11 relative per step.
-    release::ReleaseOptions o;
-    o.integrator = support::tight(1e-11, 1e-13);
-    return o;
+    return {.integrator = {.tolerances = {1e-11, 1e-13}}};
   }
   static void expect_same(const contact::Relative<double>& a, const contact::Relative<double>& b,
                           double tolerance, const std::string& inputs) {

@@ -93,8 +93,7 @@ TEST(CubeTosses, ResultIsALogThatRoundTrips) {
   const Scratch scratch;
   put_bytes(scratch / "t.csv", header + toss(0, 9, 2) + toss(4, 12, 0));
   const ThrowLog log = import_cube_tosses(scratch / "t.csv");
-  write_throw_log(scratch / "t.h5", log);
-  EXPECT_EQ(read_throw_log(scratch / "t.h5"), log);
+  EXPECT_EQ(reread(log), log);
 }
 
 // Columns are found by their names: another order, more of them, fewer that nobody reads, a byte order mark.
@@ -138,19 +137,6 @@ TEST(CubeTosses, LandingHeightClearsEveryOrientation) {
   put_bytes(scratch / "t.csv", header + toss(0, 9, 2));
   EXPECT_NEAR(import_cube_tosses(scratch / "t.csv").landing_height, std::hypot(0.0524, 0.0524, 0.0524),
               1e-15);
-}
-
-TEST(CubeTosses, OptionsChooseTheSplitAndTheMinimum) {
-  const Scratch scratch;
-  put_bytes(scratch / "t.csv", header + toss(0, 9, 2) + toss(1, 4, 2));
-  CubeTossOptions options;
-  options.min_samples = 3;
-  options.test_every = 2;
-  const ThrowLog log = import_cube_tosses(scratch / "t.csv", options);
-  ASSERT_EQ(log.throws.size(), 2U);
-  EXPECT_EQ(log.throws[1].split, Split::test);
-  options.min_samples = 1;
-  EXPECT_THROW(import_cube_tosses(scratch / "t.csv", options), std::invalid_argument);
 }
 
 TEST(CubeTosses, SaysWhichLineAndColumn) {

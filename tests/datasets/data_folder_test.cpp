@@ -12,10 +12,7 @@ namespace {
 namespace fs = std::filesystem;
 
 void expect_round_trip(const std::string& file) {
-  const Scratch scratch;
-  const ThrowLog log = read_throw_log(file);
-  write_throw_log(scratch / "copy.h5", log);
-  const ThrowLog back = read_throw_log(scratch / "copy.h5");
+  const ThrowLog log = read_throw_log(file), back = reread(log);
   ASSERT_EQ(back.throws.size(), log.throws.size());
   EXPECT_EQ(back.objects, log.objects);
   for (std::size_t k = 0; k < log.throws.size(); ++k) {
@@ -57,9 +54,7 @@ TEST(DataFolder, CubeTosses) {
   EXPECT_EQ(report.kept + int(report.dropped.size()), report.tosses);
   EXPECT_GT(report.kept, 500);
   EXPECT_NEAR(double(report.train) / report.test, 4, 0.2);
-  const Scratch scratch;
-  write_throw_log(scratch / "cube.h5", log);
-  EXPECT_EQ(read_throw_log(scratch / "cube.h5"), log);
+  EXPECT_EQ(reread(log), log);
   EXPECT_NEAR(summarise(log).groups.at(0).lowest_rate, 148, 0.5);
 }
 

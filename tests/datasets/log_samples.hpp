@@ -28,6 +28,13 @@ inline void put_bytes(const std::string& file, const std::string& bytes) {
   std::ofstream(file, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 
+/// The log as it comes back from a file.
+inline ThrowLog reread(const ThrowLog& log) {
+  const Scratch scratch;
+  write_throw_log(scratch / "log.h5", log);
+  return read_throw_log(scratch / "log.h5");
+}
+
 /// The same bits, NaN included.
 inline bool same_bits(const Series& a, const Series& b) {
   const auto same = [](const std::vector<double>& u, const std::vector<double>& v) {

@@ -13,6 +13,7 @@
 #include <random>
 #include <sstream>
 
+#include "tests/support/refusal.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace unhand::datasets {
@@ -35,12 +36,7 @@ ModelCard small_card() {
 
 /// The error of a text that must be refused.
 std::string refusal(const std::string& text) {
-  try {
-    parse_model_card(text, "c.json");
-  } catch (const CardError& error) {
-    return error.what();
-  }
-  return "accepted";
+  return support::refusal<CardError>([&] { parse_model_card(text, "c.json"); });
 }
 
 /// The small card with one thing changed.

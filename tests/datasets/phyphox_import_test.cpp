@@ -144,9 +144,7 @@ TEST(Phyphox, ThrowsGoIntoALog) {
   fall.object = "phone";
   fall.condition = "fall";
   log.throws.push_back(fall);
-  const Scratch scratch;
-  write_throw_log(scratch / "falls.h5", log);
-  EXPECT_EQ(read_throw_log(scratch / "falls.h5"), log);
+  EXPECT_EQ(reread(log), log);
 }
 
 // Columns in another unit than the header says would be a log of falls that never were.
@@ -173,16 +171,13 @@ TEST(Phyphox, RefusesOtherUnits) {
 // Readings that stand still on their grid have its rounding as their noise: no noise at all would outvote all
 // others.
 TEST(Phyphox, TheNoiseIsNotBelowThatOfRounding) {
-  const Scratch scratch;
-  const std::string file = scratch / "phone.csv";
   std::ostringstream out;
   out << header;
   for (int k = 0; k < 400; ++k) {
     const double t = 0.005 * k, up = t < 1 || t > 1.65 ? 9.75 + 0.15 * (k % 3) : 0.3;
     out << t << ",0.45," << 0.15 * (k % 2) << ',' << up << '\n';
   }
-  put_bytes(file, out.str());
-  const auto recording = read_phyphox(file);
+  const auto recording = read(out.str());
   ASSERT_EQ(recording.falls.size(), 1U);
   const auto& sigma = recording.falls[0].imu->specific_force.sigma;
   ASSERT_EQ(sigma.size(), 3U);
@@ -193,16 +188,13 @@ TEST(Phyphox, TheNoiseIsNotBelowThatOfRounding) {
 
 // A phone that is thrown hard reads far from gravity outside of its fall.
 TEST(Phyphox, AHardThrowIsNoOtherUnit) {
-  const Scratch scratch;
-  const std::string file = scratch / "phone.csv";
   std::ostringstream out;
   out << header;
   for (int k = 0; k < 400; ++k) {
     const double t = 0.005 * k, up = t < 1 ? 20 + 3 * std::sin(9 * t) : t > 1.65 ? 25 : 0.2;
     out << t << ",0.1,-0.2," << up << '\n';
   }
-  put_bytes(file, out.str());
-  const auto recording = read_phyphox(file);
+  const auto recording = read(out.str());
   EXPECT_EQ(recording.falls.size(), 1U);
   EXPECT_GT(recording.rest.value(), 18);  // as thrown: told, not refused
 }

@@ -238,7 +238,7 @@ TEST(PlanarPushes, SaysWhichLineAndColumn) {
   expect_error<ImportError>([&] { import_planar_pushes(std::vector<fs::path>{scratch / "empty"}); },
                             scratch / "empty", "", "without .txt files");
   PlanarPushOptions options;
-  options.step = 0;
+  options.block.mass = 0;
   EXPECT_THROW(import_planar_pushes(std::vector<fs::path>{file}, options), std::invalid_argument);
 }
 

@@ -9,7 +9,6 @@ namespace unhand::dynamics {
 namespace {
 
 using support::best_difference;
-using support::best_differences;
 
 class Derivatives : public testing::TestWithParam<Method> {
  protected:
@@ -87,13 +86,12 @@ auto kicked(Dual c, Dual k, Dual level, Dual b, Dual r) {
 }
 
 TEST_P(Derivatives, EveryTermOfTheJumpOfTheSensitivity) {
-  const double p[8] = {0.3, 2.0, 0.1, 0.7, 0.6, 1.0, 0.2, 0.05};  // c, k, level, b, r, x0, v0, t0
+  const std::array p{0.3, 2.0, 0.1, 0.7, 0.6, 1.0, 0.2, 0.05};  // c, k, level, b, r, x0, v0, t0
   auto integrate_with = [this](const std::array<Dual, 8>& q) {
     return integrate<Dual, 2>(kicked(q[0], q[1], q[2], q[3], q[4]),
                               Entry<Dual, 2>{0, q[7], {q[5], q[6]}, Dual(0)}, Dual(2.0), options());
   };
-  std::array<Dual, 8> seeded;
-  for (int k = 0; k < 8; ++k) seeded[k] = independent(p[k], k);
+  std::array<Dual, 8> seeded = support::seeded(p);
   const auto end = integrate_with(seeded);
   ASSERT_EQ(end.events.size(), 1u);
   // Which slot a parameter takes must not matter: the integrator uses slots of its own for slopes and
@@ -106,15 +104,10 @@ TEST_P(Derivatives, EveryTermOfTheJumpOfTheSensitivity) {
         EXPECT_NEAR(turned.y[i].v[(k + first) % 8], end.y[i].v[k], 1e-10)
             << first << k;  // the order of iterations
   }
-  for (int k = 0; k < 8; ++k) {
-    const auto f = [&](double x) {
-      std::array<Dual, 8> q;
-      for (int j = 0; j < 8; ++j) q[j] = Dual(j == k ? x : p[j]);
-      const auto y = integrate_with(q).y;
-      return std::array{y[0].a, y[1].a};
-    };
+  const auto state = [&](const std::array<Dual, 8>& q) { return integrate_with(q).y; };
+  for (std::size_t k = 0; k < 8; ++k) {
     // The bottom of the V: truncation 1e-8, rounding and step-control noise 1e-13 over a step of 1e-4.
-    const auto off = best_differences<2>(f, p[k], {end.y[0].v[k], end.y[1].v[k]});
+    const auto off = support::best_differences_by(k, state, p, end.y);
     for (std::size_t i = 0; i < 2; ++i) EXPECT_LT(off[i], 3e-8) << "parameter " << k << " component " << i;
   }
 }

@@ -8,6 +8,8 @@
 #include <string>
 #include <tuple>
 
+#include "tests/support/refusal.hpp"
+
 namespace unhand::dynamics {
 namespace {
 
@@ -30,12 +32,7 @@ TEST(RequireInRange, TakesBothEndsAndTheLeast) {
   for (const double x : {-1.0, 5.0}) EXPECT_NO_THROW(require_in_range(effect, force, x));
   for (const double x : {-2.0, 1.0}) EXPECT_NO_THROW(require_in_range(effect, share, x));
   const auto refusal = [&](const EffectParameter& p, double x) {
-    try {
-      require_in_range(effect, p, x);
-    } catch (const std::invalid_argument& e) {
-      return std::string(e.what());
-    }
-    return std::string("accepted");
+    return support::refusal([&] { require_in_range(effect, p, x); });
   };
   EXPECT_EQ(refusal(force, 5.5), "contact.glue.force = 5.5 is not in [-1, 5] N");
   EXPECT_EQ(refusal(share, -2.5), "contact.glue.share = -2.5 is not in [-2, 1]");

@@ -97,9 +97,8 @@ TEST(SplineFit, ReproducesAQuinticFromAnyOfItsDerivatives) {
     problem.end = t.back();
     // equal sigma in SI units: the second derivative weighs 1/h² more, the hardest case for the conditioning
     for (int k = 0; k < 3; ++k) problem.observations.push_back({k, t, y[k], {1e-6}});
-    SplineOptions options;
-    options.initial_intervals = intervals;
-    const auto fit = fit_spline(problem, options);
+    for (int k = 1; k < intervals; ++k) problem.breaks.push_back({t0 + 0.3 * k / intervals, 4});
+    const auto fit = fit_spline(problem);
     for (double x = t.front(); x < t.back(); x += 0.7e-3) {
       const auto j = fit.polynomial.at(kAlways, x);
       EXPECT_NEAR(j.value[0], f(x, 0), 2e-11) << intervals;  // times near 1000 s round to 1e-13 s
@@ -120,13 +119,10 @@ TEST(SplineFit, KeepsTheContinuityAskedFor) {
     SplineProblem<1, 5> problem;
     problem.begin = t.front();
     problem.end = t.back();
-    problem.breaks = {{0.1, continuity}};
+    for (double b : {0.03, 0.07, 0.1, 0.13, 0.17}) problem.breaks.push_back({b, b == 0.1 ? continuity : 4});
     problem.observations = {{0, t, y, {1e-3}}};
     problem.end_value = {0.25};
-    SplineOptions options;
-    options.initial_intervals = 3;
-    options.refine = false;
-    const auto fit = fit_spline(problem, options);
+    const auto fit = fit_spline(problem);
     EXPECT_NEAR(fit.polynomial.value(kAlways, t.back())[0], 0.25, 1e-12);
     for (double b : fit.polynomial.breaks()) {
       if (b == t.front() || b == t.back()) continue;

@@ -311,19 +311,11 @@ TYPED_TEST(WithDual, IsThatOfTheSolution) {
     while (stepper.t1().a < 3.0) EXPECT_EQ(stepper.step(Dual(3.0), 0.1), StepStatus::accepted);
     return stepper.y1();
   };
-  const double p[5] = {4.0, 0.5, 1.0, -0.2, 0.3};
-  std::array<Dual, 5> seeded;
-  for (int k = 0; k < 5; ++k) seeded[k] = independent(p[k], k);
-  const auto y = at_end(seeded);
-  for (int k = 0; k < 5; ++k) {
-    const auto f = [&](double x) {
-      std::array<Dual, 5> q;
-      for (int j = 0; j < 5; ++j) q[j] = Dual(j == k ? x : p[j]);
-      const auto end = at_end(q);
-      return std::array{end[0].a, end[1].a};
-    };
+  const std::array p{4.0, 0.5, 1.0, -0.2, 0.3};
+  const auto exact = at_end(support::seeded(p));
+  for (std::size_t k = 0; k < 5; ++k) {
     // The bottom of the V: truncation 1e-8 against step-control noise 1e-10 over 1e-4 to 1e-3.
-    const auto off = support::best_differences<2>(f, p[k], {y[0].v[k], y[1].v[k]});
+    const auto off = support::best_differences_by(k, at_end, p, exact);
     for (std::size_t i = 0; i < 2; ++i) EXPECT_LT(off[i], 2e-7) << "parameter " << k << " component " << i;
   }
 }

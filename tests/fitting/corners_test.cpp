@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "fitting/discovery/discover.hpp"
+#include "tests/fitting/loop_campaign.hpp"
 #include "tests/support/small_campaign.hpp"
 
 namespace unhand::fitting {
@@ -137,9 +138,7 @@ TEST_P(Corners, FitAnswers) {
 
 TEST_P(Corners, DiscoverAnswers) {
   const std::string answer = answered([] {
-    DiscoverOptions options;
-    options.campaign.model = "limit_surface_disc";
-    options.campaign.integrator.tolerances = {1e-5, 1e-8};
+    DiscoverOptions options = support::loop_options();
     options.refits = 1;
     const Discovery found = discover(GetParam().log(), "(in memory)", options);
     EXPECT_GT(found.seconds, 0);

@@ -15,23 +15,18 @@
 #include "fitting/discovery/stage.hpp"
 #include "tests/fitting/found_size.hpp"
 #include "tests/fitting/loop_campaign.hpp"
+#include "tests/support/refusal.hpp"
 
 namespace unhand::fitting {
 namespace {
 
+using support::named;
+
 Discovery found_in(const datasets::ThrowLog& log, std::vector<std::string> forget = {}) {
-  DiscoverOptions options;
-  options.campaign.model = "limit_surface_disc";
-  options.campaign.integrator.tolerances = {1e-5, 1e-8};
+  DiscoverOptions options = support::loop_options();
   options.forget = std::move(forget);
   options.refits = 3;
   return discover(log, "synthetic", options);
-}
-
-const AcceptedEffect* named(const Discovery& found, const std::string& id) {
-  for (const auto& effect : found.effects)
-    if (effect.id == id) return &effect;
-  return nullptr;
 }
 
 /// How far a footprint is from the base model's residual: the mean of |log(rms / rms)| over the bins that are
@@ -50,18 +45,13 @@ double unlike_the_residual(const Discovery& found, const FootprintTrace& footpri
 }
 
 TEST(DiscoverOptions, ThatMeanNothingAreRefused) {
-  const auto complaint = [](auto change) -> std::string {
+  const auto complaint = [](auto change) {
     DiscoverOptions options;
     change(options);
-    try {
-      validate(options);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "";
+    return unhand::support::refusal([&] { validate(options); });
   };
-  EXPECT_EQ(complaint([](auto&) {}), "");
-  EXPECT_EQ(complaint([](auto& o) { o.forget = {"flight.wind", "contact.law:limit_surface"}; }), "");
+  EXPECT_EQ(complaint([](auto&) {}), "accepted");
+  EXPECT_EQ(complaint([](auto& o) { o.forget = {"flight.wind", "contact.law:limit_surface"}; }), "accepted");
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(complaint([&](auto& o) { o.family_wise_level = nan; }),
             "family_wise_level = nan is not in (0, 1)");
@@ -363,11 +353,8 @@ TEST(Discovery, TwoEffectsAtOnceAreBothFound) {
 // Pads of the sliding pivot cannot give: of ones that do, it lacks another law, and in that their give.
 TEST(Discovery, AGiveIsFoundBehindALawWhosePadsCannot) {
   constexpr double kGive = 2e-5;  // m/N
-  DiscoverOptions options;
-  options.campaign.model = "sliding_pivot";
-  options.campaign.integrator.tolerances = {1e-5, 1e-8};
-  const Discovery found =
-      discover(support::loop_campaign({{"contact.pad_compliance.compliance", kGive}}), "synthetic", options);
+  const Discovery found = discover(support::loop_campaign({{"contact.pad_compliance.compliance", kGive}}),
+                                   "synthetic", support::loop_options("sliding_pivot"));
   ASSERT_EQ(found.verdict, Verdict::effect_found);
   EXPECT_EQ(found.effects.front().id, "contact.law:limit_surface_disc");
   support::expect_size(found, "contact.pad_compliance", kGive);
@@ -376,10 +363,8 @@ TEST(Discovery, AGiveIsFoundBehindALawWhosePadsCannot) {
 }
 
 TEST(Discovery, OfTheWrongLawTheRightOneIsMissing) {
-  DiscoverOptions options;
-  options.campaign.model = "sliding_pivot";
-  options.campaign.integrator.tolerances = {1e-5, 1e-8};
-  const Discovery found = discover(support::loop_campaign({}), "synthetic", options);
+  const Discovery found =
+      discover(support::loop_campaign({}), "synthetic", support::loop_options("sliding_pivot"));
   ASSERT_EQ(found.verdict, Verdict::effect_found);
   EXPECT_EQ(found.effects.front().id, "contact.law:limit_surface_disc");
   EXPECT_EQ(found.model, "limit_surface_disc");
@@ -388,10 +373,8 @@ TEST(Discovery, OfTheWrongLawTheRightOneIsMissing) {
 
 // A delay knows nothing of pads: its throws have other unknowns of their own than those of a law.
 TEST(Discovery, OfThePureDelayALawIsMissing) {
-  DiscoverOptions options;
-  options.campaign.model = "gripper_delay";
-  options.campaign.integrator.tolerances = {1e-5, 1e-8};
-  const Discovery found = discover(support::loop_campaign({}), "synthetic", options);
+  const Discovery found =
+      discover(support::loop_campaign({}), "synthetic", support::loop_options("gripper_delay"));
   ASSERT_EQ(found.verdict, Verdict::effect_found);
   EXPECT_EQ(found.effects.front().id, "contact.law:limit_surface_disc");
   EXPECT_FALSE(found.unexplained.has_value());

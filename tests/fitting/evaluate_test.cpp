@@ -9,6 +9,7 @@
 #include "fitting/advice.hpp"
 #include "fitting/card.hpp"
 #include "fitting/distributions.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/small_campaign.hpp"
 
@@ -190,13 +191,8 @@ TEST(Card, HoldsEffectsAndRefusesUnknownOnes) {
   const CampaignProblem again(log_of_disc(), "(in memory)", options);
   EXPECT_EQ(fit_of(card, again, "card.json").values(), made.values());
 
-  const auto refusal = [](const datasets::ModelCard& bad) -> std::string {
-    try {
-      options_of(bad, "card.json");
-    } catch (const datasets::CardError& error) {
-      return error.what();
-    }
-    return "accepted";
+  const auto refusal = [](const datasets::ModelCard& bad) {
+    return unhand::support::refusal<datasets::CardError>([&] { options_of(bad, "card.json"); });
   };
   auto bad = card;
   bad.effects.push_back("flight.sorcery");

@@ -14,9 +14,12 @@
 #include "fitting/measured/measured_discovery.hpp"
 #include "fitting/slips/surface_discovery.hpp"
 #include "slip_simulator.hpp"
+#include "tests/fitting/found_size.hpp"
 
 namespace unhand::fitting {
 namespace {
+
+using support::named;
 
 struct Truth {
   double bias_x{}, bias_y{}, bias_z{}, drag{}, drift_z{};
@@ -89,11 +92,6 @@ datasets::ThrowLog falls(const Truth& truth, int n, unsigned seed) {
   return log;
 }
 
-const AcceptedEffect* named(const MeasuredDiscovery& found, const std::string& id) {
-  for (const auto& e : found.effects)
-    if (e.id == id) return &e;
-  return nullptr;
-}
 double value_of(const AcceptedEffect& effect, const std::string& name) {
   for (const auto& p : effect.parameters)
     if (p.name == name) return p.value;

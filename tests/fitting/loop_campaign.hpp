@@ -4,11 +4,21 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <string>
 
 #include "experiment/campaign_effects.hpp"
 #include "experiment/synthetic_campaign.hpp"
+#include "fitting/discovery/discover.hpp"
 
 namespace unhand::fitting::support {
+
+/// Tolerances that are fast enough for tests.
+inline DiscoverOptions loop_options(const std::string& model = "limit_surface_disc") {
+  DiscoverOptions options;
+  options.campaign.model = model;
+  options.campaign.integrator.tolerances = {1e-5, 1e-8};
+  return options;
+}
 
 /// 24 throws of two bars, six conditions each, two repetitions.
 inline experiment::CampaignDesign loop_design() {

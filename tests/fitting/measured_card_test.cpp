@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/refusal.hpp"
 #include "tests/support/spatial_flights.hpp"
 
 namespace unhand::fitting {
@@ -61,13 +62,9 @@ TEST(MeasuredCard, NoEffectsAreTheBaseModel) {
 }
 
 TEST(MeasuredCard, WhatALogOrTheLibraryLacksIsRefusedByName) {
-  const auto refusal = [](const datasets::ModelCard& card) -> std::string {
-    try {
-      compare_with_card(card, "card.json", dragged(), 1);
-    } catch (const datasets::CardError& error) {
-      return error.what();
-    }
-    return "";
+  const auto refusal = [](const datasets::ModelCard& card) {
+    return unhand::support::refusal<datasets::CardError>(
+        [&] { compare_with_card(card, "card.json", dragged(), 1); });
   };
   auto card = card_with(kDrag);
   card.effects = {"flight.phlogiston"};

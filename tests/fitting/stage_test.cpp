@@ -26,9 +26,8 @@ TEST(Stage, AShapeThatTheLogLeavesOpenIsHeldAndTheSizeIsKnownForIt) {
   experiment::CampaignDesign design = experiment::campaign_design("quick12");
   design.sensors.mocap = false;
   design.effects = {{"sensor.length_scale.scale", kScale}, {"sensor.length_scale.landing_share", 1}};
-  DiscoverOptions options;
+  DiscoverOptions options = support::loop_options();
   options.campaign.effects = {"sensor.length_scale"};
-  options.campaign.integrator.tolerances = {1e-5, 1e-8};
   const auto log = experiment::generate_campaign(design, 8);
   Stage stage{CampaignProblem(log, "synthetic", options.campaign), {}, {}, {}};
   auto start = stage.problem.start();
@@ -51,9 +50,7 @@ TEST(Stage, AShapeThatTheLogLeavesOpenIsHeldAndTheSizeIsKnownForIt) {
 // From another law back to the one that the loop began with: that is no effect.
 TEST(Selection, TheBaseLawIsNoEffect) {
   const auto log = support::loop_campaign({});  // of the disc
-  DiscoverOptions options;
-  options.campaign.model = "limit_surface_disc";
-  options.campaign.integrator.tolerances = {1e-5, 1e-8};
+  DiscoverOptions options = support::loop_options();
   options.refits = 1;
   const std::string other = std::string(kLaw) + "sliding_pivot";
   auto wrong = options.campaign;
@@ -232,9 +229,7 @@ TEST(Misfit, IsExplainedWhereMostOfItGoes) {
 // the lift is withdrawn, nothing speaks for the law, and it goes, too.
 TEST(Selection, WhatHasNoEvidenceWithoutWhatIsWithdrawnGoesWithIt) {
   const auto log = support::loop_campaign({});  // of the disc
-  DiscoverOptions options;
-  options.campaign.model = "limit_surface_disc";
-  options.campaign.integrator.tolerances = {1e-5, 1e-8};
+  DiscoverOptions options = support::loop_options();
   Stage base{CampaignProblem(log, "synthetic", options.campaign), {}, {}, {}};
   solve(base, options, {});
   const std::string law = std::string(kLaw) + "limit_surface", lift = "flight.magnus_lift";
@@ -262,9 +257,7 @@ TEST(Selection, WhatHasNoEvidenceWithoutWhatIsWithdrawnGoesWithIt) {
 TEST(Selection, TheLastEffectIsJudgedAgainBesideTheGiveThatWasFittedAlong) {
   const auto log = support::loop_campaign({{"contact.pad_compliance.compliance", 4e-7}});  // some 20 um
   const std::string delay = "release.opening_delay";
-  DiscoverOptions options;
-  options.campaign.model = "limit_surface_disc";
-  options.campaign.integrator.tolerances = {1e-5, 1e-8};
+  DiscoverOptions options = support::loop_options();
   Stage base{CampaignProblem(log, "synthetic", options.campaign), {}, {}, {}};
   solve(base, options, {});
   Stage stage{base.problem.with(options.campaign.model, {delay}), {}, {}, {delay}};
@@ -412,10 +405,8 @@ TEST(Footprints, AClockThatIsOffTheOtherWayIsNoLagOfTheHand) {
 // The quartic has an unknown that the ellipsoid has not, and the other way round.
 TEST(Separating, ALawIsToldFromAnEffectByExperiments) {
   for (const char* law : {"limit_surface", "limit_surface_quartic"}) {
-    DiscoverOptions options;
-    options.campaign.model = law;
+    DiscoverOptions options = support::loop_options(law);
     options.campaign.effects = {"contact.viscous"};
-    options.campaign.integrator.tolerances = {1e-5, 1e-8};
     Stage stage{CampaignProblem(support::loop_campaign({{"contact.viscous.1/v_0", 2}}), "synthetic",
                                 options.campaign),
                 {},
@@ -451,10 +442,8 @@ TEST(Separating, ALawIsToldFromAnEffectByExperiments) {
 TEST(Separating, AnExperimentBringsWhatItPromised) {
   experiment::CampaignDesign design = support::loop_design();
   design.effects = {{"sensor.mocap_time_offset.offset", 0.004}};
-  DiscoverOptions options;
-  options.campaign.model = "limit_surface_disc";
+  DiscoverOptions options = support::loop_options();
   options.campaign.effects = {"sensor.mocap_time_offset"};
-  options.campaign.integrator.tolerances = {1e-5, 1e-8};
   AcceptedEffect accepted;
   accepted.id = "sensor.mocap_time_offset";
   const auto asked = [&](const datasets::ThrowLog& log) {

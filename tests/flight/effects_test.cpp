@@ -9,6 +9,7 @@
 #include "dynamics/gravity_effects.hpp"
 #include "flight/fly.hpp"
 #include "tests/flight/tight.hpp"
+#include "tests/support/best_difference.hpp"
 
 namespace unhand::flight {
 namespace {
@@ -33,20 +34,11 @@ std::array<S, 4> land(const std::array<S, kParameters>& p) {
 }
 
 void expect_gradient(const std::array<double, kParameters>& at, const char* where) {
-  std::array<Dual, kParameters> seeded;
-  for (int k = 0; k < kParameters; ++k) seeded[k] = dynamics::independent(at[k], k);
-  const auto exact = land(seeded);
+  const auto exact = land(support::seeded(at));
   for (int k = 0; k < kParameters; ++k) {
     if (k == 0 && at[0] == 0) continue;  // drag is one-sided there
-    std::array<double, 4> best{1e300, 1e300, 1e300, 1e300};
-    for (const double h : {1e-3, 1e-4, 1e-5}) {
-      auto above = at, below = at;
-      above[k] += h;
-      below[k] -= h;
-      const auto a = land(above), b = land(below);
-      for (int j = 0; j < 4; ++j)
-        best[j] = std::min(best[j], std::abs((a[j] - b[j]) / (2 * h) - exact[j].v[k]));
-    }
+    const auto best =
+        support::best_differences_by(static_cast<std::size_t>(k), land<double>, at, exact, 1e-3);
     for (int j = 0; j < 4; ++j)
       EXPECT_LT(best[j], 1e-7 * std::max(1.0, std::abs(exact[j].v[k])))
           << where << ": answer " << j << " by " << kNames[k] << ", slope " << exact[j].v[k];

@@ -13,6 +13,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "tests/support/best_difference.hpp"
+
 namespace unhand::flight {
 namespace {
 
@@ -121,14 +123,12 @@ TEST(FlowMap, GradientIsTheCentralDifferenceWithDrag) {
     ASSERT_TRUE(flow);
     const std::array<double State::*, 4> members{&State::r, &State::z, &State::r_rate, &State::z_rate};
     for (int i = 0; i < 4; ++i) {
-      double best = INFINITY;
-      for (double step = 1e-1; step > 0.5e-7; step *= 0.1) {
-        State up = at, down = at;
-        up.*members[i] += step;
-        down.*members[i] -= step;
-        const double slope = (flow_map(up, medium)->landing - flow_map(down, medium)->landing) / (2 * step);
-        best = std::min(best, std::abs(slope - flow->gradient[i]));
-      }
+      const auto landing = [&](double value) {
+        State moved = at;
+        moved.*members[i] = value;
+        return flow_map(moved, medium)->landing;
+      };
+      const double best = support::best_difference(landing, at.*members[i], flow->gradient[i]);
       // The bottom of the V: the integrator's steps, chosen to 1e-8, scatter by some 1e-9 of the landing.
       EXPECT_LT(best, k > 0 ? 1e-5 : 1e-8) << i;
     }

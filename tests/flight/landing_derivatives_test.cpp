@@ -12,8 +12,6 @@
 namespace unhand::flight {
 namespace {
 
-using support::best_differences;
-
 using dynamics::Dual;
 using dynamics::independent;
 
@@ -46,26 +44,12 @@ TEST_P(LandingDerivatives, AgreeWithCentralDifferences) {
     return std::array<Dual, 7>{l.flight_time, l.pose.x,   l.pose.z,     l.pose.theta,
                                l.twist.vx,    l.twist.vz, l.twist.omega};
   };
-  for (const int first : {0, 8}) {
-    const int last = first == 0 ? 8 : 10;
-    std::array<Dual, 10> seeded;
-    for (int k = 0; k < 10; ++k)
-      seeded[k] = k >= first && k < last ? independent(p[k], k - first) : Dual(p[k]);
-    const auto end = land(seeded);
-    for (int k = first; k < last; ++k) {
+  for (const std::size_t first : {0, 8}) {
+    const auto exact = land(support::seeded(p, first));
+    for (std::size_t k = first; k < (first == 0 ? 8 : 10); ++k) {
       if (k == 6 && p[k] == 0) continue;  // drag has one side at zero: below
-      const auto f = [&](double value) {
-        std::array<Dual, 10> x;
-        for (int j = 0; j < 10; ++j) x[j] = Dual(j == k ? value : p[j]);
-        const auto landed = land(x);
-        std::array<double, 7> out;
-        for (std::size_t i = 0; i < 7; ++i) out[i] = landed[i].a;
-        return out;
-      };
-      std::array<double, 7> derivative;
-      for (std::size_t i = 0; i < 7; ++i) derivative[i] = end[i].v[k - first];
       // The bottom of the V: truncation of order 10 step², noise of the steps' choice 1e-12 over the step.
-      const auto off = best_differences<7>(f, p[k], derivative);
+      const auto off = support::best_differences_by(k, land, p, exact, 1e-1, first);
       for (std::size_t i = 0; i < 7; ++i) EXPECT_LT(off[i], 5e-7) << "parameter " << k << " component " << i;
     }
   }

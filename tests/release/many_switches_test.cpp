@@ -55,7 +55,7 @@ class ManySwitches : public testing::TestWithParam<const char*> {
     return support::SwayingHand(c, periods * kPeriod);
   }
   static dynamics::IntegratorOptions options() {
-    auto o = support::tight(1e-6, 1e-8);
+    dynamics::IntegratorOptions o{.tolerances = {1e-6, 1e-8}};
     o.event_budget = 20'000;
     o.step_budget = 2'000'000;
     return o;
@@ -128,9 +128,7 @@ TEST_P(ManySwitches, EachIsLoggedWithTheStateOfItsInstant) {
   // μ g/A = 0.4: the slip stops and sets in again the other way at once. At that instant the slip is zero, in
   // the event log and in the recorded trajectory.
   const support::ConstantForce force(0.4 * kMass * kShaking);
-  auto o = support::tight(1e-9, 1e-11);
-  o.record = true;
-  const auto result = run(shaken(10), force, o);
+  const auto result = run(shaken(10), force, {.tolerances = {1e-9, 1e-11}, .record = true});
   int reversals = 0;
   for (const auto& event : result.events) {
     const auto slip = [&](double t) {

@@ -34,7 +34,7 @@ Detached<S> detach(const std::string& law, const RandomThrow& thrown,
                                            {},
                                            S(0.0)};
   release::ReleaseOptions options;
-  options.integrator = tight(tolerance, 1e-2 * tolerance);
+  options.integrator.tolerances = {tolerance, 1e-2 * tolerance};
   // one method for both scalars: the double runs then follow the same steps
   if (law != "sliding_pivot") options.integrator.method = dynamics::Method::radau;
   const auto result = simulate_release(problem, options);

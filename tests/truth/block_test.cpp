@@ -24,10 +24,7 @@ class Block : public testing::TestWithParam<const char*> {
                                      dynamics::Vec2<double> slip = {}) {
     const release::ReleaseProblem<double> problem{hand, force, *model, {kMass, 1e-3}, gravity, {0, 0},
                                                   0.0,  slip,  0.0};
-    release::ReleaseOptions options;
-    options.integrator = support::tight(1e-10, 1e-12);
-    options.integrator.record = true;
-    auto result = simulate_release(problem, options);
+    auto result = simulate_release(problem, {.integrator = {.tolerances = {1e-10, 1e-12}, .record = true}});
     EXPECT_EQ(result.outcome, release::ReleaseOutcome::never_separated);
     words = mode_events(problem, result);
     return result;

@@ -30,9 +30,8 @@ BarLetGo release_with(double excess, double tolerance = 1e-9) {
   const release::ReleaseProblem<double> problem{
       hand, force, model, {LevelBar::mass, LevelBar::inertia}, {0, -9.81}, {LevelBar::lever, 0},
       0.0,  {},    0.0};
-  release::ReleaseOptions options;
-  options.integrator = support::tight(tolerance, 0.01 * tolerance);
-  const auto result = simulate_release(problem, options);
+  const auto result =
+      simulate_release(problem, {.integrator = {.tolerances = {tolerance, 0.01 * tolerance}}});
   EXPECT_EQ(result.outcome, release::ReleaseOutcome::detached) << excess;
   const auto words = mode_events(problem, result);
   return {result.detach.twist.omega, result.detach.twist.vz, words.at(words.size() - 2).mode};

@@ -82,9 +82,7 @@ struct Scene {
   }
   release::ReleaseProblem<double> problem() const { return support::problem_of(thrown, *model); }
   Twist<double> disc() const {
-    release::ReleaseOptions options;
-    options.integrator = support::tight(1e-9, 1e-11);
-    const auto result = simulate_release(problem(), options);
+    const auto result = simulate_release(problem(), {.integrator = {.tolerances = {1e-9, 1e-11}}});
     EXPECT_EQ(result.outcome, release::ReleaseOutcome::detached);
     return result.detach.twist;
   }
@@ -163,9 +161,7 @@ TEST(DistributedPatch, AFreeDiscStopsAsFarkasFound) {
   const auto model = contact::make_contact_model("limit_surface_disc", parameters);
   const release::ReleaseProblem<double> problem{hand,   force, *model,           {1.0, 0.5}, {0, 0},
                                                 {0, 0}, 0.0,   {0.3 * kUnit, 0}, kUnit};
-  release::ReleaseOptions tight;
-  tight.integrator = support::tight(1e-10, 1e-14);
-  const auto exact = simulate_release(problem, tight).relative;
+  const auto exact = simulate_release(problem, {.integrator = {.tolerances = {1e-10, 1e-14}}}).relative;
   PatchOptions options;
   options.step = 1e-3;
   const auto points = simulate_distributed_patch(problem, {1.0, 1.0, disc_points(24), 1}, options);

@@ -42,10 +42,8 @@ Rest stop(double k, double slip, double spin, double direction = 0) {
       hand,         force,  model, {1.0, k},
       {0, 0},       {0, 0}, 0.0,   {kSpeed * slip * std::cos(direction), kSpeed * slip * std::sin(direction)},
       kSpeed * spin};
-  release::ReleaseOptions options;
-  options.integrator = support::tight(1e-11, 1e-14);
-  options.integrator.record = true;
-  const auto result = simulate_release(problem, options);
+  const auto result =
+      simulate_release(problem, {.integrator = {.tolerances = {1e-11, 1e-14}, .record = true}});
   EXPECT_EQ(result.outcome, release::ReleaseOutcome::never_separated);
   EXPECT_TRUE(result.slips_at_start);
   EXPECT_EQ(result.relative.slip.x, 0.0);  // at rest, exactly
@@ -159,10 +157,8 @@ TEST(FreeDisc, TheEllipsoidFollowsItsPowerLaw) {
   const support::ConstantForce force(kStrong);
   const LimitSurface<Ellipsoid> model("limit surface", Patch<double>{1.0, 1.0, 2.0 / 3, 1});
   const ReleaseProblem<double> problem{hand, force, model, {1.0, k}, {0, 0}, {0, 0}, 0.0, {0.3, 0}, 1.0};
-  release::ReleaseOptions options;
-  options.integrator = support::tight(1e-11, 1e-13);
-  options.integrator.record = true;
-  const auto result = simulate_release(problem, options);
+  const auto result =
+      simulate_release(problem, {.integrator = {.tolerances = {1e-11, 1e-13}, .record = true}});
   int seen = 0;
   for (const auto& piece : result.trajectory.pieces) {
     const auto y = Relative<double>::from(piece.nodes[0]);
@@ -181,9 +177,7 @@ double time_to_rest(const Model& model, double inertia, dynamics::Vec2<double> s
   const auto hand = support::still_hand(10);
   const support::ConstantForce force(4.0);  // N; two pads of 0.5: 4 N on 1 kg
   const ReleaseProblem<double> problem{hand, force, model, {1.0, inertia}, {0, 0}, {0, 0}, 0.0, slip, spin};
-  release::ReleaseOptions options;
-  options.integrator = support::tight(1e-10, 1e-12);
-  const auto result = simulate_release(problem, options);
+  const auto result = simulate_release(problem, {.integrator = {.tolerances = {1e-10, 1e-12}}});
   EXPECT_EQ(result.outcome, release::ReleaseOutcome::never_separated);
   for (const auto& event : result.events)
     if (event.kind == dynamics::EventKind::guard) return event.t;

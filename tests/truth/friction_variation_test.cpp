@@ -34,9 +34,7 @@ class FrictionVariationTruth : public testing::TestWithParam<const char*> {
     const auto model = law(variation);
     const release::ReleaseProblem<double> problem{
         hand, force, *model, {kBodyMass, kInertia}, {0, 0}, {0, 0.3}, 0.0, {}, 0.0};
-    release::ReleaseOptions options;
-    options.integrator = support::tight(1e-10, 1e-12);
-    const auto result = simulate_release(problem, options);
+    const auto result = simulate_release(problem, {.integrator = {.tolerances = {1e-10, 1e-12}}});
     EXPECT_EQ(result.outcome, release::ReleaseOutcome::detached);
     for (const auto& event : result.events)
       if (event.kind == dynamics::EventKind::guard) return {event.t, result.detach.time};
@@ -50,10 +48,7 @@ class FrictionVariationTruth : public testing::TestWithParam<const char*> {
     const auto model = law(variation);
     const release::ReleaseProblem<double> problem{
         hand, force, *model, {kBodyMass, kInertia}, {0, 0}, {0, 0}, 0.0, {speed, 0}, spin};
-    release::ReleaseOptions options;
-    options.integrator = support::tight(1e-10, 1e-12);
-    options.integrator.record = true;
-    return simulate_release(problem, options).relative;
+    return simulate_release(problem, {.integrator = {.tolerances = {1e-10, 1e-12}, .record = true}}).relative;
   }
   /// The block's path and speed [m, m/s] after `t`, thrown at `speed`.
   std::pair<double, double> slide(double speed, const Variation& variation, double t) {

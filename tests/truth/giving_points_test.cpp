@@ -193,10 +193,8 @@ struct Recorded {
     p.patch = {kMu, kRadius};
     p.variation = pads.variation();
     model = contact::make_contact_model("limit_surface_disc", p);
-    release::ReleaseOptions options;
-    options.integrator = support::tight(1e-7, 1e-10);
-    options.ledger = true;
-    result = simulate_release(launch.problem(*model), options);
+    result = simulate_release(launch.problem(*model),
+                              {.integrator = {.tolerances = {1e-7, 1e-10}}, .ledger = true});
     EXPECT_EQ(result.outcome, release::ReleaseOutcome::detached);
   }
   release::ReleaseSample<double> at(double t) const {

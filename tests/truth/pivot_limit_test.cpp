@@ -29,12 +29,7 @@ struct Pivoting {
   }
 };
 
-release::ReleaseOptions options() {
-  release::ReleaseOptions o;
-  o.integrator = support::tight(1e-9, 1e-11);
-  o.integrator.record = true;
-  return o;
-}
+release::ReleaseOptions options() { return {.integrator = {.tolerances = {1e-9, 1e-11}, .record = true}}; }
 
 /// The pivot equation with the torque `tau`: the force that carries the contact point, with r the lever in
 /// the world.

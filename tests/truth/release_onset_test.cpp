@@ -22,9 +22,7 @@ class Onset : public testing::TestWithParam<const char*> {
     const auto model = make_contact_model(GetParam(), p);
     const release::ReleaseProblem<double> problem{hand,     force, *model, {0.25, 4e-4}, {0, 0},
                                                   {0, 0.3}, 0.0,   {},     0.0};
-    release::ReleaseOptions options;
-    options.integrator = support::tight(1e-10, 1e-12);
-    const auto result = simulate_release(problem, options);
+    const auto result = simulate_release(problem, {.integrator = {.tolerances = {1e-10, 1e-12}}});
     EXPECT_EQ(result.outcome, release::ReleaseOutcome::detached);
     const auto words = mode_events(problem, result);
     for (std::size_t i = 0; i < words.size(); ++i)
