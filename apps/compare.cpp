@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <memory>
-#include <optional>
 #include <set>
 #include <stdexcept>
 #include <utility>
@@ -19,7 +18,6 @@
 #include "apps/throws.hpp"
 #include "apps/weak_grip.hpp"
 #include "datasets/near_miss.hpp"
-#include "dynamics/parallel.hpp"
 #include "experiment/free_flight.hpp"
 #include "experiment/friction_estimate.hpp"
 #include "fitting/slips/slip_surface.hpp"
@@ -40,7 +38,7 @@ bool is_surface_model(const std::string& name) {
 
 std::vector<std::string> known_models() {
   auto names = experiment::release_model_names();
-  for (const auto& model : experiment::flight_models()) names.emplace_back(model.name);
+  names.emplace_back(experiment::kProjectile);
   for (const auto& model : surface_model_names()) names.push_back(model);
   return names;
 }
@@ -61,19 +59,6 @@ std::vector<std::string> usual_models() {
   auto names = experiment::release_model_names();
   std::erase(names, release::kNaiveModel);
   return names;
-}
-
-std::vector<experiment::PreparedThrow> prepare_throws(const datasets::ThrowLog& log,
-                                                      const CompareRequest& request) {
-  std::vector<std::optional<experiment::PreparedThrow>> prepared(log.throws.size());
-  Progress progress("prepare", prepared.size());
-  dynamics::parallel_for(prepared.size(), request.threads, [&](std::size_t i) {
-    prepared[i] = experiment::prepare(log, log.throws[i], request.log);
-    progress.step();
-  });
-  std::vector<experiment::PreparedThrow> out;
-  for (auto& one : prepared) out.push_back(std::move(*one));
-  return out;
 }
 
 /// Tells of predictions that failed; if none of any model succeeded, there is no answer.
@@ -118,7 +103,7 @@ void compare_releases(const CompareRequest& request, const datasets::ThrowLog& l
   const bool named = !request.models.empty();
   auto models = named ? request.models : usual_models();
   const auto cards = read_usable_cards(request.cards, models, named);
-  const auto prepared = prepare_throws(log, request);
+  const auto prepared = experiment::prepare_all(log, request.log, request.threads, false);
   ReleaseRun run(request, log, prepared);
   std::vector<NotCompared> unanswered;
   {

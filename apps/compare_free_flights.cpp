@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "apps/command.hpp"
 #include "apps/compare.hpp"
@@ -35,90 +36,75 @@ Json json_of(const experiment::Spread& s) {
   return {{"n", s.n}, {"mean", s.mean}, {"median", s.median}, {"std", s.n > 1 ? Json(s.std) : Json(nullptr)}};
 }
 
-std::map<std::string, int> skip_reasons(const FreeFlightComparison& model) {
+std::map<std::string, int> skip_reasons(const FreeFlightComparison& found) {
   std::map<std::string, int> out;
-  for (const auto& one : model.each)
+  for (const auto& one : found.each)
     if (one.outcome != FreeFlightOutcome::fitted)
       ++out[fmt::format("{}: {}", to_string(one.outcome), one.reason)];
   return out;
 }
 
-Json flights_json(const std::vector<FreeFlightComparison>& models, const CompareRequest& request,
+Json flights_json(const FreeFlightComparison& found, const CompareRequest& request,
                   const datasets::ThrowLog& log) {
   Json out = json_head("compare");
   out["log"] = request.log;
   out["dimension"] = log.dimension;
   out["gravity_m_s2"] = log.gravity;
-  Json& all = out["models"] = Json::object();
-  for (const auto& model : models) {
-    Json& one = all[model.model];
-    one["parameters"] = Json::object();
-    one["failed"] = model.skipped;
-    for (const auto& [split, name, member] : kFlightSplits) {
-      const FreeFlightStatistics& s = model.*member;
-      one[name] = {{"n", s.n}, {"trajectory_rms_m", nullptr}};
-      if (s.n > 0) one[name]["trajectory_rms_m"] = s.trajectory_rms_m;
-      one[name]["end_position_error_m"] = json_of(s.end_position_error_m);
-      one[name]["end_orientation_error_deg"] = json_of(s.end_orientation_error_deg);
-    }
-    one["microseconds_per_throw"] = model.microseconds_per_throw;
+  Json& one = out["models"][experiment::kProjectile];
+  one["parameters"] = Json::object();
+  one["failed"] = found.skipped;
+  for (const auto& [split, name, member] : kFlightSplits) {
+    const FreeFlightStatistics& s = found.*member;
+    one[name] = {{"n", s.n}, {"trajectory_rms_m", nullptr}};
+    if (s.n > 0) one[name]["trajectory_rms_m"] = s.trajectory_rms_m;
+    one[name]["end_position_error_m"] = json_of(s.end_position_error_m);
+    one[name]["end_orientation_error_deg"] = json_of(s.end_orientation_error_deg);
   }
+  one["microseconds_per_throw"] = found.microseconds_per_throw;
   return out;
 }
 
-Table flights_table(const std::vector<FreeFlightComparison>& models) {
+Table flights_table(const FreeFlightComparison& found) {
   Table out{{"model", "throws", "n", "trajectory rms [mm]", "end position [mm]", "median",
              "end orientation [deg]", "median", "us/throw"},
             {},
             2};
-  for (const auto& [split, name, member] : kFlightSplits)
-    for (const auto& model : models) {
-      const FreeFlightStatistics& s = model.*member;
-      const auto &p = s.end_position_error_m, &a = s.end_orientation_error_deg;
-      out.rows.push_back({model.model, name, fmt::to_string(s.n), fixed(s.n > 0, 1e3 * s.trajectory_rms_m, 3),
-                          mean_and_spread(p.n, 1e3 * p.mean, 1e3 * p.std, 2),
-                          fixed(p.n > 0, 1e3 * p.median, 2), mean_and_spread(a.n, a.mean, a.std, 2),
-                          fixed(a.n > 0, a.median, 2), fmt::format("{:.0f}", model.microseconds_per_throw)});
-    }
+  for (const auto& [split, name, member] : kFlightSplits) {
+    const FreeFlightStatistics& s = found.*member;
+    const auto &p = s.end_position_error_m, &a = s.end_orientation_error_deg;
+    out.rows.push_back({experiment::kProjectile, name, fmt::to_string(s.n),
+                        fixed(s.n > 0, 1e3 * s.trajectory_rms_m, 3),
+                        mean_and_spread(p.n, 1e3 * p.mean, 1e3 * p.std, 2), fixed(p.n > 0, 1e3 * p.median, 2),
+                        mean_and_spread(a.n, a.mean, a.std, 2), fixed(a.n > 0, a.median, 2),
+                        fmt::format("{:.0f}", found.microseconds_per_throw)});
+  }
   return out;
 }
 
-Table flight_rows(const std::vector<FreeFlightComparison>& models) {
+Table flight_rows(const FreeFlightComparison& found) {
   Table out{{"throw", "split", "model", "outcome", "samples", "trajectory_rms_m", "end_position_error_m",
              "end_orientation_error_deg"},
             {},
             4};
-  for (const auto& model : models)
-    for (const auto& one : model.each) {
-      const bool fitted = one.outcome == FreeFlightOutcome::fitted;
-      const auto number = [&](bool known, double value) {
-        return known ? fmt::format("{}", value) : std::string();
-      };
-      out.rows.push_back({one.id, one.split == Split::train ? "train" : "test", model.model,
-                          to_string(one.outcome), fmt::to_string(one.whole.times.size()),
-                          number(fitted, one.trajectory_rms), number(fitted, one.end_position_error),
-                          number(one.end_orientation_error.has_value(),
-                                 one.end_orientation_error.value_or(0) * experiment::kDegrees)});
-    }
+  for (const auto& one : found.each) {
+    const bool fitted = one.outcome == FreeFlightOutcome::fitted;
+    out.rows.push_back({one.id, one.split == Split::train ? "train" : "test", experiment::kProjectile,
+                        to_string(one.outcome), fmt::to_string(one.whole.times.size()),
+                        all_digits(fitted, one.trajectory_rms), all_digits(fitted, one.end_position_error),
+                        all_digits(one.end_orientation_error.has_value(),
+                                   one.end_orientation_error.value_or(0) * experiment::kDegrees)});
+  }
   return out;
-}
-
-/// Linear interpolation between order statistics; `values` are sorted.
-double quantile(const std::vector<double>& values, double p) {
-  const double at = p * static_cast<double>(values.size() - 1);
-  const auto low = static_cast<std::size_t>(at);
-  const std::size_t high = std::min(low + 1, values.size() - 1);
-  return values[low] + (at - static_cast<double>(low)) * (values[high] - values[low]);
 }
 
 using Residuals = std::vector<flight::Vec3<double>> experiment::FreeFlightFit::*;
 
 /// Median and 10-90 % of fitted − measured, one axis in bins of normalised time.
-DataBlock band(const FreeFlightComparison& model, bool test_only, Residuals residuals, int axis, double scale,
+DataBlock band(const FreeFlightComparison& found, bool test_only, Residuals residuals, int axis, double scale,
                const std::string& title) {
   constexpr std::size_t bins = 20;
   std::array<std::vector<double>, bins> values;
-  for (const auto& one : model.each) {
+  for (const auto& one : found.each) {
     if (one.outcome != FreeFlightOutcome::fitted || (test_only && one.split != Split::test)) continue;
     const auto& r = one.whole.*residuals;
     for (std::size_t i = 0; i < r.size(); ++i) {
@@ -158,12 +144,12 @@ std::vector<PanelRow> panel_rows(bool planar, bool oriented) {
 }
 
 /// What the fit over the whole flight leaves, over the share of the flight that has passed.
-Figure residual_figure(const FreeFlightComparison& model, bool planar) {
-  const bool test_only = model.test.n > 0;
-  const bool oriented = model.train.end_orientation_error_deg.n + model.test.end_orientation_error_deg.n > 0;
+Figure residual_figure(const FreeFlightComparison& found, bool planar) {
+  const bool test_only = found.test.n > 0;
+  const bool oriented = found.train.end_orientation_error_deg.n + found.test.end_orientation_error_deg.n > 0;
   const auto rows = panel_rows(planar, oriented);
-  Figure figure{"residuals_" + model.model, 19, oriented ? 12.5 : 7.5, {}, {}};
-  const Style style = style_of(model.model);
+  Figure figure{std::string("residuals_") + experiment::kProjectile, 19, oriented ? 12.5 : 7.5, {}, {}};
+  const Style style = style_of(experiment::kProjectile);
   const std::vector<KeyEntry> key{
       {fmt::format("with filledcurves linecolor rgb '{}'", style.colour), "10 - 90 %"},
       {fmt::format("with linespoints linecolor rgb '{}' linewidth 1.4 pointtype {} pointsize 0.4",
@@ -177,13 +163,13 @@ Figure residual_figure(const FreeFlightComparison& model, bool planar) {
       "set multiplot\nunset key\nset style fill transparent solid 0.3 noborder\nset xrange [0:1]\n"
       "set xtics 0,0.25,1 format '%g'\nset xzeroaxis linetype 1 linecolor rgb '#808080' linewidth 0.6\n"
       "set label 1 'what {} leaves: fitted - measured, {} flights' at screen 0.5,{:.4f} center\n",
-      plain(model.model), test_only ? "test" : "all", 1 - 0.5 / figure.height);
+      experiment::kProjectile, test_only ? "test" : "all", 1 - 0.5 / figure.height);
   double y = top - height;
   for (const PanelRow& row : rows) {
     double extent = 0;
     const std::size_t first = figure.data.size();
     for (const auto& [axis, name] : row.axes) {
-      figure.data.push_back(band(model, test_only, row.residuals, axis, row.scale, row.label + ", " + name));
+      figure.data.push_back(band(found, test_only, row.residuals, axis, row.scale, row.label + ", " + name));
       for (const auto& values : figure.data.back().rows)
         for (std::size_t j = 1; j < values.size(); ++j) extent = std::max(extent, std::abs(values[j]));
     }
@@ -214,44 +200,30 @@ void compare_flights(const CompareRequest& request, const datasets::ThrowLog& lo
     throw WrongUsage(
         "--write-cards: models of free flight take no parameters; what they lack goes on the card of `unhand "
         "discover LOG --card FILE`");
-  const auto names = request.models.empty() ? std::vector<std::string>{"projectile"} : request.models;
-  std::vector<FreeFlightComparison> models;
-  {
-    Progress progress("simulate", names.size());
-    for (const auto& name : names) {
-      models.push_back(experiment::compare_free_flights(log, std::array{name}, request.threads).front());
-      progress.step();
-    }
-  }
-  bool any = false;
-  for (const auto& model : models) {
-    any = any || model.train.n + model.test.n > 0;
-    for (const auto& [reason, n] : skip_reasons(model))
-      tell("unhand: {}: {} of {} throws: {}\n", model.model, n, model.each.size(), reason);
-  }
-  if (!any) throw Unanswered("no throw could be fitted");
+  std::optional<Progress> progress(std::in_place, "simulate", 0);
+  const FreeFlightComparison found = experiment::compare_free_flights(log, request.threads);
+  progress.reset();
+  for (const auto& [reason, n] : skip_reasons(found))
+    tell("unhand: {}: {} of {} throws: {}\n", experiment::kProjectile, n, found.each.size(), reason);
+  if (found.train.n + found.test.n == 0) throw Unanswered("no throw could be fitted");
 
   const std::string heading = fmt::format(
       "{}: {}\n{} free flights; rms: start fitted to every sample; end errors: start fitted to the first "
       "half, mean ± "
       "standard deviation\n",
       request.log, log.title, log.throws.size());
-  const Table table = flights_table(models);
-  const Json json = flights_json(models, request, log);
+  const Table table = flights_table(found);
+  const Json json = flights_json(found, request, log);
   Outputs outputs{request.inputs()};
   if (!request.json.empty()) outputs.json(request.json, json);
   if (!request.report.empty()) {
     const auto directory = outputs.directory(request.report);
-    std::string pictures;
-    for (const auto& model : models) {
-      if (model.train.n + model.test.n == 0) continue;
-      const Figure figure = residual_figure(model, log.dimension == 2);
-      draw(figure, directory);
-      pictures += fmt::format("![What {} leaves]({}.png)\n\n", model.model, figure.name);
-    }
+    const Figure figure = residual_figure(found, log.dimension == 2);
+    draw(figure, directory);
     write_text(directory / "report.md",
-               fmt::format("# Free flights\n\n{}\n{}\n{}", heading, table.markdown(), pictures));
-    write_text(directory / "throws.csv", flight_rows(models).csv());
+               fmt::format("# Free flights\n\n{}\n{}\n![What {} leaves]({}.png)\n\n", heading,
+                           table.markdown(), experiment::kProjectile, figure.name));
+    write_text(directory / "throws.csv", flight_rows(found).csv());
     write_text(directory / "compare.json", json_text(json));
   }
   outputs.commit();

@@ -15,9 +15,6 @@ Table throw_table(const experiment::Comparison& comparison, const datasets::Thro
             6};
   for (const auto& quantity : experiment::kQuantities)
     out.header.push_back(std::string("error_") + quantity.key);
-  const auto number = [](bool known, double value) {
-    return known ? fmt::format("{}", value) : std::string();
-  };
   for (const auto& model : comparison.models)
     for (const auto& one : model.throws) {
       const auto& p = one.prediction;
@@ -28,13 +25,13 @@ Table throw_table(const experiment::Comparison& comparison, const datasets::Thro
                                    one.split == datasets::Split::train ? "train" : "test",
                                    model.model,
                                    outcome_of(p),
-                                   number(detached, p.detach.time + log.clock_origin),
-                                   number(detached, p.detach.twist.vx),
-                                   number(detached, p.detach.twist.vz),
-                                   number(detached, p.detach.twist.omega * experiment::kDegrees),
-                                   number(p.landed(), p.landing.pose.x),
-                                   number(p.landed(), p.landing.pose.theta * experiment::kDegrees)};
-      for (const auto& error : one.error) row.push_back(number(error.has_value(), error.value_or(0)));
+                                   all_digits(detached, p.detach.time + log.clock_origin),
+                                   all_digits(detached, p.detach.twist.vx),
+                                   all_digits(detached, p.detach.twist.vz),
+                                   all_digits(detached, p.detach.twist.omega * experiment::kDegrees),
+                                   all_digits(p.landed(), p.landing.pose.x),
+                                   all_digits(p.landed(), p.landing.pose.theta * experiment::kDegrees)};
+      for (const auto& error : one.error) row.push_back(all_digits(error.has_value(), error.value_or(0)));
       out.rows.push_back(std::move(row));
     }
   return out;

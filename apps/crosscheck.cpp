@@ -288,7 +288,7 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
   if (options.engine == "bullet" && !crosscheck::has_bullet())
     throw Unanswered("built without Bullet (Debian package libbullet-dev)");
   const auto log = read_throws(options.log);
-  auto throws = experiment::prepare_all(log, options.log, options.threads);
+  auto throws = experiment::prepare_all(log, options.log, options.threads, false);
   std::string from;
   const auto parameters = parameters_of(options, log, throws, from);
 

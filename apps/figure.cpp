@@ -234,6 +234,13 @@ std::string value_axis(const std::vector<double>& values) {
   return out + fmt::format("set xtics ({})\n", tics);
 }
 
+double quantile(const std::vector<double>& sorted, double share) {
+  const double at = share * static_cast<double>(sorted.size() - 1);
+  const auto below = static_cast<std::size_t>(at);
+  const double above = sorted[std::min(below + 1, sorted.size() - 1)];
+  return sorted[below] + (at - static_cast<double>(below)) * (above - sorted[below]);
+}
+
 std::string plain(const std::string& text) {
   std::string out;
   for (const char c : text) {

@@ -66,6 +66,9 @@ double tic_step(double high);
 /// than a factor of 20, then with tics at 1, 2 and 5 where decades alone would be few.
 std::string value_axis(const std::vector<double>& values);
 
+/// A quantile of sorted values, between neighbours; at least one value.
+double quantile(const std::vector<double>& sorted, double share);
+
 /// Text as gnuplot takes it between single quotes, without its own markup.
 std::string plain(const std::string& text);
 

@@ -27,14 +27,6 @@ struct FigureCommandOptions {
 
 constexpr int kLandingX = 2;  // of experiment::kQuantities
 
-/// A quantile of sorted values, between neighbours.
-double quantile(const std::vector<double>& sorted, double share) {
-  const double at = share * static_cast<double>(sorted.size() - 1);
-  const auto below = static_cast<std::size_t>(at);
-  const double above = sorted[std::min(below + 1, sorted.size() - 1)];
-  return sorted[below] + (at - static_cast<double>(below)) * (above - sorted[below]);
-}
-
 /// The absolute errors of one quantity over the throws of a split, sorted.
 std::vector<double> absolute_errors(const experiment::ModelComparison& model, int quantity,
                                     datasets::Split split, double scale) {

@@ -37,7 +37,7 @@ FigureSource::FigureSource(const FigureRequest& request) : request_(request) {
     log_ = read_throws(file_);
   }
   if (!request_.thrown.empty()) chosen_ = place_of(log_, request_.thrown, file_);
-  prepared_ = experiment::prepare_all(log_, file_, request_.threads);
+  prepared_ = experiment::prepare_all(log_, file_, request_.threads, false);
 }
 
 const FigureSource::Fitted& FigureSource::fitted(const std::string& model) {

@@ -189,11 +189,6 @@ void fit(const FitRequest& request, const Parser& parser) {
 
 }  // namespace
 
-bool FitAnswer::has_test() const {
-  return std::any_of(errors.throws.begin(), errors.throws.end(),
-                     [](const auto& one) { return one.split == datasets::Split::test; });
-}
-
 Command fit_command(Parser& root) {
   auto request = std::make_shared<FitRequest>();
   Parser& parser = root.subcommand("fit", "Fit a model's parameters to a log and write its card");

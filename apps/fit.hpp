@@ -35,7 +35,6 @@ struct FitAnswer {
   int threads{1};      ///< used
   std::string origin;  ///< of the log, as it declares it
 
-  bool has_test() const;
   /// Of the fit's time, over all threads.
   double jacobian_share() const {
     return fit.seconds > 0 ? fit.jacobian_seconds / (fit.seconds * threads) : 0;

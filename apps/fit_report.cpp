@@ -179,7 +179,6 @@ Table fit_throw_table(const FitAnswer& a) {
     out.header.push_back(std::string(name) == "sigma" ? "sigma_" + out.header.back() : name);
   for (const auto& quantity : experiment::kQuantities)
     out.header.push_back(std::string("error_") + quantity.key);
-  const auto text = [](bool known, double value) { return known ? fmt::format("{}", value) : std::string(); };
   for (std::size_t i = 0; i < a.throws.size(); ++i) {
     const auto& t = a.fit.throws[i];
     const auto& [c, sigma, own, seconds] = a.throws[i];
@@ -190,20 +189,20 @@ Table fit_throw_table(const FitAnswer& a) {
                                  c.condition,
                                  c.split == Split::train ? "train" : "test",
                                  t.used ? "yes" : "no",
-                                 text(t.used, t.weight),
-                                 text(t.used, t.chi2)};
-    for (const double value : t.own) row.push_back(text(t.used, value));
+                                 all_digits(t.used, t.weight),
+                                 all_digits(t.used, t.chi2)};
+    for (const double value : t.own) row.push_back(all_digits(t.used, value));
     const auto s = sigma.value_or(fitting::OutcomeSigma{});
     const bool known = sigma.has_value();
-    row.push_back(text(detached, p.detach.twist.vx));
-    row.push_back(text(known, s.detach_vx));
-    row.push_back(text(detached, p.detach.twist.omega * kDegrees));
-    row.push_back(text(known, s.detach_omega * kDegrees));
-    row.push_back(text(p.landed(), p.landing.pose.x));
-    row.push_back(text(known, s.landing_x));
-    row.push_back(text(p.landed(), p.landing.pose.theta * kDegrees));
-    row.push_back(text(known, s.landing_theta * kDegrees));
-    for (const auto& error : c.error) row.push_back(text(error.has_value(), error.value_or(0)));
+    row.push_back(all_digits(detached, p.detach.twist.vx));
+    row.push_back(all_digits(known, s.detach_vx));
+    row.push_back(all_digits(detached, p.detach.twist.omega * kDegrees));
+    row.push_back(all_digits(known, s.detach_omega * kDegrees));
+    row.push_back(all_digits(p.landed(), p.landing.pose.x));
+    row.push_back(all_digits(known, s.landing_x));
+    row.push_back(all_digits(p.landed(), p.landing.pose.theta * kDegrees));
+    row.push_back(all_digits(known, s.landing_theta * kDegrees));
+    for (const auto& error : c.error) row.push_back(all_digits(error.has_value(), error.value_or(0)));
     out.rows.push_back(std::move(row));
   }
   return out;

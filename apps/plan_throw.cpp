@@ -184,7 +184,7 @@ void plan_release(ThrowAnswer& a, planners::ReleaseThrow release, const planners
     a.needed_force = planners::HeldMotion(release, a.plan.motion).needed_force();
   };
   std::string reason;
-  auto robust = planners::plan_robust_throw(release, how, &reason);
+  auto robust = planners::plan_robust_throw(release, how.home, &reason);
   if (!robust) {
     tell("unhand: of the motions to the insensitive throw none will do ({}); the tube's is kept\n", reason);
     tell_needed();
@@ -196,7 +196,7 @@ void plan_release(ThrowAnswer& a, planners::ReleaseThrow release, const planners
   a.plan.qdd = release.qdd = robust->choice.qdd;
   const planners::TubeProblem rigid{a.chain, release.start, a.box.middle, a.window, a.medium};
   const auto landings = [&](const planners::JointVector<double>& qdd) {
-    return planners::landings_over_window(rigid, qdd, how.landing_samples);
+    return planners::landings_over_window(rigid, qdd, planners::kLandingSamples);
   };
   a.plan.landings = landings(release.qdd);
   a.plan.tube_landings.clear();  // of another throw

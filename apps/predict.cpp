@@ -113,7 +113,7 @@ Table csv_table(const experiment::Comparison& comparison, const datasets::ThrowL
     const auto s = sigmas[i].value_or(fitting::OutcomeSigma{});
     for (const double value : {s.detach_time, s.detach_vx, s.detach_vz, s.detach_omega * kDegrees,
                                s.landing_x, s.landing_theta * kDegrees})
-      out.rows[i].push_back(sigmas[i] ? fmt::format("{}", value) : std::string());
+      out.rows[i].push_back(all_digits(sigmas[i].has_value(), value));
   }
   return out;
 }
@@ -167,7 +167,7 @@ Predictions predictions_of(const UsableCard& card, const datasets::ThrowLog& log
     out.comparison.models.push_back(std::move(predicted.comparison));
     return out;
   }
-  out.prepared = experiment::prepare_all(log, options.log, options.threads);
+  out.prepared = experiment::prepare_all(log, options.log, options.threads, false);
   experiment::CompareOptions compare_options;
   compare_options.models = {card.card.model};
   compare_options.threads = options.threads;

@@ -95,6 +95,8 @@ std::string fixed(bool known, double value, int decimals) {
   return out;
 }
 
+std::string all_digits(bool known, double value) { return known ? fmt::format("{}", value) : std::string(); }
+
 std::string with_sign(double value, int decimals) {
   const std::string out = fixed(true, value, decimals);
   return out.starts_with('-') ? out : "+" + out;

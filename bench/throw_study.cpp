@@ -307,8 +307,7 @@ void judge(const ReleaseThrow& thrown, Judged& out) {
   const Joints home = options(true).home;
   bool possible = false;
   for (const double share : {0.9, 0.65, 0.45, 0.3}) {
-    const auto motion = throw_motion(thrown.chain, home, thrown.start, thrown.qdd,
-                                     {.window = thrown.hold, .acceleration_share = share});
+    const auto motion = throw_motion(thrown.chain, home, thrown.start, thrown.qdd, thrown.hold, share);
     if (!motion) continue;
     const auto limits = check_limits(thrown.chain, *motion);
     if (!limits.within() || !(limits.lowest > 0)) continue;
@@ -359,7 +358,7 @@ void grasps() {
         (holding_power(thrown, search.window) < 0 ? braked : others).add(real->miss - rigid->miss);
         if (++seen % 2 != 1) continue;
         judge(thrown, before);
-        const auto better = make_insensitive(thrown, {{1, 3, 5}});
+        const auto better = make_insensitive(thrown, {1, 3, 5});
         thrown.start = better.start;
         thrown.qdd = better.qdd;
         judge(thrown, after);

@@ -11,12 +11,13 @@
 namespace unhand::crosscheck {
 
 using dynamics::Pose;
-using dynamics::Twist;
 using dynamics::Vec2;
 using release::ReleaseOutcome;
 using release::ReleaseProblem;
 
 namespace {
+
+constexpr int kNewtonBudget = 100;  ///< iterations per step
 
 void require(bool holds, const char* name, double value, const char* range) {
   if (!holds)
@@ -101,7 +102,7 @@ class Run {
     if (const Potential other = potential(carried, before, weight, h, g, limit); other.value < here.value)
       twist_ = carried, here = other;
     bool solved = false;
-    for (int k = 0; k < options_.newton_budget && !solved; ++k, ++iterations_) {
+    for (int k = 0; k < kNewtonBudget && !solved; ++k) {
       const Eigen::Vector3d direction = -here.hessian.ldlt().solve(here.gradient);
       const double slope = here.gradient.dot(direction);
       // the gradient is a wrench in N: to 1e-12 of what the limit and the weight make it
@@ -139,7 +140,6 @@ class Run {
   }
 
   release::DetachState<double> state(double t) const { return {t, pose_, {twist_[0], twist_[1], twist_[2]}}; }
-  int iterations() const { return iterations_; }
 
  private:
   struct Potential {
@@ -186,7 +186,6 @@ class Run {
   std::vector<double> stretch_x_, stretch_z_;  // in the hand's frame
   std::vector<double> offset_x_, offset_z_, drive_x_,
       drive_z_;  // from the CoM; the stretch without the twist
-  int iterations_{};
 };
 
 }  // namespace
@@ -206,20 +205,6 @@ std::vector<PatchPoint> disc_points(int rings, double pressure_exponent) {
       const double angle = 2 * std::numbers::pi * (k + std::fmod(j * std::numbers::phi, 1.0)) / count;
       out.push_back({{rho * std::cos(angle), rho * std::sin(angle)}, 1 / (3 * n * n)});
     }
-  }
-  return out;
-}
-
-dynamics::Wrench<double> sliding_wrench(const DistributedPatch& patch, double normal_force,
-                                        const Twist<double>& slip) {
-  const double limit = patch.pads * patch.mu * normal_force;
-  dynamics::Wrench<double> out{};
-  for (const auto& [p, load] : patch.points) {
-    const double x = patch.radius * p.x, z = patch.radius * p.z;
-    const double vx = slip.vx - slip.omega * z, vz = slip.vz + slip.omega * x, size = std::hypot(vx, vz);
-    if (size == 0) continue;
-    const double fx = -limit * load * vx / size, fz = -limit * load * vz / size;
-    out = {out.fx + fx, out.fz + fz, out.tau + x * fz - z * fx};
   }
   return out;
 }
@@ -251,7 +236,6 @@ PatchResult simulate_distributed_patch(const ReleaseProblem<double>& problem, co
       {limit(a.twist.vx, b.twist.vx), limit(a.twist.vz, b.twist.vz), limit(a.twist.omega, b.twist.omega)}};
   result.time_error = std::max({std::abs(b.twist.vx - a.twist.vx), std::abs(b.twist.vz - a.twist.vz),
                                 std::abs(b.twist.omega - a.twist.omega)});
-  result.newton_iterations = coarse.iterations() + fine.iterations();
   result.outcome = parts ? ReleaseOutcome::detached : ReleaseOutcome::never_separated;
   return result;
 }

@@ -44,8 +44,7 @@ struct PatchOptions {
   /// n μ f₀/K, by how much a bristle stretches before it slides [m]; f₀ the normal force at the start. Its
   /// own vibration is shorter than the step and damped by it.
   double elastic_slip{1e-11};
-  double loss_time{0};     ///< T, of the bristles [s]
-  int newton_budget{100};  ///< iterations per step
+  double loss_time{0};  ///< T, of the bristles [s]
 };
 
 /// How a release from the patch ended.
@@ -53,7 +52,6 @@ struct PatchResult {
   release::ReleaseOutcome outcome{};    ///< not_solved: a step's iteration spent its budget
   release::DetachState<double> detach;  ///< at the end of the hand's motion, if the pads never part
   double time_error{};  ///< largest difference between the finer run and the extrapolated twist [m/s, rad/s]
-  int newton_iterations{};  ///< Newton steps in all
 };
 
 /// Integrates pose and twist of the CoM in the world by the implicit Euler method with steps h and h/2 that
@@ -65,10 +63,5 @@ struct PatchResult {
 /// model is not. Throws std::invalid_argument, naming parameter, value and range.
 PatchResult simulate_distributed_patch(const release::ReleaseProblem<double>& problem,
                                        const DistributedPatch& patch, const PatchOptions& options = {});
-
-/// Force and torque about the centre [N, N, N m] that slide and spin together at every point, in the limit of
-/// stiff bristles: −n μ f_N Σ w_i v_i/|v_i|, v_i = v + ω J a p_i.
-dynamics::Wrench<double> sliding_wrench(const DistributedPatch& patch, double normal_force,
-                                        const dynamics::Twist<double>& slip);
 
 }  // namespace unhand::crosscheck

@@ -40,7 +40,7 @@ int main() {
   release.card = card;
   release.object = bar;
   const auto before = draw_landings(release, 300, 1);
-  const auto robust = plan_robust_throw(release, options);
+  const auto robust = plan_robust_throw(release, options.home);
   if (!robust) {
     std::printf("no motion to the robust throw stays within the limits\n");
     return 1;

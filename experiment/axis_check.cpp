@@ -158,22 +158,16 @@ void check_fall(const ThrowLog& log, const Throw& one, double opening, Links& ou
 
 /// The landing beside where motion capture leads within its last tenth of a second.
 void check_landing(const Throw& one, double opening, Links& out) {
-  constexpr double kLast = 0.1, kBeyond = 0.15;  // s
+  constexpr double kGap = 0.15;  // s
   const auto& landing = *one.landing;
-  const auto& mocap = *one.mocap;
   if (landing.time.empty() || landing.pose.empty() || landing.time(0) <= opening) return;
-  std::vector<double> t, x, theta;
-  for (std::size_t i = mocap.time.rows; i-- > 0;) {
-    if (!mocap.is_valid(i) || mocap.time(i) > landing.time(0)) continue;
-    if (!t.empty() && mocap.time(i) < t.front() - kLast) break;
-    t.push_back(mocap.time(i)), x.push_back(mocap.pose(i, 0)), theta.push_back(mocap.pose(i, 2));
-  }
-  if (t.size() < 4 || landing.time(0) - t.front() > kBeyond) return;
+  const auto track = track_before_landing(one, kGap);
+  if (!track) return;
   ColumnPair there, turned;
-  there.add(landing.pose(0, 0), dynamics::fit_line(t, x).at(landing.time(0)));
+  there.add(landing.pose(0, 0), dynamics::fit_line(track->time, track->x).at(landing.time(0)));
   keep(out, {Source::landing, 0}, {Source::mocap, 0}, there.size_ratio(10 * kShowsShift));
   if (!tells_angle(landing)) return;
-  turned.add(landing.pose(0, 1), dynamics::fit_line(t, theta).at(landing.time(0)));
+  turned.add(landing.pose(0, 1), dynamics::fit_line(track->time, track->theta).at(landing.time(0)));
   keep(out, {Source::landing, 2}, {Source::mocap, 2}, turned.size_ratio(10 * kShowsTurn));
 }
 

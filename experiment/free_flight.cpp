@@ -12,6 +12,7 @@
 
 #include "datasets/summary.hpp"
 #include "dynamics/parallel.hpp"
+#include "dynamics/straight_line.hpp"
 #include "experiment/flight_samples.hpp"
 #include "experiment/least_squares.hpp"
 #include "flight/spatial_flight.hpp"
@@ -46,13 +47,6 @@ const char* to_string(FreeFlightOutcome outcome) {
 
 namespace {
 
-void place(const MatrixXd& covariance, const std::vector<int>& axes, Eigen::Matrix<double, 6, 6>& out) {
-  const int n = static_cast<int>(axes.size());
-  for (int a = 0; a < 2 * n; ++a)
-    for (int b = 0; b < 2 * n; ++b)
-      out(axes[a % n] + 3 * (a / n), axes[b % n] + 3 * (b / n)) = covariance(a, b);
-}
-
 const dynamics::IntegratorOptions kFine =
     dynamics::error_controlled({1e-10, 1e-12});  // far below any tracker
 
@@ -80,11 +74,9 @@ bool fit_translation(const FlightSamples& s, const Vec3<double>& gravity, double
   for (const int a : s.axes) {
     std::vector<double> y(n);
     for (std::size_t i = 0; i < n; ++i) y[i] = s.position[i][a] - 0.5 * gravity[a] * fitted[i] * fitted[i];
-    const FittedLine line = fit_line(fitted, y, s.sigma[a]);
-    fit.position[a] = line.p;
-    fit.velocity[a] = line.v;
-    for (const int i : {0, 1})
-      for (const int j : {0, 1}) fit.translation_covariance(a + 3 * i, a + 3 * j) = line.covariance(i, j);
+    const auto line = dynamics::fit_line(fitted, y);
+    fit.position[a] = line.at(0);
+    fit.velocity[a] = line.slope;
   }
   if (drag_k > 0) {
     struct Start {
@@ -118,14 +110,12 @@ bool fit_translation(const FlightSamples& s, const Vec3<double>& gravity, double
           J.row(row) = predicted[i][a].v.head(2 * axes).transpose() / s.sigma[a];
         }
     };
-    MatrixXd covariance;
     if (!gauss_newton(
             evaluate, [&](const VectorXd& d) { x = moved(d); }, 2 * axes,
-            *std::min_element(s.sigma.begin(), s.sigma.end()), covariance))
+            *std::min_element(s.sigma.begin(), s.sigma.end())))
       return false;
     fit.position = x.p;
     fit.velocity = x.v;
-    place(covariance, s.axes, fit.translation_covariance);
   }
   const auto predicted =
       places<double>({.position = fit.position, .velocity = fit.velocity}, gravity, drag_k, s.elapsed);
@@ -171,16 +161,14 @@ bool fit_rotation(const FlightSamples& s, const Vec3<double>& inertia, std::size
       }
     }
   };
-  MatrixXd covariance;
   for (std::size_t size = std::min<std::size_t>(3, n);; size = std::min(4 * size, n)) {
     window.assign(s.elapsed.begin(), s.elapsed.begin() + static_cast<long>(size));
     if (!gauss_newton(
-            evaluate, [&](const VectorXd& d) { x = moved(d); }, 6, s.sigma_angle, covariance))
+            evaluate, [&](const VectorXd& d) { x = moved(d); }, 6, s.sigma_angle))
       return false;
     if (size == n) break;
   }
   fit.rotation = x;
-  fit.rotation_covariance = covariance;
   const auto predicted = flight::rotate_freely(inertia, x, s.elapsed, kFine).states;
   for (std::size_t i = 0; i < predicted.size(); ++i)
     fit.orientation_residuals.push_back(flight::rotation_between(predicted[i].attitude, s.attitude[i]));
@@ -188,78 +176,12 @@ bool fit_rotation(const FlightSamples& s, const Vec3<double>& inertia, std::size
 }
 
 void fit_angle(const FlightSamples& s, std::size_t n, FreeFlightFit& fit) {
-  const FittedLine line = fit_line(std::span(s.elapsed).first(n), std::span(s.theta).first(n), s.sigma_angle);
-  fit.theta = line.p;
-  fit.rotation = {flight::exp(Vec3<double>{0, -line.p, 0}), {0, -line.v, 0}};
-  for (const int i : {0, 1})
-    for (const int j : {0, 1}) fit.rotation_covariance(1 + 3 * i, 1 + 3 * j) = line.covariance(i, j);
+  const auto line = dynamics::fit_line(std::span(s.elapsed).first(n), std::span(s.theta).first(n));
+  fit.theta = line.at(0);
+  fit.rotation = {flight::exp(Vec3<double>{0, -fit.theta, 0}), {0, -line.slope, 0}};
   for (std::size_t i = 0; i < s.elapsed.size(); ++i)
-    fit.orientation_residuals.push_back({0, -(s.theta[i] - line.p - line.v * s.elapsed[i]), 0});
+    fit.orientation_residuals.push_back({0, -(s.theta[i] - fit.theta - line.slope * s.elapsed[i]), 0});
 }
-
-/// chi2 and dof; where no sigma is declared, what the residuals say of it scales the covariance instead.
-void judge(const std::vector<Vec3<double>>& residuals, std::size_t n, const Vec3<double>& sigma, int axes,
-           bool declared, std::optional<double>& chi2, int& dof, Eigen::Matrix<double, 6, 6>& covariance) {
-  double sum = 0;
-  for (std::size_t i = 0; i < n; ++i)
-    for (int a = 0; a < 3; ++a) sum += (residuals[i][a] / sigma[a]) * (residuals[i][a] / sigma[a]);
-  dof = axes * (static_cast<int>(n) - 2);
-  if (declared)
-    chi2 = sum;
-  else
-    covariance *= dof > 0 ? sum / dof : std::numeric_limits<double>::quiet_NaN();
-}
-
-FreeFlightFit fit_projectile(const ThrowLog& log, const Throw& one, double fraction) {
-  if (!(fraction > 0 && fraction <= 1))
-    throw std::invalid_argument(fmt::format("free flight: fraction = {} is not in (0, 1]", fraction));
-  FreeFlightFit fit;
-  const auto stop = [&fit](FreeFlightOutcome outcome, std::string reason) {
-    fit.outcome = outcome;
-    fit.reason = std::move(reason);
-    return fit;
-  };
-  if (!one.mocap) return stop(FreeFlightOutcome::no_tracking, "no mocap");
-  if (one.hand && !one.free_flight)
-    return stop(FreeFlightOutcome::not_free, "a hand and no free_flight: it is not known when it flies");
-  if (const std::string held = datasets::held_by(log, one); !held.empty())
-    return stop(FreeFlightOutcome::not_free,
-                held + " and no free_flight: it is held at first, and not known when it flies");
-  const FlightSamples s = read_flight_samples(log, one);
-  fit.times = s.times;
-  if (fit.times.size() < kFewestFlightSamples)
-    return stop(FreeFlightOutcome::too_short, fmt::format("{} valid samples in free flight, fewer than {}",
-                                                          fit.times.size(), kFewestFlightSamples));
-  const auto samples = static_cast<double>(fit.times.size());
-  fit.fitted = std::max<std::size_t>(2, static_cast<std::size_t>(std::ceil(fraction * samples - 1e-9)));
-  fit.oriented = !s.attitude.empty() || !s.theta.empty();
-  const Object& object = log.objects.at(one.object);
-  try {
-    if (!fit_translation(s, {0, 0, -log.gravity}, object.drag_k.value_or(0), fit.fitted, fit))
-      return stop(FreeFlightOutcome::not_solved, "the fit of the position did not converge");
-    if (!s.theta.empty()) fit_angle(s, fit.fitted, fit);
-    if (!s.attitude.empty()) {
-      Vec3<double> inertia{1, 1, 1};
-      if (object.inertia && object.inertia->size() == 3)
-        std::copy_n(object.inertia->begin(), 3, inertia.begin());
-      if (!fit_rotation(s, inertia, fit.fitted, fit))
-        return stop(FreeFlightOutcome::not_solved, "the fit of the orientation did not converge");
-    }
-  } catch (const std::runtime_error& error) {
-    return stop(FreeFlightOutcome::not_solved, error.what());
-  }
-  judge(fit.position_residuals, fit.fitted, s.sigma, static_cast<int>(s.axes.size()), s.declared,
-        fit.translation_chi2, fit.translation_dof, fit.translation_covariance);
-  if (fit.oriented)
-    judge(fit.orientation_residuals, fit.fitted, {s.sigma_angle, s.sigma_angle, s.sigma_angle},
-          s.theta.empty() ? 3 : 1, s.declared, fit.rotation_chi2, fit.rotation_dof, fit.rotation_covariance);
-  return fit;
-}
-
-constexpr FlightModel kModels[] = {
-    {"projectile", "declared gravity and drag, torque-free rotation about the tracked point",
-     &fit_projectile},
-};
 
 Spread spread(std::vector<double> x) {
   Spread out;
@@ -297,26 +219,52 @@ FreeFlightStatistics statistics(const std::vector<FreeFlightErrors>& each, datas
 }  // namespace
 
 FreeFlightFit fit_free_flight(const ThrowLog& log, const Throw& one, double fraction) {
-  return fit_projectile(log, one, fraction);
-}
-
-std::span<const FlightModel> flight_models() { return kModels; }
-
-const FlightModel& flight_model(std::string_view name) {
-  std::string names;
-  for (const FlightModel& model : kModels) {
-    if (model.name == name) return model;
-    names += fmt::format("{}{}", names.empty() ? "" : ", ", model.name);
+  if (!(fraction > 0 && fraction <= 1))
+    throw std::invalid_argument(fmt::format("free flight: fraction = {} is not in (0, 1]", fraction));
+  FreeFlightFit fit;
+  const auto stop = [&fit](FreeFlightOutcome outcome, std::string reason) {
+    fit.outcome = outcome;
+    fit.reason = std::move(reason);
+    return fit;
+  };
+  if (!one.mocap) return stop(FreeFlightOutcome::no_tracking, "no mocap");
+  if (one.hand && !one.free_flight)
+    return stop(FreeFlightOutcome::not_free, "a hand and no free_flight: it is not known when it flies");
+  if (const std::string held = datasets::held_by(log, one); !held.empty())
+    return stop(FreeFlightOutcome::not_free,
+                held + " and no free_flight: it is held at first, and not known when it flies");
+  const FlightSamples s = read_flight_samples(log, one);
+  fit.times = s.times;
+  if (fit.times.size() < kFewestFlightSamples)
+    return stop(FreeFlightOutcome::too_short, fmt::format("{} valid samples in free flight, fewer than {}",
+                                                          fit.times.size(), kFewestFlightSamples));
+  const auto samples = static_cast<double>(fit.times.size());
+  fit.fitted = std::max<std::size_t>(2, static_cast<std::size_t>(std::ceil(fraction * samples - 1e-9)));
+  fit.oriented = !s.attitude.empty() || !s.theta.empty();
+  const Object& object = log.objects.at(one.object);
+  try {
+    if (!fit_translation(s, {0, 0, -log.gravity}, object.drag_k.value_or(0), fit.fitted, fit))
+      return stop(FreeFlightOutcome::not_solved, "the fit of the position did not converge");
+    if (!s.theta.empty()) fit_angle(s, fit.fitted, fit);
+    if (!s.attitude.empty()) {
+      Vec3<double> inertia{1, 1, 1};
+      if (object.inertia && object.inertia->size() == 3)
+        std::copy_n(object.inertia->begin(), 3, inertia.begin());
+      if (!fit_rotation(s, inertia, fit.fitted, fit))
+        return stop(FreeFlightOutcome::not_solved, "the fit of the orientation did not converge");
+    }
+  } catch (const std::runtime_error& error) {
+    return stop(FreeFlightOutcome::not_solved, error.what());
   }
-  throw std::invalid_argument(fmt::format("no flight model '{}'; there are: {}", name, names));
+  return fit;
 }
 
-FreeFlightErrors free_flight_errors(const FlightModel& model, const ThrowLog& log, const Throw& one) {
+FreeFlightErrors free_flight_errors(const ThrowLog& log, const Throw& one) {
   FreeFlightErrors out;
   out.id = one.id;
   out.split = one.split;
-  out.whole = model.fit(log, one, 1.0);
-  out.half = model.fit(log, one, 0.5);
+  out.whole = fit_free_flight(log, one, 1.0);
+  out.half = fit_free_flight(log, one, 0.5);
   const FreeFlightFit& worse = out.whole.outcome != FreeFlightOutcome::fitted ? out.whole : out.half;
   out.outcome = worse.outcome;
   out.reason = worse.reason;
@@ -333,29 +281,23 @@ FreeFlightErrors free_flight_errors(const FlightModel& model, const ThrowLog& lo
   return out;
 }
 
-std::vector<FreeFlightComparison> compare_free_flights(const ThrowLog& log,
-                                                       std::span<const std::string> models, int threads) {
+FreeFlightComparison compare_free_flights(const ThrowLog& log, int threads) {
   using Clock = std::chrono::steady_clock;
   if (threads < 0) throw std::invalid_argument(fmt::format("free flight: threads = {} is not >= 0", threads));
-  std::vector<FreeFlightComparison> out;
-  for (const std::string& name : models) {
-    const FlightModel& model = flight_model(name);
-    FreeFlightComparison& comparison = out.emplace_back();
-    comparison.model = name;
-    const std::size_t n = log.throws.size();
-    comparison.each.resize(n);
-    std::vector<double> seconds(n);
-    if (n > 0) free_flight_errors(model, log, log.throws[0]);  // warms up, untimed
-    dynamics::parallel_for(n, threads, [&](std::size_t i) {
-      const auto begin = Clock::now();
-      comparison.each[i] = free_flight_errors(model, log, log.throws[i]);
-      seconds[i] = std::chrono::duration<double>(Clock::now() - begin).count();
-    });
-    comparison.train = statistics(comparison.each, datasets::Split::train);
-    comparison.test = statistics(comparison.each, datasets::Split::test);
-    comparison.skipped = n - comparison.train.n - comparison.test.n;
-    for (const double s : seconds) comparison.microseconds_per_throw += 1e6 * s / static_cast<double>(n);
-  }
+  FreeFlightComparison out;
+  const std::size_t n = log.throws.size();
+  out.each.resize(n);
+  std::vector<double> seconds(n);
+  if (n > 0) free_flight_errors(log, log.throws[0]);  // warms up, untimed
+  dynamics::parallel_for(n, threads, [&](std::size_t i) {
+    const auto begin = Clock::now();
+    out.each[i] = free_flight_errors(log, log.throws[i]);
+    seconds[i] = std::chrono::duration<double>(Clock::now() - begin).count();
+  });
+  out.train = statistics(out.each, datasets::Split::train);
+  out.test = statistics(out.each, datasets::Split::test);
+  out.skipped = n - out.train.n - out.test.n;
+  for (const double s : seconds) out.microseconds_per_throw += 1e6 * s / static_cast<double>(n);
   return out;
 }
 

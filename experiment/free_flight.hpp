@@ -1,11 +1,8 @@
 // Throws without a hand: how well a flight model explains a measured free flight.
 #pragma once
 
-#include <Eigen/Core>
 #include <optional>
-#include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "datasets/throw_log.hpp"
@@ -30,46 +27,30 @@ inline constexpr std::size_t kFewestFlightSamples = 4;
 /// The start of a flight, fitted to its first samples, and what it says of all of them. Planar flights lie in
 /// the plane y = 0 and turn about −y: their θ runs from +x to +z.
 struct FreeFlightFit {
-  FreeFlightOutcome outcome{};                  ///< only `fitted` has an answer
-  std::string reason;                           ///< why it was not fitted, in words
-  std::vector<double> times;                    ///< of the valid samples of the flight [s]
-  std::size_t fitted{};                         ///< the first so many were fitted
-  bool oriented{};                              ///< the orientation was tracked
-  flight::Vec3<double> position{}, velocity{};  ///< at times.front() [m, m/s]
-  flight::RotationState<double> rotation;       ///< at times.front(), if oriented
-  double theta{};                               ///< planar: the same angle, unwrapped [rad]
-  /// Of (position, velocity) [m, m/s] and of (rotation vector in the body, ω) [rad, rad/s], from the declared
-  /// sigma or, where none is declared, from the scatter of the residuals. Zero in the directions that a
-  /// planar flight lacks.
-  Eigen::Matrix<double, 6, 6> translation_covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  Eigen::Matrix<double, 6, 6> rotation_covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  /// Σ (residual/sigma)² over the fitted samples and its degrees of freedom; no chi2 without a declared
-  /// sigma.
-  std::optional<double> translation_chi2, rotation_chi2;    ///< sums of squares [-]
-  int translation_dof{}, rotation_dof{};                    ///< measured numbers minus fitted ones
+  FreeFlightOutcome outcome{};                              ///< only `fitted` has an answer
+  std::string reason;                                       ///< why it was not fitted, in words
+  std::vector<double> times;                                ///< of the valid samples of the flight [s]
+  std::size_t fitted{};                                     ///< the first so many were fitted
+  bool oriented{};                                          ///< the orientation was tracked
+  flight::Vec3<double> position{}, velocity{};              ///< at times.front() [m, m/s]
+  flight::RotationState<double> rotation;                   ///< at times.front(), if oriented
+  double theta{};                                           ///< planar: the same angle, unwrapped [rad]
   std::vector<flight::Vec3<double>> position_residuals;     ///< measured − predicted, every sample [m]
   std::vector<flight::Vec3<double>> orientation_residuals;  ///< from predicted to measured, in the body [rad]
 };
 
+/// The model's name, on cards and in what commands write.
+inline constexpr const char* kProjectile = "projectile";
+
 /// Fits the start on the first `fraction` of the samples by least squares weighted with the declared sigma,
-/// with the model "projectile": declared gravity straight down, the object's declared drag_k if it has one,
+/// with the model kProjectile: declared gravity straight down, the object's declared drag_k if it has one,
 /// torque-free rotation with its declared inertia (without one, a spherical body's), and the tracked frame
 /// taken for the centre of mass. Used are the valid samples within `free_flight`, or all valid ones. A
 /// quaternion's sigma stands for an angle of twice that much. Throws std::invalid_argument when `fraction` is
 /// not in (0, 1].
 FreeFlightFit fit_free_flight(const datasets::ThrowLog& log, const datasets::Throw& one, double fraction);
 
-/// A model of free flight, by name.
-struct FlightModel {
-  std::string_view name, summary;  ///< as --models names it; in one line
-  FreeFlightFit (*fit)(const datasets::ThrowLog&, const datasets::Throw&, double fraction);  ///< its fit
-};
-/// All models there are.
-std::span<const FlightModel> flight_models();
-/// Throws std::invalid_argument that lists the names there are.
-const FlightModel& flight_model(std::string_view name);
-
-/// One throw through one model. `whole` is what is left when the start is fitted on every sample: it shows
+/// One throw through the model. `whole` is what is left when the start is fitted on every sample: it shows
 /// what the model lacks. `half` has the start fitted on the first half: its last residual is the error of a
 /// prediction.
 struct FreeFlightErrors {
@@ -84,9 +65,8 @@ struct FreeFlightErrors {
   double end_position_error{};  ///< distance at the last sample, of `half` [m]
   std::optional<double> end_orientation_error;  ///< angle at the last sample, of `half` [rad]
 };
-/// The errors of one flight model on one throw.
-FreeFlightErrors free_flight_errors(const FlightModel& model, const datasets::ThrowLog& log,
-                                    const datasets::Throw& one);
+/// The errors of one throw.
+FreeFlightErrors free_flight_errors(const datasets::ThrowLog& log, const datasets::Throw& one);
 
 /// Of a sample of errors; std with n − 1 (0 for n < 2).
 struct Spread {
@@ -101,19 +81,16 @@ struct FreeFlightStatistics {
   Spread end_position_error_m, end_orientation_error_deg;  ///< the latter over the throws with orientation
 };
 
-/// A flight model against every free flight of a log.
+/// The model against every free flight of a log.
 struct FreeFlightComparison {
-  std::string model;                   ///< its name
   FreeFlightStatistics train, test;    ///< over the fitted throws of each split
   std::size_t skipped{};               ///< throws that were not fitted: their `each` says why
   double microseconds_per_throw{};     ///< both fits, one thread's time, warmed up
   std::vector<FreeFlightErrors> each;  ///< in the order of the log
 };
 
-/// Every throw of the log through each named model, on `threads` threads (0: one per core). The answer (but
-/// for the time it took) does not depend on their number. Throws std::invalid_argument for a name that is
-/// unknown or threads < 0.
-std::vector<FreeFlightComparison> compare_free_flights(const datasets::ThrowLog& log,
-                                                       std::span<const std::string> models, int threads = 1);
+/// Every throw of the log, on `threads` threads (0: one per core). The answer (but for the time it took) does
+/// not depend on their number. Throws std::invalid_argument for threads < 0.
+FreeFlightComparison compare_free_flights(const datasets::ThrowLog& log, int threads = 1);
 
 }  // namespace unhand::experiment

@@ -3,25 +3,14 @@
 #include <cmath>
 
 #include "dynamics/dense_solve.hpp"
-#include "dynamics/straight_line.hpp"
 
 namespace unhand::experiment {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-FittedLine fit_line(std::span<const double> t, std::span<const double> y, double sigma) {
-  const dynamics::StraightLine fitted = dynamics::fit_line(t, y);
-  const double n = static_cast<double>(t.size()), mean = fitted.mean_time, spread = fitted.spread;
-  FittedLine line{fitted.at(0), fitted.slope, {}};
-  line.covariance << 1 / n + mean * mean / spread, -mean / spread, -mean / spread, 1 / spread;
-  line.covariance *= sigma * sigma;
-  return line;
-}
-
 bool gauss_newton(const std::function<void(const VectorXd&, VectorXd&, MatrixXd&)>& evaluate,
-                  const std::function<void(const VectorXd&)>& accept, int unknowns, double sigma,
-                  MatrixXd& covariance) {
+                  const std::function<void(const VectorXd&)>& accept, int unknowns, double sigma) {
   constexpr int kSteps = 40, kHalvings = 12;
   constexpr double kSolved = 1e-9;  // [m] or [rad]: what the integrator leaves of a state
   VectorXd r, moved_r;
@@ -51,7 +40,6 @@ bool gauss_newton(const std::function<void(const VectorXd&, VectorXd&, MatrixXd&
       }
       if (predicted > 1e-8 * cost + 1e2 * floor) return false;  // not a minimum that rounding hides
     }
-    covariance = linear.covariance;
     return true;
   }
   return false;

@@ -61,9 +61,11 @@ std::unique_ptr<contact::ContactModel> contact_model_for(const PreparedThrow& th
                                                          const std::string& model, const ModelParameters& p) {
   if (model == release::kNaiveModel) return nullptr;
   if (contact::follows_pads(model)) require_force(throw_, model);
-  return contact::make_contact_model(
-      model, contact::ContactParameters<double>{patch_of(p), p.slide_end, p.law_values, throw_.open_command,
-                                                p.delay.centre});
+  return contact::make_contact_model(model,
+                                     contact::ContactParameters<double>{.patch = patch_of(p),
+                                                                        .law_values = p.law_values,
+                                                                        .open_command = throw_.open_command,
+                                                                        .delay = p.delay.centre});
 }
 
 release::ReleaseProblem<double> release_problem(const PreparedThrow& throw_,

@@ -17,11 +17,10 @@ namespace unhand::experiment {
 
 /// Campaign parameters of a model; each model reads what it needs.
 struct ModelParameters {
-  double mu{0.5};                                                 ///< friction coefficient [-]
-  double length{contact::kFingerLength};                          ///< L = c a = τ_max/f_max [m]
-  int pads{2};                                                    ///< n >= 1
-  contact::LawValues<double> law_values{};                        ///< of the law's own parameters
-  contact::SlideEnd slide_end{contact::SlideEnd::latched_brake};  ///< sliding_pivot
+  double mu{0.5};                           ///< friction coefficient [-]
+  double length{contact::kFingerLength};    ///< L = c a = τ_max/f_max [m]
+  int pads{2};                              ///< n >= 1
+  contact::LawValues<double> law_values{};  ///< of the law's own parameters
   contact::DelayDistribution delay{contact::DelayDistribution::number(0.05)};  ///< gripper_delay
   release::NaiveOptions naive{};                                               ///< limit_surface_naive
 };

@@ -12,6 +12,7 @@
 #include "dynamics/straight_line.hpp"
 #include "experiment/landing_noise.hpp"
 #include "experiment/time_check.hpp"
+#include "experiment/unit_evidence.hpp"
 
 namespace unhand::experiment {
 namespace {
@@ -47,19 +48,13 @@ std::optional<std::string> jump_of(const datasets::Series& time, const datasets:
 
 /// In words, how far a landing's angle is from where the track leads.
 std::optional<std::string> landing_off(const datasets::Throw& one) {
-  constexpr double kLast = 0.1, kBeyond = 0.3;  // [s]
-  const auto& mocap = *one.mocap;
+  constexpr double kGap = 0.3;  // [s]
   const auto& landing = *one.landing;
   if (landing.time.empty() || !tells_angle(landing)) return {};
-  const double landed = landing.time(0);
-  std::vector<double> t, theta;
-  for (std::size_t i = mocap.time.rows; i-- > 0;) {
-    if (!mocap.is_valid(i) || mocap.time(i) > landed) continue;
-    if (!t.empty() && mocap.time(i) < t.front() - kLast) break;
-    t.push_back(mocap.time(i)), theta.push_back(mocap.pose(i, 2));
-  }
-  if (t.size() < 4 || landed - t.front() > kBeyond) return {};
-  const double expected = dynamics::fit_line(t, theta).at(landed), off = landing.pose(0, 1) - expected;
+  const auto track = track_before_landing(one, kGap);
+  if (!track) return {};
+  const double expected = dynamics::fit_line(track->time, track->theta).at(landing.time(0)),
+               off = landing.pose(0, 1) - expected;
   if (!(std::abs(off) > 0.5 * kTurn)) return {};
   return fmt::format("theta is {:.4g} rad, and the track before leads to {:.4g} rad, {:.2g} turns from it",
                      landing.pose(0, 1), expected, std::abs(off) / kTurn);

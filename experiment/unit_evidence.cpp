@@ -291,6 +291,21 @@ std::optional<TimedLanding> timed_landing(const datasets::ThrowLog& log, const d
   return TimedLanding{z + vz * t - fall, 1 + 0.5 * fall};
 }
 
+std::optional<LastTrack> track_before_landing(const datasets::Throw& logged, double gap) {
+  constexpr double kLast = 0.1;  // s
+  const auto& mocap = *logged.mocap;
+  const double landed = logged.landing->time(0);
+  LastTrack out;
+  for (std::size_t i = mocap.time.rows; i-- > 0;) {
+    if (!mocap.is_valid(i) || mocap.time(i) > landed) continue;
+    if (!out.time.empty() && mocap.time(i) < out.time.front() - kLast) break;
+    out.time.push_back(mocap.time(i));
+    out.x.push_back(mocap.pose(i, 0)), out.theta.push_back(mocap.pose(i, 2));
+  }
+  if (out.time.size() < 4 || landed - out.time.front() > gap) return {};
+  return out;
+}
+
 std::optional<double> highest_point(const datasets::ThrowLog& log, const datasets::Throw& logged) {
   std::optional<double> out;
   const auto at_least = [&](double z) { out = std::max(out.value_or(z), z); };

@@ -60,6 +60,14 @@ struct TimedLanding {
 /// Nothing if the throw does not tell.
 std::optional<TimedLanding> timed_landing(const datasets::ThrowLog& log, const datasets::Throw& logged);
 
+/// The last tenth of a second that motion capture shows before a landing, latest first.
+struct LastTrack {
+  std::vector<double> time, x, theta;  ///< [s], [m], [rad]
+};
+/// Of a planar throw with motion capture and a timed landing; nothing where fewer than four samples show it,
+/// or none within `gap` [s] before the landing.
+std::optional<LastTrack> track_before_landing(const datasets::Throw& logged, double gap);
+
 /// From the declared com_offset to where motion capture sees the CoM from the pads' centre while the object
 /// is held, in the object's frame [rad]; nothing if the throw does not tell, or tells of another distance (by
 /// a factor of two).

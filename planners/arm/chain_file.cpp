@@ -89,7 +89,7 @@ Chain toml_chain(std::string_view text, const std::string& name) {
 
 Chain read_chain(const std::string& name_or_file, const std::string& tip) {
   const std::filesystem::path file(name_or_file);
-  if (file.extension() == ".urdf" || file.extension() == ".xml") return read_urdf_chain(file, "", tip);
+  if (file.extension() == ".urdf" || file.extension() == ".xml") return read_urdf_chain(file, tip);
   if (!tip.empty()) throw std::invalid_argument(fmt::format("tip: '{}' is no .urdf file", name_or_file));
   if (name_or_file == "panda") return panda();
   if (file.extension() == ".toml") return read_toml_chain(file);

@@ -34,13 +34,12 @@ Chain read_toml_chain(const std::filesystem::path& file);
 /// The same from text; `name` stands for the file in errors.
 Chain toml_chain(std::string_view text, const std::string& name);
 
-/// The chain from link `base` to link `tip` of a URDF file; empty names: the only root, the only leaf. Joints
+/// The chain from the root to link `tip` of a URDF file; an empty name: the only leaf. Joints
 /// may be revolute or continuous, about any axis (frames are turned so that it is z), and fixed: a link fixed
 /// to a moving one belongs to it. Links beside the chain on joints that move (fingers) do not count, nor does
 /// their mass, as the chain's notes say; a joint of the chain that mimics another is refused. A URDF tells no
 /// limits of acceleration and jerk. Throws datasets::ImportError with the line.
-Chain read_urdf_chain(const std::filesystem::path& file, const std::string& base = "",
-                      const std::string& tip = "");
+Chain read_urdf_chain(const std::filesystem::path& file, const std::string& tip = "");
 
 /// By name or file: "panda", FILE.toml or FILE.urdf, of the last up to link `tip`. Throws
 /// std::invalid_argument for another name, and for a tip of what is no URDF file.

@@ -86,11 +86,12 @@ struct LimitCheck {
   /// have.
   std::string worst(const Chain& chain) const;
 };
-/// The least step of check_limits, by which a long look stays one of seconds [s].
+inline constexpr double kCheckStep = 1e-3;  ///< of check_limits, where nobody asks for another [s]
+/// The least, by which a long look stays one of seconds [s].
 inline constexpr double kLeastCheckStep = 1e-5;
 /// Looks every `step` [s], at the end, and where a velocity or an acceleration is largest. Torques are those
 /// of inverse dynamics, with friction. Throws std::invalid_argument for a step out of [kLeastCheckStep, inf)
 /// and a trajectory of another number of joints than the chain's.
-LimitCheck check_limits(const Chain& chain, const JointTrajectory& trajectory, double step = 1e-3);
+LimitCheck check_limits(const Chain& chain, const JointTrajectory& trajectory, double step = kCheckStep);
 
 }  // namespace unhand::planners

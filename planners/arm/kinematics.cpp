@@ -8,8 +8,6 @@ template Jacobian<double> jacobian(const Chain&, const ChainFrames<double>&);
 template Jacobian<Dual> jacobian(const Chain&, const ChainFrames<Dual>&);
 template Jacobian<double> jacobian(const Chain&, const JointVector<double>&);
 template Jacobian<Dual> jacobian(const Chain&, const JointVector<Dual>&);
-template Jacobian<double> jacobian_rate(const Chain&, const JointVector<double>&, const JointVector<double>&);
-template Jacobian<Dual> jacobian_rate(const Chain&, const JointVector<Dual>&, const JointVector<Dual>&);
 template TipMotion<double> tip_motion(const Chain&, const JointVector<double>&, const JointVector<double>&,
                                       const JointVector<double>&);
 template TipMotion<Dual> tip_motion(const Chain&, const JointVector<Dual>&, const JointVector<Dual>&,

@@ -69,9 +69,6 @@ Jacobian<S> jacobian(const Chain& chain, const JointVector<S>& q);
 /// The same from frames at hand.
 template <class S>
 Jacobian<S> jacobian(const Chain& chain, const ChainFrames<S>& frames);
-/// d/dt J(q(t)) where q moves with q̇ [1/s, m/(rad s)]; the tip's acceleration is J q̈ + J̇ q̇.
-template <class S>
-Jacobian<S> jacobian_rate(const Chain& chain, const JointVector<S>& q, const JointVector<S>& qd);
 
 /// The tip's frame, twist and acceleration, in the base's axes.
 template <class S>
@@ -119,30 +116,6 @@ Jacobian<S> jacobian(const Chain& chain, const JointVector<S>& q) {
 }
 
 template <class S>
-Jacobian<S> jacobian_rate(const Chain& chain, const JointVector<S>& q, const JointVector<S>& qd) {
-  require_sizes(chain, "rate of a Jacobian", q, qd);
-  const ChainFrames<S> frames = frames_of(chain, q);
-  std::array<Vector3<S>, kMaxJoints> velocity, omega;  // of the links' origins, and of the links
-  Vector3<S> v = Vector3<S>::Zero(), w = Vector3<S>::Zero(), at = Vector3<S>::Zero();
-  for (int i = 0; i < chain.size(); ++i) {
-    v += cross(w, Vector3<S>(frames.links[i].p - at));
-    at = frames.links[i].p;
-    w += qd[i] * frames.links[i].R.col(2);
-    velocity[i] = v;
-    omega[i] = w;
-  }
-  v += cross(w, Vector3<S>(frames.tip.p - at));
-  Jacobian<S> out(6, chain.size());
-  for (int i = 0; i < chain.size(); ++i) {
-    const Vector3<S> z = frames.links[i].R.col(2), turn = cross(omega[i], z);
-    out.col(i).template head<3>() =
-        cross(turn, Vector3<S>(frames.tip.p - frames.links[i].p)) + cross(z, Vector3<S>(v - velocity[i]));
-    out.col(i).template tail<3>() = turn;
-  }
-  return out;
-}
-
-template <class S>
 TipMotion<S> tip_motion(const Chain& chain, const JointVector<S>& q, const JointVector<S>& qd,
                         const JointVector<S>& qdd) {
   require_sizes(chain, "motion of the tip", q, qd, qdd);
@@ -172,10 +145,6 @@ extern template Jacobian<double> jacobian(const Chain&, const ChainFrames<double
 extern template Jacobian<Dual> jacobian(const Chain&, const ChainFrames<Dual>&);
 extern template Jacobian<double> jacobian(const Chain&, const JointVector<double>&);
 extern template Jacobian<Dual> jacobian(const Chain&, const JointVector<Dual>&);
-extern template Jacobian<double> jacobian_rate(const Chain&, const JointVector<double>&,
-                                               const JointVector<double>&);
-extern template Jacobian<Dual> jacobian_rate(const Chain&, const JointVector<Dual>&,
-                                             const JointVector<Dual>&);
 extern template TipMotion<double> tip_motion(const Chain&, const JointVector<double>&,
                                              const JointVector<double>&, const JointVector<double>&);
 extern template TipMotion<Dual> tip_motion(const Chain&, const JointVector<Dual>&, const JointVector<Dual>&,

@@ -165,19 +165,13 @@ std::string only_leaf(const Urdf& urdf) {
   return found;
 }
 
-/// The joints from the base to the tip.
-std::vector<const XMLElement*> path_between(const Urdf& urdf, const std::string& base,
-                                            const std::string& tip) {
+/// The joints from the root to the tip.
+std::vector<const XMLElement*> path_to(const Urdf& urdf, const std::string& tip) {
   std::vector<const XMLElement*> out;
-  for (std::string link = tip; link != base;) {
-    const auto above = urdf.joint_above.find(link);
-    if (above == urdf.joint_above.end()) {
-      if (base.empty()) break;  // the root
-      urdf.fail(fmt::format("no joints lead from link '{}' to link '{}'", base, tip));
-    }
+  for (auto above = urdf.joint_above.find(tip); above != urdf.joint_above.end();) {
     out.push_back(above->second);
-    link = urdf.parent_of(*above->second);
     if (out.size() > urdf.links.size()) urdf.fail("its joints go round in a circle");
+    above = urdf.joint_above.find(urdf.parent_of(*above->second));
   }
   return {out.rbegin(), out.rend()};
 }
@@ -192,14 +186,13 @@ Eigen::Matrix3d onto(const Eigen::Vector3d& axis) {
 
 }  // namespace
 
-Chain read_urdf_chain(const std::filesystem::path& file, const std::string& base, const std::string& tip) {
+Chain read_urdf_chain(const std::filesystem::path& file, const std::string& tip) {
   const Urdf urdf(file.string());
-  for (const std::string& link : {base, tip})
-    if (!link.empty() && !urdf.links.contains(link)) urdf.fail(fmt::format("there is no link '{}'", link));
+  if (!tip.empty() && !urdf.links.contains(tip)) urdf.fail(fmt::format("there is no link '{}'", tip));
   Chain out{urdf.name, {}, {}};
   Transform<double>
       here;  // the URDF's frame of the link at hand, in the frame of the last joint (or the base)
-  const auto path = path_between(urdf, base, tip.empty() ? only_leaf(urdf) : tip);
+  const auto path = path_to(urdf, tip.empty() ? only_leaf(urdf) : tip);
   std::set<std::string> on_path;
   for (const XMLElement* element : path)
     on_path.insert(urdf.attribute(urdf.child_of(*element, "child"), "link"));

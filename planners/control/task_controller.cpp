@@ -63,7 +63,7 @@ ControlStep AdaptiveController::task_law(const TaskReference& r, const TaskGains
       inverse_dynamics<double>(model_, q, Joints::Zero(n), alpha) + coriolis_between(model_, q, qd, beta);
   Eigen::Matrix<double, 6, 1> pull = gains.stiffness * out.error;
   pull.tail<3>() = gains.rotational * out.error.tail<3>();
-  out.torque = model_torque(Y_r_, nominal) + friction_torque<double>(model_, qd) +
+  out.torque = nominal + Y_r_ * estimate + friction_torque<double>(model_, qd) +
                gains.damping.cwiseProduct(out.velocity_error) + J.transpose() * pull;
   return out;
 }

@@ -63,14 +63,7 @@ class AdaptiveController {
 
   LinkParameters estimate = LinkParameters::Zero();  ///< π̂
 
-  /// The chain as the controller knows it, without the estimate.
-  const Chain& model() const { return model_; }
-
  private:
-  JointVector<double> model_torque(const Regressor<double>& Y, const JointVector<double>& nominal) const {
-    return nominal + Y * estimate;
-  }
-
   Chain model_;
   Adaptation adaptation_;
   mutable Regressor<double> Y_r_;      ///< of the last step

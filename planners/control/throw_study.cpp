@@ -180,7 +180,6 @@ StudyThrow run_throw(const ControllerChoice& choice, const Payload& payload, con
     const ControlStep control = controller.task_law(reference, gains, q, qd);
     const Joints applied = control.torque.cwiseMin(limit).cwiseMax(-limit);
     out.torque_use = std::max(out.torque_use, control.torque.cwiseQuotient(limit).cwiseAbs().maxCoeff());
-    out.saturated += (applied - control.torque).norm() > 0;
     controller.adapt(control, applied, q, qd, kStep);
     Joints noisy = applied;
     for (int i = 0; i < 7; ++i) noisy[i] += o.torque_noise * normal(random);

@@ -68,7 +68,6 @@ struct StudyThrow {
   double release_position_error{}, release_velocity_error{};  ///< m, m/s
   std::vector<double> rms_error;  ///< of the position per repetition, the throw last [m]
   double torque_use{};            ///< largest share of a joint's torque limit that was asked for
-  int saturated{};                ///< control steps with a torque at its limit
   LinkParameters estimate = LinkParameters::Zero();  ///< π̂ at the release
   std::vector<TrackingSample> history;               ///< every 10 ms, if asked for
 };

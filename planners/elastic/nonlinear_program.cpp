@@ -184,22 +184,6 @@ void check(const NonlinearProgram& p) {
 
 }  // namespace
 
-const char* to_string(ProgramOutcome outcome) {
-  switch (outcome) {
-    case ProgramOutcome::solved:
-      return "solved";
-    case ProgramOutcome::infeasible:
-      return "infeasible";
-    case ProgramOutcome::iterations_spent:
-      return "iterations_spent";
-    case ProgramOutcome::time_spent:
-      return "time_spent";
-    case ProgramOutcome::failed:
-      break;
-  }
-  return "failed";
-}
-
 int NonlinearProgram::add_variable(double low, double high, double first) {
   lower.push_back(low);
   upper.push_back(high);
@@ -248,7 +232,6 @@ ProgramSummary solve(const NonlinearProgram& program, const ProgramOptions& opti
     default:
       summary.outcome = ProgramOutcome::failed;
   }
-  if (IsValid(app->Statistics())) summary.iterations = app->Statistics()->IterationCount();
   summary.seconds = cpu_seconds() - begin;
   return summary;
 }

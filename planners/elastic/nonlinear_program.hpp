@@ -104,8 +104,6 @@ enum class ProgramOutcome {
   time_spent,        ///< more CPU time than the options allow
   failed,            ///< the functions could not be evaluated, or the linear algebra broke down
 };
-/// The outcome's name, as it is written above.
-const char* to_string(ProgramOutcome);
 
 /// The minimum, or how far it got.
 struct ProgramSummary {
@@ -113,7 +111,6 @@ struct ProgramSummary {
   std::vector<double> x;                           ///< the program's variables
   double objective{};                              ///< there
   double violation{};                              ///< largest of the constraints, in their own units
-  int iterations{};                                ///< of the interior point
   double seconds{};                                ///< of CPU time
 };
 

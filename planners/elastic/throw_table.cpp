@@ -10,7 +10,8 @@
 namespace unhand::planners::elastic {
 
 Basins find_basins(const ClutchedArm& arm, const ThrowTask& task, const ThrowProgramOptions& options,
-                   int starts, double share) {
+                   int starts) {
+  constexpr double kShare = 0.01;  // of objectives that agree
   if (starts < 1)
     throw std::invalid_argument(fmt::format("find_basins: starts = {}; accepted: >= 1", starts));
   Basins out;
@@ -21,14 +22,12 @@ Basins find_basins(const ClutchedArm& arm, const ThrowTask& task, const ThrowPro
     out.longest = std::max(out.longest, plan.program.seconds);
     if (!plan.solved()) {
       ++out.failed;
-      out.failed_by_budget += plan.program.outcome == ProgramOutcome::iterations_spent ||
-                              plan.program.outcome == ProgramOutcome::time_spent;
       continue;
     }
     const double value = plan.program.objective;
     const auto same = std::find_if(out.found.begin(), out.found.end(), [&](const Basin& basin) {
       const double there = basin.best.program.objective;
-      return std::abs(value - there) <= share * std::max(std::abs(value), std::abs(there));
+      return std::abs(value - there) <= kShare * std::max(std::abs(value), std::abs(there));
     });
     if (same == out.found.end()) {
       out.found.push_back({std::move(plan), 1});

@@ -8,7 +8,7 @@
 
 namespace unhand::planners::elastic {
 
-/// Solutions of one task from random starts whose objectives agree within `share`.
+/// Solutions of one task from random starts whose objectives agree within 1 %.
 struct Basin {
   ElasticThrow best;  ///< of its solutions
   int starts{};       ///< that ended here
@@ -18,11 +18,10 @@ struct Basins {
   std::vector<Basin> found;  ///< best first
   int failed{};              ///< starts that ended nowhere
   double longest{};          ///< CPU time of the longest solve [s]
-  int failed_by_budget{};    ///< of those, spent iterations or time
 };
 /// Solves from `starts` random starts.
 Basins find_basins(const ClutchedArm& arm, const ThrowTask& task, const ThrowProgramOptions& options,
-                   int starts, double share = 0.01);
+                   int starts);
 
 /// Throws to targets at one height, by increasing distance.
 struct ThrowTable {

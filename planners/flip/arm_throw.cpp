@@ -170,7 +170,7 @@ ArmThrow ThrowingArm::finish(const Chain& chain, std::span<const dynamics::Wrenc
   }
   ticks.push_back({s.q, s.qd});
 
-  double beside = 0, last = 0;
+  double last = 0;
   std::vector<double> breaks;
   std::vector<HandKnot> knots;
   for (std::size_t k = 1; k + 1 < ticks.size(); k += kKnot) {
@@ -183,12 +183,11 @@ ArmThrow ThrowingArm::finish(const Chain& chain, std::span<const dynamics::Wrenc
                      {tip.velocity.x(), tip.velocity.z(), -tip.omega.y()},
                      {tip.acceleration.x(), tip.acceleration.z(), -tip.alpha.y()}});
     breaks.push_back((static_cast<double>(k) - static_cast<double>(before_.size())) * kControlStep);
-    if (breaks.back() >= 0) beside = std::max(beside, std::abs(tip.frame.p.y()));
   }
   std::vector<release::PolynomialHand::Polynomial::Coefficients> pieces;
   for (std::size_t k = 0; k + 1 < knots.size(); ++k)
     pieces.push_back(between(knots[k], knots[k + 1], breaks[k + 1] - breaks[k]));
-  return {release::PolynomialHand(release::PolynomialHand::Polynomial(breaks, pieces)), s.use, beside};
+  return {release::PolynomialHand(release::PolynomialHand::Polynomial(breaks, pieces)), s.use};
 }
 
 }  // namespace unhand::planners::flip

@@ -54,7 +54,6 @@ struct ArmUse {
 struct ArmThrow {
   release::PolynomialHand hand;  ///< in the vertical plane y = 0; t = 0 is the brake's start
   ArmUse use;                    ///< over acceleration and brake
-  double beside{};               ///< most that the pads were beside the plane after the brake's start [m]
 };
 
 /// Simulates to the brake's start once; braking can then be simulated with different loads on the hand.

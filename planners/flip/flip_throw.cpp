@@ -63,8 +63,7 @@ std::optional<FlipRelease> release_bar(const release::HandMotion& hand, const He
   return FlipRelease{
       detach.time,
       {detach.pose.x, detach.pose.z, detach.pose.theta, detach.twist.vx, detach.twist.vz, detach.twist.omega},
-      {at.pose.x, at.pose.z, at.pose.theta, at.twist.vx, at.twist.vz, at.twist.omega},
-      result.relative.angle - held.angle};
+      {at.pose.x, at.pose.z, at.pose.theta, at.twist.vx, at.twist.vz, at.twist.omega}};
 }
 
 }  // namespace unhand::planners::flip

@@ -40,7 +40,6 @@ struct FlipRelease {
   double time{};                 ///< of the detach, after the gripper's command [s]
   DetachVector detach{};         ///< m, m, rad, m/s, m/s, rad/s
   std::array<double, 6> hand{};  ///< pose and twist of the hand then, in the same order
-  double turned{};               ///< of the bar against the hand until then [rad]
 };
 
 /// Throws std::invalid_argument for pads whose law does not follow them (contact::follows_pads) and for a

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <tuple>
@@ -59,15 +60,6 @@ void validate(const FlipTarget& target) {
           fmt::format("flip target: {} = {} is not in (0, inf) {}", name, value, unit));
 }
 
-void validate(const ConeSearch& search) {
-  constexpr double kFinest = 500;
-  if (!(search.reach > 0 && search.reach <= 100))
-    throw std::invalid_argument(fmt::format("cone search: reach = {} is not in (0, 100]", search.reach));
-  if (!(search.mesh >= search.reach / kFinest && search.mesh <= search.reach))
-    throw std::invalid_argument(fmt::format("cone search: mesh = {} is not in [{}, {}], reach/500 to reach",
-                                            search.mesh, search.reach / kFinest, search.reach));
-}
-
 double normalized_error(const FlipPose& landing, const FlipTarget& target) {
   return std::hypot((landing.x - target.pose.x) / target.tolerance_x,
                     (landing.angle - target.pose.angle) / target.tolerance_angle);
@@ -95,12 +87,16 @@ std::optional<FlipDatum> mean_of(std::span<const FlipTrial> trials) {
   return out;
 }
 
-std::optional<ConeStep> cone_search(ForwardModel model, const FlipDatum& base,
-                                    std::span<const FlipDatum, 3> simplex, const FlipTarget& target,
-                                    const CommandRange& range, const ConeSearch& search,
-                                    std::span<const FlipCommand> tried) {
-  validate(target);
-  validate(search);
+namespace {
+
+/// Searches the mesh for the command whose prediction is nearest to the target; commands out of range, and
+/// those in `tried`, are passed over. Deltas come from `simplex`, prediction and command start at `base` (the
+/// simplex's first entry, but for model 3). Empty where no mesh point remains, or the simplex is degenerate.
+std::optional<FlipCommand> cone_search(ForwardModel model, const FlipDatum& base,
+                                       std::span<const FlipDatum, 3> simplex, const FlipTarget& target,
+                                       const CommandRange& range, std::span<const FlipCommand> tried) {
+  constexpr int kMesh = 50;       // to either side
+  constexpr double kStep = 0.05;  // of α
   const auto u0 = range.fractions(simplex[0].command), u1 = range.fractions(simplex[1].command),
              u2 = range.fractions(simplex[2].command), from = range.fractions(base.command);
   std::array<double, 3> d1{}, d2{};
@@ -109,11 +105,11 @@ std::optional<ConeStep> cone_search(ForwardModel model, const FlipDatum& base,
                c = d1[0] * d2[1] - d1[1] * d2[0];
   const auto norm = [](const std::array<double, 3>& d) { return std::hypot(d[0], d[1], d[2]); };
   if (!(std::hypot(a, b, c) > 1e-3 * norm(d1) * norm(d2))) return {};
-  const int n = static_cast<int>(std::lround(search.reach / search.mesh));
-  std::optional<ConeStep> best;
-  for (int i = -n; i <= n; ++i)
-    for (int j = -n; j <= n; ++j) {
-      const double x = i * search.mesh, y = j * search.mesh;
+  std::optional<FlipCommand> best;
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = -kMesh; i <= kMesh; ++i)
+    for (int j = -kMesh; j <= kMesh; ++j) {
+      const double x = i * kStep, y = j * kStep;
       std::array<double, 3> f{};
       bool inside = true;
       for (std::size_t k = 0; k < 3; ++k) {
@@ -138,22 +134,17 @@ std::optional<ConeStep> cone_search(ForwardModel model, const FlipDatum& base,
       }
       if (!landing) continue;
       const double error = normalized_error(*landing, target);
-      if (!best || error < best->error)
-        best = ConeStep{range.clamp(range.at(f[0], f[1], f[2])), *landing, error};
+      if (error < least) least = error, best = range.clamp(range.at(f[0], f[1], f[2]));
     }
   return best;
 }
 
+}  // namespace
+
 ConeLearner::ConeLearner(ForwardModel model, std::vector<FlipDatum> support, const FlipTarget& target,
-                         const CommandRange& range, const ConeSearch& search, std::vector<FlipCommand> tried)
-    : model_(model),
-      data_(std::move(support)),
-      tried_(std::move(tried)),
-      target_(target),
-      range_(range),
-      search_(search) {
+                         const CommandRange& range, std::vector<FlipCommand> tried)
+    : model_(model), data_(std::move(support)), tried_(std::move(tried)), target_(target), range_(range) {
   validate(target_);
-  validate(search_);
   require_finite(data_);
   if (const std::size_t n = different(data_); n < kSimplex)
     throw std::invalid_argument(fmt::format(
@@ -174,10 +165,10 @@ std::optional<FlipCommand> ConeLearner::next() {
                                                std::max(order[i], order[j])};
         if (!searched_.insert(which).second) continue;
         const std::array<FlipDatum, 3> simplex{data_[order[0]], data_[order[i]], data_[order[j]]};
-        const auto step = cone_search(model_, simplex[0], simplex, target_, range_, search_, tried_);
-        if (!step) continue;
-        tried_.push_back(step->command);
-        return step->command;
+        const auto command = cone_search(model_, simplex[0], simplex, target_, range_, tried_);
+        if (!command) continue;
+        tried_.push_back(*command);
+        return command;
       }
   return {};
 }
@@ -210,10 +201,9 @@ std::vector<FlipDatum> transferred(std::span<const FlipDatum> data, double shift
 }
 
 TransferLearner::TransferLearner(std::span<const FlipDatum> past, double shift, const FlipTarget& target,
-                                 const CommandRange& range, const ConeSearch& search)
-    : past_(transferred(past, shift)), target_(target), range_(range), search_(search) {
+                                 const CommandRange& range)
+    : past_(transferred(past, shift)), target_(target), range_(range) {
   validate(target_);
-  validate(search_);
   if (past_.size() < 4)
     throw std::invalid_argument("transfer: fewer than four throws of the old bar can be transferred");
   sort_by_error(past_, target_);
@@ -233,9 +223,7 @@ std::optional<FlipCommand> TransferLearner::next() {
   } else if (!own_.empty()) {
     const FlipDatum& third = own_.size() == 1 ? past_[2] : past_[3];
     const std::array<FlipDatum, 3> simplex{past_[0], past_[1], third};
-    if (const auto step =
-            cone_search(ForwardModel::detach, own_.back(), simplex, target_, range_, search_, tried_))
-      command = step->command;
+    command = cone_search(ForwardModel::detach, own_.back(), simplex, target_, range_, tried_);
   }
   if (!command) command = nearest_left();
   if (command) tried_.push_back(*command);
@@ -249,7 +237,7 @@ void TransferLearner::observe(std::span<const FlipTrial> trials) {
     own_.push_back(*mean);
   }
   if (different(own_) == kSimplex)
-    after_ = std::make_unique<ConeLearner>(ForwardModel::detach, own_, target_, range_, search_, tried_);
+    after_ = std::make_unique<ConeLearner>(ForwardModel::detach, own_, target_, range_, tried_);
 }
 
 }  // namespace unhand::planners::flip

@@ -55,43 +55,19 @@ enum class ForwardModel {
   detach,   ///< model 2, Eq. 28: the detach state is, and flight follows
 };
 
-/// The plane of commands through u_1 that (α_1, α_2) span: u = u_1 + Σ α_i (u_{i+1} − u_1).
-struct ConeSearch {
-  double reach{2.5};  ///< |α_i| at most, in (0, 100]
-  double mesh{
-      0.05};  ///< between mesh points, from reach/500 to reach: of a finer one the search would be long
-};
-/// Throws std::invalid_argument, naming value and accepted range. Whoever takes a search checks it.
-void validate(const ConeSearch& search);
-
-/// What Σ α_i (y_{i+1} − y_1) is added to, and its prediction, at the best mesh point.
-struct ConeStep {
-  FlipCommand command;  ///< to try
-  FlipPose predicted;   ///< its landing
-  double error{};       ///< normalised, of the prediction [-]
-};
-/// Searches the mesh for the command whose prediction is nearest to the target; commands out of range, and
-/// those in `tried`, are passed over. Deltas come from `simplex`, prediction and command start at `base` (the
-/// simplex's first entry, but for model 3). Empty where no mesh point remains, or the simplex is degenerate.
-std::optional<ConeStep> cone_search(ForwardModel model, const FlipDatum& base,
-                                    std::span<const FlipDatum, 3> simplex, const FlipTarget& target,
-                                    const CommandRange& range, const ConeSearch& search,
-                                    std::span<const FlipCommand> tried = {});
-
-/// Models 1 and 2 with Algorithm 1. The neighbours are the best datum and two others, the nearest three
-/// first; re-selection takes the nearest three that have not been searched yet, so it acts exactly when the
-/// last throws changed nothing about which those are.
+/// Models 1 and 2 with Algorithm 1: of the plane of commands u = u_1 + Σ α_i (u_{i+1} − u_1) through three
+/// data, the one whose prediction is nearest to the target, on a mesh with |α_i| <= 2.5. The neighbours are
+/// the best datum and two others, the nearest three first; re-selection takes the nearest three that have not
+/// been searched yet, so it acts exactly when the last throws changed nothing about which those are.
 class ConeLearner final : public FlipLearner {
  public:
   /// `support`: what is known before, at least three throws of different commands. `tried`: commands that
   /// were executed, landed or not, and are not to be given again; those of the support are among them anyway.
-  /// Throws std::invalid_argument for a smaller support, one that is not finite, and as both validate() do.
+  /// Throws std::invalid_argument for a smaller support, one that is not finite, and as validate() does.
   ConeLearner(ForwardModel model, std::vector<FlipDatum> support, const FlipTarget& target,
-              const CommandRange& range, const ConeSearch& search = {}, std::vector<FlipCommand> tried = {});
+              const CommandRange& range, std::vector<FlipCommand> tried = {});
   std::optional<FlipCommand> next() override;
   void observe(std::span<const FlipTrial> trials) override;
-  /// All data so far, in the order of arrival.
-  const std::vector<FlipDatum>& data() const { return data_; }
 
  private:
   ForwardModel model_;
@@ -100,7 +76,6 @@ class ConeLearner final : public FlipLearner {
   std::set<std::array<std::size_t, 3>> searched_;  ///< triples of data, the base first
   FlipTarget target_;
   CommandRange range_;
-  ConeSearch search_;
 };
 
 /// (q^o, v^o) of a bar whose centre of mass lies Δh [m] further from the pads, the twist of the bar
@@ -115,9 +90,9 @@ std::vector<FlipDatum> transferred(std::span<const FlipDatum> data, double shift
 class TransferLearner final : public FlipLearner {
  public:
   /// `past` are throws of the old bar. Throws std::invalid_argument for fewer than four that can be
-  /// transferred, and as both validate() do.
+  /// transferred, and as validate() does.
   TransferLearner(std::span<const FlipDatum> past, double shift, const FlipTarget& target,
-                  const CommandRange& range, const ConeSearch& search = {});
+                  const CommandRange& range);
   std::optional<FlipCommand> next() override;
   void observe(std::span<const FlipTrial> trials) override;
 
@@ -129,7 +104,6 @@ class TransferLearner final : public FlipLearner {
   std::vector<FlipCommand> tried_;
   FlipTarget target_;
   CommandRange range_;
-  ConeSearch search_;
   std::unique_ptr<ConeLearner> after_;
 };
 

@@ -46,8 +46,6 @@ class LeftOverField {
   };
   /// At a command, in fractions of the range, for a bar.
   At at(const std::array<double, 3>& fractions, const Bar& bar) const;
-  /// σ_j as chosen, in DetachVector's units.
-  const DetachVector& sigma() const { return sigma_; }
 
  private:
   std::vector<LeftOver> samples_;

@@ -1,7 +1,6 @@
 #include "planners/tube/nominal_throw.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -24,6 +23,10 @@ double TargetBox::half_length(const Vector2d& direction) const {
 }
 
 namespace {
+
+constexpr double kLowestTip = 0.15;     ///< height [m]
+constexpr double kShortestThrow = 0.3;  ///< level distance from the tip to the target [m]
+constexpr double kSpeedReserve = 0.02;  ///< of the joints' velocity limits, kept free
 
 /// Points that fill the unit cube evenly, x_k = frac(½ + k α) with α_i = φ⁻ⁱ and φ^(d+1) = φ + 1
 /// [Roberts2018].
@@ -52,14 +55,12 @@ class Search {
     if (options.face_target) held_[0] = true;
   }
 
-  /// The best throw from a configuration, if there is one; sets `barred` where one flies through the column.
-  std::optional<NominalThrow> best_at(const JointVector<double>& q, bool& barred) const {
+  /// The best throw from a configuration, if there is one.
+  std::optional<NominalThrow> best_at(const JointVector<double>& q) const {
     const auto frames = frames_of(chain_, q);
     const Vector3d p = frames.tip.p, e = box_.middle - p;
     const double distance = e.head<2>().norm();
-    if (p.z() < options_.lowest_tip || p.head<2>().norm() < options_.nearest_tip ||
-        distance < options_.shortest_throw)
-      return {};
+    if (p.z() < kLowestTip || p.head<2>().norm() < kColumn || distance < kShortestThrow) return {};
     const TipJacobian J = jacobian(chain_, frames).topRows<3>();
     Eigen::Matrix3d A = Eigen::Matrix3d::Zero();  // J W Jᵀ
     for (int i = 0; i < chain_.size(); ++i)
@@ -81,8 +82,7 @@ class Search {
       auto swung = swing_at(*speed);
       if (!swung) continue;  // the faster, the less room
       if (options_.medium.drag_k > 0) {
-        const double most = *speed * (1 - options_.speed_reserve - beaten) /
-                            (1 - options_.speed_reserve - swung->speed_margin);
+        const double most = *speed * (1 - kSpeedReserve - beaten) / (1 - kSpeedReserve - swung->speed_margin);
         speed = speed_with_drag(distance, height, elevation, *speed, most);
         if (!speed || !(swung = swing_at(*speed))) continue;
       }
@@ -92,11 +92,8 @@ class Search {
                                               landing, options_.medium);
       const double margin = std::min({swung->speed_margin, swung->position_margin, -level});
       if (!(margin > beaten)) continue;
-      if (options_.clear_column && through_column(frames, along, swung->v))
-        barred = true;
-      else
-        best = NominalThrow{{q, swung->qd}, margin,   swung->speed_margin, swung->position_margin, -level,
-                            *speed,         elevation};
+      if (!options_.clear_column || !through_column(frames, along, swung->v))
+        best = NominalThrow{{q, swung->qd}, margin, swung->speed_margin, swung->position_margin, -level};
     }
     return best;
   }
@@ -121,7 +118,7 @@ class Search {
         out.qd[i] = weight(i) * J.col(i).dot(scaled);
         use = std::max(use, std::abs(out.qd[i]) / chain_.joints[i].limits.velocity);
       }
-    out.speed_margin = 1 - options_.speed_reserve - use;
+    out.speed_margin = 1 - kSpeedReserve - use;
     if (!(out.speed_margin > beaten)) return {};
     out.position_margin = room(q, out.qd);
     if (!(out.position_margin > beaten) || (J * out.qd - v).norm() > 1e-6) return {};
@@ -138,7 +135,7 @@ class Search {
     const Vector3d& p = frames.tip.p;
     const double distance = along.dot(box_.middle.head<2>() - p.head<2>()),
                  nearest = std::clamp(-along.dot(p.head<2>()), 0.0, distance);
-    const auto inside = [&](const Vector2d& at) { return at.norm() < options_.nearest_tip; };
+    const auto inside = [&](const Vector2d& at) { return at.norm() < kColumn; };
     if (!inside(p.head<2>() + nearest * along)) return false;
     double top = -std::numeric_limits<double>::infinity();
     for (int i = 0; i < chain_.size(); ++i)
@@ -242,8 +239,8 @@ void make_planar(NominalOptions& options, const Chain& chain) {
   options.face_target = std::abs(chain.joints.front().origin.R(2, 2)) > 0.999;
 }
 
-std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box, const NominalOptions& options,
-                                      bool* through_column) {
+std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box,
+                                      const NominalOptions& options) {
   check(chain, box, options);
   const int n = chain.size();
   const Search search(chain, box, options);
@@ -254,7 +251,6 @@ std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box, 
   };
   const EvenPoints points(n);
   std::vector<std::optional<NominalThrow>> at(static_cast<std::size_t>(options.samples));
-  std::atomic<bool> any_barred = false;
   dynamics::parallel_for(at.size(), options.threads, [&](std::size_t k) {
     JointVector<double> q(n);
     for (int i = 0; i < n; ++i) {
@@ -263,14 +259,11 @@ std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box, 
       q[i] = lower + (0.05 + 0.9 * points.at(static_cast<int>(k), i)) * (upper - lower);
     }
     hold(q);
-    bool barred = false;
-    at[k] = search.best_at(q, barred);
-    if (barred) any_barred = true;
+    at[k] = search.best_at(q);
   });
   std::vector<NominalThrow> found;
   for (auto& one : at)
     if (one) found.push_back(std::move(*one));
-  if (through_column != nullptr) *through_column = found.empty() && any_barred;
   const auto better = [](const NominalThrow& a, const NominalThrow& b) { return a.margin > b.margin; };
   const auto kept = std::min(found.size(), static_cast<std::size_t>(options.candidates));
   std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(kept), found.end(), better);
@@ -283,8 +276,7 @@ std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box, 
       for (int i = 0; i < n; ++i)
         q[i] = within(chain.joints[i].limits, q[i] + size * (2 * points.at(k + 7, i) - 1));
       hold(q);
-      bool ignored = false;
-      const auto one = search.best_at(q, ignored);
+      const auto one = search.best_at(q);
       if (one && one->margin > found[j].margin)
         found[j] = *one;
       else if (k % 6 == 5)

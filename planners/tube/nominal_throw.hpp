@@ -22,6 +22,9 @@ struct TargetBox {
   }
 };
 
+/// Radius of the arm's column about the base's z axis [m]: no tip is nearer when the gripper opens.
+inline constexpr double kColumn = 0.25;
+
 /// What throws are looked for, and how long.
 struct NominalOptions {
   double window{0.1};                            ///< the arm must be able to go on for so long [s]
@@ -30,11 +33,8 @@ struct NominalOptions {
   int samples{3000};                             ///< configurations looked at, >= 1
   int refined{10};                               ///< best ones improved by small steps, >= 0
   int candidates{40};                            ///< most that come back, >= 1
-  double lowest_tip{0.15}, nearest_tip{0.25};    ///< height, and level distance from the base's z axis [m]
-  double shortest_throw{0.3};                    ///< level distance from the tip to the target [m]
-  double speed_reserve{0.02};                    ///< of the joints' velocity limits, kept free
-  /// No flight through the arm's column: as near to the base's z axis as no tip is, and lower than the
-  /// highest joint that is as near.
+  /// No flight through the arm's column: within kColumn of the base's z axis, and lower than the highest
+  /// joint that is as near.
   bool clear_column{true};
   /// The arm as a planar one: joints named here stay at the given angle, and the first turns to the target.
   struct Fixed {
@@ -62,16 +62,15 @@ void validate(const NominalOptions& options, const Chain& chain);
 struct NominalThrow {
   ThrowState state;                                                   ///< when the gripper is told to open
   double margin{}, speed_margin{}, position_margin{}, tube_margin{};  ///< [-]; the first is the least
-  double speed{}, elevation{};                                        ///< of the tip [m/s, rad]
 };
 
-/// Configurations from a low-discrepancy sequence; at each, elevations whose parabola (with drag: whose
+/// Configurations from a low-discrepancy sequence, with the tip at least 0.15 m high and 0.3 m from the
+/// target; at each, elevations whose parabola (with drag: whose
 /// flight) ends in the box's middle, and of all joint velocities with that tip velocity the one that is
-/// smallest against the limits, q̇ = W Jᵀ (J W Jᵀ)⁻¹ v with W = diag(q̇_max²). Sorted, best first; only margins
-/// > 0. The same options give the same throws. Throws std::invalid_argument for a box without area, a chain
-/// that is none or lacks limits, and as validate() does. Where nothing comes back, `through_column` says
-/// whether clear_column alone left it out.
+/// smallest against the limits, q̇ = W Jᵀ (J W Jᵀ)⁻¹ v with W = diag(q̇_max²), of which 2 % are kept free.
+/// Sorted, best first; only margins > 0. The same options give the same throws. Throws std::invalid_argument
+/// for a box without area, a chain that is none or lacks limits, and as validate() does.
 std::vector<NominalThrow> find_throws(const Chain& chain, const TargetBox& box,
-                                      const NominalOptions& options = {}, bool* through_column = nullptr);
+                                      const NominalOptions& options = {});
 
 }  // namespace unhand::planners

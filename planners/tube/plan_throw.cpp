@@ -27,21 +27,21 @@ const char* to_string(PlanOutcome outcome) {
 
 namespace {
 
-JointLimits share_of(JointLimits limits, const MotionOptions& options) {
-  limits.velocity *= options.velocity_share;
-  limits.acceleration *= options.acceleration_share;
-  limits.jerk *= options.acceleration_share;
+JointLimits share_of(JointLimits limits, double acceleration_share) {
+  limits.velocity *= 0.95;
+  limits.acceleration *= acceleration_share;
+  limits.jerk *= acceleration_share;
   return limits;
 }
 
 /// Ramps of all joints from rest to (v, a) in the time of the slowest.
 std::optional<std::vector<std::vector<JerkPiece>>> ramps(const Chain& chain, const JointVector<double>& v,
                                                          const JointVector<double>& a,
-                                                         const MotionOptions& options) {
+                                                         double acceleration_share) {
   // What the window asks for may use the whole limit, to the rounding of who made use of it.
   constexpr double kWhole = 1 + 1e-12;
   const auto limits = [&](int i) {
-    JointLimits l = share_of(chain.joints[i].limits, options);
+    JointLimits l = share_of(chain.joints[i].limits, acceleration_share);
     l.acceleration =
         std::max(l.acceleration, std::min(std::abs(a[i]), kWhole * chain.joints[i].limits.acceleration));
     return l;
@@ -61,22 +61,20 @@ std::optional<std::vector<std::vector<JerkPiece>>> ramps(const Chain& chain, con
 
 std::optional<JointTrajectory> throw_motion(const Chain& chain, const JointVector<double>& home,
                                             const ThrowState& state, const JointVector<double>& qdd,
-                                            const MotionOptions& options) {
+                                            double window, double acceleration_share) {
   constexpr const char* kOf = "throw motion";
   require_joints(chain, kOf, "home", home);
   require_joints(chain, kOf, "q", state.q);
   require_joints(chain, kOf, "qd", state.qd);
   require_joints(chain, kOf, "qdd", qdd);
-  const double T = options.window;
-  require(T >= 0 && std::isfinite(T), kOf, "window", T, "[0, inf) s");
-  for (const auto& [name, share] : {std::pair{"velocity_share", options.velocity_share},
-                                    {"acceleration_share", options.acceleration_share}})
-    require(share > 0 && share <= 1, kOf, name, share, "(0, 1]");
+  require(window >= 0 && std::isfinite(window), kOf, "window", window, "[0, inf) s");
+  require(acceleration_share > 0 && acceleration_share <= 1, kOf, "acceleration_share", acceleration_share,
+          "(0, 1]");
   const int n = chain.size();
-  const JointVector<double> last = state.qd + T * qdd;
-  const auto swing = ramps(chain, state.qd, qdd, options);
+  const JointVector<double> last = state.qd + window * qdd;
+  const auto swing = ramps(chain, state.qd, qdd, acceleration_share);
   // Braking is speeding up seen backwards: there the acceleration at the joint is −q̈.
-  const auto brake = ramps(chain, last, -qdd, options);
+  const auto brake = ramps(chain, last, -qdd, acceleration_share);
   if (!swing || !brake) return {};
   JointVector<double> start(n);
   for (int i = 0; i < n; ++i) {
@@ -89,7 +87,7 @@ std::optional<JointTrajectory> throw_motion(const Chain& chain, const JointVecto
   for (int i = 0; i < n; ++i) {
     const double length = std::abs(start[i] - home[i]);
     if (!(length > 1e-12)) continue;
-    const JointLimits l = share_of(chain.joints[i].limits, options);
+    const JointLimits l = share_of(chain.joints[i].limits, acceleration_share);
     velocity = std::min(velocity, l.velocity / length);
     acceleration = std::min(acceleration, l.acceleration / length);
     jerk = std::min(jerk, l.jerk / length);
@@ -104,7 +102,7 @@ std::optional<JointTrajectory> throw_motion(const Chain& chain, const JointVecto
     profile.append(approach);
     profile.append((*swing)[i]);
     if (i == 0) out.begin = -profile.duration();
-    profile.append({{T, 0.0}});
+    profile.append({{window, 0.0}});
     profile.append({(*brake)[i].rbegin(), (*brake)[i].rend()});
     out.joints.push_back(std::move(profile));
   }
@@ -132,19 +130,15 @@ namespace {
 /// The motion to a throw, with as much acceleration as the torques allow.
 bool add_motion(const Chain& chain, const JointVector<double>& home, const PlanOptions& options,
                 ThrowPlan& plan, std::string& reason) {
-  MotionOptions motion = options.motion;
-  motion.window = options.search.window;
   for (const double share : {1.0, 0.75, 0.55, 0.4}) {
-    motion.acceleration_share = share * options.motion.acceleration_share;
-    auto moved = throw_motion(chain, home, plan.nominal.state, plan.qdd, motion);
+    auto moved = throw_motion(chain, home, plan.nominal.state, plan.qdd, options.search.window, share * 0.9);
     if (!moved) {
       reason = "no ramp leads to the tube acceleration within the limits";
       return false;
     }
-    plan.limits = check_limits(chain, *moved, 10 * options.check_step);  // a coarse look is enough to refuse
-    if (plan.limits.within()) plan.limits = check_limits(chain, *moved, options.check_step);
+    plan.limits = check_limits(chain, *moved, 10 * kCheckStep);  // a coarse look is enough to refuse
+    if (plan.limits.within()) plan.limits = check_limits(chain, *moved);
     plan.motion = std::move(*moved);
-    plan.acceleration_share = motion.acceleration_share;
     const bool possible = plan.limits.within() && plan.limits.lowest > 0;
     reason = possible               ? (options.refuse ? options.refuse(plan) : "")
              : plan.limits.within() ? fmt::format("the arm would come down to {:.2f} m", plan.limits.lowest)
@@ -155,6 +149,17 @@ bool add_motion(const Chain& chain, const JointVector<double>& home, const PlanO
   return false;
 }
 
+std::string why_no_throw(const Chain& chain, const TargetBox& box, NominalOptions search) {
+  search.clear_column = false;
+  search.refined = 0;
+  return find_throws(chain, box, search).empty()
+             ? "no configuration reaches the box within the joints' limits"
+             : fmt::format(
+                   "every throw to the box flies through the arm's own column, within {:g} m of the "
+                   "base's axis and below its joints there",
+                   kColumn);
+}
+
 }  // namespace
 
 PlanResult plan_throw(const Chain& chain, const TargetBox& box, const PlanOptions& options) {
@@ -162,43 +167,29 @@ PlanResult plan_throw(const Chain& chain, const TargetBox& box, const PlanOption
   JointVector<double> home = options.home;
   if (home.size() == 0) home = middle_of(chain);
   require_joints(chain, "plan", "home", home);
-  require(options.landing_samples >= 2, "plan", "landing_samples", options.landing_samples, "[2, inf)");
-  require(options.check_step >= kLeastCheckStep && std::isfinite(options.check_step), "plan", "check_step",
-          options.check_step, "[1e-5, inf) s");
-  bool through_column = false;
-  const auto throws = find_throws(chain, box, options.search, &through_column);
+  const auto throws = find_throws(chain, box, options.search);
   out.throws = static_cast<int>(throws.size());
   out.outcome = PlanOutcome::no_throw;
-  out.reason = "no configuration reaches the box within the joints' limits";
-  if (through_column)
-    out.reason = fmt::format(
-        "every throw to the box flies through the arm's own column, within {:g} m of the base's axis and "
-        "below its joints there",
-        options.search.nearest_tip);
+  if (throws.empty()) out.reason = why_no_throw(chain, box, options.search);
   for (const NominalThrow& nominal : throws) {
     ++out.tried;
     const TubeProblem problem{chain, nominal.state, box.middle, options.search.window, options.search.medium};
     ThrowPlan plan;
     plan.nominal = nominal;
-    std::string reason;
-    if (options.tube) {
-      plan.tube = solve_tube(problem);
-      reason = plan.tube.reason;
-    } else {
-      plan.tube.qdd = JointVector<double>::Zero(chain.size());
-    }
+    plan.tube = solve_tube(problem);
+    std::string reason = plan.tube.reason;
     const bool first = out.outcome == PlanOutcome::no_throw;
     if (plan.tube.outcome == TubeOutcome::solved) {
-      plan.qdd = options.tube && options.refine ? refine_tube(problem, plan.tube.qdd) : plan.tube.qdd;
+      plan.qdd = options.refine ? refine_tube(problem, plan.tube.qdd) : plan.tube.qdd;
       const auto landings = [&](const JointVector<double>& qdd) {
-        return landings_over_window(problem, qdd, options.landing_samples);
+        return landings_over_window(problem, qdd, kLandingSamples);
       };
       plan.at_rest = landings(JointVector<double>::Zero(chain.size()));
       plan.tube_landings = landings(plan.tube.qdd);
       plan.landings = landings(plan.qdd);
       const bool inside = std::all_of(plan.landings.begin(), plan.landings.end(),
                                       [&](const LandingAt& at) { return at.lands && box.holds(at.x, at.y); });
-      if (inside || !options.tube) {
+      if (inside) {
         if (add_motion(chain, home, options, plan, reason)) {
           out.outcome = PlanOutcome::planned;
           out.reason.clear();

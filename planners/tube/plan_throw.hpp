@@ -11,32 +11,26 @@
 
 namespace unhand::planners {
 
-/// How the arm moves before and after the window.
-struct MotionOptions {
-  double window{0.1};              ///< T >= 0 [s], from the instant at which the gripper is told to open
-  double velocity_share{0.95};     ///< of the joints' limits that speeding up and braking use, in (0, 1]
-  double acceleration_share{0.9};  ///< the same of acceleration and jerk; a torque limit may ask for less
-};
-
 /// The arm's motion, t = 0 where the gripper is told to open: from rest at `home` along a straight line in
 /// joint space to where the swing begins; from rest to (q₀, q̇₀, q̈), all joints at once; q̈ held for the
-/// window; to rest, all joints at once. Acceleration is continuous. Empty where |q̈| exceeds a limit. Throws
-/// std::invalid_argument unless there is one finite number per joint, and the options are in their ranges.
+/// window T >= 0 [s]; to rest, all joints at once. Acceleration is continuous. Speeding up and braking use
+/// 95 % of the joints' limits of velocity and `acceleration_share`, in (0, 1], of those of acceleration and
+/// jerk (a torque limit may ask for less). Empty where |q̈| exceeds a limit. Throws std::invalid_argument
+/// unless there is one finite number per joint, for another window and for another share.
 std::optional<JointTrajectory> throw_motion(const Chain& chain, const JointVector<double>& home,
                                             const ThrowState& state, const JointVector<double>& qdd,
-                                            const MotionOptions& options = {});
+                                            double window, double acceleration_share);
 
 struct ThrowPlan;
+
+/// Instants of the window at which the landings of a plan are reported.
+inline constexpr int kLandingSamples = 21;
 
 /// What a whole throw may be.
 struct PlanOptions {
   NominalOptions search;     ///< window and medium are those of all parts
-  MotionOptions motion;      ///< its window is the search's
   JointVector<double> home;  ///< where the arm rests before; empty: middle_of
-  bool tube{true};           ///< false: no acceleration in the window, for comparison
   bool refine{true};         ///< go on from Tube-CVX to refine_tube
-  int landing_samples{21};   ///< instants of the window at which landings are reported, >= 2
-  double check_step{1e-3};   ///< of the dense check of limits, in [kLeastCheckStep, inf) [s]
   /// Why a plan within the limits is not taken, as that the grip does not hold its object (why_not_held);
   /// empty: it is taken. Without one all are.
   std::function<std::string(const ThrowPlan&)> refuse{};
@@ -56,12 +50,11 @@ const char* to_string(PlanOutcome);
 struct ThrowPlan {
   NominalThrow nominal;                           ///< the state that it was planned for
   TubeSolution tube;                              ///< of Tube-CVX
-  JointVector<double> qdd;                        ///< what the motion holds: q̈_tube, refined, or none
+  JointVector<double> qdd;                        ///< what the motion holds: q̈_tube, or refined
   JointTrajectory motion;                         ///< from rest to rest
   LimitCheck limits;                              ///< of the motion, looked at densely
   std::vector<LandingAt> landings;                ///< over the window, with qdd
   std::vector<LandingAt> tube_landings, at_rest;  ///< the same with q̈_tube, and with none
-  double acceleration_share{};  ///< share of the limits that speeding up and braking used [-]
 };
 
 /// The middle of all joints' ranges; 0 where there is none.
@@ -80,7 +73,7 @@ struct PlanResult {
 };
 
 /// Tries the throws of find_throws in order of their margin. The same options give the same plan.
-/// Throws std::invalid_argument as find_throws does, and for options out of range.
+/// Throws std::invalid_argument as find_throws does, and for a home of another number of joints.
 PlanResult plan_throw(const Chain& chain, const TargetBox& box, const PlanOptions& options = {});
 
 }  // namespace unhand::planners

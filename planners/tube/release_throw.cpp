@@ -430,13 +430,14 @@ class Points {
 };
 
 /// Limits of what a step may change: rows of a quadratic program in (δq̇₀, δq̈).
-std::vector<QpConstraint> step_limits(const ReleaseThrow& p, const InsensitiveOptions& options) {
-  const int m = static_cast<int>(options.joints.size());
+std::vector<QpConstraint> step_limits(const ReleaseThrow& p, const std::vector<int>& joints) {
+  constexpr double kReserve = 0.02;  // of the limits, kept free
+  const int m = static_cast<int>(joints.size());
   std::vector<QpConstraint> out;
   for (int i = 0; i < m; ++i) {
-    const int joint = options.joints[i];
+    const int joint = joints[i];
     const JointLimits& l = p.chain.joints[joint].limits;
-    const double v = (1 - options.reserve) * l.velocity, a = (1 - options.reserve) * l.acceleration;
+    const double v = (1 - kReserve) * l.velocity, a = (1 - kReserve) * l.acceleration;
     const double qd = p.start.qd[joint], qdd = p.qdd[joint];
     const auto add = [&](double by_rate, double by_acceleration, double now, double most) {
       for (const double side : {1.0, -1.0}) {
@@ -461,10 +462,16 @@ double square_sum(const std::vector<double>& r) {
 
 }  // namespace
 
-InsensitiveResult make_insensitive(const ReleaseThrow& problem, const InsensitiveOptions& options) {
+InsensitiveResult make_insensitive(const ReleaseThrow& problem, const std::vector<int>& joints) {
+  constexpr int kIterations = 15;      // at most
+  constexpr double kTolerance = 1e-3;  // relative decrease of the cost at which it is enough
+  constexpr std::size_t kMostJoints = dynamics::kDualSize / 2;
   validate(problem);
-  validate(options, problem.chain);
-  const int m = static_cast<int>(options.joints.size()), n = 2 * m;
+  if (joints.empty() || joints.size() > kMostJoints)
+    throw std::invalid_argument(
+        fmt::format("make_insensitive: {} joints named; accepted: 1 to {}", joints.size(), kMostJoints));
+  require_distinct(problem.chain, "make_insensitive", joints);
+  const int m = static_cast<int>(joints.size()), n = 2 * m;
   const Points points(problem);
   const auto moved = [&](const ThrowState& start, const JointVector<double>& qdd) {
     ReleaseThrow out = problem;
@@ -481,16 +488,16 @@ InsensitiveResult make_insensitive(const ReleaseThrow& problem, const Insensitiv
   double cost = cost_of(out.start, out.qdd), damping = 1e-3;
   out.before = out.after = std::sqrt(cost);
   if (!std::isfinite(cost)) out.lost = points.lost(problem, hand_of(problem));
-  for (; std::isfinite(cost) && out.iterations < options.iterations; ++out.iterations) {
+  for (; std::isfinite(cost) && out.iterations < kIterations; ++out.iterations) {
     const ReleaseThrow at = moved(out.start, out.qdd);
     JointVector<Dual> qd = constant(at.start.qd), qdd = constant(at.qdd);
     for (int i = 0; i < m; ++i) {
-      qd[options.joints[i]].v[i] = 1;
-      qdd[options.joints[i]].v[m + i] = 1;
+      qd[joints[i]].v[i] = 1;
+      qdd[joints[i]].v[m + i] = 1;
     }
     const auto residuals = points.residuals<Dual>(at, hand_of(at, qd, qdd));
     if (!residuals) break;
-    QuadraticProgram step{QpMatrix::Zero(n, n), QpVector::Zero(n), step_limits(at, options)};
+    QuadraticProgram step{QpMatrix::Zero(n, n), QpVector::Zero(n), step_limits(at, joints)};
     for (const Dual& r : *residuals)
       for (int i = 0; i < n; ++i) {
         step.c[i] += r.a * r.v[i];
@@ -501,7 +508,7 @@ InsensitiveResult make_insensitive(const ReleaseThrow& problem, const Insensitiv
     for (int attempt = 0; attempt < 6 && !(tried < cost); ++attempt) {
       step.H = hessian;
       for (int i = 0; i < m; ++i) {  // a step of a whole limit costs `damping` square decimetres
-        const JointLimits& l = problem.chain.joints[options.joints[i]].limits;
+        const JointLimits& l = problem.chain.joints[joints[i]].limits;
         step.H(i, i) += damping * 1e-2 / (l.velocity * l.velocity);
         step.H(m + i, m + i) += damping * 1e-2 / (l.acceleration * l.acceleration);
       }
@@ -510,8 +517,8 @@ InsensitiveResult make_insensitive(const ReleaseThrow& problem, const Insensitiv
       ThrowState start = at.start;
       JointVector<double> acceleration = at.qdd;
       for (int i = 0; i < m; ++i) {
-        start.qd[options.joints[i]] += solution.x[i];
-        acceleration[options.joints[i]] += solution.x[m + i];
+        start.qd[joints[i]] += solution.x[i];
+        acceleration[joints[i]] += solution.x[m + i];
       }
       tried = cost_of(start, acceleration);
       damping *= tried < cost ? 0.3 : 8;
@@ -521,7 +528,7 @@ InsensitiveResult make_insensitive(const ReleaseThrow& problem, const Insensitiv
       }
     }
     if (!(tried < cost)) break;
-    const bool enough = tried > (1 - options.tolerance) * cost;
+    const bool enough = tried > (1 - kTolerance) * cost;
     cost = tried;
     if (enough) break;
   }

@@ -152,16 +152,6 @@ void summarise(Landings& landings);
 Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t seed,
                        const HeldMotion* before = nullptr);
 
-/// How the search for an insensitive throw runs.
-struct InsensitiveOptions {
-  std::vector<int> joints;  ///< that move in the plane, 1 to 4, each once
-  int iterations{15};       ///< at most
-  double reserve{0.02};     ///< of the limits of velocity and acceleration, kept free; in [0, 1)
-  double tolerance{1e-3};   ///< relative decrease of the cost at which it is enough; in [0, 1)
-};
-/// Throws std::invalid_argument, naming value and accepted range.
-void validate(const InsensitiveOptions& options, const Chain& chain);
-
 /// A throw that depends little on what is not known.
 struct InsensitiveResult {
   ThrowState start;          ///< q̇₀ as chosen
@@ -172,15 +162,16 @@ struct InsensitiveResult {
   std::string lost{};
 };
 
-/// Chooses q̇₀ and q̈ so that landings miss least over the card's and the grasp's uncertainty: minimises
+/// Chooses q̇₀ and q̈ of `joints`, those that move in the plane (1 to 4, each once), so that landings miss
+/// least over the card's and the grasp's uncertainty: minimises
 ///
 ///   E[x²] ≈ 1/(2 p) Σ_k (x(θ ± √p σ_k e_k; q̇₀, q̈))²,   k = 1 … p
 ///
 /// by Levenberg-Marquardt. The rule is exact where x² is a cubic of the p unknowns, so for a landing that is
 /// linear in them; of curvature it knows only roughly: of x = (θ_k/σ_k)² it makes p where 3 is true, of x =
 /// θ_i θ_j nothing. The derivatives by q̇₀ and q̈ pass exactly through hand, release with its events, and
-/// flight, and each step is a quadratic program within the limits of q̇₀, q̇₀ + hold q̈ and q̈. Throws
-/// std::invalid_argument as both validate() do.
-InsensitiveResult make_insensitive(const ReleaseThrow& problem, const InsensitiveOptions& options);
+/// flight, and each of at most fifteen steps is a quadratic program within 98 % of the limits of q̇₀,
+/// q̇₀ + hold q̈ and q̈. Throws std::invalid_argument as validate() does, and for other joints.
+InsensitiveResult make_insensitive(const ReleaseThrow& problem, const std::vector<int>& joints);
 
 }  // namespace unhand::planners

@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <set>
 #include <stdexcept>
+#include <vector>
 
 #include "planners/arm/chain.hpp"
 
@@ -22,6 +24,17 @@ inline void require_joints(const Chain& chain, const char* of, const char* name,
     throw std::invalid_argument(
         fmt::format("{}: {} has {} values for {} joints", of, name, x.size(), chain.size()));
   for (const double one : x) require(std::isfinite(one), of, name, one, "(-inf, inf)");
+}
+
+/// Throws std::invalid_argument for a joint that the chain does not have, or one that is named twice.
+inline void require_distinct(const Chain& chain, const char* of, const std::vector<int>& joints) {
+  std::set<int> seen;
+  for (const int joint : joints) {
+    if (joint < 0 || joint >= chain.size())
+      throw std::invalid_argument(fmt::format("{}: joint {} is not in [0, {}]", of, joint, chain.size() - 1));
+    if (!seen.insert(joint).second)
+      throw std::invalid_argument(fmt::format("{}: joint {} is named twice", of, joint));
+  }
 }
 
 }  // namespace unhand::planners

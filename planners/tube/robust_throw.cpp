@@ -13,14 +13,14 @@ double window_for(const ReleaseCard& card) {
          4 * std::hypot(card.dead_time.sigma, card.opening_time.sigma);
 }
 
-std::optional<RobustThrow> plan_robust_throw(const ReleaseThrow& problem, const PlanOptions& options,
+std::optional<RobustThrow> plan_robust_throw(const ReleaseThrow& problem, const JointVector<double>& home,
                                              std::string* reason) {
   validate(problem);
-  InsensitiveOptions insensitive;
+  std::vector<int> joints;
   for (int i = 0; i < problem.chain.size(); ++i)
-    if (std::abs(problem.start.qd[i]) > 1e-9) insensitive.joints.push_back(i);
+    if (std::abs(problem.start.qd[i]) > 1e-9) joints.push_back(i);
   RobustThrow out;
-  out.choice = make_insensitive(problem, insensitive);
+  out.choice = make_insensitive(problem, joints);
   if (!out.choice.lost.empty()) {
     if (reason != nullptr)
       *reason =
@@ -28,9 +28,6 @@ std::optional<RobustThrow> plan_robust_throw(const ReleaseThrow& problem, const 
                       out.choice.lost);
     return {};
   }
-  const JointVector<double> home = options.home.size() == 0 ? middle_of(problem.chain) : options.home;
-  MotionOptions motion = options.motion;
-  motion.window = problem.hold;
   ReleaseThrow chosen = problem;
   chosen.start = out.choice.start;
   chosen.qdd = out.choice.qdd;
@@ -38,12 +35,10 @@ std::optional<RobustThrow> plan_robust_throw(const ReleaseThrow& problem, const 
       with_tool(problem.chain, {Eigen::Matrix3d::Identity(), {0, 0, problem.object.com_offset.value}});
   std::string why = "no ramp leads to its acceleration within the limits";
   for (const double share : {0.9, 0.65, 0.45, 0.3}) {
-    motion.acceleration_share = out.acceleration_share = std::min(share, options.motion.acceleration_share);
-    auto moved = throw_motion(problem.chain, home, out.choice.start, out.choice.qdd, motion);
+    auto moved = throw_motion(problem.chain, home, out.choice.start, out.choice.qdd, problem.hold, share);
     if (!moved) continue;
-    out.limits = check_limits(problem.chain, *moved, options.check_step);
-    out.limits.lowest =
-        std::min(out.limits.lowest, check_limits(to_object, *moved, options.check_step).lowest);
+    out.limits = check_limits(problem.chain, *moved);
+    out.limits.lowest = std::min(out.limits.lowest, check_limits(to_object, *moved).lowest);
     if (!out.limits.within())
       why = out.limits.worst(problem.chain);
     else if (!(out.limits.lowest > 0))

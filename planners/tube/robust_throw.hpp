@@ -16,19 +16,17 @@ double window_for(const ReleaseCard& card);
 
 /// What make_insensitive chose, and a motion to it.
 struct RobustThrow {
-  InsensitiveResult choice;     ///< q̇₀ and q̈, for the q₀ that was given
-  JointTrajectory motion;       ///< from rest to rest; its window is the throw's `hold`
-  LimitCheck limits;            ///< of the motion, looked at densely; its lowest counts the object's centre
-  double acceleration_share{};  ///< share of the limits that speeding up and braking use [-]
+  InsensitiveResult choice;  ///< q̇₀ and q̈, for the q₀ that was given
+  JointTrajectory motion;    ///< from rest to rest; its window is the throw's `hold`
+  LimitCheck limits;         ///< of the motion, looked at densely; its lowest counts the object's centre
 };
 
-/// The throw made insensitive by the joints that move in it, and the fastest of a few motions to it that stay
-/// within the limits and above the base, and over which the grip holds the object; nothing where none does,
-/// and `reason`, where given, says why. `home`, shares and the step of the check are those of
-/// `options`, its search is not used. The way to a throw to begin with: plan_throw with a chain up to the
-/// object's centre of mass, in the vertical plane of the target (make_planar). Throws std::invalid_argument
-/// as make_insensitive and throw_motion do.
-std::optional<RobustThrow> plan_robust_throw(const ReleaseThrow& problem, const PlanOptions& options = {},
+/// The throw made insensitive by the joints that move in it, and the fastest of a few motions to it from
+/// `home` that stay within the limits and above the base, and over which the grip holds the object; nothing
+/// where none does, and `reason`, where given, says why. The way to a throw to begin with: plan_throw with a
+/// chain up to the object's centre of mass, in the vertical plane of the target (make_planar). Throws
+/// std::invalid_argument as make_insensitive and throw_motion do.
+std::optional<RobustThrow> plan_robust_throw(const ReleaseThrow& problem, const JointVector<double>& home,
                                              std::string* reason = nullptr);
 
 }  // namespace unhand::planners

@@ -21,6 +21,9 @@ const char* to_string(QpOutcome outcome) {
 
 namespace {
 
+constexpr double kSlack = 1e-10;  ///< of a constraint whose normal is scaled to length one
+constexpr int kMostSteps = 200;   ///< constraints added, at most
+
 /// Lower L with L Lᵀ = H; false where H is not positive definite.
 bool factorise(QpMatrix& H) {
   const int n = static_cast<int>(H.rows());
@@ -145,14 +148,14 @@ std::vector<Scaled> scaled_constraints(const QuadraticProgram& program, const Qp
 
 /// The constraint to add at y: any equality that is not settled, or the inequality violated most; −1: none.
 int next_constraint(const QuadraticProgram& program, const std::vector<Scaled>& scaled,
-                    const std::vector<bool>& settled, const QpVector& y, double tolerance) {
+                    const std::vector<bool>& settled, const QpVector& y) {
   int chosen = -1;
   double worst = 0;
   for (std::size_t k = 0; k < scaled.size(); ++k) {
     if (settled[k]) continue;
     if (program.constraints[k].equality) return static_cast<int>(k);
     const double slack = scaled[k].normal.dot(y) - scaled[k].offset;
-    if (slack < -tolerance * (1 + std::abs(scaled[k].offset)) && slack < worst)
+    if (slack < -kSlack * (1 + std::abs(scaled[k].offset)) && slack < worst)
       chosen = static_cast<int>(k), worst = slack;
   }
   return chosen;
@@ -160,7 +163,7 @@ int next_constraint(const QuadraticProgram& program, const std::vector<Scaled>& 
 
 }  // namespace
 
-QpSolution solve(const QuadraticProgram& program, const QpOptions& options) {
+QpSolution solve(const QuadraticProgram& program) {
   check(program);
   const int n = static_cast<int>(program.c.size()), m = static_cast<int>(program.constraints.size());
   QpSolution out;
@@ -184,20 +187,20 @@ QpSolution solve(const QuadraticProgram& program, const QpOptions& options) {
     return out;
   };
 
-  for (;;) {
-    const int chosen = next_constraint(program, scaled, settled, y, options.tolerance);
+  for (int steps = 0;;) {
+    const int chosen = next_constraint(program, scaled, settled, y);
     if (chosen < 0) return finish(QpOutcome::solved);
     const double sign = program.constraints[chosen].equality && slack(chosen) > 0 ? -1 : 1;
     const QpVector normal = sign * scaled[chosen].normal;
     double multiplier = 0;
     for (;;) {
-      if (++out.steps > options.max_steps) return finish(QpOutcome::not_solved);
+      if (++steps > kMostSteps) return finish(QpOutcome::not_solved);
       const double s = sign * slack(chosen);
       const auto [free, r] = active.split(normal);
       const double room = free.squaredNorm();
       const bool dependent = !(room > 1e-18);
       if (dependent && program.constraints[chosen].equality &&
-          std::abs(s) <= options.tolerance * (1 + std::abs(scaled[chosen].offset)))
+          std::abs(s) <= kSlack * (1 + std::abs(scaled[chosen].offset)))
         break;  // an equality that says what others say already
       // How far the multipliers of the active inequalities allow, and how far it is to the constraint.
       double step = dependent ? std::numeric_limits<double>::infinity() : -s / room;
@@ -226,19 +229,6 @@ QpSolution solve(const QuadraticProgram& program, const QpOptions& options) {
     }
     settled[chosen] = true;
   }
-}
-
-double kkt_residual(const QuadraticProgram& program, const QpSolution& solution) {
-  QpVector gradient = program.H * solution.x + program.c;
-  double worst = 0;
-  for (std::size_t k = 0; k < program.constraints.size(); ++k) {
-    const QpConstraint& constraint = program.constraints[k];
-    const double slack = constraint.a.dot(solution.x) - constraint.b, lambda = solution.multipliers[k];
-    gradient -= lambda * constraint.a;
-    worst = std::max(worst, constraint.equality ? std::abs(slack) : std::max(-slack, 0.0));
-    if (!constraint.equality) worst = std::max({worst, -lambda, std::abs(lambda * slack)});
-  }
-  return std::max(worst, gradient.cwiseAbs().maxCoeff());
 }
 
 }  // namespace unhand::planners

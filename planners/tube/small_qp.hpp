@@ -31,16 +31,10 @@ struct QuadraticProgram {
 enum class QpOutcome {
   solved,      ///< `x` is the minimum
   infeasible,  ///< `conflict` names constraints that no x obeys together
-  not_solved,  ///< H is not positive definite, or the budget is spent
+  not_solved,  ///< H is not positive definite, or too many constraints were added
 };
 /// The outcome's name, as it is written above.
 const char* to_string(QpOutcome);
-
-/// Tolerance and budget.
-struct QpOptions {
-  double tolerance{1e-10};  ///< of a constraint, of its normal scaled to length one
-  int max_steps{200};       ///< constraints added, at most
-};
 
 /// The minimum, or why there is none.
 struct QpSolution {
@@ -49,7 +43,6 @@ struct QpSolution {
   /// λ with H x + c = Σ λ_k a_k; λ_k >= 0 of an inequality, zero where it is not active.
   std::vector<double> multipliers;
   std::vector<int> conflict;  ///< indices of constraints
-  int steps{};                ///< constraints added
 };
 
 /// The dual active-set method [GoldfarbIdnani1983]: starts at the free minimum and adds violated constraints
@@ -57,10 +50,6 @@ struct QpSolution {
 /// negative. It ends after finitely many steps at the solution, or with a certificate that there is none: a
 /// violated constraint whose normal is a non-negative combination of the active ones' opposites. Throws
 /// std::invalid_argument where sizes do not match or a number is not finite.
-QpSolution solve(const QuadraticProgram& program, const QpOptions& options = {});
-
-/// How far (x, λ) is from optimal: the largest of the stationarity residual, constraint violation, negative
-/// multiplier and complementarity |λ_k (a_kᵀx − b_k)|.
-double kkt_residual(const QuadraticProgram& program, const QpSolution& solution);
+QpSolution solve(const QuadraticProgram& program);
 
 }  // namespace unhand::planners

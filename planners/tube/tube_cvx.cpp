@@ -13,14 +13,6 @@ namespace unhand::planners {
 
 using Eigen::Vector2d, Eigen::Vector3d;
 
-PlaneView plane_view(const Vector3d& tip, const Vector3d& velocity, const Vector3d& target) {
-  const Vector3d e = target - tip;
-  const double distance = e.head<2>().norm();
-  const Vector2d along = distance > 0 ? Vector2d(e.head<2>() / distance) : Vector2d(1, 0);
-  return {{-distance, -e.z(), along.dot(velocity.head<2>()), velocity.z()},
-          along.x() * velocity.y() - along.y() * velocity.x()};
-}
-
 namespace {
 
 void check(const TubeProblem& p) {
@@ -34,7 +26,8 @@ void check(const TubeProblem& p) {
 struct End {
   Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, kMaxJoints> J;  ///< of the tip's position
   Vector2d along;
-  PlaneView view;  ///< with q̇₀
+  flight::PlaneState<double> state;  ///< (r, z, ṙ, ż) with q̇₀ [LiuBillard2024]: r = −|e| for e the level
+                                     ///< part of E → B
   std::optional<flight::FlowMap> flow;
 };
 End end_of(const TubeProblem& p) {
@@ -43,13 +36,11 @@ End end_of(const TubeProblem& p) {
   End out;
   out.J = jacobian(p.chain, frames).topRows<3>();
   const Vector3d velocity = out.J * p.start.qd;
-  out.view = plane_view(frames.tip.p, velocity, p.target);
-  out.along = (p.target - frames.tip.p).head<2>().normalized();
+  const Vector3d e = p.target - frames.tip.p;
+  out.along = e.head<2>().normalized();
   // Eq. 2h: ṙ is the level speed, whatever its direction; aligned it is the velocity along e.
-  flight::PlaneState<double> still = out.view.state;
-  still.r_rate = velocity.head<2>().norm();
-  out.view.state = still;
-  out.flow = flight::flow_map(still, p.medium);
+  out.state = {-e.head<2>().norm(), -e.z(), velocity.head<2>().norm(), velocity.z()};
+  out.flow = flight::flow_map(out.state, p.medium);
   return out;
 }
 
@@ -82,6 +73,11 @@ void add_limits(const TubeProblem& p, const QpVector& at, Add&& add) {
   }
 }
 
+struct TubeProgram {
+  QuadraticProgram qp;             ///< unknowns q̈
+  std::vector<std::string> names;  ///< of its constraints
+};
+
 TubeProgram program_of(const TubeProblem& p, const End& end) {
   const int n = p.chain.size();
   const double T = p.window;
@@ -99,23 +95,16 @@ TubeProgram program_of(const TubeProblem& p, const End& end) {
   const QpVector ahead = end.J.topRows<2>().transpose() * end.along, up = end.J.row(2).transpose(),
                  across = end.J.topRows<2>().transpose() * Vector2d(-end.along.y(), end.along.x());
   add("the throw's direction", T * across, -across.dot(p.start.qd), true);
-  if (end.flow) {
-    const auto& gradient = end.flow->gradient;
-    const QpVector row = gradient[2] * ahead + gradient[3] * up;
-    const double now = gradient[2] * end.view.state.r_rate + gradient[3] * end.view.state.z_rate;
-    add("the landing", T * row, now - row.dot(p.start.qd) - end.flow->landing, true);
-  }
+  const auto& gradient = end.flow->gradient;
+  const QpVector row = gradient[2] * ahead + gradient[3] * up;
+  const double now = gradient[2] * end.state.r_rate + gradient[3] * end.state.z_rate;
+  add("the landing", T * row, now - row.dot(p.start.qd) - end.flow->landing, true);
   add_limits(p, QpVector::Zero(n),
              [&](const auto& name, const QpVector& a, double b) { add(name(), a, b, false); });
   return out;
 }
 
 }  // namespace
-
-TubeProgram tube_program(const TubeProblem& problem) {
-  check(problem);
-  return program_of(problem, end_of(problem));
-}
 
 TubeSolution solve_tube(const TubeProblem& problem) {
   check(problem);
@@ -138,15 +127,14 @@ TubeSolution solve_tube(const TubeProblem& problem) {
     out.reason = "thrown at the end of the window, the object does not rise to the target's height";
     return out;
   }
-  out.landing_at_rest = end.flow->landing;
   const TubeProgram program = program_of(problem, end);
-  out.qp = solve(program.qp);
-  out.qdd = out.qp.x;
-  if (out.qp.outcome != QpOutcome::solved) {
+  const QpSolution solution = solve(program.qp);
+  out.qdd = solution.x;
+  if (solution.outcome != QpOutcome::solved) {
     out.outcome = TubeOutcome::infeasible;
     std::vector<std::string> names;
-    for (const int k : out.qp.conflict) names.push_back(program.names[k]);
-    out.reason = names.empty() ? fmt::format("the program is {}", to_string(out.qp.outcome))
+    for (const int k : solution.conflict) names.push_back(program.names[k]);
+    out.reason = names.empty() ? fmt::format("the program is {}", to_string(solution.outcome))
                                : fmt::format("cannot hold together: {}", fmt::join(names, ", "));
   }
   return out;
@@ -213,10 +201,12 @@ std::vector<LandingAt> landings_over_window(const TubeProblem& problem, const Jo
 namespace {
 
 constexpr double kEase = 1e-6;  ///< (1 mm)²: the weight of an acceleration at its limit
+constexpr int kInstants = 4;    ///< of the window
+constexpr int kSteps = 6;       ///< of Gauss-Newton, at most
 
 /// Σ_k miss² + ease, and its Gauss-Newton model where `model` is given.
-double refine_cost(const TubeProblem& p, const Vector2d& along, const JointVector<double>& qdd, int times,
-                   QuadraticProgram* model) {
+double refine_cost(const TubeProblem& p, const Vector2d& along, const JointVector<double>& qdd,
+                   QuadraticProgram* model = nullptr) {
   const int n = p.chain.size();
   double cost = 0;
   if (model != nullptr) model->H = QpMatrix::Zero(n, n), model->c = QpVector::Zero(n);
@@ -229,8 +219,8 @@ double refine_cost(const TubeProblem& p, const Vector2d& along, const JointVecto
   };
   JointVector<Dual> seeded(n);
   for (int i = 0; i < n; ++i) seeded[i] = dynamics::independent(qdd[i], i);
-  for (int k = 1; k <= times; ++k) {
-    const double t = p.window * k / times;
+  for (int k = 1; k <= kInstants; ++k) {
+    const double t = p.window * k / kInstants;
     if (model == nullptr) {
       const auto miss = miss_at(p, along, qdd, t);
       if (!miss) return JointLimits::kNone;
@@ -253,16 +243,15 @@ double refine_cost(const TubeProblem& p, const Vector2d& along, const JointVecto
 
 }  // namespace
 
-JointVector<double> refine_tube(const TubeProblem& problem, const JointVector<double>& start,
-                                const RefineOptions& options) {
+JointVector<double> refine_tube(const TubeProblem& problem, const JointVector<double>& start) {
   check(problem);
   require_joints(problem.chain, "tube", "qdd", start);
   const Vector2d along = forward_of(problem);
   JointVector<double> at = start;
-  double cost = refine_cost(problem, along, at, options.times, nullptr);
+  double cost = refine_cost(problem, along, at);
   QuadraticProgram step;
-  for (int iteration = 0; iteration < options.iterations && std::isfinite(cost); ++iteration) {
-    refine_cost(problem, along, at, options.times, &step);
+  for (int iteration = 0; iteration < kSteps && std::isfinite(cost); ++iteration) {
+    refine_cost(problem, along, at, &step);
     step.constraints.clear();
     add_limits(problem, at, [&](const auto&, const QpVector& a, double b) {
       step.constraints.push_back({a, b, false});
@@ -271,7 +260,7 @@ JointVector<double> refine_tube(const TubeProblem& problem, const JointVector<do
     if (solution.outcome != QpOutcome::solved) break;
     double share = 1, tried = cost;
     for (; share > 0.1; share *= 0.5) {
-      tried = refine_cost(problem, along, at + share * solution.x, options.times, nullptr);
+      tried = refine_cost(problem, along, at + share * solution.x);
       if (tried < cost) break;
     }
     if (!(tried < cost)) break;

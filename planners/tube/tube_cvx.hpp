@@ -25,16 +25,6 @@ struct TubeProblem {
   flight::Medium medium{};  ///< of the flight
 };
 
-/// How the tip moves in the throwing plane of a state: ξ = (r, z, ṙ, ż) as in [LiuBillard2024], with
-/// r = −|e|, ṙ along e for e the level part of E → B, and what leaves the plane.
-struct PlaneView {
-  flight::PlaneState<double> state;  ///< ξ [m, m, m/s, m/s]
-  double across{};                   ///< velocity across e [m/s], to the left
-};
-/// The tip's position and velocity [m, m/s] as the throwing plane sees them.
-PlaneView plane_view(const Eigen::Vector3d& tip, const Eigen::Vector3d& velocity,
-                     const Eigen::Vector3d& target);
-
 /// How the problem ended.
 enum class TubeOutcome {
   solved,         ///< `qdd` is the answer
@@ -44,12 +34,9 @@ enum class TubeOutcome {
 
 /// The tube acceleration, or why there is none.
 struct TubeSolution {
-  TubeOutcome outcome{};     ///< only `solved` has a q̈
-  JointVector<double> qdd;   ///< q̈_tube [rad/s²]
-  std::string reason;        ///< in words
-  QpSolution qp;             ///< of the program
-  double landing_at_rest{};  ///< Φ(0): landing error of a release at T without acceleration, linear part's
-                             ///< base [m]
+  TubeOutcome outcome{};    ///< only `solved` has a q̈
+  JointVector<double> qdd;  ///< q̈_tube [rad/s²]
+  std::string reason;       ///< in words
 };
 
 /// Problem Tube-CVX, [DarkoD46] Eq. 2: with q_T = q₀ + T q̇₀ a parameter and q̇_T = q̇₀ + T q̈, find q̈ with
@@ -61,14 +48,6 @@ struct TubeSolution {
 /// program with one solution. Beyond the printed constraints, q_T must obey the position limits, or the
 /// answer is infeasible. Throws std::invalid_argument for sizes that differ or a window outside (0, 1] s.
 TubeSolution solve_tube(const TubeProblem& problem);
-
-/// The program itself, for whoever wants to solve it otherwise.
-struct TubeProgram {
-  QuadraticProgram qp;             ///< unknowns q̈
-  std::vector<std::string> names;  ///< of its constraints
-};
-/// Throws as solve_tube does.
-TubeProgram tube_program(const TubeProblem& problem);
 
 /// Where the object really lands when it leaves at t under a constant q̈ (problem RTV, [DarkoD46] Eq. 1: q(t)
 /// is integrated, kinematics and flight are not linearised).
@@ -88,13 +67,8 @@ std::vector<LandingAt> landings_over_window(const TubeProblem& problem, const Jo
 ///
 ///   min Σ_k |landing(t_k; q̈) − B|² + (1 mm)² Σ (q̈_i/q̈_max,i)²   with the same limits,
 ///
-/// by Gauss-Newton from `start`, each step a quadratic program; t_k are `times` instants up to T. Derivatives
-/// are exact. Returns `start` where no step helps.
-struct RefineOptions {
-  int times{4}, iterations{6};  ///< instants of the window; Gauss-Newton steps
-};
-/// See RefineOptions. Throws as landings_over_window does.
-JointVector<double> refine_tube(const TubeProblem& problem, const JointVector<double>& start,
-                                const RefineOptions& options = {});
+/// by at most six steps of Gauss-Newton from `start`, each a quadratic program; t_k = k T/4, k = 1 … 4.
+/// Derivatives are exact. Returns `start` where no step helps. Throws as landings_over_window does.
+JointVector<double> refine_tube(const TubeProblem& problem, const JointVector<double>& start);
 
 }  // namespace unhand::planners

@@ -1,5 +1,4 @@
 // What throws may be asked for: sizes, ranges, finiteness.
-#include <set>
 #include <tuple>
 #include <utility>
 
@@ -18,14 +17,6 @@ bool is_not_negative(double x) { return x >= 0 && std::isfinite(x); }
 void require_medium(const char* of, const flight::Medium& medium) {
   require(is_positive(medium.gravity), of, "gravity", medium.gravity, "(0, inf) m/s²");
   require(is_not_negative(medium.drag_k), of, "drag_k", medium.drag_k, "[0, inf) 1/m");
-}
-
-/// Throws std::invalid_argument for a joint that the chain does not have, or one named before.
-void require_joint(const Chain& chain, const char* of, int joint, std::set<int>& seen) {
-  if (joint < 0 || joint >= chain.size())
-    throw std::invalid_argument(fmt::format("{}: joint {} is not in [0, {}]", of, joint, chain.size() - 1));
-  if (!seen.insert(joint).second)
-    throw std::invalid_argument(fmt::format("{}: joint {} is named twice", of, joint));
 }
 
 }  // namespace
@@ -69,19 +60,6 @@ void validate(const ReleaseThrow& p) {
   require_medium(kOf, p.medium);
 }
 
-void validate(const InsensitiveOptions& options, const Chain& chain) {
-  constexpr const char* kOf = "make_insensitive";
-  constexpr std::size_t kMost = dynamics::kDualSize / 2;
-  if (options.joints.empty() || options.joints.size() > kMost)
-    throw std::invalid_argument(
-        fmt::format("{}: {} joints named; accepted: 1 to {}", kOf, options.joints.size(), kMost));
-  std::set<int> seen;
-  for (const int joint : options.joints) require_joint(chain, kOf, joint, seen);
-  require(options.iterations >= 0, kOf, "iterations", options.iterations, "[0, inf)");
-  require(options.reserve >= 0 && options.reserve < 1, kOf, "reserve", options.reserve, "[0, 1)");
-  require(options.tolerance >= 0 && options.tolerance < 1, kOf, "tolerance", options.tolerance, "[0, 1)");
-}
-
 void validate(const NominalOptions& options, const Chain& chain) {
   constexpr const char* kOf = "throw search";
   require(options.window > 0 && options.window <= 1, kOf, "window", options.window, "(0, 1] s");
@@ -91,17 +69,12 @@ void validate(const NominalOptions& options, const Chain& chain) {
                                            {"candidates", options.candidates, 1},
                                            {"threads", options.threads, 0}})
     require(count >= least, kOf, name, count, least == 1 ? "[1, inf)" : "[0, inf)");
-  require(std::isfinite(options.lowest_tip), kOf, "lowest_tip", options.lowest_tip, "(-inf, inf) m");
-  require(is_not_negative(options.nearest_tip), kOf, "nearest_tip", options.nearest_tip, "[0, inf) m");
-  require(is_not_negative(options.shortest_throw), kOf, "shortest_throw", options.shortest_throw,
-          "[0, inf) m");
-  require(options.speed_reserve >= 0 && options.speed_reserve < 1, kOf, "speed_reserve",
-          options.speed_reserve, "[0, 1)");
-  std::set<int> seen;
-  for (const auto& fixed : options.fixed) {
-    require_joint(chain, "throw search, fixed", fixed.joint, seen);
-    require(std::isfinite(fixed.angle), kOf, "angle of a fixed joint", fixed.angle, "(-inf, inf) rad");
+  std::vector<int> fixed;
+  for (const auto& [joint, angle] : options.fixed) {
+    fixed.push_back(joint);
+    require(std::isfinite(angle), kOf, "angle of a fixed joint", angle, "(-inf, inf) rad");
   }
+  require_distinct(chain, "throw search, fixed", fixed);
 }
 
 }  // namespace unhand::planners

@@ -2,7 +2,7 @@
 // variance, and the parameters that it takes from a log against those that made it.
 #include "experiment/compare.hpp"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,6 +16,8 @@
 #include "tests/support/perfect_campaign.hpp"
 
 namespace {
+
+using testing::HasSubstr, testing::ThrowsMessage;
 
 using namespace unhand;
 using namespace unhand::experiment;
@@ -120,13 +122,8 @@ TEST(FrictionEstimate, OfOneWrenchDirectionIsNoPatch) {
   EXPECT_NO_THROW(require_patch(estimate, "limit_surface"));
   estimate.parameters.length = 4e10;  // all torque and no force
   EXPECT_NO_THROW(require_patch(estimate, "gripper_delay")) << "which has no pads";
-  try {
-    require_patch(estimate, "limit_surface");
-    FAIL();
-  } catch (const std::invalid_argument& error) {
-    EXPECT_NE(std::string(error.what()).find("does not determine the length"), std::string::npos)
-        << error.what();
-  }
+  EXPECT_THAT([&] { require_patch(estimate, "limit_surface"); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("does not determine the length")));
 }
 
 TEST(FrictionEstimate, OfTheTrueLawIsTheTrueFriction) {
@@ -179,36 +176,27 @@ TEST(FrictionEstimate, NothingThatSlipsDeterminesNothing) {
       ft.wrench(k, 0) = force.x / 2, ft.wrench(k, 1) = force.z / 2, ft.wrench(k, 2) = wrench.tau / 2;
     }
   }
-  try {
-    (void)estimate_friction(known.log, known.prepared, "limit_surface_disc");
-    FAIL();
-  } catch (const std::invalid_argument& error) {
-    EXPECT_NE(std::string(error.what()).find("--fit"), std::string::npos) << error.what();
-  }
+  EXPECT_THAT([&] { estimate_friction(known.log, known.prepared, "limit_surface_disc"); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("--fit")));
 }
 
 TEST(FrictionEstimate, OfADoubtfulPatchPointsToTheFit) {
-  const auto refused = [](const FrictionEstimate& estimate, const char* why) {
-    try {
-      require_patch(estimate, "limit_surface");
-      return false;
-    } catch (const std::invalid_argument& error) {
-      const std::string text = error.what();
-      return text.find(why) != std::string::npos && text.find("--fit") != std::string::npos;
-    }
+  const auto expect_refused = [](const FrictionEstimate& estimate, const char* why) {
+    EXPECT_THAT([&] { require_patch(estimate, "limit_surface"); },
+                ThrowsMessage<std::invalid_argument>(testing::AllOf(HasSubstr(why), HasSubstr("--fit"))));
   };
   FrictionEstimate good;
   good.pad_radius = 0.0105, good.scatter = 0.03, good.mu_sigma = good.length_sigma = 0.01;
   EXPECT_NO_THROW(require_patch(good, "limit_surface"));
   FrictionEstimate bad = good;
   bad.scatter = 0.5;
-  EXPECT_TRUE(refused(bad, "scatter by 50 %"));
+  expect_refused(bad, "scatter by 50 %");
   bad = good, bad.parameters.length = 0.03;
-  EXPECT_TRUE(refused(bad, "more than a pad of the declared radius"));
+  expect_refused(bad, "more than a pad of the declared radius");
   bad.pad_radius.reset();
   EXPECT_NO_THROW(require_patch(bad, "limit_surface")) << "nothing is declared";
   bad = good, bad.length_sigma = 0.3;
-  EXPECT_TRUE(refused(bad, "uncertain by 30 %"));
+  expect_refused(bad, "uncertain by 30 %");
 }
 
 TEST(FrictionEstimate, OfASlidingPivotKnowsThatItsLimitsAreApart) {

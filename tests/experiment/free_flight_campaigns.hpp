@@ -1,14 +1,11 @@
 // Free flights whose truth is known, as a tracker would see them, and how far a fit is from it.
 #pragma once
 
-#include <Eigen/Core>
-#include <array>
 #include <cmath>
 #include <random>
 #include <vector>
 
 #include "datasets/throw_log.hpp"
-#include "dynamics/dense_solve.hpp"
 #include "experiment/free_flight.hpp"
 #include "flight/fly.hpp"
 #include "flight/spatial_flight.hpp"
@@ -122,31 +119,13 @@ inline Campaign planar(int throws, double drag_k, double noise) {
   return out;
 }
 
-/// eᵀ C⁻¹ e over the directions in which C has a size.
-inline double distance(const Eigen::Matrix<double, 6, 6>& C, const std::array<double, 6>& e) {
-  std::vector<int> used;
-  for (int i = 0; i < 6; ++i)
-    if (C(i, i) > 0) used.push_back(i);
-  const auto n = static_cast<long>(used.size());
-  Eigen::MatrixXd c(n, n);
-  Eigen::VectorXd x(n);
-  for (long a = 0; a < n; ++a) {
-    x[a] = e[used[a]];
-    for (long b = 0; b < n; ++b) c(a, b) = C(used[a], used[b]);
-  }
-  const Eigen::VectorXd solved = dynamics::definite_solve(c, x);
-  return x.dot(solved);
-}
-
-inline double translation_distance(const FreeFlightFit& fit, const Truth& truth) {
-  const auto p = flight::difference(fit.position, truth.position),
-             v = flight::difference(fit.velocity, truth.velocity);
-  return distance(fit.translation_covariance, {p[0], p[1], p[2], v[0], v[1], v[2]});
-}
-inline double rotation_distance(const FreeFlightFit& fit, const Truth& truth) {
-  const auto q = flight::rotation_between(truth.rotation.attitude, fit.rotation.attitude);
-  const auto w = flight::difference(fit.rotation.omega, truth.rotation.omega);
-  return distance(fit.rotation_covariance, {q[0], q[1], q[2], w[0], w[1], w[2]});
+/// Σ (residual/sigma)² over the fitted samples.
+inline double chi2_of(const std::vector<Vec3<double>>& residuals, std::size_t fitted,
+                      const Vec3<double>& sigma) {
+  double out = 0;
+  for (std::size_t i = 0; i < fitted; ++i)
+    for (std::size_t a = 0; a < 3; ++a) out += std::pow(residuals[i][a] / sigma[a], 2);
+  return out;
 }
 
 }  // namespace unhand::experiment

@@ -18,26 +18,21 @@ using namespace unhand::testing_support;
 using dynamics::Effect;
 
 TEST(CampaignEffects, AreReadByName) {
-  using testing::HasSubstr;
+  using testing::HasSubstr, testing::ThrowsMessage;
   EXPECT_EQ(parse_effect("contact.stribeck=1.25"),
             std::pair(std::string("contact.stribeck.mu_s/mu_k"), 1.25));
   EXPECT_EQ(parse_effect("contact.stribeck.v_s=1e-2"), std::pair(std::string("contact.stribeck.v_s"), 0.01));
   EXPECT_EQ(parse_effect("flight.quadratic_drag[jar]=0.1"),
             std::pair(std::string("flight.quadratic_drag.k[jar]"), 0.1));
-  const auto refusal = [](const char* text) -> std::string {
-    try {
-      parse_effect(text);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "no error";
+  const auto expect_refused = [](const char* text, const char* why) {
+    EXPECT_THAT([&] { parse_effect(text); }, ThrowsMessage<std::invalid_argument>(HasSubstr(why)));
   };
-  EXPECT_THAT(refusal("contact.stribek=1"), HasSubstr("did you mean 'contact.stribeck'?"));
-  EXPECT_THAT(refusal("stribeck=1"), HasSubstr("did you mean 'contact.stribeck'?"));
-  EXPECT_THAT(refusal("flight.quadratic_drag=-1"), HasSubstr("k = -1 is not in [0, 10] 1/m"));
-  EXPECT_THAT(refusal("sensor.mass=nan"), HasSubstr("is not in [0.1, 6]"));
-  EXPECT_THAT(refusal("sensor.mass=1kg"), HasSubstr("not a number"));
-  EXPECT_THAT(refusal("sensor.mass[jar=1"), HasSubstr("in brackets"));
+  expect_refused("contact.stribek=1", "did you mean 'contact.stribeck'?");
+  expect_refused("stribeck=1", "did you mean 'contact.stribeck'?");
+  expect_refused("flight.quadratic_drag=-1", "k = -1 is not in [0, 10] 1/m");
+  expect_refused("sensor.mass=nan", "is not in [0.1, 6]");
+  expect_refused("sensor.mass=1kg", "not a number");
+  expect_refused("sensor.mass[jar=1", "in brackets");
 
   const OwnEffects jar({{"flight.quadratic_drag.k", 0.1}, {"flight.quadratic_drag.k[jar]", 0.2}}, "jar");
   EXPECT_EQ(jar.values().get("flight.quadratic_drag.k", 0), 0.2);

@@ -1,6 +1,7 @@
 // Columns of a log in another unit are told.
 #include "experiment/unit_check.hpp"
 
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -22,6 +23,12 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 
 constexpr double kDegree = 180 / std::numbers::pi, kGravity = 9.80665;
+
+/// `why` matches what is said of the log.
+void expect_refused(const ThrowLog& log, const testing::Matcher<std::string>& why,
+                    const std::string& of = "") {
+  EXPECT_THAT([&] { require_units(log, "log.h5"); }, testing::ThrowsMessage<datasets::LogError>(why)) << of;
+}
 
 const ThrowLog& campaign() {
   static const ThrowLog log = generate_campaign(testing_support::small_design("limit_surface_disc"), 5);
@@ -153,58 +160,32 @@ TEST(UnitCheck, NamesTheColumnAndTheUnitOfEveryMistake) {
       named = named || (doubt.path == mistake.path && doubt.column == mistake.column &&
                         doubt.reason.find(mistake.unit) != std::string::npos);
     EXPECT_TRUE(named) << mistake.name << ": " << doubts.front().path << ": " << doubts.front().reason;
-    try {
-      require_units(log, "log.h5");
-      FAIL() << mistake.name;
-    } catch (const datasets::LogError& error) {
-      EXPECT_THAT(error.what(), AllOf(HasSubstr("log.h5: /throws/*/"), HasSubstr(mistake.unit)))
-          << mistake.name;
-    }
+    expect_refused(log, AllOf(HasSubstr("log.h5: /throws/*/"), HasSubstr(mistake.unit)), mistake.name);
   }
 }
 
 TEST(UnitCheck, MassesInGramsShowInTheForce) {
   auto log = campaign();
   for (auto& [name, object] : log.objects) object.mass *= 1e3;
-  try {
-    require_units(log, "log.h5");
-    FAIL();
-  } catch (const datasets::LogError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("mass in g"));
-  }
+  expect_refused(log, HasSubstr("mass in g"));
 }
 
 TEST(UnitCheck, LeversInMillimetresShowInTheDistanceOfTheObject) {
   auto log = campaign();
   for (auto& [name, object] : log.objects) *object.com_offset *= 1e3;
-  try {
-    require_units(log, "log.h5");
-    FAIL();
-  } catch (const datasets::LogError& error) {
-    EXPECT_THAT(error.what(), AllOf(HasSubstr("/objects/*@com_offset"), HasSubstr("mm for m")));
-  }
+  expect_refused(log, AllOf(HasSubstr("/objects/*@com_offset"), HasSubstr("mm for m")));
 }
 
 TEST(UnitCheck, NoPlanetPullsWithTenThousand) {
   auto log = campaign();
   log.gravity *= 1e3;
-  try {
-    require_units(log, "log.h5");
-    FAIL();
-  } catch (const datasets::LogError& error) {
-    EXPECT_THAT(error.what(), AllOf(HasSubstr("/@gravity"), HasSubstr("mm/s²")));
-  }
+  expect_refused(log, AllOf(HasSubstr("/@gravity"), HasSubstr("mm/s²")));
 }
 
 TEST(UnitCheck, AGraspAngleBeyondAWholeTurnIsInDegrees) {
   auto log = campaign();
   for (auto& one : log.throws) one.mocap.reset(), one.grasp_angle = -22;
-  try {
-    require_units(log, "log.h5");
-    FAIL();
-  } catch (const datasets::LogError& error) {
-    EXPECT_THAT(error.what(), AllOf(HasSubstr("@grasp_angle"), HasSubstr("degrees for rad")));
-  }
+  expect_refused(log, AllOf(HasSubstr("@grasp_angle"), HasSubstr("degrees for rad")));
 }
 
 TEST(UnitCheck, WithoutAnOpeningCommandTheForceTellsWhenItOpens) {
@@ -270,15 +251,10 @@ TEST(UnitCheck, OneThrowInAnotherUnitIsToldByItsOwnPath) {
       mistake.make(log.throws[which]);
       if (std::string(mistake.unit) == "lbf for N") continue;  // 4.4 may be the sensor's
       const std::string path = "/throws/" + log.throws[which].id + std::string(mistake.path).substr(9);
-      try {
-        require_units(log, "log.h5");
-        ADD_FAILURE() << mistake.name << ": nothing told of " << path;
-      } catch (const datasets::LogError& error) {
-        EXPECT_THAT(error.what(),
-                    AllOf(HasSubstr(path + ": "), HasSubstr(mistake.unit), HasSubstr("accepted")))
-            << mistake.name;
-        EXPECT_THAT(error.what(), testing::Not(HasSubstr("/throws/*/"))) << mistake.name;
-      }
+      expect_refused(log,
+                     AllOf(HasSubstr(path + ": "), HasSubstr(mistake.unit), HasSubstr("accepted"),
+                           testing::Not(HasSubstr("/throws/*/"))),
+                     mistake.name);
     }
 }
 
@@ -350,12 +326,8 @@ TEST(UnitCheck, ALandingHeightWhereNothingLandsIsRefused) {
       if (!timed)
         for (auto& one : log.throws) one.landing.reset();
       if (!timed && height < 0) continue;  // may be a deep fall
-      try {
-        require_units(log, "log.h5");
-        ADD_FAILURE() << height << " m, with landings: " << timed;
-      } catch (const datasets::LogError& error) {
-        EXPECT_THAT(error.what(), AllOf(HasSubstr("log.h5: /@landing_height: "), HasSubstr("accepted")));
-      }
+      expect_refused(log, AllOf(HasSubstr("log.h5: /@landing_height: "), HasSubstr("accepted")),
+                     fmt::format("{} m, with landings: {}", height, timed));
     }
   }
 }

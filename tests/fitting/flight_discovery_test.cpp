@@ -75,8 +75,7 @@ TEST(FlightDiscovery, ErrorsBeforeAreThoseOfTheComparison) {
   for (auto& one : log.throws)
     for (double& t : one.mocap->time.data) t = 1e-5 * std::round(1e5 * t);
   const auto found = found_in(log);
-  const std::vector<std::string> names{"projectile"};
-  const auto expected = experiment::compare_free_flights(log, names, 1)[0];
+  const auto expected = experiment::compare_free_flights(log, 1);
   const auto value = [&](const NamedErrors& errors, const char* name) {
     for (const auto& [key, x] : errors)
       if (key == name) return x;

@@ -1,12 +1,30 @@
-// Quadratic programs by IPOPT: the oracle of the planners' own solver.
+// What the planners' own solver of quadratic programs is held against: the KKT conditions, and IPOPT.
 #pragma once
 
 #include <coin/IpIpoptApplication.hpp>
 #include <coin/IpTNLP.hpp>
 
+#include <algorithm>
+#include <cmath>
+
 #include "planners/tube/small_qp.hpp"
 
 namespace unhand::planners {
+
+/// How far (x, λ) is from optimal: the largest of the stationarity residual, constraint violation, negative
+/// multiplier and complementarity |λ_k (a_kᵀx − b_k)|.
+inline double kkt_residual(const QuadraticProgram& program, const QpSolution& solution) {
+  QpVector gradient = program.H * solution.x + program.c;
+  double worst = 0;
+  for (std::size_t k = 0; k < program.constraints.size(); ++k) {
+    const QpConstraint& constraint = program.constraints[k];
+    const double slack = constraint.a.dot(solution.x) - constraint.b, lambda = solution.multipliers[k];
+    gradient -= lambda * constraint.a;
+    worst = std::max(worst, constraint.equality ? std::abs(slack) : std::max(-slack, 0.0));
+    if (!constraint.equality) worst = std::max({worst, -lambda, std::abs(lambda * slack)});
+  }
+  return std::max(worst, gradient.cwiseAbs().maxCoeff());
+}
 
 class IpoptQp final : public Ipopt::TNLP {
  public:

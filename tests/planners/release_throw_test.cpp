@@ -157,7 +157,7 @@ TEST(ReleaseThrow, InsensitiveMotionsMissLess) {
   const Chain arm = pads();
   ReleaseThrow p = swing(arm);
   p.card.model = "sliding_pivot";
-  const auto result = make_insensitive(p, {{1, 3, 5}});
+  const auto result = make_insensitive(p, {1, 3, 5});
   EXPECT_LT(result.after, 0.5 * result.before);
   const auto before = draw_landings(p, 300, 1);
   for (const int j : {1, 3, 5}) {
@@ -172,7 +172,7 @@ TEST(ReleaseThrow, InsensitiveMotionsMissLess) {
   const auto rms = [](const Landings& l) { return std::hypot(l.mean, l.std); };
   EXPECT_LT(rms(after), 0.6 * rms(before));
   EXPECT_NEAR(rms(after), result.after, 0.3 * result.after);
-  EXPECT_THROW(make_insensitive(p, {{}}), std::invalid_argument);
+  EXPECT_THROW(make_insensitive(p, {}), std::invalid_argument);
 }
 
 // With a gripper, from ready pose to rest; the spread of its landing against the tube's.
@@ -193,7 +193,7 @@ TEST(RobustThrow, IsPlannedForAPandaWithAGripper) {
   p.hold = options.search.window + 1e-6;
   p.card = card;
   const auto before = draw_landings(p, 100, 1);
-  const auto robust = plan_robust_throw(p, options);
+  const auto robust = plan_robust_throw(p, options.home);
   ASSERT_TRUE(robust);
   p.start = robust->choice.start;
   p.qdd = robust->choice.qdd;
@@ -301,7 +301,7 @@ TEST(RobustThrow, IsNotPlannedWhereTheGripDoesNotHold) {
   ReleaseThrow p = bar.release(*tube.plan);
   p.card.grip_force = 1;
   std::string reason;
-  EXPECT_FALSE(plan_robust_throw(p, bar.options, &reason));
+  EXPECT_FALSE(plan_robust_throw(p, bar.options.home, &reason));
   EXPECT_THAT(reason, testing::HasSubstr("a grip of 1 N per pad lets the object slip before"));
 }
 
@@ -319,7 +319,7 @@ TEST(RobustThrow, StaysAboveItsBase) {
   ASSERT_TRUE(tube.plan) << tube.reason;
   // The motion to what would be least sensitive swings the pads below the base.
   std::string reason;
-  EXPECT_FALSE(plan_robust_throw(bar.release(*tube.plan), bar.options, &reason));
+  EXPECT_FALSE(plan_robust_throw(bar.release(*tube.plan), bar.options.home, &reason));
   EXPECT_THAT(reason, testing::HasSubstr("it would come down to -0.0"));
 }
 
@@ -330,7 +330,7 @@ TEST(RobustThrow, SaysWhyThereIsNothingToMinimise) {
   ReleaseThrow p = bar.release(*tube.plan);
   p.card.dead_time.sigma = 0.2;  // longer than the motion goes on
   std::string reason;
-  EXPECT_FALSE(plan_robust_throw(p, bar.options, &reason));
+  EXPECT_FALSE(plan_robust_throw(p, bar.options.home, &reason));
   EXPECT_THAT(reason, testing::HasSubstr("a draw of dead_time within its spread does not land"));
 }
 
@@ -340,7 +340,7 @@ TEST(ReleaseThrow, DrawsFrictionThatPadsMayHave) {
   ReleaseThrow p = swing(arm);
   p.card.mu.sigma = 20;
   EXPECT_NO_THROW(draw_landings(p, 50, 1));
-  EXPECT_NO_THROW(make_insensitive(p, {{1, 3, 5}, 1}));
+  EXPECT_NO_THROW(make_insensitive(p, {1, 3, 5}));
 }
 
 TEST(ReleaseCard, NamesTheSigmasThatItPassesOver) {
@@ -420,44 +420,40 @@ TEST(ReleaseThrow, FollowsTheShapeOfItsCard) {
 }
 
 TEST(ReleaseCard, RefusesWhatItDoesNotTake) {
-  const auto complaint = [](const datasets::ModelCard& card) -> std::string {
-    try {
-      release_card(card, "card.json");
-    } catch (const datasets::CardError& error) {
-      return error.what();
-    }
-    return "";
+  const auto expect_refused = [](const datasets::ModelCard& card, const char* why) {
+    EXPECT_THAT([&] { release_card(card, "card.json"); },
+                testing::ThrowsMessage<datasets::CardError>(testing::HasSubstr(why)));
   };
-  EXPECT_EQ(complaint(quartic(2.7)), "");
-  EXPECT_THAT(complaint(quartic(3.1)), testing::HasSubstr("/parameters/kappa/value"));
+  EXPECT_NO_THROW(release_card(quartic(2.7), "card.json"));
+  expect_refused(quartic(3.1), "/parameters/kappa/value");
   datasets::ModelCard card = quartic(1);
   card.parameters["mu"].value = 11;  // contact::Patch takes no more than contact::kMostMu
-  EXPECT_THAT(complaint(card), testing::HasSubstr("card.json"));
-  EXPECT_THAT(complaint(card), testing::HasSubstr("/parameters/mu/value"));
-  EXPECT_THAT(complaint(card), testing::HasSubstr("is 11; accepted: (0, 10]"));
+  expect_refused(card, "card.json");
+  expect_refused(card, "/parameters/mu/value");
+  expect_refused(card, "is 11; accepted: (0, 10]");
   card.parameters["mu"].value = 10;
-  EXPECT_EQ(complaint(card), "");
+  EXPECT_NO_THROW(release_card(card, "card.json"));
   card.parameters["length"].value = 0.7;
-  EXPECT_THAT(complaint(card), testing::HasSubstr("/parameters/length/value"));
+  expect_refused(card, "/parameters/length/value");
   card = quartic(1);
   card.model = "sliding_pivot";
-  EXPECT_THAT(complaint(card), testing::HasSubstr("/parameters/kappa"));
+  expect_refused(card, "/parameters/kappa");
   card = quartic(1);
   card.parameters["stiffness"] = {1, {}, "N/m"};
-  EXPECT_THAT(complaint(card), testing::HasSubstr("/parameters/stiffness"));
+  expect_refused(card, "/parameters/stiffness");
   card = quartic(1);
   card.own_spreads["tilt"] = {0.1, "rad"};
-  EXPECT_THAT(complaint(card), testing::HasSubstr("/own_spreads/tilt"));
+  expect_refused(card, "/own_spreads/tilt");
   card = quartic(1);
   card.own_spreads["dead_time_deviation"] = {0.1, "ms"};
-  EXPECT_THAT(complaint(card), testing::HasSubstr("/own_spreads/dead_time_deviation/unit"));
+  expect_refused(card, "/own_spreads/dead_time_deviation/unit");
   card = quartic(1);
   card.effects = {"contact.pad_compliance"};
-  EXPECT_THAT(complaint(card), testing::HasSubstr("contact.pad_compliance"));
+  expect_refused(card, "contact.pad_compliance");
   card = quartic(1);
   card.parameters["reference_force"] = {20, {}, "N"};  // every fit's card has it
   card.own_spreads["force_deviation"] = {1, "-"};
-  EXPECT_EQ(complaint(card), "");
+  EXPECT_NO_THROW(release_card(card, "card.json"));
 }
 
 TEST(ReleaseCard, CountsWhatScattersFromThrowToThrow) {
@@ -520,28 +516,26 @@ TEST(ReleaseCard, TakesTheGripperThatItsThrowsHad) {
 }
 
 TEST(ReleaseCard, RefusesNumbersThatNoGripperHas) {
-  const auto refused = [](const std::string& name, const std::string& unit, double value) {
+  const auto read_with = [](const std::string& name, const std::string& unit, double value) {
     datasets::ModelCard card;
     card.model = "limit_surface";
     card.parameters[name] = {value, {}, unit};
-    try {
-      release_card(card, "card.json");
-    } catch (const datasets::CardError& error) {
-      const std::string what = error.what();
-      return what.find("card.json") != std::string::npos &&
-             what.find("/parameters/" + name + "/value") != std::string::npos;
-    }
-    return false;
+    release_card(card, "card.json");
   };
-  EXPECT_TRUE(refused("mu", "-", 0));
-  EXPECT_TRUE(refused("mu", "-", std::nan("")));
-  EXPECT_TRUE(refused("length", "m", -1e-3));
-  EXPECT_TRUE(refused("opening_time", "s", 0));
-  EXPECT_TRUE(refused("dead_time", "s", -1e-3));
-  EXPECT_TRUE(refused("shape", "-", 0));
-  for (const double pads : {0.0, 0.5, 2.5, 1e300}) EXPECT_TRUE(refused("pads", "-", pads)) << pads;
-  EXPECT_FALSE(refused("dead_time", "s", 0));  // of a gripper that opens at once
-  EXPECT_FALSE(refused("pads", "-", 1));
+  const auto expect_refused = [&](const std::string& name, const std::string& unit, double value) {
+    EXPECT_THAT([&] { read_with(name, unit, value); },
+                testing::ThrowsMessage<datasets::CardError>(
+                    testing::HasSubstr("card.json: /parameters/" + name + "/value")));
+  };
+  expect_refused("mu", "-", 0);
+  expect_refused("mu", "-", std::nan(""));
+  expect_refused("length", "m", -1e-3);
+  expect_refused("opening_time", "s", 0);
+  expect_refused("dead_time", "s", -1e-3);
+  expect_refused("shape", "-", 0);
+  for (const double pads : {0.0, 0.5, 2.5, 1e300}) expect_refused("pads", "-", pads);
+  EXPECT_NO_THROW(read_with("dead_time", "s", 0));  // of a gripper that opens at once
+  EXPECT_NO_THROW(read_with("pads", "-", 1));
 }
 
 TEST(ReleaseThrow, OfAGripperWithoutDeadTimeIsDrawn) {
@@ -581,7 +575,7 @@ TEST(ReleaseThrow, RefusesWhatIsNoThrow) {
     EXPECT_THAT(refusal([&] { rigid_landing(p, 0.14, 0.05); }), HasSubstr(what));
     EXPECT_THAT(refusal([&] { release_spread(p); }), HasSubstr(what));
     EXPECT_THAT(refusal([&] { draw_landings(p, 1, 1); }), HasSubstr(what));
-    EXPECT_THAT(refusal([&] { make_insensitive(p, {{1, 3, 5}}); }), HasSubstr(what));
+    EXPECT_THAT(refusal([&] { make_insensitive(p, {1, 3, 5}); }), HasSubstr(what));
   };
   expect_refused("q has 3 values for 7 joints", [](auto& p) { p.start.q = p.start.q.head(3).eval(); });
   expect_refused("qd has 3 values for 7 joints", [](auto& p) { p.start.qd = p.start.qd.head(3).eval(); });
@@ -604,14 +598,12 @@ TEST(ReleaseThrow, RefusesWhatIsNoThrow) {
     expect_refused("gravity = ", [=](auto& p) { p.medium.gravity = gravity; });
   const ReleaseThrow p = swing(arm);
   EXPECT_THAT(refusal([&] { draw_landings(p, -5, 1); }), HasSubstr("count = -5"));
-  const auto insensitive = [&](const InsensitiveOptions& o) {
-    return refusal([&] { make_insensitive(p, o); });
+  const auto insensitive = [&](const std::vector<int>& joints) {
+    return refusal([&] { make_insensitive(p, joints); });
   };
-  EXPECT_THAT(insensitive({{1, 1}}), HasSubstr("joint 1 is named twice"));
-  EXPECT_THAT(insensitive({{1, 7}}), HasSubstr("joint 7 is not in [0, 6]"));
-  EXPECT_THAT(insensitive({{0, 1, 2, 3, 4}}), HasSubstr("accepted: 1 to 4"));
-  EXPECT_THAT(insensitive({{1}, 15, 1.0}), HasSubstr("reserve = 1 is not in [0, 1)"));
-  EXPECT_THAT(insensitive({{1}, -1}), HasSubstr("iterations = -1"));
+  EXPECT_THAT(insensitive({1, 1}), HasSubstr("joint 1 is named twice"));
+  EXPECT_THAT(insensitive({1, 7}), HasSubstr("joint 7 is not in [0, 6]"));
+  EXPECT_THAT(insensitive({0, 1, 2, 3, 4}), HasSubstr("accepted: 1 to 4"));
 }
 
 TEST(ReleaseThrow, IsNotOfALawWithoutPads) {
@@ -640,13 +632,6 @@ TEST(NominalThrow, RefusesASearchWithoutSense) {
     expect_refused("gravity = ", [=](auto& o) { o.medium.gravity = gravity; });
   expect_refused("drag_k = -1", [](auto& o) { o.medium.drag_k = -1; });
   expect_refused("window = 0 is not in (0, 1] s", [](auto& o) { o.window = 0; });
-  expect_refused("speed_reserve = nan", [](auto& o) { o.speed_reserve = NAN; });
-  PlanOptions fine;
-  fine.check_step = 1e-9;
-  EXPECT_THAT(refusal([&] {
-                plan_throw(arm, {{1.3, 0, -0.2}}, fine);
-              }),
-              HasSubstr("check_step = 1e-09 is not in [1e-5, inf) s"));
   expect_refused("joint 99 is not in [0, 6]", [](auto& o) { o.fixed = {{99, 0}}; });
   expect_refused("joint 2 is named twice", [](auto& o) { o.fixed = {{2, 0}, {2, 0.1}}; });
 }
@@ -656,10 +641,13 @@ TEST(ThrowMotion, RefusesAnotherNumberOfJoints) {
   const Chain arm = pads();
   const ReleaseThrow p = swing(arm);
   const Joints three = p.qdd.head(3).eval();
-  EXPECT_THAT(refusal([&] { throw_motion(arm, three, p.start, p.qdd); }), HasSubstr("home has 3 values"));
-  EXPECT_THAT(refusal([&] { throw_motion(arm, middle_of(arm), p.start, three); }), HasSubstr("qdd has 3"));
-  EXPECT_THAT(refusal([&] { throw_motion(arm, middle_of(arm), p.start, p.qdd, {.velocity_share = 0}); }),
-              HasSubstr("velocity_share = 0"));
+  const auto moved = [&](const Joints& home, const Joints& qdd, double window, double share) {
+    return refusal([&] { throw_motion(arm, home, p.start, qdd, window, share); });
+  };
+  EXPECT_THAT(moved(three, p.qdd, 0.1, 0.9), HasSubstr("home has 3 values"));
+  EXPECT_THAT(moved(middle_of(arm), three, 0.1, 0.9), HasSubstr("qdd has 3"));
+  EXPECT_THAT(moved(middle_of(arm), p.qdd, -0.1, 0.9), HasSubstr("window = -0.1"));
+  EXPECT_THAT(moved(middle_of(arm), p.qdd, 0.1, 0), HasSubstr("acceleration_share = 0"));
   const TubeProblem tube{arm, p.start, p.target};
   EXPECT_THAT(refusal([&] { landings_over_window(tube, three, 5); }), HasSubstr("qdd has 3"));
   EXPECT_THAT(refusal([&] { landings_over_window(tube, p.qdd, 0); }), HasSubstr("samples = 0"));

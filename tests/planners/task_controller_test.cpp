@@ -58,7 +58,6 @@ TEST(ThrowStudy, AdaptationLearnsTheLoadAndTracksFiveTimesBetter) {
     // V after the repetitions is below V at their start; within a period the printed α is not the rate of β,
     // and V may rise.
     EXPECT_LT(adaptive.history.back().lyapunov, adaptive.history.front().lyapunov) << payload.name;
-    EXPECT_EQ(adaptive.saturated, 0);
     EXPECT_LT(adaptive.torque_use, 1);
   }
 }

@@ -41,6 +41,22 @@ TEST(DistributedPatch, ThePointsShareTheLoad) {
   EXPECT_THROW(disc_points(5, -1), std::invalid_argument);
 }
 
+/// Force and torque about the centre [N, N, N m] that slide and spin together at every point, in the limit of
+/// stiff bristles: −n μ f_N Σ w_i v_i/|v_i|, v_i = v + ω J a p_i.
+dynamics::Wrench<double> sliding_wrench(const DistributedPatch& patch, double normal_force,
+                                        const Twist<double>& slip) {
+  const double limit = patch.pads * patch.mu * normal_force;
+  dynamics::Wrench<double> out{};
+  for (const auto& [p, load] : patch.points) {
+    const double x = patch.radius * p.x, z = patch.radius * p.z;
+    const double vx = slip.vx - slip.omega * z, vz = slip.vz + slip.omega * x, size = std::hypot(vx, vz);
+    if (size == 0) continue;
+    const double fx = -limit * load * vx / size, fz = -limit * load * vz / size;
+    out = {out.fx + fx, out.fz + fz, out.tau + x * fz - z * fx};
+  }
+  return out;
+}
+
 /// Largest error of force and torque, in units of their limits, where the disc slides at εaω and spins at ω.
 double wrench_error(int rings, double epsilon) {
   const double full = 2 * kMu * kNormal, omega = 3;
