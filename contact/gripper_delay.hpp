@@ -1,16 +1,21 @@
 // The kinematic model: the object is carried rigidly until the gripper's delay has passed, then flies.
 #pragma once
 
+#include <vector>
+
 #include "contact/contact_model.hpp"
 
 namespace unhand::contact {
 
-/// Time between the opening command and the release [s]: a number, or one that scatters from throw to throw.
-/// Predictions release after `centre`.
+/// Time between the opening command and the release [s]: a number, or a distribution on [0, longest].
+///
+/// Predictions release after `centre`. `quantiles(n)` are delays to simulate where an outcome's distribution
+/// is wanted: they are equally likely, and the mean over them is a quadrature of the expectation.
 struct DelayDistribution {
   /// A number, or a distribution.
   enum class Kind {
     number,            ///< `centre`, known
+    uniform,           ///< on [0, longest]
     truncated_normal,  ///< cut off at 0 and `longest`
   };
   Kind kind{Kind::number};  ///< which of them
@@ -20,11 +25,22 @@ struct DelayDistribution {
 
   /// A known delay [s], >= 0.
   static DelayDistribution number(double delay) { return {Kind::number, delay, 0, delay}; }
+  /// Uniform on [0, longest] [s].
+  static DelayDistribution uniform(double longest) { return {Kind::uniform, 0.5 * longest, 0, longest}; }
   /// Normal of the given mean and standard deviation before truncation, cut off at 0 and `longest`; all [s].
   static DelayDistribution normal(double mean, double deviation, double longest) {
     return {Kind::truncated_normal, mean, deviation, longest};
   }
+
+  /// Mean after truncation [s]. Throws as validate() does.
+  double mean() const;
+  /// The delays at probabilities (k + ½)/n, k = 0 … n − 1 [s], increasing; n >= 1. A number gives itself
+  /// once. Throws std::invalid_argument for another n, and as validate() does.
+  std::vector<double> quantiles(int n) const;
 };
+
+/// Throws std::invalid_argument, naming parameter, value and accepted range.
+void validate(const DelayDistribution&);
 
 /// The model's name in the registry.
 inline constexpr const char* kGripperDelay = "gripper_delay";
