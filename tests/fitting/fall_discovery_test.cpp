@@ -168,6 +168,39 @@ void expect_bias_and_drag(const MeasuredDiscovery& found, const Truth& truth, do
   EXPECT_NEAR(value_of(*bias, "z"), truth.bias_z, near);
 }
 
+// Biases wander from recording to recording. Turned a little in each fall, a drag several times as large and
+// a drift against it would take that up.
+TEST(FallDiscovery, ZerosThatDifferFromFallToFallAreNeitherADriftNorALargerDrag) {
+  const Truth truth{.bias_x = -0.34, .bias_y = -0.24, .bias_z = -0.15, .drag = 0.0436, .bias_scatter = 0.05};
+  for (const unsigned seed : {61U, 62U})
+    expect_bias_and_drag(discover_falls(falls_from_rest(truth, 22, seed), {}), truth, 0.05);
+}
+
+// What the readings of falls differ by at rest is that scatter, whatever slows them later.
+TEST(FallDiscovery, AFallHasAZeroOfItsOwn) {
+  for (const double scatter : {0.0, 0.06}) {
+    const auto log = falls({.bias_x = 0.5, .drag = 0.045, .bias_scatter = scatter}, 60, 71);
+    const FallProblem shared(log), own(log, FallProblem::Zeros::own);
+    std::vector<std::string> names{"flight.quadratic_drag.k"};
+    const double k[] = {0.045};
+    double squares = 0, noise = 0;
+    for (std::size_t i = 0; i < own.groups().size(); ++i) {
+      const Eigen::Map<const Eigen::VectorXd> start(own.groups()[i].start.data(), 7);
+      const auto a = shared.equations(i, names, k, start, false),
+                 b = own.equations(i, names, k, start, false);
+      const Eigen::VectorXd left = shared.left_of(i, a.residual);
+      EXPECT_LT((left - own.left_of(i, b.residual)).norm(), 1e-9 * left.norm()) << "the same readings";
+      EXPECT_NEAR(left[1], -0.03 * a.residual[1], 1e-12);
+      const auto rows = left.size() / 3;
+      const double mean = b.residual(Eigen::seqN(1, rows, 3)).sum() / std::sqrt(static_cast<double>(rows));
+      squares += mean * mean, noise += 1;
+    }
+    // Of the mean of y, whose bias is none: one where what it scatters by is known.
+    EXPECT_GT(squares / noise, 0.3) << scatter;
+    EXPECT_LT(squares / noise, 2) << scatter;
+  }
+}
+
 // A decay of two seconds is a bias for a fall of 0.6 s: an effect whose shape has become open is another one.
 TEST(FallDiscovery, ABiasIsNoDecayWithoutEnd) {
   const Truth truth{.bias_x = -0.34, .bias_y = -0.24, .bias_z = 0.77, .drag = 0.0436};
