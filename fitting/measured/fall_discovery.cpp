@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "dynamics/median.hpp"
 #include "dynamics/quantisation.hpp"
 #include "dynamics/third_difference.hpp"
 #include "flight/quaternion.hpp"
@@ -151,9 +152,38 @@ std::map<std::string, std::array<Axis, 3>> axes_of(const datasets::ThrowLog& log
   return out;
 }
 
+/// A series at one time, by the parabola through it, and the variance of that in units of a sample's.
+struct Smoothed {
+  double value{}, variance{};
+};
+Smoothed smoothed_at(const std::vector<double>& time, const std::vector<Vec3<double>>& x, std::size_t axis,
+                     double at) {
+  const auto n = static_cast<Eigen::Index>(time.size());
+  Eigen::MatrixX3d powers(n, 3);
+  Eigen::VectorXd values(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double t = time[static_cast<std::size_t>(i)] - at;
+    powers.row(i) << 1, t, t * t;
+    values[i] = x[static_cast<std::size_t>(i)][axis];
+  }
+  const Eigen::Matrix3d inverse = (powers.transpose() * powers).inverse();
+  return {(inverse * (powers.transpose() * values))[0], inverse(0, 0)};
+}
+
+/// 1 σ of what numbers differ by beyond the noise of each, robust; 0 of too few.
+double differ_by(const std::vector<double>& values, const std::vector<double>& variances) {
+  constexpr std::size_t kLeast = 4;
+  if (values.size() < kLeast) return 0;
+  const double middle = dynamics::median(values);
+  std::vector<double> away;
+  for (const double value : values) away.push_back(std::abs(value - middle));
+  const double scatter = 1.4826 * dynamics::median(away);
+  return std::sqrt(std::max(0.0, scatter * scatter - dynamics::median(variances)));
+}
+
 }  // namespace
 
-FallProblem::FallProblem(const datasets::ThrowLog& log) : gravity_(log.gravity) {
+FallProblem::FallProblem(const datasets::ThrowLog& log, Zeros zeros) : gravity_(log.gravity) {
   datasets::validate(log);
   channels_ = {"force_x", "force_y", "force_z"};
   covariates_ = {"speed at the start [m/s]", "duration [s]", "vertical along body z [-]", "order"};
@@ -224,6 +254,7 @@ FallProblem::FallProblem(const datasets::ThrowLog& log) : gravity_(log.gravity) 
     groups_.push_back(std::move(group));
     falls_.push_back(std::move(fall));
   }
+  if (zeros == Zeros::own) free_zeros();
   for (const auto& [what, times] : left_out)
     notes_.push_back(fmt::format("{}: left out of {} falls", what, times));
   for (const auto& [object, of] : coarse)
@@ -236,6 +267,49 @@ FallProblem::FallProblem(const datasets::ThrowLog& log) : gravity_(log.gravity) 
   if (groups_.empty())
     throw std::invalid_argument("falls: no throw is one" +
                                 (skipped_.empty() ? "" : ": " + skipped_.front().second));
+}
+
+void FallProblem::free_zeros() {
+  for (const std::string& object : objects_of(*this))
+    for (std::size_t a = 0; a < 3; ++a) {
+      std::vector<double> zeros, variances;
+      std::vector<Fall*> of;
+      for (std::size_t i = 0; i < falls_.size(); ++i) {
+        Fall& fall = falls_[i];
+        if (groups_[i].object != object ||
+            std::find(fall.axes.begin(), fall.axes.end(), a) == fall.axes.end())
+          continue;
+        const double still = std::clamp(fall.speed / gravity_, 0.0, fall.samples.time.back());
+        const Smoothed zero = smoothed_at(fall.samples.time, fall.force, a, still);
+        zeros.push_back(zero.value), variances.push_back(zero.variance * fall.sigma[a] * fall.sigma[a]);
+        of.push_back(&fall);
+      }
+      const double differ = differ_by(zeros, variances);
+      for (Fall* fall : of) {
+        const double noise = fall->sigma[a] * fall->sigma[a],
+                     n = static_cast<double>(fall->samples.time.size());
+        fall->mean[a] = std::sqrt(noise / (noise + n * differ * differ));
+      }
+      if (differ > 0)
+        notes_.push_back(
+            fmt::format("{} of {}: from fall to fall its zero differs by {:.2g} m/s², as biases do "
+                        "from recording to recording; the mean of a fall counts by so much less",
+                        channels_[a], object, differ));
+    }
+}
+
+Eigen::VectorXd FallProblem::left_of(std::size_t group, const Eigen::VectorXd& residual) const {
+  const Fall& fall = falls_[group];
+  const auto axes = static_cast<Eigen::Index>(fall.axes.size()),
+             rows = axes * static_cast<Eigen::Index>(fall.samples.time.size());
+  Eigen::VectorXd out(rows);
+  for (Eigen::Index k = 0; k < axes; ++k) {
+    const std::size_t a = fall.axes[static_cast<std::size_t>(k)];
+    const auto of_axis = Eigen::seqN(k, fall.samples.time.size(), axes);
+    const double mean = residual(of_axis).mean();
+    out(of_axis) = -fall.sigma[a] * (residual(of_axis).array() + (1 / fall.mean[a] - 1) * mean);
+  }
+  return out;
 }
 
 std::vector<dynamics::Effect> FallProblem::effects() const {
@@ -268,6 +342,15 @@ GroupEquations FallProblem::equations(std::size_t group, std::span<const std::st
     out.reserve(groups_[group].rows.size());
     for (std::size_t i = 0; i < force.size(); ++i)
       for (const std::size_t a : fall.axes) out.push_back((force[i][a] - fall.force[i][a]) / fall.sigma[a]);
+    const std::size_t n = force.size(), axes = fall.axes.size();
+    for (std::size_t k = 0; k < axes; ++k) {
+      const double rest_of_mean = fall.mean[fall.axes[k]];
+      if (rest_of_mean == 1) continue;
+      S sum(0);
+      for (std::size_t i = 0; i < n; ++i) sum += out[i * axes + k];
+      const S off = sum * ((1 - rest_of_mean) / static_cast<double>(n));
+      for (std::size_t i = 0; i < n; ++i) out[i * axes + k] -= off;
+    }
     out.push_back((x[0] - fall.speed) / fall.speed_sigma);
     for (std::size_t a = 1; a < 4; ++a) out.push_back(x[a] / fall.tilt_sigma);
     for (std::size_t a = 4; a < 7; ++a)
@@ -289,12 +372,13 @@ FallErrors fall_errors(const FallProblem& problem, const GroupedFit& fit) {
     Vec3<double> speed{}, position{}, last{};
     double before = 0;
     const auto& axes = problem.axes(i);
+    const Eigen::VectorXd left = problem.left_of(i, g.residual);
     for (std::size_t j = 0; j < rows.size() && rows[j].channel >= 0; j += axes.size()) {
       const double dt = rows[j].time - before;
       before = rows[j].time;
       for (std::size_t k = 0; k < axes.size(); ++k) {
         const std::size_t a = axes[k];
-        const double r = g.residual[static_cast<Eigen::Index>(j + k)] * problem.sigma(i)[a];
+        const double r = -left[static_cast<Eigen::Index>(j + k)];
         squares += r * r;
         position[a] += dt * (speed[a] + 0.25 * dt * (r + last[a]));
         speed[a] += 0.5 * dt * (r + last[a]);

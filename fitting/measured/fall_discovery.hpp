@@ -16,16 +16,24 @@ namespace unhand::fitting {
 /// The noise of an axis is the declared one or that of its third differences, and not below what rounding to
 /// the grid of its readings adds. An axis that says nothing of a fall, as it stands still or is cut off, is
 /// left out of it.
+///
+/// With Zeros::own, every fall has a zero of its own: biases wander from recording to recording, and a steady
+/// turn about an axis off the sensor adds a constant as well. What readings differ by from fall to fall where
+/// the object does not move, at the start of a fall or at the apex, is then noise that all samples of an axis
+/// share, and their mean counts by so much less.
 class FallProblem final : public GroupedProblem {
  public:
+  enum class Zeros { shared, own };
   /// Throws datasets::LogError for a log that breaks the rules of its kind, std::invalid_argument when no
   /// throw can be used.
-  explicit FallProblem(const datasets::ThrowLog& log);
+  explicit FallProblem(const datasets::ThrowLog& log, Zeros zeros = Zeros::shared);
   std::vector<dynamics::Effect> effects() const override;
   GroupEquations equations(std::size_t group, std::span<const std::string> names,
                            std::span<const double> values, const Eigen::VectorXd& own,
                            Derivatives derivatives) const override;
   const flight::Vec3<double>& sigma(std::size_t group) const { return falls_[group].sigma; }  ///< [m/s²]
+  /// (measured − predicted) of the rows that are measurements, from their residuals [m/s²].
+  Eigen::VectorXd left_of(std::size_t group, const Eigen::VectorXd& residual) const;
   /// The axes that a fall's rows are of, in their order at every sample.
   const std::vector<std::size_t>& axes(std::size_t group) const { return falls_[group].axes; }
   /// What the readings are like: axes that were left out, and coarse ones.
@@ -37,8 +45,10 @@ class FallProblem final : public GroupedProblem {
     std::vector<flight::Vec3<double>> force;      // [m/s²]
     std::vector<std::size_t> axes;                // that are used
     flight::Vec3<double> sigma{}, rest{};         // rest: read before the fall [m/s²]
+    flight::Vec3<double> mean{1, 1, 1};           // what is left of the mean of an axis' rows
     double speed{}, speed_sigma{}, tilt_sigma{};  // upward, when the fall begins [m/s]; of that; [rad]
   };
+  void free_zeros();
   std::vector<Fall> falls_;
   std::vector<std::string> notes_;
   double gravity_{};
