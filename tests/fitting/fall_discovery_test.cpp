@@ -184,8 +184,8 @@ TEST(FallDiscovery, AFallHasAZeroOfItsOwn) {
     double squares = 0, noise = 0;
     for (std::size_t i = 0; i < own.groups().size(); ++i) {
       const Eigen::Map<const Eigen::VectorXd> start(own.groups()[i].start.data(), 7);
-      const auto a = shared.equations(i, names, k, start, false),
-                 b = own.equations(i, names, k, start, false);
+      const auto a = shared.equations(i, names, k, start, Derivatives::none),
+                 b = own.equations(i, names, k, start, Derivatives::none);
       const Eigen::VectorXd left = shared.left_of(i, a.residual);
       EXPECT_LT((left - own.left_of(i, b.residual)).norm(), 1e-9 * left.norm()) << "the same readings";
       EXPECT_NEAR(left[1], -0.03 * a.residual[1], 1e-12);
@@ -468,7 +468,8 @@ class TwoThatLookLikeOne final : public GroupedProblem {
     return out;
   }
   GroupEquations equations(std::size_t group, std::span<const std::string> names,
-                           std::span<const double> values, const Eigen::VectorXd& own, bool) const override {
+                           std::span<const double> values, const Eigen::VectorXd& own,
+                           Derivatives) const override {
     GroupEquations out{true, Eigen::VectorXd(41), Eigen::MatrixXd::Zero(41, static_cast<long>(names.size())),
                        Eigen::MatrixXd::Zero(41, 1)};
     for (Eigen::Index i = 0; i < 40; ++i) {
