@@ -128,8 +128,12 @@ void search(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   // One look more than effects are wanted: where none is found, another beside pads that give.
   for (int look = 0; look <= options.most_effects; ++look) {
     if (static_cast<int>(out.effects.size()) >= options.most_effects) break;
-    auto next = forward(stage, options, out);
-    if (!next) {
+    const bool beside_rigid_pads = out.along.empty();
+    if (auto next = forward(stage, options, out)) {
+      stage = std::move(*next);
+      polish(stage, options);
+      if (acts_on_pads(stage)) fit_along(stage, options, out);
+    } else {
       // The give of the pads may hide what else there is, and predictions may lack it: with it, one more
       // look.
       const Stage rigid = stage;
@@ -140,11 +144,8 @@ void search(Stage& stage, const DiscoverOptions& options, Discovery& out) {
         break;
       }
       out.small.reset();
-      continue;
     }
-    stage = std::move(*next);
-    polish(stage, options);
-    if (acts_on_pads(stage)) fit_along(stage, options, out);
+    if (beside_rigid_pads && !out.along.empty()) choose_again_beside_give(stage, options, out);
   }
 }
 

@@ -124,6 +124,21 @@ bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   return true;
 }
 
+void choose_again_beside_give(Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  const std::string last = out.effects.empty() ? "" : out.effects.back().id;
+  if (!acts_on_pads(last) || is_law(last)) return;
+  const Stage& less = without(stage, {last}, options);
+  if (!less.solved()) return;
+  Discovery again = out;
+  again.effects.pop_back();
+  auto other = forward(less, options, again);
+  if (!other || again.effects.size() != out.effects.size() || again.effects.back().id == last) return;
+  polish(*other, options);
+  if (other->bic() - stage.bic() > kDeltaBic) return;
+  stage = std::move(*other);
+  out = std::move(again);
+}
+
 void judge(const Stage& stage, const Stage& base, const DiscoverOptions& options, Discovery& out) {
   if (out.effects.empty()) return;
   const OutcomeErrors with = errors_of(stage, Share::test, options.fit.threads);

@@ -36,6 +36,11 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
 /// `out.along`. True if it is.
 bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
+/// Which effect on the pads it is, a step has decided beside pads that do not give, though pads that stick
+/// and pads that open late may differ by less than what all pads give. Beside the give that has been fitted
+/// along since then, the last step is taken again; the more evident effect (BIC) stands.
+void choose_again_beside_give(Stage& stage, const DiscoverOptions& options, Discovery& out);
+
 /// What speaks for every accepted effect in the end: the answer with it against the answer without it, which
 /// is `base` where there is no other.
 void judge(const Stage& stage, const Stage& base, const DiscoverOptions& options, Discovery& out);

@@ -23,7 +23,11 @@ namespace unhand::fitting {
 /// share, and their mean counts by so much less.
 class FallProblem final : public GroupedProblem {
  public:
-  enum class Zeros { shared, own };
+  /// What a sensor reads of no force.
+  enum class Zeros {
+    shared,  ///< is the same in all recordings
+    own,     ///< differs from recording to recording
+  };
   /// Throws datasets::LogError for a log that breaks the rules of its kind, std::invalid_argument when no
   /// throw can be used.
   explicit FallProblem(const datasets::ThrowLog& log, Zeros zeros = Zeros::shared);

@@ -43,7 +43,11 @@ struct GroupEquations {
 };
 
 /// By which unknowns equations are asked to be differentiated.
-enum class Derivatives { none, own, all };
+enum class Derivatives {
+  none,  ///< by none
+  own,   ///< by the group's own
+  all,   ///< by those, and by the shared parameters
+};
 
 struct GroupedFit;
 

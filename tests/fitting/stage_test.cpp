@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "experiment/random_stream.hpp"
 #include "fitting/discovery/acceptance.hpp"
@@ -277,6 +278,48 @@ TEST(Selection, TheLastEffectIsJudgedAgainBesideTheGiveThatWasFittedAlong) {
   EXPECT_TRUE(out.effects.empty());
   EXPECT_TRUE(stage.ids.empty());
   EXPECT_EQ(stage.problem.options().effects, std::vector<std::string>{kPads});
+}
+
+// Sticking pads and late ones, each beside pads that give, and the wrong one accepted beside rigid pads.
+TEST(Selection, AStepOnThePadsIsTakenAgainBesideTheGiveThatWasFittedAlong) {
+  const std::string adhesion = "contact.adhesion", delay = "release.opening_delay";
+  for (const auto& [is, was] : {std::pair{adhesion, delay}, std::pair{delay, adhesion}}) {
+    experiment::EffectSettings effects{{"contact.pad_compliance.compliance", 4e-7}};
+    if (is == delay) effects["release.opening_delay.delay"] = 0.003;
+    if (is == adhesion)
+      effects["contact.adhesion.f_adh"] = 0.8, effects["contact.adhesion.parting_time"] = 0.003;
+    const auto log = support::loop_campaign(effects);
+    DiscoverOptions options = support::loop_options();
+    options.refits = 2;
+    Stage base{CampaignProblem(log, "synthetic", options.campaign), {}, {}, {}};
+    solve(base, options, {});
+    Stage stage{base.problem.with(options.campaign.model, {was}), {}, {}, {was}};
+    solve(stage, options, {});
+    ASSERT_TRUE(base.solved() && stage.solved());
+    Discovery out;
+    out.model = options.campaign.model;
+    out.base = base.fit, out.base_test = base.held_out.misfit;
+    AcceptedEffect effect;
+    effect.id = was;
+    effect.phase = Phase::release;
+    out.effects = {effect};
+    ASSERT_TRUE(fit_along(stage, options, out));
+    const double before = stage.bic();
+    choose_again_beside_give(stage, options, out);
+    ASSERT_EQ(out.effects.size(), 1u);
+    EXPECT_EQ(out.effects[0].id, is);
+    EXPECT_EQ(stage.ids, std::vector<std::string>{is});
+    EXPECT_EQ(out.along, std::vector<std::string>{kPads});
+    EXPECT_LT(stage.bic(), before - 10);
+    for (const auto& u : stage.fit.campaign) {
+      if (u.unknown.name == "release.opening_delay.delay") {
+        EXPECT_NEAR(u.value, 0.003, 4 * u.sigma);
+      }
+      if (u.unknown.name == "contact.adhesion.f_adh") {
+        EXPECT_NEAR(u.value, 0.8, 4 * u.sigma);
+      }
+    }
+  }
 }
 
 // Thirty landings whose chi-square is 1.78 per sample: one in two hundred by chance, and a log has 22 such
