@@ -254,23 +254,30 @@ TEST(Selection, WhatHasNoEvidenceWithoutWhatIsWithdrawnGoesWithIt) {
   EXPECT_NEAR(stage.bic(), base.bic(), 1);
 }
 
+/// The loop when it has accepted one effect of the release, and nothing else.
+std::pair<Stage, Discovery> accepted_beside_rigid_pads(const datasets::ThrowLog& log, const std::string& id,
+                                                       const DiscoverOptions& options) {
+  Stage base{CampaignProblem(log, "synthetic", options.campaign), {}, {}, {}};
+  solve(base, options, {});
+  Stage stage{base.problem.with(options.campaign.model, {id}), {}, {}, {id}};
+  solve(stage, options, {});
+  EXPECT_TRUE(base.solved() && stage.solved());
+  Discovery out;
+  out.model = options.campaign.model;
+  out.base = base.fit, out.base_test = base.held_out.misfit;
+  AcceptedEffect effect;
+  effect.id = id;
+  effect.phase = Phase::release;
+  out.effects = {effect};
+  return {std::move(stage), std::move(out)};
+}
+
 // A delay was accepted over rigid pads; the give that was then fitted along takes its part.
 TEST(Selection, TheLastEffectIsJudgedAgainBesideTheGiveThatWasFittedAlong) {
   const auto log = support::loop_campaign({{"contact.pad_compliance.compliance", 4e-7}});  // some 20 um
   const std::string delay = "release.opening_delay";
   DiscoverOptions options = support::loop_options();
-  Stage base{CampaignProblem(log, "synthetic", options.campaign), {}, {}, {}};
-  solve(base, options, {});
-  Stage stage{base.problem.with(options.campaign.model, {delay}), {}, {}, {delay}};
-  solve(stage, options, {});
-  ASSERT_TRUE(base.solved() && stage.solved());
-  Discovery out;
-  out.model = options.campaign.model;
-  out.base = base.fit, out.base_test = base.held_out.misfit;
-  AcceptedEffect effect;
-  effect.id = delay;
-  effect.phase = Phase::release;
-  out.effects = {effect};
+  auto [stage, out] = accepted_beside_rigid_pads(log, delay, options);
   backward(stage, options, out);
   EXPECT_EQ(out.effects.size(), 1u) << "it has just been judged";
   ASSERT_TRUE(fit_along(stage, options, out));
@@ -291,18 +298,7 @@ TEST(Selection, AStepOnThePadsIsTakenAgainBesideTheGiveThatWasFittedAlong) {
     const auto log = support::loop_campaign(effects);
     DiscoverOptions options = support::loop_options();
     options.refits = 2;
-    Stage base{CampaignProblem(log, "synthetic", options.campaign), {}, {}, {}};
-    solve(base, options, {});
-    Stage stage{base.problem.with(options.campaign.model, {was}), {}, {}, {was}};
-    solve(stage, options, {});
-    ASSERT_TRUE(base.solved() && stage.solved());
-    Discovery out;
-    out.model = options.campaign.model;
-    out.base = base.fit, out.base_test = base.held_out.misfit;
-    AcceptedEffect effect;
-    effect.id = was;
-    effect.phase = Phase::release;
-    out.effects = {effect};
+    auto [stage, out] = accepted_beside_rigid_pads(log, was, options);
     ASSERT_TRUE(fit_along(stage, options, out));
     const double before = stage.bic();
     choose_again_beside_give(stage, options, out);
