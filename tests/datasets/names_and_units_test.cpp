@@ -1,5 +1,6 @@
 // Misspelled names, units, and the list of all datasets.
 #include "datasets/near_miss.hpp"
+#include "datasets/reference.hpp"
 #include "datasets/units.hpp"
 #include "log_samples.hpp"
 
@@ -86,6 +87,14 @@ TEST(Layout, ListsEveryDatasetByDimension) {
   EXPECT_THAT(paths(3), testing::Contains("mocap/pose (N,7) m,m,m,1,1,1,1"));
   EXPECT_THAT(paths(3), testing::Contains("mocap/pose (N,3) m,m,m"));
   EXPECT_THAT(paths(3), testing::Not(testing::Contains(testing::StartsWith("hand/"))));
+}
+
+TEST(Reference, IsLabelledAsReported) {
+  for (const ReportedModel& model : release_models_as_reported.models) {
+    EXPECT_THAT(std::string(model.label), testing::HasSubstr("as reported"));
+  }
+  EXPECT_EQ(release_models_as_reported.throws,
+            2 * 3 * 6 * 5);  // offsets, pitches, accelerations, repetitions
 }
 
 }  // namespace
