@@ -69,6 +69,7 @@ GroupedFit fit_groups(const GroupedProblem& problem, datasets::Split split,
                       const GroupedFitOptions& options = {}, const GroupedFit* near = nullptr);
 
 /// The own unknowns alone, the shared ones as in `fit`; of the groups of another split, or the same.
+/// They begin as above.
 GroupedFit fit_own(const GroupedProblem& problem, datasets::Split split, const GroupedFit& fit,
                    const GroupedFitOptions& options = {}, const GroupedFit* near = nullptr);
 

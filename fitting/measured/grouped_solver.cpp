@@ -94,7 +94,7 @@ class Solver {
       const Group& group = problem_.groups()[used_[n]];
       g.solved = parts_[n].solved;
       if (!g.solved) continue;
-      g.residual = residual_[n];
+      g.residual = equations_[n].residual;
       g.chi2 = 0, g.n = 0;
       for (Index i = 0; i < g.residual.size(); ++i)
         if (group.rows[static_cast<std::size_t>(i)].channel >= 0)
@@ -145,12 +145,10 @@ class Solver {
   /// The equations at the fit's values and own unknowns.
   void linearise() {
     equations_.resize(used_.size());
-    residual_.resize(used_.size());
     const std::vector<double> values(fit_.values.data(), fit_.values.data() + fit_.values.size());
     dynamics::parallel_for(used_.size(), options_.threads, [&](std::size_t n) {
       equations_[n] = problem_.equations(used_[n], names_, values, fit_.groups[used_[n]].own,
                                          fit_.values.size() > 0 ? Derivatives::all : Derivatives::own);
-      residual_[n] = equations_[n].residual;
     });
   }
 
@@ -165,7 +163,6 @@ class Solver {
     if (!equations_[n].solved) return;
     const Group& group = problem_.groups()[used_[n]];
     GroupEquations e = equations_[n];
-    e.residual = residual_[n];
     part.cost = cost_of(e.residual, group, fit_.weights, options_.sample_limit);
     part.quadratic = is_quadratic(e.residual, group, fit_.weights, options_.sample_limit);
     weigh_rows(e, group, fit_.weights, options_.sample_limit);
@@ -196,18 +193,19 @@ class Solver {
   void move_group(std::size_t n, const VectorXd& shared_change) {
     Part& part = parts_[n];
     if (!part.solved) return;
+    GroupEquations& e = equations_[n];
     VectorXd own = part.own_step;
     if (shared_change.size() > 0) {
       own += part.own_per_shared * shared_change;
-      residual_[n] += product(equations_[n].shared, shared_change);
+      e.residual += product(e.shared, shared_change);
     }
-    residual_[n] += product(equations_[n].own, own);
+    e.residual += product(e.own, own);
     fit_.groups[used_[n]].own += own;
     const Group& group = problem_.groups()[used_[n]];
-    if (!part.quadratic || !is_quadratic(residual_[n], group, fit_.weights, options_.sample_limit))
+    if (!part.quadratic || !is_quadratic(e.residual, group, fit_.weights, options_.sample_limit))
       return project(n);
     // Its rows count as before: nothing is left for its own unknowns to do.
-    part.cost = cost_of(residual_[n], group, fit_.weights, options_.sample_limit);
+    part.cost = cost_of(e.residual, group, fit_.weights, options_.sample_limit);
     if (shared_change.size() > 0) part.score += part.information * shared_change;
     part.own_step.setZero();
   }
@@ -274,8 +272,7 @@ class Solver {
   const GroupedFitOptions& options_;
   std::vector<std::string> names_;
   std::vector<std::size_t> used_;
-  std::vector<GroupEquations> equations_;  // of the groups used, before weighing
-  std::vector<VectorXd> residual_;         // theirs, on the linear model
+  std::vector<GroupEquations> equations_;  // of the groups used, before weighing; residuals on the model
   std::vector<Part> parts_;
 };
 
