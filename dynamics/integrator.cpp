@@ -12,10 +12,18 @@
 namespace unhand::dynamics {
 
 const char* to_string(Outcome outcome) {
-  constexpr const char* kNames[] = {"finished",           "horizon",           "zeno",
-                                    "event_budget_spent", "step_budget_spent", "mode_cycle",
-                                    "not_converged",      "step_too_small",    "not_finite"};
-  return kNames[static_cast<int>(outcome)];
+  switch (outcome) {
+    case Outcome::finished: return "finished";
+    case Outcome::horizon: return "horizon";
+    case Outcome::zeno: return "zeno";
+    case Outcome::event_budget_spent: return "event_budget_spent";
+    case Outcome::step_budget_spent: return "step_budget_spent";
+    case Outcome::mode_cycle: return "mode_cycle";
+    case Outcome::not_converged: return "not_converged";
+    case Outcome::step_too_small: return "step_too_small";
+    case Outcome::not_finite: return "not_finite";
+  }
+  return "";
 }
 
 namespace {

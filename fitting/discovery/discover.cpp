@@ -22,14 +22,23 @@
 namespace unhand::fitting {
 
 const char* to_string(Verdict verdict) {
-  constexpr const char* kNames[] = {"effect_found", "no_missing_effect", "unexplained", "not_answered"};
-  return kNames[static_cast<int>(verdict)];
+  switch (verdict) {
+    case Verdict::effect_found: return "effect_found";
+    case Verdict::no_missing_effect: return "no_missing_effect";
+    case Verdict::unexplained: return "unexplained";
+    case Verdict::not_answered: return "not_answered";
+  }
+  return "";
 }
 
 const char* to_string(Outcome outcome) {
-  constexpr const char* kNames[] = {"position in flight", "orientation in flight", "landing x",
-                                    "landing theta"};
-  return kNames[static_cast<int>(outcome)];
+  switch (outcome) {
+    case Outcome::position: return "position in flight";
+    case Outcome::orientation: return "orientation in flight";
+    case Outcome::landing_x: return "landing x";
+    case Outcome::landing_theta: return "landing theta";
+  }
+  return "";
 }
 
 const char* unit_of(Outcome outcome) {

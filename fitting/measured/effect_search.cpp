@@ -147,14 +147,9 @@ class Search {
       if (!(left(out_.final_test) > kMisfit)) return;
       if (static_cast<int>(rival.answer.effects.size()) >= options_.most_effects) continue;
       if (!rival.opens.empty() && is_accepted(rival.answer.effects.back().id)) continue;  // asked since then
-      EffectSearch first = std::exchange(out_, rival.answer);
-      auto shown_from = std::exchange(shown_from_, rival.shown_from);
-      const bool stands = rival.opens.empty() ? climbed_from_one() : opened(rival);
-      const bool better = stands && left(out_.final_test) < kBetter * left(first.final_test) &&
-                          left(out_.final) < kBetter * left(first.final);
-      if (better) continue;
-      out_ = std::move(first);
-      shown_from_ = std::move(shown_from);
+      try_instead(rival.answer, rival.shown_from, [&](const EffectSearch& first) {
+        return (rival.opens.empty() ? climbed_from_one() : opened(rival)) && leaves_less(first, kBetter);
+      });
     }
   }
 
@@ -175,18 +170,13 @@ class Search {
     const auto openings = std::move(openings_);
     for (const Rival& opening : openings) {
       if (!(left(out_.final_test) > kFarOff)) return;
-      EffectSearch first = std::exchange(out_, opening.answer);
-      auto shown_from = std::exchange(shown_from_, opening.shown_from);
-      climb();
-      exchange();
-      backward();
-      const std::size_t has = out_.final.shared.size(), had = first.final.shared.size();
-      const double times = has < had ? 1 : kBetter;
-      if (has <= had && left(out_.final_test) < times * left(first.final_test) &&
-          left(out_.final) < times * left(first.final))
-        continue;
-      out_ = std::move(first);
-      shown_from_ = std::move(shown_from);
+      try_instead(opening.answer, opening.shown_from, [&](const EffectSearch& first) {
+        climb();
+        exchange();
+        backward();
+        const std::size_t has = out_.final.shared.size(), had = first.final.shared.size();
+        return has <= had && leaves_less(first, has < had ? 1 : kBetter);
+      });
     }
   }
 
@@ -199,14 +189,10 @@ class Search {
       if (!shape_is_open(out_.final, id) || is_needed(id)) continue;
       auto less = without(i);
       if (!less) continue;
-      EffectSearch first = std::exchange(out_, std::move(*less));
-      auto shown_from = shown_from_;
-      climb();
-      if (kBetter * left(out_.final_test) < left(first.final_test) &&
-          kBetter * left(out_.final) < left(first.final))
-        continue;
-      out_ = std::move(first);
-      shown_from_ = std::move(shown_from);
+      try_instead(*less, shown_from_, [&](const EffectSearch& first) {
+        climb();
+        return leaves_less(first, 1 / kBetter);
+      });
     }
   }
 
@@ -417,28 +403,40 @@ class Search {
     const std::string id = out_.effects[i].id;
     auto less = without(i);
     if (!less) return false;
-    EffectSearch first = std::exchange(out_, std::move(*less));
-    auto shown_from = shown_from_;
-    auto effects = inactive();
-    std::erase_if(effects, [&](const auto& e) { return e.id == id; });
-    const auto f = grouped_footprints(problem_, out_.final, effects, options_.fit);
-    const auto scored = first_order(f);
-    // To first order; where less than a third of what goes with the old one comes back, no fit will tell
-    // more.
-    const double lost = out_.final.chi2 - first.final.chi2;
-    if (!scored.empty() && scored.front().gain > 0 && kPromised * scored.front().gain > lost) {
+    return try_instead(*less, shown_from_, [&](const EffectSearch& first) {
+      auto effects = inactive();
+      std::erase_if(effects, [&](const auto& e) { return e.id == id; });
+      const auto f = grouped_footprints(problem_, out_.final, effects, options_.fit);
+      const auto scored = first_order(f);
+      // To first order; where less than a third of what goes with the old one comes back, no fit will tell
+      // more.
+      const double lost = out_.final.chi2 - first.final.chi2;
+      if (scored.empty() || !(scored.front().gain > 0 && kPromised * scored.front().gain > lost))
+        return false;
       const auto trials = evident(f.total, {scored.front()}, effects,
                                   options_.family_wise_level / static_cast<double>(scored.size()));
-      if (!trials.empty() && is_confirmed(trials.front().held) &&
-          left(trials.front().test) < kBetter * left(first.final_test) &&
-          left(trials.front().fit) < kBetter * left(first.final)) {
-        accept(trials.front(), out_);
-        return true;
-      }
-    }
+      if (trials.empty() || !is_confirmed(trials.front().held)) return false;
+      accept(trials.front(), out_);
+      return leaves_less(first, kBetter);
+    });
+  }
+
+  /// Puts another answer in the place of the present one; `stands` searches on from it and says, given the
+  /// former answer, whether it stays. Else the former one is restored.
+  template <typename Stands>
+  bool try_instead(EffectSearch answer, std::map<std::string, std::size_t> shown_from, const Stands& stands) {
+    EffectSearch first = std::exchange(out_, std::move(answer));
+    std::swap(shown_from_, shown_from);
+    if (stands(std::as_const(first))) return true;
     out_ = std::move(first);
     shown_from_ = std::move(shown_from);
     return false;
+  }
+
+  /// Whether all groups, held out or not, have less than `times` of the misfit that the former answer left.
+  bool leaves_less(const EffectSearch& former, double times) const {
+    return left(out_.final_test) < times * left(former.final_test) &&
+           left(out_.final) < times * left(former.final);
   }
 
   /// An answer with another effect in the place of the accepted one. `opens`: ids of effects that act through
