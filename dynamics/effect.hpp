@@ -175,10 +175,7 @@ struct EffectOn {
   using Apply = void (*)(const EffectValues<S>&, Setup<S>&);
   /// `enter` serves either scalar: [](const auto& p, auto& setup) { setup.drag = p["k"]; }
   template <class Enter>
-  EffectOn(Effect what, Enter enter) : EffectOn(std::move(what), enter, enter) {}
-  /// One function for each.
-  EffectOn(Effect what, Apply<double> enter, Apply<Dual> enter_dual)
-      : effect(std::move(what)), apply(enter), apply_dual(enter_dual) {}
+  EffectOn(Effect what, Enter enter) : effect(std::move(what)), apply(enter), apply_dual(enter) {}
 
   Effect effect;           ///< the descriptor
   Apply<double> apply;     ///< writes the parameters into the setup

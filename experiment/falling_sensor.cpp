@@ -20,23 +20,6 @@ template <class S>
 Vec3<S> vector_of(const EffectValues<S>& p) {
   return {p["x"], p["y"], p["z"]};
 }
-template <class S>
-void bias(const EffectValues<S>& p, Accelerometer<S>& sensor) {
-  sensor.bias = vector_of(p);
-}
-template <class S>
-void drift(const EffectValues<S>& p, Accelerometer<S>& sensor) {
-  sensor.drift = vector_of(p);
-}
-template <class S>
-void settling(const EffectValues<S>& p, Accelerometer<S>& sensor) {
-  sensor.settling = vector_of(p);
-  sensor.settling_time = p["tau"];
-}
-template <class S>
-void lever_arm(const EffectValues<S>& p, Accelerometer<S>& sensor) {
-  sensor.lever_arm = vector_of(p);
-}
 
 /// x, y and z of what is added to the reading of that axis alone.
 std::vector<EffectParameter> on_each_axis(const char* unit, double limit) {
@@ -58,13 +41,11 @@ std::span<const dynamics::EffectOn<Accelerometer>> accelerometer_effects() {
       {{.id = "sensor.accelerometer_bias",
         .mechanism = "constant bias of the accelerometer, body axes",
         .parameters = on_each_axis("m/s^2", 20)},
-       &bias<double>,
-       &bias<Dual>},
+       [](const auto& p, auto& sensor) { sensor.bias = vector_of(p); }},
       {{.id = "sensor.accelerometer_drift",
         .mechanism = "the bias changes during a fall",
         .parameters = on_each_axis("m/s^3", 50)},
-       &drift<double>,
-       &drift<Dual>},
+       [](const auto& p, auto& sensor) { sensor.drift = vector_of(p); }},
       {{.id = "sensor.settling",
         .mechanism = "the sensor recovers from the time before the fall, s exp(-t/tau)",
         .parameters =
@@ -73,13 +54,14 @@ std::span<const dynamics::EffectOn<Accelerometer>> accelerometer_effects() {
               all.push_back({"tau", "s", 0.05, 2e-3, 2, 0.02, {0.02, 0.08, 0.3}});
               return all;
             }()},
-       &settling<double>,
-       &settling<Dual>},
+       [](const auto& p, auto& sensor) {
+         sensor.settling = vector_of(p);
+         sensor.settling_time = p["tau"];
+       }},
       {{.id = "sensor.lever_arm",
         .mechanism = "the sensor is not at the CoM: w x (w x r) + dw/dt x r",
         .parameters = {{"x", "m", 0, -1, 1, 0.01}, {"y", "m", 0, -1, 1, 0.01}, {"z", "m", 0, -1, 1, 0.01}}},
-       &lever_arm<double>,
-       &lever_arm<Dual>},
+       [](const auto& p, auto& sensor) { sensor.lever_arm = vector_of(p); }},
   };
   return table;
 }

@@ -29,8 +29,4 @@ std::optional<Eigen::MatrixXd> outcome_slopes(const PreparedThrow& prepared, con
                                               const std::vector<std::string>& names,
                                               std::span<const double> values);
 
-/// Whether the grip holds the object fast until the gripper is told to open.
-bool grip_holds(const PreparedThrow& prepared, const ThrowModel& model,
-                const dynamics::Values<double>& values);
-
 }  // namespace unhand::experiment

@@ -1,45 +1,8 @@
 #include "experiment/sensing.hpp"
 
 namespace unhand::experiment {
-namespace {
 
 using dynamics::AccelerationForm;
-using dynamics::Dual;
-using dynamics::EffectValues;
-
-template <class S>
-void mocap_time_offset(const EffectValues<S>& p, Sensing<S>& sensing) {
-  sensing.mocap_time_offset = p["offset"];
-}
-template <class S>
-void length_scale(const EffectValues<S>& p, Sensing<S>& sensing) {
-  sensing.length_scale = p["scale"] - 1.0;
-  sensing.landing_share = p["landing_share"];
-}
-template <class S>
-void com_offset(const EffectValues<S>& p, Sensing<S>& sensing) {
-  sensing.com_offset = p["offset"];
-}
-template <class S>
-void inertia(const EffectValues<S>& p, Sensing<S>& sensing) {
-  sensing.inertia = p["ratio"] - 1.0;
-}
-template <class S>
-void mass(const EffectValues<S>& p, Sensing<S>& sensing) {
-  sensing.mass = p["ratio"] - 1.0;
-}
-template <class S>
-void ft_bias(const EffectValues<S>& p, Sensing<S>& sensing) {
-  sensing.bias_fx = p["fx"];
-  sensing.bias_fz = p["fz"];
-  sensing.bias_tau = p["tau"];
-}
-template <class S>
-void normal_force_bias(const EffectValues<S>& p, Sensing<S>& sensing) {
-  sensing.normal_force_bias = p["bias"];
-}
-
-}  // namespace
 
 std::span<const dynamics::EffectOn<Sensing>> sensor_effects() {
   static const char *const kMoved = "motion capture while the object is held by a moving hand",
@@ -50,8 +13,7 @@ std::span<const dynamics::EffectOn<Sensing>> sensor_effects() {
         .parameters = {{"offset", "s", 0, -0.05, 0.05, 1e-3}},
         .needs = {.mocap = true},
         .remedy = kMoved},
-       &mocap_time_offset<double>,
-       &mocap_time_offset<Dual>},
+       [](const auto& p, auto& sensing) { sensing.mocap_time_offset = p["offset"]; }},
       {{.id = "sensor.length_scale",
         .mechanism = "the tracker's metric scale is off",
         .parameters = {{"scale", "-", 1, 0.8, 1.2, 2e-3},
@@ -64,8 +26,10 @@ std::span<const dynamics::EffectOn<Sensing>> sensor_effects() {
         .form = AccelerationForm::along_z,
         .needs = {.mocap = true},
         .remedy = kMoved},
-       &length_scale<double>,
-       &length_scale<Dual>},
+       [](const auto& p, auto& sensing) {
+         sensing.length_scale = p["scale"] - 1.0;
+         sensing.landing_share = p["landing_share"];
+       }},
       {{.id = "sensor.com_offset",
         .mechanism = "the declared CoM is off along the object's x axis",
         .parameters = {{"offset", "m", 0, -0.1, 0.1, 1e-3}},
@@ -73,22 +37,19 @@ std::span<const dynamics::EffectOn<Sensing>> sensor_effects() {
         .about_declaration = true,
         .remedy = "grasps at other places on the object",
         .untracked_remedy = "motion capture of the turning flight"},
-       &com_offset<double>,
-       &com_offset<Dual>},
+       [](const auto& p, auto& sensing) { sensing.com_offset = p["offset"]; }},
       {{.id = "sensor.inertia",
         .mechanism = "the declared inertia is off",
         .parameters = {{"ratio", "-", 1, 0.1, 6, 0.02}},
         .about_declaration = true,
         .remedy = "the torque behind a pad while the held object turns, or a weighed inertia"},
-       &inertia<double>,
-       &inertia<Dual>},
+       [](const auto& p, auto& sensing) { sensing.inertia = p["ratio"] - 1.0; }},
       {{.id = "sensor.mass",
         .mechanism = "the declared mass is off",
         .parameters = {{"ratio", "-", 1, 0.1, 6, 0.02}},
         .about_declaration = true,
         .remedy = "the force behind a pad while the object is held, or a weighing"},
-       &mass<double>,
-       &mass<Dual>},
+       [](const auto& p, auto& sensing) { sensing.mass = p["ratio"] - 1.0; }},
       {{.id = "sensor.ft_bias",
         .mechanism = "constant bias of the F/T sensor",
         .parameters = {{"fx", "N", 0, -20, 20, 0.05},
@@ -96,15 +57,17 @@ std::span<const dynamics::EffectOn<Sensing>> sensor_effects() {
                        {"tau", "N m", 0, -2, 2, 5e-4}},
         .needs = {.wrench = true},
         .remedy = kUnloaded},
-       &ft_bias<double>,
-       &ft_bias<Dual>},
+       [](const auto& p, auto& sensing) {
+         sensing.bias_fx = p["fx"];
+         sensing.bias_fz = p["fz"];
+         sensing.bias_tau = p["tau"];
+       }},
       {{.id = "sensor.normal_force_bias",
         .mechanism = "constant bias of the measured normal force",
         .parameters = {{"bias", "N", 0, -10, 10, 0.1}},
         .needs = {.normal_force = true},
         .remedy = kUnloaded},
-       &normal_force_bias<double>,
-       &normal_force_bias<Dual>},
+       [](const auto& p, auto& sensing) { sensing.normal_force_bias = p["bias"]; }},
   };
   return table;
 }

@@ -53,6 +53,10 @@ template <class S>
 ThrowPrediction<S> predict_channels(const PreparedThrow& prepared, const Observations& observed,
                                     const ThrowModel& model, const dynamics::Values<S>& values);
 
+/// Whether the grip holds the object fast until the gripper is told to open.
+bool grip_holds(const PreparedThrow& prepared, const ThrowModel& model,
+                const dynamics::Values<double>& values);
+
 /// What looks at a release.
 using UseOfRelease =
     std::function<void(const release::ReleaseProblem<double>&, const release::ReleaseResult<double>&)>;

@@ -3,43 +3,18 @@
 namespace unhand::experiment {
 
 using dynamics::Dual;
-using dynamics::EffectValues;
 using flight::Vec3;
-
-namespace {
-
-template <class S>
-void length_scale(const EffectValues<S>& p, Tracking<S>& tracking) {
-  tracking.length_scale = p["scale"] - 1.0;
-}
-template <class S>
-void time_scale(const EffectValues<S>& p, Tracking<S>& tracking) {
-  tracking.time_scale = p["scale"] - 1.0;
-}
-template <class S>
-void com_offset(const EffectValues<S>& p, Tracking<S>& tracking) {
-  tracking.com_offset = {p["x"], p["y"], p["z"]};
-}
-template <class S>
-void inertia(const EffectValues<S>& p, Tracking<S>& tracking) {
-  tracking.inertia_y = p["ratio_y"] - 1.0;
-  tracking.inertia_z = p["ratio_z"] - 1.0;
-}
-
-}  // namespace
 
 std::span<const dynamics::EffectOn<Tracking>> tracking_effects() {
   static const dynamics::EffectOn<Tracking> table[] = {
       {{.id = "sensor.length_scale",
         .mechanism = "the tracker's metric scale is off",
         .parameters = {{"scale", "-", 1, 0.1, 10, 2e-3}}},
-       &length_scale<double>,
-       &length_scale<Dual>},
+       [](const auto& p, auto& tracking) { tracking.length_scale = p["scale"] - 1.0; }},
       {{.id = "sensor.time_scale",
         .mechanism = "the tracker's clock runs fast or slow",
         .parameters = {{"scale", "-", 1, 0.3, 3, 1e-3}}},
-       &time_scale<double>,
-       &time_scale<Dual>},
+       [](const auto& p, auto& tracking) { tracking.time_scale = p["scale"] - 1.0; }},
       {{.id = "sensor.com_offset",
         .mechanism = "the tracked point is not the CoM: true - declared CoM in body axes",
         .parameters =
@@ -49,8 +24,9 @@ std::span<const dynamics::EffectOn<Tracking>> tracking_effects() {
         .per_object = true,
         .needs = {.attitude = true},
         .about_declaration = true},
-       &com_offset<double>,
-       &com_offset<Dual>},
+       [](const auto& p, auto& tracking) {
+         tracking.com_offset = {p["x"], p["y"], p["z"]};
+       }},
       {{.id = "sensor.inertia",
         .mechanism = "the declared ratios of the moments of inertia are off",
         .parameters = {{.name = "ratio_y",
@@ -70,8 +46,10 @@ std::span<const dynamics::EffectOn<Tracking>> tracking_effects() {
         .per_object = true,
         .needs = {.attitude = true},
         .about_declaration = true},
-       &inertia<double>,
-       &inertia<Dual>},
+       [](const auto& p, auto& tracking) {
+         tracking.inertia_y = p["ratio_y"] - 1.0;
+         tracking.inertia_z = p["ratio_z"] - 1.0;
+       }},
   };
   return table;
 }

@@ -1,5 +1,6 @@
 #include "planners/tube/small_qp.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -24,36 +25,8 @@ namespace {
 constexpr double kSlack = 1e-10;  ///< of a constraint whose normal is scaled to length one
 constexpr int kMostSteps = 200;   ///< constraints added, at most
 
-/// Lower L with L Lᵀ = H; false where H is not positive definite.
-bool factorise(QpMatrix& H) {
-  const int n = static_cast<int>(H.rows());
-  for (int j = 0; j < n; ++j) {
-    for (int k = 0; k < j; ++k) H(j, j) -= H(j, k) * H(j, k);
-    if (!(H(j, j) > 0)) return false;
-    H(j, j) = std::sqrt(H(j, j));
-    for (int i = j + 1; i < n; ++i) {
-      for (int k = 0; k < j; ++k) H(i, j) -= H(i, k) * H(j, k);
-      H(i, j) /= H(j, j);
-    }
-  }
-  return true;
-}
-/// L⁻¹ v
-QpVector forward(const QpMatrix& L, QpVector v) {
-  for (int i = 0; i < v.size(); ++i) {
-    for (int k = 0; k < i; ++k) v[i] -= L(i, k) * v[k];
-    v[i] /= L(i, i);
-  }
-  return v;
-}
-/// L⁻ᵀ v
-QpVector backward(const QpMatrix& L, QpVector v) {
-  for (int i = static_cast<int>(v.size()) - 1; i >= 0; --i) {
-    for (int k = i + 1; k < v.size(); ++k) v[i] -= L(k, i) * v[k];
-    v[i] /= L(i, i);
-  }
-  return v;
-}
+/// H = L Lᵀ
+using Factor = Eigen::LLT<QpMatrix>;
 
 /// In y = Lᵀx, where the objective is ½ |y|² + const, with normals of length one.
 struct Scaled {
@@ -135,10 +108,10 @@ void check(const QuadraticProgram& p) {
   if (!fits) throw std::invalid_argument("quadratic program: sizes do not match, or a number is not finite");
 }
 
-std::vector<Scaled> scaled_constraints(const QuadraticProgram& program, const QpMatrix& L) {
+std::vector<Scaled> scaled_constraints(const QuadraticProgram& program, const Factor& H) {
   std::vector<Scaled> out;
   for (const QpConstraint& constraint : program.constraints) {
-    QpVector a = forward(L, constraint.a);
+    QpVector a = H.matrixL().solve(constraint.a);
     const double length = a.norm();
     if (length > 0) a /= length;
     out.push_back({a, length > 0 ? constraint.b / length : constraint.b, length});
@@ -168,20 +141,20 @@ QpSolution solve(const QuadraticProgram& program) {
   const int n = static_cast<int>(program.c.size()), m = static_cast<int>(program.constraints.size());
   QpSolution out;
   out.multipliers.assign(static_cast<std::size_t>(m), 0.0);
-  QpMatrix L = program.H;
-  if (!factorise(L)) {
+  const Factor H(program.H);
+  if (H.info() != Eigen::Success) {
     out.outcome = QpOutcome::not_solved;
     out.x = QpVector::Zero(n);
     return out;
   }
-  QpVector y = -forward(L, program.c);
-  const std::vector<Scaled> scaled = scaled_constraints(program, L);
+  QpVector y = -H.matrixL().solve(program.c);
+  const std::vector<Scaled> scaled = scaled_constraints(program, H);
   const auto slack = [&](int k) { return scaled[k].normal.dot(y) - scaled[k].offset; };
   ActiveSet active(n);
   std::vector<bool> settled(static_cast<std::size_t>(m), false);  // active, or following from what is
   const auto finish = [&](QpOutcome outcome) {
     out.outcome = outcome;
-    out.x = backward(L, y);
+    out.x = H.matrixU().solve(y);
     for (const auto& one : active.members)
       out.multipliers[one.constraint] = one.sign * one.multiplier / scaled[one.constraint].length;
     return out;
