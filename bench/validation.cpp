@@ -91,7 +91,7 @@ int main() {
       "it:\n"
       "  [where-the-models-hold.md](where-the-models-hold.md).\n"
       "- Another engine: Bullet in double precision, throw by throw, and where it departs: "
-      "[crosscheck.md](crosscheck.md).\n"
+      "[crosscheck.md](crosscheck.md). Its pads are rigid: pads that give or shrink are not checked by it.\n"
       "- Measured flights, falls and pushes, which none of this replaces: "
       "[measured-data.md](measured-data.md). "
       "No measured release is among them.\n"
