@@ -37,9 +37,10 @@ endfunction()
 #     LEVEL   -O2                   # of optimisation in a Release build, where its time goes into other modules
 #     BATCH   5                     # as unhand_batches
 #     ALONE   registry.cpp
+#     FAST    kinematics.cpp        # compiled alone at -O3 whatever LEVEL says: the arithmetic of dual numbers
 #     PRECOMPILED)                  # as unhand_precompiled, with the modules of the same LEVEL
 function(unhand_module name)
-  cmake_parse_arguments(ARG "PRECOMPILED" "BATCH;LEVEL" "SOURCES;HEADERS;USES;LINKS;ALONE" ${ARGN})
+  cmake_parse_arguments(ARG "PRECOMPILED" "BATCH;LEVEL" "SOURCES;HEADERS;USES;LINKS;ALONE;FAST" ${ARGN})
   add_library(unhand_${name} ${ARG_SOURCES})
   add_library(unhand::${name} ALIAS unhand_${name})
   set_target_properties(unhand_${name} PROPERTIES EXPORT_NAME ${name})
@@ -63,10 +64,15 @@ function(unhand_module name)
   endforeach()
   target_link_libraries(unhand_${name} PRIVATE $<BUILD_INTERFACE:unhand_warnings>)
   target_compile_options(unhand_${name} PRIVATE $<$<CONFIG:Release>:${ARG_LEVEL}>)
-  if(NOT ARG_LEVEL)  # else GCC stops inlining in the middle of the arithmetic of dual numbers: twice the time and more
-    foreach(growth IN ITEMS inline-unit-growth=400 large-function-growth=1000 large-stack-frame-growth=10000)
-      target_compile_options(unhand_${name} PRIVATE $<$<AND:$<CXX_COMPILER_ID:GNU>,$<CONFIG:Release>>:--param=${growth}>)
-    endforeach()
+  set(growths inline-unit-growth=400 large-function-growth=1000 large-stack-frame-growth=10000)
+  # Without these GCC stops inlining in the middle of the arithmetic of dual numbers: twice the time and more.
+  list(TRANSFORM growths REPLACE "(.+)" "$<$<AND:$<CXX_COMPILER_ID:GNU>,$<CONFIG:Release>>:--param=\\1>")
+  if(NOT ARG_LEVEL)
+    target_compile_options(unhand_${name} PRIVATE ${growths})
+  endif()
+  if(ARG_FAST)  # precompiled headers would bring their own level
+    set_source_files_properties(${ARG_FAST} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON SKIP_PRECOMPILE_HEADERS ON
+      COMPILE_OPTIONS "$<$<CONFIG:Release>:-O3>;${growths}")
   endif()
   install(TARGETS unhand_${name} EXPORT unhandTargets)
   foreach(header IN LISTS ARG_HEADERS)
