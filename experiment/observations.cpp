@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include "contact/patch.hpp"
 #include "dynamics/median.hpp"
+#include "dynamics/quantisation.hpp"
 #include "dynamics/third_difference.hpp"
 #include "experiment/landing_noise.hpp"
 
@@ -36,10 +39,23 @@ double scatter_of(const Series& series, std::size_t column) {
   return variances.empty() ? 0 : 1.4826 * std::sqrt(dynamics::median(variances));
 }
 
+/// 1 σ of what rounding adds to the readings of a column; 0 where they lie on no grid, or are too few to
+/// tell.
+double rounding_of(const Series& series, std::size_t column) {
+  constexpr std::size_t kEnough = 20;
+  std::vector<double> readings;
+  for (std::size_t i = 0; i < series.rows; ++i)
+    if (std::isfinite(series(i, column))) readings.push_back(series(i, column));
+  if (readings.size() < kEnough) return 0;
+  return dynamics::rounding_sigma(dynamics::quantisation_step(std::move(readings)));
+}
+
+/// The declared σ is the sensor's before its readings are rounded; their scatter has the rounding in it.
 double sigma_of(const Series& series, std::size_t column, double least) {
+  const double rounding = rounding_of(series, column);
   double sigma = 0;
   if (!series.sigma.empty()) sigma = series.sigma[series.sigma.size() == 1 ? 0 : column];
-  if (!(sigma > 0)) sigma = scatter_of(series, column);
+  sigma = sigma > 0 ? std::hypot(sigma, rounding) : std::max(scatter_of(series, column), rounding);
   return std::max(sigma, least);
 }
 

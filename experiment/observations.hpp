@@ -64,6 +64,8 @@ struct ObservationOptions {
 /// the hand's motion, motion capture after the landing, and an F/T channel that is dead. A channel without
 /// a declared σ takes it from its own scatter (third differences), a landing from those of the log
 /// (experiment::landing_noise): where these are too few, it is left out. So is a landing/time without one.
+/// A declared σ is the sensor's: where the readings of a throw lie on a grid, what rounding adds is added to
+/// it in quadrature (dynamics::quantisation_step).
 Observations observe(const datasets::ThrowLog& log, const datasets::Throw& logged,
                      const PreparedThrow& prepared, const ObservationOptions& options = {});
 

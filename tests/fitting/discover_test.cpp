@@ -288,6 +288,22 @@ TEST(Discovery, ATrackerThatSmoothsIsNotTakenForALateClock) {
   EXPECT_EQ(named(found, "sensor.mocap_time_offset"), nullptr);
 }
 
+// What a tracker rounds its readings to is noise beside the declared one: no misfit of its own, and an effect
+// is seen through it.
+TEST(Discovery, ReadingsThatAreRoundedHaveTheNoiseOfTheirGridToo) {
+  constexpr double kGrid = 1e-3, kTilt = 0.02;  // m; rad
+  const auto rounded = [](datasets::ThrowLog log) {
+    for (auto& thrown : log.throws)
+      for (double& reading : thrown.mocap->pose.data) reading = kGrid * std::round(reading / kGrid);
+    return found_in(log);
+  };
+  const Discovery none = rounded(support::loop_campaign({}));
+  EXPECT_EQ(none.verdict, Verdict::no_missing_effect);
+  const Discovery tilt = rounded(support::loop_campaign({{"flight.gravity_tilt.angle", kTilt}}));
+  support::expect_size(tilt, "flight.gravity_tilt", kTilt);
+  EXPECT_EQ(tilt.effects.size(), 1u);
+}
+
 // A bias of the sensor is a force that does not turn with the hand. In one component of the wrench another
 // mass does nearly the same (gravity and the hand's acceleration are much the same in all throws), and lowers
 // its misfit on held-out throws fourfold. But conditions do not agree on that mass, and the rest stays.
