@@ -13,15 +13,24 @@ namespace unhand::dynamics {
 
 const char* to_string(Outcome outcome) {
   switch (outcome) {
-    case Outcome::finished: return "finished";
-    case Outcome::horizon: return "horizon";
-    case Outcome::zeno: return "zeno";
-    case Outcome::event_budget_spent: return "event_budget_spent";
-    case Outcome::step_budget_spent: return "step_budget_spent";
-    case Outcome::mode_cycle: return "mode_cycle";
-    case Outcome::not_converged: return "not_converged";
-    case Outcome::step_too_small: return "step_too_small";
-    case Outcome::not_finite: return "not_finite";
+    case Outcome::finished:
+      return "finished";
+    case Outcome::horizon:
+      return "horizon";
+    case Outcome::zeno:
+      return "zeno";
+    case Outcome::event_budget_spent:
+      return "event_budget_spent";
+    case Outcome::step_budget_spent:
+      return "step_budget_spent";
+    case Outcome::mode_cycle:
+      return "mode_cycle";
+    case Outcome::not_converged:
+      return "not_converged";
+    case Outcome::step_too_small:
+      return "step_too_small";
+    case Outcome::not_finite:
+      return "not_finite";
   }
   return "";
 }

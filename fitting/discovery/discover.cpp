@@ -23,20 +23,28 @@ namespace unhand::fitting {
 
 const char* to_string(Verdict verdict) {
   switch (verdict) {
-    case Verdict::effect_found: return "effect_found";
-    case Verdict::no_missing_effect: return "no_missing_effect";
-    case Verdict::unexplained: return "unexplained";
-    case Verdict::not_answered: return "not_answered";
+    case Verdict::effect_found:
+      return "effect_found";
+    case Verdict::no_missing_effect:
+      return "no_missing_effect";
+    case Verdict::unexplained:
+      return "unexplained";
+    case Verdict::not_answered:
+      return "not_answered";
   }
   return "";
 }
 
 const char* to_string(Outcome outcome) {
   switch (outcome) {
-    case Outcome::position: return "position in flight";
-    case Outcome::orientation: return "orientation in flight";
-    case Outcome::landing_x: return "landing x";
-    case Outcome::landing_theta: return "landing theta";
+    case Outcome::position:
+      return "position in flight";
+    case Outcome::orientation:
+      return "orientation in flight";
+    case Outcome::landing_x:
+      return "landing x";
+    case Outcome::landing_theta:
+      return "landing theta";
   }
   return "";
 }
