@@ -1,4 +1,4 @@
-// Forward search for effects over groups: which one leaves such a residual, and do held-out groups agree?
+// Search for effects over groups: which one leaves such a residual, and do held-out groups agree?
 #pragma once
 
 #include <optional>
@@ -49,8 +49,9 @@ struct EffectSearch {
 ///    the change that is predicted, and
 ///  - it matters there.
 /// Candidates whose footprints are the same are fitted once, under the name that problem.effects() lists
-/// first; those that correlate by `equivalent` with what was accepted are listed as its other names. At the
-/// end, what has become dispensable is taken away.
+/// first; those that correlate by `equivalent` with what was accepted are listed as its other names. What has
+/// become dispensable is taken away. Where a misfit is left, other answers near this one are searched on
+/// from, too, and the better one is returned (docs/measured-data.md).
 EffectSearch search_effects(const GroupedProblem& problem, const EffectSearchOptions& options);
 
 }  // namespace unhand::fitting
