@@ -134,15 +134,6 @@ bool predicts_better(const Stage& before, const Stage& after, const DiscoverOpti
          holds(&OutcomeErrors::trajectory_rms);
 }
 
-bool needs_give(const Stage& rigid, const Stage& give, const std::vector<ChannelMisfit>& base,
-                const DiscoverOptions& options) {
-  if (improvement(rigid, give, base, options).matters >= 1) return true;
-  const int threads = options.fit.threads;
-  const PredictionGain gain =
-      prediction_gain(outcomes_of(rigid, Share::test, threads), outcomes_of(give, Share::test, threads));
-  return gain.after < gain.before && held_out_confirms(rigid, give);
-}
-
 bool is_lacking(const OutcomeLack& lack, double level) {
   return lack.fit.ratio() >= kLacking && lack.fit.p_value < level &&
          lack.fit.shared > lack.resolution * lack.resolution;

@@ -112,15 +112,6 @@ std::vector<OutcomeLack> lacking(const OutcomeErrors& train, const OutcomeErrors
 /// An outcome's errors in `all`; none where it was not predicted.
 OutcomeLack lack_in(const OutcomeErrors& all, Outcome outcome);
 
-/// The give of pads before they slip, under the grip's friction limit, from where on it is an effect like any
-/// other [m].
-inline constexpr double kMostGive = 3e-5;
-
-/// Whether that give is a part of a model beside which nothing is found: on held-out throws it matters to a
-/// channel, or they are predicted the better for it and are likelier.
-bool needs_give(const Stage& rigid, const Stage& give, const std::vector<ChannelMisfit>& base,
-                const DiscoverOptions& options);
-
 /// An estimate of what is missing is used as a correction where it lowers the held-out error to this share.
 inline constexpr double kCorrects = 0.98;
 

@@ -15,6 +15,7 @@
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/held_out_split.hpp"
 #include "fitting/discovery/outcome_errors.hpp"
+#include "fitting/discovery/pads_give.hpp"
 #include "fitting/discovery/selection.hpp"
 #include "fitting/discovery/separating.hpp"
 #include "fitting/discovery/unexplained.hpp"
@@ -124,45 +125,16 @@ FirstMisfit first_misfit(const FitResult& fit, const DiscoverOptions& options) {
   return out;
 }
 
-/// A give that was fitted along and has grown beyond what all pads do, beside what was accepted after it, is
-/// an effect like any other.
-void promote_give(Stage& stage, const DiscoverOptions& options, Discovery& out) {
-  if (out.along.empty() || give_of(stage) <= kMostGive) return;
-  AcceptedEffect give;
-  give.id = kPads;
-  if (const Stage& rigid = without(stage, out.along, options); rigid.solved()) {
-    const Improvement gain = improvement(rigid, stage, out.base_test, options);
-    give.why = gain.where;
-    give.phase = gain.phase;
-  }
-  stage.ids.push_back(kPads);
-  out.effects.push_back(std::move(give));
-  out.along.clear();
-}
-
-/// Steps forward, each from the model that the one before has found.
+/// Steps forward, each from the model that the one before has found, beside the pads' give wherever there is
+/// evidence for it.
 void search(Stage& stage, const DiscoverOptions& options, Discovery& out) {
-  // One look more than effects are wanted: where none is found, another beside pads that give.
-  for (int look = 0; look <= options.most_effects; ++look) {
-    if (static_cast<int>(out.effects.size()) >= options.most_effects) break;
-    const bool beside_rigid_pads = out.along.empty();
-    if (auto next = forward(stage, options, out)) {
-      stage = std::move(*next);
-      polish(stage, options);
-      if (acts_on_pads(stage)) fit_along(stage, options, out);
-    } else {
-      // The give of the pads may hide what else there is, and predictions may lack it: with it, one more
-      // look.
-      const Stage rigid = stage;
-      if (!fit_along(stage, options, out)) break;
-      if (!needs_give(rigid, stage, out.base_test, options)) {
-        stage = rigid;
-        out.along.clear();
-        break;
-      }
-      out.small.reset();
-    }
-    if (beside_rigid_pads && !out.along.empty()) choose_again_beside_give(stage, options, out);
+  fit_give_along(stage, options);
+  while (static_cast<int>(out.effects.size()) < options.most_effects) {
+    auto next = forward(stage, options, out);
+    if (!next) break;
+    stage = std::move(*next);
+    polish(stage, options);
+    fit_give_along(stage, options);
   }
 }
 
@@ -215,9 +187,11 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
 
   const Stage base = stage;
   search(stage, options, out);
-  promote_give(stage, options, out);
+  settle_give(stage, options, out);
   backward(stage, options, out);
   FitResult counted = withdraw(stage, options, out);
+  drop_idle_give(stage, options, out);
+  if (gives_along(stage)) out.along = {kPads};
   judge(stage, base, options, out);
   describe(stage, std::move(counted), options, out);
   for (AcceptedEffect& effect : out.effects)

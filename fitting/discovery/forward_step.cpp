@@ -7,6 +7,7 @@
 
 #include "contact/registry.hpp"
 #include "fitting/discovery/acceptance.hpp"
+#include "fitting/discovery/pads_give.hpp"
 #include "fitting/discovery/selection.hpp"
 #include "fitting/distributions.hpp"
 #include "fitting/normal_equations.hpp"
@@ -86,18 +87,16 @@ class ForwardStep {
     for (const Score& score : all_)
       if (static_cast<int>(tried_.size()) < options_.refits && score.gain >= kImitation * all_.front().gain)
         consider(score);
-    consider_pads();
+    // Rigid pads that fit badly in the grasp are bent so far that their give's footprint may be lost among
+    // the others; and a law whose pads cannot give hides what they do there.
+    const bool off = grasp_is_off();
+    for (const Score& score : all_)
+      if (off && id_of(score) == kPads) consider(score);
     // Laws are alternatives to each other: where one convinces, all are tried. And where nothing convinced,
     // another law may still be the better one.
-    if (!best_ || is_law(id_of(*best_->score)))
+    if (!best_ || is_law(id_of(*best_->score)) || (off && !contact::can_give(stage_.problem.options().model)))
       for (const Score& score : all_)
         if (is_law(id_of(score))) consider(score);
-    consider_laws_that_give();
-    if (best_ && is_small_give(*best_)) {
-      std::erase(best_->next.ids, kPads);
-      out_.along.push_back(kPads);
-      return std::move(best_->next);
-    }
     if (best_) {
       const std::string why = best_->held_out.where;
       return accept(std::move(*best_), why, convincing_);
@@ -112,11 +111,6 @@ class ForwardStep {
   const std::string& id_of(const Score& score) const { return f_.candidates[score.candidate].id; }
   double between_footprints(const Score& a, const Score& b) const {
     return between(f_, f_.candidates[a.candidate], a.step, f_.candidates[b.candidate]);
-  }
-
-  /// A give that no pads are without: a part of the model, and no answer.
-  bool is_small_give(const TriedEffect& trial) const {
-    return id_of(*trial.score) == kPads && give_of(trial.next) <= kMostGive;
   }
 
   /// Under the base model: it is no other name for anything.
@@ -177,14 +171,6 @@ class ForwardStep {
     if (!leader || bic < leader->next.bic()) leader = std::move(trial);
   }
 
-  /// Rigid pads that fit badly in the grasp are bent so far that their give's footprint may be lost among the
-  /// others.
-  void consider_pads() {
-    if (!grasp_is_off()) return;
-    for (const Score& score : all_)
-      if (id_of(score) == kPads) consider(score);
-  }
-
   bool grasp_is_off() const {
     const auto& misfit = stage_.fit.misfit;
     return std::any_of(misfit.begin(), misfit.end(), [&](const ChannelMisfit& m) {
@@ -192,81 +178,38 @@ class ForwardStep {
     });
   }
 
-  /// The likeliest law whose pads can give, if the present one's cannot, the grasp is off, and their give
-  /// convinces beside it, more than what convinced so far.
-  void consider_laws_that_give() {
-    if (contact::can_give(stage_.problem.options().model) || !grasp_is_off()) return;
-    std::optional<TriedEffect> law;
-    for (const Score& score : all_) {
-      const Candidate& candidate = f_.candidates[score.candidate];
-      if (!is_law(candidate.id) || !contact::can_give(candidate.id.substr(kLaw.size()))) continue;
-      TriedEffect trial{&score, extended(stage_, candidate, score, true, options_), 0, 0, {}};
-      if (trial.next.is_fitted() && (!law || trial.next.bic() < law->next.bic())) law = std::move(trial);
-    }
-    if (!law || !solve_held_out(law->next, options_)) return;
-    Discovery aside = out_;  // whose ranking is not this step's
-    ForwardStep beside(law->next, options_, aside);
-    beside.consider_pads();
-    if (!beside.best_) return;
-    law->delta_bic = beside.best_->next.bic() - stage_.bic();
-    law->held_out = improvement(stage_, beside.best_->next, out_.base_test, options_);
-    const double bic = beside.best_->next.bic(), least = best_ ? best_->next.bic() : stage_.bic();
-    if (bic - least <= kDeltaBic && law->held_out.matters >= 1) best_ = std::move(law);
-  }
-
-  /// What matters to no channel may matter to a prediction, where all of a throw's errors add up. Not a give
-  /// of the pads that no pads are without, nor what imitates that.
+  /// What matters to no channel may matter to one beside pads that give, which slow slips show more of; or to
+  /// a prediction, where all of a throw's errors add up.
   std::optional<Stage> weigh_small() {
     if (auto beside = beside_give()) return beside;
-    try_give();
     const int threads = options_.fit.threads;
     const PredictionGain gain = prediction_gain(outcomes_of(stage_, Share::test, threads),
                                                 outcomes_of(small_->next, Share::test, threads));
-    const std::string& id = id_of(*small_->score);
-    const bool give = is_small_give(*small_);
-    if (!give && predicts_better(stage_, small_->next, options_))
+    if (predicts_better(stage_, small_->next, options_))
       return accept(std::move(*small_),
                     fmt::format("predicted before the throw: {:.3g} to {:.3g} mm rms", 1e3 * gain.before,
                                 1e3 * gain.after),
                     evident_);
-    if (out_.small && out_.small->delta_bic <= small_->delta_bic) return std::nullopt;
-    out_.small = {id,
-                  small_->delta_bic,
-                  small_->p_value,
-                  small_->held_out.fall,
-                  gain.before,
-                  gain.after,
-                  give,
-                  held_out_confirms(stage_, small_->next)};
+    if (!out_.small || small_->delta_bic < out_.small->delta_bic)
+      out_.small = {
+          id_of(*small_->score), small_->delta_bic, small_->p_value, small_->held_out.fall,
+          gain.before,           gain.after,        false,           held_out_confirms(stage_, small_->next)};
     return std::nullopt;
   }
 
-  /// What settles a wrench on the train throws may matter to the held-out ones beside pads that give, which
-  /// their slower slips show more of.
+  /// An effect on the pads with a give along that there is no evidence for without it, against that give
+  /// alone.
   std::optional<Stage> beside_give() {
-    if (!acts_on_pads(id_of(*small_->score)) ||
-        settled_wrenches(stage_.fit, small_->next.fit, options_).empty())
-      return std::nullopt;
+    const std::string& id = id_of(*small_->score);
     TriedEffect trial = *small_;
-    if (!fit_along(trial.next, options_, out_)) return std::nullopt;
-    const Stage& less = without(trial.next, {id_of(*trial.score)}, options_);
-    if (less.solved()) trial.held_out = improvement(less, trial.next, out_.base_test, options_);
-    if (trial.held_out.matters >= 1) {
-      const std::string why = trial.held_out.where;
-      return accept(std::move(trial), why, evident_);
-    }
-    out_.along.clear();
-    return std::nullopt;
-  }
-
-  /// Where a give of the pads explains more than what there is evidence for, it takes its place.
-  void try_give() {
-    const auto score =
-        std::find_if(all_.begin(), all_.end(), [&](const Score& s) { return id_of(s) == kPads; });
-    if (score == all_.end() || !score->visible || !tried_.insert(kPads).second) return;
-    auto trial = try_out(*score);
-    if (trial && trial->next.bic() < small_->next.bic() && give_of(trial->next) <= kMostGive)
-      small_ = std::move(trial);
+    if (acts_on_pads(id)) fit_give_along(trial.next, options_);
+    if (gives_along(stage_) || !gives_along(trial.next)) return std::nullopt;
+    const Stage& less = without(trial.next, {id}, options_);
+    if (!less.solved()) return std::nullopt;
+    trial.held_out = improvement(less, trial.next, out_.base_test, options_);
+    if (trial.held_out.matters < 1) return std::nullopt;
+    const std::string why = trial.held_out.where;
+    return accept(std::move(trial), why, evident_);
   }
 
   Stage accept(TriedEffect trial, const std::string& why, const WithCriterion& rivals) {

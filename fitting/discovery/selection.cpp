@@ -5,9 +5,9 @@
 #include <cmath>
 #include <optional>
 
-#include "contact/registry.hpp"
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/discrepancy.hpp"
+#include "fitting/discovery/pads_give.hpp"
 
 namespace unhand::fitting {
 
@@ -23,15 +23,6 @@ void find_other_names(const Footprints& f, const Eigen::VectorXd& contribution, 
     if (r < enough) continue;
     accepted.add_other_name(candidate.id, r);
   }
-}
-
-/// The give that was fitted along with effects which are gone stays where it is needed without them.
-void drop_give(Stage& stage, const DiscoverOptions& options, Discovery& out) {
-  if (out.along.empty()) return;
-  const Stage& rigid = without(stage, out.along, options);
-  if (!rigid.solved() || needs_give(rigid, stage, out.base_test, options)) return;
-  stage = Stage(rigid);
-  out.along.clear();
 }
 
 /// What was accepted in the company of something that has been withdrawn, another law included, must have its
@@ -52,9 +43,7 @@ void drop_without_evidence(Stage& stage, const DiscoverOptions& options, Discove
 void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   for (bool removed = true; removed && !stage.ids.empty();) {
     removed = false;
-    // The last one has just been judged, unless pads that give were fitted along after it.
-    const std::size_t judged = stage.ids.size() - (out.along.empty() ? 1 : 0);
-    for (std::size_t i = 0; i < judged && !removed; ++i) {
+    for (std::size_t i = 0; i < stage.ids.size() && !removed; ++i) {
       if (is_law(stage.ids[i])) continue;
       const Stage& less = without(stage, {stage.ids[i]}, options);
       if (!less.solved()) continue;
@@ -70,10 +59,7 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
 }
 
 FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out) {
-  if (out.effects.empty()) {
-    drop_give(stage, options, out);
-    return stage.fit;
-  }
+  if (out.effects.empty()) return stage.fit;
   FitResult counted = stage.fit;
   count_discrepancy(stage.problem, counted, options.fit.threads);
   const BothErrors errors = errors_of(stage, options.fit.threads);
@@ -103,46 +89,10 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   return withdraw(stage, options, out);
 }
 
-bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out) {
-  const std::string along = kPads;
-  const auto& model = stage.problem.options().model;
-  auto effects = stage.problem.options().effects;
-  const auto known = catalogue(options);
-  if (!contact::can_give(model) || std::find(effects.begin(), effects.end(), along) != effects.end() ||
-      std::find(known.begin(), known.end(), along) == known.end())
-    return false;
-  effects.push_back(along);
-  Stage next{stage.problem.with(model, effects), {}, {}, stage.ids};
-  std::vector<double> start = carried(stage.fit, next.problem);
-  constexpr double kGive = 3e-6;  // to start with [m]
-  for (std::size_t k = 0; k < start.size(); ++k)
-    if (next.problem.campaign()[k].name == kCompliance) start[k] = kGive / give_per_compliance(stage);
-  solve(next, options, std::move(start));
-  if (!next.solved() || next.bic() - stage.bic() > kDeltaBic || give_of(next) > kMostGive) return false;
-  stage = std::move(next);
-  out.along.push_back(along);
-  return true;
-}
-
-void choose_again_beside_give(Stage& stage, const DiscoverOptions& options, Discovery& out) {
-  const std::string last = out.effects.empty() ? "" : out.effects.back().id;
-  if (!acts_on_pads(last) || is_law(last)) return;
-  const Stage& less = without(stage, {last}, options);
-  if (!less.solved()) return;
-  Discovery again = out;
-  again.effects.pop_back();
-  auto other = forward(less, options, again);
-  if (!other || again.effects.size() != out.effects.size() || again.effects.back().id == last) return;
-  polish(*other, options);
-  if (other->bic() - stage.bic() > kDeltaBic) return;
-  stage = std::move(*other);
-  out = std::move(again);
-}
-
 void judge(const Stage& stage, const Stage& base, const DiscoverOptions& options, Discovery& out) {
   if (out.effects.empty()) return;
   const OutcomeErrors with = errors_of(stage, Share::test, options.fit.threads);
-  const bool alone = stage.ids.size() == 1 && out.along.empty();
+  const bool alone = stage.ids.size() == 1 && !gives_along(stage);
   for (AcceptedEffect& accepted : out.effects) {
     const Stage& less = alone ? base : without(stage, {accepted.id}, options);
     if (!less.solved()) continue;  // what it was accepted for stands

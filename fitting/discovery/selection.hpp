@@ -13,12 +13,10 @@ namespace unhand::fitting {
 /// evidence is not less by what an effect needs to be accepted (ten of the criterion). Convincing is evidence
 /// on the train throws, and on held-out ones an improvement that matters: to a channel (Improvement), or,
 /// where no candidate's does, to the predictions made before the throw (PredictionGain). The most evident one
-/// that matters to neither is left in `out.small`. A law whose pads cannot give (the sliding pivot) hides
-/// what they do in the grasp: where that is a misfit, the likeliest law whose pads can takes its place if
-/// their give beside it convinces more than anything else. Empty if none convinces.
+/// that matters to neither is left in `out.small`. Empty if none convinces.
 std::optional<Stage> forward(const Stage& stage, const DiscoverOptions& options, Discovery& out);
 
-/// Effects that a later one, or the pads' give that was fitted along, has made superfluous are taken back.
+/// Effects that a later one, or the pads' give, has made superfluous are taken back.
 void backward(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
 /// Withdraws imitations of something that is not in the catalogue, and names them in `out.imitations`: an
@@ -29,17 +27,6 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out);
 /// it in that half goes with it: it was judged in its company. Returns the stage's fit
 /// with intervals that count its misfit.
 FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out);
-
-/// No pads are rigid: a give of some micrometres before they slip bends what the slipping pads say of an
-/// effect on them, and what predictions lack. contact.pad_compliance is fitted along if the evidence (BIC) is
-/// for it and the give stays below kMostGive; then it is a nuisance of the answer, not a part of it, and in
-/// `out.along`. True if it is.
-bool fit_along(Stage& stage, const DiscoverOptions& options, Discovery& out);
-
-/// Which effect on the pads it is, a step has decided beside pads that do not give, though pads that stick
-/// and pads that open late may differ by less than what all pads give. Beside the give that has been fitted
-/// along since then, the last step is taken again; the more evident effect (BIC) stands.
-void choose_again_beside_give(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
 /// What speaks for every accepted effect in the end: the answer with it against the answer without it, which
 /// is `base` where there is no other.

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/registry.hpp"
 #include "fitting/discovery/acceptance.hpp"
+#include "fitting/discovery/pads_give.hpp"
 
 namespace unhand::fitting {
 
@@ -45,19 +47,6 @@ std::optional<double> error_ratio(const OutcomeErrors& before, const OutcomeErro
     return *(after.*error) / *(before.*error);
   };
   return before.trajectory_rms ? ratio(&OutcomeErrors::trajectory_rms) : ratio(&OutcomeErrors::landing_x_mae);
-}
-
-double give_per_compliance(const Stage& stage) {
-  double mu = 0.5;
-  for (const auto& u : stage.fit.campaign)
-    if (u.unknown.name == "mu") mu = u.value;
-  return stage.problem.model().pads * mu * stage.problem.model().reference_force;
-}
-
-double give_of(const Stage& stage) {
-  for (const auto& u : stage.fit.campaign)
-    if (u.unknown.name == kCompliance) return u.value * give_per_compliance(stage);
-  return 0;
 }
 
 namespace {
@@ -158,8 +147,12 @@ bool is_astray(const Stage& stage, const Stage& next, const Score& score, bool l
 Stage extended(const Stage& stage, const Candidate& candidate, const Score& score, bool leads,
                const DiscoverOptions& options) {
   Stage out{extended_problem(stage.problem, candidate.id), {}, {}, stage.ids};
+  const std::string model = out.problem.options().model;
+  const bool gives = is_law(candidate.id) && !contact::can_give(stage.problem.options().model);
+  if (gives) out.problem = out.problem.with(model, with_give(out.problem, model, options));
   out.ids.push_back(candidate.id);
   std::vector<double> start = carried(stage.fit, out.problem), typical = out.problem.start();
+  if (gives) start_give(stage, out.problem, start);
   for (std::size_t k = 0; k < start.size(); ++k) {
     const Unknown& u = out.problem.campaign()[k];
     for (std::size_t j = 0; j < candidate.parameters.size(); ++j) {
@@ -199,6 +192,7 @@ const Stage& without(const Stage& stage, const std::vector<std::string>& gone,
     std::erase(ids, id);
     if (is_law(id)) model = options.campaign.model;
   }
+  if (gives_along(stage) && !contact::can_give(model)) std::erase(effects, kPads);
   Stage out{stage.problem.with(model, effects), {}, {}, std::move(ids)};
   solve(out, options, carried(stage.fit, out.problem));
   return *stage.less.emplace(gone, std::make_shared<const Stage>(std::move(out))).first->second;

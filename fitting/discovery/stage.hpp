@@ -42,15 +42,6 @@ BothErrors errors_of(const Stage& stage, int threads);
 /// known.
 std::optional<double> error_ratio(const OutcomeErrors& before, const OutcomeErrors& after);
 
-/// The give of the pads.
-inline constexpr const char* kPads = "contact.pad_compliance";
-/// Its size.
-inline constexpr const char* kCompliance = "contact.pad_compliance.compliance";
-/// That give per unit of the effect [N]: the friction limit of all pads at the campaign's grip force.
-double give_per_compliance(const Stage& stage);
-/// The give of a fit's pads [m]; 0 where it has none.
-double give_of(const Stage& stage);
-
 /// The throws that the stage uses, of both halves: what is compared with it must use them all
 /// (FitOptions::throws).
 std::vector<bool> throws_of(const Stage& stage);
@@ -76,7 +67,8 @@ void polish(Stage& stage, const DiscoverOptions& options);
 
 /// The stage with one candidate more, fitted to the train throws from the step that its footprint asks for;
 /// where that search may have gone astray, once more from the problem's own start. `leads`: the candidate
-/// has the leading footprint, or is the one that a base with rigid pads is bent by most, their give.
+/// has the leading footprint, or is the one that a base with rigid pads is bent by most, their give. A law
+/// whose pads can give, in the place of one whose cannot, has a give along.
 Stage extended(const Stage& stage, const Candidate& candidate, const Score& score, bool leads,
                const DiscoverOptions&);
 

@@ -1,0 +1,106 @@
+#include "fitting/discovery/pads_give.hpp"
+
+#include <algorithm>
+
+#include "contact/registry.hpp"
+#include "fitting/discovery/acceptance.hpp"
+
+namespace unhand::fitting {
+
+namespace {
+
+constexpr const char* kCompliance = "contact.pad_compliance.compliance";
+constexpr double kStart = 3e-6;  // of a give [m]
+
+bool has(const std::vector<std::string>& ids, const std::string& id) {
+  return std::find(ids.begin(), ids.end(), id) != ids.end();
+}
+
+/// The give per unit of the effect [N]: the friction limit of all pads at the campaign's grip force.
+double give_per_compliance(const Stage& stage) {
+  double mu = 0.5;
+  for (const auto& u : stage.fit.campaign)
+    if (u.unknown.name == "mu") mu = u.value;
+  return stage.problem.model().pads * mu * stage.problem.model().reference_force;
+}
+
+}  // namespace
+
+double give_of(const Stage& stage) {
+  for (const auto& u : stage.fit.campaign)
+    if (u.unknown.name == kCompliance) return u.value * give_per_compliance(stage);
+  return 0;
+}
+
+bool gives_along(const Stage& stage) {
+  return has(stage.problem.options().effects, kPads) && !has(stage.ids, kPads);
+}
+
+std::vector<std::string> with_give(const CampaignProblem& problem, const std::string& law,
+                                   const DiscoverOptions& options) {
+  auto out = problem.options().effects;
+  if (contact::can_give(law) && !has(out, kPads) && has(catalogue(options), kPads)) out.push_back(kPads);
+  return out;
+}
+
+void start_give(const Stage& stage, const CampaignProblem& problem, std::vector<double>& start) {
+  const std::vector<double> typical = problem.start();
+  for (std::size_t k = 0; k < start.size(); ++k) {
+    const std::string& name = problem.campaign()[k].name;
+    if (name == kCompliance)
+      start[k] = kStart / give_per_compliance(stage);
+    else if (name.starts_with(std::string(kPads) + "."))
+      start[k] = typical[k];
+  }
+}
+
+void fit_give_along(Stage& stage, const DiscoverOptions& options) {
+  const auto& model = stage.problem.options().model;
+  const bool again = gives_along(stage);
+  const auto effects = with_give(stage.problem, model, options);
+  if (!again && effects == stage.problem.options().effects) return;
+  Stage next{stage.problem.with(model, effects), {}, {}, stage.ids};
+  std::vector<double> start = carried(stage.fit, next.problem);
+  start_give(stage, next.problem, start);
+  solve(next, options, std::move(start));
+  if (next.solved() && next.bic() - stage.bic() <= (again ? -1 : kDeltaBic) && give_of(next) <= kMostGive)
+    stage = std::move(next);
+}
+
+void settle_give(Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  const bool small = give_of(stage) <= kMostGive;
+  if (has(stage.ids, kPads) && small) {
+    std::erase(stage.ids, kPads);
+    std::erase_if(out.effects, [](const AcceptedEffect& e) { return e.id == kPads; });
+  } else if (gives_along(stage) && !small) {
+    AcceptedEffect give;
+    give.id = kPads;
+    if (const Stage& rigid = without(stage, {kPads}, options); rigid.solved()) {
+      const Improvement gain = improvement(rigid, stage, out.base_test, options);
+      give.why = gain.where;
+      give.phase = gain.phase;
+    }
+    stage.ids.push_back(kPads);
+    out.effects.push_back(std::move(give));
+  }
+}
+
+void drop_idle_give(Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  if (!gives_along(stage) || !out.effects.empty()) return;
+  const Stage rigid = without(stage, {kPads}, options);
+  if (!rigid.solved()) return;
+  const Improvement held_out = improvement(rigid, stage, out.base_test, options);
+  const int threads = options.fit.threads;
+  const PredictionGain gain =
+      prediction_gain(outcomes_of(rigid, Share::test, threads), outcomes_of(stage, Share::test, threads));
+  const bool likelier = held_out_confirms(rigid, stage);
+  if (held_out.matters >= 1 || (gain.after < gain.before && likelier)) return;
+  const double delta_bic = stage.bic() - rigid.bic();
+  if (!out.small || delta_bic < out.small->delta_bic)
+    out.small = {kPads,         delta_bic,   wald_p_value(stage.fit, find_effect(kPads)),
+                 held_out.fall, gain.before, gain.after,
+                 true,          likelier};
+  stage = rigid;
+}
+
+}  // namespace unhand::fitting
