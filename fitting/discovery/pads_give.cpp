@@ -24,6 +24,23 @@ double give_per_compliance(const Stage& stage) {
   return stage.problem.model().pads * mu * stage.problem.model().reference_force;
 }
 
+/// The stage with a give along that is fitted from what its footprint asks for; the stage where it has none.
+Stage from_footprint(const Stage& stage, const DiscoverOptions& options) {
+  const Footprints f = footprints(stage.problem, stage.fit, {kPads}, {}, options.fit.threads);
+  const auto all = scores(f);
+  const auto best = std::max_element(all.begin(), all.end(),
+                                     [](const Score& a, const Score& b) { return a.gain < b.gain; });
+  if (best == all.end() || !best->visible) return stage;
+  Stage out = extended(stage, f.candidates[best->candidate], *best, true, options);
+  std::erase(out.ids, kPads);
+  return out;
+}
+
+void take_likelier(Stage& stage, Stage other) {
+  if (other.is_fitted() && (!stage.is_fitted() || other.fit.deviance() < stage.fit.deviance()))
+    stage = std::move(other);
+}
+
 }  // namespace
 
 double give_of(const Stage& stage) {
@@ -62,8 +79,10 @@ void fit_give_along(Stage& stage, const DiscoverOptions& options) {
   Stage next{stage.problem.with(model, effects), {}, {}, stage.ids};
   std::vector<double> start = carried(stage.fit, next.problem);
   start_give(stage, next.problem, start);
-  solve(next, options, std::move(start));
-  if (next.solved() && next.bic() - stage.bic() <= (again ? -1 : kDeltaBic) && give_of(next) <= kMostGive)
+  solve_train(next, options, std::move(start));
+  if (!again) take_likelier(next, from_footprint(stage, options));
+  if (!next.is_fitted() || !solve_held_out(next, options)) return;
+  if (next.bic() - stage.bic() <= (again ? -1 : kDeltaBic) && give_of(next) <= kMostGive)
     stage = std::move(next);
 }
 
