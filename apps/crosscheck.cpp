@@ -1,6 +1,4 @@
 // unhand crosscheck: another engine on the throws of a log, beside the library's models.
-#include "apps/crosscheck.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,6 +1,4 @@
 // unhand figure: one figure of a paper on release dynamics, with the data and the script that draw it again.
-#include "apps/figure_command.hpp"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -10,6 +8,7 @@
 #include <memory>
 #include <numeric>
 
+#include "apps/command.hpp"
 #include "apps/compare_figures.hpp"
 #include "apps/figure_source.hpp"
 #include "apps/output.hpp"
