@@ -50,6 +50,12 @@ Command validate_sku_command(Parser& root);
 Command figure_command(Parser& root);
 Command crosscheck_command(Parser& root);
 
+Command plan_control_command(Parser& plan);
+Command plan_wrist_command(Parser& plan);
+Command plan_elastic_command(Parser& plan);
+Command plan_flip_command(Parser& plan);
+Command plan_throw_command(Parser& plan);
+
 /// --threads, the same in every subcommand.
 inline void add_threads(Parser& parser, int& threads) {
   parser.option("--threads", threads, "Threads to use; 0: one per core").range(0, 1024).with_default();
