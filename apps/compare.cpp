@@ -177,6 +177,20 @@ void compare(const CompareRequest& request) {
 
 }  // namespace
 
+void answer_with(const CompareRequest& request, const std::string& heading, const Table& table,
+                 const Json& json,
+                 const std::function<void(const std::filesystem::path& directory)>& report) {
+  Outputs outputs{request.inputs()};
+  if (!request.json.empty()) outputs.json(request.json, json);
+  if (!request.report.empty()) {
+    const auto directory = outputs.directory(request.report);
+    report(directory);
+    write_text(directory / "compare.json", json_text(json));
+  }
+  outputs.commit();
+  fmt::print("{}\n{}", heading, table.text());
+}
+
 std::string outcome_of(const experiment::Prediction& prediction) {
   if (prediction.landed()) return "landed";
   return prediction.release == release::ReleaseOutcome::detached ? to_string(prediction.flight)
