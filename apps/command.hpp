@@ -46,6 +46,15 @@ Command fit_command(Parser& root);
 Command predict_command(Parser& root);
 Command discover_command(Parser& root);
 Command plan_command(Parser& root);
+Command validate_sku_command(Parser& root);
+Command figure_command(Parser& root);
+Command crosscheck_command(Parser& root);
+
+Command plan_control_command(Parser& plan);
+Command plan_wrist_command(Parser& plan);
+Command plan_elastic_command(Parser& plan);
+Command plan_flip_command(Parser& plan);
+Command plan_throw_command(Parser& plan);
 
 /// --threads, the same in every subcommand.
 inline void add_threads(Parser& parser, int& threads) {

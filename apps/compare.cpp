@@ -20,21 +20,9 @@
 #include "datasets/near_miss.hpp"
 #include "experiment/free_flight.hpp"
 #include "experiment/friction_estimate.hpp"
-#include "fitting/slips/slip_surface.hpp"
 
 namespace unhand::apps {
 namespace {
-
-std::vector<std::string> surface_model_names() {
-  std::vector<std::string> names;
-  for (const auto model : fitting::surface_models) names.push_back(to_string(model));
-  return names;
-}
-
-bool is_surface_model(const std::string& name) {
-  const auto names = surface_model_names();
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
 
 std::vector<std::string> known_models() {
   auto names = experiment::release_model_names();
@@ -154,11 +142,7 @@ void compare(const CompareRequest& request) {
       request.inputs());
   if (!request.report.empty()) require_gnuplot();
   if (datasets::read_schema_name(request.log) == "slip-log") {
-    for (const auto& model : request.models)
-      if (!is_surface_model(model))
-        throw datasets::LogError(request.log, "/surfaces",
-                                 fmt::format("slips, which {} does not predict; there are {}", model,
-                                             fmt::join(surface_model_names(), ", ")));
+    for (const auto& model : request.models) require_of_slips(model, request.log);
     if (!request.fit)
       throw datasets::LogError(request.log, "/@schema",
                                "is a slip-log, whose surfaces are compared by fitting: add --fit");
@@ -171,9 +155,7 @@ void compare(const CompareRequest& request) {
                                          [](const auto& one) { return one.hand.has_value(); });
   if (flights) require_flights(log, request.log);
   for (const auto& model : request.models) {
-    if (is_surface_model(model))
-      throw datasets::LogError(request.log, "/throws",
-                               fmt::format("throws, which {} does not predict: it is for slip-logs", model));
+    require_of_throws(model, request.log);
     const auto releases = experiment::release_model_names();
     const bool of_release = std::find(releases.begin(), releases.end(), model) != releases.end();
     if (of_release && flights)
@@ -194,6 +176,20 @@ void compare(const CompareRequest& request) {
 }
 
 }  // namespace
+
+void answer_with(const CompareRequest& request, const std::string& heading, const Table& table,
+                 const Json& json,
+                 const std::function<void(const std::filesystem::path& directory)>& report) {
+  Outputs outputs{request.inputs()};
+  if (!request.json.empty()) outputs.json(request.json, json);
+  if (!request.report.empty()) {
+    const auto directory = outputs.directory(request.report);
+    report(directory);
+    write_text(directory / "compare.json", json_text(json));
+  }
+  outputs.commit();
+  fmt::print("{}\n{}", heading, table.text());
+}
 
 std::string outcome_of(const experiment::Prediction& prediction) {
   if (prediction.landed()) return "landed";

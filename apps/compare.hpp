@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -36,6 +37,11 @@ void compare_with_card(const CompareRequest& request, const datasets::ThrowLog& 
 
 /// Slip logs: limit surfaces identified from measured slips, cross-validated.
 void compare_slips(const CompareRequest& request);
+
+/// Writes what the request wants of one table's answer (`report` draws and writes into a directory, to which
+/// compare.json comes), and prints it.
+void answer_with(const CompareRequest& request, const std::string& heading, const Table& table,
+                 const Json& json, const std::function<void(const std::filesystem::path& directory)>& report);
 
 /// Statistics of errors, null where so few errors have none: below one a mean, below two a standard
 /// deviation.

@@ -214,20 +214,14 @@ void compare_flights(const CompareRequest& request, const datasets::ThrowLog& lo
       request.log, log.title, log.throws.size());
   const Table table = flights_table(found);
   const Json json = flights_json(found, request, log);
-  Outputs outputs{request.inputs()};
-  if (!request.json.empty()) outputs.json(request.json, json);
-  if (!request.report.empty()) {
-    const auto directory = outputs.directory(request.report);
+  answer_with(request, heading, table, json, [&](const std::filesystem::path& directory) {
     const Figure figure = residual_figure(found, log.dimension == 2);
     draw(figure, directory);
     write_text(directory / "report.md",
                fmt::format("# Free flights\n\n{}\n{}\n![What {} leaves]({}.png)\n\n", heading,
                            table.markdown(), experiment::kProjectile, figure.name));
     write_text(directory / "throws.csv", flight_rows(found).csv());
-    write_text(directory / "compare.json", json_text(json));
-  }
-  outputs.commit();
-  fmt::print("{}\n{}", heading, table.text());
+  });
 }
 
 }  // namespace unhand::apps

@@ -121,17 +121,14 @@ Figure surface_error_figure(const std::vector<fitting::SlipSamples>& surfaces,
     key.push_back({point_style(model), model});
     figure.data.push_back(std::move(block));
   }
-  for (const auto& one : surfaces) longest = std::max(longest, one.surface.size());
+  std::vector<std::string> names;
+  for (const auto& one : surfaces) names.push_back(one.surface);
+  for (const auto& name : names) longest = std::max(longest, name.size());
   const double n = static_cast<double>(surfaces.size());
   const double left = std::clamp(0.18 * static_cast<double>(longest) + 0.4, 1.5, 7.0);
   const double bottom = 1.7 + key_height(key.size(), 3);
   figure.height = std::clamp(bottom + 1.2 + 0.7 * n, bottom + 4.0, 34.0);
   const double top = figure.height - 1.2, middle = (left + figure.width) / 2;
-  std::string named, blank;
-  for (std::size_t i = 0; i < surfaces.size(); ++i) {
-    named += fmt::format("{}'{}' {}", i > 0 ? ", " : "", plain(surfaces[i].surface), i);
-    blank += fmt::format("{}'' {}", i > 0 ? ", " : "", i);
-  }
   std::string& s = figure.script;
   s = fmt::format("set multiplot\nunset key\nset yrange [{}:-0.7]\nset xrange [0:{:.6g}]\nset grid xtics\n",
                   n - 0.3, 1.1 * most);
@@ -146,8 +143,9 @@ Figure surface_error_figure(const std::vector<fitting::SlipSamples>& surfaces,
                        point_style(figure.data[i].title));
     s += "\n";
   };
-  panel(left, middle - 0.25, named, "left-out slips", 2);
-  panel(middle + 0.25, figure.width - 0.5, blank, "null control (from the ellipsoid)", 3);
+  panel(left, middle - 0.25, named_tics(names), "left-out slips", 2);
+  panel(middle + 0.25, figure.width - 0.5, named_tics(std::vector<std::string>(names.size())),
+        "null control (from the ellipsoid)", 3);
   s += key_strip(figure, key, 3) + "unset multiplot\n";
   return figure;
 }

@@ -171,10 +171,7 @@ void compare_slips(const CompareRequest& request) {
       request.log, options.folds, options.null_draws);
   const Table table = slips_table(surfaces, scores);
   const Json json = slips_json(request, surfaces, scores, options);
-  Outputs outputs{request.inputs()};
-  if (!request.json.empty()) outputs.json(request.json, json);
-  if (!request.report.empty()) {
-    const auto directory = outputs.directory(request.report);
+  answer_with(request, heading, table, json, [&](const std::filesystem::path& directory) {
     const Figure errors = surface_error_figure(surfaces, scores);
     draw(errors, directory);
     std::string pictures = fmt::format("![Direction errors by surface]({}.png)\n\n", errors.name);
@@ -189,10 +186,7 @@ void compare_slips(const CompareRequest& request) {
     write_text(directory / "report.md",
                fmt::format("# Limit surfaces from slips\n\n{}\n{}\n{}", heading, table.markdown(), pictures));
     write_text(directory / "slips.csv", sample_rows(surfaces, scores).csv());
-    write_text(directory / "compare.json", json_text(json));
-  }
-  outputs.commit();
-  fmt::print("{}\n{}", heading, table.text());
+  });
 }
 
 }  // namespace unhand::apps

@@ -68,10 +68,7 @@ void compare_with_card(const CompareRequest& request, const datasets::ThrowLog& 
       "{}: {}\n{} {}, {} of them held out; each one's start is fitted, {} from {}\n", request.log, log.title,
       found.train + found.test, found.kind, found.test,
       card.effects.empty() ? "without effects" : fmt::format("{}", fmt::join(card.effects, ", ")), file);
-  Outputs outputs{request.inputs()};
-  if (!request.json.empty()) outputs.json(request.json, json);
-  if (!request.report.empty()) {
-    const auto directory = outputs.directory(request.report);
+  answer_with(request, heading, table, json, [&](const std::filesystem::path& directory) {
     const Figure figure =
         measured_residual_figure(found.base_profile, found.card_profile, card.model, "with the card");
     draw(figure, directory);
@@ -80,10 +77,7 @@ void compare_with_card(const CompareRequest& request, const datasets::ThrowLog& 
         fmt::format("# A card against a log\n\n{}\n{}\nResiduals of the {} throws over their duration, "
                     "each with its start fitted; 1 is the noise.\n\n![Residuals]({}.png)\n",
                     heading, table.markdown(), found.test > 0 ? "held-out" : "train", figure.name));
-    write_text(directory / "compare.json", json_text(json));
-  }
-  outputs.commit();
-  fmt::print("{}\n{}", heading, table.text());
+  });
 }
 
 }  // namespace unhand::apps

@@ -1,6 +1,4 @@
 // unhand crosscheck: another engine on the throws of a log, beside the library's models.
-#include "apps/crosscheck.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -221,17 +219,8 @@ Differences against_model(const std::vector<Prediction>& engine, const std::vect
 
 Differences against_measured(const std::vector<Prediction>& engine, const Throws& throws) {
   Differences out;
-  for (std::size_t i = 0; i < engine.size(); ++i) {
-    const auto& a = engine[i];
-    const auto& m = throws[i].measured;
-    if (!a.landed()) continue;
-    std::optional<double> d[experiment::kQuantityCount];
-    if (m.detach_twist) d[0] = a.detach.twist.vx - m.detach_twist->vx;
-    if (m.detach_twist) d[1] = (a.detach.twist.omega - m.detach_twist->omega) * kDegrees;
-    if (m.landing_x) d[2] = a.landing.pose.x - *m.landing_x;
-    if (m.landing_theta) d[3] = (a.landing.pose.theta - *m.landing_theta) * kDegrees;
-    out.add(d);
-  }
+  for (std::size_t i = 0; i < engine.size(); ++i)
+    if (engine[i].landed()) out.add(experiment::judge(throws[i], engine[i]).error);
   return out;
 }
 

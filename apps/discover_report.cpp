@@ -14,19 +14,20 @@
 namespace unhand::apps {
 namespace {
 
-using experiment::Channel;
 using fitting::Discovery;
 using fitting::OutcomeErrors;
 
+NamedCurves curves_of(const std::string& name, const std::vector<fitting::ResidualBin>& bins) {
+  NamedCurves out{name, {}};
+  for (const auto& bin : bins)
+    out.add(std::string(to_string(bin.channel)), {bin.time, bin.rms, bin.mean, bin.n});
+  return out;
+}
+
 /// Residuals over time, before and after, a panel for each channel that has any.
 Figure residual_figure(const Discovery& found) {
-  std::vector<Channel> channels;
-  for (int c = 0; c < experiment::kChannelCount; ++c)
-    for (const auto& bin : found.residual_before)
-      if (bin.channel == static_cast<Channel>(c)) {
-        channels.push_back(static_cast<Channel>(c));
-        break;
-      }
+  const auto channels = curves_of("before", found.residual_before).channels;
+  const auto after = curves_of("after", found.residual_after);
   const int columns = channels.size() > 1 ? 2 : 1;
   const int rows = (static_cast<int>(channels.size()) + columns - 1) / columns;
   Figure figure{"residual", 17, 1.4 + 3.9 * rows, {}, {}};
@@ -37,15 +38,8 @@ Figure residual_figure(const Discovery& found) {
   low -= margin, high += margin;
   std::string script = "set multiplot\nset key off\n";
   int index = 0, at = 0;
-  for (const Channel channel : channels) {
-    const auto points = [&](const auto& bins) {
-      std::vector<ResidualPoint> out;
-      for (const auto& bin : bins)
-        if (bin.channel == channel) out.push_back({bin.time, bin.rms, bin.mean, static_cast<int>(bin.n)});
-      return out;
-    };
-    const double top = add_residuals(figure, std::string(to_string(channel)), "time from release [s]",
-                                     points(found.residual_before), points(found.residual_after));
+  for (const auto& [channel, before] : channels) {
+    const double top = add_residuals(figure, channel, "time from release [s]", before, after.of(channel));
     const double left = 1.9 + (at % columns) * 8.2, bottom = 1.9 + (rows - 1 - at / columns) * 3.9;
     script += place(figure, {left, left + 6.3, bottom, bottom + 2.5});
     script += fmt::format(
@@ -55,7 +49,7 @@ Figure residual_figure(const Discovery& found) {
         "set arrow 1 from 0,graph 0 to 0,graph 1 nohead dashtype 3 linecolor rgb '#808080'\n"
         "set arrow 2 from {:.3f},1 to {:.3f},1 nohead linecolor rgb '#b0b0b0'\n"
         "plot DATA index {} using 1:2 {}, DATA index {} using 1:2 {}\n",
-        plain(std::string(to_string(channel))), low, high, kResidualFloor, 1.5 * top, residual_tics(top),
+        plain(channel), low, high, kResidualFloor, 1.5 * top, residual_tics(top),
         at + columns >= static_cast<int>(channels.size())
             ? "set xlabel 'time from release [s]' offset 0,0.3\n"
             : "unset xlabel\n",
@@ -71,19 +65,9 @@ Figure residual_figure(const Discovery& found) {
 }
 
 Figure footprints_of(const Discovery& found) {
-  std::vector<std::string> channels;
-  const auto curves = [&](const std::string& name, const std::vector<fitting::ResidualBin>& bins) {
-    NamedCurves out{name, {}};
-    for (const auto& bin : bins)
-      out.channels[std::string(to_string(bin.channel))].push_back({bin.time, bin.rms, bin.mean, bin.n});
-    return out;
-  };
-  std::vector<NamedCurves> all{curves("residual of the base model", found.residual_before)};
-  for (const auto& bin : found.residual_before)
-    if (const std::string name(to_string(bin.channel)); channels.empty() || channels.back() != name)
-      channels.push_back(name);
-  for (const auto& footprint : found.footprints) all.push_back(curves(footprint.id, footprint.bins));
-  return footprint_figure(channels, all, "time from release [s]");
+  std::vector<NamedCurves> all{curves_of("residual of the base model", found.residual_before)};
+  for (const auto& footprint : found.footprints) all.push_back(curves_of(footprint.id, footprint.bins));
+  return footprint_figure(all, "time from release [s]");
 }
 
 /// What is missing, component by component; a curve for every object.
@@ -146,11 +130,19 @@ Table structure_table(const Discovery& found) {
   return table;
 }
 
+/// The errors before and after, by the names of their rows.
+std::vector<std::pair<const char*, OutcomeErrors>> errors_of(const Discovery& found) {
+  return {{"before, train", found.before_train},
+          {"before, test", found.before_test},
+          {"after, train", found.after_train},
+          {"after, test", found.after_test}};
+}
+
 /// Whether the errors go with the condition: rms over what repetitions scatter by, outcome by outcome.
 Table lack_table(const Discovery& found) {
   Table table{{"prediction errors over repetitions' scatter"}, {}, 1};
   for (const auto& lack : found.before_train.lacks) table.header.push_back(to_string(lack.outcome));
-  const auto row = [&](const char* name, const OutcomeErrors& e) {
+  for (const auto& [name, e] : errors_of(found)) {
     table.rows.push_back({name});
     for (const auto& column : found.before_train.lacks) {
       std::string cell = "-";
@@ -159,11 +151,7 @@ Table lack_table(const Discovery& found) {
           cell = fmt::format("{:.2f} (p {:.1g})", std::sqrt(fit.ratio()), fit.p_value);
       table.rows.back().push_back(cell);
     }
-  };
-  row("before, train", found.before_train);
-  row("before, test", found.before_test);
-  row("after, train", found.after_train);
-  row("after, test", found.after_test);
+  }
   return table;
 }
 
@@ -193,20 +181,15 @@ Table prediction_errors(const Discovery& found) {
                "detach vx MAE [m/s]", "omega MAE [deg/s]", "trajectory RMS [mm]", "chi2/dof"},
               {},
               1};
-  const auto row = [&](const char* name, const OutcomeErrors& e) {
-    const auto mm = [](std::optional<double> metres) {
-      if (metres) *metres *= 1e3;
-      return metres;
-    };
+  const auto mm = [](std::optional<double> metres) {
+    if (metres) *metres *= 1e3;
+    return metres;
+  };
+  for (const auto& [name, e] : errors_of(found))
     table.rows.push_back({name, std::to_string(e.n), fixed(mm(e.landing_x_mae), 2),
                           fixed(e.landing_theta_mae, 3), fixed(e.detach_vx_mae, 5),
                           fixed(e.detach_omega_mae, 3), fixed(mm(e.trajectory_rms), 3),
                           fixed(e.chi2_per_dof, 3)});
-  };
-  row("before, train", found.before_train);
-  row("before, test", found.before_test);
-  row("after, train", found.after_train);
-  row("after, test", found.after_test);
   return table;
 }
 

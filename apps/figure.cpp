@@ -251,4 +251,11 @@ std::string plain(const std::string& text) {
   return out;
 }
 
+std::string named_tics(const std::vector<std::string>& names) {
+  std::string out;
+  for (std::size_t i = 0; i < names.size(); ++i)
+    out += fmt::format("{}'{}' {}", i > 0 ? ", " : "", plain(names[i]), i);
+  return out;
+}
+
 }  // namespace unhand::apps

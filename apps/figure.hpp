@@ -72,4 +72,7 @@ double quantile(const std::vector<double>& sorted, double share);
 /// Text as gnuplot takes it between single quotes, without its own markup.
 std::string plain(const std::string& text);
 
+/// The names as marks at 0, 1, 2, ..., for `set ytics (...)`; beside a panel that has them, empty names.
+std::string named_tics(const std::vector<std::string>& names);
+
 }  // namespace unhand::apps

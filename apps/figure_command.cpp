@@ -1,6 +1,4 @@
 // unhand figure: one figure of a paper on release dynamics, with the data and the script that draw it again.
-#include "apps/figure_command.hpp"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -10,6 +8,7 @@
 #include <memory>
 #include <numeric>
 
+#include "apps/command.hpp"
 #include "apps/compare_figures.hpp"
 #include "apps/figure_source.hpp"
 #include "apps/output.hpp"
@@ -46,14 +45,14 @@ std::optional<Figure> mae_figure(const experiment::Comparison& comparison) {
                   [](const auto& t) { return t.split == datasets::Split::test; })
           ? datasets::Split::test
           : datasets::Split::train;
-  std::string tics, body;
+  std::string body;
   bool any = false;
   const auto thrown =
       std::count_if(comparison.models.front().throws.begin(), comparison.models.front().throws.end(),
                     [&](const auto& t) { return t.split == split; });
   const auto n = comparison.models.size();
-  for (std::size_t i = 0; i < n; ++i)
-    tics += fmt::format("{}'{}' {}", i > 0 ? ", " : "", plain(comparison.models[i].model), i);
+  std::vector<std::string> names;
+  for (const auto& model : comparison.models) names.push_back(model.model);
   figure.height = 5.7 + 1.1 * static_cast<double>(n);
   const double left = 4.4, gap = 1.1, width = (figure.width - left - gap - 0.5) / 2,
                panel = (figure.height - 3.3) / 2;
@@ -90,12 +89,8 @@ std::optional<Figure> mae_figure(const experiment::Comparison& comparison) {
     figure.data.push_back(std::move(block));
     const double x = left + (q % 2) * (width + gap), y = 1.3 + (1 - q / 2) * (panel + 1.3);
     body += place(figure, {x, x + width, y, y + panel - 0.7});
-    body += fmt::format(
-        "set ytics ({}) scale 0\n", q % 2 == 0 ? tics : [&] {
-          std::string blank;
-          for (std::size_t i = 0; i < n; ++i) blank += fmt::format("{}'' {}", i > 0 ? ", " : "", i);
-          return blank;
-        }());
+    body +=
+        fmt::format("set ytics ({}) scale 0\n", named_tics(q % 2 == 0 ? names : std::vector<std::string>(n)));
     body += fmt::format("set title '{}' offset 0,-0.7\nset xtics font ',7.5'\n{}{}\nunset label 1\n",
                         plain(title), value_axis(shown), points);
   }

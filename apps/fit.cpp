@@ -18,7 +18,6 @@
 #include "apps/throws.hpp"
 #include "apps/weak_grip.hpp"
 #include "datasets/near_miss.hpp"
-#include "fitting/slips/slip_surface.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -27,19 +26,13 @@ constexpr int kDefaultFolds = 5;
 constexpr double kWildMisfit = 900;  ///< χ² per sample of a channel that is told of: 30 σ
 constexpr double kPoorFit = 2;  ///< χ² per degree of freedom from which parameters are not to be trusted
 
-std::vector<std::string> surface_names() {
-  std::vector<std::string> out;
-  for (const auto model : fitting::surface_models) out.push_back(to_string(model));
-  return out;
-}
-
 bool among(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
 void require_names(const FitRequest& request) {
   auto models = contact::contact_model_names();
-  for (auto& name : surface_names()) models.push_back(std::move(name));
+  for (auto& name : surface_model_names()) models.push_back(std::move(name));
   if (!among(models, request.model))
     throw WrongUsage(datasets::unknown_name(fmt::format("--model: '{}' cannot be fitted", request.model),
                                             request.model, models));
@@ -162,22 +155,15 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
 void fit(const FitRequest& request, const Parser& parser) {
   require_names(request);
   require_outputs({{request.json}, {request.card}, {request.report, Wanted::directory}}, {request.log});
-  const bool surface = among(surface_names(), request.model);
   if (datasets::read_schema_name(request.log) == "slip-log") {
-    if (!surface)
-      throw datasets::LogError(request.log, "/surfaces",
-                               fmt::format("slips, which {} does not predict; there are {}", request.model,
-                                           fmt::join(surface_names(), ", ")));
+    require_of_slips(request.model, request.log);
     refuse_options(parser, {"--effects", "--floor", "--rtol"},
                    fmt::format("is for throws; {} holds slips", request.log));
     fit_slips(request);
     return;
   }
   if (!request.report.empty()) require_gnuplot();
-  if (surface)
-    throw datasets::LogError(
-        request.log, "/throws",
-        fmt::format("throws, which {} does not predict: it is for slip-logs", request.model));
+  require_of_throws(request.model, request.log);
   const auto log = read_throws(request.log);
   if (std::none_of(log.throws.begin(), log.throws.end(),
                    [](const auto& one) { return one.split == datasets::Split::train; }))
@@ -194,9 +180,10 @@ Command fit_command(Parser& root) {
   Parser& parser = root.subcommand("fit", "Fit a model's parameters to a log and write its card");
   parser.option("LOG", request->log, "A throw log or a slip log").required();
   parser
-      .option("--model", request->model,
-              fmt::format("Which model: {}; for slip logs: {}",
-                          fmt::join(contact::contact_model_names(), ", "), fmt::join(surface_names(), ", ")))
+      .option(
+          "--model", request->model,
+          fmt::format("Which model: {}; for slip logs: {}", fmt::join(contact::contact_model_names(), ", "),
+                      fmt::join(surface_model_names(), ", ")))
       .required();
   parser
       .option("--effects", request->effects,

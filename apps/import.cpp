@@ -62,13 +62,6 @@ datasets::PlanarPushOptions pushes_of(const ImportOptions& options) {
   return out;
 }
 
-/// What an importer says of its inputs.
-struct Imported {
-  std::string text;
-  Json details;
-  std::vector<std::string> notes;
-};
-
 Imported import_cubes(const ImportOptions& options, Outputs& outputs) {
   if (options.inputs.size() != 1)
     throw WrongUsage(fmt::format("cube-tosses takes one CSV file, not {}", options.inputs.size()));
@@ -90,8 +83,7 @@ Imported import_cubes(const ImportOptions& options, Outputs& outputs) {
 }
 
 Imported import_lab_files(const ImportOptions& options, Outputs& outputs) {
-  LabImport imported = import_lab(options.format, options.inputs, options.out, options.lab, outputs);
-  return {std::move(imported.text), std::move(imported.details), std::move(imported.notes)};
+  return import_lab(options.format, options.inputs, options.out, options.lab, outputs);
 }
 
 Imported import_pushes(const ImportOptions& options, Outputs& outputs) {

@@ -381,8 +381,8 @@ void refuse_lab_options(const std::string& format, const LabOptions& options) {
     if (given(options, name)) throw WrongUsage(fmt::format("{} is not for {}", name, format));
 }
 
-LabImport import_lab(const std::string& format, const std::vector<std::string>& named, const std::string& out,
-                     const LabOptions& options, Outputs& outputs) {
+Imported import_lab(const std::string& format, const std::vector<std::string>& named, const std::string& out,
+                    const LabOptions& options, Outputs& outputs) {
   require_options(format, options);
   const std::vector<std::string> inputs = format == "phyphox" ? phone_files(named) : named;
   for (const char* single : {"--throw", "--free-flight"})
@@ -394,7 +394,7 @@ LabImport import_lab(const std::string& format, const std::vector<std::string>& 
   const bool adding = !options.into.empty();
   ThrowLog log = adding ? datasets::read_throw_log(options.into)
                         : new_log(format, options, source_of(format, inputs.size()));
-  LabImport imported;
+  Imported imported;
   imported.details["files"] = Json::array();
   for (std::size_t k = 0; k < inputs.size(); ++k) {
     const std::string& file = inputs[k];

@@ -28,7 +28,8 @@ struct LabOptions {
   const Parser* parser{};                   // knows which of them were given
 };
 
-struct LabImport {
+/// What an importer says of its inputs.
+struct Imported {
   std::string text;
   Json details;
   std::vector<std::string> notes;  ///< to be said on stderr once the log is written
@@ -43,7 +44,7 @@ void refuse_lab_options(const std::string& format, const LabOptions& options);
 /// Reads the files of one format ("hand-csv", "ft-csv", "mocap-csv", "motive-csv", "phyphox") into a new log,
 /// or into the throws of the log that --into names, and hands it to `outputs` as `out`. Throws WrongUsage and
 /// LogError.
-LabImport import_lab(const std::string& format, const std::vector<std::string>& inputs,
-                     const std::string& out, const LabOptions& options, Outputs& outputs);
+Imported import_lab(const std::string& format, const std::vector<std::string>& inputs, const std::string& out,
+                    const LabOptions& options, Outputs& outputs);
 
 }  // namespace unhand::apps

@@ -8,11 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command.hpp"
-#include "apps/crosscheck.hpp"
-#include "apps/figure_command.hpp"
 #include "apps/interruption.hpp"
 #include "apps/tell.hpp"
-#include "apps/validate_sku.hpp"
 #include "datasets/log_error.hpp"
 
 namespace {

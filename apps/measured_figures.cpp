@@ -8,26 +8,33 @@
 
 namespace unhand::apps {
 
-// Residuals over the share of the duration, a panel for each channel.
+namespace {
+
+NamedCurves profile_curves(const std::string& name, const std::vector<fitting::ResidualProfile>& profile) {
+  NamedCurves out{name, {}};
+  for (const auto& bin : profile) out.add(bin.channel, {bin.share, bin.rms, bin.mean, bin.n});
+  return out;
+}
+
+}  // namespace
+
+Figure measured_footprints(const fitting::MeasuredDiscovery& found) {
+  std::vector<NamedCurves> all{profile_curves("residual of the base model", found.profile_before)};
+  for (const auto& one : found.footprints) all.push_back(profile_curves(one.id, one.profile));
+  return footprint_figure(all, "share of the duration");
+}
+
 Figure measured_residual_figure(const std::vector<fitting::ResidualProfile>& base,
                                 const std::vector<fitting::ResidualProfile>& answer,
                                 const std::string& base_name, const std::string& answer_name) {
-  std::vector<std::string> channels;
-  for (const auto& bin : base)
-    if (std::find(channels.begin(), channels.end(), bin.channel) == channels.end())
-      channels.push_back(bin.channel);
+  const auto channels = profile_curves(base_name, base).channels;
+  const auto of_answer = profile_curves(answer_name, answer);
   const int columns = 3, rows = (static_cast<int>(channels.size()) + columns - 1) / columns;
   Figure figure{"residual", 17, 2.2 + 3.9 * rows, {}, {}};
   std::string script = "set multiplot\nset key off\nset xrange [0:1]\nset xtics 0,0.25,1 format '%g'\n";
   int at = 0, index = 0;
-  for (const auto& channel : channels) {
-    const auto points = [&](const auto& profile) {
-      std::vector<ResidualPoint> out;
-      for (const auto& bin : profile)
-        if (bin.channel == channel) out.push_back({bin.share, bin.rms, bin.mean, static_cast<int>(bin.n)});
-      return out;
-    };
-    const double top = add_residuals(figure, channel, "share of the duration", points(base), points(answer));
+  for (const auto& [channel, before] : channels) {
+    const double top = add_residuals(figure, channel, "share of the duration", before, of_answer.of(channel));
     const double left = 1.8 + (at % columns) * 5.2, bottom = 2.3 + (rows - 1 - at / columns) * 3.9;
     script += place(figure, {left, left + 4.2, bottom, bottom + 2.5});
     script += fmt::format(
@@ -47,7 +54,6 @@ Figure measured_residual_figure(const std::vector<fitting::ResidualProfile>& bas
   return figure;
 }
 
-// Held-out direction errors by surface, and those of the null control.
 Figure surface_figure(const MeasuredResult& result) {
   std::vector<std::string> laws, surfaces;
   for (const auto& e : result.surfaces) {
@@ -57,9 +63,7 @@ Figure surface_figure(const MeasuredResult& result) {
       laws.push_back(law);
   }
   Figure figure{"surfaces", 17, 3.2 + 0.6 * static_cast<double>(surfaces.size()), {}, {}};
-  std::string tics, plots;
-  for (std::size_t i = 0; i < surfaces.size(); ++i)
-    tics += fmt::format("{}'{}' {}", i ? ", " : "", plain(surfaces[i]), i);
+  std::string plots;
   std::vector<KeyEntry> key;
   double largest = 1;
   for (std::size_t k = 0; k < laws.size(); ++k) {
@@ -92,7 +96,7 @@ Figure surface_figure(const MeasuredResult& result) {
                       "linecolor rgb '#e0e0e0'\n"
                       "set xlabel 'mean angle between predicted and "
                       "measured sliding [deg]'\nplot {}\n",
-                      1.08 * largest, count - 0.5, tics, plots) +
+                      1.08 * largest, count - 0.5, named_tics(surfaces), plots) +
                   key_strip(figure, key, 2) + "unset multiplot\n";
   return figure;
 }

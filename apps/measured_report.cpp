@@ -128,21 +128,6 @@ std::string first_text(const MeasuredDiscovery& found) {
   return fmt::format("The residual leaves the noise in {} (phase {}).", found.first.channel, found.phase);
 }
 
-Figure footprints_of(const MeasuredDiscovery& found) {
-  std::vector<std::string> channels;
-  const auto curves = [&](const std::string& name, const std::vector<fitting::ResidualProfile>& profile) {
-    NamedCurves out{name, {}};
-    for (const auto& bin : profile)
-      out.channels[bin.channel].push_back({bin.share, bin.rms, bin.mean, bin.n});
-    return out;
-  };
-  std::vector<NamedCurves> all{curves("residual of the base model", found.profile_before)};
-  for (const auto& bin : found.profile_before)
-    if (channels.empty() || channels.back() != bin.channel) channels.push_back(bin.channel);
-  for (const auto& footprint : found.footprints) all.push_back(curves(footprint.id, footprint.profile));
-  return footprint_figure(channels, all, "share of the duration");
-}
-
 }  // namespace
 
 std::string error_title(const std::string& key) {
@@ -219,7 +204,7 @@ void write_measured_report(const MeasuredResult& result, const Json& json,
   if (slips) body += "<h2>By surface</h2>\n" + html(surface_table(result));
   body += "<h2>Candidates</h2>\n" + picture(ranking) + html(ranking_table(found.ranking));
   if (!slips) {
-    const Figure footprints = footprints_of(found);
+    const Figure footprints = measured_footprints(found);
     draw(footprints, directory, about);
     body += fmt::format("<p>{}</p>\n", kFootprints) + picture(footprints);
   }

@@ -32,6 +32,8 @@ std::string measured_text(const MeasuredResult& result);
 Figure measured_residual_figure(const std::vector<fitting::ResidualProfile>& base,
                                 const std::vector<fitting::ResidualProfile>& answer,
                                 const std::string& base_name, const std::string& answer_name);
+/// What candidates would do to the samples, over the same share.
+Figure measured_footprints(const fitting::MeasuredDiscovery& found);
 /// Held-out direction errors by surface, and those of the null control.
 Figure surface_figure(const MeasuredResult& result);
 /// A self-contained page (index.html), the figures with their data and scripts, and discovery.json.

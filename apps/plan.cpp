@@ -1,5 +1,5 @@
 // unhand plan: the subcommand of planners.
-#include "apps/plan.hpp"
+#include "apps/command.hpp"
 
 #include <vector>
 

@@ -6,9 +6,9 @@
 #include <memory>
 #include <optional>
 
+#include "apps/command.hpp"
 #include "apps/figure.hpp"
 #include "apps/output.hpp"
-#include "apps/plan.hpp"
 #include "apps/progress.hpp"
 #include "apps/table.hpp"
 #include "dynamics/parallel.hpp"

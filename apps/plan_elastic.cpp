@@ -7,9 +7,9 @@
 #include <optional>
 #include <sstream>
 
+#include "apps/command.hpp"
 #include "apps/figure.hpp"
 #include "apps/output.hpp"
-#include "apps/plan.hpp"
 #include "apps/table.hpp"
 #include "planners/elastic/throw_refinement.hpp"
 #include "planners/elastic/throw_table.hpp"

@@ -8,10 +8,10 @@
 #include <memory>
 #include <numbers>
 
+#include "apps/command.hpp"
 #include "apps/figure.hpp"
 #include "apps/flip_store.hpp"
 #include "apps/numbers.hpp"
-#include "apps/plan.hpp"
 #include "apps/progress.hpp"
 #include "apps/tell.hpp"
 #include "datasets/log_error.hpp"

@@ -10,9 +10,9 @@
 #include <random>
 #include <tuple>
 
+#include "apps/command.hpp"
 #include "apps/figure.hpp"
 #include "apps/numbers.hpp"
-#include "apps/plan.hpp"
 #include "apps/progress.hpp"
 #include "apps/tell.hpp"
 #include "apps/throws.hpp"

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <memory>
 
+#include "apps/command.hpp"
 #include "apps/figure.hpp"
 #include "apps/output.hpp"
-#include "apps/plan.hpp"
 #include "apps/table.hpp"
 #include "apps/tell.hpp"
 #include "planners/elastic/throw_refinement.hpp"

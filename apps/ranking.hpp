@@ -1,9 +1,9 @@
 // What every discovery reports, of throws and of measured logs: the candidates, accepted effects, residuals.
 #pragma once
 
-#include <map>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "apps/figure.hpp"
@@ -59,16 +59,19 @@ struct ResidualPoint {
   int samples{};
 };
 
-/// Points by channel, under one name.
+/// Points by channel, in order of appearance, under one name.
 struct NamedCurves {
   std::string name;
-  std::map<std::string, std::vector<ResidualPoint>> channels;
+  std::vector<std::pair<std::string, std::vector<ResidualPoint>>> channels;
+
+  void add(const std::string& channel, const ResidualPoint& point);
+  /// None of a channel that is not there.
+  std::vector<ResidualPoint> of(const std::string& channel) const;
 };
 
 /// What candidates would do to the samples (all but the first of `curves`), beside what the base model leaves
-/// of them (the first): rms over `x`, a panel for each channel.
-Figure footprint_figure(const std::vector<std::string>& channels, const std::vector<NamedCurves>& curves,
-                        const std::string& x);
+/// of them (the first): rms over `x`, a panel for each channel of the base model's.
+Figure footprint_figure(const std::vector<NamedCurves>& curves, const std::string& x);
 
 /// What the figure shows.
 inline constexpr const char* kFootprints =

@@ -142,9 +142,10 @@ Figure mode_figure(const std::vector<ReleaseTrace>& traces) {
   DataBlock pressed{"measured", figure.data.front().columns, {}, {}};
   for (const auto& [t, force] : traces.front().pressed)
     if (t >= begin && t <= end) pressed.rows.push_back({milliseconds(traces.front(), t), force});
-  std::string tics, ribbons;
+  std::vector<std::string> names;
+  std::string ribbons;
   for (std::size_t i = 0; i < traces.size(); ++i) {
-    tics += fmt::format("{}'{}' {}", i > 0 ? ", " : "", plain(traces[i].model), i);
+    names.push_back(traces[i].model);
     for (const auto& mode : seen)
       ribbons += fmt::format(
           "{}DATA index {} using (strcol(4) eq '{}' ? 0.5*($1+$2) : NaN):3:(0.5*($2-$1)):(0.38) with "
@@ -180,7 +181,7 @@ Figure mode_figure(const std::vector<ReleaseTrace>& traces) {
       "set format x '%h'; unset ylabel; set xlabel '{}'\nset yrange [{}:-0.5]\nset ytics ({}) scale "
       "0\n"
       "set style fill solid 1 border rgb '#404040'\nunset grid\nplot {}\n",
-      time_label(traces.front()), n - 0.5, tics, ribbons);
+      time_label(traces.front()), n - 0.5, named_tics(names), ribbons);
   s += "unset label 99\n" + key_strip(figure, key, columns) + "unset multiplot\n";
   return figure;
 }

@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <vector>
 
 #include "apps/command.hpp"
 #include "apps/table.hpp"
@@ -15,6 +14,7 @@
 #include "experiment/prepared_throw.hpp"
 #include "experiment/time_check.hpp"
 #include "experiment/unit_check.hpp"
+#include "fitting/slips/slip_surface.hpp"
 
 namespace unhand::apps {
 
@@ -110,6 +110,27 @@ datasets::Sku read_possible_sku(const std::string& file) {
   const std::string why = experiment::impossible_inertia(datasets::to_object(sku));
   if (!why.empty()) throw datasets::TomlError(file, 0, 0, "inertia_kg_m2", why);
   return sku;
+}
+
+std::vector<std::string> surface_model_names() {
+  std::vector<std::string> out;
+  for (const auto model : fitting::surface_models) out.push_back(to_string(model));
+  return out;
+}
+
+void require_of_slips(const std::string& model, const std::string& file) {
+  const auto names = surface_model_names();
+  if (std::ranges::find(names, model) == names.end())
+    throw datasets::LogError(
+        file, "/surfaces",
+        fmt::format("slips, which {} does not predict; there are {}", model, fmt::join(names, ", ")));
+}
+
+void require_of_throws(const std::string& model, const std::string& file) {
+  const auto names = surface_model_names();
+  if (std::ranges::find(names, model) != names.end())
+    throw datasets::LogError(file, "/throws",
+                             fmt::format("throws, which {} does not predict: it is for slip-logs", model));
 }
 
 std::string sign_doubt(double dissipation) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "datasets/sku.hpp"
 #include "datasets/slip_log.hpp"
@@ -35,6 +36,13 @@ datasets::SlipLog read_slips(const std::string& file);
 /// An object that a body can be: throws datasets::TomlError where none of its mass and dims has its inertia
 /// (experiment::impossible_inertia), and as datasets::read_sku does.
 datasets::Sku read_possible_sku(const std::string& file);
+
+/// What can be fitted to slips: limit surfaces.
+std::vector<std::string> surface_model_names();
+/// Throws datasets::LogError where the log, of slips or of throws, is not of the kind that the model
+/// predicts.
+void require_of_slips(const std::string& model, const std::string& file);
+void require_of_throws(const std::string& model, const std::string& file);
 
 /// In words, what is wrong with a surface of that (negative) datasets::dissipation.
 std::string sign_doubt(double dissipation);

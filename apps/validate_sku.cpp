@@ -9,6 +9,7 @@
 #include <set>
 
 #include "apps/cards.hpp"
+#include "apps/command.hpp"
 #include "apps/progress.hpp"
 #include "apps/throws.hpp"
 

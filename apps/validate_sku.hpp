@@ -1,17 +1,14 @@
-// `unhand validate-sku`, and what it writes.
+// What the parts of `unhand validate-sku` hand to each other.
 #pragma once
 
 #include <string>
 
-#include "apps/command.hpp"
 #include "apps/figure.hpp"
 #include "apps/output.hpp"
 #include "datasets/sku.hpp"
 #include "fitting/sku/sku_validation.hpp"
 
 namespace unhand::apps {
-
-Command validate_sku_command(Parser& root);
 
 /// What was asked, for the report.
 struct SkuQuestion {

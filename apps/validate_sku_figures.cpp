@@ -93,13 +93,13 @@ Figure sku_budget_figure(const SkuQuestion& question, const SkuValidation& answe
                   {"line", "landing x [cm]", "landing theta [deg]", "share [%]", "input"},
                   {},
                   {}};
-  std::string tics;
+  std::vector<std::string> names;
   for (std::size_t i = 0; i < n; ++i) {
     const auto& line = answer.budget[i];
     block.rows.push_back({static_cast<double>(i), 100 * line.x, line.theta * kDegrees, 100 * line.share});
     block.labels.push_back(line.input.name);
-    tics += fmt::format("{}'{} ({}, {:.0f} %%)' {}", i > 0 ? ", " : "", plain(line.input.name),
-                        to_string(line.input.source), std::round(100 * line.share) + 0.0, i);  // no "-0"
+    names.push_back(fmt::format("{} ({}, {:.0f} %%)", line.input.name, to_string(line.input.source),
+                                std::round(100 * line.share) + 0.0));  // no "-0"
   }
   figure.data.push_back(std::move(block));
   constexpr double left = 6.6, gap = 0.5;
@@ -112,7 +112,7 @@ Figure sku_budget_figure(const SkuQuestion& question, const SkuValidation& answe
       "0.5,{:.4f} "
       "center\n"
       "set yrange [{}:-0.7]\nset ytics ({}) scale 0\n",
-      plain(question.sku.name), 1 - 0.5 / figure.height, static_cast<double>(n) - 0.3, tics);
+      plain(question.sku.name), 1 - 0.5 / figure.height, static_cast<double>(n) - 0.3, named_tics(names));
   const auto panel = [&](const char* label, int column, const char* colour) {
     double high = 0;
     for (const auto& row : figure.data.front().rows)
@@ -127,12 +127,8 @@ Figure sku_budget_figure(const SkuQuestion& question, const SkuValidation& answe
         label, column, column, colour);
   };
   s += place(figure, {left, middle - gap / 2, bottom, top}) + panel("landing x [cm]", 2, "#0072b2");
-  s += "unset label 1\nset ytics format ''\n";
-  s += fmt::format("set ytics ({}) scale 0\n", [&] {
-    std::string blank;
-    for (std::size_t i = 0; i < n; ++i) blank += fmt::format("{}'' {}", i > 0 ? ", " : "", i);
-    return blank;
-  }());
+  s += fmt::format("unset label 1\nset ytics format ''\nset ytics ({}) scale 0\n",
+                   named_tics(std::vector<std::string>(n)));
   s += place(figure, {middle + gap / 2, figure.width - 0.5, bottom, top}) +
        panel("landing theta [deg]", 3, "#e69f00");
   s += "unset multiplot\n";

@@ -117,13 +117,19 @@ const Series& time_of(Throw& toss, std::string_view group) {
   return *std::get<Series*>(time->slot(toss, false));
 }
 
+/// The channel's samples in a throw; null where it has none.
+const Series* recorded(const Channel<Throw>& channel, Throw& toss) {
+  const Slot slot = channel.slot(toss, false);
+  const Series* const* series = std::get_if<Series*>(&slot);
+  return series != nullptr && !(*series)->empty() ? *series : nullptr;
+}
+
 void add_scatter(NoiseSummary& noise, const Channel<Throw>& channel, std::vector<Throw>& throws) {
   std::vector<Scatter> all, whitened;
   for (Throw& toss : throws) {
-    const Slot slot = channel.slot(toss, false);
-    const Series* const* series = std::get_if<Series*>(&slot);
-    if (series == nullptr || (*series)->empty()) continue;
-    const Series& values = **series;
+    const Series* const series = recorded(channel, toss);
+    if (series == nullptr) continue;
+    const Series& values = *series;
     std::vector<std::size_t> rows;
     for (std::size_t i = 0; i < values.rows; ++i)
       if (channel.group != "mocap" || toss.mocap->is_valid(i)) rows.push_back(i);
@@ -192,11 +198,10 @@ LogSummary summarise(const ThrowLog& log) {
     noise.dataset = std::string(channel.group) + "/" + std::string(channel.name);
     std::size_t widest = 0;
     for (Throw& toss : throws) {
-      const Slot slot = channel.slot(toss, false);
-      const Series* const* series = std::get_if<Series*>(&slot);
-      if (series == nullptr || (*series)->empty()) continue;
-      add(noise, **series);
-      widest = std::max(widest, (*series)->cols);
+      const Series* const series = recorded(channel, toss);
+      if (series == nullptr) continue;
+      add(noise, *series);
+      widest = std::max(widest, series->cols);
     }
     if (const ColumnLayout* layout = layout_of_width(channel.layouts(log.dimension), widest))
       noise.columns = layout->columns, noise.units = layout->units;

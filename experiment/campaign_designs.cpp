@@ -39,16 +39,7 @@ struct Hold {
 /// The grasp angle at which the object with the largest moment loads the pads least, about where its CoM
 /// follows the hand's acceleration against gravity: above the pads (standing) or below (hanging).
 Hold hold_in(const CampaignDesign& design, const Posture& posture, bool standing) {
-  const double speed = posture.speed, a = design.launch_acceleration;
-  const PlanarArmHand hand = throw_motion(
-      design.arm, {design.begin,
-                   design.switch_time,
-                   design.follow_through,
-                   design.end,
-                   posture.hand,
-                   {speed * std::cos(posture.elevation), speed * std::sin(posture.elevation), posture.omega},
-                   a,
-                   a});
+  const PlanarArmHand hand = throw_motion(design.arm, design.motion(posture, design.launch_acceleration));
   const double opening = design.opening.open_command + design.opening.dead_time;
   const Window window{hand.begin(), design.switch_time};
   const auto grip = [&](const ThrownObject& object, double grasp_angle) {
@@ -109,6 +100,18 @@ int CampaignDesign::conditions() const {
   return static_cast<int>(objects.size() * postures.size() * release_accelerations.size());
 }
 int CampaignDesign::throws() const { return conditions() * repetitions; }
+
+ThrowMotion CampaignDesign::motion(const Posture& posture, double release_acceleration) const {
+  const double speed = posture.speed;
+  return {begin,
+          switch_time,
+          follow_through,
+          end,
+          posture.hand,
+          {speed * std::cos(posture.elevation), speed * std::sin(posture.elevation), posture.omega},
+          launch_acceleration,
+          release_acceleration};
+}
 
 /// Pitch, speed and how hard the hand brakes, each at three levels, as in the task of
 /// [LiuDaCostaBillard2025]: the pads become a hinge and the bar flips on. Bar, pads and gripper are those of

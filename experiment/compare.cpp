@@ -36,18 +36,6 @@ void judge_detach(const PreparedThrow& prepared, ThrowComparison& comparison) {
   comparison.error[1] = (prediction.detach.twist.omega - measured.detach_twist->omega) * kDegrees;
 }
 
-namespace {
-
-template <class Keep>
-ErrorStatistics collect(const std::vector<ThrowComparison>& throws, int quantity, Keep&& keep) {
-  if (quantity < 0 || quantity >= kQuantityCount)
-    throw std::invalid_argument(fmt::format("quantity {} is not in [0, {})", quantity, kQuantityCount));
-  std::vector<double> errors;
-  for (const auto& t : throws)
-    if (keep(t) && t.error[quantity]) errors.push_back(*t.error[quantity]);
-  return statistics_of(errors);
-}
-
 ThrowComparison judge(const PreparedThrow& prepared, const Prediction& prediction) {
   ThrowComparison out{prepared.id, prepared.object, prepared.condition, prepared.split, prediction, {}};
   const MeasuredOutcome& measured = prepared.measured;
@@ -58,6 +46,18 @@ ThrowComparison judge(const PreparedThrow& prepared, const Prediction& predictio
       out.error[3] = (prediction.landing.pose.theta - *measured.landing_theta) * kDegrees;
   }
   return out;
+}
+
+namespace {
+
+template <class Keep>
+ErrorStatistics collect(const std::vector<ThrowComparison>& throws, int quantity, Keep&& keep) {
+  if (quantity < 0 || quantity >= kQuantityCount)
+    throw std::invalid_argument(fmt::format("quantity {} is not in [0, {})", quantity, kQuantityCount));
+  std::vector<double> errors;
+  for (const auto& t : throws)
+    if (keep(t) && t.error[quantity]) errors.push_back(*t.error[quantity]);
+  return statistics_of(errors);
 }
 
 RepetitionScatter scatter_of(const std::vector<PreparedThrow>& throws) {

@@ -48,6 +48,9 @@ struct ThrowComparison {
 /// neither.
 void judge_detach(const PreparedThrow& prepared, ThrowComparison& comparison);
 
+/// A prediction with its errors at the detach, and at the landing where it lands.
+ThrowComparison judge(const PreparedThrow& prepared, const Prediction& prediction);
+
 /// A fitted parameter as tables show it; sigma is NaN where it is not known.
 struct NamedParameter {
   std::string name, unit;   ///< as a card has them

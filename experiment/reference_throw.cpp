@@ -1,6 +1,5 @@
 #include "experiment/reference_throw.hpp"
 
-#include <cmath>
 #include <stdexcept>
 
 #include "experiment/synthetic_campaign.hpp"
@@ -11,17 +10,7 @@ PreparedThrow reference_throw(const std::string& name, const datasets::Object& o
   if (!object.inertia || object.inertia->size() != 1)
     throw std::invalid_argument("reference_throw: " + name + " declares no planar moment of inertia");
   const CampaignDesign design = campaign_design("batch180");
-  const Posture& posture = design.postures[1];
-  const double speed = posture.speed;
-  const ThrowMotion motion{
-      design.begin,
-      design.switch_time,
-      design.follow_through,
-      design.end,
-      posture.hand,
-      {speed * std::cos(posture.elevation), speed * std::sin(posture.elevation), posture.omega},
-      design.launch_acceleration,
-      design.release_accelerations[3]};
+  const ThrowMotion motion = design.motion(design.postures[1], design.release_accelerations[3]);
   PreparedThrow out{"reference",
                     name,
                     "reference flip",

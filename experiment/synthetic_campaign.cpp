@@ -91,10 +91,7 @@ ThrowTruth draw(const CampaignDesign& design, const Cell& cell, RandomStream ran
   const Posture& posture = design.postures[cell.posture];
   ThrowTruth truth;
   ThrowMotion& motion = truth.motion;
-  motion.begin = design.begin;
-  motion.switch_time = design.switch_time;
-  motion.follow_through = design.follow_through;
-  motion.end = design.end;
+  motion = design.motion(posture, design.release_accelerations[cell.acceleration]);
   motion.pose.x = random.normal(posture.hand.x, v.hand_position);
   motion.pose.z = random.normal(posture.hand.z, v.hand_position);
   motion.pose.theta = random.normal(posture.hand.theta, v.hand_angle);
@@ -102,8 +99,7 @@ ThrowTruth draw(const CampaignDesign& design, const Cell& cell, RandomStream ran
   const double turned = posture.elevation + motion.pose.theta - posture.hand.theta;
   motion.twist = {speed * posture.speed * std::cos(turned), speed * posture.speed * std::sin(turned),
                   speed * posture.omega};
-  motion.before = design.launch_acceleration;
-  motion.after = random.normal(design.release_accelerations[cell.acceleration], v.release_acceleration);
+  motion.after = random.normal(motion.after, v.release_acceleration);
   truth.grasp_angle = random.normal(posture.grasp_angle.value_or(design.grasp_angle), v.grasp_angle);
   truth.opening = design.opening;
   truth.opening.grip_force *= random.normal(1, v.grip_force);

@@ -119,6 +119,8 @@ struct CampaignDesign {
 
   int conditions() const;  ///< objects × postures × accelerations
   int throws() const;      ///< conditions × repetitions
+  /// The hand's motion of a posture, without what varies from throw to throw; release_acceleration [m/s²].
+  ThrowMotion motion(const Posture& posture, double release_acceleration) const;
   /// f₀ of contact.soft_patch_radius [N]
   double reference_force() const { return opening.grip_force; }
 };

@@ -5,6 +5,15 @@ namespace unhand::experiment {
 using dynamics::Dual;
 using flight::Vec3;
 
+namespace {
+
+dynamics::EffectParameter in_space_only(dynamics::EffectParameter parameter) {
+  parameter.in_space_only = true;
+  return parameter;
+}
+
+}  // namespace
+
 std::span<const dynamics::EffectOn<Tracking>> tracking_effects() {
   static const dynamics::EffectOn<Tracking> table[] = {
       {{.id = "sensor.length_scale",
@@ -17,10 +26,9 @@ std::span<const dynamics::EffectOn<Tracking>> tracking_effects() {
        [](const auto& p, auto& tracking) { tracking.time_scale = p["scale"] - 1.0; }},
       {{.id = "sensor.com_offset",
         .mechanism = "the tracked point is not the CoM: true - declared CoM in body axes",
-        .parameters =
-            {{"x", "m", 0, -0.1, 0.1, 1e-3},
-             {.name = "y", .unit = "m", .low = -0.1, .high = 0.1, .typical = 1e-3, .in_space_only = true},
-             {"z", "m", 0, -0.1, 0.1, 1e-3}},
+        .parameters = {{"x", "m", 0, -0.1, 0.1, 1e-3},
+                       in_space_only({"y", "m", 0, -0.1, 0.1, 1e-3}),
+                       {"z", "m", 0, -0.1, 0.1, 1e-3}},
         .per_object = true,
         .needs = {.attitude = true},
         .about_declaration = true},
@@ -29,20 +37,8 @@ std::span<const dynamics::EffectOn<Tracking>> tracking_effects() {
        }},
       {{.id = "sensor.inertia",
         .mechanism = "the declared ratios of the moments of inertia are off",
-        .parameters = {{.name = "ratio_y",
-                        .unit = "-",
-                        .neutral = 1,
-                        .low = 0.2,
-                        .high = 5,
-                        .typical = 0.02,
-                        .in_space_only = true},
-                       {.name = "ratio_z",
-                        .unit = "-",
-                        .neutral = 1,
-                        .low = 0.2,
-                        .high = 5,
-                        .typical = 0.02,
-                        .in_space_only = true}},
+        .parameters = {in_space_only({"ratio_y", "-", 1, 0.2, 5, 0.02}),
+                       in_space_only({"ratio_z", "-", 1, 0.2, 5, 0.02})},
         .per_object = true,
         .needs = {.attitude = true},
         .about_declaration = true},

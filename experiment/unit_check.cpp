@@ -83,12 +83,9 @@ std::vector<UnitDoubt> disproportionate_columns(const RatiosByColumn& ratios) {
       if (std::any_of(out.begin(), out.end(),
                       [&](const auto& told) { return told.path == path && told.column == side.column; }))
         return;
-      const std::string against = other.units.empty()
-                                      ? std::string(rule.where)
-                                      : fmt::format("{} of {} says {}", other.column, other.path, rule.where);
       out.push_back({path, side.column, size, static_cast<int>(all.size()),
                      fmt::format("{} is {:.3g} times what {} (median of {} throws): {}?", side.column, size,
-                                 against, all.size(), unit->words)});
+                                 rule.said_by(other), all.size(), unit->words)});
     };
     doubt(rule.seen, rule.expected, ratio);
     doubt(rule.expected, rule.seen, 1 / ratio);

@@ -53,13 +53,10 @@ void check_ratios(const Throw& one, const SizeRatios& sizes, const std::map<Size
       if (side.path[0] == '/' || std::abs(std::log(ratio)) < far) return;
       const auto* unit = explaining_unit(side.units, ratio, rule.within);
       if (!unit) return;
-      const std::string against = other.units.empty()
-                                      ? std::string(rule.where)
-                                      : fmt::format("{} of {} says {}", other.column, other.path, rule.where);
       out.add(one, side, ratio,
               fmt::format("in this throw {} is {:.3g} times what {}, accepted are {:.3g} to {:.3g} (usual "
                           "in this log is {:.3g}): {}?",
-                          side.column, ratio, against, 1 / kLeastOutlier, kLeastOutlier,
+                          side.column, ratio, rule.said_by(other), 1 / kLeastOutlier, kLeastOutlier,
                           ratio == size->second ? median : 1 / median, unit->words));
     };
     check(rule.seen, rule.expected, size->second);

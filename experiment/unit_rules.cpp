@@ -1,5 +1,7 @@
 #include "experiment/unit_rules.hpp"
 
+#include <fmt/core.h>
+
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -75,60 +77,34 @@ const Series* series_of(const Throw& one) {
   const auto& group = one.*kGroup;
   return group ? &((*group).*kSeries) : nullptr;
 }
+constexpr auto kHandPose = series_of<&Throw::hand, &datasets::HandLog::pose>,
+               kHandTwist = series_of<&Throw::hand, &datasets::HandLog::twist>,
+               kHandAcceleration = series_of<&Throw::hand, &datasets::HandLog::acceleration>,
+               kMocapPose = series_of<&Throw::mocap, &datasets::MocapLog::pose>,
+               kWrench = series_of<&Throw::ft, &datasets::FtLog::wrench>,
+               kNormalForce = series_of<&Throw::ft, &datasets::FtLog::normal_force>,
+               kLandingPose = series_of<&Throw::landing, &datasets::LandingLog::pose>;
 constexpr PlainColumn kPlain[] = {
-    {{"hand/pose", "position", kLengths},
-     series_of<&Throw::hand, &datasets::HandLog::pose>,
-     0,
-     2,
-     kShowsShift},
-    {{"hand/pose", "theta", kAngles}, series_of<&Throw::hand, &datasets::HandLog::pose>, 2, 3, kShowsTurn},
-    {{"hand/twist", "velocity", kSpeeds},
-     series_of<&Throw::hand, &datasets::HandLog::twist>,
-     0,
-     2,
-     kShowsSpeed},
-    {{"hand/twist", "omega", kRates}, series_of<&Throw::hand, &datasets::HandLog::twist>, 2, 3, kShowsSpin},
-    {{"hand/acceleration", "a", kAccelerations},
-     series_of<&Throw::hand, &datasets::HandLog::acceleration>,
-     0,
-     2,
-     kShowsSpeed},
-    {{"hand/acceleration", "alpha", kAngularAccelerations},
-     series_of<&Throw::hand, &datasets::HandLog::acceleration>,
-     2,
-     3,
-     kShowsSpin},
-    {{"mocap/pose", "position", kLengths},
-     series_of<&Throw::mocap, &datasets::MocapLog::pose>,
-     0,
-     2,
-     kShowsShift},
-    {{"mocap/pose", "theta", kAngles}, series_of<&Throw::mocap, &datasets::MocapLog::pose>, 2, 3, kShowsTurn},
-    {{"ft/wrench", "force", kForces}, series_of<&Throw::ft, &datasets::FtLog::wrench>, 0, 2, kShowsNewton},
-    {{"ft/wrench", "tau", kTorques},
-     series_of<&Throw::ft, &datasets::FtLog::wrench>,
-     2,
-     3,
-     kShowsNewtonMetre},
-    {{"ft/normal_force", "f_N", kForces},
-     series_of<&Throw::ft, &datasets::FtLog::normal_force>,
-     0,
-     1,
-     kShowsNewton,
-     true},
-    {{"landing/pose", "x", kLengths},
-     series_of<&Throw::landing, &datasets::LandingLog::pose>,
-     0,
-     1,
-     kShowsShift},
-    {{"landing/pose", "theta", kAngles},
-     series_of<&Throw::landing, &datasets::LandingLog::pose>,
-     1,
-     2,
-     kShowsTurn},
+    {{"hand/pose", "position", kLengths}, kHandPose, 0, 2, kShowsShift},
+    {{"hand/pose", "theta", kAngles}, kHandPose, 2, 3, kShowsTurn},
+    {{"hand/twist", "velocity", kSpeeds}, kHandTwist, 0, 2, kShowsSpeed},
+    {{"hand/twist", "omega", kRates}, kHandTwist, 2, 3, kShowsSpin},
+    {{"hand/acceleration", "a", kAccelerations}, kHandAcceleration, 0, 2, kShowsSpeed},
+    {{"hand/acceleration", "alpha", kAngularAccelerations}, kHandAcceleration, 2, 3, kShowsSpin},
+    {{"mocap/pose", "position", kLengths}, kMocapPose, 0, 2, kShowsShift},
+    {{"mocap/pose", "theta", kAngles}, kMocapPose, 2, 3, kShowsTurn},
+    {{"ft/wrench", "force", kForces}, kWrench, 0, 2, kShowsNewton},
+    {{"ft/wrench", "tau", kTorques}, kWrench, 2, 3, kShowsNewtonMetre},
+    {{"ft/normal_force", "f_N", kForces}, kNormalForce, 0, 1, kShowsNewton, true},
+    {{"landing/pose", "x", kLengths}, kLandingPose, 0, 1, kShowsShift},
+    {{"landing/pose", "theta", kAngles}, kLandingPose, 1, 2, kShowsTurn},
 };
 
 }  // namespace
+
+std::string UnitRule::said_by(const ColumnSide& side) const {
+  return side.units.empty() ? where : fmt::format("{} of {} says {}", side.column, side.path, where);
+}
 
 const std::map<SizedColumn, UnitRule>& unit_rules() { return kRules; }
 

@@ -36,6 +36,10 @@ struct UnitRule {
   ColumnSide expected;  ///< what it is compared with
   const char* where;    ///< they are compared
   double within = 1.5;  ///< a factor of a unit's, to be taken for it
+
+  /// What one of the sides says of the other, in words: "position of hand/pose says while the object is
+  /// held".
+  std::string said_by(const ColumnSide& side) const;
 };
 
 /// Every comparison that knows units; slip_force, a friction coefficient, knows none.
