@@ -91,6 +91,14 @@ Law<S> law_between(const FrictionLimits<S>& limits, const Scene<S>& scene, const
           S(0)};
 }
 
+/// margin() of a demand's square against a limit's; where pads can give nothing and nothing is demanded of
+/// them, as at the end of a release without torque, it suffices.
+template <class S>
+S shortfall(const S& demand_squared, const S& limit_squared) {
+  if (value_of(demand_squared) == 0 && value_of(limit_squared) == 0) return S(-1);
+  return margin(demand_squared, limit_squared);
+}
+
 /// The rotation that follows when friction is short of the torque that it takes: the object lags behind the
 /// hand.
 constexpr Rotation lagging(double demanded_torque) { return demanded_torque > 0 ? kNegative : kPositive; }
@@ -173,7 +181,7 @@ void SlidingPivot::guards_(const Phase& phase, const SceneSource& source, const 
   if (rotation_of(mode) != kLocked) {
     g[kRotationGuard] = sign_of(rotation_of(mode)) * y.spin;
   } else {
-    g[kRotationGuard] = margin(S(now.wrench.tau * now.wrench.tau), S(torque_limit * torque_limit));
+    g[kRotationGuard] = shortfall(S(now.wrench.tau * now.wrench.tau), S(torque_limit * torque_limit));
   }
   if (mode == kSlideBetween) {
     const S plus = law(mode_of(kSlide, kPositive), limits, scene, y, stands.r).spin_acceleration;
@@ -182,9 +190,9 @@ void SlidingPivot::guards_(const Phase& phase, const SceneSource& source, const 
     const S torque = scene.body.inertia * drive;
     g[kRotationGuard] = torque / (torque_limit + std::abs(value_of(torque)) + 1e-300);
     const S demand = law(mode_of(kSlide, kLocked), limits, scene, y, stands.r).wrench.tau;
-    g[kTorqueSuffices] = margin(S(demand * demand), S(torque_limit * torque_limit));
+    g[kTorqueSuffices] = shortfall(S(demand * demand), S(torque_limit * torque_limit));
   }
-  const S force = margin(dot(now.carrying_force, now.carrying_force), S(force_limit * force_limit));
+  const S force = shortfall(dot(now.carrying_force, now.carrying_force), S(force_limit * force_limit));
   if (translation_of(mode) == kBrake) {
     const State<S, 6> rate = relative_rate(scene, y, stands, now.wrench);
     const S speed = norm(y.slip);

@@ -96,6 +96,20 @@ class Run {
     return departure;
   }
 
+  /// The state at the window's end of an entry that lies there but for rounding: its time may move otherwise
+  /// with the parameters, and the mode's flow is in force in between.
+  State<S, N> at_window_end(const Entry<S, N>& entry) const {
+    State<S, N> y = entry.y;
+    if constexpr (!std::is_same_v<S, double>) {
+      const auto ahead = (window_end().v - entry.t.v).eval();
+      if (ahead.isZero(0) || system_.kind(entry.mode) == FlowKind::frozen) return y;
+      State<double, N> rate;
+      system_.flow(phase_, entry.t.a, values<S, N>(y), rate);
+      for (int i = 0; i < N; ++i) y[i].v += rate[i] * ahead;
+    }
+    return y;
+  }
+
   // ---------------------------------------------------------------- one phase
 
   Departure run_phase(const Entry<S, N>& entry) {
@@ -106,7 +120,7 @@ class Run {
     watch_.enter(phase_);
 
     if (!(value_of(window_end()) - value_of(entry.t) > shortest_step(value_of(entry.t))))
-      return leave_window(entry.mode, entry.y);
+      return leave_window(entry.mode, at_window_end(entry));
 
     const int immediate = watch_.arm(entry, same_mode);
     if (immediate == watch_.kNotFinite) return {entry, Outcome::not_finite};

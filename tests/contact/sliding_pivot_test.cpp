@@ -8,6 +8,7 @@
 #include <string>
 
 #include "contact/slip_stop.hpp"
+#include "release/simulate_release.hpp"
 #include "tests/support/best_difference.hpp"
 
 namespace unhand::contact {
@@ -356,6 +357,30 @@ TEST_F(Pivot, AZeroSpinThatAttractsFromBothSidesIsHeld) {
     }
   }
   EXPECT_GT(attracting, 10) << "the case under test must occur";
+}
+
+TEST_F(Pivot, WhatIsSlidWithoutTorqueDoesNotSpinAtTheRelease) {
+  // Held at the centre of mass in a hand that turns evenly: no torque is asked for, and the limit ends at
+  // none. The pads of normal force f₀ u², u from 1 to 0 within T, slide from f_max = m b on, b the hand's
+  // acceleration against gravity: u₁ = √(m b/(n μ f₀)). From then on the object gains b (T/3) u₁ along b.
+  constexpr double kGrip = 30, kOpening = 0.07;
+  const double ax = -8, apparent_z = 9.81 - 8, b = std::hypot(ax, apparent_z);
+  const auto hand =
+      release::PolynomialHand::segments(0, {0, 0, 0}, {2, 2, 1.5}, {{2 * kOpening, {ax, ax, 0}}});
+  const ProfileNormalForce force(OpeningProfile<double>{0, kGrip, 0, kOpening, 2});
+  const Dual mass = dynamics::independent(kMass, 0);
+  const release::ReleaseProblem<Dual> problem{
+      hand, force, model, {mass, Dual(kInertia)}, {Dual(0), Dual(-9.81)}, {Dual(0), Dual(0.3)}};
+  const auto let_go = release::simulate_release(problem);
+  ASSERT_EQ(let_go.outcome, release::ReleaseOutcome::detached);
+  const auto events = release::mode_events(problem, let_go);
+  ASSERT_EQ(events.size(), 2u);
+  EXPECT_EQ(events[0].mode, "slide");
+  EXPECT_EQ(events[1].mode, "free");
+  // v_x = 2 + ax T (1 − ⅔ u₁), and u₁ ~ √m; what the slid arm's turning adds to the demand is left out.
+  const double u = std::sqrt(kMass * b / (2 * patch.mu * kGrip));
+  EXPECT_NEAR(let_go.detach.twist.vx.a, 2 + ax * kOpening * (1 - u * 2 / 3), 1e-4);
+  EXPECT_NEAR(let_go.detach.twist.vx.v[0], -ax * kOpening * u / (3 * kMass), 1e-3);
 }
 
 TEST_F(Pivot, DerivativesOfTheLaw) {

@@ -121,6 +121,24 @@ TEST_P(Derivatives, TheHorizonMayBeAParameter) {
   EXPECT_NEAR(end.t.v[0], 1.0, 1e-15);
 }
 
+TEST_P(Derivatives, AnEventAtTheHorizonKeepsThoseOfTheFlowAfterIt) {
+  // x' = p until x passes 1, at t = 1/p, then x' = 5; the horizon is at 1. For p from 1 on x(1) = 6 − 5/p.
+  const Dual p = independent(1.0, 0);
+  const Toy kink(
+      {{FlowKind::smooth, {{"passes", Crossing::rising}}}, {FlowKind::smooth, {}}},
+      [p](int mode, const auto& t, const auto&, auto& dy) {
+        using S = std::decay_t<decltype(t)>;
+        dy[0] = mode == 0 ? as<S>(p) : S(5);
+        dy[1] = S(0);
+      },
+      [](int, const auto&, const auto& y, auto* g) { g[0] = y[0] - (1 - 3e-15); }, enter(1));
+  const auto end =
+      integrate<Dual, 2>(kink, Entry<Dual, 2>{0, Dual(0), {Dual(0), Dual(0)}, Dual(0)}, Dual(1.0), options());
+  ASSERT_EQ(end.events.size(), 1u);
+  EXPECT_NEAR(end.y[0].a, 1, 1e-13);
+  EXPECT_NEAR(end.y[0].v[0], 5, 1e-10);
+}
+
 TEST_P(Derivatives, ARecordedTrajectoryHasTheDerivativesAtAFixedTime) {
   // The step that an event cuts short too: at a fixed time before the event nothing of the event's shift may
   // show.
