@@ -74,10 +74,31 @@ const Unit* find_unit(std::string_view symbol) {
 }
 
 std::string_view quantity_name(Quantity quantity) {
-  constexpr std::string_view kNames[] = {
-      "pure number",          "length", "time",   "angle", "speed", "angular rate", "acceleration",
-      "angular acceleration", "force",  "torque", "mass"};
-  return kNames[static_cast<int>(quantity)];
+  switch (quantity) {
+    case number:
+      return "pure number";
+    case length:
+      return "length";
+    case time:
+      return "time";
+    case angle:
+      return "angle";
+    case speed:
+      return "speed";
+    case angular_rate:
+      return "angular rate";
+    case acceleration:
+      return "acceleration";
+    case angular_acceleration:
+      return "angular acceleration";
+    case force:
+      return "force";
+    case torque:
+      return "torque";
+    case mass:
+      return "mass";
+  }
+  return "quantity";
 }
 
 std::string units_of(Quantity quantity) {

@@ -30,8 +30,19 @@ using flight::RotationState;
 using flight::Vec3;
 
 const char* to_string(FreeFlightOutcome outcome) {
-  constexpr const char* kNames[] = {"fitted", "no_tracking", "not_free", "too_short", "not_solved"};
-  return kNames[static_cast<int>(outcome)];
+  switch (outcome) {
+    case FreeFlightOutcome::fitted:
+      return "fitted";
+    case FreeFlightOutcome::no_tracking:
+      return "no_tracking";
+    case FreeFlightOutcome::not_free:
+      return "not_free";
+    case FreeFlightOutcome::too_short:
+      return "too_short";
+    case FreeFlightOutcome::not_solved:
+      return "not_solved";
+  }
+  return "unknown";
 }
 
 namespace {
