@@ -546,12 +546,12 @@ class Search {
     return std::any_of(others.begin(), others.end(),
                        [&](const std::string& other) { return !problem_.may_act(other, others); });
   }
+  /// Into the answer: what the sizes would be by the groups below and above the middle of each covariate.
   void halves(const GroupedFootprints& f) {
     std::vector<std::size_t> used;
     for (std::size_t i = 0; i < out_.final.groups.size(); ++i)
       if (out_.final.groups[i].used && out_.final.groups[i].solved) used.push_back(i);
-    std::vector<Index> columns;
-    for (std::size_t k = 0; k < f.total.fitted; ++k) columns.push_back(static_cast<Index>(k));
+    const std::vector<Index> columns = indices(all_of(f.total.fitted));
     for (std::size_t c = 0; c < problem_.covariates().size(); ++c) {
       std::vector<double> x;
       for (const std::size_t i : used) x.push_back(problem_.groups()[i].covariates[c]);
