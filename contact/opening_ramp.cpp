@@ -83,10 +83,6 @@ double bend_cost(const Ramp& r) {
   return sum;
 }
 
-double tick_of(const ForceSeries& s) {
-  return (s.time.back() - s.time.front()) / static_cast<double>(s.size() - 1);
-}
-
 // Of a time that is anywhere between two samples [s²].
 double between_samples(const ForceSeries& s) { return tick_of(s) * tick_of(s) / 12.0; }
 
@@ -345,6 +341,10 @@ std::optional<Descent> last_descent(const ForceSeries& measured, double tail, do
     }
   }
   return best;
+}
+
+double tick_of(const ForceSeries& s) {
+  return (s.time.back() - s.time.front()) / static_cast<double>(s.size() - 1);
 }
 
 std::size_t index_of(const ForceSeries& s, double t) {

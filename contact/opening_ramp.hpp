@@ -61,6 +61,9 @@ std::vector<double> outlier_weights(const std::vector<double>& e, std::size_t fr
 double chi2(const ForceSeries&, const Ramp&, std::size_t from, std::size_t to,
             const std::vector<double>& weight);
 
+/// The mean time between two samples [s].
+double tick_of(const ForceSeries&);
+
 /// The first sample at or after t [s].
 std::size_t index_of(const ForceSeries&, double t);
 

@@ -64,7 +64,7 @@ struct Pieces {
 };
 
 SampledNormalForce assemble(const ForceSeries& s, Pieces p, double release) {
-  const double tick = (s.time.back() - s.time.front()) / static_cast<double>(s.size() - 1);
+  const double tick = tick_of(s);
   // Before the first sample, and after the release or the last sample, the force is constant.
   p.pieces.insert(p.pieces.begin(), constant(std::max(0.0, p.pieces.front()[0][0])));
   p.breaks.insert(p.breaks.begin(), p.breaks.front() - tick);
@@ -269,7 +269,7 @@ NormalForceFit with_release(const ForceSeries& s, Opening o) {
   if (index_of(s, o.ramp.release) < index_of(s, std::max(o.ramp.start, s.time.front())) + kFewest)
     o.modelled = true;
   const double begin = s.time.front(), release = o.ramp.release;
-  const double tick = (s.time.back() - begin) / static_cast<double>(s.size() - 1);
+  const double tick = tick_of(s);
   // A start before the log, or right at its ends, is not a kink of this series.
   const bool starts = o.ramp.start > begin + 2.0 * tick;
   const double start = starts ? o.ramp.start : begin;
@@ -351,7 +351,7 @@ NormalForceFit smooth_normal_force(std::span<const double> time, std::span<const
     return fit;
   }
   const Opening opening = find_opening(s, *descent);
-  const double tick = (time.back() - time.front()) / static_cast<double>(n - 1);
+  const double tick = tick_of(s);
   const bool sound = std::isfinite(opening.ramp.release) && index_of(s, opening.ramp.release) + 3 <= n &&
                      opening.ramp.release > time.front() + 3.0 * tick &&
                      is_zero(opening.ramp.tail, descent->height);

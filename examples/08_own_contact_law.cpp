@@ -114,7 +114,7 @@ int main() {
     if (fit.outcome != fitting::FitOutcome::converged) return 1;
     std::printf("%s: chi2 %.0f\n", model, chi2[k++] = fit.chi2);
     for (const auto& u : fit.campaign)
-      std::printf("  %-8s %.4f +- %.4f %s\n", u.unknown.name.c_str(), u.value, u.sigma,
+      std::printf("  %-8s %.5g +- %.2g %s\n", u.unknown.name.c_str(), u.value, u.sigma,
                   u.unknown.unit.c_str());
   }
   return chi2[1] < chi2[0] ? 0
