@@ -201,9 +201,10 @@ class ForwardStep {
   /// alone.
   std::optional<Stage> beside_give() {
     const std::string& id = id_of(*small_->score);
+    if (gives_along(stage_) || !acts_on_pads(id)) return std::nullopt;
     TriedEffect trial = *small_;
-    if (acts_on_pads(id)) fit_give_along(trial.next, options_);
-    if (gives_along(stage_) || !gives_along(trial.next)) return std::nullopt;
+    fit_give_along(trial.next, options_);
+    if (!gives_along(trial.next)) return std::nullopt;
     const Stage& less = without(trial.next, {id}, options_);
     if (!less.solved()) return std::nullopt;
     trial.held_out = improvement(less, trial.next, out_.base_test, options_);
