@@ -190,7 +190,7 @@ std::optional<Figure> landing_figure(const Comparison& comparison) {
         -zoom.x, -zoom.theta, zoom.x, zoom.theta);
   s += scatter(clouds, all, (two ? "every model, " : "landing errors, ") + which);
   if (two)
-    s += "unset object 1\nset ylabel ''\n" + place(figure, {10.8, figure.width - 0.5, bottom, top}) +
+    s += "unset object 1\n" + place(figure, {10.8, figure.width - 0.5, bottom, top}) +
          scatter(clouds, zoom, "the same, magnified about zero");
   s += key_strip(figure, key, columns) + "unset multiplot\n";
   return figure;

@@ -36,14 +36,14 @@ std::span<const dynamics::EffectOn<FrictionVariation>> friction_effects() {
   static const dynamics::EffectOn<FrictionVariation> table[] = {
       {{.id = "contact.stribeck",
         .mechanism = "friction falls with slip speed from a static to a kinetic coefficient",
-        // Pads that hold less than they slip with would not hold what a campaign's grip holds.
+        // Below 1 the law has solutions, but friction that rises with speed is the viscous effect's.
         .parameters = {{.name = "mu_s/mu_k",
                         .unit = "-",
                         .neutral = 1,
-                        .low = 0.2,
+                        .low = 1,
                         .high = 5,
                         .typical = 0.1,
-                        .above_neutral = true},
+                        .least = 0.2},
                        {"v_s", "m/s", 0.02, 1e-3, 1, 0.01, {0.003, 0.01, 0.03, 0.1}}}},
        [](const auto& p, auto& friction) {
          friction.static_ratio = p["mu_s/mu_k"];

@@ -61,12 +61,19 @@ std::string unknown_name(const std::string& said, std::string_view name,
   const std::vector<std::string_view> views(known.begin(), known.end());
   const std::string_view meant = nearest_name(name, views);
   if (!meant.empty()) return fmt::format("{}; did you mean '{}'?", said, meant);
-  std::vector<std::string_view> some;
-  for (const std::string_view view : views) {
-    if (!view.empty() && some.size() < 12) some.push_back(view);
-  }
-  return fmt::format("{} (there are: {}{})", said, fmt::join(some, ", "),
-                     some.size() == 12 && views.size() > 12 ? ", ..." : "");
+  const std::string_view family = name.substr(0, name.find('.') + 1);  // "flight."; none: empty
+  const auto listed = [&](std::string_view prefix) {
+    std::vector<std::string_view> out;
+    for (const std::string_view view : views)
+      if (!view.empty() && view.starts_with(prefix)) out.push_back(view);
+    return out;
+  };
+  auto some = listed(family);
+  if (some.empty()) some = listed("");
+  constexpr std::size_t kMost = 12;
+  const bool more = some.size() > kMost;
+  if (more) some.resize(kMost);
+  return fmt::format("{} (there are: {}{})", said, fmt::join(some, ", "), more ? ", ..." : "");
 }
 
 }  // namespace unhand::datasets

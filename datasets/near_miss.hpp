@@ -18,7 +18,8 @@ bool is_near_miss(std::string_view name, std::string_view known);
 /// The nearest of `known` that `name` misses, or nothing.
 std::string_view nearest_name(std::string_view name, std::span<const std::string_view> known);
 
-/// "X; did you mean 'y'?" or "X (there are: a, b)": what to say of a name that is not among those known.
+/// "X; did you mean 'y'?" or "X (there are: a, b)": what to say of a name that is not among those known. Of
+/// "flight.x", those of its family are listed, if there are any.
 std::string unknown_name(const std::string& said, std::string_view name,
                          const std::vector<std::string>& known);
 

@@ -32,7 +32,6 @@ struct EffectParameter {
   std::vector<double> grid{};
   /// The equations hold down to here, though no fit looks and no campaign goes below `low` [unit].
   std::optional<double> least{};
-  bool above_neutral{false};             ///< random campaigns draw it above neutral alone
   bool in_space_only{false};             ///< no motion in the plane x-z tells it
   std::optional<std::size_t> on_axis{};  ///< of the body, 0 to 2: it adds to what a sensor reads there alone
   std::string remedy{};  ///< what to measure where a log does not tell it; empty: Effect::remedy

@@ -109,8 +109,7 @@ constexpr double kLeastSteps = 0.5;
 double random_size(const Effect& effect, const EffectParameter& p, RandomStream& random) {
   constexpr double kLargeOverLeast = 20;
   const double size = p.typical * kLeastSteps * std::pow(kLargeOverLeast, random.uniform());
-  const bool two_sided = !effect.one_sided && !p.above_neutral;
-  const bool negative = random.uniform() < 0.5 && two_sided && p.neutral - size >= p.low;
+  const bool negative = random.uniform() < 0.5 && !effect.one_sided && p.neutral - size >= p.low;
   return std::min(p.high, p.neutral + (negative ? -size : size));
 }
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 
 #include "dynamics/dense_solve.hpp"
 #include "fitting/discovery/traces.hpp"
@@ -157,33 +158,57 @@ std::vector<OutcomeLack> lacking(const OutcomeErrors& train, const OutcomeErrors
 
 namespace {
 
-/// P-value of Wald's test of an effect's sizes against neutral. `ends`: sizes that are neutral at an end of
-/// their range cannot go beyond it.
+/// The covariance of some unknowns of a fit where `given` others are what they are.
+Eigen::MatrixXd conditional(const Eigen::MatrixXd& all, const std::vector<Eigen::Index>& of,
+                            const std::vector<Eigen::Index>& given) {
+  Eigen::MatrixXd out = all(of, of);
+  const Eigen::MatrixXd among = all(given, given), with = all(given, of);
+  for (Eigen::Index k = 0; k < out.cols(); ++k)
+    out.col(k) -= with.transpose() * pseudo_solve(among, with.col(k));
+  return out;
+}
+
+/// P-value of Wald's test of an effect's sizes against neutral, with its shape as it was fitted, for every
+/// shape of its grid. `ends`: sizes that are neutral at an end of their range cannot go beyond it.
 double absence(const FitResult& fit, const dynamics::Effect& effect, bool ends) {
-  std::vector<Eigen::Index> index;
-  std::vector<double> away;
   const auto width = static_cast<Eigen::Index>(fit.campaign.size());
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const Eigen::Map<const RowMajor> all(fit.covariance.data(), width, width);
-  int free = 0, bounded = 0;
-  double least = std::numeric_limits<double>::infinity(), each = 1;
-  for (Eigen::Index k = 0; k < width; ++k)
-    for (const auto& p : effect.parameters) {
+  std::vector<Eigen::Index> sizes, shapes;
+  std::vector<double> away;
+  std::vector<int> at_end;
+  double tried = 1;
+  for (const auto& p : effect.parameters) {
+    if (p.is_shape()) tried *= static_cast<double>(p.grid.size());
+    for (Eigen::Index k = 0; k < width; ++k) {
       const FittedUnknown& u = fit.campaign[static_cast<std::size_t>(k)];
-      if (p.is_shape() || without_object(u.unknown.name) != effect.full_name(p)) continue;
-      const double d = u.value - p.neutral, n = std::max(1.0, u.degrees_of_freedom);
-      const int at_end = ends && !(p.neutral > p.low && p.neutral < p.high) ? 1 : 0;
-      index.push_back(k);
-      away.push_back(d);
-      bounded += at_end, free += 1 - at_end;
-      least = std::min(least, n);
-      if (all(k, k) > 0) each = std::min(each, hotelling_bar_tail(d * d / all(k, k), 1 - at_end, at_end, n));
+      if (without_object(u.unknown.name) != effect.full_name(p)) continue;
+      if (p.is_shape()) {
+        if (all(k, k) > 0) shapes.push_back(k);  // one that was not fitted has none
+        continue;
+      }
+      sizes.push_back(k);
+      away.push_back(u.value - p.neutral);
+      at_end.push_back(ends && !(p.neutral > p.low && p.neutral < p.high) ? 1 : 0);
     }
-  if (index.size() < 2) return each;
-  const Eigen::MatrixXd C = all(index, index);
+  }
+  const Eigen::MatrixXd C = conditional(all, sizes, shapes);
+  if (!C.allFinite()) return 1;
+  double least = std::numeric_limits<double>::infinity(), each = 1;
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    const double known = fit.campaign[static_cast<std::size_t>(sizes[i])].degrees_of_freedom,
+                 n = std::max(1.0, known - static_cast<double>(shapes.size()));
+    const auto k = static_cast<Eigen::Index>(i);
+    least = std::min(least, n);
+    if (C(k, k) > 0)
+      each = std::min(each, hotelling_bar_tail(away[i] * away[i] / C(k, k), 1 - at_end[i], at_end[i], n));
+  }
+  if (sizes.size() < 2) return std::min(1.0, tried * each);
+  const int bounded = std::accumulate(at_end.begin(), at_end.end(), 0),
+            free = static_cast<int>(sizes.size()) - bounded;
   const Eigen::Map<const Eigen::VectorXd> d(away.data(), static_cast<Eigen::Index>(away.size()));
   const double joint = hotelling_bar_tail(d.dot(pseudo_solve(C, d)), free, bounded, least);
-  return std::min(1.0, 2 * std::min(joint, static_cast<double>(index.size()) * each));
+  return std::min(1.0, 2 * tried * std::min(joint, static_cast<double>(sizes.size()) * each));
 }
 
 }  // namespace
@@ -192,8 +217,8 @@ double wald_p_value(const FitResult& fit, const dynamics::Effect& effect) {
   return absence(fit, effect, true);
 }
 
-bool is_told_from_none(const FitResult& fit, const dynamics::Effect& effect) {
-  return absence(fit, effect, false) <= kToldFromNone;
+bool is_told_from_none(const FitResult& fit, const dynamics::Effect& effect, double level) {
+  return absence(fit, effect, false) <= level;
 }
 
 bool in_air(Phase phase) { return phase == Phase::flight || phase == Phase::landing; }
@@ -237,9 +262,10 @@ bool is_shown_unloaded(Channel channel, const std::vector<ChannelMisfit>& base,
 
 /// Whether too much is left in the half of the throw where an effect acts, or in a channel that it
 /// `explains`, of what the base model's fit left there in the other throws (`other`: train against held-out
-/// ones) as well; and not next to nothing of what the base left in that phase's worst channel. Readings of an
-/// unloaded sensor are of sensors alone, and where they have shown a sensor's effect, what is left of the
-/// same channel under load is something else's.
+/// ones) as well; and not next to nothing of what the base left in that phase's worst channel; for an effect
+/// on the pads, which flights and landings show as well, what is left in the hand, in any phase's. Readings
+/// of an unloaded sensor are of sensors alone, and where they have shown a sensor's effect, what is left of
+/// the same channel under load is something else's.
 template <class Explains>
 bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisfit>& base,
                      const std::vector<ChannelMisfit>& other, const std::vector<ChannelMisfit>& now,
@@ -252,9 +278,10 @@ bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisf
     return acts(effect, in_air(m.phase)) || explains(m);
   };
   const auto worst = [&](Phase phase) {
+    const bool anywhere = acts_on_pads(effect.id) && !in_air(phase);
     double out = 1;
     for (const ChannelMisfit& m : base)
-      if (m.phase == phase) out = std::max(out, m.chi2_per_sample());
+      if (m.phase == phase || anywhere) out = std::max(out, m.chi2_per_sample());
     return out;
   };
   return std::any_of(now.begin(), now.end(), [&](const ChannelMisfit& m) {
@@ -308,7 +335,9 @@ bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const BothEr
   };
   const bool lacks = acts(effect, false) && leaves_lacking(errors, so_far, options) &&
                      (!is_of_sensor(effect.id) || bears_on_lacking(effect, stage, errors, so_far, options));
-  return lacks || (!is_law(effect.id) && !is_told_from_none(counted, find_effect(effect.id))) ||
+  return lacks ||
+         (!is_law(effect.id) &&
+          !is_told_from_none(counted, find_effect(effect.id), options.family_wise_level)) ||
          leaves_too_much(effect, so_far.base.misfit, so_far.base_test, stage.fit.misfit, options,
                          explains(&Stage::fit)) ||
          leaves_too_much(effect, so_far.base_test, so_far.base.misfit, stage.held_out.misfit, options,

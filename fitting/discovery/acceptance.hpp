@@ -1,5 +1,5 @@
-// Every rule by which the loop believes something, with its threshold: what docs/closing-the-loop.md says in
-// words under "Refits". Thresholds that the user may set are in DiscoverOptions; which terms describe what is
+// Every rule by which the loop believes something, with its threshold: what docs/closing-the-loop.md has
+// in two tables. Thresholds that the user may set are in DiscoverOptions; which terms describe what is
 // missing is missing_force.hpp's to say. Internal to fitting.
 #pragma once
 
@@ -122,7 +122,8 @@ inline constexpr double kCorrects = 0.98;
 /// What is left of the misfit where an effect acts, from which on it is an imitation of another.
 inline constexpr double kLeft = 0.1;
 /// The same of the misfit in the worst channel of the phase, a tenth of its size: a channel that showed
-/// little beside it cannot tell an imitation from a true effect whose law is not quite right.
+/// little beside it cannot tell an imitation from a true effect whose law is not quite right. What effects on
+/// the pads leave in the hand is held against the worst channel of any phase.
 inline constexpr double kNextToNothing = 0.01;
 
 /// Of the misfit without a sensor's effect, the share below which the effect explains a channel in a phase.
@@ -130,17 +131,16 @@ inline constexpr double kExplains = 0.5;
 /// Whether so little of the misfit `without` an effect is left, `now` that it is there.
 bool explains_most(const ChannelMisfit& now, const std::vector<ChannelMisfit>& without);
 
-/// The level at which an effect's size must be told from none by its own interval.
-inline constexpr double kToldFromNone = 0.05;
-
 /// Wald's test of an effect's size parameters against neutral, with the fit's covariance, which is known to
 /// its degrees of freedom only: each size by Student's t of its own, and several together by Hotelling's T²
 /// of the fewest; the smaller p of the two ways, times two, since few throws know a covariance of several
 /// sizes (forces of three components, drags of two objects) less than the variance of each. Sizes that are
-/// neutral at an end of their range count as hotelling_bar_tail has it.
+/// neutral at an end of their range count as hotelling_bar_tail has it. Where an effect is absent its shape
+/// (a loss time, a Stribeck speed) is nothing that data could tell: sizes are tested with the shape as it was
+/// fitted, and p counts for every shape of its grid (Bonferroni's bound on the search).
 double wald_p_value(const FitResult& fit, const dynamics::Effect& effect);
-/// Whether the two-sided confidence region of the sizes, of the level kToldFromNone, leaves neutral out.
-bool is_told_from_none(const FitResult& fit, const dynamics::Effect& effect);
+/// Whether the two-sided confidence region of the sizes, of a level, leaves neutral out.
+bool is_told_from_none(const FitResult& fit, const dynamics::Effect& effect, double level);
 
 /// In flight or at the landing, not in the hand.
 bool in_air(Phase phase);
@@ -155,7 +155,8 @@ bool acts_on_pads(const Stage& stage);
 bool acts(const AcceptedEffect& effect, bool air);
 
 /// An accepted effect that is the shadow of something else. Either conditions and blocks of sensors do not
-/// agree on its size, so that its interval, which counts that (`counted`), has none in it. Or it leaves too
+/// agree on its size, so that its interval, which counts that (`counted`), has none in it at the level that
+/// it was accepted at. Or it leaves too
 /// much where it acts: of the throws that it was fitted to, or of those that it has not seen. A sensor's
 /// effect, which is there in the hand and in the air, answers for every channel that it explains. Or, acting
 /// in the hand, it leaves predictions lacking (`errors` are the stage's) by too much of what the base's

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <stdexcept>
 #include <utility>
 
@@ -128,13 +129,17 @@ FirstMisfit first_misfit(const FitResult& fit, const DiscoverOptions& options) {
 /// Steps forward, each from the model that the one before has found, beside the pads' give wherever there is
 /// evidence for it.
 void search(Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  auto from = std::make_shared<const Stage>(stage);
   fit_give_along(stage, options);
+  stage.from = std::move(from);
   while (static_cast<int>(out.effects.size()) < options.most_effects) {
     auto next = forward(stage, options, out);
     if (!next) break;
+    from = std::make_shared<const Stage>(std::move(stage));
     stage = std::move(*next);
     polish(stage, options);
     fit_give_along(stage, options);
+    stage.from = std::move(from);
   }
 }
 
@@ -192,7 +197,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
   FitResult counted = withdraw(stage, options, out);
   drop_idle_give(stage, options, out);
   if (gives_along(stage)) out.along = {kPads};
-  judge(stage, base, options, out);
+  judge(stage, options, out);
   describe(stage, std::move(counted), options, out);
   for (AcceptedEffect& effect : out.effects)
     for (const auto& [other, correlation] : effect.equivalent) {

@@ -80,9 +80,10 @@ void fit_give_along(Stage& stage, const DiscoverOptions& options) {
   std::vector<double> start = carried(stage.fit, next.problem);
   start_give(stage, next.problem, start);
   solve_train(next, options, std::move(start));
-  if (!again) take_likelier(next, from_footprint(stage, options));
+  if (stage.ids.empty()) take_likelier(next, from_footprint(stage, options));
   if (!next.is_fitted() || !solve_held_out(next, options)) return;
-  if (next.bic() - stage.bic() <= (again ? -1 : kDeltaBic) && give_of(next) <= kMostGive)
+  const double give = give_of(next);  // where it is none, the fit has found something else
+  if (give > 0 && give <= kMostGive && next.bic() - stage.bic() <= (again ? -1 : kDeltaBic))
     stage = std::move(next);
 }
 

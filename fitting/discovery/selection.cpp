@@ -7,7 +7,6 @@
 
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/discrepancy.hpp"
-#include "fitting/discovery/pads_give.hpp"
 
 namespace unhand::fitting {
 
@@ -89,12 +88,11 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   return withdraw(stage, options, out);
 }
 
-void judge(const Stage& stage, const Stage& base, const DiscoverOptions& options, Discovery& out) {
+void judge(const Stage& stage, const DiscoverOptions& options, Discovery& out) {
   if (out.effects.empty()) return;
   const OutcomeErrors with = errors_of(stage, Share::test, options.fit.threads);
-  const bool alone = stage.ids.size() == 1 && !gives_along(stage);
   for (AcceptedEffect& accepted : out.effects) {
-    const Stage& less = alone ? base : without(stage, {accepted.id}, options);
+    const Stage& less = without(stage, {accepted.id}, options);
     if (!less.solved()) continue;  // what it was accepted for stands
     accepted.delta_bic = stage.bic() - less.bic();
     accepted.test_error_ratio = error_ratio(errors_of(less, Share::test, options.fit.threads), with);

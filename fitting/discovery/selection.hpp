@@ -28,9 +28,8 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out);
 /// with intervals that count its misfit.
 FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
-/// What speaks for every accepted effect in the end: the answer with it against the answer without it, which
-/// is `base` where there is no other.
-void judge(const Stage& stage, const Stage& base, const DiscoverOptions& options, Discovery& out);
+/// What speaks for every accepted effect in the end: the answer with it against the answer without it.
+void judge(const Stage& stage, const DiscoverOptions& options, Discovery& out);
 
 /// Values, significance and other names of what was accepted. From here on the fit of the stage is `counted`,
 /// what withdraw returned.

@@ -152,7 +152,7 @@ Stage extended(const Stage& stage, const Candidate& candidate, const Score& scor
   if (gives) out.problem = out.problem.with(model, with_give(out.problem, model, options));
   out.ids.push_back(candidate.id);
   std::vector<double> start = carried(stage.fit, out.problem), typical = out.problem.start();
-  if (gives) start_give(stage, out.problem, start);
+  if (gives || gives_along(stage)) start_give(stage, out.problem, start);
   for (std::size_t k = 0; k < start.size(); ++k) {
     const Unknown& u = out.problem.campaign()[k];
     for (std::size_t j = 0; j < candidate.parameters.size(); ++j) {
@@ -181,6 +181,16 @@ Stage extended(const Stage& stage, const Candidate& candidate, const Score& scor
   return out;
 }
 
+namespace {
+
+bool is_same_model(const CampaignProblem& a, const CampaignProblem& b) {
+  const auto &p = a.options(), &q = b.options();
+  return p.model == q.model &&
+         std::is_permutation(p.effects.begin(), p.effects.end(), q.effects.begin(), q.effects.end());
+}
+
+}  // namespace
+
 const Stage& without(const Stage& stage, const std::vector<std::string>& gone,
                      const DiscoverOptions& options) {
   if (const auto known = stage.less.find(gone); known != stage.less.end()) return *known->second;
@@ -195,6 +205,11 @@ const Stage& without(const Stage& stage, const std::vector<std::string>& gone,
   if (gives_along(stage) && !contact::can_give(model)) std::erase(effects, kPads);
   Stage out{stage.problem.with(model, effects), {}, {}, std::move(ids)};
   solve(out, options, carried(stage.fit, out.problem));
+  for (const Stage* before = stage.from.get(); before; before = before->from.get())
+    if (is_same_model(before->problem, out.problem) && before->solved() &&
+        (!out.solved() || before->fit.deviance() < out.fit.deviance()))
+      out = Stage{before->problem, before->fit, before->held_out, out.ids};
+  out.from = stage.from;
   return *stage.less.emplace(gone, std::make_shared<const Stage>(std::move(out))).first->second;
 }
 

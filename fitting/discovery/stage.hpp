@@ -18,7 +18,8 @@ namespace unhand::fitting {
 struct Stage {
   CampaignProblem problem;
   FitResult fit, held_out;
-  std::vector<std::string> ids;  ///< of what was added to the base, "contact.law:..." included
+  std::vector<std::string> ids;         ///< of what was added to the base, "contact.law:..." included
+  std::shared_ptr<const Stage> from{};  ///< the one that the loop was at a step before
   /// What without() has fitted: checks ask for the same removals one after the other.
   mutable std::map<std::vector<std::string>, std::shared_ptr<const Stage>> less{};
 
@@ -72,8 +73,9 @@ void polish(Stage& stage, const DiscoverOptions& options);
 Stage extended(const Stage& stage, const Candidate& candidate, const Score& score, bool leads,
                const DiscoverOptions&);
 
-/// The stage fitted again without some of its ids: effects, or the law that took the place of the model to
-/// begin with. Every removal is fitted once.
+/// The stage without some of its ids (effects, or the law that took the place of the model to begin with):
+/// fitted again from its own solution, or the step before that had this model, whichever is likelier. Every
+/// removal is fitted once.
 const Stage& without(const Stage& stage, const std::vector<std::string>& gone, const DiscoverOptions&);
 
 /// The ids of all effects but those that were forgotten.

@@ -17,7 +17,7 @@ namespace {
 /// A candidate without the parameters of which what the accepted effects but `accepted` do leaves (almost)
 /// nothing: a wind along the vertical beside a scale. What is left of those is rounding, which is like
 /// anything. Without any, where that holds of all of them together.
-Candidate unspoken(const Footprints& f, const GroupedFit& fit, const std::string& accepted,
+Candidate own_part(const Footprints& f, const GroupedFit& fit, const std::string& accepted,
                    const Candidate& candidate) {
   constexpr double kNothing = 1e-2;
   std::vector<Index> others;
@@ -66,7 +66,7 @@ std::vector<AcceptedEffect> described(const GroupedProblem& problem, const Effec
       const auto shown = answer.shown_from.find(candidate.id);
       if (shown == answer.shown_from.end() || shown->second > i) continue;  // it needs what was found later
       if (!problem.may_act(candidate.id, answer.ids_without(accepted.id))) continue;
-      const Candidate own = unspoken(f.total, fit, accepted.id, candidate);
+      const Candidate own = own_part(f.total, fit, accepted.id, candidate);
       if (own.columns.empty()) continue;
       const double r = correlation(f.total, contribution, own);
       if (r >= options.equivalent) accepted.add_other_name(candidate.id, r);

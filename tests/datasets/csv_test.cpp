@@ -78,6 +78,8 @@ TEST(Csv, UnknownNames) {
   EXPECT_EQ(unknown_name("no 'q'", "q", {"x", "", "pitch"}), "no 'q' (there are: x, pitch)");
   EXPECT_THAT(unknown_name("no 'q'", "q", std::vector<std::string>(40, "column")),
               testing::EndsWith(", ...)"));
+  EXPECT_EQ(unknown_name("no 'flight.q'", "flight.q", {"sensor.mass", "flight.wind", "flight.drift"}),
+            "no 'flight.q' (there are: flight.wind, flight.drift)");
 }
 
 }  // namespace

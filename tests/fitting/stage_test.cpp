@@ -209,12 +209,35 @@ TEST(Wald, AFewThrowsAreNoCertainty) {
   const dynamics::Effect mass = find_effect("sensor.mass"), bias = find_effect("sensor.ft_bias");
   const double t = student_factor(3);  // 3.18
   EXPECT_NEAR(wald_p_value(fit_of(mass.id, t, 3), mass), 0.05, 1e-9);
-  EXPECT_FALSE(is_told_from_none(fit_of(mass.id, 0.99 * t, 3), mass));
-  EXPECT_TRUE(is_told_from_none(fit_of(mass.id, 1.01 * t, 3), mass));
+  EXPECT_FALSE(is_told_from_none(fit_of(mass.id, 0.99 * t, 3), mass, 0.05));
+  EXPECT_TRUE(is_told_from_none(fit_of(mass.id, 1.01 * t, 3), mass, 0.05));
   EXPECT_NEAR(wald_p_value(fit_of(mass.id, 3, 1e9), mass), normal_two_sided(3), 1e-6);
   // Three sizes that such a covariance says next to nothing of together are certain each by itself.
   EXPECT_LT(wald_p_value(fit_of(bias.id, 60, 3), bias), 1e-4);
   EXPECT_NEAR(wald_p_value(fit_of(bias.id, 3, 1e9), bias), 2 * chi2_tail(27, 3), 1e-6);
+}
+
+// Pads that give by something, with a loss time that nobody knows, give: a size is tested with its shape as
+// it was fitted, for each shape that was tried.
+TEST(Wald, AnOpenShapeDoesNotHideASize) {
+  const dynamics::Effect give = find_effect("contact.pad_compliance");
+  constexpr double kTogether = 0.99, kSigmas = 2, kDegrees = 8;
+  FitResult fit;
+  for (const auto& p : give.parameters) {
+    FittedUnknown u;
+    u.unknown.name = give.full_name(p);
+    u.sigma = 1, u.value = p.neutral + kSigmas, u.degrees_of_freedom = kDegrees;
+    fit.campaign.push_back(u);
+  }
+  fit.covariance = {1, kTogether, kTogether, 1};
+  const double z2 = kSigmas * kSigmas / (1 - kTogether * kTogether);
+  const double shapes = static_cast<double>(give.parameters[1].grid.size());
+  EXPECT_NEAR(wald_p_value(fit, give), shapes * hotelling_bar_tail(z2, 0, 1, kDegrees - 1), 1e-12);
+  EXPECT_TRUE(is_told_from_none(fit, give, 0.05));
+  fit.covariance = {1, 0, 0, 1};
+  EXPECT_FALSE(is_told_from_none(fit, give, 0.05));
+  fit.covariance = {1, 0, 0, 0};  // the shape was not fitted
+  EXPECT_NEAR(wald_p_value(fit, give), shapes * hotelling_bar_tail(kSigmas * kSigmas, 0, 1, kDegrees), 1e-12);
 }
 
 // What is left of a misfit tells whether an effect explains it.
