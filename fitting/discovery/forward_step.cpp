@@ -75,7 +75,7 @@ class ForwardStep {
       : stage_(stage),
         options_(options),
         out_(out),
-        f_(footprints(stage.problem, stage.fit, catalogue(options), options.laws, options.fit.threads)),
+        f_(footprints_of(stage, options)),
         all_(scores(f_)),
         noise_(!leaves_misfit(stage, options)) {}
 
@@ -242,7 +242,7 @@ class ForwardStep {
   const Stage& stage_;
   const DiscoverOptions& options_;
   Discovery& out_;
-  Footprints f_;
+  const Footprints& f_;
   std::vector<Score> all_;
   bool noise_;  // nothing but that is left
   std::set<std::string> tried_;

@@ -24,21 +24,25 @@ double give_per_compliance(const Stage& stage) {
   return stage.problem.model().pads * mu * stage.problem.model().reference_force;
 }
 
-/// The stage with a give along that is fitted from what its footprint asks for; the stage where it has none.
-Stage from_footprint(const Stage& stage, const DiscoverOptions& options) {
-  const Footprints f = footprints(stage.problem, stage.fit, {kPads}, {}, options.fit.threads);
-  const auto all = scores(f);
-  const auto best = std::max_element(all.begin(), all.end(),
-                                     [](const Score& a, const Score& b) { return a.gain < b.gain; });
-  if (best == all.end() || !best->visible) return stage;
-  Stage out = extended(stage, f.candidates[best->candidate], *best, true, options);
-  std::erase(out.ids, kPads);
+/// The give's footprint at a stage without one.
+struct GiveFootprint {
+  const Candidate* candidate{};  // none where it is not in the catalogue, or shows nothing
+  Score score;
+  bool leads{};  // no effect that pads take no part in explains so much more that it may be what bends them
+};
+GiveFootprint footprint_of_give(const Stage& stage, const DiscoverOptions& options) {
+  const Footprints& f = footprints_of(stage, options);
+  GiveFootprint out;
+  double most = 0;
+  bool on_pads = false;
+  for (const Score& score : scores(f)) {
+    const Candidate& candidate = f.candidates[score.candidate];
+    if (score.gain > most) most = score.gain, on_pads = acts_on_pads(candidate.id);
+    if (candidate.id == kPads && score.visible && (!out.candidate || score.gain > out.score.gain))
+      out.candidate = &candidate, out.score = score;
+  }
+  out.leads = on_pads || out.score.gain >= kImitation * most;
   return out;
-}
-
-void take_likelier(Stage& stage, Stage other) {
-  if (other.is_fitted() && (!stage.is_fitted() || other.fit.deviance() < stage.fit.deviance()))
-    stage = std::move(other);
 }
 
 }  // namespace
@@ -79,8 +83,19 @@ void fit_give_along(Stage& stage, const DiscoverOptions& options) {
   Stage next{stage.problem.with(model, effects), {}, {}, stage.ids};
   std::vector<double> start = carried(stage.fit, next.problem);
   start_give(stage, next.problem, start);
-  solve_train(next, options, std::move(start));
-  if (stage.ids.empty()) take_likelier(next, from_footprint(stage, options));
+  if (!again) {
+    const GiveFootprint footprint = footprint_of_give(stage, options);
+    if (!footprint.leads) return;
+    if (footprint.candidate) {
+      std::vector<double> asked = start;
+      start_candidate(next.problem, *footprint.candidate, footprint.score, asked);
+      solve_train(next, options, std::move(asked));
+    }
+  }
+  if (Stage other{next.problem, {}, {}, stage.ids};
+      solve_train(other, options, std::move(start)) &&
+      (!next.is_fitted() || other.fit.deviance() < next.fit.deviance()))
+    next = std::move(other);
   if (!next.is_fitted() || !solve_held_out(next, options)) return;
   const double give = give_of(next);  // where it is none, the fit has found something else
   if (give > 0 && give <= kMostGive && next.bic() - stage.bic() <= (again ? -1 : kDeltaBic))

@@ -25,9 +25,10 @@ std::vector<std::string> with_give(const CampaignProblem& problem, const std::st
 /// Lets `start` (of the problem's unknowns, from the stage's fit) begin with a give of some micrometres.
 void start_give(const Stage& stage, const CampaignProblem& problem, std::vector<double>& start);
 
-/// Fits a give along, where BIC is for it and it stays below kMostGive; else the stage stays as it was. One
-/// that is there already begins anew: fitted while something was missing, it has taken up some of that, and
-/// need not find back.
+/// Fits a give along, where BIC is for it and it stays below kMostGive; else the stage stays as it was. Not
+/// while an effect that pads take no part in explains so much more that the give would imitate it
+/// (kImitation). One that is there already begins anew: fitted while something was missing, it has taken up
+/// some of that, and need not find back.
 void fit_give_along(Stage& stage, const DiscoverOptions& options);
 
 /// A nuisance that has grown beyond what all pads do becomes an effect like any other, and an effect that is

@@ -101,7 +101,7 @@ void judge(const Stage& stage, const DiscoverOptions& options, Discovery& out) {
 
 void describe(Stage& stage, FitResult counted, const DiscoverOptions& options, Discovery& out) {
   if (out.effects.empty()) return;
-  const auto f = footprints(stage.problem, stage.fit, catalogue(options), options.laws, options.fit.threads);
+  const Footprints& f = footprints_of(stage, options);
   stage.fit = std::move(counted);
   for (AcceptedEffect& accepted : out.effects) {
     if (is_law(accepted.id)) {

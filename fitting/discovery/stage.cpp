@@ -122,6 +122,13 @@ std::vector<bool> throws_of(const Stage& stage) {
   return out;
 }
 
+const Footprints& footprints_of(const Stage& stage, const DiscoverOptions& options) {
+  if (!stage.asked)
+    stage.asked = std::make_shared<const Footprints>(
+        footprints(stage.problem, stage.fit, catalogue(options), options.laws, options.fit.threads));
+  return *stage.asked;
+}
+
 CampaignProblem extended_problem(const CampaignProblem& problem, const std::string& id) {
   const auto& options = problem.options();
   if (is_law(id)) return problem.with(id.substr(kLaw.size()), options.effects);
@@ -144,6 +151,17 @@ bool is_astray(const Stage& stage, const Stage& next, const Score& score, bool l
 
 }  // namespace
 
+void start_candidate(const CampaignProblem& problem, const Candidate& candidate, const Score& score,
+                     std::vector<double>& start) {
+  for (std::size_t k = 0; k < start.size(); ++k) {
+    const Unknown& u = problem.campaign()[k];
+    for (std::size_t j = 0; j < candidate.parameters.size(); ++j)
+      if (candidate.parameters[j] == u.name) start[k] = std::clamp(u.start + score.step[j], u.low, u.high);
+    if (const auto shape = candidate.shape.find(without_object(u.name)); shape != candidate.shape.end())
+      start[k] = shape->second;
+  }
+}
+
 Stage extended(const Stage& stage, const Candidate& candidate, const Score& score, bool leads,
                const DiscoverOptions& options) {
   Stage out{extended_problem(stage.problem, candidate.id), {}, {}, stage.ids};
@@ -153,17 +171,15 @@ Stage extended(const Stage& stage, const Candidate& candidate, const Score& scor
   out.ids.push_back(candidate.id);
   std::vector<double> start = carried(stage.fit, out.problem), typical = out.problem.start();
   if (gives || gives_along(stage)) start_give(stage, out.problem, start);
+  start_candidate(out.problem, candidate, score, start);
   for (std::size_t k = 0; k < start.size(); ++k) {
     const Unknown& u = out.problem.campaign()[k];
     for (std::size_t j = 0; j < candidate.parameters.size(); ++j) {
       if (candidate.parameters[j] != u.name) continue;
-      start[k] = std::clamp(u.start + score.step[j], u.low, u.high);
       const double by = std::copysign(u.scale, score.step[j]);
       typical[k] = std::clamp(u.start + by, u.low, u.high);
       if (typical[k] == u.start) typical[k] = std::clamp(u.start - by, u.low, u.high);  // one-sided
     }
-    if (const auto shape = candidate.shape.find(without_object(u.name)); shape != candidate.shape.end())
-      start[k] = shape->second;
   }
   // Where the step is so long that a throw has no answer, half of it.
   const std::vector<double> from = carried(stage.fit, out.problem);

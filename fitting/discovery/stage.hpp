@@ -22,6 +22,7 @@ struct Stage {
   std::shared_ptr<const Stage> from{};  ///< the one that the loop was at a step before
   /// What without() has fitted: checks ask for the same removals one after the other.
   mutable std::map<std::vector<std::string>, std::shared_ptr<const Stage>> less{};
+  mutable std::shared_ptr<const Footprints> asked{};  ///< what footprints_of() has computed
 
   bool is_fitted() const;  ///< to the train throws
   bool solved() const;     ///< and so are the own unknowns of the others
@@ -47,6 +48,9 @@ std::optional<double> error_ratio(const OutcomeErrors& before, const OutcomeErro
 /// (FitOptions::throws).
 std::vector<bool> throws_of(const Stage& stage);
 
+/// The footprints of the whole catalogue and of the laws at the stage's fit. Computed once.
+const Footprints& footprints_of(const Stage& stage, const DiscoverOptions& options);
+
 /// The problem with an effect more, or with another contact law.
 CampaignProblem extended_problem(const CampaignProblem& problem, const std::string& id);
 
@@ -65,6 +69,10 @@ void solve(Stage& stage, const DiscoverOptions& options, std::vector<double> sta
 /// Fits again from the solution while that helps: the weights of the channels were learned while the effect
 /// was still missing, and throws may have an answer there that had none at the start.
 void polish(Stage& stage, const DiscoverOptions& options);
+
+/// Lets `start`, of a problem's unknowns, begin with what a candidate's footprint asks for.
+void start_candidate(const CampaignProblem& problem, const Candidate& candidate, const Score& score,
+                     std::vector<double>& start);
 
 /// The stage with one candidate more, fitted to the train throws from the step that its footprint asks for;
 /// where that search may have gone astray, once more from the problem's own start. `leads`: the candidate
