@@ -28,20 +28,20 @@ double give_per_compliance(const Stage& stage) {
 struct GiveFootprint {
   const Candidate* candidate{};  // none where it is not in the catalogue, or shows nothing
   Score score;
-  bool leads{};  // no effect that pads take no part in explains so much more that it may be what bends them
+  bool hidden{};  // by an effect that pads take no part in, which explains far more of a misfit
 };
 GiveFootprint footprint_of_give(const Stage& stage, const DiscoverOptions& options) {
   const Footprints& f = footprints_of(stage, options);
   GiveFootprint out;
   double most = 0;
-  bool on_pads = false;
+  bool by_pads = false;
   for (const Score& score : scores(f)) {
     const Candidate& candidate = f.candidates[score.candidate];
-    if (score.gain > most) most = score.gain, on_pads = acts_on_pads(candidate.id);
+    if (score.gain > most) most = score.gain, by_pads = acts_on_pads(candidate.id);
     if (candidate.id == kPads && score.visible && (!out.candidate || score.gain > out.score.gain))
       out.candidate = &candidate, out.score = score;
   }
-  out.leads = on_pads || out.score.gain >= kImitation * most;
+  out.hidden = !by_pads && out.score.gain < kImitation * most && leaves_misfit(stage, options);
   return out;
 }
 
@@ -85,7 +85,7 @@ void fit_give_along(Stage& stage, const DiscoverOptions& options) {
   start_give(stage, next.problem, start);
   if (!again) {
     const GiveFootprint footprint = footprint_of_give(stage, options);
-    if (!footprint.leads) return;
+    if (footprint.hidden) return;
     if (footprint.candidate) {
       std::vector<double> asked = start;
       start_candidate(next.problem, *footprint.candidate, footprint.score, asked);
