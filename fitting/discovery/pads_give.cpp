@@ -85,7 +85,7 @@ void fit_give_along(Stage& stage, const DiscoverOptions& options) {
   start_give(stage, next.problem, start);
   if (!again) {
     const GiveFootprint footprint = footprint_of_give(stage, options);
-    if (footprint.hidden) return;
+    if (footprint.hidden && stage.ids.empty()) return;
     if (footprint.candidate) {
       std::vector<double> asked = start;
       start_candidate(next.problem, *footprint.candidate, footprint.score, asked);

@@ -26,9 +26,9 @@ std::vector<std::string> with_give(const CampaignProblem& problem, const std::st
 void start_give(const Stage& stage, const CampaignProblem& problem, std::vector<double>& start);
 
 /// Fits a give along, where BIC is for it and it stays below kMostGive; else the stage stays as it was. Not
-/// while an effect that pads take no part in explains so much more of a misfit that the give would imitate it
-/// (kImitation). One that is there already begins anew: fitted while something was missing, it has taken up
-/// some of that, and need not find back.
+/// before the first step where an effect that pads take no part in explains so much more of a misfit that the
+/// give would imitate it (kImitation). One that is there already begins anew: fitted while something was
+/// missing, it has taken up some of that, and need not find back.
 void fit_give_along(Stage& stage, const DiscoverOptions& options);
 
 /// A nuisance that has grown beyond what all pads do becomes an effect like any other, and an effect that is

@@ -170,7 +170,7 @@ Stage extended(const Stage& stage, const Candidate& candidate, const Score& scor
   if (gives) out.problem = out.problem.with(model, with_give(out.problem, model, options));
   out.ids.push_back(candidate.id);
   std::vector<double> start = carried(stage.fit, out.problem), typical = out.problem.start();
-  if (gives || gives_along(stage)) start_give(stage, out.problem, start);
+  if (gives) start_give(stage, out.problem, start);
   start_candidate(out.problem, candidate, score, start);
   for (std::size_t k = 0; k < start.size(); ++k) {
     const Unknown& u = out.problem.campaign()[k];
