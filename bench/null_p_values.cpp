@@ -10,7 +10,8 @@
 
 #include "dynamics/parallel.hpp"
 #include "experiment/synthetic_campaign.hpp"
-#include "fitting/discovery/acceptance.hpp"
+#include "fitting/discovery/stage.hpp"
+#include "fitting/discovery/wald.hpp"
 
 namespace {
 

@@ -21,6 +21,83 @@ const char* in_words(ReleaseOutcome outcome) {
 
 namespace {
 
+/// Where a release begins.
+template <class S>
+struct Start {
+  Relative<S> held;           ///< the object against the hand
+  std::vector<double> times;  ///< [s], increasing: the time events
+  Window first;               ///< from the start to the first of them after it
+  Entry<S, 6> entry;          ///< the mode that the grip allows, and the state in it
+  bool pressed{};             ///< the pads press on the object
+  bool slips{};               ///< it is held, and slips or pivots at once
+};
+
+template <class S>
+Start<S> start_of(const ReleaseProblem<S>& problem, const ReleaseSystem<S>& system) {
+  const auto& [offset, angle] = problem.grasp;
+  Start<S> start;
+  start.held = {{offset, S(0)}, angle, problem.slip, problem.spin};
+  system.time_events(start.times);
+  const auto next = std::upper_bound(start.times.begin(), start.times.end(), problem.start);
+  const double end = problem.hand.end();
+  start.first = {problem.start, next == start.times.end() ? end : std::min(*next, end)};
+  start.pressed = problem.start < system.separation();
+  start.entry = start.pressed ? system.begin(start.first, start.held)
+                              : Entry<S, 6>{system.free_mode(), S(problem.start), start.held.state(), S(0)};
+  start.slips = start.entry.mode != 0 && start.entry.mode != system.free_mode();
+  return start;
+}
+
+/// What pads do that give at every point.
+template <class S>
+ReleaseResult<S> integrate_points(const ReleaseProblem<S>& problem, const contact::GivesAtPoints& pads,
+                                  const ReleaseSystem<S>& system, const Start<S>& start,
+                                  const ReleaseOptions& options) {
+  std::vector<S> events;
+  system.time_events(events);
+  return simulate_giving_release(problem, pads, system,
+                                 GivingStart<S>{start.held, system.template hold<S>(), std::move(events),
+                                                system.separation(), system.free_mode()},
+                                 options);
+}
+
+/// What a patch does that slips and sticks as one, mode by mode.
+template <class S>
+ReleaseResult<S> integrate_modes(const ReleaseProblem<S>& problem, const ReleaseSystem<S>& system,
+                                 const Start<S>& start, const dynamics::IntegratorOptions& options) {
+  // A release at the very end of the log still counts: the horizon lies one instant after.
+  double horizon = problem.hand.end();
+  if (system.separation() <= horizon)
+    horizon = std::max(horizon, std::nextafter(system.separation(), HUGE_VAL) + 1e-9);
+  dynamics::Solution<S, 6> solution = dynamics::integrate<S, 6>(system, start.entry, S(horizon), options);
+
+  ReleaseResult<S> result;
+  result.integration = solution.outcome;
+  result.events = std::move(solution.events);
+  result.trajectory = std::move(solution.trajectory);
+  result.statistics = solution.statistics;
+  if (start.entry.lead != S(0) || start.slips)
+    result.events.insert(result.events.begin(), {dynamics::EventKind::time, -1, 0, start.entry.mode,
+                                                 S(problem.start), start.entry.event_state()});
+  switch (solution.outcome) {
+    case dynamics::Outcome::finished:
+      result.outcome = ReleaseOutcome::detached;
+      break;
+    case dynamics::Outcome::horizon:
+      result.outcome = ReleaseOutcome::never_separated;
+      break;
+    default:
+      result.outcome = ReleaseOutcome::not_solved;
+  }
+  const double at = value_of(solution.t);
+  const auto after = std::lower_bound(start.times.begin(), start.times.end(), at - 1e-12);
+  const Window last{after == start.times.begin() ? problem.start : *std::prev(after), at};
+  const Scene<S> scene = system.scene(start.pressed ? last : start.first, solution.t);
+  result.relative = Relative<S>::from(solution.y);
+  result.detach = {solution.t, object_pose(scene, result.relative), object_twist(scene, result.relative)};
+  return result;
+}
+
 /// A detach that is not finite is none: poses do not pass through the integrator, which looks at what it
 /// integrates.
 template <class S>
@@ -33,71 +110,23 @@ void require_finite_detach(ReleaseResult<S>& result) {
 }  // namespace
 
 template <class S>
-ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const ReleaseOptions& options) {
+ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const ReleaseOptions& given) {
   validate(problem);
-  if (std::is_same_v<S, Dual> && options.ledger)
+  if (std::is_same_v<S, Dual> && given.ledger)
     throw std::invalid_argument(
         "release: ledger = true is not for problems with derivatives: simulate the values for it");
   const ReleaseSystem<S> system(problem);
   if (std::abs(system.separation() - problem.normal_force.release_time()) <= contact::kSameInstant)
     require_released(problem.normal_force, problem.hand.end());
-  const auto& [offset, angle] = problem.grasp;
-  const Relative<S> held{{offset, S(0)}, angle, problem.slip, problem.spin};
-  std::vector<double> times;
-  system.time_events(times);
-  const auto next = std::upper_bound(times.begin(), times.end(), problem.start);
-  const Window first{problem.start,
-                     next == times.end() ? problem.hand.end() : std::min(*next, problem.hand.end())};
+  const Start<S> start = start_of(problem, system);
+  ReleaseOptions options = given;
+  options.integrator.record |= options.ledger;
 
-  ReleaseResult<S> result;
-  Entry<S, 6> entry{system.free_mode(), S(problem.start), held.state(), S(0)};
-  if (problem.start < system.separation()) entry = system.begin(first, held);
-  result.slips_at_start = entry.mode != 0 && entry.mode != system.free_mode();
-
-  dynamics::IntegratorOptions integrator = options.integrator;
-  integrator.record = integrator.record || options.ledger;
-  if (const auto* pads = giving(problem.contact); pads && problem.start < system.separation()) {
-    std::vector<S> events;
-    system.time_events(events);
-    const GivingStart<S> start{held, system.template hold<S>(), std::move(events), system.separation(),
-                               system.free_mode()};
-    const bool slips = result.slips_at_start;
-    result = simulate_giving_release(problem, *pads, system, start, {integrator, options.ledger});
-    result.slips_at_start = slips;
-    require_finite_detach(result);
-    if constexpr (std::is_same_v<S, double>)
-      if (options.ledger && !result.trajectory.empty()) result.ledger = energy_ledger(problem, result);
-    return result;
-  }
-  // A release at the very end of the log still counts: the horizon lies one instant after.
-  double horizon = problem.hand.end();
-  if (system.separation() <= horizon)
-    horizon = std::max(horizon, std::nextafter(system.separation(), HUGE_VAL) + 1e-9);
-  dynamics::Solution<S, 6> solution = dynamics::integrate<S, 6>(system, entry, S(horizon), integrator);
-
-  result.integration = solution.outcome;
-  result.events = std::move(solution.events);
-  result.trajectory = std::move(solution.trajectory);
-  result.statistics = solution.statistics;
-  if (entry.lead != S(0) || result.slips_at_start)
-    result.events.insert(result.events.begin(), {dynamics::EventKind::time, -1, 0, entry.mode,
-                                                 S(problem.start), entry.event_state()});
-  switch (solution.outcome) {
-    case dynamics::Outcome::finished:
-      result.outcome = ReleaseOutcome::detached;
-      break;
-    case dynamics::Outcome::horizon:
-      result.outcome = ReleaseOutcome::never_separated;
-      break;
-    default:
-      result.outcome = ReleaseOutcome::not_solved;
-  }
-  const double at = value_of(solution.t);
-  const auto after = std::lower_bound(times.begin(), times.end(), at - 1e-12);
-  const Window last{after == times.begin() ? problem.start : *std::prev(after), at};
-  const Scene<S> scene = system.scene(problem.start < system.separation() ? last : first, solution.t);
-  result.relative = Relative<S>::from(solution.y);
-  result.detach = {solution.t, object_pose(scene, result.relative), object_twist(scene, result.relative)};
+  const auto* pads = giving(problem.contact);
+  ReleaseResult<S> result = pads && start.pressed
+                                ? integrate_points(problem, *pads, system, start, options)
+                                : integrate_modes(problem, system, start, options.integrator);
+  result.slips_at_start = start.slips;
   require_finite_detach(result);
   if constexpr (std::is_same_v<S, double>)
     if (options.ledger && !result.trajectory.empty()) result.ledger = energy_ledger(problem, result);

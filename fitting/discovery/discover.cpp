@@ -13,8 +13,8 @@
 #include "datasets/near_miss.hpp"
 #include "experiment/throw_setup.hpp"
 #include "fitting/clock.hpp"
-#include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/held_out_split.hpp"
+#include "fitting/discovery/misfit_rules.hpp"
 #include "fitting/discovery/outcome_errors.hpp"
 #include "fitting/discovery/pads_give.hpp"
 #include "fitting/discovery/selection.hpp"
@@ -143,52 +143,92 @@ void search(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   }
 }
 
+/// The options of a search, without the laws that it is told to forget.
+DiscoverOptions without_forgotten(DiscoverOptions options) {
+  const auto& forget = options.forget;
+  std::erase_if(options.laws, [&](const std::string& law) {
+    return std::find(forget.begin(), forget.end(), std::string(kLaw) + law) != forget.end();
+  });
+  return options;
+}
+
+/// Fits the base model to the train throws. What keeps it from being asked anything, or nothing.
+std::string fit_base(Stage& stage, const datasets::ThrowLog& log, const DiscoverOptions& options) {
+  if (std::none_of(log.throws.begin(), log.throws.end(),
+                   [](const datasets::Throw& t) { return t.split == datasets::Split::test; }))
+    return "nothing can be held out to judge an effect by: needed are train and test throws, or an object "
+           "that "
+           "was thrown under two conditions";
+  solve(stage, options, {});
+  if (stage.solved()) polish(stage, options);
+  if (stage.solved()) return {};
+  return stage.is_fitted()
+             ? fmt::format("there are no held-out throws to judge the fit by: {}", stage.held_out.message)
+             : fmt::format("the base model could not be fitted: {}", stage.fit.message);
+}
+
+/// What was there before anything was added.
+void tell_before(const Stage& base, const DiscoverOptions& options, Discovery& out) {
+  const int threads = options.fit.threads;
+  out.base_test = base.held_out.misfit;
+  out.before_train = errors_of(base, Share::train, threads);
+  out.before_test = errors_of(base, Share::test, threads);
+  out.first = first_misfit(base.fit, options);
+  const auto residuals = residuals_of(base.problem, base.fit, threads);
+  out.residual_before = residual_over_time(base.problem, base.fit, residuals);
+  out.structure_before = structures(base.problem, base.fit, residuals);
+}
+
+/// What is there now.
+void tell_after(const Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  const int threads = options.fit.threads;
+  out.final = stage.fit;
+  out.final_test = stage.held_out.misfit;
+  out.model = stage.problem.options().model;
+  if (out.adds_nothing()) {
+    out.residual_after = out.residual_before, out.structure_after = out.structure_before;
+    out.after_train = out.before_train, out.after_test = out.before_test;
+    return;
+  }
+  const auto residuals = residuals_of(stage.problem, stage.fit, threads);
+  out.residual_after = residual_over_time(stage.problem, stage.fit, residuals);
+  out.structure_after = structures(stage.problem, stage.fit, residuals);
+  out.after_train = errors_of(stage, Share::train, threads);
+  out.after_test = errors_of(stage, Share::test, threads);
+}
+
+/// Which further throws would tell an accepted effect from those that explain the log as well.
+void plan_experiments(const Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  for (AcceptedEffect& effect : out.effects)
+    for (const auto& [other, correlation] : effect.equivalent) {
+      const auto experiments = separating_experiments(stage, effect, other, options);
+      effect.separating.insert(effect.separating.end(), experiments.begin(), experiments.end());
+    }
+}
+
 }  // namespace
 
 Discovery discover(const datasets::ThrowLog& logged, const std::string& file, const DiscoverOptions& given) {
   const auto begin = Clock::now();
   validate(given);
-  DiscoverOptions options = given;
-  std::erase_if(options.laws, [&](const std::string& law) {
-    return std::find(given.forget.begin(), given.forget.end(), std::string(kLaw) + law) != given.forget.end();
-  });
-  const int threads = options.fit.threads;
+  DiscoverOptions options = without_forgotten(given);
   const datasets::ThrowLog log = with_held_out(logged);
   Discovery out;
   if (!has_both_splits(logged))
     for (const auto& one : log.throws)
       if (one.split == datasets::Split::test) out.held_out.push_back(one.id);
+
   Stage stage{CampaignProblem(log, file, options.campaign), {}, {}, {}};
-  if (std::none_of(log.throws.begin(), log.throws.end(),
-                   [](const datasets::Throw& t) { return t.split == datasets::Split::test; })) {
-    out.verdict = Verdict::not_answered;
-    out.message =
-        "nothing can be held out to judge an effect by: needed are train and test throws, or an object that "
-        "was thrown under two conditions";
-    out.seconds = seconds_since(begin);
-    return out;
-  }
-  solve(stage, options, {});
-  if (stage.solved()) polish(stage, options);
+  out.message = fit_base(stage, log, options);
   out.base = stage.fit;
   out.model = options.campaign.model;
-  if (!stage.solved()) {
+  if (!out.message.empty()) {
     out.verdict = Verdict::not_answered;
-    out.message =
-        stage.is_fitted()
-            ? fmt::format("there are no held-out throws to judge the fit by: {}", stage.held_out.message)
-            : fmt::format("the base model could not be fitted: {}", stage.fit.message);
     out.seconds = seconds_since(begin);
     return out;
   }
   options.fit.throws = throws_of(stage);
-  out.base_test = stage.held_out.misfit;
-  out.before_train = errors_of(stage, Share::train, threads);
-  out.before_test = errors_of(stage, Share::test, threads);
-  out.first = first_misfit(stage.fit, options);
-  const auto residuals_before = residuals_of(stage.problem, stage.fit, threads);
-  out.residual_before = residual_over_time(stage.problem, stage.fit, residuals_before);
-  out.structure_before = structures(stage.problem, stage.fit, residuals_before);
+  tell_before(stage, options, out);
 
   const Stage base = stage;
   search(stage, options, out);
@@ -199,23 +239,11 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
   if (gives_along(stage)) out.along = {kPads};
   judge(stage, options, out);
   describe(stage, std::move(counted), options, out);
-  for (AcceptedEffect& effect : out.effects)
-    for (const auto& [other, correlation] : effect.equivalent) {
-      const auto experiments = separating_experiments(stage, effect, other, options);
-      effect.separating.insert(effect.separating.end(), experiments.begin(), experiments.end());
-    }
+  plan_experiments(stage, options, out);
 
   out.footprints =
       footprint_traces(base.problem, base.fit, leading_names(out.effects, out.ranking), options.fit);
-  const bool unchanged = out.adds_nothing();
-  const auto residuals_after = unchanged ? residuals_before : residuals_of(stage.problem, stage.fit, threads);
-  out.residual_after = residual_over_time(stage.problem, stage.fit, residuals_after);
-  out.structure_after = structures(stage.problem, stage.fit, residuals_after);
-  out.final = stage.fit;
-  out.final_test = stage.held_out.misfit;
-  out.model = stage.problem.options().model;
-  out.after_train = unchanged ? out.before_train : errors_of(stage, Share::train, threads);
-  out.after_test = unchanged ? out.before_test : errors_of(stage, Share::test, threads);
+  tell_after(stage, options, out);
   out.unexplained = unexplained(stage, out, options);
   if (out.unexplained) out.small.reset();  // beside that, nobody knows what it imitates
   out.verdict = !out.effects.empty() ? Verdict::effect_found

@@ -220,7 +220,7 @@ struct Discovery {
   std::vector<std::string> held_out;    ///< throws that with_held_out chose; empty where the log says which
   std::string message;                  ///< why there is no answer (not_answered); else empty
   std::vector<AcceptedEffect> effects;  ///< in order of acceptance
-  std::vector<std::string> imitations;  ///< accepted at first, and withdrawn (acceptance.hpp)
+  std::vector<std::string> imitations;  ///< accepted at first, and withdrawn (withdrawal.hpp)
   std::optional<AskedForm> asked;       ///< what the flights asked for when effects were questioned
   std::vector<std::string> along;       ///< effects that are fitted along as nuisances, too small to matter
   std::optional<SmallEffect> small;     ///< the most evident of what was too small to matter

@@ -7,8 +7,11 @@
 
 #include "contact/registry.hpp"
 #include "fitting/discovery/acceptance.hpp"
+#include "fitting/discovery/misfit_rules.hpp"
 #include "fitting/discovery/pads_give.hpp"
 #include "fitting/discovery/selection.hpp"
+#include "fitting/discovery/wald.hpp"
+#include "fitting/discovery/where_acts.hpp"
 #include "fitting/distributions.hpp"
 #include "fitting/normal_equations.hpp"
 

@@ -4,6 +4,9 @@
 
 #include "contact/registry.hpp"
 #include "fitting/discovery/acceptance.hpp"
+#include "fitting/discovery/misfit_rules.hpp"
+#include "fitting/discovery/wald.hpp"
+#include "fitting/discovery/where_acts.hpp"
 
 namespace unhand::fitting {
 

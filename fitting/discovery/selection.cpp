@@ -6,7 +6,11 @@
 #include <optional>
 
 #include "fitting/discovery/acceptance.hpp"
+#include "fitting/discovery/asked_form.hpp"
 #include "fitting/discovery/discrepancy.hpp"
+#include "fitting/discovery/wald.hpp"
+#include "fitting/discovery/where_acts.hpp"
+#include "fitting/discovery/withdrawal.hpp"
 
 namespace unhand::fitting {
 

@@ -8,6 +8,7 @@
 
 #include "contact/registry.hpp"
 #include "fitting/discovery/acceptance.hpp"
+#include "fitting/discovery/misfit_rules.hpp"
 #include "fitting/discovery/pads_give.hpp"
 
 namespace unhand::fitting {

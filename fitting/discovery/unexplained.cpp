@@ -9,7 +9,9 @@
 
 #include "dynamics/parallel.hpp"
 #include "fitting/discovery/acceptance.hpp"
+#include "fitting/discovery/misfit_rules.hpp"
 #include "fitting/discovery/traces.hpp"
+#include "fitting/discovery/where_acts.hpp"
 #include "fitting/distributions.hpp"
 #include "fitting/evaluate.hpp"
 

@@ -12,6 +12,7 @@
 #include "experiment/campaign_effects.hpp"
 #include "experiment/synthetic_campaign.hpp"
 #include "fitting/discovery/acceptance.hpp"
+#include "fitting/discovery/misfit_rules.hpp"
 #include "fitting/discovery/stage.hpp"
 #include "tests/fitting/found_size.hpp"
 #include "tests/fitting/loop_campaign.hpp"

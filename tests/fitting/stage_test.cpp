@@ -11,10 +11,13 @@
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/discrepancy.hpp"
 #include "fitting/discovery/footprints.hpp"
+#include "fitting/discovery/misfit_rules.hpp"
 #include "fitting/discovery/pads_give.hpp"
 #include "fitting/discovery/residuals.hpp"
 #include "fitting/discovery/selection.hpp"
 #include "fitting/discovery/separating.hpp"
+#include "fitting/discovery/wald.hpp"
+#include "fitting/discovery/withdrawal.hpp"
 #include "fitting/distributions.hpp"
 #include "tests/fitting/loop_campaign.hpp"
 

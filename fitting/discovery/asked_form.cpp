@@ -1,0 +1,124 @@
+#include "fitting/discovery/asked_form.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "fitting/discovery/acceptance.hpp"
+#include "fitting/discovery/misfit_rules.hpp"
+#include "fitting/discovery/traces.hpp"
+#include "fitting/discovery/where_acts.hpp"
+#include "fitting/discovery/withdrawal.hpp"
+
+namespace unhand::fitting {
+
+namespace {
+
+/// Whether an accepted effect bends what is seen of flights, wherever it was seen most: a gravity that is
+/// tilted acts in the hand as well.
+bool bends_flights(const AcceptedEffect& effect) {
+  if (effect.id.starts_with("flight.")) return true;
+  return in_air(effect.phase) && !is_law(effect.id) && !acts_on_pads(effect.id);
+}
+
+/// Whether something is left in the tracked flights of both halves.
+bool leaves_flights(const Stage& stage, const DiscoverOptions& options) {
+  return std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(), [&](const ChannelMisfit& m) {
+    return m.phase == Phase::flight && is_left(m, options) && is_confirmed(stage.held_out.misfit, m);
+  });
+}
+
+/// One candidate for every object, from its own flights.
+std::map<int, MissingCandidate> candidates_of(const PhaseTraces& train) {
+  std::map<int, std::vector<ResidualTrace>> of_object;
+  for (const ResidualTrace& trace : train.all) of_object[trace.group].push_back(trace);
+  std::map<int, MissingCandidate> out;
+  for (const auto& [object, traces] : of_object) out[object] = missing_terms(traces, train.how);
+  return out;
+}
+
+/// What candidates leave, a candidate for each object; one that is not there says nothing.
+Rest left_by(const std::map<int, MissingCandidate>& candidates, const PhaseTraces& flights) {
+  Rest out;
+  for (const ResidualTrace& trace : flights.all) {
+    const auto candidate = candidates.find(trace.group);
+    const Rest rest = rest_around(
+        {trace}, candidate == candidates.end() ? MissingCandidate{} : candidate->second, flights.how);
+    out.chi2 += rest.chi2;
+    out.degrees_of_freedom += rest.degrees_of_freedom;
+  }
+  return out;
+}
+
+double beyond_noise(const Rest& rest) { return rest.chi2 - static_cast<double>(rest.degrees_of_freedom); }
+
+/// How much likelier the form makes the flights of one half, 2 log of the likelihoods' ratio, in units of the
+/// scatter that the effects leave.
+double likelier(const Rest& by_effects, const Rest& by_form) {
+  const double n = static_cast<double>(std::max(1L, by_effects.degrees_of_freedom));
+  return (by_effects.chi2 - by_form.chi2) / std::max(1.0, by_effects.chi2 / n);
+}
+
+/// The unknowns of some effects in a fit.
+std::size_t unknowns_of(const FitResult& fit, const std::vector<std::string>& ids) {
+  return static_cast<std::size_t>(std::count_if(fit.campaign.begin(), fit.campaign.end(), [&](const auto& u) {
+    return std::any_of(ids.begin(), ids.end(),
+                       [&](const std::string& id) { return u.unknown.name.starts_with(id + "."); });
+  }));
+}
+
+}  // namespace
+
+std::optional<AskedForm> form_asked_for(const Stage& stage, const Discovery& so_far,
+                                        const DiscoverOptions& options) {
+  std::vector<std::string> accepted;
+  for (const AcceptedEffect& effect : so_far.effects)
+    if (bends_flights(effect)) accepted.push_back(effect.id);
+  if (accepted.empty()) return {};
+  const Stage& less = without(stage, accepted, options);
+  if (!less.solved()) return {};
+  const int threads = options.fit.threads;
+  const auto flights = [&](const Stage& of, const FitResult& half) {
+    return traces_of(of.problem, half, Phase::flight, threads);
+  };
+  const PhaseTraces train = flights(less, less.fit);
+  const auto candidates = candidates_of(train);
+  const Rest effects = left_by({}, flights(stage, stage.fit)), form = left_by(candidates, train);
+  // They may have no part in the flights, or these may lack no acceleration.
+  const double lacked = beyond_noise(left_by({}, train));
+  if (!(lacked > 0 && std::max(beyond_noise(effects), beyond_noise(form)) < kOutdone * lacked)) return {};
+  const Rest effects_held_out = left_by({}, flights(stage, stage.held_out)),
+             form_held_out = left_by(candidates, flights(less, less.held_out));
+  double terms = 0;
+  for (const auto& [object, candidate] : candidates) terms += static_cast<double>(candidate.terms.size());
+  const double more = terms - static_cast<double>(unknowns_of(stage.fit, accepted));
+  const double bic =
+      more * std::log(static_cast<double>(std::max(2L, form.degrees_of_freedom))) - likelier(effects, form);
+  if (!(bic <= kDeltaBic) || !(likelier(effects_held_out, form_held_out) > 2 * std::log(kTimesAsLikely)))
+    return {};
+  // Beside a misfit that a form lowers by little, the effects may be true, and something acts beside them.
+  const auto halves = [](const Rest& by_form, const Rest& by_effects) {
+    return beyond_noise(by_form) < kOutdone * beyond_noise(by_effects);
+  };
+  if (leaves_flights(stage, options) && !(halves(form, effects) && halves(form_held_out, effects_held_out)))
+    return {};
+  AskedForm out{accepted, {}, false};
+  for (const auto& [name, object] : train.objects) {
+    const auto candidate = candidates.find(object);
+    if (candidate == candidates.end() || candidate->second.terms.empty()) continue;
+    out.words += (out.words.empty() ? "" : ", ") + candidate->second.in_words();
+    if (train.objects.size() > 1) out.words += fmt::format(" for {}", name);
+    for (const MissingTerm& term : candidate->second.terms) {
+      const auto is_its_own = [&](const std::string& id) {
+        return term.form != dynamics::AccelerationForm::none && find_effect(id).form == term.form;
+      };
+      out.unlisted |= std::none_of(accepted.begin(), accepted.end(), is_its_own);
+      std::erase_if(out.outdone, is_its_own);
+    }
+  }
+  return out;
+}
+
+}  // namespace unhand::fitting

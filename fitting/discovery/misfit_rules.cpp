@@ -1,0 +1,43 @@
+#include "fitting/discovery/misfit_rules.hpp"
+
+#include <algorithm>
+
+#include "fitting/distributions.hpp"
+
+namespace unhand::fitting {
+
+using experiment::Channel;
+
+bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options) {
+  const bool slips = is_wrench(m.channel) && m.phase != Phase::grasped;
+  if (m.chi2_per_sample() <= (slips ? options.wrench_misfit : 1 + options.matters)) return false;
+  return chi2_tail(m.chi2, m.n) < options.family_wise_level / kSeries;
+}
+
+bool leaves_misfit(const Stage& stage, const DiscoverOptions& options) {
+  return std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(),
+                     [&](const ChannelMisfit& m) { return is_misfit(m, options); });
+}
+
+bool is_confirmed(const std::vector<ChannelMisfit>& other_half, const ChannelMisfit& misfit) {
+  return std::any_of(other_half.begin(), other_half.end(), [&](const ChannelMisfit& m) {
+    return m.channel == misfit.channel && m.phase == misfit.phase && chi2_tail(m.chi2, m.n) < kConfirmedAt;
+  });
+}
+
+double unexplained_from(Channel channel, Phase phase, bool elsewhere, const DiscoverOptions& options) {
+  const bool twice = phase == Phase::grasped ? elsewhere : is_wrench(channel);
+  return (twice ? 2 : 1) * options.unexplained;
+}
+
+double misfit_in(const std::vector<ChannelMisfit>& misfit, Channel channel, Phase phase) {
+  for (const auto& m : misfit)
+    if (m.channel == channel && m.phase == phase) return m.chi2_per_sample();
+  return 1;
+}
+
+bool is_left(const ChannelMisfit& m, const DiscoverOptions& options) {
+  return is_misfit(m, options) && m.chi2_per_sample() >= unexplained_from(m.channel, m.phase, false, options);
+}
+
+}  // namespace unhand::fitting

@@ -1,0 +1,142 @@
+#include "fitting/discovery/withdrawal.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fitting/discovery/acceptance.hpp"
+#include "fitting/discovery/misfit_rules.hpp"
+#include "fitting/discovery/wald.hpp"
+#include "fitting/discovery/where_acts.hpp"
+
+namespace unhand::fitting {
+
+using experiment::Channel;
+
+namespace {
+
+/// Whether a channel in a phase is read by a sensor behind the pads while nothing touches them: what it shows
+/// is the sensor's own.
+bool is_unloaded(Channel channel, Phase phase) {
+  return in_air(phase) && (is_wrench(channel) || channel == Channel::normal_force);
+}
+
+/// Whether an unloaded sensor has shown that an effect is its own: of what the base left in this channel in
+/// the air, no more than kLeft is there now.
+bool is_shown_unloaded(Channel channel, const std::vector<ChannelMisfit>& base,
+                       const std::vector<ChannelMisfit>& now, const DiscoverOptions& options) {
+  return std::any_of(base.begin(), base.end(), [&](const ChannelMisfit& b) {
+    return b.channel == channel && is_unloaded(channel, b.phase) && is_left(b, options) &&
+           misfit_in(now, channel, b.phase) - 1 <= kLeft * (b.chi2_per_sample() - 1);
+  });
+}
+
+/// Whether too much is left in the half of the throw where an effect acts, or in a channel that it
+/// `explains`, of what the base model's fit left there in the other throws (`other`: train against held-out
+/// ones) as well; and not next to nothing of what the base left in that phase's worst channel; for an effect
+/// on the pads, which flights and landings show as well, what is left in the hand, in any phase's. Readings
+/// of an unloaded sensor are of sensors alone, and where they have shown a sensor's effect, what is left of
+/// the same channel under load is something else's.
+template <class Explains>
+bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisfit>& base,
+                     const std::vector<ChannelMisfit>& other, const std::vector<ChannelMisfit>& now,
+                     const DiscoverOptions& options, const Explains& explains) {
+  const bool sensor = is_of_sensor(effect.id);
+  const auto answers_for = [&](const ChannelMisfit& m) {
+    if (is_unloaded(m.channel, m.phase) ? !sensor
+                                        : sensor && is_shown_unloaded(m.channel, base, now, options))
+      return false;
+    return acts(effect, in_air(m.phase)) || explains(m);
+  };
+  const auto worst = [&](Phase phase) {
+    const bool anywhere = acts_on_pads(effect.id) && !in_air(phase);
+    double out = 1;
+    for (const ChannelMisfit& m : base)
+      if (m.phase == phase || anywhere) out = std::max(out, m.chi2_per_sample());
+    return out;
+  };
+  return std::any_of(now.begin(), now.end(), [&](const ChannelMisfit& m) {
+    return is_left(m, options) && is_confirmed(other, m) &&
+           m.chi2_per_sample() - 1 > std::max(kLeft * (misfit_in(base, m.channel, m.phase) - 1),
+                                              kNextToNothing * (worst(m.phase) - 1)) &&
+           answers_for(m);
+  });
+}
+
+/// Whether predictions lack so much of what the base model's lacked, in both halves of the throws.
+bool leaves_lacking(const BothErrors& errors, const Discovery& so_far, const DiscoverOptions& options) {
+  const auto share = [](const OutcomeLack& now, const OutcomeLack& base) {
+    return now.fit.shared > kLeft * base.fit.shared;
+  };
+  const auto all = lacking(errors.train, errors.held_out, options);
+  return std::any_of(all.begin(), all.end(), [&](const OutcomeLack& lack) {
+    return share(lack, lack_in(so_far.before_train, lack.outcome)) &&
+           share(lack_in(errors.held_out, lack.outcome), lack_in(so_far.before_test, lack.outcome));
+  });
+}
+
+/// Whether what predictions lack is another with an effect than without it, by so much of what the base's
+/// lacked.
+bool bears_on_lacking(const AcceptedEffect& effect, const Stage& stage, const BothErrors& errors,
+                      const Discovery& so_far, const DiscoverOptions& options) {
+  const Stage& less = without(stage, {effect.id}, options);
+  if (!less.solved()) return true;
+  const OutcomeErrors before = errors_of(less, Share::train, options.fit.threads);
+  return std::any_of(errors.train.lacks.begin(), errors.train.lacks.end(), [&](const OutcomeLack& now) {
+    return std::abs(now.fit.shared - lack_in(before, now.outcome).fit.shared) >
+           kLeft * lack_in(so_far.before_train, now.outcome).fit.shared;
+  });
+}
+
+}  // namespace
+
+bool explains_most(const ChannelMisfit& now, const std::vector<ChannelMisfit>& without) {
+  return now.chi2_per_sample() - 1 < kExplains * (misfit_in(without, now.channel, now.phase) - 1);
+}
+
+bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const BothErrors& errors,
+                  const FitResult& counted, const Discovery& so_far, const DiscoverOptions& options) {
+  // A sensor that is off is so in the hand and in the air, wherever that was seen most.
+  const auto explains = [&](FitResult Stage::*half) {
+    return [&, half](const ChannelMisfit& m) {
+      if (!is_of_sensor(effect.id)) return false;
+      const Stage& less = without(stage, {effect.id}, options);
+      return less.solved() && explains_most(m, (less.*half).misfit);
+    };
+  };
+  const bool lacks = acts(effect, false) && leaves_lacking(errors, so_far, options) &&
+                     (!is_of_sensor(effect.id) || bears_on_lacking(effect, stage, errors, so_far, options));
+  return lacks ||
+         (!is_law(effect.id) &&
+          !is_told_from_none(counted, find_effect(effect.id), options.family_wise_level)) ||
+         leaves_too_much(effect, so_far.base.misfit, so_far.base_test, stage.fit.misfit, options,
+                         explains(&Stage::fit)) ||
+         leaves_too_much(effect, so_far.base_test, so_far.base.misfit, stage.held_out.misfit, options,
+                         explains(&Stage::held_out));
+}
+
+namespace {
+
+/// Whether a channel is noisier in `now` than in `before`, beyond chance.
+bool is_noisier(const ChannelMisfit& now, const std::vector<ChannelMisfit>& before) {
+  const double chance = 3 * std::sqrt(2.0 / now.n);
+  return now.chi2_per_sample() > (1 + std::max(kNoisier, chance)) * misfit_in(before, now.channel, now.phase);
+}
+
+}  // namespace
+
+bool spoils(const AcceptedEffect& effect, const Stage& stage, const Discovery& so_far,
+            const DiscoverOptions& options) {
+  const auto spoilt = [&](const ChannelMisfit& m, const std::vector<ChannelMisfit>& before) {
+    return is_noisier(m, before) && (is_left(m, options) || acts(effect, in_air(m.phase)));
+  };
+  const auto& train = stage.fit.misfit;
+  const auto& held_out = stage.held_out.misfit;
+  return std::any_of(train.begin(), train.end(), [&](const ChannelMisfit& m) {
+    return spoilt(m, so_far.base.misfit) &&
+           std::any_of(held_out.begin(), held_out.end(), [&](const ChannelMisfit& other) {
+             return other.channel == m.channel && other.phase == m.phase && spoilt(other, so_far.base_test);
+           });
+  });
+}
+
+}  // namespace unhand::fitting
