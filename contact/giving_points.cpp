@@ -126,7 +126,7 @@ void GivingPoints<S>::extrapolate(const Stretch<S>& coarse, const Stretch<S>& fi
     }
 }
 
-/// Without a branch, so that the compiler takes several points at once.
+/// Without a branch: which points slip is another set at every guess.
 template <class S>
 typename GivingPoints<S>::Sum GivingPoints<S>::sum(const Stretch<S>& from, const Vec3<double>& slip,
                                                    double gain, double radius) const {
