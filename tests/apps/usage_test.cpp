@@ -396,6 +396,16 @@ TEST_F(Cli, Inspect) {
   EXPECT_EQ(json::parse(run("inspect " + quick + " --json").out), seen);
 }
 
+TEST_F(Cli, TheNameOfALogNeedNotBeUtf8) {
+  fs::copy_file(quick, folder / "w\xfcrfe.h5");
+  const std::string log = "w\xfcrfe.h5", seen = "w\uFFFDrfe.h5";
+  ASSERT_EQ(run("inspect " + log + " --json a.json").code, 0);
+  EXPECT_EQ(read_json(folder / "a.json")["log"], seen);
+  ASSERT_EQ(run("fit " + log + " --model gripper_delay --card card.json --json fit.json").code, 0);
+  EXPECT_EQ(read_json(folder / "fit.json")["log"], seen);
+  EXPECT_EQ(read_json(folder / "card.json")["log"]["file"], seen);
+}
+
 TEST_F(Cli, InspectSaysWhatIsTakenForANoiseThatIsNotDeclared) {
   EXPECT_THAT(run("inspect " + quick).out, Not(HasSubstr("note:")));
   write_changed("unsure.h5", [](datasets::Throw& one) { one.landing->pose.sigma.clear(); });
