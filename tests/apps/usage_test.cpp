@@ -93,6 +93,11 @@ TEST_F(Cli, WrongUsage) {
                  "given twice");
   expect_refusal("generate quick12 --out ''", 2, "--out: '' names no file");
   expect_refusal("figure mae --out ''", 2, "--out: '' names no file");
+  expect_refusal("figure mae --log '' --out out", 2, "--log: '' names no file");
+  expect_refusal("compare " + quick + " --models limit_surface --json ''", 2, "--json: '' names no file");
+  expect_refusal("compare " + quick + " --models limit_surface --report ''", 2, "--report: '' names no file");
+  expect_refusal("fit " + quick + " --model limit_surface --card ''", 2, "--card: '' names no file");
+  expect_refusal("import phyphox a --mass 0.2 --out a.h5 --into ''", 2, "--into: '' names no file");
   expect_refusal("compare " + quick + " --rtol nan", 2, "finite");
 }
 
