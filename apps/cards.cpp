@@ -8,6 +8,7 @@
 #include <set>
 
 #include "apps/command.hpp"
+#include "apps/output.hpp"
 #include "contact/gripper_delay.hpp"
 #include "contact/patch.hpp"
 #include "contact/registry.hpp"
@@ -67,8 +68,7 @@ datasets::CardLog log_of(const fs::path& file, const datasets::ThrowLog& log) {
     if (const auto& object = log.objects.at(one.object);
         one.split == datasets::Split::train && object.surface && !object.surface->empty())
       surfaces.insert(*object.surface);
-  return {
-      file.filename().string(), log.title, fitting::checksum_of(file), {surfaces.begin(), surfaces.end()}};
+  return {utf8_name(file), log.title, fitting::checksum_of(file), {surfaces.begin(), surfaces.end()}};
 }
 
 }  // namespace

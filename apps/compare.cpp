@@ -219,11 +219,11 @@ Command compare_command(Parser& root) {
       "--card", request->cards,
       "A model card: its parameters are used for its model; may be repeated (free flights and falls: "
       "one, of `unhand discover --card`)");
-  parser.option("--json", request->json, "Write the comparison as JSON");
-  parser.option("--report", request->report,
-                "A directory for figures, tables (Markdown), per-throw errors (CSV) and the JSON");
-  parser.option("--write-cards", request->write_cards,
-                "A directory for the estimated or fitted parameters as model cards");
+  parser.file("--json", request->json, "Write the comparison as JSON");
+  parser.file("--report", request->report,
+              "A directory for figures, tables (Markdown), per-throw errors (CSV) and the JSON");
+  parser.file("--write-cards", request->write_cards,
+              "A directory for the estimated or fitted parameters as model cards");
   parser.option("--naive-step", request->naive.step, "Step of limit_surface_naive [s]")
       .range(1e-7, 0.1)
       .with_default();

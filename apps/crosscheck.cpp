@@ -359,7 +359,7 @@ Command crosscheck_command(Parser& root) {
   parser.option("--models", options->models, "Models to hold it against, separated by commas")
       .with_commas()
       .with_default();
-  parser.option(
+  parser.file(
       "--card", options->card,
       "Friction from a model card, and how the pads open where the log has no normal force; without it,\n"
       "friction is estimated from the log for the first model");
@@ -378,7 +378,7 @@ Command crosscheck_command(Parser& root) {
   parser.option("--rings", options->rings, "Rings of points of a pad: 3 n^2 points")
       .range(1, 10)
       .with_default();
-  parser.option("--json", options->json, "Write every throw and the differences as JSON");
+  parser.file("--json", options->json, "Write every throw and the differences as JSON");
   add_threads(parser, options->threads);
   parser.footer(
       "All get the same hand, normal force and friction, so that differences are the engine's.\n"

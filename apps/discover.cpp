@@ -287,9 +287,9 @@ Command discover_command(Parser& root) {
               "The base model of throws; other logs have their own (projectile, free_fall, ellipsoid)")
       .one_of(base_models())
       .with_default();
-  parser.option("--report", options->report, "Directory for the page, its figures and discovery.json");
-  parser.option("--json", options->json, "Write the result as JSON");
-  parser.option("--card", options->card, "Write the card of the extended model");
+  parser.file("--report", options->report, "Directory for the page, its figures and discovery.json");
+  parser.file("--json", options->json, "Write the result as JSON");
+  parser.file("--card", options->card, "Write the card of the extended model");
   parser
       .option("--forget", options->forget,
               "Effects, and laws as contact.law:MODEL, that the catalogue is told to forget")

@@ -9,6 +9,7 @@
 #include "apps/command.hpp"
 #include "apps/figure.hpp"
 #include "apps/measured_report.hpp"
+#include "apps/output.hpp"
 #include "apps/progress.hpp"
 #include "apps/throws.hpp"
 #include "experiment/tracked_flight.hpp"
@@ -65,7 +66,7 @@ datasets::ModelCard card_of(const MeasuredDiscovery& found, const datasets::Thro
       matrix[i * n + i] = sigma * sigma;
     }
   }
-  card.log = {std::filesystem::path(file).filename().string(), log.title, fitting::checksum_of(file)};
+  card.log = {utf8_name(file), log.title, fitting::checksum_of(file)};
   card.split = "train";
   card.library_version = datasets::library_version();
   return card;

@@ -197,7 +197,7 @@ Command figure_command(Parser& root) {
   std::string listed = "Which:";
   for (const Kind& kind : kinds()) listed += fmt::format("\n{}: {}", kind.name, kind.what);
   parser.option("NAME", options->name, listed + "\nall: every one that the log has data for").required();
-  parser.option("--log", options->request.log, "A throw log; without one, the synthetic campaign quick12");
+  parser.file("--log", options->request.log, "A throw log; without one, the synthetic campaign quick12");
   parser.option("--throw", options->request.thrown,
                 "Id of the throw for figures of one; the first if not given");
   parser
@@ -210,11 +210,10 @@ Command figure_command(Parser& root) {
               "A model card: its parameters are used for its model; may be repeated")
       .one_value_each();
   parser
-      .option("--out", options->out,
-              "Directory for NAME.png, NAME.pdf, NAME.dat and NAME.gp, with _ in the place of - in NAME")
-      .not_empty()
+      .file("--out", options->out,
+            "Directory for NAME.png, NAME.pdf, NAME.dat and NAME.gp, with _ in the place of - in NAME")
       .with_default();
-  parser.option("--json", options->json, "Write the names of the figures as JSON");
+  parser.file("--json", options->json, "Write the names of the figures as JSON");
   add_threads(parser, options->request.threads);
   parser.footer(
       "Friction that no card gives is estimated from the log as `unhand compare` does. The residual of a\n"

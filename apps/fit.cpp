@@ -189,9 +189,9 @@ Command fit_command(Parser& root) {
       .option("--effects", request->effects,
               "Ids of effects whose parameters are fitted, too, separated by commas")
       .with_commas();
-  parser.option("--card", request->card, "Write the model card");
-  parser.option("--json", request->json, "Write the fit as JSON");
-  parser.option(
+  parser.file("--card", request->card, "Write the model card");
+  parser.file("--json", request->json, "Write the fit as JSON");
+  parser.file(
       "--report", request->report,
       "A directory for the tables (Markdown) and the JSON; of throws also a figure and all throws (CSV)");
   parser

@@ -5,6 +5,7 @@
 
 #include "apps/command.hpp"
 #include "apps/fit.hpp"
+#include "apps/output.hpp"
 #include "apps/progress.hpp"
 #include "apps/tell.hpp"
 #include "apps/throws.hpp"
@@ -50,7 +51,7 @@ datasets::ModelCard slip_card(const FitRequest& request, const std::vector<SlipS
           static_cast<int>(e.size()), scores[i].mean_deg, std::sqrt(square), bias};
     }
   }
-  card.log = {std::filesystem::path(request.log).filename().string(), "", fitting::checksum_of(request.log)};
+  card.log = {utf8_name(request.log), "", fitting::checksum_of(request.log)};
   card.split = "all";
   card.library_version = datasets::library_version();
   return card;

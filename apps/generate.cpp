@@ -229,9 +229,7 @@ Command generate_command(Parser& root) {
       .option("CAMPAIGN", options->campaign,
               fmt::format("Which campaign: {}", fmt::join(experiment::campaign_names(), ", ")))
       .required();
-  parser.option("--out", options->out, "The throw log to write (replaced if it exists)")
-      .required()
-      .not_empty();
+  parser.file("--out", options->out, "The throw log to write (replaced if it exists)").required();
   parser.option("--seed", options->seed, "Seed of everything random; the same seed gives the same log")
       .with_default();
   parser
@@ -247,9 +245,9 @@ Command generate_command(Parser& root) {
       .one_of({"ft", "wrench", "mocap", "landing"})
       .with_commas()
       .one_value_each();
-  parser.option("--truth", options->truth,
-                "Write the truth (parameters, effects, every throw) as JSON; the log never tells it");
-  parser.option("--json", options->json, "Write what was made as JSON");
+  parser.file("--truth", options->truth,
+              "Write the truth (parameters, effects, every throw) as JSON; the log never tells it");
+  parser.file("--json", options->json, "Write what was made as JSON");
   add_threads(parser, options->threads);
   parser.footer(footer());
   return {&parser, [options] { generate(*options); }};

@@ -195,9 +195,8 @@ Command import_command(Parser& root) {
   Parser& parser = root.subcommand("import", "Make a log from measured data in another format");
   parser.option("FORMAT", options->format, "Which format:" + known_formats()).required();
   parser.option("INPUT", options->inputs, "The files to read").required();
-  parser.option("--out", options->out,
-                "The log to write (replaced if it exists); --into, where that is given");
-  parser.option("--json", options->json, "Write what was read, kept and dropped as JSON");
+  parser.file("--out", options->out, "The log to write (replaced if it exists); --into, where that is given");
+  parser.file("--json", options->json, "Write what was read, kept and dropped as JSON");
   add_threads(parser, options->threads);
   const char* cube = "Another cube than the published one (cube-tosses)";
   parser.option("--cube-side", options->cube_side, "[m] Its side").group(cube).positive();

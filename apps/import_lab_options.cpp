@@ -11,10 +11,12 @@ void add_lab_options(Parser& parser, LabOptions& options) {
   };
   const char* one = "A log to add to (hand-csv, ft-csv, mocap-csv, motive-csv)";
   add(one, "--into", options.into,
-      "Add to the throws of this log that are named like the files; it is --out if that is not given");
+      "Add to the throws of this log that are named like the files; it is --out if that is not given")
+      .not_empty();
   parser.flag("--replace", options.replace, "Where a throw has such data already, replace it").group(one);
   const char* fresh = "A new log (hand-csv, ft-csv, mocap-csv, motive-csv, phyphox)";
-  add(fresh, "--sku", options.sku, "The object as an SKU file (TOML): mass, inertia, offset of the CoM");
+  add(fresh, "--sku", options.sku, "The object as an SKU file (TOML): mass, inertia, offset of the CoM")
+      .not_empty();
   add(fresh, "--mass", options.mass, "[kg] The object's mass, where there is no SKU file").positive();
   add(fresh, "--object", options.object, "The object's name; else the SKU file's");
   add(fresh, "--title", options.title, "The campaign's title");

@@ -183,7 +183,7 @@ Inspection inspect_throws(const std::string& file) {
     out.text += fmt::format("doubtful: {}: {}\n", doubt.path, doubt.reason);
     json["doubtful"].push_back({{"path", doubt.path}, {"reason", doubt.reason}});
   }
-  out.json = json.dump(1) + "\n";
+  out.json = json_text(json);
   return out;
 }
 
@@ -222,7 +222,7 @@ Inspection inspect_slips(const std::string& file) {
     if (const double share = datasets::dissipation(surface); share < 0)
       doubts += fmt::format("doubtful: /surfaces/{}: {}\n", name, sign_doubt(share));
   }
-  out.json = json.dump(1) + "\n";
+  out.json = json_text(json);
   out.text =
       fmt::format("{}: slip-log, {}\n{}\n{}\nno schema errors; wrench N, N, N m; twist m/s, m/s, rad/s\n",
                   file, plural(log.surfaces.size(), "surface"), descriptions, table.text()) +

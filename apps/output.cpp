@@ -143,6 +143,10 @@ void require_outputs(const std::vector<Wanted>& outputs, const std::vector<fs::p
   for (const Wanted& one : outputs) require_one(one, inputs);
 }
 
+std::string utf8_name(const fs::path& file) {
+  return Json::parse(json_text(file.filename().string())).get<std::string>();
+}
+
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 Json number(const std::optional<double>& value) { return value ? number(*value) : Json(nullptr); }
 std::string fixed(const std::optional<double>& value, int digits) {

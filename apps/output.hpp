@@ -22,7 +22,12 @@ Json number(const std::optional<double>& value);
 /// With so many digits after the point; "-" where there is none.
 std::string fixed(const std::optional<double>& value, int digits);
 
-inline std::string json_text(const Json& value) { return value.dump(1) + "\n"; }
+/// Names of files may hold any bytes, JSON only UTF-8: what is none becomes U+FFFD.
+inline std::string json_text(const Json& value) {
+  return value.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+/// The name of a file without its directories, as json_text would have it.
+std::string utf8_name(const std::filesystem::path& file);
 
 /// Writes a file in place, for directories that are not in place yet. Throws Unanswered.
 void write_text(const std::filesystem::path& file, const std::string& content);

@@ -198,6 +198,10 @@ template Option Parser::option(const std::string&, std::optional<double>&, const
 template Option Parser::option(const std::string&, std::vector<std::string>&, const std::string&);
 template Option Parser::option(const std::string&, std::vector<double>&, const std::string&);
 
+Option Parser::file(const std::string& name, std::string& value, const std::string& help) {
+  return option(name, value, help).not_empty();
+}
+
 Option Parser::flag(const std::string& name, bool& value, const std::string& help) {
   return Option(app_->add_flag(name, value, help));
 }

@@ -62,6 +62,8 @@ class Parser {
   /// std::optional<int> or <double>, std::vector of std::string or double.
   template <class T>
   Option option(const std::string& name, T& value, const std::string& help);
+  /// The name of a file or directory: never empty, as where a shell's variable is not set.
+  Option file(const std::string& name, std::string& value, const std::string& help);
   Option flag(const std::string& name, bool& value, const std::string& help);
   /// One of several names, each of which stands for a value.
   template <class Value>

@@ -203,8 +203,8 @@ Command plan_control_command(Parser& plan) {
       .range(0, 1000)
       .with_default();
   parser.option("--box", o->box, "Side of the box [m]").positive().with_default();
-  parser.option("--json", o->json, "Write the numbers here");
-  parser.option("--report", o->report, "Write table and figures into this directory");
+  parser.file("--json", o->json, "Write the numbers here");
+  parser.file("--report", o->report, "Write table and figures into this directory");
   add_threads(parser, o->threads);
   return {&parser, [o] { run(*o); }};
 }

@@ -282,9 +282,9 @@ Command plan_elastic_command(Parser& plan) {
       .range(-89.0, 89.0)
       .with_default();
   parser.option("--seed", o->seed, "Seed of the random starts").with_default();
-  parser.option("--json", o->json, "Write the numbers here");
+  parser.file("--json", o->json, "Write the numbers here");
   add_one_thread(parser, o->threads);
-  parser.option("--report", o->report, "Write tables and figures into this directory");
+  parser.file("--report", o->report, "Write tables and figures into this directory");
   return {&parser, [o] { run(*o); }};
 }
 

@@ -209,16 +209,16 @@ Command plan_flip_command(Parser& plan) {
               "Throw a bar with its centre of mass there [m]; m3 and m4 know throws of the robot file's. Not "
               "given, m3 moves it by 0.06, as the paper does")
       .range(0, 1);
-  parser.option("--sku", o->sku, "Throw this object: mass, inertia and centre of mass of an SKU file");
-  parser.option("--card", o->card, "Model card to begin from (m4)");
+  parser.file("--sku", o->sku, "Throw this object: mass, inertia and centre of mass of an SKU file");
+  parser.file("--card", o->card, "Model card to begin from (m4)");
   parser.option("--iterations", o->iterations, "Commands to try").range(1, 1000).with_default();
   parser.option("--throws", o->throws, "Of each command").range(1, 100).with_default();
   parser.option("--repeats", o->repeats, "Of each of the 27 commands of the population")
       .range(1, 100)
       .with_default();
-  parser.option("--json", o->json, "Write the numbers here");
+  parser.file("--json", o->json, "Write the numbers here");
   add_one_thread(parser, o->threads);
-  parser.option("--report", o->report, "Keep every throw here, and write table and figures");
+  parser.file("--report", o->report, "Keep every throw here, and write table and figures");
   return {&parser, [o] { run(*o); }};
 }
 

@@ -370,17 +370,16 @@ Command plan_throw_command(Parser& plan) {
       .option("--drag", o->drag,
               "Quadratic drag of the flight, k in a = -k |v| v [1/m]; else that of the SKU")
       .range(0.0, 10.0);
-  parser.option("--card", o->card, "A model card: the release follows its contact model (planar throws)");
-  parser.option("--sku", o->sku,
-                "The object: mass, inertia, drag, offset of its centre of mass from the pads");
+  parser.file("--card", o->card, "A model card: the release follows its contact model (planar throws)");
+  parser.file("--sku", o->sku, "The object: mass, inertia, drag, offset of its centre of mass from the pads");
   parser.flag("--planar", o->planar, "Throw in the vertical plane of the target");
   parser.flag("--tube-cvx", o->plain, "Stop at the convex problem, without refinement");
   parser.option("--samples", o->samples, "Configurations searched").range(1, 1000000).with_default();
   parser.option("--draws", o->draws, "Landings drawn").range(1, 1000000).with_default();
   parser.option("--seed", o->seed, "Seed of the draws").with_default();
-  parser.option("--json", o->json, "Write the plan as JSON");
+  parser.file("--json", o->json, "Write the plan as JSON");
   add_threads(parser, o->threads);
-  parser.option("--report", o->report, "Directory for trajectory.csv, landings.csv and figures");
+  parser.file("--report", o->report, "Directory for trajectory.csv, landings.csv and figures");
   parser.footer(
       "Without a card, the object leaves at a delay that may be anything in the window. With one, it is\n"
       "let go as the card's contact model says, and the motion is the one whose landings depend least on\n"

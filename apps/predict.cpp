@@ -230,9 +230,9 @@ Command predict_command(Parser& root) {
   Parser& parser =
       root.subcommand("predict", "Predict each throw of a log with a card's model and parameters");
   parser.option("LOG", options->log, "A throw log; outcomes need not be in it").required();
-  parser.option("--card", options->card, "The model card").required();
-  parser.option("--json", options->json, "Write the predictions as JSON");
-  parser.option("--csv", options->csv, "Write the predictions as CSV");
+  parser.file("--card", options->card, "The model card").required();
+  parser.file("--json", options->json, "Write the predictions as JSON");
+  parser.file("--csv", options->csv, "Write the predictions as CSV");
   add_threads(parser, options->threads);
   parser.footer(
       "Cards come from `unhand fit LOG --card FILE` (with uncertainties) and from\n"

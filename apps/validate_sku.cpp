@@ -92,9 +92,9 @@ Command validate_sku_command(Parser& root) {
   Parser& parser = root.subcommand(
       "validate-sku", "Can this object be thrown with this gripper, so that it lands as predicted?");
   parser.option("SKU", options->sku, "The object as an SKU file (TOML)").required();
-  parser.option("--card", options->card, "The gripper's model card, of `unhand fit`").required();
-  parser.option("--log", options->log,
-                "Throws whose motion and normal force are taken; those of this object are judged");
+  parser.file("--card", options->card, "The gripper's model card, of `unhand fit`").required();
+  parser.file("--log", options->log,
+              "Throws whose motion and normal force are taken; those of this object are judged");
   parser.option("--condition", options->condition,
                 "Which of the log's conditions; otherwise that with the least spread");
   parser.option("--tolerance", options->tolerance, "METRES,DEGREES about the predicted landing")
@@ -112,8 +112,8 @@ Command validate_sku_command(Parser& root) {
       .range(100, 1'000'000)
       .with_default();
   parser.option("--seed", options->request.seed, "Of the draws").with_default();
-  parser.option("--json", options->json, "Write the answer as JSON");
-  parser.option("--report", options->report, "A directory for the tables (Markdown), figures and JSON");
+  parser.file("--json", options->json, "Write the answer as JSON");
+  parser.file("--report", options->report, "A directory for the tables (Markdown), figures and JSON");
   add_threads(parser, options->request.threads);
   parser.footer(
       "Without --log, the motion is the middle flip of the synthetic campaign batch180 and the gripper\n"

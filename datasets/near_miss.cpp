@@ -10,6 +10,20 @@ namespace unhand::datasets {
 namespace {
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+bool is_letter_or_digit(char c) { return (c >= '0' && c <= '9') || (lower(c) >= 'a' && lower(c) <= 'z'); }
+
+/// "ftt", "f_t" or "fts" for "ft"; "ft2" is another name.
+bool has_one_too_many(std::string_view name, std::string_view known) {
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    std::string rest(name);
+    rest.erase(i, 1);
+    if (edit_distance(rest, known) != 0) continue;
+    const bool doubled = i > 0 && lower(name[i]) == lower(name[i - 1]);
+    const bool plural = i + 1 == name.size() && lower(name[i]) == 's';
+    if (doubled || plural || !is_letter_or_digit(name[i])) return true;
+  }
+  return false;
+}
 
 }  // namespace
 
@@ -37,7 +51,9 @@ bool is_near_miss(std::string_view name, std::string_view known) {
   const int distance = edit_distance(name, known);
   if (known.size() <= 3) {
     const auto equal = [](char a, char b) { return lower(a) == lower(b); };
-    return distance <= 1 && std::is_permutation(name.begin(), name.end(), known.begin(), known.end(), equal);
+    return distance <= 1 &&
+           (std::is_permutation(name.begin(), name.end(), known.begin(), known.end(), equal) ||
+            has_one_too_many(name, known));
   }
   return distance <= (known.size() <= 5 ? 1 : 2);
 }

@@ -12,7 +12,7 @@ namespace unhand::datasets {
 int edit_distance(std::string_view a, std::string_view b);
 
 /// True when `name` is plausibly `known` misspelt: one step for names up to five letters (for names up to
-/// three only a swap or another case), two for longer ones.
+/// three only a swap, another case, a letter twice, an s at the end or a sign), two for longer ones.
 bool is_near_miss(std::string_view name, std::string_view known);
 
 /// The nearest of `known` that `name` misses, or nothing.

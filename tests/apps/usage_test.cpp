@@ -93,6 +93,11 @@ TEST_F(Cli, WrongUsage) {
                  "given twice");
   expect_refusal("generate quick12 --out ''", 2, "--out: '' names no file");
   expect_refusal("figure mae --out ''", 2, "--out: '' names no file");
+  expect_refusal("figure mae --log '' --out out", 2, "--log: '' names no file");
+  expect_refusal("compare " + quick + " --models limit_surface --json ''", 2, "--json: '' names no file");
+  expect_refusal("compare " + quick + " --models limit_surface --report ''", 2, "--report: '' names no file");
+  expect_refusal("fit " + quick + " --model limit_surface --card ''", 2, "--card: '' names no file");
+  expect_refusal("import phyphox a --mass 0.2 --out a.h5 --into ''", 2, "--into: '' names no file");
   expect_refusal("compare " + quick + " --rtol nan", 2, "finite");
 }
 
@@ -394,6 +399,16 @@ TEST_F(Cli, Inspect) {
   EXPECT_EQ(seen["schema"], "inspect");
   EXPECT_EQ(seen["throws"], 12);
   EXPECT_EQ(json::parse(run("inspect " + quick + " --json").out), seen);
+}
+
+TEST_F(Cli, TheNameOfALogNeedNotBeUtf8) {
+  fs::copy_file(quick, folder / "w\xfcrfe.h5");
+  const std::string log = "w\xfcrfe.h5", seen = "w\uFFFDrfe.h5";
+  ASSERT_EQ(run("inspect " + log + " --json a.json").code, 0);
+  EXPECT_EQ(read_json(folder / "a.json")["log"], seen);
+  ASSERT_EQ(run("fit " + log + " --model gripper_delay --card card.json --json fit.json").code, 0);
+  EXPECT_EQ(read_json(folder / "fit.json")["log"], seen);
+  EXPECT_EQ(read_json(folder / "card.json")["log"]["file"], seen);
 }
 
 TEST_F(Cli, InspectSaysWhatIsTakenForANoiseThatIsNotDeclared) {

@@ -26,12 +26,19 @@ TEST(NearMiss, TellsMisspellingsFromOtherWords) {
                                                                   {"unit", "units"},
                                                                   {"tf", "ft"},
                                                                   {"IMU", "imu"},
+                                                                  {"ftt", "ft"},
+                                                                  {"fft", "ft"},
+                                                                  {"F_T", "ft"},
+                                                                  {"imus", "imu"},
                                                                   {"poses", "pose"}}) {
     EXPECT_TRUE(is_near_miss(name, known)) << name << " for " << known;
   }
   for (const auto& [name, known] :
        std::initializer_list<std::pair<const char*, const char*>>{{"twist", "twist"},
                                                                   {"fx", "ft"},
+                                                                  {"ft2", "ft"},
+                                                                  {"fto", "ft"},
+                                                                  {"aft", "ft"},
                                                                   {"sky", "sku"},
                                                                   {"colour", "source"},
                                                                   {"torque", "twist"},

@@ -107,6 +107,8 @@ const Case planar_cases[] = {
      "did you mean 'mocap'"},
     {"short_group_swapped", [](const Editor& f) { f.rename(ft, one + "/tf"); }, "/throws/001/tf",
      "did you mean 'ft'"},
+    {"short_group_stutters", [](const Editor& f) { f.rename(ft, one + "/ftt"); }, "/throws/001/ftt",
+     "did you mean 'ft'"},
     {"group_is_dataset",
      [](const Editor& f) {
        f.remove(hand);
