@@ -106,13 +106,23 @@ std::vector<UnitDoubt> turned_grasps(const datasets::ThrowLog& log) {
                        turn, angles.size())}};
 }
 
+/// Whether wrenches of slipping pads go with the normal force, as in any unit they do. A bias of either, or a
+/// force that acts later than it says, counts for more the less is left of it.
+bool is_one_factor(const RatiosByColumn& ratios) {
+  constexpr double kGrowth = 1.5;
+  const auto found = ratios.find(SizedColumn::slip_growth);
+  if (found == ratios.end()) return true;
+  const double growth = dynamics::median(found->second);
+  return growth < kGrowth && growth > 1 / kGrowth;
+}
+
 std::vector<UnitDoubt> doubtful_friction(const RatiosByColumn& ratios) {
   const auto found = ratios.find(SizedColumn::slip_force);
   if (found == ratios.end()) return {};
   const auto& friction = found->second;
   const double mu = dynamics::median(friction);
   const bool dead = mu == 0;  // a wrench that says nothing is no unit
-  if (dead || (mu >= kLeastFriction && mu <= kMostFriction)) return {};
+  if (dead || !is_one_factor(ratios) || (mu >= kLeastFriction && mu <= kMostFriction)) return {};
   return {{"/throws/*/ft/normal_force", "f_N", mu, static_cast<int>(friction.size()),
            fmt::format("where the pads slip their wrench takes a friction of {:.3g} of it (median of {} "
                        "throws), and there are pads of {} to {}: {}?",

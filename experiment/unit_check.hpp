@@ -42,7 +42,8 @@ inline constexpr double kLeastOutlier = 5;
 /// - the clocks of the groups with each other; a declared grasp_angle with a whole turn;
 /// - the wrench with the normal force while that falls through its last fifth and the pads slip: no
 ///   channel knows the unit of the normal force, of which only the product with friction is determined, but
-///   in another one friction lies outside [kLeastFriction, kMostFriction];
+///   in another one friction lies outside [kLeastFriction, kMostFriction], by the same factor (1.5) in the
+///   upper and the lower half of that fifth;
 /// - a declared inertia with what a body of that mass and size can have, and a declared pad_radius with the
 ///   objects (declared_check.hpp);
 /// - each axis by itself, and the signs of the wrench and the normal force (axis_check.hpp);

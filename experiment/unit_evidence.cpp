@@ -213,8 +213,16 @@ void check_landing(const Held& held, SizeRatios& out) {
   }
 }
 
-/// The pads slip while the normal force falls through its last fifth. Their torque, where a declared radius
-/// tells what it counts for, uses up friction, too: of an ellipsoid, and within sqrt(2) of any other law.
+/// What a series reads at its end: median of its last samples.
+double at_the_end(const Series& series) {
+  constexpr std::ptrdiff_t kLast = 9;
+  const auto n = static_cast<std::ptrdiff_t>(series.data.size());
+  return dynamics::median(std::vector<double>(series.data.end() - std::min(n, kLast), series.data.end()));
+}
+
+/// The pads slip while the normal force falls through its last fifth, down to where it stays. Their torque,
+/// where a declared radius tells what it counts for, uses up friction, too: of an ellipsoid, and within
+/// sqrt(2) of any other law.
 void check_friction(const datasets::ThrowLog& log, const datasets::FtLog& ft, double opening,
                     SizeRatios& out) {
   const double length =
@@ -222,12 +230,23 @@ void check_friction(const datasets::ThrowLog& log, const datasets::FtLog& ft, do
   const auto& force = ft.normal_force;
   if (force.empty()) return;
   const double most = *std::max_element(force.data.begin(), force.data.end()),
-               sigma = force.sigma.empty() ? 0 : force.sigma.front(), low = std::max(0.02 * most, 4 * sigma);
-  std::vector<double> ratios;
+               sigma = force.sigma.empty() ? 0 : force.sigma.front(),
+               low = std::max(0.0, at_the_end(force)) + std::max(0.02 * most, 4 * sigma);
+  std::vector<std::pair<double, double>> slips;  // normal force, and friction
   for (std::size_t i = 0; i < ft.time.rows; ++i)
     if (ft.time(i) > opening && force(i) > low && force(i) < 0.2 * most)
-      ratios.push_back(std::hypot(ft.wrench(i, 0), ft.wrench(i, 1), ft.wrench(i, 2) / length) / force(i));
-  if (!ratios.empty()) keep(out, SizedColumn::slip_force, dynamics::median(ratios));
+      slips.emplace_back(force(i),
+                         std::hypot(ft.wrench(i, 0), ft.wrench(i, 1), ft.wrench(i, 2) / length) / force(i));
+  if (slips.empty()) return;
+  std::sort(slips.begin(), slips.end());
+  const auto friction = [&](std::size_t from, std::size_t to) {
+    std::vector<double> of;
+    for (std::size_t i = from; i < to; ++i) of.push_back(slips[i].second);
+    return dynamics::median(of);
+  };
+  const std::size_t n = slips.size();
+  keep(out, SizedColumn::slip_force, friction(0, n));
+  if (n >= 2) keep(out, SizedColumn::slip_growth, friction((n + 1) / 2, n) / friction(0, n / 2));
 }
 
 }  // namespace

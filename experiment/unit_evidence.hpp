@@ -29,6 +29,7 @@ enum class SizedColumn {
   landing_x,      ///< against a free flight from the opening
   landing_turn,   ///< against the angle that motion capture saw last
   slip_force,     ///< tangential over normal force where the pads slip: a friction coefficient
+  slip_growth,    ///< that of the upper half of these normal forces over that of the lower half
 };
 
 /// Size over what the other source tells, where the throw has a say.

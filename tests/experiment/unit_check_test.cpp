@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 #include <numbers>
+#include <tuple>
 
 #include "tests/support/data_folder.hpp"
 #include "tests/support/small_campaign.hpp"
@@ -236,6 +237,20 @@ TEST(UnitCheck, WhatASensorMayHaveRaisesNoDoubt) {
     for (std::size_t i = 0; i < one.ft->wrench.rows; ++i) one.ft->wrench(i, 0) = 0.125;  // dead
   }
   for (const auto& doubt : unit_doubts(log)) ADD_FAILURE() << doubt.path << ": " << doubt.reason;
+}
+
+TEST(UnitCheck, WhatAnEffectMakesOfTheFrictionIsNoUnit) {
+  for (const auto& [effect, seed, size] : {std::tuple{"sensor.normal_force_bias.bias", 7, 4.0},
+                                           {"sensor.ft_bias.tau", 7, 0.05},
+                                           {"sensor.ft_bias.fx", 7, 7.0},
+                                           {"contact.adhesion.f_adh", 7, 15.0},
+                                           {"release.opening_delay.delay", 5, 0.03},
+                                           {"release.opening_delay.delay", 7, -0.01}}) {
+    auto design = random_campaign(static_cast<std::uint64_t>(seed));
+    design.effects[effect] = size;
+    for (const auto& doubt : unit_doubts(generate_campaign(design, static_cast<std::uint64_t>(seed))))
+      ADD_FAILURE() << effect << " = " << size << ": " << doubt.path << ": " << doubt.reason;
+  }
 }
 
 TEST(UnitCheck, OneThrowInAnotherUnitIsToldByItsOwnPath) {
