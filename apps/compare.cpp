@@ -17,6 +17,7 @@
 #include "apps/tell.hpp"
 #include "apps/throws.hpp"
 #include "apps/weak_grip.hpp"
+#include "contact/registry.hpp"
 #include "datasets/near_miss.hpp"
 #include "experiment/free_flight.hpp"
 #include "experiment/friction_estimate.hpp"
@@ -87,10 +88,21 @@ void tell_not_compared(const std::vector<NotCompared>& all) {
   for (const auto& helps : advice) tell("unhand: {}\n", helps);
 }
 
-void compare_releases(const CompareRequest& request, const datasets::ThrowLog& log) {
+/// Whether what it follows is a measured normal force: neither a fit nor a card says how the pads open.
+bool follows_measured_force(const std::string& model, const CompareRequest& request,
+                            const std::map<std::string, UsableCard>& cards) {
+  const bool follows = model == release::kNaiveModel || contact::follows_pads(model);
+  return follows && !request.fit && !cards.contains(model);
+}
+
+void compare_releases(const CompareRequest& request, datasets::ThrowLog log) {
   const bool named = !request.models.empty();
   auto models = named ? request.models : usual_models();
   const auto cards = read_usable_cards(request.cards, models, named);
+  // All models have the same throws.
+  if (std::any_of(models.begin(), models.end(),
+                  [&](const auto& model) { return follows_measured_force(model, request, cards); }))
+    leave_out_forceless(log);
   const auto prepared = experiment::prepare_all(log, request.log, request.threads, false);
   ReleaseRun run(request, log, prepared);
   std::vector<NotCompared> unanswered;
@@ -149,7 +161,7 @@ void compare(const CompareRequest& request) {
     compare_slips(request);
     return;
   }
-  const auto log = read_throws(request.log);
+  auto log = read_throws(request.log);
   const bool flights =
       log.dimension == 3 || std::none_of(log.throws.begin(), log.throws.end(),
                                          [](const auto& one) { return one.hand.has_value(); });
@@ -171,7 +183,7 @@ void compare(const CompareRequest& request) {
   }
   if (flights && request.fit)
     throw Unanswered("free flights hold nothing to fit here: leave out --fit, or use `unhand discover`");
-  if (!flights) return compare_releases(request, log);
+  if (!flights) return compare_releases(request, std::move(log));
   request.cards.empty() ? compare_flights(request, log) : compare_with_card(request, log);
 }
 

@@ -276,7 +276,8 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
           datasets::unknown_name(fmt::format("--models: there is no model '{}'", model), model, known));
   if (options.engine == "bullet" && !crosscheck::has_bullet())
     throw Unanswered("built without Bullet (Debian package libbullet-dev)");
-  const auto log = read_throws(options.log);
+  auto log = read_throws(options.log);
+  if (options.card.empty()) leave_out_forceless(log);
   auto throws = experiment::prepare_all(log, options.log, options.threads, false);
   std::string from;
   const auto parameters = parameters_of(options, log, throws, from);

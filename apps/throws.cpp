@@ -66,6 +66,10 @@ datasets::ThrowLog read_throws(const std::string& file) {
   return log;
 }
 
+void leave_out_forceless(datasets::ThrowLog& log) {
+  leave_out(log, "have no normal force, which the others have", [](const auto& one) { return !one.ft; });
+}
+
 std::string origin_text(const datasets::ThrowLog& log) {
   return log.title + (log.title.empty() || log.source.empty() ? "" : "; ") + log.source;
 }

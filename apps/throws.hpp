@@ -17,6 +17,10 @@ namespace unhand::apps {
 /// overlap; Unanswered where it holds no throws.
 datasets::ThrowLog read_throws(const std::string& file);
 
+/// Leaves out, and says so on stderr, throws without a normal force, as long as others have one: for models
+/// that follow the pads and are not told how these open.
+void leave_out_forceless(datasets::ThrowLog& log);
+
 /// Title and source as the log declares them: "synthetic throws: ...; synthetic: simulated by ...".
 std::string origin_text(const datasets::ThrowLog& log);
 /// Of a slip-log: how many surfaces, and what is said of the first.

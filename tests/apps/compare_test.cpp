@@ -76,6 +76,30 @@ TEST_F(Cli, ThrowsWithoutAHandAreLeftOutWhereOthersHaveOne) {
               HasSubstr("note: 1 of 12 throws have no hand and are held at first"));
 }
 
+// Neither does one without the sensor, and all models are judged by the same throws.
+TEST_F(Cli, ThrowsWithoutANormalForceAreLeftOutOfModelsThatFollowIt) {
+  int k = 0;
+  write_changed("one.h5", [&](datasets::Throw& one) {
+    if (k++ == 2) one.ft.reset();
+  });
+  const std::string told = "left out 1 of 12 throws, which have no normal force, which the others have: 003";
+  const auto throws_of = [&](const std::string& options, const char* model) {
+    const Answer answer = run("compare one.h5 " + options + " --json a.json");
+    EXPECT_EQ(answer.code, 0) << answer.err;
+    EXPECT_EQ(
+        answer.err.find(told) != std::string::npos,
+        options.find("limit_surface") != std::string::npos && options.find("--fit") == std::string::npos)
+        << options;
+    const json of = read_json(folder / "a.json")["models"][model];
+    return of["train"]["n"].get<int>() + of["test"]["n"].get<int>();
+  };
+  EXPECT_EQ(throws_of("--models limit_surface,gripper_delay", "limit_surface"), 11);
+  EXPECT_EQ(throws_of("--models limit_surface,gripper_delay", "gripper_delay"), 11);
+  EXPECT_EQ(throws_of("--models gripper_delay", "gripper_delay"), 12);
+  EXPECT_EQ(throws_of("--models limit_surface --fit", "limit_surface"), 12);
+  EXPECT_THAT(run("crosscheck one.h5 --engine cvode --models limit_surface").err, HasSubstr(told));
+}
+
 TEST_F(Cli, BlanksAroundNamesMeanNothing) {
   auto log = datasets::read_throw_log(quick);
   const std::string first = log.throws.front().condition;
