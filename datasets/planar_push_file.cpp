@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "datasets/attribute_fields.hpp"
 #include "datasets/log_error.hpp"
 
 namespace unhand::datasets {
@@ -72,6 +73,8 @@ class Lines {
   void next(std::string_view what) {
     ++number_;
     if (!std::getline(in_, text_)) fail(fmt::format("the file ends where {} should be", what));
+    if (number_ == 1 && text_.starts_with("\xef\xbb\xbf")) text_.erase(0, 3);  // a byte order mark
+    if (!is_utf8_text(text_)) fail("is not UTF-8 text");
   }
 
   static std::string_view word(std::string_view& rest) {

@@ -12,6 +12,11 @@ namespace {
 
 constexpr double kStandardGravity = 9.80665, kPoundForce = 4.4482216;
 constexpr OtherUnit kLengths[] = {{1e3, "mm for m"}, {100, "cm for m"}, {1 / 0.0254, "inches for m"}};
+constexpr OtherUnit kFalls[] = {{1e3, "mm for m"},
+                                {100, "cm for m"},
+                                {1 / 0.0254, "inches for m"},
+                                {1e-6, "mocap/time in ms for s"},
+                                {1e-12, "mocap/time in us for s"}};
 constexpr OtherUnit kSpeeds[] = {{1e3, "mm/s for m/s"}, {100, "cm/s for m/s"}};
 constexpr OtherUnit kAccelerations[] = {
     {1e3, "mm/s^2 for m/s^2"}, {100, "cm/s^2 for m/s^2"}, {1 / kStandardGravity, "g for m/s^2"}};
@@ -49,7 +54,7 @@ const std::map<SizedColumn, UnitRule> kRules{
      {{"hand/twist", "omega", kRates},
       {"hand/acceleration", "alpha", kAngularAccelerations},
       "added up over time"}},
-    {SizedColumn::fall, {{"mocap/pose", "position", kLengths}, kDeclared, "gravity makes of a free flight"}},
+    {SizedColumn::fall, {{"mocap/pose", "position", kFalls}, kDeclared, "gravity makes of a free flight"}},
     {SizedColumn::held_shift,
      {{"mocap/pose", "position", kLengths}, {"hand/pose", "position", kLengths}, "while the object is held"}},
     {SizedColumn::held_turn,

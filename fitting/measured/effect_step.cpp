@@ -42,6 +42,20 @@ bool is_pinned(const GroupedFit& fit) {
   return false;
 }
 
+/// Whether a candidate that is nothing without an accepted effect, as the anisotropy of a drag is, leaves
+/// that one told: each of its sizes at most so many times less surely than before. Else what tells the
+/// candidate is not what it shapes along directions that groups move in, but a guess along others.
+bool keeps_what_it_shapes(const GroupedProblem& problem, const EffectAnswer& answer,
+                          const EffectTrial& trial) {
+  constexpr double kLessSure = 10;
+  for (std::size_t k = 0; k < answer.train.shared.size(); ++k) {
+    const SharedParameter& p = answer.train.shared[k];
+    if (p.shape || problem.may_act(trial.id, answer.ids_without(p.effect))) continue;
+    if (!(trial.fit.sigma(k) < kLessSure * answer.train.sigma(k))) return false;
+  }
+  return true;
+}
+
 /// A candidate to first order: the χ² that it would take away, at which sizes, and Wald's p-value of them.
 struct Scored {
   const Candidate* candidate;
@@ -151,6 +165,7 @@ EvidentEffects evident_effects(const GroupedProblem& problem, const std::vector<
     r.refit_step = answer.step(), r.delta_bic = trial.delta_bic, r.held_out_gain = trial.held.fall();
     if (!trial.fit.solved || !(trial.p < out.level) || shape_is_open(trial.fit, id)) continue;
     if (is_pinned(trial.fit) || !problem.may_be(trial.fit)) continue;
+    if (!keeps_what_it_shapes(problem, answer, trial)) continue;
     out.trials.push_back(std::move(trial));
   }
   std::sort(out.trials.begin(), out.trials.end(),

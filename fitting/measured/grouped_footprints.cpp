@@ -9,8 +9,7 @@
 
 namespace unhand::fitting {
 
-using dynamics::congruent, dynamics::gram, dynamics::least_squares, dynamics::product,
-    dynamics::pseudo_inverse;
+using dynamics::gram, dynamics::least_squares, dynamics::product, dynamics::pseudo_inverse;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -138,7 +137,7 @@ std::vector<FootprintProfile> footprint_profiles(const GroupedProblem& problem, 
 LinearStep linear_step(const std::vector<MatrixXd>& parts, const std::vector<std::size_t>& which,
                        const std::vector<Index>& columns) {
   const auto p = static_cast<Index>(columns.size()), r = parts.front().rows() - 1;
-  MatrixXd A = MatrixXd::Zero(p, p), B = A;
+  MatrixXd A = MatrixXd::Zero(p, p), scores = MatrixXd::Zero(p, static_cast<Index>(which.size()));
   VectorXd b = VectorXd::Zero(p);
   for (const std::size_t n : which) {
     A += parts[n](columns, columns);
@@ -148,13 +147,14 @@ LinearStep linear_step(const std::vector<MatrixXd>& parts, const std::vector<std
   LinearStep out;
   out.value = -inverse * b;
   double used = 0;
-  for (const std::size_t n : which) {
-    const VectorXd score =
-        VectorXd(parts[n](columns, std::vector<Index>{r})) + MatrixXd(parts[n](columns, columns)) * out.value;
-    B += score * score.transpose();
-    used += parts[n](r, r) > 0 ? 1 : 0;
+  for (std::size_t k = 0; k < which.size(); ++k) {
+    const MatrixXd& part = parts[which[k]];
+    scores.col(static_cast<Index>(k)) =
+        VectorXd(part(columns, std::vector<Index>{r})) + MatrixXd(part(columns, columns)) * out.value;
+    used += part(r, r) > 0 ? 1 : 0;
   }
-  out.covariance = congruent(inverse, B) * (used / std::max(1.0, used - static_cast<double>(p)));
+  out.covariance =
+      gram(product(scores.transpose(), inverse)) * (used / std::max(1.0, used - static_cast<double>(p)));
   out.sigma = out.covariance.diagonal().cwiseMax(inverse.diagonal()).cwiseSqrt();
   return out;
 }

@@ -12,8 +12,8 @@
 
 namespace unhand::fitting {
 
-using dynamics::congruent, dynamics::gram, dynamics::least_squares, dynamics::product,
-    dynamics::pseudo_inverse, dynamics::pseudo_solve;
+using dynamics::gram, dynamics::least_squares, dynamics::product, dynamics::pseudo_inverse,
+    dynamics::pseudo_solve;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -88,7 +88,7 @@ class Solver {
     fit_.chi2 = 0, fit_.samples = 0, fit_.used = 0;
     long unknowns = fit_.values.size();
     const Index p = fit_.values.size();
-    MatrixXd A = MatrixXd::Zero(p, p), B = MatrixXd::Zero(p, p);
+    MatrixXd A = MatrixXd::Zero(p, p), scores = MatrixXd::Zero(p, static_cast<Index>(used_.size()));
     for (std::size_t n = 0; n < used_.size(); ++n) {
       GroupFit& g = fit_.groups[used_[n]];
       const Group& group = problem_.groups()[used_[n]];
@@ -105,7 +105,7 @@ class Solver {
       unknowns += g.own.size();
       ++fit_.used;
       A += w * parts_[n].information;
-      B += w * w * parts_[n].score * parts_[n].score.transpose();
+      scores.col(static_cast<Index>(n)) = w * parts_[n].score;
     }
     for (std::size_t n = 0; n < used_.size(); ++n)  // what is known beforehand counts as measured
       for (const auto& row : problem_.groups()[used_[n]].rows)
@@ -115,7 +115,9 @@ class Solver {
     if (p == 0) return;
     const MatrixXd inverse = pseudo_inverse(A);
     const double n = fit_.used;
-    fit_.covariance = congruent(inverse, B) * (n / std::max(1.0, n - static_cast<double>(p)));
+    // A gram matrix: symmetric and nowhere negative, however alike two parameters are.
+    fit_.covariance =
+        gram(product(scores.transpose(), inverse)) * (n / std::max(1.0, n - static_cast<double>(p)));
     VectorXd widened = VectorXd::Ones(p);  // no parameter is surer than independent noise would let it be
     for (Index j = 0; j < p; ++j)
       if (fit_.covariance(j, j) < inverse(j, j))
@@ -129,7 +131,7 @@ class Solver {
       range[j] = std::pow(s.high - s.low, 2) / 12;
     }
     if (unseen.diagonal().maxCoeff() > 1e-3)
-      fit_.covariance += congruent(unseen, MatrixXd(range.asDiagonal()));
+      fit_.covariance += gram(range.cwiseSqrt().asDiagonal() * unseen.transpose());
     if (!fit_.covariance.allFinite())
       fit_.solved = false, fit_.message = "the shared parameters are not determined";
   }

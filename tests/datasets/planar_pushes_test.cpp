@@ -206,6 +206,12 @@ TEST(PlanarPushes, SeveralLogsAndARoundTrip) {
   EXPECT_TRUE(import_planar_pushes(std::vector<fs::path>{scratch / "logs"}).surfaces.contains("two-b"));
 }
 
+// As editors write it.
+TEST(PlanarPushes, AByteOrderMarkIsPassedOver) {
+  const Scratch scratch;
+  EXPECT_EQ(import_text(scratch, "\xef\xbb\xbf" + log_of({{}})).surfaces.at("felt").slips.size(), 1U);
+}
+
 TEST(PlanarPushes, SaysWhichLineAndColumn) {
   const Scratch scratch;
   const std::string file = scratch / "p.txt";
@@ -219,6 +225,7 @@ TEST(PlanarPushes, SaysWhichLineAndColumn) {
   expect("", "line 1", "the file ends where number of pushes should be");
   expect("many\n", "line 1, column number of pushes", "'many' is not an integer");
   expect("0\n", "line 1, column number of pushes", "0 is not in 1");
+  expect("1\n\xff\xfe 2 3 1 0 0 0\n", "line 2", "is not UTF-8 text");
   expect("1\n1 2 3 1 0 0\n", "line 2, column qz", "6 of 7 numbers");
   expect("1\n1 2 3 1 0 0 0 9\n", "line 2, column 8", "'9' after the 7 numbers");
   expect("1\n1 x 3 1 0 0 0\n", "line 2, column y", "'x' is not a number");

@@ -330,6 +330,11 @@ TEST(UnitCheck, GravityMeasuresTheLengthsOfAFreeFlight) {
     for (auto& toss : all.throws) scale(toss.mocap->pose, 1e3, 0, columns);
     ASSERT_FALSE(unit_doubts(all).empty()) << dimension;
     EXPECT_EQ(unit_doubts(all).front().path, "/throws/*/mocap/pose");
+    all = clean;
+    for (auto& toss : all.throws)
+      for (double& t : toss.mocap->time.data) t *= 1e3;
+    ASSERT_FALSE(unit_doubts(all).empty()) << dimension;
+    EXPECT_THAT(unit_doubts(all).front().reason, HasSubstr("mocap/time in ms for s?"));
   }
 }
 

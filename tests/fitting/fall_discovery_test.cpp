@@ -506,6 +506,78 @@ TEST(EffectSearch, TwoThatLookLikeOneAreFoundWhereTheSearchBeginsOtherwise) {
   EXPECT_LT(found.final_test.chi2, 1.3 * static_cast<double>(found.final_test.samples));
 }
 
+/// A drag along three axes, of which groups show one directly and the two others `seen` times as much: k is
+/// 20 sigma along z, and what they show of x is 5 sigma.
+class DragAlongAxes final : public GroupedProblem {
+ public:
+  explicit DragAlongAxes(double seen) : seen_(seen) {
+    std::mt19937_64 random(4);
+    std::normal_distribution<double> normal;
+    channels_ = {"x", "y", "z"}, covariates_ = {"order"};
+    for (int k = 0; k < 24; ++k) {
+      Group group{"group-" + std::to_string(k),
+                  "thing",
+                  "all",
+                  k % 4 == 3 ? datasets::Split::test : datasets::Split::train,
+                  {},
+                  {0},
+                  {static_cast<double>(k)}};
+      Eigen::VectorXd noise(30);
+      for (int i = 0; i < 30; ++i) group.rows.push_back({i % 3, 0.01 * i}), noise[i] = normal(random);
+      group.rows.push_back({kPriorChannel, 0});
+      noise_.push_back(noise);
+      groups_.push_back(std::move(group));
+    }
+  }
+  std::vector<dynamics::Effect> effects() const override {
+    std::vector<dynamics::Effect> out;
+    for (auto& effect : experiment::known_fall_effects())
+      if (effect.id == "flight.quadratic_drag" || effect.id == "flight.drag_by_axis") {
+        effect.per_object = false;
+        for (auto& p : effect.parameters) p.high = 1e6, p.low = p.low < 0 ? -1e6 : 0;
+        out.push_back(effect);
+      }
+    return out;
+  }
+  GroupEquations equations(std::size_t group, std::span<const std::string> names,
+                           std::span<const double> values, const Eigen::VectorXd& own,
+                           Derivatives) const override {
+    const std::map<std::string, std::array<double, 3>> along{{"flight.quadratic_drag.k", {1, 1, 1}},
+                                                             {"flight.drag_by_axis.a_x", {1, 0, -1}},
+                                                             {"flight.drag_by_axis.a_y", {0, 1, -1}}};
+    GroupEquations out{true, Eigen::VectorXd(31), Eigen::MatrixXd::Zero(31, static_cast<long>(names.size())),
+                       Eigen::MatrixXd::Zero(31, 1)};
+    for (Eigen::Index i = 0; i < 30; ++i) {
+      const auto axis = static_cast<std::size_t>(i % 3);
+      out.residual[i] = -std::array{5.0, 0.0, 20.0}[axis] - noise_[group][i];
+      for (std::size_t k = 0; k < names.size(); ++k) {
+        const double by = (axis < 2 ? seen_ : 1) * along.at(names[k])[axis];
+        out.shared(i, static_cast<Eigen::Index>(k)) = by;
+        out.residual[i] += by * values[k];
+      }
+    }
+    out.residual[30] = own[0], out.own(30, 0) = 1;
+    return out;
+  }
+
+ private:
+  double seen_;
+  std::vector<Eigen::VectorXd> noise_;
+};
+
+// What hardly moves along an axis cannot say how it brakes there: the mean over all axes would be a guess.
+TEST(EffectSearch, ADragByAxisIsNotFoundAlongAxesThatNothingMovesAlong) {
+  std::vector<std::vector<std::string>> found;
+  for (const double seen : {1.0, 0.02}) {
+    const EffectSearch search = search_effects(DragAlongAxes(seen), {});
+    ASSERT_TRUE(search.solved);
+    auto& ids = found.emplace_back();
+    for (const auto& effect : search.effects) ids.push_back(effect.id);
+  }
+  EXPECT_THAT(found[0], testing::UnorderedElementsAre("flight.quadratic_drag", "flight.drag_by_axis"));
+  EXPECT_THAT(found[1], testing::ElementsAre("flight.quadratic_drag"));
+}
+
 TEST(SurfaceDiscovery, AnEllipsoidMissesNothing) {
   const Eigen::Matrix3d diagonal = Eigen::Vector3d(1 / 16.0, 1 / 9.0, 1 / 25.0).asDiagonal();
   SurfaceDiscoveryOptions options;

@@ -449,6 +449,16 @@ TEST(FlightDiscovery, AGrossFlightNearTheOthersCostsNoSecondSearch) {
   EXPECT_LT(flights.asked, 1.7 * one_search);
 }
 
+// Not so far off that they are set aside, but what is left of them is most of what is left.
+TEST(FlightDiscovery, AFewFlightsThatErrMoreDoNotTakeBackWhatAllOthersShow) {
+  auto log = spatial_flights({.length_scale = -0.008}, {}, 64);
+  for (const std::size_t k : {3U, 12U, 21U, 34U, 37U}) pull_by(0.055, log.throws[k]);
+  const auto found = found_in(log);
+  EXPECT_TRUE(found.skipped.empty());
+  EXPECT_EQ(found.verdict, Verdict::effect_found);
+  expect_value(found, "sensor.length_scale", "scale", 0.992);
+}
+
 // Half of the flights, or every seventh, are no strays.
 TEST(FlightDiscovery, ManyWildFlightsAreUnexplained) {
   SpatialDesign design;

@@ -118,5 +118,59 @@ TEST(GroupedFit, IsTheSameFromWhereAnotherFitEnded) {
   EXPECT_NEAR(near.chi2, far.chi2, 1e-6 * far.chi2);
 }
 
+/// y = a x + b (x + e x²) + an offset of each group: for a small e, a and b do nearly the same.
+class NearlyTheSame final : public GroupedProblem {
+ public:
+  explicit NearlyTheSame(double e) : e_(e) {
+    channels_ = {"y"};
+    std::mt19937_64 random(6);
+    std::normal_distribution<double> noise;
+    for (int g = 0; g < kGroups; ++g) {
+      Group group{"g" + std::to_string(g), "object", "", datasets::Split::train, {}, {0.0}, {}};
+      std::vector<double> y;
+      for (int i = 0; i < kSamples; ++i) {
+        group.rows.push_back({0, Parabolas::at(i)});
+        y.push_back(noise(random));
+      }
+      groups_.push_back(std::move(group));
+      measured_.push_back(std::move(y));
+    }
+  }
+  std::vector<dynamics::Effect> effects() const override { return {}; }
+  GroupEquations equations(std::size_t group, std::span<const std::string>, std::span<const double> values,
+                           const Eigen::VectorXd& own, Derivatives derivatives) const override {
+    const auto residual = [&]<class S>(const std::vector<S>& shared, const std::vector<S>& offset) {
+      std::vector<S> out;
+      for (int i = 0; i < kSamples; ++i) {
+        const double x = Parabolas::at(i);
+        out.push_back(shared[0] * x + shared[1] * (x + e_ * x * x) + offset[0] - measured_[group][i]);
+      }
+      return out;
+    };
+    return swept({values.begin(), values.end()}, own, derivatives, residual);
+  }
+
+ private:
+  double e_;
+  std::vector<std::vector<double>> measured_;
+};
+
+// A card's reader refuses any other.
+TEST(GroupedFit, TheCovarianceOfParametersThatAreNearlyTheSameIsOne) {
+  for (const double e : {1e-3, 1e-4, 1e-5, 1e-6}) {
+    const NearlyTheSame problem(e);
+    auto wide = parameters(1e9);
+    for (auto& p : wide) p.low = -1e9, p.high = 1e9;
+    const auto fit = fit_groups(problem, datasets::Split::train, wide, Eigen::VectorXd::Zero(2));
+    ASSERT_TRUE(fit.solved) << e;
+    const Eigen::MatrixXd& C = fit.covariance;
+    const double scale = std::sqrt(C(0, 0) * C(1, 1));
+    EXPECT_GT(C(0, 0), 0) << e;
+    EXPECT_GT(C(1, 1), 0) << e;
+    EXPECT_LE(std::abs(C(0, 1) - C(1, 0)), 1e-12 * scale) << e;
+    EXPECT_LE(std::abs(C(0, 1)), (1 + 1e-12) * scale) << e;
+  }
+}
+
 }  // namespace
 }  // namespace unhand::fitting
