@@ -2,6 +2,7 @@
 #include "apps/plan_flip.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <limits>
@@ -125,6 +126,11 @@ std::unique_ptr<fl::FlipLearner> learner_of(const PlanFlipOptions& o, const fl::
       o.card.empty()
           ? fl::prior_card(robot)
           : planners::release_card(datasets::read_model_card(o.card), o.card, fl::prior_card(robot));
+  if (!prior.effects.empty())
+    throw datasets::CardError(
+        o.card, "/effects",
+        fmt::format("throw-flips take cards without effects on friction; this one has {}",
+                    fmt::join(prior.effects, ", ")));
   const fl::ReleaseFit fit = fl::fit_release(old, prior, support.data);
   auto learned = fl::model_card_of(fit, old, support.data, o.robot);
   learned.library_version = UNHAND_VERSION;

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
@@ -16,6 +17,7 @@
 #include "apps/progress.hpp"
 #include "apps/tell.hpp"
 #include "apps/throws.hpp"
+#include "contact/friction_effects.hpp"
 #include "contact/registry.hpp"
 #include "datasets/model_card.hpp"
 #include "datasets/sku.hpp"
@@ -146,6 +148,14 @@ std::vector<ThrowAnswer::Number> numbers_of(const planners::ReleaseCard& card,
   add("length", "m", card.length, card.length_sigma);
   for (const auto& [own, value] : contact::given_law_parameters(card.model, card.law_values))
     add(own.name.c_str(), own.unit.c_str(), value, 0);
+  const auto of_effects = contact::effect_values(card.friction);
+  std::size_t k = 0;
+  for (const auto& [effect, apply, apply_dual] : contact::friction_effects())
+    for (const auto& p : effect.parameters) {
+      const double value = *of_effects[k++];
+      if (std::find(card.effects.begin(), card.effects.end(), effect.id) != card.effects.end())
+        add(effect.full_name(p).c_str(), p.unit.c_str(), value, 0);
+    }
   add("pads", "-", card.pads, 0);
   add("grip_force", "N", card.grip_force, 0);
   add("dead_time", "s", card.dead_time.value, card.dead_time.sigma);

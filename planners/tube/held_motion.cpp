@@ -42,10 +42,13 @@ std::unique_ptr<contact::ContactModel> law_of(const ReleaseCard& card, const Dra
   contact::ContactParameters<double> pads;
   pads.patch = contact::Patch<double>::of_length(draw[kMu], draw[kLength], card.pads);
   pads.law_values = card.law_values;
+  pads.variation = card.friction;
   return contact::make_contact_model(card.model, pads);
 }
 
-bool sticks(const contact::ContactModel& law, Scene<double> scene, const Draw& draw) {
+bool sticks(const ReleaseCard& card, const contact::ContactModel& law, Scene<double> scene,
+            const Draw& draw) {
+  scene.normal_force += card.friction.adhesion;
   scene.body = {draw[kMass], draw[kInertia]};
   const contact::Relative<double> held{{draw[kComOffset], 0}, draw[kGraspAngle], {}, 0};
   return law.membership(-1, {0, 1}, StandingScene(scene), 0.0, held).mode == 0;
@@ -81,7 +84,7 @@ HeldMotion::HeldMotion(const ReleaseThrow& problem, const JointTrajectory& motio
 bool HeldMotion::holds(const Draw& draw) const {
   const auto law = law_of(problem_.card, draw);
   return std::all_of(scenes_.rbegin(), scenes_.rend(),
-                     [&](const Scene<double>& scene) { return sticks(*law, scene, draw); });
+                     [&](const Scene<double>& scene) { return sticks(problem_.card, *law, scene, draw); });
 }
 
 std::optional<double> HeldMotion::needed_force() const {
@@ -91,7 +94,7 @@ std::optional<double> HeldMotion::needed_force() const {
   for (Scene<double> scene : scenes_) {
     const auto enough = [&](double force) {
       scene.normal_force = force;
-      return sticks(*law, scene, nominal);
+      return sticks(problem_.card, *law, scene, nominal);
     };
     if (needed > 0 && enough(needed)) continue;
     double low = needed, high = std::max(1e-3, 2 * needed);

@@ -5,8 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <random>
+#include <span>
 #include <stdexcept>
+#include <type_traits>
 
 #include "contact/patch.hpp"
 #include "contact/registry.hpp"
@@ -115,8 +118,45 @@ class CardReader {
     return found->second.sigma;
   }
 
-  /// Parameters that are right on any card of the model and move nothing here.
-  void pass_over(const char* name) { known_.emplace_back(name); }
+  /// What the card's effects make of friction.
+  contact::FrictionVariation<double> friction() {
+    std::vector<std::string> names;
+    std::vector<double> values;
+    for (const std::string& id : card_.effects)
+      if (const dynamics::Effect* effect = effect_of(id))
+        for (const auto& p : effect->parameters) {
+          names.push_back(effect->full_name(p));
+          values.push_back(p.neutral);
+          take(names.back().c_str(), p.unit.c_str(), p.least.value_or(p.low), false, p.high, values.back());
+        }
+    contact::FrictionVariation<double> out;
+    dynamics::apply_effects(contact::friction_effects(),
+                            dynamics::Values<double>(std::span<const std::string>(names), values), out);
+    take("reference_force", "N", 0, true, HUGE_VAL, out.reference_force);
+    try {
+      contact::validate(contact::constant(out));
+    } catch (const std::invalid_argument& error) {
+      throw CardError(file_, "/parameters", error.what());
+    }
+    return out;
+  }
+
+  /// Whose effects the card has; sensors' are of what a log measured or declared, and of no planned throw.
+  const dynamics::Effect* effect_of(const std::string& id) {
+    for (const auto& one : contact::friction_effects())
+      if (one.effect.id == id) {
+        out_.effects.push_back(id);
+        return &one.effect;
+      }
+    if (!id.starts_with("sensor."))
+      throw CardError(file_, "/effects",
+                      fmt::format("plans of throws take effects on friction, and pass over those of sensors; "
+                                  "this card has {}",
+                                  id));
+    for (const auto& [name, ignored] : card_.parameters)
+      if (name.starts_with(id + ".")) known_.push_back(name);
+    return nullptr;
+  }
   void pass_over_spread(const char* name) { spreads_.emplace_back(name); }
 
   void reject_unknown() const {
@@ -161,13 +201,10 @@ ReleaseCard release_card(const datasets::ModelCard& card, const std::string& fil
                          const ReleaseCard& otherwise) {
   if (!contact::follows_pads(card.model) || card.model == release::kNaiveModel || card.model == "projectile")
     throw CardError(file, "/model", fmt::format("'{}' does not say how the pads let go", card.model));
-  if (!card.effects.empty())
-    throw CardError(file, "/effects",
-                    fmt::format("plans of throws take cards without effects; this one has {}",
-                                fmt::join(card.effects, ", ")));
   ReleaseCard out = otherwise;
   out.model = card.model;
   out.law_values.clear();
+  out.effects.clear();
   out.passed_over.clear();
   CardReader reader(card, file, out);
   reader.take("mu", "-", 0, true, contact::kMostMu, out.mu.value, &out.mu.sigma);
@@ -192,7 +229,7 @@ ReleaseCard release_card(const datasets::ModelCard& card, const std::string& fil
   reader.take_or_range("opening_time", "s", true, out.opening_time.value, out.opening_time.sigma, 0,
                        kLeastOpeningSigma);
   reader.take_or_range("shape", "-", true, out.shape, out.shape_sigma, 0, 0);
-  reader.pass_over("reference_force");  // of contact.soft_patch_radius, an effect
+  out.friction = reader.friction();
   reader.pass_over_spread("force_deviation");
   // Friction's limits know the product of mu and the force alone, of which a card without a measured force
   // knows more than of either.
@@ -247,9 +284,18 @@ std::optional<Thrown<S>> throw_once(const ReleaseThrow& p, const release::HandMo
   contact::ContactParameters<S> pads;
   pads.patch = contact::Patch<S>::of_length(draw[kMu], draw[kLength], p.card.pads);
   for (const auto& [name, value] : p.card.law_values) pads.law_values.emplace(name, S(value));
+  if constexpr (std::is_same_v<S, double>)
+    pads.variation = p.card.friction;
+  else
+    pads.variation = contact::constant(p.card.friction);
   const auto law = contact::make_contact_model(p.card.model, pads);
-  const contact::ProfileNormalForce force(contact::OpeningProfile<S>{
+  const contact::ProfileNormalForce pressed(contact::OpeningProfile<S>{
       0.0, S(p.card.grip_force), draw[kDeadTime], draw[kOpeningTime], draw[kShape]});
+  std::optional<contact::AdhesiveForce> adhesive;
+  if (p.card.friction.adhesion > 0)
+    adhesive.emplace(pressed, Dual(p.card.friction.adhesion), Dual(p.card.friction.parting_time));
+  const contact::NormalForce& force =
+      adhesive ? static_cast<const contact::NormalForce&>(*adhesive) : pressed;
   const dynamics::Vec2<S> gravity{S(0.0), S(-p.medium.gravity)};
   if (!(force.release_time() < hand.end())) return {};
   const auto let_go = release::simulate_release<S>({hand,

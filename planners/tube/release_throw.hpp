@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "contact/friction_effects.hpp"
 #include "contact/law_parameter.hpp"
 #include "contact/patch.hpp"
 #include "datasets/model_card.hpp"
@@ -38,14 +39,16 @@ struct NumberOrigin {
 struct ReleaseCard {
   /// A name that contact::make_contact_model knows, of a law that follows the pads (contact::follows_pads).
   std::string model{"limit_surface"};
-  Uncertain mu{0.5, 0.05};                  ///< friction coefficient [-]
-  double length{contact::kFingerLength};    ///< L = τ_max/f_max [m]
-  int pads{2};                              ///< n >= 1
-  double grip_force{40};                    ///< of one pad [N]
-  Uncertain dead_time{0.020, 0.005};        ///< from the command to the first change of the force [s]
-  Uncertain opening_time{0.060, 0.006};     ///< from there until the pads part [s]
-  double shape{1.0};                        ///< p of contact::OpeningProfile [-]
-  contact::LawValues<double> law_values{};  ///< of the law's own parameters
+  Uncertain mu{0.5, 0.05};                        ///< friction coefficient [-]
+  double length{contact::kFingerLength};          ///< L = τ_max/f_max [m]
+  int pads{2};                                    ///< n >= 1
+  double grip_force{40};                          ///< of one pad [N]
+  Uncertain dead_time{0.020, 0.005};              ///< from the command to the first change of the force [s]
+  Uncertain opening_time{0.060, 0.006};           ///< from there until the pads part [s]
+  double shape{1.0};                              ///< p of contact::OpeningProfile [-]
+  contact::LawValues<double> law_values{};        ///< of the law's own parameters
+  contact::FrictionVariation<double> friction{};  ///< of the effects on friction
+  std::vector<std::string> effects{};             ///< ids of these
   double grasp_offset{};  ///< 1 σ of the place of the pads on the object, throw to throw [m]
   double grasp_angle{};   ///< 1 σ of the object's angle in the hand, throw to throw [rad]
   std::map<std::string, NumberOrigin> origins{};  ///< by a number's name on cards; assumed if absent
@@ -61,9 +64,10 @@ inline constexpr double kLeastForceSigma = 0.03,  ///< of the grip force, as its
 /// dead_time, opening_time and shape; else, for these four of the gripper, of its valid range; else those of
 /// `otherwise`. The card's spreads from throw to throw add to σ: mu_deviation, dead_time_deviation,
 /// grasp_offset and grasp_angle; force_deviation is of a log's sensor and passed over. σ of the grip force
-/// counts as friction's, with which it forms one product. Throws datasets::CardError for a card of
-/// gripper_delay, for one with effects, which this planner does not take, and for parameters and spreads that
-/// it does not know.
+/// counts as friction's, with which it forms one product. Effects on friction (contact::friction_effects)
+/// act in the release; those of sensors, of what a log measured or declared, are passed over. Throws
+/// datasets::CardError for a card of gripper_delay, for one with other effects, which this planner does not
+/// take, and for parameters and spreads that it does not know.
 ReleaseCard release_card(const datasets::ModelCard& card, const std::string& file,
                          const ReleaseCard& otherwise = {});
 

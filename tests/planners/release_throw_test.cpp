@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "planners/arm/panda.hpp"
@@ -384,7 +385,7 @@ TEST(ReleaseThrow, TakesModelCards) {
   card.parameters["mu"].unit = "N";
   EXPECT_THROW(release_card(card, "card.json"), datasets::CardError);
   card.parameters["mu"].unit = "-";
-  card.effects = {"contact.viscous"};
+  card.effects = {"release.hand_tracking_lag"};
   EXPECT_THROW(release_card(card, "card.json"), datasets::CardError);
   card.effects.clear();
   card.model = "gripper_delay";
@@ -448,12 +449,79 @@ TEST(ReleaseCard, RefusesWhatItDoesNotTake) {
   card.own_spreads["dead_time_deviation"] = {0.1, "ms"};
   expect_refused(card, "/own_spreads/dead_time_deviation/unit");
   card = quartic(1);
-  card.effects = {"contact.pad_compliance"};
-  expect_refused(card, "contact.pad_compliance");
+  card.effects = {"flight.quadratic_drag"};
+  expect_refused(card, "flight.quadratic_drag");
+  card = quartic(1);
+  card.effects = {"contact.viscous"};
+  card.parameters["contact.viscous.1/v_0"] = {1, {}, "1/s"};
+  expect_refused(card, "/parameters/contact.viscous.1/v_0/unit");
+  card.parameters["contact.viscous.1/v_0"] = {500, {}, "s/m"};
+  expect_refused(card, "/parameters/contact.viscous.1/v_0/value");
+  card = quartic(1);
+  card.effects = {"contact.soft_patch_radius"};
+  card.parameters["contact.soft_patch_radius.gamma"] = {0.3, {}, "-"};
+  expect_refused(card, "f_0 = 0");
   card = quartic(1);
   card.parameters["reference_force"] = {20, {}, "N"};  // every fit's card has it
   card.own_spreads["force_deviation"] = {1, "-"};
   EXPECT_NO_THROW(release_card(card, "card.json"));
+}
+
+/// A card of the disc with some effects.
+datasets::ModelCard disc_with(const std::vector<std::string>& effects,
+                              const std::map<std::string, datasets::CardParameter>& parameters) {
+  datasets::ModelCard card;
+  card.model = "limit_surface_disc";
+  card.parameters = parameters;
+  card.parameters["mu"] = {0.5, 0.01, "-"};
+  card.parameters["reference_force"] = {40, {}, "N"};
+  card.parameters["grip_force"] = {6, {}, "N"};
+  card.parameters["opening_time"] = {0.11, {}, "s"};
+  card.effects = effects;
+  return card;
+}
+
+TEST(ReleaseCard, EffectsOnFrictionActInTheRelease) {
+  const Chain arm = pads();
+  ReleaseThrow p = swing(arm);
+  const auto landing_of = [&](const std::vector<std::string>& effects,
+                              const std::map<std::string, datasets::CardParameter>& parameters) {
+    p.card = release_card(disc_with(effects, parameters), "card.json");
+    return release_landing(p, nominal_draw(p)).value();
+  };
+  const ReleaseLanding rigid = landing_of({}, {});
+  const auto with_give = [&](double compliance) {
+    return landing_of({"contact.pad_compliance"},
+                      {{"contact.pad_compliance.compliance", {compliance, {}, "m/N"}},
+                       {"contact.pad_compliance.loss_time", {0.005, {}, "s"}}});
+  };
+  EXPECT_EQ(with_give(0).miss, rigid.miss);  // fitted along, and nothing there
+  EXPECT_NEAR(with_give(1e-8).miss, rigid.miss, 1e-3);
+  EXPECT_GT(std::abs(with_give(3e-5).miss - rigid.miss), 1e-3);
+  // Adhesion holds on for the parting time.
+  const ReleaseLanding stuck = landing_of(
+      {"contact.adhesion"},
+      {{"contact.adhesion.f_adh", {1, 0.1, "N"}}, {"contact.adhesion.parting_time", {0.004, {}, "s"}}});
+  EXPECT_NEAR(stuck.detach_time, rigid.detach_time + 0.004, 1e-9);
+  EXPECT_THAT(p.card.passed_over, testing::ElementsAre("contact.adhesion.f_adh"));
+  // Friction that grows with speed is a friction that is larger by what the pads slip at, below 1 m/s.
+  constexpr double kViscous = 0.5;  // s/m
+  const ReleaseLanding viscous =
+      landing_of({"contact.viscous"}, {{"contact.viscous.1/v_0", {kViscous, {}, "s/m"}}});
+  const double speed =
+      (viscous.miss - rigid.miss) / (release_spread(p).value().gradient[kMu] * p.card.mu.value * kViscous);
+  EXPECT_GT(speed, 0.01);
+  EXPECT_LT(speed, 1);
+  // A sensor's error is no part of a throw.
+  EXPECT_EQ(landing_of({"sensor.length_scale"}, {{"sensor.length_scale.scale", {1.01, 0.001, "-"}}}).miss,
+            rigid.miss);
+
+  with_give(1e-5);  // and derivatives go with it
+  const auto spread = release_spread(p).value();
+  Draw up = nominal_draw(p), down = up;
+  up[kMu] += 1e-4, down[kMu] -= 1e-4;
+  EXPECT_NEAR((release_landing(p, up)->miss - release_landing(p, down)->miss) / 2e-4, spread.gradient[kMu],
+              1e-3 * std::abs(spread.gradient[kMu]) + 1e-4);
 }
 
 TEST(ReleaseCard, CountsWhatScattersFromThrowToThrow) {
