@@ -123,7 +123,7 @@ class CardReader {
     std::vector<std::string> names;
     std::vector<double> values;
     for (const std::string& id : card_.effects)
-      if (const dynamics::Effect* effect = effect_of(id))
+      if (const dynamics::Effect* effect = taken_effect(id))
         for (const auto& p : effect->parameters) {
           names.push_back(effect->full_name(p));
           values.push_back(p.neutral);
@@ -141,8 +141,9 @@ class CardReader {
     return out;
   }
 
-  /// Whose effects the card has; sensors' are of what a log measured or declared, and of no planned throw.
-  const dynamics::Effect* effect_of(const std::string& id) {
+  /// Notes an effect on friction and gives its descriptor; null for those of sensors, of what a log measured
+  /// or declared, whose parameters are passed over.
+  const dynamics::Effect* taken_effect(const std::string& id) {
     for (const auto& one : contact::friction_effects())
       if (one.effect.id == id) {
         out_.effects.push_back(id);
