@@ -91,8 +91,7 @@ void tell_not_compared(const std::vector<NotCompared>& all) {
 /// Whether what it follows is a measured normal force: neither a fit nor a card says how the pads open.
 bool follows_measured_force(const std::string& model, const CompareRequest& request,
                             const std::map<std::string, UsableCard>& cards) {
-  const bool follows = model == release::kNaiveModel || contact::follows_pads(model);
-  return follows && !request.fit && !cards.contains(model);
+  return contact::follows_pads(model) && !request.fit && !cards.contains(model);
 }
 
 void compare_releases(const CompareRequest& request, datasets::ThrowLog log) {

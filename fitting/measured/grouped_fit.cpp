@@ -133,15 +133,16 @@ ProjectedEquations projected(const GroupedProblem& problem, std::size_t group,
 std::vector<GroupedMisfit> misfit(const GroupedProblem& problem, const GroupedFit& fit,
                                   const GroupedWeights* weights) {
   std::vector<GroupedMisfit> out;
-  for (const auto& name : problem.channels()) out.push_back({name, 0, 0});
+  for (const auto& name : problem.channels()) out.push_back({name, 0, 0, 0});
   for (std::size_t i = 0; i < fit.groups.size(); ++i) {
     const GroupFit& g = fit.groups[i];
     if (!g.used || !g.solved) continue;
     for (Index j = 0; j < g.residual.size(); ++j)
       if (const int c = problem.groups()[i].rows[static_cast<std::size_t>(j)].channel; c >= 0) {
-        out[static_cast<std::size_t>(c)].n += 1;
-        out[static_cast<std::size_t>(c)].chi2 +=
-            (weights ? weights->group[i] : 1.0) * g.residual[j] * g.residual[j];
+        GroupedMisfit& of = out[static_cast<std::size_t>(c)];
+        const double weight = weights ? weights->group[i] : 1.0;
+        of.n += 1, of.weight += weight;
+        of.chi2 += weight * g.residual[j] * g.residual[j];
       }
   }
   return out;

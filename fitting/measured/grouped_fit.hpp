@@ -95,6 +95,7 @@ struct GroupedMisfit {
   std::string channel;  ///< which
   int n{};              ///< measurements
   double chi2{};        ///< not robust
+  double weight{};      ///< what its groups count for together: n where all count alike
   /// 1 where the model explains the channel to its noise.
   double chi2_per_sample() const { return n > 0 ? chi2 / n : 0; }
 };

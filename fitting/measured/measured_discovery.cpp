@@ -170,28 +170,19 @@ void take_fits(const GroupedProblem& problem, const EffectSearch& search, Measur
 /// χ² per sample by channel where every group counts by these weights.
 std::vector<double> weighed_misfit(const GroupedProblem& problem, const GroupedFit& fit,
                                    const GroupedWeights& weights) {
-  std::vector<double> chi2(problem.channels().size(), 0.0), n = chi2;
-  for (std::size_t i = 0; i < fit.groups.size(); ++i) {
-    const GroupFit& g = fit.groups[i];
-    if (!g.used || !g.solved) continue;
-    for (Eigen::Index j = 0; j < g.residual.size(); ++j)
-      if (const int c = problem.groups()[i].rows[static_cast<std::size_t>(j)].channel; c >= 0) {
-        const auto channel = static_cast<std::size_t>(c);
-        chi2[channel] += weights.group[i] * g.residual[j] * g.residual[j], n[channel] += weights.group[i];
-      }
-  }
-  for (std::size_t c = 0; c < chi2.size(); ++c) chi2[c] = n[c] > 0 ? chi2[c] / n[c] : 0;
-  return chi2;
+  std::vector<double> out;
+  for (const GroupedMisfit& m : misfit(problem, fit, &weights))
+    out.push_back(m.weight > 0 ? m.chi2 / m.weight : 0);
+  return out;
 }
 
 /// Whether groups count for less than others as exceptions do: an eighth of them at most.
 bool are_exceptions(const EffectSearch& search) {
-  constexpr double kMost = 0.125;
   double all = 0, less = 0;
   for (const GroupedFit* fit : {&search.final, &search.final_test})
     for (std::size_t i = 0; i < fit->groups.size(); ++i)
       if (fit->groups[i].used && fit->groups[i].solved) all += 1, less += fit->weights.group[i] < 1 ? 1 : 0;
-  return less <= std::max(1.0, kMost * all);
+  return less <= std::max(1.0, kMostWild * all);
 }
 
 /// The misfit where groups that the answer leaves far more than the others count for as much less, before it

@@ -21,7 +21,6 @@ namespace {
 
 constexpr double kGross = 6, kMedians = 10;     // robust sigmas; medians
 constexpr double kUpper = 0.84;                 // one sigma of a normal distribution
-constexpr double kMost = 0.125;                 // of the groups
 constexpr std::size_t kFewestGroups = 6;        // groups that can say what is usual
 constexpr int kWeighings = 30, kSearches = 10;  // of the weights; of setting aside
 
@@ -104,7 +103,7 @@ std::vector<std::size_t> gross(const std::vector<double>& misfits, std::vector<W
 }
 
 bool is_too_many(const std::vector<Footing>& parts, const std::vector<std::size_t>& places) {
-  if (static_cast<double>(places.size()) > std::max(1.0, kMost * static_cast<double>(parts.size())))
+  if (static_cast<double>(places.size()) > std::max(1.0, kMostWild * static_cast<double>(parts.size())))
     return true;
   const auto all = std::count_if(parts.begin(), parts.end(), [](const Footing& p) { return p.train; });
   const auto wild = static_cast<std::ptrdiff_t>(places.size());

@@ -7,6 +7,9 @@
 
 namespace unhand::fitting {
 
+/// The share of groups that are exceptions at most; more than that are no strays.
+inline constexpr double kMostWild = 0.125;
+
 /// A group whose misfit is a gross outlier.
 struct WildGroup {
   std::size_t group{};  ///< its place among the problem's

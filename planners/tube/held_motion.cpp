@@ -6,7 +6,7 @@
 #include <cmath>
 #include <memory>
 
-#include "contact/registry.hpp"
+#include "planners/tube/card_pads.hpp"
 #include "planners/tube/planar_hand.hpp"
 #include "planners/tube/require.hpp"
 
@@ -39,16 +39,10 @@ class StandingScene final : public contact::SceneSource {
 };
 
 std::unique_ptr<contact::ContactModel> law_of(const ReleaseCard& card, const Draw& draw) {
-  contact::ContactParameters<double> pads;
-  pads.patch = contact::Patch<double>::of_length(draw[kMu], draw[kLength], card.pads);
-  pads.law_values = card.law_values;
-  pads.variation = card.friction;
-  return contact::make_contact_model(card.model, pads);
+  return contact::make_contact_model(card.model, pads_of(card, draw[kMu], draw[kLength]));
 }
 
-bool sticks(const ReleaseCard& card, const contact::ContactModel& law, Scene<double> scene,
-            const Draw& draw) {
-  scene.normal_force += card.friction.adhesion;
+bool sticks(const contact::ContactModel& law, Scene<double> scene, const Draw& draw) {
   scene.body = {draw[kMass], draw[kInertia]};
   const contact::Relative<double> held{{draw[kComOffset], 0}, draw[kGraspAngle], {}, 0};
   return law.membership(-1, {0, 1}, StandingScene(scene), 0.0, held).mode == 0;
@@ -76,7 +70,7 @@ HeldMotion::HeldMotion(const ReleaseThrow& problem, const JointTrajectory& motio
                        {},
                        {tip.velocity.dot(x), tip.velocity.dot(z), tip.omega.dot(turn)},
                        {tip.acceleration.dot(x), tip.acceleration.dot(z), tip.alpha.dot(turn)},
-                       problem.card.grip_force,
+                       problem.card.grip_force + problem.card.friction.adhesion,
                        nullptr});
   }
 }
@@ -84,7 +78,7 @@ HeldMotion::HeldMotion(const ReleaseThrow& problem, const JointTrajectory& motio
 bool HeldMotion::holds(const Draw& draw) const {
   const auto law = law_of(problem_.card, draw);
   return std::all_of(scenes_.rbegin(), scenes_.rend(),
-                     [&](const Scene<double>& scene) { return sticks(problem_.card, *law, scene, draw); });
+                     [&](const Scene<double>& scene) { return sticks(*law, scene, draw); });
 }
 
 std::optional<double> HeldMotion::needed_force() const {
@@ -93,8 +87,8 @@ std::optional<double> HeldMotion::needed_force() const {
   double needed = 0;
   for (Scene<double> scene : scenes_) {
     const auto enough = [&](double force) {
-      scene.normal_force = force;
-      return sticks(problem_.card, *law, scene, nominal);
+      scene.normal_force = force + problem_.card.friction.adhesion;
+      return sticks(*law, scene, nominal);
     };
     if (needed > 0 && enough(needed)) continue;
     double low = needed, high = std::max(1e-3, 2 * needed);

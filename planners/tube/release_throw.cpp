@@ -9,11 +9,10 @@
 #include <random>
 #include <span>
 #include <stdexcept>
-#include <type_traits>
 
-#include "contact/patch.hpp"
 #include "contact/registry.hpp"
 #include "flight/fly.hpp"
+#include "planners/tube/card_pads.hpp"
 #include "planners/tube/held_motion.hpp"
 #include "planners/tube/planar_hand.hpp"
 #include "planners/tube/require.hpp"
@@ -158,6 +157,8 @@ class CardReader {
       if (name.starts_with(id + ".")) known_.push_back(name);
     return nullptr;
   }
+
+  /// A spread that is right on any card of the model and moves nothing here.
   void pass_over_spread(const char* name) { spreads_.emplace_back(name); }
 
   void reject_unknown() const {
@@ -282,14 +283,7 @@ struct Thrown {
 template <class S>
 std::optional<Thrown<S>> throw_once(const ReleaseThrow& p, const release::HandMotion& hand,
                                     const std::array<S, kUnknowns>& draw) {
-  contact::ContactParameters<S> pads;
-  pads.patch = contact::Patch<S>::of_length(draw[kMu], draw[kLength], p.card.pads);
-  for (const auto& [name, value] : p.card.law_values) pads.law_values.emplace(name, S(value));
-  if constexpr (std::is_same_v<S, double>)
-    pads.variation = p.card.friction;
-  else
-    pads.variation = contact::constant(p.card.friction);
-  const auto law = contact::make_contact_model(p.card.model, pads);
+  const auto law = contact::make_contact_model(p.card.model, pads_of(p.card, draw[kMu], draw[kLength]));
   const contact::ProfileNormalForce pressed(contact::OpeningProfile<S>{
       0.0, S(p.card.grip_force), draw[kDeadTime], draw[kOpeningTime], draw[kShape]});
   std::optional<contact::AdhesiveForce> adhesive;

@@ -434,6 +434,12 @@ TEST(FallDiscovery, NoDragIsAThrust) {
   EXPECT_TRUE(problem.may_act("flight.drag_by_axis", {"flight.quadratic_drag"}));
 }
 
+/// One of a toy problem's groups without samples, every fourth held out.
+Group toy_group(int k) {
+  const auto split = k % 4 == 3 ? datasets::Split::test : datasets::Split::train;
+  return {"group-" + std::to_string(k), "thing", "all", split, {}, {0}, {static_cast<double>(k)}};
+}
+
 /// Groups of four kinds of samples, ten of each, with noise of one. What acts are `one` and `other`, 20 sigma
 /// in the first and in the second kind; `both` looks much like the two together, and `around` takes most of
 /// what it leaves.
@@ -444,13 +450,7 @@ class TwoThatLookLikeOne final : public GroupedProblem {
     std::normal_distribution<double> normal;
     channels_ = {"reading"}, covariates_ = {"order"};
     for (int k = 0; k < 24; ++k) {
-      Group group{"group-" + std::to_string(k),
-                  "thing",
-                  "all",
-                  k % 4 == 3 ? datasets::Split::test : datasets::Split::train,
-                  {},
-                  {0},
-                  {static_cast<double>(k)}};
+      Group group = toy_group(k);
       Eigen::VectorXd noise(40);
       for (Eigen::Index i = 0; i < noise.size(); ++i) {
         group.rows.push_back({0, 0.01 * static_cast<double>(i)});
@@ -515,13 +515,7 @@ class DragAlongAxes final : public GroupedProblem {
     std::normal_distribution<double> normal;
     channels_ = {"x", "y", "z"}, covariates_ = {"order"};
     for (int k = 0; k < 24; ++k) {
-      Group group{"group-" + std::to_string(k),
-                  "thing",
-                  "all",
-                  k % 4 == 3 ? datasets::Split::test : datasets::Split::train,
-                  {},
-                  {0},
-                  {static_cast<double>(k)}};
+      Group group = toy_group(k);
       Eigen::VectorXd noise(30);
       for (int i = 0; i < 30; ++i) group.rows.push_back({i % 3, 0.01 * i}), noise[i] = normal(random);
       group.rows.push_back({kPriorChannel, 0});
