@@ -31,7 +31,7 @@ struct SplitOf {
 constexpr SplitOf kFlightSplits[] = {{Split::train, "train", &FreeFlightComparison::train},
                                      {Split::test, "test", &FreeFlightComparison::test}};
 
-Json json_of(const experiment::Spread& s) {
+Json spread_json(const experiment::Spread& s) {
   if (s.n == 0) return {{"n", 0}, {"mean", nullptr}, {"median", nullptr}, {"std", nullptr}};
   return {{"n", s.n}, {"mean", s.mean}, {"median", s.median}, {"std", s.n > 1 ? Json(s.std) : Json(nullptr)}};
 }
@@ -57,8 +57,8 @@ Json flights_json(const FreeFlightComparison& found, const CompareRequest& reque
     const FreeFlightStatistics& s = found.*member;
     one[name] = {{"n", s.n}, {"trajectory_rms_m", nullptr}};
     if (s.n > 0) one[name]["trajectory_rms_m"] = s.trajectory_rms_m;
-    one[name]["end_position_error_m"] = json_of(s.end_position_error_m);
-    one[name]["end_orientation_error_deg"] = json_of(s.end_orientation_error_deg);
+    one[name]["end_position_error_m"] = spread_json(s.end_position_error_m);
+    one[name]["end_orientation_error_deg"] = spread_json(s.end_orientation_error_deg);
   }
   one["microseconds_per_throw"] = found.microseconds_per_throw;
   return out;

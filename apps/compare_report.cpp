@@ -19,7 +19,6 @@ namespace {
 using datasets::Split;
 using experiment::ModelComparison;
 
-constexpr int decimals[experiment::kQuantityCount] = {4, 2, 4, 2};
 constexpr std::pair<Split, const char*> kThrowSplits[] = {{Split::train, "train"}, {Split::test, "test"}};
 
 struct Count {
@@ -75,8 +74,8 @@ ReleaseTables release_tables(const experiment::Comparison& comparison, const dat
       auto bias = row;
       for (int q = 0; q < experiment::kQuantityCount; ++q) {
         const auto s = model.statistics(q, split);
-        row.push_back(mean_and_spread(s.n, s.mae, s.std, decimals[q]));
-        bias.push_back(s.n > 0 ? fmt::format("{:+.{}f}", s.bias, decimals[q]) : "-");
+        row.push_back(mean_and_spread(s.n, s.mae, s.std, experiment::kQuantities[q].decimals));
+        bias.push_back(s.n > 0 ? fmt::format("{:+.{}f}", s.bias, experiment::kQuantities[q].decimals) : "-");
       }
       row.push_back(fmt::format("{:.0f}", model.microseconds_per_throw));
       out.errors.rows.push_back(std::move(row));

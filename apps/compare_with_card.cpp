@@ -15,7 +15,7 @@ namespace {
 using fitting::CardComparison;
 using fitting::NamedErrors;
 
-Json json_of(const NamedErrors& errors) {
+Json errors_json(const NamedErrors& errors) {
   Json out = Json::object();
   for (const auto& [name, value] : errors) out[name] = number(value);
   return out;
@@ -54,8 +54,8 @@ void compare_with_card(const CompareRequest& request, const datasets::ThrowLog& 
   json["effects"] = card.effects;
   json["parameters"] = Json::object();
   for (const auto& [name, p] : card.parameters) json["parameters"][name] = p.value;
-  json["base"] = {{"train", json_of(found.base_train)}, {"test", json_of(found.base_test)}};
-  json["with_card"] = {{"train", json_of(found.card_train)}, {"test", json_of(found.card_test)}};
+  json["base"] = {{"train", errors_json(found.base_train)}, {"test", errors_json(found.base_test)}};
+  json["with_card"] = {{"train", errors_json(found.card_train)}, {"test", errors_json(found.card_test)}};
   json["train"] = found.train, json["test"] = found.test;
 
   Table table{{"error", card.model + ", train", "test", "card, train", "test"}, {}, 1};

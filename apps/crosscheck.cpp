@@ -224,7 +224,7 @@ Differences against_measured(const std::vector<Prediction>& engine, const Throws
   return out;
 }
 
-Json json_of(const Differences& differences) {
+Json differences_json(const Differences& differences) {
   Json out = Json::object();
   for (int q = 0; q < experiment::kQuantityCount; ++q) {
     const auto s = experiment::statistics_of(differences.of[q]);
@@ -319,7 +319,7 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
       if (!setting.model.empty() && name != setting.model) continue;
       const auto differences = against_model(setting.throws, predictions);
       any = any || !differences.of[0].empty();
-      one["models"][name] = json_of(differences);
+      one["models"][name] = differences_json(differences);
       if (worst) {
         int other = 0;
         for (std::size_t i = 0; i < throws.size(); ++i)
@@ -329,7 +329,7 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
       add_row(table, name, differences, worst);
     }
     const auto measured = against_measured(setting.throws, throws);
-    one["measured"] = json_of(measured);
+    one["measured"] = differences_json(measured);
     add_row(table, "measured", measured, worst);
     one["throws"] = throws_json(setting, throws);
     json["settings"].push_back(one);

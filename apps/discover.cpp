@@ -35,7 +35,7 @@ struct DiscoverOptions {
   int threads{0};
 };
 
-Json json_of(const OutcomeErrors& e) {
+Json errors_json(const OutcomeErrors& e) {
   Json lacks = Json::array();
   for (const auto& [outcome, fit, resolution] : e.lacks) {
     const auto of_repeated = [known = fit.repetitions > 0](double value) {
@@ -76,7 +76,7 @@ Json structure_json(const std::vector<fitting::ChannelStructure>& structures) {
   return out;
 }
 
-Json json_of(const fitting::MissingEstimate& missing) {
+Json missing_json(const fitting::MissingEstimate& missing) {
   const bool flight = missing.phase == fitting::Phase::flight;
   Json out{{"quantity", flight ? "acceleration" : "wrench of one pad, hand frame"},
            {"time", flight ? "since the detach, s" : "share of the opening"},
@@ -212,10 +212,11 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
                           {"channel", to_string(found.unexplained->channel)},
                           {"chi2_per_dof", number(found.unexplained->chi2_per_dof)},
                           {"description", found.unexplained->description}};
-    if (found.unexplained->missing) out["unexplained"]["missing"] = json_of(*found.unexplained->missing);
+    if (found.unexplained->missing) out["unexplained"]["missing"] = missing_json(*found.unexplained->missing);
   }
-  out["error"] = {{"before", {{"train", json_of(found.before_train)}, {"test", json_of(found.before_test)}}},
-                  {"after", {{"train", json_of(found.after_train)}, {"test", json_of(found.after_test)}}}};
+  out["error"] = {
+      {"before", {{"train", errors_json(found.before_train)}, {"test", errors_json(found.before_test)}}},
+      {"after", {{"train", errors_json(found.after_train)}, {"test", errors_json(found.after_test)}}}};
   out["ranking"] = ranking_json(found.ranking);
   out["first_misfit"] = nullptr;
   if (found.first.any)

@@ -13,8 +13,6 @@ using datasets::Split;
 using experiment::ErrorStatistics;
 using experiment::kDegrees;
 
-constexpr int decimals[experiment::kQuantityCount] = {4, 2, 4, 2};
-
 std::string standing_of(const fitting::FitResult& fit, std::size_t k) {
   const auto& u = fit.campaign[k];
   if (u.at_bound) return "at its bound";
@@ -68,9 +66,11 @@ Table error_table(const FitAnswer& a) {
     std::vector<std::string> row{name, fmt::to_string(n)};
     for (int q = 0; q < experiment::kQuantityCount; ++q) {
       const ErrorStatistics s = statistics(q);
-      row.push_back(s.n > 0 ? fmt::format("{} ({:+.{}f})", mean_and_spread(s.n, s.mae, s.std, decimals[q]),
-                                          s.bias, decimals[q])
-                            : "-");
+      row.push_back(s.n > 0
+                        ? fmt::format("{} ({:+.{}f})",
+                                      mean_and_spread(s.n, s.mae, s.std, experiment::kQuantities[q].decimals),
+                                      s.bias, experiment::kQuantities[q].decimals)
+                        : "-");
     }
     out.rows.push_back(std::move(row));
   };

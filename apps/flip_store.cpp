@@ -64,11 +64,11 @@ fl::FlipTrial trial_of(const fs::path& file, const Json& label, const fl::FlipCo
 
 }  // namespace
 
-Json json_of(const fl::Bar& b) {
+Json bar_json(const fl::Bar& b) {
   return {{"mass_kg", b.mass}, {"inertia_kg_m2", b.inertia}, {"com_offset_m", b.com_offset}};
 }
 
-Json json_of(const fl::FlipTrial& t) {
+Json trial_json(const fl::FlipTrial& t) {
   Json out{{"command", command_json(t.command)}, {"outcome", to_string(t.outcome)}};
   if (t.outcome == fl::FlipOutcome::landed) {
     out["hand"] = t.hand;
@@ -118,7 +118,7 @@ Json FlipStore::label_of(const fl::TrialRequest& request) const {
           {"seed", seed_},
           {"stage", request.stage},
           {"index", request.index},
-          {"bar", json_of(request.bar)},
+          {"bar", bar_json(request.bar)},
           {"command", command_json(request.command)}};
 }
 
@@ -133,7 +133,7 @@ fl::Thrower FlipStore::over(fl::Thrower plant) {
     const fl::FlipTrial trial = plant(request);
     Json json = json_head("plan-flip-trial");
     json.update(label);
-    json.update(json_of(trial));
+    json.update(trial_json(trial));
     Outputs outputs;
     outputs.json(file, json);
     outputs.commit();

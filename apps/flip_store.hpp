@@ -9,8 +9,8 @@
 
 namespace unhand::apps {
 
-Json json_of(const planners::flip::FlipTrial& trial);
-Json json_of(const planners::flip::Bar& bar);
+Json trial_json(const planners::flip::FlipTrial& trial);
+Json bar_json(const planners::flip::Bar& bar);
 
 /// DIRECTORY/session.json says what is thrown; DIRECTORY/trials/STAGE-INDEX.json is one throw.
 class FlipStore {

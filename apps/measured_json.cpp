@@ -9,7 +9,7 @@ namespace {
 using fitting::MeasuredDiscovery;
 using fitting::NamedErrors;
 
-Json json_of(const NamedErrors& errors, int n) {
+Json errors_json(const NamedErrors& errors, int n) {
   // The fields that every discovery has; null where the log has no such outcome.
   Json out{{"n", n},
            {"landing_x_mae_m", nullptr},
@@ -22,7 +22,7 @@ Json json_of(const NamedErrors& errors, int n) {
   return out;
 }
 
-Json json_of(const std::vector<fitting::Autocorrelation>& all) {
+Json autocorrelation_json(const std::vector<fitting::Autocorrelation>& all) {
   Json out = Json::object();
   for (const auto& a : all) out[a.channel] = {{"lag1", number(a.lag1)}, {"z", number(a.z)}};
   return out;
@@ -54,11 +54,11 @@ Json measured_json(const MeasuredResult& result) {
   if (found.unexplained && found.unexplained->correlation)
     out["unexplained"]["correlation"] = number(*found.unexplained->correlation);
   out["error"] = {{"before",
-                   {{"train", json_of(found.before_train, found.train)},
-                    {"test", json_of(found.before_test, found.test)}}},
+                   {{"train", errors_json(found.before_train, found.train)},
+                    {"test", errors_json(found.before_test, found.test)}}},
                   {"after",
-                   {{"train", json_of(found.after_train, found.train)},
-                    {"test", json_of(found.after_test, found.test)}}}};
+                   {{"train", errors_json(found.after_train, found.train)},
+                    {"test", errors_json(found.after_test, found.test)}}}};
   out["ranking"] = ranking_json(found.ranking);
   out["first_misfit"] = nullptr;
   if (found.first.any)
@@ -75,8 +75,8 @@ Json measured_json(const MeasuredResult& result) {
                              {"after_train", number(m.after_train)},
                              {"after_test", number(m.after_test)},
                              {"unit", result.surfaces.empty() ? "chi2 per sample" : "deg"}});
-  out["autocorrelation"] = {{"before", json_of(found.autocorrelation_before)},
-                            {"after", json_of(found.autocorrelation_after)}};
+  out["autocorrelation"] = {{"before", autocorrelation_json(found.autocorrelation_before)},
+                            {"after", autocorrelation_json(found.autocorrelation_after)}};
   out["evidence"] = Json::array();
   for (const auto& e : found.evidence)
     out["evidence"].push_back({{"about", e.about}, {"text", e.text}, {"speaks_against", e.against}});

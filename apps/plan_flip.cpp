@@ -164,7 +164,7 @@ void run(const PlanFlipOptions& o) {
                   {"seed", o.seed},
                   {"throws", o.throws},
                   {"repeats", o.repeats},
-                  {"bar", json_of(answer.bar)},
+                  {"bar", bar_json(answer.bar)},
                   {"card", o.card.empty() ? "" : fitting::checksum_of(o.card).value_or("")}};
     store.emplace(o.report, settings);
     thrower = store->over(std::move(thrower));
@@ -183,7 +183,7 @@ void run(const PlanFlipOptions& o) {
     fmt::print("{} throws recalled, {} thrown now\n", store->recalled(), store->thrown());
   Outputs outputs{{o.sku, o.card}};
   if (!o.report.empty()) write_report(answer, outputs.directory(o.report));
-  if (!o.json.empty()) outputs.json(o.json, json_of(answer));
+  if (!o.json.empty()) outputs.json(o.json, flip_json(answer));
   outputs.commit();
 }
 

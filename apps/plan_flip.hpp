@@ -29,7 +29,7 @@ struct FlipAnswer {
 };
 
 std::string text_of(const FlipAnswer& answer);
-Json json_of(const FlipAnswer& answer);
+Json flip_json(const FlipAnswer& answer);
 /// path.md, flip.json, and the figures path, progress and, if it was thrown, population.
 void write_report(const FlipAnswer& answer, const std::filesystem::path& directory);
 

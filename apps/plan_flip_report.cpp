@@ -286,15 +286,15 @@ std::string summary(const FlipAnswer& a) {
 
 std::string text_of(const FlipAnswer& a) { return table_of(a).text() + "\n" + summary(a); }
 
-Json json_of(const FlipAnswer& a) {
+Json flip_json(const FlipAnswer& a) {
   Json out = json_head("plan-flip");
   out["learner"] = a.learner;
   out["target"] = {{"x_m", a.target.pose.x},
                    {"angle_rad", a.target.pose.angle},
                    {"tolerance_x_m", a.target.tolerance_x},
                    {"tolerance_angle_rad", a.target.tolerance_angle}};
-  out["bar"] = json_of(a.bar);
-  out["known_bar"] = json_of(a.known_bar);
+  out["bar"] = bar_json(a.bar);
+  out["known_bar"] = bar_json(a.known_bar);
   out["known_throws"] = a.known_throws;
   out["initial_error"] = number(a.path.initial);
   out["initial_error_is_seen"] = a.path.initial_is_seen;
@@ -306,7 +306,7 @@ Json json_of(const FlipAnswer& a) {
   out["iterations"] = Json::array();
   for (const auto& one : a.path.iterations) {
     Json trials = Json::array();
-    for (const auto& t : one.trials) trials.push_back(json_of(t));
+    for (const auto& t : one.trials) trials.push_back(trial_json(t));
     Json mean;
     if (one.mean) mean = {{"x_m", one.mean->x}, {"angle_rad", one.mean->angle}};
     out["iterations"].push_back(
@@ -314,7 +314,7 @@ Json json_of(const FlipAnswer& a) {
   }
   if (a.population) {
     out["population"] = Json::array();
-    for (const auto& t : a.population->trials) out["population"].push_back(json_of(t));
+    for (const auto& t : a.population->trials) out["population"].push_back(trial_json(t));
   }
   if (!a.card.empty()) out["card"] = Json::parse(a.card);
   return out;
@@ -325,7 +325,7 @@ void write_report(const FlipAnswer& a, const std::filesystem::path& folder) {
   draw_progress(a, folder);
   if (a.population) draw_population(a, folder);
   write_text(folder / "path.md", summary(a) + "\n" + table_of(a).markdown());
-  write_text(folder / "flip.json", json_text(json_of(a)));
+  write_text(folder / "flip.json", json_text(flip_json(a)));
   if (!a.card.empty()) write_text(folder / "card.json", a.card);
 }
 

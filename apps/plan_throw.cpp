@@ -347,7 +347,7 @@ void plan_throw(const PlanThrowOptions& options) {
     Json json = json_head("plan-throw");
     json["arm"] = options.arm;
     json["card"] = options.card.empty() ? Json(nullptr) : Json(options.card);
-    json.update(json_of(answer));
+    json.update(throw_json(answer));
     outputs.json(options.json, json);
   }
   if (!options.report.empty()) write_report(answer, outputs.directory(options.report));

@@ -45,7 +45,7 @@ struct ThrowAnswer {
 };
 
 std::string text_of(const ThrowAnswer& answer);
-Json json_of(const ThrowAnswer& answer);
+Json throw_json(const ThrowAnswer& answer);
 /// trajectory.csv, landings.csv, and the figures tube, motion and landings.
 void write_report(const ThrowAnswer& answer, const std::filesystem::path& directory);
 

@@ -130,7 +130,7 @@ std::string text_of(const ThrowAnswer& a) {
   return out;
 }
 
-Json json_of(const ThrowAnswer& a) {
+Json throw_json(const ThrowAnswer& a) {
   const auto& plan = a.plan;
   Json out;
   out["target_m"] = {a.box.middle.x(), a.box.middle.y(), a.box.middle.z()};
@@ -356,7 +356,7 @@ Rows curve_of(const std::vector<LandingAt>& landings) {
 }
 
 /// Landings against the time of release, or their distribution.
-Figure landing_figure(const ThrowAnswer& a) {
+Figure planned_landing_figure(const ThrowAnswer& a) {
   Figure out{"landings", 17, 9, {}, {}};
   const double half = 100 * a.box.half_length(along_of(a));
   if (!a.with_release) {
@@ -414,7 +414,8 @@ Figure landing_figure(const ThrowAnswer& a) {
 void write_report(const ThrowAnswer& a, const std::filesystem::path& directory) {
   write_text(directory / "trajectory.csv", trajectory_csv(a));
   write_text(directory / "landings.csv", landings_csv(a));
-  for (const Figure& figure : {tube_figure(a), motion_figure(a), landing_figure(a)}) draw(figure, directory);
+  for (const Figure& figure : {tube_figure(a), motion_figure(a), planned_landing_figure(a)})
+    draw(figure, directory);
 }
 
 }  // namespace unhand::apps

@@ -26,9 +26,9 @@ using experiment::kDegrees;
 /// By throw; nothing where a card tells no uncertainty.
 using Sigmas = std::vector<std::optional<fitting::OutcomeSigma>>;
 
-Json json_of(const experiment::ThrowComparison& one, const experiment::PreparedThrow& prepared,
-             const std::optional<fitting::OutcomeSigma>& sigma, const datasets::ModelCard& card,
-             double clock_origin) {
+Json prediction_json(const experiment::ThrowComparison& one, const experiment::PreparedThrow& prepared,
+                     const std::optional<fitting::OutcomeSigma>& sigma, const datasets::ModelCard& card,
+                     double clock_origin) {
   const auto& p = one.prediction;
   Json out{{"id", one.id},
            {"object", one.object},
@@ -213,7 +213,7 @@ void predict(const PredictOptions& options) {
     json["throws"] = Json::array();
     for (std::size_t i = 0; i < prepared.size(); ++i)
       json["throws"].push_back(
-          json_of(result.throws[i], prepared[i], sigmas[i], card.card, log.clock_origin));
+          prediction_json(result.throws[i], prepared[i], sigmas[i], card.card, log.clock_origin));
     outputs.json(options.json, json);
   }
   if (!options.csv.empty()) outputs.text(options.csv, csv_table(comparison, log, sigmas).csv());

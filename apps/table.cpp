@@ -17,7 +17,7 @@ std::size_t width(const std::string& text) {
       text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
 }
 
-std::string quoted(const std::string& cell) {
+std::string csv_cell(const std::string& cell) {
   if (cell.find_first_of(",\"\n\r") == std::string::npos) return cell;
   std::string out(1, '"');
   for (const char c : cell) {
@@ -79,7 +79,7 @@ std::string Table::csv() const {
   const auto line = [&](const std::vector<std::string>& row) {
     for (std::size_t j = 0; j < row.size(); ++j) {
       if (j > 0) out += ',';
-      out += quoted(row[j]);
+      out += csv_cell(row[j]);
     }
     out += "\n";
   };

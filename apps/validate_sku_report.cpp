@@ -14,7 +14,7 @@ using fitting::SkuValidation;
 
 namespace {
 
-Json json_of(const fitting::LandingSpread& s) {
+Json spread_json(const fitting::LandingSpread& s) {
   return {{"landing_x_m", s.x},
           {"landing_theta_deg", s.theta * kDegrees},
           {"bias_x_m", s.bias_x},
@@ -184,9 +184,9 @@ Json sku_json(const SkuQuestion& question, const SkuValidation& answer) {
                                  {"landing_theta_deg", c.landing_theta * kDegrees},
                                  {"sigma_x_m", c.linear.x},
                                  {"sigma_theta_deg", c.linear.theta * kDegrees}});
-  out["linear"] = json_of(answer.linear);
+  out["linear"] = spread_json(answer.linear);
   out["linear"]["within"] = answer.within_linear;
-  out["monte_carlo"] = json_of(answer.monte_carlo);
+  out["monte_carlo"] = spread_json(answer.monte_carlo);
   out["monte_carlo"]["within"] = answer.within;
   out["monte_carlo"]["lost"] = answer.lost;
   out["monte_carlo"]["samples"] = request.samples;

@@ -8,7 +8,7 @@ namespace {
 
 using dynamics::Dual;
 
-dynamics::IntegratorOptions tight() {
+dynamics::IntegratorOptions tightest() {
   dynamics::IntegratorOptions options;
   options.tolerances = {1e-12, 1e-13};
   return options;
@@ -17,7 +17,7 @@ dynamics::IntegratorOptions tight() {
 void pendulum(Section& out) {
   constexpr double kStart = 2.5;  // rad, far from small
   const double period = 4 * std::comp_ellint_1(std::sin(kStart / 2));
-  const auto end = dynamics::run(dynamics::pendulum(), {kStart, 0.0}, 5 * period, tight());
+  const auto end = dynamics::run(dynamics::pendulum(), {kStart, 0.0}, 5 * period, tightest());
   out.row("pendulum from 2.5 rad: fifth time at the bottom, in √(l/g)",
           "17 quarters of the elliptic integral", 4.25 * period,
           end.events.size() == 5 ? end.events[4].t : std::nan(""), 2e-8);
@@ -31,7 +31,7 @@ void zeno(Section& out) {
   for (const double e : {0.5, 0.9, 0.99}) {
     const double limit = std::sqrt(2 / kGravity) * (1 + e) / (1 - e);
     const auto end =
-        dynamics::run(dynamics::bouncing_ball(Dual(kGravity), Dual(e)), {1.0, 0.0}, limit + 1, tight());
+        dynamics::run(dynamics::bouncing_ball(Dual(kGravity), Dual(e)), {1.0, 0.0}, limit + 1, tightest());
     const bool rests = end.mode == 1 && !end.events.empty();
     out.row("Zeno: a ball with restitution " + std::to_string(e).substr(0, 4) + " rests at [s]",
             "geometric series", limit, rests ? end.events.back().t : std::nan(""), 1e-6);
@@ -43,7 +43,7 @@ void zeno(Section& out) {
 void plate(Section& out) {
   const dynamics::Entry<double, 2> start{2, 0.0, {0.0, 0.0}, 0.0};
   const auto shake = [&](double rho, double t_end, double guard_interval) {
-    auto options = tight();
+    auto options = tightest();
     options.guard_interval = guard_interval;
     return dynamics::integrate<double, 2>(dynamics::plate(Dual(rho)), start, t_end, options);
   };

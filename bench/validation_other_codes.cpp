@@ -10,7 +10,7 @@
 namespace unhand::bench {
 namespace {
 
-release::ReleaseOptions tight(double relative) {
+release::ReleaseOptions tight_to(double relative) {
   release::ReleaseOptions options;
   options.integrator = support::tight(relative, 1e-2 * relative);
   return options;
@@ -24,9 +24,9 @@ double against_cvode(const char* law) {
     const auto thrown = support::random_throw(random, k % 2);  // smooth and shaken by turns
     const auto model = contact::make_contact_model(law, support::parameters_of(thrown));
     const auto problem = support::problem_of(thrown, *model);
-    auto cvode = tight(1e-11);
+    auto cvode = tight_to(1e-11);
     cvode.integrator.method = dynamics::Method::cvode;
-    const auto a = simulate_release(problem, tight(1e-10)).detach.twist;
+    const auto a = simulate_release(problem, tight_to(1e-10)).detach.twist;
     const auto b = simulate_release(problem, cvode).detach.twist;
     worst = std::max({worst, std::abs(a.vx - b.vx), std::abs(a.vz - b.vz), std::abs(a.omega - b.omega)});
   }
@@ -42,7 +42,7 @@ void points_with_bristles(Section& out) {
       problem, {thrown.patch.mu, thrown.patch.radius, crosscheck::disc_points(12)});
   out.row("a throw's ω at detach, against 432 points with bristles [rad/s]",
           "[crosscheck/distributed_patch.hpp](../crosscheck/distributed_patch.hpp)",
-          points.detach.twist.omega, simulate_release(problem, tight(1e-9)).detach.twist.omega, 5e-3);
+          points.detach.twist.omega, simulate_release(problem, tight_to(1e-9)).detach.twist.omega, 5e-3);
 }
 
 /// Both pads 4 N, μ = 0.5: 8 m/s² on 0.5 kg, and 53.3 rad/s² on 1e-3 kg m² of a disc of 2 cm.

@@ -27,13 +27,13 @@ const std::vector<Effect>& catalogue() {
   return effects;
 }
 
-struct Found {
+struct CataloguedParameter {
   const Effect* effect{};
   const EffectParameter* parameter{};
 };
 
 /// By "id.parameter" or "id", which means its first parameter.
-Found find(std::string_view name) {
+CataloguedParameter find(std::string_view name) {
   for (const Effect& effect : catalogue()) {
     if (name == effect.id) return {&effect, &effect.parameters.front()};
     for (const EffectParameter& p : effect.parameters)
@@ -77,7 +77,7 @@ std::pair<std::string, std::string> split_object(std::string_view name) {
 /// The full name; checks everything but whether the object exists.
 std::string checked(std::string_view name, double value) {
   const auto [bare, object] = split_object(name);
-  const Found found = find(bare);
+  const CataloguedParameter found = find(bare);
   if (!found.effect) throw_unknown(bare);
   if (!object.empty() && !found.effect->per_object)
     throw std::invalid_argument(

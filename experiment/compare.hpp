@@ -25,13 +25,14 @@ ErrorStatistics statistics_of(const std::vector<double>& errors);
 struct Quantity {
   const char* key;    ///< in JSON, with its unit
   const char* title;  ///< in tables
+  int decimals;       ///< in tables
 };
 inline constexpr double kDegrees = 57.29577951308232;  ///< per radian
 /// What models are compared by.
-inline constexpr Quantity kQuantities[] = {{"detach_vx_m_s", "detach vx [m/s]"},
-                                           {"detach_omega_deg_s", "detach omega [deg/s]"},
-                                           {"landing_x_m", "landing x [m]"},
-                                           {"landing_theta_deg", "landing theta [deg]"}};
+inline constexpr Quantity kQuantities[] = {{"detach_vx_m_s", "detach vx [m/s]", 4},
+                                           {"detach_omega_deg_s", "detach omega [deg/s]", 2},
+                                           {"landing_x_m", "landing x [m]", 4},
+                                           {"landing_theta_deg", "landing theta [deg]", 2}};
 inline constexpr int kQuantityCount = 4;  ///< of quantities
 
 /// One throw's prediction and its errors.

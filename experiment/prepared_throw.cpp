@@ -43,10 +43,10 @@ void measure_flight(const datasets::ThrowLog& log, const datasets::Throw& logged
   std::vector<double> drag_x(t.size()), drag_z(t.size()), xs(t.size()), zs(t.size());
   dynamics::Pose<double> pose;
   dynamics::Twist<double> twist;
-  constexpr int kMost = 100;         // each takes off a share of about k |v| times the flight's duration
-  constexpr double kSettled = 1e-9;  // [m/s]
+  constexpr int kMostIterations = 100;  // each takes off a share of about k |v| times the flight's duration
+  constexpr double kSettled = 1e-9;     // [m/s]
   double change = HUGE_VAL;
-  for (int iteration = 0; iteration < kMost && change > kSettled; ++iteration) {
+  for (int iteration = 0; iteration < kMostIterations && change > kSettled; ++iteration) {
     for (std::size_t i = 0; i < t.size(); ++i) {
       xs[i] = x[i] - drag_x[i] - 0.5 * out.gravity.x * t[i] * t[i];
       zs[i] = z[i] - drag_z[i] - 0.5 * out.gravity.z * t[i] * t[i];
@@ -75,7 +75,7 @@ void measure_flight(const datasets::ThrowLog& log, const datasets::Throw& logged
 }
 
 /// The log, one of its throws, and how to refuse it.
-struct Source {
+struct LoggedThrow {
   const datasets::ThrowLog& log;
   const datasets::Throw& logged;
   const std::string& file;
@@ -85,7 +85,7 @@ struct Source {
   }
 };
 
-release::HandFit fitted_hand(const Source& source) {
+release::HandFit fitted_hand(const LoggedThrow& source) {
   const datasets::HandLog& hand = *source.logged.hand;
   try {
     return release::fit_hand_motion({hand.time.data, hand.pose.data, hand.twist.data, hand.acceleration.data,
@@ -98,7 +98,7 @@ release::HandFit fitted_hand(const Source& source) {
 
 /// Whether the log shows that the pads let go: a landing, a free flight, or an object that motion capture
 /// last sees elsewhere in the hand than first.
-bool lets_go(const Source& source, const release::HandMotion& hand) {
+bool lets_go(const LoggedThrow& source, const release::HandMotion& hand) {
   if (source.logged.landing || source.logged.free_flight) return true;
   if (!source.logged.mocap) return false;
   constexpr double kGone = 0.05;  // [m]
@@ -116,7 +116,7 @@ bool lets_go(const Source& source, const release::HandMotion& hand) {
   return first && std::abs(last - *first) > kGone;
 }
 
-void smooth_force(const Source& source, PreparedThrow& out) {
+void smooth_force(const LoggedThrow& source, PreparedThrow& out) {
   if (!source.logged.ft || datasets::is_constant(source.logged.ft->normal_force)) return;
   const auto& series = source.logged.ft->normal_force;
   contact::NormalForceOptions options;
@@ -132,7 +132,7 @@ void smooth_force(const Source& source, PreparedThrow& out) {
 }
 
 /// When the gripper is told to open [s]: declared, seen in the smoothed normal force, or else at detach.
-double opening_command(const Source& source, const PreparedThrow& prepared) {
+double opening_command(const LoggedThrow& source, const PreparedThrow& prepared) {
   const auto& gripper = source.log.gripper;
   if (gripper && gripper->opening_command_time) return *gripper->opening_command_time;
   if (std::isfinite(prepared.force_fit.opening_start) && prepared.normal_force)
@@ -145,7 +145,7 @@ double opening_command(const Source& source, const PreparedThrow& prepared) {
 }
 
 /// The grasp: as declared, or the mean that motion capture saw while the object was held.
-release::Grasp<double> grasp_of(const Source& source, const PreparedThrow& prepared) {
+release::Grasp<double> grasp_of(const LoggedThrow& source, const PreparedThrow& prepared) {
   double angle = 0, offset_x = 0;
   int seen = 0;
   if (source.logged.mocap) {
@@ -193,7 +193,7 @@ double quiet_from(const datasets::FtLog& ft, const contact::NormalForceSummary& 
 }
 
 /// Detach, flight and landing as measured.
-void measure_outcome(const Source& source, PreparedThrow& out) {
+void measure_outcome(const LoggedThrow& source, PreparedThrow& out) {
   const datasets::Throw& logged = source.logged;
   double flight_from = 0;
   if (out.normal_force && std::isfinite(out.normal_force->release_time())) {
@@ -257,7 +257,7 @@ bool shows_grasp(const datasets::ThrowLog& log, const datasets::Throw& logged) {
 }
 
 PreparedThrow prepare(const datasets::ThrowLog& log, const datasets::Throw& logged, const std::string& file) {
-  const Source source{log, logged, file};
+  const LoggedThrow source{log, logged, file};
   if (log.dimension != 2) source.reject("/@dimension", "a release needs a planar log (dimension 2)");
   if (!logged.hand) source.reject(source.path() + "/hand", "missing: a release needs the hand's motion");
   const datasets::Object& object = log.objects.at(logged.object);

@@ -12,7 +12,7 @@
 namespace unhand::datasets::test {
 namespace {
 
-const std::string header =
+const std::string toss_header =
     "toss,k,t_s,x_m,y_m,z_m,qw,qx,qy,qz,vx,vy,vz,wx_body,wy_body,wz_body,before_first_contact\n";
 
 std::string row(int toss, int k, bool before) {
@@ -30,7 +30,7 @@ std::string toss(int number, int before, int after) {
 
 TEST(CubeTosses, KeepsWhatFliesLongEnough) {
   const Scratch scratch;
-  std::string text = header;
+  std::string text = toss_header;
   for (int n = 0; n < 10; ++n) text += toss(n, n == 3 ? 7 : 8 + n, 5);
   put_bytes(scratch / "t.csv", text);
   ImportReport report;
@@ -67,7 +67,7 @@ TEST(CubeTosses, DeclaresTheScatterOfTheSamples) {
   std::normal_distribution<double> normal;
   constexpr double sigma = 4e-4, sigma_q = 1.5e-3;
   std::ostringstream out;
-  out << header << std::setprecision(12);
+  out << toss_header << std::setprecision(12);
   for (int n = 0; n < 60; ++n) {
     double t = 0;
     for (int k = 0; k < 20; ++k, t += k % 5 == 2 ? 0.02 : 0.004 + 0.002 * (k % 3)) {
@@ -91,7 +91,7 @@ TEST(CubeTosses, DeclaresTheScatterOfTheSamples) {
 
 TEST(CubeTosses, ResultIsALogThatRoundTrips) {
   const Scratch scratch;
-  put_bytes(scratch / "t.csv", header + toss(0, 9, 2) + toss(4, 12, 0));
+  put_bytes(scratch / "t.csv", toss_header + toss(0, 9, 2) + toss(4, 12, 0));
   const ThrowLog log = import_cube_tosses(scratch / "t.csv");
   EXPECT_EQ(reread(log), log);
 }
@@ -99,7 +99,7 @@ TEST(CubeTosses, ResultIsALogThatRoundTrips) {
 // Columns are found by their names: another order, more of them, fewer that nobody reads, a byte order mark.
 TEST(CubeTosses, ReadsColumnsByName) {
   const Scratch scratch;
-  put_bytes(scratch / "t.csv", header + toss(0, 9, 2) + toss(4, 12, 0));
+  put_bytes(scratch / "t.csv", toss_header + toss(0, 9, 2) + toss(4, 12, 0));
   const ThrowLog expected = import_cube_tosses(scratch / "t.csv");
   const auto read = [&](const std::string& first, const std::string& separator, auto cells) {
     std::istringstream rows(toss(0, 9, 2) + toss(4, 12, 0));
@@ -116,7 +116,8 @@ TEST(CubeTosses, ReadsColumnsByName) {
     return import_cube_tosses(scratch / "u.csv");
   };
   using Cells = std::vector<std::string>;
-  EXPECT_EQ(read("\xef\xbb\xbf" + header.substr(0, header.size() - 1), ",", [](const Cells& c) { return c; }),
+  EXPECT_EQ(read("\xef\xbb\xbf" + toss_header.substr(0, toss_header.size() - 1), ",",
+                 [](const Cells& c) { return c; }),
             expected);
   EXPECT_EQ(read("note,before_first_contact,qz,qy,qx,qw,z_m,y_m,x_m,t_s,k,toss", ",",
                  [](const Cells& c) {
@@ -134,21 +135,21 @@ TEST(CubeTosses, ReadsColumnsByName) {
 // Half the space diagonal: with the centre above it, no orientation touches the table.
 TEST(CubeTosses, LandingHeightClearsEveryOrientation) {
   const Scratch scratch;
-  put_bytes(scratch / "t.csv", header + toss(0, 9, 2));
+  put_bytes(scratch / "t.csv", toss_header + toss(0, 9, 2));
   EXPECT_NEAR(import_cube_tosses(scratch / "t.csv").landing_height, std::hypot(0.0524, 0.0524, 0.0524),
               1e-15);
 }
 
 TEST(CubeTosses, SaysWhichLineAndColumn) {
   const Scratch scratch;
-  const std::string file = scratch / "t.csv", start = header + toss(0, 9, 2);
+  const std::string file = scratch / "t.csv", start = toss_header + toss(0, 9, 2);
   const auto expect = [&](const std::string& text, const std::string& place, const std::string& reason) {
     put_bytes(file, text);
     expect_error<ImportError>([&] { import_cube_tosses(file); }, file, place, reason);
   };
   const std::string tail = "0.15,0.6,0,0.8,0,1,0,0,0,0,3,1\n";
   expect("", "line 1", "holds no tosses");
-  expect(header, "line 1", "holds no tosses");
+  expect(toss_header, "line 1", "holds no tosses");
   expect(toss(0, 9, 2), "line 1", "header is missing");
   expect("toss,k,t_s,x_m,y_m,z,qw,qx,qy,qz,before_first_contact\n0,0,0,0,0,0,1,0,0,0,1\n", "line 1",
          "there is no column 'z_m'");
@@ -167,7 +168,7 @@ TEST(CubeTosses, SaysWhichLineAndColumn) {
   expect(start + row(1, 0, true) + row(1, 2, true), "line 14, column k", "sample 2 after 0");
   expect(start + row(0, 11, true), "line 13, column before_first_contact", "back to 1");
   expect(start + toss(1, 9, 0) + row(0, 0, true), "line 22, column toss", "appears in two places");
-  expect(header + toss(0, 3, 3), "line 1", "none of 1 tosses has 8 samples");
+  expect(toss_header + toss(0, 3, 3), "line 1", "none of 1 tosses has 8 samples");
   std::filesystem::remove(file);
   expect_error<ImportError>([&] { import_cube_tosses(file); }, file, "", "no such file");
 }

@@ -14,12 +14,11 @@ namespace unhand::fitting::test {
 namespace {
 
 const std::vector<SurfaceModel> all(std::begin(surface_models), std::end(surface_models));
-const Eigen::Matrix3d diagonal = Eigen::Vector3d(1 / 16.0, 1 / 9.0, 1 / 25.0).asDiagonal();
 
 TEST(CompareSurfaces, RicherModelsPayForNoiseAndOnlyForNoise) {
   // The truth is the axis-aligned ellipsoid: on its own data and on the null control, the fewer coefficients
   // the better.
-  const auto scores = compare_surfaces({simulate(ellipsoid(diagonal), 50, 0.15, 0.1, 11)}, all);
+  const auto scores = compare_surfaces({simulate(ellipsoid(along_axes), 50, 0.15, 0.1, 11)}, all);
   ASSERT_EQ(scores.size(), 1U);
   const auto& row = scores[0];
   for (const SurfaceScore& score : row) ASSERT_TRUE(score.scored()) << score.reason;
@@ -39,7 +38,7 @@ TEST(CompareSurfaces, FindsAQuartic) {
 }
 
 TEST(CompareSurfaces, SameForAnyNumberOfThreads) {
-  const std::vector<SlipSamples> slips{simulate(ellipsoid(diagonal), 30, 0.1, 0.1, 13)};
+  const std::vector<SlipSamples> slips{simulate(ellipsoid(along_axes), 30, 0.1, 0.1, 13)};
   SurfaceComparisonOptions one, four;
   one.threads = 1;
   four.threads = 4;
@@ -54,7 +53,7 @@ TEST(CompareSurfaces, SameForAnyNumberOfThreads) {
 
 TEST(CompareSurfaces, SaysWhichSurfaceHasTooLittle) {
   // 18 slips are enough for the quartic; four fifths of them are not.
-  const auto scores = compare_surfaces({simulate(ellipsoid(diagonal), 18, 0.1, 0.1, 14)}, all);
+  const auto scores = compare_surfaces({simulate(ellipsoid(along_axes), 18, 0.1, 0.1, 14)}, all);
   EXPECT_TRUE(scores[0][0].scored());
   EXPECT_TRUE(scores[0][2].fit.fitted());
   EXPECT_EQ(scores[0][2].outcome, SurfaceOutcome::too_few_slips);

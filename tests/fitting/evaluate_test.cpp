@@ -29,14 +29,14 @@ const CampaignProblem& disc() {
   return problem;
 }
 
-const FitResult& disc_fit() {
+const FitResult& fit_of_disc() {
   static const FitResult result = fit(disc());
   return result;
 }
 
 /// A fit that knows everything but how sure it is of one unknown.
 FitResult sure_but_for(std::size_t unknown, double sigma) {
-  FitResult out = disc_fit();
+  FitResult out = fit_of_disc();
   const std::size_t n = out.campaign.size();
   out.covariance.assign(n * n, 0.0);
   out.covariance[unknown * n + unknown] = sigma * sigma;
@@ -46,7 +46,7 @@ FitResult sure_but_for(std::size_t unknown, double sigma) {
 
 TEST(Evaluate, SigmaIsTheSlopeTimesSigma) {
   for (std::size_t k = 0; k < 2; ++k) {
-    const double sigma = 1e-3 * disc_fit().campaign[k].value;
+    const double sigma = 1e-3 * fit_of_disc().campaign[k].value;
     const FitResult centre = sure_but_for(k, sigma);
     FitResult above = centre, below = centre;
     above.campaign[k].value += sigma;
@@ -72,20 +72,20 @@ TEST(Evaluate, SigmaIsTheSlopeTimesSigma) {
 
 TEST(Evaluate, AFitOfAnotherProblemAndNoAnswerAreRefused) {
   const CampaignProblem quartic = disc().with("limit_surface_quartic", {});
-  FitResult none = disc_fit();
+  FitResult none = fit_of_disc();
   none.outcome = FitOutcome::no_start;
   none.covariance.clear();
   const auto refused = [](const CampaignProblem& problem, const FitResult& fit) {
     EXPECT_THROW(predict_throws(problem, fit), std::invalid_argument);
     EXPECT_THROW(card_of(problem, fit), std::invalid_argument);
   };
-  refused(quartic, disc_fit());
+  refused(quartic, fit_of_disc());
   refused(disc(), {});
   refused(disc(), none);
-  EXPECT_THROW(predict_some(disc(), disc_fit(), {disc().throws().size()}), std::invalid_argument);
+  EXPECT_THROW(predict_some(disc(), fit_of_disc(), {disc().throws().size()}), std::invalid_argument);
   EXPECT_THROW(disc().predict(disc().throws().front(), {}, {}), std::invalid_argument);
   EXPECT_EQ(none.correlation(0, 1), 0);
-  EXPECT_THROW(disc_fit().correlation(0, 2), std::out_of_range);
+  EXPECT_THROW(fit_of_disc().correlation(0, 2), std::out_of_range);
 }
 
 // The friction of each throw is the campaign's times 1 + its own deviation, which the next throw's is drawn
@@ -118,7 +118,7 @@ TEST(Evaluate, OwnSpreadAddsUncertainty) {
 }
 
 TEST(Evaluate, TwistErrorsOfTheBaseModelAreThoseOfCompare) {
-  const auto throws = predict_throws(disc(), disc_fit(), {false, 0});
+  const auto throws = predict_throws(disc(), fit_of_disc(), {false, 0});
   for (std::size_t i = 0; i < throws.size(); ++i) {
     const auto& [id, object, condition, split, p, error] = throws[i].comparison;
     const auto& measured = disc().throws()[i].prepared.measured;
@@ -147,19 +147,19 @@ TEST(Evaluate, CrossValidationLeavesConditionsOut) {
 }
 
 TEST(Card, RoundTripIsExact) {
-  auto card = card_of(disc(), disc_fit());
+  auto card = card_of(disc(), fit_of_disc());
   card.log = {"campaign.h5", "a campaign", "fnv1a64:0123456789abcdef"};
   card.library_version = "0.1.0";
-  const auto throws = predict_throws(disc(), disc_fit(), {true, 0});
-  card.errors["train"] = errors_of(comparison_of(disc(), disc_fit(), throws), datasets::Split::train);
+  const auto throws = predict_throws(disc(), fit_of_disc(), {true, 0});
+  card.errors["train"] = errors_of(comparison_of(disc(), fit_of_disc(), throws), datasets::Split::train);
   const auto back = datasets::parse_model_card(datasets::to_json(card));
   EXPECT_EQ(back, card);
 
   const CampaignProblem problem(log_of_disc(), "(in memory)", options_of(back, "card.json"));
   const auto again = fit_of(back, problem, "card.json");
-  EXPECT_EQ(again.values(), disc_fit().values());
-  EXPECT_EQ(again.covariance, disc_fit().covariance);
-  EXPECT_EQ(again.own_spread, disc_fit().own_spread);
+  EXPECT_EQ(again.values(), fit_of_disc().values());
+  EXPECT_EQ(again.covariance, fit_of_disc().covariance);
+  EXPECT_EQ(again.own_spread, fit_of_disc().own_spread);
   const auto predicted = predict_some(problem, again, {3});
   EXPECT_EQ(predicted[0].comparison.prediction.landing.pose.x,
             throws[3].comparison.prediction.landing.pose.x);
@@ -169,7 +169,7 @@ TEST(Card, RoundTripIsExact) {
 TEST(Card, SaysWhichThrowsItIsOf) {
   FitOptions options;
   options.share = Share::test;
-  const auto test = card_of(disc(), fit(disc(), options)), train = card_of(disc(), disc_fit());
+  const auto test = card_of(disc(), fit(disc(), options)), train = card_of(disc(), fit_of_disc());
   EXPECT_EQ(train.split, "train");
   EXPECT_EQ(test.split, "test");
   EXPECT_EQ(test.library_version, datasets::library_version());
@@ -178,7 +178,7 @@ TEST(Card, SaysWhichThrowsItIsOf) {
 
 TEST(Card, HoldsEffectsAndRefusesUnknownOnes) {
   const auto problem = disc().with("limit_surface_disc", {"sensor.length_scale"});
-  FitResult made = disc_fit();
+  FitResult made = fit_of_disc();
   made.campaign.clear();
   for (const auto& u : problem.campaign())
     made.campaign.push_back({u, u.start, 0.1 * u.scale, 0.1 * u.scale, false});
@@ -212,7 +212,7 @@ TEST(Card, HoldsEffectsAndRefusesUnknownOnes) {
 }
 
 TEST(Card, KnowsWhereItHasBeenTried) {
-  const auto card = card_of(disc(), disc_fit());
+  const auto card = card_of(disc(), fit_of_disc());
   for (const char* name : {"mass", "com_offset", "release_speed", "release_omega", "grip_force",
                            "opening_time", "detach_speed", "detach_omega"})
     EXPECT_TRUE(card.valid_range.contains(name)) << name;
@@ -231,7 +231,7 @@ TEST(Card, KnowsWhereItHasBeenTried) {
 
 // All throws of a log alike make a range without width: as wide as the throws themselves scatter.
 TEST(Card, ARangeWithoutWidthIsNoEquality) {
-  auto card = card_of(disc(), disc_fit());
+  auto card = card_of(disc(), fit_of_disc());
   auto thrown = disc().throws()[0].prepared;
   const auto outside = [&](double com_offset) {
     thrown.grasp.com_offset = com_offset;
@@ -269,7 +269,7 @@ TEST(Advice, NamesWhatWouldFixIt) {
     if (problem.campaign()[k].name == "mu" || problem.campaign()[k].name == "grip_force")
       open.direction[k] = 0.7;
   EXPECT_THAT(remedy(problem, open), HasSubstr("normal force"));
-  FitResult made = disc_fit();
+  FitResult made = fit_of_disc();
   made.covariance = {1, 0.95, 0.95, 1};
   const auto pairs = strong_correlations(made);
   ASSERT_EQ(pairs.size(), 1u);

@@ -573,11 +573,10 @@ TEST(EffectSearch, ADragByAxisIsNotFoundAlongAxesThatNothingMovesAlong) {
 }
 
 TEST(SurfaceDiscovery, AnEllipsoidMissesNothing) {
-  const Eigen::Matrix3d diagonal = Eigen::Vector3d(1 / 16.0, 1 / 9.0, 1 / 25.0).asDiagonal();
   SurfaceDiscoveryOptions options;
   options.comparison.null_draws = 1;
   const auto found =
-      discover_surfaces({test::simulate(test::ellipsoid(diagonal), 50, 0.15, 0.1, 21)}, options);
+      discover_surfaces({test::simulate(test::ellipsoid(test::along_axes), 50, 0.15, 0.1, 21)}, options);
   EXPECT_EQ(found.answer.verdict, Verdict::no_missing_effect);
 }
 
@@ -621,15 +620,14 @@ TEST(SurfaceDiscovery, AQuarticIsFound) {
 // Two samples that are each other's nearest are one observation: of noise alone, the correlation of
 // neighbours is as uncertain as it is said to be.
 TEST(SurfaceDiscovery, NeighboursOfNoiseCorrelateAsTheirSigmaSays) {
-  const Eigen::Matrix3d diagonal = Eigen::Vector3d(1 / 16.0, 1 / 9.0, 1 / 25.0).asDiagonal();
   SurfaceDiscoveryOptions options;
   options.comparison.null_draws = 0;
   options.forget = {"contact.law:ellipsoid_full", "contact.law:convex_quartic"};
   constexpr unsigned kSets = 200;
   double squares = 0;
   for (unsigned set = 0; set < kSets; ++set) {
-    const auto found =
-        discover_surfaces({test::simulate(test::ellipsoid(diagonal), 60, 0.08, 0.03, 100 + set)}, options);
+    const auto found = discover_surfaces(
+        {test::simulate(test::ellipsoid(test::along_axes), 60, 0.08, 0.03, 100 + set)}, options);
     const auto& left = found.evidence.front();
     squares += std::pow(left.left / left.left_sigma, 2) / kSets;
   }
@@ -654,9 +652,8 @@ TEST(SurfaceDiscovery, TheNullControlSaysWhatItFound) {
   ASSERT_TRUE(loses);
   EXPECT_FALSE(loses->against);
   EXPECT_NE(loses->text.find("the same law loses 0."), std::string::npos) << loses->text;
-  const Eigen::Matrix3d diagonal = Eigen::Vector3d(1 / 16.0, 1 / 9.0, 1 / 25.0).asDiagonal();
-  const auto gains =
-      control(test::simulate(test::ellipsoid(diagonal), 30, 0.1, 0.1, 2), SurfaceModel::convex_quartic, 1);
+  const auto gains = control(test::simulate(test::ellipsoid(test::along_axes), 30, 0.1, 0.1, 2),
+                             SurfaceModel::convex_quartic, 1);
   ASSERT_TRUE(gains);
   EXPECT_TRUE(gains->against);
   EXPECT_NE(gains->text.find("the same law gains "), std::string::npos) << gains->text;

@@ -20,9 +20,9 @@
 namespace unhand::fitting {
 namespace {
 
-using test::spatial_flights;
-using test::SpatialDesign;
-using test::SpatialTruth;
+using unhand::test::spatial_flights;
+using unhand::test::SpatialDesign;
+using unhand::test::SpatialTruth;
 
 MeasuredDiscovery found_in(const datasets::ThrowLog& log, std::vector<std::string> forget = {}) {
   MeasuredOptions options;
@@ -92,13 +92,13 @@ TEST(FlightDiscovery, ErrorsBeforeAreThoseOfTheComparison) {
   }
 }
 
-struct Case {
+struct FlightCase {
   const char* name;
   SpatialTruth truth;
   std::vector<std::tuple<std::string, std::string, double>> expected;
 };
 
-class EveryFlightEffect : public testing::TestWithParam<Case> {};
+class EveryFlightEffect : public testing::TestWithParam<FlightCase> {};
 
 TEST_P(EveryFlightEffect, IsFoundWithItsSize) {
   const auto found = found_in(spatial_flights(GetParam().truth, {}, 5));
@@ -124,10 +124,10 @@ TEST_P(EveryFlightEffect, IsFoundWithItsSize) {
   EXPECT_GT(noise_alone, 2 * off);
 }
 
-std::vector<Case> cases() {
-  std::vector<Case> out;
+std::vector<FlightCase> cases() {
+  std::vector<FlightCase> out;
   const auto with = [&](const char* name, auto set, auto expected) {
-    Case c{name, {}, expected};
+    FlightCase c{name, {}, expected};
     set(c.truth);
     out.push_back(c);
   };

@@ -10,9 +10,9 @@
 namespace unhand::fitting {
 namespace {
 
-using test::spatial_flights;
-using test::SpatialDesign;
-using test::SpatialTruth;
+using unhand::test::spatial_flights;
+using unhand::test::SpatialDesign;
+using unhand::test::SpatialTruth;
 
 constexpr double kDrag = 0.04;  // 1/m
 

@@ -9,6 +9,9 @@
 
 namespace unhand::fitting::test {
 
+/// Of an ellipsoid whose semi-axes are 4, 3 and 5.
+inline const Eigen::Matrix3d along_axes = Eigen::Vector3d(1 / 16.0, 1 / 9.0, 1 / 25.0).asDiagonal();
+
 inline SlipSurface ellipsoid(const Eigen::Matrix3d& a) {
   return {SurfaceModel::ellipsoid_full, 0.05, {a(0, 0), a(0, 1), a(0, 2), a(1, 1), a(1, 2), a(2, 2)}};
 }

@@ -11,13 +11,11 @@
 namespace unhand::fitting::test {
 namespace {
 
-const Eigen::Matrix3d diagonal = Eigen::Vector3d(1 / 16.0, 1 / 9.0, 1 / 25.0).asDiagonal();
-
 Eigen::Matrix3d tilted() {
   const Eigen::Matrix3d r =
       (Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitX()))
           .toRotationMatrix();
-  return r * diagonal * r.transpose();
+  return r * along_axes * r.transpose();
 }
 
 void expect_coefficients(const SurfaceFit& fit, const SlipSurface& truth, double tolerance) {
@@ -32,8 +30,8 @@ void expect_coefficients(const SurfaceFit& fit, const SlipSurface& truth, double
 
 TEST(SlipSurface, EllipsoidsComeBackWithoutNoise) {
   // Ceres stops at a relative change of 1e-10; the noise has a floor of 1e-4.
-  expect_coefficients(fit_surface(simulate(ellipsoid(diagonal), 40, 0, 0, 1), SurfaceModel::ellipsoid),
-                      ellipsoid(diagonal), 1e-6);
+  expect_coefficients(fit_surface(simulate(ellipsoid(along_axes), 40, 0, 0, 1), SurfaceModel::ellipsoid),
+                      ellipsoid(along_axes), 1e-6);
   expect_coefficients(fit_surface(simulate(ellipsoid(tilted()), 40, 0, 0, 2), SurfaceModel::ellipsoid_full),
                       ellipsoid(tilted()), 1e-6);
 }
@@ -109,7 +107,7 @@ TEST(SlipSurface, GaugeAndNormalAgreeWithTheContactModel) {
 }
 
 TEST(SlipSurface, RefusesWhatDoesNotDetermineASurface) {
-  const SlipSamples slips = simulate(ellipsoid(diagonal), 14, 0.1, 0.1, 7);
+  const SlipSamples slips = simulate(ellipsoid(along_axes), 14, 0.1, 0.1, 7);
   const SurfaceFit few = fit_surface(slips, SurfaceModel::convex_quartic);
   EXPECT_EQ(few.outcome, SurfaceOutcome::too_few_slips);
   EXPECT_THAT(few.reason, testing::HasSubstr("surface 'simulated': 14 slips"));

@@ -11,14 +11,13 @@
 #include "datasets/log_error.hpp"
 #include "planners/elastic/replay.hpp"
 #include "planners/elastic/second_dual.hpp"
+#include "tests/planners/bsa3.hpp"
 
 namespace unhand::planners::elastic {
 namespace {
 
 constexpr ClutchMode kModes[]{ClutchMode::free, ClutchMode::hold, ClutchMode::sea, ClutchMode::brk,
                               ClutchMode::rigid};
-
-ClutchedArm bsa3() { return read_clutched_arm("bsa3"); }
 
 struct RandomState {
   Coordinates<double> at, rate;

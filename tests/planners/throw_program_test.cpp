@@ -11,11 +11,10 @@
 
 #include "planners/elastic/throw_refinement.hpp"
 #include "planners/elastic/throw_table.hpp"
+#include "tests/planners/bsa3.hpp"
 
 namespace unhand::planners::elastic {
 namespace {
-
-ClutchedArm bsa3() { return read_clutched_arm("bsa3"); }
 
 struct Rosenbrock {
   template <class S>
