@@ -113,6 +113,20 @@ FlightScatter scatter_of(const FlightSamples& s) {
   return out;
 }
 
+FlightScatter pooled(const std::vector<FlightScatter>& flights) {
+  FlightScatter out;
+  for (const FlightScatter& one : flights) {
+    const auto n = static_cast<double>(one.n);
+    out.n += one.n;
+    for (std::size_t a = 0; a < 3; ++a) out.position[a] += n * one.position[a] * one.position[a];
+    out.angle += n * one.angle * one.angle;
+  }
+  if (out.n == 0) return out;
+  for (double& x : out.position) x = std::sqrt(x / static_cast<double>(out.n));
+  out.angle = std::sqrt(out.angle / static_cast<double>(out.n));
+  return out;
+}
+
 std::size_t remove_glitches(FlightSamples& s) {
   std::vector<bool> good(s.times.size(), true);
   std::size_t removed = 0;

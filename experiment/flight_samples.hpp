@@ -33,6 +33,8 @@ struct FlightScatter {
 };
 /// The scatter of a flight's samples; see FlightScatter.
 FlightScatter scatter_of(const FlightSamples& samples);
+/// Of several flights together.
+FlightScatter pooled(const std::vector<FlightScatter>& flights);
 
 /// Takes out the frames in which a tracker was elsewhere for once: positions that lie off the parabolas
 /// through both sets of three neighbours around them, by more than eight of their sigmas and by the same

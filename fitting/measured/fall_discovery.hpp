@@ -1,7 +1,7 @@
 // Accelerometers in free fall as groups: the speed at the start of each fall is its own, effects are shared.
 #pragma once
 
-#include "experiment/falling_sensor.hpp"
+#include "fitting/measured/fall_readings.hpp"
 #include "fitting/measured/grouped_fit.hpp"
 
 namespace unhand::fitting {
@@ -45,13 +45,16 @@ class FallProblem final : public GroupedProblem {
 
  private:
   struct Fall {
-    experiment::FallSamples samples;
-    std::vector<flight::Vec3<double>> force;      // [m/s²]
-    std::vector<std::size_t> axes;                // that are used
-    flight::Vec3<double> sigma{}, rest{};         // rest: read before the fall [m/s²]
-    flight::Vec3<double> mean{1, 1, 1};           // what is left of the mean of an axis' rows
-    double speed{}, speed_sigma{}, tilt_sigma{};  // upward, when the fall begins [m/s]; of that; [rad]
+    FallReadings readings;
+    BeforeFall before;
+    std::vector<std::size_t> axes;       // that are used
+    flight::Vec3<double> sigma{};        // of a reading [m/s²]
+    flight::Vec3<double> mean{1, 1, 1};  // what is left of the mean of an axis' rows
   };
+  struct AxisCounts;
+  /// Makes a group of a throw, or says why it is none.
+  std::string add(const datasets::Throw& one, datasets::Split split, const ForceAxes& axes,
+                  AxisCounts& counts);
   void free_zeros();
   std::vector<Fall> falls_;
   std::vector<std::string> notes_;

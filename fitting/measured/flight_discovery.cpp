@@ -67,55 +67,55 @@ FlightProblem::FlightProblem(const ThrowLog& log, int threads) : gravity_(log.gr
           experiment::scatter_of(experiment::read_flight_samples(log, log.throws[i])));
   for (std::size_t i = 0; i < log.throws.size(); ++i) {
     const auto& one = log.throws[i];
-    const auto& fit = starts[i];
-    if (fit.outcome != experiment::FreeFlightOutcome::fitted || fit.times.size() < 6) {
-      skipped_.push_back({one.id, fit.reason.empty() ? "fewer than 6 samples" : fit.reason});
-      continue;
-    }
-    Flight flight;
-    flight.samples = experiment::read_flight_samples(log, one);
-    auto& s = flight.samples;
-    if (!s.declared) {
-      double n = 0, angle = 0;
-      Vec3<double> position{};
-      for (const auto& x : scatter[one.object]) {
-        const auto m = static_cast<double>(x.n);
-        n += m, angle += m * x.angle * x.angle;
-        for (std::size_t a = 0; a < 3; ++a) position[a] += m * x.position[a] * x.position[a];
-      }
-      for (std::size_t a = 0; a < 3; ++a)
-        s.sigma[a] = std::max(1e-9, std::sqrt(position[a] / std::max(1.0, n)));
-      s.sigma_angle = std::max(1e-9, std::sqrt(angle / std::max(1.0, n)));
-    }
-    glitches_ += experiment::remove_glitches(s);
-    const auto& object = log.objects.at(one.object);
-    flight.drag_k = object.drag_k.value_or(0);
-    declared_["flight.quadratic_drag.k[" + one.object + "]"] = flight.drag_k;
-    if (object.inertia && object.inertia->size() == 3)
-      std::copy_n(object.inertia->begin(), 3, flight.inertia.begin());
-    flight.reference = fit.rotation.attitude;
-    for (const double theta : s.theta) s.attitude.push_back(flight::exp(Vec3<double>{0, -theta, 0}));
-    Group group{one.id, one.object, one.condition, splits[i], {}, {}, {}};
-    const bool turns = !s.attitude.empty();
-    for (const auto* start : {&fit.position, &fit.velocity})
-      for (const std::size_t a : axes_) group.start.push_back((*start)[a]);
-    if (turns) {
-      group.start.insert(group.start.end(), turns_.size(), 0.0);
-      for (const std::size_t a : turns_) group.start.push_back(fit.rotation.omega[a]);
-    }
-    for (const double t : s.elapsed)
-      for (int c = 0; c < (turns ? static_cast<int>(channels_.size()) : position_channels()); ++c)
-        group.rows.push_back({c, t});
-    group.covariates = {flight::norm(fit.velocity), turns ? flight::norm(fit.rotation.omega) : 0,
-                        s.elapsed.back(), fit.position[2], fit.position[0]};
-    if (!planar) group.covariates.push_back(fit.position[1]);
-    group.covariates.push_back(static_cast<double>(groups_.size()));
-    groups_.push_back(std::move(group));
-    flights_.push_back(std::move(flight));
+    if (const std::string why = add(log, one, splits[i], starts[i], experiment::pooled(scatter[one.object]));
+        !why.empty())
+      skipped_.push_back({one.id, why});
   }
   if (groups_.empty())
     throw std::invalid_argument("free flights: no throw is one" +
                                 (skipped_.empty() ? "" : ": " + skipped_.front().second));
+}
+
+std::string FlightProblem::add(const ThrowLog& log, const datasets::Throw& one, datasets::Split split,
+                               const experiment::FreeFlightFit& fit, const experiment::FlightScatter& usual) {
+  constexpr std::size_t kFewest = 6;
+  if (fit.outcome != experiment::FreeFlightOutcome::fitted || fit.times.size() < kFewest)
+    return fit.reason.empty() ? fmt::format("fewer than {} samples", kFewest) : fit.reason;
+  Flight flight;
+  flight.samples = experiment::read_flight_samples(log, one);
+  auto& s = flight.samples;
+  if (!s.declared) {
+    constexpr double kLeast = 1e-9;  // m, rad
+    for (std::size_t a = 0; a < 3; ++a) s.sigma[a] = std::max(kLeast, usual.position[a]);
+    s.sigma_angle = std::max(kLeast, usual.angle);
+  }
+  glitches_ += experiment::remove_glitches(s);
+  const auto& object = log.objects.at(one.object);
+  flight.drag_k = object.drag_k.value_or(0);
+  declared_["flight.quadratic_drag.k[" + one.object + "]"] = flight.drag_k;
+  if (object.inertia && object.inertia->size() == 3)
+    std::copy_n(object.inertia->begin(), 3, flight.inertia.begin());
+  flight.reference = fit.rotation.attitude;
+  for (const double theta : s.theta) s.attitude.push_back(flight::exp(Vec3<double>{0, -theta, 0}));
+
+  Group group{one.id, one.object, one.condition, split, {}, {}, {}};
+  const bool turns = !s.attitude.empty();
+  for (const auto* start : {&fit.position, &fit.velocity})
+    for (const std::size_t a : axes_) group.start.push_back((*start)[a]);
+  if (turns) {
+    group.start.insert(group.start.end(), turns_.size(), 0.0);
+    for (const std::size_t a : turns_) group.start.push_back(fit.rotation.omega[a]);
+  }
+  for (const double t : s.elapsed)
+    for (int c = 0; c < (turns ? static_cast<int>(channels_.size()) : position_channels()); ++c)
+      group.rows.push_back({c, t});
+  group.covariates = {flight::norm(fit.velocity), turns ? flight::norm(fit.rotation.omega) : 0,
+                      s.elapsed.back(), fit.position[2], fit.position[0]};
+  if (log.dimension == 3) group.covariates.push_back(fit.position[1]);
+  group.covariates.push_back(static_cast<double>(groups_.size()));
+  groups_.push_back(std::move(group));
+  flights_.push_back(std::move(flight));
+  return {};
 }
 
 std::vector<dynamics::Effect> FlightProblem::effects() const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "experiment/flight_samples.hpp"
+#include "experiment/free_flight.hpp"
 #include "fitting/measured/grouped_fit.hpp"
 
 namespace unhand::fitting {
@@ -38,6 +39,10 @@ class FlightProblem final : public GroupedProblem {
     flight::Vec3<double> inertia{1, 1, 1};
     double drag_k{};
   };
+  /// Makes a group of a throw whose start is known, or says why it is none. `usual`: how the flights of its
+  /// object scatter.
+  std::string add(const datasets::ThrowLog& log, const datasets::Throw& one, datasets::Split split,
+                  const experiment::FreeFlightFit& fit, const experiment::FlightScatter& usual);
   std::vector<Flight> flights_;
   double gravity_{};
   std::size_t glitches_{};
