@@ -148,92 +148,113 @@ typename GivingPoints<S>::Sum GivingPoints<S>::sum(const Stretch<S>& from, const
   return {energy, {fx, fz, tau}, {xx, xz, zz, xt, zt, tt}};
 }
 
-/// Minimises ½ qᵀ A q − c·q + k/g Σ w ψ over q by Newton's method with a line search; for Dual the implicit
-/// function theorem, with the answer's moment k Σ w Bᵀ e = c − A q.
 template <class S>
-bool GivingPoints<S>::solve(const Step& p, const Stretch<S>& from, const S& gain, const S& radius, Slip& slip,
-                            Vec3<S>& wrench) {
-  const auto& A = p.inertia;
-  const auto& c = p.free;
-  const double k = value_of(stiffness_), g = value_of(gain), a = value_of(radius);
-  Eigen::Matrix3d metric;
-  Eigen::Vector3d pull, q;
-  for (int i = 0; i < 3; ++i) {
-    pull[i] = value_of(c[i]), q[i] = value_of(slip[i]);
-    for (int j = 0; j < 3; ++j) metric(i, j) = value_of(A[i][j]);
-  }
-  const auto at = [&](const Eigen::Vector3d& x) { return sum(from, {x[0], x[1], x[2]}, g, a); };
-  const auto potential = [&](const Eigen::Vector3d& x, const Sum& s) {
-    return 0.5 * x.dot(metric * x) - pull.dot(x) + k / g * s.energy;
-  };
-  Sum here = at(q);
-  double value = potential(q, here);
-  Eigen::Matrix3d hessian;
-  bool solved = false;
-  for (int iteration = 0; iteration < kNewtonBudget && !solved; ++iteration) {
-    const Eigen::Vector3d moment(here.moment[0], here.moment[1], here.moment[2]);
-    const Eigen::Vector3d gradient = metric * q - pull + k * moment;
-    const auto& b = here.bending;
-    hessian << b[0], b[1], b[3], b[1], b[2], b[4], b[3], b[4], b[5];
-    hessian = metric + k * g * hessian;
-    const Eigen::Vector3d way = -hessian.llt().solve(gradient);
+double GivingPoints<S>::Potential::value(const Eigen::Vector3d& q, const Sum& at) const {
+  return 0.5 * q.dot(inertia * q) - pull.dot(q) + stiffness / gain * at.energy;
+}
+
+template <class S>
+Eigen::Vector3d GivingPoints<S>::Potential::gradient(const Eigen::Vector3d& q, const Sum& at) const {
+  const Eigen::Vector3d moment(at.moment[0], at.moment[1], at.moment[2]);
+  return inertia * q - pull + stiffness * moment;
+}
+
+template <class S>
+Eigen::Matrix3d GivingPoints<S>::Potential::hessian(const Sum& at) const {
+  const auto& b = at.bending;
+  Eigen::Matrix3d bending;
+  bending << b[0], b[1], b[3], b[1], b[2], b[4], b[3], b[4], b[5];
+  return inertia + stiffness * gain * bending;
+}
+
+/// Newton's method with a line search.
+template <class S>
+typename GivingPoints<S>::Minimum GivingPoints<S>::minimise(const Potential& p, const Stretch<S>& from,
+                                                            const Eigen::Vector3d& guess) const {
+  const auto at = [&](const Eigen::Vector3d& x) { return sum(from, {x[0], x[1], x[2]}, p.gain, p.radius); };
+  Minimum here{guess, at(guess), false};
+  auto& q = here.slip;
+  double value = p.value(q, here.sum);
+  for (int iteration = 0; iteration < kNewtonBudget && !here.found; ++iteration) {
+    const Eigen::Vector3d gradient = p.gradient(q, here.sum);
+    const Eigen::Vector3d way = -p.hessian(here.sum).llt().solve(gradient);
     const double slope = gradient.dot(way);
-    if (!std::isfinite(slope)) return false;
+    if (!std::isfinite(slope)) return here;
     // what a step of Newton's would still take off, beside the terms that the potential is the difference of
-    if (-slope <= 1e-28 * (q.dot(metric * q) + k / g * here.energy) + 1e-300) {
-      solved = true;
+    const double terms = q.dot(p.inertia * q) + p.stiffness / p.gain * here.sum.energy;
+    if (-slope <= 1e-28 * terms + 1e-300) {
+      here.found = true;
       break;
     }
     double reach = 1;
     Eigen::Vector3d next = q + way;
     Sum there = at(next);
-    double next_value = potential(next, there);
-    const double rounding = 1e-13 * (std::abs(value) + std::abs(pull.dot(q)));
+    double next_value = p.value(next, there);
+    const double rounding = 1e-13 * (std::abs(value) + std::abs(p.pull.dot(q)));
     for (int halving = 0; halving < 40 && next_value > value + 1e-4 * reach * slope + rounding; ++halving) {
       reach *= 0.5;
       next = q + reach * way;
       there = at(next);
-      next_value = potential(next, there);
+      next_value = p.value(next, there);
     }
-    solved = reach == 1 && -slope <= 1e-22 * (q.dot(metric * q) + k / g * here.energy);
-    q = next, here = there, value = next_value;
+    here = {next, there, reach == 1 && -slope <= 1e-22 * terms};
+    value = next_value;
   }
-  if (!q.allFinite()) return false;
-  for (int i = 0; i < 3; ++i) slip[i] = S(q[i]);
-  if constexpr (kVaries<S>) {
-    // The residual A q − c + k Σ w Bᵀ e at this q, with derivatives.
-    std::array<Gradient, 3> moment;
-    for (auto& each : moment) each.setZero();
-    const Gradient &dg = gain.v, &da = radius.v;
-    for (std::size_t i = 0; i < points_.x.size(); ++i) {
-      const double px = points_.x[i], pz = points_.z[i], x = a * px, z = a * pz, w = points_.area[i];
-      const double bx = q[0] - z * q[2], bz = q[1] + x * q[2];
-      double ux = from.x[i] + g * bx, uz = from.z[i] + g * bz;
-      Gradient dx = gradient(from.dx[i]) + bx * dg - (g * pz * q[2]) * da;
-      Gradient dz = gradient(from.dz[i]) + bz * dg + (g * px * q[2]) * da;
-      const double size = std::sqrt(ux * ux + uz * uz), limit = limit_[i];
-      if (size > limit) {
-        const double kept = limit / size;
-        limited(ux / size, uz / size, kept, gradient(limit_dual_[i]), dx, dz);
-        ux *= kept, uz *= kept;
-      }
-      moment[0] += w * dx;
-      moment[1] += w * dz;
-      moment[2] += w * (x * dz - z * dx + (px * uz - pz * ux) * da);
+  return here;
+}
+
+template <class S>
+void GivingPoints<S>::follow(const Minimum& minimum, const Potential& potential, const Step& p,
+                             const Stretch<S>& from, const S& gain, const S& radius,
+                             Slip& slip) const requires std::is_same_v<S, Dual> {
+  const Eigen::Vector3d& q = minimum.slip;
+  const double k = potential.stiffness, g = potential.gain, a = potential.radius;
+  // The residual A q − c + k Σ w Bᵀ e at this q, with derivatives.
+  std::array<Gradient, 3> moment;
+  for (auto& each : moment) each.setZero();
+  const Gradient &dg = gain.v, &da = radius.v;
+  for (std::size_t i = 0; i < points_.x.size(); ++i) {
+    const double px = points_.x[i], pz = points_.z[i], x = a * px, z = a * pz, w = points_.area[i];
+    const double bx = q[0] - z * q[2], bz = q[1] + x * q[2];
+    double ux = from.x[i] + g * bx, uz = from.z[i] + g * bz;
+    Gradient dx = gradient(from.dx[i]) + bx * dg - (g * pz * q[2]) * da;
+    Gradient dz = gradient(from.dz[i]) + bz * dg + (g * px * q[2]) * da;
+    const double size = std::sqrt(ux * ux + uz * uz), limit = limit_[i];
+    if (size > limit) {
+      const double kept = limit / size;
+      limited(ux / size, uz / size, kept, gradient(limit_dual_[i]), dx, dz);
+      ux *= kept, uz *= kept;
     }
-    Eigen::Matrix<double, 3, dynamics::kDualSize> residual;
-    for (int i = 0; i < 3; ++i) {
-      residual.row(i) = (k * moment[i] + here.moment[i] * stiffness_.v - c[i].v).transpose();
-      for (int j = 0; j < 3; ++j) residual.row(i) += q[j] * A[i][j].v.transpose();
-    }
-    const auto& b = here.bending;
-    hessian << b[0], b[1], b[3], b[1], b[2], b[4], b[3], b[4], b[5];
-    hessian = metric + k * g * hessian;
-    const Eigen::Matrix<double, 3, dynamics::kDualSize> shift = hessian.llt().solve(residual);
-    for (int i = 0; i < 3; ++i) slip[i].v = -shift.row(i).transpose();
+    moment[0] += w * dx;
+    moment[1] += w * dz;
+    moment[2] += w * (x * dz - z * dx + (px * uz - pz * ux) * da);
   }
-  for (int i = 0; i < 3; ++i) wrench[i] = dot3(A[i], slip) - c[i];
-  return solved;
+  Eigen::Matrix<double, 3, dynamics::kDualSize> residual;
+  for (int i = 0; i < 3; ++i) {
+    residual.row(i) = (k * moment[i] + minimum.sum.moment[i] * stiffness_.v - p.free[i].v).transpose();
+    for (int j = 0; j < 3; ++j) residual.row(i) += q[j] * p.inertia[i][j].v.transpose();
+  }
+  const Eigen::Matrix<double, 3, dynamics::kDualSize> shift =
+      potential.hessian(minimum.sum).llt().solve(residual);
+  for (int i = 0; i < 3; ++i) slip[i].v = -shift.row(i).transpose();
+}
+
+/// At the minimum the moment k Σ w Bᵀ e is c − A q: the object's wrench, reversed.
+template <class S>
+bool GivingPoints<S>::solve(const Step& p, const Stretch<S>& from, const S& gain, const S& radius, Slip& slip,
+                            Vec3<S>& wrench) {
+  Potential potential{{}, {}, value_of(stiffness_), value_of(gain), value_of(radius)};
+  Eigen::Vector3d guess;
+  for (int i = 0; i < 3; ++i) {
+    potential.pull[i] = value_of(p.free[i]), guess[i] = value_of(slip[i]);
+    for (int j = 0; j < 3; ++j) potential.inertia(i, j) = value_of(p.inertia[i][j]);
+  }
+  const Minimum minimum = minimise(potential, from, guess);
+  if (!minimum.slip.allFinite()) return false;
+  for (int i = 0; i < 3; ++i) slip[i] = S(minimum.slip[i]);
+  if constexpr (kVaries<S>) follow(minimum, potential, p, from, gain, radius, slip);
+  for (int i = 0; i < 3; ++i) wrench[i] = dot3(p.inertia[i], slip) - p.free[i];
+  return minimum.found;
 }
 
 /// The springs follow the slip as far as the limit lets them.

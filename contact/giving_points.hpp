@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <type_traits>
 #include <vector>
 
 #include "contact/friction_limits.hpp"
@@ -84,7 +85,28 @@ class GivingPoints {
     Vec3<double> moment;            ///< Σ w Bᵀ e
     std::array<double, 6> bending;  ///< Σ w Bᵀ C B: xx, xz, zz, xτ, zτ, ττ
   };
+  /// The potential of a step or a hold in values, ½ qᵀ A q − c·q + k/g Σ w_i ψ_i(s_i + g B_i q), and where it
+  /// is least.
+  struct Potential {
+    Eigen::Matrix3d inertia;  ///< A
+    Eigen::Vector3d pull;     ///< c
+    double stiffness, gain;   ///< k, g
+    double radius;            ///< of the patch [m]
+
+    double value(const Eigen::Vector3d& q, const Sum& at) const;
+    Eigen::Vector3d gradient(const Eigen::Vector3d& q, const Sum& at) const;
+    Eigen::Matrix3d hessian(const Sum& at) const;
+  };
+  struct Minimum {
+    Eigen::Vector3d slip;
+    Sum sum;
+    bool found;
+  };
   Sum sum(const Stretch<S>& from, const Vec3<double>& slip, double gain, double radius) const;
+  Minimum minimise(const Potential& potential, const Stretch<S>& from, const Eigen::Vector3d& guess) const;
+  /// How the slip of the minimum moves with the parameters, by the implicit function theorem.
+  void follow(const Minimum& minimum, const Potential& potential, const Step& problem, const Stretch<S>& from,
+              const S& gain, const S& radius, Slip& slip) const requires std::is_same_v<S, dynamics::Dual>;
   bool solve(const Step& problem, const Stretch<S>& from, const S& gain, const S& radius, Slip& slip,
              Vec3<S>& wrench);
   void move(const Stretch<S>& from, const Slip& slip, const S& radius, const S& h, Stretch<S>& to) const;
