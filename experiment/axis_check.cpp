@@ -343,6 +343,38 @@ std::vector<UnitDoubt> contradicted_axes(const ThrowLog& log) {
   return out;
 }
 
+std::vector<UnitDoubt> turned_vertical(const ThrowLog& log) {
+  constexpr double kNear = 1.5;
+  constexpr const char* kHorizontal[] = {"x", "y"};
+  const std::size_t axes = static_cast<std::size_t>(log.dimension), z = axes - 1;
+  std::vector<std::vector<double>> falls(axes);  // by axis: what a flight bends along it, in units of g
+  std::size_t flights = 0;
+  for (const auto& one : log.throws) {
+    const auto bends = flight_bends(log, one);
+    flights += !bends.empty();
+    for (std::size_t c = 0; c < bends.size(); ++c)
+      if (const auto ratio = bends[c].size_ratio(kShowsBend)) falls[c].push_back(*ratio);
+  }
+  const auto usual = [&](std::size_t c) {
+    return 2 * falls[c].size() > flights ? dynamics::median(falls[c]) : 0;
+  };
+  const auto near_gravity = [](double ratio) {
+    return std::abs(ratio) > 1 / kNear && std::abs(ratio) < kNear;
+  };
+  if (flights == 0 || usual(z) > 1 / kNear) return {};
+  for (std::size_t c = 0; c < axes; ++c) {
+    const double ratio = usual(c);
+    if (!near_gravity(ratio)) continue;
+    const std::string name = c == z ? "z" : kHorizontal[c];
+    return {{"/throws/*/mocap/pose", name, ratio, static_cast<int>(flights),
+             fmt::format(
+                 "free flights fall along {}{} (by {:.3g} of gravity, median of {} throws), and not along "
+                 "-z: which axis of the file points up?",
+                 ratio > 0 ? "-" : "+", name, std::abs(ratio), falls[c].size())}};
+  }
+  return {};
+}
+
 std::vector<UnitDoubt> reversed_wrenches(const ThrowLog& log) {
   constexpr const char* kNames[] = {"fx", "fz", "tau"};
   constexpr double kAgainst = -0.9, kRaw = -0.5, kSize = 5, kCrossed = 0.95, kOwn = 0.9;

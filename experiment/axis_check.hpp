@@ -1,5 +1,5 @@
-// Single axes of a planar throw in another unit, or with the other sign, and a normal force with it. Internal
-// to unit_check.
+// Single axes of a planar throw in another unit, or with the other sign, a normal force with it, and a
+// vertical that another axis has. Internal to unit_check.
 #pragma once
 
 #include <vector>
@@ -19,6 +19,11 @@ namespace unhand::experiment {
 /// disagreements beyond its agreements. An axis that hardly moves has no say. Of the median over throws
 /// first; where that agrees, of single throws, by factors alone.
 std::vector<UnitDoubt> contradicted_axes(const datasets::ThrowLog& log);
+
+/// A vertical that is not z, or points down: free flights without a hand, of either dimension, that fall by
+/// gravity (within a factor of 1.5, in the median over the throws) along another axis than −z, and not along
+/// that.
+std::vector<UnitDoubt> turned_vertical(const datasets::ThrowLog& log);
 
 /// Columns of the wrench with the other sign. While the object is held the pads' wrench is M a − m g. A
 /// column is told if it goes against that: in the median over throws a correlation below −0.9 about the means

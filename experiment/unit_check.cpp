@@ -148,8 +148,8 @@ std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log) {
   if (out.empty()) out = doubtful_friction(ratios);
   if (out.empty()) out = outlying_throws(log, throws);
   if (!out.empty()) return out;
-  for (const auto check : {contradicted_axes, turned_levers, reversed_wrenches, landings_turns_off,
-                           doubtful_landing_height, contradicted_landing_height})
+  for (const auto check : {turned_vertical, contradicted_axes, turned_levers, reversed_wrenches,
+                           landings_turns_off, doubtful_landing_height, contradicted_landing_height})
     if (auto found = check(log); !found.empty()) return found;
   return {};
 }

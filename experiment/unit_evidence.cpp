@@ -10,6 +10,7 @@
 #include "datasets/summary.hpp"
 #include "dynamics/frames.hpp"
 #include "dynamics/median.hpp"
+#include "dynamics/straight_line.hpp"
 #include "experiment/column_pair.hpp"
 #include "experiment/landing_noise.hpp"
 #include "experiment/unit_rules.hpp"
@@ -61,6 +62,33 @@ std::vector<HeldWrench> held_wrenches(const datasets::ThrowLog& log, const datas
                          object.mass * (free.z + a[2] * d.x - w2 * d.z)};
     out.push_back({{pads * ft.wrench(i, 0), pads * ft.wrench(i, 1), pads * ft.wrench(i, 2)},
                    {f.x, f.z, turns ? object.inertia->front() * a[2] + d.x * f.z - d.z * f.x : NAN}});
+  }
+  return out;
+}
+
+std::vector<ColumnPair> flight_bends(const datasets::ThrowLog& log, const datasets::Throw& logged) {
+  constexpr std::size_t kEnough = 8;
+  if (logged.hand || !logged.mocap || !datasets::held_by(log, logged).empty()) return {};
+  const auto& mocap = *logged.mocap;
+  const auto axes = static_cast<std::size_t>(log.dimension);
+  std::vector<double> time, fall;
+  std::vector<std::vector<double>> position(axes);
+  for (std::size_t i = 0; i < mocap.time.rows; ++i) {
+    const double t = mocap.time(i);
+    if (!mocap.is_valid(i)) continue;
+    if (logged.free_flight && (t < logged.free_flight->first || t > logged.free_flight->second)) continue;
+    time.push_back(t);
+    const double since = t - time.front();
+    fall.push_back(-0.5 * log.gravity * since * since);
+    for (std::size_t c = 0; c < axes; ++c) position[c].push_back(mocap.pose(i, c));
+  }
+  if (time.size() < kEnough) return {};
+  const auto falls = dynamics::fit_line(time, fall);
+  std::vector<ColumnPair> out(axes);
+  for (std::size_t c = 0; c < axes; ++c) {
+    const auto straight = dynamics::fit_line(time, position[c]);
+    for (std::size_t i = 0; i < time.size(); ++i)
+      out[c].add(position[c][i] - straight.at(time[i]), fall[i] - falls.at(time[i]));
   }
   return out;
 }
@@ -150,36 +178,6 @@ void check_wrench(const Held& held, std::optional<double> grasp_angle, SizeRatio
   keep(out, SizedColumn::torque, torque.fitted_ratio(kShowsNewtonMetre));
 }
 
-/// The bend of the height over time, beside gravity's; what is straight of both is taken out.
-void check_fall(const datasets::ThrowLog& log, const datasets::Throw& logged, SizeRatios& out) {
-  const auto& mocap = *logged.mocap;
-  const std::size_t z = log.dimension == 2 ? 1 : 2;
-  std::vector<std::array<double, 3>> samples;  // t, height, fall
-  for (std::size_t i = 0; i < mocap.time.rows; ++i) {
-    const double t = mocap.time(i);
-    if (!mocap.is_valid(i)) continue;
-    if (logged.free_flight && (t < logged.free_flight->first || t > logged.free_flight->second)) continue;
-    const double since = samples.empty() ? 0 : t - samples.front()[0];
-    samples.push_back({t, mocap.pose(i, z), -0.5 * log.gravity * since * since});
-  }
-  constexpr std::size_t kEnough = 8;
-  if (samples.size() < kEnough) return;
-  std::array<double, 3> mean{};
-  for (const auto& s : samples)
-    for (std::size_t c = 0; c < 3; ++c) mean[c] += s[c] / static_cast<double>(samples.size());
-  double tt = 0, th = 0, tf = 0;
-  for (const auto& s : samples) {
-    const double t = s[0] - mean[0];
-    tt += t * t, th += t * (s[1] - mean[1]), tf += t * (s[2] - mean[2]);
-  }
-  ColumnPair bend;
-  for (const auto& s : samples) {
-    const double t = s[0] - mean[0];
-    bend.add(s[1] - mean[1] - th / tt * t, s[2] - mean[2] - tf / tt * t);
-  }
-  keep(out, SizedColumn::fall, bend.fitted_ratio(kShowsBend));
-}
-
 /// A free flight of the pads' centre from the end of the grasp.
 void check_landing(const Held& held, SizeRatios& out) {
   const auto& landing = *held.logged.landing;
@@ -253,7 +251,8 @@ void check_friction(const datasets::ThrowLog& log, const datasets::FtLog& ft, do
 
 SizeRatios compare_sizes(const datasets::ThrowLog& log, const datasets::Throw& logged) {
   SizeRatios out;
-  if (!logged.hand && logged.mocap && datasets::held_by(log, logged).empty()) check_fall(log, logged, out);
+  if (const auto bends = flight_bends(log, logged); !bends.empty())
+    keep(out, SizedColumn::fall, bends.back().fitted_ratio(kShowsBend));
   if (log.dimension != 2 || !logged.hand || logged.hand->time.rows < 3) return out;
   const auto& hand = *logged.hand;
   check_hand(hand, out);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "datasets/throw_log.hpp"
+#include "experiment/column_pair.hpp"
 
 namespace unhand::experiment {
 
@@ -37,6 +38,10 @@ using SizeRatios = std::map<SizedColumn, double>;
 
 /// What a throw shows: from a hand if the log is planar, and the height of a free flight in either.
 SizeRatios compare_sizes(const datasets::ThrowLog& log, const datasets::Throw& logged);
+
+/// Of a throw without a hand, by position axis (x, z; or x, y, z): what is not straight of it over time,
+/// beside that of a fall by gravity. Nothing if it was held, or has fewer than eight samples.
+std::vector<ColumnPair> flight_bends(const datasets::ThrowLog& log, const datasets::Throw& logged);
 
 /// The hand's columns at a time within its own, by straight lines.
 std::array<double, 3> hand_at(const datasets::Series& time, const datasets::Series& values, double t);

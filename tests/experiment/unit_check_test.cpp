@@ -338,6 +338,40 @@ TEST(UnitCheck, GravityMeasuresTheLengthsOfAFreeFlight) {
   }
 }
 
+// Files in which another axis points up, or z down, and others whose vertical is a little off.
+TEST(UnitCheck, FreeFlightsTellWhichAxisIsTheVertical) {
+  for (const int dimension : {2, 3}) {
+    const auto columns = static_cast<std::size_t>(dimension), z = columns - 1;
+    for (std::size_t up = 0; up < columns; ++up)
+      for (const double sign : {1.0, -1.0}) {
+        auto log = tosses(dimension);
+        for (auto& toss : log.throws)
+          for (std::size_t s = 0; s < toss.mocap->time.rows; ++s) {
+            auto& pose = toss.mocap->pose;
+            std::swap(pose(s, up), pose(s, z));
+            pose(s, up) *= sign;
+          }
+        const auto doubts = unit_doubts(log);
+        if (up == z && sign > 0) {
+          EXPECT_THAT(doubts, IsEmpty());
+          continue;
+        }
+        ASSERT_EQ(doubts.size(), 1U) << dimension << up << sign;
+        EXPECT_EQ(doubts[0].path, "/throws/*/mocap/pose");
+        EXPECT_EQ(doubts[0].column, up == z ? "z" : up == 0 ? "x" : "y");
+        EXPECT_NEAR(doubts[0].ratio, sign, 1e-9);
+        EXPECT_THAT(doubts[0].reason, HasSubstr(sign > 0 ? "fall along -" : "fall along +"));
+      }
+    auto tilted = tosses(dimension);
+    for (auto& toss : tilted.throws)
+      for (std::size_t s = 0; s < toss.mocap->time.rows; ++s) {
+        auto& pose = toss.mocap->pose;
+        pose(s, 0) += 0.2 * (pose(s, z) - 1 - 4 * toss.mocap->time(s));
+      }
+    EXPECT_THAT(unit_doubts(tilted), IsEmpty()) << dimension;
+  }
+}
+
 TEST(UnitCheck, ALandingHeightWhereNothingLandsIsRefused) {
   for (const double height : {50.0, 800.0, -50.0, -800.0}) {
     auto log = campaign();
