@@ -94,6 +94,23 @@ std::vector<UnitDoubt> disproportionate_columns(const RatiosByColumn& ratios) {
   return out;
 }
 
+/// An accelerometer that reads nothing at rest and gravity in a fall.
+std::vector<UnitDoubt> gravity_taken_out(const datasets::ThrowLog& log) {
+  constexpr double kLeast = 0.3, kNear = 0.3;  // of gravity
+  std::vector<double> before, fall;
+  for (const auto& one : log.throws)
+    if (const auto levels = force_levels(one)) before.push_back(levels->before), fall.push_back(levels->fall);
+  if (before.empty()) return {};
+  const double rest = dynamics::median(before), falling = dynamics::median(fall), g = log.gravity;
+  if (!(rest < kLeast * g && std::abs(falling - g) < kNear * g)) return {};
+  return {
+      {"/throws/*/imu/specific_force", "f", falling / g, static_cast<int>(before.size()),
+       fmt::format("an accelerometer reads {:.3g} m/s^2 before the falls and {:.3g} m/s^2 in them (medians "
+                   "of {} throws), where {:.3g} and 0 are expected: gravity taken out, as phones do for "
+                   "\"linear acceleration\"?",
+                   rest, falling, before.size(), g)}};
+}
+
 std::vector<UnitDoubt> turned_grasps(const datasets::ThrowLog& log) {
   std::vector<double> angles;
   for (const auto& one : log.throws)
@@ -135,7 +152,8 @@ std::vector<UnitDoubt> doubtful_friction(const RatiosByColumn& ratios) {
 std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log) {
   // What one check finds makes the later ones compare with what is wrong: the first that finds something is
   // the last.
-  for (const auto check : {doubtful_gravity, impossible_declarations, jumping_angles, reversed_forces})
+  for (const auto check :
+       {doubtful_gravity, impossible_declarations, gravity_taken_out, jumping_angles, reversed_forces})
     if (auto out = check(log); !out.empty()) return out;
   std::vector<SizeRatios> throws;
   RatiosByColumn ratios;

@@ -52,9 +52,9 @@ inline constexpr double kLeastOutlier = 5;
 ///   free flights are at landing/time, and with the highest point of all throws (to a metre);
 /// - the angles of hand and object with themselves, from sample to sample, and those of the landing with
 ///   what motion capture leads to: logs hold them unwrapped, without jumps of whole turns;
-/// - the height of a free flight with what gravity makes of it, and which axis it falls along: the only ones
-/// of
-///   logs without a hand, and of dimension 3.
+/// - the height of a free flight of a log without a hand with what gravity makes of it, and which axis it
+///   falls along, in either dimension;
+/// - what an accelerometer reads at rest before a fall, and in it, with gravity.
 ///
 /// A throw has a say where the two are proportional (cosine of at least 0.9 over its samples) and what is
 /// expected is large enough to show. The median over throws must lie within a factor of 1.5 (clocks and

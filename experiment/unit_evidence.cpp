@@ -93,6 +93,40 @@ std::vector<ColumnPair> flight_bends(const datasets::ThrowLog& log, const datase
   return out;
 }
 
+std::optional<ForceLevels> force_levels(const datasets::Throw& logged) {
+  constexpr double kMemory = 3, kWindow = 0.2;  // s
+  constexpr std::size_t kEnough = 8;
+  if (!logged.imu || !logged.free_flight) return {};
+  const auto& [time, force, rate] = *logged.imu;
+  const auto size = [&](std::size_t i) { return std::hypot(force(i, 0), force(i, 1), force(i, 2)); };
+  std::vector<double> falling;
+  std::size_t first = time.rows;  // of the fall
+  for (std::size_t i = 0; i < time.rows; ++i) {
+    if (time(i) < logged.free_flight->first || time(i) > logged.free_flight->second) continue;
+    first = std::min(first, i);
+    falling.push_back(size(i));
+  }
+  if (falling.size() < kEnough) return {};
+  std::optional<ForceLevels> out;
+  for (std::size_t begin = 0, end = 0; begin < first; ++begin) {
+    if (time(first) - time(begin) > kMemory) continue;
+    while (end < first && time(end) - time(begin) < kWindow) ++end;
+    if (end == first) break;
+    const auto n = static_cast<double>(end - begin);
+    if (end - begin < kEnough) continue;
+    std::array<double, 3> mean{};
+    double squares = 0;
+    for (std::size_t i = begin; i < end; ++i)
+      for (std::size_t a = 0; a < 3; ++a) mean[a] += force(i, a) / n;
+    for (std::size_t i = begin; i < end; ++i)
+      for (std::size_t a = 0; a < 3; ++a) squares += (force(i, a) - mean[a]) * (force(i, a) - mean[a]) / n;
+    const ForceLevels here{std::hypot(mean[0], mean[1], mean[2]), std::sqrt(squares), 0};
+    if (!out || here.scatter < out->scatter) out = here;
+  }
+  if (out) out->fall = dynamics::median(falling);
+  return out;
+}
+
 namespace {
 
 /// Every sample of `value` minus the first, beside its derivative added up (trapezoids).
@@ -253,6 +287,8 @@ SizeRatios compare_sizes(const datasets::ThrowLog& log, const datasets::Throw& l
   SizeRatios out;
   if (const auto bends = flight_bends(log, logged); !bends.empty())
     keep(out, SizedColumn::fall, bends.back().fitted_ratio(kShowsBend));
+  if (const auto levels = force_levels(logged); levels && levels->at_rest() && log.gravity > 0)
+    out[SizedColumn::rest] = levels->before / log.gravity;
   if (log.dimension != 2 || !logged.hand || logged.hand->time.rows < 3) return out;
   const auto& hand = *logged.hand;
   check_hand(hand, out);

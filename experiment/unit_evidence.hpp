@@ -22,6 +22,7 @@ enum class SizedColumn {
   hand_speed,     ///< twist against the sum of the acceleration
   hand_spin,      ///< the same of the rate
   fall,           ///< the height of a free flight against gravity
+  rest,           ///< what an accelerometer reads before a fall against gravity
   held_shift,     ///< the object's position against the hand's while it is held
   held_turn,      ///< the same of the angle
   lever,          ///< declared com_offset against the distance at which motion capture sees the object
@@ -42,6 +43,18 @@ SizeRatios compare_sizes(const datasets::ThrowLog& log, const datasets::Throw& l
 /// Of a throw without a hand, by position axis (x, z; or x, y, z): what is not straight of it over time,
 /// beside that of a fall by gravity. Nothing if it was held, or has fewer than eight samples.
 std::vector<ColumnPair> flight_bends(const datasets::ThrowLog& log, const datasets::Throw& logged);
+
+/// What an accelerometer reads before a fall, in the quietest fifth of a second of the last three seconds,
+/// and in the fall.
+struct ForceLevels {
+  double before{};   ///< size of the mean reading [m/s²]
+  double scatter{};  ///< of the readings about it [m/s²]
+  double fall{};     ///< median size of a reading in the fall [m/s²]
+  /// Whether the sensor was at rest, in any unit.
+  bool at_rest() const { return scatter < 0.06 * before; }
+};
+/// Of a throw with `imu` and `free_flight`; nothing where the recording has too little of either.
+std::optional<ForceLevels> force_levels(const datasets::Throw& logged);
 
 /// The hand's columns at a time within its own, by straight lines.
 std::array<double, 3> hand_at(const datasets::Series& time, const datasets::Series& values, double t);

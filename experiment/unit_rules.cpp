@@ -20,6 +20,8 @@ constexpr OtherUnit kFalls[] = {{1e3, "mm for m"},
 constexpr OtherUnit kSpeeds[] = {{1e3, "mm/s for m/s"}, {100, "cm/s for m/s"}};
 constexpr OtherUnit kAccelerations[] = {
     {1e3, "mm/s^2 for m/s^2"}, {100, "cm/s^2 for m/s^2"}, {1 / kStandardGravity, "g for m/s^2"}};
+constexpr OtherUnit kSpecificForces[] = {
+    {1e3, "mm/s^2 for m/s^2"}, {100, "cm/s^2 or mg for m/s^2"}, {1 / kStandardGravity, "g for m/s^2"}};
 constexpr OtherUnit kAngles[] = {{180 / std::numbers::pi, "degrees for rad"}};
 constexpr OtherUnit kRates[] = {{180 / std::numbers::pi, "deg/s for rad/s"}};
 constexpr OtherUnit kAngularAccelerations[] = {{180 / std::numbers::pi, "deg/s^2 for rad/s^2"}};
@@ -55,6 +57,8 @@ const std::map<SizedColumn, UnitRule> kRules{
       {"hand/acceleration", "alpha", kAngularAccelerations},
       "added up over time"}},
     {SizedColumn::fall, {{"mocap/pose", "position", kFalls}, kDeclared, "gravity makes of a free flight"}},
+    {SizedColumn::rest,
+     {{"imu/specific_force", "f", kSpecificForces}, kDeclared, "gravity makes of a sensor at rest"}},
     {SizedColumn::held_shift,
      {{"mocap/pose", "position", kLengths}, {"hand/pose", "position", kLengths}, "while the object is held"}},
     {SizedColumn::held_turn,

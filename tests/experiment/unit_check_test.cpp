@@ -10,6 +10,7 @@
 #include <numbers>
 #include <tuple>
 
+#include "experiment/random_stream.hpp"
 #include "tests/support/data_folder.hpp"
 #include "tests/support/small_campaign.hpp"
 
@@ -370,6 +371,50 @@ TEST(UnitCheck, FreeFlightsTellWhichAxisIsTheVertical) {
       }
     EXPECT_THAT(unit_doubts(tilted), IsEmpty()) << dimension;
   }
+}
+
+/// Phones at rest for half a second, then falling for as long: what an accelerometer reads, times `unit`.
+ThrowLog drops(double unit, bool gravity_taken_out) {
+  ThrowLog log;
+  log.dimension = 3;
+  log.objects["phone"].mass = 0.2;
+  RandomStream random(7, 0, Purpose::mocap);
+  for (int i = 0; i < 5; ++i) {
+    Throw one;
+    one.id = std::to_string(i), one.object = "phone", one.condition = "drop", one.repetition = i;
+    one.free_flight = {0.5, 1.0};
+    auto& imu = one.imu.emplace();
+    imu.time = {101, 1, std::vector<double>(101), {}};
+    imu.specific_force = {101, 3, std::vector<double>(303), {}};
+    for (std::size_t s = 0; s < 101; ++s) {
+      const double t = imu.time(s) = 0.01 * static_cast<double>(s);
+      const double up = (t < 0.5 ? log.gravity : 0.05 * (t - 0.5)) - (gravity_taken_out ? log.gravity : 0);
+      for (std::size_t a = 0; a < 3; ++a)
+        imu.specific_force(s, a) = unit * ((a == 2 ? up : 0) + 0.03 * random.normal());
+    }
+    log.throws.push_back(one);
+  }
+  return log;
+}
+
+TEST(UnitCheck, GravityMeasuresAnAccelerometerAtRest) {
+  EXPECT_THAT(unit_doubts(drops(1, false)), IsEmpty());
+  for (const auto& [factor, words] :
+       {std::pair{1 / 9.81, "g for m/s^2"}, {1e3, "mm/s^2"}, {101.9, "mg for"}}) {
+    const auto doubts = unit_doubts(drops(factor, false));
+    ASSERT_EQ(doubts.size(), 1U) << factor;
+    EXPECT_EQ(doubts[0].path, "/throws/*/imu/specific_force");
+    EXPECT_NEAR(doubts[0].ratio / factor, 1, 0.02);
+    EXPECT_THAT(doubts[0].reason, HasSubstr(words));
+  }
+  const auto doubts = unit_doubts(drops(1, true));
+  ASSERT_EQ(doubts.size(), 1U);
+  EXPECT_THAT(doubts[0].reason, HasSubstr("gravity taken out"));
+  auto moving = drops(1, false);  // never at rest: nothing is said of it
+  for (auto& one : moving.throws)
+    for (std::size_t s = 0; s < 50; ++s)
+      one.imu->specific_force(s, 2) = 5 * std::sin(0.9 * static_cast<double>(s));
+  EXPECT_THAT(unit_doubts(moving), IsEmpty());
 }
 
 TEST(UnitCheck, ALandingHeightWhereNothingLandsIsRefused) {
