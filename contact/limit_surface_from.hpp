@@ -235,7 +235,8 @@ Entry<S, 6> LimitSurface<Shape>::membership_(int mode, const Window& window, con
     if (value_of(margin_of(wrench_(kHeld, scene, y), scene)) < 0) return {kHeld, t, y.state(), S(0)};
     return let_go(window, source, t, y);
   }
-  if (mode == kSlip || slips(y)) return {kSlip, t, y.state(), S(0)};
+  if (slips(y)) return let_go(window, source, t, y);
+  if (mode == kSlip) return {kSlip, t, y.state(), S(0)};
   const Scene<double> scene = values(source.scene(window, t));
   if (margin_of(sticking_wrench(scene, values(y)), scene) < 0) return {stick(), t, y.state(), S(0)};
   return onset(window, source, t, y, false);

@@ -27,7 +27,8 @@ inline constexpr double kSameInstant = 1e-9;
 class NormalForce {
  public:
   virtual ~NormalForce() = default;
-  /// f_N [N] at t [s]; the branch at a kink is the window's.
+  /// f_N [N] at t [s]; the branch at a kink is the window's. Steppers look beyond its ends, too: the branch
+  /// goes on there (below zero counts as zero past the end).
   virtual double at(const Window&, double t) const = 0;
   virtual Dual at(const Window&, const Dual& t) const = 0;
   /// Appends the instants [s], increasing, at which f_N or its slope jumps; the last is the release, if there

@@ -63,7 +63,10 @@ Law<S> law(int mode, const FrictionLimits<S>& limits, const Scene<S>& scene, con
                         m * (apparent.z + alpha * r.x - omega * omega * r.z)};
 
   Vec2<S> force = out.carrying_force;
-  if (translation == kSlide) force = (limit / norm(out.carrying_force)) * out.carrying_force;
+  if (translation == kSlide && value_of(limit) > 0)
+    force = (limit / norm(out.carrying_force)) * out.carrying_force;
+  if (translation == kSlide && !(value_of(limit) > 0))
+    force = {S(0), S(0)};  // and nothing may be asked of them
   if (translation == kBrake) force = (-limit / norm(y.slip)) * y.slip;
 
   const S lever_torque = r.z * force.x - r.x * force.z;
@@ -341,17 +344,40 @@ int SlidingPivot::enter(const Window& window, const SceneSource& source, int bef
   return consistent_mode(values(source.scene(window, now.t)), values(now.y), kBrake, {});
 }
 
-/// A brake's slip along a straight line to zero.
+/// A brake's slip v to zero, by the impulse of its friction. With the friction F = −f n, n = v/|v|, the slip
+/// changes by v' = W F + b, where W is the mobility of the patch's point (1/m while the rotation is locked)
+/// and f, W and b hardly change any more. Where W is isotropic,
+///
+///   d/dt (f |v| + v·W⁻¹b) = −(f² n·W n − b·W⁻¹b)
+///
+/// is constant, whatever way the slip turns on its way to rest; else it errs by what W is anisotropic. The
+/// impulse P = −W⁻¹(v + b T) of the time T that is left brings the slip to zero, and turns the object. An
+/// error of T then moves the state along the flow that follows, which takes it back.
 template <class S>
 void SlidingPivot::come_to_rest(const Phase& brake, const SceneSource& source, Instant<S>& now) const {
   auto& [t, y] = now;
+  const Scene<S> scene = source.scene(brake.window, t);
   State<S, 6> dy;
-  rate_(brake.mode, source.scene(brake.window, t), y, dy);
-  const S speed = norm(y.slip);
-  const S left = -speed * speed / (y.slip.x * dy[3] + y.slip.z * dy[4]);
+  rate_(brake.mode, scene, y, dy);
+  const auto& [m, I] = scene.body;
+  const bool locked = rotation_of(brake.mode) == kLocked;
+  const Vec2<S> r = lever(scene, y), q{r.z, -r.x};  // W = 1/m + q qᵀ/I
+  const S turning = locked ? S(0) : S(1.0 / I), share = locked ? S(0) : S(m / (I + m * dot(r, r)));
+  const auto inverse = [&](const Vec2<S>& x) { return m * (x - (share * dot(q, x)) * q); };  // W⁻¹ x
+
+  const S f = limits<S>().slipping(scene.normal_force, y.slip, y.spin), speed = norm(y.slip);
+  const Vec2<S> n = (1.0 / speed) * y.slip, mobile = (1.0 / m) * n + (turning * dot(q, n)) * q;  // W n
+  const Vec2<S> slip_rate{dy[3], dy[4]}, b = slip_rate + f * mobile;
+  const S decay = f * f * dot(n, mobile) - dot(b, inverse(b));
+  S left = -speed * speed / dot(y.slip, slip_rate);  // along a straight line
+  if (value_of(decay) > 0) {
+    const S by_impulse = (f * speed + dot(y.slip, inverse(b))) / decay;
+    if (value_of(by_impulse) > 0) left = by_impulse;
+  }
+  const Vec2<S> impulse = S(-1.0) * inverse(y.slip + left * b);
   y.arm = y.arm + (0.5 * left) * Vec2<S>{dy[0], dy[1]};
   y.angle += left * y.spin;
-  y.spin += left * dy[5];
+  if (!locked) y.spin += left * (dy[5] + f * turning * dot(q, n)) + turning * dot(q, impulse);
   y.slip = {S(0), S(0)};
   t += left;
 }

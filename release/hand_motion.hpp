@@ -29,7 +29,8 @@ struct HandState {
 class HandMotion {
  public:
   virtual ~HandMotion() = default;
-  /// The hand at t [s]; where the acceleration jumps, the window says which side.
+  /// The hand at t [s]; where the acceleration jumps, the window says which side. Steppers look beyond its
+  /// ends, too: that side goes on there.
   virtual HandState<double> at(const Window&, double t) const = 0;
   virtual HandState<Dual> at(const Window&, const Dual& t) const = 0;
   /// Instants [s], increasing, strictly inside (begin, end), at which the acceleration jumps.

@@ -224,7 +224,9 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   Scene<S> scene_at(const Window& window, const S& t) const {
     const HandState<S> hand = problem_.hand.at(window, t);
     const auto& [m, I] = problem_.body;
-    const S force = problem_.normal_force.at(window, t);
+    S force = problem_.normal_force.at(window, t);
+    if (value_of(t) > window.end && !(value_of(force) >= 0))
+      force = S(0);  // a stepper that looks beyond the phase
     if (value_of(force) < 0)
       throw std::invalid_argument(fmt::format("release: normal force = {} N at {} s is not in [0, inf) N",
                                               value_of(force), value_of(t)));
