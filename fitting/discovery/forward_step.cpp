@@ -100,6 +100,13 @@ class ForwardStep {
     if (!best_ || is_law(id_of(*best_->score)) || (off && !contact::can_give(stage_.problem.options().model)))
       for (const Score& score : all_)
         if (is_law(id_of(score))) consider(score);
+    // A law has no size that could be told from none: it is no answer where an effect that was not sure
+    // enough is likelier.
+    if (best_ && is_law(id_of(*best_->score)) && refused_ && refused_->next.bic() < best_->next.bic()) {
+      best_.reset();
+      if (solve_held_out(refused_->next, options_) && (!small_ || refused_->next.bic() < small_->next.bic()))
+        small_ = std::move(refused_);  // predictions decide
+    }
     if (best_) {
       const std::string why = best_->held_out.where;
       return accept(std::move(*best_), why, convincing_);
@@ -149,8 +156,10 @@ class ForwardStep {
       const dynamics::Effect effect = find_effect(candidate.id);
       trial.p_value = wald_p_value(trial.next.fit, effect);
       if (!is_significant(trial.next.fit, effect, trial.p_value, options_.family_wise_level,
-                          static_cast<double>(f_.candidates.size())))
+                          static_cast<double>(f_.candidates.size()))) {
+        if (!refused_ || trial.next.bic() < refused_->next.bic()) refused_ = std::move(trial);
         return std::nullopt;
+      }
     }
     if (!(trial.delta_bic <= kDeltaBic)) return std::nullopt;
     if (!solve_held_out(trial.next, options_)) return std::nullopt;
@@ -251,6 +260,7 @@ class ForwardStep {
   std::set<std::string> tried_;
   std::optional<TriedEffect> best_, small_;  // of those that matter to a channel, and of those that do not
   WithCriterion convincing_, evident_;
+  std::optional<TriedEffect> refused_;  // the likeliest of those that are not told from none surely enough
 };
 
 }  // namespace
