@@ -244,7 +244,7 @@ std::string discovery_text(const Discovery& found, const std::string& log, const
         "the residual first leaves the noise in the phase {}, channel {} ({:.3g} times its variance)\n",
         to_string(found.first.phase), to_string(found.first.channel), found.first.chi2_per_sample);
   else
-    out += "no channel leaves the noise in any phase\n";
+    out += "no channel of the train throws leaves the noise in any phase\n";
   for (const auto& s : found.structure_before)
     if (found.first.any && s.phase == found.first.phase && s.channel == found.first.channel)
       out += fmt::format("  there: {}\n", s.structure.in_words());

@@ -7,6 +7,8 @@
 #include <optional>
 
 #include "fitting/discovery/misfit_rules.hpp"
+#include "fitting/discovery/pads_give.hpp"
+#include "fitting/discovery/wald.hpp"
 
 namespace unhand::fitting {
 
@@ -99,6 +101,21 @@ bool predicts_better(const Stage& before, const Stage& after, const DiscoverOpti
   return holds(&OutcomeErrors::landing_x_mae) && holds(&OutcomeErrors::landing_theta_mae) &&
          holds(&OutcomeErrors::detach_vx_mae) && holds(&OutcomeErrors::detach_omega_mae) &&
          holds(&OutcomeErrors::trajectory_rms);
+}
+
+SmallEffect small_effect(const Stage& without, const Stage& with, const std::string& id,
+                         const std::vector<ChannelMisfit>& base, const DiscoverOptions& options) {
+  const int threads = options.fit.threads;
+  const PredictionGain gain =
+      prediction_gain(outcomes_of(without, Share::test, threads), outcomes_of(with, Share::test, threads));
+  return {id,
+          with.bic() - without.bic(),
+          wald_p_value(with.fit, find_effect(id)),
+          improvement(without, with, base, options).fall,
+          gain.before,
+          gain.after,
+          id == kPads && give_of(with) <= kMostGive,
+          held_out_confirms(without, with)};
 }
 
 bool is_lacking(const OutcomeLack& lack, double level) {

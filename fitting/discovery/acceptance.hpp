@@ -65,6 +65,10 @@ bool held_out_confirms(const Stage& before, const Stage& after);
 /// no outcome (detach, landing, trajectory) by as much worse.
 bool predicts_better(const Stage& before, const Stage& after, const DiscoverOptions& options);
 
+/// What an effect is worth in the model with it against the one without it.
+SmallEffect small_effect(const Stage& without, const Stage& with, const std::string& id,
+                         const std::vector<ChannelMisfit>& base, const DiscoverOptions& options);
+
 /// How many times what repetitions scatter by the mean square of prediction errors is where a model lacks
 /// something: most of the error then goes with the condition, and a better model would take it away.
 inline constexpr double kLacking = 2;

@@ -143,6 +143,20 @@ void search(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   }
 }
 
+/// Searches, and questions what was found, to the fit with its intervals. A give that was in the model
+/// throughout and turned out to be idle may have stood in the place of something likelier: then once more
+/// without it.
+FitResult search_and_question(Stage& stage, DiscoverOptions options, Discovery& out) {
+  search(stage, options, out);
+  settle_give(stage, options, out);
+  backward(stage, options, out);
+  FitResult counted = withdraw(stage, options, out);
+  if (!drop_idle_give(stage, options, out)) return counted;
+  options.forget.push_back(kPads);
+  stage.asked.reset();
+  return search_and_question(stage, std::move(options), out);
+}
+
 /// The options of a search, without the laws that it is told to forget.
 DiscoverOptions without_forgotten(DiscoverOptions options) {
   const auto& forget = options.forget;
@@ -231,11 +245,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
   tell_before(stage, options, out);
 
   const Stage base = stage;
-  search(stage, options, out);
-  settle_give(stage, options, out);
-  backward(stage, options, out);
-  FitResult counted = withdraw(stage, options, out);
-  drop_idle_give(stage, options, out);
+  FitResult counted = search_and_question(stage, options, out);
   if (gives_along(stage)) out.along = {kPads};
   judge(stage, options, out);
   describe(stage, std::move(counted), options, out);

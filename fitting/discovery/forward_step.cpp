@@ -72,6 +72,10 @@ struct TriedEffect {
   Improvement held_out;
 };
 
+bool is_likelier(const std::optional<TriedEffect>& one, const std::optional<TriedEffect>& other) {
+  return one && other && one->next.bic() < other->next.bic();
+}
+
 class ForwardStep {
  public:
   ForwardStep(const Stage& stage, const DiscoverOptions& options, Discovery& out)
@@ -100,12 +104,12 @@ class ForwardStep {
     if (!best_ || is_law(id_of(*best_->score)) || (off && !contact::can_give(stage_.problem.options().model)))
       for (const Score& score : all_)
         if (is_law(id_of(score))) consider(score);
-    // A law has no size that could be told from none: it is no answer where an effect that was not sure
-    // enough is likelier.
-    if (best_ && is_law(id_of(*best_->score)) && refused_ && refused_->next.bic() < best_->next.bic()) {
-      best_.reset();
-      if (solve_held_out(refused_->next, options_) && (!small_ || refused_->next.bic() < small_->next.bic()))
-        small_ = std::move(refused_);  // predictions decide
+    // A law has no size that could be told from none, and half a per cent of the held-out misfit is enough
+    // for it: it is no answer where an effect is likelier that was not sure enough, or too small to matter.
+    const bool refused_leads = !small_ || is_likelier(refused_, small_);
+    if (best_ && is_law(id_of(*best_->score)) && is_likelier(refused_leads ? refused_ : small_, best_)) {
+      best_.reset();  // predictions decide
+      if (refused_leads && solve_held_out(refused_->next, options_)) small_ = std::move(refused_);
     }
     if (best_) {
       const std::string why = best_->held_out.where;
@@ -194,18 +198,14 @@ class ForwardStep {
   /// a prediction, where all of a throw's errors add up.
   std::optional<Stage> weigh_small() {
     if (auto beside = beside_give()) return beside;
-    const int threads = options_.fit.threads;
-    const PredictionGain gain = prediction_gain(outcomes_of(stage_, Share::test, threads),
-                                                outcomes_of(small_->next, Share::test, threads));
+    const SmallEffect small =
+        small_effect(stage_, small_->next, id_of(*small_->score), out_.base_test, options_);
     if (predicts_better(stage_, small_->next, options_))
       return accept(std::move(*small_),
-                    fmt::format("predicted before the throw: {:.3g} to {:.3g} mm rms", 1e3 * gain.before,
-                                1e3 * gain.after),
+                    fmt::format("predicted before the throw: {:.3g} to {:.3g} mm rms", 1e3 * small.rms_before,
+                                1e3 * small.rms_after),
                     evident_);
-    if (!out_.small || small_->delta_bic < out_.small->delta_bic)
-      out_.small = {
-          id_of(*small_->score), small_->delta_bic, small_->p_value, small_->held_out.fall,
-          gain.before,           gain.after,        false,           held_out_confirms(stage_, small_->next)};
+    if (!out_.small || small.delta_bic < out_.small->delta_bic) out_.small = small;
     return std::nullopt;
   }
 

@@ -123,22 +123,15 @@ void settle_give(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   }
 }
 
-void drop_idle_give(Stage& stage, const DiscoverOptions& options, Discovery& out) {
-  if (!gives_along(stage) || !out.effects.empty()) return;
+bool drop_idle_give(Stage& stage, const DiscoverOptions& options, Discovery& out) {
+  if (!gives_along(stage) || !out.effects.empty()) return false;
   const Stage rigid = without(stage, {kPads}, options);
-  if (!rigid.solved()) return;
-  const Improvement held_out = improvement(rigid, stage, out.base_test, options);
-  const int threads = options.fit.threads;
-  const PredictionGain gain =
-      prediction_gain(outcomes_of(rigid, Share::test, threads), outcomes_of(stage, Share::test, threads));
-  const bool likelier = held_out_confirms(rigid, stage);
-  if (held_out.matters >= 1 || (gain.after < gain.before && likelier)) return;
-  const double delta_bic = stage.bic() - rigid.bic();
-  if (!out.small || delta_bic < out.small->delta_bic)
-    out.small = {kPads,         delta_bic,   wald_p_value(stage.fit, find_effect(kPads)),
-                 held_out.fall, gain.before, gain.after,
-                 true,          likelier};
+  if (!rigid.solved() || improvement(rigid, stage, out.base_test, options).matters >= 1) return false;
+  const SmallEffect give = small_effect(rigid, stage, kPads, out.base_test, options);
+  if (give.rms_after < give.rms_before && give.likelier) return false;
+  if (!out.small || give.delta_bic < out.small->delta_bic) out.small = give;
   stage = rigid;
+  return true;
 }
 
 }  // namespace unhand::fitting

@@ -36,8 +36,8 @@ void fit_give_along(Stage& stage, const DiscoverOptions& options);
 void settle_give(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
 /// In an answer without effects a give stays only if it matters to a channel of the held-out throws, or they
-/// are predicted the better for it and are likelier. Else it is left in `out.small`, if nothing more evident
-/// is.
-void drop_idle_give(Stage& stage, const DiscoverOptions& options, Discovery& out);
+/// are predicted the better for it and are likelier. Else it goes (true), and is left in `out.small`, if
+/// nothing more evident is.
+bool drop_idle_give(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
 }  // namespace unhand::fitting

@@ -41,22 +41,6 @@ void drop_without_evidence(Stage& stage, const DiscoverOptions& options, Discove
   }
 }
 
-/// An effect that is evident and matters neither to a channel nor to a prediction.
-void tell_small(const Stage& less, const Stage& stage, const std::string& id, const DiscoverOptions& options,
-                Discovery& out) {
-  const int threads = options.fit.threads;
-  const PredictionGain gain =
-      prediction_gain(outcomes_of(less, Share::test, threads), outcomes_of(stage, Share::test, threads));
-  out.small = {id,
-               stage.bic() - less.bic(),
-               wald_p_value(stage.fit, find_effect(id)),
-               improvement(less, stage, out.base_test, options).fall,
-               gain.before,
-               gain.after,
-               false,
-               held_out_confirms(less, stage)};
-}
-
 }  // namespace
 
 void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
@@ -71,7 +55,7 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
            predicts_better(less, stage, options));
       if (needed) continue;
       if (stage.bic() - less.bic() < kDeltaBic && !out.small)
-        tell_small(less, stage, stage.ids[i], options, out);
+        out.small = small_effect(less, stage, stage.ids[i], out.base_test, options);
       std::erase_if(out.effects, [&](const AcceptedEffect& e) { return e.id == stage.ids[i]; });
       stage = Stage(less);
       removed = true;

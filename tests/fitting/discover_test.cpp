@@ -494,6 +494,29 @@ TEST(Discovery, TheGiveOfAnyPadsIsFittedAlongWhereOnlyPredictionsShowIt) {
   EXPECT_EQ(found.along, std::vector<std::string>{"contact.pad_compliance"});
 }
 
+// Friction that grows with the slip bends the fit like pads that give a little, at first with more evidence;
+// but held-out throws are predicted the worse for that give. Without it the friction is likelier than the
+// give was.
+TEST(Discovery, AGiveThatPredictsNothingDoesNotHideWhatItStoodFor) {
+  experiment::CampaignDesign design = experiment::campaign_design("quick12");
+  design.effects = {{"contact.viscous.1/v_0", 5}};
+  const Discovery found = found_in(experiment::generate_campaign(design, 3));
+  EXPECT_TRUE(found.along.empty());
+  ASSERT_TRUE(found.small.has_value());
+  EXPECT_EQ(found.small->id, "contact.viscous");
+}
+
+// And like another limit surface, for which half a per cent of the held-out misfit is enough. It is no answer
+// where friction that is too small to matter is likelier.
+TEST(Discovery, ALawIsNoAnswerWhereASmallEffectIsLikelier) {
+  experiment::CampaignDesign design = experiment::campaign_design("quick12");
+  design.effects = {{"contact.viscous.1/v_0", 8}};
+  const Discovery found = found_in(experiment::generate_campaign(design, 23));
+  EXPECT_TRUE(found.effects.empty()) << found.effects.front().id;
+  ASSERT_TRUE(found.small.has_value());
+  EXPECT_EQ(found.small->id, "contact.viscous");
+}
+
 // Friction that falls with the slip, beside pads that give by four micrometres. The held-out conditions slip
 // slowly: their torque is no misfit, and without the give nothing there speaks for Stribeck's friction.
 TEST(Discovery, WhatTheTrainThrowsSettleIsConfirmedBesideTheGiveOfThePads) {
