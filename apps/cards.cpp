@@ -12,6 +12,8 @@
 #include "contact/gripper_delay.hpp"
 #include "contact/patch.hpp"
 #include "contact/registry.hpp"
+#include "datasets/near_miss.hpp"
+#include "dynamics/effect.hpp"
 #include "fitting/measured/measured_card.hpp"
 
 namespace unhand::apps {
@@ -39,7 +41,8 @@ class Reader {
     const std::string& given = found->second.unit;
     if (given != unit) fail("/parameters/" + name + "/unit", fmt::format("is '{}', not '{}'", given, unit));
     if (!(value >= low && value <= high))
-      fail("/parameters/" + name + "/value", fmt::format("{} is not in [{}, {}] {}", value, low, high, unit));
+      fail("/parameters/" + name + "/value",
+           fmt::format("{} is not in [{}, {}]{}", value, low, high, dynamics::after_number(unit)));
     return value;
   }
 
@@ -109,8 +112,8 @@ UsableCard read_usable_card(const fs::path& file) {
   }
   const auto models = experiment::release_model_names();
   if (std::find(models.begin(), models.end(), out.card.model) == models.end())
-    reader.fail("/model", fmt::format("'{}' is no model of releases; there are {}", out.card.model,
-                                      fmt::join(models, ", ")));
+    reader.fail("/model", datasets::unknown_name(fmt::format("'{}' is no model of releases", out.card.model),
+                                                 out.card.model, models));
   auto& p = out.parameters;
   if (!contact::follows_pads(out.card.model)) {
     const double delay = reader.take("delay", "s", 0, 10),

@@ -129,6 +129,7 @@ void compare_releases(const CompareRequest& request, datasets::ThrowLog log) {
 
   const ReleaseTables tables = release_tables(comparison, log, request.log);
   Json json = release_json(comparison, request);
+  json["source"] = log.source;
   for (const auto& [model, reason, advice] : unanswered)
     json["not_compared"][model] = reason + (advice.empty() ? "" : "; " + advice);
   Outputs outputs{request.inputs()};
@@ -155,15 +156,13 @@ void compare(const CompareRequest& request) {
   if (datasets::read_schema_name(request.log) == "slip-log") {
     for (const auto& model : request.models) require_of_slips(model, request.log);
     if (!request.fit)
-      throw datasets::LogError(request.log, "/@schema",
-                               "is a slip-log, whose surfaces are compared by fitting: add --fit");
+      throw WrongUsage(
+          fmt::format("{} is a slip-log, whose surfaces are compared by fitting: add --fit", request.log));
     compare_slips(request);
     return;
   }
   auto log = read_throws(request.log);
-  const bool flights =
-      log.dimension == 3 || std::none_of(log.throws.begin(), log.throws.end(),
-                                         [](const auto& one) { return one.hand.has_value(); });
+  const bool flights = is_of_flights(log);
   if (flights) require_flights(log, request.log);
   for (const auto& model : request.models) {
     require_of_throws(model, request.log);
@@ -221,11 +220,12 @@ Command compare_command(Parser& root) {
       .option("--models", request->models,
               fmt::format(
                   "Which models, separated by commas: {}. Without it, all release models but {}; for free "
-                  "flights, projectile; for slip logs, all surfaces",
+                  "flights, projectile; for slip logs (with --fit), all surfaces",
                   fmt::join(known_models(), ", "), release::kNaiveModel))
       .with_commas();
-  parser.flag("--fit", request->fit,
-              "Fit the models to the log's train throws (see `unhand fit`), or to its slips");
+  parser.flag(
+      "--fit", request->fit,
+      "Fit the models to the log's train throws (see `unhand fit`), or to its slips, which slip logs need");
   parser.option(
       "--card", request->cards,
       "A model card: its parameters are used for its model; may be repeated (free flights and falls: "

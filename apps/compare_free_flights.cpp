@@ -48,6 +48,7 @@ Json flights_json(const FreeFlightComparison& found, const CompareRequest& reque
                   const datasets::ThrowLog& log) {
   Json out = json_head("compare");
   out["log"] = request.log;
+  out["source"] = log.source;
   out["dimension"] = log.dimension;
   out["gravity_m_s2"] = log.gravity;
   Json& one = out["models"][experiment::kProjectile];
@@ -211,7 +212,7 @@ void compare_flights(const CompareRequest& request, const datasets::ThrowLog& lo
       "{}: {}\n{} free flights; rms: start fitted to every sample; end errors: start fitted to the first "
       "half, mean ± "
       "standard deviation\n",
-      request.log, log.title, log.throws.size());
+      request.log, origin_text(log), log.throws.size());
   const Table table = flights_table(found);
   const Json json = flights_json(found, request, log);
   answer_with(request, heading, table, json, [&](const std::filesystem::path& directory) {

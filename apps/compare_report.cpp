@@ -58,7 +58,7 @@ ReleaseTables release_tables(const experiment::Comparison& comparison, const dat
   for (const auto& one : log.throws) ++n[one.split == Split::test];
   out.heading = fmt::format(
       "{}: {}\n{} throws ({} train, {} test), {}; mean absolute error ± its standard deviation\n", file,
-      log.title, log.throws.size(), n[0], n[1], plural(comparison.conditions.size(), "condition"));
+      origin_text(log), log.throws.size(), n[0], n[1], plural(comparison.conditions.size(), "condition"));
   out.errors.left = out.bias.left = 2;
   out.errors.header = out.bias.header = {"model", "throws", "n", "failed"};
   for (const auto& quantity : experiment::kQuantities) {

@@ -165,10 +165,10 @@ void compare_slips(const CompareRequest& request) {
   report_failures(scores);
 
   const std::string heading = fmt::format(
-      "{}\nmean angle [deg] between predicted and measured twist in (vx, vy, L omega); {} folds by slip; "
+      "{}: {}\nmean angle [deg] between predicted and measured twist in (vx, vy, L omega); {} folds by slip; "
       "null: "
       "the same\non data simulated from the fitted ellipsoid, {} draws\n",
-      request.log, options.folds, options.null_draws);
+      request.log, origin_text(log), options.folds, options.null_draws);
   const Table table = slips_table(surfaces, scores);
   const Json json = slips_json(request, surfaces, scores, options);
   answer_with(request, heading, table, json, [&](const std::filesystem::path& directory) {

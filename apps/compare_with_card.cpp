@@ -49,6 +49,7 @@ void compare_with_card(const CompareRequest& request, const datasets::ThrowLog& 
 
   Json json = json_head("compare");
   json["log"] = request.log;
+  json["source"] = log.source;
   json["card"] = file;
   json["model"] = card.model;
   json["effects"] = card.effects;
@@ -65,8 +66,8 @@ void compare_with_card(const CompareRequest& request, const datasets::ThrowLog& 
                           value_of(found.base_test, k), value_of(found.card_train, k),
                           value_of(found.card_test, k)});
   const std::string heading = fmt::format(
-      "{}: {}\n{} {}, {} of them held out; each one's start is fitted, {} from {}\n", request.log, log.title,
-      found.train + found.test, found.kind, found.test,
+      "{}: {}\n{} {}, {} of them held out; each one's start is fitted, {} from {}\n", request.log,
+      origin_text(log), found.train + found.test, found.kind, found.test,
       card.effects.empty() ? "without effects" : fmt::format("{}", fmt::join(card.effects, ", ")), file);
   answer_with(request, heading, table, json, [&](const std::filesystem::path& directory) {
     const Figure figure =

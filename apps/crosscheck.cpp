@@ -340,8 +340,9 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
   Outputs outputs{{options.log, options.card}};
   if (!options.json.empty()) outputs.json(options.json, json);
   outputs.commit();
-  fmt::print("{}: {} throws; mean absolute differences; mu {:.4f}, length {:.3f} mm, {} pads ({})\n{}",
-             options.log, throws.size(), parameters.mu, 1e3 * parameters.length, parameters.pads, from, text);
+  fmt::print("{}: {}\n{} throws; mean absolute differences; mu {:.4f}, length {:.3f} mm, {} pads ({})\n{}",
+             options.log, origin_text(log), throws.size(), parameters.mu, 1e3 * parameters.length,
+             parameters.pads, from, text);
 }
 
 }  // namespace

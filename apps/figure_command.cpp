@@ -1,6 +1,5 @@
 // unhand figure: one figure of a paper on release dynamics, with the data and the script that draw it again.
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -15,6 +14,7 @@
 #include "apps/release_figures.hpp"
 #include "apps/table.hpp"
 #include "apps/tell.hpp"
+#include "datasets/near_miss.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -147,8 +147,9 @@ void figure(const FigureCommandOptions& options) {
   if (kind == kinds().end() && options.name != "all") {
     std::vector<std::string> names;
     for (const Kind& k : kinds()) names.push_back(k.name);
+    names.push_back("all");
     throw WrongUsage(
-        fmt::format("no figure is called '{}'; there are {}, and all", options.name, fmt::join(names, ", ")));
+        datasets::unknown_name(fmt::format("no figure is called '{}'", options.name), options.name, names));
   }
   FigureSource source(options.request);
   Outputs outputs{options.request.inputs()};

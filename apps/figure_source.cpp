@@ -34,7 +34,18 @@ FigureSource::FigureSource(const FigureRequest& request) : request_(request) {
     log_ = experiment::generate_campaign(experiment::campaign_design("quick12"), 1);
   } else {
     file_ = request_.log;
+    if (datasets::read_schema_name(file_) == "slip-log")
+      throw datasets::LogError(
+          file_, "/@schema",
+          "is a slip-log, and these figures are of releases from a hand: `unhand compare "
+          "LOG --fit --report DIR` draws the limit surfaces of slips");
     log_ = read_throws(file_);
+    if (is_of_flights(log_))
+      throw datasets::LogError(
+          file_, "/throws",
+          "free flights, and these figures are of releases from a hand in the plane: `unhand "
+          "discover LOG --report DIR` draws what a model leaves of flights and falls, `unhand "
+          "compare LOG --report DIR` of tracked flights");
   }
   if (!request_.thrown.empty()) chosen_ = place_of(log_, request_.thrown, file_);
   prepared_ = experiment::prepare_all(log_, file_, request_.threads, false);

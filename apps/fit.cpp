@@ -95,12 +95,16 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
   int folds = request.kfold > 0 ? request.kfold : has_test ? 0 : kDefaultFolds;
   Progress progress("fit", 3 + (folds > 0 ? 1 : 0) + (request.floor > 0 ? 1 : 0));
   const fitting::CampaignProblem problem(log, request.log, campaign);
-  if (folds > 0 && conditions_of_train(log) < 2) {
+  const int conditions = conditions_of_train(log);
+  if (folds > 0 && conditions < 2) {
     if (request.kfold > 0)
       throw Unanswered(fmt::format("{}: --kfold needs two conditions among the train throws", request.log));
     tell("unhand: no test throws and one condition only: no held-out errors\n");
     folds = 0;
   }
+  if (request.kfold > conditions && folds > 0)
+    tell("unhand: --kfold {}: {} folds, as many as the train throws have conditions\n", request.kfold,
+         conditions);
   progress.step();
   const auto fit = fitting::fit(problem, options);
   if (fit.outcome == fitting::FitOutcome::no_start || fit.outcome == fitting::FitOutcome::not_solved)

@@ -87,6 +87,12 @@ void fit_slips(const FitRequest& request) {
   options.threads = request.threads;
   options.null_draws = 0;
   if (request.kfold > 0) options.folds = request.kfold;
+  std::size_t most = 0;  // slips of one surface
+  for (const auto& one : surfaces) most = std::max(most, one.slips.size());
+  if (request.kfold > 0 && static_cast<std::size_t>(request.kfold) > most && most >= 2) {
+    options.folds = static_cast<int>(most);
+    tell("unhand: --kfold {}: {} folds, as many as a surface has slips\n", request.kfold, most);
+  }
   std::optional<Progress> progress(std::in_place, "fit", 0);
   std::vector<SurfaceScore> scores;
   for (auto& row : fitting::compare_surfaces(surfaces, {fitting::surface_model(request.model)}, options))

@@ -1,8 +1,10 @@
 #include "apps/flip_store.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <fstream>
+#include <numbers>
 #include <utility>
 
 #include "apps/command.hpp"
@@ -62,6 +64,26 @@ fl::FlipTrial trial_of(const fs::path& file, const Json& label, const fl::FlipCo
   return out;
 }
 
+/// A setting as the command line takes it; empty where it is told by a file or by several options.
+std::string as_option(const std::string& key, const Json& value) {
+  if (key == "target")
+    return fmt::format("{:g},{:g}", value.at(0).get<double>(),
+                       value.at(1).get<double>() * 180 / std::numbers::pi);
+  if (key == "learner") return value.get<std::string>();
+  if (key == "seed" || key == "throws" || key == "repeats") return value.dump();
+  return {};
+}
+
+/// "--target 1.2,180 and not 1.3,180", "another --robot": what the run of a folder has that this one has not.
+std::string difference(const std::string& key, const Json& there, const Json& here) {
+  try {
+    if (const std::string old = as_option(key, there); !old.empty())
+      return fmt::format("--{} {} and not {}", key, old, as_option(key, here));
+  } catch (const Json::exception&) {  // of another version, or written by hand
+  }
+  return key == "bar" ? "another bar (--sku, --com-offset, --robot)" : "another --" + key;
+}
+
 }  // namespace
 
 Json bar_json(const fl::Bar& b) {
@@ -104,13 +126,16 @@ FlipStore::FlipStore(fs::path directory, const Json& settings)
   const auto found = there.find("settings");
   if (found == there.end() || !found->is_object())
     throw datasets::LogError(file.string(), "/settings", "required key is missing");
+  std::vector<std::string> differences;
   for (const auto& [key, value] : settings.items()) {
-    const auto old = found->find(key);
-    if (old == found->end() || *old != value)
-      throw datasets::LogError(file.string(), "/settings/" + key,
-                               fmt::format("another session lies there: {} instead of {}",
-                                           old == found->end() ? "nothing" : old->dump(), value.dump()));
+    const Json old = found->value(key, Json(nullptr));
+    if (old != value) differences.push_back(difference(key, old, value));
   }
+  if (!differences.empty())
+    throw WrongUsage(fmt::format(
+        "--report: {} holds the throws of a run with {}: give the same to go on with it, or another "
+        "directory, or remove that one to begin anew",
+        directory_.string(), fmt::join(differences, ", ")));
 }
 
 Json FlipStore::label_of(const fl::TrialRequest& request) const {

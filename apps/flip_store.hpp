@@ -16,8 +16,9 @@ Json bar_json(const planners::flip::Bar& bar);
 class FlipStore {
  public:
   /// Creates the session, or goes on with the one that is there, and removes what a killed run left half
-  /// written. `settings` has a `robot` and a `seed`, which every throw's file repeats. Throws
-  /// datasets::LogError, naming the setting, where another session lies there, or its file cannot be read.
+  /// written. `settings` has a `robot` and a `seed`, which every throw's file repeats. Throws WrongUsage,
+  /// with the options that differ, where another session lies there, and datasets::LogError where its file
+  /// cannot be read.
   FlipStore(std::filesystem::path directory, const Json& settings);
 
   /// Recalls the throws that are there, and keeps those that `plant` makes. A recalled throw must be of the

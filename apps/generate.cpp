@@ -9,6 +9,7 @@
 #include "apps/output.hpp"
 #include "apps/progress.hpp"
 #include "apps/tell.hpp"
+#include "datasets/near_miss.hpp"
 #include "dynamics/effect.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/synthetic_campaign.hpp"
@@ -29,8 +30,8 @@ constexpr const char* kRandomEffect = "random";
 experiment::CampaignDesign design_of(const GenerateOptions& options) {
   const auto names = experiment::campaign_names();
   if (std::find(names.begin(), names.end(), options.campaign) == names.end())
-    throw WrongUsage(fmt::format("no campaign is called '{}': choose one of {}", options.campaign,
-                                 fmt::join(names, ", ")));
+    throw WrongUsage(datasets::unknown_name(fmt::format("no campaign is called '{}'", options.campaign),
+                                            options.campaign, names));
   auto design = experiment::campaign_design(options.campaign, options.seed);
   for (const std::string& group : options.without) {
     if (group == "ft") design.sensors.ft = false;
@@ -209,7 +210,7 @@ std::string footer() {
       "\\\n"
       "      --out campaign.h5 --truth truth.json\n"
       "  unhand generate random --seed 4 --effect random --without ft --out campaign.h5 --truth truth.json\n"
-      "Effects and their parameters (neutral, range):\n";
+      "Effects and their parameters (neutral, range); ID=value sets the first:\n";
   for (const auto& effect : experiment::known_effects()) {
     std::vector<std::string> parameters;
     for (const auto& p : effect.parameters)
@@ -233,10 +234,12 @@ Command generate_command(Parser& root) {
   parser.option("--seed", options->seed, "Seed of everything random; the same seed gives the same log")
       .with_default();
   parser
-      .option("--effect", options->effects,
-              "ID=value, ID.parameter=value or ID[object]=value: what the world or the sensors do and the "
-              "log does not say; 'random': one drawn with the seed. Several with blanks or commas between, "
-              "or repeated")
+      .option(
+          "--effect", options->effects,
+          "ID=value (sets the effect's first parameter), ID.parameter=value or ID[object]=value: what the "
+          "world or the sensors do and the log does not say; 'random': one drawn with the seed. Several with "
+          "blanks or commas between, "
+          "or repeated")
       .with_commas()
       .assignments();
   parser

@@ -9,6 +9,7 @@
 #include "apps/tell.hpp"
 #include "datasets/import_cube_tosses.hpp"
 #include "datasets/import_planar_pushes.hpp"
+#include "datasets/near_miss.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -185,7 +186,10 @@ void import(ImportOptions& options) {
     for (const std::string& note : imported.notes) tell("unhand: {}\n", note);
     return;
   }
-  throw WrongUsage(fmt::format("format '{}' is not known; there are:{}", options.format, known_formats()));
+  std::vector<std::string> names;
+  for (const Format& format : formats) names.emplace_back(format.name);
+  throw WrongUsage(
+      datasets::unknown_name(fmt::format("there is no format '{}'", options.format), options.format, names));
 }
 
 }  // namespace

@@ -44,6 +44,19 @@ Table groups_of(const datasets::LogSummary& summary) {
   return table;
 }
 
+/// Whether a column scatters by more than it declares, although that is not told to be its noise.
+bool is_unjudged(const datasets::NoiseSummary& noise, std::size_t column) {
+  constexpr double kMore = 1.2;  // as for a sigma that is told to be too small
+  return noise.ratio[column] > kMore && !noise.too_small[column];
+}
+
+bool has_unjudged(const datasets::LogSummary& summary) {
+  for (const auto& noise : summary.noise)
+    for (std::size_t j = 0; j < noise.ratio.size(); ++j)
+      if (is_unjudged(noise, j)) return true;
+  return false;
+}
+
 /// Columns, units, declared noise and scatter of every dataset that the log holds.
 Table datasets_of(const datasets::LogSummary& summary) {
   Table table{{"dataset", "columns", "units", "throws", "declared sigma", "scatter"}, {}, 6};
@@ -55,7 +68,8 @@ Table datasets_of(const datasets::LogSummary& summary) {
       sigma += fmt::format(" (in {} throws)", noise.declared);
     std::string scatter;
     for (std::size_t j = 0; j < noise.scatter.size(); ++j)
-      scatter += fmt::format("{}{:.3g}", j > 0 ? ", " : "", noise.scatter[j]);
+      scatter +=
+          fmt::format("{}{:.3g}{}", j > 0 ? ", " : "", noise.scatter[j], is_unjudged(noise, j) ? "*" : "");
     table.rows.push_back({noise.dataset, noise.columns, noise.units, fmt::to_string(noise.throws),
                           sigma.empty() ? "-" : sigma, scatter.empty() ? "-" : scatter});
   }
@@ -154,6 +168,9 @@ Inspection inspect_throws(const std::string& file) {
                   summary.train, summary.test, plural(summary.conditions.size(), "condition"), landed,
                   plural(summary.free_flights, "free flight"));
   out.text += groups_of(summary).text() + "\n" + datasets_of(summary).text();
+  if (has_unjudged(summary))
+    out.text +=
+        "*: more than is declared, but mostly motion (or of too few samples): no measure of the noise\n";
   out.text += "\nno schema errors; times in s, values in SI units and radians as read\n";
   out.text += noise_doubts(summary);
   if (const int n = log.dimension == 2 ? experiment::landings_without_sigma(log) : 0; n > 0)

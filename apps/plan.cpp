@@ -8,7 +8,9 @@ namespace unhand::apps {
 Command plan_command(Parser& root) {
   Parser& parser = root.subcommand("plan", "Plan a throw");
   parser.require_subcommand();
-  parser.footer("Example: unhand plan throw --target 1.3,0,-0.2 --report out/throw");
+  parser.footer(
+      "Outputs of an earlier run in the same place are replaced.\n"
+      "Example: unhand plan throw --target 1.3,0,-0.2 --report out/throw");
   const std::vector<Command> planners{plan_throw_command(parser), plan_control_command(parser),
                                       plan_elastic_command(parser), plan_wrist_command(parser),
                                       plan_flip_command(parser)};

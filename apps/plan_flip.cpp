@@ -196,7 +196,9 @@ Command plan_flip_command(Parser& plan) {
   parser.footer(
       "Example: unhand plan flip --target 1.2,180 --learner m4 --robot robot.toml --seed 7 "
       "--report out/flip\n"
-      "A run that was killed goes on where it was when it is given the same --report.");
+      "A run that was killed goes on where it was when it is given the same --report: throws that lie there "
+      "are\n"
+      "recalled; tables and figures of an earlier run are replaced.");
   parser
       .option("--target", o->target, "Landing place [m] and angle from hanging [deg], not wrapped: X,DEGREES")
       .required();

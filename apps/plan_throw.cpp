@@ -3,6 +3,7 @@
 #include "apps/plan_throw.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -140,24 +141,26 @@ std::vector<ThrowAnswer::Number> numbers_of(const planners::ReleaseCard& card,
     const auto found = card.origins.find(name);
     return found == card.origins.end() ? planners::NumberOrigin{} : found->second;
   };
-  const auto add = [&](const char* name, const char* unit, double value, double sigma) {
-    const auto [from, of_sigma] = origin(name);
-    out.push_back({name, unit, value, sigma, say(to_string(from), to_string(of_sigma), sigma > 0)});
+  const auto add = [&](const char* name, const char* unit, double value, std::optional<double> sigma) {
+    const auto [from, of_sigma, with, counted_in] = origin(name);
+    std::string told = say(to_string(from), to_string(of_sigma), sigma.value_or(0) > 0);
+    if (!with.empty()) told += fmt::format(", with {}", fmt::join(with, " and "));
+    out.push_back({name, unit, value, sigma, told, counted_in});
   };
   add("mu", "-", card.mu.value, card.mu.sigma);
   add("length", "m", card.length, card.length_sigma);
   for (const auto& [own, value] : contact::given_law_parameters(card.model, card.law_values))
-    add(own.name.c_str(), own.unit.c_str(), value, 0);
+    add(own.name.c_str(), own.unit.c_str(), value, {});
   const auto of_effects = contact::effect_values(card.friction);
   std::size_t k = 0;
   for (const auto& [effect, apply, apply_dual] : contact::friction_effects())
     for (const auto& p : effect.parameters) {
       const double value = *of_effects[k++];
       if (std::find(card.effects.begin(), card.effects.end(), effect.id) != card.effects.end())
-        add(effect.full_name(p).c_str(), p.unit.c_str(), value, 0);
+        add(effect.full_name(p).c_str(), p.unit.c_str(), value, {});
     }
   add("pads", "-", card.pads, 0);
-  add("grip_force", "N", card.grip_force, 0);
+  add("grip_force", "N", card.grip_force, {});
   add("dead_time", "s", card.dead_time.value, card.dead_time.sigma);
   add("opening_time", "s", card.opening_time.value, card.opening_time.sigma);
   add("shape", "-", card.shape, card.shape_sigma);
@@ -343,14 +346,12 @@ void plan_throw(const PlanThrowOptions& options) {
 
   progress.reset();
   Outputs outputs{{options.arm, options.card, options.sku}};
-  if (!options.json.empty()) {
-    Json json = json_head("plan-throw");
-    json["arm"] = options.arm;
-    json["card"] = options.card.empty() ? Json(nullptr) : Json(options.card);
-    json.update(throw_json(answer));
-    outputs.json(options.json, json);
-  }
-  if (!options.report.empty()) write_report(answer, outputs.directory(options.report));
+  Json json = json_head("plan-throw");
+  json["arm"] = options.arm;
+  json["card"] = options.card.empty() ? Json(nullptr) : Json(options.card);
+  json.update(throw_json(answer));
+  if (!options.json.empty()) outputs.json(options.json, json);
+  if (!options.report.empty()) write_report(answer, json, outputs.directory(options.report));
   outputs.commit();
   fmt::print("{}", text_of(answer));
 }
@@ -389,12 +390,15 @@ Command plan_throw_command(Parser& plan) {
   parser.option("--seed", o->seed, "Seed of the draws").with_default();
   parser.file("--json", o->json, "Write the plan as JSON");
   add_threads(parser, o->threads);
-  parser.file("--report", o->report, "Directory for trajectory.csv, landings.csv and figures");
+  parser.file(
+      "--report", o->report,
+      "Directory for the tables (Markdown), the plan as JSON, trajectory.csv, landings.csv and figures");
   parser.footer(
       "Without a card, the object leaves at a delay that may be anything in the window. With one, it is\n"
       "let go as the card's contact model says, and the motion is the one whose landings depend least on\n"
       "friction, delay and grasp.\n"
-      "Exit code 1 says why there is no plan. Example:\n"
+      "Exit code 1 says why there is no plan. Outputs of an earlier run in the same place are replaced. "
+      "Example:\n"
       "  unhand plan throw --target 1.3,0,-0.2 --box 0.15x0.15 --report out/throw");
   return {&parser, [o] { plan_throw(*o); }};
 }

@@ -29,8 +29,10 @@ struct ThrowAnswer {
   /// A number that the release rests on, and who told it and its σ.
   struct Number {
     std::string name, unit;  ///< "-" where it has none
-    double value{}, sigma{};
-    std::string from;  ///< "card", "card; sigma assumed", …
+    double value{};
+    std::optional<double> sigma;  ///< none: not counted by itself
+    std::string from;             ///< "card", "card; sigma: assumed", …
+    std::string sigma_in{};       ///< the number in whose σ this one's is counted; empty: none
   };
   std::vector<Number> numbers;           ///< with a contact model
   std::vector<std::string> beyond_card;  ///< where the plan is beyond what its card was tried on
@@ -44,9 +46,9 @@ struct ThrowAnswer {
   std::vector<PredictedLandings> predicted;  ///< the plan's first
 };
 
-std::string text_of(const ThrowAnswer& answer);
+std::string text_of(const ThrowAnswer& answer, bool markdown = false);
 Json throw_json(const ThrowAnswer& answer);
-/// trajectory.csv, landings.csv, and the figures tube, motion and landings.
-void write_report(const ThrowAnswer& answer, const std::filesystem::path& directory);
+/// report.md, plan.json, trajectory.csv, landings.csv, and the figures tube, motion and landings.
+void write_report(const ThrowAnswer& answer, const Json& json, const std::filesystem::path& directory);
 
 }  // namespace unhand::apps

@@ -70,7 +70,8 @@ std::string percent(int part, std::size_t all) {
 
 }  // namespace
 
-std::string text_of(const ThrowAnswer& a) {
+std::string text_of(const ThrowAnswer& a, bool markdown) {
+  const auto shown = [&](const Table& t) { return markdown ? t.markdown() : t.text(); };
   const auto& plan = a.plan;
   const auto tip = planners::tip_motion<double>(a.chain, plan.nominal.state.q, plan.nominal.state.qd,
                                                 JointVector<double>::Zero(a.chain.size()));
@@ -86,14 +87,14 @@ std::string text_of(const ThrowAnswer& a) {
   for (int i = 0; i < a.chain.size(); ++i)
     joints.rows.push_back({a.chain.joints[i].name, fixed(true, plan.nominal.state.q[i], 4),
                            fixed(true, plan.nominal.state.qd[i], 4), fixed(true, plan.qdd[i], 3)});
-  out += joints.text() + "\n";
+  out += shown(joints) + "\n";
   Table landings{{"motion", "landings", "in the box", "mean miss [m]", "std [m]", "lost"}, {}, 1};
   for (const auto& one : a.predicted)
     landings.rows.push_back(
         {one.name, fmt::to_string(one.drawn.miss.size()),
          percent(one.hits, one.drawn.miss.size() + static_cast<std::size_t>(one.drawn.lost)),
          with_sign(one.drawn.mean, 4), fmt::format("{:.4f}", one.drawn.std), fmt::to_string(one.drawn.lost)});
-  out += landings.text();
+  out += shown(landings);
   if (a.real && a.rigid)
     out += fmt::format(
         "\nunder the tube's motion a rigidly carried object would land {} m from the middle, the contact "
@@ -104,8 +105,11 @@ std::string text_of(const ThrowAnswer& a) {
     for (const auto& one : a.numbers)
       numbers.rows.push_back({one.unit == "-" ? one.name : fmt::format("{} [{}]", one.name, one.unit),
                               fmt::format("{:.4g}", one.value),
-                              one.sigma > 0 ? fmt::format("{:.2g}", one.sigma) : "-", one.from});
-    out += "\n" + numbers.text();
+                              !one.sigma_in.empty()       ? "in " + one.sigma_in
+                              : one.sigma.value_or(0) > 0 ? fmt::format("{:.2g}", *one.sigma)
+                                                          : "-",
+                              one.from});
+    out += "\n" + shown(numbers);
   }
   for (const auto& one : a.beyond_card) out += fmt::format("\nBeyond the card: {}.\n", one);
   if (!a.passed_over.empty())
@@ -156,7 +160,11 @@ Json throw_json(const ThrowAnswer& a) {
   out["release"] = nullptr;
   Json numbers = Json::object();
   for (const auto& one : a.numbers)
-    numbers[one.name] = {{"value", one.value}, {"sigma", one.sigma}, {"unit", one.unit}, {"from", one.from}};
+    numbers[one.name] = {{"value", one.value},
+                         {"sigma", number(one.sigma)},
+                         {"sigma_in", one.sigma_in.empty() ? Json(nullptr) : Json(one.sigma_in)},
+                         {"unit", one.unit},
+                         {"from", one.from}};
   if (a.with_release)
     out["release"] = {{"numbers", numbers},
                       {"outside_valid_range", a.beyond_card},
@@ -411,11 +419,16 @@ Figure planned_landing_figure(const ThrowAnswer& a) {
 
 }  // namespace
 
-void write_report(const ThrowAnswer& a, const std::filesystem::path& directory) {
+void write_report(const ThrowAnswer& a, const Json& json, const std::filesystem::path& directory) {
+  std::string page = "# A throw into a box\n\n" + text_of(a, true);
   write_text(directory / "trajectory.csv", trajectory_csv(a));
   write_text(directory / "landings.csv", landings_csv(a));
-  for (const Figure& figure : {tube_figure(a), motion_figure(a), planned_landing_figure(a)})
+  for (const Figure& figure : {tube_figure(a), motion_figure(a), planned_landing_figure(a)}) {
     draw(figure, directory);
+    page += fmt::format("\n![{0}]({0}.png)\n", figure.name);
+  }
+  write_text(directory / "report.md", page);
+  write_text(directory / "plan.json", json_text(json));
 }
 
 }  // namespace unhand::apps

@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 
@@ -13,6 +14,8 @@
 #include "apps/throws.hpp"
 #include "apps/weak_grip.hpp"
 #include "dynamics/effect.hpp"
+#include "experiment/landing_noise.hpp"
+#include "experiment/observations.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -26,9 +29,38 @@ using experiment::kDegrees;
 /// By throw; nothing where a card tells no uncertainty.
 using Sigmas = std::vector<std::optional<fitting::OutcomeSigma>>;
 
+/// By how much a measured landing scatters about the prediction: its own 1 σ and that of the sensor, as the
+/// throw declares it or the log's landings tell it.
+struct MeasuredSigma {
+  std::optional<double> x, theta;  ///< [m], [rad]; absent where either is not known
+};
+
+std::vector<MeasuredSigma> measured_sigmas(const datasets::ThrowLog& log,
+                                           const std::vector<experiment::PreparedThrow>& prepared,
+                                           const Sigmas& sigmas) {
+  experiment::ObservationOptions landing;
+  landing.wrench = landing.normal_force = landing.mocap = false;
+  landing.landing_noise = experiment::landing_noise(log);
+  std::vector<MeasuredSigma> out(prepared.size());
+  for (std::size_t i = 0; i < prepared.size(); ++i) {
+    if (!sigmas[i]) continue;
+    for (const auto& one : experiment::observe(log, log.throws[i], prepared[i], landing).all) {
+      if (one.channel == experiment::Channel::landing_x)
+        out[i].x = std::hypot(sigmas[i]->landing_x, one.sigma);
+      if (one.channel == experiment::Channel::landing_theta)
+        out[i].theta = std::hypot(sigmas[i]->landing_theta, one.sigma);
+    }
+  }
+  return out;
+}
+
+std::optional<double> in_degrees(const std::optional<double>& radians) {
+  return radians ? std::optional(*radians * kDegrees) : std::nullopt;
+}
+
 Json prediction_json(const experiment::ThrowComparison& one, const experiment::PreparedThrow& prepared,
-                     const std::optional<fitting::OutcomeSigma>& sigma, const datasets::ModelCard& card,
-                     double clock_origin) {
+                     const std::optional<fitting::OutcomeSigma>& sigma, const MeasuredSigma& of_measured,
+                     const datasets::ModelCard& card, double clock_origin) {
   const auto& p = one.prediction;
   Json out{{"id", one.id},
            {"object", one.object},
@@ -57,6 +89,10 @@ Json prediction_json(const experiment::ThrowComparison& one, const experiment::P
         {"detach_vz_m_s", sigma->detach_vz},   {"detach_omega_deg_s", sigma->detach_omega * kDegrees},
         {"landing_x_m", sigma->landing_x},     {"landing_theta_deg", sigma->landing_theta * kDegrees},
         {"flight_time_s", sigma->flight_time}};
+  out["sigma_measured"] = nullptr;
+  if (of_measured.x || of_measured.theta)
+    out["sigma_measured"] = {{"landing_x_m", number(of_measured.x)},
+                             {"landing_theta_deg", number(in_degrees(of_measured.theta))}};
   out["outside_valid_range"] = fitting::reasons_of(fitting::outside_range(card, prepared));
   Json& measured = out["measured"] = Json::object();
   const auto& m = prepared.measured;
@@ -76,7 +112,7 @@ Json prediction_json(const experiment::ThrowComparison& one, const experiment::P
 
 Table table_of(const experiment::ModelComparison& model, const Sigmas& sigmas) {
   Table out{{"throw", "condition", "outcome", "detach vx [m/s]", "vz [m/s]", "omega [deg/s]", "landing x [m]",
-             "error", "theta [deg]", "error"},
+             "error x", "theta [deg]", "error theta"},
             {},
             3};
   for (std::size_t i = 0; i < model.throws.size(); ++i) {
@@ -103,17 +139,21 @@ Table table_of(const experiment::ModelComparison& model, const Sigmas& sigmas) {
 }
 
 /// The comparison's table with 1 σ beside it.
-Table csv_table(const experiment::Comparison& comparison, const datasets::ThrowLog& log,
-                const Sigmas& sigmas) {
+Table csv_table(const experiment::Comparison& comparison, const datasets::ThrowLog& log, const Sigmas& sigmas,
+                const std::vector<MeasuredSigma>& of_measured) {
   Table out = throw_table(comparison, log);
   for (const char* name : {"detach_time_s", "detach_vx_m_s", "detach_vz_m_s", "detach_omega_deg_s",
                            "landing_x_m", "landing_theta_deg"})
     out.header.push_back(std::string("sigma_") + name);
+  for (const char* name : {"landing_x_m", "landing_theta_deg"})
+    out.header.push_back(std::string("sigma_measured_") + name);
   for (std::size_t i = 0; i < out.rows.size(); ++i) {
     const auto s = sigmas[i].value_or(fitting::OutcomeSigma{});
     for (const double value : {s.detach_time, s.detach_vx, s.detach_vz, s.detach_omega * kDegrees,
                                s.landing_x, s.landing_theta * kDegrees})
       out.rows[i].push_back(all_digits(sigmas[i].has_value(), value));
+    for (const auto& value : {of_measured[i].x, in_degrees(of_measured[i].theta)})
+      out.rows[i].push_back(all_digits(value.has_value(), value.value_or(0)));
   }
   return out;
 }
@@ -199,10 +239,12 @@ void predict(const PredictOptions& options) {
   for (const auto& [name, failure] : failures)
     tell("unhand: {} of {} throws, {}: {}\n", failure.second, result.throws.size(), name, failure.first);
 
+  const auto of_measured = measured_sigmas(log, prepared, sigmas);
   Outputs outputs{{options.log, options.card}};
   if (!options.json.empty()) {
     Json json = json_head("predict");
     json["log"] = options.log;
+    json["source"] = log.source;
     json["card"] = options.card;
     json["model"] = model;
     json["effects"] = card.card.effects;
@@ -212,15 +254,17 @@ void predict(const PredictOptions& options) {
     json["slips_at_start"] = slips_at_start(result);
     json["throws"] = Json::array();
     for (std::size_t i = 0; i < prepared.size(); ++i)
-      json["throws"].push_back(
-          prediction_json(result.throws[i], prepared[i], sigmas[i], card.card, log.clock_origin));
+      json["throws"].push_back(prediction_json(result.throws[i], prepared[i], sigmas[i], of_measured[i],
+                                               card.card, log.clock_origin));
     outputs.json(options.json, json);
   }
-  if (!options.csv.empty()) outputs.text(options.csv, csv_table(comparison, log, sigmas).csv());
+  if (!options.csv.empty()) outputs.text(options.csv, csv_table(comparison, log, sigmas, of_measured).csv());
   outputs.commit();
-  fmt::print("{}: {} throws with {}{}{} from {} (± 1 sigma; errors: predicted - measured)\n\n{}", options.log,
-             prepared.size(), model, card.card.effects.empty() ? "" : " with ",
-             fmt::join(card.card.effects, ", "), options.card, table_of(result, sigmas).text());
+  fmt::print(
+      "{}: {}\n{} throws with {}{}{} from {} (± 1 sigma of the throw itself, without the noise of sensors; "
+      "errors: predicted - measured)\n\n{}",
+      options.log, origin_text(log), prepared.size(), model, card.card.effects.empty() ? "" : " with ",
+      fmt::join(card.card.effects, ", "), options.card, table_of(result, sigmas).text());
 }
 
 }  // namespace
@@ -237,6 +281,9 @@ Command predict_command(Parser& root) {
   parser.footer(
       "Cards come from `unhand fit LOG --card FILE` (with uncertainties) and from\n"
       "`unhand compare LOG --write-cards DIR`. Existing files are replaced.\n"
+      "± is 1 sigma of the throw itself. A measured landing scatters about it by the sensor's noise as "
+      "well:\n"
+      "sigma_measured of --json and --csv is both.\n"
       "Example:\n  unhand predict campaign.h5 --card cards/sliding_pivot.json --csv predictions.csv");
   return {&parser, [options] { predict(*options); }};
 }

@@ -89,6 +89,11 @@ std::size_t place_of(const datasets::ThrowLog& log, const std::string& id, const
   throw WrongUsage(datasets::unknown_name(fmt::format("--throw: {} has no throw '{}'", file, id), id, known));
 }
 
+bool is_of_flights(const datasets::ThrowLog& log) {
+  return log.dimension == 3 || std::none_of(log.throws.begin(), log.throws.end(),
+                                            [](const auto& one) { return one.hand.has_value(); });
+}
+
 void require_flights(const datasets::ThrowLog& log, const std::string& file) {
   for (const auto& one : log.throws)
     if (datasets::held_by(log, one).empty()) return;

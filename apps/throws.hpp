@@ -29,6 +29,9 @@ std::string origin_text(const datasets::SlipLog& log);
 /// Where the throw of that id is. Throws WrongUsage, naming the nearest id or some of them, if there is none.
 std::size_t place_of(const datasets::ThrowLog& log, const std::string& id, const std::string& file);
 
+/// Whether no throw of the log has a hand in the plane to be released from.
+bool is_of_flights(const datasets::ThrowLog& log);
+
 /// Throws datasets::LogError where every throw is held at first and nothing says when it flies
 /// (datasets::held_by); where some are, they are left out as not_free.
 void require_flights(const datasets::ThrowLog& log, const std::string& file);

@@ -2,7 +2,6 @@
 #include "apps/validate_sku.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <memory>
 #include <numbers>
@@ -12,6 +11,7 @@
 #include "apps/command.hpp"
 #include "apps/progress.hpp"
 #include "apps/throws.hpp"
+#include "datasets/near_miss.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -68,8 +68,9 @@ void validate(ValidateSkuOptions options) {
     std::set<std::string> known;
     for (const auto& one : log->throws) known.insert(one.condition);
     if (!known.contains(options.condition))
-      throw WrongUsage(fmt::format("--condition: {} has no '{}'; there are {}", options.log,
-                                   options.condition, fmt::join(known, ", ")));
+      throw WrongUsage(
+          datasets::unknown_name(fmt::format("--condition: {} has no '{}'", options.log, options.condition),
+                                 options.condition, {known.begin(), known.end()}));
     request.condition = options.condition;
   }
   const auto answer = [&] {

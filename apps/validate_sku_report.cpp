@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "apps/table.hpp"
+#include "apps/throws.hpp"
 #include "apps/validate_sku.hpp"
 
 namespace unhand::apps {
@@ -47,7 +48,10 @@ Table gain_table(const SkuValidation& answer) {
 }
 
 Table candidate_table(const SkuValidation& answer) {
-  Table out{{"condition", "held", "lands at x [m]", "theta [deg]", "1 sigma x [cm]", "theta [deg]"}, {}, 2};
+  Table out{{"condition", "held", "lands at x [m]", "lands at theta [deg]", "1 sigma x [cm]",
+             "1 sigma theta [deg]"},
+            {},
+            2};
   for (const auto& c : answer.candidates)
     out.rows.push_back({c.condition, c.held ? "yes" : "no", fixed(c.landed, c.landing_x, 3),
                         fixed(c.landed, c.landing_theta * kDegrees, 1), fixed(c.landed, 100 * c.linear.x, 2),
@@ -56,7 +60,10 @@ Table candidate_table(const SkuValidation& answer) {
 }
 
 Table spread_table(const SkuValidation& answer) {
-  Table out{{"", "1 sigma x [cm]", "theta [deg]", "mean shift x [cm]", "theta [deg]", "within"}, {}, 1};
+  Table out{
+      {"", "1 sigma x [cm]", "1 sigma theta [deg]", "mean shift x [cm]", "mean shift theta [deg]", "within"},
+      {},
+      1};
   const auto row = [&](const char* name, const fitting::LandingSpread& s, double within) {
     out.rows.push_back({name, fmt::format("{:.2f}", 100 * s.x), fmt::format("{:.2f}", s.theta * kDegrees),
                         fmt::format("{:+.2f}", 100 * s.bias_x),
@@ -97,7 +104,7 @@ std::string held_out_text(const datasets::ModelCard& card) {
                      100 * x->second.mae, theta->second.mae);
 }
 
-/// "throwable, if the card holds beyond what it was tried on: mass, surface".
+/// "throwable, provided that the card also holds for what it was not tried on: mass, surface".
 std::string verdict_text(const SkuValidation& answer) {
   std::vector<std::string> conditions;
   for (const auto& one : answer.untried) conditions.push_back(one.condition);
@@ -106,7 +113,7 @@ std::string verdict_text(const SkuValidation& answer) {
   return fmt::format("{}{}{}", to_string(answer.verdict),
                      conditions.empty() ? ""
                      : !judged          ? "; the card was not tried on: "
-                                        : ", if the card holds beyond what it was tried on: ",
+                               : ", provided that the card also holds for what it was not tried on: ",
                      fmt::join(conditions, ", "));
 }
 
@@ -130,6 +137,8 @@ std::string sku_text(const SkuQuestion& question, const SkuValidation& answer, b
                        question.card.log.title,
                        question.request.assumed.other_surface > 0 ? "--other-surface is allowed for"
                                                                   : "allow with --other-surface (0.2: 20 %)");
+  if (const auto* log = question.request.log)
+    out += fmt::format("Throws of {}: {}.\n", question.log_file, origin_text(*log));
   out += held_out_text(question.card);
   if (answer.measured)
     out += measured_text(answer);

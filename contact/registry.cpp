@@ -7,9 +7,11 @@
 #include <cmath>
 #include <deque>
 #include <stdexcept>
+#include <tuple>
 
 #include "contact/gripper_delay.hpp"
 #include "contact/limit_surface.hpp"
+#include "dynamics/effect.hpp"
 
 namespace unhand::contact {
 namespace {
@@ -138,6 +140,13 @@ void validate(const ContactModelEntry& entry) {
 }
 
 Model made(const ContactModelEntry& entry, const Parameters& parameters) {
+  if (!entry.follows_pads)
+    for (const auto& [name, value, what] :
+         {std::tuple{"open_command", parameters.open_command, "when the gripper is told to open"},
+          std::tuple{"delay", parameters.delay.a, "from the command to the release"}})
+      if (std::isnan(value))
+        throw std::invalid_argument(
+            fmt::format("contact model \"{}\" needs {} [s], {}: it is not given", entry.name, name, what));
   Model law = entry.make(parameters);
   if (!law) throw std::logic_error(fmt::format("contact model \"{}\": its maker gave null", entry.name));
   return law;
@@ -152,8 +161,9 @@ LawValues<Dual> complete(const ContactModelEntry& entry, LawValues<Dual> values)
   for (const LawParameter& own : entry.own) {
     const double value = values.try_emplace(own.name, Dual(own.start)).first->second.a;
     if (!(value >= own.low && value <= own.high))
-      throw std::invalid_argument(fmt::format("contact model \"{}\": {} = {} is not in [{}, {}] {}",
-                                              entry.name, own.name, value, own.low, own.high, own.unit));
+      throw std::invalid_argument(fmt::format("contact model \"{}\": {} = {} is not in [{}, {}]{}",
+                                              entry.name, own.name, value, own.low, own.high,
+                                              dynamics::after_number(own.unit)));
   }
   return values;
 }
@@ -184,6 +194,7 @@ bool feels_pressure(std::string_view name) {
 bool can_give(std::string_view name) {
   ContactParameters<double> giving;
   giving.patch = {0.5, 0.01};
+  giving.open_command = giving.delay = 0;
   giving.variation.compliance = 1e-6;
   return make_contact_model(name, giving)->needs_hold();
 }

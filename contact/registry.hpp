@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -16,14 +17,18 @@
 
 namespace unhand::contact {
 
+/// A number that nobody gave.
+inline constexpr double kNotGiven = std::numeric_limits<double>::quiet_NaN();
+
 /// Everything that some contact model takes. Each model reads what it needs.
 template <class S>
 struct ContactParameters {
   Patch<S> patch;                               ///< the limits, for laws that follow the pads
   SlideEnd slide_end{SlideEnd::latched_brake};  ///< of sliding_pivot alone
   LawValues<S> law_values{};                    ///< of the law's own parameters (ContactModelEntry::own)
-  double open_command{};                        ///< for other laws: when the gripper is told to open [s]
-  S delay{};                                    ///< for other laws: from the command to the release [s]
+  /// For other laws, which need both; NaN: not given.
+  double open_command{kNotGiven};  ///< when the gripper is told to open [s]
+  S delay{kNotGiven};              ///< from the command to the release [s]
   /// Departures of the friction limits; neutral by default. A law passes over what it does not have:
   /// gripper_delay all of it, sliding_pivot `compliance` and `loss_time`, all laws but the disc
   /// `pressure_exponent`, and every law `adhesion` and `parting_time`, which AdhesiveForce has.
@@ -92,7 +97,8 @@ std::vector<GivenLawParameter> given_law_parameters(std::string_view name, const
 /// The model of that name. Throws std::invalid_argument, listing the names, if there is none, and as the
 /// model's constructor does. Of the law's own parameters `law_values` may leave out any, which then have
 /// their start; throws std::invalid_argument for one that the law does not have, and for one out of its
-/// range. std::logic_error, naming the law, where its maker gives null.
+/// range; and, naming it, where `open_command` or `delay` is not given to a law that does not follow the
+/// pads. std::logic_error, naming the law, where its maker gives null.
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name, const ContactParameters<double>&);
 std::unique_ptr<ContactModel> make_contact_model(std::string_view name, const ContactParameters<Dual>&);
 

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "datasets/attribute_fields.hpp"
+#include "datasets/file_kind.hpp"
 
 namespace unhand::datasets {
 namespace {
@@ -131,7 +132,8 @@ bool CsvReader::next(CsvLine& line) {
       if (line.text.starts_with("\xff\xfe") || line.text.starts_with("\xfe\xff"))
         line.fail("", "is UTF-16 text, expected UTF-8: save it again as CSV UTF-8");
     }
-    if (!is_utf8_text(line.text)) line.fail("", "is not UTF-8 text");
+    if (!is_utf8_text(line.text))
+      line.fail("", with_kind("is not UTF-8 text", number_ == 1 ? kind_of_file(file_) : ""));
     if (trimmed(line.text).empty()) continue;
     if (separator_ == '\0') separator_ = find_separator(line.text);
     line.decimal_comma = separator_ != ',';

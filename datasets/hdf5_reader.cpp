@@ -6,6 +6,7 @@
 #include <climits>
 #include <filesystem>
 
+#include "datasets/file_kind.hpp"
 #include "datasets/hdf5_driver.hpp"
 #include "datasets/hdf5_lzf.hpp"
 #include "datasets/near_miss.hpp"
@@ -57,7 +58,7 @@ Node Node::open_file(const std::string& file, Place* place) {
   if (fs::file_size(file, error) == 0) throw LogError(file, "", "is empty, not an HDF5 file");
   const htri_t is_hdf5 = H5Fis_hdf5(file.c_str());
   if (is_hdf5 < 0) throw LogError(file, "/", fmt::format("cannot be opened ({})", last_message()));
-  if (is_hdf5 == 0) throw LogError(file, "", "is not an HDF5 file");
+  if (is_hdf5 == 0) throw LogError(file, "", with_kind("is not an HDF5 file", kind_of_file(file)));
   Handle access = list_handle(H5Pcreate(H5P_FILE_ACCESS));
 #if H5_VERSION_GE(1, 10, 7)
   H5Pset_file_locking(access.id(), false, true);  // reading must work on a read-only disk

@@ -9,6 +9,7 @@
 #include <sstream>
 #include <string_view>
 
+#include "datasets/file_kind.hpp"
 #include "datasets/json_fields.hpp"
 #include "datasets/whole_file.hpp"
 #include "dynamics/dense_solve.hpp"
@@ -262,6 +263,8 @@ ModelCard read_model_card(const fs::path& file) {
   std::ostringstream text;
   text << in.rdbuf();
   if (!in) throw CardError(file.string(), "", "cannot be read");
+  if (const std::string kind = kind_of(text.str()); kind.find("JSON") == std::string::npos && !kind.empty())
+    throw CardError(file.string(), "", with_kind("is not a model card (JSON)", kind));
   return parse_model_card(text.str(), file.string());
 }
 

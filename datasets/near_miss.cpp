@@ -25,6 +25,12 @@ bool has_one_too_many(std::string_view name, std::string_view known) {
   return false;
 }
 
+/// "7" of "007", "0" of "00"; nothing of what is no number.
+std::string_view without_zeros(std::string_view name) {
+  if (name.empty() || name.find_first_not_of("0123456789") != std::string_view::npos) return {};
+  return name.substr(std::min(name.find_first_not_of('0'), name.size() - 1));
+}
+
 }  // namespace
 
 int edit_distance(std::string_view a, std::string_view b) {
@@ -72,10 +78,29 @@ std::string_view nearest_name(std::string_view name, std::span<const std::string
   return best;
 }
 
+std::string_view meant_name(std::string_view name, std::span<const std::string_view> known) {
+  if (const std::string_view nearest = nearest_name(name, known); !nearest.empty()) return nearest;
+  const std::string_view number = without_zeros(name);
+  std::vector<std::string_view> same, last;
+  for (const std::string_view one : known) {
+    if (!number.empty() && without_zeros(one) == number) same.push_back(one);
+    if (const std::size_t dot = one.find('.'); dot != std::string_view::npos)
+      last.push_back(one.substr(dot + 1));
+  }
+  if (same.size() == 1) return same.front();
+  std::string_view meant = name;
+  if (std::find(last.begin(), last.end(), name) == last.end()) meant = nearest_name(name, last);
+  if (meant.empty() || std::count(last.begin(), last.end(), meant) != 1) return {};
+  return *std::find_if(known.begin(), known.end(), [&](std::string_view one) {
+    const std::size_t dot = one.find('.');
+    return dot != std::string_view::npos && one.substr(dot + 1) == meant;
+  });
+}
+
 std::string unknown_name(const std::string& said, std::string_view name,
                          const std::vector<std::string>& known) {
   const std::vector<std::string_view> views(known.begin(), known.end());
-  const std::string_view meant = nearest_name(name, views);
+  const std::string_view meant = meant_name(name, views);
   if (!meant.empty()) return fmt::format("{}; did you mean '{}'?", said, meant);
   const std::string_view family = name.substr(0, name.find('.') + 1);  // "flight."; none: empty
   const auto listed = [&](std::string_view prefix) {

@@ -18,6 +18,11 @@ bool is_near_miss(std::string_view name, std::string_view known);
 /// The nearest of `known` that `name` misses, or nothing.
 std::string_view nearest_name(std::string_view name, std::span<const std::string_view> known);
 
+/// What a user who wrote `name` meant of `known`, or nothing: the nearest name; the only one that has this
+/// for what follows its first dot ("wind" for "flight.wind"), or nearly; the only one that is this number
+/// ("1" for "001").
+std::string_view meant_name(std::string_view name, std::span<const std::string_view> known);
+
 /// "X; did you mean 'y'?" or "X (there are: a, b)": what to say of a name that is not among those known. Of
 /// "flight.x", those of its family are listed, if there are any.
 std::string unknown_name(const std::string& said, std::string_view name,

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "datasets/attribute_fields.hpp"
+#include "datasets/file_kind.hpp"
 #include "datasets/log_error.hpp"
 
 namespace unhand::datasets {
@@ -74,7 +75,7 @@ class Lines {
     ++number_;
     if (!std::getline(in_, text_)) fail(fmt::format("the file ends where {} should be", what));
     if (number_ == 1 && text_.starts_with("\xef\xbb\xbf")) text_.erase(0, 3);  // a byte order mark
-    if (!is_utf8_text(text_)) fail("is not UTF-8 text");
+    if (!is_utf8_text(text_)) fail(with_kind("is not UTF-8 text", number_ == 1 ? kind_of_file(name_) : ""));
   }
 
   static std::string_view word(std::string_view& rest) {

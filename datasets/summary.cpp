@@ -131,8 +131,14 @@ void add_scatter(NoiseSummary& noise, const Channel<Throw>& channel, std::vector
     if (series == nullptr) continue;
     const Series& values = *series;
     std::vector<std::size_t> rows;
-    for (std::size_t i = 0; i < values.rows; ++i)
-      if (channel.group != "mocap" || toss.mocap->is_valid(i)) rows.push_back(i);
+    const bool falls = channel.group == "imu" && toss.free_flight && !toss.mocap;
+    for (std::size_t i = 0; i < values.rows; ++i) {
+      if (channel.group == "mocap" && !toss.mocap->is_valid(i)) continue;
+      if (const double t = falls ? toss.imu->time(i) : 0;
+          falls && !(t >= toss.free_flight->first && t <= toss.free_flight->second))
+        continue;
+      rows.push_back(i);
+    }
     all.resize(std::max(all.size(), values.cols));
     whitened.resize(all.size());
     for (std::size_t j = 0; j < values.cols; ++j) {

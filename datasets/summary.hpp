@@ -41,7 +41,8 @@ struct GroupSummary {
 /// The declared noise of one dataset: [lowest, highest] per column over all throws; empty where none declares
 /// any. Beside it the high-frequency scatter of the samples themselves, from third differences over all
 /// throws, without what a smooth motion adds (its third differences over doubled steps are eight times as
-/// large, those of white noise are not). Noise that is slower than the samples does not show in it.
+/// large, those of white noise are not). Noise that is slower than the samples does not show in it. Of a
+/// sensor that falls, that of its falls: before and after, hands and bounces move it.
 struct NoiseSummary {
   std::string dataset;                   // "mocap/pose"
   std::string columns, units;            ///< "x,z,theta" and "m,m,rad"; of the widest, where throws differ

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "datasets/file_kind.hpp"
 #include "datasets/near_miss.hpp"
 
 namespace unhand::datasets {
@@ -35,7 +36,10 @@ TomlKeys TomlKeys::parse(const fs::path& file) {
   if (!fs::is_regular_file(file, error)) throw TomlError(file.string(), 0, 0, "", "no such file");
   std::ifstream in(file, std::ios::binary);
   if (!in) throw TomlError(file.string(), 0, 0, "", "cannot be opened");
-  return parse_text(std::string(std::istreambuf_iterator<char>(in), {}), file.string());
+  const std::string text(std::istreambuf_iterator<char>(in), {});
+  if (const std::string kind = kind_of(text); !kind.empty())
+    throw TomlError(file.string(), 0, 0, "", with_kind("is not a TOML file", kind));
+  return parse_text(text, file.string());
 }
 
 TomlKeys TomlKeys::parse_text(std::string_view text, const std::string& name) {

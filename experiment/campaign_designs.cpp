@@ -1,11 +1,11 @@
 #include <fmt/core.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
 
+#include "datasets/near_miss.hpp"
 #include "experiment/random_stream.hpp"
 #include "experiment/synthetic_campaign.hpp"
 
@@ -159,7 +159,7 @@ CampaignDesign campaign_design(std::string_view name, std::uint64_t seed) {
     design.repetitions = 2;
   } else {
     throw std::invalid_argument(
-        fmt::format("no campaign is called '{}': choose one of {}", name, fmt::join(campaign_names(), ", ")));
+        datasets::unknown_name(fmt::format("no campaign is called '{}'", name), name, campaign_names()));
   }
   return design;
 }

@@ -55,13 +55,9 @@ CataloguedParameter find(std::string_view name) {
     own = fmt::format("; {} has {}", effect.id, fmt::join(parameters, ", "));
   }
   const std::vector<std::string_view> views(names.begin(), names.end());
-  std::string near(datasets::nearest_name(name, views));
-  if (near.empty())  // the id's last word alone, say
-    for (const std::string& id : ids)
-      if (id.substr(id.find('.') + 1) == name) near = id;
-  throw std::invalid_argument(fmt::format("effect \"{}\" is unknown{}; {}", name, own,
-                                          near.empty() ? fmt::format("there are {}", fmt::join(ids, ", "))
-                                                       : fmt::format("did you mean '{}'?", near)));
+  throw std::invalid_argument(
+      datasets::unknown_name(fmt::format("effect \"{}\" is unknown{}", name, own), name,
+                             datasets::meant_name(name, views).empty() ? ids : names));
 }
 
 /// "k[jar]" is {"k", "jar"}; without brackets the second is empty.

@@ -10,6 +10,7 @@
 
 #include "contact/patch.hpp"
 #include "contact/registry.hpp"
+#include "datasets/near_miss.hpp"
 #include "experiment/campaign_effects.hpp"
 #include "fitting/normal_equations.hpp"
 
@@ -86,9 +87,10 @@ double margin_of(const ModelCard& card, const std::string& condition, const Card
 }
 
 std::string in_words(const Condition& is, const CardRange& range) {
+  const std::string unit = dynamics::after_number(is.unit);
   const auto low = fmt::format("{:.4g}", range.low), high = fmt::format("{:.4g}", range.high);
-  return low == high ? fmt::format("{} {:.4g} {} is not {}", is.name, is.value, is.unit, low)
-                     : fmt::format("{} {:.4g} {} is outside [{}, {}]", is.name, is.value, is.unit, low, high);
+  return low == high ? fmt::format("{} {:.4g}{} is not {}", is.name, is.value, unit, low)
+                     : fmt::format("{} {:.4g}{} is outside [{}, {}]", is.name, is.value, unit, low, high);
 }
 
 void widen(std::map<std::string, CardRange>& range, const experiment::PreparedThrow& prepared, Share share) {
@@ -236,7 +238,7 @@ CampaignOptions options_of(const ModelCard& card, const std::string& file) {
   if (std::find(models.begin(), models.end(), card.model) == models.end())
     throw CardError(
         file, "/model",
-        fmt::format("'{}' is no model of releases; there are {}", card.model, fmt::join(models, ", ")));
+        datasets::unknown_name(fmt::format("'{}' is no model of releases", card.model), card.model, models));
   std::vector<dynamics::Effect> effects;
   for (std::size_t i = 0; i < card.effects.size(); ++i) {
     try {

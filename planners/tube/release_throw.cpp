@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "contact/registry.hpp"
+#include "datasets/near_miss.hpp"
 #include "flight/fly.hpp"
 #include "planners/tube/card_pads.hpp"
 #include "planners/tube/held_motion.hpp"
@@ -112,8 +113,10 @@ class CardReader {
     if (found->second.unit != unit)
       throw CardError(file_, fmt::format("/own_spreads/{}/unit", name),
                       fmt::format("is '{}', not '{}'", found->second.unit, unit));
-    NumberSource& source = out_.origins[adds_to].sigma;
-    if (source == NumberSource::assumed) source = base > 0 ? NumberSource::widened : NumberSource::parameter;
+    NumberOrigin& origin = out_.origins[adds_to];
+    if (origin.sigma == NumberSource::assumed)
+      origin.sigma = base > 0 ? NumberSource::widened : NumberSource::parameter;
+    if (found->second.sigma > 0 && adds_to != std::string_view(name)) origin.with.emplace_back(name);
     return found->second.sigma;
   }
 
@@ -197,12 +200,21 @@ class CardReader {
   std::vector<std::string> known_, spreads_;
 };
 
+std::vector<std::string> names_that_follow_pads() {
+  auto names = contact::contact_model_names();
+  std::erase_if(names, [](const std::string& name) { return !contact::follows_pads(name); });
+  return names;
+}
+
 }  // namespace
 
 ReleaseCard release_card(const datasets::ModelCard& card, const std::string& file,
                          const ReleaseCard& otherwise) {
-  if (!contact::follows_pads(card.model) || card.model == release::kNaiveModel || card.model == "projectile")
-    throw CardError(file, "/model", fmt::format("'{}' does not say how the pads let go", card.model));
+  const auto laws = names_that_follow_pads();
+  if (std::find(laws.begin(), laws.end(), card.model) == laws.end())
+    throw CardError(file, "/model",
+                    datasets::unknown_name(fmt::format("'{}' does not say how the pads let go", card.model),
+                                           card.model, laws));
   ReleaseCard out = otherwise;
   out.model = card.model;
   out.law_values.clear();
@@ -238,8 +250,12 @@ ReleaseCard release_card(const datasets::ModelCard& card, const std::string& fil
   const double mu = out.mu.value, per_newton = mu / out.grip_force;
   const double variance = std::pow(out.mu.sigma, 2) + std::pow(per_newton * force_sigma, 2) +
                           2 * per_newton * reader.covariance("mu", "grip_force");
-  if (NumberSource& source = out.origins["mu"].sigma; force_sigma > 0 && source == NumberSource::assumed)
-    source = NumberSource::widened;
+  if (force_sigma > 0) {
+    NumberOrigin& origin = out.origins["mu"];
+    if (origin.sigma == NumberSource::assumed) origin.sigma = NumberSource::widened;
+    origin.with.emplace_back("grip_force");
+    out.origins["grip_force"].counted_in = "mu";
+  }
   out.mu.sigma = std::sqrt(std::max(0.0, variance));
   out.mu.sigma = std::hypot(out.mu.sigma, mu * reader.spread("mu_deviation", "-", "mu", out.mu.sigma));
   out.dead_time.sigma = std::hypot(

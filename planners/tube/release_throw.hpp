@@ -32,7 +32,9 @@ enum class NumberSource {
 const char* to_string(NumberSource);
 /// Of a number and of its σ.
 struct NumberOrigin {
-  NumberSource value{}, sigma{};  ///< of each
+  NumberSource value{}, sigma{};    ///< of each
+  std::vector<std::string> with{};  ///< spreads and numbers on cards whose σ is in this one, too
+  std::string counted_in{};         ///< the number that this one's σ is in; empty: σ is its own
 };
 
 /// What is known of the release: a contact model, the friction of its pads, and how the gripper opens.

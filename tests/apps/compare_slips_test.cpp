@@ -51,10 +51,14 @@ TEST_F(Cli, SlipsAreComparedByFitting) {
   const Eigen::Matrix3d along = Eigen::Vector3d(1 / 16.0, 1 / 9.0, 1 / 25.0).asDiagonal();
   log.surfaces["felt"] = logged(fitting::test::simulate(fitting::test::ellipsoid(along), 12, 0.1, 0.1, 21));
   datasets::write_slip_log(folder / "slips.h5", log);
-  expect_refusal("compare slips.h5", 3, "slips.h5: /@schema: is a slip-log");
-  expect_refusal("compare slips.h5 --models ellipsoid", 3, "add --fit");
+  expect_refusal("compare slips.h5", 2, "slips.h5 is a slip-log");
+  expect_refusal("compare slips.h5 --models ellipsoid", 2, "add --fit");
   expect_refusal("compare slips.h5 --models sliding_pivot", 3,
                  "which sliding_pivot does not predict; there are ellipsoid, ");
+  const Answer folds = run("fit slips.h5 --model ellipsoid --kfold 100 --json f.json");
+  EXPECT_EQ(folds.code, 0) << folds.err;
+  EXPECT_THAT(folds.err, HasSubstr("unhand: --kfold 100: 12 folds, as many as a surface has slips\n"));
+  EXPECT_EQ(read_json(folder / "f.json")["folds"], 12);
 }
 
 // Slips declare no noise: what is left of them is an angle and a correlation, and no chi2.

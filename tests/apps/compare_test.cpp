@@ -12,12 +12,14 @@ TEST_F(Cli, CompareReleases) {
   const Answer answer = run(models + "--threads 2 --json two.json");
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.out, HasSubstr("landing theta [deg]"));
+  EXPECT_THAT(answer.out, HasSubstr("campaign quick12; synthetic: simulated by unhand"));
   EXPECT_THAT(answer.err, IsEmpty());
   json one = read_json(folder / "one.json");
   EXPECT_EQ(timeless(one), timeless(read_json(folder / "two.json")));
   EXPECT_EQ(one["schema"], "compare");
   EXPECT_EQ(one["schema_version"], 1);
   EXPECT_TRUE(one.contains("log"));
+  EXPECT_THAT(one["source"], StartsWith("synthetic: "));
   ASSERT_EQ(one["models"].size(), 3u);
   for (const auto& [name, model] : one["models"].items()) {
     EXPECT_FALSE(model["parameters"].empty()) << name;

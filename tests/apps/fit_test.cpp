@@ -59,6 +59,8 @@ TEST_F(Cli, FitThenPredict) {
   const Answer predicted = run("predict " + quick + " --card c.json --json p.json --csv p.csv");
   ASSERT_EQ(predicted.code, 0) << predicted.err;
   EXPECT_THAT(predicted.out, HasSubstr("±"));
+  EXPECT_THAT(predicted.out, HasSubstr("campaign quick12; synthetic: simulated by unhand"));
+  EXPECT_THAT(read_json(folder / "p.json")["source"], StartsWith("synthetic: "));
   EXPECT_THAT(content(folder / "p.csv"), HasSubstr("sigma_landing_x_m"));
   json throws = read_json(folder / "p.json")["throws"];
   ASSERT_EQ(throws.size(), 12u);
@@ -69,6 +71,11 @@ TEST_F(Cli, FitThenPredict) {
     for (const auto& reason : one["outside_valid_range"])
       conditions.insert(reason.get<std::string>().substr(0, reason.get<std::string>().find(' ')));
     EXPECT_GT(one["sigma"]["landing_x_m"].get<double>(), 0);
+    // The campaign's landing sensor has 1 mm and 0.5 deg.
+    const auto of = [&](const char* what, const char* quantity) { return one[what][quantity].get<double>(); };
+    EXPECT_NEAR(of("sigma_measured", "landing_x_m"), std::hypot(of("sigma", "landing_x_m"), 0.001), 1e-12);
+    EXPECT_NEAR(of("sigma_measured", "landing_theta_deg"), std::hypot(of("sigma", "landing_theta_deg"), 0.5),
+                1e-9);
     const bool outside = !one["outside_valid_range"].empty();
     if (one["split"] == "train") {
       EXPECT_FALSE(outside);
@@ -77,6 +84,10 @@ TEST_F(Cli, FitThenPredict) {
       ++n;
     }
   }
+  card["valid_range"]["shape"] = {{"low", 5}, {"high", 6}, {"unit", "-"}};
+  std::ofstream(folder / "narrow.json") << card;
+  EXPECT_THAT(run("predict " + quick + " --card narrow.json").err,
+              testing::ContainsRegex("shape [0-9.]+ is outside \\[5, 6\\]"));
   EXPECT_NEAR(mae / n, fitted["test"]["landing_x_m"]["mae"].get<double>(), 1e-12);  // summed in another order
   EXPECT_EQ(static_cast<std::size_t>(std::count(predicted.err.begin(), predicted.err.end(), '\n')),
             conditions.size());  // a line each, not one per throw
@@ -226,6 +237,12 @@ TEST_F(Cli, FitCrossValidatesWithoutTestThrows) {
   EXPECT_EQ(fitted["cross_validation"]["folds"], 5);
   EXPECT_EQ(fitted["cross_validation"]["n"], 12);
   EXPECT_TRUE(read_json(folder / "c.json")["errors"].contains("cross_validation"));
+
+  const Answer more = run("fit train.h5 --model gripper_delay --kfold 100 --json f.json");
+  ASSERT_EQ(more.code, 0) << more.err;
+  EXPECT_THAT(more.err,
+              HasSubstr("unhand: --kfold 100: 6 folds, as many as the train throws have conditions\n"));
+  EXPECT_EQ(read_json(folder / "f.json")["cross_validation"]["folds"], 6);
 }
 
 TEST_F(Cli, CompareFitsTheModels) {

@@ -140,7 +140,15 @@ TEST_F(Cli, PlansAThrowWithACard) {
     EXPECT_DOUBLE_EQ(numbers[name]["value"],
                      0.5 * (range[name]["low"].get<double>() + range[name]["high"].get<double>()));
   }
-  EXPECT_EQ(numbers["mu"]["from"], "card; sigma: assumed and card");
+  EXPECT_EQ(numbers["mu"]["from"], "card; sigma: assumed and card, with grip_force");
+  EXPECT_GT(numbers["mu"]["sigma"], 0);
+  EXPECT_TRUE(numbers["grip_force"]["sigma"].is_null()) << "it is not known exactly";
+  EXPECT_EQ(numbers["grip_force"]["sigma_in"], "mu");
+  EXPECT_EQ(numbers["pads"]["sigma"], 0);
+  EXPECT_THAT(answer.out, testing::ContainsRegex("grip_force \\[N\\] +[0-9.]+ +in mu "));
+  EXPECT_EQ(read_json(folder / "out/plan.json"), plan);
+  for (const char* words : {"# A throw into a box", "| grip_force [N] |", "![tube](tube.png)"})
+    EXPECT_THAT(content(folder / "out/report.md"), HasSubstr(words));
   EXPECT_EQ(numbers["mass"]["from"], "SKU; sigma: assumed");
   EXPECT_DOUBLE_EQ(numbers["mass"]["sigma"], 0.01 * 0.246);
   EXPECT_THAT(answer.out, HasSubstr("card's range"));
@@ -270,7 +278,13 @@ TEST_F(Cli, LearnsToThrowFlipAndGoesOnAfterAKill) {
   EXPECT_THAT(again.out, HasSubstr("41 throws recalled, 4 thrown now"));
   EXPECT_EQ(nlohmann::json::parse(content(folder / "flip.json")), flip);
 
-  expect_refusal(what + "--learner m1", 3, "session.json: /settings/learner: another session lies there");
+  expect_refusal(
+      what + "--learner m1", 2,
+      "--report: out holds the throws of a run with --learner m2 and not m1: give the same to go on");
+  expect_refusal("plan flip --target 1.3,190 --seed 3 --iterations 2 --repeats 1 --report out --learner m2",
+                 2, "a run with --target 1.2,180 and not 1.3,190: ");
+  expect_refusal(what + "--learner m2 --com-offset 0.1 --throws 4", 2,
+                 "--throws 3 and not 4, another bar (--sku");
   // A throw of another robot, under a name that this run asks for.
   const std::string kept = content(trials / "population-0002.json");
   auto foreign = nlohmann::json::parse(kept);
@@ -374,13 +388,17 @@ TEST_F(Cli, ValidateSkuAnswersWithABudget) {
   const Answer with_log =
       run("validate-sku bar.toml --card card.json --samples 200 --log " + quick + " --json b.json");
   ASSERT_EQ(with_log.code, 0) << with_log.err;
+  EXPECT_THAT(with_log.out, HasSubstr("synthetic: simulated by unhand"));
+  for (const char* column : {"lands at theta [deg]", "1 sigma theta [deg]", "mean shift theta [deg]"})
+    EXPECT_THAT(with_log.out, HasSubstr(column));
   json judged = read_json(folder / "b.json");
   EXPECT_EQ(judged["candidates"].size(), 6u);  // the campaign's conditions, three for each of two objects
   EXPECT_EQ(judged["measured"]["n"], 6);
 
   // The verdict says where it rests on nothing that the card was tried on.
-  EXPECT_THAT(answer.out, HasSubstr(out["verdict"].get<std::string>() +
-                                    ", if the card holds beyond what it was tried on: surface\n"));
+  EXPECT_THAT(answer.out,
+              HasSubstr(out["verdict"].get<std::string>() +
+                        ", provided that the card also holds for what it was not tried on: surface\n"));
   EXPECT_THAT(out["outside_valid_range"].dump(), HasSubstr("does not name those that it was fitted on"));
   json card = read_json(folder / "card.json");
   const auto outside = [&](const std::string& options) {

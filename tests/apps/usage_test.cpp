@@ -153,7 +153,11 @@ TEST_F(Cli, BadInput) {
     expect_refusal("inspect " + file + " --json a.json", 3, file + ": ");
     expect_refusal("compare " + file + " --json a.json --report r", 3, file + ": ");
   }
-  expect_refusal("compare slips.h5 --json a.json", 3, "slips.h5: /@schema: is a slip-log");
+  expect_refusal("compare slips.h5 --json a.json", 2, "slips.h5 is a slip-log, whose surfaces are compared");
+  expect_refusal("figure all --log slips.h5 --out f", 3, "`unhand compare LOG --fit --report DIR` draws");
+  expect_refusal(
+      "figure all --log " + flights + " --out f", 3,
+      "free flights, and these figures are of releases from a hand in the plane: `unhand discover");
   expect_refusal("compare " + flights + " --models sliding_pivot", 3, "free flights");
   expect_refusal("compare " + quick + " --models projectile", 3, "projectile");
   expect_refusal("import cube-tosses none.csv --out a.h5", 3, "none.csv: ");
@@ -163,6 +167,46 @@ TEST_F(Cli, BadInput) {
   const Answer slip = run("inspect slips.h5 --json slips.json");
   EXPECT_EQ(slip.code, 0) << slip.err;
   EXPECT_EQ(read_json(folder / "slips.json")["surfaces"]["felt"]["slips"], 1);
+}
+
+TEST_F(Cli, AFileOfAnotherKindIsToldFromADamagedOne) {
+  std::ofstream(folder / "card.json")
+      << R"({"schema": "model-card", "schema_version": 1, "model": "limit_surface"})";
+  std::ofstream(folder / "fit.json") << R"({"schema": "fit"})";
+  for (const char* command : {"inspect card.json", "compare card.json", "predict card.json --card card.json",
+                              "validate-sku card.json --card card.json --log card.json"})
+    EXPECT_THAT(run(command).err, testing::ContainsRegex("card.json: .*")) << command;
+  expect_refusal("inspect card.json", 3, "card.json: is not an HDF5 file; it is a model card (JSON)");
+  expect_refusal("compare fit.json", 3, "fit.json: is not an HDF5 file; it is JSON of schema 'fit'");
+  for (const std::string& command :
+       {"predict " + quick + " --card " + quick, "plan throw --target 1.3,0,-0.2 --card " + quick})
+    expect_refusal(command, 3, "quick.h5: is not a model card (JSON); it is an HDF5 file");
+  expect_refusal("validate-sku card.json --card card.json", 3,
+                 "card.json: is not a TOML file; it is a model card (JSON)");
+  expect_refusal("validate-sku " + quick + " --card card.json", 3, "is not a TOML file; it is an HDF5 file");
+  expect_refusal("import cube-tosses " + quick + " --out o.h5", 3,
+                 "line 1: is not UTF-8 text; it is an HDF5 file");
+  expect_refusal("import planar-pushes " + quick + " --out o.h5", 3,
+                 "line 1: is not UTF-8 text; it is an HDF5 file");
+}
+
+TEST_F(Cli, UnknownNamesBringTheNearest) {
+  expect_refusal("generate quick --out a.h5", 2, "no campaign is called 'quick'; did you mean 'quick12'?");
+  expect_refusal("generate quick12 --out a.h5 --effect wnid=1", 2, "did you mean 'flight.wind'?");
+  expect_refusal("generate quick12 --out a.h5 --effect stribeck.v_s=1", 2,
+                 "did you mean 'contact.stribeck.v_s'?");
+  expect_refusal("fit " + quick + " --model limit_surface --effects quadratic_drag", 2,
+                 "did you mean 'flight.quadratic_drag'?");
+  expect_refusal("figure landing_errors --log " + quick, 2,
+                 "no figure is called 'landing_errors'; did you mean 'landing-errors'?");
+  expect_refusal("figure alll --log " + quick, 2, "did you mean 'all'?");
+  expect_refusal("figure modes --throw 1 --log " + quick, 2, "no throw '1'; did you mean '001'?");
+  expect_refusal("import cube-toses a.csv --out a.h5", 2, "did you mean 'cube-tosses'?");
+}
+
+TEST_F(Cli, TheFirstParameterOfAnEffectIsNamedInTheHelp) {
+  EXPECT_THAT(std::regex_replace(run("generate --help").out, std::regex("\\s+"), " "),
+              HasSubstr("ID=value (sets the effect's first parameter)"));
 }
 
 TEST_F(Cli, UnwritableOutputs) {
@@ -419,7 +463,11 @@ TEST_F(Cli, InspectSaysWhatIsTakenForANoiseThatIsNotDeclared) {
 }
 
 TEST_F(Cli, InspectHoldsTheDeclaredNoiseAgainstTheScatter) {
-  EXPECT_THAT(run("inspect " + quick).out, Not(HasSubstr("declared too small")));
+  const Answer honest = run("inspect " + quick);
+  EXPECT_THAT(honest.out, Not(HasSubstr("declared too small")));
+  EXPECT_THAT(honest.out, testing::ContainsRegex("hand/acceleration .*e-06\\*, .*e-06\\*, .*e-06\n"))
+      << "of a brake that jumps along x and z, and does not turn";
+  EXPECT_THAT(honest.out, HasSubstr("\n*: more than is declared, but mostly motion"));
   write_changed("bold.h5", [](datasets::Throw& one) {
     for (double& sigma : one.ft->normal_force.sigma) sigma *= 0.5;
     one.mocap->pose.sigma.assign(3, 0.0);

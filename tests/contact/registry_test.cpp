@@ -92,6 +92,22 @@ TEST(Registry, RefusesParametersThatALawDoesNotHave) {
   for (const double value : {-1.0, 11.0, std::nan("")})
     EXPECT_THAT(refusal("taped", {{"glue", value}}), HasSubstr("is not in [0, 10] N"));
   EXPECT_EQ(refusal("taped", {{"glue", 10}}), "accepted");
+  EXPECT_THAT(refusal("limit_surface_quartic", {{"kappa", 9}}), testing::EndsWith("is not in [0, 3]"))
+      << "no unit";
+}
+
+// A release at t = 0 would be the answer to another question.
+TEST(Registry, ADelayThatNobodyGaveIsNotZero) {
+  ContactParameters<double> p;
+  const auto refusal = [&] { return support::refusal([&] { make_contact_model(kGripperDelay, p); }); };
+  EXPECT_EQ(refusal(),
+            "contact model \"gripper_delay\" needs open_command [s], when the gripper is told to open: it "
+            "is not given");
+  p.open_command = 0;
+  EXPECT_THAT(refusal(), HasSubstr("needs delay [s], from the command to the release: it is not given"));
+  p.delay = 0;
+  EXPECT_EQ(refusal(), "accepted");
+  for (const auto& name : contact_model_names()) EXPECT_NO_THROW(can_give(name)) << name;
 }
 
 TEST(Registry, GaugesAreOneOnTheSurface) {

@@ -15,6 +15,7 @@ TEST_P(Stick, DoesNotCreepInTenSeconds) {
   contact::ContactParameters<double> p;
   p.patch = {0.8, 0.03, 2.0 / 3, 2};
   p.open_command = 20;
+  p.delay = 0;
   const auto model = make(p);
   const double offset = 0.123456789, angle = 0.987654321;
   const release::ReleaseProblem<double> problem{

@@ -1,5 +1,6 @@
 // Tables of text as spreadsheets and recorders write them.
 #include "datasets/csv.hpp"
+#include "datasets/file_kind.hpp"
 #include "datasets/near_miss.hpp"
 
 #include "log_samples.hpp"
@@ -80,6 +81,26 @@ TEST(Csv, UnknownNames) {
               testing::EndsWith(", ...)"));
   EXPECT_EQ(unknown_name("no 'flight.q'", "flight.q", {"sensor.mass", "flight.wind", "flight.drift"}),
             "no 'flight.q' (there are: flight.wind, flight.drift)");
+  const std::vector<std::string> ids{"sensor.mass", "flight.wind", "hand.lag", "arm.lag"};
+  EXPECT_EQ(unknown_name("no 'wind'", "wind", ids), "no 'wind'; did you mean 'flight.wind'?");
+  EXPECT_EQ(unknown_name("no 'widn'", "widn", ids), "no 'widn'; did you mean 'flight.wind'?");
+  EXPECT_THAT(unknown_name("no 'lag'", "lag", ids), testing::HasSubstr("there are: "))
+      << "of which of the two?";
+  EXPECT_EQ(unknown_name("no '1'", "1", {"001", "010"}), "no '1'; did you mean '001'?");
+  EXPECT_EQ(unknown_name("no '0'", "0", {"000", "toss-0"}), "no '0'; did you mean '000'?");
+  EXPECT_EQ(unknown_name("no '2'", "2", {"001", "010"}), "no '2' (there are: 001, 010)");
+}
+
+TEST(FileKind, IsToldByTheFirstBytes) {
+  EXPECT_EQ(kind_of("\x89HDF\r\n\x1a\n..."), "an HDF5 file");
+  EXPECT_EQ(kind_of("{\n \"schema\": \"model-card\","), "a model card (JSON)");
+  EXPECT_EQ(kind_of("\n{\"schema\" :\"fit\"}"), "JSON of schema 'fit'");
+  for (const char* json : {"{}", "{\"a\": 1}", "{\"schema\"", "{\"schema\": 3}", "{\"schema\": \"fi"})
+    EXPECT_EQ(kind_of(json), "JSON") << json;
+  for (const char* other : {"", " \n", "name = 'bar'\n", "[table]\n", "t,x\n1,2\n"})
+    EXPECT_EQ(kind_of(other), "");
+  EXPECT_EQ(with_kind("is no log", kind_of("{}")), "is no log; it is JSON");
+  EXPECT_EQ(with_kind("is no log", ""), "is no log");
 }
 
 }  // namespace

@@ -72,6 +72,32 @@ NoiseSummary force_noise(double noise, double rate, double declared = 0.05) {
   return *std::ranges::find_if(s.noise, [](const auto& n) { return n.dataset == "ft/normal_force"; });
 }
 
+// A phone that is shaken, falls for a second and is caught: its noise is that of the fall.
+TEST(Summary, ScatterOfAPhoneIsThatOfItsFalls) {
+  std::mt19937_64 random(6);
+  std::normal_distribution<double> normal;
+  ThrowLog log = planar_log();
+  log.throws.resize(1);
+  Throw& toss = log.throws.front();
+  toss.hand.reset(), toss.ft.reset(), toss.mocap.reset(), toss.landing.reset(), toss.detach_time.reset();
+  toss.free_flight = {1.0, 2.0};
+  ImuLog& felt = toss.imu.emplace();
+  constexpr std::size_t kRows = 600;
+  felt.time = clock_of(kRows, 200);
+  felt.specific_force = {kRows, 3, {}, {0.02, 0.02, 0.02}};
+  for (std::size_t i = 0; i < kRows; ++i)
+    for (int axis = 0; axis < 3; ++axis)
+      felt.specific_force.data.push_back((std::abs(felt.time(i) - 1.5) <= 0.5 ? 0.02 : 1.0) * normal(random));
+  const LogSummary s = summarise(log);
+  const auto noise =
+      std::ranges::find_if(s.noise, [](const auto& n) { return n.dataset == "imu/specific_force"; });
+  ASSERT_NE(noise, s.noise.end());
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(noise->scatter.at(axis), 0.02, 3 * 0.02 * 1.07 / std::sqrt(200.0));  // of 200 samples
+    EXPECT_FALSE(noise->too_small.at(axis));
+  }
+}
+
 TEST(Summary, ScatterTellsADeclaredNoiseThatIsTooSmall) {
   constexpr double kSure = 3 * 1.07 / 24.4;  // of 600 samples
   for (double ratio : {0.5, 1.0, 1.4, 2.0}) {

@@ -152,7 +152,9 @@ TEST(SyntheticCampaign, RefusesWhatMakesNoSense) {
   using testing::AllOf, testing::HasSubstr;
   EXPECT_THAT([] { campaign_design("batch-180"); },
               testing::ThrowsMessage<std::invalid_argument>(
-                  AllOf(HasSubstr("batch-180"), HasSubstr("batch180"), HasSubstr("quick12"))));
+                  AllOf(HasSubstr("batch-180"), HasSubstr("did you mean 'batch180'?"))));
+  EXPECT_THAT([] { campaign_design("grasps"); }, testing::ThrowsMessage<std::invalid_argument>(
+                                                     AllOf(HasSubstr("batch180"), HasSubstr("quick12"))));
   EXPECT_THROW(loaded_bar("too far", 0.3), std::invalid_argument);
   EXPECT_THROW(generate_throw(campaign_design("quick12"), 1, 12), std::out_of_range);
   EXPECT_THROW(generate_throw(campaign_design("quick12"), 1, -1), std::out_of_range);

@@ -388,8 +388,13 @@ TEST(ReleaseThrow, TakesModelCards) {
   card.effects = {"release.hand_tracking_lag"};
   EXPECT_THROW(release_card(card, "card.json"), datasets::CardError);
   card.effects.clear();
-  card.model = "gripper_delay";
-  EXPECT_THROW(release_card(card, "card.json"), datasets::CardError);
+  for (const char* model : {"gripper_delay", "limit_surface_naive", "projectile", "convex_quartic"}) {
+    card.model = model;
+    EXPECT_THAT(
+        [&] { release_card(card, "card.json"); },
+        testing::ThrowsMessage<datasets::CardError>(testing::HasSubstr(fmt::format(
+            "card.json: /model: '{}' does not say how the pads let go (there are: sliding_pivot, ", model))));
+  }
 }
 
 datasets::ModelCard quartic(double kappa) {
@@ -538,6 +543,9 @@ TEST(ReleaseCard, CountsWhatScattersFromThrowToThrow) {
   p.card = release_card(card, "card.json");
   EXPECT_DOUBLE_EQ(p.card.dead_time.sigma, 0.005);  // 3, 4, 5
   EXPECT_EQ(p.card.origins.at("dead_time").sigma, NumberSource::parameter);
+  EXPECT_THAT(p.card.origins.at("dead_time").with, testing::ElementsAre("dead_time_deviation"));
+  EXPECT_THAT(p.card.origins.at("mu").with, testing::IsEmpty());
+  EXPECT_THAT(p.card.origins.at("mu").counted_in, testing::IsEmpty());
   const auto after = release_spread(p);
   ASSERT_TRUE(before && after);
   EXPECT_EQ(after->miss, before->miss);
@@ -562,6 +570,8 @@ TEST(ReleaseCard, TakesTheGripperThatItsThrowsHad) {
   EXPECT_EQ(seen.origins.at("grip_force").value, NumberSource::range);
   EXPECT_EQ(seen.origins.at("mu").value, NumberSource::parameter);
   EXPECT_FALSE(seen.origins.contains("dead_time"));  // nothing tells it
+  EXPECT_THAT(seen.origins.at("mu").with, testing::ElementsAre("grip_force"));
+  EXPECT_EQ(seen.origins.at("grip_force").counted_in, "mu");
   card.valid_range["dead_time"] = {0.006, 0.008, "s"};
   card.valid_range["shape"] = {1.9, 2.1, "-"};
   const ReleaseCard whole = release_card(card, "card.json");
