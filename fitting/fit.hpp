@@ -135,7 +135,8 @@ struct ThrowFit {
 /// A fit: values, covariance, what is open, misfit by channel. Without an answer the values are the start's,
 /// the sigmas infinite, and `covariance`, `own_spread`, `open`, `misfit` and `group_weight` empty.
 struct FitResult {
-  FitOutcome outcome{};                 ///< only `converged` and `iterations_spent` are answers
+  /// Only `converged` and `iterations_spent` are answers, and a fit that was never made is none.
+  FitOutcome outcome{FitOutcome::not_solved};
   std::string message;                  ///< in words
   Share share{Share::train};            ///< of the log that was fitted to
   std::vector<FittedUnknown> campaign;  ///< in the problem's order
