@@ -313,6 +313,30 @@ TEST(Selection, AnEffectIsJudgedAgainBesideTheGiveThatWasFittedAlong) {
   EXPECT_EQ(stage.problem.options().effects, std::vector<std::string>{kPads});
 }
 
+// Fitted along while something else was missing, a give may end at none, where no derivative leads away from.
+TEST(Selection, AGiveThatIsStuckAtNoneBeginsAnew) {
+  experiment::CampaignDesign design = experiment::campaign_design("quick12");
+  design.effects = {{"contact.pad_compliance.compliance", 1.5e-7}};
+  const auto log = experiment::generate_campaign(design, 1);
+  DiscoverOptions options = support::loop_options();
+  options.campaign.effects = {kPads};
+  Stage stage{CampaignProblem(log, "synthetic", options.campaign), {}, {}, {}};
+  EXPECT_FALSE(stage.is_fitted());
+  DiscoverOptions without_give = options;
+  std::vector<double> start = stage.problem.start();
+  for (std::size_t k = 0; k < start.size(); ++k)
+    if (const std::string& name = stage.problem.campaign()[k].name; name.starts_with(kPads)) {
+      without_give.fit.fixed.push_back(name);
+      if (name.ends_with("compliance")) start[k] = 0;
+    }
+  solve(stage, without_give, start);
+  ASSERT_TRUE(stage.solved());
+  ASSERT_EQ(give_of(stage), 0);
+  fit_give_along(stage, options);
+  const double give = 2 * design.patch.mu * design.opening.grip_force * 1.5e-7;
+  EXPECT_NEAR(give_of(stage), give, 0.3 * give);
+}
+
 // Pads that stick and pads that open late differ by less than what all pads give.
 TEST(Selection, StickingPadsAndLateOnesAreToldApartBesidePadsThatGive) {
   const std::string adhesion = "contact.adhesion", delay = "release.opening_delay";
