@@ -94,14 +94,6 @@ Law<S> law_between(const FrictionLimits<S>& limits, const Scene<S>& scene, const
           S(0)};
 }
 
-/// margin() of a demand's square against a limit's; where pads can give nothing and nothing is demanded of
-/// them, as at the end of a release without torque, it suffices.
-template <class S>
-S shortfall(const S& demand_squared, const S& limit_squared) {
-  if (value_of(demand_squared) == 0 && value_of(limit_squared) == 0) return S(-1);
-  return margin(demand_squared, limit_squared);
-}
-
 /// The rotation that follows when friction is short of the torque that it takes: the object lags behind the
 /// hand.
 constexpr Rotation lagging(double demanded_torque) { return demanded_torque > 0 ? kNegative : kPositive; }
@@ -115,20 +107,9 @@ constexpr double kTurned = 0.1;  // of the time in which a brake turns or stops 
 
 SlidingPivot::SlidingPivot(const Patch<Dual>& patch, SlideEnd slide_end,
                            const FrictionVariation<Dual>& variation)
-    : limits_double_(values(patch), values(variation)),
-      limits_dual_(patch, variation),
-      slide_end_(slide_end) {
-  validate(limits_double_.patch());
+    : limits_{{values(patch), values(variation)}, {patch, variation}}, slide_end_(slide_end) {
+  validate(limits_.value.patch());
   validate(variation);
-}
-
-template <>
-const FrictionLimits<double>& SlidingPivot::limits<double>() const {
-  return limits_double_;
-}
-template <>
-const FrictionLimits<Dual>& SlidingPivot::limits<Dual>() const {
-  return limits_dual_;
 }
 
 std::string_view SlidingPivot::mode_name(int mode) const {
@@ -176,7 +157,7 @@ void SlidingPivot::guards_(const Phase& phase, const SceneSource& source, const 
                            S* g) const {
   const int mode = phase.mode;
   const Scene<S> scene = source.scene(phase.window, t);
-  const FrictionLimits<S>& limits = this->limits<S>();
+  const FrictionLimits<S>& limits = limits_.of<S>();
   const Stance<S> stands = stance(scene, y);
   const Law<S> now = law(mode, limits, scene, y, stands.r);
   const S force_limit = limits.slipping(scene.normal_force, y.slip, y.spin),
@@ -184,7 +165,7 @@ void SlidingPivot::guards_(const Phase& phase, const SceneSource& source, const 
   if (rotation_of(mode) != kLocked) {
     g[kRotationGuard] = sign_of(rotation_of(mode)) * y.spin;
   } else {
-    g[kRotationGuard] = shortfall(S(now.wrench.tau * now.wrench.tau), S(torque_limit * torque_limit));
+    g[kRotationGuard] = margin(S(now.wrench.tau * now.wrench.tau), S(torque_limit * torque_limit));
   }
   if (mode == kSlideBetween) {
     const S plus = law(mode_of(kSlide, kPositive), limits, scene, y, stands.r).spin_acceleration;
@@ -193,9 +174,9 @@ void SlidingPivot::guards_(const Phase& phase, const SceneSource& source, const 
     const S torque = scene.body.inertia * drive;
     g[kRotationGuard] = torque / (torque_limit + std::abs(value_of(torque)) + 1e-300);
     const S demand = law(mode_of(kSlide, kLocked), limits, scene, y, stands.r).wrench.tau;
-    g[kTorqueSuffices] = shortfall(S(demand * demand), S(torque_limit * torque_limit));
+    g[kTorqueSuffices] = margin(S(demand * demand), S(torque_limit * torque_limit));
   }
-  const S force = shortfall(dot(now.carrying_force, now.carrying_force), S(force_limit * force_limit));
+  const S force = margin(dot(now.carrying_force, now.carrying_force), S(force_limit * force_limit));
   if (translation_of(mode) == kBrake) {
     const State<S, 6> rate = relative_rate(scene, y, stands, now.wrench);
     const S speed = norm(y.slip);
@@ -208,13 +189,13 @@ void SlidingPivot::guards_(const Phase& phase, const SceneSource& source, const 
 
 template <class S>
 Wrench<S> SlidingPivot::wrench_(int mode, const Scene<S>& scene, const Relative<S>& y) const {
-  return law(mode, limits<S>(), scene, y, lever(scene, y)).wrench;
+  return law(mode, limits_.of<S>(), scene, y, lever(scene, y)).wrench;
 }
 
 template <class S>
 void SlidingPivot::rate_(int mode, const Scene<S>& scene, const Relative<S>& y, State<S, 6>& dy) const {
   const Stance<S> stands = stance(scene, y);
-  const Law<S> now = law(mode, limits<S>(), scene, y, stands.r);
+  const Law<S> now = law(mode, limits_.of<S>(), scene, y, stands.r);
   if (translation_of(mode) == kStuck) {
     dy = {S(0), S(0), y.spin, S(0), S(0), now.spin_acceleration};
   } else {
@@ -242,7 +223,7 @@ struct SlidingPivot::Instant {
 /// = 0 attracts from both sides.
 int SlidingPivot::consistent_mode(const Scene<double>& scene, const Relative<double>& y, int before,
                                   const Excluded& excluded) const {
-  const FrictionLimits<double>& limits = limits_double_;
+  const FrictionLimits<double>& limits = limits_.value;
   const double force_limit = limits.slipping(scene.normal_force, y.slip, y.spin),
                torque_limit = limits.length(scene.normal_force) * force_limit;
   const bool slipping = y.slip.x != 0 || y.slip.z != 0;
@@ -365,7 +346,7 @@ void SlidingPivot::come_to_rest(const Phase& brake, const SceneSource& source, I
   const S turning = locked ? S(0) : S(1.0 / I), share = locked ? S(0) : S(m / (I + m * dot(r, r)));
   const auto inverse = [&](const Vec2<S>& x) { return m * (x - (share * dot(q, x)) * q); };  // W⁻¹ x
 
-  const S f = limits<S>().slipping(scene.normal_force, y.slip, y.spin), speed = norm(y.slip);
+  const S f = limits_.of<S>().slipping(scene.normal_force, y.slip, y.spin), speed = norm(y.slip);
   const Vec2<S> n = (1.0 / speed) * y.slip, mobile = (1.0 / m) * n + (turning * dot(q, n)) * q;  // W n
   const Vec2<S> slip_rate{dy[3], dy[4]}, b = slip_rate + f * mobile;
   const S decay = f * f * dot(n, mobile) - dot(b, inverse(b));
