@@ -208,13 +208,20 @@ template <class Shape>
 template <class S>
 Entry<S, 6> LimitSurface<Shape>::membership_(int mode, const Window& window, const SceneSource& source,
                                              const S& t, const Relative<S>& y) const {
+  // What a stop at once takes has passed since t.
+  const auto moving = [&] {
+    Entry<S, 6> next = slip_or_rest(window, source, t, y);
+    next.lead = next.t - t;
+    next.at_event = y.state();
+    return next;
+  };
   const bool start = mode < 0 && !slips(y);
   if (is_elastic(mode) || (start && is_elastic(kHeld))) {
     const Scene<S> scene = source.scene(window, t);
     if (value_of(margin_of(wrench_(kHeld, scene, y), scene)) < 0) return {kHeld, t, y.state(), S(0)};
-    return slip_or_rest(window, source, t, y);
+    return moving();
   }
-  if (slips(y)) return slip_or_rest(window, source, t, y);
+  if (slips(y)) return moving();
   if (mode == kSlip) return {kSlip, t, y.state(), S(0)};
   const Scene<double> scene = values(source.scene(window, t));
   if (margin_of(sticking_wrench(scene, values(y)), scene) < 0) return {stick(), t, y.state(), S(0)};

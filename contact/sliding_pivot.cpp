@@ -391,7 +391,7 @@ Entry<S, 6> SlidingPivot::membership_(int mode, const Window& window, const Scen
                                       const Relative<S>& y) const {
   Instant<S> now{t, y};
   const int next = enter(window, source, mode < 0 ? kStuck : translation_of(mode), {}, now);
-  return {next, now.t, now.y.state(), S(0)};
+  return {next, now.t, now.y.state(), S(now.t - t), y.state()};  // what a stop at once takes has passed
 }
 
 template class ContactModelFrom<SlidingPivot>;
