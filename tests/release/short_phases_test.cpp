@@ -1,6 +1,8 @@
-// Phases of next to no length: onsets and stops beside a time event.
+// Phases of next to no length: onsets and stops beside a time event, brakes of light objects, pads without
+// friction that nothing is asked of.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -90,6 +92,73 @@ TEST(ShortPhases, AStopBesideATimeEventLeavesNoHole) {
     const double rest = stops(0.1, 0.5);
     for (const double before : {1e-7, 3e-8, 1.5e-8, 1e-8, 7e-9, 3e-9, 1e-9, 1e-11, 1e-13, 0.0, -1e-9})
       stops(rest - before, 0.5);
+  }
+}
+
+// A brake across the lever turns a light object at once, in nanoseconds, and only then is on its way to rest:
+// it is not at rest, and its energy not gone, by then.
+TEST(ShortPhases, ABrakeOfALightObjectClosesItsEnergy) {
+  constexpr double kAcross[] = {1e-2, 1e-4, 1e-5, 1e-6, 1e-7};  // I/(m l²)
+  int brakes = 0;
+  for (const double ratio : kAcross) {
+    std::mt19937_64 random(5);
+    for (int k = 0; k < 60; ++k) {
+      const auto thrown = support::random_throw(random, 1.0);
+      const double lever = thrown.grasp.com_offset;
+      if (lever < 0.02) continue;
+      const auto law = contact::make_contact_model("sliding_pivot", support::parameters_of(thrown));
+      auto problem = support::problem_of(thrown, *law);
+      problem.body.inertia = ratio * problem.body.mass * lever * lever;
+      const auto result = release::simulate_release(problem, {.ledger = true});
+      ASSERT_EQ(result.outcome, release::ReleaseOutcome::detached) << ratio << ' ' << k;
+      const auto& e = result.ledger;
+      const double turned_over = std::abs(e.mechanical_change) + std::abs(e.hand_work) +
+                                 std::abs(e.linear_friction) + std::abs(e.torsional_friction) +
+                                 e.nonphysical_work;
+      // The integrator's 1e-8; the lighter, the faster it sways across the lever while it slides.
+      EXPECT_LT(std::abs(e.residual), 1e-6 * turned_over) << ratio << ' ' << k;
+      brakes += std::any_of(result.events.begin(), result.events.end(),
+                            [](const auto& event) { return event.mode_after >= 6 && event.mode_after <= 8; });
+    }
+  }
+  EXPECT_GE(brakes, 30);
+}
+
+// Nothing is asked of the pads while the hand falls freely without turning, so neither of the two limits nor
+// a sign of the spin is told by what is demanded at the instant where that ends.
+TEST(ShortPhases, PadsWithoutFrictionBesideAHandInFreeFall) {
+  std::mt19937_64 random(17);
+  const auto uniform = [&](double a, double b) {
+    return std::uniform_real_distribution<double>(a, b)(random);
+  };
+  const auto some = [&](double a, double b) { return uniform(0, 1) < 0.5 ? 0.0 : uniform(a, b); };
+  for (int k = 0; k < 500; ++k) {
+    std::vector<release::HandSegment> stretches;
+    double t = 0;
+    for (int i = 0; i < 3; ++i) {
+      t += uniform(0.003, 0.03);
+      stretches.push_back({t, {some(-9, 9), -9.81 + some(-9, 9), some(-50, 50)}});
+      if (uniform(0, 1) < 0.5) stretches.back() = {t, {0, -9.81, some(-50, 50)}};
+      if (uniform(0, 1) < 0.3)
+        stretches.back().jerk = {uniform(-100, 100), uniform(-100, 100), uniform(-500, 500)};
+    }
+    stretches.push_back({0.3, {0, -9.81, some(-5, 5)}});
+    const dynamics::Twist<double> twist{uniform(-2, 2), uniform(-2, 2), some(-3, 3)};
+    const double theta = some(-2, 2), lever = some(-0.15, 0.15), angle = some(-3, 3);
+    const auto hand = release::PolynomialHand::segments(0.0, {0.5, 0.9, theta}, twist, stretches);
+    const contact::ProfileNormalForce force({0.02, 60, uniform(0, 0.02), uniform(0.02, 0.1), 1});
+    contact::ContactParameters<double> pads;
+    pads.patch = {0.0, 0.0106};
+    const auto law = contact::make_contact_model("sliding_pivot", pads);
+    const auto result = release::simulate_release<double>(
+        {hand, force, *law, {0.246, 2.4e-3}, dynamics::level_gravity(9.81), {lever, angle}});
+    ASSERT_EQ(result.outcome, release::ReleaseOutcome::detached)
+        << k << ' ' << dynamics::to_string(result.integration);
+    EXPECT_NEAR(result.detach.twist.omega, twist.omega, 1e-7) << k;
+    EXPECT_NEAR(result.detach.twist.vx, twist.vx - twist.omega * lever * std::sin(theta + angle), 1e-6) << k;
+    EXPECT_NEAR(result.detach.twist.vz,
+                twist.vz + twist.omega * lever * std::cos(theta + angle) - 9.81 * result.detach.time, 1e-6)
+        << k;
   }
 }
 
