@@ -47,16 +47,48 @@ Rest free_disc(double k, double slip) {
 }
 
 /// When a held object first moves under a linear release N₀ (1 − t/T), T = 0.1 s, in a hand with a constant
-/// acceleration.
-double onset(const dynamics::Acceleration<double>& a, double lever) {
+/// acceleration; and its spin at detach. `softness`: γ of the patch.
+struct Onset {
+  double time{std::nan("")}, omega{};
+};
+Onset onset(const dynamics::Acceleration<double>& a, double lever, double softness = 0) {
   const auto hand = support::accelerating_hand(a, 0.2);
   const contact::ProfileNormalForce force(contact::OpeningProfile<double>{0.0, 10, 0.0, 0.1, 1.0});
-  const auto model = contact::make_contact_model("sliding_pivot", pads(0.5, 0.03));
+  auto p = pads(0.5, 0.03);
+  p.variation.softness = softness;
+  p.variation.reference_force = 10;
+  const auto model = contact::make_contact_model("sliding_pivot", p);
   const release::ReleaseProblem<double> problem{hand,       force, *model, {0.5, 1e-3}, {0, 0},
                                                 {lever, 0}, 0.0,   {},     0.0};
-  for (const auto& event : simulate_release(problem, tight()).events)
-    if (event.kind == dynamics::EventKind::guard) return event.t;
-  return std::nan("");
+  const auto result = simulate_release(problem, tight());
+  for (const auto& event : result.events)
+    if (event.kind == dynamics::EventKind::guard) return {event.t, result.detach.twist.omega};
+  return {};
+}
+
+/// A bar that pivots on two small, strong pads of τ_max = 0.05 N m, f_N = 20 N: its spin after 80 ms, and the
+/// friction's torque at 40 ms, over τ_max, with the √(1 − ρ²) of the force that then carries the contact
+/// point. (tests/truth/pivot_limit_test.cpp)
+struct Pivot {
+  double omega{}, torque{}, closed_form{};
+};
+Pivot strong_pivot(const char* law, double mu) {
+  const double force_limit = 2 * mu * 20, torque_limit = 0.05;
+  const support::SwayingHand hand({{{0, 0.4, 3, 0, 1, 0}, {0, 0.5, 6, 0, 1, 0}, {0, 1, -20, 0, 1, 0}}}, 0.08);
+  const support::ConstantForce force(20);
+  const auto model = contact::make_contact_model(law, pads(mu, 1.5 * torque_limit / force_limit));
+  const release::ReleaseProblem<double> problem{hand, force, *model, {0.2, 1.2e-3}, {0, -9.81}, {0.12, 0.1},
+                                                0.0,  {},    0.0};
+  const auto result = simulate_release(problem, tight(1e-9, 1e-11));
+  const auto s = sample_release(problem, result, 0.04);
+  const auto& [m, I] = problem.body;
+  const dynamics::Vec2<double> r{s.pose.x - s.hand.pose.x, s.pose.z - s.hand.pose.z},
+      a{s.hand.acceleration.ax, s.hand.acceleration.az + 9.81};
+  const double alpha = (m * (r.z * a.x - r.x * a.z) + s.wrench.tau) / (I + m * dot(r, r)),
+               square = s.twist.omega * s.twist.omega;
+  const double rho =
+      m / force_limit * std::hypot(a.x - alpha * r.z - square * r.x, a.z + alpha * r.x - square * r.z);
+  return {result.detach.twist.omega, std::abs(s.wrench.tau) / torque_limit, std::sqrt(1 - rho * rho)};
 }
 
 /// 0.2 kg held level on a lever of 1 cm, which is the patches' length as well; two pads of μ 0.5 open from 30
@@ -97,9 +129,20 @@ Section friction_and_release() {
   out.row("free disc, k = 0.6: final slip ratio", "F/ε = T/k", 0.404383, free_disc(0.6, 0.4).ratio, 2e-6);
   // f_max = 10 N on 0.5 kg; τ_max = 0.2 N m on I = 1e-3 kg m² without a lever
   out.row("linear release, slides at T (1 − f/f₀) [s]", "closed form", 0.1 * (1 - 0.5 * 8 / 10.0),
-          onset({8, 0, 0}, 0), 1e-9);
+          onset({8, 0, 0}, 0).time, 1e-9);
   out.row("linear release, pivots at T (1 − τ/τ₀) [s]", "closed form", 0.1 * (1 - 0.1 / 0.2),
-          onset({0, 0, 100}, 0), 1e-9);
+          onset({0, 0, 100}, 0).time, 1e-9);
+  const double soft = 1.0 / 3, begun = 0.1 * (1 - std::pow(0.5, 1 / (1 + soft)));
+  const Onset pivots = onset({0, 0, 100}, 0, soft);
+  out.row("a soft patch, γ = 1/3, pivots at T (1 − (τ/τ₀)^(1/(1+γ))) [s]", "closed form", begun, pivots.time,
+          1e-9);
+  out.row("and detaches with ω = α t₁ + τ₀ T/(I (2+γ)) (1 − t₁/T)^(2+γ) [rad/s]", "closed form",
+          100 * begun + 200 * 0.1 / (2 + soft) * std::pow(1 - begun / 0.1, 2 + soft), pivots.omega, 1e-7);
+  const Pivot surface = strong_pivot("limit_surface", 1);
+  out.row("the ellipsoid pivots about small, strong pads (f_max = 40 N, ρ = f/f_max): torque over τ_max",
+          "√(1 − ρ²), up to ρ² L/l", surface.closed_form, surface.torque, 1e-6);
+  out.row("and at 320 N: its spin after 80 ms, against the sliding pivot's [rad/s]", "limit ρ → 0",
+          strong_pivot("sliding_pivot", 8).omega, strong_pivot("limit_surface", 8).omega, 1e-4);
   const auto bar = level_bar();
   out.row("a level bar's force and torque reach their limits together: v_z at detach, −g τ/2 [m/s]",
           "closed form, `sliding_pivot`", -9.81 * 0.1 * 0.2 * 9.81 / 30 / 2, bar.vz, 1e-9);

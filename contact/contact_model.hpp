@@ -146,7 +146,9 @@ State<S, 6> relative_rate(const Scene<S>& scene, const Relative<S>& y, const Wre
 }
 
 /// f_p: the wrench about the patch that makes the material point there and the object's rotation follow the
-/// hand (no slip acceleration). [LiuBillard2025] Eq. 19, 20 with the signs of dynamics/frames.hpp.
+/// hand (no slip acceleration). [LiuBillard2025] Eq. 19, 20 with the signs of dynamics/frames.hpp. The third
+/// row of Eq. 20, with Eq. 19 put in, is τ_p = (I + m l²) α_H − m [z_r ax_H − x_r (az_H + g)]: the
+/// centripetal terms cancel.
 template <class S>
 Wrench<S> sticking_wrench(const Scene<S>& scene, const Relative<S>& y) {
   const Vec2<S> r = lever(scene, y);
@@ -272,10 +274,12 @@ class ContactModelFrom : public ContactModel {
 };
 
 /// Signed margin of a demand against a limit, both >= 0: (d² − l²)/(d² + l²), in [−1, 1], zero where they are
-/// equal. Takes the squares, so that it is smooth where the demand vanishes.
+/// equal. Takes the squares, so that it is smooth where the demand vanishes. Where pads can give nothing and
+/// nothing is demanded of them, as at the end of a release without torque, it suffices: −1.
 template <class S>
 S margin(const S& demand_squared, const S& limit_squared) {
-  return (demand_squared - limit_squared) / (demand_squared + limit_squared + 1e-300);
+  const S limit = limit_squared + 1e-300;
+  return (demand_squared - limit) / (demand_squared + limit);
 }
 
 }  // namespace unhand::contact

@@ -20,8 +20,8 @@ struct FrictionVariation {
   S softness{};              ///< γ: a = a₀ (f_N/f₀)^γ, soft finger [XydasKao1999] [-]
   double reference_force{};  ///< f₀ [N]
   S pressure_exponent{};     ///< s: pressure ∝ (1 − (r/a)²)^s at the same L = c a [-]; of the disc alone
-  S compliance{};            ///< tangential, of the pads together [m/N]; of limit surfaces alone
-  S loss_time{};             ///< of the compliance [s]; likewise
+  S compliance{};    ///< tangential, of the pads together [m/N], 0 or >= 1e-10; of limit surfaces alone
+  S loss_time{};     ///< of the compliance [s]; likewise
   S adhesion{};      ///< f_adh: limits μ (f_N + f_adh) of a pad [N]; AdhesiveForce's, no law reads it
   S parting_time{};  ///< from f_N = 0 until the adhesion has died [s]; likewise
 };
@@ -49,7 +49,7 @@ FrictionVariation<Dual> constant(const FrictionVariation<S>& v) {
 FrictionVariation<double> values(const FrictionVariation<Dual>& v);
 
 /// Throws std::invalid_argument, naming parameter, value and range, outside of those of friction_effects()
-/// (EffectParameter::least where there is one), and unless f₀ > 0 where the patch is soft.
+/// (EffectParameter::least and `smallest` where there are), and unless f₀ > 0 where the patch is soft.
 void validate(const FrictionVariation<Dual>& v);
 
 /// contact.stribeck, contact.viscous, contact.soft_patch_radius, contact.pressure_profile,

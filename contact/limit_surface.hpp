@@ -66,7 +66,7 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>>, public 
       : LimitSurface(name, patch, Shape{}) {}
 
   std::string_view name() const override { return name_; }
-  int mode_count() const override { return pads_dual_ ? 3 : 2; }
+  int mode_count() const override { return pads_.dual ? 3 : 2; }
   std::string_view mode_name(int mode) const override {
     return mode == kSlip ? "slip" : is_elastic(mode) ? "elastic" : "stick";
   }
@@ -77,12 +77,12 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>>, public 
   int guard_count(int) const override { return 1; }
   dynamics::Guard guard(int mode, int) const override;
   bool is_homogeneous(int mode) const override { return mode == kSlip; }
-  bool needs_hold() const override { return pads_double_.has_value(); }
-  double spin_length() const override { return limits_double_.patch().length(); }
-  bool gives_at_points() const override { return kDisc && pads_double_.has_value(); }
+  bool needs_hold() const override { return pads_.value.has_value(); }
+  double spin_length() const override { return limits_.value.patch().length(); }
+  bool gives_at_points() const override { return kDisc && pads_.value.has_value(); }
   /// The friction limits that the points share.
-  const FrictionLimits<double>& point_limits(double) const override { return limits_double_; }
-  const FrictionLimits<Dual>& point_limits(const Dual&) const override { return limits_dual_; }
+  const FrictionLimits<double>& point_limits(double) const override { return limits_.value; }
+  const FrictionLimits<Dual>& point_limits(const Dual&) const override { return limits_.dual; }
 
   /// ContactModel's functions for either scalar, made virtual by ContactModelFrom.
   /// @{
@@ -102,14 +102,10 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>>, public 
   static constexpr int kHeld = 0, kSlip = 1, kStickAgain = 2;
   /// Whether the shape says where the pressure is.
   static constexpr bool kDisc = PressedShape<Shape>;
-  bool is_elastic(int mode) const { return mode == kHeld && pads_dual_; }
+  bool is_elastic(int mode) const { return mode == kHeld && pads_.dual; }
   /// The mode of an object that came to rest on the pads.
-  int stick() const { return pads_dual_ ? kStickAgain : kHeld; }
+  int stick() const { return pads_.dual ? kStickAgain : kHeld; }
 
-  template <class S>
-  const FrictionLimits<S>& limits() const;
-  template <class S>
-  const PadCompliance<S>& pads() const;
   template <class S>
   S growth(const Scene<S>&, const Relative<S>&, const State<S, 6>& rate) const;
   template <class S>
@@ -117,18 +113,16 @@ class LimitSurface final : public ContactModelFrom<LimitSurface<Shape>>, public 
   template <class S>
   Entry<S, 6> come_to_rest(const Window&, const SceneSource&, const S& t, const Relative<S>&) const;
   template <class S>
-  Entry<S, 6> let_go(const Window&, const SceneSource&, const S& t, const Relative<S>&) const;
+  Entry<S, 6> slip_or_rest(const Window&, const SceneSource&, const S& t, const Relative<S>&) const;
   template <class S>
   Entry<S, 6> onset(const Window&, const SceneSource&, const S& t, const Relative<S>&,
                     bool at_the_surface) const;
 
   std::string name_;
   Shape shape_;
-  FrictionLimits<double> limits_double_;
-  FrictionLimits<Dual> limits_dual_;
-  std::optional<LocalFriction> local_;  ///< of a disc, where friction depends on the speed
-  std::optional<PadCompliance<double>> pads_double_;
-  std::optional<PadCompliance<Dual>> pads_dual_;
+  dynamics::OfBoth<FrictionLimits> limits_;
+  std::optional<LocalFriction> local_;         ///< of a disc, where friction depends on the speed
+  dynamics::OfBoth<OptionalCompliance> pads_;  ///< none that are rigid
 };
 
 extern template class ContactModelFrom<LimitSurface<Ellipsoid>>;

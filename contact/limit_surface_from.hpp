@@ -48,34 +48,12 @@ using namespace limit_surface_detail;
 template <class Shape>
 LimitSurface<Shape>::LimitSurface(std::string_view name, const Patch<Dual>& patch, Shape shape,
                                   const FrictionVariation<Dual>& variation)
-    : name_(name),
-      shape_(std::move(shape)),
-      limits_double_(values(patch), values(variation)),
-      limits_dual_(patch, variation) {
-  validate(limits_double_.patch());
+    : name_(name), shape_(std::move(shape)), limits_{{values(patch), values(variation)}, {patch, variation}} {
+  validate(limits_.value.patch());
   validate(variation);
-  pads_double_ = pad_compliance(limits_double_);
-  pads_dual_ = pad_compliance(limits_dual_);
+  pads_ = {pad_compliance(limits_.value), pad_compliance(limits_.dual)};
   if constexpr (kDisc)
-    if (limits_dual_.speed().any()) local_.emplace(shape_.exponent(), shape_.torque_factor());
-}
-
-template <class Shape>
-template <class S>
-const FrictionLimits<S>& LimitSurface<Shape>::limits() const {
-  if constexpr (std::is_same_v<S, double>)
-    return limits_double_;
-  else
-    return limits_dual_;
-}
-
-template <class Shape>
-template <class S>
-const PadCompliance<S>& LimitSurface<Shape>::pads() const {
-  if constexpr (std::is_same_v<S, double>)
-    return *pads_double_;
-  else
-    return *pads_dual_;
+    if (limits_.dual.speed().any()) local_.emplace(shape_.exponent(), shape_.torque_factor());
 }
 
 template <class Shape>
@@ -88,12 +66,12 @@ dynamics::Guard LimitSurface<Shape>::guard(int mode, int) const {
 template <class Shape>
 template <class S>
 Wrench<S> LimitSurface<Shape>::wrench_(int mode, const Scene<S>& scene, const Relative<S>& y) const {
-  if (mode != kSlip) return is_elastic(mode) ? pads<S>().wrench(scene, y) : sticking_wrench(scene, y);
-  const S length = limits<S>().length(scene.normal_force);
+  if (mode != kSlip) return is_elastic(mode) ? pads_.of<S>()->wrench(scene, y) : sticking_wrench(scene, y);
+  const S length = limits_.of<S>().length(scene.normal_force);
   if (y.slip.x == S(0) && y.slip.z == S(0) && y.spin == S(0)) {
     // At the very onset of slip there is no direction yet: the demand, brought back to the surface.
     const Wrench<S> demand = sticking_wrench(scene, y);
-    const S limit = limits<S>().held(scene.normal_force);
+    const S limit = limits_.of<S>().held(scene.normal_force);
     const S size = gauge(shape_, scene, Vec3<S>{demand.fx, demand.fz, demand.tau / length});
     if (!(value_of(size) > value_of(limit))) return demand;
     const S k = limit / size;
@@ -101,10 +79,10 @@ Wrench<S> LimitSurface<Shape>::wrench_(int mode, const Scene<S>& scene, const Re
   }
   const Vec3<S> u = normalised_slip(y, length);
   Vec3<S> w = resist(shape_, scene, u);
-  if (!local_) return physical(w, limits<S>().slipping(scene.normal_force, y.slip, y.spin), length);
-  const Vec3<S> more = local_->wrench(limits<S>().speed(), u);
+  if (!local_) return physical(w, limits_.of<S>().slipping(scene.normal_force, y.slip, y.spin), length);
+  const Vec3<S> more = local_->wrench(limits_.of<S>().speed(), u);
   for (int i = 0; i < 3; ++i) w[i] += more[i];
-  return physical(w, limits<S>().coulomb(scene.normal_force), length);
+  return physical(w, limits_.of<S>().coulomb(scene.normal_force), length);
 }
 
 template <class Shape>
@@ -121,7 +99,7 @@ void LimitSurface<Shape>::rate_(int mode, const Scene<S>& scene, const Relative<
 template <class Shape>
 template <class S>
 S LimitSurface<Shape>::growth(const Scene<S>& scene, const Relative<S>& y, const State<S, 6>& rate) const {
-  const S length = limits<S>().length(scene.normal_force);
+  const S length = limits_.of<S>().length(scene.normal_force);
   const Vec3<S> u = normalised_slip(y, length), du{rate[3], rate[4], length * rate[5]};
   const Vec3<S> momentum = times(normalised_inertia(scene, lever(scene, y), length), u);
   return dot3(momentum, du) / dot3(momentum, u);
@@ -131,7 +109,8 @@ S LimitSurface<Shape>::growth(const Scene<S>& scene, const Relative<S>& y, const
 template <class Shape>
 template <class S>
 S LimitSurface<Shape>::margin_of(const Wrench<S>& demand, const Scene<S>& scene) const {
-  const S length = limits<S>().length(scene.normal_force), f_max = limits<S>().held(scene.normal_force);
+  const S length = limits_.of<S>().length(scene.normal_force),
+          f_max = limits_.of<S>().held(scene.normal_force);
   const S size = gauge(shape_, scene, Vec3<S>{demand.fx, demand.fz, demand.tau / length});
   return margin(S(size * size), S(f_max * f_max));
 }
@@ -148,7 +127,7 @@ void LimitSurface<Shape>::guards_(const Phase& phase, const SceneSource& source,
     const Scene<S> scene = source.scene(phase.window, t);
     State<S, 6> rate;
     rate_(kSlip, scene, y, rate);
-    const Vec3<S> u = normalised_slip(y, limits<S>().length(scene.normal_force));
+    const Vec3<S> u = normalised_slip(y, limits_.of<S>().length(scene.normal_force));
     const S speed = sqrt(dot3(u, u));
     g[0] = stop_guard(speed, S(speed * growth(scene, y, rate)));
   }
@@ -167,7 +146,7 @@ Entry<S, 6> LimitSurface<Shape>::onset(const Window& window, const SceneSource& 
   y.spin = S(0);
   const State<S, 6> at_rest = y.state();
   const auto acceleration = [&](double after) {
-    return slip_acceleration(shape_, limits<S>(), source.scene(window, S(t + after)), y);
+    return slip_acceleration(shape_, limits_.of<S>(), source.scene(window, S(t + after)), y);
   };
   const auto size = [](const Vec3<S>& a) {
     const S square = dot3(a, a);
@@ -183,7 +162,7 @@ Entry<S, 6> LimitSurface<Shape>::onset(const Window& window, const SceneSource& 
   if (!(value_of(a2) > 0)) return {stick(), t, y.state(), S(0)};  // a demand that only touches the surface
   const S k = speed / a2;
   y.slip = {k * end[0], k * end[1]};
-  y.spin = k * end[2] / limits<S>().length(source.scene(window, S(t + delta)).normal_force);
+  y.spin = k * end[2] / limits_.of<S>().length(source.scene(window, S(t + delta)).normal_force);
   return {kSlip, S(t + delta), y.state(), S(delta), at_rest};
 }
 
@@ -204,11 +183,11 @@ Entry<S, 6> LimitSurface<Shape>::come_to_rest(const Window& window, const SceneS
   return membership_(stick(), window, source, S(t + left), y);
 }
 
-/// From the springs at the surface: slip at the velocity of the moment, unless friction stops it at once.
+/// Slip on at the velocity of the moment, unless friction stops it at once.
 template <class Shape>
 template <class S>
-Entry<S, 6> LimitSurface<Shape>::let_go(const Window& window, const SceneSource& source, const S& t,
-                                        const Relative<S>& y) const {
+Entry<S, 6> LimitSurface<Shape>::slip_or_rest(const Window& window, const SceneSource& source, const S& t,
+                                              const Relative<S>& y) const {
   if (!slips(y)) return membership_(stick(), window, source, t, y);
   double stops;
   guards_({kSlip, window}, source, value_of(t), values(y), &stops);
@@ -220,7 +199,7 @@ template <class Shape>
 template <class S>
 Entry<S, 6> LimitSurface<Shape>::on_guard_(const Phase& from, int /*guard*/, const SceneSource& source,
                                            const S& t, const Relative<S>& at) const {
-  if (is_elastic(from.mode)) return let_go(from.window, source, t, at);
+  if (is_elastic(from.mode)) return slip_or_rest(from.window, source, t, at);
   return from.mode == kSlip ? come_to_rest(from.window, source, t, at)
                             : onset(from.window, source, t, at, true);
 }
@@ -229,13 +208,20 @@ template <class Shape>
 template <class S>
 Entry<S, 6> LimitSurface<Shape>::membership_(int mode, const Window& window, const SceneSource& source,
                                              const S& t, const Relative<S>& y) const {
+  // What a stop at once takes has passed since t.
+  const auto moving = [&] {
+    Entry<S, 6> next = slip_or_rest(window, source, t, y);
+    next.lead = next.t - t;
+    next.at_event = y.state();
+    return next;
+  };
   const bool start = mode < 0 && !slips(y);
   if (is_elastic(mode) || (start && is_elastic(kHeld))) {
     const Scene<S> scene = source.scene(window, t);
     if (value_of(margin_of(wrench_(kHeld, scene, y), scene)) < 0) return {kHeld, t, y.state(), S(0)};
-    return let_go(window, source, t, y);
+    return moving();
   }
-  if (slips(y)) return let_go(window, source, t, y);
+  if (slips(y)) return moving();
   if (mode == kSlip) return {kSlip, t, y.state(), S(0)};
   const Scene<double> scene = values(source.scene(window, t));
   if (margin_of(sticking_wrench(scene, values(y)), scene) < 0) return {stick(), t, y.state(), S(0)};

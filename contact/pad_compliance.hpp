@@ -39,7 +39,10 @@ struct PadCompliance {
 
 /// None where the pads are rigid.
 template <class S>
-std::optional<PadCompliance<S>> pad_compliance(const FrictionLimits<S>& limits) {
+using OptionalCompliance = std::optional<PadCompliance<S>>;
+/// As the variation of the limits says.
+template <class S>
+OptionalCompliance<S> pad_compliance(const FrictionLimits<S>& limits) {
   const auto& variation = limits.variation();
   if (!(dynamics::value_of(variation.compliance) > 0)) return std::nullopt;
   const S stiffness = 1.0 / variation.compliance, radius = limits.patch().radius;

@@ -94,12 +94,28 @@ Law<S> law_between(const FrictionLimits<S>& limits, const Scene<S>& scene, const
           S(0)};
 }
 
-/// margin() of a demand's square against a limit's; where pads can give nothing and nothing is demanded of
-/// them, as at the end of a release without torque, it suffices.
+/// How the object's point at the patch answers a push: W = 1/m + q qᵀ/I, q = (r_z, −r_x); 1/m while the
+/// rotation is locked.
 template <class S>
-S shortfall(const S& demand_squared, const S& limit_squared) {
-  if (value_of(demand_squared) == 0 && value_of(limit_squared) == 0) return S(-1);
-  return margin(demand_squared, limit_squared);
+struct Mobility {
+  S mass, turning, share;  ///< m [kg]; 1/I [1/(kg m²)] and m/(I + m l²) [1/m²], or zeros
+  Vec2<S> q;               ///< m
+  Mobility(const RigidBody<S>& body, Rotation rotation, const Vec2<S>& r)
+      : mass(body.mass), turning(0), share(0), q{r.z, -r.x} {
+    if (rotation == kLocked) return;
+    turning = 1.0 / body.inertia;
+    share = mass / (body.inertia + mass * dot(r, r));
+  }
+  Vec2<S> times(const Vec2<S>& x) const { return (1.0 / mass) * x + (turning * dot(q, x)) * q; }  // W x
+  Vec2<S> solve(const Vec2<S>& x) const { return mass * (x - (share * dot(q, x)) * q); }          // W⁻¹ x
+};
+
+/// v̇/v [1/s] of a braked slip, judged by its energy ½ v·W⁻¹v: its part across the lever, which turns a light
+/// object instead of carrying it, may end long before the slip does. See LimitSurface's.
+template <class S>
+S brake_growth(const Mobility<S>& mobility, const Vec2<S>& slip, const State<S, 6>& rate) {
+  const Vec2<S> momentum = mobility.solve(slip);
+  return dot(momentum, Vec2<S>{rate[3], rate[4]}) / dot(momentum, slip);
 }
 
 /// The rotation that follows when friction is short of the torque that it takes: the object lags behind the
@@ -115,20 +131,9 @@ constexpr double kTurned = 0.1;  // of the time in which a brake turns or stops 
 
 SlidingPivot::SlidingPivot(const Patch<Dual>& patch, SlideEnd slide_end,
                            const FrictionVariation<Dual>& variation)
-    : limits_double_(values(patch), values(variation)),
-      limits_dual_(patch, variation),
-      slide_end_(slide_end) {
-  validate(limits_double_.patch());
+    : limits_{{values(patch), values(variation)}, {patch, variation}}, slide_end_(slide_end) {
+  validate(limits_.value.patch());
   validate(variation);
-}
-
-template <>
-const FrictionLimits<double>& SlidingPivot::limits<double>() const {
-  return limits_double_;
-}
-template <>
-const FrictionLimits<Dual>& SlidingPivot::limits<Dual>() const {
-  return limits_dual_;
 }
 
 std::string_view SlidingPivot::mode_name(int mode) const {
@@ -176,7 +181,7 @@ void SlidingPivot::guards_(const Phase& phase, const SceneSource& source, const 
                            S* g) const {
   const int mode = phase.mode;
   const Scene<S> scene = source.scene(phase.window, t);
-  const FrictionLimits<S>& limits = this->limits<S>();
+  const FrictionLimits<S>& limits = limits_.of<S>();
   const Stance<S> stands = stance(scene, y);
   const Law<S> now = law(mode, limits, scene, y, stands.r);
   const S force_limit = limits.slipping(scene.normal_force, y.slip, y.spin),
@@ -184,7 +189,7 @@ void SlidingPivot::guards_(const Phase& phase, const SceneSource& source, const 
   if (rotation_of(mode) != kLocked) {
     g[kRotationGuard] = sign_of(rotation_of(mode)) * y.spin;
   } else {
-    g[kRotationGuard] = shortfall(S(now.wrench.tau * now.wrench.tau), S(torque_limit * torque_limit));
+    g[kRotationGuard] = margin(S(now.wrench.tau * now.wrench.tau), S(torque_limit * torque_limit));
   }
   if (mode == kSlideBetween) {
     const S plus = law(mode_of(kSlide, kPositive), limits, scene, y, stands.r).spin_acceleration;
@@ -193,28 +198,30 @@ void SlidingPivot::guards_(const Phase& phase, const SceneSource& source, const 
     const S torque = scene.body.inertia * drive;
     g[kRotationGuard] = torque / (torque_limit + std::abs(value_of(torque)) + 1e-300);
     const S demand = law(mode_of(kSlide, kLocked), limits, scene, y, stands.r).wrench.tau;
-    g[kTorqueSuffices] = shortfall(S(demand * demand), S(torque_limit * torque_limit));
+    g[kTorqueSuffices] = margin(S(demand * demand), S(torque_limit * torque_limit));
   }
-  const S force = shortfall(dot(now.carrying_force, now.carrying_force), S(force_limit * force_limit));
+  const S force = margin(dot(now.carrying_force, now.carrying_force), S(force_limit * force_limit));
   if (translation_of(mode) == kBrake) {
     const State<S, 6> rate = relative_rate(scene, y, stands, now.wrench);
     const S speed = norm(y.slip);
-    g[kTranslationGuard] = stop_guard(speed, S((y.slip.x * rate[3] + y.slip.z * rate[4]) / speed));
+    const Mobility<S> mobility(scene.body, rotation_of(mode), stands.r);
+    g[kTranslationGuard] = stop_guard(speed, S(speed * brake_growth(mobility, y.slip, rate)));
     if (slide_end_ == SlideEnd::memoryless) g[kSlideAgain] = force;
   } else {
-    g[kTranslationGuard] = force;
+    // What slides on pads without friction slides on, also where nothing is demanded of them.
+    g[kTranslationGuard] = translation_of(mode) == kSlide && !(value_of(force_limit) > 0) ? S(1) : force;
   }
 }
 
 template <class S>
 Wrench<S> SlidingPivot::wrench_(int mode, const Scene<S>& scene, const Relative<S>& y) const {
-  return law(mode, limits<S>(), scene, y, lever(scene, y)).wrench;
+  return law(mode, limits_.of<S>(), scene, y, lever(scene, y)).wrench;
 }
 
 template <class S>
 void SlidingPivot::rate_(int mode, const Scene<S>& scene, const Relative<S>& y, State<S, 6>& dy) const {
   const Stance<S> stands = stance(scene, y);
-  const Law<S> now = law(mode, limits<S>(), scene, y, stands.r);
+  const Law<S> now = law(mode, limits_.of<S>(), scene, y, stands.r);
   if (translation_of(mode) == kStuck) {
     dy = {S(0), S(0), y.spin, S(0), S(0), now.spin_acceleration};
   } else {
@@ -242,13 +249,14 @@ struct SlidingPivot::Instant {
 /// = 0 attracts from both sides.
 int SlidingPivot::consistent_mode(const Scene<double>& scene, const Relative<double>& y, int before,
                                   const Excluded& excluded) const {
-  const FrictionLimits<double>& limits = limits_double_;
+  const FrictionLimits<double>& limits = limits_.value;
   const double force_limit = limits.slipping(scene.normal_force, y.slip, y.spin),
                torque_limit = limits.length(scene.normal_force) * force_limit;
   const bool slipping = y.slip.x != 0 || y.slip.z != 0;
   const Vec2<double> r = lever(scene, y);
 
   auto translation_with = [&](Rotation rotation) {
+    if (slipping && !(force_limit > 0)) return kSlide;  // nothing brakes
     if (slipping && before == kBrake && slide_end_ == SlideEnd::latched_brake) return kBrake;
     const double demand = norm(law(mode_of(kStuck, rotation), limits, scene, y, r).carrying_force);
     if (slipping) return excluded.brake || (demand > force_limit && !excluded.slide) ? kSlide : kBrake;
@@ -316,6 +324,9 @@ Entry<S, 6> SlidingPivot::on_guard_(const Phase& from, int guard, const SceneSou
   // The patch, too, starts or ceases to slide within the first instants of the spin: both at once.
   excluded = {};
   (translation_of(mode) == kStuck ? excluded.stuck : excluded.slide) = true;
+  const Entry<S, 6> both = begin(enter(from.window, source, translation, excluded, now));
+  if (both.mode != from.mode) return both;
+  excluded.locked = true;  // the guard did not fire for nothing
   return begin(enter(from.window, source, translation, excluded, now));
 }
 
@@ -350,59 +361,67 @@ int SlidingPivot::enter(const Window& window, const SceneSource& source, int bef
 ///
 ///   d/dt (f |v| + v·W⁻¹b) = −(f² n·W n − b·W⁻¹b)
 ///
-/// is constant, whatever way the slip turns on its way to rest; else it errs by what W is anisotropic. The
-/// impulse P = −W⁻¹(v + b T) of the time T that is left brings the slip to zero, and turns the object. An
-/// error of T then moves the state along the flow that follows, which takes it back.
+/// is constant, whatever way the slip turns on its way to rest. Else it changes by as much as
+/// 2 f Φ (e·W n)/(e·W e) along with it, to first order in the turn Φ/|v|, Φ = e·v', e = J n, that is left: it
+/// dies within |v|/(f e·W e). The impulse P = −W⁻¹(v + b T) of the time T that is left brings the slip to
+/// zero, and turns the object. An error of T then moves the state along the flow that follows, which takes it
+/// back.
 template <class S>
 void SlidingPivot::come_to_rest(const Phase& brake, const SceneSource& source, Instant<S>& now) const {
   auto& [t, y] = now;
   const Scene<S> scene = source.scene(brake.window, t);
   State<S, 6> dy;
   rate_(brake.mode, scene, y, dy);
-  const auto& [m, I] = scene.body;
-  const bool locked = rotation_of(brake.mode) == kLocked;
-  const Vec2<S> r = lever(scene, y), q{r.z, -r.x};  // W = 1/m + q qᵀ/I
-  const S turning = locked ? S(0) : S(1.0 / I), share = locked ? S(0) : S(m / (I + m * dot(r, r)));
-  const auto inverse = [&](const Vec2<S>& x) { return m * (x - (share * dot(q, x)) * q); };  // W⁻¹ x
-
-  const S f = limits<S>().slipping(scene.normal_force, y.slip, y.spin), speed = norm(y.slip);
-  const Vec2<S> n = (1.0 / speed) * y.slip, mobile = (1.0 / m) * n + (turning * dot(q, n)) * q;  // W n
-  const Vec2<S> slip_rate{dy[3], dy[4]}, b = slip_rate + f * mobile;
-  const S decay = f * f * dot(n, mobile) - dot(b, inverse(b));
-  S left = -speed * speed / dot(y.slip, slip_rate);  // along a straight line
+  const Mobility<S> mobility(scene.body, rotation_of(brake.mode), lever(scene, y));
+  const S f = limits_.of<S>().slipping(scene.normal_force, y.slip, y.spin), speed = norm(y.slip);
+  const Vec2<S> n = (1.0 / speed) * y.slip, mobile = mobility.times(n);
+  const Vec2<S> b = Vec2<S>{dy[3], dy[4]} + f * mobile;
+  const Vec2<S> e{-n.z, n.x};
+  const S turn = 2.0 * f * (dy[4] * e.z + dy[3] * e.x) * dot(e, mobile) / dot(e, mobility.times(e));
+  const S decay = f * f * dot(n, mobile) - dot(b, mobility.solve(b)) + turn;
+  S left = -1.0 / brake_growth(mobility, y.slip, dy);  // along a straight line
   if (value_of(decay) > 0) {
-    const S by_impulse = (f * speed + dot(y.slip, inverse(b))) / decay;
+    const S by_impulse = (f * speed + dot(y.slip, mobility.solve(b))) / decay;
     if (value_of(by_impulse) > 0) left = by_impulse;
   }
-  const Vec2<S> impulse = S(-1.0) * inverse(y.slip + left * b);
+  const Vec2<S> impulse = S(-1.0) * mobility.solve(y.slip + left * b);
   y.arm = y.arm + (0.5 * left) * Vec2<S>{dy[0], dy[1]};
   y.angle += left * y.spin;
-  if (!locked) y.spin += left * (dy[5] + f * turning * dot(q, n)) + turning * dot(q, impulse);
+  if (rotation_of(brake.mode) != kLocked)
+    y.spin += left * dy[5] + mobility.turning * dot(mobility.q, impulse + (left * f) * n);
   y.slip = {S(0), S(0)};
   t += left;
 }
 
-/// The first instants of a spin, by the midpoint rule. A demand that only touches its limit leaves no spin.
+/// The first instants of a spin, by the midpoint rule. Where it turns out to have the other sign, as where
+/// nothing is demanded yet of pads without friction, the other mode is taken if that keeps it; a demand that
+/// only touches its limit leaves no spin.
 /// Beside a brake they are no longer than a share of the time in which its force turns: else the spin would
 /// have the sign of a force that has long turned, and a torque in excess would leave no spin, again and
 /// again.
 template <class S>
 Entry<S, 6> SlidingPivot::spin_onset(int mode, const Phase& from, const SceneSource& source, const S& t,
                                      const Relative<S>& rest) const {
-  double delta = std::min(kOnset, 0.25 * (from.window.end - value_of(t)));
+  const double longest = std::min(kOnset, 0.25 * (from.window.end - value_of(t)));
   const State<S, 6> y0 = rest.state();
-  if (!(delta > 0)) return {mode, t, y0, S(0)};
-  State<S, 6> dy, y = y0;
-  rate_(mode, source.scene(from.window, t), rest, dy);
-  if (translation_of(mode) == kBrake) {  // its force turns with the slip, the faster the smaller that is
-    const double slip = value_of(norm(rest.slip)), rate = std::hypot(value_of(dy[3]), value_of(dy[4]));
-    delta = std::min(delta, kTurned * slip / rate);
+  if (!(longest > 0)) return {mode, t, y0, S(0)};
+  const Translation translation = translation_of(mode);
+  const Rotation first = rotation_of(mode);
+  for (const Rotation rotation : {first, first == kPositive ? kNegative : kPositive}) {
+    const int spinning = mode_of(translation, rotation);
+    double delta = longest;
+    State<S, 6> dy, y = y0;
+    rate_(spinning, source.scene(from.window, t), rest, dy);
+    if (translation == kBrake) {  // its force turns with the slip, the faster the smaller that is
+      const double slip = value_of(norm(rest.slip)), rate = std::hypot(value_of(dy[3]), value_of(dy[4]));
+      delta = std::min(delta, kTurned * slip / rate);
+    }
+    for (int i = 0; i < 6; ++i) y[i] = y0[i] + 0.5 * delta * dy[i];
+    rate_(spinning, source.scene(from.window, S(t + 0.5 * delta)), Relative<S>::from(y), dy);
+    for (int i = 0; i < 6; ++i) y[i] = y0[i] + delta * dy[i];
+    if (sign_of(rotation) * value_of(y[5]) > 0) return {spinning, S(t + delta), y, S(delta), y0};
   }
-  for (int i = 0; i < 6; ++i) y[i] = y0[i] + 0.5 * delta * dy[i];
-  rate_(mode, source.scene(from.window, S(t + 0.5 * delta)), Relative<S>::from(y), dy);
-  for (int i = 0; i < 6; ++i) y[i] = y0[i] + delta * dy[i];
-  if (sign_of(rotation_of(mode)) * value_of(y[5]) > 0) return {mode, S(t + delta), y, S(delta), y0};
-  return {mode_of(translation_of(mode), kLocked), t, y0, S(0)};
+  return {mode_of(translation, kLocked), t, y0, S(0)};
 }
 
 template <class S>
@@ -410,7 +429,7 @@ Entry<S, 6> SlidingPivot::membership_(int mode, const Window& window, const Scen
                                       const Relative<S>& y) const {
   Instant<S> now{t, y};
   const int next = enter(window, source, mode < 0 ? kStuck : translation_of(mode), {}, now);
-  return {next, now.t, now.y.state(), S(0)};
+  return {next, now.t, now.y.state(), S(now.t - t), y.state()};  // what a stop at once takes has passed
 }
 
 template class ContactModelFrom<SlidingPivot>;

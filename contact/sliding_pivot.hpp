@@ -75,8 +75,6 @@ class SlidingPivot final : public ContactModelFrom<SlidingPivot> {
   /// @}
 
  private:
-  template <class S>
-  const FrictionLimits<S>& limits() const;
   struct Excluded;
   template <class S>
   struct Instant;
@@ -91,8 +89,7 @@ class SlidingPivot final : public ContactModelFrom<SlidingPivot> {
   Entry<S, 6> spin_onset(int mode, const Phase& from, const SceneSource&, const S& t,
                          const Relative<S>& rest) const;
 
-  FrictionLimits<double> limits_double_;
-  FrictionLimits<Dual> limits_dual_;
+  dynamics::OfBoth<FrictionLimits> limits_;
   SlideEnd slide_end_;
 };
 

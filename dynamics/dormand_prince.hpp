@@ -27,7 +27,7 @@ class DormandPrince final : public SingleStep<DormandPrince<S, N>, S, N> {
       k_[0] = k_[kEnd];
   }
   /// A first step length [s].
-  double guess() { return this->first_step(values<S, N>(k_[0])); }
+  double guess(double longest) { return this->first_step(values<S, N>(k_[0]), longest); }
 
   /// Takes the step of length h [s] and returns its error norm.
   double attempt(const S& h) {

@@ -8,9 +8,12 @@ namespace unhand::dynamics {
 
 void require_in_range(const Effect& effect, const EffectParameter& parameter, double value) {
   const double low = std::min(parameter.low, parameter.least.value_or(parameter.low));
-  if (value >= low && value <= parameter.high) return;
-  throw std::invalid_argument(fmt::format("{} = {} is not in [{}, {}]{}", effect.full_name(parameter), value,
-                                          low, parameter.high, after_number(parameter.unit)));
+  const double neutral = parameter.neutral, smallest = parameter.smallest.value_or(neutral);
+  if (value >= low && value <= parameter.high && !(value > neutral && value < smallest)) return;
+  const std::string range =
+      parameter.smallest ? fmt::format("{} or in [{}, ", neutral, smallest) : fmt::format("in [{}, ", low);
+  throw std::invalid_argument(fmt::format("{} = {} is not {}{}]{}", effect.full_name(parameter), value, range,
+                                          parameter.high, after_number(parameter.unit)));
 }
 
 std::string after_number(std::string_view unit) {

@@ -35,6 +35,8 @@ struct EffectParameter {
   bool in_space_only{false};             ///< no motion in the plane x-z tells it
   std::optional<std::size_t> on_axis{};  ///< of the body, 0 to 2: it adds to what a sensor reads there alone
   std::string remedy{};  ///< what to measure where a log does not tell it; empty: Effect::remedy
+  /// Beside neutral, the least that can be integrated, > neutral [unit]; whatever is greater where absent.
+  std::optional<double> smallest{};
   /// True if the parameter only shapes an effect that another parameter switches on.
   bool is_shape() const { return !grid.empty(); }
 };
@@ -115,7 +117,7 @@ struct Effect {
 };
 
 /// Throws std::invalid_argument, naming parameter, value and range, for a value [unit] outside of what the
-/// equations hold for: [low, high], or from `least` on.
+/// equations hold for: [low, high], or from `least` on; and between neutral and `smallest`.
 void require_in_range(const Effect& effect, const EffectParameter& parameter, double value);
 
 /// Named numbers; what is not named has the value the reader expects.

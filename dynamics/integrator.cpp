@@ -37,6 +37,9 @@ const char* to_string(Outcome outcome) {
 
 namespace {
 
+/// A phase shorter than this [s] is over: no tolerance can be met in so few spacings of times.
+constexpr double kNoTime = 1e-12;
+
 template <class S, int N>
 class Run {
  public:
@@ -50,7 +53,7 @@ class Run {
   Solution<S, N> operator()(const Entry<S, N>& start, const S& t_end) {
     solution_.events.reserve(32);
     begin_windows(start, t_end);
-    record_lead(start, {value_of(start.t) - value_of(start.lead), window_.end});
+    record_lead(start, window_);
     Entry<S, N> entry = start;
     phase_.mode = kNoMode;
     for (;;) {
@@ -73,7 +76,7 @@ class Run {
 
   void begin_windows(const Entry<S, N>& start, const S& t_end) {
     system_.time_events(times_);
-    const double t = value_of(start.t);
+    const double t = value_of(start.t) - value_of(start.lead);
     skipped_ = static_cast<int>(
         std::count_if(times_.begin(), times_.end(), [&](const S& x) { return value_of(x) <= t; }));
     std::erase_if(times_, [&](const S& x) { return !(value_of(x) > t) || value_of(x) >= value_of(t_end); });
@@ -90,24 +93,33 @@ class Run {
     const int index = skipped_ + static_cast<int>(next_time_);
     ++next_time_;
     window_ = {value_of(t), value_of(window_end())};
-    Departure departure{system_.on_time(mode, window_, t, y), {}};
+    Departure departure{within_window(system_.on_time(mode, window_, t, y)), {}};
     record_lead(departure.at, window_);
     log(EventKind::time, index, mode, departure.at);
     return departure;
   }
 
-  /// The state at the window's end of an entry that lies there but for rounding: its time may move otherwise
-  /// with the parameters, and the mode's flow is in force in between.
+  /// The state at the window's end of an entry as good as there, by the flow in force in between: an entry's
+  /// time may also move otherwise with the parameters.
   State<S, N> at_window_end(const Entry<S, N>& entry) const {
     State<S, N> y = entry.y;
-    if constexpr (!std::is_same_v<S, double>) {
-      const auto ahead = (window_end().v - entry.t.v).eval();
-      if (ahead.isZero(0) || system_.kind(entry.mode) == FlowKind::frozen) return y;
-      State<double, N> rate;
-      system_.flow(phase_, entry.t.a, values<S, N>(y), rate);
-      for (int i = 0; i < N; ++i) y[i].v += rate[i] * ahead;
-    }
+    const S ahead = window_end() - entry.t;
+    const FlowKind kind = system_.kind(entry.mode);
+    if (is_zero(ahead) || kind == FlowKind::frozen || kind == FlowKind::finished) return y;
+    State<double, N> rate;
+    system_.flow({entry.mode, window_}, value_of(entry.t), values<S, N>(y), rate);
+    for (int i = 0; i < N; ++i) y[i] += rate[i] * ahead;
     return y;
+  }
+
+  /// What a transition follows in closed form ends with the window: a slip may stop just beyond.
+  Entry<S, N> within_window(Entry<S, N> entry) const {
+    const S beyond = entry.t - window_end();
+    if (!(value_of(beyond) > 0)) return entry;
+    entry.y = at_window_end(entry);
+    entry.t = window_end();
+    if (value_of(entry.lead) > 0) entry.lead -= beyond;
+    return entry;
   }
 
   // ---------------------------------------------------------------- one phase
@@ -119,8 +131,12 @@ class Run {
     phase_ = {entry.mode, window_};
     watch_.enter(phase_);
 
-    if (!(value_of(window_end()) - value_of(entry.t) > shortest_step(value_of(entry.t))))
-      return leave_window(entry.mode, at_window_end(entry));
+    const double t = value_of(entry.t);
+    if (!(window_.end - t > std::max(shortest_step(t), kNoTime))) {
+      const State<S, N> y = at_window_end(entry);
+      record_straight(phase_, entry.t, entry.y, window_end(), y);
+      return leave_window(entry.mode, y);
+    }
 
     const int immediate = watch_.arm(entry, same_mode);
     if (immediate == watch_.kNotFinite) return {entry, Outcome::not_finite};
@@ -164,7 +180,7 @@ class Run {
   }
 
   Departure transition(int guard, const S& t, const State<S, N>& y) {
-    Departure departure{system_.on_guard(phase_, guard, t, y), {}};
+    Departure departure{within_window(system_.on_guard(phase_, guard, t, y)), {}};
     record_straight(phase_, t, y, departure.at.t - departure.at.lead, departure.at.event_state());
     record_lead(departure.at, window_);
     watch_.fired = guard;

@@ -14,7 +14,10 @@ namespace unhand::dynamics {
 /// Tolerances and budgets of an integration.
 struct IntegratorOptions {
   Method method{Method::automatic};  ///< `automatic` unless methods are compared
-  Tolerances tolerances;             ///< of the local error
+  /// Of the local error of the values. With Dual the derivatives are those of the steps that the values ask
+  /// for, so their error is not controlled; it falls with the tolerance (release/simulate_release.hpp has
+  /// measured ones).
+  Tolerances tolerances;
   /// Guards are sampled at least every third of this [s], and through the cubic in between: two roots closer
   /// than about a ninth of it may be missed.
   double guard_interval{5e-3};

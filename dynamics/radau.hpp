@@ -35,7 +35,7 @@ class Radau final : public SingleStep<Radau<N>, double, N> {
     factored_ = 0;
   }
   /// A first step length [s].
-  double guess() { return this->first_step(f0_); }
+  double guess(double longest) { return this->first_step(f0_, longest); }
 
   /// Takes the step of length h [s] and returns its error norm: 32 where the iterations do not converge, NaN
   /// where the flow is not finite.

@@ -31,7 +31,7 @@ class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
     for (int i = 0; i < N; ++i) ft_[i] = ft[i];
   }
   /// A first step length [s].
-  double guess() { return this->first_step(f0_); }
+  double guess(double longest) { return this->first_step(f0_, longest); }
 
   /// Takes the step of length h [s] and returns its error norm.
   double attempt(const double& h) {

@@ -45,6 +45,21 @@ T convert(const S& x) {
     return T(x);
 }
 
+/// One thing with and without derivatives: whoever is a template of its scalar takes the one of that scalar.
+template <template <class> class T>
+struct OfBoth {
+  T<double> value;  ///< without derivatives
+  T<Dual> dual;     ///< with them
+  /// The one of the scalar S.
+  template <class S>
+  const T<S>& of() const {
+    if constexpr (std::is_same_v<S, double>)
+      return value;
+    else
+      return dual;
+  }
+};
+
 /// Applies a scalar function whose value f and derivative df at value_of(x) are already known (the chain
 /// rule).
 inline double chain(double /*x*/, double f, double /*df*/) { return f; }

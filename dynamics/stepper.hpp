@@ -166,7 +166,8 @@ inline double combined_square(double fine, double coarse) {
 /// The error-controlled step of a single-step method. Derived supplies
 ///   double attempt(const S& h)   takes y0_ at t0_ to y1_ and returns the error norm (NaN if not finite),
 ///   kOrder                       the exponent's order,
-///   void prepare(bool retry)     what a new start point needs (once a step).
+///   void prepare(bool retry)     what a new start point needs (once a step),
+///   double guess(double longest) a first step length, found without looking further than `longest` [s].
 template <class Derived, class S, int N>
 class SingleStep : public Stepper<S, N> {
  public:
@@ -187,11 +188,11 @@ class SingleStep : public Stepper<S, N> {
     this->t0_ = this->t1_;
     this->y0_ = this->y1_;
     self().prepare(fresh_);
-    if (fresh_ && !(h_next_ > 0)) h_next_ = self().guess();
-    if (fresh_) error_before_ = 0;
-    fresh_ = false;
     const double t = value_of(this->t0_);
     const double left = value_of(limit) - t;
+    if (fresh_ && !(h_next_ > 0)) h_next_ = self().guess(std::min(left, longest));
+    if (fresh_) error_before_ = 0;
+    fresh_ = false;
     double h = std::min(h_next_, longest);
     for (bool rejected = false;; rejected = true) {
       // Land on the limit rather than leave a sliver before it.
@@ -244,13 +245,13 @@ class SingleStep : public Stepper<S, N> {
   }
 
   /// A first step length from the sizes of the state, its rate and the change of its rate over a trial step
-  /// ([HairerNorsettWanner1993] II.4).
-  double first_step(const State<double, N>& rate) {
+  /// ([HairerNorsettWanner1993] II.4) of at most `longest` [s]: beyond it other data may hold.
+  double first_step(const State<double, N>& rate, double longest) {
     const State<double, N> y = values<S, N>(this->y0_);
     State<double, N> scale;
     system_->error_scale(phase_, tolerances_, y, y, scale);
     const double d0 = scaled_norm<N>(y, scale), d1 = scaled_norm<N>(rate, scale);
-    const double trial = d0 > 1e-5 && d1 > 1e-5 ? 0.01 * d0 / d1 : 1e-6;
+    const double trial = std::min(d0 > 1e-5 && d1 > 1e-5 ? 0.01 * d0 / d1 : 1e-6, longest);
     State<double, N> ahead, change;
     for (int i = 0; i < N; ++i) ahead[i] = y[i] + trial * rate[i];
     ++this->flow_evaluations_;

@@ -44,10 +44,7 @@ class SuperEllipsoid {
  private:
   template <class S>
   S p() const {
-    if constexpr (std::is_same_v<S, double>)
-      return p_.a;
-    else
-      return p_;
+    return dynamics::convert<S>(p_);
   }
   /// |f|, |tau| and the larger of them, which is taken out before anything is raised to a power.
   template <class S>

@@ -102,8 +102,8 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
           fmt::format("contact model \"{}\": {} modes are not in [1, inf)", contact_.name(), free_));
     contact_.separation(problem.normal_force, separation_);
     if (!contact_.needs_hold()) return;
-    hold_at_start(hold_dual_);
-    hold_at_start(hold_);
+    hold_at_start(hold_.dual);
+    hold_at_start(hold_.value);
   }
 
   int free_mode() const { return free_; }
@@ -111,10 +111,7 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   /// How the object is held at the start, for pads that give.
   template <class S>
   const contact::Hold<S>& hold() const {
-    if constexpr (std::is_same_v<S, double>)
-      return hold_;
-    else
-      return hold_dual_;
+    return hold_.of<S>();
   }
 
   Scene<double> scene(const Window& window, double t) const override { return scene_(window, t); }
@@ -261,8 +258,7 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   const ReleaseProblem<P>& problem_;
   const contact::ContactModel& contact_;
   int free_;
-  contact::Hold<double> hold_;
-  contact::Hold<Dual> hold_dual_;
+  dynamics::OfBoth<contact::Hold> hold_;
   P separation_{};
   struct Kept {
     double time{std::numeric_limits<double>::quiet_NaN()};  // none yet

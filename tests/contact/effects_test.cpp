@@ -300,6 +300,10 @@ TEST(ContactEffectParameters, OutOfRangeAreNamed) {
   EXPECT_NE(message([](auto& v) { v.softness = 3; }).find("gamma"), std::string::npos);
   EXPECT_NE(message([](auto& v) { v.softness = 0.3; }).find("f_0 = 0"), std::string::npos);
   EXPECT_NE(message([](auto& v) { v.compliance = -1; }).find("compliance"), std::string::npos);
+  EXPECT_NE(message([](auto& v) {
+              v.compliance = 1e-15;
+            }).find("contact.pad_compliance.compliance = 1e-15 is not 0 or in [1e-10, 0.001] m/N"),
+            std::string::npos);
 }
 
 /// What validate() accepts is what the table says, parameter by parameter.
@@ -319,6 +323,10 @@ TEST(ContactEffectParameters, HaveTheRangesOfTheTable) {
       const double low = p.least.value_or(p.low), beyond = 0.01 * (p.high - low);
       EXPECT_TRUE(accepts(low) && accepts(p.neutral) && accepts(p.high)) << effect.full_name(p);
       EXPECT_FALSE(accepts(low - beyond) || accepts(p.high + beyond)) << effect.full_name(p);
+      if (p.smallest) {
+        EXPECT_TRUE(accepts(*p.smallest)) << effect.full_name(p);
+        EXPECT_FALSE(accepts(p.neutral + 0.99 * (*p.smallest - p.neutral))) << effect.full_name(p);
+      }
       // the same parameter as the effect sets
       FrictionVariation<double> set;
       const std::vector<std::string> name{effect.full_name(p)};

@@ -181,6 +181,23 @@ TYPED_TEST(SingleSteps, TheDenseOutputIsOfOrderThreeOrBetter) {
   }
 }
 
+TYPED_TEST(SingleSteps, TheGuessAtAFirstStepLooksNoFurtherThanTheLimit) {
+  double furthest = 0;
+  const auto watched = free_flow([&](int, const auto& t, const auto& y, auto& dy) {
+    furthest = std::max(furthest, value_of(t));
+    using std::cos;
+    dy[0] = cos(t) * y[1];
+    dy[1] = -1.0 * y[0];
+  });
+  for (const double limit : {1e-9, 1e-7, 1e-4}) {
+    furthest = 0;
+    TypeParam stepper(Tolerances{1e-8, 1e-8});
+    stepper.start(watched, kPhase, 0.0, {1.0, 1.0});  // whose rate alone would say a trial of some 0.01
+    ASSERT_EQ(stepper.step(limit, 10.0), StepStatus::accepted);
+    EXPECT_LE(furthest, limit);
+  }
+}
+
 TYPED_TEST(SingleSteps, RetakingTheWholeStepIsTheStepAndLeavesItAlone) {
   const auto problem = smooth_problem();
   TypeParam stepper(Tolerances{1e-8, 1e-8});

@@ -13,10 +13,7 @@ namespace unhand::dynamics {
 /// A constant of a toy as the scalar of the moment.
 template <class S>
 S as(const Dual& x) {
-  if constexpr (std::is_same_v<S, double>)
-    return x.a;
-  else
-    return x;
+  return convert<S>(x);
 }
 
 struct ToyMode {

@@ -25,7 +25,7 @@ class FrictionVariationTruth : public testing::TestWithParam<const char*> {
     return make_contact_model(GetParam(), p);
   }
   struct Give {
-    double slip{std::nan("")}, detach{};
+    double slip{std::nan("")}, detach{}, omega{};
   };
   /// When a grip first slips and when it is gone, the hand accelerating from rest at `a`.
   Give release(const dynamics::Acceleration<double>& a, const Variation& variation,
@@ -37,8 +37,9 @@ class FrictionVariationTruth : public testing::TestWithParam<const char*> {
     const auto result = simulate_release(problem, {.integrator = {.tolerances = {1e-10, 1e-12}}});
     EXPECT_EQ(result.outcome, release::ReleaseOutcome::detached);
     for (const auto& event : result.events)
-      if (event.kind == dynamics::EventKind::guard) return {event.t, result.detach.time};
-    return {std::nan(""), result.detach.time};
+      if (event.kind == dynamics::EventKind::guard)
+        return {event.t, result.detach.time, result.detach.twist.omega};
+    return {std::nan(""), result.detach.time, result.detach.twist.omega};
   }
   /// Relative state after `t`, from the slip `speed` [m/s] and `spin` [rad/s] on pads at rest that never
   /// open.
@@ -74,6 +75,22 @@ TEST_P(FrictionVariationTruth, ASoftPatchPivotsLaterOrEarlierAndSlidesAsEver) {
                   kT * (1 - std::pow(tau / kTorque, 1 / (1 + gamma))), gamma > 0 ? 1e-9 : 1e-8)
           << gamma << ' ' << tau;
     EXPECT_NEAR(release({6 / kBodyMass, 0, 0}, soft, opening).slip, kT * (1 - 6 / kForce), 1e-9);
+  }
+}
+
+// Left behind by the hand at t₁, the object is dragged on by τ₀ (1 − t/T)^(1+γ) until the end.
+TEST_P(FrictionVariationTruth, ASoftPatchDragsAPivotOnByItsFadingTorque) {
+  for (const double gamma : {-0.5, 0.33, 1.0, 2.0}) {
+    Variation soft;
+    soft.softness = gamma;
+    soft.reference_force = kFullGrip;
+    for (const double tau : {0.02, 0.08}) {
+      const double alpha = tau / kInertia, begin = kT * (1 - std::pow(tau / kTorque, 1 / (1 + gamma)));
+      EXPECT_NEAR(release({0, 0, alpha}, soft, opening).omega,
+                  alpha * begin + kTorque / kInertia * kT / (2 + gamma) * std::pow(1 - begin / kT, 2 + gamma),
+                  1e-6)  // of some 10 rad/s, as the onset's 1e-8 s
+          << gamma << ' ' << tau;
+    }
   }
 }
 
