@@ -180,12 +180,17 @@ class ForwardStep {
     auto trial = try_out(score);
     if (!trial) return;
     const double bic = trial->next.bic();
-    const bool matters = trial->held_out.matters >= 1;
-    if (!matters && is_law(id_of(score))) return;
+    const bool law = is_law(id_of(score));
+    const bool matters =
+        trial->held_out.matters >= 1 || (law && trial->held_out.fall > 0 && has_left_base_law());
+    if (!matters && law) return;
     (matters ? convincing_ : evident_).push_back({&score, bic});
     auto& leader = matters ? best_ : small_;
     if (!leader || bic < leader->next.bic()) leader = std::move(trial);
   }
+
+  /// The law that was asked about has gone already: of the others the likelier one stays.
+  bool has_left_base_law() const { return stage_.problem.options().model != options_.campaign.model; }
 
   bool grasp_is_off() const {
     const auto& misfit = stage_.fit.misfit;
@@ -243,6 +248,8 @@ class ForwardStep {
         accepted.add_other_name(id_of(*score), between_footprints(*trial.score, *score));
     const bool base_law = accepted.id == std::string(kLaw) + options_.campaign.model;  // no effect
     if (is_law(accepted.id)) {  // it takes the place of a former one
+      for (const AcceptedEffect& former : out_.effects)
+        if (is_law(former.id)) accepted.why = fmt::format("{} by {}; then {}", former.why, former.id, why);
       std::erase_if(out_.effects, [](const AcceptedEffect& e) { return is_law(e.id); });
       std::erase_if(trial.next.ids,
                     [&](const std::string& id) { return is_law(id) && (base_law || id != accepted.id); });
