@@ -1,0 +1,79 @@
+// docs/output-keys.md has every key of the JSON outputs.
+#include <gtest/gtest.h>
+
+#include <regex>
+
+#include "tests/apps/cli.hpp"
+
+namespace unhand::cli {
+namespace {
+
+/// Objects whose keys are names: of parameters, objects, models, channels, conditions.
+const std::set<std::string> kByName{"parameters",
+                                    "parameter_units",
+                                    "parameter_sigmas",
+                                    "models",
+                                    "surfaces",
+                                    "own_spreads",
+                                    "own",
+                                    "conditions",
+                                    "declared_objects",
+                                    "groups",
+                                    "noise",
+                                    "channels",
+                                    "numbers",
+                                    "derivatives",
+                                    "datasets",
+                                    "autocorrelation",
+                                    "not_compared",
+                                    "footprint_correlations"};
+
+void collect(const json& at, const std::string& parent, std::set<std::string>& keys) {
+  if (at.is_array())
+    for (const json& element : at) collect(element, parent + "[]", keys);
+  if (!at.is_object() || parent == "card") return;
+  for (const auto& [key, value] : at.items()) {
+    if (!kByName.contains(parent)) keys.insert(key);
+    collect(value, key, keys);
+  }
+}
+
+/// Words in backticks of the page's introduction and of one of its sections.
+std::set<std::string> words_of(const std::string& page, const std::string& section) {
+  const std::string introduction = page.substr(0, page.find("\n## "));
+  const std::size_t begin = page.find("\n## " + section + "\n");
+  if (begin == std::string::npos) return {};
+  const std::string text = introduction + page.substr(begin, page.find("\n## ", begin + 1) - begin);
+  std::set<std::string> out;
+  const std::regex code("`([^`]+)`"), word("[A-Za-z0-9_]+");
+  for (std::sregex_iterator it(text.begin(), text.end(), code), end; it != end; ++it) {
+    const std::string found = (*it)[1];
+    for (std::sregex_iterator w(found.begin(), found.end(), word); w != end; ++w) out.insert(w->str());
+  }
+  return out;
+}
+
+TEST_F(Cli, ThePageHasEveryKeyOfTheOutputs) {
+  const std::string page = content(fs::path(UNHAND_SOURCE_DIR) / "docs/output-keys.md");
+  const std::string sku = (fs::path(UNHAND_SOURCE_DIR) / "examples/bar.toml").string();
+  ASSERT_EQ(run("fit " + quick + " --model limit_surface_disc --card card.json").code, 0);
+  const std::pair<std::string, std::string> commands[] = {
+      {"unhand compare", "compare " + quick},
+      {"unhand fit", "fit " + quick + " --model limit_surface_disc"},
+      {"unhand predict", "predict " + quick + " --card card.json"},
+      {"unhand inspect", "inspect " + quick},
+      {"unhand discover", "discover " + quick},
+      {"unhand validate-sku", "validate-sku " + sku + " --card card.json --samples 100"},
+      {"unhand plan throw", "plan throw --target 1.3,0,-0.2 --card card.json --sku " + sku}};
+  for (const auto& [section, command] : commands) {
+    ASSERT_EQ(run(command + " --json out.json").code, 0) << command;
+    std::set<std::string> keys;
+    collect(read_json(folder / "out.json"), "", keys);
+    ASSERT_GT(keys.size(), 5u) << section;
+    const auto words = words_of(page, section);
+    for (const std::string& key : keys) EXPECT_TRUE(words.contains(key)) << section << ": " << key;
+  }
+}
+
+}  // namespace
+}  // namespace unhand::cli
