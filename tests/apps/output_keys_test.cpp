@@ -24,6 +24,7 @@ const std::set<std::string> kByName{"parameters",
                                     "numbers",
                                     "derivatives",
                                     "datasets",
+                                    "predicted",
                                     "autocorrelation",
                                     "not_compared",
                                     "footprint_correlations"};
