@@ -30,7 +30,7 @@ Figure residual_figure(const Discovery& found) {
   const auto after = curves_of("after", found.residual_after);
   const int columns = channels.size() > 1 ? 2 : 1;
   const int rows = (static_cast<int>(channels.size()) + columns - 1) / columns;
-  Figure figure{"residual", 17, 1.4 + 3.9 * rows, {}, {}};
+  Figure figure{"residual", 17, 1.8 + 3.9 * rows, {}, {}};
   double low = 0, high = 0.05;
   for (const auto& bin : found.residual_before)
     low = std::min(low, bin.time), high = std::max(high, bin.time);

@@ -92,9 +92,10 @@ constexpr Corner kCorners[]{{1, 1, "left offset 0.7,0.7"},
                             {1, -1, "left offset 0.7,-0.7"},
                             {-1, -1, "right offset -0.7,-0.7"}};
 
-/// The labels of each corner: where they cover least of the path through the means.
+/// The labels of each corner: where they cover least of the path through the means, and of other points.
 std::vector<DataBlock> placed_labels(const DataBlock& labels, const std::vector<std::vector<double>>& means,
-                                     double width, double height) {
+                                     const std::vector<std::vector<double>>& others, double width,
+                                     double height) {
   constexpr double kLetter = 0.018, kText = 0.06, kAside = 0.015, kAbove = 0.02;  // of width and height
   constexpr int kAlong = 20;
   std::vector<DataBlock> out(std::size(kCorners), {labels.title, labels.columns, {}, {}});
@@ -115,6 +116,7 @@ std::vector<DataBlock> placed_labels(const DataBlock& labels, const std::vector<
           covered += covers(kCorners[c], means[k - 1][0] + share * (means[k][0] - means[k - 1][0]),
                             means[k - 1][1] + share * (means[k][1] - means[k - 1][1]));
         }
+      for (const auto& point : others) covered += kAlong * covers(kCorners[c], point[0], point[1]);
       if (covered < least) least = covered, best = c;
     }
     out[best].rows.push_back(labels.rows[i]);
@@ -152,8 +154,10 @@ void draw_path(const FlipAnswer& a, const std::filesystem::path& folder) {
       for (std::size_t k = 0; k < 2; ++k)
         low[k] = std::min(low[k], row[k]), high[k] = std::max(high[k], row[k]);
   const double width = high[0] - low[0], height = high[1] - low[1];
+  std::vector<std::vector<double>> others = throws.rows;
+  others.insert(others.end(), known.rows.begin(), known.rows.end());
   const auto labels =
-      placed_labels(labels_of(means.rows, 0.11 * width, 0.06 * height), means.rows, width, height);
+      placed_labels(labels_of(means.rows, 0.11 * width, 0.06 * height), means.rows, others, width, height);
   struct Series {
     const DataBlock& block;
     std::string style;
