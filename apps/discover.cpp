@@ -161,7 +161,8 @@ void discover(const DiscoverOptions& options, const Parser& parser) {
     const Progress progress("discover", 0);
     return fitting::discover(log, options.log, request);
   }();
-  if (found.verdict == fitting::Verdict::not_answered) throw Unanswered(found.message);
+  if (found.verdict == fitting::Verdict::not_answered)
+    throw Unanswered(fmt::format("{}: {}", options.log, found.message));
 
   const auto& problem = *found.problem;
   const auto errors =
@@ -244,7 +245,9 @@ std::string discovery_text(const Discovery& found, const std::string& log, const
         "the residual first leaves the noise in the phase {}, channel {} ({:.3g} times its variance)\n",
         to_string(found.first.phase), to_string(found.first.channel), found.first.chi2_per_sample);
   else
-    out += "no channel of the train throws leaves the noise in any phase\n";
+    out +=
+        "no channel of the train throws leaves a misfit (chi2 per sample above 1.5; of wrenches while pads "
+        "slip, above 3)\n";
   for (const auto& s : found.structure_before)
     if (found.first.any && s.phase == found.first.phase && s.channel == found.first.channel)
       out += fmt::format("  there: {}\n", s.structure.in_words());

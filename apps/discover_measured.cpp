@@ -135,7 +135,8 @@ void discover_measured(MeasuredKind kind, const MeasuredRequest& request) {
     }
   }
   progress.reset();
-  if (result.answer.verdict == fitting::Verdict::not_answered) throw Unanswered(result.answer.message);
+  if (result.answer.verdict == fitting::Verdict::not_answered)
+    throw Unanswered(fmt::format("{}: {}", request.log, result.answer.message));
   Outputs outputs{{request.log}};
   const Json json = measured_json(result);
   if (!request.json.empty()) outputs.json(request.json, json);

@@ -17,6 +17,8 @@ std::string standing_of(const fitting::FitResult& fit, std::size_t k) {
   const auto& u = fit.campaign[k];
   if (u.at_bound) return "at its bound";
   if (!fitting::is_determined(fit, k)) return "not by this log";
+  if (const auto [low, high] = u.interval95(); !std::isfinite(low) || !std::isfinite(high))
+    return "to one side only";
   if (u.unknown.prior_sigma && u.data_sigma > *u.unknown.prior_sigma) return "less than the prior";
   return "yes";
 }
@@ -28,8 +30,8 @@ Table parameter_table(const fitting::FitResult& fit) {
     const auto [low, high] = u.interval95();
     const Rounded shown = rounded(u.value, u.sigma);
     const auto end = [&](double x) {
-      return shown.decimals && std::isfinite(x) ? fmt::format("{:.{}f}", x, *shown.decimals)
-                                                : fmt::format("{:.5g}", x);
+      if (!std::isfinite(x)) return std::string("open");
+      return shown.decimals ? fmt::format("{:.{}f}", x, *shown.decimals) : fmt::format("{:.5g}", x);
     };
     out.rows.push_back(
         {u.unknown.name, u.unknown.unit, shown.value, std::isfinite(u.sigma) ? shown.sigma : "-",

@@ -140,8 +140,8 @@ Inspection inspect_throws(const std::string& file) {
   const auto summary = datasets::summarise(log);
   Inspection out;
   out.text = fmt::format("{}: throw-log, dimension {}\n  title    {}\n  source   {}\n", file,
-                         summary.dimension, summary.title, summary.source);
-  if (!summary.licence.empty()) out.text += fmt::format("  licence  {}\n", summary.licence);
+                         summary.dimension, printable(summary.title), printable(summary.source));
+  if (!summary.licence.empty()) out.text += fmt::format("  licence  {}\n", printable(summary.licence));
   out.text += fmt::format("  gravity {:.6g} m/s^2 (declared), landing height {:.6g} m\n", summary.gravity,
                           summary.landing_height);
   for (const auto& [name, object] : log.objects) {

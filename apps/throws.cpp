@@ -70,14 +70,20 @@ void leave_out_forceless(datasets::ThrowLog& log) {
   leave_out(log, "have no normal force, which the others have", [](const auto& one) { return !one.ft; });
 }
 
+std::string printable(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
+  return text;
+}
+
 std::string origin_text(const datasets::ThrowLog& log) {
-  return log.title + (log.title.empty() || log.source.empty() ? "" : "; ") + log.source;
+  return printable(log.title + (log.title.empty() || log.source.empty() ? "" : "; ") + log.source);
 }
 
 std::string origin_text(const datasets::SlipLog& log) {
   const std::string count = plural(log.surfaces.size(), "surface");
   const std::string first = log.surfaces.empty() ? "" : log.surfaces.begin()->second.description;
-  return first.empty() ? count : fmt::format("{}, the first: {}", count, first);
+  return first.empty() ? count : printable(fmt::format("{}, the first: {}", count, first));
 }
 
 std::size_t place_of(const datasets::ThrowLog& log, const std::string& id, const std::string& file) {

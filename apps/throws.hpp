@@ -21,6 +21,9 @@ datasets::ThrowLog read_throws(const std::string& file);
 /// that follow the pads and are not told how these open.
 void leave_out_forceless(datasets::ThrowLog& log);
 
+/// A log's own words with blanks for control characters, which would steer the terminal.
+std::string printable(std::string text);
+
 /// Title and source as the log declares them: "synthetic throws: ...; synthetic: simulated by ...".
 std::string origin_text(const datasets::ThrowLog& log);
 /// Of a slip-log: how many surfaces, and what is said of the first.

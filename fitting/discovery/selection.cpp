@@ -28,6 +28,11 @@ void find_other_names(const Footprints& f, const Eigen::VectorXd& contribution, 
   }
 }
 
+void name_imitation(const std::string& id, Discovery& out) {
+  if (std::find(out.imitations.begin(), out.imitations.end(), id) == out.imitations.end())
+    out.imitations.push_back(id);
+}
+
 /// What was accepted in the company of something that has been withdrawn, another law included, must have its
 /// evidence alone.
 void drop_without_evidence(Stage& stage, const DiscoverOptions& options, Discovery& out) {
@@ -35,7 +40,7 @@ void drop_without_evidence(Stage& stage, const DiscoverOptions& options, Discove
     const std::string id = out.effects[i].id;
     const Stage& less = without(stage, {id}, options);
     if (!less.solved() || stage.bic() - less.bic() <= kDeltaBic) continue;
-    out.imitations.push_back(id);
+    name_imitation(id, out);
     out.effects.erase(out.effects.begin() + static_cast<std::ptrdiff_t>(i));
     stage = Stage(less);
   }
@@ -88,7 +93,7 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   std::erase_if(out.effects, [&](const AcceptedEffect& effect) {
     return std::find(gone.begin(), gone.end(), effect.id) != gone.end();
   });
-  out.imitations.insert(out.imitations.end(), gone.begin(), gone.end());
+  for (const std::string& id : gone) name_imitation(id, out);
   stage = Stage(less);
   drop_without_evidence(stage, options, out);
   return withdraw(stage, options, out);

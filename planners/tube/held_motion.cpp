@@ -38,8 +38,11 @@ class StandingScene final : public contact::SceneSource {
   const Scene<double>& scene_;
 };
 
+/// Pads that give hold what rigid ones do: they have given by then as much as the wrench asks for.
 std::unique_ptr<contact::ContactModel> law_of(const ReleaseCard& card, const Draw& draw) {
-  return contact::make_contact_model(card.model, pads_of(card, draw[kMu], draw[kLength]));
+  auto pads = pads_of(card, draw[kMu], draw[kLength]);
+  pads.variation.compliance = 0;
+  return contact::make_contact_model(card.model, pads);
 }
 
 bool sticks(const contact::ContactModel& law, Scene<double> scene, const Draw& draw) {

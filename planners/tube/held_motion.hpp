@@ -13,7 +13,8 @@ namespace unhand::planners {
 
 /// A motion up to t = 0 with the object in the closed hand. The pads hold where the wrench that makes the
 /// object follow the hand lies within their limit, in the plane of the throw as it turns with the hand; what
-/// acts across that plane, and so presses on the pads, is left out.
+/// acts across that plane, and so presses on the pads, is left out; and so are oscillations on pads that
+/// give.
 class HeldMotion {
  public:
   /// Looks every `step` [s] > 0 from the motion's begin on, and at t = 0. The throw is copied; its chain must

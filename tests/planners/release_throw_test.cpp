@@ -263,6 +263,17 @@ TEST(HeldMotion, NeedsTheForceThatTheLargestLoadTakes) {
   EXPECT_TRUE(HeldMotion(weaker, tube.plan->motion).holds(nominal_draw(p)));
 }
 
+TEST(HeldMotion, PadsThatGiveHoldWhatRigidOnesDo) {
+  BarThrow bar;
+  const auto tube = bar.plan();
+  ASSERT_TRUE(tube.plan) << tube.reason;
+  ReleaseThrow p = bar.release(*tube.plan);
+  const auto rigid = HeldMotion(p, tube.plan->motion).needed_force();
+  p.card.friction.compliance = 1e-7;  // m/N
+  p.card.friction.loss_time = 0.005;
+  EXPECT_EQ(HeldMotion(p, tube.plan->motion).needed_force(), rigid);
+}
+
 // A draw that slips while the arm swings has no landing, wherever a release from rest in the hand would go.
 TEST(HeldMotion, DrawsThatSlipBeforeTheGripperOpensAreLost) {
   BarThrow bar;
