@@ -44,7 +44,7 @@ void write_report(const SkuQuestion& question, const fitting::SkuValidation& ans
 
 void validate(ValidateSkuOptions options) {
   if (options.tolerance.size() != 2 || !(options.tolerance[0] > 0) || !(options.tolerance[1] > 0))
-    throw WrongUsage("--tolerance takes two positive numbers, METRES,DEGREES: 0.05,45");
+    throw WrongUsage("--tolerance takes two positive numbers, METRES,DEGREES, for example 0.05,45");
   constexpr double kMostMetres = 100, kMostDegrees = 57000;  // of SkuRequest's tolerance
   if (options.tolerance[0] > kMostMetres || options.tolerance[1] > kMostDegrees)
     throw WrongUsage(fmt::format("--tolerance: {:g} m, {:g} degrees; accepted: up to {:g} m, {:g} degrees",

@@ -150,7 +150,6 @@ FitResult search_and_question(Stage& stage, DiscoverOptions options, Discovery& 
   search(stage, options, out);
   settle_give(stage, options, out);
   backward(stage, options, out);
-  drop_vanished_give(stage, options);
   FitResult counted = withdraw(stage, options, out);
   if (!drop_idle_give(stage, options, out)) return counted;
   options.forget.push_back(kPads);

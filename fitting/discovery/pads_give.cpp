@@ -123,13 +123,6 @@ void settle_give(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   }
 }
 
-void drop_vanished_give(Stage& stage, const DiscoverOptions& options) {
-  if (!gives_along(stage)) return;
-  for (const auto& u : stage.fit.campaign)
-    if (u.unknown.name == kCompliance && u.value > 2 * u.sigma) return;
-  if (const Stage& rigid = without(stage, {kPads}, options); rigid.solved()) stage = Stage(rigid);
-}
-
 bool drop_idle_give(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   if (!gives_along(stage) || !out.effects.empty()) return false;
   const Stage rigid = without(stage, {kPads}, options);

@@ -35,10 +35,6 @@ void fit_give_along(Stage& stage, const DiscoverOptions& options);
 /// no more than that a nuisance.
 void settle_give(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
-/// A give that was fitted along before the answer was complete may be none beside it: within two sigma it
-/// goes.
-void drop_vanished_give(Stage& stage, const DiscoverOptions& options);
-
 /// In an answer without effects a give stays only if it matters to a channel of the held-out throws, or they
 /// are predicted the better for it and are likelier. Else it goes (true), and is left in `out.small`, if
 /// nothing more evident is.
