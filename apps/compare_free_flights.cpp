@@ -12,6 +12,7 @@
 #include "apps/figure.hpp"
 #include "apps/progress.hpp"
 #include "apps/tell.hpp"
+#include "apps/throws.hpp"
 #include "experiment/free_flight.hpp"
 
 namespace unhand::apps {

@@ -7,6 +7,7 @@
 #include "apps/figure.hpp"
 #include "apps/measured_report.hpp"
 #include "apps/tell.hpp"
+#include "apps/throws.hpp"
 #include "fitting/measured/measured_card.hpp"
 
 namespace unhand::apps {
