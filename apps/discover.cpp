@@ -245,9 +245,7 @@ std::string discovery_text(const Discovery& found, const std::string& log, const
         "the residual first leaves the noise in the phase {}, channel {} ({:.3g} times its variance)\n",
         to_string(found.first.phase), to_string(found.first.channel), found.first.chi2_per_sample);
   else
-    out +=
-        "no channel of the train throws leaves a misfit (chi2 per sample above 1.5; of wrenches while pads "
-        "slip, above 3)\n";
+    out += "no channel of the train throws leaves a misfit that asks for an explanation\n";
   for (const auto& s : found.structure_before)
     if (found.first.any && s.phase == found.first.phase && s.channel == found.first.channel)
       out += fmt::format("  there: {}\n", s.structure.in_words());

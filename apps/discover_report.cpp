@@ -227,8 +227,8 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
                                                   "the declared variance.",
                                                   to_string(found.first.phase),
                                                   to_string(found.first.channel), found.first.chi2_per_sample)
-                                            : "No channel of the train throws leaves a misfit (chi2 per "
-                                              "sample above 1.5; of wrenches while pads slip, above 3).";
+                                            : "No channel of the train throws leaves a misfit that asks for "
+                                              "an explanation.";
   const std::string body = fmt::format(
       "<p>{}: base model <code>{}</code>. Verdict: <b>{}</b>.</p>\n<h2>Where it starts</h2><p>{}</p>\n{}"
       "<h2>The answer</h2>\n{}<h2>Errors before and after</h2>\n"

@@ -4,11 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <fstream>
-#include <numbers>
 #include <utility>
 
 #include "apps/command.hpp"
 #include "datasets/log_error.hpp"
+#include "experiment/compare.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -68,7 +68,7 @@ fl::FlipTrial trial_of(const fs::path& file, const Json& label, const fl::FlipCo
 std::string as_option(const std::string& key, const Json& value) {
   if (key == "target")
     return fmt::format("{:g},{:g}", value.at(0).get<double>(),
-                       value.at(1).get<double>() * 180 / std::numbers::pi);
+                       value.at(1).get<double>() * experiment::kDegrees);
   if (key == "learner") return value.get<std::string>();
   if (key == "seed" || key == "throws" || key == "repeats") return value.dump();
   return {};
