@@ -268,8 +268,7 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
   if (options.engine == "patch")
     refuse_options(parser, {"--pads", "--friction"}, "of bullet; patch has points with bristles");
   require_outputs({{options.json}}, {options.log, options.card});
-  auto known = contact::contact_model_names();
-  std::erase_if(known, [](const auto& law) { return !contact::follows_pads(law); });
+  const auto known = contact::pad_law_names();
   for (const auto& model : options.models)
     if (std::find(known.begin(), known.end(), model) == known.end())
       throw WrongUsage(

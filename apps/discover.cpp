@@ -254,7 +254,7 @@ std::string discovery_text(const Discovery& found, const std::string& log, const
     for (const auto& line : separating_lines(effect)) out += fmt::format("  {}\n", line);
   }
   if (const std::string note = gain_text(found.effects); !note.empty()) out += "\n" + note + "\n";
-  for (const auto& id : found.along) out += fmt::format("\n{}\n", along_text(id));
+  for (const auto& id : found.along) out += fmt::format("\n{}\n", along_text(id, found.final));
   if (found.small) out += fmt::format("\n{}\n", small_text(*found.small));
   if (found.unexplained)
     out +=

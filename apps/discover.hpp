@@ -19,8 +19,8 @@ std::string discovery_text(const fitting::Discovery& discovery, const std::strin
 
 /// Errors of what is predicted before the throw, of train and test throws, before and after.
 Table prediction_errors(const fitting::Discovery& discovery);
-/// What was fitted along without being an answer, by the effect's id.
-std::string along_text(const std::string& id);
+/// What was fitted along without being an answer, by the effect's id, with its values in `fit`.
+std::string along_text(const std::string& id, const fitting::FitResult& fit);
 
 /// A self-contained page (index.html), the figures with their data and scripts, and discovery.json.
 void write_discovery_report(const fitting::Discovery& discovery, const std::string& log,

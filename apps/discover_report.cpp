@@ -1,5 +1,6 @@
 // The page of `unhand discover`: one self-contained HTML file.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -148,7 +149,7 @@ Table lack_table(const Discovery& found) {
       std::string cell = "-";
       for (const auto& [outcome, fit, resolution] : e.lacks)
         if (outcome == column.outcome && fit.repetitions > 0)
-          cell = fmt::format("{:.2f} (p {:.1g})", std::sqrt(fit.ratio()), fit.p_value);
+          cell = fmt::format("{:.2f} (p {})", std::sqrt(fit.ratio()), p_text(fit.p_value));
       table.rows.back().push_back(cell);
     }
   }
@@ -193,7 +194,14 @@ Table prediction_errors(const Discovery& found) {
   return table;
 }
 
-std::string along_text(const std::string& id) { return "fitted along, since no pads are rigid: " + id; }
+std::string along_text(const std::string& id, const fitting::FitResult& fit) {
+  std::vector<std::string> values;
+  for (const auto& u : fit.campaign)
+    if (u.unknown.name.starts_with(id + "."))
+      values.push_back(fmt::format("{} = {}", u.unknown.name.substr(id.size() + 1),
+                                   with_sigma(u.value, u.sigma, u.unknown.unit)));
+  return fmt::format("fitted along, since no pads are rigid: {} ({})", id, fmt::join(values, ", "));
+}
 
 void write_discovery_report(const Discovery& found, const std::string& log, const std::string& origin,
                             const std::string& command, const Json& json,
@@ -213,7 +221,8 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
   for (const auto& effect : found.effects) answer += effect_html(effect);
   if (const std::string note = gain_text(found.effects); !note.empty())
     answer += fmt::format("<p>{}</p>\n", escaped(note));
-  for (const auto& id : found.along) answer += fmt::format("<p>{}.</p>\n", escaped(along_text(id)));
+  for (const auto& id : found.along)
+    answer += fmt::format("<p>{}.</p>\n", escaped(along_text(id, found.final)));
   if (found.small) answer += fmt::format("<p>{}.</p>\n", escaped(small_text(*found.small)));
   if (found.unexplained)
     answer += fmt::format("<p><b>Unexplained:</b> {}.</p>\n",

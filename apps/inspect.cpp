@@ -46,8 +46,7 @@ Table groups_of(const datasets::LogSummary& summary) {
 
 /// Whether a column scatters by more than it declares, although that is not told to be its noise.
 bool is_unjudged(const datasets::NoiseSummary& noise, std::size_t column) {
-  constexpr double kMore = 1.2;  // as for a sigma that is told to be too small
-  return noise.ratio[column] > kMore && !noise.too_small[column];
+  return noise.ratio[column] > datasets::NoiseSummary::kMore && !noise.too_small[column];
 }
 
 bool has_unjudged(const datasets::LogSummary& summary) {

@@ -164,6 +164,8 @@ void warn_outside(const datasets::ModelCard& card, const std::vector<experiment:
     int throws{};
     std::string first, reason;
   };
+  if (card.valid_range.empty())
+    tell("unhand: the card has no valid_range: nothing tells whether it was tried on such throws\n");
   std::map<std::string, Outside> by_condition;
   for (const auto& one : throws)
     for (const auto& [condition, reason] : fitting::outside_range(card, one)) {

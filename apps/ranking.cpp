@@ -23,22 +23,23 @@ Json ranking_json(std::span<const fitting::Ranked> ranking) {
                    {"refitted", r.refit_step.has_value()},
                    {"refit_step", r.refit_step ? Json(*r.refit_step) : Json(nullptr)},
                    {"delta_bic", r.refit_step ? number(r.delta_bic) : Json(nullptr)},
-                   {"held_out_gain", r.held_out_gain ? number(*r.held_out_gain) : Json(nullptr)}});
+                   {"held_out_gain", r.held_out_gain ? number(*r.held_out_gain) : Json(nullptr)},
+                   {"fate", to_string(r.fate)}});
   return out;
 }
 
 Table ranking_table(std::span<const fitting::Ranked> ranking) {
   Table table{{"candidate", "chi2 gain", "in step", "p", "correlation with its step's best", "refitted: BIC",
-               "in step", "held-out fall"},
+               "in step", "held-out fall", "fate"},
               {},
               1};
   for (const auto& r : ranking)
     table.rows.push_back({r.id, r.visible ? fmt::format("{:.4g}", std::max(0.0, r.gain)) : "no footprint",
-                          std::to_string(r.step), fmt::format("{:.2g}", r.p_value),
+                          std::to_string(r.step), p_text(r.p_value),
                           fmt::format("{:.3f}", r.correlation_with_best),
                           r.refit_step ? fmt::format("{:+.1f}", r.delta_bic) : "",
                           r.refit_step ? std::to_string(*r.refit_step) : "",
-                          r.held_out_gain ? fmt::format("{:.3g}", *r.held_out_gain) : ""});
+                          r.held_out_gain ? fmt::format("{:.3g}", *r.held_out_gain) : "", to_string(r.fate)});
   return table;
 }
 
@@ -83,7 +84,7 @@ std::string effect_text(const fitting::AcceptedEffect& effect) {
     out += fmt::format("\n  or {} (footprints correlate by {:.4f})", id, correlation);
   for (const auto& p : effect.parameters)
     out += fmt::format("\n  {} = {}", p.name, with_sigma(p.value, p.sigma, p.unit));
-  const std::string p = effect.p_value ? fmt::format(", p {:.2g}", *effect.p_value) : "";
+  const std::string p = effect.p_value ? ", p " + p_text(*effect.p_value) : "";
   return out + fmt::format("\n  BIC {:+.1f}{}; held out: {}\n", effect.delta_bic, p, effect.why);
 }
 
@@ -106,9 +107,9 @@ std::vector<std::string> separating_lines(const fitting::AcceptedEffect& effect)
 
 std::string small_text(const fitting::SmallEffect& small) {
   const bool predicts = small.rms_before > fitting::DiscoverOptions{}.prediction_matters * small.rms_after;
-  const std::string numbers =
-      fmt::format("{} (BIC {:+.1f}, p {:.2g}; rms predicted before the throw, test: {:.3g} to {:.3g} mm",
-                  small.id, small.delta_bic, small.p_value, 1e3 * small.rms_before, 1e3 * small.rms_after);
+  const std::string numbers = fmt::format(
+      "{} (BIC {:+.1f}, p {}; rms predicted before the throw, test: {:.3g} to {:.3g} mm", small.id,
+      small.delta_bic, p_text(small.p_value), 1e3 * small.rms_before, 1e3 * small.rms_after);
   if (small.any_pads) return fmt::format("evident, but no pads are without it: {})", numbers);
   if (!predicts) return fmt::format("evident, but too small to matter: {})", numbers);
   return fmt::format(
@@ -159,7 +160,7 @@ std::string effect_html(const fitting::AcceptedEffect& effect) {
     out += fmt::format("{} = {}{}<br>", escaped(p.name), escaped(with_sigma(p.value, p.sigma, p.unit)),
                        interval);
   }
-  const std::string p_value = effect.p_value ? fmt::format(", p = {:.2g}", *effect.p_value) : "";
+  const std::string p_value = effect.p_value ? ", p = " + p_text(*effect.p_value) : "";
   out += fmt::format("BIC {:+.1f}{}. On held-out data: {}.</p>\n", effect.delta_bic, p_value,
                      escaped(effect.why));
   for (const auto& [id, correlation] : effect.equivalent)

@@ -110,6 +110,11 @@ std::string mean_and_spread(std::size_t n, double mean, double spread, int decim
   return n == 1 ? fmt::format("{:.{}f} ± -", mean, decimals) : plus_minus(n > 0, mean, spread, decimals);
 }
 
+std::string p_text(double p_value) {
+  constexpr double kLeast = 1e-300;
+  return p_value < kLeast ? fmt::format("< {:g}", kLeast) : fmt::format("{:.2g}", p_value);
+}
+
 std::string plural(std::size_t n, const char* what) {
   return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s");
 }

@@ -37,6 +37,8 @@ std::string with_sigma(double value, double sigma, const std::string& unit);
 std::string fixed(bool known, double value, int decimals);
 /// The same with its sign, + for 0.
 std::string with_sign(double value, int decimals);
+/// A p-value's two leading digits; what rounds to 0 is "< 1e-300".
+std::string p_text(double p_value);
 /// As many decimals as there are, for CSV; empty if it is not known.
 std::string all_digits(bool known, double value);
 /// "1 throw", "2 throws".

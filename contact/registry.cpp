@@ -186,6 +186,12 @@ bool follows_pads(std::string_view name) {
   return !entry || entry->follows_pads;
 }
 
+std::vector<std::string> pad_law_names() {
+  std::vector<std::string> names = contact_model_names();
+  std::erase_if(names, [](const std::string& name) { return !follows_pads(name); });
+  return names;
+}
+
 bool feels_pressure(std::string_view name) {
   const auto* entry = find(name);
   return entry && entry->feels_pressure;

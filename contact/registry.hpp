@@ -71,6 +71,9 @@ std::vector<std::string> contact_model_names();
 /// ContactModelEntry::follows_pads; true for a name that is not known.
 bool follows_pads(std::string_view name);
 
+/// Those of contact_model_names() that follow the pads.
+std::vector<std::string> pad_law_names();
+
 /// ContactModelEntry::feels_pressure; false for a name that is not known.
 bool feels_pressure(std::string_view name);
 

@@ -31,11 +31,17 @@ std::string_view schema_in(std::string_view json) {
 std::string kind_of(std::string_view bytes) {
   bytes = bytes.substr(0, kFirstBytes);
   if (bytes.starts_with(kHdf5Signature)) return "an HDF5 file";
-  const std::size_t first = bytes.find_first_not_of(kBlanks);
-  if (first == std::string_view::npos || bytes[first] != '{') return {};
+  if (!begins_json_object(bytes)) return {};
   const std::string_view schema = schema_in(bytes);
   if (schema.empty()) return "JSON";
   return schema == "model-card" ? "a model card (JSON)" : fmt::format("JSON of schema '{}'", schema);
+}
+
+bool begins_json_object(std::string_view bytes) {
+  constexpr std::string_view byte_order_mark = "\xef\xbb\xbf";
+  if (bytes.starts_with(byte_order_mark)) bytes.remove_prefix(byte_order_mark.size());
+  const std::size_t first = bytes.find_first_not_of(kBlanks);
+  return first != std::string_view::npos && bytes[first] == '{';
 }
 
 std::string kind_of_file(const std::filesystem::path& file) {

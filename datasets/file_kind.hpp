@@ -12,6 +12,9 @@ namespace unhand::datasets {
 std::string kind_of(std::string_view bytes);
 std::string kind_of_file(const std::filesystem::path& file);
 
+/// Whether the first character that is no blank opens a JSON object.
+bool begins_json_object(std::string_view bytes);
+
 /// `said`, then what the file is instead: "is not an HDF5 file; it is a model card (JSON)".
 std::string with_kind(const std::string& said, const std::string& kind);
 

@@ -263,8 +263,8 @@ ModelCard read_model_card(const fs::path& file) {
   std::ostringstream text;
   text << in.rdbuf();
   if (!in) throw CardError(file.string(), "", "cannot be read");
-  if (const std::string kind = kind_of(text.str()); kind.find("JSON") == std::string::npos && !kind.empty())
-    throw CardError(file.string(), "", with_kind("is not a model card (JSON)", kind));
+  if (!begins_json_object(text.str()))
+    throw CardError(file.string(), "", with_kind("is not a model card (JSON)", kind_of(text.str())));
   return parse_model_card(text.str(), file.string());
 }
 

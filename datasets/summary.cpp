@@ -147,12 +147,12 @@ void add_scatter(NoiseSummary& noise, const Channel<Throw>& channel, std::vector
       if (sigma > 0) whitened[j].add(time_of(toss, channel.group), values, j, rows, sigma);
     }
   }
-  constexpr double kTooSmall = 1.2, kSure = 3;
+  constexpr double kSure = 3;
   for (std::size_t j = 0; j < all.size(); ++j) {
     const double ratio = whitened[j].sigma();
     noise.scatter.push_back(all[j].sigma());
     noise.ratio.push_back(ratio);
-    noise.too_small.push_back(whitened[j].seen() && ratio > kTooSmall &&
+    noise.too_small.push_back(whitened[j].seen() && ratio > NoiseSummary::kMore &&
                               ratio > 1 + kSure * whitened[j].standard_error());
   }
 }

@@ -44,6 +44,8 @@ struct GroupSummary {
 /// large, those of white noise are not). Noise that is slower than the samples does not show in it. Of a
 /// sensor that falls, that of its falls: before and after, hands and bounces move it.
 struct NoiseSummary {
+  /// From this ratio on a column scatters by more than it declares [-].
+  static constexpr double kMore = 1.2;
   std::string dataset;                   // "mocap/pose"
   std::string columns, units;            ///< "x,z,theta" and "m,m,rad"; of the widest, where throws differ
   std::size_t throws = 0, declared = 0;  ///< that carry the dataset; that declare its noise
@@ -51,8 +53,8 @@ struct NoiseSummary {
   std::vector<double> lowest, highest;  ///< 1 σ by column, SI units
   std::vector<double> scatter;          ///< 1 σ by column, SI units; empty for single rows and times
   std::vector<double> ratio;            ///< of the scatter to the declared noise; 0 where there is no either
-  std::vector<bool> too_small;          ///< a ratio above 1.2, above 1 by three of its standard errors, where
-                                        ///< noise, not motion, is most of the doubled differences
+  std::vector<bool> too_small;  ///< a ratio above kMore, above 1 by three of its standard errors, where
+                                ///< noise, not motion, is most of the doubled differences
 };
 
 /// What `unhand inspect` says of a log.

@@ -152,7 +152,12 @@ std::vector<UntriedCondition> outside_range(const ModelCard& card, const std::ve
   std::vector<UntriedCondition> out;
   for (const Condition& is : conditions) {
     const auto range = card.valid_range.find(is.name);
-    if (range == card.valid_range.end() || range->second.unit != is.unit) continue;
+    if (range == card.valid_range.end()) continue;
+    if (range->second.unit != is.unit) {
+      out.push_back({is.name, fmt::format("{}: the card's valid range is in '{}', not in '{}'", is.name,
+                                          range->second.unit, is.unit)});
+      continue;
+    }
     const double margin = margin_of(card, is.name, range->second);
     if (is.value >= range->second.low - margin && is.value <= range->second.high + margin) continue;
     out.push_back({is.name, in_words(is, range->second)});

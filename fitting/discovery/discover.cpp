@@ -55,12 +55,6 @@ const char* unit_of(Outcome outcome) {
   return outcome == Outcome::orientation || outcome == Outcome::landing_theta ? "rad" : "m";
 }
 
-std::vector<std::string> all_laws() {
-  auto out = contact::contact_model_names();
-  std::erase_if(out, [](const auto& law) { return !contact::follows_pads(law); });
-  return out;
-}
-
 void validate(const DiscoverOptions& options) {
   const auto require = [](bool ok, const char* name, double value, const char* range) {
     if (!ok) throw std::invalid_argument(fmt::format("{} = {} is not in {}", name, value, range));
@@ -80,7 +74,7 @@ void validate(const DiscoverOptions& options) {
   require(options.most_effects >= 0, "most_effects", options.most_effects, "[0, inf)");
   std::vector<std::string> known;
   for (const auto& effect : experiment::known_effects()) known.push_back(effect.id);
-  for (const auto& law : all_laws()) known.push_back(std::string(kLaw) + law);
+  for (const auto& law : contact::pad_law_names()) known.push_back(std::string(kLaw) + law);
   for (const auto& id : options.forget)
     if (std::find(known.begin(), known.end(), id) == known.end())
       throw std::invalid_argument(
@@ -89,6 +83,46 @@ void validate(const DiscoverOptions& options) {
     if (std::find(known.begin(), known.end(), std::string(kLaw) + law) == known.end())
       throw std::invalid_argument(
           fmt::format("laws: {} is no contact law whose pads press on the object", law));
+}
+
+const char* to_string(Fate fate) {
+  switch (fate) {
+    case Fate::not_refitted:
+      return "not refitted";
+    case Fate::no_fit:
+      return "no fit";
+    case Fate::not_significant:
+      return "not significant";
+    case Fate::too_small:
+      return "too small";
+    case Fate::outdone:
+      return "outdone";
+    case Fate::another_name:
+      return "another name";
+    case Fate::withdrawn:
+      return "withdrawn";
+    case Fate::fitted_along:
+      return "fitted along";
+    case Fate::accepted:
+      return "accepted";
+  }
+  return "";
+}
+
+void tell_fates(std::span<const AcceptedEffect> effects, std::span<const std::string> withdrawn,
+                std::span<const std::string> along, std::vector<Ranked>& ranking) {
+  const auto among = [](std::span<const std::string> ids, const std::string& id) {
+    return std::find(ids.begin(), ids.end(), id) != ids.end();
+  };
+  for (Ranked& one : ranking) {
+    if (among(withdrawn, one.id)) one.fate = Fate::withdrawn;
+    if (among(along, one.id)) one.fate = Fate::fitted_along;
+    for (const AcceptedEffect& effect : effects)
+      for (const auto& [other, correlation] : effect.equivalent)
+        if (other == one.id) one.fate = Fate::another_name;
+    for (const AcceptedEffect& effect : effects)
+      if (effect.id == one.id) one.fate = Fate::accepted;
+  }
 }
 
 std::vector<std::string> leading_names(std::span<const AcceptedEffect> effects,
@@ -254,6 +288,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
   out.footprints =
       footprint_traces(base.problem, base.fit, leading_names(out.effects, out.ranking), options.fit);
   tell_after(stage, options, out);
+  tell_fates(out.effects, out.imitations, out.along, out.ranking);
   out.unexplained = unexplained(stage, out, options);
   if (out.unexplained) out.small.reset();  // beside that, nobody knows what it imitates
   out.verdict = !out.effects.empty() ? Verdict::effect_found

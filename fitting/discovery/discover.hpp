@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "contact/registry.hpp"
 #include "fitting/discovery/footprint_traces.hpp"
 #include "fitting/discovery/lack_of_fit.hpp"
 #include "fitting/discovery/missing_force.hpp"
@@ -15,9 +16,6 @@
 #include "fitting/fit.hpp"
 
 namespace unhand::fitting {
-
-/// Every contact model that follows the pads (contact::follows_pads).
-std::vector<std::string> all_laws();
 
 /// What the loop may try, and what convinces it.
 struct DiscoverOptions {
@@ -46,7 +44,8 @@ struct DiscoverOptions {
   double unexplained{1.5};  ///< χ² per sample of a channel in a phase from which on something is missing
   /// Effects, and laws as contact.law:MODEL, that are not in the catalogue today.
   std::vector<std::string> forget;
-  std::vector<std::string> laws{all_laws()};  ///< contact laws that are tried
+  /// Contact laws that are tried: of contact::pad_law_names().
+  std::vector<std::string> laws{contact::pad_law_names()};
 };
 
 /// Throws std::invalid_argument, naming option, value and accepted range; for a name in `forget` that is no
@@ -142,6 +141,21 @@ struct SmallEffect {
   bool likelier{};         ///< the held-out throws' likelihood rises enough with it
 };
 
+/// What became of a candidate: in the last refit, or since.
+enum class Fate {
+  not_refitted,     ///< others led in every step, or it leaves no footprint
+  no_fit,           ///< the refit has no answer, or one at the end of its range
+  not_significant,  ///< the refit does not tell it from none
+  too_small,        ///< evident, and held-out throws show too little of it
+  outdone,          ///< it would have done; another did better, or makes it dispensable
+  another_name,     ///< of an accepted effect: the data cannot tell which of them it is
+  withdrawn,        ///< accepted at first
+  fitted_along,     ///< as a nuisance, too small to matter
+  accepted,         ///< part of the answer
+};
+/// "not refitted", "no fit", ...: as it is written above, in words.
+const char* to_string(Fate);
+
 /// One candidate: gain, p-value, correlation and visibility of the step in which its gain was largest, the
 /// rest of its last refit.
 struct Ranked {
@@ -157,7 +171,12 @@ struct Ranked {
   /// Largest fall of the held-out χ² per sample in a channel and phase; of refits with evidence on the train
   /// throws.
   std::optional<double> held_out_gain{};
+  Fate fate{};  ///< in the last refit, or since
 };
+
+/// What an answer has become to its candidates: accepted, another name, ...
+void tell_fates(std::span<const AcceptedEffect> effects, std::span<const std::string> withdrawn,
+                std::span<const std::string> along, std::vector<Ranked>& ranking);
 
 /// The effects that were found, then what else would take most away: a few that a figure can show.
 std::vector<std::string> leading_names(std::span<const AcceptedEffect> effects,

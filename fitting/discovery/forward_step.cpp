@@ -149,13 +149,17 @@ class ForwardStep {
     const Candidate& candidate = f_.candidates[score.candidate];
     const bool leads = &score == &all_.front() || candidate.id == kPads;
     TriedEffect trial{&score, extended(stage_, candidate, score, leads, options_), 0, 0, {}};
-    if (!trial.next.is_fitted()) return std::nullopt;
+    Ranked& ranked = named(out_.ranking, candidate.id);
+    if (!trial.next.is_fitted()) {
+      if (!ranked.refit_step) ranked.fate = Fate::no_fit;
+      return std::nullopt;
+    }
     trial.delta_bic = trial.next.bic() - stage_.bic();
     const bool law = is_law(candidate.id);
-    Ranked& ranked = named(out_.ranking, candidate.id);
     ranked.refit_step = this_step();
     ranked.delta_bic = trial.delta_bic;
     ranked.held_out_gain.reset();
+    ranked.fate = Fate::not_significant;
     if (!law) {
       const dynamics::Effect effect = find_effect(candidate.id);
       trial.p_value = wald_p_value(trial.next.fit, effect);
@@ -166,7 +170,10 @@ class ForwardStep {
       }
     }
     if (!(trial.delta_bic <= kDeltaBic)) return std::nullopt;
-    if (!solve_held_out(trial.next, options_)) return std::nullopt;
+    if (!solve_held_out(trial.next, options_)) {
+      ranked.fate = Fate::no_fit;
+      return std::nullopt;
+    }
     trial.held_out = law ? law_improvement(stage_.held_out, trial.next.held_out, out_.base_test, options_)
                          : improvement(stage_, trial.next, out_.base_test, options_);
     ranked.held_out_gain = trial.held_out.fall;
@@ -183,6 +190,7 @@ class ForwardStep {
     const bool law = is_law(id_of(score));
     const bool matters =
         trial->held_out.matters >= 1 || (law && trial->held_out.fall > 0 && has_left_base_law());
+    named(out_.ranking, id_of(score)).fate = matters ? Fate::outdone : Fate::too_small;
     if (!matters && law) return;
     (matters ? convincing_ : evident_).push_back({&score, bic});
     auto& leader = matters ? best_ : small_;

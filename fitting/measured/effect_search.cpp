@@ -164,6 +164,8 @@ class Search {
     kept_at_ = std::max(kept_at_, evident.level);
     const EffectTrial* best = best_of(evident.trials);
     for (const EffectTrial& trial : evident.trials)
+      answer.ranked(trial.id).fate = is_confirmed(trial.held) ? Fate::outdone : Fate::too_small;
+    for (const EffectTrial& trial : evident.trials)
       if (&trial != best) keep(answer, trial, best, evident.silent);
     if (!best) return false;
     answer.accept(*best);

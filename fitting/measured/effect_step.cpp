@@ -163,9 +163,12 @@ EvidentEffects evident_effects(const GroupedProblem& problem, const std::vector<
     auto trial = try_effect(problem, answer.train, answer.test, *s.candidate, step, *effect, options.fit);
     Ranked& r = answer.ranked(id);
     r.refit_step = answer.step(), r.delta_bic = trial.delta_bic, r.held_out_gain = trial.held.fall();
-    if (!trial.fit.solved || !(trial.p < out.level) || shape_is_open(trial.fit, id)) continue;
-    if (is_pinned(trial.fit) || !problem.may_be(trial.fit)) continue;
+    r.fate = Fate::no_fit;
+    if (!trial.fit.solved || is_pinned(trial.fit) || !problem.may_be(trial.fit)) continue;
+    r.fate = Fate::not_significant;
+    if (!(trial.p < out.level) || shape_is_open(trial.fit, id)) continue;
     if (!keeps_what_it_shapes(problem, answer, trial)) continue;
+    r.fate = Fate::outdone;
     out.trials.push_back(std::move(trial));
   }
   std::sort(out.trials.begin(), out.trials.end(),

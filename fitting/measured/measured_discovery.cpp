@@ -1,6 +1,7 @@
 #include "fitting/measured/measured_discovery.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -226,13 +227,14 @@ void withdraw_imitations(const GroupedProblem& problem, const EffectSearchOption
   if (out.effects.empty()) return;
   const std::string fault = fault_of(problem, options, search, out);
   if (fault.empty()) return;
-  std::string names;
-  for (const auto& effect : out.effects) names += (names.empty() ? "" : ", ") + effect.id;
+  std::vector<std::string> withdrawn;
+  for (const auto& effect : out.effects) withdrawn.push_back(effect.id);
   out.evidence.push_back({"",
                           fmt::format("Withdrawn: {}. They lower the misfit, but {}: the nearest names of "
                                       "something that is not listed",
-                                      names, fault),
+                                      fmt::join(withdrawn, ", "), fault),
                           false});
+  tell_fates({}, withdrawn, {}, out.ranking);
   search.effects.clear();
   search.stability.clear();
   search.final = search.base;
@@ -310,6 +312,7 @@ EffectSearch run_search(GroupedProblem& problem, const MeasuredOptions& options,
   out.train = search.base.used, out.test = search.base_test.used;
   take_fits(problem, search, out);
   withdraw_imitations(problem, options.search, search, out);
+  tell_fates(out.effects, {}, {}, out.ranking);
   out.first = leaves_noise(problem, search.base, 1.2, options.search.fit.threads);
   out.autocorrelation_before = autocorrelation(problem, search.base_test);
   out.autocorrelation_after = autocorrelation(problem, search.final_test);

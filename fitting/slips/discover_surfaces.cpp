@@ -183,9 +183,10 @@ std::size_t believed(const std::vector<LawScore>& laws, const SurfaceDiscoveryOp
     const double gain = law.base_error - law.error;
     Ranked r{id_of(law.model), std::max(0.0, law.gain.t() * law.gain.t())};
     r.p_value = law.gain.p(), r.refit_step = 1, r.held_out_gain = gain, r.delta_bic = law.delta_bic();
+    const bool significant = law.gain.p() < rate;
+    const bool convinces = significant && gain > options.matters * law.base_error && gain > law.null_gain;
+    r.fate = convinces ? Fate::outdone : significant ? Fate::too_small : Fate::not_significant;
     ranking.push_back(r);
-    const bool convinces =
-        law.gain.p() < rate && gain > options.matters * law.base_error && gain > law.null_gain;
     // Ellipsoids come first: a richer law has to be better by a twentieth.
     if (convinces &&
         (best == 0 || law.error / law.base_error < 0.95 * laws[best].error / laws[best].base_error))
@@ -227,7 +228,11 @@ BiasTrial try_bias(const std::vector<SlipSamples>& surfaces, std::size_t k, cons
   const SurfaceModel model = scores.front()[k].model;
   out.with.model = out.without.model = model;
   out.whole = fit_wrench_bias(scored, model);
-  if (!out.whole.solved) return out;
+  if (!out.whole.solved) {
+    out.ranked.fate = Fate::no_fit;
+    return out;
+  }
+  out.ranked.fate = Fate::not_significant;
   out.ranked.p_value = out.whole.p_value;
   if (!(out.whole.p_value < options.family_wise_level)) return out;
   const auto biased = score_with_bias(scored, model, out.whole, options.comparison);
@@ -241,8 +246,9 @@ BiasTrial try_bias(const std::vector<SlipSamples>& surfaces, std::size_t k, cons
   out.ranked.gain = std::max(0.0, out.with.gain.t() * out.with.gain.t());
   out.ranked.p_value = out.with.gain.p();
   out.ranked.held_out_gain = gain, out.ranked.delta_bic = out.with.delta_bic();
-  out.convinces =
-      out.with.gain.p() < options.family_wise_level && gain > options.matters * out.with.base_error;
+  const bool significant = out.with.gain.p() < options.family_wise_level;
+  out.convinces = significant && gain > options.matters * out.with.base_error;
+  if (significant) out.ranked.fate = out.convinces ? Fate::outdone : Fate::too_small;
   return out;
 }
 
@@ -387,6 +393,7 @@ SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
   answer.after_test = {{"direction_mae_deg", final.error}};
   if (bias.convinces) accept_bias(bias, answer);
   if (choice.best > 0) accept_law(law, options.comparison.null_draws > 0, out);
+  tell_fates(answer.effects, {}, {}, answer.ranking);
   judge_residuals(final, base, options.unexplained, answer);
   answer.misfit.push_back(
       {"direction", static_cast<int>(base.gain.n), base.train, base.error, final.train, final.error});

@@ -93,8 +93,8 @@ FlipControl control_of(Section keys, int n) {
 Pads pads_of(Section keys) {
   Pads out;
   out.law = keys.text("law");
-  const auto known = contact::contact_model_names();
-  if (!contact::follows_pads(out.law) || std::find(known.begin(), known.end(), out.law) == known.end())
+  const auto known = contact::pad_law_names();
+  if (std::find(known.begin(), known.end(), out.law) == known.end())
     keys.fail("law", fmt::format("'{}' is no contact model that says how the pads let go", out.law));
   out.mu = keys.number("mu", {0, contact::kMostMu, true, ""});
   out.length = keys.number("length_m", {0, 0.5, true, "m"});

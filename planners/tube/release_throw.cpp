@@ -200,17 +200,11 @@ class CardReader {
   std::vector<std::string> known_, spreads_;
 };
 
-std::vector<std::string> names_that_follow_pads() {
-  auto names = contact::contact_model_names();
-  std::erase_if(names, [](const std::string& name) { return !contact::follows_pads(name); });
-  return names;
-}
-
 }  // namespace
 
 ReleaseCard release_card(const datasets::ModelCard& card, const std::string& file,
                          const ReleaseCard& otherwise) {
-  const auto laws = names_that_follow_pads();
+  const auto laws = contact::pad_law_names();
   if (std::find(laws.begin(), laws.end(), card.model) == laws.end())
     throw CardError(file, "/model",
                     datasets::unknown_name(fmt::format("'{}' does not say how the pads let go", card.model),

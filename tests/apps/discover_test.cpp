@@ -80,7 +80,12 @@ TEST_F(Cli, DiscoverFindsTheDragThatIsThere) {
   EXPECT_LT((*named)["score_p_value"].get<double>(), 1e-6);
   EXPECT_NEAR((*named)["footprint_correlation_with_best"].get<double>(), 1, 1e-9) << "it is the best";
   EXPECT_EQ((*named)["refit_step"], 1);
+  EXPECT_EQ((*named)["fate"], "accepted");
   for (json& one : ranking) {
+    EXPECT_EQ(one["fate"] == "accepted", one["id"] == "flight.quadratic_drag") << one;
+    EXPECT_TRUE(one["refitted"].get<bool>() || one["fate"] == "not refitted" || one["fate"] == "no fit" ||
+                one["fate"] == "another name" || one["fate"] == "fitted along")
+        << one;
     EXPECT_TRUE(one.contains("footprint_correlation_with_best")) << one;
     EXPECT_EQ(one["refitted"].get<bool>(), one["delta_bic"].is_number()) << one;
     EXPECT_EQ(one["refitted"].get<bool>(), one["refit_step"].is_number()) << one;

@@ -181,6 +181,8 @@ TEST_F(Cli, AFileOfAnotherKindIsToldFromADamagedOne) {
   for (const std::string& command :
        {"predict " + quick + " --card " + quick, "plan throw --target 1.3,0,-0.2 --card " + quick})
     expect_refusal(command, 3, "quick.h5: is not a model card (JSON); it is an HDF5 file");
+  std::ofstream(folder / "bar.toml") << "name = 'bar'\n";
+  expect_refusal("predict " + quick + " --card bar.toml", 3, "bar.toml: is not a model card (JSON)");
   expect_refusal("validate-sku card.json --card card.json", 3,
                  "card.json: is not a TOML file; it is a model card (JSON)");
   expect_refusal("validate-sku " + quick + " --card card.json", 3, "is not a TOML file; it is an HDF5 file");

@@ -25,6 +25,9 @@ TEST(Rounded, IsAsFarAsTheSigmaSays) {
   EXPECT_EQ(with_sigma(0.25, INFINITY, "-"), "0.25 ± inf");
   EXPECT_EQ(with_sigma(0.25, 0, "-"), "0.25 (held)");
   EXPECT_EQ(with_sigma(1, 1e-16, "m"), "1 m (held)") << "a sigma of rounding errors is none";
+  EXPECT_EQ(p_text(0.0234), "0.023");
+  EXPECT_EQ(p_text(3.21e-12), "3.2e-12");
+  EXPECT_EQ(p_text(0), "< 1e-300") << "no probability is 0";
 }
 
 TEST(Fixed, HasNoMinusZero) {

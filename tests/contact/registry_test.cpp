@@ -68,6 +68,9 @@ TEST(Registry, SaysWhichLawsFollowThePads) {
   rigid.follows_pads = false;
   register_once(std::move(rigid));
   EXPECT_FALSE(follows_pads("rigid"));
+  EXPECT_THAT(pad_law_names(), testing::IsSupersetOf({"sliding_pivot", "limit_surface_disc"}));
+  for (const char* other : {"rigid", kGripperDelay})
+    EXPECT_THAT(pad_law_names(), testing::Not(Contains(other)));
 }
 
 TEST(Registry, GivenParametersAreTheLawsOwn) {

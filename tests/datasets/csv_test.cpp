@@ -99,6 +99,9 @@ TEST(FileKind, IsToldByTheFirstBytes) {
     EXPECT_EQ(kind_of(json), "JSON") << json;
   for (const char* other : {"", " \n", "name = 'bar'\n", "[table]\n", "t,x\n1,2\n"})
     EXPECT_EQ(kind_of(other), "");
+  EXPECT_TRUE(begins_json_object(" \n{")) << "blanks may come first";
+  EXPECT_TRUE(begins_json_object("\xef\xbb\xbf{}")) << "and a byte order mark";
+  for (const char* other : {"", "[1]", "name = 'bar'\n"}) EXPECT_FALSE(begins_json_object(other));
   EXPECT_EQ(with_kind("is no log", kind_of("{}")), "is no log; it is JSON");
   EXPECT_EQ(with_kind("is no log", ""), "is no log");
 }

@@ -23,6 +23,21 @@ namespace {
 
 using support::named;
 
+/// What was accepted comes before every other fate; other candidates keep that of their refit.
+TEST(Fates, AreTheAnswers) {
+  AcceptedEffect accepted;
+  accepted.id = "a";
+  accepted.equivalent = {{"b", 0.99}, {"c", 0.99}};
+  std::vector<Ranked> ranking;
+  for (const char* id : {"a", "b", "c", "d", "e"}) ranking.push_back(Ranked{id});
+  ranking.back().fate = Fate::too_small;
+  tell_fates(std::vector{accepted}, std::vector<std::string>{"a", "d"}, std::vector<std::string>{"c"},
+             ranking);
+  const std::vector<Fate> told{Fate::accepted, Fate::another_name, Fate::another_name, Fate::withdrawn,
+                               Fate::too_small};
+  for (std::size_t k = 0; k < told.size(); ++k) EXPECT_EQ(ranking[k].fate, told[k]) << ranking[k].id;
+}
+
 Discovery found_in(const datasets::ThrowLog& log, std::vector<std::string> forget = {}) {
   DiscoverOptions options = support::loop_options();
   options.forget = std::move(forget);
