@@ -1,7 +1,9 @@
 // unhand inspect: what is in a log.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <map>
 #include <memory>
 #include <sstream>
 
@@ -107,6 +109,19 @@ std::string noise_doubts(const datasets::LogSummary& summary) {
   return out;
 }
 
+/// What the log holds that the schema does not know, a line.
+std::string ignored_text(const std::map<std::string, std::size_t>& ignored) {
+  constexpr std::size_t kShown = 12;
+  std::vector<std::string> names;
+  for (const auto& [path, places] : ignored) {
+    if (names.size() == kShown) break;
+    names.push_back(printable(path) + (places > 1 ? fmt::format(" ({} times)", places) : ""));
+  }
+  if (names.empty()) return {};
+  return fmt::format("ignored, since the schema does not know it: {}{}\n", fmt::join(names, ", "),
+                     ignored.size() > kShown ? fmt::format(", and {} more", ignored.size() - kShown) : "");
+}
+
 /// What the log says of objects and gripper; null where it says nothing.
 void add_declared(Json& json, const datasets::ThrowLog& log) {
   const auto json_of = [](const auto& value) { return value ? Json(*value) : Json(nullptr); };
@@ -186,8 +201,12 @@ Inspection inspect_throws(const std::string& file) {
         "note: {} of {} throws have no hand and are held at first, and no free_flight says from when on they "
         "fly: neither a release nor a flight can be predicted from them\n",
         n, log.throws.size());
+  const auto ignored = datasets::ignored_names(file);
+  out.text += ignored_text(ignored);
   Json json = head_of(file, "throw-log");
   json.update(Json::parse(datasets::to_json(summary)));
+  json["ignored"] = Json::array();
+  for (const auto& [path, places] : ignored) json["ignored"].push_back({{"path", path}, {"places", places}});
   add_declared(json, log);
   json["impossible_times"] = Json::array();
   for (const auto& note : experiment::impossible_times(log)) {

@@ -7,6 +7,30 @@
 namespace unhand::datasets::hdf5 {
 namespace {
 
+const KnownNames* place_of(const std::string& name, const KnownNames& known) {
+  const auto found = std::ranges::find_if(
+      known.children, [&](const KnownNames& k) { return k.name.empty() || k.name == name; });
+  return found == known.children.end() ? nullptr : &*found;
+}
+
+bool is_known_attribute(const std::string& name, const KnownNames& known) {
+  return std::ranges::find(known.attributes, name) != known.attributes.end();
+}
+
+void add_extra_paths(const Node& at, const std::string& path, const KnownNames& known,
+                     std::map<std::string, std::size_t>& out) {
+  for (const std::string& name : at.attributes())
+    if (!is_known_attribute(name, known)) ++out[path + "@" + name];
+  if (H5Iget_type(at.id()) != H5I_GROUP) return;
+  for (const std::string& name : at.children()) {
+    const KnownNames* place = place_of(name, known);
+    if (place)
+      add_extra_paths(at.child(name), join(path, place->name.empty() ? "*" : name), *place, out);
+    else
+      ++out[join(path, name)];
+  }
+}
+
 /// One walk through both files.
 class Extras {
  public:
@@ -14,13 +38,11 @@ class Extras {
 
   void take(const Node& old, hid_t made, const KnownNames& known) {
     for (const std::string& name : old.attributes())
-      if (std::ranges::find(known.attributes, name) == known.attributes.end())
-        take_attribute(old, made, name);
+      if (!is_known_attribute(name, known)) take_attribute(old, made, name);
     if (H5Iget_type(old.id()) != H5I_GROUP) return;
     for (const std::string& name : old.children()) {
-      const auto place = std::ranges::find_if(
-          known.children, [&](const KnownNames& k) { return k.name.empty() || k.name == name; });
-      if (place == known.children.end()) {
+      const KnownNames* place = place_of(name, known);
+      if (!place) {
         take_child(old, made, name);
       } else if (H5Lexists(made, name.c_str(), H5P_DEFAULT) > 0) {
         const Handle there = object_handle(H5Oopen(made, name.c_str(), H5P_DEFAULT));
@@ -90,6 +112,12 @@ std::vector<std::string> take_extras(const Node& old, const Output& made, const 
   Extras extras(old);
   extras.take(old, made.id(), known);
   return std::move(extras.left_out);
+}
+
+std::map<std::string, std::size_t> extra_paths(const Node& root, const KnownNames& known) {
+  std::map<std::string, std::size_t> out;
+  add_extra_paths(root, "/", known, out);
+  return out;
 }
 
 }  // namespace unhand::datasets::hdf5

@@ -1,6 +1,7 @@
 // What a log holds that its layout does not know, taken along into another file. Private to the module.
 #pragma once
 
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,5 +23,9 @@ struct KnownNames {
 /// or has it not. Returns the paths of attributes that refer to other objects of their file, which would lead
 /// nowhere in another one: they are left out. Throws LogError.
 std::vector<std::string> take_extras(const Node& old, const Output& made, const KnownNames& known);
+
+/// The paths of what `known` does not name at its place of the file, a '*' for names that the log chose, each
+/// with the number of places. Throws LogError.
+std::map<std::string, std::size_t> extra_paths(const Node& root, const KnownNames& known);
 
 }  // namespace unhand::datasets::hdf5

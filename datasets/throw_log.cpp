@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <set>
 
 #include "datasets/channel_rules.hpp"
@@ -244,6 +245,18 @@ ExtendedLog to_hdf5_with_extras(const ThrowLog& log, const std::filesystem::path
     carry(pipe, out.image);
     carry_list(pipe, out.left_out, [&](std::string& path) { carry(pipe, path); });
   });
+}
+
+std::map<std::string, std::size_t> ignored_names(const std::filesystem::path& file) {
+  using Names = std::vector<std::pair<std::string, std::uint64_t>>;
+  const auto parse = [](const std::string& name, hdf5::Place* place) {
+    const auto paths = hdf5::extra_paths(hdf5::Node::open_file(name, place), known_names());
+    return Names(paths.begin(), paths.end());
+  };
+  const Names names = hdf5::value_apart<Names>(file.string(), parse, [](auto& pipe, Names& all) {
+    carry_list(pipe, all, [&](auto& one) { carry(pipe, one.first), carry(pipe, one.second); });
+  });
+  return {names.begin(), names.end()};
 }
 
 void write_throw_log(const std::filesystem::path& file, const ThrowLog& log) {

@@ -135,6 +135,10 @@ void move_clock(Throw& toss, double origin);
 /// parts). Throws LogError with `file` as its file.
 void validate(const ThrowLog& log, const std::string& file = "(in memory)");
 
+/// The groups, datasets and attributes of a throw log that read_throw_log ignores: their paths, with a '*'
+/// for the ids of throws and objects, and in how many places each is. Throws LogError.
+std::map<std::string, std::size_t> ignored_names(const std::filesystem::path& file);
+
 /// The root attribute `schema` ("throw-log", "slip-log" or whatever it says), to choose a reader by.
 std::string read_schema_name(const std::filesystem::path& file);
 
