@@ -125,6 +125,15 @@ std::vector<std::string> repeated(const CLI::App& command, int argc, char** argv
   return out;
 }
 
+/// CLI11's message; of an option that is given too often, in plain words.
+std::string in_words(const CLI::ParseError& error) {
+  const std::string said = error.what(), too_often = ": At Most 1 required but received ";
+  const auto at = said.find(too_often);
+  if (at == std::string::npos) return said;
+  return fmt::format("{}: given {} times, and one is taken", said.substr(0, at),
+                     said.substr(at + too_often.size()));
+}
+
 }  // namespace
 
 Option Option::required() { return option_->required(), *this; }
@@ -244,7 +253,7 @@ Parser::Parsed Parser::parse(int argc, char** argv) {
     return Parsed::run;
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() != 0) {
-      tell("unhand: {}\nRun with --help for more information.\n", error.what());
+      tell("unhand: {}\nRun with --help for more information.\n", in_words(error));
       return Parsed::wrong_usage;
     }
     app_->exit(error);  // prints the help or the version

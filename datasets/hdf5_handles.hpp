@@ -67,7 +67,8 @@ class Session {
   void* data_ = nullptr;
 };
 
-/// What HDF5 itself said about the call that just failed: its innermost message.
+/// What HDF5 itself said about the call that just failed: its innermost message, of the system's errors what
+/// the system said.
 inline std::string last_message() {
   std::string text;
   const auto take = [](unsigned depth, const H5E_error2_t* error, void* out) -> herr_t {
@@ -75,6 +76,11 @@ inline std::string last_message() {
     return 0;
   };
   H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take, &text);
+  constexpr std::string_view of_system = "error message = '";
+  if (const auto at = text.find(of_system); at != std::string::npos) {
+    const std::string said = text.substr(at + of_system.size());
+    return said.substr(0, said.find('\''));
+  }
   return text.empty() ? "no detail" : text;
 }
 

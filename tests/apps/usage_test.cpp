@@ -192,6 +192,11 @@ TEST_F(Cli, AFileOfAnotherKindIsToldFromADamagedOne) {
                  "line 1: is not UTF-8 text; it is an HDF5 file");
 }
 
+TEST_F(Cli, AnOptionGivenTwiceIsSaidToBe) {
+  expect_refusal("compare " + quick + " --json a.json --json b.json", 2,
+                 "--json: given 2 times, and one is taken");
+}
+
 TEST_F(Cli, UnknownNamesBringTheNearest) {
   expect_refusal("generate quick --out a.h5", 2, "no campaign is called 'quick'; did you mean 'quick12'?");
   expect_refusal("generate quick12 --out a.h5 --effect wnid=1", 2, "did you mean 'flight.wind'?");
