@@ -152,11 +152,11 @@ std::string unexplained_text(std::span<const fitting::AcceptedEffect> effects,
 std::string effect_html(const fitting::AcceptedEffect& effect) {
   std::string out = fmt::format("<h3>{}</h3><p>", escaped(effect.id));
   for (const auto& p : effect.parameters) {
-    const auto end = [&](double sign) {
-      return rounded(p.value + sign * fitting::kNormal95 * p.sigma, p.sigma).value;
-    };
+    const auto [low, high] = p.interval95();
     const std::string interval =
-        is_held(p.value, p.sigma) ? "" : fmt::format(" (95 %: {} to {})", end(-1), end(1));
+        is_held(p.value, p.sigma)
+            ? ""
+            : fmt::format(" (95 %: {} to {})", rounded(low, p.sigma).value, rounded(high, p.sigma).value);
     out += fmt::format("{} = {}{}<br>", escaped(p.name), escaped(with_sigma(p.value, p.sigma, p.unit)),
                        interval);
   }
@@ -175,7 +175,11 @@ Json effect_json(const fitting::AcceptedEffect& effect) {
   Json out{{"id", effect.id}, {"equivalent", Json::array()}, {"parameters", Json::object()}};
   for (const auto& [id, correlation] : effect.equivalent) out["equivalent"].push_back(id);
   for (const auto& p : effect.parameters)
-    out["parameters"][p.name] = {{"value", number(p.value)}, {"sigma", number(p.sigma)}, {"unit", p.unit}};
+    out["parameters"][p.name] = {{"value", number(p.value)},
+                                 {"sigma", number(p.sigma)},
+                                 {"low95", number(p.interval95()[0])},
+                                 {"high95", number(p.interval95()[1])},
+                                 {"unit", p.unit}};
   out["delta_bic"] = number(effect.delta_bic);
   out["p_value"] = number(effect.p_value);
   out["test_error_ratio"] = number(effect.test_error_ratio);

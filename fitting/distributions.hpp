@@ -6,6 +6,9 @@ namespace unhand::fitting {
 /// Half the width of a normal distribution's 95 % interval [standard deviations].
 inline constexpr double kNormal95 = 1.959963984540054;
 
+/// Degrees of freedom of a variance that rests on declarations alone.
+inline constexpr double kCertain = 1e9;
+
 /// Half the width of a 95 % interval in sigmas: t₀.₉₇₅ of Student's t for n degrees of freedom; one where n
 /// is less.
 double student_factor(double n);

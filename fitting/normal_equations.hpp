@@ -5,6 +5,7 @@
 #include <array>
 #include <vector>
 
+#include "fitting/distributions.hpp"
 #include "fitting/fit.hpp"
 
 namespace unhand::fitting {
@@ -64,9 +65,6 @@ NormalEquations normal_equations(const CampaignProblem& problem, const std::vect
                                  const std::vector<std::vector<double>>& own,
                                  const std::vector<double>& own_sigma, const Weighting& weighting,
                                  int threads);
-
-/// Degrees of freedom of a variance that rests on declarations alone.
-inline constexpr double kCertain = 1e9;
 
 /// A covariance that rests on the scatter between throws.
 struct ScatterCovariance {

@@ -138,6 +138,11 @@ std::vector<std::string> leading_names(std::span<const AcceptedEffect> effects,
   return out;
 }
 
+std::array<double, 2> Parameter::interval95() const {
+  const double half = student_factor(degrees_of_freedom) * sigma;
+  return {value - half, value + half};
+}
+
 void AcceptedEffect::add_other_name(const std::string& other, double correlation) {
   for (auto& [name, known] : equivalent)
     if (name == other) {

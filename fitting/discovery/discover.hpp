@@ -2,6 +2,7 @@
 // whether held-out throws agree.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <span>
@@ -13,6 +14,7 @@
 #include "fitting/discovery/lack_of_fit.hpp"
 #include "fitting/discovery/missing_force.hpp"
 #include "fitting/discovery/residuals.hpp"
+#include "fitting/distributions.hpp"
 #include "fitting/fit.hpp"
 
 namespace unhand::fitting {
@@ -102,6 +104,9 @@ struct OutcomeErrors {
 struct Parameter {
   std::string name, unit;   ///< without the effect's id, with "[object]" where every object has its own
   double value{}, sigma{};  ///< in `unit`; 1 σ
+  double degrees_of_freedom{kCertain};  ///< of sigma, which comes from the scatter between throws
+  /// value ± t sigma, Student's t.
+  std::array<double, 2> interval95() const;
 };
 
 /// An experiment that would tell an accepted effect from another name of its footprint.

@@ -118,7 +118,8 @@ void describe(Stage& stage, FitResult counted, const DiscoverOptions& options, D
     if (is_law(accepted.id)) {
       for (const auto& u : stage.fit.campaign)
         if (u.unknown.of_law)
-          accepted.parameters.push_back({u.unknown.name, u.unknown.unit, u.value, u.sigma});
+          accepted.parameters.push_back(
+              {u.unknown.name, u.unknown.unit, u.value, u.sigma, u.degrees_of_freedom});
       continue;
     }
     const dynamics::Effect effect = find_effect(accepted.id);
@@ -126,8 +127,8 @@ void describe(Stage& stage, FitResult counted, const DiscoverOptions& options, D
     for (const auto& u : stage.fit.campaign)
       for (const auto& p : effect.parameters)
         if (without_object(u.unknown.name) == effect.full_name(p))
-          accepted.parameters.push_back(
-              {u.unknown.name.substr(accepted.id.size() + 1), u.unknown.unit, u.value, u.sigma});
+          accepted.parameters.push_back({u.unknown.name.substr(accepted.id.size() + 1), u.unknown.unit,
+                                         u.value, u.sigma, u.degrees_of_freedom});
     find_other_names(f, contribution_of(stage.fit, effect), options.equivalent, out.silent, accepted);
   }
 }

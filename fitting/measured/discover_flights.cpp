@@ -27,7 +27,7 @@ struct ApparentGravity {
   double excess{}, sigma{};
 };
 ApparentGravity apparent_gravity(const AcceptedEffect& effect) {
-  const auto& [name, unit, s, sigma] = effect.parameters.front();
+  const double s = effect.parameters.front().value, sigma = effect.parameters.front().sigma;
   if (effect.id == kClock) return {1 / (s * s) - 1, 2 * sigma / (s * s * s)};
   return {s - 1, sigma};
 }

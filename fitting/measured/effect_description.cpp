@@ -59,7 +59,7 @@ std::vector<AcceptedEffect> described(const GroupedProblem& problem, const Effec
       const SharedParameter& p = fit.shared[k];
       if (p.effect != accepted.id) continue;
       const double value = fit.values[static_cast<Index>(k)];
-      accepted.parameters.push_back({p.short_name, p.unit, value, fit.sigma(k)});
+      accepted.parameters.push_back({p.short_name, p.unit, value, fit.sigma(k), fit.used - 1.0});
       if (!p.shape) contribution[static_cast<Index>(k)] = value - p.neutral;
     }
     for (const Candidate& candidate : f.total.candidates) {

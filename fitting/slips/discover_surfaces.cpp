@@ -260,7 +260,7 @@ void accept_law(const LawScore& law, bool controlled, SurfaceDiscovery& out) {
   effect.p_value = law.gain.p();
   effect.delta_bic = law.delta_bic();
   effect.test_error_ratio = law.error / law.base_error;
-  effect.parameters.push_back({"gain", "deg", law.gain.mean(), law.gain.error()});
+  effect.parameters.push_back({"gain", "deg", law.gain.mean(), law.gain.error(), law.gain.n - 1});
   effect.why = fmt::format(
       "mean angle between predicted and measured direction of sliding falls from {:.2f} to {:.2f} degrees, "
       "on {} of {} surfaces",

@@ -58,6 +58,10 @@ TEST_F(Cli, DiscoverFindsTheDragThatIsThere) {
     EXPECT_NEAR(k["value"].get<double>(), kDrag, 4 * k["sigma"].get<double>()) << name;
     EXPECT_LT(k["sigma"].get<double>(), 0.05 * kDrag) << name;
     EXPECT_EQ(k["unit"], "1/m") << name;
+    const double half = 0.5 * (k["high95"].get<double>() - k["low95"].get<double>());
+    EXPECT_GT(half / k["sigma"].get<double>(), 2.2)
+        << "the scatter of eight throws: at most seven degrees of freedom";
+    EXPECT_NEAR(k["low95"].get<double>() + half, k["value"].get<double>(), 1e-9) << name;
   }
   // Without the drag the landings are predicted centimetres too far; with it, as well as throws repeat: 2 mm.
   json &before = found["error"]["before"], &after = found["error"]["after"];
