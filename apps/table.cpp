@@ -124,7 +124,7 @@ bool is_held(double value, double sigma) { return sigma <= 1e-12 * std::abs(valu
 Rounded rounded(double value, double sigma) {
   if (!(sigma > 0) || !std::isfinite(sigma) || !std::isfinite(value))
     return {fmt::format("{:.6g}", value), fmt::format("{:.2g}", sigma), {}};
-  constexpr int most = 9;  // digits after the point that are still read at a glance
+  constexpr int most = 7;  // digits after the point that are still read at a glance
   const std::string two = fmt::format("{:.1e}", sigma);  // rounded first: 0.0996 is 0.10
   const int power = std::atoi(two.c_str() + two.find('e') + 1), decimals = 1 - power;
   if (decimals > most) {

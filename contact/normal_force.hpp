@@ -143,6 +143,10 @@ struct NormalForceSummary {
       std::numeric_limits<double>::infinity()};  ///< 1 σ of it [N]; infinite without samples there
 };
 
+/// The share of the sensor's bias (tail_mean) that the smoothing takes off at time t [s]: 0 while the grip
+/// holds, 1 from the release on, in proportion to time between.
+double bias_share(const NormalForceSummary& summary, double t);
+
 /// A smoothed normal force and how it was found.
 struct NormalForceFit {
   SampledNormalForce force;    ///< from the first sample on; constant before it

@@ -13,6 +13,13 @@
 #include "dynamics/white_noise.hpp"
 
 namespace unhand::contact {
+
+double bias_share(const NormalForceSummary& u, double t) {
+  const double length = u.release_time - u.opening_start;
+  if (!std::isfinite(length)) return t >= u.release_time ? 1.0 : 0.0;
+  return std::clamp((t - u.opening_start) / length, 0.0, 1.0);
+}
+
 namespace {
 
 using Polynomial = SampledNormalForce::Polynomial;
@@ -76,13 +83,6 @@ SampledNormalForce assemble(const ForceSeries& s, Pieces p, double release) {
   std::sort(p.kinks.begin(), p.kinks.end());
   p.kinks.erase(std::unique(p.kinks.begin(), p.kinks.end()), p.kinks.end());
   return {Polynomial(std::move(p.breaks), std::move(p.pieces)), std::move(p.kinks), release};
-}
-
-// The share of the sensor's bias that acts at t: it is faded out over the ramp.
-double bias_share(const NormalForceSummary& u, double t) {
-  const double length = u.release_time - u.opening_start;
-  if (!std::isfinite(length)) return t >= u.release_time ? 1.0 : 0.0;
-  return std::clamp((t - u.opening_start) / length, 0.0, 1.0);
 }
 
 void finish(const ForceSeries& s, NormalForceFit& fit, double parameters) {

@@ -21,6 +21,14 @@ inline double trimmed_rms(std::span<const double> squares) {
   return std::sqrt(sum / n);
 }
 
+/// The same, but of all where the median is zero: as on a coarse grid, where most differences are.
+inline double typical_rms(std::span<const double> squares) {
+  if (const double trimmed = trimmed_rms(squares); trimmed > 0.0 || squares.empty()) return trimmed;
+  double sum = 0.0;
+  for (const double x : squares) sum += x;
+  return std::sqrt(sum / static_cast<double>(squares.size()));
+}
+
 /// Fourth differences of every `stride`-th value from `first` on; of white noise they have the variance 70
 /// σ².
 inline std::vector<double> fourth_differences(std::span<const double> values, std::size_t first = 0,

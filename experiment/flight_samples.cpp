@@ -1,10 +1,12 @@
 #include "experiment/flight_samples.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include "dynamics/third_difference.hpp"
+#include "dynamics/white_noise.hpp"
 
 namespace unhand::experiment {
 namespace {
@@ -95,21 +97,24 @@ FlightScatter scatter_of(const FlightSamples& s) {
   std::vector<flight::Vec3<double>> turns;  // between neighbours: their second differences are third ones
   for (std::size_t i = 1; i < s.attitude.size(); ++i)
     turns.push_back(flight::rotation_between(s.attitude[i - 1], s.attitude[i]));
+  std::array<std::vector<double>, 3> position;  // variances
+  std::vector<double> angle;
   for (std::size_t i = 3; i < s.position.size(); ++i) {
     ++out.n;
+    double turned = 0;
     for (std::size_t a = 0; a < 3; ++a) {
-      out.position[a] += dynamics::third_difference_variance(s.position[i - 3][a], s.position[i - 2][a],
-                                                             s.position[i - 1][a], s.position[i][a]);
+      position[a].push_back(dynamics::third_difference_variance(s.position[i - 3][a], s.position[i - 2][a],
+                                                                s.position[i - 1][a], s.position[i][a]));
       if (i < s.attitude.size())
-        out.angle += std::pow(turns[i - 1][a] - 2 * turns[i - 2][a] + turns[i - 3][a], 2) / 60;
+        turned += std::pow(turns[i - 1][a] - 2 * turns[i - 2][a] + turns[i - 3][a], 2) / 60;
     }
     if (i < s.theta.size())
-      out.angle +=
+      turned =
           dynamics::third_difference_variance(s.theta[i - 3], s.theta[i - 2], s.theta[i - 1], s.theta[i]);
+    angle.push_back(turned);
   }
-  if (out.n == 0) return out;
-  for (double& x : out.position) x = std::sqrt(x / static_cast<double>(out.n));
-  out.angle = std::sqrt(out.angle / static_cast<double>(out.n));
+  for (std::size_t a = 0; a < 3; ++a) out.position[a] = dynamics::typical_rms(position[a]);
+  out.angle = dynamics::typical_rms(angle);
   return out;
 }
 

@@ -24,8 +24,9 @@ struct FlightSamples {
 /// Of a throw with `mocap`.
 FlightSamples read_flight_samples(const datasets::ThrowLog& log, const datasets::Throw& one);
 
-/// What scatters from sample to sample, 1 σ (dynamics::third_difference_variance).
-/// Of position [m] per axis and of a small rotation about any axis [rad]; 0 where the series is too short.
+/// What scatters from sample to sample, 1 σ (dynamics::third_difference_variance), without the few
+/// differences that glitches make (dynamics::typical_rms). Of position [m] per axis and of a small rotation
+/// about any axis [rad]; 0 where the series is too short.
 struct FlightScatter {
   flight::Vec3<double> position{};  ///< 1 σ by world axis [m]
   double angle{};                   ///< 1 σ [rad]

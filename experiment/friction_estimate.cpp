@@ -221,8 +221,9 @@ void estimate_delay(const datasets::ThrowLog& log, const std::vector<PreparedThr
                        "detach_time, nor motion capture from the opening to the landing)",
                        "give a card (--card), or the throws their detach_time");
   double mean = 0, square = 0;
-  for (const double d : delays) mean += d / static_cast<double>(delays.size());
-  for (const double d : delays) square += (d - mean) * (d - mean) / static_cast<double>(delays.size());
+  const auto n = static_cast<double>(delays.size());
+  for (const double d : delays) mean += d / n;
+  for (const double d : delays) square += (d - mean) * (d - mean) / std::max(1.0, n - 1);
   mean = std::max(mean, 0.0);
   out.parameters.delay =
       square > 0 ? contact::DelayDistribution::normal(mean, std::sqrt(square), std::max(0.1, 2 * mean))

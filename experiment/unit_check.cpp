@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -123,6 +124,58 @@ std::vector<UnitDoubt> turned_grasps(const datasets::ThrowLog& log) {
                        turn, angles.size())}};
 }
 
+/// How far a hand moves along a column of its pose while motion capture sees the object in it.
+double hand_moves(const datasets::ThrowLog& log, const datasets::Throw& one, std::size_t column) {
+  double opening = one.hand->time(one.hand->time.rows - 1), low = HUGE_VAL, high = -HUGE_VAL,
+         first = HUGE_VAL;
+  if (log.gripper && log.gripper->opening_command_time)
+    opening = *log.gripper->opening_command_time;
+  else if (one.detach_time)
+    opening = *one.detach_time;
+  for (std::size_t i = one.mocap->time.rows; i-- > 0;)
+    if (one.mocap->is_valid(i)) first = one.mocap->time(i);
+  for (std::size_t i = 0; i < one.hand->time.rows; ++i) {
+    if (one.hand->time(i) < first || one.hand->time(i) > opening) continue;
+    low = std::min(low, one.hand->pose(i, column)), high = std::max(high, one.hand->pose(i, column));
+  }
+  return std::max(0.0, high - low);
+}
+
+/// Columns of a tracked pose that read one value although the hand that holds the object moves along them.
+std::vector<UnitDoubt> dead_tracks(const datasets::ThrowLog& log) {
+  constexpr double kMoves[3] = {0.01, 0.01, 0.05};  // m, m, rad
+  constexpr const char *kNames[3] = {"x", "z", "theta"}, *kUnits[3] = {"m", "m", "rad"};
+  constexpr std::size_t kFewest = 10;  // samples
+  std::vector<UnitDoubt> out;
+  if (log.dimension != 2) return out;
+  for (std::size_t c = 0; c < 3; ++c) {
+    UnitDoubt doubt;
+    for (const auto& one : log.throws) {
+      if (!one.hand || one.hand->pose.empty() || !one.mocap) continue;
+      std::set<double> seen;
+      std::size_t samples = 0;
+      for (std::size_t i = 0; i < one.mocap->time.rows && seen.size() < 2; ++i)
+        if (one.mocap->is_valid(i)) seen.insert(one.mocap->pose(i, c)), ++samples;
+      if (seen.size() != 1 || samples < kFewest) continue;
+      const double moves = hand_moves(log, one, c);
+      if (moves < kMoves[c] || doubt.throws++ > 0) continue;
+      doubt.path = "/throws/" + one.id + "/mocap/pose";
+      doubt.column = kNames[c];
+      doubt.reason = fmt::format(
+          "{} is {:.6g} {} in every sample, while the hand that holds the object moves by "
+          "{:.3g} {}",
+          kNames[c], *seen.begin(), kUnits[c], moves, kUnits[c]);
+    }
+    if (doubt.throws == 0) continue;
+    doubt.reason += fmt::format(
+        " (so in {} of {} throws): not tracked? Leave such a mocap out of the log; predictions then need the "
+        "throw's grasp_angle",
+        doubt.throws, log.throws.size());
+    out.push_back(std::move(doubt));
+  }
+  return out;
+}
+
 /// Whether wrenches of slipping pads go with the normal force, as in any unit they do. A bias of either, or a
 /// force that acts later than it says, counts for more the less is left of it.
 bool is_one_factor(const RatiosByColumn& ratios) {
@@ -152,8 +205,8 @@ std::vector<UnitDoubt> doubtful_friction(const RatiosByColumn& ratios) {
 std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log) {
   // What one check finds makes the later ones compare with what is wrong: the first that finds something is
   // the last.
-  for (const auto check :
-       {doubtful_gravity, impossible_declarations, gravity_taken_out, jumping_angles, reversed_forces})
+  for (const auto check : {doubtful_gravity, impossible_declarations, gravity_taken_out, dead_tracks,
+                           jumping_angles, reversed_forces})
     if (auto out = check(log); !out.empty()) return out;
   std::vector<SizeRatios> throws;
   RatiosByColumn ratios;

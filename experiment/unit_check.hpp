@@ -34,6 +34,7 @@ inline constexpr double kLeastOutlier = 5;
 /// The columns of a log whose size contradicts other channels by about the factor of a
 /// unit in use (mm, cm, inch; degrees; kgf, lbf, mN, kN; N mm, N cm, kgf cm; ms; g). Compared are
 ///
+/// - a column of the tracked pose that never changes with the hand's, which moves;
 /// - the hand's pose with the sum of its twist, the twist with the sum of the acceleration;
 /// - the object's motion with the hand's while it is held, and then its distance with its com_offset;
 /// - the wrench of all pads with what the held body's mass, inertia and lever need (Newton and Euler);

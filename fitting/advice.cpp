@@ -83,8 +83,7 @@ std::vector<Correlation> strong_correlations(const FitResult& fit, double limit)
 
 std::array<double, 2> FittedUnknown::interval95() const {
   if (profile) return *profile;
-  const double half = student_factor(degrees_of_freedom) * sigma;
-  return {value - half, value + half};
+  return student_interval(value, sigma, interval_freedom());
 }
 
 }  // namespace unhand::fitting

@@ -214,7 +214,7 @@ ModelCard card_of(const CampaignProblem& problem, const FitResult& fit) {
   for (std::size_t k = 0; k < n; ++k) {
     const FittedUnknown& u = fit.campaign[k];
     auto& one = card.parameters[u.unknown.name] = {
-        u.value, {}, u.unknown.unit, is_determined(fit, k), u.degrees_of_freedom, u.profile};
+        u.value, {}, u.unknown.unit, is_determined(fit, k), u.interval_freedom(), u.profile};
     if (!std::isfinite(fit.covariance[k * n + k])) continue;
     one.sigma = u.sigma;
     if (fit.covariance[k * n + k] == 0) continue;  // fixed

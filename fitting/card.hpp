@@ -22,6 +22,7 @@ struct Condition {
 ///   mass [kg], com_offset [m]     the object and the lever from the pads to its CoM
 ///   release_speed [m/s], release_omega [rad/s]   of the hand when the gripper is told to open
 ///   grip_force [N], opening_time [s]             of the measured normal force: before it falls, and its fall
+///   shape [-], dead_time [s]      exponent of that fall, and from the command to its begin
 ///   detach_speed [m/s], detach_omega [rad/s]     of the object, measured in flight
 std::vector<Condition> conditions_of(const experiment::PreparedThrow& prepared);
 

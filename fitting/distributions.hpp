@@ -1,6 +1,8 @@
 // Tails of the distributions that tests refer to, by Boost.Math.
 #pragma once
 
+#include <array>
+
 namespace unhand::fitting {
 
 /// Half the width of a normal distribution's 95 % interval [standard deviations].
@@ -12,6 +14,12 @@ inline constexpr double kCertain = 1e9;
 /// Half the width of a 95 % interval in sigmas: t₀.₉₇₅ of Student's t for n degrees of freedom; one where n
 /// is less.
 double student_factor(double n);
+
+/// value ± student_factor(n) sigma.
+inline std::array<double, 2> student_interval(double value, double sigma, double n) {
+  const double half = student_factor(n) * sigma;
+  return {value - half, value + half};
+}
 
 /// P(|N(0, 1)| > |z|).
 double normal_two_sided(double z);

@@ -170,10 +170,13 @@ CrossValidation cross_validate(const datasets::ThrowLog& log, const std::string&
                                const CampaignOptions& campaign, const FitOptions& options, int folds) {
   datasets::ThrowLog train = log;
   std::erase_if(train.throws, [](const datasets::Throw& one) { return one.split != datasets::Split::train; });
-  std::vector<std::string> conditions;
+  const auto condition_of = [](const datasets::Throw& one) {  // two objects may share its name
+    return std::pair{one.object, one.condition};
+  };
+  std::vector<std::pair<std::string, std::string>> conditions;
   for (const auto& one : train.throws)
-    if (std::find(conditions.begin(), conditions.end(), one.condition) == conditions.end())
-      conditions.push_back(one.condition);
+    if (std::find(conditions.begin(), conditions.end(), condition_of(one)) == conditions.end())
+      conditions.push_back(condition_of(one));
   if (folds < 2 || conditions.size() < 2)
     throw std::invalid_argument(fmt::format(
         "{}: {} folds of {} conditions among the train throws: cross-validation needs two of each", file,
@@ -185,7 +188,7 @@ CrossValidation cross_validate(const datasets::ThrowLog& log, const std::string&
     std::vector<std::size_t> left_out;
     for (std::size_t i = 0; i < part.throws.size(); ++i) {
       const auto c =
-          std::find(conditions.begin(), conditions.end(), part.throws[i].condition) - conditions.begin();
+          std::find(conditions.begin(), conditions.end(), condition_of(part.throws[i])) - conditions.begin();
       if (c % out.folds != fold) continue;
       part.throws[i].split = datasets::Split::test;
       left_out.push_back(i);

@@ -10,6 +10,7 @@
 
 #include "experiment/observations.hpp"
 #include "fitting/campaign_problem.hpp"
+#include "fitting/distributions.hpp"
 
 namespace unhand::fitting {
 
@@ -93,8 +94,11 @@ struct FittedUnknown {
   /// fitted again, the cost has risen by as much as it would at ± t sigma if it were a parabola. An end
   /// beyond the accepted range is infinite.
   std::optional<std::array<double, 2>> profile{};
-  /// The 95 % interval: the profile's, or value ± t sigma, Student's t.
+  bool allows_for_few{};  ///< sigma is wider by what Student's t asks: ±1.96 sigma is the 95 % interval
+  /// The 95 % interval: the profile's, or value ± t sigma, Student's t (1.96 where sigma allows for few).
   std::array<double, 2> interval95() const;
+  /// Degrees of freedom of that t.
+  double interval_freedom() const { return allows_for_few ? kCertain : degrees_of_freedom; }
 };
 
 /// A direction in the space of the campaign's unknowns that the log leaves open.

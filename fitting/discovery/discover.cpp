@@ -138,11 +138,6 @@ std::vector<std::string> leading_names(std::span<const AcceptedEffect> effects,
   return out;
 }
 
-std::array<double, 2> Parameter::interval95() const {
-  const double half = student_factor(degrees_of_freedom) * sigma;
-  return {value - half, value + half};
-}
-
 void AcceptedEffect::add_other_name(const std::string& other, double correlation) {
   for (auto& [name, known] : equivalent)
     if (name == other) {
@@ -193,6 +188,7 @@ FitResult search_and_question(Stage& stage, DiscoverOptions options, Discovery& 
   if (!drop_idle_give(stage, options, out)) return counted;
   options.forget.push_back(kPads);
   stage.asked.reset();
+  out.asked.reset(), out.imitations.clear();  // of a search that is made again
   return search_and_question(stage, std::move(options), out);
 }
 
@@ -264,6 +260,7 @@ void plan_experiments(const Stage& stage, const DiscoverOptions& options, Discov
 Discovery discover(const datasets::ThrowLog& logged, const std::string& file, const DiscoverOptions& given) {
   const auto begin = Clock::now();
   validate(given);
+  datasets::validate(logged, file);
   DiscoverOptions options = without_forgotten(given);
   const datasets::ThrowLog log = with_held_out(logged);
   Discovery out;
@@ -293,6 +290,8 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
   out.footprints =
       footprint_traces(base.problem, base.fit, leading_names(out.effects, out.ranking), options.fit);
   tell_after(stage, options, out);
+  for (const AcceptedEffect& effect : out.effects)
+    if (out.small && out.small->id == effect.id) out.small.reset();
   tell_fates(out.effects, out.imitations, out.along, out.ranking);
   out.unexplained = unexplained(stage, out, options);
   if (out.unexplained) out.small.reset();  // beside that, nobody knows what it imitates

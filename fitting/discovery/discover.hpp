@@ -106,7 +106,7 @@ struct Parameter {
   double value{}, sigma{};  ///< in `unit`; 1 σ
   double degrees_of_freedom{kCertain};  ///< of sigma, which comes from the scatter between throws
   /// value ± t sigma, Student's t.
-  std::array<double, 2> interval95() const;
+  std::array<double, 2> interval95() const { return student_interval(value, sigma, degrees_of_freedom); }
 };
 
 /// An experiment that would tell an accepted effect from another name of its footprint.

@@ -113,12 +113,16 @@ void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threa
   const Eigen::VectorXd noise = whole.covariance.diagonal();
 
   Eigen::VectorXd variance = noise;
+  std::vector<bool> allows_for_few(static_cast<std::size_t>(width), false);
   const auto count = static_cast<double>(conditions.size());
   if (count >= 3) {
     Eigen::VectorXd jackknife = Eigen::VectorXd::Zero(width);
     for (const auto& [name, of] : conditions) jackknife += (Answer(all - of).step - whole.step).cwiseAbs2();
     const double t = student_factor(count - 1) / kNormal95;
-    variance = variance.cwiseMax((count - 1) / count * t * t * jackknife);
+    jackknife *= (count - 1) / count * t * t;
+    for (Eigen::Index k = 0; k < width; ++k)
+      if (jackknife[k] > variance[k])
+        variance[k] = jackknife[k], allows_for_few[static_cast<std::size_t>(k)] = true;
   }
   Eigen::VectorXd excess = Eigen::VectorXd::Zero(width);
   for (const Equations& rest : without) {
@@ -139,6 +143,7 @@ void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threa
     if (!(u.sigma > 0) || !(variance[k] > u.sigma * u.sigma)) continue;
     factor[static_cast<std::size_t>(k)] = std::sqrt(variance[k]) / u.sigma;
     u.sigma = std::sqrt(variance[k]);
+    u.allows_for_few = allows_for_few[static_cast<std::size_t>(k)];
   }
   for (std::size_t j = 0; j < factor.size(); ++j)
     for (std::size_t k = 0; k < factor.size(); ++k)

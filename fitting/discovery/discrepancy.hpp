@@ -15,7 +15,8 @@ namespace unhand::fitting {
 /// without a block of channels (pads' wrenches; motion in the hand; flight; landing) and V_b what noise alone
 /// would make of it (H₋b⁻¹ − H⁻¹, scaled as V is to H⁻¹): where one kind of sensor says something else than
 /// the rest, the law is wrong in one of the two, and nobody knows in which [Hausman1978]. A block without
-/// which the unknown is no longer determined has no say. Correlations stay as they are.
+/// which the unknown is no longer determined has no say. Correlations stay as they are, and so do the degrees
+/// of freedom: Wald's test of a σ that t has widened (allows_for_few) asks for somewhat more than its level.
 void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threads);
 
 }  // namespace unhand::fitting

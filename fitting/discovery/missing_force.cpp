@@ -204,13 +204,14 @@ std::vector<MissingCurve> missing_curves(const std::vector<ResidualTrace>& trace
       curve.chi2_before += squares, curve.chi2_after += squares;
       if (!(H.diagonal().maxCoeff() > 0)) continue;
       // Second differences cost a thousandth of what the best determined knot is worth.
+      const Eigen::MatrixXd information = H;
       Eigen::MatrixXd D = Eigen::MatrixXd::Zero(std::max<Eigen::Index>(width - 2, 0), width);
       for (Eigen::Index k = 0; k + 2 < width; ++k) D(k, k) = 1, D(k, k + 1) = -2, D(k, k + 2) = 1;
       H += 1e-3 * H.diagonal().maxCoeff() * gram(D);
       H.diagonal().array() += 1e-9 * H.diagonal().maxCoeff();
       const Eigen::VectorXd a = definite_solve(H, g);
       const Eigen::MatrixXd covariance = definite_inverse(H);
-      curve.chi2_after -= a.dot(g);
+      curve.chi2_after += a.dot(information * a) - 2 * a.dot(g);
       for (std::size_t j = 0; j < n; ++j) {
         value[j] = a[static_cast<Eigen::Index>(j)];
         sigma[j] =
@@ -259,7 +260,7 @@ MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const M
       H += gram(columns);
       g += inner_products(columns, rows.seen());
       squares += rows.seen().squaredNorm();
-      samples += static_cast<double>(rows.seen().size());
+      samples += static_cast<double>(rows.degrees_of_freedom());
     }
   MissingCandidate out;
   if (!(samples > 0)) return out;

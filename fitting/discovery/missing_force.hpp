@@ -75,9 +75,10 @@ struct MissingCandidate {
 };
 
 /// Sparse regression by forward selection: a term enters while it lowers χ² by more than 2 log n and by a
-/// fifth. Accelerations: v, |v| v, |v|² v, ω J v, a constant along x or z, one and ω² along each of the
-/// object's axes (a reference point off the CoM), and for the rotation a constant, ω, |ω| ω, sin θ and cos θ.
-/// Wrenches: a constant, f_N, and f_N² of each component, and |v| and ω for their dependence on the motion.
+/// fifth of what exceeds the noise. Accelerations: v, |v| v, |v|² v, ω J v, a constant along x or z, one and
+/// ω² along each of the object's axes (a reference point off the CoM), and for the rotation a constant, ω,
+/// |ω| ω, sin θ and cos θ. Wrenches: a constant, f_N, and f_N² of each component, and |v| and ω for their
+/// dependence on the motion.
 MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const MissingOptions& options);
 
 /// χ² of the traces around what a candidate says, each recording's own offset and slope projected out where

@@ -36,7 +36,7 @@ std::vector<ResidualBin> residual_over_time(const CampaignProblem& problem, cons
 /// The predicted motion of the tracked frame where motion capture saw it, by differences of its samples, and
 /// the normal force. Empty without motion capture.
 struct StateSeries {
-  std::vector<double> time;                 ///< from the release [s]
+  std::vector<double> time;                 ///< as in the log [s]
   std::vector<ResidualTrace::State> state;  ///< one per time
   std::vector<std::array<double, 3>> pose;  ///< m, m, rad
   /// By linear interpolation, level beyond the ends; the normal force at that time.

@@ -119,7 +119,7 @@ void describe(Stage& stage, FitResult counted, const DiscoverOptions& options, D
       for (const auto& u : stage.fit.campaign)
         if (u.unknown.of_law)
           accepted.parameters.push_back(
-              {u.unknown.name, u.unknown.unit, u.value, u.sigma, u.degrees_of_freedom});
+              {u.unknown.name, u.unknown.unit, u.value, u.sigma, u.interval_freedom()});
       continue;
     }
     const dynamics::Effect effect = find_effect(accepted.id);

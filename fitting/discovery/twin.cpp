@@ -3,10 +3,12 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
 
+#include "contact/normal_force.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/random_stream.hpp"
 #include "experiment/sample_window.hpp"
@@ -35,14 +37,16 @@ void write_hand(const experiment::PreparedThrow& prepared, RandomStream random, 
     if (t < prepared.hand.begin() || t > prepared.hand.end()) continue;
     const auto state =
         prepared.hand.at(experiment::window_at(prepared.hand.begin(), prepared.hand.end(), jumps, t), t);
-    const auto put = [&](Series& series, double a, double b, double c) {
-      const double row[3] = {a, b, c};
+    const auto put = [&](Series& series, const std::array<double, 3>& row,
+                         const std::array<double, 3>& used) {
       for (std::size_t k = 0; k < 3 && !series.data.empty(); ++k)
-        series.data[i * series.cols + k] = random.normal(row[k], sigma_of(series, k, 0));
+        series.data[i * series.cols + k] = random.normal(row[k], sigma_of(series, k, used[k]));
     };
-    put(log.pose, state.pose.x, state.pose.z, state.pose.theta);
-    put(log.twist, state.twist.vx, state.twist.vz, state.twist.omega);
-    put(log.acceleration, state.acceleration.ax, state.acceleration.az, state.acceleration.alpha);
+    const auto& [pose, twist, acceleration] = state;
+    put(log.pose, {pose.x, pose.z, pose.theta}, prepared.hand_fit.pose_sigma);
+    put(log.twist, {twist.vx, twist.vz, twist.omega}, prepared.hand_fit.twist_sigma);
+    put(log.acceleration, {acceleration.ax, acceleration.az, acceleration.alpha},
+        prepared.hand_fit.acceleration_sigma);
   }
 }
 
@@ -51,10 +55,8 @@ void write_normal_force(const experiment::PreparedThrow& prepared, RandomStream 
                         datasets::FtLog& log) {
   const auto& fit = prepared.force_fit;
   for (std::size_t i = 0; i < log.time.rows; ++i) {
-    const double t = log.time(i), length = fit.release_time - fit.opening_start;
-    double fade = t >= fit.release_time ? 1 : 0;
-    if (std::isfinite(length)) fade = std::clamp((t - fit.opening_start) / length, 0.0, 1.0);
-    const double force = prepared.normal_force->at(kAlways, t) + fade * fit.tail_mean;
+    const double t = log.time(i);
+    const double force = prepared.normal_force->at(kAlways, t) + contact::bias_share(fit, t) * fit.tail_mean;
     log.normal_force.data[i] = random.normal(force, fit.sigma);
   }
 }

@@ -21,7 +21,7 @@ struct ErrorFloor {
   int twins{};                                      ///< with an answer
   std::vector<experiment::ModelComparison> models;  ///< of each twin
 
-  /// The mean over the twins of each statistic.
+  /// The mean over the twins of each statistic; n of the last one.
   experiment::ErrorStatistics statistics(int quantity, datasets::Split split) const;
 };
 /// Makes `twins` twins, from seeds derived from `seed`, and fits and predicts each.

@@ -101,7 +101,8 @@ std::vector<Stability> stability_of(const GroupedProblem& problem, const EffectA
       const auto j = static_cast<Index>(k);
       if (fit.shared[k].shape) continue;
       out.push_back({fit.shared[k].name, problem.covariates()[c], at, fit.values[j] + a.value[j], a.sigma[j],
-                     fit.values[j] + b.value[j], b.sigma[j]});
+                     fit.values[j] + b.value[j], b.sigma[j],
+                     static_cast<double>(used.size() - 2 * columns.size())});
     }
   }
   return out;

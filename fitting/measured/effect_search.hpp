@@ -26,6 +26,7 @@ struct Stability {
   std::string parameter, covariate;                 ///< which parameter; what the groups were split by
   double split_at{};                                ///< median of the covariate
   double low{}, low_sigma{}, high{}, high_sigma{};  ///< value and 1 σ in the lower and in the upper half
+  double degrees_of_freedom{};  ///< of both σ, which come from the scatter between groups
   /// The difference in its own σ.
   double z() const { return (high - low) / std::hypot(low_sigma, high_sigma); }
 };

@@ -8,6 +8,7 @@
 
 #include "dynamics/quantisation.hpp"
 #include "dynamics/third_difference.hpp"
+#include "dynamics/white_noise.hpp"
 #include "flight/quaternion.hpp"
 
 namespace unhand::fitting {
@@ -23,12 +24,13 @@ bool falls_at(const datasets::Throw& one, double time) {
   return time >= one.free_flight->first - 1e-9 && time <= one.free_flight->second + 1e-9;
 }
 
-/// 1 σ of white noise on a smooth series, from its third differences.
+/// 1 σ of white noise on a smooth series, from its third differences without those of stray samples.
 double scatter_of(const std::vector<Vec3<double>>& x, std::size_t axis) {
-  double sum = 0;
+  std::vector<double> variances;
   for (std::size_t i = 3; i < x.size(); ++i)
-    sum += dynamics::third_difference_variance(x[i - 3][axis], x[i - 2][axis], x[i - 1][axis], x[i][axis]);
-  return std::sqrt(sum / static_cast<double>(x.size() - 3));
+    variances.push_back(
+        dynamics::third_difference_variance(x[i - 3][axis], x[i - 2][axis], x[i - 1][axis], x[i][axis]));
+  return dynamics::typical_rms(variances);
 }
 
 /// Why an axis says nothing of a fall, or nothing. One of a single value does not, unless that is all that

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <utility>
 
+#include "fitting/discovery/held_out_split.hpp"
 #include "fitting/measured/grouped_fit.hpp"
 
 namespace unhand::fitting {
@@ -62,16 +64,21 @@ void OwnNames::spread(GroupEquations& equations, std::size_t all) const {
   equations.shared = std::move(out);
 }
 
+double Group::taken() const {
+  const auto priors = std::count_if(rows.begin(), rows.end(),
+                                    [](const GroupRow& row) { return row.channel == kPriorChannel; });
+  return std::max(0.0, static_cast<double>(start.size()) - static_cast<double>(priors));
+}
+
 std::vector<datasets::Split> splits_of(const datasets::ThrowLog& log) {
-  bool train = false, test = false;
-  for (const auto& t : log.throws) (t.split == datasets::Split::train ? train : test) = true;
+  const bool both = has_both_splits(log);
   std::vector<datasets::Split> out(log.throws.size(), datasets::Split::train);
-  std::map<std::string, std::vector<std::size_t>> conditions;
+  std::map<std::pair<std::string, std::string>, std::vector<std::size_t>> conditions;  // of each object
   for (std::size_t i = 0; i < out.size(); ++i) {
-    conditions[log.throws[i].condition].push_back(i);
-    if (train && test) out[i] = log.throws[i].split;
+    conditions[{log.throws[i].object, log.throws[i].condition}].push_back(i);
+    if (both) out[i] = log.throws[i].split;
   }
-  if (train && test) return out;
+  if (both) return out;
   int seen = 0;  // on from condition to condition, since each may have few
   for (const auto& [condition, throws] : conditions)
     for (const std::size_t i : throws)

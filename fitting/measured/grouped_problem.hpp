@@ -33,6 +33,10 @@ struct Group {
   /// problem.
   std::vector<double> covariates;
   bool set_aside{};  ///< it errs as no other does: nothing is fitted to it, and it judges nothing
+
+  /// Degrees of freedom that its own unknowns take from its measurements: what is known of them beforehand
+  /// counts as measured.
+  double taken() const;
 };
 
 /// (predicted − measured)/σ of a group, by row, with derivatives where they were asked for.

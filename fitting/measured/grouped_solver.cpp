@@ -86,7 +86,7 @@ class Solver {
   /// The residuals at the solution, and the shared parameters' covariance.
   void finish() {
     fit_.chi2 = 0, fit_.samples = 0, fit_.used = 0;
-    long unknowns = fit_.values.size();
+    double unknowns = static_cast<double>(fit_.values.size());
     const Index p = fit_.values.size();
     MatrixXd A = MatrixXd::Zero(p, p), scores = MatrixXd::Zero(p, static_cast<Index>(used_.size()));
     for (std::size_t n = 0; n < used_.size(); ++n) {
@@ -102,15 +102,12 @@ class Solver {
       const double w = fit_.weights.group[used_[n]];
       fit_.chi2 += g.chi2;
       fit_.samples += g.n;
-      unknowns += g.own.size();
+      unknowns += group.taken();
       ++fit_.used;
       A += w * parts_[n].information;
       scores.col(static_cast<Index>(n)) = w * parts_[n].score;
     }
-    for (std::size_t n = 0; n < used_.size(); ++n)  // what is known beforehand counts as measured
-      for (const auto& row : problem_.groups()[used_[n]].rows)
-        if (row.channel == kPriorChannel && fit_.groups[used_[n]].solved) --unknowns;
-    fit_.degrees_of_freedom = fit_.samples - unknowns;
+    fit_.degrees_of_freedom = fit_.samples - static_cast<long>(unknowns);
     fit_.solved = fit_.used > 0;
     if (p == 0) return;
     const MatrixXd inverse = pseudo_inverse(A);

@@ -90,7 +90,7 @@ double least_misfit(int n) { return std::max(0.2, 3 * std::sqrt(2.0 / std::max(1
 
 /// Of a misfit: what may be left of it where it is explained. A few times the noise is what trackers err by,
 /// and no effect has to answer for it.
-constexpr double kRest = 0.1, kTrackers = 10;
+constexpr double kStays = 0.1, kTrackers = 10;
 
 /// Whether the accepted effects explain some channel to within a tenth of its misfit, on train or on held-out
 /// groups, or leave one in its noise that carries a tenth of what they take: a channel that they do not touch
@@ -108,7 +108,7 @@ bool explains_a_channel(const std::vector<MeasuredMisfit>& misfit) {
     const double none = least_misfit(n);
     if (before - 1 < none) return false;
     any = true;
-    return after - 1 < std::max(kRest * (before - 1), none);
+    return after - 1 < std::max(kStays * (before - 1), none);
   };
   for (const auto& m : misfit)
     if (explained(m.n - m.n_test, m.before_train, m.after_train) ||
@@ -122,7 +122,7 @@ bool explains_a_channel(const std::vector<MeasuredMisfit>& misfit) {
 /// what trackers err by.
 bool is_explained(const MeasuredMisfit& m) {
   const auto explained = [](double before, double after) {
-    return after - 1 < std::max(kRest * (before - 1), kTrackers);
+    return after - 1 < std::max(kStays * (before - 1), kTrackers);
   };
   return explained(m.before_train, m.after_train) || explained(m.before_test, m.after_test);
 }
@@ -372,7 +372,7 @@ void weigh_drag_form(const GroupedProblem& problem, const EffectSearch& search,
 void weigh_stability(MeasuredDiscovery& out) {
   const double tests = std::max<double>(1, static_cast<double>(out.stability.size()));
   for (const auto& s : out.stability) {
-    if (normal_two_sided(s.z()) > 0.05 / tests) continue;
+    if (f_tail(s.z() * s.z(), 1, s.degrees_of_freedom) > 0.05 / tests) continue;
     out.evidence.push_back(
         {s.parameter.substr(0, s.parameter.rfind('.')),
          fmt::format(

@@ -90,7 +90,8 @@ std::vector<ResidualProfile> residual_profile(const GroupedProblem& problem, con
   for (std::size_t at = 0; at < all.size(); ++at) {
     const Bin& b = all[at];
     if (!(b.n > 0)) continue;
-    const double variance = b.group_squares - b.sum * b.sum / b.groups;
+    const double variance =
+        b.groups > 1 ? (b.group_squares - b.sum * b.sum / b.groups) * b.groups / (b.groups - 1) : 0;
     out.push_back({problem.channels()[at / static_cast<std::size_t>(bins)],
                    (static_cast<double>(at % static_cast<std::size_t>(bins)) + 0.5) / bins,
                    static_cast<int>(b.n), b.sum / b.n, std::sqrt(b.squares / b.n),
@@ -129,8 +130,7 @@ LeavesNoise leaves_noise(const GroupedProblem& problem, const GroupedFit& fit, d
       for (const auto& row : group.rows)
         if (row.channel >= 0 && row.time <= until) n[static_cast<std::size_t>(row.channel)] += 1, rows += 1;
       ratios[k].assign(channels, std::numeric_limits<double>::quiet_NaN());
-      const double unknowns = static_cast<double>(group.start.size());
-      if (rows < 1.5 * unknowns) return;
+      if (rows < 1.5 * static_cast<double>(group.start.size())) return;
       const auto part =
           fit_own_part(problem, used[k], fit, [&](const GroupRow& row) { return row.time <= until; });
       if (!part.solved) return;
@@ -139,7 +139,7 @@ LeavesNoise leaves_noise(const GroupedProblem& problem, const GroupedFit& fit, d
           chi2[static_cast<std::size_t>(row.channel)] += std::pow(part.residual[static_cast<Index>(j)], 2);
       for (std::size_t c = 0; c < channels; ++c)
         if (n[c] > 0)
-          ratios[k][c] = chi2[c] / (n[c] * (1 - unknowns / rows));  // shared evenly by the channels
+          ratios[k][c] = chi2[c] / (n[c] * (1 - group.taken() / rows));  // shared evenly by the channels
     });
     for (std::size_t c = 0; c < channels; ++c) {
       double n = 0, sum = 0, squares = 0;

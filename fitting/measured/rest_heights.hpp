@@ -19,7 +19,7 @@ struct RestHeights {
   std::array<double, 3> offset_sigma{};         ///< 1 σ [m]
 };
 /// Of one object with `dims`, spatial log with orientation. Empty if fewer than five throws come to rest, or
-/// none on some axis' faces.
+/// no axis has two rests on each of its faces; an axis that has not is left out.
 std::optional<RestHeights> rest_heights(const datasets::ThrowLog& log, const std::string& object,
                                         double floor);
 

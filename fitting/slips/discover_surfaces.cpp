@@ -301,11 +301,15 @@ Choice choose_again(const std::vector<SlipSamples>& surfaces, const Choice& meas
                     const SurfaceDiscoveryOptions& options, BiasTrial& bias) {
   Choice unbiased = choose_law(without_bias(surfaces, bias.whole.value), options);
   if (unbiased.best == measured.best) return unbiased;
-  BiasTrial again = try_bias(surfaces, unbiased.best, measured.scores, options);
-  if (again.convinces && again.with.error < bias.with.error)
+  const std::size_t law = unbiased.best;
+  BiasTrial again = try_bias(surfaces, law, measured.scores, options);
+  if (again.convinces && again.with.error < bias.with.error) {
     bias = std::move(again);
-  else
+    unbiased = choose_law(without_bias(surfaces, bias.whole.value), options);
+    unbiased.best = law;
+  } else {
     unbiased.best = measured.best;
+  }
   return unbiased;
 }
 
@@ -317,9 +321,11 @@ void accept_bias(const BiasTrial& bias, MeasuredDiscovery& answer) {
   effect.delta_bic = bias.with.delta_bic();
   effect.test_error_ratio = bias.with.error / bias.without.error;
   const char* names[] = {"fx", "fy", "tau"};
-  for (Eigen::Index j = 0; j < 3; ++j)
-    effect.parameters.push_back({names[j], j < 2 ? "N" : "N m", bias.whole.value[j],
-                                 std::sqrt(std::max(0.0, bias.whole.covariance(j, j)))});
+  for (Eigen::Index j = 0; j < 3; ++j) {
+    const double variance = std::max(0.0, bias.whole.covariance(j, j));
+    effect.parameters.push_back(
+        {names[j], j < 2 ? "N" : "N m", bias.whole.value[j], std::sqrt(variance), bias.with.gain.n - 1});
+  }
   effect.why = fmt::format(
       "a limit surface is symmetric, and without this constant the wrenches are, too: mean angle between "
       "predicted and measured direction of sliding falls from {:.2f} to {:.2f} degrees, on {} of {} surfaces",

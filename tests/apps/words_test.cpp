@@ -21,6 +21,7 @@ TEST(Rounded, IsAsFarAsTheSigmaSays) {
   EXPECT_EQ(with_sigma(-1.2345, 0.0996, ""), "-1.23 ± 0.10") << "the sigma is rounded first";
   EXPECT_EQ(with_sigma(123456, 2345, "N"), "123500 ± 2300 N");
   EXPECT_EQ(with_sigma(0.5, 300, "-"), "0 ± 300");
+  EXPECT_EQ(with_sigma(1.8123e-7, 9.2e-8, "m/N"), "1.81e-07 ± 9.2e-08 m/N");
   EXPECT_EQ(with_sigma(1.234567e-12, 4.56e-14, "m"), "1.235e-12 ± 4.6e-14 m");
   EXPECT_EQ(with_sigma(0.25, INFINITY, "-"), "0.25 ± inf");
   EXPECT_EQ(with_sigma(0.25, 0, "-"), "0.25 (held)");

@@ -23,6 +23,7 @@ using datasets::ThrowLog;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 
 constexpr double kDegree = 180 / std::numbers::pi, kGravity = 9.80665;
 
@@ -182,6 +183,22 @@ TEST(UnitCheck, NoPlanetPullsWithTenThousand) {
   auto log = campaign();
   log.gravity *= 1e3;
   expect_refused(log, AllOf(HasSubstr("/@gravity"), HasSubstr("mm/s²")));
+}
+
+TEST(UnitCheck, AnAngleThatTheTrackerDoesNotSeeIsRefused) {
+  auto log = campaign();
+  for (auto& one : log.throws)
+    for (std::size_t i = 0; i < one.mocap->pose.rows; ++i) one.mocap->pose(i, 2) = 0;
+  expect_refused(log, AllOf(HasSubstr("/throws/" + log.throws[0].id + "/mocap/pose"),
+                            HasSubstr("theta is 0 rad in every sample"), HasSubstr("grasp_angle")));
+  // In flight alone nothing says that an object has to turn.
+  for (auto& one : log.throws)
+    for (std::size_t i = 0; i < one.mocap->time.rows; ++i)
+      if (one.mocap->time(i) <= *log.gripper->opening_command_time + 0.1) {
+        one.mocap->valid.resize(one.mocap->time.rows, 1);
+        one.mocap->valid[i] = 0;
+      }
+  for (const auto& doubt : unit_doubts(log)) EXPECT_THAT(doubt.reason, Not(HasSubstr("in every sample")));
 }
 
 TEST(UnitCheck, AGraspAngleBeyondAWholeTurnIsInDegrees) {

@@ -38,6 +38,14 @@ TEST(Fates, AreTheAnswers) {
   for (std::size_t k = 0; k < told.size(); ++k) EXPECT_EQ(ranking[k].fate, told[k]) << ranking[k].id;
 }
 
+// A log in memory was checked by no reader.
+TEST(Discovery, ALogThatBreaksTheRulesIsRefused) {
+  auto log = support::loop_campaign({});
+  for (auto& one : log.throws) one.split = datasets::Split::train;
+  log.throws[2].hand->twist = {};
+  EXPECT_THROW(discover(log, "synthetic", support::loop_options()), datasets::LogError);
+}
+
 Discovery found_in(const datasets::ThrowLog& log, std::vector<std::string> forget = {}) {
   DiscoverOptions options = support::loop_options();
   options.forget = std::move(forget);

@@ -103,6 +103,21 @@ double value_of(const AcceptedEffect& effect, const std::string& name) {
 TEST(FallDiscovery, APerfectSensorInAVacuumReadsZero) {
   const auto found = discover_falls(falls({}, 30, 1), {});
   EXPECT_EQ(found.verdict, Verdict::no_missing_effect);
+  EXPECT_FALSE(found.first.any) << "nor does anything leave the noise: " << found.first.chi2_per_dof;
+}
+
+// One reading that is out by fifty sigmas says nothing of the noise of the others.
+TEST(FallDiscovery, AStrayReadingIsNoPartOfAnUndeclaredNoise) {
+  auto log = falls({}, 30, 1);
+  for (auto& one : log.throws) one.imu->specific_force.sigma.clear();
+  const FallProblem clean(log);
+  auto& imu = *log.throws.front().imu;
+  const double begin = log.throws.front().free_flight->first;
+  std::size_t i = 0;
+  while (imu.time(i) < begin + 0.3) ++i;
+  imu.specific_force(i, 0) += 1.5;
+  const FallProblem stray(log);
+  EXPECT_NEAR(stray.sigma(0)[0], clean.sigma(0)[0], 0.1 * clean.sigma(0)[0]);
 }
 
 TEST(FallDiscovery, BiasAndDragAreToldApart) {

@@ -665,6 +665,18 @@ TEST(FlightDiscovery, SingleGlitchedFramesAreNoMisfit) {
   }));
 }
 
+// Where no sigma is declared the noise is read off the samples: a frame that is out by a thousand sigmas is
+// no part of it, and hides nothing.
+TEST(FlightDiscovery, AGlitchedFrameIsNoPartOfAnUndeclaredNoise) {
+  auto log = spatial_flights({.drag = 0.005}, {}, 47);
+  const double sigma = log.throws.front().mocap->pose.sigma.front();
+  for (auto& one : log.throws) one.mocap->pose.sigma.clear();
+  log.throws[4].mocap->pose(12, 0) += 1000 * sigma;
+  const auto found = found_in(log);
+  expect_value(found, "flight.quadratic_drag", "k[body]", 0.005);
+  for (const auto& m : found.misfit) EXPECT_NEAR(m.after_train, 1, 0.3) << m.channel;
+}
+
 TEST(FlightDiscovery, MeasuredCubeTosses) {
   const auto [csv, missing] = unhand::support::from_data_folder("measured/cube_tosses/cube_tosses.csv");
   if (!missing.empty()) GTEST_SKIP() << missing;

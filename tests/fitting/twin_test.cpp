@@ -3,6 +3,9 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+
+#include "dynamics/third_difference.hpp"
 #include "tests/support/small_campaign.hpp"
 
 namespace unhand::fitting {
@@ -52,6 +55,24 @@ TEST(Twin, HasTheSameSamplesAndNewNoise) {
     }
   }
   EXPECT_NEAR(square / n, 2, 6 * std::sqrt(8 / n));  // each with variance 1; six sigma of a mean square
+}
+
+TEST(Twin, AHandWithoutADeclaredNoiseHasThatOfItsScatter) {
+  auto log = twinned_log();
+  for (auto& one : log.throws) one.hand->acceleration.sigma.clear();
+  const CampaignProblem problem(log, "(in memory)", {});
+  const auto twin = twin_of(log, problem, twinned_fit(), 5);
+  const auto noise = [](const datasets::Series& series) {  // by third differences
+    double sum = 0;
+    for (std::size_t i = 3; i < series.rows; ++i)
+      sum += dynamics::third_difference_variance(series(i - 3, 0), series(i - 2, 0), series(i - 1, 0),
+                                                 series(i, 0));
+    return std::sqrt(sum / static_cast<double>(series.rows - 3));
+  };
+  for (std::size_t i = 0; i < twin.throws.size(); ++i) {
+    const double was = noise(log.throws[i].hand->acceleration);
+    EXPECT_NEAR(noise(twin.throws[i].hand->acceleration), was, 0.3 * was) << twin.throws[i].id;
+  }
 }
 
 TEST(Twin, FloorOfATrueModelIsItsError) {
