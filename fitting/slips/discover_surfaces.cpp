@@ -123,6 +123,8 @@ struct LawScore {
   void average() {
     for (double* sum : {&error, &base_error, &train, &level, &null_gain}) *sum /= std::max(1, compared);
   }
+  /// As Bayes' criterion would be of one parameter more: the gain is held out, so richer laws have no head
+  /// start.
   double delta_bic() const { return std::log(std::max(2.0, gain.n)) - gain.t() * std::abs(gain.t()); }
   NamedErrors errors(double direction) const {
     return {{"direction_mae_deg", direction}, {"level_mae", level}};

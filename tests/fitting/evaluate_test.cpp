@@ -148,6 +148,16 @@ TEST(Evaluate, CrossValidationLeavesConditionsOut) {
   EXPECT_THROW(cross_validate(single, "(in memory)", {}, {}, 2), std::invalid_argument);
 }
 
+// Which force the patch's radius is of would be another one for every reader's guess.
+TEST(Card, ASoftPatchWithoutItsForceIsRefused) {
+  auto card = card_of(disc(), fit_of_disc());
+  card.effects = {"contact.soft_patch_radius"};
+  card.parameters["contact.soft_patch_radius.gamma"] = {0.3, {}, "-"};
+  EXPECT_NO_THROW(options_of(card, "card.json"));
+  card.parameters.erase("reference_force");
+  EXPECT_THROW(options_of(card, "card.json"), datasets::CardError);
+}
+
 TEST(Card, RoundTripIsExact) {
   auto card = card_of(disc(), fit_of_disc());
   card.log = {"campaign.h5", "a campaign", "fnv1a64:0123456789abcdef"};
