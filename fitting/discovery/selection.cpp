@@ -128,7 +128,7 @@ void describe(Stage& stage, FitResult counted, const DiscoverOptions& options, D
       for (const auto& p : effect.parameters)
         if (without_object(u.unknown.name) == effect.full_name(p))
           accepted.parameters.push_back({u.unknown.name.substr(accepted.id.size() + 1), u.unknown.unit,
-                                         u.value, u.sigma, u.degrees_of_freedom});
+                                         u.value, u.sigma, u.interval_freedom()});
     find_other_names(f, contribution_of(stage.fit, effect), options.equivalent, out.silent, accepted);
   }
 }
