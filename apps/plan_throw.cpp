@@ -111,9 +111,11 @@ PredictedLandings by_delay(const std::string& name, const ThrowAnswer& a,
       continue;
     }
     out.drawn.miss.push_back(at.forward);
+    out.across.miss.push_back(at.across);
     out.hits += a.box.holds(at.x, at.y);
   }
   planners::summarise(out.drawn);
+  planners::summarise(out.across);
   return out;
 }
 

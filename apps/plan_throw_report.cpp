@@ -20,8 +20,6 @@ using planners::JointVector;
 using planners::LandingAt;
 using Rows = std::vector<std::vector<double>>;
 
-double rms(const planners::Landings& l) { return std::hypot(l.mean, l.std); }
-
 Json list(const JointVector<double>& v) {
   Json out = Json::array();
   for (const double x : v) out.push_back(x);
@@ -70,6 +68,11 @@ std::string percent(int part, std::size_t all) {
 
 }  // namespace
 
+double PredictedLandings::rms() const {
+  const double along = std::hypot(drawn.mean, drawn.std), beside = std::hypot(across.mean, across.std);
+  return std::hypot(along, beside);
+}
+
 std::string text_of(const ThrowAnswer& a, bool markdown) {
   const auto shown = [&](const Table& t) { return markdown ? t.markdown() : t.text(); };
   const auto& plan = a.plan;
@@ -88,13 +91,21 @@ std::string text_of(const ThrowAnswer& a, bool markdown) {
     joints.rows.push_back({a.chain.joints[i].name, fixed(true, plan.nominal.state.q[i], 4),
                            fixed(true, plan.nominal.state.qd[i], 4), fixed(true, plan.qdd[i], 3)});
   out += shown(joints) + "\n";
-  Table landings{{"motion", "landings", "in the box", "mean miss [m]", "std [m]", "lost"}, {}, 1};
+  Table landings{{"motion", "landings", "in the box", "mean miss [m]", "std [m]", "mean across [m]",
+                  "std across [m]", "rms [m]", "lost"},
+                 {},
+                 1};
   for (const auto& one : a.predicted)
     landings.rows.push_back(
         {one.name, fmt::to_string(one.drawn.miss.size()),
          percent(one.hits, one.drawn.miss.size() + static_cast<std::size_t>(one.drawn.lost)),
-         with_sign(one.drawn.mean, 4), fmt::format("{:.4f}", one.drawn.std), fmt::to_string(one.drawn.lost)});
+         with_sign(one.drawn.mean, 4), fmt::format("{:.4f}", one.drawn.std), with_sign(one.across.mean, 4),
+         fmt::format("{:.4f}", one.across.std), fmt::format("{:.4f}", one.rms()),
+         fmt::to_string(one.drawn.lost)});
   out += shown(landings);
+  if (!plan.landings.empty())
+    out += fmt::format("\nlargest miss of any release in the window: {:.4f} m\n",
+                       planners::largest_miss(plan.landings));
   if (a.real && a.rigid)
     out += fmt::format(
         "\nunder the tube's motion a rigidly carried object would land {} m from the middle, the contact "
@@ -156,7 +167,8 @@ Json throw_json(const ThrowAnswer& a) {
   for (const auto& one : a.predicted)
     out["predicted"][one.name] = {
         {"landed", one.drawn.miss.size()}, {"lost", one.drawn.lost}, {"hits", one.hits},
-        {"mean_m", one.drawn.mean},        {"std_m", one.drawn.std}, {"rms_m", rms(one.drawn)}};
+        {"mean_m", one.drawn.mean},        {"std_m", one.drawn.std}, {"mean_across_m", one.across.mean},
+        {"std_across_m", one.across.std},  {"rms_m", one.rms()}};
   out["release"] = nullptr;
   Json numbers = Json::object();
   for (const auto& one : a.numbers)
@@ -211,9 +223,11 @@ std::string trajectory_csv(const ThrowAnswer& a) {
 }
 
 std::string landings_csv(const ThrowAnswer& a) {
-  std::string out = "motion,forward_m\n";
+  std::string out = "motion,forward_m,across_m\n";
   for (const auto& one : a.predicted)
-    for (const double miss : one.drawn.miss) out += fmt::format("{},{:.6g}\n", one.name, miss);
+    for (std::size_t i = 0; i < one.drawn.miss.size(); ++i)
+      out += fmt::format("{},{:.6g},{:.6g}\n", one.name, one.drawn.miss[i],
+                         one.across.miss.empty() ? 0.0 : one.across.miss[i]);
   return out;
 }
 
@@ -373,18 +387,30 @@ Figure planned_landing_figure(const ThrowAnswer& a) {
     out.data = {{"planned", columns, curve_of(a.plan.landings), {}},
                 {"Tube-CVX", columns, curve_of(a.plan.tube_landings), {}},
                 {"no acceleration", columns, curve_of(a.plan.at_rest), {}}};
-    out.script = fmt::format(
-        "set xlabel 'release after the command [ms]'; set ylabel 'landing, forward of the middle [cm]'\n"
-        "set grid linecolor rgb '#dddddd'; set key outside top center horizontal\n"
-        "plot {0:.3g} with lines linecolor rgb 'black' title 'edges of the box', {1:.3g} with lines "
-        "linecolor rgb 'black' notitle, \\\n"
-        "     DATA index 2 using 1:2 with linespoints pointtype 6 pointinterval 4 linecolor rgb '{4}' "
-        "dashtype 2 title 'no acceleration', \\\n"
-        "     DATA index 1 using 1:2 with linespoints pointtype 5 pointinterval 4 linecolor rgb '{3}' "
-        "dashtype 4 title 'Tube-CVX', \\\n"
-        "     DATA index 0 using 1:2 with linespoints pointtype 7 pointinterval 4 linewidth 2 linecolor rgb "
-        "'{2}' title 'planned'\n",
-        half, -half, ink, other, quiet);
+    const Eigen::Vector2d along = along_of(a);
+    const double beside = 100 * a.box.half_length(Eigen::Vector2d(-along.y(), along.x()));
+    const std::string styles[]{
+        fmt::format("with linespoints pointtype 7 pointinterval 4 linewidth 2 linecolor rgb '{}'", ink),
+        fmt::format("with linespoints pointtype 5 pointinterval 4 linecolor rgb '{}' dashtype 4", other),
+        fmt::format("with linespoints pointtype 6 pointinterval 4 linecolor rgb '{}' dashtype 2", quiet)};
+    out.script = "set multiplot\nset key off\nset grid linecolor rgb '#dddddd'\n";
+    for (const bool forward : {true, false}) {
+      out.script += place(out, forward ? Panel{1.9, 8.3, 2.7, 8.4} : Panel{10.3, 16.7, 2.7, 8.4});
+      out.script += fmt::format(
+          "set xlabel 'release after the command [ms]' offset 0,0.3; set ylabel 'landing, {0} the middle "
+          "[cm]'\nplot {1:.3g} with lines linecolor rgb 'black', {2:.3g} with lines linecolor rgb 'black'",
+          forward ? "forward of" : "across from", forward ? half : beside, forward ? -half : -beside);
+      for (const int i : {2, 1, 0})
+        out.script += fmt::format(", DATA index {} using 1:{} {}", i, forward ? 2 : 3, styles[i]);
+      out.script += "\n";
+    }
+    out.script += key_strip(out,
+                            {{"with lines linecolor rgb 'black'", "edges of the box"},
+                             {styles[2], "no acceleration"},
+                             {styles[1], "Tube-CVX"},
+                             {styles[0], "planned"}},
+                            4) +
+                  "unset multiplot\n";
     return out;
   }
   double low = -half, high = half;

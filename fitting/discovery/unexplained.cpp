@@ -280,13 +280,29 @@ bool is_of_flight(const OutcomeLack& lack) {
   return lack.outcome == Outcome::position || lack.outcome == Outcome::orientation;
 }
 
+/// Outcomes that held-out throws are predicted so badly in, where the train throws confirm that it goes with
+/// the condition: the fit has followed these as far as it could, so that less is left of them. Held-out
+/// throws are off by what the fit is uncertain of, too: four times the scatter is beyond that.
+std::vector<OutcomeLack> lacking_held_out(const Discovery& so_far, const DiscoverOptions& options) {
+  constexpr double kFarOff = 4;
+  std::vector<OutcomeLack> out;
+  for (const OutcomeLack& lack : so_far.after_test.lacks)
+    if (is_lacking(lack, options.family_wise_level / kOutcomes) && lack.fit.ratio() >= kFarOff &&
+        lack_in(so_far.after_train, lack.outcome).fit.p_value < kConfirmedAt)
+      out.push_back(lack);
+  return out;
+}
+
 /// Where every channel is noise once a throw's own unknowns follow it, but predictions made before the throw
 /// are off by what repetitions share: something acts before the detach that those unknowns take up.
 std::optional<Unexplained> left_in_predictions(const Discovery& so_far, double rest,
                                                const DiscoverOptions& options) {
   std::optional<OutcomeLack> most;
-  for (const OutcomeLack& lack : lacking(so_far.after_train, so_far.after_test, options)) {
-    const double base = lack_in(so_far.before_train, lack.outcome).fit.shared;
+  std::vector<OutcomeLack> all = lacking(so_far.after_train, so_far.after_test, options);
+  const bool held_out = all.empty();
+  if (held_out) all = lacking_held_out(so_far, options);
+  for (const OutcomeLack& lack : all) {
+    const double base = lack_in(held_out ? so_far.before_test : so_far.before_train, lack.outcome).fit.shared;
     if (!so_far.effects.empty() && lack.fit.shared < rest * base) continue;
     const bool more =
         !most || (is_of_flight(lack) == is_of_flight(*most) ? lack.fit.ratio() > most->fit.ratio()
@@ -303,11 +319,12 @@ std::optional<Unexplained> left_in_predictions(const Discovery& so_far, double r
       is_of_flight(*most) ? Phase::release : Phase::landing,
       channel,
       most->fit.ratio(),
-      fmt::format("{}, predicted before the throw: {:.3g} times the mean square that repetitions scatter by "
-                  "({:.3g} instead of {:.3g} {} rms): the errors go with the condition",
-                  to_string(most->outcome), most->fit.ratio(),
-                  unit * std::sqrt(most->fit.repetitions + most->fit.shared),
-                  unit * std::sqrt(most->fit.repetitions), angle ? "deg" : "mm"),
+      fmt::format(
+          "{}, predicted before the throw{}: {:.3g} times the mean square that repetitions scatter by "
+          "({:.3g} instead of {:.3g} {} rms): the errors go with the condition",
+          to_string(most->outcome), held_out ? ", on held-out throws" : "", most->fit.ratio(),
+          unit * std::sqrt(most->fit.repetitions + most->fit.shared), unit * std::sqrt(most->fit.repetitions),
+          angle ? "deg" : "mm"),
       {}};
 }
 

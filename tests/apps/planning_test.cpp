@@ -13,6 +13,14 @@ TEST_F(Cli, PlansAThrowIntoABox) {
   EXPECT_EQ(plan["schema"], "plan-throw");
   EXPECT_EQ(plan["qdd_rad_s2"].size(), 7u);
   EXPECT_EQ(plan["predicted"]["planned"]["landed"], 50);
+  // The arm swings out of the plane: without its acceleration landings go astray across as well.
+  auto& carried = plan["predicted"]["no acceleration"];
+  double square = 0;
+  for (const char* part : {"mean_m", "std_m", "mean_across_m", "std_across_m"})
+    square += std::pow(carried[part].get<double>(), 2);
+  EXPECT_NEAR(carried["rms_m"].get<double>(), std::sqrt(square), 1e-12);
+  EXPECT_GT(std::abs(carried["mean_across_m"].get<double>()), 0.01);
+  EXPECT_LE(carried["rms_m"], plan["window_landings"]["no_acceleration"]["largest_miss_m"]);
   for (const char* limit : {"position", "velocity", "acceleration", "jerk", "torque"})
     EXPECT_LE(plan["limits"][limit]["fraction"], 1 + 1e-9) << limit;
   EXPECT_THAT(content(folder / "out/trajectory.csv"), testing::StartsWith("time_s,q1_rad,"));
