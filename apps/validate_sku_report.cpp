@@ -82,8 +82,8 @@ std::string measured_text(const SkuValidation& answer) {
   const std::string never =
       m.never_lands == 0 ? "" : fmt::format("; {} of them never land, says the card", m.never_lands);
   return fmt::format(
-      "{}: of {} measured throws of this object {:.1f} % land within the tolerance of their prediction "
-      "(error "
+      "{}: of {} measured throws of this object {:.1f} % land within the tolerance of their prediction, each "
+      "from its own motion (error "
       "{:.2f} cm, {:.2f} deg in the mean of the absolute; bias {:+.2f} cm, {:+.2f} deg); the errors are "
       "{:.2f} "
       "times what was foretold{}\n",
@@ -199,6 +199,13 @@ Json sku_json(const SkuQuestion& question, const SkuValidation& answer) {
   out["monte_carlo"]["within"] = answer.within;
   out["monte_carlo"]["lost"] = answer.lost;
   out["monte_carlo"]["samples"] = request.samples;
+  out["repeats"] = nullptr;
+  if (const auto& r = answer.repeats)
+    out["repeats"] = {{"motions", r->motions},
+                      {"conditions", r->conditions},
+                      {"landing_x_m", r->x},
+                      {"landing_theta_deg", r->theta * kDegrees},
+                      {"within", r->within}};
   out["agree"] = answer.agree;
   out["disagreement"] = answer.disagreement.empty() ? Json(nullptr) : Json(answer.disagreement);
   out["budget"] = Json::array();

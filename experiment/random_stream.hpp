@@ -17,7 +17,8 @@ enum class Purpose : std::uint64_t {
   split,         ///< which conditions are trained on
   design,        ///< a random campaign
   effect,        ///< a random effect
-  validation     ///< draws of validate_sku
+  validation,    ///< draws of validate_sku
+  repetition     ///< its motions, repeated
 };
 
 /// A stream of random numbers. splitmix64 (Steele, Lea and Flood 2014), started from a hash of its key.

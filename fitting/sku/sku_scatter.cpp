@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <stdexcept>
 
 #include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
+#include "experiment/prepared_throw.hpp"
 #include "experiment/random_stream.hpp"
 
 namespace unhand::fitting {
@@ -200,6 +202,49 @@ void monte_carlo(const SkuMotion& motion, const MatrixXd& J, const SkuRequest& r
       "over its spread; {}",
       100 * kAgree, worst == out.budget.end() ? "its inputs" : worst->input.name,
       whom(worst == out.budget.end() || worst->input.determined ? nullptr : &worst->input));
+}
+
+std::optional<MotionRepeats> repeats_of(const datasets::Sku& sku, const datasets::ModelCard& card,
+                                        const std::string& file, const SkuRequest& request,
+                                        const SkuValidation& answer) {
+  const auto object = datasets::to_object(sku);
+  const auto& throws = request.log->throws;
+  std::vector<std::optional<Eigen::Vector2d>> landings(throws.size());
+  dynamics::parallel_for(throws.size(), request.threads, [&](std::size_t i) {
+    SkuMotion motion{experiment::with_object(*request.log, throws[i], request.log_file, object), {}};
+    motion.prepared.object = sku.name;
+    motion.inputs = throw_inputs(sku, card, file, motion.prepared, request.assumed);
+    const auto at = motion.predict(motion.inputs.values);
+    if (at.landed() && motion.held(motion.inputs.values))
+      landings[i] = {at.landing.pose.x, at.landing.pose.theta};
+  });
+  std::map<std::string, std::vector<Eigen::Vector2d>> by_condition;
+  for (std::size_t i = 0; i < throws.size(); ++i)
+    if (landings[i]) by_condition[throws[i].object + "/" + throws[i].condition].push_back(*landings[i]);
+  MotionRepeats out;
+  Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
+  int freedom = 0;
+  for (const auto& [condition, all] : by_condition) {
+    if (all.size() < 2) continue;
+    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+    for (const auto& one : all) mean += one / static_cast<double>(all.size());
+    for (const auto& one : all) squares += (one - mean) * (one - mean).transpose();
+    out.motions += static_cast<int>(all.size()), ++out.conditions;
+    freedom += static_cast<int>(all.size()) - 1;
+  }
+  constexpr int kFewest = 3;
+  if (freedom < kFewest) return {};
+  const MatrixXd covariance = squares / freedom, root = root_of(covariance);
+  out.x = std::sqrt(covariance(0, 0)), out.theta = std::sqrt(covariance(1, 1));
+  int within = 0;
+  for (std::size_t i = 0; i < answer.samples.size(); ++i) {
+    experiment::RandomStream random(request.seed, i, experiment::Purpose::repetition);
+    const VectorXd normal = Eigen::Vector2d(random.normal(), random.normal()), by = root * normal;
+    within += std::abs(answer.samples[i].x + by[0]) <= request.tolerance.x &&
+              std::abs(answer.samples[i].theta + by[1]) <= request.tolerance.theta;
+  }
+  out.within = static_cast<double>(within) / request.samples;
+  return out;
 }
 
 }  // namespace unhand::fitting

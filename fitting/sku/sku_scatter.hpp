@@ -18,4 +18,10 @@ std::vector<MeasurementGain> gains_of(const ThrowInputs& inputs, const Eigen::Ma
 void monte_carlo(const SkuMotion& motion, const Eigen::MatrixXd& J, const SkuRequest& request,
                  SkuValidation& out);
 
+/// The scatter of the log's repetitions; nothing where fewer than three repeat a condition. After
+/// monte_carlo(), whose draws it moves.
+std::optional<MotionRepeats> repeats_of(const datasets::Sku& sku, const datasets::ModelCard& card,
+                                        const std::string& card_file, const SkuRequest& request,
+                                        const SkuValidation& answer);
+
 }  // namespace unhand::fitting

@@ -66,12 +66,24 @@ void decide(const datasets::Sku& sku, const datasets::ModelCard& card, const Sku
     if (out.needed_grip_force)
       out.message += fmt::format(": this motion needs at least {:.3g} N per pad", *out.needed_grip_force);
   } else {
-    const bool enough = out.within >= request.confidence;
+    const double within = out.repeats ? out.repeats->within : out.within;
+    const bool enough = within >= request.confidence;
     out.verdict = enough ? SkuVerdict::throwable : SkuVerdict::too_uncertain;
     out.message = fmt::format(
         "{:.1f} % of its landings lie within {:.3g} m and {:.3g} deg of the predicted one; "
         "asked for are {:.3g} %",
-        100 * out.within, request.tolerance.x, request.tolerance.theta * kDegrees, 100 * request.confidence);
+        100 * within, request.tolerance.x, request.tolerance.theta * kDegrees, 100 * request.confidence);
+    if (out.repeats)
+      out.message += fmt::format(
+          ". Of the same motion as it was logged {:.1f} % would, but the log's motions, repeated, bring it "
+          "down "
+          "{:.3g} m and {:.3g} deg apart (1 sigma of {} motions of {} conditions)",
+          100 * out.within, out.repeats->x, out.repeats->theta * kDegrees, out.repeats->motions,
+          out.repeats->conditions);
+    else
+      out.message +=
+          ", if the robot repeats its motion exactly: a log that repeats some (--log) tells how "
+          "well it does";
     const bool lever = !contact::follows_pads(card.model) && std::abs(sku.com_offset) > kLeastLever;
     if (lever && !(out.measured && out.measured->confirmed)) {
       out.verdict = SkuVerdict::beyond_the_model;
@@ -130,6 +142,8 @@ SkuValidation validate_sku(const datasets::Sku& sku, const datasets::ModelCard& 
           "the log is the card's own: its train throws, which the card was fitted to, do not count");
     out.measured = measured_verdict(sku, card, card_file, request, own);
   }
+  if (request.log != nullptr && !out.samples.empty())
+    out.repeats = repeats_of(sku, card, card_file, request, out);
   decide(sku, card, request, out);
   return out;
 }

@@ -110,6 +110,14 @@ struct MeasuredVerdict {
   bool confirmed{};               ///< within >= confidence, and rms_z <= kMostSurprise
 };
 
+/// How far apart the same motion, repeated, brings this object down: predicted landings of the log's
+/// repetitions, each with its own hand and force, about the mean of their condition.
+struct MotionRepeats {
+  int motions{}, conditions{};  ///< that bring it to a landing; those with two or more of them
+  double x{}, theta{};          ///< 1 σ, pooled over conditions [m, rad]
+  double within{};              ///< share of the Monte Carlo's draws within the tolerance, with this scatter
+};
+
 /// Whether an object can be thrown, how surely, and why.
 struct SkuValidation {
   SkuVerdict verdict{};  ///< the answer
@@ -131,6 +139,7 @@ struct SkuValidation {
   std::vector<BudgetLine> budget;           ///< the largest share first
   std::vector<MeasurementGain> gains;       ///< the largest first
   std::vector<LandingSample> samples;       ///< of the draws that land
+  std::optional<MotionRepeats> repeats;     ///< of the log's motions, where they are repeated
   std::optional<MeasuredVerdict> measured;  ///< against the log's throws of this object, if there are any
 
   /// The motion that the answer is about.
@@ -143,8 +152,9 @@ struct SkuValidation {
 /// through both. Draws at which a value leaves its range are drawn again.
 ///
 /// The motion is a logged one with this object in the hand or, without a log, experiment::reference_throw.
-/// How well a robot repeats its motion is not in it, nor what the model lacks: the card's errors on held-out
-/// throws tell that.
+/// How well the robot repeats its motion is known of a log that repeats some (MotionRepeats), and the verdict
+/// counts it then; else it does not. What the model lacks is in neither: the card's errors on held-out throws
+/// tell that.
 ///
 /// Throws datasets::CardError as options_of does, std::invalid_argument for an SKU without inertia, a request
 /// out of range or a condition that the log does not have, datasets::LogError as prepare() does.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <numeric>
 #include <set>
 #include <string>
@@ -291,6 +292,40 @@ TEST(SkuValidation, MeasuredThrowsConfirmTheRightSkuAndContradictAWrongOne) {
 
   request.condition = "no such";
   EXPECT_THROW(validate_sku(bar(), gripper, "card.json", request), std::invalid_argument);
+}
+
+// The log's own landings scatter about their conditions' means as its motions are foretold to bring the same
+// object down; a robot that repeats nothing exactly is believed less.
+TEST(SkuValidation, HowWellTheRobotRepeatsIsReadOffTheLog) {
+  auto design = testing_support::small_design("limit_surface_disc");
+  design.objects = {experiment::loaded_bar("bar-com100", 0.10)};
+  design.repetitions = 6;
+  design.variation.hand_speed = 0.03;
+  const auto log = experiment::generate_campaign(design, 5);
+  std::map<std::string, std::vector<double>> measured;
+  for (const auto& one : log.throws) measured[one.condition].push_back(one.landing->pose(0, 0));
+  double square = 0, freedom = 0;
+  for (const auto& [condition, x] : measured) {
+    const double mean = std::accumulate(x.begin(), x.end(), 0.0) / static_cast<double>(x.size());
+    for (const double one : x) square += (one - mean) * (one - mean);
+    freedom += static_cast<double>(x.size()) - 1;
+  }
+  const double scatter = std::sqrt(square / freedom);
+  auto request = quick(500);
+  request.log = &log;
+  request.log_file = "synthetic";
+  request.tolerance.x = scatter;
+  auto gripper = card();
+  gripper.parameters["mu"].value = design.patch.mu;
+  gripper.parameters["length"].value = design.patch.length();
+  const auto answer = validate_sku(bar(), gripper, "card.json", request);
+  ASSERT_TRUE(answer.repeats);
+  EXPECT_EQ(answer.repeats->conditions, 3);
+  EXPECT_EQ(answer.repeats->motions, static_cast<int>(log.throws.size()));
+  EXPECT_NEAR(answer.repeats->x / scatter, 1, 0.3);
+  EXPECT_LT(answer.repeats->within, 0.8) << "of normal draws 68 % lie within one sigma";
+  EXPECT_GT(answer.within, 0.95) << "of the motion as it was logged";
+  EXPECT_EQ(answer.verdict, SkuVerdict::too_uncertain) << answer.message;
 }
 
 // Throws that a card was fitted to say nothing of how well it foretells.
