@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 #include <stdexcept>
 #include <utility>
 
@@ -96,6 +97,75 @@ double tube_level(const PlaneState<double>& release, const LandingSet& set, cons
   return std::max({beyond(landing->r, -set.half_length, set.half_length),
                    beyond(landing->r_rate, set.r_rate_low, set.r_rate_high),
                    beyond(landing->z_rate, set.z_rate_low, set.z_rate_high)});
+}
+
+namespace {
+
+/// With drag, the fastest that a flight is followed back to [m/s]: backward in time, drag has the speed grow
+/// without bound within a finite time, before which there is no flight.
+constexpr double kFastest = 100;
+/// How slowly a sampled flight may come down, without drag and with it [m/s]: it has just risen above the
+/// height, by 5e-14 m and by 1e-6 m, and rounding or the integrator must not lose that.
+constexpr double kSlowest = 1e-6, kSlowestWithDrag = 5e-3;
+
+/// `longest` seconds backward in time, or to where it had kFastest: by the closed form, or by Runge-Kutta
+/// steps of at most 1 ms and a hundredth of the time in which drag takes the speed away, whose error at
+/// throwing speeds is below 1e-11 m.
+PlaneState<double> before(PlaneState<double> s, double longest, const Medium& medium) {
+  const double g = medium.gravity, k = medium.drag_k;
+  if (k == 0)
+    return {s.r - longest * s.r_rate, s.z - longest * s.z_rate - 0.5 * g * longest * longest, s.r_rate,
+            s.z_rate + g * longest};
+  const auto rate = [&](const PlaneState<double>& x) -> PlaneState<double> {
+    const double drag = k * std::hypot(x.r_rate, x.z_rate);
+    return {x.r_rate, x.z_rate, -drag * x.r_rate, -drag * x.z_rate - g};
+  };
+  const auto plus = [](const PlaneState<double>& a, double h,
+                       const PlaneState<double>& b) -> PlaneState<double> {
+    return {a.r + h * b.r, a.z + h * b.z, a.r_rate + h * b.r_rate, a.z_rate + h * b.z_rate};
+  };
+  for (double left = longest; left > 0;) {
+    const double speed = std::hypot(s.r_rate, s.z_rate);
+    if (speed > kFastest) break;
+    const double step = std::min({left, 1e-3, 1e-2 / (k * std::max(speed, 1e-3))}), h = -step;
+    const auto k1 = rate(s), k2 = rate(plus(s, h / 2, k1)), k3 = rate(plus(s, h / 2, k2)),
+               k4 = rate(plus(s, h, k3));
+    s = plus(plus(plus(plus(s, h / 6, k1), h / 3, k2), h / 3, k3), h / 6, k4);
+    left -= step;
+  }
+  return s;
+}
+
+}  // namespace
+
+std::vector<PlaneState<double>> sample_tube(const LandingSet& set, const Medium& medium,
+                                            const TubeSampling& sampling) {
+  validate(set);
+  validate(medium);
+  if (sampling.count < 0 || sampling.boundary_every < 1 || !(sampling.longest > 0 && sampling.longest <= 100))
+    throw std::invalid_argument(fmt::format(
+        "sample_tube: count = {} is not >= 0, boundary_every = {} not >= 1, or longest = {} s not in "
+        "(0, 100] s",
+        sampling.count, sampling.boundary_every, sampling.longest));
+  std::mt19937_64 random(sampling.seed);
+  std::uniform_real_distribution<double> unit(0, 1);
+  const std::array<std::array<double, 2>, 3> ranges{{{-set.half_length, set.half_length},
+                                                     {set.r_rate_low, set.r_rate_high},
+                                                     {set.z_rate_low, set.z_rate_high}}};
+  std::vector<PlaneState<double>> out;
+  out.reserve(static_cast<std::size_t>(sampling.count));
+  for (int i = 0; i < sampling.count; ++i) {
+    double x[3];
+    for (int k = 0; k < 3; ++k) x[k] = ranges[k][0] + unit(random) * (ranges[k][1] - ranges[k][0]);
+    if (i % sampling.boundary_every == 0) {
+      const int face = static_cast<int>(6 * unit(random));
+      x[face % 3] = ranges[face % 3][face / 3];
+    }
+    // A flight that comes down at ż = 0 has just touched the height: the tube ends there.
+    const double down = std::min(x[2], medium.drag_k > 0 ? -kSlowestWithDrag : -kSlowest);
+    out.push_back(before({x[0], 0, x[1], down}, unit(random) * sampling.longest, medium));
+  }
+  return out;
 }
 
 }  // namespace unhand::flight

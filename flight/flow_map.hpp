@@ -5,7 +5,9 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "dynamics/scalar.hpp"
 
@@ -51,5 +53,19 @@ struct LandingSet {
 /// (without drag) lacks over half_length. [-] Throws std::invalid_argument for a state that is not finite,
 /// and for a set or a medium out of range.
 double tube_level(const PlaneState<double>& release, const LandingSet& set, const Medium& medium);
+
+/// The same tube by samples: states from which flights of up to `longest` [s] end in the set, found by flying
+/// backward from landings drawn from it. Every `boundary_every`-th sample comes from the set's boundary. With
+/// drag, a flight is followed back to where it had 100 m/s and no further: it began within a finite time
+/// before that, at any speed however large.
+struct TubeSampling {
+  int count{1000};        ///< samples, >= 0
+  double longest{1.0};    ///< in (0, 100] s
+  int boundary_every{4};  ///< every how many samples one lies on the boundary
+  std::uint64_t seed{1};  ///< the same seed gives the same samples
+};
+/// The samples. Throws std::invalid_argument for a set, a medium or a sampling out of range.
+std::vector<PlaneState<double>> sample_tube(const LandingSet& set, const Medium& medium,
+                                            const TubeSampling& sampling = {});
 
 }  // namespace unhand::flight

@@ -25,74 +25,6 @@ State random_state(std::mt19937_64& random) {
   return {r(random), z(random), forward(random), up(random)};
 }
 
-/// The same tube by samples: states from which flights of up to `longest` [s] end in the set, found by flying
-/// backward from landings drawn from it. Every `boundary_every`-th sample comes from the set's boundary. With
-/// drag, a flight is followed back to where it had 100 m/s and no further: it began within a finite time
-/// before that, at any speed however large.
-struct TubeSampling {
-  int count{1000};        ///< samples, >= 0
-  double longest{1.0};    ///< in (0, 100] s
-  int boundary_every{4};  ///< every how many samples one lies on the boundary
-  std::uint64_t seed{1};  ///< the same seed gives the same samples
-};
-/// With drag, the fastest that a flight is followed back to [m/s]: backward in time, drag has the speed grow
-/// without bound within a finite time, before which there is no flight.
-constexpr double kFastest = 100;
-/// How slowly a sampled flight may come down, without drag and with it [m/s]: it has just risen above the
-/// height, by 5e-14 m and by 1e-6 m, and rounding or the integrator must not lose that.
-constexpr double kSlowest = 1e-6, kSlowestWithDrag = 5e-3;
-
-/// `longest` seconds backward in time, or to where it had kFastest: by the closed form, or by Runge-Kutta
-/// steps of at most 1 ms and a hundredth of the time in which drag takes the speed away, whose error at
-/// throwing speeds is below 1e-11 m.
-PlaneState<double> before(PlaneState<double> s, double longest, const Medium& medium) {
-  const double g = medium.gravity, k = medium.drag_k;
-  if (k == 0)
-    return {s.r - longest * s.r_rate, s.z - longest * s.z_rate - 0.5 * g * longest * longest, s.r_rate,
-            s.z_rate + g * longest};
-  const auto rate = [&](const PlaneState<double>& x) -> PlaneState<double> {
-    const double drag = k * std::hypot(x.r_rate, x.z_rate);
-    return {x.r_rate, x.z_rate, -drag * x.r_rate, -drag * x.z_rate - g};
-  };
-  const auto plus = [](const PlaneState<double>& a, double h,
-                       const PlaneState<double>& b) -> PlaneState<double> {
-    return {a.r + h * b.r, a.z + h * b.z, a.r_rate + h * b.r_rate, a.z_rate + h * b.z_rate};
-  };
-  for (double left = longest; left > 0;) {
-    const double speed = std::hypot(s.r_rate, s.z_rate);
-    if (speed > kFastest) break;
-    const double step = std::min({left, 1e-3, 1e-2 / (k * std::max(speed, 1e-3))}), h = -step;
-    const auto k1 = rate(s), k2 = rate(plus(s, h / 2, k1)), k3 = rate(plus(s, h / 2, k2)),
-               k4 = rate(plus(s, h, k3));
-    s = plus(plus(plus(plus(s, h / 6, k1), h / 3, k2), h / 3, k3), h / 6, k4);
-    left -= step;
-  }
-  return s;
-}
-
-std::vector<PlaneState<double>> sample_tube(const LandingSet& set, const Medium& medium,
-                                            const TubeSampling& sampling) {
-  std::mt19937_64 random(sampling.seed);
-  std::uniform_real_distribution<double> unit(0, 1);
-  const std::array<std::array<double, 2>, 3> ranges{{{-set.half_length, set.half_length},
-                                                     {set.r_rate_low, set.r_rate_high},
-                                                     {set.z_rate_low, set.z_rate_high}}};
-  std::vector<PlaneState<double>> out;
-  out.reserve(static_cast<std::size_t>(sampling.count));
-  for (int i = 0; i < sampling.count; ++i) {
-    double x[3];
-    for (int k = 0; k < 3; ++k) x[k] = ranges[k][0] + unit(random) * (ranges[k][1] - ranges[k][0]);
-    if (i % sampling.boundary_every == 0) {
-      const int face = static_cast<int>(6 * unit(random));
-      x[face % 3] = ranges[face % 3][face / 3];
-    }
-    // A flight that comes down at ż = 0 has just touched the height: the tube ends there.
-    const double down = std::min(x[2], medium.drag_k > 0 ? -kSlowestWithDrag : -kSlowest);
-    out.push_back(before({x[0], 0, x[1], down}, unit(random) * sampling.longest, medium));
-  }
-  return out;
-}
-
 TEST(FlowMap, IsTheParabola) {
   std::mt19937_64 random(1);
   const double g = 9.81;
@@ -226,6 +158,14 @@ TEST(FlowMap, RefusesWhatIsNoFlight) {
   }
   for (const Medium& medium : {Medium{9.81, -0.1}, Medium{0.0, 0.0}, Medium{std::nan(""), 0.0}})
     EXPECT_THROW(flow_map({-1, -0.3, 2, 5}, medium), std::invalid_argument);
+}
+
+TEST(ReachableTube, SamplingsOutOfRangeAreRefused) {
+  for (const TubeSampling& wrong :
+       {TubeSampling{-1}, TubeSampling{1, 0}, TubeSampling{1, 101}, TubeSampling{1, 1, 0}})
+    EXPECT_THROW(sample_tube({0.1}, {}, wrong), std::invalid_argument);
+  EXPECT_THROW(sample_tube({0}, {}), std::invalid_argument);
+  EXPECT_TRUE(sample_tube({0.1}, {}, {0}).empty());
 }
 
 }  // namespace

@@ -14,6 +14,8 @@
 #include "datasets/sku.hpp"
 #include "datasets/slip_log.hpp"
 #include "datasets/throw_log.hpp"
+#include "planners/arm/chain_file.hpp"
+#include "planners/flip/robot.hpp"
 #include "tests/fuzz/scratch_file.hpp"
 
 namespace unhand::fuzz {
@@ -43,10 +45,14 @@ const std::map<std::string, std::function<void(const Path&)>>& readers() {
       {"sku", [](const Path& file) { datasets::read_sku(file); }},
       {"hand_csv", [](const Path& file) { datasets::read_hand_csv(file, plain(TableKind::hand)); }},
       {"ft_csv", [](const Path& file) { datasets::read_ft_csv(file, plain(TableKind::ft)); }},
+      {"mocap_csv", [](const Path& file) { datasets::read_mocap_csv(file, plain(TableKind::mocap)); }},
       {"motive_csv", [](const Path& file) { datasets::read_motive_csv(file); }},
       {"phyphox", [](const Path& file) { datasets::read_phyphox(file); }},
       {"cube_tosses", [](const Path& file) { datasets::import_cube_tosses(file); }},
-      {"planar_pushes", [](const Path& file) { datasets::read_push_file(file); }}};
+      {"planar_pushes", [](const Path& file) { datasets::read_push_file(file); }},
+      {"robot_toml", [](const Path& file) { planners::read_toml_chain(file); }},
+      {"robot_urdf", [](const Path& file) { planners::read_urdf_chain(file, "hand"); }},
+      {"flip_robot", [](const Path& file) { planners::flip::read_flip_robot(file.string()); }}};
   return all;
 }
 
