@@ -270,6 +270,13 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
   require_outputs({{options.json}}, {options.log, options.card});
   const auto known = contact::pad_law_names();
   for (const auto& model : options.models)
+    if (!contact::follows_pads(model))
+      throw WrongUsage(
+          fmt::format("--models: {} has no pads that let go, which the other engine could simulate: it "
+                      "carries the object "
+                      "rigidly until it is free",
+                      model));
+  for (const auto& model : options.models)
     if (std::find(known.begin(), known.end(), model) == known.end())
       throw WrongUsage(
           datasets::unknown_name(fmt::format("--models: there is no model '{}'", model), model, known));

@@ -137,8 +137,8 @@ void discover(const DiscoverOptions& options, const Parser& parser) {
     if (*kind == MeasuredKind::slips) refuse_options(parser, {"--most"}, "slips have one law");
     return discover_measured(
         *kind, {options.log, options.report, options.json, options.card, command,
-                options.model == DiscoverOptions{}.model ? std::nullopt : std::optional(options.model),
-                options.forget, options.floor, options.most.value_or(6), options.threads});
+                parser.given("--model") ? std::optional(options.model) : std::nullopt, options.forget,
+                options.floor, options.most.value_or(6), options.threads});
   }
   refuse_options(parser, {"--floor"}, "only free flights come to rest on one");
   const auto& others = measured_models();

@@ -198,8 +198,9 @@ std::string along_text(const std::string& id, const fitting::FitResult& fit) {
   std::vector<std::string> values;
   for (const auto& u : fit.campaign)
     if (u.unknown.name.starts_with(id + "."))
-      values.push_back(fmt::format("{} = {}", u.unknown.name.substr(id.size() + 1),
-                                   with_sigma(u.value, u.sigma, u.unknown.unit)));
+      values.push_back(
+          fmt::format("{} = {}", u.unknown.name.substr(id.size() + 1),
+                      std::isfinite(u.sigma) ? with_sigma(u.value, u.sigma, u.unknown.unit) : "open"));
   return fmt::format("fitted along, since no pads are rigid: {} ({})", id, fmt::join(values, ", "));
 }
 

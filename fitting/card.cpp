@@ -89,8 +89,10 @@ double margin_of(const ModelCard& card, const std::string& condition, const Card
 std::string in_words(const Condition& is, const CardRange& range) {
   const std::string unit = dynamics::after_number(is.unit);
   const auto low = fmt::format("{:.4g}", range.low), high = fmt::format("{:.4g}", range.high);
-  return low == high ? fmt::format("{} {:.4g}{} is not {}", is.name, is.value, unit, low)
-                     : fmt::format("{} {:.4g}{} is outside [{}, {}]", is.name, is.value, unit, low, high);
+  return low == high
+             ? fmt::format("{} is {:.4g}{}; the card was fitted at {}{} alone", is.name, is.value, unit, low,
+                           unit)
+             : fmt::format("{} is {:.4g}{}, outside [{}, {}]{}", is.name, is.value, unit, low, high, unit);
 }
 
 void widen(std::map<std::string, CardRange>& range, const experiment::PreparedThrow& prepared, Share share) {

@@ -87,7 +87,7 @@ TEST_F(Cli, FitThenPredict) {
   card["valid_range"]["shape"] = {{"low", 5}, {"high", 6}, {"unit", "-"}};
   std::ofstream(folder / "narrow.json") << card;
   EXPECT_THAT(run("predict " + quick + " --card narrow.json").err,
-              testing::ContainsRegex("shape [0-9.]+ is outside \\[5, 6\\]"));
+              testing::ContainsRegex("shape is [0-9.]+, outside \\[5, 6\\]"));
   EXPECT_NEAR(mae / n, fitted["test"]["landing_x_m"]["mae"].get<double>(), 1e-12);  // summed in another order
   EXPECT_EQ(static_cast<std::size_t>(std::count(predicted.err.begin(), predicted.err.end(), '\n')),
             conditions.size());  // a line each, not one per throw

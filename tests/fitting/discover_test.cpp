@@ -445,6 +445,19 @@ TEST(Discovery, WhatMattersToThePredictionAloneIsUnexplainedWhereTheCatalogueFor
   EXPECT_GT(found.unexplained->chi2_per_dof, 2) << found.unexplained->description;
 }
 
+// The fit follows the train throws as far as it can: what predictions lack then shows on the held-out ones.
+TEST(Discovery, WhatTheFitFollowsIsUnexplainedOnHeldOutThrows) {
+  experiment::CampaignDesign design = experiment::random_campaign(97003);
+  design.effects = {{"sensor.inertia.ratio", 0.88}};
+  const Discovery found = found_in(experiment::generate_campaign(design, 97003), {"sensor.inertia"});
+  EXPECT_TRUE(found.effects.empty()) << found.effects.front().id;
+  ASSERT_TRUE(found.unexplained.has_value());
+  EXPECT_EQ(found.unexplained->phase, Phase::release);
+  EXPECT_NE(found.unexplained->description.find("on held-out throws"), std::string::npos)
+      << found.unexplained->description;
+  EXPECT_GT(found.unexplained->chi2_per_dof, 4);
+}
+
 // Pads that stick let go later than the normal force does, and so do pads that open later: the delay brings
 // every channel to its noise. But it is later by the same time in every condition, and sticking pads are not.
 TEST(Discovery, WhatLeavesPredictionsOffByConditionIsWithdrawn) {

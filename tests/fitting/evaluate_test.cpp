@@ -257,7 +257,7 @@ TEST(Card, ARangeWithoutWidthIsNoEquality) {
   EXPECT_FALSE(outside(5.9e-3));
   EXPECT_TRUE(outside(-6.1e-3));
   EXPECT_THAT(reasons_of(outside_range(card, thrown)),
-              testing::ElementsAre(HasSubstr("com_offset -0.0061 m is not 0")));
+              testing::ElementsAre(HasSubstr("com_offset is -0.0061 m; the card was fitted at 0 m alone")));
 }
 
 TEST(Card, ChecksumIsTheDocumentedOne) {
