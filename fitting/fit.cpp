@@ -127,15 +127,15 @@ void describe_throws(const CampaignProblem& problem, const FitRounds& rounds, Fi
       out.samples - fitted - static_cast<long>(rounds.used().size() * problem.own().size());
 }
 
-/// The sizes of one-sided effects among the campaign's unknowns. At their neutral values they may have no
-/// derivative, so that a fit that is there cannot leave.
-std::vector<std::size_t> one_sided_sizes(const CampaignProblem& problem) {
+/// The sizes of effects among the campaign's unknowns, of one-sided effects alone or of all. At their neutral
+/// values one-sided ones may have no derivative, so that a fit that is there cannot leave.
+std::vector<std::size_t> effect_sizes(const CampaignProblem& problem, bool one_sided) {
   std::vector<std::size_t> out;
   for (const auto& id : problem.options().effects) {
     const dynamics::Effect effect = find_effect(id);
     for (const auto& p : effect.parameters)
       for (std::size_t k = 0; k < problem.campaign().size(); ++k)
-        if (effect.one_sided && !p.is_shape() &&
+        if ((effect.one_sided || !one_sided) && !p.is_shape() &&
             experiment::without_object(problem.campaign()[k].name) == effect.full_name(p))
           out.push_back(k);
   }
@@ -240,7 +240,7 @@ FitResult fit_from(std::vector<double> start, const CampaignProblem& problem, co
 FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
   validate(options, problem);
   if (!options.start.empty()) return fit_from(options.start, problem, options);
-  const std::vector<std::size_t> sizes = one_sided_sizes(problem);
+  const std::vector<std::size_t> sizes = effect_sizes(problem, true);
   const auto start = [&](double share) {  // of a typical step
     std::vector<double> out = problem.start();
     for (const std::size_t k : sizes) out[k] += share * problem.campaign()[k].scale;
@@ -254,15 +254,28 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
              return out.campaign[k].at_bound && out.campaign[k].value < problem.campaign()[k].scale;
            });
   };
-  for (const double share : {0.1, 0.01}) {
-    if (!is_stuck()) break;
-    FitResult smaller = fit_from(start(share), problem, options);
-    smaller.seconds += out.seconds;
-    smaller.jacobian_seconds += out.jacobian_seconds;
+  const auto try_from = [&](const std::vector<double>& values) {
+    FitResult other = fit_from(values, problem, options);
+    const double seconds = out.seconds + other.seconds,
+                 jacobian = out.jacobian_seconds + other.jacobian_seconds;
     // Deviances of the same throws; a start from which more of them have an answer is the better one.
     const bool likelier =
-        smaller.samples == out.samples ? smaller.deviance() < out.deviance() : smaller.samples > out.samples;
-    if (smaller.is_answer() && likelier) out = std::move(smaller);
+        other.samples == out.samples ? other.deviance() < out.deviance() : other.samples > out.samples;
+    if (other.is_answer() && (!out.is_answer() || likelier)) out = std::move(other);
+    out.seconds = seconds, out.jacobian_seconds = jacobian;
+  };
+  for (const double share : {0.1, 0.01}) {
+    if (!is_stuck()) break;
+    try_from(start(share));
+  }
+  // Several effects may stand for each other, each with a minimum of its own in which it does most.
+  constexpr double kMost = 4, kLeast = 0.1;  // typical steps
+  if (problem.options().effects.size() < 2) return out;
+  for (const std::size_t k : effect_sizes(problem, false)) {
+    std::vector<double> values = start(kLeast);
+    values[k] =
+        std::min(problem.start()[k] + kMost * problem.campaign()[k].scale, problem.campaign()[k].high);
+    try_from(values);
   }
   return out;
 }

@@ -342,7 +342,8 @@ TEST_F(Cli, ThrowFlipTransfersToAnotherBar) {
                                           "com_offset_m = 0.08\nsurface = 'printed'\n";
   const Answer object = run("validate-sku light.toml --card card.json --json sku.json");
   ASSERT_EQ(object.code, 0) << object.err;
-  EXPECT_THAT(object.out, HasSubstr("Beyond the card: mass is 0.2 kg; the card was fitted at 0.242 kg alone"));
+  EXPECT_THAT(object.out,
+              HasSubstr("Beyond the card: mass is 0.2 kg; the card was fitted at 0.242 kg alone"));
   auto budget = nlohmann::json::parse(content(folder / "sku.json"))["budget"].dump();
   for (const char* of : {"\"mu\"", "\"length\"", "\"dead_time\"", "\"mu_deviation\"", "\"grasp_angle\""})
     EXPECT_THAT(budget, HasSubstr(of));

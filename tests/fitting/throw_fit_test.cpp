@@ -520,6 +520,27 @@ TEST(ThrowFit, AnEffectWithoutADerivativeAtNeutralIsNotStuckThere) {
   }
 }
 
+// Pads that give and pads that press more in their middle stand for each other: started at a typical give the
+// fit ends with three times the true one and hardly a profile.
+TEST(ThrowFit, OfSeveralMinimaTheLikeliestIsTheAnswer) {
+  experiment::CampaignDesign design = experiment::random_campaign(9104);
+  design.effects = {{"contact.pressure_profile.s", 0.8},
+                    {"contact.pad_compliance.compliance", 1.5e-7},
+                    {"contact.pad_compliance.loss_time", 0.005}};
+  CampaignOptions options;
+  options.effects = {"contact.pressure_profile", "contact.pad_compliance"};
+  options.integrator.tolerances = {1e-5, 1e-8};
+  const CampaignProblem problem(experiment::generate_campaign(design, 9104), "synthetic", options);
+  const auto value = [](const FitResult& result, const std::string& name) {
+    for (const auto& u : result.campaign)
+      if (u.unknown.name == name) return u.value;
+    return std::nan("");
+  };
+  const FitResult best = fit(problem);
+  EXPECT_NEAR(value(best, "contact.pressure_profile.s"), 0.8, 0.05);
+  EXPECT_NEAR(value(best, "contact.pad_compliance.compliance"), 1.5e-7, 0.2e-7);
+}
+
 TEST(ThrowFit, UnknownsAtTheirBoundsDoNotStopTheOthers) {
   // Pads that part later than the force says would have the smoothing's deviation beyond its range.
   auto design = small_design(kLaw);
