@@ -9,7 +9,7 @@
 
 #include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
-#include "experiment/prepared_throw.hpp"
+#include "experiment/reference_throw.hpp"
 #include "experiment/random_stream.hpp"
 
 namespace unhand::fitting {
