@@ -9,8 +9,8 @@
 
 #include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
-#include "experiment/reference_throw.hpp"
 #include "experiment/random_stream.hpp"
+#include "experiment/reference_throw.hpp"
 
 namespace unhand::fitting {
 
