@@ -176,7 +176,8 @@ TEST_F(Cli, AdaptationThrowsUnknownObjectsWhereItShould) {
   for (auto& [object, by] : cells) {
     json &adaptive = by.at("adaptive, 30 N/m"), &soft = by.at("plain, 30 N/m"),
          &stiff = by.at("plain, 300 N/m");
-    for (json cell : {adaptive, soft, stiff}) {
+    json& joints = by.at("adaptive, in the joints");
+    for (json cell : {adaptive, soft, stiff, joints}) {
       EXPECT_EQ(cell["throws"], 3);
       EXPECT_LT(cell["torque_use"], 1);
       // rms² is the square of the mean and the spread about it, on both axes.
@@ -190,6 +191,7 @@ TEST_F(Cli, AdaptationThrowsUnknownObjectsWhereItShould) {
     EXPECT_LT(soft["mean_m"][0], -0.01) << object << " is heavy: the arm lags, and the throw falls short";
     const auto error = [](json cell) { return cell["release_position_error_m"].get<double>(); };
     EXPECT_LT(10 * error(adaptive), error(soft)) << object;
+    EXPECT_LT(5 * error(joints), error(soft)) << object;
     EXPECT_LT(5 * error(stiff), error(soft)) << object << ": ten times the stiffness, a tenth of the lag";
   }
   const auto lag = [&](const char* object) {
