@@ -228,15 +228,30 @@ TEST_F(Cli, AClutchedSpringThrowsFaster) {
   };
   EXPECT_GT(fastest("SEA"), 1.2 * fastest("rigid"));
   EXPECT_THAT(content(folder / "out/speeds.md"), HasSubstr("SEA"));
+  for (const std::string& told : {answer.out, content(folder / "out/speeds.md")})
+    EXPECT_THAT(told, HasSubstr("as reported on hardware [DarkoD46] 4.3: 4.1 m/s"));
 
   expect_refusal("plan elastic --arm none.toml", 3, "none.toml: no such file");
 }
 
 TEST_F(Cli, ElasticThrowsReachTheirTargets) {
-  const Answer answer =
-      run("plan elastic --target 2.2 --starts 2 --intervals 8 --nodes 4 --checks 9 --json e.json");
+  const Answer answer = run(
+      "plan elastic --target 2.2 --starts 2 --intervals 8 --nodes 4 --checks 9 --json e.json --report out");
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.out, HasSubstr("9 land in the box of 0.5 m"));
+  json found = read_json(folder / "e.json");
+  ASSERT_EQ(found["nodes"].size(), 4u);
+  for (const auto& node : found["nodes"]) {
+    EXPECT_TRUE(node["confirmed"]);
+    EXPECT_LE(std::abs(node["resimulated_miss_m"].get<double>()), 5e-3);
+  }
+
+  const Answer far = run("plan elastic --target 9 --starts 1 --intervals 4 --json f.json");
+  EXPECT_EQ(far.code, 1);
+  EXPECT_THAT(far.err,
+              HasSubstr("--target 9: no throw was found to a target at 9 m, 0.5 m below the shoulder"));
+  EXPECT_THAT(far.err, testing::ContainsRegex("found throws to targets from [0-9.]+ to [2-8][.][0-9]+ m"));
+  EXPECT_THAT(far.err, Not(HasSubstr("make_table")));
 }
 
 TEST_F(Cli, AnElasticWristThrowsFaster) {
