@@ -192,6 +192,7 @@ void run(const PlanControlOptions& o) {
       recorded.push_back(ct::run_throw(controller, ct::reported_payloads().back(), study, 1, true));
     draw_errors(recorded, controllers, folder);
     write_text(folder / "landings.md", table.markdown());
+    write_text(folder / "control.json", json_text(json));
   }
   if (!o.json.empty()) outputs.json(o.json, json);
   outputs.commit();
@@ -212,7 +213,7 @@ Command plan_control_command(Parser& plan) {
       .with_default();
   parser.option("--box", o->box, "Side of the box [m]").positive().with_default();
   parser.file("--json", o->json, "Write the numbers here");
-  parser.file("--report", o->report, "Write table and figures into this directory");
+  parser.file("--report", o->report, "Write table, figures and numbers into this directory");
   add_threads(parser, o->threads);
   return {&parser, [o] { run(*o); }};
 }

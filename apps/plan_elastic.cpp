@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "apps/command.hpp"
+#include "apps/elastic_trajectory.hpp"
 #include "apps/figure.hpp"
 #include "apps/output.hpp"
 #include "apps/table.hpp"
@@ -174,6 +175,13 @@ void fastest(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs& o
   const fs::path folder = outputs.directory(o.report);
   draw_speeds(arm, all, folder);
   write_text(folder / "speeds.md", table.markdown() + "\n" + notes);
+  std::string csv = trajectory_header("drive,basin");
+  for (const Fastest& one : all)
+    for (std::size_t k = 0; k < one.basins.found.size(); ++k)
+      csv += trajectory_rows(fmt::format("{},{}", el::to_string(one.drive), k + 1), arm,
+                             one.basins.found[k].best.run);
+  write_text(folder / "trajectory.csv", csv);
+  write_text(folder / "plan.json", json_text(json));
 }
 
 /// Why there is no table: the target without a throw, and to which there are some.
@@ -216,6 +224,7 @@ void to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs&
              1};
   json["nodes"] = Json::array();
   int missed = 0;
+  std::string csv = trajectory_header("target_m");
   for (std::size_t k = 0; k < distances.size(); ++k) {
     const el::ElasticThrow& one = table.throws[k];
     const auto& [run, miss, fine] = confirmed.nodes[k];
@@ -236,6 +245,7 @@ void to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs&
                              {"resimulated_miss_m", number(miss)},
                              {"spring_stop", run.spring_stop},
                              {"limits", use_json(run.use)}});
+    csv += trajectory_rows(fmt::format("{:.6g}", distances[k]), arm, run);
   }
   const auto checks = el::check_table(arm, table, o.checks);
   double worst = 0, use = 0;
@@ -262,6 +272,8 @@ void to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs&
   const fs::path folder = outputs.directory(o.report);
   draw_table(checks, folder);
   write_text(folder / "table.md", text.markdown() + "\n" + notes);
+  write_text(folder / "trajectory.csv", csv);
+  write_text(folder / "plan.json", json_text(json));
 }
 
 void run(const PlanElasticOptions& o) {
@@ -311,7 +323,7 @@ Command plan_elastic_command(Parser& plan) {
   parser.option("--seed", o->seed, "Seed of the random starts").with_default();
   parser.file("--json", o->json, "Write the numbers here");
   add_one_thread(parser, o->threads);
-  parser.file("--report", o->report, "Write tables and figures into this directory");
+  parser.file("--report", o->report, "Write table, figure, trajectories and numbers into this directory");
   return {&parser, [o] { run(*o); }};
 }
 
