@@ -34,13 +34,21 @@ struct Cell {
 };
 
 const char* kLook[]{"pt 6 ps 0.6 lc rgb '#0072b2'", "pt 8 ps 0.6 lc rgb '#d55e00'",
-                    "pt 2 ps 0.6 lc rgb '#555555'"};
-const char* kLine[]{"lw 2 dt 1 lc rgb '#0072b2'", "lw 2 dt 2 lc rgb '#d55e00'", "lw 2 dt 4 lc rgb '#555555'"};
+                    "pt 2 ps 0.6 lc rgb '#555555'", "pt 4 ps 0.6 lc rgb '#009e73'"};
+const char* kLine[]{"lw 2 dt 1 lc rgb '#0072b2'", "lw 2 dt 2 lc rgb '#d55e00'", "lw 2 dt 4 lc rgb '#555555'",
+                    "lw 2 dt 3 lc rgb '#009e73'"};
+
+/// Those of [DarkoD46], then its law in the joints.
+std::vector<ct::ControllerChoice> compared_controllers() {
+  auto out = ct::reported_controllers();
+  out.push_back(ct::joint_controller());
+  return out;
+}
 
 /// A panel for every object, all to one scale about their landings; the last controllers first, so that the
 /// adaptive one lies on top.
 void draw_landings(const std::vector<Cell>& cells, double box, const fs::path& folder) {
-  const std::size_t controllers = ct::reported_controllers().size(), panels = cells.size() / controllers;
+  const std::size_t controllers = compared_controllers().size(), panels = cells.size() / controllers;
   double back = -1, front = 1, side = 1;  // [cm]
   for (const Cell& cell : cells)
     for (const auto& one : cell.throws) {
@@ -52,7 +60,7 @@ void draw_landings(const std::vector<Cell>& cells, double box, const fs::path& f
   const double margin = 0.04 * (front - back);
   back -= margin, front += margin, side += margin;
   Figure figure{"landings", 17, 0, {}, ""};
-  constexpr double left = 1.9, width = 14.6, bottom = 2.0, gap = 0.9;
+  constexpr double left = 1.9, width = 14.6, bottom = 2.5, gap = 0.9;
   const double height = std::clamp(2 * side * width / (front - back), 1.5, 6.0);
   figure.height = bottom + static_cast<double>(panels) * (height + gap);
   std::string script = fmt::format(
@@ -85,7 +93,7 @@ void draw_landings(const std::vector<Cell>& cells, double box, const fs::path& f
                           plain(cells[p * controllers].payload.name),
                           1e3 * cells[p * controllers].payload.mass, points);
   }
-  figure.script = script + key_strip(figure, key, static_cast<int>(controllers)) + "unset multiplot\n";
+  figure.script = script + key_strip(figure, key, 2) + "unset multiplot\n";
   draw(figure, folder);
 }
 
@@ -129,7 +137,7 @@ void run(const PlanControlOptions& o) {
   study.box = {o.box, o.box};
   std::vector<Cell> cells;
   for (const auto& payload : ct::reported_payloads())
-    for (const auto& controller : ct::reported_controllers())
+    for (const auto& controller : compared_controllers())
       cells.push_back({payload, controller, std::vector<ct::StudyThrow>(o.seeds), {}});
   std::optional<Progress> progress(std::in_place, "plan control", cells.size() * o.seeds);
   dynamics::parallel_for(cells.size() * o.seeds, o.threads, [&](std::size_t i) {
@@ -179,11 +187,12 @@ void run(const PlanControlOptions& o) {
     const fs::path folder = outputs.directory(o.report);
     draw_landings(cells, o.box, folder);
     std::vector<ct::StudyThrow> recorded;
-    const auto controllers = ct::reported_controllers();
+    const auto controllers = compared_controllers();
     for (const auto& controller : controllers)
       recorded.push_back(ct::run_throw(controller, ct::reported_payloads().back(), study, 1, true));
     draw_errors(recorded, controllers, folder);
     write_text(folder / "landings.md", table.markdown());
+    write_text(folder / "control.json", json_text(json));
   }
   if (!o.json.empty()) outputs.json(o.json, json);
   outputs.commit();
@@ -204,7 +213,7 @@ Command plan_control_command(Parser& plan) {
       .with_default();
   parser.option("--box", o->box, "Side of the box [m]").positive().with_default();
   parser.file("--json", o->json, "Write the numbers here");
-  parser.file("--report", o->report, "Write table and figures into this directory");
+  parser.file("--report", o->report, "Write table, figures and numbers into this directory");
   add_threads(parser, o->threads);
   return {&parser, [o] { run(*o); }};
 }

@@ -5,9 +5,12 @@
 #include <cmath>
 #include <memory>
 #include <optional>
-#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "apps/command.hpp"
+#include "apps/elastic_trajectory.hpp"
 #include "apps/figure.hpp"
 #include "apps/output.hpp"
 #include "apps/table.hpp"
@@ -33,9 +36,13 @@ const el::Links<double> kReadyPose{0.2, -1.0, -0.5};
 
 struct Fastest {
   el::Drive drive;
-  el::Basins basins;
-  std::vector<el::Replay> runs;  ///< of the basins
+  el::ConfirmedBasins basins;
 };
+
+/// What [DarkoD46] reports of its arm.
+constexpr const char* kOnHardware =
+    "as reported on hardware [DarkoD46] 4.3: 4.1 m/s with BRK -> SEA and motors of 4.5 rad/s, on an arm "
+    "whose lengths and masses are not published\n";
 
 double speed_of(const el::TipState<double>& tip) { return std::hypot(tip.vx, tip.vz); }
 
@@ -68,9 +75,10 @@ void draw_speeds(const el::ClutchedArm& arm, const std::vector<Fastest>& all, co
                       "lines lw 2 lc rgb '#555555' dt 4"};
   std::string speed, deflection;
   for (std::size_t i = 0; i < all.size(); ++i) {
-    if (all[i].runs.empty()) continue;
+    const auto& found = all[i].basins.found;
+    if (found.empty()) continue;
     figure.data.push_back(
-        {el::to_string(all[i].drive), kHistoryColumns, history(arm, all[i].runs.front()), {}});
+        {el::to_string(all[i].drive), kHistoryColumns, history(arm, found.front().best.run), {}});
     const auto index = figure.data.size() - 1;
     speed += fmt::format("{}DATA index {} using 1:2 with {} title '{}'", index ? ", " : "plot ", index,
                          style[i], plain(el::to_string(all[i].drive)));
@@ -126,20 +134,14 @@ void fastest(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs& o
   json["drives"] = Json::object();
   for (const el::Drive drive : {el::Drive::clutched, el::Drive::series, el::Drive::rigid}) {
     task.drive = drive;
-    Fastest one{drive, el::find_basins(arm, task, program_options(o), o.starts), {}};
-    longest = std::max(longest, one.basins.longest);
-    Json& j = json["drives"][el::to_string(drive)] = {{"failed_starts", one.basins.failed},
-                                                      {"basins", Json::array()}};
-    std::vector<std::pair<el::ConfirmedThrow, int>> found;  // with the starts that led there
-    for (const el::Basin& basin : one.basins.found) {
-      found.emplace_back(el::confirm(arm, task, basin.best, program_options(o)), basin.starts);
-      longest = std::max(longest, found.back().first.longest_solve);
-    }
-    std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) {
-      return a.first.plan.speed() > b.first.plan.speed();
-    });
-    for (std::size_t k = 0; k < found.size(); ++k) {
-      const auto& [best, starts] = found[k];
+    const el::Basins basins = el::find_basins(arm, task, program_options(o), o.starts);
+    all.push_back({drive, el::confirm_basins(arm, task, basins, program_options(o))});
+    const el::ConfirmedBasins& confirmed = all.back().basins;
+    longest = std::max(longest, confirmed.longest);
+    Json& j =
+        json["drives"][el::to_string(drive)] = {{"failed_starts", basins.failed}, {"basins", Json::array()}};
+    for (std::size_t k = 0; k < confirmed.found.size(); ++k) {
+      const auto& [best, starts] = confirmed.found[k];
       const el::Replay& run = best.run;
       table.rows.push_back(
           {k == 0 ? el::to_string(drive) : "", fmt::to_string(k + 1), fmt::to_string(starts),
@@ -162,21 +164,42 @@ void fastest(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs& o
                                {"impacts", run.impacts},
                                {"gain", run.gain},
                                {"unexplained", run.unexplained()}}}});
-      one.runs.push_back(run);
     }
-    all.push_back(std::move(one));
   }
   json["longest_solve_s"] = longest;
-  fmt::print(
-      "{}\nlongest solve {:.2f} s of CPU time, {} random starts each\nas reported on hardware [DarkoD46] "
-      "4.3: 4.1 m/s with "
-      "BRK -> SEA and motors of 4.5 rad/s, on an arm whose lengths and masses are not published\n",
-      table.text(), longest, o.starts);
-  if (!o.report.empty()) {
-    const fs::path folder = outputs.directory(o.report);
-    draw_speeds(arm, all, folder);
-    write_text(folder / "speeds.md", table.markdown());
-  }
+  const std::string notes =
+      fmt::format("longest solve {:.2f} s of CPU time, {} random starts each\n", longest, o.starts) +
+      kOnHardware;
+  fmt::print("{}\n{}", table.text(), notes);
+  if (o.report.empty()) return;
+  const fs::path folder = outputs.directory(o.report);
+  draw_speeds(arm, all, folder);
+  write_text(folder / "speeds.md", table.markdown() + "\n" + notes);
+  std::string csv = trajectory_header("drive,basin");
+  for (const Fastest& one : all)
+    for (std::size_t k = 0; k < one.basins.found.size(); ++k)
+      csv += trajectory_rows(fmt::format("{},{}", el::to_string(one.drive), k + 1), arm,
+                             one.basins.found[k].best.run);
+  write_text(folder / "trajectory.csv", csv);
+  write_text(folder / "plan.json", json_text(json));
+}
+
+/// Why there is no table: the target without a throw, and to which there are some.
+std::string out_of_reach(const el::ClutchedArm& arm, const el::ThrowTask& task, const PlanElasticOptions& o,
+                         double distance) {
+  std::string out =
+      fmt::format("--target {:g}: no throw was found to a target at {:g} m", o.target_x, distance);
+  if (std::abs(distance - o.target_x) > 1e-9)
+    out += fmt::format(", a node of the table (--half-table {:g})", o.half_table);
+  out += fmt::format(", {:g} m {} the shoulder; ", std::abs(o.target_z), o.target_z < 0 ? "below" : "above");
+  const auto reach = el::find_reach(arm, task, program_options(o), std::min(o.starts, 3));
+  if (!reach) return out + "nor to any other at this height";
+  out += fmt::format("at this height a coarse search found throws to targets from {:.2f} to {:.2f} m",
+                     std::ceil(100 * reach->nearest - 1e-6) / 100,
+                     std::floor(100 * reach->farthest + 1e-6) / 100);
+  if (reach->nearest <= distance && distance <= reach->farthest)
+    out += ", so that more --starts or another --seed may find one here, too";
+  return out;
 }
 
 void to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs& outputs, Json& json) {
@@ -187,29 +210,42 @@ void to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs&
   std::vector<double> distances;
   for (int k = 0; k < o.nodes; ++k)
     distances.push_back(o.target_x - o.half_table + 2 * o.half_table * k / (o.nodes - 1));
-  el::ThrowTable table;
+  el::ThrowTable solved;
   try {
-    table = el::make_table(arm, task, distances, program_options(o), o.starts);
-  } catch (const std::runtime_error& error) {
-    throw Unanswered(error.what());
+    solved = el::make_table(arm, task, distances, program_options(o), o.starts);
+  } catch (const el::OutOfReach& error) {
+    throw Unanswered(out_of_reach(arm, task, o, error.distance));
   }
-  Table text{{"target [m]", "tip speed [m/s]", "duration [s]", "solve [s]", "miss, re-simulated [mm]",
-              "limits used"},
+  const el::ConfirmedTable confirmed = el::confirm_table(arm, task, std::move(solved), program_options(o));
+  const el::ThrowTable& table = confirmed.table;
+  Table text{{"target [m]", "tip speed [m/s]", "re-simulated", "duration [s]", "solve [s]",
+              "miss, re-simulated [mm]", "limits used", "intervals"},
              {},
              1};
   json["nodes"] = Json::array();
+  int missed = 0;
+  std::string csv = trajectory_header("target_m");
   for (std::size_t k = 0; k < distances.size(); ++k) {
     const el::ElasticThrow& one = table.throws[k];
-    const el::Replay run = el::replay(arm, one);
-    const double miss = el::landing_x(run.release, o.target_z).value_or(NAN) - distances[k];
-    text.rows.push_back({fmt::format("{:.2f}", distances[k]), fmt::format("{:.3f}", one.speed()),
-                         fmt::format("{:.3f}", one.duration()), fmt::format("{:.2f}", one.program.seconds),
-                         with_sign(1e3 * miss, 2), fmt::format("{:.1f} %", 100 * run.use.largest())});
+    const auto& [run, miss, fine] = confirmed.nodes[k];
+    missed += !fine;
+    text.rows.push_back(
+        {fmt::format("{:.2f}", distances[k]), fmt::format("{:.3f}", one.speed()),
+         run.spring_stop ? "spring at its stop" : fmt::format("{:.3f}", speed_of(run.release)),
+         fmt::format("{:.3f}", one.duration()), fmt::format("{:.2f}", one.program.seconds),
+         miss ? with_sign(1e3 * *miss, 2) : "-", fmt::format("{:.1f} %", 100 * run.use.largest()),
+         fmt::to_string(2 * confirmed.intervals) + (fine ? "" : ", not confirmed")});
     json["nodes"].push_back({{"target_m", distances[k]},
                              {"speed_m_s", one.speed()},
+                             {"resimulated_speed_m_s", speed_of(run.release)},
                              {"duration_s", one.duration()},
                              {"solve_s", one.program.seconds},
+                             {"intervals", 2 * confirmed.intervals},
+                             {"confirmed", fine},
+                             {"resimulated_miss_m", number(miss)},
+                             {"spring_stop", run.spring_stop},
                              {"limits", use_json(run.use)}});
+    csv += trajectory_rows(fmt::format("{:.6g}", distances[k]), arm, run);
   }
   const auto checks = el::check_table(arm, table, o.checks);
   double worst = 0, use = 0;
@@ -225,16 +261,19 @@ void to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs&
                    {"hits", hits},
                    {"worst_miss_m", worst},
                    {"largest_limit_use", use}};
-  fmt::print(
-      "{}\ninterpolated between the nodes at {} targets: {} land in the box of {:g} m, worst miss {:.2f} mm, "
-      "limits used at "
-      "most {:.1f} %\n",
-      text.text(), checks.size(), hits, o.box, 1e3 * worst, 100 * use);
-  if (!o.report.empty()) {
-    const fs::path folder = outputs.directory(o.report);
-    draw_table(checks, folder);
-    write_text(folder / "table.md", text.markdown());
-  }
+  std::string notes = fmt::format(
+      "interpolated between the nodes at {} targets: {} land in the box of {:g} m, worst miss {:.2f} mm, "
+      "limits used at most {:.1f} %\n",
+      checks.size(), hits, o.box, 1e3 * worst, 100 * use);
+  if (missed > 0)
+    notes += fmt::format("{} of {} nodes are not confirmed by their runs\n", missed, distances.size());
+  fmt::print("{}\n{}", text.text(), notes);
+  if (o.report.empty()) return;
+  const fs::path folder = outputs.directory(o.report);
+  draw_table(checks, folder);
+  write_text(folder / "table.md", text.markdown() + "\n" + notes);
+  write_text(folder / "trajectory.csv", csv);
+  write_text(folder / "plan.json", json_text(json));
 }
 
 void run(const PlanElasticOptions& o) {
@@ -284,7 +323,7 @@ Command plan_elastic_command(Parser& plan) {
   parser.option("--seed", o->seed, "Seed of the random starts").with_default();
   parser.file("--json", o->json, "Write the numbers here");
   add_one_thread(parser, o->threads);
-  parser.file("--report", o->report, "Write tables and figures into this directory");
+  parser.file("--report", o->report, "Write table, figure, trajectories and numbers into this directory");
   return {&parser, [o] { run(*o); }};
 }
 

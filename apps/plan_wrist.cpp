@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "apps/command.hpp"
+#include "apps/elastic_trajectory.hpp"
 #include "apps/figure.hpp"
 #include "apps/output.hpp"
 #include "apps/table.hpp"
@@ -162,6 +163,10 @@ void run(const PlanWristOptions& o) {
     const fs::path folder = outputs.directory(o.report);
     draw_gain(points, rigid, folder);
     write_text(folder / "gain.md", table.markdown());
+    std::string csv = trajectory_header("stiffness_n_m_rad") + trajectory_rows("inf", arm, rigid.best.run);
+    for (const Point& p : points) csv += trajectory_rows(fmt::format("{:.9g}", p.stiffness), arm, p.best.run);
+    write_text(folder / "trajectory.csv", csv);
+    write_text(folder / "plan.json", json_text(json));
   }
   if (!o.json.empty()) outputs.json(o.json, json);
   outputs.commit();
@@ -188,7 +193,7 @@ Command plan_wrist_command(Parser& plan) {
   parser.option("--seed", o->seed, "Seed of the random starts").with_default();
   parser.file("--json", o->json, "Write the numbers here");
   add_one_thread(parser, o->threads);
-  parser.file("--report", o->report, "Write table and figure into this directory");
+  parser.file("--report", o->report, "Write table, figure, trajectories and numbers into this directory");
   return {&parser, [o] { run(*o); }};
 }
 

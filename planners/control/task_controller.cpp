@@ -24,6 +24,14 @@ Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& R) {
   return turn.angle() * turn.axis();
 }
 
+/// ½ π̃ᵀ R_p⁻¹ π̃ over the adapted parameters.
+double estimate_energy(const Adaptation& adaptation, const LinkParameters& error) {
+  double out = 0;
+  for (int i = 0; i < kLinkParameters; ++i)
+    if (adaptation.gain[i] > 0) out += 0.5 * error[i] * error[i] / adaptation.gain[i];
+  return out;
+}
+
 }  // namespace
 
 AdaptiveController::AdaptiveController(const Chain& model, const Adaptation& adaptation)
@@ -35,6 +43,18 @@ AdaptiveController::AdaptiveController(const Chain& model, const Adaptation& ada
   if (!(adaptation.prediction >= 0)) refuse("prediction", adaptation.prediction, ">= 0");
   if (!(adaptation.torque_weight > 0)) refuse("torque_weight", adaptation.torque_weight, "> 0");
   if (!(adaptation.filter > 0)) refuse("filter", adaptation.filter, "> 0");
+}
+
+ControlStep AdaptiveController::joint_law(const JointReference& r, const JointGains& gains, const Joints& q,
+                                          const Joints& qd) const {
+  require_sizes(model_, "joint law", q, qd, r.q, r.qd, r.qdd, gains.stiffness, gains.damping);
+  ControlStep out;
+  out.velocity_error = r.qd - qd;
+  Y_r_ = torque_regressor<double>(model_, q, qd, r.qdd, kGravity, model_.size() - 1);  // q̇_r = q̇
+  out.torque = inverse_dynamics<double>(model_, q, qd, r.qdd) + Y_r_ * estimate +
+               friction_torque<double>(model_, qd) + gains.damping.cwiseProduct(out.velocity_error) +
+               gains.stiffness.cwiseProduct(r.q - q);
+  return out;
 }
 
 ControlStep AdaptiveController::task_law(const TaskReference& r, const TaskGains& gains, const Joints& q,
@@ -104,12 +124,17 @@ void AdaptiveController::adapt(const ControlStep& step, const Joints& applied, c
 double lyapunov(const Chain& truth, const TaskGains& gains, const Adaptation& adaptation,
                 const ControlStep& step, const Joints& q, const LinkParameters& error) {
   const Joints& s = step.velocity_error;
-  double out = 0.5 * s.dot(mass_matrix<double>(truth, q) * s) +
-               0.5 * gains.stiffness * step.error.head<3>().squaredNorm() +
-               0.5 * gains.rotational * step.error.tail<3>().squaredNorm();
-  for (int i = 0; i < kLinkParameters; ++i)
-    if (adaptation.gain[i] > 0) out += 0.5 * error[i] * error[i] / adaptation.gain[i];
-  return out;
+  return 0.5 * s.dot(mass_matrix<double>(truth, q) * s) +
+         0.5 * gains.stiffness * step.error.head<3>().squaredNorm() +
+         0.5 * gains.rotational * step.error.tail<3>().squaredNorm() + estimate_energy(adaptation, error);
+}
+
+double lyapunov(const Chain& truth, const JointGains& gains, const Adaptation& adaptation,
+                const ControlStep& step, const Joints& q, const Joints& off, const LinkParameters& error) {
+  require_sizes(truth, "Lyapunov function", q, off, step.velocity_error, gains.stiffness);
+  const Joints& s = step.velocity_error;
+  return 0.5 * s.dot(mass_matrix<double>(truth, q) * s) + 0.5 * off.dot(gains.stiffness.cwiseProduct(off)) +
+         estimate_energy(adaptation, error);
 }
 
 TaskReference MinimumJerk::at(double t, const Eigen::Matrix3d& orientation) const {

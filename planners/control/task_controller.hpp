@@ -1,7 +1,7 @@
-// Computed torque in the task with and without adaptation, [DarkoD46] Eq. 34, 35, 36.
+// Computed torque in the joints and in the task, with and without adaptation, [DarkoD46] Eq. 31, 34, 35, 36.
 //
 // What is not known is a body in the hand: ten parameters π̃ of the last link beyond the model, estimated as π̂
-// from 0. The law neither measures an acceleration nor inverts an estimated mass matrix.
+// from 0. Neither law measures an acceleration or inverts an estimated mass matrix.
 #pragma once
 
 #include <optional>
@@ -22,6 +22,17 @@ struct Adaptation {
   double filter{50};           ///< λ [1/s], > 0
 };
 
+/// Motion of the joints.
+struct JointReference {
+  JointVector<double> q, qd, qdd;  ///< rad, rad/s, rad/s²
+};
+
+/// Gains of the law in the joints.
+struct JointGains {
+  JointVector<double> stiffness;  ///< k_p [N m/rad], diagonal, > 0
+  JointVector<double> damping;    ///< k_v [N m s/rad], diagonal, > 0
+};
+
 /// Motion of the tip with its orientation kept.
 struct TaskReference {
   Eigen::Vector3d position, velocity, acceleration;  ///< m, m/s, m/s²
@@ -40,18 +51,23 @@ struct TaskGains {
 /// Quantities of a step that a monitor asks for.
 struct ControlStep {
   JointVector<double> torque;          ///< τ [N m], before limits
-  JointVector<double> velocity_error;  ///< s = β − q̇ [rad/s]
-  Eigen::Matrix<double, 6, 1> error;   ///< e_ξ: position [m] and rotation vector [rad]
+  JointVector<double> velocity_error;  ///< s = β − q̇ in the task, ė in the joints [rad/s]
+  Eigen::Matrix<double, 6, 1> error =  ///< e_ξ: position [m] and rotation vector [rad]; 0 in the joints
+      Eigen::Matrix<double, 6, 1>::Zero();
 };
 
-/// The law with its estimate of the unknown body. For one thread: `task_law` keeps its regressor for `adapt`.
-/// Both throw std::invalid_argument for vectors that have not one number for each joint.
+/// Two laws with one estimate of the unknown body. For one thread: a law keeps its regressor for `adapt`. All
+/// throw std::invalid_argument for vectors that have not one number for each joint.
 class AdaptiveController {
  public:
   /// `model`: the chain as it is known, without the unknown body; friction is compensated as the model has
   /// it.
   AdaptiveController(const Chain& model, const Adaptation& adaptation);
 
+  /// Torques of Eq. 31, e = q_d − q: τ = M̂ q̈_d + Ĉ q̇ + ĝ + k_v ė + k_p e. With the true parameters M ë + k_v
+  /// ė + k_p e = 0; else Y_r π̃ is on the right, with Y_r(q, q̇, q̇, q̈_d) = Y(q, q̇, q̈_d) of Eq. 34.
+  ControlStep joint_law(const JointReference& reference, const JointGains& gains,
+                        const JointVector<double>& q, const JointVector<double>& qd) const;
   /// Torques of Eq. 35: impedance in the task, posture in its null space.
   ControlStep task_law(const TaskReference& reference, const TaskGains& gains, const JointVector<double>& q,
                        const JointVector<double>& qd) const;
@@ -78,6 +94,12 @@ class AdaptiveController {
 /// motion, and is lower only after the repetitions than before them (docs/adaptive-control.md).
 double lyapunov(const Chain& truth, const TaskGains& gains, const Adaptation& adaptation,
                 const ControlStep& step, const JointVector<double>& q, const LinkParameters& error);
+/// The same under the joint law, ½ ėᵀ M ė + ½ eᵀ k_p e + ½ π̃ᵀ R_p⁻¹ π̃ with e = `off`. Eq. 31 has Ĉ q̇ where
+/// Slotine and Li have Ĉ q̇_d: the rate is −ėᵀ k_v ė + ½ ėᵀ Ṁ ė − γ |Y_f π̃|²_R_t, and V may rise where k_v is
+/// small against ½ Ṁ.
+double lyapunov(const Chain& truth, const JointGains& gains, const Adaptation& adaptation,
+                const ControlStep& step, const JointVector<double>& q, const JointVector<double>& off,
+                const LinkParameters& error);
 
 /// The quintic of least jerk between two states in `duration` [s], [FlashHogan1985]: position, velocity,
 /// acceleration at t, held beyond the ends.

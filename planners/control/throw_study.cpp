@@ -84,6 +84,49 @@ struct Course {
   }
 };
 
+/// The course in the joints, step by step from rest at `at`: q̈_d = J⁺ (ξ̈_d + 2 κ ė_ξ + κ² e_ξ − J̇ q̇_d) +
+/// N (ρ² (rest − q_d) − 2 ρ q̇_d), κ against drift.
+class JointCourse {
+ public:
+  JointCourse(const Chain& arm, const Joints& rest, double posture)
+      : arm_(arm), rest_(rest), posture_(posture), now_{rest, Joints::Zero(7), Joints::Zero(7)} {}
+
+  /// The motion now, with the acceleration that the task asks for; then a step of the controller on.
+  JointReference next(const TaskReference& r) {
+    constexpr double kDrift = 50;  // κ [1/s]
+    const TipMotion<double> tip = tip_motion<double>(arm_, now_.q, now_.qd, Joints::Zero(7));
+    const Jacobian<double> J = jacobian<double>(arm_, now_.q);
+    const Eigen::AngleAxisd turn(r.orientation * tip.frame.R.transpose());
+    Eigen::Matrix<double, 6, 1> off, rate, wanted;
+    off << r.position - tip.frame.p, turn.angle() * turn.axis();
+    rate << r.velocity - tip.velocity, -tip.omega;
+    wanted << r.acceleration - tip.acceleration, -tip.alpha;
+    const JointMatrix<double> JJt = J * J.transpose();
+    const auto reach = [&](const Eigen::Matrix<double, 6, 1>& x) {
+      return Joints(J.transpose() * solve_positive<double>(JJt, x));
+    };
+    const Joints home = posture_ * (posture_ * (rest_ - now_.q) - 2 * now_.qd);
+    now_.qdd = reach(wanted + 2 * kDrift * rate + kDrift * kDrift * off) + home - reach(J * home);
+    const JointReference out = now_;
+    now_.q += kStep * now_.qd + 0.5 * kStep * kStep * now_.qdd;
+    now_.qd += kStep * now_.qdd;
+    return out;
+  }
+
+ private:
+  const Chain& arm_;
+  Joints rest_;
+  double posture_;
+  JointReference now_;
+};
+
+/// What each joint feels of the tip's stiffness, J_iᵀ k_ξ J_i [N m/rad].
+Joints felt_stiffness(const ControllerChoice& c, const Jacobian<double>& J) {
+  return (c.stiffness * J.topRows<3>().colwise().squaredNorm() +
+          c.rotational * J.bottomRows<3>().colwise().squaredNorm())
+      .transpose();
+}
+
 TaskGains gains_of(const ControllerChoice& c, const Chain& arm, const Joints& rest) {
   TaskGains g;
   g.stiffness = c.stiffness;
@@ -94,11 +137,8 @@ TaskGains gains_of(const ControllerChoice& c, const Chain& arm, const Joints& re
   const Jacobian<double> J = jacobian<double>(arm, rest);
   const JointMatrix<double> M = mass_matrix<double>(arm, rest);
   g.damping.resize(arm.size());
-  for (int i = 0; i < arm.size(); ++i) {
-    const double K =
-        c.stiffness * J.col(i).head<3>().squaredNorm() + c.rotational * J.col(i).tail<3>().squaredNorm();
-    g.damping[i] = 2 * std::sqrt(K * M(i, i)) + (i < 4 ? 2.0 : 0.5);
-  }
+  const Joints K = felt_stiffness(c, J);
+  for (int i = 0; i < arm.size(); ++i) g.damping[i] = 2 * std::sqrt(K[i] * M(i, i)) + (i < 4 ? 2.0 : 0.5);
   return g;
 }
 
@@ -142,6 +182,8 @@ std::vector<ControllerChoice> reported_controllers() {
           {"plain, 300 N/m", 300, 40, false}};
 }
 
+ControllerChoice joint_controller() { return {"adaptive, in the joints", 30, 10, true, true}; }
+
 StudyThrow run_throw(const ControllerChoice& choice, const Payload& payload, const StudyOptions& o,
                      std::uint64_t seed, bool record) {
   check(choice, payload, o);
@@ -163,6 +205,9 @@ StudyThrow run_throw(const ControllerChoice& choice, const Payload& payload, con
       pose_at(known, o.start, orientation, Joints{{0, -pi / 4, 0, -3 * pi / 4, 0, pi / 2, pi / 4}});
   robot.q = rest;
   const TaskGains gains = gains_of(choice, known, rest);
+  const JointGains joint_gains{felt_stiffness(choice, jacobian<double>(known, rest)), gains.damping};
+  JointCourse joint_course(known, rest, gains.posture);
+  JointReference joint_reference;
   Adaptation adaptation = o.adaptation;
   if (!choice.adaptive) adaptation.gain.setZero();
   AdaptiveController controller(known, adaptation);
@@ -177,7 +222,14 @@ StudyThrow run_throw(const ControllerChoice& choice, const Payload& payload, con
     Joints q = robot.q, qd = robot.qd;
     for (int i = 0; i < 7; ++i)
       q[i] += o.angle_noise * normal(random), qd[i] += o.rate_noise * normal(random);
-    const ControlStep control = controller.task_law(reference, gains, q, qd);
+    ControlStep control;
+    if (choice.in_joints) {
+      joint_reference = joint_course.next(reference);
+      control = controller.joint_law(joint_reference, joint_gains, q, qd);
+      control.error.head<3>() = reference.position - forward_kinematics<double>(known, q).p;
+    } else {
+      control = controller.task_law(reference, gains, q, qd);
+    }
     const Joints applied = control.torque.cwiseMin(limit).cwiseMax(-limit);
     out.torque_use = std::max(out.torque_use, control.torque.cwiseQuotient(limit).cwiseAbs().maxCoeff());
     controller.adapt(control, applied, q, qd, kStep);
@@ -200,10 +252,12 @@ StudyThrow run_throw(const ControllerChoice& choice, const Payload& payload, con
       if (k * kStep < o.throw_time) squares += control.error.head<3>().squaredNorm(), ++counted;
       if (record && k % 10 == 0) {
         const TipMotion<double> tip = tip_motion<double>(known, robot.q, robot.qd, Joints::Zero(7));
-        out.history.push_back(
-            {t, control.error.head<3>().norm(), (reference.velocity - tip.velocity).norm(),
-             lyapunov(robot.truth, gains, adaptation, control, robot.q, unknown - controller.estimate),
-             controller.estimate[0]});
+        const LinkParameters off = unknown - controller.estimate;
+        const double V = choice.in_joints ? lyapunov(robot.truth, joint_gains, adaptation, control, robot.q,
+                                                     joint_reference.q - robot.q, off)
+                                          : lyapunov(robot.truth, gains, adaptation, control, robot.q, off);
+        out.history.push_back({t, control.error.head<3>().norm(), (reference.velocity - tip.velocity).norm(),
+                               V, controller.estimate[0]});
       }
     }
     out.rms_error.push_back(std::sqrt(squares / std::max(1, counted)));

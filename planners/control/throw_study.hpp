@@ -28,9 +28,13 @@ struct ControllerChoice {
   double stiffness{};   ///< k_ξ of the position [N/m], > 0
   double rotational{};  ///< of the orientation [N m/rad], > 0
   bool adaptive{};      ///< with Adaptation; else its gains are zero
+  bool in_joints{};     ///< Eq. 31 instead of Eq. 35: each joint has the stiffness that it feels of the tip's
+                        ///< at the start, J_iᵀ k_ξ J_i, and follows the course by inverse kinematics
 };
 /// Adaptive low gain (30 N/m), plain low gain (30 N/m), plain high gain (300 N/m).
 std::vector<ControllerChoice> reported_controllers();
+/// Adaptive low gain (30 N/m) by the law in the joints, which [DarkoD46] gives but does not throw with.
+ControllerChoice joint_controller();
 
 /// The motion, the noise and the tolerances of the study.
 struct StudyOptions {

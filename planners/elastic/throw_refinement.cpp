@@ -24,14 +24,19 @@ ThrowPoint between(const ThrowPoint& a, const ThrowPoint& b) {
   return out;
 }
 
-bool confirms(const ElasticThrow& plan, const Replay& run, const Refinement& refinement) {
+}  // namespace
+
+bool confirms(const ThrowTask& task, const ElasticThrow& plan, const Replay& run,
+              const Refinement& refinement) {
   if (run.outcome != dynamics::Outcome::horizon || run.spring_stop) return false;
+  if (task.target) {
+    const auto x = landing_x(run.release, task.target->z, task.gravity);
+    if (!x || !(std::abs(*x - task.target->x) <= refinement.miss)) return false;
+  }
   const double speed = std::hypot(run.release.vx, run.release.vz);
   return std::abs(plan.speed() - speed) <= refinement.speed_error * speed &&
          run.use.largest() <= refinement.limit_use;
 }
-
-}  // namespace
 
 ElasticThrow on_finer_mesh(const ElasticThrow& plan) {
   ElasticThrow out = plan;
@@ -53,7 +58,7 @@ ConfirmedThrow confirm(const ClutchedArm& arm, const ThrowTask& task, ElasticThr
   out.run = replay(arm, plan);
   out.plan = std::move(plan);
   out.intervals = options.intervals;
-  while (!(out.confirmed = confirms(out.plan, out.run, refinement)) &&
+  while (!(out.confirmed = confirms(task, out.plan, out.run, refinement)) &&
          2 * out.intervals <= refinement.finest) {
     const ElasticThrow start = on_finer_mesh(out.plan);
     options.intervals = 2 * out.intervals;

@@ -8,6 +8,7 @@ namespace unhand::planners::elastic {
 /// When a plan counts as confirmed, and how far to go for it.
 struct Refinement {
   double speed_error{5e-3};  ///< of the tip at the release, plan against run, share of the run's [-]
+  double miss{5e-3};         ///< largest of the run at the task's target, if it has one [m]
   double limit_use{1.0};     ///< largest share of any limit that the run may use [-]
   int finest{64};            ///< intervals per phase, as in ThrowProgramOptions: no mesh finer than this
 };
@@ -20,6 +21,11 @@ struct ConfirmedThrow {
   bool confirmed{};        ///< run and plan agree, and no limit is exceeded
   double longest_solve{};  ///< CPU time of the longest solve on the way, the first not counted [s]
 };
+
+/// Whether the run of a plan came to its end without the spring's stop, at the plan's speed, on the task's
+/// target, and within the limits.
+bool confirms(const ThrowTask& task, const ElasticThrow& plan, const Replay& run,
+              const Refinement& refinement = {});
 
 /// The same motion on twice the intervals: states by Hermite's cubics between the points, torques and
 /// accelerations on straight lines.

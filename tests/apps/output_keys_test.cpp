@@ -25,6 +25,7 @@ const std::set<std::string> kByName{"parameters",
                                     "derivatives",
                                     "datasets",
                                     "predicted",
+                                    "drives",
                                     "autocorrelation",
                                     "not_compared",
                                     "footprint_correlations"};
@@ -65,7 +66,11 @@ TEST_F(Cli, ThePageHasEveryKeyOfTheOutputs) {
       {"unhand inspect", "inspect " + quick},
       {"unhand discover", "discover " + quick},
       {"unhand validate-sku", "validate-sku " + sku + " --card card.json --samples 100"},
-      {"unhand plan throw", "plan throw --target 1.3,0,-0.2 --card card.json --sku " + sku}};
+      {"unhand plan throw", "plan throw --target 1.3,0,-0.2 --card card.json --sku " + sku},
+      {"unhand plan control", "plan control --seeds 2 --repetitions 0"},
+      {"unhand plan elastic", "plan elastic --starts 1 --intervals 8"},
+      {"unhand plan elastic", "plan elastic --target 2.2 --starts 1 --intervals 8 --nodes 4 --checks 2"},
+      {"unhand plan wrist", "plan wrist --stiffnesses 2 --softest 4 --stiffest 16 --starts 1 --intervals 4"}};
   for (const auto& [section, command] : commands) {
     ASSERT_EQ(run(command + " --json out.json").code, 0) << command;
     std::set<std::string> keys;

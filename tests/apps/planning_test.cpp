@@ -176,7 +176,8 @@ TEST_F(Cli, AdaptationThrowsUnknownObjectsWhereItShould) {
   for (auto& [object, by] : cells) {
     json &adaptive = by.at("adaptive, 30 N/m"), &soft = by.at("plain, 30 N/m"),
          &stiff = by.at("plain, 300 N/m");
-    for (json cell : {adaptive, soft, stiff}) {
+    json& joints = by.at("adaptive, in the joints");
+    for (json cell : {adaptive, soft, stiff, joints}) {
       EXPECT_EQ(cell["throws"], 3);
       EXPECT_LT(cell["torque_use"], 1);
       // rms² is the square of the mean and the spread about it, on both axes.
@@ -190,6 +191,7 @@ TEST_F(Cli, AdaptationThrowsUnknownObjectsWhereItShould) {
     EXPECT_LT(soft["mean_m"][0], -0.01) << object << " is heavy: the arm lags, and the throw falls short";
     const auto error = [](json cell) { return cell["release_position_error_m"].get<double>(); };
     EXPECT_LT(10 * error(adaptive), error(soft)) << object;
+    EXPECT_LT(5 * error(joints), error(soft)) << object;
     EXPECT_LT(5 * error(stiff), error(soft)) << object << ": ten times the stiffness, a tenth of the lag";
   }
   const auto lag = [&](const char* object) {
@@ -197,6 +199,50 @@ TEST_F(Cli, AdaptationThrowsUnknownObjectsWhereItShould) {
   };
   EXPECT_LT(lag("box"), lag("ball"));  // 221 g, 427 g
   EXPECT_THAT(content(folder / "out/landings.md"), HasSubstr("ball, 427 g"));
+  EXPECT_EQ(read_json(folder / "out/control.json"), found);
+}
+
+/// The columns of a CSV by name, as text.
+std::map<std::string, std::vector<std::string>> columns_of(const std::string& csv) {
+  const auto cells = [](const std::string& line) {
+    std::istringstream in(line);
+    std::vector<std::string> out;
+    for (std::string cell; std::getline(in, cell, ',');) out.push_back(cell);
+    return out;
+  };
+  std::istringstream lines(csv);
+  std::string line;
+  std::getline(lines, line);
+  const auto names = cells(line);
+  std::map<std::string, std::vector<std::string>> out;
+  while (std::getline(lines, line)) {
+    const auto row = cells(line);
+    EXPECT_EQ(row.size(), names.size()) << line;
+    for (std::size_t i = 0; i < std::min(row.size(), names.size()); ++i) out[names[i]].push_back(row[i]);
+  }
+  return out;
+}
+
+/// Trajectories whose angles are the integrals of their rates, with deflections that are those of the spring.
+void expect_trajectories(const std::string& csv, const std::string& of) {
+  auto all = columns_of(csv);
+  const auto value = [&](const char* name, std::size_t k) { return std::stod(all.at(name).at(k)); };
+  const auto& run = all.at(of);
+  ASSERT_GT(run.size(), 100u);
+  for (std::size_t k = 0; k < run.size(); ++k) {
+    EXPECT_NEAR(value("deflection_rad", k), value("motor_rad", k) - value("spring_end_rad", k), 1e-7);
+    if (k == 0 || run[k] != run[k - 1] || all.at("mode")[k] != all.at("mode")[k - 1]) continue;
+    const double dt = value("time_s", k) - value("time_s", k - 1);
+    EXPECT_LE(dt, 0.02);
+    for (const auto& [angle, rate] : {std::pair{"q1_rad", "qd1_rad_s"},
+                                      {"q3_rad", "qd3_rad_s"},
+                                      {"motor_rad", "motor_rad_s"},
+                                      {"tip_x_m", "tip_vx_m_s"},
+                                      {"tip_z_m", "tip_vz_m_s"}})
+      EXPECT_NEAR(value(angle, k) - value(angle, k - 1), 0.5 * dt * (value(rate, k) + value(rate, k - 1)),
+                  2e-4)
+          << angle << " at " << value("time_s", k);
+  }
 }
 
 // What the motors put in and no loss takes is in the arm: the spring lends it, and throws with it are faster.
@@ -226,15 +272,49 @@ TEST_F(Cli, AClutchedSpringThrowsFaster) {
   };
   EXPECT_GT(fastest("SEA"), 1.2 * fastest("rigid"));
   EXPECT_THAT(content(folder / "out/speeds.md"), HasSubstr("SEA"));
+  for (const std::string& told : {answer.out, content(folder / "out/speeds.md")})
+    EXPECT_THAT(told, HasSubstr("as reported on hardware [DarkoD46] 4.3: 4.1 m/s"));
+  EXPECT_EQ(read_json(folder / "out/plan.json"), read_json(folder / "e.json"));
+  const std::string csv = content(folder / "out/trajectory.csv");
+  expect_trajectories(csv, "drive");
+  const auto columns = columns_of(csv);
+  EXPECT_THAT(columns.at("mode"), testing::IsSupersetOf({"BRK", "SEA"}));
+  const double vx = std::stod(columns.at("tip_vx_m_s").back()),
+               vz = std::stod(columns.at("tip_vz_m_s").back());
+  EXPECT_NEAR(std::hypot(vx, vz), drives["rigid"]["basins"].back()["resimulated_speed_m_s"].get<double>(),
+              1e-6);
 
   expect_refusal("plan elastic --arm none.toml", 3, "none.toml: no such file");
 }
 
 TEST_F(Cli, ElasticThrowsReachTheirTargets) {
-  const Answer answer =
-      run("plan elastic --target 2.2 --starts 2 --intervals 8 --nodes 4 --checks 9 --json e.json");
+  const Answer answer = run(
+      "plan elastic --target 2.2 --starts 2 --intervals 8 --nodes 4 --checks 9 --json e.json --report out");
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.out, HasSubstr("9 land in the box of 0.5 m"));
+  json found = read_json(folder / "e.json");
+  ASSERT_EQ(found["nodes"].size(), 4u);
+  // The run's last row, thrown without drag to 0.5 m below the shoulder, lands where the node says.
+  const std::string csv = content(folder / "out/trajectory.csv");
+  expect_trajectories(csv, "target_m");
+  const auto columns = columns_of(csv);
+  const auto last = [&](const char* name) { return std::stod(columns.at(name).back()); };
+  const double up = last("tip_vz_m_s"),
+               time = (up + std::sqrt(up * up + 2 * 9.81 * (last("tip_z_m") + 0.5))) / 9.81;
+  EXPECT_NEAR(found["nodes"][3]["resimulated_miss_m"].get<double>(),
+              last("tip_x_m") + time * last("tip_vx_m_s") - 2.6, 1e-6);
+  for (const auto& node : found["nodes"]) {
+    EXPECT_TRUE(node["confirmed"]);
+    EXPECT_LE(std::abs(node["resimulated_miss_m"].get<double>()), 5e-3);
+  }
+  EXPECT_EQ(read_json(folder / "out/plan.json"), found);
+
+  const Answer far = run("plan elastic --target 9 --starts 1 --intervals 4 --json f.json");
+  EXPECT_EQ(far.code, 1);
+  EXPECT_THAT(far.err,
+              HasSubstr("--target 9: no throw was found to a target at 9 m, 0.5 m below the shoulder"));
+  EXPECT_THAT(far.err, testing::ContainsRegex("found throws to targets from [0-9.]+ to [2-8][.][0-9]+ m"));
+  EXPECT_THAT(far.err, Not(HasSubstr("make_table")));
 }
 
 TEST_F(Cli, AnElasticWristThrowsFaster) {
@@ -254,6 +334,10 @@ TEST_F(Cli, AnElasticWristThrowsFaster) {
     EXPECT_NEAR(speed, spring["planned_m_s"].get<double>(), 0.01 * speed);
   }
   EXPECT_TRUE(fs::exists(folder / "out/gain.png"));
+  EXPECT_EQ(read_json(folder / "out/plan.json"), wrist);
+  const std::string csv = content(folder / "out/trajectory.csv");
+  expect_trajectories(csv, "stiffness_n_m_rad");
+  EXPECT_THAT(columns_of(csv).at("stiffness_n_m_rad"), testing::IsSupersetOf({"inf", "4", "16"}));
 }
 
 TEST_F(Cli, LearnsToThrowFlipAndGoesOnAfterAKill) {

@@ -1,11 +1,14 @@
-// Computed torque in the task, adaptive and plain: perfect models track, adaptation learns the load, V ends
-// below its start.
+// Computed torque in the joints and in the task, adaptive and plain: perfect models track, adaptation learns
+// the load, V ends below its start.
 #include "planners/control/task_controller.hpp"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <random>
 
+#include "planners/arm/panda.hpp"
 #include "planners/control/throw_study.hpp"
 
 namespace unhand::planners::control {
@@ -27,6 +30,86 @@ TEST(MinimumJerk, MeetsItsEndsAndIsItsOwnDerivative) {
   }
   EXPECT_LT(best_velocity, 1e-9);  // h² against rounding/h
   EXPECT_LT(best_acceleration, 1e-8);
+}
+
+/// A Panda with an unknown load, somewhere on its way along a reference.
+struct OnItsWay {
+  Chain known = panda(), truth;
+  LinkParameters load;
+  JointGains gains{JointVector<double>(7), JointVector<double>(7)};
+  JointReference reference{JointVector<double>(7), JointVector<double>(7), JointVector<double>(7)};
+  JointVector<double> q = JointVector<double>(7), qd = q;
+
+  explicit OnItsWay(std::mt19937_64& random) {
+    truth = with_payload(known, {0.9, {0.03, -0.02, 0.09}, symmetric(2e-3, 3e-3, 2.5e-3, 0, 0, 0)});
+    load = parameters_of(truth.joints.back().link) - parameters_of(known.joints.back().link);
+    std::uniform_real_distribution<double> one(-1, 1);
+    for (int i = 0; i < 7; ++i) {
+      q[i] = 2 * one(random), qd[i] = 2 * one(random);
+      reference.q[i] = q[i] + 0.2 * one(random), reference.qd[i] = qd[i] + 0.3 * one(random);
+      reference.qdd[i] = 5 * one(random);
+      gains.stiffness[i] = 20 + 10 * one(random), gains.damping[i] = 5 + 2 * one(random);
+    }
+  }
+  JointVector<double> acceleration(const ControlStep& step) const {
+    return forward_dynamics<double>(truth, q, qd, step.torque - friction_torque<double>(truth, qd));
+  }
+};
+
+// M ë + k_v ė + k_p e = Y(q, q̇, q̈_d) (π − π̂): Y times the load is what it adds to the inverse dynamics.
+TEST(JointLaw, LeavesASpringADamperAndTheUnknownLoad) {
+  std::mt19937_64 random(1);
+  for (int k = 0; k < 50; ++k) {
+    const OnItsWay at(random);
+    const auto& r = at.reference;
+    const JointVector<double> lacks = inverse_dynamics<double>(at.truth, at.q, at.qd, r.qdd) -
+                                      inverse_dynamics<double>(at.known, at.q, at.qd, r.qdd);
+    for (const double learnt : {0.0, 0.4, 1.0}) {
+      AdaptiveController controller(at.known, {});
+      controller.estimate = learnt * at.load;
+      const ControlStep step = controller.joint_law(r, at.gains, at.q, at.qd);
+      const JointVector<double> left = mass_matrix<double>(at.truth, at.q) * (r.qdd - at.acceleration(step)) +
+                                       at.gains.damping.cwiseProduct(r.qd - at.qd) +
+                                       at.gains.stiffness.cwiseProduct(r.q - at.q);
+      EXPECT_LE((left - (1 - learnt) * lacks).norm(), 1e-9) << k << ' ' << learnt;  // solves of 100 N m
+    }
+  }
+}
+
+// With the update, V' = −ėᵀ k_v ė + ½ ėᵀ Ṁ ė, whatever is not known of the load.
+TEST(JointLaw, LyapunovFunctionFallsByTheDampingButForTheMassThatChanges) {
+  std::mt19937_64 random(2);
+  Adaptation adaptation = StudyOptions::default_adaptation();
+  adaptation.prediction = 0;
+  for (int k = 0; k < 20; ++k) {
+    const OnItsWay at(random);
+    AdaptiveController controller(at.known, adaptation);
+    controller.estimate = 0.3 * at.load;
+    const ControlStep step = controller.joint_law(at.reference, at.gains, at.q, at.qd);
+    AdaptiveController later = controller;
+    later.adapt(step, step.torque, at.q, at.qd, 1);  // Euler's rule over 1 s: the rate
+    const LinkParameters learns = later.estimate - controller.estimate;
+    const JointVector<double> qdd = at.acceleration(step);
+    const auto V = [&](double t) {
+      ControlStep then = step;
+      then.velocity_error = at.reference.qd + t * at.reference.qdd - at.qd - t * qdd;
+      const JointVector<double> q = at.q + t * at.qd + 0.5 * t * t * qdd;
+      const JointVector<double> off =
+          at.reference.q + t * at.reference.qd + 0.5 * t * t * at.reference.qdd - q;
+      return lyapunov(at.truth, at.gains, adaptation, then, q, off,
+                      at.load - controller.estimate - t * learns);
+    };
+    const JointVector<double> s = step.velocity_error;
+    double best = 1;
+    for (double h = 1e-1; h > 1e-7; h /= 10) {  // central differences: h² against rounding/h
+      const JointMatrix<double> M_rate = (mass_matrix<double>(at.truth, at.q + h * at.qd) -
+                                          mass_matrix<double>(at.truth, at.q - h * at.qd)) /
+                                         (2 * h);
+      const double due = -s.dot(at.gains.damping.cwiseProduct(s)) + 0.5 * s.dot(M_rate * s);
+      best = std::min(best, std::abs((V(h) - V(-h)) / (2 * h) - due));
+    }
+    EXPECT_LE(best, 1e-7) << k;  // of some W
+  }
 }
 
 /// A robot without noise, whose friction is the model's.
@@ -60,6 +143,22 @@ TEST(ThrowStudy, AdaptationLearnsTheLoadAndTracksFiveTimesBetter) {
     EXPECT_LT(adaptive.history.back().lyapunov, adaptive.history.front().lyapunov) << payload.name;
     EXPECT_LT(adaptive.torque_use, 1);
   }
+}
+
+TEST(ThrowStudy, TheLawInTheJointsLearnsTheLoadToo) {
+  const Payload tube = reported_payloads().back();
+  const StudyThrow adaptive = run_throw(joint_controller(), tube, ideal(), 1, true);
+  StudyOptions once = ideal();
+  once.repetitions = 0;
+  ControllerChoice plain = joint_controller();
+  plain.adaptive = false;
+  EXPECT_NEAR(adaptive.estimate[0], tube.mass, 0.15 * tube.mass);
+  EXPECT_LT(adaptive.rms_error.back(), 0.2 * run_throw(plain, tube, once, 1).rms_error.back());
+  EXPECT_LT(adaptive.history.back().lyapunov, adaptive.history.front().lyapunov);
+  // Without a load it follows the same course: what is left is the zero-order hold of 1 ms.
+  const StudyThrow free = run_throw(plain, {"feather", 1e-6, 0.05}, once, 1);
+  EXPECT_LT(free.release_position_error, 1e-3);
+  EXPECT_LT(free.release_velocity_error, 2e-2);
 }
 
 TEST(ThrowStudy, IsRepeatable) {

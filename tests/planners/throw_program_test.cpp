@@ -179,6 +179,95 @@ TEST(ElasticThrow, BetweenTheNodesOfATableNoLimitIsExceeded) {
   EXPECT_THROW(interpolate(table, 1.9), std::invalid_argument);
 }
 
+// Finer meshes move objectives: what agrees after them is one basin, and no start is lost.
+TEST(ElasticThrow, BasinsDifferByMoreThanAPercentAfterTheirConfirmation) {
+  ThrowTask task;
+  task.longest = 0.5;
+  ThrowProgramOptions options;
+  options.intervals = 6;
+  const Basins coarse = find_basins(bsa3(), task, options, 5);
+  const ConfirmedBasins fine = confirm_basins(bsa3(), task, coarse, options);
+  int starts = coarse.failed;
+  for (const ConfirmedBasin& basin : fine.found) {
+    starts += basin.starts;
+    EXPECT_TRUE(basin.best.confirmed);
+  }
+  EXPECT_EQ(starts, 5);
+  EXPECT_LE(fine.found.size(), coarse.found.size());
+  for (std::size_t k = 1; k < fine.found.size(); ++k)  // −v²
+    EXPECT_GT(std::pow(fine.found[k - 1].best.plan.speed() / fine.found[k].best.plan.speed(), 2), 1.01);
+
+  // Two that the first mesh told apart, one of them on a mesh that no run confirms.
+  ASSERT_FALSE(fine.found.empty());
+  Basins twice;
+  twice.found = {{fine.found[0].best.plan, 2}, {coarse.found[0].best, 3}};
+  twice.found[1].best.release.vx = 1.003 * twice.found[0].best.release.vx;
+  twice.found[1].best.release.vz = 1.003 * twice.found[0].best.release.vz;
+  ThrowProgramOptions as_it_is = options;
+  as_it_is.intervals = fine.found[0].best.intervals;
+  Refinement none;
+  none.finest = 1;
+  const ConfirmedBasins one = confirm_basins(bsa3(), task, twice, as_it_is, none);
+  ASSERT_EQ(one.found.size(), 1u);
+  EXPECT_EQ(one.found[0].starts, 5);
+  EXPECT_TRUE(one.found[0].best.confirmed);
+}
+
+// On a coarse mesh runs land centimetres beside their targets; the table is refined as a whole until none
+// does.
+TEST(ElasticThrow, NodesOfATableAreRefinedUntilTheirRunsLandOnTheirTargets) {
+  ThrowTask task;
+  task.target = Target{2.2, -0.5};
+  task.start = Links<double>(0.2, -1.0, -0.5);
+  ThrowProgramOptions options;
+  options.intervals = 4;
+  const ThrowTable coarse = make_table(bsa3(), task, {2.0, 2.1, 2.2, 2.3}, options, 2);
+  Refinement tight;
+  tight.miss = 1e-3;
+  tight.finest = 4;
+  const ConfirmedTable as_it_is = confirm_table(bsa3(), task, coarse, options, tight);
+  EXPECT_EQ(as_it_is.intervals, 4);
+  int missed = 0;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const auto x = landing_x(replay(bsa3(), coarse.throws[k]).release, -0.5);
+    ASSERT_TRUE(x && as_it_is.nodes[k].miss);
+    EXPECT_DOUBLE_EQ(*as_it_is.nodes[k].miss, *x - coarse.distances[k]);
+    EXPECT_FALSE(as_it_is.nodes[k].confirmed && std::abs(*as_it_is.nodes[k].miss) > 1e-3);
+    missed += !as_it_is.nodes[k].confirmed;
+  }
+  EXPECT_GT(missed, 0);
+  tight.finest = 64;
+  const ConfirmedTable fine = confirm_table(bsa3(), task, coarse, options, tight);
+  EXPECT_GT(fine.intervals, 4);
+  for (std::size_t k = 0; k < 4; ++k) {
+    EXPECT_TRUE(fine.nodes[k].confirmed) << k;
+    EXPECT_LE(std::abs(fine.nodes[k].miss.value_or(1)), 1e-3) << k;
+  }
+  EXPECT_LT(std::abs(check_table(bsa3(), fine.table, 3)[1].miss), 0.01);
+}
+
+TEST(ElasticThrow, TellsWhichTargetIsOutOfReachAndWhichAreNot) {
+  ThrowTask task;
+  task.target = Target{9, -0.5};
+  task.start = Links<double>(0.2, -1.0, -0.5);
+  ThrowProgramOptions options;
+  options.intervals = 4;
+  try {
+    make_table(bsa3(), task, {8.6, 8.8, 9.0, 9.2}, options, 1);
+    FAIL();
+  } catch (const OutOfReach& error) {
+    EXPECT_EQ(error.distance, 9.0);
+    EXPECT_THAT(error.what(), testing::Not(testing::HasSubstr("make_table")));
+  }
+  const auto reach = find_reach(bsa3(), task, options, 1);
+  ASSERT_TRUE(reach);
+  // Farther than the arm's length, and no farther than its fastest throw flies from its farthest reach.
+  const double v = 8, length = 1.5, g = 9.81, down = length + 0.5;
+  EXPECT_LT(reach->nearest, 1.8);
+  EXPECT_GT(reach->farthest, 2.6);
+  EXPECT_LT(reach->farthest, length + v / g * std::sqrt(v * v + 2 * g * down));
+}
+
 TEST(ElasticThrow, StartsFromNoSolutionOfOtherPhases) {
   ElasticThrow near = planned(Drive::series, 6);  // one phase of 12 intervals: as many points as below
   ThrowTask task;
