@@ -273,8 +273,7 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
     if (!contact::follows_pads(model))
       throw WrongUsage(
           fmt::format("--models: {} has no pads that let go, which the other engine could simulate: it "
-                      "carries the object "
-                      "rigidly until it is free",
+                      "carries the object rigidly until it is free",
                       model));
   for (const auto& model : options.models)
     if (std::find(known.begin(), known.end(), model) == known.end())

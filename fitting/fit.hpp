@@ -191,11 +191,10 @@ bool is_determined(const FitResult& fit, std::size_t k);
 /// Least squares by Ceres (Levenberg-Marquardt; the throws' own unknowns eliminated by Schur's complement)
 /// with exact derivatives. Without `options.start` from the problem's own, one-sided effects a typical step
 /// from neutral, and from smaller ones where they end at neutral; with several effects, from each large
-/// beside small others, too: of those the likeliest. With one, the
-/// answer is the minimum that it leads to: what a channel and a throw count for is learned on the way, and
-/// where the law cannot follow the log, a start far off may end some sigma from the problem's own. Throws
-/// std::invalid_argument for options outside their ranges, a start outside an unknown's, lists of the wrong
-/// length, and unknown names.
+/// beside small others, too: of those the likeliest. With a start, the answer is the minimum that it leads
+/// to: what a channel and a throw count for is learned on the way, and where the law cannot follow the log, a
+/// start far off may end some sigma from the problem's own. Throws std::invalid_argument for options outside
+/// their ranges, a start outside an unknown's, lists of the wrong length, and unknown names.
 FitResult fit(const CampaignProblem& problem, const FitOptions& options = {});
 
 }  // namespace unhand::fitting

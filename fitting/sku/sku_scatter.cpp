@@ -214,9 +214,12 @@ std::optional<MotionRepeats> repeats_of(const datasets::Sku& sku, const datasets
     SkuMotion motion{experiment::with_object(*request.log, throws[i], request.log_file, object), {}};
     motion.prepared.object = sku.name;
     motion.inputs = throw_inputs(sku, card, file, motion.prepared, request.assumed);
-    const auto at = motion.predict(motion.inputs.values);
-    if (at.landed() && motion.held(motion.inputs.values))
-      landings[i] = {at.landing.pose.x, at.landing.pose.theta};
+    try {
+      const auto at = motion.predict(motion.inputs.values);
+      if (at.landed() && motion.held(motion.inputs.values))
+        landings[i] = {at.landing.pose.x, at.landing.pose.theta};
+    } catch (const std::invalid_argument&) {  // out of range with this object: no such throw
+    }
   });
   std::map<std::string, std::vector<Eigen::Vector2d>> by_condition;
   for (std::size_t i = 0; i < throws.size(); ++i)

@@ -84,8 +84,8 @@ struct Course {
   }
 };
 
-/// The course in the joints, step by step from rest at `at`: q̈_d = J⁺ (ξ̈_d + 2 κ ė_ξ + κ² e_ξ − J̇ q̇_d) +
-/// N (ρ² (rest − q_d) − 2 ρ q̇_d), κ against drift.
+/// The course in the joints, step by step from standing still at `rest`: q̈_d = J⁺ (ξ̈_d + 2 κ ė_ξ + κ² e_ξ − J̇
+/// q̇_d) + N (ρ² (rest − q_d) − 2 ρ q̇_d), κ against drift.
 class JointCourse {
  public:
   JointCourse(const Chain& arm, const Joints& rest, double posture)
