@@ -16,13 +16,25 @@ using dynamics::Wrench;
 
 namespace {
 
-/// The step [s] at a relative tolerance of 1e-5; the error is of second order in it.
+/// The step [s] of pads that slip, at a relative tolerance of 1e-5; the error is of second order in it.
 constexpr double kStep = 5e-4, kStepTolerance = 1e-5, kShortest = 2.5e-5;
+/// Steps that are `kMost` times as long at most are taken where one of them and two of half its length agree
+/// to `kAgree` [m/s] times the relative tolerance: where the pads hold, and stretch with the load. The
+/// difference is of second order, so a step of twice the length may follow if it is a quarter of that.
+constexpr double kMost = 16, kAgree = 4, kDoubled = 0.25;
 
-double step_for(const dynamics::IntegratorOptions& options) {
-  const double step = kStep * std::sqrt(options.tolerances.relative / kStepTolerance);
-  return std::min(std::clamp(step, kShortest, kStep), options.longest_step);
-}
+/// How long steps may be.
+struct Pace {
+  double slipping, longest, agree;  ///< s, s, m/s
+
+  explicit Pace(const dynamics::IntegratorOptions& options) {
+    const double relative = options.tolerances.relative;
+    const double step = std::clamp(kStep * std::sqrt(relative / kStepTolerance), kShortest, kStep);
+    slipping = std::min(step, options.longest_step);
+    longest = std::min(kMost * step, options.longest_step);
+    agree = kAgree * relative;
+  }
+};
 
 template <class S>
 struct Moving {
@@ -114,11 +126,116 @@ void record(dynamics::Trajectory<S, 6>& trajectory, const S& t0, const S& t1, co
   trajectory.pieces.push_back(std::move(piece));
 }
 
+/// How far two slips are from each other [m/s], the spin's part at the object's radius of gyration.
+template <class S>
+double distance(const Relative<S>& a, const Relative<S>& b, const dynamics::RigidBody<S>& body) {
+  const double x = value_of(a.slip.x) - value_of(b.slip.x), z = value_of(a.slip.z) - value_of(b.slip.z),
+               spin = value_of(a.spin) - value_of(b.spin);
+  return std::sqrt(x * x + z * z + value_of(body.inertia) / value_of(body.mass) * spin * spin);
+}
+
 template <class S>
 bool is_finite(const Relative<S>& y) {
   const auto state = y.state();
   return std::all_of(state.begin(), state.end(), [](const S& x) { return std::isfinite(value_of(x)); });
 }
+
+/// A release on its way.
+template <class S>
+class GivingRelease {
+ public:
+  GivingRelease(const ReleaseProblem<S>& problem, const contact::GivesAtPoints& pads,
+                const contact::SceneSource& scenes, const GivingStart<S>& start,
+                const dynamics::IntegratorOptions& options)
+      : body_(problem.body),
+        scenes_(scenes),
+        options_(options),
+        pace_(options),
+        usual_(pace_.slipping),
+        stepper_(pads.point_limits(S(0))),
+        t_(problem.start),
+        window_{problem.start, problem.start},
+        at_(stepper_.unloaded(start)),
+        coarse_(at_),
+        half_(at_),
+        fine_(at_) {}
+
+  /// Loads the pads for a stretch that begins now.
+  Outcome load(double end) {
+    window_.end = end;
+    return stepper_.load(scenes_.scene(window_, t_), at_) ? Outcome::finished : Outcome::not_converged;
+  }
+  /// Up to `stop`, with nothing but smooth functions of time before it.
+  Outcome advance(const S& stop) {
+    const S from = t_;
+    window_ = {value_of(from), value_of(stop)};
+    if (!(window_.end > window_.begin)) return Outcome::finished;
+    State<S, 6> rate = rate_of(at_, scenes_.scene(window_, t_));
+    while (value_of(t_) < window_.end) {
+      if (result_.statistics.steps >= options_.step_budget) return Outcome::step_budget_spent;
+      const double begin = value_of(t_), left = window_.end - begin;
+      const double steps = std::max(1.0, std::ceil(left / usual_ * (1 - 1e-12))), length = left / steps;
+      const double done = (begin + length - window_.begin) / (window_.end - window_.begin);
+      const S next = steps == 1 ? stop : S(from + (stop - from) * done);
+      const Scene<S> there = scenes_.scene(window_, next);
+      const bool solved = attempt(next, there);
+      const double apart = distance(coarse_.relative, fine_.relative, body_);
+      if (std::min(length, usual_) > pace_.slipping && !(solved && apart <= pace_.agree)) {
+        usual_ = std::max(pace_.slipping, 0.5 * length);
+        ++result_.statistics.rejected_steps;
+        continue;
+      }
+      if (!solved)
+        return is_finite(coarse_.relative) && is_finite(fine_.relative) ? Outcome::not_converged
+                                                                        : Outcome::not_finite;
+      if (apart <= kDoubled * pace_.agree) usual_ = std::max(usual_, std::min(2 * length, pace_.longest));
+      if (!accept(next, there, rate)) return Outcome::not_finite;
+    }
+    return Outcome::finished;
+  }
+
+  /// What there is of it, which ended so.
+  ReleaseResult<S> result(Outcome outcome) {
+    const Scene<S> scene = scenes_.scene(window_, t_);
+    result_.outcome = ReleaseOutcome::not_solved;
+    result_.integration = outcome;
+    result_.relative = at_.relative;
+    result_.detach = {t_, object_pose(scene, at_.relative), object_twist(scene, at_.relative)};
+    return std::move(result_);
+  }
+
+ private:
+  /// To `next` in one step and in two of half its length; whether all were solved.
+  bool attempt(const S& next, const Scene<S>& there) {
+    const S h = next - t_, middle = t_ + 0.5 * h;
+    return stepper_.step(h, there, at_, coarse_) &&
+           stepper_.step(S(0.5 * h), scenes_.scene(window_, middle), at_, half_) &&
+           stepper_.step(S(0.5 * h), there, half_, fine_);
+  }
+  /// Moves on to what both say; false where that is not finite. `rate` becomes that of the new state.
+  bool accept(const S& next, const Scene<S>& there, State<S, 6>& rate) {
+    const State<S, 6> before = at_.relative.state(), rate_before = rate;
+    stepper_.extrapolate(coarse_, fine_, at_);
+    if (!is_finite(at_.relative)) return false;
+    rate = rate_of(at_, there);
+    if (options_.record)
+      record(result_.trajectory, t_, next, window_, before, rate_before, at_.relative.state(), rate);
+    t_ = next;
+    ++result_.statistics.steps;
+    return true;
+  }
+
+  const dynamics::RigidBody<S> body_;
+  const contact::SceneSource& scenes_;
+  const dynamics::IntegratorOptions options_;
+  const Pace pace_;
+  double usual_;  // the length of steps [s], as the last ones have shown
+  Stepper<S> stepper_;
+  S t_;
+  dynamics::Window window_;
+  Moving<S> at_, coarse_, half_, fine_;
+  ReleaseResult<S> result_;
+};
 
 }  // namespace
 
@@ -133,66 +250,19 @@ ReleaseResult<S> simulate_giving_release(const ReleaseProblem<S>& problem, const
     if (value_of(t) > problem.start && value_of(t) <= end) stops.push_back(t);
   if (stops.empty() || value_of(stops.back()) < end) stops.push_back(S(end));
 
-  ReleaseResult<S> result;
-  result.outcome = ReleaseOutcome::not_solved;
-  Stepper<S> stepper(pads.point_limits(S(0)));
-  S t(problem.start);
-  dynamics::Window window{problem.start, value_of(stops.front())};
-  Moving<S> at = stepper.unloaded(start);
-  const double longest = step_for(options.integrator);
-  const auto ended = [&](Outcome outcome) {
-    result.integration = outcome;
-    result.relative = at.relative;
-    const Scene<S> scene = scenes.scene(window, t);
-    result.detach = {t, object_pose(scene, at.relative), object_twist(scene, at.relative)};
-  };
-  if (!stepper.load(scenes.scene(window, t), at)) {
-    ended(Outcome::not_converged);
-    return result;
-  }
-  Moving<S> coarse = at, half = at, fine = at;
-  for (const S& stop : stops) {
-    const S from = t;
-    window = {value_of(from), value_of(stop)};
-    if (!(window.end > window.begin)) continue;
-    const double needed = std::ceil((window.end - window.begin) / longest);
-    if (!(needed <= static_cast<double>(options.integrator.step_budget - result.statistics.steps))) {
-      ended(Outcome::step_budget_spent);
-      return result;
-    }
-    const long steps = std::max(1L, static_cast<long>(needed));
-    State<S, 6> rate = rate_of(at, scenes.scene(window, t));
-    for (long k = 1; k <= steps; ++k) {
-      const S next =
-          k == steps ? stop : S(from + (stop - from) * (static_cast<double>(k) / static_cast<double>(steps)));
-      const S h = next - t, middle = t + 0.5 * h;
-      const Scene<S> there = scenes.scene(window, next);
-      if (!stepper.step(h, there, at, coarse) ||
-          !stepper.step(S(0.5 * h), scenes.scene(window, middle), at, half) ||
-          !stepper.step(S(0.5 * h), there, half, fine)) {
-        ended(is_finite(coarse.relative) && is_finite(fine.relative) ? Outcome::not_converged
-                                                                     : Outcome::not_finite);
-        return result;
-      }
-      const Relative<S> before = at.relative;
-      stepper.extrapolate(coarse, fine, at);
-      if (!is_finite(at.relative)) {
-        ended(Outcome::not_finite);
-        return result;
-      }
-      const State<S, 6> rate_there = rate_of(at, there);
-      if (options.integrator.record)
-        record(result.trajectory, t, next, window, before.state(), rate, at.relative.state(), rate_there);
-      rate = rate_there;
-      t = next;
-      ++result.statistics.steps;
-    }
-  }
+  GivingRelease<S> release(problem, pads, scenes, start, options.integrator);
+  Outcome outcome = release.load(value_of(stops.front()));
+  for (std::size_t k = 0; k < stops.size() && outcome == Outcome::finished; ++k)
+    outcome = release.advance(stops[k]);
   const bool parts = start.separation <= problem.hand.end();
-  ended(parts ? Outcome::finished : Outcome::horizon);
-  result.outcome = parts ? ReleaseOutcome::detached : ReleaseOutcome::never_separated;
-  if (parts)
-    result.events.push_back({dynamics::EventKind::time, 0, 0, start.free_mode, t, at.relative.state()});
+  if (outcome == Outcome::finished && !parts) outcome = Outcome::horizon;
+  ReleaseResult<S> result = release.result(outcome);
+  if (outcome == Outcome::horizon) result.outcome = ReleaseOutcome::never_separated;
+  if (outcome == Outcome::finished) {
+    result.outcome = ReleaseOutcome::detached;
+    result.events.push_back(
+        {dynamics::EventKind::time, 0, 0, start.free_mode, result.detach.time, result.relative.state()});
+  }
   return result;
 }
 

@@ -21,10 +21,10 @@ struct GivingStart {
 ///
 ///   N (q₁ − q₀ − h b)/h = f(q₁),   q = (v_r, ω_r),   b its rate without friction, N = (G M⁻¹ Gᵀ)⁻¹,
 ///
-/// twice with h/2 and once with h, which are extrapolated: second order, L-stable, whatever the springs. h
-/// follows from the tolerances and the time events alone, so that derivatives are those of the steps. A
-/// stretch between two time events that takes more of them than is left of the step budget is not begun. The
-/// recorded trajectory has the rate at the ends of its pieces that the points' wrench there gives.
+/// twice with h/2 and once with h, which are extrapolated: second order, L-stable, whatever the springs. h is
+/// the one that the tolerances give to pads that slip, and up to 16 times that where both agree. Derivatives
+/// are those of the steps that were taken. The recorded trajectory has the rate at the ends of its pieces
+/// that the points' wrench there gives.
 template <class S>
 ReleaseResult<S> simulate_giving_release(const ReleaseProblem<S>& problem, const contact::GivesAtPoints& pads,
                                          const contact::SceneSource& scenes, const GivingStart<S>& start,

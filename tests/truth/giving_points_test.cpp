@@ -159,6 +159,36 @@ TEST(GivingPoints, ThrowAsManyBristlesDo) {
     }
 }
 
+// Steps may be long where the pads hold the object, but not where it slips, and they must not show in the
+// wrench that the sensor would have read.
+TEST(GivingPoints, TakeLongStepsWhileTheyHoldAndShortOnesWhileTheySlip) {
+  const Launch launch;
+  contact::ContactParameters<double> p;
+  p.patch = {kMu, kRadius};
+  p.variation = limits(1e-7, 3e-3).variation();
+  const auto model = contact::make_contact_model("limit_surface_disc", p);
+  const auto problem = launch.problem(*model);
+  const auto released = [&](double tolerance) {
+    return simulate_release(problem,
+                            {.integrator = {.tolerances = {tolerance, 1e-3 * tolerance}, .record = true}});
+  };
+  const auto usual = released(1e-5), fine = released(1e-8);
+  ASSERT_EQ(usual.outcome, release::ReleaseOutcome::detached);
+  double longest_held = 0, longest_slip = 0;
+  for (const auto& piece : usual.trajectory.pieces) {
+    const double h = piece.t1 - piece.t0, middle = piece.t0 + 0.5 * h;
+    const auto coarse = sample_release(problem, usual, middle), exact = sample_release(problem, fine, middle);
+    const double slip = norm(exact.relative.slip);  // creeping pads: micrometres per second
+    double& longest = slip < 1e-3 ? longest_held : longest_slip;
+    longest = std::max(longest, h);
+    EXPECT_LT(norm(coarse.relative.slip - exact.relative.slip), 1e-4 + 1e-3 * slip) << middle;
+    EXPECT_LT(norm(coarse.wrench.force() - exact.wrench.force()), 0.02) << middle;  // N, of up to 20
+  }
+  EXPECT_GT(longest_held, 3e-3);
+  EXPECT_LT(longest_slip, 1e-3);
+  EXPECT_LT(distance(usual.detach.twist, fine.detach.twist), 1e-4);
+}
+
 TEST(GivingPoints, StopAtTheStepBudget) {
   const Launch launch;
   contact::ContactParameters<double> p;
