@@ -28,6 +28,21 @@ Json autocorrelation_json(const std::vector<fitting::Autocorrelation>& all) {
   return out;
 }
 
+Json missing_json(const fitting::MissingAcceleration& missing) {
+  Json curves = Json::object();
+  for (const auto& c : missing.components)
+    curves[c.along] = {{"knots", c.at}, {"value", c.value}, {"sigma", c.sigma}};
+  return {{"quantity", "acceleration [m/s^2]"},
+          {"of", missing.of},
+          {"against", missing.against},
+          {"curves", std::move(curves)},
+          {"correction", missing.helps ? "curve" : "withheld"},
+          {"held_out_error",
+           {{"before", number(missing.test_before)},
+            {"after", number(missing.test_after)},
+            {"unit", "chi2 per degree of freedom"}}}};
+}
+
 }  // namespace
 
 Json measured_json(const MeasuredResult& result) {
@@ -53,6 +68,8 @@ Json measured_json(const MeasuredResult& result) {
                           {"description", found.unexplained->description}};
   if (found.unexplained && found.unexplained->correlation)
     out["unexplained"]["correlation"] = number(*found.unexplained->correlation);
+  if (found.unexplained && found.unexplained->missing)
+    out["unexplained"]["missing"] = missing_json(*found.unexplained->missing);
   out["error"] = {{"before",
                    {{"train", errors_json(found.before_train, found.train)},
                     {"test", errors_json(found.before_test, found.test)}}},

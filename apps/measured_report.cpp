@@ -128,6 +128,22 @@ std::string first_text(const MeasuredDiscovery& found) {
   return fmt::format("The residual leaves the noise in {} (phase {}).", found.first.channel, found.phase);
 }
 
+/// What is missing where something is unexplained, and whether it may be used.
+std::string missing_text(const fitting::MissingAcceleration& missing) {
+  double most = 0, its_sigma = 0;
+  for (const auto& c : missing.components)
+    for (std::size_t j = 0; j < c.value.size(); ++j)
+      if (std::abs(c.value[j]) > std::abs(most)) most = c.value[j], its_sigma = c.sigma[j];
+  return fmt::format(
+      "Without assuming a form, an acceleration {} as a function of {} predicts train groups best that it "
+      "was "
+      "not estimated from; it is largest with {:+.3g} ± {:.2g} m/s^2. On held-out groups it {}: {:.3g} to "
+      "{:.3g} per degree of freedom",
+      missing.of, missing.against.substr(0, missing.against.find(' ')), most, its_sigma,
+      missing.helps ? "lowers the misfit" : "does not lower the misfit beyond chance, so it is no correction",
+      missing.test_before, missing.test_after);
+}
+
 }  // namespace
 
 std::string error_title(const std::string& key) {
@@ -153,6 +169,8 @@ std::string measured_text(const MeasuredResult& result) {
   if (found.unexplained)
     out +=
         fmt::format("\nunexplained: {}\n", unexplained_text(found.effects, found.unexplained->description));
+  if (found.unexplained && found.unexplained->missing)
+    out += fmt::format("{}\n", missing_text(*found.unexplained->missing));
   for (const auto& e : found.evidence)
     out += fmt::format("\n{} {}{}{}\n", e.against ? "against:" : "note:", e.about,
                        e.about.empty() ? "" : ": ", e.text);
@@ -183,6 +201,12 @@ void write_measured_report(const MeasuredResult& result, const Json& json,
   if (found.unexplained)
     answer += fmt::format("<p><b>Unexplained:</b> {}.</p>\n",
                           escaped(unexplained_text(found.effects, found.unexplained->description)));
+  if (found.unexplained && found.unexplained->missing) {
+    const Figure missing = missing_acceleration_figure(*found.unexplained->missing);
+    draw(missing, directory, about);
+    answer +=
+        fmt::format("<p>{}.</p>\n", escaped(missing_text(*found.unexplained->missing))) + picture(missing);
+  }
   if (found.effects.empty() && !found.unexplained)
     answer += "<p>Nothing that the data show is missing in the model.</p>\n";
   for (const bool against : {true, false}) {

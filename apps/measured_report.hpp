@@ -34,6 +34,8 @@ Figure measured_residual_figure(const std::vector<fitting::ResidualProfile>& bas
                                 const std::string& base_name, const std::string& answer_name);
 /// What candidates would do to the samples, over the same share.
 Figure measured_footprints(const fitting::MeasuredDiscovery& found);
+/// The acceleration that is missing, with 2 σ: a panel for each component.
+Figure missing_acceleration_figure(const fitting::MissingAcceleration& missing);
 /// Held-out direction errors by surface, and those of the null control.
 Figure surface_figure(const MeasuredResult& result);
 /// A self-contained page (index.html), the figures with their data and scripts, and discovery.json.

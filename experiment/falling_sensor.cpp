@@ -94,19 +94,17 @@ Vec3<S> specific_force(const Accelerometer<S>& sensor, const flight::SpatialAir<
 }
 
 template <class S>
-std::vector<Vec3<S>> falling_readings(const FallStart<S>& start, const FallSamples& samples, double gravity,
-                                      const dynamics::Values<S>& values) {
-  Accelerometer<S> sensor;
+std::vector<FallingBody<S>> falling_bodies(const FallStart<S>& start, const FallSamples& samples,
+                                           double gravity, const dynamics::Values<S>& values) {
   flight::SpatialAir<S> air;
-  dynamics::apply_effects(accelerometer_effects(), values, sensor);
   dynamics::apply_effects(flight::spatial_effects(), values, air);
   const auto& time = samples.time;
   for (const auto& [name, size] :
        {std::pair{"omega", samples.omega.size()}, {"turned", samples.turned.size()}})
     if (size != 0 && size != time.size())
       throw std::invalid_argument(
-          fmt::format("falling_readings: {} has {} rows, and time {}", name, size, time.size()));
-  std::vector<Vec3<S>> out;
+          fmt::format("falling_bodies: {} has {} rows, and time {}", name, size, time.size()));
+  std::vector<FallingBody<S>> out;
   out.reserve(time.size());
   FallingBody<S> body{0, start.velocity, start.up, {}, {}};
   for (std::size_t i = 0; i < time.size(); ++i) {
@@ -131,8 +129,22 @@ std::vector<Vec3<S>> falling_readings(const FallStart<S>& start, const FallSampl
         body.omega_rate[a] =
             (samples.omega[after][a] - samples.omega[before][a]) / (time[after] - time[before]);
     }
-    out.push_back(specific_force(sensor, air, body));
+    out.push_back(body);
   }
+  return out;
+}
+
+template <class S>
+std::vector<Vec3<S>> falling_readings(const FallStart<S>& start, const FallSamples& samples, double gravity,
+                                      const dynamics::Values<S>& values) {
+  Accelerometer<S> sensor;
+  flight::SpatialAir<S> air;
+  dynamics::apply_effects(accelerometer_effects(), values, sensor);
+  dynamics::apply_effects(flight::spatial_effects(), values, air);
+  std::vector<Vec3<S>> out;
+  out.reserve(samples.time.size());
+  for (const FallingBody<S>& body : falling_bodies(start, samples, gravity, values))
+    out.push_back(specific_force(sensor, air, body));
   return out;
 }
 
@@ -140,6 +152,10 @@ template Vec3<double> specific_force(const Accelerometer<double>&, const flight:
                                      const FallingBody<double>&);
 template Vec3<Dual> specific_force(const Accelerometer<Dual>&, const flight::SpatialAir<Dual>&,
                                    const FallingBody<Dual>&);
+template std::vector<FallingBody<double>> falling_bodies(const FallStart<double>&, const FallSamples&, double,
+                                                         const dynamics::Values<double>&);
+template std::vector<FallingBody<Dual>> falling_bodies(const FallStart<Dual>&, const FallSamples&, double,
+                                                       const dynamics::Values<Dual>&);
 template std::vector<Vec3<double>> falling_readings(const FallStart<double>&, const FallSamples&, double,
                                                     const dynamics::Values<double>&);
 template std::vector<Vec3<Dual>> falling_readings(const FallStart<Dual>&, const FallSamples&, double,

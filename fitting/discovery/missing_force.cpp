@@ -8,28 +8,17 @@
 #include <set>
 
 #include "dynamics/dense_solve.hpp"
+#include "dynamics/twice_integrated.hpp"
 
 namespace unhand::fitting {
 
 using dynamics::definite_inverse, dynamics::definite_solve, dynamics::gram, dynamics::inner_products,
-    dynamics::orthonormal_basis, dynamics::pseudo_inverse, dynamics::pseudo_solve;
+    dynamics::orthonormal_basis, dynamics::pseudo_inverse, dynamics::pseudo_solve, dynamics::twice_integrated;
 
 namespace {
 
 using State = ResidualTrace::State;
 using Vector3 = std::array<double, 3>;
-
-/// x(t) of x'' = a(t), a linear between the times, from rest at zero.
-std::vector<double> twice_integrated(const std::vector<double>& time, const std::vector<double>& a) {
-  std::vector<double> x(time.size(), 0.0);
-  double v = 0;
-  for (std::size_t k = 1; k < time.size(); ++k) {
-    const double h = time[k] - time[k - 1];
-    x[k] = x[k - 1] + h * v + h * h * (2 * a[k - 1] + a[k]) / 6;
-    v += 0.5 * h * (a[k - 1] + a[k]);
-  }
-  return x;
-}
 
 /// The rows in which something was seen, with offset and slope projected out if they are the recording's own.
 class Rows {

@@ -176,6 +176,31 @@ std::vector<dynamics::Effect> FallProblem::effects() const {
   return out;
 }
 
+template <class S>
+experiment::FallStart<S> FallProblem::started(const Fall& fall, const dynamics::Values<S>& given,
+                                              const std::vector<S>& x) const {
+  experiment::Accelerometer<S> sensor;
+  dynamics::apply_effects(experiment::accelerometer_effects(), given, sensor);
+  Vec3<S> rest;
+  for (std::size_t a = 0; a < 3; ++a) rest[a] = fall.before.rest[a] - sensor.bias[a];
+  const Vec3<S> up = flight::rotate(flight::exp(Vec3<S>{x[1], x[2], x[3]}),
+                                    flight::scaled(S(1.0 / flight::norm(rest)), rest));
+  return {x[0], up, {x[4], x[5], x[6]}};
+}
+
+template <class S>
+void FallProblem::discount_means(const Fall& fall, std::vector<S>& rows) {
+  const std::size_t axes = fall.axes.size(), n = rows.size() / axes;
+  for (std::size_t k = 0; k < axes; ++k) {
+    const double rest_of_mean = fall.mean[fall.axes[k]];
+    if (rest_of_mean == 1) continue;
+    S sum(0);
+    for (std::size_t i = 0; i < n; ++i) sum += rows[i * axes + k];
+    const S off = sum * ((1 - rest_of_mean) / static_cast<double>(n));
+    for (std::size_t i = 0; i < n; ++i) rows[i * axes + k] -= off;
+  }
+}
+
 GroupEquations FallProblem::equations(std::size_t group, std::span<const std::string> names,
                                       std::span<const double> values, const Eigen::VectorXd& own,
                                       Derivatives derivatives) const {
@@ -183,28 +208,14 @@ GroupEquations FallProblem::equations(std::size_t group, std::span<const std::st
   const OwnNames mine(names, groups_[group].object);
   const auto residual = [&]<class S>(const std::vector<S>& effects, const std::vector<S>& x) {
     const dynamics::Values<S> given(mine.names, effects);
-    experiment::Accelerometer<S> sensor;
-    dynamics::apply_effects(experiment::accelerometer_effects(), given, sensor);
-    Vec3<S> rest;
-    for (std::size_t a = 0; a < 3; ++a) rest[a] = fall.before.rest[a] - sensor.bias[a];
-    const Vec3<S> up = flight::rotate(flight::exp(Vec3<S>{x[1], x[2], x[3]}),
-                                      flight::scaled(S(1.0 / flight::norm(rest)), rest));
-    const auto force = experiment::falling_readings<S>({x[0], up, {x[4], x[5], x[6]}}, fall.readings.samples,
-                                                       gravity_, given);
+    const auto force =
+        experiment::falling_readings<S>(started(fall, given, x), fall.readings.samples, gravity_, given);
     std::vector<S> out;
     out.reserve(groups_[group].rows.size());
     for (std::size_t i = 0; i < force.size(); ++i)
       for (const std::size_t a : fall.axes)
         out.push_back((force[i][a] - fall.readings.force[i][a]) / fall.sigma[a]);
-    const std::size_t n = force.size(), axes = fall.axes.size();
-    for (std::size_t k = 0; k < axes; ++k) {
-      const double rest_of_mean = fall.mean[fall.axes[k]];
-      if (rest_of_mean == 1) continue;
-      S sum(0);
-      for (std::size_t i = 0; i < n; ++i) sum += out[i * axes + k];
-      const S off = sum * ((1 - rest_of_mean) / static_cast<double>(n));
-      for (std::size_t i = 0; i < n; ++i) out[i * axes + k] -= off;
-    }
+    discount_means(fall, out);
     out.push_back((x[0] - fall.before.speed) / fall.before.speed_sigma);
     for (std::size_t a = 1; a < 4; ++a) out.push_back(x[a] / fall.before.tilt_sigma);
     for (std::size_t a = 4; a < 7; ++a)
@@ -213,6 +224,35 @@ GroupEquations FallProblem::equations(std::size_t group, std::span<const std::st
   };
   GroupEquations out = swept(mine.values(values), own, derivatives, residual);
   if (derivatives == Derivatives::all) mine.spread(out, names.size());
+  return out;
+}
+
+GroupMotion FallProblem::motion(std::size_t group, std::span<const std::string> names,
+                                std::span<const double> values, const Eigen::VectorXd& own) const {
+  const Fall& fall = falls_[group];
+  const OwnNames mine(names, groups_[group].object);
+  const std::vector<double> shared = mine.values(values);
+  const dynamics::Values<double> given(mine.names, shared);
+  const auto start = started(fall, given, std::vector<double>(own.data(), own.data() + own.size()));
+  GroupMotion out;
+  for (const auto& body : experiment::falling_bodies<double>(start, fall.readings.samples, gravity_, given)) {
+    out.time.push_back(body.time);
+    out.velocity.push_back(flight::scaled(body.velocity, body.up));
+    out.body.push_back({Vec3<double>{1, 0, 0}, Vec3<double>{0, 1, 0}, Vec3<double>{0, 0, 1}});
+  }
+  return out;
+}
+
+Eigen::VectorXd FallProblem::response(std::size_t group,
+                                      const std::vector<Vec3<double>>& acceleration) const {
+  const Fall& fall = falls_[group];
+  std::vector<double> rows;
+  for (const auto& a : acceleration)
+    for (const std::size_t axis : fall.axes) rows.push_back(a[axis] / fall.sigma[axis]);
+  discount_means(fall, rows);
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(groups_[group].rows.size()));
+  out.head(static_cast<Eigen::Index>(rows.size())) =
+      Eigen::Map<const Eigen::VectorXd>(rows.data(), static_cast<Eigen::Index>(rows.size()));
   return out;
 }
 

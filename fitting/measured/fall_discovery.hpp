@@ -35,6 +35,10 @@ class FallProblem final : public GroupedProblem {
   GroupEquations equations(std::size_t group, std::span<const std::string> names,
                            std::span<const double> values, const Eigen::VectorXd& own,
                            Derivatives derivatives) const override;
+  GroupMotion motion(std::size_t group, std::span<const std::string> names, std::span<const double> values,
+                     const Eigen::VectorXd& own) const override;
+  Eigen::VectorXd response(std::size_t group,
+                           const std::vector<flight::Vec3<double>>& acceleration) const override;
   const flight::Vec3<double>& sigma(std::size_t group) const { return falls_[group].sigma; }  ///< [m/s²]
   /// (measured − predicted) of the rows that are measurements, from their residuals [m/s²].
   Eigen::VectorXd left_of(std::size_t group, const Eigen::VectorXd& residual) const;
@@ -56,6 +60,13 @@ class FallProblem final : public GroupedProblem {
   std::string add(const datasets::Throw& one, datasets::Split split, const ForceAxes& axes,
                   AxisCounts& counts);
   void free_zeros();
+  /// The fall that starts as its own unknowns `x` say, with a sensor that errs as `given` says.
+  template <class S>
+  experiment::FallStart<S> started(const Fall& fall, const dynamics::Values<S>& given,
+                                   const std::vector<S>& x) const;
+  /// Rows of readings, axis by axis at every sample, without what their mean does not count for.
+  template <class S>
+  static void discount_means(const Fall& fall, std::vector<S>& rows);
   std::vector<Fall> falls_;
   std::vector<std::string> notes_;
   double gravity_{};

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "dynamics/parallel.hpp"
+#include "dynamics/twice_integrated.hpp"
 #include "experiment/free_flight.hpp"
 #include "experiment/tracked_flight.hpp"
 
@@ -132,6 +133,28 @@ double FlightProblem::sigma(std::size_t group, int channel) const {
   return channel < position_channels() ? s.sigma[axes_[static_cast<std::size_t>(channel)]] : s.sigma_angle;
 }
 
+template <class S>
+experiment::TrackedFlight<S> FlightProblem::started(const Flight& flight, const std::vector<S>& x) const {
+  experiment::TrackedFlight<S> declared;
+  declared.gravity = gravity_;
+  declared.drag_k = flight.drag_k;
+  for (std::size_t a = 0; a < 3; ++a) declared.start.inertia[a] = S(flight.inertia[a]);
+  const std::size_t axes = axes_.size(), turns = turns_.size();
+  for (std::size_t k = 0; k < axes; ++k) {
+    declared.start.position[axes_[k]] = x[k];
+    declared.start.velocity[axes_[k]] = x[axes + k];
+  }
+  if (x.size() > 2 * axes) {
+    Vec3<S> turn{S(0.0), S(0.0), S(0.0)}, omega = turn;
+    for (std::size_t k = 0; k < turns; ++k) {
+      turn[turns_[k]] = x[2 * axes + k];
+      omega[turns_[k]] = x[2 * axes + turns + k];
+    }
+    declared.start.rotation = {converted<S>(flight.reference) * flight::exp(turn), omega};
+  }
+  return declared;
+}
+
 GroupEquations FlightProblem::equations(std::size_t group, std::span<const std::string> names,
                                         std::span<const double> values, const Eigen::VectorXd& own,
                                         Derivatives derivatives) const {
@@ -139,24 +162,8 @@ GroupEquations FlightProblem::equations(std::size_t group, std::span<const std::
   const OwnNames mine(names, groups_[group].object);
   const std::vector<double> shared = mine.values(values);
   const auto residual = [&]<class S>(const std::vector<S>& effects, const std::vector<S>& x) {
-    experiment::TrackedFlight<S> declared;
-    declared.gravity = gravity_;
-    declared.drag_k = flight.drag_k;
-    for (std::size_t a = 0; a < 3; ++a) declared.start.inertia[a] = S(flight.inertia[a]);
-    const std::size_t axes = axes_.size(), turns = turns_.size();
-    for (std::size_t k = 0; k < axes; ++k) {
-      declared.start.position[axes_[k]] = x[k];
-      declared.start.velocity[axes_[k]] = x[axes + k];
-    }
-    const bool oriented = x.size() > 2 * axes;
-    if (oriented) {
-      Vec3<S> turn{S(0.0), S(0.0), S(0.0)}, omega = turn;
-      for (std::size_t k = 0; k < turns; ++k) {
-        turn[turns_[k]] = x[2 * axes + k];
-        omega[turns_[k]] = x[2 * axes + turns + k];
-      }
-      declared.start.rotation = {converted<S>(flight.reference) * flight::exp(turn), omega};
-    }
+    const auto declared = started(flight, x);
+    const bool oriented = x.size() > 2 * axes_.size();
     const auto& s = flight.samples;
     const auto poses =
         experiment::tracked_poses(declared, dynamics::Values<S>(mine.names, effects), s.elapsed, kFine);
@@ -178,6 +185,53 @@ GroupEquations FlightProblem::equations(std::size_t group, std::span<const std::
     return {};  // a step led where no flight is
   }
   if (derivatives == Derivatives::all) mine.spread(out, names.size());
+  return out;
+}
+
+GroupMotion FlightProblem::motion(std::size_t group, std::span<const std::string> names,
+                                  std::span<const double> values, const Eigen::VectorXd& own) const {
+  const Flight& flight = flights_[group];
+  const OwnNames mine(names, groups_[group].object);
+  const std::vector<double> shared = mine.values(values);
+  const auto start = started(flight, std::vector<double>(own.data(), own.data() + own.size()));
+  const auto& time = flight.samples.elapsed;
+  constexpr double kBeside = 1e-4;  // s
+  std::vector<double> before, after;
+  for (const double t : time) before.push_back(std::max(0.0, t - kBeside)), after.push_back(t + kBeside);
+  const auto poses = [&](const std::vector<double>& times) {
+    return experiment::tracked_poses(start, dynamics::Values<double>(mine.names, shared), times, kFine);
+  };
+  const auto from = poses(before), to = poses(after);
+  GroupMotion out;
+  if (from.size() != time.size() || to.size() != time.size()) return out;
+  out.time = time;
+  out.in_world = true;
+  for (std::size_t i = 0; i < time.size(); ++i) {
+    const double per_second = 1 / (after[i] - before[i]);
+    out.velocity.push_back(flight::scaled(per_second, flight::difference(to[i].position, from[i].position)));
+    if (!oriented(group)) continue;
+    const auto& attitude = from[i].attitude;
+    const auto turned = flight::rotation_between(attitude, to[i].attitude);
+    out.spin.push_back(flight::rotate(attitude, flight::scaled(per_second, turned)));
+    out.body.push_back({flight::rotate(attitude, Vec3<double>{1, 0, 0}),
+                        flight::rotate(attitude, Vec3<double>{0, 1, 0}),
+                        flight::rotate(attitude, Vec3<double>{0, 0, 1})});
+  }
+  return out;
+}
+
+Eigen::VectorXd FlightProblem::response(std::size_t group,
+                                        const std::vector<Vec3<double>>& acceleration) const {
+  const auto& s = flights_[group].samples;
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(groups_[group].rows.size()));
+  const std::size_t width = oriented(group) ? channels_.size() : axes_.size();
+  for (std::size_t k = 0; k < axes_.size(); ++k) {
+    std::vector<double> along;
+    for (const auto& a : acceleration) along.push_back(a[axes_[k]]);
+    const auto moved = dynamics::twice_integrated(s.elapsed, along);
+    for (std::size_t i = 0; i < moved.size(); ++i)
+      out[static_cast<Eigen::Index>(i * width + k)] = moved[i] / s.sigma[axes_[k]];
+  }
   return out;
 }
 

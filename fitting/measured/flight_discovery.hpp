@@ -3,6 +3,7 @@
 
 #include "experiment/flight_samples.hpp"
 #include "experiment/free_flight.hpp"
+#include "experiment/tracked_flight.hpp"
 #include "fitting/measured/grouped_fit.hpp"
 
 namespace unhand::fitting {
@@ -22,6 +23,10 @@ class FlightProblem final : public GroupedProblem {
   GroupEquations equations(std::size_t group, std::span<const std::string> names,
                            std::span<const double> values, const Eigen::VectorXd& own,
                            Derivatives derivatives) const override;
+  GroupMotion motion(std::size_t group, std::span<const std::string> names, std::span<const double> values,
+                     const Eigen::VectorXd& own) const override;
+  Eigen::VectorXd response(std::size_t group,
+                           const std::vector<flight::Vec3<double>>& acceleration) const override;
 
   /// 1 σ of a row's channel, in m or rad.
   double sigma(std::size_t group, int channel) const;
@@ -43,6 +48,9 @@ class FlightProblem final : public GroupedProblem {
   /// object scatter.
   std::string add(const datasets::ThrowLog& log, const datasets::Throw& one, datasets::Split split,
                   const experiment::FreeFlightFit& fit, const experiment::FlightScatter& usual);
+  /// The flight that starts as its own unknowns `x` say.
+  template <class S>
+  experiment::TrackedFlight<S> started(const Flight& flight, const std::vector<S>& x) const;
   std::vector<Flight> flights_;
   double gravity_{};
   std::size_t glitches_{};

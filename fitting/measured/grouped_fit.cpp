@@ -117,10 +117,15 @@ GroupFit fit_own_part(const GroupedProblem& problem, std::size_t group, const Gr
 ProjectedEquations projected(const GroupedProblem& problem, std::size_t group,
                              std::span<const std::string> names, std::span<const double> values,
                              const VectorXd& own, const GroupedWeights& weights, double sample_limit) {
-  ProjectedEquations out;
   auto e = problem.equations(group, names, values, own, Derivatives::all);
-  if (!e.solved) return out;
-  weigh_rows(e, problem.groups()[group], weights, sample_limit);
+  return e.solved ? projected(std::move(e), problem.groups()[group], weights, sample_limit)
+                  : ProjectedEquations{};
+}
+
+ProjectedEquations projected(GroupEquations e, const Group& group, const GroupedWeights& weights,
+                             double sample_limit) {
+  ProjectedEquations out;
+  weigh_rows(e, group, weights, sample_limit);
   MatrixXd columns(e.residual.size(), e.shared.cols() + 1);
   columns << e.shared, e.residual;
   out.own_basis = orthonormal_basis(e.own);

@@ -89,6 +89,9 @@ struct ProjectedEquations {
 ProjectedEquations projected(const GroupedProblem& problem, std::size_t group,
                              std::span<const std::string> names, std::span<const double> values,
                              const Eigen::VectorXd& own, const GroupedWeights& weights, double sample_limit);
+/// The same of equations that are there, and solved.
+ProjectedEquations projected(GroupEquations equations, const Group& group, const GroupedWeights& weights,
+                             double sample_limit);
 
 /// χ² per sample of a channel over the groups used.
 struct GroupedMisfit {

@@ -24,6 +24,15 @@ std::string of_object(const std::string& id, const std::string& parameter, const
 
 }  // namespace
 
+GroupMotion GroupedProblem::motion(std::size_t, std::span<const std::string>, std::span<const double>,
+                                   const Eigen::VectorXd&) const {
+  return {};
+}
+
+Eigen::VectorXd GroupedProblem::response(std::size_t group, const std::vector<flight::Vec3<double>>&) const {
+  return Eigen::VectorXd::Zero(static_cast<Index>(groups_[group].rows.size()));
+}
+
 std::vector<std::string> objects_of(const GroupedProblem& problem) {
   std::set<std::string> out;
   for (const auto& g : problem.groups()) out.insert(g.object);

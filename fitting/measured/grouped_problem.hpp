@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <limits>
 #include <map>
 #include <span>
@@ -11,6 +12,7 @@
 
 #include "datasets/throw_log.hpp"
 #include "dynamics/effect.hpp"
+#include "flight/quaternion.hpp"
 
 namespace unhand::fitting {
 
@@ -55,6 +57,15 @@ enum class Derivatives {
 
 struct GroupedFit;
 
+/// How a group moves, at its samples. Vectors are in the axes of GroupedProblem::response.
+struct GroupMotion {
+  std::vector<double> time;                               ///< from the start of the group [s]
+  std::vector<flight::Vec3<double>> velocity;             ///< of the CoM [m/s]
+  std::vector<flight::Vec3<double>> spin;                 ///< [rad/s]; empty where it is not known
+  std::vector<std::array<flight::Vec3<double>, 3>> body;  ///< the body's axes; empty where they are not known
+  bool in_world{};                                        ///< the axes are the world's, else the body's
+};
+
 /// Groups of measurements under one model: unknowns that all groups share, and some of each group's own.
 class GroupedProblem {
  public:
@@ -81,6 +92,15 @@ class GroupedProblem {
   virtual GroupEquations equations(std::size_t group, std::span<const std::string> names,
                                    std::span<const double> values, const Eigen::VectorXd& own,
                                    Derivatives derivatives) const = 0;
+
+  /// The motion that the model says, with values as of `equations`; without samples where it is not solved,
+  /// and of a problem that knows no such motion.
+  virtual GroupMotion motion(std::size_t group, std::span<const std::string> names,
+                             std::span<const double> values, const Eigen::VectorXd& own) const;
+  /// What the residual of a group (by row) would change by, to first order, if its body were accelerated by
+  /// so much more at the samples of its motion [m/s²].
+  virtual Eigen::VectorXd response(std::size_t group,
+                                   const std::vector<flight::Vec3<double>>& acceleration) const;
 
   /// Whether an effect says anything beside `others` (ids): an anisotropy does where what it shapes is among
   /// them, or declared of every object.

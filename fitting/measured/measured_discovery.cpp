@@ -324,6 +324,9 @@ EffectSearch run_search(GroupedProblem& problem, const MeasuredOptions& options,
       if (effect.id == id) leading.push_back(std::move(effect));
   out.footprints = footprint_profiles(problem, search.base, leading, options.search.fit);
   look_for_the_unexplained(problem, search.final_test, options, out);
+  if (out.unexplained)
+    out.unexplained->missing =
+        missing_acceleration(problem, search.final, search.final_test, options.search.fit);
   out.verdict = !out.effects.empty() ? Verdict::effect_found
                 : out.unexplained    ? Verdict::unexplained
                                      : Verdict::no_missing_effect;

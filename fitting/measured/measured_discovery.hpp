@@ -9,6 +9,7 @@
 
 #include "datasets/slip_log.hpp"
 #include "fitting/measured/effect_search.hpp"
+#include "fitting/measured/missing_acceleration.hpp"
 #include "fitting/measured/residual_tests.hpp"
 
 namespace unhand::fitting {
@@ -45,6 +46,8 @@ struct MeasuredUnexplained {
   std::string description;     ///< in words
   /// Of slips: what residual directions of neighbouring wrenches of different slips correlate by.
   std::optional<double> correlation{};
+  /// Of flights and falls: the acceleration that is missing, as a function.
+  std::optional<MissingAcceleration> missing{};
 };
 
 /// The answer of the loop on a log without a hand: what is missing, the errors before and after, and what is

@@ -1,0 +1,272 @@
+#include "fitting/measured/missing_acceleration.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+
+#include "dynamics/dense_solve.hpp"
+#include "dynamics/parallel.hpp"
+#include "fitting/measured/grouped_weights.hpp"
+
+namespace unhand::fitting {
+
+using dynamics::definite_solve, dynamics::gram, dynamics::inner_products, dynamics::pseudo_inverse,
+    dynamics::product;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using flight::Vec3;
+
+namespace {
+
+constexpr int kKnots = 6, kFolds = 5;
+constexpr std::size_t kFewestTrain = 10;
+/// Second differences cost this share of what the best determined knot is worth.
+constexpr double kSmooth = 1e-3;
+
+/// Directions at a sample, one per component; zero where there is none.
+using Directions = std::function<Vec3<double>(const GroupMotion&, std::size_t sample, std::size_t component)>;
+
+struct Form {
+  std::string of;
+  std::vector<std::string> along;  ///< by component
+  Directions direction;
+  bool of_speed;  ///< else of time
+};
+
+Vec3<double> unit(const Vec3<double>& x) {
+  const double size = flight::norm(x);
+  return size > 0 ? flight::scaled(1 / size, x) : Vec3<double>{};
+}
+
+std::vector<Form> forms() {
+  const auto velocity = [](const GroupMotion& m, std::size_t i, std::size_t) { return unit(m.velocity[i]); };
+  const auto lift = [](const GroupMotion& m, std::size_t i, std::size_t) {
+    return m.spin.empty() ? Vec3<double>{} : unit(flight::cross(m.spin[i], m.velocity[i]));
+  };
+  const auto world = [](const GroupMotion& m, std::size_t, std::size_t c) {
+    Vec3<double> out{};
+    if (m.in_world) out[c] = 1;
+    return out;
+  };
+  const auto body = [](const GroupMotion& m, std::size_t i, std::size_t c) {
+    return m.body.empty() ? Vec3<double>{} : m.body[i][c];
+  };
+  const std::vector<std::string> axes{"x", "y", "z"}, of_body{"the body's x", "the body's y", "the body's z"};
+  return {{"along the velocity", {"the velocity"}, velocity, true},
+          {"along the velocity", {"the velocity"}, velocity, false},
+          {"along omega x v", {"omega x v"}, lift, true},
+          {"along the axes of the world", axes, world, false},
+          {"along the axes of the body", of_body, body, false},
+          {"along the axes of the body", of_body, body, true}};
+}
+
+double argument(const GroupMotion& motion, std::size_t sample, const Form& form) {
+  return form.of_speed ? flight::norm(motion.velocity[sample]) : motion.time[sample];
+}
+
+double hat(const std::vector<double>& knots, std::size_t j, double x) {
+  x = std::clamp(x, knots.front(), knots.back());
+  if (j > 0 && x < knots[j]) return std::max(0.0, (x - knots[j - 1]) / (knots[j] - knots[j - 1]));
+  if (j + 1 < knots.size() && x > knots[j])
+    return std::max(0.0, (knots[j + 1] - x) / (knots[j + 1] - knots[j]));
+  return 1;
+}
+
+/// A group's rows and how it moved.
+struct Seen {
+  std::size_t group{};
+  GroupMotion motion;
+  bool solved{};
+};
+
+std::vector<Seen> motions(const GroupedProblem& problem, const GroupedFit& fit, int threads) {
+  std::vector<Seen> out;
+  for (std::size_t i = 0; i < fit.groups.size(); ++i)
+    if (fit.groups[i].used && fit.groups[i].solved) out.push_back({i, {}, false});
+  const auto names = fit.names();
+  const std::vector<double> values(fit.values.data(), fit.values.data() + fit.values.size());
+  dynamics::parallel_for(out.size(), threads, [&](std::size_t n) {
+    out[n].motion = problem.motion(out[n].group, names, values, fit.groups[out[n].group].own);
+    out[n].solved = !out[n].motion.time.empty();
+  });
+  std::erase_if(out, [](const Seen& one) { return !one.solved; });
+  return out;
+}
+
+/// Between the hundredths of what the samples have.
+std::vector<double> knots_of(const std::vector<Seen>& seen, const Form& form) {
+  std::vector<double> all;
+  for (const Seen& one : seen)
+    for (std::size_t i = 0; i < one.motion.time.size(); ++i) all.push_back(argument(one.motion, i, form));
+  std::sort(all.begin(), all.end());
+  const std::size_t cut = all.size() / 100;
+  const double low = all[cut], high = all[all.size() - 1 - cut];
+  std::vector<double> out;
+  for (int j = 0; j < kKnots; ++j) out.push_back(low + (high - low) * j / (kKnots - 1));
+  return out;
+}
+
+/// Gram matrices of every group's [shared unknowns, knots by component, residual], its own unknowns projected
+/// out.
+std::vector<MatrixXd> parts_of(const GroupedProblem& problem, const GroupedFit& fit,
+                               const std::vector<Seen>& seen, const Form& form,
+                               const std::vector<double>& knots, const GroupedFitOptions& options) {
+  const auto names = fit.names();
+  const std::vector<double> values(fit.values.data(), fit.values.data() + fit.values.size());
+  std::vector<MatrixXd> out(seen.size());
+  dynamics::parallel_for(seen.size(), options.threads, [&](std::size_t n) {
+    const auto& [group, motion, solved] = seen[n];
+    std::vector<VectorXd> columns;
+    for (std::size_t c = 0; c < form.along.size(); ++c)
+      for (std::size_t j = 0; j < knots.size(); ++j) {
+        std::vector<Vec3<double>> a;
+        for (std::size_t i = 0; i < motion.time.size(); ++i)
+          a.push_back(flight::scaled(hat(knots, j, argument(motion, i, form)), form.direction(motion, i, c)));
+        columns.push_back(problem.response(group, a));
+      }
+    auto e = problem.equations(group, names, values, fit.groups[group].own, Derivatives::all);
+    const auto shared = static_cast<Index>(names.size()), width = static_cast<Index>(columns.size());
+    out[n] = MatrixXd::Zero(shared + width + 1, shared + width + 1);
+    if (!e.solved) return;
+    MatrixXd with(e.residual.size(), shared + width);
+    with.leftCols(shared) = e.shared;
+    for (Index k = 0; k < width; ++k) with.col(shared + k) = columns[static_cast<std::size_t>(k)];
+    e.shared = std::move(with);
+    const auto p = projected(std::move(e), problem.groups()[group], fit.weights, options.sample_limit);
+    out[n] = fit.weights.group[group] * gram(p.columns);
+  });
+  return out;
+}
+
+/// The knots and what the shared unknowns do beside them, from the groups for which `use`.
+struct Estimate {
+  VectorXd change;   ///< shared, then knots
+  MatrixXd inverse;  ///< of the knots' information, smoothness included
+};
+Estimate estimate(const std::vector<MatrixXd>& parts, Index shared, std::size_t components,
+                  const std::function<bool(std::size_t)>& use) {
+  const Index all = parts.front().rows() - 1, width = all - shared;
+  MatrixXd H = MatrixXd::Zero(all + 1, all + 1);
+  for (std::size_t n = 0; n < parts.size(); ++n)
+    if (use(n)) H += parts[n];
+  // What the shared unknowns can do is theirs.
+  const MatrixXd taken =
+      product(pseudo_inverse(H.topLeftCorner(shared, shared)), H.topRows(shared).rightCols(width + 1));
+  MatrixXd rest = H.bottomRightCorner(width + 1, width + 1) -
+                  inner_products(H.topRows(shared).rightCols(width + 1), taken);
+  MatrixXd A = rest.topLeftCorner(width, width);
+  const double most = A.diagonal().maxCoeff();
+  Estimate out{VectorXd::Zero(all), MatrixXd::Zero(width, width)};
+  if (!(most > 0)) return out;
+  for (std::size_t c = 0; c < components; ++c) {
+    const Index first = static_cast<Index>(c) * kKnots;
+    const double scale = A.diagonal().segment(first, kKnots).maxCoeff();
+    for (Index k = first; k + 2 < first + kKnots; ++k) {
+      const std::array<double, 3> bend{1, -2, 1};
+      for (Index i = 0; i < 3; ++i)
+        for (Index j = 0; j < 3; ++j)
+          A(k + i, k + j) +=
+              kSmooth * scale * bend[static_cast<std::size_t>(i)] * bend[static_cast<std::size_t>(j)];
+    }
+  }
+  out.inverse = pseudo_inverse(A);
+  out.change.tail(width) = -product(out.inverse, rest.topRightCorner(width, 1));
+  out.change.head(shared) = -taken.rightCols(1) - product(taken.leftCols(width), out.change.tail(width));
+  return out;
+}
+
+/// By how much it lowers a group's χ².
+double gain_of(const MatrixXd& part, const VectorXd& change) {
+  const Index all = change.size();
+  const VectorXd bent = product(part.topLeftCorner(all, all), change);
+  return -(change.dot(bent) + 2 * change.dot(part.topRightCorner(all, 1).col(0)));
+}
+
+/// The gain over train groups that it was not estimated from.
+double cross_validated(const std::vector<MatrixXd>& parts, Index shared, std::size_t components) {
+  double gain = 0;
+  for (int fold = 0; fold < kFolds; ++fold) {
+    const auto in_fold = [&](std::size_t n) { return static_cast<int>(n) % kFolds == fold; };
+    const Estimate one = estimate(parts, shared, components, [&](std::size_t n) { return !in_fold(n); });
+    for (std::size_t n = 0; n < parts.size(); ++n)
+      if (in_fold(n)) gain += gain_of(parts[n], one.change);
+  }
+  return gain;
+}
+
+/// From the scatter of the groups' scores.
+VectorXd sigmas(const std::vector<MatrixXd>& parts, Index shared, const Estimate& of) {
+  const Index all = of.change.size(), width = all - shared;
+  MatrixXd scatter = MatrixXd::Zero(width, width);
+  for (const MatrixXd& part : parts) {
+    const VectorXd score =
+        part.topRightCorner(all, 1).col(0) + product(part.topLeftCorner(all, all), of.change);
+    scatter += score.tail(width) * score.tail(width).transpose();
+  }
+  const auto groups = static_cast<double>(parts.size());
+  const MatrixXd covariance =
+      product(product(of.inverse, scatter), of.inverse) * (groups / std::max(1.0, groups - 1));
+  return covariance.diagonal().cwiseMax(of.inverse.diagonal()).cwiseSqrt();
+}
+
+}  // namespace
+
+std::optional<MissingAcceleration> missing_acceleration(const GroupedProblem& problem, const GroupedFit& fit,
+                                                        const GroupedFit& held_out,
+                                                        const GroupedFitOptions& options) {
+  const auto train = motions(problem, fit, options.threads),
+             test = motions(problem, held_out, options.threads);
+  if (train.size() < kFewestTrain || test.empty()) return {};
+  const auto shared = static_cast<Index>(fit.shared.size());
+  const Form* best = nullptr;
+  double best_gain = 0;
+  std::vector<double> knots;
+  std::vector<MatrixXd> parts;
+  const auto all = forms();
+  for (const Form& form : all) {
+    auto of = knots_of(train, form);
+    if (!(of.back() > of.front())) continue;
+    auto its = parts_of(problem, fit, train, form, of, options);
+    const double gain = cross_validated(its, shared, form.along.size());
+    if (!(gain > best_gain)) continue;
+    best = &form, best_gain = gain, knots = std::move(of), parts = std::move(its);
+  }
+  if (!best) return {};
+  const Estimate found = estimate(parts, shared, best->along.size(), [](std::size_t) { return true; });
+  const VectorXd sigma = sigmas(parts, shared, found);
+
+  MissingAcceleration out;
+  out.of = best->of;
+  out.against = best->of_speed ? "speed [m/s]" : "time [s]";
+  for (std::size_t c = 0; c < best->along.size(); ++c) {
+    MissingComponent component{best->along[c], knots, {}, {}};
+    double information = 0;
+    for (std::size_t j = 0; j < knots.size(); ++j) {
+      const auto k = static_cast<Index>(c * knots.size() + j);
+      component.value.push_back(found.change[shared + k]);
+      component.sigma.push_back(sigma[k]);
+      for (const MatrixXd& part : parts) information += part(shared + k, shared + k);
+    }
+    if (information > 0) out.components.push_back(std::move(component));
+  }
+  GroupedFit beside = fit;  // its values and weights, with the own unknowns of the held-out groups
+  beside.groups = held_out.groups;
+  const auto judges = parts_of(problem, beside, test, *best, knots, options);
+  double before = 0, gain = 0, squares = 0, samples = 0;
+  for (std::size_t n = 0; n < judges.size(); ++n) {
+    const Index last = judges[n].rows() - 1;
+    const double one = gain_of(judges[n], found.change);
+    before += judges[n](last, last), gain += one, squares += one * one;
+    samples += fit.weights.group[test[n].group] *
+               (held_out.groups[test[n].group].n - problem.groups()[test[n].group].taken());
+  }
+  out.test_before = before / std::max(1.0, samples);
+  out.test_after = (before - gain) / std::max(1.0, samples);
+  const auto n = static_cast<double>(judges.size());
+  out.helps = gain > 2 * std::sqrt(std::max(0.0, squares - gain * gain / n) * n / std::max(1.0, n - 1));
+  return out;
+}
+
+}  // namespace unhand::fitting
