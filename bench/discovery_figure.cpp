@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
+#include <stdexcept>
+#include <string>
 
 #include "fitting/distributions.hpp"
 
@@ -133,7 +136,7 @@ apps::Figure detection_figure(const std::vector<StudyRecord>& records) {
       all.begin(), all.end(), [](const Mark& a, const Mark& b) { return a.size < b.size; });
   const double left = least->size / 1.15, right = most->size * 1.15;
 
-  const double row = 0.56, names = 4.6, rest = 1.2, key = 0.1 + apps::key_height(4, 2);
+  const double row = 0.56, names = 4.6, rest = 1.45, key = 0.1 + apps::key_height(4, 2);
   const auto rows = static_cast<double>(by_effect.size());
   apps::Figure out{"detection", 17, key + 1.5 + row * rows + 0.5 + 4.6 + 0.4, {}, {}};
 
@@ -187,13 +190,16 @@ apps::Figure detection_figure(const std::vector<StudyRecord>& records) {
 
   std::string& s = out.script;
   s += "set multiplot\nunset key\n";
-  std::vector<double> sizes;
-  for (const Mark& mark : all) sizes.push_back(mark.size);
-  s += apps::value_axis(sizes);
-  s += fmt::format("set xrange [{:.6g}:{:.6g}]\n", left, right);
+  std::string tics;
+  for (double decade = 1e-3; decade < right; decade *= 10)
+    for (const int digit : {1, 2, 5}) tics += fmt::format("{}{:g}", tics.empty() ? "" : ", ", digit * decade);
+  s += fmt::format("set logscale x\nset xtics ({})\nset xrange [{:.6g}:{:.6g}]\n", tics, left, right);
   const double bottom = key + 1.5, between = bottom + row * rows;
   s += apps::place(out, {names, out.width - rest, between + 0.5, out.height - 0.4});
   s += "set format x ''\nset yrange [0:1.08]\nset ytics 0, 0.25, 1\nset ylabel 'share found, all effects'\n";
+  const auto found = std::count_if(all.begin(), all.end(), [](const Mark& mark) { return mark.found; });
+  s += fmt::format("set label 1 '{}/{}' at graph 1, first 1 left offset 0.6,0 textcolor rgb '#404040'\n",
+                   found, all.size());
   s += "plot ";
   if (!curve.rows.empty())
     s += "DATA index 1 using 1:2 with lines linewidth 1.6 linecolor rgb '#e69f00', \\\n  ";
@@ -202,7 +208,7 @@ apps::Figure detection_figure(const std::vector<StudyRecord>& records) {
       "'#202020', \\\n"
       "  DATA index 0 using 1:(0.06):(sprintf('%d', $7)) with labels textcolor rgb '#606060'\n";
   s += apps::place(out, {names, out.width - rest, bottom, between});
-  s += "set format x '%g'\nset xlabel 'size [typical steps]'\nunset ylabel\n";
+  s += "unset label 1\nset format x '%g'\nset xlabel 'size [typical steps]'\nunset ylabel\n";
   s += fmt::format("set yrange [{}:-0.5]\nset ytics ({}) scale 0\n", rows - 0.5, apps::named_tics(ids));
   s += fmt::format("plot DATA index 5 using 1:2:3:4 with xerrorbars pointtype -1 {}, \\\n", kHalf);
   s += fmt::format("  DATA index 5 using 1:($2-0.38):(0):(0.76) with vectors nohead {}", kHalf);

@@ -1,4 +1,6 @@
 // crosscheck: other engines on a log's throws.
+#include <array>
+
 #include "tests/apps/cli.hpp"
 
 namespace unhand::cli {
