@@ -5,7 +5,6 @@
 #include <cmath>
 #include <functional>
 #include <memory>
-#include <numeric>
 
 #include "apps/command.hpp"
 #include "apps/compare_figures.hpp"
@@ -24,7 +23,7 @@ struct FigureCommandOptions {
   FigureRequest request;
 };
 
-constexpr int kLandingX = 2;  // of experiment::kQuantities
+constexpr int kDetachVx = 0, kLandingX = 2;  // of experiment::kQuantities
 
 /// The absolute errors of one quantity over the throws of a split, sorted.
 std::vector<double> absolute_errors(const experiment::ModelComparison& model, int quantity,
@@ -37,9 +36,18 @@ std::vector<double> absolute_errors(const experiment::ModelComparison& model, in
   return out;
 }
 
-/// MAE with the quartiles of the absolute error as whiskers, held-out throws where there are any.
+/// "0.43 ± 0.38", two digits of the mean; the mean alone of one throw.
+std::string mean_and_std(const experiment::ErrorStatistics& of) {
+  const double size = std::max(of.mae, 1e-9);
+  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(size))), 0, 9);
+  return of.n > 1 ? fmt::format("{:.{}f} ± {:.{}f}", of.mae, decimals, of.std, decimals)
+                  : fmt::format("{:.{}f}", of.mae, decimals);
+}
+
+/// MAE with the quartiles of the absolute error as whiskers, and in words with its standard deviation, which
+/// may exceed the mean and so has no place on a logarithmic axis; held-out throws where there are any.
 std::optional<Figure> mae_figure(const experiment::Comparison& comparison) {
-  Figure figure{"mae", 17, 0, {}, {}};
+  Figure figure{"mae", 19, 0, {}, {}};
   const auto split =
       std::any_of(comparison.models.front().throws.begin(), comparison.models.front().throws.end(),
                   [](const auto& t) { return t.split == datasets::Split::test; })
@@ -54,22 +62,27 @@ std::optional<Figure> mae_figure(const experiment::Comparison& comparison) {
   std::vector<std::string> names;
   for (const auto& model : comparison.models) names.push_back(model.model);
   figure.height = 5.7 + 1.1 * static_cast<double>(n);
-  const double left = 4.4, gap = 1.1, width = (figure.width - left - gap - 0.5) / 2,
+  const double left = 4.2, words = 2.4, gap = 0.4, width = (figure.width - left - gap) / 2 - words,
                panel = (figure.height - 3.3) / 2;
   for (int q = 0; q < experiment::kQuantityCount; ++q) {
-    const bool position = q == kLandingX;
-    const std::string title = position ? "landing x [cm]" : experiment::kQuantities[q].title;
+    const double scale = q == kDetachVx || q == kLandingX ? 100 : 1;  // to cm
+    const std::string title = q == kDetachVx   ? "detach vx [cm/s]"
+                              : q == kLandingX ? "landing x [cm]"
+                                               : experiment::kQuantities[q].title;
     DataBlock block{title,
-                    {"line", "MAE", "lower quartile of the absolute error", "upper quartile", "n", "model"},
+                    {"line", "MAE", "lower quartile of the absolute error", "upper quartile",
+                     "STD of the absolute error (0 of one throw)", "n", "model"},
                     {},
                     {}};
     std::vector<double> means, shown;
     std::string points;
+    body +=
+        "set label 'MAE ± STD' at graph 1.05, graph 1 left offset 0,0.6 font ',7.5' textcolor rgb "
+        "'#606060'\n";
     for (std::size_t i = 0; i < n; ++i) {
-      const auto errors = absolute_errors(comparison.models[i], q, split, position ? 100 : 1);
+      const auto errors = absolute_errors(comparison.models[i], q, split, scale);
       if (errors.empty()) continue;
-      const double mae =
-          std::accumulate(errors.begin(), errors.end(), 0.0) / static_cast<double>(errors.size());
+      const auto of = experiment::statistics_of(errors);
       const double low = quantile(errors, 0.25), high = quantile(errors, 0.75);
       const Style style = style_of(comparison.models[i].model);
       points += fmt::format(
@@ -77,21 +90,22 @@ std::optional<Figure> mae_figure(const experiment::Comparison& comparison) {
           "linewidth 1.2",
           points.empty() ? "plot " : ", \\\n     ", q, block.rows.size(), block.rows.size(), style.marker,
           style.colour);
-      block.rows.push_back({static_cast<double>(i), mae, low, high, static_cast<double>(errors.size())});
+      body += fmt::format("set label '{}' at graph 1.05, first {} left font ',7.5'\n", mean_and_std(of), i);
+      block.rows.push_back({static_cast<double>(i), of.mae, low, high, of.std, static_cast<double>(of.n)});
       block.labels.push_back(comparison.models[i].model);
-      means.push_back(mae);
-      shown.insert(shown.end(), {mae, low, high});
+      means.push_back(of.mae);
+      shown.insert(shown.end(), {of.mae, low, high});
     }
     if (shown.empty()) means = shown = {1}, points = "plot NaN";
     const auto [least, most] = std::minmax_element(means.begin(), means.end());
     if (*most < 5 * *least) shown.push_back(0);  // models that are alike, on an axis from 0
     any = any || !block.rows.empty();
     figure.data.push_back(std::move(block));
-    const double x = left + (q % 2) * (width + gap), y = 1.3 + (1 - q / 2) * (panel + 1.3);
+    const double x = left + (q % 2) * (width + words + gap), y = 1.3 + (1 - q / 2) * (panel + 1.3);
     body += place(figure, {x, x + width, y, y + panel - 0.7});
     body +=
         fmt::format("set ytics ({}) scale 0\n", named_tics(q % 2 == 0 ? names : std::vector<std::string>(n)));
-    body += fmt::format("set title '{}' offset 0,-0.7\nset xtics font ',7.5'\n{}{}\nunset label 1\n",
+    body += fmt::format("set title '{}' offset 0,-0.7\nset xtics font ',7.5'\n{}{}\nunset label\n",
                         plain(title), value_axis(shown), points);
   }
   if (!any) return {};
@@ -121,7 +135,7 @@ const std::vector<Kind>& kinds() {
        [](FigureSource& s) { return required(landing_figure(s.compared()), s); }},
       {"conditions", "mean landing errors of each condition",
        [](FigureSource& s) { return required(condition_figure(s.compared()), s); }},
-      {"mae", "mean absolute errors of each model, and where half of them lie",
+      {"mae", "mean absolute errors of each model with their standard deviation, and where half of them lie",
        [](FigureSource& s) {
          return required(mae_figure(s.compared()), s, "neither a detach nor a landing was measured");
        }},

@@ -1,20 +1,25 @@
 // How often the loop finds what is missing, on this library's own synthetic campaigns:
 //   build/release/bench/discovery_study FILE KIND [CAMPAIGNS [FIRST_SEED [WITHOUT]]]
 //   build/release/bench/discovery_study FILE...
+//   build/release/bench/discovery_study --figure OUT_DIRECTORY FILE...
 // KIND: `one` effect of random size, from about what a campaign can show to twenty times that; `none`; `two`
 // at once; `forgotten`, one effect that the catalogue is told to forget. Every campaign adds a line to FILE;
 // what the file has already is not run again. Of `two`, an effect that was missed is asked for again in the
 // same campaign without the other one: was it too small to be seen there, or did the other one hide it? Of
 // `forgotten`, one that passed unnoticed is asked for again by the whole catalogue: would anybody have seen
 // it? WITHOUT: "ft", "mocap", "landing" or several of them, sensors that the campaigns do not have. Files
-// alone: the tables over all their lines. One thread a campaign; several processes may share a file's seeds.
+// alone: the tables over all their lines; with --figure, also the detection rate over the size, from the
+// campaigns of `one` that have all sensors, as a figure with its data and script in the directory. One thread
+// a campaign; several processes may share a file's seeds.
 #include <fmt/core.h>
 
 #include <algorithm>
 #include <ctime>
+#include <filesystem>
 #include <fstream>
 
-#include "discovery_record.hpp"
+#include "bench/discovery_figure.hpp"
+#include "bench/discovery_record.hpp"
 #include "experiment/synthetic_campaign.hpp"
 
 namespace {
@@ -82,21 +87,35 @@ void print(const StudyRecord& r) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::vector<std::string> arguments(argv + 1, argv + argc);
-  if (arguments.empty()) {
-    fmt::print(stderr, "usage: discovery_study FILE KIND [CAMPAIGNS [FIRST_SEED [WITHOUT]]] | FILE...\n");
+  std::vector<std::string> arguments(argv + 1, argv + argc);
+  const bool draws = !arguments.empty() && arguments[0] == "--figure";
+  if (arguments.empty() || (draws && arguments.size() < 3)) {
+    fmt::print(
+        stderr,
+        "usage: discovery_study FILE KIND [CAMPAIGNS [FIRST_SEED [WITHOUT]]] | [--figure OUT_DIRECTORY] "
+        "FILE...\n");
     return 2;
+  }
+  std::filesystem::path out;
+  if (draws) {
+    out = arguments[1];
+    arguments.erase(arguments.begin(), arguments.begin() + 2);
   }
   const auto argument = [&](std::size_t k, const char* otherwise) {
     return arguments.size() > k ? arguments[k] : std::string(otherwise);
   };
   const std::string& file = arguments[0];
   const std::string kind = argument(1, "");
-  if (kind != "one" && kind != "none" && kind != "two" && kind != "forgotten") {
+  if (draws || (kind != "one" && kind != "none" && kind != "two" && kind != "forgotten")) {
     std::vector<StudyRecord> all;
     for (const auto& name : arguments)
       for (auto& r : read_records(name)) all.push_back(std::move(r));
     print_tables(all);
+    if (draws) {
+      std::filesystem::create_directories(out);
+      apps::draw(detection_figure(all), out, "synthetic campaigns, bench/discovery_study");
+      fmt::print("\n{}\n", (out / "detection.png").string());
+    }
     return 0;
   }
   const auto campaigns = std::stoull(argument(2, "20")), first = std::stoull(argument(3, "1"));

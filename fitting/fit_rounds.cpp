@@ -24,7 +24,6 @@ FitRounds::FitRounds(const CampaignProblem& problem, const FitOptions& options,
   for (std::size_t k = 0; k < start.size(); ++k) x_.push_back(start[k] / shared_.scale[k]);
   choose_throws(start);
   own_.assign(used_.size() * problem.own().size(), 0.0);
-  modes_.resize(used_.size());
 }
 
 void FitRounds::choose_throws(const std::vector<double>& start) {
@@ -53,6 +52,7 @@ void FitRounds::choose_throws(const std::vector<double>& start) {
   for (const std::size_t i : used_) {
     weigh(starts[i], throws[i].observed, throws[i], shared_.weighting);
     chi2_.push_back(starts[i].residual.squaredNorm());
+    modes_.push_back(starts[i].modes);
   }
 }
 
@@ -144,7 +144,7 @@ bool FitRounds::solve(bool last) {
   mode_changes_ = 0;
   for (std::size_t i = 0; i < used_.size(); ++i) {
     chi2_[i] = equations_.throws[i].chi2;
-    mode_changes_ += !modes_[i].empty() && modes_[i] != equations_.throws[i].modes;
+    mode_changes_ += modes_[i] != equations_.throws[i].modes;
     modes_[i] = equations_.throws[i].modes;
   }
   return true;

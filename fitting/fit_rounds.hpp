@@ -59,7 +59,7 @@ class FitRounds {
   };
   const Solution& solution() const { return solution_; }
   int iterations() const { return iterations_; }
-  /// Throws whose sequence of modes changed in the last round.
+  /// Throws whose sequence of modes changed in the last round, between its start and its end.
   int mode_changes() const { return mode_changes_; }
 
  private:
@@ -86,7 +86,7 @@ class FitRounds {
   // One array: Ceres orders blocks by their addresses, which must be the throws' order in every run.
   std::vector<double> own_;
   std::vector<double> chi2_;
-  std::vector<std::vector<int>> modes_;
+  std::vector<std::vector<int>> modes_;  // where the last round ended, or the first one starts
   NormalEquations equations_;
   Solution solution_;
   int iterations_{}, mode_changes_{}, learned_{};

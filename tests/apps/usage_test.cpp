@@ -115,6 +115,32 @@ TEST_F(Cli, SeveralEffectsAndSensorsMayBeSaidAtOnce) {
   EXPECT_EQ(content(folder / "a.h5"), content(folder / "c.h5"));
 }
 
+TEST_F(Cli, TheFigureOfMeanErrorsHasWhatCompareSays) {
+  ASSERT_EQ(run("figure mae --log " + quick + " --models sliding_pivot --out f").code, 0);
+  ASSERT_EQ(run("compare " + quick + " --models sliding_pivot --json c.json").code, 0);
+  json of = read_json(folder / "c.json")["models"]["sliding_pivot"]["test"];
+  std::istringstream data(content(folder / "f/mae.dat"));
+  std::vector<std::vector<double>> rows;  // line, MAE, quartiles, STD, n; one of each quantity
+  for (std::string line; std::getline(data, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    std::istringstream numbers(line);
+    rows.emplace_back();
+    for (double x = 0; numbers >> x;) rows.back().push_back(x);
+  }
+  ASSERT_EQ(rows.size(), 4u);
+  const std::vector<std::pair<const char*, double>> quantities{
+      {"detach_vx_m_s", 100}, {"detach_omega_deg_s", 1}, {"landing_x_m", 100}, {"landing_theta_deg", 1}};
+  for (std::size_t q = 0; q < 4; ++q) {
+    const auto& [key, scale] = quantities[q];  // the figure has cm
+    ASSERT_EQ(rows[q].size(), 6u) << key;      // 1e-4: the two have tolerances of their own
+    EXPECT_NEAR(rows[q][1], scale * of[key]["mae"].get<double>(), 1e-4 * rows[q][1]) << key;
+    EXPECT_NEAR(rows[q][4], scale * of[key]["std"].get<double>(), 1e-4 * rows[q][4]) << key;
+    EXPECT_EQ(rows[q][5], of[key]["n"].get<double>()) << key;
+    EXPECT_LE(rows[q][2], rows[q][3]) << key;
+  }
+  EXPECT_THAT(content(folder / "f/mae.gp"), HasSubstr(" ± "));
+}
+
 // A block without rows keeps its place: gnuplot's index would draw the next one in it.
 TEST_F(Cli, AFigureWithoutLandingsDrawsTheOthersWhereTheyBelong) {
   ASSERT_EQ(run("generate quick12 --seed 3 --without landing --out blind.h5").code, 0);

@@ -567,6 +567,44 @@ TEST(ThrowFit, UnknownsAtTheirBoundsDoNotStopTheOthers) {
   }
 }
 
+TEST(ThrowFit, CountsTheThrowsWhoseModesTheLastRoundChanged) {
+  // With half the friction more of the objects slip from the start. One step of the solver in every round: it
+  // comes nearer to the truth from round to round, and objects are held one after the other.
+  const CampaignProblem problem = problem_of(disc_log());
+  FitOptions options;
+  options.start = problem.start();
+  ASSERT_EQ(problem.campaign()[0].name, "mu");
+  options.start[0] = 0.25;
+  options.iterations = 1;
+  std::vector<std::vector<int>> before;
+  for (const auto& thrown : problem.throws())
+    before.push_back(problem
+                         .linearise(thrown, options.start, std::vector<double>(problem.own().size()),
+                                    DerivativesBy::nothing)
+                         .modes);
+  std::vector<int> changes;
+  for (options.rounds = 1; options.rounds <= 4; ++options.rounds) {
+    const auto result = fit(problem, options);
+    int expected = 0;
+    for (std::size_t i = 0; i < result.throws.size(); ++i) {
+      if (!result.throws[i].used) continue;
+      ASSERT_FALSE(result.throws[i].modes.empty());
+      expected += result.throws[i].modes != before[i];
+      before[i] = result.throws[i].modes;
+    }
+    EXPECT_EQ(result.mode_changes, expected) << options.rounds << " rounds, mu " << result.campaign[0].value;
+    changes.push_back(result.mode_changes);
+  }
+  EXPECT_GT(changes[1], 0);
+  EXPECT_EQ(changes[3], 0);  // near the truth
+  EXPECT_EQ(disc_fit().mode_changes, 0);
+  // Nor where the campaign's unknowns are fixed at the answer.
+  FitOptions still;
+  still.start = disc_fit().values();
+  still.all_fixed = true;
+  EXPECT_EQ(fit(problem, still).mode_changes, 0);
+}
+
 TEST(ThrowFit, SaysWhyThereIsNothingToFit) {
   auto bare = disc_log();
   for (auto& one : bare.throws) {
