@@ -22,7 +22,8 @@ namespace {
 
 constexpr int kKnots = 6, kFolds = 5;
 constexpr std::size_t kFewestTrain = 10;
-/// Second differences cost this share of what the best determined knot is worth.
+/// Second differences, and values, cost this share of what the best determined knot is worth: what the rows
+/// hardly tell stays near zero.
 constexpr double kSmooth = 1e-3;
 
 /// Directions at a sample, one per component; zero where there is none.
@@ -144,6 +145,7 @@ std::vector<MatrixXd> parts_of(const GroupedProblem& problem, const GroupedFit& 
 struct Estimate {
   VectorXd change;   ///< shared, then knots
   MatrixXd inverse;  ///< of the knots' information, smoothness included
+  MatrixXd taken;    ///< by the shared unknowns, of every knot's column
 };
 Estimate estimate(const std::vector<MatrixXd>& parts, Index shared, std::size_t components,
                   const std::function<bool(std::size_t)>& use) {
@@ -158,11 +160,12 @@ Estimate estimate(const std::vector<MatrixXd>& parts, Index shared, std::size_t 
                   inner_products(H.topRows(shared).rightCols(width + 1), taken);
   MatrixXd A = rest.topLeftCorner(width, width);
   const double most = A.diagonal().maxCoeff();
-  Estimate out{VectorXd::Zero(all), MatrixXd::Zero(width, width)};
+  Estimate out{VectorXd::Zero(all), MatrixXd::Zero(width, width), taken.leftCols(width)};
   if (!(most > 0)) return out;
   for (std::size_t c = 0; c < components; ++c) {
     const Index first = static_cast<Index>(c) * kKnots;
     const double scale = A.diagonal().segment(first, kKnots).maxCoeff();
+    A.diagonal().segment(first, kKnots).array() += kSmooth * scale;
     for (Index k = first; k + 2 < first + kKnots; ++k) {
       const std::array<double, 3> bend{1, -2, 1};
       for (Index i = 0; i < 3; ++i)
@@ -184,6 +187,12 @@ double gain_of(const MatrixXd& part, const VectorXd& change) {
   return -(change.dot(bent) + 2 * change.dot(part.topRightCorner(all, 1).col(0)));
 }
 
+/// The slope of half of χ² at the change: what noise, and whatever else is missing, leaves to gain.
+VectorXd score_of(const MatrixXd& part, const VectorXd& change) {
+  const Index all = change.size();
+  return part.topRightCorner(all, 1).col(0) + product(part.topLeftCorner(all, all), change);
+}
+
 /// The gain over train groups that it was not estimated from.
 double cross_validated(const std::vector<MatrixXd>& parts, Index shared, std::size_t components) {
   double gain = 0;
@@ -201,9 +210,9 @@ VectorXd sigmas(const std::vector<MatrixXd>& parts, Index shared, const Estimate
   const Index all = of.change.size(), width = all - shared;
   MatrixXd scatter = MatrixXd::Zero(width, width);
   for (const MatrixXd& part : parts) {
-    const VectorXd score =
-        part.topRightCorner(all, 1).col(0) + product(part.topLeftCorner(all, all), of.change);
-    scatter += score.tail(width) * score.tail(width).transpose();
+    const VectorXd all_scores = score_of(part, of.change);
+    const VectorXd score = all_scores.tail(width) - inner_products(of.taken, all_scores.head(shared));
+    scatter += score * score.transpose();
   }
   const auto groups = static_cast<double>(parts.size());
   const MatrixXd covariance =
@@ -254,18 +263,17 @@ std::optional<MissingAcceleration> missing_acceleration(const GroupedProblem& pr
   GroupedFit beside = fit;  // its values and weights, with the own unknowns of the held-out groups
   beside.groups = held_out.groups;
   const auto judges = parts_of(problem, beside, test, *best, knots, options);
-  double before = 0, gain = 0, squares = 0, samples = 0;
+  double before = 0, gain = 0, left = 0, samples = 0;
   for (std::size_t n = 0; n < judges.size(); ++n) {
     const Index last = judges[n].rows() - 1;
-    const double one = gain_of(judges[n], found.change);
-    before += judges[n](last, last), gain += one, squares += one * one;
-    samples += fit.weights.group[test[n].group] *
-               (held_out.groups[test[n].group].n - problem.groups()[test[n].group].taken());
+    before += judges[n](last, last), gain += gain_of(judges[n], found.change);
+    left += std::pow(score_of(judges[n], found.change).dot(found.change), 2);
+    const Group& group = problem.groups()[test[n].group];
+    samples += fit.weights.group[test[n].group] * (held_out.groups[test[n].group].n - group.taken());
   }
   out.test_before = before / std::max(1.0, samples);
   out.test_after = (before - gain) / std::max(1.0, samples);
-  const auto n = static_cast<double>(judges.size());
-  out.helps = gain > 2 * std::sqrt(std::max(0.0, squares - gain * gain / n) * n / std::max(1.0, n - 1));
+  out.helps = gain > 2 * 2 * std::sqrt(left);
   return out;
 }
 

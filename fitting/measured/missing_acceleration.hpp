@@ -21,8 +21,8 @@ struct MissingAcceleration {
   std::string against;                       ///< "speed [m/s]": what it is a function of
   std::vector<MissingComponent> components;  ///< that the rows say something of
   double test_before{}, test_after{};        ///< χ² per sample on held-out groups, as they count in fits
-  /// It lowers the misfit of held-out groups by more than two standard errors (from the scatter between
-  /// groups): else it must not be used as a correction.
+  /// It lowers the misfit of held-out groups by more than two standard errors, from the scatter of what it
+  /// leaves there: else it must not be used as a correction.
   bool helps{};
 };
 

@@ -106,6 +106,36 @@ TEST(FallDiscovery, APerfectSensorInAVacuumReadsZero) {
   EXPECT_FALSE(found.first.any) << "nor does anything leave the noise: " << found.first.chi2_per_dof;
 }
 
+TEST(FallDiscovery, ABumpOfTimeIsEstimatedWithoutAForm) {
+  constexpr double kSize = 0.4, kDuration = 0.6;
+  const auto bump = [&](double t) { return kSize * std::pow(std::sin(std::numbers::pi * t / kDuration), 2); };
+  auto log = falls({}, 30, 21);
+  for (auto& one : log.throws) {
+    auto& imu = *one.imu;
+    for (std::size_t i = 0; i < imu.time.rows; ++i)
+      if (const double t = imu.time(i) - one.free_flight->first; t >= 0 && t <= kDuration)
+        imu.specific_force(i, 2) += bump(t);
+  }
+  const FallProblem problem(log);
+  const auto train = fit_groups(problem, datasets::Split::train, {}, Eigen::VectorXd());
+  const auto missing =
+      missing_acceleration(problem, train, fit_own(problem, datasets::Split::test, train), {});
+  ASSERT_TRUE(missing.has_value());
+  EXPECT_TRUE(missing->helps);
+  EXPECT_EQ(missing->of, "along the axes of the body");
+  EXPECT_EQ(missing->against, "time [s]");
+  ASSERT_EQ(missing->components.size(), 3u);
+  for (std::size_t c = 0; c < 3; ++c) {
+    const auto& component = missing->components[c];
+    for (std::size_t j = 0; j < component.at.size(); ++j)  // a tenth for the straight lines between knots
+      EXPECT_NEAR(component.value[j], c == 2 ? bump(component.at[j]) : 0.0,
+                  4 * component.sigma[j] + 0.1 * kSize)
+          << c << ' ' << component.at[j];
+  }
+  EXPECT_GT(missing->test_before, 3);
+  EXPECT_LT(missing->test_after, 1.3);
+}
+
 // One reading that is out by fifty sigmas says nothing of the noise of the others.
 TEST(FallDiscovery, AStrayReadingIsNoPartOfAnUndeclaredNoise) {
   auto log = falls({}, 30, 1);
