@@ -10,6 +10,7 @@
 
 #include "dynamics/parallel.hpp"
 #include "dynamics/pooled_scatter.hpp"
+#include "experiment/glitches.hpp"
 #include "experiment/unit_check.hpp"
 
 namespace unhand::experiment {
@@ -107,10 +108,12 @@ ErrorStatistics ModelComparison::of_condition(int quantity, const ThrownConditio
 std::vector<PreparedThrow> prepare_all(const datasets::ThrowLog& log, const std::string& file, int threads,
                                        bool check_units) {
   datasets::validate(log, file);
-  if (check_units) require_units(log, file);
-  std::vector<std::optional<PreparedThrow>> prepared(log.throws.size());
-  dynamics::parallel_for(log.throws.size(), threads,
-                         [&](std::size_t i) { prepared[i] = prepare(log, log.throws[i], file); });
+  datasets::ThrowLog clean = log;
+  mark_glitches(clean);
+  if (check_units) require_units(clean, file);
+  std::vector<std::optional<PreparedThrow>> prepared(clean.throws.size());
+  dynamics::parallel_for(clean.throws.size(), threads,
+                         [&](std::size_t i) { prepared[i] = prepare(clean, clean.throws[i], file); });
   std::vector<PreparedThrow> out;
   out.reserve(prepared.size());
   for (auto& p : prepared) out.push_back(std::move(*p));

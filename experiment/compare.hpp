@@ -110,7 +110,8 @@ struct CompareOptions {
   release::NaiveOptions naive;  ///< of limit_surface_naive
 };
 
-/// All throws prepared, on several threads. `file` names the log in errors. Throws datasets::LogError for a
+/// All throws prepared, on several threads, without frames in which the tracker was elsewhere for once
+/// (mark_glitches). `file` names the log in errors. Throws datasets::LogError for a
 /// log that breaks the rules of its kind (datasets::validate), for one with a column in another unit than it
 /// says (require_units; not asked without `check_units`), and for throws that lack what a release needs.
 std::vector<PreparedThrow> prepare_all(const datasets::ThrowLog& log, const std::string& file, int threads,

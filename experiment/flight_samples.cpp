@@ -7,37 +7,10 @@
 
 #include "dynamics/third_difference.hpp"
 #include "dynamics/white_noise.hpp"
+#include "experiment/glitches.hpp"
 
 namespace unhand::experiment {
 namespace {
-
-/// How far sample `member` of the four from `first` on lies off the parabola through the other three, and its
-/// σ for samples of σ = 1.
-struct Off {
-  double size{}, sigma{};
-};
-Off off_parabola(const FlightSamples& s, std::size_t axis, std::size_t first, std::size_t member) {
-  const double* t = &s.times[first];
-  const auto weight = dynamics::third_difference_weights({t[0], t[1], t[2], t[3]});
-  double sum = 0, squares = 0;
-  for (std::size_t i = 0; i < 4; ++i)
-    sum += weight[i] * s.position[first + i][axis], squares += weight[i] * weight[i];
-  const double own = weight[member];
-  return {sum / own, std::sqrt(squares) / std::abs(own)};
-}
-
-bool is_glitch(const FlightSamples& s, std::size_t i) {
-  constexpr double kFar = 8;
-  for (const int axis : s.axes) {
-    const auto a = static_cast<std::size_t>(axis);
-    const Off after = off_parabola(s, a, i - 1, 1), before = off_parabola(s, a, i - 2, 2);
-    const double x = std::abs(after.size), y = std::abs(before.size);
-    if (x > kFar * after.sigma * s.sigma[a] && y > kFar * before.sigma * s.sigma[a] &&
-        std::abs(after.size - before.size) < 0.25 * (x + y))
-      return true;
-  }
-  return false;
-}
 
 template <class T>
 void keep(std::vector<T>& values, const std::vector<bool>& good) {
@@ -133,10 +106,18 @@ FlightScatter pooled(const std::vector<FlightScatter>& flights) {
 }
 
 std::size_t remove_glitches(FlightSamples& s) {
-  std::vector<bool> good(s.times.size(), true);
-  std::size_t removed = 0;
-  for (std::size_t i = 2; i + 3 < s.times.size(); ++i)  // the last frames may have met the ground
-    if (is_glitch(s, i)) good[i] = false, ++removed;
+  std::vector<std::vector<double>> columns;
+  std::vector<double> sigma;
+  for (const int axis : s.axes) {
+    const auto a = static_cast<std::size_t>(axis);
+    sigma.push_back(s.sigma[a]);
+    columns.emplace_back();
+    for (const auto& p : s.position) columns.back().push_back(p[a]);
+  }
+  std::vector<bool> good = glitches(s.times, columns, sigma);
+  good.flip();
+  if (good.size() > 2) good[good.size() - 3] = true;  // the last frames may have met the ground
+  const auto removed = static_cast<std::size_t>(std::count(good.begin(), good.end(), false));
   if (removed == 0) return 0;
   keep(s.times, good);
   keep(s.elapsed, good);

@@ -37,9 +37,8 @@ FlightScatter scatter_of(const FlightSamples& samples);
 /// Of several flights together.
 FlightScatter pooled(const std::vector<FlightScatter>& flights);
 
-/// Takes out the frames in which a tracker was elsewhere for once: positions that lie off the parabolas
-/// through both sets of three neighbours around them, by more than eight of their sigmas and by the same
-/// distance. Neither a force nor an impact does that to one frame. Returns how many.
+/// Takes out the frames in which a tracker was elsewhere for once (experiment::glitches, of positions; not
+/// the last three, which may have met the ground). Returns how many.
 std::size_t remove_glitches(FlightSamples& samples);
 
 }  // namespace unhand::experiment

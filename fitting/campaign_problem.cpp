@@ -13,6 +13,7 @@
 #include "dynamics/median.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/compare.hpp"
+#include "experiment/glitches.hpp"
 
 namespace unhand::fitting {
 
@@ -70,10 +71,14 @@ Effect find_effect(const std::string& id) {
   throw std::invalid_argument(datasets::unknown_name(fmt::format("effect \"{}\" is unknown", id), id, ids));
 }
 
-CampaignProblem::CampaignProblem(const datasets::ThrowLog& log, const std::string& file,
+CampaignProblem::CampaignProblem(const datasets::ThrowLog& logged, const std::string& file,
                                  const CampaignOptions& options)
     : options_(options) {
   validate(options);
+  datasets::validate(logged, file);
+  datasets::ThrowLog log = logged;
+  if (const std::size_t n = experiment::mark_glitches(log); n > 0)
+    notes_.push_back(fmt::format("{} frames in which the tracker was elsewhere for once were taken out", n));
   const std::vector<Effect> effects = find_effects(options.effects);
   header_ = log;
   header_.throws.clear();

@@ -141,7 +141,10 @@ ScatterCovariance scatter_covariance(const NormalEquations& equations, const Eig
   const auto n = static_cast<Eigen::Index>(share.size());
   out.degrees_of_freedom.setOnes(width);
   for (Eigen::Index k = 0; k < width; ++k) {
-    const Eigen::VectorXd c = whiten.row(k);
+    Eigen::VectorXd c = whiten.row(k);
+    const double size = c.stableNorm();  // no power of it counts below, and its own may not be representable
+    if (!(size > 0) || !std::isfinite(size)) continue;
+    c /= size;
     Eigen::MatrixXd toward(width, n), shared(width, n);  // A_i c and H_i A_i c
     for (Eigen::Index i = 0; i < n; ++i) {
       toward.col(i) = adjust[static_cast<std::size_t>(i)] * c;

@@ -185,7 +185,10 @@ FitResult search_and_question(Stage& stage, DiscoverOptions options, Discovery& 
   settle_give(stage, options, out);
   backward(stage, options, out);
   FitResult counted = withdraw(stage, options, out);
-  if (!drop_idle_give(stage, options, out)) return counted;
+  if (!drop_idle_give(stage, options, out)) {
+    drop_vanished_give(stage, options);
+    return counted;
+  }
   options.forget.push_back(kPads);
   stage.asked.reset();
   out.asked.reset(), out.imitations.clear();  // of a search that is made again

@@ -126,12 +126,21 @@ void settle_give(Stage& stage, const DiscoverOptions& options, Discovery& out) {
 bool drop_idle_give(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   if (!gives_along(stage) || !out.effects.empty()) return false;
   const Stage rigid = without(stage, {kPads}, options);
-  if (!rigid.solved() || improvement(rigid, stage, out.base_test, options).matters >= 1) return false;
+  if (!rigid.solved()) return false;
+  constexpr double kSpoils = 1.05;  // times the held-out predictions' rms
   const SmallEffect give = small_effect(rigid, stage, kPads, out.base_test, options);
-  if (give.rms_after < give.rms_before && give.likelier) return false;
-  if (!out.small || give.delta_bic < out.small->delta_bic) out.small = give;
+  const bool spoils = give.rms_after > kSpoils * give.rms_before,
+             matters = improvement(rigid, stage, out.base_test, options).matters >= 1;
+  if (!spoils && (matters || (give.rms_after < give.rms_before && give.likelier))) return false;
+  if (!matters && (!out.small || give.delta_bic < out.small->delta_bic)) out.small = give;
   stage = rigid;
   return true;
+}
+
+void drop_vanished_give(Stage& stage, const DiscoverOptions& options) {
+  constexpr double kNone = 1e-9;  // m
+  if (!gives_along(stage) || give_of(stage) > kNone) return;
+  if (const Stage& rigid = without(stage, {kPads}, options); rigid.solved()) stage = Stage(rigid);
 }
 
 }  // namespace unhand::fitting

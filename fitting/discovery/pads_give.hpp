@@ -36,8 +36,12 @@ void fit_give_along(Stage& stage, const DiscoverOptions& options);
 void settle_give(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
 /// In an answer without effects a give stays only if it matters to a channel of the held-out throws, or they
-/// are predicted the better for it and are likelier. Else it goes (true), and is left in `out.small`, if
-/// nothing more evident is.
+/// are predicted the better for it and are likelier; and never where it spoils their predictions: it then
+/// stands for something else. Else it goes (true), and is left in `out.small`, if it does not matter and
+/// nothing more evident is there.
 bool drop_idle_give(Stage& stage, const DiscoverOptions& options, Discovery& out);
+
+/// A give along that has vanished in later fits, beside what was added or taken away since, goes.
+void drop_vanished_give(Stage& stage, const DiscoverOptions& options);
 
 }  // namespace unhand::fitting

@@ -10,6 +10,7 @@
 #include "dynamics/parallel.hpp"
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/misfit_rules.hpp"
+#include "fitting/discovery/own_drift.hpp"
 #include "fitting/discovery/traces.hpp"
 #include "fitting/discovery/where_acts.hpp"
 #include "fitting/distributions.hpp"
@@ -328,6 +329,31 @@ std::optional<Unexplained> left_in_predictions(const Discovery& so_far, double r
       {}};
 }
 
+/// Where every throw's own unknowns take up what changes over the campaign.
+std::optional<Unexplained> left_in_own_unknowns(const Stage& stage, const DiscoverOptions& options) {
+  const auto drift = own_drift(stage.problem, stage.fit, stage.held_out, options.family_wise_level);
+  if (!drift) return std::nullopt;
+  const bool friction = drift->name == "mu_deviation";
+  const auto& seen = stage.fit.misfit;
+  const bool felt = std::any_of(seen.begin(), seen.end(),
+                                [](const ChannelMisfit& m) { return m.channel == Channel::wrench_fx; });
+  const Channel shown = friction && felt               ? Channel::wrench_fx
+                        : drift->name == "grasp_angle" ? Channel::mocap_theta
+                                                       : Channel::mocap_x;
+  return Unexplained{
+      friction ? Phase::release : Phase::grasped,
+      shown,
+      drift->ratio,
+      fmt::format("the throws' own {} drifts with their order in the log, by {:+.3g}{} from the first to the "
+                  "last (correlation {:.3f} about the means of the conditions; held-out throws agree): {}",
+                  drift->name, drift->change, dynamics::after_number(drift->unit), drift->correlation,
+                  friction
+                      ? "friction changes over the campaign, as pads do that wear or warm; every throw is "
+                        "fitted a friction of its own, so that channels do not show it"
+                      : "what is tracked moves against the object, or the grasp against the hand"),
+      {}};
+}
+
 /// Of which throws a misfit is: the fewest that hold most of it, by name or by the condition they share.
 std::string held_by(const Stage& stage, const FitResult& half, const ChannelMisfit& m, int threads) {
   constexpr double kMost = 0.9;
@@ -419,8 +445,8 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
       return few;
     }
     out = left_in_predictions(so_far, rest, options);
+    if (!out) return left_in_own_unknowns(stage, options);
   }
-  if (!out) return out;
   out->description += "; no effect of the catalogue explains it on held-out throws";
   for (const auto& id : so_far.imitations) out->description += fmt::format("; {} imitates it", id);
   if (so_far.effects.empty() && so_far.imitations.empty() && !so_far.ranking.empty() &&

@@ -30,6 +30,30 @@ TEST(ScatterCovariance, OfAMeanIsTheTextbooks) {
   EXPECT_NEAR(found.degrees_of_freedom[0], n - 1, 1e-9);
 }
 
+TEST(ScatterCovariance, AnUnknownOfWhichNothingIsSaidDoesNotTouchTheOthers) {
+  // A mean of eight numbers, beside a second unknown without information: the give of pads that have none.
+  NormalEquations alone, beside;
+  alone.information = Eigen::MatrixXd::Constant(1, 1, 8);
+  beside.information = Eigen::MatrixXd::Zero(2, 2);
+  beside.information(0, 0) = 8;
+  for (const double y : {3, -1, 4, 1, -5, 9, -2, 6}) {
+    ThrowEquations part;
+    part.gradient = Eigen::VectorXd::Constant(1, 1.875 - y);
+    part.information = Eigen::MatrixXd::Constant(1, 1, 1);
+    alone.throws.push_back(part);
+    part.gradient = Eigen::Vector2d(1.875 - y, 0);
+    part.information = Eigen::MatrixXd::Zero(2, 2);
+    part.information(0, 0) = 1;
+    beside.throws.push_back(part);
+  }
+  const auto one = scatter_covariance(alone, Eigen::MatrixXd::Zero(1, 1));
+  const auto two = scatter_covariance(beside, Eigen::MatrixXd::Zero(2, 2));
+  EXPECT_NEAR(two.covariance(0, 0), one.covariance(0, 0), 1e-12);
+  EXPECT_NEAR(two.degrees_of_freedom[0], one.degrees_of_freedom[0], 1e-9);
+  EXPECT_FALSE(two.covariance(1, 1) < 1e12);
+  EXPECT_GE(two.degrees_of_freedom[1], 1);  // a number
+}
+
 TEST(ScatterCovariance, UnequalSharesLeaveFewerDegrees) {
   // One throw that holds as much as all others: its residual is half followed, and it speaks for few. As
   // Satterthwaite counts: of a sum of squares of normal numbers with covariance B, (tr B)² / tr B². The

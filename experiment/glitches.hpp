@@ -1,0 +1,22 @@
+// Frames in which a tracker was elsewhere for once.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "datasets/throw_log.hpp"
+
+namespace unhand::experiment {
+
+/// Which frames lie, in one of the `columns` (tracked coordinates by frame), off the parabolas through both
+/// sets of three neighbours around them, by more than eight of their sigmas and by the same distance: a force
+/// that sets in puts them off to both sides. Not the first and the last two. `times` [s] increase; `sigma`: 1
+/// σ of a column.
+std::vector<bool> glitches(const std::vector<double>& times, std::span<const std::vector<double>> columns,
+                           std::span<const double> sigma);
+
+/// Marks such frames of planar throws from a hand as lost, and returns how many. Where the log declares no σ,
+/// that of a throw is its scatter from frame to frame.
+std::size_t mark_glitches(datasets::ThrowLog& log);
+
+}  // namespace unhand::experiment
