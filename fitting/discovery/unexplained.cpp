@@ -354,6 +354,19 @@ std::optional<Unexplained> left_in_own_unknowns(const Stage& stage, const Discov
       {}};
 }
 
+/// The candidate that would take most of the misfit away to first order, with how much of it; nothing where
+/// that is little, as it then resembles nothing.
+std::string nearest_footprint(const Stage& stage, const Discovery& so_far, const DiscoverOptions& options) {
+  constexpr double kLeast = 0.25;
+  double misfit = 0;
+  for (const ChannelMisfit& m : stage.fit.misfit)
+    if (is_misfit(m, options)) misfit += m.chi2 - m.n;
+  if (so_far.ranking.empty() || !(so_far.ranking.front().gain > kLeast * misfit) || !(misfit > 0)) return {};
+  const Ranked& nearest = so_far.ranking.front();
+  return fmt::format("; the nearest footprint is that of {}, with {:.0f} % of the misfit to first order",
+                     nearest.id, 100 * std::min(1.0, nearest.gain / misfit));
+}
+
 /// Of which throws a misfit is: the fewest that hold most of it, by name or by the condition they share.
 std::string held_by(const Stage& stage, const FitResult& half, const ChannelMisfit& m, int threads) {
   constexpr double kMost = 0.9;
@@ -449,9 +462,8 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
   }
   out->description += "; no effect of the catalogue explains it on held-out throws";
   for (const auto& id : so_far.imitations) out->description += fmt::format("; {} imitates it", id);
-  if (so_far.effects.empty() && so_far.imitations.empty() && !so_far.ranking.empty() &&
-      so_far.ranking.front().gain > 1 && !too_small_by(so_far, out->channel))
-    out->description += fmt::format("; the nearest footprint is that of {}", so_far.ranking.front().id);
+  if (so_far.effects.empty() && so_far.imitations.empty() && !too_small_by(so_far, out->channel))
+    out->description += nearest_footprint(stage, so_far, options);
   out->missing = estimate_missing(stage, out->phase, options);
   if (out->phase == Phase::grasped && is_tracked(out->channel)) {  // what acts there may act in flight, too
     auto in_flight = estimate_missing(stage, Phase::flight, options);
