@@ -21,7 +21,7 @@ constexpr double kStep = 5e-4, kStepTolerance = 1e-5, kShortest = 2.5e-5;
 /// Steps that are `kMost` times as long at most are taken where one of them and two of half its length agree
 /// to `kAgree` [m/s] times the relative tolerance: where the pads hold, and stretch with the load. The
 /// difference is of second order, so a step of twice the length may follow if it is a quarter of that.
-constexpr double kMost = 16, kAgree = 4, kDoubled = 0.25;
+constexpr double kMost = 8, kAgree = 1, kDoubled = 0.25;
 
 /// How long steps may be.
 struct Pace {

@@ -22,7 +22,7 @@ struct GivingStart {
 ///   N (q₁ − q₀ − h b)/h = f(q₁),   q = (v_r, ω_r),   b its rate without friction, N = (G M⁻¹ Gᵀ)⁻¹,
 ///
 /// twice with h/2 and once with h, which are extrapolated: second order, L-stable, whatever the springs. h is
-/// the one that the tolerances give to pads that slip, and up to 16 times that where both agree. Derivatives
+/// the one that the tolerances give to pads that slip, and up to 8 times that where both agree. Derivatives
 /// are those of the steps that were taken. The recorded trajectory has the rate at the ends of its pieces
 /// that the points' wrench there gives.
 template <class S>

@@ -13,6 +13,7 @@
 #include "datasets/near_miss.hpp"
 #include "experiment/throw_setup.hpp"
 #include "fitting/clock.hpp"
+#include "fitting/discovery/discrepancy.hpp"
 #include "fitting/discovery/held_out_split.hpp"
 #include "fitting/discovery/misfit_rules.hpp"
 #include "fitting/discovery/outcome_errors.hpp"
@@ -186,7 +187,9 @@ FitResult search_and_question(Stage& stage, DiscoverOptions options, Discovery& 
   backward(stage, options, out);
   FitResult counted = withdraw(stage, options, out);
   if (!drop_idle_give(stage, options, out)) {
-    drop_vanished_give(stage, options);
+    if (!drop_vanished_give(stage, options)) return counted;
+    counted = stage.fit;
+    count_discrepancy(stage.problem, counted, options.fit.threads);
     return counted;
   }
   options.forget.push_back(kPads);

@@ -137,10 +137,12 @@ bool drop_idle_give(Stage& stage, const DiscoverOptions& options, Discovery& out
   return true;
 }
 
-void drop_vanished_give(Stage& stage, const DiscoverOptions& options) {
+bool drop_vanished_give(Stage& stage, const DiscoverOptions& options) {
   constexpr double kNone = 1e-9;  // m
-  if (!gives_along(stage) || give_of(stage) > kNone) return;
-  if (const Stage& rigid = without(stage, {kPads}, options); rigid.solved()) stage = Stage(rigid);
+  if (!gives_along(stage) || give_of(stage) > kNone) return false;
+  const Stage rigid = without(stage, {kPads}, options);
+  if (rigid.solved()) stage = rigid;
+  return rigid.solved();
 }
 
 }  // namespace unhand::fitting

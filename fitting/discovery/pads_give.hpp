@@ -41,7 +41,7 @@ void settle_give(Stage& stage, const DiscoverOptions& options, Discovery& out);
 /// nothing more evident is there.
 bool drop_idle_give(Stage& stage, const DiscoverOptions& options, Discovery& out);
 
-/// A give along that has vanished in later fits, beside what was added or taken away since, goes.
-void drop_vanished_give(Stage& stage, const DiscoverOptions& options);
+/// A give along that has vanished in later fits, beside what was added or taken away since, goes (true).
+bool drop_vanished_give(Stage& stage, const DiscoverOptions& options);
 
 }  // namespace unhand::fitting

@@ -8,7 +8,6 @@
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/asked_form.hpp"
 #include "fitting/discovery/discrepancy.hpp"
-#include "fitting/discovery/pads_give.hpp"
 #include "fitting/discovery/wald.hpp"
 #include "fitting/discovery/where_acts.hpp"
 #include "fitting/discovery/withdrawal.hpp"
@@ -71,7 +70,6 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
 
 FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out) {
   if (out.effects.empty()) return stage.fit;
-  drop_vanished_give(stage, options);
   FitResult counted = stage.fit;
   count_discrepancy(stage.problem, counted, options.fit.threads);
   const BothErrors errors = errors_of(stage, options.fit.threads);
