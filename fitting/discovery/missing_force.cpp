@@ -9,6 +9,7 @@
 
 #include "dynamics/dense_solve.hpp"
 #include "dynamics/twice_integrated.hpp"
+#include "fitting/hat.hpp"
 
 namespace unhand::fitting {
 
@@ -62,13 +63,6 @@ class Rows {
   Eigen::MatrixXd own_;
   Eigen::VectorXd seen_;
 };
-
-double hat(const std::vector<double>& knots, std::size_t j, double t) {
-  if (j > 0 && t < knots[j]) return std::max(0.0, (t - knots[j - 1]) / (knots[j] - knots[j - 1]));
-  if (j + 1 < knots.size() && t > knots[j])
-    return std::max(0.0, (knots[j + 1] - t) / (knots[j + 1] - knots[j]));
-  return 1;
-}
 
 struct Term {
   dynamics::AccelerationForm form;
@@ -147,8 +141,7 @@ std::vector<Term> terms_for(Response response) {
 std::array<double, 3> MissingCurve::at(double time) const {
   std::array<double, 3> out{};
   for (std::size_t c = 0; c < 3; ++c)
-    for (std::size_t j = 0; j < knots.size(); ++j)
-      out[c] += value[c][j] * hat(knots, j, std::clamp(time, knots.front(), knots.back()));
+    for (std::size_t j = 0; j < knots.size(); ++j) out[c] += value[c][j] * hat(knots, j, time);
   return out;
 }
 

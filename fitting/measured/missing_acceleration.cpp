@@ -7,6 +7,7 @@
 
 #include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
+#include "fitting/hat.hpp"
 #include "fitting/measured/grouped_weights.hpp"
 
 namespace unhand::fitting {
@@ -67,32 +68,25 @@ double argument(const GroupMotion& motion, std::size_t sample, const Form& form)
   return form.of_speed ? flight::norm(motion.velocity[sample]) : motion.time[sample];
 }
 
-double hat(const std::vector<double>& knots, std::size_t j, double x) {
-  x = std::clamp(x, knots.front(), knots.back());
-  if (j > 0 && x < knots[j]) return std::max(0.0, (x - knots[j - 1]) / (knots[j] - knots[j - 1]));
-  if (j + 1 < knots.size() && x > knots[j])
-    return std::max(0.0, (knots[j + 1] - x) / (knots[j + 1] - knots[j]));
-  return 1;
-}
-
 /// A group's rows and how it moved.
 struct Seen {
   std::size_t group{};
   GroupMotion motion;
-  bool solved{};
+  GroupEquations equations;  ///< with derivatives by everything
 };
 
-std::vector<Seen> motions(const GroupedProblem& problem, const GroupedFit& fit, int threads) {
+std::vector<Seen> seen_in(const GroupedProblem& problem, const GroupedFit& fit, int threads) {
   std::vector<Seen> out;
   for (std::size_t i = 0; i < fit.groups.size(); ++i)
-    if (fit.groups[i].used && fit.groups[i].solved) out.push_back({i, {}, false});
+    if (fit.groups[i].used && fit.groups[i].solved) out.push_back({i, {}, {}});
   const auto names = fit.names();
   const std::vector<double> values(fit.values.data(), fit.values.data() + fit.values.size());
   dynamics::parallel_for(out.size(), threads, [&](std::size_t n) {
-    out[n].motion = problem.motion(out[n].group, names, values, fit.groups[out[n].group].own);
-    out[n].solved = !out[n].motion.time.empty();
+    const std::size_t i = out[n].group;
+    out[n].motion = problem.motion(i, names, values, fit.groups[i].own);
+    out[n].equations = problem.equations(i, names, values, fit.groups[i].own, Derivatives::all);
   });
-  std::erase_if(out, [](const Seen& one) { return !one.solved; });
+  std::erase_if(out, [](const Seen& one) { return one.motion.time.empty() || !one.equations.solved; });
   return out;
 }
 
@@ -114,11 +108,9 @@ std::vector<double> knots_of(const std::vector<Seen>& seen, const Form& form) {
 std::vector<MatrixXd> parts_of(const GroupedProblem& problem, const GroupedFit& fit,
                                const std::vector<Seen>& seen, const Form& form,
                                const std::vector<double>& knots, const GroupedFitOptions& options) {
-  const auto names = fit.names();
-  const std::vector<double> values(fit.values.data(), fit.values.data() + fit.values.size());
   std::vector<MatrixXd> out(seen.size());
   dynamics::parallel_for(seen.size(), options.threads, [&](std::size_t n) {
-    const auto& [group, motion, solved] = seen[n];
+    const auto& [group, motion, equations] = seen[n];
     std::vector<VectorXd> columns;
     for (std::size_t c = 0; c < form.along.size(); ++c)
       for (std::size_t j = 0; j < knots.size(); ++j) {
@@ -127,10 +119,8 @@ std::vector<MatrixXd> parts_of(const GroupedProblem& problem, const GroupedFit& 
           a.push_back(flight::scaled(hat(knots, j, argument(motion, i, form)), form.direction(motion, i, c)));
         columns.push_back(problem.response(group, a));
       }
-    auto e = problem.equations(group, names, values, fit.groups[group].own, Derivatives::all);
-    const auto shared = static_cast<Index>(names.size()), width = static_cast<Index>(columns.size());
-    out[n] = MatrixXd::Zero(shared + width + 1, shared + width + 1);
-    if (!e.solved) return;
+    GroupEquations e = equations;
+    const Index shared = e.shared.cols(), width = static_cast<Index>(columns.size());
     MatrixXd with(e.residual.size(), shared + width);
     with.leftCols(shared) = e.shared;
     for (Index k = 0; k < width; ++k) with.col(shared + k) = columns[static_cast<std::size_t>(k)];
@@ -225,8 +215,8 @@ VectorXd sigmas(const std::vector<MatrixXd>& parts, Index shared, const Estimate
 std::optional<MissingAcceleration> missing_acceleration(const GroupedProblem& problem, const GroupedFit& fit,
                                                         const GroupedFit& held_out,
                                                         const GroupedFitOptions& options) {
-  const auto train = motions(problem, fit, options.threads),
-             test = motions(problem, held_out, options.threads);
+  const auto train = seen_in(problem, fit, options.threads),
+             test = seen_in(problem, held_out, options.threads);
   if (train.size() < kFewestTrain || test.empty()) return {};
   const auto shared = static_cast<Index>(fit.shared.size());
   const Form* best = nullptr;
@@ -260,9 +250,7 @@ std::optional<MissingAcceleration> missing_acceleration(const GroupedProblem& pr
     }
     if (information > 0) out.components.push_back(std::move(component));
   }
-  GroupedFit beside = fit;  // its values and weights, with the own unknowns of the held-out groups
-  beside.groups = held_out.groups;
-  const auto judges = parts_of(problem, beside, test, *best, knots, options);
+  const auto judges = parts_of(problem, fit, test, *best, knots, options);
   double before = 0, gain = 0, left = 0, samples = 0;
   for (std::size_t n = 0; n < judges.size(); ++n) {
     const Index last = judges[n].rows() - 1;
