@@ -10,6 +10,7 @@
 #include "fitting/discovery/misfit_rules.hpp"
 #include "fitting/discovery/pads_give.hpp"
 #include "fitting/discovery/selection.hpp"
+#include "fitting/discovery/unexplained.hpp"
 #include "fitting/discovery/wald.hpp"
 #include "fitting/discovery/where_acts.hpp"
 #include "fitting/distributions.hpp"
@@ -208,12 +209,14 @@ class ForwardStep {
   }
 
   /// What matters to no channel may matter to one beside pads that give, which slow slips show more of; or to
-  /// a prediction, where all of a throw's errors add up.
+  /// a prediction, where all of a throw's errors add up. Beside a misfit that stays, nobody knows whose
+  /// errors those are.
   std::optional<Stage> weigh_small() {
     if (auto beside = beside_give()) return beside;
     const SmallEffect small =
         small_effect(stage_, small_->next, id_of(*small_->score), out_.base_test, options_);
-    if (predicts_better(stage_, small_->next, options_))
+    if (left_by_answer(small_->next, out_, options_).empty() &&
+        predicts_better(stage_, small_->next, options_))
       return accept(std::move(*small_),
                     fmt::format("predicted before the throw: {:.3g} to {:.3g} mm rms", 1e3 * small.rms_before,
                                 1e3 * small.rms_after),

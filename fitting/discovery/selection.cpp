@@ -8,6 +8,7 @@
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/asked_form.hpp"
 #include "fitting/discovery/discrepancy.hpp"
+#include "fitting/discovery/unexplained.hpp"
 #include "fitting/discovery/wald.hpp"
 #include "fitting/discovery/where_acts.hpp"
 #include "fitting/discovery/withdrawal.hpp"
@@ -57,7 +58,7 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
       const bool needed =
           stage.bic() - less.bic() < kDeltaBic &&
           (is_law(stage.ids[i]) || improvement(less, stage, out.base_test, options).matters >= 1 ||
-           predicts_better(less, stage, options));
+           (left_by_answer(stage, out, options).empty() && predicts_better(less, stage, options)));
       if (needed) continue;
       if (stage.bic() - less.bic() < kDeltaBic && !out.small)
         out.small = small_effect(less, stage, stage.ids[i], out.base_test, options);

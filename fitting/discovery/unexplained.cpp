@@ -215,6 +215,9 @@ std::optional<double> too_small_by(const Discovery& so_far, Channel channel) {
   return mean;
 }
 
+/// No law of pads is quite right; of flight and of sensors they are.
+double rest_of(const Stage& stage) { return acts_on_pads(stage) ? kRest : 0; }
+
 /// What the answer leaves of a channel in a phase.
 std::string in_words(const Discovery& so_far, const Unexplained& left) {
   std::string words = fmt::format("{:.3g} times the variance of the noise", left.chi2_per_dof);
@@ -224,21 +227,12 @@ std::string in_words(const Discovery& so_far, const Unexplained& left) {
 }
 
 /// Where a channel leaves more than noise: the first phase, and in it the channel in which most is left.
-std::optional<Unexplained> left_in_channels(const Stage& stage, const Discovery& so_far, double rest,
+std::optional<Unexplained> left_in_channels(const Stage& stage, const Discovery& so_far,
                                             const DiscoverOptions& options) {
   std::optional<Unexplained> out;
+  const std::vector<ChannelMisfit> left = left_by_answer(stage, so_far, options);
   const ChannelMisfit* worst = nullptr;
-  const bool elsewhere = std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(), [&](const auto& m) {
-    return is_misfit(m, options) &&
-           m.chi2_per_sample() >= unexplained_from(m.channel, m.phase, true, options) &&
-           is_confirmed(stage.held_out.misfit, m);
-  });
-  for (const auto& m : stage.fit.misfit) {
-    const double before = misfit_in(so_far.base.misfit, m.channel, m.phase);
-    const double limit = std::max(unexplained_from(m.channel, m.phase, elsewhere, options),
-                                  so_far.effects.empty() ? 0.0 : 1 + rest * (before - 1));
-    if (!is_misfit(m, options) || m.chi2_per_sample() < limit) continue;
-    if (!is_confirmed(stage.held_out.misfit, m)) continue;
+  for (const ChannelMisfit& m : left) {
     if (!worst || m.chi2_per_sample() > worst->chi2_per_sample()) worst = &m;
     if (out && (m.phase != out->phase || m.chi2_per_sample() <= out->chi2_per_dof)) continue;
     out = Unexplained{m.phase, m.channel, m.chi2_per_sample(), {}, {}};
@@ -446,18 +440,34 @@ std::optional<Unexplained> left_in_one_half(const Stage& stage, const DiscoverOp
 
 }  // namespace
 
+std::vector<ChannelMisfit> left_by_answer(const Stage& stage, const Discovery& so_far,
+                                          const DiscoverOptions& options) {
+  const bool elsewhere = std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(), [&](const auto& m) {
+    return is_misfit(m, options) &&
+           m.chi2_per_sample() >= unexplained_from(m.channel, m.phase, true, options) &&
+           is_confirmed(stage.held_out.misfit, m);
+  });
+  std::vector<ChannelMisfit> out;
+  for (const ChannelMisfit& m : stage.fit.misfit) {
+    const double base = misfit_in(so_far.base.misfit, m.channel, m.phase);
+    const double limit = std::max(unexplained_from(m.channel, m.phase, elsewhere, options),
+                                  stage.ids.empty() ? 0.0 : 1 + rest_of(stage) * (base - 1));
+    if (is_misfit(m, options) && m.chi2_per_sample() >= limit && is_confirmed(stage.held_out.misfit, m))
+      out.push_back(m);
+  }
+  return out;
+}
+
 std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_far,
                                        const DiscoverOptions& options) {
-  // No law of pads is quite right; of flight and of sensors they are.
-  const double rest = acts_on_pads(stage) ? kRest : 0;
   std::optional<Unexplained> out = asked_for_in_flight(stage, so_far);
-  if (!out) out = left_in_channels(stage, so_far, rest, options);
+  if (!out) out = left_in_channels(stage, so_far, options);
   if (!out) {
     if (auto few = left_in_one_half(stage, options)) {
       few->description += suspects(*few, so_far);
       return few;
     }
-    out = left_in_predictions(so_far, rest, options);
+    out = left_in_predictions(so_far, rest_of(stage), options);
     if (!out) return left_in_own_unknowns(stage, options);
   }
   out->description += "; no effect of the catalogue explains it on held-out throws";

@@ -9,10 +9,14 @@
 
 namespace unhand::fitting {
 
+/// The channels and phases, in their order, in which a stage leaves more than noise in both halves of the
+/// throws; of what an effect on the pads has taken away of the base's misfit, a hundredth may stay.
+std::vector<ChannelMisfit> left_by_answer(const Stage& stage, const Discovery& so_far,
+                                          const DiscoverOptions& options);
+
 /// The first phase in which the stage leaves more than noise, and the channel in which most is left; where
-/// none does, the outcome whose predictions go with the condition. Of what an accepted effect on the pads has
-/// taken away, a hundredth may stay. With the estimate of what is missing there. `so_far` has the answer's
-/// errors already.
+/// none does, the outcome whose predictions go with the condition. With the estimate of what is missing
+/// there. `so_far` has the answer's errors already.
 std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_far,
                                        const DiscoverOptions& options);
 
