@@ -204,8 +204,10 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
                                 {"delta_bic", number(small->delta_bic)},
                                 {"p_value", number(small->p_value)},
                                 {"held_out_gain", number(small->held_out_fall)},
-                                {"test_rms_before_m", number(small->rms_before)},
-                                {"test_rms_after_m", number(small->rms_after)},
+                                {"test_rms_before_m", number(small->rms.position.before)},
+                                {"test_rms_after_m", number(small->rms.position.after)},
+                                {"test_rms_before_rad", number(small->rms.angle.before)},
+                                {"test_rms_after_rad", number(small->rms.angle.after)},
                                 {"test_likelier", small->likelier}};
   out["unexplained"] = nullptr;
   if (found.unexplained) {

@@ -106,10 +106,10 @@ std::vector<std::string> separating_lines(const fitting::AcceptedEffect& effect)
 }
 
 std::string small_text(const fitting::SmallEffect& small) {
-  const bool predicts = small.rms_before > fitting::DiscoverOptions{}.prediction_matters * small.rms_after;
-  const std::string numbers = fmt::format(
-      "{} (BIC {:+.1f}, p {}; rms predicted before the throw, test: {:.3g} to {:.3g} mm", small.id,
-      small.delta_bic, p_text(small.p_value), 1e3 * small.rms_before, 1e3 * small.rms_after);
+  const bool predicts = small.rms.is_better_by(fitting::DiscoverOptions{}.prediction_matters);
+  const std::string numbers =
+      fmt::format("{} (BIC {:+.1f}, p {}; test throws, predicted before the throw: {}", small.id,
+                  small.delta_bic, p_text(small.p_value), small.rms.in_words());
   if (small.any_pads) return fmt::format("evident, but no pads are without it: {})", numbers);
   if (!predicts) return fmt::format("evident, but too small to matter: {})", numbers);
   return fmt::format(

@@ -90,8 +90,8 @@ bool held_out_confirms(const Stage& before, const Stage& after) {
 bool predicts_better(const Stage& before, const Stage& after, const DiscoverOptions& options) {
   const auto outcomes_before = outcomes_of(before, Share::test, options.fit.threads),
              outcomes_after = outcomes_of(after, Share::test, options.fit.threads);
-  const PredictionGain gain = prediction_gain(outcomes_before, outcomes_after);
-  if (!(gain.before > options.prediction_matters * gain.after) || !held_out_confirms(before, after))
+  if (!prediction_gain(outcomes_before, outcomes_after).is_better_by(options.prediction_matters) ||
+      !held_out_confirms(before, after))
     return false;
   const OutcomeErrors was = outcome_errors(outcomes_before), is = outcome_errors(outcomes_after);
   const auto holds = [&](std::optional<double> OutcomeErrors::*outcome) {
@@ -106,16 +106,14 @@ bool predicts_better(const Stage& before, const Stage& after, const DiscoverOpti
 SmallEffect small_effect(const Stage& without, const Stage& with, const std::string& id,
                          const std::vector<ChannelMisfit>& base, const DiscoverOptions& options) {
   const int threads = options.fit.threads;
-  const PredictionGain gain =
-      prediction_gain(outcomes_of(without, Share::test, threads), outcomes_of(with, Share::test, threads));
-  return {id,
-          with.bic() - without.bic(),
-          wald_p_value(with.fit, find_effect(id)),
-          improvement(without, with, base, options).fall,
-          gain.before,
-          gain.after,
-          id == kPads && give_of(with) <= kMostGive,
-          held_out_confirms(without, with)};
+  return {
+      id,
+      with.bic() - without.bic(),
+      wald_p_value(with.fit, find_effect(id)),
+      improvement(without, with, base, options).fall,
+      prediction_gain(outcomes_of(without, Share::test, threads), outcomes_of(with, Share::test, threads)),
+      id == kPads && give_of(with) <= kMostGive,
+      held_out_confirms(without, with)};
 }
 
 bool is_lacking(const OutcomeLack& lack, double level) {

@@ -86,6 +86,12 @@ void validate(const DiscoverOptions& options) {
           fmt::format("laws: {} is no contact law whose pads press on the object", law));
 }
 
+std::string PredictionGain::in_words() const {
+  return fmt::format("{:.3g} to {:.3g} mm, {:.3g} to {:.3g} deg rms", 1e3 * position.before,
+                     1e3 * position.after, angle.before * experiment::kDegrees,
+                     angle.after * experiment::kDegrees);
+}
+
 const char* to_string(Fate fate) {
   switch (fate) {
     case Fate::not_refitted:

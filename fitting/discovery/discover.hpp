@@ -134,14 +134,36 @@ struct AcceptedEffect {
   void add_other_name(const std::string& other, double correlation);
 };
 
+/// An error of the same predictions, rms, by two models; zeros where nothing can be compared.
+struct RmsOfBoth {
+  double before{};  ///< by the first
+  double after{};   ///< by the other
+  /// Whether it falls by a factor; whether it rises by one.
+  bool falls_by(double factor) const { return before > factor * after; }
+  bool rises_by(double factor) const { return after > factor * before; }
+};
+
+/// What one model's predictions are better by than another's: rms errors of the pose tracked in flight, of
+/// the landing where nothing is tracked.
+struct PredictionGain {
+  RmsOfBoth position;  ///< of x and z together, or landing x [m]
+  RmsOfBoth angle;     ///< of theta [rad]
+  /// Whether either falls by a factor, and the other does not rise by it.
+  bool is_better_by(double factor) const {
+    return (position.falls_by(factor) && !angle.rises_by(factor)) ||
+           (angle.falls_by(factor) && !position.rises_by(factor));
+  }
+  /// "1.21 to 1.19 mm, 1.14 to 0.69 deg rms"
+  std::string in_words() const;
+};
+
 /// An effect for which the evidence is, and which is no part of the answer.
 struct SmallEffect {
   std::string id;          ///< of the effect
   double delta_bic{};      ///< with it against without
   double p_value{};        ///< of its absence
   double held_out_fall{};  ///< largest, of χ² per sample in a channel and phase
-  double rms_before{};     ///< of held-out predictions without it, as PredictionGain has it [m]
-  double rms_after{};      ///< and with it [m]
+  PredictionGain rms;      ///< of held-out predictions, without it and with it
   bool any_pads{};         ///< it is a give of the pads that no pads are without
   bool likelier{};         ///< the held-out throws' likelihood rises enough with it
 };

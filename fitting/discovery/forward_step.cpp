@@ -217,9 +217,7 @@ class ForwardStep {
         small_effect(stage_, small_->next, id_of(*small_->score), out_.base_test, options_);
     if (left_by_answer(small_->next, out_, options_).empty() &&
         predicts_better(stage_, small_->next, options_))
-      return accept(std::move(*small_),
-                    fmt::format("predicted before the throw: {:.3g} to {:.3g} mm rms", 1e3 * small.rms_before,
-                                1e3 * small.rms_after),
+      return accept(std::move(*small_), fmt::format("predicted before the throw: {}", small.rms.in_words()),
                     evident_);
     if (!out_.small || small.delta_bic < out_.small->delta_bic) out_.small = small;
     return std::nullopt;

@@ -39,11 +39,14 @@ void follow_flight(const CampaignProblem& problem, const CampaignThrow& thrown,
     if (k == 3) continue;
     const double error = channels[j] - o.value;
     sum[k] += error, n[k] += 1;
-    if (k < 2) out.squares += error * error;
+    if (k < 2)
+      out.squares += error * error;
+    else
+      out.angle_squares += error * error;
     (k < 2 ? axes[k] : variance(Outcome::orientation)) = o.sigma * o.sigma;
   }
   variance(Outcome::position) = axes[0] + axes[1];
-  out.samples = n[0];
+  out.samples = n[0], out.angles = n[2];
   if (n[0] > 0 && n[1] > 0 && n[2] > 0) out.flight = {sum[0] / n[0], sum[1] / n[1], sum[2] / n[2]};
 }
 
@@ -147,20 +150,27 @@ OutcomeErrors outcome_errors(const std::vector<PredictedOutcome>& throws) {
 
 PredictionGain prediction_gain(const std::vector<PredictedOutcome>& before,
                                const std::vector<PredictedOutcome>& after) {
-  const bool tracked =
-      std::any_of(before.begin(), before.end(), [](const PredictedOutcome& t) { return t.samples > 0; });
-  const auto square_of = [&](const PredictedOutcome& t) -> std::optional<double> {
-    if (tracked) return t.samples > 0 ? std::optional(t.squares / t.samples) : std::nullopt;
-    const auto& error = t.error[kLandingX];
-    return error ? std::optional(*error * *error) : std::nullopt;
+  // Of what was tracked in flight, or, where no throw's was, of the landing.
+  const auto rms = [&](double PredictedOutcome::*samples, double PredictedOutcome::*squares, int landing,
+                       double unit) -> RmsOfBoth {
+    const bool tracked =
+        std::any_of(before.begin(), before.end(), [&](const PredictedOutcome& t) { return t.*samples > 0; });
+    const auto square_of = [&](const PredictedOutcome& t) -> std::optional<double> {
+      if (tracked) return t.*samples > 0 ? std::optional(t.*squares / (t.*samples)) : std::nullopt;
+      const auto& error = t.error[static_cast<std::size_t>(landing)];
+      return error ? std::optional(*error * unit * *error * unit) : std::nullopt;
+    };
+    double n = 0, sum_before = 0, sum_after = 0;
+    for (std::size_t k = 0; k < before.size(); ++k) {
+      const auto was = square_of(before[k]), is = square_of(after[k]);
+      if (was && is) n += 1, sum_before += *was, sum_after += *is;
+    }
+    if (!(n > 0)) return {};
+    return {std::sqrt(sum_before / n), std::sqrt(sum_after / n)};
   };
-  double n = 0, sum_before = 0, sum_after = 0;
-  for (std::size_t k = 0; k < before.size(); ++k) {
-    const auto was = square_of(before[k]), is = square_of(after[k]);
-    if (was && is) n += 1, sum_before += *was, sum_after += *is;
-  }
-  if (!(n > 0)) return {};
-  return {std::sqrt(sum_before / n), std::sqrt(sum_after / n)};
+  return {rms(&PredictedOutcome::samples, &PredictedOutcome::squares, kLandingX, 1),
+          rms(&PredictedOutcome::angles, &PredictedOutcome::angle_squares, kLandingTheta,
+              1 / experiment::kDegrees)};
 }
 
 }  // namespace unhand::fitting

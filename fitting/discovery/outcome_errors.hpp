@@ -15,7 +15,9 @@ struct PredictedOutcome {
   int condition{};  ///< throws that repeat one experiment share it
   std::array<std::optional<double>, experiment::kQuantityCount> error;  ///< as experiment::kQuantities
   double samples{};                                                     ///< of the tracked position in flight
-  double squares{};  ///< Σ (Δx² + Δz²) over them [m²]
+  double squares{};        ///< Σ (Δx² + Δz²) over them [m²]
+  double angles{};         ///< of the tracked angle in flight
+  double angle_squares{};  ///< Σ Δθ² over them [rad²]
   /// Mean error of the tracked pose in flight [m, m, rad]; none where it was not tracked.
   std::optional<std::array<double, 3>> flight;
   /// Variance of one reading of each outcome's sensor [m² or rad²]; of a position, both axes' together.
@@ -31,13 +33,7 @@ std::vector<PredictedOutcome> predicted_outcomes(const CampaignProblem& problem,
 /// were measured.
 OutcomeErrors outcome_errors(const std::vector<PredictedOutcome>& throws);
 
-/// What one model's predictions of the same throws are better by than another's: rms of the tracked position
-/// in flight, of landing x where nothing is tracked [m]; zeros where nothing can be compared.
-struct PredictionGain {
-  double before{};  ///< rms of the first model [m]
-  double after{};   ///< rms of the other [m]
-};
-/// Both hold the same throws in the same order.
+/// Of two models' predictions of the same throws, in the same order.
 PredictionGain prediction_gain(const std::vector<PredictedOutcome>& before,
                                const std::vector<PredictedOutcome>& after);
 

@@ -129,9 +129,10 @@ bool drop_idle_give(Stage& stage, const DiscoverOptions& options, Discovery& out
   if (!rigid.solved()) return false;
   constexpr double kSpoils = 1.05;  // times the held-out predictions' rms
   const SmallEffect give = small_effect(rigid, stage, kPads, out.base_test, options);
-  const bool spoils = give.rms_after > kSpoils * give.rms_before,
+  const RmsOfBoth& position = give.rms.position;
+  const bool spoils = position.rises_by(kSpoils),
              matters = improvement(rigid, stage, out.base_test, options).matters >= 1;
-  if (!spoils && (matters || (give.rms_after < give.rms_before && give.likelier))) return false;
+  if (!spoils && (matters || (position.falls_by(1) && give.likelier))) return false;
   if (!matters && (!out.small || give.delta_bic < out.small->delta_bic)) out.small = give;
   stage = rigid;
   return true;

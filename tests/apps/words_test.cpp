@@ -69,13 +69,13 @@ TEST(WeakGrip, NamesConditionsOfEveryObject) {
 }
 
 TEST(SmallEffect, IsNotCalledSmallWhereHeldOutErrorsFall) {
-  fitting::SmallEffect small{"contact.viscous", -369, 8e-4, 0.1, 1.23e-3, 0.911e-3, false};
+  fitting::SmallEffect small{"contact.viscous", -369, 8e-4, 0.1, {{1.23e-3, 0.911e-3}, {}}, false};
   EXPECT_THAT(small_text(small),
               testing::AllOf(testing::StartsWith("evident on the train throws, but the test throws do not"),
                              testing::EndsWith("and their likelihood does not rise enough)")));
   small.likelier = true;
   EXPECT_THAT(small_text(small), testing::EndsWith("and another of their errors grows)"));
-  small.rms_after = 1.2e-3;
+  small.rms.position.after = 1.2e-3;
   EXPECT_THAT(small_text(small), testing::StartsWith("evident, but too small to matter: contact.viscous"));
   small.any_pads = true;
   EXPECT_THAT(small_text(small), testing::StartsWith("evident, but no pads are without it: "));
