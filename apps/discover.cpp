@@ -209,6 +209,9 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
                                 {"test_rms_before_rad", number(small->rms.angle.before)},
                                 {"test_rms_after_rad", number(small->rms.angle.after)},
                                 {"test_likelier", small->likelier}};
+  out["withdrawn"] = Json::array();
+  for (const auto& one : found.imitations)
+    out["withdrawn"].push_back({{"id", one.id}, {"why", one.why}, {"delta_bic", number(one.delta_bic)}});
   out["unexplained"] = nullptr;
   if (found.unexplained) {
     out["unexplained"] = {{"phase", to_string(found.unexplained->phase)},
@@ -258,6 +261,8 @@ std::string discovery_text(const Discovery& found, const std::string& log, const
   if (const std::string note = gain_text(found.effects); !note.empty()) out += "\n" + note + "\n";
   for (const auto& id : found.along) out += fmt::format("\n{}\n", along_text(id, found.final));
   if (found.small) out += fmt::format("\n{}\n", small_text(*found.small));
+  if (!found.unexplained)  // which names them
+    for (const auto& one : found.imitations) out += fmt::format("\n{}\n", withdrawn_text(one));
   if (found.unexplained)
     out +=
         fmt::format("\nunexplained: {}\n", unexplained_text(found.effects, found.unexplained->description));

@@ -225,6 +225,9 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
   for (const auto& id : found.along)
     answer += fmt::format("<p>{}.</p>\n", escaped(along_text(id, found.final)));
   if (found.small) answer += fmt::format("<p>{}.</p>\n", escaped(small_text(*found.small)));
+  if (!found.unexplained)
+    for (const auto& one : found.imitations)
+      answer += fmt::format("<p>{}.</p>\n", escaped(withdrawn_text(one)));
   if (found.unexplained)
     answer += fmt::format("<p><b>Unexplained:</b> {}.</p>\n",
                           escaped(unexplained_text(found.effects, found.unexplained->description)));

@@ -111,11 +111,19 @@ std::string small_text(const fitting::SmallEffect& small) {
       fmt::format("{} (BIC {:+.1f}, p {}; test throws, predicted before the throw: {}", small.id,
                   small.delta_bic, p_text(small.p_value), small.rms.in_words());
   if (small.any_pads) return fmt::format("evident, but no pads are without it: {})", numbers);
+  if (!predicts && !small.likelier)
+    return fmt::format("evident on the train throws alone, as the test throws are no likelier with it: {})",
+                       numbers);
   if (!predicts) return fmt::format("evident, but too small to matter: {})", numbers);
   return fmt::format(
       "evident on the train throws, but the test throws do not confirm it: {}, yet no channel's chi2 falls "
       "by what matters, and {})",
       numbers, small.likelier ? "another of their errors grows" : "their likelihood does not rise enough");
+}
+
+std::string withdrawn_text(const fitting::Imitation& one) {
+  return fmt::format("accepted at first, and withdrawn: {} (BIC {:+.1f}): {}", one.id, one.delta_bic,
+                     one.why);
 }
 
 std::string held_out_text(const fitting::Discovery& found) {

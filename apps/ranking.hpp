@@ -35,6 +35,8 @@ std::vector<std::string> separating_lines(const fitting::AcceptedEffect& effect)
 
 /// Evident, and yet no part of the answer: too small, or not confirmed by the held-out throws.
 std::string small_text(const fitting::SmallEffect& small);
+/// One that was accepted at first, with the reason why it was withdrawn.
+std::string withdrawn_text(const fitting::Imitation& one);
 
 /// Which throws were held out where the log does not say; empty where it does.
 std::string held_out_text(const fitting::Discovery& found);

@@ -9,6 +9,7 @@
 #include "fitting/discovery/misfit_rules.hpp"
 #include "fitting/discovery/pads_give.hpp"
 #include "fitting/discovery/wald.hpp"
+#include "fitting/discovery/where_acts.hpp"
 
 namespace unhand::fitting {
 
@@ -51,7 +52,7 @@ Improvement improvement(const FitResult& before, const FitResult& after,
     if (b.phase == Phase::grasped && !is_wrench(b.channel)) continue;  // no prediction is the better for it
     const double was = b.chi2_per_sample(), is = misfit_in(after.misfit, b.channel, b.phase);
     double needed = std::max({options.matters, kShare * (was - 1), 2 * std::sqrt(2.0 / b.n)});
-    if (is_wrench(b.channel)) {
+    if (is_wrench(b.channel) && !in_air(b.phase)) {
       const double from = b.phase == Phase::grasped ? 1 + options.matters : options.wrench_misfit;
       const bool settles = is_among(settled, b);
       if (was < from && !settles && !is_explained(was, is)) continue;

@@ -304,7 +304,9 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
   tell_after(stage, options, out);
   for (const AcceptedEffect& effect : out.effects)
     if (out.small && out.small->id == effect.id) out.small.reset();
-  tell_fates(out.effects, out.imitations, out.along, out.ranking);
+  std::vector<std::string> withdrawn;
+  for (const Imitation& one : out.imitations) withdrawn.push_back(one.id);
+  tell_fates(out.effects, withdrawn, out.along, out.ranking);
   out.unexplained = unexplained(stage, out, options);
   if (out.unexplained) out.small.reset();  // beside that, nobody knows what it imitates
   out.verdict = !out.effects.empty() ? Verdict::effect_found

@@ -26,10 +26,10 @@ struct DiscoverOptions {
   /// An effect matters if, on held-out throws, it takes at least this much off the χ² per sample of some
   /// channel of the motion in some phase (1 is the noise), and a tenth of the misfit there.
   double matters{0.5};
-  /// For the wrench channels: this much, and a quarter of the misfit there. Once the pads open it must also
-  /// have been so many times the noise, or vanish altogether: near the end of a release a patch slips in
-  /// parts, and no law of the catalogue follows its torque better. In the firm grasp only the body's inertia
-  /// speaks, and they are channels like others.
+  /// For the wrench channels while the object is held: this much, and a quarter of the misfit there. Once the
+  /// pads open it must also have been so many times the noise, or vanish altogether: near the end of a
+  /// release a patch slips in parts, and no law of the catalogue follows its torque better. In the firm grasp
+  /// only the body's inertia speaks, in flight only the sensor, and they are channels like others.
   double wrench_matters{1}, wrench_misfit{3};  ///< as above [χ² per sample]; times the noise
   /// Or if the held-out throws are predicted that much better before they are made: rms before over after.
   double prediction_matters{1.15};
@@ -138,8 +138,9 @@ struct AcceptedEffect {
 struct RmsOfBoth {
   double before{};  ///< by the first
   double after{};   ///< by the other
-  /// Whether it falls by a factor; whether it rises by one.
+  /// Whether it falls by a factor.
   bool falls_by(double factor) const { return before > factor * after; }
+  /// Whether it rises by one.
   bool rises_by(double factor) const { return after > factor * before; }
 };
 
@@ -252,6 +253,13 @@ struct AskedForm {
   bool unlisted{};                   ///< a term is no accepted effect's own form
 };
 
+/// An effect that was accepted at first, and withdrawn (withdrawal.hpp).
+struct Imitation {
+  std::string id;      ///< of the effect
+  std::string why;     ///< it was withdrawn, in words
+  double delta_bic{};  ///< with it against without, when it was
+};
+
 /// Where the residual first leaves the noise.
 struct FirstMisfit {
   bool any{false};                ///< false: it stays in the noise
@@ -266,7 +274,7 @@ struct Discovery {
   std::vector<std::string> held_out;    ///< throws that with_held_out chose; empty where the log says which
   std::string message;                  ///< why there is no answer (not_answered); else empty
   std::vector<AcceptedEffect> effects;  ///< in order of acceptance
-  std::vector<std::string> imitations;  ///< accepted at first, and withdrawn (withdrawal.hpp)
+  std::vector<Imitation> imitations;    ///< accepted at first, and withdrawn
   std::optional<AskedForm> asked;       ///< what the flights asked for when effects were questioned
   std::vector<std::string> along;       ///< effects that are fitted along as nuisances, too small to matter
   std::optional<SmallEffect> small;     ///< the most evident of what was too small to matter

@@ -9,7 +9,7 @@ namespace unhand::fitting {
 using experiment::Channel;
 
 bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options) {
-  const bool slips = is_wrench(m.channel) && m.phase != Phase::grasped;
+  const bool slips = is_wrench(m.channel) && m.phase == Phase::release;
   if (m.chi2_per_sample() <= (slips ? options.wrench_misfit : 1 + options.matters)) return false;
   return chi2_tail(m.chi2, m.n) < options.family_wise_level / kSeries;
 }
@@ -26,7 +26,7 @@ bool is_confirmed(const std::vector<ChannelMisfit>& other_half, const ChannelMis
 }
 
 double unexplained_from(Channel channel, Phase phase, bool elsewhere, const DiscoverOptions& options) {
-  const bool twice = phase == Phase::grasped ? elsewhere : is_wrench(channel);
+  const bool twice = phase == Phase::grasped ? elsewhere : is_wrench(channel) && phase == Phase::release;
   return (twice ? 2 : 1) * options.unexplained;
 }
 

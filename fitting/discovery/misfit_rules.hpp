@@ -15,8 +15,8 @@ inline constexpr double kConfirmedAt = 0.05;
 
 /// Whether a channel leaves anything to explain in a phase: more than `matters` beyond the noise, and more
 /// than chance leaves (χ², at the family-wise level shared among all channels and phases of a log). The
-/// wrench while the pads still slip or may: more than `wrench_misfit`. In the firm grasp no friction law
-/// takes part, only Newton and Euler: there it is a channel like any other.
+/// wrench while the pads slip or may: more than `wrench_misfit`. In the firm grasp no friction law takes
+/// part, only Newton and Euler, and in flight the sensor alone: there it is a channel like any other.
 bool is_misfit(const ChannelMisfit& m, const DiscoverOptions& options);
 
 /// Whether any channel does on the train throws.
@@ -27,7 +27,7 @@ bool leaves_misfit(const Stage& stage, const DiscoverOptions& options);
 bool is_confirmed(const std::vector<ChannelMisfit>& other_half, const ChannelMisfit& misfit);
 
 /// χ² per sample of a channel in a phase from where on something is missing there. Twice as much of a wrench
-/// once the pads open, most of whose variance is trust; and in the firm grasp where something is missing
+/// while the pads open, most of whose variance is trust; and in the firm grasp where something is missing
 /// `elsewhere`, for which the fit bends each throw's own grasp.
 double unexplained_from(experiment::Channel, Phase, bool elsewhere, const DiscoverOptions& options);
 

@@ -29,9 +29,10 @@ void find_other_names(const Footprints& f, const Eigen::VectorXd& contribution, 
   }
 }
 
-void name_imitation(const std::string& id, Discovery& out) {
-  if (std::find(out.imitations.begin(), out.imitations.end(), id) == out.imitations.end())
-    out.imitations.push_back(id);
+void name_imitation(Imitation one, Discovery& out) {
+  if (std::none_of(out.imitations.begin(), out.imitations.end(),
+                   [&](const Imitation& known) { return known.id == one.id; }))
+    out.imitations.push_back(std::move(one));
 }
 
 /// What was accepted in the company of something that has been withdrawn, another law included, must have its
@@ -41,7 +42,8 @@ void drop_without_evidence(Stage& stage, const DiscoverOptions& options, Discove
     const std::string id = out.effects[i].id;
     const Stage& less = without(stage, {id}, options);
     if (!less.solved() || stage.bic() - less.bic() <= kDeltaBic) continue;
-    name_imitation(id, out);
+    name_imitation(
+        {id, "there is no evidence for it without what has been withdrawn", stage.bic() - less.bic()}, out);
     out.effects.erase(out.effects.begin() + static_cast<std::ptrdiff_t>(i));
     stage = Stage(less);
   }
@@ -74,19 +76,24 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   FitResult counted = stage.fit;
   count_discrepancy(stage.problem, counted, options.fit.threads);
   const BothErrors errors = errors_of(stage, options.fit.threads);
-  std::vector<std::string> gone;
+  std::vector<std::string> gone, why;
   const std::optional<AskedForm> asked = form_asked_for(stage, out, options);
   if (asked) out.asked = asked;
   std::array<bool, 2> misled{};  // in the hand, in the air
   for (const AcceptedEffect& effect : out.effects) {
     const bool in_company = (misled[0] && acts(effect, false)) || (misled[1] && acts(effect, true));
     const bool last = effect.id == out.effects.back().id;
-    const bool here =
-        in_company || is_imitation(effect, stage, errors, counted, out, options) ||
-        (last && spoils(effect, stage, out, options)) ||
-        (asked && std::find(asked->outdone.begin(), asked->outdone.end(), effect.id) != asked->outdone.end());
-    for (const bool air : {false, true}) misled[air ? 1 : 0] |= here && acts(effect, air);
-    if (here) gone.push_back(effect.id);
+    std::string here;
+    if (in_company) here = "it was accepted in the company of one that is withdrawn";
+    if (here.empty()) here = why_imitation(effect, stage, errors, counted, out, options);
+    if (here.empty() && last && spoils(effect, stage, out, options))
+      here = "with it a channel is noisier than under the base model";
+    if (here.empty() && asked &&
+        std::find(asked->outdone.begin(), asked->outdone.end(), effect.id) != asked->outdone.end())
+      here = "another form describes the flights better";
+    if (here.empty()) continue;
+    for (const bool air : {false, true}) misled[air ? 1 : 0] |= acts(effect, air);
+    gone.push_back(effect.id), why.push_back(here);
   }
   if (gone.empty()) return counted;
   const Stage& less = without(stage, gone, options);
@@ -94,7 +101,10 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   std::erase_if(out.effects, [&](const AcceptedEffect& effect) {
     return std::find(gone.begin(), gone.end(), effect.id) != gone.end();
   });
-  for (const std::string& id : gone) name_imitation(id, out);
+  for (std::size_t k = 0; k < gone.size(); ++k) {
+    const Stage& alone = without(stage, {gone[k]}, options);
+    name_imitation({gone[k], why[k], alone.solved() ? stage.bic() - alone.bic() : 0}, out);
+  }
   stage = Stage(less);
   drop_without_evidence(stage, options, out);
   return withdraw(stage, options, out);

@@ -420,19 +420,23 @@ std::optional<Unexplained> left_in_one_half(const Stage& stage, const DiscoverOp
     const FitResult& half = train ? stage.fit : stage.held_out;
     const FitResult& other = train ? stage.held_out : stage.fit;
     for (const ChannelMisfit& m : half.misfit) {
-      if (!is_misfit(m, options) || is_confirmed(other.misfit, m)) continue;
+      const bool in_both = std::any_of(other.misfit.begin(), other.misfit.end(), [&](const ChannelMisfit& o) {
+        return o.channel == m.channel && o.phase == m.phase && is_left(o, options);
+      });
+      if (!is_misfit(m, options) || in_both) continue;
       if (m.chi2_per_sample() < kFar * unexplained_from(m.channel, m.phase, false, options)) continue;
       if (out && m.chi2_per_sample() <= out->chi2_per_dof) continue;
-      out = Unexplained{m.phase,
-                        m.channel,
-                        m.chi2_per_sample(),
-                        fmt::format("{} in {}: {:.3g} times the variance of the noise in the {} throws, "
-                                    "noise in the {} ones; nearly all of it is of {}: something is wrong "
-                                    "with them, or it shows in them alone",
-                                    to_string(m.channel), to_string(m.phase), m.chi2_per_sample(),
-                                    train ? "train" : "held-out", train ? "held-out" : "train",
-                                    held_by(stage, half, m, options.fit.threads)),
-                        {}};
+      out =
+          Unexplained{m.phase,
+                      m.channel,
+                      m.chi2_per_sample(),
+                      fmt::format("{} in {}: {:.3g} times the variance of the noise in the {} throws, {:.3g} "
+                                  "times in the {} ones; nearly all of it is of {}: something is wrong "
+                                  "with them, or it shows in them alone",
+                                  to_string(m.channel), to_string(m.phase), m.chi2_per_sample(),
+                                  train ? "train" : "held-out", misfit_in(other.misfit, m.channel, m.phase),
+                                  train ? "held-out" : "train", held_by(stage, half, m, options.fit.threads)),
+                      {}};
     }
   }
   return out;
@@ -471,7 +475,8 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
     if (!out) return left_in_own_unknowns(stage, options);
   }
   out->description += "; no effect of the catalogue explains it on held-out throws";
-  for (const auto& id : so_far.imitations) out->description += fmt::format("; {} imitates it", id);
+  for (const Imitation& one : so_far.imitations)
+    out->description += fmt::format("; {} imitates it ({})", one.id, one.why);
   if (so_far.effects.empty() && so_far.imitations.empty() && !too_small_by(so_far, out->channel))
     out->description += nearest_footprint(stage, so_far, options);
   out->missing = estimate_missing(stage, out->phase, options);

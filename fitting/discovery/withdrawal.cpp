@@ -1,5 +1,7 @@
 #include "fitting/discovery/withdrawal.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -30,16 +32,17 @@ bool is_shown_unloaded(Channel channel, const std::vector<ChannelMisfit>& base,
   });
 }
 
-/// Whether too much is left in the half of the throw where an effect acts, or in a channel that it
-/// `explains`, of what the base model's fit left there in the other throws (`other`: train against held-out
-/// ones) as well; and not next to nothing of what the base left in that phase's worst channel; for an effect
-/// on the pads, which flights and landings show as well, what is left in the hand, in any phase's. Readings
-/// of an unloaded sensor are of sensors alone, and where they have shown a sensor's effect, what is left of
-/// the same channel under load is something else's.
+/// The first channel in which too much is left, or none: in the half of the throw where an effect acts, or in
+/// a channel that it `explains`, of what the base model's fit left there in the other throws (`other`: train
+/// against held-out ones) as well; and not next to nothing of what the base left in that phase's worst
+/// channel; for an effect on the pads, which flights and landings show as well, what is left in the hand, in
+/// any phase's. Readings of an unloaded sensor are of sensors alone, and where they have shown a sensor's
+/// effect, what is left of the same channel under load is something else's.
 template <class Explains>
-bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisfit>& base,
-                     const std::vector<ChannelMisfit>& other, const std::vector<ChannelMisfit>& now,
-                     const DiscoverOptions& options, const Explains& explains) {
+const ChannelMisfit* too_much_left(const AcceptedEffect& effect, const std::vector<ChannelMisfit>& base,
+                                   const std::vector<ChannelMisfit>& other,
+                                   const std::vector<ChannelMisfit>& now, const DiscoverOptions& options,
+                                   const Explains& explains) {
   const bool sensor = is_of_sensor(effect.id);
   const auto answers_for = [&](const ChannelMisfit& m) {
     if (is_unloaded(m.channel, m.phase) ? !sensor
@@ -54,12 +57,13 @@ bool leaves_too_much(const AcceptedEffect& effect, const std::vector<ChannelMisf
       if (m.phase == phase || anywhere) out = std::max(out, m.chi2_per_sample());
     return out;
   };
-  return std::any_of(now.begin(), now.end(), [&](const ChannelMisfit& m) {
+  const auto found = std::find_if(now.begin(), now.end(), [&](const ChannelMisfit& m) {
     return is_left(m, options) && is_confirmed(other, m) &&
            m.chi2_per_sample() - 1 > std::max(kLeft * (misfit_in(base, m.channel, m.phase) - 1),
                                               kNextToNothing * (worst(m.phase) - 1)) &&
            answers_for(m);
   });
+  return found == now.end() ? nullptr : &*found;
 }
 
 /// Whether predictions lack so much of what the base model's lacked, in both halves of the throws.
@@ -93,8 +97,13 @@ bool explains_most(const ChannelMisfit& now, const std::vector<ChannelMisfit>& w
   return now.chi2_per_sample() - 1 < kExplains * (misfit_in(without, now.channel, now.phase) - 1);
 }
 
-bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const BothErrors& errors,
-                  const FitResult& counted, const Discovery& so_far, const DiscoverOptions& options) {
+std::string why_imitation(const AcceptedEffect& effect, const Stage& stage, const BothErrors& errors,
+                          const FitResult& counted, const Discovery& so_far, const DiscoverOptions& options) {
+  if (acts(effect, false) && leaves_lacking(errors, so_far, options) &&
+      (!is_of_sensor(effect.id) || bears_on_lacking(effect, stage, errors, so_far, options)))
+    return "it leaves what predictions lack";
+  if (!is_law(effect.id) && !is_told_from_none(counted, find_effect(effect.id), options.family_wise_level))
+    return "conditions and sensors do not agree on its size";
   // A sensor that is off is so in the hand and in the air, wherever that was seen most.
   const auto explains = [&](FitResult Stage::*half) {
     return [&, half](const ChannelMisfit& m) {
@@ -103,15 +112,17 @@ bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const BothEr
       return less.solved() && explains_most(m, (less.*half).misfit);
     };
   };
-  const bool lacks = acts(effect, false) && leaves_lacking(errors, so_far, options) &&
-                     (!is_of_sensor(effect.id) || bears_on_lacking(effect, stage, errors, so_far, options));
-  return lacks ||
-         (!is_law(effect.id) &&
-          !is_told_from_none(counted, find_effect(effect.id), options.family_wise_level)) ||
-         leaves_too_much(effect, so_far.base.misfit, so_far.base_test, stage.fit.misfit, options,
-                         explains(&Stage::fit)) ||
-         leaves_too_much(effect, so_far.base_test, so_far.base.misfit, stage.held_out.misfit, options,
-                         explains(&Stage::held_out));
+  const auto too_much = [&](FitResult Stage::*half, const std::vector<ChannelMisfit>& base,
+                            const std::vector<ChannelMisfit>& other, const char* throws) -> std::string {
+    const ChannelMisfit* left =
+        too_much_left(effect, base, other, (stage.*half).misfit, options, explains(half));
+    if (!left) return {};
+    return fmt::format("it leaves {} in {} at {:.3g} times the noise on the {} throws",
+                       to_string(left->channel), to_string(left->phase), left->chi2_per_sample(), throws);
+  };
+  const auto& base = so_far.base.misfit;
+  const std::string train = too_much(&Stage::fit, base, so_far.base_test, "train");
+  return train.empty() ? too_much(&Stage::held_out, so_far.base_test, base, "held-out") : train;
 }
 
 namespace {

@@ -2,6 +2,7 @@
 // docs/closing-the-loop.md. Internal to fitting.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "fitting/discovery/stage.hpp"
@@ -20,16 +21,15 @@ inline constexpr double kExplains = 0.5;
 /// Whether so little of the misfit `without` an effect is left, `now` that it is there.
 bool explains_most(const ChannelMisfit& now, const std::vector<ChannelMisfit>& without);
 
-/// An accepted effect that is the shadow of something else. Either conditions and blocks of sensors do not
-/// agree on its size, so that its interval, which counts that (`counted`), has none in it at the level that
-/// it was accepted at. Or it leaves too
-/// much where it acts: of the throws that it was fitted to, or of those that it has not seen. A sensor's
-/// effect, which is there in the hand and in the air, answers for every channel that it explains. Or, acting
-/// in the hand, it leaves predictions lacking (`errors` are the stage's) by too much of what the base's
-/// lacked; a sensor's effect only where they lack another amount without it, as most sensors take no part in
-/// what happens.
-bool is_imitation(const AcceptedEffect& effect, const Stage& stage, const BothErrors& errors,
-                  const FitResult& counted, const Discovery& so_far, const DiscoverOptions& options);
+/// Why an accepted effect is the shadow of something else, in words; empty where it is not. Either conditions
+/// and blocks of sensors do not agree on its size, so that its interval, which counts that (`counted`), has
+/// none in it at the level that it was accepted at. Or it leaves too much where it acts: of the throws that
+/// it was fitted to, or of those that it has not seen. A sensor's effect, which is there in the hand and in
+/// the air, answers for every channel that it explains. Or, acting in the hand, it leaves predictions lacking
+/// (`errors` are the stage's) by too much of what the base's lacked; a sensor's effect only where they lack
+/// another amount without it, as most sensors take no part in what happens.
+std::string why_imitation(const AcceptedEffect& effect, const Stage& stage, const BothErrors& errors,
+                          const FitResult& counted, const Discovery& so_far, const DiscoverOptions& options);
 
 /// By what share of its χ² an answer may leave a channel noisier than the base model did.
 inline constexpr double kNoisier = 0.25;

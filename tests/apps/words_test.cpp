@@ -77,6 +77,8 @@ TEST(SmallEffect, IsNotCalledSmallWhereHeldOutErrorsFall) {
   EXPECT_THAT(small_text(small), testing::EndsWith("and another of their errors grows)"));
   small.rms.position.after = 1.2e-3;
   EXPECT_THAT(small_text(small), testing::StartsWith("evident, but too small to matter: contact.viscous"));
+  small.likelier = false;
+  EXPECT_THAT(small_text(small), testing::StartsWith("evident on the train throws alone"));
   small.any_pads = true;
   EXPECT_THAT(small_text(small), testing::StartsWith("evident, but no pads are without it: "));
 }

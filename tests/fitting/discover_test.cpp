@@ -465,7 +465,10 @@ TEST(Discovery, WhatLeavesPredictionsOffByConditionIsWithdrawn) {
   design.effects = {{"contact.adhesion.f_adh", 0.2226}, {"contact.adhesion.parting_time", 0.003}};
   const Discovery found = found_in(experiment::generate_campaign(design, 3024), {"contact.adhesion"});
   EXPECT_EQ(named(found, "release.opening_delay"), nullptr);
-  EXPECT_EQ(found.imitations, std::vector<std::string>{"release.opening_delay"});
+  ASSERT_EQ(found.imitations.size(), 1u);
+  EXPECT_EQ(found.imitations[0].id, "release.opening_delay");
+  EXPECT_EQ(found.imitations[0].why, "it leaves what predictions lack");
+  EXPECT_LT(found.imitations[0].delta_bic, -10);
   ASSERT_TRUE(found.unexplained.has_value());
   EXPECT_EQ(found.unexplained->phase, Phase::release) << "flights lack no acceleration";
   EXPECT_TRUE(found.unexplained->description.starts_with("in release, seen in mocap."))
