@@ -1,7 +1,9 @@
 #include "experiment/glitches.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 #include "dynamics/third_difference.hpp"
 #include "dynamics/white_noise.hpp"
@@ -9,29 +11,79 @@
 namespace unhand::experiment {
 namespace {
 
-/// How far frame `member` of the four from `first` on lies off the parabola through the other three, and its
-/// σ for frames of σ = 1.
-struct Off {
-  double size{}, sigma{};
-};
-Off off_parabola(const std::vector<double>& times, const std::vector<double>& column, std::size_t first,
-                 std::size_t member) {
-  const double* t = &times[first];
-  const auto weight = dynamics::third_difference_weights({t[0], t[1], t[2], t[3]});
-  double sum = 0, squares = 0;
-  for (std::size_t i = 0; i < 4; ++i) sum += weight[i] * column[first + i], squares += weight[i] * weight[i];
-  const double own = weight[member];
-  return {sum / own, std::sqrt(squares) / std::abs(own)};
-}
+/// The third differences of one coordinate over the frames that are left, in units of their σ.
+class ThirdDifferences {
+ public:
+  ThirdDifferences(const std::vector<double>& times, const std::vector<double>& column, double sigma)
+      : times_(times), column_(column), sigma_(sigma) {
+    for (std::size_t i = 0; i < times.size(); ++i) left_.push_back(i);
+    work_out();
+  }
 
-bool is_glitch(const std::vector<double>& times, const std::vector<double>& column, double sigma,
-               std::size_t i) {
-  constexpr double kFar = 8;
-  const Off after = off_parabola(times, column, i - 1, 1), before = off_parabola(times, column, i - 2, 2);
-  const double x = std::abs(after.size), y = std::abs(before.size);
-  return x > kFar * after.sigma * sigma && y > kFar * before.sigma * sigma &&
-         std::abs(after.size - before.size) < 0.25 * (x + y);
-}
+  /// The frame that has most of a share in differences, where one is far off, or no noise over a gap that a
+  /// frame has left.
+  std::optional<std::size_t> worst() const {
+    std::vector<double> toward(left_.size(), 0.0), squares(left_.size(), 0.0);
+    bool any = false;
+    for (std::size_t k = 0; k < all_.size(); ++k) {
+      const bool over_a_gap = left_[k + 3] - left_[k] > 3;
+      any = any || std::abs(all_[k].size) > (over_a_gap ? kNoise : kFar);
+      for (std::size_t i = 0; i < 4; ++i) {
+        toward[k + i] += all_[k].weight[i] * all_[k].size;
+        squares[k + i] += all_[k].weight[i] * all_[k].weight[i];
+      }
+    }
+    if (!any) return std::nullopt;
+    std::size_t out = 0;
+    double most = 0;
+    for (std::size_t i = 0; i < left_.size(); ++i)
+      if (const double explains = toward[i] * toward[i] / squares[i]; explains > most)
+        most = explains, out = left_[i];
+    return out;
+  }
+  void remove(std::size_t frame) {
+    std::erase(left_, frame);
+    work_out();
+  }
+  /// Whether every difference that spans a frame's time is noise.
+  bool is_smooth_about(std::size_t frame) const {
+    for (std::size_t k = 0; k < all_.size(); ++k) {
+      // At an end, the nearest ones.
+      const bool spans = (k == 0 || times_[left_[k]] <= times_[frame]) &&
+                         (k + 1 == all_.size() || times_[left_[k + 3]] >= times_[frame]);
+      if (spans && std::abs(all_[k].size) > kNoise) return false;
+    }
+    return true;
+  }
+  std::size_t frames() const { return left_.size(); }
+
+ private:
+  static constexpr double kFar = 8, kNoise = 5;  // σ
+  struct Difference {
+    std::array<double, 4> weight{};  // of its frames, for σ = 1
+    double size{};                   // [σ]
+  };
+
+  void work_out() {
+    all_.clear();
+    for (std::size_t k = 0; k + 3 < left_.size(); ++k) {
+      const auto at = [&](std::size_t i) { return times_[left_[k + i]]; };
+      Difference one{dynamics::third_difference_weights({at(0), at(1), at(2), at(3)}), 0};
+      double squares = 0;
+      for (const double w : one.weight) squares += w * w;
+      for (std::size_t i = 0; i < 4; ++i) {
+        one.weight[i] /= std::sqrt(squares);
+        one.size += one.weight[i] * column_[left_[k + i]] / sigma_;
+      }
+      all_.push_back(one);
+    }
+  }
+
+  const std::vector<double>&times_, &column_;
+  double sigma_;
+  std::vector<std::size_t> left_;
+  std::vector<Difference> all_;
+};
 
 /// 1 σ by frame, of what differs from frame to frame; 0 of too few.
 double scatter_of(const std::vector<double>& column) {
@@ -68,10 +120,21 @@ std::size_t mark_glitches(datasets::MocapLog& mocap) {
 
 std::vector<bool> glitches(const std::vector<double>& times, std::span<const std::vector<double>> columns,
                            std::span<const double> sigma) {
+  constexpr std::size_t kFewest = 5, kShare = 10;  // frames that stay; at most a tenth goes
   std::vector<bool> out(times.size(), false);
-  for (std::size_t c = 0; c < columns.size(); ++c)
-    for (std::size_t i = 2; sigma[c] > 0 && i + 2 < times.size(); ++i)
-      if (is_glitch(times, columns[c], sigma[c], i)) out[i] = true;
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    if (!(sigma[c] > 0)) continue;
+    ThirdDifferences differences(times, columns[c], sigma[c]);
+    std::vector<std::size_t> removed;
+    while (removed.size() < 1 + times.size() / kShare && differences.frames() > kFewest) {
+      const auto frame = differences.worst();
+      if (!frame) break;
+      differences.remove(*frame);
+      removed.push_back(*frame);
+    }
+    for (const std::size_t frame : removed)
+      if (differences.is_smooth_about(frame)) out[frame] = true;
+  }
   return out;
 }
 

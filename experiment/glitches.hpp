@@ -8,10 +8,10 @@
 
 namespace unhand::experiment {
 
-/// Which frames lie, in one of the `columns` (tracked coordinates by frame), off the parabolas through both
-/// sets of three neighbours around them, by more than eight of their sigmas and by the same distance: a force
-/// that sets in puts them off to both sides. Not the first and the last two. `times` [s] increase; `sigma`: 1
-/// σ of a column.
+/// Which frames lie, in one of the `columns` (tracked coordinates by frame), so far off the parabolas through
+/// their neighbours that a third difference is more than eight of its sigmas, and leave a smooth motion
+/// (five) behind when they are taken out, worst first, at most a tenth: what a force that sets in or an
+/// impact does is smooth without no frame. `times` [s] increase; `sigma`: 1 σ of a column.
 std::vector<bool> glitches(const std::vector<double>& times, std::span<const std::vector<double>> columns,
                            std::span<const double> sigma);
 

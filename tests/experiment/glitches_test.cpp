@@ -33,6 +33,31 @@ TEST(Glitches, AFrameElsewhereIsOneAndWhatForcesDoIsNot) {
   EXPECT_TRUE(off[20] && off[50]);
 }
 
+// Side by side, at both ends, and beside frames that were lost; but not the frames about an impact.
+TEST(Glitches, NeedNoGoodNeighbours) {
+  constexpr double kNoise = 1e-4, kRate = 120;
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  std::vector<double> times;
+  std::vector<std::vector<double>> columns(2);
+  for (int i = 0; i < 100; ++i) {
+    if (i % 17 == 5) continue;
+    const double t = i / kRate;
+    times.push_back(t);
+    columns[0].push_back(3 * t - 5 * t * t + kNoise * normal(random));
+    columns[1].push_back(std::abs(t - 0.4) + kNoise * normal(random));  // bounces
+  }
+  const std::array sigma{kNoise, kNoise};
+  EXPECT_EQ(glitches(times, columns, sigma), std::vector<bool>(times.size(), false));
+  const std::array<std::size_t, 7> wild{0, 5, 30, 31, 60, times.size() - 2, times.size() - 1};
+  double by = 0.02;
+  for (const std::size_t i : wild) columns[0][i] += by, by *= -0.8;
+  std::vector<bool> expected(times.size(), false);
+  for (const std::size_t i : wild) expected[i] = true;
+  const auto off = glitches(times, columns, sigma);
+  for (std::size_t i = 0; i < times.size(); ++i) EXPECT_EQ(off[i], expected[i]) << i << " of " << times.size();
+}
+
 TEST(Glitches, OfACampaignAreFoundAndNoOthers) {
   auto log = generate_campaign(campaign_design("quick12"), 4);
   EXPECT_EQ(mark_glitches(log), 0u);
