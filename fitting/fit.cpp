@@ -12,6 +12,7 @@
 #include "dynamics/effect.hpp"
 #include "experiment/campaign_effects.hpp"
 #include "fitting/fit_rounds.hpp"
+#include "fitting/give_start.hpp"
 #include "fitting/misfit.hpp"
 #include "fitting/profile.hpp"
 
@@ -268,9 +269,13 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
     if (!is_stuck()) break;
     try_from(start(share));
   }
+  const auto& effects = problem.options().effects;
+  if (std::find(effects.begin(), effects.end(), "contact.pad_compliance") != effects.end() &&
+      out.is_answer() && !options.all_fixed)
+    if (const auto other = likelier_give(problem, out.values(), out.throws, options)) try_from(*other);
+  if (effects.size() < 2) return out;
   // Several effects may stand for each other, each with a minimum of its own in which it does most.
   constexpr double kMost = 4, kLeast = 0.1;  // typical steps
-  if (problem.options().effects.size() < 2) return out;
   for (const std::size_t k : effect_sizes(problem, false)) {
     std::vector<double> values = start(kLeast);
     values[k] =

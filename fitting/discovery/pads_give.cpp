@@ -1,32 +1,27 @@
 #include "fitting/discovery/pads_give.hpp"
 
 #include <algorithm>
-#include <limits>
 
 #include "contact/registry.hpp"
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/misfit_rules.hpp"
 #include "fitting/discovery/wald.hpp"
 #include "fitting/discovery/where_acts.hpp"
+#include "fitting/give_start.hpp"
 
 namespace unhand::fitting {
 
 namespace {
 
 constexpr const char* kCompliance = "contact.pad_compliance.compliance";
-constexpr const char* kLossTime = "contact.pad_compliance.loss_time";
 constexpr double kStart = 3e-6;  // of a give [m]
 
 bool has(const std::vector<std::string>& ids, const std::string& id) {
   return std::find(ids.begin(), ids.end(), id) != ids.end();
 }
 
-/// The give per unit of the effect [N]: the friction limit of all pads at the campaign's grip force.
 double give_per_compliance(const Stage& stage) {
-  double mu = 0.5;
-  for (const auto& u : stage.fit.campaign)
-    if (u.unknown.name == "mu") mu = u.value;
-  return stage.problem.model().pads * mu * stage.problem.model().reference_force;
+  return give_per_compliance(stage.problem, stage.fit.values());
 }
 
 /// The give's footprint at a stage without one.
@@ -69,54 +64,6 @@ std::vector<std::string> with_give(const CampaignProblem& problem, const std::st
   return out;
 }
 
-namespace {
-
-/// Some of the throws that the stage is fitted to, spread over the log.
-std::vector<bool> some_throws(const Stage& stage) {
-  constexpr std::size_t kSome = 12;
-  const auto& throws = stage.fit.throws;
-  const auto used = static_cast<std::size_t>(
-      std::count_if(throws.begin(), throws.end(), [](const ThrowFit& t) { return t.used; }));
-  const std::size_t every = std::max<std::size_t>(1, used / kSome);
-  std::vector<bool> out;
-  std::size_t n = 0;
-  for (const ThrowFit& one : throws) out.push_back(one.used && n++ % every == 0);
-  return out;
-}
-
-/// Pads that ring have a minimum at every give whose pitch is off by a beat more; damped ones have one. Of
-/// such gives and loss times, those at which some throws are likeliest while their own unknowns alone follow.
-std::vector<double> likeliest_give(const Stage& stage, const CampaignProblem& problem,
-                                   std::vector<double> start, const DiscoverOptions& options) {
-  struct Give {
-    double length, loss;  // [m], [s]
-  };
-  std::vector<Give> gives{{1e-6, 5e-3}, {3e-6, 5e-3}, {9e-6, 5e-3}};
-  constexpr double kLeast = 0.7e-6, kMost = 16e-6, kFinely = 1.3, kRings = 1e-3;
-  for (double length = kLeast; length < kMost; length *= kFinely) gives.push_back({length, kRings});
-
-  FitOptions held = options.fit;
-  held.throws = some_throws(stage);
-  held.weigh = Weigh::variances;
-  held.all_fixed = true;
-  held.rounds = 1, held.iterations = 3;
-  std::vector<double> best = start;
-  double least = std::numeric_limits<double>::infinity();
-  for (const Give& give : gives) {
-    for (std::size_t k = 0; k < start.size(); ++k) {
-      const std::string& name = problem.campaign()[k].name;
-      if (name == kCompliance) start[k] = give.length / give_per_compliance(stage);
-      if (name == kLossTime) start[k] = give.loss;
-    }
-    held.start = start;
-    const FitResult fitted = fit(problem, held);
-    if (fitted.is_answer() && fitted.deviance() < least) least = fitted.deviance(), best = start;
-  }
-  return best;
-}
-
-}  // namespace
-
 void start_give(const Stage& stage, const CampaignProblem& problem, std::vector<double>& start) {
   const std::vector<double> typical = problem.start();
   for (std::size_t k = 0; k < start.size(); ++k) {
@@ -145,7 +92,7 @@ void fit_give_along(Stage& stage, const DiscoverOptions& options) {
       solve_train(next, options, std::move(asked));
     }
   }
-  start = likeliest_give(stage, next.problem, start, options);
+  if (auto likelier = likelier_give(next.problem, start, stage.fit.throws, options.fit)) start = *likelier;
   if (Stage other{next.problem, {}, {}, stage.ids};
       solve_train(other, options, std::move(start)) &&
       (!next.is_fitted() || other.fit.deviance() < next.fit.deviance()))

@@ -55,7 +55,8 @@ TEST(Glitches, NeedNoGoodNeighbours) {
   std::vector<bool> expected(times.size(), false);
   for (const std::size_t i : wild) expected[i] = true;
   const auto off = glitches(times, columns, sigma);
-  for (std::size_t i = 0; i < times.size(); ++i) EXPECT_EQ(off[i], expected[i]) << i << " of " << times.size();
+  for (std::size_t i = 0; i < times.size(); ++i)
+    EXPECT_EQ(off[i], expected[i]) << i << " of " << times.size();
 }
 
 TEST(Glitches, OfACampaignAreFoundAndNoOthers) {

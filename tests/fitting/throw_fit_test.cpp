@@ -541,6 +541,25 @@ TEST(ThrowFit, OfSeveralMinimaTheLikeliestIsTheAnswer) {
   EXPECT_NEAR(value(best, "contact.pad_compliance.compliance"), 1.5e-7, 0.2e-7);
 }
 
+// Pads that ring: a fit that begins at another pitch ends there, at 4.2e-7 m/N here with an interval of a
+// tenth.
+TEST(ThrowFit, PadsThatRingAreFoundAtTheirPitch) {
+  experiment::CampaignDesign design = experiment::random_campaign(4);
+  design.effects = {{"contact.pad_compliance.compliance", 1.2e-7},
+                    {"contact.pad_compliance.loss_time", 0.001}};
+  CampaignOptions options;
+  options.effects = {"contact.pad_compliance"};
+  options.integrator.tolerances = {1e-5, 1e-8};
+  const FitResult best = fit(CampaignProblem(experiment::generate_campaign(design, 4), "synthetic", options));
+  const auto value = [&](const std::string& name) {
+    for (const auto& u : best.campaign)
+      if (u.unknown.name == "contact.pad_compliance." + name) return u.value;
+    return std::nan("");
+  };
+  EXPECT_NEAR(value("compliance"), 1.2e-7, 0.03e-7);
+  EXPECT_NEAR(value("loss_time"), 0.001, 0.0001);
+}
+
 TEST(ThrowFit, UnknownsAtTheirBoundsDoNotStopTheOthers) {
   // Pads that part later than the force says would have the smoothing's deviation beyond its range.
   auto design = small_design(kLaw);
