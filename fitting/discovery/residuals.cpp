@@ -61,17 +61,41 @@ std::vector<ResidualBin> residual_over_time(const CampaignProblem& problem, cons
   return out;
 }
 
-StateSeries states_of(const CampaignThrow& thrown, const Eigen::VectorXd& residual) {
+namespace {
+
+/// The value at `k` of the line through the eleven samples around it.
+double smoothed(const std::vector<double>& time, const std::vector<std::array<double, 3>>& value,
+                std::size_t component, std::size_t k) {
+  constexpr std::size_t kHalf = 5;
+  const std::size_t begin = k > kHalf ? k - kHalf : 0, end = std::min(time.size(), k + kHalf + 1);
+  double n = 0, t = 0, x = 0, tt = 0, tx = 0;
+  for (std::size_t i = begin; i < end; ++i) {
+    const double dt = time[i] - time[k], v = value[i][component];
+    n += 1, t += dt, x += v, tt += dt * dt, tx += dt * v;
+  }
+  const double spread = n * tt - t * t;
+  return spread > 0 ? (tt * x - t * tx) / spread : x / n;
+}
+
+}  // namespace
+
+StateSeries states_of(const CampaignThrow& thrown, const Eigen::VectorXd& residual, MotionOf motion) {
   StateSeries out;
   const auto& all = thrown.observed.all;
-  const auto predicted = [&](std::size_t i) {
-    return all[i].value + residual[static_cast<Eigen::Index>(i)] * all[i].sigma;
-  };
+  std::vector<std::array<double, 3>> error;
   for (std::size_t i = 0; i + 2 < all.size(); ++i) {
     if (all[i].channel != Channel::mocap_x) continue;
     out.time.push_back(all[i].time);
-    out.pose.push_back({predicted(i), predicted(i + 1), predicted(i + 2)});
+    auto& e = error.emplace_back();
+    auto& predicted = out.pose.emplace_back();
+    for (std::size_t c = 0; c < 3; ++c) {
+      e[c] = residual[static_cast<Eigen::Index>(i + c)] * all[i + c].sigma;
+      predicted[c] = all[i + c].value + e[c];
+    }
   }
+  if (motion == MotionOf::measurement)
+    for (std::size_t k = 0; k < out.time.size(); ++k)
+      for (std::size_t c = 0; c < 3; ++c) out.pose[k][c] -= smoothed(out.time, error, c, k);
   const std::size_t n = out.time.size();
   if (n < 2) return {};
   for (std::size_t k = 0; k < n; ++k) {
@@ -104,7 +128,7 @@ std::vector<ChannelStructure> structures(const CampaignProblem& problem, const F
     if (residuals[i].size() == 0) continue;
     const CampaignThrow& thrown = problem.throws()[i];
     const double release = thrown.release_or(fit.throws[i].detach);
-    const StateSeries states = states_of(thrown, residuals[i]);
+    const StateSeries states = states_of(thrown, residuals[i], MotionOf::model);
     const int condition =
         conditions.try_emplace(thrown.prepared.experiment(), static_cast<int>(conditions.size()))
             .first->second;

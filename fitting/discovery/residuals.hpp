@@ -33,8 +33,16 @@ std::vector<Eigen::VectorXd> residuals_of(const CampaignProblem& problem, const 
 std::vector<ResidualBin> residual_over_time(const CampaignProblem& problem, const FitResult& fit,
                                             const std::vector<Eigen::VectorXd>& residuals);
 
-/// The predicted motion of the tracked frame where motion capture saw it, by differences of its samples, and
-/// the normal force. Empty without motion capture.
+/// Whose motion.
+enum class MotionOf {
+  model,  ///< as predicted
+  /// The model's less its residual, smoothed over eleven frames: what depends on the motion, and is missing
+  /// in the model, would be too small by the model's.
+  measurement,
+};
+
+/// The motion of the tracked frame where motion capture saw it, by differences of its samples, and the normal
+/// force. Empty without motion capture.
 struct StateSeries {
   std::vector<double> time;                 ///< as in the log [s]
   std::vector<ResidualTrace::State> state;  ///< one per time
@@ -43,7 +51,7 @@ struct StateSeries {
   ResidualTrace::State at(const CampaignThrow& thrown, double time) const;
 };
 /// The states of one throw; `residual` is its own, of residuals_of.
-StateSeries states_of(const CampaignThrow& thrown, const Eigen::VectorXd& residual);
+StateSeries states_of(const CampaignThrow& thrown, const Eigen::VectorXd& residual, MotionOf motion);
 
 /// By channel and phase, against condition, time from the release, and state (speed, spin, and until the
 /// release the normal force). In the order of the phases.

@@ -20,7 +20,7 @@ int component_of(const experiment::Observation& o, Channel first) {
 ResidualTrace trace_of(const CampaignThrow& thrown, const Eigen::VectorXd& residual, double release,
                        Channel first, Phase phase) {
   ResidualTrace out;
-  const StateSeries states = states_of(thrown, residual);
+  const StateSeries states = states_of(thrown, residual, MotionOf::measurement);
   const auto [origin, scale] = phase_clock(thrown, release, phase);
   for (std::size_t j = 0; j < thrown.observed.all.size(); ++j) {
     const auto& o = thrown.observed.all[j];

@@ -80,7 +80,7 @@ OutcomeSquares squares_with(const CampaignProblem& problem, const CampaignThrow&
                             const Linearisation& predicted, Phase phase, const Missing& missing) {
   OutcomeSquares out;
   const Eigen::VectorXd& residual = predicted.residual;
-  const StateSeries states = states_of(thrown, residual);
+  const StateSeries states = states_of(thrown, residual, MotionOf::model);
   if (states.time.empty()) return out;  // where it moved, and how fast, is not known
   const double release = thrown.release_or(predicted.detach), g = -thrown.prepared.gravity.z;
   double end = release;

@@ -12,6 +12,8 @@
 #include "experiment/random_stream.hpp"
 #include "experiment/throw_setup.hpp"
 #include "fitting/discovery/missing_force.hpp"
+#include "fitting/discovery/residuals.hpp"
+#include "tests/fitting/loop_campaign.hpp"
 
 namespace unhand::fitting {
 namespace {
@@ -234,6 +236,29 @@ TEST(MissingForce, TheFormsOfEffectsAreFound) {
     EXPECT_EQ(candidate.terms.front().form, effect.form) << effect.id;
   }
   EXPECT_GE(forms, 5);  // drag, lift, tilt, scale, centre of mass
+}
+
+// A model that is too slow by 0.02 m/s and 0.3 rad/s: what is missing depends on the motion that was
+// measured.
+TEST(States, OfTheMeasurementAreThoseThatTheModelMisses) {
+  const CampaignProblem problem(support::loop_campaign({}), "synthetic", {});
+  const CampaignThrow& thrown = problem.throws().front();
+  const auto& all = thrown.observed.all;
+  Eigen::VectorXd residual = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(all.size()));
+  for (std::size_t j = 0; j < all.size(); ++j) {
+    const double rate = all[j].channel == experiment::Channel::mocap_x       ? -0.02
+                        : all[j].channel == experiment::Channel::mocap_theta ? -0.3
+                                                                             : 0;
+    residual[static_cast<Eigen::Index>(j)] = rate * all[j].time / all[j].sigma;
+  }
+  const StateSeries model = states_of(thrown, residual, MotionOf::model),
+                    measured = states_of(thrown, residual, MotionOf::measurement);
+  ASSERT_GT(model.time.size(), 20u);
+  for (std::size_t k = 0; k < model.time.size(); ++k) {
+    EXPECT_NEAR(measured.state[k].vx - model.state[k].vx, 0.02, 1e-9) << k;
+    EXPECT_NEAR(measured.state[k].omega - model.state[k].omega, 0.3, 1e-9) << k;
+    EXPECT_NEAR(measured.state[k].vz - model.state[k].vz, 0, 1e-9) << k;
+  }
 }
 
 TEST(MissingForce, NoiseHasNoCandidate) {
