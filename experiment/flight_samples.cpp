@@ -116,7 +116,9 @@ std::size_t remove_glitches(FlightSamples& s) {
   }
   std::vector<bool> good = glitches(s.times, columns, sigma);
   good.flip();
-  if (good.size() > 2) good[good.size() - 3] = true;  // the last frames may have met the ground
+  // The last frames may have met the ground.
+  std::fill(good.end() - static_cast<std::ptrdiff_t>(std::min<std::size_t>(3, good.size())), good.end(),
+            true);
   const auto removed = static_cast<std::size_t>(std::count(good.begin(), good.end(), false));
   if (removed == 0) return 0;
   keep(s.times, good);
