@@ -454,8 +454,8 @@ std::vector<ChannelMisfit> left_by_answer(const Stage& stage, const Discovery& s
   std::vector<ChannelMisfit> out;
   for (const ChannelMisfit& m : stage.fit.misfit) {
     const double base = misfit_in(so_far.base.misfit, m.channel, m.phase);
-    const double limit = std::max(unexplained_from(m.channel, m.phase, elsewhere, options),
-                                  stage.ids.empty() ? 0.0 : 1 + rest_of(stage) * (base - 1));
+    const double limit =
+        std::max(unexplained_from(m.channel, m.phase, elsewhere, options), 1 + rest_of(stage) * (base - 1));
     if (is_misfit(m, options) && m.chi2_per_sample() >= limit && is_confirmed(stage.held_out.misfit, m))
       out.push_back(m);
   }
