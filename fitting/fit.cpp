@@ -271,7 +271,7 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
   }
   const auto& effects = problem.options().effects;
   if (std::find(effects.begin(), effects.end(), "contact.pad_compliance") != effects.end() &&
-      out.is_answer() && !options.all_fixed)
+      out.is_answer() && !options.all_fixed && options.fixed.empty())
     if (const auto other = likelier_give(problem, out.values(), out.throws, options)) try_from(*other);
   if (effects.size() < 2) return out;
   // Several effects may stand for each other, each with a minimum of its own in which it does most.
