@@ -165,15 +165,16 @@ void discover(const DiscoverOptions& options, const Parser& parser) {
     throw Unanswered(fmt::format("{}: {}", options.log, found.message));
 
   const auto& problem = *found.problem;
-  const auto errors =
-      comparison_of(problem, found.final, predict_throws(problem, found.final, {false, options.threads}));
+  const auto errors = comparison_of(problem, found.after.fit,
+                                    predict_throws(problem, found.after.fit, {false, options.threads}));
   tell_weak_grip(errors);
 
   Outputs outputs{{options.log}};
   const Json json = discovery_json(found, options.log, options.model);
   if (!options.json.empty()) outputs.json(options.json, json);
   if (!options.card.empty())
-    outputs.text(options.card, datasets::to_json(card_of(problem, found.final, errors, options.log, log)));
+    outputs.text(options.card,
+                 datasets::to_json(card_of(problem, found.after.fit, errors, options.log, log)));
   if (!options.report.empty())
     write_discovery_report(found, options.log, origin_text(log), command, json,
                            outputs.directory(options.report));
@@ -221,8 +222,8 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
     if (found.unexplained->missing) out["unexplained"]["missing"] = missing_json(*found.unexplained->missing);
   }
   out["error"] = {
-      {"before", {{"train", errors_json(found.before_train)}, {"test", errors_json(found.before_test)}}},
-      {"after", {{"train", errors_json(found.after_train)}, {"test", errors_json(found.after_test)}}}};
+      {"before", {{"train", errors_json(found.before.train)}, {"test", errors_json(found.before.test)}}},
+      {"after", {{"train", errors_json(found.after.train)}, {"test", errors_json(found.after.test)}}}};
   out["ranking"] = ranking_json(found.ranking);
   out["first_misfit"] = nullptr;
   if (found.first.any)
@@ -230,14 +231,16 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
                            {"channel", to_string(found.first.channel)},
                            {"chi2_per_sample", number(found.first.chi2_per_sample)}};
   out["misfit"] = {
-      {"before", {{"train", misfit_json(found.base.misfit)}, {"test", misfit_json(found.base_test)}}},
-      {"after", {{"train", misfit_json(found.final.misfit)}, {"test", misfit_json(found.final_test)}}}};
-  out["structure"] = {{"before", structure_json(found.structure_before)},
-                      {"after", structure_json(found.structure_after)}};
+      {"before",
+       {{"train", misfit_json(found.before.fit.misfit)}, {"test", misfit_json(found.before.held_out)}}},
+      {"after",
+       {{"train", misfit_json(found.after.fit.misfit)}, {"test", misfit_json(found.after.held_out)}}}};
+  out["structure"] = {{"before", structure_json(found.before.structure)},
+                      {"after", structure_json(found.after.structure)}};
   if (!found.held_out.empty()) out["held_out"] = found.held_out;
   out["model"] = found.model;
   out["parameters"] = Json::object();
-  for (const auto& u : found.final.campaign)
+  for (const auto& u : found.after.fit.campaign)
     out["parameters"][u.unknown.name] = {
         {"value", number(u.value)}, {"sigma", number(u.sigma)}, {"unit", u.unknown.unit}};
   return out;
@@ -251,7 +254,7 @@ std::string discovery_text(const Discovery& found, const std::string& log, const
         to_string(found.first.phase), to_string(found.first.channel), found.first.chi2_per_sample);
   else
     out += "no channel of the train throws leaves a misfit that asks for an explanation\n";
-  for (const auto& s : found.structure_before)
+  for (const auto& s : found.before.structure)
     if (found.first.any && s.phase == found.first.phase && s.channel == found.first.channel)
       out += fmt::format("  there: {}\n", s.structure.in_words());
   for (const auto& effect : found.effects) {
@@ -259,7 +262,7 @@ std::string discovery_text(const Discovery& found, const std::string& log, const
     for (const auto& line : separating_lines(effect)) out += fmt::format("  {}\n", line);
   }
   if (const std::string note = gain_text(found.effects); !note.empty()) out += "\n" + note + "\n";
-  for (const auto& id : found.along) out += fmt::format("\n{}\n", along_text(id, found.final));
+  for (const auto& id : found.along) out += fmt::format("\n{}\n", along_text(id, found.after.fit));
   if (found.small) out += fmt::format("\n{}\n", small_text(*found.small));
   if (!found.unexplained)  // which names them
     for (const auto& one : found.imitations) out += fmt::format("\n{}\n", withdrawn_text(one));

@@ -27,13 +27,13 @@ NamedCurves curves_of(const std::string& name, const std::vector<fitting::Residu
 
 /// Residuals over time, before and after, a panel for each channel that has any.
 Figure residual_figure(const Discovery& found) {
-  const auto channels = curves_of("before", found.residual_before).channels;
-  const auto after = curves_of("after", found.residual_after);
+  const auto channels = curves_of("before", found.before.residual).channels;
+  const auto after = curves_of("after", found.after.residual);
   const int columns = channels.size() > 1 ? 2 : 1;
   const int rows = (static_cast<int>(channels.size()) + columns - 1) / columns;
   Figure figure{"residual", 17, 1.8 + 3.9 * rows, {}, {}};
   double low = 0, high = 0.05;
-  for (const auto& bin : found.residual_before)
+  for (const auto& bin : found.before.residual)
     low = std::min(low, bin.time), high = std::max(high, bin.time);
   const double margin = 0.02 * (high - low);  // for the markers at the ends
   low -= margin, high += margin;
@@ -66,7 +66,7 @@ Figure residual_figure(const Discovery& found) {
 }
 
 Figure footprints_of(const Discovery& found) {
-  std::vector<NamedCurves> all{curves_of("residual of the base model", found.residual_before)};
+  std::vector<NamedCurves> all{curves_of("residual of the base model", found.before.residual)};
   for (const auto& footprint : found.footprints) all.push_back(curves_of(footprint.id, footprint.bins));
   return footprint_figure(all, "time from release [s]");
 }
@@ -120,9 +120,9 @@ Figure missing_figure(const fitting::MissingEstimate& missing) {
 
 Table structure_table(const Discovery& found) {
   Table table{{"phase", "channel", "before", "after"}, {}, 2};
-  for (const auto& before : found.structure_before) {
+  for (const auto& before : found.before.structure) {
     std::string after = "-";
-    for (const auto& s : found.structure_after)
+    for (const auto& s : found.after.structure)
       if (s.phase == before.phase && s.channel == before.channel) after = s.structure.in_words();
     table.rows.push_back({std::string(to_string(before.phase)), std::string(to_string(before.channel)),
                           before.structure.in_words(), found.adds_nothing() ? "" : after});
@@ -133,19 +133,19 @@ Table structure_table(const Discovery& found) {
 
 /// The errors before and after, by the names of their rows.
 std::vector<std::pair<const char*, OutcomeErrors>> errors_of(const Discovery& found) {
-  return {{"before, train", found.before_train},
-          {"before, test", found.before_test},
-          {"after, train", found.after_train},
-          {"after, test", found.after_test}};
+  return {{"before, train", found.before.train},
+          {"before, test", found.before.test},
+          {"after, train", found.after.train},
+          {"after, test", found.after.test}};
 }
 
 /// Whether the errors go with the condition: rms over what repetitions scatter by, outcome by outcome.
 Table lack_table(const Discovery& found) {
   Table table{{"prediction errors over repetitions' scatter"}, {}, 1};
-  for (const auto& lack : found.before_train.lacks) table.header.push_back(to_string(lack.outcome));
+  for (const auto& lack : found.before.train.lacks) table.header.push_back(to_string(lack.outcome));
   for (const auto& [name, e] : errors_of(found)) {
     table.rows.push_back({name});
-    for (const auto& column : found.before_train.lacks) {
+    for (const auto& column : found.before.train.lacks) {
       std::string cell = "-";
       for (const auto& [outcome, fit, resolution] : e.lacks)
         if (outcome == column.outcome && fit.repetitions > 0)
@@ -165,10 +165,11 @@ Table misfit_table(const Discovery& found) {
         return fmt::format("{:.3f}", m.chi2_per_sample());
     return std::string("-");
   };
-  for (const auto& m : found.base.misfit)
+  for (const auto& m : found.before.fit.misfit)
     table.rows.push_back({std::string(to_string(m.phase)), std::string(to_string(m.channel)),
-                          std::to_string(m.n), find(found.base.misfit, m), find(found.final.misfit, m),
-                          find(found.base_test, m), find(found.final_test, m)});
+                          std::to_string(m.n), find(found.before.fit.misfit, m),
+                          find(found.after.fit.misfit, m), find(found.before.held_out, m),
+                          find(found.after.held_out, m)});
   return table;
 }
 
@@ -209,7 +210,7 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
                             const std::filesystem::path& directory) {
   const Figure residual = residual_figure(found), ranking = ranking_figure(found.ranking, found.effects);
   const std::string about = log + ": " + origin;
-  const bool over_time = !found.residual_before.empty();
+  const bool over_time = !found.before.residual.empty();
   if (over_time) draw(residual, directory, about);
   draw(ranking, directory, about);
   if (over_time) draw(footprints_of(found), directory, about);
@@ -223,7 +224,7 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
   if (const std::string note = gain_text(found.effects); !note.empty())
     answer += fmt::format("<p>{}</p>\n", escaped(note));
   for (const auto& id : found.along)
-    answer += fmt::format("<p>{}.</p>\n", escaped(along_text(id, found.final)));
+    answer += fmt::format("<p>{}.</p>\n", escaped(along_text(id, found.after.fit)));
   if (found.small) answer += fmt::format("<p>{}.</p>\n", escaped(small_text(*found.small)));
   if (!found.unexplained)
     for (const auto& one : found.imitations)

@@ -20,12 +20,6 @@ namespace {
 /// Most of a wrench's variance is trust, not noise: one that is explained falls below 1.
 bool is_explained(double was, double is) { return is < 1 + kRest * (was - 1); }
 
-bool is_among(const std::vector<ChannelMisfit>& all, const ChannelMisfit& m) {
-  return std::any_of(all.begin(), all.end(), [&](const ChannelMisfit& other) {
-    return other.channel == m.channel && other.phase == m.phase;
-  });
-}
-
 }  // namespace
 
 std::vector<ChannelMisfit> settled_wrenches(const FitResult& before, const FitResult& after,
@@ -54,7 +48,7 @@ Improvement improvement(const FitResult& before, const FitResult& after,
     double needed = std::max({options.matters, kShare * (was - 1), 2 * std::sqrt(2.0 / b.n)});
     if (is_wrench(b.channel) && !in_air(b.phase)) {
       const double from = b.phase == Phase::grasped ? 1 + options.matters : options.wrench_misfit;
-      const bool settles = is_among(settled, b);
+      const bool settles = find_misfit(settled, b.channel, b.phase) != nullptr;
       if (was < from && !settles && !is_explained(was, is)) continue;
       needed = std::max(options.wrench_matters, kWrenchShare * (was - 1));
       if (settles) needed = std::min(needed, std::max(kWrenchShare * was, 2 * std::sqrt(2.0 / b.n)));

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "fitting/discovery/ranking.hpp"
 #include "fitting/discovery/stage.hpp"
 
 namespace unhand::fitting {

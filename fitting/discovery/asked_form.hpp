@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "fitting/discovery/discover.hpp"
 #include "fitting/discovery/stage.hpp"
 
 namespace unhand::fitting {

@@ -3,156 +3,19 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
-#include <stdexcept>
 #include <utility>
 
-#include "contact/gripper_delay.hpp"
-#include "contact/registry.hpp"
-#include "datasets/near_miss.hpp"
-#include "experiment/throw_setup.hpp"
 #include "fitting/clock.hpp"
 #include "fitting/discovery/discrepancy.hpp"
 #include "fitting/discovery/held_out_split.hpp"
 #include "fitting/discovery/misfit_rules.hpp"
-#include "fitting/discovery/outcome_errors.hpp"
 #include "fitting/discovery/pads_give.hpp"
 #include "fitting/discovery/selection.hpp"
 #include "fitting/discovery/separating.hpp"
 #include "fitting/discovery/unexplained.hpp"
 
 namespace unhand::fitting {
-
-const char* to_string(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::effect_found:
-      return "effect_found";
-    case Verdict::no_missing_effect:
-      return "no_missing_effect";
-    case Verdict::unexplained:
-      return "unexplained";
-    case Verdict::not_answered:
-      return "not_answered";
-  }
-  return "";
-}
-
-const char* to_string(Outcome outcome) {
-  switch (outcome) {
-    case Outcome::position:
-      return "position in flight";
-    case Outcome::orientation:
-      return "orientation in flight";
-    case Outcome::landing_x:
-      return "landing x";
-    case Outcome::landing_theta:
-      return "landing theta";
-  }
-  return "";
-}
-
-const char* unit_of(Outcome outcome) {
-  return outcome == Outcome::orientation || outcome == Outcome::landing_theta ? "rad" : "m";
-}
-
-void validate(const DiscoverOptions& options) {
-  const auto require = [](bool ok, const char* name, double value, const char* range) {
-    if (!ok) throw std::invalid_argument(fmt::format("{} = {} is not in {}", name, value, range));
-  };
-  for (const auto& [name, value] : {std::pair{"matters", options.matters},
-                                    {"wrench_matters", options.wrench_matters},
-                                    {"wrench_misfit", options.wrench_misfit},
-                                    {"law_matters", options.law_matters}})
-    require(value > 0 && std::isfinite(value), name, value, "(0, inf)");
-  for (const auto& [name, value] :
-       {std::pair{"prediction_matters", options.prediction_matters}, {"unexplained", options.unexplained}})
-    require(value >= 1 && std::isfinite(value), name, value, "[1, inf)");
-  require(options.family_wise_level > 0 && options.family_wise_level < 1, "family_wise_level",
-          options.family_wise_level, "(0, 1)");
-  require(options.equivalent > 0 && options.equivalent <= 1, "equivalent", options.equivalent, "(0, 1]");
-  require(options.refits >= 1, "refits", options.refits, "[1, inf)");
-  require(options.most_effects >= 0, "most_effects", options.most_effects, "[0, inf)");
-  std::vector<std::string> known;
-  for (const auto& effect : experiment::known_effects()) known.push_back(effect.id);
-  for (const auto& law : contact::pad_law_names()) known.push_back(std::string(kLaw) + law);
-  for (const auto& id : options.forget)
-    if (std::find(known.begin(), known.end(), id) == known.end())
-      throw std::invalid_argument(
-          datasets::unknown_name(fmt::format("forget: there is no effect '{}'", id), id, known));
-  for (const auto& law : options.laws)
-    if (std::find(known.begin(), known.end(), std::string(kLaw) + law) == known.end())
-      throw std::invalid_argument(
-          fmt::format("laws: {} is no contact law whose pads press on the object", law));
-}
-
-std::string PredictionGain::in_words() const {
-  return fmt::format("{:.3g} to {:.3g} mm, {:.3g} to {:.3g} deg rms", 1e3 * position.before,
-                     1e3 * position.after, angle.before * experiment::kDegrees,
-                     angle.after * experiment::kDegrees);
-}
-
-const char* to_string(Fate fate) {
-  switch (fate) {
-    case Fate::not_refitted:
-      return "not refitted";
-    case Fate::no_fit:
-      return "no fit";
-    case Fate::not_significant:
-      return "not significant";
-    case Fate::too_small:
-      return "too small";
-    case Fate::outdone:
-      return "outdone";
-    case Fate::another_name:
-      return "another name";
-    case Fate::withdrawn:
-      return "withdrawn";
-    case Fate::fitted_along:
-      return "fitted along";
-    case Fate::accepted:
-      return "accepted";
-  }
-  return "";
-}
-
-void tell_fates(std::span<const AcceptedEffect> effects, std::span<const std::string> withdrawn,
-                std::span<const std::string> along, std::vector<Ranked>& ranking) {
-  const auto among = [](std::span<const std::string> ids, const std::string& id) {
-    return std::find(ids.begin(), ids.end(), id) != ids.end();
-  };
-  for (Ranked& one : ranking) {
-    if (among(withdrawn, one.id)) one.fate = Fate::withdrawn;
-    if (among(along, one.id)) one.fate = Fate::fitted_along;
-    for (const AcceptedEffect& effect : effects)
-      for (const auto& [other, correlation] : effect.equivalent)
-        if (other == one.id) one.fate = Fate::another_name;
-    for (const AcceptedEffect& effect : effects)
-      if (effect.id == one.id) one.fate = Fate::accepted;
-  }
-}
-
-std::vector<std::string> leading_names(std::span<const AcceptedEffect> effects,
-                                       std::span<const Ranked> ranking) {
-  constexpr std::size_t kShown = 4;
-  std::vector<std::string> out;
-  const auto add = [&](const std::string& id) {
-    if (out.size() < kShown && std::find(out.begin(), out.end(), id) == out.end()) out.push_back(id);
-  };
-  for (const AcceptedEffect& effect : effects) add(effect.id);
-  for (const Ranked& ranked : ranking)
-    if (ranked.visible) add(ranked.id);
-  return out;
-}
-
-void AcceptedEffect::add_other_name(const std::string& other, double correlation) {
-  for (auto& [name, known] : equivalent)
-    if (name == other) {
-      known = std::max(known, correlation);
-      return;
-    }
-  equivalent.push_back({other, correlation});
-}
 
 namespace {
 
@@ -218,8 +81,7 @@ std::string fit_base(Stage& stage, const datasets::ThrowLog& log, const Discover
   if (std::none_of(log.throws.begin(), log.throws.end(),
                    [](const datasets::Throw& t) { return t.split == datasets::Split::test; }))
     return "nothing can be held out to judge an effect by: needed are train and test throws, or an object "
-           "that "
-           "was thrown under two conditions";
+           "that was thrown under two conditions";
   solve(stage, options, {});
   if (stage.solved()) polish(stage, options);
   if (stage.solved()) return {};
@@ -228,34 +90,16 @@ std::string fit_base(Stage& stage, const datasets::ThrowLog& log, const Discover
              : fmt::format("the base model could not be fitted: {}", stage.fit.message);
 }
 
-/// What was there before anything was added.
-void tell_before(const Stage& base, const DiscoverOptions& options, Discovery& out) {
-  const int threads = options.fit.threads;
-  out.base_test = base.held_out.misfit;
-  out.before_train = errors_of(base, Share::train, threads);
-  out.before_test = errors_of(base, Share::test, threads);
-  out.first = first_misfit(base.fit, options);
-  const auto residuals = residuals_of(base.problem, base.fit, threads);
-  out.residual_before = residual_over_time(base.problem, base.fit, residuals);
-  out.structure_before = structures(base.problem, base.fit, residuals);
-}
-
-/// What is there now.
-void tell_after(const Stage& stage, const DiscoverOptions& options, Discovery& out) {
-  const int threads = options.fit.threads;
-  out.final = stage.fit;
-  out.final_test = stage.held_out.misfit;
-  out.model = stage.problem.options().model;
-  if (out.adds_nothing()) {
-    out.residual_after = out.residual_before, out.structure_after = out.structure_before;
-    out.after_train = out.before_train, out.after_test = out.before_test;
-    return;
-  }
+SeenModel seen(const Stage& stage, int threads) {
+  SeenModel out;
+  out.fit = stage.fit;
+  out.held_out = stage.held_out.misfit;
+  out.train = errors_of(stage, Share::train, threads);
+  out.test = errors_of(stage, Share::test, threads);
   const auto residuals = residuals_of(stage.problem, stage.fit, threads);
-  out.residual_after = residual_over_time(stage.problem, stage.fit, residuals);
-  out.structure_after = structures(stage.problem, stage.fit, residuals);
-  out.after_train = errors_of(stage, Share::train, threads);
-  out.after_test = errors_of(stage, Share::test, threads);
+  out.residual = residual_over_time(stage.problem, stage.fit, residuals);
+  out.structure = structures(stage.problem, stage.fit, residuals);
+  return out;
 }
 
 /// Which further throws would tell an accepted effect from those that explain the log as well.
@@ -282,7 +126,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
 
   Stage stage{CampaignProblem(log, file, options.campaign), {}, {}, {}};
   out.message = fit_base(stage, log, options);
-  out.base = stage.fit;
+  out.before.fit = stage.fit;
   out.model = options.campaign.model;
   if (!out.message.empty()) {
     out.verdict = Verdict::not_answered;
@@ -290,7 +134,8 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
     return out;
   }
   options.fit.throws = throws_of(stage);
-  tell_before(stage, options, out);
+  out.before = seen(stage, options.fit.threads);
+  out.first = first_misfit(stage.fit, options);
 
   const Stage base = stage;
   FitResult counted = search_and_question(stage, options, out);
@@ -301,7 +146,8 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
 
   out.footprints =
       footprint_traces(base.problem, base.fit, leading_names(out.effects, out.ranking), options.fit);
-  tell_after(stage, options, out);
+  out.model = stage.problem.options().model;
+  out.after = out.adds_nothing() ? out.before : seen(stage, options.fit.threads);
   for (const AcceptedEffect& effect : out.effects)
     if (out.small && out.small->id == effect.id) out.small.reset();
   std::vector<std::string> withdrawn;

@@ -7,10 +7,10 @@
 
 #include "contact/registry.hpp"
 #include "fitting/discovery/acceptance.hpp"
+#include "fitting/discovery/left_over.hpp"
 #include "fitting/discovery/misfit_rules.hpp"
 #include "fitting/discovery/pads_give.hpp"
 #include "fitting/discovery/selection.hpp"
-#include "fitting/discovery/unexplained.hpp"
 #include "fitting/discovery/wald.hpp"
 #include "fitting/discovery/where_acts.hpp"
 #include "fitting/distributions.hpp"
@@ -175,8 +175,9 @@ class ForwardStep {
       ranked.fate = Fate::no_fit;
       return std::nullopt;
     }
-    trial.held_out = law ? law_improvement(stage_.held_out, trial.next.held_out, out_.base_test, options_)
-                         : improvement(stage_, trial.next, out_.base_test, options_);
+    trial.held_out =
+        law ? law_improvement(stage_.held_out, trial.next.held_out, out_.before.held_out, options_)
+            : improvement(stage_, trial.next, out_.before.held_out, options_);
     ranked.held_out_gain = trial.held_out.fall;
     return trial;
   }
@@ -214,7 +215,7 @@ class ForwardStep {
   std::optional<Stage> weigh_small() {
     if (auto beside = beside_give()) return beside;
     const SmallEffect small =
-        small_effect(stage_, small_->next, id_of(*small_->score), out_.base_test, options_);
+        small_effect(stage_, small_->next, id_of(*small_->score), out_.before.held_out, options_);
     if (left_by_answer(small_->next, out_, options_).empty() &&
         predicts_better(stage_, small_->next, options_))
       return accept(std::move(*small_), fmt::format("predicted before the throw: {}", small.rms.in_words()),
@@ -233,7 +234,7 @@ class ForwardStep {
     if (!gives_along(trial.next)) return std::nullopt;
     const Stage& less = without(trial.next, {id}, options_);
     if (!less.solved()) return std::nullopt;
-    trial.held_out = improvement(less, trial.next, out_.base_test, options_);
+    trial.held_out = improvement(less, trial.next, out_.before.held_out, options_);
     if (trial.held_out.matters < 1) return std::nullopt;
     const std::string why = trial.held_out.where;
     return accept(std::move(trial), why, evident_);

@@ -20,9 +20,8 @@ bool leaves_misfit(const Stage& stage, const DiscoverOptions& options) {
 }
 
 bool is_confirmed(const std::vector<ChannelMisfit>& other_half, const ChannelMisfit& misfit) {
-  return std::any_of(other_half.begin(), other_half.end(), [&](const ChannelMisfit& m) {
-    return m.channel == misfit.channel && m.phase == misfit.phase && chi2_tail(m.chi2, m.n) < kConfirmedAt;
-  });
+  const ChannelMisfit* there = find_misfit(other_half, misfit.channel, misfit.phase);
+  return there && chi2_tail(there->chi2, there->n) < kConfirmedAt;
 }
 
 double unexplained_from(Channel channel, Phase phase, bool elsewhere, const DiscoverOptions& options) {
@@ -30,10 +29,16 @@ double unexplained_from(Channel channel, Phase phase, bool elsewhere, const Disc
   return (twice ? 2 : 1) * options.unexplained;
 }
 
+const ChannelMisfit* find_misfit(const std::vector<ChannelMisfit>& misfit, Channel channel, Phase phase) {
+  const auto found = std::find_if(misfit.begin(), misfit.end(), [&](const ChannelMisfit& m) {
+    return m.channel == channel && m.phase == phase;
+  });
+  return found == misfit.end() ? nullptr : &*found;
+}
+
 double misfit_in(const std::vector<ChannelMisfit>& misfit, Channel channel, Phase phase) {
-  for (const auto& m : misfit)
-    if (m.channel == channel && m.phase == phase) return m.chi2_per_sample();
-  return 1;
+  const ChannelMisfit* found = find_misfit(misfit, channel, phase);
+  return found ? found->chi2_per_sample() : 1;
 }
 
 bool is_left(const ChannelMisfit& m, const DiscoverOptions& options) {

@@ -34,6 +34,9 @@ double unexplained_from(experiment::Channel, Phase, bool elsewhere, const Discov
 /// Whether so much is left in a channel in a phase, looked at alone, that something is missing there.
 bool is_left(const ChannelMisfit& m, const DiscoverOptions& options);
 
+/// A channel in a phase of these; null where it is not among them.
+const ChannelMisfit* find_misfit(const std::vector<ChannelMisfit>& misfit, experiment::Channel, Phase);
+
 /// The misfit of a channel in a phase, 1 where there is none.
 double misfit_in(const std::vector<ChannelMisfit>& misfit, experiment::Channel, Phase);
 

@@ -1,5 +1,7 @@
 #include "fitting/discovery/outcome_errors.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -9,6 +11,30 @@
 #include "fitting/evaluate.hpp"
 
 namespace unhand::fitting {
+
+const char* to_string(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::position:
+      return "position in flight";
+    case Outcome::orientation:
+      return "orientation in flight";
+    case Outcome::landing_x:
+      return "landing x";
+    case Outcome::landing_theta:
+      return "landing theta";
+  }
+  return "";
+}
+
+const char* unit_of(Outcome outcome) {
+  return outcome == Outcome::orientation || outcome == Outcome::landing_theta ? "rad" : "m";
+}
+
+std::string PredictionGain::in_words() const {
+  return fmt::format("{:.3g} to {:.3g} mm, {:.3g} to {:.3g} deg rms", 1e3 * position.before,
+                     1e3 * position.after, angle.before * experiment::kDegrees,
+                     angle.after * experiment::kDegrees);
+}
 
 using experiment::Channel;
 

@@ -112,7 +112,7 @@ void settle_give(Stage& stage, const DiscoverOptions& options, Discovery& out) {
     AcceptedEffect give;
     give.id = kPads;
     if (const Stage& rigid = without(stage, {kPads}, options); rigid.solved()) {
-      const Improvement gain = improvement(rigid, stage, out.base_test, options);
+      const Improvement gain = improvement(rigid, stage, out.before.held_out, options);
       give.why = gain.where;
       give.phase = gain.phase;
     }
@@ -126,10 +126,10 @@ bool drop_idle_give(Stage& stage, const DiscoverOptions& options, Discovery& out
   const Stage rigid = without(stage, {kPads}, options);
   if (!rigid.solved()) return false;
   constexpr double kSpoils = 1.05;  // times the held-out predictions' rms
-  const SmallEffect give = small_effect(rigid, stage, kPads, out.base_test, options);
+  const SmallEffect give = small_effect(rigid, stage, kPads, out.before.held_out, options);
   const RmsOfBoth& position = give.rms.position;
   const bool spoils = position.rises_by(kSpoils),
-             matters = improvement(rigid, stage, out.base_test, options).matters >= 1;
+             matters = improvement(rigid, stage, out.before.held_out, options).matters >= 1;
   if (!spoils && (matters || (position.falls_by(1) && give.likelier))) return false;
   if (!matters && (!out.small || give.delta_bic < out.small->delta_bic)) out.small = give;
   stage = rigid;

@@ -3,6 +3,7 @@
 // answer. Internal to fitting.
 #pragma once
 
+#include "fitting/discovery/discover.hpp"
 #include "fitting/discovery/stage.hpp"
 
 namespace unhand::fitting {

@@ -8,7 +8,7 @@
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/asked_form.hpp"
 #include "fitting/discovery/discrepancy.hpp"
-#include "fitting/discovery/unexplained.hpp"
+#include "fitting/discovery/left_over.hpp"
 #include "fitting/discovery/wald.hpp"
 #include "fitting/discovery/where_acts.hpp"
 #include "fitting/discovery/withdrawal.hpp"
@@ -59,11 +59,11 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
       if (!less.solved()) continue;
       const bool needed =
           stage.bic() - less.bic() < kDeltaBic &&
-          (is_law(stage.ids[i]) || improvement(less, stage, out.base_test, options).matters >= 1 ||
+          (is_law(stage.ids[i]) || improvement(less, stage, out.before.held_out, options).matters >= 1 ||
            (left_by_answer(stage, out, options).empty() && predicts_better(less, stage, options)));
       if (needed) continue;
       if (stage.bic() - less.bic() < kDeltaBic && !out.small)
-        out.small = small_effect(less, stage, stage.ids[i], out.base_test, options);
+        out.small = small_effect(less, stage, stage.ids[i], out.before.held_out, options);
       std::erase_if(out.effects, [&](const AcceptedEffect& e) { return e.id == stage.ids[i]; });
       stage = Stage(less);
       removed = true;

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "fitting/discovery/discover.hpp"
+#include "fitting/discovery/accepted_effect.hpp"
 #include "fitting/discovery/stage.hpp"
 
 namespace unhand::fitting {

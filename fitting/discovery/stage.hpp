@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "fitting/discovery/discover.hpp"
+#include "fitting/discovery/discover_options.hpp"
 #include "fitting/discovery/footprints.hpp"
 #include "fitting/discovery/outcome_errors.hpp"
 

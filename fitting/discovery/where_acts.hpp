@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "fitting/discovery/accepted_effect.hpp"
 #include "fitting/discovery/stage.hpp"
 
 namespace unhand::fitting {

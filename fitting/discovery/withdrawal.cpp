@@ -73,8 +73,8 @@ bool leaves_lacking(const BothErrors& errors, const Discovery& so_far, const Dis
   };
   const auto all = lacking(errors.train, errors.held_out, options);
   return std::any_of(all.begin(), all.end(), [&](const OutcomeLack& lack) {
-    return share(lack, lack_in(so_far.before_train, lack.outcome)) &&
-           share(lack_in(errors.held_out, lack.outcome), lack_in(so_far.before_test, lack.outcome));
+    return share(lack, lack_in(so_far.before.train, lack.outcome)) &&
+           share(lack_in(errors.held_out, lack.outcome), lack_in(so_far.before.test, lack.outcome));
   });
 }
 
@@ -87,7 +87,7 @@ bool bears_on_lacking(const AcceptedEffect& effect, const Stage& stage, const Bo
   const OutcomeErrors before = errors_of(less, Share::train, options.fit.threads);
   return std::any_of(errors.train.lacks.begin(), errors.train.lacks.end(), [&](const OutcomeLack& now) {
     return std::abs(now.fit.shared - lack_in(before, now.outcome).fit.shared) >
-           kLeft * lack_in(so_far.before_train, now.outcome).fit.shared;
+           kLeft * lack_in(so_far.before.train, now.outcome).fit.shared;
   });
 }
 
@@ -120,9 +120,9 @@ std::string why_imitation(const AcceptedEffect& effect, const Stage& stage, cons
     return fmt::format("it leaves {} in {} at {:.3g} times the noise on the {} throws",
                        to_string(left->channel), to_string(left->phase), left->chi2_per_sample(), throws);
   };
-  const auto& base = so_far.base.misfit;
-  const std::string train = too_much(&Stage::fit, base, so_far.base_test, "train");
-  return train.empty() ? too_much(&Stage::held_out, so_far.base_test, base, "held-out") : train;
+  const auto& base = so_far.before.fit.misfit;
+  const std::string train = too_much(&Stage::fit, base, so_far.before.held_out, "train");
+  return train.empty() ? too_much(&Stage::held_out, so_far.before.held_out, base, "held-out") : train;
 }
 
 namespace {
@@ -140,13 +140,9 @@ bool spoils(const AcceptedEffect& effect, const Stage& stage, const Discovery& s
   const auto spoilt = [&](const ChannelMisfit& m, const std::vector<ChannelMisfit>& before) {
     return is_noisier(m, before) && (is_left(m, options) || acts(effect, in_air(m.phase)));
   };
-  const auto& train = stage.fit.misfit;
-  const auto& held_out = stage.held_out.misfit;
-  return std::any_of(train.begin(), train.end(), [&](const ChannelMisfit& m) {
-    return spoilt(m, so_far.base.misfit) &&
-           std::any_of(held_out.begin(), held_out.end(), [&](const ChannelMisfit& other) {
-             return other.channel == m.channel && other.phase == m.phase && spoilt(other, so_far.base_test);
-           });
+  return std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(), [&](const ChannelMisfit& m) {
+    const ChannelMisfit* other = find_misfit(stage.held_out.misfit, m.channel, m.phase);
+    return spoilt(m, so_far.before.fit.misfit) && other && spoilt(*other, so_far.before.held_out);
   });
 }
 

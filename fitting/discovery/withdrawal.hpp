@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "fitting/discovery/discover.hpp"
 #include "fitting/discovery/stage.hpp"
 
 namespace unhand::fitting {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "fitting/discovery/discover.hpp"
+#include "fitting/discovery/ranking.hpp"
 #include "fitting/measured/effect_trial.hpp"
 
 namespace unhand::fitting {

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "fitting/discovery/discover.hpp"
+#include "fitting/discovery/ranking.hpp"
 #include "fitting/measured/grouped_fit.hpp"
 
 namespace unhand::fitting {

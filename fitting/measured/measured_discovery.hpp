@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "datasets/slip_log.hpp"
+#include "fitting/discovery/verdict.hpp"
 #include "fitting/measured/effect_search.hpp"
 #include "fitting/measured/missing_acceleration.hpp"
 #include "fitting/measured/residual_tests.hpp"

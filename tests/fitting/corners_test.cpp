@@ -142,7 +142,7 @@ TEST_P(Corners, DiscoverAnswers) {
     options.refits = 1;
     const Discovery found = discover(GetParam().log(), "(in memory)", options);
     EXPECT_GT(found.seconds, 0);
-    outcome_of(found.base);
+    outcome_of(found.before.fit);
     return std::string(to_string(found.verdict)) + ": " + found.message;
   });
   EXPECT_THAT(answer, StartsWith(GetParam().discover));

@@ -57,9 +57,9 @@ Discovery found_in(const datasets::ThrowLog& log, std::vector<std::string> forge
 /// ten times above the noise and more, where noise plays no part.
 double unlike_the_residual(const Discovery& found, const FootprintTrace& footprint) {
   double sum = 0, n = 0;
-  EXPECT_EQ(footprint.bins.size(), found.residual_before.size());
+  EXPECT_EQ(footprint.bins.size(), found.before.residual.size());
   for (std::size_t k = 0; k < footprint.bins.size(); ++k) {
-    const ResidualBin &left = found.residual_before[k], &would = footprint.bins[k];
+    const ResidualBin &left = found.before.residual[k], &would = footprint.bins[k];
     EXPECT_EQ(would.channel, left.channel);
     EXPECT_EQ(would.time, left.time);
     if (left.rms > 10) sum += std::abs(std::log(std::max(would.rms, 1e-3) / left.rms)), n += 1;
@@ -103,7 +103,7 @@ TEST(Discovery, DragIsFoundWithItsSize) {
   EXPECT_EQ(found.silent, std::vector<std::string>{"flight.wind"}) << "none was declared";
   EXPECT_EQ(found.first.phase, Phase::flight) << "drag acts in flight, and first there";
   support::expect_size(found, "flight.quadratic_drag", kDrag);
-  EXPECT_LT(found.after_test.trajectory_rms.value(), 0.5 * found.before_test.trajectory_rms.value());
+  EXPECT_LT(found.after.test.trajectory_rms.value(), 0.5 * found.before.test.trajectory_rms.value());
 
   // What is missing has the residual's shape at every time; what imitates it has not.
   ASSERT_EQ(found.footprints.size(), 4u);
@@ -377,8 +377,8 @@ TEST(Discovery, AChanceMisfitElsewhereDoesNotWithdrawAnEffect) {
   experiment::CampaignDesign design = experiment::random_campaign(2018);
   design.effects = {{"contact.pressure_profile.s", 0.5136}, {"sensor.normal_force_bias.bias", 0.7581}};
   const Discovery found = found_in(experiment::generate_campaign(design, 2018));
-  EXPECT_GT(misfit_in(found.base_test, experiment::Channel::landing_time, Phase::landing), 1.7);
-  EXPECT_LT(misfit_in(found.base.misfit, experiment::Channel::landing_time, Phase::landing), 1.5);
+  EXPECT_GT(misfit_in(found.before.held_out, experiment::Channel::landing_time, Phase::landing), 1.7);
+  EXPECT_LT(misfit_in(found.before.fit.misfit, experiment::Channel::landing_time, Phase::landing), 1.5);
   support::expect_size(found, "sensor.normal_force_bias", 0.7581);
 }
 
@@ -429,7 +429,7 @@ TEST(Discovery, WhatMattersToThePredictionAloneIsFound) {
   const Discovery found = found_in(experiment::generate_campaign(design, 4));
   EXPECT_FALSE(found.first.any) << "no channel alone would show it";
   support::expect_size(found, "contact.viscous", kViscous);
-  EXPECT_LT(found.after_test.trajectory_rms.value(), 0.7 * found.before_test.trajectory_rms.value());
+  EXPECT_LT(found.after.test.trajectory_rms.value(), 0.7 * found.before.test.trajectory_rms.value());
 }
 
 // Not listed, no name can be right; that predictions could be better is told without one: repetitions scatter
@@ -498,7 +498,7 @@ TEST(Discovery, TheGiveOfAnyPadsIsFittedAlongAndNoPartOfTheAnswer) {
   EXPECT_EQ(found.verdict, Verdict::no_missing_effect);
   EXPECT_EQ(found.along, std::vector<std::string>{"contact.pad_compliance"});
   EXPECT_FALSE(found.unexplained.has_value());
-  EXPECT_LT(found.after_test.trajectory_rms.value(), found.before_test.trajectory_rms.value());
+  EXPECT_LT(found.after.test.trajectory_rms.value(), found.before.test.trajectory_rms.value());
 }
 
 // Four micrometres that explain the torque of the slipping pads so well that they would convince as an
@@ -513,7 +513,7 @@ TEST(Discovery, TheGiveOfAnyPadsIsNoPartOfTheAnswerWhereAChannelShowsIt) {
   const auto torque = [](const std::vector<ChannelMisfit>& misfit) {
     return misfit_in(misfit, experiment::Channel::wrench_tau, Phase::release);
   };
-  EXPECT_GT(torque(found.base_test) - torque(found.final_test), DiscoverOptions().wrench_matters);
+  EXPECT_GT(torque(found.before.held_out) - torque(found.after.held_out), DiscoverOptions().wrench_matters);
 }
 
 // A micrometre, and a robot that repeats itself: to first order no effect explains anything, but predictions
@@ -525,8 +525,8 @@ TEST(Discovery, TheGiveOfAnyPadsIsFittedAlongWhereOnlyPredictionsShowIt) {
   design.effects = {
       {"contact.pad_compliance.compliance", 1e-6 / (2 * design.patch.mu * design.opening.grip_force)}};
   const Discovery found = found_in(experiment::generate_campaign(design, 6));
-  const LackOfFit before = lack_in(found.before_train, Outcome::orientation).fit;
-  const LackOfFit after = lack_in(found.after_train, Outcome::orientation).fit;
+  const LackOfFit before = lack_in(found.before.train, Outcome::orientation).fit;
+  const LackOfFit after = lack_in(found.after.train, Outcome::orientation).fit;
   EXPECT_GT(before.ratio(), 2);
   EXPECT_LT(after.shared, 0.1 * before.shared);
   EXPECT_EQ(found.verdict, Verdict::no_missing_effect);
@@ -567,13 +567,13 @@ TEST(Discovery, WhatTheTrainThrowsSettleIsConfirmedBesideTheGiveOfThePads) {
   const auto torque = [](const std::vector<ChannelMisfit>& misfit) {
     return misfit_in(misfit, experiment::Channel::wrench_tau, Phase::release);
   };
-  EXPECT_GT(torque(found.base.misfit), 3);
-  EXPECT_LT(torque(found.base_test), 1.5);
+  EXPECT_GT(torque(found.before.fit.misfit), 3);
+  EXPECT_LT(torque(found.before.held_out), 1.5);
   ASSERT_EQ(found.effects.size(), 1u) << to_string(found.verdict);
   EXPECT_EQ(found.effects.front().id, "contact.stribeck");
   support::expect_size(found, "contact.stribeck", kRatio, 1);
   EXPECT_EQ(found.along, std::vector<std::string>{"contact.pad_compliance"});
-  EXPECT_LT(found.after_test.trajectory_rms.value(), 0.75 * found.before_test.trajectory_rms.value());
+  EXPECT_LT(found.after.test.trajectory_rms.value(), 0.75 * found.before.test.trajectory_rms.value());
 }
 
 // Pads that give by a millimetre bend a base with rigid ones until it slips in the firm grasp, at less than
@@ -583,7 +583,7 @@ TEST(Discovery, PadsThatBendTheBaseFarAreFound) {
   constexpr double kCompliance = 4.08e-5;  // m/N
   design.effects = {{"contact.pad_compliance.compliance", kCompliance}};
   const Discovery found = found_in(experiment::generate_campaign(design, 144));
-  EXPECT_LT(found.base.campaign.front().value, 0.6 * design.patch.mu) << "of the base";
+  EXPECT_LT(found.before.fit.campaign.front().value, 0.6 * design.patch.mu) << "of the base";
   support::expect_size(found, "contact.pad_compliance", kCompliance);
 }
 

@@ -65,7 +65,7 @@ TEST(Selection, TheBaseLawIsNoEffect) {
   ASSERT_TRUE(stage.solved());
   Discovery out;
   out.model = options.campaign.model;
-  out.base = stage.fit, out.base_test = stage.held_out.misfit;
+  out.before.fit = stage.fit, out.before.held_out = stage.held_out.misfit;
   out.effects.emplace_back().id = other;
   options.laws = {"limit_surface_disc"};
   const auto next = forward(stage, options, out);
@@ -267,7 +267,7 @@ TEST(Selection, WhatHasNoEvidenceWithoutWhatIsWithdrawnGoesWithIt) {
   ASSERT_GT(stage.bic(), base.bic());
   Discovery out;
   out.model = options.campaign.model;
-  out.base = base.fit, out.base_test = base.held_out.misfit;
+  out.before.fit = base.fit, out.before.held_out = base.held_out.misfit;
   for (const std::string& id : stage.ids) {
     AcceptedEffect effect;
     effect.id = id;
@@ -291,7 +291,7 @@ std::pair<Stage, Discovery> begun(const datasets::ThrowLog& log, const DiscoverO
   EXPECT_TRUE(base.solved());
   Discovery out;
   out.model = options.campaign.model;
-  out.base = base.fit, out.base_test = base.held_out.misfit;
+  out.before.fit = base.fit, out.before.held_out = base.held_out.misfit;
   return {std::move(base), std::move(out)};
 }
 
@@ -353,7 +353,7 @@ TEST(Selection, StickingPadsAndLateOnesAreToldApartBesidePadsThatGive) {
     ASSERT_EQ(found.effects.size(), 1u) << is;
     EXPECT_EQ(found.effects[0].id, is);
     EXPECT_EQ(found.along, std::vector<std::string>{kPads});
-    for (const auto& u : found.final.campaign) {
+    for (const auto& u : found.after.fit.campaign) {
       if (u.unknown.name == "release.opening_delay.delay") {
         EXPECT_NEAR(u.value, 0.003, 4 * u.sigma);
       }
@@ -575,7 +575,7 @@ TEST(Spoils, IsAChannelThatTheAnswerLeavesNoisier) {
   const auto spoilt = [&](const AcceptedEffect& by, const FitResult& base, const FitResult& train,
                           const FitResult& held_out) {
     Discovery so_far;
-    so_far.base = base, so_far.base_test = base.misfit;
+    so_far.before.fit = base, so_far.before.held_out = base.misfit;
     const CampaignProblem problem(support::loop_campaign({}), "synthetic", {});
     return spoils(by, Stage{problem, train, held_out, {}}, so_far, {});
   };
