@@ -71,6 +71,10 @@ Json structure_json(const std::vector<fitting::ChannelStructure>& structures) {
                    {"chi2_p_value", number(s.structure.chi2_p_value)},
                    {"autocorrelation", number(s.structure.autocorrelation)},
                    {"autocorrelation_p_value", number(s.structure.autocorrelation_p)},
+                   {"offset",
+                    {{"mean_sigma", number(s.structure.offset.mean)},
+                     {"share", number(s.structure.offset.share)},
+                     {"p_value", number(s.structure.offset.p_value)}}},
                    {"depends", depends}});
   }
   return out;

@@ -5,41 +5,22 @@
 #include <vector>
 
 #include "fitting/discovery/misfit_rules.hpp"
-#include "fitting/distributions.hpp"
+#include "fitting/discovery/order_trend.hpp"
 
 namespace unhand::fitting {
 namespace {
 
-/// A straight line over the place in the log, each condition with a mean of its own.
-struct Trend {
-  double slope{}, correlation{}, p_value{1}, ratio{1};
-};
-
-Trend trend_of(const CampaignProblem& problem, const FitResult& half, std::size_t unknown) {
-  struct Sums {
-    double n{}, x{}, y{}, xx{}, xy{}, yy{};
-  };
-  std::map<std::string, Sums> conditions;
+OrderTrend trend_of(const CampaignProblem& problem, const FitResult& half, std::size_t unknown) {
+  std::map<std::string, int> conditions;
+  std::vector<Placed> values;
   for (std::size_t i = 0; i < half.throws.size(); ++i) {
     if (!half.throws[i].used || half.throws[i].weight < 1) continue;  // outliers have a trend of their own
-    const auto x = static_cast<double>(i);
-    const double y = half.throws[i].own[unknown];
-    Sums& s = conditions[problem.throws()[i].prepared.experiment()];
-    s.n += 1, s.x += x, s.y += y, s.xx += x * x, s.xy += x * y, s.yy += y * y;
+    const int condition =
+        conditions.try_emplace(problem.throws()[i].prepared.experiment(), static_cast<int>(conditions.size()))
+            .first->second;
+    values.push_back({condition, static_cast<double>(i), half.throws[i].own[unknown]});
   }
-  double n = -1, xx = 0, xy = 0, yy = 0;
-  for (const auto& [name, s] : conditions) {
-    n += s.n - 1;
-    xx += s.xx - s.x * s.x / s.n, xy += s.xy - s.x * s.y / s.n, yy += s.yy - s.y * s.y / s.n;
-  }
-  Trend out;
-  if (n < 1 || !(xx > 0) || !(yy > 0)) return out;
-  out.slope = xy / xx;
-  out.correlation = xy / std::sqrt(xx * yy);
-  const double share = std::min(out.correlation * out.correlation, 1 - 1e-12);
-  out.p_value = f_tail(share * n / (1 - share), 1, n);
-  out.ratio = 1 / (1 - share);
-  return out;
+  return order_trend(values);
 }
 
 }  // namespace
@@ -52,7 +33,7 @@ std::optional<OwnDrift> own_drift(const CampaignProblem& problem, const FitResul
   for (std::size_t k = 0; k < problem.own().size(); ++k) {
     const Unknown& u = problem.own()[k];
     if (u.kind == Unknown::Kind::smoothing) continue;
-    const Trend train = trend_of(problem, fit, k), test = trend_of(problem, held_out, k);
+    const OrderTrend train = trend_of(problem, fit, k), test = trend_of(problem, held_out, k);
     const double change = train.slope * (throws - 1);
     const bool seen = train.p_value < level / static_cast<double>(problem.own().size()) &&
                       train.correlation * train.correlation > kMost && std::abs(change) > u.scale;

@@ -7,6 +7,7 @@
 #include <map>
 #include <numeric>
 
+#include "fitting/discovery/order_trend.hpp"
 #include "fitting/distributions.hpp"
 
 namespace unhand::fitting {
@@ -61,34 +62,67 @@ Dependence over_groups(const std::string& on, const std::vector<double>& residua
   return analyse(on, r, quantile_groups(x, std::clamp(groups, 2, std::max(2, most))));
 }
 
-Dependence over_conditions(const ResidualSamples& samples) {
-  struct Series {
-    double n{}, sum{};
-    int condition{};
-  };
-  std::map<int, Series> series;
+/// A recording's samples: as a witness, its mean.
+struct SeriesMean {
+  double n{}, sum{};
+  int condition{};
+  double mean() const { return sum / n; }
+};
+
+std::map<int, SeriesMean> means_of(const ResidualSamples& samples) {
+  std::map<int, SeriesMean> out;
   for (std::size_t i = 0; i < samples.value.size(); ++i) {
-    Series& s = series[samples.series[i]];
+    SeriesMean& s = out[samples.series[i]];
     s.n += 1, s.sum += samples.value[i], s.condition = samples.condition[i];
   }
+  return out;
+}
+
+Dependence over_conditions(const std::map<int, SeriesMean>& series, double squares) {
   std::vector<double> mean;
   std::vector<int> condition;
-  for (const auto& [id, s] : series) mean.push_back(s.sum / s.n), condition.push_back(s.condition);
+  double of_means = 0;
+  for (const auto& [id, s] : series) {
+    mean.push_back(s.mean()), condition.push_back(s.condition);
+    of_means += s.sum * s.mean();
+  }
   Dependence out = analyse("condition", mean, condition);
-  // As a share of the residual's mean square, not of its means'.
-  double squares = 0, of_means = 0;
-  for (const double r : samples.value) squares += r * r;
-  for (const auto& [id, s] : series) of_means += s.sum * s.sum / s.n;
-  if (squares > 0) out.share *= of_means / squares;
+  if (squares > 0) out.share *= of_means / squares;  // of the residual's mean square, not of its means'
+  return out;
+}
+
+/// Over the number of the recording, which is its place in the log.
+Dependence over_order(const std::map<int, SeriesMean>& series, double squares) {
+  std::vector<Placed> means;
+  double samples = 0;
+  for (const auto& [id, s] : series) {
+    means.push_back({s.condition, static_cast<double>(id), s.mean()});
+    samples += s.n / static_cast<double>(series.size());
+  }
+  const OrderTrend trend = order_trend(means);
+  return {"order in the log", squares > 0 ? trend.explained * samples / squares : 0, trend.p_value};
+}
+
+SharedOffset shared_offset(const std::map<int, SeriesMean>& series, double samples, double squares) {
+  const auto k = static_cast<double>(series.size());
+  double sum = 0, means = 0, scatter = 0;
+  for (const auto& [id, s] : series) sum += s.sum, means += s.mean() / k;
+  for (const auto& [id, s] : series) scatter += (s.mean() - means) * (s.mean() - means);
+  SharedOffset out{sum / samples, 0, 1};
+  if (k < 2 || !(squares > 0)) return out;
+  const double of_mean = std::max(scatter / (k - 1) / k, 1e-12 * means * means);  // its variance
+  if (!(of_mean > 0)) return out;
+  out.p_value = f_tail(means * means / of_mean, 1, k - 1);
+  out.share = std::max(0.0, out.mean * out.mean - of_mean) * samples / squares;
   return out;
 }
 
 }  // namespace
 
 double ResidualStructure::p_value() const {
-  double least = std::min(chi2_p_value, autocorrelation_p);
+  double least = std::min({chi2_p_value, autocorrelation_p, offset.p_value});
   for (const Dependence& d : depends) least = std::min(least, d.p_value);
-  return std::min(1.0, least * static_cast<double>(2 + depends.size()));
+  return std::min(1.0, least * static_cast<double>(3 + depends.size()));
 }
 
 std::string ResidualStructure::in_words() const {
@@ -96,6 +130,9 @@ std::string ResidualStructure::in_words() const {
   std::string out = fmt::format("{:.3g} times the variance of the noise", chi2_per_sample);
   if (autocorrelation_p < limits.level)
     out += fmt::format(", neighbours correlate by {:.2f}", autocorrelation);
+  if (offset.p_value < limits.level && offset.share > limits.share)
+    out += fmt::format("; {:.0f} % of it is an offset of {:+.3g} sigma, predicted minus measured",
+                       100 * offset.share, offset.mean);
   std::string with;
   for (const Dependence& d : depends)
     if (d.p_value < limits.level && d.share > limits.share)
@@ -123,7 +160,10 @@ ResidualStructure find_structure(const ResidualSamples& samples, const Structure
     out.autocorrelation = products / std::sqrt(of_former * of_latter);
     out.autocorrelation_p = normal_two_sided(out.autocorrelation * std::sqrt(pairs));
   }
-  out.depends.push_back(over_conditions(samples));
+  const auto series = means_of(samples);
+  out.offset = shared_offset(series, out.n, squares);
+  out.depends.push_back(over_conditions(series, squares));
+  out.depends.push_back(over_order(series, squares));
   out.depends.push_back(over_groups("time", samples.value, samples.time, options.groups));
   for (const auto& state : samples.states)
     out.depends.push_back(over_groups(state.name, samples.value, state.value, options.groups));

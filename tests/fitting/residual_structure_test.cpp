@@ -70,6 +70,32 @@ TEST(ResidualStructure, WhatItGoesWithIsNamed) {
   EXPECT_LT(drifting.autocorrelation_p, 1e-6);
 }
 
+TEST(ResidualStructure, AnOffsetIsWhatAllRecordingsShare) {
+  const auto same = find_structure(samples(11, [](int, double, double) { return 0.8; }));
+  EXPECT_NEAR(same.offset.mean, 0.8, 0.1);
+  EXPECT_NEAR(same.offset.share, 0.64 / 1.64, 0.05);
+  EXPECT_LT(same.offset.p_value, 1e-6);
+  EXPECT_NE(same.in_words().find("is an offset of +0."), std::string::npos) << same.in_words();
+  // Half of the conditions one way, half the other: what they share is nothing.
+  const auto either =
+      find_structure(samples(12, [](int c, double, double) { return c % 2 == 0 ? 0.8 : -0.8; }));
+  EXPECT_LT(either.offset.share, 0.02);
+  EXPECT_GT(either.offset.p_value, 0.01);
+}
+
+TEST(ResidualStructure, WhatChangesOverTheCampaignGoesWithTheOrder) {
+  ResidualSamples drifting = samples(13, [](int, double, double) { return 0.0; });
+  for (std::size_t i = 0; i < drifting.value.size(); ++i) {
+    drifting.condition[i] =
+        drifting.series[i] % 8;  // in turn, so that every condition sees all of the campaign
+    drifting.value[i] += 0.1 * (drifting.series[i] - 19.5);
+  }
+  const ResidualStructure found = find_structure(drifting);
+  EXPECT_EQ(found.depends.front().on, "order in the log");
+  EXPECT_NEAR(found.depends.front().share, 0.01 * 1599 / 12 / (1 + 0.01 * 1599 / 12), 0.05);
+  EXPECT_LT(found.offset.share, 0.02);
+}
+
 TEST(ResidualStructure, NeighboursThatAreTheSameCorrelateByOne) {
   // Large in the one series that has neighbours, small in the recordings of a single sample.
   const ResidualSamples s{{9, 9, 9, 0.1, -0.1}, {0, 0.1, 0.2, 0, 0}, {0, 0, 0, 1, 2}, {0, 0, 0, 1, 1}, {}};
