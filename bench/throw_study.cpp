@@ -20,9 +20,9 @@
 #include "planners/arm/kinematics.hpp"
 #include "planners/arm/panda.hpp"
 #include "planners/tube/held_motion.hpp"
+#include "planners/tube/insensitive_throw.hpp"
 #include "planners/tube/plan_throw.hpp"
 #include "planners/tube/planar_hand.hpp"
-#include "planners/tube/release_throw.hpp"
 
 namespace {
 

@@ -5,7 +5,7 @@
 
 #include "contact/patch.hpp"
 #include "contact/registry.hpp"
-#include "planners/tube/release_throw.hpp"
+#include "planners/tube/release_card.hpp"
 
 namespace unhand::planners {
 

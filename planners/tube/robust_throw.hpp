@@ -5,8 +5,8 @@
 #include <string>
 
 #include "planners/tube/held_motion.hpp"
+#include "planners/tube/insensitive_throw.hpp"
 #include "planners/tube/plan_throw.hpp"
-#include "planners/tube/release_throw.hpp"
 
 namespace unhand::planners {
 

@@ -1,5 +1,5 @@
 // Throws whose object leaves as a contact model says: the hand, limits in closed form, derivatives, spread.
-#include "planners/tube/release_throw.hpp"
+#include "planners/tube/insensitive_throw.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
