@@ -18,6 +18,7 @@
 #include "experiment/unit_evidence.hpp"
 #include "experiment/unit_outliers.hpp"
 #include "experiment/unit_rules.hpp"
+#include "experiment/wrench_check.hpp"
 
 namespace unhand::experiment {
 

@@ -1,135 +1,18 @@
 #include <fmt/format.h>
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 
 #include "fitting/clock.hpp"
-#include "fitting/distributions.hpp"
+#include "fitting/slips/law_score.hpp"
 #include "fitting/slips/surface_discovery.hpp"
 #include "fitting/slips/wrench_bias.hpp"
 
 namespace unhand::fitting {
 namespace {
 
-struct Paired {
-  double n{}, sum{}, squares{};
-  void add(double x) { n += 1, sum += x, squares += x * x; }
-  void add(const Paired& other) { n += other.n, sum += other.sum, squares += other.squares; }
-  double mean() const { return n > 0 ? sum / n : 0; }
-  double error() const {
-    return n > 1 ? std::sqrt(std::max(0.0, squares - n * mean() * mean()) / (n - 1) / n) : 0;
-  }
-  double t() const { return error() > 0 ? mean() / error() : 0; }
-  /// One-sided: the mean is above zero.
-  double p() const { return n > 2 && mean() > 0 ? 0.5 * f_tail(t() * t(), 1, n - 1) : 1; }
-};
-
-/// Mean held-out error of every slip [deg].
-std::map<int, double> by_slip(const SlipSamples& slips, const std::vector<double>& errors) {
-  std::map<int, std::pair<double, double>> sums;
-  for (std::size_t i = 0; i < errors.size(); ++i) {
-    auto& [sum, n] = sums[slips.samples[i].slip];
-    sum += errors[i], n += 1;
-  }
-  std::map<int, double> out;
-  for (const auto& [slip, s] : sums) out[slip] = s.first / s.second;
-  return out;
-}
-
-/// Do pushes that know nothing of each other err the same way where their wrenches are alike? Every sample
-/// against the one of another slip whose direction of wrench is nearest. Pairs of slips are the observations:
-/// of errors that know nothing of each other, the products in different pairs do not correlate.
-Paired left_by(const SlipSamples& slips, const SlipSurface& surface, double& correlation) {
-  const std::size_t n = slips.samples.size();
-  std::vector<Eigen::Vector3d> residual(n), at(n);
-  double squares = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    const auto& s = slips.samples[i];
-    const auto normal = surface.normal(s.wrench);
-    residual[i] =
-        Eigen::Vector3d(s.direction[0] - normal[0], s.direction[1] - normal[1], s.direction[2] - normal[2]);
-    at[i] = Eigen::Vector3d(s.wrench[0], s.wrench[1], s.wrench[2]).normalized();
-    squares += residual[i].squaredNorm() / static_cast<double>(n);
-  }
-  std::map<std::pair<int, int>, double> sums;
-  double count = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    double nearest = -2;
-    std::size_t other = i;
-    for (std::size_t j = 0; j < n; ++j)
-      if (slips.samples[j].slip != slips.samples[i].slip && at[i].dot(at[j]) > nearest)
-        nearest = at[i].dot(at[j]), other = j;
-    if (other == i) continue;
-    sums[std::minmax({slips.samples[i].slip, slips.samples[other].slip})] +=
-        residual[i].dot(residual[other]) / squares;
-    count += 1;
-  }
-  Paired out;  // whose mean is the mean over samples
-  for (const auto& [pair, sum] : sums) out.add(sum * static_cast<double>(sums.size()) / count);
-  correlation = out.mean();
-  return out;
-}
-
-double in_sample(const SlipSamples& slips, const SlipSurface& surface) {
-  double out = 0;
-  for (const auto& s : slips.samples) out += kDegreesPerRadian * direction_error(surface, s);
-  return slips.samples.empty() ? 0 : out / static_cast<double>(slips.samples.size());
-}
-
-double level_error(const SlipSamples& slips, const SlipSurface& surface) {
-  double out = 0;
-  for (const auto& s : slips.samples) out += std::abs(surface.gauge(s.wrench) - 1);
-  return slips.samples.empty() ? 0 : out / static_cast<double>(slips.samples.size());
-}
-
 std::string id_of(SurfaceModel model) { return "contact.law:" + to_string(model); }
-
-/// A law beside the base, over the surfaces on which both were scored.
-struct LawScore {
-  SurfaceModel model{};
-  Paired gain;  ///< by slip: how much less the law errs [deg]
-  Paired left;  ///< left_by, over pairs of slips
-  int better{}, compared{};
-  // Means over the surfaces: held-out errors, the law's own in sample and in level, what the null control
-  // gains.
-  double error{}, base_error{}, train{}, level{}, null_gain{};
-
-  SurfaceEvidence add(const SlipSamples& slips, const SurfaceScore& base, const SurfaceScore& score) {
-    const auto of_base = by_slip(slips, base.errors_deg);
-    Paired own;
-    for (const auto& [slip, by_law] : by_slip(slips, score.errors_deg)) {
-      own.add(of_base.at(slip) - by_law);
-      gain.add(of_base.at(slip) - by_law);
-    }
-    SurfaceEvidence e;
-    e.surface = slips.surface, e.law = model, e.slips = static_cast<int>(of_base.size());
-    e.base_deg = base.mean_deg, e.law_deg = score.mean_deg;
-    e.null_base_deg = base.null_control_deg, e.null_law_deg = score.null_control_deg;
-    e.gain_deg = own.mean(), e.gain_sigma = own.error();
-    const Paired left_here = left_by(slips, score.fit.surface, e.left);
-    e.left_sigma = left_here.error();
-    left.add(left_here);
-    better += score.mean_deg < base.mean_deg ? 1 : 0, ++compared;
-    error += score.mean_deg, base_error += base.mean_deg;
-    null_gain += base.null_control_deg - score.null_control_deg;
-    train += in_sample(slips, score.fit.surface);
-    level += level_error(slips, score.fit.surface);
-    return e;
-  }
-  /// Sums over surfaces become means.
-  void average() {
-    for (double* sum : {&error, &base_error, &train, &level, &null_gain}) *sum /= std::max(1, compared);
-  }
-  /// As Bayes' criterion would be of one parameter more: the gain is held out, so richer laws have no head
-  /// start.
-  double delta_bic() const { return std::log(std::max(2.0, gain.n)) - gain.t() * std::abs(gain.t()); }
-  NamedErrors errors(double direction) const {
-    return {{"direction_mae_deg", direction}, {"level_mae", level}};
-  }
-};
 
 using Scores = std::vector<std::vector<SurfaceScore>>;  // by surface, then model; the base is the first
 

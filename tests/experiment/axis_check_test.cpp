@@ -1,5 +1,6 @@
 // Axes of a log that point the other way are told from the motion.
 #include "experiment/axis_check.hpp"
+#include "experiment/wrench_check.hpp"
 
 #include <gmock/gmock.h>
 
