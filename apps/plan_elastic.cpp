@@ -169,7 +169,7 @@ void fastest(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs& o
   json["longest_solve_s"] = longest;
   const std::string notes =
       fmt::format("longest solve {:.2f} s of CPU time, {} random starts each\n", longest, o.starts) +
-      kOnHardware;
+      (o.arm == PlanElasticOptions().arm ? kOnHardware : "");
   fmt::print("{}\n{}", table.text(), notes);
   if (o.report.empty()) return;
   const fs::path folder = outputs.directory(o.report);
@@ -202,7 +202,8 @@ std::string out_of_reach(const el::ClutchedArm& arm, const el::ThrowTask& task, 
   return out;
 }
 
-void to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs& outputs, Json& json) {
+/// How many of the nodes are confirmed by their runs.
+int to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs& outputs, Json& json) {
   el::ThrowTask task;
   task.longest = o.longest > 0 ? o.longest : 1.0;
   task.start = kReadyPose;
@@ -268,12 +269,14 @@ void to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs&
   if (missed > 0)
     notes += fmt::format("{} of {} nodes are not confirmed by their runs\n", missed, distances.size());
   fmt::print("{}\n{}", text.text(), notes);
-  if (o.report.empty()) return;
+  const int fine = static_cast<int>(distances.size()) - missed;
+  if (o.report.empty()) return fine;
   const fs::path folder = outputs.directory(o.report);
   draw_table(checks, folder);
   write_text(folder / "table.md", text.markdown() + "\n" + notes);
   write_text(folder / "trajectory.csv", csv);
   write_text(folder / "plan.json", json_text(json));
+  return fine;
 }
 
 void run(const PlanElasticOptions& o) {
@@ -285,12 +288,17 @@ void run(const PlanElasticOptions& o) {
   Outputs outputs{{o.arm}};
   Json json = json_head("plan-elastic");
   json["arm"] = arm.chain.name;
+  int confirmed = 1;
   if (o.target_x > 0)
-    to_target(arm, o, outputs, json);
+    confirmed = to_target(arm, o, outputs, json);
   else
     fastest(arm, o, outputs, json);
   if (!o.json.empty()) outputs.json(o.json, json);
   outputs.commit();
+  if (confirmed == 0)
+    throw Unanswered(
+        "no node of the table is confirmed by its run: none of these throws is to be made; more --intervals, "
+        "or a shorter --longest, may confirm some");
 }
 
 }  // namespace

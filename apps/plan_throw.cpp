@@ -85,8 +85,14 @@ Chain armed(const PlanThrowOptions& options, const std::optional<datasets::Sku>&
                                  planners::symmetric(*sku->inertia, *sku->inertia, about_its_axis, 0, 0, 0)});
 }
 
-planners::PlanOptions plan_options(const PlanThrowOptions& options, const Chain& arm, bool planar) {
+/// `height` of the box [m].
+planners::PlanOptions plan_options(const PlanThrowOptions& options, const Chain& arm, bool planar,
+                                   double height) {
   planners::PlanOptions out;
+  // The tube's landings come down at no more than so much: half as fast again as from above any arm.
+  constexpr double kHighest = 1.5, kMargin = 1.5;  // m, -
+  const double fall = std::sqrt(2 * out.search.medium.gravity * std::max(0.0, kHighest - height));
+  out.search.landing.z_rate_low = std::min(out.search.landing.z_rate_low, -kMargin * fall);
   out.search.window = options.window;
   out.search.samples = options.samples;
   out.search.threads = options.threads;
@@ -96,11 +102,15 @@ planners::PlanOptions plan_options(const PlanThrowOptions& options, const Chain&
   return out;
 }
 
-/// Landings at delays drawn evenly from the window.
+/// Landings at delays drawn evenly from the window; `aimed`: by a throw that a release in the middle of the
+/// window brings to the middle of the box, to first order.
 PredictedLandings by_delay(const std::string& name, const ThrowAnswer& a,
-                           const planners::JointVector<double>& qdd, const PlanThrowOptions& options) {
+                           const planners::JointVector<double>& qdd, const PlanThrowOptions& options,
+                           bool aimed = false) {
   const planners::TubeProblem problem{a.chain, a.plan.nominal.state, a.box.middle, a.window, a.medium};
   const auto table = planners::landings_over_window(problem, qdd, 201);
+  planners::LandingAt aim{};
+  if (const auto& middle = table[table.size() / 2]; aimed && middle.lands) aim = middle;
   std::mt19937_64 random(options.seed);
   std::uniform_int_distribution<std::size_t> delay(0, table.size() - 1);
   PredictedLandings out{name, {}, 0};
@@ -110,18 +120,19 @@ PredictedLandings by_delay(const std::string& name, const ThrowAnswer& a,
       ++out.drawn.lost;
       continue;
     }
-    out.drawn.miss.push_back(at.forward);
-    out.across.miss.push_back(at.across);
-    out.hits += a.box.holds(at.x, at.y);
+    out.drawn.miss.push_back(at.forward - aim.forward);
+    out.across.miss.push_back(at.across - aim.across);
+    out.hits += a.box.holds(at.x - aim.x, at.y - aim.y);
   }
   planners::summarise(out.drawn);
   planners::summarise(out.across);
   return out;
 }
 
-PredictedLandings by_release(const std::string& name, const ThrowAnswer& a,
-                             const planners::ReleaseThrow& release, const PlanThrowOptions& options) {
-  const planners::HeldMotion before(release, a.plan.motion);
+PredictedLandings by_release(const std::string& name, const planners::JointTrajectory& motion,
+                             const ThrowAnswer& a, const planners::ReleaseThrow& release,
+                             const PlanThrowOptions& options) {
+  const planners::HeldMotion before(release, motion);
   PredictedLandings out{name, planners::draw_landings(release, options.draws, options.seed, &before), 0};
   const planners::ThrowPlane plane(planners::forward_kinematics(release.chain, release.start.q).p,
                                    release.target);
@@ -184,7 +195,8 @@ std::vector<ThrowAnswer::Number> numbers_of(const planners::ReleaseCard& card,
   return out;
 }
 
-/// The plan made insensitive to what the card leaves open, where that is possible within the limits.
+/// The plan made insensitive to what the card leaves open, where that is possible within the limits and
+/// brings no fewer draws into the box: the choice does not look at the swing, in which a grip may slip.
 void plan_release(ThrowAnswer& a, planners::ReleaseThrow release, const planners::PlanOptions& how,
                   const PlanThrowOptions& options) {
   a.with_release = true;
@@ -194,21 +206,30 @@ void plan_release(ThrowAnswer& a, planners::ReleaseThrow release, const planners
         "the object is not free of the pads within {} s, or never comes down to the target", release.hold));
   a.rigid = planners::rigid_landing(release, release.object.com_offset.value, a.real->detach_time);
   a.spread_before = planners::release_spread(release);
-  a.predicted.push_back(by_release("tube acceleration", a, release, options));
-  const auto tell_needed = [&] {
-    a.needed_force = planners::HeldMotion(release, a.plan.motion).needed_force();
-  };
+  a.predicted = {by_release("tube acceleration", a.plan.motion, a, release, options)};
+  a.needed_force = planners::HeldMotion(release, a.plan.motion).needed_force();
   std::string reason;
   auto robust = planners::plan_robust_throw(release, how.home, &reason);
   if (!robust) {
     tell("unhand: of the motions to the insensitive throw none will do ({}); the tube's is kept\n", reason);
-    tell_needed();
     return;
   }
+  release.start = robust->choice.start, release.qdd = robust->choice.qdd;
+  auto insensitive = by_release("insensitive motion", robust->motion, a, release, options);
+  const auto& tube = a.predicted.front();
+  if (insensitive.hits < tube.hits) {
+    tell(
+        "unhand: the insensitive motion brings {} of {} draws into the box ({} slip in the hand or never "
+        "land), the tube's {}: that is kept\n",
+        insensitive.hits, options.draws, insensitive.drawn.lost, tube.hits);
+    a.predicted.push_back(std::move(insensitive));
+    return;
+  }
+  a.predicted.insert(a.predicted.begin(), std::move(insensitive));
   a.plan.motion = std::move(robust->motion);
   a.plan.limits = robust->limits;
-  a.plan.nominal.state = release.start = robust->choice.start;
-  a.plan.qdd = release.qdd = robust->choice.qdd;
+  a.plan.nominal.state = release.start;
+  a.plan.qdd = release.qdd;
   const planners::TubeProblem rigid{a.chain, release.start, a.box.middle, a.window, a.medium};
   const auto landings = [&](const planners::JointVector<double>& qdd) {
     return planners::landings_over_window(rigid, qdd, planners::kLandingSamples);
@@ -217,8 +238,7 @@ void plan_release(ThrowAnswer& a, planners::ReleaseThrow release, const planners
   a.plan.tube_landings.clear();  // of another throw
   a.plan.at_rest = landings(planners::JointVector<double>::Zero(release.chain.size()));
   a.spread_after = planners::release_spread(release);
-  a.predicted.insert(a.predicted.begin(), by_release("insensitive motion", a, release, options));
-  tell_needed();
+  a.needed_force = planners::HeldMotion(release, a.plan.motion).needed_force();
 }
 
 /// Where the plan is beyond what its card was tried on.
@@ -310,7 +330,7 @@ void plan_throw(const PlanThrowOptions& options) {
   }
   const Chain pads = armed(options, given);
   answer.chain = planners::with_tool(pads, {Eigen::Matrix3d::Identity(), {0, 0, object.com_offset.value}});
-  auto how = plan_options(options, pads, options.planar || card.has_value());
+  auto how = plan_options(options, pads, options.planar || card.has_value(), target[2]);
   how.search.medium.drag_k = drag_of(answer, options, given);
   how.search.window = answer.window = std::max(options.window, card ? planners::window_for(*card) : 0.0);
   const auto release_of = [&](const planners::ThrowPlan& plan) {
@@ -343,7 +363,7 @@ void plan_throw(const PlanThrowOptions& options) {
     answer.predicted = {
         by_delay("planned", answer, answer.plan.qdd, options),
         by_delay("Tube-CVX", answer, answer.plan.tube.qdd, options),
-        by_delay("no acceleration", answer, planners::JointVector<double>::Zero(pads.size()), options)};
+        by_delay("no acceleration", answer, planners::JointVector<double>::Zero(pads.size()), options, true)};
   }
 
   progress.reset();

@@ -139,9 +139,11 @@ std::string text_of(const ThrowAnswer& a, bool markdown) {
   const auto& limits = plan.limits;
   out += fmt::format(
       "\nlimits used, at most: position {:.1f} %, velocity {:.1f} %, acceleration {:.1f} %, jerk {:.1f} %, "
-      "torque {:.1f} %\n",
+      "torque {:.1f} %\n"
+      "torques change by up to {:.3g} N m/s ({} at {:.3f} s), which the plan does not limit\n",
       100 * limits.position.fraction, 100 * limits.velocity.fraction, 100 * limits.acceleration.fraction,
-      100 * limits.jerk.fraction, 100 * limits.torque.fraction);
+      100 * limits.jerk.fraction, 100 * limits.torque.fraction, limits.torque_rate.value,
+      a.chain.joints[static_cast<std::size_t>(limits.torque_rate.joint)].name, limits.torque_rate.time);
   return out;
 }
 
@@ -163,6 +165,7 @@ Json throw_json(const ThrowAnswer& a) {
   out["window_landings"] = {{"planned", window_json(plan.landings)},
                             {"tube_cvx", window_json(plan.tube_landings)},
                             {"no_acceleration", window_json(plan.at_rest)}};
+  out["motion"] = a.predicted.empty() ? Json(nullptr) : Json(a.predicted.front().name);
   out["predicted"] = Json::object();
   for (const auto& one : a.predicted)
     out["predicted"][one.name] = {
@@ -190,7 +193,11 @@ Json throw_json(const ThrowAnswer& a) {
                    {"velocity", use_json(a, plan.limits.velocity)},
                    {"acceleration", use_json(a, plan.limits.acceleration)},
                    {"jerk", use_json(a, plan.limits.jerk)},
-                   {"torque", use_json(a, plan.limits.torque)}};
+                   {"torque", use_json(a, plan.limits.torque)},
+                   {"torque_rate",
+                    {{"largest_N_m_s", plan.limits.torque_rate.value},
+                     {"joint", a.chain.joints[static_cast<std::size_t>(plan.limits.torque_rate.joint)].name},
+                     {"time_s", plan.limits.torque_rate.time}}}};
   return out;
 }
 

@@ -182,9 +182,12 @@ LimitCheck check_limits(const Chain& chain, const JointTrajectory& trajectory, d
   std::vector<double> times;
   for (const JerkProfile& joint : trajectory.joints) joint.extremes(times);
   for (double& t : times) t += trajectory.begin;
+  const auto grid = times.size();  // from here on every `step`
   const int steps = static_cast<int>(std::ceil((trajectory.end() - trajectory.begin) / step));
   for (int k = 0; k < steps; ++k) times.push_back(trajectory.begin + k * step);
-  for (const double t : times) {
+  JointVector<double> before;
+  for (std::size_t k = 0; k < times.size(); ++k) {
+    const double t = times[k];
     const auto s = trajectory.at(t);
     const JointVector<double> torque =
         inverse_dynamics(chain, s.q, s.qd, s.qdd) + friction_torque(chain, s.qd);
@@ -196,7 +199,11 @@ LimitCheck check_limits(const Chain& chain, const JointTrajectory& trajectory, d
       note(out.acceleration, std::abs(s.qdd[i]) / l.acceleration, i, t);
       note(out.jerk, std::abs(s.jerk[i]) / l.jerk, i, t);
       note(out.torque, std::abs(torque[i]) / l.torque, i, t);
+      if (k > grid)
+        if (const double rate = std::abs(torque[i] - before[i]) / step; rate > out.torque_rate.value)
+          out.torque_rate = {rate, i, t};
     }
+    before = torque;
     const auto frames = frames_of(chain, s.q);
     out.lowest = std::min(out.lowest, frames.tip.p.z());
     for (int i = 2; i < chain.size(); ++i) out.lowest = std::min(out.lowest, frames.links[i].p.z());

@@ -76,10 +76,17 @@ struct LimitUse {
   int joint{};        ///< index
   double time{};      ///< s
 };
+/// The largest change of a joint's torque from look to look, over the time between them.
+struct TorqueRate {
+  double value{};  ///< N m/s
+  int joint{};     ///< index
+  double time{};   ///< of the later look [s]
+};
 /// The use of all limits over a trajectory.
 struct LimitCheck {
   LimitUse position, velocity, acceleration, jerk, torque;  ///< the largest of each
-  double lowest{};  ///< height of the lowest joint origin beyond the second, or the tip [m]
+  TorqueRate torque_rate;  ///< for information: motions are not limited by it
+  double lowest{};         ///< height of the lowest joint origin beyond the second, or the tip [m]
   /// Whether every fraction is at most 1 + tolerance.
   bool within(double tolerance = 1e-9) const;
   /// The limit that is used most, in words. Throws std::invalid_argument for a joint that the chain does not

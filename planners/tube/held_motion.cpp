@@ -9,6 +9,7 @@
 #include "planners/tube/card_pads.hpp"
 #include "planners/tube/planar_hand.hpp"
 #include "planners/tube/require.hpp"
+#include "planners/tube/throw_once.hpp"
 
 namespace unhand::planners {
 
@@ -82,6 +83,13 @@ bool HeldMotion::holds(const Draw& draw) const {
   const auto law = law_of(problem_.card, draw);
   return std::all_of(scenes_.rbegin(), scenes_.rend(),
                      [&](const Scene<double>& scene) { return sticks(*law, scene, draw); });
+}
+
+int HeldMotion::drops(int count, std::uint64_t seed) const {
+  Draws draws(problem_, seed);
+  int out = 0;
+  for (int i = 0; i < count; ++i) out += !holds(draws.next());
+  return out;
 }
 
 std::optional<double> HeldMotion::needed_force() const {

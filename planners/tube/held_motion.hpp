@@ -1,6 +1,7 @@
 // Whether a grip holds its object while the arm moves, before the gripper opens.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,6 +24,8 @@ class HeldMotion {
 
   /// Whether the grip of the card holds the object all the way, with the draw's pads, object and grasp.
   bool holds(const Draw& draw) const;
+  /// How many of `count` draws, from equal seeds those of draw_landings, it does not hold.
+  int drops(int count, std::uint64_t seed) const;
   /// The least force of one pad that holds it with the nominal draw, to 0.1 % [N]; nothing if
   /// 10 kN do not.
   std::optional<double> needed_force() const;

@@ -149,15 +149,27 @@ bool add_motion(const Chain& chain, const JointVector<double>& home, const PlanO
   return false;
 }
 
+/// Why the search found nothing: by what it finds without one demand or another.
 std::string why_no_throw(const Chain& chain, const TargetBox& box, NominalOptions search) {
-  search.clear_column = false;
   search.refined = 0;
-  return find_throws(chain, box, search).empty()
-             ? "no configuration reaches the box within the joints' limits"
-             : fmt::format(
-                   "every throw to the box flies through the arm's own column, within {:g} m of the "
-                   "base's axis and below its joints there",
-                   kColumn);
+  auto anywhere = search;
+  anywhere.clear_column = false;
+  if (!find_throws(chain, box, anywhere).empty())
+    return fmt::format(
+        "every throw to the box flies through the arm's own column, within {:g} m of the base's axis and "
+        "below "
+        "its joints there",
+        kColumn);
+  auto any_landing = anywhere;
+  constexpr double kAny = 100;  // m/s
+  any_landing.landing.z_rate_low = -kAny, any_landing.landing.r_rate_high = kAny;
+  if (!find_throws(chain, box, any_landing).empty())
+    return fmt::format(
+        "every throw to the box comes down outside of the velocities that its tube allows ({:g} to {:g} m/s "
+        "upward, {:g} to {:g} m/s forward)",
+        search.landing.z_rate_low, search.landing.z_rate_high, search.landing.r_rate_low,
+        search.landing.r_rate_high);
+  return fmt::format("none of {} configurations reaches the box within the joints' limits", search.samples);
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 #include <stdexcept>
 
 #include "contact/registry.hpp"
@@ -172,32 +171,30 @@ void summarise(Landings& out) {
   out.std = std::sqrt(out.std);
 }
 
-namespace {
-
-/// A draw of the unknown. One that may not be negative, or not above `most`, is drawn again while it is: the
-/// last resort is the value.
-template <class Normal>
-double drawn(const Uncertain& one, bool may_be_negative, double most, Normal&& normal) {
-  if (one.sigma == 0) return one.value;
-  for (int attempt = 0; attempt < 1000; ++attempt)
-    if (const double x = one.value + one.sigma * normal(); (may_be_negative || x >= 0) && x <= most) return x;
-  return one.value;
+Draw Draws::next() {
+  constexpr int kAttempts = 1000;
+  Draw out{};
+  for (int k = 0; k < kUnknowns; ++k) {
+    const Uncertain& one = unknowns_[k];
+    out[k] = one.value;
+    for (int attempt = 0; one.sigma != 0 && attempt < kAttempts; ++attempt) {
+      const double x = one.value + one.sigma * normal_(random_);
+      if (!(has_sign(k) || x >= 0) || x > most_of(k)) continue;
+      out[k] = x;
+      break;
+    }
+  }
+  return out;
 }
-
-}  // namespace
 
 Landings draw_landings(const ReleaseThrow& problem, int count, std::uint64_t seed, const HeldMotion* before) {
   validate(problem);
   require(count >= 1, "draw_landings", "count", count, "[1, inf)");
-  const auto unknowns = unknowns_of(problem);
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal;
+  Draws draws(problem, seed);
   const PlanarHand hand = hand_of(problem);
   Landings out;
   for (int i = 0; i < count; ++i) {
-    Draw draw{};
-    for (int k = 0; k < kUnknowns; ++k)
-      draw[k] = drawn(unknowns[k], has_sign(k), most_of(k), [&] { return normal(random); });
+    const Draw draw = draws.next();
     const bool held = before == nullptr || before->holds(draw);
     const auto thrown = held ? throw_once<double>(problem, hand, draw) : std::nullopt;
     if (thrown && !thrown->slips_at_start)

@@ -34,6 +34,7 @@ std::optional<RobustThrow> plan_robust_throw(const ReleaseThrow& problem, const 
   const Chain to_object =
       with_tool(problem.chain, {Eigen::Matrix3d::Identity(), {0, 0, problem.object.com_offset.value}});
   std::string why = "no ramp leads to its acceleration within the limits";
+  std::optional<RobustThrow> best;
   for (const double share : {0.9, 0.65, 0.45, 0.3}) {
     auto moved = throw_motion(problem.chain, home, out.choice.start, out.choice.qdd, problem.hold, share);
     if (!moved) continue;
@@ -46,11 +47,13 @@ std::optional<RobustThrow> plan_robust_throw(const ReleaseThrow& problem, const 
     else
       why = why_not_held(chosen, *moved);
     if (!why.empty()) continue;
+    out.dropped = HeldMotion(chosen, *moved).drops(RobustThrow::kDraws, 1);
     out.motion = std::move(*moved);
-    return out;
+    if (!best || out.dropped < best->dropped) best = out;
+    if (best->dropped == 0) break;
   }
-  if (reason != nullptr) *reason = why;
-  return {};
+  if (!best && reason != nullptr) *reason = why;
+  return best;
 }
 
 }  // namespace unhand::planners

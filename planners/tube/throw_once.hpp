@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
+#include <random>
 
 #include "planners/tube/planar_hand.hpp"
 #include "planners/tube/release_throw.hpp"
@@ -15,6 +17,19 @@ std::array<Uncertain, kUnknowns> unknowns_of(const ReleaseThrow& problem);
 double most_of(int unknown);
 /// Whether a draw may be negative.
 bool has_sign(int unknown);
+
+/// Draws of the unknowns, each from its normal distribution. One that may not be negative, or not above
+/// most_of(), is drawn again while it is: the last resort is the value. An unknown without σ takes no draw.
+class Draws {
+ public:
+  Draws(const ReleaseThrow& problem, std::uint64_t seed) : unknowns_(unknowns_of(problem)), random_(seed) {}
+  Draw next();
+
+ private:
+  std::array<Uncertain, kUnknowns> unknowns_;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+};
 
 /// What became of one throw.
 template <class S>

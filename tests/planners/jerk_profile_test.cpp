@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "planners/arm/dynamics.hpp"
 #include "planners/arm/panda.hpp"
 
 namespace unhand::planners {
@@ -107,6 +108,29 @@ TEST(LimitCheck, FindsWhatIsExceeded) {
   EXPECT_EQ(found.velocity.joint, 3);
   EXPECT_NEAR(found.velocity.fraction, 3 / 2.175, 1e-12);
   EXPECT_EQ(found.worst(arm).substr(0, 24), "velocity of panda_joint4");
+}
+
+// From rest under a constant jerk, the torque grows by the inertia times the jerk, once friction is left out.
+TEST(LimitCheck, TellsHowFastTorquesChange) {
+  Chain arm = panda();
+  for (Joint& joint : arm.joints) joint.friction = {};
+  constexpr double kJerk = 1000, kDuration = 4e-3;
+  JointTrajectory motion;
+  JointVector<double> q(7);
+  for (int i = 0; i < 7; ++i) {
+    q[i] = 0.5 * (arm.joints[i].limits.lower + arm.joints[i].limits.upper);
+    JerkProfile profile({q[i], 0, 0, 0});
+    profile.append({{kDuration, i == 1 ? kJerk : 0}});
+    motion.joints.push_back(profile);
+  }
+  const JointVector<double> none = JointVector<double>::Zero(7), one = JointVector<double>::Unit(7, 1);
+  const JointVector<double> inertia =
+      inverse_dynamics(arm, q, none, one) - inverse_dynamics(arm, q, none, none);
+  const LimitCheck found = check_limits(arm, motion, 1e-3);
+  Eigen::Index joint = 0;
+  const double most = inertia.cwiseAbs().maxCoeff(&joint);
+  EXPECT_EQ(found.torque_rate.joint, joint);
+  EXPECT_NEAR(found.torque_rate.value, most * kJerk, 0.01 * most * kJerk);  // gravity and speed hardly change
 }
 
 TEST(JerkProfile, GoesOnUniformlyBeyondItsEnds) {

@@ -317,6 +317,44 @@ TEST(RobustThrow, IsNotPlannedWhereTheGripDoesNotHold) {
   EXPECT_THAT(reason, testing::HasSubstr("a grip of 1 N per pad lets the object slip before"));
 }
 
+// A grip that hardly holds its object over the fastest swing drops fewer draws over a slower one.
+TEST(RobustThrow, TakesTheSwingInWhichTheFewestDrawsSlip) {
+  BarThrow bar;
+  const auto tube = bar.plan();
+  ASSERT_TRUE(tube.plan) << tube.reason;
+  ReleaseThrow p = bar.release(*tube.plan);
+  p.card.mu.sigma = 0.1 * p.card.mu.value;
+  ASSERT_TRUE(plan_robust_throw(p, bar.options.home));
+  // The grip that the fastest swing needs with the nominal draw: half of the draws have less friction.
+  const auto choice = make_insensitive(p, {1, 3, 5});
+  ReleaseThrow chosen = p;
+  chosen.start = choice.start, chosen.qdd = choice.qdd;
+  const auto fastest = throw_motion(bar.arm, bar.options.home, choice.start, choice.qdd, p.hold, 0.9);
+  ASSERT_TRUE(fastest);
+  const auto needed = HeldMotion(chosen, *fastest).needed_force();
+  ASSERT_TRUE(needed);
+  p.card.grip_force = 1.03 * *needed;
+  const auto robust = plan_robust_throw(p, bar.options.home);
+  ASSERT_TRUE(robust);
+  ReleaseThrow taken = p;
+  taken.start = robust->choice.start, taken.qdd = robust->choice.qdd;
+  int least = RobustThrow::kDraws, most = 0;
+  for (const double share : {0.9, 0.65, 0.45, 0.3}) {
+    const auto motion = throw_motion(bar.arm, bar.options.home, taken.start, taken.qdd, p.hold, share);
+    if (!motion || !check_limits(bar.arm, *motion).within() || !why_not_held(taken, *motion).empty())
+      continue;
+    const int dropped = HeldMotion(taken, *motion).drops(RobustThrow::kDraws, 1);
+    least = std::min(least, dropped), most = std::max(most, dropped);
+  }
+  EXPECT_LT(least, most);  // there is a choice
+  EXPECT_EQ(robust->dropped, least);
+  // What slips in the hand is lost.
+  EXPECT_LE(robust->dropped, [&] {
+    const HeldMotion before(taken, robust->motion);
+    return draw_landings(taken, RobustThrow::kDraws, 1, &before).lost;
+  }());
+}
+
 // A bar whose centre of mass is behind the pads: the tube's motion stays above the base, the fastest one to
 // the insensitive throw would dip the pads below it.
 TEST(RobustThrow, StaysAboveItsBase) {
