@@ -81,6 +81,25 @@ int conditions_of_train(const datasets::ThrowLog& log) {
   return static_cast<int>(seen.size());
 }
 
+/// Says where wrenches of the firm grasp hardly count: no friction law acts there, so that what the model
+/// does not explain is the object (its mass, its inertia), the sensor, or pads that give.
+void tell_of_firm_grasp(const fitting::FitResult& fit) {
+  using experiment::Channel;
+  constexpr double kHardly = 0.7;  // weight
+  std::vector<std::string> words;
+  for (const auto& m : fit.misfit)
+    if (m.phase == fitting::Phase::grasped && m.weight < kHardly &&
+        (m.channel == Channel::wrench_fx || m.channel == Channel::wrench_fz ||
+         m.channel == Channel::wrench_tau))
+      words.push_back(fmt::format("{} (weight {:.2f})", to_string(m.channel), m.weight));
+  if (!words.empty())
+    tell(
+        "unhand: in the firm grasp, where no friction acts, the model does not follow {}: a mass or an "
+        "inertia declared wrong, the sensor, or pads that give. It bends the parameters, which no "
+        "interval tells; ask unhand discover\n",
+        fmt::join(words, ", "));
+}
+
 void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
   fitting::CampaignOptions campaign;
   campaign.model = request.model;
@@ -141,10 +160,10 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
           to_string(m.channel), to_string(m.phase), std::sqrt(m.chi2_per_sample()));
   if (const auto chi2 = fit.chi2_per_dof(); chi2 && *chi2 > kPoorFit)
     tell(
-        "unhand: chi2 per degree of freedom is {:.3g}: something is missing in {} or wrong in the log, and "
-        "it bends "
-        "the parameters, which no interval tells; ask unhand discover\n",
+        "unhand: chi2 per degree of freedom is {:.3g}: something is missing in {} or wrong in the log, "
+        "and it bends the parameters, which no interval tells; ask unhand discover\n",
         *chi2, request.model);
+  tell_of_firm_grasp(fit);
   tell_weak_grip(answer.errors);
 
   const Json json = fit_json(answer, request);

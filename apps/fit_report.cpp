@@ -1,9 +1,11 @@
 // The answer of `unhand fit` on throws, as text.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "apps/fit.hpp"
+#include "contact/registry.hpp"
 #include "fitting/advice.hpp"
 
 namespace unhand::apps {
@@ -97,6 +99,15 @@ Table error_table(const FitAnswer& a) {
   return out;
 }
 
+/// Whether pads that press on a wrench sensor could give, and are fitted as if they did not.
+bool takes_pads_as_rigid(const FitAnswer& a, const FitRequest& request) {
+  const auto& effects = request.effects;
+  return contact::can_give(request.model) &&
+         std::find(effects.begin(), effects.end(), "contact.pad_compliance") == effects.end() &&
+         std::any_of(a.fit.misfit.begin(), a.fit.misfit.end(),
+                     [](const auto& m) { return m.channel == experiment::Channel::wrench_fx; });
+}
+
 }  // namespace
 
 std::string why_unfitted(const fitting::FitResult& fit) {
@@ -145,6 +156,11 @@ std::string fit_text(const FitAnswer& a, const FitRequest& request, bool markdow
   if (const auto without = n_train - used - static_cast<std::size_t>(fit.not_simulated); without > 0)
     out += fmt::format("{} train throws have no observation among the channels asked for\n", without);
   for (const auto& note : a.problem.notes()) out += fmt::format("note: {}\n", note);
+  if (takes_pads_as_rigid(a, request))
+    out +=
+        "note: pads are taken as rigid. A give of a micrometre before they slip makes length some per "
+        "cent too small, more than its interval says, and chi2 hardly shows it; --effects "
+        "contact.pad_compliance fits it\n";
   out += fmt::format("\npredictions: mean absolute error ± its standard deviation (bias)\n{}{}",
                      markdown ? "\n" : "", table(error_table(a)));
   if (const auto& cv = a.cross_validation) {
@@ -153,9 +169,8 @@ std::string fit_text(const FitAnswer& a, const FitRequest& request, bool markdow
   }
   if (a.floor)
     out += fmt::format(
-        "floor: the mean of {} synthetic twins, simulated with the model as fitted and the declared noise, "
-        "then "
-        "fitted and predicted alike\n",
+        "floor: the mean of {} synthetic twins, simulated with the model as fitted and the declared "
+        "noise, then fitted and predicted alike\n",
         a.floor->twins);
   if (a.errors.failed > 0) out += fmt::format("{} throws are not brought to a landing\n", a.errors.failed);
   if (!markdown) return out;  // how long it took: in the report and the JSON
@@ -165,8 +180,7 @@ std::string fit_text(const FitAnswer& a, const FitRequest& request, bool markdow
   if (g.plain > 0)
     out += fmt::format(
         "a throw's derivatives by {} unknowns: {:.2f} ms exact, {:.1f} plain predictions; {:.2f} ms by "
-        "central "
-        "differences, {:.1f} of them (median deviation {:.1g})\n",
+        "central differences, {:.1f} of them (median deviation {:.1g})\n",
         g.unknowns, 1e3 * g.exact / static_cast<double>(used), g.exact / g.plain,
         1e3 * g.central / static_cast<double>(used), g.central / g.plain, g.deviation);
   return out;

@@ -284,8 +284,7 @@ struct DroppingMotions {
   std::string in_words(const planners::ReleaseCard& card) const {
     std::string out = fmt::format(
         "a grip of {:.4g} N per pad lets the object slip before the gripper opens in {} of the motions "
-        "within "
-        "the limits",
+        "within the limits",
         card.grip_force, count);
     if (least_force)
       out += fmt::format("; the gentlest of them needs at least {:.3g} N per pad", *least_force);

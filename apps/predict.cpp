@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -14,6 +15,7 @@
 #include "apps/throws.hpp"
 #include "apps/weak_grip.hpp"
 #include "dynamics/effect.hpp"
+#include "dynamics/median.hpp"
 #include "experiment/landing_noise.hpp"
 #include "experiment/observations.hpp"
 
@@ -177,6 +179,45 @@ void warn_outside(const datasets::ModelCard& card, const std::vector<experiment:
          outside.throws, throws.size(), condition, outside.first, outside.reason);
 }
 
+/// Says where the card's own held-out throws were missed by far more than the predictions' σ: that is of what
+/// is not known of parameters and throw, and not of what the model itself has wrong.
+void warn_wrong_model(const datasets::ModelCard& card, const Sigmas& sigmas,
+                      const std::vector<MeasuredSigma>& of_measured) {
+  constexpr double kBeyond = 3;        // of a σ that has the sensor's noise; a mean |error| is 0.8 σ then
+  constexpr double kBeyondUnread = 6;  // of one that has not
+  auto errors = card.errors.find("test");
+  if (errors == card.errors.end()) errors = card.errors.find("cross_validation");
+  if (errors == card.errors.end()) return;
+  std::vector<std::string> words;
+  const auto compare = [&](const experiment::Quantity& quantity, std::vector<double> all, double beyond) {
+    const auto error = errors->second.find(quantity.key);
+    if (all.empty() || error == errors->second.end()) return;
+    const double sigma = dynamics::median(all), mae = error->second.mae;
+    if (mae > beyond * sigma) words.push_back(fmt::format("{} {:.2g} ({:.2g})", quantity.title, mae, sigma));
+  };
+  std::array<std::vector<double>, experiment::kQuantityCount> own, read;
+  for (std::size_t i = 0; i < sigmas.size(); ++i) {
+    if (!sigmas[i]) continue;
+    const std::array<double, experiment::kQuantityCount> each{
+        sigmas[i]->detach_vx, sigmas[i]->detach_omega * kDegrees, sigmas[i]->landing_x,
+        sigmas[i]->landing_theta * kDegrees};
+    for (std::size_t q = 0; q < each.size(); ++q) own[q].push_back(each[q]);
+    if (of_measured[i].x) read[2].push_back(*of_measured[i].x);
+    if (of_measured[i].theta) read[3].push_back(*of_measured[i].theta * kDegrees);
+  }
+  for (std::size_t q = 0; q < own.size(); ++q)
+    if (read[q].empty())
+      compare(experiment::kQuantities[q], std::move(own[q]), kBeyondUnread);
+    else
+      compare(experiment::kQuantities[q], std::move(read[q]), kBeyond);
+  if (!words.empty())
+    tell(
+        "unhand: the card's own held-out throws were missed by far more than the sigmas here (mean "
+        "absolute error, in brackets the median sigma): {}. A sigma holds what is not known of parameters "
+        "and throw, and not what {} has wrong\n",
+        fmt::join(words, ", "), card.model);
+}
+
 /// Says how the gripper opens in throws whose normal force was not measured.
 void tell_opening(const datasets::ModelCard& card, const std::vector<experiment::PreparedThrow>& throws) {
   const auto n =
@@ -242,6 +283,7 @@ void predict(const PredictOptions& options) {
     tell("unhand: {} of {} throws, {}: {}\n", failure.second, result.throws.size(), name, failure.first);
 
   const auto of_measured = measured_sigmas(log, prepared, sigmas);
+  warn_wrong_model(card.card, sigmas, of_measured);
   Outputs outputs{{options.log, options.card}};
   if (!options.json.empty()) {
     Json json = json_head("predict");

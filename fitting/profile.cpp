@@ -3,14 +3,24 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fitting/card.hpp"
 #include "fitting/distributions.hpp"
 
 namespace unhand::fitting {
 
 namespace {
 
+/// The parameters of an opening that no sensor saw: any of a family of openings with the same tail may let an
+/// object go in the same way, and the curvature where one of its throws begins to slip early says nothing of
+/// the others.
+bool is_of_opening(const Unknown& unknown) {
+  return std::find(std::begin(kOpeningParameters), std::end(kOpeningParameters), unknown.name) !=
+         std::end(kOpeningParameters);
+}
+
 bool is_weak(const FittedUnknown& u, double half) {
-  return u.at_bound || half > 0.2 * std::abs(u.value) || !std::isfinite(u.data_sigma) ||
+  return is_of_opening(u.unknown) || u.at_bound || half > 0.2 * std::abs(u.value) ||
+         !std::isfinite(u.data_sigma) ||
          (u.unknown.prior_sigma && u.data_sigma > 0.5 * *u.unknown.prior_sigma);
 }
 

@@ -157,8 +157,7 @@ std::string why_no_throw(const Chain& chain, const TargetBox& box, NominalOption
   if (!find_throws(chain, box, anywhere).empty())
     return fmt::format(
         "every throw to the box flies through the arm's own column, within {:g} m of the base's axis and "
-        "below "
-        "its joints there",
+        "below its joints there",
         kColumn);
   auto any_landing = anywhere;
   constexpr double kAny = 100;  // m/s
