@@ -201,10 +201,9 @@ Json sku_json(const SkuQuestion& question, const SkuValidation& answer) {
   out["monte_carlo"]["samples"] = request.samples;
   out["repeats"] = nullptr;
   if (const auto& r = answer.repeats)
-    out["repeats"] = {{"motions", r->motions},
-                      {"conditions", r->conditions},
-                      {"landing_x_m", r->x},
-                      {"landing_theta_deg", r->theta * kDegrees},
+    out["repeats"] = {{"motions", r->motions},     {"conditions", r->conditions},
+                      {"landing_x_m", r->x},       {"landing_theta_deg", r->theta * kDegrees},
+                      {"offset_x_m", r->offset_x}, {"offset_theta_deg", r->offset_theta * kDegrees},
                       {"within", r->within}};
   out["agree"] = answer.agree;
   out["disagreement"] = answer.disagreement.empty() ? Json(nullptr) : Json(answer.disagreement);

@@ -204,6 +204,22 @@ void monte_carlo(const SkuMotion& motion, const MatrixXd& J, const SkuRequest& r
       whom(worst == out.budget.end() || worst->input.determined ? nullptr : &worst->input));
 }
 
+namespace {
+
+/// Predicted landings of one condition, each with its own hand and force.
+struct Repetitions {
+  int n{};
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();     ///< [m, rad]
+  Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();  ///< about the mean
+
+  explicit Repetitions(const std::vector<Eigen::Vector2d>& all) : n(static_cast<int>(all.size())) {
+    for (const auto& one : all) mean += one / n;
+    for (const auto& one : all) squares += (one - mean) * (one - mean).transpose();
+  }
+};
+
+}  // namespace
+
 std::optional<MotionRepeats> repeats_of(const datasets::Sku& sku, const datasets::ModelCard& card,
                                         const std::string& file, const SkuRequest& request,
                                         const SkuValidation& answer) {
@@ -224,25 +240,37 @@ std::optional<MotionRepeats> repeats_of(const datasets::Sku& sku, const datasets
   std::map<std::string, std::vector<Eigen::Vector2d>> by_condition;
   for (std::size_t i = 0; i < throws.size(); ++i)
     if (landings[i]) by_condition[throws[i].object + "/" + throws[i].condition].push_back(*landings[i]);
+  constexpr int kFewest = 3;  // degrees of freedom
+  const ThrowCandidate& nominal = answer.reference();
+  const auto first = std::find_if(throws.begin(), throws.end(),
+                                  [&](const auto& one) { return one.condition == nominal.condition; });
+  const auto own =
+      first == throws.end() ? by_condition.end() : by_condition.find(first->object + "/" + first->condition);
   MotionRepeats out;
   Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
   int freedom = 0;
-  for (const auto& [condition, all] : by_condition) {
-    if (all.size() < 2) continue;
-    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-    for (const auto& one : all) mean += one / static_cast<double>(all.size());
-    for (const auto& one : all) squares += (one - mean) * (one - mean).transpose();
-    out.motions += static_cast<int>(all.size()), ++out.conditions;
-    freedom += static_cast<int>(all.size()) - 1;
-  }
-  constexpr int kFewest = 3;
+  const auto add = [&](const std::vector<Eigen::Vector2d>& all) {
+    if (all.size() < 2) return;
+    const Repetitions here(all);
+    squares += here.squares, freedom += here.n - 1;
+    out.motions += here.n, ++out.conditions;
+  };
+  Eigen::Vector2d offset = Eigen::Vector2d::Zero();
+  const bool repeated = own != by_condition.end() && own->second.size() > 1;
+  if (repeated)
+    offset = Repetitions(own->second).mean - Eigen::Vector2d(nominal.landing_x, nominal.landing_theta);
+  if (repeated && static_cast<int>(own->second.size()) > kFewest)
+    add(own->second);
+  else
+    for (const auto& [condition, all] : by_condition) add(all);
   if (freedom < kFewest) return {};
   const MatrixXd covariance = squares / freedom, root = root_of(covariance);
   out.x = std::sqrt(covariance(0, 0)), out.theta = std::sqrt(covariance(1, 1));
+  out.offset_x = offset[0], out.offset_theta = offset[1];
   int within = 0;
   for (std::size_t i = 0; i < answer.samples.size(); ++i) {
     experiment::RandomStream random(request.seed, i, experiment::Purpose::repetition);
-    const VectorXd normal = Eigen::Vector2d(random.normal(), random.normal()), by = root * normal;
+    const VectorXd normal = Eigen::Vector2d(random.normal(), random.normal()), by = root * normal + offset;
     within += std::abs(answer.samples[i].x + by[0]) <= request.tolerance.x &&
               std::abs(answer.samples[i].theta + by[1]) <= request.tolerance.theta;
   }

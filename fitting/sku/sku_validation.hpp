@@ -111,11 +111,15 @@ struct MeasuredVerdict {
 };
 
 /// How far apart the same motion, repeated, brings this object down: predicted landings of the log's
-/// repetitions, each with its own hand and force, about the mean of their condition.
+/// repetitions, each with its own hand and force, about the mean of their condition. Of the answer's own
+/// condition where that is repeated four times, as some motions repeat better than others; else pooled over
+/// all that are repeated.
 struct MotionRepeats {
-  int motions{}, conditions{};  ///< that bring it to a landing; those with two or more of them
-  double x{}, theta{};          ///< 1 σ, pooled over conditions [m, rad]
-  double within{};              ///< share of the Monte Carlo's draws within the tolerance, with this scatter
+  int motions{}, conditions{};        ///< that bring it to a landing; those with two or more of them
+  double x{}, theta{};                ///< 1 σ [m, rad]
+  double offset_x{}, offset_theta{};  ///< from the nominal landing, of one repetition, to their mean [m, rad]
+  /// Share of the Monte Carlo's draws within the tolerance of the nominal landing, with scatter and offset.
+  double within{};
 };
 
 /// Whether an object can be thrown, how surely, and why.
