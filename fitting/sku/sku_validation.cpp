@@ -77,15 +77,13 @@ void decide(const datasets::Sku& sku, const datasets::ModelCard& card, const Sku
       out.message += fmt::format(
           ". Of the same motion as it was logged {:.1f} % would, but the log's motions, repeated, bring it "
           "down {:.3g} m and {:.3g} deg apart (1 sigma of {} motions of {} {}), and in the mean {:+.3g} m "
-          "and "
-          "{:+.3g} deg from the predicted one, which is of one of them",
+          "and {:+.3g} deg from the predicted one, which is of one of them",
           100 * out.within, out.repeats->x, out.repeats->theta * kDegrees, out.repeats->motions,
           out.repeats->conditions, out.repeats->conditions == 1 ? "condition" : "conditions",
           out.repeats->offset_x, out.repeats->offset_theta * kDegrees);
     else
       out.message +=
-          ", if the robot repeats its motion exactly: a log that repeats some (--log) tells how "
-          "well it does";
+          ", if the robot repeats its motion exactly: a log that repeats some (--log) tells how well it does";
     const bool lever = !contact::follows_pads(card.model) && std::abs(sku.com_offset) > kLeastLever;
     if (lever && !(out.measured && out.measured->confirmed)) {
       out.verdict = SkuVerdict::beyond_the_model;
