@@ -202,8 +202,8 @@ std::string out_of_reach(const el::ClutchedArm& arm, const el::ThrowTask& task, 
   return out;
 }
 
-/// How many of the nodes are confirmed by their runs.
-int to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs& outputs, Json& json) {
+/// Whether any node of the table is confirmed by its run.
+bool to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs& outputs, Json& json) {
   el::ThrowTask task;
   task.longest = o.longest > 0 ? o.longest : 1.0;
   task.start = kReadyPose;
@@ -269,14 +269,14 @@ int to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs& 
   if (missed > 0)
     notes += fmt::format("{} of {} nodes are not confirmed by their runs\n", missed, distances.size());
   fmt::print("{}\n{}", text.text(), notes);
-  const int fine = static_cast<int>(distances.size()) - missed;
-  if (o.report.empty()) return fine;
+  const bool any = missed < static_cast<int>(distances.size());
+  if (o.report.empty()) return any;
   const fs::path folder = outputs.directory(o.report);
   draw_table(checks, folder);
   write_text(folder / "table.md", text.markdown() + "\n" + notes);
   write_text(folder / "trajectory.csv", csv);
   write_text(folder / "plan.json", json_text(json));
-  return fine;
+  return any;
 }
 
 void run(const PlanElasticOptions& o) {
@@ -288,14 +288,14 @@ void run(const PlanElasticOptions& o) {
   Outputs outputs{{o.arm}};
   Json json = json_head("plan-elastic");
   json["arm"] = arm.chain.name;
-  int confirmed = 1;
+  bool usable = true;
   if (o.target_x > 0)
-    confirmed = to_target(arm, o, outputs, json);
+    usable = to_target(arm, o, outputs, json);
   else
     fastest(arm, o, outputs, json);
   if (!o.json.empty()) outputs.json(o.json, json);
   outputs.commit();
-  if (confirmed == 0)
+  if (!usable)
     throw Unanswered(
         "no node of the table is confirmed by its run: none of these throws is to be made; more --intervals, "
         "or a shorter --longest, may confirm some");

@@ -86,7 +86,7 @@ struct Score {
 };
 
 /// Landings for delays of all classes alike, with the scatter that other causes add on each axis [m].
-/// `aimed`: of a throw that a release at the classes' mean delay brings to the middle, to first order: what
+/// `aimed`: of a throw that a release at the classes' mean delay brings to the middle, to first order: who
 /// plans without the tube does not aim at an opening without delay.
 Score score(const TubeProblem& problem, const Joints& qdd, double scatter, std::uint64_t seed,
             bool aimed = false) {

@@ -48,7 +48,7 @@ inline constexpr double kLeastOutlier = 5;
 /// - a declared inertia with what a body of that mass and size can have, and a declared pad_radius with the
 ///   objects (declared_check.hpp);
 /// - each axis by itself (axis_check.hpp), the signs of the wrench and of the normal force
-/// (wrench_check.hpp);
+///   (wrench_check.hpp);
 /// - the direction of com_offset with where motion capture sees the CoM while the object is held;
 /// - the landing height with the height at which motion capture sees the flights end (to 0.1 m), with where
 ///   free flights are at landing/time, and with the highest point of all throws (to a metre);
