@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "fitting/discovery/acceptance.hpp"
@@ -49,6 +50,21 @@ std::string in_words(const MissingEstimate& missing, bool with_terms) {
                            *missing.error_before, *missing.error_after, missing.error_unit);
 }
 
+/// How far off a tracker's clock would be that leaves the same as a constant acceleration along the vertical:
+/// flights timed by a clock that is fast by a share r seem to fall at g (1 - 2 r). No effect of throws has
+/// its form.
+std::string as_clock(const Stage& stage, const MissingEstimate& missing) {
+  const auto& terms = missing.candidate.terms;
+  if (missing.phase != Phase::flight || terms.size() != 1 ||
+      terms.front().form != dynamics::AccelerationForm::along_z || stage.problem.throws().empty())
+    return {};
+  const double g = -stage.problem.throws().front().prepared.gravity.z;
+  if (!(g > 0)) return {};
+  const double rate = terms.front().coefficient / (2 * g);
+  return fmt::format("; a clock of the tracker that runs {} by {:.2g} % leaves the same in flight",
+                     rate > 0 ? "fast" : "slow", 100 * std::abs(rate));
+}
+
 /// The estimate where something is left; what acts on a tracked object in the hand may act in flight, too.
 std::optional<MissingEstimate> missing_there(const Stage& stage, const Unexplained& left,
                                              const DiscoverOptions& options) {
@@ -77,7 +93,7 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
     out->description += nearest_footprint(stage, so_far, options);
   out->missing = missing_there(stage, *out, options);
   const bool asked = so_far.asked && so_far.asked->unlisted;  // its terms have been said
-  if (out->missing) out->description += in_words(*out->missing, !asked);
+  if (out->missing) out->description += in_words(*out->missing, !asked) + as_clock(stage, *out->missing);
   return out;
 }
 

@@ -169,6 +169,25 @@ TEST(Discovery, ADragThatNoEffectHasIsNotTakenForTheNearestOne) {
            -cubic, 0.1 * cubic);
 }
 
+// A camera of 119.5 frames a second whose stamps count 120: flights fall at g / (1 + r)^2 by its clock.
+TEST(Discovery, AClockOfTheTrackerThatRunsFastIsNoEffectButIsTold) {
+  constexpr double kFast = 0.004;
+  auto log = support::loop_campaign({});
+  for (auto& one : log.throws) {
+    ASSERT_TRUE(one.mocap);
+    const double first = one.mocap->time(0);
+    for (double& t : one.mocap->time.data) t = first + (1 + kFast) * (t - first);
+  }
+  const Discovery found = found_in(std::move(log));
+  EXPECT_EQ(found.verdict, Verdict::unexplained);
+  ASSERT_TRUE(found.unexplained);
+  const std::string& words = found.unexplained->description;
+  const std::string told = "a clock of the tracker that runs fast by ";
+  const auto at = words.find(told);
+  ASSERT_NE(at, std::string::npos) << words;
+  EXPECT_NEAR(std::stod(words.substr(at + told.size())), 100 * kFast, 5 * kFast) << words;
+}
+
 // A tracked frame that is off its CoM across the pads, along which no effect moves it, turns about the CoM.
 // Listed effects, a tilt of gravity and a lift say, may take that down to the noise of every channel.
 TEST(Discovery, AFrameThatIsOffAcrossThePadsIsNoTiltAndNoLift) {
