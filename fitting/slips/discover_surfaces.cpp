@@ -6,6 +6,7 @@
 
 #include "fitting/clock.hpp"
 #include "fitting/slips/law_score.hpp"
+#include "fitting/slips/level_dependence.hpp"
 #include "fitting/slips/surface_discovery.hpp"
 #include "fitting/slips/wrench_bias.hpp"
 
@@ -165,6 +166,51 @@ void accept_law(const LawScore& law, bool controlled, SurfaceDiscovery& out) {
            true});
 }
 
+/// Writes that friction depends on speed, or says what else the levels depend on.
+void judge_levels(const LevelAnswer& levels, MeasuredDiscovery& answer) {
+  constexpr double kNoNoise = std::numeric_limits<double>::quiet_NaN();
+  if (!levels.found.empty() && !answer.first.any) answer.first = {true, 0, "level", kNoNoise};
+  for (const LevelDependence& one : levels.found) {
+    if (const std::string id = level_effect(one.by); !id.empty()) {
+      AcceptedEffect effect;
+      effect.id = id;
+      effect.p_value = one.gain.p();
+      effect.delta_bic = std::log(std::max(2.0, one.gain.n)) - one.gain.t() * std::abs(one.gain.t());
+      effect.test_error_ratio = one.after / one.before;
+      effect.parameters = one.parameters;
+      effect.why = fmt::format(
+          "the mean error of the level, of forces in units of the limit surface's, falls from {:.3g} to "
+          "{:.3g}",
+          one.before, one.after);
+      answer.effects.push_back(std::move(effect));
+      answer.separating.push_back({id, "the same pushes at other speeds"});
+      continue;
+    }
+    const auto most = std::max_element(
+        one.parameters.begin(), one.parameters.end(),
+        [](const Parameter& a, const Parameter& b) { return std::abs(a.value) < std::abs(b.value); });
+    if (most == one.parameters.end()) continue;
+    const std::string& surface = one.surfaces[static_cast<std::size_t>(most - one.parameters.begin())];
+    const std::string what =
+        one.by == LevelBy::order
+            ? fmt::format(
+                  "forces change with the order of the slips in the log, by {:+.1f} ± {:.1f} % from the "
+                  "first to the last of {}: wear, warming, or a sensor that drifts",
+                  100 * most->value, 100 * most->sigma, surface)
+            : fmt::format(
+                  "forces are {:.1f} ± {:.1f} % larger one way than the other on {}, which they are on no "
+                  "limit surface",
+                  100 * most->value, 100 * most->sigma, surface);
+    const std::string text =
+        fmt::format("{} (mean error of the level {:.3g}, with it {:.3g})", what, one.before, one.after);
+    if (answer.unexplained) {
+      answer.unexplained->description += "; and " + text;
+      continue;
+    }
+    answer.unexplained = MeasuredUnexplained{answer.phase, "level", kNoNoise, text};
+  }
+}
+
 bool is_forgotten(const std::string& id, const SurfaceDiscoveryOptions& options) {
   return std::find(options.forget.begin(), options.forget.end(), id) != options.forget.end();
 }
@@ -230,7 +276,8 @@ void judge_residuals(const LawScore& law, const LawScore& base, double unexplain
                    law.left.mean(), law.left.error(), base.left.mean(), base.left.error()),
        is_common(law.left)});
   constexpr double kNoNoise = std::numeric_limits<double>::quiet_NaN();  // is declared, to compare with
-  answer.first = {is_common(base.left), 0, "direction", kNoNoise};
+  // A law or a bias that was accepted lowers the error of directions.
+  answer.first = {is_common(base.left) || !answer.effects.empty(), 0, "direction", kNoNoise};
   if (is_common(law.left))
     answer.unexplained = MeasuredUnexplained{
         answer.phase, "direction", kNoNoise,
@@ -279,13 +326,31 @@ SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
   const LawScore& law = choice.laws[choice.best];
   const LawScore& final = bias.convinces ? bias.with : law;
   const LawScore base = base_beside(choice.best, surfaces, measured.scores);
+  std::vector<SlipSamples> logged, slips;  // as they were measured; without the bias
+  std::vector<SlipSurface> of_base, of_law;
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    const auto &before = measured.scores[i].front(), &after = choice.scores[i][choice.best];
+    if (!before.scored() || !after.scored()) continue;
+    logged.push_back(surfaces[i]);
+    slips.push_back(bias.convinces ? without_bias(surfaces[i], bias.whole.value) : surfaces[i]);
+    of_base.push_back(before.fit.surface), of_law.push_back(after.fit.surface);
+  }
+  const LevelAnswer levels = level_dependence(slips, of_law, options);
   answer.before_train = base.errors(base.train), answer.after_train = final.errors(final.train);
+  if (!levels.found.empty()) answer.after_train.back().second = levels.after_train;
   answer.before_test = {{"direction_mae_deg", base.error}};
   answer.after_test = {{"direction_mae_deg", final.error}};
+  if (levels.before > 0) {
+    answer.before_test.emplace_back("level_mae", level_error(logged, of_base, options.comparison.folds));
+    answer.after_test.emplace_back("level_mae", levels.after);
+  }
+  answer.ranking.insert(answer.ranking.end(), levels.ranking.begin(), levels.ranking.end());
+  std::stable_sort(answer.ranking.begin(), answer.ranking.end(), larger_gain);
   if (bias.convinces) accept_bias(bias, answer);
   if (choice.best > 0) accept_law(law, options.comparison.null_draws > 0, out);
-  tell_fates(answer.effects, {}, {}, answer.ranking);
   judge_residuals(final, base, options.unexplained, answer);
+  judge_levels(levels, answer);
+  tell_fates(answer.effects, {}, {}, answer.ranking);
   answer.misfit.push_back(
       {"direction", static_cast<int>(base.gain.n), base.train, base.error, final.train, final.error});
   answer.verdict = !answer.effects.empty() ? Verdict::effect_found

@@ -13,15 +13,16 @@ double norm(const Row& a) { return std::hypot(a[0], a[1], a[2]); }
 /// A stretch of sliding as it grows.
 struct Stretch {
   Row path{}, wrench{}, first{};
-  double length = 0;
+  double length = 0, lasted = 0;  // m, s
 
-  void add(const Row& f, const Row& moved, double weight) {
+  void add(const Row& f, const Row& moved, double weight, double dt) {
     if (length == 0) first = moved;
     for (std::size_t j = 0; j < 3; ++j) {
       path[j] += moved[j];
       wrench[j] += weight * f[j];
     }
     length += weight;
+    lasted += dt;
   }
   /// The angle between this row's motion and the first one's [rad].
   double turned(const Row& moved) const {
@@ -31,7 +32,7 @@ struct Stretch {
   void finish(std::vector<SlipSample>& out, int slip) {
     const double gone = norm(path);
     if (length > 0 && gone > 0) {
-      SlipSample sample{{}, {}, slip};
+      SlipSample sample{{}, {}, slip, lasted > 0 ? length / lasted : 0};
       for (std::size_t j = 0; j < 3; ++j) {
         sample.wrench[j] = wrench[j] / length;
         sample.direction[j] = path[j] / gone;
@@ -67,7 +68,7 @@ SlipSamples slip_samples(const std::string& name, const datasets::Surface& surfa
       const double weight = norm(moved);
       if (!(norm(wrench) > 0 && weight > 0)) continue;
       if (stretch.length > 0 && stretch.turned(moved) > turn) stretch.finish(out.samples, index);
-      stretch.add(wrench, moved, weight);
+      stretch.add(wrench, moved, weight, dt);
     }
     stretch.finish(out.samples, index);
   }

@@ -15,6 +15,7 @@ struct SlipSample {
   std::array<double, 3> wrench{};     ///< (f_x, f_y, τ/L) [N] that the object applies to the surface
   std::array<double, 3> direction{};  ///< (v_x, v_y, L ω)/|·| [-]
   int slip{};                         ///< index into SlipSamples::slips
+  double speed{};                     ///< mean |(v_x, v_y, L ω)| [m/s]; 0 where it is not known
 };
 
 /// The samples of one surface.

@@ -12,7 +12,7 @@ namespace {
 datasets::Surface logged(const fitting::SlipSamples& slips) {
   const double length = slips.characteristic_length;
   datasets::Surface out{1.0, length, "simulated", {}, {}};
-  for (const auto& [w, u, slip] : slips.samples) {
+  for (const auto& [w, u, slip, speed] : slips.samples) {
     std::string id = std::to_string(1000 + slip);  // in order of id
     out.slips.push_back({std::move(id),
                          datasets::Split::train,

@@ -1,0 +1,327 @@
+#include "fitting/slips/level_dependence.hpp"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "dynamics/dense_solve.hpp"
+
+namespace unhand::fitting {
+namespace {
+
+constexpr LevelBy kQuestions[] = {LevelBy::viscous, LevelBy::stribeck, LevelBy::order, LevelBy::sense};
+
+bool is_of_speed(LevelBy by) { return by == LevelBy::viscous || by == LevelBy::stribeck; }
+
+/// Levels of one surface beside what they may depend on.
+struct Levels {
+  const SlipSamples* slips{};
+  std::vector<double> level;  ///< gauge, 1 on the surface
+  std::vector<double> speed;  ///< |(v_x, v_y, r ω)| [m/s], r the largest torque over the mean largest force
+
+  Levels(const SlipSamples& of, const SlipSurface& fit) : slips(&of) {
+    const SlipSurface::Extremes e = fit.extremes();
+    const double radius = e.torque / std::sqrt(e.least_force * e.largest_force),
+                 share = radius / of.characteristic_length;
+    for (const SlipSample& s : of.samples) {
+      level.push_back(fit.gauge(s.wrench));
+      speed.push_back(s.speed * std::hypot(s.direction[0], s.direction[1], share * s.direction[2]));
+    }
+  }
+  const SlipSample& sample(std::size_t i) const { return slips->samples[i]; }
+};
+
+/// a (1 + Σ b f) with the columns of some questions, fitted to some samples.
+class LevelFit {
+ public:
+  LevelFit(const Levels& levels, std::vector<LevelBy> of, const std::vector<std::size_t>& rows)
+      : of_(std::move(of)) {
+    double least = HUGE_VAL, most = 0;
+    for (const std::size_t i : rows) {
+      least = std::min(least, levels.speed[i]);
+      most = std::max(most, levels.speed[i]);
+    }
+    if (std::find(of_.begin(), of_.end(), LevelBy::stribeck) == of_.end() || !(most > least && least > 0)) {
+      solve(levels, rows);
+      return;
+    }
+    // From speeds at which all slips but the slowest are kinetic to ones at which friction falls in all of
+    // them; then finer about the best.
+    constexpr int kGrid = 24;
+    const double low = least, ratio = std::pow(3 * most / low, 1.0 / kGrid);
+    double best = HUGE_VAL, at = low;
+    const auto take = [&](double speed) {
+      stribeck_speed_ = speed;
+      solve(levels, rows);
+      if (squares_ < best) best = squares_, at = speed;
+    };
+    for (int k = 0; k <= kGrid; ++k) take(low * std::pow(ratio, k));
+    for (double step = std::sqrt(ratio); step > 1.002; step = std::sqrt(step)) {
+      const double middle = at;
+      take(middle * step), take(middle / step);
+    }
+    stribeck_speed_ = at;
+    solve(levels, rows);
+  }
+
+  double at(const Levels& levels, std::size_t i) const { return columns(levels, i).dot(x_); }
+  /// Sizes of `by` with their σ by the scatter between slips.
+  std::vector<Parameter> parameters(const Levels& levels, const std::vector<std::size_t>& rows,
+                                    LevelBy by) const {
+    const auto first = static_cast<Eigen::Index>(place(by));
+    const double a = x_[0], b = x_[first];
+    // Derivatives of the level by a, b, ... and the speed of Stribeck's law.
+    const bool shaped = by == LevelBy::stribeck;
+    const Eigen::Index n = x_.size() + (shaped ? 1 : 0);
+    Eigen::MatrixXd bread = Eigen::MatrixXd::Zero(n, n), meat = bread;
+    std::map<int, Eigen::VectorXd> of_slip;
+    for (const std::size_t i : rows) {
+      Eigen::VectorXd j(n);
+      j.head(x_.size()) = columns(levels, i);
+      if (shaped) {
+        const double u = levels.speed[i] / stribeck_speed_;
+        j[n - 1] = b * j[first] * 2 * u * u / stribeck_speed_;
+      }
+      bread += j * j.transpose();
+      const auto sum =
+          of_slip.try_emplace(levels.sample(i).slip, Eigen::VectorXd(Eigen::VectorXd::Zero(n))).first;
+      sum->second += (levels.level[i] - at(levels, i)) * j;
+    }
+    for (const auto& [slip, g] : of_slip) meat += g * g.transpose();
+    const double S = static_cast<double>(of_slip.size()), freedom = S - static_cast<double>(n);
+    if (!(freedom > 0)) return {};
+    meat *= S / freedom;
+    const Eigen::MatrixXd C = dynamics::congruent(dynamics::pseudo_inverse(bread), meat);
+    const auto relative = [&](Eigen::Index k) {  // σ of x_k/a
+      Eigen::VectorXd d = Eigen::VectorXd::Zero(n);
+      d[k] = 1 / a, d[0] = -x_[k] / (a * a);
+      return std::sqrt(std::max(0.0, d.dot(C * d)));
+    };
+    switch (by) {
+      case LevelBy::viscous:
+        return {{"1/v_0", "s/m", b / a, relative(first), freedom}};
+      case LevelBy::stribeck:
+        if (!(b > 0)) return {{"mu_s/mu_k", "-", 1, relative(first), freedom}};  // at no speed
+        return {{"mu_s/mu_k", "-", 1 + b / a, relative(first), freedom},
+                {"v_s", "m/s", stribeck_speed_, std::sqrt(std::max(0.0, C(n - 1, n - 1))), freedom}};
+      case LevelBy::order:
+        return {{"change", "-", b / a, relative(first), freedom}};
+      case LevelBy::sense:
+        break;
+    }
+    const Eigen::Vector3d odd = x_.segment<3>(first);
+    Eigen::VectorXd d = Eigen::VectorXd::Zero(n);
+    d.segment<3>(first) = 2 * odd.normalized() / a;  // one way against the other
+    return {{"change", "-", 2 * odd.norm() / a, std::sqrt(std::max(0.0, d.dot(C * d))), freedom}};
+  }
+
+ private:
+  static std::size_t width(LevelBy by) { return by == LevelBy::sense ? 3 : 1; }
+  std::size_t place(LevelBy by) const {
+    std::size_t k = 1;
+    for (const LevelBy one : of_) {
+      if (one == by) break;
+      k += width(one);
+    }
+    return k;
+  }
+  Eigen::VectorXd columns(const Levels& levels, std::size_t i) const {
+    const SlipSample& s = levels.sample(i);
+    std::vector<double> out{1};
+    for (const LevelBy by : of_) switch (by) {
+        case LevelBy::viscous:
+          out.push_back(levels.speed[i]);
+          break;
+        case LevelBy::stribeck:
+          out.push_back(std::exp(-std::pow(levels.speed[i] / stribeck_speed_, 2)));
+          break;
+        case LevelBy::order: {
+          const double slips = static_cast<double>(levels.slips->slips.size());
+          out.push_back(s.slip / std::max(1.0, slips - 1) - 0.5);
+          break;
+        }
+        case LevelBy::sense: {
+          const double size = std::hypot(s.wrench[0], s.wrench[1], s.wrench[2]);
+          for (const double w : s.wrench) out.push_back(w / size);
+          break;
+        }
+      }
+    return Eigen::Map<const Eigen::VectorXd>(out.data(), static_cast<Eigen::Index>(out.size()));
+  }
+  void solve(const Levels& levels, const std::vector<std::size_t>& rows) {
+    std::vector<int> sides{0};  // friction rises, or falls, with speed as its effect says
+    for (const LevelBy by : of_) sides.insert(sides.end(), width(by), is_of_speed(by) ? 1 : 0);
+    const auto n = static_cast<Eigen::Index>(sides.size());
+    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
+    Eigen::VectorXd b = Eigen::VectorXd::Zero(n);
+    double yy = 0;
+    for (const std::size_t i : rows) {
+      const Eigen::VectorXd f = columns(levels, i);
+      A += f * f.transpose();
+      b += levels.level[i] * f;
+      yy += levels.level[i] * levels.level[i];
+    }
+    x_ = dynamics::pseudo_solve(A, b, sides);
+    squares_ = yy - x_.dot(b);
+  }
+
+  std::vector<LevelBy> of_;
+  Eigen::VectorXd x_;
+  double stribeck_speed_{1};  // [m/s]
+  double squares_{};
+};
+
+std::vector<std::size_t> rows_where(const Levels& levels, const auto& is_taken) {
+  std::vector<std::size_t> out;
+  for (std::size_t i = 0; i < levels.level.size(); ++i)
+    if (is_taken(levels.sample(i).slip)) out.push_back(i);
+  return out;
+}
+
+/// |level − predicted| of every sample by the folds that left its slip out.
+std::vector<double> held_out(const Levels& levels, const std::vector<LevelBy>& of, int folds) {
+  std::vector<double> out(levels.level.size());
+  for (int fold = 0; fold < folds; ++fold) {
+    const auto is_left_out = [&](int slip) { return slip % folds == fold; };
+    const LevelFit fit(levels, of, rows_where(levels, [&](int slip) { return !is_left_out(slip); }));
+    for (const std::size_t i : rows_where(levels, is_left_out))
+      out[i] = std::abs(levels.level[i] - fit.at(levels, i));
+  }
+  return out;
+}
+
+double mean_error_of(const std::vector<double>& errors) {
+  double sum = 0;
+  for (const double e : errors) sum += e;
+  return errors.empty() ? 0 : sum / static_cast<double>(errors.size());
+}
+
+/// Held-out errors of all surfaces with some questions asked.
+struct Errors {
+  std::vector<std::vector<double>> of;  ///< by surface, sample
+  double mean{};                        ///< over the surfaces' means
+};
+Errors errors_with(const std::vector<Levels>& all, const std::vector<LevelBy>& questions, int folds) {
+  Errors out;
+  for (const Levels& levels : all) {
+    out.of.push_back(held_out(levels, questions, folds));
+    out.mean += mean_error_of(out.of.back()) / static_cast<double>(all.size());
+  }
+  return out;
+}
+
+/// By slip: how much less the second errs.
+Paired gain_of(const std::vector<Levels>& all, const Errors& before, const Errors& after) {
+  Paired out;
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    std::map<int, Paired> of_slip;
+    for (std::size_t i = 0; i < all[k].level.size(); ++i)
+      of_slip[all[k].sample(i).slip].add(before.of[k][i] - after.of[k][i]);
+    for (const auto& [slip, gain] : of_slip) out.add(gain.mean());
+  }
+  return out;
+}
+
+/// The surface in turn with what its level depends on: fitted to the wrenches without that.
+Levels in_turn(const SlipSamples& slips, const SlipSurface& fit, const std::vector<LevelBy>& of) {
+  constexpr int kRounds = 3;
+  Levels levels(slips, fit);
+  for (int round = 0; round < kRounds; ++round) {
+    const LevelFit dependence(levels, of, rows_where(levels, [](int) { return true; }));
+    SlipSamples level = slips;
+    for (std::size_t i = 0; i < level.samples.size(); ++i) {
+      const double factor = dependence.at(levels, i);
+      if (!(factor > 0)) return levels;
+      for (double& w : level.samples[i].wrench) w /= factor;
+    }
+    const SurfaceFit again = fit_surface(level, fit.model);
+    if (!again.fitted()) return levels;
+    levels = Levels(slips, again.surface);
+  }
+  return levels;
+}
+
+/// Surfaces of enough slips.
+std::vector<std::size_t> judged(const std::vector<SlipSamples>& slips, int folds) {
+  std::vector<std::size_t> out;
+  for (std::size_t k = 0; k < slips.size(); ++k)
+    if (slips[k].slips.size() >= 2 * static_cast<std::size_t>(folds) && !slips[k].samples.empty())
+      out.push_back(k);
+  return out;
+}
+
+}  // namespace
+
+std::string level_effect(LevelBy by) {
+  return by == LevelBy::viscous ? "contact.viscous" : by == LevelBy::stribeck ? "contact.stribeck" : "";
+}
+
+double level_error(const std::vector<SlipSamples>& slips, const std::vector<SlipSurface>& fits, int folds) {
+  std::vector<Levels> all;
+  for (const std::size_t k : judged(slips, folds)) all.emplace_back(slips[k], fits[k]);
+  return errors_with(all, {}, folds).mean;
+}
+
+LevelAnswer level_dependence(const std::vector<SlipSamples>& slips, const std::vector<SlipSurface>& fits,
+                             const SurfaceDiscoveryOptions& options) {
+  const int folds = options.comparison.folds;
+  const std::vector<std::size_t> which = judged(slips, folds);
+  std::vector<Levels> all;
+  for (const std::size_t k : which) all.emplace_back(slips[k], fits[k]);
+  LevelAnswer out;
+  if (all.empty()) return out;
+  const auto forgotten = [&](LevelBy by) {
+    return std::find(options.forget.begin(), options.forget.end(), level_effect(by)) != options.forget.end();
+  };
+  std::vector<LevelBy> accepted;
+  Errors now = errors_with(all, {}, folds);
+  out.before = now.mean;
+  const double rate = options.family_wise_level / static_cast<double>(std::size(kQuestions));
+  for (;;) {
+    std::optional<LevelDependence> best;
+    Errors best_errors;
+    for (const LevelBy by : kQuestions) {
+      const bool has_speed = std::any_of(accepted.begin(), accepted.end(), is_of_speed);
+      if (forgotten(by) || std::find(accepted.begin(), accepted.end(), by) != accepted.end() ||
+          (is_of_speed(by) && has_speed))
+        continue;
+      std::vector<LevelBy> with = accepted;
+      with.push_back(by);
+      Errors errors = errors_with(all, with, folds);
+      const LevelDependence one{by, gain_of(all, now, errors), now.mean, errors.mean, {}, {}};
+      const bool significant = one.gain.p() < rate;
+      const bool convinces = significant && one.before - one.after > options.matters * one.before;
+      if (accepted.empty() && !level_effect(by).empty()) {
+        Ranked r{level_effect(by), std::max(0.0, one.gain.t() * one.gain.t())};
+        r.p_value = one.gain.p(), r.refit_step = 1, r.held_out_gain = one.before - one.after;
+        r.delta_bic = std::log(std::max(2.0, one.gain.n)) - one.gain.t() * std::abs(one.gain.t());
+        r.fate = convinces ? Fate::outdone : significant ? Fate::too_small : Fate::not_significant;
+        out.ranking.push_back(std::move(r));
+      }
+      if (convinces && (!best || one.after < best->after)) best = one, best_errors = std::move(errors);
+    }
+    if (!best) break;
+    accepted.push_back(best->by);
+    out.found.push_back(*best);
+    now = std::move(best_errors);
+  }
+  out.after = now.mean;
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    const Levels levels = accepted.empty() ? all[k] : in_turn(slips[which[k]], fits[which[k]], accepted);
+    const auto rows = rows_where(levels, [](int) { return true; });
+    const LevelFit fit(levels, accepted, rows);
+    for (LevelDependence& one : out.found)
+      for (Parameter p : fit.parameters(levels, rows, one.by)) {
+        p.name += "[" + slips[which[k]].surface + "]";
+        one.parameters.push_back(std::move(p)), one.surfaces.push_back(slips[which[k]].surface);
+      }
+    double sum = 0;
+    for (const std::size_t i : rows) sum += std::abs(levels.level[i] - fit.at(levels, i));
+    out.after_train += sum / static_cast<double>(rows.size() * all.size());
+  }
+  return out;
+}
+
+}  // namespace unhand::fitting

@@ -1,0 +1,153 @@
+// What forces of slips depend on beside their direction: friction that rises or falls with speed, wear,
+// another force one way than the other. All slips are synthetic.
+#include "fitting/slips/level_dependence.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+#include <string>
+
+#include "datasets/slip_log.hpp"
+#include "fitting/slips/surface_discovery.hpp"
+#include "tests/fitting/slip_simulator.hpp"
+
+namespace unhand::fitting {
+namespace {
+
+const SlipSurface kPatch = test::ellipsoid(test::along_axes);
+
+/// Speed of the reduced laws [m/s]: turning counts by the torque that a patch bears over its force.
+double reduced_speed(const SlipSample& s) {
+  const auto e = kPatch.extremes();
+  const double share = e.torque / std::sqrt(e.least_force * e.largest_force) / kPatch.characteristic_length;
+  return s.speed * std::hypot(s.direction[0], s.direction[1], share * s.direction[2]);
+}
+
+/// Slips at speeds of 2 to 200 mm/s, their forces times a factor.
+SlipSamples slips(unsigned seed, const std::function<double(const SlipSample&)>& factor) {
+  constexpr int kSlips = 60;
+  SlipSamples out = test::simulate(kPatch, kSlips, 0.05, 0.01, seed);
+  std::mt19937_64 random(seed + 1000);
+  std::uniform_real_distribution<double> decades(-2.7, -0.7);
+  for (SlipSample& s : out.samples) {
+    s.speed = std::pow(10, decades(random));
+    for (double& w : s.wrench) w *= factor(s);
+  }
+  return out;
+}
+
+SurfaceDiscoveryOptions quick() {
+  SurfaceDiscoveryOptions out;
+  out.comparison.null_draws = 0;
+  return out;
+}
+
+const AcceptedEffect* named(const MeasuredDiscovery& found, const std::string& id) {
+  for (const AcceptedEffect& effect : found.effects)
+    if (effect.id == id) return &effect;
+  return nullptr;
+}
+
+void expect_size(const Parameter& p, const std::string& name, double truth) {
+  EXPECT_EQ(p.name, name);
+  EXPECT_NEAR(p.value, truth, 4 * p.sigma) << name;
+  EXPECT_LT(p.sigma, 0.2 * std::abs(truth)) << name;
+}
+
+TEST(LevelDependence, FrictionThatRisesWithSpeedIsNamedWithItsSize) {
+  constexpr double kViscous = 5;  // s/m
+  const auto found =
+      discover_surfaces({slips(1, [](const auto& s) { return 1 + kViscous * reduced_speed(s); })}, quick())
+          .answer;
+  EXPECT_EQ(found.verdict, Verdict::effect_found);
+  EXPECT_FALSE(found.unexplained) << found.unexplained->description;
+  ASSERT_EQ(found.effects.size(), 1U);
+  EXPECT_EQ(found.effects.front().id, "contact.viscous");
+  EXPECT_LT(found.effects.front().test_error_ratio.value(), 0.3);
+  expect_size(found.effects.front().parameters.at(0), "1/v_0[simulated]", kViscous);
+}
+
+TEST(LevelDependence, FrictionThatFallsWithSpeedIsNamedWithItsSpeed) {
+  constexpr double kRatio = 1.3, kSpeed = 0.02;  // -, m/s
+  const auto found = discover_surfaces({slips(2,
+                                              [](const auto& s) {
+                                                const double u = reduced_speed(s) / kSpeed;
+                                                return 1 + (kRatio - 1) * std::exp(-u * u);
+                                              })},
+                                       quick())
+                         .answer;
+  EXPECT_FALSE(found.unexplained) << found.unexplained->description;
+  ASSERT_EQ(found.effects.size(), 1U);
+  EXPECT_EQ(found.effects.front().id, "contact.stribeck");
+  expect_size(found.effects.front().parameters.at(0), "mu_s/mu_k[simulated]", kRatio);
+  expect_size(found.effects.front().parameters.at(1), "v_s[simulated]", kSpeed);
+}
+
+TEST(LevelDependence, WearAndAnotherForceOneWayAreUnexplained) {
+  struct Case {
+    const char* words;
+    std::function<double(const SlipSample&)> factor;
+  };
+  for (const auto& [words, factor] :
+       {Case{"order of the slips", [](const SlipSample& s) { return 1 - 0.2 * s.slip / 59.0; }},
+        Case{"one way than the other", [](const SlipSample& s) { return s.wrench[1] > 0 ? 1.1 : 0.9; }}}) {
+    SurfaceDiscoveryOptions options = quick();
+    options.forget = {kWrenchBias};  // which is another reading of the second
+    const auto found = discover_surfaces({slips(3, factor)}, options).answer;
+    EXPECT_EQ(found.verdict, Verdict::unexplained) << words;
+    EXPECT_THAT(found.effects, testing::IsEmpty());
+    ASSERT_TRUE(found.unexplained) << words;
+    EXPECT_EQ(found.unexplained->channel, "level");
+    EXPECT_THAT(found.unexplained->description, testing::HasSubstr(words));
+  }
+}
+
+TEST(LevelDependence, BesideFrictionOfSpeedWearIsStillSeen) {
+  const auto found =
+      discover_surfaces(
+          {slips(4, [](const auto& s) { return (1 + 5 * reduced_speed(s)) * (1 - 0.2 * s.slip / 59.0); })},
+          quick())
+          .answer;
+  ASSERT_NE(named(found, "contact.viscous"), nullptr);
+  ASSERT_TRUE(found.unexplained);
+  EXPECT_THAT(found.unexplained->description, testing::HasSubstr("order of the slips"));
+}
+
+TEST(LevelDependence, WhatIsForgottenIsNotNamed) {
+  SurfaceDiscoveryOptions options = quick();
+  options.forget = {"contact.viscous"};
+  const auto found =
+      discover_surfaces({slips(1, [](const auto& s) { return 1 + 5 * reduced_speed(s); })}, options).answer;
+  EXPECT_EQ(named(found, "contact.viscous"), nullptr);
+  EXPECT_EQ(named(found, "contact.stribeck"), nullptr) << "friction does not fall";
+}
+
+// The level of significance of all questions together is 2 %, and a change must be worth 5 % of the error.
+TEST(LevelDependence, NoiseAloneIsHardlyEverADependence) {
+  constexpr unsigned kSets = 200;
+  int named = 0;
+  for (unsigned set = 0; set < kSets; ++set)
+    named += !level_dependence({slips(100 + set, [](const auto&) { return 1.0; })}, {kPatch}, quick())
+                  .found.empty();
+  EXPECT_LE(named, 10) << "of " << kSets;  // four expected at most; more than ten by chance in one run of 400
+}
+
+// A slip at constant velocity: the speed of its sample is that of its rows, however these are spaced.
+TEST(LevelDependence, ASampleKnowsItsSpeed) {
+  datasets::Surface patch;
+  patch.mass = 1, patch.characteristic_length = 0.05;
+  patch.slips = {{"1",
+                  datasets::Split::train,
+                  {3, 1, {0, 0.01, 0.05}, {}},
+                  {3, 3, {1, 0, 0, 1, 0, 0, 1, 0, 0}, {}},
+                  {3, 3, {0.03, 0, 0.8, 0.03, 0, 0.8, 0.03, 0, 0.8}, {}}}};
+  const SlipSamples samples = slip_samples("patch", patch);
+  ASSERT_EQ(samples.samples.size(), 1U);
+  EXPECT_NEAR(samples.samples.front().speed, std::hypot(0.03, 0.05 * 0.8), 1e-12);
+}
+
+}  // namespace
+}  // namespace unhand::fitting
