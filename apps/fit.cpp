@@ -234,7 +234,8 @@ Command fit_command(Parser& root) {
       .with_default();
   add_threads(parser, request->threads);
   parser.footer(
-      "Train throws only are fitted; the others are predicted. Existing files are replaced, each at once.\n"
+      "Train throws only are fitted; the others are predicted. Of slips all are fitted, and errors are of "
+      "a cross-validation. Existing files are replaced, each at once.\n"
       "Examples:\n  unhand fit campaign.h5 --model limit_surface --card card.json --report out\n"
       "  unhand fit campaign.h5 --model limit_surface_disc --effects flight.quadratic_drag --card card.json\n"
       "  unhand fit pushes.h5 --model convex_quartic --card felt.json");

@@ -344,9 +344,9 @@ Reading read(const std::string& format, const std::string& file, const ThrowLog&
   return read_columns(format, file, log, options);
 }
 
-std::string source_of(const std::string& format, std::size_t files) {
+std::string source_of(const std::string& format, std::size_t files, const char* kind = "measured: ") {
   return fmt::format(
-      "measured: {} file{} imported by unhand import {}{}", files, files == 1 ? "" : "s", format,
+      "{}{} file{} imported by unhand import {}{}", kind, files, files == 1 ? "" : "s", format,
       format == "phyphox" ? "; sigma estimated by the importer from the scatter in the falls" : "");
 }
 
@@ -434,7 +434,10 @@ Imported import_lab(const std::string& format, const std::vector<std::string>& n
     throw WrongUsage(fmt::format("--test-every, --test-conditions: {}", error.what()));
   }
   if (adding) {
-    const std::string added = source_of(format, inputs.size());  // --source is for new logs
+    // --source is for new logs; of one that says something else than "measured" the files may be of that,
+    // too.
+    const std::string added =
+        source_of(format, inputs.size(), log.source.starts_with("measured") ? "measured: " : "");
     if (log.source.find(added) == std::string::npos) log.source += "; " + added;
     if (log.title.starts_with(kUntitled) && log.title.find(format) == std::string::npos)
       log.title += ", " + format;

@@ -174,6 +174,9 @@ std::string measured_text(const MeasuredResult& result) {
   for (const auto& e : found.evidence)
     out += fmt::format("\n{} {}{}{}\n", e.against ? "against:" : "note:", e.about,
                        e.about.empty() ? "" : ": ", e.text);
+  if (!found.skipped.empty())
+    out += fmt::format("\nnote: {} left out; the first: {} ({})\n", found.skipped.size(),
+                       found.skipped.front().first, found.skipped.front().second);
   return out + "\n" + error_table(found).text() + "\n" + misfit_table(result).text() +
          fmt::format("\n{:.1f} s\n", found.seconds);
 }

@@ -77,9 +77,10 @@ std::string time_label(const ReleaseTrace& trace) {
 
 /// A line at the command to open.
 std::string command_mark(const ReleaseTrace& trace) {
-  return trace.open_command
-             ? "set arrow 97 from 0, graph 0 to 0, graph 1 nohead back linecolor rgb '#808080' dashtype 3\n"
-             : "";
+  const bool shown =
+      trace.open_command && !trace.rows.empty() && trace.rows.front().time <= *trace.open_command;
+  return shown ? "set arrow 97 from 0, graph 0 to 0, graph 1 nohead back linecolor rgb '#808080' dashtype 3\n"
+               : "";
 }
 
 }  // namespace
@@ -104,7 +105,11 @@ ReleaseTrace trace_of(const release::ReleaseProblem<double>& problem,
     else
       out.modes.push_back({mode, events[i].time, end});
   }
-  const double begin = problem.start, end = result.detach.time;
+  // From a little before anything happens: of a long log, the release would be a sliver.
+  constexpr double kBefore = 0.03;  // [s]
+  const double first_change = events.size() > 1 ? events[1].time : result.detach.time,
+               begin = std::max(problem.start, first_change - kBefore), end = result.detach.time;
+  for (auto& mode : out.modes) mode.begin = std::max(mode.begin, begin);
   double angle = 0;
   for (int i = 0; i < samples; ++i) {
     // Not the very end, where the limits vanish.

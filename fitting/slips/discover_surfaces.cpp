@@ -281,10 +281,12 @@ void judge_residuals(const LawScore& law, const LawScore& base, double unexplain
   if (is_common(law.left))
     answer.unexplained = MeasuredUnexplained{
         answer.phase, "direction", kNoNoise,
-        fmt::format("pushes that know nothing of each other err the same way where their wrenches are alike "
-                    "(correlation {:.2f} ± {:.2f}): the surface has features that the law has not; on three "
-                    "feet a limit surface has flat facets and edges, which no smooth law follows",
-                    law.left.mean(), law.left.error()),
+        fmt::format(
+            "pushes that know nothing of each other err the same way where their wrenches are alike "
+            "(correlation {:.2f} ± {:.2f}): the surface has features that the law has not (on three feet "
+            "a limit surface has flat facets and edges, which no smooth law follows), or wrench and twist "
+            "are not of one patch at one time: late, turned, about another point, on another scale",
+            law.left.mean(), law.left.error()),
         law.left.mean()};
 }
 

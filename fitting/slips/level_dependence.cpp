@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <optional>
 
 #include "dynamics/dense_solve.hpp"
@@ -13,15 +14,45 @@ namespace {
 
 constexpr LevelBy kQuestions[] = {LevelBy::viscous, LevelBy::stribeck, LevelBy::order, LevelBy::sense};
 
+/// Whether id `a` comes before `b`, numbers in them by their value: 2 before 10.
+bool is_before(const std::string& a, const std::string& b) {
+  const auto digit = [](char c) { return c >= '0' && c <= '9'; };
+  std::size_t i = 0, j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (!digit(a[i]) || !digit(b[j])) {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i, ++j;
+      continue;
+    }
+    const auto number = [&](const std::string& s, std::size_t& at) {
+      while (at < s.size() && s[at] == '0') ++at;
+      const std::size_t begin = at;
+      while (at < s.size() && digit(s[at])) ++at;
+      return s.substr(begin, at - begin);
+    };
+    const std::string m = number(a, i), n = number(b, j);
+    if (m.size() != n.size()) return m.size() < n.size();
+    if (m != n) return m < n;
+  }
+  return a.size() - i < b.size() - j;
+}
+
 bool is_of_speed(LevelBy by) { return by == LevelBy::viscous || by == LevelBy::stribeck; }
 
 /// Levels of one surface beside what they may depend on.
 struct Levels {
   const SlipSamples* slips{};
   std::vector<double> level;  ///< gauge, 1 on the surface
+  std::vector<double> place;  ///< of every slip in the order of ids, −1/2 to 1/2
   std::vector<double> speed;  ///< |(v_x, v_y, r ω)| [m/s], r the largest torque over the mean largest force
 
-  Levels(const SlipSamples& of, const SlipSurface& fit) : slips(&of) {
+  Levels(const SlipSamples& of, const SlipSurface& fit) : slips(&of), place(of.slips.size()) {
+    std::vector<std::size_t> order(of.slips.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return is_before(of.slips[a], of.slips[b]); });
+    for (std::size_t k = 0; k < order.size(); ++k)
+      place[order[k]] = static_cast<double>(k) / std::max(1.0, static_cast<double>(order.size()) - 1) - 0.5;
     const SlipSurface::Extremes e = fit.extremes();
     const double radius = e.torque / std::sqrt(e.least_force * e.largest_force),
                  share = radius / of.characteristic_length;
@@ -137,11 +168,9 @@ class LevelFit {
         case LevelBy::stribeck:
           out.push_back(std::exp(-std::pow(levels.speed[i] / stribeck_speed_, 2)));
           break;
-        case LevelBy::order: {
-          const double slips = static_cast<double>(levels.slips->slips.size());
-          out.push_back(s.slip / std::max(1.0, slips - 1) - 0.5);
+        case LevelBy::order:
+          out.push_back(levels.place[static_cast<std::size_t>(s.slip)]);
           break;
-        }
         case LevelBy::sense: {
           const double size = std::hypot(s.wrench[0], s.wrench[1], s.wrench[2]);
           for (const double w : s.wrench) out.push_back(w / size);

@@ -15,7 +15,7 @@ namespace unhand::fitting {
 enum class LevelBy {
   viscous,  ///< contact.viscous: 1 + v/v_0, rising; v = |(v_x, v_y, r ω)|, r the surface's torque over force
   stribeck,  ///< contact.stribeck: 1 + (μ_s/μ_k − 1) exp(−(v/v_s)²), falling
-  order,     ///< the slip's place in the log: wear, warming, a sensor that drifts
+  order,     ///< the slip's place in the order of ids (2 before 10): wear, warming, a sensor that drifts
   sense      ///< more one way than the other: no even surface has it
 };
 

@@ -50,6 +50,21 @@ double duration(const datasets::Series& time, std::size_t i) {
   return (time(std::min(i + 1, n - 1)) - time(i > 0 ? i - 1 : 0)) / 2;
 }
 
+/// The speed |(v_x, v_y, L ω)| [m/s] below which a patch rests, beside how it slides in the rest of a slip.
+double resting_speed(const datasets::Slip& slip, double length) {
+  constexpr double kRests = 0.05, kUpper = 0.9;
+  std::vector<double> speeds;
+  for (std::size_t i = 0; i < slip.time.rows; ++i) {
+    const double speed = norm({slip.twist(i, 0), slip.twist(i, 1), slip.twist(i, 2) * length});
+    if (speed > 0) speeds.push_back(speed);
+  }
+  if (speeds.empty()) return 0;
+  const auto upper =
+      speeds.begin() + static_cast<std::ptrdiff_t>(kUpper * static_cast<double>(speeds.size() - 1));
+  std::nth_element(speeds.begin(), upper, speeds.end());
+  return kRests * *upper;
+}
+
 }  // namespace
 
 SlipSamples slip_samples(const std::string& name, const datasets::Surface& surface, double turn) {
@@ -59,6 +74,7 @@ SlipSamples slip_samples(const std::string& name, const datasets::Surface& surfa
     const int index = static_cast<int>(out.slips.size());
     out.slips.push_back(slip.id);
     Stretch stretch;
+    const double rests = resting_speed(slip, length);
     for (std::size_t i = 0; i < slip.time.rows; ++i) {
       const auto& f = slip.wrench;
       const auto& v = slip.twist;
@@ -66,7 +82,7 @@ SlipSamples slip_samples(const std::string& name, const datasets::Surface& surfa
       const Row wrench{f(i, 0), f(i, 1), f(i, 2) / length};
       const Row moved{dt * v(i, 0), dt * v(i, 1), dt * v(i, 2) * length};
       const double weight = norm(moved);
-      if (!(norm(wrench) > 0 && weight > 0)) continue;
+      if (!(norm(wrench) > 0 && weight > 0 && weight >= rests * dt)) continue;
       if (stretch.length > 0 && stretch.turned(moved) > turn) stretch.finish(out.samples, index);
       stretch.add(wrench, moved, weight, dt);
     }

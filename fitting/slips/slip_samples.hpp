@@ -28,8 +28,10 @@ struct SlipSamples {
 
 /// The samples of one surface, in the log's order. A slip is cut where the twist has turned by more than
 /// `turn` [rad] since the last cut; a sample is the path of one stretch (each row's twist lasts half of each
-/// interval beside it) and its wrench, averaged over that path. Rows without motion or force are left out; a
-/// slip that has no others keeps its id and has no samples.
+/// interval beside it) and its wrench, averaged over that path. Rows without motion or force are left out,
+/// and so are those slower than a twentieth of the speed that nine tenths of the slip's rows do not exceed:
+/// the patch rests there, its wrench may be any within the surface, and its twist is noise. A slip that has
+/// no others keeps its id and has no samples.
 SlipSamples slip_samples(const std::string& name, const datasets::Surface& surface, double turn = 0.1);
 
 }  // namespace unhand::fitting
