@@ -124,12 +124,6 @@ class ColumnFinder {
     if (symbol.empty()) line_.fail(out.header, "has no unit: " + hint);
     out.unit = find_unit(spelt(symbol));
     if (out.unit == nullptr) line_.fail(out.header, fmt::format("unit '{}' is not known: {}", symbol, hint));
-    if (given != map_.units.end() && has_header_ && !headers_[out.index].unit.empty()) {
-      const auto* headed = find_unit(spelt(headers_[out.index].unit));
-      if (headed != nullptr && headed != out.unit)
-        line_.fail(out.header, fmt::format("its header says '{}', and the units given say '{}'",
-                                           headers_[out.index].unit, symbol));
-    }
     if (out.unit->quantity != wanted.quantity)
       line_.fail(out.header,
                  fmt::format("unit '{}' is for {}, but {} is measured in {}", symbol,
