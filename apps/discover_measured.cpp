@@ -34,7 +34,7 @@ std::vector<std::string> catalogue(MeasuredKind kind) {
   if (kind == MeasuredKind::slips) {
     for (const auto model : fitting::surface_models)
       out.push_back(std::string(fitting::kLaw) + fitting::to_string(model));
-    for (const char* id : {fitting::kWrenchBias, "contact.stribeck", "contact.viscous"}) out.emplace_back(id);
+    for (const char* id : {fitting::kWrenchBias, fitting::kStribeck, fitting::kViscous}) out.emplace_back(id);
     return out;
   }
   for (const auto& effect :

@@ -77,8 +77,7 @@ std::string time_label(const ReleaseTrace& trace) {
 
 /// A line at the command to open.
 std::string command_mark(const ReleaseTrace& trace) {
-  const bool shown =
-      trace.open_command && !trace.rows.empty() && trace.rows.front().time <= *trace.open_command;
+  const bool shown = trace.open_command && trace.rows.front().time <= *trace.open_command;
   return shown ? "set arrow 97 from 0, graph 0 to 0, graph 1 nohead back linecolor rgb '#808080' dashtype 3\n"
                : "";
 }

@@ -73,8 +73,9 @@ Figure sku_landing_figure(const SkuQuestion& question, const SkuValidation& answ
       "set xlabel 'landing x about the predicted [cm]'\nset ylabel 'landing theta about the predicted "
       "[deg]'\n"
       "set xrange [{:.6g}:{:.6g}]; set yrange [{:.6g}:{:.6g}]\n",
-      plain(question.sku.name), 100 * (answer.repeats ? answer.repeats->within : answer.within), tx, tt,
-      answer.repeats ? ", with how the log repeats its motions" : "", -x, x, -theta, theta);
+      plain(question.sku.name), 100 * answer.within, tx, tt,
+      answer.repeats ? fmt::format("; as the log repeats it {:.1f} %", 100 * answer.repeats->within) : "", -x,
+      x, -theta, theta);
   s += place(figure, {1.9, figure.width - 0.5, 1.8 + key_height(key.size(), columns), figure.height - 1.0});
   s += "plot DATA index 0 using 1:2 with points pointtype 7 pointsize 0.35 linecolor rgb '#56b4e9', \\\n"
        "     DATA index 1 using 1:2 with lines linecolor rgb '#000000' linewidth 1.6, \\\n"

@@ -68,7 +68,7 @@ std::size_t believed(const std::vector<LawScore>& laws, const SurfaceDiscoveryOp
     const LawScore& law = laws[k];
     const double gain = law.base_error - law.error;
     Ranked r{id_of(law.model), std::max(0.0, law.gain.t() * law.gain.t())};
-    r.p_value = law.gain.p(), r.refit_step = 1, r.held_out_gain = gain, r.delta_bic = law.delta_bic();
+    r.p_value = law.gain.p(), r.refit_step = 1, r.held_out_gain = gain, r.delta_bic = law.gain.delta_bic();
     const bool significant = law.gain.p() < rate;
     const bool convinces = significant && gain > options.matters * law.base_error && gain > law.null_gain;
     r.fate = convinces ? Fate::outdone : significant ? Fate::too_small : Fate::not_significant;
@@ -131,7 +131,7 @@ BiasTrial try_bias(const std::vector<SlipSamples>& surfaces, std::size_t k, cons
   const double gain = out.with.base_error - out.with.error;
   out.ranked.gain = std::max(0.0, out.with.gain.t() * out.with.gain.t());
   out.ranked.p_value = out.with.gain.p();
-  out.ranked.held_out_gain = gain, out.ranked.delta_bic = out.with.delta_bic();
+  out.ranked.held_out_gain = gain, out.ranked.delta_bic = out.with.gain.delta_bic();
   const bool significant = out.with.gain.p() < options.family_wise_level;
   out.convinces = significant && gain > options.matters * out.with.base_error;
   if (significant) out.ranked.fate = out.convinces ? Fate::outdone : Fate::too_small;
@@ -144,7 +144,7 @@ void accept_law(const LawScore& law, bool controlled, SurfaceDiscovery& out) {
   AcceptedEffect effect;
   effect.id = id;
   effect.p_value = law.gain.p();
-  effect.delta_bic = law.delta_bic();
+  effect.delta_bic = law.gain.delta_bic();
   effect.test_error_ratio = law.error / law.base_error;
   effect.parameters.push_back({"gain", "deg", law.gain.mean(), law.gain.error(), law.gain.n - 1});
   effect.why = fmt::format(
@@ -175,7 +175,7 @@ void judge_levels(const LevelAnswer& levels, MeasuredDiscovery& answer) {
       AcceptedEffect effect;
       effect.id = id;
       effect.p_value = one.gain.p();
-      effect.delta_bic = std::log(std::max(2.0, one.gain.n)) - one.gain.t() * std::abs(one.gain.t());
+      effect.delta_bic = one.gain.delta_bic();
       effect.test_error_ratio = one.after / one.before;
       effect.parameters = one.parameters;
       effect.why = fmt::format(
@@ -190,7 +190,8 @@ void judge_levels(const LevelAnswer& levels, MeasuredDiscovery& answer) {
         one.parameters.begin(), one.parameters.end(),
         [](const Parameter& a, const Parameter& b) { return std::abs(a.value) < std::abs(b.value); });
     if (most == one.parameters.end()) continue;
-    const std::string& surface = one.surfaces[static_cast<std::size_t>(most - one.parameters.begin())];
+    const std::size_t bracket = most->name.find('[') + 1;
+    const std::string surface = most->name.substr(bracket, most->name.size() - 1 - bracket);
     const std::string what =
         one.by == LevelBy::order
             ? fmt::format(
@@ -211,14 +212,10 @@ void judge_levels(const LevelAnswer& levels, MeasuredDiscovery& answer) {
   }
 }
 
-bool is_forgotten(const std::string& id, const SurfaceDiscoveryOptions& options) {
-  return std::find(options.forget.begin(), options.forget.end(), id) != options.forget.end();
-}
-
 Choice choose_law(const std::vector<SlipSamples>& surfaces, const SurfaceDiscoveryOptions& options) {
   std::vector<SurfaceModel> models{options.base};
   for (const SurfaceModel model : surface_models)
-    if (model != options.base && !is_forgotten(id_of(model), options)) models.push_back(model);
+    if (model != options.base && !options.is_forgotten(id_of(model))) models.push_back(model);
   Choice choice;
   choice.scores = compare_surfaces(surfaces, models, options.comparison);
   choice.laws = score_laws(surfaces, models, choice.scores, choice);
@@ -249,7 +246,7 @@ void accept_bias(const BiasTrial& bias, MeasuredDiscovery& answer) {
   AcceptedEffect effect;
   effect.id = kWrenchBias;
   effect.p_value = bias.with.gain.p();
-  effect.delta_bic = bias.with.delta_bic();
+  effect.delta_bic = bias.with.gain.delta_bic();
   effect.test_error_ratio = bias.with.error / bias.without.error;
   const char* names[] = {"fx", "fy", "tau"};
   for (Eigen::Index j = 0; j < 3; ++j) {
@@ -316,12 +313,12 @@ SurfaceDiscovery discover_surfaces(const std::vector<SlipSamples>& surfaces,
     return out;
   }
   BiasTrial bias;
-  if (!is_forgotten(kWrenchBias, options)) bias = try_bias(surfaces, measured.best, measured.scores, options);
+  if (!options.is_forgotten(kWrenchBias)) bias = try_bias(surfaces, measured.best, measured.scores, options);
   Choice choice = bias.convinces ? choose_again(surfaces, measured, options, bias) : measured;
   answer.ranking = std::move(choice.ranking);
   out.evidence = std::move(choice.evidence);
   answer.train = answer.test = choice.slips;
-  if (!is_forgotten(kWrenchBias, options)) {
+  if (!options.is_forgotten(kWrenchBias)) {
     answer.ranking.push_back(bias.ranked);
     std::stable_sort(answer.ranking.begin(), answer.ranking.end(), larger_gain);
   }

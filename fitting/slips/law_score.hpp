@@ -21,6 +21,9 @@ struct Paired {
   double t() const { return error() > 0 ? mean() / error() : 0; }
   /// One-sided: the mean is above zero.
   double p() const;
+  /// As Bayes' criterion would be of one parameter more. Of a gain that is held out, so that richer laws have
+  /// no head start.
+  double delta_bic() const { return std::log(std::max(2.0, n)) - t() * std::abs(t()); }
 };
 
 /// A law beside the base, over the surfaces on which both were scored.
@@ -39,9 +42,6 @@ struct LawScore {
   void average() {
     for (double* sum : {&error, &base_error, &train, &level, &null_gain}) *sum /= std::max(1, compared);
   }
-  /// As Bayes' criterion would be of one parameter more: the gain is held out, so richer laws have no head
-  /// start.
-  double delta_bic() const { return std::log(std::max(2.0, gain.n)) - gain.t() * std::abs(gain.t()); }
   NamedErrors errors(double direction) const {
     return {{"direction_mae_deg", direction}, {"level_mae", level}};
   }

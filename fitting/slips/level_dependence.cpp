@@ -69,35 +69,25 @@ class LevelFit {
  public:
   LevelFit(const Levels& levels, std::vector<LevelBy> of, const std::vector<std::size_t>& rows)
       : of_(std::move(of)) {
+    for (const LevelBy by : of_) sides_.insert(sides_.end(), width(by), is_of_speed(by) ? 1 : 0);
+    design_.resize(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(sides_.size()));
+    level_.resize(design_.rows());
     double least = HUGE_VAL, most = 0;
-    for (const std::size_t i : rows) {
-      least = std::min(least, levels.speed[i]);
-      most = std::max(most, levels.speed[i]);
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      const std::size_t i = rows[k];
+      design_.row(static_cast<Eigen::Index>(k)) = columns(levels, i).transpose();
+      level_[static_cast<Eigen::Index>(k)] = levels.level[i];
+      least = std::min(least, levels.speed[i]), most = std::max(most, levels.speed[i]);
     }
     if (std::find(of_.begin(), of_.end(), LevelBy::stribeck) == of_.end() || !(most > least && least > 0)) {
-      solve(levels, rows);
+      solve();
       return;
     }
-    // From speeds at which all slips but the slowest are kinetic to ones at which friction falls in all of
-    // them; then finer about the best.
-    constexpr int kGrid = 24;
-    const double low = least, ratio = std::pow(3 * most / low, 1.0 / kGrid);
-    double best = HUGE_VAL, at = low;
-    const auto take = [&](double speed) {
-      stribeck_speed_ = speed;
-      solve(levels, rows);
-      if (squares_ < best) best = squares_, at = speed;
-    };
-    for (int k = 0; k <= kGrid; ++k) take(low * std::pow(ratio, k));
-    for (double step = std::sqrt(ratio); step > 1.002; step = std::sqrt(step)) {
-      const double middle = at;
-      take(middle * step), take(middle / step);
-    }
-    stribeck_speed_ = at;
-    solve(levels, rows);
+    search_speed(levels, rows, least, most);
   }
 
   double at(const Levels& levels, std::size_t i) const { return columns(levels, i).dot(x_); }
+
   /// Sizes of `by` with their σ by the scatter between slips.
   std::vector<Parameter> parameters(const Levels& levels, const std::vector<std::size_t>& rows,
                                     LevelBy by) const {
@@ -166,7 +156,7 @@ class LevelFit {
           out.push_back(levels.speed[i]);
           break;
         case LevelBy::stribeck:
-          out.push_back(std::exp(-std::pow(levels.speed[i] / stribeck_speed_, 2)));
+          out.push_back(falling(levels.speed[i]));
           break;
         case LevelBy::order:
           out.push_back(levels.place[static_cast<std::size_t>(s.slip)]);
@@ -179,25 +169,41 @@ class LevelFit {
       }
     return Eigen::Map<const Eigen::VectorXd>(out.data(), static_cast<Eigen::Index>(out.size()));
   }
-  void solve(const Levels& levels, const std::vector<std::size_t>& rows) {
-    std::vector<int> sides{0};  // friction rises, or falls, with speed as its effect says
-    for (const LevelBy by : of_) sides.insert(sides.end(), width(by), is_of_speed(by) ? 1 : 0);
-    const auto n = static_cast<Eigen::Index>(sides.size());
-    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
-    Eigen::VectorXd b = Eigen::VectorXd::Zero(n);
-    double yy = 0;
-    for (const std::size_t i : rows) {
-      const Eigen::VectorXd f = columns(levels, i);
-      A += f * f.transpose();
-      b += levels.level[i] * f;
-      yy += levels.level[i] * levels.level[i];
+  /// From speeds at which all slips but the slowest are kinetic to ones at which friction falls in all of
+  /// them; then finer about the best.
+  void search_speed(const Levels& levels, const std::vector<std::size_t>& rows, double least, double most) {
+    constexpr int kGrid = 24;
+    const double ratio = std::pow(3 * most / least, 1.0 / kGrid);
+    double best = HUGE_VAL, at = least;
+    const auto take = [&](double speed) {
+      solve_at(levels, rows, speed);
+      if (squares_ < best) best = squares_, at = speed;
+    };
+    for (int k = 0; k <= kGrid; ++k) take(least * std::pow(ratio, k));
+    for (double step = std::sqrt(ratio); step > 1.002; step = std::sqrt(step)) {
+      const double middle = at;
+      take(middle * step), take(middle / step);
     }
-    x_ = dynamics::pseudo_solve(A, b, sides);
-    squares_ = yy - x_.dot(b);
+    solve_at(levels, rows, at);
   }
+  /// Of the columns as they are, and of Stribeck's at another speed.
+  void solve() {
+    x_ = dynamics::pseudo_solve(dynamics::gram(design_), design_.transpose() * level_, sides_);
+    squares_ = (level_ - design_ * x_).squaredNorm();
+  }
+  void solve_at(const Levels& levels, const std::vector<std::size_t>& rows, double speed) {
+    stribeck_speed_ = speed;
+    const auto column = static_cast<Eigen::Index>(place(LevelBy::stribeck));
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      design_(static_cast<Eigen::Index>(k), column) = falling(levels.speed[rows[k]]);
+    solve();
+  }
+  double falling(double speed) const { return std::exp(-std::pow(speed / stribeck_speed_, 2)); }
 
   std::vector<LevelBy> of_;
-  Eigen::VectorXd x_;
+  std::vector<int> sides_{0};  // friction rises, or falls, with speed as its effect says
+  Eigen::MatrixXd design_;     // a row per sample
+  Eigen::VectorXd level_, x_;
   double stribeck_speed_{1};  // [m/s]
   double squares_{};
 };
@@ -221,12 +227,6 @@ std::vector<double> held_out(const Levels& levels, const std::vector<LevelBy>& o
   return out;
 }
 
-double mean_error_of(const std::vector<double>& errors) {
-  double sum = 0;
-  for (const double e : errors) sum += e;
-  return errors.empty() ? 0 : sum / static_cast<double>(errors.size());
-}
-
 /// Held-out errors of all surfaces with some questions asked.
 struct Errors {
   std::vector<std::vector<double>> of;  ///< by surface, sample
@@ -236,7 +236,9 @@ Errors errors_with(const std::vector<Levels>& all, const std::vector<LevelBy>& q
   Errors out;
   for (const Levels& levels : all) {
     out.of.push_back(held_out(levels, questions, folds));
-    out.mean += mean_error_of(out.of.back()) / static_cast<double>(all.size());
+    Paired errors;
+    for (const double error : out.of.back()) errors.add(error);
+    out.mean += errors.mean() / static_cast<double>(all.size());
   }
   return out;
 }
@@ -272,6 +274,22 @@ Levels in_turn(const SlipSamples& slips, const SlipSurface& fit, const std::vect
   return levels;
 }
 
+/// Sizes of what was accepted on each surface, and what it leaves in sample.
+void add_sizes(const std::vector<Levels>& all, const std::vector<LevelBy>& accepted, LevelAnswer& out) {
+  for (const Levels& levels : all) {
+    const auto rows = rows_where(levels, [](int) { return true; });
+    const LevelFit fit(levels, accepted, rows);
+    for (LevelDependence& one : out.found)
+      for (Parameter p : fit.parameters(levels, rows, one.by)) {
+        p.name += "[" + levels.slips->surface + "]";
+        one.parameters.push_back(std::move(p));
+      }
+    Paired errors;
+    for (const std::size_t i : rows) errors.add(std::abs(levels.level[i] - fit.at(levels, i)));
+    out.after_train += errors.mean() / static_cast<double>(all.size());
+  }
+}
+
 /// Surfaces of enough slips.
 std::vector<std::size_t> judged(const std::vector<SlipSamples>& slips, int folds) {
   std::vector<std::size_t> out;
@@ -284,7 +302,7 @@ std::vector<std::size_t> judged(const std::vector<SlipSamples>& slips, int folds
 }  // namespace
 
 std::string level_effect(LevelBy by) {
-  return by == LevelBy::viscous ? "contact.viscous" : by == LevelBy::stribeck ? "contact.stribeck" : "";
+  return by == LevelBy::viscous ? kViscous : by == LevelBy::stribeck ? kStribeck : "";
 }
 
 double level_error(const std::vector<SlipSamples>& slips, const std::vector<SlipSurface>& fits, int folds) {
@@ -301,9 +319,6 @@ LevelAnswer level_dependence(const std::vector<SlipSamples>& slips, const std::v
   for (const std::size_t k : which) all.emplace_back(slips[k], fits[k]);
   LevelAnswer out;
   if (all.empty()) return out;
-  const auto forgotten = [&](LevelBy by) {
-    return std::find(options.forget.begin(), options.forget.end(), level_effect(by)) != options.forget.end();
-  };
   std::vector<LevelBy> accepted;
   Errors now = errors_with(all, {}, folds);
   out.before = now.mean;
@@ -313,19 +328,19 @@ LevelAnswer level_dependence(const std::vector<SlipSamples>& slips, const std::v
     Errors best_errors;
     for (const LevelBy by : kQuestions) {
       const bool has_speed = std::any_of(accepted.begin(), accepted.end(), is_of_speed);
-      if (forgotten(by) || std::find(accepted.begin(), accepted.end(), by) != accepted.end() ||
-          (is_of_speed(by) && has_speed))
+      if (options.is_forgotten(level_effect(by)) ||
+          std::find(accepted.begin(), accepted.end(), by) != accepted.end() || (is_of_speed(by) && has_speed))
         continue;
       std::vector<LevelBy> with = accepted;
       with.push_back(by);
       Errors errors = errors_with(all, with, folds);
-      const LevelDependence one{by, gain_of(all, now, errors), now.mean, errors.mean, {}, {}};
+      const LevelDependence one{by, gain_of(all, now, errors), now.mean, errors.mean, {}};
       const bool significant = one.gain.p() < rate;
       const bool convinces = significant && one.before - one.after > options.matters * one.before;
       if (accepted.empty() && !level_effect(by).empty()) {
         Ranked r{level_effect(by), std::max(0.0, one.gain.t() * one.gain.t())};
         r.p_value = one.gain.p(), r.refit_step = 1, r.held_out_gain = one.before - one.after;
-        r.delta_bic = std::log(std::max(2.0, one.gain.n)) - one.gain.t() * std::abs(one.gain.t());
+        r.delta_bic = one.gain.delta_bic();
         r.fate = convinces ? Fate::outdone : significant ? Fate::too_small : Fate::not_significant;
         out.ranking.push_back(std::move(r));
       }
@@ -337,19 +352,10 @@ LevelAnswer level_dependence(const std::vector<SlipSamples>& slips, const std::v
     now = std::move(best_errors);
   }
   out.after = now.mean;
-  for (std::size_t k = 0; k < all.size(); ++k) {
-    const Levels levels = accepted.empty() ? all[k] : in_turn(slips[which[k]], fits[which[k]], accepted);
-    const auto rows = rows_where(levels, [](int) { return true; });
-    const LevelFit fit(levels, accepted, rows);
-    for (LevelDependence& one : out.found)
-      for (Parameter p : fit.parameters(levels, rows, one.by)) {
-        p.name += "[" + slips[which[k]].surface + "]";
-        one.parameters.push_back(std::move(p)), one.surfaces.push_back(slips[which[k]].surface);
-      }
-    double sum = 0;
-    for (const std::size_t i : rows) sum += std::abs(levels.level[i] - fit.at(levels, i));
-    out.after_train += sum / static_cast<double>(rows.size() * all.size());
-  }
+  std::vector<Levels> sized;
+  for (std::size_t k = 0; k < all.size(); ++k)
+    sized.push_back(accepted.empty() ? all[k] : in_turn(slips[which[k]], fits[which[k]], accepted));
+  add_sizes(sized, accepted, out);
   return out;
 }
 

@@ -26,7 +26,6 @@ struct LevelDependence {
   double before{}, after{};           ///< mean held-out |level − predicted| [-]
   std::vector<Parameter> parameters;  ///< with "[surface]"; of order and sense the relative change from end
                                       ///< to end
-  std::vector<std::string> surfaces;  ///< of the parameters, in their order
 };
 
 /// What the levels depend on.

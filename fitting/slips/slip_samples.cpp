@@ -32,7 +32,7 @@ struct Stretch {
   void finish(std::vector<SlipSample>& out, int slip) {
     const double gone = norm(path);
     if (length > 0 && gone > 0) {
-      SlipSample sample{{}, {}, slip, lasted > 0 ? length / lasted : 0};
+      SlipSample sample{{}, {}, slip, length / lasted};
       for (std::size_t j = 0; j < 3; ++j) {
         sample.wrench[j] = wrench[j] / length;
         sample.direction[j] = path[j] / gone;

@@ -1,6 +1,10 @@
 // The loop on slips: is the ellipsoid the limit surface that the patches have?
 #pragma once
 
+#include <algorithm>
+#include <string>
+#include <vector>
+
 #include "fitting/measured/measured_discovery.hpp"
 #include "fitting/slips/compare_surfaces.hpp"
 
@@ -8,6 +12,8 @@ namespace unhand::fitting {
 
 /// What slips can show beside another law: wrenches that are off by a constant, in the frame of the object.
 inline constexpr const char* kWrenchBias = "sensor.ft_bias";
+/// And friction that rises, or falls, with the speed of sliding.
+inline constexpr const char *kViscous = "contact.viscous", *kStribeck = "contact.stribeck";
 
 /// When another limit surface, or a bias, is believed.
 struct SurfaceDiscoveryOptions {
@@ -19,6 +25,10 @@ struct SurfaceDiscoveryOptions {
   /// standard errors) say that something is left.
   double unexplained{0.15};
   std::vector<std::string> forget;  ///< "contact.law:convex_quartic", ...
+  /// Whether `forget` names it.
+  bool is_forgotten(const std::string& id) const {
+    return std::find(forget.begin(), forget.end(), id) != forget.end();
+  }
 };
 
 /// One law on one surface against the base.
