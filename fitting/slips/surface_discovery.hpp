@@ -12,8 +12,10 @@ namespace unhand::fitting {
 
 /// What slips can show beside another law: wrenches that are off by a constant, in the frame of the object.
 inline constexpr const char* kWrenchBias = "sensor.ft_bias";
-/// And friction that rises, or falls, with the speed of sliding.
-inline constexpr const char *kViscous = "contact.viscous", *kStribeck = "contact.stribeck";
+/// And friction that rises with the speed of sliding.
+inline constexpr const char* kViscous = "contact.viscous";
+/// Or that falls.
+inline constexpr const char* kStribeck = "contact.stribeck";
 
 /// When another limit surface, or a bias, is believed.
 struct SurfaceDiscoveryOptions {
