@@ -62,9 +62,10 @@ double sigma_of(const Series& series, std::size_t column, double least) {
 /// The least σ that a channel is trusted to [SI]: the integration and the smoothed inputs are no better.
 constexpr double kLeastForce = 1e-4, kLeastTorque = 1e-6, kLeastLength = 1e-6, kLeastAngle = 1e-5;
 
-bool is_settling(const std::vector<double>& jumps, double t, double settling) {
-  return std::any_of(jumps.begin(), jumps.end(),
-                     [&](double jump) { return t >= jump - 1e-9 && t < jump + settling; });
+bool is_near_jump(const std::vector<double>& jumps, double t, const ObservationOptions& options) {
+  return std::any_of(jumps.begin(), jumps.end(), [&](double jump) {
+    return t >= jump - options.before_jump - 1e-9 && t < jump + options.settling;
+  });
 }
 
 void add_wrench(const datasets::FtLog& ft, const PreparedThrow& prepared, const ObservationOptions& options,
@@ -82,8 +83,7 @@ void add_wrench(const datasets::FtLog& ft, const PreparedThrow& prepared, const 
   }
   for (std::size_t i = 0; i < ft.time.rows; ++i) {
     const double t = ft.time(i);
-    if (t < prepared.hand.begin() || t > prepared.hand.end() || is_settling(jumps, t, options.settling))
-      continue;
+    if (t < prepared.hand.begin() || t > prepared.hand.end() || is_near_jump(jumps, t, options)) continue;
     const double force = std::hypot(ft.wrench(i, 0), ft.wrench(i, 1));
     const double size[3] = {force, force, std::hypot(ft.wrench(i, 2), contact::kFingerLength * force)};
     for (std::size_t c = 0; c < 3; ++c)

@@ -52,6 +52,9 @@ struct ObservationOptions {
   /// Wrenches are not used for this long after the log begins and after a jump of the hand's acceleration
   /// [s]: real pads ring there (some micrometres under a held object of 0.2 kg: 30 ms), rigid ones jump.
   double settling{0.03};
+  /// Nor for this long before a jump [s]: the sensor's clock may be early, and the sample that a jump passes
+  /// over as that clock is fitted would make a step of the misfit.
+  double before_jump{0.005};
   /// To what share of the whole wrench a sample of its parts is trusted, beside its noise [-]. The gain of an
   /// F/T sensor and the shape of a friction law are good to a hundredth, and such an error stays for some
   /// twenty samples, which would count as that many witnesses.

@@ -234,7 +234,8 @@ SyntheticThrow make_throw(const CampaignDesign& design, const std::vector<bool>&
     ThrowReader<double> reader(problem, result, flight, setup, truth.patch.pads);
     reader.fly(seen.landing.flight_time + 0.1, options.integrator);
     record_sensors({commanded, opening, reader, problem.start, result.detach.time + seen.landing.flight_time,
-                    seen.landing.pose, setup.sensing.normal_force_bias, setup.sensing.mocap_time_offset},
+                    seen.landing.pose, setup.sensing.normal_force_bias, setup.sensing.mocap_time_offset,
+                    setup.sensing.ft_time_offset},
                    design.sensors, seed, static_cast<std::uint64_t>(index), record);
   } catch (const std::invalid_argument& error) {
     throw fail(error.what());

@@ -68,14 +68,15 @@ datasets::FtLog log_forces(const SensedThrow& sensed, const SensorSuite& sensors
   const double begin = sensed.commanded.begin(), end = sensed.commanded.end();
   const auto kinks = sensed.normal_force.kinks();
   for (const double t : sample_times(begin, end, sensors.ft_rate)) {
+    const double stamp = t + sensed.ft_time_offset;
     std::array<double, 3> wrench{};
     if (sensors.wrench) {
-      const auto felt = sensed.reader.wrench(t);
+      const auto felt = sensed.reader.wrench(stamp);
       wrench = {felt.fx, felt.fz, felt.tau};
     }
     const double force =
         sensed.normal_force.at(window_at(begin, end, kinks, t), t) + sensed.normal_force_bias;
-    append(log.time, std::array{t});
+    append(log.time, std::array{stamp});
     append(log.wrench, noisy(wrench, w, random));
     append(log.normal_force, noisy(std::array{force}, {sensors.normal_force_sigma}, random));
   }

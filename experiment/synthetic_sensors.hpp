@@ -20,6 +20,7 @@ struct SensedThrow {
   dynamics::Pose<double> landing_pose;       ///< of the tracked frame; m, m, rad
   double normal_force_bias{};                ///< [N]
   double mocap_time_offset{};                ///< [s]
+  double ft_time_offset{};                   ///< [s]
 };
 
 /// Writes the groups that the suite has into `record`. Each sensor draws from its own stream of (seed,

@@ -27,7 +27,7 @@ FeltForce<S> felt_force(const PreparedThrow& prepared, const ThrowSetup<S>& setu
     force.doubt(prepared.force_fit, values.get("force_deviation", 0));
     // The smoothing fades the bias out over the measured ramp, not from the command on.
     const double start = prepared.force_fit.opening_start;
-    force.unbias(setup, std::isfinite(start) ? start : prepared.open_command);
+    force.correct(setup, std::isfinite(start) ? start : prepared.open_command);
     force.act(setup);
     return force;
   }

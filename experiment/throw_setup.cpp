@@ -58,10 +58,12 @@ void FeltForce<S>::doubt(const contact::NormalForceSummary& ramp, const S& devia
     wrap(std::make_unique<DoubtfulForce>(*force_, ramp, Dual(deviation)));
 }
 template <class S>
-void FeltForce<S>::unbias(const ThrowSetup<S>& setup, double opening_start) {
+void FeltForce<S>::correct(const ThrowSetup<S>& setup, double opening_start) {
   if (!dynamics::is_zero(setup.sensing.normal_force_bias))
     wrap(std::make_unique<contact::BiasedForce>(*force_, Dual(setup.sensing.normal_force_bias),
                                                 opening_start));
+  if (!dynamics::is_zero(setup.sensing.ft_time_offset))
+    wrap(std::make_unique<release::DelayedForce>(*force_, Dual(-setup.sensing.ft_time_offset)));
 }
 template <class S>
 void FeltForce<S>::act(const ThrowSetup<S>& setup) {
@@ -100,12 +102,13 @@ void ThrowReader<S>::fly(double longest, const dynamics::IntegratorOptions& opti
 }
 
 template <class S>
-dynamics::Wrench<S> ThrowReader<S>::wrench(double t) const {
+dynamics::Wrench<S> ThrowReader<S>::wrench(double stamp) const {
   const auto& s = setup_.sensing;
+  const S t = stamp - s.ft_time_offset;
   dynamics::Wrench<S> out{s.bias_fx, s.bias_fz, s.bias_tau};
-  if (t >= value_of(result_.detach.time) - kAtSample || result_.trajectory.empty()) return out;
-  const double held = std::max(t, first());
-  auto sample = sample_release(problem_, result_, S(held));
+  if (value_of(t) >= value_of(result_.detach.time) - kAtSample || result_.trajectory.empty()) return out;
+  const S held = value_of(t) < first() ? S(first()) : t;
+  auto sample = sample_release(problem_, result_, held);
   // Where slip sets in at this very instant, its direction exists only as the limit from the right.
   if (!std::isfinite(value_of(sample.wrench.fx) + value_of(sample.wrench.fz) + value_of(sample.wrench.tau)))
     sample = sample_release(problem_, result_, S(held + kAtSample));

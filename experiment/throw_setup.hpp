@@ -42,8 +42,9 @@ class FeltForce {
 
   /// Moves the release of a measured ramp by `deviation` standard deviations, if its smoothing knows them.
   void doubt(const contact::NormalForceSummary& ramp, const S& deviation);
-  /// Takes the sensor's bias off a measured force whose opening starts at `opening_start` [s].
-  void unbias(const ThrowSetup<S>& setup, double opening_start);
+  /// Takes the sensor's errors off a measured force: its bias, its opening starting at the stamp
+  /// `opening_start` [s], then its clock's.
+  void correct(const ThrowSetup<S>& setup, double opening_start);
   /// What comes between sensor and object: release.opening_delay, then contact.adhesion.
   void act(const ThrowSetup<S>& setup);
 
@@ -73,8 +74,8 @@ class ThrowReader {
   /// Integrates the flight up to `longest` [s] after the detach, where the air matters: before mocap().
   void fly(double longest, const dynamics::IntegratorOptions& options);
 
-  /// Of the sensor behind one pad, on the object, in the hand frame, about the pad centre.
-  dynamics::Wrench<S> wrench(double t) const;
+  /// Of the sensor behind one pad at its stamp [s], on the object, in the hand frame, about the pad centre.
+  dynamics::Wrench<S> wrench(double stamp) const;
   /// The tracked frame as the tracker reports it at its stamp [s], in the world.
   dynamics::Pose<S> mocap(double stamp) const;
   /// x of the landing as reported [m], from the true one.

@@ -128,7 +128,7 @@ datasets::ThrowLog twin_of(const datasets::ThrowLog& log, const CampaignProblem&
   out.source =
       fmt::format("synthetic: simulated by unhand with {} as fitted, seed {}", problem.options().model, seed);
   experiment::ObservationOptions every;
-  every.settling = every.wrench_trust = 0;
+  every.settling = every.before_jump = every.wrench_trust = 0;
   every.landing_noise = experiment::landing_noise(log);  // once, not for every throw
   for (std::size_t i = 0; i < log.throws.size(); ++i)
     if (auto one = twin_throw(log, log.throws[i], problem.throws()[i], problem, fit, every, seed, i))

@@ -114,6 +114,21 @@ TEST(CampaignEffects, TheTrackerIsLateAndOffInScale) {
   EXPECT_NEAR(tracked.record.landing->pose(0, 0), 1.01 * plain.landing->pose(0, 0), 1e-15);
 }
 
+TEST(CampaignEffects, TheForceSensorIsLateWithAllItReads) {
+  const double late = 0.0015;
+  const auto plain = generate_throw(perfect(), kSeed, kThrow).record;
+  const auto made = generate_throw(perfect({{"sensor.ft_time_offset.offset", late}}), kSeed, kThrow).record;
+  const auto &a = *plain.ft, &b = *made.ft;
+  ASSERT_EQ(a.time.rows, b.time.rows);
+  EXPECT_EQ(a.normal_force.data, b.normal_force.data);
+  for (std::size_t k = 0; k < a.time.rows; ++k) {
+    EXPECT_NEAR(b.time(k) - a.time(k), late, 1e-15);
+    for (std::size_t c : {0u, 1u, 2u}) EXPECT_NEAR(b.wrench(k, c), a.wrench(k, c), 1e-9);  // t + late - late
+  }
+  EXPECT_TRUE(plain.mocap == made.mocap);
+  EXPECT_TRUE(plain.landing == made.landing);
+}
+
 TEST(CampaignEffects, DeclarationsAreOffAndTheTrackerFollowsTheDeclaredCoM) {
   const double offset = 0.004;
   const CampaignDesign design = perfect(

@@ -401,6 +401,17 @@ TEST(Discovery, AChanceMisfitElsewhereDoesNotWithdrawAnEffect) {
   support::expect_size(found, "sensor.normal_force_bias", 0.7581);
 }
 
+// Pads that open late and a force/torque sensor that is early put the same force on the object. What tells
+// them apart is the wrench, which follows the pads or goes with the sensor's clock.
+TEST(Discovery, ALateForceSensorIsNotALateOpening) {
+  const Discovery clock = found_in(support::loop_campaign({{"sensor.ft_time_offset.offset", -1e-3}}));
+  support::expect_size(clock, "sensor.ft_time_offset", -1e-3);
+  EXPECT_EQ(clock.effects.size(), 1u);
+  const Discovery opening = found_in(support::loop_campaign({{"release.opening_delay.delay", 2e-3}}));
+  support::expect_size(opening, "release.opening_delay", 2e-3);
+  EXPECT_EQ(opening.effects.size(), 1u);
+}
+
 TEST(Discovery, TwoEffectsAtOnceAreBothFound) {
   const Discovery found = found_in(support::loop_campaign(
       {{"flight.gravity_tilt.angle", 0.02}, {"sensor.mocap_time_offset.offset", 0.005}}));
