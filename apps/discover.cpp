@@ -243,10 +243,14 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
                       {"after", structure_json(found.after.structure)}};
   if (!found.held_out.empty()) out["held_out"] = found.held_out;
   out["model"] = found.model;
-  out["parameters"] = Json::object();
-  for (const auto& u : found.after.fit.campaign)
-    out["parameters"][u.unknown.name] = {
-        {"value", number(u.value)}, {"sigma", number(u.sigma)}, {"unit", u.unknown.unit}};
+  const auto parameters = [&](const char* key, const fitting::FitResult& fit) {
+    out[key] = Json::object();
+    for (const auto& u : fit.campaign)
+      out[key][u.unknown.name] = {
+          {"value", number(u.value)}, {"sigma", number(u.sigma)}, {"unit", u.unknown.unit}};
+  };
+  parameters("parameters", found.after.fit);
+  parameters("parameters_before", found.before.fit);
   return out;
 }
 
@@ -267,6 +271,7 @@ std::string discovery_text(const Discovery& found, const std::string& log, const
   }
   if (const std::string note = gain_text(found.effects); !note.empty()) out += "\n" + note + "\n";
   for (const auto& id : found.along) out += fmt::format("\n{}\n", along_text(id, found.after.fit));
+  out += fmt::format("\n{}\n", parameters_text(found));
   if (found.small) out += fmt::format("\n{}\n", small_text(*found.small));
   if (!found.unexplained)  // which names them
     for (const auto& one : found.imitations) out += fmt::format("\n{}\n", withdrawn_text(one));

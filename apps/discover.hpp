@@ -19,6 +19,8 @@ std::string discovery_text(const fitting::Discovery& discovery, const std::strin
 
 /// Errors of what is predicted before the throw, of train and test throws, before and after.
 Table prediction_errors(const fitting::Discovery& discovery);
+/// The base model's parameters as the answer has them and, where it adds something, as they were before.
+std::string parameters_text(const fitting::Discovery& discovery);
 /// What was fitted along without being an answer, by the effect's id, with its values in `fit`.
 std::string along_text(const std::string& id, const fitting::FitResult& fit);
 

@@ -11,6 +11,7 @@
 #include "apps/ranking.hpp"
 #include "apps/report_page.hpp"
 #include "apps/table.hpp"
+#include "experiment/campaign_effects.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -195,6 +196,21 @@ Table prediction_errors(const Discovery& found) {
   return table;
 }
 
+std::string parameters_text(const Discovery& found) {
+  const auto of = [](const fitting::FitResult& fit) {
+    std::vector<std::string> values;
+    for (const auto& u : fit.campaign)
+      if (!experiment::effect_of(u.unknown.name))
+        values.push_back(
+            fmt::format("{} = {}", u.unknown.name,
+                        std::isfinite(u.sigma) ? with_sigma(u.value, u.sigma, u.unknown.unit) : "open"));
+    return fmt::format("{}", fmt::join(values, ", "));
+  };
+  const std::string now = of(found.after.fit);
+  return fmt::format("fitted parameters of {}: {}{}", found.model, now,
+                     found.adds_nothing() ? "" : "; before: " + of(found.before.fit));
+}
+
 std::string along_text(const std::string& id, const fitting::FitResult& fit) {
   std::vector<std::string> values;
   for (const auto& u : fit.campaign)
@@ -225,6 +241,7 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
     answer += fmt::format("<p>{}</p>\n", escaped(note));
   for (const auto& id : found.along)
     answer += fmt::format("<p>{}.</p>\n", escaped(along_text(id, found.after.fit)));
+  answer += fmt::format("<p>{}.</p>\n", escaped(parameters_text(found)));
   if (found.small) answer += fmt::format("<p>{}.</p>\n", escaped(small_text(*found.small)));
   if (!found.unexplained)
     for (const auto& one : found.imitations)

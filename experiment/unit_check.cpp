@@ -14,6 +14,7 @@
 #include "dynamics/median.hpp"
 #include "experiment/axis_check.hpp"
 #include "experiment/declared_check.hpp"
+#include "experiment/time_check.hpp"
 #include "experiment/turn_check.hpp"
 #include "experiment/unit_evidence.hpp"
 #include "experiment/unit_outliers.hpp"
@@ -28,14 +29,20 @@ std::string path_of(const ColumnSide& side) {
   return side.path[0] == '/' ? side.path : fmt::format("/throws/*/{}", side.path);
 }
 
-/// A height that throws do not come by, or do not land at.
+/// A height that throws do not come by, or do not land at; or, behind that, the clock that landings are timed
+/// by.
 std::vector<UnitDoubt> doubtful_landing_height(const datasets::ThrowLog& log) {
   std::vector<double> seen, tolerances;
   std::optional<double> highest;
+  UnitDoubt clock{"", "t", 1, 0, ""};
   for (const auto& one : log.throws) {
     if (const auto top = highest_point(log, one)) highest = std::max(highest.value_or(*top), *top);
-    if (const auto timed = log.dimension == 2 ? timed_landing(log, one) : std::nullopt)
-      seen.push_back(timed->height), tolerances.push_back(timed->tolerance);
+    const auto timed = log.dimension == 2 ? timed_landing(log, one) : std::nullopt;
+    if (!timed) continue;
+    seen.push_back(timed->height), tolerances.push_back(timed->tolerance);
+    const auto apart = clocks_apart(log, one);
+    if (!apart.empty() && clock.throws++ == 0)
+      clock.path = fmt::format("/throws/{}/mocap/time", one.id), clock.reason = apart;
   }
   const auto doubt = [&](double accepted, std::size_t throws, const std::string& reason) {
     return std::vector{UnitDoubt{
@@ -46,6 +53,13 @@ std::vector<UnitDoubt> doubtful_landing_height(const datasets::ThrowLog& log) {
   };
   if (!seen.empty()) {
     const double height = dynamics::median(seen), most = dynamics::median(tolerances);
+    if (std::abs(log.landing_height - height) > most && 2 * clock.throws > static_cast<int>(seen.size())) {
+      clock.reason += fmt::format(
+          "; by the robot's clock, free flights from the opening to landing/time end at {:.3g} m, and not at "
+          "landing_height = {:.6g} m: are landings timed by the tracker's clock?",
+          height, log.landing_height);
+      return {clock};
+    }
     if (std::abs(log.landing_height - height) > most)
       return doubt(height, seen.size(),
                    fmt::format("free flights from the opening to landing/time end at {:.3g} m (median of {} "

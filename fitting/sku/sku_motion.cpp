@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "dynamics/dense_solve.hpp"
+#include "dynamics/parallel.hpp"
 #include "experiment/outcome_slopes.hpp"
 #include "experiment/reference_throw.hpp"
 
@@ -32,25 +33,75 @@ std::optional<MatrixXd> SkuMotion::slopes() const {
   return product(landing, inputs.mixing());
 }
 
-std::vector<SkuMotion> motions_of(const datasets::Sku& sku, const datasets::ModelCard& card,
-                                  const std::string& file, const SkuRequest& request) {
+namespace {
+
+/// `prepared` with the SKU's object in it.
+SkuMotion motion_of(experiment::PreparedThrow prepared, const datasets::Sku& sku,
+                    const datasets::ModelCard& card, const std::string& file, const SkuRequest& request) {
+  prepared.object = sku.name;
+  auto inputs = throw_inputs(sku, card, file, prepared, request.assumed);
+  return {std::move(prepared), std::move(inputs)};
+}
+
+/// Among the throws that repeat the motion of throw `first`, the one that lands nearest to their mean;
+/// `first` where none lands.
+std::size_t middle_repetition(const std::vector<datasets::Throw>& throws, std::size_t first,
+                              const LoggedLandings& landings, const LandingTolerance& tolerance) {
+  std::vector<std::size_t> landed;
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (std::size_t i = first; i < throws.size(); ++i)
+    if (landings[i] && repeated_motion(throws[i]) == repeated_motion(throws[first]))
+      landed.push_back(i), mean += *landings[i];
+  if (landed.empty()) return first;
+  mean /= static_cast<double>(landed.size());
+  return *std::min_element(landed.begin(), landed.end(), [&](std::size_t a, std::size_t b) {
+    const auto away = [&](std::size_t i) {
+      const Eigen::Vector2d d = *landings[i] - mean;
+      return std::hypot(d[0] / tolerance.x, d[1] / tolerance.theta);
+    };
+    return away(a) < away(b);
+  });
+}
+
+}  // namespace
+
+std::string repeated_motion(const datasets::Throw& one) { return one.object + "/" + one.condition; }
+
+LoggedLandings logged_landings(const datasets::Sku& sku, const datasets::ModelCard& card,
+                               const std::string& file, const SkuRequest& request) {
+  if (request.log == nullptr) return {};
   const auto object = datasets::to_object(sku);
+  const auto& throws = request.log->throws;
+  LoggedLandings out(throws.size());
+  dynamics::parallel_for(throws.size(), request.threads, [&](std::size_t i) {
+    const auto motion = motion_of(experiment::with_object(*request.log, throws[i], request.log_file, object),
+                                  sku, card, file, request);
+    try {
+      const auto at = motion.predict(motion.inputs.values);
+      if (at.landed() && motion.held(motion.inputs.values))
+        out[i] = {at.landing.pose.x, at.landing.pose.theta};
+    } catch (const std::invalid_argument&) {  // out of range with this object: no such throw
+    }
+  });
+  return out;
+}
+
+std::vector<SkuMotion> motions_of(const datasets::Sku& sku, const datasets::ModelCard& card,
+                                  const std::string& file, const SkuRequest& request,
+                                  const LoggedLandings& landings) {
+  const auto object = datasets::to_object(sku);
+  if (request.log == nullptr)
+    return {motion_of(experiment::reference_throw(sku.name, object), sku, card, file, request)};
   std::vector<SkuMotion> out;
-  const auto add = [&](experiment::PreparedThrow prepared) {
-    prepared.object = sku.name;
-    auto inputs = throw_inputs(sku, card, file, prepared, request.assumed);
-    out.push_back({std::move(prepared), std::move(inputs)});
-  };
-  if (request.log == nullptr) {
-    add(experiment::reference_throw(sku.name, object));
-    return out;
-  }
   std::vector<std::string> seen;
-  for (const auto& one : request.log->throws) {
-    if (request.condition && one.condition != *request.condition) continue;
-    if (std::find(seen.begin(), seen.end(), one.condition) != seen.end()) continue;
-    seen.push_back(one.condition);
-    add(experiment::with_object(*request.log, one, request.log_file, object));
+  const auto& throws = request.log->throws;
+  for (std::size_t i = 0; i < throws.size(); ++i) {
+    if (request.condition && throws[i].condition != *request.condition) continue;
+    if (std::find(seen.begin(), seen.end(), throws[i].condition) != seen.end()) continue;
+    seen.push_back(throws[i].condition);
+    const auto& one = throws[middle_repetition(throws, i, landings, request.tolerance)];
+    out.push_back(motion_of(experiment::with_object(*request.log, one, request.log_file, object), sku, card,
+                            file, request));
   }
   if (out.empty())
     throw std::invalid_argument(

@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "experiment/throw_prediction.hpp"
 #include "fitting/sku/sku_inputs.hpp"
@@ -21,10 +23,21 @@ struct SkuMotion {
   std::optional<Eigen::MatrixXd> slopes() const;
 };
 
-/// The motions to try: one of each condition of the request's log, or the reference throw. Throws
-/// std::invalid_argument where there is none.
+/// Where each throw of the request's log, with its own hand and force, would bring this object down [m, rad];
+/// nothing where the grip does not hold it or it never lands. Empty without a log.
+using LoggedLandings = std::vector<std::optional<Eigen::Vector2d>>;
+LoggedLandings logged_landings(const datasets::Sku& sku, const datasets::ModelCard& card,
+                               const std::string& card_file, const SkuRequest& request);
+
+/// The throws that repeat one motion.
+std::string repeated_motion(const datasets::Throw& one);
+
+/// The motions to try: of each condition of the request's log the repetition that lands nearest to their
+/// mean, distances in units of the tolerance; or the reference throw. Throws std::invalid_argument where
+/// there is none.
 std::vector<SkuMotion> motions_of(const datasets::Sku& sku, const datasets::ModelCard& card,
-                                  const std::string& card_file, const SkuRequest& request);
+                                  const std::string& card_file, const SkuRequest& request,
+                                  const LoggedLandings& landings);
 
 /// The nominal throw, and the landing's scatter to first order.
 ThrowCandidate candidate_of(const SkuMotion& motion);

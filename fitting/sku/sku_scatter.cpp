@@ -10,7 +10,6 @@
 #include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/random_stream.hpp"
-#include "experiment/reference_throw.hpp"
 
 namespace unhand::fitting {
 
@@ -220,32 +219,17 @@ struct Repetitions {
 
 }  // namespace
 
-std::optional<MotionRepeats> repeats_of(const datasets::Sku& sku, const datasets::ModelCard& card,
-                                        const std::string& file, const SkuRequest& request,
+std::optional<MotionRepeats> repeats_of(const SkuRequest& request, const LoggedLandings& landings,
                                         const SkuValidation& answer) {
-  const auto object = datasets::to_object(sku);
   const auto& throws = request.log->throws;
-  std::vector<std::optional<Eigen::Vector2d>> landings(throws.size());
-  dynamics::parallel_for(throws.size(), request.threads, [&](std::size_t i) {
-    SkuMotion motion{experiment::with_object(*request.log, throws[i], request.log_file, object), {}};
-    motion.prepared.object = sku.name;
-    motion.inputs = throw_inputs(sku, card, file, motion.prepared, request.assumed);
-    try {
-      const auto at = motion.predict(motion.inputs.values);
-      if (at.landed() && motion.held(motion.inputs.values))
-        landings[i] = {at.landing.pose.x, at.landing.pose.theta};
-    } catch (const std::invalid_argument&) {  // out of range with this object: no such throw
-    }
-  });
   std::map<std::string, std::vector<Eigen::Vector2d>> by_condition;
   for (std::size_t i = 0; i < throws.size(); ++i)
-    if (landings[i]) by_condition[throws[i].object + "/" + throws[i].condition].push_back(*landings[i]);
+    if (landings[i]) by_condition[repeated_motion(throws[i])].push_back(*landings[i]);
   constexpr int kFewest = 3;  // degrees of freedom
   const ThrowCandidate& nominal = answer.reference();
   const auto first = std::find_if(throws.begin(), throws.end(),
                                   [&](const auto& one) { return one.condition == nominal.condition; });
-  const auto own =
-      first == throws.end() ? by_condition.end() : by_condition.find(first->object + "/" + first->condition);
+  const auto own = first == throws.end() ? by_condition.end() : by_condition.find(repeated_motion(*first));
   MotionRepeats out;
   Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
   int freedom = 0;

@@ -20,8 +20,7 @@ void monte_carlo(const SkuMotion& motion, const Eigen::MatrixXd& J, const SkuReq
 
 /// The scatter of the log's repetitions; nothing where fewer than three repeat a condition. After
 /// monte_carlo(), whose draws it moves.
-std::optional<MotionRepeats> repeats_of(const datasets::Sku& sku, const datasets::ModelCard& card,
-                                        const std::string& card_file, const SkuRequest& request,
+std::optional<MotionRepeats> repeats_of(const SkuRequest& request, const LoggedLandings& landings,
                                         const SkuValidation& answer);
 
 }  // namespace unhand::fitting

@@ -77,7 +77,7 @@ void decide(const datasets::Sku& sku, const datasets::ModelCard& card, const Sku
       out.message += fmt::format(
           ". Of the same motion as it was logged {:.1f} % would, but the log's motions, repeated, bring it "
           "down {:.3g} m and {:.3g} deg apart (1 sigma of {} motions of {} {}), and in the mean {:+.3g} m "
-          "and {:+.3g} deg from the predicted one, which is of one of them",
+          "and {:+.3g} deg from the predicted one, which is of the one nearest to it",
           100 * out.within, out.repeats->x, out.repeats->theta * kDegrees, out.repeats->motions,
           out.repeats->conditions, out.repeats->conditions == 1 ? "condition" : "conditions",
           out.repeats->offset_x, out.repeats->offset_theta * kDegrees);
@@ -118,7 +118,8 @@ SkuValidation validate_sku(const datasets::Sku& sku, const datasets::ModelCard& 
     throw std::invalid_argument("validate_sku: " + sku.name +
                                 " has no inertia: inertia_kg_m2, or shape and dims_m, are needed");
   const auto card = with_spread(given);
-  const auto tried = motions_of(sku, card, card_file, request);
+  const auto landings = logged_landings(sku, card, card_file, request);
+  const auto tried = motions_of(sku, card, card_file, request, landings);
   SkuValidation out;
   for (const SkuMotion& motion : tried) out.candidates.push_back(candidate_of(motion));
   out.chosen = best(out.candidates, request.tolerance);
@@ -142,8 +143,7 @@ SkuValidation validate_sku(const datasets::Sku& sku, const datasets::ModelCard& 
           "the log is the card's own: its train throws, which the card was fitted to, do not count");
     out.measured = measured_verdict(sku, card, card_file, request, own);
   }
-  if (request.log != nullptr && !out.samples.empty())
-    out.repeats = repeats_of(sku, card, card_file, request, out);
+  if (request.log != nullptr && !out.samples.empty()) out.repeats = repeats_of(request, landings, out);
   decide(sku, card, request, out);
   return out;
 }

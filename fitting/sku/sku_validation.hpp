@@ -117,7 +117,7 @@ struct MeasuredVerdict {
 struct MotionRepeats {
   int motions{}, conditions{};        ///< that bring it to a landing; those with two or more of them
   double x{}, theta{};                ///< 1 σ [m, rad]
-  double offset_x{}, offset_theta{};  ///< from the nominal landing, of one repetition, to their mean [m, rad]
+  double offset_x{}, offset_theta{};  ///< from the nominal landing to their mean [m, rad]
   /// Share of the Monte Carlo's draws within the tolerance of the nominal landing, with scatter and offset.
   double within{};
 };

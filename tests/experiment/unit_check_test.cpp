@@ -512,6 +512,18 @@ TEST(UnitCheck, ALeverAlongAnotherAxisIsSeenByMotionCapture) {
   EXPECT_THAT(unit_doubts(turned(10 / kDegree)), IsEmpty());
 }
 
+// Motion capture and landings count from another instant than the robot: the height is not to blame.
+TEST(UnitCheck, LandingsTimedByAnotherClockDoNotDoubtTheLandingHeight) {
+  auto log = campaign();
+  for (auto& one : log.throws) {
+    for (std::size_t i = 0; i < one.mocap->time.rows; ++i) one.mocap->time(i) += 5;
+    one.landing->time(0) += 5;
+  }
+  const auto told = only_doubt(log);
+  EXPECT_THAT(told.path, AllOf(HasSubstr("/throws/"), HasSubstr("mocap/time")));
+  EXPECT_THAT(told.reason, AllOf(HasSubstr("do not overlap"), HasSubstr("tracker's clock")));
+}
+
 TEST(UnitCheck, FlightsContradictAWrongLandingHeight) {
   for (const double height : {0.3, -0.3}) {
     auto log = campaign();
