@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <span>
 #include <stdexcept>
 
 #include "apps/command.hpp"
@@ -65,21 +66,16 @@ std::map<std::string, double> parse_numbers(const char* option, const std::strin
   return out;
 }
 
-constexpr const char* new_log_options[] = {"--sku",
-                                           "--mass",
-                                           "--object",
-                                           "--title",
-                                           "--source",
-                                           "--licence",
-                                           "--gravity",
-                                           "--pads",
-                                           "--pad-radius",
-                                           "--opening-time",
-                                           "--condition",
-                                           "--test-every",
-                                           "--test-conditions",
-                                           "--dimension",
-                                           "--landing-height"};
+constexpr const char* new_log_options[] = {"--title",     "--source",       "--licence",
+                                           "--gravity",   "--pads",         "--pad-radius",
+                                           "--dimension", "--opening-time", "--landing-height"};
+constexpr const char* new_throws_options[] = {"--sku",       "--mass",       "--object",
+                                              "--condition", "--test-every", "--test-conditions"};
+
+/// Whether the files are throws that a log does not have: of a new log, or of another object of one.
+bool brings_throws(const LabOptions& options) {
+  return options.into.empty() || given(options, "--sku") || given(options, "--mass");
+}
 
 /// The options that are for some of these formats only.
 struct Rule {
@@ -118,18 +114,47 @@ void refuse_others(const std::string& format, const LabOptions& options) {
 /// Only those that `format` takes may be given, and those of a new log not with a log to add to.
 void require_options(const std::string& format, const LabOptions& options) {
   refuse_others(format, options);
-  if (options.into.empty()) {
-    if (given(options, "--replace")) throw WrongUsage("--replace goes with --into");
+  if (brings_throws(options)) {
+    if (given(options, "--replace")) throw WrongUsage("--replace goes with --into, and without a new object");
     if (given(options, "--sku") == given(options, "--mass"))
       throw WrongUsage(
           "a new log needs its object: --sku FILE or --mass KG (or --into LOG, to add to a log)");
-  } else {
-    for (const char* name : new_log_options)
-      if (given(options, name)) throw WrongUsage(fmt::format("{} is for a new log, not for --into", name));
   }
+  if (options.into.empty()) return;
+  for (const char* name : new_log_options)
+    if (given(options, name)) throw WrongUsage(fmt::format("{} is for a new log, not for --into", name));
+  for (const char* name : new_throws_options)
+    if (given(options, name) && !brings_throws(options))
+      throw WrongUsage(
+          fmt::format("{} is for throws that {} does not have: of an object that --sku or --mass names", name,
+                      options.into));
 }
 
 const std::string kUntitled = "imported from ";
+
+/// The name and the declarations of the object that --sku or --mass is about.
+std::pair<std::string, datasets::Object> new_object(const std::string& format, const LabOptions& options,
+                                                    int dimension) {
+  datasets::Object object;
+  std::string name = format == "phyphox" ? "phone" : "object";
+  if (options.sku.empty()) {
+    object.mass = options.mass;
+  } else {
+    const datasets::Sku sku = read_possible_sku(options.sku);
+    object = datasets::to_object(sku, dimension);
+    name = sku.name;
+  }
+  return {options.object.empty() ? name : options.object, object};
+}
+
+/// Adds the object, which may be there already as it is. Throws datasets::LogError where it is another one.
+void add_object(ThrowLog& log, const std::pair<std::string, datasets::Object>& object,
+                const std::string& log_file) {
+  const auto [at, is_new] = log.objects.insert(object);
+  if (!is_new && !(at->second == object.second))
+    throw datasets::LogError(log_file, "/objects/" + object.first,
+                             "is there already with other declarations: --object gives the new one a name");
+}
 
 ThrowLog new_log(const std::string& format, const LabOptions& options, const std::string& source) {
   ThrowLog log;
@@ -139,16 +164,6 @@ ThrowLog new_log(const std::string& format, const LabOptions& options, const std
   if (!options.licence.empty()) log.licence = options.licence;
   log.gravity = options.gravity;
   log.landing_height = options.landing_height;
-  datasets::Object object;
-  std::string name = format == "phyphox" ? "phone" : "object";
-  if (options.sku.empty()) {
-    object.mass = options.mass;
-  } else {
-    const datasets::Sku sku = read_possible_sku(options.sku);
-    object = datasets::to_object(sku, log.dimension);
-    name = sku.name;
-  }
-  log.objects.emplace(options.object.empty() ? name : options.object, object);
   if (given(options, "--pads") || given(options, "--pad-radius") || given(options, "--opening-time")) {
     datasets::Gripper& gripper = log.gripper.emplace();
     gripper.n_pads = options.pads;
@@ -377,8 +392,10 @@ std::string one_sided(const std::string& out, const ThrowLog& log, std::ptrdiff_
 
 void refuse_lab_options(const std::string& format, const LabOptions& options) {
   refuse_others(format, options);
-  for (const char* name : new_log_options)
-    if (given(options, name)) throw WrongUsage(fmt::format("{} is not for {}", name, format));
+  for (const std::span<const char* const> names :
+       {std::span<const char* const>(new_log_options), {new_throws_options}})
+    for (const char* name : names)
+      if (given(options, name)) throw WrongUsage(fmt::format("{} is not for {}", name, format));
 }
 
 Imported import_lab(const std::string& format, const std::vector<std::string>& named, const std::string& out,
@@ -391,9 +408,16 @@ Imported import_lab(const std::string& format, const std::vector<std::string>& n
   if (!options.free_flight.empty() && !(options.free_flight[0] < options.free_flight[1]))
     throw WrongUsage(
         fmt::format("--free-flight: {} is not before {}", options.free_flight[0], options.free_flight[1]));
-  const bool adding = !options.into.empty();
+  const bool adding = !options.into.empty(), bringing = brings_throws(options);
   ThrowLog log = adding ? datasets::read_throw_log(options.into)
                         : new_log(format, options, source_of(format, inputs.size()));
+  ThrowLog brought;  // its throws are split among themselves, whatever the log has
+  std::string object;
+  if (bringing) {
+    const auto entry = new_object(format, options, log.dimension);
+    add_object(log, entry, options.into);
+    object = entry.first;
+  }
   Imported imported;
   imported.details["files"] = Json::array();
   for (std::size_t k = 0; k < inputs.size(); ++k) {
@@ -403,16 +427,17 @@ Imported import_lab(const std::string& format, const std::vector<std::string>& n
     const std::string id = options.throw_id.empty() ? name.id : options.throw_id;
     for (std::size_t j = 0; j < reading.throws.size(); ++j) {
       Throw& one = reading.throws[j];
-      if (adding) {
-        datasets::move_clock(one, log.clock_origin);
+      if (adding) datasets::move_clock(one, log.clock_origin);
+      if (!bringing) {
         fill_throw(log, id, std::move(one), options.replace, options.into);
         continue;
       }
       one.id = reading.throws.size() == 1 ? id : fmt::format("{}-{}", id, j + 1);
-      one.object = log.objects.begin()->first;
+      one.object = object;
       one.condition = options.condition.empty() ? name.condition : options.condition;
       one.repetition = name.repetition;
-      add_throw(log, std::move(one), file);
+      if (adding) datasets::require_new(log, one.id, file);
+      add_throw(brought, std::move(one), file);
     }
     imported.text +=
         fmt::format("  {}: {}{}\n", file, adding ? fmt::format("throw {}, ", id) : "", reading.text);
@@ -420,7 +445,7 @@ Imported import_lab(const std::string& format, const std::vector<std::string>& n
     reading.details["file"] = file;
     imported.details["files"].push_back(reading.details);
   }
-  if (log.throws.empty()) {
+  if (log.throws.empty() && brought.throws.empty()) {
     std::string why = "holds no free fall";
     for (const Json& dropped : imported.details["files"].front().value("dropped", Json::array()))
       why += fmt::format("; {:.3f} s: {}", dropped["begin_s"].get<double>(),
@@ -429,10 +454,12 @@ Imported import_lab(const std::string& format, const std::vector<std::string>& n
                                 why + (inputs.size() > 1 ? "; nor do the other inputs" : ""));
   }
   try {
-    if (!adding) split_throws(log, {options.test_every, options.test_conditions});
+    if (bringing) split_throws(brought, {options.test_every, options.test_conditions});
   } catch (const std::invalid_argument& error) {
     throw WrongUsage(fmt::format("--test-every, --test-conditions: {}", error.what()));
   }
+  log.throws.insert(log.throws.end(), std::make_move_iterator(brought.throws.begin()),
+                    std::make_move_iterator(brought.throws.end()));
   if (adding) {
     // --source is for new logs; of one that says something else than "measured" the files may be of that,
     // too.

@@ -11,7 +11,9 @@ void add_lab_options(Parser& parser, LabOptions& options) {
   };
   const char* one = "A log to add to (hand-csv, ft-csv, mocap-csv, motive-csv)";
   add(one, "--into", options.into,
-      "Add to the throws of this log that are named like the files; it is --out if that is not given")
+      "Add to the throws of this log that are named like the files or, with --sku or --mass, throws of "
+      "another "
+      "object; it is --out if that is not given")
       .not_empty();
   parser.flag("--replace", options.replace, "Where a throw has such data already, replace it").group(one);
   const char* fresh = "A new log (hand-csv, ft-csv, mocap-csv, motive-csv, phyphox)";

@@ -66,11 +66,14 @@ void split_throws(ThrowLog& log, const SplitRule& rule) {
   }
 }
 
-void add_throw(ThrowLog& log, Throw one, const std::string& file) {
+void require_new(const ThrowLog& log, const std::string& id, const std::string& file) {
   for (const Throw& other : log.throws)
-    if (other.id == one.id)
-      throw ImportError(file, "",
-                        fmt::format("there is already a throw '{}': two files of one name?", one.id));
+    if (other.id == id)
+      throw ImportError(file, "", fmt::format("there is already a throw '{}': two files of one name?", id));
+}
+
+void add_throw(ThrowLog& log, Throw one, const std::string& file) {
+  require_new(log, one.id, file);
   log.throws.push_back(std::move(one));
 }
 

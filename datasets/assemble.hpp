@@ -31,6 +31,9 @@ struct SplitRule {
 /// Throws std::invalid_argument for a rule out of range, or a condition that the log does not have.
 void split_throws(ThrowLog& log, const SplitRule& rule);
 
+/// Throws ImportError (`file` is where the throw would come from) if the id is taken.
+void require_new(const ThrowLog& log, const std::string& id, const std::string& file);
+
 /// Adds a throw. Throws ImportError (`file` is where it came from) if its id is taken.
 void add_throw(ThrowLog& log, Throw one, const std::string& file);
 

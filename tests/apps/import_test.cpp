@@ -84,8 +84,36 @@ TEST_F(Cli, ImportsTheFilesOfALab) {
     EXPECT_GT(H5Lexists(f.file, "/throws/slow_01/ft/temperature", H5P_DEFAULT), 0);
   }
   expect_refusal("import " + ft + "--into none.h5", 3, "none.h5");
+
+  // Throws of a second object: split among themselves, and then filled like the others.
+  std::string hand_of_jar = hand, ft_of_jar = ft;
+  for (const char* name : {"slow_01", "slow_02"})
+    for (const char* kind : {"hand", "ft"}) {
+      const std::string to = std::string(kind) + "/jar-" + name + ".csv";
+      std::filesystem::copy_file(folder / kind / (std::string(name) + ".csv"), folder / to);
+      std::string& step = kind[0] == 'h' ? hand_of_jar : ft_of_jar;
+      step.replace(step.find(std::string(kind) + "/slow"), 12 + std::string(kind).size(), to);
+    }
+  const std::string another = "--into full.h5 --mass 0.4 --object jar --test-every 2 --out both.h5";
+  const Answer both = run("import " + hand_of_jar + another);
+  ASSERT_EQ(both.code, 0) << both.err;
+  EXPECT_THAT(both.out, HasSubstr("4 throws (2 train, 2 test)"));
+  ASSERT_EQ(run("import " + ft_of_jar + "--into both.h5").code, 0);
+  const auto grown = datasets::read_throw_log(folder / "both.h5");
+  ASSERT_EQ(grown.throws.size(), 4u);
+  EXPECT_EQ(grown.objects.at("jar").mass, 0.4);
+  for (const auto& throw_of : grown.throws) {
+    EXPECT_EQ(throw_of.object == "jar", throw_of.id.starts_with("jar-")) << throw_of.id;
+    EXPECT_TRUE(throw_of.hand && throw_of.ft) << throw_of.id;
+  }
+  expect_refusal("import " + hand_of_jar + "--into full.h5 --mass 0.4 --object bar --out no.h5", 3,
+                 "full.h5: /objects/bar: is there already with other declarations");
   expect_refusal("import " + ft + "--into full.h5 --throw slow_01", 2, "--throw goes with one input");
-  expect_refusal("import " + ft + "--into full.h5 --sku bar.toml", 2, "--sku is for a new log");
+  expect_refusal("import " + ft + "--into full.h5 --gravity 9.8", 2, "--gravity is for a new log");
+  expect_refusal("import " + ft + "--into full.h5 --test-every 2", 2,
+                 "--test-every is for throws that full.h5 does not have");
+  expect_refusal("import " + ft + "--into full.h5 --sku bar.toml", 3, "there is already a throw 'slow_01'");
+  expect_refusal("import " + ft + "--into full.h5 --sku bar.toml --replace", 2, "without a new object");
   expect_refusal("import " + ft + "--out a.h5", 2, "--sku FILE or --mass KG");
   expect_refusal("import " + ft + "--mass 0.25", 2, "--out is required");
   expect_refusal("import " + ft + "--mass 0.25 --out a.h5 --body bar", 2, "--body is not for ft-csv");
