@@ -10,6 +10,7 @@ namespace {
 
 /// Objects whose keys are names: of parameters, objects, models, channels, conditions.
 const std::set<std::string> kByName{"parameters",
+                                    "parameters_before",
                                     "parameter_units",
                                     "parameter_sigmas",
                                     "models",
