@@ -34,7 +34,8 @@ void add_lab_options(Parser& parser, LabOptions& options) {
       "What these throws repeat; else the file's name without its number");
   add(fresh, "--test-every", options.test_every, "Hold out every Nth throw of each condition; 0: none")
       .with_default();
-  add(fresh, "--test-conditions", options.test_conditions, "Hold out these conditions as a whole")
+  add(fresh, "--test-conditions", options.test_conditions,
+      "Hold out these conditions as a whole, too; with --test-every 0, these alone")
       .with_commas();
   const char* files = "What is in the files (hand-csv, ft-csv, mocap-csv, motive-csv)";
   add(files, "--throw", options.throw_id, "The throw's name; else the file's");

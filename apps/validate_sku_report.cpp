@@ -157,7 +157,7 @@ std::string sku_text(const SkuQuestion& question, const SkuValidation& answer, b
       out += fmt::format("{:.1f} % of the draws slip out of the grip or do not land.\n", 100 * answer.lost);
     out += title("What it is made of (share of the variance in tolerances; bend: second order in sigma)");
     out += table(budget_table(answer));
-    if (answer.budget.back().share < 0)
+    if (answer.budget.back().share < -5e-4)  // as printed
       out +=
           "\nA share below zero: the card knows this input against another, so that what both bring is less "
           "than each alone.\n";

@@ -132,4 +132,8 @@ std::vector<OutcomeLack> lacking(const OutcomeErrors& train, const OutcomeErrors
   return out;
 }
 
+std::string predicted_in_words(const SmallEffect& effect) {
+  return fmt::format("predicted before the throw: {}", effect.rms.in_words());
+}
+
 }  // namespace unhand::fitting

@@ -69,6 +69,8 @@ bool predicts_better(const Stage& before, const Stage& after, const DiscoverOpti
 /// What an effect is worth in the model with it against the one without it.
 SmallEffect small_effect(const Stage& without, const Stage& with, const std::string& id,
                          const std::vector<ChannelMisfit>& base, const DiscoverOptions& options);
+/// "predicted before the throw: 0.895 to 0.456 mm, ...": what speaks for one that no channel shows.
+std::string predicted_in_words(const SmallEffect& effect);
 
 /// How many times what repetitions scatter by the mean square of prediction errors is where a model lacks
 /// something: most of the error then goes with the condition, and a better model would take it away.

@@ -218,8 +218,7 @@ class ForwardStep {
         small_effect(stage_, small_->next, id_of(*small_->score), out_.before.held_out, options_);
     if (left_by_answer(small_->next, out_, options_).empty() &&
         predicts_better(stage_, small_->next, options_))
-      return accept(std::move(*small_), fmt::format("predicted before the throw: {}", small.rms.in_words()),
-                    evident_);
+      return accept(std::move(*small_), predicted_in_words(small), evident_);
     if (!out_.small || small.delta_bic < out_.small->delta_bic) out_.small = small;
     return std::nullopt;
   }

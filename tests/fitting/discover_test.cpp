@@ -459,6 +459,7 @@ TEST(Discovery, WhatMattersToThePredictionAloneIsFound) {
   const Discovery found = found_in(experiment::generate_campaign(design, 4));
   EXPECT_FALSE(found.first.any) << "no channel alone would show it";
   support::expect_size(found, "contact.viscous", kViscous);
+  EXPECT_THAT(named(found, "contact.viscous")->why, testing::HasSubstr("predicted before the throw"));
   EXPECT_LT(found.after.test.trajectory_rms.value(), 0.7 * found.before.test.trajectory_rms.value());
 }
 
