@@ -174,6 +174,18 @@ Table misfit_table(const Discovery& found) {
   return table;
 }
 
+/// "mu = 0.50 ± 0.01, ..." of the unknowns whose name `takes`, without the first `skipped` letters of it.
+template <class Takes>
+std::string values_text(const fitting::FitResult& fit, const Takes& takes, std::size_t skipped) {
+  std::vector<std::string> values;
+  for (const auto& u : fit.campaign)
+    if (takes(u.unknown.name))
+      values.push_back(
+          fmt::format("{} = {}", u.unknown.name.substr(skipped),
+                      std::isfinite(u.sigma) ? with_sigma(u.value, u.sigma, u.unknown.unit) : "open"));
+  return fmt::format("{}", fmt::join(values, ", "));
+}
+
 /// In the place of figures over time.
 constexpr const char* kLandingsAlone = "<p>Landings alone were measured: nothing to draw over time.</p>\n";
 
@@ -197,28 +209,16 @@ Table prediction_errors(const Discovery& found) {
 }
 
 std::string parameters_text(const Discovery& found) {
-  const auto of = [](const fitting::FitResult& fit) {
-    std::vector<std::string> values;
-    for (const auto& u : fit.campaign)
-      if (!experiment::effect_of(u.unknown.name))
-        values.push_back(
-            fmt::format("{} = {}", u.unknown.name,
-                        std::isfinite(u.sigma) ? with_sigma(u.value, u.sigma, u.unknown.unit) : "open"));
-    return fmt::format("{}", fmt::join(values, ", "));
-  };
-  const std::string now = of(found.after.fit);
+  const auto is_base = [](const std::string& name) { return !experiment::effect_of(name); };
+  const std::string now = values_text(found.after.fit, is_base, 0);
   return fmt::format("fitted parameters of {}: {}{}", found.model, now,
-                     found.adds_nothing() ? "" : "; before: " + of(found.before.fit));
+                     found.adds_nothing() ? "" : "; before: " + values_text(found.before.fit, is_base, 0));
 }
 
 std::string along_text(const std::string& id, const fitting::FitResult& fit) {
-  std::vector<std::string> values;
-  for (const auto& u : fit.campaign)
-    if (u.unknown.name.starts_with(id + "."))
-      values.push_back(
-          fmt::format("{} = {}", u.unknown.name.substr(id.size() + 1),
-                      std::isfinite(u.sigma) ? with_sigma(u.value, u.sigma, u.unknown.unit) : "open"));
-  return fmt::format("fitted along, since no pads are rigid: {} ({})", id, fmt::join(values, ", "));
+  const auto is_its = [&](const std::string& name) { return name.starts_with(id + "."); };
+  return fmt::format("fitted along, since no pads are rigid: {} ({})", id,
+                     values_text(fit, is_its, id.size() + 1));
 }
 
 void write_discovery_report(const Discovery& found, const std::string& log, const std::string& origin,

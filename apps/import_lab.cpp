@@ -74,7 +74,8 @@ void require_options(const std::string& format, const LabOptions& options) {
     if (given(options, "--replace")) throw WrongUsage("--replace goes with --into, and without a new object");
     if (given(options, "--sku") == given(options, "--mass"))
       throw WrongUsage(
-          "a new log needs its object: --sku FILE or --mass KG (or --into LOG, to add to a log)");
+          "new throws need one object: --sku FILE or --mass KG (or --into LOG alone, to add to a log's "
+          "throws)");
   }
   if (options.into.empty()) return;
   for (const char* name : new_log_options)

@@ -53,14 +53,15 @@ std::vector<UnitDoubt> doubtful_landing_height(const datasets::ThrowLog& log) {
   };
   if (!seen.empty()) {
     const double height = dynamics::median(seen), most = dynamics::median(tolerances);
-    if (std::abs(log.landing_height - height) > most && 2 * clock.throws > static_cast<int>(seen.size())) {
+    const bool off = std::abs(log.landing_height - height) > most;
+    if (off && 2 * clock.throws > static_cast<int>(seen.size())) {
       clock.reason += fmt::format(
           "; by the robot's clock, free flights from the opening to landing/time end at {:.3g} m, and not at "
           "landing_height = {:.6g} m: are landings timed by the tracker's clock?",
           height, log.landing_height);
       return {clock};
     }
-    if (std::abs(log.landing_height - height) > most)
+    if (off)
       return doubt(height, seen.size(),
                    fmt::format("free flights from the opening to landing/time end at {:.3g} m (median of {} "
                                "throws), accepted are {:.3g} to {:.3g} m",

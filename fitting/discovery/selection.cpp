@@ -120,8 +120,10 @@ void judge(const Stage& stage, const DiscoverOptions& options, Discovery& out) {
     accepted.test_error_ratio = error_ratio(errors_of(less, Share::test, options.fit.threads), with);
     if (is_law(accepted.id)) continue;
     const Improvement gain = improvement(less, stage, out.before.held_out, options);
-    const SmallEffect small = small_effect(less, stage, accepted.id, out.before.held_out, options);
-    accepted.why = gain.matters >= 1 ? gain.where : predicted_in_words(small);
+    accepted.why =
+        gain.matters >= 1
+            ? gain.where
+            : predicted_in_words(small_effect(less, stage, accepted.id, out.before.held_out, options));
   }
 }
 
