@@ -14,6 +14,7 @@
 #include "datasets/slip_log.hpp"
 #include "datasets/summary.hpp"
 #include "dynamics/median.hpp"
+#include "experiment/force_zero.hpp"
 #include "experiment/landing_noise.hpp"
 #include "experiment/prepared_throw.hpp"
 #include "experiment/time_check.hpp"
@@ -213,6 +214,9 @@ Inspection inspect_throws(const std::string& file) {
     out.text += fmt::format("note: {}\n", note.in_words(log.throws.size()));
     json["impossible_times"].push_back({{"path", note.path}, {"reason", note.said}, {"throws", note.throws}});
   }
+  const auto untared = experiment::untared_force(log);
+  if (untared) out.text += fmt::format("note: {}\n", untared->in_words());
+  json["untared_normal_force_N"] = untared ? Json(untared->level) : Json(nullptr);
   json["doubtful"] = Json::array();
   for (const auto& doubt : experiment::unit_doubts(log)) {
     out.text += fmt::format("doubtful: {}: {}\n", doubt.path, doubt.reason);

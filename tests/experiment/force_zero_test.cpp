@@ -1,0 +1,38 @@
+// A normal force that does not end at zero is told.
+#include "experiment/force_zero.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/small_campaign.hpp"
+
+namespace unhand::experiment {
+namespace {
+
+datasets::ThrowLog offset_log(double level) {
+  auto log = generate_campaign(testing_support::small_design("limit_surface_disc"), 5);
+  for (auto& one : log.throws)
+    for (double& f : one.ft->normal_force.data) f += level;
+  return log;
+}
+
+TEST(ForceZero, ASensorThatWasTaredIsNotTold) { EXPECT_FALSE(untared_force(offset_log(0))); }
+
+TEST(ForceZero, TheLevelAfterThePadsHavePartedIsTheSensors) {
+  for (const double level : {-0.5, 1.0, 8.0, 60.0}) {
+    const auto told = untared_force(offset_log(level));
+    ASSERT_TRUE(told) << level;
+    EXPECT_NEAR(told->level, level, 5 * told->sigma);
+    EXPECT_GT(told->grip, level);
+    EXPECT_GT(told->throws, 0);
+  }
+}
+
+/// Nothing says that the pads let go: they may still press.
+TEST(ForceZero, PadsThatMayStillPressAreNoDoubt) {
+  auto log = offset_log(1);
+  for (auto& one : log.throws) one.landing.reset(), one.free_flight.reset();
+  EXPECT_FALSE(untared_force(log));
+}
+
+}  // namespace
+}  // namespace unhand::experiment
