@@ -125,14 +125,20 @@ DataBlock condition_block(const ModelComparison& model, const std::vector<Thrown
 
 constexpr const char* floor_style = "linecolor rgb '#404040' linewidth 1.2 dashtype 2";
 
-/// One panel: all models along column `column` of the data.
-std::string condition_panel(const Figure& figure, int column, std::optional<double> floor,
-                            const std::string& label) {
+/// What the panel of a column shows: all models, and the floor.
+std::vector<double> panel_values(const Figure& figure, int column, std::optional<double> floor) {
   std::vector<double> values;
   for (const auto& block : figure.data)
     for (const auto& row : block.rows) values.push_back(row[static_cast<std::size_t>(column) - 1]);
   if (floor) values.push_back(*floor);
-  std::string out = value_axis(values) + fmt::format("set xlabel '{}'\nunset arrow\n", label);
+  return values;
+}
+
+/// One panel: all models along column `column` of the data.
+std::string condition_panel(const Figure& figure, int column, std::optional<double> floor, Scale scale,
+                            const std::string& label) {
+  std::string out = value_axis(panel_values(figure, column, floor), scale) +
+                    fmt::format("set xlabel '{}'\nunset arrow\n", label);
   if (floor)
     out += fmt::format("set arrow from {0:.6g}, graph 0 to {0:.6g}, graph 1 nohead back {1}\n", *floor,
                        floor_style);
@@ -218,6 +224,7 @@ std::optional<Figure> condition_figure(const Comparison& comparison) {
     floor_theta = comparison.repetitions.landing_theta;
     key.push_back({fmt::format("with lines {}", floor_style), "scatter of repetitions"});
   }
+  const Scale scale = common_scale({panel_values(figure, 2, floor_x), panel_values(figure, 3, floor_theta)});
   constexpr int columns = 3;
   std::size_t longest = 0;
   for (const auto& label : labels) longest = std::max(longest, label.size());
@@ -234,10 +241,10 @@ std::optional<Figure> condition_figure(const Comparison& comparison) {
       "set yrange [{}:-0.7]\nset ytics ({}) scale 0\n",
       plain(first.model), 1 - 0.5 / figure.height, n - 0.3, line_tics(labels, true));
   s += place(figure, {left, middle - 0.25, bottom, top}) +
-       condition_panel(figure, 2, floor_x, "landing x [cm]");
+       condition_panel(figure, 2, floor_x, scale, "landing x [cm]");
   s += fmt::format("unset label 1\nset ytics ({})\n", line_tics(labels, false));
   s += place(figure, {middle + 0.25, figure.width - 0.5, bottom, top}) +
-       condition_panel(figure, 3, floor_theta, "landing theta [deg]");
+       condition_panel(figure, 3, floor_theta, scale, "landing theta [deg]");
   s += key_strip(figure, key, columns) + "unset multiplot\n";
   return figure;
 }

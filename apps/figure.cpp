@@ -219,9 +219,19 @@ double tic_step(double high) {
   return decade * (raw >= 5 * decade ? 5 : raw >= 2 * decade ? 2 : 1);
 }
 
-std::string value_axis(const std::vector<double>& values) {
+Scale common_scale(const std::vector<std::vector<double>>& panels) {
+  bool wide = false;
+  for (const auto& values : panels) {
+    const auto [low, high] = std::minmax_element(values.begin(), values.end());
+    if (!(*low > 0)) return Scale::linear;
+    wide = wide || *high / *low > 20;
+  }
+  return wide ? Scale::logarithmic : Scale::linear;
+}
+
+std::string value_axis(const std::vector<double>& values, Scale scale) {
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  if (!(*low > 0 && *high / *low > 20))
+  if (scale == Scale::linear)
     return fmt::format("unset logscale x; set xtics {:.6g}\nset xrange [0:{:.6g}]\n", tic_step(*high),
                        *high > 0 ? 1.08 * *high : 1);
   const double left = *low / 1.4, right = *high * 1.4;

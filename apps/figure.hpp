@@ -62,9 +62,16 @@ inline double key_height(std::size_t entries, int columns) {
 /// A round distance, so that there are three to seven tics beyond 0, up to `high`.
 double tic_step(double high);
 
-/// An axis x of values that are not negative, at least one: logarithmic where they are positive and span more
-/// than a factor of 20, then with tics at 1, 2 and 5 where decades alone would be few.
-std::string value_axis(const std::vector<double>& values);
+/// How an axis of values that are not negative shows them.
+enum class Scale { linear, logarithmic };
+
+/// Logarithmic where every panel's values, at least one, are positive, and those of one span more than a
+/// factor of 20: panels side by side are read alike.
+Scale common_scale(const std::vector<std::vector<double>>& panels);
+
+/// An axis x of values, at least one; a logarithmic one with tics at 1, 2 and 5 where decades alone would be
+/// few.
+std::string value_axis(const std::vector<double>& values, Scale scale);
 
 /// A quantile of sorted values, between neighbours; at least one value.
 double quantile(const std::vector<double>& sorted, double share);

@@ -106,7 +106,7 @@ std::optional<Figure> mae_figure(const experiment::Comparison& comparison) {
     body +=
         fmt::format("set ytics ({}) scale 0\n", named_tics(q % 2 == 0 ? names : std::vector<std::string>(n)));
     body += fmt::format("set title '{}' offset 0,-0.7\nset xtics font ',7.5'\n{}{}\nunset label\n",
-                        plain(title), value_axis(shown), points);
+                        plain(title), value_axis(shown, common_scale({shown})), points);
   }
   if (!any) return {};
   figure.script = fmt::format(

@@ -33,15 +33,19 @@ CLI::Validator finite_number(const std::string& accepted, const std::string& in_
       in_help);
 }
 
+/// CLI11 lets -1 wrap around, and says of 1e3 only that it cannot convert it.
+template <class Integer>
 CLI::Validator whole_number() {
   return CLI::Validator(
       [](std::string& text) -> std::string {
-        std::uint64_t value = 0;
+        Integer value = 0;
         const char* end = text.data() + text.size();
         const auto read = std::from_chars(text.data(), end, value);
         if (read.ec == std::errc{} && read.ptr == end) return {};
-        return fmt::format("{} is not a whole number from 0 to {}", text,
-                           std::numeric_limits<std::uint64_t>::max());
+        if (std::is_signed_v<Integer> && read.ec != std::errc::result_out_of_range)
+          return fmt::format("{} is not a whole number", text);
+        using Limits = std::numeric_limits<Integer>;
+        return fmt::format("{} is not a whole number from {} to {}", text, Limits::min(), Limits::max());
       },
       "");
 }
@@ -191,7 +195,8 @@ void Parser::footer(const std::string& text) { app_->footer(text); }
 template <class T>
 Option Parser::option(const std::string& name, T& value, const std::string& help) {
   CLI::Option* const out = app_->add_option(name, value, help);
-  if constexpr (std::is_same_v<T, std::uint64_t>) out->check(whole_number());  // CLI11 lets -1 wrap around
+  if constexpr (std::is_integral_v<T>) out->check(whole_number<T>());
+  if constexpr (std::is_same_v<T, std::optional<int>>) out->check(whole_number<int>());
   if constexpr (std::is_same_v<T, double> || std::is_same_v<T, std::optional<double>> ||
                 std::is_same_v<T, std::vector<double>>)
     out->check(finite_number("a finite number", "", [](double) { return true; }));

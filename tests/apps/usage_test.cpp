@@ -74,7 +74,9 @@ TEST_F(Cli, WrongUsage) {
   expect_refusal("crosscheck a.h5 --engine bulet", 2, "did you mean 'bullet'?");
   expect_refusal("compare", 2, "unhand: LOG is required\n");
   expect_refusal("inspect " + quick + " -z", 2, "unhand: The following argument was not expected: -z\n");
-  expect_refusal("inspect " + quick + " --threads -1", 2, "unhand: --threads: ");
+  expect_refusal("inspect " + quick + " --threads -1", 2,
+                 "unhand: --threads: -1 is not a number from 0 to 1024");
+  expect_refusal("inspect " + quick + " --threads 1e3", 2, "unhand: --threads: 1e3 is not a whole number\n");
   expect_refusal("generate nonsense --out a.h5", 2, "batch180");
   expect_refusal("generate quick12 --out a.h5 --effect flight.winds=1", 2, "did you mean 'flight.wind'?");
   expect_refusal("generate quick12 --out a.h5 --effect breeze=1", 2, "contact.stribeck");
