@@ -37,7 +37,8 @@ endfunction()
 #     LEVEL   -O2                   # of optimisation in a Release build, where its time goes into other modules
 #     BATCH   5                     # as unhand_batches
 #     ALONE   registry.cpp
-#     FAST    kinematics.cpp        # compiled alone at -O3 whatever LEVEL says: the arithmetic of dual numbers
+#     FAST    kinematics.cpp        # compiled alone at -O3 whatever LEVEL says, loops marked `omp simd` in vectors:
+#                                   # arithmetic that most of the time goes into
 #     PRECOMPILED)                  # as unhand_precompiled, with the modules of the same LEVEL
 function(unhand_module name)
   cmake_parse_arguments(ARG "PRECOMPILED" "BATCH;LEVEL" "SOURCES;HEADERS;USES;LINKS;ALONE;FAST" ${ARGN})
@@ -72,7 +73,7 @@ function(unhand_module name)
   endif()
   if(ARG_FAST)  # precompiled headers would bring their own level
     set_source_files_properties(${ARG_FAST} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON SKIP_PRECOMPILE_HEADERS ON
-      COMPILE_OPTIONS "$<$<CONFIG:Release>:-O3>;${growths}")
+      COMPILE_OPTIONS "$<$<CONFIG:Release>:-O3>;-fopenmp-simd;-fno-math-errno;-fno-trapping-math;${growths}")
   endif()
   install(TARGETS unhand_${name} EXPORT unhandTargets)
   foreach(header IN LISTS ARG_HEADERS)

@@ -126,16 +126,19 @@ void GivingPoints<S>::extrapolate(const Stretch<S>& coarse, const Stretch<S>& fi
     }
 }
 
-/// Without a branch: which points slip is another set at every guess.
+/// Without a branch, two points at once: which points slip is another set at every guess.
 template <class S>
 typename GivingPoints<S>::Sum GivingPoints<S>::sum(const Stretch<S>& from, const Vec3<double>& slip,
                                                    double gain, double radius) const {
   double energy = 0, fx = 0, fz = 0, tau = 0, xx = 0, xz = 0, zz = 0, xt = 0, zt = 0, tt = 0;
   const double gx = gain * slip[0], gz = gain * slip[1], turn = gain * slip[2];
   const std::size_t n = points_.x.size();
+  const double *const px = points_.x.data(), *const pz = points_.z.data(), *const area = points_.area.data(),
+                      *const sx = from.x.data(), *const sz = from.z.data(), *const limit = limit_.data();
+#pragma omp simd reduction(+ : energy, fx, fz, tau, xx, xz, zz, xt, zt, tt)
   for (std::size_t i = 0; i < n; ++i) {
-    const double x = radius * points_.x[i], z = radius * points_.z[i], w = points_.area[i];
-    const double ux = from.x[i] + gx - turn * z, uz = from.z[i] + gz + turn * x, most = limit_[i];
+    const double x = radius * px[i], z = radius * pz[i], w = area[i];
+    const double ux = sx[i] + gx - turn * z, uz = sz[i] + gz + turn * x, most = limit[i];
     const double square = ux * ux + uz * uz, size = std::sqrt(square), held = std::min(size, most);
     const double k = w * (size > most ? most / size : 1.0), bent = size > most ? k / square : 0.0;
     energy += w * held * (size - 0.5 * held);

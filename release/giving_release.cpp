@@ -43,6 +43,14 @@ struct Moving {
   Vec3<S> wrench;  ///< on the object about the patch, in the hand's frame [N, N, N m]
 };
 
+/// Slip and spin in world axes [m/s, m/s, rad/s], to begin a search at.
+using SlipGuess = Vec3<double>;
+
+template <class S>
+SlipGuess slip_of(const Relative<S>& y) {
+  return {value_of(y.slip.x), value_of(y.slip.z), value_of(y.spin)};
+}
+
 template <class S>
 class Stepper {
  public:
@@ -57,8 +65,8 @@ class Stepper {
                         at.stretch);
   }
 
-  /// One implicit step of length h to `scene`, the world at its end.
-  bool step(const S& h, const Scene<S>& scene, const Moving<S>& from, Moving<S>& to) {
+  /// One implicit step of length h to `scene`, the world at its end, with a first guess of the slip there.
+  bool step(const S& h, const Scene<S>& scene, const Moving<S>& from, const SlipGuess& guess, Moving<S>& to) {
     const Relative<S>& y = from.relative;
     // Where the object will be, as the old slip says: explicit here keeps the step convex.
     const Relative<S> ahead = moved(y, h, scene, y.slip, y.spin);
@@ -69,14 +77,15 @@ class Stepper {
     const auto& [m, I] = scene.body;
     const S zx = -m * lever.z, zz = m * lever.x;
     const Vec2<S> before = dynamics::rotate(S(-theta), y.slip);
-    Vec3<S> slip{before.x, before.z, y.spin};
+    const Vec2<double> near = dynamics::rotate(-value_of(theta), Vec2<double>{guess[0], guess[1]});
+    Vec3<S> slip{S(near.x), S(near.z), S(guess[2])};
     const typename contact::GivingPoints<S>::Step step{
         h,
         limits_.coulomb(scene.normal_force),
         limits_.length(scene.normal_force),
         {{{m, S(0), zx}, {S(0), m, zz}, {zx, zz, I + m * dot(lever, lever)}}},
         {free.x, free.z, y.spin + h * rate[5]},
-        slip};
+        {before.x, before.z, y.spin}};
     const bool solved = points_.step(step, from.stretch, to.stretch, slip, to.wrench);
     to.relative = moved(y, h, scene, dynamics::rotate(theta, Vec2<S>{slip[0], slip[1]}), slip[2]);
     return solved;
@@ -178,7 +187,7 @@ class GivingRelease {
       const double done = (begin + length - window_.begin) / (window_.end - window_.begin);
       const S next = steps == 1 ? stop : S(from + (stop - from) * done);
       const Scene<S> there = scenes_.scene(window_, next);
-      const bool solved = attempt(next, there);
+      const bool solved = attempt(next, there, rate);
       const double apart = distance(coarse_.relative, fine_.relative, body_);
       if (std::min(length, usual_) > pace_.slipping && !(solved && apart <= pace_.agree)) {
         usual_ = std::max(pace_.slipping, 0.5 * length);
@@ -205,12 +214,18 @@ class GivingRelease {
   }
 
  private:
-  /// To `next` in one step and in two of half its length; whether all were solved.
-  bool attempt(const S& next, const Scene<S>& there) {
+  /// To `next` in one step and in two of half its length, `rate` the state's now; whether all were solved.
+  bool attempt(const S& next, const Scene<S>& there, const State<S, 6>& rate) {
     const S h = next - t_, middle = t_ + 0.5 * h;
-    return stepper_.step(h, there, at_, coarse_) &&
-           stepper_.step(S(0.5 * h), scenes_.scene(window_, middle), at_, half_) &&
-           stepper_.step(S(0.5 * h), there, half_, fine_);
+    const SlipGuess now = slip_of(at_.relative);
+    SlipGuess ahead = now;
+    for (int i = 0; i < 3; ++i) ahead[i] += value_of(h) * value_of(rate[3 + i]);
+    if (!stepper_.step(h, there, at_, ahead, coarse_)) return false;
+    const SlipGuess end = slip_of(coarse_.relative);
+    SlipGuess between;
+    for (int i = 0; i < 3; ++i) between[i] = 0.5 * (now[i] + end[i]);
+    return stepper_.step(S(0.5 * h), scenes_.scene(window_, middle), at_, between, half_) &&
+           stepper_.step(S(0.5 * h), there, half_, end, fine_);
   }
   /// Moves on to what both say; false where that is not finite. `rate` becomes that of the new state.
   bool accept(const S& next, const Scene<S>& there, State<S, 6>& rate) {
