@@ -24,12 +24,17 @@ FrictionVariation<double> values(const FrictionVariation<Dual>& v) {
 void validate(const FrictionVariation<Dual>& v) {
   const auto values = effect_values(v);
   auto value = values.begin();
-  for (const auto& [effect, apply, apply_dual] : friction_effects())
-    for (const dynamics::EffectParameter& p : effect.parameters)
-      dynamics::require_in_range(effect, p, (*value++)->a);
-  if (!dynamics::is_zero(v.softness) && !(v.reference_force > 0))
-    throw std::invalid_argument(
-        fmt::format("contact.soft_patch_radius: f_0 = {} is not in (0, inf) N", v.reference_force));
+  for (const auto& [effect, apply, apply_dual] : friction_effects()) {
+    bool there = false;
+    for (const dynamics::EffectParameter& p : effect.parameters) {
+      dynamics::require_in_range(effect, p, (*value)->a);
+      there = there || !dynamics::is_zero(Dual(**value - p.neutral));
+      ++value;
+    }
+    if (there && effect.needs.reference_force && !(v.reference_force > 0))
+      throw std::invalid_argument(
+          fmt::format("{}: f_0 = {} is not in (0, inf) N", effect.id, v.reference_force));
+  }
 }
 
 std::span<const dynamics::EffectOn<FrictionVariation>> friction_effects() {
@@ -56,7 +61,8 @@ std::span<const dynamics::EffectOn<FrictionVariation>> friction_effects() {
       {{.id = "contact.soft_patch_radius",
         .mechanism = "the patch shrinks with the normal force, a = a_0 (f_N/f_0)^gamma",
         // Below 0 the law has solutions, but no patch widens as it is let go.
-        .parameters = {{.name = "gamma", .unit = "-", .high = 2, .typical = 0.1, .least = -1}}},
+        .parameters = {{.name = "gamma", .unit = "-", .high = 2, .typical = 0.1, .least = -1}},
+        .needs = {.reference_force = true}},
        [](const auto& p, auto& friction) { friction.softness = p["gamma"]; }},
       {{.id = "contact.pressure_profile",
         .mechanism = "pressure (1 - (r/a)^2)^s instead of a uniform one",

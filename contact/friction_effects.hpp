@@ -49,7 +49,7 @@ FrictionVariation<Dual> constant(const FrictionVariation<S>& v) {
 FrictionVariation<double> values(const FrictionVariation<Dual>& v);
 
 /// Throws std::invalid_argument, naming parameter, value and range, outside of those of friction_effects()
-/// (EffectParameter::least and `smallest` where there are), and unless f₀ > 0 where the patch is soft.
+/// (EffectParameter::least and `smallest` where there are), and unless f₀ > 0 where an effect needs it.
 void validate(const FrictionVariation<Dual>& v);
 
 /// contact.stribeck, contact.viscous, contact.soft_patch_radius, contact.pressure_profile,

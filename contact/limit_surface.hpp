@@ -25,8 +25,8 @@ concept PressedShape = requires(const T& shape) {
 };
 
 /// The set-valued law: slipping, the friction wrench is the one in the limit set that dissipates most,
-///   f = argmin over the set of f · v_r
-/// (for the ellipsoid f = −D v_r / sqrt(v_rᵀ D v_r) with D = diag(f_max², f_max², τ_max²));
+///   f = argmin over the set of f · s,   s = (v_r, ω_r)
+/// (for the ellipsoid f = −D s / sqrt(sᵀ D s) with D = diag(f_max², f_max², τ_max²));
 /// sticking, any f in the set. The slip acceleration is W f + b, W = G M⁻¹ Gᵀ. [LiuBillard2025] section II-B,
 /// [GoyalRuinaPapadopoulos1991] for the surface.
 ///

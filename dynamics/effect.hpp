@@ -73,12 +73,13 @@ enum class AccelerationForm {
 
 /// What must be there for an effect to leave a trace in a log of throws or flights.
 struct EffectNeeds {
-  bool wrench{false};        ///< the wrench behind a pad is measured
-  bool normal_force{false};  ///< the pads' normal force is measured
-  bool mocap{false};         ///< the object is tracked
-  bool attitude{false};      ///< how a free body lies is tracked
-  bool giving_pads{false};   ///< the contact law has pads that may give before they slip
-  bool pressure{false};      ///< where the pads press shapes the contact law's limits
+  bool wrench{false};           ///< the wrench behind a pad is measured
+  bool normal_force{false};     ///< the pads' normal force is measured
+  bool mocap{false};            ///< the object is tracked
+  bool attitude{false};         ///< how a free body lies is tracked
+  bool giving_pads{false};      ///< the contact law has pads that may give before they slip
+  bool pressure{false};         ///< where the pads press shapes the contact law's limits
+  bool reference_force{false};  ///< f₀, the campaign's median grip force, is known (every campaign's is)
 };
 
 /// Of an effect that is the traceless anisotropy of another one's parameter q ≥ 0: along body axis d that is

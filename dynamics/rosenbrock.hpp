@@ -15,6 +15,16 @@ namespace unhand::dynamics {
 /// is what slip does: there RODAS needs ten times the steps. Values only: the exact
 /// tangent of a step would need the derivative of its Jacobian (TangentStepper carries derivatives beside
 /// it).
+///
+/// A step of length h from (t₀, y₀), J = ∂f/∂y and f_t = ∂f/∂t there, in the form of [HairerWanner1996] IV.7
+/// that needs no product with J:
+///
+///   (I/(h γ) − J) k_i = f(t₀ + c_i h, y₀ + Σ_j A_ij k_j) + Σ_j (C_ij/h) k_j + h d_i f_t,   j < i
+///   y₁ = y₀ + Σ_j A_8j k_j + k_8,   error k_8
+///   y(t₀ + s h) = (1 − s) y₀ + s (y₁ + (1 − s)(b₁ + s (b₂ + s b₃))),   b_r = Σ_j H_rj k_j
+///
+/// With the paper's α and Γ = (γ_ij), γ on its diagonal: C = I/γ − Γ⁻¹, A = α Γ⁻¹; c and d are the row sums
+/// of α and Γ (the numbers below satisfy that to 2e-14).
 template <int N>
 class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
  public:
@@ -78,8 +88,10 @@ class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
   using Packed = Eigen::Matrix<double, kPadded, 1>;
   static constexpr double kGamma = 0.21193756319429014;
   static constexpr double kNode[kStages] = {
+      // c
       0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716, 0.4288403609558664, 1, 1, 1};
-  static constexpr double kTimeWeight[kStages] = {0.21193756319429014,
+  static constexpr double kTimeWeight[kStages] = {// d
+                                                  0.21193756319429014,
                                                   -0.42387512638858027,
                                                   -0.3384627126235924,
                                                   1.8046452872882734,
@@ -87,8 +99,8 @@ class Rosenbrock final : public SingleStep<Rosenbrock<N>, double, N> {
                                                   0,
                                                   0,
                                                   0};
-  // Row i: the weights of stages 0 … i − 1 in the argument of stage i; rows 6 and 7 add the stage before with
-  // weight 1.
+  // A: row i has the weights of stages 0 … i − 1 in the argument of stage i; rows 6 and 7 are row 5 and the
+  // stages after it with weight 1.
   static constexpr double kA[6][5] = {
       {0, 0, 0, 0, 0},
       {3.0, 0, 0, 0, 0},

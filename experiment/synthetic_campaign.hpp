@@ -121,7 +121,7 @@ struct CampaignDesign {
   int throws() const;      ///< conditions × repetitions
   /// The hand's motion of a posture, without what varies from throw to throw; release_acceleration [m/s²].
   ThrowMotion motion(const Posture& posture, double release_acceleration) const;
-  /// f₀ of contact.soft_patch_radius [N]
+  /// f₀ of FrictionVariation [N]
   double reference_force() const { return opening.grip_force; }
 };
 

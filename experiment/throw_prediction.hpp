@@ -26,7 +26,7 @@ namespace unhand::experiment {
 struct ThrowModel {
   std::string contact_model;   ///< a name that contact::make_contact_model knows
   int pads{2};                 ///< n >= 1: the friction limits are those of all
-  double reference_force{20};  ///< f₀ of contact.soft_patch_radius: the campaign's median grip force [N]
+  double reference_force{20};  ///< f₀ of FrictionVariation: the campaign's median grip force [N]
   dynamics::IntegratorOptions integrator{};  ///< of release and flight
 };
 

@@ -50,7 +50,7 @@ struct CampaignOptions {
   /// for, and the campaign's own numbers (ThrowModel) are these if given.
   bool predict_only{false};
   std::optional<int> pads{};                ///< 1 … 1000, as in logs
-  std::optional<double> reference_force{};  ///< f₀ of contact.soft_patch_radius, > 0 [N]
+  std::optional<double> reference_force{};  ///< f₀ of contact::FrictionVariation, > 0 [N]
 };
 
 /// One throw and its observations.

@@ -73,8 +73,8 @@ std::map<std::string, datasets::CardStatistics> errors_of(const experiment::Mode
                                                           datasets::Split split);
 
 /// The card of a fit. Beside the unknowns it holds what the model takes from the campaign: `pads`, and
-/// `reference_force`, f₀ of contact.soft_patch_radius. Errors and log are the caller's to add, the log's file
-/// at least. Throws std::invalid_argument as require_fit_of does.
+/// `reference_force`, f₀ of contact::FrictionVariation. Errors and log are the caller's to add, the log's
+/// file at least. Throws std::invalid_argument as require_fit_of does.
 datasets::ModelCard card_of(const CampaignProblem& problem, const FitResult& fit);
 
 /// Whether the card comes from a fit (it holds effects, spreads or a covariance), rather than from a plain

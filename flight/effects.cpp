@@ -15,6 +15,8 @@ std::span<const dynamics::EffectOn<Air>> air_effects() {
         .remedy = kLonger},
        [](const auto& p, auto& air) { air.extra_drag = p["k"]; }},
       {{.id = "flight.magnus_lift",
+        // One value for all objects, as outside tools read it from discovery.json; spatial_effects() has one
+        // for each.
         .mechanism = "Magnus lift, a = k_m omega J v",
         .parameters = {{"k_m", "-", 0, -5, 5, 0.01}},
         .form = AccelerationForm::lift,

@@ -30,7 +30,8 @@ Landing<S> ballistic(const dynamics::Pose<S>& pose, const dynamics::Twist<S>& tw
 /// t_fly = (vz + sqrt(vz² + 2 g (z − z_land)))/g with g = −gravity.z > 0: the downward passage of
 /// `landing_height` [m]. Empty if the flight never reaches that height on its way down: it starts below it
 /// and its apex does too, or gravity does not pull down (g <= 0) and it does not fall far enough by itself.
-/// Derivatives pass through the landing when S carries them; gravity may be tilted. D4.6 2.1.1, whose printed
+/// Derivatives pass through the landing when S carries them, as dθ/dp = ∂θ/∂p + ω dt_fly/dp with t_fly's from
+/// the formula; gravity may be tilted. D4.6 2.1.1, whose printed
 /// event function z + max(vz, 0) fires while still rising.
 template <class S>
 std::optional<Landing<S>> project(const dynamics::Pose<S>& pose, const dynamics::Twist<S>& twist,

@@ -35,6 +35,12 @@ bool is_still(const SpatialAir<S>& a) {
   return is_zero(a.drag_k) && is_zero(a.linear_drag) && is_zero(a.lift) && !has_shape(a);
 }
 
+/// −k |u| u − c u of a body that is alike from all sides, in any axes.
+template <class S>
+Vec3<S> round_drag(const S& k, const S& c, const Vec3<S>& u) {
+  return difference(quadratic_drag(k, u), scaled(c, u));
+}
+
 /// κ (Σ n_i⁴ − 3/5) |u| u and |u| A u in body axes.
 template <class S>
 Vec3<S> shape_drag(const S& x, const S& y, const S& cubic, const Vec3<S>& u) {
@@ -61,8 +67,8 @@ class SpatialPath final : public dynamics::SmoothSystem<SpatialPath<P>, 6> {
   template <class S>
   void flow_(const Phase&, const S& t, const State<S, 6>& y, State<S, 6>& dy) const {
     const Vec3<S> u = difference(Vec3<S>{y[3], y[4], y[5]}, convert3<S>(air_.wind));
-    Vec3<S> a = sum(convert3<S>(air_.gravity), quadratic_drag(convert<S>(air_.drag_k), u));
-    a = difference(a, scaled(convert<S>(air_.linear_drag), u));
+    Vec3<S> a =
+        sum(convert3<S>(air_.gravity), round_drag(convert<S>(air_.drag_k), convert<S>(air_.linear_drag), u));
     if (turns_) {
       const RotationState<P> now = rotation_.at(value_of(t) < last_ ? convert<P>(t) : P(last_));
       const Quaternion<S> q{convert<S>(now.attitude.w), convert<S>(now.attitude.x),
@@ -110,11 +116,9 @@ void validate(const SpatialStart<S>& start, const SpatialAir<S>& air, const std:
 
 template <class S>
 Vec3<S> body_drag(const SpatialAir<S>& air, const Vec3<S>& u) {
-  Vec3<S> a{S(0), S(0), S(0)};
-  if (!is_zero(air.drag_k)) a = quadratic_drag(air.drag_k, u);
-  if (!is_zero(air.linear_drag)) a = difference(a, scaled(air.linear_drag, u));
-  if (has_shape(air)) a = difference(a, shape_drag(air.axis_drag_x, air.axis_drag_y, air.cubic_drag, u));
-  return a;
+  const Vec3<S> round = round_drag(air.drag_k, air.linear_drag, u);
+  if (!has_shape(air)) return round;
+  return difference(round, shape_drag(air.axis_drag_x, air.axis_drag_y, air.cubic_drag, u));
 }
 template Vec3<double> body_drag(const SpatialAir<double>&, const Vec3<double>&);
 template Vec3<Dual> body_drag(const SpatialAir<Dual>&, const Vec3<Dual>&);

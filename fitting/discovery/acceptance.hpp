@@ -17,8 +17,16 @@ inline constexpr double kImitation = 1.0 / 3.0;
 /// Where nothing is left but noise, footprints are small and a refit gains what they say, within this factor.
 inline constexpr double kFirstOrder = 3;
 
-/// Evidence (difference of Bayes' criterion) that an effect needs before it is accepted or kept.
+/// Evidence that an effect needs before it is accepted or kept: by how much Bayes' criterion (Stage::bic())
+/// falls with it.
 inline constexpr double kDeltaBic = -10;
+/// The same of a fit of the same model that starts elsewhere: any that is likelier, beyond rounding.
+inline constexpr double kLikelierBic = -1;
+
+/// Whether `with` has that evidence against `without`, of the same throws.
+inline bool is_evident(const Stage& without, const Stage& with) {
+  return with.bic() - without.bic() <= kDeltaBic;
+}
 
 /// What a law leaves of an effect that it describes: a hundredth of its χ² is a tenth of its size.
 inline constexpr double kRest = 0.01;

@@ -99,7 +99,7 @@ void fit_give_along(Stage& stage, const DiscoverOptions& options) {
     next = std::move(other);
   if (!next.is_fitted() || !solve_held_out(next, options)) return;
   const double give = give_of(next);  // where it is none, the fit has found something else
-  if (give > 0 && give <= kMostGive && next.bic() - stage.bic() <= (again ? -1 : kDeltaBic))
+  if (give > 0 && give <= kMostGive && next.bic() - stage.bic() <= (again ? kLikelierBic : kDeltaBic))
     stage = std::move(next);
 }
 

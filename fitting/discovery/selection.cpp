@@ -41,7 +41,7 @@ void drop_without_evidence(Stage& stage, const DiscoverOptions& options, Discove
   for (std::size_t i = out.effects.size(); i-- > 0;) {
     const std::string id = out.effects[i].id;
     const Stage& less = without(stage, {id}, options);
-    if (!less.solved() || stage.bic() - less.bic() <= kDeltaBic) continue;
+    if (!less.solved() || is_evident(less, stage)) continue;
     name_imitation(
         {id, "there is no evidence for it without what has been withdrawn", stage.bic() - less.bic()}, out);
     out.effects.erase(out.effects.begin() + static_cast<std::ptrdiff_t>(i));
@@ -58,11 +58,11 @@ void backward(Stage& stage, const DiscoverOptions& options, Discovery& out) {
       const Stage& less = without(stage, {stage.ids[i]}, options);
       if (!less.solved()) continue;
       const bool needed =
-          stage.bic() - less.bic() < kDeltaBic &&
+          is_evident(less, stage) &&
           (is_law(stage.ids[i]) || improvement(less, stage, out.before.held_out, options).matters >= 1 ||
            (left_by_answer(stage, out, options).empty() && predicts_better(less, stage, options)));
       if (needed) continue;
-      if (stage.bic() - less.bic() < kDeltaBic && !out.small)
+      if (is_evident(less, stage) && !out.small)
         out.small = small_effect(less, stage, stage.ids[i], out.before.held_out, options);
       std::erase_if(out.effects, [&](const AcceptedEffect& e) { return e.id == stage.ids[i]; });
       stage = Stage(less);

@@ -110,7 +110,7 @@ void polish(Stage& stage, const DiscoverOptions& options) {
     Stage next{stage.problem, {}, {}, stage.ids};
     if (!solve_train(next, options, stage.fit.values())) return;
     const long more = next.fit.samples - stage.fit.samples;  // of throws that the start could not simulate
-    if (more < 0 || (more == 0 && next.bic() > stage.bic() - 1)) return;
+    if (more < 0 || (more == 0 && next.bic() - stage.bic() > kLikelierBic)) return;
     if (!solve_held_out(next, options)) return;
     stage = std::move(next);
   }
@@ -147,7 +147,7 @@ bool is_astray(const Stage& stage, const Stage& next, const Score& score, bool l
   if (!next.is_fitted()) return leads || leaves_misfit(stage, options);
   if (!leaves_misfit(stage, options))
     return leads && stage.fit.deviance() - next.fit.deviance() < score.gain / kFirstOrder;
-  return next.bic() - stage.bic() > kDeltaBic || (leads && leaves_misfit(next, options));
+  return !is_evident(stage, next) || (leads && leaves_misfit(next, options));
 }
 
 }  // namespace

@@ -38,6 +38,7 @@ struct Wald {
   double statistic{};
   Eigen::Index parameters{};
   double largest{};  ///< (θ_j − neutral_j)²/V_jj of the parameter that is told best from neutral
+  /// Bayes' criterion with the effect less that without: parameters log(groups) less the statistic.
   double delta_bic(const GroupedFit& fit) const;
   /// Against F, over the groups used; or of the largest alone against Student's t, shared by the parameters:
   /// few groups cannot say how all of them scatter together, and still that one of them is there. The smaller

@@ -64,6 +64,23 @@ constexpr Place kPlaces[] = {{"static_ratio", 1.3, 1, true},      {"static_ratio
                              {"softness", 0.4, 0, true},          {"softness", -0.3, 0, false},
                              {"compliance", 2e-5, 0, false},      {"loss_time", 0.004, 0, false},
                              {"pressure_exponent", 0.5, 0, true}, {"pressure_exponent", -0.3, 0, false}};
+/// Every parameter of every effect that changes friction itself (adhesion wraps the force) has its place.
+TEST(ContactEffects, EveryParameterHasAPlaceWhereItsDerivativeIsChecked) {
+  const FrictionVariation<double> neutral;
+  FrictionVariation<double> variation;
+  for (const Place& place : kPlaces) Place::set(place.name, 0.123, variation);
+  const auto before = effect_values(neutral);
+  const auto after = effect_values(variation);
+  std::size_t k = 0;
+  for (const auto& [effect, apply, apply_dual] : friction_effects())
+    for (const auto& parameter : effect.parameters) {
+      if (effect.id != "contact.adhesion") {
+        EXPECT_NE(*after[k], *before[k]) << effect.full_name(parameter);
+      }
+      ++k;
+    }
+}
+
 /// Whether the effect has a footprint in this law.
 bool matters(std::string_view name, std::string_view law) {
   if (name == "compliance" || name == "loss_time") return law != "sliding_pivot";

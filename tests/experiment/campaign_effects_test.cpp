@@ -300,6 +300,28 @@ TEST(CampaignEffects, AirMovesTheLandingAsPerturbationTheorySays) {
   EXPECT_EQ(moved(design, {{"flight.wind.w_x", 2}}), plain.landing_pose.x) << "no declared drag, no wind";
 }
 
+/// Without drag the flight has a closed form, which must not be taken where an effect bends it:
+/// `is_ballistic`.
+TEST(CampaignEffects, EachOfTheFlightAloneMovesALandingWithoutDrag) {
+  const CampaignDesign calm = perfect();
+  for (const auto& object : calm.objects) ASSERT_EQ(object.drag_k, 0);
+  const auto plain = generate_throw(calm, kSeed, kThrow).truth;
+  int alone = 0;
+  for (const Effect& effect : known_effects()) {
+    if (!effect.id.starts_with("flight.") || !effect.acts_through.empty()) continue;
+    ++alone;
+    const auto moved = generate_throw(perfect(typical(effect)), kSeed, kThrow).truth;
+    if (!effect.acts_everywhere) {
+      EXPECT_EQ(moved.detach_pose.x, plain.detach_pose.x) << effect.id;
+    }
+    EXPECT_GT(std::hypot(moved.landing_pose.x - plain.landing_pose.x,
+                         moved.landing_pose.theta - plain.landing_pose.theta),
+              1e-5)
+        << effect.id << ": does is_ballistic() know it?";
+  }
+  EXPECT_GE(alone, 3);
+}
+
 TEST(CampaignEffects, FrictionMattersOnlyOnceThePadsOpen) {
   const auto plain = generate_throw(perfect(), kSeed, kThrow);
   for (const Effect& effect : known_effects()) {

@@ -256,7 +256,8 @@ TEST(MissingForce, TheFormsOfEffectsAreFound) {
   for (const auto& effect : experiment::known_effects()) {
     if (effect.form == Form::none) continue;
     ++forms;
-    ASSERT_TRUE(missing.contains(effect.form)) << effect.id;
+    ASSERT_TRUE(missing.contains(effect.form))
+        << effect.id << ": what acceleration is of its form? Add it above";
     const auto candidate = missing_terms(flights(missing.at(effect.form)), kFlight);
     ASSERT_FALSE(candidate.terms.empty()) << effect.id;
     EXPECT_EQ(candidate.terms.front().form, effect.form) << effect.id;
