@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "dynamics/median.hpp"
 #include "fitting/clock.hpp"
 #include "fitting/measured/effect_trial.hpp"
 #include "fitting/measured/fall_discovery.hpp"
@@ -82,6 +83,45 @@ void weigh_start_speeds(const datasets::ThrowLog& log, const FallProblem& proble
            true});
 }
 
+/// The sensor's scale as it shows at rest, where it reads gravity once the fitted bias is taken off. A fall
+/// by itself does not tell it from the size of a drag: what is read there is their product.
+void weigh_gain(const datasets::ThrowLog& log, const FallProblem& problem, const EffectSearch& search,
+                MeasuredDiscovery& out) {
+  constexpr double kSurely = 3;    // standard errors
+  constexpr double kLeast = 2e-3;  // of gravity: it differs by more than that from place to place
+  constexpr std::size_t kFewest = 3;
+  flight::Vec3<double> bias{};
+  const char* const axes[] = {"x", "y", "z"};
+  for (std::size_t k = 0; k < search.final.shared.size(); ++k)
+    for (std::size_t a = 0; a < 3; ++a)
+      if (search.final.shared[k].name == fmt::format("sensor.accelerometer_bias.{}", axes[a]))
+        bias[a] = search.final.values[static_cast<Eigen::Index>(k)];
+  std::vector<double> sizes;
+  for (std::size_t i = 0; i < problem.groups().size(); ++i)
+    if (problem.before(i).quiet)
+      sizes.push_back(flight::norm(flight::difference(problem.before(i).rest, bias)));
+  if (sizes.size() < kFewest) return;
+  const double n = static_cast<double>(sizes.size()), gain = dynamics::median(sizes) / log.gravity;
+  double square = 0;
+  for (const double size : sizes) square += std::pow(size / log.gravity - gain, 2);
+  const double error = std::sqrt(square / (n - 1) / n);
+  if (std::abs(gain - 1) < std::max(kLeast, kSurely * error)) return;
+  for (const auto& effect : out.effects) {
+    if (effect.id != "flight.quadratic_drag" && effect.id != "flight.linear_drag") continue;
+    std::string sizes_then;
+    for (const auto& p : effect.parameters)
+      sizes_then += fmt::format("{}{} = {:#.4g}{}, not {:#.4g}", sizes_then.empty() ? "" : "; ", p.name,
+                                p.value / gain, dynamics::after_number(p.unit), p.value);
+    out.evidence.push_back(
+        {effect.id,
+         fmt::format(
+             "At rest before {} falls the sensor reads {:.4g} of the declared gravity, ± {:.1g}, once the "
+             "fitted bias is taken off. If its scale is off by that, {}",
+             sizes.size(), gain, error, sizes_then),
+         true});
+  }
+}
+
 /// Whether an accepted effect lives from zeros that differ from fall to fall, which turned forces that cancel
 /// in the mean (a large drag, a bias and a drift against it) take up: where every fall has a zero of its own,
 /// it is not told from none.
@@ -133,6 +173,7 @@ void explain(const datasets::ThrowLog& log, const FallProblem& problem, const Ef
            "a bias and a steady turn about an axis off the sensor: a gyroscope in the same recording"});
   }
   weigh_start_speeds(log, problem, search, out);
+  weigh_gain(log, problem, search, out);
   std::map<std::string, int> conditions;
   for (const auto& g : problem.groups()) ++conditions[g.condition];
   std::string text;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "fitting/measured/effect_answer.hpp"
+#include "fitting/measured/effect_conditions.hpp"
 #include "fitting/measured/effect_description.hpp"
 #include "fitting/measured/effect_step.hpp"
 #include "fitting/measured/effect_trial.hpp"
@@ -270,6 +271,7 @@ EffectSearch search_effects(const GroupedProblem& problem, const EffectSearchOpt
   answer = Search(problem, catalogue, options).run(std::move(answer));
   out.effects = described(problem, answer, catalogue, options);
   out.stability = stability_of(problem, answer, options);
+  out.conditions = conditions_of(problem, answer, out.effects, catalogue, options);
   out.ranking = std::move(answer.ranking);
   std::sort(out.ranking.begin(), out.ranking.end(),
             [](const Ranked& a, const Ranked& b) { return a.gain > b.gain; });

@@ -31,6 +31,20 @@ struct Stability {
   double z() const { return (high - low) / std::hypot(low_sigma, high_sigma); }
 };
 
+/// A parameter of an answer, and what it would be otherwise.
+struct SizeShift {
+  std::string effect, parameter, unit;  ///< "flight.quadratic_drag", "k[jar]", "1/m"
+  double value{}, then{}, then_sigma{};
+};
+/// Sizes that hang on an effect that the answer does not have.
+struct SizeCondition {
+  std::string on;  ///< that effect
+  std::string
+      instead_of;      ///< the accepted one that it is another name of; empty: it stands beside all of them
+  double delta_bic{};  ///< of it there; negative: for it
+  std::vector<SizeShift> shifts;  ///< with it
+};
+
 /// What a search over effects found: the accepted ones, all scores, and the fits before and after.
 struct EffectSearch {
   bool solved{};                                  ///< false: the base fit has no answer
@@ -39,6 +53,7 @@ struct EffectSearch {
   std::vector<Ranked> ranking;                    ///< best first
   GroupedFit base, base_test, final, final_test;  ///< train and held-out groups, before and after
   std::vector<Stability> stability;               ///< of the accepted parameters
+  std::vector<SizeCondition> conditions;          ///< of their sizes
 };
 
 /// Fits the train groups without effects; then, step by step, takes the footprints of all effects of

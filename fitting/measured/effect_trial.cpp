@@ -20,10 +20,12 @@ double Wald::delta_bic(const GroupedFit& fit) const {
 
 double Wald::p_value(const GroupedFit& fit) const {
   const auto p = static_cast<double>(parameters), n = static_cast<double>(fit.used);
-  if (!(n > p + 1)) return 1;
+  if (!(n > 2)) return 1;
+  const double one = p * f_tail(largest, 1, n - 1);
+  // So few groups say nothing of all parameters together.
+  if (!(n > p + 1)) return std::min(1.0, one);
   const double all = f_tail(statistic * (n - p) / (p * (n - 1)), p, n - p);
-  if (parameters < 2) return all;
-  return std::min(1.0, 2 * std::min(all, p * f_tail(largest, 1, n - 1)));
+  return parameters < 2 ? all : std::min(1.0, 2 * std::min(all, one));
 }
 
 Wald wald_of(const VectorXd& away, const MatrixXd& covariance) {

@@ -77,7 +77,7 @@ BeforeFall before_fall(const datasets::ImuLog& imu, std::size_t first, double gr
     mean_over(begin, end, mean, scatter);
     const double size = flight::norm(mean);
     if (scatter > kQuiet || std::abs(size - gravity) > kQuiet) continue;
-    out.rest = mean;
+    out.rest = mean, out.quiet = true;
     for (std::size_t k = end; k < first; ++k) {
       const double dt = imu.time(k + 1) - imu.time(k);
       for (const std::size_t i : {k, k + 1}) {

@@ -16,6 +16,7 @@ namespace unhand::fitting {
 /// there, a bias included: the vertical, once the bias is taken off.
 struct BeforeFall {
   flight::Vec3<double> rest{0, 0, 1};  ///< body axes [m/s²]
+  bool quiet{};                        ///< there was such a stretch
   double speed{};                      ///< upward, as the fall begins [m/s]
   double speed_sigma{3};               ///< of that [m/s]
   double tilt_sigma{0.3};              ///< of the vertical's direction [rad]

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "dynamics/median.hpp"
 #include "fitting/distributions.hpp"
@@ -43,6 +44,21 @@ double without_strays(const GroupedProblem& problem, const GroupedFit& fit, std:
   return total - n <= kFew * total ? near / n : all / total;
 }
 
+/// The channel whose neighbouring residuals correlate most surely, if that is a good part of the declared
+/// noise: noise as large as declared hides a slow error no longer where it is smaller than that. χ² may then
+/// be below one.
+std::optional<MeasuredUnexplained> slow_error(const MeasuredDiscovery& out) {
+  constexpr double kSurely = 5;  // standard deviations of white noise
+  constexpr double kPart = 0.1;  // of the declared variance
+  std::optional<MeasuredUnexplained> found;
+  double most = kSurely;
+  for (const auto& m : out.misfit)
+    for (const auto& a : out.autocorrelation_after)
+      if (a.channel == m.channel && a.z > most && a.lag1 * m.after_test > kPart)
+        most = a.z, found = MeasuredUnexplained{out.phase, m.channel, m.after_test, {}};
+  return found;
+}
+
 void look_for_the_unexplained(const GroupedProblem& problem, const GroupedFit& held_out,
                               const MeasuredOptions& options, MeasuredDiscovery& out) {
   const auto& names = problem.channels();
@@ -64,6 +80,7 @@ void look_for_the_unexplained(const GroupedProblem& problem, const GroupedFit& h
     if (out.unexplained && out.unexplained->chi2_per_dof >= left) continue;
     out.unexplained = MeasuredUnexplained{out.phase, m.channel, left, {}};
   }
+  if (!out.unexplained) out.unexplained = slow_error(out);
   if (!out.unexplained) return;
   auto& u = *out.unexplained;
   u.description = fmt::format("{} in {}: {:.3g} times the variance of the noise is left on held-out groups",
@@ -139,6 +156,38 @@ void tell_of_wild(const GroupedProblem& problem, const std::vector<WildGroup>& w
        false});
 }
 
+/// What the sizes of the effects that were not withdrawn hang on, as evidence.
+void weigh_conditions(const std::vector<SizeCondition>& conditions, MeasuredDiscovery& out) {
+  const auto stands = [&](const std::string& id) {
+    return std::any_of(out.effects.begin(), out.effects.end(), [&](const auto& e) { return e.id == id; });
+  };
+  for (const SizeCondition& c : conditions) {
+    if (c.instead_of.empty() && c.shifts.empty()) {
+      out.evidence.push_back(
+          {c.on,
+           fmt::format("It is evident on the train groups (BIC {:.1f}), but held-out groups "
+                       "show too little of it to confirm it",
+                       c.delta_bic),
+           false});
+      continue;
+    }
+    if (!c.instead_of.empty() && !stands(c.instead_of)) continue;
+    const std::string how =
+        c.instead_of.empty()
+            ? fmt::format("{} is evident beside it (BIC {:.1f}), though held-out groups do not confirm that",
+                          c.on, c.delta_bic)
+            : fmt::format("{} would explain the log as {} does", c.on, c.instead_of);
+    std::map<std::string, std::string> sizes;  // by effect
+    for (const SizeShift& s : c.shifts)
+      if (stands(s.effect))
+        sizes[s.effect] +=
+            fmt::format("{}{} = {:#.4g} ± {:.2g}{}, not {:#.4g}", sizes[s.effect].empty() ? "" : "; ",
+                        s.parameter, s.then, s.then_sigma, dynamics::after_number(s.unit), s.value);
+    for (const auto& [effect, size] : sizes)
+      out.evidence.push_back({effect, fmt::format("{}: with it {}", how, size), true});
+  }
+}
+
 }  // namespace
 
 EffectSearch run_search(GroupedProblem& problem, const MeasuredOptions& options, MeasuredDiscovery& out) {
@@ -166,6 +215,7 @@ EffectSearch run_search(GroupedProblem& problem, const MeasuredOptions& options,
     for (auto& effect : problem.effects())
       if (effect.id == id) leading.push_back(std::move(effect));
   out.footprints = footprint_profiles(problem, search.base, leading, options.search.fit);
+  weigh_conditions(search.conditions, out);
   look_for_the_unexplained(problem, search.final_test, options, out);
   if (out.unexplained)
     out.unexplained->missing =

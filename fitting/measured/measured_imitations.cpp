@@ -168,6 +168,7 @@ void withdraw_imitations(const GroupedProblem& problem, const EffectSearchOption
   tell_fates({}, withdrawn, {}, out.ranking);
   search.effects.clear();
   search.stability.clear();
+  search.conditions.clear();
   search.final = search.base;
   search.final_test = search.base_test;
   take_fits(problem, search, out);
