@@ -167,6 +167,25 @@ TEST(FallDiscovery, BiasAndDragAreToldApart) {
     for (const auto& [other, correlation] : e.equivalent) EXPECT_NE(other, "flight.drag_by_axis") << e.id;
 }
 
+// A reading of a drag is the sensor's scale times its size: only at rest is the scale seen.
+TEST(FallDiscovery, AScaleThatIsOffAtRestMakesTheDragDoubtful) {
+  const auto doubted = [](double scale) {
+    auto log = falls({0, 0, 0, 0.045, 0}, 30, 2);
+    for (auto& one : log.throws)
+      for (double& f : one.imu->specific_force.data) f *= scale;
+    const auto found = discover_falls(log, {});
+    const auto* drag = named(found, "flight.quadratic_drag");
+    EXPECT_NE(drag, nullptr);
+    EXPECT_NEAR(value_of(*drag, "k[phone]"), 0.045 * scale, 0.001);
+    for (const auto& e : found.evidence)
+      if (const auto at = e.text.find("k[phone] = "); e.text.starts_with("At rest before") && e.against)
+        return std::stod(e.text.substr(at + 11));
+    return 0.0;
+  };
+  EXPECT_EQ(doubted(1), 0) << "nothing to say";
+  EXPECT_NEAR(doubted(1.04), 0.045, 5e-4);
+}
+
 TEST(FallDiscovery, StartsThatTheSensorDidNotSeeMakeTheDragUndetermined) {
   // Before the throws upwards the sensor misses most of the push: what it gained is not what they start with.
   auto log = falls({.bias_z = 0.3, .drag = 0.05}, 24, 7);

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstdio>
+#include <random>
 #include <utility>
 
 #include "datasets/import_cube_tosses.hpp"
@@ -284,6 +285,70 @@ TEST(FlightDiscovery, AClockIsAlsoAScaleAndAGravityAsUncertainByEveryName) {
   EXPECT_NEAR(scale.first, 9.81 * std::pow(1 - 0.0075, -2), 4 * scale.second);
   EXPECT_NEAR(clock.first, scale.first, 0.3 * scale.second);
   EXPECT_NEAR(clock.second, scale.second, 0.1 * scale.second);  // printed to 1e-4 m/s²
+}
+
+/// The size that evidence gives a parameter beside `on`: "... k[body] = 0.0500 ± 1.5e-05 1/m, not 0.0490".
+double size_beside(const MeasuredDiscovery& found, const std::string& about, const std::string& on,
+                   const std::string& parameter) {
+  for (const auto& e : found.evidence)
+    if (const auto at = e.text.find(parameter + " = ");
+        e.about == about && e.against && e.text.starts_with(on + " ") && at != std::string::npos)
+      return std::stod(e.text.substr(at + parameter.size() + 3));
+  return std::nan("");
+}
+
+// A drag is one per metre: with a clock that is off under the name of a scale, it is off by as much.
+TEST(FlightDiscovery, TheSizeOfADragIsToldByEveryNameOfAClock) {
+  SpatialDesign design;
+  design.speed = 5;
+  const SpatialTruth truth{.drag = 0.05, .time_scale = 0.01};
+  const auto found = found_in(spatial_flights(truth, design, 61));
+  const auto accepted = [&](const std::string& id) {
+    return std::find_if(found.effects.begin(), found.effects.end(),
+                        [&](const auto& e) { return e.id == id; });
+  };
+  ASSERT_NE(accepted("sensor.length_scale"), found.effects.end()) << "the name that is listed first";
+  ASSERT_NE(accepted("flight.quadratic_drag"), found.effects.end());
+  for (const char* on : {"sensor.time_scale", "flight.gravity"})
+    EXPECT_NEAR(size_beside(found, "flight.quadratic_drag", on, "k[body]"), 0.05, 2e-4) << on;
+  const auto& k = accepted("flight.quadratic_drag")->parameters.front();
+  EXPECT_GT(std::abs(k.value - 0.05), 4 * k.sigma) << "else there is nothing to tell";
+}
+
+// Half a sigma of a slow error lies in the declared noise: χ² does not show it, neighbours do.
+TEST(FlightDiscovery, ASlowErrorBelowTheDeclaredNoiseIsUnexplained) {
+  SpatialDesign design;
+  design.flights = 200;
+  const auto with = [&](double size) {
+    auto log = spatial_flights({}, design, 62);
+    std::mt19937_64 random(63);
+    std::normal_distribution<double> normal;
+    for (auto& one : log.throws) {
+      double slow = 0;
+      for (std::size_t i = 0; i < one.mocap->time.rows; ++i) {
+        slow = 0.8 * slow + 0.6 * normal(random);
+        one.mocap->pose.data[7 * i + 1] += size * design.sigma * slow;
+      }
+    }
+    return found_in(log);
+  };
+  EXPECT_EQ(with(0).verdict, Verdict::no_missing_effect);
+  const auto found = with(0.6);
+  for (const auto& m : found.misfit) EXPECT_LT(m.after_test, MeasuredOptions{}.unexplained) << m.channel;
+  ASSERT_EQ(found.verdict, Verdict::unexplained);
+  EXPECT_EQ(found.unexplained->channel, "position_y");
+}
+
+// Four train flights say nothing of three parameters together, but enough of the one that is off.
+TEST(FlightDiscovery, FiveFlightsShowACentreOfMassThatIsOff) {
+  SpatialDesign design;
+  design.flights = 5;
+  const auto found = found_in(spatial_flights({.com = {0, 0, 0.01}}, design, 64));
+  ASSERT_NE(named(found, "sensor.com_offset"), nullptr);
+  for (const auto& p : named(found, "sensor.com_offset")->parameters)
+    if (p.name == "z[body]") {
+      EXPECT_NEAR(p.value, 0.01, 1e-3);
+    }
 }
 
 // Gravity, the scale or the clock may be far off: the declared gravity here is another planet's.
