@@ -119,6 +119,9 @@ std::size_t remove_glitches(FlightSamples& s) {
   // The last frames may have met the ground.
   std::fill(good.end() - static_cast<std::ptrdiff_t>(std::min<std::size_t>(3, good.size())), good.end(),
             true);
+  const std::vector<bool> held = held_frames(columns, sigma);
+  for (std::size_t i = 0; i < good.size(); ++i)
+    if (held[i]) good[i] = false;
   const auto removed = static_cast<std::size_t>(std::count(good.begin(), good.end(), false));
   if (removed == 0) return 0;
   keep(s.times, good);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "dynamics/quantisation.hpp"
 #include "dynamics/third_difference.hpp"
 #include "dynamics/white_noise.hpp"
 
@@ -14,9 +15,12 @@ namespace {
 /// The third differences of one coordinate over the frames that are left, in units of their σ.
 class ThirdDifferences {
  public:
-  ThirdDifferences(const std::vector<double>& times, const std::vector<double>& column, double sigma)
+  /// Over the frames that are not `out`.
+  ThirdDifferences(const std::vector<double>& times, const std::vector<double>& column, double sigma,
+                   const std::vector<bool>& out)
       : times_(times), column_(column), sigma_(sigma) {
-    for (std::size_t i = 0; i < times.size(); ++i) left_.push_back(i);
+    for (std::size_t i = 0; i < times.size(); ++i)
+      if (!out[i]) left_.push_back(i);
     work_out();
   }
 
@@ -118,13 +122,48 @@ std::size_t mark_glitches(datasets::MocapLog& mocap) {
 
 }  // namespace
 
+std::vector<bool> held_frames(std::span<const std::vector<double>> columns, std::span<const double> sigma) {
+  constexpr double kSigmas = 4, kSteps = 3;
+  constexpr std::size_t kEnds = 2;  // frames, at most, where no motion comes before or follows
+  const std::size_t n = columns.front().size();
+  std::vector<bool> out(n, false);
+  std::vector<double> least;  // what is a motion, by column
+  const auto repeats = [&](std::size_t i) {
+    return std::all_of(columns.begin(), columns.end(), [i](const auto& x) { return x[i] == x[i - 1]; });
+  };
+  for (std::size_t i = 1; i < n; ++i) {
+    if (!repeats(i)) continue;
+    std::size_t next = i + 1;
+    while (next < n && repeats(next)) ++next;
+    const bool to_the_end = next == n;
+    if ((to_the_end || i < 2) && next - i > kEnds) {  // at rest
+      i = next;
+      continue;
+    }
+    if (least.empty())
+      for (std::size_t c = 0; c < columns.size(); ++c)
+        least.push_back(std::max(kSigmas * sigma[c], kSteps * dynamics::quantisation_step(columns[c])));
+    bool moves = false;
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const auto& x = columns[c];
+      const bool came = i < 2 || std::abs(x[i - 1] - x[i - 2]) > least[c],
+                 went = to_the_end || std::abs(x[next] - x[i]) > least[c];
+      moves = moves || (came && went && !(i < 2 && to_the_end));
+    }
+    for (std::size_t k = i; moves && k < next; ++k) out[k] = true;
+    i = next;
+  }
+  return out;
+}
+
 std::vector<bool> glitches(const std::vector<double>& times, std::span<const std::vector<double>> columns,
                            std::span<const double> sigma) {
   constexpr std::size_t kFewest = 5, kShare = 10;  // frames that stay; at most a tenth goes
-  std::vector<bool> out(times.size(), false);
+  const std::vector<bool> held = held_frames(columns, sigma);
+  std::vector<bool> out = held;
   for (std::size_t c = 0; c < columns.size(); ++c) {
     if (!(sigma[c] > 0)) continue;
-    ThirdDifferences differences(times, columns[c], sigma[c]);
+    ThirdDifferences differences(times, columns[c], sigma[c], held);
     std::vector<std::size_t> removed;
     while (removed.size() < 1 + times.size() / kShare && differences.frames() > kFewest) {
       const auto frame = differences.worst();

@@ -1,4 +1,4 @@
-// Frames in which a tracker was elsewhere for once.
+// Frames in which a tracker was elsewhere for once, or held the pose before.
 #pragma once
 
 #include <span>
@@ -8,10 +8,16 @@
 
 namespace unhand::experiment {
 
-/// Which frames lie, in one of the `columns` (tracked coordinates by frame), so far off the parabolas through
-/// their neighbours that a third difference is more than eight of its sigmas, and leave a smooth motion
-/// (five) behind when they are taken out, worst first, at most a tenth: what a force that sets in or an
-/// impact does is smooth without no frame. `times` [s] increase; `sigma`: 1 σ of a column.
+/// Which frames repeat the one before in every column, to the bit, while some column moves to that one and to
+/// the next different one by more than four sigmas and three steps of its grid: a tracker that had lost the
+/// object. At either end, one or two that show one of both motions. `columns`: tracked coordinates by frame,
+/// `sigma`: 1 σ of a column.
+std::vector<bool> held_frames(std::span<const std::vector<double>> columns, std::span<const double> sigma);
+
+/// Those, and which frames lie, in one of the columns, so far off the parabolas through their neighbours that
+/// a third difference is more than eight of its sigmas, and leave a smooth motion (five) behind when they are
+/// taken out, worst first, at most a tenth: what a force that sets in or an impact does is smooth without no
+/// frame. `times` [s] increase.
 std::vector<bool> glitches(const std::vector<double>& times, std::span<const std::vector<double>> columns,
                            std::span<const double> sigma);
 

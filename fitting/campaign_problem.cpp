@@ -78,7 +78,8 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& logged, const std::st
   datasets::validate(logged, file);
   datasets::ThrowLog log = logged;
   if (const std::size_t n = experiment::mark_glitches(log); n > 0)
-    notes_.push_back(fmt::format("{} frames in which the tracker was elsewhere for once were taken out", n));
+    notes_.push_back(fmt::format(
+        "{} frames in which the tracker was elsewhere for once, or held the pose before, were taken out", n));
   const std::vector<Effect> effects = find_effects(options.effects);
   header_ = log;
   header_.throws.clear();

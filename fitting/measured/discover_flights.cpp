@@ -251,8 +251,9 @@ MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const Measured
   if (problem.glitches() > 0)
     out.evidence.push_back(
         {"",
-         fmt::format("{} frames in which the tracker was elsewhere for once were taken out",
-                     problem.glitches()),
+         fmt::format(
+             "{} frames in which the tracker was elsewhere for once, or held the pose before, were taken out",
+             problem.glitches()),
          false});
   out.seconds = seconds_since(begin);
   return out;

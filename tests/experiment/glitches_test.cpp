@@ -33,6 +33,28 @@ TEST(Glitches, AFrameElsewhereIsOneAndWhatForcesDoIsNot) {
   EXPECT_TRUE(off[20] && off[50]);
 }
 
+// A tracker that loses an object may hold its pose: to the bit, as no noise does. One at rest on a grid does,
+// too.
+TEST(Glitches, AFrameThatRepeatsTheOneBeforeInMotionIsOne) {
+  constexpr double kNoise = 1e-4, kRate = 120, kGrid = 1e-3;
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> normal;
+  std::vector<double> times;
+  std::vector<std::vector<double>> columns(2);
+  for (int i = 0; i < 90; ++i) {
+    const double t = i / kRate, moving = std::max(0.0, t - 0.25);
+    times.push_back(t);
+    columns[0].push_back(kGrid * std::round((4 * moving + kNoise * normal(random)) / kGrid));
+    columns[1].push_back(kGrid * std::round((2 * moving * moving + kNoise * normal(random)) / kGrid));
+  }
+  const std::array sigma{kNoise, kNoise};
+  EXPECT_EQ(glitches(times, columns, sigma), std::vector<bool>(times.size(), false));
+  std::vector<bool> expected(times.size(), false);
+  for (const std::size_t i : {40U, 60U, 61U, 89U})
+    for (auto& x : columns) x[i] = x[i - 1], expected[i] = true;
+  EXPECT_EQ(glitches(times, columns, sigma), expected);
+}
+
 // Side by side, at both ends, and beside frames that were lost; but not the frames about an impact.
 TEST(Glitches, NeedNoGoodNeighbours) {
   constexpr double kNoise = 1e-4, kRate = 120;
