@@ -214,6 +214,7 @@ MeasuredDiscovery discover_falls(const datasets::ThrowLog& log, const MeasuredOp
   out.after_train = named_errors(problem, search.final);
   out.after_test = named_errors(problem, search.final_test);
   weigh_stability(out);
+  weigh_conditions(search, out);
   explain(log, problem, search, out);
   weigh_drag_form(problem, search, options, out);
   out.seconds = seconds_since(begin);

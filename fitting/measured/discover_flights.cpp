@@ -213,6 +213,56 @@ void weigh_thrust(const datasets::ThrowLog& log, const FlightProblem& problem, M
   }
 }
 
+/// χ² per sample of some train flights without their first or last frames, each flight's start fitted to the
+/// others; of all frames where `first` and `last` are 0.
+double left_without(const FlightProblem& problem, const GroupedFit& fit, std::size_t first,
+                    std::size_t last) {
+  constexpr std::size_t kAsked = 40;  // flights are enough to tell
+  double chi2 = 0, n = 0;
+  std::size_t asked = 0;
+  for (std::size_t i = 0; i < fit.groups.size() && asked < kAsked; ++i) {
+    if (!fit.groups[i].used || !fit.groups[i].solved) continue;
+    const auto& rows = problem.groups()[i].rows;
+    std::vector<double> times;
+    for (const GroupRow& row : rows)
+      if (row.channel != kPriorChannel && (times.empty() || row.time > times.back()))
+        times.push_back(row.time);
+    if (times.size() < 3 * (first + last) + 3) continue;
+    const double from = times[first], to = times[times.size() - 1 - last];
+    const auto stays = [&](const GroupRow& row) { return row.time >= from && row.time <= to; };
+    const GroupFit part = fit_own_part(problem, i, fit, stays);
+    if (!part.solved) continue;
+    ++asked;
+    for (std::size_t j = 0; j < rows.size(); ++j)
+      if (rows[j].channel != kPriorChannel && stays(rows[j]))
+        chi2 += std::pow(part.residual[static_cast<Eigen::Index>(j)], 2), n += 1;
+  }
+  return n > 0 ? chi2 / n : std::nan("");
+}
+
+/// Whether a misfit lies in the first or in the last frames: a recording that begins in the hand, or goes on
+/// into an impact. An acceleration that is missing bends all of a flight.
+void weigh_ends(const FlightProblem& problem, const GroupedFit& fit, MeasuredDiscovery& out) {
+  constexpr std::size_t kFrames = 4;
+  constexpr double kGoes = 0.25;  // of the misfit stays
+  constexpr double kMisfit = 2;   // χ² per sample
+  if (!out.unexplained) return;
+  const double all = left_without(problem, fit, 0, 0);
+  if (!(all > kMisfit)) return;
+  const double begins = left_without(problem, fit, kFrames, 0), ends = left_without(problem, fit, 0, kFrames);
+  const auto tell = [&](double without, double other, const char* which, const char* cause) {
+    if (!(without - 1 < kGoes * (all - 1)) || !(without - 1 < kGoes * (other - 1))) return;
+    out.evidence.push_back({"",
+                            fmt::format("Without the {} {} frames of each flight {:.3g} times the variance "
+                                        "of the noise is left of {:.3g}: "
+                                        "{}? Then declare free_flight to be shorter",
+                                        which, kFrames, without, all, cause),
+                            false});
+  };
+  tell(begins, ends, "first", "does the recording begin while something still holds the object");
+  tell(ends, begins, "last", "does it go on after the object has met something");
+}
+
 }  // namespace
 
 NamedErrors named_errors(const FlightProblem& problem, const GroupedFit& fit, int threads) {
@@ -244,6 +294,8 @@ MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const Measured
   out.after_test = named_errors(problem, search.final_test, threads);
   name_scale(log, options, out);
   weigh_stability(out);
+  weigh_conditions(search, out);
+  weigh_ends(problem, search.final, out);
   weigh_scales(log, options, out);
   weigh_drag(log, out);
   weigh_drag_form(problem, search, options, out);

@@ -156,38 +156,6 @@ void tell_of_wild(const GroupedProblem& problem, const std::vector<WildGroup>& w
        false});
 }
 
-/// What the sizes of the effects that were not withdrawn hang on, as evidence.
-void weigh_conditions(const std::vector<SizeCondition>& conditions, MeasuredDiscovery& out) {
-  const auto stands = [&](const std::string& id) {
-    return std::any_of(out.effects.begin(), out.effects.end(), [&](const auto& e) { return e.id == id; });
-  };
-  for (const SizeCondition& c : conditions) {
-    if (c.instead_of.empty() && c.shifts.empty()) {
-      out.evidence.push_back(
-          {c.on,
-           fmt::format("It is evident on the train groups (BIC {:.1f}), but held-out groups "
-                       "show too little of it to confirm it",
-                       c.delta_bic),
-           false});
-      continue;
-    }
-    if (!c.instead_of.empty() && !stands(c.instead_of)) continue;
-    const std::string how =
-        c.instead_of.empty()
-            ? fmt::format("{} is evident beside it (BIC {:.1f}), though held-out groups do not confirm that",
-                          c.on, c.delta_bic)
-            : fmt::format("{} would explain the log as {} does", c.on, c.instead_of);
-    std::map<std::string, std::string> sizes;  // by effect
-    for (const SizeShift& s : c.shifts)
-      if (stands(s.effect))
-        sizes[s.effect] +=
-            fmt::format("{}{} = {:#.4g} ± {:.2g}{}, not {:#.4g}", sizes[s.effect].empty() ? "" : "; ",
-                        s.parameter, s.then, s.then_sigma, dynamics::after_number(s.unit), s.value);
-    for (const auto& [effect, size] : sizes)
-      out.evidence.push_back({effect, fmt::format("{}: with it {}", how, size), true});
-  }
-}
-
 }  // namespace
 
 EffectSearch run_search(GroupedProblem& problem, const MeasuredOptions& options, MeasuredDiscovery& out) {
@@ -215,7 +183,6 @@ EffectSearch run_search(GroupedProblem& problem, const MeasuredOptions& options,
     for (auto& effect : problem.effects())
       if (effect.id == id) leading.push_back(std::move(effect));
   out.footprints = footprint_profiles(problem, search.base, leading, options.search.fit);
-  weigh_conditions(search.conditions, out);
   look_for_the_unexplained(problem, search.final_test, options, out);
   if (out.unexplained)
     out.unexplained->missing =
@@ -224,6 +191,37 @@ EffectSearch run_search(GroupedProblem& problem, const MeasuredOptions& options,
                 : out.unexplained    ? Verdict::unexplained
                                      : Verdict::no_missing_effect;
   return search;
+}
+
+void weigh_conditions(const EffectSearch& search, MeasuredDiscovery& out) {
+  const auto stands = [&](const std::string& id) {
+    return std::any_of(out.effects.begin(), out.effects.end(), [&](const auto& e) { return e.id == id; });
+  };
+  for (const SizeCondition& c : search.conditions) {
+    if (c.instead_of.empty() && c.shifts.empty()) {
+      out.evidence.push_back(
+          {c.on,
+           fmt::format("It is evident on the train groups (BIC {:.1f}), but held-out groups "
+                       "show too little of it to confirm it",
+                       c.delta_bic),
+           false});
+      continue;
+    }
+    if (!c.instead_of.empty() && !stands(c.instead_of)) continue;
+    const std::string how =
+        c.instead_of.empty()
+            ? fmt::format("{} is evident beside it (BIC {:.1f}), though held-out groups do not confirm that",
+                          c.on, c.delta_bic)
+            : fmt::format("{} would explain the log as {} does", c.on, c.instead_of);
+    std::map<std::string, std::string> sizes;  // by effect
+    for (const SizeShift& s : c.shifts)
+      if (stands(s.effect))
+        sizes[s.effect] +=
+            fmt::format("{}{} = {:#.4g} ± {:.2g}{}, not {:#.4g}", sizes[s.effect].empty() ? "" : "; ",
+                        s.parameter, s.then, s.then_sigma, dynamics::after_number(s.unit), s.value);
+    for (const auto& [effect, size] : sizes)
+      out.evidence.push_back({effect, fmt::format("{}: with it {}", how, size), true});
+  }
 }
 
 void weigh_drag_form(const GroupedProblem& problem, const EffectSearch& search,

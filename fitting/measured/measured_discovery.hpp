@@ -93,6 +93,8 @@ MeasuredDiscovery discover_falls(const datasets::ThrowLog& log, const MeasuredOp
 /// The part that flights and falls share: the search, residual tests, the verdict. Groups that err as no
 /// other does (wild_groups.hpp) are set aside of the problem, and named among the skipped.
 EffectSearch run_search(GroupedProblem& problem, const MeasuredOptions& options, MeasuredDiscovery& out);
+/// On what the sizes of the answer's effects hang (EffectSearch::conditions), as evidence.
+void weigh_conditions(const EffectSearch& search, MeasuredDiscovery& out);
 /// Whether the form of a drag is the one that it is named by: evidence against a quadratic or a linear one
 /// beside which the train groups want some of the other, by the scatter between groups, at the level of the
 /// search. Some less than none of the linear one says that it grows faster than v².

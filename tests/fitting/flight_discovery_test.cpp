@@ -339,6 +339,28 @@ TEST(FlightDiscovery, ASlowErrorBelowTheDeclaredNoiseIsUnexplained) {
   EXPECT_EQ(found.unexplained->channel, "position_y");
 }
 
+// The last two frames of every flight are after the bounce, as one that is cut by a clock may be.
+TEST(FlightDiscovery, FramesAfterTheEndOfTheFlightAreSaidToBeWhereItFails) {
+  const auto told = [](int frames, bool at_the_end) {
+    SpatialDesign design;
+    design.flights = 15, design.samples = 25;
+    auto log = spatial_flights({.drag = 0.03}, design, 65);
+    for (auto& one : log.throws)
+      for (int k = 0; k < frames; ++k) {
+        const std::size_t n = one.mocap->time.rows,
+                          i = at_the_end ? n - 1 - static_cast<std::size_t>(k) : static_cast<std::size_t>(k);
+        one.mocap->pose.data[7 * i + 2] += 0.03 * (frames - k);  // 4 m/s
+      }
+    std::string out;
+    for (const auto& e : found_in(log).evidence)
+      if (e.text.starts_with("Without the ")) out += e.text;
+    return out;
+  };
+  EXPECT_EQ(told(0, true), "");
+  EXPECT_THAT(told(2, true), testing::StartsWith("Without the last 4 frames"));
+  EXPECT_THAT(told(2, false), testing::StartsWith("Without the first 4 frames"));
+}
+
 // Four train flights say nothing of three parameters together, but enough of the one that is off.
 TEST(FlightDiscovery, FiveFlightsShowACentreOfMassThatIsOff) {
   SpatialDesign design;
