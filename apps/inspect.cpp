@@ -19,6 +19,7 @@
 #include "experiment/prepared_throw.hpp"
 #include "experiment/time_check.hpp"
 #include "experiment/unit_check.hpp"
+#include "fitting/measured/rest_heights.hpp"
 
 namespace unhand::apps {
 namespace {
@@ -214,6 +215,8 @@ Inspection inspect_throws(const std::string& file) {
     out.text += fmt::format("note: {}\n", note.in_words(log.throws.size()));
     json["impossible_times"].push_back({{"path", note.path}, {"reason", note.said}, {"throws", note.throws}});
   }
+  if (const auto rests = fitting::rests_on_faces(log); rests.is_doubtful())
+    out.text += fmt::format("note: {}\n", rests.in_words());
   const auto untared = experiment::untared_force(log);
   if (untared) out.text += fmt::format("note: {}\n", untared->in_words());
   json["untared_normal_force_N"] = untared ? Json(untared->level) : Json(nullptr);

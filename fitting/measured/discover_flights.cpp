@@ -300,6 +300,8 @@ MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const Measured
   weigh_drag(log, out);
   weigh_drag_form(problem, search, options, out);
   weigh_thrust(log, problem, out);
+  if (const RestsOnFaces rests = rests_on_faces(log); rests.is_doubtful())
+    out.evidence.push_back({"", rests.in_words(), true});
   if (problem.glitches() > 0)
     out.evidence.push_back(
         {"",

@@ -1,5 +1,7 @@
 #include "fitting/measured/rest_heights.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -15,10 +17,15 @@ constexpr double kLevel = 0.995;  // cosine between a face's normal and the vert
 struct Rest {
   double height{};
   std::size_t axis{};
-  int up{};  // sign of the body axis that points up
+  int up{};      // sign of the body axis that points up
+  bool level{};  // it does
 };
 
-std::optional<Rest> rest_of(const datasets::MocapLog& mocap) {
+std::optional<Rest> rest_of(const datasets::Throw& one) {
+  if (!one.mocap || one.mocap->pose.cols != 7) return {};
+  const datasets::MocapLog& mocap = *one.mocap;
+  if (one.free_flight && mocap.time.rows > 0 && !(one.free_flight->second < mocap.time(mocap.time.rows - 1)))
+    return {};  // nothing was recorded after the flight
   std::vector<std::size_t> last;
   for (std::size_t i = mocap.time.rows; i-- > 0 && last.size() < kStillSamples;)
     if (mocap.is_valid(i)) last.push_back(i);
@@ -35,7 +42,7 @@ std::optional<Rest> rest_of(const datasets::MocapLog& mocap) {
   const auto up = flight::rotate(flight::conjugate(q), flight::Vec3<double>{0, 0, 1});
   for (std::size_t a = 1; a < 3; ++a)
     if (std::abs(up[a]) > std::abs(up[out.axis])) out.axis = a;
-  if (std::abs(up[out.axis]) < kLevel) return {};
+  out.level = std::abs(up[out.axis]) >= kLevel;
   out.up = up[out.axis] > 0 ? 1 : -1;
   return out;
 }
@@ -59,12 +66,9 @@ std::optional<RestHeights> rest_heights(const datasets::ThrowLog& log, const std
   std::array<std::array<Mean, 2>, 3> heights;
   RestHeights out;
   for (const auto& one : log.throws) {
-    if (one.object != object || !one.mocap || one.mocap->pose.cols != 7) continue;
-    if (one.free_flight && one.mocap->time.rows > 0 &&
-        !(one.free_flight->second < one.mocap->time(one.mocap->time.rows - 1)))
-      continue;  // nothing was recorded after the flight
-    const auto rest = rest_of(*one.mocap);
-    if (!rest) continue;
+    if (one.object != object) continue;
+    const auto rest = rest_of(one);
+    if (!rest || !rest->level) continue;
     heights[rest->axis][rest->up > 0 ? 1 : 0].add(rest->height - floor);
     ++out.n;
   }
@@ -82,6 +86,28 @@ std::optional<RestHeights> rest_heights(const datasets::ThrowLog& log, const std
   if (out.n < 5 || !(scales.n > 0)) return {};
   out.scale = scales.mean();
   out.sigma = std::max(scales.error(), within);
+  return out;
+}
+
+bool RestsOnFaces::is_doubtful() const {
+  constexpr int kFewest = 10;
+  return still >= kFewest && 2 * on_face < still;
+}
+
+std::string RestsOnFaces::in_words() const {
+  return fmt::format(
+      "{} throws of boxes end still, and {} of them on a face: are the quaternions (w, x, y, z), "
+      "from the body to the world?",
+      still, on_face);
+}
+
+RestsOnFaces rests_on_faces(const datasets::ThrowLog& log) {
+  RestsOnFaces out;
+  if (log.dimension != 3) return out;
+  for (const auto& one : log.throws) {
+    if (!log.objects.at(one.object).dims) continue;
+    if (const auto rest = rest_of(one)) ++out.still, out.on_face += rest->level ? 1 : 0;
+  }
   return out;
 }
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <optional>
+#include <string>
 
 #include "datasets/throw_log.hpp"
 
@@ -22,5 +23,16 @@ struct RestHeights {
 /// no axis has two rests on each of its faces; an axis that has not is left out.
 std::optional<RestHeights> rest_heights(const datasets::ThrowLog& log, const std::string& object,
                                         double floor);
+
+/// Throws of boxes that end still, and those among them that lie on a face.
+struct RestsOnFaces {
+  int still{}, on_face{};
+  /// Boxes stop on their faces: where most seem not to, attitudes are in another convention than the
+  /// schema's.
+  bool is_doubtful() const;
+  std::string in_words() const;
+};
+/// Of all objects with `dims`, spatial log with orientation.
+RestsOnFaces rests_on_faces(const datasets::ThrowLog& log);
 
 }  // namespace unhand::fitting

@@ -14,7 +14,9 @@
 #include "fitting/measured/effect_search.hpp"
 #include "fitting/measured/flight_discovery.hpp"
 #include "fitting/measured/measured_discovery.hpp"
+#include "fitting/measured/rest_heights.hpp"
 #include "fitting/measured/wild_groups.hpp"
+#include "flight/quaternion.hpp"
 #include "tests/support/data_folder.hpp"
 #include "tests/support/spatial_flights.hpp"
 
@@ -649,6 +651,34 @@ TEST(FlightDiscovery, AScaleThatBoxesAtRestRefuteIsGravityByEveryName) {
   EXPECT_EQ(found.parameters, std::vector<std::string>{"flight.gravity.ratio"});
   EXPECT_FALSE(found.stability.empty());
   for (const Stability& s : found.stability) EXPECT_EQ(s.parameter, "flight.gravity.ratio");
+}
+
+// Boxes stop on their faces, whichever way they are turned about the vertical; read from the world to the
+// body, few of them do.
+TEST(RestHeights, AttitudesOfAnotherConventionLeaveBoxesOnNoFace) {
+  auto log = spatial_flights({}, {}, 42);
+  log.objects.at("body").dims = {0.06, 0.06, 0.06};
+  std::mt19937_64 random(43);
+  std::uniform_real_distribution<double> half_turn(-3, 3);
+  const double quarter = 1.5707963267948966;
+  int n = 0;
+  for (auto& one : log.throws) {
+    const flight::Vec3<double> axes[] = {{0, 0, 0},        {2 * quarter, 0, 0}, {quarter, 0, 0},
+                                         {-quarter, 0, 0}, {0, quarter, 0},     {0, -quarter, 0}};
+    const auto q = flight::exp(flight::Vec3<double>{0, 0, half_turn(random)}) * flight::exp(axes[n++ % 6]);
+    for (int i = 0; i < 8; ++i) {
+      one.mocap->time.data.push_back(one.mocap->time.data.back() + 0.01);
+      one.mocap->pose.data.insert(one.mocap->pose.data.end(), {1, 1, 0.03, q.w, q.x, q.y, q.z});
+    }
+    one.mocap->time.rows = one.mocap->pose.rows = one.mocap->time.data.size();
+  }
+  EXPECT_EQ(rests_on_faces(log).still, static_cast<int>(log.throws.size()));
+  EXPECT_EQ(rests_on_faces(log).on_face, static_cast<int>(log.throws.size()));
+  EXPECT_FALSE(rests_on_faces(log).is_doubtful());
+  for (auto& one : log.throws)
+    for (std::size_t i = 0; i < one.mocap->pose.rows; ++i)
+      for (std::size_t j = 4; j < 7; ++j) one.mocap->pose.data[7 * i + j] *= -1;
+  EXPECT_TRUE(rests_on_faces(log).is_doubtful()) << rests_on_faces(log).on_face;
 }
 
 // Air that moves acts through a drag, whether it was declared or has been found.
