@@ -34,7 +34,8 @@ struct Stability {
 /// A parameter of an answer, and what it would be otherwise.
 struct SizeShift {
   std::string effect, parameter, unit;  ///< "flight.quadratic_drag", "k[jar]", "1/m"
-  double value{}, then{}, then_sigma{};
+  double value{};                       ///< of the answer
+  double then{}, then_sigma{};          ///< what it would be, and 1 σ
 };
 /// Sizes that hang on an effect that the answer does not have.
 struct SizeCondition {

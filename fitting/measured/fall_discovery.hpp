@@ -40,6 +40,7 @@ class FallProblem final : public GroupedProblem {
   Eigen::VectorXd response(std::size_t group,
                            const std::vector<flight::Vec3<double>>& acceleration) const override;
   const flight::Vec3<double>& sigma(std::size_t group) const { return falls_[group].sigma; }  ///< [m/s²]
+  /// What the sensor read before a fall.
   const BeforeFall& before(std::size_t group) const { return falls_[group].before; }
   /// (measured − predicted) of the rows that are measurements, from their residuals [m/s²].
   Eigen::VectorXd left_of(std::size_t group, const Eigen::VectorXd& residual) const;

@@ -26,10 +26,12 @@ std::optional<RestHeights> rest_heights(const datasets::ThrowLog& log, const std
 
 /// Throws of boxes that end still, and those among them that lie on a face.
 struct RestsOnFaces {
-  int still{}, on_face{};
+  int still{};    ///< throws that end so
+  int on_face{};  ///< of these
   /// Boxes stop on their faces: where most seem not to, attitudes are in another convention than the
   /// schema's.
   bool is_doubtful() const;
+  /// For reports.
   std::string in_words() const;
 };
 /// Of all objects with `dims`, spatial log with orientation.
