@@ -262,7 +262,8 @@ Json throws_json(const Setting& setting, const Throws& throws) {
   return out;
 }
 
-void check(const CrosscheckOptions& options, const Parser& parser) {
+/// Refuses what the engine or the models do not have.
+void require_usable(const CrosscheckOptions& options, const Parser& parser) {
   if (options.engine == "cvode")
     refuse_options(parser, {"--steps", "--pads", "--friction", "--rings"}, "cvode integrates the models");
   if (options.engine == "patch")
@@ -281,26 +282,73 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
           datasets::unknown_name(fmt::format("--models: there is no model '{}'", model), model, known));
   if (options.engine == "bullet" && !crosscheck::has_bullet())
     throw Unanswered("built without Bullet (Debian package libbullet-dev)");
+}
+
+/// By model, the throws in their order.
+using ModelPredictions = std::map<std::string, std::vector<Prediction>>;
+
+/// At a tolerance that is none of the differences.
+ModelPredictions predictions_of(const CrosscheckOptions& options, const Throws& throws,
+                                const experiment::ModelParameters& parameters) {
+  dynamics::IntegratorOptions tight;
+  tight.tolerances = {1e-9, 1e-11};
+  ModelPredictions out;
+  Progress progress("models", throws.size() * options.models.size());
+  for (const auto& model : options.models)
+    out[model] = all(throws, options.threads, progress, [&](const auto& one) {
+      experiment::ModelParameters of_law = parameters;
+      of_law.law_values.clear();
+      for (const auto& [own, value] : contact::given_law_parameters(model, parameters.law_values))
+        of_law.law_values[own.name] = value;
+      return experiment::predict(one, model, of_law, tight);
+    });
+  return out;
+}
+
+/// One setting of the engine beside the models and what was measured.
+struct SettingReport {
+  Json json;
+  std::string text;
+  bool any{};  ///< throw that it brings to a landing
+};
+
+SettingReport report_of(const Setting& setting, const ModelPredictions& models, const Throws& throws) {
+  const bool same_model = !setting.model.empty();  // by another integrator: the worst differences matter
+  Table table{{same_model ? "CVODE - own steppers" : "engine - model"}, {}, 1};
+  for (const auto& quantity : experiment::kQuantities) {
+    table.header.push_back(quantity.title);
+    if (same_model) table.header.push_back("worst");
+  }
+  SettingReport out{{{"setting", setting.json}, {"models", Json::object()}}, {}, false};
+  for (const auto& [name, predictions] : models) {
+    if (same_model && name != setting.model) continue;
+    const auto differences = against_model(setting.throws, predictions);
+    out.any = out.any || !differences.of[0].empty();
+    Json& json = out.json["models"][name] = differences_json(differences);
+    if (same_model) {
+      int other = 0;
+      for (std::size_t i = 0; i < throws.size(); ++i)
+        other += setting.throws[i].events != predictions[i].events;
+      json["other_number_of_events"] = other;
+    }
+    add_row(table, name, differences, same_model);
+  }
+  const auto measured = against_measured(setting.throws, throws);
+  out.json["measured"] = differences_json(measured);
+  add_row(table, "measured", measured, same_model);
+  out.json["throws"] = throws_json(setting, throws);
+  out.text = fmt::format("\n{}{}\n{}", setting.words, same_model ? ", " + setting.model : "", table.text());
+  return out;
+}
+
+void check(const CrosscheckOptions& options, const Parser& parser) {
+  require_usable(options, parser);
   auto log = read_throws(options.log);
   if (options.card.empty()) leave_out_forceless(log);
   auto throws = experiment::prepare_all(log, options.log, options.threads, false);
   std::string from;
   const auto parameters = parameters_of(options, log, throws, from);
-
-  dynamics::IntegratorOptions tight;
-  tight.tolerances = {1e-9, 1e-11};
-  std::map<std::string, std::vector<Prediction>> models;
-  {
-    Progress progress("models", throws.size() * options.models.size());
-    for (const auto& model : options.models)
-      models[model] = all(throws, options.threads, progress, [&](const auto& one) {
-        experiment::ModelParameters of_law = parameters;
-        of_law.law_values.clear();
-        for (const auto& [own, value] : contact::given_law_parameters(model, parameters.law_values))
-          of_law.law_values[own.name] = value;
-        return experiment::predict(one, model, of_law, tight);
-      });
-  }
+  const auto models = predictions_of(options, throws, parameters);
   const auto settings = run_engine(options, throws, parameters);
 
   Json json = json_head("crosscheck");
@@ -313,33 +361,10 @@ void check(const CrosscheckOptions& options, const Parser& parser) {
   std::string text;
   bool any = false;
   for (const auto& setting : settings) {
-    Table table{{setting.model.empty() ? "engine - model" : "CVODE - own steppers"}, {}, 1};
-    const bool worst = !setting.model.empty();
-    for (const auto& quantity : experiment::kQuantities) {
-      table.header.push_back(quantity.title);
-      if (worst) table.header.push_back("worst");
-    }
-    Json one{{"setting", setting.json}, {"models", Json::object()}};
-    for (const auto& [name, predictions] : models) {
-      if (!setting.model.empty() && name != setting.model) continue;
-      const auto differences = against_model(setting.throws, predictions);
-      any = any || !differences.of[0].empty();
-      one["models"][name] = differences_json(differences);
-      if (worst) {
-        int other = 0;
-        for (std::size_t i = 0; i < throws.size(); ++i)
-          other += setting.throws[i].events != predictions[i].events;
-        one["models"][name]["other_number_of_events"] = other;
-      }
-      add_row(table, name, differences, worst);
-    }
-    const auto measured = against_measured(setting.throws, throws);
-    one["measured"] = differences_json(measured);
-    add_row(table, "measured", measured, worst);
-    one["throws"] = throws_json(setting, throws);
-    json["settings"].push_back(one);
-    text += fmt::format("\n{}{}\n{}", setting.words, setting.model.empty() ? "" : ", " + setting.model,
-                        table.text());
+    const SettingReport one = report_of(setting, models, throws);
+    any = any || one.any;
+    json["settings"].push_back(one.json);
+    text += one.text;
   }
   if (!any) throw Unanswered(fmt::format("{}: {} brings no throw to a landing", options.log, options.engine));
   Outputs outputs{{options.log, options.card}};
