@@ -292,10 +292,8 @@ struct DroppingMotions {
   }
 };
 
-void plan_throw(const PlanThrowOptions& options) {
-  require_outputs({{options.json}, {options.report, Wanted::directory}},
-                  {options.arm, options.card, options.sku});
-  if (!options.report.empty()) require_gnuplot();
+/// The box that is aimed at.
+planners::TargetBox box_of(const PlanThrowOptions& options) {
   const auto target = numbers<3>("--target", options.target, ',');
   constexpr double kFarthest = 1000;  // m
   for (const double one : target)
@@ -303,33 +301,51 @@ void plan_throw(const PlanThrowOptions& options) {
       throw WrongUsage(fmt::format("--target: {:g} m is not in [{:g}, {:g}] m", one, -kFarthest, kFarthest));
   const auto box = numbers<2>("--box", options.box, 'x');
   if (!(box[0] > 0 && box[1] > 0)) throw WrongUsage(fmt::format("--box: '{}' has no area", options.box));
-  ThrowAnswer answer;
-  answer.box = {{target[0], target[1], target[2]}, box[0], box[1]};
-  answer.window = options.window;
+  return {{target[0], target[1], target[2]}, box[0], box[1]};
+}
 
+std::optional<datasets::Sku> sku_of(const PlanThrowOptions& options) {
+  if (options.sku.empty()) return {};
+  auto sku = read_possible_sku(options.sku);
+  if (!sku.inertia)
+    throw datasets::LogError(options.sku, "inertia_kg_m2", "is not known: give it, or a shape with dims_m");
+  return sku;
+}
+
+/// What is thrown: the SKU or, without one, the planner's own object; what is not known of it is as uncertain
+/// as validate-sku assumes.
+planners::HeldObject object_of(const std::optional<datasets::Sku>& sku) {
+  const fitting::AssumedTolerances assumed;
+  planners::HeldObject out;
+  if (!sku) {
+    out.com_offset = {0, assumed.com_offset};
+    out.mass_sigma = assumed.mass * out.mass, out.inertia_sigma = assumed.inertia * out.inertia;
+    return out;
+  }
+  out.mass = sku->mass, out.inertia = *sku->inertia;
+  out.mass_sigma = fitting::mass_sigma_of(*sku), out.inertia_sigma = fitting::inertia_sigma_of(*sku);
+  out.com_offset = {sku->com_offset, sku->com_offset_sigma.value_or(assumed.com_offset)};
+  return out;
+}
+
+void plan_throw(const PlanThrowOptions& options) {
+  require_outputs({{options.json}, {options.report, Wanted::directory}},
+                  {options.arm, options.card, options.sku});
+  if (!options.report.empty()) require_gnuplot();
+  ThrowAnswer answer;
+  answer.box = box_of(options);
   std::optional<planners::ReleaseCard> card;
-  planners::HeldObject object;
-  const fitting::AssumedTolerances assumed;  // as validate-sku assumes
-  object.com_offset = {0, assumed.com_offset};
-  object.mass_sigma = assumed.mass * object.mass, object.inertia_sigma = assumed.inertia * object.inertia;
   datasets::ModelCard read;
   if (!options.card.empty()) {
     read = datasets::read_model_card(options.card);
     card = planners::release_card(read, options.card);
   }
-  std::optional<datasets::Sku> given;
-  if (!options.sku.empty()) {
-    const auto& sku = given.emplace(read_possible_sku(options.sku));
-    if (!sku.inertia)
-      throw datasets::LogError(options.sku, "inertia_kg_m2", "is not known: give it, or a shape with dims_m");
-    answer.lever = sku.com_offset;
-    object.mass = sku.mass, object.inertia = *sku.inertia;
-    object.mass_sigma = fitting::mass_sigma_of(sku), object.inertia_sigma = fitting::inertia_sigma_of(sku);
-    object.com_offset = {sku.com_offset, sku.com_offset_sigma.value_or(assumed.com_offset)};
-  }
+  const auto given = sku_of(options);
+  const planners::HeldObject object = object_of(given);
+  if (given) answer.lever = given->com_offset;
   const Chain pads = armed(options, given);
   answer.chain = planners::with_tool(pads, {Eigen::Matrix3d::Identity(), {0, 0, object.com_offset.value}});
-  auto how = plan_options(options, pads, options.planar || card.has_value(), target[2]);
+  auto how = plan_options(options, pads, options.planar || card.has_value(), answer.box.middle.z());
   how.search.medium.drag_k = drag_of(answer, options, given);
   how.search.window = answer.window = std::max(options.window, card ? planners::window_for(*card) : 0.0);
   const auto release_of = [&](const planners::ThrowPlan& plan) {
