@@ -44,9 +44,8 @@ double without_strays(const GroupedProblem& problem, const GroupedFit& fit, std:
   return total - n <= kFew * total ? near / n : all / total;
 }
 
-/// The channel whose neighbouring residuals correlate most surely, if that is a good part of the declared
-/// noise: noise as large as declared hides a slow error no longer where it is smaller than that. χ² may then
-/// be below one.
+/// The channel whose neighbouring residuals correlate most surely, if what they share is a good part of the
+/// declared noise. A noise that was declared too large hides a slow error in χ², which may be below one.
 std::optional<MeasuredUnexplained> slow_error(const MeasuredDiscovery& out) {
   constexpr double kSurely = 5;  // standard deviations of white noise
   constexpr double kPart = 0.1;  // of the declared variance
@@ -197,6 +196,13 @@ void weigh_conditions(const EffectSearch& search, MeasuredDiscovery& out) {
   const auto stands = [&](const std::string& id) {
     return std::any_of(out.effects.begin(), out.effects.end(), [&](const auto& e) { return e.id == id; });
   };
+  const auto is_told =
+      [&](const SizeShift& s) {  // and not in other lengths, those of a scale that is gravity
+        for (const auto& effect : out.effects)
+          for (const auto& p : effect.parameters)
+            if (effect.id == s.effect && p.name == s.parameter) return p.value == s.value;
+        return false;
+      };
   for (const SizeCondition& c : search.conditions) {
     if (c.instead_of.empty() && c.shifts.empty()) {
       out.evidence.push_back(
@@ -215,7 +221,7 @@ void weigh_conditions(const EffectSearch& search, MeasuredDiscovery& out) {
             : fmt::format("{} would explain the log as {} does", c.on, c.instead_of);
     std::map<std::string, std::string> sizes;  // by effect
     for (const SizeShift& s : c.shifts)
-      if (stands(s.effect))
+      if (is_told(s))
         sizes[s.effect] +=
             fmt::format("{}{} = {:#.4g} ± {:.2g}{}, not {:#.4g}", sizes[s.effect].empty() ? "" : "; ",
                         s.parameter, s.then, s.then_sigma, dynamics::after_number(s.unit), s.value);
