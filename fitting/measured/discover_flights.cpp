@@ -263,6 +263,27 @@ void weigh_ends(const FlightProblem& problem, const GroupedFit& fit, MeasuredDis
   tell(ends, begins, "last", "does it go on after the object has met something");
 }
 
+/// A declared drag that is too large: no effect takes of it, as none is a thrust.
+void weigh_declared_drag(const datasets::ThrowLog& log, const FlightProblem& problem,
+                         const EffectSearch& search, const MeasuredOptions& options, MeasuredDiscovery& out) {
+  const std::string drag = "flight.quadratic_drag";
+  const bool declared = std::any_of(log.objects.begin(), log.objects.end(),
+                                    [](const auto& object) { return object.second.drag_k.value_or(0) > 0; });
+  if (!out.unexplained || !declared ||
+      std::any_of(out.effects.begin(), out.effects.end(), [&](const auto& e) { return e.id == drag; }))
+    return;
+  for (const auto& [parameter, value, sigma] : asked_beside(problem, search.final, drag, options))
+    for (const auto& [name, object] : log.objects)
+      if (parameter.short_name == "k[" + name + "]" && value < 0 && object.drag_k.value_or(0) > 0)
+        out.evidence.push_back(
+            {drag,
+             fmt::format(
+                 "The flights of {} ask for {:.3g} ± {:.2g} 1/m less than its declared drag_k of {:.4g} 1/m: "
+                 "is that too large?",
+                 name, -value, sigma, *object.drag_k),
+             false});
+}
+
 }  // namespace
 
 NamedErrors named_errors(const FlightProblem& problem, const GroupedFit& fit, int threads) {
@@ -300,6 +321,7 @@ MeasuredDiscovery discover_flights(const datasets::ThrowLog& log, const Measured
   weigh_drag(log, out);
   weigh_drag_form(problem, search, options, out);
   weigh_thrust(log, problem, out);
+  weigh_declared_drag(log, problem, search, options, out);
   if (const RestsOnFaces rests = rests_on_faces(log); rests.is_doubtful())
     out.evidence.push_back({"", rests.in_words(), true});
   if (problem.glitches() > 0)

@@ -230,6 +230,32 @@ void weigh_conditions(const EffectSearch& search, MeasuredDiscovery& out) {
   }
 }
 
+std::vector<AskedBeside> asked_beside(const GroupedProblem& problem, const GroupedFit& fit,
+                                      const std::string& id, const MeasuredOptions& options) {
+  std::vector<dynamics::Effect> beside;
+  for (auto& effect : problem.effects())
+    if (effect.id == id) beside.push_back(std::move(effect));
+  if (beside.empty()) return {};
+  auto parameters = shared_parameters(beside.front(), objects_of(problem));
+  const auto f = grouped_footprints(problem, fit, beside, options.search.fit);
+  std::vector<std::size_t> which;
+  std::vector<Eigen::Index> columns;
+  for (std::size_t n = 0; n < f.parts.size(); ++n) which.push_back(n);
+  for (Eigen::Index k = 0; k + 1 < f.total.gram.rows(); ++k) columns.push_back(k);
+  if (which.size() < columns.size() + 2) return {};
+  const LinearStep step = linear_step(f.parts, which, columns);
+  const double level = options.search.family_wise_level / static_cast<double>(parameters.size());
+  std::vector<AskedBeside> out;
+  for (std::size_t j = 0; j < parameters.size(); ++j) {
+    const auto k = static_cast<Eigen::Index>(f.total.fitted + j);
+    const double value = step.value[k], sigma = step.sigma[k];
+    const auto groups = static_cast<double>(which.size());
+    if (!(sigma > 0) || f_tail(value * value / (sigma * sigma), 1, groups - 1) > level) continue;
+    out.push_back({std::move(parameters[j]), value, sigma});
+  }
+  return out;
+}
+
 void weigh_drag_form(const GroupedProblem& problem, const EffectSearch& search,
                      const MeasuredOptions& options, MeasuredDiscovery& out) {
   const std::string quadratic = "flight.quadratic_drag", linear = "flight.linear_drag";
@@ -238,24 +264,8 @@ void weigh_drag_form(const GroupedProblem& problem, const EffectSearch& search,
   };
   if (has(quadratic) == has(linear)) return;
   const std::string &is = has(quadratic) ? quadratic : linear, &other = has(quadratic) ? linear : quadratic;
-  std::vector<dynamics::Effect> beside;
-  for (auto& effect : problem.effects())
-    if (effect.id == other) beside.push_back(std::move(effect));
-  if (beside.empty()) return;
-  const auto parameters = shared_parameters(beside.front(), objects_of(problem));
-  const auto f = grouped_footprints(problem, search.final, beside, options.search.fit);
-  std::vector<std::size_t> which;
-  std::vector<Eigen::Index> columns;
-  for (std::size_t n = 0; n < f.parts.size(); ++n) which.push_back(n);
-  for (Eigen::Index k = 0; k + 1 < f.total.gram.rows(); ++k) columns.push_back(k);
-  if (which.size() < columns.size() + 2) return;
-  const LinearStep step = linear_step(f.parts, which, columns);
-  const double level = options.search.family_wise_level / static_cast<double>(parameters.size());
-  for (std::size_t j = 0; j < parameters.size(); ++j) {
-    const auto k = static_cast<Eigen::Index>(f.total.fitted + j);
-    const double value = step.value[k], sigma = step.sigma[k];
-    const auto groups = static_cast<double>(which.size());
-    if (!(sigma > 0) || f_tail(value * value / (sigma * sigma), 1, groups - 1) > level) continue;
+  for (const AskedBeside& asked : asked_beside(problem, search.final, other, options)) {
+    const auto& [parameter, value, sigma] = asked;
     const char* form = is == linear ? (value > 0 ? "grows faster than v" : "grows less than v")
                                     : (value > 0 ? "grows less than v²" : "grows faster than v²");
     out.evidence.push_back(
@@ -264,7 +274,7 @@ void weigh_drag_form(const GroupedProblem& problem, const EffectSearch& search,
              "Its form is not confirmed: beside it the fit would take {} = {:.3g} ± {:.2g} {} ({:.1f} "
              "sigma). What slows them {}, or something else bends them alike: its size is one for "
              "these speeds",
-             parameters[j].name, value, sigma, parameters[j].unit, std::abs(value) / sigma, form),
+             parameter.name, value, sigma, parameter.unit, std::abs(value) / sigma, form),
          true});
   }
 }

@@ -95,6 +95,15 @@ MeasuredDiscovery discover_falls(const datasets::ThrowLog& log, const MeasuredOp
 EffectSearch run_search(GroupedProblem& problem, const MeasuredOptions& options, MeasuredDiscovery& out);
 /// On what the sizes of the answer's effects hang (EffectSearch::conditions), as evidence.
 void weigh_conditions(const EffectSearch& search, MeasuredDiscovery& out);
+/// A parameter that the train groups ask for, to first order and with either sign.
+struct AskedBeside {
+  SharedParameter parameter;  ///< which
+  double value{}, sigma{};    ///< from neutral, and 1 σ, in its unit
+};
+/// Those of an effect, beside a fit, that differ from neutral by the scatter between groups, at the level of
+/// the search.
+std::vector<AskedBeside> asked_beside(const GroupedProblem& problem, const GroupedFit& fit,
+                                      const std::string& id, const MeasuredOptions& options);
 /// Whether the form of a drag is the one that it is named by: evidence against a quadratic or a linear one
 /// beside which the train groups want some of the other, by the scatter between groups, at the level of the
 /// search. Some less than none of the linear one says that it grows faster than v².

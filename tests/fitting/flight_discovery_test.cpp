@@ -341,6 +341,20 @@ TEST(FlightDiscovery, ASlowErrorBelowTheDeclaredNoiseIsUnexplained) {
   EXPECT_EQ(found.unexplained->channel, "position_y");
 }
 
+TEST(FlightDiscovery, ADeclaredDragThatIsTooLargeIsSaidToBe) {
+  const auto told = [](double declared) {
+    auto log = spatial_flights({.drag = 0.05}, {}, 66);
+    log.objects.at("body").drag_k = declared;
+    const auto found = found_in(log);
+    for (const auto& e : found.evidence)
+      if (const auto at = e.text.find("ask for "); e.text.find("is that too large?") != std::string::npos)
+        return std::stod(e.text.substr(at + 8));
+    return 0.0;
+  };
+  EXPECT_EQ(told(0.05), 0);
+  EXPECT_NEAR(told(0.08), 0.03, 0.003);
+}
+
 // The last two frames of every flight are after the bounce, as one that is cut by a clock may be.
 TEST(FlightDiscovery, FramesAfterTheEndOfTheFlightAreSaidToBeWhereItFails) {
   const auto told = [](int frames, bool at_the_end) {
