@@ -72,7 +72,7 @@ TEST(ContactEffects, EveryParameterHasAPlaceWhereItsDerivativeIsChecked) {
   const auto before = effect_values(neutral);
   const auto after = effect_values(variation);
   std::size_t k = 0;
-  for (const auto& [effect, apply, apply_dual] : friction_effects())
+  for (const auto& [effect, apply, apply_dual] : contact::friction_effects())
     for (const auto& parameter : effect.parameters) {
       if (effect.id != "contact.adhesion") {
         EXPECT_NE(*after[k], *before[k]) << effect.full_name(parameter);
