@@ -56,6 +56,17 @@ void EffectAnswer::accept(const EffectTrial& trial) {
   test = trial.test;
 }
 
+std::optional<EffectAnswer> without(const GroupedProblem& problem, const EffectAnswer& answer,
+                                    const std::string& id, const GroupedFitOptions& options) {
+  EffectAnswer less = answer;
+  std::erase_if(less.effects, [&](const auto& e) { return e.id == id; });
+  less.train = fit_without(problem, answer.train, id, options);
+  if (!less.train.solved) return {};
+  less.test = fit_own(problem, datasets::Split::test, less.train, options, &answer.test);
+  if (!less.test.solved) return {};
+  return less;
+}
+
 double left(const GroupedFit& fit) {
   return fit.samples > 0 ? fit.chi2 / static_cast<double>(fit.samples) : 0;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,9 @@ struct EffectAnswer {
   int step() const { return 1 + static_cast<int>(effects.size()); }
 };
 
+/// The answer without one of its effects, the others fitted again; nothing where that has no fit.
+std::optional<EffectAnswer> without(const GroupedProblem& problem, const EffectAnswer& answer,
+                                    const std::string& id, const GroupedFitOptions& options);
 /// χ² per sample; 0 of none.
 double left(const GroupedFit& fit);
 

@@ -39,16 +39,13 @@ std::vector<SizeCondition> conditions_of(const GroupedProblem& problem, const Ef
   std::vector<SizeCondition> out;
   for (const AcceptedEffect& accepted : effects) {
     if (effects.size() < 2 || accepted.equivalent.empty() || answer.needs(problem, accepted.id)) continue;
-    EffectAnswer less = answer;
-    std::erase_if(less.effects, [&](const auto& e) { return e.id == accepted.id; });
-    less.train = fit_without(problem, answer.train, accepted.id, options.fit);
-    if (!less.train.solved) continue;
-    less.test = fit_own(problem, datasets::Split::test, less.train, options.fit, &answer.test);
+    auto less = without(problem, answer, accepted.id, options.fit);
+    if (!less) continue;
     for (const auto& effect : catalogue) {
       const bool named = std::any_of(accepted.equivalent.begin(), accepted.equivalent.end(),
                                      [&](const auto& other) { return other.first == effect.id; });
       if (!named) continue;
-      for (const EffectTrial& trial : evident_effects(problem, {effect}, options, less).trials)
+      for (const EffectTrial& trial : evident_effects(problem, {effect}, options, *less).trials)
         if (auto shifts = shifts_of(answer.train, trial.fit); !shifts.empty())
           out.push_back({effect.id, accepted.id, trial.delta_bic, std::move(shifts)});
     }

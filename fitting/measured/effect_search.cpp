@@ -74,7 +74,7 @@ class Search {
     for (std::size_t i = best.effects.size(); i-- > 0;) {
       const std::string& id = best.effects[i].id;
       if (best.needs(problem_, id) || !(misfit > kFarOff || shape_is_open(best.train, id))) continue;
-      auto less = without(best, id);
+      auto less = without(problem_, best, id, options_.fit);
       if (!less) continue;
       if (auto answer = better_than(best, [&] { return std::optional(instead_of(id, std::move(*less))); }))
         return answer;
@@ -210,24 +210,13 @@ class Search {
       const std::string& id = answer.effects[i].id;
       std::optional<EffectAnswer> less;
       if (!answer.needs(problem_, id) && !(wald_of(answer.train, id).p_value(answer.train) < kept_at_))
-        less = without(answer, id);
+        less = without(problem_, answer, id, options_.fit);
       if (less)
         answer = std::move(*less), i = 0;
       else
         ++i;
     }
     return answer;
-  }
-
-  /// The answer without one of its effects; nothing where that has no fit.
-  std::optional<EffectAnswer> without(const EffectAnswer& answer, const std::string& id) const {
-    EffectAnswer less = answer;
-    std::erase_if(less.effects, [&](const auto& e) { return e.id == id; });
-    less.train = fit_without(problem_, answer.train, id, options_.fit);
-    if (!less.train.solved) return {};
-    less.test = fit_own(problem_, Split::test, less.train, options_.fit, &answer.test);
-    if (!less.test.solved) return {};
-    return less;
   }
 
   const GroupedProblem& problem_;

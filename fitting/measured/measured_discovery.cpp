@@ -264,8 +264,7 @@ void weigh_drag_form(const GroupedProblem& problem, const EffectSearch& search,
   };
   if (has(quadratic) == has(linear)) return;
   const std::string &is = has(quadratic) ? quadratic : linear, &other = has(quadratic) ? linear : quadratic;
-  for (const AskedBeside& asked : asked_beside(problem, search.final, other, options)) {
-    const auto& [parameter, value, sigma] = asked;
+  for (const auto& [parameter, value, sigma] : asked_beside(problem, search.final, other, options)) {
     const char* form = is == linear ? (value > 0 ? "grows faster than v" : "grows less than v")
                                     : (value > 0 ? "grows less than v²" : "grows faster than v²");
     out.evidence.push_back(
