@@ -39,7 +39,9 @@ constexpr int kMostTried = 100;
 /// nothing is. An early step may not know which of two effects it is, or take one for two others. So where an
 /// answer leaves a misfit, its neighbours are searched on from: what could have been accepted in a step of
 /// its instead (limited discrepancy search), and itself without one of its effects. One that explains the
-/// groups better takes its place.
+/// groups better takes its place. Two effects of like size are each other's noise, and few held-out groups
+/// confirm neither: what is evident and not confirmed is followed by one step, too, and stays if each of the
+/// two is confirmed beside the other.
 class Search {
  public:
   Search(const GroupedProblem& problem, const std::vector<dynamics::Effect>& catalogue,
@@ -58,6 +60,7 @@ class Search {
     EffectAnswer from;  ///< before that step
     EffectTrial trial;
     double asks;  ///< for a misfit of more than that
+    bool alone;   ///< it may be all that is found
     /// Ids of effects that act through it, of which one has to be found beside it; the held-out groups need
     /// not have shown it alone.
     std::vector<std::string> opens;
@@ -123,8 +126,32 @@ class Search {
   std::optional<EffectAnswer> followed(const Alternative& alternative) {
     EffectAnswer answer = alternative.from;
     answer.accept(alternative.trial);
-    if (!alternative.opens.empty() && !opened(alternative, answer)) return {};
+    const std::size_t known = alternatives_.size();
+    if (!alternative.opens.empty()) {
+      if (!opened(alternative, answer)) return {};
+    } else if (!alternative.alone) {
+      if (!paired(alternative.trial.id, answer)) return {};
+      // They would stand beside what is not confirmed beside them.
+      alternatives_.erase(alternatives_.begin() + static_cast<std::ptrdiff_t>(known), alternatives_.end());
+    }
     return climbed(std::move(answer));
+  }
+
+  /// Accepts one more, if held-out groups confirm the effect `id`, too, beside it.
+  bool paired(const std::string& id, EffectAnswer& answer) {
+    if (!step(answer)) return false;
+    const auto less = without(problem_, answer, id, options_.fit);
+    if (!less) return false;
+    const HeldOutFall beside = held_out_fall(problem_, less->train, less->test, answer.train, answer.test);
+    if (!is_confirmed(beside) || !(wald_of(answer.train, id).p_value(answer.train) < kept_at_)) return false;
+    tell(answer.effects[answer.effects.size() - 2], "beside", answer.effects.back().id, beside);
+    return true;
+  }
+  static void tell(AcceptedEffect& effect, const char* how, const std::string& other,
+                   const HeldOutFall& held) {
+    effect.test_error_ratio = std::sqrt(held.is / held.was);
+    effect.why = fmt::format("{} {} chi2 per sample falls from {:.4g} to {:.4g} (p {:.1g})", how, other,
+                             held.was, held.is, held.p);
   }
 
   /// Accepts one that acts through the alternative's effect, if held-out groups confirm the two together.
@@ -134,10 +161,7 @@ class Search {
     const HeldOutFall both =
         held_out_fall(problem_, alternative.from.train, alternative.from.test, answer.train, answer.test);
     if (!is_confirmed(both) || !(wald_of(answer.train, id).p_value(answer.train) < kept_at_)) return false;
-    AcceptedEffect& first = answer.effects[answer.effects.size() - 2];
-    first.test_error_ratio = std::sqrt(both.is / both.was);
-    first.why = fmt::format("with {} chi2 per sample falls from {:.4g} to {:.4g} (p {:.1g})",
-                            answer.effects.back().id, both.was, both.is, both.p);
+    tell(answer.effects[answer.effects.size() - 2], "with", answer.effects.back().id, both);
     return true;
   }
 
@@ -192,17 +216,19 @@ class Search {
     return best;
   }
 
-  /// As an alternative: what is as evident as the best one, or confirmed, or makes room for what no channel
-  /// shows yet.
+  /// As an alternative: what is as evident as the best one, or confirmed, or evident where nothing is
+  /// confirmed, or makes room for what no channel shows yet.
   void keep(const EffectAnswer& from, const EffectTrial& trial, const EffectTrial* best,
             const std::vector<dynamics::Effect>& silent) {
     if (best && matters(trial.held) && trial.delta_bic < best->delta_bic + kAlike)
-      alternatives_.push_back({from, trial, kMisfit, {}});
+      alternatives_.push_back({from, trial, kMisfit, true, {}});
     else if (is_confirmed(trial.held))
-      alternatives_.push_back({from, trial, kFarOff, {}});
+      alternatives_.push_back({from, trial, kFarOff, true, {}});
+    else if (!best && matters(trial.held) && trial.delta_bic < -kAlike)
+      alternatives_.push_back({from, trial, kMisfit, false, {}});
     if (!(left(trial.test) > kMisfit)) return;
     if (auto opens = shown_beside(problem_, trial, silent, options_); !opens.empty())
-      alternatives_.push_back({from, trial, kMisfit, std::move(opens)});
+      alternatives_.push_back({from, trial, kMisfit, false, std::move(opens)});
   }
 
   EffectAnswer pruned(EffectAnswer answer) const {

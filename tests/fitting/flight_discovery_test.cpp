@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include "datasets/import_cube_tosses.hpp"
 #include "experiment/free_flight.hpp"
@@ -173,6 +174,24 @@ TEST(FlightDiscovery, FiveHeldOutFlightsOfNoiseDoNotHideWhatTheyShow) {
     ++found_it;
   }
   EXPECT_GE(found_it, 6);
+}
+
+// Five held-out flights confirm neither alone: each is the other's noise, of ten times the tracker's.
+TEST(FlightDiscovery, TwoEffectsThatHideEachOtherAreBothFound) {
+  SpatialDesign design;
+  design.flights = 25;
+  for (const auto& [truth, seed] :
+       {std::pair(SpatialTruth{.lift = 0.0217, .com = {0, 0, 0.00377}}, 5002U),
+        std::pair(SpatialTruth{.linear_drag = 0.037, .com = {0, 0, 0.0019}}, 5071U)}) {
+    const auto found = found_in_flights(spatial_flights(truth, design, seed));
+    EXPECT_EQ(found.effects.size(), 2U);
+    EXPECT_FALSE(found.unexplained.has_value());
+    expect_value(found, "sensor.com_offset", "z[body]", truth.com.z());
+    if (truth.lift > 0)
+      expect_value(found, "flight.magnus_lift", "k_m[body]", truth.lift);
+    else
+      expect_value(found, "flight.linear_drag", "c[body]", truth.linear_drag);
+  }
 }
 
 TEST(FlightDiscovery, ADragThatPushesAlongADiagonalIsSaidToBeNone) {
