@@ -242,6 +242,7 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
   out["structure"] = {{"before", structure_json(found.before.structure)},
                       {"after", structure_json(found.after.structure)}};
   if (!found.held_out.empty()) out["held_out"] = found.held_out;
+  out["skipped"] = skipped_json(found.skipped);
   out["model"] = found.model;
   const auto parameters = [&](const char* key, const fitting::FitResult& fit) {
     out[key] = Json::object();
@@ -278,7 +279,8 @@ std::string discovery_text(const Discovery& found, const std::string& log, const
   if (found.unexplained)
     out +=
         fmt::format("\nunexplained: {}\n", unexplained_text(found.effects, found.unexplained->description));
-  if (const std::string note = held_out_text(found); !note.empty()) out += "\n" + note + "\n";
+  for (const std::string& note : {held_out_text(found), skipped_text(found.skipped)})
+    if (!note.empty()) out += "\n" + note + "\n";
   return out + "\n" + prediction_errors(found).text() + fmt::format("\n{:.1f} s\n", found.seconds);
 }
 

@@ -260,6 +260,9 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
                                                   to_string(found.first.channel), found.first.chi2_per_sample)
                                             : "No channel of the train throws leaves a misfit that asks for "
                                               "an explanation.";
+  std::string notes;
+  for (const std::string& note : {held_out_text(found), skipped_text(found.skipped)})
+    if (!note.empty()) notes += fmt::format("<p>{}</p>\n", escaped(note));
   const std::string body = fmt::format(
       "<p>{}: base model <code>{}</code>. Verdict: <b>{}</b>.</p>\n<h2>Where it starts</h2><p>{}</p>\n{}"
       "<h2>The answer</h2>\n{}<h2>Errors before and after</h2>\n"
@@ -277,10 +280,8 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
       "with (share of its mean square).</p>{}<h2>Again</h2><p><code>{}</code><br>log checksum "
       "<code>{}</code></p>",
       escaped(origin), escaped(json.at("base_model").get<std::string>()), to_string(found.verdict), first,
-      over_time ? picture("residual") : kLandingsAlone, answer,
-      found.held_out.empty() ? "" : fmt::format("<p>{}</p>\n", escaped(held_out_text(found))),
-      html(prediction_errors(found)), html(lack_table(found)), picture("ranking"),
-      html(ranking_table(found.ranking)),
+      over_time ? picture("residual") : kLandingsAlone, answer, notes, html(prediction_errors(found)),
+      html(lack_table(found)), picture("ranking"), html(ranking_table(found.ranking)),
       over_time ? fmt::format("<p>{}</p>", kFootprints) + picture("footprints") : "",
       html(misfit_table(found)), html(structure_table(found)), escaped(command),
       json.value("log_checksum", "unknown"));

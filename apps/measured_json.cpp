@@ -120,8 +120,7 @@ Json measured_json(const MeasuredResult& result) {
                                  {"neighbour_correlation", number(e.left)},
                                  {"neighbour_correlation_sigma", number(e.left_sigma)}});
   }
-  out["skipped"] = Json::array();
-  for (const auto& [id, reason] : found.skipped) out["skipped"].push_back({{"id", id}, {"reason", reason}});
+  out["skipped"] = skipped_json(found.skipped);
   out["command"] = result.command;
   return out;
 }

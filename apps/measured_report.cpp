@@ -128,12 +128,6 @@ std::string first_text(const MeasuredDiscovery& found) {
   return fmt::format("The residual leaves the noise in {} (phase {}).", found.first.channel, found.phase);
 }
 
-/// Of what was left out, where something was.
-std::string skipped_text(const MeasuredDiscovery& found) {
-  const auto& [id, reason] = found.skipped.front();
-  return fmt::format("{} left out; the first: {} ({})", found.skipped.size(), id, reason);
-}
-
 /// What is missing where something is unexplained, and whether it may be used.
 std::string missing_text(const fitting::MissingAcceleration& missing) {
   double most = 0, its_sigma = 0;
@@ -180,7 +174,7 @@ std::string measured_text(const MeasuredResult& result) {
   for (const auto& e : found.evidence)
     out += fmt::format("\n{} {}{}{}\n", e.against ? "against:" : "note:", e.about,
                        e.about.empty() ? "" : ": ", e.text);
-  if (!found.skipped.empty()) out += fmt::format("\nnote: {}\n", skipped_text(found));
+  if (!found.skipped.empty()) out += fmt::format("\nnote: {}\n", skipped_text(found.skipped));
   return out + "\n" + error_table(found).text() + "\n" + misfit_table(result).text() +
          fmt::format("\n{:.1f} s\n", found.seconds);
 }
@@ -250,7 +244,7 @@ void write_measured_report(const MeasuredResult& result, const Json& json,
                     : "chi2 per sample; 1 is the noise. Neighbours: correlation of neighbouring residuals "
                       "on held-out data.") +
           html(misfit_table(result));
-  if (!found.skipped.empty()) body += fmt::format("<p>{}.</p>\n", escaped(skipped_text(found)));
+  if (!found.skipped.empty()) body += fmt::format("<p>{}.</p>\n", escaped(skipped_text(found.skipped)));
   body += fmt::format("<h2>Again</h2><p><code>{}</code><br>log checksum <code>{}</code></p>",
                       escaped(result.command), json.value("log_checksum", "unknown"));
   write_text(

@@ -132,6 +132,22 @@ std::string held_out_text(const fitting::Discovery& found) {
                      found.held_out.size(), fmt::join(found.held_out, ", "));
 }
 
+std::string skipped_text(const std::vector<std::pair<std::string, std::string>>& skipped) {
+  if (skipped.empty()) return {};
+  constexpr std::size_t kNamed = 5;
+  std::string out = fmt::format("{} left out: ", skipped.size());
+  for (std::size_t k = 0; k < std::min(kNamed, skipped.size()); ++k)
+    out += fmt::format("{}{} ({})", k > 0 ? "; " : "", skipped[k].first, skipped[k].second);
+  if (skipped.size() > kNamed) out += fmt::format("; and {} more", skipped.size() - kNamed);
+  return out;
+}
+
+Json skipped_json(const std::vector<std::pair<std::string, std::string>>& skipped) {
+  Json out = Json::array();
+  for (const auto& [id, reason] : skipped) out.push_back({{"id", id}, {"reason", reason}});
+  return out;
+}
+
 std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects) {
   const auto ratio = [&](const char* id) -> const fitting::Parameter* {
     for (const auto& effect : effects)

@@ -40,6 +40,10 @@ std::string withdrawn_text(const fitting::Imitation& one);
 
 /// Which throws were held out where the log does not say; empty where it does.
 std::string held_out_text(const fitting::Discovery& found);
+/// Throws (flights, falls, slips) that were left out, with the reason: the first few. Empty where none were.
+std::string skipped_text(const std::vector<std::pair<std::string, std::string>>& skipped);
+/// "skipped" of discovery.json.
+Json skipped_json(const std::vector<std::pair<std::string, std::string>>& skipped);
 
 /// Where mass and inertia are off by the same ratio: that it may be a gain of the wrench. Else empty.
 std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects);

@@ -14,6 +14,7 @@
 #include "fitting/discovery/selection.hpp"
 #include "fitting/discovery/separating.hpp"
 #include "fitting/discovery/unexplained.hpp"
+#include "fitting/discovery/wild_throws.hpp"
 
 namespace unhand::fitting {
 
@@ -111,26 +112,14 @@ void plan_experiments(const Stage& stage, const DiscoverOptions& options, Discov
     }
 }
 
-}  // namespace
-
-Discovery discover(const datasets::ThrowLog& logged, const std::string& file, const DiscoverOptions& given) {
-  const auto begin = Clock::now();
-  validate(given);
-  datasets::validate(logged, file);
-  DiscoverOptions options = without_forgotten(given);
-  const datasets::ThrowLog log = with_held_out(logged);
+/// The loop from a base model that was fitted, or was not: `message` says why.
+Discovery searched(Stage stage, std::string message, DiscoverOptions options) {
   Discovery out;
-  if (!has_both_splits(logged))
-    for (const auto& one : log.throws)
-      if (one.split == datasets::Split::test) out.held_out.push_back(one.id);
-
-  Stage stage{CampaignProblem(log, file, options.campaign), {}, {}, {}};
-  out.message = fit_base(stage, log, options);
+  out.message = std::move(message);
   out.before.fit = stage.fit;
   out.model = options.campaign.model;
   if (!out.message.empty()) {
     out.verdict = Verdict::not_answered;
-    out.seconds = seconds_since(begin);
     return out;
   }
   options.fit.throws = throws_of(stage);
@@ -159,6 +148,45 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
                 : out.unexplained    ? Verdict::unexplained
                                      : Verdict::no_missing_effect;
   out.problem = std::make_shared<const CampaignProblem>(std::move(stage.problem));
+  return out;
+}
+
+/// Without the throws that err as no other does. One that the answer explains as it does the others is none,
+/// and takes part in another search.
+Discovery searched_without_wild(Stage all, const datasets::ThrowLog& log, const std::string& file,
+                                const DiscoverOptions& options) {
+  constexpr int kMostSearches = 3;
+  auto wild = wild_throws(all, options);
+  for (int search = 1; !wild.empty(); ++search) {
+    const auto rest = without_throws(log, wild);
+    Stage stage{CampaignProblem(rest, file, options.campaign), {}, {}, {}};
+    if (std::string message = fit_base(stage, rest, options); !message.empty()) break;
+    Discovery out = searched(std::move(stage), {}, options);
+    auto still = still_wild(*out.problem, out.after.fit, all.problem, wild, options);
+    if (still == wild || search == kMostSearches) {
+      for (const WildGroup& one : wild) out.skipped.push_back({log.throws[one.group].id, told(one, all)});
+      return out;
+    }
+    wild = std::move(still);
+  }
+  return searched(std::move(all), {}, options);
+}
+
+}  // namespace
+
+Discovery discover(const datasets::ThrowLog& logged, const std::string& file, const DiscoverOptions& given) {
+  const auto begin = Clock::now();
+  validate(given);
+  datasets::validate(logged, file);
+  const DiscoverOptions options = without_forgotten(given);
+  const datasets::ThrowLog log = with_held_out(logged);
+  Stage stage{CampaignProblem(log, file, options.campaign), {}, {}, {}};
+  std::string message = fit_base(stage, log, options);
+  Discovery out = message.empty() ? searched_without_wild(std::move(stage), log, file, options)
+                                  : searched(std::move(stage), std::move(message), options);
+  if (!has_both_splits(logged))
+    for (const auto& one : log.throws)
+      if (one.split == datasets::Split::test) out.held_out.push_back(one.id);
   out.seconds = seconds_since(begin);
   return out;
 }

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fitting/discovery/accepted_effect.hpp"
@@ -38,8 +39,11 @@ struct SeenModel {
 
 /// The loop's answer.
 struct Discovery {
-  Verdict verdict{};                    ///< found, nothing missing, unexplained, or no answer
-  std::vector<std::string> held_out;    ///< throws that with_held_out chose; empty where the log says which
+  Verdict verdict{};                  ///< found, nothing missing, unexplained, or no answer
+  std::vector<std::string> held_out;  ///< throws that with_held_out chose; empty where the log says which
+  /// Throws that were set aside, since neither the answer nor all listed effects together explain them as
+  /// they do the others: id and how far they are off.
+  std::vector<std::pair<std::string, std::string>> skipped;
   std::string message;                  ///< why there is no answer (not_answered); else empty
   std::vector<AcceptedEffect> effects;  ///< in order of acceptance
   std::vector<Imitation> imitations;    ///< accepted at first, and withdrawn
@@ -60,8 +64,8 @@ struct Discovery {
   bool adds_nothing() const { return effects.empty() && along.empty(); }
 };
 
-/// Runs the loop. A log without a test split is split as with_held_out does.
-/// Throws as validate and CampaignProblem do.
+/// Runs the loop. A log without a test split is split as with_held_out does. Throws of both splits that err
+/// as no other does (gross_outliers) take no part. Throws as validate and CampaignProblem do.
 Discovery discover(const datasets::ThrowLog& log, const std::string& file, const DiscoverOptions& options);
 
 }  // namespace unhand::fitting
