@@ -213,7 +213,8 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
                                 {"test_rms_after_m", number(small->rms.position.after)},
                                 {"test_rms_before_rad", number(small->rms.angle.before)},
                                 {"test_rms_after_rad", number(small->rms.angle.after)},
-                                {"test_likelier", small->likelier}};
+                                {"test_likelier", small->likelier},
+                                {"parameters", parameters_json(small->parameters)}};
   out["withdrawn"] = Json::array();
   for (const auto& one : found.imitations)
     out["withdrawn"].push_back({{"id", one.id}, {"why", one.why}, {"delta_bic", number(one.delta_bic)}});
@@ -243,6 +244,7 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
                       {"after", structure_json(found.after.structure)}};
   if (!found.held_out.empty()) out["held_out"] = found.held_out;
   out["skipped"] = skipped_json(found.skipped);
+  out["notes"] = found.notes;
   out["model"] = found.model;
   const auto parameters = [&](const char* key, const fitting::FitResult& fit) {
     out[key] = Json::object();
@@ -281,6 +283,7 @@ std::string discovery_text(const Discovery& found, const std::string& log, const
         fmt::format("\nunexplained: {}\n", unexplained_text(found.effects, found.unexplained->description));
   for (const std::string& note : {held_out_text(found), skipped_text(found.skipped)})
     if (!note.empty()) out += "\n" + note + "\n";
+  for (const std::string& note : found.notes) out += fmt::format("\nnote: {}\n", note);
   return out + "\n" + prediction_errors(found).text() + fmt::format("\n{:.1f} s\n", found.seconds);
 }
 

@@ -263,6 +263,7 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
   std::string notes;
   for (const std::string& note : {held_out_text(found), skipped_text(found.skipped)})
     if (!note.empty()) notes += fmt::format("<p>{}</p>\n", escaped(note));
+  for (const std::string& note : found.notes) notes += fmt::format("<p>Note: {}.</p>\n", escaped(note));
   const std::string body = fmt::format(
       "<p>{}: base model <code>{}</code>. Verdict: <b>{}</b>.</p>\n<h2>Where it starts</h2><p>{}</p>\n{}"
       "<h2>The answer</h2>\n{}<h2>Errors before and after</h2>\n"

@@ -107,8 +107,12 @@ std::vector<std::string> separating_lines(const fitting::AcceptedEffect& effect)
 
 std::string small_text(const fitting::SmallEffect& small) {
   const bool predicts = small.rms.is_better_by(fitting::DiscoverOptions{}.prediction_matters);
+  std::string sizes;
+  for (const auto& p : small.parameters)
+    sizes +=
+        fmt::format("{}{} = {}", sizes.empty() ? "" : ", ", p.name, with_sigma(p.value, p.sigma, p.unit));
   const std::string numbers =
-      fmt::format("{} (BIC {:+.1f}, p {}; test throws, predicted before the throw: {}", small.id,
+      fmt::format("{} ({}; BIC {:+.1f}, p {}; test throws, predicted before the throw: {}", small.id, sizes,
                   small.delta_bic, p_text(small.p_value), small.rms.in_words());
   if (small.any_pads) return fmt::format("evident, but no pads are without it: {})", numbers);
   if (!predicts && !small.likelier)
@@ -195,15 +199,21 @@ std::string effect_html(const fitting::AcceptedEffect& effect) {
   return out;
 }
 
+Json parameters_json(const std::vector<fitting::Parameter>& parameters) {
+  Json out = Json::object();
+  for (const auto& p : parameters)
+    out[p.name] = {{"value", number(p.value)},
+                   {"sigma", number(p.sigma)},
+                   {"low95", number(p.interval95()[0])},
+                   {"high95", number(p.interval95()[1])},
+                   {"unit", p.unit}};
+  return out;
+}
+
 Json effect_json(const fitting::AcceptedEffect& effect) {
-  Json out{{"id", effect.id}, {"equivalent", Json::array()}, {"parameters", Json::object()}};
+  Json out{
+      {"id", effect.id}, {"equivalent", Json::array()}, {"parameters", parameters_json(effect.parameters)}};
   for (const auto& [id, correlation] : effect.equivalent) out["equivalent"].push_back(id);
-  for (const auto& p : effect.parameters)
-    out["parameters"][p.name] = {{"value", number(p.value)},
-                                 {"sigma", number(p.sigma)},
-                                 {"low95", number(p.interval95()[0])},
-                                 {"high95", number(p.interval95()[1])},
-                                 {"unit", p.unit}};
   out["delta_bic"] = number(effect.delta_bic);
   out["p_value"] = number(effect.p_value);
   out["test_error_ratio"] = number(effect.test_error_ratio);

@@ -23,6 +23,8 @@ Table ranking_table(std::span<const fitting::Ranked> ranking);
 Figure ranking_figure(std::span<const fitting::Ranked> ranking,
                       std::span<const fitting::AcceptedEffect> accepted);
 
+/// By name: value, sigma, low95, high95 and unit.
+Json parameters_json(const std::vector<fitting::Parameter>& parameters);
 /// An accepted effect as `effects` of discovery.json lists it.
 Json effect_json(const fitting::AcceptedEffect& effect);
 

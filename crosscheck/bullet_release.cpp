@@ -107,7 +107,8 @@ class World {
   void add_object() {
     const auto hand = problem_.hand.at({problem_.start, problem_.start + options_.step}, problem_.start);
     theta_ = hand.pose.theta + problem_.grasp.angle;
-    const auto r = dynamics::rotate(theta_, dynamics::Vec2<double>{problem_.grasp.com_offset, 0});
+    const auto r =
+        dynamics::rotate(theta_, dynamics::Vec2<double>{problem_.grasp.com_offset, problem_.grasp.across});
     btTransform at(btQuaternion(btVector3(0, 0, 1), theta_), {hand.pose.x + r.x, hand.pose.z + r.z, 0});
     plate_.setMargin(1e-3);
     object_ = body(plate_, problem_.body.mass, problem_.body.inertia, at);

@@ -63,7 +63,8 @@ class Run {
     const double t = problem.start;
     const auto hand = problem.hand.at({t, t + options.step}, t);
     const double theta = hand.pose.theta + problem.grasp.angle;
-    const Vec2<double> r = dynamics::rotate(theta, Vec2<double>{problem.grasp.com_offset, 0});
+    const Vec2<double> r =
+        dynamics::rotate(theta, Vec2<double>{problem.grasp.com_offset, problem.grasp.across});
     pose_ = {hand.pose.x + r.x, hand.pose.z + r.z, theta};
     const double omega = hand.twist.omega + problem.spin;
     twist_ = {hand.twist.vx + problem.slip.x - omega * r.z, hand.twist.vz + problem.slip.z + omega * r.x,

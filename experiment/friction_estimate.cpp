@@ -45,7 +45,8 @@ std::array<double, 3> held_wrench(const PreparedThrow& prepared, const std::vect
   return {force.x / pads, force.z / pads, wrench.tau / pads};
 }
 
-/// A wrench sample of one pad. A channel that is dead has an infinite σ.
+/// A wrench sample of one pad. A channel that is dead has an infinite σ, and the sample does not say whether
+/// it slips.
 struct PadSample {
   double time{};
   std::array<double, 3> wrench{}, sigma{HUGE_VAL, HUGE_VAL, HUGE_VAL};  ///< N, N, N m
@@ -71,7 +72,6 @@ bool evidently_slips(const PadSample& sample, const std::array<double, 3>& held)
   constexpr double kSigmas = 5, kShare = 0.2;
   double beyond = 0, missing = 0, whole = 0;
   for (std::size_t c = 0; c < 3; ++c) {
-    if (!std::isfinite(sample.sigma[c])) continue;
     const double off = sample.wrench[c] - held[c], unit = c < 2 ? 1.0 : contact::kFingerLength;
     beyond += std::pow(off / sample.sigma[c], 2);
     missing += std::pow(off / unit, 2);
@@ -98,10 +98,11 @@ std::vector<SlipSample> slipping_samples(const datasets::ThrowLog& log,
       if (s->time >= release) continue;
       const double f = prepared.normal_force->at({prepared.start, release}, s->time);
       if (f < 8 * prepared.force_fit.sigma) continue;
+      // A dead channel is no zero: what is left does not say where on the surface the wrench lies.
+      if (!std::all_of(s->sigma.begin(), s->sigma.end(), [](double x) { return std::isfinite(x); })) continue;
       if (!evidently_slips(*s, held_wrench(prepared, jumps, pads, s->time))) break;
       SlipSample& slip = out.emplace_back();
-      for (std::size_t c = 0; c < 3; ++c)
-        slip.ratio[c] = s->wrench[c] / f, slip.sigma[c] = std::isfinite(s->sigma[c]) ? s->sigma[c] / f : 0;
+      for (std::size_t c = 0; c < 3; ++c) slip.ratio[c] = s->wrench[c] / f, slip.sigma[c] = s->sigma[c] / f;
     }
   }
   return out;

@@ -108,6 +108,8 @@ ThrowTruth draw(const CampaignDesign& design, const Cell& cell, RandomStream ran
   truth.patch = design.patch;
   truth.patch.mu *= random.normal(1, v.mu);
   truth.grasp_offset = random.normal(0, v.grasp_offset);
+  if (v.grasp_across > 0)
+    truth.grasp_across = random.normal(0, v.grasp_across);  // else seeds draw what they did
   return truth;
 }
 
@@ -197,13 +199,14 @@ SyntheticThrow make_throw(const CampaignDesign& design, const std::vector<bool>&
     force.act(setup);
     const auto law = make_law(design, truth, setup);
     truth.contact_model = law->name();
-    const release::ReleaseProblem<double> problem{*hand,
-                                                  *force,
-                                                  *law,
-                                                  object.body,
-                                                  setup.gravity.at(design.gravity),
-                                                  {object.com_offset + truth.grasp_offset, truth.grasp_angle},
-                                                  commanded.begin()};
+    const release::ReleaseProblem<double> problem{
+        *hand,
+        *force,
+        *law,
+        object.body,
+        setup.gravity.at(design.gravity),
+        {object.com_offset + truth.grasp_offset, truth.grasp_angle, truth.grasp_across},
+        commanded.begin()};
     release::ReleaseOptions options{design.integrator, false};
     options.integrator.record = true;
     const auto result = release::simulate_release(problem, options);
@@ -214,7 +217,8 @@ SyntheticThrow make_throw(const CampaignDesign& design, const std::vector<bool>&
     truth.detach_time = result.detach.time;
     truth.detach_pose = result.detach.pose;
     truth.detach_twist = result.detach.twist;
-    truth.slip = norm(result.relative.arm - dynamics::Vec2<double>{problem.grasp.com_offset, 0});
+    truth.slip =
+        norm(result.relative.arm - dynamics::Vec2<double>{problem.grasp.com_offset, problem.grasp.across});
     truth.pivot = result.relative.angle - truth.grasp_angle;
 
     const auto flight =

@@ -60,6 +60,7 @@ struct ThrowVariation {
   double dead_time{1.0e-3};          ///< [s]
   double opening_time{1.0e-3};       ///< [s]
   double grasp_offset{0};            ///< of the pads along the object's x axis [m]
+  double grasp_across{0};            ///< and across it [m]
 };
 
 /// Rates and noise (1 σ) of the sensors; a σ of 0 is a perfect channel, which declares no noise.
@@ -146,6 +147,7 @@ struct ThrowTruth {
   contact::OpeningProfile<double> opening;  ///< of this throw
   double grasp_angle{};                     ///< [rad]
   double grasp_offset{};                    ///< of the pads along the object's −x axis [m]
+  double grasp_across{};                    ///< and along its −z axis [m]
   double detach_time{};                     ///< [s]
   dynamics::Pose<double> detach_pose;       ///< of the CoM; m, m, rad
   dynamics::Twist<double> detach_twist;     ///< m/s, m/s, rad/s

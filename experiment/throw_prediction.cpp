@@ -72,7 +72,7 @@ auto with_release(const PreparedThrow& prepared, const ThrowModel& model, const 
       {prepared.body.mass * (1.0 + sensing.mass), prepared.body.inertia * (1.0 + sensing.inertia)},
       gravity,
       {prepared.grasp.com_offset + sensing.com_offset + values.get("grasp_offset", 0),
-       prepared.grasp.angle + values.get("grasp_angle", 0)},
+       prepared.grasp.angle + values.get("grasp_angle", 0), values.get("grasp_across", 0)},
       prepared.start,
       {},
       S(0)};

@@ -19,6 +19,7 @@ namespace unhand::experiment {
 ///   delay          gripper_delay: from the opening command to the release [s]
 ///   grasp_angle    of this throw, beyond the prepared one [rad]
 ///   grasp_offset   of this throw: the pads hold a point that much nearer to the tip [m]
+///   grasp_across   of this throw: and beside the object's x axis, the CoM ahead along its z axis [m]
 ///   mu_deviation   of this throw: its μ is mu (1 + mu_deviation) [-]
 ///   force_deviation  of this throw: of its measured normal force, in σ of the smoothing (DoubtfulForce) [-]
 ///   dead_time_deviation  of this throw, beyond `dead_time` [s]

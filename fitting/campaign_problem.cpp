@@ -14,6 +14,7 @@
 #include "dynamics/parallel.hpp"
 #include "experiment/compare.hpp"
 #include "experiment/glitches.hpp"
+#include "fitting/grasp_scatter.hpp"
 
 namespace unhand::fitting {
 
@@ -92,6 +93,10 @@ CampaignProblem::CampaignProblem(const datasets::ThrowLog& logged, const std::st
             options.reference_force.value_or(grips.empty() ? 20.0 : dynamics::median(grips)),
             options.integrator};
   if (!options.predict_only) guess_start(log, prepared, !grips.empty());
+  if (const auto scatter = grasp_scatter_across(log, prepared); scatter.is_evident()) {
+    scatters_across_ = true;
+    notes_.push_back(scatter.in_words());
+  }
   if (observe(log, std::move(prepared)) == 0 && !options.predict_only)
     throw std::invalid_argument(
         fmt::format("{}: nothing to fit to: no throw has F/T data, motion capture or a landing among the "
@@ -167,6 +172,7 @@ CampaignProblem CampaignProblem::with(const std::string& model,
 void CampaignProblem::name_unknowns(const std::vector<Effect>& effects) {
   campaign_.clear();
   own_ = {{"grasp_angle", "rad", 0, -1, 1, 0.01, 0.05}, {"grasp_offset", "m", 0, -0.02, 0.02, 1e-3, 1e-3}};
+  if (scatters_across_) own_.push_back({"grasp_across", "m", 0, -0.02, 0.02, 1e-3, 1e-3});
   const bool follows_pads = contact::follows_pads(options_.model);
   bool all_forces = true, any_force = false;
   std::set<std::string> objects;

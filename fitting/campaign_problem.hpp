@@ -173,6 +173,7 @@ class CampaignProblem {
   std::map<std::string, Layout> layouts_;  // by object
   std::vector<std::string> notes_;
   experiment::ModelParameters first_guess_;
+  bool scatters_across_{};  // repetitions differ in where the pads hold the object across its x axis
 };
 
 /// The effect of that id. Throws std::invalid_argument, listing the ids, if there is none.

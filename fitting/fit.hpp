@@ -40,8 +40,10 @@ enum class Weigh {
   /// As many witnesses as its errors are independent: an error that stays for a stretch is one. For
   /// parameters and predictions of a law that is not quite right.
   witnesses,
-  /// 1/(the variance that it shows) in each phase: maximises the likelihood that has such variances, by which
-  /// models are compared (Stage::bic). Of two nested ones the larger is then never worse.
+  /// 1/(the variance that it shows) in each phase: as the likelihood has it by which models are compared
+  /// (Stage::bic), but for samples and throws that stray, which the fit lets count less and that likelihood
+  /// does
+  /// not.
   variances
 };
 

@@ -26,9 +26,9 @@ struct WildGroup {
 /// Inner products of what effects do to a group's whitened samples and of its residual (last), the group's
 /// own unknowns projected out of all.
 struct GroupFooting {
-  std::size_t group{};  ///< its place among the problem's
-  bool train{};         ///< else it is held out
-  double n{};           ///< samples
+  std::size_t group{};   ///< its place among the problem's
+  bool train{};          ///< else it is held out
+  double n{};            ///< samples
   Eigen::MatrixXd gram;  ///< symmetric; a row for each effect's parameter, the last for the residual
   /// χ² per sample that is left where the effects have these sizes.
   double misfit(const Eigen::VectorXd& sizes) const;

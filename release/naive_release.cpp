@@ -35,7 +35,7 @@ NaiveResult simulate_release_naive(const ReleaseProblem<double>& problem, const 
   double t = problem.start;
   HandState<double> hand = problem.hand.at({t, t + options.step}, t);
   const double theta = hand.pose.theta + problem.grasp.angle;
-  Vec2<double> r = dynamics::rotate(theta, Vec2<double>{problem.grasp.com_offset, 0});
+  Vec2<double> r = dynamics::rotate(theta, Vec2<double>{problem.grasp.com_offset, problem.grasp.across});
   Pose<double> pose{hand.pose.x + r.x, hand.pose.z + r.z, theta};
   Twist<double> twist =
       dynamics::twist_at_com(Twist<double>{hand.twist.vx + problem.slip.x, hand.twist.vz + problem.slip.z,

@@ -46,6 +46,8 @@ void validate(const ReleaseProblem<S>& problem) {
   finite("gravity z", value_of(problem.gravity.z), "m/s²");
   require(std::abs(value_of(problem.grasp.com_offset)) <= 100, "com_offset",
           value_of(problem.grasp.com_offset), "[-100, 100] m");
+  require(std::abs(value_of(problem.grasp.across)) <= 100, "across", value_of(problem.grasp.across),
+          "[-100, 100] m");
   finite("grasp angle", value_of(problem.grasp.angle), "rad");
   finite("slip x", value_of(problem.slip.x), "m/s");
   finite("slip z", value_of(problem.slip.z), "m/s");
@@ -239,8 +241,8 @@ class ReleaseSystem final : public dynamics::HybridSystemFrom<ReleaseSystem<P>, 
   /// As the object is held at the start, by the wrench that makes it follow the hand.
   template <class S>
   void hold_at_start(contact::Hold<S>& hold) const {
-    const auto& [offset, angle] = problem_.grasp;
-    hold = {{convert<S>(offset), S(0)}, convert<S>(angle), {}};
+    const auto& [offset, angle, across] = problem_.grasp;
+    hold = {{convert<S>(offset), convert<S>(across)}, convert<S>(angle), {}};
     const S start(problem_.start);
     const Scene<S> scene = scene_(Window{problem_.start, problem_.hand.end()}, start);
     const Wrench<S> wrench =

@@ -34,9 +34,9 @@ struct Start {
 
 template <class S>
 Start<S> start_of(const ReleaseProblem<S>& problem, const ReleaseSystem<S>& system) {
-  const auto& [offset, angle] = problem.grasp;
+  const auto& [offset, angle, across] = problem.grasp;
   Start<S> start;
-  start.held = {{offset, S(0)}, angle, problem.slip, problem.spin};
+  start.held = {{offset, across}, angle, problem.slip, problem.spin};
   system.time_events(start.times);
   const auto next = std::upper_bound(start.times.begin(), start.times.end(), problem.start);
   const double end = problem.hand.end();

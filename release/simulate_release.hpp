@@ -13,9 +13,9 @@ namespace unhand::release {
 
 /// Everything that determines a release. The references must outlive the simulation, and the readings of its
 /// result (mode_events, sample_release). A held object starts in the mode that its grip allows; one that
-/// slips already starts slipping. Accepted: mass (0, 1e4] kg, inertia (0, 1e6] kg m², com_offset [-100, 100]
-/// m, start [-1e6, 1e6] s and within the hand's motion but not at its end, everything else finite. Units
-/// cannot be seen here: metres and radians are taken as they are given.
+/// slips already starts slipping. Accepted: mass (0, 1e4] kg, inertia (0, 1e6] kg m², com_offset and across
+/// [-100, 100] m, start [-1e6, 1e6] s and within the hand's motion but not at its end, everything else
+/// finite. Units cannot be seen here: metres and radians are taken as they are given.
 template <class S>
 struct ReleaseProblem {
   const HandMotion& hand;                    ///< in the world

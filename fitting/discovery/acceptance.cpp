@@ -101,10 +101,12 @@ bool predicts_better(const Stage& before, const Stage& after, const DiscoverOpti
 SmallEffect small_effect(const Stage& without, const Stage& with, const std::string& id,
                          const std::vector<ChannelMisfit>& base, const DiscoverOptions& options) {
   const int threads = options.fit.threads;
+  const dynamics::Effect effect = find_effect(id);
   return {
       id,
+      parameters_of(with.fit, effect),
       with.bic() - without.bic(),
-      wald_p_value(with.fit, find_effect(id)),
+      wald_p_value(with.fit, effect),
       improvement(without, with, base, options).fall,
       prediction_gain(outcomes_of(without, Share::test, threads), outcomes_of(with, Share::test, threads)),
       id == kPads && give_of(with) <= kMostGive,

@@ -21,6 +21,9 @@ struct Parameter {
   std::array<double, 2> interval95() const { return student_interval(value, sigma, degrees_of_freedom); }
 };
 
+/// An effect's parameters as a fit has them.
+std::vector<Parameter> parameters_of(const FitResult& fit, const dynamics::Effect& effect);
+
 /// An experiment that would tell an accepted effect from another name of its footprint.
 struct SeparatingExperiment {
   std::string from;          ///< the other name

@@ -184,6 +184,7 @@ Discovery discover(const datasets::ThrowLog& logged, const std::string& file, co
   std::string message = fit_base(stage, log, options);
   Discovery out = message.empty() ? searched_without_wild(std::move(stage), log, file, options)
                                   : searched(std::move(stage), std::move(message), options);
+  if (out.problem) out.notes = out.problem->notes();
   if (!has_both_splits(logged))
     for (const auto& one : log.throws)
       if (one.split == datasets::Split::test) out.held_out.push_back(one.id);

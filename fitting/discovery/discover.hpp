@@ -44,6 +44,7 @@ struct Discovery {
   /// Throws that were set aside, since neither the answer nor all listed effects together explain them as
   /// they do the others: id and how far they are off.
   std::vector<std::pair<std::string, std::string>> skipped;
+  std::vector<std::string> notes;       ///< CampaignProblem::notes()
   std::string message;                  ///< why there is no answer (not_answered); else empty
   std::vector<AcceptedEffect> effects;  ///< in order of acceptance
   std::vector<Imitation> imitations;    ///< accepted at first, and withdrawn

@@ -19,17 +19,24 @@ std::optional<Unexplained> left_in_own_unknowns(const Stage& stage, const Discov
   const Channel shown = friction && felt               ? Channel::wrench_fx
                         : drift->name == "grasp_angle" ? Channel::mocap_theta
                                                        : Channel::mocap_x;
+  const char* const why =
+      friction ? "friction changes over the campaign, as pads do that wear or warm; every throw is "
+                 "fitted a friction of its own, so that channels do not show it"
+               : "what is tracked moves against the object, or the grasp against the hand";
   return Unexplained{
       friction ? Phase::release : Phase::grasped,
       shown,
       drift->ratio,
-      fmt::format("the throws' own {} drifts with their order in the log, by {:+.3g}{} from the first to the "
-                  "last (correlation {:.3f} about the means of the conditions; held-out throws agree): {}",
-                  drift->name, drift->change, dynamics::after_number(drift->unit), drift->correlation,
-                  friction
-                      ? "friction changes over the campaign, as pads do that wear or warm; every throw is "
-                        "fitted a friction of its own, so that channels do not show it"
-                      : "what is tracked moves against the object, or the grasp against the hand"),
+      drift->slow
+          ? fmt::format(
+                "the throws' own {} goes up and down with their order in the log, by {:.2g}{} (1 sigma): "
+                "neighbours correlate by {:.2f} about the means of the conditions, and held-out throws agree "
+                "with the train throws before and after them: {}",
+                drift->name, drift->change, dynamics::after_number(drift->unit), drift->correlation, why)
+          : fmt::format(
+                "the throws' own {} drifts with their order in the log, by {:+.3g}{} from the first to the "
+                "last (correlation {:.3f} about the means of the conditions; held-out throws agree): {}",
+                drift->name, drift->change, dynamics::after_number(drift->unit), drift->correlation, why),
       {}};
 }
 

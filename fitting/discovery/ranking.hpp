@@ -13,13 +13,14 @@ namespace unhand::fitting {
 
 /// An effect for which the evidence is, and which is no part of the answer.
 struct SmallEffect {
-  std::string id;          ///< of the effect
-  double delta_bic{};      ///< with it against without
-  double p_value{};        ///< of its absence
-  double held_out_fall{};  ///< largest, of χ² per sample in a channel and phase
-  PredictionGain rms;      ///< of held-out predictions, without it and with it
-  bool any_pads{};         ///< it is a give of the pads that no pads are without
-  bool likelier{};         ///< the held-out throws' likelihood rises enough with it
+  std::string id;                     ///< of the effect
+  std::vector<Parameter> parameters;  ///< as fitted
+  double delta_bic{};                 ///< with it against without
+  double p_value{};                   ///< of its absence
+  double held_out_fall{};             ///< largest, of χ² per sample in a channel and phase
+  PredictionGain rms;                 ///< of held-out predictions, without it and with it
+  bool any_pads{};                    ///< it is a give of the pads that no pads are without
+  bool likelier{};                    ///< the held-out throws' likelihood rises enough with it
 };
 
 /// What became of a candidate: in the last refit, or since.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <utility>
 
 #include "fitting/discovery/order_trend.hpp"
 #include "fitting/distributions.hpp"
@@ -50,16 +51,38 @@ std::vector<int> quantile_groups(const std::vector<double>& value, int groups) {
   return out;
 }
 
-Dependence over_groups(const std::string& on, const std::vector<double>& residual,
+/// The samples of a recording in a group are one witness, their mean: neighbours may err alike.
+Dependence over_groups(const std::string& on, const ResidualSamples& samples,
                        const std::vector<double>& variable, int groups) {
   std::vector<double> r, x;
-  for (std::size_t i = 0; i < residual.size(); ++i)
-    if (std::isfinite(variable[i])) r.push_back(residual[i]), x.push_back(variable[i]);
+  std::vector<int> series;
+  for (std::size_t i = 0; i < samples.value.size(); ++i)
+    if (std::isfinite(variable[i]))
+      r.push_back(samples.value[i]), x.push_back(variable[i]), series.push_back(samples.series[i]);
   if (r.size() < 4) return {on, 0, 1};
   const auto [low, high] = std::minmax_element(x.begin(), x.end());
   if (!(*high - *low > 1e-9 * std::max(std::abs(*high), std::abs(*low)))) return {on, 0, 1};
   const int most = static_cast<int>(r.size()) / 4;
-  return analyse(on, r, quantile_groups(x, std::clamp(groups, 2, std::max(2, most))));
+  const auto group = quantile_groups(x, std::clamp(groups, 2, std::max(2, most)));
+  struct Cell {
+    double n{}, sum{};
+  };
+  std::map<std::pair<int, int>, Cell> cells;  // by recording and group
+  double squares = 0;
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    Cell& cell = cells[{series[i], group[i]}];
+    cell.n += 1, cell.sum += r[i], squares += r[i] * r[i];
+  }
+  std::vector<double> mean;
+  std::vector<int> in;
+  double of_means = 0;
+  for (const auto& [where, cell] : cells) {
+    mean.push_back(cell.sum / cell.n), in.push_back(where.second);
+    of_means += cell.sum * cell.sum / cell.n;
+  }
+  Dependence out = analyse(on, mean, in);
+  if (squares > 0) out.share *= of_means / squares;
+  return out;
 }
 
 /// A recording's samples: as a witness, its mean.
@@ -164,9 +187,9 @@ ResidualStructure find_structure(const ResidualSamples& samples, const Structure
   out.offset = shared_offset(series, out.n, squares);
   out.depends.push_back(over_conditions(series, squares));
   out.depends.push_back(over_order(series, squares));
-  out.depends.push_back(over_groups("time", samples.value, samples.time, options.groups));
+  out.depends.push_back(over_groups("time", samples, samples.time, options.groups));
   for (const auto& state : samples.states)
-    out.depends.push_back(over_groups(state.name, samples.value, state.value, options.groups));
+    out.depends.push_back(over_groups(state.name, samples, state.value, options.groups));
   std::stable_sort(out.depends.begin(), out.depends.end(), [](const Dependence& a, const Dependence& b) {
     return a.p_value != b.p_value ? a.p_value < b.p_value : a.share > b.share;
   });

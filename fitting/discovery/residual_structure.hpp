@@ -61,7 +61,8 @@ struct StructureOptions {
 
 /// Tests: χ² of the whole; the lag-one autocorrelation within series; Student's t of an offset that the
 /// series share; one-way analyses of variance over conditions (with the mean of a series as its one witness,
-/// as throws differ as wholes) and over groups of equal count in time and in every state; a straight line of
+/// as throws differ as wholes) and over groups of equal count in time and in every state (with the mean of a
+/// series' samples in a group as one, as neighbours may err alike); a straight line of
 /// the series' means over their number, beside means of the conditions.
 ResidualStructure find_structure(const ResidualSamples& samples, const StructureOptions& options = {});
 

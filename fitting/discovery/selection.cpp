@@ -141,11 +141,7 @@ void describe(Stage& stage, FitResult counted, const DiscoverOptions& options, D
     }
     const dynamics::Effect effect = find_effect(accepted.id);
     accepted.p_value = wald_p_value(stage.fit, effect);  // with the covariance of the sigmas beside it
-    for (const auto& u : stage.fit.campaign)
-      for (const auto& p : effect.parameters)
-        if (without_object(u.unknown.name) == effect.full_name(p))
-          accepted.parameters.push_back({u.unknown.name.substr(accepted.id.size() + 1), u.unknown.unit,
-                                         u.value, u.sigma, u.interval_freedom()});
+    accepted.parameters = parameters_of(stage.fit, effect);
     find_other_names(f, contribution_of(stage.fit, effect), options.equivalent, out.silent, accepted);
   }
 }

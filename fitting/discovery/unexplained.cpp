@@ -86,9 +86,11 @@ std::optional<Unexplained> unexplained(const Stage& stage, const Discovery& so_f
     out = left_in_predictions(stage, so_far, options);
     if (!out) return left_in_own_unknowns(stage, options);
   }
-  out->description += "; no effect of the catalogue explains it on held-out throws";
+  out->description += so_far.imitations.empty()
+                          ? "; no effect of the catalogue explains it on held-out throws"
+                          : "; no effect of the catalogue explains all of it on held-out throws";
   for (const Imitation& one : so_far.imitations)
-    out->description += fmt::format("; {} imitates it ({})", one.id, one.why);
+    out->description += fmt::format("; {}, which was accepted at first, is no answer ({})", one.id, one.why);
   if (so_far.effects.empty() && so_far.imitations.empty() && !too_small_by(so_far, out->channel))
     out->description += nearest_footprint(stage, so_far, options);
   out->missing = missing_there(stage, *out, options);

@@ -24,27 +24,25 @@ struct MeanResidual {
 };
 MeanResidual mean_residual(const FallProblem& problem, const GroupedFit& fit) {
   MeanResidual out;
-  std::vector<std::array<double, 3>> means;
+  std::array<std::vector<double>, 3> means;  // of the falls whose axis is used
   for (std::size_t i = 0; i < fit.groups.size(); ++i) {
     if (!fit.groups[i].used || !fit.groups[i].solved) continue;
-    std::array<double, 3> mean{};
-    double n = 0;
+    std::array<double, 3> mean{}, n{};
     const auto& rows = problem.groups()[i].rows;
     const Eigen::VectorXd left = problem.left_of(i, fit.groups[i].residual);
     for (std::size_t j = 0; j < rows.size(); ++j)
       if (rows[j].channel >= 0) {
         const auto a = static_cast<std::size_t>(rows[j].channel);
-        mean[a] += left[static_cast<Eigen::Index>(j)];
-        n += 1.0 / static_cast<double>(problem.axes(i).size());
+        mean[a] += left[static_cast<Eigen::Index>(j)], n[a] += 1;
       }
-    for (double& x : mean) x /= n;
-    means.push_back(mean);
+    for (std::size_t a = 0; a < 3; ++a)
+      if (n[a] > 0) means[a].push_back(mean[a] / n[a]);
   }
-  const auto falls = static_cast<double>(means.size());
   for (std::size_t a = 0; a < 3; ++a) {
-    for (const auto& mean : means) out.common[a] += mean[a] / falls;
+    const auto falls = static_cast<double>(means[a].size());
+    for (const double mean : means[a]) out.common[a] += mean / falls;
     double squares = 0;
-    for (const auto& mean : means) squares += std::pow(mean[a] - out.common[a], 2);
+    for (const double mean : means[a]) squares += std::pow(mean - out.common[a], 2);
     out.scatter[a] = falls > 1 ? std::sqrt(squares / (falls - 1)) : 0;
   }
   return out;

@@ -21,30 +21,37 @@ double Wald::delta_bic(const GroupedFit& fit) const {
 double Wald::p_value(const GroupedFit& fit) const {
   const auto p = static_cast<double>(parameters), n = static_cast<double>(fit.used);
   if (!(n > 2)) return 1;
-  const double one = p * f_tail(largest, 1, n - 1);
+  const double one = p * std::min(hotelling_bar_tail(largest, 1, 0, n - 1),
+                                  hotelling_bar_tail(largest_bounded, 0, 1, n - 1));
   // So few groups say nothing of all parameters together.
   if (!(n > p + 1)) return std::min(1.0, one);
-  const double all = f_tail(statistic * (n - p) / (p * (n - 1)), p, n - p);
+  const double all = hotelling_bar_tail(statistic, static_cast<int>(parameters) - bounded, bounded, n - 1);
   return parameters < 2 ? all : std::min(1.0, 2 * std::min(all, one));
 }
 
-Wald wald_of(const VectorXd& away, const MatrixXd& covariance) {
-  Wald out{away.dot(pseudo_solve(covariance, away)), away.size(), 0};
-  for (Index j = 0; j < away.size(); ++j)
-    if (covariance(j, j) > 0) out.largest = std::max(out.largest, away[j] * away[j] / covariance(j, j));
+Wald wald_of(const VectorXd& away, const MatrixXd& covariance, const std::vector<int>& sides) {
+  Wald out{away.dot(pseudo_solve(covariance, away)), away.size()};
+  for (Index j = 0; j < away.size(); ++j) {
+    const bool bounded = sides[static_cast<std::size_t>(j)] != 0;
+    out.bounded += bounded ? 1 : 0;
+    double& largest = bounded ? out.largest_bounded : out.largest;
+    if (covariance(j, j) > 0) largest = std::max(largest, away[j] * away[j] / covariance(j, j));
+  }
   return out;
 }
 
 Wald wald_of(const GroupedFit& fit, const std::string& id) {
   std::vector<Index> at;
   std::vector<double> away;
+  std::vector<int> sides;
   for (std::size_t k = 0; k < fit.shared.size(); ++k)
-    if (fit.shared[k].effect == id && !fit.shared[k].shape) {
+    if (const SharedParameter& p = fit.shared[k]; p.effect == id && !p.shape) {
       at.push_back(static_cast<Index>(k));
-      away.push_back(fit.values[at.back()] - fit.shared[k].neutral);
+      away.push_back(fit.values[at.back()] - p.neutral);
+      sides.push_back(side_of(p.neutral, p.low, p.high));
     }
   const Eigen::Map<const VectorXd> d(away.data(), static_cast<Index>(away.size()));
-  return wald_of(d, fit.covariance(at, at));
+  return wald_of(d, fit.covariance(at, at), sides);
 }
 
 namespace {

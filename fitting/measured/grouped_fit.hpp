@@ -10,8 +10,8 @@ namespace unhand::fitting {
 /// Budget and robustness of a fit.
 struct GroupedFitOptions {
   int iterations{20};  ///< of the solver
-  /// Samples beyond this many times the scatter of their channel count linearly, and so do groups whose χ²
-  /// per sample exceeds `group_limit` medians.
+  /// Samples beyond this many times the scatter of their channel count linearly; groups whose χ² per sample
+  /// exceeds `group_limit` medians count as if it did not.
   double sample_limit{6}, group_limit{3};  ///< in scatters; in medians
   bool robust{true};                       ///< else all samples count alike
   int threads{0};                          ///< 0: one per core; the answer does not depend on it
@@ -100,7 +100,7 @@ struct GroupedMisfit {
   double chi2{};        ///< not robust
   double weight{};      ///< what its groups count for together: n where all count alike
   /// 1 where the model explains the channel to its noise.
-  double chi2_per_sample() const { return n > 0 ? chi2 / n : 0; }
+  double chi2_per_sample() const { return weight > 0 ? chi2 / weight : 0; }
 };
 /// By channel. With weights, every group counts as it does in them.
 std::vector<GroupedMisfit> misfit(const GroupedProblem& problem, const GroupedFit& fit,

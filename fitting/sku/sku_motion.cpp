@@ -97,11 +97,13 @@ std::vector<SkuMotion> motions_of(const datasets::Sku& sku, const datasets::Mode
   const auto& throws = request.log->throws;
   for (std::size_t i = 0; i < throws.size(); ++i) {
     if (request.condition && throws[i].condition != *request.condition) continue;
-    if (std::find(seen.begin(), seen.end(), throws[i].condition) != seen.end()) continue;
-    seen.push_back(throws[i].condition);
+    const std::string motion = repeated_motion(throws[i]);
+    if (std::find(seen.begin(), seen.end(), motion) != seen.end()) continue;
+    seen.push_back(motion);
     const auto& one = throws[middle_repetition(throws, i, landings, request.tolerance)];
     out.push_back(motion_of(experiment::with_object(*request.log, one, request.log_file, object), sku, card,
                             file, request));
+    out.back().repeats = motion;
   }
   if (out.empty())
     throw std::invalid_argument(
@@ -114,6 +116,7 @@ std::vector<SkuMotion> motions_of(const datasets::Sku& sku, const datasets::Mode
 ThrowCandidate candidate_of(const SkuMotion& motion) {
   ThrowCandidate out;
   out.condition = motion.prepared.condition;
+  out.repeats = motion.repeats;
   const auto nominal = motion.predict(motion.inputs.values);
   out.held = motion.held(motion.inputs.values);
   out.landed = nominal.landed();

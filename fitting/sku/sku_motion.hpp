@@ -16,6 +16,7 @@ namespace unhand::fitting {
 struct SkuMotion {
   experiment::PreparedThrow prepared;
   ThrowInputs inputs;
+  std::string repeats{};  ///< repeated_motion() of the log's throw; empty without a log
 
   experiment::ThrowPrediction<double> predict(const std::vector<double>& values) const;
   bool held(const std::vector<double>& values) const;

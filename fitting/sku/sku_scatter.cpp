@@ -227,9 +227,7 @@ std::optional<MotionRepeats> repeats_of(const SkuRequest& request, const LoggedL
     if (landings[i]) by_condition[repeated_motion(throws[i])].push_back(*landings[i]);
   constexpr int kFewest = 3;  // degrees of freedom
   const ThrowCandidate& nominal = answer.reference();
-  const auto first = std::find_if(throws.begin(), throws.end(),
-                                  [&](const auto& one) { return one.condition == nominal.condition; });
-  const auto own = first == throws.end() ? by_condition.end() : by_condition.find(repeated_motion(*first));
+  const auto own = by_condition.find(nominal.repeats);
   MotionRepeats out;
   Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
   int freedom = 0;

@@ -75,8 +75,9 @@ struct MeasurementGain {
 
 /// One motion with this object.
 struct ThrowCandidate {
-  std::string condition;                ///< of the log; or of the reference throw
-  bool held{}, landed{};                ///< the grip holds it until the gripper opens; the throw lands
+  std::string condition;  ///< of the log; or of the reference throw
+  std::string repeats;    ///< the log's object and condition whose motion it is; empty without a log
+  bool held{}, landed{};  ///< the grip holds it until the gripper opens; the throw lands
   double landing_x{}, landing_theta{};  ///< nominal [m, rad]
   LandingSpread linear;                 ///< spread to first order
 };

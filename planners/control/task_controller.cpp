@@ -50,8 +50,8 @@ ControlStep AdaptiveController::joint_law(const JointReference& r, const JointGa
   require_sizes(model_, "joint law", q, qd, r.q, r.qd, r.qdd, gains.stiffness, gains.damping);
   ControlStep out;
   out.velocity_error = r.qd - qd;
-  Y_r_ = torque_regressor<double>(model_, q, qd, r.qdd, kGravity, model_.size() - 1);  // q̇_r = q̇
-  out.torque = inverse_dynamics<double>(model_, q, qd, r.qdd) + Y_r_ * estimate +
+  out.regressor = torque_regressor<double>(model_, q, qd, r.qdd, kGravity, model_.size() - 1);  // q̇_r = q̇
+  out.torque = inverse_dynamics<double>(model_, q, qd, r.qdd) + out.regressor * estimate +
                friction_torque<double>(model_, qd) + gains.damping.cwiseProduct(out.velocity_error) +
                gains.stiffness.cwiseProduct(r.q - q);
   return out;
@@ -78,12 +78,12 @@ ControlStep AdaptiveController::task_law(const TaskReference& r, const TaskGains
   const Joints beta = reach(rate) + null(gains.posture * (gains.rest - q));
   const Joints alpha = reach(acceleration - drift) - gains.posture * null(qd);
   out.velocity_error = beta - qd;
-  Y_r_ = slotine_li_regressor<double>(model_, q, qd, beta, alpha, kGravity, last);
+  out.regressor = slotine_li_regressor<double>(model_, q, qd, beta, alpha, kGravity, last);
   const Joints nominal =
       inverse_dynamics<double>(model_, q, Joints::Zero(n), alpha) + coriolis_between(model_, q, qd, beta);
   Eigen::Matrix<double, 6, 1> pull = gains.stiffness * out.error;
   pull.tail<3>() = gains.rotational * out.error.tail<3>();
-  out.torque = nominal + Y_r_ * estimate + friction_torque<double>(model_, qd) +
+  out.torque = nominal + out.regressor * estimate + friction_torque<double>(model_, qd) +
                gains.damping.cwiseProduct(out.velocity_error) + J.transpose() * pull;
   return out;
 }
@@ -91,11 +91,13 @@ ControlStep AdaptiveController::task_law(const TaskReference& r, const TaskGains
 void AdaptiveController::adapt(const ControlStep& step, const Joints& applied, const Joints& q,
                                const Joints& qd, double dt) {
   require_sizes(model_, "adaptation", step.velocity_error, applied, q, qd);
+  if (step.regressor.rows() != model_.size() || step.regressor.cols() != estimate.size())
+    throw std::invalid_argument("adaptation: the step has no regressor: it is of no law of this arm");
   if (!(dt >= 0 && std::isfinite(dt)))
     throw std::invalid_argument(fmt::format("adaptation: dt = {} is not in [0, inf) s", dt));
   if (adaptation_.gain.maxCoeff() == 0) return;
   const int last = model_.size() - 1;
-  LinkParameters rate = Y_r_.transpose() * step.velocity_error;
+  LinkParameters rate = step.regressor.transpose() * step.velocity_error;
   if (adaptation_.prediction > 0) {
     const double l = adaptation_.filter;
     const Regressor<double> momentum = momentum_regressor<double>(model_, q, qd, last),

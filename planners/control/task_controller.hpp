@@ -54,10 +54,11 @@ struct ControlStep {
   JointVector<double> velocity_error;  ///< s = β − q̇ in the task, ė in the joints [rad/s]
   Eigen::Matrix<double, 6, 1> error =  ///< e_ξ: position [m] and rotation vector [rad]; 0 in the joints
       Eigen::Matrix<double, 6, 1>::Zero();
+  Regressor<double> regressor;  ///< Y_r of the torque's law, by which the estimate adapts
 };
 
-/// Two laws with one estimate of the unknown body. For one thread: a law keeps its regressor for `adapt`. All
-/// throw std::invalid_argument for vectors that have not one number for each joint.
+/// Two laws with one estimate of the unknown body. All throw std::invalid_argument for vectors that have not
+/// one number for each joint.
 class AdaptiveController {
  public:
   /// `model`: the chain as it is known, without the unknown body; friction is compensated as the model has
@@ -72,8 +73,8 @@ class AdaptiveController {
   ControlStep task_law(const TaskReference& reference, const TaskGains& gains, const JointVector<double>& q,
                        const JointVector<double>& qd) const;
 
-  /// Advances estimate and filters by dt [s] with the torque applied (after limits), by Euler's rule as a
-  /// controller does.
+  /// Advances estimate and filters by dt [s] from a law's step, with the torque applied (after limits), by
+  /// Euler's rule as a controller does. Throws std::invalid_argument for a step that no law has made.
   void adapt(const ControlStep& step, const JointVector<double>& applied, const JointVector<double>& q,
              const JointVector<double>& qd, double dt);
 
@@ -82,7 +83,6 @@ class AdaptiveController {
  private:
   Chain model_;
   Adaptation adaptation_;
-  mutable Regressor<double> Y_r_;      ///< of the last step
   Regressor<double> filtered_;         ///< λ/(p + λ) (λ Y_p − Y_h)
   JointVector<double> filtered_rest_;  ///< λ/(p + λ) (τ + λ p − h), p and h of the model
   bool started_{};

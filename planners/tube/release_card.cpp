@@ -202,6 +202,7 @@ ReleaseCard release_card(const datasets::ModelCard& card, const std::string& fil
   reader.take_or_range("shape", "-", true, out.shape, out.shape_sigma, 0, 0);
   out.friction = reader.friction();
   reader.pass_over_spread("force_deviation");
+  reader.pass_over_spread("grasp_across");  // plans hold objects on their axis
   // Friction's limits know the product of mu and the force alone, of which a card without a measured force
   // knows more than of either.
   const double mu = out.mu.value, per_newton = mu / out.grip_force;

@@ -69,14 +69,17 @@ TEST(WeakGrip, NamesConditionsOfEveryObject) {
 }
 
 TEST(SmallEffect, IsNotCalledSmallWhereHeldOutErrorsFall) {
-  fitting::SmallEffect small{"contact.viscous", -369, 8e-4, 0.1, {{1.23e-3, 0.911e-3}, {}}, false};
+  fitting::SmallEffect small{
+      "contact.viscous", {{"1/v_0", "s/m", 0.25, 0.01}}, -369, 8e-4, 0.1, {{1.23e-3, 0.911e-3}, {}}, false};
   EXPECT_THAT(small_text(small),
               testing::AllOf(testing::StartsWith("evident on the train throws, but the test throws do not"),
                              testing::EndsWith("and their likelihood does not rise enough)")));
   small.likelier = true;
   EXPECT_THAT(small_text(small), testing::EndsWith("and another of their errors grows)"));
   small.rms.position.after = 1.2e-3;
-  EXPECT_THAT(small_text(small), testing::StartsWith("evident, but too small to matter: contact.viscous"));
+  EXPECT_THAT(small_text(small),
+              testing::StartsWith(
+                  "evident, but too small to matter: contact.viscous (1/v_0 = 0.250 ± 0.010 s/m; BIC"));
   small.likelier = false;
   EXPECT_THAT(small_text(small), testing::StartsWith("evident on the train throws alone"));
   small.any_pads = true;

@@ -50,6 +50,7 @@ Worst consistency(const CampaignDesign& design, int index, bool exact_inputs, bo
   add("shape", truth.opening.shape);
   add("grasp_angle", truth.grasp_angle - prepared.grasp.angle);
   add("grasp_offset", truth.grasp_offset);
+  add("grasp_across", truth.grasp_across);
   const ThrowModel model{design.contact_model, truth.patch.pads, design.reference_force(), design.integrator};
   const auto predicted =
       predict_channels(prepared, observed, model, dynamics::Values<double>(names, numbers));
@@ -68,7 +69,7 @@ CampaignDesign with_everything(const std::string& law, const EffectSettings& eff
   CampaignDesign design = perfect(effects);
   design.contact_model = law;
   for (auto& object : design.objects) object.drag_k = kDrag;
-  design.variation.grasp_offset = 0.3e-3;
+  design.variation.grasp_offset = design.variation.grasp_across = 0.3e-3;
   design.sensors.landing_time_sigma = 1e-15;      // declared, or the landing's time is no observation
   design.integrator.tolerances = {1e-11, 1e-13};  // what differs is not what the integrators leave
   return design;

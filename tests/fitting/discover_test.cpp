@@ -429,6 +429,25 @@ TEST(Discovery, AWildThrowIsSetAsideAndNamed) {
     }
 }
 
+// Repetitions that the pads hold at other places across the object's axis: each throw is fitted its own.
+TEST(Discovery, AGraspThatScattersAcrossThePadsHidesNothing) {
+  const auto found_with = [](const experiment::EffectSettings& effects) {
+    experiment::CampaignDesign design = support::loop_design();
+    design.effects = effects;
+    design.variation.grasp_across = 0.5e-3;
+    return found_in(experiment::generate_campaign(design, 3));
+  };
+  const Discovery nothing = found_with({});
+  EXPECT_EQ(nothing.verdict, Verdict::no_missing_effect);
+  ASSERT_EQ(nothing.notes.size(), 1U);
+  EXPECT_NE(nothing.notes.front().find("grasp_across"), std::string::npos) << nothing.notes.front();
+  EXPECT_TRUE(found_in(support::loop_campaign({})).notes.empty()) << "these are all held on the axis";
+  const Discovery found = found_with({{"release.opening_delay.delay", 0.002}});
+  EXPECT_EQ(found.effects.size(), 1U);
+  support::expect_size(found, "release.opening_delay", 0.002);
+  EXPECT_FALSE(found.unexplained.has_value());
+}
+
 // Half of the throws are no strays.
 TEST(Discovery, ManyWildThrowsAreUnexplained) {
   auto log = support::loop_campaign({});

@@ -1,5 +1,6 @@
 // Least squares over groups with robust weights: it ends at the minimum, whatever it started from.
 #include "fitting/measured/grouped_fit.hpp"
+#include "fitting/measured/effect_trial.hpp"
 
 #include <gtest/gtest.h>
 
@@ -18,7 +19,7 @@ constexpr int kGroups = 12, kSamples = 40;
 /// y = a x + b x² + an offset of each group, measured with σ = 1; some samples are far off.
 class Parabolas final : public GroupedProblem {
  public:
-  explicit Parabolas(double far_off) {
+  explicit Parabolas(double far_off, double sigma = 1, const std::vector<double>& slopes = {}) {
     channels_ = {"y"};
     std::mt19937_64 random(5);
     std::normal_distribution<double> noise;
@@ -28,7 +29,8 @@ class Parabolas final : public GroupedProblem {
       for (int i = 0; i < kSamples; ++i) {
         const double x = at(i), wild = i % 10 == g % 10 ? far_off * (1 + i % 3) : 0;
         group.rows.push_back({0, x});
-        y.push_back(3 * x + 2 * x * x + 0.5 * g + wild + noise(random));
+        y.push_back((slopes.empty() ? 3 : slopes[static_cast<std::size_t>(g)]) * x + 2 * x * x + 0.5 * g +
+                    wild + sigma * noise(random));
       }
       groups_.push_back(std::move(group));
       measured_.push_back(std::move(y));
@@ -82,6 +84,58 @@ TEST(GroupedFit, SamplesThatAreFarOffDoNotStopItShortOfTheMinimum) {
   }
   EXPECT_GT(beyond, kGroups * kSamples / 25);
   EXPECT_LT(shared.cwiseAbs().maxCoeff(), 0.1);
+}
+
+// Without noise, groups of one design that differ in slope: its variance is that of a mean, with the two
+// degrees of freedom that both shared parameters take.
+TEST(GroupedFit, CovarianceIsThatOfTheMeanOfGroups) {
+  const std::vector<double> slopes{3.1, 2.5, 4.2, 3.3, 1.9, 2.8, 3.6, 3.0, 2.2, 4.0, 3.4, 2.6};
+  double mean = 0, squares = 0;
+  for (const double a : slopes) mean += a / kGroups;
+  for (const double a : slopes) squares += (a - mean) * (a - mean);
+  GroupedFitOptions options;
+  options.robust = false;
+  const Parabolas problem(0, 0, slopes);
+  const auto fit =
+      fit_groups(problem, datasets::Split::train, parameters(100), Eigen::VectorXd::Zero(2), options);
+  ASSERT_TRUE(fit.solved);
+  EXPECT_NEAR(fit.values[0], mean, 1e-9);
+  EXPECT_NEAR(fit.sigma(0), std::sqrt(squares / (kGroups * (kGroups - 2.0))), 1e-6);
+  // The other is the same in all groups: it is known no better than the declared noise allows.
+  double xx = 0, xy = 0, yy = 0, x = 0, y = 0;
+  for (int i = 0; i < kSamples; ++i) {
+    const double at = Parabolas::at(i);
+    x += at / kSamples, y += at * at / kSamples;
+  }
+  for (int i = 0; i < kSamples; ++i) {
+    const double u = Parabolas::at(i) - x, v = std::pow(Parabolas::at(i), 2) - y;
+    xx += u * u, xy += u * v, yy += v * v;
+  }
+  EXPECT_NEAR(fit.sigma(1), 1 / std::sqrt(kGroups * (yy - xy * xy / xx)), 1e-6);
+}
+
+// Student's t of nine degrees of freedom is beyond 2.262157 in one of twenty cases, and in half of them on
+// the side on which a bounded parameter can be.
+TEST(Wald, IsStudentsTOfOneParameterAndHalfOfItOnABound) {
+  GroupedFit fit;
+  fit.used = 10;
+  const Eigen::VectorXd away = Eigen::VectorXd::Constant(1, 3 * 2.262157);
+  const Eigen::MatrixXd variance = Eigen::MatrixXd::Constant(1, 1, 9);
+  EXPECT_NEAR(wald_of(away, variance, {0}).p_value(fit), 0.05, 1e-6);
+  EXPECT_NEAR(wald_of(away, variance, {1}).p_value(fit), 0.025, 1e-6);
+  EXPECT_NEAR(wald_of(away, variance, {0}).delta_bic(fit), std::log(10) - 2.262157 * 2.262157, 1e-9);
+}
+
+// Hotelling: T² (n − p)/(p (n − 1)) is F of p and n − p; F_{2,8} exceeds 4.458970 in one of twenty cases. Of
+// the two ways to look, all parameters and the largest alone, the surer one counts twice.
+TEST(Wald, IsHotellingsTOfTwo) {
+  GroupedFit fit;
+  fit.used = 10;
+  const double size = 4.458970 * 2 * 9 / 8;  // T²
+  Eigen::Vector2d away(std::sqrt(size / 2), std::sqrt(size / 2));
+  EXPECT_NEAR(wald_of(away, Eigen::Matrix2d::Identity(), {0, 0}).p_value(fit), 0.1, 1e-6);
+  fit.used = 3;  // of two parameters' scatter these say nothing
+  EXPECT_GT(wald_of(away, Eigen::Matrix2d::Identity(), {0, 0}).p_value(fit), 0.1);
 }
 
 TEST(GroupedFit, WhereOneParameterEndsAtItsRangeTheOthersAreAtTheirBestBesideIt) {

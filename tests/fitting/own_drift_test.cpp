@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <map>
 #include <random>
@@ -77,6 +78,27 @@ TEST(OwnDrift, WhatGoesWithTheConditionOrTheSplitIsNone) {
   }));
   // One too small to matter.
   EXPECT_FALSE(campaign.drift([](std::size_t i) { return 1e-4 * static_cast<double>(i); }));
+}
+
+// Pads that warm and cool: no straight line, but throws near each other in the log are alike.
+TEST(OwnDrift, FrictionThatGoesUpAndDownIsSeen) {
+  const Campaign campaign(3);
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> normal;
+  const auto n = static_cast<double>(campaign.log.throws.size());
+  const auto wave = [&](std::size_t i) {
+    return 0.1 * std::sin(2 * 3.14159 * 1.3 * static_cast<double>(i) / n);
+  };
+  const auto drift = campaign.drift([&](std::size_t i) { return wave(i) + 0.02 * normal(random); });
+  ASSERT_TRUE(drift.has_value());
+  EXPECT_TRUE(drift->slow);
+  EXPECT_NEAR(drift->change, 0.1 / std::sqrt(2.0), 0.02);
+  EXPECT_GT(drift->correlation, 0.7);
+  // Held-out throws that do not follow the others.
+  EXPECT_FALSE(campaign.drift([&](std::size_t i) {
+    const bool train = campaign.problem->throws()[i].prepared.split == datasets::Split::train;
+    return (train ? wave(i) : 0) + 0.02 * normal(random);
+  }));
 }
 
 TEST(OwnDrift, ChanceIsHardlyEverOne) {

@@ -57,6 +57,22 @@ TEST(ResidualStructure, NoiseHasNone) {
   EXPECT_LE(structured, static_cast<int>(0.095 * kTries));
 }
 
+// Neighbours that err alike are fewer witnesses than they are samples: noise that correlates goes with
+// nothing.
+TEST(ResidualStructure, SlowNoiseGoesWithNothing) {
+  int told = 0;
+  constexpr int kTries = 200;
+  for (int seed = 1; seed <= kTries; ++seed) {
+    ResidualSamples slow = samples(static_cast<std::uint64_t>(seed), [](int, double, double) { return 0.0; });
+    for (std::size_t i = 1; i < slow.value.size(); ++i)
+      if (slow.series[i] == slow.series[i - 1])
+        slow.value[i] = 0.9 * slow.value[i - 1] + std::sqrt(1 - 0.81) * slow.value[i];
+    for (const Dependence& d : find_structure(slow).depends) told += d.on == "time" && d.p_value < 0.01;
+  }
+  EXPECT_LE(told,
+            static_cast<int>(0.03 * kTries));  // three times what is designed; samples as witnesses: half
+}
+
 TEST(ResidualStructure, WhatItGoesWithIsNamed) {
   const auto strongest = [](const ResidualSamples& s) { return find_structure(s).depends.front(); };
   const auto speed = strongest(samples(7, [](int, double, double v) { return 3 * (v - 2.5); }));
