@@ -195,11 +195,12 @@ Json discovery_json(const Discovery& found, const std::string& log, const std::s
   out["base_model"] = model;
   out["verdict"] = to_string(found.verdict);
   out["effects"] = Json::array();
-  const std::string gain = gain_text(found.effects);
+  const std::string gain = gain_text(found.effects), filter = filter_text(found.effects);
   for (const auto& effect : found.effects) {
     Json one = effect_json(effect);
     if (!gain.empty() && (effect.id == "sensor.mass" || effect.id == "sensor.inertia"))
       one["reads_the_same"] = gain;
+    if (!filter.empty() && effect.id == "sensor.ft_time_offset") one["reads_the_same"] = filter;
     out["effects"].push_back(std::move(one));
   }
   out["fitted_along"] = found.along;
@@ -272,7 +273,8 @@ std::string discovery_text(const Discovery& found, const std::string& log, const
     out += effect_text(effect);
     for (const auto& line : separating_lines(effect)) out += fmt::format("  {}\n", line);
   }
-  if (const std::string note = gain_text(found.effects); !note.empty()) out += "\n" + note + "\n";
+  for (const std::string& note : {gain_text(found.effects), filter_text(found.effects)})
+    if (!note.empty()) out += "\n" + note + "\n";
   for (const auto& id : found.along) out += fmt::format("\n{}\n", along_text(id, found.after.fit));
   out += fmt::format("\n{}\n", parameters_text(found));
   if (found.small) out += fmt::format("\n{}\n", small_text(*found.small));

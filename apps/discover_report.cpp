@@ -237,8 +237,8 @@ void write_discovery_report(const Discovery& found, const std::string& log, cons
   };
   std::string answer;
   for (const auto& effect : found.effects) answer += effect_html(effect);
-  if (const std::string note = gain_text(found.effects); !note.empty())
-    answer += fmt::format("<p>{}</p>\n", escaped(note));
+  for (const std::string& note : {gain_text(found.effects), filter_text(found.effects)})
+    if (!note.empty()) answer += fmt::format("<p>{}</p>\n", escaped(note));
   for (const auto& id : found.along)
     answer += fmt::format("<p>{}.</p>\n", escaped(along_text(id, found.after.fit)));
   answer += fmt::format("<p>{}.</p>\n", escaped(parameters_text(found)));

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "apps/report_page.hpp"
 #include "fitting/distributions.hpp"
@@ -168,6 +169,19 @@ std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects) {
       "nothing, and a gain of {:.4g} on the whole measured wrench leaves just that. A weighing of the object "
       "tells which, or a known weight on the sensor.",
       mass->value);
+}
+
+std::string filter_text(const std::vector<fitting::AcceptedEffect>& effects) {
+  for (const auto& effect : effects)
+    if (effect.id == "sensor.ft_time_offset" && !effect.parameters.empty() &&
+        effect.parameters.front().value > 0)
+      return fmt::format(
+          "A low-pass filter of the F/T sensor with a time constant of {:.3g} ms ({:.0f} Hz) delays what it "
+          "reads by as "
+          "much as such a clock does: its data sheet, or a tap on the sensor, tells which.",
+          1e3 * effect.parameters.front().value,
+          1 / (2 * std::numbers::pi * effect.parameters.front().value));
+  return {};
 }
 
 std::string unexplained_text(std::span<const fitting::AcceptedEffect> effects,

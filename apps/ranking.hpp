@@ -49,6 +49,8 @@ Json skipped_json(const std::vector<std::pair<std::string, std::string>>& skippe
 
 /// Where mass and inertia are off by the same ratio: that it may be a gain of the wrench. Else empty.
 std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects);
+/// The filter that would explain an accepted delay of the F/T sensor as well; empty without one.
+std::string filter_text(const std::vector<fitting::AcceptedEffect>& effects);
 
 /// What is unexplained, with what that means for the sizes of what was found.
 std::string unexplained_text(std::span<const fitting::AcceptedEffect> effects,

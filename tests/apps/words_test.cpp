@@ -86,6 +86,16 @@ TEST(SmallEffect, IsNotCalledSmallWhereHeldOutErrorsFall) {
   EXPECT_THAT(small_text(small), testing::StartsWith("evident, but no pads are without it: "));
 }
 
+TEST(FilterText, NamesTheFilterThatDelaysAsMuch) {
+  fitting::AcceptedEffect late;
+  late.id = "sensor.ft_time_offset";
+  late.parameters = {{"offset", "s", 0.796e-3, 2e-5}};
+  EXPECT_THAT(filter_text({late}), testing::HasSubstr("0.796 ms (200 Hz)"));
+  late.parameters.front().value = -1e-3;  // no filter is early
+  EXPECT_EQ(filter_text({late}), "");
+  EXPECT_EQ(filter_text({}), "");
+}
+
 TEST(Separating, OnlyWhatSeparatesIsAdvised) {
   fitting::AcceptedEffect effect;
   effect.separating = {{"flight.wind", "throw faster", 0.999, 0.5, true},

@@ -8,6 +8,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "experiment/campaign_effects.hpp"
 #include "experiment/synthetic_campaign.hpp"
@@ -409,24 +410,24 @@ void pull(datasets::Throw& one) {
 TEST(Discovery, AWildThrowIsSetAsideAndNamed) {
   const auto clean = support::loop_campaign({{"flight.quadratic_drag.k", 0.01}}),
              null = support::loop_campaign({});
-  for (const auto split : {datasets::Split::train, datasets::Split::test})
-    for (const auto spoil : {jump, pull}) {
-      std::size_t k = 5;
-      while (clean.throws[k].split != split) ++k;
-      auto log = clean;
-      spoil(log.throws[k]);
-      const Discovery found = found_in(log);
-      ASSERT_EQ(found.skipped.size(), 1U);
-      EXPECT_EQ(found.skipped.front().first, log.throws[k].id);
-      EXPECT_EQ(found.effects.size(), 1U);
-      support::expect_size(found, "flight.quadratic_drag", 0.01);
-      EXPECT_FALSE(found.unexplained.has_value());
-      log = null;
-      spoil(log.throws[k]);
-      const Discovery nothing = found_in(log);
-      EXPECT_EQ(nothing.verdict, Verdict::no_missing_effect);
-      EXPECT_EQ(nothing.skipped.size(), 1U);
-    }
+  for (const auto& [split, spoil] :
+       {std::pair(datasets::Split::train, &jump), std::pair(datasets::Split::test, &pull)}) {
+    std::size_t k = 5;
+    while (clean.throws[k].split != split) ++k;
+    auto log = clean;
+    spoil(log.throws[k]);
+    const Discovery found = found_in(log);
+    ASSERT_EQ(found.skipped.size(), 1U);
+    EXPECT_EQ(found.skipped.front().first, log.throws[k].id);
+    EXPECT_EQ(found.effects.size(), 1U);
+    support::expect_size(found, "flight.quadratic_drag", 0.01);
+    EXPECT_FALSE(found.unexplained.has_value());
+    log = null;
+    spoil(log.throws[k]);
+    const Discovery nothing = found_in(log);
+    EXPECT_EQ(nothing.verdict, Verdict::no_missing_effect);
+    EXPECT_EQ(nothing.skipped.size(), 1U);
+  }
 }
 
 // Repetitions that the pads hold at other places across the object's axis: each throw is fitted its own.

@@ -30,7 +30,7 @@ using testing::HasSubstr;
 using testing_support::small_design;
 using testing_support::truth_of;
 
-constexpr const char* kLaw = "limit_surface_disc";
+constexpr const char* kTrueLaw = "limit_surface_disc";
 
 datasets::ThrowLog campaign(const std::string& model, std::uint64_t seed = 11) {
   return experiment::generate_campaign(small_design(model), seed);
@@ -38,11 +38,11 @@ datasets::ThrowLog campaign(const std::string& model, std::uint64_t seed = 11) {
 
 /// The campaign of the disc, made once.
 const datasets::ThrowLog& disc_log() {
-  static const datasets::ThrowLog log = campaign(kLaw);
+  static const datasets::ThrowLog log = campaign(kTrueLaw);
   return log;
 }
 
-CampaignProblem problem_of(const datasets::ThrowLog& log, const std::string& model = kLaw) {
+CampaignProblem problem_of(const datasets::ThrowLog& log, const std::string& model = kTrueLaw) {
   CampaignOptions options;
   options.model = model;
   return CampaignProblem(log, "(in memory)", options);
@@ -247,7 +247,7 @@ TEST(ThrowFit, DeadForceChannelIsDropped) {
 
 TEST(ThrowFit, ACardTellsHowTheGripperOpened) {
   const auto card = card_of(problem_of(disc_log()), disc_fit());
-  const auto& opening = small_design(kLaw).opening;
+  const auto& opening = small_design(kTrueLaw).opening;
   const auto expect_around = [&](const char* name, double truth, double within) {
     const auto& range = card.valid_range.at(name);
     EXPECT_LT(range.low, truth + within) << name;
@@ -262,7 +262,7 @@ TEST(ThrowFit, ACardTellsHowTheGripperOpened) {
 // A wind in which nothing drags.
 TEST(ThrowFit, ACardTellsOfWhatLeavesNoTrace) {
   CampaignOptions options;
-  options.model = kLaw;
+  options.model = kTrueLaw;
   options.effects = {"flight.wind"};
   const CampaignProblem problem(disc_log(), "(in memory)", options);
   datasets::ModelCard card = card_of(problem, fit(problem));
@@ -310,7 +310,7 @@ TEST(ThrowFit, ChannelInAnotherUnitDoesNotMoveIt) {
       for (std::size_t i = 0; i < series.rows; ++i) series(i, column) *= factor;
     }
     CampaignOptions as_written;
-    as_written.model = kLaw;
+    as_written.model = kTrueLaw;
     as_written.check_units = false;
     const auto result = fit(CampaignProblem(wrong, "(in memory)", as_written));
     bool seen = false;
@@ -363,7 +363,7 @@ TEST(ThrowFit, ProfilesWhatTheLogHardlyKnows) {
   int left = 3;  // train throws: where more say it, the cost is as good as a parabola
   std::erase_if(bare.throws, [&](const auto& one) { return one.split == Split::train && left-- <= 0; });
   CampaignOptions options;
-  options.model = kLaw;
+  options.model = kTrueLaw;
   options.observations.wrench = options.observations.normal_force = false;  // landings are all there is
   FitOptions profiled;
   profiled.profile = true;
@@ -378,7 +378,7 @@ TEST(ThrowFit, ProfilesWhatTheLogHardlyKnows) {
   int ends = 0;
   for (const auto& u : result.campaign) {
     const auto [low, high] = u.interval95();
-    const double truth = truth_of(small_design(kLaw), u.unknown.name);
+    const double truth = truth_of(small_design(kTrueLaw), u.unknown.name);
     EXPECT_LT(low, u.value) << u.unknown.name;
     EXPECT_GT(high, u.value) << u.unknown.name;
     EXPECT_LT(low, truth) << u.unknown.name;
@@ -408,11 +408,13 @@ TEST(ThrowFit, WithoutANormalForceOnlyTheProductOfGripAndFrictionIsKnown) {
   FitOptions profiled;
   profiled.profile = true;
   const auto result = fit(problem_of(log), profiled);
-  const auto& opening = small_design(kLaw).opening;
-  const std::map<std::string, double> truth{
-      {"mu", truth_of(small_design(kLaw), "mu")}, {"length", truth_of(small_design(kLaw), "length")},
-      {"grip_force", opening.grip_force},         {"dead_time", opening.dead_time},
-      {"opening_time", opening.opening_time},     {"shape", opening.shape}};
+  const auto& opening = small_design(kTrueLaw).opening;
+  const std::map<std::string, double> truth{{"mu", truth_of(small_design(kTrueLaw), "mu")},
+                                            {"length", truth_of(small_design(kTrueLaw), "length")},
+                                            {"grip_force", opening.grip_force},
+                                            {"dead_time", opening.dead_time},
+                                            {"opening_time", opening.opening_time},
+                                            {"shape", opening.shape}};
   double product = 1;
   for (const auto& u : result.campaign) {
     const auto [low, high] = u.interval95();
@@ -454,14 +456,15 @@ TEST(ThrowFit, WhatIsFixedLeavesNothingOpen) {
                                     problem.campaign().begin());
   };
   const std::size_t mu = index("mu"), grip = index("grip_force");
-  options.start[grip] = small_design(kLaw).opening.grip_force;
+  options.start[grip] = small_design(kTrueLaw).opening.grip_force;
   options.fixed = {"grip_force"};
   const auto result = fit(problem, options);
   ASSERT_TRUE(result.is_answer()) << result.message;
   EXPECT_TRUE(result.open.empty()) << result.open.front().meaning;
   EXPECT_TRUE(is_determined(result, mu));
   EXPECT_FALSE(is_determined(result, grip)) << "it was not asked for";
-  EXPECT_NEAR(result.campaign[mu].value, truth_of(small_design(kLaw), "mu"), 3 * result.campaign[mu].sigma);
+  EXPECT_NEAR(result.campaign[mu].value, truth_of(small_design(kTrueLaw), "mu"),
+              3 * result.campaign[mu].sigma);
   EXPECT_LT(result.campaign[mu].data_sigma, 0.1 * result.campaign[mu].value);
   EXPECT_LT(result.campaign[grip].sigma, 1e-9);
 }
@@ -504,10 +507,10 @@ TEST(ThrowFit, RefusesOptionsThatMeanNothing) {
 // From the size of soft pads it overshoots to it where the pads give by micrometres only.
 TEST(ThrowFit, AnEffectWithoutADerivativeAtNeutralIsNotStuckThere) {
   for (const double compliance : {5e-6, 1e-7}) {  // m/N
-    auto design = small_design(kLaw);
+    auto design = small_design(kTrueLaw);
     design.effects = {{"contact.pad_compliance.compliance", compliance}};
     CampaignOptions options;
-    options.model = kLaw;
+    options.model = kTrueLaw;
     options.effects = {"contact.pad_compliance"};
     options.integrator.tolerances = {1e-5, 1e-8};
     const auto result =
@@ -562,7 +565,7 @@ TEST(ThrowFit, PadsThatRingAreFoundAtTheirPitch) {
 
 TEST(ThrowFit, UnknownsAtTheirBoundsDoNotStopTheOthers) {
   // Pads that part later than the force says would have the smoothing's deviation beyond its range.
-  auto design = small_design(kLaw);
+  auto design = small_design(kTrueLaw);
   design.effects = {{"release.opening_delay.delay", 0.006}};
   const auto problem = problem_of(experiment::generate_campaign(design, 14));
   FitOptions options;
@@ -694,7 +697,7 @@ TEST(CampaignInput, RefusesOptionsOutOfRange) {
   EXPECT_THAT(message([](auto& o) { o.model = "limit_surface_naive"; }), HasSubstr("that can be fitted"));
   const auto problem = problem_of(disc_log());
   EXPECT_THROW(problem.with("limit_surface_naive", {}), std::invalid_argument);
-  EXPECT_THROW(problem.with(kLaw, {"flight.wind", "flight.wind"}), std::invalid_argument);
+  EXPECT_THROW(problem.with(kTrueLaw, {"flight.wind", "flight.wind"}), std::invalid_argument);
 }
 
 TEST(CampaignInput, ThrowsThatCannotBeSimulatedAreCountedAndSayWhy) {

@@ -518,6 +518,7 @@ TEST(ReleaseCard, RefusesWhatItDoesNotTake) {
   card = quartic(1);
   card.parameters["reference_force"] = {20, {}, "N"};  // every fit's card has it
   card.own_spreads["force_deviation"] = {1, "-"};
+  card.own_spreads["grasp_across"] = {2e-4, "m"};
   EXPECT_NO_THROW(release_card(card, "card.json"));
 }
 
