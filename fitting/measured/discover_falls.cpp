@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -102,7 +103,7 @@ void weigh_gain(const datasets::ThrowLog& log, const FallProblem& problem, const
   const double n = static_cast<double>(sizes.size()), gain = dynamics::median(sizes) / log.gravity;
   double square = 0;
   for (const double size : sizes) square += std::pow(size / log.gravity - gain, 2);
-  const double error = std::sqrt(square / (n - 1) / n);
+  const double error = std::sqrt(std::numbers::pi / 2 * square / (n - 1) / n);  // of a median
   if (std::abs(gain - 1) < std::max(kLeast, kSurely * error)) return;
   for (const auto& effect : out.effects) {
     if (effect.id != "flight.quadratic_drag" && effect.id != "flight.linear_drag") continue;

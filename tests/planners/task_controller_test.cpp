@@ -76,6 +76,22 @@ TEST(JointLaw, LeavesASpringADamperAndTheUnknownLoad) {
   }
 }
 
+// A law that was asked in between, for another state, changes nothing of what a step teaches.
+TEST(JointLaw, TeachesByTheStepThatIsGiven) {
+  std::mt19937_64 random(7);
+  const OnItsWay at(random), elsewhere(random);
+  AdaptiveController alone(at.known, StudyOptions::default_adaptation()), asked = alone;
+  const ControlStep step = alone.joint_law(at.reference, at.gains, at.q, at.qd);
+  asked.joint_law(elsewhere.reference, elsewhere.gains, elsewhere.q, elsewhere.qd);
+  alone.adapt(step, step.torque, at.q, at.qd, 1e-3);
+  asked.adapt(step, step.torque, at.q, at.qd, 1e-3);
+  EXPECT_EQ(asked.estimate, alone.estimate);
+  EXPECT_GT(alone.estimate.norm(), 0);
+  ControlStep of_no_law;
+  of_no_law.velocity_error = step.velocity_error;
+  EXPECT_THROW(alone.adapt(of_no_law, step.torque, at.q, at.qd, 1e-3), std::invalid_argument);
+}
+
 // With the update, V' = −ėᵀ k_v ė + ½ ėᵀ Ṁ ė, whatever is not known of the load.
 TEST(JointLaw, LyapunovFunctionFallsByTheDampingButForTheMassThatChanges) {
   std::mt19937_64 random(2);
