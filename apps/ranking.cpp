@@ -177,8 +177,7 @@ std::string filter_text(const std::vector<fitting::AcceptedEffect>& effects) {
         effect.parameters.front().value > 0)
       return fmt::format(
           "A low-pass filter of the F/T sensor with a time constant of {:.3g} ms ({:.0f} Hz) delays what it "
-          "reads by as "
-          "much as such a clock does: its data sheet, or a tap on the sensor, tells which.",
+          "reads by as much as such a clock does: its data sheet, or a tap on the sensor, tells which.",
           1e3 * effect.parameters.front().value,
           1 / (2 * std::numbers::pi * effect.parameters.front().value));
   return {};

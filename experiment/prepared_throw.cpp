@@ -9,6 +9,7 @@
 #include "datasets/assemble.hpp"
 #include "dynamics/straight_line.hpp"
 #include "experiment/landing_noise.hpp"
+#include "experiment/seen_grasp.hpp"
 
 namespace unhand::experiment {
 
@@ -148,20 +149,11 @@ double opening_command(const LoggedThrow& source, const PreparedThrow& prepared)
 release::Grasp<double> grasp_of(const LoggedThrow& source, const PreparedThrow& prepared) {
   double angle = 0, offset_x = 0;
   int seen = 0;
-  if (source.logged.mocap) {
-    const datasets::MocapLog& mocap = *source.logged.mocap;
-    const release::HandMotion& hand = prepared.hand;
-    const Window whole{hand.begin(), hand.end()};
-    for (std::size_t i = 0; i < mocap.time.rows; ++i) {
-      const double t = mocap.time(i);
-      if (!mocap.is_valid(i) || t < hand.begin() || t >= prepared.open_command || t > hand.end()) continue;
-      const auto pose = hand.at(whole, t).pose;
-      const dynamics::Vec2<double> r{mocap.pose(i, 0) - pose.x, mocap.pose(i, 1) - pose.z};
-      angle += mocap.pose(i, 2) - pose.theta;
-      offset_x += dynamics::rotate(-mocap.pose(i, 2), r).x;
-      ++seen;
-    }
-  }
+  each_seen_in_hand(source.logged, prepared.hand, prepared.open_command,
+                    [&](double turned, const dynamics::Vec2<double>& at) {
+                      angle += turned, offset_x += at.x;
+                      ++seen;
+                    });
   release::Grasp<double> out;
   if (seen > 0)
     out.angle = angle / seen;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "experiment/seen_grasp.hpp"
 #include "fitting/distributions.hpp"
 
 namespace unhand::fitting {
@@ -21,17 +22,9 @@ struct Seen {
 };
 
 std::optional<Seen> seen_across(const datasets::Throw& logged, const experiment::PreparedThrow& prepared) {
-  if (!logged.mocap) return {};
-  const auto& mocap = *logged.mocap;
-  const auto& hand = prepared.hand;
   std::vector<double> across;
-  for (std::size_t i = 0; i < mocap.time.rows; ++i) {
-    const double t = mocap.time(i);
-    if (!mocap.is_valid(i) || t < hand.begin() || t >= prepared.open_command || t > hand.end()) continue;
-    const auto pose = hand.at({hand.begin(), hand.end()}, t).pose;
-    const dynamics::Vec2<double> r{mocap.pose(i, 0) - pose.x, mocap.pose(i, 1) - pose.z};
-    across.push_back(dynamics::rotate(-mocap.pose(i, 2), r).z);
-  }
+  experiment::each_seen_in_hand(logged, prepared.hand, prepared.open_command,
+                                [&](double, const dynamics::Vec2<double>& at) { across.push_back(at.z); });
   if (across.size() < 3) return {};
   Seen out;
   out.n = static_cast<double>(across.size());

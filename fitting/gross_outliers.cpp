@@ -22,6 +22,10 @@ std::string WildGroup::in_words() const {
                      times, sigmas);
 }
 
+bool is_among(const std::vector<WildGroup>& wild, std::size_t group) {
+  return std::any_of(wild.begin(), wild.end(), [&](const WildGroup& one) { return one.group == group; });
+}
+
 double GroupFooting::misfit(const VectorXd& sizes) const {
   const Index p = sizes.size();
   const double left =
@@ -123,12 +127,9 @@ std::vector<WildGroup> gross_outliers(const std::vector<GroupFooting>& parts, do
 
 std::vector<WildGroup> still_gross(const std::vector<WildGroup>& wild,
                                    const std::vector<GroupFooting>& groups, double limit) {
-  const auto is_wild = [&](std::size_t group) {
-    return std::any_of(wild.begin(), wild.end(), [&](const WildGroup& g) { return g.group == group; });
-  };
   double worst = 0;
   for (const GroupFooting& part : groups)
-    if (!is_wild(part.group)) worst = std::max(worst, part.misfit());
+    if (!is_among(wild, part.group)) worst = std::max(worst, part.misfit());
   const auto is_explained = [&](const WildGroup& one) {
     return std::any_of(groups.begin(), groups.end(), [&](const GroupFooting& part) {
       return part.group == one.group && part.misfit() <= limit * worst;

@@ -23,6 +23,9 @@ struct WildGroup {
   std::string in_words() const;
 };
 
+/// Whether a group is one of them.
+bool is_among(const std::vector<WildGroup>& wild, std::size_t group);
+
 /// Inner products of what effects do to a group's whitened samples and of its residual (last), the group's
 /// own unknowns projected out of all.
 struct GroupFooting {

@@ -13,10 +13,6 @@ namespace unhand::fitting {
 
 namespace {
 
-bool is_among(const std::vector<WildGroup>& wild, std::size_t group) {
-  return std::any_of(wild.begin(), wild.end(), [&](const WildGroup& one) { return one.group == group; });
-}
-
 /// The footings of a fit's throws, by columns that may be of another fit of the same problem.
 void add_footings(const FootprintColumns& columns, const CampaignProblem& problem, const FitResult& fit,
                   int threads, std::vector<GroupFooting>& to) {
