@@ -87,9 +87,10 @@ std::string measured_text(const SkuValidation& answer) {
       "{:.2f} cm, {:.2f} deg in the mean of the absolute; bias {:+.2f} cm, {:+.2f} deg); the errors are "
       "{:.2f} "
       "times what was foretold{}\n",
-      m.confirmed    ? "Confirmed"
-      : contradicted ? "Contradicted"
-                     : "Not within the tolerance",
+      m.confirmed                              ? "Confirmed"
+      : contradicted                           ? "Contradicted"
+      : m.p_value < fitting::kTooFewToBeChance ? "Fewer within the tolerance than asked"
+                                               : "Neither confirmed nor contradicted",
       m.throws.size() + static_cast<std::size_t>(m.never_lands), 100 * m.within, 100 * m.mae_x,
       m.mae_theta * kDegrees, 100 * m.bias_x, m.bias_theta * kDegrees, m.rms_z, never);
 }
@@ -201,6 +202,7 @@ Json sku_json(const SkuQuestion& question, const SkuValidation& answer) {
   out["linear"]["within"] = answer.within_linear;
   out["monte_carlo"] = spread_json(answer.monte_carlo);
   out["monte_carlo"]["within"] = answer.within;
+  out["monte_carlo"]["within_sigma"] = answer.within_sigma;
   out["monte_carlo"]["lost"] = answer.lost;
   out["monte_carlo"]["samples"] = request.samples;
   out["repeats"] = nullptr;
@@ -228,17 +230,12 @@ Json sku_json(const SkuQuestion& question, const SkuValidation& answer) {
         {{"measurement", gain.measurement}, {"inputs", gain.inputs}, {"share", gain.share}});
   out["measured"] = nullptr;
   if (const auto& m = answer.measured) {
-    out["measured"] = {{"confirmed", m->confirmed},
-                       {"n", m->throws.size()},
-                       {"never_lands", m->never_lands},
-                       {"held_out", m->held_out},
-                       {"within", m->within},
-                       {"landing_x_mae_m", m->mae_x},
-                       {"landing_theta_mae_deg", m->mae_theta * kDegrees},
-                       {"bias_x_m", m->bias_x},
-                       {"bias_theta_deg", m->bias_theta * kDegrees},
-                       {"rms_z", number(m->rms_z)},
-                       {"throws", Json::array()}};
+    out["measured"] = {{"confirmed", m->confirmed},     {"n", m->throws.size()},
+                       {"never_lands", m->never_lands}, {"held_out", m->held_out},
+                       {"within", m->within},           {"p_value", m->p_value},
+                       {"landing_x_mae_m", m->mae_x},   {"landing_theta_mae_deg", m->mae_theta * kDegrees},
+                       {"bias_x_m", m->bias_x},         {"bias_theta_deg", m->bias_theta * kDegrees},
+                       {"rms_z", number(m->rms_z)},     {"throws", Json::array()}};
     for (const auto& one : m->throws)
       out["measured"]["throws"].push_back({{"id", one.id},
                                            {"condition", one.condition},

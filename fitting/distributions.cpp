@@ -1,6 +1,7 @@
 #include "fitting/distributions.hpp"
 
 #include <algorithm>
+#include <boost/math/distributions/binomial.hpp>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/students_t.hpp>
@@ -13,6 +14,7 @@ namespace {
 using Policy = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
 using Students = boost::math::students_t_distribution<double, Policy>;
 using ChiSquared = boost::math::chi_squared_distribution<double, Policy>;
+using Binomial = boost::math::binomial_distribution<double, Policy>;
 using FisherF = boost::math::fisher_f_distribution<double, Policy>;
 constexpr double kLargest = std::numeric_limits<double>::max();
 
@@ -50,6 +52,11 @@ double chi_bar_tail(double x, int free, int bounded) {
 double hotelling_bar_tail(double x, int free, int bounded, double n) {
   return mixed_tail(x, free, bounded,
                     [x, n](int k) { return f_tail(x * (n - k + 1) / (n * k), k, n - k + 1); });
+}
+
+double binomial_tail(int k, int n, double p) {
+  if (n < 1 || k >= n) return 1;
+  return k < 0 ? 0 : cdf(Binomial(n, p), k);
 }
 
 double f_tail(double x, double p, double q) {

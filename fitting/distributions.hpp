@@ -37,6 +37,9 @@ double chi_bar_tail(double x, int free, int bounded);
 /// P(T²_{k,n} > x) = P(F_{k,n−k+1} > x (n − k + 1)/(n k)); 1, no evidence, where n − k + 1 <= 0.
 double hotelling_bar_tail(double x, int free, int bounded, double n);
 
+/// P(at most k of n succeed) where each does with probability p in [0, 1]; 1, no evidence, where n < 1.
+double binomial_tail(int k, int n, double p);
+
 /// P(F_{p,q} > x), Fisher's F. 1, no evidence, where p or q or x is no positive number.
 double f_tail(double x, double p, double q);
 

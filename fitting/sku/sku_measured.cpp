@@ -79,18 +79,21 @@ std::optional<MeasuredVerdict> measured_verdict(const datasets::Sku& sku, const 
   }
   if (out.throws.empty() && out.never_lands == 0) return {};
   const auto n = static_cast<double>(out.throws.size());
+  const int all = static_cast<int>(out.throws.size()) + out.never_lands;
   double squares = 0;
+  int within = 0;
   for (const auto& one : out.throws) {
     out.mae_x += std::abs(one.error_x) / n;
     out.mae_theta += std::abs(one.error_theta) / n;
     out.bias_x += one.error_x / n;
     out.bias_theta += one.error_theta / n;
     squares += std::pow(one.error_x / one.sigma_x, 2) + std::pow(one.error_theta / one.sigma_theta, 2);
-    out.within += (std::abs(one.error_x) <= request.tolerance.x &&
-                   std::abs(one.error_theta) <= request.tolerance.theta) /
-                  (n + out.never_lands);
+    within += std::abs(one.error_x) <= request.tolerance.x &&
+              std::abs(one.error_theta) <= request.tolerance.theta;
   }
   out.rms_z = n > 0 ? std::sqrt(squares / (2 * n)) : HUGE_VAL;
+  out.within = static_cast<double>(within) / all;
+  out.p_value = binomial_tail(within, all, request.confidence);
   out.confirmed = out.within >= request.confidence && out.rms_z <= kMostSurprise;
   return out;
 }

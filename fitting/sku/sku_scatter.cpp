@@ -158,6 +158,7 @@ void monte_carlo(const SkuMotion& motion, const MatrixXd& J, const SkuRequest& r
     draws[i] = draw(motion, out.reference(), J, root, request, i);
   });
   const auto n = static_cast<double>(draws.size());
+  out.within_sigma = std::sqrt(request.confidence * (1 - request.confidence) / n);
   for (const Draw& d : draws) {
     out.within += d.within / n;
     out.within_linear += d.linear_within / n;

@@ -54,53 +54,65 @@ std::size_t best(const std::vector<ThrowCandidate>& candidates, const LandingTol
   return out;
 }
 
+/// How the share of landings compares with what is asked, in words.
+std::string share_in_words(const SkuRequest& request, const SkuValidation& answer) {
+  const double within = answer.repeats ? answer.repeats->within : answer.within;
+  std::string out = fmt::format(
+      "{:.1f} % of its landings lie within {:.3g} m and {:.3g} deg of the predicted one; "
+      "asked for are {:.3g} %",
+      100 * within, request.tolerance.x, request.tolerance.theta * kDegrees, 100 * request.confidence);
+  if (std::abs(within - request.confidence) < 2 * answer.within_sigma)
+    out += fmt::format(", which {} draws hardly tell from that (1 sigma {:.2g} %; --samples draws more)",
+                       request.samples, 100 * answer.within_sigma);
+  if (const auto& r = answer.repeats)
+    return out +
+           fmt::format(
+               ". Of the same motion as it was logged {:.1f} % would, but the log's motions, repeated, bring "
+               "it down {:.3g} m and {:.3g} deg apart (1 sigma of {} motions of {} {}), and in the mean "
+               "{:+.3g} m and {:+.3g} deg from the predicted one, which is of the one nearest to it",
+               100 * answer.within, r->x, r->theta * kDegrees, r->motions, r->conditions,
+               r->conditions == 1 ? "condition" : "conditions", r->offset_x, r->offset_theta * kDegrees);
+  return out +
+         ", if the robot repeats its motion exactly: a log that repeats some (--log) tells how well it does";
+}
+
+/// Sets the verdict of an object that is held and lands.
+void decide_by_landings(const datasets::Sku& sku, const datasets::ModelCard& card, const SkuRequest& request,
+                        SkuValidation& out) {
+  const bool enough = (out.repeats ? out.repeats->within : out.within) >= request.confidence;
+  out.verdict = enough ? SkuVerdict::throwable : SkuVerdict::too_uncertain;
+  out.message = share_in_words(request, out);
+  const bool lever = !contact::follows_pads(card.model) && std::abs(sku.com_offset) > kLeastLever;
+  if (lever && !(out.measured && out.measured->confirmed)) {
+    out.verdict = SkuVerdict::beyond_the_model;
+    out.message += fmt::format(
+        ", as {} sees it, which carries the object rigidly until it is free; this one hangs {:.3g} m from "
+        "the pads and turns in them as they open: a card of limit_surface_disc or sliding_pivot tells of "
+        "that",
+        card.model, std::abs(sku.com_offset));
+  }
+  if (!out.measured || out.measured->confirmed) return;
+  const MeasuredVerdict& m = *out.measured;
+  const std::string seen =
+      fmt::format("; of {} measured throws {:.1f} % lie within",
+                  m.throws.size() + static_cast<std::size_t>(m.never_lands), 100 * m.within);
+  if (m.rms_z > kMostSurprise || (enough && m.p_value < kTooFewToBeChance)) {
+    out.verdict = SkuVerdict::contradicted;
+    out.message += seen + fmt::format(", with errors {:.2g} times what was foretold", m.rms_z);
+  } else if (enough) {
+    out.message += seen + fmt::format(", which may be chance (p = {:.2g})", m.p_value);
+  }
+}
+
 void decide(const datasets::Sku& sku, const datasets::ModelCard& card, const SkuRequest& request,
             SkuValidation& out) {
   const ThrowCandidate& c = out.reference();
-  if (!c.landed) {
-    out.verdict = SkuVerdict::does_not_land;
-    out.message = "no motion that was tried brings this object to a landing";
-  } else if (!c.held) {
-    out.verdict = SkuVerdict::cannot_be_held;
-    out.message = "the grip lets the object slip before the gripper opens";
-    if (out.needed_grip_force)
-      out.message += fmt::format(": this motion needs at least {:.3g} N per pad", *out.needed_grip_force);
-  } else {
-    const double within = out.repeats ? out.repeats->within : out.within;
-    const bool enough = within >= request.confidence;
-    out.verdict = enough ? SkuVerdict::throwable : SkuVerdict::too_uncertain;
-    out.message = fmt::format(
-        "{:.1f} % of its landings lie within {:.3g} m and {:.3g} deg of the predicted one; "
-        "asked for are {:.3g} %",
-        100 * within, request.tolerance.x, request.tolerance.theta * kDegrees, 100 * request.confidence);
-    if (out.repeats)
-      out.message += fmt::format(
-          ". Of the same motion as it was logged {:.1f} % would, but the log's motions, repeated, bring it "
-          "down {:.3g} m and {:.3g} deg apart (1 sigma of {} motions of {} {}), and in the mean {:+.3g} m "
-          "and {:+.3g} deg from the predicted one, which is of the one nearest to it",
-          100 * out.within, out.repeats->x, out.repeats->theta * kDegrees, out.repeats->motions,
-          out.repeats->conditions, out.repeats->conditions == 1 ? "condition" : "conditions",
-          out.repeats->offset_x, out.repeats->offset_theta * kDegrees);
-    else
-      out.message +=
-          ", if the robot repeats its motion exactly: a log that repeats some (--log) tells how well it does";
-    const bool lever = !contact::follows_pads(card.model) && std::abs(sku.com_offset) > kLeastLever;
-    if (lever && !(out.measured && out.measured->confirmed)) {
-      out.verdict = SkuVerdict::beyond_the_model;
-      out.message += fmt::format(
-          ", as {} sees it, which carries the object rigidly until it is free; this one hangs {:.3g} m from "
-          "the pads and turns in them as they open: a card of limit_surface_disc or sliding_pivot tells of "
-          "that",
-          card.model, std::abs(sku.com_offset));
-    }
-    if (out.measured && !out.measured->confirmed && (enough || out.measured->rms_z > kMostSurprise)) {
-      out.verdict = SkuVerdict::contradicted;
-      out.message += fmt::format(
-          "; of {} measured throws {:.1f} % lie within, with errors {:.2g} times what was foretold",
-          out.measured->throws.size() + static_cast<std::size_t>(out.measured->never_lands),
-          100 * out.measured->within, out.measured->rms_z);
-    }
-  }
+  if (c.landed && c.held) return decide_by_landings(sku, card, request, out);
+  out.verdict = c.landed ? SkuVerdict::cannot_be_held : SkuVerdict::does_not_land;
+  out.message = c.landed ? "the grip lets the object slip before the gripper opens"
+                         : "no motion that was tried brings this object to a landing";
+  if (out.needed_grip_force)
+    out.message += fmt::format(": this motion needs at least {:.3g} N per pad", *out.needed_grip_force);
 }
 
 }  // namespace

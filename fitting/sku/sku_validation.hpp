@@ -42,8 +42,8 @@ enum class SkuVerdict {
   /// The card's model carries the object rigidly, and its centre of mass is a lever (kLeastLever) from pads
   /// in which it turns as they open; measured throws do not show otherwise.
   beyond_the_model,
-  /// Measured throws are not where they are foretold: too few within the tolerance where enough were
-  /// foretold, or errors beyond twice what was foretold.
+  /// Measured throws are not where they are foretold: fewer within the tolerance than chance would have
+  /// (kTooFewToBeChance) where enough were foretold, or errors beyond twice what was foretold.
   contradicted,
 };
 /// From which distance of the centre of mass from the pads on an object turns in them [m]: under gravity
@@ -98,13 +98,17 @@ struct MeasuredLanding {
 /// Errors in their own σ beyond which throws contradict what was foretold of them: twice is more than a tail.
 inline constexpr double kMostSurprise = 2;
 
+/// Below this probability of so few throws within the tolerance they contradict that enough land there.
+inline constexpr double kTooFewToBeChance = 0.05;
+
 /// Throws of this object, set against what the SKU and the card say of them.
 struct MeasuredVerdict {
   std::vector<MeasuredLanding> throws;  ///< one per throw with a landing and a prediction of it
   int never_lands{};  ///< further ones of which the card says that they never land: not within
   /// The log is the card's own: the throws are those that it was not fitted to.
   bool held_out{};
-  double within{};                ///< share that lands within the tolerance of its prediction
+  double within{};   ///< share that lands within the tolerance of its prediction
+  double p_value{};  ///< of so few or fewer within it if a share `confidence` of all throws is (binomial)
   double mae_x{}, mae_theta{};    ///< [m, rad]
   double bias_x{}, bias_theta{};  ///< mean of predicted − measured [m, rad]
   double rms_z{};                 ///< errors in their own σ; 1 where the prediction knows how sure it is
@@ -137,6 +141,7 @@ struct SkuValidation {
 
   LandingSpread linear, monte_carlo;  ///< of the landing, by derivatives and by simulation
   double within_linear{}, within{};   ///< shares within the tolerance of the nominal landing
+  double within_sigma{};              ///< 1 σ of a Monte Carlo share that is the one asked for
   double lost{};                      ///< share of draws that the grip does not hold or that never land
   bool agree{};                       ///< Monte Carlo and the derivatives, to a tenth of σ
   /// Which input bends the answer, or that it is draws that are lost; empty: they agree.

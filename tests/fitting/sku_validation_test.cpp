@@ -97,6 +97,21 @@ TEST(SkuValidation, MonteCarloAndDerivativesAgreeOnAPreciseObject) {
   EXPECT_EQ(answer.verdict, SkuVerdict::throwable) << answer.message;
 }
 
+TEST(SkuValidation, SaysWhereItsDrawsCannotTellTheShareFromWhatIsAsked) {
+  auto request = quick(1000);
+  request.tolerance.x = 1.5 * validate_sku(bar(), card(), "card.json", request).monte_carlo.x;
+  const double share = validate_sku(bar(), card(), "card.json", request).within;
+  ASSERT_GT(share, 0.6);
+  ASSERT_LT(share, 0.95);
+  const auto asked = [&](double confidence) {
+    request.confidence = confidence;
+    return validate_sku(bar(), card(), "card.json", request).message;
+  };
+  const double sigma = std::sqrt(share * (1 - share) / 1000);
+  EXPECT_THAT(asked(share + sigma), HasSubstr("hardly tell"));
+  EXPECT_THAT(asked(share + 3 * sigma), Not(HasSubstr("hardly tell")));
+}
+
 TEST(SkuValidation, SaysWhereTheyDoNotAgree) {
   auto sku = bar();
   sku.com_offset_sigma = 0.04;  // the object may hang from the pads or hardly load them
@@ -270,6 +285,21 @@ TEST(SkuValidation, MeasuredThrowsConfirmTheRightSkuAndContradictAWrongOne) {
   EXPECT_TRUE(right.measured->confirmed) << right.measured->rms_z << " " << right.measured->within;
   EXPECT_EQ(right.verdict, SkuVerdict::throwable) << right.message;
   EXPECT_EQ(right.candidates.size(), 3u);  // the design's release accelerations
+
+  // One throw of them beyond the tolerance is what a share of nine in ten leads to expect.
+  double most = 0;
+  for (const auto& one : right.measured->throws) most = std::max(most, std::abs(one.error_x));
+  auto narrow = request;
+  narrow.tolerance.x = 0.999 * most;
+  narrow.confidence = 0.8;
+  const auto chance = validate_sku(bar(), gripper, "card.json", narrow);
+  const auto n = static_cast<double>(chance.measured->throws.size());
+  EXPECT_NEAR(chance.measured->within, 1 - 1 / n, 1e-12);
+  EXPECT_NEAR(chance.measured->p_value, 1 - std::pow(0.8, n), 1e-12);
+  narrow.confidence = 1 - 0.5 / n;  // more than lie within, and still no contradiction
+  const auto close = validate_sku(bar(), gripper, "card.json", narrow);
+  EXPECT_FALSE(close.measured->confirmed);
+  EXPECT_NE(close.verdict, SkuVerdict::contradicted) << close.message;
 
   auto wrong = bar();
   wrong.com_offset = 0.07;  // thirty of its sigmas off

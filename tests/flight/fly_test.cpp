@@ -212,6 +212,28 @@ TEST(Drag, EnergyOnlyFalls) {
   }
 }
 
+/// The speed turns at the rate Ω = k_m ω about the drift (g/Ω, 0) in which lift and weight cancel:
+/// v = v_d + R(Ωt)(v_0 − v_d). The object's path is a cycloid.
+TEST(MagnusLift, IsACycloid) {
+  for (const double omega : {-30.0, 12.0}) {
+    Problem p = thrown(1.2, 3.0);
+    p.twist.omega = omega;
+    p.lift_km = 0.08;
+    const auto result = fly(p, kTight);
+    ASSERT_EQ(result.outcome, FlightOutcome::landed) << omega;
+    const auto& end = result.landing;
+    const double rate = p.lift_km * omega, t = end.flight_time, drift = g / rate;
+    const Vec2<double> u{1.5 - drift, 3.0}, turned = dynamics::rotate(rate * t, u);
+    // The integral of R(Ωs) u is [sin Ωt u + (1 − cos Ωt) J u]/Ω.
+    const double sine = std::sin(rate * t) / rate, versine = (1 - std::cos(rate * t)) / rate;
+    EXPECT_NEAR(end.pose.x, 0.2 + drift * t + sine * u.x - versine * u.z, 1e-9) << omega;
+    EXPECT_NEAR(0, 1.2 + sine * u.z + versine * u.x, 1e-9) << omega;
+    EXPECT_NEAR(end.twist.vx, drift + turned.x, 1e-9) << omega;
+    EXPECT_NEAR(end.twist.vz, turned.z, 1e-9) << omega;
+    EXPECT_NEAR(end.pose.theta, 0.4 + omega * t, 1e-9) << omega;
+  }
+}
+
 // ---------------------------------------------------------------- tracked point
 
 TEST(TrackedPoint, LandsInsteadOfTheCentreOfMass) {
