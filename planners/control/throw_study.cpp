@@ -17,6 +17,7 @@ namespace {
 
 using Joints = JointVector<double>;
 constexpr double kStep = 1e-3;                          ///< of the controller [s]
+constexpr int kSettle = 1000;                           ///< steps of the controller
 constexpr int kSubsteps = 2;                            ///< of the robot's Runge-Kutta steps in it
 constexpr double kHandLength = 0.15, kHandMass = 0.52;  ///< chosen: a soft hand of half a kilogram
 
@@ -162,6 +163,135 @@ std::optional<Eigen::Vector2d> land(const Eigen::Vector3d& p, const Eigen::Vecto
   return Eigen::Vector2d(at->pose.x, p.y() + at->flight_time * v.y());
 }
 
+/// An arm with an object in its hand and a controller that does not know it.
+class Run {
+ public:
+  Run(const ControllerChoice& choice, const Payload& payload, const StudyOptions& options, std::uint64_t seed)
+      : options_(options), in_joints_(choice.in_joints), random_(seed) {
+    const double w = payload.width, I = payload.mass * w * w / 6;
+    object_ = {payload.mass, options.grasp_offset * Eigen::Vector3d(normal(), normal(), normal()),
+               symmetric(I, I, I, 0, 0, 0)};
+    robot_.truth = with_payload(known_, object_);
+    for (int i = 0; i < 7; ++i)
+      robot_.friction_scale[i] = std::max(0.0, 1 + options.friction_error * normal());
+    constexpr double pi = std::numbers::pi;
+    const Joints rest =
+        pose_at(known_, options.start, orientation_, Joints{{0, -pi / 4, 0, -3 * pi / 4, 0, pi / 2, pi / 4}});
+    robot_.q = rest;
+    gains_ = gains_of(choice, known_, rest);
+    joint_gains_ = {felt_stiffness(choice, jacobian<double>(known_, rest)), gains_.damping};
+    joint_course_.emplace(known_, rest, gains_.posture);
+    adaptation_ = options.adaptation;
+    if (!choice.adaptive) adaptation_.gain.setZero();
+    controller_.emplace(known_, adaptation_);
+    release_time_ = options.throw_time + options.release_jitter * normal();
+  }
+
+  /// Of the controller: in a repetition, and before the release in the throw.
+  /// @{
+  int steps_of_course() const { return static_cast<int>(std::lround(course_.length() / kStep)); }
+  int steps_to_release() const { return static_cast<int>(release_time_ / kStep); }
+  /// @}
+
+  /// The object is picked up at the start and held there until the arm has settled.
+  void settle() {
+    for (int k = 0; k < kSettle; ++k) step(course_.up.at(0, orientation_));
+  }
+
+  /// The course's first steps.
+  void swing(int steps, bool record) {
+    double squares = 0;
+    int counted = 0;
+    for (int k = 0; k < steps; ++k, now_ += kStep) {
+      const double t = k * kStep;
+      const TaskReference reference = course_.at(t, orientation_);
+      const ControlStep control = step(reference);
+      if (t < options_.throw_time) squares += control.error.head<3>().squaredNorm(), ++counted;
+      if (record && k % 10 == 0) remember(reference, control);
+    }
+    out_.rms_error.push_back(std::sqrt(squares / std::max(1, counted)));
+  }
+
+  /// The object's landing, from its centre at the release: the rest of the last control step is a straight
+  /// line.
+  StudyThrow let_go() {
+    out_.estimate = controller_->estimate;
+    const Chain to_object = with_tool(known_, {Eigen::Matrix3d::Identity(), object_.com});
+    const TipMotion<double> object = tip_motion<double>(to_object, robot_.q, robot_.qd, Joints::Zero(7));
+    const double left = release_time_ - std::floor(release_time_ / kStep) * kStep;
+    const Eigen::Vector3d p = object.frame.p + left * object.velocity;
+    const TaskReference wanted = course_.at(options_.throw_time, orientation_);
+    const TaskReference due = course_.at(release_time_ - left, orientation_);  // of the last control step
+    const TipMotion<double> tip = tip_of_robot();
+    out_.release_position_error = (tip.frame.p - due.position).norm();
+    out_.release_velocity_error = (tip.velocity - due.velocity).norm();
+    const Eigen::Vector2d nowhere(0, 0), half = options_.box / 2;
+    const auto target = land(wanted.position, wanted.velocity, options_.landing_height);
+    const auto landed = land(p, object.velocity, options_.landing_height);
+    out_.lands = landed.has_value();
+    out_.miss = landed.value_or(nowhere) - target.value_or(nowhere);
+    out_.hit = out_.lands && (out_.miss.cwiseAbs().array() <= half.array()).all();
+    return std::move(out_);
+  }
+
+ private:
+  double normal() { return normal_(random_); }
+  TipMotion<double> tip_of_robot() const {
+    return tip_motion<double>(known_, robot_.q, robot_.qd, Joints::Zero(7));
+  }
+
+  /// One of the controller's steps: what it measures, asks for and learns, and where that takes the robot.
+  ControlStep step(const TaskReference& reference) {
+    Joints q = robot_.q, qd = robot_.qd;
+    for (int i = 0; i < 7; ++i)
+      q[i] += options_.angle_noise * normal(), qd[i] += options_.rate_noise * normal();
+    ControlStep control;
+    if (in_joints_) {
+      joint_reference_ = joint_course_->next(reference);
+      control = controller_->joint_law(joint_reference_, joint_gains_, q, qd);
+      control.error.head<3>() = reference.position - forward_kinematics<double>(known_, q).p;
+    } else {
+      control = controller_->task_law(reference, gains_, q, qd);
+    }
+    Joints applied = control.torque.cwiseMin(limit_).cwiseMax(-limit_);
+    out_.torque_use = std::max(out_.torque_use, control.torque.cwiseQuotient(limit_).cwiseAbs().maxCoeff());
+    controller_->adapt(control, applied, q, qd, kStep);
+    for (int i = 0; i < 7; ++i) applied[i] += options_.torque_noise * normal();
+    robot_.advance(applied);
+    return control;
+  }
+
+  void remember(const TaskReference& reference, const ControlStep& control) {
+    const LinkParameters off = parameters_of(robot_.truth.joints.back().link) -
+                               parameters_of(known_.joints.back().link) - controller_->estimate;
+    const double V = in_joints_ ? lyapunov(robot_.truth, joint_gains_, adaptation_, control, robot_.q,
+                                           joint_reference_.q - robot_.q, off)
+                                : lyapunov(robot_.truth, gains_, adaptation_, control, robot_.q, off);
+    out_.history.push_back({now_, control.error.head<3>().norm(),
+                            (reference.velocity - tip_of_robot().velocity).norm(), V,
+                            controller_->estimate[0]});
+  }
+
+  const StudyOptions& options_;
+  bool in_joints_;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+  const Chain known_ = known_arm();
+  const Eigen::Matrix3d orientation_ = Eigen::Vector3d(1, -1, -1).asDiagonal();  ///< the hand points down
+  const Joints limit_ = limits_of(known_, &JointLimits::torque);
+  const Course course_{options_};
+  Inertia object_;
+  Robot robot_{known_, Joints(7), Joints(7), Joints::Zero(7)};
+  TaskGains gains_;
+  JointGains joint_gains_;
+  std::optional<JointCourse> joint_course_;
+  JointReference joint_reference_;
+  Adaptation adaptation_;
+  std::optional<AdaptiveController> controller_;
+  double release_time_{}, now_{};
+  StudyThrow out_;
+};
+
 }  // namespace
 
 Adaptation StudyOptions::default_adaptation() {
@@ -184,102 +314,14 @@ std::vector<ControllerChoice> reported_controllers() {
 
 ControllerChoice joint_controller() { return {"adaptive, in the joints", 30, 10, true, true}; }
 
-StudyThrow run_throw(const ControllerChoice& choice, const Payload& payload, const StudyOptions& o,
+StudyThrow run_throw(const ControllerChoice& choice, const Payload& payload, const StudyOptions& options,
                      std::uint64_t seed, bool record) {
-  check(choice, payload, o);
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal;
-  const Chain known = known_arm();
-  const double w = payload.width, I = payload.mass * w * w / 6;
-  const Inertia body{payload.mass,
-                     o.grasp_offset * Eigen::Vector3d(normal(random), normal(random), normal(random)),
-                     symmetric(I, I, I, 0, 0, 0)};
-  Robot robot{with_payload(known, body), Joints(7), Joints(7), Joints::Zero(7)};
-  for (int i = 0; i < 7; ++i) robot.friction_scale[i] = std::max(0.0, 1 + o.friction_error * normal(random));
-  const LinkParameters unknown =
-      parameters_of(robot.truth.joints.back().link) - parameters_of(known.joints.back().link);
-
-  constexpr double pi = std::numbers::pi;
-  const Eigen::Matrix3d orientation = Eigen::Vector3d(1, -1, -1).asDiagonal();  // the hand points down
-  const Joints rest =
-      pose_at(known, o.start, orientation, Joints{{0, -pi / 4, 0, -3 * pi / 4, 0, pi / 2, pi / 4}});
-  robot.q = rest;
-  const TaskGains gains = gains_of(choice, known, rest);
-  const JointGains joint_gains{felt_stiffness(choice, jacobian<double>(known, rest)), gains.damping};
-  JointCourse joint_course(known, rest, gains.posture);
-  JointReference joint_reference;
-  Adaptation adaptation = o.adaptation;
-  if (!choice.adaptive) adaptation.gain.setZero();
-  AdaptiveController controller(known, adaptation);
-  const Course course(o);
-  const double release_at = o.throw_time + o.release_jitter * normal(random);
-  const int length = static_cast<int>(std::lround(course.length() / kStep)),
-            settle = static_cast<int>(std::lround(1.0 / kStep));
-
-  StudyThrow out;
-  Joints limit = limits_of(known, &JointLimits::torque);
-  const auto step = [&](const TaskReference& reference) {
-    Joints q = robot.q, qd = robot.qd;
-    for (int i = 0; i < 7; ++i)
-      q[i] += o.angle_noise * normal(random), qd[i] += o.rate_noise * normal(random);
-    ControlStep control;
-    if (choice.in_joints) {
-      joint_reference = joint_course.next(reference);
-      control = controller.joint_law(joint_reference, joint_gains, q, qd);
-      control.error.head<3>() = reference.position - forward_kinematics<double>(known, q).p;
-    } else {
-      control = controller.task_law(reference, gains, q, qd);
-    }
-    const Joints applied = control.torque.cwiseMin(limit).cwiseMax(-limit);
-    out.torque_use = std::max(out.torque_use, control.torque.cwiseQuotient(limit).cwiseAbs().maxCoeff());
-    controller.adapt(control, applied, q, qd, kStep);
-    Joints noisy = applied;
-    for (int i = 0; i < 7; ++i) noisy[i] += o.torque_noise * normal(random);
-    robot.advance(noisy);
-    return control;
-  };
-  // The object is picked up at the start and held there until the arm has settled.
-  for (int k = 0; k < settle; ++k) step(course.up.at(0, orientation));
-  double t = 0;
-  for (int repetition = 0; repetition <= o.repetitions; ++repetition) {
-    const bool last = repetition == o.repetitions;
-    const int steps = last ? static_cast<int>(release_at / kStep) : length;
-    double squares = 0;
-    int counted = 0;
-    for (int k = 0; k < steps; ++k, t += kStep) {
-      const TaskReference reference = course.at(k * kStep, orientation);
-      const ControlStep control = step(reference);
-      if (k * kStep < o.throw_time) squares += control.error.head<3>().squaredNorm(), ++counted;
-      if (record && k % 10 == 0) {
-        const TipMotion<double> tip = tip_motion<double>(known, robot.q, robot.qd, Joints::Zero(7));
-        const LinkParameters off = unknown - controller.estimate;
-        const double V = choice.in_joints ? lyapunov(robot.truth, joint_gains, adaptation, control, robot.q,
-                                                     joint_reference.q - robot.q, off)
-                                          : lyapunov(robot.truth, gains, adaptation, control, robot.q, off);
-        out.history.push_back({t, control.error.head<3>().norm(), (reference.velocity - tip.velocity).norm(),
-                               V, controller.estimate[0]});
-      }
-    }
-    out.rms_error.push_back(std::sqrt(squares / std::max(1, counted)));
-  }
-  out.estimate = controller.estimate;
-  // The object's centre at the release, the rest of the last control step on a straight line.
-  const Chain to_object = with_tool(known, {Eigen::Matrix3d::Identity(), body.com});
-  const TipMotion<double> object = tip_motion<double>(to_object, robot.q, robot.qd, Joints::Zero(7));
-  const double left = release_at - std::floor(release_at / kStep) * kStep;
-  const Eigen::Vector3d p = object.frame.p + left * object.velocity;
-  const TaskReference wanted = course.at(o.throw_time, orientation);
-  const TaskReference due = course.at(release_at - left, orientation);  // of the last control step
-  const TipMotion<double> tip = tip_motion<double>(known, robot.q, robot.qd, Joints::Zero(7));
-  out.release_position_error = (tip.frame.p - due.position).norm();
-  out.release_velocity_error = (tip.velocity - due.velocity).norm();
-  const Eigen::Vector2d nowhere(0, 0);
-  const auto target = land(wanted.position, wanted.velocity, o.landing_height);
-  const auto landed = land(p, object.velocity, o.landing_height);
-  out.lands = landed.has_value();
-  out.miss = landed.value_or(nowhere) - target.value_or(nowhere);
-  out.hit = out.lands && std::abs(out.miss.x()) <= o.box.x() / 2 && std::abs(out.miss.y()) <= o.box.y() / 2;
-  return out;
+  check(choice, payload, options);
+  Run run(choice, payload, options, seed);
+  run.settle();
+  for (int k = 0; k < options.repetitions; ++k) run.swing(run.steps_of_course(), record);
+  run.swing(run.steps_to_release(), record);
+  return run.let_go();
 }
 
 Dispersion dispersion_of(const std::vector<StudyThrow>& throws) {
