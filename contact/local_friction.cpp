@@ -54,10 +54,10 @@ struct Excess {
 
 /// h without the linear part, which is known in closed form; or all of it where that would make the friction
 /// negative somewhere (`whole`).
-class Law {
+class ExcessLaw {
  public:
   template <class S>
-  Law(const SpeedDependence<S>& s, bool whole)
+  ExcessLaw(const SpeedDependence<S>& s, bool whole)
       : sigma_(value_of(s.static_excess)),
         speed_(value_of(s.stribeck_speed)),
         viscous_(value_of(s.viscous)),
@@ -88,7 +88,7 @@ struct DiscExcess {
   std::array<double, kParameters> force_by{}, torque_by{};
 };
 
-DiscExcess sliding_whole(const Law& law, double V, double W) {
+DiscExcess sliding_whole(const ExcessLaw& law, double V, double W) {
   const Excess at = law(V);
   DiscExcess out;
   out.force = at.h, out.force_v = at.slope, out.force_by = at.by;
@@ -99,7 +99,7 @@ DiscExcess sliding_whole(const Law& law, double V, double W) {
 }
 
 /// Whole circles around the centre of rotation, out to ρ = 1 − d.
-void add_whole_circles(const Law& law, double d, double W, DiscExcess& out) {
+void add_whole_circles(const ExcessLaw& law, double d, double W, DiscExcess& out) {
   static const GaussRule<kInnerNodes> rule;
   const double rim = 1 - d, length = std::min(rim, law.reach() / W);
   double moment = 0;
@@ -117,7 +117,7 @@ void add_whole_circles(const Law& law, double d, double W, DiscExcess& out) {
 }
 
 /// Arcs, from ρ = |1 − d| on.
-void add_arcs(const Law& law, double d, double W, DiscExcess& out) {
+void add_arcs(const ExcessLaw& law, double d, double W, DiscExcess& out) {
   const double begin = std::abs(d - 1), reach = law.reach() / W;
   const double end = std::min(d + 1, std::hypot(begin, reach));
   const auto& rule = gathered();
@@ -145,7 +145,7 @@ void add_arcs(const Law& law, double d, double W, DiscExcess& out) {
   }
 }
 
-DiscExcess even_disc(const Law& law, double V, double W) {
+DiscExcess even_disc(const ExcessLaw& law, double V, double W) {
   if (V >= kFar * W) return sliding_whole(law, V, W);
   DiscExcess out;
   const double d = V / W;
@@ -199,7 +199,7 @@ Vec3<S> LocalFriction::wrench(const SpeedDependence<S>& speed, const Vec3<S>& u)
     torque = speed.viscous * dynamics::convert<S>(square_radius_) * W;
   }
   if (speed.stribeck || negative) {
-    const Law law(speed, negative);
+    const ExcessLaw law(speed, negative);
     for (std::size_t j = static_cast<std::size_t>(first_); j < kDiscs; ++j) {
       const double R = radius_[j], v = value_of(V), w = R * value_of(W);
       const DiscExcess disc = even_disc(law, v, w);

@@ -124,7 +124,7 @@ constexpr Rotation lagging(double demanded_torque) { return demanded_torque > 0 
 
 /// Time after the onset of spin [s] at which its sign is beyond rounding: at the onset ω_r and its rate are
 /// both zero.
-constexpr double kOnset = 1e-6;
+constexpr double kSpinOnset = 1e-6;
 constexpr double kTurned = 0.1;  // of the time in which a brake turns or stops its slip
 
 }  // namespace
@@ -402,7 +402,7 @@ void SlidingPivot::come_to_rest(const Phase& brake, const SceneSource& source, I
 template <class S>
 Entry<S, 6> SlidingPivot::spin_onset(int mode, const Phase& from, const SceneSource& source, const S& t,
                                      const Relative<S>& rest) const {
-  const double longest = std::min(kOnset, 0.25 * (from.window.end - value_of(t)));
+  const double longest = std::min(kSpinOnset, 0.25 * (from.window.end - value_of(t)));
   const State<S, 6> y0 = rest.state();
   if (!(longest > 0)) return {mode, t, y0, S(0)};
   const Translation translation = translation_of(mode);

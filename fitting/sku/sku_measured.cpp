@@ -88,8 +88,8 @@ std::optional<MeasuredVerdict> measured_verdict(const datasets::Sku& sku, const 
     out.bias_x += one.error_x / n;
     out.bias_theta += one.error_theta / n;
     squares += std::pow(one.error_x / one.sigma_x, 2) + std::pow(one.error_theta / one.sigma_theta, 2);
-    within += std::abs(one.error_x) <= request.tolerance.x &&
-              std::abs(one.error_theta) <= request.tolerance.theta;
+    within +=
+        std::abs(one.error_x) <= request.tolerance.x && std::abs(one.error_theta) <= request.tolerance.theta;
   }
   out.rms_z = n > 0 ? std::sqrt(squares / (2 * n)) : HUGE_VAL;
   out.within = static_cast<double>(within) / all;

@@ -129,6 +129,36 @@ LeftOverField::At LeftOverField::at(const std::array<double, 3>& fractions, cons
   return out;
 }
 
+double probability_of_hits(const FlipForecast& forecast, const ThrowScatter& scatter,
+                           const FlipTarget& target, int throws) {
+  constexpr double kReach = 5, kLongest = 0.8, kShortest = kReach / 200;  // of what is not known [σ]
+  const double scatter_x = std::sqrt(scatter.x), scatter_angle = std::sqrt(scatter.angle),
+               along = forecast.correlation * forecast.sigma_angle,
+               across = std::sqrt(std::max(0.0, 1 - forecast.correlation * forecast.correlation)) *
+                        forecast.sigma_angle;
+  // What is summed varies within a scatter of the throws.
+  const auto step = [&](double scattered, double moves) {
+    return std::clamp(scattered / std::max(1e-12, std::abs(moves)), kShortest, kLongest);
+  };
+  const double du = std::min(step(scatter_x, forecast.sigma_x), step(scatter_angle, along)),
+               dv = step(scatter_angle, across);
+  const int last_u = static_cast<int>(kReach / du), last_v = static_cast<int>(kReach / dv);
+  double out = 0;
+  for (int i = -last_u; i <= last_u; ++i) {
+    const double u = i * du, px = within(forecast.mean.x + u * forecast.sigma_x, scatter_x, target.pose.x,
+                                         target.tolerance_x);
+    if (px < 1e-9) continue;
+    double of_angles = 0;
+    for (int j = -last_v; j <= last_v; ++j) {
+      const double v = j * dv, p = within(forecast.mean.angle + along * u + across * v, scatter_angle,
+                                          target.pose.angle, target.tolerance_angle);
+      of_angles += std::exp(-0.5 * v * v) * std::pow(p, throws);
+    }
+    out += std::exp(-0.5 * u * u) * std::pow(px, throws) * of_angles;
+  }
+  return std::min(1.0, out * du * dv / (2 * std::numbers::pi));
+}
+
 ReleaseLearner::ReleaseLearner(const HandLibrary& library, const ReleaseCard& card,
                                std::vector<LeftOver> known, const ThrowScatter& scatter,
                                const FlipTarget& target, int throws)
@@ -183,22 +213,7 @@ std::optional<FlipForecast> ReleaseLearner::forecast(const std::array<double, 3>
   out.sigma_angle = std::sqrt(out.sigma_angle);
   const double product = out.sigma_x * out.sigma_angle;
   out.correlation = product > 0 ? std::clamp(cross / product, -1.0, 1.0) : 0.0;
-  // All throws share the unknown mean and scatter about it: E[p^throws] by Gauss-Hermite's five points.
-  constexpr double nodes[]{0, 1.3556261799742659, -1.3556261799742659, 2.8569700138728056,
-                           -2.8569700138728056};
-  constexpr double weights[]{0.53333333333333333, 0.22207592200561266, 0.22207592200561266,
-                             0.011257411327720689, 0.011257411327720689};
-  const double scatter_x = std::sqrt(scatter_.x), scatter_angle = std::sqrt(scatter_.angle),
-               rest = std::sqrt(std::max(0.0, 1 - out.correlation * out.correlation));
-  for (int i = 0; i < 5; ++i) {
-    const double px =
-        within(mean->x + nodes[i] * out.sigma_x, scatter_x, target_.pose.x, target_.tolerance_x);
-    for (int j = 0; j < 5; ++j) {
-      const double angle = mean->angle + out.sigma_angle * (out.correlation * nodes[i] + rest * nodes[j]);
-      const double p = px * within(angle, scatter_angle, target_.pose.angle, target_.tolerance_angle);
-      out.probability += weights[i] * weights[j] * std::pow(p, throws_);
-    }
-  }
+  out.probability = probability_of_hits(out, scatter_, target_, throws_);
   return out;
 }
 

@@ -61,6 +61,13 @@ struct FlipForecast {
   double probability{};                            ///< that all throws of it land within the tolerances
 };
 
+/// The probability that `throws` of a command all land within the target's tolerances: they share the
+/// command's mean landing, of which the forecast tells, and each scatters about it. To 1e-4, by the
+/// trapezoidal rule over what is not known of the mean; less exact where that is more than forty times the
+/// scatter.
+double probability_of_hits(const FlipForecast& forecast, const ThrowScatter& scatter,
+                           const FlipTarget& target, int throws);
+
 /// Model 4: tries the command that most probably lands within the tolerances.
 class ReleaseLearner final : public FlipLearner {
  public:

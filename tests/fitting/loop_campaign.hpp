@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdint>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "experiment/campaign_effects.hpp"
 #include "experiment/synthetic_campaign.hpp"
@@ -18,6 +20,14 @@ inline DiscoverOptions loop_options(const std::string& model = "limit_surface_di
   options.campaign.model = model;
   options.campaign.integrator.tolerances = {1e-5, 1e-8};
   return options;
+}
+
+/// What the loop finds by the disc's law, with three refits a step.
+inline Discovery found_in(const datasets::ThrowLog& log, std::vector<std::string> forget = {}) {
+  DiscoverOptions options = loop_options();
+  options.forget = std::move(forget);
+  options.refits = 3;
+  return discover(log, "synthetic", options);
 }
 
 /// 24 throws of two bars, six conditions each, two repetitions.

@@ -193,6 +193,44 @@ TEST(ReleaseLearner, LearnsWhatThePhysicsLacks) {
   EXPECT_LT(path.minimum(), 0.3);
 }
 
+TEST(FlipForecast, ItsProbabilityIsTheShareOfDraws) {
+  const FlipTarget target{{1.2, kTurn / 2}};
+  const auto within = [](double mean, double sigma, double middle, double half) {
+    const auto phi = [&](double x) { return 0.5 * std::erfc((mean - x) / (sigma * std::numbers::sqrt2)); };
+    return phi(middle + half) - phi(middle - half);
+  };
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  for (const double unknown : {0.0, 0.3, 3.0, 12.0})  // of the scatter
+    for (const double correlation : {0.0, -0.8}) {
+      const ThrowScatter scatter{0.02 * 0.02, 0.2 * 0.2, {}, 4};
+      const FlipForecast said{{1.23, kTurn / 2 - 0.3}, unknown * 0.02, unknown * 0.2, correlation, 0};
+      // One throw, with x and angle apart: two normal variables.
+      if (correlation == 0) {
+        const double wide = std::hypot(1, unknown);
+        EXPECT_NEAR(
+            probability_of_hits(said, scatter, target, 1),
+            within(1.23, 0.02 * wide, 1.2, 0.05) * within(-0.3, 0.2 * wide, 0, target.tolerance_angle), 1e-4)
+            << unknown;
+      }
+      constexpr int kDraws = 40000, kThrows = 3;
+      int all = 0;
+      for (int draw = 0; draw < kDraws; ++draw) {
+        const double u = normal(random),
+                     v = correlation * u + std::sqrt(1 - correlation * correlation) * normal(random);
+        int in = 0;
+        for (int k = 0; k < kThrows; ++k)
+          in += hits({said.mean.x + u * said.sigma_x + 0.02 * normal(random),
+                      said.mean.angle + v * said.sigma_angle + 0.2 * normal(random)},
+                     target);
+        all += in == kThrows;
+      }
+      const double share = static_cast<double>(all) / kDraws, sigma = std::sqrt(share * (1 - share) / kDraws);
+      EXPECT_NEAR(probability_of_hits(said, scatter, target, kThrows), share, 4 * sigma + 1e-4)
+          << unknown << " " << correlation;
+    }
+}
+
 // A bar with another centre of mass is another SKU: the forecast is that of the plant with it.
 TEST(ReleaseLearner, AnotherBarIsAnotherForecastNotAnotherLesson) {
   Bar bar = robot().bar;
@@ -207,8 +245,6 @@ TEST(ReleaseLearner, AnotherBarIsAnotherForecastNotAnotherLesson) {
   const FlipTrial thrown = plant({"", 0, u, bar});
   EXPECT_NEAR(forecast->mean.x, thrown.landing.x, 1e-9);
   EXPECT_NEAR(forecast->mean.angle, thrown.landing.angle, 1e-9);
-  EXPECT_GE(forecast->probability, 0);
-  EXPECT_LE(forecast->probability, 1);
 }
 
 // The stated uncertainty is worth something: over robots, forecasts of the first command miss by about as
