@@ -1,9 +1,11 @@
 #include "experiment/glitches.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "dynamics/quantisation.hpp"
 #include "dynamics/third_difference.hpp"
@@ -12,82 +14,174 @@
 namespace unhand::experiment {
 namespace {
 
-/// The third differences of one coordinate over the frames that are left, in units of their σ.
+constexpr double kNoise = 5;      // σ
+constexpr std::size_t kSide = 6;  // frames that a parabola is fitted to
+
+/// A coordinate by time, in units of its σ.
+struct Coordinate {
+  const std::vector<double>& times;   // [s]
+  const std::vector<double>& column;  // [m or rad]
+  double sigma;
+  double operator()(std::size_t frame) const { return column[frame] / sigma; }
+};
+
+/// Third differences of a coordinate over some of its frames, in units of their σ.
 class ThirdDifferences {
  public:
-  /// Over the frames that are not `out`.
-  ThirdDifferences(const std::vector<double>& times, const std::vector<double>& column, double sigma,
-                   const std::vector<bool>& out)
-      : times_(times), column_(column), sigma_(sigma) {
-    for (std::size_t i = 0; i < times.size(); ++i)
-      if (!out[i]) left_.push_back(i);
+  ThirdDifferences(const Coordinate& coordinate, std::vector<std::size_t> frames)
+      : coordinate_(coordinate), left_(std::move(frames)) {
     work_out();
   }
 
-  /// The frame that has most of a share in differences, where one is far off, or no noise over a gap that a
-  /// frame has left.
-  std::optional<std::size_t> worst() const {
-    std::vector<double> toward(left_.size(), 0.0), squares(left_.size(), 0.0);
-    bool any = false;
+  /// Stretches of frames [first, last] by their number among those that are left: about differences that are
+  /// no noise, one of them far off, with as many frames on either side as a parabola is fitted to. Between
+  /// two of them are several differences that are noise.
+  std::vector<std::array<std::size_t, 2>> stretches() const {
+    constexpr std::size_t kQuiet = 8;
+    std::vector<std::array<std::size_t, 2>> out;
     for (std::size_t k = 0; k < all_.size(); ++k) {
-      const bool over_a_gap = left_[k + 3] - left_[k] > 3;
-      any = any || std::abs(all_[k].size) > (over_a_gap ? kNoise : kFar);
-      for (std::size_t i = 0; i < 4; ++i) {
-        toward[k + i] += all_[k].weight[i] * all_[k].size;
-        squares[k + i] += all_[k].weight[i] * all_[k].weight[i];
-      }
+      if (std::abs(all_[k]) <= kNoise) continue;
+      std::size_t last = k;
+      bool far = false;
+      for (std::size_t next = k; next < all_.size() && next <= last + kQuiet; ++next)
+        if (std::abs(all_[next]) > kNoise) last = next, far = far || std::abs(all_[next]) > kFar;
+      if (far) out.push_back({k - std::min(k, kSide), std::min(last + 3 + kSide, left_.size() - 1)});
+      k = last;
     }
-    if (!any) return std::nullopt;
-    std::size_t out = 0;
-    double most = 0;
-    for (std::size_t i = 0; i < left_.size(); ++i)
-      if (const double explains = toward[i] * toward[i] / squares[i]; explains > most)
-        most = explains, out = left_[i];
     return out;
   }
-  void remove(std::size_t frame) {
-    std::erase(left_, frame);
+
+  /// A run of frames, by number among those that are left.
+  struct Run {
+    std::size_t first{}, length{};
+  };
+  /// The run of up to `longest` frames without which the squares of differences fall most, by frame; of no
+  /// length where none takes off more than noise might.
+  Run worst(std::size_t longest) const {
+    Run out;
+    double most = kNoise * kNoise;
+    for (std::size_t i = 0; i < left_.size(); ++i)
+      for (std::size_t n = 1; n <= longest && i + n <= left_.size(); ++n)
+        if (const double gain = gain_without(i, n) / static_cast<double>(n); gain > most)
+          most = gain, out = {i, n};
+    return out;
+  }
+  /// Takes a run out and returns its frames.
+  std::vector<std::size_t> take_out(const Run& run) {
+    const auto first = left_.begin() + static_cast<std::ptrdiff_t>(run.first),
+               last = first + static_cast<std::ptrdiff_t>(run.length);
+    const std::vector<std::size_t> out(first, last);
+    left_.erase(first, last);
     work_out();
+    return out;
   }
   /// Whether every difference that spans a frame's time is noise.
   bool is_smooth_about(std::size_t frame) const {
+    const std::vector<double>& times = coordinate_.times;
     for (std::size_t k = 0; k < all_.size(); ++k) {
       // At an end, the nearest ones.
-      const bool spans = (k == 0 || times_[left_[k]] <= times_[frame]) &&
-                         (k + 1 == all_.size() || times_[left_[k + 3]] >= times_[frame]);
-      if (spans && std::abs(all_[k].size) > kNoise) return false;
+      const bool spans = (k == 0 || times[left_[k]] <= times[frame]) &&
+                         (k + 1 == all_.size() || times[left_[k + 3]] >= times[frame]);
+      if (spans && std::abs(all_[k]) > kNoise) return false;
     }
     return true;
   }
   std::size_t frames() const { return left_.size(); }
 
  private:
-  static constexpr double kFar = 8, kNoise = 5;  // σ
-  struct Difference {
-    std::array<double, 4> weight{};  // of its frames, for σ = 1
-    double size{};                   // [σ]
-  };
-
+  static constexpr double kFar = 8;  // σ
+  double difference(const std::array<std::size_t, 4>& frames) const {
+    const std::array<double, 4> weights =
+        dynamics::third_difference_weights({coordinate_.times[frames[0]], coordinate_.times[frames[1]],
+                                            coordinate_.times[frames[2]], coordinate_.times[frames[3]]});
+    double sum = 0, squares = 0;
+    for (std::size_t i = 0; i < 4; ++i)
+      sum += weights[i] * coordinate_(frames[i]), squares += weights[i] * weights[i];
+    return sum / std::sqrt(squares);
+  }
   void work_out() {
     all_.clear();
-    for (std::size_t k = 0; k + 3 < left_.size(); ++k) {
-      const auto at = [&](std::size_t i) { return times_[left_[k + i]]; };
-      Difference one{dynamics::third_difference_weights({at(0), at(1), at(2), at(3)}), 0};
-      double squares = 0;
-      for (const double w : one.weight) squares += w * w;
-      for (std::size_t i = 0; i < 4; ++i) {
-        one.weight[i] /= std::sqrt(squares);
-        one.size += one.weight[i] * column_[left_[k + i]] / sigma_;
-      }
-      all_.push_back(one);
-    }
+    for (std::size_t k = 0; k + 3 < left_.size(); ++k)
+      all_.push_back(difference({left_[k], left_[k + 1], left_[k + 2], left_[k + 3]}));
+  }
+  /// By how much the sum of the squares falls without n frames from i on.
+  double gain_without(std::size_t i, std::size_t n) const {
+    double out = 0;
+    for (std::size_t k = i - std::min<std::size_t>(i, 3); k < std::min(i + n, all_.size()); ++k)
+      out += all_[k] * all_[k];
+    std::array<std::size_t, 6> rest{};
+    std::size_t count = 0;
+    for (std::size_t k = i - std::min<std::size_t>(i, 3); k < i; ++k) rest[count++] = left_[k];
+    for (std::size_t k = i + n; k < std::min(i + n + 3, left_.size()); ++k) rest[count++] = left_[k];
+    for (std::size_t k = 0; k + 3 < count; ++k)
+      out -= std::pow(difference({rest[k], rest[k + 1], rest[k + 2], rest[k + 3]}), 2);
+    return out;
   }
 
-  const std::vector<double>&times_, &column_;
-  double sigma_;
+  Coordinate coordinate_;
   std::vector<std::size_t> left_;
-  std::vector<Difference> all_;
+  std::vector<double> all_;
 };
+
+/// Whether a frame lies off the parabola through the frames on one side of it, by more than their noise and
+/// its own. Too few for a parabola tell nothing: true.
+bool is_off(const Coordinate& x, std::size_t frame, const std::vector<std::size_t>& side) {
+  const auto n = static_cast<Eigen::Index>(side.size());
+  if (n < 3) return true;
+  const double span = std::abs(x.times[frame] - x.times[side.back()]);
+  const auto row = [&](std::size_t at) {
+    const double t = (x.times[at] - x.times[frame]) / span;
+    return Eigen::RowVector3d(1, t, t * t);
+  };
+  Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kSide, 3> A(n, 3);
+  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kSide, 1> y(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const std::size_t at = side[static_cast<std::size_t>(i)];
+    A.row(i) = row(at);
+    y[i] = x(at) - x(frame);
+  }
+  const Eigen::LDLT<Eigen::Matrix3d> normal(A.transpose() * A);
+  const Eigen::Vector3d parabola = normal.solve(A.transpose() * y), own = Eigen::Vector3d::UnitX();
+  const double left = n > 3 ? (y - A * parabola).squaredNorm() / static_cast<double>(n - 3) : 0;
+  const double variance = std::max(1.0, left) * (1 + own.dot(normal.solve(own)));
+  return std::abs(parabola[0]) > kNoise * std::sqrt(variance);
+}
+
+/// Frames of a coordinate that were elsewhere, of those in a stretch of `frames`; `taken` are frames that are
+/// under suspicion.
+void find_in_stretch(const Coordinate& x, const std::vector<std::size_t>& frames,
+                     const std::array<std::size_t, 2>& stretch, std::vector<bool>& taken,
+                     std::vector<bool>& out) {
+  constexpr std::size_t kFewest = 5, kLongestRun = 5, kMost = 100;
+  const auto at = [&](std::size_t i) { return frames.begin() + static_cast<std::ptrdiff_t>(i); };
+  ThirdDifferences differences(x, {at(stretch[0]), at(stretch[1] + 1)});
+  const std::size_t most = std::min(1 + differences.frames() / 3, kMost);
+  std::vector<std::size_t> removed;
+  while (removed.size() < most && differences.frames() > kFewest) {
+    const auto run = differences.worst(kLongestRun);
+    if (run.length == 0) break;
+    for (const std::size_t frame : differences.take_out(run)) removed.push_back(frame), taken[frame] = true;
+  }
+  for (const std::size_t frame : removed) {
+    const auto here =
+        static_cast<std::size_t>(std::lower_bound(frames.begin(), frames.end(), frame) - frames.begin());
+    std::array<std::vector<std::size_t>, 2> side;  // nearest first
+    std::size_t run = 1;
+    for (std::size_t i = here; i-- > 0 && side[0].size() < kSide;)
+      if (!taken[frames[i]])
+        side[0].push_back(frames[i]);
+      else if (side[0].empty())
+        ++run;
+    for (std::size_t i = here + 1; i < frames.size() && side[1].size() < kSide; ++i)
+      if (!taken[frames[i]])
+        side[1].push_back(frames[i]);
+      else if (side[1].empty())
+        ++run;
+    if (run > kLongestRun || (side[0].size() < 3 && side[1].size() < 3)) continue;
+    if (differences.is_smooth_about(frame) && is_off(x, frame, side[0]) && is_off(x, frame, side[1]))
+      out[frame] = true;
+  }
+}
 
 /// 1 σ by frame, of what differs from frame to frame; 0 of too few.
 double scatter_of(const std::vector<double>& column) {
@@ -158,23 +252,22 @@ std::vector<bool> held_frames(std::span<const std::vector<double>> columns, std:
 
 std::vector<bool> glitches(const std::vector<double>& times, std::span<const std::vector<double>> columns,
                            std::span<const double> sigma) {
-  constexpr std::size_t kFewest = 5, kShare = 10;  // frames that stay; at most a tenth goes
+  constexpr std::size_t kShare = 10;  // at most a tenth goes
   const std::vector<bool> held = held_frames(columns, sigma);
+  std::vector<std::size_t> frames;
+  for (std::size_t i = 0; i < times.size(); ++i)
+    if (!held[i]) frames.push_back(i);
   std::vector<bool> out = held;
   for (std::size_t c = 0; c < columns.size(); ++c) {
     if (!(sigma[c] > 0)) continue;
-    ThirdDifferences differences(times, columns[c], sigma[c], held);
-    std::vector<std::size_t> removed;
-    while (removed.size() < 1 + times.size() / kShare && differences.frames() > kFewest) {
-      const auto frame = differences.worst();
-      if (!frame) break;
-      differences.remove(*frame);
-      removed.push_back(*frame);
-    }
-    for (const std::size_t frame : removed)
-      if (differences.is_smooth_about(frame)) out[frame] = true;
+    const Coordinate x{times, columns[c], sigma[c]};
+    std::vector<bool> taken(times.size(), false);
+    for (const auto& stretch : ThirdDifferences(x, frames).stretches())
+      find_in_stretch(x, frames, stretch, taken, out);
   }
-  return out;
+  const auto elsewhere = static_cast<std::size_t>(std::count(out.begin(), out.end(), true) -
+                                                  std::count(held.begin(), held.end(), true));
+  return elsewhere > 1 + times.size() / kShare ? held : out;
 }
 
 std::size_t mark_glitches(datasets::ThrowLog& log) {

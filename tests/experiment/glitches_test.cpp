@@ -1,6 +1,7 @@
 // Frames in which a tracker was elsewhere for once, and motions that are none.
 #include "experiment/glitches.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -11,6 +12,14 @@
 
 namespace unhand::experiment {
 namespace {
+
+/// The frames that are off, by number.
+std::vector<std::size_t> numbers(const std::vector<bool>& off) {
+  std::vector<std::size_t> out;
+  for (std::size_t i = 0; i < off.size(); ++i)
+    if (off[i]) out.push_back(i);
+  return out;
+}
 
 TEST(Glitches, AFrameElsewhereIsOneAndWhatForcesDoIsNot) {
   constexpr double kNoise = 1e-4, kRate = 240;
@@ -79,6 +88,43 @@ TEST(Glitches, NeedNoGoodNeighbours) {
   const auto off = glitches(times, columns, sigma);
   for (std::size_t i = 0; i < times.size(); ++i)
     EXPECT_EQ(off[i], expected[i]) << i << " of " << times.size();
+}
+
+/// A box that lies, is thrown up at 2 m/s, bounces twice and lies again, at 240 Hz.
+double bouncing(double t, double lies) {
+  constexpr double g = 9.81;
+  t -= lies;
+  if (t < 0) return 0;
+  for (double v = 2; v > 0.5; v *= 0.5) {
+    const double flight = 2 * v / g;
+    if (t < flight) return v * t - 0.5 * g * t * t;
+    t -= flight;
+  }
+  return 0;
+}
+
+// Nor is a throw that ends in a long rest, whatever the noise: each frame follows those before or after it.
+TEST(Glitches, AreNoImpacts) {
+  constexpr double kRate = 240;
+  for (const double noise : {3e-5, 2e-4})
+    for (const double lies : {0.1, 5.0})
+      for (unsigned seed = 0; seed < 20; ++seed) {
+        std::mt19937_64 random(seed);
+        std::normal_distribution<double> normal;
+        std::vector<double> times;
+        std::vector<std::vector<double>> columns(1);
+        for (int i = 0; i < kRate * (lies + 2); ++i) {
+          times.push_back((i + 0.01 * seed) / kRate);
+          columns[0].push_back(bouncing(times.back(), lies) + noise * normal(random));
+        }
+        const std::array sigma{noise};
+        EXPECT_THAT(numbers(glitches(times, columns, sigma)), testing::IsEmpty())
+            << noise << " " << lies << " " << seed;
+        const auto off = static_cast<std::size_t>(kRate * (lies + 0.1));  // in flight
+        const std::vector<std::size_t> wild{off, off + 1, off + 30, off + 40, off + 41, off + 42};
+        for (const std::size_t i : wild) columns[0][i] += 100 * noise;
+        EXPECT_EQ(numbers(glitches(times, columns, sigma)), wild) << noise << " " << lies << " " << seed;
+      }
 }
 
 TEST(Glitches, OfACampaignAreFoundAndNoOthers) {
