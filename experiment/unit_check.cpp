@@ -14,6 +14,7 @@
 #include "dynamics/median.hpp"
 #include "experiment/axis_check.hpp"
 #include "experiment/declared_check.hpp"
+#include "experiment/glitches.hpp"
 #include "experiment/time_check.hpp"
 #include "experiment/turn_check.hpp"
 #include "experiment/unit_evidence.hpp"
@@ -218,7 +219,9 @@ std::vector<UnitDoubt> doubtful_friction(const RatiosByColumn& ratios) {
 
 }  // namespace
 
-std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log) {
+std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& logged) {
+  datasets::ThrowLog log = logged;  // a frame in which the tracker was elsewhere is in no unit
+  mark_glitches(log);
   // What one check finds makes the later ones compare with what is wrong: the first that finds something is
   // the last.
   for (const auto check : {doubtful_gravity, impossible_declarations, gravity_taken_out, dead_tracks,

@@ -40,7 +40,8 @@ inline constexpr double kLeastOutlier = 5;
 /// - the wrench of all pads with what the held body's mass, inertia and lever need (Newton and Euler);
 /// - the landing with the hand's state at the opening (as a free flight from there: to a factor of three)
 ///   and with the attitude that motion capture saw last;
-/// - the clocks of the groups with each other; a declared grasp_angle with a whole turn;
+/// - the clocks of the groups with each other, where one has another pace than 10 Hz to 50 kHz; a declared
+///   grasp_angle with a whole turn;
 /// - the wrench with the normal force while that falls through its last fifth and the pads slip: no
 ///   channel knows the unit of the normal force, of which only the product with friction is determined, but
 ///   in another one friction lies outside [kLeastFriction, kMostFriction], by the same factor (1.5) in the
@@ -63,8 +64,8 @@ inline constexpr double kLeastOutlier = 5;
 /// landing_x: 3 to 4) of a unit's factor, the smallest of which is 4.4: no scale or bias that a sensor may
 /// have comes near. Where no median does, single throws are looked at the same way, and by the size of their
 /// columns in the other throws of their condition: those are told by their own path
-/// ("/throws/017/mocap/pose") with what is accepted.
-std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& log);
+/// ("/throws/017/mocap/pose") with what is accepted. Glitches of a tracker (glitches.hpp) have no say.
+std::vector<UnitDoubt> unit_doubts(const datasets::ThrowLog& logged);
 
 /// Throws datasets::LogError, naming the columns, if unit_doubts has any.
 void require_units(const datasets::ThrowLog& log, const std::string& file);

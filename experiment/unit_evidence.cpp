@@ -281,6 +281,14 @@ void check_friction(const datasets::ThrowLog& log, const datasets::FtLog& ft, do
   if (n >= 2) keep(out, SizedColumn::slip_growth, friction((n + 1) / 2, n) / friction(0, n / 2));
 }
 
+/// Whether a sensor may sample a throw at these times [s]: 10 Hz to 50 kHz.
+bool is_a_pace(const Series& time) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < time.rows; ++i) steps.push_back(time(i) - time(i - 1));
+  const double step = dynamics::median(steps);
+  return step >= 2e-5 && step <= 0.1;
+}
+
 }  // namespace
 
 SizeRatios compare_sizes(const datasets::ThrowLog& log, const datasets::Throw& logged) {
@@ -296,7 +304,11 @@ SizeRatios compare_sizes(const datasets::ThrowLog& log, const datasets::Throw& l
   for (const auto& [rule, time] :
        {std::pair{SizedColumn::ft_clock, logged.ft ? &logged.ft->time : nullptr},
         std::pair{SizedColumn::mocap_clock, logged.mocap ? &logged.mocap->time : nullptr}})
-    if (time && time->rows > 1) keep(out, rule, ((*time)(time->rows - 1) - (*time)(0)) / (end - begin));
+    // A recording may be as long as it likes, if a sensor may have its pace.
+    if (time && time->rows > 1)
+      keep(out, rule,
+           is_a_pace(*time) && is_a_pace(hand.time) ? 1
+                                                    : ((*time)(time->rows - 1) - (*time)(0)) / (end - begin));
   const auto opening = opening_of(log, logged);
   if (!opening || *opening <= begin || *opening > end) return out;
   const Held held{log, logged, hand, begin, *opening};

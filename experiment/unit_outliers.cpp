@@ -8,6 +8,7 @@
 #include <numbers>
 #include <optional>
 #include <set>
+#include <string_view>
 
 #include "dynamics/median.hpp"
 #include "experiment/unit_rules.hpp"
@@ -81,9 +82,24 @@ std::optional<double> size_of(const PlainColumn& column, const Throw& one) {
   return *tenth;
 }
 
-/// What other throws say that should be `apart` times as large at most.
+/// Whether another channel of the throw says that the column has its size.
+bool is_confirmed(const ColumnSide& column, const SizeRatios& sizes) {
+  return std::any_of(sizes.begin(), sizes.end(), [&](const auto& size) {
+    const auto found = unit_rules().find(size.first);
+    if (found == unit_rules().end() || !(size.second > 0)) return false;
+    const UnitRule& rule = found->second;
+    const auto is = [&](const ColumnSide& side) {
+      return std::string_view(side.path) == column.path && std::string_view(side.column) == column.column;
+    };
+    return (is(rule.seen) || is(rule.expected)) && std::abs(std::log(size.second)) < std::log(rule.within);
+  });
+}
+
+/// What other throws say that should be `apart` times as large at most, where no other channel of the throw
+/// tells its size; `sizes` of a throw of the log.
+template <class Sizes>
 void check_repetitions(const std::vector<const Throw*>& alike, const PlainColumn& column, double apart,
-                       Doubts& out) {
+                       const Sizes& sizes_of, Doubts& out) {
   struct Sized {
     const Throw* one;
     double size;
@@ -105,7 +121,7 @@ void check_repetitions(const std::vector<const Throw*>& alike, const PlainColumn
     if (!(std::max(size, median) > column.shows) || !(median > 0) || (size >= low && size <= high)) continue;
     constexpr double kWithin = 2;  // repetitions differ
     const auto* unit = explaining_unit(column.side.units, size / median, kWithin);
-    if (unit == nullptr || out.of(*one)) continue;
+    if (unit == nullptr || out.of(*one) || is_confirmed(column.side, sizes_of(*one))) continue;
     out.add(*one, column.side, size / median,
             fmt::format("in this throw {} reaches {:.3g}, and {:.3g} to {:.3g} in {} others like "
                         "it, accepted are {:.3g} to {:.3g}: {}?",
@@ -113,11 +129,17 @@ void check_repetitions(const std::vector<const Throw*>& alike, const PlainColumn
   }
 }
 
-/// A declared angle needs no other channel: it lies within a whole turn.
+/// A declared angle needs no other channel: it lies within a whole turn, or whole turns from the others.
 void check_grasp_angles(const datasets::ThrowLog& log, Doubts& out) {
-  constexpr double kTurn = 2 * std::numbers::pi;
+  constexpr double kTurn = 2 * std::numbers::pi, kAlike = 0.5;  // rad
+  std::vector<double> usual;
   for (const auto& one : log.throws)
-    if (one.grasp_angle && std::abs(*one.grasp_angle) > kTurn)
+    if (one.grasp_angle && std::abs(*one.grasp_angle) <= kTurn) usual.push_back(*one.grasp_angle);
+  const auto is_alike = [&](double angle) {
+    return !usual.empty() && std::abs(std::remainder(angle - dynamics::median(usual), kTurn)) < kAlike;
+  };
+  for (const auto& one : log.throws)
+    if (one.grasp_angle && std::abs(*one.grasp_angle) > kTurn && !is_alike(*one.grasp_angle))
       out.add(one, {"@grasp_angle", "grasp_angle", {}}, *one.grasp_angle,
               fmt::format("grasp_angle is {:.3g} rad in this throw, accepted are -{:.3g} to {:.3g}: degrees "
                           "for rad?",
@@ -141,10 +163,13 @@ std::vector<UnitDoubt> outlying_throws(const datasets::ThrowLog& log, std::span<
   for (const auto& one : log.throws) conditions[one.condition + "\n" + one.object].push_back(&one);
   std::vector<const Throw*> any;
   for (const auto& one : log.throws) any.push_back(&one);
+  const auto sizes_of = [&](const Throw& one) -> const SizeRatios& {
+    return throws[static_cast<std::size_t>(&one - log.throws.data())];
+  };
   for (const auto& column : plain_columns()) {
     for (const auto& [condition, alike] : conditions)
-      if (alike.size() >= kEnoughThrows) check_repetitions(alike, column, kLeastOutlier, out);
-    if (column.grip) check_repetitions(any, column, kLeastOfLog, out);
+      if (alike.size() >= kEnoughThrows) check_repetitions(alike, column, kLeastOutlier, sizes_of, out);
+    if (column.grip) check_repetitions(any, column, kLeastOfLog, sizes_of, out);
   }
   check_grasp_angles(log, out);
   return out.take();

@@ -310,6 +310,61 @@ TEST(UnitCheck, AWildThrowIsNotInAnotherUnit) {
   for (const auto& doubt : unit_doubts(log)) ADD_FAILURE() << doubt.path << ": " << doubt.reason;
 }
 
+TEST(UnitCheck, AFrameElsewhereIsInNoUnitAndNoTurnOff) {
+  for (const double by : {4.0, 2 * std::numbers::pi}) {  // rad
+    auto log = campaign();
+    log.throws[2].mocap->pose(20, 2) += by;
+    EXPECT_THAT(unit_doubts(log), IsEmpty()) << by;
+  }
+}
+
+TEST(UnitCheck, ARecordingMayBeginLongBeforeTheThrow) {
+  auto log = campaign();
+  for (auto& one : log.throws) {
+    auto& mocap = *one.mocap;
+    constexpr std::size_t kBefore = 30000;  // frames
+    const double step = mocap.time(1) - mocap.time(0);
+    Series time{kBefore + mocap.time.rows, 1, {}, mocap.time.sigma},
+        pose{kBefore + mocap.time.rows, 3, {}, mocap.pose.sigma};
+    for (std::size_t k = kBefore; k > 0; --k) {
+      time.data.push_back(mocap.time(0) - static_cast<double>(k) * step);
+      for (std::size_t c = 0; c < 3; ++c) pose.data.push_back(mocap.pose(0, c));
+    }
+    time.data.insert(time.data.end(), mocap.time.data.begin(), mocap.time.data.end());
+    pose.data.insert(pose.data.end(), mocap.pose.data.begin(), mocap.pose.data.end());
+    if (!mocap.valid.empty()) mocap.valid.insert(mocap.valid.begin(), kBefore, 1);
+    mocap.time = time, mocap.pose = pose;
+    const double hand = one.hand->time(one.hand->time.rows - 1) - one.hand->time(0);
+    ASSERT_GT((time(time.rows - 1) - time(0)) / hand, 1000 / 4.0) << "as ms for s would make it";
+  }
+  EXPECT_THAT(unit_doubts(log), IsEmpty());
+}
+
+// One that tumbles while its repetitions hardly turn, as motion capture sees it do.
+TEST(UnitCheck, AThrowThatTurnsAsNoOtherDoesIsNotInDegrees) {
+  auto log = campaign();
+  for (auto& one : log.throws) {
+    one.condition = "alike";
+    const bool tumbles = one.id == log.throws[3].id;
+    const double landed = one.landing->time(0), opened = *log.gripper->opening_command_time,
+                 rate = ((tumbles ? 2.0 : 0.03) - one.landing->pose(0, 1)) / (landed - opened);
+    for (std::size_t i = 0; i < one.mocap->time.rows; ++i)
+      one.mocap->pose(i, 2) += rate * std::max(0.0, one.mocap->time(i) - opened);
+    one.landing->pose(0, 1) += rate * (landed - opened);
+  }
+  EXPECT_THAT(unit_doubts(log), IsEmpty());
+}
+
+TEST(UnitCheck, AGraspAngleMayBeWholeTurnsFromTheOthers) {
+  auto log = campaign();
+  for (auto& one : log.throws) one.mocap.reset(), one.grasp_angle = -0.2;
+  for (const std::size_t k : {2u, 5u}) {
+    const double turns = 2 * std::numbers::pi * (k == 2 ? -1 : 2);
+    *log.throws[k].grasp_angle += turns, log.throws[k].landing->pose(0, 1) += turns;
+  }
+  for (const auto& doubt : unit_doubts(log)) EXPECT_THAT(doubt.path, Not(HasSubstr("grasp_angle")));
+}
+
 /// Tosses that nothing holds: 0.4 s, 4 m/s up.
 ThrowLog tosses(int dimension) {
   ThrowLog log;
