@@ -6,10 +6,7 @@
 namespace unhand::datasets {
 
 void SampleNoise::add(const std::array<double, 4>& times, const std::array<double, 4>& values) {
-  const auto weight = dynamics::third_difference_weights(times);
-  double sum = 0, weights = 0;
-  for (std::size_t i = 0; i < 4; ++i) sum += weight[i] * values[i], weights += weight[i] * weight[i];
-  squares_.push_back(sum * sum / weights);
+  squares_.push_back(dynamics::third_difference_variance(times, values));
 }
 
 double SampleNoise::sigma() const { return dynamics::trimmed_rms(squares_); }

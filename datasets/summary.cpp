@@ -4,9 +4,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "datasets/sample_noise.hpp"
 #include "datasets/throw_log_table.hpp"
 #include "dynamics/median.hpp"
+#include "dynamics/third_difference.hpp"
 
 namespace unhand::datasets {
 namespace {
@@ -83,32 +83,53 @@ void add(NoiseSummary& noise, const Series& series) {
   }
 }
 
-/// The scatter of one column, over steps and over doubled steps.
+/// The scatter of one column: what four samples in a row show of it beside what every other one of the seven
+/// about them shows, where a motion counts 64 times as much.
 class Scatter {
  public:
   void add(const Series& time, const Series& values, std::size_t column, const std::vector<std::size_t>& rows,
            double unit) {
-    for (const std::size_t stride : {1, 2})
-      for (std::size_t k = 0; k + 3 * stride < rows.size(); ++k) {
-        std::array<double, 4> t{}, x{};
-        for (std::size_t i = 0; i < 4; ++i) {
-          const std::size_t row = rows[k + i * stride];
-          t[i] = time(row), x[i] = values(row, column) / unit;
-        }
-        (stride == 1 ? single_ : doubled_).add(t, x);
+    const auto square = [&](std::size_t first, std::size_t stride) {
+      std::array<double, 4> t{}, x{};
+      for (std::size_t i = 0; i < 4; ++i) {
+        const std::size_t row = rows[first + i * stride];
+        t[i] = time(row), x[i] = values(row, column) / unit;
       }
+      return dynamics::third_difference_variance(t, x);
+    };
+    for (std::size_t k = 0; k + 3 < rows.size(); ++k) {
+      once_.push_back(square(k, 1));
+      twice_.push_back(k >= 1 && k + 5 < rows.size() ? square(k - 1, 2) : -1);
+    }
   }
-  double sigma() const {
-    const double once = std::pow(single_.sigma(), 2), twice = std::pow(doubled_.sigma(), 2);
-    return std::sqrt(std::max(0.0, doubled_.size() > 0 ? (64 * once - twice) / 63 : once));
+  struct Seen {
+    double once{}, twice{};  ///< variances [unit²]
+    double n{};              ///< pairs that they are of
+    double sigma() const { return std::sqrt(std::max(0.0, (64 * once - twice) / 63)); }
+    /// Whether the noise is most of it also over doubled steps.
+    bool is_noise() const { return twice <= 4 * once; }
+    /// Of sigma, relative, for white noise.
+    double standard_error() const { return 1.07 / std::sqrt(n); }
+  };
+  /// Pairs that a glitch or a jump makes large, one of them or both, are left out. Of less than seven
+  /// samples, where there are no pairs, all is noise.
+  Seen seen() const {
+    Seen out;
+    std::vector<double> of_pairs;
+    for (const double twice : twice_)
+      if (twice >= 0) of_pairs.push_back(twice);
+    const double most_once = 25 * dynamics::median(once_), most_twice = 25 * dynamics::median(of_pairs);
+    for (std::size_t k = 0; k < once_.size(); ++k) {
+      const double twice = of_pairs.empty() ? once_[k] : twice_[k];
+      if (twice < 0 || once_[k] > most_once || (!of_pairs.empty() && twice > most_twice)) continue;
+      out.once += once_[k], out.twice += twice, out.n += 1;
+    }
+    if (out.n > 0) out.once /= out.n, out.twice /= out.n;
+    return out;
   }
-  /// Whether the noise is most of it also over doubled steps, where a motion shows 64 times as much.
-  bool seen() const { return std::pow(doubled_.sigma(), 2) <= 4 * std::pow(single_.sigma(), 2); }
-  /// Of sigma, relative, for white noise.
-  double standard_error() const { return 1.07 / std::sqrt(static_cast<double>(single_.size())); }
 
  private:
-  SampleNoise single_, doubled_;
+  std::vector<double> once_, twice_;  // of the same samples; below zero where there are not seven
 };
 
 const Series& time_of(Throw& toss, std::string_view group) {
@@ -149,11 +170,11 @@ void add_scatter(NoiseSummary& noise, const Channel<Throw>& channel, std::vector
   }
   constexpr double kSure = 3;
   for (std::size_t j = 0; j < all.size(); ++j) {
-    const double ratio = whitened[j].sigma();
-    noise.scatter.push_back(all[j].sigma());
-    noise.ratio.push_back(ratio);
-    noise.too_small.push_back(whitened[j].seen() && ratio > NoiseSummary::kMore &&
-                              ratio > 1 + kSure * whitened[j].standard_error());
+    const Scatter::Seen seen = whitened[j].seen();
+    noise.scatter.push_back(all[j].seen().sigma());
+    noise.ratio.push_back(seen.sigma());
+    noise.too_small.push_back(seen.is_noise() && seen.sigma() > NoiseSummary::kMore &&
+                              seen.sigma() > 1 + kSure * seen.standard_error());
   }
 }
 

@@ -23,4 +23,13 @@ inline double third_difference_variance(double x0, double x1, double x2, double 
   return difference * difference / 20;
 }
 
+/// The same of four samples at different times.
+inline double third_difference_variance(const std::array<double, 4>& times,
+                                        const std::array<double, 4>& values) {
+  const auto weight = third_difference_weights(times);
+  double sum = 0, weights = 0;
+  for (std::size_t i = 0; i < 4; ++i) sum += weight[i] * values[i], weights += weight[i] * weight[i];
+  return sum * sum / weights;
+}
+
 }  // namespace unhand::dynamics

@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "datasets/summary.hpp"
 #include "tests/support/perfect_campaign.hpp"
 
 namespace {
@@ -16,6 +17,18 @@ using namespace unhand;
 using namespace unhand::experiment;
 using namespace unhand::testing_support;
 using dynamics::Effect;
+
+// What the samples of a moving hand scatter by is their noise, of any campaign.
+TEST(RandomCampaign, ItsSamplesScatterAsDeclared) {
+  for (std::uint64_t seed = 1; seed <= 24; ++seed) {
+    const CampaignDesign design = random_campaign(seed);
+    const auto summary = datasets::summarise(generate_campaign(design, seed));
+    for (const auto& noise : summary.noise)
+      for (std::size_t j = 0; j < noise.too_small.size(); ++j)
+        EXPECT_FALSE(noise.too_small[j])
+            << seed << " " << noise.dataset << " " << j << ": " << noise.ratio[j];
+  }
+}
 
 TEST(CampaignEffects, AreReadByName) {
   using testing::HasSubstr, testing::ThrowsMessage;
