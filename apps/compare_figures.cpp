@@ -218,10 +218,10 @@ std::optional<Figure> condition_figure(const Comparison& comparison) {
     figure.data.push_back(std::move(block));
   }
   if (figure.data.empty()) return {};
-  std::optional<double> floor_x, floor_theta;
-  if (comparison.repetitions.conditions > 0) {
-    floor_x = 100 * comparison.repetitions.landing_x;
-    floor_theta = comparison.repetitions.landing_theta;
+  std::optional<double> floor_x = comparison.repetitions.landing_x,
+                        floor_theta = comparison.repetitions.landing_theta;
+  if (floor_x) *floor_x *= 100;  // cm
+  if (floor_x || floor_theta) {
     key.push_back({fmt::format("with lines {}", floor_style), "scatter of repetitions"});
   }
   const Scale scale = common_scale({panel_values(figure, 2, floor_x), panel_values(figure, 3, floor_theta)});

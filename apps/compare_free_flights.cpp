@@ -208,6 +208,11 @@ void compare_flights(const CompareRequest& request, const datasets::ThrowLog& lo
   for (const auto& [reason, n] : skip_reasons(found))
     tell("unhand: {}: {} of {} throws: {}\n", experiment::kProjectile, n, found.each.size(), reason);
   if (found.train.n + found.test.n == 0) throw Unanswered("no throw could be fitted");
+  std::size_t removed = 0;
+  for (const auto& one : found.each) removed += one.whole.removed;
+  if (removed > 0)
+    tell("unhand: left out {}, in which the tracker was elsewhere for once, or held the pose before\n",
+         plural(removed, "frame"));
 
   const std::string heading = fmt::format(
       "{}: {}\n{} free flights; rms: start fitted to every sample; end errors: start fitted to the first "

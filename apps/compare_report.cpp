@@ -83,14 +83,14 @@ ReleaseTables release_tables(const experiment::Comparison& comparison, const dat
     }
   }
   const auto& floor = comparison.repetitions;
-  out.floor =
-      floor.conditions > 0
-          ? fmt::format(
-                "scatter of repetitions: landing x {:.4f} m, landing theta {:.2f} deg (pooled 1 sigma, "
-                "{}): the floor of a model that knows of a throw only its condition\n",
-                floor.landing_x, floor.landing_theta,
-                plural(static_cast<std::size_t>(floor.conditions), "condition"))
-          : "scatter of repetitions: no condition was repeated with its landing measured\n";
+  out.floor = floor.conditions > 0
+                  ? fmt::format(
+                        "scatter of repetitions: landing x {} m, landing theta {} deg (pooled 1 sigma, "
+                        "{}): the floor of a model that knows of a throw only its condition\n",
+                        fixed(floor.landing_x.has_value(), floor.landing_x.value_or(0), 4),
+                        fixed(floor.landing_theta.has_value(), floor.landing_theta.value_or(0), 2),
+                        plural(static_cast<std::size_t>(floor.conditions), "condition"))
+                  : "scatter of repetitions: no condition was repeated with its landing measured\n";
   out.parameters = {{"model", "parameters", "how", "samples", "scatter"}, {}, 3};
   std::vector<std::string> known;
   for (const auto& model : comparison.models) {
@@ -120,12 +120,9 @@ Json release_json(const experiment::Comparison& comparison, const CompareRequest
                      {"naive_smoothing_m_s", request.naive.smoothing}};
   out["conditions"] = comparison.conditions.size();
   const auto& floor = comparison.repetitions;
-  out["repetition_scatter"] = {
-      {"conditions", floor.conditions}, {"landing_x_m", nullptr}, {"landing_theta_deg", nullptr}};
-  if (floor.conditions > 0) {
-    out["repetition_scatter"]["landing_x_m"] = floor.landing_x;
-    out["repetition_scatter"]["landing_theta_deg"] = floor.landing_theta;
-  }
+  out["repetition_scatter"] = {{"conditions", floor.conditions},
+                               {"landing_x_m", number(floor.landing_x)},
+                               {"landing_theta_deg", number(floor.landing_theta)}};
   out["inputs"] = {{"worst_hand_chi2_per_dof", comparison.worst_hand_chi2},
                    {"mean_normal_force_chi2_per_dof", number(comparison.mean_force_chi2)}};
   Json& models = out["models"] = Json::object();

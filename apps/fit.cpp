@@ -74,13 +74,6 @@ void write_report(const FitAnswer& answer, const FitRequest& request, const Json
   write_text(directory / "fit.json", json_text(json));
 }
 
-int conditions_of_train(const datasets::ThrowLog& log) {
-  std::vector<std::string> seen;
-  for (const auto& one : log.throws)
-    if (one.split == datasets::Split::train && !among(seen, one.condition)) seen.push_back(one.condition);
-  return static_cast<int>(seen.size());
-}
-
 /// Says where wrenches of the firm grasp hardly count: no friction law acts there, so that what the model
 /// does not explain is the object (its mass, its inertia), the sensor, or pads that give.
 void tell_of_firm_grasp(const fitting::FitResult& fit) {
@@ -114,7 +107,7 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
   int folds = request.kfold > 0 ? request.kfold : has_test ? 0 : kDefaultFolds;
   Progress progress("fit", 3 + (folds > 0 ? 1 : 0) + (request.floor > 0 ? 1 : 0));
   const fitting::CampaignProblem problem(log, request.log, campaign);
-  const int conditions = conditions_of_train(log);
+  const int conditions = static_cast<int>(datasets::conditions_of(log, datasets::Split::train).size());
   if (folds > 0 && conditions < 2) {
     if (request.kfold > 0)
       throw Unanswered(fmt::format("{}: --kfold needs two conditions among the train throws", request.log));

@@ -137,10 +137,12 @@ void add_declared(Json& json, const datasets::ThrowLog& log) {
                      {"sku", json_of(object.sku)},
                      {"drag_k_1_m", json_of(object.drag_k)}};
   json["gripper"] = nullptr;
-  if (log.gripper)
-    json["gripper"] = {{"n_pads", log.gripper->n_pads},
-                       {"pad_radius_m", json_of(log.gripper->pad_radius)},
-                       {"opening_command_time_s", json_of(log.gripper->opening_command_time)}};
+  if (!log.gripper) return;
+  std::optional<double> opening = log.gripper->opening_command_time;
+  if (opening) *opening += log.clock_origin;
+  json["gripper"] = {{"n_pads", log.gripper->n_pads},
+                     {"pad_radius_m", json_of(log.gripper->pad_radius)},
+                     {"opening_command_time_s", json_of(opening)}};
 }
 
 /// What the JSON of both kinds of logs begins with.
@@ -174,7 +176,8 @@ Inspection inspect_throws(const std::string& file) {
     out.text += fmt::format("  gripper: {}", plural(static_cast<std::size_t>(log.gripper->n_pads), "pad"));
     if (log.gripper->pad_radius) out.text += fmt::format(", radius {} m", *log.gripper->pad_radius);
     if (log.gripper->opening_command_time)
-      out.text += fmt::format(", told to open at {} s", *log.gripper->opening_command_time);
+      out.text +=
+          fmt::format(", told to open at {} s", log.clock_origin + *log.gripper->opening_command_time);
     out.text += "\n";
   }
   const std::size_t landed = static_cast<std::size_t>(

@@ -59,9 +59,10 @@ const std::vector<std::string> kHistoryColumns{
     "qd1 [rad/s]", "qd2 [rad/s]",     "qd3 [rad/s]",      "tau1 [N m]",
     "tau2 [N m]",  "tau_m [N m]",     "spring energy [J]"};
 
-Json use_json(const el::LimitUse& use) {
+Json use_json(const el::UsedShares& use) {
   return {{"angle", use.angle},
           {"speed", use.speed},
+          {"acceleration", use.acceleration},
           {"torque", use.torque},
           {"brake", use.brake},
           {"motor_speed", use.motor_speed},

@@ -348,6 +348,12 @@ void plan_throw(const PlanThrowOptions& options) {
   auto how = plan_options(options, pads, options.planar || card.has_value(), answer.box.middle.z());
   how.search.medium.drag_k = drag_of(answer, options, given);
   how.search.window = answer.window = std::max(options.window, card ? planners::window_for(*card) : 0.0);
+  constexpr double kLongestWindow = 1;  // [s]
+  if (answer.window > kLongestWindow && options.window <= kLongestWindow)
+    throw Unanswered(fmt::format(
+        "{}: the gripper takes up to {:.3g} s to let go (dead time, opening time and what they vary by); a "
+        "throw is planned for at most {} s",
+        options.card, answer.window, kLongestWindow));
   const auto release_of = [&](const planners::ThrowPlan& plan) {
     planners::ReleaseThrow release{pads, plan.nominal.state, plan.qdd, answer.box.middle};
     release.hold = answer.window + 1e-6;

@@ -122,10 +122,15 @@ std::optional<LandingLog> landing_of(const MocapLog& mocap, int dimension, doubl
   const double above = mocap.pose(i, up) - height, below = mocap.pose(*k, up) - height;
   const double s = above / (above - below);
   const auto at = [&](std::size_t j) { return (1 - s) * mocap.pose(i, j) + s * mocap.pose(*k, j); };
+  // Of the two frames, and of the time of the passage that their heights tell.
   const auto noise = [&](std::initializer_list<std::size_t> columns) {
     std::vector<double> sigma;
-    for (const std::size_t j : columns)
-      if (mocap.pose.sigma.size() == mocap.pose.cols) sigma.push_back(mocap.pose.sigma[j]);
+    if (mocap.pose.sigma.size() != mocap.pose.cols) return sigma;
+    for (const std::size_t j : columns) {
+      const double per_height = j == up ? 0 : (mocap.pose(*k, j) - mocap.pose(i, j)) / (above - below);
+      sigma.push_back(std::hypot(1 - s, s) *
+                      std::hypot(mocap.pose.sigma[j], per_height * mocap.pose.sigma[up]));
+    }
     return sigma;
   };
   LandingLog out;

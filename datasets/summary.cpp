@@ -217,6 +217,8 @@ LogSummary summarise(const ThrowLog& log) {
     ++out.conditions[toss.condition];
     out.free_flights += !toss.hand && held_by(log, toss).empty();
     out.each.push_back(summarise_throw(toss));
+    for (ChannelSummary& channel : out.each.back().channels)
+      for (double* const time : {&channel.start, &channel.end, &channel.gap_at}) *time += log.clock_origin;
     for (const ChannelSummary& channel : out.each.back().channels) add(out.groups, channel, toss.id);
   }
   for (const Channel<Throw>& channel : throw_channels) {

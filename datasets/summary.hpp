@@ -14,7 +14,7 @@ namespace unhand::datasets {
 struct ChannelSummary {
   std::string group;                   ///< its name in the log
   std::size_t rows = 0, lost = 0;      // lost: samples flagged invalid
-  double start = 0, end = 0;           // [s]
+  double start = 0, end = 0;           // [s], as all times of this by the file's clock
   double rate = 0;                     // [Hz] 1 / median step
   double median_step = 0;              // [s]
   double longest_gap = 0, gap_at = 0;  // [s] the largest step, and the time it starts at

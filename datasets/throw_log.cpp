@@ -165,6 +165,17 @@ hdf5::KnownNames known_names() {
 
 }  // namespace
 
+std::vector<std::pair<std::string, std::string>> conditions_of(const ThrowLog& log,
+                                                               std::optional<Split> split) {
+  std::vector<std::pair<std::string, std::string>> out;
+  for (const Throw& one : log.throws) {
+    const std::pair condition{one.object, one.condition};
+    if ((!split || one.split == *split) && std::find(out.begin(), out.end(), condition) == out.end())
+      out.push_back(condition);
+  }
+  return out;
+}
+
 void move_clock(Throw& toss, double origin) {
   change_times(toss, [&](double& t) { t -= origin; });
 }

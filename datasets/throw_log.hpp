@@ -115,6 +115,11 @@ struct ThrowLog {
   bool operator==(const ThrowLog&) const = default;
 };
 
+/// What repetitions share, in order of appearance: object and condition, since two objects may be thrown in
+/// conditions of one name. Of the throws of a split, or of all.
+std::vector<std::pair<std::string, std::string>> conditions_of(const ThrowLog& log,
+                                                               std::optional<Split> split = {});
+
 /// Reads and checks a throw log. The file is opened read-only; names that the schema does not know stay in
 /// the file and are ignored (so they are not in the value, and write_throw_log does not repeat them), unless
 /// they look like a missing name misspelt. Quaternions off unit length by up to 1e-3 are normalised. Times

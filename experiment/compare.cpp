@@ -62,16 +62,23 @@ ErrorStatistics collect(const std::vector<ThrowComparison>& throws, int quantity
 }
 
 RepetitionScatter scatter_of(const std::vector<PreparedThrow>& throws) {
-  std::map<std::string, std::vector<std::array<double, 2>>> repetitions;
-  for (const auto& t : throws)
-    if (t.measured.landing_x && t.measured.landing_theta)
-      repetitions[t.experiment()].push_back({*t.measured.landing_x, *t.measured.landing_theta * kDegrees});
-  dynamics::PooledScatter<2> pooled;
-  for (const auto& [experiment, landings] : repetitions) pooled.add(landings);
-  RepetitionScatter out;
-  out.conditions = pooled.groups();
-  if (pooled.freedom() > 0) out.landing_x = pooled.sigma(0), out.landing_theta = pooled.sigma(1);
-  return out;
+  const auto pooled = [&](auto measured) {
+    std::map<std::string, std::vector<double>> repetitions;
+    for (const auto& t : throws)
+      if (const std::optional<double> value = measured(t.measured))
+        repetitions[t.experiment()].push_back(*value);
+    dynamics::PooledScatter out;
+    for (const auto& [experiment, values] : repetitions) out.add(values);
+    return out;
+  };
+  const auto sigma = [](const dynamics::PooledScatter& of) {
+    return of.freedom() > 0 ? std::optional(of.sigma()) : std::nullopt;
+  };
+  const auto x = pooled([](const MeasuredOutcome&m) { return m.landing_x; }),
+             theta = pooled([](const MeasuredOutcome&m) {
+               return m.landing_theta ? std::optional(*m.landing_theta * kDegrees) : std::nullopt;
+             });
+  return {std::max(x.groups(), theta.groups()), sigma(x), sigma(theta)};
 }
 
 template <class Throw>

@@ -86,9 +86,9 @@ std::vector<ThrownCondition> conditions_of(const std::vector<ThrowComparison>& t
 /// How far repetitions of a condition scatter about their mean: the floor of any model that does not know
 /// what differs between them.
 struct RepetitionScatter {
-  int conditions{};        ///< with at least two repetitions
-  double landing_x{};      ///< pooled standard deviation [m]
-  double landing_theta{};  ///< [deg]
+  int conditions{};  ///< with at least two repetitions
+  std::optional<double> landing_x;      ///< pooled standard deviation [m]; absent where none was measured
+  std::optional<double> landing_theta;  ///< [deg]
 };
 
 /// Models against the measured outcomes of a campaign.

@@ -124,8 +124,10 @@ std::size_t remove_glitches(FlightSamples& s) {
     if (held[i]) good[i] = false;
   const auto removed = static_cast<std::size_t>(std::count(good.begin(), good.end(), false));
   if (removed == 0) return 0;
+  const double first = s.times.front();
   keep(s.times, good);
   keep(s.elapsed, good);
+  for (double& t : s.elapsed) t -= s.times.front() - first;
   keep(s.position, good);
   keep(s.attitude, good);
   keep(s.theta, good);

@@ -11,7 +11,7 @@ namespace unhand::experiment {
 /// The valid samples within `free_flight`, or all valid ones (which a throw that datasets::held_by shows as
 /// held does not all fly). A planar flight lies in the plane y = 0.
 struct FlightSamples {
-  std::vector<double> times, elapsed;                // [s]: as logged, and from the first
+  std::vector<double> times, elapsed;                // [s]: as logged, and from the first of these
   std::vector<flight::Vec3<double>> position;        // [m]
   std::vector<flight::Quaternion<double>> attitude;  // spatial, where it was tracked
   std::vector<double> theta;                         // planar [rad]

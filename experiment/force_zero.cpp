@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <vector>
@@ -52,8 +53,12 @@ std::optional<UntaredForce> untared_force(const datasets::ThrowLog& log) {
   if (levels.empty()) return {};
   UntaredForce out{dynamics::median(levels), dynamics::median(sigmas), dynamics::median(grips),
                    static_cast<int>(levels.size())};
-  const double median_error =
-      1.2533 * out.sigma / std::sqrt(static_cast<double>(out.throws));  // of normal ones
+  // Zeros may scatter from throw to throw by more than a throw's samples show.
+  std::vector<double> away;
+  for (const double level : levels) away.push_back(std::abs(level - out.level));
+  const double scatter = std::max(out.sigma, 1.4826 * dynamics::median(away)),
+               median_error =
+                   1.2533 * scatter / std::sqrt(static_cast<double>(out.throws));  // of normal ones
   if (std::abs(out.level) <= kStandardErrors * median_error || std::abs(out.level) <= kOfGrip * out.grip)
     return {};
   return out;

@@ -20,9 +20,9 @@ struct UntaredForce {
 };
 
 /// The zero of the normal force of planar throws that land or are declared to fly (else pads may still
-/// press). Told is a level beyond five standard errors of the median and half a per cent of the grip:
-/// friction that is fitted to slips follows the level with some ten times that share, since pads slip while
-/// the force is small.
+/// press). Told is a level beyond five standard errors of the median (of a throw's own noise, or of how
+/// levels scatter from throw to throw) and half a per cent of the grip: friction that is fitted to slips
+/// follows the level with some ten times that share, since pads slip while the force is small.
 std::optional<UntaredForce> untared_force(const datasets::ThrowLog& log);
 
 }  // namespace unhand::experiment

@@ -233,7 +233,8 @@ FreeFlightFit fit_free_flight(const ThrowLog& log, const Throw& one, double frac
   if (const std::string held = datasets::held_by(log, one); !held.empty())
     return stop(FreeFlightOutcome::not_free,
                 held + " and no free_flight: it is held at first, and not known when it flies");
-  const FlightSamples s = read_flight_samples(log, one);
+  FlightSamples s = read_flight_samples(log, one);
+  fit.removed = remove_glitches(s);
   fit.times = s.times;
   if (fit.times.size() < kFewestFlightSamples)
     return stop(FreeFlightOutcome::too_short, fmt::format("{} valid samples in free flight, fewer than {}",

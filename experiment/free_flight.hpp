@@ -27,11 +27,12 @@ inline constexpr std::size_t kFewestFlightSamples = 4;
 /// The start of a flight, fitted to its first samples, and what it says of all of them. Planar flights lie in
 /// the plane y = 0 and turn about −y: their θ runs from +x to +z.
 struct FreeFlightFit {
-  FreeFlightOutcome outcome{};                              ///< only `fitted` has an answer
-  std::string reason;                                       ///< why it was not fitted, in words
-  std::vector<double> times;                                ///< of the valid samples of the flight [s]
-  std::size_t fitted{};                                     ///< the first so many were fitted
-  bool oriented{};                                          ///< the orientation was tracked
+  FreeFlightOutcome outcome{};  ///< only `fitted` has an answer
+  std::string reason;           ///< why it was not fitted, in words
+  std::vector<double> times;    ///< of the valid samples of the flight, without those removed [s]
+  std::size_t removed{};        ///< frames in which the tracker was elsewhere (remove_glitches)
+  std::size_t fitted{};         ///< the first so many were fitted
+  bool oriented{};              ///< the orientation was tracked
   flight::Vec3<double> position{}, velocity{};              ///< at times.front() [m, m/s]
   flight::RotationState<double> rotation;                   ///< at times.front(), if oriented
   double theta{};                                           ///< planar: the same angle, unwrapped [rad]
@@ -45,9 +46,9 @@ inline constexpr const char* kProjectile = "projectile";
 /// Fits the start on the first `fraction` of the samples by least squares weighted with the declared sigma,
 /// with the model kProjectile: declared gravity straight down, the object's declared drag_k if it has one,
 /// torque-free rotation with its declared inertia (without one, a spherical body's), and the tracked frame
-/// taken for the centre of mass. Used are the valid samples within `free_flight`, or all valid ones. A
-/// quaternion's sigma stands for an angle of twice that much. Throws std::invalid_argument when `fraction` is
-/// not in (0, 1].
+/// taken for the centre of mass. Used are the valid samples within `free_flight`, or all valid ones, without
+/// glitches (remove_glitches). A quaternion's sigma stands for an angle of twice that much. Throws
+/// std::invalid_argument when `fraction` is not in (0, 1].
 FreeFlightFit fit_free_flight(const datasets::ThrowLog& log, const datasets::Throw& one, double fraction);
 
 /// One throw through the model. `whole` is what is left when the start is fitted on every sample: it shows

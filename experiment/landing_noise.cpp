@@ -17,6 +17,7 @@ namespace unhand::experiment {
 namespace {
 
 using Pair = std::array<double, 2>;  // x [m], θ [rad]
+constexpr std::size_t kX = 0, kTheta = 1;
 
 /// The parabola through samples, by lines through them and through their times squared.
 struct Parabola {
@@ -72,63 +73,87 @@ std::optional<Pair> tracked_landing(const datasets::ThrowLog& log, const dataset
   return Pair{Parabola(t, x).at(s), dynamics::fit_line(t, theta).at(s)};
 }
 
-/// Numbers by what they repeat.
-using Groups = std::map<std::string, std::vector<Pair>>;
+/// Whether a fit takes part of the throws.
+bool has_train(const datasets::ThrowLog& log) {
+  return std::any_of(log.throws.begin(), log.throws.end(),
+                     [](const auto& one) { return one.split == datasets::Split::train; });
+}
 
-using Pooled = dynamics::PooledScatter<2>;
+/// A number of the landings, and what motion capture says of it, by what they repeat.
+struct Landings {
+  std::map<std::string, std::vector<double>> landed, differences;
+  std::vector<double> together;
+};
 
-/// About the mean of each group.
-Pooled pool(const Groups& groups) {
-  Pooled out;
-  for (const auto& [name, members] : groups) out.add(members);
+Landings landings_of(const datasets::ThrowLog& log, std::size_t column) {
+  Landings out;
+  const bool fitted = has_train(log);
+  for (const auto& one : log.throws) {
+    if (log.dimension != 2 || !one.landing || one.landing->pose.empty() ||
+        (fitted && one.split != datasets::Split::train))
+      continue;
+    if (column == kTheta && !tells_angle(*one.landing)) continue;
+    const std::string repeats = one.object + ", " + one.condition;
+    const double landed = one.landing->pose(0, column);
+    out.landed[repeats].push_back(landed);
+    if (const auto tracked = tracked_landing(log, one)) {
+      out.differences[repeats].push_back(landed - (*tracked)[column]);
+      out.together.push_back(landed - (*tracked)[column]);
+    }
+  }
   return out;
+}
+
+struct Noise {
+  std::optional<double> sigma;
+  std::string how;
+};
+
+Noise noise_of(const Landings& landings) {
+  constexpr int kLeast = 3;
+  using Pooled = dynamics::PooledScatter;
+  const auto within = [](const std::map<std::string, std::vector<double>>& groups) {
+    Pooled out;
+    for (const auto& [name, members] : groups) out.add(members);
+    return out;
+  };
+  const auto say = [](const Pooled& of, const char* what) {
+    return Noise{of.sigma(), fmt::format("{}, {} degrees of freedom", what, of.freedom())};
+  };
+  if (const Pooled of = within(landings.differences); of.freedom() >= kLeast)
+    return say(of, "scatter of landing minus motion capture within repetitions of a condition");
+  if (const Pooled of = within({{"", landings.together}}); of.freedom() >= kLeast)
+    return say(of, "scatter of landing minus motion capture over all throws");
+  if (const Pooled of = within(landings.landed); of.freedom() >= kLeast)
+    return say(of, "scatter of landings within repetitions of a condition, as large as throws differ");
+  return {};
 }
 
 }  // namespace
 
 LandingNoise landing_noise(const datasets::ThrowLog& log) {
-  constexpr int kLeast = 3;
-  Groups landings, differences, together;
-  int seen = 0;
-  const auto is_train = [](const datasets::Throw& one) { return one.split == datasets::Split::train; };
-  const bool fitted = std::any_of(log.throws.begin(), log.throws.end(), is_train);
-  for (const auto& one : log.throws) {
-    if (log.dimension != 2 || !one.landing || one.landing->pose.empty() || (fitted && !is_train(one)))
-      continue;
-    const std::string repeats = one.object + ", " + one.condition;
-    const Pair landed{one.landing->pose(0, 0), one.landing->pose(0, 1)};
-    landings[repeats].push_back(landed);
-    ++seen;
-    if (const auto tracked = tracked_landing(log, one)) {
-      const Pair difference{landed[0] - (*tracked)[0], landed[1] - (*tracked)[1]};
-      differences[repeats].push_back(difference);
-      together[""].push_back(difference);
-    }
+  const Landings x = landings_of(log, kX);
+  const Noise of_x = noise_of(x), of_theta = noise_of(landings_of(log, kTheta));
+  if (of_x.sigma) {
+    const bool alike = !of_theta.sigma || of_theta.how == of_x.how;
+    return {of_x.sigma, of_theta.sigma,
+            alike ? of_x.how : fmt::format("{}; of the angle, {}", of_x.how, of_theta.how)};
   }
-  const auto say = [](const Pooled& of, const char* what) {
-    return LandingNoise{of.sigma(0), of.sigma(1),
-                        fmt::format("{}, {} degrees of freedom", what, of.freedom())};
-  };
-  if (const Pooled of = pool(differences); of.freedom() >= kLeast)
-    return say(of, "scatter of landing minus motion capture within repetitions of a condition");
-  if (const Pooled of = pool(together); of.freedom() >= kLeast)
-    return say(of, "scatter of landing minus motion capture over all throws");
-  if (const Pooled of = pool(landings); of.freedom() >= kLeast)
-    return say(of, "scatter of landings within repetitions of a condition, as large as throws differ");
-  return {
-      {},
-      {},
-      fmt::format("{} landings{}, and neither repetitions nor motion capture at the landing height to judge "
-                  "their noise by",
-                  seen, fitted ? " of train throws" : "")};
+  std::size_t seen = 0;
+  for (const auto& [repeats, landed] : x.landed) seen += landed.size();
+  return {{},
+          {},
+          fmt::format("{} landings{}, and neither repetitions nor motion capture at the landing height to "
+                      "judge their noise by",
+                      seen, has_train(log) ? " of train throws" : "")};
 }
 
 std::string in_words(const LandingNoise& noise, int landings) {
-  if (!noise.x || !noise.theta)
+  if (!noise.x)
     return fmt::format("landing/pose declares no sigma in {} throws: its landings are not used ({})",
                        landings, noise.how);
-  return fmt::format("landing/pose declares no sigma in {} throws: taken are {:.3g} m and {:.3g} rad ({})",
-                     landings, *noise.x, *noise.theta, noise.how);
+  return fmt::format("landing/pose declares no sigma in {} throws: taken are {:.3g} m and {} ({})", landings,
+                     *noise.x, noise.theta ? fmt::format("{:.3g} rad", *noise.theta) : "no angle", noise.how);
 }
 
 bool tells_angle(const datasets::LandingLog& landing) {

@@ -15,7 +15,8 @@ struct LandingNoise {
   std::string how;                 ///< in words, for reports: from what, or what is missing
 };
 
-/// Of planar logs, from the first of these with three degrees of freedom:
+/// Of planar logs, x and angle each from the first of these with three degrees of freedom, the angle of
+/// landings that tell it:
 ///
 /// - the difference between a landing and where motion capture passes the landing height (a parabola through
 ///   its last 0.1 s), pooled within the repetitions of a condition: what throws differ by, and what clocks

@@ -26,7 +26,8 @@ double turns(double angle) {
 }
 
 /// In words, where the angles of a series first jump.
-std::optional<std::string> jump_of(const datasets::Series& time, const datasets::Series& pose,
+std::optional<std::string> jump_of(double clock_origin, const datasets::Series& time,
+                                   const datasets::Series& pose,
                                    const std::function<bool(std::size_t)>& valid) {
   constexpr double kApart = 0.1;  // [s]: farther apart, the rate before says little
   std::optional<std::size_t> last;
@@ -37,8 +38,9 @@ std::optional<std::string> jump_of(const datasets::Series& time, const datasets:
       const double dt = time(i) - time(*last), step = pose(i, 2) - pose(*last, 2);
       if (const double n = dt < kApart ? turns(step - rate * dt) : 0; n != 0)
         return fmt::format(
-            "theta goes from {:.4g} to {:.4g} rad within {:.3g} s (to t = {:.6g} s), a jump of {} turn{}",
-            pose(*last, 2), pose(i, 2), dt, time(i), std::abs(n), std::abs(n) == 1 ? "" : "s");
+            "theta goes from {:.4g} to {:.4g} rad within {:.3g} s (to t = {:.15g} s), a jump of {} turn{}",
+            pose(*last, 2), pose(i, 2), dt, std::round((clock_origin + time(i)) * 1e5) / 1e5, std::abs(n),
+            std::abs(n) == 1 ? "" : "s");
       rate = step / dt;
     }
     last = i;
@@ -82,11 +84,13 @@ std::vector<UnitDoubt> first_found(const datasets::ThrowLog& log, const char* wh
 }  // namespace
 
 std::vector<UnitDoubt> jumping_angles(const datasets::ThrowLog& log) {
-  auto out = first_found(log, "hand/pose", [](const datasets::Throw& one) {
-    return one.hand ? jump_of(one.hand->time, one.hand->pose, [](std::size_t) { return true; }) : Found{};
+  auto out = first_found(log, "hand/pose", [&](const datasets::Throw& one) {
+    return one.hand
+               ? jump_of(log.clock_origin, one.hand->time, one.hand->pose, [](std::size_t) { return true; })
+               : Found{};
   });
-  for (auto& doubt : first_found(log, "mocap/pose", [](const datasets::Throw& one) {
-         return one.mocap ? jump_of(one.mocap->time, one.mocap->pose,
+  for (auto& doubt : first_found(log, "mocap/pose", [&](const datasets::Throw& one) {
+         return one.mocap ? jump_of(log.clock_origin, one.mocap->time, one.mocap->pose,
                                     [&](std::size_t i) { return one.mocap->is_valid(i); })
                           : Found{};
        }))

@@ -170,13 +170,7 @@ CrossValidation cross_validate(const datasets::ThrowLog& log, const std::string&
                                const CampaignOptions& campaign, const FitOptions& options, int folds) {
   datasets::ThrowLog train = log;
   std::erase_if(train.throws, [](const datasets::Throw& one) { return one.split != datasets::Split::train; });
-  const auto condition_of = [](const datasets::Throw& one) {  // two objects may share its name
-    return std::pair{one.object, one.condition};
-  };
-  std::vector<std::pair<std::string, std::string>> conditions;
-  for (const auto& one : train.throws)
-    if (std::find(conditions.begin(), conditions.end(), condition_of(one)) == conditions.end())
-      conditions.push_back(condition_of(one));
+  const auto conditions = datasets::conditions_of(train);
   if (folds < 2 || conditions.size() < 2)
     throw std::invalid_argument(fmt::format(
         "{}: {} folds of {} conditions among the train throws: cross-validation needs two of each", file,
@@ -187,8 +181,9 @@ CrossValidation cross_validate(const datasets::ThrowLog& log, const std::string&
     datasets::ThrowLog part = train;
     std::vector<std::size_t> left_out;
     for (std::size_t i = 0; i < part.throws.size(); ++i) {
-      const auto c =
-          std::find(conditions.begin(), conditions.end(), condition_of(part.throws[i])) - conditions.begin();
+      const auto c = std::find(conditions.begin(), conditions.end(),
+                               std::pair(part.throws[i].object, part.throws[i].condition)) -
+                     conditions.begin();
       if (c % out.folds != fold) continue;
       part.throws[i].split = datasets::Split::test;
       left_out.push_back(i);

@@ -48,7 +48,7 @@ struct LogCondition {
 };
 
 /// In the order in which the log first has them.
-std::vector<LogCondition> conditions_of(const datasets::ThrowLog& log) {
+std::vector<LogCondition> log_conditions(const datasets::ThrowLog& log) {
   std::vector<LogCondition> out;
   std::map<std::pair<std::string, std::string>, std::vector<Features>> seen;
   for (const auto& one : log.throws) {
@@ -127,7 +127,7 @@ bool has_both_splits(const datasets::ThrowLog& log) {
 
 datasets::ThrowLog with_held_out(datasets::ThrowLog log) {
   if (has_both_splits(log)) return log;
-  auto conditions = conditions_of(log);
+  auto conditions = log_conditions(log);
   std::map<std::string, int> of_object;
   int most = 0;
   for (auto& c : conditions) {

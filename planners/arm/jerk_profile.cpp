@@ -66,9 +66,10 @@ constexpr int kHalvings = 60;  ///< of an interval: to rounding
 void require_ramp(double v, double a, const JointLimits& limits) {
   if (!std::isfinite(v) || !std::isfinite(a))
     throw std::invalid_argument(fmt::format("velocity ramp: to {} rad/s with {} rad/s² is not finite", v, a));
-  if (!(limits.acceleration > 0) || !(limits.jerk > 0))
+  if (!(limits.acceleration > 0 && std::isfinite(limits.acceleration)) ||
+      !(limits.jerk > 0 && std::isfinite(limits.jerk)))
     throw std::invalid_argument(
-        fmt::format("velocity ramp: limits of {} rad/s² and {} rad/s³ are not in (0, inf]",
+        fmt::format("velocity ramp: limits of {} rad/s² and {} rad/s³ are not in (0, inf)",
                     limits.acceleration, limits.jerk));
 }
 

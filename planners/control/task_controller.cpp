@@ -88,6 +88,32 @@ ControlStep AdaptiveController::task_law(const TaskReference& r, const TaskGains
   return out;
 }
 
+AdaptiveController::Prediction AdaptiveController::predict(const Joints& applied, const Joints& q,
+                                                           const Joints& qd, double dt) {
+  const int last = model_.size() - 1;
+  const double l = adaptation_.filter;
+  const Regressor<double> momentum = momentum_regressor<double>(model_, q, qd, last);
+  // The known links: the same columns times their parameters, without forming them.
+  const Joints own = mass_matrix<double>(model_, q) * qd;
+  const Joints rest =  // h = g − Cᵀ q̇
+      gravity_torque<double>(model_, q) - coriolis_matrix<double>(model_, q, qd).transpose() * qd;
+  // Of Y_f, λ Y_p − Y_h; of τ_f − Y_f π of the model, λ p − h, and the torque beside it.
+  const Filtered input{l * momentum - momentum_rest_regressor(model_, q, qd, kGravity, last),
+                       l * own - rest - friction_torque<double>(model_, qd)};
+  if (!held_) {
+    filtered_ = {input.regressor, input.torque + applied};
+  } else {
+    // The torque was held since the last step; what goes with the motion is taken at both of its ends: with
+    // one of them alone λ dt/2 of the arm's whole momentum rate would be learned as load.
+    const double keep = std::exp(-l * held_->dt), mean = 0.5 * (1 - keep);
+    filtered_.regressor = keep * filtered_.regressor + mean * (held_->input.regressor + input.regressor);
+    filtered_.torque =
+        keep * filtered_.torque + mean * (held_->input.torque + input.torque) + (1 - keep) * held_->applied;
+  }
+  held_ = {input, applied, dt};
+  return {l * momentum - filtered_.regressor, filtered_.torque - l * own};
+}
+
 void AdaptiveController::adapt(const ControlStep& step, const Joints& applied, const Joints& q,
                                const Joints& qd, double dt) {
   require_sizes(model_, "adaptation", step.velocity_error, applied, q, qd);
@@ -96,29 +122,11 @@ void AdaptiveController::adapt(const ControlStep& step, const Joints& applied, c
   if (!(dt >= 0 && std::isfinite(dt)))
     throw std::invalid_argument(fmt::format("adaptation: dt = {} is not in [0, inf) s", dt));
   if (adaptation_.gain.maxCoeff() == 0) return;
-  const int last = model_.size() - 1;
   LinkParameters rate = step.regressor.transpose() * step.velocity_error;
   if (adaptation_.prediction > 0) {
-    const double l = adaptation_.filter;
-    const Regressor<double> momentum = momentum_regressor<double>(model_, q, qd, last),
-                            input = l * momentum - momentum_rest_regressor(model_, q, qd, kGravity, last);
-    // The known links: the same columns times their parameters, without forming them.
-    const Joints own = mass_matrix<double>(model_, q) * qd;
-    const Joints rest =  // h = g − Cᵀ q̇
-        gravity_torque<double>(model_, q) - coriolis_matrix<double>(model_, q, qd).transpose() * qd;
-    // τ_f − Y_f π of the model: λ/(p + λ) (τ + λ p − h) − λ p
-    const Joints input_rest = applied - friction_torque<double>(model_, qd) + l * own - rest;
-    if (!started_) {
-      filtered_ = input;
-      filtered_rest_ = input_rest;
-      started_ = true;
-    }
-    const Regressor<double> Y_f = l * momentum - filtered_;
-    const Joints residual = filtered_rest_ - l * own - Y_f * estimate;
-    rate += adaptation_.prediction * adaptation_.torque_weight * (Y_f.transpose() * residual);
-    const double keep = std::exp(-l * dt);
-    filtered_ = keep * filtered_ + (1 - keep) * input;
-    filtered_rest_ = keep * filtered_rest_ + (1 - keep) * input_rest;
+    const Prediction seen = predict(applied, q, qd, dt);
+    rate += adaptation_.prediction * adaptation_.torque_weight *
+            (seen.regressor.transpose() * (seen.torque - seen.regressor * estimate));
   }
   estimate += dt * adaptation_.gain.cwiseProduct(rate);
 }

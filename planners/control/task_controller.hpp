@@ -73,8 +73,9 @@ class AdaptiveController {
   ControlStep task_law(const TaskReference& reference, const TaskGains& gains, const JointVector<double>& q,
                        const JointVector<double>& qd) const;
 
-  /// Advances estimate and filters by dt [s] from a law's step, with the torque applied (after limits), by
-  /// Euler's rule as a controller does. Throws std::invalid_argument for a step that no law has made.
+  /// Advances estimate and filters by dt [s] from a law's step, with the torque applied (after limits) until
+  /// the next step: the estimate by Euler's rule as a controller does, the filters with an error of O(λ²
+  /// dt²). Throws std::invalid_argument for a step that no law has made.
   void adapt(const ControlStep& step, const JointVector<double>& applied, const JointVector<double>& q,
              const JointVector<double>& qd, double dt);
 
@@ -83,9 +84,22 @@ class AdaptiveController {
  private:
   Chain model_;
   Adaptation adaptation_;
-  Regressor<double> filtered_;         ///< λ/(p + λ) (λ Y_p − Y_h)
-  JointVector<double> filtered_rest_;  ///< λ/(p + λ) (τ + λ p − h), p and h of the model
-  bool started_{};
+  /// Columns of the unknown body, and a torque [N m].
+  struct Filtered {
+    Regressor<double> regressor;
+    JointVector<double> torque;
+  };
+  using Prediction = Filtered;  // Y_f, and τ_f less what the model has of it
+  /// Advances the filters to now, and holds the torque for the dt [s] to come.
+  Prediction predict(const JointVector<double>& applied, const JointVector<double>& q,
+                     const JointVector<double>& qd, double dt);
+  struct Held {
+    Filtered input;  ///< at the last step: λ Y_p − Y_h, and λ p − h of the model
+    JointVector<double> applied;
+    double dt;
+  };
+  Filtered filtered_;         ///< λ/(p + λ) of these, and of the torque
+  std::optional<Held> held_;  ///< empty before the first step
 };
 
 /// ½ sᵀ M s + ½ k |e_p|² + ½ k_r |e_r|² + ½ π̃ᵀ R_p⁻¹ π̃ over the adapted parameters, M of the true chain. If α

@@ -29,7 +29,8 @@ Chain known_arm() {
   return with_tool(arm, {Eigen::Matrix3d::Identity(), {0, 0, l}});
 }
 
-/// Joint angles at which the tip has a frame, near `q`, by damped least squares.
+/// Joint angles at which the tip has a frame, near `q`, by damped least squares. Throws std::invalid_argument
+/// where it does not get there.
 Joints pose_at(const Chain& arm, const Eigen::Vector3d& p, const Eigen::Matrix3d& R, Joints q) {
   for (int k = 0; k < 200; ++k) {
     const Transform<double> tip = forward_kinematics<double>(arm, q);
@@ -42,6 +43,10 @@ Joints pose_at(const Chain& arm, const Eigen::Vector3d& p, const Eigen::Matrix3d
     JJt.diagonal().array() += 1e-8;
     q += J.transpose() * solve_positive<double>(JJt, error);
   }
+  if (const double off = (forward_kinematics<double>(arm, q).p - p).norm(); !(off < 1e-6))
+    throw std::invalid_argument(
+        fmt::format("throw study: the tip does not reach ({:.3g}, {:.3g}, {:.3g}) m: it stays {:.2g} m away",
+                    p.x(), p.y(), p.z(), off));
   return q;
 }
 
@@ -147,10 +152,21 @@ void check(const ControllerChoice& c, const Payload& payload, const StudyOptions
   const auto refuse = [](const char* name, double value, const char* accepted) {
     throw std::invalid_argument(fmt::format("throw study: {} = {}; accepted: {}", name, value, accepted));
   };
-  if (!(c.stiffness > 0)) refuse("stiffness", c.stiffness, "> 0 N/m");
-  if (!(c.rotational > 0)) refuse("rotational", c.rotational, "> 0 N m/rad");
+  if (!(c.stiffness > 0 && std::isfinite(c.stiffness))) refuse("stiffness", c.stiffness, "(0, inf) N/m");
+  if (!(c.rotational > 0 && std::isfinite(c.rotational)))
+    refuse("rotational", c.rotational, "(0, inf) N m/rad");
   if (!(payload.mass > 0 && payload.mass < 3)) refuse("mass", payload.mass, "(0, 3) kg");
   if (!(payload.width > 0 && payload.width < 0.5)) refuse("width", payload.width, "(0, 0.5) m");
+  for (const auto& [name, value] : {std::pair{"angle_noise", o.angle_noise},
+                                    {"rate_noise", o.rate_noise},
+                                    {"torque_noise", o.torque_noise},
+                                    {"friction_error", o.friction_error},
+                                    {"grasp_offset", o.grasp_offset},
+                                    {"release_jitter", o.release_jitter},
+                                    {"box", std::min(o.box.x(), o.box.y())}})
+    if (!(value >= 0 && std::isfinite(value))) refuse(name, value, "[0, inf)");
+  for (const double x : {o.start.sum(), o.release.sum(), o.velocity.sum(), o.landing_height, o.box.sum()})
+    if (!std::isfinite(x)) refuse("start, release, velocity, landing_height and box", x, "finite");
   if (o.repetitions < 0 || o.repetitions > 1000) refuse("repetitions", o.repetitions, "0 to 1000");
   if (!(o.throw_time > 0.05 && o.brake_time > 0.05 && o.return_time > 0.05 && o.hold_time >= 0))
     refuse("throw_time", o.throw_time, "all times > 0.05 s");

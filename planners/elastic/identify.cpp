@@ -18,6 +18,7 @@ using control::LinkParameters;
 using Joints = JointVector<double>;
 
 /// Singular values below this share of the largest belong to combinations that no motion shows.
+constexpr int kPasses = 3;
 constexpr double kRank = 1e-9;
 
 /// π of a link from its ten log-Cholesky parameters (α, d₁, d₂, d₃, s₁₂, s₂₃, s₁₃, t₁, t₂, t₃).
@@ -113,9 +114,10 @@ void Excitation::at(double t, Joints& q, Joints& qd, Joints& qdd) const {
 
 DesignedExcitation design_excitation(const Chain& chain, const ExcitationOptions& o) {
   validate(chain);
-  if (!(o.period > 0 && std::isfinite(o.period)) || o.harmonics < 1 || o.samples < 10 || o.trials < 1)
+  if (!(o.period > 0 && std::isfinite(o.period)) || o.harmonics < 1 || o.harmonics > 100 || o.samples < 10 ||
+      o.trials < 1)
     throw std::invalid_argument(
-        "design_excitation: period in (0, inf) s, harmonics >= 1, samples >= 10 and trials >= 1 are "
+        "design_excitation: period in (0, inf) s, harmonics of 1 to 100, samples >= 10 and trials >= 1 are "
         "accepted");
   const int n = chain.size();
   std::mt19937_64 random(o.seed);
@@ -130,10 +132,11 @@ DesignedExcitation design_excitation(const Chain& chain, const ExcitationOptions
         one.sine(i, k) = trial == 0 ? normal(random) : out.motion.sine(i, k) + width * normal(random);
         one.cosine(i, k) = trial == 0 ? normal(random) : out.motion.cosine(i, k) + width * normal(random);
       }
-    // Shrink each joint into its limits, seen at the samples and with 5 % to spare in between.
+    // Shrink each joint into its limits, seen twenty times a period of the fastest, with 5 % to spare.
+    const int instants = std::max(o.samples, 20 * o.harmonics);
     Joints q(n), qd(n), qdd(n), low = Joints::Constant(n, 1e9), high = -low, fast = Joints::Zero(n);
-    for (int k = 0; k < o.samples; ++k) {
-      one.at(o.period * k / o.samples, q, qd, qdd);
+    for (int k = 0; k < instants; ++k) {
+      one.at(o.period * k / instants, q, qd, qdd);
       low = low.cwiseMin(q), high = high.cwiseMax(q), fast = fast.cwiseMax(qd.cwiseAbs());
     }
     for (int i = 0; i < n; ++i) {
@@ -157,6 +160,36 @@ DesignedExcitation design_excitation(const Chain& chain, const ExcitationOptions
   return out;
 }
 
+namespace {
+
+/// The equations of each joint less what its noise keeps of the sample before, in units of what comes anew.
+/// `left`: residuals of a fit with so many parameters a joint, which take (1 + 3 ρ)/samples off a correlation
+/// each.
+void whiten(const Eigen::VectorXd& left, int joints, double parameters, const Eigen::MatrixXd& W,
+            const Eigen::VectorXd& tau, Eigen::MatrixXd& white, Eigen::VectorXd& white_tau) {
+  const Eigen::Index samples = left.size() / joints;
+  for (int i = 0; i < joints; ++i) {
+    double squares = 0, products = 0;
+    for (Eigen::Index k = 0; k < samples; ++k) {
+      const double r = left[k * joints + i];
+      squares += r * r;
+      if (k > 0) products += r * left[(k - 1) * joints + i];
+    }
+    if (!(squares > 0)) continue;  // without noise
+    const double seen = products / squares, n = static_cast<double>(samples),
+                 stays = std::clamp((seen + parameters / n) / (1 - 3 * parameters / n), 0.0, 0.98),
+                 size = std::sqrt(squares / n * (1 - stays * stays)), first = std::sqrt(1 - stays * stays);
+    for (Eigen::Index k = samples - 1; k >= 0; --k) {
+      const Eigen::Index row = k * joints + i, before = row - joints;
+      white.row(row) =
+          k > 0 ? ((W.row(row) - stays * W.row(before)) / size).eval() : (first / size * W.row(row)).eval();
+      white_tau[row] = k > 0 ? (tau[row] - stays * tau[before]) / size : first / size * tau[row];
+    }
+  }
+}
+
+}  // namespace
+
 IdentifiedInertia identify_inertia(const Chain& prior, const std::vector<MotionSample>& log) {
   validate(prior);
   const int n = prior.size(), parameters = kLinkParameters * n, rows = n * static_cast<int>(log.size());
@@ -174,17 +207,25 @@ IdentifiedInertia identify_inertia(const Chain& prior, const std::vector<MotionS
         control::torque_regressor<double>(prior, log[k].q, log[k].qd, log[k].qdd);
     tau.segment(n * static_cast<int>(k), n) = log[k].torque;
   }
-  const dynamics::SingularVectors svd = dynamics::singular_vectors(W, tau);
-  const Eigen::VectorXd& s = svd.values;
-  int rank = 0;
-  while (rank < s.size() && s[rank] > kRank * s[0]) ++rank;
   IdentifiedInertia out;
-  out.condition = condition_of(s);
-  out.combinations = svd.right.leftCols(rank);
-  out.estimate = svd.left_times_b.head(rank).cwiseQuotient(s.head(rank));
-  out.torque_noise =
-      (tau - W * (out.combinations * out.estimate)).norm() / std::sqrt(static_cast<double>(rows - rank));
-  out.sigma = out.torque_noise * s.head(rank).cwiseInverse();
+  out.condition = condition_of(dynamics::singular_vectors(W, tau).values);
+  // Least squares, then twice again with what was left: each joint's noise has its own size, and stays from
+  // sample to sample as far as it does (Cochrane and Orcutt).
+  Eigen::MatrixXd white = W;
+  Eigen::VectorXd white_tau = tau;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const dynamics::SingularVectors svd = dynamics::singular_vectors(white, white_tau);
+    const Eigen::VectorXd& s = svd.values;
+    int rank = 0;
+    while (rank < s.size() && s[rank] > kRank * s[0]) ++rank;
+    out.combinations = svd.right.leftCols(rank);
+    out.estimate = svd.left_times_b.head(rank).cwiseQuotient(s.head(rank));
+    const Eigen::VectorXd solution = out.combinations * out.estimate, left = tau - W * solution;
+    const double freedom = static_cast<double>(rows - rank);
+    out.torque_noise = left.norm() / std::sqrt(freedom);
+    out.sigma = (white_tau - white * solution).norm() / std::sqrt(freedom) * s.head(rank).cwiseInverse();
+    if (pass + 1 < kPasses) whiten(left, n, static_cast<double>(rank) / n, W, tau, white, white_tau);
+  }
 
   // Bodies: Levenberg and Marquardt on the log-Cholesky parameters, held to the prior's by 1e-3 of a sigma.
   constexpr double hold = 1e-3;
@@ -226,7 +267,7 @@ IdentifiedInertia identify_inertia(const Chain& prior, const std::vector<MotionS
   out.feasible = prior;
   for (int i = 0; i < n; ++i)
     out.feasible.joints[i].link = control::inertia_from(pi.segment<kLinkParameters>(kLinkParameters * i));
-  out.feasible_misfit = std::sqrt(misfit(pi).squaredNorm() / rank);
+  out.feasible_misfit = std::sqrt(misfit(pi).squaredNorm() / static_cast<double>(out.estimate.size()));
   return out;
 }
 
@@ -234,16 +275,28 @@ IdentifiedSpring identify_spring(const std::vector<SpringSample>& log) {
   const int rows = static_cast<int>(log.size());
   if (rows < 10)
     throw std::invalid_argument(fmt::format("identify_spring: {} samples; accepted: at least 10", rows));
+  constexpr double kAlike = 20;  // condition number: a swing at one frequency is 1/noise, one at two some 4
   Eigen::Matrix<double, Eigen::Dynamic, 3> W(rows, 3);
   Eigen::VectorXd tau(rows);
   for (int k = 0; k < rows; ++k) {
     W.row(k) << log[k].deflection, log[k].rate, log[k].acceleration;
     tau[k] = log[k].torque;
+    if (!std::isfinite(W.row(k).sum() + tau[k]))
+      throw std::invalid_argument(fmt::format("identify_spring: sample {} is not finite", k));
   }
+  const Eigen::RowVector3d sizes = W.colwise().norm();
+  if (!(sizes.minCoeff() > 0))
+    throw std::invalid_argument("identify_spring: the log does not move the motor");
+  const Eigen::VectorXd values = dynamics::singular_vectors(W.array().rowwise() / sizes.array(), tau).values;
+  if (!(values[0] < kAlike * values[2]))
+    throw std::invalid_argument(
+        fmt::format("identify_spring: deflection, rate and acceleration are not told apart (condition number "
+                    "{:.2g}, accepted: up to {}): a swing at one frequency shows K - B w^2 alone; move the "
+                    "motor at two",
+                    values[0] / values[2], kAlike));
   const Eigen::Matrix3d information = W.transpose() * W, inverse = information.inverse();
   const Eigen::Vector3d x = inverse * (W.transpose() * tau);
   const double noise = (tau - W * x).norm() / std::sqrt(rows - 3.0);
-  if (!x.allFinite()) throw std::invalid_argument("identify_spring: the log does not move the motor");
   return {x[0],
           x[1],
           x[2],

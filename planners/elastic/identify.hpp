@@ -20,7 +20,7 @@ struct Excitation {
 /// What motion is looked for, and how long.
 struct ExcitationOptions {
   double period{4};  ///< s, in (0, inf)
-  int harmonics{3};  ///< >= 1
+  int harmonics{3};  ///< 1 to 100
   int samples{60};   ///< instants per period that the condition number looks at, >= 10
   int trials{300};   ///< of a random search that narrows around the best, >= 1
   unsigned seed{1};  ///< of the random search
@@ -49,11 +49,13 @@ struct IdentifiedInertia {
   double feasible_misfit{};  ///< √(mean ((β_feasible − estimate)/σ)²): of order one if the log is consistent
                              ///< with bodies
 };
-/// Least squares for the identifiable combinations, then bodies for them: each link's pseudo-inertia is J = U
-/// Uᵀ with an upper triangular U of positive diagonal (log-Cholesky, [RuckerWensing2022]), so that no
-/// estimate is unphysical; what the log does not determine stays near `prior`. Throws std::invalid_argument
-/// for fewer equations (one per sample and joint) than twice the parameters, that is fewer than 20 samples,
-/// for samples that have not one finite number for each joint, or a prior with no mass.
+/// Least squares for the identifiable combinations, weighted with each joint's own noise, which may stay from
+/// sample to sample as of a filtered torque (AR(1); samples in order, evenly spaced). Then bodies for them:
+/// each link's pseudo-inertia is J = U Uᵀ with an upper triangular U of positive diagonal (log-Cholesky,
+/// [RuckerWensing2022]), so that no estimate is unphysical; what the log does not determine stays near
+/// `prior`. Throws std::invalid_argument for fewer equations (one per sample and joint) than twice the
+/// parameters, that is fewer than 20 samples, for samples that have not one finite number for each joint, or
+/// a prior with no mass.
 IdentifiedInertia identify_inertia(const Chain& prior, const std::vector<MotionSample>& log);
 
 /// One line of a log in a coupled mode, the link held: deflection θ − ψ, θ̇, θ̈ and the motor's torque.
@@ -65,7 +67,9 @@ struct IdentifiedSpring {
   double stiffness{}, damping{}, inertia{};                    ///< N m/rad, N m s/rad, kg m²
   double stiffness_sigma{}, damping_sigma{}, inertia_sigma{};  ///< 1 σ
 };
-/// τ = B θ̈ + D θ̇ + K (θ − ψ), by least squares.
+/// τ = B θ̈ + D θ̇ + K (θ − ψ), by least squares. Throws std::invalid_argument for fewer than ten samples, for
+/// some that are not finite, and for a motion that does not tell the three terms apart, as a swing at one
+/// frequency.
 IdentifiedSpring identify_spring(const std::vector<SpringSample>& log);
 
 }  // namespace unhand::planners::elastic

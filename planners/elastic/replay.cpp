@@ -92,16 +92,18 @@ template dynamics::Entry<double, kStates> ClutchedArmSystem::on_time_(int, const
 template dynamics::Entry<Dual, kStates> ClutchedArmSystem::on_time_(int, const dynamics::Window&, const Dual&,
                                                                     const Full<Dual>&) const;
 
-double LimitUse::largest() const {
-  return std::max({angle, speed, torque, motor_speed, motor_torque, deflection, brake});
+double UsedShares::largest() const {
+  return std::max({angle, speed, acceleration, torque, motor_speed, motor_torque, deflection, brake});
 }
 
 namespace {
 
-void use_limits(const ClutchedArm& arm, const ReplaySample& s, LimitUse& use) {
+void use_limits(const ClutchedArm& arm, const ReplaySample& s, UsedShares& use) {
   const auto most = [](double& largest, double share) { largest = std::max(largest, std::abs(share)); };
+  const Coordinates<double> acceleration = acceleration_in<double>(arm, s.mode, s.at, s.rate, s.torque);
   for (int i = 0; i < kLinks; ++i) {
     const JointLimits& l = arm.chain.joints[i].limits;
+    most(use.acceleration, acceleration[2 + i] / l.acceleration);
     most(use.angle, (2 * s.at[2 + i] - l.lower - l.upper) / (l.upper - l.lower));
     most(use.speed, s.rate[2 + i] / l.velocity);
     if (i < 2) most(use.torque, s.torque[i] / l.torque);
@@ -110,7 +112,6 @@ void use_limits(const ClutchedArm& arm, const ReplaySample& s, LimitUse& use) {
   most(use.motor_torque, s.torque[2] / arm.last.motor_torque);
   if (s.mode != ClutchMode::rigid) most(use.deflection, (s.at[0] - s.at[1]) / arm.last.deflection);
   if (s.mode == ClutchMode::brk) {
-    const Coordinates<double> acceleration = acceleration_in<double>(arm, s.mode, s.at, s.rate, s.torque);
     const Links<double> need =
         joint_torque<double>(arm, s.at.tail<3>(), s.rate.tail<3>(), acceleration.tail<3>());
     const double spring =

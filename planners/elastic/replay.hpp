@@ -91,8 +91,9 @@ struct ReplaySample {
 };
 
 /// The largest share of each limit that is used, 1 = at the limit.
-struct LimitUse {
-  double angle{}, speed{}, torque{}, motor_speed{}, motor_torque{}, deflection{}, brake{};  ///< shares [-]
+struct UsedShares {
+  double angle{}, speed{}, acceleration{}, torque{};            ///< of the links [-]
+  double motor_speed{}, motor_torque{}, deflection{}, brake{};  ///< of the last joint's drive [-]
   /// The largest of them.
   double largest() const;
 };
@@ -103,7 +104,7 @@ struct Replay {
   bool spring_stop{};                 ///< the spring came to its largest deflection
   std::vector<ReplaySample> samples;  ///< in order of time; two at an instant where two intervals meet
   TipState<double> release;           ///< the tip at the end
-  LimitUse use;                       ///< over the run
+  UsedShares use;                     ///< over the run
   // Energy from start to end [J]: work of the motors − damping − friction − clutch impacts = gain, but for
   // `unexplained`.
   double motor_work{}, damping{}, friction{}, impacts{}, gain{};  ///< J

@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kNone = 1e20;
 constexpr int kFixed = -1;  ///< no variable: the quantity is constant in this phase
-/// Weight of the mean square of the scaled accelerations beside −speed²: it picks one of many motions that
-/// hardly differ in speed, at the price of some 1e-3 of the speed.
+/// Weight of the integrated squares of the scaled accelerations beside −speed²: it picks one of many motions
+/// that hardly differ in speed, at the price of some 1e-3 of the speed.
 constexpr double kSmoothing = 2e-3;
 
 /// Indices of what is unknown at a point.
@@ -42,6 +42,7 @@ class ThrowProgram {
     } else {
       add_phase(mode_of(task.drive), 2 * options.intervals);
     }
+    if (task.let_go) fix(phases_.front().step, *task.let_go / options.intervals);
     fix_start();
     constrain_release();
     limit_duration();
@@ -185,11 +186,13 @@ class ThrowProgram {
                                            kAcceleration),
                            {0, 0}, {0, 0});
       }
-    for (int k = 0; k <= n; ++k)  // Simpson's weights
+    // ∫ a² dt over the longest time: not each phase's own mean square, under which one would vanish.
+    for (int k = 0; k <= n; ++k)
       for (int i = 0; i < 4; ++i)
         if (const int a = phase.points[k].acceleration[i]; a != kFixed) {
-          const double simpson = (k == 0 || k == n ? 1.0 : k % 2 ? 4.0 : 2.0) / (3.0 * n);
-          program_.minimise(weighted_square({a}, (task_.target ? 1.0 : kSmoothing) * share * simpson));
+          const double simpson = (k == 0 || k == n ? 1.0 : k % 2 ? 4.0 : 2.0) / 6.0;
+          program_.minimise(
+              square_over_time({a, phase.step}, (task_.target ? 1.0 : kSmoothing) * simpson / task_.longest));
         }
   }
 
@@ -344,9 +347,17 @@ void check(const ClutchedArm& arm, const ThrowTask& task, const ThrowProgramOpti
     throw std::invalid_argument(fmt::format("plan_throw: {} = {}; accepted: {}", name, value, accepted));
   };
   if (!(task.longest >= 0.1 && task.longest <= 10)) refuse("longest", task.longest, "0.1 to 10 s");
+  if (task.let_go && !(task.drive == Drive::clutched && *task.let_go > 0 && *task.let_go < task.longest))
+    refuse("let_go", *task.let_go, "(0, longest) s, of the clutched drive");
   if (!(task.margin >= 0 && task.margin < 0.5)) refuse("margin", task.margin, "[0, 0.5)");
   if (!(std::abs(task.elevation) < 1.57)) refuse("elevation", task.elevation, "(-pi/2, pi/2) rad");
-  if (!(task.gravity > 0)) refuse("gravity", task.gravity, "> 0");
+  if (!(task.gravity > 0 && std::isfinite(task.gravity))) refuse("gravity", task.gravity, "(0, inf) m/s²");
+  for (int i = 0; task.start && i < kLinks; ++i) {
+    const JointLimits& l = arm.chain.joints[i].limits;
+    if (const double q = (*task.start)[i]; !(q >= l.lower && q <= l.upper))
+      refuse(("start of " + arm.chain.joints[i].name).c_str(), q,
+             fmt::format("{} to {} rad", l.lower, l.upper).c_str());
+  }
   if (options.intervals < 2 || options.intervals > 500) refuse("intervals", options.intervals, "2 to 500");
   if (task.target && !(std::isfinite(task.target->x) && std::isfinite(task.target->z)))
     refuse("target", task.target->x, "finite");

@@ -1,9 +1,9 @@
 // Throws of a clutched arm as multi-phase optimal control, [DarkoD46] Eq. 38.
 //
-// The sequence of clutch modes is given, the phases' durations are free. Direct collocation after Hermite and
-// Simpson [HargravesParis1987] on accelerations: q, q̇ and q̈ of the links and of the motor are the unknowns at
-// nodes and middles, so that defects are bilinear in them and the step, and the equations of motion are one
-// constraint per point.
+// The sequence of clutch modes is given, the phases' durations are free (0.03 s at least). Direct collocation
+// after Hermite and Simpson [HargravesParis1987] on accelerations: q, q̇ and q̈ of the links and of the motor
+// are the unknowns at nodes and middles, so that defects are bilinear in them and the step, and the equations
+// of motion are one constraint per point.
 #pragma once
 
 #include <optional>
@@ -29,11 +29,13 @@ const char* to_string(Drive);
 /// What throw is asked for.
 struct ThrowTask {
   Drive drive{Drive::clutched};  ///< how the last joint is driven
-  std::optional<Target>
-      target;  ///< none: the tip's speed is maximised; else the smoothest throw to it is sought
+  std::optional<Target> target;  ///< none: the tip's speed is maximised; else the smoothest throw to it is
+                                 ///< sought, of the least ∫ |q̈|² dt of links and motor
   std::optional<Links<double>> start;  ///< pose at the start [rad]; none: free. The arm starts at rest, its
                                        ///< spring unloaded (clutched) or in equilibrium (series)
-  double longest{1.0};                 ///< [s], of the whole motion, > 0
+  double longest{1.0};                 ///< [s], of the whole motion, 0.1 to 10
+  std::optional<double> let_go{};  ///< when the clutched drive lets its spring go [s], in (0, longest); none:
+                                   ///< free
   double margin{0.04};  ///< share of every limit that the collocation points keep free, in [0, 0.5): between
                         ///< them the solution may overshoot a little
   double elevation{0.7853981633974483};  ///< of the tip's velocity at the release when no target says it

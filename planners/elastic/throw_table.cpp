@@ -56,6 +56,12 @@ ThrowProgramOptions beside(const ThrowProgramOptions& options, const ElasticThro
   return out;
 }
 
+/// When the clutched drive lets its spring go; none of another drive.
+std::optional<double> let_go_of(const ThrowTask& task, const ElasticThrow& plan) {
+  if (task.drive != Drive::clutched) return {};
+  return plan.phases.front().points.back().t;
+}
+
 }  // namespace
 
 OutOfReach::OutOfReach(double x, double z)
@@ -114,9 +120,15 @@ ThrowTable make_table(const ClutchedArm& arm, ThrowTask task, const std::vector<
   const Basins basins = find_basins(arm, task, options, starts);
   if (basins.found.empty()) throw OutOfReach(distances[middle], out.height);
   out.throws[middle] = basins.found.front().best;
+  task.let_go = let_go_of(task, out.throws[middle]);
   const auto solve_beside = [&](std::size_t k, std::size_t neighbour) {
-    task.target->x = distances[k];
-    out.throws[k] = plan_throw(arm, task, beside(options, out.throws[neighbour]));
+    ThrowTask there = task;
+    there.target->x = distances[k];
+    out.throws[k] = plan_throw(arm, there, beside(options, out.throws[neighbour]));
+    if (!out.throws[k].solved() && there.let_go) {  // of another family, but a throw
+      there.let_go.reset();
+      out.throws[k] = plan_throw(arm, there, beside(options, out.throws[neighbour]));
+    }
     if (!out.throws[k].solved()) throw OutOfReach(distances[k], out.height);
   };
   for (std::size_t k = middle + 1; k < distances.size(); ++k) solve_beside(k, k - 1);
@@ -152,6 +164,7 @@ ConfirmedTable confirm_table(const ClutchedArm& arm, ThrowTask task, ThrowTable 
     for (std::size_t k = 0; k < n; ++k) {
       const ElasticThrow start = on_finer_mesh(out.table.throws[k]);
       task.target->x = finer.distances[k];
+      task.let_go = let_go_of(task, start);
       finer.throws[k] = plan_throw(arm, task, beside(options, start));
       if (!finer.throws[k].solved()) return out;
     }

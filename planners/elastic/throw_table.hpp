@@ -58,8 +58,10 @@ struct OutOfReach : std::runtime_error {
 };
 
 /// Solves the task for each distance [m], increasing, at least four: the middle one from `starts` random
-/// starts (the best basin is taken), the others from their neighbour's solution, so that the table is of one
-/// family. Throws OutOfReach for the first distance where there is none.
+/// starts (the best basin is taken), the others from their neighbour's solution and, with clutches, the
+/// instant at which the middle one lets its spring go, so that the table is of one family: how smooth a throw
+/// is hardly depends on that instant, which would jump from node to node. Throws OutOfReach for the first
+/// distance where there is none.
 ThrowTable make_table(const ClutchedArm& arm, ThrowTask task, const std::vector<double>& distances,
                       const ThrowProgramOptions& options, int starts = 6);
 

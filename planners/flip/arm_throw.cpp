@@ -58,18 +58,16 @@ void check_reference(const FlipRobot& robot, const FlipCommand& u) {
   for (int i = 0; i < robot.chain.size(); ++i) {
     const Joint& joint = robot.chain.joints[static_cast<std::size_t>(i)];
     const JointLimits& l = joint.limits;
-    const auto refuse = [&](const char* what, double value, double limit) {
-      throw std::invalid_argument(
-          fmt::format("flip command pitch {:.3f}, speed {:.3f}: {} of {} is {:.3f}; accepted: up to {:.3f}",
-                      u.pitch, u.speed, what, joint.name, value, limit));
+    const auto refuse = [&](const char* what, double value, double low, double high) {
+      throw std::invalid_argument(fmt::format(
+          "flip command pitch {:.3f}, speed {:.3f}: {} of {} is {:.3f}; accepted: {:.3f} to {:.3f}", u.pitch,
+          u.speed, what, joint.name, value, low, high));
     };
-    for (const double q : {start.q[i], end.q[i]}) {  // monotonous in between
-      if (q < l.lower) refuse("position [rad]", q, l.lower);
-      if (q > l.upper) refuse("position [rad]", q, l.upper);
-    }
+    for (const double q : {start.q[i], end.q[i]})  // monotonous in between
+      if (q < l.lower || q > l.upper) refuse("position [rad]", q, l.lower, l.upper);
     const double rate = std::abs(end.qd[i]), most = 1.5 * rate / robot.motion.duration;
-    if (rate > l.velocity) refuse("velocity [rad/s]", rate, l.velocity);
-    if (most > l.acceleration) refuse("acceleration [rad/s²]", most, l.acceleration);
+    if (rate > l.velocity) refuse("velocity [rad/s]", rate, 0, l.velocity);
+    if (most > l.acceleration) refuse("acceleration [rad/s²]", most, 0, l.acceleration);
   }
 }
 

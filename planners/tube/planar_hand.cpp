@@ -86,6 +86,19 @@ PlanarHand::PlanarHand(const Chain& chain, const ThrowPlane& plane, const JointV
       coefficients_[j][i] = sum;
       values_[j][i] = sum.a;
     }
+  // Farthest from the points, at the ends, it errs most.
+  constexpr double kMost = 1e-3;  // m
+  for (const double t : {0.0, end}) {
+    JointVector<double> at(chain.size());
+    for (int i = 0; i < chain.size(); ++i) at[i] = q[i] + t * qd[i].a + 0.5 * t * t * qdd[i].a;
+    const auto pose = plane.pose(forward_kinematics(chain, at));
+    const auto fitted = evaluate(values_, end_, t).pose;
+    if (const double off = std::hypot(fitted.x - pose[0], fitted.z - pose[1]); !(off <= kMost))
+      throw std::invalid_argument(
+          fmt::format("planar hand: over {} s the motion turns too far for a polynomial of degree {} ({:.2g} "
+                      "m off; accepted: {})",
+                      end, N - 1, off, kMost));
+  }
 }
 
 release::HandState<double> PlanarHand::at(const dynamics::Window&, double t) const {

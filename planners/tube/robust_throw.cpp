@@ -9,7 +9,8 @@
 namespace unhand::planners {
 
 double window_for(const ReleaseCard& card) {
-  return card.dead_time.value + card.opening_time.value +
+  const double sticking = card.friction.adhesion > 0 ? card.friction.parting_time : 0;
+  return card.dead_time.value + card.opening_time.value + sticking +
          4 * std::hypot(card.dead_time.sigma, card.opening_time.sigma);
 }
 

@@ -1,6 +1,8 @@
 // Throws put together from the files of their channels.
 #include "datasets/assemble.hpp"
 
+#include <cmath>
+#include <random>
 #include <stdexcept>
 
 #include "log_samples.hpp"
@@ -103,12 +105,34 @@ TEST(Assemble, LandingFromTheTrack) {
   EXPECT_NEAR(planar->time(0), passes, chord);
   EXPECT_NEAR(planar->pose(0, 0), 2 * passes, 2 * chord);
   EXPECT_NEAR(planar->pose(0, 1), 6 * passes, 6 * chord);
-  EXPECT_EQ(planar->pose.sigma, (std::vector<double>{1e-4, 3e-4}));
   const auto spatial = landing_of(parabola(3), 3, 0.5);
   ASSERT_TRUE(spatial);
   EXPECT_NEAR(spatial->pose(0, 2), 0.5, 1e-12);
   EXPECT_FALSE(landing_of(parabola(2), 2, -5));
   EXPECT_FALSE(landing_of(parabola(2), 2, 1.5));
+}
+
+// The sigma that a landing is given is what noise of the track moves it by, wherever between two frames it
+// is.
+TEST(Assemble, LandingsScatterAsTheyDeclare) {
+  std::mt19937_64 random(2);
+  std::normal_distribution<double> normal;
+  for (const double height : {0.5, 0.52}) {
+    constexpr int kDraws = 3000;
+    const MocapLog clean = parabola(2);
+    const auto declared = landing_of(clean, 2, height);
+    double squares[2]{};
+    for (int draw = 0; draw < kDraws; ++draw) {
+      MocapLog noisy = clean;
+      for (std::size_t i = 0; i < noisy.pose.rows; ++i)
+        for (std::size_t c = 0; c < 3; ++c) noisy.pose(i, c) += noisy.pose.sigma[c] * normal(random);
+      const auto landed = landing_of(noisy, 2, height);
+      for (std::size_t c = 0; c < 2; ++c)
+        squares[c] += std::pow(landed->pose(0, c) - declared->pose(0, c), 2);
+    }
+    for (std::size_t c = 0; c < 2; ++c)  // of so many draws, σ is known to 1.3 %
+      EXPECT_NEAR(std::sqrt(squares[c] / kDraws) / declared->pose.sigma[c], 1, 0.06) << height << " " << c;
+  }
 }
 
 TEST(Assemble, NoLandingWhereTheTrackIsLost) {

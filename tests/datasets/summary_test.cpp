@@ -116,6 +116,20 @@ TEST(Summary, ScatterTellsADeclaredNoiseThatIsTooSmall) {
   EXPECT_FALSE(zero.too_small.at(0));
 }
 
+TEST(Summary, TimesAreThoseOfTheFilesClock) {
+  ThrowLog log = planar_log();
+  const LogSummary before = summarise(log);
+  log.clock_origin = 1.7e9;
+  const LogSummary after = summarise(log);
+  for (std::size_t i = 0; i < before.each.size(); ++i)
+    for (std::size_t k = 0; k < before.each[i].channels.size(); ++k) {
+      const ChannelSummary &a = before.each[i].channels[k], &b = after.each[i].channels[k];
+      EXPECT_NEAR(b.start - 1.7e9, a.start, 1e-6);
+      EXPECT_NEAR(b.end - 1.7e9, a.end, 1e-6);
+      EXPECT_NEAR(b.gap_at - 1.7e9, a.gap_at, 1e-6);
+    }
+}
+
 TEST(Summary, OneSampleHasNoRate) {
   ThrowLog log = spatial_log();
   log.throws[0].mocap->time = clock_of(1, 1);

@@ -80,11 +80,15 @@ TEST(RepetitionScatter, PoolsTheVarianceOfTheConditions) {
   lands("box", "fast", 100, 9);  // another object's, alone
   throws.push_back(any);         // not seen to land
   throws.back().object = "bar", throws.back().condition = "slow";
-  throws.back().measured.landing_x.reset();
+  throws.back().measured.landing_x.reset(), throws.back().measured.landing_theta.reset();
   const auto scatter = compare(known.log, throws, {}).repetitions;
   EXPECT_EQ(scatter.conditions, 2);
-  EXPECT_NEAR(scatter.landing_x, std::sqrt(16.0 / 3), 1e-14);  // rounding
-  EXPECT_NEAR(scatter.landing_theta, 0.1 * std::sqrt(16.0 / 3) * 180 / M_PI, 1e-13);
+  EXPECT_NEAR(scatter.landing_x.value(), std::sqrt(16.0 / 3), 1e-14);  // rounding
+  EXPECT_NEAR(scatter.landing_theta.value(), 0.1 * std::sqrt(16.0 / 3) * 180 / M_PI, 1e-13);
+  for (auto& one : throws) one.measured.landing_theta.reset();  // by a ruler
+  const auto ruler = compare(known.log, throws, {}).repetitions;
+  EXPECT_EQ(ruler.landing_x, scatter.landing_x);
+  EXPECT_FALSE(ruler.landing_theta);
 }
 
 // Two objects may be thrown under conditions of one name; each has its own errors.

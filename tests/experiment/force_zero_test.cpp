@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "tests/support/small_campaign.hpp"
 
 namespace unhand::experiment {
@@ -25,6 +27,24 @@ TEST(ForceZero, TheLevelAfterThePadsHavePartedIsTheSensors) {
     EXPECT_GT(told->grip, level);
     EXPECT_GT(told->throws, 0);
   }
+}
+
+// A sensor whose zero drifts between throws, about zero.
+TEST(ForceZero, ZerosThatScatterFromThrowToThrowAreNoCommonOne) {
+  int told = 0;
+  const auto clean = offset_log(0);
+  constexpr unsigned kSeeds = 30;
+  for (unsigned seed = 0; seed < kSeeds; ++seed) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    auto log = clean;
+    for (auto& one : log.throws) {
+      const double zero = normal(random);
+      for (double& f : one.ft->normal_force.data) f += zero;
+    }
+    told += untared_force(log).has_value();
+  }
+  EXPECT_LE(told, 1);
 }
 
 /// Nothing says that the pads let go: they may still press.

@@ -46,6 +46,19 @@ TEST(LandingNoise, IsWhatThrowsDifferByWhereNothingElseTells) {
   EXPECT_THAT(noise.how, HasSubstr("as large as throws differ"));
 }
 
+// Half of the landings were measured with a ruler, which tells no angle.
+TEST(LandingNoise, AnglesThatWereNotMeasuredHaveNoSayInIt) {
+  auto log = unsure(true);
+  const auto before = landing_noise(log);
+  for (std::size_t i = 0; i < log.throws.size(); i += 2) {
+    auto& pose = log.throws[i].landing->pose;
+    pose(0, 1) = 0, pose.sigma = {kSensors.landing_sigma[0], 10};
+  }
+  const auto noise = landing_noise(log);
+  EXPECT_EQ(noise.x, before.x);
+  EXPECT_NEAR(noise.theta.value(), kSensors.landing_sigma[1], 0.6 * kSensors.landing_sigma[1]);
+}
+
 TEST(LandingNoise, HeldOutLandingsHaveNoSayInWhatAFitTrusts) {
   for (const bool mocap : {true, false}) {
     auto log = unsure(mocap);

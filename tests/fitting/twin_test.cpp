@@ -15,10 +15,10 @@ using datasets::Split;
 using testing::HasSubstr;
 using testing_support::small_design;
 
-constexpr const char* kTrueLaw = "limit_surface_disc";
+constexpr const char* kTwinsLaw = "limit_surface_disc";
 
 const datasets::ThrowLog& twinned_log() {
-  static const datasets::ThrowLog log = experiment::generate_campaign(small_design(kTrueLaw), 11);
+  static const datasets::ThrowLog log = experiment::generate_campaign(small_design(kTwinsLaw), 11);
   return log;
 }
 const CampaignProblem& twinned() {

@@ -182,6 +182,9 @@ TEST(RobustThrow, IsPlannedForAPandaWithAGripper) {
   const TargetBox box{{1.3, 0, -0.2}};
   ReleaseCard card;
   EXPECT_NEAR(window_for(card), 0.080 + 4 * std::hypot(0.005, 0.006), 1e-12);
+  ReleaseCard sticky = card;  // pads that stick let go when that has died
+  sticky.friction.adhesion = 1, sticky.friction.parting_time = 0.03;
+  EXPECT_NEAR(window_for(sticky), window_for(card) + 0.03, 1e-12);
   PlanOptions options;
   make_planar(options.search, arm);
   options.home = panda_ready();

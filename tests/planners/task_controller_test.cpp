@@ -92,6 +92,47 @@ TEST(JointLaw, TeachesByTheStepThatIsGiven) {
   EXPECT_THROW(alone.adapt(of_no_law, step.torque, at.q, at.qd, 1e-3), std::invalid_argument);
 }
 
+// A load that is known exactly stays known, to the second order of the step: the torque is held between
+// steps, and the momentum that it makes is not. (A filter of the first order learned 16 g of arm as load.)
+TEST(Prediction, TeachesNothingWhereNothingIsUnknown) {
+  std::mt19937_64 random(4);
+  const OnItsWay start(random);
+  Adaptation adaptation = StudyOptions::default_adaptation();
+  adaptation.filter = 200;
+  const auto learned = [&](double dt) {  // [kg], at most, over a second
+    OnItsWay at = start;
+    AdaptiveController controller(at.known, adaptation);
+    controller.estimate = at.load;
+    double most = 0;
+    for (double t = 0; t < 1; t += dt) {
+      JointReference r = at.reference;  // sways about where it starts
+      for (int i = 0; i < 7; ++i) {
+        const double w = 3 + 0.5 * i, a = 0.5, s = std::sin(w * t), c = std::cos(w * t);
+        r.q[i] = start.q[i] + a * s * s * s, r.qd[i] = 3 * a * w * s * s * c;
+        r.qdd[i] = 3 * a * w * w * s * (2 * c * c - s * s);
+      }
+      if (t == 0) at.qd = r.qd;  // from rest, where the filters begin
+      ControlStep step = controller.joint_law(r, at.gains, at.q, at.qd);
+      step.velocity_error.setZero();  // teaches by the prediction alone
+      controller.adapt(step, step.torque, at.q, at.qd, dt);
+      most = std::max(most, std::abs(controller.estimate[0] - at.load[0]));
+      constexpr int kSubsteps = 4;  // Heun's
+      for (int k = 0; k < kSubsteps; ++k) {
+        const double h = dt / kSubsteps;
+        OnItsWay next = at;
+        const JointVector<double> a = at.acceleration(step);
+        next.q = at.q + h * at.qd, next.qd = at.qd + h * a;
+        const JointVector<double> b = next.acceleration(step);
+        at.q += 0.5 * h * (at.qd + next.qd), at.qd += 0.5 * h * (a + b);
+      }
+    }
+    return most;
+  };
+  const double coarse = learned(2e-3), fine = learned(1e-3);
+  EXPECT_LT(fine, 0.02);
+  EXPECT_GT(coarse / fine, 3);  // 4 of the second order, 2 of the first
+}
+
 // With the update, V' = −ėᵀ k_v ė + ½ ėᵀ Ṁ ė, whatever is not known of the load.
 TEST(JointLaw, LyapunovFunctionFallsByTheDampingButForTheMassThatChanges) {
   std::mt19937_64 random(2);

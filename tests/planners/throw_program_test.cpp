@@ -130,6 +130,14 @@ TEST(ElasticThrow, IsRefinedUntilTheIntegratorConfirmsIt) {
   EXPECT_GT(fine.intervals, 4);
   EXPECT_LE(shortfall(fine.plan, fine.run), 5.1e-3);
   EXPECT_LE(fine.run.use.largest(), 1);
+  const auto& samples = fine.run.samples;
+  for (std::size_t k = 0; k + 1 < samples.size(); ++k) {  // what the links do, by the speeds of the run
+    const double dt = samples[k + 1].t - samples[k].t;
+    for (int i = 0; i < kLinks && dt > 1e-6; ++i)
+      EXPECT_LE(std::abs(samples[k + 1].rate[2 + i] - samples[k].rate[2 + i]) / dt,
+                1.0001 * arm.chain.joints[i].limits.acceleration)
+          << samples[k].t;
+  }
   EXPECT_NEAR(fine.run.unexplained(), 0, 1e-9 * fine.run.motor_work);
   Refinement none;
   none.finest = 4;
@@ -143,6 +151,26 @@ TEST(ElasticThrow, AFinerMeshHoldsTheSameMotion) {
   const Replay a = replay(bsa3(), plan), b = replay(bsa3(), finer);  // straight lines of torque are kept
   EXPECT_NEAR(a.release.vx, b.release.vx, 1e-8);
   EXPECT_NEAR(a.release.vz, b.release.vz, 1e-8);
+}
+
+// The smoothest throw is that of the least ∫ q̈² dt, however long its phases are: one of them does not vanish.
+TEST(ElasticThrow, IsSmoothOverTimeAndNotPhaseByPhase) {
+  const ElasticThrow plan = planned(Drive::clutched, 12, Target{2.2, -0.5});
+  ASSERT_TRUE(plan.solved());
+  double integral = 0;
+  for (const ThrowPhase& phase : plan.phases) {
+    const double length = phase.points.back().t - phase.points.front().t;
+    EXPECT_GT(length, 0.1);
+    for (std::size_t k = 0; k + 2 < phase.points.size(); k += 2)
+      for (const auto& [point, weight] : {std::pair(k, 1.0), std::pair(k + 1, 4.0), std::pair(k + 2, 1.0)}) {
+        const auto& a = phase.points[point].acceleration;  // (θ, ψ, q₁, q₂, q₃); ψ moves with one of them
+        const double squares = a[0] * a[0] + a[2] * a[2] + a[3] * a[3] + a[4] * a[4];
+        integral += weight / 6 * (phase.points[k + 2].t - phase.points[k].t) * squares;
+      }
+  }
+  constexpr double kLongest = 0.6;
+  EXPECT_NEAR(plan.program.objective, integral / (kAcceleration * kAcceleration) / kLongest,
+              1e-6 * plan.program.objective);
 }
 
 TEST(ElasticThrow, LandsOnItsTarget) {
