@@ -136,7 +136,7 @@ std::unique_ptr<fl::FlipLearner> learner_of(const PlanFlipOptions& o, const fl::
   learned.library_version = UNHAND_VERSION;
   answer.card = datasets::to_json(learned);
   library.emplace(robot, answer.bar);
-  return std::make_unique<fl::ReleaseLearner>(*library, fit.card, fl::left_over(old, fit.card, support.data),
+  return std::make_unique<fl::ReleaseLearner>(*library, fit, fl::left_over(old, fit.card, support.data),
                                               fl::scatter_of(support.trials, robot.bar.com_offset),
                                               answer.target, o.throws);
 }

@@ -24,7 +24,7 @@ using namespace flip_bench;
 ReleaseLearner learned(const HandLibrary& library, const HandLibrary& old, const Gathered& thrown) {
   const ReleaseFit fit = fit_release(old, prior_card(old.robot()), thrown.data);
   return {library,
-          fit.card,
+          fit,
           left_over(old, fit.card, thrown.data),
           scatter_of(thrown.trials, old.bar().com_offset),
           {},

@@ -129,10 +129,9 @@ LeftOverField::At LeftOverField::at(const std::array<double, 3>& fractions, cons
   return out;
 }
 
-double probability_of_hits(const FlipForecast& forecast, const ThrowScatter& scatter,
-                           const FlipTarget& target, int throws) {
+double probability_of_hits(const FlipForecast& forecast, const FlipTarget& target, int throws) {
   constexpr double kReach = 5, kLongest = 0.8, kShortest = kReach / 200;  // of what is not known [σ]
-  const double scatter_x = std::sqrt(scatter.x), scatter_angle = std::sqrt(scatter.angle),
+  const double scatter_x = forecast.scatter_x, scatter_angle = forecast.scatter_angle,
                along = forecast.correlation * forecast.sigma_angle,
                across = std::sqrt(std::max(0.0, 1 - forecast.correlation * forecast.correlation)) *
                         forecast.sigma_angle;
@@ -159,11 +158,86 @@ double probability_of_hits(const FlipForecast& forecast, const ThrowScatter& sca
   return std::min(1.0, out * du * dv / (2 * std::numbers::pi));
 }
 
-ReleaseLearner::ReleaseLearner(const HandLibrary& library, const ReleaseCard& card,
-                               std::vector<LeftOver> known, const ThrowScatter& scatter,
-                               const FlipTarget& target, int throws)
+std::optional<PredictedDetach> predicted_detach(const release::HandMotion& hand, const ReleaseFit& fit,
+                                                const Bar& bar, const ThrowSpread& throws) {
+  const auto let_go = [&](const ReleaseCard& card, double offset, double angle) {
+    Bar held = bar;
+    held.com_offset += offset;
+    const auto release =
+        release_bar(hand, {held,
+                           angle,
+                           {card.grip_force, card.dead_time.value, card.opening_time.value, card.shape},
+                           {card.model, card.mu.value, card.length, card.pads, card.law_values}});
+    return release ? std::optional(release->detach) : std::nullopt;
+  };
+  const auto changed = [&](const Eigen::Vector4d& by) {
+    ReleaseCard out = fit.card;
+    out.mu.value = std::max(0.01, out.mu.value + by[0]);
+    out.length = std::max(1e-4, out.length + by[1]);
+    out.dead_time.value = std::max(0.0, out.dead_time.value + by[2]);
+    out.opening_time.value = std::max(0.01, out.opening_time.value + by[3]);
+    return out;
+  };
+  PredictedDetach out;
+  const auto middle = let_go(fit.card, 0, 0);
+  if (!middle) return {};
+  out.detach = *middle;
+  const auto differ = [&](std::size_t direction, const Eigen::Vector4d& by, double offset, double angle) {
+    if (by.isZero() && offset == 0 && angle == 0) return;
+    const auto up = let_go(changed(by), offset, angle), down = let_go(changed(-by), -offset, -angle);
+    const DetachVector &high = up ? *up : *middle, &low = down ? *down : *middle;
+    for (std::size_t j = 0; j < 6; ++j) out.by[direction][j] = (high[j] - low[j]) / (up && down ? 2 : 1);
+  };
+  const dynamics::Spectrum spectrum = dynamics::spectrum_of(fit.covariance);
+  for (std::size_t k = 0; k < PredictedDetach::kOfCard; ++k) {
+    const auto column = static_cast<Eigen::Index>(k);
+    differ(k, std::sqrt(std::max(0.0, spectrum.values[column])) * spectrum.vectors.col(column), 0, 0);
+  }
+  const double mu = fit.card.mu.value * std::hypot(throws.mu, throws.grip_force);
+  differ(4, {mu, 0, 0, 0}, 0, 0);
+  differ(5, {0, 0, throws.dead_time, 0}, 0, 0);
+  differ(6, {0, 0, 0, throws.opening_time}, 0, 0);
+  differ(7, Eigen::Vector4d::Zero(), throws.grasp_offset, 0);
+  differ(8, Eigen::Vector4d::Zero(), 0, throws.grasp_angle);
+  return out;
+}
+
+namespace {
+
+/// Variances and covariance of a landing [m², rad², m rad].
+struct LandingSpread {
+  double x{}, angle{}, cross{};
+  /// Of a σ each way; the flight is mildly curved. Whether both land.
+  bool add(const std::optional<FlipPose>& up, const std::optional<FlipPose>& down) {
+    if (!up || !down) return false;
+    const double dx = 0.5 * (up->x - down->x), da = 0.5 * (up->angle - down->angle);
+    x += dx * dx, angle += da * da, cross += dx * da;
+    return true;
+  }
+};
+
+DetachVector plus(DetachVector a, const DetachVector& b, double sign) {
+  for (std::size_t j = 0; j < 6; ++j) a[j] += sign * b[j];
+  return a;
+}
+
+/// What landings of a command scatter by, as declared; empty where some do not land.
+template <class Land>
+std::optional<LandingSpread> declared_scatter(const PredictedDetach& predicted, const Land& land) {
+  LandingSpread out;
+  for (std::size_t k = PredictedDetach::kOfCard; k < PredictedDetach::kAll; ++k)
+    if (!out.add(land(plus(predicted.detach, predicted.by[k], 1)),
+                 land(plus(predicted.detach, predicted.by[k], -1))))
+      return {};
+  return out;
+}
+
+}  // namespace
+
+ReleaseLearner::ReleaseLearner(const HandLibrary& library, const ReleaseFit& fit, std::vector<LeftOver> known,
+                               const ThrowScatter& scatter, const FlipTarget& target, int throws)
     : library_(library),
-      card_(card),
+      fit_(fit),
       samples_(std::move(known)),
       scatter_(scatter),
       target_(target),
@@ -171,10 +245,23 @@ ReleaseLearner::ReleaseLearner(const HandLibrary& library, const ReleaseCard& ca
   validate(target_);
   if (throws_ < 1)
     throw std::invalid_argument(fmt::format("release learner: throws = {} is not in [1, inf)", throws_));
+  const FlipRobot& robot = library_.robot();
   for (std::size_t i = 0; i < library_.commands().size(); ++i) {
-    const auto release = predicted_release(library_.hand(i), card_, library_.bar());
-    mesh_.push_back(release ? std::optional(release->detach) : std::nullopt);
+    const auto predicted = predicted_detach(library_.hand(i), fit_, library_.bar(), robot.throws);
+    mesh_[0].push_back(predicted ? std::optional(predicted->detach) : std::nullopt);
+    for (std::size_t k = 0; k < PredictedDetach::kAll; ++k)
+      mesh_[1 + k].push_back(predicted ? std::optional(predicted->by[k]) : std::nullopt);
   }
+  double x = 0, angle = 0, n = 0;
+  for (const LeftOver& one : samples_) {
+    const HandLibrary of_its_bar(robot, one.bar, 2);
+    const auto predicted =
+        predicted_detach(of_its_bar.simulate(robot.motion.range.at(one.at[0], one.at[1], one.at[2])), fit_,
+                         one.bar, robot.throws);
+    const auto declared = predicted ? declared_scatter(*predicted, fly_flip) : std::nullopt;
+    if (declared) x += declared->x, angle += declared->angle, n += 1;
+  }
+  if (x > 0 && angle > 0) of_declared_ = {scatter_.x * n / x, scatter_.angle * n / angle};
   field_.set(samples_, scatter_.detach);
 }
 
@@ -185,42 +272,56 @@ ReleaseLearner ReleaseLearner::aimed_at(const FlipTarget& target) const {
   return out;
 }
 
-std::optional<FlipForecast> ReleaseLearner::forecast(const std::array<double, 3>& fractions,
-                                                     const DetachVector& predicted) const {
+std::optional<PredictedDetach> ReleaseLearner::between(const Fractions& fractions) const {
+  PredictedDetach out;
+  const auto detach = library_.between(mesh_[0], fractions);
+  if (!detach) return {};
+  out.detach = *detach;
+  for (std::size_t k = 0; k < PredictedDetach::kAll; ++k)
+    out.by[k] = library_.between(mesh_[1 + k], fractions).value();
+  return out;
+}
+
+std::optional<FlipForecast> ReleaseLearner::forecast(const Fractions& fractions,
+                                                     const PredictedDetach& predicted) const {
   const double l = library_.bar().com_offset;
   const LeftOverField::At left = field_.at(fractions, library_.bar());
-  DetachVector pads = shifted(predicted, -l);
-  for (std::size_t j = 0; j < 6; ++j) pads[j] += left.mean[j];
-  const auto land = [&](const DetachVector& d) { return fly_flip(shifted(d, l)); };
-  const auto mean = land(pads);
+  const auto land = [&](const DetachVector& detach, const DetachVector& rest) {
+    return fly_flip(shifted(plus(shifted(detach, -l), rest, 1), l));
+  };
+  const auto mean = land(predicted.detach, left.mean);
   if (!mean) return {};
-  FlipForecast out{*mean, 0, 0, 0, 0};
-  double cross = 0;
+  LandingSpread unknown;
   for (std::size_t j = 0; j < 6; ++j) {
-    const double sigma = std::sqrt(left.variance[j]);
-    if (!(sigma > 0)) continue;
-    DetachVector up = pads, down = pads;  // a σ each way: the flight is mildly curved
-    up[j] += sigma;
-    down[j] -= sigma;
-    const auto a = land(up), b = land(down);
-    if (!a || !b) return {};
-    const double dx = 0.5 * (a->x - b->x), da = 0.5 * (a->angle - b->angle);
-    out.sigma_x += dx * dx;
-    out.sigma_angle += da * da;
-    cross += dx * da;
+    DetachVector up = left.mean, down = left.mean;
+    up[j] += std::sqrt(left.variance[j]), down[j] -= std::sqrt(left.variance[j]);
+    if (!unknown.add(land(predicted.detach, up), land(predicted.detach, down))) return {};
   }
-  out.sigma_x = std::sqrt(out.sigma_x);
-  out.sigma_angle = std::sqrt(out.sigma_angle);
+  for (std::size_t k = 0; k < PredictedDetach::kOfCard; ++k)
+    if (!unknown.add(land(plus(predicted.detach, predicted.by[k], 1), left.mean),
+                     land(plus(predicted.detach, predicted.by[k], -1), left.mean)))
+      return {};
+  FlipForecast out{*mean, std::sqrt(unknown.x),  std::sqrt(unknown.angle),
+                   0,     std::sqrt(scatter_.x), std::sqrt(scatter_.angle),
+                   0};
+  if (of_declared_) {
+    const auto declared =
+        declared_scatter(predicted, [&](const DetachVector& detach) { return land(detach, left.mean); });
+    if (!declared) return {};
+    out.scatter_x = std::sqrt((*of_declared_)[0] * declared->x);
+    out.scatter_angle = std::sqrt((*of_declared_)[1] * declared->angle);
+  }
   const double product = out.sigma_x * out.sigma_angle;
-  out.correlation = product > 0 ? std::clamp(cross / product, -1.0, 1.0) : 0.0;
-  out.probability = probability_of_hits(out, scatter_, target_, throws_);
+  out.correlation = product > 0 ? std::clamp(unknown.cross / product, -1.0, 1.0) : 0.0;
+  out.probability = probability_of_hits(out, target_, throws_);
   return out;
 }
 
 std::optional<FlipForecast> ReleaseLearner::forecast(const FlipCommand& u) const {
-  const auto release = predicted_release(library_.simulate(u), card_, library_.bar());
-  if (!release) return {};
-  return forecast(library_.robot().motion.range.fractions(u), release->detach);
+  const FlipRobot& robot = library_.robot();
+  const auto predicted = predicted_detach(library_.simulate(u), fit_, library_.bar(), robot.throws);
+  if (!predicted) return {};
+  return forecast(robot.motion.range.fractions(u), *predicted);
 }
 
 /// The probability; far from the target, where it is zero everywhere, the error decides.
@@ -236,10 +337,12 @@ std::optional<FlipCommand> ReleaseLearner::next() {
     double worth;
   };
   std::vector<Point> points;
-  for (std::size_t i = 0; i < mesh_.size(); ++i) {
-    if (!mesh_[i]) continue;
+  for (std::size_t i = 0; i < mesh_[0].size(); ++i) {
+    if (!mesh_[0][i]) continue;
     const auto at = range.fractions(library_.commands()[i]);
-    points.push_back({at, worth(forecast(at, *mesh_[i]))});
+    PredictedDetach predicted{*mesh_[0][i], {}};
+    for (std::size_t k = 0; k < PredictedDetach::kAll; ++k) predicted.by[k] = *mesh_[1 + k][i];
+    points.push_back({at, worth(forecast(at, predicted))});
   }
   if (points.empty()) return {};
   // The best points of the mesh that are not neighbours, each improved along the axes by halved steps.
@@ -262,7 +365,7 @@ std::optional<FlipCommand> ReleaseLearner::next() {
           Point tried = at;
           tried.at[k] = std::clamp(tried.at[k] + side, 0.0, 1.0);
           if (tried.at[k] == at.at[k]) continue;
-          const auto predicted = library_.between(mesh_, tried.at);
+          const auto predicted = between(tried.at);
           tried.worth = worth(predicted ? forecast(tried.at, *predicted) : std::nullopt);
           if (!(tried.worth > at.worth)) continue;
           at = tried;
@@ -280,7 +383,7 @@ void ReleaseLearner::observe(std::span<const FlipTrial> trials) {
   const auto mean = mean_of(trials);
   if (!mean) return;
   const std::vector<FlipDatum> one{*mean};
-  for (const LeftOver& left : left_over(library_, card_, one)) samples_.push_back(left);
+  for (const LeftOver& left : left_over(library_, fit_.card, one)) samples_.push_back(left);
   field_.set(samples_, scatter_.detach);
 }
 

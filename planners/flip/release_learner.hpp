@@ -58,23 +58,36 @@ class LeftOverField {
 struct FlipForecast {
   FlipPose mean;                                   ///< of the landings
   double sigma_x{}, sigma_angle{}, correlation{};  ///< of what is not known of the command's mean landing
+  double scatter_x{}, scatter_angle{};             ///< 1 σ of a throw about it [m, rad]
   double probability{};                            ///< that all throws of it land within the tolerances
 };
 
 /// The probability that `throws` of a command all land within the target's tolerances: they share the
 /// command's mean landing, of which the forecast tells, and each scatters about it. To 1e-4, by the
-/// trapezoidal rule over what is not known of the mean; less exact where that is more than forty times the
-/// scatter.
-double probability_of_hits(const FlipForecast& forecast, const ThrowScatter& scatter,
-                           const FlipTarget& target, int throws);
+/// trapezoidal rule over what is not known of the mean (scatter > 0); less exact where that is more than
+/// forty times the scatter.
+double probability_of_hits(const FlipForecast& forecast, const FlipTarget& target, int throws);
+
+/// The state at detach that a card predicts, and how it changes by one σ of what is not known: of the card,
+/// in four directions that do not correlate, and between throws as the robot declares it: friction with grip
+/// force, dead time, opening time, the held point along the bar, the bar's angle in the hand.
+struct PredictedDetach {
+  static constexpr std::size_t kOfCard = 4, kAll = 9;  ///< directions
+  DetachVector detach{};                               ///< m, m, rad, m/s, m/s, rad/s
+  std::array<DetachVector, kAll> by{};                 ///< half the change from −σ to +σ
+};
+/// Empty where the bar is not let go in time.
+std::optional<PredictedDetach> predicted_detach(const release::HandMotion& hand, const ReleaseFit& fit,
+                                                const Bar& bar, const ThrowSpread& throws);
 
 /// Model 4: tries the command that most probably lands within the tolerances.
 class ReleaseLearner final : public FlipLearner {
  public:
-  /// `known`: what was left over of earlier throws, of this bar or another one. `throws`: of each command.
-  /// Keeps a reference to `library`. Throws std::invalid_argument as validate(target) does, and for fewer
-  /// than one throw.
-  ReleaseLearner(const HandLibrary& library, const ReleaseCard& card, std::vector<LeftOver> known,
+  /// `known`: what was left over of earlier throws, of this bar or another one. `scatter`: of their landings;
+  /// how it differs between commands is as the robot declares its throws. `throws`: of each command. Keeps a
+  /// reference to `library`. Throws std::invalid_argument as validate(target) does, and for fewer than one
+  /// throw.
+  ReleaseLearner(const HandLibrary& library, const ReleaseFit& fit, std::vector<LeftOver> known,
                  const ThrowScatter& scatter, const FlipTarget& target, int throws);
   /// With the same knowledge at another target.
   ReleaseLearner aimed_at(const FlipTarget& target) const;
@@ -85,18 +98,23 @@ class ReleaseLearner final : public FlipLearner {
   std::optional<FlipForecast> forecast(const FlipCommand& u) const;
 
  private:
-  std::optional<FlipForecast> forecast(const std::array<double, 3>& fractions,
-                                       const DetachVector& predicted) const;
+  using Fractions = std::array<double, 3>;
+  std::optional<PredictedDetach> between(const Fractions& fractions) const;
+  std::optional<FlipForecast> forecast(const Fractions& fractions, const PredictedDetach& predicted) const;
   double worth(const std::optional<FlipForecast>& forecast) const;
 
   const HandLibrary& library_;
-  ReleaseCard card_;
+  ReleaseFit fit_;
   std::vector<LeftOver> samples_;
   ThrowScatter scatter_;
+  /// Seen variances of landings over those that are declared for the same commands, x and angle; none where
+  /// nothing was thrown.
+  std::optional<std::array<double, 2>> of_declared_;
   FlipTarget target_;
   int throws_;
   LeftOverField field_;
-  std::vector<std::optional<DetachVector>> mesh_;  ///< predicted, of the library's commands
+  /// Of the library's commands: the state at detach, and its changes.
+  std::array<std::vector<std::optional<DetachVector>>, 1 + PredictedDetach::kAll> mesh_;
 };
 
 }  // namespace unhand::planners::flip
