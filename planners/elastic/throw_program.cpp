@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kNone = 1e20;
 constexpr int kFixed = -1;  ///< no variable: the quantity is constant in this phase
-/// Weight of the integrated squares of the scaled accelerations beside −speed²: it picks one of many motions
+/// Weight of the mean square of the scaled accelerations beside −speed²: it picks one of many motions
 /// that hardly differ in speed, at the price of some 1e-3 of the speed.
 constexpr double kSmoothing = 2e-3;
 
@@ -43,6 +43,7 @@ class ThrowProgram {
       add_phase(mode_of(task.drive), 2 * options.intervals);
     }
     if (task.let_go) fix(phases_.front().step, *task.let_go / options.intervals);
+    smooth();
     fix_start();
     constrain_release();
     limit_duration();
@@ -186,14 +187,27 @@ class ThrowProgram {
                                            kAcceleration),
                            {0, 0}, {0, 0});
       }
-    // ∫ a² dt over the longest time: not each phase's own mean square, under which one would vanish.
-    for (int k = 0; k <= n; ++k)
-      for (int i = 0; i < 4; ++i)
-        if (const int a = phase.points[k].acceleration[i]; a != kFixed) {
-          const double simpson = (k == 0 || k == n ? 1.0 : k % 2 ? 4.0 : 2.0) / 6.0;
-          program_.minimise(
-              square_over_time({a, phase.step}, (task_.target ? 1.0 : kSmoothing) * simpson / task_.longest));
+  }
+
+  /// Towards a small mean square of the accelerations, over time and both phases: of means phase by phase,
+  /// one phase would vanish.
+  void smooth() {
+    for (std::size_t index = 0; index < phases_.size(); ++index) {
+      const PhasePlan& phase = phases_[index];
+      const int n = 2 * phase.intervals;
+      for (int k = 0; k <= n; ++k)
+        for (const int a : phase.points[k].acceleration) {
+          if (a == kFixed) continue;
+          const double simpson = (k == 0 || k == n ? 1.0
+                                  : k % 2          ? 4.0
+                                                   : 2.0) /
+                                 (3.0 * n),
+                       weight = (task_.target ? 1.0 : kSmoothing) * simpson;
+          program_.minimise(phases_.size() == 1
+                                ? weighted_square({a}, weight)
+                                : square_in_share({a, phase.step, phases_[1 - index].step}, weight));
         }
+    }
   }
 
   /// A held motor gives nothing: its torque stays zero.

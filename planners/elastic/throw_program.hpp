@@ -30,7 +30,8 @@ const char* to_string(Drive);
 struct ThrowTask {
   Drive drive{Drive::clutched};  ///< how the last joint is driven
   std::optional<Target> target;  ///< none: the tip's speed is maximised; else the smoothest throw to it is
-                                 ///< sought, of the least ∫ |q̈|² dt of links and motor
+                                 ///< sought, of the least mean square over time of the accelerations of
+                                 ///< links and motor
   std::optional<Links<double>> start;  ///< pose at the start [rad]; none: free. The arm starts at rest, its
                                        ///< spring unloaded (clutched) or in equilibrium (series)
   double longest{1.0};                 ///< [s], of the whole motion, 0.1 to 10

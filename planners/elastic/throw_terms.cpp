@@ -117,11 +117,19 @@ class LinearTerm final : public Term {
   std::vector<double> factors_;
 };
 
-struct SquareOverTime {
+struct WeightedSquare {
   double weight;
   template <class S>
   void operator()(const S* x, S* f) const {
-    f[0] = weight * x[1] * x[0] * x[0];
+    f[0] = weight * x[0] * x[0];
+  }
+};
+
+struct SquareInShare {
+  double weight;
+  template <class S>
+  void operator()(const S* x, S* f) const {
+    f[0] = weight * x[0] * x[0] * x[1] / (x[1] + x[2]);
   }
 };
 
@@ -153,8 +161,11 @@ TermPointer term(std::vector<int> variables, Law law) {
 TermPointer hermite_simpson(std::vector<int> v, double scale) {
   return term<7, 2>(std::move(v), HermiteSimpson{scale});
 }
-TermPointer square_over_time(std::vector<int> v, double weight) {
-  return term<2, 1>(std::move(v), SquareOverTime{weight});
+TermPointer weighted_square(std::vector<int> v, double weight) {
+  return term<1, 1>(std::move(v), WeightedSquare{weight});
+}
+TermPointer square_in_share(std::vector<int> v, double weight) {
+  return term<3, 1>(std::move(v), SquareInShare{weight});
 }
 TermPointer linear(std::vector<int> v, std::vector<double> factors) {
   return std::make_unique<LinearTerm>(std::move(v), std::move(factors));

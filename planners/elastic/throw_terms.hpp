@@ -23,8 +23,11 @@ struct Target {
 /// (x₀, x_m, x₁, ẋ₀, ẋ_m, ẋ₁, h), ẋ given in units of `scale`: x₁ − x₀ − h/6 (ẋ₀ + 4 ẋ_m + ẋ₁) and
 /// x_m − ½ (x₀ + x₁) − h/8 (ẋ₀ − ẋ₁) [HargravesParis1987].
 TermPointer hermite_simpson(std::vector<int> variables, double scale);
-/// (x, h) -> weight h x²: a point's part in an integral of x² over intervals of the length h.
-TermPointer square_over_time(std::vector<int> variables, double weight);
+/// (x) -> weight x².
+TermPointer weighted_square(std::vector<int> variables, double weight);
+/// (x, h, h') -> weight x² h/(h + h'): in a mean over two phases of as many intervals of the lengths h and
+/// h'.
+TermPointer square_in_share(std::vector<int> variables, double weight);
 /// Rows of factors times the variables.
 TermPointer linear(std::vector<int> variables, std::vector<double> factors);
 

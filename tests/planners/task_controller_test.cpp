@@ -169,6 +169,56 @@ TEST(JointLaw, LyapunovFunctionFallsByTheDampingButForTheMassThatChanges) {
   }
 }
 
+// Eq. 35 with the true parameters: M (α − q̈) + C s + k_v s + Jᵀ k_ξ e_ξ = 0, and Y_r times what is not known
+// of the load else. α and β are formed here from differences of the Jacobian and its pseudo-inverse.
+TEST(TaskLaw, LeavesASpringADamperAndTheUnknownLoad) {
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> one(-1, 1);
+  for (int k = 0; k < 50; ++k) {
+    const OnItsWay at(random);
+    const auto tip = forward_kinematics<double>(at.known, at.q);
+    const Eigen::Vector3d off = 0.02 * Eigen::Vector3d(one(random), one(random), one(random)),
+                          turned = 0.2 * Eigen::Vector3d(one(random), one(random), one(random)),
+                          velocity(one(random), one(random), one(random)),
+                          acceleration = 3 * Eigen::Vector3d(one(random), one(random), one(random));
+    const Eigen::Matrix3d turn = Eigen::AngleAxisd(turned.norm(), turned.normalized()).toRotationMatrix();
+    TaskGains gains;
+    gains.stiffness = 40, gains.rotational = 8, gains.damping = at.gains.damping;
+    gains.rest = at.q + 0.3 * JointVector<double>::Random(7);
+
+    using Matrix = Eigen::MatrixXd;
+    const auto J_at = [&](const JointVector<double>& q) { return Matrix(jacobian<double>(at.known, q)); };
+    const double h = 1e-6;
+    const Matrix J = J_at(at.q), J_rate = (J_at(at.q + h * at.qd) - J_at(at.q - h * at.qd)) / (2 * h),
+                 inverse = J.completeOrthogonalDecomposition().pseudoInverse(),
+                 null = Matrix::Identity(7, 7) - inverse * J;
+    Eigen::VectorXd rate(6), wanted(6), pull(6);
+    rate << velocity, Eigen::Vector3d::Zero();
+    wanted << acceleration, Eigen::Vector3d::Zero();
+    pull << gains.stiffness * off, gains.rotational * turned;
+    const Eigen::VectorXd beta = inverse * rate + gains.posture * null * (gains.rest - at.q),
+                          alpha = inverse * (wanted - J_rate * at.qd) - gains.posture * null * at.qd;
+    const JointVector<double> s = beta - at.qd;
+    const Matrix C = coriolis_matrix<double>(at.truth, at.q, at.qd),
+                 C_known = coriolis_matrix<double>(at.known, at.q, at.qd),
+                 M = mass_matrix<double>(at.truth, at.q), M_known = mass_matrix<double>(at.known, at.q);
+    const Eigen::VectorXd lacks = (M - M_known) * alpha + (C - C_known) * beta +
+                                  gravity_torque<double>(at.truth, at.q) -
+                                  gravity_torque<double>(at.known, at.q);
+    for (const double learnt : {0.0, 0.4, 1.0}) {
+      AdaptiveController controller(at.known, {});
+      controller.estimate = learnt * at.load;
+      const ControlStep step =
+          controller.task_law({tip.p + off, velocity, acceleration, turn * tip.R}, gains, at.q, at.qd);
+      EXPECT_LE((step.velocity_error - s).norm(), 1e-8) << k;
+      const Eigen::VectorXd left =
+          M * (alpha - at.acceleration(step)) + C * s + gains.damping.cwiseProduct(s) + J.transpose() * pull;
+      // Differences of the Jacobian near singular poses
+      EXPECT_LE((left - (1 - learnt) * lacks).norm(), 1e-6 * (1 + alpha.norm())) << k << ' ' << learnt;
+    }
+  }
+}
+
 /// A robot without noise, whose friction is the model's.
 StudyOptions ideal() {
   StudyOptions o;
