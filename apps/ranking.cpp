@@ -172,15 +172,22 @@ std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects) {
 }
 
 std::string filter_text(const std::vector<fitting::AcceptedEffect>& effects) {
-  for (const auto& effect : effects)
-    if (effect.id == "sensor.ft_time_offset" && !effect.parameters.empty() &&
-        effect.parameters.front().value > 0)
-      return fmt::format(
-          "A low-pass filter of the F/T sensor with a time constant of {:.3g} ms ({:.0f} Hz) delays what it "
-          "reads by as much as such a clock does: its data sheet, or a tap on the sensor, tells which.",
-          1e3 * effect.parameters.front().value,
-          1 / (2 * std::numbers::pi * effect.parameters.front().value));
-  return {};
+  std::string out;
+  for (const auto& effect : effects) {
+    const bool wrench = effect.id == "sensor.ft_time_offset";
+    if ((!wrench && effect.id != "sensor.mocap_time_offset") || effect.parameters.empty() ||
+        !(effect.parameters.front().value > 0))
+      continue;
+    const double late = effect.parameters.front().value;
+    out += fmt::format(
+        "{}A low-pass filter of the {} with a time constant of {:.3g} ms ({:.0f} Hz) delays what it {} by as "
+        "much as such a clock does: {} tells which.",
+        out.empty() ? "" : " ", wrench ? "F/T sensor" : "tracker", 1e3 * late,
+        1 / (2 * std::numbers::pi * late), wrench ? "reads" : "sees",
+        wrench ? "its data sheet, or a tap on the sensor,"
+               : "a knock that both the tracker and another sensor see");
+  }
+  return out;
 }
 
 std::string unexplained_text(std::span<const fitting::AcceptedEffect> effects,

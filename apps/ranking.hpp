@@ -49,7 +49,8 @@ Json skipped_json(const std::vector<std::pair<std::string, std::string>>& skippe
 
 /// Where mass and inertia are off by the same ratio: that it may be a gain of the wrench. Else empty.
 std::string gain_text(const std::vector<fitting::AcceptedEffect>& effects);
-/// The filter that would explain an accepted delay of the F/T sensor as well; empty without one.
+/// The filters that would explain accepted delays of the F/T sensor and the tracker as well; empty without
+/// any.
 std::string filter_text(const std::vector<fitting::AcceptedEffect>& effects);
 
 /// What is unexplained, with what that means for the sizes of what was found.

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <set>
 
 #include "dynamics/dense_solve.hpp"
@@ -246,30 +247,42 @@ MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const M
     }
   MissingCandidate out;
   if (!(samples > 0)) return out;
-  std::vector<Eigen::Index> chosen;
-  Eigen::VectorXd x;
-  double gain = 0;
   const auto solved = [&](const std::vector<Eigen::Index>& of, Eigen::VectorXd& at) {
     const Eigen::VectorXd b = g(of);
     at = pseudo_solve(H(of, of), b);
     return at.dot(b);
   };
-  while (static_cast<int>(chosen.size()) < options.terms) {
-    Eigen::Index best = -1;
+  // The best single term, then the best pair, whether the first is in it or not, and so on.
+  std::vector<Eigen::Index> chosen;
+  Eigen::VectorXd x;
+  double gain = 0;
+  for (int size = 1; size <= options.terms; ++size) {
+    std::vector<Eigen::Index> best, tried;
     double best_gain = gain;
-    for (Eigen::Index j = 0; j < width; ++j) {
-      if (std::find(chosen.begin(), chosen.end(), j) != chosen.end() || !(H(j, j) > 0)) continue;
-      auto with = chosen;
-      with.push_back(j);
-      Eigen::VectorXd at;
-      const double of = solved(with, at);
-      if (of > best_gain) best_gain = of, best = j;
-    }
-    if (best < 0 || best_gain - gain < std::max(2 * std::log(samples), 0.2 * (squares - gain - samples)))
+    const std::function<void(Eigen::Index)> try_from = [&](Eigen::Index first) {
+      if (static_cast<int>(tried.size()) == size) {
+        Eigen::VectorXd at;
+        if (const double of = solved(tried, at); of > best_gain) best_gain = of, best = tried;
+        return;
+      }
+      for (Eigen::Index j = first; j < width; ++j) {
+        if (!(H(j, j) > 0)) continue;
+        tried.push_back(j);
+        try_from(j + 1);
+        tried.pop_back();
+      }
+    };
+    try_from(0);
+    if (best.empty() || best_gain - gain < std::max(2 * std::log(samples), 0.2 * (squares - gain - samples)))
       break;
-    chosen.push_back(best);
+    chosen = best;
     gain = solved(chosen, x);
   }
+  // Strongest first: by what alone they take off.
+  const auto alone = [&](Eigen::Index j) { return g[j] * g[j] / H(j, j); };
+  std::sort(chosen.begin(), chosen.end(),
+            [&](Eigen::Index i, Eigen::Index j) { return alone(i) > alone(j); });
+  gain = chosen.empty() ? 0 : solved(chosen, x);
   if (chosen.empty()) return out;
   const double scatter = std::max(1.0, (squares - gain) / samples);
   const Eigen::MatrixXd covariance = pseudo_inverse(H(chosen, chosen)) * scatter;

@@ -74,11 +74,12 @@ struct MissingCandidate {
   std::string in_words() const;
 };
 
-/// Sparse regression by forward selection: a term enters while it lowers χ² by more than 2 log n and by a
-/// fifth of what exceeds the noise. Accelerations: v, |v| v, |v|² v, ω J v, a constant along x or z, one and
-/// ω² along each of the object's axes (a reference point off the CoM), and for the rotation a constant, ω,
-/// |ω| ω, sin θ and cos θ. Wrenches: a constant, f_N, and f_N² of each component, and |v| and ω for their
-/// dependence on the motion.
+/// Sparse regression: of every number of terms up to `terms` those that explain most; one more while it
+/// lowers χ² by more than 2 log n and by a fifth of what exceeds the noise. (Adding to the best smaller set
+/// would miss pairs that stand for a third term together.) Accelerations: v, |v| v, |v|² v, ω J v, a constant
+/// along x or z, one and ω² along each of the object's axes (a reference point off the CoM), and for the
+/// rotation a constant, ω, |ω| ω, sin θ and cos θ. Wrenches: a constant, f_N, and f_N² of each component, and
+/// |v| and ω for their dependence on the motion.
 MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const MissingOptions& options);
 
 /// χ² of the traces around what a candidate says, each recording's own offset and slope projected out where

@@ -14,6 +14,8 @@ bool in_air(Phase phase);
 bool acts_on_pads(const std::string& id);
 /// Whether an effect is one of sensing, or of what the log declares.
 bool is_of_sensor(const std::string& id);
+/// Whether an effect acts in the hand and in the air alike (Effect::acts_everywhere); laws do not.
+bool acts_everywhere(const std::string& id);
 /// Whether an effect on the pads was added.
 bool acts_on_pads(const Stage& stage);
 /// Whether an effect acts in the air, or in the hand: where the misfit fell most, an effect on the pads in

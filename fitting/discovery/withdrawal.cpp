@@ -36,18 +36,21 @@ bool is_shown_unloaded(Channel channel, const std::vector<ChannelMisfit>& base,
 /// a channel that it `explains`, of what the base model's fit left there in the other throws (`other`: train
 /// against held-out ones) as well; and not next to nothing of what the base left in that phase's worst
 /// channel; for an effect on the pads, which flights and landings show as well, what is left in the hand, in
-/// any phase's. Readings of an unloaded sensor are of sensors alone, and where they have shown a sensor's
-/// effect, what is left of the same channel under load is something else's.
-template <class Explains>
+/// any phase's; for an effect that acts everywhere, in the other half only a channel that it `worsens`.
+/// Readings of an unloaded sensor are of sensors alone, and where they have shown a sensor's effect, what is
+/// left of the same channel under load is something else's.
+template <class Explains, class Worsens>
 const ChannelMisfit* too_much_left(const AcceptedEffect& effect, const std::vector<ChannelMisfit>& base,
                                    const std::vector<ChannelMisfit>& other,
                                    const std::vector<ChannelMisfit>& now, const DiscoverOptions& options,
-                                   const Explains& explains) {
+                                   const Explains& explains, const Worsens& worsens) {
   const bool sensor = is_of_sensor(effect.id);
   const auto answers_for = [&](const ChannelMisfit& m) {
     if (is_unloaded(m.channel, m.phase) ? !sensor
                                         : sensor && is_shown_unloaded(m.channel, base, now, options))
       return false;
+    // What acts everywhere answers in the other half of the throw for what it makes worse there.
+    if (acts_everywhere(effect.id) && in_air(effect.phase) != in_air(m.phase)) return worsens(m);
     return acts(effect, in_air(m.phase)) || explains(m);
   };
   const auto worst = [&](Phase phase) {
@@ -99,7 +102,8 @@ bool explains_most(const ChannelMisfit& now, const std::vector<ChannelMisfit>& w
 
 std::string why_imitation(const AcceptedEffect& effect, const Stage& stage, const BothErrors& errors,
                           const FitResult& counted, const Discovery& so_far, const DiscoverOptions& options) {
-  if (acts(effect, false) && leaves_lacking(errors, so_far, options) &&
+  const bool by_flights = acts_everywhere(effect.id) && in_air(effect.phase);
+  if (acts(effect, false) && !by_flights && leaves_lacking(errors, so_far, options) &&
       (!is_of_sensor(effect.id) || bears_on_lacking(effect, stage, errors, so_far, options)))
     return "it leaves what predictions lack";
   if (!is_law(effect.id) && !is_told_from_none(counted, find_effect(effect.id), options.family_wise_level))
@@ -112,10 +116,17 @@ std::string why_imitation(const AcceptedEffect& effect, const Stage& stage, cons
       return less.solved() && explains_most(m, (less.*half).misfit);
     };
   };
+  const auto worsens = [&](FitResult Stage::*half) {
+    return [&, half](const ChannelMisfit& m) {
+      const Stage& less = without(stage, {effect.id}, options);
+      return !less.solved() || m.chi2_per_sample() - misfit_in((less.*half).misfit, m.channel, m.phase) >
+                                   kLeft * (m.chi2_per_sample() - 1);
+    };
+  };
   const auto too_much = [&](FitResult Stage::*half, const std::vector<ChannelMisfit>& base,
                             const std::vector<ChannelMisfit>& other, const char* throws) -> std::string {
     const ChannelMisfit* left =
-        too_much_left(effect, base, other, (stage.*half).misfit, options, explains(half));
+        too_much_left(effect, base, other, (stage.*half).misfit, options, explains(half), worsens(half));
     if (!left) return {};
     return fmt::format("it leaves {} in {} at {:.3g} times the noise on the {} throws",
                        to_string(left->channel), to_string(left->phase), left->chi2_per_sample(), throws);

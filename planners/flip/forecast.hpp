@@ -18,6 +18,8 @@ class HandLibrary {
  public:
   /// Simulates `per_side`³ commands, 2 to 64; the robot is kept by reference.
   HandLibrary(const FlipRobot& robot, const Bar& bar, int per_side = 7);
+  /// A robot that would be gone.
+  HandLibrary(const FlipRobot&& robot, const Bar& bar, int per_side = 7) = delete;
 
   /// The declared robot.
   const FlipRobot& robot() const { return robot_; }

@@ -43,6 +43,8 @@ class FlipPlant {
  public:
   /// Keeps a reference to `robot`.
   FlipPlant(const FlipRobot& robot, std::uint64_t seed);
+  /// A robot that would be gone.
+  FlipPlant(const FlipRobot&& robot, std::uint64_t seed) = delete;
 
   /// Throws the bar once. Equal seeds give equal throws. Throws std::invalid_argument for a command or
   /// options out of range.

@@ -324,10 +324,12 @@ std::optional<FlipForecast> ReleaseLearner::forecast(const FlipCommand& u) const
   return forecast(robot.motion.range.fractions(u), *predicted);
 }
 
-/// The probability; far from the target, where it is zero everywhere, the error decides.
+/// The probability; among commands that hit about as surely, and far from the target, where none does, the
+/// error decides.
 double ReleaseLearner::worth(const std::optional<FlipForecast>& forecast) const {
   if (!forecast) return -1;
-  return forecast->probability - 1e-3 * std::min(1e2, normalized_error(forecast->mean, target_));
+  constexpr double kPerTolerance = 0.02;
+  return forecast->probability - kPerTolerance * std::min(49.0, normalized_error(forecast->mean, target_));
 }
 
 std::optional<FlipCommand> ReleaseLearner::next() {

@@ -91,6 +91,10 @@ TEST(FilterText, NamesTheFilterThatDelaysAsMuch) {
   late.id = "sensor.ft_time_offset";
   late.parameters = {{"offset", "s", 0.796e-3, 2e-5}};
   EXPECT_THAT(filter_text({late}), testing::HasSubstr("0.796 ms (200 Hz)"));
+  fitting::AcceptedEffect tracker = late;
+  tracker.id = "sensor.mocap_time_offset";
+  EXPECT_THAT(filter_text({tracker}), testing::HasSubstr("of the tracker with a time constant of 0.796 ms"));
+  EXPECT_THAT(filter_text({late, tracker}), testing::HasSubstr("data sheet"));
   late.parameters.front().value = -1e-3;  // no filter is early
   EXPECT_EQ(filter_text({late}), "");
   EXPECT_EQ(filter_text({}), "");
