@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
+#include <utility>
 
 #include "fitting/discovery/acceptance.hpp"
 #include "fitting/discovery/misfit_rules.hpp"
@@ -71,14 +73,14 @@ std::size_t unknowns_of(const FitResult& fit, const std::vector<std::string>& id
 
 }  // namespace
 
-std::optional<AskedForm> form_asked_for(const Stage& stage, const Discovery& so_far,
-                                        const DiscoverOptions& options) {
+AskedForm form_asked_for(const Stage& stage, const Discovery& so_far, const DiscoverOptions& options) {
+  AskedForm out;
   std::vector<std::string> accepted;
   for (const AcceptedEffect& effect : so_far.effects)
     if (bends_flights(effect)) accepted.push_back(effect.id);
-  if (accepted.empty()) return {};
+  if (accepted.empty()) return out;
   const Stage& less = without(stage, accepted, options);
-  if (!less.solved()) return {};
+  if (!less.solved()) return out;
   const int threads = options.fit.threads;
   const auto flights = [&](const Stage& of, const FitResult& half) {
     return traces_of(of.problem, half, Phase::flight, threads);
@@ -88,7 +90,18 @@ std::optional<AskedForm> form_asked_for(const Stage& stage, const Discovery& so_
   const Rest effects = left_by({}, flights(stage, stage.fit)), form = left_by(candidates, train);
   // They may have no part in the flights, or these may lack no acceleration.
   const double lacked = beyond_noise(left_by({}, train));
-  if (!(lacked > 0 && std::max(beyond_noise(effects), beyond_noise(form)) < kOutdone * lacked)) return {};
+  if (!(lacked > 0 && beyond_noise(form) < kOutdone * lacked)) return out;
+  std::vector<std::string> outdone = accepted;
+  for (const auto& [object, candidate] : candidates)
+    for (const MissingTerm& term : candidate.terms) {
+      const auto is_its_own = [&](const std::string& id) {
+        return term.form != dynamics::AccelerationForm::none && find_effect(id).form == term.form;
+      };
+      std::copy_if(accepted.begin(), accepted.end(), std::back_inserter(out.backed), is_its_own);
+      out.unlisted |= std::none_of(accepted.begin(), accepted.end(), is_its_own);
+      std::erase_if(outdone, is_its_own);
+    }
+  if (!(beyond_noise(effects) < kOutdone * lacked)) return out;
   const Rest effects_held_out = left_by({}, flights(stage, stage.held_out)),
              form_held_out = left_by(candidates, flights(less, less.held_out));
   double terms = 0;
@@ -97,26 +110,19 @@ std::optional<AskedForm> form_asked_for(const Stage& stage, const Discovery& so_
   const double bic =
       more * std::log(static_cast<double>(std::max(2L, form.degrees_of_freedom))) - likelier(effects, form);
   if (!(bic <= kDeltaBic) || !(likelier(effects_held_out, form_held_out) > 2 * std::log(kTimesAsLikely)))
-    return {};
+    return out;
   // Beside a misfit that a form lowers by little, the effects may be true, and something acts beside them.
   const auto halves = [](const Rest& by_form, const Rest& by_effects) {
     return beyond_noise(by_form) < kOutdone * beyond_noise(by_effects);
   };
   if (leaves_flights(stage, options) && !(halves(form, effects) && halves(form_held_out, effects_held_out)))
-    return {};
-  AskedForm out{accepted, {}, false};
+    return out;
+  out.outdone = std::move(outdone);
   for (const auto& [name, object] : train.objects) {
     const auto candidate = candidates.find(object);
     if (candidate == candidates.end() || candidate->second.terms.empty()) continue;
     out.words += (out.words.empty() ? "" : ", ") + candidate->second.in_words();
     if (train.objects.size() > 1) out.words += fmt::format(" for {}", name);
-    for (const MissingTerm& term : candidate->second.terms) {
-      const auto is_its_own = [&](const std::string& id) {
-        return term.form != dynamics::AccelerationForm::none && find_effect(id).form == term.form;
-      };
-      out.unlisted |= std::none_of(accepted.begin(), accepted.end(), is_its_own);
-      std::erase_if(out.outdone, is_its_own);
-    }
   }
   return out;
 }

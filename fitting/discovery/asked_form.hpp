@@ -2,8 +2,6 @@
 // to fitting.
 #pragma once
 
-#include <optional>
-
 #include "fitting/discovery/discover.hpp"
 #include "fitting/discovery/stage.hpp"
 
@@ -19,8 +17,8 @@ inline constexpr double kOutdone = 0.5;
 /// without them, and the terms do. They are outdone where a few terms (missing_terms, one candidate an
 /// object), fitted to the train throws in their place, win by Bayes' criterion there (kDeltaBic), and make
 /// the held-out flights kTimesAsLikely as likely; where the effects leave a misfit, if less than kOutdone of
-/// it is left in both halves, too. An effect whose own form is among those terms is not outdone.
-std::optional<AskedForm> form_asked_for(const Stage& stage, const Discovery& so_far,
-                                        const DiscoverOptions& options);
+/// it is left in both halves, too. An effect whose own form is among those terms is not outdone but backed,
+/// also where effects explain little of the flights. Without words: nothing else is asked for.
+AskedForm form_asked_for(const Stage& stage, const Discovery& so_far, const DiscoverOptions& options);
 
 }  // namespace unhand::fitting

@@ -77,20 +77,22 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   count_discrepancy(stage.problem, counted, options.fit.threads);
   const BothErrors errors = errors_of(stage, options.fit.threads);
   std::vector<std::string> gone, why;
-  const std::optional<AskedForm> asked = form_asked_for(stage, out, options);
-  if (asked) out.asked = asked;
+  const AskedForm asked = form_asked_for(stage, out, options);
+  if (!asked.words.empty()) out.asked = asked;
+  const auto is_among = [](const std::vector<std::string>& ids, const AcceptedEffect& effect) {
+    return std::find(ids.begin(), ids.end(), effect.id) != ids.end();
+  };
   std::array<bool, 2> misled{};  // in the hand, in the air
   for (const AcceptedEffect& effect : out.effects) {
     const bool in_company = (misled[0] && acts(effect, false)) || (misled[1] && acts(effect, true));
     const bool last = effect.id == out.effects.back().id;
     std::string here;
     if (in_company) here = "it was accepted in the company of one that is withdrawn";
-    if (here.empty()) here = why_imitation(effect, stage, errors, counted, out, options);
-    if (here.empty() && last && spoils(effect, stage, out, options))
+    if (here.empty())
+      here = why_imitation(effect, stage, errors, counted, is_among(asked.backed, effect), out, options);
+    if (here.empty() && last && !is_among(asked.backed, effect) && spoils(effect, stage, out, options))
       here = "with it a channel is noisier than under the base model";
-    if (here.empty() && asked &&
-        std::find(asked->outdone.begin(), asked->outdone.end(), effect.id) != asked->outdone.end())
-      here = "another form describes the flights better";
+    if (here.empty() && is_among(asked.outdone, effect)) here = "another form describes the flights better";
     if (here.empty()) continue;
     for (const bool air : {false, true}) misled[air ? 1 : 0] |= acts(effect, air);
     gone.push_back(effect.id), why.push_back(here);

@@ -42,10 +42,12 @@ bool is_shown_unloaded(Channel channel, const std::vector<ChannelMisfit>& base,
 template <class Explains, class Worsens>
 const ChannelMisfit* too_much_left(const AcceptedEffect& effect, const std::vector<ChannelMisfit>& base,
                                    const std::vector<ChannelMisfit>& other,
-                                   const std::vector<ChannelMisfit>& now, const DiscoverOptions& options,
-                                   const Explains& explains, const Worsens& worsens) {
+                                   const std::vector<ChannelMisfit>& now, bool backed,
+                                   const DiscoverOptions& options, const Explains& explains,
+                                   const Worsens& worsens) {
   const bool sensor = is_of_sensor(effect.id);
   const auto answers_for = [&](const ChannelMisfit& m) {
+    if (backed && in_air(m.phase)) return false;
     if (is_unloaded(m.channel, m.phase) ? !sensor
                                         : sensor && is_shown_unloaded(m.channel, base, now, options))
       return false;
@@ -101,7 +103,8 @@ bool explains_most(const ChannelMisfit& now, const std::vector<ChannelMisfit>& w
 }
 
 std::string why_imitation(const AcceptedEffect& effect, const Stage& stage, const BothErrors& errors,
-                          const FitResult& counted, const Discovery& so_far, const DiscoverOptions& options) {
+                          const FitResult& counted, bool backed, const Discovery& so_far,
+                          const DiscoverOptions& options) {
   const bool by_flights = acts_everywhere(effect.id) && in_air(effect.phase);
   if (acts(effect, false) && !by_flights && leaves_lacking(errors, so_far, options) &&
       (!is_of_sensor(effect.id) || bears_on_lacking(effect, stage, errors, so_far, options)))
@@ -125,8 +128,8 @@ std::string why_imitation(const AcceptedEffect& effect, const Stage& stage, cons
   };
   const auto too_much = [&](FitResult Stage::*half, const std::vector<ChannelMisfit>& base,
                             const std::vector<ChannelMisfit>& other, const char* throws) -> std::string {
-    const ChannelMisfit* left =
-        too_much_left(effect, base, other, (stage.*half).misfit, options, explains(half), worsens(half));
+    const ChannelMisfit* left = too_much_left(effect, base, other, (stage.*half).misfit, backed, options,
+                                              explains(half), worsens(half));
     if (!left) return {};
     return fmt::format("it leaves {} in {} at {:.3g} times the noise on the {} throws",
                        to_string(left->channel), to_string(left->phase), left->chi2_per_sample(), throws);

@@ -30,8 +30,11 @@ bool explains_most(const ChannelMisfit& now, const std::vector<ChannelMisfit>& w
 /// (`errors` are the stage's) by too much of what the base's lacked; a sensor's effect only
 /// where they lack another amount without it, as most sensors take no part in what happens, and not one that
 /// acts everywhere and is seen in flight: in the hand that is held against what it makes worse.
+/// What is left in flights is not held against an effect that they ask for, in its own form, beside another
+/// (`backed`).
 std::string why_imitation(const AcceptedEffect& effect, const Stage& stage, const BothErrors& errors,
-                          const FitResult& counted, const Discovery& so_far, const DiscoverOptions& options);
+                          const FitResult& counted, bool backed, const Discovery& so_far,
+                          const DiscoverOptions& options);
 
 /// By what share of its χ² an answer may leave a channel noisier than the base model did.
 inline constexpr double kNoisier = 0.25;
