@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kNoise = 5;      // σ
 constexpr std::size_t kSide = 6;  // frames that a parabola is fitted to
+constexpr std::size_t kEnds = 2;  // frames, at most, of either end, where nothing comes before or follows
 
 /// A coordinate by time, in units of its σ.
 struct Coordinate {
@@ -177,7 +178,9 @@ void find_in_stretch(const Coordinate& x, const std::vector<std::size_t>& frames
         side[1].push_back(frames[i]);
       else if (side[1].empty())
         ++run;
-    if (run > kLongestRun || (side[0].size() < 3 && side[1].size() < 3)) continue;
+    const auto shortest = std::min(side[0].size(), side[1].size()),
+               longest = std::max(side[0].size(), side[1].size());
+    if (longest < 3 || run > (shortest < 3 ? kEnds : kLongestRun)) continue;
     if (differences.is_smooth_about(frame) && is_off(x, frame, side[0]) && is_off(x, frame, side[1]))
       out[frame] = true;
   }
@@ -218,7 +221,6 @@ std::size_t mark_glitches(datasets::MocapLog& mocap) {
 
 std::vector<bool> held_frames(std::span<const std::vector<double>> columns, std::span<const double> sigma) {
   constexpr double kSigmas = 4, kSteps = 3;
-  constexpr std::size_t kEnds = 2;  // frames, at most, where no motion comes before or follows
   const std::size_t n = columns.front().size();
   std::vector<bool> out(n, false);
   std::vector<double> least;  // what is a motion, by column

@@ -15,10 +15,10 @@ namespace unhand::experiment {
 std::vector<bool> held_frames(std::span<const std::vector<double>> columns, std::span<const double> sigma);
 
 /// Those, and which frames were elsewhere in one of the columns: a third difference with their neighbours is
-/// more than eight of its sigmas; without them, at most five in a row, it is noise (five); and they lie, by
-/// more than that noise, on neither of the parabolas through the six frames before and after. So an impact is
-/// no glitch: each frame about it follows those before or those after. None where they are more than a tenth.
-/// `times` [s] increase. O(n).
+/// more than eight of its sigmas; without them, at most five in a row (two at either end), it is noise
+/// (five); and they lie, by more than that noise, on neither of the parabolas through the six frames before
+/// and after. So an impact is no glitch: each frame about it follows those before or those after. None where
+/// they are more than a tenth. `times` [s] increase. O(n).
 std::vector<bool> glitches(const std::vector<double>& times, std::span<const std::vector<double>> columns,
                            std::span<const double> sigma);
 

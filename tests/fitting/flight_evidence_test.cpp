@@ -118,7 +118,7 @@ TEST(FlightEvidence, FramesAfterTheEndOfTheFlightAreSaidToBeWhereItFails) {
   };
   EXPECT_EQ(told(0, true), "");
   EXPECT_THAT(told(2, true), testing::StartsWith("Without the last 4 frames"));
-  EXPECT_THAT(told(2, false), testing::StartsWith("Without the first 4 frames"));
+  EXPECT_THAT(told(3, false), testing::StartsWith("Without the first 4 frames"));
 }
 
 // Boxes that come to rest at the height of their size say that the tracker's scale is right. The same holds
