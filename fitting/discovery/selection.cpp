@@ -90,7 +90,8 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
     if (in_company) here = "it was accepted in the company of one that is withdrawn";
     if (here.empty())
       here = why_imitation(effect, stage, errors, counted, is_among(asked.backed, effect), out, options);
-    if (here.empty() && last && !is_among(asked.backed, effect) && spoils(effect, stage, out, options))
+    const bool stands = is_among(asked.backed, effect) && !acts(effect, false);  // whatever is beside it
+    if (here.empty() && last && !stands && spoils(effect, stage, out, options))
       here = "with it a channel is noisier than under the base model";
     if (here.empty() && is_among(asked.outdone, effect)) here = "another form describes the flights better";
     if (here.empty()) continue;
