@@ -122,6 +122,24 @@ TEST(Unexplained, APushThatTheHandDoesNotFeelIsNoTiltedGravity) {
   EXPECT_EQ(found.unexplained->phase, Phase::flight);
 }
 
+// Pads that wear from condition to condition leave predictions lacking, with a tilt or without: flights show
+// it.
+TEST(Unexplained, ATiltStaysBesidePadsThatWear) {
+  constexpr double kTilt = 0.008;
+  experiment::CampaignDesign design = support::loop_design();
+  design.effects = {{"flight.gravity_tilt.angle", kTilt}};
+  design.repetitions = 4;
+  datasets::ThrowLog log = experiment::campaign_header(design, 3);
+  const double fresh = design.patch.mu;
+  for (int i = 0; i < design.throws(); ++i) {
+    design.patch.mu = fresh * (1 - 0.03 * (i / design.repetitions));
+    log.throws.push_back(experiment::generate_throw(design, 3, i).record);
+  }
+  const Discovery found = found_in(log);
+  support::expect_size(found, "flight.gravity_tilt", kTilt);
+  EXPECT_TRUE(found.unexplained.has_value());
+}
+
 // A drag of the catalogue beside a push that is not in it: the rest is unexplained, and the drag stays.
 TEST(Unexplained, AListedEffectBesideAnUnlistedOneStays) {
   const Discovery found =
