@@ -243,27 +243,31 @@ TEST(HeldMotion, NeedsTheForceThatTheLargestLoadTakes) {
   BarThrow bar;
   const auto tube = bar.plan();
   ASSERT_TRUE(tube.plan) << tube.reason;
-  const ReleaseThrow p = bar.release(*tube.plan);
-  const auto needed = HeldMotion(p, tube.plan->motion, 1e-3).needed_force();
-  ASSERT_TRUE(needed);
-  double most = 0;
-  for (double t = tube.plan->motion.begin; t <= 0; t += 1e-3) {
-    const auto s = tube.plan->motion.at(t);
-    const auto tip = tip_motion<double>(bar.arm, s.q, s.qd, s.qdd);
-    const Eigen::Vector3d r = 0.14 * tip.frame.R.col(2),
-                          a = tip.acceleration + tip.alpha.cross(r) + tip.omega.cross(tip.omega.cross(r)),
-                          f = p.object.mass * (a + Eigen::Vector3d(0, 0, p.medium.gravity)),
-                          torque = p.object.inertia * tip.alpha + r.cross(f);
-    // f² + (τ/L)² = (n μ N)²
-    most = std::max(most, std::hypot(f.norm(), torque.y() / p.card.length));
+  for (const double angle : {0.0, 0.3}) {  // of the bar against the hand, counter-clockwise from x to z
+    ReleaseThrow p = bar.release(*tube.plan);
+    p.object.angle = angle;
+    const Eigen::AngleAxisd turn(angle, Eigen::Vector3d(0, -1, 0));
+    const auto needed = HeldMotion(p, tube.plan->motion, 1e-3).needed_force();
+    ASSERT_TRUE(needed);
+    double most = 0;
+    for (double t = tube.plan->motion.begin; t <= 0; t += 1e-3) {
+      const auto s = tube.plan->motion.at(t);
+      const auto tip = tip_motion<double>(bar.arm, s.q, s.qd, s.qdd);
+      const Eigen::Vector3d r = 0.14 * (turn * tip.frame.R.col(2)),
+                            a = tip.acceleration + tip.alpha.cross(r) + tip.omega.cross(tip.omega.cross(r)),
+                            f = p.object.mass * (a + Eigen::Vector3d(0, 0, p.medium.gravity)),
+                            torque = p.object.inertia * tip.alpha + r.cross(f);
+      // f² + (τ/L)² = (n μ N)²
+      most = std::max(most, std::hypot(f.norm(), torque.y() / p.card.length));
+    }
+    EXPECT_NEAR(*needed, most / (p.card.pads * p.card.mu.value), 5e-3 * *needed) << angle;
+    ReleaseThrow weaker = p;
+    weaker.card.grip_force = 0.99 * *needed;
+    EXPECT_FALSE(HeldMotion(weaker, tube.plan->motion).holds(nominal_draw(p)));
+    EXPECT_THAT(why_not_held(weaker, tube.plan->motion), testing::HasSubstr("needs at least"));
+    weaker.card.grip_force = 1.01 * *needed;
+    EXPECT_TRUE(HeldMotion(weaker, tube.plan->motion).holds(nominal_draw(p)));
   }
-  EXPECT_NEAR(*needed, most / (p.card.pads * p.card.mu.value), 5e-3 * *needed);
-  ReleaseThrow weaker = p;
-  weaker.card.grip_force = 0.99 * *needed;
-  EXPECT_FALSE(HeldMotion(weaker, tube.plan->motion).holds(nominal_draw(p)));
-  EXPECT_THAT(why_not_held(weaker, tube.plan->motion), testing::HasSubstr("needs at least"));
-  weaker.card.grip_force = 1.01 * *needed;
-  EXPECT_TRUE(HeldMotion(weaker, tube.plan->motion).holds(nominal_draw(p)));
 }
 
 TEST(HeldMotion, PadsThatGiveHoldWhatRigidOnesDo) {
