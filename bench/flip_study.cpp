@@ -23,12 +23,9 @@ using namespace flip_bench;
 /// Model 4 for the library's bar after throws of a bar, aimed at nothing in particular.
 ReleaseLearner learned(const HandLibrary& library, const HandLibrary& old, const Gathered& thrown) {
   const ReleaseFit fit = fit_release(old, prior_card(old.robot()), thrown.data);
-  return {library,
-          fit,
-          left_over(old, fit.card, thrown.data),
-          scatter_of(thrown.trials, old.bar().com_offset),
-          {},
-          3};
+  return {
+      library, fit, left_over(old, fit.card, thrown.data), scatter_of(thrown.trials, old.bar().com_offset),
+      {},      3};
 }
 
 /// Has no command: where fewer than three of the known ones landed.

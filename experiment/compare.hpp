@@ -86,7 +86,7 @@ std::vector<ThrownCondition> conditions_of(const std::vector<ThrowComparison>& t
 /// How far repetitions of a condition scatter about their mean: the floor of any model that does not know
 /// what differs between them.
 struct RepetitionScatter {
-  int conditions{};  ///< with at least two repetitions
+  int conditions{};                     ///< with at least two repetitions
   std::optional<double> landing_x;      ///< pooled standard deviation [m]; absent where none was measured
   std::optional<double> landing_theta;  ///< [deg]
 };
