@@ -74,10 +74,10 @@ RepetitionScatter scatter_of(const std::vector<PreparedThrow>& throws) {
   const auto sigma = [](const dynamics::PooledScatter& of) {
     return of.freedom() > 0 ? std::optional(of.sigma()) : std::nullopt;
   };
-  const auto x = pooled([](const MeasuredOutcome& m) { return m.landing_x; }),
-             theta = pooled([](const MeasuredOutcome& m) {
-               return m.landing_theta ? std::optional(*m.landing_theta * kDegrees) : std::nullopt;
-             });
+  const auto x = pooled([](const MeasuredOutcome& m) { return m.landing_x; });
+  const auto theta = pooled([](const MeasuredOutcome& m) {
+    return m.landing_theta ? std::optional(*m.landing_theta * kDegrees) : std::nullopt;
+  });
   return {std::max(x.groups(), theta.groups()), sigma(x), sigma(theta)};
 }
 
