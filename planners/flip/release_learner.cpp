@@ -135,6 +135,13 @@ double probability_of_hits(const FlipForecast& forecast, const FlipTarget& targe
                along = forecast.correlation * forecast.sigma_angle,
                across = std::sqrt(std::max(0.0, 1 - forecast.correlation * forecast.correlation)) *
                         forecast.sigma_angle;
+  const auto is_beyond = [](double off, double tolerance, double unknown, double scatter) {
+    return std::abs(off) > tolerance + 7 * std::hypot(unknown, scatter);
+  };
+  if (is_beyond(forecast.mean.x - target.pose.x, target.tolerance_x, forecast.sigma_x, scatter_x) ||
+      is_beyond(forecast.mean.angle - target.pose.angle, target.tolerance_angle, forecast.sigma_angle,
+                scatter_angle))
+    return 0;
   // What is summed varies within a scatter of the throws.
   const auto step = [&](double scattered, double moves) {
     return std::clamp(scattered / std::max(1e-12, std::abs(moves)), kShortest, kLongest);
@@ -253,8 +260,14 @@ ReleaseLearner::ReleaseLearner(const HandLibrary& library, const ReleaseFit& fit
       mesh_[1 + k].push_back(predicted ? std::optional(predicted->by[k]) : std::nullopt);
   }
   double x = 0, angle = 0, n = 0;
+  std::optional<HandLibrary> of_another_bar;
+  const auto hands_with = [&](const Bar& bar) -> const HandLibrary& {
+    if (bar == library_.bar()) return library_;
+    if (!of_another_bar || !(of_another_bar->bar() == bar)) of_another_bar.emplace(robot, bar, 2);
+    return *of_another_bar;
+  };
   for (const LeftOver& one : samples_) {
-    const HandLibrary of_its_bar(robot, one.bar, 2);
+    const HandLibrary& of_its_bar = hands_with(one.bar);
     const auto predicted =
         predicted_detach(of_its_bar.simulate(robot.motion.range.at(one.at[0], one.at[1], one.at[2])), fit_,
                          one.bar, robot.throws);
