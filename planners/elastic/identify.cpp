@@ -177,7 +177,8 @@ void whiten(const Eigen::VectorXd& left, int joints, double parameters, const Ei
     }
     if (!(squares > 0)) continue;  // without noise
     const double seen = products / squares, n = static_cast<double>(samples),
-                 stays = std::clamp((seen + parameters / n) / (1 - 3 * parameters / n), 0.0, 0.98),
+                 stays =
+                     std::clamp((seen + parameters / n) / std::max(0.5, 1 - 3 * parameters / n), 0.0, 0.98),
                  size = std::sqrt(squares / n * (1 - stays * stays)), first = std::sqrt(1 - stays * stays);
     for (Eigen::Index k = samples - 1; k >= 0; --k) {
       const Eigen::Index row = k * joints + i, before = row - joints;
