@@ -91,8 +91,8 @@ std::string measured_text(const SkuValidation& answer) {
       : contradicted                           ? "Contradicted"
       : m.p_value < fitting::kTooFewToBeChance ? "Fewer within the tolerance than asked"
                                                : "Neither confirmed nor contradicted",
-      m.throws.size() + static_cast<std::size_t>(m.never_lands), 100 * m.within, 100 * m.mae_x,
-      m.mae_theta * kDegrees, 100 * m.bias_x, m.bias_theta * kDegrees, m.rms_z, never);
+      m.count(), 100 * m.within, 100 * m.mae_x, m.mae_theta * kDegrees, 100 * m.bias_x,
+      m.bias_theta * kDegrees, m.rms_z, never);
 }
 
 /// The card's own errors on throws that it was not fitted to, which the spread does not hold.

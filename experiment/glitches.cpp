@@ -40,12 +40,12 @@ class ThirdDifferences {
   std::vector<std::array<std::size_t, 2>> stretches() const {
     constexpr std::size_t kQuiet = 8;
     std::vector<std::array<std::size_t, 2>> out;
-    for (std::size_t k = 0; k < all_.size(); ++k) {
-      if (std::abs(all_[k]) <= kNoise) continue;
+    for (std::size_t k = 0; k < squares_.size(); ++k) {
+      if (squares_[k] <= kNoise * kNoise) continue;
       std::size_t last = k;
       bool far = false;
-      for (std::size_t next = k; next < all_.size() && next <= last + kQuiet; ++next)
-        if (std::abs(all_[next]) > kNoise) last = next, far = far || std::abs(all_[next]) > kFar;
+      for (std::size_t next = k; next < squares_.size() && next <= last + kQuiet; ++next)
+        if (squares_[next] > kNoise * kNoise) last = next, far = far || squares_[next] > kFar * kFar;
       if (far) out.push_back({k - std::min(k, kSide), std::min(last + 3 + kSide, left_.size() - 1)});
       k = last;
     }
@@ -79,11 +79,11 @@ class ThirdDifferences {
   /// Whether every difference that spans a frame's time is noise.
   bool is_smooth_about(std::size_t frame) const {
     const std::vector<double>& times = coordinate_.times;
-    for (std::size_t k = 0; k < all_.size(); ++k) {
+    for (std::size_t k = 0; k < squares_.size(); ++k) {
       // At an end, the nearest ones.
       const bool spans = (k == 0 || times[left_[k]] <= times[frame]) &&
-                         (k + 1 == all_.size() || times[left_[k + 3]] >= times[frame]);
-      if (spans && std::abs(all_[k]) > kNoise) return false;
+                         (k + 1 == squares_.size() || times[left_[k + 3]] >= times[frame]);
+      if (spans && squares_[k] > kNoise * kNoise) return false;
     }
     return true;
   }
@@ -91,37 +91,35 @@ class ThirdDifferences {
 
  private:
   static constexpr double kFar = 8;  // σ
-  double difference(const std::array<std::size_t, 4>& frames) const {
-    const std::array<double, 4> weights =
-        dynamics::third_difference_weights({coordinate_.times[frames[0]], coordinate_.times[frames[1]],
-                                            coordinate_.times[frames[2]], coordinate_.times[frames[3]]});
-    double sum = 0, squares = 0;
+  /// Its square, in units of σ².
+  double square_of(const std::array<std::size_t, 4>& frames) const {
+    std::array<double, 4> times{}, values{};
     for (std::size_t i = 0; i < 4; ++i)
-      sum += weights[i] * coordinate_(frames[i]), squares += weights[i] * weights[i];
-    return sum / std::sqrt(squares);
+      times[i] = coordinate_.times[frames[i]], values[i] = coordinate_(frames[i]);
+    return dynamics::third_difference_variance(times, values);
   }
   void work_out() {
-    all_.clear();
+    squares_.clear();
     for (std::size_t k = 0; k + 3 < left_.size(); ++k)
-      all_.push_back(difference({left_[k], left_[k + 1], left_[k + 2], left_[k + 3]}));
+      squares_.push_back(square_of({left_[k], left_[k + 1], left_[k + 2], left_[k + 3]}));
   }
   /// By how much the sum of the squares falls without n frames from i on.
   double gain_without(std::size_t i, std::size_t n) const {
     double out = 0;
-    for (std::size_t k = i - std::min<std::size_t>(i, 3); k < std::min(i + n, all_.size()); ++k)
-      out += all_[k] * all_[k];
+    for (std::size_t k = i - std::min<std::size_t>(i, 3); k < std::min(i + n, squares_.size()); ++k)
+      out += squares_[k];
     std::array<std::size_t, 6> rest{};
     std::size_t count = 0;
     for (std::size_t k = i - std::min<std::size_t>(i, 3); k < i; ++k) rest[count++] = left_[k];
     for (std::size_t k = i + n; k < std::min(i + n + 3, left_.size()); ++k) rest[count++] = left_[k];
     for (std::size_t k = 0; k + 3 < count; ++k)
-      out -= std::pow(difference({rest[k], rest[k + 1], rest[k + 2], rest[k + 3]}), 2);
+      out -= square_of({rest[k], rest[k + 1], rest[k + 2], rest[k + 3]});
     return out;
   }
 
   Coordinate coordinate_;
   std::vector<std::size_t> left_;
-  std::vector<double> all_;
+  std::vector<double> squares_;
 };
 
 /// Whether a frame lies off the parabola through the frames on one side of it, by more than their noise and

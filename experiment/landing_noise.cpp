@@ -17,7 +17,6 @@ namespace unhand::experiment {
 namespace {
 
 using Pair = std::array<double, 2>;  // x [m], θ [rad]
-constexpr std::size_t kX = 0, kTheta = 1;
 
 /// The parabola through samples, by lines through them and through their times squared.
 struct Parabola {
@@ -85,20 +84,22 @@ struct Landings {
   std::vector<double> together;
 };
 
-Landings landings_of(const datasets::ThrowLog& log, std::size_t column) {
-  Landings out;
+/// Of x, and of the angle where a landing tells it.
+std::array<Landings, 2> landings_of(const datasets::ThrowLog& log) {
+  std::array<Landings, 2> out;
   const bool fitted = has_train(log);
   for (const auto& one : log.throws) {
     if (log.dimension != 2 || !one.landing || one.landing->pose.empty() ||
         (fitted && one.split != datasets::Split::train))
       continue;
-    if (column == kTheta && !tells_angle(*one.landing)) continue;
     const std::string repeats = one.object + ", " + one.condition;
-    const double landed = one.landing->pose(0, column);
-    out.landed[repeats].push_back(landed);
-    if (const auto tracked = tracked_landing(log, one)) {
-      out.differences[repeats].push_back(landed - (*tracked)[column]);
-      out.together.push_back(landed - (*tracked)[column]);
+    const auto tracked = tracked_landing(log, one);
+    for (std::size_t c = 0; c < (tells_angle(*one.landing) ? 2 : 1); ++c) {
+      const double landed = one.landing->pose(0, c);
+      out[c].landed[repeats].push_back(landed);
+      if (!tracked) continue;
+      out[c].differences[repeats].push_back(landed - (*tracked)[c]);
+      out[c].together.push_back(landed - (*tracked)[c]);
     }
   }
   return out;
@@ -132,8 +133,8 @@ Noise noise_of(const Landings& landings) {
 }  // namespace
 
 LandingNoise landing_noise(const datasets::ThrowLog& log) {
-  const Landings x = landings_of(log, kX);
-  const Noise of_x = noise_of(x), of_theta = noise_of(landings_of(log, kTheta));
+  const auto [x, theta] = landings_of(log);
+  const Noise of_x = noise_of(x), of_theta = noise_of(theta);
   if (of_x.sigma) {
     const bool alike = !of_theta.sigma || of_theta.how == of_x.how;
     return {of_x.sigma, of_theta.sigma,

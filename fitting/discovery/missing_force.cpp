@@ -254,7 +254,6 @@ MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const M
   };
   // The best single term, then the best pair, whether the first is in it or not, and so on.
   std::vector<Eigen::Index> chosen;
-  Eigen::VectorXd x;
   double gain = 0;
   for (int size = 1; size <= options.terms; ++size) {
     std::vector<Eigen::Index> best, tried;
@@ -275,15 +274,15 @@ MissingCandidate missing_terms(const std::vector<ResidualTrace>& traces, const M
     try_from(0);
     if (best.empty() || best_gain - gain < std::max(2 * std::log(samples), 0.2 * (squares - gain - samples)))
       break;
-    chosen = best;
-    gain = solved(chosen, x);
+    chosen = best, gain = best_gain;
   }
   // Strongest first: by what alone they take off.
   const auto alone = [&](Eigen::Index j) { return g[j] * g[j] / H(j, j); };
   std::sort(chosen.begin(), chosen.end(),
             [&](Eigen::Index i, Eigen::Index j) { return alone(i) > alone(j); });
-  gain = chosen.empty() ? 0 : solved(chosen, x);
   if (chosen.empty()) return out;
+  Eigen::VectorXd x;
+  solved(chosen, x);
   const double scatter = std::max(1.0, (squares - gain) / samples);
   const Eigen::MatrixXd covariance = pseudo_inverse(H(chosen, chosen)) * scatter;
   for (std::size_t k = 0; k < chosen.size(); ++k) {

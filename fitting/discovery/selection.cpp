@@ -86,11 +86,11 @@ FitResult withdraw(Stage& stage, const DiscoverOptions& options, Discovery& out)
   for (const AcceptedEffect& effect : out.effects) {
     const bool in_company = (misled[0] && acts(effect, false)) || (misled[1] && acts(effect, true));
     const bool last = effect.id == out.effects.back().id;
+    const bool backed = is_among(asked.backed, effect);
     std::string here;
     if (in_company) here = "it was accepted in the company of one that is withdrawn";
-    if (here.empty())
-      here = why_imitation(effect, stage, errors, counted, is_among(asked.backed, effect), out, options);
-    const bool stands = is_among(asked.backed, effect) && !acts(effect, false);  // whatever is beside it
+    if (here.empty()) here = why_imitation(effect, stage, errors, counted, backed, out, options);
+    const bool stands = backed && !acts(effect, false);  // whatever is beside it
     if (here.empty() && last && !stands && spoils(effect, stage, out, options))
       here = "with it a channel is noisier than under the base model";
     if (here.empty() && is_among(asked.outdone, effect)) here = "another form describes the flights better";

@@ -27,11 +27,10 @@ bool explains_most(const ChannelMisfit& now, const std::vector<ChannelMisfit>& w
 /// none in it at the level that it was accepted at. Or it leaves too much where it acts: of the throws that
 /// it was fitted to, or of those that it has not seen. A sensor's effect, which is there in the hand and in
 /// the air, answers for every channel that it explains. Or, acting in the hand, it leaves predictions lacking
-/// (`errors` are the stage's) by too much of what the base's lacked; a sensor's effect only
-/// where they lack another amount without it, as most sensors take no part in what happens, and not one that
-/// acts everywhere and is seen in flight: in the hand that is held against what it makes worse.
-/// What is left in flights is not held against an effect that they ask for, in its own form, beside another
-/// (`backed`).
+/// (`errors` are the stage's) by too much of what the base's lacked; a sensor's effect only where they lack
+/// another amount without it, as most sensors take no part in what happens, and not one that acts everywhere
+/// and is seen in flight: in the hand that is held against what it makes worse. What is left in flights is
+/// not held against an effect that they ask for, in its own form, beside another (`backed`).
 std::string why_imitation(const AcceptedEffect& effect, const Stage& stage, const BothErrors& errors,
                           const FitResult& counted, bool backed, const Discovery& so_far,
                           const DiscoverOptions& options);

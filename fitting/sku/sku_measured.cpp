@@ -77,9 +77,8 @@ std::optional<MeasuredVerdict> measured_verdict(const datasets::Sku& sku, const 
          total(predicted[i].sigma->landing_x, variance[0], experiment::Channel::landing_x),
          total(predicted[i].sigma->landing_theta, variance[1], experiment::Channel::landing_theta)});
   }
-  if (out.throws.empty() && out.never_lands == 0) return {};
+  if (out.count() == 0) return {};
   const auto n = static_cast<double>(out.throws.size());
-  const int all = static_cast<int>(out.throws.size()) + out.never_lands;
   double squares = 0;
   int within = 0;
   for (const auto& one : out.throws) {
@@ -92,8 +91,8 @@ std::optional<MeasuredVerdict> measured_verdict(const datasets::Sku& sku, const 
         std::abs(one.error_x) <= request.tolerance.x && std::abs(one.error_theta) <= request.tolerance.theta;
   }
   out.rms_z = n > 0 ? std::sqrt(squares / (2 * n)) : HUGE_VAL;
-  out.within = static_cast<double>(within) / all;
-  out.p_value = binomial_tail(within, all, request.confidence);
+  out.within = static_cast<double>(within) / out.count();
+  out.p_value = binomial_tail(within, out.count(), request.confidence);
   out.confirmed = out.within >= request.confidence && out.rms_z <= kMostSurprise;
   return out;
 }

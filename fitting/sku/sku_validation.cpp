@@ -56,7 +56,7 @@ std::size_t best(const std::vector<ThrowCandidate>& candidates, const LandingTol
 
 /// How the share of landings compares with what is asked, in words.
 std::string share_in_words(const SkuRequest& request, const SkuValidation& answer) {
-  const double within = answer.repeats ? answer.repeats->within : answer.within;
+  const double within = answer.share();
   std::string out = fmt::format(
       "{:.1f} % of its landings lie within {:.3g} m and {:.3g} deg of the predicted one; "
       "asked for are {:.3g} %",
@@ -79,7 +79,7 @@ std::string share_in_words(const SkuRequest& request, const SkuValidation& answe
 /// Sets the verdict of an object that is held and lands.
 void decide_by_landings(const datasets::Sku& sku, const datasets::ModelCard& card, const SkuRequest& request,
                         SkuValidation& out) {
-  const bool enough = (out.repeats ? out.repeats->within : out.within) >= request.confidence;
+  const bool enough = out.share() >= request.confidence;
   out.verdict = enough ? SkuVerdict::throwable : SkuVerdict::too_uncertain;
   out.message = share_in_words(request, out);
   const bool lever = !contact::follows_pads(card.model) && std::abs(sku.com_offset) > kLeastLever;
@@ -94,8 +94,7 @@ void decide_by_landings(const datasets::Sku& sku, const datasets::ModelCard& car
   if (!out.measured || out.measured->confirmed) return;
   const MeasuredVerdict& m = *out.measured;
   const std::string seen =
-      fmt::format("; of {} measured throws {:.1f} % lie within",
-                  m.throws.size() + static_cast<std::size_t>(m.never_lands), 100 * m.within);
+      fmt::format("; of {} measured throws {:.1f} % lie within", m.count(), 100 * m.within);
   if (m.rms_z > kMostSurprise || (enough && m.p_value < kTooFewToBeChance)) {
     out.verdict = SkuVerdict::contradicted;
     out.message += seen + fmt::format(", with errors {:.2g} times what was foretold", m.rms_z);

@@ -105,6 +105,8 @@ inline constexpr double kTooFewToBeChance = 0.05;
 struct MeasuredVerdict {
   std::vector<MeasuredLanding> throws;  ///< one per throw with a landing and a prediction of it
   int never_lands{};  ///< further ones of which the card says that they never land: not within
+  /// Both together.
+  int count() const { return static_cast<int>(throws.size()) + never_lands; }
   /// The log is the card's own: the throws are those that it was not fitted to.
   bool held_out{};
   double within{};   ///< share that lands within the tolerance of its prediction
@@ -152,6 +154,8 @@ struct SkuValidation {
   std::optional<MotionRepeats> repeats;     ///< of the log's motions, where they are repeated
   std::optional<MeasuredVerdict> measured;  ///< against the log's throws of this object, if there are any
 
+  /// Share within the tolerance that the verdict goes by: with what repetitions differ, where a log has some.
+  double share() const { return repeats ? repeats->within : within; }
   /// The motion that the answer is about.
   const ThrowCandidate& reference() const { return candidates[chosen]; }
 };
