@@ -82,11 +82,40 @@ void describe_campaign(const CampaignProblem& problem, const FitRounds& rounds, 
   if (!rounds.shared().options.all_fixed) describe_open_directions(information, problem, scale, out);
 }
 
+using PhaseMisfits = std::array<ChannelMisfit, kPhaseCount * kChannelCount>;
+
+/// Adds a throw's residuals, and remembers the throw that errs most. In place of the weights the sum of their
+/// squares.
+void add_throw(const CampaignThrow& thrown, const ThrowEquations& part, const Weighting& weighting,
+               PhaseMisfits& groups) {
+  PhaseMisfits own;
+  for (std::size_t j = 0; j < thrown.observed.all.size(); ++j) {
+    const auto& o = thrown.observed.all[j];
+    const int where = part_of(o, thrown, part.detach);
+    const Phase phase = phase_of_part(where);
+    const auto g =
+        static_cast<std::size_t>(static_cast<int>(phase) * kChannelCount + static_cast<int>(o.channel));
+    const double r = part.residual[static_cast<Eigen::Index>(j)];
+    own[g].n += 1;
+    own[g].chi2 += r * r;
+    const double weight = weighting.group[group_of(where, o.channel)];
+    if (groups[g].n == 0 && own[g].n == 1) groups[g] = {o.channel, phase, 0, 0, 0};
+    groups[g].weight += weight * weight;
+  }
+  for (std::size_t g = 0; g < own.size(); ++g) {
+    ChannelMisfit& m = groups[g];
+    m.n += own[g].n;
+    m.chi2 += own[g].chi2;
+    if (own[g].n > 0 && (m.worst_n == 0 || own[g].chi2 - own[g].n > m.worst_chi2 - m.worst_n))
+      m.worst_n = own[g].n, m.worst_chi2 = own[g].chi2;
+  }
+}
+
 /// Every throw's part, and the misfit by channel and phase.
 void describe_throws(const CampaignProblem& problem, const FitRounds& rounds, FitResult& out) {
   const auto& weight = rounds.shared().weighting.group;
   out.group_weight.assign(weight.begin(), weight.end());
-  Misfit total;
+  PhaseMisfits groups;
   for (std::size_t i = 0; i < rounds.used().size(); ++i) {
     const auto& part = rounds.equations().throws[i];
     const CampaignThrow& thrown = problem.throws()[rounds.used()[i]];
@@ -98,26 +127,11 @@ void describe_throws(const CampaignProblem& problem, const FitRounds& rounds, Fi
     one.modes = part.modes;
     one.detach = part.detach;
     out.samples += static_cast<long>(thrown.observed.all.size());
-    total.add(thrown, part.residual, part.detach);
+    add_throw(thrown, part, rounds.shared().weighting, groups);
   }
-  std::array<ChannelMisfit, kPhaseCount * kChannelCount> groups;
-  for (int part = 0; part < kPartCount; ++part)
-    for (int c = 0; c < kChannelCount; ++c) {
-      const auto channel = static_cast<Channel>(c);
-      const std::size_t g = group_of(part, channel);
-      const Phase phase = phase_of_part(part);
-      ChannelMisfit& m = groups[static_cast<std::size_t>(static_cast<int>(phase) * kChannelCount + c)];
-      m.channel = channel;
-      m.phase = phase;
-      for (const auto& one : total.parts[g]) {
-        m.n += static_cast<int>(one.n);
-        m.chi2 += one.squares;
-        m.weight += one.n * weight[g] * weight[g];
-      }
-    }
   for (ChannelMisfit& m : groups) {
     if (m.n == 0) continue;
-    m.weight = std::sqrt((m.weight - 1) / m.n);  // it starts at 1
+    m.weight = std::sqrt(m.weight / m.n);
     out.chi2 += m.chi2;
     out.misfit.push_back(m);
   }

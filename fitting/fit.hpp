@@ -122,8 +122,14 @@ struct ChannelMisfit {
   int n{};                        ///< samples
   double chi2{};                  ///< of the residuals, not weighted
   double weight{1};  ///< factor on its residuals in the fit (of the release's quarters, the root mean square)
+  int worst_n{};     ///< samples of the throw that errs most
+  double worst_chi2{};  ///< its χ²
   /// 1 where the model explains the channel to its noise.
   double chi2_per_sample() const { return n > 0 ? chi2 / n : 0; }
+  /// The same of all throws but the one that errs most; of a single throw itself.
+  ChannelMisfit without_worst() const {
+    return n > worst_n ? ChannelMisfit{channel, phase, n - worst_n, chi2 - worst_chi2, weight} : *this;
+  }
 };
 
 /// One throw's part in a fit.

@@ -73,8 +73,8 @@ struct TriedEffect {
   Improvement held_out;
 };
 
-bool is_likelier(const std::optional<TriedEffect>& one, const std::optional<TriedEffect>& other) {
-  return one && other && one->next.bic() < other->next.bic();
+bool is_likelier(const TriedEffect& one, const TriedEffect& other) {
+  return one.next.bic() < other.next.bic();
 }
 
 class ForwardStep {
@@ -107,16 +107,21 @@ class ForwardStep {
         if (is_law(id_of(score))) consider(score);
     // A law has no size that could be told from none, and half a per cent of the held-out misfit is enough
     // for it: it is no answer where an effect is likelier that was not sure enough, or too small to matter.
-    const bool refused_leads = !small_ || is_likelier(refused_, small_);
-    if (best_ && is_law(id_of(*best_->score)) && is_likelier(refused_leads ? refused_ : small_, best_)) {
-      best_.reset();  // predictions decide
-      if (refused_leads && solve_held_out(refused_->next, options_)) small_ = std::move(refused_);
+    std::sort(small_.begin(), small_.end(), is_likelier);
+    if (best_ && is_law(id_of(*best_->score))) {
+      const bool refused_leads = refused_ && (small_.empty() || is_likelier(*refused_, small_.front()));
+      if (refused_leads ? is_likelier(*refused_, *best_)
+                        : !small_.empty() && is_likelier(small_.front(), *best_)) {
+        best_.reset();  // predictions decide
+        if (refused_leads && solve_held_out(refused_->next, options_))
+          small_.insert(small_.begin(), std::move(*refused_));
+      }
     }
     if (best_) {
       const std::string why = best_->held_out.where;
       return accept(std::move(*best_), why, convincing_);
     }
-    return small_ ? weigh_small() : std::nullopt;
+    return weigh_small();
   }
 
  private:
@@ -195,8 +200,10 @@ class ForwardStep {
     named(out_.ranking, id_of(score)).fate = matters ? Fate::outdone : Fate::too_small;
     if (!matters && law) return;
     (matters ? convincing_ : evident_).push_back({&score, bic});
-    auto& leader = matters ? best_ : small_;
-    if (!leader || bic < leader->next.bic()) leader = std::move(trial);
+    if (!matters)
+      small_.push_back(std::move(*trial));
+    else if (!best_ || is_likelier(*trial, *best_))
+      best_ = std::move(trial);
   }
 
   /// The law that was asked about has gone already: of the others the likelier one stays.
@@ -211,24 +218,28 @@ class ForwardStep {
 
   /// What matters to no channel may matter to one beside pads that give, which slow slips show more of; or to
   /// a prediction, where all of a throw's errors add up. Beside a misfit that stays, nobody knows whose
-  /// errors those are.
+  /// errors those are. The likeliest of these is accepted; of several that matter to nothing, the likeliest
+  /// is told.
   std::optional<Stage> weigh_small() {
-    if (auto beside = beside_give()) return beside;
-    const SmallEffect small =
-        small_effect(stage_, small_->next, id_of(*small_->score), out_.before.held_out, options_);
-    if (left_by_answer(small_->next, out_, options_).empty() &&
-        predicts_better(stage_, small_->next, options_))
-      return accept(std::move(*small_), predicted_in_words(small), evident_);
-    if (!out_.small || small.delta_bic < out_.small->delta_bic) out_.small = small;
+    std::optional<SmallEffect> told;
+    for (TriedEffect& trial : small_) {
+      if (auto beside = beside_give(trial)) return beside;
+      const SmallEffect small =
+          small_effect(stage_, trial.next, id_of(*trial.score), out_.before.held_out, options_);
+      if (left_by_answer(trial.next, out_, options_).empty() && predicts_better(stage_, trial.next, options_))
+        return accept(std::move(trial), predicted_in_words(small), evident_);
+      std::erase_if(evident_, [&](const auto& rival) { return rival.first == trial.score; });
+      if (!told) told = small;
+    }
+    if (told && (!out_.small || told->delta_bic < out_.small->delta_bic)) out_.small = told;
     return std::nullopt;
   }
 
   /// An effect on the pads with a give along that there is no evidence for without it, against that give
   /// alone.
-  std::optional<Stage> beside_give() {
-    const std::string& id = id_of(*small_->score);
+  std::optional<Stage> beside_give(TriedEffect trial) {
+    const std::string& id = id_of(*trial.score);
     if (gives_along(stage_) || !acts_on_pads(id)) return std::nullopt;
-    TriedEffect trial = *small_;
     fit_give_along(trial.next, options_);
     if (!gives_along(trial.next)) return std::nullopt;
     const Stage& less = without(trial.next, {id}, options_);
@@ -274,7 +285,8 @@ class ForwardStep {
   std::vector<Score> all_;
   bool noise_;  // nothing but that is left
   std::set<std::string> tried_;
-  std::optional<TriedEffect> best_, small_;  // of those that matter to a channel, and of those that do not
+  std::optional<TriedEffect> best_;  // of those that matter to a channel
+  std::vector<TriedEffect> small_;   // those that do not
   WithCriterion convincing_, evident_;
   std::optional<TriedEffect> refused_;  // the likeliest of those that are not told from none surely enough
 };

@@ -140,14 +140,15 @@ CampaignProblem extended_problem(const CampaignProblem& problem, const std::stri
 
 namespace {
 
-/// Whether the search of a candidate may have gone astray: it gains nothing where something is missing; or it
-/// has the leading footprint, and still leaves a misfit, or gains far less than noise alone could take away.
+/// Whether the search of a candidate may have gone astray: where no misfit is left, it gains far less than
+/// its footprint promised. Where one is, in the first step, it gains nothing; or it has the leading
+/// footprint, and still leaves a misfit.
 bool is_astray(const Stage& stage, const Stage& next, const Score& score, bool leads,
                const DiscoverOptions& options) {
-  if (!next.is_fitted()) return leads || leaves_misfit(stage, options);
   if (!leaves_misfit(stage, options))
-    return leads && stage.fit.deviance() - next.fit.deviance() < score.gain / kFirstOrder;
-  return !is_evident(stage, next) || (leads && leaves_misfit(next, options));
+    return !next.is_fitted() || stage.fit.deviance() - next.fit.deviance() < score.gain / kFirstOrder;
+  if (!stage.ids.empty()) return false;
+  return !next.is_fitted() || !is_evident(stage, next) || (leads && leaves_misfit(next, options));
 }
 
 }  // namespace
@@ -188,7 +189,7 @@ Stage extended(const Stage& stage, const Candidate& candidate, const Score& scor
     if (out.fit.outcome != FitOutcome::no_start) break;
     for (std::size_t k = 0; k < start.size(); ++k) start[k] = 0.5 * (start[k] + from[k]);
   }
-  if (is_law(candidate.id) || !stage.ids.empty() || !is_astray(stage, out, score, leads, options)) return out;
+  if (is_law(candidate.id) || !is_astray(stage, out, score, leads, options)) return out;
   // The base had bent what they share to make up for what it lacks. Once more, from what the log itself
   // suggests of that and with an effect of a typical size.
   Stage again{out.problem, {}, {}, out.ids};

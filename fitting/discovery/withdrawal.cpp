@@ -36,7 +36,8 @@ bool is_shown_unloaded(Channel channel, const std::vector<ChannelMisfit>& base,
 /// a channel that it `explains`, of what the base model's fit left there in the other throws (`other`: train
 /// against held-out ones) as well; and not next to nothing of what the base left in that phase's worst
 /// channel; for an effect on the pads, which flights and landings show as well, what is left in the hand, in
-/// any phase's; for an effect that acts everywhere, in the other half only a channel that it `worsens`.
+/// any phase's; for an effect that acts everywhere, in the other half only a channel that it `worsens`. One
+/// throw alone, of which a sample may lie where the wrench jumps, is not much.
 /// Readings of an unloaded sensor are of sensors alone, and where they have shown a sensor's effect, what is
 /// left of the same channel under load is something else's.
 template <class Explains, class Worsens>
@@ -62,11 +63,13 @@ const ChannelMisfit* too_much_left(const AcceptedEffect& effect, const std::vect
       if (m.phase == phase || anywhere) out = std::max(out, m.chi2_per_sample());
     return out;
   };
-  const auto found = std::find_if(now.begin(), now.end(), [&](const ChannelMisfit& m) {
-    return is_left(m, options) && is_confirmed(other, m) &&
+  const auto is_much = [&](const ChannelMisfit& m) {
+    return is_left(m, options) &&
            m.chi2_per_sample() - 1 > std::max(kLeft * (misfit_in(base, m.channel, m.phase) - 1),
-                                              kNextToNothing * (worst(m.phase) - 1)) &&
-           answers_for(m);
+                                              kNextToNothing * (worst(m.phase) - 1));
+  };
+  const auto found = std::find_if(now.begin(), now.end(), [&](const ChannelMisfit& m) {
+    return is_much(m) && is_much(m.without_worst()) && is_confirmed(other, m) && answers_for(m);
   });
   return found == now.end() ? nullptr : &*found;
 }
