@@ -115,7 +115,12 @@ template <class S>
 S AdhesiveForce::at_(const Window& window, const S& t) const {
   const double snap = std::min(1e-9, 0.25 * (window.end - window.begin));
   const double inside = std::clamp(value_of(t), window.begin + snap, window.end - snap);
-  if (inside < parting_.a) return base_.at(window, t) + convert<S>(adhesion_);
+  if (inside < parting_.a) {
+    const S pressed = base_.at(window, t);
+    // Past the window's end the branch may go on below zero; within it that is for who reads it to refuse.
+    if (value_of(pressed) < 0) return value_of(t) > window.end ? convert<S>(adhesion_) : pressed;
+    return pressed + convert<S>(adhesion_);
+  }
   const S rest = 1.0 - (t - convert<S>(parting_)) / convert<S>(parting_time_);
   return value_of(rest) > 0 ? S(convert<S>(adhesion_) * rest) : S(0);
 }
@@ -138,12 +143,14 @@ BiasedForce::BiasedForce(const NormalForce& base, const Dual& bias, double openi
 template <class S>
 S BiasedForce::at_(const Window& window, const S& t) const {
   const double release = release_.a;
-  if (value_of(t) >= release) return S(0);
+  const double snap = std::min(1e-9, 0.25 * (window.end - window.begin));
+  if (std::clamp(value_of(t), window.begin + snap, window.end - snap) >= release) return S(0);
   S weight(1.0);
   if (value_of(t) > opening_start_ && std::isfinite(release))
     weight = (convert<S>(release_) - t) / (convert<S>(release_) - opening_start_);
-  const S force = base_.at(window, t) - convert<S>(bias_) * weight;
-  return value_of(force) > 0 ? force : S(0);
+  const S pressed = base_.at(window, t), force = pressed - convert<S>(bias_) * weight;
+  if (value_of(pressed) < 0) return pressed;  // no force: for who reads it to refuse
+  return value_of(force) < 0 ? S(0) : force;
 }
 void BiasedForce::kinks(std::vector<double>& out) const { base_.kinks(out); }
 void BiasedForce::kinks(std::vector<Dual>& out) const { base_.kinks(out); }

@@ -63,6 +63,7 @@ class AdhesiveForce final : public NormalForce {
   /// `adhesion` f_adh [N], `parting_time` [s] > 0. Throws std::invalid_argument outside of the effect's
   /// ranges.
   AdhesiveForce(const NormalForce& base, const Dual& adhesion, const Dual& parting_time);
+  AdhesiveForce(const NormalForce&&, const Dual&, const Dual&) = delete;
   double at(const Window& window, double t) const override { return at_(window, t); }
   Dual at(const Window& window, const Dual& t) const override { return at_(window, t); }
   void kinks(std::vector<double>& out) const override { kinks_(out); }
@@ -88,6 +89,7 @@ class BiasedForce final : public NormalForce {
   /// `bias` b [N]; `opening_start` [s], when the grip begins to open (after the release: all of b acts until
   /// then; not read where `base` has none). Throws std::invalid_argument where either is not finite.
   BiasedForce(const NormalForce& base, const Dual& bias, double opening_start);
+  BiasedForce(const NormalForce&&, const Dual&, double) = delete;
   double at(const Window& window, double t) const override { return at_(window, t); }
   Dual at(const Window& window, const Dual& t) const override { return at_(window, t); }
   void kinks(std::vector<double>& out) const override;

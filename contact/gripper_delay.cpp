@@ -37,6 +37,8 @@ void validate(const DelayDistribution& d) {
   };
   if (!(d.longest >= 0) || !(d.longest <= 10)) reject("longest", d.longest, "[0, 10] s");
   if (!(d.centre >= 0) || !(d.centre <= d.longest)) reject("centre", d.centre, "[0, longest] s");
+  if (d.kind == DelayDistribution::Kind::uniform && d.centre != 0.5 * d.longest)
+    reject("centre", d.centre, "{longest/2}, of a uniform delay");
   if (d.kind == DelayDistribution::Kind::truncated_normal && !(d.spread > 0 && d.spread <= 10))
     reject("spread", d.spread, "(0, 10] s");
 }

@@ -19,7 +19,7 @@ struct DelayDistribution {
     truncated_normal,  ///< cut off at 0 and `longest`
   };
   Kind kind{Kind::number};  ///< which of them
-  double centre{};          ///< the number; the mean of the normal before truncation [s]
+  double centre{};          ///< the number; the mean, of the normal before truncation [s]
   double spread{};          ///< standard deviation before truncation [s]
   double longest{0.1};      ///< T: the distribution lives on [0, T] [s]
 

@@ -150,7 +150,7 @@ Entry<S, 6> LimitSurface<Shape>::onset(const Window& window, const SceneSource& 
   };
   const auto size = [](const Vec3<S>& a) {
     const S square = dot3(a, a);
-    return value_of(square) > 0 ? S(sqrt(square)) : S(0);
+    return value_of(square) == 0 ? S(0) : S(sqrt(square));
   };
   const S a0 = at_the_surface ? S(0) : size(acceleration(0));
   double delta = std::min(kOnset, 0.25 * (window.end - value_of(t)));
@@ -159,7 +159,7 @@ Entry<S, 6> LimitSurface<Shape>::onset(const Window& window, const SceneSource& 
   const S a1 = size(acceleration(0.5 * delta));
   const Vec3<S> end = acceleration(delta);
   const S a2 = size(end), speed = delta / 6 * (a0 + 4.0 * a1 + a2);
-  if (!(value_of(a2) > 0)) return {stick(), t, y.state(), S(0)};  // a demand that only touches the surface
+  if (value_of(a2) == 0) return {stick(), t, y.state(), S(0)};  // a demand that only touches the surface
   const S k = speed / a2;
   y.slip = {k * end[0], k * end[1]};
   y.spin = k * end[2] / limits_.of<S>().length(source.scene(window, S(t + delta)).normal_force);

@@ -88,6 +88,11 @@ SampledNormalForce::SampledNormalForce(Polynomial force, std::vector<double> kin
   if (std::isfinite(release_) && (kinks_.empty() || kinks_.back() != release_))
     throw std::invalid_argument(
         fmt::format("SampledNormalForce: the last kink must be the release, {} s", release_));
+  for (const auto& piece : force_.pieces())
+    for (const auto& coefficient : piece)
+      if (!std::isfinite(coefficient[0]))
+        throw std::invalid_argument(
+            fmt::format("SampledNormalForce: coefficient {} is not finite", coefficient[0]));
 }
 
 void SampledNormalForce::kinks(std::vector<double>& out) const {

@@ -92,15 +92,17 @@ class SampledNormalForce final : public NormalForce {
   using Polynomial = dynamics::PiecewisePolynomial<1, 5>;  ///< N over s
 
   /// `kinks` [s], increasing: the breaks of `force` [N] at which the force or its slope jumps. `release` [s]
-  /// is the last of them, or +infinity. Values below zero are cut off at zero.
+  /// is the last of them, or +infinity. Values below zero are cut off at zero. Throws std::invalid_argument
+  /// for kinks that do not increase, another last kink, and coefficients that are not finite.
   SampledNormalForce(Polynomial force, std::vector<double> kinks, double release);
 
   double at(const Window& window, double t) const override {
-    return std::max(0.0, force_.value(window, t)[0]);
+    const double f = force_.value(window, t)[0];
+    return f < 0.0 ? 0.0 : f;
   }
   Dual at(const Window& window, const Dual& t) const override {
     const Dual f = force_.value(window, t)[0];
-    return f.a > 0.0 ? f : Dual(0.0);
+    return f.a < 0.0 ? Dual(0.0) : f;
   }
   /// The instants alone [s].
   using NormalForce::kinks;

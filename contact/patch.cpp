@@ -17,7 +17,8 @@ void require(bool ok, const char* name, double value, const char* range) {
 
 void validate(const Patch<double>& p) {
   require(p.mu >= 0 && p.mu <= kMostMu, "mu", p.mu, fmt::format("[0, {}]", kMostMu).c_str());
-  require(p.radius > 0 && p.radius <= 1, "radius", p.radius, "(0, 1] m");
+  require(p.radius >= kSmallestRadius && p.radius <= 1, "radius", p.radius,
+          fmt::format("[{}, 1] m", kSmallestRadius).c_str());
   require(p.torque_factor > 0 && p.torque_factor <= 1, "torque_factor", p.torque_factor, "(0, 1]");
   require(p.pads >= 1, "pads", p.pads, "[1, inf)");
 }

@@ -36,6 +36,11 @@ enum class SlideEnd {
 /// continuous in its parameters: an onset of spin appears or vanishes, and the twist at detach jumps by the
 /// little that was spun until then.
 ///
+/// Nor is it continuous where the hand's acceleration jumps while the patch slides: f_p may jump from one
+/// side of the circle |f_p| = f_max to the other and the patch slides on, while any continuous change,
+/// however fast, passes inside, and the brake latches. So a tracking lag that tends to zero need not tend to
+/// none.
+///
 /// Departures from the print: Eq. 21, 22, 25 have sgn(|τ_p|), always +1, and the sign of the reaction, and
 /// Eq. 22 lets a pivoting object feel no friction when |τ_p| < τ_max; Eq. 23's left side is the CoM's
 /// absolute acceleration; in Eq. 24 the lost lever torque is divided by I, since the pivot's constraint is

@@ -205,6 +205,7 @@ bool has_bullet() { return true; }
 
 BulletResult simulate_in_bullet(const release::ReleaseProblem<double>& problem,
                                 const contact::Patch<double>& patch, const BulletOptions& options) {
+  release::validate(problem);
   validate(patch);
   if (!(options.step > 0 && options.step <= 1e-2))
     throw std::invalid_argument(fmt::format("Bullet: step = {} is not in (0, 1e-2] s", options.step));
@@ -214,9 +215,6 @@ BulletResult simulate_in_bullet(const release::ReleaseProblem<double>& problem,
     throw std::invalid_argument(
         fmt::format("Bullet: iterations = {} is not in [1, 100000]", options.iterations));
   const double release = problem.normal_force.release_time();
-  if (!(problem.start >= problem.hand.begin() && problem.start < problem.hand.end()))
-    throw std::invalid_argument(fmt::format("Bullet: start = {} is not in [{}, {}) s, where the hand moves",
-                                            problem.start, problem.hand.begin(), problem.hand.end()));
   const bool parts = release <= problem.hand.end();
   const double end = parts ? release : problem.hand.end();
   World world(problem, patch, options);

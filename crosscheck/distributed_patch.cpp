@@ -52,6 +52,17 @@ std::vector<double> coarse_times(const ReleaseProblem<double>& problem, double e
   return times;
 }
 
+/// The normal force at the start, or the largest at a kink after it [N].
+double greatest_force(const ReleaseProblem<double>& problem) {
+  double out = problem.normal_force.at({problem.start, problem.hand.end()}, problem.start);
+  for (const double t : problem.normal_force.kinks()) {
+    if (t <= problem.start || t >= problem.hand.end()) continue;
+    out = std::max({out, problem.normal_force.at({problem.start, t}, t),
+                    problem.normal_force.at({t, problem.hand.end()}, t)});
+  }
+  return out;
+}
+
 /// One run at given times. Twists are (v_x, v_z, ω) of the CoM in the world.
 class Run {
  public:
@@ -69,8 +80,7 @@ class Run {
     const double omega = hand.twist.omega + problem.spin;
     twist_ = {hand.twist.vx + problem.slip.x - omega * r.z, hand.twist.vz + problem.slip.z + omega * r.x,
               omega};
-    const double grip = problem.normal_force.at({t, t + options.step}, t);
-    stiffness_ = patch.pads * std::max(patch.mu * grip, 1e-12) / options.elastic_slip;
+    stiffness_ = patch.pads * std::max(patch.mu * greatest_force(problem), 1e-12) / options.elastic_slip;
     mass_ = {problem.body.mass, problem.body.mass, problem.body.inertia};
   }
 
@@ -212,6 +222,7 @@ std::vector<PatchPoint> disc_points(int rings, double pressure_exponent) {
 
 PatchResult simulate_distributed_patch(const ReleaseProblem<double>& problem, const DistributedPatch& patch,
                                        const PatchOptions& options) {
+  release::validate(problem);
   validate(patch, options);
   const double release = problem.normal_force.release_time();
   const bool parts = release <= problem.hand.end();

@@ -41,7 +41,7 @@ struct DistributedPatch {
 /// How finely the patch is integrated.
 struct PatchOptions {
   double step{4e-5};  ///< h of the coarser of two runs [s], (0, 1e-3]
-  /// n μ f₀/K, by how much a bristle stretches before it slides [m]; f₀ the normal force at the start. Its
+  /// n μ f₀/K, by how much a bristle stretches before it slides [m]; f₀ the largest normal force. Its
   /// own vibration is shorter than the step and damped by it.
   double elastic_slip{1e-11};
   double loss_time{0};  ///< T, of the bristles [s]

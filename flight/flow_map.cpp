@@ -18,6 +18,9 @@ using dynamics::value_of;
 
 namespace {
 
+/// Of a flight with drag [s]: what rises at 100 m/s and comes down as slowly as a feather has landed by then.
+constexpr double kLongest = 1000;
+
 void validate(const Medium& medium) {
   if (!(medium.gravity > 0 && medium.drag_k >= 0 && std::isfinite(medium.gravity + medium.drag_k)))
     throw std::invalid_argument(fmt::format("medium: gravity {} m/s² is not > 0, or drag_k {} 1/m not >= 0",
@@ -49,6 +52,7 @@ std::optional<PlaneState<S>> landing_of(const PlaneState<S>& release, const Medi
   problem.twist = {release.r_rate, release.z_rate, S(0.0)};
   problem.gravity = {S(0.0), S(-medium.gravity)};
   problem.drag_k = S(medium.drag_k);
+  problem.longest = kLongest;
   const auto flown = fly(problem);
   if (flown.outcome != FlightOutcome::landed) return {};
   const auto& [x, z, theta] = flown.landing.pose;
@@ -79,10 +83,13 @@ void validate(const LandingSet& set) {
   if (!(set.half_length > 0 && std::isfinite(set.half_length)))
     throw std::invalid_argument(
         fmt::format("landing set: half_length {} is not in (0, inf) m", set.half_length));
-  if (!(set.r_rate_low < set.r_rate_high) || !(set.z_rate_low < set.z_rate_high) || !(set.z_rate_high <= 0))
-    throw std::invalid_argument(
-        fmt::format("landing set: velocities [{}, {}] and [{}, {}] m/s are not ranges, the second at most 0",
-                    set.r_rate_low, set.r_rate_high, set.z_rate_low, set.z_rate_high));
+  const bool finite = std::isfinite(set.r_rate_low) && std::isfinite(set.r_rate_high) &&
+                      std::isfinite(set.z_rate_low) && std::isfinite(set.z_rate_high);
+  if (!finite || !(set.r_rate_low < set.r_rate_high) || !(set.z_rate_low < set.z_rate_high) ||
+      !(set.z_rate_high <= 0))
+    throw std::invalid_argument(fmt::format(
+        "landing set: velocities [{}, {}] and [{}, {}] m/s are not finite ranges, the second at most 0",
+        set.r_rate_low, set.r_rate_high, set.z_rate_low, set.z_rate_high));
 }
 
 }  // namespace

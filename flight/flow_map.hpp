@@ -25,9 +25,10 @@ struct Medium {
   double drag_k{};       ///< quadratic drag, a = −k |v| v [1/m], >= 0
 };
 
-/// The state on the way down through z = 0; empty if the flight never gets there. Projectiles in closed form,
-/// drag by the integrator; derivatives pass through the landing. Throws std::invalid_argument for a state
-/// that is not finite and a medium out of range. Instantiated for double and Dual.
+/// The state on the way down through z = 0; empty if the flight never gets there (with drag: not within 1000
+/// s). Projectiles in closed form, drag by the integrator; derivatives pass through the landing. Throws
+/// std::invalid_argument for a state that is not finite and a medium out of range. Instantiated for double
+/// and Dual.
 template <class S>
 std::optional<PlaneState<S>> landing_of(const PlaneState<S>& release, const Medium& medium);
 
@@ -40,7 +41,7 @@ struct FlowMap {
 std::optional<FlowMap> flow_map(const PlaneState<double>& release, const Medium& medium);
 
 /// Where and how fast a throw may come down: |r| <= half_length at z = 0, and both velocities in their
-/// ranges.
+/// ranges, all of them finite.
 struct LandingSet {
   double half_length{};                    ///< [m], > 0
   double r_rate_low{0}, r_rate_high{6};    ///< ṙ [m/s]

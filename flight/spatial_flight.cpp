@@ -107,6 +107,9 @@ void validate(const SpatialStart<S>& start, const SpatialAir<S>& air, const std:
   if (!(value_of(air.drag_k) >= 0))
     throw std::invalid_argument(
         fmt::format("spatial flight: drag_k = {} is not in [0, inf) 1/m", value_of(air.drag_k)));
+  if (!(value_of(air.linear_drag) >= 0))
+    throw std::invalid_argument(
+        fmt::format("spatial flight: linear_drag = {} is not in [0, inf) 1/s", value_of(air.linear_drag)));
   for (const S& t : times)
     if (!(value_of(t) >= 0 && std::isfinite(value_of(t))))
       throw std::invalid_argument(fmt::format("spatial flight: time {} s is not in [0, inf)", value_of(t)));

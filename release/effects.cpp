@@ -65,10 +65,22 @@ LaggedHand::LaggedHand(const PolynomialHand& logged, const Dual& lag) : logged_(
       const Piece& before = pieces_.back();
       const double h = breaks[i] - breaks[i - 1];
       const Dual decay = exp(-h / lag);
+      const auto& ends = path.pieces()[i - 1];
       for (int n = 0; n < 3; ++n) {
-        Dual end = before.settled[5][n];
-        for (int j = 4; j >= 0; --j) end = end * h + before.settled[j][n];
-        piece.transient[n] = end + before.transient[n] * decay - piece.settled[0][n];
+        // What settled jumps by here: Σ (−τ)^k of the jump of the k-th derivative, of which pose and twist
+        // (k = 0, 1) have none. Their rounding, over τ² in the acceleration, would be felt.
+        Dual jump(0.0);
+        for (int k = 5; k >= 2; --k) {
+          double derivative = 0, factorial = 1;
+          for (int m = 5; m >= k; --m) {
+            double falling = 1;
+            for (int q = 0; q < k; ++q) falling *= m - q;
+            derivative = derivative * h + falling * ends[m][n];
+          }
+          for (int q = 2; q <= k; ++q) factorial *= q;
+          jump = (derivative - factorial * c[k][n]) - jump * lag;
+        }
+        piece.transient[n] = jump * lag * lag + before.transient[n] * decay;
       }
     }
     pieces_.push_back(piece);

@@ -26,6 +26,7 @@ class DelayedForce final : public contact::NormalForce {
   /// `delay` [s], positive where the force acts later than logged. Throws std::invalid_argument outside of
   /// the effect's range.
   DelayedForce(const contact::NormalForce& base, const dynamics::Dual& delay);
+  DelayedForce(const contact::NormalForce&&, const dynamics::Dual&) = delete;
   double at(const Window& window, double t) const override;
   Dual at(const Window& window, const Dual& t) const override;
   void kinks(std::vector<double>& out) const override;
@@ -39,11 +40,12 @@ class DelayedForce final : public contact::NormalForce {
 
 /// The hand behind a logged one by the first-order lag τ ẏ + y = y_log, in closed form: between the breaks of
 /// the log's polynomials y = Σ_k (−τ)^k dᵏ/dtᵏ y_log + C exp(−(t − t_i)/τ), with the C that keep y
-/// continuous; before the log begins the lag has settled (C = 0). `logged` must outlive it.
+/// and ẏ continuous; before the log begins the lag has settled (C = 0). `logged` must outlive it.
 class LaggedHand final : public HandMotion {
  public:
   /// `lag` τ [s]. Throws std::invalid_argument outside of the effect's range.
   LaggedHand(const PolynomialHand& logged, const dynamics::Dual& lag);
+  LaggedHand(const PolynomialHand&&, const dynamics::Dual&) = delete;
   HandState<double> at(const Window& window, double t) const override { return at_(window, t); }
   HandState<Dual> at(const Window& window, const Dual& t) const override { return at_(window, t); }
   std::vector<double> jumps() const override { return logged_.jumps(); }

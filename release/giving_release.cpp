@@ -16,8 +16,12 @@ using dynamics::Wrench;
 
 namespace {
 
-/// The step [s] of pads that slip, at a relative tolerance of 1e-5; the error is of second order in it.
-constexpr double kStep = 5e-4, kStepTolerance = 1e-5, kShortest = 2.5e-5;
+/// The usual step [s] of pads that slip, at a relative tolerance of 1e-5; the error is of second order in it.
+constexpr double kStep = 5e-4, kStepTolerance = 1e-5;
+/// Shorter steps, down to the shortest [s], are taken where one of them and two of half its length are further
+/// from each other than `kMostApart` [m/s] times the relative tolerance: where a hand turns fast, or the
+/// tolerance is tight.
+constexpr double kMostApart = 100, kShortest = 1e-6;
 /// Steps that are `kMost` times as long at most are taken where one of them and two of half its length agree
 /// to `kAgree` [m/s] times the relative tolerance: where the pads hold, and stretch with the load. The
 /// difference is of second order, so a step of twice the length may follow if it is a quarter of that.
@@ -25,7 +29,8 @@ constexpr double kMost = 8, kAgree = 1, kDoubled = 0.25;
 
 /// How long steps may be.
 struct Pace {
-  double slipping, longest, agree;  ///< s, s, m/s
+  double slipping, longest;  ///< s
+  double agree, most_apart;  ///< m/s
 
   explicit Pace(const dynamics::IntegratorOptions& options) {
     const double relative = options.tolerances.relative;
@@ -33,6 +38,16 @@ struct Pace {
     slipping = std::min(step, options.longest_step);
     longest = std::min(kMost * step, options.longest_step);
     agree = kAgree * relative;
+    most_apart = kMostApart * relative;
+  }
+  /// The length [s] below which a step is not halved, and how far apart [m/s] its two answers may be.
+  double least(double length) const { return length > slipping ? slipping : std::min(kShortest, slipping); }
+  double allowed(double length) const { return length > slipping ? agree : most_apart; }
+  /// The length [s] of the next step after one whose two answers were so far apart.
+  double next(double usual, double length, double apart) const {
+    if (apart <= kDoubled * agree) return std::max(usual, std::min(2 * length, longest));
+    if (apart <= kDoubled * most_apart) return std::max(usual, std::min(2 * length, slipping));
+    return usual;
   }
 };
 
@@ -189,15 +204,16 @@ class GivingRelease {
       const Scene<S> there = scenes_.scene(window_, next);
       const bool solved = attempt(next, there, rate);
       const double apart = distance(coarse_.relative, fine_.relative, body_);
-      if (std::min(length, usual_) > pace_.slipping && !(solved && apart <= pace_.agree)) {
-        usual_ = std::max(pace_.slipping, 0.5 * length);
+      const double tried = std::min(length, usual_), least = pace_.least(tried);
+      if (tried > least && !(solved && apart <= pace_.allowed(tried))) {
+        usual_ = std::max(least, 0.5 * length);
         ++result_.statistics.rejected_steps;
         continue;
       }
       if (!solved)
         return is_finite(coarse_.relative) && is_finite(fine_.relative) ? Outcome::not_converged
                                                                         : Outcome::not_finite;
-      if (apart <= kDoubled * pace_.agree) usual_ = std::max(usual_, std::min(2 * length, pace_.longest));
+      usual_ = pace_.next(usual_, length, apart);
       if (!accept(next, there, rate)) return Outcome::not_finite;
     }
     return Outcome::finished;

@@ -110,6 +110,48 @@ void require_finite_detach(ReleaseResult<S>& result) {
 }  // namespace
 
 template <class S>
+void validate(const ReleaseProblem<S>& problem) {
+  if (!(std::abs(problem.start) <= 1e6))
+    throw std::invalid_argument(
+        fmt::format("release: start = {} is not in [-1e6, 1e6] s: a clock must begin near the throw, for its "
+                    "times to be resolved",
+                    problem.start));
+  const auto require = [](bool ok, const char* name, double value, const char* range) {
+    if (!ok) throw std::invalid_argument(fmt::format("release: {} = {} is not in {}", name, value, range));
+  };
+  const double m = value_of(problem.body.mass), I = value_of(problem.body.inertia);
+  require(m > 0 && m <= 1e4, "mass", m, "(0, 1e4] kg");
+  require(I > 0 && I <= 1e6, "inertia", I, "(0, 1e6] kg m²");
+  const auto finite = [](const char* name, double value, const char* unit) {
+    dynamics::require_finite("release", {{name, value, unit}});
+  };
+  finite("gravity x", value_of(problem.gravity.x), "m/s²");
+  finite("gravity z", value_of(problem.gravity.z), "m/s²");
+  require(std::abs(value_of(problem.grasp.com_offset)) <= 100, "com_offset",
+          value_of(problem.grasp.com_offset), "[-100, 100] m");
+  require(std::abs(value_of(problem.grasp.across)) <= 100, "across", value_of(problem.grasp.across),
+          "[-100, 100] m");
+  finite("grasp angle", value_of(problem.grasp.angle), "rad");
+  finite("slip x", value_of(problem.slip.x), "m/s");
+  finite("slip z", value_of(problem.slip.z), "m/s");
+  finite("spin", value_of(problem.spin), "rad/s");
+  const double begin = problem.hand.begin(), end = problem.hand.end();
+  finite("begin of the hand's motion", begin, "s");
+  finite("end of the hand's motion", end, "s");
+  for (const double t : problem.hand.jumps()) finite("jump of the hand's motion", t, "s");
+  for (const double t : problem.normal_force.kinks()) finite("kink of the normal force", t, "s");
+  const double release = problem.normal_force.release_time();
+  require(release > -std::numeric_limits<double>::infinity(), "release time of the normal force", release,
+          "(-inf, inf] s");
+  if (!(problem.start >= begin && problem.start < end))
+    throw std::invalid_argument(
+        fmt::format("release: start = {} is not in [{}, {}) s, where the hand's motion is known",
+                    problem.start, begin, end));
+}
+template void validate(const ReleaseProblem<double>&);
+template void validate(const ReleaseProblem<Dual>&);
+
+template <class S>
 ReleaseResult<S> simulate_release(const ReleaseProblem<S>& problem, const ReleaseOptions& given) {
   validate(problem);
   if (std::is_same_v<S, Dual> && given.ledger)

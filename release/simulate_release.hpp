@@ -96,6 +96,11 @@ struct ReleaseResult {
   EnergyLedger ledger;                        ///< zero unless options.ledger
 };
 
+/// Throws std::invalid_argument, naming parameter, value and range, for a problem that is none. Instantiated
+/// for double and Dual.
+template <class S>
+void validate(const ReleaseProblem<S>& problem);
+
 /// Simulates from `problem.start` to detach. Throws std::invalid_argument when an input is not finite (an
 /// instant of the hand or of the normal force, too; a release at +infinity is none) or out of range
 /// (ReleaseProblem), where a ledger is asked for with derivatives, where the normal force is not zero after

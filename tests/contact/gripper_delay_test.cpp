@@ -42,6 +42,12 @@ TEST(DelayDistribution, UniformMidpoints) {
   for (int k = 0; k < 4; ++k) EXPECT_DOUBLE_EQ(q[k], 0.08 * (k + 0.5) / 4);
 }
 
+TEST(DelayDistribution, AUniformOneHasItsCentreInTheMiddle) {
+  const DelayDistribution off{DelayDistribution::Kind::uniform, 0.01, 0, 0.1};
+  EXPECT_THROW(off.mean(), std::invalid_argument);
+  EXPECT_THROW(off.quantiles(3), std::invalid_argument);
+}
+
 TEST(DelayDistribution, TheMeanOfATruncatedNormal) {
   // Simpson's rule with 20,000 points is exact to rounding for these
   for (const auto& [centre, spread, longest] : {std::array{0.03, 0.01, 0.08},

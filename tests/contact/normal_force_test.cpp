@@ -558,6 +558,50 @@ TEST(SmoothNormalForce, RejectsBrokenSeries) {
   EXPECT_THROW(smooth_normal_force(t, f, 0.1), std::invalid_argument);
 }
 
+/// What is no force: below zero, or no number.
+class NoForce final : public NormalForce {
+ public:
+  explicit NoForce(double value) : value_(value) {}
+  double at(const Window&, double) const override { return value_; }
+  dynamics::Dual at(const Window&, const dynamics::Dual&) const override { return dynamics::Dual(value_); }
+  void kinks(std::vector<double>& out) const override { out.push_back(0.1); }
+  void kinks(std::vector<dynamics::Dual>& out) const override { out.push_back(dynamics::Dual(0.1)); }
+  double release_time() const override { return 0.1; }
+
+ private:
+  double value_;
+};
+
+TEST(NormalForce, WhatIsNoForceStaysNoneUnderEffects) {
+  const Window pressed{0.0, 0.1};
+  for (const double value : {-5.0, double(NAN)}) {
+    const NoForce base(value);
+    const BiasedForce biased(base, dynamics::Dual(-20.0), 0.05);
+    const AdhesiveForce sticky(base, dynamics::Dual(20.0), dynamics::Dual(0.01));
+    for (const double t : {0.0, 0.02, 0.07}) {
+      EXPECT_FALSE(biased.at(pressed, t) >= 0) << value << " at " << t;
+      EXPECT_FALSE(sticky.at(pressed, t) >= 0) << value << " at " << t;
+      EXPECT_FALSE(biased.at(pressed, dynamics::Dual(t)).a >= 0) << value << " at " << t;
+      EXPECT_FALSE(sticky.at(pressed, dynamics::Dual(t)).a >= 0) << value << " at " << t;
+    }
+  }
+}
+
+TEST(SampledNormalForce, RefusesCoefficientsThatAreNoNumbers) {
+  SampledNormalForce::Polynomial::Coefficients piece{};
+  piece[0][0] = 10;
+  EXPECT_NO_THROW(SampledNormalForce(SampledNormalForce::Polynomial({0.0, 1.0}, {piece}), {0.5}, 0.5));
+  piece[1][0] = NAN;
+  EXPECT_THROW(SampledNormalForce(SampledNormalForce::Polynomial({0.0, 1.0}, {piece}), {0.5}, 0.5),
+               std::invalid_argument);
+}
+
+TEST(BiasedForce, AtTheWindowsEndHasTheLimitFromTheLeft) {
+  const NoForce holds(40);  // 40 N up to the release, where it drops
+  EXPECT_EQ(BiasedForce(holds, dynamics::Dual(1.0), 1.0).at({0.0, 0.1}, 0.1), 39);
+  EXPECT_EQ(BiasedForce(holds, dynamics::Dual(1.0), 1.0).at({0.1, 0.2}, 0.1), 0);
+}
+
 TEST(BiasedForce, RefusesWhatIsNoNumber) {
   const ProfileNormalForce opens(OpeningProfile<double>{0.0, 40, 0.01, 0.05, 1});
   EXPECT_THROW(BiasedForce(opens, dynamics::Dual(NAN), 0.01), std::invalid_argument);

@@ -148,6 +148,9 @@ TEST(ReachableTube, RefusesWhatIsNoSet) {
   EXPECT_THROW(tube_level({}, {0.0}, {}), std::invalid_argument);
   EXPECT_THROW(tube_level({}, {0.1, 2, 1}, {}), std::invalid_argument);
   EXPECT_THROW(tube_level({}, {0.1, 0, 1, -1, 1}, {}), std::invalid_argument);
+  // one infinite side would make the other one no bound
+  EXPECT_THROW(tube_level({}, {0.1, -INFINITY, 1}, {}), std::invalid_argument);
+  EXPECT_THROW(sample_tube({0.1, 0, 1, -INFINITY, 0}, {}), std::invalid_argument);
 }
 
 TEST(FlowMap, RefusesWhatIsNoFlight) {

@@ -226,6 +226,8 @@ TEST(SpatialFlight, RefusesADragThatDrives) {
   for (const double k : {-1.0, static_cast<double>(NAN)}) {
     OpenAir air{{0, 0, -9.8}, k};
     EXPECT_THROW(fly_in_space<double>(kStart, air, {0.5}), std::invalid_argument) << k;
+    air.drag_k = 0, air.linear_drag = k;
+    EXPECT_THROW(fly_in_space<double>(kStart, air, {0.5}), std::invalid_argument) << k;
   }
 }
 

@@ -159,6 +159,31 @@ TEST(Contracts, AJumpAtTheInstantOfTheSeparationLeavesItsDerivative) {
   }
 }
 
+TEST(Contracts, AJumpAtTheInstantOfAKinkKeepsItsOwnDerivative) {
+  // 0.1 + 0.2 is one rounding above 0.3. The force begins to fall there, where the hand's acceleration jumps:
+  // the jump stays where it is whatever moves the kink.
+  ASSERT_GT(0.1 + 0.2, 0.3);
+  contact::ContactParameters<double> pads;
+  pads.patch = {0.05, 0.004};
+  const auto law = contact::make_contact_model("limit_surface", pads);
+  for (const double jump : {0.3, 0.1 + 0.2, std::nextafter(0.1 + 0.2, 1)}) {
+    const auto hand = release::PolynomialHand::segments(0, {0.5, 0.9, 0.8}, {1.8, 1.8, 2.0},
+                                                        {{jump, {3, 3, 0}, {}}, {0.6, {-28, -28, 0}, {}}});
+    const auto spin = [&](auto dead_time) {
+      using S = decltype(dead_time);
+      const contact::ProfileNormalForce force(
+          contact::OpeningProfile<S>{0.1, S(60), dead_time, S(0.07), S(1)});
+      const release::ReleaseProblem<S> thrown{
+          hand, force, *law, {S(0.246), S(2.4e-3)}, {S(0), S(-9.81)}, {S(0.1), S(-0.7)}, 0.0, {}, S(0)};
+      return release::simulate_release(thrown, {.integrator = {.tolerances = {1e-10, 1e-12}}})
+          .detach.twist.omega;
+    };
+    const double exact = spin(Dual(0.2, 0)).v[0], h = 1e-5;
+    const double difference = (spin(0.2 + h) - spin(0.2 - h)) / (2 * h);
+    EXPECT_NEAR(exact, difference, 1e-3 * std::abs(difference)) << jump;
+  }
+}
+
 TEST(Contracts, LedgersAreOfValues) {
   const auto hand = support::still_hand(0.2);
   const Claimed force(0.1, 0.1);

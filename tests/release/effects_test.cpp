@@ -90,6 +90,21 @@ TEST(LaggedHand, IsSettledBeforeTheLogHoweverShortTheLag) {
   }
 }
 
+TEST(LaggedHand, ATinyLagIsTheLogAFewOfItLater) {
+  const auto log = logged();
+  for (const double lag : {1e-6, 1e-9, 1e-12})
+    for (const double jump : kJumps)
+      for (const double later : {1.0, 3.0, 40.0}) {
+        const LaggedHand hand(log, Dual(lag));
+        const double t = jump + later * lag;
+        const auto a = acceleration(hand.at({jump, 0.1}, t)), before = acceleration(log.at({0, jump}, jump)),
+                   after = acceleration(log.at({jump, 0.1}, jump));
+        for (int n = 0; n < 3; ++n)  // the jump dies as exp(−(t − t_i)/τ); the rest of the log is slow
+          EXPECT_NEAR(a[n], after[n] + (before[n] - after[n]) * std::exp(-(t - jump) / lag), 0.05)
+              << lag << ' ' << later;
+      }
+}
+
 TEST(LaggedHand, WithoutLagIsTheLog) {
   const auto log = logged();
   const LaggedHand hand(log, Dual(0));

@@ -151,6 +151,40 @@ TEST(DistributedPatch, StepsAndBristlesDoNotMatter) {
   }
 }
 
+/// A grip that closes from nothing to 20 N in 10 ms, and opens again.
+class ClosingGrip final : public contact::NormalForce {
+ public:
+  double at(const contact::Window&, double t) const override {
+    return std::clamp(std::min(20 * t / 0.01, 20 * (0.08 - t) / 0.05), 0.0, 20.0);
+  }
+  dynamics::Dual at(const contact::Window& w, const dynamics::Dual& t) const override {
+    return dynamics::Dual(at(w, t.a));
+  }
+  void kinks(std::vector<double>& out) const override { out.insert(out.end(), {0.01, 0.03, 0.08}); }
+  void kinks(std::vector<dynamics::Dual>& out) const override {
+    for (const double t : {0.01, 0.03, 0.08}) out.push_back(dynamics::Dual(t));
+  }
+  double release_time() const override { return 0.08; }
+};
+
+TEST(DistributedPatch, AGripThatClosesFirstIsTheDiscs) {
+  const auto hand = support::accelerating_hand({3, -4, 30}, 0.2);
+  const ClosingGrip force;
+  ContactParameters<double> parameters;
+  parameters.patch = {kMu, kRadius};
+  const auto model = contact::make_contact_model("limit_surface_disc", parameters);
+  release::ReleaseProblem<double> problem{hand, force, *model, {0.4, 1e-3}, {0, -9.81}, {0.05, 0.3},
+                                          0.0,  {},    0.0};
+  const auto disc = simulate_release(problem, {.integrator = {.tolerances = {1e-9, 1e-11}}});
+  const auto points = simulate_distributed_patch(problem, patch_of(12));
+  ASSERT_EQ(points.outcome, release::ReleaseOutcome::detached);
+  EXPECT_LT(distance(points.detach.twist, disc.detach.twist), 2e-4);  // m/s: 12 rings, as above, of a weak grip
+  problem.start = -1;  // the hand is not known there
+  EXPECT_THROW(simulate_distributed_patch(problem, patch_of(5)), std::invalid_argument);
+  problem.start = 0, problem.body.mass = -1;
+  EXPECT_THROW(simulate_distributed_patch(problem, patch_of(5)), std::invalid_argument);
+}
+
 TEST(DistributedPatch, HoldsWithoutCreep) {
   const auto hand = support::still_hand(1);
   const support::ConstantForce force(kNormal);
