@@ -174,7 +174,11 @@ struct NormalForceFit {
 /// always by where it is between two samples; by one whole step where the ramp has fewer than four. Outliers
 /// that stand alone, or in pairs, count as little as they go beyond 3.5 σ. The last bit before the release
 /// (below the noise, or 1 % of the grip) falls monotonically to zero. What the few samples of a slow or noisy
-/// sensor cannot tell from a power is taken for one, and σ does not know of it.
+/// sensor cannot tell from a power is taken for one, and σ does not know of it. Of a ramp that ends steeply
+/// (p < 1) σ is too small, the more so the fewer samples the ramp has.
+///
+/// Pads that touch once more after they have let go: where that stands out of the noise, the release is after
+/// it; else it is part of the tail, and `chi2_per_dof` alone shows it.
 ///
 /// A curve that leaves the samples by a fifth of the largest (through spikes, or rubbish) is replaced by
 /// straight lines between them.

@@ -9,9 +9,9 @@ namespace unhand::contact {
 inline constexpr double kUniformDisc = 2.0 / 3.0;
 /// The largest friction coefficient that anything here accepts [-].
 inline constexpr double kMostMu = 10;
-/// The smallest radius that anything here accepts [m]: of a point, which holds no torque. The spin of smaller
-/// ones is too fast for any step.
-inline constexpr double kSmallestRadius = 1e-9;
+/// The smallest radius that anything here accepts [m], far below an atom's: the spin of smaller ones is too
+/// fast for any step.
+inline constexpr double kSmallestRadius = 1e-12;
 /// L = c a of a finger's pad of about 1 cm radius [m]: where a length is to be assumed, and where force and
 /// torque of a wrench are judged together.
 inline constexpr double kFingerLength = 0.007;

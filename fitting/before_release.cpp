@@ -28,7 +28,7 @@ BeforeRelease before_release(const CampaignProblem& problem, const CampaignThrow
     if (phase_of(o, thrown.opening, HUGE_VAL) == Phase::grasped) held.all.push_back(o);
   if (held.all.empty()) return out;
   const BeforeRelease unknown = out;
-  constexpr int kSteps = 4;
+  constexpr int kSteps = 60;  // where samples count linearly (Huber's), steps shrink by a factor only
   for (int step = 0; step < kSteps; ++step) {
     auto l = problem.linearise(thrown.prepared, held, campaign, out.own, derivatives);
     if (!l.solved) return unknown;

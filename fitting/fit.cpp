@@ -255,7 +255,15 @@ FitResult fit_from(std::vector<double> start, const CampaignProblem& problem, co
 FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
   validate(options, problem);
   if (!options.start.empty()) return fit_from(options.start, problem, options);
-  const std::vector<std::size_t> sizes = effect_sizes(problem, true);
+  const auto free_sizes = [&](bool one_sided) {  // what is held stays at its start
+    auto out = effect_sizes(problem, one_sided);
+    std::erase_if(out, [&](std::size_t k) {
+      return options.all_fixed || std::find(options.fixed.begin(), options.fixed.end(),
+                                            problem.campaign()[k].name) != options.fixed.end();
+    });
+    return out;
+  };
+  const std::vector<std::size_t> sizes = free_sizes(true);
   const auto start = [&](double share) {  // of a typical step
     std::vector<double> out = problem.start();
     for (const std::size_t k : sizes) out[k] += share * problem.campaign()[k].scale;
@@ -290,7 +298,7 @@ FitResult fit(const CampaignProblem& problem, const FitOptions& options) {
   if (effects.size() < 2) return out;
   // Several effects may stand for each other, each with a minimum of its own in which it does most.
   constexpr double kMost = 4, kLeast = 0.1;  // typical steps
-  for (const std::size_t k : effect_sizes(problem, false)) {
+  for (const std::size_t k : free_sizes(false)) {
     std::vector<double> values = start(kLeast);
     values[k] =
         std::min(problem.start()[k] + kMost * problem.campaign()[k].scale, problem.campaign()[k].high);

@@ -96,7 +96,7 @@ struct FittedUnknown {
   /// fitted again, the cost has risen by as much as it would at ± t sigma if it were a parabola. An end
   /// beyond the accepted range is infinite.
   std::optional<std::array<double, 2>> profile{};
-  bool allows_for_few{};  ///< sigma is wider by what Student's t asks: ±1.96 sigma is the 95 % interval
+  bool allows_for_few{};  ///< ±1.96 sigma is the 95 % interval: wider by Student's t, or of declared noise
   /// The 95 % interval: the profile's, or value ± t sigma, Student's t (1.96 where sigma allows for few).
   std::array<double, 2> interval95() const;
   /// Degrees of freedom of that t.
@@ -154,8 +154,10 @@ struct FitResult {
   std::vector<FittedUnknown> campaign;  ///< in the problem's order
   /// Covariance of the campaign's unknowns, row by row. H⁻¹ G H⁻¹ with H the Gauss-Newton matrix after the
   /// throws' own unknowns are eliminated and G the scatter of the throws' gradients, each enlarged by what
-  /// the fit has taken out of it [BellMcCaffrey2002]: it holds when the noise within a throw is correlated or
-  /// the law is not quite right. To throws that agree too well, one that scatters as its noise is added.
+  /// the fit has taken out of it [BellMcCaffrey2002]: it holds when the noise within a throw is correlated,
+  /// or the law is wrong by something that differs from throw to throw; what repetitions share of that it
+  /// does not see (count_discrepancy does). To throws that agree too well, one that scatters as its noise is
+  /// added.
   std::vector<double> covariance;
   std::vector<double> own_spread;        ///< learned 1 σ of the throws' own unknowns
   std::vector<OpenDirection> open;       ///< directions without an answer

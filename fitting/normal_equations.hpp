@@ -7,6 +7,7 @@
 
 #include "fitting/distributions.hpp"
 #include "fitting/fit.hpp"
+#include "fitting/scatter_covariance.hpp"
 
 namespace unhand::fitting {
 
@@ -66,21 +67,7 @@ NormalEquations normal_equations(const CampaignProblem& problem, const std::vect
                                  const std::vector<double>& own_sigma, const Weighting& weighting,
                                  int threads);
 
-/// A covariance that rests on the scatter between throws.
-struct ScatterCovariance {
-  Eigen::MatrixXd covariance;
-  Eigen::VectorXd degrees_of_freedom;  ///< of every unknown's variance
-};
-/// H⁻¹ G H⁻¹; H = information + prior, G = prior + Σ g̃_i g̃_iᵀ over the throws' gradients g_i,
-/// g̃_i = (1 − H_i H⁻¹)^(−1/2) g_i: the fit follows a throw by its share H_i of the information, which makes
-/// its gradient that much too small. If the noise is as declared, E[G] = H whatever the shares: "CR2" of
-/// [BellMcCaffrey2002]. With c the row of H⁻¹ that belongs to an unknown and B_ij = Cov(cᵀg̃_i, cᵀg̃_j), the
-/// degrees of freedom of its variance are (tr B + cᵀ prior c)²/tr B², as there, since nothing of the prior's
-/// part is estimated; at most kCertain.
-///
-/// Few throws may by chance, or in some direction must, agree better than their noise allows. So where an
-/// eigenvalue λ of H^(−1/2) G H^(−1/2) is below 1 it becomes (1 + ν λ)/(1 + ν), ν the least of the degrees of
-/// freedom: one more throw that scatters as the noise says.
+/// Over its throws.
 ScatterCovariance scatter_covariance(const NormalEquations& equations, const Eigen::MatrixXd& prior);
 
 /// The inverse in units of `scale`, with +infinity on the diagonal of what is not determined.

@@ -10,6 +10,7 @@
 
 #include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
+#include "experiment/campaign_effects.hpp"
 #include "fitting/distributions.hpp"
 #include "fitting/normal_equations.hpp"
 
@@ -79,6 +80,56 @@ ThrowShare share_of(const CampaignProblem& problem, std::size_t index, const Fit
   return out;
 }
 
+/// Fewer conditions than these, by what they say of an unknown, cannot say how far they agree on it.
+constexpr double kFewestConditions = 2.5;
+/// By how many σ a block has to differ [-].
+constexpr double kFar = 2.5;
+
+/// What leaving out each condition does to every unknown.
+struct Jackknife {
+  Eigen::VectorXd conditions;  ///< that speak of it: (Σ h)²/Σ h² by their shares h of what is known
+  Eigen::VectorXd excess;      ///< Σ δ², less what noise alone makes of it
+};
+
+Jackknife jackknife(const std::map<std::string, Equations>& conditions, const Equations& all,
+                    const Answer& whole) {
+  const Eigen::VectorXd noise = whole.covariance.diagonal();
+  const Eigen::Index width = noise.size();
+  Jackknife out{Eigen::VectorXd::Zero(width), Eigen::VectorXd::Zero(width)};
+  Eigen::VectorXd shares = out.excess, squares = out.excess;
+  for (const auto& [name, of] : conditions) {
+    const Answer rest(all - of);
+    for (Eigen::Index k = 0; k < width; ++k) {
+      const double without = rest.covariance(k, k), step = rest.step[k] - whole.step[k];
+      constexpr double kAlone = 1e4;  // what is hardly known without it is its own
+      const bool alone = !(without > noise[k] * (1 - 1e-9)) || without > kAlone * noise[k];
+      const double share = alone ? 1 : std::clamp(1 - noise[k] / without, 0.0, 1.0);
+      shares[k] += share, squares[k] += share * share;
+      if (!alone) out.excess[k] += step * step - (without - noise[k]);
+    }
+  }
+  for (Eigen::Index k = 0; k < width; ++k)
+    if (squares[k] > 0) out.conditions[k] = shares[k] * shares[k] / squares[k];
+  return out;
+}
+
+/// To the sizes of objects of which too few conditions speak: by as much more than noise as those of the same
+/// parameter of other objects.
+void lend(const CampaignProblem& problem, const Eigen::VectorXd& conditions, const Eigen::VectorXd& noise,
+          Eigen::VectorXd& variance) {
+  std::map<std::string, double> inflated;  // by parameter
+  const auto parameter = [&](Eigen::Index k) {
+    return experiment::without_object(problem.campaign()[static_cast<std::size_t>(k)].name);
+  };
+  for (Eigen::Index k = 0; k < noise.size(); ++k)
+    if (conditions[k] >= kFewestConditions && noise[k] > 0)
+      inflated[parameter(k)] = std::max(inflated[parameter(k)], variance[k] / noise[k]);
+  for (Eigen::Index k = 0; k < noise.size(); ++k)
+    if (!(conditions[k] >= kFewestConditions))
+      if (const auto by = inflated.find(parameter(k)); by != inflated.end())
+        variance[k] = std::max(variance[k], by->second * noise[k]);
+}
+
 }  // namespace
 
 void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threads) {
@@ -113,16 +164,16 @@ void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threa
   const Eigen::VectorXd noise = whole.covariance.diagonal();
 
   Eigen::VectorXd variance = noise;
-  std::vector<bool> allows_for_few(static_cast<std::size_t>(width), false);
   const auto count = static_cast<double>(conditions.size());
   if (count >= 3) {
-    Eigen::VectorXd jackknife = Eigen::VectorXd::Zero(width);
-    for (const auto& [name, of] : conditions) jackknife += (Answer(all - of).step - whole.step).cwiseAbs2();
-    const double t = student_factor(count - 1) / kNormal95;
-    jackknife *= (count - 1) / count * t * t;
-    for (Eigen::Index k = 0; k < width; ++k)
-      if (jackknife[k] > variance[k])
-        variance[k] = jackknife[k], allows_for_few[static_cast<std::size_t>(k)] = true;
+    const Jackknife by = jackknife(conditions, all, whole);
+    for (Eigen::Index k = 0; k < width; ++k) {
+      if (!(by.conditions[k] >= kFewestConditions)) continue;  // few that speak of it cannot disagree
+      const double t = student_factor(by.conditions[k] - 1) / kNormal95,
+                   spread = (by.conditions[k] - 1) / by.conditions[k] * t * t * by.excess[k];
+      variance[k] += std::max(0.0, spread);
+    }
+    lend(problem, by.conditions, noise, variance);
   }
   Eigen::VectorXd excess = Eigen::VectorXd::Zero(width);
   for (const Equations& rest : without) {
@@ -132,7 +183,8 @@ void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threa
       const double expected = std::max(0.0, of.covariance(k, k) - noise[k]) * inflated;
       // Ten times as uncertain without the block: the rest has no say of its own.
       if (!(rest(k, k) > 0) || of.covariance(k, k) > 100 * noise[k]) continue;
-      excess[k] = std::max(excess[k], step * step - expected);
+      // One of four goes beyond what chance allows by chance: only far beyond.
+      if (step * step > kFar * kFar * expected) excess[k] = std::max(excess[k], step * step - expected);
     }
   }
   variance += excess;
@@ -143,7 +195,7 @@ void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threa
     if (!(u.sigma > 0) || !(variance[k] > u.sigma * u.sigma)) continue;
     factor[static_cast<std::size_t>(k)] = std::sqrt(variance[k]) / u.sigma;
     u.sigma = std::sqrt(variance[k]);
-    u.allows_for_few = allows_for_few[static_cast<std::size_t>(k)];
+    u.allows_for_few = true;  // of declared noise, or widened by t above
   }
   for (std::size_t j = 0; j < factor.size(); ++j)
     for (std::size_t k = 0; k < factor.size(); ++k)

@@ -65,6 +65,33 @@ bool is_significant(const FitResult& fit, const dynamics::Effect& effect, double
   return p_value <= level && wald_as_known(fit, effect) <= level / candidates;
 }
 
+/// Of a candidate's shapes the one with the largest gain; null where it is none.
+const Score* best_score_of(const Footprints& f, const std::vector<Score>& all, const std::string& id) {
+  const Score* out = nullptr;
+  for (const Score& score : all)
+    if (f.candidates[score.candidate].id == id && (!out || score.gain > out->gain)) out = &score;
+  return out;
+}
+
+/// A stage with an effect, and with another one beside it that acts through it.
+struct OpenedPair {
+  Stage first, both;
+};
+
+/// Fits both to either half of the throws; nothing where one has no answer there.
+std::optional<OpenedPair> fit_pair(const Stage& stage, const Candidate& through, const Score& score,
+                                   const std::string& id, const DiscoverOptions& options) {
+  OpenedPair out{extended(stage, through, score, true, options), {stage.problem, {}, {}, {}}};
+  if (!out.first.is_fitted() || !solve_held_out(out.first, options)) return std::nullopt;
+  const Footprints& f = footprints_of(out.first, options);
+  const std::vector<Score> all = scores(f);
+  const Score* beside = best_score_of(f, all, id);
+  if (!beside || !beside->visible) return std::nullopt;
+  out.both = extended(out.first, f.candidates[beside->candidate], *beside, true, options);
+  if (!out.both.is_fitted() || !solve_held_out(out.both, options)) return std::nullopt;
+  return out;
+}
+
 /// A refit of one candidate against the stage that it would extend, with evidence on the train throws.
 struct TriedEffect {
   const Score* score{};
@@ -121,6 +148,7 @@ class ForwardStep {
       const std::string why = best_->held_out.where;
       return accept(std::move(*best_), why, convincing_);
     }
+    if (auto opened = open_pair()) return opened;
     return weigh_small();
   }
 
@@ -144,6 +172,41 @@ class ForwardStep {
     const std::string through = find_effect(id).acts_through;
     const auto& in_model = stage_.problem.options().effects;
     return !through.empty() && std::find(in_model.begin(), in_model.end(), through) == in_model.end();
+  }
+
+  /// Where flights leave a misfit and nothing convinced: what another effect acts through (a drag, for a
+  /// wind), if both together explain it. The other one follows in the next step.
+  std::optional<Stage> open_pair() {
+    const auto flights_leave = [&](const ChannelMisfit& m) {
+      return in_air(m.phase) && is_misfit(m, options_);
+    };
+    if (std::none_of(stage_.fit.misfit.begin(), stage_.fit.misfit.end(), flights_leave)) return std::nullopt;
+    for (const std::string& id : out_.silent) {
+      if (!acts_through_nothing(id)) continue;
+      const Score* through = best_score_of(f_, all_, find_effect(id).acts_through);
+      if (!through || !through->visible) continue;
+      auto pair = fit_pair(stage_, f_.candidates[through->candidate], *through, id, options_);
+      const auto tried = static_cast<double>(f_.candidates.size());
+      if (!pair || !is_convincing(*pair, {id, id_of(*through)}, tried * tried)) continue;
+      const Improvement gain = improvement(stage_, pair->both, out_.before.held_out, options_);
+      if (!(gain.matters >= 1)) continue;
+      TriedEffect first{through, std::move(pair->first), 0, 0, gain};
+      first.delta_bic = first.next.bic() - stage_.bic();
+      Ranked& ranked = named(out_.ranking, id_of(*through));
+      ranked.refit_step = this_step(), ranked.delta_bic = first.delta_bic, ranked.held_out_gain = gain.fall;
+      return accept(std::move(first), fmt::format("{}, together with {}", gain.where, id), {});
+    }
+    return std::nullopt;
+  }
+
+  /// Whether both fits and both effects are evident against the stage before.
+  bool is_convincing(const OpenedPair& pair, const std::vector<std::string>& ids, double tried) const {
+    return pair.both.bic() - stage_.bic() <= kDeltaBic &&
+           std::all_of(ids.begin(), ids.end(), [&](const std::string& id) {
+             const dynamics::Effect effect = find_effect(id);
+             return is_significant(pair.both.fit, effect, wald_p_value(pair.both.fit, effect),
+                                   options_.family_wise_level, tried);
+           });
   }
 
   bool in_reach(const Score& score) const {

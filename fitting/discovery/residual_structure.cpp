@@ -51,14 +51,31 @@ std::vector<int> quantile_groups(const std::vector<double>& value, int groups) {
   return out;
 }
 
-/// The samples of a recording in a group are one witness, their mean: neighbours may err alike.
+/// Whether conditions, rather than recordings, are the witnesses of what all of them share: repetitions of a
+/// condition err alike where the model fails there. Too few cannot say how much they scatter.
+bool are_witnesses(const std::map<int, int>& recordings_of) {
+  constexpr std::size_t kFewest = 4;
+  return recordings_of.size() >= kFewest &&
+         std::any_of(recordings_of.begin(), recordings_of.end(), [](const auto& c) { return c.second > 1; });
+}
+
+/// The witness that each sample belongs to.
+std::vector<int> witnesses(const ResidualSamples& samples) {
+  std::map<int, int> condition_of, recordings_of;
+  for (std::size_t i = 0; i < samples.value.size(); ++i)
+    condition_of.try_emplace(samples.series[i], samples.condition[i]);
+  for (const auto& [series, condition] : condition_of) ++recordings_of[condition];
+  return are_witnesses(recordings_of) ? samples.condition : samples.series;
+}
+
+/// The samples of a witness in a group count once, their mean: neighbours may err alike.
 Dependence over_groups(const std::string& on, const ResidualSamples& samples,
-                       const std::vector<double>& variable, int groups) {
+                       const std::vector<double>& variable, const std::vector<int>& of, int groups) {
   std::vector<double> r, x;
-  std::vector<int> series;
+  std::vector<int> witness;
   for (std::size_t i = 0; i < samples.value.size(); ++i)
     if (std::isfinite(variable[i]))
-      r.push_back(samples.value[i]), x.push_back(variable[i]), series.push_back(samples.series[i]);
+      r.push_back(samples.value[i]), x.push_back(variable[i]), witness.push_back(of[i]);
   if (r.size() < 4) return {on, 0, 1};
   const auto [low, high] = std::minmax_element(x.begin(), x.end());
   if (!(*high - *low > 1e-9 * std::max(std::abs(*high), std::abs(*low)))) return {on, 0, 1};
@@ -67,10 +84,10 @@ Dependence over_groups(const std::string& on, const ResidualSamples& samples,
   struct Cell {
     double n{}, sum{};
   };
-  std::map<std::pair<int, int>, Cell> cells;  // by recording and group
+  std::map<std::pair<int, int>, Cell> cells;  // by witness and group
   double squares = 0;
   for (std::size_t i = 0; i < r.size(); ++i) {
-    Cell& cell = cells[{series[i], group[i]}];
+    Cell& cell = cells[{witness[i], group[i]}];
     cell.n += 1, cell.sum += r[i], squares += r[i] * r[i];
   }
   std::vector<double> mean;
@@ -92,10 +109,10 @@ struct SeriesMean {
   double mean() const { return sum / n; }
 };
 
-std::map<int, SeriesMean> means_of(const ResidualSamples& samples) {
+std::map<int, SeriesMean> means_of(const ResidualSamples& samples, const std::vector<int>& of) {
   std::map<int, SeriesMean> out;
   for (std::size_t i = 0; i < samples.value.size(); ++i) {
-    SeriesMean& s = out[samples.series[i]];
+    SeriesMean& s = out[of[i]];
     s.n += 1, s.sum += samples.value[i], s.condition = samples.condition[i];
   }
   return out;
@@ -183,13 +200,14 @@ ResidualStructure find_structure(const ResidualSamples& samples, const Structure
     out.autocorrelation = products / std::sqrt(of_former * of_latter);
     out.autocorrelation_p = normal_two_sided(out.autocorrelation * std::sqrt(pairs));
   }
-  const auto series = means_of(samples);
-  out.offset = shared_offset(series, out.n, squares);
+  const auto series = means_of(samples, samples.series);
+  const auto of = witnesses(samples);
+  out.offset = shared_offset(means_of(samples, of), out.n, squares);
   out.depends.push_back(over_conditions(series, squares));
   out.depends.push_back(over_order(series, squares));
-  out.depends.push_back(over_groups("time", samples, samples.time, options.groups));
+  out.depends.push_back(over_groups("time", samples, samples.time, of, options.groups));
   for (const auto& state : samples.states)
-    out.depends.push_back(over_groups(state.name, samples, state.value, options.groups));
+    out.depends.push_back(over_groups(state.name, samples, state.value, of, options.groups));
   std::stable_sort(out.depends.begin(), out.depends.end(), [](const Dependence& a, const Dependence& b) {
     return a.p_value != b.p_value ? a.p_value < b.p_value : a.share > b.share;
   });

@@ -55,7 +55,7 @@ double absence(const FitResult& fit, const dynamics::Effect& effect, bool ends) 
   if (!C.allFinite()) return 1;
   double least = std::numeric_limits<double>::infinity(), each = 1;
   for (std::size_t i = 0; i < sizes.size(); ++i) {
-    const double known = fit.campaign[static_cast<std::size_t>(sizes[i])].degrees_of_freedom,
+    const double known = fit.campaign[static_cast<std::size_t>(sizes[i])].interval_freedom(),
                  n = std::max(1.0, known - static_cast<double>(shapes.size()));
     const auto k = static_cast<Eigen::Index>(i);
     least = std::min(least, n);

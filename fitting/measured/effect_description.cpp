@@ -1,6 +1,7 @@
 #include "fitting/measured/effect_description.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "dynamics/dense_solve.hpp"
 #include "fitting/measured/grouped_footprints.hpp"
@@ -59,7 +60,8 @@ std::vector<AcceptedEffect> described(const GroupedProblem& problem, const Effec
       const SharedParameter& p = fit.shared[k];
       if (p.effect != accepted.id) continue;
       const double value = fit.values[static_cast<Index>(k)];
-      accepted.parameters.push_back({p.short_name, p.unit, value, fit.sigma(k), fit.used - 1.0});
+      accepted.parameters.push_back(
+          {p.short_name, p.unit, value, fit.sigma(k), fit.freedom[static_cast<Index>(k)]});
       if (!p.shape) contribution[static_cast<Index>(k)] = value - p.neutral;
     }
     for (const Candidate& candidate : f.total.candidates) {
@@ -100,9 +102,12 @@ std::vector<Stability> stability_of(const GroupedProblem& problem, const EffectA
     for (std::size_t k = 0; k < f.total.fitted; ++k) {
       const auto j = static_cast<Index>(k);
       if (fit.shared[k].shape) continue;
+      // Welch's: of a difference of two that are known unequally well
+      const double va = a.sigma[j] * a.sigma[j], vb = b.sigma[j] * b.sigma[j];
+      const double freedom = (va + vb) * (va + vb) / (va * va / a.freedom[j] + vb * vb / b.freedom[j]);
+      if (!(va + vb < HUGE_VAL)) continue;  // one half does not see it
       out.push_back({fit.shared[k].name, problem.covariates()[c], at, fit.values[j] + a.value[j], a.sigma[j],
-                     fit.values[j] + b.value[j], b.sigma[j],
-                     static_cast<double>(used.size() - 2 * columns.size())});
+                     fit.values[j] + b.value[j], b.sigma[j], freedom});
     }
   }
   return out;

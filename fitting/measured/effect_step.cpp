@@ -79,7 +79,7 @@ void judge(const GroupedFootprints& f, const GroupedFit& fit, Scored& one) {
   const auto p = static_cast<Index>(inside.size());
   const VectorXd x = step.value.tail(p);
   const MatrixXd covariance = step.covariance.bottomRightCorner(p, p);
-  one.p = wald_of(x, covariance, sides).p_value(fit);
+  one.p = wald_of(x, covariance, step.freedom.tail(p), sides).p_value(fit);
   for (Index j = 0; j < p; ++j)
     if (sides[static_cast<std::size_t>(j)] * x[j] < 0) one.gain = 0, one.p = 1;
 }

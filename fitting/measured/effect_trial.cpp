@@ -21,21 +21,22 @@ double Wald::delta_bic(const GroupedFit& fit) const {
 double Wald::p_value(const GroupedFit& fit) const {
   const auto p = static_cast<double>(parameters), n = static_cast<double>(fit.used);
   if (!(n > 2)) return 1;
-  const double one = p * std::min(hotelling_bar_tail(largest, 1, 0, n - 1),
-                                  hotelling_bar_tail(largest_bounded, 0, 1, n - 1));
+  const double one = p * each;
   // So few groups say nothing of all parameters together.
   if (!(n > p + 1)) return std::min(1.0, one);
   const double all = hotelling_bar_tail(statistic, static_cast<int>(parameters) - bounded, bounded, n - 1);
   return parameters < 2 ? all : std::min(1.0, 2 * std::min(all, one));
 }
 
-Wald wald_of(const VectorXd& away, const MatrixXd& covariance, const std::vector<int>& sides) {
+Wald wald_of(const VectorXd& away, const MatrixXd& covariance, const VectorXd& freedom,
+             const std::vector<int>& sides) {
   Wald out{away.dot(pseudo_solve(covariance, away)), away.size()};
   for (Index j = 0; j < away.size(); ++j) {
     const bool bounded = sides[static_cast<std::size_t>(j)] != 0;
     out.bounded += bounded ? 1 : 0;
-    double& largest = bounded ? out.largest_bounded : out.largest;
-    if (covariance(j, j) > 0) largest = std::max(largest, away[j] * away[j] / covariance(j, j));
+    if (covariance(j, j) > 0)
+      out.each = std::min(out.each, hotelling_bar_tail(away[j] * away[j] / covariance(j, j), bounded ? 0 : 1,
+                                                       bounded ? 1 : 0, freedom[j]));
   }
   return out;
 }
@@ -51,7 +52,7 @@ Wald wald_of(const GroupedFit& fit, const std::string& id) {
       sides.push_back(side_of(p.neutral, p.low, p.high));
     }
   const Eigen::Map<const VectorXd> d(away.data(), static_cast<Index>(away.size()));
-  return wald_of(d, fit.covariance(at, at), sides);
+  return wald_of(d, fit.covariance(at, at), fit.freedom(at), sides);
 }
 
 namespace {

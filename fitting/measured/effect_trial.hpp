@@ -37,19 +37,20 @@ EffectTrial try_effect(const GroupedProblem& problem, const GroupedFit& fit, con
 struct Wald {
   double statistic{};
   Eigen::Index parameters{};
-  int bounded{};  ///< of the parameters: neutral at an end of their range
-  /// (θ_j − neutral_j)²/V_jj of the parameter that is told best from neutral: of those that go both ways, and
-  /// of those that are bounded.
-  double largest{}, largest_bounded{};
+  int bounded{};   ///< of the parameters: neutral at an end of their range
+  double each{1};  ///< p-value of the parameter that is told best from neutral, alone
   /// Bayes' criterion with the effect less that without: parameters log(groups) less the statistic.
   double delta_bic(const GroupedFit& fit) const;
   /// Against Hotelling's T² over the groups used, half of it where a parameter may only go one way
-  /// (hotelling_bar_tail); or of the largest alone, shared by the parameters: few groups cannot say how all
-  /// of them scatter together, and still that one of them is there. The smaller one, twice.
+  /// (hotelling_bar_tail); or of the surest alone, by its own degrees of freedom and shared by the
+  /// parameters: few groups cannot say how all of them scatter together, and still that one of them is there.
+  /// The smaller one, twice.
   double p_value(const GroupedFit& fit) const;
 };
 Wald wald_of(const GroupedFit& fit, const std::string& id);
-/// Of parameters that are `away` from neutral; `sides` as Candidate has them.
-Wald wald_of(const Eigen::VectorXd& away, const Eigen::MatrixXd& covariance, const std::vector<int>& sides);
+/// Of parameters that are `away` from neutral, their variances of so many degrees of freedom; `sides` as
+/// Candidate has them.
+Wald wald_of(const Eigen::VectorXd& away, const Eigen::MatrixXd& covariance, const Eigen::VectorXd& freedom,
+             const std::vector<int>& sides);
 
 }  // namespace unhand::fitting

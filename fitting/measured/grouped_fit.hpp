@@ -40,11 +40,11 @@ struct GroupedFit {
   std::string message;                  ///< in words
   std::vector<SharedParameter> shared;  ///< the parameters
   Eigen::VectorXd values;               ///< theirs, in their order
-  /// A⁻¹ B A⁻¹ n/(n − p): A the information with the groups' own unknowns eliminated, B the scatter of the
-  /// groups' scores (the infinitesimal jackknife over groups). It holds when the noise within a group is
-  /// correlated and when the model is not quite right. Not below A⁻¹; what no group sees is as uncertain as
-  /// its range is wide.
+  /// By the scatter of the groups' gradients (borrowing_scatter): it holds when the noise within a group is
+  /// correlated and when the model is not quite right. Not below that of white noise; what no group sees is
+  /// as uncertain as its range is wide.
   Eigen::MatrixXd covariance;
+  Eigen::VectorXd freedom;               ///< degrees of freedom of every parameter's variance
   std::vector<GroupFit> groups;          ///< one per group of the problem
   GroupedWeights weights;                ///< as at the answer
   double chi2{};                         ///< of the groups used, not robust

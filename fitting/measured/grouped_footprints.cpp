@@ -6,6 +6,7 @@
 #include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
 #include "fitting/measured/grouped_weights.hpp"
+#include "fitting/scatter_covariance.hpp"
 
 namespace unhand::fitting {
 
@@ -137,7 +138,7 @@ std::vector<FootprintProfile> footprint_profiles(const GroupedProblem& problem, 
 LinearStep linear_step(const std::vector<MatrixXd>& parts, const std::vector<std::size_t>& which,
                        const std::vector<Index>& columns) {
   const auto p = static_cast<Index>(columns.size()), r = parts.front().rows() - 1;
-  MatrixXd A = MatrixXd::Zero(p, p), scores = MatrixXd::Zero(p, static_cast<Index>(which.size()));
+  MatrixXd A = MatrixXd::Zero(p, p);
   VectorXd b = VectorXd::Zero(p);
   for (const std::size_t n : which) {
     A += parts[n](columns, columns);
@@ -146,16 +147,17 @@ LinearStep linear_step(const std::vector<MatrixXd>& parts, const std::vector<std
   const MatrixXd inverse = pseudo_inverse(A);
   LinearStep out;
   out.value = -inverse * b;
-  double used = 0;
-  for (std::size_t k = 0; k < which.size(); ++k) {
-    const MatrixXd& part = parts[which[k]];
-    scores.col(static_cast<Index>(k)) =
-        VectorXd(part(columns, std::vector<Index>{r})) + MatrixXd(part(columns, columns)) * out.value;
-    used += part(r, r) > 0 ? 1 : 0;
+  std::vector<Cluster> clusters;
+  for (const std::size_t n : which) {
+    const MatrixXd own = parts[n](columns, columns);
+    clusters.push_back({own, VectorXd(parts[n](columns, std::vector<Index>{r})) + own * out.value});
   }
-  out.covariance =
-      gram(product(scores.transpose(), inverse)) * (used / std::max(1.0, used - static_cast<double>(p)));
-  out.sigma = out.covariance.diagonal().cwiseMax(inverse.diagonal()).cwiseSqrt();
+  auto scatter = borrowing_scatter(clusters, A, MatrixXd::Zero(p, p), inverse);
+  out.sigma = scatter.covariance.diagonal().cwiseSqrt();
+  for (Index k = 0; k < p; ++k)
+    if (!(inverse(k, k) > 0)) out.sigma[k] = HUGE_VAL;  // no group sees it
+  out.covariance = std::move(scatter.covariance);
+  out.freedom = std::move(scatter.degrees_of_freedom);
   return out;
 }
 

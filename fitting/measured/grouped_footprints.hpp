@@ -27,7 +27,7 @@ std::vector<FootprintProfile> footprint_profiles(const GroupedProblem& problem, 
 
 /// One linear step of `columns` over the groups `which`, in units of the scatter between groups.
 struct LinearStep {
-  Eigen::VectorXd value, sigma;
+  Eigen::VectorXd value, sigma, freedom;  ///< change; 1 σ, infinite where no group sees it; its degrees
   Eigen::MatrixXd covariance;
 };
 LinearStep linear_step(const std::vector<Eigen::MatrixXd>& parts, const std::vector<std::size_t>& which,

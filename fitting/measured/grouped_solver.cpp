@@ -9,6 +9,7 @@
 #include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
 #include "fitting/measured/grouped_weights.hpp"
+#include "fitting/scatter_covariance.hpp"
 
 namespace unhand::fitting {
 
@@ -88,7 +89,8 @@ class Solver {
     fit_.chi2 = 0, fit_.samples = 0, fit_.used = 0;
     double unknowns = static_cast<double>(fit_.values.size());
     const Index p = fit_.values.size();
-    MatrixXd A = MatrixXd::Zero(p, p), scores = MatrixXd::Zero(p, static_cast<Index>(used_.size()));
+    MatrixXd A = MatrixXd::Zero(p, p);
+    std::vector<Cluster> clusters;
     for (std::size_t n = 0; n < used_.size(); ++n) {
       GroupFit& g = fit_.groups[used_[n]];
       const Group& group = problem_.groups()[used_[n]];
@@ -104,31 +106,21 @@ class Solver {
       fit_.samples += g.n;
       unknowns += group.taken();
       ++fit_.used;
-      A += w * parts_[n].information;
-      scores.col(static_cast<Index>(n)) = w * parts_[n].score;
+      clusters.push_back({w * parts_[n].information, w * parts_[n].score});
+      A += clusters.back().information;
     }
     fit_.degrees_of_freedom = fit_.samples - static_cast<long>(unknowns);
     fit_.solved = fit_.used > 0;
     if (p == 0) return;
-    const MatrixXd inverse = pseudo_inverse(A);
-    const double n = fit_.used;
-    // A gram matrix: symmetric and nowhere negative, however alike two parameters are.
-    fit_.covariance =
-        gram(product(scores.transpose(), inverse)) * (n / std::max(1.0, n - static_cast<double>(p)));
-    VectorXd widened = VectorXd::Ones(p);  // no parameter is surer than independent noise would let it be
-    for (Index j = 0; j < p; ++j)
-      if (fit_.covariance(j, j) < inverse(j, j))
-        widened[j] = std::sqrt(inverse(j, j) / std::max(1e-300, fit_.covariance(j, j)));
-    fit_.covariance = widened.asDiagonal() * fit_.covariance * widened.asDiagonal();
     // Of a direction that no group sees nothing is known but the range.
-    const MatrixXd unseen = MatrixXd::Identity(p, p) - product(inverse, A);
-    VectorXd range(p);
+    MatrixXd prior = MatrixXd::Zero(p, p);
     for (Index j = 0; j < p; ++j) {
       const SharedParameter& s = fit_.shared[static_cast<std::size_t>(j)];
-      range[j] = std::pow(s.high - s.low, 2) / 12;
+      prior(j, j) = 12 / std::pow(s.high - s.low, 2);
     }
-    if (unseen.diagonal().maxCoeff() > 1e-3)
-      fit_.covariance += gram(range.cwiseSqrt().asDiagonal() * unseen.transpose());
+    const auto scatter = borrowing_scatter(clusters, A, prior, pseudo_inverse(A + prior));
+    fit_.covariance = scatter.covariance;
+    fit_.freedom = scatter.degrees_of_freedom;
     if (!fit_.covariance.allFinite())
       fit_.solved = false, fit_.message = "the shared parameters are not determined";
   }

@@ -133,9 +133,7 @@ void tell_of_wild(const GroupedProblem& problem, const std::vector<WildGroup>& w
   std::string names;
   for (std::size_t k = 0; k < wild.size(); ++k) {
     const Group& group = problem.groups()[wild[k].group];
-    const std::string how =
-        fmt::format("{:.0f} times the median misfit that they leave, {:.1f} robust sigmas in its logarithm",
-                    wild[k].times, wild[k].sigmas);
+    const std::string how = wild[k].in_words();
     out.skipped.push_back({group.id, "set aside: " + how});
     if (k < kNamed)
       names += fmt::format("{}{} ({}{})", names.empty() ? "" : ", ", group.id,
@@ -249,8 +247,7 @@ std::vector<AskedBeside> asked_beside(const GroupedProblem& problem, const Group
   for (std::size_t j = 0; j < parameters.size(); ++j) {
     const auto k = static_cast<Eigen::Index>(f.total.fitted + j);
     const double value = step.value[k], sigma = step.sigma[k];
-    const auto groups = static_cast<double>(which.size());
-    if (!(sigma > 0) || f_tail(value * value / (sigma * sigma), 1, groups - 1) > level) continue;
+    if (!(sigma > 0) || f_tail(value * value / (sigma * sigma), 1, step.freedom[k]) > level) continue;
     out.push_back({std::move(parameters[j]), value, sigma});
   }
   return out;

@@ -32,7 +32,7 @@ TEST(Patch, ValidationNamesParameterValueAndRange) {
   EXPECT_EQ(message({0.0, 1.0, 1.0, 1}), "accepted");
   EXPECT_EQ(message({10.0, 1e-6, 1e-3, 4}), "accepted");
   EXPECT_THAT(message({-0.1, 0.01, 0.6, 2}), AllOf(HasSubstr("mu"), HasSubstr("-0.1"), HasSubstr("[0, 10]")));
-  EXPECT_THAT(message({0.5, 0.0, 0.6, 2}), AllOf(HasSubstr("radius"), HasSubstr("[1e-09, 1] m")));
+  EXPECT_THAT(message({0.5, 0.0, 0.6, 2}), AllOf(HasSubstr("radius"), HasSubstr("[1e-12, 1] m")));
   EXPECT_THAT(message({0.5, 12.0, 0.6, 2}), AllOf(HasSubstr("radius"), HasSubstr("12")));
   EXPECT_THAT(message({0.5, 0.01, 1.1, 2}), AllOf(HasSubstr("torque_factor"), HasSubstr("1.1")));
   EXPECT_THAT(message({0.5, 0.01, 0.6, 0}), HasSubstr("pads"));

@@ -124,7 +124,7 @@ TEST_P(Outcomes, WrongPatchesAreRefused) {
     for (const double mu : {-0.1, 10.1, kNaN, kInfinity})
       expect_refused({"mu", "[0, 10]"}, with([=](auto& p) { p.patch.mu = mu; }));
     for (const double radius : {0.0, -1.0, 1.1, kNaN})
-      expect_refused({"radius", "[1e-09, 1] m"}, with([=](auto& p) { p.patch.radius = radius; }));
+      expect_refused({"radius", "[1e-12, 1] m"}, with([=](auto& p) { p.patch.radius = radius; }));
     for (const double c : {0.0, 1.1, kNaN})
       expect_refused({"torque_factor", "(0, 1]"}, with([=](auto& p) { p.patch.torque_factor = c; }));
     expect_refused({"pads"}, with([](auto& p) { p.patch.pads = 0; }));

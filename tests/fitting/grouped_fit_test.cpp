@@ -100,7 +100,7 @@ TEST(GroupedFit, CovarianceIsThatOfTheMeanOfGroups) {
       fit_groups(problem, datasets::Split::train, parameters(100), Eigen::VectorXd::Zero(2), options);
   ASSERT_TRUE(fit.solved);
   EXPECT_NEAR(fit.values[0], mean, 1e-9);
-  EXPECT_NEAR(fit.sigma(0), std::sqrt(squares / (kGroups * (kGroups - 2.0))), 1e-6);
+  EXPECT_NEAR(fit.sigma(0), std::sqrt(squares / (kGroups * (kGroups - 1.0))), 1e-6);
   // The other is the same in all groups: it is known no better than the declared noise allows.
   double xx = 0, xy = 0, yy = 0, x = 0, y = 0;
   for (int i = 0; i < kSamples; ++i) {
@@ -121,9 +121,10 @@ TEST(Wald, IsStudentsTOfOneParameterAndHalfOfItOnABound) {
   fit.used = 10;
   const Eigen::VectorXd away = Eigen::VectorXd::Constant(1, 3 * 2.262157);
   const Eigen::MatrixXd variance = Eigen::MatrixXd::Constant(1, 1, 9);
-  EXPECT_NEAR(wald_of(away, variance, {0}).p_value(fit), 0.05, 1e-6);
-  EXPECT_NEAR(wald_of(away, variance, {1}).p_value(fit), 0.025, 1e-6);
-  EXPECT_NEAR(wald_of(away, variance, {0}).delta_bic(fit), std::log(10) - 2.262157 * 2.262157, 1e-9);
+  const Eigen::VectorXd nine = Eigen::VectorXd::Constant(1, 9.0);
+  EXPECT_NEAR(wald_of(away, variance, nine, {0}).p_value(fit), 0.05, 1e-6);
+  EXPECT_NEAR(wald_of(away, variance, nine, {1}).p_value(fit), 0.025, 1e-6);
+  EXPECT_NEAR(wald_of(away, variance, nine, {0}).delta_bic(fit), std::log(10) - 2.262157 * 2.262157, 1e-9);
 }
 
 // Hotelling: T² (n − p)/(p (n − 1)) is F of p and n − p; F_{2,8} exceeds 4.458970 in one of twenty cases. Of
@@ -133,9 +134,12 @@ TEST(Wald, IsHotellingsTOfTwo) {
   fit.used = 10;
   const double size = 4.458970 * 2 * 9 / 8;  // T²
   Eigen::Vector2d away(std::sqrt(size / 2), std::sqrt(size / 2));
-  EXPECT_NEAR(wald_of(away, Eigen::Matrix2d::Identity(), {0, 0}).p_value(fit), 0.1, 1e-6);
+  const auto wald = [&](double freedom) {
+    return wald_of(away, Eigen::Matrix2d::Identity(), Eigen::Vector2d::Constant(freedom), {0, 0});
+  };
+  EXPECT_NEAR(wald(9).p_value(fit), 0.1, 1e-6);
   fit.used = 3;  // of two parameters' scatter these say nothing
-  EXPECT_GT(wald_of(away, Eigen::Matrix2d::Identity(), {0, 0}).p_value(fit), 0.1);
+  EXPECT_GT(wald(2).p_value(fit), 0.1);
 }
 
 TEST(GroupedFit, WhereOneParameterEndsAtItsRangeTheOthersAreAtTheirBestBesideIt) {

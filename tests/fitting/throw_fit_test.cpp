@@ -469,6 +469,25 @@ TEST(ThrowFit, WhatIsFixedLeavesNothingOpen) {
   EXPECT_LT(result.campaign[grip].sigma, 1e-9);
 }
 
+// An effect that is held and has no start of its own is held at none.
+TEST(ThrowFit, WhatIsFixedStaysAtItsStart) {
+  const auto log = disc_log();
+  CampaignOptions campaign;
+  campaign.effects = {"contact.adhesion"};
+  const CampaignProblem problem(log, "synthetic", campaign);
+  FitOptions options;
+  options.fixed = {"contact.adhesion.f_adh", "contact.adhesion.parting_time"};
+  const auto result = fit(problem, options);
+  ASSERT_TRUE(result.is_answer()) << result.message;
+  for (const FittedUnknown& u : result.campaign)
+    if (u.unknown.name == "contact.adhesion.f_adh") {
+      EXPECT_EQ(u.value, 0);
+    }
+  options.fixed.clear();
+  options.all_fixed = true;
+  for (const FittedUnknown& u : fit(problem, options).campaign) EXPECT_EQ(u.value, u.unknown.start);
+}
+
 TEST(ThrowFit, AGripperThatOpensBeforeItIsToldToIsNoAnswerAndNoError) {
   auto log = disc_log();
   for (auto& one : log.throws) one.ft.reset();

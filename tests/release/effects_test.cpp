@@ -136,9 +136,10 @@ TEST(LaggedHand, DerivativesAreCentralDifferences) {
 }
 
 TEST(LaggedHand, RefusesTimesOutOfRange) {
-  EXPECT_THROW(LaggedHand(logged(), Dual(-1e-3)), std::invalid_argument);
-  EXPECT_THROW(DelayedForce(contact::ProfileNormalForce(contact::OpeningProfile<double>{0, 20}), Dual(2)),
-               std::invalid_argument);
+  const auto log = logged();
+  EXPECT_THROW(LaggedHand(log, Dual(-1e-3)), std::invalid_argument);
+  const contact::ProfileNormalForce force(contact::OpeningProfile<double>{0, 20});
+  EXPECT_THROW(DelayedForce(force, Dual(2)), std::invalid_argument);
 }
 
 TEST(DelayedForce, IsTheForceOfAnEarlierInstant) {
