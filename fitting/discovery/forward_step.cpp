@@ -144,11 +144,11 @@ class ForwardStep {
           small_.insert(small_.begin(), std::move(*refused_));
       }
     }
+    if (auto opened = open_pair(best_ ? best_->next : stage_)) return opened;
     if (best_) {
       const std::string why = best_->held_out.where;
       return accept(std::move(*best_), why, convincing_);
     }
-    if (auto opened = open_pair()) return opened;
     return weigh_small();
   }
 
@@ -174,20 +174,21 @@ class ForwardStep {
     return !through.empty() && std::find(in_model.begin(), in_model.end(), through) == in_model.end();
   }
 
-  /// Where flights leave a misfit and nothing convinced: what another effect acts through (a drag, for a
-  /// wind), if both together explain it. The other one follows in the next step.
-  std::optional<Stage> open_pair() {
+  /// Where `so_far`, the best of this step, leaves a misfit in flights: what another effect acts through (a
+  /// drag, for a wind), if both together explain more. The other one follows in the next step.
+  std::optional<Stage> open_pair(const Stage& so_far) {
     const auto flights_leave = [&](const ChannelMisfit& m) {
       return in_air(m.phase) && is_misfit(m, options_);
     };
-    if (std::none_of(stage_.fit.misfit.begin(), stage_.fit.misfit.end(), flights_leave)) return std::nullopt;
+    if (std::none_of(so_far.fit.misfit.begin(), so_far.fit.misfit.end(), flights_leave)) return std::nullopt;
     for (const std::string& id : out_.silent) {
       if (!acts_through_nothing(id)) continue;
       const Score* through = best_score_of(f_, all_, find_effect(id).acts_through);
       if (!through || !through->visible) continue;
       auto pair = fit_pair(stage_, f_.candidates[through->candidate], *through, id, options_);
       const auto tried = static_cast<double>(f_.candidates.size());
-      if (!pair || !is_convincing(*pair, {id, id_of(*through)}, tried * tried)) continue;
+      if (!pair || !(pair->both.bic() - so_far.bic() <= kDeltaBic)) continue;
+      if (!are_told(pair->both, {id, id_of(*through)}, tried * tried)) continue;
       const Improvement gain = improvement(stage_, pair->both, out_.before.held_out, options_);
       if (!(gain.matters >= 1)) continue;
       TriedEffect first{through, std::move(pair->first), 0, 0, gain};
@@ -199,14 +200,12 @@ class ForwardStep {
     return std::nullopt;
   }
 
-  /// Whether both fits and both effects are evident against the stage before.
-  bool is_convincing(const OpenedPair& pair, const std::vector<std::string>& ids, double tried) const {
-    return pair.both.bic() - stage_.bic() <= kDeltaBic &&
-           std::all_of(ids.begin(), ids.end(), [&](const std::string& id) {
-             const dynamics::Effect effect = find_effect(id);
-             return is_significant(pair.both.fit, effect, wald_p_value(pair.both.fit, effect),
-                                   options_.family_wise_level, tried);
-           });
+  bool are_told(const Stage& stage, const std::vector<std::string>& ids, double tried) const {
+    return std::all_of(ids.begin(), ids.end(), [&](const std::string& id) {
+      const dynamics::Effect effect = find_effect(id);
+      return is_significant(stage.fit, effect, wald_p_value(stage.fit, effect), options_.family_wise_level,
+                            tried);
+    });
   }
 
   bool in_reach(const Score& score) const {

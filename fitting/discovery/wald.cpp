@@ -27,9 +27,15 @@ Eigen::MatrixXd conditional(const Eigen::MatrixXd& all, const std::vector<Eigen:
   return out;
 }
 
-/// P-value of Wald's test of an effect's sizes against neutral, with its shape as it was fitted, for every
-/// shape of its grid. `ends`: sizes that are neutral at an end of their range cannot go beyond it.
-double absence(const FitResult& fit, const dynamics::Effect& effect, bool ends) {
+/// How an effect's sizes are tested.
+enum class By {
+  fitted_shape,  ///< with its shape as it was fitted; the scatter's degrees of freedom
+  intervals,     ///< by their own, whatever the shape is
+};
+
+/// P-value of Wald's test of an effect's sizes against neutral, for every shape of its grid. `ends`: sizes
+/// that are neutral at an end of their range cannot go beyond it.
+double absence(const FitResult& fit, const dynamics::Effect& effect, bool ends, By by) {
   const auto width = static_cast<Eigen::Index>(fit.campaign.size());
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const Eigen::Map<const RowMajor> all(fit.covariance.data(), width, width);
@@ -43,7 +49,7 @@ double absence(const FitResult& fit, const dynamics::Effect& effect, bool ends) 
       const FittedUnknown& u = fit.campaign[static_cast<std::size_t>(k)];
       if (without_object(u.unknown.name) != effect.full_name(p)) continue;
       if (p.is_shape()) {
-        if (all(k, k) > 0) shapes.push_back(k);  // one that was not fitted has none
+        if (all(k, k) > 0 && by == By::fitted_shape) shapes.push_back(k);  // one that was not fitted has none
         continue;
       }
       sizes.push_back(k);
@@ -55,7 +61,8 @@ double absence(const FitResult& fit, const dynamics::Effect& effect, bool ends) 
   if (!C.allFinite()) return 1;
   double least = std::numeric_limits<double>::infinity(), each = 1;
   for (std::size_t i = 0; i < sizes.size(); ++i) {
-    const double known = fit.campaign[static_cast<std::size_t>(sizes[i])].interval_freedom(),
+    const FittedUnknown& u = fit.campaign[static_cast<std::size_t>(sizes[i])];
+    const double known = by == By::intervals ? u.interval_freedom() : u.degrees_of_freedom,
                  n = std::max(1.0, known - static_cast<double>(shapes.size()));
     const auto k = static_cast<Eigen::Index>(i);
     least = std::min(least, n);
@@ -73,11 +80,12 @@ double absence(const FitResult& fit, const dynamics::Effect& effect, bool ends) 
 }  // namespace
 
 double wald_p_value(const FitResult& fit, const dynamics::Effect& effect) {
-  return absence(fit, effect, true);
+  return absence(fit, effect, true, By::fitted_shape);
 }
 
 bool is_told_from_none(const FitResult& fit, const dynamics::Effect& effect, double level) {
-  return absence(fit, effect, false) <= level;
+  return absence(fit, effect, false, By::fitted_shape) <= level ||
+         absence(fit, effect, false, By::intervals) <= level;
 }
 
 }  // namespace unhand::fitting

@@ -14,7 +14,9 @@ namespace unhand::fitting {
 /// (a loss time, a Stribeck speed) is nothing that data could tell: sizes are tested with the shape as it was
 /// fitted, and p counts for every shape of its grid (Bonferroni's bound on the search).
 double wald_p_value(const FitResult& fit, const dynamics::Effect& effect);
-/// Whether the two-sided confidence region of the sizes, of a level, leaves neutral out.
+/// Whether the two-sided confidence region of the sizes, of a level, leaves neutral out: with the shape as it
+/// was fitted, by those degrees of freedom, or whatever the shape is, by the sizes' own intervals
+/// (FittedUnknown::interval_freedom).
 bool is_told_from_none(const FitResult& fit, const dynamics::Effect& effect, double level);
 
 }  // namespace unhand::fitting

@@ -97,15 +97,15 @@ TEST(ScatterCovariance, ThrowsThatAgreeTooWellAreNotQuiteBelieved) {
   }
 }
 
-// One size from twenty groups, another from one or two, all of which scatter five times as much as their
-// noise says: the few cannot tell that by themselves, and without borrowing most intervals miss.
+// One size from twenty groups, another from one to three, all of which scatter five times as much as their
+// noise says: a single one cannot tell that by itself.
 TEST(ScatterCovariance, FewGroupsBorrowTheScatterOfMany) {
   constexpr int kMany = 20, kDraws = 1000;
   constexpr double kScatter = 5;
   for (const int few : {1, 2, 3}) {
     std::mt19937_64 random(static_cast<std::uint64_t>(few));
     std::normal_distribution<double> normal;
-    int misses = 0, without = 0, misses_of_many = 0;
+    int misses = 0, misses_of_many = 0;
     for (int draw = 0; draw < kDraws; ++draw) {
       std::vector<double> said;
       for (int i = 0; i < kMany + few; ++i) said.push_back(kScatter * normal(random));
@@ -125,15 +125,11 @@ TEST(ScatterCovariance, FewGroupsBorrowTheScatterOfMany) {
       };
       const auto found = borrowing_scatter(groups, information, none, noise);
       misses += outside(found, 1), misses_of_many += outside(found, 0);
-      without += outside(scatter_covariance(groups, information, none), 1);
     }
     // 5 % by design; of 1000 draws that scatters by 0.7 %. Borrowed are four degrees, not all nineteen.
     EXPECT_NEAR(misses_of_many, 0.05 * kDraws, 3 * std::sqrt(0.05 * 0.95 * kDraws)) << few;
     EXPECT_LT(misses, 0.08 * kDraws) << few;
     EXPECT_GT(misses, 0.005 * kDraws) << few;
-    if (few == 1) {
-      EXPECT_GT(without, 0.2 * kDraws) << "its own scatter is zero";
-    }
   }
 }
 
