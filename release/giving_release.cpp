@@ -18,9 +18,9 @@ namespace {
 
 /// The usual step [s] of pads that slip, at a relative tolerance of 1e-5; the error is of second order in it.
 constexpr double kStep = 5e-4, kStepTolerance = 1e-5;
-/// Shorter steps, down to the shortest [s], are taken where one of them and two of half its length are further
-/// from each other than `kMostApart` [m/s] times the relative tolerance: where a hand turns fast, or the
-/// tolerance is tight.
+/// Shorter steps, down to the shortest [s], are taken where one of them and two of half its length are
+/// further from each other than `kMostApart` [m/s] times the relative tolerance: where a hand turns fast, or
+/// the tolerance is tight.
 constexpr double kMostApart = 100, kShortest = 1e-6;
 /// Steps that are `kMost` times as long at most are taken where one of them and two of half its length agree
 /// to `kAgree` [m/s] times the relative tolerance: where the pads hold, and stretch with the load. The

@@ -173,12 +173,13 @@ TEST(DistributedPatch, AGripThatClosesFirstIsTheDiscs) {
   ContactParameters<double> parameters;
   parameters.patch = {kMu, kRadius};
   const auto model = contact::make_contact_model("limit_surface_disc", parameters);
-  release::ReleaseProblem<double> problem{hand, force, *model, {0.4, 1e-3}, {0, -9.81}, {0.05, 0.3},
-                                          0.0,  {},    0.0};
+  release::ReleaseProblem<double> problem{hand,        force, *model, {0.4, 1e-3}, {0, -9.81},
+                                          {0.05, 0.3}, 0.0,   {},     0.0};
   const auto disc = simulate_release(problem, {.integrator = {.tolerances = {1e-9, 1e-11}}});
   const auto points = simulate_distributed_patch(problem, patch_of(12));
   ASSERT_EQ(points.outcome, release::ReleaseOutcome::detached);
-  EXPECT_LT(distance(points.detach.twist, disc.detach.twist), 2e-4);  // m/s: 12 rings, as above, of a weak grip
+  EXPECT_LT(distance(points.detach.twist, disc.detach.twist),
+            2e-4);     // m/s: 12 rings, as above, of a weak grip
   problem.start = -1;  // the hand is not known there
   EXPECT_THROW(simulate_distributed_patch(problem, patch_of(5)), std::invalid_argument);
   problem.start = 0, problem.body.mass = -1;
