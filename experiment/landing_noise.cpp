@@ -162,9 +162,15 @@ bool tells_angle(const datasets::LandingLog& landing) {
          (landing.pose.sigma.empty() || landing.pose.sigma.back() < std::numbers::pi);
 }
 
+bool declares_noise(const datasets::LandingLog& landing, std::size_t column) {
+  const auto& sigma = landing.pose.sigma;
+  return !sigma.empty() && sigma[sigma.size() == 1 ? 0 : column] > 0;
+}
+
 int landings_without_sigma(const datasets::ThrowLog& log) {
   int out = 0;
-  for (const auto& one : log.throws) out += one.landing && one.landing->pose.sigma.empty();
+  for (const auto& one : log.throws)
+    out += one.landing && !(declares_noise(*one.landing, 0) && declares_noise(*one.landing, 1));
   return out;
 }
 

@@ -30,6 +30,8 @@ LandingNoise landing_noise(const datasets::ThrowLog& log);
 
 /// Whether a landing tells the angle: one whose sigma is declared as half a turn or more was not measured.
 bool tells_angle(const datasets::LandingLog& landing);
+/// Whether x (column 0) or θ (1) declares its noise: a σ of 0 is none, as it is of the other sensors.
+bool declares_noise(const datasets::LandingLog& landing, std::size_t column);
 
 /// How many landings of the log declare no noise.
 int landings_without_sigma(const datasets::ThrowLog& log);

@@ -124,13 +124,14 @@ void add_landing(const datasets::ThrowLog& log, const datasets::LandingLog& land
   const double t = landing.time.empty() ? 0.0 : landing.time(0);
   constexpr double kLeast[2] = {1e-5, 1e-4};  // m, rad
   std::optional<double> sigma[2];
-  if (landing.pose.sigma.empty()) {
+  const bool declared[2] = {declares_noise(landing, 0), declares_noise(landing, 1)};
+  if (!declared[0] || !declared[1]) {
     const LandingNoise noise = options.landing_noise ? *options.landing_noise : landing_noise(log);
     if (noise.x) sigma[0] = std::max(*noise.x, kLeast[0]);
     if (noise.theta) sigma[1] = std::max(*noise.theta, kLeast[1]);
-  } else {
-    for (std::size_t c = 0; c < 2; ++c) sigma[c] = sigma_of(landing.pose, c, kLeast[c]);
   }
+  for (std::size_t c = 0; c < 2; ++c)
+    if (declared[c]) sigma[c] = sigma_of(landing.pose, c, kLeast[c]);
   if (sigma[0]) out.all.push_back({Channel::landing_x, t, landing.pose(0, 0), *sigma[0]});
   if (sigma[1] && tells_angle(landing))
     out.all.push_back({Channel::landing_theta, t, landing.pose(0, 1), *sigma[1]});

@@ -113,7 +113,7 @@ void weigh_scales(const datasets::ThrowLog& log, const MeasuredOptions& options,
              fmt::format(
                  "{} throws of {} end at rest on a face, {:.4g} m above where its size puts them: the "
                  "floor is not at {:.4g} m, and with its height (--floor) they would say the scale",
-                 rest->n, name, 0.5 * rest->scale * (*object.dims)[0], options.floor),
+                 rest->n, name, rest->above, options.floor),
              false});
       } else if (rest) {
         const double apart = (rest->scale - apparent) / std::hypot(rest->sigma, sigma);

@@ -72,19 +72,21 @@ std::optional<RestHeights> rest_heights(const datasets::ThrowLog& log, const std
     heights[rest->axis][rest->up > 0 ? 1 : 0].add(rest->height - floor);
     ++out.n;
   }
-  Mean scales;
+  Mean scales, above;
   double within = 0;
   for (std::size_t a = 0; a < 3; ++a) {
     const Mean &down = heights[a][0], &up = heights[a][1];
     if (!(down.n > 1 && up.n > 1) || !(dims[a] > 0)) continue;
     const double middle = 0.5 * (up.mean() + down.mean());
     scales.add(2 * middle / dims[a] - 1);
+    above.add(middle - 0.5 * dims[a]);
     within = std::max(within, std::hypot(up.error(), down.error()) / dims[a]);
     out.offset[a] = 0.5 * (up.mean() - down.mean());
     out.offset_sigma[a] = 0.5 * std::hypot(up.error(), down.error());
   }
   if (out.n < 5 || !(scales.n > 0)) return {};
   out.scale = scales.mean();
+  out.above = above.mean();
   out.sigma = std::max(scales.error(), within);
   return out;
 }

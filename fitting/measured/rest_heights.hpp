@@ -15,6 +15,7 @@ namespace unhand::fitting {
 struct RestHeights {
   int n{};         ///< throws at rest
   double scale{};  ///< reported/true − 1 [-], if the floor is where it was said to be
+  double above{};  ///< mean height of the middle above where the size puts it [m]
   double sigma{};  ///< from the scatter between axes, or between throws if that is larger [-]
   std::array<std::optional<double>, 3> offset;  ///< from the middle to the tracked point, body axes [m]
   std::array<double, 3> offset_sigma{};         ///< 1 σ [m]

@@ -84,6 +84,13 @@ TEST(LandingNoise, WeighsTheLandingsOfALogThatDeclaresNone) {
   const auto noise = landing_noise(log);
   EXPECT_EQ(sigma_in(log, Channel::landing_x), *noise.x);
   EXPECT_EQ(sigma_in(log, Channel::landing_theta), *noise.theta);
+  auto zero = log;  // as of the other sensors, 0 declares nothing
+  for (auto& one : zero.throws) one.landing->pose.sigma = {0, 0};
+  EXPECT_EQ(sigma_in(zero, Channel::landing_x), *landing_noise(zero).x);
+  EXPECT_EQ(landings_without_sigma(zero), landings_without_sigma(log));
+  for (auto& one : zero.throws) one.landing->pose.sigma = {0.002, 0};
+  EXPECT_NEAR(sigma_in(zero, Channel::landing_x), 0.002, 1e-5);
+  EXPECT_EQ(sigma_in(zero, Channel::landing_theta), *landing_noise(zero).theta);
   log.throws.resize(2);  // too few to tell: left out, not trusted to the last digit
   EXPECT_FALSE(landing_noise(log).x);
   EXPECT_EQ(sigma_in(log, Channel::landing_x), 0);
