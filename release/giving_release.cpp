@@ -21,7 +21,7 @@ constexpr double kStep = 5e-4, kStepTolerance = 1e-5;
 /// Shorter steps, down to the shortest [s], are taken where one of them and two of half its length are
 /// further from each other than `kMostApart` [m/s] times the relative tolerance: where a hand turns fast, or
 /// the tolerance is tight.
-constexpr double kMostApart = 100, kShortest = 1e-6;
+constexpr double kMostApart = 300, kShortest = 1e-6;
 /// Steps that are `kMost` times as long at most are taken where one of them and two of half its length agree
 /// to `kAgree` [m/s] times the relative tolerance: where the pads hold, and stretch with the load. The
 /// difference is of second order, so a step of twice the length may follow if it is a quarter of that.

@@ -81,13 +81,13 @@ struct OpenedPair {
 /// Fits both to either half of the throws; nothing where one has no answer there.
 std::optional<OpenedPair> fit_pair(const Stage& stage, const Candidate& through, const Score& score,
                                    const std::string& id, const DiscoverOptions& options) {
-  OpenedPair out{extended(stage, through, score, true, options), {stage.problem, {}, {}, {}}};
+  OpenedPair out{extended(stage, through, score, false, options), {stage.problem, {}, {}, {}}};
   if (!out.first.is_fitted() || !solve_held_out(out.first, options)) return std::nullopt;
-  const Footprints& f = footprints_of(out.first, options);
+  const Footprints f = footprints(out.first.problem, out.first.fit, {id}, {}, options.fit.threads);
   const std::vector<Score> all = scores(f);
   const Score* beside = best_score_of(f, all, id);
   if (!beside || !beside->visible) return std::nullopt;
-  out.both = extended(out.first, f.candidates[beside->candidate], *beside, true, options);
+  out.both = extended(out.first, f.candidates[beside->candidate], *beside, false, options);
   if (!out.both.is_fitted() || !solve_held_out(out.both, options)) return std::nullopt;
   return out;
 }
@@ -174,13 +174,13 @@ class ForwardStep {
     return !through.empty() && std::find(in_model.begin(), in_model.end(), through) == in_model.end();
   }
 
-  /// Where `so_far`, the best of this step, leaves a misfit in flights: what another effect acts through (a
-  /// drag, for a wind), if both together explain more. The other one follows in the next step.
+  /// Where most of what `so_far`, the best of this step, leaves is in flights: what another effect acts
+  /// through (a drag, for a wind), if both together explain more. The other one follows in the next step.
   std::optional<Stage> open_pair(const Stage& so_far) {
-    const auto flights_leave = [&](const ChannelMisfit& m) {
-      return in_air(m.phase) && is_misfit(m, options_);
-    };
-    if (std::none_of(so_far.fit.misfit.begin(), so_far.fit.misfit.end(), flights_leave)) return std::nullopt;
+    double in_flights = 0, elsewhere = 0;
+    for (const ChannelMisfit& m : so_far.fit.misfit)
+      if (is_misfit(m, options_)) (in_air(m.phase) ? in_flights : elsewhere) += m.chi2 - m.n;
+    if (!(in_flights > elsewhere)) return std::nullopt;
     for (const std::string& id : out_.silent) {
       if (!acts_through_nothing(id)) continue;
       const Score* through = best_score_of(f_, all_, find_effect(id).acts_through);

@@ -140,15 +140,18 @@ CampaignProblem extended_problem(const CampaignProblem& problem, const std::stri
 
 namespace {
 
-/// Whether the search of a candidate may have gone astray: where no misfit is left, it gains far less than
-/// its footprint promised. Where one is, in the first step, it gains nothing; or it has the leading
-/// footprint, and still leaves a misfit.
+/// Whether the search of a candidate may have gone astray. Where no misfit is left: it gains far less than
+/// its footprint promised, which would have been evident. Where one is, in the first step: it gains nothing,
+/// or it has the leading footprint and still leaves a misfit.
 bool is_astray(const Stage& stage, const Stage& next, const Score& score, bool leads,
                const DiscoverOptions& options) {
-  if (!leaves_misfit(stage, options))
-    return !next.is_fitted() || stage.fit.deviance() - next.fit.deviance() < score.gain / kFirstOrder;
-  if (!stage.ids.empty()) return false;
-  return !next.is_fitted() || !is_evident(stage, next) || (leads && leaves_misfit(next, options));
+  if (leaves_misfit(stage, options))
+    return stage.ids.empty() &&
+           (!next.is_fitted() || !is_evident(stage, next) || (leads && leaves_misfit(next, options)));
+  const auto more = static_cast<double>(next.problem.campaign().size() - stage.problem.campaign().size());
+  const bool promises = score.gain >= more * std::log(static_cast<double>(stage.fit.samples)) - kDeltaBic;
+  return (promises || (leads && stage.ids.empty())) &&
+         (!next.is_fitted() || stage.fit.deviance() - next.fit.deviance() < score.gain / kFirstOrder);
 }
 
 }  // namespace
