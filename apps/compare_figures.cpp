@@ -155,7 +155,7 @@ std::string line_tics(const std::vector<std::string>& labels, bool named) {
   const std::size_t skip = (labels.size() + most - 1) / most;
   std::string out;
   for (std::size_t i = 0; i < labels.size(); i += skip)
-    out += fmt::format("{}'{}' {}", i > 0 ? ", " : "", named ? plain(labels[i]) : "", i);
+    out += fmt::format("{}'{}' {}", i > 0 ? ", " : "", named ? tic_label(labels[i]) : "", i);
   return out;
 }
 
@@ -222,7 +222,7 @@ std::optional<Figure> condition_figure(const Comparison& comparison) {
                         floor_theta = comparison.repetitions.landing_theta;
   if (floor_x) *floor_x *= 100;  // cm
   if (floor_x || floor_theta) {
-    key.push_back({fmt::format("with lines {}", floor_style), "scatter of repetitions"});
+    key.push_back({fmt::format("with lines {}", floor_style), "1 sigma of repetitions"});
   }
   const Scale scale = common_scale({panel_values(figure, 2, floor_x), panel_values(figure, 3, floor_theta)});
   constexpr int columns = 3;

@@ -140,6 +140,15 @@ Prediction from_engine(const experiment::PreparedThrow& thrown, const experiment
   return out;
 }
 
+/// Without the law's own parameters that a model has not.
+experiment::ModelParameters parameters_of(const std::string& model, const experiment::ModelParameters& all) {
+  experiment::ModelParameters out = all;
+  out.law_values.clear();
+  for (const auto& [own, value] : contact::given_law_parameters(model, all.law_values))
+    out.law_values[own.name] = value;
+  return out;
+}
+
 std::vector<Setting> run_engine(const CrosscheckOptions& options, const Throws& throws,
                                 const experiment::ModelParameters& p) {
   std::vector<Setting> out;
@@ -151,9 +160,11 @@ std::vector<Setting> run_engine(const CrosscheckOptions& options, const Throws& 
       dynamics::IntegratorOptions integrator;
       integrator.tolerances = {1e-10, 1e-12};
       integrator.method = dynamics::Method::cvode;
-      out.push_back({fmt::format("CVODE, tolerance 1e-10"), model, Json{{"rtol", 1e-10}, {"atol", 1e-12}},
-                     all(throws, options.threads, progress,
-                         [&](const auto& one) { return experiment::predict(one, model, p, integrator); })});
+      out.push_back(
+          {fmt::format("CVODE, tolerance 1e-10"), model, Json{{"rtol", 1e-10}, {"atol", 1e-12}},
+           all(throws, options.threads, progress, [&, own = parameters_of(model, p)](const auto& one) {
+             return experiment::predict(one, model, own, integrator);
+           })});
     }
     return out;
   }
@@ -295,13 +306,10 @@ ModelPredictions predictions_of(const CrosscheckOptions& options, const Throws& 
   ModelPredictions out;
   Progress progress("models", throws.size() * options.models.size());
   for (const auto& model : options.models)
-    out[model] = all(throws, options.threads, progress, [&](const auto& one) {
-      experiment::ModelParameters of_law = parameters;
-      of_law.law_values.clear();
-      for (const auto& [own, value] : contact::given_law_parameters(model, parameters.law_values))
-        of_law.law_values[own.name] = value;
-      return experiment::predict(one, model, of_law, tight);
-    });
+    out[model] =
+        all(throws, options.threads, progress, [&, own = parameters_of(model, parameters)](const auto& one) {
+          return experiment::predict(one, model, own, tight);
+        });
   return out;
 }
 

@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <cstring>
 #include <memory>
 #include <optional>
 
@@ -115,11 +117,20 @@ Json misfit_json(const std::vector<fitting::ChannelMisfit>& misfit) {
   return out;
 }
 
+/// As a shell reads it back.
+std::string quoted(const std::string& word) {
+  const auto is_plain = [](unsigned char c) { return std::isalnum(c) || std::strchr("_./:+=,@%-", c); };
+  if (!word.empty() && std::all_of(word.begin(), word.end(), is_plain)) return word;
+  std::string out = "'";
+  for (const char c : word) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
+
 /// The command line that finds the same again: what it gave, but for outputs and threads.
 std::string command_of(const DiscoverOptions& options, const Parser& parser) {
-  std::string out = fmt::format("unhand discover {}", options.log);
+  std::string out = fmt::format("unhand discover {}", quoted(options.log));
   const auto add = [&](const char* name, const auto& value) {
-    if (parser.given(name)) out += fmt::format(" {} {}", name, value);
+    if (parser.given(name)) out += fmt::format(" {} {}", name, quoted(fmt::format("{}", value)));
   };
   add("--model", options.model);
   for (const auto& id : options.forget) add("--forget", id);

@@ -209,7 +209,9 @@ Table prediction_errors(const Discovery& found) {
 }
 
 std::string parameters_text(const Discovery& found) {
-  const auto is_base = [](const std::string& name) { return !experiment::effect_of(name); };
+  const auto is_base = [](const std::string& name) {
+    return !experiment::effect_of(experiment::without_object(name));
+  };
   const std::string now = values_text(found.after.fit, is_base, 0);
   return fmt::format("fitted parameters of {}: {}{}", found.model, now,
                      found.adds_nothing() ? "" : "; before: " + values_text(found.before.fit, is_base, 0));

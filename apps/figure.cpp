@@ -256,15 +256,40 @@ std::string plain(const std::string& text) {
   for (const char c : text) {
     if (c == '\'') out += '\'';
     if (c == '_' || c == '^' || c == '{' || c == '}' || c == '@' || c == '&' || c == '~') out += '\\';
-    out += c == '\n' ? ' ' : c;
+    if (c == '\\')
+      out += "∖";  // set minus: the terminals swallow a backslash, or draw two
+    else
+      out += c == '\n' ? ' ' : c;
   }
+  return out;
+}
+
+namespace {
+
+/// As much of a name's end as has room beside a panel: names of conditions differ there.
+std::string shortened(const std::string& text) {
+  constexpr std::ptrdiff_t kMost = 38;  // characters
+  const auto begins = [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; };
+  const auto length = std::count_if(text.begin(), text.end(), begins);
+  if (length <= kMost) return text;
+  std::ptrdiff_t skipped = 0;
+  const auto from = std::find_if(text.begin(), text.end(),
+                                 [&](char c) { return begins(c) && skipped++ == length - (kMost - 1); });
+  return "…" + std::string(from, text.end());
+}
+
+}  // namespace
+
+std::string tic_label(const std::string& text) {
+  std::string out;
+  for (const char c : plain(shortened(text))) out += c == '%' ? std::string("%%") : std::string(1, c);
   return out;
 }
 
 std::string named_tics(const std::vector<std::string>& names) {
   std::string out;
   for (std::size_t i = 0; i < names.size(); ++i)
-    out += fmt::format("{}'{}' {}", i > 0 ? ", " : "", plain(names[i]), i);
+    out += fmt::format("{}'{}' {}", i > 0 ? ", " : "", tic_label(names[i]), i);
   return out;
 }
 

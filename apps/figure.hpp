@@ -79,6 +79,9 @@ double quantile(const std::vector<double>& sorted, double share);
 /// Text as gnuplot takes it between single quotes, without its own markup.
 std::string plain(const std::string& text);
 
+/// The same of a mark on an axis, which gnuplot reads as a format; of a long one, its end.
+std::string tic_label(const std::string& text);
+
 /// The names as marks at 0, 1, 2, ..., for `set ytics (...)`; beside a panel that has them, empty names.
 std::string named_tics(const std::vector<std::string>& names);
 

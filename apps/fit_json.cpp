@@ -140,9 +140,12 @@ Json fit_json(const FitAnswer& a, const FitRequest& request) {
   out["floor"] = nullptr;
   if (a.floor) {
     Json& floor = out["floor"] = {{"twins", a.floor->twins}};
-    for (const auto& [split, name] : {std::pair{Split::train, "train"}, {Split::test, "test"}})
-      floor[name] = errors_json(a.floor->statistics(0, split).n,
-                                [&, s = split](int q) { return a.floor->statistics(q, s); });
+    for (const auto& [split, name] : {std::pair{Split::train, "train"}, {Split::test, "test"}}) {
+      const auto of = [&, s = split](int q) { return a.floor->statistics(q, s); };
+      int n = 0;  // throws, of which some quantity may not be measured
+      for (int q = 0; q < experiment::kQuantityCount; ++q) n = std::max(n, of(q).n);
+      floor[name] = errors_json(n, of);
+    }
   }
   return out;
 }

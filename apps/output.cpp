@@ -183,10 +183,20 @@ Outputs::~Outputs() {
   }
 }
 
+namespace {
+
+/// Where the parts of an output are made: beside it; a directory that is there, which may be a volume of its
+/// own, has them inside.
+fs::path place_of_parts(const fs::path& destination) {
+  std::error_code error;
+  return fs::is_directory(destination, error) ? destination : nearest_existing(parent_of(destination));
+}
+
+}  // namespace
+
 fs::path Outputs::part_of(const fs::path& destination) {
-  const auto name =
-      fmt::format(".{}{}{}-{}", destination.filename().string(), kPart, getpid(), parts_.size());
-  return nearest_existing(parent_of(destination)) / name;
+  return place_of_parts(destination) /
+         fmt::format(".{}{}{}-{}", destination.filename().string(), kPart, getpid(), parts_.size());
 }
 
 fs::path Outputs::add(const Wanted& wanted) {
@@ -195,7 +205,7 @@ fs::path Outputs::add(const Wanted& wanted) {
   std::error_code error;
   const fs::path destination =
       fs::is_symlink(wanted.path, error) ? fs::weakly_canonical(wanted.path, error) : wanted.path;
-  remove_leftovers(nearest_existing(parent_of(destination)), destination.filename().string());
+  remove_leftovers(place_of_parts(destination), destination.filename().string());
   parts_.push_back({part_of(destination), {destination, wanted.what}});
   remove_if_interrupted(parts_.back().made);
   return parts_.back().made;

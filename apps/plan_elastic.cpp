@@ -109,7 +109,7 @@ void draw_table(const std::vector<el::TableCheck>& checks, const fs::path& folde
       "target [m]'\nset ylabel "
       "'miss [mm]'\n"
       "plot DATA using 1:2 with lines lw 2 lc rgb '#0072b2'\nset ylabel 'largest share of a limit'\nset "
-      "yrange [0.8:1.02]\n"
+      "yrange [0:*]\n"
       "plot DATA using 1:3 with lines lw 2 lc rgb '#d55e00', 1 with lines lw 1 dt 2 lc rgb '#000000'\nunset "
       "multiplot\n";
   draw(figure, folder);
@@ -267,6 +267,10 @@ bool to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs&
       "interpolated between the nodes at {} targets: {} land in the box of {:g} m, worst miss {:.2f} mm, "
       "limits used at most {:.1f} %\n",
       checks.size(), hits, o.box, 1e3 * worst, 100 * use);
+  const auto beyond = std::count_if(checks.begin(), checks.end(),
+                                    [](const el::TableCheck& c) { return c.lands && c.limit_use > 1; });
+  if (beyond > 0)
+    notes += fmt::format("{} of these throws are beyond a limit of the arm: they cannot be made\n", beyond);
   if (missed > 0)
     notes += fmt::format("{} of {} nodes are not confirmed by their runs\n", missed, distances.size());
   fmt::print("{}\n{}", text.text(), notes);

@@ -15,6 +15,7 @@
 #include "apps/numbers.hpp"
 #include "apps/progress.hpp"
 #include "apps/tell.hpp"
+#include "apps/throws.hpp"
 #include "datasets/log_error.hpp"
 #include "datasets/sku.hpp"
 #include "fitting/card.hpp"
@@ -47,9 +48,7 @@ fl::FlipTarget target_of(const std::string& text) {
 fl::Bar bar_of(const PlanFlipOptions& o, const fl::FlipRobot& robot) {
   fl::Bar out = robot.bar;
   if (!o.sku.empty()) {
-    const datasets::Sku sku = datasets::read_sku(o.sku);
-    if (!sku.inertia)
-      throw datasets::LogError(o.sku, "inertia_kg_m2", "is not known: give it, or a shape with dims_m");
+    const datasets::Sku sku = read_throwable_sku(o.sku);
     if (sku.drag_k.value_or(0) > 0)
       tell("note: drag_k_per_m = {:g} of {} is passed over: throw-flip flies without drag\n", *sku.drag_k,
            o.sku);
@@ -144,7 +143,7 @@ std::unique_ptr<fl::FlipLearner> learner_of(const PlanFlipOptions& o, const fl::
 void run(const PlanFlipOptions& o) {
   if (!o.card.empty() && o.learner != "m4") throw WrongUsage("--card: only --learner m4 begins from a card");
   if (!o.report.empty()) require_gnuplot();
-  require_outputs({{o.report, Wanted::directory}, {o.json}}, {o.sku, o.card});
+  require_outputs({{o.report, Wanted::directory}, {o.json}}, {o.sku, o.card, o.robot});
   FlipAnswer answer;
   answer.learner = o.learner;
   answer.throws = o.throws;
@@ -181,7 +180,7 @@ void run(const PlanFlipOptions& o) {
   fmt::print("{}", text_of(answer));
   if (store && store->recalled() > 0)
     fmt::print("{} throws recalled, {} thrown now\n", store->recalled(), store->thrown());
-  Outputs outputs{{o.sku, o.card}};
+  Outputs outputs{{o.sku, o.card, o.robot}};
   if (!o.report.empty()) write_report(answer, outputs.directory(o.report));
   if (!o.json.empty()) outputs.json(o.json, flip_json(answer));
   outputs.commit();

@@ -304,8 +304,12 @@ Json flip_json(const FlipAnswer& a) {
   out["initial_error_is_seen"] = a.path.initial_is_seen;
   out["first_error"] = number(a.path.first());
   out["minimum_error"] = number(a.path.minimum());
-  out["iterations_to_two_thirds"] = a.path.reached((2 * a.throws + 2) / 3);
-  out["iterations_to_all"] = a.path.reached(a.throws);
+  const auto reached = [&](int hits) {
+    const int iterations = a.path.reached(hits);
+    return iterations > 0 ? Json(iterations) : Json(nullptr);
+  };
+  out["iterations_to_two_thirds"] = reached((2 * a.throws + 2) / 3);
+  out["iterations_to_all"] = reached(a.throws);
   out["gave_up"] = a.path.gave_up;
   out["iterations"] = Json::array();
   for (const auto& one : a.path.iterations) {

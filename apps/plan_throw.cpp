@@ -229,6 +229,7 @@ void plan_release(ThrowAnswer& a, planners::ReleaseThrow release, const planners
   a.plan.motion = std::move(robust->motion);
   a.plan.limits = robust->limits;
   a.plan.nominal.state = release.start;
+  a.of_tube = false;
   a.plan.qdd = release.qdd;
   const planners::TubeProblem rigid{a.chain, release.start, a.box.middle, a.window, a.medium};
   const auto landings = [&](const planners::JointVector<double>& qdd) {
@@ -306,10 +307,7 @@ planners::TargetBox box_of(const PlanThrowOptions& options) {
 
 std::optional<datasets::Sku> sku_of(const PlanThrowOptions& options) {
   if (options.sku.empty()) return {};
-  auto sku = read_possible_sku(options.sku);
-  if (!sku.inertia)
-    throw datasets::LogError(options.sku, "inertia_kg_m2", "is not known: give it, or a shape with dims_m");
-  return sku;
+  return read_throwable_sku(options.sku);
 }
 
 /// What is thrown: the SKU or, without one, the planner's own object; what is not known of it is as uncertain

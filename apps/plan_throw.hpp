@@ -26,7 +26,8 @@ struct ThrowAnswer {
   planners::Chain chain;  ///< up to what lands: the object's centre of mass
   planners::TargetBox box;
   planners::ThrowPlan plan;
-  double window{};        ///< for which q̈ is held [s]
+  bool of_tube{true};  ///< the plan's state and margins are Tube-CVX's throw's, not the insensitive motion's
+  double window{};     ///< for which q̈ is held [s]
   flight::Medium medium;  ///< of the flight
   std::string drag_from;  ///< who told its drag
   /// A number that the release rests on, and who told it and its σ.

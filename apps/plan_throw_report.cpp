@@ -73,6 +73,11 @@ double PredictedLandings::rms() const {
   return std::hypot(along, beside);
 }
 
+std::string margins_text(const planners::NominalThrow& n) {
+  return fmt::format("margin of the throw found {:.3f} (speed {:.3f}, position {:.3f}, tube {:.3f}); ",
+                     n.margin, n.speed_margin, n.position_margin, n.tube_margin);
+}
+
 std::string text_of(const ThrowAnswer& a, bool markdown) {
   const auto shown = [&](const Table& t) { return markdown ? t.markdown() : t.text(); };
   const auto& plan = a.plan;
@@ -80,11 +85,9 @@ std::string text_of(const ThrowAnswer& a, bool markdown) {
                                                 JointVector<double>::Zero(a.chain.size()));
   std::string out = fmt::format(
       "box {:g} x {:g} m at ({:g}, {:g}, {:g}) m; the object may leave up to {:.0f} ms after the command\n"
-      "margin of the throw found {:.3f} (speed {:.3f}, position {:.3f}, tube {:.3f}); the object moves at "
-      "{:.2f} m/s, {:.1f} deg upward\n\n",
+      "{}the object moves at {:.2f} m/s, {:.1f} deg upward\n\n",
       a.box.length_x, a.box.length_y, a.box.middle.x(), a.box.middle.y(), a.box.middle.z(), 1e3 * a.window,
-      plan.nominal.margin, plan.nominal.speed_margin, plan.nominal.position_margin, plan.nominal.tube_margin,
-      tip.velocity.norm(),
+      a.of_tube ? margins_text(plan.nominal) : "", tip.velocity.norm(),
       std::atan2(tip.velocity.z(), tip.velocity.head<2>().norm()) * 180 / std::numbers::pi);
   Table joints{{"joint", "q0 [rad]", "qd0 [rad/s]", "qdd [rad/s2]"}, {}, 1};
   for (int i = 0; i < a.chain.size(); ++i)
@@ -154,14 +157,16 @@ Json throw_json(const ThrowAnswer& a) {
   out["box_m"] = {a.box.length_x, a.box.length_y};
   out["window_s"] = a.window;
   out["drag_k_per_m"] = a.medium.drag_k;
-  out["margin"] = {{"least", plan.nominal.margin},
-                   {"speed", plan.nominal.speed_margin},
-                   {"position", plan.nominal.position_margin},
-                   {"tube", plan.nominal.tube_margin}};
+  out["margin"] = nullptr;
+  if (a.of_tube)
+    out["margin"] = {{"least", plan.nominal.margin},
+                     {"speed", plan.nominal.speed_margin},
+                     {"position", plan.nominal.position_margin},
+                     {"tube", plan.nominal.tube_margin}};
   out["q0_rad"] = list(plan.nominal.state.q);
   out["qd0_rad_s"] = list(plan.nominal.state.qd);
   out["qdd_rad_s2"] = list(plan.qdd);
-  out["qdd_tube_cvx_rad_s2"] = list(plan.tube.qdd);
+  out["qdd_tube_cvx_rad_s2"] = a.of_tube ? list(plan.tube.qdd) : Json(nullptr);
   out["window_landings"] = {{"planned", window_json(plan.landings)},
                             {"tube_cvx", window_json(plan.tube_landings)},
                             {"no_acceleration", window_json(plan.at_rest)}};

@@ -122,7 +122,7 @@ Table table_of(const experiment::ModelComparison& model, const Sigmas& sigmas) {
     const auto& p = one.prediction;
     const bool detached = p.release == release::ReleaseOutcome::detached;
     const auto error = [&](int q, int decimals) {
-      return one.error[q] ? fmt::format("{:+.{}f}", *one.error[q], decimals) : std::string("-");
+      return one.error[q] ? with_sign(*one.error[q], decimals) : std::string("-");
     };
     const auto value = [&](bool known, double v, double fitting::OutcomeSigma::*s, double unit,
                            int decimals) {

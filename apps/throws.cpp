@@ -127,6 +127,13 @@ datasets::Sku read_possible_sku(const std::string& file) {
   return sku;
 }
 
+datasets::Sku read_throwable_sku(const std::string& file) {
+  auto sku = read_possible_sku(file);
+  if (!sku.inertia)
+    throw datasets::TomlError(file, 0, 0, "inertia_kg_m2", "missing: it, or shape and dims_m, are needed");
+  return sku;
+}
+
 std::vector<std::string> surface_model_names() {
   std::vector<std::string> out;
   for (const auto model : fitting::surface_models) out.push_back(to_string(model));

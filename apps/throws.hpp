@@ -46,6 +46,8 @@ datasets::SlipLog read_slips(const std::string& file);
 /// An object that a body can be: throws datasets::TomlError where none of its mass and dims has its inertia
 /// (experiment::impossible_inertia), and as datasets::read_sku does.
 datasets::Sku read_possible_sku(const std::string& file);
+/// The same with its inertia known, which every throw needs.
+datasets::Sku read_throwable_sku(const std::string& file);
 
 /// What can be fitted to slips: limit surfaces.
 std::vector<std::string> surface_model_names();

@@ -22,13 +22,6 @@ struct ValidateSkuOptions {
   fitting::SkuRequest request;
 };
 
-datasets::Sku read_throwable_sku(const std::string& file) {
-  auto sku = read_possible_sku(file);
-  if (!sku.inertia)
-    throw datasets::TomlError(file, 0, 0, "inertia_kg_m2", "missing: it, or shape and dims_m, are needed");
-  return sku;
-}
-
 void write_report(const SkuQuestion& question, const fitting::SkuValidation& answer, const Json& json,
                   const std::filesystem::path& directory) {
   std::string pictures;

@@ -15,6 +15,9 @@ using fitting::SkuValidation;
 
 namespace {
 
+/// null where it is not known.
+Json known(bool is, double value) { return is ? Json(value) : Json(nullptr); }
+
 Json spread_json(const fitting::LandingSpread& s) {
   return {{"landing_x_m", s.x},
           {"landing_theta_deg", s.theta * kDegrees},
@@ -66,8 +69,7 @@ Table spread_table(const SkuValidation& answer) {
       1};
   const auto row = [&](const char* name, const fitting::LandingSpread& s, double within) {
     out.rows.push_back({name, fmt::format("{:.2f}", 100 * s.x), fmt::format("{:.2f}", s.theta * kDegrees),
-                        fmt::format("{:+.2f}", 100 * s.bias_x),
-                        fmt::format("{:+.2f}", s.bias_theta * kDegrees),
+                        with_sign(100 * s.bias_x, 2), with_sign(s.bias_theta * kDegrees, 2),
                         fmt::format("{:.1f} %", 100 * within)});
   };
   row("Monte Carlo", answer.monte_carlo, answer.within);
@@ -194,24 +196,27 @@ Json sku_json(const SkuQuestion& question, const SkuValidation& answer) {
     out["candidates"].push_back({{"condition", c.condition},
                                  {"held", c.held},
                                  {"landed", c.landed},
-                                 {"landing_x_m", c.landing_x},
-                                 {"landing_theta_deg", c.landing_theta * kDegrees},
-                                 {"sigma_x_m", c.linear.x},
-                                 {"sigma_theta_deg", c.linear.theta * kDegrees}});
-  out["linear"] = spread_json(answer.linear);
-  out["linear"]["within"] = answer.within_linear;
-  out["monte_carlo"] = spread_json(answer.monte_carlo);
-  out["monte_carlo"]["within"] = answer.within;
-  out["monte_carlo"]["within_sigma"] = answer.within_sigma;
-  out["monte_carlo"]["lost"] = answer.lost;
-  out["monte_carlo"]["samples"] = request.samples;
+                                 {"landing_x_m", known(c.landed, c.landing_x)},
+                                 {"landing_theta_deg", known(c.landed, c.landing_theta * kDegrees)},
+                                 {"sigma_x_m", known(c.landed, c.linear.x)},
+                                 {"sigma_theta_deg", known(c.landed, c.linear.theta * kDegrees)}});
+  const bool drawn = !answer.samples.empty();
+  out["linear"] = drawn ? spread_json(answer.linear) : Json(nullptr);
+  if (drawn) out["linear"]["within"] = answer.within_linear;
+  out["monte_carlo"] = drawn ? spread_json(answer.monte_carlo) : Json(nullptr);
+  if (drawn) {
+    out["monte_carlo"]["within"] = answer.within;
+    out["monte_carlo"]["within_sigma"] = answer.within_sigma;
+    out["monte_carlo"]["lost"] = answer.lost;
+    out["monte_carlo"]["samples"] = request.samples;
+  }
   out["repeats"] = nullptr;
   if (const auto& r = answer.repeats)
     out["repeats"] = {{"motions", r->motions},     {"conditions", r->conditions},
                       {"landing_x_m", r->x},       {"landing_theta_deg", r->theta * kDegrees},
                       {"offset_x_m", r->offset_x}, {"offset_theta_deg", r->offset_theta * kDegrees},
                       {"within", r->within}};
-  out["agree"] = answer.agree;
+  out["agree"] = drawn ? Json(answer.agree) : Json(nullptr);
   out["disagreement"] = answer.disagreement.empty() ? Json(nullptr) : Json(answer.disagreement);
   out["budget"] = Json::array();
   for (const auto& line : answer.budget)

@@ -446,10 +446,10 @@ TEST_F(Cli, ThrowFlipRefusesWhatItCannotDo) {
   expect_refusal(aim + "--card card.json", 2, "--card: only --learner m4");
   expect_refusal(aim + "--com-offset 0.9", 1, "lands this bar with none of its commands");
   expect_refusal(aim + "--robot none.toml", 3, "none.toml");
-  std::ofstream(folder / "sku.toml") << "name = 'b'\nmass_kg = 0.3\ninertia_kg_m2 = 1e-9\n"
+  std::ofstream(folder / "sku.toml") << "name = 'b'\nmass_kg = 0.3\ninertia_kg_m2 = 4e-7\n"
                                         "com_offset_m = 0.15\nsurface = 'printed'\n";
   expect_refusal(aim + "--sku sku.toml", 3,
-                 "sku.toml: object: inertia_kg_m2: 1e-09 is outside [1e-06, 1] kg m^2");
+                 "sku.toml: object: inertia_kg_m2: 4e-07 is outside [1e-06, 1] kg m^2");
   const Answer far = run(other + "m2 --target 1.8,360 --iterations 1");
   EXPECT_EQ(far.code, 0);
   EXPECT_THAT(far.err, HasSubstr("note: out of reach of the robot as declared"));
