@@ -83,7 +83,7 @@ ThrowShare share_of(const CampaignProblem& problem, std::size_t index, const Fit
 /// Fewer conditions than these, by what they say of an unknown, cannot say how far they agree on it.
 constexpr double kFewestConditions = 2.5;
 /// By how many σ a block has to differ [-].
-constexpr double kFar = 2.5;
+constexpr double kFar = 1.5;
 
 /// What leaving out each condition does to every unknown.
 struct Jackknife {
@@ -183,7 +183,7 @@ void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threa
       const double expected = std::max(0.0, of.covariance(k, k) - noise[k]) * inflated;
       // Ten times as uncertain without the block: the rest has no say of its own.
       if (!(rest(k, k) > 0) || of.covariance(k, k) > 100 * noise[k]) continue;
-      // One of four goes beyond what chance allows by chance: only far beyond.
+      // The largest of four is about one sigma and a half of chance.
       if (step * step > kFar * kFar * expected) excess[k] = std::max(excess[k], step * step - expected);
     }
   }
@@ -195,7 +195,8 @@ void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threa
     if (!(u.sigma > 0) || !(variance[k] > u.sigma * u.sigma)) continue;
     factor[static_cast<std::size_t>(k)] = std::sqrt(variance[k]) / u.sigma;
     u.sigma = std::sqrt(variance[k]);
-    u.allows_for_few = true;  // of declared noise, or widened by t above
+    // Of declared noise, or widened by t above; but how much sensors disagree is known from few of them.
+    u.allows_for_few = excess[k] <= 0.5 * variance[k];
   }
   for (std::size_t j = 0; j < factor.size(); ++j)
     for (std::size_t k = 0; k < factor.size(); ++k)

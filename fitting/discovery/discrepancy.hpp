@@ -16,10 +16,11 @@ namespace unhand::fitting {
 /// 95 % interval of few. Fewer than 2.5 cannot disagree: the size of such an object is as much less sure than
 /// noise says as those of other objects are. δ_b is the step without a block of channels (pads' wrenches;
 /// motion in the hand; flight; landing) and V_b what noise alone would make of it (H₋b⁻¹ − H⁻¹, scaled as the
-/// first two terms are to H⁻¹), which counts beyond 2.5 σ: where one kind of sensor says something else than
-/// the rest, the law is wrong in one of the two, and nobody knows in which [Hausman1978]. A block without
-/// which the unknown is no longer determined has no say. Correlations stay as they are. What is widened so
-/// needs no Student's t any more (allows_for_few).
+/// first two terms are to H⁻¹), which counts beyond 1.5 σ, about the largest of four by chance: where one
+/// kind of sensor says something else than the rest, the law is wrong in one of the two, and nobody knows in
+/// which [Hausman1978]. A block without which the unknown is no longer determined has no say. Correlations
+/// stay as they are. What is widened so needs no Student's t any more (allows_for_few), unless the last term
+/// is the larger part: two sensors know little of how much they differ.
 void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threads);
 
 }  // namespace unhand::fitting

@@ -80,11 +80,13 @@ TEST(PadsThatGive, TheGiveOfAnyPadsIsFittedAlongWhereOnlyPredictionsShowIt) {
 // give was.
 TEST(PadsThatGive, AGiveThatPredictsNothingDoesNotHideWhatItStoodFor) {
   experiment::CampaignDesign design = experiment::campaign_design("quick12");
-  design.effects = {{"contact.viscous.1/v_0", 5}};
+  constexpr double kViscous = 5;
+  design.effects = {{"contact.viscous.1/v_0", kViscous}};
   const Discovery found = found_in(experiment::generate_campaign(design, 3));
   EXPECT_TRUE(found.along.empty());
-  ASSERT_TRUE(found.small.has_value());
-  EXPECT_EQ(found.small->id, "contact.viscous");
+  ASSERT_EQ(found.effects.size(), 1u) << to_string(found.verdict);
+  EXPECT_EQ(found.effects.front().id, "contact.viscous");
+  support::expect_size(found, "contact.viscous", kViscous);
 }
 
 // Friction that falls with the slip, beside pads that give by four micrometres. The held-out conditions slip
