@@ -13,7 +13,6 @@
 #include "experiment/campaign_effects.hpp"
 #include "fitting/fit_rounds.hpp"
 #include "fitting/give_start.hpp"
-#include "fitting/misfit.hpp"
 #include "fitting/profile.hpp"
 
 namespace unhand::fitting {
