@@ -8,6 +8,18 @@ namespace {
 
 Window shifted(const Window& window, double by) { return {window.begin - by, window.end - by}; }
 
+/// The k-th derivative of channel n of a polynomial, h [s] after its begin.
+template <class Coefficients>
+double derivative(const Coefficients& c, int n, int k, double h) {
+  double out = 0;
+  for (int m = static_cast<int>(c.size()) - 1; m >= k; --m) {
+    double falling = 1;  // m (m − 1) … (m − k + 1)
+    for (int q = 0; q < k; ++q) falling *= m - q;
+    out = out * h + falling * c[static_cast<std::size_t>(m)][static_cast<std::size_t>(n)];
+  }
+  return out;
+}
+
 }  // namespace
 
 std::span<const dynamics::EffectOn<Lateness>> lateness_effects() {
@@ -70,16 +82,7 @@ LaggedHand::LaggedHand(const PolynomialHand& logged, const Dual& lag) : logged_(
         // What settled jumps by here: Σ (−τ)^k of the jump of the k-th derivative, of which pose and twist
         // (k = 0, 1) have none. Their rounding, over τ² in the acceleration, would be felt.
         Dual jump(0.0);
-        for (int k = 5; k >= 2; --k) {
-          double derivative = 0, factorial = 1;
-          for (int m = 5; m >= k; --m) {
-            double falling = 1;
-            for (int q = 0; q < k; ++q) falling *= m - q;
-            derivative = derivative * h + falling * ends[m][n];
-          }
-          for (int q = 2; q <= k; ++q) factorial *= q;
-          jump = (derivative - factorial * c[k][n]) - jump * lag;
-        }
+        for (int k = 5; k >= 2; --k) jump = (derivative(ends, n, k, h) - derivative(c, n, k, 0)) - jump * lag;
         piece.transient[n] = jump * lag * lag + before.transient[n] * decay;
       }
     }
