@@ -61,11 +61,10 @@ inline void add_threads(Parser& parser, int& threads) {
   parser.option("--threads", threads, "Threads to use; 0: one per core").range(0, 1024).with_default();
 }
 
-/// The same option of a command whose steps each need the one before: it runs on one thread, whatever is
-/// asked.
+/// The same option of a command that runs on one thread, whatever is asked: it is quick, or each of its steps
+/// needs the one before.
 inline void add_one_thread(Parser& parser, int& threads) {
-  parser
-      .option("--threads", threads, "Accepted as everywhere: every step needs the one before, on one thread")
+  parser.option("--threads", threads, "Accepted as everywhere; this command runs on one thread")
       .range(0, 1024);
 }
 

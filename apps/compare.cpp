@@ -147,7 +147,18 @@ void compare_releases(const CompareRequest& request, datasets::ThrowLog log) {
              fmt::join(tables.methods, "\n"));
 }
 
-void compare(const CompareRequest& request) {
+/// Refuses what only releases are integrated with, and what only the naive limit surface takes.
+void refuse_unused(const CompareRequest& request, const Parser& parser, bool releases) {
+  if (!releases)
+    refuse_options(parser, {"--rtol", "--naive-step", "--naive-smoothing"},
+                   "only throws from a hand are integrated so");
+  const auto& models = request.models;
+  if (std::find(models.begin(), models.end(), release::kNaiveModel) == models.end())
+    refuse_options(parser, {"--naive-step", "--naive-smoothing"},
+                   fmt::format("of {}, which --models does not name", release::kNaiveModel));
+}
+
+void compare(const CompareRequest& request, const Parser& parser) {
   require_models(request.models);
   require_outputs(
       {{request.json}, {request.report, Wanted::directory}, {request.write_cards, Wanted::directory}},
@@ -158,6 +169,7 @@ void compare(const CompareRequest& request) {
     if (!request.fit)
       throw WrongUsage(
           fmt::format("{} is a slip-log, whose surfaces are compared by fitting: add --fit", request.log));
+    refuse_unused(request, parser, false);
     compare_slips(request);
     return;
   }
@@ -179,6 +191,7 @@ void compare(const CompareRequest& request) {
                                            "is for free flights",
                                            model));
   }
+  refuse_unused(request, parser, !flights);
   if (flights && request.fit)
     throw Unanswered("free flights hold nothing to fit here: leave out --fit, or use `unhand discover`");
   if (!flights) return compare_releases(request, std::move(log));
@@ -254,7 +267,7 @@ Command compare_command(Parser& root) {
       "  unhand compare cubes.h5 --models projectile --json flights.json\n"
       "  unhand compare cubes.h5 --card discovered.json\n"
       "  unhand compare pushes.h5 --models ellipsoid,convex_quartic --fit --report out");
-  return {&parser, [request] { compare(*request); }};
+  return {&parser, [request, &parser] { compare(*request, parser); }};
 }
 
 }  // namespace unhand::apps

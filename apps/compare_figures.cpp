@@ -118,7 +118,7 @@ DataBlock condition_block(const ModelComparison& model, const std::vector<Thrown
     const auto theta = model.of_condition(landing_theta, conditions[i]);
     if (x.n == 0 || theta.n == 0) continue;
     out.rows.push_back({static_cast<double>(i) + dodge, 100 * x.mae, theta.mae});
-    out.labels.push_back(conditions[i].label);
+    out.labels.push_back(conditions[i].label + (conditions[i].held_out ? " (held out)" : ""));
   }
   return out;
 }
@@ -206,7 +206,11 @@ std::optional<Figure> condition_figure(const Comparison& comparison) {
   const ModelComparison& first = comparison.models.front();
   const auto conditions = sorted_conditions(comparison, first);
   std::vector<std::string> labels;
-  for (const auto& condition : conditions) labels.push_back(condition.label);
+  bool any_held_out = false;
+  for (const auto& condition : conditions) {
+    any_held_out = any_held_out || condition.held_out;
+    labels.push_back((condition.held_out ? "* " : "") + condition.label);
+  }
   Figure figure{"conditions", 19, 0, {}, {}};
   std::vector<KeyEntry> key;
   const double models = static_cast<double>(comparison.models.size());
@@ -236,10 +240,11 @@ std::optional<Figure> condition_figure(const Comparison& comparison) {
   std::string& s = figure.script;
   s = fmt::format(
       "set multiplot\nunset key\n"
-      "set label 1 'mean absolute error of each condition, sorted by landing x of {}' at screen 0.5,{:.4f} "
+      "set label 1 'mean absolute error of each condition, sorted by landing x of {}{}' at screen 0.5,{:.4f} "
       "center\n"
       "set yrange [{}:-0.7]\nset ytics ({}) scale 0\n",
-      plain(first.model), 1 - 0.5 / figure.height, n - 0.3, line_tics(labels, true));
+      plain(first.model), any_held_out ? " (*: held-out throws)" : "", 1 - 0.5 / figure.height, n - 0.3,
+      line_tics(labels, true));
   s += place(figure, {left, middle - 0.25, bottom, top}) +
        condition_panel(figure, 2, floor_x, scale, "landing x [cm]");
   s += fmt::format("unset label 1\nset ytics ({})\n", line_tics(labels, false));

@@ -223,9 +223,9 @@ void compare_flights(const CompareRequest& request, const datasets::ThrowLog& lo
   const Json json = flights_json(found, request, log);
   answer_with(request, heading, table, json, [&](const std::filesystem::path& directory) {
     const Figure figure = residual_figure(found, log.dimension == 2);
-    draw(figure, directory);
+    draw(figure, directory, origin_text(log));
     write_text(directory / "report.md",
-               fmt::format("# Free flights\n\n{}\n{}\n![What {} leaves]({}.png)\n\n", heading,
+               fmt::format("# Free flights\n\n{}\n{}\n![What {} leaves]({}.png)\n\n", markdown_text(heading),
                            table.markdown(), experiment::kProjectile, figure.name));
     write_text(directory / "throws.csv", flight_rows(found).csv());
   });

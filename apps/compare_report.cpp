@@ -74,7 +74,9 @@ ReleaseTables release_tables(const experiment::Comparison& comparison, const dat
       auto bias = row;
       for (int q = 0; q < experiment::kQuantityCount; ++q) {
         const auto s = model.statistics(q, split);
-        row.push_back(mean_and_spread(s.n, s.mae, s.std, experiment::kQuantities[q].decimals));
+        const bool of_all = s.n == 0 || s.n == counted.throws;
+        row.push_back(mean_and_spread(s.n, s.mae, s.std, experiment::kQuantities[q].decimals) +
+                      (of_all ? "" : fmt::format(" (of {})", s.n)));
         bias.push_back(s.n > 0 ? fmt::format("{:+.{}f}", s.bias, experiment::kQuantities[q].decimals) : "-");
       }
       row.push_back(fmt::format("{:.0f}", model.microseconds_per_throw));
@@ -193,8 +195,8 @@ void write_release_report(const experiment::Comparison& comparison, const datase
       directory / "report.md",
       fmt::format("# Models against a log\n\n{}\n{}\n{}\n{}## Bias (predicted - measured)\n\n{}\n"
                   "## Parameters\n\n{}\n{}\n",
-                  tables.heading, tables.errors.markdown(), tables.floor, pictures, tables.bias.markdown(),
-                  tables.parameters.markdown(), fmt::join(tables.methods, "\n\n")));
+                  markdown_text(tables.heading), tables.errors.markdown(), tables.floor, pictures,
+                  tables.bias.markdown(), tables.parameters.markdown(), fmt::join(tables.methods, "\n\n")));
   write_text(directory / "throws.csv", throw_table(comparison, log).csv());
   write_text(directory / "compare.json", json_text(json));
 }

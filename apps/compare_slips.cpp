@@ -173,18 +173,18 @@ void compare_slips(const CompareRequest& request) {
   const Json json = slips_json(request, surfaces, scores, options);
   answer_with(request, heading, table, json, [&](const std::filesystem::path& directory) {
     const Figure errors = surface_error_figure(surfaces, scores);
-    draw(errors, directory);
+    draw(errors, directory, origin_text(log));
     std::string pictures = fmt::format("![Direction errors by surface]({}.png)\n\n", errors.name);
     for (std::size_t i = 0; i < surfaces.size(); ++i) {
       const std::string& surface = surfaces[i].surface;
       const std::string name = file_stem(surface);
       const Figure figure =
           section_figure(surfaces[i], scores[i], name == surface ? name : fmt::format("{}_{}", name, i + 1));
-      draw(figure, directory);
-      pictures += fmt::format("![Limit surface of {}]({}.png)\n\n", surface, figure.name);
+      draw(figure, directory, origin_text(log));
+      pictures += fmt::format("![Limit surface of {}]({}.png)\n\n", markdown_text(surface), figure.name);
     }
-    write_text(directory / "report.md",
-               fmt::format("# Limit surfaces from slips\n\n{}\n{}\n{}", heading, table.markdown(), pictures));
+    write_text(directory / "report.md", fmt::format("# Limit surfaces from slips\n\n{}\n{}\n{}",
+                                                    markdown_text(heading), table.markdown(), pictures));
     write_text(directory / "slips.csv", sample_rows(surfaces, scores).csv());
   });
 }

@@ -73,12 +73,13 @@ void compare_with_card(const CompareRequest& request, const datasets::ThrowLog& 
   answer_with(request, heading, table, json, [&](const std::filesystem::path& directory) {
     const Figure figure =
         measured_residual_figure(found.base_profile, found.card_profile, card.model, "with the card");
-    draw(figure, directory);
+    draw(figure, directory, origin_text(log));
     write_text(
         directory / "report.md",
         fmt::format("# A card against a log\n\n{}\n{}\nResiduals of the {} throws over their duration, "
                     "each with its start fitted; 1 is the noise.\n\n![Residuals]({}.png)\n",
-                    heading, table.markdown(), found.test > 0 ? "held-out" : "train", figure.name));
+                    markdown_text(heading), table.markdown(), found.test > 0 ? "held-out" : "train",
+                    figure.name));
   });
 }
 

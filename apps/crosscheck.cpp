@@ -183,7 +183,7 @@ std::vector<Setting> run_engine(const CrosscheckOptions& options, const Throws& 
       setting.words =
           fmt::format("patch of {} points, step {:g} ms", 3 * options.rings * options.rings, 1e3 * step);
     }
-    setting.json["rings"] = options.rings;
+    if (options.engine == "patch" || options.pads == BulletPads::pins) setting.json["rings"] = options.rings;
     const crosscheck::DistributedPatch points{patch.mu, patch.radius, crosscheck::disc_points(options.rings),
                                               patch.pads};
     setting.throws = all(throws, options.threads, progress, [&](const auto& one) {
@@ -279,6 +279,8 @@ void require_usable(const CrosscheckOptions& options, const Parser& parser) {
     refuse_options(parser, {"--steps", "--pads", "--friction", "--rings"}, "cvode integrates the models");
   if (options.engine == "patch")
     refuse_options(parser, {"--pads", "--friction"}, "of bullet; patch has points with bristles");
+  if (options.engine == "bullet" && options.pads != BulletPads::pins)
+    refuse_options(parser, {"--rings"}, "of --pads pins and of patch, whose pads are points");
   require_outputs({{options.json}}, {options.log, options.card});
   const auto known = contact::pad_law_names();
   for (const auto& model : options.models)

@@ -159,7 +159,7 @@ void draw(const Figure& figure, const fs::path& directory, const std::string& ab
   if (figure.name != file_stem(figure.name))
     throw std::logic_error("figure: the name " + figure.name + " is none for a file");
   const fs::path program = gnuplot();
-  const std::string comment = about.empty() ? "" : "# " + quoted(about) + "\n";
+  const std::string comment = "# " + quoted(about) + "\n";
   write_text(directory / (figure.name + ".dat"), comment + data_text(figure));
   write_text(directory / (figure.name + ".gp"), comment + script_text(figure));
   const auto [status, said] = run(program, figure.name + ".gp", directory);

@@ -27,9 +27,9 @@ struct Figure {
 std::string file_stem(const std::string& text);
 
 /// Writes NAME.png and NAME.pdf, and beside them NAME.gp and NAME.dat from which `gnuplot NAME.gp` draws them
-/// again; `about`, of what data, is a comment in these. Throws Unanswered if there is no gnuplot or it
-/// complains.
-void draw(const Figure& figure, const std::filesystem::path& directory, const std::string& about = {});
+/// again; `about`, of what data and whether they are synthetic, is a comment in these. Throws Unanswered if
+/// there is no gnuplot or it complains.
+void draw(const Figure& figure, const std::filesystem::path& directory, const std::string& about);
 
 /// Throws Unanswered, naming the package, where gnuplot is missing.
 void require_gnuplot();

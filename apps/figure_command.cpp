@@ -90,7 +90,8 @@ std::optional<Figure> mae_figure(const experiment::Comparison& comparison) {
           "linewidth 1.2",
           points.empty() ? "plot " : ", \\\n     ", q, block.rows.size(), block.rows.size(), style.marker,
           style.colour);
-      body += fmt::format("set label '{}' at graph 1.05, first {} left font ',7.5'\n", mean_and_std(of), i);
+      body += fmt::format("set label '{}{}' at graph 1.05, first {} left font ',7.5'\n", mean_and_std(of),
+                          of.n == thrown ? "" : fmt::format(" (n = {})", of.n), i);
       block.rows.push_back({static_cast<double>(i), of.mae, low, high, of.std, static_cast<double>(of.n)});
       block.labels.push_back(comparison.models[i].model);
       means.push_back(of.mae);

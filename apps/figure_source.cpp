@@ -154,11 +154,13 @@ FlightOverlay FigureSource::overlay() {
   const auto& p = compared().models.front().throws[chosen_].prediction;
   if (!p.landed()) throw Unanswered(fmt::format("{} brings throw {} to no landing", model, logged.id));
   FlightOverlay out{model, logged.id, {}, {}, {}};
+  std::vector<double> seen;  // on the log's clock
   for (std::size_t i = 0; i < logged.mocap->time.rows; ++i) {
     const double t = logged.mocap->time(i);
     if (!logged.mocap->is_valid(i) || t < p.detach.time || t > p.detach.time + p.landing.flight_time)
       continue;
-    out.time.push_back(t);
+    seen.push_back(t);
+    out.time.push_back(t - p.detach.time);
     out.measured.push_back({logged.mocap->pose(i, 0), logged.mocap->pose(i, 1), logged.mocap->pose(i, 2)});
   }
   if (out.time.empty()) throw Unanswered(fmt::format("throw {} was not tracked in flight", logged.id));
@@ -167,7 +169,7 @@ FlightOverlay FigureSource::overlay() {
     using experiment::Channel;
     const Fitted& known = fitted(model);
     experiment::Observations wanted;  // what the tracker would say, with the card's effects
-    for (const double t : out.time)
+    for (const double t : seen)
       for (const auto channel : {Channel::mocap_x, Channel::mocap_z, Channel::mocap_theta})
         wanted.all.push_back({channel, t, 0, 1});
     const auto said = known.predicted.problem.predict(prepared_[chosen_], wanted, known.fit.values(),
@@ -177,11 +179,9 @@ FlightOverlay FigureSource::overlay() {
     return out;
   }
   const auto& prepared = prepared_[chosen_];
-  std::vector<double> since;
-  for (const double t : out.time) since.push_back(t - p.detach.time);
   const flight::FlightProblem<double> flight{p.detach.pose, p.detach.twist, prepared.gravity, prepared.drag_k,
                                              prepared.landing_height};
-  out.predicted = flight::fly_through(flight, since);
+  out.predicted = flight::fly_through(flight, out.time);
   return out;
 }
 

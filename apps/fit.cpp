@@ -66,7 +66,7 @@ void write_report(const FitAnswer& answer, const FitRequest& request, const Json
   experiment::Comparison comparison;
   comparison.models.push_back(answer.errors);
   if (const auto figure = landing_figure(comparison)) {
-    draw(*figure, directory);
+    draw(*figure, directory, request.log + ": " + answer.origin);
     pictures = fmt::format("\n![Landing errors]({}.png)\n", figure->name);
   }
   write_text(directory / "report.md", fit_text(answer, request, true) + pictures);

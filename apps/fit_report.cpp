@@ -125,10 +125,11 @@ std::string fit_text(const FitAnswer& a, const FitRequest& request, bool markdow
   }
   std::string effects;
   for (const auto& id : request.effects) effects += (effects.empty() ? " with " : ", ") + id;
+  const std::string log = request.log + ": " + a.origin;
   std::string out =
-      fmt::format("{}{}: {}\n{}{}{} fitted to {} of {} train throws, {} samples: {}, {} iterations\n\n",
-                  markdown ? "# Fit\n\n" : "", request.log, a.origin, markdown ? "\n" : "", request.model,
-                  effects, used, n_train, fit.samples,
+      fmt::format("{}{}\n{}{}{} fitted to {} of {} train throws, {} samples: {}, {} iterations\n\n",
+                  markdown ? "# Fit\n\n" : "", markdown ? markdown_text(log) : log, markdown ? "\n" : "",
+                  request.model, effects, used, n_train, fit.samples,
                   fit.outcome == fitting::FitOutcome::converged ? "converged" : "stopped before it converged",
                   fit.iterations);
   out += table(parameter_table(fit)) + "\n";

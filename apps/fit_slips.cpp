@@ -132,8 +132,9 @@ void fit_slips(const FitRequest& request) {
     outputs.text(request.card, datasets::to_json(slip_card(request, surfaces, scores)));
   if (!request.report.empty()) {
     const auto directory = outputs.directory(request.report);
-    write_text(directory / "report.md", fmt::format("# Fit\n\n{}: {}\n\n{} by surface\n\n{}", request.log,
-                                                    origin_text(log), request.model, table.markdown()));
+    write_text(directory / "report.md", fmt::format("# Fit\n\n{}\n\n{} by surface\n\n{}",
+                                                    markdown_text(request.log + ": " + origin_text(log)),
+                                                    request.model, table.markdown()));
     write_text(directory / "fit.json", json_text(json));
   }
   outputs.commit();

@@ -201,7 +201,7 @@ Command import_command(Parser& root) {
   parser.option("INPUT", options->inputs, "The files to read").required();
   parser.file("--out", options->out, "The log to write (replaced if it exists); --into, where that is given");
   parser.file("--json", options->json, "Write what was read, kept and dropped as JSON");
-  add_threads(parser, options->threads);
+  add_one_thread(parser, options->threads);
   const char* cube = "Another cube than the published one (cube-tosses)";
   parser.option("--cube-side", options->cube_side, "[m] Its side").group(cube).positive();
   parser.option("--cube-mass", options->cube_mass, "[kg] Its mass").group(cube).positive();

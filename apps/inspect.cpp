@@ -303,7 +303,7 @@ Command inspect_command(Parser& root) {
                           .option("--json", options->json,
                                   "Write it as JSON; without a file name, JSON on stdout (then after LOG)")
                           .expected(0, 1);
-  add_threads(parser, options->threads);
+  add_one_thread(parser, options->threads);
   parser.footer("Examples:\n  unhand inspect campaign.h5\n  unhand inspect campaign.h5 --json campaign.json");
   return {&parser, [options, json] {
             options->json_wanted = json.given();

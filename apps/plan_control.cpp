@@ -94,7 +94,7 @@ void draw_landings(const std::vector<Cell>& cells, double box, const fs::path& f
                           1e3 * cells[p * controllers].payload.mass, points);
   }
   figure.script = script + key_strip(figure, key, 2) + "unset multiplot\n";
-  draw(figure, folder);
+  draw(figure, folder, "simulated by unhand plan control");
 }
 
 void draw_errors(const std::vector<ct::StudyThrow>& recorded,
@@ -126,7 +126,7 @@ void draw_errors(const std::vector<ct::StudyThrow>& recorded,
       "error [cm]'\n" +
       position + "\nset ylabel 'velocity error [m/s]'\n" + velocity +
       "\nset ylabel 'V of the adaptive law [J]'\n" + falls + "\nunset multiplot\n";
-  draw(figure, folder);
+  draw(figure, folder, "simulated by unhand plan control");
 }
 
 void run(const PlanControlOptions& o) {

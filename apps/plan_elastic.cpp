@@ -92,7 +92,7 @@ void draw_speeds(const el::ClutchedArm& arm, const std::vector<Fastest>& all, co
       "ylabel 'tip speed "
       "[m/s]'\n" +
       speed + "\nset ylabel 'spring deflection [rad]'\n" + deflection + "\nunset multiplot\n";
-  draw(figure, folder);
+  draw(figure, folder, "simulated by unhand plan elastic");
 }
 
 void draw_table(const std::vector<el::TableCheck>& checks, const fs::path& folder) {
@@ -112,7 +112,7 @@ void draw_table(const std::vector<el::TableCheck>& checks, const fs::path& folde
       "yrange [0:*]\n"
       "plot DATA using 1:3 with lines lw 2 lc rgb '#d55e00', 1 with lines lw 1 dt 2 lc rgb '#000000'\nunset "
       "multiplot\n";
-  draw(figure, folder);
+  draw(figure, folder, "simulated by unhand plan elastic");
 }
 
 el::ThrowProgramOptions program_options(const PlanElasticOptions& o) {
@@ -284,7 +284,12 @@ bool to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs&
   return any;
 }
 
-void run(const PlanElasticOptions& o) {
+void run(const PlanElasticOptions& o, const Parser& parser) {
+  if (o.target_x > 0)
+    refuse_options(parser, {"--elevation"}, "of the fastest throw; a target has the direction that it needs");
+  else
+    refuse_options(parser, {"--height", "--box", "--half-table", "--nodes", "--checks"},
+                   "of a table of throws to a target: give --target, too");
   if (o.longest > 0 && o.longest < 0.1)
     throw WrongUsage(fmt::format("--longest: {:g} s; accepted: 0, or 0.1 to 10 s", o.longest));
   if (!o.report.empty()) require_gnuplot();
@@ -337,7 +342,7 @@ Command plan_elastic_command(Parser& plan) {
   parser.file("--json", o->json, "Write the numbers here");
   add_one_thread(parser, o->threads);
   parser.file("--report", o->report, "Write table, figure, trajectories and numbers into this directory");
-  return {&parser, [o] { run(*o); }};
+  return {&parser, [o, &parser] { run(*o, parser); }};
 }
 
 }  // namespace unhand::apps

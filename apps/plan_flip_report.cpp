@@ -182,7 +182,7 @@ void draw_path(const FlipAnswer& a, const std::filesystem::path& folder) {
       "set style textbox opaque noborder fillcolor rgb '#ffffff' margins 0.4,0.4\n"
       "set ylabel 'angle from hanging [deg]'\nset offsets graph 0.05, graph 0.08, graph 0.08, graph 0.05\n" +
       target_box(a.target) + plots + "\n";
-  draw(figure, folder);
+  draw(figure, folder, "simulated by unhand plan flip");
 }
 
 /// The error over the iterations; * two of three throws hit, T all of them. An error that was only expected
@@ -218,7 +218,7 @@ void draw_progress(const FlipAnswer& a, const std::filesystem::path& folder) {
       "error "
       "[-]'\n{}{}\n",
       static_cast<double>(a.path.iterations.size()) + 0.3, most, a.throws, marks, plots);
-  draw(figure, folder);
+  draw(figure, folder, "simulated by unhand plan flip");
 }
 
 /// Landing poses of the population: marker the pitch, size the speed, colour the damping.
@@ -262,7 +262,7 @@ void draw_population(const FlipAnswer& a, const std::filesystem::path& folder) {
       "from the "
       "pads'\nset ylabel 'angle from hanging [deg]'\nset ytics 90\n{}{}\n",
       100 * a.declared_bar.com_offset, target_box(a.target), plots);
-  draw(figure, folder);
+  draw(figure, folder, "simulated by unhand plan flip");
 }
 
 /// What was thrown, what was known before, and what came of it.

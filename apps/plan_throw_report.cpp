@@ -462,7 +462,7 @@ void write_report(const ThrowAnswer& a, const Json& json, const std::filesystem:
   write_text(directory / "trajectory.csv", trajectory_csv(a));
   write_text(directory / "landings.csv", landings_csv(a));
   for (const Figure& figure : {tube_figure(a), motion_figure(a), planned_landing_figure(a)}) {
-    draw(figure, directory);
+    draw(figure, directory, "simulated by unhand plan throw");
     page += fmt::format("\n![{0}]({0}.png)\n", figure.name);
   }
   write_text(directory / "report.md", page);

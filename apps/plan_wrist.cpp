@@ -100,7 +100,7 @@ void draw_gain(const std::vector<Point>& points, const Point& rigid, const fs::p
       "'elastic wrist', {} with "
       "lines lw 2 dt 2 lc rgb '#555555' title 'rigid wrist'\n",
       rigid.speed);
-  draw(figure, folder);
+  draw(figure, folder, "simulated by unhand plan wrist");
 }
 
 void run(const PlanWristOptions& o) {

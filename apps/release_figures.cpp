@@ -294,12 +294,12 @@ Figure phase_figure(const std::vector<ReleaseTrace>& traces, double length) {
 
 Figure flight_figure(const FlightOverlay& overlay) {
   Figure figure{"flight", 17, 9, {}, {}};
-  DataBlock block{
-      overlay.model,
-      {"time [s]", "x predicted [m]", "z predicted [m]", "theta predicted [deg]", "x measured [m]",
-       "z measured [m]", "theta measured [deg]", "predicted - measured x [mm]", "z [mm]", "theta [deg]"},
-      {},
-      {}};
+  DataBlock block{overlay.model,
+                  {"time since the predicted detach [s]", "x predicted [m]", "z predicted [m]",
+                   "theta predicted [deg]", "x measured [m]", "z measured [m]", "theta measured [deg]",
+                   "predicted - measured x [mm]", "z [mm]", "theta [deg]"},
+                  {},
+                  {}};
   for (std::size_t i = 0; i < overlay.time.size(); ++i) {
     const auto &p = overlay.predicted[i], &m = overlay.measured[i];
     block.rows.push_back({overlay.time[i], p.x, p.z, p.theta * kDegrees, m.x, m.z, m.theta * kDegrees,
@@ -331,10 +331,11 @@ Figure flight_figure(const FlightOverlay& overlay) {
        "     DATA index 0 using 2:3 " +
        path + "\n";
   s += fmt::format("set xtics {:.6g}\n", tic_step(overlay.time.back() - overlay.time.front()));
-  s += "set title 'predicted - measured' offset 0,-0.5\nset xlabel 'time [s]'; set ylabel "
-       "'mm, deg' offset "
-       "1,0\n"
-       "set xzeroaxis linetype 1 linecolor rgb '#808080' linewidth 0.6\n";
+  s +=
+      "set title 'predicted - measured' offset 0,-0.5\nset xlabel 'time since the predicted detach [s]'; set "
+      "ylabel 'mm, deg' offset "
+      "1,0\n"
+      "set xzeroaxis linetype 1 linecolor rgb '#808080' linewidth 0.6\n";
   s += place(figure, {middle + 1.9, figure.width - 0.5, bottom, top});
   s += "plot DATA index 0 using 1:8 with points pointtype 7 pointsize 0.45 linecolor rgb '#009e73', \\\n"
        "     DATA index 0 using 1:9 with points pointtype 4 pointsize 0.45 linecolor rgb '#606060', \\\n"

@@ -62,7 +62,7 @@ Figure phase_figure(const std::vector<ReleaseTrace>& traces, double length);
 /// A flight and what a tracker saw of it: paths in the plane, and the residual over time.
 struct FlightOverlay {
   std::string model, thrown;                                ///< and the throw's id
-  std::vector<double> time;                                 ///< [s]
+  std::vector<double> time;                                 ///< since the predicted detach [s]
   std::vector<dynamics::Pose<double>> predicted, measured;  ///< m, m, rad
 };
 Figure flight_figure(const FlightOverlay& overlay);

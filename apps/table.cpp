@@ -58,12 +58,7 @@ std::string Table::markdown() const {
   const auto line = [](const std::vector<std::string>& row) {
     std::string out = "|";
     for (const auto& cell : row) {
-      out += ' ';
-      for (const char c : cell) {
-        if (c == '|') out += '\\';
-        out += c;
-      }
-      out += " |";
+      out += ' ' + markdown_text(cell) + " |";
     }
     return out + "\n";
   };
@@ -71,6 +66,19 @@ std::string Table::markdown() const {
   for (std::size_t j = 0; j < header.size(); ++j) out += static_cast<int>(j) < left ? " --- |" : " ---: |";
   out += "\n";
   for (const auto& row : rows) out += line(row);
+  return out;
+}
+
+std::string markdown_text(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '<' || c == '&') {
+      out += c == '<' ? "&lt;" : "&amp;";
+      continue;
+    }
+    if (c == '|' || c == '*' || c == '`' || c == '\\') out += '\\';
+    out += c;
+  }
   return out;
 }
 

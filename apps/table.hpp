@@ -18,6 +18,9 @@ struct Table {
   std::string csv() const;  ///< RFC 4180
 };
 
+/// Text of a log or a file, such as a name, as Markdown shows it: without markup or HTML of its own.
+std::string markdown_text(const std::string& text);
+
 /// value ± spread with so many decimals; a dash if there is nothing to show.
 std::string plus_minus(bool known, double value, double spread, int decimals);
 /// The same of n numbers: a single one has no spread, for which a dash stands.

@@ -24,9 +24,10 @@ struct ValidateSkuOptions {
 
 void write_report(const SkuQuestion& question, const fitting::SkuValidation& answer, const Json& json,
                   const std::filesystem::path& directory) {
-  std::string pictures;
+  std::string pictures, about = "predicted from " + question.card_file;
+  if (const auto* log = question.request.log) about += "; measured: " + origin_text(*log);
   const auto add = [&](const Figure& figure, const char* title) {
-    draw(figure, directory);
+    draw(figure, directory, about);
     pictures += fmt::format("\n![{}]({}.png)\n", title, figure.name);
   };
   if (!answer.samples.empty()) add(sku_landing_figure(question, answer), "Landings about the predicted one");

@@ -127,27 +127,28 @@ std::string sku_text(const SkuQuestion& question, const SkuValidation& answer, b
   const auto title = [&](const std::string& text) {
     return markdown ? fmt::format("\n## {}\n\n", text) : fmt::format("\n{}\n\n", text);
   };
+  const auto shown = [&](const std::string& text) { return markdown ? markdown_text(text) : text; };
   const auto& sku = question.sku;
-  std::string out = markdown ? fmt::format("# {}: {}\n\n", sku.name, verdict_text(answer))
+  std::string out = markdown ? fmt::format("# {}: {}\n\n", shown(sku.name), verdict_text(answer))
                              : fmt::format("{}: {}\n", sku.name, verdict_text(answer));
   out += answer.message + ".\n";
   for (const auto& one : answer.untried) out += fmt::format("Beyond the card: {}.\n", one.reason);
   out += fmt::format("{:.3g} kg, {:.3g} kg m^2, centre of mass {:.3g} m from the pads, {}; {} of {}.\n",
-                     sku.mass, *sku.inertia, sku.com_offset, sku.surface, question.card.model,
-                     question.card_file);
+                     sku.mass, *sku.inertia, sku.com_offset, shown(sku.surface), question.card.model,
+                     shown(question.card_file));
   if (fitting::untried_surface(question.card, sku.surface))
     out += fmt::format("Friction is that of the card's log ({}); for another surface {}.\n",
-                       question.card.log.title,
+                       shown(question.card.log.title),
                        question.request.assumed.other_surface > 0 ? "--other-surface is allowed for"
                                                                   : "allow with --other-surface (0.2: 20 %)");
   if (const auto* log = question.request.log)
-    out += fmt::format("Throws of {}: {}.\n", question.log_file, origin_text(*log));
+    out += fmt::format("Throws of {}: {}.\n", shown(question.log_file), shown(origin_text(*log)));
   out += held_out_text(question.card);
   if (answer.measured)
     out += measured_text(answer);
   else if (question.request.log != nullptr)
     out += fmt::format("{} holds no throws of this object with a landing: nothing measured to judge by.\n",
-                       question.log_file);
+                       shown(question.log_file));
   for (const auto& note : answer.notes) out += fmt::format("Note: {}.\n", note);
   out += title(answer.candidates.size() > 1 ? "Motions of the log, with this object (first order)"
                                             : "The motion");

@@ -184,7 +184,7 @@ int main(int argc, char** argv) {
          fmt::format("{}", 1e3 * worst->opening), fmt::format("{}", worst->inertia)});
   }
   std::filesystem::create_directories(out);
-  draw(figure(cells), out);
+  draw(figure(cells), out, "synthetic throws, bench/where_models_hold");
   fmt::print("{} throws, {} points; errors in units of 1 cm and 5 degrees, whichever is larger\n\n{}\n{}",
              cells.size(), 3 * rings * rings, table.text(), (out / "where-models-hold.png").string() + "\n");
 }

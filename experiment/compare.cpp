@@ -84,11 +84,16 @@ RepetitionScatter scatter_of(const std::vector<PreparedThrow>& throws) {
 template <class Throw>
 std::vector<ThrownCondition> labelled_conditions(const std::vector<Throw>& throws) {
   std::vector<ThrownCondition> out;
-  for (const auto& t : throws)
-    if (std::none_of(out.begin(), out.end(), [&](const ThrownCondition& known) {
-          return known.object == t.object && known.condition == t.condition;
-        }))
-      out.push_back({t.object, t.condition, {}});
+  for (const auto& t : throws) {
+    const auto known = std::find_if(out.begin(), out.end(), [&](const ThrownCondition& c) {
+      return c.object == t.object && c.condition == t.condition;
+    });
+    const bool held_out = t.split == datasets::Split::test;
+    if (known == out.end())
+      out.push_back({t.object, t.condition, {}, held_out});
+    else
+      known->held_out |= held_out;
+  }
   for (ThrownCondition& one : out) {
     const auto sharing = std::count_if(
         out.begin(), out.end(), [&](const ThrownCondition& c) { return c.condition == one.condition; });
@@ -108,7 +113,8 @@ ErrorStatistics ModelComparison::statistics(int quantity, datasets::Split split)
 }
 ErrorStatistics ModelComparison::of_condition(int quantity, const ThrownCondition& of) const {
   return collect(throws, quantity, [&](const ThrowComparison& t) {
-    return t.object == of.object && t.condition == of.condition;
+    return t.object == of.object && t.condition == of.condition &&
+           (!of.held_out || t.split == datasets::Split::test);
   });
 }
 

@@ -62,6 +62,7 @@ struct NamedParameter {
 struct ThrownCondition {
   std::string object, condition;  ///< as in the log
   std::string label;              ///< the condition, after its object where several share its name
+  bool held_out{};                ///< at least one of its throws is a test throw
 };
 
 /// One model's predictions and errors, throw by throw.
@@ -76,7 +77,7 @@ struct ModelComparison {
 
   /// Over the throws of one split; `quantity` is a place in kQuantities.
   ErrorStatistics statistics(int quantity, datasets::Split split) const;
-  /// The same over all throws of one object under one condition.
+  /// The same over the throws of one object under one condition: its held-out ones where it has any.
   ErrorStatistics of_condition(int quantity, const ThrownCondition& condition) const;
 };
 

@@ -45,7 +45,7 @@ int failures() { return failed; }
 void show(const Figure& figure) {
   try {
     const fs::path folder = figures();
-    draw(figure, folder);
+    draw(figure, folder, "a cell of a notebook, which says of what data");
     const fs::path picture = folder / (figure.name + ".png");
     if (in_jupyter())
       mark("png " + picture.string());

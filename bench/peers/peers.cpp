@@ -98,6 +98,6 @@ int main(int argc, char** argv) {
   std::filesystem::create_directories(out);
   apps::write_text(out / "peers.csv", runs.csv());
   apps::write_text(out / "peers.md", verdicts.markdown());
-  draw(figure(all), out);
+  draw(figure(all), out, "synthetic throws, bench/peers");
   fmt::print("{}\n{}", runs.text(), verdicts.text());
 }

@@ -11,12 +11,13 @@
 #include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
 #include "experiment/campaign_effects.hpp"
+#include "fitting/discovery/jackknife.hpp"
 #include "fitting/distributions.hpp"
 #include "fitting/normal_equations.hpp"
 
 namespace unhand::fitting {
 
-using dynamics::eliminated, dynamics::gram, dynamics::pseudo_inverse;
+using dynamics::eliminated, dynamics::gram;
 using experiment::Channel;
 
 namespace {
@@ -30,22 +31,6 @@ Block block_of(Channel channel, Phase phase) {
              ? kHeld
              : kWrench;
 }
-
-/// Information and, in the last column, gradient of the campaign's unknowns.
-using Equations = Eigen::MatrixXd;
-
-Equations no_equations(Eigen::Index width) { return Equations::Zero(width + 1, width + 1); }
-
-/// The covariance that equations leave, and the step that they ask for.
-struct Answer {
-  Eigen::MatrixXd covariance;
-  Eigen::VectorXd step;
-  explicit Answer(const Equations& e) {
-    const Eigen::Index width = e.cols() - 1;
-    covariance = pseudo_inverse(e.topLeftCorner(width, width));
-    step = covariance * e.col(width).head(width);
-  }
-};
 
 /// One throw: all of its samples, and without each block; its own unknowns eliminated.
 struct ThrowShare {
@@ -82,36 +67,8 @@ ThrowShare share_of(const CampaignProblem& problem, std::size_t index, const Fit
 
 /// Fewer conditions than these, by what they say of an unknown, cannot say how far they agree on it.
 constexpr double kFewestConditions = 2.5;
-/// By how many σ a block has to differ [-].
+/// By how many σ a block has to differ [-]: the largest of four is about that by chance.
 constexpr double kFar = 1.5;
-
-/// What leaving out each condition does to every unknown.
-struct Jackknife {
-  Eigen::VectorXd conditions;  ///< that speak of it: (Σ h)²/Σ h² by their shares h of what is known
-  Eigen::VectorXd excess;      ///< Σ δ², less what noise alone makes of it
-};
-
-Jackknife jackknife(const std::map<std::string, Equations>& conditions, const Equations& all,
-                    const Answer& whole) {
-  const Eigen::VectorXd noise = whole.covariance.diagonal();
-  const Eigen::Index width = noise.size();
-  Jackknife out{Eigen::VectorXd::Zero(width), Eigen::VectorXd::Zero(width)};
-  Eigen::VectorXd shares = out.excess, squares = out.excess;
-  for (const auto& [name, of] : conditions) {
-    const Answer rest(all - of);
-    for (Eigen::Index k = 0; k < width; ++k) {
-      const double without = rest.covariance(k, k), step = rest.step[k] - whole.step[k];
-      constexpr double kAlone = 1e4;  // what is hardly known without it is its own
-      const bool alone = !(without > noise[k] * (1 - 1e-9)) || without > kAlone * noise[k];
-      const double share = alone ? 1 : std::clamp(1 - noise[k] / without, 0.0, 1.0);
-      shares[k] += share, squares[k] += share * share;
-      if (!alone) out.excess[k] += step * step - (without - noise[k]);
-    }
-  }
-  for (Eigen::Index k = 0; k < width; ++k)
-    if (squares[k] > 0) out.conditions[k] = shares[k] * shares[k] / squares[k];
-  return out;
-}
 
 /// To the sizes of objects of which too few conditions speak: by as much more than noise as those of the same
 /// parameter of other objects.
@@ -130,77 +87,108 @@ void lend(const CampaignProblem& problem, const Eigen::VectorXd& conditions, con
         variance[k] = std::max(variance[k], by->second * noise[k]);
 }
 
-}  // namespace
+/// What all throws say of the campaign's unknowns, together and in parts.
+struct Sums {
+  Equations all;
+  std::array<Equations, kBlocks> without;       ///< a block of channels
+  std::map<std::string, Equations> conditions;  ///< each one's part
+};
 
-void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threads) {
+/// What is known of the unknowns without any throw: those that are held, and priors.
+Equations prior_equations(const FitResult& fit) {
   const auto campaign = fit.values();
   const auto width = static_cast<Eigen::Index>(campaign.size());
+  Equations out = no_equations(width);
+  for (Eigen::Index k = 0; k < width; ++k) {
+    const auto& fitted = fit.campaign[static_cast<std::size_t>(k)];
+    const Unknown& u = fitted.unknown;
+    if (!(fitted.sigma > 1e-9 * u.scale)) out(k, k) = 1e30 / (u.scale * u.scale);  // held
+    if (!u.prior_sigma) continue;
+    out(k, k) += 1 / (*u.prior_sigma * *u.prior_sigma);
+    out(k, width) = (campaign[static_cast<std::size_t>(k)] - u.start) / (*u.prior_sigma * *u.prior_sigma);
+  }
+  return out;
+}
+
+Sums sums_of(const CampaignProblem& problem, const FitResult& fit, int threads) {
+  const auto campaign = fit.values();
   Weighting weighting;
   std::copy(fit.group_weight.begin(), fit.group_weight.end(), weighting.group.begin());
   std::vector<ThrowShare> shares(fit.throws.size());
   dynamics::parallel_for(fit.throws.size(), threads, [&](std::size_t i) {
     if (fit.throws[i].used) shares[i] = share_of(problem, i, fit, campaign, weighting);
   });
-  Equations all = no_equations(width);
-  for (Eigen::Index k = 0; k < width; ++k) {
-    const Unknown& u = fit.campaign[static_cast<std::size_t>(k)].unknown;
-    if (!(fit.campaign[static_cast<std::size_t>(k)].sigma > 1e-9 * u.scale))
-      all(k, k) = 1e30 / (u.scale * u.scale);  // held
-    if (!u.prior_sigma) continue;
-    all(k, k) += 1 / (*u.prior_sigma * *u.prior_sigma);
-    all(k, width) = (campaign[static_cast<std::size_t>(k)] - u.start) / (*u.prior_sigma * *u.prior_sigma);
-  }
-  std::array<Equations, kBlocks> without{all, all, all, all};
-  std::map<std::string, Equations> conditions;
+  const Equations prior = prior_equations(fit);
+  Sums out{prior, {prior, prior, prior, prior}, {}};
   for (std::size_t i = 0; i < shares.size(); ++i) {
     if (!fit.throws[i].used) continue;
-    all += shares[i].whole;
-    for (std::size_t b = 0; b < kBlocks; ++b) without[b] += shares[i].without[b];
+    out.all += shares[i].whole;
+    for (std::size_t b = 0; b < kBlocks; ++b) out.without[b] += shares[i].without[b];
     const auto& prepared = problem.throws()[i].prepared;
-    const auto [at, first] = conditions.try_emplace(prepared.experiment(), shares[i].whole);
+    const auto [at, first] = out.conditions.try_emplace(prepared.experiment(), shares[i].whole);
     if (!first) at->second += shares[i].whole;
   }
-  const Answer whole(all);  // its step: what the solver has not gone yet
-  const Eigen::VectorXd noise = whole.covariance.diagonal();
+  return out;
+}
 
-  Eigen::VectorXd variance = noise;
-  const auto count = static_cast<double>(conditions.size());
-  if (count >= 3) {
-    const Jackknife by = jackknife(conditions, all, whole);
-    for (Eigen::Index k = 0; k < width; ++k) {
-      if (!(by.conditions[k] >= kFewestConditions)) continue;  // few that speak of it cannot disagree
-      const double t = student_factor(by.conditions[k] - 1) / kNormal95,
-                   spread = (by.conditions[k] - 1) / by.conditions[k] * t * t * by.excess[k];
-      variance[k] += std::max(0.0, spread);
-    }
-    lend(problem, by.conditions, noise, variance);
+/// Noise, and how far the conditions disagree beyond it.
+Eigen::VectorXd between_conditions(const CampaignProblem& problem, const Sums& sums,
+                                   const LinearAnswer& whole) {
+  const Eigen::VectorXd noise = whole.covariance.diagonal();
+  Eigen::VectorXd out = noise;
+  if (sums.conditions.size() < 3) return out;
+  const Jackknife by = jackknife(sums.conditions, sums.all, whole);
+  for (Eigen::Index k = 0; k < out.size(); ++k) {
+    const double n = by.groups[k];
+    if (!(n >= kFewestConditions)) continue;  // few that speak of it cannot disagree
+    const double t = student_factor(n - 1) / kNormal95;
+    out[k] += std::max(0.0, (n - 1) / n * t * t * by.excess[k]);
   }
-  Eigen::VectorXd excess = Eigen::VectorXd::Zero(width);
-  for (const Equations& rest : without) {
-    const Answer of(rest);
-    for (Eigen::Index k = 0; k < width; ++k) {
+  lend(problem, by.groups, noise, out);
+  return out;
+}
+
+/// How far a block of sensors disagrees with the rest beyond `variance`, of which `whole` has the noise.
+Eigen::VectorXd between_blocks(const Sums& sums, const LinearAnswer& whole, const Eigen::VectorXd& variance) {
+  const Eigen::VectorXd noise = whole.covariance.diagonal();
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(noise.size());
+  for (const Equations& rest : sums.without) {
+    const LinearAnswer of(rest);
+    for (Eigen::Index k = 0; k < noise.size(); ++k) {
       const double inflated = variance[k] / std::max(noise[k], 1e-300), step = of.step[k] - whole.step[k];
       const double expected = std::max(0.0, of.covariance(k, k) - noise[k]) * inflated;
       // Ten times as uncertain without the block: the rest has no say of its own.
       if (!(rest(k, k) > 0) || of.covariance(k, k) > 100 * noise[k]) continue;
-      // The largest of four is about one sigma and a half of chance.
-      if (step * step > kFar * kFar * expected) excess[k] = std::max(excess[k], step * step - expected);
+      if (step * step > kFar * kFar * expected) out[k] = std::max(out[k], step * step - expected);
     }
   }
-  variance += excess;
+  return out;
+}
 
-  std::vector<double> factor(static_cast<std::size_t>(width), 1.0);
-  for (Eigen::Index k = 0; k < width; ++k) {
+/// Widens the unknowns' sigmas to these variances, of which `blocks` is the part of sensors that disagree.
+void widen(FitResult& fit, const Eigen::VectorXd& variance, const Eigen::VectorXd& blocks) {
+  std::vector<double> factor(fit.campaign.size(), 1.0);
+  for (Eigen::Index k = 0; k < variance.size(); ++k) {
     auto& u = fit.campaign[static_cast<std::size_t>(k)];
     if (!(u.sigma > 0) || !(variance[k] > u.sigma * u.sigma)) continue;
     factor[static_cast<std::size_t>(k)] = std::sqrt(variance[k]) / u.sigma;
     u.sigma = std::sqrt(variance[k]);
     // Of declared noise, or widened by t above; but how much sensors disagree is known from few of them.
-    u.allows_for_few = excess[k] <= 0.5 * variance[k];
+    u.allows_for_few = blocks[k] <= 0.5 * variance[k];
   }
   for (std::size_t j = 0; j < factor.size(); ++j)
     for (std::size_t k = 0; k < factor.size(); ++k)
       fit.covariance[j * factor.size() + k] *= factor[j] * factor[k];
+}
+
+}  // namespace
+
+void count_discrepancy(const CampaignProblem& problem, FitResult& fit, int threads) {
+  const Sums sums = sums_of(problem, fit, threads);
+  const LinearAnswer whole(sums.all);  // its step: what the solver has not gone yet
+  const Eigen::VectorXd conditions = between_conditions(problem, sums, whole),
+                        blocks = between_blocks(sums, whole, conditions);
+  widen(fit, conditions + blocks, blocks);
 }
 
 }  // namespace unhand::fitting

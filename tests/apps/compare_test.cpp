@@ -244,6 +244,33 @@ TEST_F(Cli, ReportIsComplete) {
   EXPECT_EQ(files().size(), 2u + 8 + 3 + 1);
 }
 
+TEST_F(Cli, ReportsShowNamesAsTheyAreAndWhereDataComeFrom) {
+  const std::string name = "a<b>*c*|.h5";
+  fs::copy_file(quick, folder / name);
+  ASSERT_EQ(run("compare '" + name + "' --models gripper_delay --report r").code, 0);
+  EXPECT_THAT(content(folder / "r/report.md"), HasSubstr("a&lt;b>\\*c\\*\\|.h5: "));
+  const std::string origin = datasets::read_throw_log(quick).source;
+  ASSERT_THAT(origin, HasSubstr("synthetic"));
+  EXPECT_THAT(content(folder / "r/landing_errors.gp"), HasSubstr(origin));
+  ASSERT_EQ(run("fit " + quick + " --model limit_surface_disc --report f").code, 0);
+  EXPECT_THAT(content(folder / "f/landing_errors.gp"), HasSubstr(origin));
+}
+
+TEST_F(Cli, ErrorsSayOfHowManyThrowsTheyAre) {
+  bool first = true;
+  write_changed("some.h5", [&](datasets::Throw& one) {
+    if (one.split == datasets::Split::test && std::exchange(first, false)) one.landing.reset();
+  });
+  const Answer answer = run("compare some.h5 --models gripper_delay --report r --json a.json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json test = read_json(folder / "a.json")["models"]["gripper_delay"]["test"];
+  const int n = test["landing_x_m"]["n"];
+  ASSERT_LT(n, test["n"].get<int>());
+  EXPECT_THAT(answer.out, HasSubstr("(of " + std::to_string(n) + ")"));
+  // A figure of conditions tells which are held out.
+  EXPECT_THAT(content(folder / "r/conditions.gp"), HasSubstr("'* "));
+}
+
 TEST_F(Cli, MissingGnuplotIsSaid) {
   fs::create_directory(folder / "bin");
   const Answer answer = run("compare " + quick + " --models gripper_delay --report r --json a.json",

@@ -4,6 +4,7 @@
 #include <regex>
 
 #include "tests/apps/cli.hpp"
+#include "tests/apps/lab_files.hpp"
 
 namespace unhand::cli {
 namespace {
@@ -29,6 +30,10 @@ const std::set<std::string> kByName{"parameters",
                                     "drives",
                                     "autocorrelation",
                                     "not_compared",
+                                    "objects",
+                                    "effects",
+                                    "throws",
+                                    "left_out",
                                     "footprint_correlations"};
 
 void collect(const json& at, const std::string& parent, std::set<std::string>& keys) {
@@ -60,7 +65,22 @@ TEST_F(Cli, ThePageHasEveryKeyOfTheOutputs) {
   const std::string page = content(fs::path(UNHAND_SOURCE_DIR) / "docs/output-keys.md");
   const std::string sku = (fs::path(UNHAND_SOURCE_DIR) / "examples/bar.toml").string();
   ASSERT_EQ(run("fit " + quick + " --model limit_surface_disc --card card.json").code, 0);
+  write_lab_files(folder);
+  const std::string hand =
+      "import hand-csv hand/slow_01.csv hand/slow_02.csv --columns "
+      "time=t,x=X,z=Z,theta=pitch,vx=VX,vz=VZ,omega=Q,ax=AX,az=AZ,alpha=DQ --units "
+      "time=ms,x=mm,z=mm,theta=deg,vx=m/s,vz=m/s,omega=deg/s,ax=m/s^2,az=m/s^2,alpha=deg/s^2 "
+      "--sku bar.toml --opening-time 0.1 --out log.h5";
   const std::pair<std::string, std::string> commands[] = {
+      {"unhand generate", "generate quick12 --out g.h5"},
+      {"unhand generate", "generate quick12 --effect contact.stribeck=1.3 --out g.h5 --truth out.json"},
+      {"unhand import", hand},
+      {"unhand import",
+       "import motive-csv takes/slow_01.csv takes/slow_02.csv --sigma position=2e-4,angle=3e-3 --landing "
+       "--into log.h5 --out full.h5"},
+      {"unhand figure", "figure all --out figures"},
+      {"unhand crosscheck", "crosscheck " + quick + " --engine patch --steps 1e-3"},
+      {"unhand crosscheck", "crosscheck " + quick + " --engine cvode"},
       {"unhand compare", "compare " + quick},
       {"unhand fit", "fit " + quick + " --model limit_surface_disc"},
       {"unhand predict", "predict " + quick + " --card card.json"},
@@ -71,9 +91,11 @@ TEST_F(Cli, ThePageHasEveryKeyOfTheOutputs) {
       {"unhand plan control", "plan control --seeds 2 --repetitions 0"},
       {"unhand plan elastic", "plan elastic --starts 1 --intervals 8"},
       {"unhand plan elastic", "plan elastic --target 2.2 --starts 1 --intervals 8 --nodes 4 --checks 2"},
-      {"unhand plan wrist", "plan wrist --stiffnesses 2 --softest 4 --stiffest 16 --starts 1 --intervals 4"}};
+      {"unhand plan wrist", "plan wrist --stiffnesses 2 --softest 4 --stiffest 16 --starts 1 --intervals 4"},
+      {"unhand plan flip", "plan flip --learner m2 --target 1.2,180 --iterations 2"}};
   for (const auto& [section, command] : commands) {
-    ASSERT_EQ(run(command + " --json out.json").code, 0) << command;
+    const bool written = command.find("out.json") != std::string::npos;
+    ASSERT_EQ(run(command + (written ? "" : " --json out.json")).code, 0) << command;
     std::set<std::string> keys;
     collect(read_json(folder / "out.json"), "", keys);
     ASSERT_GT(keys.size(), 5u) << section;

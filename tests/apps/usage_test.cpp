@@ -101,6 +101,12 @@ TEST_F(Cli, WrongUsage) {
   expect_refusal("fit " + quick + " --model limit_surface --card ''", 2, "--card: '' names no file");
   expect_refusal("import phyphox a --mass 0.2 --out a.h5 --into ''", 2, "--into: '' names no file");
   expect_refusal("compare " + quick + " --rtol nan", 2, "finite");
+  expect_refusal("compare " + quick + " --naive-step 1e-3", 2,
+                 "--naive-step: of limit_surface_naive, which --models does not name");
+  expect_refusal("compare " + flights + " --rtol 1e-6", 2, "--rtol: only throws from a hand");
+  expect_refusal("crosscheck " + quick + " --pads point --rings 2", 2, "--rings: of --pads pins");
+  expect_refusal("plan elastic --nodes 5", 2, "--nodes: of a table of throws to a target");
+  expect_refusal("plan elastic --target 2.2 --elevation 30", 2, "--elevation: of the fastest throw");
 }
 
 TEST_F(Cli, SeveralEffectsAndSensorsMayBeSaidAtOnce) {
