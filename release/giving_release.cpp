@@ -299,17 +299,10 @@ ReleaseResult<S> simulate_giving_release(const ReleaseProblem<S>& problem, const
 
 template <class S>
 Wrench<S> wrench_of_motion(const dynamics::TrajectoryPiece<S, 6>& piece, const S& fraction,
-                           const Scene<S>& scene) {
-  const Relative<S> y = Relative<S>::from(piece.at_fraction(fraction));
-  // The slip's rate: the pieces are cubics, whose slope four differences on any spacing give exactly.
-  const double d = 0.25;
-  const auto far = [&](double by) { return piece.at_fraction(S(fraction + by)); };
-  const State<S, 6> b2 = far(-2 * d), b1 = far(-d), a1 = far(d), a2 = far(2 * d);
+                           const Scene<S>& scene, const Relative<S>& y) {
+  const State<S, 6> slope = piece.rate_at_fraction(fraction);
   const S h = piece.t1 - piece.t0;
-  std::array<S, 3> rate;
-  for (int i = 0; i < 3; ++i)
-    rate[static_cast<std::size_t>(i)] =
-        (8.0 * (a1[i + 3] - b1[i + 3]) - (a2[i + 3] - b2[i + 3])) / (12 * d * h);
+  const std::array<S, 3> rate{slope[3] / h, slope[4] / h, slope[5] / h};
   // v_r' = (a_C − a_H) − ω_O J v_r
   const S omega = scene.hand_twist.omega + y.spin;
   const dynamics::Acceleration<S> point{rate[0] + scene.hand_acceleration.ax - omega * y.slip.z,
@@ -329,8 +322,8 @@ template ReleaseResult<Dual> simulate_giving_release(const ReleaseProblem<Dual>&
                                                      const contact::SceneSource&, const GivingStart<Dual>&,
                                                      const ReleaseOptions&);
 template Wrench<double> wrench_of_motion(const dynamics::TrajectoryPiece<double, 6>&, const double&,
-                                         const Scene<double>&);
+                                         const Scene<double>&, const Relative<double>&);
 template Wrench<Dual> wrench_of_motion(const dynamics::TrajectoryPiece<Dual, 6>&, const Dual&,
-                                       const Scene<Dual>&);
+                                       const Scene<Dual>&, const Relative<Dual>&);
 
 }  // namespace unhand::release

@@ -31,9 +31,9 @@ ReleaseResult<S> simulate_giving_release(const ReleaseProblem<S>& problem, const
                                          const ReleaseOptions& options);
 
 /// The wrench about the patch [N, N, N m] that moves the object as the recorded piece says at `fraction` of
-/// it.
+/// it, where the state is y.
 template <class S>
 dynamics::Wrench<S> wrench_of_motion(const dynamics::TrajectoryPiece<S, 6>& piece, const S& fraction,
-                                     const contact::Scene<S>& scene);
+                                     const contact::Scene<S>& scene, const contact::Relative<S>& y);
 
 }  // namespace unhand::release

@@ -30,7 +30,7 @@ EnergyLedger energy_ledger(const ReleaseProblem<double>& problem, const ReleaseR
       const double fraction = (k / 4 + kNode[k % 4]) / panels;
       const Scene<double> scene = system.scene(piece.phase.window, piece.t0 + fraction * length);
       const auto y = Relative<double>::from(piece.at_fraction(fraction));
-      const Wrench<double> f = wrench_at(problem.contact, piece, fraction, scene);
+      const Wrench<double> f = wrench_at(problem.contact, piece, fraction, scene, y);
       const double weight = kWeight[k % 4] * length / panels;
       ledger.hand_work +=
           weight * (dot(f.force(), scene.hand_twist.linear()) + f.tau * scene.hand_twist.omega);
@@ -76,7 +76,7 @@ ReleaseSample<S> sample_release(const ReleaseProblem<S>& problem, const ReleaseR
   return {system.mode_name(piece.phase.mode),
           object_pose(scene, y),
           object_twist(scene, y),
-          wrench_at(problem.contact, piece, fraction, scene),
+          wrench_at(problem.contact, piece, fraction, scene, y),
           {scene.hand, scene.hand_twist, scene.hand_acceleration},
           scene.normal_force,
           y};

@@ -241,12 +241,13 @@ inline const contact::GivesAtPoints* giving(const contact::ContactModel& model) 
   return points && points->gives_at_points() ? points : nullptr;
 }
 
-/// The wrench on the object about the patch, in the world, at `fraction` of a recorded piece.
+/// The wrench on the object about the patch, in the world, at `fraction` of a recorded piece, where the state
+/// is y.
 template <class S>
 Wrench<S> wrench_at(const contact::ContactModel& model, const dynamics::TrajectoryPiece<S, 6>& piece,
-                    const S& fraction, const Scene<S>& scene) {
-  if (giving(model)) return wrench_of_motion(piece, fraction, scene);
-  return model.wrench(piece.phase.mode, scene, Relative<S>::from(piece.at_fraction(fraction)));
+                    const S& fraction, const Scene<S>& scene, const Relative<S>& y) {
+  if (giving(model)) return wrench_of_motion(piece, fraction, scene, y);
+  return model.wrench(piece.phase.mode, scene, y);
 }
 
 /// The energy of a recorded release.
