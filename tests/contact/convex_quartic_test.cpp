@@ -10,8 +10,10 @@
 #include <stdexcept>
 
 #include "contact/isotropic_quartic.hpp"
+#include "contact/limit_surface.hpp"
 #include "tests/support/best_difference.hpp"
 #include "tests/support/refusal.hpp"
+#include "tests/support/simple_scenes.hpp"
 
 namespace {
 
@@ -243,6 +245,66 @@ TEST(ConvexQuartic, KappaIsTheLeastSquaresFit) {
   // cost is a parabola in κ: its vertex from three points
   const double a = cost(1.5), b = cost(1.6), c = cost(1.7);
   EXPECT_NEAR(1.6 + 0.05 * (a - c) / (a - 2.0 * b + c), ConvexQuartic::kappa_closest_to_disc(), 1e-6);
+}
+
+/// Pads with a grain: an ellipsoid that holds α and β times as much along the hand's x and z axes,
+/// H = ((w_x/α)² + (w_z/β)² + w_τ²)².
+constexpr double kAlong = 1.3, kAcross = 0.6;
+LimitSurface<ConvexQuartic> grained_pads(const Patch<double>& patch) {
+  constexpr double x = 1 / (kAlong * kAlong), z = 1 / (kAcross * kAcross);
+  Coefficients c{};
+  c[0] = x * x, c[3] = 2 * x * z, c[5] = 2 * x, c[10] = z * z, c[12] = 2 * z, c[14] = 1;
+  return {"grained", patch, ConvexQuartic(c)};
+}
+
+/// The largest wrench power on an ellipsoid D = diag(α², β², 1): w = −D u/√(u·D u), in the hand's axes.
+TEST(ConvexQuartic, TheGrainOfPadsTurnsWithTheHand) {
+  using unhand::dynamics::rotate;
+  constexpr double kNormal = 20;
+  const Patch<double> patch{0.5, 0.012};
+  const auto law = grained_pads(patch);
+  const double limit = patch.f_max(kNormal), length = patch.length();
+  int slip = 0;
+  while (law.mode_name(slip) != "slip") ++slip;
+  for (const double turned : {0.0, 0.7, -2.1})
+    for (const auto& u : {Vec3<double>{0.3, 0, 0}, {0, -0.2, 0}, {0.1, 0.25, -0.15}}) {
+      Scene<double> scene;
+      scene.body = {0.2, 5e-4}, scene.normal_force = kNormal, scene.hand.theta = turned;
+      const Relative<double> y{{0.05, 0}, 0.4, rotate(turned, {u[0], u[1]}), u[2] / length};
+      const double power = std::hypot(kAlong * u[0], kAcross * u[1], u[2]);
+      const auto force = rotate(
+          turned, {-kAlong * kAlong * u[0] / power * limit, -kAcross * kAcross * u[1] / power * limit});
+      const auto wrench = law.wrench(slip, scene, y);
+      EXPECT_NEAR(wrench.fx, force.x, 1e-12 * limit) << turned;
+      EXPECT_NEAR(wrench.fz, force.z, 1e-12 * limit) << turned;
+      EXPECT_NEAR(wrench.tau, -u[2] / power * limit * length, 1e-12 * limit) << turned;
+    }
+}
+
+/// An object held at its centre by a hand that accelerates along an axis of the pads lags behind by what they
+/// do not hold, and not at all where they hold it.
+TEST(ConvexQuartic, PadsHoldMoreAlongTheirGrain) {
+  constexpr double kNormal = 20, kMass = 0.2, kEnd = 0.1;
+  const Patch<double> patch{0.5, 0.012};
+  const auto law = grained_pads(patch);
+  const unhand::support::ConstantForce force(kNormal);
+  for (const double turned : {0.0, 0.7, -2.1})
+    for (const bool along : {true, false})
+      for (const double share : {0.999, 1.001, 1.5}) {
+        const double held = (along ? kAlong : kAcross) * patch.f_max(kNormal) / kMass;  // m/s²
+        const auto axis = unhand::dynamics::rotate(
+            turned, along ? unhand::dynamics::Vec2<double>{1, 0} : unhand::dynamics::Vec2<double>{0, 1});
+        const auto hand = unhand::release::PolynomialHand::segments(
+            0, {0, 0, turned}, {}, {{kEnd, {share * held * axis.x, share * held * axis.z, 0}}});
+        const auto result = simulate_release(unhand::release::ReleaseProblem<double>{
+            hand, force, law, {kMass, 5e-4}, {0, 0}, {0, 0.3}, 0.0, {}, 0.0});
+        ASSERT_EQ(result.outcome, unhand::release::ReleaseOutcome::never_separated);
+        EXPECT_EQ(result.slips_at_start, share > 1) << turned << ' ' << along;
+        const double lag = std::max(0.0, share - 1) * held * kEnd;  // m/s
+        EXPECT_NEAR(result.relative.slip.x, -lag * axis.x, 1e-7) << turned << ' ' << along << ' ' << share;
+        EXPECT_NEAR(result.relative.slip.z, -lag * axis.z, 1e-7) << turned << ' ' << along << ' ' << share;
+        EXPECT_NEAR(result.relative.spin, 0, 1e-6) << turned << ' ' << along << ' ' << share;
+      }
 }
 
 }  // namespace

@@ -196,29 +196,41 @@ TEST(PadComplianceTruth, AnObjectHeldAtItsCentreOscillatesAsTheFormulaSays) {
       const auto r = dynamics::rotate(0.3, pushed.arm);
       EXPECT_NEAR(r.x, oscillation(std::sqrt(1e5 / 0.2), loss, 10, t), 1e-10);
       EXPECT_NEAR(r.z, 0, 1e-12);
+      const auto lifted = on_compliant_pads({0, 10, 0}, 0, loss, t);
+      const auto up = dynamics::rotate(0.3, lifted.arm);
+      EXPECT_NEAR(up.z, oscillation(std::sqrt(1e5 / 0.2), loss, 10, t), 1e-10);
+      EXPECT_NEAR(up.x, 0, 1e-12);
       const auto turned = on_compliant_pads({0, 0, 50}, 0, loss, t);
       EXPECT_NEAR(turned.angle - 0.3, oscillation(std::sqrt(1e5 * 5e-5 / 5e-4), loss, 50, t), 1e-8);
     }
 }
 
+/// However hand and object are turned, and whichever law says how far the pads give.
 TEST(PadComplianceTruth, AnObjectThatHasBeenHeldForLongStaysWhereItIs) {
   contact::ContactParameters<double> p;
   p.patch = {0.8, 0.01};
   p.variation.compliance = 1e-5;
   p.variation.loss_time = 1e-3;
-  const auto model = contact::make_contact_model("limit_surface_disc", p);
-  const auto hand = support::accelerating_hand({3, -2, 0}, 0.2);
-  const support::ConstantForce force(1e4);
-  const release::ReleaseProblem<double> problem{hand, force, *model, {0.2, 5e-4}, {0, -9.81}, {0.1, 0.3},
-                                                0,    {},    0};
-  const auto result =
-      simulate_release(problem, {.integrator = {.tolerances = {1e-10, 1e-12}, .record = true}});
-  const auto y = contact::Relative<double>::from(result.trajectory.at(0.15));
-  EXPECT_NEAR(y.angle, 0.3, 1e-12) << "in steady acceleration nothing moves: the pads carry the load already";
-  EXPECT_NEAR(y.arm.x, 0.1, 1e-12);
-  const auto sample = sample_release(problem, result, 0.15);
-  EXPECT_NEAR(sample.wrench.fx, 0.2 * 3, 1e-9);
-  EXPECT_NEAR(sample.wrench.fz, 0.2 * (9.81 - 2), 1e-9);
+  for (const char* law : {"limit_surface", "limit_surface_disc", "limit_surface_quartic"})
+    for (const double turned : {0.0, 0.8, -2.3})
+      for (const double across : {0.0, 0.02}) {
+        const auto model = contact::make_contact_model(law, p);
+        const auto hand =
+            release::PolynomialHand::segments(0, {0.2, 0.1, turned}, {0.4, -0.3, 0}, {{0.2, {3, -2, 0}}});
+        const support::ConstantForce force(1e4);
+        const release::ReleaseProblem<double> problem{
+            hand, force, *model, {0.2, 5e-4}, {0, -9.81}, {0.1, 0.3, across}, 0, {}, 0};
+        const auto result =
+            simulate_release(problem, {.integrator = {.tolerances = {1e-10, 1e-12}, .record = true}});
+        const auto y = contact::Relative<double>::from(result.trajectory.at(0.15));
+        EXPECT_NEAR(y.angle, 0.3, 1e-12)
+            << law << ": in steady acceleration nothing moves: the pads carry the load already";
+        EXPECT_NEAR(y.arm.x, 0.1, 1e-12) << law << ' ' << turned;
+        EXPECT_NEAR(y.arm.z, across, 1e-12) << law << ' ' << turned;
+        const auto sample = sample_release(problem, result, 0.15);
+        EXPECT_NEAR(sample.wrench.fx, 0.2 * 3, 1e-9) << law << ' ' << turned;
+        EXPECT_NEAR(sample.wrench.fz, 0.2 * (9.81 - 2), 1e-9) << law << ' ' << turned;
+      }
 }
 
 TEST(PadComplianceTruth, AnObjectHeldOffItsCentreSwingsAboutThePads) {

@@ -193,6 +193,18 @@ TYPED_TEST(Shapes, DerivativesEqualDifferences) {
   }
 }
 
+// resist is of degree 0, so its slopes are of degree −1.
+TYPED_TEST(Shapes, SlopesAreHomogeneousAtAnyMagnitude) {
+  for (const Vec3<double>& u : {Vec3<double>{0.9, 1.2, 0.8}, {0.3, 0.4, -0.9}, {-1, 0.2, 0.1}}) {
+    const auto w = this->shape.resist(lifted<TypeParam>(u));
+    for (const double k : {1e-100, 1e-12, 3.0, 1e90}) {
+      const auto other = this->shape.resist(lifted<TypeParam>(scaled(u, k)));
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) EXPECT_NEAR(k * other[i].v[j], w[i].v[j], 1e-11) << text(u) << k;
+    }
+  }
+}
+
 TYPED_TEST(Shapes, ZeroAndNotANumber) {
   const Vec3<Dual> zero = lifted<TypeParam>({0, 0, 0});
   EXPECT_EQ(this->shape.gauge(zero).a, 0.0);

@@ -222,7 +222,7 @@ TEST(SmoothNormalForce, SlopeIsTheDerivative) {
 TEST(SmoothNormalForce, BiasIsReportedAndDoesNotMoveTheRelease) {
   std::mt19937_64 random(23);
   for (double bias : {0.3, -0.3}) {
-    double sum = 0.0;
+    double sum = 0.0, chi2 = 0.0, pulls = 0.0;
     for (int run = 0; run < 50; ++run) {
       const Log log =
           record([&](double t) { return ramp(t, 25.0, 0.0575, 0.055, 1.0) + bias; }, 0.05, random);
@@ -230,9 +230,13 @@ TEST(SmoothNormalForce, BiasIsReportedAndDoesNotMoveTheRelease) {
       expect_sound(fit, log);
       sum += fit.summary.release_time - 0.1125;
       EXPECT_NEAR(fit.summary.tail_mean, bias, 6.0 * fit.summary.tail_mean_sigma);
+      pulls += std::pow((fit.summary.tail_mean - bias) / fit.summary.tail_mean_sigma, 2) / 50;
+      chi2 += fit.summary.chi2_per_dof / 50;
       EXPECT_NEAR(fit.force.at(kAlways, 0.0), 25.0 + bias, 0.05);  // the grip is as measured
     }
     EXPECT_LT(std::abs(sum / 50), 0.1e-3);
+    EXPECT_NEAR(pulls, 1, 4 * std::sqrt(2.0 / 50)) << "the bias is known as well as it is said to be";
+    EXPECT_NEAR(chi2, 1, 0.1) << "force and bias together are the series: 311 samples, 50 times";
   }
   // A pad that keeps pressing is not a bias.
   const Log log = record([](double t) { return ramp(t, 20.0, 0.0575, 0.055, 1.0) + 5.0; }, 0.05, random);
@@ -594,6 +598,56 @@ TEST(SampledNormalForce, RefusesCoefficientsThatAreNoNumbers) {
   piece[1][0] = NAN;
   EXPECT_THROW(SampledNormalForce(SampledNormalForce::Polynomial({0.0, 1.0}, {piece}), {0.5}, 0.5),
                std::invalid_argument);
+}
+
+TEST(SampledNormalForce, IsNoneWhereTheCurveIsBelowZero) {
+  SampledNormalForce::Polynomial::Coefficients falling{};
+  falling[0][0] = 10, falling[1][0] = -100;  // zero at 0.1 s
+  const SampledNormalForce force(SampledNormalForce::Polynomial({0.0, 1.0}, {falling}), {0.1}, 0.1);
+  EXPECT_DOUBLE_EQ(force.at(kAlways, 0.04), 6);
+  EXPECT_EQ(force.at(kAlways, 0.3), 0);
+  const Dual pressed = force.at(kAlways, Dual(0.04, 2)), gone = force.at(kAlways, Dual(0.3, 2));
+  EXPECT_DOUBLE_EQ(pressed.a, 6);
+  EXPECT_NEAR(pressed.v[2], -100, 1e-12);
+  EXPECT_EQ(gone.a, 0);
+  EXPECT_EQ(gone.v[2], 0);
+}
+
+TEST(SampledNormalForce, RefusesKinksOutOfOrder) {
+  const auto message = [](std::vector<double> kinks) {
+    const SampledNormalForce::Polynomial::Coefficients none{};
+    return unhand::support::refusal([&] {
+      SampledNormalForce(SampledNormalForce::Polynomial({0.0, 1.0}, {none}), kinks, 0.5);
+    });
+  };
+  EXPECT_EQ(message({0.2, 0.5}), "accepted");
+  EXPECT_EQ(message({0.5, 0.2, 0.5}), "SampledNormalForce: kinks must increase");
+  EXPECT_EQ(message({0.5, 0.5}), "SampledNormalForce: kinks must increase");
+}
+
+/// f_N − b up to the start of the opening, f_N − b (t₁ − t)/(t₁ − t₀) while it opens, and never below zero.
+TEST(BiasedForce, FadesOutWhileThePadsOpen) {
+  constexpr double kStart = 0.03, kLength = 0.05, kRelease = kStart + kLength;
+  const ProfileNormalForce base(
+      OpeningProfile<Dual>{0.02, Dual(40.0), Dual(0.01), Dual(kLength, 1), Dual(1.3)});
+  for (const double bias : {2.0, -3.0}) {
+    const BiasedForce biased(base, Dual(bias, 0), kStart);
+    EXPECT_DOUBLE_EQ(biased.release_time(), kRelease);
+    EXPECT_DOUBLE_EQ(biased.at(kAlways, 0.01), 40 - bias);
+    EXPECT_EQ(biased.at(kAlways, 0.1), 0);
+    for (const double t : {0.035, 0.05, 0.06}) {
+      const double left = (kRelease - t) / kLength;
+      EXPECT_NEAR(biased.at(kAlways, t), base.at(kAlways, t) - bias * left, 1e-12) << t;
+      const Dual f = biased.at(kAlways, Dual(t));
+      EXPECT_NEAR(f.a, biased.at(kAlways, t), 1e-12);
+      EXPECT_NEAR(f.v[0], -left, 1e-12) << t;
+      EXPECT_NEAR(f.v[1], base.at(kAlways, Dual(t)).v[1] - bias * (t - kStart) / (kLength * kLength), 1e-9)
+          << t << ": by the release";
+    }
+  }
+  const BiasedForce more(base, Dual(50.0), kStart);  // than the pads press
+  for (const double t : {0.01, 0.035, 0.06}) EXPECT_EQ(more.at(kAlways, t), 0) << t;
+  EXPECT_EQ(more.at(kAlways, Dual(0.035, 0)).v[0], 0);
 }
 
 TEST(BiasedForce, AtTheWindowsEndHasTheLimitFromTheLeft) {

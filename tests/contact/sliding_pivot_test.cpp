@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 #include <string>
+#include <utility>
 
 #include "contact/slip_stop.hpp"
 #include "release/simulate_release.hpp"
@@ -201,6 +202,23 @@ TEST_F(Pivot, ABrakeThatBeginsAtRestIsOver) {
   EXPECT_EQ(between.y[4], 0.0);
 }
 
+TEST_F(Pivot, WhatTurnsWhileABrakeStopsGoesOnTurning) {
+  // The last 1e-8 m/s take a nanosecond or so, in which the object turns on and the arm moves half the way.
+  const auto entry = leave(kBrakePlus, kTranslation, at(0.1, 0, 1e-8, 3));
+  ASSERT_GT(entry.t, 0);
+  EXPECT_EQ(entry.y[4], 0);
+  EXPECT_NEAR(entry.y[2], 3 * entry.t, 1e-6 * 3 * entry.t);
+  EXPECT_NEAR(entry.y[1], 0.5e-8 * entry.t, 1e-6 * 0.5e-8 * entry.t);
+}
+
+TEST_F(Pivot, WithoutFrictionNothingEndsASlide) {
+  // Also where nothing is demanded: beside a hand in free fall.
+  world.now.normal_force = 0;
+  EXPECT_GT(guard(kSlide, kTranslation, at(0, 0.2)), 0);
+  world.now.hand_acceleration.ax = 3;
+  EXPECT_GT(guard(kSlide, kTranslation, at(0, 0.2)), 0);
+}
+
 TEST_F(Pivot, BothReadingsOfASlidesEnd) {
   // |f_p| grows beyond f_max again while the patch still slips.
   const SlidingPivot memoryless(patch, SlideEnd::memoryless);
@@ -210,6 +228,13 @@ TEST_F(Pivot, BothReadingsOfASlidesEnd) {
   world.now.hand_acceleration.ax = kForce / kMass * 1.5;
   const auto y = at(0, 0.2);
   EXPECT_EQ(leave(kBrake, kAgain, y, &memoryless).mode, kSlide);
+  double g[3];
+  memoryless.guards({kBrake, kWindow}, world, 0, y, g);
+  EXPECT_GT(g[kAgain], 0) << "half as much again is demanded as friction can";
+  const double demanded = std::exchange(world.now.hand_acceleration.ax, kForce / kMass * 0.9);
+  memoryless.guards({kBrake, kWindow}, world, 0, y, g);
+  EXPECT_LT(g[kAgain], 0);
+  world.now.hand_acceleration.ax = demanded;
   // after a time event the latched brake goes on, the memoryless one reads |f_p| anew
   EXPECT_EQ(model.membership(kBrake, kWindow, world, 0, y).mode, kBrake);
   EXPECT_EQ(memoryless.membership(kBrake, kWindow, world, 0, y).mode, kSlide);

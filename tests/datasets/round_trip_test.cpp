@@ -52,28 +52,49 @@ TEST(RoundTrip, OnlyWhatIsRequired) {
   EXPECT_TRUE(back.throws[0].mocap->is_valid(0));
 }
 
+/// The log, `later` [s] by its clock, written out instant by instant.
+ThrowLog later_by(ThrowLog log, double later) {
+  if (log.gripper && log.gripper->opening_command_time) *log.gripper->opening_command_time += later;
+  for (Throw& toss : log.throws) {
+    const auto shift = [&](Series& time) {
+      for (double& t : time.data) t += later;
+    };
+    if (toss.hand) shift(toss.hand->time);
+    if (toss.ft) shift(toss.ft->time);
+    if (toss.mocap) shift(toss.mocap->time);
+    if (toss.landing) shift(toss.landing->time);
+    if (toss.imu) shift(toss.imu->time);
+    if (toss.detach_time) *toss.detach_time += later;
+    if (toss.free_flight) toss.free_flight->first += later, toss.free_flight->second += later;
+    for (double& t : toss.hand_jump_times) t += later;
+  }
+  return log;
+}
+
 // Seconds since 1970: in memory they count from the first full second, in files they stay what they were.
 TEST(RoundTrip, AClockFarFromZero) {
   ThrowLog log = planar_log();
   for (const double epoch : {1.7e9, -3e6}) {
-    ThrowLog far = log;
-    for (Throw& toss : far.throws) move_clock(toss, -epoch);
-    if (far.gripper && far.gripper->opening_command_time) *far.gripper->opening_command_time += epoch;
+    const ThrowLog far = later_by(log, epoch);
     const ThrowLog back = reread(far);
     EXPECT_NEAR(back.clock_origin, epoch, 10);
     EXPECT_EQ(back.clock_origin, std::floor(back.clock_origin));
     const double shift = back.clock_origin - epoch;
+    EXPECT_NEAR(*back.gripper->opening_command_time + shift, *log.gripper->opening_command_time, 2.4e-7);
     for (std::size_t k = 0; k < log.throws.size(); ++k) {
       const auto near = [&](double now, double before) { EXPECT_NEAR(now + shift, before, 2.4e-7) << k; };
       const Throw &a = back.throws[k], &b = log.throws[k];
       ASSERT_EQ(a.id, b.id);
+      if (b.ft)
+        for (std::size_t i = 0; i < b.ft->time.rows; ++i) near(a.ft->time(i), b.ft->time(i));
       if (b.hand)
         for (std::size_t i = 0; i < b.hand->time.rows; ++i) near(a.hand->time(i), b.hand->time(i));
       if (b.mocap)
         for (std::size_t i = 0; i < b.mocap->time.rows; ++i) near(a.mocap->time(i), b.mocap->time(i));
       if (b.landing) near(a.landing->time(0), b.landing->time(0));
       if (b.detach_time) near(*a.detach_time, *b.detach_time);
-      if (b.free_flight) near(a.free_flight->first, b.free_flight->first);
+      if (b.free_flight)
+        near(a.free_flight->first, b.free_flight->first), near(a.free_flight->second, b.free_flight->second);
       for (std::size_t i = 0; i < b.hand_jump_times.size(); ++i)
         near(a.hand_jump_times[i], b.hand_jump_times[i]);
     }
@@ -283,6 +304,28 @@ TEST(Reading, NormalisesQuaternionsOnce) {
   EXPECT_EQ(reread(once), once);
 }
 
+TEST(Reading, LeavesLostOrientationsAsTheyAre) {
+  ThrowLog log = spatial_log();
+  MocapLog& track = *log.throws[0].mocap;
+  track.valid.assign(track.time.rows, 1);
+  track.valid[4] = 0;
+  for (std::size_t j = 3; j < 7; ++j) track.pose(4, j) = 2;  // of norm 4: what a tracker left there
+  const ThrowLog back = reread(log);
+  for (std::size_t j = 3; j < 7; ++j) EXPECT_EQ(back.throws[0].mocap->pose(4, j), 2);
+}
+
+TEST(ThrowLog, ConditionsAreThoseOfTheSplit) {
+  ThrowLog log = planar_log();
+  log.throws[0].condition = "a", log.throws[0].split = Split::train;
+  log.throws[1].condition = "b", log.throws[1].split = Split::test;
+  log.throws.push_back(log.throws[0]);
+  using Conditions = std::vector<std::pair<std::string, std::string>>;
+  const std::string object = log.throws[0].object;
+  EXPECT_EQ(conditions_of(log, Split::train), (Conditions{{object, "a"}}));
+  EXPECT_EQ(conditions_of(log, Split::test), (Conditions{{log.throws[1].object, "b"}}));
+  EXPECT_EQ(conditions_of(log), (Conditions{{object, "a"}, {log.throws[1].object, "b"}}));
+}
+
 // Writing
 
 TEST(Writing, RefusesWhatReadingWouldRefuseAndLeavesNothing) {
@@ -297,6 +340,9 @@ TEST(Writing, RefusesWhatReadingWouldRefuseAndLeavesNothing) {
   expect([](ThrowLog& l) { l.throws[1].hand->twist(3, 1) = std::nan(""); }, "/throws/002/hand/twist",
          "row 3, column vz");
   expect([](ThrowLog& l) { l.throws[1].id = "001"; }, "/throws/001", "used twice");
+  expect([](ThrowLog& l) { l.throws[1].mocap->valid[3] = 2; }, "/throws/002/mocap/valid",
+         "row 3: 2 is not 0 or 1");
+  expect([](ThrowLog& l) { l.title = "half a pair: \xed\xa0\x80"; }, "/@title", "is not UTF-8 text");
   expect([](ThrowLog& l) { l.throws[1].id = "a/b"; }, "/throws", "cannot name a group");
   expect([](ThrowLog& l) { l.throws[1].id = ""; }, "/throws", "cannot name a group");
   expect([](ThrowLog& l) { l.throws.clear(); }, "/throws", "is empty");

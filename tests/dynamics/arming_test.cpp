@@ -92,6 +92,20 @@ TEST_P(Arming, AnEvenRootIsAGrazingAndNotAnEvent) {
     }
 }
 
+TEST_P(Arming, APeakOfRoundingOnlyTouches) {
+  // 1e-7 of what the guard changes by from sample to sample: at a sample (there are four in 0.03 s) or
+  // between two.
+  auto o = options();
+  o.longest_step = o.guard_interval = 0.03;
+  for (const double touch : {0.51, 0.52, 0.53, 0.54, 0.515, 0.5271}) {
+    const auto clock = until_guard(
+        {{"touch", Crossing::rising}}, still(),
+        [touch](int, const auto& t, const auto&, auto* g) { g[0] = 1e-11 - (t - touch) * (t - touch); },
+        FlowKind::frozen);
+    EXPECT_EQ(run(clock, {1.0, 0.0}, 1.0, o).outcome, Outcome::horizon) << touch;
+  }
+}
+
 TEST_P(Arming, ANormAsAGuardEndsTyped) {
   // |v| of a decelerating slip: never negative, so it never fires, and the kink is no false event either.
   const auto slip = until_guard(
@@ -163,6 +177,23 @@ TEST_P(Arming, SimultaneousGuardsComeInTheOrderOfTheirIndices) {
   EXPECT_EQ(end.events[1].index, 1);
   EXPECT_NEAR(end.events[0].t, std::asin(0.5), kEventTime);
   EXPECT_NEAR(end.events[1].t, std::asin(0.5), kEventTime);
+}
+
+TEST_P(Arming, OfTwoGuardsInOneStepTheEarlierFires) {
+  // Whichever comes first in the list.
+  for (const double apart : {1e-3, 1e-5, 1e-7})
+    for (const bool listed_first : {true, false}) {
+      const double first = 0.50123, second = first + apart;
+      const auto clock = until_guard({{"a", Crossing::rising}, {"b", Crossing::rising}}, still(),
+                                     [=](int, const auto& t, const auto&, auto* g) {
+                                       g[listed_first ? 0 : 1] = t - first;
+                                       g[listed_first ? 1 : 0] = t - second;
+                                     });
+      const auto end = run(clock, {1.0, 0.0}, 1.0, options());
+      ASSERT_EQ(end.events.size(), 1u);
+      EXPECT_EQ(end.events[0].index, listed_first ? 0 : 1) << apart;
+      EXPECT_NEAR(end.t, first, kEventTime) << apart;
+    }
 }
 
 TEST_P(Arming, AGuardPastItsRootAtTheStartWaitsForItsSafeSide) {

@@ -60,6 +60,15 @@ TEST_P(Derivatives, TheRestTimeOfAZenoBallIsDifferentiable) {
   const Dual expected = sqrt(2.0 * h / g) * (1.0 + e) / (1.0 - e);
   // The last flight's length, 1e-8 s, is known to 1e-15 s; the tail's derivative divides by it once.
   for (int k = 0; k < 3; ++k) EXPECT_NEAR(end.events.back().t.v[k], expected.v[k], 1e-6) << k;
+  // The tail may be most of the time, and all of its derivative.
+  auto o = options();
+  o.zeno_tolerance = 1e30;
+  const auto early = integrate<Dual, 2>(bouncing_ball(g, e),
+                                        Entry<Dual, 2>{0, Dual(0), {h, Dual(0)}, Dual(0)}, Dual(3.0), o);
+  ASSERT_EQ(early.events.back().kind, EventKind::limit);
+  EXPECT_LT(early.events.size(), 10u);
+  EXPECT_NEAR(early.events.back().t.a, expected.a, 1e-8);
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(early.events.back().t.v[k], expected.v[k], 1e-6) << k;
 }
 
 /// x'' = −c x' − k x until x falls through `level`, then y -> R y + offset and x'' = b for the rest: every
@@ -153,6 +162,24 @@ TEST_P(Derivatives, ARecordedTrajectoryHasTheDerivativesAtAFixedTime) {
     const auto y = end.trajectory.at(Dual(hit - before));
     EXPECT_NEAR(y[0].v[0], 1.0, 1e-9) << before;
     EXPECT_NEAR(y[1].v[0], 0.0, 1e-9) << before;
+  }
+}
+
+TEST_P(Derivatives, AHorizonThatMovesDoesNotShowBeforeIt) {
+  // A fall recorded up to an end that is a parameter: its last step moves with it, the fall itself does not.
+  auto o = options();
+  o.record = true;
+  const Dual last = independent(0.3, 0);
+  const auto fall = free_flow(free_fall());
+  const auto end =
+      integrate<Dual, 2>(fall, Entry<Dual, 2>{0, Dual(0), {Dual(1), Dual(0.5)}, Dual(0)}, last, o);
+  EXPECT_NEAR(end.y[0].v[0], 0.5 - kGravity * 0.3, 1e-9);
+  for (const double t : {0.1, 0.29, 0.2999}) {
+    const auto y = end.trajectory.at(Dual(t, 1));
+    EXPECT_NEAR(y[0].a, 1 + 0.5 * t - 0.5 * kGravity * t * t, 1e-9) << t;
+    EXPECT_NEAR(y[0].v[0], 0, 1e-9) << t;
+    EXPECT_NEAR(y[1].v[0], 0, 1e-9) << t;
+    EXPECT_NEAR(y[0].v[1], 0.5 - kGravity * t, 1e-7) << t;
   }
 }
 

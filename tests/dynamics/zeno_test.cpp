@@ -76,6 +76,13 @@ TEST_P(Zeno, AHorizonBeforeTheLimitIsReachedInFlight) {
     EXPECT_EQ(end.mode, 0) << before;
     EXPECT_GE(end.y[0], -1e-12) << before;
   }
+  // Nor is it passed where a limit may be jumped to from afar.
+  auto o = options();
+  o.zeno_tolerance = 1e30;
+  const auto end = run(bouncing_ball(Dual(kGravity), Dual(0.9)), {1.0, 0.0}, limit - 1.0, o);
+  EXPECT_EQ(end.outcome, Outcome::horizon);
+  EXPECT_EQ(end.t, limit - 1.0);
+  EXPECT_EQ(end.mode, 0);
 }
 
 TEST_P(Zeno, IntervalsThatShrinkLikeAPowerAreNotJumped) {

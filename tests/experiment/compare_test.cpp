@@ -120,6 +120,49 @@ TEST(Conditions, OfTwoObjectsAreNotPooled) {
   EXPECT_NEAR(box.bias - bar.bias, -0.5, 1e-12);  // predicted less measured
 }
 
+TEST(Judge, ErrorsArePredictedLessMeasuredInDegrees) {
+  PreparedThrow prepared = Known(testing_support::perfect()).prepared.front();
+  prepared.measured.detach_twist = dynamics::Twist<double>{1.5, 0.3, 4};
+  prepared.measured.landing_x = 1.2, prepared.measured.landing_theta = 2;
+  Prediction prediction;
+  prediction.release = release::ReleaseOutcome::detached;
+  prediction.detach.twist = {1.4, 0, 4.5};
+  prediction.landing.pose = {1.3, 0, 1.9};
+  EXPECT_FALSE(judge(prepared, prediction).error[2]) << "it does not land";
+  prediction.flight = flight::FlightOutcome::landed;
+  const auto judged = judge(prepared, prediction);
+  constexpr double kDegree = 180 / 3.14159265358979;
+  EXPECT_NEAR(*judged.error[0], -0.1, 1e-12);
+  EXPECT_NEAR(*judged.error[1], 0.5 * kDegree, 1e-9);
+  EXPECT_NEAR(*judged.error[2], 0.1, 1e-12);
+  EXPECT_NEAR(*judged.error[3], -0.1 * kDegree, 1e-9);
+}
+
+TEST(Compare, CountsTheThrowsThatTheModelDoesNotLand) {
+  Known known(testing_support::perfect());
+  CompareOptions options;
+  options.models = {"gripper_delay"};
+  options.parameters["gripper_delay"] = {};
+  EXPECT_EQ(compare(known.log, known.prepared, options).models.front().failed, 0);
+  known.prepared[1].landing_height = known.prepared[4].landing_height = 1e3;
+  EXPECT_EQ(compare(known.log, known.prepared, options).models.front().failed, 2);
+}
+
+TEST(FrictionEstimate, KnowsNothingOfTheTestThrows) {
+  Known known(testing_support::perfect());
+  const auto before = estimate_friction(known.log, known.prepared, "limit_surface_disc");
+  int held_out = 0;
+  for (auto& one : known.log.throws)
+    if (one.split == datasets::Split::test) {
+      for (double& x : one.ft->wrench.data) x *= 2;
+      ++held_out;
+    }
+  ASSERT_GT(held_out, 0);
+  const auto after = estimate_friction(known.log, known.prepared, "limit_surface_disc");
+  EXPECT_EQ(after.parameters.mu, before.parameters.mu);
+  EXPECT_EQ(after.samples, before.samples);
+}
+
 TEST(FrictionEstimate, OfOneWrenchDirectionIsNoPatch) {
   FrictionEstimate estimate;
   estimate.samples = 24;

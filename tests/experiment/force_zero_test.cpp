@@ -29,6 +29,15 @@ TEST(ForceZero, TheLevelAfterThePadsHavePartedIsTheSensors) {
   }
 }
 
+// What is plain in the noise may be too little of the grip to matter.
+TEST(ForceZero, AThousandthOfTheGripIsNotTold) {
+  const double grip = untared_force(offset_log(1))->grip;
+  for (const double sign : {1.0, -1.0}) {
+    EXPECT_FALSE(untared_force(offset_log(sign * 0.001 * grip)));
+    EXPECT_TRUE(untared_force(offset_log(sign * 0.01 * grip)));
+  }
+}
+
 // A sensor whose zero drifts between throws, about zero.
 TEST(ForceZero, ZerosThatScatterFromThrowToThrowAreNoCommonOne) {
   int told = 0;

@@ -39,6 +39,22 @@ TEST(LandingNoise, IsTheSensorsWhereMotionCaptureSawTheLanding) {
   EXPECT_NEAR(landing_noise(log).x.value(), *noise.x, 1e-9);
 }
 
+// Two objects may be thrown under conditions of one name: what differs between them is no noise.
+TEST(LandingNoise, ObjectsAreNotPooled) {
+  auto log = unsure(true);
+  const auto before = landing_noise(log);
+  const std::string first = log.throws.front().object;
+  int others = 0;
+  for (auto& one : log.throws) {
+    one.condition = one.condition.substr(one.condition.find('/'));
+    if (one.object == first) continue;
+    one.landing->pose(0, 0) += 0.1;  // as its frame, or its size
+    ++others;
+  }
+  ASSERT_GT(others, 0);
+  EXPECT_NEAR(landing_noise(log).x.value(), *before.x, 1e-9);
+}
+
 TEST(LandingNoise, IsWhatThrowsDifferByWhereNothingElseTells) {
   const auto noise = landing_noise(unsure(false));
   EXPECT_GT(noise.x.value(), kSensors.landing_sigma[0]);

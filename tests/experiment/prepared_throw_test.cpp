@@ -188,6 +188,35 @@ TEST(PreparedThrow, TheGraspIsWhatMotionCaptureSaw) {
   }
 }
 
+/// An object whose x axis points backwards lies behind the pads along it.
+TEST(PreparedThrow, ACentreOfMassBehindThePadsIsSeenThere) {
+  const CampaignDesign design = campaign_design("quick12");
+  datasets::ThrowLog log = campaign_header(design, 1);
+  log.throws = {generate_throw(design, 1, 3).record};
+  for (auto& [name, object] : log.objects) object.com_offset.reset();
+  const auto ahead = prepare(log, log.throws[0], "(in memory)").grasp;
+  auto& pose = log.throws[0].mocap->pose;
+  for (std::size_t i = 0; i < pose.rows; ++i) pose(i, 2) += 3.14159265358979312;
+  const auto behind = prepare(log, log.throws[0], "(in memory)").grasp;
+  EXPECT_GT(ahead.com_offset, 0.05);
+  EXPECT_NEAR(behind.com_offset, -ahead.com_offset, 1e-12);
+  EXPECT_NEAR(behind.angle, ahead.angle + 3.14159265358979312, 1e-12);
+}
+
+/// Where the track goes on after the landing, frames that may be after it, by 3 σ of its time, are no flight.
+TEST(PreparedThrow, AFlightEndsBeforeItsLandingMayHaveBeen) {
+  const CampaignDesign design = campaign_design("quick12");
+  datasets::ThrowLog log = campaign_header(design, 1);
+  auto [record, truth] = generate_throw(design, 1, 3);
+  const double landed = record.mocap->time(record.mocap->time.rows - 1);
+  record.landing->time.data = {landed}, record.landing->time.sigma = {0.004};
+  EXPECT_NEAR(flight_end(log, record, 0), landed, 1e-6) << "nothing comes after it";
+  track(*record.mocap, landed + 0.02, {0, log.landing_height + 1, 0});
+  EXPECT_NEAR(flight_end(log, record, 0), landed - 3 * 0.004, 1e-6);
+  record.landing->time.sigma.clear();
+  EXPECT_NEAR(flight_end(log, record, 0), landed, 1e-6);
+}
+
 /// A sensor that was not tared reads an eighth of the grip after the pads have parted. That they have, only
 /// the rest of the log can tell.
 TEST(PreparedThrow, TheReleaseInAnUntaredForceIsSeenWhereTheObjectFlew) {

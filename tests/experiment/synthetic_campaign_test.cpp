@@ -51,6 +51,44 @@ TEST(SyntheticCampaign, ThrowFlipsLandFromBelowHalfAFlipToBeyondAFullOne) {
   EXPECT_GT(most, 2 * M_PI);
 }
 
+/// Throws that all are as they were meant.
+constexpr ThrowVariation kNone{0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+
+/// A hand that is turned moves in a direction that is turned as much, and as fast.
+TEST(SyntheticCampaign, ATurnedHandMovesInATurnedDirection) {
+  CampaignDesign design = testing_support::perfect();
+  design.variation = kNone;
+  design.variation.hand_angle = 0.02;
+  double turned = 0;
+  for (int i = 0; i < design.throws(); ++i) {
+    const auto motion = generate_throw(design, 3, i).truth.motion;
+    bool found = false;
+    for (const Posture& posture : design.postures) {
+      const double by = motion.pose.theta - posture.hand.theta;
+      if (motion.pose.x != posture.hand.x || std::abs(by) > 0.1) continue;
+      found = true;
+      turned = std::max(turned, std::abs(by));
+      EXPECT_NEAR(std::hypot(motion.twist.vx, motion.twist.vz), posture.speed, 1e-12);
+      EXPECT_NEAR(std::atan2(motion.twist.vz, motion.twist.vx), posture.elevation + by, 1e-12);
+    }
+    EXPECT_TRUE(found) << i;
+  }
+  EXPECT_GT(turned, 0.01);
+}
+
+TEST(SyntheticCampaign, FrictionScattersAsTheDesignSays) {
+  CampaignDesign design = testing_support::perfect();
+  design.variation = kNone;
+  design.variation.mu = 0.05;
+  double mean = 0, square = 0;
+  const int n = design.throws();
+  for (int i = 0; i < n; ++i) mean += generate_throw(design, 3, i).truth.patch.mu / design.patch.mu / n;
+  for (int i = 0; i < n; ++i)
+    square += std::pow(generate_throw(design, 3, i).truth.patch.mu / design.patch.mu - mean, 2) / (n - 1);
+  EXPECT_NEAR(mean, 1, 4 * 0.05 / std::sqrt(n));
+  EXPECT_NEAR(std::sqrt(square), 0.05, 4 * 0.05 / std::sqrt(2.0 * n));
+}
+
 TEST(SyntheticCampaign, ThrowsDoNotDependOnTheirOrder) {
   const CampaignDesign design = campaign_design("quick12");
   const ThrowLog log = generate_campaign(design, kSeed);

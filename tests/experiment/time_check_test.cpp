@@ -52,6 +52,18 @@ TEST(TimeCheck, ALandingBeforeTheOpeningIsTold) {
   EXPECT_THAT(notes[0].said, HasSubstr("not after the gripper's opening at "));
 }
 
+TEST(TimeCheck, ALandingAtTheOpeningIsNoneAfterIt) {
+  auto log = small_log();
+  log.throws[1].landing->time.data = {*log.gripper->opening_command_time};
+  EXPECT_THAT(impossible_times(log), ElementsAre(note("/throws/" + log.throws[1].id + "/landing/time", 1)));
+}
+
+TEST(TimeCheck, TimesBeforeTheHandBeginsAreToldToo) {
+  auto log = small_log();
+  log.throws[2].detach_time = log.throws[2].hand->time(0) - 0.5;
+  EXPECT_THAT(impossible_times(log), ElementsAre(note("/throws/" + log.throws[2].id + "@detach_time", 1)));
+}
+
 // As the file counts: a log whose clock began in 1970 was moved when it was read.
 TEST(TimeCheck, ClocksThatShareNoTimeAreTold) {
   for (const double off : {10.0, -10.0, 1.7e9}) {

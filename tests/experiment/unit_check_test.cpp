@@ -10,6 +10,7 @@
 #include <numbers>
 #include <tuple>
 
+#include "experiment/declared_check.hpp"
 #include "experiment/random_stream.hpp"
 #include "tests/support/data_folder.hpp"
 #include "tests/support/small_campaign.hpp"
@@ -534,6 +535,25 @@ TEST(UnitCheck, NoBodyOfItsMassAndSizeHasSuchAnInertia) {
   for (const auto& doubt : unit_doubts(log)) EXPECT_EQ(doubt.path.find("@inertia"), std::string::npos);
   object.inertia->front() = 1.2 * most;
   EXPECT_THAT(only_doubt(log).reason, HasSubstr("within its dims"));
+}
+
+// Of all bodies of a mass that fit into a length, a thin rod of the densest element turns most easily, about
+// itself: I = m r²/2 with m = ρ π r² l.
+TEST(UnitCheck, ARodOfOsmiumHasTheLeastInertia) {
+  const double mass = 0.2, length = 0.5, square = mass / (22600 * std::numbers::pi * length);
+  const auto range = gyration_range(mass, length);
+  EXPECT_NEAR(range.least, 0.5 * square, 1e-12 * square);
+  EXPECT_NEAR(range.most, 0.25 * length * length, 1e-15) << "two halves at the ends";
+}
+
+TEST(UnitCheck, ALeverInMillimetresShowsOnEitherSideOfThePads) {
+  auto log = campaign();
+  for (auto& [name, object] : log.objects) *object.com_offset *= -1000;  // and the x axis points backwards
+  for (auto& one : log.throws) {
+    for (std::size_t i = 0; i < one.mocap->pose.rows; ++i) one.mocap->pose(i, 2) += std::numbers::pi;
+    one.landing->pose(0, 1) += std::numbers::pi;
+  }
+  expect_refused(log, AllOf(HasSubstr("@com_offset"), HasSubstr("mm for m")));
 }
 
 TEST(UnitCheck, NoPadIsLargerThanWhatItHolds) {

@@ -94,6 +94,18 @@ TEST(AirEffects, WindWithoutDragOrLiftIsNothing) {
   EXPECT_EQ(calm, windy);
 }
 
+TEST(AirEffects, EachIsTheFlightsTerm) {
+  const std::vector<std::string> names{"flight.quadratic_drag.k", "flight.magnus_lift.k_m", "flight.wind.w_x",
+                                       "flight.wind.w_z"};
+  const std::vector<double> values{0.03, 0.02, 1.3, -0.7};
+  Air<double> air;
+  dynamics::apply_effects(air_effects(), dynamics::Values<double>(names, values), air);
+  EXPECT_EQ(air.extra_drag, 0.03);
+  EXPECT_EQ(air.lift, 0.02);
+  EXPECT_EQ(air.wind.x, 1.3);
+  EXPECT_EQ(air.wind.z, -0.7);
+}
+
 TEST(GravityTilt, TurnsGravityAlone) {
   dynamics::Gravity<double> gravity;
   EXPECT_EQ(gravity.at(9.81).x, 0);

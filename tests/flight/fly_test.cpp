@@ -119,6 +119,17 @@ TEST(Projectile, NeverReachesAHeightAboveItsApex) {
   }
 }
 
+TEST(Projectile, AFlightThatTakesTooLongReachesNothing) {
+  Problem p = thrown(1.2, 3.0);
+  const double t = (3 + std::sqrt(9 + 2 * g * 1.2)) / g;
+  for (const bool closed : {true, false}) {
+    p.longest = 1.001 * t;
+    EXPECT_EQ(fly(closed ? p : by_integrator(p)).outcome, FlightOutcome::landed) << closed;
+    p.longest = 0.999 * t;
+    EXPECT_EQ(fly(closed ? p : by_integrator(p)).outcome, FlightOutcome::never_reaches) << closed;
+  }
+}
+
 TEST(Projectile, AtTheHeightItself) {
   EXPECT_NEAR(fly(thrown(0, 2)).landing.flight_time, 4 / g, 1e-15);
   EXPECT_NEAR(fly(by_integrator(thrown(0, 2)), kTight).landing.flight_time, 4 / g, 1e-10);
@@ -259,6 +270,44 @@ TEST(TrackedPoint, LandsInsteadOfTheCentreOfMass) {
     EXPECT_NEAR(landing.pose.x, at.pose.x + d.x, 1e-10) << n;
     EXPECT_NEAR(landing.twist.vx, at.twist.vx - p.twist.omega * d.z, 1e-9) << n;
     EXPECT_NEAR(landing.twist.vz, at.twist.vz + p.twist.omega * d.x, 1e-9) << n;
+  }
+}
+
+TEST(TrackedPoint, LandsThoughTheCentreOfMassIsBelowTheHeight) {
+  // Without spin the point falls as the object does: from 0.1 m above the height, with the CoM 0.05 m below.
+  for (const double vz : {0.0, 1.0}) {
+    Problem p = thrown(-0.05, vz);
+    p.twist.omega = 0;
+    p.tracked = dynamics::rotate(-p.pose.theta, Vec2<double>{0.03, 0.15});
+    const auto result = fly(p, kTight);
+    ASSERT_EQ(result.outcome, FlightOutcome::landed) << vz;
+    EXPECT_NEAR(result.landing.flight_time, (vz + std::sqrt(vz * vz + 2 * g * 0.1)) / g, 1e-10) << vz;
+    // and the other way round: the point starts below the height, and passes it upwards first
+    p.pose.z = 0.05, p.twist.vz = 2;
+    p.tracked = dynamics::rotate(-p.pose.theta, Vec2<double>{0.03, -0.15});
+    const auto risen = fly(p, kTight);
+    ASSERT_EQ(risen.outcome, FlightOutcome::landed);
+    EXPECT_NEAR(risen.landing.flight_time, (2 + std::sqrt(4 - 2 * g * 0.1)) / g, 1e-10);
+  }
+}
+
+TEST(TrackedPoint, AFastSpinHidesNoPassage) {
+  // Half a turn takes 5 to 15 ms.
+  std::mt19937_64 random(8);
+  std::uniform_real_distribution<double> height(0.3, 1), speed(-1, 3), spin(200, 600);
+  for (int n = 0; n < 12; ++n) {
+    Problem p = thrown(height(random), speed(random));
+    p.twist.omega = (n % 2 ? 1 : -1) * spin(random);
+    p.tracked = {0.1, -0.06};
+    const auto z = [&](double t) {
+      const auto com = ballistic(p.pose, p.twist, p.gravity, t).pose;
+      return com.z + dynamics::rotate(com.theta, p.tracked).z;
+    };
+    double t = 0;
+    while (!(z(t) > 0 && z(t + 1e-5) <= 0)) t += 1e-5;
+    const auto result = fly(p, kTight);
+    ASSERT_EQ(result.outcome, FlightOutcome::landed) << n;
+    EXPECT_NEAR(result.landing.flight_time, t + 5e-6, 6e-6) << n << " omega " << p.twist.omega;
   }
 }
 

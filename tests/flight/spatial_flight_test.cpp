@@ -166,6 +166,20 @@ TEST(SpatialFlight, ADyingSpinIsAFreeOneOnASlowerClock) {
   expect_near(damped.omega, scaled(std::exp(-c * t), free.omega), kSame, "spin");
 }
 
+TEST(SpatialFlight, ASpheresDyingSpinKeepsItsAxis) {
+  // ω' = −c ω: it has turned by |ω₀| (1 − exp(−c t))/c about ω₀, also where all moments of inertia are alike.
+  const double c = 1.6, t = 0.9;
+  LetGo ball = kStart;
+  ball.inertia = {2e-3, 2e-3, 2e-3};
+  OpenAir air;
+  air.spin_damping = c;
+  const auto damped = at(ball, air, t).rotation;
+  const auto& from = kStart.rotation;
+  const auto turned = from.attitude * exp(scaled((1 - std::exp(-c * t)) / c, from.omega));
+  expect_near(rotation_between(damped.attitude, turned), {0, 0, 0}, kSame, "attitude");
+  expect_near(damped.omega, scaled(std::exp(-c * t), from.omega), kSame, "spin");
+}
+
 TEST(SpatialFlight, DerivativesAreCentralDifferences) {
   constexpr int kInputs = 8;
   const double t = 0.8;

@@ -207,6 +207,39 @@ TEST(Contracts, SamplesAreOfRecordedInstants) {
     EXPECT_THROW(release::sample_release(p, result, t), std::out_of_range) << t;
 }
 
+TEST(Contracts, ASamplesDerivativeByTimeIsItsMotion) {
+  const auto hand = release::PolynomialHand::segments(0, {0.5, 0.9, 0.8}, {1.8, 1.8, 2.0},
+                                                      {{0.2, {3, -2, 40}, {50, 0, 0}}});
+  const Claimed force(0.1, 0.1);
+  const Odd law;
+  auto p = problem<Dual>(hand, force, law);
+  p.slip = {Dual(0.1), Dual(-0.2)};
+  p.spin = Dual(3);
+  release::ReleaseOptions options;
+  options.integrator = support::tight(1e-9, 1e-11);
+  options.integrator.record = true;
+  const auto result = release::simulate_release(p, options);
+  for (const double t : {0.013, 0.05, 0.087}) {
+    const auto at = release::sample_release(p, result, Dual(t, 0));
+    EXPECT_NEAR(at.pose.x.v[0], at.twist.vx.a, 1e-6) << t;
+    EXPECT_NEAR(at.pose.z.v[0], at.twist.vz.a, 1e-6) << t;
+    EXPECT_NEAR(at.pose.theta.v[0], at.twist.omega.a, 1e-6) << t;
+    // Newton's law for the rate of the twist
+    EXPECT_NEAR(at.twist.vx.v[0], at.wrench.fx.a / 0.4, 1e-4) << t;
+    EXPECT_NEAR(at.twist.vz.v[0], at.wrench.fz.a / 0.4 - 9.81, 1e-4) << t;
+  }
+}
+
+TEST(Contracts, AReleaseAtTheEndOfTheHandsMotionCounts) {
+  const auto hand = support::still_hand(0.1);
+  const Odd law;
+  const auto at_the_end = release::simulate_release(problem<double>(hand, Claimed(0.1, 0.1), law));
+  EXPECT_EQ(at_the_end.outcome, release::ReleaseOutcome::detached);
+  EXPECT_EQ(at_the_end.detach.time, 0.1);
+  const auto later = release::simulate_release(problem<double>(hand, Claimed(0.1001, 0.1001), law));
+  EXPECT_EQ(later.outcome, release::ReleaseOutcome::never_separated);
+}
+
 TEST(Contracts, ErrorsSayWhatIsNotFinite) {
   const auto hand = support::still_hand(0.2);
   const Claimed force(0.1, 0.1);

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "contact/contact_model.hpp"
 #include "tests/support/best_difference.hpp"
@@ -142,6 +143,28 @@ TEST(LaggedHand, RefusesTimesOutOfRange) {
   EXPECT_THROW(DelayedForce(force, Dual(2)), std::invalid_argument);
 }
 
+/// 40 N up to 0.1 s, where it drops: the window says on which side.
+class DroppingForce final : public contact::NormalForce {
+ public:
+  double at(const Window& w, double) const override { return 0.5 * (w.begin + w.end) < 0.1 ? 40 : 0; }
+  Dual at(const Window& w, const Dual& t) const override { return Dual(at(w, t.a)); }
+  void kinks(std::vector<double>& out) const override { out.push_back(0.1); }
+  void kinks(std::vector<Dual>& out) const override { out.push_back(Dual(0.1)); }
+  double release_time() const override { return 0.1; }
+};
+
+TEST(DelayedForce, DropsWhereItsWindowsMeet) {
+  const DroppingForce base;
+  for (const double delay : {-0.04, 0.03}) {
+    const DelayedForce late(base, Dual(delay));
+    const double drop = 0.1 + delay;
+    EXPECT_EQ(late.at({drop - 0.02, drop}, drop), 40) << delay;
+    EXPECT_EQ(late.at({drop, drop + 0.02}, drop), 0) << delay;
+    EXPECT_EQ(late.at({drop - 0.02, drop}, Dual(drop)).a, 40) << delay;
+    EXPECT_EQ(late.at({drop, drop + 0.02}, Dual(drop)).a, 0) << delay;
+  }
+}
+
 TEST(DelayedForce, IsTheForceOfAnEarlierInstant) {
   const contact::ProfileNormalForce base(contact::OpeningProfile<double>{0.02, 20, 0.005, 0.04, 1.3});
   for (const double delay : {-0.007, 0.004}) {
@@ -165,6 +188,9 @@ TEST(DelayedForce, IsTheForceOfAnEarlierInstant) {
     // limits from both sides of the shifted kink
     const double kink = kinks.front();
     EXPECT_NEAR(late.at({0, kink}, kink), late.at({kink, 1}, kink), 1e-12);
+    // of the slope, too: flat before the ramp and f₀ p/T steep after it
+    EXPECT_EQ(late.at({0, kink}, Dual(kink, 1)).v[1], 0);
+    EXPECT_NEAR(late.at({kink, 1}, Dual(kink, 1)).v[1], -20 * 1.3 / 0.04, 1e-6);
   }
 }
 

@@ -9,6 +9,7 @@
 #include "contact/disc_friction.hpp"
 #include "contact/registry.hpp"
 #include "crosscheck/distributed_patch.hpp"
+#include "tests/support/best_difference.hpp"
 #include "tests/support/effect_releases.hpp"
 
 namespace unhand {
@@ -157,6 +158,71 @@ TEST(GivingPoints, ThrowAsManyBristlesDo) {
       EXPECT_LT(distance(finer.detach.twist, many.detach.twist), 5e-5) << slip << ' ' << loss;
       EXPECT_LT(distance(ours.detach.twist, finer.detach.twist), 2e-4) << slip << ' ' << loss;
     }
+}
+
+// Their friction depends on how fast each of them slips, as in the rigid disc: a spin that viscous pads stop.
+TEST(GivingPoints, StiffPadsSlowASpinAsTheRigidDiscDoes) {
+  const auto hand = support::still_hand(0.01);
+  const support::ConstantForce force(kNormal);
+  const auto spun = [&](double compliance, double viscous) {
+    contact::ContactParameters<double> p;
+    p.patch = {kMu, kRadius};
+    p.variation.compliance = compliance;
+    p.variation.viscous = viscous;
+    const auto model = contact::make_contact_model("limit_surface_disc", p);
+    return simulate_release(
+               release::ReleaseProblem<double>{
+                   hand, force, *model, {0.15, 5e-5}, {0, 0}, {0, 0}, 0.0, {}, 40.0},
+               {.integrator = {.tolerances = {1e-7, 1e-10}}})
+        .relative.spin;
+  };
+  const double rigid = spun(0, 5), coulomb = spun(0, 0);
+  EXPECT_GT(coulomb - rigid, 3) << "rad/s that the growth with speed makes";
+  EXPECT_NEAR(spun(1e-9, 5), rigid, 0.02);
+  EXPECT_NEAR(spun(1e-9, 0), coulomb, 0.02);
+}
+
+// By all that the pads are made of, and by when they open: central differences of whole releases.
+TEST(GivingPoints, CarryDerivativesOfPadsAndOpening) {
+  constexpr int kCount = 7;
+  constexpr const char* kNames[kCount] = {"mu",       "radius",       "exponent", "compliance",
+                                          "softness", "opening_time", "loss_time"};
+  const std::array<double, kCount> at{0.5, kRadius, 0.4, 2e-5, 0.3, 0.05, 3e-3};
+  const Launch launch;
+  const auto detached = [&]<class S>(const std::array<S, kCount>& x) {
+    contact::OpeningProfile<S> opening;
+    opening.open_command = 0.04, opening.grip_force = S(kNormal), opening.dead_time = S(0.008);
+    opening.opening_time = x[5], opening.shape = S(1.2);
+    const contact::ProfileNormalForce force(opening);
+    contact::ContactParameters<S> p;
+    p.patch = {x[0], x[1], S(2.0 / 3), 2};
+    p.variation.reference_force = 15;
+    p.variation.pressure_exponent = x[2], p.variation.compliance = x[3], p.variation.softness = x[4];
+    p.variation.loss_time = x[6];
+    const auto model = contact::make_contact_model("limit_surface_disc", p);
+    const auto result = simulate_release(
+        release::ReleaseProblem<S>{
+            launch.hand, force, *model, {S(0.15), S(6e-4)}, {S(0), S(0)}, {S(0.09), S(0.2)}, 0.0, {}, S(0)},
+        {.integrator = {.tolerances = {1e-6, 1e-9}}});
+    EXPECT_EQ(result.outcome, release::ReleaseOutcome::detached);
+    const auto& twist = result.detach.twist;
+    return std::array<S, 3>{twist.vx, twist.vz, twist.omega};
+  };
+  const auto exact = detached(support::seeded(at));
+  for (int k = 0; k < kCount; ++k) {
+    std::array<double, 3> best{1e300, 1e300, 1e300};
+    for (const double relative : {1e-4, 1e-5, 1e-6}) {
+      const double h = relative * at[k];
+      auto above = at, below = at;
+      above[k] += h, below[k] -= h;
+      const auto a = detached(above), b = detached(below);
+      for (int j = 0; j < 3; ++j)
+        best[j] = std::min(best[j], std::abs((a[j] - b[j]) / (2 * h) - exact[j].v[k]));
+    }
+    // h² and rounding over h cross near 1e-8 of the slope: both runs take the same steps.
+    for (int j = 0; j < 3; ++j)
+      EXPECT_LT(best[j], 1e-6 * std::abs(exact[j].v[k])) << kNames[k] << ", state " << j;
+  }
 }
 
 // Steps may be long where the pads hold the object, but not where it slips, and they must not show in the
