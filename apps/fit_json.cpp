@@ -92,6 +92,7 @@ Json fit_json(const FitAnswer& a, const FitRequest& request) {
     matrix.push_back(std::move(row));
   }
   out["covariance"] = {{"names", names}, {"matrix", matrix}};
+  out["intervals"] = {{"clusters", fit.clusters}, {"of", fit.by_conditions ? "conditions" : "throws"}};
   Json& correlations = out["correlations"] = Json::array();
   for (const auto& pair : fitting::strong_correlations(fit))
     correlations.push_back({{"first", pair.first}, {"second", pair.second}, {"value", pair.value}});

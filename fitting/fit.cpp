@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <stdexcept>
 #include <string>
 
@@ -21,6 +22,9 @@ using dynamics::Spectrum, dynamics::spectrum_of;
 using experiment::Channel;
 
 namespace {
+
+/// Fewer conditions than these say too little of how far they agree.
+constexpr std::size_t kFewestClusters = 4;
 
 void describe_open_directions(const Eigen::MatrixXd& information, const CampaignProblem& problem,
                               const std::vector<double>& scale, FitResult& out) {
@@ -50,6 +54,19 @@ void describe_open_directions(const Eigen::MatrixXd& information, const Campaign
   }
 }
 
+/// By the scatter between conditions, whose repetitions share what the law gets wrong about them, where there
+/// are enough of them and the channels are weighed as witnesses, too; else between throws.
+ScatterCovariance scatter_of(const CampaignProblem& problem, const FitRounds& rounds,
+                             const Eigen::MatrixXd& prior, FitResult& out) {
+  std::vector<std::string> condition;
+  for (const std::size_t i : rounds.used()) condition.push_back(problem.throws()[i].prepared.experiment());
+  const std::size_t n = std::set<std::string>(condition.begin(), condition.end()).size();
+  out.by_conditions = rounds.shared().options.weigh == Weigh::witnesses && n >= kFewestClusters;
+  out.clusters = static_cast<int>(out.by_conditions ? n : condition.size());
+  return out.by_conditions ? scatter_covariance(rounds.equations(), condition, prior)
+                           : scatter_covariance(rounds.equations(), prior);
+}
+
 /// Values, covariance and what the log leaves open.
 void describe_campaign(const CampaignProblem& problem, const FitRounds& rounds, FitResult& out) {
   const auto& scale = rounds.shared().scale;
@@ -60,7 +77,7 @@ void describe_campaign(const CampaignProblem& problem, const FitRounds& rounds, 
     if (u.prior_sigma) prior(k, k) = 1 / (*u.prior_sigma * *u.prior_sigma);
     if (rounds.is_fixed(u)) prior(k, k) = 1e30 / (u.scale * u.scale);
   }
-  const auto [covariance, degrees_of_freedom] = scatter_covariance(rounds.equations(), prior);
+  const auto [covariance, degrees_of_freedom, noise] = scatter_of(problem, rounds, prior, out);
   const Eigen::MatrixXd information = rounds.information(), data = guarded_inverse(information, scale);
   const auto values = rounds.campaign();
   for (Eigen::Index k = 0; k < width; ++k) {

@@ -37,8 +37,9 @@ enum class Share {
 
 /// What a channel that the model cannot follow counts for.
 enum class Weigh {
-  /// As many witnesses as its errors are independent: an error that stays for a stretch is one. For
-  /// parameters and predictions of a law that is not quite right.
+  /// As many witnesses as its errors are independent: an error that stays for a stretch is one, and so is a
+  /// condition, whose repetitions share what the law gets wrong about it. For parameters and predictions of a
+  /// law that is not quite right.
   witnesses,
   /// 1/(the variance that it shows) in each phase: as the likelihood has it by which models are compared
   /// (Stage::bic), but for samples and throws that stray, which the fit lets count less and that likelihood
@@ -86,12 +87,12 @@ const char* to_string(FitOutcome);
 struct FittedUnknown {
   Unknown unknown;  ///< name, unit, range
   double value{};   ///< in the unknown's unit
-  /// 1 σ, from the scatter between throws (see covariance); infinite without an answer, 0 of what was fixed.
+  /// 1 σ, from the scatter between clusters (see covariance); infinite without an answer, 0 of what was fixed.
   double sigma{};
   double data_sigma{};  ///< 1 σ without the prior; infinite where the log does not determine it, or was
                         ///< not asked, since the unknown was fixed
   bool at_bound{};      ///< the value is at an end of its range: sigma says little
-  double degrees_of_freedom{};  ///< of sigma: it comes from the scatter between throws
+  double degrees_of_freedom{};  ///< of sigma: it comes from the scatter between clusters
   /// The 95 % interval of the profile, where it departs from value ± t sigma: there, with everything else
   /// fitted again, the cost has risen by as much as it would at ± t sigma if it were a parabola. An end
   /// beyond the accepted range is infinite.
@@ -153,12 +154,14 @@ struct FitResult {
   Share share{Share::train};            ///< of the log that was fitted to
   std::vector<FittedUnknown> campaign;  ///< in the problem's order
   /// Covariance of the campaign's unknowns, row by row. H⁻¹ G H⁻¹ with H the Gauss-Newton matrix after the
-  /// throws' own unknowns are eliminated and G the scatter of the throws' gradients, each enlarged by what
-  /// the fit has taken out of it [BellMcCaffrey2002]: it holds when the noise within a throw is correlated,
-  /// or the law is wrong by something that differs from throw to throw; what repetitions share of that it
-  /// does not see (count_discrepancy does). To throws that agree too well, one that scatters as its noise is
-  /// added.
+  /// throws' own unknowns are eliminated and G the scatter of the gradients of clusters, each enlarged by what
+  /// the fit has taken out of it [BellMcCaffrey2002]: it holds when the noise within a cluster is correlated,
+  /// or the law is wrong by something that differs from cluster to cluster. These are conditions if there are
+  /// four and Weigh::witnesses is asked for, else throws. To clusters that agree too well, one that scatters
+  /// as its noise is added.
   std::vector<double> covariance;
+  bool by_conditions{};  ///< the clusters are conditions, not throws
+  int clusters{};        ///< how many
   std::vector<double> own_spread;        ///< learned 1 σ of the throws' own unknowns
   std::vector<OpenDirection> open;       ///< directions without an answer
   std::vector<ThrowFit> throws;          ///< in the order of the log

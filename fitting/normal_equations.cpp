@@ -3,6 +3,8 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "dynamics/dense_solve.hpp"
 #include "dynamics/parallel.hpp"
@@ -117,6 +119,31 @@ ScatterCovariance scatter_covariance(const NormalEquations& equations, const Eig
   for (const ThrowEquations& part : equations.throws)
     if (part.weight > 0) throws.push_back({part.information, part.gradient});
   return scatter_covariance(throws, equations.information, prior);
+}
+
+ScatterCovariance scatter_covariance(const NormalEquations& equations, const std::vector<std::string>& set,
+                                     const Eigen::MatrixXd& prior) {
+  std::map<std::string, Cluster> sets;
+  for (std::size_t i = 0; i < equations.throws.size(); ++i) {
+    const ThrowEquations& part = equations.throws[i];
+    if (!(part.weight > 0)) continue;
+    const auto [at, first] = sets.try_emplace(set[i], Cluster{part.information, part.gradient});
+    if (first) continue;
+    at->second.information += part.information;
+    at->second.gradient += part.gradient;
+  }
+  std::vector<Cluster> clusters;
+  for (auto& [name, cluster] : sets) clusters.push_back(std::move(cluster));
+  ScatterCovariance out = borrowing_scatter(clusters, equations.information, prior);
+  const Eigen::VectorXd most = scatter_covariance(equations, prior).degrees_of_freedom;
+  for (Eigen::Index k = 0; k < prior.rows(); ++k) {
+    const double variance = out.covariance(k, k), excess = variance - out.noise(k, k);
+    double& freedom = out.degrees_of_freedom[k];
+    if (!(variance > 0) || !std::isfinite(variance)) continue;  // nothing is known of it
+    freedom *= std::pow(variance / std::max(excess, 1e-3 * variance), 2);
+    freedom = std::min(freedom, std::max(1.0, most[k]));
+  }
+  return out;
 }
 
 Eigen::MatrixXd guarded_inverse(const Eigen::MatrixXd& information, const std::vector<double>& scale) {

@@ -69,6 +69,11 @@ NormalEquations normal_equations(const CampaignProblem& problem, const std::vect
 
 /// Over its throws.
 ScatterCovariance scatter_covariance(const NormalEquations& equations, const Eigen::MatrixXd& prior);
+/// Over sets of its throws: `set[i]` is that of throw i. What few sets tell borrows the scatter of the rest
+/// (borrowing_scatter). Degrees of freedom ν count for what exceeds the noise: of a variance V = noise + e
+/// there are ν (V/e)², but no more than the throws have, from which the noise was learned.
+ScatterCovariance scatter_covariance(const NormalEquations& equations, const std::vector<std::string>& set,
+                                     const Eigen::MatrixXd& prior);
 
 /// The inverse in units of `scale`, with +infinity on the diagonal of what is not determined.
 Eigen::MatrixXd guarded_inverse(const Eigen::MatrixXd& information, const std::vector<double>& scale);

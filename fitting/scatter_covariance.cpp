@@ -35,6 +35,7 @@ ScatterCovariance scatter_covariance(const std::vector<Cluster>& clusters, const
     G += g * g.transpose();
   }
   ScatterCovariance out;
+  out.noise = gram(whiten.transpose());
   const auto n = static_cast<Eigen::Index>(share.size());
   out.degrees_of_freedom.setOnes(width);
   for (Eigen::Index k = 0; k < width; ++k) {
@@ -62,16 +63,18 @@ ScatterCovariance scatter_covariance(const std::vector<Cluster>& clusters, const
 }
 
 ScatterCovariance borrowing_scatter(const std::vector<Cluster>& clusters, const Eigen::MatrixXd& information,
-                                    const Eigen::MatrixXd& prior, const Eigen::MatrixXd& noise) {
+                                    const Eigen::MatrixXd& prior) {
   ScatterCovariance out = scatter_covariance(clusters, information, prior);
+  const Eigen::MatrixXd& noise = out.noise;
   const Eigen::Index width = noise.rows();
   const auto ratio = [&](Eigen::Index k) {
     return noise(k, k) > 0 ? std::max(0.0, out.covariance(k, k) / noise(k, k)) : 0.0;
   };
   const auto is_few = [&](Eigen::Index k) { return out.degrees_of_freedom[k] < kFewDegrees; };
+  const auto is_held = [&](Eigen::Index k) { return prior(k, k) * noise(k, k) > 0.5; };
   double sum = 0, degrees = 0;  // of those that lend
   for (Eigen::Index k = 0; k < width; ++k) {
-    if (is_few(k)) continue;
+    if (is_few(k) || is_held(k)) continue;
     const double counts = std::min(out.degrees_of_freedom[k], 1e3);
     sum += counts * ratio(k), degrees += counts;
   }
@@ -79,7 +82,7 @@ ScatterCovariance borrowing_scatter(const std::vector<Cluster>& clusters, const 
   for (Eigen::Index k = 0; k < width; ++k) {
     double& own = out.degrees_of_freedom[k];
     wanted[k] = ratio(k);
-    if (is_few(k) && degrees > 0) {
+    if (is_few(k) && !is_held(k) && degrees > 0) {
       wanted[k] = (own * ratio(k) + kBorrowed * sum / degrees) / (own + kBorrowed);
       own += kBorrowed;
     }

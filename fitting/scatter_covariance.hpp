@@ -19,6 +19,7 @@ struct Cluster {
 struct ScatterCovariance {
   Eigen::MatrixXd covariance;
   Eigen::VectorXd degrees_of_freedom;  ///< of every unknown's variance
+  Eigen::MatrixXd noise;               ///< H⁻¹: the covariance if all is as declared
 };
 /// H⁻¹ G H⁻¹; H = information + prior, G = prior + Σ g̃_i g̃_iᵀ over the clusters' gradients g_i,
 /// g̃_i = (1 − H_i H⁻¹)^(−1/2) g_i: the fit follows a cluster by its share H_i of the information, which makes
@@ -34,11 +35,11 @@ ScatterCovariance scatter_covariance(const std::vector<Cluster>& clusters, const
                                      const Eigen::MatrixXd& prior);
 
 /// The same for clusters of which some unknowns are known from few, as the size of one object from its two
-/// flights: `noise` being (information + prior)⁻¹, the variance over noise of an unknown with less than
-/// kFewDegrees is mixed with that of those which have more, as four degrees of freedom that it borrows. No
-/// unknown is surer than the noise lets it be.
+/// flights: the variance over noise of an unknown with less than
+/// kFewDegrees is mixed with that of those which have more, as four degrees of freedom that it borrows. What
+/// a prior holds for the most part takes no part in that. No unknown is surer than the noise lets it be.
 inline constexpr double kFewDegrees = 5, kBorrowed = 4;
 ScatterCovariance borrowing_scatter(const std::vector<Cluster>& clusters, const Eigen::MatrixXd& information,
-                                    const Eigen::MatrixXd& prior, const Eigen::MatrixXd& noise);
+                                    const Eigen::MatrixXd& prior);
 
 }  // namespace unhand::fitting

@@ -152,7 +152,7 @@ LinearStep linear_step(const std::vector<MatrixXd>& parts, const std::vector<std
     const MatrixXd own = parts[n](columns, columns);
     clusters.push_back({own, VectorXd(parts[n](columns, std::vector<Index>{r})) + own * out.value});
   }
-  auto scatter = borrowing_scatter(clusters, A, MatrixXd::Zero(p, p), inverse);
+  auto scatter = borrowing_scatter(clusters, A, MatrixXd::Zero(p, p));
   out.sigma = scatter.covariance.diagonal().cwiseSqrt();
   for (Index k = 0; k < p; ++k)
     if (!(inverse(k, k) > 0)) out.sigma[k] = HUGE_VAL;  // no group sees it

@@ -13,8 +13,7 @@
 
 namespace unhand::fitting {
 
-using dynamics::gram, dynamics::least_squares, dynamics::product, dynamics::pseudo_inverse,
-    dynamics::pseudo_solve;
+using dynamics::gram, dynamics::least_squares, dynamics::product, dynamics::pseudo_solve;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -118,7 +117,7 @@ class Solver {
       const SharedParameter& s = fit_.shared[static_cast<std::size_t>(j)];
       prior(j, j) = 12 / std::pow(s.high - s.low, 2);
     }
-    const auto scatter = borrowing_scatter(clusters, A, prior, pseudo_inverse(A + prior));
+    const auto scatter = borrowing_scatter(clusters, A, prior);
     fit_.covariance = scatter.covariance;
     fit_.freedom = scatter.degrees_of_freedom;
     if (!fit_.covariance.allFinite())

@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
+#include <random>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -71,6 +74,67 @@ TEST(Coverage, SigmasAreNeitherTooSmallNorTooLarge) {
   // And sigmas that are off by half would have been seen.
   EXPECT_LT(p_value(errors, 1 / 1.5), kOneSide);
   EXPECT_GT(p_value(errors, 1.5), 1 - kOneSide);
+}
+
+/// The throws of a log under six of its conditions, all to be fitted.
+datasets::ThrowLog under_conditions(const datasets::ThrowLog& log, std::span<const std::string> conditions) {
+  datasets::ThrowLog out = log;
+  std::erase_if(out.throws, [&](const datasets::Throw& one) {
+    return std::find(conditions.begin(), conditions.end(), one.condition) == conditions.end();
+  });
+  for (auto& one : out.throws) one.split = datasets::Split::train;
+  return out;
+}
+
+// What a law gets wrong differs from condition to condition, and repetitions share it: fits to other
+// conditions must not disagree by more than their intervals say. A sliding pivot, of pads that obey a disc's
+// limit surface, misses by a tenth.
+TEST(Coverage, IntervalsOfALawThatIsOffHoldForOtherConditions) {
+  const auto log = experiment::generate_campaign(experiment::campaign_design("batch180"), 1);
+  std::vector<std::string> conditions;
+  for (const auto& one : log.throws)
+    if (std::find(conditions.begin(), conditions.end(), one.condition) == conditions.end())
+      conditions.push_back(one.condition);
+  ASSERT_EQ(conditions.size(), 36u);
+  std::shuffle(conditions.begin(), conditions.end(), std::mt19937(5));  // NOLINT: the same every time
+  CampaignOptions campaign;
+  campaign.model = "sliding_pivot";
+  std::vector<FitResult> fits;
+  for (std::size_t k = 0; k < 36; k += 6) {
+    const auto part = under_conditions(log, std::span(conditions).subspan(k, 6));
+    fits.push_back(fit(CampaignProblem(part, "(in memory)", campaign)));
+    ASSERT_TRUE(fits.back().is_answer()) << fits.back().message;
+    EXPECT_TRUE(fits.back().by_conditions);
+    EXPECT_EQ(fits.back().clusters, 6);
+  }
+  for (std::size_t k = 0; k < fits.front().campaign.size(); ++k) {
+    const std::string& name = fits.front().campaign[k].unknown.name;
+    double mean = 0, square = 0, width = 0;
+    for (const FitResult& one : fits) mean += one.campaign[k].value / 6;
+    int inside = 0;
+    for (const FitResult& one : fits) {
+      const auto [low, high] = one.campaign[k].interval95();
+      inside += low <= mean && mean <= high;
+      square += std::pow(one.campaign[k].value - mean, 2) / 5;
+      width += (high - low) / 12;
+    }
+    EXPECT_GE(inside, 4) << name;
+    EXPECT_GT(std::sqrt(square), 0.05 * mean) << name << ": the law is off";
+    EXPECT_LT(width, 3 * std::sqrt(square)) << name << ": no wider than it takes";
+  }
+}
+
+// Below four conditions only throws tell how far they scatter.
+TEST(Coverage, FewConditionsLeaveTheScatterOfThrows) {
+  const auto log = experiment::generate_campaign(testing_support::small_design("limit_surface_disc"), 1);
+  std::vector<std::string> three;
+  for (const auto& one : log.throws)
+    if (std::find(three.begin(), three.end(), one.condition) == three.end() && three.size() < 3)
+      three.push_back(one.condition);
+  const auto result = fit(CampaignProblem(under_conditions(log, three), "(in memory)", {}));
+  ASSERT_TRUE(result.is_answer()) << result.message;
+  EXPECT_FALSE(result.by_conditions);
+  EXPECT_EQ(result.clusters, 6);
 }
 
 }  // namespace

@@ -485,7 +485,8 @@ TEST(ThrowFit, WhatIsFixedStaysAtItsStart) {
     }
   options.fixed.clear();
   options.all_fixed = true;
-  for (const FittedUnknown& u : fit(problem, options).campaign) EXPECT_EQ(u.value, u.unknown.start);
+  for (const FittedUnknown& u : fit(problem, options).campaign)
+    EXPECT_DOUBLE_EQ(u.value, u.unknown.start) << "but for the rounding of its unit";
 }
 
 TEST(ThrowFit, AGripperThatOpensBeforeItIsToldToIsNoAnswerAndNoError) {
@@ -538,7 +539,7 @@ TEST(ThrowFit, AnEffectWithoutADerivativeAtNeutralIsNotStuckThere) {
     const auto& fitted = result.campaign.at(2);
     ASSERT_EQ(fitted.unknown.name, "contact.pad_compliance.compliance");
     EXPECT_NEAR(fitted.value, compliance, 3 * fitted.sigma);
-    EXPECT_LT(fitted.sigma, 0.2 * compliance);
+    EXPECT_GT(fitted.value, 4 * fitted.sigma) << "told from none, by noise as declared";
   }
 }
 
