@@ -133,11 +133,12 @@ std::string fit_text(const FitAnswer& a, const FitRequest& request, bool markdow
                   fit.outcome == fitting::FitOutcome::converged ? "converged" : "stopped before it converged",
                   fit.iterations);
   out += table(parameter_table(fit)) + "\n";
-  out += fmt::format("intervals: from the scatter between {}{}\n",
-                     plural(static_cast<std::size_t>(fit.clusters), fit.by_conditions ? "condition" : "throw"),
-                     fit.by_conditions ? ""
-                                       : "; what repetitions share of the model's errors is not in them: that "
-                                         "would take four conditions");
+  out +=
+      fmt::format("intervals: from the scatter between {}{}\n",
+                  plural(static_cast<std::size_t>(fit.clusters), fit.by_conditions ? "condition" : "throw"),
+                  fit.by_conditions ? ""
+                                    : "; what repetitions share of the model's errors is not in them: that "
+                                      "would take four conditions");
   for (const auto& open : fit.open)
     out += fmt::format("not determined by this log: {} ({}).\n  It would take {}.\n", open.meaning,
                        std::isfinite(open.sigma) ? fmt::format("1 sigma is {:.2g} such steps", open.sigma)

@@ -87,7 +87,8 @@ const char* to_string(FitOutcome);
 struct FittedUnknown {
   Unknown unknown;  ///< name, unit, range
   double value{};   ///< in the unknown's unit
-  /// 1 σ, from the scatter between clusters (see covariance); infinite without an answer, 0 of what was fixed.
+  /// 1 σ, from the scatter between clusters (see covariance); infinite without an answer, 0 of what was
+  /// fixed.
   double sigma{};
   double data_sigma{};  ///< 1 σ without the prior; infinite where the log does not determine it, or was
                         ///< not asked, since the unknown was fixed
@@ -154,14 +155,14 @@ struct FitResult {
   Share share{Share::train};            ///< of the log that was fitted to
   std::vector<FittedUnknown> campaign;  ///< in the problem's order
   /// Covariance of the campaign's unknowns, row by row. H⁻¹ G H⁻¹ with H the Gauss-Newton matrix after the
-  /// throws' own unknowns are eliminated and G the scatter of the gradients of clusters, each enlarged by what
-  /// the fit has taken out of it [BellMcCaffrey2002]: it holds when the noise within a cluster is correlated,
-  /// or the law is wrong by something that differs from cluster to cluster. These are conditions if there are
-  /// four and Weigh::witnesses is asked for, else throws. To clusters that agree too well, one that scatters
-  /// as its noise is added.
+  /// throws' own unknowns are eliminated and G the scatter of the gradients of clusters, each enlarged by
+  /// what the fit has taken out of it [BellMcCaffrey2002]: it holds when the noise within a cluster is
+  /// correlated, or the law is wrong by something that differs from cluster to cluster. These are conditions
+  /// if there are four and Weigh::witnesses is asked for, else throws. To clusters that agree too well, one
+  /// that scatters as its noise is added.
   std::vector<double> covariance;
-  bool by_conditions{};  ///< the clusters are conditions, not throws
-  int clusters{};        ///< how many
+  bool by_conditions{};                  ///< the clusters are conditions, not throws
+  int clusters{};                        ///< how many
   std::vector<double> own_spread;        ///< learned 1 σ of the throws' own unknowns
   std::vector<OpenDirection> open;       ///< directions without an answer
   std::vector<ThrowFit> throws;          ///< in the order of the log
