@@ -146,8 +146,7 @@ std::string fit_text(const FitAnswer& a, const FitRequest& request, bool markdow
                        fitting::remedy(a.problem, open));
   for (const auto& pair : fitting::strong_correlations(fit))
     out += fmt::format("correlated: {} and {}, {:+.3f}\n", pair.first, pair.second, pair.value);
-  if (!fit.open.empty() || !fitting::strong_correlations(fit).empty()) out += "\n";
-  out += table(spread_table(a)) + "\n";
+  out += "\n" + table(spread_table(a)) + "\n";
   out += fmt::format("{}\nchi2 {:.6g} for {} degrees of freedom: {} each\n", table(misfit_table(fit)),
                      fit.chi2, fit.degrees_of_freedom, fixed(fit.chi2_per_dof(), 3));
   if (fit.mode_changes > 0)

@@ -107,7 +107,9 @@ std::vector<std::string> separating_lines(const fitting::AcceptedEffect& effect)
 }
 
 std::string small_text(const fitting::SmallEffect& small) {
-  const bool predicts = small.rms.is_better_by(fitting::DiscoverOptions{}.prediction_matters);
+  const double matters = fitting::DiscoverOptions{}.prediction_matters;
+  const bool predicts = small.rms.is_better_by(matters),
+             spoils = small.rms.position.rises_by(matters) || small.rms.angle.rises_by(matters);
   std::string sizes;
   for (const auto& p : small.parameters)
     sizes +=
@@ -118,6 +120,9 @@ std::string small_text(const fitting::SmallEffect& small) {
   if (small.any_pads) return fmt::format("evident, but no pads are without it: {})", numbers);
   if (!predicts && !small.likelier)
     return fmt::format("evident on the train throws alone, as the test throws are no likelier with it: {})",
+                       numbers);
+  if (!predicts && spoils)
+    return fmt::format("evident, but no answer, as predictions of the test throws are worse with it: {})",
                        numbers);
   if (!predicts) return fmt::format("evident, but too small to matter: {})", numbers);
   return fmt::format(

@@ -86,7 +86,9 @@ void print(const StudyRecord& r) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+namespace {
+
+int study(int argc, char** argv) {
   std::vector<std::string> arguments(argv + 1, argv + argc);
   const bool draws = !arguments.empty() && arguments[0] == "--figure";
   if (arguments.empty() || (draws && arguments.size() < 3)) {
@@ -133,4 +135,16 @@ int main(int argc, char** argv) {
     print(record);
   }
   print_tables(read_records(file));
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return study(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "discovery_study: {}\n", error.what());
+    return 1;
+  }
 }

@@ -129,25 +129,29 @@ class ForwardStep {
       if (off && id_of(score) == kPads) consider(score);
     // Laws are alternatives to each other: where one convinces, all are tried. And where nothing convinced,
     // another law may still be the better one.
-    if (!best_ || is_law(id_of(*best_->score)) || (off && !contact::can_give(stage_.problem.options().model)))
+    if (!best() || is_law(id_of(*best()->score)) ||
+        (off && !contact::can_give(stage_.problem.options().model)))
       for (const Score& score : all_)
         if (is_law(id_of(score))) consider(score);
     // A law has no size that could be told from none, and half a per cent of the held-out misfit is enough
     // for it: it is no answer where an effect is likelier that was not sure enough, or too small to matter.
     std::sort(small_.begin(), small_.end(), is_likelier);
-    if (best_ && is_law(id_of(*best_->score))) {
+    if (best() && is_law(id_of(*best()->score))) {
       const bool refused_leads = refused_ && (small_.empty() || is_likelier(*refused_, small_.front()));
-      if (refused_leads ? is_likelier(*refused_, *best_)
-                        : !small_.empty() && is_likelier(small_.front(), *best_)) {
-        best_.reset();  // predictions decide
+      if (refused_leads ? is_likelier(*refused_, *best())
+                        : !small_.empty() && is_likelier(small_.front(), *best())) {
+        convincing_.clear();  // predictions decide
         if (refused_leads && solve_held_out(refused_->next, options_))
           small_.insert(small_.begin(), std::move(*refused_));
       }
     }
-    if (auto opened = open_pair(best_ ? best_->next : stage_)) return opened;
-    if (best_) {
-      const std::string why = best_->held_out.where;
-      return accept(std::move(*best_), why, convincing_);
+    refit_rivals();
+    if (auto opened = open_pair(best() ? best()->next : stage_)) return opened;
+    if (TriedEffect* found = best()) {
+      WithCriterion rivals;
+      for (const TriedEffect& one : convincing_) rivals.emplace_back(one.score, one.next.bic());
+      const std::string why = found->held_out.where;
+      return accept(std::move(*found), why, rivals);
     }
     return weigh_small();
   }
@@ -159,6 +163,39 @@ class ForwardStep {
   const std::string& id_of(const Score& score) const { return f_.candidates[score.candidate].id; }
   double between_footprints(const Score& a, const Score& b) const {
     return between(f_, f_.candidates[a.candidate], a.step, f_.candidates[b.candidate]);
+  }
+
+  /// The likeliest of those that matter to a channel, or null.
+  TriedEffect* best() {
+    const auto found = std::min_element(convincing_.begin(), convincing_.end(), is_likelier);
+    return found == convincing_.end() ? nullptr : &*found;
+  }
+
+  /// What explains nearly as much as the best one may have ended in another minimum of what all share (the
+  /// friction, the pads' give), to which the base was bent: once more from where the best one ended.
+  void refit_rivals() {
+    constexpr double kNearly = 0.9;  // of its evidence
+    const TriedEffect* leader = best();
+    if (!leader || is_law(id_of(*leader->score))) return;
+    const FitResult led = leader->next.fit;
+    for (TriedEffect& rival : convincing_) {
+      if (&rival == leader || is_law(id_of(*rival.score))) continue;
+      if (!(rival.delta_bic <= kNearly * leader->delta_bic)) continue;
+      const CampaignProblem& problem = rival.next.problem;
+      std::vector<double> start = carried(led, problem);
+      for (std::size_t k = 0; k < start.size(); ++k)
+        if (problem.campaign()[k].name.starts_with(id_of(*rival.score) + "."))
+          start[k] = rival.next.fit.campaign[k].value;
+      Stage again{problem, {}, {}, rival.next.ids};
+      if (!solve_train(again, options_, std::move(start)) ||
+          !(again.bic() - rival.next.bic() <= kLikelierBic))
+        continue;
+      if (!solve_held_out(again, options_)) continue;
+      rival.next = std::move(again);
+      rival.delta_bic = rival.next.bic() - stage_.bic();
+      rival.held_out = improvement(stage_, rival.next, out_.before.held_out, options_);
+      named(out_.ranking, id_of(*rival.score)).delta_bic = rival.delta_bic;
+    }
   }
 
   /// Under the base model: it is no other name for anything.
@@ -255,17 +292,13 @@ class ForwardStep {
       return;
     auto trial = try_out(score);
     if (!trial) return;
-    const double bic = trial->next.bic();
     const bool law = is_law(id_of(score));
     const bool matters =
         trial->held_out.matters >= 1 || (law && trial->held_out.fall > 0 && has_left_base_law());
     named(out_.ranking, id_of(score)).fate = matters ? Fate::outdone : Fate::too_small;
     if (!matters && law) return;
-    (matters ? convincing_ : evident_).push_back({&score, bic});
-    if (!matters)
-      small_.push_back(std::move(*trial));
-    else if (!best_ || is_likelier(*trial, *best_))
-      best_ = std::move(trial);
+    if (!matters) evident_.emplace_back(&score, trial->next.bic());
+    (matters ? convincing_ : small_).push_back(std::move(*trial));
   }
 
   /// The law that was asked about has gone already: of the others the likelier one stays.
@@ -347,9 +380,8 @@ class ForwardStep {
   std::vector<Score> all_;
   bool noise_;  // nothing but that is left
   std::set<std::string> tried_;
-  std::optional<TriedEffect> best_;  // of those that matter to a channel
-  std::vector<TriedEffect> small_;   // those that do not
-  WithCriterion convincing_, evident_;
+  std::vector<TriedEffect> convincing_, small_;  // what matters to a channel, and what does not
+  WithCriterion evident_;                        // the latter
   std::optional<TriedEffect> refused_;  // the likeliest of those that are not told from none surely enough
 };
 

@@ -80,6 +80,8 @@ TEST(SmallEffect, IsNotCalledSmallWhereHeldOutErrorsFall) {
   EXPECT_THAT(small_text(small),
               testing::StartsWith(
                   "evident, but too small to matter: contact.viscous (1/v_0 = 0.250 ± 0.010 s/m; BIC"));
+  small.rms.position.after = 1.83e-3;
+  EXPECT_THAT(small_text(small), testing::HasSubstr("predictions of the test throws are worse with it"));
   small.likelier = false;
   EXPECT_THAT(small_text(small), testing::StartsWith("evident on the train throws alone"));
   small.any_pads = true;

@@ -368,6 +368,21 @@ TEST(Selection, StickingPadsAndLateOnesAreToldApartBesidePadsThatGive) {
   }
 }
 
+// A base whose pads do not give bends their friction to twice its size, and a late opening that is fitted
+// from there ends in another minimum, where an adhesion seems likelier by 148 in Bayes' criterion. From where
+// the adhesion ended the two fit alike.
+TEST(Selection, StickingPadsAreNotSurerThanLateOnesThatWereFittedBadly) {
+  experiment::CampaignDesign design = experiment::random_campaign(9106);
+  design.effects = {{"release.opening_delay.delay", 0.002}, {"contact.pad_compliance.compliance", 1.5e-7}};
+  DiscoverOptions options;
+  options.campaign.model = "limit_surface_disc";
+  const Discovery found = discover(experiment::generate_campaign(design, 9106), "synthetic", options);
+  ASSERT_EQ(found.effects.size(), 1u);
+  EXPECT_EQ(found.effects[0].id, "release.opening_delay");
+  for (const auto& [name, correlation] : found.effects[0].equivalent) EXPECT_EQ(name, "contact.adhesion");
+  EXPECT_NEAR(found.effects[0].parameters.at(0).value, 0.002, 3 * found.effects[0].parameters.at(0).sigma);
+}
+
 // Thirty landings whose chi-square is 1.78 per sample: one in two hundred by chance, and a log has 22 such
 // series to look at.
 TEST(Misfit, IsJudgedByItsChanceAndByTheSeriesThatAreLookedAt) {
