@@ -374,8 +374,7 @@ TEST(Selection, StickingPadsAndLateOnesAreToldApartBesidePadsThatGive) {
 TEST(Selection, StickingPadsAreNotSurerThanLateOnesThatWereFittedBadly) {
   experiment::CampaignDesign design = experiment::random_campaign(9106);
   design.effects = {{"release.opening_delay.delay", 0.002}, {"contact.pad_compliance.compliance", 1.5e-7}};
-  DiscoverOptions options;
-  options.campaign.model = "limit_surface_disc";
+  const DiscoverOptions options = support::loop_options();
   const Discovery found = discover(experiment::generate_campaign(design, 9106), "synthetic", options);
   ASSERT_EQ(found.effects.size(), 1u);
   EXPECT_EQ(found.effects[0].id, "release.opening_delay");
