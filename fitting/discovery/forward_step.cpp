@@ -177,7 +177,7 @@ class ForwardStep {
     constexpr double kNearly = 0.9;  // of its evidence
     const TriedEffect* leader = best();
     if (!leader || is_law(id_of(*leader->score))) return;
-    const FitResult led = leader->next.fit;
+    const FitResult& led = leader->next.fit;
     for (TriedEffect& rival : convincing_) {
       if (&rival == leader || is_law(id_of(*rival.score))) continue;
       if (!(rival.delta_bic <= kNearly * leader->delta_bic)) continue;
