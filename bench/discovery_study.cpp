@@ -84,10 +84,6 @@ void print(const StudyRecord& r) {
   std::fflush(stdout);
 }
 
-}  // namespace
-
-namespace {
-
 int study(int argc, char** argv) {
   std::vector<std::string> arguments(argv + 1, argv + argc);
   const bool draws = !arguments.empty() && arguments[0] == "--figure";

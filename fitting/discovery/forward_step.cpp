@@ -96,7 +96,7 @@ std::optional<OpenedPair> fit_pair(const Stage& stage, const Candidate& through,
 struct TriedEffect {
   const Score* score{};
   Stage next;
-  double delta_bic{}, p_value{};
+  double delta_bic{};
   Improvement held_out;
 };
 
@@ -228,7 +228,7 @@ class ForwardStep {
       if (!are_told(pair->both, {id, id_of(*through)}, tried * tried)) continue;
       const Improvement gain = improvement(stage_, pair->both, out_.before.held_out, options_);
       if (!(gain.matters >= 1)) continue;
-      TriedEffect first{through, std::move(pair->first), 0, 0, gain};
+      TriedEffect first{through, std::move(pair->first), 0, gain};
       first.delta_bic = first.next.bic() - stage_.bic();
       Ranked& ranked = named(out_.ranking, id_of(*through));
       ranked.refit_step = this_step(), ranked.delta_bic = first.delta_bic, ranked.held_out_gain = gain.fall;
@@ -253,7 +253,7 @@ class ForwardStep {
   std::optional<TriedEffect> try_out(const Score& score) {
     const Candidate& candidate = f_.candidates[score.candidate];
     const bool leads = &score == &all_.front() || candidate.id == kPads;
-    TriedEffect trial{&score, extended(stage_, candidate, score, leads, options_), 0, 0, {}};
+    TriedEffect trial{&score, extended(stage_, candidate, score, leads, options_), 0, {}};
     Ranked& ranked = named(out_.ranking, candidate.id);
     if (!trial.next.is_fitted()) {
       if (!ranked.refit_step) ranked.fate = Fate::no_fit;
@@ -267,9 +267,8 @@ class ForwardStep {
     ranked.fate = Fate::not_significant;
     if (!law) {
       const dynamics::Effect effect = find_effect(candidate.id);
-      trial.p_value = wald_p_value(trial.next.fit, effect);
-      if (!is_significant(trial.next.fit, effect, trial.p_value, options_.family_wise_level,
-                          static_cast<double>(f_.candidates.size()))) {
+      if (!is_significant(trial.next.fit, effect, wald_p_value(trial.next.fit, effect),
+                          options_.family_wise_level, static_cast<double>(f_.candidates.size()))) {
         if (!refused_ || trial.next.bic() < refused_->next.bic()) refused_ = std::move(trial);
         return std::nullopt;
       }
