@@ -1,6 +1,7 @@
 #include "fitting/measured/fall_discovery.hpp"
 
 #include <fmt/format.h>
+#include <Eigen/LU>
 
 #include <algorithm>
 #include <array>
