@@ -90,15 +90,17 @@ Json missing_json(const fitting::MissingEstimate& missing) {
            {"curves", Json::object()},
            {"candidate", Json::array()},
            {"candidate_explains", number(missing.candidate.explained)}};
-  for (const auto& [object, group] : missing.groups)
+  for (const auto& [group, object] : missing.groups)
     for (const auto& curve : missing.curves)
       if (curve.group == group)
         out["curves"][object] = {{"knots", curve.knots}, {"value", curve.value}, {"sigma", curve.sigma}};
   for (const auto& t : missing.candidate.terms)
-    out["candidate"].push_back({{"term", t.name},
-                                {"coefficient", number(t.coefficient)},
-                                {"sigma", number(t.sigma)},
-                                {"unit", t.unit}});
+    for (const auto& size : t.sizes)
+      out["candidate"].push_back({{"term", t.name},
+                                  {"object", size.group ? Json(missing.groups.at(*size.group)) : Json()},
+                                  {"coefficient", number(size.value)},
+                                  {"sigma", number(size.sigma)},
+                                  {"unit", t.unit}});
   constexpr const char* kCorrection[] = {"withheld", "curve", "candidate", "not_judged"};
   out["correction"] = kCorrection[static_cast<int>(missing.correction)];
   out["held_out_error"] = {{"before", number(missing.error_before)},

@@ -95,7 +95,7 @@ Figure missing_figure(const fitting::MissingEstimate& missing) {
         unit[component], flight ? "since the detach [s]" : "share of the opening", 1.04 * last,
         tic_step(last));
     int colour = 0;
-    for (const auto& [object, group] : missing.groups)
+    for (const auto& [group, object] : missing.groups)
       for (const auto& curve : missing.curves) {
         if (curve.group != group) continue;
         DataBlock block{fmt::format("{} {}", object, unit[component]), {"time", "value", "sigma"}, {}, {}};

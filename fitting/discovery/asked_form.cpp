@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <map>
 #include <utility>
 
 #include "fitting/discovery/acceptance.hpp"
@@ -30,28 +29,6 @@ bool leaves_flights(const Stage& stage, const DiscoverOptions& options) {
   return std::any_of(stage.fit.misfit.begin(), stage.fit.misfit.end(), [&](const ChannelMisfit& m) {
     return m.phase == Phase::flight && is_left(m, options) && is_confirmed(stage.held_out.misfit, m);
   });
-}
-
-/// One candidate for every object, from its own flights.
-std::map<int, MissingCandidate> candidates_of(const PhaseTraces& train) {
-  std::map<int, std::vector<ResidualTrace>> of_object;
-  for (const ResidualTrace& trace : train.all) of_object[trace.group].push_back(trace);
-  std::map<int, MissingCandidate> out;
-  for (const auto& [object, traces] : of_object) out[object] = missing_terms(traces, train.how);
-  return out;
-}
-
-/// What candidates leave, a candidate for each object; one that is not there says nothing.
-Rest left_by(const std::map<int, MissingCandidate>& candidates, const PhaseTraces& flights) {
-  Rest out;
-  for (const ResidualTrace& trace : flights.all) {
-    const auto candidate = candidates.find(trace.group);
-    const Rest rest = rest_around(
-        {trace}, candidate == candidates.end() ? MissingCandidate{} : candidate->second, flights.how);
-    out.chi2 += rest.chi2;
-    out.degrees_of_freedom += rest.degrees_of_freedom;
-  }
-  return out;
 }
 
 double beyond_noise(const Rest& rest) { return rest.chi2 - static_cast<double>(rest.degrees_of_freedom); }
@@ -86,27 +63,28 @@ AskedForm form_asked_for(const Stage& stage, const Discovery& so_far, const Disc
     return traces_of(of.problem, half, Phase::flight, threads);
   };
   const PhaseTraces train = flights(less, less.fit);
-  const auto candidates = candidates_of(train);
-  const Rest effects = left_by({}, flights(stage, stage.fit)), form = left_by(candidates, train);
+  const MissingCandidate candidate = missing_terms(train.all, train.how);
+  const auto left_by = [](const MissingCandidate& by, const PhaseTraces& in) {
+    return rest_around(in.all, by, in.how);
+  };
+  const Rest effects = left_by({}, flights(stage, stage.fit)), form = left_by(candidate, train);
   // They may have no part in the flights, or these may lack no acceleration.
   const double lacked = beyond_noise(left_by({}, train));
   if (!(lacked > 0 && beyond_noise(form) < kOutdone * lacked)) return out;
   std::vector<std::string> outdone = accepted;
-  for (const auto& [object, candidate] : candidates)
-    for (const MissingTerm& term : candidate.terms) {
-      const auto is_its_own = [&](const std::string& id) {
-        return term.form != dynamics::AccelerationForm::none && find_effect(id).form == term.form;
-      };
-      std::copy_if(accepted.begin(), accepted.end(), std::back_inserter(out.backed), is_its_own);
-      out.unlisted |= std::none_of(accepted.begin(), accepted.end(), is_its_own);
-      std::erase_if(outdone, is_its_own);
-    }
+  for (const MissingTerm& term : candidate.terms) {
+    const auto is_its_own = [&](const std::string& id) {
+      return term.form != dynamics::AccelerationForm::none && find_effect(id).form == term.form;
+    };
+    std::copy_if(accepted.begin(), accepted.end(), std::back_inserter(out.backed), is_its_own);
+    out.unlisted |= std::none_of(accepted.begin(), accepted.end(), is_its_own);
+    std::erase_if(outdone, is_its_own);
+  }
   if (!(beyond_noise(effects) < kOutdone * lacked)) return out;
   const Rest effects_held_out = left_by({}, flights(stage, stage.held_out)),
-             form_held_out = left_by(candidates, flights(less, less.held_out));
-  double terms = 0;
-  for (const auto& [object, candidate] : candidates) terms += static_cast<double>(candidate.terms.size());
-  const double more = terms - static_cast<double>(unknowns_of(stage.fit, accepted));
+             form_held_out = left_by(candidate, flights(less, less.held_out));
+  const double more =
+      static_cast<double>(candidate.coefficients()) - static_cast<double>(unknowns_of(stage.fit, accepted));
   const double bic =
       more * std::log(static_cast<double>(std::max(2L, form.degrees_of_freedom))) - likelier(effects, form);
   if (!(bic <= kDeltaBic) || !(likelier(effects_held_out, form_held_out) > 2 * std::log(kTimesAsLikely)))
@@ -118,12 +96,7 @@ AskedForm form_asked_for(const Stage& stage, const Discovery& so_far, const Disc
   if (leaves_flights(stage, options) && !(halves(form, effects) && halves(form_held_out, effects_held_out)))
     return out;
   out.outdone = std::move(outdone);
-  for (const auto& [name, object] : train.objects) {
-    const auto candidate = candidates.find(object);
-    if (candidate == candidates.end() || candidate->second.terms.empty()) continue;
-    out.words += (out.words.empty() ? "" : ", ") + candidate->second.in_words();
-    if (train.objects.size() > 1) out.words += fmt::format(" for {}", name);
-  }
+  out.words = candidate.in_words(train.names());
   return out;
 }
 

@@ -113,7 +113,7 @@ std::optional<MissingEstimate> estimate_missing(const Stage& stage, Phase phase,
   out.phase = phase;
   const PhaseTraces seen = traces_of(stage.problem, stage.fit, phase, options.fit.threads);
   if (seen.all.size() < 4) return std::nullopt;
-  for (const auto& [name, number] : seen.objects) out.groups.push_back({name, number});
+  out.groups = seen.names();
   out.curves = missing_curves(seen.all, seen.how);
   out.candidate = missing_terms(seen.all, seen.how);
 
@@ -135,8 +135,8 @@ std::optional<MissingEstimate> estimate_missing(const Stage& stage, Phase phase,
     squares[k][1] = squares_with(problem, thrown, l, phase, [&](double t, const State&) {
       return curve == out.curves.end() ? Vector3{} : curve->at(t);
     });
-    squares[k][2] =
-        squares_with(problem, thrown, l, phase, [&](double, const State& s) { return out.candidate.at(s); });
+    squares[k][2] = squares_with(problem, thrown, l, phase,
+                                 [&](double, const State& s) { return out.candidate.at(s, group); });
   });
   std::array<OutcomeSquares, kTried> sum{};
   for (const auto& of : squares)

@@ -1,9 +1,9 @@
 // What no effect of the catalogue explains, and an estimate of it that assumes no form.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "experiment/observations.hpp"
@@ -24,10 +24,10 @@ enum class Correction {
 /// m/s², rad/s²], or a pad's wrench in the hand's frame over the share of the opening that has passed [N, N,
 /// N m].
 struct MissingEstimate {
-  Phase phase{};                                    ///< in flight, or during the release
-  std::vector<std::pair<std::string, int>> groups;  ///< objects, and the group of their curve
-  std::vector<MissingCurve> curves;                 ///< one per group
-  MissingCandidate candidate;                       ///< physical terms that follow the curves
+  Phase phase{};                      ///< in flight, or during the release
+  std::map<int, std::string> groups;  ///< the object of each group
+  std::vector<MissingCurve> curves;   ///< one per group
+  MissingCandidate candidate;         ///< physical terms that follow the curves
   /// What lowers the held-out error, if anything: else it is withheld.
   Correction correction{};  ///< what is used
   /// rms without the correction, of the flight where it was seen, else of the landing; none where it is not

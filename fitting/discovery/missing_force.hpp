@@ -4,6 +4,8 @@
 
 #include <array>
 #include <functional>
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -55,13 +57,21 @@ struct MissingOptions {
 std::vector<MissingCurve> missing_curves(const std::vector<ResidualTrace>& traces,
                                          const MissingOptions& options);
 
+/// A coefficient of a term.
+struct MissingSize {
+  std::optional<int> group;  ///< of which traces; of all, where they do not differ
+  double value{}, sigma{};   ///< in the term's unit; 1 σ
+};
+
 /// A physical term and its size.
 struct MissingTerm {
-  std::string name;               ///< "|v| v", "omega J v", "1 (x)", ...
-  double coefficient{}, sigma{};  ///< in `unit`; 1 σ
-  std::string unit;               ///< of the coefficient
+  std::string name;                ///< "|v| v", "omega J v", "1 (x)", ...
+  std::vector<MissingSize> sizes;  ///< one, or one of every group
+  std::string unit;                ///< of the coefficients
   std::function<std::array<double, 3>(const ResidualTrace::State&)> shape;  ///< of coefficient one
   dynamics::AccelerationForm form{dynamics::AccelerationForm::none};        ///< of an acceleration
+  /// In a group; zero in one that was not seen.
+  double coefficient(int group) const;
 };
 
 /// The few terms that explain most.
@@ -69,14 +79,18 @@ struct MissingCandidate {
   std::vector<MissingTerm> terms;  ///< strongest first
   double explained{};              ///< share of the residual's χ² beyond noise that they take away
   /// The missing quantity in a state; zero without terms.
-  std::array<double, 3> at(const ResidualTrace::State& state) const;
-  /// The terms with their sizes, for reports.
-  std::string in_words() const;
+  std::array<double, 3> at(const ResidualTrace::State& state, int group) const;
+  /// How many sizes its terms have.
+  std::size_t coefficients() const;
+  /// The terms with their sizes, for reports; `names` of groups, where these differ.
+  std::string in_words(const std::map<int, std::string>& names) const;
 };
 
 /// Sparse regression: of every number of terms up to `terms` those that explain most; one more while it
-/// lowers χ² by more than 2 log n and by a fifth of what exceeds the noise. (Adding to the best smaller set
-/// would miss pairs that stand for a third term together.) Accelerations: v, |v| v, |v|² v, ω J v, a constant
+/// lowers χ² by more than 2 log n for every coefficient and by a fifth of what exceeds the noise. (Adding to
+/// the best smaller set would miss pairs that stand for a third term together.) A term has one coefficient,
+/// or one for every group where that is worth them: bodies differ in what the air does to them, not in
+/// gravity. Accelerations: v, |v| v, |v|² v, ω J v, a constant
 /// along x or z, one and ω² along each of the object's axes (a reference point off the CoM), and for the
 /// rotation a constant, ω, |ω| ω, sin θ and cos θ. Wrenches: a constant, f_N, and f_N² of each component, and
 /// |v| and ω for their dependence on the motion.

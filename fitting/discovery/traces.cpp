@@ -47,6 +47,12 @@ PhaseClock phase_clock(const CampaignThrow& thrown, double release, Phase phase)
   return {thrown.opening, std::max(1e-6, release - thrown.opening)};
 }
 
+std::map<int, std::string> PhaseTraces::names() const {
+  std::map<int, std::string> out;
+  for (const auto& [object, group] : objects) out.emplace(group, object);
+  return out;
+}
+
 PhaseTraces traces_of(const CampaignProblem& problem, const FitResult& fit, Phase phase, int threads) {
   const Channel first = phase == Phase::flight ? Channel::mocap_x : Channel::wrench_fx;
   PhaseTraces out;

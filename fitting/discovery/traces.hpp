@@ -23,6 +23,8 @@ struct PhaseTraces {
   std::vector<ResidualTrace> all;      ///< of the throws in which enough was seen; grouped by object
   std::map<std::string, int> objects;  ///< group of each object of the campaign
   MissingOptions how;                  ///< how the channels respond
+  /// The object of each group.
+  std::map<int, std::string> names() const;
 };
 
 /// In flight the tracked positions (m, m, rad; they respond twice integrated), during the release the wrench

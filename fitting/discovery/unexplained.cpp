@@ -34,7 +34,7 @@ std::string in_words(const MissingEstimate& missing, bool with_terms) {
   if (with_terms && !missing.candidate.terms.empty())
     out += fmt::format("; of the forms tried, the missing {} is nearest to {}",
                        missing.phase == Phase::flight ? "acceleration in flight" : "wrench of a pad",
-                       missing.candidate.in_words());
+                       missing.candidate.in_words(missing.groups));
   switch (missing.correction) {
     case Correction::withheld:
       return out +
@@ -55,12 +55,12 @@ std::string in_words(const MissingEstimate& missing, bool with_terms) {
 /// its form.
 std::string as_clock(const Stage& stage, const MissingEstimate& missing) {
   const auto& terms = missing.candidate.terms;
-  if (missing.phase != Phase::flight || terms.size() != 1 ||
+  if (missing.phase != Phase::flight || missing.candidate.coefficients() != 1 ||
       terms.front().form != dynamics::AccelerationForm::along_z || stage.problem.throws().empty())
     return {};
   const double g = -stage.problem.throws().front().prepared.gravity.z;
   if (!(g > 0)) return {};
-  const double rate = terms.front().coefficient / (2 * g);
+  const double rate = terms.front().sizes.front().value / (2 * g);
   return fmt::format("; a clock of the tracker that runs {} by {:.2g} % leaves the same in flight",
                      rate > 0 ? "fast" : "slow", 100 * std::abs(rate));
 }

@@ -165,14 +165,15 @@ std::vector<ResidualTrace> flights(const Missing& missing, int first = 0) {
       t.time.push_back(k * kStep);
       t.state.push_back(s);
       const auto a = missing(s);
+      s.vz -= 9.81 * kStep;
+      s.theta += s.omega * kStep;
+      const auto b = missing(s);
       for (std::size_t c = 0; c < 3; ++c) {
         t.residual[c].push_back(x[c] + random.normal(0, 2e-4));
         t.sigma[c].push_back(2e-4);
-        x[c] += kStep * v[c] + 0.5 * kStep * kStep * a[c];
-        v[c] += kStep * a[c];
+        x[c] += kStep * v[c] + kStep * kStep * (2 * a[c] + b[c]) / 6;
+        v[c] += 0.5 * kStep * (a[c] + b[c]);
       }
-      s.vz -= 9.81 * kStep;
-      s.theta += s.omega * kStep;
     }
     out.push_back(std::move(t));
   }
@@ -187,9 +188,9 @@ TEST(MissingForce, DragIsReadFromFlightsWithoutBeingAskedFor) {
     return std::array<double, 3>{-k * speed * s.vx, -k * speed * s.vz, 0};
   });
   const auto candidate = missing_terms(traces, kFlight);
-  ASSERT_EQ(candidate.terms.size(), 1u) << candidate.in_words();
+  ASSERT_EQ(candidate.terms.size(), 1u) << candidate.in_words({});
   EXPECT_EQ(candidate.terms[0].name, "|v| v");
-  EXPECT_NEAR(candidate.terms[0].coefficient, -k, 5 * candidate.terms[0].sigma + 0.01 * k);
+  EXPECT_NEAR(candidate.terms[0].coefficient(0), -k, 5 * candidate.terms[0].sizes[0].sigma + 0.01 * k);
   EXPECT_GT(candidate.explained, 0.95);
 }
 
@@ -202,7 +203,76 @@ TEST(MissingForce, LiftIsNotMistakenForDrag) {
                     kFlight);
   ASSERT_FALSE(candidate.terms.empty());
   EXPECT_EQ(candidate.terms[0].name, "omega J v");
-  EXPECT_NEAR(candidate.terms[0].coefficient, k, 5 * candidate.terms[0].sigma + 0.01 * k);
+  EXPECT_NEAR(candidate.terms[0].coefficient(0), k, 5 * candidate.terms[0].sizes[0].sigma + 0.01 * k);
+}
+
+/// Traces of two groups, each with its own missing acceleration.
+template <class First, class Second>
+std::vector<ResidualTrace> two_groups(const First& first, const Second& second) {
+  std::vector<ResidualTrace> out = flights(first);
+  for (ResidualTrace& trace : flights(second, 50)) {
+    trace.group = 1;
+    out.push_back(std::move(trace));
+  }
+  return out;
+}
+
+// What the air does depends on the body: a drag of each, and of one that has none, zero.
+TEST(MissingForce, BodiesHaveDragsOfTheirOwn) {
+  const auto drag = [](double k) {
+    return [k](const ResidualTrace::State& s) {
+      const double speed = std::hypot(s.vx, s.vz);
+      return std::array<double, 3>{-k * speed * s.vx, -k * speed * s.vz, 0};
+    };
+  };
+  for (const double second : {0.03, 0.0}) {
+    const auto candidate = missing_terms(two_groups(drag(0.15), drag(second)), kFlight);
+    const std::string words = candidate.in_words({{0, "jar"}, {1, "bar"}});
+    ASSERT_EQ(candidate.terms.size(), 1u) << words;
+    EXPECT_EQ(candidate.terms[0].name, "|v| v");
+    ASSERT_EQ(candidate.terms[0].sizes.size(), 2u) << words;
+    EXPECT_NEAR(candidate.terms[0].coefficient(0), -0.15, 0.002);
+    EXPECT_NEAR(candidate.terms[0].coefficient(1), -second, 0.002);
+    for (const MissingSize& size : candidate.terms[0].sizes) EXPECT_LT(size.sigma, 0.001);
+    EXPECT_GT(candidate.explained, 0.95);
+    EXPECT_NE(words.find("for jar, "), std::string::npos) << words;
+  }
+}
+
+// Gravity is the same for all: one coefficient, √2 better known than that of either alone.
+TEST(MissingForce, WhatActsOnAllAlikeHasOneCoefficient) {
+  const auto tilt = [](const ResidualTrace::State&) { return std::array<double, 3>{0.05, 0, 0}; };
+  const auto traces = two_groups(tilt, tilt);
+  const auto both = missing_terms(traces, kFlight);
+  const std::vector<ResidualTrace> half(traces.begin(), traces.begin() + 12);
+  const auto one = missing_terms(half, kFlight);
+  ASSERT_EQ(both.terms.size(), 1u);
+  ASSERT_EQ(one.terms.size(), 1u);
+  EXPECT_EQ(both.terms[0].name, "1 along x");
+  ASSERT_EQ(both.coefficients(), 1u) << both.in_words({{0, "jar"}, {1, "bar"}});
+  EXPECT_NEAR(both.terms[0].coefficient(1), 0.05, 4 * both.terms[0].sizes[0].sigma);
+  EXPECT_NEAR(both.terms[0].sizes[0].sigma, one.terms[0].sizes[0].sigma / std::sqrt(2.0),
+              0.1 * both.terms[0].sizes[0].sigma);
+}
+
+// A tilt of gravity that both feel beside a drag that one has: a coefficient of both, and one of each.
+TEST(MissingForce, ACommonTermBesideOneOfTheBodies) {
+  const auto with = [](double k) {
+    return [k](const ResidualTrace::State& s) {
+      const double speed = std::hypot(s.vx, s.vz);
+      return std::array<double, 3>{0.2 - k * speed * s.vx, -k * speed * s.vz, 0};
+    };
+  };
+  const auto candidate = missing_terms(two_groups(with(0.15), with(0.0)), kFlight);
+  const std::string words = candidate.in_words({{0, "jar"}, {1, "bar"}});
+  ASSERT_EQ(candidate.terms.size(), 2u) << words;
+  for (const MissingTerm& term : candidate.terms) {
+    const bool is_drag = term.name == "|v| v";
+    ASSERT_TRUE(is_drag || term.name == "1 along x") << words;
+    EXPECT_EQ(term.sizes.size(), is_drag ? 2u : 1u) << words;
+    EXPECT_NEAR(term.coefficient(0), is_drag ? -0.15 : 0.2, 0.005) << words;
+    EXPECT_NEAR(term.coefficient(1), is_drag ? 0 : 0.2, 0.005) << words;
+  }
 }
 
 // What is left around the right form is noise: χ² of its degrees of freedom, on throws that it has not seen.
@@ -268,7 +338,7 @@ TEST(MissingForce, NoisySamplesCountForWhatTheyKnow) {
   const auto candidate = missing_terms(traces, {Response::direct, 7, 1});
   ASSERT_EQ(candidate.terms.size(), 1u);
   const double known_to = kQuiet / std::sqrt(kThrows * kSamples / 2.0);
-  const double size = candidate.terms[0].coefficient * candidate.terms[0].shape({0.1, 0, 0, 0, 10})[0];
+  const double size = candidate.terms[0].coefficient(0) * candidate.terms[0].shape({0.1, 0, 0, 0, 10})[0];
   EXPECT_NEAR(size, kMissing, 4 * known_to);
 }
 

@@ -47,8 +47,8 @@ void asks_for(const Discovery& found, const std::string& term, double size, doub
   EXPECT_NE(words.find(") " + term + " ["), std::string::npos) << words;
   const MissingCandidate& candidate = found.unexplained->missing->candidate;
   ASSERT_FALSE(candidate.terms.empty()) << words;
-  EXPECT_EQ(candidate.terms.front().name, term) << candidate.in_words();
-  EXPECT_NEAR(candidate.terms.front().coefficient, size, within) << candidate.in_words();
+  EXPECT_EQ(candidate.terms.front().name, term) << words;
+  EXPECT_NEAR(candidate.terms.front().coefficient(0), size, within) << words;
 }
 
 // Quadratic drag takes all but a few thousandths of it, as speeds do not differ by much. But the laws of
@@ -166,7 +166,7 @@ TEST(Unexplained, GravityDeclaredWrongIsNoLiftAndNoWind) {
   const MissingCandidate& form = found.unexplained->missing->candidate;
   ASSERT_EQ(form.terms.size(), 1u);
   EXPECT_EQ(form.terms[0].name, "1 along z");
-  EXPECT_NEAR(form.terms[0].coefficient, -0.03, 0.003);
+  EXPECT_NEAR(form.terms[0].coefficient(0), -0.03, 0.003);
 }
 
 // Noise that is declared too small leaves the noise in every phase, by the same factor.
