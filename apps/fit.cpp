@@ -23,8 +23,6 @@ namespace unhand::apps {
 namespace {
 
 constexpr int kDefaultFolds = 5;
-constexpr double kWildMisfit = 900;  ///< χ² per sample of a channel that is told of: 30 σ
-constexpr double kPoorFit = 2;  ///< χ² per degree of freedom from which parameters are not to be trusted
 
 bool among(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
@@ -74,25 +72,6 @@ void write_report(const FitAnswer& answer, const FitRequest& request, const Json
   write_text(directory / "fit.json", json_text(json));
 }
 
-/// Says where wrenches of the firm grasp hardly count: no friction law acts there, so that what the model
-/// does not explain is the object (its mass, its inertia), the sensor, or pads that give.
-void tell_of_firm_grasp(const fitting::FitResult& fit) {
-  using experiment::Channel;
-  constexpr double kHardly = 0.7;  // weight
-  std::vector<std::string> words;
-  for (const auto& m : fit.misfit)
-    if (m.phase == fitting::Phase::grasped && m.weight < kHardly &&
-        (m.channel == Channel::wrench_fx || m.channel == Channel::wrench_fz ||
-         m.channel == Channel::wrench_tau))
-      words.push_back(fmt::format("{} (weight {:.2f})", to_string(m.channel), m.weight));
-  if (!words.empty())
-    tell(
-        "unhand: in the firm grasp, where no friction acts, the model does not follow {}: a mass or an "
-        "inertia declared wrong, the sensor, or pads that give. It bends the parameters, which no "
-        "interval tells; ask unhand discover\n",
-        fmt::join(words, ", "));
-}
-
 void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
   fitting::CampaignOptions campaign;
   campaign.model = request.model;
@@ -134,29 +113,7 @@ void fit_throws(const FitRequest& request, const datasets::ThrowLog& log) {
     answer.cross_validation = fitting::cross_validate(log, request.log, campaign, options, folds);
   if (request.floor > 0)
     answer.floor = fitting::error_floor(log, request.log, problem, fit, options, request.floor);
-  std::vector<std::string> left_out;
-  for (std::size_t i = 0; i < fit.throws.size(); ++i)
-    if (log.throws[i].split == datasets::Split::train && !fit.throws[i].used)
-      left_out.push_back(log.throws[i].id);
-  if (!left_out.empty())
-    tell(
-        "unhand: fitted without {} of the train throws, which {} cannot simulate or which show nothing: {}\n",
-        left_out.size(), request.model, fmt::join(left_out, ", "));
-  if (fit.outcome == fitting::FitOutcome::iterations_spent)
-    tell("unhand: the fit stopped before it had converged: {}\n", fit.message);
-
-  for (const auto& m : fit.misfit)
-    if (m.chi2_per_sample() > kWildMisfit)
-      tell(
-          "unhand: {} ({}) is off by {:.0f} sigma: it hardly counts in the fit. Another unit, clock or "
-          "frame, or not this model?\n",
-          to_string(m.channel), to_string(m.phase), std::sqrt(m.chi2_per_sample()));
-  if (const auto chi2 = fit.chi2_per_dof(); chi2 && *chi2 > kPoorFit)
-    tell(
-        "unhand: chi2 per degree of freedom is {:.3g}: something is missing in {} or wrong in the log, "
-        "and it bends the parameters, which no interval tells; ask unhand discover\n",
-        *chi2, request.model);
-  tell_of_firm_grasp(fit);
+  for (const auto& warning : fit_warnings(answer, request)) tell("unhand: {}\n", warning);
   tell_weak_grip(answer.errors);
 
   const Json json = fit_json(answer, request);

@@ -44,6 +44,11 @@ struct FitAnswer {
 /// Why a fit is no answer, in words.
 std::string why_unfitted(const fitting::FitResult& fit);
 
+/// Why the answer is not to be trusted as it is, a line each: said on stderr, in the report and in the JSON.
+std::vector<std::string> fit_warnings(const FitAnswer& answer, const FitRequest& request);
+/// What was dropped or assumed, a line each.
+std::vector<std::string> fit_notes(const FitAnswer& answer, const FitRequest& request);
+
 /// The answer in words and tables; `markdown` for the report, otherwise aligned with spaces.
 std::string fit_text(const FitAnswer& answer, const FitRequest& request, bool markdown);
 Json fit_json(const FitAnswer& answer, const FitRequest& request);

@@ -114,7 +114,8 @@ Json fit_json(const FitAnswer& a, const FitRequest& request) {
   out["iterations"] = fit.iterations;
   out["mode_changes"] = fit.mode_changes;
   out["throws"] = throws_json(a);
-  out["notes"] = a.problem.notes();
+  out["warnings"] = fit_warnings(a, request);
+  out["notes"] = fit_notes(a, request);
   for (const auto& [split, name] : {std::pair{Split::train, "train"}, {Split::test, "test"}}) {
     const auto n = static_cast<int>(std::count_if(a.errors.throws.begin(), a.errors.throws.end(),
                                                   [s = split](const auto& one) { return one.split == s; }));

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "apps/fit.hpp"
 #include "contact/registry.hpp"
@@ -115,8 +116,17 @@ std::string why_unfitted(const fitting::FitResult& fit) {
                                                         : fit.message;
 }
 
+std::vector<std::string> fit_notes(const FitAnswer& a, const FitRequest& request) {
+  std::vector<std::string> out = a.problem.notes();
+  if (takes_pads_as_rigid(a, request))
+    out.push_back(
+        "pads are taken as rigid. A give of a micrometre before they slip makes length some per cent too "
+        "small, more than its interval says, and chi2 hardly shows it; --effects contact.pad_compliance fits "
+        "it");
+  return out;
+}
+
 std::string fit_text(const FitAnswer& a, const FitRequest& request, bool markdown) {
-  const auto table = [&](const Table& t) { return markdown ? t.markdown() : t.text(); };
   const auto& fit = a.fit;
   std::size_t used = 0, n_train = 0;
   for (std::size_t i = 0; i < fit.throws.size(); ++i) {
@@ -126,67 +136,69 @@ std::string fit_text(const FitAnswer& a, const FitRequest& request, bool markdow
   std::string effects;
   for (const auto& id : request.effects) effects += (effects.empty() ? " with " : ", ") + id;
   const std::string log = request.log + ": " + a.origin;
-  std::string out =
-      fmt::format("{}{}\n{}{}{} fitted to {} of {} train throws, {} samples: {}, {} iterations\n\n",
-                  markdown ? "# Fit\n\n" : "", markdown ? markdown_text(log) : log, markdown ? "\n" : "",
-                  request.model, effects, used, n_train, fit.samples,
-                  fit.outcome == fitting::FitOutcome::converged ? "converged" : "stopped before it converged",
-                  fit.iterations);
-  out += table(parameter_table(fit)) + "\n";
-  out +=
-      fmt::format("intervals: from the scatter between {}{}\n",
-                  plural(static_cast<std::size_t>(fit.clusters), fit.by_conditions ? "condition" : "throw"),
-                  fit.by_conditions ? ""
-                                    : "; what repetitions share of the model's errors is not in them: that "
-                                      "would take four conditions");
+  std::string out = markdown ? "# Fit\n\n" : "";
+  const auto say = [&]<class... T>(fmt::format_string<T...> format, T&&... of) {
+    out += fmt::format(format, std::forward<T>(of)...) +
+           (markdown ? "\n\n" : "\n");  // else its lines are joined
+  };
+  const auto show = [&](const Table& table) { out += (markdown ? table.markdown() : table.text()) + "\n"; };
+  say("{}", markdown ? markdown_text(log) : log);
+  say("{}{} fitted to {} of {} train throws, {} samples: {}, {} iterations{}", request.model, effects, used,
+      n_train, fit.samples,
+      fit.outcome == fitting::FitOutcome::converged ? "converged" : "stopped before it converged",
+      fit.iterations, markdown ? "" : "\n");
+  show(parameter_table(fit));
+  say("intervals: from the scatter between {}{}",
+      plural(static_cast<std::size_t>(fit.clusters), fit.by_conditions ? "condition" : "throw"),
+      fit.by_conditions ? ""
+                        : "; what repetitions share of the model's errors is not in them: that would take "
+                          "four conditions");
   for (const auto& open : fit.open)
-    out += fmt::format("not determined by this log: {} ({}).\n  It would take {}.\n", open.meaning,
-                       std::isfinite(open.sigma) ? fmt::format("1 sigma is {:.2g} such steps", open.sigma)
-                                                 : std::string("no trace of it at all"),
-                       fitting::remedy(a.problem, open));
+    say("not determined by this log: {} ({}).\n  It would take {}.", open.meaning,
+        std::isfinite(open.sigma) ? fmt::format("1 sigma is {:.2g} such steps", open.sigma)
+                                  : std::string("no trace of it at all"),
+        fitting::remedy(a.problem, open));
   for (const auto& pair : fitting::strong_correlations(fit))
-    out += fmt::format("correlated: {} and {}, {:+.3f}\n", pair.first, pair.second, pair.value);
-  out += "\n" + table(spread_table(a)) + "\n";
-  out += fmt::format("{}\nchi2 {:.6g} for {} degrees of freedom: {} each\n", table(misfit_table(fit)),
-                     fit.chi2, fit.degrees_of_freedom, fixed(fit.chi2_per_dof(), 3));
+    say("correlated: {} and {}, {:+.3f}", pair.first, pair.second, pair.value);
+  if (!markdown) out += "\n";
+  show(spread_table(a));
+  show(misfit_table(fit));
+  say("chi2 {:.6g} for {} degrees of freedom: {} each", fit.chi2, fit.degrees_of_freedom,
+      fixed(fit.chi2_per_dof(), 3));
   if (fit.mode_changes > 0)
-    out += fmt::format("{} throws changed their sequence of modes in the last round\n", fit.mode_changes);
+    say("{} throws changed their sequence of modes in the last round", fit.mode_changes);
   std::string outliers;
   for (const auto& t : fit.throws)
     if (t.used && t.weight < 1)
       outliers += fmt::format("{}{} ({:.2f})", outliers.empty() ? "" : ", ", t.id, t.weight);
-  out += outliers.empty() ? "no outlier throws\n" : fmt::format("outlier throws (weight): {}\n", outliers);
+  say("{}", outliers.empty() ? "no outlier throws" : "outlier throws (weight): " + outliers);
   if (fit.not_simulated > 0)
-    out += fmt::format("{} train throws could not be simulated from the start and took no part: {}\n",
-                       fit.not_simulated, fit.why_not());
+    say("{} train throws could not be simulated from the start and took no part: {}", fit.not_simulated,
+        fit.why_not());
   if (const auto without = n_train - used - static_cast<std::size_t>(fit.not_simulated); without > 0)
-    out += fmt::format("{} train throws have no observation among the channels asked for\n", without);
-  for (const auto& note : a.problem.notes()) out += fmt::format("note: {}\n", note);
-  if (takes_pads_as_rigid(a, request))
-    out +=
-        "note: pads are taken as rigid. A give of a micrometre before they slip makes length some per "
-        "cent too small, more than its interval says, and chi2 hardly shows it; --effects "
-        "contact.pad_compliance fits it\n";
-  out += fmt::format("\npredictions: mean absolute error ± its standard deviation (bias)\n{}{}",
-                     markdown ? "\n" : "", table(error_table(a)));
+    say("{} train throws have no observation among the channels asked for", without);
+  if (markdown)
+    for (const auto& warning : fit_warnings(a, request)) say("warning: {}", warning);
+  for (const auto& note : fit_notes(a, request)) say("note: {}", note);
+  if (!markdown) out += "\n";
+  say("predictions: mean absolute error ± its standard deviation (bias)");
+  out += markdown ? error_table(a).markdown() + "\n" : error_table(a).text();
   if (const auto& cv = a.cross_validation) {
-    out += fmt::format("cross-validated: {} folds of whole conditions of the train throws\n", cv->folds);
-    for (const auto& failure : cv->failed) out += failure + "\n";
+    say("cross-validated: {} folds of whole conditions of the train throws", cv->folds);
+    for (const auto& failure : cv->failed) say("{}", failure);
   }
   if (a.floor)
-    out += fmt::format(
-        "floor: the mean of {} synthetic twins, simulated with the model as fitted and the declared "
-        "noise, then fitted and predicted alike\n",
+    say("floor: the mean of {} synthetic twins, simulated with the model as fitted and the declared noise, "
+        "then fitted and predicted alike",
         a.floor->twins);
-  if (a.errors.failed > 0) out += fmt::format("{} throws are not brought to a landing\n", a.errors.failed);
+  if (a.errors.failed > 0) say("{} throws are not brought to a landing", a.errors.failed);
   if (!markdown) return out;  // how long it took: in the report and the JSON
-  out += fmt::format("\n{:.2f} s on {} threads, Jacobian {:.0f} %\n", fit.seconds, a.threads,
-                     100 * a.jacobian_share());
+  say("{:.2f} s on {} threads, Jacobian {:.0f} %", fit.seconds, a.threads, 100 * a.jacobian_share());
   const auto& g = a.gradients;
   if (g.plain > 0)
-    out += fmt::format(
-        "a throw's derivatives by {} unknowns: {:.2f} ms exact, {:.1f} plain predictions; {:.2f} ms by "
-        "central differences, {:.1f} of them (median deviation {:.1g})\n",
+    say("a throw's derivatives by {} unknowns: {:.2f} ms exact, {:.1f} plain predictions; {:.2f} ms by "
+        "central "
+        "differences, {:.1f} of them (median deviation {:.1g})",
         g.unknowns, 1e3 * g.exact / static_cast<double>(used), g.exact / g.plain,
         1e3 * g.central / static_cast<double>(used), g.central / g.plain, g.deviation);
   return out;

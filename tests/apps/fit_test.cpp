@@ -54,6 +54,29 @@ TEST_F(Cli, PredictSaysWhereTheCardWasMissedByFarMoreThanItsSigmas) {
   EXPECT_THAT(off.err, Not(HasSubstr("landing x [m]")));
 }
 
+// A fit converges whatever the model lacks; its intervals know nothing of that.
+TEST_F(Cli, FitWarnsOfWhatTheModelLacksInTheReportAndTheJsonToo) {
+  ASSERT_EQ(run("generate quick12 --seed 3 --effect flight.quadratic_drag=0.3 --out windy.h5").code, 0);
+  for (const bool windy : {true, false}) {
+    const std::string log = windy ? "windy.h5" : quick;
+    const Answer answer = run("fit " + log + " --model limit_surface_disc --report r --json f.json");
+    ASSERT_EQ(answer.code, 0) << answer.err;
+    const std::string report = content(folder / "r/report.md");
+    json fitted = read_json(folder / "f.json");
+    EXPECT_EQ(fitted["warnings"].empty(), !windy) << fitted["warnings"];
+    EXPECT_EQ(fitted["warnings"].dump().find("mocap.x (flight) is off by") != std::string::npos, windy);
+    for (const auto& warning : fitted["warnings"]) {
+      EXPECT_THAT(answer.err, HasSubstr("unhand: " + warning.get<std::string>() + "\n"));
+      EXPECT_THAT(report, HasSubstr("\n\nwarning: " + warning.get<std::string>() + "\n\n"));
+    }
+    EXPECT_FALSE(fitted["notes"].empty());
+    for (const auto& note : fitted["notes"]) {
+      EXPECT_THAT(answer.out, HasSubstr("\nnote: " + note.get<std::string>() + "\n"));
+      EXPECT_THAT(report, HasSubstr("\n\nnote: " + note.get<std::string>() + "\n\n"));
+    }
+  }
+}
+
 TEST_F(Cli, FitThenPredict) {
   const Answer answer =
       run("fit " + quick + " --model limit_surface_disc --card c.json --json f.json --report r");
