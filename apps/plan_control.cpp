@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <optional>
+#include <vector>
 
 #include "apps/command.hpp"
 #include "apps/figure.hpp"
@@ -129,59 +129,83 @@ void draw_errors(const std::vector<ct::StudyThrow>& recorded,
   draw(figure, folder, "simulated by unhand plan control");
 }
 
+/// Every controller with every object, thrown by the same simulated robots.
+std::vector<Cell> throw_all(const PlanControlOptions& o, const ct::StudyOptions& study) {
+  std::vector<Cell> out;
+  for (const auto& payload : ct::reported_payloads())
+    for (const auto& controller : compared_controllers())
+      out.push_back({payload, controller, std::vector<ct::StudyThrow>(o.seeds), {}});
+  Progress progress("plan control", out.size() * o.seeds);
+  dynamics::parallel_for(out.size() * o.seeds, o.threads, [&](std::size_t i) {
+    Cell& cell = out[i / o.seeds];
+    const std::size_t k = i % o.seeds;
+    cell.throws[k] = ct::run_throw(cell.controller, cell.payload, study, k + 1);
+    progress.step();
+  });
+  for (Cell& cell : out) cell.landed = ct::dispersion_of(cell.throws);
+  return out;
+}
+
+/// The mean error at the release.
+double mean_of(const std::vector<ct::StudyThrow>& throws, double ct::StudyThrow::*error) {
+  double sum = 0;
+  for (const auto& one : throws) sum += one.*error;
+  return sum / static_cast<double>(throws.size());
+}
+
+Table table_of(const std::vector<Cell>& cells) {
+  Table out{{"object", "controller", "in the box", "mean miss [mm]", "std along, across [mm]",
+             "rms miss [mm]", "error at the release [mm, mm/s]", "torque used"},
+            {},
+            2};
+  for (const Cell& cell : cells) {
+    const auto& d = cell.landed;
+    const int landed = d.throws - d.lost;
+    out.rows.push_back(
+        {fmt::format("{}, {:.0f} g", cell.payload.name, 1e3 * cell.payload.mass), cell.controller.name,
+         fmt::format("{}/{}", d.hits, d.throws), landed > 0 ? with_sign(1e3 * d.mean.x(), 1) : "-",
+         fmt::format("{}, {}", fixed(landed > 1, 1e3 * d.std.x(), 1), fixed(landed > 1, 1e3 * d.std.y(), 1)),
+         fixed(landed > 0, 1e3 * d.rms, 1),
+         fmt::format("{:.1f}, {:.1f}", 1e3 * mean_of(cell.throws, &ct::StudyThrow::release_position_error),
+                     1e3 * mean_of(cell.throws, &ct::StudyThrow::release_velocity_error)),
+         fmt::format("{:.0f} %", 100 * d.largest_torque_use)});
+  }
+  return out;
+}
+
+Json json_of(const std::vector<Cell>& cells, const PlanControlOptions& o) {
+  Json out = json_head("plan-control");
+  out["seeds"] = o.seeds;
+  out["cells"] = Json::array();
+  for (const Cell& cell : cells) {
+    const auto& d = cell.landed;
+    const int landed = d.throws - d.lost;
+    out["cells"].push_back(
+        {{"object", cell.payload.name},
+         {"mass_kg", cell.payload.mass},
+         {"controller", cell.controller.name},
+         {"throws", d.throws},
+         {"hits", d.hits},
+         {"lost", d.lost},
+         {"mean_m", landed > 0 ? Json{d.mean.x(), d.mean.y()} : Json(nullptr)},
+         {"std_m", landed > 1 ? Json{d.std.x(), d.std.y()} : Json(nullptr)},
+         {"rms_m", landed > 0 ? Json(d.rms) : Json(nullptr)},
+         {"release_position_error_m", mean_of(cell.throws, &ct::StudyThrow::release_position_error)},
+         {"release_velocity_error_m_s", mean_of(cell.throws, &ct::StudyThrow::release_velocity_error)},
+         {"torque_use", d.largest_torque_use}});
+  }
+  return out;
+}
+
 void run(const PlanControlOptions& o) {
   if (!o.report.empty()) require_gnuplot();
   require_outputs({{o.report, Wanted::directory}, {o.json}});
   ct::StudyOptions study;
   study.repetitions = o.repetitions;
   study.box = {o.box, o.box};
-  std::vector<Cell> cells;
-  for (const auto& payload : ct::reported_payloads())
-    for (const auto& controller : compared_controllers())
-      cells.push_back({payload, controller, std::vector<ct::StudyThrow>(o.seeds), {}});
-  std::optional<Progress> progress(std::in_place, "plan control", cells.size() * o.seeds);
-  dynamics::parallel_for(cells.size() * o.seeds, o.threads, [&](std::size_t i) {
-    Cell& cell = cells[i / o.seeds];
-    const std::size_t k = i % o.seeds;
-    cell.throws[k] = ct::run_throw(cell.controller, cell.payload, study, k + 1);
-    progress->step();
-  });
-  progress.reset();
-  Table table{{"object", "controller", "in the box", "mean miss [mm]", "std along, across [mm]",
-               "rms miss [mm]", "error at the release [mm, mm/s]", "torque used"},
-              {},
-              2};
-  Json json = json_head("plan-control");
-  json["seeds"] = o.seeds;
-  json["cells"] = Json::array();
-  for (Cell& cell : cells) {
-    cell.landed = ct::dispersion_of(cell.throws);
-    const auto& d = cell.landed;
-    const int landed = d.throws - d.lost;
-    double position = 0, velocity = 0;
-    for (const auto& one : cell.throws)
-      position += one.release_position_error / o.seeds, velocity += one.release_velocity_error / o.seeds;
-    table.rows.push_back(
-        {fmt::format("{}, {:.0f} g", cell.payload.name, 1e3 * cell.payload.mass), cell.controller.name,
-         fmt::format("{}/{}", d.hits, d.throws), landed > 0 ? with_sign(1e3 * d.mean.x(), 1) : "-",
-         fmt::format("{}, {}", fixed(landed > 1, 1e3 * d.std.x(), 1), fixed(landed > 1, 1e3 * d.std.y(), 1)),
-         fixed(landed > 0, 1e3 * d.rms, 1), fmt::format("{:.1f}, {:.1f}", 1e3 * position, 1e3 * velocity),
-         fmt::format("{:.0f} %", 100 * d.largest_torque_use)});
-    json["cells"].push_back({{"object", cell.payload.name},
-                             {"mass_kg", cell.payload.mass},
-                             {"controller", cell.controller.name},
-                             {"throws", d.throws},
-                             {"hits", d.hits},
-                             {"lost", d.lost},
-                             {"mean_m", landed > 0 ? Json{d.mean.x(), d.mean.y()} : Json(nullptr)},
-                             {"std_m", landed > 1 ? Json{d.std.x(), d.std.y()} : Json(nullptr)},
-                             {"rms_m", landed > 0 ? Json(d.rms) : Json(nullptr)},
-                             {"release_position_error_m", position},
-                             {"release_velocity_error_m_s", velocity},
-                             {"torque_use", d.largest_torque_use}});
-  }
-  fmt::print("{}\n{} simulated robots each, the same for every controller; {} repetitions before the throw\n",
-             table.text(), o.seeds, o.repetitions);
+  const std::vector<Cell> cells = throw_all(o, study);
+  const Table table = table_of(cells);
+  const Json json = json_of(cells, o);
   Outputs outputs;
   if (!o.report.empty()) {
     const fs::path folder = outputs.directory(o.report);
@@ -196,6 +220,8 @@ void run(const PlanControlOptions& o) {
   }
   if (!o.json.empty()) outputs.json(o.json, json);
   outputs.commit();
+  fmt::print("{}\n{} simulated robots each, the same for every controller; {} repetitions before the throw\n",
+             table.text(), o.seeds, o.repetitions);
 }
 
 }  // namespace

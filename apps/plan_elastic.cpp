@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "apps/command.hpp"
+#include "apps/elastic_answer.hpp"
 #include "apps/elastic_trajectory.hpp"
 #include "apps/figure.hpp"
 #include "apps/output.hpp"
@@ -21,7 +22,6 @@ namespace unhand::apps {
 namespace {
 
 namespace el = planners::elastic;
-namespace fs = std::filesystem;
 
 struct PlanElasticOptions {
   int threads{1};
@@ -70,7 +70,8 @@ Json use_json(const el::UsedShares& use) {
           {"deflection", use.deflection}};
 }
 
-void draw_speeds(const el::ClutchedArm& arm, const std::vector<Fastest>& all, const fs::path& folder) {
+/// None where no drive has a throw.
+std::vector<Figure> speed_figures(const el::ClutchedArm& arm, const std::vector<Fastest>& all) {
   Figure figure{"speed", 17, 12, {}, ""};
   const char* style[]{"lines lw 2 lc rgb '#0072b2' dt 1", "lines lw 2 lc rgb '#d55e00' dt 2",
                       "lines lw 2 lc rgb '#555555' dt 4"};
@@ -86,16 +87,17 @@ void draw_speeds(const el::ClutchedArm& arm, const std::vector<Fastest>& all, co
     deflection +=
         fmt::format("{}DATA index {} using 1:3 with {} notitle", index ? ", " : "plot ", index, style[i]);
   }
-  if (figure.data.empty()) return;
+  if (figure.data.empty()) return {};
   figure.script =
       "set multiplot layout 2,1\nset lmargin 10\nset rmargin 3\nset key left top\nset xlabel 'time [s]'\nset "
       "ylabel 'tip speed "
       "[m/s]'\n" +
       speed + "\nset ylabel 'spring deflection [rad]'\n" + deflection + "\nunset multiplot\n";
-  draw(figure, folder, "simulated by unhand plan elastic");
+  return {figure};
 }
 
-void draw_table(const std::vector<el::TableCheck>& checks, const fs::path& folder) {
+/// None where no throw of a dense check lands.
+std::vector<Figure> check_figures(const std::vector<el::TableCheck>& checks) {
   Figure figure{"table",
                 17,
                 11,
@@ -103,7 +105,7 @@ void draw_table(const std::vector<el::TableCheck>& checks, const fs::path& folde
                 ""};
   for (const auto& c : checks)
     if (c.lands) figure.data[0].rows.push_back({c.distance, 1e3 * c.miss, c.limit_use});
-  if (figure.data[0].rows.empty()) return;
+  if (figure.data[0].rows.empty()) return {};
   figure.script =
       "set multiplot layout 2,1\nset lmargin 10\nset rmargin 3\nunset key\nset xlabel 'distance of the "
       "target [m]'\nset ylabel "
@@ -112,7 +114,7 @@ void draw_table(const std::vector<el::TableCheck>& checks, const fs::path& folde
       "yrange [0:*]\n"
       "plot DATA using 1:3 with lines lw 2 lc rgb '#d55e00', 1 with lines lw 1 dt 2 lc rgb '#000000'\nunset "
       "multiplot\n";
-  draw(figure, folder, "simulated by unhand plan elastic");
+  return {figure};
 }
 
 el::ThrowProgramOptions program_options(const PlanElasticOptions& o) {
@@ -122,67 +124,70 @@ el::ThrowProgramOptions program_options(const PlanElasticOptions& o) {
   return out;
 }
 
-void fastest(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs& outputs, Json& json) {
+Json basin_json(const el::ConfirmedBasin& basin) {
+  const auto& [best, starts] = basin;
+  const el::Replay& run = best.run;
+  return {{"starts", starts},
+          {"speed_m_s", best.plan.speed()},
+          {"intervals", 2 * best.intervals},
+          {"confirmed", best.confirmed},
+          {"resimulated_speed_m_s", speed_of(run.release)},
+          {"spring_stop", run.spring_stop},
+          {"duration_s", best.plan.duration()},
+          {"limits", use_json(run.use)},
+          {"energy_J",
+           {{"motors", run.motor_work},
+            {"damping", run.damping},
+            {"friction", run.friction},
+            {"impacts", run.impacts},
+            {"gain", run.gain},
+            {"unexplained", run.unexplained()}}}};
+}
+
+std::string resimulated(const el::Replay& run) {
+  return run.spring_stop ? "spring at its stop" : fmt::format("{:.3f}", speed_of(run.release));
+}
+
+/// The fastest throw of each drive.
+ElasticAnswer fastest(const el::ClutchedArm& arm, const PlanElasticOptions& o, Json json) {
   el::ThrowTask task;
   task.longest = o.longest > 0 ? o.longest : 0.6;
   task.elevation = o.elevation * M_PI / 180;
   std::vector<Fastest> all;
-  Table table{{"drive", "basin", "starts", "tip speed [m/s]", "re-simulated", "duration [s]", "limits used",
-               "intervals"},
-              {},
-              2};
+  ElasticAnswer out;
+  out.table = {{"drive", "basin", "starts", "tip speed [m/s]", "re-simulated", "duration [s]", "limits used",
+                "intervals"},
+               {},
+               2};
+  out.table_file = "speeds.md";
+  out.trajectories = trajectory_header("drive,basin");
   double longest = 0;
   json["drives"] = Json::object();
   for (const el::Drive drive : {el::Drive::clutched, el::Drive::series, el::Drive::rigid}) {
     task.drive = drive;
+    const std::string name = el::to_string(drive);
     const el::Basins basins = el::find_basins(arm, task, program_options(o), o.starts);
     all.push_back({drive, el::confirm_basins(arm, task, basins, program_options(o))});
     const el::ConfirmedBasins& confirmed = all.back().basins;
     longest = std::max(longest, confirmed.longest);
-    Json& j =
-        json["drives"][el::to_string(drive)] = {{"failed_starts", basins.failed}, {"basins", Json::array()}};
+    Json& j = json["drives"][name] = {{"failed_starts", basins.failed}, {"basins", Json::array()}};
     for (std::size_t k = 0; k < confirmed.found.size(); ++k) {
       const auto& [best, starts] = confirmed.found[k];
-      const el::Replay& run = best.run;
-      table.rows.push_back(
-          {k == 0 ? el::to_string(drive) : "", fmt::to_string(k + 1), fmt::to_string(starts),
-           fmt::format("{:.3f}", best.plan.speed()),
-           run.spring_stop ? "spring at its stop" : fmt::format("{:.3f}", speed_of(run.release)),
-           fmt::format("{:.3f}", best.plan.duration()), fmt::format("{:.1f} %", 100 * run.use.largest()),
+      out.table.rows.push_back(
+          {k == 0 ? name : "", fmt::to_string(k + 1), fmt::to_string(starts),
+           fmt::format("{:.3f}", best.plan.speed()), resimulated(best.run),
+           fmt::format("{:.3f}", best.plan.duration()), fmt::format("{:.1f} %", 100 * best.run.use.largest()),
            fmt::to_string(2 * best.intervals) + (best.confirmed ? "" : ", not confirmed")});
-      j["basins"].push_back({{"starts", starts},
-                             {"speed_m_s", best.plan.speed()},
-                             {"intervals", 2 * best.intervals},
-                             {"confirmed", best.confirmed},
-                             {"resimulated_speed_m_s", speed_of(run.release)},
-                             {"spring_stop", run.spring_stop},
-                             {"duration_s", best.plan.duration()},
-                             {"limits", use_json(run.use)},
-                             {"energy_J",
-                              {{"motors", run.motor_work},
-                               {"damping", run.damping},
-                               {"friction", run.friction},
-                               {"impacts", run.impacts},
-                               {"gain", run.gain},
-                               {"unexplained", run.unexplained()}}}});
+      j["basins"].push_back(basin_json(confirmed.found[k]));
+      out.trajectories += trajectory_rows(fmt::format("{},{}", name, k + 1), arm, best.run);
     }
   }
   json["longest_solve_s"] = longest;
-  const std::string notes =
-      fmt::format("longest solve {:.2f} s of CPU time, {} random starts each\n", longest, o.starts) +
-      (o.arm == PlanElasticOptions().arm ? kOnHardware : "");
-  fmt::print("{}\n{}", table.text(), notes);
-  if (o.report.empty()) return;
-  const fs::path folder = outputs.directory(o.report);
-  draw_speeds(arm, all, folder);
-  write_text(folder / "speeds.md", table.markdown() + "\n" + notes);
-  std::string csv = trajectory_header("drive,basin");
-  for (const Fastest& one : all)
-    for (std::size_t k = 0; k < one.basins.found.size(); ++k)
-      csv += trajectory_rows(fmt::format("{},{}", el::to_string(one.drive), k + 1), arm,
-                             one.basins.found[k].best.run);
-  write_text(folder / "trajectory.csv", csv);
-  write_text(folder / "plan.json", json_text(json));
+  out.notes = fmt::format("longest solve {:.2f} s of CPU time, {} random starts each\n", longest, o.starts) +
+              (o.arm == PlanElasticOptions().arm ? kOnHardware : "");
+  out.figures = speed_figures(arm, all);
+  out.json = std::move(json);
+  return out;
 }
 
 /// Why there is no table: the target without a throw, and to which there are some.
@@ -203,8 +208,31 @@ std::string out_of_reach(const el::ClutchedArm& arm, const el::ThrowTask& task, 
   return out;
 }
 
-/// Whether any node of the table is confirmed by its run.
-bool to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs& outputs, Json& json) {
+/// What a table's interpolated throws do between its nodes.
+struct DenseCheck {
+  std::vector<el::TableCheck> each;
+  int lost{}, hits{}, beyond{};  ///< do not land, land in the box, land but are beyond a limit
+  double worst{}, use{};         ///< miss [m], and share of a limit
+};
+DenseCheck check(const el::ClutchedArm& arm, const el::ThrowTable& table, const PlanElasticOptions& o) {
+  DenseCheck out;
+  out.each = el::check_table(arm, table, o.checks);
+  for (const el::TableCheck& c : out.each) {
+    out.lost += !c.lands;
+    out.hits += c.lands && std::abs(c.miss) <= o.box / 2;
+    out.beyond += c.lands && c.limit_use > 1;
+    out.worst = std::max(out.worst, std::abs(c.miss));
+    out.use = std::max(out.use, c.limit_use);
+  }
+  return out;
+}
+
+/// A table of throws to targets, and in how many of its nodes no run confirms the throw.
+struct TargetAnswer {
+  ElasticAnswer answer;
+  int nodes{}, missed{};
+};
+TargetAnswer to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Json json) {
   el::ThrowTask task;
   task.longest = o.longest > 0 ? o.longest : 1.0;
   task.start = kReadyPose;
@@ -220,20 +248,20 @@ bool to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs&
   }
   const el::ConfirmedTable confirmed = el::confirm_table(arm, task, std::move(solved), program_options(o));
   const el::ThrowTable& table = confirmed.table;
-  Table text{{"target [m]", "tip speed [m/s]", "re-simulated", "duration [s]", "solve [s]",
-              "miss, re-simulated [mm]", "limits used", "intervals"},
-             {},
-             1};
+  TargetAnswer out{{}, o.nodes, 0};
+  out.answer.table = {{"target [m]", "tip speed [m/s]", "re-simulated", "duration [s]", "solve [s]",
+                       "miss, re-simulated [mm]", "limits used", "intervals"},
+                      {},
+                      1};
+  out.answer.table_file = "table.md";
+  out.answer.trajectories = trajectory_header("target_m");
   json["nodes"] = Json::array();
-  int missed = 0;
-  std::string csv = trajectory_header("target_m");
   for (std::size_t k = 0; k < distances.size(); ++k) {
     const el::ElasticThrow& one = table.throws[k];
     const auto& [run, miss, fine] = confirmed.nodes[k];
-    missed += !fine;
-    text.rows.push_back(
-        {fmt::format("{:.2f}", distances[k]), fmt::format("{:.3f}", one.speed()),
-         run.spring_stop ? "spring at its stop" : fmt::format("{:.3f}", speed_of(run.release)),
+    out.missed += !fine;
+    out.answer.table.rows.push_back(
+        {fmt::format("{:.2f}", distances[k]), fmt::format("{:.3f}", one.speed()), resimulated(run),
          fmt::format("{:.3f}", one.duration()), fmt::format("{:.2f}", one.program.seconds),
          miss ? with_sign(1e3 * *miss, 2) : "-", fmt::format("{:.1f} %", 100 * run.use.largest()),
          fmt::to_string(2 * confirmed.intervals) + (fine ? "" : ", not confirmed")});
@@ -247,41 +275,26 @@ bool to_target(const el::ClutchedArm& arm, const PlanElasticOptions& o, Outputs&
                              {"resimulated_miss_m", number(miss)},
                              {"spring_stop", run.spring_stop},
                              {"limits", use_json(run.use)}});
-    csv += trajectory_rows(fmt::format("{:.6g}", distances[k]), arm, run);
+    out.answer.trajectories += trajectory_rows(fmt::format("{:.6g}", distances[k]), arm, run);
   }
-  const auto checks = el::check_table(arm, table, o.checks);
-  double worst = 0, use = 0;
-  int lost = 0, hits = 0;
-  for (const auto& c : checks) {
-    lost += !c.lands;
-    hits += c.lands && std::abs(c.miss) <= o.box / 2;
-    worst = std::max(worst, std::abs(c.miss));
-    use = std::max(use, c.limit_use);
-  }
-  json["check"] = {{"targets", checks.size()},
-                   {"lost", lost},
-                   {"hits", hits},
-                   {"worst_miss_m", worst},
-                   {"largest_limit_use", use}};
-  std::string notes = fmt::format(
+  const DenseCheck dense = check(arm, table, o);
+  json["check"] = {{"targets", dense.each.size()},
+                   {"lost", dense.lost},
+                   {"hits", dense.hits},
+                   {"worst_miss_m", dense.worst},
+                   {"largest_limit_use", dense.use}};
+  std::string& notes = out.answer.notes = fmt::format(
       "interpolated between the nodes at {} targets: {} land in the box of {:g} m, worst miss {:.2f} mm, "
       "limits used at most {:.1f} %\n",
-      checks.size(), hits, o.box, 1e3 * worst, 100 * use);
-  const auto beyond = std::count_if(checks.begin(), checks.end(),
-                                    [](const el::TableCheck& c) { return c.lands && c.limit_use > 1; });
-  if (beyond > 0)
-    notes += fmt::format("{} of these throws are beyond a limit of the arm: they cannot be made\n", beyond);
-  if (missed > 0)
-    notes += fmt::format("{} of {} nodes are not confirmed by their runs\n", missed, distances.size());
-  fmt::print("{}\n{}", text.text(), notes);
-  const bool any = missed < static_cast<int>(distances.size());
-  if (o.report.empty()) return any;
-  const fs::path folder = outputs.directory(o.report);
-  draw_table(checks, folder);
-  write_text(folder / "table.md", text.markdown() + "\n" + notes);
-  write_text(folder / "trajectory.csv", csv);
-  write_text(folder / "plan.json", json_text(json));
-  return any;
+      dense.each.size(), dense.hits, o.box, 1e3 * dense.worst, 100 * dense.use);
+  if (dense.beyond > 0)
+    notes +=
+        fmt::format("{} of these throws are beyond a limit of the arm: they cannot be made\n", dense.beyond);
+  if (out.missed > 0)
+    notes += fmt::format("{} of {} nodes are not confirmed by their runs\n", out.missed, out.nodes);
+  out.answer.figures = check_figures(dense.each);
+  out.answer.json = std::move(json);
+  return out;
 }
 
 void run(const PlanElasticOptions& o, const Parser& parser) {
@@ -295,17 +308,15 @@ void run(const PlanElasticOptions& o, const Parser& parser) {
   if (!o.report.empty()) require_gnuplot();
   require_outputs({{o.report, Wanted::directory}, {o.json}}, {o.arm});
   const el::ClutchedArm arm = el::read_clutched_arm(o.arm);
-  Outputs outputs{{o.arm}};
   Json json = json_head("plan-elastic");
   json["arm"] = arm.chain.name;
-  bool usable = true;
-  if (o.target_x > 0)
-    usable = to_target(arm, o, outputs, json);
-  else
-    fastest(arm, o, outputs, json);
-  if (!o.json.empty()) outputs.json(o.json, json);
-  outputs.commit();
-  if (!usable)
+  const auto give_all = [&](const ElasticAnswer& answer) {
+    give(answer, "plan elastic", o.arm, o.json, o.report);
+  };
+  if (!(o.target_x > 0)) return give_all(fastest(arm, o, std::move(json)));
+  const TargetAnswer found = to_target(arm, o, std::move(json));
+  give_all(found.answer);
+  if (found.missed == found.nodes)
     throw Unanswered(
         "no node of the table is confirmed by its run: none of these throws is to be made; more --intervals, "
         "or a shorter --longest, may confirm some");

@@ -177,13 +177,13 @@ void run(const PlanFlipOptions& o) {
   answer.path = fl::learn(*learner, answer.target, answer.known, answer.bar, thrower,
                           {o.iterations, o.throws, !(answer.known_bar == answer.bar)});
   progress.reset();
-  fmt::print("{}", text_of(answer));
-  if (store && store->recalled() > 0)
-    fmt::print("{} throws recalled, {} thrown now\n", store->recalled(), store->thrown());
   Outputs outputs{{o.sku, o.card, o.robot}};
   if (!o.report.empty()) write_report(answer, outputs.directory(o.report));
   if (!o.json.empty()) outputs.json(o.json, flip_json(answer));
   outputs.commit();
+  fmt::print("{}", text_of(answer));
+  if (store && store->recalled() > 0)
+    fmt::print("{} throws recalled, {} thrown now\n", store->recalled(), store->thrown());
 }
 
 }  // namespace

@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "apps/command.hpp"
+#include "apps/elastic_answer.hpp"
 #include "apps/elastic_trajectory.hpp"
 #include "apps/figure.hpp"
 #include "apps/output.hpp"
@@ -18,7 +21,6 @@ namespace unhand::apps {
 namespace {
 
 namespace el = planners::elastic;
-namespace fs = std::filesystem;
 
 struct PlanWristOptions {
   int threads{1};
@@ -84,7 +86,7 @@ double most_stored(const Point& p) {
   return out;
 }
 
-void draw_gain(const std::vector<Point>& points, const Point& rigid, const fs::path& folder) {
+Figure gain_figure(const std::vector<Point>& points, const Point& rigid) {
   Figure figure{
       "gain",
       15,
@@ -100,76 +102,89 @@ void draw_gain(const std::vector<Point>& points, const Point& rigid, const fs::p
       "'elastic wrist', {} with "
       "lines lw 2 dt 2 lc rgb '#555555' title 'rigid wrist'\n",
       rigid.speed);
-  draw(figure, folder, "simulated by unhand plan wrist");
+  return figure;
 }
 
-void run(const PlanWristOptions& o) {
-  if (!o.report.empty()) require_gnuplot();
-  require_outputs({{o.report, Wanted::directory}, {o.json}}, {o.arm});
-  if (!(o.softest < o.stiffest)) throw WrongUsage("--softest must be below --stiffest");
-  el::ClutchedArm arm = el::read_clutched_arm(o.arm);
-  const Point rigid = solve(arm, o, el::Drive::locked);
-  if (rigid.speed == 0) throw Unanswered("no throw with the wrist locked was found that its run confirms");
-  std::vector<Point> points;
+/// The fastest throws with springs, softest first; from random starts, then from each other. Tells of those
+/// with which none was found, which are left out.
+std::vector<Point> by_stiffness(el::ClutchedArm arm, const PlanWristOptions& o) {
+  std::vector<Point> out;
   for (int k = 0; k < o.stiffnesses; ++k) {
     arm.last.stiffness =
         o.softest * std::pow(o.stiffest / o.softest, static_cast<double>(k) / (o.stiffnesses - 1));
-    points.push_back(solve(arm, o, el::Drive::passive));
+    out.push_back(solve(arm, o, el::Drive::passive));
   }
-  for (std::size_t k = points.size() - 1; k > 0; --k) follow(arm, o, points[k], points[k - 1]);
-  for (std::size_t k = 1; k < points.size(); ++k) follow(arm, o, points[k - 1], points[k]);
-  for (const Point& p : points)
+  for (std::size_t k = out.size() - 1; k > 0; --k) follow(arm, o, out[k], out[k - 1]);
+  for (std::size_t k = 1; k < out.size(); ++k) follow(arm, o, out[k - 1], out[k]);
+  for (const Point& p : out)
     if (p.speed == 0) tell("{:.2f} N m/rad: no throw was found that its run confirms\n", p.stiffness);
-  std::erase_if(points, [](const Point& p) { return p.speed == 0; });
-  if (points.empty()) throw Unanswered("no throw with the spring was found that its run confirms");
+  std::erase_if(out, [](const Point& p) { return p.speed == 0; });
+  return out;
+}
 
-  Table table{{"stiffness [N m/rad]", "tip speed [m/s]", "planned", "gain", "stored [J]", "motors [J]",
-               "unexplained [J]", "limits used", "intervals"},
-              {},
-              1};
+Table table_of(const std::vector<Point>& points, const Point& rigid) {
+  Table out{{"stiffness [N m/rad]", "tip speed [m/s]", "planned", "gain", "stored [J]", "motors [J]",
+             "unexplained [J]", "limits used", "intervals"},
+            {},
+            1};
   const auto row = [&](const std::string& name, const Point& p, double stored) {
     const el::Replay& run = p.best.run;
-    table.rows.push_back(
+    out.rows.push_back(
         {name, fmt::format("{:.3f}", p.speed), fmt::format("{:.3f}", p.best.plan.speed()),
          fmt::format("{:.2f}", p.speed / rigid.speed), fmt::format("{:.2f}", stored),
          fmt::format("{:.2f}", run.motor_work), fmt::format("{:.0e}", std::abs(run.unexplained())),
          fmt::format("{:.1f} %", 100 * run.use.largest()), fmt::to_string(2 * p.best.intervals)});
   };
   row("rigid", rigid, 0);
-  Json json = json_head("plan-wrist");
-  json["rigid_m_s"] = rigid.speed;
-  json["spring"] = Json::array();
+  for (const Point& p : points) row(fmt::format("{:.2f}", p.stiffness), p, most_stored(p));
+  return out;
+}
+
+Json json_of(const std::vector<Point>& points, const Point& rigid) {
+  Json out = json_head("plan-wrist");
+  out["rigid_m_s"] = rigid.speed;
+  out["spring"] = Json::array();
   for (const Point& p : points) {
     const el::Replay& run = p.best.run;
-    row(fmt::format("{:.2f}", p.stiffness), p, most_stored(p));
-    json["spring"].push_back({{"stiffness_n_m_rad", p.stiffness},
-                              {"speed_m_s", p.speed},
-                              {"planned_m_s", p.best.plan.speed()},
-                              {"gain", p.speed / rigid.speed},
-                              {"intervals", 2 * p.best.intervals},
-                              {"largest_limit_use", run.use.largest()},
-                              {"stored_J", most_stored(p)},
-                              {"motors_J", run.motor_work},
-                              {"damping_J", run.damping},
-                              {"friction_J", run.friction},
-                              {"unexplained_J", run.unexplained()}});
+    out["spring"].push_back({{"stiffness_n_m_rad", p.stiffness},
+                             {"speed_m_s", p.speed},
+                             {"planned_m_s", p.best.plan.speed()},
+                             {"gain", p.speed / rigid.speed},
+                             {"intervals", 2 * p.best.intervals},
+                             {"largest_limit_use", run.use.largest()},
+                             {"stored_J", most_stored(p)},
+                             {"motors_J", run.motor_work},
+                             {"damping_J", run.damping},
+                             {"friction_J", run.friction},
+                             {"unexplained_J", run.unexplained()}});
   }
-  const Point* best = &*std::max_element(points.begin(), points.end(),
-                                         [](const Point& a, const Point& b) { return a.speed < b.speed; });
-  fmt::print("{}\nbest stiffness {:.2f} N m/rad: {:.2f} m/s, {:.2f} times the rigid wrist's {:.2f} m/s\n",
-             table.text(), best->stiffness, best->speed, best->speed / rigid.speed, rigid.speed);
-  Outputs outputs{{o.arm}};
-  if (!o.report.empty()) {
-    const fs::path folder = outputs.directory(o.report);
-    draw_gain(points, rigid, folder);
-    write_text(folder / "gain.md", table.markdown());
-    std::string csv = trajectory_header("stiffness_n_m_rad") + trajectory_rows("inf", arm, rigid.best.run);
-    for (const Point& p : points) csv += trajectory_rows(fmt::format("{:.9g}", p.stiffness), arm, p.best.run);
-    write_text(folder / "trajectory.csv", csv);
-    write_text(folder / "plan.json", json_text(json));
-  }
-  if (!o.json.empty()) outputs.json(o.json, json);
-  outputs.commit();
+  return out;
+}
+
+void run(const PlanWristOptions& o) {
+  if (!o.report.empty()) require_gnuplot();
+  require_outputs({{o.report, Wanted::directory}, {o.json}}, {o.arm});
+  if (!(o.softest < o.stiffest)) throw WrongUsage("--softest must be below --stiffest");
+  const el::ClutchedArm arm = el::read_clutched_arm(o.arm);
+  const Point rigid = solve(arm, o, el::Drive::locked);
+  if (rigid.speed == 0) throw Unanswered("no throw with the wrist locked was found that its run confirms");
+  const std::vector<Point> points = by_stiffness(arm, o);
+  if (points.empty()) throw Unanswered("no throw with the spring was found that its run confirms");
+
+  ElasticAnswer answer;
+  answer.table = table_of(points, rigid);
+  answer.table_file = "gain.md";
+  const Point& best = *std::max_element(points.begin(), points.end(),
+                                        [](const Point& a, const Point& b) { return a.speed < b.speed; });
+  answer.notes =
+      fmt::format("best stiffness {:.2f} N m/rad: {:.2f} m/s, {:.2f} times the rigid wrist's {:.2f} m/s\n",
+                  best.stiffness, best.speed, best.speed / rigid.speed, rigid.speed);
+  answer.trajectories = trajectory_header("stiffness_n_m_rad") + trajectory_rows("inf", arm, rigid.best.run);
+  for (const Point& p : points)
+    answer.trajectories += trajectory_rows(fmt::format("{:.9g}", p.stiffness), arm, p.best.run);
+  answer.figures = {gain_figure(points, rigid)};
+  answer.json = json_of(points, rigid);
+  give(answer, "plan wrist", o.arm, o.json, o.report);
 }
 
 }  // namespace
