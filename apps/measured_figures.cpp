@@ -55,24 +55,26 @@ Figure measured_residual_figure(const std::vector<fitting::ResidualProfile>& bas
 }
 
 Figure missing_acceleration_figure(const fitting::MissingAcceleration& missing) {
-  const auto panels = static_cast<double>(missing.components.size());
-  const double room = 14.9 / panels;
-  Figure figure{"missing", 17, 6.0, {}, {}};
+  const int panels = static_cast<int>(missing.components.size()), columns = std::min(panels, 3),
+            rows = (panels + columns - 1) / columns;
+  const double room = 14.9 / columns, height = 5.2;
+  Figure figure{"missing", 17, 0.8 + height * rows, {}, {}};
   std::string script = "set multiplot\nset key off\n";
-  double at = 0;
+  int at = 0;
   for (const auto& component : missing.components) {
-    DataBlock block{component.along, {missing.against, "acceleration [m/s^2]", "2 sigma [m/s^2]"}, {}, {}};
+    DataBlock block{component.name(), {missing.against, "acceleration [m/s^2]", "2 sigma [m/s^2]"}, {}, {}};
     for (std::size_t j = 0; j < component.at.size(); ++j)
       block.rows.push_back({component.at[j], component.value[j], 2 * component.sigma[j]});
     figure.data.push_back(std::move(block));
-    script += place(figure, {2.0 + room * at, 2.0 + room * (at + 1) - 1.4, 1.6, 5.2});
+    const double left = 2.0 + room * (at % columns), bottom = 1.6 + height * (rows - 1 - at / columns);
+    script += place(figure, {left, left + room - 1.4, bottom, bottom + 3.6});
     script += fmt::format(
         "set title 'along {}' offset 0,-0.6\nset xlabel '{}' offset 0,0.3\nset ylabel '{}' offset 0.5\n"
         "set format y '%.3g'\nplot 0 with lines linecolor rgb '#808080', "
         "DATA index {} using 1:2:3 with yerrorlines pointtype 7 pointsize 0.6 linecolor rgb '#0072b2'\n",
-        plain(component.along), missing.against, at == 0 ? "a [m/s^2], with 2 {/Symbol s}" : "",
-        figure.data.size() - 1);
-    at += 1;
+        plain(component.name()), missing.against, at % columns == 0 ? "a [m/s^2], with 2 {/Symbol s}" : "",
+        at);
+    ++at;
   }
   figure.script = script + "unset multiplot\n";
   return figure;

@@ -31,7 +31,7 @@ Json autocorrelation_json(const std::vector<fitting::Autocorrelation>& all) {
 Json missing_json(const fitting::MissingAcceleration& missing) {
   Json curves = Json::object();
   for (const auto& c : missing.components)
-    curves[c.along] = {{"knots", c.at}, {"value", c.value}, {"sigma", c.sigma}};
+    curves[c.name()] = {{"knots", c.at}, {"value", c.value}, {"sigma", c.sigma}};
   return {{"quantity", "acceleration [m/s^2]"},
           {"of", missing.of},
           {"against", missing.against},

@@ -131,15 +131,17 @@ std::string first_text(const MeasuredDiscovery& found) {
 /// What is missing where something is unexplained, and whether it may be used.
 std::string missing_text(const fitting::MissingAcceleration& missing) {
   double most = 0, its_sigma = 0;
+  std::string whose;
   for (const auto& c : missing.components)
     for (std::size_t j = 0; j < c.value.size(); ++j)
-      if (std::abs(c.value[j]) > std::abs(most)) most = c.value[j], its_sigma = c.sigma[j];
+      if (std::abs(c.value[j]) > std::abs(most))
+        most = c.value[j], its_sigma = c.sigma[j], whose = c.object.empty() ? "" : " (" + c.object + ")";
   return fmt::format(
       "Without assuming a form, an acceleration {} as a function of {} predicts train groups best that "
-      "it was not estimated from; it is largest with {:+.3g} ± {:.2g} m/s^2. On held-out groups it {}: "
+      "it was not estimated from; it is largest with {:+.3g} ± {:.2g} m/s^2{}. On held-out groups it {}: "
       "{:.3g} to "
       "{:.3g} per degree of freedom",
-      missing.of, missing.against.substr(0, missing.against.find(' ')), most, its_sigma,
+      missing.of, missing.against.substr(0, missing.against.find(' ')), most, its_sigma, whose,
       missing.helps ? "lowers the misfit" : "does not lower the misfit beyond chance, so it is no correction",
       missing.test_before, missing.test_after);
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <span>
 
 #include "contact/registry.hpp"
 #include "fitting/discovery/acceptance.hpp"
@@ -148,8 +149,7 @@ class ForwardStep {
     refit_rivals();
     if (auto opened = open_pair(best() ? best()->next : stage_)) return opened;
     if (TriedEffect* found = best()) {
-      WithCriterion rivals;
-      for (const TriedEffect& one : convincing_) rivals.emplace_back(one.score, one.next.bic());
+      const WithCriterion rivals = with_criterion(convincing_);
       const std::string why = found->held_out.where;
       return accept(std::move(*found), why, rivals);
     }
@@ -158,6 +158,12 @@ class ForwardStep {
 
  private:
   using WithCriterion = std::vector<std::pair<const Score*, double>>;  // Bayes' criterion of the refit
+
+  static WithCriterion with_criterion(std::span<const TriedEffect> tried) {
+    WithCriterion out;
+    for (const TriedEffect& one : tried) out.emplace_back(one.score, one.next.bic());
+    return out;
+  }
 
   int this_step() const { return 1 + static_cast<int>(out_.effects.size()); }
   const std::string& id_of(const Score& score) const { return f_.candidates[score.candidate].id; }
@@ -296,7 +302,6 @@ class ForwardStep {
         trial->held_out.matters >= 1 || (law && trial->held_out.fall > 0 && has_left_base_law());
     named(out_.ranking, id_of(score)).fate = matters ? Fate::outdone : Fate::too_small;
     if (!matters && law) return;
-    if (!matters) evident_.emplace_back(&score, trial->next.bic());
     (matters ? convincing_ : small_).push_back(std::move(*trial));
   }
 
@@ -316,13 +321,15 @@ class ForwardStep {
   /// is told.
   std::optional<Stage> weigh_small() {
     std::optional<SmallEffect> told;
-    for (TriedEffect& trial : small_) {
-      if (auto beside = beside_give(trial)) return beside;
+    for (std::size_t k = 0; k < small_.size(); ++k) {
+      TriedEffect& trial = small_[k];
+      const WithCriterion rivals =
+          with_criterion(std::span(small_).subspan(k));  // those before predict nothing
+      if (auto beside = beside_give(trial, rivals)) return beside;
       const SmallEffect small =
           small_effect(stage_, trial.next, id_of(*trial.score), out_.before.held_out, options_);
       if (left_by_answer(trial.next, out_, options_).empty() && predicts_better(stage_, trial.next, options_))
-        return accept(std::move(trial), predicted_in_words(small), evident_);
-      std::erase_if(evident_, [&](const auto& rival) { return rival.first == trial.score; });
+        return accept(std::move(trial), predicted_in_words(small), rivals);
       if (!told) told = small;
     }
     if (told && (!out_.small || told->delta_bic < out_.small->delta_bic)) out_.small = told;
@@ -331,7 +338,7 @@ class ForwardStep {
 
   /// An effect on the pads with a give along that there is no evidence for without it, against that give
   /// alone.
-  std::optional<Stage> beside_give(TriedEffect trial) {
+  std::optional<Stage> beside_give(TriedEffect trial, const WithCriterion& rivals) {
     const std::string& id = id_of(*trial.score);
     if (gives_along(stage_) || !acts_on_pads(id)) return std::nullopt;
     fit_give_along(trial.next, options_);
@@ -341,7 +348,7 @@ class ForwardStep {
     trial.held_out = improvement(less, trial.next, out_.before.held_out, options_);
     if (trial.held_out.matters < 1) return std::nullopt;
     const std::string why = trial.held_out.where;
-    return accept(std::move(trial), why, evident_);
+    return accept(std::move(trial), why, rivals);
   }
 
   Stage accept(TriedEffect trial, const std::string& why, const WithCriterion& rivals) {
@@ -380,7 +387,6 @@ class ForwardStep {
   bool noise_;  // nothing but that is left
   std::set<std::string> tried_;
   std::vector<TriedEffect> convincing_, small_;  // what matters to a channel, and what does not
-  WithCriterion evident_;                        // the latter
   std::optional<TriedEffect> refused_;  // the likeliest of those that are not told from none surely enough
 };
 

@@ -68,6 +68,20 @@ double argument(const GroupMotion& motion, std::size_t sample, const Form& form)
   return form.of_speed ? flight::norm(motion.velocity[sample]) : motion.time[sample];
 }
 
+/// One unknown function of a form: along one direction, of the groups of one object or of all.
+struct Column {
+  std::size_t along;   ///< into Form::along
+  std::string object;  ///< none: all
+};
+
+/// A form with one function of each component for all objects, or with one for every object.
+std::vector<Column> columns_of(const Form& form, const std::vector<std::string>& objects) {
+  std::vector<Column> out;
+  for (const std::string& object : objects)
+    for (std::size_t c = 0; c < form.along.size(); ++c) out.push_back({c, object});
+  return out;
+}
+
 /// A group's rows and how it moved.
 struct Seen {
   std::size_t group{};
@@ -107,16 +121,22 @@ std::vector<double> knots_of(const std::vector<Seen>& seen, const Form& form) {
 /// out.
 std::vector<MatrixXd> parts_of(const GroupedProblem& problem, const GroupedFit& fit,
                                const std::vector<Seen>& seen, const Form& form,
-                               const std::vector<double>& knots, const GroupedFitOptions& options) {
+                               const std::vector<Column>& functions, const std::vector<double>& knots,
+                               const GroupedFitOptions& options) {
   std::vector<MatrixXd> out(seen.size());
   dynamics::parallel_for(seen.size(), options.threads, [&](std::size_t n) {
     const auto& [group, motion, equations] = seen[n];
     std::vector<VectorXd> columns;
-    for (std::size_t c = 0; c < form.along.size(); ++c)
+    for (const Column& function : functions)
       for (std::size_t j = 0; j < knots.size(); ++j) {
+        if (!function.object.empty() && function.object != problem.groups()[group].object) {
+          columns.push_back(VectorXd::Zero(equations.residual.size()));
+          continue;
+        }
         std::vector<Vec3<double>> a;
         for (std::size_t i = 0; i < motion.time.size(); ++i)
-          a.push_back(flight::scaled(hat(knots, j, argument(motion, i, form)), form.direction(motion, i, c)));
+          a.push_back(flight::scaled(hat(knots, j, argument(motion, i, form)),
+                                     form.direction(motion, i, function.along)));
         columns.push_back(problem.response(group, a));
       }
     GroupEquations e = equations;
@@ -137,7 +157,7 @@ struct Estimate {
   MatrixXd inverse;  ///< of the knots' information, smoothness included
   MatrixXd taken;    ///< by the shared unknowns, of every knot's column
 };
-Estimate estimate(const std::vector<MatrixXd>& parts, Index shared, std::size_t components,
+Estimate estimate(const std::vector<MatrixXd>& parts, Index shared, std::size_t functions,
                   const std::function<bool(std::size_t)>& use) {
   const Index all = parts.front().rows() - 1, width = all - shared;
   MatrixXd H = MatrixXd::Zero(all + 1, all + 1);
@@ -152,7 +172,7 @@ Estimate estimate(const std::vector<MatrixXd>& parts, Index shared, std::size_t 
   const double most = A.diagonal().maxCoeff();
   Estimate out{VectorXd::Zero(all), MatrixXd::Zero(width, width), taken.leftCols(width)};
   if (!(most > 0)) return out;
-  for (std::size_t c = 0; c < components; ++c) {
+  for (std::size_t c = 0; c < functions; ++c) {
     const Index first = static_cast<Index>(c) * kKnots;
     const double scale = A.diagonal().segment(first, kKnots).maxCoeff();
     A.diagonal().segment(first, kKnots).array() += kSmooth * scale;
@@ -184,11 +204,11 @@ VectorXd score_of(const MatrixXd& part, const VectorXd& change) {
 }
 
 /// The gain over train groups that it was not estimated from.
-double cross_validated(const std::vector<MatrixXd>& parts, Index shared, std::size_t components) {
+double cross_validated(const std::vector<MatrixXd>& parts, Index shared, std::size_t functions) {
   double gain = 0;
   for (int fold = 0; fold < kFolds; ++fold) {
     const auto in_fold = [&](std::size_t n) { return static_cast<int>(n) % kFolds == fold; };
-    const Estimate one = estimate(parts, shared, components, [&](std::size_t n) { return !in_fold(n); });
+    const Estimate one = estimate(parts, shared, functions, [&](std::size_t n) { return !in_fold(n); });
     for (std::size_t n = 0; n < parts.size(); ++n)
       if (in_fold(n)) gain += gain_of(parts[n], one.change);
   }
@@ -212,6 +232,8 @@ VectorXd sigmas(const std::vector<MatrixXd>& parts, Index shared, const Estimate
 
 }  // namespace
 
+std::string MissingComponent::name() const { return object.empty() ? along : along + " of " + object; }
+
 std::optional<MissingAcceleration> missing_acceleration(const GroupedProblem& problem, const GroupedFit& fit,
                                                         const GroupedFit& held_out,
                                                         const GroupedFitOptions& options) {
@@ -221,26 +243,32 @@ std::optional<MissingAcceleration> missing_acceleration(const GroupedProblem& pr
   const auto shared = static_cast<Index>(fit.shared.size());
   const Form* best = nullptr;
   double best_gain = 0;
+  std::vector<Column> functions;
   std::vector<double> knots;
   std::vector<MatrixXd> parts;
   const auto all = forms();
+  std::vector<std::vector<std::string>> objects{{""}};  // one function of all, or one of each
+  if (auto each = objects_of(problem); each.size() > 1) objects.push_back(std::move(each));
   for (const Form& form : all) {
-    auto of = knots_of(train, form);
-    if (!(of.back() > of.front())) continue;
-    auto its = parts_of(problem, fit, train, form, of, options);
-    const double gain = cross_validated(its, shared, form.along.size());
-    if (!(gain > best_gain)) continue;
-    best = &form, best_gain = gain, knots = std::move(of), parts = std::move(its);
+    const auto at = knots_of(train, form);
+    if (!(at.back() > at.front())) continue;
+    for (const auto& of : objects) {
+      auto tried = columns_of(form, of);
+      auto its = parts_of(problem, fit, train, form, tried, at, options);
+      const double gain = cross_validated(its, shared, tried.size());
+      if (!(gain > best_gain)) continue;
+      best = &form, best_gain = gain, functions = std::move(tried), knots = at, parts = std::move(its);
+    }
   }
   if (!best) return {};
-  const Estimate found = estimate(parts, shared, best->along.size(), [](std::size_t) { return true; });
+  const Estimate found = estimate(parts, shared, functions.size(), [](std::size_t) { return true; });
   const VectorXd sigma = sigmas(parts, shared, found);
 
   MissingAcceleration out;
   out.of = best->of;
   out.against = best->of_speed ? "speed [m/s]" : "time [s]";
-  for (std::size_t c = 0; c < best->along.size(); ++c) {
-    MissingComponent component{best->along[c], knots, {}, {}};
+  for (std::size_t c = 0; c < functions.size(); ++c) {
+    MissingComponent component{best->along[functions[c].along], functions[c].object, knots, {}, {}};
     double information = 0;
     for (std::size_t j = 0; j < knots.size(); ++j) {
       const auto k = static_cast<Index>(c * knots.size() + j);
@@ -250,7 +278,7 @@ std::optional<MissingAcceleration> missing_acceleration(const GroupedProblem& pr
     }
     if (information > 0) out.components.push_back(std::move(component));
   }
-  const auto judges = parts_of(problem, fit, test, *best, knots, options);
+  const auto judges = parts_of(problem, fit, test, *best, functions, knots, options);
   double before = 0, gain = 0, left = 0, samples = 0;
   for (std::size_t n = 0; n < judges.size(); ++n) {
     const Index last = judges[n].rows() - 1;

@@ -12,7 +12,9 @@ namespace unhand::fitting {
 /// A component of it: piecewise linear between its knots, level beyond them.
 struct MissingComponent {
   std::string along;                     ///< which way it points where it is positive: "the velocity"
+  std::string object;                    ///< whose; none: of all, where they do not differ
   std::vector<double> at, value, sigma;  ///< knots, in the argument's unit; [m/s²] there; 1 σ
+  std::string name() const;              ///< "the velocity", "the velocity of ball"
 };
 
 /// What is estimated to be missing, and whether it is worth anything.
@@ -28,10 +30,10 @@ struct MissingAcceleration {
 
 /// Least squares over the train groups in what their residual leaves, to first order, beside the own unknowns
 /// of the groups and what the shared ones of `fit` can do: their part is theirs. Tried along the velocity,
-/// along ω × v, along the axes of the world and of the body, as functions of time or of speed; taken is the
-/// one that predicts train groups best that it was not estimated from (five folds). Nothing where a problem
-/// has no such motion (GroupedProblem::motion), fewer than ten train groups, or no held-out one. `held_out`:
-/// own unknowns of the held-out groups at the values of `fit`.
+/// along ω × v, along the axes of the world and of the body, as functions of time or of speed, for all
+/// objects or for each; taken is the one that predicts train groups best that it was not estimated from (five
+/// folds). Nothing where a problem has no such motion (GroupedProblem::motion), fewer than ten train groups,
+/// or no held-out one. `held_out`: own unknowns of the held-out groups at the values of `fit`.
 std::optional<MissingAcceleration> missing_acceleration(const GroupedProblem& problem, const GroupedFit& fit,
                                                         const GroupedFit& held_out,
                                                         const GroupedFitOptions& options);

@@ -122,6 +122,34 @@ TEST(MissingAcceleration, ABrakeThatSetsInAtASpeedIsFoundAlongTheVelocity) {
   EXPECT_LT(missing->test_after, 1.2);
 }
 
+// Two objects of one log, of which something brakes both alike, or one only.
+TEST(MissingAcceleration, ObjectsThatDifferHaveFunctionsOfTheirOwn) {
+  constexpr double kBrake = -0.5;  // m/s^2
+  const auto plain = spatial_flights({}, {}, 12);
+  const auto braked = accelerated(plain, [&](const GroupMotion& m, std::size_t k) {
+    return flight::scaled(kBrake / flight::norm(m.velocity[k]), m.velocity[k]);
+  });
+  for (const bool alike : {true, false}) {
+    datasets::ThrowLog log = braked;
+    log.objects.emplace("other", log.objects.at("body"));
+    for (std::size_t i = 0; i < log.throws.size(); i += 3) {
+      if (!alike) log.throws[i] = plain.throws[i];
+      log.throws[i].object = "other";
+    }
+    const auto missing = Base(log).missing();
+    ASSERT_TRUE(missing.has_value());
+    EXPECT_TRUE(missing->helps);
+    EXPECT_EQ(missing->of, "along the velocity");
+    EXPECT_LT(missing->test_after, 1.2);
+    ASSERT_EQ(missing->components.size(), alike ? 1u : 2u);
+    for (const MissingComponent& c : missing->components) {
+      EXPECT_EQ(c.name(), alike ? "the velocity" : "the velocity of " + c.object);
+      const double size = c.object == "other" ? 0 : kBrake;
+      EXPECT_LT(farthest(c, std::abs(kBrake), [&](double) { return size; }), 4) << c.name();
+    }
+  }
+}
+
 TEST(MissingAcceleration, ASideForceIsFoundAlongTheBody) {
   unhand::test::SpatialTruth truth;
   truth.side_force = 0.3;
