@@ -424,6 +424,9 @@ TEST(FlipPlant, TellsWhatTheJointsWereAskedFor) {
   FlipRobot slow = exact_robot();
   slow.control.torque_rate *= 0.02;
   EXPECT_GT(use_of(slow).cut_rate, 0);
+  weak.control.torque_rate = 1e9;
+  EXPECT_EQ(use_of(weak).cut_rate, 0);
+  EXPECT_GT(use_of(weak).cut_torque, 0);
   // It moves at the brake's start, not where it has come to rest, and bends most somewhere on its way.
   const FlipMotion& m = exact_robot().motion;
   double fastest = 0, farthest = 0;

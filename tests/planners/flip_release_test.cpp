@@ -438,7 +438,7 @@ TEST(ReleaseLearner, ScattersAsItsKnownCommandsDid) {
 }
 
 // What was seen of a command is what the next forecast of it says.
-TEST(ReleaseLearner, ForecastsWhatItHasSeen) {
+TEST(ReleaseLearner, TakesInWhatItHasSeen) {
   const HandLibrary small(robot(), robot().bar, 2);
   const CardPlant plant{prior_card(robot()), {0, 0, 0.3, 0.15, 0.1, 1.5}};
   ThrowScatter exact = scatter_of({}, 0.12);
