@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <set>
@@ -45,6 +46,27 @@ inline json read_json(const fs::path& file) { return json::parse(content(file));
 inline json timeless(json comparison) {
   for (auto& [name, model] : comparison["models"].items()) model.erase("microseconds_per_throw");
   return comparison;
+}
+
+/// The columns of a CSV by name, as text.
+inline std::map<std::string, std::vector<std::string>> columns_of(const std::string& csv) {
+  const auto cells = [](const std::string& line) {
+    std::istringstream in(line);
+    std::vector<std::string> out;
+    for (std::string cell; std::getline(in, cell, ',');) out.push_back(cell);
+    return out;
+  };
+  std::istringstream lines(csv);
+  std::string line;
+  std::getline(lines, line);
+  const auto names = cells(line);
+  std::map<std::string, std::vector<std::string>> out;
+  while (std::getline(lines, line)) {
+    const auto row = cells(line);
+    EXPECT_EQ(row.size(), names.size()) << line;
+    for (std::size_t i = 0; i < std::min(row.size(), names.size()); ++i) out[names[i]].push_back(row[i]);
+  }
+  return out;
 }
 
 /// Every test has a folder of its own; a tiny campaign is made once for all.

@@ -1,6 +1,8 @@
 // compare, its report and its cards; predict with them.
 #include <fmt/format.h>
 
+#include <iomanip>
+
 #include "tests/apps/cli.hpp"
 
 namespace unhand::cli {
@@ -339,6 +341,8 @@ TEST_F(Cli, AClockFarFromZeroChangesNothing) {
           << name << ' ' << quantity;
     }
   }
+  EXPECT_NEAR(std::stod(columns_of(content(folder / "r/throws.csv")).at("detach_time_s").front()), kEpoch,
+              100);
   const std::string card = " --card cards/limit_surface_disc.json --json p.json";
   ASSERT_EQ(run("predict " + quick + card).code, 0);
   json before = read_json(folder / "p.json");
@@ -472,6 +476,40 @@ TEST_F(Cli, ACardOfFlightsIsShownInAFigure) {
   EXPECT_GT(fs::file_size(folder / "r/residual.png"), 0u);
   std::ifstream report(folder / "r/report.md");
   EXPECT_THAT(std::string(std::istreambuf_iterator<char>(report), {}), testing::HasSubstr("(residual.png)"));
+}
+
+// The statistics are those of the throws in the report's CSV; heading and bias table say the same.
+TEST_F(Cli, CompareSumsUpItsThrows) {
+  const Answer answer =
+      run("compare " + quick + " --models sliding_pivot,limit_surface --json c.json --report r");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("12 throws (8 train, 4 test)"));
+  EXPECT_THAT(run("inspect " + quick).out, HasSubstr("12 throws (8 train, 4 test)"));
+  const json models = read_json(folder / "c.json")["models"];
+  const auto csv = columns_of(content(folder / "r/throws.csv"));
+  const std::string report = content(folder / "r/report.md");
+  for (const auto& [model, told] : models.items())
+    for (const char* split : {"train", "test"})
+      for (const char* quantity :
+           {"detach_vx_m_s", "detach_omega_deg_s", "landing_x_m", "landing_theta_deg"}) {
+        double n = 0, sum = 0, absolute = 0, squares = 0;
+        for (std::size_t k = 0; k < csv.at("model").size(); ++k) {
+          if (csv.at("model")[k] != model || csv.at("split")[k] != split) continue;
+          const double error = std::stod(csv.at(std::string("error_") + quantity)[k]);
+          ++n, sum += error, absolute += std::abs(error), squares += error * error;
+        }
+        const json& one = told[split][quantity];
+        const double mae = absolute / n;
+        EXPECT_EQ(one["n"].get<double>(), n);
+        EXPECT_NEAR(one["mae"].get<double>(), mae, 1e-9 * mae) << model << split << quantity;
+        EXPECT_NEAR(one["bias"].get<double>(), sum / n, 1e-9 * mae);
+        EXPECT_NEAR(one["std"].get<double>(), std::sqrt((squares - n * mae * mae) / (n - 1)), 1e-6 * mae);
+        if (std::string(quantity) == "landing_x_m") {
+          std::ostringstream bias;
+          bias << std::showpos << std::fixed << std::setprecision(4) << sum / n;
+          EXPECT_THAT(report.substr(report.find("## Bias")), HasSubstr(bias.str()));
+        }
+      }
 }
 
 }  // namespace

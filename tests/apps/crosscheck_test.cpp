@@ -1,5 +1,6 @@
 // crosscheck: other engines on a log's throws.
 #include <array>
+#include <tuple>
 
 #include "tests/apps/cli.hpp"
 
@@ -173,6 +174,17 @@ TEST_F(Cli, CrosscheckFollowsTheShapeOfACard) {
     ASSERT_EQ(engine.size(), 12u);
     ASSERT_EQ(predicted.size(), 12u);
     for (std::size_t i = 0; i < 12; ++i) EXPECT_NEAR(engine[i], predicted[i], 1e-5);  // predict's tolerance
+    EXPECT_EQ(checked["parameters"]["from"], "card.json");
+    json by_card = read_json(folder / "p.json")["throws"];
+    for (std::size_t i = 0; i < 12; ++i) {
+      json &one = checked["settings"][0]["throws"][i], &other = by_card[i];
+      ASSERT_EQ(one["id"], other["id"]);
+      for (const auto& [mine, where, its] : {std::tuple{"detach_vx_m_s", "detach", "vx_m_s"},
+                                             {"detach_vz_m_s", "detach", "vz_m_s"},
+                                             {"detach_omega_deg_s", "detach", "omega_deg_s"},
+                                             {"landing_theta_deg", "landing", "theta_deg"}})
+        EXPECT_NEAR(one[mine].get<double>(), other[where][its].get<double>(), 1e-2) << mine;
+    }
     found.push_back(engine);
   }
   double most = 0;
@@ -199,6 +211,25 @@ TEST_F(Cli, CrosscheckOpensThePadsAsTheCardSays) {
     EXPECT_THAT(answer.err, HasSubstr("12 of 12 throws have no normal force"));
     const auto landings = landings_of(read_json(folder / "c.json")["settings"][0]["throws"]);
     ASSERT_EQ(landings.size(), 12u) << engine;
+    // Differences are engine minus model, and minus measured, of the throws.
+    json setting = read_json(folder / "c.json")["settings"][0],
+         by_card = read_json(folder / "p.json")["throws"];
+    for (const char* key : {"landing_x_m", "landing_theta_deg"}) {
+      double bias = 0, worst = 0, measured = 0;
+      for (std::size_t i = 0; i < 12; ++i) {
+        const double is = setting["throws"][i][key],
+                     model = by_card[i]["landing"][std::string(key).substr(8)];
+        bias += (is - model) / 12, worst = std::max(worst, std::abs(is - model));
+        measured += std::abs(is - by_card[i]["measured"][key].get<double>()) / 12;
+      }
+      json& told = setting["models"]["limit_surface"][key];
+      EXPECT_NEAR(told["bias"].get<double>(), bias, 1e-4 + 0.05 * worst) << key;  // predict's tolerance
+      EXPECT_NEAR(told["max"].get<double>(), worst, 1e-4 + 0.05 * worst) << key;
+      EXPECT_NEAR(setting["measured"][key]["mae"].get<double>(), measured, 1e-6 * (1 + measured)) << key;
+      if (engine == "patch") {
+        EXPECT_GT(worst, 1e-3) << key;
+      }
+    }
     // The same equations; or points of a disc, of whose limit surface the ellipsoid is some per cent away.
     for (std::size_t i = 0; i < 12; ++i)
       EXPECT_NEAR(landings[i], predicted[i], engine == "cvode" ? 1e-5 : 0.02) << engine;

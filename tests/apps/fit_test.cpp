@@ -1,4 +1,6 @@
 // fit, and what its cards foretell.
+#include <fmt/format.h>
+
 #include "tests/apps/cli.hpp"
 
 namespace unhand::cli {
@@ -130,6 +132,25 @@ TEST_F(Cli, FitThenPredict) {
       mae += std::abs(one["error"]["landing_x_m"].get<double>());
       ++n;
     }
+  }
+  // The CSV and the table say what the JSON does.
+  const auto csv = columns_of(content(folder / "p.csv"));
+  for (std::size_t k = 0; k < 12; ++k) {
+    json& one = throws[k];
+    ASSERT_EQ(csv.at("throw")[k], one["id"]);
+    const auto same = [&](const std::string& column, const json& value) {
+      EXPECT_NEAR(std::stod(csv.at(column)[k]), value.get<double>(),
+                  1e-9 * (1 + std::abs(value.get<double>())))
+          << column;
+    };
+    for (const auto& [key, value] : one["detach"].items())
+      if (csv.count("detach_" + key) > 0) same("detach_" + key, value);
+    same("landing_theta_deg", one["landing"]["theta_deg"]);
+    for (const auto& [key, value] : one["sigma"].items())
+      if (key != "flight_time_s") same("sigma_" + key, value);
+    for (const auto& [key, value] : one["sigma_measured"].items()) same("sigma_measured_" + key, value);
+    EXPECT_THAT(predicted.out,
+                HasSubstr(fmt::format("{:.2f} ± ", one["landing"]["theta_deg"].get<double>())));
   }
   card["valid_range"]["shape"] = {{"low", 5}, {"high", 6}, {"unit", "-"}};
   std::ofstream(folder / "narrow.json") << card;

@@ -1,4 +1,10 @@
 // Throws planned and learnt, and new objects.
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <regex>
+
 #include "tests/apps/cli.hpp"
 
 namespace unhand::cli {
@@ -21,6 +27,21 @@ TEST_F(Cli, PlansAThrowIntoABox) {
   EXPECT_NEAR(carried["rms_m"].get<double>(), std::sqrt(square), 1e-12);
   EXPECT_GT(std::abs(carried["mean_across_m"].get<double>()), 0.01);
   EXPECT_LE(carried["rms_m"], plan["window_landings"]["no_acceleration"]["largest_miss_m"]);
+  // It is aimed so that a release in the middle of the window lands in the middle.
+  const auto window = plan["window_landings"]["no_acceleration"]["across_m"].get<std::vector<double>>();
+  const auto [low, high] = std::minmax_element(window.begin(), window.end());
+  const double middle = window[window.size() / 2];
+  const auto landings = columns_of(content(folder / "out/landings.csv"));
+  for (std::size_t i = 0; i < landings.at("motion").size(); ++i) {
+    if (landings.at("motion")[i] != "no acceleration") continue;
+    EXPECT_GE(std::stod(landings.at("across_m")[i]), *low - middle - 1e-4);
+    EXPECT_LE(std::stod(landings.at("across_m")[i]), *high - middle + 1e-4);
+  }
+  EXPECT_GT(std::abs(middle), 1e-3);
+  double beside = 0;
+  for (std::size_t i = 0; i < landings.at("motion").size(); ++i)
+    if (landings.at("motion")[i] == "no acceleration") beside += std::stod(landings.at("across_m")[i]) / 50;
+  EXPECT_NEAR(carried["mean_across_m"].get<double>(), beside, 1e-6);
   for (const char* limit : {"position", "velocity", "acceleration", "jerk", "torque"})
     EXPECT_LE(plan["limits"][limit]["fraction"], 1 + 1e-9) << limit;
   EXPECT_THAT(content(folder / "out/trajectory.csv"), testing::StartsWith("time_s,q1_rad,"));
@@ -136,7 +157,7 @@ TEST_F(Cli, PlansAThrowWithACard) {
   EXPECT_THAT(content(folder / "out/tube.gp"), HasSubstr("landings that the card predicts"));
   const Answer rigid = run("plan throw --target 1.3,0,-0.2 --samples 600 --draws 40 --sku bar.toml");
   EXPECT_THAT(rigid.out, HasSubstr("note: without a card the object is taken as carried rigidly"));
-  EXPECT_THAT(rigid.out, HasSubstr("14 cm from the pads"));
+  EXPECT_THAT(rigid.out, HasSubstr("this one hangs 14 cm from the pads"));
   auto plan = nlohmann::json::parse(content(folder / "plan.json"));
   EXPECT_LT(plan["predicted"]["insensitive motion"]["rms_m"],
             plan["predicted"]["tube acceleration"]["rms_m"]);
@@ -203,24 +224,25 @@ TEST_F(Cli, AdaptationThrowsUnknownObjectsWhereItShould) {
   EXPECT_EQ(read_json(folder / "out/control.json"), found);
 }
 
-/// The columns of a CSV by name, as text.
-std::map<std::string, std::vector<std::string>> columns_of(const std::string& csv) {
-  const auto cells = [](const std::string& line) {
+/// The rows of a figure's data by the title of their block.
+std::map<std::string, std::vector<std::vector<double>>> blocks_of(const fs::path& file) {
+  std::map<std::string, std::vector<std::vector<double>>> out;
+  std::istringstream lines(content(file));
+  std::string title;
+  for (std::string line; std::getline(lines, line);) {
+    std::smatch found;
+    if (std::regex_match(line, found, std::regex("# [0-9]+: \"(.*)\""))) title = found[1];
+    if (line.empty() || line.front() == '#') continue;
     std::istringstream in(line);
-    std::vector<std::string> out;
-    for (std::string cell; std::getline(in, cell, ',');) out.push_back(cell);
-    return out;
-  };
-  std::istringstream lines(csv);
-  std::string line;
-  std::getline(lines, line);
-  const auto names = cells(line);
-  std::map<std::string, std::vector<std::string>> out;
-  while (std::getline(lines, line)) {
-    const auto row = cells(line);
-    EXPECT_EQ(row.size(), names.size()) << line;
-    for (std::size_t i = 0; i < std::min(row.size(), names.size()); ++i) out[names[i]].push_back(row[i]);
+    auto& row = out[title].emplace_back();
+    for (double x{}; in >> x;) row.push_back(x);
   }
+  return out;
+}
+
+std::vector<double> numbers_of(const std::vector<std::string>& cells) {
+  std::vector<double> out;
+  for (const std::string& cell : cells) out.push_back(std::stod(cell));
   return out;
 }
 
@@ -236,6 +258,7 @@ void expect_trajectories(const std::string& csv, const std::string& of) {
     const double dt = value("time_s", k) - value("time_s", k - 1);
     EXPECT_LE(dt, 0.02);
     for (const auto& [angle, rate] : {std::pair{"q1_rad", "qd1_rad_s"},
+                                      {"q2_rad", "qd2_rad_s"},
                                       {"q3_rad", "qd3_rad_s"},
                                       {"motor_rad", "motor_rad_s"},
                                       {"tip_x_m", "tip_vx_m_s"},
@@ -285,6 +308,36 @@ TEST_F(Cli, AClutchedSpringThrowsFaster) {
   EXPECT_NEAR(std::hypot(vx, vz), drives["rigid"]["basins"].back()["resimulated_speed_m_s"].get<double>(),
               1e-6);
 
+  // What the drawn motions use of the limits is what is told: 8 N m/rad, and limits as
+  // docs/elastic-throwing.md has them.
+  const auto drawn = blocks_of(folder / "out/speed.dat");
+  for (auto& [name, drive] : drives.items()) {
+    double speed = 0, torque[2]{}, deflection = 0;
+    for (const auto& row : drawn.at(name)) {
+      speed = std::max(speed, std::abs(row[3]) / 4.5);
+      torque[0] = std::max({torque[0], std::abs(row[7]) / 20, std::abs(row[8]) / 8});
+      torque[1] = std::max(torque[1], std::abs(row[9]) / 5);
+      deflection = std::max(deflection, std::abs(row[2]) / 0.4);
+      EXPECT_NEAR(row[10], 4 * row[2] * row[2], 1e-12) << "J, of 8 N m/rad";
+    }
+    json& limits = drive["basins"][0]["limits"];
+    EXPECT_NEAR(limits["motor_speed"].get<double>(), speed, 1e-9) << name;
+    EXPECT_NEAR(limits["torque"].get<double>(), torque[0], 1e-9) << name;
+    EXPECT_NEAR(limits["motor_torque"].get<double>(), torque[1], 1e-9) << name;
+    if (name != "rigid") {
+      EXPECT_NEAR(limits["deflection"].get<double>(), deflection, 1e-9) << name;
+    }
+    EXPECT_EQ(limits["brake"].get<double>() > 0, name == "BRK -> SEA");
+    EXPECT_NEAR(drawn.at(name).back()[1], drive["basins"][0]["resimulated_speed_m_s"].get<double>(), 1e-9);
+  }
+  double torque2 = 0;
+  for (std::size_t k = 0; k < columns.at("drive").size(); ++k)
+    if (columns.at("drive")[k] == "BRK -> SEA" && columns.at("basin")[k] == "1")
+      torque2 = std::max(torque2, std::abs(std::stod(columns.at("torque2_N_m")[k])));
+  double of_figure = 0;
+  for (const auto& row : drawn.at("BRK -> SEA")) of_figure = std::max(of_figure, std::abs(row[8]));
+  EXPECT_NEAR(torque2, of_figure, 0.02 * of_figure);
+
   expect_refusal("plan elastic --arm none.toml", 3, "none.toml: no such file");
 }
 
@@ -309,6 +362,21 @@ TEST_F(Cli, ElasticThrowsReachTheirTargets) {
     EXPECT_LE(std::abs(node["resimulated_miss_m"].get<double>()), 5e-3);
   }
   EXPECT_EQ(read_json(folder / "out/plan.json"), found);
+  EXPECT_NEAR(found["nodes"][0]["target_m"].get<double>(), 1.8, 1e-12);
+  for (const auto& node : found["nodes"])
+    EXPECT_THAT(answer.out,
+                HasSubstr(fmt::format("{:+.2f}", 1e3 * node["resimulated_miss_m"].get<double>())));
+  // The dense check, of which the figure has every target.
+  const auto checks = blocks_of(folder / "out/table.dat").at("dense check");
+  ASSERT_EQ(checks.size(), 9u);
+  EXPECT_EQ(found["check"]["targets"], 9);
+  double worst = 0, use = 0;
+  for (const auto& row : checks) worst = std::max(worst, std::abs(row[1]) / 1e3), use = std::max(use, row[2]);
+  EXPECT_NEAR(found["check"]["worst_miss_m"].get<double>(), worst, 1e-12);
+  EXPECT_NEAR(found["check"]["largest_limit_use"].get<double>(), use, 1e-12);
+  EXPECT_EQ(found["check"]["hits"], 9);
+  EXPECT_NEAR(checks.front()[0], 1.8, 1e-12);
+  EXPECT_NEAR(checks.back()[0], 2.6, 1e-12);
 
   const Answer far = run("plan elastic --target 9 --starts 1 --intervals 4 --json f.json");
   EXPECT_EQ(far.code, 1);
@@ -320,8 +388,8 @@ TEST_F(Cli, ElasticThrowsReachTheirTargets) {
 
 TEST_F(Cli, AnElasticWristThrowsFaster) {
   const Answer answer =
-      run("plan wrist --stiffnesses 2 --softest 4 --stiffest 16 --starts 1 --intervals 4 --json w.json "
-          "--report out");
+      run("plan wrist --stiffnesses 2 --softest 4 --stiffest 16 --starts 1 --intervals 4 --elevation 30 "
+          "--json w.json --report out");
   ASSERT_EQ(answer.code, 0) << answer.err;
   json wrist = read_json(folder / "w.json");
   ASSERT_EQ(wrist["spring"].size(), 2u);
@@ -338,7 +406,25 @@ TEST_F(Cli, AnElasticWristThrowsFaster) {
   EXPECT_EQ(read_json(folder / "out/plan.json"), wrist);
   const std::string csv = content(folder / "out/trajectory.csv");
   expect_trajectories(csv, "stiffness_n_m_rad");
-  EXPECT_THAT(columns_of(csv).at("stiffness_n_m_rad"), testing::IsSupersetOf({"inf", "4", "16"}));
+  const auto columns = columns_of(csv);
+  EXPECT_THAT(columns.at("stiffness_n_m_rad"), testing::IsSupersetOf({"inf", "4", "16"}));
+  EXPECT_NEAR(
+      std::atan2(std::stod(columns.at("tip_vz_m_s").back()), std::stod(columns.at("tip_vx_m_s").back())),
+      std::numbers::pi / 6, 0.01)
+      << "as asked for";
+  const auto drawn = blocks_of(folder / "out/gain.dat").at("spring");
+  for (std::size_t k = 0; k < 2; ++k) {
+    const double stiffness = k == 0 ? 4 : 16;
+    EXPECT_NEAR(drawn[k][2], wrist["spring"][k]["gain"].get<double>(), 1e-9);
+    double most = 0;  // J, over the run
+    for (std::size_t i = 0; i < columns.at("deflection_rad").size(); ++i)
+      if (columns.at("stiffness_n_m_rad")[i] == fmt::to_string(static_cast<int>(stiffness)))
+        most = std::max(most, 0.5 * stiffness * std::pow(std::stod(columns.at("deflection_rad")[i]), 2));
+    EXPECT_NEAR(wrist["spring"][k]["stored_J"].get<double>(), most, 0.02 * most);
+    EXPECT_NEAR(drawn[k][3], wrist["spring"][k]["stored_J"].get<double>(), 1e-9);
+  }
+  const std::size_t best = drawn[1][1] > drawn[0][1];
+  EXPECT_THAT(answer.out, HasSubstr(fmt::format("best stiffness {:.2f} N m/rad", drawn[best][0])));
 }
 
 TEST_F(Cli, LearnsToThrowFlipAndGoesOnAfterAKill) {
@@ -358,6 +444,53 @@ TEST_F(Cli, LearnsToThrowFlipAndGoesOnAfterAKill) {
   EXPECT_EQ(flip["population"].size(), 27u);
   for (const char* file : {"path.png", "progress.png", "population.pdf", "path.md", "session.json"})
     EXPECT_TRUE(fs::exists(folder / "out" / file)) << file;
+
+  // Means, errors, hits and figures are those of the throws.
+  const json target = flip["target"];
+  const auto off = [&](const json& landing, const char* key, const char* tolerance) {
+    return (landing[key].get<double>() - target[key].get<double>()) / target[tolerance].get<double>();
+  };
+  const auto drawn = blocks_of(folder / "out/path.dat");
+  const double degree = std::numbers::pi / 180;
+  std::size_t shown = 0;
+  json two_thirds;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const json& one = flip["iterations"][i];
+    double x = 0, angle = 0;
+    int hits = 0;
+    for (const auto& trial : one["trials"]) {
+      const json& landing = trial["landing"];
+      x += landing["x_m"].get<double>() / 3, angle += landing["angle_rad"].get<double>() / 3;
+      hits += std::abs(off(landing, "x_m", "tolerance_x_m")) <= 1 &&
+              std::abs(off(landing, "angle_rad", "tolerance_angle_rad")) <= 1;
+      EXPECT_NEAR(drawn.at("throws").at(shown)[0], landing["x_m"].get<double>(), 1e-12);
+      EXPECT_NEAR(drawn.at("throws").at(shown++)[1], landing["angle_rad"].get<double>() / degree, 1e-9);
+    }
+    EXPECT_NEAR(one["mean"]["x_m"].get<double>(), x, 1e-12);
+    EXPECT_NEAR(one["mean"]["angle_rad"].get<double>(), angle, 1e-12);
+    EXPECT_NEAR(one["error"].get<double>(),
+                std::hypot(off(one["mean"], "x_m", "tolerance_x_m"),
+                           off(one["mean"], "angle_rad", "tolerance_angle_rad")),
+                1e-9);
+    EXPECT_EQ(one["hits"], hits);
+    if (two_thirds.is_null() && hits >= 2) two_thirds = i + 1;
+    EXPECT_NEAR(drawn.at("means by iteration")[i][1], angle / degree, 1e-9);
+    EXPECT_THAT(answer.out, testing::ContainsRegex(fmt::format(
+                                "{} +{:.2f} +{:.4f} .* {:.3f} +{:.0f} ", i + 1,
+                                one["trials"][0]["command"]["pitch_rad"].get<double>() / degree,
+                                one["trials"][0]["command"]["speed"].get<double>(), x, angle / degree)));
+  }
+  EXPECT_EQ(flip["first_error"], flip["iterations"][0]["error"]);
+  EXPECT_EQ(flip["iterations_to_two_thirds"], two_thirds);
+  const auto progress = blocks_of(folder / "out/progress.dat").at("all");
+  EXPECT_EQ(progress[0][0], 0);
+  EXPECT_NEAR(progress[0][1], flip["initial_error"].get<double>(), 1e-9);
+  double drawn_angles = 0, angles = 0;
+  for (const auto& [title, rows] : blocks_of(folder / "out/population.dat"))
+    for (const auto& row : rows) drawn_angles += row[1];
+  for (const auto& trial : flip["population"])
+    if (trial.contains("landing")) angles += trial["landing"]["angle_rad"].get<double>() / degree;
+  EXPECT_NEAR(drawn_angles, angles, 1e-6);
 
   // As a kill leaves it: some throws are there, the report is not. The rest comes out as before.
   const auto trials = folder / "out/trials";
@@ -488,6 +621,46 @@ TEST_F(Cli, ValidateSkuAnswersWithABudget) {
   json judged = read_json(folder / "b.json");
   EXPECT_EQ(judged["candidates"].size(), 6u);  // the campaign's conditions, three for each of two objects
   EXPECT_EQ(judged["measured"]["n"], 6);
+  // The tables say what the JSON does, in cm; what an input brings adds up in squares where nothing
+  // correlates.
+  const auto row = [](const std::vector<std::string>& cells) {
+    std::string pattern;
+    for (const auto& cell : cells) pattern += (pattern.empty() ? "" : " +") + cell;
+    return testing::ContainsRegex(pattern);
+  };
+  double square = 0;
+  for (const auto& line : out["budget"]) {
+    const auto of = [&](const char* key) { return line[key].get<double>(); };
+    square += of("landing_theta_deg") * of("landing_theta_deg");
+    EXPECT_THAT(answer.out, row({fmt::format("{:.2f}", 100 * of("landing_x_m")),
+                                 fmt::format("{:.2f}", of("landing_theta_deg")),
+                                 fmt::format("{:.1f} %", 100 * of("share"))}));
+  }
+  EXPECT_NEAR(out["linear"]["landing_theta_deg"].get<double>(), std::sqrt(square), 1e-9);
+  for (const auto& one : judged["candidates"])
+    EXPECT_THAT(with_log.out, row({one["condition"].get<std::string>().substr(0, 20) + ".*",
+                                   fmt::format("{:.2f}", 100 * one["sigma_x_m"].get<double>()),
+                                   fmt::format("{:.2f}", one["sigma_theta_deg"].get<double>())}));
+  const auto condition =
+      std::find_if(judged["candidates"].begin(), judged["candidates"].end(),
+                   [&](const json& one) { return one["condition"] == judged["condition"]; });
+  ASSERT_NE(condition, judged["candidates"].end());
+  EXPECT_EQ((*condition)["sigma_theta_deg"], judged["linear"]["landing_theta_deg"]);
+  EXPECT_EQ((*condition)["sigma_x_m"], judged["linear"]["landing_x_m"]);
+  const json& measured = judged["measured"];
+  double mae = 0, bias = 0, z = 0;
+  for (const auto& one : measured["throws"]) {
+    const auto of = [&](const char* key) { return one[key].get<double>(); };
+    mae += std::abs(of("error_theta_deg")) / 6, bias += of("error_x_m") / 6;
+    z += (std::pow(of("error_x_m") / of("sigma_x_m"), 2) +
+          std::pow(of("error_theta_deg") / of("sigma_theta_deg"), 2)) /
+         12;
+  }
+  EXPECT_NEAR(measured["landing_theta_mae_deg"].get<double>(), mae, 1e-9);
+  EXPECT_NEAR(measured["bias_x_m"].get<double>(), bias, 1e-12);
+  EXPECT_NEAR(measured["rms_z"].get<double>(), std::sqrt(z), 1e-9);
+  EXPECT_THAT(with_log.out, HasSubstr(fmt::format("{:.2f} deg in the mean of the absolute; bias {:+.2f} cm",
+                                                  mae, 100 * bias)));
 
   // The verdict says where it rests on nothing that the card was tried on.
   EXPECT_THAT(answer.out,
@@ -532,6 +705,291 @@ TEST_F(Cli, ValidateSkuAnswersWithABudget) {
   expect_refusal("plan throw --target 1.3,0,-0.2 --sku odd.toml", 3, "odd.toml: inertia_kg_m2");
   expect_refusal("import hand-csv x.csv --sku odd.toml --out o.h5 --columns time=t", 3,
                  "odd.toml: inertia_kg_m2");
+}
+
+/// Table, JSON, CSV files and figures of one plan tell of one motion and of one set of landings. `along`: the
+/// throw's level direction.
+void expect_one_story(const Answer& answer, const json& plan, const fs::path& folder,
+                      const std::array<double, 2>& along) {
+  const auto close = [](double told, double is) { return std::abs(told - is) <= 1e-5 * (1 + std::abs(is)); };
+  // Landings: moments, those in the box, and the table.
+  const auto landings = columns_of(content(folder / "landings.csv"));
+  const auto forward = numbers_of(landings.at("forward_m")), across = numbers_of(landings.at("across_m"));
+  for (const auto& [name, told] : plan["predicted"].items()) {
+    double n = 0, sum = 0, beside = 0, squares = 0, squares_beside = 0;
+    int hits = 0;
+    for (std::size_t i = 0; i < forward.size(); ++i) {
+      if (landings.at("motion")[i] != name) continue;
+      const double f = forward[i], a = across[i];
+      ++n, sum += f, beside += a, squares += f * f, squares_beside += a * a;
+      hits += std::abs(along[0] * f - along[1] * a) <= plan["box_m"][0].get<double>() / 2 &&
+              std::abs(along[1] * f + along[0] * a) <= plan["box_m"][1].get<double>() / 2;
+    }
+    const double mean = sum / n, mean_beside = beside / n;
+    EXPECT_EQ(told["landed"].get<double>(), n) << name;
+    EXPECT_TRUE(close(told["mean_m"], mean) && close(told["mean_across_m"], mean_beside)) << name;
+    EXPECT_TRUE(close(told["std_m"], std::sqrt(std::max(0.0, squares - n * mean * mean) / (n - 1)))) << name;
+    EXPECT_TRUE(close(told["std_across_m"],
+                      std::sqrt(std::max(0.0, squares_beside - n * mean_beside * mean_beside) / (n - 1))))
+        << name;
+    EXPECT_EQ(told["hits"], hits) << name;
+    const double all = n + told["lost"].get<double>();
+    EXPECT_THAT(answer.out, HasSubstr(fmt::format("{:.1f} %", 100 * hits / all))) << name;
+  }
+  // The motion: angles are integrals of rates, rates of accelerations, and at the command they are the
+  // plan's.
+  const auto rows = columns_of(content(folder / "trajectory.csv"));
+  const auto time = numbers_of(rows.at("time_s"));
+  EXPECT_LT(time.front(), -0.1);
+  EXPECT_GE(time.back(), plan["window_s"].get<double>());
+  const double most_velocity[]{2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61};
+  double velocity = 0;
+  for (int i = 0; i < 7; ++i) {
+    const auto column = [&](const char* what, const char* unit) {
+      return numbers_of(rows.at(fmt::format("{}{}_{}", what, i + 1, unit)));
+    };
+    const auto q = column("q", "rad"), qd = column("qd", "rad_s"), qdd = column("qdd", "rad_s2");
+    std::size_t at_command = 0;
+    for (std::size_t k = 0; k < time.size(); ++k) {
+      velocity = std::max(velocity, std::abs(qd[k]) / most_velocity[i]);
+      if (time[k] <= 0) at_command = k + 1;
+      if (k == 0) continue;
+      const double dt = time[k] - time[k - 1];
+      ASSERT_NEAR(q[k] - q[k - 1], 0.5 * dt * (qd[k] + qd[k - 1]), 1e-5) << i << ' ' << time[k];
+      ASSERT_NEAR(qd[k] - qd[k - 1], 0.5 * dt * (qdd[k] + qdd[k - 1]), 1e-2) << i << ' ' << time[k];
+    }
+    const double t = time[at_command], rate = plan["qd0_rad_s"][i], held = plan["qdd_rad_s2"][i];
+    EXPECT_NEAR(q[at_command], plan["q0_rad"][i].get<double>() + t * (rate + 0.5 * t * held), 1e-6) << i;
+    EXPECT_NEAR(qd[at_command], rate + t * held, 1e-5) << i;  // instants are told to a microsecond
+    EXPECT_NEAR(qdd[at_command], held, 1e-6) << i;
+  }
+  EXPECT_NEAR(plan["limits"]["velocity"]["fraction"].get<double>(), velocity, 2e-3);
+  std::vector<double> drawn(2, 0.0);
+  const auto motion = blocks_of(folder / "motion.dat").at("use of the limits");
+  for (const auto& row : motion)
+    for (std::size_t k = 1; k < row.size(); ++k)
+      drawn[(k - 1) / 7] = std::max(drawn[(k - 1) / 7], std::abs(row[k]));
+  EXPECT_NEAR(drawn[0], velocity, 2e-3);
+  EXPECT_NEAR(drawn[1], plan["limits"]["acceleration"]["fraction"].get<double>(), 0.02);
+  std::string used;
+  for (const char* limit : {"position", "velocity", "acceleration", "jerk", "torque"})
+    used += fmt::format("{}{} {:.1f} %", used.empty() ? "" : ", ", limit,
+                        100 * plan["limits"][limit]["fraction"].get<double>());
+  EXPECT_THAT(answer.out, HasSubstr(used));
+  // Releases over the window, in the figures too.
+  const auto tube = blocks_of(folder / "tube.dat");
+  for (const auto& [name, drawn_as] :
+       {std::pair{"planned", "planned"}, {"no_acceleration", "no acceleration"}}) {
+    const json& window = plan["window_landings"][name];
+    double most = 0;
+    for (std::size_t k = 0; k < window["time_s"].size(); ++k)
+      most = std::max(most,
+                      std::hypot(window["forward_m"][k].get<double>(), window["across_m"][k].get<double>()));
+    EXPECT_NEAR(window["largest_miss_m"].get<double>(), most, 1e-12);
+    const auto& last =
+        tube.at(fmt::format("flight from {:.3f} s, {}", plan["window_s"].get<double>(), drawn_as)).back();
+    EXPECT_NEAR(last[0], window["forward_m"].back().get<double>(), 1e-5) << name;
+    EXPECT_NEAR(last[1], 0, 1e-9) << "at the box's height";
+  }
+  const double half = std::min(plan["box_m"][0].get<double>() / 2 / std::abs(along[0]),
+                               plan["box_m"][1].get<double>() / 2 / std::abs(along[1]));
+  EXPECT_NEAR(tube.at("box").back()[0], half, 1e-9);
+}
+
+/// The level direction of planar throws to kAskew.
+constexpr const char* kAskew = "0.7,-0.9,-0.1";
+const std::array<double, 2> kAlong{0.7 / std::hypot(0.7, 0.9), -0.9 / std::hypot(0.7, 0.9)};
+
+// A box that is narrow one way, thrown into askew.
+TEST_F(Cli, OutputsOfAPlannedThrowAgree) {
+  const std::string plan = std::string("plan throw --target ") + kAskew +
+                           " --box 0.03x0.2 --planar --samples 300 --draws 60 --json p.json ";
+  const Answer answer = run(plan + "--report out");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json told = read_json(folder / "p.json");
+  EXPECT_EQ(told["box_m"], json({0.03, 0.2}));
+  expect_one_story(answer, told, folder / "out", kAlong);
+  EXPECT_LT(told["predicted"]["Tube-CVX"]["hits"].get<int>() +
+                told["predicted"]["no acceleration"]["hits"].get<int>(),
+            120)
+      << "some miss the narrow box";
+  // Upward by the slope of the first flight's parabola, from its first three points.
+  const auto flight = blocks_of(folder / "out/tube.dat").at("flight from 0.000 s, planned");
+  const double slope = (4 * flight[1][1] - 3 * flight[0][1] - flight[2][1]) / (flight[2][0] - flight[0][0]);
+  EXPECT_THAT(answer.out,
+              HasSubstr(fmt::format(", {:.1f} deg upward", std::atan(slope) * 180 / std::numbers::pi)));
+  const auto window = blocks_of(folder / "out/landings.dat");
+  const json& forward = told["window_landings"]["tube_cvx"]["forward_m"];
+  ASSERT_EQ(window.at("Tube-CVX").size(), forward.size());
+  for (std::size_t k = 0; k < forward.size(); ++k) {
+    EXPECT_NEAR(window.at("Tube-CVX")[k][0],
+                1e3 * told["window_landings"]["tube_cvx"]["time_s"][k].get<double>(), 1e-9);
+    EXPECT_NEAR(window.at("Tube-CVX")[k][1], 100 * forward[k].get<double>(), 1e-9);
+  }
+  // Without refinement what is planned is Tube-CVX's.
+  EXPECT_NE(told["qdd_rad_s2"], told["qdd_tube_cvx_rad_s2"]);
+  ASSERT_EQ(run(plan + "--tube-cvx").code, 0);
+  const json plain = read_json(folder / "p.json");
+  EXPECT_EQ(plain["qdd_rad_s2"], plain["qdd_tube_cvx_rad_s2"]);
+}
+
+/// A card of a pivot whose gripper is known, with scatter of the grasp; friction to `mu_sigma`.
+void write_pivot_card(const fs::path& file, double grip_force, double mu_sigma, double dead_time = 0.02) {
+  std::ofstream(file) << fmt::format(
+      R"({{"schema": "model-card", "schema_version": 1, "model": "sliding_pivot", "library_version": "0",
+      "log": {{"file": "made by a test"}}, "parameters": {{"mu": {{"value": 0.5, "sigma": {}, "unit": "-"}},
+      "length": {{"value": 0.007, "sigma": 1e-4, "unit": "m"}},
+      "grip_force": {{"value": {}, "unit": "N"}}, "dead_time": {{"value": {}, "sigma": 0.003, "unit": "s"}},
+      "opening_time": {{"value": 0.06, "sigma": 0.004, "unit": "s"}}, "shape": {{"value": 1.5, "unit": "-"}}}},
+      "own_spreads": {{"grasp_offset": {{"sigma": 0.003, "unit": "m"}},
+                       "grasp_angle": {{"sigma": 0.01, "unit": "rad"}}}}}})",
+      mu_sigma, grip_force, dead_time);
+}
+void write_bar(const fs::path& file, double mass, double com_offset) {
+  std::ofstream(file) << fmt::format(
+      "name='bar'\nsurface='paper'\nmass_kg={}\ncom_offset_m={}\ncom_offset_sigma_m=0.004\ninertia_kg_m2={}"
+      "\n",
+      mass, com_offset, 0.01 * mass);
+}
+
+TEST_F(Cli, OutputsOfAThrowWithACardAgree) {
+  write_pivot_card(folder / "card.json", 80, 0.03);
+  write_bar(folder / "bar.toml", 0.25, 0.12);
+  const std::string plan = std::string("plan throw --target ") + kAskew +
+                           " --box 0.015x0.2 --samples 300 --draws 60 --card card.json --json "
+                           "p.json ";
+  const Answer answer = run(plan + "--sku bar.toml --report out");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  json told = read_json(folder / "p.json");
+  expect_one_story(answer, told, folder / "out", kAlong);
+  EXPECT_NEAR(told["window_s"].get<double>(), std::max(0.1, 0.02 + 0.06 + 4 * std::hypot(0.003, 0.004)),
+              1e-12);
+  json& release = told["release"];
+  // sigma² = Σ (∂x/∂θ σ)² with the sigmas that the table tells; of the grasp both that of SKU and card.
+  EXPECT_DOUBLE_EQ(release["numbers"]["com_offset"]["sigma"], 0.005);  // 3, 4, 5
+  EXPECT_EQ(told["motion"], "insensitive motion");
+  for (const char* when : {"before", "after"}) {
+    double square = 0;
+    for (const auto& [name, derivative] : release[when]["derivatives"].items())
+      if (const json& sigma = release["numbers"][name]["sigma"]; sigma.is_number())
+        square += std::pow(derivative.get<double>() * sigma.get<double>(), 2);
+    EXPECT_NEAR(release[when]["sigma_m"].get<double>(), std::sqrt(square), 1e-9) << when;
+  }
+  EXPECT_EQ(release["before"]["miss_m"], release["contact_model"]["miss_m"]);
+  EXPECT_LT(release["after"]["sigma_m"], release["before"]["sigma_m"]);
+  EXPECT_EQ(release["carried_rigidly"]["detach_time_s"], release["contact_model"]["detach_time_s"]);
+  EXPECT_NE(release["carried_rigidly"]["miss_m"], release["contact_model"]["miss_m"]);
+  // Landings of the motion that is planned, in both figures.
+  const json& predicted = told["predicted"]["insensitive motion"];
+  const auto mean = blocks_of(folder / "out/tube.dat").at("landings that the card predicts").front();
+  EXPECT_NEAR(mean[0], predicted["mean_m"].get<double>(), 1e-9);
+  EXPECT_NEAR(mean[2], predicted["std_m"].get<double>(), 1e-9);
+  double shares = 0, middle = 0;
+  const auto bins = blocks_of(folder / "out/landings.dat").at("insensitive motion");
+  for (const auto& bin : bins) shares += bin[1], middle += bin[0] * bin[1] / 100;
+  EXPECT_NEAR(shares, 100, 1e-6);
+  EXPECT_NEAR(middle, 100 * predicted["mean_m"].get<double>(), 1);  // cm, of bins
+}
+
+// In air, and held at its middle, an object lands where the plan aims; a slow gripper takes a longer window.
+TEST_F(Cli, AThrowWithACardKnowsItsAirAndItsGripper) {
+  write_pivot_card(folder / "card.json", 80, 0.03, 0.06);
+  write_bar(folder / "bar.toml", 0.25, 0.0);
+  const std::string plan =
+      "plan throw --target 1.1,0,0 --samples 600 --draws 20 --card card.json --json p.json ";
+  const Answer answer = run(plan + "--sku bar.toml --drag 0.1");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  json told = read_json(folder / "p.json");
+  EXPECT_NEAR(told["window_s"].get<double>(), 0.06 + 0.06 + 4 * std::hypot(0.003, 0.004), 1e-12);
+  EXPECT_LT(std::abs(told["release"]["contact_model"]["miss_m"].get<double>()), 0.03);
+  EXPECT_LT(std::abs(told["predicted"][told["motion"].get<std::string>()]["mean_m"].get<double>()), 0.03);
+}
+
+// A grip that holds the nominal object and hardly more drops draws on the way; twice the object needs about
+// twice the grip.
+TEST_F(Cli, DrawsThatSlipOnTheWayAreLost) {
+  const std::string plan =
+      "plan throw --target 1.3,0,-0.2 --samples 300 --draws 100 --card card.json --json p.json ";
+  const auto needed = [&](double mass) {
+    write_pivot_card(folder / "card.json", 300, 0.03);
+    write_bar(folder / "bar.toml", mass, 0.1);
+    EXPECT_EQ(run(plan + "--sku bar.toml").code, 0);
+    return read_json(folder / "p.json")["release"]["needed_grip_force_N"].get<double>();
+  };
+  const double heavy = needed(0.4), light = needed(0.2);
+  EXPECT_NEAR(heavy / light, 2, 0.4);  // another motion
+  int kept = 0;
+  for (const double share : {1.2, 0.8}) {  // of what the strong grip's motion needs
+    write_pivot_card(folder / "card.json", share * light, 0.08);
+    const Answer weak = run(plan + "--sku bar.toml");
+    ASSERT_EQ(weak.code, 0) << weak.err;
+    json told = read_json(folder / "p.json");
+    const json& predicted = told["predicted"][told["motion"].get<std::string>()];
+    EXPECT_GT(predicted["lost"], 0);
+    EXPECT_EQ(predicted["landed"].get<int>() + predicted["lost"].get<int>(), 100);
+    EXPECT_THAT(weak.out, HasSubstr(fmt::format("{:.1f} %", predicted["hits"].get<double>())));
+    for (const auto& [name, other] : told["predicted"].items())
+      EXPECT_LE(other["hits"], predicted["hits"]) << name;
+    if (told["motion"] != "tube acceleration") continue;
+    ++kept;
+    EXPECT_THAT(weak.err, HasSubstr("that is kept"));
+    // Carried rigidly until then, it lands as the window's landings do.
+    const json &rigid = told["release"]["carried_rigidly"], &window = told["window_landings"]["planned"];
+    for (std::size_t k = 1; k < window["time_s"].size(); ++k) {
+      const double before = window["time_s"][k - 1], after = window["time_s"][k], t = rigid["detach_time_s"];
+      if (t < before || t > after) continue;
+      EXPECT_NEAR(rigid["miss_m"].get<double>(),
+                  std::lerp(window["forward_m"][k - 1].get<double>(), window["forward_m"][k].get<double>(),
+                            (t - before) / (after - before)),
+                  1e-3);
+    }
+  }
+  EXPECT_EQ(kept, 1);
+}
+
+// Two robots without repetitions: numbers, table and figures are those of the same throws.
+TEST_F(Cli, OutputsOfControlledThrowsAgree) {
+  const Answer answer = run("plan control --seeds 2 --repetitions 0 --box 0.012 --json c.json --report out");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  json cells = read_json(folder / "c.json")["cells"];
+  ASSERT_EQ(cells.size(), 12u);
+  const auto landings = blocks_of(folder / "out/landings.dat");
+  EXPECT_NEAR(landings.at("box")[1][0], 0.6, 1e-12);  // cm
+  int hit = 0;
+  for (json& cell : cells) {
+    const auto& rows =
+        landings.at(cell["object"].get<std::string>() + ", " + cell["controller"].get<std::string>());
+    ASSERT_EQ(rows.size(), 2u);
+    int hits = 0;
+    double square = 0;
+    for (const auto& row : rows) {
+      hits += std::abs(row[0]) <= 0.6 && std::abs(row[1]) <= 0.6;
+      square += row[0] * row[0] + row[1] * row[1];
+    }
+    hit += hits;
+    EXPECT_EQ(cell["hits"], hits);
+    for (int axis = 0; axis < 2; ++axis) {
+      EXPECT_NEAR(cell["mean_m"][axis].get<double>(), 0.005 * (rows[0][axis] + rows[1][axis]), 1e-9);
+      EXPECT_NEAR(cell["std_m"][axis].get<double>(),
+                  0.01 * std::abs(rows[0][axis] - rows[1][axis]) / std::sqrt(2.0), 1e-9);
+      EXPECT_GT(cell["std_m"][axis].get<double>(), 0) << "the robots differ";
+    }
+    EXPECT_NEAR(cell["rms_m"].get<double>(), 0.01 * std::sqrt(square / 2), 1e-9);
+    EXPECT_THAT(answer.out, HasSubstr(fmt::format("  {:.1f}  ", 1e3 * cell["rms_m"].get<double>())));
+  }
+  EXPECT_GT(hit, 0);
+  EXPECT_LT(hit, 24);
+  // The record of the last object ends at its release, with the errors that are told of it.
+  const auto errors = blocks_of(folder / "out/errors.dat");
+  for (std::size_t k = 8; k < 12; ++k) {
+    const auto& record = errors.at(cells[k]["controller"].get<std::string>());
+    EXPECT_LT(record.back()[0], 0.75) << "s: nothing is repeated";
+    const auto near = [](double told, double drawn) { return told < 1.6 * drawn && drawn < 1.6 * told; };
+    EXPECT_TRUE(near(cells[k]["release_velocity_error_m_s"], record.back()[2])) << cells[k];
+    if (cells[k]["controller"] == "plain, 30 N/m") {
+      EXPECT_TRUE(near(cells[k]["release_position_error_m"], record.back()[1] / 100)) << cells[k];
+    }
+  }
 }
 
 }  // namespace

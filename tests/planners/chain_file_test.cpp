@@ -187,5 +187,31 @@ TEST_F(ChainFile, UrdfMistakesAreToldWhereTheyAre) {
   EXPECT_THROW(read_urdf_chain(folder / "none.urdf"), datasets::ImportError);
 }
 
+// rpy is about the fixed axes, roll first: an upright rod that is rolled by 90° lies along −y, and a yaw of
+// 90° then turns it to +x; a pitch in between is about the fixed y, along which it lies, and moves nothing.
+TEST_F(ChainFile, UrdfTurnsAboutFixedAxes) {
+  const auto rod = [](const std::string& rpy) {  // 1 kg, along its own z
+    return R"(<robot name="rod"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 0" rpy=")" +
+           rpy +
+           R"("/><mass value="1"/><inertia ixx="0.08" iyy="0.09" izz="0.01" ixy="0" ixz="0" iyz="0"/>
+             </inertial></link><link name="end"/>
+             <joint name="j" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 0 1"/></joint>
+             <joint name="k" type="fixed"><parent link="rod"/><child link="end"/>
+               <origin xyz="0 0 0.5" rpy=")" +
+           rpy + R"("/></joint></robot>)";
+  };
+  const auto read = [&](const std::string& rpy) { return read_urdf_chain(put("rod.urdf", rod(rpy)), "end"); };
+  const std::string quarter = "1.5707963267948966";
+  const Chain turned = read(quarter + " 0.7 " + quarter);
+  EXPECT_LT((turned.tip.R.col(2) - Eigen::Vector3d(1, 0, 0)).norm(), 1e-12);
+  // Along x: least about x. The rod's own x axis, pitched by 0.7 in the x-z plane, is yawed into y-z.
+  const double c = std::cos(0.7), s = std::sin(0.7);
+  const Eigen::Vector3d x(0, c, -s), y = Eigen::Vector3d(1, 0, 0).cross(x);
+  const Eigen::Matrix3d expected = 0.08 * x * x.transpose() + 0.09 * y * y.transpose() +
+                                   0.01 * Eigen::Vector3d::UnitX() * Eigen::Vector3d::UnitX().transpose();
+  EXPECT_LT((turned.joints[0].link.about_com - expected).norm(), 1e-12);
+  EXPECT_NEAR(mass_matrix<double>(turned, Joints::Zero(1))(0, 0), expected(2, 2), 1e-12);
+}
+
 }  // namespace
 }  // namespace unhand::planners

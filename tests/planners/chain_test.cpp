@@ -260,5 +260,28 @@ TEST(Chain, RefusesVectorsOfAnotherSize) {
   EXPECT_THROW(energy_of(arm, all, three), std::invalid_argument);
 }
 
+// Of a gripper's block at some depth below the flange: its weight, and its inertia about an axis across it.
+TEST(Chain, AGripperIsABlockAsLongAsItself) {
+  const double length = 0.2, mass = 0.8, width = 0.1;
+  const Chain bare = panda(), arm = with_gripper(bare, length, mass), light = with_gripper(bare, length, 0);
+  std::mt19937_64 random(3);
+  for (int k = 0; k < 20; ++k) {
+    const RandomState s = state_of(7, random);
+    const Transform<double> flange = forward_kinematics(bare, s.q);
+    expect_near(forward_kinematics(arm, s.q).p, flange.p + length * flange.R.col(2), "pads");
+    const Eigen::Vector3d middle = flange.p + 0.5 * length * flange.R.col(2);
+    const auto without = energy_of<double>(light, s.q, s.qd), with = energy_of<double>(arm, s.q, s.qd);
+    EXPECT_NEAR(with.potential - without.potential, mass * 9.81 * middle.z(),
+                1e-12 * std::abs(with.potential));
+    const auto tip = tip_motion<double>(with_tool(bare, {Eigen::Matrix3d::Identity(), {0, 0, length / 2}}),
+                                        s.q, s.qd, Joints::Zero(7));
+    const double along = tip.omega.dot(flange.R.col(2)), across = tip.omega.squaredNorm() - along * along,
+                 turning = 0.5 * mass * (length * length + width * width) / 12 * across;
+    // What it has about its own axis is of the order of its width squared.
+    EXPECT_NEAR(with.kinetic - without.kinetic, 0.5 * mass * tip.velocity.squaredNorm() + turning,
+                0.5 * mass * width * width / 3 * along * along + 1e-12 * with.kinetic);
+  }
+}
+
 }  // namespace
 }  // namespace unhand::planners

@@ -94,7 +94,8 @@ TEST(ClutchedArm, ClutchesHoldWhatTheySay) {
 }
 
 /// A motion that goes through several modes, two of them entered with an impact.
-Replay tour(const ClutchedArm& arm, int intervals, int samples = 21) {
+Replay tour(const ClutchedArm& arm, int intervals, int samples = 21,
+            const MotorTorques<double>& torque = {12, 6, 1.5}) {
   ElasticThrow plan;
   const double length = 0.05;
   double t = 0;
@@ -104,7 +105,7 @@ Replay tour(const ClutchedArm& arm, int intervals, int samples = 21) {
     phase.mode = mode;
     for (int k = 0; k <= 2 * intervals; ++k) {
       ThrowPoint p{t + length * k / (2 * intervals), Coordinates<double>::Zero(), Coordinates<double>::Zero(),
-                   Coordinates<double>::Zero(), MotorTorques<double>(12, 6, 1.5)};
+                   Coordinates<double>::Zero(), torque};
       p.at.tail<3>() << 0.4, 0.6, -0.3;
       p.at[0] = p.at[1] = -0.3;
       phase.points.push_back(p);
@@ -229,6 +230,65 @@ TEST(ClutchedArm, RefusesWhatIsNone) {
   arm = bsa3();
   arm.chain.joints[0].origin.R.setIdentity();
   refused(arm, "the axis of joint 'shoulder' is not");
+}
+
+// What a run says that it used, against its own record: angles, rates and their differences, torques, and
+// what the brake adds to the spring to hold the last link.
+TEST(ClutchedArm, SharesOfTheLimitsAreThoseOfItsRecord) {
+  ClutchedArm arm = bsa3();
+  arm.last.deflection = 3;  // no stop on the way
+  arm.last.damping = 0.4;
+  for (int i = 0; i < kLinks; ++i) arm.chain.joints[i].limits.acceleration = 50.0 * (i + 1);
+  for (const MotorTorques<double>& torque :
+       {MotorTorques<double>(12, 1, 0.5), MotorTorques<double>(1, 6, 2.5)}) {
+    const Replay run = tour(arm, 2, 101, torque);
+    ASSERT_FALSE(run.spring_stop);
+    UsedShares most;
+    const auto note = [](double& share, double value) { share = std::max(share, std::abs(value)); };
+    const auto& all = run.samples;
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      const ReplaySample& s = all[k];
+      for (int i = 0; i < kLinks; ++i) {
+        const JointLimits& l = arm.chain.joints[i].limits;
+        note(most.angle, (s.at[2 + i] - 0.5 * (l.lower + l.upper)) / (0.5 * (l.upper - l.lower)));
+        note(most.speed, s.rate[2 + i] / l.velocity);
+        if (i < 2) note(most.torque, torque[i] / l.torque);
+      }
+      note(most.motor_speed, s.rate[0] / arm.last.motor_speed);
+      note(most.motor_torque, torque[2] / arm.last.motor_torque);
+      note(most.deflection, (s.at[0] - s.at[1]) / arm.last.deflection);
+      if (k == 0 || k + 1 == all.size() || all[k - 1].mode != s.mode || all[k + 1].mode != s.mode ||
+          !(all[k + 1].t - s.t > 1e-9 && s.t - all[k - 1].t > 1e-9))
+        continue;
+      const Links<double> qdd = (all[k + 1].rate - all[k - 1].rate).tail<3>() / (all[k + 1].t - all[k - 1].t);
+      for (int i = 0; i < kLinks; ++i)
+        note(most.acceleration, qdd[i] / arm.chain.joints[i].limits.acceleration);
+      if (s.mode != ClutchMode::brk) continue;
+      const double spring =
+          arm.last.stiffness * (s.at[0] - s.at[1]) + arm.last.damping * (s.rate[0] - s.rate[1]);
+      const Links<double> needs = joint_torque<double>(arm, s.at.tail<3>(), s.rate.tail<3>(), qdd);
+      note(most.brake, (needs[2] - spring) / arm.last.brake_torque);
+    }
+    EXPECT_NEAR(run.use.angle, most.angle, 1e-9);
+    EXPECT_NEAR(run.use.speed, most.speed, 1e-9);
+    EXPECT_NEAR(run.use.torque, most.torque, 1e-9);
+    EXPECT_NEAR(run.use.motor_speed, most.motor_speed, 1e-9);
+    EXPECT_NEAR(run.use.motor_torque, most.motor_torque, 1e-9);
+    EXPECT_NEAR(run.use.deflection, most.deflection, 1e-9);
+    EXPECT_NEAR(run.use.acceleration, most.acceleration, 0.03 * most.acceleration);  // of differences
+    EXPECT_NEAR(run.use.brake, most.brake, 0.03 * most.brake);
+    EXPECT_GT(most.brake, 0);
+  }
+}
+
+// On the Moon it flies six times as long.
+TEST(ClutchedArm, LandingsAreParabolasUnderAnyGravity) {
+  const TipState<double> release{0.3, 0.8, 2.0, 1.5};
+  for (const double g : {9.81, 1.62}) {
+    const double time = (1.5 + std::sqrt(1.5 * 1.5 + 2 * g * (0.8 + 0.5))) / g;
+    EXPECT_NEAR(landing_x(release, -0.5, g).value_or(0), 0.3 + 2 * time, 1e-12) << g;
+  }
+  EXPECT_FALSE(landing_x(release, 2.0));
 }
 
 }  // namespace

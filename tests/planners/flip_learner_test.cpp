@@ -263,5 +263,44 @@ TEST(Path, CountsIterationsToTheThreshold) {
   EXPECT_EQ(path.lowest(1), 4);
 }
 
+// Throws that never land have no landing to take the mean of.
+TEST(FlipError, MeansAreOfWhatLanded) {
+  std::vector<FlipTrial> trials(3);
+  for (std::size_t k = 0; k < 3; ++k) {
+    trials[k].outcome = FlipOutcome::landed;
+    trials[k].landing = {1.0 + 0.1 * static_cast<double>(k), 3.0};
+    trials[k].detach[5] = static_cast<double>(k);
+  }
+  trials[1].outcome = FlipOutcome::never_lands;
+  const auto mean = mean_of(trials);
+  ASSERT_TRUE(mean);
+  EXPECT_EQ(mean->throws, 2);
+  EXPECT_DOUBLE_EQ(mean->landing.x, 1.1);
+  EXPECT_DOUBLE_EQ(mean->detach[5], 1);
+  EXPECT_FALSE(mean_of(std::span(trials).subspan(1, 1)));
+}
+
+// Every throw of a path and of a grid has an index of its own, and a throw that lands elsewhere is no hit.
+TEST(Path, EveryThrowIsAnotherOne) {
+  const LinearPlant plant{false};
+  std::vector<int> asked;
+  const Thrower thrower = [&](const TrialRequest& request) {
+    asked.push_back(request.index);
+    FlipTrial out = plant(request);
+    out.landing.x += request.index % 2 == 0 ? 0 : 1;  // every other one goes astray
+    return out;
+  };
+  const auto support = gather(plant, "support", support_simplex(kRange), 1, kBar).data;
+  const FlipTarget target = target_on_mesh(plant, support, 0.3, 0.25, support[3].landing);
+  ConeLearner learner(ForwardModel::detach, support, target, kRange);
+  const LearningPath path = learn(learner, target, support, kBar, thrower, {2, 2});
+  EXPECT_EQ(asked, (std::vector{0, 1, 2, 3}));
+  ASSERT_FALSE(path.iterations.empty());
+  EXPECT_EQ(path.iterations[0].hits, 1);
+  asked.clear();
+  gather(thrower, "support", support_simplex(kRange), 2, kBar);
+  EXPECT_EQ(asked, (std::vector{0, 1, 2, 3, 4, 5, 6, 7}));
+}
+
 }  // namespace
 }  // namespace unhand::planners::flip

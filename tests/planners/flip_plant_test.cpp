@@ -351,5 +351,117 @@ TEST(FlipRobotFile, SaysTheShapeOfTheQuartic) {
   EXPECT_THROW(with("kappa = -0.1"), datasets::TomlError);
 }
 
+// Whatever is declared to scatter does so by itself: robots, throws and sensors, the reading by as much as is
+// said.
+TEST(FlipPlant, EveryDeclaredSpreadScatters) {
+  const auto thrown = [](const FlipRobot& r, std::uint64_t seed_of_robot, std::uint64_t trial) {
+    return FlipPlant(r, seed_of_robot).throw_bar(middle(), r.bar, trial, {{1, 1.0}, 1});
+  };
+  const FlipTrial exact = thrown(exact_robot(), 1, 1);
+  EXPECT_EQ(thrown(exact_robot(), 2, 1).landing.angle, exact.landing.angle);
+  EXPECT_EQ(thrown(exact_robot(), 1, 2).landing.angle, exact.landing.angle);
+  const auto apart = [](const FlipTrial& a, const FlipTrial& b) {
+    return std::abs(a.landing.angle - b.landing.angle);
+  };
+  for (const auto& [name, spread, size] : {std::tuple{"link_mass", &RobotSpread::link_mass, 0.05},
+                                           {"friction", &RobotSpread::friction, 0.2},
+                                           {"torque_gain", &RobotSpread::torque_gain, 0.02},
+                                           {"mu", &RobotSpread::mu, 0.1},
+                                           {"length", &RobotSpread::length, 0.2},
+                                           {"grip_force", &RobotSpread::grip_force, 0.1},
+                                           {"shape", &RobotSpread::shape, 0.1},
+                                           {"dead_time", &RobotSpread::dead_time, 3e-3},
+                                           {"opening_time", &RobotSpread::opening_time, 3e-3},
+                                           {"com_offset", &RobotSpread::com_offset, 3e-3}}) {
+    FlipRobot r = exact_robot();
+    r.robots.*spread = size;
+    EXPECT_GT(apart(thrown(r, 1, 1), thrown(r, 2, 1)), 1e-5) << name;
+    EXPECT_EQ(apart(thrown(r, 1, 1), thrown(r, 1, 2)), 0) << name;
+  }
+  for (const auto& [name, spread, size] : {std::tuple{"mu", &ThrowSpread::mu, 0.1},
+                                           {"grip_force", &ThrowSpread::grip_force, 0.1},
+                                           {"dead_time", &ThrowSpread::dead_time, 3e-3},
+                                           {"opening_time", &ThrowSpread::opening_time, 3e-3},
+                                           {"grasp_offset", &ThrowSpread::grasp_offset, 3e-3},
+                                           {"grasp_angle", &ThrowSpread::grasp_angle, 0.03},
+                                           {"torque_noise", &ThrowSpread::torque_noise, 0.01}}) {
+    FlipRobot r = exact_robot();
+    r.throws.*spread = size;
+    EXPECT_GT(apart(thrown(r, 1, 1), thrown(r, 1, 2)), 1e-5) << name;
+  }
+  for (double FlipSensors::*of_joints : {&FlipSensors::angle, &FlipSensors::rate}) {
+    FlipRobot r = exact_robot();
+    r.sensors.*of_joints = 0.01;
+    EXPECT_GT(apart(thrown(r, 1, 1), thrown(r, 1, 2)), 1e-5) << "the controller acts on what it reads";
+  }
+  FlipRobot reads = exact_robot();
+  reads.sensors.landing_turn = 0.3;
+  reads.sensors.omega = 1.5;
+  double turn = 0, omega = 0;
+  constexpr int kThrows = 40;
+  for (std::uint64_t k = 1; k <= kThrows; ++k) {
+    const FlipTrial one = thrown(reads, 1, k);
+    EXPECT_EQ(one.landing.x, exact.landing.x);
+    turn += std::pow(one.landing.angle - exact.landing.angle, 2) / kThrows;
+    omega += std::pow(one.detach[5] - exact.detach[5], 2) / kThrows;
+  }
+  // 40 scatter by 11 %, three of those; the draws are cut off at three sigma.
+  EXPECT_NEAR(std::sqrt(turn), 0.3, 0.1);
+  EXPECT_NEAR(std::sqrt(omega), 1.5, 0.5);
+}
+
+// What the joints are asked for is cut to what they have, and what they did is the most of the whole throw.
+TEST(FlipPlant, TellsWhatTheJointsWereAskedFor) {
+  FlipRobot weak = exact_robot();
+  for (Joint& joint : weak.chain.joints) joint.limits.torque *= 0.5;
+  const auto use_of = [](const FlipRobot& r) {
+    return ThrowingArm(r, declared_body(r, r.bar), middle(), 1, {1, 0.0}).brake().use;
+  };
+  const ArmUse strong = use_of(exact_robot()), cut = use_of(weak);
+  EXPECT_EQ(strong.cut_torque, 0);
+  EXPECT_GT(cut.cut_torque, 0);
+  EXPECT_LE(cut.torque, 1);
+  FlipRobot slow = exact_robot();
+  slow.control.torque_rate *= 0.02;
+  EXPECT_GT(use_of(slow).cut_rate, 0);
+  weak.control.torque_rate = 1e9;
+  EXPECT_EQ(use_of(weak).cut_rate, 0);
+  EXPECT_GT(use_of(weak).cut_torque, 0);
+  // It moves at the brake's start, not where it has come to rest, and bends most somewhere on its way.
+  const FlipMotion& m = exact_robot().motion;
+  double fastest = 0, farthest = 0;
+  for (const double t : {0.0, m.duration}) {
+    const FlipReference at = reference_at(m, middle(), t);
+    for (int i = 0; i < 7; ++i) {
+      const JointLimits& l = exact_robot().chain.joints[static_cast<std::size_t>(i)].limits;
+      fastest = std::max(fastest, std::abs(at.qd[i]) / l.velocity);
+      farthest = std::max(farthest, std::abs(2 * at.q[i] - l.lower - l.upper) / (l.upper - l.lower));
+    }
+  }
+  EXPECT_GT(strong.velocity, 0.85 * fastest);
+  EXPECT_GT(strong.position, farthest - 0.02);
+}
+
+// Each limit by itself refuses a command.
+TEST(FlipMotion, EveryLimitOfAJointRefuses) {
+  const FlipCommand u = middle();
+  const FlipMotion& m = exact_robot().motion;
+  Eigen::Index joint = 0;
+  const double rate = reference_at(m, u, m.duration).qd.cwiseAbs().maxCoeff(&joint);
+  const auto refused = [&](double JointLimits::*limit, double value, const char* why) {
+    FlipRobot r = exact_robot();
+    r.chain.joints[static_cast<std::size_t>(joint)].limits.*limit = value;
+    EXPECT_THAT([&] { check_reference(r, u); }, ThrowsMessage<std::invalid_argument>(HasSubstr(why)));
+  };
+  EXPECT_NO_THROW(check_reference(exact_robot(), u));
+  refused(&JointLimits::velocity, 0.99 * rate, "velocity [rad/s]");
+  refused(&JointLimits::acceleration, 0.99 * 1.5 * rate / m.duration, "acceleration [rad/s²]");
+  for (const double damping : {-0.1, 1.1}) {
+    FlipCommand outside = u;
+    outside.damping = std::lerp(m.range.low.damping, m.range.high.damping, damping);
+    EXPECT_FALSE(m.range.holds(outside));
+  }
+}
+
 }  // namespace
 }  // namespace unhand::planners::flip

@@ -302,5 +302,176 @@ TEST(HandLibrary, AnswersForItsOwnMeshOnly) {
   EXPECT_THROW(release_bar(small.hand(0), held), std::invalid_argument);
 }
 
+// A pair that differs by 2 d scatters by d²/1 about its mean, beside a prior of four; a bar that is turned
+// about its pads scatters at its centre and not between the pads.
+TEST(ReleaseLearner, ScatterIsPooledWithItsPrior) {
+  const double l = 0.12;
+  const DetachVector pads{0.7, 0.5, 0.3, 1.0, 1.2, 6};
+  std::vector<FlipTrial> trials(2);
+  for (const std::size_t k : {0u, 1u}) {
+    DetachVector turned = pads;
+    turned[2] += k == 0 ? 0.1 : -0.1;
+    trials[k].outcome = FlipOutcome::landed;
+    trials[k].command = robot().motion.range.low;
+    trials[k].detach = shifted(turned, l);
+    trials[k].landing = {k == 0 ? 1.3 : 1.1, k == 0 ? 3.3 : 2.7};
+  }
+  const ThrowScatter none = scatter_of({}, l), seen = scatter_of(trials, l);
+  EXPECT_EQ(seen.freedom, none.freedom + 1);
+  const double n = none.freedom;
+  EXPECT_NEAR(seen.x * (n + 1), none.x * n + 2 * 0.1 * 0.1, 1e-12);
+  EXPECT_NEAR(seen.angle * (n + 1), none.angle * n + 2 * 0.3 * 0.3, 1e-12);
+  EXPECT_NEAR(seen.detach[2] * (n + 1), none.detach[2] * n + 2 * 0.1 * 0.1, 1e-12);
+  for (const std::size_t still : {0u, 1u, 3u, 4u, 5u})
+    EXPECT_NEAR(seen.detach[still] * (n + 1), none.detach[still] * n, 1e-12) << still;
+}
+
+// What is left over is told of the point between the pads.
+TEST(ReleaseLearner, WhatIsLeftOverIsAtThePads) {
+  const HandLibrary small(robot(), robot().bar, 2);
+  const DetachVector offset{0.004, -0.003, 0.1, 0.05, -0.04, 0.8};
+  const CardPlant plant{prior_card(robot()), offset};
+  const std::vector<FlipCommand> one{robot().motion.range.at(0.4, 0.6, 0.3)};
+  const auto left = left_over(small, plant.card, gather(plant, "", one, 2, robot().bar).data);
+  ASSERT_EQ(left.size(), 1u);
+  EXPECT_EQ(left[0].throws, 2);
+  for (std::size_t j = 0; j < 6; ++j) EXPECT_NEAR(left[0].value[j], offset[j], 1e-9) << j;
+}
+
+// The mean of four throws is as sure as one throw of a quarter of the variance.
+TEST(LeftOverField, MeansAreSurerThanThrows) {
+  const DetachVector value{0.01, -0.01, 0.2, 0.05, -0.05, 1};
+  DetachVector noise{}, quarter{};
+  for (std::size_t j = 0; j < 6; ++j) noise[j] = value[j] * value[j], quarter[j] = noise[j] / 4;
+  LeftOverField four, sure, one;
+  four.set({{{0.5, 0.5, 0.5}, robot().bar, value, 4}}, noise);
+  sure.set({{{0.5, 0.5, 0.5}, robot().bar, value, 1}}, quarter);
+  one.set({{{0.5, 0.5, 0.5}, robot().bar, value, 1}}, noise);
+  const auto a = four.at({0.4, 0.5, 0.6}, robot().bar), b = sure.at({0.4, 0.5, 0.6}, robot().bar),
+             c = one.at({0.5, 0.5, 0.5}, robot().bar);
+  for (std::size_t j = 0; j < 6; ++j) {
+    EXPECT_DOUBLE_EQ(a.mean[j], b.mean[j]);
+    EXPECT_DOUBLE_EQ(a.variance[j], b.variance[j]);
+    // Of one sample: s² y/(s² + σ²) and s² σ²/(s² + σ²), whatever s was chosen.
+    EXPECT_NEAR(c.variance[j], c.mean[j] / value[j] * noise[j], 1e-9 * noise[j]);
+  }
+}
+
+// Half the change of the release from −σ to +σ of what differs between throws.
+TEST(ReleaseLearner, PredictsHowReleasesScatter) {
+  const HandLibrary small(robot(), robot().bar, 2);
+  const auto hand = small.simulate(robot().motion.range.at(0.4, 0.6, 0.3));
+  const ReleaseCard card = prior_card(robot());
+  const ThrowSpread& throws = robot().throws;
+  const auto predicted = predicted_detach(hand, {card}, robot().bar, throws);
+  ASSERT_TRUE(predicted);
+  const auto release = [&](double mu, double dead, double opening, double offset, double angle) {
+    Bar bar = robot().bar;
+    bar.com_offset += offset;
+    return release_bar(
+               hand,
+               {bar,
+                angle,
+                {card.grip_force, card.dead_time.value + dead, card.opening_time.value + opening, card.shape},
+                {card.model, card.mu.value * (1 + mu), card.length, card.pads, card.law_values}})
+        ->detach;
+  };
+  const double mu = std::hypot(throws.mu, throws.grip_force);  // pads know μ N alone
+  const std::array<std::array<double, 5>, 5> sigmas{{{mu, 0, 0, 0, 0},
+                                                     {0, throws.dead_time, 0, 0, 0},
+                                                     {0, 0, throws.opening_time, 0, 0},
+                                                     {0, 0, 0, throws.grasp_offset, 0},
+                                                     {0, 0, 0, 0, throws.grasp_angle}}};
+  for (std::size_t k = 0; k < 5; ++k) {
+    const auto& s = sigmas[k];
+    const DetachVector up = release(s[0], s[1], s[2], s[3], s[4]),
+                       down = release(-s[0], -s[1], -s[2], -s[3], -s[4]);
+    for (std::size_t j = 0; j < 6; ++j)
+      EXPECT_NEAR(predicted->by[PredictedDetach::kOfCard + k][j], 0.5 * (up[j] - down[j]), 1e-7) << k << j;
+  }
+  EXPECT_GT(std::abs(predicted->by[8][2]), 0.5 * throws.grasp_angle);
+}
+
+// What is not known of the card widens the forecast by what moves with it, place and angle together.
+TEST(ReleaseLearner, DoubtsOfTheCardWidenItsForecast) {
+  const HandLibrary small(robot(), robot().bar, 2);
+  const FlipTarget target{{1.2, kTurn / 2}};
+  const FlipCommand u = robot().motion.range.at(0.4, 0.6, 0.3);
+  const auto forecast = [&](double change, double sigma) {
+    ReleaseFit fit{prior_card(robot())};
+    fit.card.dead_time.value += change;
+    fit.covariance(2, 2) = sigma * sigma;
+    return *ReleaseLearner(small, fit, {}, scatter_of({}, 0.12), target, 3).forecast(u);
+  };
+  const double sigma = 2e-3;
+  const auto sure = forecast(0, 0), doubtful = forecast(0, sigma), early = forecast(-sigma, 0),
+             late = forecast(sigma, 0);
+  const double dx = 0.5 * (late.mean.x - early.mean.x), da = 0.5 * (late.mean.angle - early.mean.angle);
+  const auto cross = [](const FlipForecast& f) { return f.correlation * f.sigma_x * f.sigma_angle; };
+  EXPECT_GT(std::abs(dx * da), 0);
+  EXPECT_NEAR(doubtful.sigma_x * doubtful.sigma_x - sure.sigma_x * sure.sigma_x, dx * dx, 0.05 * dx * dx);
+  EXPECT_NEAR(std::pow(doubtful.sigma_angle, 2) - std::pow(sure.sigma_angle, 2), da * da, 0.05 * da * da);
+  EXPECT_NEAR(cross(doubtful) - cross(sure), dx * da, 0.05 * std::abs(dx * da));
+}
+
+// How throws scatter differs between commands as the robot declares; over those that were seen it is what was
+// seen of them.
+TEST(ReleaseLearner, ScattersAsItsKnownCommandsDid) {
+  const HandLibrary small(robot(), robot().bar, 2);
+  const CommandRange& range = robot().motion.range;
+  const std::array<std::array<double, 3>, 2> known{{{0.2, 0.3, 0.2}, {0.8, 0.7, 0.8}}};
+  std::vector<LeftOver> nothing_left;
+  for (const auto& at : known) nothing_left.push_back({at, robot().bar, {}, 3});
+  ThrowScatter seen = scatter_of({}, 0.12);
+  seen.x = 0.02 * 0.02, seen.angle = 0.3 * 0.3;
+  const ReleaseLearner learner(small, {prior_card(robot())}, nothing_left, seen, {{1.2, kTurn / 2}}, 3);
+  double x = 0, angle = 0, most = 0, least = 1;
+  for (const auto& at : known) {
+    const auto said = learner.forecast(range.at(at[0], at[1], at[2]));
+    ASSERT_TRUE(said);
+    x += said->scatter_x * said->scatter_x / 2, angle += said->scatter_angle * said->scatter_angle / 2;
+    most = std::max(most, said->scatter_angle), least = std::min(least, said->scatter_angle);
+  }
+  EXPECT_NEAR(x, seen.x, 1e-6 * seen.x);
+  EXPECT_NEAR(angle, seen.angle, 1e-6 * seen.angle);
+  EXPECT_GT(most, 1.02 * least);
+}
+
+// What was seen of a command is what the next forecast of it says.
+TEST(ReleaseLearner, TakesInWhatItHasSeen) {
+  const HandLibrary small(robot(), robot().bar, 2);
+  const CardPlant plant{prior_card(robot()), {0, 0, 0.3, 0.15, 0.1, 1.5}};
+  ThrowScatter exact = scatter_of({}, 0.12);
+  for (double& v : exact.detach) v *= 1e-6;
+  ReleaseLearner learner(small, {plant.card}, {}, exact, {{1.2, kTurn / 2}}, 3);
+  const FlipCommand u = robot().motion.range.at(0.4, 0.6, 0.3);
+  const FlipTrial seen = plant({"", 0, u, robot().bar});
+  const double before = std::abs(learner.forecast(u)->mean.angle - seen.landing.angle);
+  learner.observe(std::span(&seen, 1));
+  EXPECT_GT(before, 0.3);
+  EXPECT_NEAR(learner.forecast(u)->mean.angle, seen.landing.angle, 0.01 * before);
+  EXPECT_LT(learner.forecast(u)->sigma_angle, 0.1);
+}
+
+// Friction and the pads' force are known, and scatter, as one product.
+TEST(ReleaseFit, ItsCardCountsFrictionWithTheForce) {
+  const FlipRobot& r = robot();
+  const ReleaseCard prior = prior_card(r);
+  EXPECT_NEAR(std::pow(prior.mu.sigma / prior.mu.value, 2),
+              r.robots.mu * r.robots.mu + r.robots.grip_force * r.robots.grip_force, 1e-12);
+  FlipRobot late = r;
+  late.robots.dead_time = 0.007, late.robots.opening_time = 0.011;
+  EXPECT_EQ(prior_card(late).dead_time.sigma, 0.007);
+  EXPECT_EQ(prior_card(late).opening_time.sigma, 0.011);
+  const HandLibrary small(r, r.bar, 2);
+  FlipDatum thrown;
+  thrown.detach = {0.7, 0.5, 0.3, 3, 4, -6};
+  const datasets::ModelCard card = model_card_of({prior}, small, std::vector{thrown}, "robot.toml");
+  EXPECT_NEAR(std::pow(card.own_spreads.at("mu_deviation").sigma, 2),
+              r.throws.mu * r.throws.mu + r.throws.grip_force * r.throws.grip_force, 1e-12);
+  EXPECT_EQ(card.valid_range.at("detach_speed").low, 5);
+  EXPECT_EQ(card.valid_range.at("detach_omega").high, -6);
+}
+
 }  // namespace
 }  // namespace unhand::planners::flip

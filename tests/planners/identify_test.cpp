@@ -156,5 +156,27 @@ TEST(Excitation, KeepsTheLimitsEverywhere) {
   }
 }
 
+// Over many logs the errors are as large as their sigmas say, of all three.
+TEST(IdentifySpring, ItsSigmasAreThoseOfItsErrors) {
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> normal;
+  constexpr int kLogs = 800, kSamples = 14;
+  std::array<double, 3> squares{};
+  for (int one = 0; one < kLogs; ++one) {
+    std::vector<SpringSample> log;
+    for (int k = 0; k < kSamples; ++k) {  // whatever deflection, rate and acceleration
+      SpringSample s{0.2 * normal(random), 2 * normal(random), 5 * normal(random), 0};
+      s.torque = 8.0 * s.deflection + 0.02 * s.rate + 0.05 * s.acceleration + 0.02 * normal(random);
+      log.push_back(s);
+    }
+    const IdentifiedSpring found = identify_spring(log);
+    squares[0] += std::pow((found.stiffness - 8.0) / found.stiffness_sigma, 2) / kLogs;
+    squares[1] += std::pow((found.damping - 0.02) / found.damping_sigma, 2) / kLogs;
+    squares[2] += std::pow((found.inertia - 0.05) / found.inertia_sigma, 2) / kLogs;
+  }
+  // Student's t of 11 degrees of freedom has the variance 11/9, of which 800 scatter by some 7 %.
+  for (const double square : squares) EXPECT_NEAR(square, 11.0 / 9, 0.25);
+}
+
 }  // namespace
 }  // namespace unhand::planners::elastic

@@ -126,11 +126,14 @@ TEST(LimitCheck, TellsHowFastTorquesChange) {
   const JointVector<double> none = JointVector<double>::Zero(7), one = JointVector<double>::Unit(7, 1);
   const JointVector<double> inertia =
       inverse_dynamics(arm, q, none, one) - inverse_dynamics(arm, q, none, none);
-  const LimitCheck found = check_limits(arm, motion, 1e-3);
   Eigen::Index joint = 0;
   const double most = inertia.cwiseAbs().maxCoeff(&joint);
-  EXPECT_EQ(found.torque_rate.joint, joint);
-  EXPECT_NEAR(found.torque_rate.value, most * kJerk, 0.01 * most * kJerk);  // gravity and speed hardly change
+  for (const double step : {1e-3, 2.5e-4}) {
+    const LimitCheck found = check_limits(arm, motion, step);
+    EXPECT_EQ(found.torque_rate.joint, joint);
+    // Gravity and speed hardly change.
+    EXPECT_NEAR(found.torque_rate.value, most * kJerk, 0.01 * most * kJerk) << step;
+  }
 }
 
 TEST(JerkProfile, GoesOnUniformlyBeyondItsEnds) {
@@ -164,6 +167,79 @@ TEST(LimitCheck, RefusesOtherArmsAndStepsWithoutEnd) {
   LimitCheck elsewhere;
   elsewhere.torque = {2.0, 9, 0.0};
   EXPECT_THROW(static_cast<void>(elsewhere.worst(arm)), std::invalid_argument);
+}
+
+/// All joints of the Panda in the middle of their ranges, but for one that moves otherwise from `begin` on.
+JointTrajectory one_moves(const Chain& arm, int joint, const JointSample& start,
+                          const std::vector<JerkPiece>& pieces, double begin = 0) {
+  JointTrajectory out;
+  out.begin = begin;
+  double duration = 0;
+  for (const JerkPiece& piece : pieces) duration += piece.duration;
+  for (int i = 0; i < arm.size(); ++i) {
+    const JointLimits& l = arm.joints[i].limits;
+    JerkProfile profile(i == joint ? start : JointSample{0.5 * (l.lower + l.upper), 0, 0, 0});
+    profile.append(i == joint ? pieces : std::vector<JerkPiece>{{duration, 0}});
+    out.joints.push_back(profile);
+  }
+  return out;
+}
+
+// Between two looks and two pieces: q̇ = a t − ½ j t² is largest at t = a/j, with a²/(2 j).
+TEST(LimitCheck, FindsTheLargestVelocityBetweenItsLooks) {
+  const Chain arm = panda();
+  const double a = 2, j = 1000;
+  const LimitCheck found = check_limits(arm, one_moves(arm, 5, {1, 0, a, 0}, {{3 * a / j, -j}}, -5), 1);
+  // At the end q̇ is 3 a²/j − 4.5 a²/j = −1.5 a²/j, three times as large; the other sign has the same peak.
+  EXPECT_NEAR(found.velocity.fraction, 1.5 * a * a / j / arm.joints[5].limits.velocity, 1e-12);
+  const LimitCheck peak = check_limits(arm, one_moves(arm, 5, {1, 0, a, 0}, {{2 * a / j, -j}}, -5), 1);
+  EXPECT_NEAR(peak.velocity.fraction, 0.5 * a * a / j / arm.joints[5].limits.velocity, 1e-12);
+  EXPECT_EQ(peak.velocity.joint, 5);
+  EXPECT_NEAR(peak.velocity.time, -5 + a / j, 1e-12);
+}
+
+// The first joint stands upright: where it turns evenly and alone, nothing but friction asks for its torque.
+TEST(LimitCheck, FrictionAsksForTorque) {
+  Chain arm = panda();
+  for (int i = 1; i < 7; ++i) arm.joints[i].limits.torque = JointLimits::kNone;
+  const double rate = 1.3;
+  const JointFriction& f = arm.joints[0].friction;
+  const auto sigmoid = [&](double qd) { return f.phi1 / (1 + std::exp(-f.phi2 * (qd + f.phi3))); };
+  const LimitCheck found = check_limits(arm, one_moves(arm, 0, {-0.1, rate, 0, 0}, {{0.1, 0}}));
+  EXPECT_NEAR(found.torque.fraction, (sigmoid(rate) - sigmoid(0)) / arm.joints[0].limits.torque, 1e-9);
+  EXPECT_GT(found.torque.fraction, 1e-3);
+}
+
+TEST(LimitCheck, AJerkAloneMayBeTooMuch) {
+  const Chain arm = panda();
+  const double most = arm.joints[2].limits.jerk, h = 1e-3;
+  const auto with = [&](double jerk) {
+    return check_limits(arm, one_moves(arm, 2, {0, 0, 0, 0}, {{h, jerk}, {h, -jerk}}));
+  };
+  EXPECT_TRUE(with(0.99 * most).within());
+  const LimitCheck broken = with(-1.01 * most);
+  EXPECT_FALSE(broken.within());
+  EXPECT_NEAR(broken.jerk.fraction, 1.01, 1e-12);
+  EXPECT_EQ(broken.worst(arm).substr(0, 20), "jerk of panda_joint3");
+}
+
+// Bent over, with the hand turned up again: the wrist is lower than the hand.
+TEST(LimitCheck, TheWristMayBeTheLowest) {
+  const Chain arm = panda();
+  JointTrajectory bent;
+  const double q[]{0, 1.7, 0, -3.0, 0, 1.5, 0};
+  JointVector<double> at(7);
+  for (int i = 0; i < 7; ++i) {
+    at[i] = q[i];
+    bent.joints.push_back(JerkProfile({q[i], 0, 0, 0}));
+    bent.joints.back().append({{0.01, 0}});
+  }
+  // The shoulder 0.333 m up, 0.316 m along the upper arm and 0.0825 m across it; 0.384 m along the forearm,
+  // and back across it.
+  const double wrist =
+      0.333 + 0.316 * std::cos(1.7) - 0.0825 * std::sin(1.7) + 0.384 * std::cos(4.7) + 0.0825 * std::sin(4.7);
+  ASSERT_GT(forward_kinematics(arm, at).p.z(), wrist + 0.05);
+  EXPECT_NEAR(check_limits(arm, bent).lowest, wrist, 1e-12);
 }
 
 }  // namespace

@@ -789,5 +789,205 @@ TEST(ThrowMotion, RefusesAnotherNumberOfJoints) {
   EXPECT_THAT(refusal([&] { refine_tube(tube, three); }), HasSubstr("qdd has 3"));
 }
 
+TEST(PlanarHand, TurnsOnWhereItsAnglesWouldJump) {
+  // The hand's axis turned so that it points straight back from the target halfway: θ passes π there.
+  const ReleaseThrow unturned = swing(pads());
+  const auto tip_at = [&](double t) {
+    return forward_kinematics(unturned.chain,
+                              Joints(unturned.start.q + t * unturned.start.qd + 0.5 * t * t * unturned.qdd));
+  };
+  const Transform<double> middle = tip_at(0.5 * unturned.hold);
+  const Eigen::Vector3d back = middle.R.transpose() * Eigen::Vector3d(-1, 0, 0);
+  const Eigen::Matrix3d turn =
+      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), back).toRotationMatrix();
+  const Chain arm = with_tool(pads(), {turn, Eigen::Vector3d::Zero()});
+  const ReleaseThrow p = swing(arm);
+  const ThrowPlane plane(forward_kinematics(arm, p.start.q).p, p.target);
+  const PlanarHand hand(arm, plane, p.start.q, p.start.qd.cast<Dual>(), p.qdd.cast<Dual>(), p.hold);
+  for (double t = 0; t <= p.hold; t += p.hold / 23) {
+    const auto tip = tip_motion(arm, Joints(p.start.q + t * p.start.qd + 0.5 * t * t * p.qdd),
+                                Joints(p.start.qd + t * p.qdd), p.qdd);
+    const auto at = hand.at({0, p.hold}, t);
+    EXPECT_NEAR(std::cos(at.pose.theta), tip.frame.R(0, 2), 1e-9);
+    EXPECT_NEAR(std::sin(at.pose.theta), tip.frame.R(2, 2), 1e-9);
+    EXPECT_NEAR(at.twist.omega, -tip.omega.y(), 1e-7);
+  }
+}
+
+TEST(PlanarHand, RefusesAnAxisThatLeansOutAndAMotionThatTurnsTooFar) {
+  const Chain leaning =
+      with_tool(pads(), {Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()).toRotationMatrix(), {0, 0, 0}});
+  ReleaseThrow p = swing(leaning);
+  EXPECT_THROW(release_landing(p, nominal_draw(p)), std::invalid_argument);
+  const Chain arm = pads();
+  ReleaseThrow far = swing(arm);
+  far.hold = 2;
+  EXPECT_THAT([&] { release_landing(far, nominal_draw(far)); },
+              testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("turns too far")));
+}
+
+// Carried rigidly until it is free, the object's centre is the tip of a longer arm, bent where the object
+// hangs askew; it lands where the tube says that that tip throws to, in air too.
+TEST(ReleaseThrow, ARigidlyCarriedObjectIsTheTipOfALongerArm) {
+  const Chain arm = pads();
+  ReleaseThrow p = swing(arm);
+  p.qdd *= 2;
+  for (const double angle : {0.0, 0.4})
+    for (const double drag : {0.0, 0.2}) {
+      p.object.angle = angle;
+      p.medium.drag_k = drag;
+      // From x to z turns about −y of the base; of this arm, whose hand points along its z axis, it is the
+      // tool's axis that turns so.
+      const Transform<double> tip = forward_kinematics(arm, p.start.q);
+      const Eigen::Vector3d axis = tip.R.transpose() * Eigen::Vector3d(0, -1, 0);
+      const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle, axis).toRotationMatrix();
+      const Chain longer = with_tool(arm, {turn, turn * Eigen::Vector3d(0, 0, 0.14)});
+      const TubeProblem tube{longer, p.start, p.target, 0.1, p.medium};
+      for (const LandingAt& at : landings_over_window(tube, p.qdd, 4)) {
+        const auto rigid = rigid_landing(p, 0.14, at.time);
+        ASSERT_TRUE(rigid && at.lands);
+        EXPECT_NEAR(rigid->miss, at.forward, 1e-7) << angle << ' ' << drag;  // the hand's polynomial
+        EXPECT_EQ(rigid->detach_time, at.time);
+        const auto there =
+            tip_motion(longer, Joints(p.start.q + at.time * p.start.qd + 0.5 * at.time * at.time * p.qdd),
+                       Joints(p.start.qd + at.time * p.qdd), p.qdd);
+        EXPECT_NEAR(rigid->speed, there.velocity.norm(), 1e-7);
+      }
+    }
+}
+
+// The same of a gripper that opens at once, whatever the air and the angle in the hand.
+TEST(ReleaseThrow, OfAGripperThatOpensAtOnceFliesThroughTheSameAir) {
+  const Chain arm = pads();
+  ReleaseThrow p = swing(arm);
+  p.card.dead_time = {0.1, 0};  // when it rises
+  p.card.opening_time = {2.5e-4, 0};
+  p.card.grip_force = 400;
+  p.object.angle = 0.3;
+  p.medium.drag_k = 0.2;
+  const auto real = release_landing(p, nominal_draw(p));
+  const auto rigid = rigid_landing(p, 0.14, 0.1 + 2.5e-4);
+  ASSERT_TRUE(real && rigid);
+  EXPECT_NEAR(real->miss, rigid->miss, 2e-3);  // it turns a little while the pads open
+  EXPECT_NEAR(real->speed, rigid->speed, 5e-3);
+  EXPECT_NEAR(real->angle, 0, 1e-3) << "it did not turn in the hand";
+  p.medium.drag_k = 0;
+  EXPECT_GT(release_landing(p, nominal_draw(p))->miss, real->miss + 0.05);
+}
+
+TEST(ReleaseThrow, SummaryIsOfASample) {
+  Landings out;
+  out.miss = {0.01, 0.03, 0.02};
+  summarise(out);
+  EXPECT_DOUBLE_EQ(out.mean, 0.02);
+  EXPECT_NEAR(out.std, 0.01, 1e-15);  // n − 1
+  out.miss = {0.5};
+  summarise(out);
+  EXPECT_EQ(out.mean, 0.5);
+  EXPECT_EQ(out.std, 0);
+}
+
+// Rubber: friction of more than one scatters as any other.
+TEST(ReleaseThrow, DrawsFrictionOfMoreThanOne) {
+  const Chain arm = pads();
+  ReleaseThrow p = weak_swing(arm);
+  p.card.mu = {1.5, 0.05};
+  p.card.grip_force = 10;
+  const Landings drawn = draw_landings(p, 200, 1);
+  const double spread = release_spread(p)->spread;
+  EXPECT_GT(spread, 1e-5);
+  EXPECT_NEAR(drawn.std, spread, 0.3 * spread);  // as above
+}
+
+// Pads that stick press on with what they stick by.
+TEST(HeldMotion, AdhesionSparesGripForce) {
+  BarThrow bar;
+  const auto tube = bar.plan();
+  ASSERT_TRUE(tube.plan) << tube.reason;
+  ReleaseThrow p = bar.release(*tube.plan);
+  const double dry = *HeldMotion(p, tube.plan->motion).needed_force(), stick = 0.2 * dry;
+  p.card.friction.adhesion = stick;
+  p.card.friction.parting_time = 0.01;
+  EXPECT_NEAR(*HeldMotion(p, tube.plan->motion).needed_force(), dry - stick, 3e-3 * dry);
+  p.card.grip_force = 1.01 * dry - stick;
+  EXPECT_TRUE(HeldMotion(p, tube.plan->motion).holds(nominal_draw(p)));
+  p.card.grip_force = 0.99 * dry - stick;
+  EXPECT_FALSE(HeldMotion(p, tube.plan->motion).holds(nominal_draw(p)));
+}
+
+// A wrist that turns evenly about a level axis pulls its load inward, m ω² r, against its weight.
+TEST(HeldMotion, AnEvenTurnPullsInward) {
+  BarThrow bar;
+  const auto tube = bar.plan();
+  ASSERT_TRUE(tube.plan) << tube.reason;
+  ReleaseThrow p = bar.release(*tube.plan);
+  p.object.com_offset.value = 0.3;
+  constexpr double kRate = 8, kDuration = 0.05;  // rad/s, s
+  JointTrajectory turning;
+  turning.begin = -kDuration;
+  for (int i = 0; i < 7; ++i) {
+    turning.joints.push_back(JerkProfile({p.start.q[i], i == 5 ? kRate : 0, 0, 0}));
+    turning.joints.back().append({{kDuration, 0}});
+  }
+  const auto needed = HeldMotion(p, turning, 1e-3).needed_force();
+  ASSERT_TRUE(needed);
+  double most = 0;
+  for (double t = -kDuration; t <= 0; t += 1e-3) {
+    const auto s = turning.at(t);
+    const auto wrist = frames_of(bar.arm, s.q);
+    const Eigen::Vector3d axis = wrist.links[5].p, r = 0.3 * wrist.tip.R.col(2);
+    // All of it goes round the wrist's axis.
+    Eigen::Vector3d out = wrist.tip.p + r - axis;
+    out.y() = 0;
+    const Eigen::Vector3d f = p.object.mass * (Eigen::Vector3d(0, 0, p.medium.gravity) - kRate * kRate * out);
+    most = std::max(most, std::hypot(f.norm(), r.cross(f).y() / p.card.length));
+  }
+  EXPECT_NEAR(*needed, most / (p.card.pads * p.card.mu.value), 5e-3 * *needed);
+}
+
+// Of two bodies of one mass the one that is harder to turn needs the better grip.
+TEST(HeldMotion, DrawsTheObjectsInertia) {
+  BarThrow bar;
+  const auto tube = bar.plan();
+  ASSERT_TRUE(tube.plan) << tube.reason;
+  ReleaseThrow p = bar.release(*tube.plan);
+  const auto needed = [&](double inertia) {
+    ReleaseThrow q = p;
+    q.object.inertia = inertia;
+    return *HeldMotion(q, tube.plan->motion).needed_force();
+  };
+  const double slim = needed(0.5e-3), wide = needed(1e-2);
+  ASSERT_GT(std::abs(wide / slim - 1), 0.02);
+  p.object.inertia = slim < wide ? 0.5e-3 : 1e-2;
+  p.card.grip_force = 0.5 * (slim + wide);
+  const HeldMotion held(p, tube.plan->motion);
+  Draw draw = nominal_draw(p);
+  EXPECT_TRUE(held.holds(draw));
+  draw[kInertia] = slim < wide ? 1e-2 : 0.5e-3;
+  EXPECT_FALSE(held.holds(draw));
+}
+
+// An arm that is weaker than the fastest motion asks for takes a slower one, or none.
+TEST(RobustThrow, KeepsTheTorqueOfItsArm) {
+  BarThrow bar;
+  const auto tube = bar.plan();
+  ASSERT_TRUE(tube.plan) << tube.reason;
+  const auto strong = plan_robust_throw(bar.release(*tube.plan), bar.options.home);
+  ASSERT_TRUE(strong);
+  const LimitUse& most = strong->limits.torque;
+  bar.arm.joints[most.joint].limits.torque *= 0.9 * most.fraction;
+  std::string reason;
+  const auto weak = plan_robust_throw(bar.release(*tube.plan), bar.options.home, &reason);
+  if (weak) {
+    EXPECT_TRUE(check_limits(bar.arm, weak->motion, 5e-4).within());
+  } else {
+    EXPECT_THAT(reason, testing::HasSubstr("torque of " + bar.arm.joints[most.joint].name));
+  }
+  // Its height counts what hangs from the pads.
+  const Chain to_object = with_tool(bar.arm, {Eigen::Matrix3d::Identity(), {0, 0, 0.14}});
+  EXPECT_EQ(strong->limits.lowest, std::min(check_limits(bar.arm, strong->motion).lowest,
+                                            check_limits(to_object, strong->motion).lowest));
+}
+
 }  // namespace
 }  // namespace unhand::planners

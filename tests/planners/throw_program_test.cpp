@@ -194,6 +194,7 @@ TEST(ElasticThrow, BetweenTheNodesOfATableNoLimitIsExceeded) {
   for (const TableCheck& check : check_table(bsa3(), table, 17)) {
     EXPECT_TRUE(check.lands) << check.distance;
     EXPECT_LE(check.limit_use, 1) << check.distance;
+    EXPECT_EQ(check.limit_use, replay(bsa3(), interpolate(table, check.distance)).use.largest());
     EXPECT_LT(std::abs(check.miss), 0.01)
         << check.distance;  // collocation's error, and cubic between nodes of 10 cm
   }
@@ -264,6 +265,12 @@ TEST(ElasticThrow, NodesOfATableAreRefinedUntilTheirRunsLandOnTheirTargets) {
     missed += !as_it_is.nodes[k].confirmed;
   }
   EXPECT_GT(missed, 0);
+  ThrowTask elsewhere = task;  // the height is the table's
+  elsewhere.target->z = 0.6;
+  Refinement loose;
+  loose.miss = 0.3, loose.speed_error = 1, loose.limit_use = 10, loose.finest = 4;
+  for (const TableNode& node : confirm_table(bsa3(), elsewhere, coarse, options, loose).nodes)
+    EXPECT_TRUE(node.confirmed);
   tight.finest = 64;
   const ConfirmedTable fine = confirm_table(bsa3(), task, coarse, options, tight);
   EXPECT_GT(fine.intervals, 4);
@@ -319,6 +326,43 @@ TEST(ElasticThrow, RefusesATaskWithoutSense) {
   for (const std::vector<double>& x : {std::vector<double>{2.0, 2.1, 2.1, 2.2}, {2.0, kNan, 2.1, 2.2}, {2.0}})
     EXPECT_THAT([&] { make_table(bsa3(), task, x, {}, 1); },
                 testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("increasing distances")));
+}
+
+// A run confirms its plan by how it ends, where it lands, how fast it is and what it uses; each by itself may
+// refuse it.
+TEST(ElasticThrow, EachDoubtByItselfRefusesAPlan) {
+  ThrowTask task;
+  task.target = Target{2.2, -0.5};
+  const double g = 9.81, up = 1.5, time = (up + std::sqrt(up * up + 2 * g * (0.8 + 0.5))) / g;
+  ElasticThrow plan;
+  Replay run;
+  run.outcome = dynamics::Outcome::horizon;
+  plan.release = run.release = {2.2 - 2 * time, 0.8, 2, up};
+  run.use.brake = 0.99;
+  EXPECT_TRUE(confirms(task, plan, run, {}));
+  const auto refused = [&](auto&& change) {
+    Replay other = run;
+    change(other);
+    return !confirms(task, plan, other, {});
+  };
+  EXPECT_TRUE(refused([](Replay& r) { r.outcome = dynamics::Outcome::finished; }));
+  EXPECT_TRUE(refused([](Replay& r) { r.spring_stop = true; }));
+  EXPECT_TRUE(refused([](Replay& r) { r.use.brake = 1.1; }));
+  EXPECT_TRUE(refused([](Replay& r) { r.use.motor_torque = 1.1; }));
+  EXPECT_TRUE(refused([](Replay& r) { r.release.x += 0.1; }));
+  EXPECT_TRUE(refused([](Replay& r) {  // another speed that lands there, too
+    r.release.vx *= 1.1, r.release.x -= 0.1 * 2 * 0.8;
+  }));
+}
+
+TEST(ElasticThrow, CountsTheStartsThatFail) {
+  ThrowTask task;
+  ThrowProgramOptions options;
+  options.intervals = 4;
+  options.program.iterations = 2;  // of some fifty
+  const Basins basins = find_basins(bsa3(), task, options, 3);
+  EXPECT_EQ(basins.failed, 3);
+  EXPECT_TRUE(basins.found.empty());
 }
 
 }  // namespace

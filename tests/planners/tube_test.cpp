@@ -293,5 +293,175 @@ TEST(PlanThrow, SaysWhyThereIsNone) {
   EXPECT_THROW(plan_throw(arm, boxes()[0]), std::invalid_argument);
 }
 
+// The parabola of what leaves at t, from nothing but the tip's place and velocity there.
+TEST(TubeCvx, LandingsOverTheWindowAreParabolas) {
+  const Chain arm = thrower();
+  const TargetBox box = box_at(0.9, -0.5, 0.1);
+  const auto one = find_throws(arm, box, few()).front();
+  Joints qdd(7);
+  qdd << 1, -2, 1.5, -1, 2, 0.5, -3;
+  const TubeProblem problem{arm, one.state, box.middle, 0.12};
+  constexpr int kSamples = 5;
+  const auto landings = landings_over_window(problem, qdd, kSamples);
+  ASSERT_EQ(landings.size(), static_cast<std::size_t>(kSamples));
+  const Eigen::Vector2d along = (box.middle - forward_kinematics(arm, one.state.q).p).head<2>().normalized();
+  for (int k = 0; k < kSamples; ++k) {
+    const LandingAt& at = landings[static_cast<std::size_t>(k)];
+    const double t = 0.12 * k / (kSamples - 1);
+    EXPECT_NEAR(at.time, t, 1e-15);
+    const Joints q = one.state.q + t * one.state.qd + 0.5 * t * t * qdd, qd = one.state.qd + t * qdd;
+    const Eigen::Vector3d p = forward_kinematics(arm, q).p, v = jacobian(arm, q).topRows<3>() * qd;
+    const double flight = (v.z() + std::sqrt(v.z() * v.z() + 2 * 9.81 * (p.z() - box.middle.z()))) / 9.81;
+    const Eigen::Vector2d off = (p + flight * v - box.middle).head<2>();
+    ASSERT_TRUE(at.lands);
+    EXPECT_NEAR(at.x, off.x(), 1e-12);
+    EXPECT_NEAR(at.y, off.y(), 1e-12);
+    EXPECT_NEAR(at.forward, along.dot(off), 1e-12);
+    EXPECT_NEAR(at.across, along.x() * off.y() - along.y() * off.x(), 1e-12);
+  }
+}
+
+TEST(TubeCvx, TheLargestMissIsADistance) {
+  std::vector<LandingAt> landings(3);
+  for (LandingAt& one : landings) one.lands = true;
+  landings[1].x = -0.03, landings[1].y = 0.04;
+  landings[2].x = 0.045;
+  EXPECT_DOUBLE_EQ(largest_miss(landings), 0.05);
+  landings[1].lands = false;
+  EXPECT_EQ(largest_miss(landings), JointLimits::kNone);
+}
+
+// The convex problem knows the air: over a short window what it leaves out is small against what moves.
+TEST(TubeCvx, ReckonsWithTheDragOfTheFlight) {
+  const Chain arm = thrower();
+  NominalOptions options = few();
+  options.samples = 60;
+  options.refined = 0;
+  options.medium.drag_k = 0.1;
+  int checked = 0;
+  for (const auto& one : find_throws(arm, boxes()[3], options)) {
+    const TubeProblem problem{arm, one.state, boxes()[3].middle, 0.002, options.medium};
+    const TubeSolution s = solve_tube(problem);
+    if (s.outcome != TubeOutcome::solved) continue;
+    ++checked;
+    EXPECT_LT(largest_miss(landings_over_window(problem, s.qdd, 2)),
+              0.2 * largest_miss(landings_over_window(problem, Joints::Zero(7), 2)));
+  }
+  EXPECT_GT(checked, 2);
+}
+
+// Whichever way a joint moves, the window ends before it is at its stop.
+TEST(TubeCvx, KeepsBothPositionLimitsAtTheWindowsEnd) {
+  const auto one = find_throws(thrower(), boxes()[0], planar()).front();
+  int up = 0, down = 0;
+  for (int i = 0; i < 7; ++i) {
+    const double rate = one.state.qd[i];
+    if (std::abs(rate) < 0.2) continue;
+    (rate > 0 ? up : down) += 1;
+    Chain arm = thrower();
+    JointLimits& l = arm.joints[i].limits;
+    (rate > 0 ? l.upper : l.lower) = one.state.q[i] + 0.09 * rate;
+    EXPECT_THAT(solve_tube({arm, one.state, boxes()[0].middle, 0.1}).reason,
+                testing::HasSubstr(fmt::format("panda_joint{} is at", i + 1)));
+    EXPECT_THAT(solve_tube({arm, one.state, boxes()[0].middle, 0.08}).reason,
+                testing::Not(testing::HasSubstr("is at")));
+  }
+  EXPECT_GT(up, 0);
+  EXPECT_GT(down, 0);
+}
+
+TEST(NominalThrow, LeavesRoomForItsWindow) {
+  const Chain arm = thrower();
+  for (const double window : {0.1, 0.4}) {
+    NominalOptions options = few();
+    options.window = window;
+    const auto found = find_throws(arm, boxes()[0], options);
+    ASSERT_FALSE(found.empty());
+    for (const auto& one : found)
+      for (int i = 0; i < 7; ++i) {
+        const JointLimits& l = arm.joints[i].limits;
+        const double end = one.state.q[i] + window * one.state.qd[i];
+        EXPECT_TRUE(end > l.lower && end < l.upper) << window << ' ' << i;
+      }
+  }
+}
+
+// Planar throws stay in the plane of their target, also where the first joint cannot turn all the way to it.
+TEST(NominalThrow, IsInThePlaneOfItsTarget) {
+  const Chain arm = thrower();
+  for (const TargetBox& box : {box_at(0.6, 1.1, -0.2), box_at(-1.3, 0.1, -0.2), box_at(-1.3, -0.5, -0.2)}) {
+    NominalOptions options = planar();
+    options.samples = 600;
+    for (const auto& one : find_throws(arm, box, options)) {
+      const auto tip = tip_motion<double>(arm, one.state.q, one.state.qd, Joints::Zero(7));
+      const Eigen::Vector3d across = (box.middle - tip.frame.p).cross(Eigen::Vector3d::UnitZ()).normalized();
+      EXPECT_NEAR(tip.velocity.dot(across), 0, 1e-6);
+      EXPECT_NEAR(tip.frame.R.col(2).dot(across), 0, 1e-6) << "the hand's axis";
+      EXPECT_NEAR(one.state.qd[0], 0, 1e-9);
+    }
+  }
+}
+
+// A box that the tube's landings leave is no box that is thrown into.
+TEST(PlanThrow, LandsInsideItsBoxFromTheWholeWindow) {
+  PlanOptions options;
+  options.search = few();
+  options.refine = false;
+  const TargetBox box{{1.1, 0, 0}, 4e-3, 4e-3};
+  const auto result = plan_throw(thrower(), box, options);
+  if (result.plan) {
+    for (const LandingAt& at : result.plan->landings) EXPECT_TRUE(box.holds(at.x, at.y)) << at.time;
+  } else {
+    EXPECT_EQ(result.outcome, PlanOutcome::no_tube);
+  }
+}
+
+TEST(PlanThrow, StaysAboveItsBase) {
+  PlanOptions options;
+  options.search = few();
+  options.home = Joints{{0, 1.5, 0, -1.0, 0, 2.6, 0.785}};
+  const Chain arm = thrower();
+  ASSERT_LT(forward_kinematics(arm, options.home).p.z(), -0.02);
+  const auto result = plan_throw(arm, boxes()[0], options);
+  EXPECT_EQ(result.outcome, PlanOutcome::no_motion);
+  EXPECT_THAT(result.reason, testing::HasSubstr("the arm would come down to -0."));
+}
+
+// What a plan says of its limits is what a look as dense finds, not what the first, coarse one did.
+TEST(PlanThrow, TellsTheLimitsThatItsMotionUses) {
+  const Chain arm = thrower();
+  PlanOptions options;
+  options.search = planar();
+  const auto result = plan_throw(arm, boxes()[1], options);
+  ASSERT_TRUE(result.plan) << result.reason;
+  const LimitCheck dense = check_limits(arm, result.plan->motion);
+  const LimitCheck& told = result.plan->limits;
+  EXPECT_EQ(told.torque.fraction, dense.torque.fraction);
+  EXPECT_EQ(told.position.fraction, dense.position.fraction);
+  EXPECT_EQ(told.lowest, dense.lowest);
+  EXPECT_EQ(told.torque_rate.value, dense.torque_rate.value);
+}
+
+// From any pose to a throw: the way there, the swing and the brake take no more than their share.
+TEST(ThrowMotion, KeepsItsShareOfTheLimits) {
+  const Chain arm = thrower();
+  const auto one = find_throws(arm, boxes()[0], planar()).front();
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> part(0.2, 0.8);
+  for (int k = 0; k < 20; ++k) {
+    Joints home(7);
+    for (int i = 0; i < 7; ++i)
+      home[i] = std::lerp(arm.joints[i].limits.lower, arm.joints[i].limits.upper, part(random));
+    for (const double share : {0.9, 0.3}) {
+      const auto motion = throw_motion(arm, home, one.state, Joints::Zero(7), 0.1, share);
+      ASSERT_TRUE(motion);
+      const LimitCheck use = check_limits(arm, *motion, 0.01);
+      EXPECT_LE(use.acceleration.fraction, share * (1 + 1e-9)) << k;
+      EXPECT_LE(use.jerk.fraction, share * (1 + 1e-9)) << k;
+      EXPECT_LE(use.velocity.fraction, 1) << k;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace unhand::planners
