@@ -159,12 +159,16 @@ void monte_carlo(const SkuMotion& motion, const MatrixXd& J, const SkuRequest& r
   });
   const auto n = static_cast<double>(draws.size());
   out.within_sigma = std::sqrt(request.confidence * (1 - request.confidence) / n);
-  for (const Draw& d : draws) {
-    out.within += d.within / n;
-    out.within_linear += d.linear_within / n;
-    out.lost += !d.landed / n;
+  const auto share = [&](bool Draw::*is) {  // a quotient of whole numbers: a sum of n-ths may exceed one
+    return static_cast<double>(
+               std::count_if(draws.begin(), draws.end(), [=](const Draw& d) { return d.*is; })) /
+           n;
+  };
+  out.within = share(&Draw::within);
+  out.within_linear = share(&Draw::linear_within);
+  out.lost = 1 - share(&Draw::landed);
+  for (const Draw& d : draws)
     if (d.landed) out.samples.push_back(d.sample);
-  }
   const auto [x, sx] = moments(out.samples, &LandingSample::x);
   const auto [theta, stheta] = moments(out.samples, &LandingSample::theta);
   const auto [lx, slx] = moments(out.samples, &LandingSample::linear_x);

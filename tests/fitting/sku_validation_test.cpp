@@ -218,6 +218,18 @@ TEST(SkuValidation, FrictionAndForceScatterAsTheirProductDoes) {
   EXPECT_THAT(b.disagreement, Not(HasSubstr("believe the Monte Carlo")));
 }
 
+// Of draws that all land within a wide tolerance the share is one: neither less by rounding nor more.
+TEST(SkuValidation, SharesAreOfWholeDraws) {
+  for (const int samples : {99, 300, 700}) {
+    auto request = quick(samples);
+    request.tolerance = {5, 30};
+    const auto answer = validate_sku(bar(), card(), "card.json", request);
+    EXPECT_EQ(answer.within, 1) << samples;
+    EXPECT_EQ(answer.within_linear, 1) << samples;
+    EXPECT_EQ(answer.lost, 0) << samples;
+  }
+}
+
 // A rigid carriage is sure of an object that turns in the pads, and wrong.
 TEST(SkuValidation, APureDelayCannotVouchForAnObjectOnALever) {
   datasets::ModelCard delay;
