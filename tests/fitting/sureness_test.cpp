@@ -151,5 +151,53 @@ TEST(Sureness, ChiSquareIsOfTheResidualsAsDeclaredAndHasAllSamplesLessAllUnknown
   }
 }
 
+TEST(Sureness, TheReleaseBeginsWithTheOpeningAndTheFlightWithTheDetach) {
+  constexpr double kOpening = 1, kDetach = 1.5;
+  const auto phase = [&](experiment::Channel channel, double time) {
+    return phase_of({channel, time, 0, 1}, kOpening, kDetach);
+  };
+  using experiment::Channel;
+  EXPECT_EQ(phase(Channel::mocap_x, 0.999), Phase::grasped);
+  EXPECT_EQ(phase(Channel::mocap_x, kOpening), Phase::release);
+  EXPECT_EQ(phase(Channel::wrench_fx, 1.499), Phase::release);
+  EXPECT_EQ(phase(Channel::wrench_fx, kDetach), Phase::flight);
+  EXPECT_EQ(phase(Channel::landing_time, 0), Phase::landing);
+}
+
+// Of normal residuals with the variance that they show, but for what all models share: n ln 2π.
+TEST(Sureness, TheDevianceIsThatOfNormalResiduals) {
+  const std::vector<double> wide{3, -4, 5, -2, 1}, narrow{0.5, -0.5, 0.1};
+  FitResult result;
+  double expected = 0;
+  for (const auto* residuals : {&wide, &narrow}) {
+    ChannelMisfit m;
+    for (const double r : *residuals) m.n += 1, m.chi2 += r * r;
+    const double sigma = residuals == &wide ? std::sqrt(55.0 / 5) : 1;  // no less than declared
+    for (const double r : *residuals)
+      expected -= 2 * std::log(std::exp(-0.5 * std::pow(r / sigma, 2)) / sigma);
+    result.misfit.push_back(m);
+  }
+  EXPECT_NEAR(result.deviance(), expected, 1e-12);
+}
+
+TEST(Sureness, CorrelationIsCovarianceOverBothSigmas) {
+  FitResult result;
+  result.campaign.resize(3);
+  result.covariance = {4, 1, -3, 1, 9, 0, -3, 0, 25};
+  EXPECT_NEAR(result.correlation(0, 1), 1 / (2.0 * 3), 1e-15);
+  EXPECT_NEAR(result.correlation(2, 0), -3 / (2.0 * 5), 1e-15);
+  EXPECT_EQ(result.correlation(1, 2), 0);
+  EXPECT_EQ(result.correlation(1, 1), 1);
+}
+
+TEST(Sureness, TheMostFrequentReasonIsGiven) {
+  FitResult result;
+  for (const char* why : {"it spins", "it slips", "", "it slips", "a wall"}) {
+    result.throws.emplace_back();
+    result.throws.back().why_not = why;
+  }
+  EXPECT_EQ(result.why_not(), "it slips (2 throws)");
+}
+
 }  // namespace
 }  // namespace unhand::fitting
