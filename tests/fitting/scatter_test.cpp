@@ -284,6 +284,9 @@ TEST(ScatterCovariance, WhatAPriorHoldsNeitherLendsNorBorrows) {
     EXPECT_NEAR(with.degrees_of_freedom[k], without.degrees_of_freedom[k], 1e-6) << k;
   }
   EXPECT_NEAR(with.covariance(2, 2) * held.prior, 1, 1e-3);
+  // Nor where the prior says but a little more than one group that errs by nothing.
+  const Told half{1, 0, 1.1};
+  EXPECT_NEAR(borrowing({many, half}).covariance(1, 1) * (half.groups + half.prior), 1, 1e-9);
 }
 
 // What is lent is the textbooks' pooled variance of those that have enough groups: sums of squares over the
