@@ -89,6 +89,8 @@ TEST(Sureness, WhatIsOpenKeepsTheProductOfFrictionAndForce) {
       }
   EXPECT_GT(size, 0.05) << result.open.front().meaning;
   EXPECT_LT(std::abs(relative), 0.05 * size) << result.open.front().meaning;
+  EXPECT_THAT(result.open.front().meaning, testing::MatchesRegex("mu [^ ]+ with grip_force [^ ]+ N"))
+      << "friction has no unit";
 }
 
 TEST(Sureness, AnUnknownAtEitherEndOfItsRangeIsSaidToBe) {
