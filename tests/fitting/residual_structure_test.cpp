@@ -99,6 +99,21 @@ TEST(Jackknife, OfAMeanIsTheTextbooks) {
   EXPECT_NEAR(1 / n + (n - 1) / n * found.excess[0], square / n, 1e-9);
 }
 
+// Three recordings of one sample each, 1, 2 and 3: a mean of 2 with the variance 1/3. t² = 12 of two degrees
+// of freedom has the two-sided tail 1 − t/√(t² + 2); the mean's square beyond chance is 11/3 of a mean square
+// of 14/3.
+TEST(ResidualStructure, AnOffsetIsStudentsMean) {
+  ResidualSamples of;
+  for (int k = 0; k < 3; ++k) {
+    of.value.push_back(k + 1), of.time.push_back(0);
+    of.series.push_back(k), of.condition.push_back(k);
+  }
+  const SharedOffset offset = find_structure(of).offset;
+  EXPECT_NEAR(offset.mean, 2, 1e-12);
+  EXPECT_NEAR(offset.p_value, 1 - std::sqrt(12.0 / 14), 1e-9);
+  EXPECT_NEAR(offset.share, 11.0 / 14, 1e-9);
+}
+
 // Three recordings of each of three conditions, one sample each: F = 3 of 2 and 6 degrees of freedom, whose
 // tail is (1 + 2 F/6)^-3 = 1/8; what conditions share beyond chance is 6 − 2 of a sum of squares of 12.
 TEST(ResidualStructure, ConditionsAreAnAnalysisOfVariance) {
