@@ -47,8 +47,8 @@ void describe_open_directions(const Eigen::MatrixXd& information, const Campaign
     for (std::size_t i = 0; i < scale.size(); ++i) {
       if (!open.moves(i)) continue;
       const Unknown& u = problem.campaign()[i];
-      open.meaning += fmt::format("{}{} {:+.3g} {}", open.meaning.empty() ? "" : " with ", u.name,
-                                  open.direction[i] * u.scale, u.unit);
+      open.meaning += fmt::format("{}{} {:+.3g}{}", open.meaning.empty() ? "" : " with ", u.name,
+                                  open.direction[i] * u.scale, dynamics::after_number(u.unit));
     }
     out.open.push_back(std::move(open));
   }

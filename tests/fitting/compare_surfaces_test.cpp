@@ -4,9 +4,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <utility>
+#include <vector>
 
 #include "datasets/import_planar_pushes.hpp"
+#include "fitting/slips/law_score.hpp"
 #include "slip_simulator.hpp"
 #include "tests/support/data_folder.hpp"
 
@@ -61,6 +66,91 @@ TEST(CompareSurfaces, SaysWhichSurfaceHasTooLittle) {
   SurfaceComparisonOptions options;
   options.folds = 1;
   EXPECT_THROW(compare_surfaces({}, all, options), std::invalid_argument);
+}
+
+/// The score of a surface whose held-out errors are these [deg].
+SurfaceScore score_of(const SlipSurface& surface, std::vector<double> errors, double null_control) {
+  SurfaceScore out;
+  out.outcome = SurfaceOutcome::fitted;
+  out.fit.outcome = SurfaceOutcome::fitted, out.fit.surface = surface;
+  out.set_errors(std::move(errors));
+  out.null_control_deg = null_control;
+  return out;
+}
+
+// A t of 3.1824 has 2.5 % of Student's distribution of three degrees above it.
+TEST(LawScore, AGainIsStudentsOnOneSide) {
+  Paired gain;
+  const double mean = 3.1824 / 2 * std::sqrt(5 / 3.0);  // of four, whose mean's error is √(5/3)/2
+  for (const double one : {-1.5, -0.5, 0.5, 1.5}) gain.add(mean + one);
+  EXPECT_NEAR(gain.t(), 3.1824, 1e-9);
+  EXPECT_NEAR(gain.p(), 0.025, 1e-5);
+  Paired loss;
+  for (const double one : {-1.5, -0.5, 0.5, 1.5}) loss.add(one - mean);
+  EXPECT_EQ(loss.p(), 1);
+}
+
+TEST(LawScore, TellsWhatASurfaceSaysOfALawBesideTheBase) {
+  const SlipSurface surface = ellipsoid(along_axes);
+  SlipSamples slips = simulate(surface, 4, 0, 0, 15);
+  for (SlipSample& s : slips.samples)
+    for (double& w : s.wrench) w *= 1.25;  // a quarter beyond the surface
+  LawScore law;
+  const auto told = law.add(slips, score_of(surface, {9, 9, 10, 12}, 6), score_of(surface, {5, 6, 7, 10}, 8));
+  EXPECT_EQ(told.base_deg, 10);
+  EXPECT_EQ(told.law_deg, 7);
+  EXPECT_EQ(told.gain_deg, 3);
+  EXPECT_NEAR(told.gain_sigma, std::sqrt((1 + 0 + 0 + 1) / 3.0 / 4), 1e-12);
+  EXPECT_EQ(law.better, 1);
+  EXPECT_EQ(law.null_gain, -2) << "on noise it loses";
+  EXPECT_NEAR(law.level, 0.25, 1e-9);
+  law.add(slips, score_of(surface, {1, 1, 1, 1}, 6), score_of(surface, {2, 2, 2, 2}, 6));
+  EXPECT_EQ(law.better, 1);
+  EXPECT_EQ(law.compared, 2);
+  law.average();
+  EXPECT_EQ(law.null_gain, -1);
+  EXPECT_EQ(law.error, 4.5);
+}
+
+// Samples of one push err alike; what speaks against a law is when other pushes do so, too.
+TEST(LawScore, OnlyOtherPushesTellOfWhatALawLeaves) {
+  const SlipSurface surface = ellipsoid(along_axes);
+  SlipSamples slips = simulate(surface, 60, 0.1, 0, 16);
+  const auto once = slips.samples;
+  for (int again = 0; again < 2; ++again) slips.samples.insert(slips.samples.end(), once.begin(), once.end());
+  LawScore law;
+  const std::vector<double> errors(slips.samples.size(), 1);
+  const auto told = law.add(slips, score_of(surface, errors, 0), score_of(surface, errors, 0));
+  EXPECT_LT(std::abs(told.left), 4 * told.left_sigma);
+  EXPECT_LT(std::abs(told.left), 0.4);
+}
+
+// The null control keeps the rays of the wrenches and the residuals of the fit: what lies on the surface
+// stays there, and directions err by angles that were measured.
+TEST(CompareSurfaces, TheNullControlDrawsItsNoiseFromTheResiduals) {
+  const SlipSurface surface = ellipsoid(along_axes);
+  const SlipSamples slips = simulate(surface, 40, 0.1, 0.2, 17);
+  SurfaceFit fit;
+  fit.outcome = SurfaceOutcome::fitted, fit.surface = surface;
+  std::vector<double> angles, levels;
+  for (const SlipSample& s : slips.samples) {
+    angles.push_back(direction_error(surface, s));
+    levels.push_back(surface.gauge(s.wrench));
+  }
+  const auto away = [](double x, const std::vector<double>& from) {
+    double nearest = HUGE_VAL;
+    for (const double one : from) nearest = std::min(nearest, std::abs(x - one));
+    return nearest;
+  };
+  const SlipSamples drawn = simulate_slips(slips, fit, 3);
+  ASSERT_EQ(drawn.samples.size(), slips.samples.size());
+  for (std::size_t i = 0; i < drawn.samples.size(); ++i) {
+    const SlipSample &one = drawn.samples[i], &was = slips.samples[i];
+    EXPECT_LT(away(surface.gauge(one.wrench), levels), 1e-9);
+    const Eigen::Vector3d a(one.wrench.data()), b(was.wrench.data());
+    EXPECT_LT(a.cross(b).norm(), 1e-9 * a.norm() * b.norm());
+    EXPECT_LT(away(direction_error(surface, one), angles), 1e-6);
+  }
 }
 
 TEST(CompareSurfaces, MeasuredPlanarPushes) {

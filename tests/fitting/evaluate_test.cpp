@@ -5,8 +5,12 @@
 
 #include <cmath>
 #include <fstream>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "fitting/advice.hpp"
+#include "fitting/before_release.hpp"
 #include "fitting/card.hpp"
 #include "fitting/distributions.hpp"
 #include "tests/support/refusal.hpp"
@@ -82,6 +86,9 @@ TEST(Evaluate, AFitOfAnotherProblemAndNoAnswerAreRefused) {
   refused(quartic, fit_of_disc());
   refused(disc(), {});
   refused(disc(), none);
+  FitResult more = fit_of_disc();
+  more.own_spread.push_back(1);
+  refused(disc(), more);
   EXPECT_THROW(predict_some(disc(), fit_of_disc(), {disc().throws().size()}), std::invalid_argument);
   EXPECT_THROW(disc().predict(disc().throws().front(), {}, {}), std::invalid_argument);
   EXPECT_EQ(none.correlation(0, 1), 0);
@@ -128,6 +135,8 @@ TEST(Evaluate, TwistErrorsOfTheBaseModelAreThoseOfCompare) {
     EXPECT_NEAR(*error[1], (p.detach.twist.omega - measured.detach_twist->omega) * experiment::kDegrees, 0.5)
         << id;
     EXPECT_NEAR(*error[2], p.landing.pose.x - *measured.landing_x, 1e-12) << id;
+    EXPECT_NEAR(*error[3], (p.landing.pose.theta - *measured.landing_theta) * experiment::kDegrees, 1e-9)
+        << id;
   }
 }
 
@@ -146,6 +155,127 @@ TEST(Evaluate, CrossValidationLeavesConditionsOut) {
   EXPECT_EQ(cross_validate(single, "(in memory)", {}, {}, 2).folds, 2) << "of two objects: two experiments";
   std::erase_if(single.throws, [&](const auto& one) { return one.object != single.throws.front().object; });
   EXPECT_THROW(cross_validate(single, "(in memory)", {}, {}, 2), std::invalid_argument);
+}
+
+// A change of the campaign's values changes what the samples before the opening say of the throw's own
+// unknowns, too: where it lands moves by both.
+TEST(Evaluate, SigmaCountsWhatAnotherValueMakesOfTheGrasp) {
+  const std::vector<std::size_t> which{0, 4, 7};
+  // Of lengths in motion capture: a longer scale is another place in the hand, and another path from there.
+  const auto problem = disc().with("limit_surface_disc", {"sensor.length_scale"});
+  FitResult centre = fit_of_disc();
+  for (std::size_t k = 2; k < problem.campaign().size(); ++k)
+    centre.campaign.push_back({problem.campaign()[k], problem.campaign()[k].start, 0, 0, false});
+  const std::size_t n = centre.campaign.size(), k = 2;
+  const double sigma = 1e-3;
+  centre.covariance.assign(n * n, 0.0);
+  const auto own_alone = predict_some(problem, centre, which);
+  centre.covariance[k * n + k] = sigma * sigma;
+  const auto both = predict_some(problem, centre, which);
+  FitResult above = centre, below = centre;
+  above.campaign[k].value += sigma, below.campaign[k].value -= sigma;
+  const auto up = predict_some(problem, above, which), down = predict_some(problem, below, which);
+  for (std::size_t i = 0; i < which.size(); ++i) {
+    ASSERT_TRUE(both[i].sigma && own_alone[i].sigma);
+    const auto worth = [&](double with, double without) {
+      return std::sqrt(with * with - without * without);
+    };
+    const auto &a = up[i].comparison.prediction.landing.pose, &b = down[i].comparison.prediction.landing.pose;
+    const double x = worth(both[i].sigma->landing_x, own_alone[i].sigma->landing_x),
+                 theta = worth(both[i].sigma->landing_theta, own_alone[i].sigma->landing_theta);
+    EXPECT_NEAR(0.5 * std::abs(a.x - b.x), x, 0.03 * x + 2e-6) << i;
+    EXPECT_NEAR(0.5 * std::abs(a.theta - b.theta), theta, 0.03 * theta + 2e-5) << i;
+  }
+}
+
+// Before the detach the object moves with the hand: what the tracker shows there is no part of the twist that
+// it leaves with, also where a model is sure that it had left already.
+TEST(Evaluate, TwistErrorsAreOfTheFlightAlone) {
+  auto log = log_of_disc();
+  for (std::size_t k = 0; k < log.throws.size(); ++k) {
+    const CampaignThrow& thrown = disc().throws()[k];
+    auto& mocap = *log.throws[k].mocap;
+    for (std::size_t i = 0; i < mocap.time.rows; ++i)
+      if (mocap.time(i) >= thrown.opening && mocap.time(i) < thrown.release)
+        mocap.pose(i, 0) += 0.5 * (mocap.time(i) - thrown.opening);
+  }
+  CampaignOptions options;
+  options.model = "gripper_delay";
+  const CampaignProblem bent(log, "(in memory)", options), seen(log_of_disc(), "(in memory)", options);
+  FitResult early;
+  early.outcome = FitOutcome::converged;
+  early.campaign.push_back({seen.campaign()[0], 0.03, 0, 0, false});
+  const auto as_bent = predict_throws(bent, early, {false, 0}),
+             as_seen = predict_throws(seen, early, {false, 0});
+  for (std::size_t i = 0; i < as_seen.size(); ++i) {
+    const auto& one = as_seen[i].comparison;
+    EXPECT_LT(one.prediction.detach.time, disc().throws()[i].release - 0.01);
+    EXPECT_EQ(*as_bent[i].comparison.error[0], *one.error[0]) << one.id;
+  }
+}
+
+// A spread that a fit or a card does not tell is the prior's.
+TEST(Evaluate, AnUntoldSpreadIsThePriors) {
+  FitResult untold = fit_of_disc(), told = untold;
+  for (std::size_t k = 2; k < told.own_spread.size(); ++k)
+    told.own_spread[k] = disc().own()[k].prior_sigma.value();
+  untold.own_spread.resize(2);
+  const auto a = predict_some(disc(), untold, {0}), b = predict_some(disc(), told, {0});
+  EXPECT_EQ(a[0].sigma->landing_theta, b[0].sigma->landing_theta);
+}
+
+// Nothing was seen of it while it was held: it is as the spread says.
+TEST(BeforeRelease, OfAThrowThatNothingWasSeenOfOnlyTheSpreadIsKnown) {
+  CampaignThrow blind = disc().throws().front();
+  blind.observed.all.clear();
+  const auto found = before_release(disc(), blind, fit_of_disc(), DerivativesBy::all);
+  for (std::size_t k = 0; k < found.own.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    EXPECT_EQ(found.own[k], 0);
+    EXPECT_NEAR(std::sqrt(found.covariance(i, i)) / fit_of_disc().own_spread[k], 1, 1e-12);
+  }
+}
+
+TEST(Evaluate, ComparisonsCountWhatDidNotLandAndTheMeanTime) {
+  auto throws = predict_some(disc(), fit_of_disc(), {0, 1, 2, 3}, {false, 0});
+  for (std::size_t i = 0; i < throws.size(); ++i) {
+    throws[i].seconds = 1e-6 * static_cast<double>(i);  // 0, 1, 2 and 3 µs
+    const auto modes = disc().predict(disc().throws()[i], fit_of_disc().values(), throws[i].own).modes;
+    EXPECT_EQ(throws[i].comparison.prediction.events, static_cast<int>(modes.size()));
+  }
+  const auto all = comparison_of(disc(), fit_of_disc(), throws);
+  EXPECT_EQ(all.failed, 0);
+  EXPECT_NEAR(all.microseconds_per_throw, 1.5, 1e-12);
+  throws[2].comparison.prediction.release = release::ReleaseOutcome::never_separated;
+  EXPECT_EQ(comparison_of(disc(), fit_of_disc(), throws).failed, 1);
+}
+
+// Where a condition is left out, so are all of its repetitions: what its landings say is not known to the fit
+// that predicts them.
+TEST(Evaluate, AConditionThatIsLeftOutSaysNothing) {
+  const auto conditions = datasets::conditions_of(log_of_disc(), datasets::Split::train);
+  auto other = log_of_disc();
+  const auto is_of_it = [&](const auto& one) {
+    return one.object == conditions.front().first && one.condition == conditions.front().second;
+  };
+  for (auto& one : other.throws)
+    if (is_of_it(one)) one.landing->pose(0, 1) += 0.5;
+  const int all = static_cast<int>(conditions.size());
+  FitOptions quickly;
+  quickly.rounds = 2;
+  const auto a = cross_validate(log_of_disc(), "(in memory)", {}, quickly, all + 3),
+             b = cross_validate(other, "(in memory)", {}, quickly, all + 3);
+  EXPECT_EQ(a.folds, all) << "no more than there are conditions";
+  EXPECT_TRUE(a.failed.empty());
+  ASSERT_EQ(a.throws.size(), b.throws.size());
+  int left_out = 0;
+  for (std::size_t i = 0; i < a.throws.size(); ++i) {
+    const auto &one = a.throws[i].comparison, &same = b.throws[i].comparison;
+    if (!is_of_it(one)) continue;
+    EXPECT_EQ(one.prediction.landing.pose.theta, same.prediction.landing.pose.theta) << one.id;
+    ++left_out;
+  }
+  EXPECT_GT(left_out, 1);
 }
 
 // Which force the patch's radius is of would be another one for every reader's guess.
@@ -258,6 +388,114 @@ TEST(Card, ARangeWithoutWidthIsNoEquality) {
   EXPECT_TRUE(outside(-6.1e-3));
   EXPECT_THAT(reasons_of(outside_range(card, thrown)),
               testing::ElementsAre(HasSubstr("com_offset is -0.0061 m; the card was fitted at 0 m alone")));
+}
+
+// What a card tells of its parameters is what predictions are made with, whatever of it there is.
+TEST(Card, EveryNumberOfItIsReadBack) {
+  auto card = card_of(disc(), fit_of_disc());
+  card.parameters["pads"].value = 3;
+  card.parameters["reference_force"].value = 33;
+  const auto options = options_of(card, "card.json");
+  EXPECT_EQ(options.pads, 3);
+  EXPECT_EQ(options.reference_force, 33);
+  EXPECT_TRUE(options.predict_only);
+
+  card.covariance.reset();
+  auto &mu = card.parameters["mu"], &length = card.parameters["length"];
+  mu.sigma = 0.02, mu.degrees_of_freedom = 7.3, mu.interval95 = {{0.4, HUGE_VAL}};
+  length.sigma.reset(), length.determined = false, length.degrees_of_freedom.reset();
+  card.own_spreads["mu_deviation"].sigma = 0;
+  const auto one = fit_of(card, disc(), "card.json");
+  EXPECT_EQ(one.campaign[0].degrees_of_freedom, 7.3);
+  EXPECT_EQ(one.campaign[0].interval95(), (std::array<double, 2>{0.4, HUGE_VAL}));
+  EXPECT_EQ(one.campaign[0].data_sigma, 0.02);
+  EXPECT_EQ(one.covariance, (std::vector<double>{0.02 * 0.02, 0, 0, 0})) << "variances are sigmas' squares";
+  EXPECT_TRUE(std::isinf(one.campaign[1].sigma) && std::isinf(one.campaign[1].data_sigma));
+  EXPECT_FALSE(is_determined(one, 1));
+  EXPECT_GT(one.own_spread[2], 0) << "a prior has a width";
+  length.determined = true;  // known, and nobody says how well
+  EXPECT_EQ(fit_of(card, disc(), "card.json").campaign[1].sigma, 0);
+  length.sigma = 1e-4, length.determined = false;  // what was known before the log
+  EXPECT_EQ(fit_of(card, disc(), "card.json").campaign[1].sigma, 1e-4);
+  EXPECT_TRUE(std::isinf(fit_of(card, disc(), "card.json").campaign[1].data_sigma));
+}
+
+TEST(Card, NumbersThatMeanNothingAreRefusedByName) {
+  const auto card = card_of(disc(), fit_of_disc());
+  const auto refusal = [&](auto&& change) {
+    auto bad = card;
+    change(bad);
+    return unhand::support::refusal<datasets::CardError>([&] {
+      options_of(bad, "card.json");
+      fit_of(bad, disc(), "card.json");
+    });
+  };
+  EXPECT_THAT(refusal([](auto& c) { c.parameters["pads"].value = 2.5; }),
+              HasSubstr("/parameters/pads/value"));
+  EXPECT_THAT(refusal([](auto& c) { c.parameters["length"].value = 5; }),
+              HasSubstr("/parameters/length/value"));
+  EXPECT_THAT(refusal([](auto& c) { c.own_spreads["mu_deviation"].unit = "N"; }),
+              HasSubstr("/own_spreads/mu_deviation/unit"));
+}
+
+// What was held is known as it was given; sigmas that allow for few throws already are as of many.
+TEST(Card, TellsOfWhatWasHeldAndOfSigmasThatAllowForFew) {
+  FitResult made = fit_of_disc();
+  made.campaign[1].sigma = 0;
+  made.covariance = {made.covariance[0], 0, 0, 0};
+  made.campaign[0].allows_for_few = true;
+  const auto card = card_of(disc(), made);
+  ASSERT_TRUE(card.covariance);
+  EXPECT_THAT(card.covariance->names, testing::ElementsAre("mu"));
+  EXPECT_THAT(card.covariance->matrix, testing::ElementsAre(made.covariance[0]));
+  EXPECT_EQ(card.parameters.at("length").sigma, 0);
+  EXPECT_EQ(card.parameters.at("mu").degrees_of_freedom, kCertain);
+  EXPECT_EQ(card_of(disc(), fit_of_disc()).parameters.at("mu").degrees_of_freedom,
+            fit_of_disc().campaign[0].degrees_of_freedom);
+}
+
+// Friction's spread is a share: the pads of a throw may hold as if they pressed by three of it more.
+TEST(Card, AGripBeyondItsRangeIsTriedAsFarAsFrictionScatters) {
+  auto card = card_of(disc(), fit_of_disc());
+  card.valid_range = {{"grip_force", {20, 20, "N"}}};
+  card.own_spreads["mu_deviation"] = {0.1, "-"};
+  const auto outside = [&](double force) {
+    return !outside_range(card, {{"grip_force", "N", force}}).empty();
+  };
+  EXPECT_FALSE(outside(20 + 0.99 * 3 * 0.1 * 20));
+  EXPECT_TRUE(outside(20 + 1.01 * 3 * 0.1 * 20));
+  EXPECT_TRUE(outside(20 - 1.01 * 3 * 0.1 * 20));
+}
+
+// One that always falls short has a bias of the other sign than its mean absolute error.
+TEST(Card, ErrorsAreTheStatisticsOfTheirSplit) {
+  experiment::ModelComparison model;
+  for (const double error : {-0.01, -0.03, 0.4}) {
+    model.throws.emplace_back();
+    model.throws.back().split = error < 0 ? datasets::Split::test : datasets::Split::train;
+    model.throws.back().error[2] = error;
+  }
+  const auto errors = errors_of(model, datasets::Split::test);
+  ASSERT_EQ(errors.size(), 1u);
+  const auto& landing = errors.at(experiment::kQuantities[2].key);
+  EXPECT_EQ(landing.n, 2);
+  EXPECT_NEAR(landing.mae, 0.02, 1e-15);
+  EXPECT_NEAR(landing.bias, -0.02, 1e-15);
+}
+
+// A hand that turns the other way does what no throw of the card did.
+TEST(Card, TheHandsTurnHasASign) {
+  auto design = testing_support::small_design("limit_surface_disc");
+  design.postures[0].omega = -2;
+  const CampaignProblem back(experiment::generate_campaign(design, 5), "(in memory)", CampaignOptions{});
+  const auto card = card_of(disc(), fit_of_disc());
+  std::set<std::string> untried;
+  for (const auto& one : outside_range(card, back.throws().front().prepared)) untried.insert(one.condition);
+  EXPECT_TRUE(untried.contains("release_omega"));
+  for (const auto& is : conditions_of(back.throws().front().prepared))
+    if (is.name == "release_omega") {
+      EXPECT_NEAR(is.value, design.postures[0].omega, 0.3);
+    }
 }
 
 TEST(Card, ChecksumIsTheDocumentedOne) {

@@ -52,6 +52,38 @@ TEST(GrossOutliers, AreNoneWhereAllErrByDegrees) {
                   .empty());
 }
 
+// A log's groups have numbers of their own, and say nothing by how many samples they have.
+TEST(GrossOutliers, AreNamedByTheirNumber) {
+  auto of = groups([](std::size_t k) { return k == 9 ? 400.0 : 0; });
+  for (auto& one : of) one.group += 100;
+  of[5].n *= 30, of[5].gram *= 30;  // thirty times the samples, and what they add up to
+  const auto found = gross_outliers(of, 3);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found.front().group, 109U);
+}
+
+// One that shows the opposite of the effect as strongly as a fifth of all others together does not speak for
+// them.
+TEST(GrossOutliers, DoNotBendWhatTheOthersShow) {
+  auto of = groups([](std::size_t) { return 0.0; });
+  const double opposite = 103;  // of the effect's size, 3, to −100
+  auto& gram = of[22].gram;
+  gram(1, 1) += 2 * opposite * gram(0, 1) + opposite * opposite * gram(0, 0);
+  gram(0, 1) += opposite * gram(0, 0), gram(1, 0) = gram(0, 1);
+  const auto found = gross_outliers(of, 3);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found.front().group, 22U);
+  EXPECT_NEAR(found.front().times, opposite * opposite * 23 * 23, 0.3 * opposite * opposite * 23 * 23);
+}
+
+// A held-out group that is set aside may need one of train in its place: of two, none can be spared.
+TEST(GrossOutliers, AreNoneWhereTrainGroupsAreTooFewToReplaceThem) {
+  auto of = groups([](std::size_t k) { return k == 8 ? 400.0 : 0; });
+  EXPECT_EQ(gross_outliers(of, 3).size(), 1U);
+  for (std::size_t k = 0; k < of.size(); ++k) of[k].train = k == 1 || k == 2;
+  EXPECT_TRUE(gross_outliers(of, 3).empty());
+}
+
 TEST(GrossOutliers, StayWhereAnAnswerLeavesThem) {
   const auto of = groups([](std::size_t k) { return k == 9 ? 400.0 : 0; });
   const auto wild = gross_outliers(of, 3);

@@ -125,6 +125,31 @@ TEST(LevelDependence, WhatIsForgottenIsNotNamed) {
   EXPECT_EQ(named(found, "contact.stribeck"), nullptr) << "friction does not fall";
 }
 
+// From end to end, of the mean level: forces that fall from 1 to 0.8 change by −0.2/0.9; ones that are a
+// tenth larger one way and a tenth smaller the other, by 0.2.
+TEST(LevelDependence, ChangesAreFromEndToEndOfTheMeanLevel) {
+  struct Case {
+    std::function<double(const SlipSample&)> factor;
+    LevelBy by;
+    double change;
+  };
+  for (const auto& [factor, by, change] :
+       {Case{[](const SlipSample& s) { return 1 - 0.2 * s.slip / 59.0; }, LevelBy::order, -0.2 / 0.9},
+        Case{[](const SlipSample& s) {
+               return 1 + 0.1 * s.wrench[1] / std::hypot(s.wrench[0], s.wrench[1], s.wrench[2]);
+             },
+             LevelBy::sense, 0.2}}) {
+    const auto answer = level_dependence({slips(5, factor)}, {kPatch}, quick());
+    ASSERT_EQ(answer.found.size(), 1U);
+    EXPECT_EQ(answer.found.front().by, by);
+    ASSERT_EQ(answer.found.front().parameters.size(), 1U);
+    expect_size(answer.found.front().parameters.front(), "change[simulated]", change);
+    // Sixty levels of 1 % noise: an end from an end is known to 1 % √(12/60), times what the surface takes
+    // up.
+    EXPECT_NEAR(answer.found.front().parameters.front().sigma, 0.005, 0.004);
+  }
+}
+
 // The level of significance of all questions together is 2 %, and a change must be worth 5 % of the error.
 TEST(LevelDependence, NoiseAloneIsHardlyEverADependence) {
   constexpr unsigned kSets = 200;

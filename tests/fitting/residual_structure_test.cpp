@@ -8,11 +8,15 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <string>
+#include <vector>
 
 #include "experiment/campaign_effects.hpp"
 #include "experiment/random_stream.hpp"
 #include "experiment/throw_setup.hpp"
+#include "fitting/discovery/jackknife.hpp"
 #include "fitting/discovery/missing_force.hpp"
+#include "fitting/discovery/order_trend.hpp"
 #include "fitting/discovery/residuals.hpp"
 #include "tests/fitting/loop_campaign.hpp"
 
@@ -45,6 +49,87 @@ TEST(ResidualStructure, TailsAreThoseOfTheTables) {
   EXPECT_NEAR(chi2_tail(1074.679449, 1000), 0.05, 1e-7);
   EXPECT_NEAR(f_tail(4.9646027, 1, 10), 0.05, 1e-7);
   EXPECT_NEAR(f_tail(2.3478775, 10, 20), 0.05, 1e-6);
+}
+
+// The textbooks' regression: of five points with an error that is orthogonal to the line, t = 3.1824 is the
+// two-sided 5 % of three degrees of freedom; a second condition with the same points adds four throws and one
+// mean, and one of a single throw adds nothing.
+TEST(OrderTrend, IsTheRegressionOfTheTextbooksWithinConditions) {
+  const std::array<double, 5> place{-2, -1, 0, 1, 2}, bend{2, -1, -2, -1, 2};  // squares: 10, 14
+  const auto points = [&](double t, double degrees, int conditions) {
+    const double error = std::sqrt(10 * degrees / (14 * t * t));
+    std::vector<Placed> out;
+    for (int c = 0; c < conditions; ++c)
+      for (std::size_t i = 0; i < 5; ++i)
+        out.push_back({c, place[i], 100.0 * c + place[i] + error * bend[i]});
+    return out;
+  };
+  auto one = points(3.1824, 3, 1);
+  EXPECT_NEAR(order_trend(one).slope, 1, 1e-12);
+  EXPECT_NEAR(order_trend(one).p_value, 0.05, 1e-5);
+  const double left = 10 * 3 / (3.1824 * 3.1824);  // about the line
+  EXPECT_NEAR(order_trend(one).explained, 10 - left / 3, 1e-9)
+      << "chance takes one part in three degrees away";
+  EXPECT_NEAR(order_trend(one).ratio, (10 + left) / left, 1e-9);
+  one.push_back({7, 40, -3});
+  EXPECT_NEAR(order_trend(one).p_value, 0.05, 1e-5) << "a condition that was thrown once";
+  const double t7 = 2.3646;  // of seven degrees: ten throws, two means, a slope
+  EXPECT_NEAR(order_trend(points(t7, 7, 2)).p_value, 0.05, 1e-5);
+}
+
+// The mean of eight numbers of unit noise, left out in turn: what they scatter beyond it, over n − 1.
+TEST(Jackknife, OfAMeanIsTheTextbooks) {
+  const std::vector<double> y{3, -1, 4, 1, -5, 9, -2, 6};
+  const auto n = static_cast<double>(y.size());
+  double mean = 0, square = 0;
+  for (const double one : y) mean += one / n;
+  for (const double one : y) square += (one - mean) * (one - mean) / (n - 1);
+  std::map<std::string, Equations> groups;
+  Equations all = no_equations(1);
+  for (std::size_t i = 0; i < y.size(); ++i) {
+    Equations one = no_equations(1);
+    one(0, 0) = 1, one(0, 1) = one(1, 0) = mean - y[i];
+    groups[std::to_string(i)] = one;
+    all += one;
+  }
+  const Jackknife found = jackknife(groups, all, LinearAnswer(all));
+  EXPECT_NEAR(found.groups[0], n, 1e-9);
+  EXPECT_NEAR(found.excess[0], (square - 1) / (n - 1), 1e-9);
+  // So that noise and excess are the textbooks' variance of a mean.
+  EXPECT_NEAR(1 / n + (n - 1) / n * found.excess[0], square / n, 1e-9);
+}
+
+// Three recordings of one sample each, 1, 2 and 3: a mean of 2 with the variance 1/3. t² = 12 of two degrees
+// of freedom has the two-sided tail 1 − t/√(t² + 2); the mean's square beyond chance is 11/3 of a mean square
+// of 14/3.
+TEST(ResidualStructure, AnOffsetIsStudentsMean) {
+  ResidualSamples of;
+  for (int k = 0; k < 3; ++k) {
+    of.value.push_back(k + 1), of.time.push_back(0);
+    of.series.push_back(k), of.condition.push_back(k);
+  }
+  const SharedOffset offset = find_structure(of).offset;
+  EXPECT_NEAR(offset.mean, 2, 1e-12);
+  EXPECT_NEAR(offset.p_value, 1 - std::sqrt(12.0 / 14), 1e-9);
+  EXPECT_NEAR(offset.share, 11.0 / 14, 1e-9);
+}
+
+// Three recordings of each of three conditions, one sample each: F = 3 of 2 and 6 degrees of freedom, whose
+// tail is (1 + 2 F/6)^-3 = 1/8; what conditions share beyond chance is 6 − 2 of a sum of squares of 12.
+TEST(ResidualStructure, ConditionsAreAnAnalysisOfVariance) {
+  ResidualSamples of;
+  for (int condition = 0; condition < 3; ++condition)
+    for (int k = 0; k < 3; ++k) {
+      of.value.push_back(condition - 1 + k - 1);
+      of.time.push_back(0);
+      of.series.push_back(3 * condition + k);
+      of.condition.push_back(condition);
+    }
+  for (const Dependence& d : find_structure(of).depends)
+    if (d.on == "condition") {
+      EXPECT_NEAR(d.p_value, 0.125, 1e-9);
+      EXPECT_NEAR(d.share, 4.0 / 12, 1e-9);
+    }
 }
 
 TEST(ResidualStructure, NoiseHasNone) {

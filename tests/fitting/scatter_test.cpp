@@ -8,6 +8,7 @@
 #include <string>
 
 #include "fitting/misfit.hpp"
+#include "tests/support/small_campaign.hpp"
 
 namespace unhand::fitting {
 namespace {
@@ -218,6 +219,158 @@ TEST(ScatterCovariance, APriorIsAMeasurementOfKnownNoise) {
     } else if (seen == 25) {
       EXPECT_NEAR(degrees, 4 * (kThrows - 1), 4) << "half of the variance is";
     }
+  }
+}
+
+// Eight conditions of twenty throws each: what conditions scatter beyond the noise is known from eight of
+// them, the noise from all. Of V = noise + excess, only the excess is uncertain: ν (V/excess)² degrees of
+// freedom.
+TEST(ScatterCovariance, OnlyWhatExceedsTheNoiseIsUncertain) {
+  constexpr int kConditions = 8, kRepeats = 20;
+  const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(1, 1);
+  for (const double size : {0.05, 0.3, 0.5, 2.0}) {  // of a condition's error, in sigmas of a throw
+    NormalEquations equations;
+    equations.information = Eigen::MatrixXd::Constant(1, 1, kConditions * kRepeats);
+    std::vector<std::string> condition;
+    for (int c = 0; c < kConditions; ++c)
+      for (int k = 0; k < kRepeats; ++k) {
+        ThrowEquations part;
+        part.gradient = Eigen::VectorXd::Constant(1, (c % 2 ? size : -size) + (k % 2 ? 1 : -1));
+        part.information = Eigen::MatrixXd::Constant(1, 1, 1);
+        equations.throws.push_back(part);
+        condition.push_back(std::to_string(c));
+      }
+    const double noise = 1.0 / (kConditions * kRepeats),
+                 scatter = size * size / (kConditions - 1);  // the textbook's variance of a mean of eight
+    const auto found = scatter_covariance(equations, condition, none);
+    const double variance = std::max(noise, scatter);  // none is surer than noise lets it be
+    if (scatter > noise) {
+      EXPECT_NEAR(found.covariance(0, 0), variance, 1e-12) << size;
+    }
+    const double excess = found.covariance(0, 0) - noise, most = kConditions * kRepeats - 1;
+    const double expected =
+        excess > 0 ? (kConditions - 1) * std::pow(found.covariance(0, 0) / excess, 2) : HUGE_VAL;
+    EXPECT_NEAR(found.degrees_of_freedom[0], std::min(expected, most), 1e-6 * most) << size;
+  }
+}
+
+/// Groups of which each tells one of several unknowns, with information 1 and an error of a given size.
+struct Told {
+  int groups;
+  double size, prior;
+};
+ScatterCovariance borrowing(const std::vector<Told>& unknowns) {
+  const auto n = static_cast<Eigen::Index>(unknowns.size());
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n), prior = information;
+  std::vector<Cluster> groups;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Told& told = unknowns[static_cast<std::size_t>(k)];
+    information(k, k) = told.groups, prior(k, k) = told.prior;
+    for (int i = 0; i < told.groups; ++i) {
+      Cluster one{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
+      one.information(k, k) = 1, one.gradient[k] = i % 2 ? told.size : -told.size;
+      groups.push_back(one);
+    }
+  }
+  return borrowing_scatter(groups, information, prior);
+}
+
+// An unknown that a prior holds has no scatter of its own to lend, and no need of another's.
+TEST(ScatterCovariance, WhatAPriorHoldsNeitherLendsNorBorrows) {
+  const Told many{20, 5, 0}, few{2, 3, 0}, held{2, 1, 1e4};
+  const auto with = borrowing({many, few, held}), without = borrowing({many, few});
+  for (const int k : {0, 1}) {
+    EXPECT_NEAR(with.covariance(k, k) / without.covariance(k, k), 1, 1e-9) << k;
+    EXPECT_NEAR(with.degrees_of_freedom[k], without.degrees_of_freedom[k], 1e-6) << k;
+  }
+  EXPECT_NEAR(with.covariance(2, 2) * held.prior, 1, 1e-3);
+  // Nor where the prior says but a little more than one group that errs by nothing.
+  const Told half{1, 0, 1.1};
+  EXPECT_NEAR(borrowing({many, half}).covariance(1, 1) * (half.groups + half.prior), 1, 1e-9);
+}
+
+// What is lent is the textbooks' pooled variance of those that have enough groups: sums of squares over the
+// sum of the degrees of freedom. It counts as four degrees.
+TEST(ScatterCovariance, LendersArePooledByTheirDegrees) {
+  const Told lenders[] = {{30, 4, 0}, {8, 9, 0}}, few{2, 3, 0};
+  const auto found = borrowing({lenders[0], lenders[1], few});
+  double squares = 0, degrees = 0;
+  for (const Told& one : lenders) squares += one.groups * one.size * one.size, degrees += one.groups - 1;
+  const double own = few.groups * few.size * few.size / (few.groups - 1), pooled = squares / degrees;
+  EXPECT_NEAR(found.degrees_of_freedom[2], few.groups - 1 + 4, 1e-9);
+  EXPECT_NEAR(found.covariance(2, 2) * few.groups, ((few.groups - 1) * own + 4 * pooled) / (few.groups + 3),
+              1e-9);
+}
+
+const CampaignProblem& bars() {
+  static const CampaignProblem problem(
+      experiment::generate_campaign(testing_support::small_design("limit_surface_disc"), 11), "(in memory)",
+      {});
+  return problem;
+}
+
+// Huber's loss of a sample: a square up to five sigmas, beyond it a straight line with the slope there.
+TEST(Weighting, ASampleThatIsFarOffPullsAsOneAtTheLimit) {
+  const CampaignThrow& thrown = bars().throws().front();
+  experiment::Observations one;
+  one.all = {{experiment::Channel::mocap_x, thrown.opening - 0.01, 0, 1}};
+  const auto weighed = [&](double residual) {
+    Linearisation l;
+    l.residual = Eigen::VectorXd::Constant(1, residual);
+    l.campaign = l.own = Eigen::MatrixXd::Ones(1, 1);
+    l.detach = thrown.release;
+    weigh(l, one, thrown, Weighting{});
+    return l;
+  };
+  for (const double size : {0.5, 4.9, 5.1, 30.0, 1e3})
+    for (const double sign : {-1.0, 1.0}) {
+      const auto half = [&](double r) { return 0.5 * weighed(sign * r).residual.squaredNorm(); };
+      const Linearisation at = weighed(sign * size);
+      const double h = 1e-3, pull = at.campaign(0, 0) * at.residual[0];
+      EXPECT_NEAR(pull, sign * std::min(size, 5.0), 1e-9) << size;
+      EXPECT_NEAR((half(size + h) - half(size - h)) / (2 * h), sign * pull, 1e-6) << size;
+      EXPECT_EQ(at.own(0, 0), at.campaign(0, 0));
+    }
+}
+
+// Of a throw as well, in its χ²: the gradient is that of half of 2 √(limit χ²).
+TEST(Weighting, TheGradientOfAThrowThatIsFarOffIsThatOfHubersLoss) {
+  const std::vector<std::size_t> used{0};
+  const CampaignThrow& thrown = bars().throws().front();
+  const std::vector<double> own(bars().own().size(), 0.0), surely(own.size(), 1e-9);
+  Weighting weighting;
+  weighting.sample_limit = 1e9;
+  auto at = bars().start();
+  at[0] *= 1.1;
+  const auto chi2 = [&](const std::vector<double>& values) {
+    return bars().linearise(thrown, values, own, DerivativesBy::nothing).residual.squaredNorm();
+  };
+  weighting.throw_limit = 0.1 * chi2(at);
+  const auto equations = normal_equations(
+      bars(), used, {bars().linearise(thrown, at, own, DerivativesBy::all)}, {own}, surely, weighting, 1);
+  for (std::size_t k = 0; k < at.size(); ++k) {
+    auto up = at, down = at;
+    const double h = 1e-3 * at[k];
+    up[k] += h, down[k] -= h;
+    const double slope =
+        (std::sqrt(weighting.throw_limit * chi2(up)) - std::sqrt(weighting.throw_limit * chi2(down))) /
+        (2 * h);
+    // Differences over a thousandth, of curves.
+    EXPECT_NEAR(equations.throws[0].gradient[static_cast<Eigen::Index>(k)] / slope, 1, 0.01)
+        << bars().campaign()[k].name;
+  }
+}
+
+// A throw's own unknown of a linear model: whatever it is now, one step leads to the same least squares.
+TEST(Weighting, WhatIsKnownOfAnOwnUnknownPullsItBack) {
+  const Eigen::Vector3d slope(1, -2, 0.5), rest(3, 1, -4);
+  const double sigma = 0.4, expected = -slope.dot(rest) / (slope.squaredNorm() + 1 / (sigma * sigma));
+  for (const double now : {-2.0, 0.0, expected, 5.0}) {
+    const Eigen::VectorXd residual = rest + now * slope;
+    const Eigen::MatrixXd gram = throw_gram(slope, residual, {now}, {sigma});
+    EXPECT_NEAR(now - gram(0, 1) / gram(0, 0), expected, 1e-12);
+    EXPECT_EQ(gram(0, 1), gram(1, 0));
+    EXPECT_NEAR(gram(1, 1), residual.squaredNorm() + std::pow(now / sigma, 2), 1e-9);
   }
 }
 

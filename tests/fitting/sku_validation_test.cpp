@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <numeric>
 #include <set>
 #include <string>
@@ -14,6 +15,8 @@
 #include "experiment/outcome_slopes.hpp"
 #include "experiment/reference_throw.hpp"
 #include "fitting/card.hpp"
+#include "fitting/sku/sku_motion.hpp"
+#include "fitting/sku/sku_scatter.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/small_campaign.hpp"
 
@@ -399,6 +402,233 @@ TEST(SkuValidation, ItsOwnLogConfirmsACardByTheHeldOutThrowsAlone) {
   EXPECT_FALSE(other.measured->held_out);
   EXPECT_THAT(own.notes, Contains(HasSubstr("the log is the card's own")));
   EXPECT_EQ(own.measured ? own.measured->throws.size() : 0, test);
+}
+
+/// By name, or none.
+const UncertainInput* input_of(const ThrowInputs& of, const std::string& name) {
+  const auto found = std::find_if(of.inputs.begin(), of.inputs.end(),
+                                  [&](const UncertainInput& one) { return one.name == name; });
+  return found == of.inputs.end() ? nullptr : &*found;
+}
+
+// An object that is heavier than its file says is that heavier object; of a uniform shape its inertia grows
+// with it.
+TEST(SkuValidation, AnObjectThatIsHeavierThanItsFileSaysIsTheHeavierObject) {
+  for (const bool shaped : {false, true}) {
+    auto sku = bar();
+    if (shaped) {
+      sku.shape = "rod", sku.dims = {{0.3, 0.02, 0.02}};
+      sku.inertia = datasets::shape_inertia(*sku.shape, sku.mass, *sku.dims);
+    }
+    auto heavier = sku;
+    heavier.mass *= 1.2;
+    if (shaped) heavier.inertia = datasets::shape_inertia(*sku.shape, heavier.mass, *sku.dims);
+    const auto thrown = experiment::reference_throw(sku.name, datasets::to_object(sku)),
+               other = experiment::reference_throw(sku.name, datasets::to_object(heavier));
+    const auto inputs = throw_inputs(sku, card(), "card.json", thrown),
+               as_told = throw_inputs(heavier, card(), "card.json", other);
+    Eigen::VectorXd by = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(inputs.inputs.size()));
+    by[input_of(inputs, "mass") - inputs.inputs.data()] = 0.2 * sku.mass;
+    const auto landing = [](const experiment::PreparedThrow& one, const ThrowInputs& of,
+                            const std::vector<double>& values) {
+      return experiment::predict_channels(one, {}, of.model, dynamics::Values<double>(of.names, values))
+          .landing.pose;
+    };
+    const auto nominal = landing(thrown, inputs, inputs.values),
+               moved = landing(thrown, inputs, inputs.moved(by)),
+               heavy = landing(other, as_told, as_told.values);
+    const double change = std::abs(heavy.theta - nominal.theta);
+    EXPECT_GT(change, 1e-2) << shaped;
+    EXPECT_NEAR(moved.theta, heavy.theta, 1e-3 * change) << shaped;
+    EXPECT_NEAR(moved.x, heavy.x, 1e-3) << shaped;
+    sku.inertia_sigma.reset();
+    const AssumedTolerances assumed;
+    EXPECT_NEAR(inertia_sigma_of(sku), (shaped ? assumed.shape : assumed.inertia) * *sku.inertia, 1e-15);
+  }
+}
+
+// Of a card of several objects only what is of this one, or of all: another's drag is not its own, nor is
+// what the card's log had declared wrong.
+TEST(SkuValidation, WhatACardTellsOfOtherObjectsIsLeftOut) {
+  auto gripper = card();
+  gripper.covariance.reset();
+  gripper.effects = {"flight.quadratic_drag", "sensor.mass"};
+  gripper.parameters["flight.quadratic_drag.k[bar-com100]"] = {0.05, 0.01, "1/m"};
+  gripper.parameters["flight.quadratic_drag.k[jar]"] = {0.4, 0.01, "1/m"};
+  gripper.parameters["sensor.mass.ratio"] = {1.3, 0.01, "-"};
+  gripper.parameters["pads"].value = 3;
+  const auto thrown = experiment::reference_throw(bar().name, datasets::to_object(bar()));
+  const auto inputs = throw_inputs(bar(), gripper, "card.json", thrown);
+  EXPECT_EQ(inputs.model.pads, 3);
+  const auto value_of = [&](const std::string& name) {
+    const auto found = std::find(inputs.names.begin(), inputs.names.end(), name);
+    return found == inputs.names.end()
+               ? NAN
+               : inputs.values[static_cast<std::size_t>(found - inputs.names.begin())];
+  };
+  EXPECT_EQ(value_of("flight.quadratic_drag.k"), 0.05);
+  EXPECT_EQ(value_of("sensor.mass.ratio"), 1) << "another object's";
+  EXPECT_NE(input_of(inputs, "flight.quadratic_drag.k[bar-com100]"), nullptr);
+  EXPECT_EQ(input_of(inputs, "flight.quadratic_drag.k[jar]"), nullptr);
+  EXPECT_THAT(inputs.notes, Contains(HasSubstr("k[jar] is of another object")));
+  EXPECT_THAT(inputs.notes, Contains(HasSubstr("sensor.mass.ratio is about what the card's log declared")));
+}
+
+TEST(SkuValidation, WhatIsAssumedIsAsWideAsItIsSaid) {
+  auto gripper = card();
+  gripper.valid_range = {{"grip_force", {20, 40, "N"}}, {"opening_time", {0.05, 0.05, "s"}}};
+  AssumedTolerances assumed;
+  assumed.other_surface = 0.3;
+  auto sku = bar();
+  const auto thrown = experiment::reference_throw(sku.name, datasets::to_object(sku));
+  const auto inputs = throw_inputs(sku, gripper, "card.json", thrown, assumed);
+  ASSERT_NE(input_of(inputs, "grip_force"), nullptr);
+  // Any force of the range is as likely as another: 1/√12 of it.
+  EXPECT_NEAR(input_of(inputs, "grip_force")->sigma, 20 / std::sqrt(12), 1e-12);
+  EXPECT_NEAR(input_of(inputs, "opening_time")->sigma, assumed.opening_time, 1e-15)
+      << "one value is no certainty";
+  ASSERT_NE(input_of(inputs, "surface"), nullptr);
+  EXPECT_NEAR(input_of(inputs, "surface")->sigma, 0.3 * 0.5, 1e-15) << "a share of mu";
+  // A force that was measured is no assumption.
+  const auto log = experiment::generate_campaign(testing_support::small_design("limit_surface_disc"), 5);
+  const CampaignProblem measured(log, "(in memory)", {});
+  EXPECT_EQ(input_of(throw_inputs(sku, gripper, "card.json", measured.throws().front().prepared, assumed),
+                     "grip_force"),
+            nullptr);
+}
+
+TEST(SkuValidation, APlainCardsScatterOfTheDelayIsEveryThrows) {
+  datasets::ModelCard delay;
+  delay.model = "gripper_delay";
+  delay.parameters = {{"delay", {0.05, 0.001, "s"}}, {"delay_sigma", {0.002, {}, "s"}}};
+  const auto answer = validate_sku(bar(), delay, "card.json", quick(100));
+  const auto line = std::find_if(answer.budget.begin(), answer.budget.end(),
+                                 [](const BudgetLine& one) { return one.input.name == "delay_deviation"; });
+  ASSERT_NE(line, answer.budget.end());
+  EXPECT_EQ(line->input.sigma, 0.002);
+}
+
+// A tolerance of the angle alone decides where the place may be anything.
+TEST(SkuValidation, PlaceAndAngleMustBothBeWithinTheirTolerances) {
+  auto request = quick(300);
+  request.tolerance = {50, 1000};
+  const auto free = validate_sku(bar(), card(), "card.json", request);
+  EXPECT_NEAR(free.within, 1, 1e-9);
+  EXPECT_NEAR(free.within_linear, 1, 1e-9);
+  for (const bool of_angle : {false, true}) {
+    request.tolerance = {of_angle ? 50 : free.linear.x, of_angle ? free.linear.theta : 1000};
+    const auto narrow = validate_sku(bar(), card(), "card.json", request);
+    // One sigma of a normal distribution; a share of 300 draws is known to 2.7 %.
+    EXPECT_NEAR(narrow.within, 0.683, 0.1) << of_angle;
+    EXPECT_NEAR(narrow.within_linear, 0.683, 0.1) << of_angle;
+    EXPECT_EQ(narrow.verdict, SkuVerdict::too_uncertain);
+  }
+}
+
+/// Throws of the bar that a log holds, and what is asked about them.
+struct LoggedBar {
+  datasets::ThrowLog log;
+  datasets::ModelCard gripper = card();
+  SkuRequest request = quick(200);
+};
+std::unique_ptr<LoggedBar> logged_bar() {
+  auto out = std::make_unique<LoggedBar>();
+  auto design = testing_support::small_design("limit_surface_disc");
+  design.objects = {experiment::loaded_bar("bar-com100", 0.10)};
+  out->log = experiment::generate_campaign(design, 5);
+  out->gripper.parameters["mu"].value = design.patch.mu;
+  out->gripper.parameters["length"].value = design.patch.length();
+  out->request.log = &out->log;
+  out->request.log_file = "synthetic";
+  return out;
+}
+
+TEST(SkuValidation, OfTheLogsMotionsTheOneThatScattersLeastIsChosen) {
+  const auto bar_log = logged_bar();
+  for (const LandingTolerance tolerance : {LandingTolerance{1e-3, 1000}, LandingTolerance{50, 1e-3}}) {
+    bar_log->request.tolerance = tolerance;
+    const auto answer = validate_sku(bar(), bar_log->gripper, "card.json", bar_log->request);
+    ASSERT_EQ(answer.candidates.size(), 3u);
+    for (const ThrowCandidate& one : answer.candidates)
+      if (one.held && one.landed) {
+        if (tolerance.x < 1) {
+          EXPECT_LE(answer.reference().linear.x, one.linear.x * (1 + 1e-6));
+        } else {
+          EXPECT_LE(answer.reference().linear.theta, one.linear.theta * (1 + 1e-6));
+        }
+      }
+  }
+}
+
+// What is foretold of a measured landing's error: the card's scatter, the object's, and the sensor's, which
+// are independent of each other; over all of them z² is 1 in the mean where they are right.
+TEST(SkuValidation, MeasuredErrorsAreJudgedByAllThatScatters) {
+  const auto bar_log = logged_bar();
+  auto sure = bar();
+  sure.mass_sigma = sure.inertia_sigma = sure.com_offset_sigma = 0;
+  const auto verdict = [&](const datasets::Sku& sku) {
+    return *validate_sku(sku, bar_log->gripper, "card.json", bar_log->request).measured;
+  };
+  const auto of_sure = verdict(sure);
+  auto told = sure, untold = sure;
+  told.com_offset_sigma = bar_log->request.assumed.com_offset;
+  untold.com_offset_sigma.reset();
+  const auto of_told = verdict(told), of_untold = verdict(untold);
+  auto twice = told;
+  *twice.com_offset_sigma *= 2;
+  const auto of_twice = verdict(twice);
+  double squares = 0;
+  const auto n = of_sure.throws.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto variance = [&](const MeasuredVerdict& of) { return std::pow(of.throws[i].sigma_theta, 2); };
+    const double object = variance(of_told) - variance(of_sure);
+    EXPECT_GT(object, 0);
+    EXPECT_NEAR(variance(of_twice) - variance(of_sure), 4 * object, 1e-6 * object);
+    EXPECT_EQ(variance(of_untold), variance(of_told)) << "what the file does not tell is assumed";
+    const MeasuredLanding& one = of_sure.throws[i];
+    squares += std::pow(one.error_x / one.sigma_x, 2) + std::pow(one.error_theta / one.sigma_theta, 2);
+  }
+  EXPECT_NEAR(of_sure.rms_z, std::sqrt(squares / (2 * static_cast<double>(n))), 1e-12);
+  // A tracker of landings that is declared three times as noisy.
+  const double declared = bar_log->log.throws.front().landing->pose.sigma.at(1);
+  for (auto& one : bar_log->log.throws)
+    for (double& sigma : one.landing->pose.sigma) sigma *= 3;
+  const auto of_noisy = verdict(sure);
+  for (std::size_t i = 0; i < n; ++i)
+    EXPECT_NEAR(std::pow(of_noisy.throws[i].sigma_theta, 2) - std::pow(of_sure.throws[i].sigma_theta, 2),
+                8 * declared * declared, 1e-6 * declared * declared);
+}
+
+// Two landings of each of three motions: the pooled variance is the sum of squares over three degrees of
+// freedom, and draws that all land on the nominal one lie as far off as the motion's own mean does.
+TEST(SkuValidation, RepeatedMotionsScatterAsTheTextbookPoolsThem) {
+  datasets::ThrowLog log;
+  LoggedLandings landings;
+  int place = 0;
+  for (const char* condition : {"a", "b", "c"})
+    for (const double side : {-1.0, 1.0}) {
+      auto& one = log.throws.emplace_back();
+      one.object = "bar", one.condition = condition;
+      landings.push_back(Eigen::Vector2d(5.0 * place + 0.1 * side, 0.3 * side));
+      place += side > 0 ? 1 : 0;
+    }
+  SkuRequest request = quick(100);
+  request.log = &log;
+  SkuValidation answer;
+  answer.candidates.emplace_back();
+  answer.candidates[0].repeats = repeated_motion(log.throws.front());
+  answer.candidates[0].landing_x = -0.4, answer.candidates[0].landing_theta = 0.05;
+  answer.samples.assign(100, {});
+  request.tolerance = {0.4, 10};  // the own motion's mean is just there
+  const auto found = repeats_of(request, landings, answer);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->conditions, 3);
+  EXPECT_EQ(found->motions, 6);
+  EXPECT_NEAR(found->x, std::sqrt(3 * 2 * 0.1 * 0.1 / 3), 1e-12);
+  EXPECT_NEAR(found->theta, std::sqrt(3 * 2 * 0.3 * 0.3 / 3), 1e-12);
+  EXPECT_NEAR(found->offset_x, 0.4, 1e-12);
+  EXPECT_NEAR(found->offset_theta, -0.05, 1e-12);
+  EXPECT_NEAR(found->within, 0.5, 0.15) << "of 100 draws about the tolerance's end";
 }
 
 TEST(SkuValidation, EveryObjectOfTheCatalogueIsAnswered) {

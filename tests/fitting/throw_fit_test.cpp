@@ -92,8 +92,12 @@ TEST_P(EveryLaw, StartsNearTheTruth) {
   auto design = small_design(GetParam());
   design.sensors.ft_rate = 1000;  // samples enough for the plain estimate of friction
   const auto problem = problem_of(experiment::generate_campaign(design, 3), GetParam());
-  for (const auto& u : problem.campaign())
+  for (const auto& u : problem.campaign()) {
     EXPECT_NEAR(u.start, truth_of(small_design(GetParam()), u.name), 0.1 * u.start) << u.name;
+    if (problem.model().contact_model != "gripper_delay") {
+      EXPECT_NEAR(u.prior_sigma.value(), 0.2 * u.start, 1e-12) << u.name;
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Throws, EveryLaw,
@@ -182,6 +186,7 @@ TEST(ThrowFit, NothingLeaksFromTestThrows) {
   EXPECT_EQ(result.values(), disc_fit().values());  // bit for bit
   EXPECT_EQ(result.covariance, disc_fit().covariance);
   EXPECT_EQ(result.own_spread, disc_fit().own_spread);
+  EXPECT_EQ(problem_of(other).model().reference_force, problem_of(disc_log()).model().reference_force);
 }
 
 TEST(ThrowFit, ThreadsDoNotMatter) {
@@ -231,6 +236,12 @@ TEST(ThrowFit, OneWildThrowCountsLess) {
   // One throw in eight less, and what is left of its pull: no more than the uncertainty claimed.
   expect_unmoved(result, 2, "wild throw");
   EXPECT_LT(result.throws[bad].weight, 0.5);
+  for (const ChannelMisfit& m : result.misfit)
+    if (m.channel == Channel::landing_x) {
+      EXPECT_EQ(m.worst_n, 1) << "it landed once";
+      EXPECT_GT(m.worst_chi2, 0.9 * m.chi2);
+      EXPECT_LT(m.without_worst().chi2_per_sample(), 0.1 * m.chi2_per_sample());
+    }
 }
 
 TEST(ThrowFit, DeadForceChannelIsDropped) {
@@ -695,6 +706,110 @@ TEST(CampaignInput, ColumnsInAnotherUnitAreRefusedUnlessTheyAreWanted) {
   CampaignOptions as_written;
   as_written.check_units = false;
   EXPECT_NO_THROW(CampaignProblem(log, "log.h5", as_written));
+}
+
+// Where no pad was seen to slip, its declared radius says how long its lever is: c a, 2/3 of a disc's radius.
+TEST(CampaignInput, ADeclaredRadiusStandsForPadsThatNobodyMeasured) {
+  auto log = disc_log();
+  for (auto& one : log.throws) one.ft.reset();
+  log.gripper->pad_radius = 0.012;
+  const auto known = problem_of(log);
+  ASSERT_EQ(known.campaign()[1].name, "length");
+  EXPECT_NEAR(known.campaign()[1].start, 0.008, 1e-12);
+  EXPECT_NEAR(known.campaign()[1].prior_sigma.value(), 0.2 * 0.008, 1e-12);
+  log.gripper->pad_radius.reset();
+  EXPECT_FALSE(problem_of(log).campaign()[1].prior_sigma) << "nobody says";
+  EXPECT_FALSE(known.campaign()[0].prior_sigma) << "nor of the friction";
+}
+
+// A radius is known to a factor of two: what slipping pads say is believed within that, and told beyond it.
+TEST(CampaignInput, PadsThatMissTheirDeclaredRadiusByAFactorOfTwoAreNoStart) {
+  const double length = problem_of(disc_log()).campaign()[1].start;
+  for (const auto& [share, is_patch] : {std::pair{0.45, false}, {0.55, true}, {1.8, true}, {2.2, false}}) {
+    auto log = disc_log();
+    log.gripper->pad_radius = length / share / (2.0 / 3.0);
+    const auto problem = problem_of(log);
+    if (is_patch) {
+      EXPECT_THAT(problem.notes(), testing::IsEmpty()) << share;
+      EXPECT_NEAR(problem.campaign()[1].start, length, 1e-12) << share;
+    } else {
+      EXPECT_THAT(problem.notes(), testing::ElementsAre(HasSubstr("which is no patch"))) << share;
+      EXPECT_NEAR(problem.campaign()[1].start, length / share, 1e-12) << share;
+    }
+  }
+}
+
+TEST(CampaignInput, TheReleaseBeginsWhereThePadsBeginToOpen) {
+  const auto problem = problem_of(disc_log());
+  for (const CampaignThrow& one : problem.throws()) {
+    const double dead = small_design(kTrueLaw).opening.dead_time;
+    EXPECT_NEAR(one.opening - one.prepared.open_command, dead, 0.3 * dead) << one.prepared.id;
+    EXPECT_GT(one.release, one.opening) << one.prepared.id;
+  }
+}
+
+// What only one object has is no other's: the drag of a box changes no throw of a jar.
+TEST(CampaignInput, EveryObjectReadsItsOwnDrag) {
+  const auto problem = problem_of(disc_log()).with(kTrueLaw, {"flight.quadratic_drag"});
+  std::map<std::string, Eigen::Index> column;
+  for (std::size_t k = 0; k < problem.campaign().size(); ++k)
+    if (const std::string& name = problem.campaign()[k].name; name.ends_with(']'))
+      column[name.substr(name.find('[') + 1, name.size() - name.find('[') - 2)] =
+          static_cast<Eigen::Index>(k);
+  ASSERT_EQ(column.size(), 2u);
+  const std::vector<double> own(problem.own().size(), 0.0);
+  for (const CampaignThrow& one : problem.throws()) {
+    const auto l = problem.linearise(one, problem.start(), own, DerivativesBy::all);
+    ASSERT_TRUE(l.solved) << l.why_not;
+    for (const auto& [object, k] : column)
+      EXPECT_EQ(l.campaign.col(k).norm() > 0, object == one.prepared.object) << one.prepared.id;
+    const auto alone = problem.linearise(one, problem.start(), own, DerivativesBy::own);
+    EXPECT_LT((alone.own - l.own).norm(), 1e-6 * l.own.norm()) << "by the throw's own unknowns alone";
+    EXPECT_EQ(alone.campaign.norm(), 0);
+  }
+}
+
+TEST(CampaignInput, AnotherLawIsTheOneThatPredicts) {
+  const auto disc = problem_of(disc_log()), pivot = problem_of(disc_log(), "sliding_pivot");
+  const auto turned = disc.with("sliding_pivot", {});
+  const std::vector<double> values{0.5, 0.007}, own(disc.own().size(), 0.0);
+  const auto landing = [&](const CampaignProblem& problem) {
+    return problem.predict(problem.throws()[2], values, own).landing.pose.theta;
+  };
+  EXPECT_EQ(landing(turned), landing(pivot));
+  EXPECT_NE(landing(turned), landing(disc));
+}
+
+// The smoothing says how far it leaves the force open; no log teaches it another spread.
+TEST(ThrowFit, TheSpreadOfTheSmoothingIsNotLearned) {
+  ASSERT_EQ(problem_of(disc_log()).own()[3].name, "force_deviation");
+  EXPECT_EQ(disc_fit().own_spread[3], 1);
+  EXPECT_NE(disc_fit().own_spread[2], problem_of(disc_log()).own()[2].prior_sigma);
+}
+
+// Sensors that see a throw's friction to no better than it scatters: values are drawn towards zero, and the
+// spread is not theirs. Of 48 such throws it is known to some 15 %.
+TEST(ThrowFit, SpreadsAreNotThoseOfValuesThatNoiseHidesHalfOf) {
+  constexpr double kSpread = 0.05;
+  auto design = small_design(kTrueLaw);
+  design.repetitions = 8;
+  design.train_share = 1;
+  design.variation.mu = kSpread;
+  design.sensors.wrench_sigma = {1, 1, 0.01};
+  CampaignOptions campaign;
+  campaign.observations.mocap = campaign.observations.landing = false;
+  const CampaignProblem problem(experiment::generate_campaign(design, 3), "(in memory)", campaign);
+  FitOptions options;
+  options.rounds = 8;
+  options.all_fixed = true;
+  options.start = {design.patch.mu, design.patch.length()};
+  const auto result = fit(problem, options);
+  ASSERT_EQ(result.throws.size(), 48u);
+  ASSERT_EQ(problem.own()[2].name, "mu_deviation");
+  double square = 0;
+  for (const ThrowFit& one : result.throws) square += one.own[2] * one.own[2] / 48;
+  EXPECT_LT(std::sqrt(square), 0.8 * kSpread) << "values drawn towards zero";
+  EXPECT_NEAR(result.own_spread[2], kSpread, 0.35 * kSpread);
 }
 
 TEST(CampaignInput, RefusesOptionsOutOfRange) {
