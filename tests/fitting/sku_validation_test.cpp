@@ -223,7 +223,7 @@ TEST(SkuValidation, FrictionAndForceScatterAsTheirProductDoes) {
 
 // Of draws that all land within a wide tolerance the share is one: neither less by rounding nor more.
 TEST(SkuValidation, SharesAreOfWholeDraws) {
-  for (const int samples : {99, 300, 700}) {
+  for (const int samples : {110, 300, 700}) {
     auto request = quick(samples);
     request.tolerance = {5, 30};
     const auto answer = validate_sku(bar(), card(), "card.json", request);
