@@ -130,7 +130,7 @@ constexpr Format formats[] = {
      "      --units time=ms,x=mm,z=mm,theta=deg,vx=m/s,vz=m/s,omega=deg/s,ax=m/s^2,az=m/s^2,alpha=deg/s^2",
      &import_lab_files},
     {"ft-csv", "the sensor behind one pad, any CSV with a map of its columns",
-     "unhand import ft-csv ft/*.csv --into log.h5 --columns time=t,fx=-Fx,fz=-Fz,tau=-Ty,normal=Fy \\\n"
+     "unhand import ft-csv ft/*.csv --into log.h5 --columns time=t,fx=-Fx,fz=-Fz,tau=Ty,normal=Fy \\\n"
      "      --units time=s,fx=N,fz=N,tau='N mm',normal=N --sigma fx=0.02,fz=0.02,tau=0.2,normal=0.05",
      &import_lab_files},
     {"mocap-csv", "a tracked object in the throwing plane, any CSV with a map of its columns",

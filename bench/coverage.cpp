@@ -1,6 +1,6 @@
 // How often 95 % intervals of fitted parameters hold the truth: campaigns with known parameters, fitted.
 //
-//   bench/coverage [campaigns per model = 100] [first seed = 1] [threads = 0] [model ...]
+//   build/release/bench/coverage [campaigns per model = 100] [first seed = 1] [threads = 0] [model ...]
 //
 // Each campaign has the design of quick12, all throws for training, with a declared pad radius that the log
 // gets wrong by up to 10 %. The truth of mu and of the delay is the mean that the throws scatter about.

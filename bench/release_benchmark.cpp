@@ -2,13 +2,15 @@
 // same run:
 //   build/release/bench/release_benchmark [--benchmark_filter=limit_surface]
 // Two rows a case: the median and the minimum of nine repetitions. Columns:
-//   cvode_us      CVODE's median CPU time [us], at a tenth of the tolerance (its local error makes some ten
-//   times the global) ratio         CVODE's time over ours events        mode changes;  steps: accepted steps
+//   cvode_us      CVODE's median CPU time [us], at a tenth of the tolerance: its global error is some ten
+//                 times its local one
+//   ratio         CVODE's time over ours
+//   events        mode changes;  steps: accepted steps
 //   event_err_s   largest error of an event's time [s] against Radau at 1e-12;  cvode_err_s: CVODE's
 //   twist_err     largest error of the twist at detach [m/s, rad/s]
 // Throws: calm and hard have a hand and a force in closed form (hard: shaken, the sliding pivot changes mode
 // nine times or more), log is throw 150 of the campaign batch180 as experiment::prepare smooths it (splines
-// of degree six; the slip stops and sets in again), log_growing throw 0, whose slip only grows. calm_scene
+// of degree five; the slip stops and sets in again), log_growing throw 0, whose slip only grows. calm_scene
 // etc. time one evaluation of the hand and the force. The tolerance of each case is the loosest decade that
 // keeps event times to 1e-9 s; absolute = relative/100.
 #include <benchmark/benchmark.h>

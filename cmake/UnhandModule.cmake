@@ -32,7 +32,7 @@ endfunction()
 #   unhand_module(contact
 #     SOURCES limit_surface.cpp ...
 #     HEADERS limit_surface.hpp ...
-#     USES    dynamics              # the modules of architecture this one may include
+#     USES    dynamics              # the modules whose headers it may include
 #     LINKS   SUNDIALS::cvode_shared  # private third-party libraries
 #     LEVEL   -O2                   # of optimisation in a Release build, where its time goes into other modules
 #     BATCH   5                     # as unhand_batches
@@ -115,7 +115,7 @@ function(unhand_test_options)
 endfunction()
 
 # unhand_test(dynamics SOURCES integrator_test.cpp ... USES release BATCH 4)
-# makes the executable test_<name> from tests/<name>/*.cpp and registers each test case. Those that LONG names (patterns
+# makes the executable test_<name> from SOURCES and registers each test case. Those that LONG names (patterns
 # of --gtest_filter) have the label <name>.long instead of <name>: runs of many seconds through the code of shorter tests
 # beside them, which slow builds (sanitizers, counters) leave out.
 function(unhand_test name)

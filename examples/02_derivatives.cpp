@@ -1,6 +1,7 @@
 // How a landing changes with friction, pad radius, mass, inertia and lever: exact, through every event.
 #include <cmath>
 #include <cstdio>
+#include <stdexcept>
 
 #include "contact/registry.hpp"
 #include "flight/fly.hpp"
@@ -9,7 +10,8 @@
 using namespace unhand;
 using dynamics::Dual;
 
-/// x [m] at the landing, of the parameters (mu, radius, mass, inertia, lever).
+/// x [m] at the landing, of the parameters (mu, radius, mass, inertia, lever). Throws where there is none: a
+/// result has a meaning only if its outcome says so.
 template <class S>
 S landing_x(const S (&p)[5]) {
   const auto hand = release::PolynomialHand::segments(0.0, {0.5, 0.9, 0.8}, {1.8, 1.8, 2.0},
@@ -22,7 +24,12 @@ S landing_x(const S (&p)[5]) {
   const auto gravity = dynamics::level_gravity(S(9.81));
   const auto let_go =
       release::simulate_release<S>({hand, force, *law, {p[2], p[3]}, gravity, {p[4], S(-0.7)}});
-  return flight::fly<S>({let_go.detach.pose, let_go.detach.twist, gravity}).landing.pose.x;
+  if (let_go.outcome != release::ReleaseOutcome::detached)
+    throw std::runtime_error(release::in_words(let_go.outcome));
+  const auto flown = flight::fly<S>({let_go.detach.pose, let_go.detach.twist, gravity});
+  if (flown.outcome != flight::FlightOutcome::landed)
+    throw std::runtime_error(flight::in_words(flown.outcome));
+  return flown.landing.pose.x;
 }
 
 int main() {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <stdexcept>
 #include <vector>
 
 #include "contact/registry.hpp"
@@ -40,6 +41,7 @@ class UnevenOpening final : public contact::NormalForce {
   contact::ProfileNormalForce first_, later_;
 };
 
+/// x [m] at the landing, of the lag [s]. Throws where there is none.
 template <class S>
 S landing_x(const S& lag) {
   const auto hand = release::PolynomialHand::segments(0.0, {0.5, 0.9, 0.8}, {1.8, 1.8, 2.0},
@@ -51,7 +53,12 @@ S landing_x(const S& lag) {
   const auto gravity = dynamics::level_gravity(S(9.81));
   const auto let_go =
       release::simulate_release<S>({hand, force, *law, {S(0.246), S(2.4e-3)}, gravity, {S(0.10), S(-0.7)}});
-  return flight::fly<S>({let_go.detach.pose, let_go.detach.twist, gravity}).landing.pose.x;
+  if (let_go.outcome != release::ReleaseOutcome::detached)
+    throw std::runtime_error(release::in_words(let_go.outcome));
+  const auto flown = flight::fly<S>({let_go.detach.pose, let_go.detach.twist, gravity});
+  if (flown.outcome != flight::FlightOutcome::landed)
+    throw std::runtime_error(flight::in_words(flown.outcome));
+  return flown.landing.pose.x;
 }
 
 int main() {

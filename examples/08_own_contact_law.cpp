@@ -1,6 +1,7 @@
 // A limit surface of one's own with a parameter of its own, known by name to everything that takes names:
 //   gauge(w) = (|f|^p + |tau|^p)^(1/p),
 // the ellipsoid for p = 2. How far are the pads of a log from it?
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -95,7 +96,15 @@ int main() {
          return std::make_unique<contact::LimitSurface<SuperEllipsoid>>(
              kName, p.patch, SuperEllipsoid(p.law_values.at("exponent")), p.variation);
        },
-       {{"exponent", "-", 1.95, 1.1, 2, 1.2, 2, 0.05, {}, "throws whose pads slide and turn at once"}}});
+       {{.name = "exponent",
+         .unit = "-",
+         .start = 1.95,
+         .low = 1.1,  // accepted
+         .high = 2,
+         .search_low = 1.2,  // where fits look
+         .search_high = 2,
+         .typical = 0.05,
+         .remedy = "throws whose pads slide and turn at once"}}});
 
   // Synthetic throws of pads that are exact discs, in place of a log of yours.
   auto design = experiment::campaign_design("quick12");
@@ -114,6 +123,6 @@ int main() {
       std::printf("  %-8s %.5g +- %.2g %s\n", u.unknown.name.c_str(), u.value, u.sigma,
                   u.unknown.unit.c_str());
   }
-  return chi2[1] < chi2[0] ? 0
-                           : 1;  // a disc resists less than the ellipsoid where it slides and turns at once
+  // A disc resists less than the ellipsoid where it slides and turns at once.
+  return chi2[1] < chi2[0] ? 0 : 1;
 }

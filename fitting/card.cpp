@@ -288,10 +288,11 @@ CampaignOptions options_of(const ModelCard& card, const std::string& file) {
   }
   if (const auto force = card.parameters.find("reference_force"); force != card.parameters.end())
     out.reference_force = force->second.value;
-  else if (std::find(card.effects.begin(), card.effects.end(), "contact.soft_patch_radius") !=
-           card.effects.end())
-    throw CardError(file, "/parameters/reference_force",
-                    "is missing: contact.soft_patch_radius scales the patch by the force over this one [N]");
+  else
+    for (const auto& effect : effects)
+      if (effect.needs.reference_force)
+        throw CardError(file, "/parameters/reference_force",
+                        fmt::format("is missing: {} divides the normal force by it [N]", effect.id));
   return out;
 }
 

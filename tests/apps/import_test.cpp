@@ -13,7 +13,7 @@ TEST_F(Cli, ImportsTheFilesOfALab) {
       "time=t,x=X,z=Z,theta=pitch,vx=VX,vz=VZ,omega=Q,ax=AX,az=AZ,alpha=DQ --units "
       "time=ms,x=mm,z=mm,theta=deg,vx=m/s,vz=m/s,omega=deg/s,ax=m/s^2,az=m/s^2,alpha=deg/s^2 ";
   const std::string ft =
-      "ft-csv ft/slow_01.csv ft/slow_02.csv --columns time=t,fx=-Fx,fz=-Fz,tau=-Ty,normal=Fy ";
+      "ft-csv ft/slow_01.csv ft/slow_02.csv --columns time=t,fx=-Fx,fz=-Fz,tau=Ty,normal=Fy ";
   const std::string motive =
       "motive-csv takes/slow_01.csv takes/slow_02.csv --sigma position=2e-4,angle=3e-3 ";
   for (const std::string& step :
@@ -126,7 +126,7 @@ TEST_F(Cli, ImportsATrackFromAnyCsv) {
       "x=0.2,z=0.2,theta=0.2 --landing ";
   ASSERT_EQ(run("import " + hand + "--sku bar.toml --opening-time 0.1 --test-every 2 --out log.h5").code, 0);
   ASSERT_EQ(run("import ft-csv ft/slow_01.csv ft/slow_02.csv --columns "
-                "time=t,fx=-Fx,fz=-Fz,tau=-Ty,normal=Fy --into log.h5")
+                "time=t,fx=-Fx,fz=-Fz,tau=Ty,normal=Fy --into log.h5")
                 .code,
             0);
   const Answer answer = run("import " + mocap + "--into log.h5 --json a.json");

@@ -9,8 +9,7 @@
 
 namespace unhand::fuzz {
 
-/// "throw_log", "slip_log", "model_card", "sku", "hand_csv", "ft_csv", "motive_csv", "phyphox",
-/// "cube_tosses", "planar_pushes"
+/// The names of the readers, which are those of the folders in corpus/.
 std::vector<std::string> reader_names();
 
 enum class Reading { accepted, refused };
