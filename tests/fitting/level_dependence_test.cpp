@@ -273,11 +273,11 @@ TEST(LevelDependence, TheSurfaceIsFittedWithoutWhatGoesWithSpeed) {
   }
   const SurfaceFit as_they_are = fit_surface(all, SurfaceModel::ellipsoid_full);
   ASSERT_TRUE(as_they_are.fitted());
-  for (const SlipSurface& from : {as_they_are.surface, kPatch}) {
-    const Parameter found = only_size(level_dependence({all}, {from}, quick()));
-    EXPECT_EQ(found.name, "1/v_0[simulated]");
-    EXPECT_NEAR(found.value, kViscous, 0.05 * kViscous);
-  }
+  const Parameter from_there = only_size(level_dependence({all}, {as_they_are.surface}, quick())),
+                  from_truth = only_size(level_dependence({all}, {kPatch}, quick()));
+  EXPECT_EQ(from_there.name, "1/v_0[simulated]");
+  EXPECT_NEAR(from_there.value, kViscous, 4 * from_there.sigma);
+  EXPECT_NEAR(from_there.value, from_truth.value, 0.2 * from_truth.sigma) << "whatever it began with";
 }
 
 // A slip at constant velocity: the speed of its sample is that of its rows, however these are spaced.
