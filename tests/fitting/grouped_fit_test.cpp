@@ -13,6 +13,7 @@
 
 #include "fitting/measured/effect_trial.hpp"
 #include "fitting/measured/residual_tests.hpp"
+#include "fitting/measured/wild_groups.hpp"
 
 namespace unhand::fitting {
 namespace {
@@ -371,6 +372,18 @@ TEST(GroupedFit, AGroupReadsTheParametersOfItsOwnObject) {
   const OwnNames box(all, "box");
   EXPECT_EQ(box.names, (std::vector<std::string>{"g", "k", "n"}));
   EXPECT_EQ(box.values(std::vector<double>{1, 2, 3, 4, 5}), (std::vector<double>{1, 3, 5}));
+}
+
+// The residuals of one group are five times those of the others: it errs 25 times as much, however little it
+// counted for in the fit.
+TEST(WildGroups, ErrByWhatTheyAreOffAndNotByWhatTheyCountFor) {
+  std::vector<std::vector<double>> measured(20, {1, -1, 1, -1, 1, -1, 1, -1});
+  for (double& y : measured[7]) y *= 5;
+  const auto wild = wild_groups(Lines(measured, 0), {}, {});
+  ASSERT_EQ(wild.size(), 1U);
+  EXPECT_EQ(wild.front().group, 7U);
+  EXPECT_NEAR(wild.front().times, 25, 1e-6);
+  EXPECT_NEAR(wild.front().apart, 25, 1e-6);
 }
 
 // A fit of an offset to four samples leaves neighbours against each other: of white noise that is no
